@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+# Everything comes from the distribution's packages; ./run-demo installs what is missing.
+find_package(Threads REQUIRED)
+find_package(TBB CONFIG REQUIRED)
+find_package(Eigen3 CONFIG REQUIRED)
+find_package(xsimd CONFIG REQUIRED)
+find_package(HDF5 REQUIRED COMPONENTS C)
+find_package(tinyxml2 CONFIG REQUIRED)
+find_package(CLI11 CONFIG REQUIRED)
+find_package(fmt CONFIG REQUIRED)
+find_package(nlohmann_json CONFIG REQUIRED)
+if(TANGERE_TESTS)
+  find_package(GTest CONFIG REQUIRED)
+endif()
+if(TANGERE_BENCH)
+  find_package(benchmark CONFIG REQUIRED)
+endif()

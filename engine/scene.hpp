@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+// A scene as its author wrote it: names, SI units, defaults filled in. The only place that holds strings.
+// io/scene_reader.hpp reads it from XML; compile() in engine/model.hpp turns it into index arrays.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "engine/error.hpp"
+#include "kernels/contact_types.hpp"
+
+namespace tangere {
+
+using Vector3 = std::array<double, 3>;     ///< x y z
+using Quaternion = std::array<double, 4>;  ///< w x y z, unit length
+
+enum class Integrator { bdf1, bdf2, sdirk2, linear_implicit };
+enum class JointType { fixed, revolute, prismatic, planar, translational, free2d, spherical, free };
+
+/// A frame given in another: x_outer = R(orientation) x_inner + position [m].
+struct Pose {
+  Vector3 position{0, 0, 0};
+  Quaternion orientation{1, 0, 0, 0};
+};
+
+/// Coefficients of one penalty contact or tactile point.
+struct ContactCoefficients {
+  double kn = 0;       ///< normal stiffness [N/m]
+  double kt = 0;       ///< tangential damping [N s/m]
+  double mu = 0;       ///< friction coefficient [-]
+  double damping = 0;  ///< k_d [N s/m²]; law linear: c [N s/m]
+};
+
+struct JointDescription {
+  std::string name;
+  JointType type = JointType::fixed;
+  Pose pose;                   ///< joint frame in the parent joint's frame (frame="WORLD" is resolved by the reader)
+  Vector3 axis0{0, 0, 1};      ///< revolute, prismatic, planar: unit, in the joint frame
+  Vector3 axis1{0, 1, 0};      ///< planar only
+  double damping = 0;          ///< force = -damping v per dof [N s/m or N m s/rad]
+  Source source;
+};
+
+struct CuboidShape {
+  Vector3 size{0, 0, 0};                     ///< full edge lengths [m]
+  std::array<int, 3> contact_resolution{6, 6, 6};  ///< surface nodes of this grid are the contact points
+};
+struct SphereShape {
+  double radius = 0;  ///< [m]
+};
+using Shape = std::variant<SphereShape, CuboidShape>;
+
+struct BodyDescription {
+  std::string name;
+  Shape shape;
+  Pose pose;                        ///< body frame in the joint's frame
+  double density = 1;               ///< [kg/m³]
+  std::array<double, 4> rgba{0.7, 0.7, 0.7, 1};
+  Source source;
+};
+
+/// A link: one joint to the parent link (or the world) and one body that moves with it.
+struct LinkDescription {
+  std::string name;
+  int parent = -1;  ///< index into Scene::links, -1 = world; parents come first
+  JointDescription joint;
+  BodyDescription body;
+};
+
+/// Force motor: u in [-1, 1] per dof of the joint is clipped and mapped linearly to [low, high].
+struct MotorDescription {
+  std::string joint;
+  double low = -1;   ///< force at u = -1 [N or N m]
+  double high = 1;   ///< force at u = +1
+  Source source;
+};
+
+/// Rectangular array of tactile points: p(i, j) = corner0 + i Δ0 axis0 + j Δ1 axis1, in the body frame [m].
+struct RectArray {
+  Vector3 corner0{}, corner1{};
+  Vector3 axis0{}, axis1{};  ///< unit, orthogonal
+  int rows = 1, cols = 1;
+};
+
+struct TactileDescription {
+  std::string name;
+  std::string body;
+  ContactCoefficients coefficients;
+  ContactLaw law = ContactLaw::clamped;
+  RectArray array;
+  int every = 0;                      ///< read every k-th step; 0: not given, left to the caller
+  std::optional<int> pressure_sign;   ///< +1 or -1; found from the geometry when not given
+  Source source;
+};
+
+struct GroundDescription {
+  Vector3 position{0, 0, 0};
+  Vector3 normal{0, 0, 1};  ///< unit, pointing out of the half-space
+};
+
+struct GroundContactDescription {
+  std::string body;
+  ContactCoefficients coefficients;
+  ContactLaw law = ContactLaw::linear;
+  double ramp = 1e-5;  ///< depth over which the linear law's damper fades in [m]; 0: the published law
+  Source source;
+};
+
+/// Contact points of `general_body` against the signed distance of `primitive_body`.
+struct PairContactDescription {
+  std::string general_body, primitive_body;
+  ContactCoefficients coefficients;
+  ContactLaw law = ContactLaw::clamped;
+  double ramp = 1e-5;  ///< law linear only
+  Source source;
+};
+
+/// Starting state of one joint; empty vectors leave the default (q = 0 or the identity, v = 0).
+struct InitialState {
+  std::string joint;
+  std::vector<double> q;  ///< free: x y z qw qx qy qz; spherical: qw qx qy qz; else one per dof
+  std::vector<double> v;  ///< tangent space: free: linear (joint frame axes), then angular (body axes)
+  Source source;
+};
+
+/// What drives an unattended rollout. Values are one per control, motors in file order, each dof in turn.
+struct ConstantControl {
+  std::vector<double> values;
+};
+struct PiecewiseControl {               ///< values[k] holds from times[k] until times[k+1]; times[0] = 0
+  std::vector<double> times;            ///< [s], ascending
+  std::vector<std::vector<double>> values;
+};
+struct CsvControl {
+  std::vector<std::vector<double>> rows;  ///< one row per step; read by io; fewer rows than steps is an error
+  std::string path;
+};
+struct RandomControl {                  ///< smooth noise: cosine-interpolated uniform knots, drawn per environment
+  double amplitude = 1;                 ///< largest |u|
+  double period = 0.1;                  ///< time between knots [s]
+};
+using ControlDescription = std::variant<ConstantControl, PiecewiseControl, CsvControl, RandomControl>;
+
+/// A number that differs between environments, drawn from (seed, episode, purpose).
+struct Distribution {
+  enum class Kind { uniform, log_uniform, normal, list } kind = Kind::uniform;
+  double a = 0, b = 0;          ///< uniform, log_uniform: low, high; normal: mean, standard deviation
+  std::vector<double> values;   ///< list: equally likely
+};
+enum class RandomTarget { joint_q, joint_v, ground_contact, pair_contact, tactile };
+enum class ContactField { kn, kt, mu, damping };
+struct RandomizationDescription {
+  RandomTarget target = RandomTarget::joint_q;
+  std::string name;                 ///< joint, tactile, body of a ground contact, or general body of a pair
+  std::string second_name;          ///< primitive body of a pair
+  int index = 0;                    ///< joint_q, joint_v: which component
+  ContactField field = ContactField::kn;  ///< contacts and tactile
+  Distribution distribution;
+  Source source;
+};
+
+struct SolverOptions {
+  double tolerance = 1e-9;   ///< on the scaled residual, dimensionless (docs/solver.md)
+  int max_iterations = 20;   ///< Newton passes before a step is split
+};
+
+struct Scene {
+  std::string name;
+  std::string path;   ///< file it was read from, "" if none
+  std::string text;   ///< the file as read, stored with every dataset
+  Vector3 gravity{0, 0, -9.8};
+  double timestep = 5e-3;  ///< [s]
+  Integrator integrator = Integrator::bdf1;
+  SolverOptions solver;
+  std::optional<GroundDescription> ground;
+  std::vector<LinkDescription> links;
+  std::vector<MotorDescription> motors;
+  std::vector<TactileDescription> sensors;
+  std::vector<GroundContactDescription> ground_contacts;
+  std::vector<PairContactDescription> pair_contacts;
+  std::vector<InitialState> initial;
+  std::optional<ControlDescription> control;
+  std::vector<RandomizationDescription> randomizations;
+};
+
+/// The name users write and read: "BDF1", "free", "clamped" …
+const char* to_string(Integrator value);
+const char* to_string(JointType value);
+const char* to_string(ContactLaw value);
+
+/// Number of configuration coordinates and of velocity dofs of a joint type: free is 7 and 6.
+int position_count(JointType type);
+int dof_count(JointType type);
+
+}  // namespace tangere
