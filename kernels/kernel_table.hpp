@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kernels of one instruction set as values: listed, chosen at start, forced with TANGERE_ISA.
+#pragma once
+
+#include <span>
+
+#include "kernels/model_view.hpp"
+
+namespace tangere::kernels {
+
+/// Everything a group of eight environments needs to evaluate and solve a stage; rows of eight lanes, sized by
+/// make_workspace_sizes(). Link and contact scratch is opaque bytes: its layout belongs to the kernels.
+struct GroupStage {
+  LaneRow *centre, *x, *r, *s, *tau;                       // inputs
+  LaneRow c0_over_h, inverse_h;
+  const double* block;
+  int group;
+  struct List {
+    LaneRow* points;     ///< (capacity, 3)
+    int count;
+    LaneRow* reference;  ///< (12)
+    double margin;
+  };
+  List* lists;           ///< (n_pairs)
+  std::byte* scratch;    ///< scratch_bytes(model)
+  int* dofs;             ///< (2 nv)
+  LaneRow *v, *g, *force_scale, *mass_diagonal, *G_q, *C, *A, *LU, *work, *excess;
+};
+
+/// One tactile sensor read for one environment.
+struct TactileArgs {
+  const double* points;   ///< (n_tiles, 3, 64): x, y, z of 8×8 points, padded with far points, sensor link axes
+  const double* bounds;   ///< (n_tiles, 4): centre and radius
+  int n_tiles;
+  PrimitiveShape shape;
+  double size[3];
+  double Q[9], c[3];      ///< shape frame in the sensor's link
+  double omega[3], v[3];  ///< twist of the shape relative to the sensor's link, at its origin, its axes
+  double kn, kt, mu, damping;
+  ContactLaw law;
+  double axes[9];         ///< rows: axis0, axis1, -(axis0 × axis1)
+  double* force;          ///< (n_tiles, 3, 64) [N], added to
+  unsigned char* touched; ///< (n_tiles) set to 1 where a tile was written
+};
+inline constexpr int kTactileTile = 64;
+
+struct KernelTable {
+  const char* name;  ///< "avx512", "avx2", "sse2", "scalar"
+  std::size_t (*scratch_bytes)(const ModelView&);
+  /// Poses at x alone: writes shape_in_1 of every pair, (n_pairs, 12) rows: R row-major, then p.
+  void (*pair_poses)(const ModelView&, const GroupStage&, LaneRow* out);
+  /// g, v, force_scale, mass_diagonal, G_q, C, A, excess at x.
+  void (*evaluate)(const ModelView&, const GroupStage&);
+  /// LU of A in the lanes where accept > 0.
+  void (*factor)(const ModelView&, const GroupStage&, const LaneRow& accept);
+  /// out = A⁻¹ b by the factor as it is.
+  void (*solve)(const ModelView&, const GroupStage&, const LaneRow* b, LaneRow* out);
+  /// The same, refined once; sound[l] = 1 where the result can be trusted.
+  void (*solve_watched)(const ModelView&, const GroupStage&, const LaneRow* b, LaneRow* out, LaneRow* sound);
+  /// Adds the forces of one shape on one sensor, tiles out of reach skipped.
+  void (*tactile)(const TactileArgs&);
+};
+
+/// Tables this machine can run, best first; never empty.
+std::span<const KernelTable* const> available_kernels();
+
+/// The table in use: the best one, or the one named by the environment variable TANGERE_ISA when the program started.
+/// Throws nothing; an unknown or unsupported name is reported by forced_isa_error().
+const KernelTable& active_kernels();
+
+/// "" or why TANGERE_ISA cannot be honoured, with the names that can. Programs check it at start.
+const char* forced_isa_error();
+
+/// Runs on `table` from now on (tests visit every one).
+void use_kernels(const KernelTable& table);
+
+}  // namespace tangere::kernels

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// A compiled scene as kernels see it: plain arrays of constants, no names, no ownership.
+#pragma once
+
+#include <cstdint>
+
+#include "kernels/contact_types.hpp"
+#include "kernels/linalg.hpp"
+
+namespace tangere::kernels {
+
+/// Elementary joints: their motion subspace S is constant in the child frame. A free joint is a translational link
+/// without mass, then a spherical one; planar is two prismatic links.
+enum class JointKind : std::uint8_t { revolute, prismatic, translational, spherical };
+
+constexpr int dofs(JointKind k) { return k == JointKind::revolute || k == JointKind::prismatic ? 1 : 3; }
+constexpr int coordinates(JointKind k) {
+  return k == JointKind::spherical ? 4 : dofs(k);
+}
+
+/// One elementary joint and everything that moves rigidly with it.
+struct Link {
+  int parent;          ///< -1: the world
+  JointKind kind;
+  int q, v;            ///< first coordinate, first dof
+  Vec3<double> axis;   ///< revolute, prismatic: unit, same in parent joint frame and child
+  Frame<double> frame; ///< joint frame at rest, in the parent link's frame
+  bool offset;         ///< frame is not the identity
+  bool massive;        ///< false: no inertia of its own
+  double mass;         ///< [kg]
+  Vec3<double> moment; ///< mass times centre of mass, link axes [kg m]
+  Mat3<double> inertia;///< about the link's origin, link axes [kg m²]
+};
+
+/// A number of the scene: the same for all environments, or one row of the batch.
+struct Parameter {
+  double value;
+  int row;  ///< row of the block, -1: constant
+};
+
+struct ContactParameters {
+  Parameter kn, kt, mu, damping;
+};
+
+/// Points of body 1 against the distance function of body 2.
+struct PairContact {
+  int link1, link2;             ///< -1: fixed in the world; then frame1/frame2 are world frames
+  Frame<double> frame2;         ///< shape frame in link2 (or the world)
+  PrimitiveShape shape;
+  Vec3<double> size;            ///< sphere: radius in x; cuboid: half edge lengths
+  ContactLaw law;
+  double ramp;
+  ContactParameters parameters;
+  const double* points;         ///< (n_points, 3) in link1's axes (or the world's), sorted into tiles
+  const double* tiles;          ///< (n_tiles, 4) centre and radius of kContactTile consecutive points
+  int n_points, n_tiles;
+  double reach;                 ///< largest |point| [m]: bounds how far a rotation moves one
+};
+inline constexpr int kContactTile = 32;
+
+/// A body against the half-space below the ground: points of the body, or a sphere's lowest point.
+struct GroundContact {
+  int link;
+  double radius;                ///< 0: material points; > 0: sphere, `points` holds its centre
+  ContactLaw law;
+  double ramp;
+  ContactParameters parameters;
+  const double* points;         ///< (n_points, 3), link axes
+  int n_points;
+};
+
+/// Structure of matrices over dofs, shared by every environment and step.
+struct Pattern {
+  int n;                    ///< dofs
+  int entries;              ///< stored entries of G_q, C and A
+  const int* slot;          ///< (n, n): index of entry (i, j), -1 where always zero
+  const int* entry_begin;   ///< (n + 1): entries of row i are entry_begin[i] … entry_begin[i + 1] - 1
+  const int* entry_column;  ///< (entries)
+  // LU: entries of A scattered to factor slots, then an interpreted elimination, in elimination order.
+  int factor_entries;
+  const int* permutation;   ///< (n) elimination step → dof
+  const int* scatter;       ///< (entries) slot of A → slot of LU
+  const int* diagonal;      ///< (n) slot of U(k, k)
+  const int* column_begin;  ///< (n + 1) into column_slot: the entries below the pivot
+  const int* column_slot;   ///< slot of L(i, k)
+  const int* column_row;    ///< its row i, an elimination step
+  const int* row_begin;     ///< (n + 1) into row_slot: entries right of the pivot
+  const int* row_slot;      ///< slot of U(k, j)
+  const int* row_column;    ///< its column j, an elimination step
+  const int* target;        ///< slots of (i, j) for k, each L row, each U column, in loop order
+};
+
+struct ModelView {
+  int n_links, nq, nv;
+  const Link* links;
+  Vec3<double> gravity;        ///< world axes [m/s²]
+  Vec3<double> ground_point, ground_normal;
+  const double* damping;       ///< (nv) joint damping
+  int n_pairs, n_grounds;
+  const PairContact* pairs;
+  const GroundContact* grounds;
+  Pattern pattern;
+};
+
+/// Start of the row holding environment lanes 8 g … 8 g + 7 of a block.
+inline const double* row_of(const double* block, int row, int group) { return block + row * kBlock + group * kGroup; }
+
+}  // namespace tangere::kernels

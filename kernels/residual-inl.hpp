@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+// The residual g of a step: kinematics outward, contacts, inverse dynamics inward (RNEA in body axes).
+//
+//   V = V_p + S q̇,  A = A_p + S q̈ + V × (S q̇),  F = I A + V ×* I V - w_ext,  F_p += X* F,  g = Sᵀ F - τ + damping v
+// The base accelerates at -gravity, so gravity needs no term of its own.
+#pragma once
+
+#include "kernels/stage.hpp"
+
+namespace tangere::kernels {
+
+/// Pose of a child link in its parent, and its joint's rates. q̇ and q̈ come back in `rate` and `acceleration`.
+template <class N>
+void joint_motion(const Link& link, const StageArgs<N>& a, LinkScratch<N>& out, Vec6<N>& rate, Vec6<N>& acceleration) {
+  const int i = link.v;
+  const auto slope = [&](int k) { return mul_add(a.c0_over_h, a.x[i + k], a.inverse_h * a.r[i + k]); };
+  const auto acceleration_of = [&](int k, const N& v) { return mul_add(a.c0_over_h, v, a.inverse_h * a.s[i + k]); };
+  rate = acceleration = zero6<N>();
+  Frame<N> moved = {diagonal(N(1.0)), zero3<N>()};
+  bool turns = false;
+  switch (link.kind) {
+    case JointKind::revolute:
+    case JointKind::prismatic: {
+      const Vec3<N> axis = broadcast<N>(link.axis);
+      const N v = slope(0), q = a.centre[link.q] + a.x[i], acc = acceleration_of(0, v);
+      a.v[i] = v;
+      if (link.kind == JointKind::prismatic) {
+        moved.p = q * axis;
+        rate.l = v * axis;
+        acceleration.l = acc * axis;
+      } else {
+        turns = true;
+        const Vec3<N> x = reduce_angle(q) * axis;
+        moved.R = rotation_exp(x, rotation_series(x));
+        rate.a = v * axis;
+        acceleration.a = acc * axis;
+      }
+      break;
+    }
+    case JointKind::translational: {
+      const Vec3<N> v = {slope(0), slope(1), slope(2)};
+      moved.p = {a.centre[link.q] + a.x[i], a.centre[link.q + 1] + a.x[i + 1], a.centre[link.q + 2] + a.x[i + 2]};
+      a.v[i] = v.x, a.v[i + 1] = v.y, a.v[i + 2] = v.z;
+      rate.l = v;
+      acceleration.l = {acceleration_of(0, v.x), acceleration_of(1, v.y), acceleration_of(2, v.z)};
+      break;
+    }
+    case JointKind::spherical: {
+      turns = true;
+      const Vec3<N> x = {a.x[i], a.x[i + 1], a.x[i + 2]};
+      const Vec3<N> x_rate = {slope(0), slope(1), slope(2)};
+      const RotationSeries<N> k = rotation_series(x);
+      const N* c = a.centre + link.q;
+      moved.R = to_matrix(Quat<N>{c[0], c[1], c[2], c[3]}) * rotation_exp(x, k);
+      out.chart = right_jacobian(x, k);
+      out.chart_rate = a.c0_over_h * out.chart + right_jacobian_derivative(x, k, x_rate);
+      const Vec3<N> v = out.chart * x_rate;
+      a.v[i] = v.x, a.v[i + 1] = v.y, a.v[i + 2] = v.z;
+      rate.a = v;
+      acceleration.a = {acceleration_of(0, v.x), acceleration_of(1, v.y), acceleration_of(2, v.z)};
+      break;
+    }
+  }
+  if (!link.offset) {
+    out.local = moved;
+  } else {
+    const Frame<N> base = broadcast<N>(link.frame);
+    out.local.R = turns ? base.R * moved.R : base.R;
+    out.local.p = base.R * moved.p + base.p;
+  }
+}
+
+/// I m for a rigid body: (J ω + c × v; m v - c × ω), c = mass times centre of mass.
+template <class N>
+Vec6<N> inertia_times(const N& mass, const Vec3<N>& moment, const Mat3<N>& inertia, const Vec6<N>& m) {
+  return {inertia * m.a + cross(moment, m.l), mass * m.l - cross(moment, m.a)};
+}
+
+/// Poses, twists, accelerations and inertial wrenches of every link.
+template <class N>
+void outward_sweep(const ModelView& model, const StageArgs<N>& a) {
+  for (int i = 0; i < model.n_links; ++i) {
+    const Link& link = model.links[i];
+    LinkScratch<N>& o = a.links[i];
+    Vec6<N> rate, acceleration;
+    joint_motion(link, a, o, rate, acceleration);
+    if (link.parent < 0) {
+      o.world = o.local;
+      o.Vp = zero6<N>();
+      o.Ap = {zero3<N>(), transposed_times(o.local.R, -broadcast<N>(model.gravity))};
+    } else {
+      const LinkScratch<N>& p = a.links[link.parent];
+      o.world = compose(p.world, o.local);
+      o.Vp = motion_to_child(o.local, p.V);
+      o.Ap = motion_to_child(o.local, p.A);
+    }
+    o.V = o.Vp + rate;
+    o.A = o.Ap + acceleration + cross_motion(o.V, rate);
+    o.F = zero6<N>();
+    if (link.massive) {
+      const N mass(link.mass);
+      const Vec3<N> moment = broadcast<N>(link.moment);
+      const Mat3<N> inertia = broadcast<N>(link.inertia);
+      o.F = inertia_times(mass, moment, inertia, o.A) +
+            cross_wrench(o.V, inertia_times(mass, moment, inertia, o.V));
+    }
+  }
+}
+
+/// Relative pose and twist of a pair's bodies. A body fixed in the world has the world's frame and no twist.
+template <class N>
+void pair_motion(const ModelView&, const PairContact& pair, const StageArgs<N>& a, ContactScratch<N>& o) {
+  const Frame<N> origin = {diagonal(N(1.0)), zero3<N>()};
+  const Frame<N>& w1 = pair.link1 < 0 ? origin : a.links[pair.link1].world;
+  const Frame<N>& w2 = pair.link2 < 0 ? origin : a.links[pair.link2].world;
+  o.link2_in_1 = relative(w1, w2);
+  o.shape_in_1 = compose(o.link2_in_1, broadcast<N>(pair.frame2));
+  o.Z = pair.link2 < 0 ? zero6<N>() : motion_to_parent(o.link2_in_1, a.links[pair.link2].V);
+  o.W = pair.link1 < 0 ? o.Z : o.Z - a.links[pair.link1].V;
+}
+
+/// How far any point of body 1 may have come nearer to the shape since its list was made, beyond the margin.
+template <class N>
+N list_excess(const PairContact& pair, const CandidateList<N>& list, const Frame<N>& now) {
+  const N* ref = list.reference;
+  const Vec3<N> p0 = {ref[9], ref[10], ref[11]};
+  N moved;
+  if (pair.shape == PrimitiveShape::sphere) {
+    const Vec3<N> step = now.p - p0;
+    moved = sqrt(dot(step, step));
+  } else {
+    Mat3<N> R0;
+    for (int k = 0; k < 9; ++k) R0.m[k / 3][k % 3] = ref[k];
+    const Mat3<N> turn = now.R - R0;
+    N square(0.0);
+    for (int k = 0; k < 9; ++k) square = mul_add(turn.m[k / 3][k % 3], turn.m[k / 3][k % 3], square);
+    const Vec3<N> step = transposed_times(now.R, now.p) - transposed_times(R0, p0);
+    moved = sqrt(square) * N(pair.reach) + sqrt(dot(step, step));
+  }
+  return moved - list.margin;
+}
+
+template <bool Derivatives, class Shape, class N>
+void sum_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list,
+                    ContactScratch<N>& o) {
+  o.sums = PairSums<N>::zero();
+  for (int k = 0; k < list.count; ++k) {
+    const Vec3<N> xi = {list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]};
+    accumulate<Derivatives>(o.sums, shape, law, o.shape_in_1.R, o.shape_in_1.p, o.W.a, o.W.l, xi);
+  }
+}
+
+/// Contact sums of every pair and ground contact; their wrenches are taken from the links' F.
+template <bool Derivatives, class N>
+void contact_sweep(const ModelView& model, const StageArgs<N>& a) {
+  a.excess[0] = N(0.0);
+  for (int k = 0; k < model.n_pairs; ++k) {
+    const PairContact& pair = model.pairs[k];
+    ContactScratch<N>& o = a.contacts[k];
+    pair_motion(model, pair, a, o);
+    a.excess[0] = max(a.excess[0], list_excess(pair, a.candidates[k], o.shape_in_1));
+    const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
+    if (pair.shape == PrimitiveShape::sphere) {
+      sum_candidates<Derivatives>(SphereDistance<N>{N(pair.size.x)}, law, a.candidates[k], o);
+    } else {
+      sum_candidates<Derivatives>(CuboidDistance<N>{broadcast<N>(pair.size)}, law, a.candidates[k], o);
+    }
+    if (pair.link1 >= 0) a.links[pair.link1].F -= o.sums.wrench;
+    if (pair.link2 >= 0) a.links[pair.link2].F += wrench_to_child(o.link2_in_1, o.sums.wrench);
+  }
+  for (int k = 0; k < model.n_grounds; ++k) {
+    const GroundContact& ground = model.grounds[k];
+    ContactScratch<N>& o = a.contacts[model.n_pairs + k];
+    const LinkScratch<N>& link = a.links[ground.link];
+    const Vec3<N> normal = broadcast<N>(model.ground_normal);
+    const Vec3<N> m = transposed_times(link.world.R, normal);
+    const N height = dot(normal, link.world.p - broadcast<N>(model.ground_point));
+    const LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
+    o.sums = PairSums<N>::zero();
+    for (int i = 0; i < ground.n_points; ++i) {
+      const double* p = ground.points + 3 * i;
+      accumulate_ground<Derivatives>(o.sums, law, m, height, link.V, Vec3<N>{N(p[0]), N(p[1]), N(p[2])},
+                                     N(ground.radius));
+    }
+    a.links[ground.link].F -= o.sums.wrench;
+  }
+}
+
+/// Joint forces from the wrenches, leaves first. Also |forces| for the stopping test.
+template <class N>
+void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
+  for (int i = model.n_links - 1; i >= 0; --i) {
+    const Link& link = model.links[i];
+    const LinkScratch<N>& o = a.links[i];
+    for (int k = 0; k < dofs(link.kind); ++k) {
+      const int d = link.v + k;
+      const N damping = model.damping[d] * a.v[d];
+      a.g[d] = project(link, k, o.F) - a.tau[d] + damping;
+      a.force_scale[d] = abs(a.tau[d]) + abs(damping);
+    }
+    if (link.parent >= 0) a.links[link.parent].F += wrench_to_parent(o.local, o.F);
+  }
+}
+
+/// Adds |generalised force| of one contact wrench on a link to the scale of every dof that carries it.
+template <class N>
+void add_force_scale(const ModelView& model, const StageArgs<N>& a, int link, Vec6<N> wrench) {
+  for (int i = link; i >= 0; i = model.links[i].parent) {
+    for (int k = 0; k < dofs(model.links[i].kind); ++k)
+      a.force_scale[model.links[i].v + k] += abs(project(model.links[i], k, wrench));
+    wrench = wrench_to_parent(a.links[i].local, wrench);
+  }
+}
+
+/// g at x, with everything the Jacobian needs left in the scratch.
+template <bool Derivatives, class N>
+void residual(const ModelView& model, const StageArgs<N>& a) {
+  outward_sweep(model, a);
+  contact_sweep<Derivatives>(model, a);
+  inward_sweep(model, a);
+  for (int k = 0; k < model.n_pairs; ++k) {
+    const ContactScratch<N>& o = a.contacts[k];
+    add_force_scale(model, a, model.pairs[k].link1, o.sums.wrench);
+    if (model.pairs[k].link2 >= 0)
+      add_force_scale(model, a, model.pairs[k].link2, wrench_to_child(o.link2_in_1, o.sums.wrench));
+  }
+  for (int k = 0; k < model.n_grounds; ++k)
+    add_force_scale(model, a, model.grounds[k].link, a.contacts[model.n_pairs + k].sums.wrench);
+}
+
+}  // namespace tangere::kernels
