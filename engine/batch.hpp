@@ -62,6 +62,8 @@ class Batch {
 
  private:
   friend class Stepper;
+  void write_state(std::size_t lane, std::span<const double> q, std::span<const double> v);
+
   Model model_;
   int environments_, blocks_;
   std::uint64_t seed_;

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+// States in lanes: allocation, the start of an episode, one environment in and out.
+#include "engine/batch.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+
+#include "engine/compiled_model.hpp"
+#include "engine/random.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+
+namespace {
+
+Purpose purpose_of(RandomTarget target) {
+  switch (target) {
+    case RandomTarget::joint_q:
+    case RandomTarget::joint_v: return Purpose::initial_state;
+    case RandomTarget::ground_contact:
+    case RandomTarget::pair_contact: return Purpose::contact;
+    case RandomTarget::tactile: break;
+  }
+  return Purpose::tactile;
+}
+
+/// The constant that a varying number replaces: what padding lanes hold.
+double nominal(const CompiledModel& m, const RandomizationDescription& d) {
+  const auto field = [&](const ContactCoefficients& c) {
+    const double values[] = {c.kn, c.kt, c.mu, c.damping};
+    return values[static_cast<int>(d.field)];
+  };
+  for (const auto& s : m.scene.sensors)
+    if (d.target == RandomTarget::tactile && s.name == d.name) return field(s.coefficients);
+  for (const auto& c : m.scene.pair_contacts)
+    if (d.target == RandomTarget::pair_contact && c.general_body == d.name && c.primitive_body == d.second_name)
+      return field(c.coefficients);
+  for (const auto& c : m.scene.ground_contacts)
+    if (d.target == RandomTarget::ground_contact && c.body == d.name) return field(c.coefficients);
+  return 0;
+}
+
+}  // namespace
+
+const char* to_string(StepStatus value) {
+  switch (value) {
+    case StepStatus::converged: return "converged";
+    case StepStatus::split: return "converged after the step was split";
+    case StepStatus::not_converged: return "no solution found, step split down to h/64";
+    case StepStatus::non_finite: return "a control or state was not finite";
+    case StepStatus::rotation: return "a joint turned by pi or more in one step";
+    case StepStatus::singular: return "the Jacobian is singular";
+  }
+  return "unknown";
+}
+
+Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int64_t first_episode)
+    : model_(model), environments_(environments), blocks_(0), seed_(seed), first_episode_(first_episode) {
+  if (environments < 1)
+    throw InputError("a batch of " + std::to_string(environments) + " environments; expected at least 1");
+  const CompiledModel& m = model.compiled();
+  blocks_ = environments / kBlock + (environments % kBlock != 0);
+  block_stride_ = std::size_t(m.layout.rows) * kBlock;
+  const std::size_t lanes = std::size_t(blocks_) * kBlock;
+  try {
+    data_.assign(block_stride_ * std::size_t(blocks_), 0.0);
+    status_.assign(lanes, StepStatus::converged);
+    iterations_.assign(lanes, 0);
+    residual_.assign(lanes, 0.0);
+    has_history_.assign(lanes, 0);
+  } catch (const std::exception&) {
+    throw InputError("no memory for " + std::to_string(environments) + " environments (" +
+                     std::to_string(double(block_stride_) * double(blocks_) * sizeof(double) / 1e9) + " GB)");
+  }
+  std::vector<double> q(m.nq), v(m.nv);
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    const int e = static_cast<int>(lane);
+    const bool padding = e >= environments_;
+    double* column = data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock;
+    q = m.initial_q;
+    v = m.initial_v;
+    for (std::size_t k = 0; k < m.scene.randomizations.size(); ++k) {
+      const RandomizationDescription& d = m.scene.randomizations[k];
+      const int row = m.randomized_row[k];
+      const bool of_state = row < m.layout.parameters;
+      if (padding) {
+        if (!of_state) column[std::size_t(row) * kBlock] = nominal(m, d);
+        continue;
+      }
+      const double value =
+          draw(d.distribution, RandomKey{seed, first_episode + e, 0, purpose_of(d.target), std::uint32_t(k)});
+      if (!of_state) {
+        column[std::size_t(row) * kBlock] = value;
+      } else if (d.target == RandomTarget::joint_q) {
+        q[std::size_t(row - m.layout.q)] = value;
+      } else {
+        v[std::size_t(row - m.layout.v)] = value;
+      }
+    }
+    write_state(lane, q, v);
+  }
+}
+
+void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<const double> v) {
+  const CompiledModel& m = model_.compiled();
+  double* column = data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock;
+  const auto at = [&](int row) -> double& { return column[std::size_t(row) * kBlock]; };
+  for (int i = 0; i < m.nq; ++i) at(m.layout.q + i) = q[i];
+  for (int i = 0; i < m.nv; ++i) at(m.layout.v + i) = v[i];
+  for (const kernels::Link& link : m.links) {
+    if (link.kind != kernels::JointKind::spherical) continue;
+    double square = 0;
+    for (int k = 0; k < 4; ++k) square += q[link.q + k] * q[link.q + k];
+    // Already unit to rounding: kept as it is, so that a stored state continues bit for bit.
+    if (std::abs(square - 1) < 1e-14) continue;
+    const double scale = 1 / std::sqrt(square);
+    for (int k = 0; k < 4; ++k) at(m.layout.q + link.q + k) *= scale;
+  }
+  for (int i = 0; i < m.nq; ++i) at(m.layout.previous_q + i) = at(m.layout.q + i);
+  for (int i = 0; i < m.nv; ++i) at(m.layout.previous_v + i) = at(m.layout.v + i);
+}
+
+void Batch::get_q(int environment, std::span<double> q) const {
+  const double* column = block(environment / kBlock) + environment % kBlock;
+  const CompiledModel& m = model_.compiled();
+  for (int i = 0; i < m.nq; ++i) q[i] = column[std::size_t(m.layout.q + i) * kBlock];
+}
+
+void Batch::get_v(int environment, std::span<double> v) const {
+  const double* column = block(environment / kBlock) + environment % kBlock;
+  const CompiledModel& m = model_.compiled();
+  for (int i = 0; i < m.nv; ++i) v[i] = column[std::size_t(m.layout.v + i) * kBlock];
+}
+
+void Batch::set_state(int environment, std::span<const double> q, std::span<const double> v) {
+  const std::size_t lane = std::size_t(environment);
+  write_state(lane, q, v);
+  status_[lane] = StepStatus::converged;
+  has_history_[lane] = 0;
+}
+
+void Batch::set_state(int environment, std::span<const double> q, std::span<const double> v,
+                      std::span<const double> previous_q, std::span<const double> previous_v) {
+  const std::size_t lane = std::size_t(environment);
+  write_state(lane, previous_q, previous_v);
+  const CompiledModel& m = model_.compiled();
+  double* column = block(environment / kBlock) + environment % kBlock;
+  std::vector<double> before_q(m.nq), before_v(m.nv);
+  get_q(environment, before_q);
+  get_v(environment, before_v);
+  write_state(lane, q, v);
+  for (int i = 0; i < m.nq; ++i) column[std::size_t(m.layout.previous_q + i) * kBlock] = before_q[i];
+  for (int i = 0; i < m.nv; ++i) column[std::size_t(m.layout.previous_v + i) * kBlock] = before_v[i];
+  status_[lane] = StepStatus::converged;
+  has_history_[lane] = 1;
+}
+
+int Batch::failed_count() const {
+  const auto all = statuses();
+  return static_cast<int>(std::count_if(all.begin(), all.end(), [](StepStatus s) { return failed(s); }));
+}
+
+double Batch::randomized_value(int environment, int k) const {
+  const CompiledModel& m = model_.compiled();
+  const RandomizationDescription& d = m.scene.randomizations[k];
+  return draw(d.distribution,
+              RandomKey{seed_, first_episode_ + environment, 0, purpose_of(d.target), std::uint32_t(k)});
+}
+
+}  // namespace tangere

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// The arrays behind a Model. Private to the engine: kernels see them through ModelView.
+#pragma once
+
+#include <vector>
+
+#include "engine/aligned.hpp"
+#include "engine/model.hpp"
+#include "kernels/model_view.hpp"
+#include "kernels/so3.hpp"
+
+namespace tangere {
+
+/// A body after folding: where it sits on its link (-1: fixed in the world).
+struct CompiledBody {
+  int link = -1;
+  kernels::Frame<double> frame;  ///< body frame in the link (or the world)
+  PrimitiveShape shape = PrimitiveShape::sphere;
+  kernels::Vec3<double> size{};  ///< radius in x, or half edges
+  double mass = 0;               ///< [kg]
+};
+
+/// A joint of the scene: its elementary links and its coordinates.
+struct CompiledJoint {
+  int first_link = -1, link_count = 0;  ///< none for a fixed joint
+  int q = 0, v = 0;                     ///< first coordinate, first dof
+  int link = -1;                        ///< what bodies of this joint move with
+  kernels::Frame<double> frame;         ///< joint frame in that link
+};
+
+/// Force motor on one dof: force = low + (clip(u) + 1)/2 (high - low).
+struct CompiledMotor {
+  int dof;
+  double low, high;
+};
+
+/// Points of one sensor in tiles of 8×8, in its link's axes.
+struct CompiledSensor {
+  int body = -1, link = -1;
+  kernels::Frame<double> frame;      ///< body frame in the link
+  AlignedVector<double> points;      ///< (n_tiles, 3, 64), padded with far points
+  std::vector<double> bounds;        ///< (n_tiles, 4) centre and radius
+  std::vector<int> index;            ///< (n_tiles, 64) row-major point index, -1 padding
+  int n_tiles = 0;
+  double axes[9] = {};               ///< rows axis0, axis1, -(axis0 × axis1), link axes
+  kernels::ContactParameters parameters{};
+  ContactLaw law = ContactLaw::clamped;
+  std::vector<int> targets;          ///< bodies it can feel
+};
+
+/// Symbolic analysis of the Jacobian: the storage behind kernels::Pattern.
+struct PatternStorage {
+  int n = 0, entries = 0, factor_entries = 0;
+  std::vector<int> slot, entry_begin, entry_column, permutation, scatter, diagonal;
+  std::vector<int> column_begin, column_slot, column_row, row_begin, row_slot, row_column, target;
+  [[nodiscard]] kernels::Pattern view() const;
+};
+
+/// Rows of a block: q, v, the state one step before, then the numbers that vary.
+struct BlockLayout {
+  int q = 0, v = 0, previous_q = 0, previous_v = 0, parameters = 0, rows = 0;
+};
+
+struct CompiledModel {
+  Scene scene;
+  int nq = 0, nv = 0, nu = 0;
+  std::vector<kernels::Link> links;
+  std::vector<CompiledJoint> joints;   ///< parallel to scene.links
+  std::vector<CompiledBody> bodies;    ///< parallel to scene.links
+  std::vector<CompiledMotor> motors;   ///< one per control
+  std::vector<CompiledSensor> sensors;
+  std::vector<kernels::PairContact> pairs;
+  std::vector<kernels::GroundContact> grounds;
+  std::vector<std::vector<double>> point_storage, tile_storage;  ///< what pairs and grounds point into
+  std::vector<double> damping;         ///< (nv)
+  std::vector<double> initial_q, initial_v;
+  PatternStorage pattern;
+  BlockLayout layout;
+  std::vector<int> randomized_row;     ///< parallel to scene.randomizations: row of a block, or coordinate -1 - index
+  kernels::ModelView view{};
+
+  std::vector<SensorInfo> sensor_info;
+  std::vector<ContactInfo> contact_info;
+  std::vector<EffectInfo> effects;
+  std::vector<std::string> q_names, v_names, u_names, q_units, v_units, u_units, body_names;
+};
+
+/// Surface nodes of a cuboid's contact grid in its body frame, (n, 3).
+std::vector<double> cuboid_contact_points(const CuboidShape& shape);
+
+/// Reorders (n, 3) points so that every kContactTile consecutive ones are neighbours; returns their (tiles, 4) bounds.
+std::vector<double> sort_into_tiles(std::vector<double>& points, int tile);
+
+/// Minimum-fill elimination of the structure of the tree and of every contact.
+PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
+                               const std::vector<std::pair<int, int>>& touching);
+
+/// Tiles, bounds, axes and pressure sign of a sensor. Throws InputError for degenerate arrays.
+CompiledSensor compile_sensor(const TactileDescription& description, const CompiledBody& body, SensorInfo& info);
+
+/// Names to indices, joints to elementary links. Throws InputError.
+std::shared_ptr<const CompiledModel> compile(const Scene& scene);
+
+kernels::Frame<double> to_frame(const Pose& pose);
+kernels::Quat<double> quaternion_of(const kernels::Mat3<double>& R);
+
+}  // namespace tangere

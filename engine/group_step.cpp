@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sets up the stages, commits their results, and splits the steps of lanes that found no root.
+#include "engine/group_step.hpp"
+
+#include <cmath>
+
+#include "engine/detection.hpp"
+#include "engine/rotation_log.hpp"
+
+namespace tangere {
+
+using kernels::JointKind;
+using kernels::kGroup;
+using kernels::LaneRow;
+using kernels::Quat;
+using kernels::Vec3;
+
+namespace {
+
+constexpr int kDeepestSplit = 6;  // h / 2^6
+// Inside a split the search may be long: a short leash there loses runs that a patient one finishes.
+constexpr int kHalvings = 10, kSplitHalvings = 20, kSplitIterations = 40;
+
+const double kGamma = 1 - std::sqrt(0.5);
+const double kEta = (1 - kGamma) / kGamma;
+const double kKappa = kEta / kGamma;
+
+Quat<double> quat_at(const LaneRow* q, int lane) { return {q[0][lane], q[1][lane], q[2][lane], q[3][lane]}; }
+
+void fill(LaneRow& row, double value) {
+  for (double& x : row.lane) x = value;
+}
+
+}  // namespace
+
+LaneBits GroupStep::solve_one_stage(const kernels::KernelTable& table, Workspace& w, LaneBits lanes, double c0,
+                                    double h, bool inside_split, NewtonReport& report) const {
+  fill(w.stage.c0_over_h, c0 / h);
+  fill(w.stage.inverse_h, 1 / h);
+  const NewtonLimits limits = {settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
+                               inside_split ? kSplitHalvings : kHalvings};
+  return solve_stage(model_, table, w, lanes, limits, report);
+}
+
+/// r = (q₀ ⊖ q₁)/2 for BDF2; q₁ is the newest state, in q0, and q₀ the one before it.
+void GroupStep::set_history_bdf2(Workspace& w) const {
+  for (const kernels::Link& link : model_.links) {
+    for (int l = 0; l < kGroup; ++l) {
+      if (link.kind == JointKind::spherical) {
+        const Vec3<double> x = rotation_log(conjugate(quat_at(w.q0 + link.q, l)) * quat_at(w.q_before + link.q, l));
+        w.stage.r[link.v][l] = 0.5 * x.x;
+        w.stage.r[link.v + 1][l] = 0.5 * x.y;
+        w.stage.r[link.v + 2][l] = 0.5 * x.z;
+      } else {
+        for (int k = 0; k < kernels::dofs(link.kind); ++k)
+          w.stage.r[link.v + k][l] = 0.5 * (w.q_before[link.q + k][l] - w.q0[link.q + k][l]);
+      }
+    }
+  }
+}
+
+LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, Workspace& w, LaneBits lanes, double h,
+                        bool inside_split, NewtonReport& report) const {
+  const int n = model_.nv;
+  for (int i = 0; i < model_.nq; ++i) w.stage.centre[i] = w.q0[i];
+  const auto each = [&](auto&& f) {
+    for (int i = 0; i < n; ++i)
+      for (int l = 0; l < kGroup; ++l) f(i, l);
+  };
+  kernels::GroupStage& s = w.stage;
+  LaneBits resolved = 0;
+  switch (scheme) {
+    case Integrator::bdf1:
+    case Integrator::linear_implicit:
+      each([&](int i, int l) { s.r[i][l] = 0, s.s[i][l] = -w.v0[i][l], s.x[i][l] = h * w.v0[i][l]; });
+      if (scheme == Integrator::bdf1) {
+        resolved = solve_one_stage(table, w, lanes, 1, h, inside_split, report);
+      } else {
+        fill(s.c0_over_h, 1 / h);
+        fill(s.inverse_h, 1 / h);
+        resolved = linear_step(model_, table, w, lanes, report);
+        each([&](int i, int l) { s.v[i][l] = s.x[i][l] / h; });
+      }
+      break;
+    case Integrator::bdf2:
+      set_history_bdf2(w);
+      each([&](int i, int l) {
+        s.s[i][l] = 0.5 * w.v_before[i][l] - 2 * w.v0[i][l];
+        s.x[i][l] = h * w.v0[i][l];
+      });
+      resolved = solve_one_stage(table, w, lanes, 1.5, h, inside_split, report);
+      break;
+    case Integrator::sdirk2: {
+      each([&](int i, int l) {
+        s.r[i][l] = 0, s.s[i][l] = -w.v0[i][l] / kGamma, s.x[i][l] = kGamma * h * w.v0[i][l];
+      });
+      lanes = solve_one_stage(table, w, lanes, 1 / kGamma, h, inside_split, report);
+      each([&](int i, int l) {
+        w.x_gamma[i][l] = s.x[i][l], w.v_gamma[i][l] = s.v[i][l];
+        s.r[i][l] = -kKappa * s.x[i][l];
+        s.s[i][l] = -(w.v0[i][l] + kEta * (s.v[i][l] - w.v0[i][l])) / kGamma;
+        s.x[i][l] += (1 - kGamma) * h * s.v[i][l];
+      });
+      resolved = solve_one_stage(table, w, lanes, 1 / kGamma, h, inside_split, report);
+      break;
+    }
+  }
+  finish(w, resolved, h, resolved, report);
+  return resolved;
+}
+
+/// q1 = centre ⊕ x, v1 = v. A joint that turned by π or more is not resolved: its chart ends there.
+void GroupStep::finish(Workspace& w, LaneBits lanes, double h, LaneBits& resolved, NewtonReport& report) const {
+  for (int l = 0; l < kGroup; ++l) {
+    if (!has(lanes, l)) continue;
+    for (int i = 0; i < model_.nv; ++i) w.v1[i][l] = w.stage.v[i][l];
+    for (const kernels::Link& link : model_.links) {
+      const LaneRow* x = w.stage.x + link.v;
+      if (link.kind != JointKind::spherical) {
+        for (int k = 0; k < kernels::dofs(link.kind); ++k)
+          w.q1[link.q + k][l] = w.stage.centre[link.q + k][l] + x[k][l];
+        continue;
+      }
+      const Vec3<double> turn = {x[0][l], x[1][l], x[2][l]};
+      const LaneRow* v = w.stage.v + link.v;
+      const Vec3<double> rate = {v[0][l], v[1][l], v[2][l]};
+      if (!(dot(turn, turn) < M_PI * M_PI) || !(dot(rate, rate) * h * h < M_PI * M_PI)) {
+        resolved &= ~(1U << l);
+        report.status[l] = StepStatus::rotation;
+      }
+      const Quat<double> q = rotate_by(quat_at(w.stage.centre + link.q, l), turn);
+      w.q1[link.q][l] = q.w, w.q1[link.q + 1][l] = q.x, w.q1[link.q + 2][l] = q.y, w.q1[link.q + 3][l] = q.z;
+    }
+  }
+}
+
+/// Two half steps of one lane from q0, v0, split again where needed. The other lanes of the group wait.
+bool GroupStep::split(const kernels::KernelTable& table, Workspace& w, int lane, double h, int depth,
+                      NewtonReport& report) const {
+  if (depth > kDeepestSplit) return false;
+  // Order 2 must survive inside a BDF2 step, and so must its history: SDIRK2 there, not BDF1.
+  const bool second_order =
+      settings_.integrator == Integrator::bdf2 || settings_.integrator == Integrator::sdirk2;
+  const Integrator scheme = second_order ? Integrator::sdirk2 : Integrator::bdf1;
+  for (int half = 0; half < 2; ++half) {
+    if (run(scheme, table, w, 1U << lane, 0.5 * h, true, report) != 0) {
+      for (int i = 0; i < model_.nq; ++i) w.q0[i][lane] = w.q1[i][lane];
+      for (int i = 0; i < model_.nv; ++i) w.v0[i][lane] = w.v1[i][lane];
+    } else if (!split(table, w, lane, 0.5 * h, depth + 1, report)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+void GroupStep::advance(const kernels::KernelTable& table, Workspace& w, LaneBits lanes, LaneBits history,
+                        NewtonReport& report) const {
+  const double h = settings_.timestep;
+  LaneBits resolved = 0;
+  const auto commit = [&](LaneBits done) {
+    for (int l = 0; l < kGroup; ++l) {
+      if (!has(done, l)) continue;
+      for (int i = 0; i < model_.nq; ++i) w.q0[i][l] = w.q1[i][l];
+      for (int i = 0; i < model_.nv; ++i) w.v0[i][l] = w.v1[i][l];
+    }
+    resolved |= done;
+  };
+  clear_candidates(w);
+  if (settings_.integrator == Integrator::bdf2) {
+    if ((lanes & history) != 0) commit(run(Integrator::bdf2, table, w, lanes & history, h, false, report));
+    if ((lanes & ~history) != 0) commit(run(Integrator::sdirk2, table, w, lanes & ~history, h, false, report));
+  } else {
+    commit(run(settings_.integrator, table, w, lanes, h, false, report));
+  }
+  for (int l = 0; l < kGroup; ++l) {
+    if (!has(lanes & ~resolved, l)) continue;
+    const StepStatus first = report.status[l];
+    if (split(table, w, l, h, 1, report)) {
+      report.status[l] = StepStatus::split;
+    } else if (!failed(report.status[l])) {
+      report.status[l] = first;
+    }
+  }
+  // The next step's history is log(R₁ᵀR₀): a turn of π or more in this one would be read as its complement.
+  for (int l = 0; l < kGroup; ++l) {
+    if (!has(lanes, l) || failed(report.status[l])) continue;
+    for (const kernels::Link& link : model_.links) {
+      if (link.kind != JointKind::spherical) continue;
+      const LaneRow* v = w.v0 + link.v;
+      const Vec3<double> rate = {v[0][l], v[1][l], v[2][l]};
+      if (!(dot(rate, rate) * h * h < M_PI * M_PI)) report.status[l] = StepStatus::rotation;
+    }
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// The time-stepping schemes on one group of eight environments, and the splitting of steps that do not converge.
+//
+// Every solve is one stage (centre c, c₀, r, s): ẋ = (c₀x + r)/h, v = J(x)ẋ, a = (c₀v + s)/h, g(x) = 0, q = c ⊕ x:
+//   BDF1            c = q₀   c₀ = 1     r = 0            s = -v₀
+//   BDF2            c = q₁   c₀ = 3/2   r = (q₀⊖q₁)/2    s = -2v₁ + v₀/2      (q₁, v₁ newest)
+//   SDIRK2 stage γ  c = q₀   c₀ = 1/γ   r = 0            s = -v₀/γ
+//   SDIRK2 stage 1  c = q₀   c₀ = 1/γ   r = -κ x_γ       s = -(v₀ + η(v_γ - v₀))/γ
+//   γ = 1 - 1/√2, η = (1 - γ)/γ, κ = η/γ
+#pragma once
+
+#include "engine/newton.hpp"
+
+namespace tangere {
+
+struct StepSettings {
+  Integrator integrator;
+  double timestep;
+  double tolerance;
+  int max_iterations;
+};
+
+/// States of a group come in and go out through the workspace's rows q0, v0, q_before, v_before.
+class GroupStep {
+ public:
+  GroupStep(const CompiledModel& model, const StepSettings& settings) : model_(model), settings_(settings) {}
+
+  /// Advances `lanes` by one step; `history`: those with a valid state one step before (BDF2). Afterwards q0, v0 hold
+  /// the new state of every lane whose status did not fail; rows of other lanes are untouched.
+  void advance(const kernels::KernelTable& table, Workspace& w, LaneBits lanes, LaneBits history,
+               NewtonReport& report) const;
+
+ private:
+  LaneBits run(Integrator scheme, const kernels::KernelTable& table, Workspace& w, LaneBits lanes, double h,
+               bool inside_split, NewtonReport& report) const;
+  LaneBits solve_one_stage(const kernels::KernelTable& table, Workspace& w, LaneBits lanes, double c0, double h,
+                           bool inside_split, NewtonReport& report) const;
+  bool split(const kernels::KernelTable& table, Workspace& w, int lane, double h, int depth,
+             NewtonReport& report) const;
+  void finish(Workspace& w, LaneBits lanes, double h, LaneBits& resolved, NewtonReport& report) const;
+  void set_history_bdf2(Workspace& w) const;
+
+  const CompiledModel& model_;
+  StepSettings settings_;
+};
+
+}  // namespace tangere

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// Names and sizes of a scene's enumerations.
+#include "engine/scene.hpp"
+
+namespace tangere {
+
+const char* to_string(Integrator value) {
+  switch (value) {
+    case Integrator::bdf1: return "BDF1";
+    case Integrator::bdf2: return "BDF2";
+    case Integrator::sdirk2: return "SDIRK2";
+    case Integrator::linear_implicit: return "linear-implicit";
+  }
+  return "unknown";
+}
+
+const char* to_string(JointType value) {
+  switch (value) {
+    case JointType::fixed: return "fixed";
+    case JointType::revolute: return "revolute";
+    case JointType::prismatic: return "prismatic";
+    case JointType::planar: return "planar";
+    case JointType::translational: return "translational";
+    case JointType::free2d: return "free2d";
+    case JointType::spherical: return "spherical";
+    case JointType::free: return "free";
+  }
+  return "unknown";
+}
+
+const char* to_string(ContactLaw value) {
+  switch (value) {
+    case ContactLaw::clamped: return "clamped";
+    case ContactLaw::paper: return "paper";
+    case ContactLaw::linear: return "linear";
+  }
+  return "unknown";
+}
+
+int position_count(JointType type) {
+  switch (type) {
+    case JointType::fixed: return 0;
+    case JointType::revolute:
+    case JointType::prismatic: return 1;
+    case JointType::planar: return 2;
+    case JointType::translational:
+    case JointType::free2d: return 3;
+    case JointType::spherical: return 4;
+    case JointType::free: return 7;
+  }
+  return 0;
+}
+
+int dof_count(JointType type) {
+  switch (type) {
+    case JointType::spherical: return 3;
+    case JointType::free: return 6;
+    default: return position_count(type);
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// One allocation for all rows of a group; sizes follow from the model.
+#include "engine/workspace.hpp"
+
+#include <algorithm>
+
+namespace tangere {
+
+using kernels::kGroup;
+using kernels::LaneRow;
+
+namespace {
+
+/// Walks over all rows, counting them (base = nullptr) or handing them out.
+std::size_t lay_out(const CompiledModel& m, Workspace& w, LaneRow* base) {
+  std::size_t used = 0;
+  const auto rows = [&](LaneRow*& p, int count) {
+    p = base == nullptr ? nullptr : base + used;
+    used += std::size_t(count);
+  };
+  kernels::GroupStage& s = w.stage;
+  rows(s.centre, m.nq);
+  for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.v, &s.g, &s.force_scale, &s.mass_diagonal}) rows(*p, m.nv);
+  for (LaneRow** p : {&s.G_q, &s.C, &s.A}) rows(*p, m.pattern.entries);
+  rows(s.LU, m.pattern.factor_entries);
+  rows(s.work, std::max(m.pattern.factor_entries, 4 * m.nv));
+  rows(s.excess, 1);
+  for (LaneRow** p : {&w.q0, &w.q_before, &w.q1}) rows(*p, m.nq);
+  for (LaneRow** p : {&w.v0, &w.v_before, &w.v1, &w.x_gamma, &w.v_gamma, &w.delta, &w.base, &w.test, &w.weight})
+    rows(*p, m.nv);
+  rows(w.poses, 12 * static_cast<int>(m.pairs.size()));
+  for (std::size_t k = 0; k < w.lists.size(); ++k) {
+    rows(w.lists[k].points, 3 * m.pairs[k].n_points);
+    rows(w.lists[k].reference, 12);
+  }
+  return used;
+}
+
+}  // namespace
+
+std::size_t Workspace::bytes(const CompiledModel& m) {
+  Workspace w(m);
+  return w.memory.size() * sizeof(LaneRow) + w.scratch.size() + w.dofs.size() * sizeof(int) +
+         sizeof(double) * std::size_t(m.nv) * std::size_t(m.nv + 1) * (kGroup + 1);
+}
+
+Workspace::Workspace(const CompiledModel& m)
+    : dofs(std::size_t(2 * m.nv)),
+      lists(m.pairs.size()),
+      list_count(m.pairs.size()),
+      stage{},
+      pivoted(kGroup, Eigen::PartialPivLU<Eigen::MatrixXd>(m.nv)),
+      dense(1, Eigen::MatrixXd(m.nv, m.nv)),
+      rhs(m.nv) {
+  memory.assign(lay_out(m, *this, nullptr), LaneRow{});
+  lay_out(m, *this, memory.data());
+  std::size_t bytes = 0;  // any instruction set may be chosen later
+  for (const kernels::KernelTable* table : kernels::available_kernels())
+    bytes = std::max(bytes, table->scratch_bytes(m.view));
+  scratch.resize(bytes);
+  // A lane that never lived holds unit quaternions, so that it computes with finite numbers.
+  for (const kernels::Link& link : m.links) {
+    if (link.kind != kernels::JointKind::spherical) continue;
+    for (LaneRow* q : {stage.centre, q0, q_before, q1})
+      for (double& w : q[link.q].lane) w = 1;
+  }
+  for (std::size_t k = 0; k < lists.size(); ++k) lists[k].margin = m.pairs[k].reach / 200;
+  stage.lists = lists.data();
+  stage.scratch = scratch.data();
+  stage.dofs = dofs.data();
+}
+
+}  // namespace tangere
