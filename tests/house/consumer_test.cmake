@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+# Installs the build into an empty folder, builds examples/consumer against it and nothing else of ours, and runs it.
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    list(JOIN ARGN " " command)
+    message(FATAL_ERROR "${command}\nended with ${result}:\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+set(prefix ${WORK}/prefix)
+file(REMOVE_RECURSE ${WORK})
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix} --config ${CONFIG})
+run(${CMAKE_COMMAND} -S ${SOURCE}/examples/consumer -B ${WORK}/build -G ${GENERATOR}
+  -D CMAKE_PREFIX_PATH=${prefix} -D CMAKE_CXX_COMPILER=${CXX} -D CMAKE_BUILD_TYPE=${CONFIG})
+file(STRINGS ${WORK}/build/CMakeCache.txt found REGEX "^tangere_DIR:")
+string(FIND "${found}" "${prefix}/" at)
+if(at EQUAL -1)
+  message(FATAL_ERROR "the consumer found another tangere than the one just installed: ${found}")
+endif()
+run(${CMAKE_COMMAND} --build ${WORK}/build --config ${CONFIG})
+
+set(scene ${prefix}/share/tangere/scenes/rolling_ball.xml)
+if(NOT EXISTS ${scene})
+  message(FATAL_ERROR "${scene} was not installed")
+endif()
+run(${WORK}/build/consumer ${scene})
+message(STATUS "${output}")
+if(NOT output MATCHES "peak normal tactile force: [0-9.e+-]+ N")
+  message(FATAL_ERROR "the consumer printed something else:\n${output}")
+endif()
+run(${prefix}/bin/tangere --help)

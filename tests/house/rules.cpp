@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: Apache-2.0
+// Line by line: an include is what the preprocessor takes for one, so no parser is needed.
+#include "tests/house/rules.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+namespace tangere::house {
+namespace fs = std::filesystem;
+namespace {
+
+using Names = std::set<std::string, std::less<>>;
+
+struct Folder {
+  Names may_include;        ///< folders
+  Names foreign_libraries;  ///< that belong elsewhere: beginnings of what stands between < and >
+};
+
+const std::map<std::string, Folder, std::less<>>& folders() {
+  static const std::map<std::string, Folder, std::less<>> table{
+      {"kernels",
+       {{"kernels"},
+        {"Eigen", "tbb", "oneapi", "hdf5", "H5", "tinyxml2", "CLI", "fmt", "nlohmann"}}},
+      {"engine", {{"engine", "kernels"}, {"hdf5", "H5", "tinyxml2", "CLI", "nlohmann"}}},
+      {"tasks",
+       {{"tasks", "engine", "kernels"}, {"hdf5", "H5", "tinyxml2", "CLI", "nlohmann", "xsimd"}}},
+      {"io", {{"io", "engine", "kernels"}, {"CLI", "tbb", "oneapi", "xsimd"}}},
+      {"apps", {{"apps", "tasks", "io", "engine", "kernels"}, {"hdf5", "H5", "tinyxml2", "xsimd"}}},
+      {"bench", {{"bench", "tasks", "io", "engine", "kernels"}, {}}},
+      {"tests", {{"tests", "apps", "tasks", "io", "engine", "kernels"}, {}}},
+      {"examples", {{"examples", "tasks", "io", "engine"}, {"xsimd", "hdf5", "H5", "tinyxml2"}}}};
+  return table;
+}
+
+struct Include {
+  int line;
+  bool quoted;
+  std::string name;
+};
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+std::vector<Include> includes_of(const std::string& text) {
+  static const std::regex pattern(R"re(^\s*#\s*include\s*(["<])([^">]+)[">])re");
+  std::vector<Include> found;
+  int number = 0;
+  for (const std::string& line : lines_of(text)) {
+    ++number;
+    std::smatch match;
+    if (line.find("include") != std::string::npos && std::regex_search(line, match, pattern))
+      found.push_back({number, match[1] == "\"", match[2]});
+  }
+  return found;
+}
+
+std::string folder_of(std::string_view path) { return std::string(path.substr(0, path.find('/'))); }
+bool ends_with_any(std::string_view path, std::initializer_list<std::string_view> ends) {
+  return std::any_of(ends.begin(), ends.end(),
+                     [&](std::string_view end) { return path.ends_with(end); });
+}
+bool is_cpp(std::string_view path) { return ends_with_any(path, {".cpp", ".hpp", ".h", ".c"}); }
+bool is_script(std::string_view path) {
+  const std::string_view name = path.substr(path.rfind('/') + 1);
+  return ends_with_any(path, {".cmake", ".cmake.in", ".sh", ".py", ".js"}) ||
+         name == "CMakeLists.txt" || name == "run-demo" || name == "run-tests" || path == ".ci/run";
+}
+
+/// The file that a quoted include names, "" when there is none.
+std::string resolve(const Tree& tree, const std::string& from, const std::string& name) {
+  if (tree.contains(name)) return name;
+  const std::string beside = from.substr(0, from.rfind('/') + 1) + name;
+  return tree.contains(beside) ? beside : "";
+}
+
+void check_quoted(const Tree& tree, const std::string& path, const Include& include,
+                  std::vector<Violation>& found) {
+  const std::string target = resolve(tree, path, include.name);
+  if (target.empty()) {
+    found.push_back(
+        {path, include.line, "includes \"" + include.name + "\", which is no file of the project"});
+    return;
+  }
+  const std::string from = folder_of(path), to = folder_of(target);
+  if (!folders().at(from).may_include.contains(to))
+    found.push_back(
+        {path, include.line, from + " must not include " + to + " (\"" + include.name + "\")"});
+}
+
+}  // namespace
+
+std::ostream& operator<<(std::ostream& out, const Violation& violation) {
+  out << violation.file;
+  if (violation.line > 0) out << ':' << violation.line;
+  return out << ": " << violation.message;
+}
+
+Tree read_tree(const fs::path& root) {
+  Tree tree;
+  const auto add = [&](const fs::path& path) {
+    const std::string name = path.lexically_relative(root).generic_string();
+    if (!is_cpp(name) && !is_script(name) &&
+        !ends_with_any(name, {".md", ".txt", ".xml", ".json", ".svg", ".csv"}))
+      return;
+    std::ifstream file(path, std::ios::binary);
+    tree[name] = std::string(std::istreambuf_iterator<char>(file), {});
+    if (!file) throw std::runtime_error("cannot read " + path.string());
+  };
+  for (auto entry = fs::recursive_directory_iterator(root);
+       entry != fs::recursive_directory_iterator(); ++entry) {
+    const std::string name = entry->path().filename().string();
+    const bool generated = entry.depth() == 0 && (name == "build" || name == "out");
+    if (entry->is_directory() && (name.starts_with('.') || name == "__pycache__" || generated))
+      entry.disable_recursion_pending();
+    else if (entry->is_regular_file())
+      add(entry->path());
+  }
+  if (fs::exists(root / ".ci/run")) add(root / ".ci/run");
+  return tree;
+}
+
+std::vector<Violation> check_includes(const Tree& tree) {
+  std::vector<Violation> found;
+  for (const auto& [path, text] : tree) {
+    if (!is_cpp(path)) continue;
+    const auto folder = folders().find(folder_of(path));
+    if (folder == folders().end()) {
+      found.push_back(
+          {path, 0,
+           "sources in a folder that tests/house/rules.cpp does not know; add it to the table"});
+      continue;
+    }
+    for (const Include& include : includes_of(text)) {
+      if (include.quoted) {
+        check_quoted(tree, path, include, found);
+        continue;
+      }
+      for (const std::string& library : folder->second.foreign_libraries)
+        if (include.name.starts_with(library))
+          found.push_back(
+              {path, include.line, folder->first + " must not include <" + include.name + ">"});
+    }
+  }
+  return found;
+}
+
+std::vector<Violation> check_kernel_includes(const Tree& tree) {
+  static const Names harmless{"array",       "cfloat",      "cmath",          "cstddef", "cstdint",
+                              "cstring",     "immintrin.h", "limits",         "new",     "span",
+                              "type_traits", "utility",     "xsimd/xsimd.hpp"};
+  std::vector<std::string> waiting;
+  for (const auto& [path, text] : tree)
+    if (path.starts_with("kernels/") && path.ends_with("-inl.hpp")) waiting.push_back(path);
+  std::set<std::string> seen(waiting.begin(), waiting.end());
+  std::vector<Violation> found;
+  while (!waiting.empty()) {
+    const std::string path = waiting.back();
+    waiting.pop_back();
+    for (const Include& include : includes_of(tree.find(path)->second)) {
+      const std::string target = include.quoted ? resolve(tree, path, include.name) : "";
+      if (!target.empty() && seen.insert(target).second) waiting.push_back(target);
+      if (!include.quoted && !harmless.contains(include.name))
+        found.push_back(
+            {path, include.line,
+             "compiled once per instruction set, so it must not include <" + include.name + ">"});
+    }
+  }
+  return found;
+}
+
+std::vector<Violation> check_public_headers(const Tree& tree) {
+  static const std::string list = "cmake/install.cmake";
+  const auto install = tree.find(list);
+  if (install == tree.end()) return {{list, 0, "is missing"}};
+  Names installed;
+  static const std::regex header(R"([a-z_]+/[a-z0-9_-]+\.hpp)");
+  for (std::sregex_iterator match(install->second.begin(), install->second.end(), header), end;
+       match != end; ++match)
+    installed.insert(match->str());
+  std::vector<Violation> found;
+  for (const std::string& path : installed) {
+    const auto file = tree.find(path);
+    if (file == tree.end()) {
+      found.push_back({list, 0, "installs " + path + ", which does not exist"});
+      continue;
+    }
+    for (const Include& include : includes_of(file->second)) {
+      const bool standard =
+          !include.quoted && include.name.find_first_of("./") == std::string::npos;
+      if (!standard && !installed.contains(include.name))
+        found.push_back({path, include.line,
+                         "is installed, but " + include.name + ", which it includes, is not"});
+    }
+  }
+  if (installed.empty()) found.push_back({list, 0, "installs no header"});
+  return found;
+}
+
+std::vector<Violation> check_sources(const Tree& tree) {
+  constexpr std::size_t kMostLines = 600;
+  std::vector<Violation> found;
+  for (const auto& [path, text] : tree) {
+    if (!is_cpp(path) && !is_script(path)) continue;
+    const std::vector<std::string> lines = lines_of(text);
+    if (lines.size() > kMostLines)
+      found.push_back(
+          {path, 0,
+           std::to_string(lines.size()) + " lines, at most " + std::to_string(kMostLines)});
+    // Scripts may start with "#!" and an instruction to a tool.
+    const std::size_t head = is_cpp(path) ? 1 : 3;
+    const auto spdx =
+        std::find_if(lines.begin(), lines.begin() + std::ptrdiff_t(std::min(head, lines.size())),
+                     [](const std::string& line) {
+                       return line.find("SPDX-License-Identifier: Apache-2.0") != std::string::npos;
+                     });
+    if (spdx == lines.begin() + std::ptrdiff_t(std::min(head, lines.size())))
+      found.push_back({path, 1, "has no line 'SPDX-License-Identifier: Apache-2.0' at its head"});
+    if (is_cpp(path) && (lines.size() < 2 || !lines[1].starts_with("//")))
+      found.push_back({path, 2, "expected a comment that says why the file exists"});
+  }
+  return found;
+}
+
+std::vector<Violation> check_documents(const Tree& tree) {
+  std::vector<Violation> found;
+  Names top;
+  for (const auto& [path, text] : tree)
+    if (path.find('/') != std::string::npos && !path.starts_with('.')) top.insert(folder_of(path));
+  for (const std::string& folder : top) {
+    const auto readme = tree.find(folder + "/README.md");
+    if (readme == tree.end())
+      found.push_back({folder, 0, "has no README.md"});
+    else if (lines_of(readme->second).size() < 3)
+      found.push_back({readme->first, 0, "says nothing"});
+  }
+  static const std::regex link(R"re(\]\(([^)#\s]+)[^)]*\))re");
+  for (const auto& [path, text] : tree) {
+    if (!path.ends_with(".md")) continue;
+    int number = 0;
+    for (const std::string& line : lines_of(text)) {
+      ++number;
+      for (std::sregex_iterator match(line.begin(), line.end(), link), end; match != end; ++match) {
+        const std::string target = (*match)[1];
+        if (target.find("://") != std::string::npos || target.starts_with("mailto:")) continue;
+        std::string there =
+            (fs::path(path).parent_path() / target).lexically_normal().generic_string();
+        while (there.ends_with('/')) there.pop_back();
+        const auto at = tree.lower_bound(there);
+        const bool folder = at != tree.end() && at->first.starts_with(there + "/");
+        const bool extensionless = there == "LICENSE" || there.starts_with(".");
+        if (!tree.contains(there) && !folder && !extensionless)
+          found.push_back({path, number, "links to " + target + ", which does not exist"});
+      }
+    }
+  }
+  return found;
+}
+
+}  // namespace tangere::house

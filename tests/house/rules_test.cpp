@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+// The project keeps its own rules, and the checkers see a violation when there is one.
+#include "tests/house/rules.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace tangere::house {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::Field;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+auto Says(const std::string& file, int line, const std::string& message) {
+  return AllOf(Field(&Violation::file, file), Field(&Violation::line, line),
+               Field(&Violation::message, HasSubstr(message)));
+}
+
+const Tree& project() {
+  static const Tree tree = read_tree(TANGERE_SOURCE_DIR);
+  return tree;
+}
+
+TEST(House, IsSeenAsAWhole) {
+  for (const char* path :
+       {"kernels/contact_types.hpp", "engine/model.hpp", "tasks/rollout.hpp",
+        "tests/CMakeLists.txt", "cmake/install.cmake", "README.md", "run-demo", ".ci/run"})
+    EXPECT_TRUE(project().contains(path)) << path;
+  for (const auto& [path, text] : project()) {
+    EXPECT_FALSE(path.starts_with("build/") || path.starts_with("out/") ||
+                 path.starts_with(".git/"))
+        << path;
+    EXPECT_FALSE(text.empty()) << path;
+  }
+}
+
+TEST(House, IncludesPointOneWay) { EXPECT_THAT(check_includes(project()), IsEmpty()); }
+TEST(House, KernelsShareNothingAcrossInstructionSets) {
+  EXPECT_THAT(check_kernel_includes(project()), IsEmpty());
+}
+TEST(House, PublicHeadersStandAlone) { EXPECT_THAT(check_public_headers(project()), IsEmpty()); }
+TEST(House, SourcesAreShortAndSayWhy) { EXPECT_THAT(check_sources(project()), IsEmpty()); }
+TEST(House, FoldersAndLinksAreDocumented) { EXPECT_THAT(check_documents(project()), IsEmpty()); }
+
+TEST(HouseRules, SeeAnIncludeThatPointsTheWrongWay) {
+  const Tree tree{
+      {"engine/model.hpp", "#include \"kernels/lanes.hpp\"\n"},
+      {"io/file.hpp", ""},
+      {"kernels/lanes.hpp", "#include <cmath>\n #  include \"engine/model.hpp\"\n"},
+      {"tasks/rollout.cpp", "#include \"io/file.hpp\"\n#include \"engine/model.hpp\"\n"},
+      {"apps/main.cpp", "#include \"io/file.hpp\"\n"}};
+  EXPECT_THAT(check_includes(tree),
+              ElementsAre(Says("kernels/lanes.hpp", 2, "kernels must not include engine"),
+                          Says("tasks/rollout.cpp", 1, "tasks must not include io")));
+}
+
+TEST(HouseRules, SeeANameFromOutsideTheRoot) {
+  const Tree tree{{"engine/deep/a.hpp", "#include \"b.hpp\"\n#include \"c.hpp\"\n"},
+                  {"engine/deep/b.hpp", ""}};
+  EXPECT_THAT(check_includes(tree),
+              ElementsAre(Says("engine/deep/a.hpp", 2, "no file of the project")));
+}
+
+TEST(HouseRules, SeeALibraryInTheWrongFolder) {
+  const Tree tree{
+      {"engine/a.cpp", "#include <vector>\n#include <hdf5.h>\n#include <CLI/CLI.hpp>\n"},
+      {"io/b.cpp", "#include <hdf5.h>\n"},
+      {"kernels/c.cpp", "#include <Eigen/Dense>\n"}};
+  EXPECT_THAT(check_includes(tree),
+              ElementsAre(Says("engine/a.cpp", 2, "<hdf5.h>"), Says("engine/a.cpp", 3, "<CLI/"),
+                          Says("kernels/c.cpp", 1, "<Eigen/Dense>")));
+}
+
+TEST(HouseRules, SeeAFolderNobodyTold) {
+  EXPECT_THAT(check_includes({{"misc/a.cpp", ""}}),
+              ElementsAre(Says("misc/a.cpp", 0, "does not know")));
+}
+
+TEST(HouseRules, SeeAContainerBehindAKernel) {
+  const Tree tree{{"kernels/lu-inl.hpp", "#include \"kernels/view.hpp\"\n#include <cmath>\n"},
+                  {"kernels/view.hpp", "#include <vector>\n"},
+                  {"kernels/table.cpp", "#include <string>\n"}};
+  EXPECT_THAT(check_kernel_includes(tree), ElementsAre(Says("kernels/view.hpp", 1, "<vector>")));
+}
+
+TEST(HouseRules, SeeAPublicHeaderThatLeansOnAPrivateOne) {
+  const Tree tree{
+      {"cmake/install.cmake", "install(FILES engine/a.hpp engine/b.hpp engine/gone.hpp)\n"},
+      {"engine/a.hpp",
+       "#include <vector>\n#include \"engine/b.hpp\"\n#include \"engine/hidden.hpp\"\n"},
+      {"engine/b.hpp", "#include <Eigen/LU>\n"},
+      {"engine/hidden.hpp", ""}};
+  EXPECT_THAT(
+      check_public_headers(tree),
+      ElementsAre(Says("engine/a.hpp", 3, "engine/hidden.hpp"), Says("engine/b.hpp", 1, "Eigen/LU"),
+                  Says("cmake/install.cmake", 0, "engine/gone.hpp")));
+  EXPECT_THAT(check_public_headers({}), Contains(Says("cmake/install.cmake", 0, "missing")));
+}
+
+TEST(HouseRules, SeeAHeadlessOrOverlongSource) {
+  const std::string head = "// SPDX-License-Identifier: Apache-2.0\n// Why.\n";
+  std::string longest = head, too_long = head + "\n";
+  for (int i = 2; i < 600; ++i) longest += "\n", too_long += "\n";
+  const Tree tree{
+      {"engine/bare.hpp", "#pragma once\n"},
+      {"engine/empty.cpp", ""},
+      {"engine/longest.cpp", longest},
+      {"engine/mute.cpp", "// SPDX-License-Identifier: Apache-2.0\n#include <vector>\n"},
+      {"engine/too_long.cpp", too_long},
+      {"run-demo", "#!/usr/bin/env bash\n# SPDX-License-Identifier: Apache-2.0\n"},
+      {"tests/CMakeLists.txt", "add_test()\n"}};
+  EXPECT_THAT(
+      check_sources(tree),
+      ElementsAre(Says("engine/bare.hpp", 1, "SPDX"), Says("engine/bare.hpp", 2, "why"),
+                  Says("engine/empty.cpp", 1, "SPDX"), Says("engine/empty.cpp", 2, "why"),
+                  Says("engine/mute.cpp", 2, "why"), Says("engine/too_long.cpp", 0, "601 lines"),
+                  Says("tests/CMakeLists.txt", 1, "SPDX")));
+}
+
+TEST(HouseRules, SeeAnUndocumentedFolderAndADeadLink) {
+  const std::string page =
+      "# Title\n\nSee [there](../docs/solver.md#newton), [far](https://example.org/x), "
+      "[all](../docs/) and [gone](gone.md).\n";
+  const Tree tree{
+      {"docs/README.md", "# A\n\nB\n"}, {"docs/solver.md", "x"}, {"engine/README.md", page},
+      {"io/README.md", "# io\n"},       {"io/a.cpp", ""},        {"tasks/a.cpp", ""}};
+  EXPECT_THAT(check_documents(tree),
+              ElementsAre(Says("io/README.md", 0, "nothing"), Says("tasks", 0, "no README.md"),
+                          Says("engine/README.md", 3, "gone.md")));
+}
+
+}  // namespace
+}  // namespace tangere::house

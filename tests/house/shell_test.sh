@@ -1,0 +1,170 @@
+#!/usr/bin/env bash
+# shellcheck disable=SC2016  # fakes expand their own variables
+# SPDX-License-Identifier: Apache-2.0
+# run-demo and run-tests on machines that lack things: a PATH of fakes stands for each machine, nothing here is touched.
+# Usage: shell_test.sh PROJECT_ROOT
+set -euo pipefail
+project=$1
+temporary=$(mktemp -d)
+trap 'rm -rf "$temporary"' EXIT
+failures=0
+
+# machine NAME: a folder with a copy of the scripts and a PATH of its own. Fakes log their arguments.
+machine() {
+  name=$1
+  home=$temporary/$name
+  bin=$home/bin
+  log=$home/log
+  mkdir -p "$bin" "$home/project/cmake"
+  : >"$log"
+  cp "$project"/run-demo "$project"/run-tests "$project"/CMakePresets.json "$home/project"
+  cp "$project"/cmake/shell.sh "$project"/cmake/packages.txt "$home/project/cmake"
+  local tool
+  for tool in bash sed grep tr sort head awk env nproc dirname readlink cat mkdir ls ctest sleep; do
+    ln -s "$(type -P "$tool")" "$bin/$tool"
+  done
+  fake id 'echo "${FAKE_UID:-0}"'
+  fake dpkg-query 'for last; do :; done
+    if grep -qx "$last" "$FAKE_HOME/installed"; then echo installed; else exit 1; fi'
+  fake apt-get 'case "$*" in
+    *update*) exit "${FAKE_UPDATE:-0}" ;;
+    *install*) [ "${FAKE_INSTALL:-0}" = 0 ] || exit 100
+      [ -n "${FAKE_LIE:-}" ] || for last; do echo "$last"; done >>"$FAKE_HOME/installed" ;;
+    esac'
+  fake cmake 'if [ "$1" = --version ]; then echo "cmake version ${FAKE_CMAKE:-3.25.1}"; fi'
+  sed -e 's/#.*//' "$project/cmake/packages.txt" >"$home/installed"
+}
+fake() {
+  printf '#!/usr/bin/env bash\necho "%s $*" >>"$FAKE_HOME/log"\n%s\n' "$1" "$2" >"$bin/$1"
+  chmod +x "$bin/$1"
+}
+lacks() { sed -i "/^$1\$/d" "$home/installed"; }
+
+# run [NAME=VALUE…] SCRIPT: from another folder, without a terminal.
+run() {
+  local script=${*: -1}
+  status=0
+  output=$(cd / && env -i PATH="$bin" FAKE_HOME="$home" CI=true "${@:1:$#-1}" "$home/project/$script" </dev/null 2>&1) ||
+    status=$?
+}
+expect() {
+  local what=$1
+  shift
+  if ! "$@"; then
+    failures=$((failures + 1))
+    printf 'FAILED: %s: %s\nstatus %s, output:\n%s\ncalls:\n%s\n\n' "$name" "$what" "$status" "$output" "$(grep -v ^dpkg-query "$log")"
+  fi
+}
+passes() { [ "$status" -eq 0 ]; }
+fails() { [ "$status" -ne 0 ]; }
+prints() { grep -qF -- "$1" <<<"$output"; }
+called() { grep -qF -- "$1" "$log"; }
+not_called() { ! called "$1"; }
+
+# The programs that the demo runs, and a ctest folder with one test per line "name result".
+built() {
+  mkdir -p "$home/project/build/release" "$home/project/build/asan"
+  printf '#!/usr/bin/env bash\necho "tangere $*" >>"$FAKE_HOME/log"\nexit "${FAKE_PROGRAM:-0}"\n' \
+    >"$home/project/build/release/tangere"
+  chmod +x "$home/project/build/release/tangere"
+}
+test_in() {  # PRESET COMMAND
+  printf 'add_test(one "%s")\nset_tests_properties(one PROPERTIES LABELS memory)\n' "$(type -P "$2")" \
+    >"$home/project/build/$1/CTestTestfile.cmake"
+}
+
+machine complete
+built
+run run-demo
+expect "succeeds" passes
+expect "says that nothing is missing" prints "All packages"
+expect "installs nothing" not_called "apt-get"
+expect "runs the main job" called "tangere simulate scenes/rolling_ball.xml"
+expect "draws" called "tangere plot out/rolling_ball.h5"
+run FAKE_PROGRAM=2 run-demo
+expect "fails with the program" fails
+expect "says what failed" prints "the simulation failed"
+run FAKE_CMAKE=3.22.1 run-demo
+expect "refuses an old CMake" fails
+expect "names both versions" prints "3.25 or newer is needed, this machine has 3.22"
+
+machine root
+built
+lacks libtbb-dev
+lacks g++
+run run-demo
+expect "succeeds" passes
+expect "says what it installs" prints "as root, because it writes to /usr): g++ libtbb-dev"
+expect "refreshes the lists" called " update"
+expect "installs only what is missing" called "install -y --no-install-recommends g++ libtbb-dev"
+run FAKE_UPDATE=100 run-demo
+expect "needs it once" prints "All packages"
+
+machine user_with_sudo
+built
+fake sudo 'shift; exec "$@"'
+lacks cmake
+run FAKE_UID=1000 run-demo
+expect "succeeds" passes
+expect "never waits for a password nobody can type" called "sudo -n env DEBIAN_FRONTEND=noninteractive apt-get"
+
+machine user_without_sudo
+lacks cmake
+run FAKE_UID=1000 run-demo
+expect "fails" fails
+expect "says the exact command" prints "As root, run: apt-get update && apt-get install -y cmake"
+expect "does not try" not_called "apt-get"
+
+machine stale_lists
+built
+lacks ninja-build
+run FAKE_UPDATE=100 run-demo
+expect "goes on without fresh lists" passes
+expect "says so" prints "apt-get update failed; trying"
+
+machine offline
+lacks ninja-build
+run FAKE_UPDATE=100 FAKE_INSTALL=100 run-demo
+expect "fails" fails
+expect "says what failed" prints "apt-get could not install the packages"
+expect "says what to do" prints "apt-get install -y ninja-build"
+expect "builds nothing" not_called "cmake --build"
+
+machine apt_lies
+lacks ninja-build
+run FAKE_LIE=1 run-demo
+expect "fails" fails
+expect "names what is still missing" prints "still not installed: ninja-build"
+
+machine another_distribution
+rm "$bin/dpkg-query"
+run run-demo
+expect "fails" fails
+expect "lists what is needed" prints "libhdf5-dev"
+
+machine tests
+built
+test_in release true
+test_in asan true
+run run-tests
+expect "passes" passes
+expect "ends with ctest's closing lines" grep -q "^Total Test time" <<<"$(tail -n 1 <<<"$output")"
+expect "counts" prints "100% tests passed, 0 tests failed out of 1"
+test_in asan false
+run run-tests
+expect "fails when a sanitizer finds something" fails
+expect "says where" prints "failed under the sanitizers"
+test_in asan true
+test_in release false
+run run-tests
+expect "fails with a test" fails
+expect "shows it" prints "0% tests passed, 1 tests failed out of 1"
+: >"$home/project/build/release/CTestTestfile.cmake"
+run run-tests
+expect "fails when no test ran" fails
+
+if [ "$failures" -gt 0 ]; then
+  echo "$failures expectations failed"
+  exit 1
+fi
+echo "all expectations met"
