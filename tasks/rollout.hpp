@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// An unattended rollout: controls in, rows out. Serial; the flow graph over blocks takes its place later.
+// An unattended rollout: controls in, rows out. Serial; the flow graph over blocks takes its place
+// later.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "engine/batch.hpp"
@@ -17,23 +19,40 @@ struct RolloutOptions {
   int every = 0;  ///< tactile every k-th step; 0: the scene's `every`, or 1 where it has none
 };
 
-struct RolloutSummary {
-  std::int64_t environment_steps = 0;
-  std::int64_t newton_iterations = 0;
-  std::int64_t split_steps = 0;
-  std::vector<int> failed_environments;
-  double seconds = 0;  ///< wall clock of the whole rollout, sink included
+/// An environment that no solution was found for. It keeps the state before that step.
+struct FailedEnvironment {
+  int environment;
+  std::int64_t step;  ///< the first that failed
+  StepStatus status;  ///< why
 };
 
-/// Called after each step with the number done; return false to stop at this safe point.
-using RolloutProgress = bool (*)(std::int64_t done, void* context);
+struct RolloutSummary {
+  std::int64_t steps = 0;              ///< done: fewer than asked when the caller stopped it
+  std::int64_t environment_steps = 0;  ///< tried, failing ones included
+  std::int64_t newton_iterations = 0;
+  std::int64_t split_steps = 0;
+  std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
+  bool stopped = false;                     ///< progress returned false
+  double seconds = 0;                       ///< wall clock of the whole rollout, sink included
+};
 
-/// Rows of a tactile sensor are read after steps K, 2K, …: field k comes from row (k + 1) K of q.
+/// Called after each step with the number done; returns false to stop at this safe point.
+using RolloutProgress = std::function<bool(std::int64_t done)>;
+
+/// Steps the batch and hands every row to the sink: row 0 of the state, then for each step its
+/// StepRow, the StateRow after it and the tactile rows due. Rows of a tactile sensor are read after
+/// steps K, 2K, …: field k comes from row (k + 1) K of q. In a StepRow, an environment that failed
+/// earlier has 0 iterations and its last status and residual. Throws InputError when steps < 1,
+/// every < 0, a table of controls is too short or was laid out for another timestep, and passes on
+/// what the sink throws.
 RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram& controls,
-                           const RolloutOptions& options, RowSink& sink, RolloutProgress progress = nullptr,
-                           void* context = nullptr);
+                           const RolloutOptions& options, RowSink& sink,
+                           const RolloutProgress& progress = {});
 
 /// The step between fields of a sensor under these options.
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options);
+
+/// Memory that a rollout allocates besides batch and stepper [bytes].
+double rollout_bytes(const Model& model, int environments);
 
 }  // namespace tangere

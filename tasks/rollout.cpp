@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// The serial rollout. Buffers are made once; rows leave in ascending order.
+#include "tasks/rollout.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+
+#include "engine/readout.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kPoseWidth = 7, kTwistWidth = 6, kForceWidth = 3;
+
+/// Numbers of one environment in the largest tactile field.
+std::size_t largest_field(const Model& model) {
+  std::size_t largest = 0;
+  for (const SensorInfo& sensor : model.sensors())
+    largest = std::max(largest, static_cast<std::size_t>(sensor.points) * kForceWidth);
+  return largest;
+}
+
+/// Copies a batch row by row into dense arrays and hands them on.
+class Recorder {
+ public:
+  Recorder(const Batch& batch, RowSink& sink)
+      : batch_(batch), sink_(sink), readout_(batch.model()), environments_(batch.environments()) {
+    const Model& model = batch.model();
+    const auto e = static_cast<std::size_t>(environments_);
+    q_.resize(e * static_cast<std::size_t>(model.nq()));
+    v_.resize(e * static_cast<std::size_t>(model.nv()));
+    pose_.resize(e * static_cast<std::size_t>(model.nb()) * kPoseWidth);
+    twist_.resize(e * static_cast<std::size_t>(model.nb()) * kTwistWidth);
+    force_.resize(e * largest_field(model));
+    iterations_.resize(e);
+    status_.resize(e);
+  }
+
+  void write_state(std::int64_t step, double time) {
+    for (int e = 0; e < environments_; ++e) {
+      batch_.get_q(e, part(q_, e));
+      batch_.get_v(e, part(v_, e));
+      readout_.bodies(batch_, e, part(pose_, e), part(twist_, e));
+    }
+    sink_.write(StateRow{step, time, q_, v_, pose_, twist_});
+  }
+
+  /// `live` is what the environments were before the step.
+  void write_step(std::int64_t step, std::span<const double> u, const std::vector<bool>& live) {
+    for (int e = 0; e < environments_; ++e) {
+      const auto i = static_cast<std::size_t>(e);
+      iterations_[i] = live[i] ? batch_.iterations(e) : 0;
+      status_[i] = static_cast<std::int8_t>(batch_.status(e));
+    }
+    sink_.write(StepRow{step, u, iterations_, status_, batch_.residuals()});
+  }
+
+  void write_field(int sensor, std::int64_t frame, std::int64_t step) {
+    const auto points =
+        static_cast<std::size_t>(batch_.model().sensors()[static_cast<std::size_t>(sensor)].points);
+    const std::span<double> field =
+        std::span(force_).first(static_cast<std::size_t>(environments_) * points * kForceWidth);
+    for (int e = 0; e < environments_; ++e) readout_.tactile(batch_, e, sensor, part(field, e));
+    sink_.write(TactileRow{sensor, frame, step, field});
+  }
+
+ private:
+  [[nodiscard]] std::span<double> part(std::span<double> all, int environment) const {
+    const std::size_t width = all.size() / static_cast<std::size_t>(environments_);
+    return all.subspan(static_cast<std::size_t>(environment) * width, width);
+  }
+
+  const Batch& batch_;
+  RowSink& sink_;
+  Readout readout_;
+  int environments_;
+  std::vector<double> q_, v_, pose_, twist_;  // as in StateRow
+  std::vector<double> force_;                 // shared by the sensors
+  std::vector<std::int32_t> iterations_;
+  std::vector<std::int8_t> status_;
+};
+
+void check(const Stepper& stepper, const ControlProgram& controls, const RolloutOptions& options) {
+  if (options.steps < 1)
+    throw InputError("a rollout of " + std::to_string(options.steps) +
+                     " steps; expected at least 1");
+  if (options.every < 0)
+    throw InputError("tactile every " + std::to_string(options.every) +
+                     " steps; expected 1 or more, or 0 for the scene's own");
+  if (controls.timestep() != stepper.timestep())
+    throw InputError("controls laid out for a timestep of " + std::to_string(controls.timestep()) +
+                     " s; the stepper's is " + std::to_string(stepper.timestep()) + " s");
+  controls.check_covers(options.steps);
+}
+
+/// Counts one step's outcome into the summary; environments that failed in it leave `live`.
+void count(const Batch& batch, std::int64_t step, std::vector<bool>& live,
+           RolloutSummary& summary) {
+  for (int e = 0; e < batch.environments(); ++e) {
+    if (!live[static_cast<std::size_t>(e)]) continue;
+    const StepStatus status = batch.status(e);
+    ++summary.environment_steps;
+    summary.newton_iterations += batch.iterations(e);
+    summary.split_steps += status == StepStatus::split ? 1 : 0;
+    if (!failed(status)) continue;
+    summary.failures.push_back({e, step, status});
+    live[static_cast<std::size_t>(e)] = false;
+  }
+}
+
+}  // namespace
+
+int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options) {
+  if (options.every > 0) return options.every;
+  return sensor.every > 0 ? sensor.every : 1;
+}
+
+double rollout_bytes(const Model& model, int environments) {
+  const double numbers = model.nq() + model.nv() + model.nu() +
+                         double{kPoseWidth + kTwistWidth} * model.nb() +
+                         static_cast<double>(largest_field(model));
+  constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
+  return environments * (numbers * sizeof(double) + kFlags);
+}
+
+RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram& controls,
+                           const RolloutOptions& options, RowSink& sink,
+                           const RolloutProgress& progress) {
+  check(stepper, controls, options);
+  const auto start = std::chrono::steady_clock::now();
+  const auto sensors = batch.model().sensors();
+  const auto environments = static_cast<std::size_t>(batch.environments());
+  const auto nu = static_cast<std::size_t>(batch.model().nu());
+  Recorder recorder(batch, sink);
+  RolloutSummary summary;
+  std::vector<double> u(environments * nu);
+  std::vector<bool> live(environments);
+  for (std::size_t e = 0; e < environments; ++e) live[e] = !failed(batch.statuses()[e]);
+
+  recorder.write_state(0, 0);
+  for (std::int64_t t = 0; t < options.steps; ++t) {
+    for (std::size_t e = 0; e < environments; ++e)
+      controls.evaluate(t, batch.episode(static_cast<int>(e)), std::span(u).subspan(e * nu, nu));
+    stepper.step(batch, u);
+    recorder.write_step(t, u, live);
+    count(batch, t, live, summary);
+    // From the counter, so that it does not drift.
+    recorder.write_state(t + 1, static_cast<double>(t + 1) * stepper.timestep());
+    for (std::size_t s = 0; s < sensors.size(); ++s) {
+      const int every = tactile_interval(sensors[s], options);
+      if ((t + 1) % every == 0)
+        recorder.write_field(static_cast<int>(s), (t + 1) / every - 1, t + 1);
+    }
+    summary.steps = t + 1;
+    summary.stopped = progress && !progress(t + 1);
+    if (summary.stopped) break;
+  }
+  summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return summary;
+}
+
+}  // namespace tangere
