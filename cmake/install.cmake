@@ -14,7 +14,6 @@ target_link_libraries(tangere_umbrella INTERFACE tangere::tasks tangere::io)
 set_target_properties(tangere_umbrella PROPERTIES EXPORT_NAME tangere)
 
 foreach(library kernels engine tasks io)
-  set_target_properties(tangere_${library} PROPERTIES EXPORT_NAME ${library})
   target_include_directories(tangere_${library} INTERFACE
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${headers}>)
   target_compile_features(tangere_${library} INTERFACE cxx_std_20)
