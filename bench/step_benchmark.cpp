@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// Environment-steps per second of the rolling ball on one thread, by batch size: what the whole program can do at best.
+#include <benchmark/benchmark.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "engine/control.hpp"
+#include "engine/readout.hpp"
+#include "engine/stepper.hpp"
+#include "io/scene_reader.hpp"
+#include "kernels/isa.hpp"
+#include "tasks/rollout.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr std::uint64_t kSeed = 1;
+
+/// The scene's own run: its controls, its length, its tactile interval.
+class RollingBall {
+ public:
+  explicit RollingBall(int environments)
+      : model_(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene),
+        start_(model_, environments, kSeed),
+        batch_(start_),
+        stepper_(model_),
+        readout_(model_),
+        program_(model_, model_.timestep(), kSeed),
+        row_(std::size_t(environments) * std::size_t(model_.nu())) {
+    const auto nu = std::size_t(model_.nu());
+    controls_.resize(std::size_t(program_.steps()) * row_);
+    for (std::int64_t t = 0; t < program_.steps(); ++t)
+      for (int e = 0; e < environments; ++e)
+        program_.evaluate(t, start_.episode(e),
+                          {&controls_[std::size_t(t) * row_ + std::size_t(e) * nu], nu});
+    for (const SensorInfo& sensor : model_.sensors()) {
+      intervals_.push_back(tactile_interval(sensor, {}));
+      fields_.emplace_back(3 * std::size_t(sensor.points));
+    }
+  }
+
+  /// Every run starts from the same state and therefore takes the same steps.
+  void restore() { batch_ = start_; }
+  /// Returns the Newton passes of all environments.
+  std::int64_t run() {
+    std::int64_t passes = 0;
+    for (std::int64_t t = 0; t < program_.steps(); ++t) {
+      stepper_.step(batch_, {&controls_[std::size_t(t) * row_], row_});
+      for (const std::int32_t i : batch_.iterations()) passes += i;
+      for (std::size_t s = 0; s < fields_.size(); ++s)
+        if ((t + 1) % intervals_[s] == 0) read(int(s));
+    }
+    return passes;
+  }
+
+  [[nodiscard]] std::int64_t steps() const { return program_.steps(); }
+  [[nodiscard]] int failed_count() const { return batch_.failed_count(); }
+
+ private:
+  void read(int sensor) {
+    for (int e = 0; e < batch_.environments(); ++e) {
+      readout_.tactile(batch_, e, sensor, fields_[std::size_t(sensor)]);
+      benchmark::DoNotOptimize(fields_[std::size_t(sensor)].data());
+      benchmark::ClobberMemory();
+    }
+  }
+
+  Model model_;
+  Batch start_, batch_;
+  Stepper stepper_;
+  Readout readout_;
+  ControlProgram program_;
+  std::size_t row_;               // numbers in the controls of one step, (E, nu)
+  std::vector<double> controls_;  // (T, E, nu)
+  std::vector<int> intervals_;
+  std::vector<std::vector<double>> fields_;  // per sensor (points, 3), one environment at a time
+};
+
+void BM_RollingBall(benchmark::State& state) {
+  const auto environments = static_cast<int>(state.range(0));
+  RollingBall ball(environments);
+  ball.run();  // warms caches and pages; its state is thrown away
+  std::int64_t passes = 0;
+  for (auto _ : state) {
+    state.PauseTiming();
+    ball.restore();
+    state.ResumeTiming();
+    passes += ball.run();
+  }
+  if (ball.failed_count() > 0) state.SkipWithError("an environment failed");
+  const auto steps = double(state.iterations()) * double(ball.steps()) * environments;
+  state.counters["env_steps/s"] = benchmark::Counter(steps, benchmark::Counter::kIsRate);
+  state.counters["newton/step"] = double(passes) / steps;
+  state.SetLabel(kernels::active_isa_name());
+}
+BENCHMARK(BM_RollingBall)
+    ->ArgName("envs")
+    ->Arg(1)
+    ->Arg(16)
+    ->Arg(256)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+
+}  // namespace
+}  // namespace tangere
