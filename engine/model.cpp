@@ -12,6 +12,7 @@ int Model::nq() const { return compiled_->nq; }
 int Model::nv() const { return compiled_->nv; }
 int Model::nu() const { return compiled_->nu; }
 int Model::nb() const { return static_cast<int>(compiled_->bodies.size()); }
+double Model::mass(int body) const { return compiled_->bodies[std::size_t(body)].mass; }
 double Model::timestep() const { return compiled_->scene.timestep; }
 Integrator Model::integrator() const { return compiled_->scene.integrator; }
 const SolverOptions& Model::solver() const { return compiled_->scene.solver; }

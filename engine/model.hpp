@@ -48,6 +48,7 @@ class Model {
   [[nodiscard]] int nv() const;  ///< velocity dofs
   [[nodiscard]] int nu() const;  ///< controls: motors in file order, each dof in turn
   [[nodiscard]] int nb() const;  ///< bodies of the scene, folded or not, in file order
+  [[nodiscard]] double mass(int body) const;     ///< [kg]
   [[nodiscard]] double timestep() const;         ///< [s]
   [[nodiscard]] Integrator integrator() const;
   [[nodiscard]] const SolverOptions& solver() const;

@@ -133,6 +133,7 @@ struct ConstantControl {
 struct PiecewiseControl {               ///< values[k] holds from times[k] until times[k+1]; times[0] = 0
   std::vector<double> times;            ///< [s], ascending
   std::vector<std::vector<double>> values;
+  double end = 0;                       ///< [s] length of the run it describes; 0: open
 };
 struct CsvControl {
   std::vector<std::vector<double>> rows;  ///< one row per step; read by io; fewer rows than steps is an error

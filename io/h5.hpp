@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// The part of HDF5 that our files need, with identifiers that close themselves and errors that are
+// exceptions carrying the library's own reason instead of text printed on stderr.
+//
+// Every function throws IoError: "cannot <operation> '<object>' in '<file>': <reason>".
+#pragma once
+
+#include <hdf5.h>
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tangere::h5 {
+
+/// An identifier of the library (file, group, dataset, attribute, type …), closed when it goes.
+class Id {
+ public:
+  Id() = default;
+  explicit Id(hid_t id) : id_(id) {}
+  Id(Id&& other) noexcept : id_(other.id_) { other.id_ = -1; }
+  Id& operator=(Id&& other) noexcept {
+    if (this != &other) {
+      reset();
+      id_ = other.id_;
+      other.id_ = -1;
+    }
+    return *this;
+  }
+  ~Id() { reset(); }
+
+  [[nodiscard]] hid_t get() const { return id_; }
+  /// Closes; failures are dropped, because only cleaning up calls it. To keep data, use close_file.
+  void reset() noexcept;
+  /// Forgets an identifier that was closed otherwise.
+  void release() noexcept { id_ = -1; }
+
+ private:
+  hid_t id_ = -1;
+};
+
+using Dims = std::vector<hsize_t>;
+
+/// Creates a file, replacing what is at `path`. Readable by HDF5 1.8 and later; two runs that write
+/// the same numbers write the same bytes.
+Id create_file(const std::string& path);
+/// Opens a file for reading.
+Id open_file(const std::string& path);
+/// Flushes and closes a file; unlike Id::reset, it reports what could not be written.
+void close_file(Id& file, const std::string& path);
+
+Id create_group(const Id& parent, const std::string& name);
+Id open_group(const Id& parent, const std::string& name);
+[[nodiscard]] bool has_link(const Id& parent, const std::string& name);
+
+/// How a dataset lies on disk.
+struct Storage {
+  Dims chunk;             ///< empty: contiguous
+  bool compress = false;  ///< shuffle, then deflate level 1; needs a chunk shape
+};
+
+/// T: double, std::int8_t, std::int32_t, std::int64_t, std::uint64_t. On disk: little endian.
+template <class T>
+Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
+                  const Storage& storage = {});
+Id open_dataset(const Id& parent, const std::string& name);
+[[nodiscard]] Dims dimensions(const Id& dataset);
+
+/// Writes the box [offset, offset + count) from `data`, dense and row-major.
+template <class T>
+void write_box(const Id& dataset, const Dims& offset, const Dims& count, const T* data);
+/// Reads the box [offset, offset + count) into `data`. Numbers are converted to T.
+template <class T>
+void read_box(const Id& dataset, const Dims& offset, const Dims& count, T* data);
+
+/// Text attributes are variable-length UTF-8, which h5py shows as str. Text must not contain NUL.
+void write_attribute(const Id& object, const std::string& name, std::string_view text);
+void write_attribute(const Id& object, const std::string& name, std::span<const std::string> texts);
+/// One number, or a list of them. T as for create_dataset.
+template <class T>
+void write_scalar(const Id& object, const std::string& name, T value);
+template <class T>
+void write_list(const Id& object, const std::string& name, std::span<const T> values);
+
+[[nodiscard]] std::string read_text(const Id& object, const std::string& name);
+[[nodiscard]] std::vector<std::string> read_texts(const Id& object, const std::string& name);
+/// The elements of a numeric attribute, whatever its rank (a scalar gives one).
+template <class T>
+[[nodiscard]] std::vector<T> read_numbers(const Id& object, const std::string& name);
+
+}  // namespace tangere::h5

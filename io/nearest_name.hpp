@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// The valid name a mistyped one most resembles, for error messages.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace tangere {
+
+/// The candidate with the smallest edit distance; "" when none is near (more than half of it would change).
+std::string nearest_name(std::string_view wrong, std::span<const std::string> candidates);
+
+/// "; did you mean 'x'?" or "; expected one of a, b, c" or "" when there are no candidates.
+std::string suggestion(std::string_view wrong, std::span<const std::string> candidates);
+
+}  // namespace tangere

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+// The file as a whole: options, defaults, the tree of links. What hangs on the tree is read in scene_sections.cpp.
+#include "io/scene_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <set>
+
+#include "engine/compiled_model.hpp"
+#include "io/scene_sections.hpp"
+
+namespace tangere {
+
+namespace {
+
+constexpr std::uintmax_t kLargestFile = 64U << 20;  // a scene is text written by people
+constexpr int kLargestResolution = 1000;            // nodes along one edge of a cuboid
+constexpr int kDeepestTree = 200;
+
+const std::vector<std::string> kJointTypes = {"fixed",     "revolute",       "prismatic", "planar",
+                                              "free2d",    "translational",  "spherical", "spherical-euler",
+                                              "spherical-exp", "free3d",     "free3d-euler", "free3d-exp"};
+constexpr JointType kJointTypeOf[] = {JointType::fixed,     JointType::revolute,      JointType::prismatic,
+                                      JointType::planar,    JointType::free2d,        JointType::translational,
+                                      JointType::spherical, JointType::spherical,     JointType::spherical,
+                                      JointType::free,      JointType::free,          JointType::free};
+
+class TreeReader {
+ public:
+  explicit TreeReader(Scene& scene) : scene_(scene) {}
+
+  void read_robot(const SceneNode& robot) {
+    robot.check_attributes({"name"});
+    for (const SceneNode& link : robot.children({"link"})) read_link(link, -1, 0);
+  }
+
+ private:
+  void read_link(const SceneNode& node, int parent, int depth) {
+    if (depth > kDeepestTree) node.fail(fmt::format("links nested deeper than {}", kDeepestTree));
+    node.check_attributes({"name"}, {}, {"design_params"});
+    LinkDescription link;
+    link.name = node.text("name");
+    link.parent = parent;
+    unique("link", link.name, node);
+    std::vector<SceneNode> inner;
+    int joints = 0, bodies = 0;
+    for (const SceneNode& child : node.children({"joint", "body", "link"})) {
+      if (child.name() == "joint") {
+        if (++joints > 1) child.fail("a second joint in link '" + link.name + "'; expected one");
+        link.joint = read_joint(child, parent);
+      } else if (child.name() == "body") {
+        if (++bodies > 1) child.fail("a second body in link '" + link.name + "'; expected one");
+        link.body = read_body(child);
+      } else {
+        inner.push_back(child);
+      }
+    }
+    if (joints == 0) node.fail("link '" + link.name + "' has no <joint>");
+    if (bodies == 0) node.fail("link '" + link.name + "' has no <body>");
+    const int index = static_cast<int>(scene_.links.size());
+    const kernels::Frame<double> at = to_frame(link.joint.pose);
+    world_.push_back(parent < 0 ? at : compose(world_[std::size_t(parent)], at));
+    scene_.links.push_back(std::move(link));
+    for (const SceneNode& child : inner) read_link(child, index, depth + 1);
+  }
+
+  void unique(const std::string& kind, const std::string& name, const SceneNode& node) {
+    if (!names_.insert(kind + "/" + name).second) node.fail(kind + " name '" + name + "' is used twice");
+  }
+
+  JointDescription read_joint(const SceneNode& node, int parent) {
+    const double length = node.context().length;
+    JointDescription joint;
+    joint.source = node.source();
+    joint.name = node.text("name");
+    unique("joint", joint.name, node);
+    joint.type = kJointTypeOf[node.choice("type", kJointTypes)];
+    std::vector<std::string> used = {"name", "type", "pos", "quat", "frame", "damping"};
+    std::vector<std::string> idle = {"lim", "lim_stiffness", "axis", "axis0", "axis1"};
+    const auto take = [&](const char* attribute) {
+      used.emplace_back(attribute);
+      idle.erase(std::find(idle.begin(), idle.end(), attribute));
+    };
+    if (joint.type == JointType::revolute || joint.type == JointType::prismatic) {
+      take("axis");
+      joint.axis0 = node.direction("axis");
+    } else if (joint.type == JointType::planar) {
+      take("axis0");
+      take("axis1");
+      joint.axis0 = node.direction("axis0");
+      joint.axis1 = node.direction("axis1");
+    }
+    for (const char* later : {"stiffness", "rest", "armature"})
+      if (node.has(later)) node.fail(fmt::format("'{}' is not simulated by this version; supported: damping", later));
+    if (joint.type != JointType::fixed && node.has("lim") && node.number("lim_stiffness", 0.0) != 0)
+      node.fail("joint limits ('lim' with 'lim_stiffness') are not simulated by this version; remove them");
+    node.check_attributes(used, {}, idle);
+    joint.pose.position = scaled(node.vector("pos", Vector3{0, 0, 0}), length);
+    joint.pose.orientation = node.quaternion("quat");
+    if (node.choice("frame", {"LOCAL", "WORLD"}, 0) == 1 && parent >= 0) joint.pose = in_parent(joint.pose, parent);
+    const bool turns = joint.type == JointType::revolute || joint.type == JointType::spherical;
+    joint.damping = node.not_negative("damping", 0.0) * (turns ? node.context().rotational : node.context().damping_force);
+    return joint;
+  }
+
+  /// A pose given in the world, in the frame of a parent joint at rest.
+  [[nodiscard]] Pose in_parent(const Pose& pose, int parent) const {
+    const kernels::Frame<double> local = relative(world_[std::size_t(parent)], to_frame(pose));
+    const kernels::Quat<double> q = quaternion_of(local.R);
+    return {{local.p.x, local.p.y, local.p.z}, {q.w, q.x, q.y, q.z}};
+  }
+
+  BodyDescription read_body(const SceneNode& node) {
+    const double length = node.context().length;
+    BodyDescription body;
+    body.source = node.source();
+    body.name = node.text("name");
+    unique("body", body.name, node);
+    const std::vector<std::string> common = {"name", "type", "pos", "quat", "density", "rgba"};
+    std::vector<std::string> used = common;
+    std::vector<std::string> idle = {"scale", "general_contact_resolution", "general_contact_angle_resolution",
+                                     "general_contact_radius_resolution", "size", "radius", "length"};
+    const auto take = [&](const char* attribute) {
+      used.emplace_back(attribute);
+      idle.erase(std::find(idle.begin(), idle.end(), attribute));
+    };
+    const std::vector<std::string> types = {"sphere", "cuboid", "cylinder", "capsule", "mesh", "abstract"};
+    const int type = node.choice("type", types);
+    if (type == 0) {
+      take("radius");
+      body.shape = SphereShape{node.positive("radius") * length};
+    } else if (type == 1) {
+      take("size");
+      take("general_contact_resolution");
+      body.shape = read_cuboid(node, length);
+    } else {
+      node.fail("bodies of type '" + types[std::size_t(type)] +
+                "' are not simulated by this version; supported: sphere, cuboid");
+    }
+    node.check_attributes(used, {"texture"}, idle);
+    body.pose.position = scaled(node.vector("pos", Vector3{0, 0, 0}), length);
+    body.pose.orientation = node.quaternion("quat");
+    body.density = node.positive("density", 1.0) * node.context().density;
+    if (node.has("rgba")) {
+      const std::vector<double> c = node.numbers("rgba");
+      if (c.size() != 3 && c.size() != 4) node.fail(fmt::format("rgba has {} numbers; expected 3 or 4", c.size()));
+      std::copy(c.begin(), c.end(), body.rgba.begin());
+    }
+    return body;
+  }
+
+  static CuboidShape read_cuboid(const SceneNode& node, double length) {
+    CuboidShape shape;
+    shape.size = scaled(node.vector("size"), length);
+    for (double s : shape.size)
+      if (!(s > 0)) node.fail(fmt::format("size has the edge {} m; expected positive lengths", s));
+    if (node.has("general_contact_resolution")) {
+      const std::vector<double> n = node.numbers("general_contact_resolution", 3);
+      for (int i = 0; i < 3; ++i) {
+        if (n[i] != std::floor(n[i]) || n[i] < 2 || n[i] > kLargestResolution)
+          node.fail(fmt::format("general_contact_resolution has {}; expected integers from 2 to {}", n[i], kLargestResolution));
+        shape.contact_resolution[i] = static_cast<int>(n[i]);
+      }
+    }
+    return shape;
+  }
+
+  Scene& scene_;
+  std::set<std::string> names_;
+  std::vector<kernels::Frame<double>> world_;  // rest pose of each joint
+};
+
+void read_option(Scene& scene, const SceneNode& node) {
+  SceneContext& c = node.context();
+  node.check_attributes({"gravity", "timestep", "integrator", "unit"});
+  scene.gravity = scaled(node.vector("gravity", Vector3{0, 0, -9.8 / c.length}), c.length);
+  scene.timestep = node.positive("timestep", 0.02);
+  constexpr Integrator kBy[] = {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit};
+  scene.integrator = kBy[node.choice("integrator", {"BDF1", "BDF2", "SDIRK2", "linear-implicit"}, 0)];
+}
+
+void read_solver(Scene& scene, const SceneNode& node) {
+  node.check_attributes({"tol", "max_iter"}, {}, {"max_ls"});
+  scene.solver.tolerance = node.positive("tol", scene.solver.tolerance);
+  scene.solver.max_iterations = node.integer("max_iter", 1, 100000, scene.solver.max_iterations);
+}
+
+void read_defaults(const SceneNode& node) {
+  const std::map<std::string, std::vector<std::string>> known = {
+      {"joint", {"damping", "lim_stiffness"}},
+      {"body", {"density", "scale", "rgba"}},
+      {"general_primitive_contact", {"kn", "kt", "mu", "damping", "render", "law", "ramp"}},
+      {"ground_contact", {"kn", "kt", "mu", "damping", "render", "law", "ramp"}},
+      {"tactile", {"kn", "kt", "mu", "damping", "render", "law", "every"}},
+      {"motor", {"P", "D", "ctrl_range"}},
+      {"endeffector", {"radius", "rgba"}}};
+  std::vector<std::string> names;
+  for (const auto& [name, attributes] : known) names.push_back(name);
+  for (const SceneNode& child : node.children(names)) {
+    const std::vector<std::string>& attributes = known.at(child.name());
+    child.check_attributes(attributes);
+    for (const std::string& a : attributes)
+      if (child.has(a.c_str())) node.context().defaults[child.name()][a] = child.text(a.c_str());
+  }
+}
+
+void read_root(const SceneNode& root, Scene& scene) {
+  if (root.name() != "redmax" && root.name() != "tangere")
+    root.fail("not a scene; expected the root <redmax> or <tangere>");
+  root.check_attributes({"model", "name"});
+  scene.name = root.text("model", root.text("name", "scene"));
+  const std::vector<SceneNode> sections =
+      root.children({"option", "solver_option", "ground", "default", "robot", "actuator", "sensor", "contact",
+                     "variable", "virtual", "initial", "control", "randomize"});
+  const auto each = [&](const char* name, auto&& read) {
+    for (const SceneNode& s : sections)
+      if (s.name() == name) read(s);
+  };
+  const auto once = [&](const char* name, auto&& read) {
+    int count = 0;
+    each(name, [&](const SceneNode& s) {
+      if (++count > 1) s.fail("given twice; expected once");
+      read(s);
+    });
+    return count > 0;
+  };
+  // Units first: every other number depends on them. Then whatever later sections refer to.
+  SceneContext& c = root.context();
+  bool metres = false;
+  each("option", [&](const SceneNode& s) { metres = s.choice("unit", {"cm-g", "m-kg"}, 0) == 1; });
+  if (!metres) c.use_centimetres_and_grams();
+  scene.timestep = 0.02;
+  scene.integrator = Integrator::bdf1;
+  scene.gravity = {0, 0, -9.8};
+  once("option", [&](const SceneNode& s) { read_option(scene, s); });
+  once("solver_option", [&](const SceneNode& s) { read_solver(scene, s); });
+  each("default", [&](const SceneNode& s) { read_defaults(s); });
+  once("ground", [&](const SceneNode& s) {
+    s.check_attributes({"pos", "normal"}, {"size", "texture", "rgba"});
+    scene.ground = GroundDescription{scaled(s.vector("pos", Vector3{0, 0, 0}), c.length),
+                                     s.direction("normal", Vector3{0, 0, 1})};
+  });
+  TreeReader tree(scene);
+  each("robot", [&](const SceneNode& s) { tree.read_robot(s); });
+  if (scene.links.empty()) root.fail("no <link> in any <robot>: there is nothing to simulate");
+  each("actuator", [&](const SceneNode& s) { read_actuators(scene, s); });
+  each("contact", [&](const SceneNode& s) { read_contacts(scene, s); });
+  each("sensor", [&](const SceneNode& s) { read_sensors(scene, s); });
+  each("variable", [&](const SceneNode& s) {
+    s.fail("variables and end effectors are not simulated by this version; remove them");
+  });
+  each("virtual", [&](const SceneNode& s) { s.warn("shapes for pictures only; ignored"); });
+  each("initial", [&](const SceneNode& s) { read_initial(scene, s); });
+  once("control", [&](const SceneNode& s) { read_control(scene, s); });
+  once("randomize", [&](const SceneNode& s) { read_randomize(scene, s); });
+}
+
+}  // namespace
+
+SceneFile parse_scene(const std::string& text, const std::string& name, const SceneReadOptions& options) {
+  tinyxml2::XMLDocument document;
+  if (text.find('\0') != std::string::npos) throw InputError(name + ": holds a zero byte; expected XML text");
+  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
+    const int line = document.ErrorLineNum();
+    throw InputError(fmt::format("{}:{}: not well-formed XML ({})", name, std::max(line, 1),
+                                 tinyxml2::XMLDocument::ErrorIDToName(document.ErrorID())));
+  }
+  const tinyxml2::XMLElement* root = document.RootElement();
+  if (root == nullptr) throw InputError(name + ":1: no element; expected the root <redmax> or <tangere>");
+  SceneContext context;
+  context.file = name;
+  context.allow_unknown = options.allow_unknown;
+  SceneFile out;
+  read_root(SceneNode(*root, context), out.scene);
+  out.scene.path = name;
+  out.scene.text = text;
+  out.warnings = std::move(context.warnings);
+  return out;
+}
+
+SceneFile read_scene(const std::filesystem::path& path, const SceneReadOptions& options) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) throw IoError(path.string() + ": is a folder; expected a scene file");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw IoError(path.string() + ": cannot be opened for reading");
+  if (std::filesystem::file_size(path, error) > kLargestFile && !error)
+    throw InputError(path.string() + ": larger than 64 MiB; expected a scene file");
+  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  if (file.bad()) throw IoError(path.string() + ": reading failed");
+  return parse_scene(text, path.string(), options);
+}
+
+}  // namespace tangere

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run of a scene starts from, is driven by, and varies: <initial>, <control>, <randomize>.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "io/csv.hpp"
+#include "io/scene_sections.hpp"
+
+namespace tangere {
+
+namespace {
+
+std::vector<double> read_coordinates(const SceneNode& node, const char* attribute, JointType type, int count) {
+  std::vector<double> x = node.numbers(attribute, std::size_t(count));
+  for (int i = 0; i < count; ++i) x[std::size_t(i)] *= coordinate_scale(type, i, node.context());
+  return x;
+}
+
+void check_controls(const Scene& scene, const SceneNode& node, std::size_t found) {
+  const int expected = control_count(scene);
+  if (found != std::size_t(expected))
+    node.fail(fmt::format("{} control values; the motors take {}", found, expected));
+}
+
+PiecewiseControl read_piecewise(const Scene& scene, const SceneNode& node) {
+  PiecewiseControl control;
+  node.check_attributes({"end"});
+  control.end = node.has("end") ? node.positive("end") : 0;
+  for (const SceneNode& at : node.children({"at"})) {
+    at.check_attributes({"time", "value"});
+    const double time = at.not_negative("time");
+    if (control.times.empty() && time != 0) at.fail(fmt::format("time=\"{}\"; the first must be 0", time));
+    if (!control.times.empty() && !(time > control.times.back()))
+      at.fail(fmt::format("time=\"{}\" does not come after {}", time, control.times.back()));
+    control.times.push_back(time);
+    control.values.push_back(at.numbers("value"));
+    check_controls(scene, at, control.values.back().size());
+  }
+  if (control.times.empty()) node.fail("no <at time value>; expected at least one");
+  if (control.end > 0 && !(control.end > control.times.back()))
+    node.fail(fmt::format("end=\"{}\" does not come after the last time {}", control.end, control.times.back()));
+  return control;
+}
+
+/// Exactly one of uniform, log_uniform, normal, list; numbers times `scale`.
+Distribution read_distribution(const SceneNode& node, double scale) {
+  Distribution d;
+  const char* const kinds[] = {"uniform", "log_uniform", "normal", "list"};
+  int found = 0;
+  for (int k = 0; k < 4; ++k) {
+    if (!node.has(kinds[k])) continue;
+    ++found;
+    d.kind = static_cast<Distribution::Kind>(k);
+    std::vector<double> x = node.numbers(kinds[k], k < 3 ? 2 : 0);
+    for (double& value : x) value *= scale;
+    if (k == 3) {
+      if (x.empty()) node.fail("list is empty");
+      d.values = x;
+      continue;
+    }
+    d.a = x[0];
+    d.b = x[1];
+    if (k < 2 && !(d.a <= d.b)) node.fail(fmt::format("{}: expected low, then high", kinds[k]));
+    if (k == 1 && !(d.a > 0)) node.fail("log_uniform: expected positive bounds");
+    if (k == 2 && !(d.b >= 0)) node.fail("normal: expected mean, then a standard deviation of zero or more");
+  }
+  if (found != 1) node.fail("expected exactly one of uniform, log_uniform, normal, list");
+  return d;
+}
+
+/// A coefficient must stay zero or more whatever is drawn, so a normal distribution has no place there.
+void check_coefficient(const SceneNode& node, const Distribution& d) {
+  if (d.kind == Distribution::Kind::normal)
+    node.fail("normal can draw a negative coefficient; expected uniform, log_uniform or list");
+  bool negative = d.a < 0;
+  for (double x : d.values) negative = negative || x < 0;
+  if (negative) node.fail("a coefficient may not be negative");
+}
+
+void read_state_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
+  node.check_attributes({"name", "q", "v", "uniform", "log_uniform", "normal", "list"});
+  const int joint = find_joint(scene, node, "name");
+  const JointType type = scene.links[std::size_t(joint)].joint.type;
+  if (node.has("q") == node.has("v")) node.fail("expected exactly one of q and v: the index of what varies");
+  const bool position = node.has("q");
+  const int count = position ? position_count(type) : dof_count(type);
+  if (count == 0) node.fail("joint '" + node.text("name") + "' is fixed; nothing of it can vary");
+  d.target = position ? RandomTarget::joint_q : RandomTarget::joint_v;
+  d.name = node.text("name");
+  d.index = node.integer(position ? "q" : "v", 0, count - 1);
+  d.distribution = read_distribution(node, coordinate_scale(type, d.index, node.context()));
+}
+
+/// The law decides the unit of `damping`.
+double field_scale(const SceneNode& node, ContactField field, ContactLaw law) {
+  const SceneContext& c = node.context();
+  switch (field) {
+    case ContactField::kn: return c.stiffness;
+    case ContactField::kt: return c.damping_force;
+    case ContactField::mu: return 1;
+    case ContactField::damping: break;
+  }
+  return law == ContactLaw::linear ? c.damping_force : c.damping_area;
+}
+
+void read_coefficient_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
+  const bool ground = node.name() == "ground_contact", pair = node.name() == "general_primitive_contact";
+  std::vector<std::string> attributes = {"field", "uniform", "log_uniform", "normal", "list"};
+  ContactLaw law = ContactLaw::clamped;
+  bool found = false;
+  if (pair) {
+    attributes.insert(attributes.end(), {"general_body", "primitive_body"});
+    d.target = RandomTarget::pair_contact;
+    find_body(scene, node, "general_body");
+    find_body(scene, node, "primitive_body");
+    d.name = node.text("general_body");
+    d.second_name = node.text("primitive_body");
+    for (const auto& c : scene.pair_contacts)
+      if (c.general_body == d.name && c.primitive_body == d.second_name) found = true, law = c.law;
+  } else if (ground) {
+    attributes.emplace_back("body");
+    d.target = RandomTarget::ground_contact;
+    find_body(scene, node, "body");
+    d.name = node.text("body");
+    for (const auto& c : scene.ground_contacts)
+      if (c.body == d.name) found = true, law = c.law;
+  } else {
+    attributes.emplace_back("name");
+    d.target = RandomTarget::tactile;
+    d.name = node.text("name");
+    std::vector<std::string> names;
+    for (const auto& s : scene.sensors) {
+      names.push_back(s.name);
+      if (s.name == d.name) found = true;
+    }
+    if (!found) node.fail("no tactile sensor is named '" + d.name + "'" + suggestion(d.name, names));
+  }
+  if (!found) node.fail("no such contact is declared in <contact>");
+  node.check_attributes(attributes);
+  d.field = static_cast<ContactField>(node.choice("field", {"kn", "kt", "mu", "damping"}));
+  d.distribution = read_distribution(node, field_scale(node, d.field, law));
+  check_coefficient(node, d.distribution);
+}
+
+}  // namespace
+
+void read_initial(Scene& scene, const SceneNode& section) {
+  section.check_attributes({});
+  for (const SceneNode& node : section.children({"joint"})) {
+    node.check_attributes({"name", "q", "v"});
+    const int joint = find_joint(scene, node, "name");
+    const JointType type = scene.links[std::size_t(joint)].joint.type;
+    InitialState state;
+    state.source = node.source();
+    state.joint = node.text("name");
+    for (const InitialState& other : scene.initial)
+      if (other.joint == state.joint) node.fail("joint '" + state.joint + "' is given twice");
+    if (type == JointType::fixed) node.fail("joint '" + state.joint + "' is fixed; it has no state");
+    if (node.has("q")) state.q = read_coordinates(node, "q", type, position_count(type));
+    if (node.has("v")) state.v = read_coordinates(node, "v", type, dof_count(type));
+    if (type == JointType::spherical || type == JointType::free) {
+      double square = 0;
+      for (std::size_t k = 0; k < 4 && !state.q.empty(); ++k) square += std::pow(state.q[state.q.size() - 4 + k], 2);
+      if (!state.q.empty() && !(square > 1e-100)) node.fail("q ends in a quaternion of zero length");
+    }
+    scene.initial.push_back(std::move(state));
+  }
+}
+
+void read_control(Scene& scene, const SceneNode& section) {
+  section.check_attributes({});
+  const std::vector<SceneNode> kinds = section.children({"constant", "piecewise", "csv", "random"});
+  if (kinds.size() != 1) section.fail(fmt::format("{} ways to drive the scene; expected one", kinds.size()));
+  const SceneNode& node = kinds.front();
+  if (node.name() == "constant") {
+    node.check_attributes({"value"});
+    ConstantControl control{node.numbers("value")};
+    check_controls(scene, node, control.values.size());
+    scene.control = std::move(control);
+  } else if (node.name() == "piecewise") {
+    scene.control = read_piecewise(scene, node);
+  } else if (node.name() == "csv") {
+    node.check_attributes({"file"});
+    const std::filesystem::path beside = std::filesystem::path(node.context().file).parent_path();
+    CsvControl control;
+    control.path = (beside / node.text("file")).string();
+    control.rows = read_csv(control.path, std::size_t(control_count(scene)));
+    scene.control = std::move(control);
+  } else {
+    node.check_attributes({"amplitude", "period"});
+    scene.control = RandomControl{node.not_negative("amplitude", 1.0), node.positive("period", 0.1)};
+  }
+}
+
+void read_randomize(Scene& scene, const SceneNode& section) {
+  section.check_attributes({});
+  for (const SceneNode& node : section.children({"joint", "ground_contact", "general_primitive_contact", "tactile"})) {
+    RandomizationDescription d;
+    d.source = node.source();
+    if (node.name() == "joint") {
+      read_state_variation(scene, node, d);
+    } else {
+      read_coefficient_variation(scene, node, d);
+    }
+    for (const RandomizationDescription& other : scene.randomizations)
+      if (other.target == d.target && other.name == d.name && other.second_name == d.second_name &&
+          other.index == d.index && other.field == d.field)
+        node.fail("this number already varies");
+    scene.randomizations.push_back(std::move(d));
+  }
+}
+
+}  // namespace tangere

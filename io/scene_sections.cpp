@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+// Actuators, contacts and sensors of a scene file.
+#include "io/scene_sections.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangere {
+
+namespace {
+
+constexpr int kLargestArray = 4096;               // rows or columns of a tactile array
+const std::vector<std::string> kLaws = {"clamped", "paper", "linear"};
+constexpr ContactLaw kLawOf[] = {ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear};
+
+template <class Name>
+int find_named(const Scene& scene, const SceneNode& node, const char* attribute, const char* kind, Name&& name_of) {
+  const std::string wanted = node.text(attribute);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < scene.links.size(); ++i) {
+    names.push_back(name_of(scene.links[i]));
+    if (names.back() == wanted) return static_cast<int>(i);
+  }
+  node.fail(fmt::format("{}=\"{}\": no {} has this name{}", attribute, wanted, kind, suggestion(wanted, names)));
+}
+
+ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law) {
+  const SceneContext& c = node.context();
+  const double damping = law == ContactLaw::linear ? c.damping_force : c.damping_area;
+  return {node.not_negative("kn", 0.0) * c.stiffness, node.not_negative("kt", 0.0) * c.damping_force,
+          node.not_negative("mu", 0.0), node.not_negative("damping", 0.0) * damping};
+}
+
+double read_ramp(const SceneNode& node) {
+  return node.has("ramp") ? node.not_negative("ramp") * node.context().length : 1e-5;
+}
+
+}  // namespace
+
+int find_joint(const Scene& scene, const SceneNode& node, const char* attribute) {
+  return find_named(scene, node, attribute, "joint", [](const LinkDescription& l) { return l.joint.name; });
+}
+int find_body(const Scene& scene, const SceneNode& node, const char* attribute) {
+  return find_named(scene, node, attribute, "body", [](const LinkDescription& l) { return l.body.name; });
+}
+
+double coordinate_scale(JointType type, int index, const SceneContext& c) {
+  switch (type) {
+    case JointType::fixed:
+    case JointType::revolute:
+    case JointType::spherical: return 1;
+    case JointType::prismatic:
+    case JointType::planar:
+    case JointType::translational: return c.length;
+    case JointType::free2d: return index < 2 ? c.length : 1;
+    case JointType::free: break;
+  }
+  return index < 3 ? c.length : 1;
+}
+
+int control_count(const Scene& scene) {
+  int count = 0;
+  for (const MotorDescription& m : scene.motors)
+    for (const LinkDescription& l : scene.links)
+      if (l.joint.name == m.joint) count += dof_count(l.joint.type);
+  return count;
+}
+
+void read_actuators(Scene& scene, const SceneNode& section) {
+  section.check_attributes({});
+  for (const SceneNode& node : section.children({"motor"})) {
+    MotorDescription motor;
+    motor.source = node.source();
+    const int joint = find_joint(scene, node, "joint");
+    const JointType type = scene.links[std::size_t(joint)].joint.type;
+    motor.joint = node.text("joint");
+    if (node.choice("ctrl", {"force", "position"}) == 1)
+      node.fail("position motors are not simulated by this version; supported: ctrl=\"force\"");
+    if (type == JointType::fixed) node.fail("joint '" + motor.joint + "' is fixed; a motor needs a joint that moves");
+    if (type == JointType::free || type == JointType::free2d)
+      node.fail("joint '" + motor.joint + "' mixes forces and torques; a motor needs a joint of one kind");
+    for (const MotorDescription& other : scene.motors)
+      if (other.joint == motor.joint) node.fail("joint '" + motor.joint + "' already has a motor");
+    node.check_attributes({"joint", "ctrl", "ctrl_range"}, {}, {"P", "D", "name"});
+    const bool turns = type == JointType::revolute || type == JointType::spherical;
+    const double scale = turns ? node.context().torque : node.context().force;
+    const std::vector<double> range = node.numbers("ctrl_range", 2);
+    motor.low = range[0] * scale;
+    motor.high = range[1] * scale;
+    if (!(motor.low <= motor.high))
+      node.fail(fmt::format("ctrl_range=\"{} {}\": expected low, then high", range[0], range[1]));
+    scene.motors.push_back(motor);
+  }
+}
+
+void read_contacts(Scene& scene, const SceneNode& section) {
+  section.check_attributes({});
+  for (const SceneNode& node : section.children({"ground_contact", "general_primitive_contact"})) {
+    if (node.name() == "ground_contact") {
+      node.check_attributes({"body", "kn", "kt", "mu", "damping", "law", "ramp"}, {"render", "scale"});
+      if (!scene.ground) node.fail("the scene has no <ground> to touch");
+      GroundContactDescription d;
+      d.source = node.source();
+      find_body(scene, node, "body");
+      d.body = node.text("body");
+      d.law = kLawOf[node.choice("law", kLaws, 2)];
+      d.ramp = read_ramp(node);
+      d.coefficients = read_coefficients(node, d.law);
+      scene.ground_contacts.push_back(std::move(d));
+    } else {
+      node.check_attributes({"general_body", "primitive_body", "kn", "kt", "mu", "damping", "law", "ramp"},
+                            {"render", "scale"});
+      PairContactDescription d;
+      d.source = node.source();
+      const int general = find_body(scene, node, "general_body");
+      const int primitive = find_body(scene, node, "primitive_body");
+      d.general_body = node.text("general_body");
+      d.primitive_body = node.text("primitive_body");
+      if (general == primitive) node.fail("body '" + d.general_body + "' against itself; expected two bodies");
+      if (std::holds_alternative<SphereShape>(scene.links[std::size_t(general)].body.shape))
+        node.fail("general_body '" + d.general_body + "' is a sphere, which has no contact points; swap the two bodies");
+      d.law = kLawOf[node.choice("law", kLaws, 0)];
+      d.ramp = read_ramp(node);
+      d.coefficients = read_coefficients(node, d.law);
+      scene.pair_contacts.push_back(std::move(d));
+    }
+  }
+}
+
+void read_sensors(Scene& scene, const SceneNode& section) {
+  section.check_attributes({});
+  for (const SceneNode& node : section.children({"tactile"})) {
+    const double length = node.context().length;
+    TactileDescription d;
+    d.source = node.source();
+    find_body(scene, node, "body");
+    d.body = node.text("body");
+    d.name = node.text("name", d.body);
+    if (d.name.find('/') != std::string::npos) node.fail("name \"" + d.name + "\" holds '/', which files use as a separator");
+    for (const TactileDescription& other : scene.sensors)
+      if (other.name == d.name) node.fail("tactile name '" + d.name + "' is used twice");
+    const std::vector<std::string> types = {"rect_array", "abstract", "hemisphere", "cylinder", "mesh"};
+    const int type = node.choice("type", types);
+    if (type != 0)
+      node.fail("tactile type '" + types[std::size_t(type)] + "' is not simulated by this version; supported: rect_array");
+    node.check_attributes({"name", "body", "type", "kn", "kt", "mu", "damping", "law", "every", "rect_pos0", "rect_pos1",
+                           "axis0", "axis1", "resolution", "pressure_sign"},
+                          {"render"}, {"spec", "pos", "quat"});
+    constexpr ContactLaw kTactileLaws[] = {ContactLaw::clamped, ContactLaw::paper};
+    d.law = kTactileLaws[node.choice("law", {"clamped", "paper"}, 0)];
+    d.coefficients = read_coefficients(node, d.law);
+    d.every = node.integer("every", 1, 1000000000, 0);
+    if (node.has("pressure_sign")) {
+      const double sign = node.number("pressure_sign");
+      if (sign != 1 && sign != -1) node.fail(fmt::format("pressure_sign=\"{}\"; expected 1 or -1", sign));
+      d.pressure_sign = static_cast<int>(sign);
+    }
+    d.array.corner0 = scaled(node.vector("rect_pos0"), length);
+    d.array.corner1 = scaled(node.vector("rect_pos1"), length);
+    d.array.axis0 = node.direction("axis0");
+    d.array.axis1 = node.direction("axis1");
+    double slant = 0;
+    for (int i = 0; i < 3; ++i) slant += d.array.axis0[i] * d.array.axis1[i];
+    if (std::abs(slant) > 1e-6) node.fail("axis0 and axis1 are not perpendicular");
+    const std::vector<double> n = node.numbers("resolution", 2);
+    for (double k : n)
+      if (k != std::floor(k) || k < 1 || k > kLargestArray)
+        node.fail(fmt::format("resolution has {}; expected integers from 1 to {}", k, kLargestArray));
+    d.array.rows = static_cast<int>(n[0]);
+    d.array.cols = static_cast<int>(n[1]);
+    scene.sensors.push_back(std::move(d));
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sections of a scene beside its tree of links. Each appends to the scene; references are checked where they stand.
+#pragma once
+
+#include "io/scene_node.hpp"
+
+namespace tangere {
+
+void read_actuators(Scene& scene, const SceneNode& section);
+void read_contacts(Scene& scene, const SceneNode& section);
+void read_sensors(Scene& scene, const SceneNode& section);
+void read_initial(Scene& scene, const SceneNode& section);
+void read_control(Scene& scene, const SceneNode& section);
+void read_randomize(Scene& scene, const SceneNode& section);
+
+inline Vector3 scaled(const Vector3& a, double s) { return {s * a[0], s * a[1], s * a[2]}; }
+
+/// Index of the named joint or body; fails at the attribute's element with the nearest name.
+int find_joint(const Scene& scene, const SceneNode& node, const char* attribute);
+int find_body(const Scene& scene, const SceneNode& node, const char* attribute);
+
+/// Factor to SI of coordinate `index` of a joint type, and of velocity `index`: both have lengths in the same places.
+double coordinate_scale(JointType type, int index, const SceneContext& context);
+
+/// Number of controls the motors read so far take.
+int control_count(const Scene& scene);
+
+}  // namespace tangere

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// A picture of tactile fields: pressure as a map with a colour bar, shear as arrows. SVG, no window.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "io/trajectory_reader.hpp"
+
+namespace tangere {
+
+struct PlotOptions {
+  std::string sensor;                 ///< "": the first
+  std::int64_t environment = 0;
+  std::optional<std::int64_t> frame;  ///< one frame instead of a strip
+  int strip = 6;                      ///< most frames of a strip, spread over those with contact
+};
+
+/// Column axis1 runs to the right and row axis0 downwards, as in the array. All frames share one colour scale and one
+/// arrow scale. Throws InputError for a sensor, environment or frame that is not there, or not rectangular.
+std::string render_tactile_svg(const TrajectoryReader& file, const PlotOptions& options);
+
+}  // namespace tangere

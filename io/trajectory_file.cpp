@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+// Everything is created before the first step, so that a run cannot fail late for a reason known early.
+#include "io/trajectory_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "io/h5.hpp"
+#include "io/part_file.hpp"
+
+namespace tangere {
+
+namespace {
+
+constexpr hsize_t kChunkBytes = 1U << 20;
+
+/// Whole rows, about a megabyte of them.
+h5::Storage rows_of(const h5::Dims& dims, std::size_t element) {
+  hsize_t row = element;
+  for (std::size_t i = 1; i < dims.size(); ++i) row *= dims[i];
+  if (dims[0] * row <= kChunkBytes) return {};  // small: one contiguous piece
+  h5::Dims chunk = dims;
+  chunk[0] = std::clamp<hsize_t>(kChunkBytes / row, 1, dims[0]);
+  // A row of very many environments is cut between environments.
+  if (row > kChunkBytes && dims.size() > 1) {
+    const hsize_t environment = row / dims[1];
+    chunk[1] = std::clamp<hsize_t>(kChunkBytes / environment, 1, dims[1]);
+  }
+  return {chunk, false};
+}
+
+/// One environment's field per chunk: mostly zeros, so compressed.
+h5::Storage field_storage(const h5::Dims& dims) {
+  h5::Dims chunk = dims;
+  chunk[0] = chunk[1] = 1;
+  return {chunk, true};
+}
+
+const char* const kPoseComponents[] = {"x", "y", "z", "qw", "qx", "qy", "qz"};
+const char* const kTwistComponents[] = {"wx", "wy", "wz", "vx", "vy", "vz"};
+
+}  // namespace
+
+struct TrajectoryFile::Impl {
+  TrajectoryLayout layout;
+  PartFile part;
+  h5::Id file, time, q, v, u, pose, twist, iterations, status, residual;
+  struct Sensor {
+    h5::Id force, step;
+    h5::Dims frame;  // dimensions of one row of force
+    std::int64_t written = 0;
+  };
+  std::vector<Sensor> sensors;
+  std::int64_t states = 0, steps = 0;
+
+  Impl(const std::string& output, const TrajectoryLayout& l, bool overwrite)
+      : layout((l.check(), l)), part(output, overwrite) {
+    const std::uint64_t needed = layout.bytes_without_tactile(), available = part.free_bytes();
+    if (needed > available)
+      throw IoError(fmt::format("{}: needs at least {} bytes and the disk has {} free", output, needed, available));
+    file = h5::create_file(part.path());
+    try {
+      describe_run();
+      create_trajectory();
+      for (const SensorLayout& s : layout.sensors) create_sensor(s);
+      create_randomized();
+    } catch (...) {
+      part.empty();
+      throw;
+    }
+  }
+
+  template <class T>
+  h5::Id rows(const h5::Id& parent, const std::string& name, h5::Dims dims) {
+    return h5::create_dataset<T>(parent, name, dims, rows_of(dims, sizeof(T)));
+  }
+
+  void describe_run() {
+    h5::write_attribute(file, "format", "tangere trajectory");
+    h5::write_scalar<std::int64_t>(file, "format_version", 1);
+    h5::write_attribute(file, "tangere_version", layout.version);
+    h5::write_attribute(file, "instruction_set", layout.instruction_set);
+    h5::write_attribute(file, "precision", layout.precision);
+    h5::write_attribute(file, "command_line", layout.command_line);
+    h5::write_attribute(file, "scene_name", layout.scene_name);
+    h5::write_attribute(file, "scene_path", layout.scene_path);
+    h5::write_attribute(file, "scene_text", layout.scene_text);
+    h5::write_attribute(file, "integrator", layout.integrator);
+    h5::write_scalar<double>(file, "timestep", layout.timestep);
+    h5::write_attribute(file, "timestep_unit", "s");
+    h5::write_scalar<double>(file, "tolerance", layout.tolerance);
+    h5::write_scalar<std::int64_t>(file, "every", layout.every);
+    h5::write_scalar<std::uint64_t>(file, "seed", layout.seed);
+    h5::write_scalar<std::int64_t>(file, "first_episode", layout.first_episode);
+    h5::write_scalar<std::int64_t>(file, "steps", layout.steps);
+    h5::write_scalar<std::int64_t>(file, "environments", layout.environments);
+    h5::write_attribute(file, "quaternion_order", "w x y z");
+    h5::write_attribute(file, "world_axes", "right-handed, SI units");
+  }
+
+  void create_trajectory() {
+    const hsize_t T = static_cast<hsize_t>(layout.steps), E = static_cast<hsize_t>(layout.environments);
+    const auto named = [](const h5::Id& d, const std::vector<std::string>& names, const std::vector<std::string>& units) {
+      h5::write_attribute(d, "names", std::span<const std::string>(names));
+      h5::write_attribute(d, "units", std::span<const std::string>(units));
+    };
+    time = rows<double>(file, "time", {T + 1});
+    h5::write_attribute(time, "units", "s");
+    q = rows<double>(file, "q", {T + 1, E, layout.q_names.size()});
+    named(q, layout.q_names, layout.q_units);
+    h5::write_attribute(q, "frame", "each joint's fixed frame; quaternions turn the moving frame into it");
+    v = rows<double>(file, "v", {T + 1, E, layout.v_names.size()});
+    named(v, layout.v_names, layout.v_units);
+    h5::write_attribute(v, "frame", "linear: axes of the joint's fixed frame; angular: axes of the moving frame");
+    if (!layout.u_names.empty()) {
+      u = rows<double>(file, "u", {T, E, layout.u_names.size()});
+      named(u, layout.u_names, layout.u_units);
+      h5::write_attribute(u, "meaning", "as given; clipped to [-1, 1], then mapped to the motor's range");
+    }
+    const h5::Id bodies = h5::create_group(file, "bodies");
+    h5::write_attribute(bodies, "names", std::span<const std::string>(layout.body_names));
+    const hsize_t nb = layout.body_names.size();
+    pose = rows<double>(bodies, "pose", {T + 1, E, nb, 7});
+    const std::vector<std::string> pose_names(std::begin(kPoseComponents), std::end(kPoseComponents));
+    named(pose, pose_names, {"m", "m", "m", "1", "1", "1", "1"});
+    h5::write_attribute(pose, "frame", "body frame in the world");
+    twist = rows<double>(bodies, "twist", {T + 1, E, nb, 6});
+    const std::vector<std::string> twist_names(std::begin(kTwistComponents), std::end(kTwistComponents));
+    named(twist, twist_names, {"rad/s", "rad/s", "rad/s", "m/s", "m/s", "m/s"});
+    h5::write_attribute(twist, "frame", "world axes; velocity of the body frame's origin");
+    for (const h5::Id* d : {&pose, &twist})
+      h5::write_attribute(*d, "bodies", std::span<const std::string>(layout.body_names));
+
+    const h5::Id solver = h5::create_group(file, "solver");
+    iterations = rows<std::int32_t>(solver, "iterations", {T, E});
+    h5::write_attribute(iterations, "meaning", "evaluations of the residual, sub-steps included");
+    status = rows<std::int8_t>(solver, "status", {T, E});
+    std::vector<std::string> meanings;
+    std::vector<std::int8_t> values;
+    for (const StatusMeaning& s : layout.statuses) values.push_back(s.value), meanings.push_back(s.meaning);
+    h5::write_list<std::int8_t>(status, "values", values);
+    h5::write_attribute(status, "meanings", std::span<const std::string>(meanings));
+    residual = rows<double>(solver, "residual", {T, E});
+    h5::write_attribute(residual, "meaning", "scaled residual at acceptance, dimensionless");
+  }
+
+  void create_sensor(const SensorLayout& s) {
+    const hsize_t E = static_cast<hsize_t>(layout.environments), F = static_cast<hsize_t>(s.frames(layout.steps));
+    if (!h5::has_link(file, "tactile")) h5::create_group(file, "tactile");
+    const h5::Id group = h5::create_group(h5::open_group(file, "tactile"), s.name);
+    Sensor out;
+    out.frame = {E, static_cast<hsize_t>(s.points), 3};
+    if (s.rectangular()) out.frame = {E, static_cast<hsize_t>(s.rows), static_cast<hsize_t>(s.cols), 3};
+    h5::Dims dims = out.frame;
+    dims.insert(dims.begin(), F);
+    out.force = h5::create_dataset<double>(group, "force", dims, F > 0 ? field_storage(dims) : h5::Storage{});
+    out.step = h5::create_dataset<std::int64_t>(group, "step", {F});
+    h5::write_attribute(out.step, "meaning", "row of /q that each field was read from");
+    h5::write_attribute(out.force, "units", "N");
+    h5::write_attribute(out.force, "components", "f.axis0, f.axis1, -f.(axis0 x axis1); f is the force on the body");
+    h5::write_attribute(out.force, "frame", "axis0, axis1 of the sensor, in the body's axes");
+    h5::write_attribute(out.force, "body", s.body);
+    h5::write_scalar<std::int64_t>(out.force, "pressure_sign", s.pressure_sign);
+    h5::write_scalar<std::int64_t>(out.force, "every", s.every);
+    const std::int64_t resolution[] = {s.rows, s.cols};
+    h5::write_list<std::int64_t>(out.force, "resolution", resolution);
+    h5::write_list<double>(out.force, "corner0", s.corner0);
+    h5::write_list<double>(out.force, "corner1", s.corner1);
+    h5::write_list<double>(out.force, "axis0", s.axis0);
+    h5::write_list<double>(out.force, "axis1", s.axis1);
+    sensors.push_back(std::move(out));
+  }
+
+  void create_randomized() {
+    if (layout.randomized_names.empty()) return;
+    const hsize_t E = static_cast<hsize_t>(layout.environments), k = layout.randomized_names.size();
+    const h5::Id d = h5::create_dataset<double>(file, "randomized", {E, k});
+    h5::write_attribute(d, "names", std::span<const std::string>(layout.randomized_names));
+    h5::write_attribute(d, "units", "SI, as the scene gives each number");
+    h5::write_box<double>(d, {0, 0}, {E, k}, layout.randomized_values.data());
+  }
+
+  /// Row `at` of a dataset whose other dimensions are `row`.
+  template <class T>
+  static void put(const h5::Id& d, std::int64_t at, h5::Dims row, const T* data) {
+    h5::Dims offset(row.size() + 1, 0);
+    offset[0] = static_cast<hsize_t>(at);
+    row.insert(row.begin(), 1);
+    h5::write_box<T>(d, offset, row, data);
+  }
+};
+
+TrajectoryFile::TrajectoryFile(const std::string& output, const TrajectoryLayout& layout, bool overwrite)
+    : impl_(std::make_unique<Impl>(output, layout, overwrite)) {}
+TrajectoryFile::~TrajectoryFile() {
+  // On a full disk the library can only close its file once there is room again.
+  if (impl_ != nullptr && impl_->file.get() >= 0) impl_->part.empty();
+}
+
+void TrajectoryFile::write(const StateRow& row) {
+  Impl& f = *impl_;
+  const hsize_t E = static_cast<hsize_t>(f.layout.environments), nb = f.layout.body_names.size();
+  const std::int64_t t = row.step;
+  const hsize_t one = 1;
+  h5::write_box<double>(f.time, {static_cast<hsize_t>(t)}, {one}, &row.time);
+  Impl::put<double>(f.q, t, {E, f.layout.q_names.size()}, row.q.data());
+  Impl::put<double>(f.v, t, {E, f.layout.v_names.size()}, row.v.data());
+  Impl::put<double>(f.pose, t, {E, nb, 7}, row.body_pose.data());
+  Impl::put<double>(f.twist, t, {E, nb, 6}, row.body_twist.data());
+  ++f.states;
+}
+
+void TrajectoryFile::write(const StepRow& row) {
+  Impl& f = *impl_;
+  const hsize_t E = static_cast<hsize_t>(f.layout.environments);
+  if (!f.layout.u_names.empty()) Impl::put<double>(f.u, row.step, {E, f.layout.u_names.size()}, row.u.data());
+  Impl::put<std::int32_t>(f.iterations, row.step, {E}, row.iterations.data());
+  Impl::put<std::int8_t>(f.status, row.step, {E}, row.status.data());
+  Impl::put<double>(f.residual, row.step, {E}, row.residual.data());
+  ++f.steps;
+}
+
+void TrajectoryFile::write(const TactileRow& row) {
+  Impl::Sensor& s = impl_->sensors[std::size_t(row.sensor)];
+  Impl::put<double>(s.force, row.frame, s.frame, row.force.data());
+  h5::write_box<std::int64_t>(s.step, {static_cast<hsize_t>(row.frame)}, {1}, &row.step);
+  ++s.written;
+}
+
+void TrajectoryFile::commit() {
+  Impl& f = *impl_;
+  const auto expect = [&](const std::string& what, std::int64_t written, std::int64_t expected) {
+    if (written != expected)
+      throw IoError(fmt::format("{}: {} {} of {} were written; the file is incomplete", f.part.output(), written, what,
+                                expected));
+  };
+  expect("states", f.states, f.layout.steps + 1);
+  expect("steps", f.steps, f.layout.steps);
+  for (std::size_t i = 0; i < f.sensors.size(); ++i)
+    expect("fields of " + f.layout.sensors[i].name, f.sensors[i].written, f.layout.sensors[i].frames(f.layout.steps));
+  for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.iterations, &f.status, &f.residual}) d->reset();
+  f.sensors.clear();
+  h5::close_file(f.file, f.part.path());
+  f.part.commit();
+}
+
+}  // namespace tangere

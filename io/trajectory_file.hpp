@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `simulate` writes: one HDF5 file with the trajectory of a batch (schema in docs/files.md).
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "engine/row_sink.hpp"
+#include "io/trajectory_layout.hpp"
+
+namespace tangere {
+
+/// Writes `<output>.part` and gives it its name on commit(). Destroyed before that, it leaves nothing behind.
+class TrajectoryFile : public RowSink {
+ public:
+  /// Creates every group, dataset and attribute. Throws IoError when the output exists (and `overwrite` is false), its
+  /// folder is missing or not writable, or the disk has no room for the uncompressed small datasets; InputError for
+  /// sizes no file can hold.
+  TrajectoryFile(const std::string& output, const TrajectoryLayout& layout, bool overwrite);
+  ~TrajectoryFile() override;
+
+  void write(const StateRow& row) override;
+  void write(const StepRow& row) override;
+  void write(const TactileRow& row) override;
+
+  /// Checks that every row came, closes, syncs and renames. Throws IoError.
+  void commit();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tangere
