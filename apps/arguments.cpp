@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parser of the library accepts 0x10, 010 and nan; a number here is what it looks like.
+#include "apps/arguments.hpp"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+
+#include "engine/error.hpp"
+#include "io/nearest_name.hpp"
+
+namespace tangere::apps {
+namespace {
+
+template <class T>
+bool parse(const std::string& text, T& number) {
+  const char* const end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, number);
+  return result.ec == std::errc() && result.ptr == end;
+}
+
+/// "--output" of "-o,--output".
+std::string long_name(const std::string& flags) { return flags.substr(flags.find("--")); }
+
+std::vector<std::string> option_names(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+  }
+  return names;
+}
+
+}  // namespace
+
+template <class T>
+CLI::Option* add_whole_number(CLI::App& command, const std::string& flags, std::optional<T>& value,
+                              T low, T high, const std::string& description) {
+  const auto read = [&value, low, high, name = long_name(flags)](const std::string& text) {
+    T number{};
+    if (!parse(text, number) || number < low || number > high)
+      throw InputError(
+          fmt::format("{} {}: expected a whole number from {} to {}", name, text, low, high));
+    value = number;
+  };
+  return command.add_option_function<std::string>(flags, read, description)->type_name("N");
+}
+
+template CLI::Option* add_whole_number(CLI::App&, const std::string&, std::optional<int>&, int, int,
+                                       const std::string&);
+template CLI::Option* add_whole_number(CLI::App&, const std::string&, std::optional<std::int64_t>&,
+                                       std::int64_t, std::int64_t, const std::string&);
+template CLI::Option* add_whole_number(CLI::App&, const std::string&, std::optional<std::uint64_t>&,
+                                       std::uint64_t, std::uint64_t, const std::string&);
+
+CLI::Option* add_positive_number(CLI::App& command, const std::string& flags,
+                                 std::optional<double>& value, const std::string& description) {
+  const auto read = [&value, name = long_name(flags)](const std::string& text) {
+    double number = 0;
+    if (!parse(text, number) || !(number > 0) || !std::isfinite(number))
+      throw InputError(fmt::format("{} {}: expected a positive number", name, text));
+    value = number;
+  };
+  return command.add_option_function<std::string>(flags, read, description)->type_name("X");
+}
+
+void add_console_options(CLI::App& command, Console& console) {
+  command.add_flag("--json", console.json,
+                   "Print one JSON object on stdout; text for people goes to stderr");
+  CLI::Option* quiet = command.add_flag("-q,--quiet", console.quiet, "Print errors only");
+  command
+      .add_flag("-v,--verbose", console.verbose,
+                "Print details, and progress even where stderr is no terminal")
+      ->excludes(quiet);
+}
+
+void check_no_extras(const CLI::App& program, const CLI::App* command) {
+  std::vector<std::string> extras = program.remaining();
+  const CLI::App* owner = &program;
+  if (extras.empty() && command != nullptr) {
+    extras = command->remaining();
+    owner = command;
+  }
+  if (extras.empty()) return;
+  const std::string word = extras.front();
+  if (word.starts_with('-')) {
+    const std::string name = word.substr(0, word.find('='));
+    throw InputError("unknown option '" + name + "'" + suggestion(name, option_names(*owner)));
+  }
+  if (command != nullptr)
+    throw InputError("unexpected argument '" + word + "' of " + command->get_name());
+  std::vector<std::string> commands;
+  for (const CLI::App* sub : program.get_subcommands({})) commands.push_back(sub->get_name());
+  throw InputError("unknown subcommand '" + word + "'" + suggestion(word, commands));
+}
+
+void require(const std::string& value, const std::string& name, const CLI::App& command) {
+  if (value.empty())
+    throw InputError(fmt::format("{}: {} is missing; see 'tangere {} --help'", command.get_name(),
+                                 name, command.get_name()));
+}
+
+void check_not_same_file(const std::string& output, const std::string& input) {
+  std::error_code not_both_there;
+  if (std::filesystem::equivalent(output, input, not_both_there))
+    throw InputError(
+        fmt::format("the output '{}' is the input '{}'; expected another file", output, input));
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+// tangere inspect: what a scene compiles to.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "apps/arguments.hpp"
+#include "apps/command.hpp"
+#include "engine/control.hpp"
+#include "engine/model.hpp"
+#include "io/scene_reader.hpp"
+#include "io/trajectory_layout.hpp"
+#include "kernels/isa.hpp"
+
+namespace tangere::apps {
+namespace {
+
+struct Options {
+  std::string scene;
+  bool allow_unknown = false;
+};
+
+const char* shape_name(const Shape& shape) {
+  return std::holds_alternative<SphereShape>(shape) ? "sphere" : "cuboid";
+}
+
+std::string parent_name(const Scene& scene, const LinkDescription& link) {
+  return link.parent < 0 ? "world" : scene.links[static_cast<std::size_t>(link.parent)].body.name;
+}
+
+const char* control_name(const Scene& scene) {
+  if (!scene.control) return "none";
+  constexpr const char* kNames[] = {"constant", "piecewise", "csv", "random"};
+  static_assert(std::size(kNames) == std::variant_size_v<ControlDescription>);
+  return kNames[scene.control->index()];
+}
+
+std::vector<std::string> randomized_names(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const RandomizationDescription& d : scene.randomizations)
+    names.push_back(randomized_name(d));
+  return names;
+}
+
+/// Steps of an unattended run, -1 when the scene does not say.
+std::int64_t steps_of(const Model& model) {
+  return ControlProgram(model, model.timestep(), 0).steps();
+}
+
+Json as_json(const Model& model) {
+  const Scene& scene = model.scene();
+  Json bodies = Json::array(), contacts = Json::array(), sensors = Json::array();
+  Json effects = Json::array();
+  for (std::size_t b = 0; b < scene.links.size(); ++b) {
+    const LinkDescription& link = scene.links[b];
+    bodies.push_back({{"name", link.body.name},
+                      {"shape", shape_name(link.body.shape)},
+                      {"mass", model.mass(static_cast<int>(b))},
+                      {"joint", link.joint.name},
+                      {"joint_type", to_string(link.joint.type)},
+                      {"parent", parent_name(scene, link)}});
+  }
+  for (const ContactInfo& c : model.contacts())
+    contacts.push_back(
+        {{"first", c.first}, {"second", c.second}, {"points", c.points}, {"law", c.law}});
+  for (const SensorInfo& s : model.sensors())
+    sensors.push_back({{"name", s.name},
+                       {"body", s.body},
+                       {"rows", s.rows},
+                       {"cols", s.cols},
+                       {"points", s.points},
+                       {"every", s.every},
+                       {"pressure_sign", s.pressure_sign}});
+  for (const EffectInfo& e : model.effects())
+    effects.push_back({{"name", e.name}, {"on", e.on}, {"reason", e.reason}});
+  const std::int64_t steps = steps_of(model);
+  return {{"command", "inspect"},
+          {"exit_code", 0},
+          {"scene", scene.path},
+          {"model", scene.name},
+          {"integrator", to_string(model.integrator())},
+          {"timestep", model.timestep()},
+          {"tolerance", model.solver().tolerance},
+          {"gravity", scene.gravity},
+          {"bodies", bodies},
+          {"q_names", model.q_names()},
+          {"v_names", model.v_names()},
+          {"u_names", model.u_names()},
+          {"contacts", contacts},
+          {"sensors", sensors},
+          {"control", control_name(scene)},
+          {"steps", steps < 0 ? Json() : Json(steps)},
+          {"randomized", randomized_names(scene)},
+          {"effects", effects},
+          {"state_bytes_per_environment", model.state_bytes_per_environment()},
+          {"workspace_bytes", model.workspace_bytes()},
+          {"instruction_set", kernels::active_isa_name()}};
+}
+
+std::string names_line(const char* what, std::span<const std::string> names) {
+  return fmt::format("{} ({}): {}\n", what, names.size(), fmt::join(names, ", "));
+}
+
+std::string bodies_text(const Model& model) {
+  const Scene& scene = model.scene();
+  std::string text = fmt::format("bodies ({})\n", model.nb());
+  for (std::size_t b = 0; b < scene.links.size(); ++b) {
+    const LinkDescription& link = scene.links[b];
+    text += fmt::format("  {:<16} {:<7} {:>12.6g} kg, joint {} ({}), parent {}\n", link.body.name,
+                        shape_name(link.body.shape), model.mass(static_cast<int>(b)),
+                        link.joint.name, to_string(link.joint.type), parent_name(scene, link));
+  }
+  return text;
+}
+
+std::string sensors_text(const Model& model) {
+  std::string text = fmt::format("sensors ({})\n", model.sensors().size());
+  for (const SensorInfo& s : model.sensors())
+    text += fmt::format("  {} on {}: {} x {} = {} points, read {}, pressure reads {}\n", s.name,
+                        s.body, s.rows, s.cols, s.points,
+                        s.every > 0 ? fmt::format("every {} steps", s.every) : "every step",
+                        s.pressure_sign > 0 ? "positive (+1)" : "negative (-1)");
+  return text;
+}
+
+std::string as_text(const Model& model) {
+  const Scene& scene = model.scene();
+  std::string text =
+      fmt::format("scene {} ({}): {}, h = {} s, tolerance {}\n\n", scene.name, scene.path,
+                  to_string(model.integrator()), model.timestep(), model.solver().tolerance);
+  text += bodies_text(model) + '\n';
+  text += names_line("coordinates", model.q_names());
+  text += names_line("dofs", model.v_names());
+  text += names_line("controls", model.u_names());
+  const std::int64_t steps = steps_of(model);
+  text += fmt::format("driven by: {}{}\n", control_name(scene),
+                      steps < 0 ? "" : fmt::format(", {} steps", steps));
+  text += names_line("varying between environments", randomized_names(scene));
+  text += fmt::format("\ncontacts ({})\n", model.contacts().size());
+  for (const ContactInfo& c : model.contacts())
+    text += fmt::format("  {} on {}: {} point{}, law {}\n", c.first, c.second, c.points,
+                        c.points == 1 ? "" : "s", c.law);
+  text += '\n' + sensors_text(model) + "\neffects\n";
+  for (const EffectInfo& e : model.effects())
+    text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);
+  return text + fmt::format(
+                    "\nmemory: {} bytes per environment, {} bytes of workspace per thread\n"
+                    "instruction set: {}",
+                    model.state_bytes_per_environment(), model.workspace_bytes(),
+                    kernels::active_isa_name());
+}
+
+int inspect(const Options& options, const Console& console, const CLI::App& app) {
+  require(options.scene, "SCENE", app);
+  const SceneFile file = read_scene(options.scene, {options.allow_unknown});
+  for (const std::string& warning : file.warnings) console.note("warning: " + warning);
+  const Model model(file.scene);
+  console.print(as_text(model));
+  console.result(as_json(model));
+  return kDone;
+}
+
+}  // namespace
+
+Command add_inspect(CLI::App& program) {
+  const auto options = std::make_shared<Options>();
+  const auto console = std::make_shared<Console>();
+  CLI::App* app = program.add_subcommand("inspect", "Show what a scene compiles to");
+  app->add_option("SCENE", options->scene, "Scene file (XML)")->type_name("");
+  app->add_flag("--allow-unknown", options->allow_unknown,
+                "Unknown elements and attributes are warnings, not errors");
+  add_console_options(*app, *console);
+  app->footer("Example:\n  tangere inspect scenes/rolling_ball.xml --json");
+  return {app, console, [=](const ProgramInfo&) { return inspect(*options, *console, *app); }};
+}
+
+}  // namespace tangere::apps

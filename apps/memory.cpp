@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Linux's own account: /proc/meminfo, and the files of control groups, version 2.
+#include "apps/memory.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <limits>
+
+#include "engine/error.hpp"
+
+namespace tangere::apps {
+namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::infinity();
+
+double machine_memory() {
+  std::ifstream file("/proc/meminfo");
+  std::string label, unit;
+  for (double kilobytes = 0; file >> label >> kilobytes;) {
+    if (label == "MemAvailable:") return kilobytes * 1024;
+    std::getline(file, unit);
+  }
+  return kUnknown;
+}
+
+double container_memory() {
+  double limit = 0, used = 0;  // "max" is no number: no limit
+  if (!(std::ifstream("/sys/fs/cgroup/memory.max") >> limit)) return kUnknown;
+  if (!(std::ifstream("/sys/fs/cgroup/memory.current") >> used)) return kUnknown;
+  return std::max(0.0, limit - used);
+}
+
+}  // namespace
+
+double available_memory() { return std::min(machine_memory(), container_memory()); }
+
+void check_memory(double bytes, const std::string& request) {
+  const double available = available_memory();
+  if (bytes > available)
+    throw InputError(
+        fmt::format("{} needs {:.0f} bytes ({:.1f} GB) of memory; {:.0f} bytes "
+                    "({:.1f} GB) are available",
+                    request, bytes, bytes / 1e9, available, available / 1e9));
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// tangere plot: tactile fields of a trajectory file as a picture.
+#include <fmt/format.h>
+
+#include <limits>
+
+#include "apps/arguments.hpp"
+#include "apps/command.hpp"
+#include "io/part_file.hpp"
+#include "io/tactile_plot.hpp"
+
+namespace tangere::apps {
+namespace {
+
+constexpr int kMostFrames = 1000;  // of a strip; each is a picture of its own
+
+struct Options {
+  std::string input, output, sensor;
+  std::optional<std::int64_t> environment, frame;
+  std::optional<int> strip;
+  bool overwrite = false;
+};
+
+int plot(const Options& options, const Console& console, const CLI::App& app) {
+  require(options.input, "FILE", app);
+  require(options.output, "--output", app);
+  check_not_same_file(options.output, options.input);
+  PlotOptions what;
+  what.sensor = options.sensor;
+  what.environment = options.environment.value_or(0);
+  what.frame = options.frame;
+  what.strip = options.strip.value_or(what.strip);
+  const TrajectoryReader file(options.input);
+  const std::string svg = render_tactile_svg(file, what);
+  write_text_atomically(options.output, svg, options.overwrite);
+  const SensorLayout& sensor = file.sensors()[file.find_sensor(what.sensor)];
+  console.print(fmt::format("wrote {} ({} bytes): sensor {}, environment {}", options.output,
+                            svg.size(), sensor.name, what.environment));
+  console.result({{"command", "plot"},
+                  {"exit_code", 0},
+                  {"input", options.input},
+                  {"output", options.output},
+                  {"bytes", svg.size()},
+                  {"sensor", sensor.name},
+                  {"environment", what.environment},
+                  {"frame", what.frame ? Json(*what.frame) : Json()}});
+  return kDone;
+}
+
+}  // namespace
+
+Command add_plot(CLI::App& program) {
+  const auto options = std::make_shared<Options>();
+  const auto console = std::make_shared<Console>();
+  Options& o = *options;
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  CLI::App* app = program.add_subcommand("plot", "Draw tactile fields of a trajectory as SVG");
+  app->add_option("FILE", o.input, "HDF5 file written by 'tangere simulate'")->type_name("");
+  app->add_option("-o,--output", o.output, "SVG file to write")->type_name("F.svg");
+  app->add_option("--sensor", o.sensor, "Tactile sensor [default: the first]")->type_name("NAME");
+  add_whole_number<std::int64_t>(*app, "--env", o.environment, 0, kMost,
+                                 "Environment, counted from 0 [default: 0]");
+  CLI::Option* frame = add_whole_number<std::int64_t>(*app, "--frame", o.frame, 0, kMost,
+                                                      "One frame, counted from 0");
+  add_whole_number<int>(*app, "--strip", o.strip, 1, kMostFrames,
+                        "Most frames in a row, spread over those with contact [default: 6]")
+      ->excludes(frame);
+  app->add_flag("--overwrite", o.overwrite, "Replace the output if it exists");
+  add_console_options(*app, *console);
+  app->footer("Example:\n  tangere plot ball.h5 -o ball.svg --sensor pad --env 2 --strip 4");
+  return {app, console, [=](const ProgramInfo&) { return plot(*options, *console, *app); }};
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Terminals understand carriage return and "erase to the end of the line"; nothing else is used.
+#include "apps/progress.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+
+namespace tangere::apps {
+namespace {
+
+constexpr auto kTerminalPause = std::chrono::milliseconds(100);
+constexpr auto kLogPause = std::chrono::seconds(10);
+
+}  // namespace
+
+Progress::Progress(const Console& console, std::int64_t steps, int environments)
+    : steps_(steps),
+      environments_(environments),
+      terminal_(isatty(STDERR_FILENO) != 0),
+      silent_(console.quiet || !(terminal_ || console.verbose)),
+      start_(Clock::now()),
+      last_(start_) {}
+
+Progress::~Progress() {
+  if (line_open_) std::fputs("\r\x1b[K", stderr);
+}
+
+void Progress::update(std::int64_t done) {
+  if (silent_) return;
+  const auto now = Clock::now();
+  if (now - last_ < (terminal_ ? Clock::duration(kTerminalPause) : Clock::duration(kLogPause)))
+    return;
+  last_ = now;
+  const double seconds = std::chrono::duration<double>(now - start_).count();
+  const auto steps_done = static_cast<double>(done);
+  const std::string text = fmt::format("step {} of {}, {:.0f} env-steps/s, {:.0f} s left", done,
+                                       steps_, steps_done * environments_ / seconds,
+                                       seconds / steps_done * static_cast<double>(steps_ - done));
+  std::fputs(terminal_ ? ("\r" + text + "\x1b[K").c_str() : (text + "\n").c_str(), stderr);
+  line_open_ = terminal_;
+}
+
+}  // namespace tangere::apps

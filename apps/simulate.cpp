@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+// tangere simulate: a scene, a batch, a file. Everything is checked before the first step.
+#include <fmt/format.h>
+
+#include <csignal>
+#include <filesystem>
+
+#include "apps/arguments.hpp"
+#include "apps/command.hpp"
+#include "apps/memory.hpp"
+#include "apps/progress.hpp"
+#include "apps/stop_signals.hpp"
+#include "io/csv.hpp"
+#include "io/nearest_name.hpp"
+#include "io/scene_reader.hpp"
+#include "io/trajectory_file.hpp"
+#include "kernels/isa.hpp"
+#include "tasks/rollout.hpp"
+
+namespace tangere::apps {
+namespace {
+
+constexpr int kMostEnvironments = 1'000'000'000;
+constexpr std::int64_t kMostSteps = 1'000'000'000'000;
+constexpr std::size_t kMostFailuresListed = 20;
+
+struct Options {
+  std::string scene, output, controls, integrator, precision = "double";
+  std::optional<std::int64_t> steps;
+  std::optional<int> environments, every;
+  std::optional<double> timestep, tolerance;
+  std::optional<std::uint64_t> seed;
+  bool overwrite = false, allow_unknown = false;
+};
+
+Integrator integrator_named(const std::string& name) {
+  std::vector<std::string> names;
+  for (const Integrator value :
+       {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
+    names.emplace_back(to_string(value));
+    if (names.back() == name) return value;
+  }
+  throw InputError("unknown integrator '" + name + "'" + suggestion(name, names));
+}
+
+void check_arguments(const Options& options, const CLI::App& app) {
+  require(options.scene, "SCENE", app);
+  require(options.output, "--output", app);
+  if (options.precision != "double")
+    throw InputError("unknown precision '" + options.precision + "'; expected double");
+  check_not_same_file(options.output, options.scene);
+  if (!options.controls.empty()) check_not_same_file(options.output, options.controls);
+}
+
+ControlProgram make_controls(const Options& options, const Model& model, const Stepper& stepper,
+                             const Console& console) {
+  const std::uint64_t seed = options.seed.value_or(0);
+  if (!options.controls.empty()) {
+    const auto columns = static_cast<std::size_t>(model.nu());
+    CsvControl table{read_csv(options.controls, columns, model.u_names()), options.controls};
+    return {model, stepper.timestep(), seed, std::move(table)};
+  }
+  if (!model.scene().control && model.nu() > 0)
+    console.note("the scene has no <control> and there is no --controls: every control is 0");
+  return {model, stepper.timestep(), seed};
+}
+
+std::int64_t step_count(const Options& options, const ControlProgram& controls) {
+  const std::int64_t steps = options.steps.value_or(controls.steps());
+  if (steps < 0)
+    throw InputError("the controls have no end, so the number of steps is not known; give --steps");
+  controls.check_covers(steps);
+  return steps;
+}
+
+void check_size(const Model& model, int environments) {
+  const double state = static_cast<double>(model.state_bytes_per_environment());
+  check_memory(state * environments + rollout_bytes(model, environments) +
+                   static_cast<double>(model.workspace_bytes()),
+               fmt::format("--envs {}", environments));
+}
+
+TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
+                             const RolloutOptions& rollout, const ProgramInfo& info) {
+  RunDescription run;
+  run.steps = rollout.steps;
+  run.every = rollout.every;
+  for (const SensorInfo& sensor : batch.model().sensors())
+    run.tactile_intervals.push_back(tactile_interval(sensor, rollout));
+  run.precision = "double";
+  run.command_line = info.command_line;
+  run.version = info.version;
+  run.instruction_set = kernels::active_isa_name();
+  return layout_from(batch, stepper, run);
+}
+
+int report_stop(const Console& console, int signal, std::int64_t done, std::int64_t steps) {
+  const char* name = signal == SIGINT ? "SIGINT" : "SIGTERM";
+  const ExitCode code = signal == SIGINT ? kInterrupted : kTerminated;
+  const std::string text =
+      fmt::format("stopped by {} after {} of {} steps; nothing was written", name, done, steps);
+  console.fail("tangere: " + text);
+  console.result({{"command", "simulate"}, {"exit_code", static_cast<int>(code)}, {"error", text}});
+  return code;
+}
+
+Json failures_of(const RolloutSummary& summary) {
+  Json failures = Json::array();
+  for (const FailedEnvironment& f : summary.failures)
+    failures.push_back({{"environment", f.environment},
+                        {"step", f.step},
+                        {"status", static_cast<int>(f.status)},
+                        {"reason", to_string(f.status)}});
+  return failures;
+}
+
+void list_failures(const Console& console, const RolloutSummary& summary) {
+  const auto& failures = summary.failures;
+  for (std::size_t i = 0; i < failures.size() && i < kMostFailuresListed; ++i)
+    console.fail(fmt::format("environment {} failed in step {}: {}", failures[i].environment,
+                             failures[i].step, to_string(failures[i].status)));
+  if (failures.size() > kMostFailuresListed)
+    console.fail(fmt::format("and {} more environments; --json and the file name them all",
+                             failures.size() - kMostFailuresListed));
+}
+
+int report(const Options& options, const Console& console, const Batch& batch,
+           const Stepper& stepper, const RolloutOptions& rollout, const RolloutSummary& summary) {
+  const ExitCode code = summary.failures.empty() ? kDone : kSomeFailed;
+  const auto bytes = std::filesystem::file_size(options.output);
+  const double rate = static_cast<double>(summary.environment_steps) / summary.seconds;
+  const double per_step = static_cast<double>(summary.newton_iterations) /
+                          static_cast<double>(summary.environment_steps);
+  list_failures(console, summary);
+  console.print(
+      fmt::format("{} steps of {} environments in {:.2f} s: {:.0f} env-steps/s, output included\n"
+                  "{:.2f} Newton iterations per step, {} steps split, {} environments failed\n"
+                  "wrote {} ({} bytes)",
+                  summary.steps, batch.environments(), summary.seconds, rate, per_step,
+                  summary.split_steps, summary.failures.size(), options.output, bytes));
+  Json sensors = Json::array();
+  for (const SensorInfo& sensor : batch.model().sensors()) {
+    const int every = tactile_interval(sensor, rollout);
+    sensors.push_back({{"name", sensor.name}, {"every", every}, {"frames", rollout.steps / every}});
+  }
+  console.result({{"command", "simulate"},
+                  {"exit_code", static_cast<int>(code)},
+                  {"scene", options.scene},
+                  {"output", options.output},
+                  {"bytes", bytes},
+                  {"steps", summary.steps},
+                  {"environments", batch.environments()},
+                  {"seed", batch.seed()},
+                  {"timestep", stepper.timestep()},
+                  {"integrator", to_string(stepper.integrator())},
+                  {"tolerance", stepper.tolerance()},
+                  {"precision", options.precision},
+                  {"instruction_set", kernels::active_isa_name()},
+                  {"sensors", sensors},
+                  {"seconds", summary.seconds},
+                  {"environment_steps", summary.environment_steps},
+                  {"environment_steps_per_second", rate},
+                  {"newton_iterations", summary.newton_iterations},
+                  {"newton_iterations_per_step", per_step},
+                  {"split_steps", summary.split_steps},
+                  {"failed", failures_of(summary)}});
+  return code;
+}
+
+int simulate(const Options& options, const Console& console, const CLI::App& app,
+             const ProgramInfo& info) {
+  check_arguments(options, app);
+  StepperOptions solver{{}, options.timestep, options.tolerance};
+  if (!options.integrator.empty()) solver.integrator = integrator_named(options.integrator);
+
+  SceneFile file = read_scene(options.scene, {options.allow_unknown});
+  for (const std::string& warning : file.warnings) console.note("warning: " + warning);
+  const Model model(file.scene);
+  Stepper stepper(model, solver);
+  const ControlProgram controls = make_controls(options, model, stepper, console);
+  const RolloutOptions rollout{step_count(options, controls), options.every.value_or(0)};
+  const int environments = options.environments.value_or(1);
+  check_size(model, environments);
+  Batch batch(model, environments, options.seed.value_or(0));
+
+  // Before the file is created and until it is gone or complete: nothing half-written stays.
+  const StopSignals signals;
+  TrajectoryFile output(options.output, make_layout(batch, stepper, rollout, info),
+                        options.overwrite);
+  console.detail(fmt::format("{} steps of {} environments, {}, h = {} s", rollout.steps,
+                             environments, to_string(stepper.integrator()), stepper.timestep()));
+  RolloutSummary summary;
+  {
+    Progress progress(console, rollout.steps, environments);
+    summary = run_rollout(batch, stepper, controls, rollout, output, [&](std::int64_t done) {
+      progress.update(done);
+      return signals.received() == 0;
+    });
+  }
+  if (summary.stopped)
+    return report_stop(console, signals.received(), summary.steps, rollout.steps);
+  output.commit();
+  return report(options, console, batch, stepper, rollout, summary);
+}
+
+}  // namespace
+
+Command add_simulate(CLI::App& program) {
+  const auto options = std::make_shared<Options>();
+  const auto console = std::make_shared<Console>();
+  Options& o = *options;
+  CLI::App* app = program.add_subcommand("simulate", "Run a scene and write its trajectory");
+  app->add_option("SCENE", o.scene, "Scene file (XML)")->type_name("");
+  app->add_option("-o,--output", o.output, "HDF5 file to write")->type_name("F.h5");
+  app->add_option("--controls", o.controls,
+                  "Table of controls, a row per step, instead of the scene's <control>")
+      ->type_name("U.csv");
+  add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
+                                 "Steps to take [default: as many as the controls last]");
+  add_whole_number<int>(*app, "--envs", o.environments, 1, kMostEnvironments,
+                        "Environments stepped together [default: 1]");
+  add_whole_number<int>(*app, "--every", o.every, 1, kMostEnvironments,
+                        "Tactile fields every N-th step [default: the scene's, or 1]");
+  add_positive_number(*app, "--timestep", o.timestep, "Step size in s [default: the scene's]");
+  app->add_option("--integrator", o.integrator,
+                  "BDF1, BDF2, SDIRK2 or linear-implicit [default: the scene's]")
+      ->type_name("NAME");
+  add_positive_number(*app, "--tol", o.tolerance,
+                      "Largest scaled residual of a step [default: the scene's]");
+  app->add_option("--precision", o.precision, "double, the only one so far")->type_name("NAME");
+  add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
+                                  "Seed of all that varies between environments [default: 0]");
+  app->add_flag("--overwrite", o.overwrite, "Replace the output if it exists");
+  app->add_flag("--allow-unknown", o.allow_unknown,
+                "Unknown elements and attributes of the scene are warnings, not errors");
+  add_console_options(*app, *console);
+  app->footer(
+      "Example:\n"
+      "  tangere simulate scenes/rolling_ball.xml --output ball.h5 --envs 4 --every 5 --seed 1");
+  return {app, console,
+          [=](const ProgramInfo& info) { return simulate(*options, *console, *app, info); }};
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Ctrl-C and a scheduler's SIGTERM end a run between two steps, where nothing half-written is left.
+#pragma once
+
+#include <array>
+#include <csignal>
+
+namespace tangere::apps {
+
+/// While one lives, SIGINT and SIGTERM are remembered instead of ending the program (unless the
+/// parent had them ignored), and a file-size limit is an error of the write instead of SIGXFSZ.
+class StopSignals {
+ public:
+  StopSignals();
+  ~StopSignals();
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+
+  /// The first of SIGINT, SIGTERM that came, 0 while none did.
+  [[nodiscard]] int received() const;
+
+ private:
+  std::array<struct sigaction, 3> previous_{};
+};
+
+}  // namespace tangere::apps
