@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// What ./run-demo says about its file is true of the file that its own command writes.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include "io/h5.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+namespace h5 = tangere::h5;
+
+std::string demo_text() {
+  std::ifstream file(TANGERE_SOURCE_DIR "/run-demo");
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+/// Dataset → shape, from lines such as "  q   (351, 4, 10)   m".
+std::map<std::string, h5::Dims> promised_shapes() {
+  static const std::regex line(R"(\n  ([a-z/]+) +\(([0-9, ]+)\) )");
+  static const std::regex number("[0-9]+");
+  const std::string text = demo_text();
+  std::map<std::string, h5::Dims> shapes;
+  for (std::sregex_iterator at(text.begin(), text.end(), line), end; at != end; ++at) {
+    const std::string list = (*at)[2];
+    for (std::sregex_iterator n(list.begin(), list.end(), number); n != end; ++n)
+      shapes[(*at)[1]].push_back(std::stoull(n->str()));
+  }
+  return shapes;
+}
+
+TEST(House, DemoTellsTheTruthAboutItsFile) {
+  const std::map<std::string, h5::Dims> promised = promised_shapes();
+  ASSERT_TRUE(promised.contains("q") && promised.contains("tactile/pad/force"));
+
+  static const std::regex command(R"(\n\$tangere (simulate scenes/rolling_ball\.xml .*--steps 350.*) --output)");
+  std::smatch match;
+  const std::string text = demo_text();
+  ASSERT_TRUE(std::regex_search(text, match, command));
+  const fs::path folder = fs::path(testing::TempDir()) / "tangere_demo_test";
+  fs::create_directories(folder);
+  const fs::path file = folder / "rolling_ball.h5";
+  const std::string run = "cd '" TANGERE_SOURCE_DIR "' && '" TANGERE_PROGRAM "' " + match[1].str() +
+                          " --seed 1 --overwrite --quiet --output '" + file.string() + "'";
+  ASSERT_EQ(std::system(run.c_str()), 0) << run;
+
+  const h5::Id opened = h5::open_file(file.string());
+  for (const auto& [name, shape] : promised)
+    EXPECT_EQ(h5::dimensions(h5::open_dataset(opened, name)), shape) << name;
+  fs::remove_all(folder);
+}
+
+}  // namespace
