@@ -24,12 +24,11 @@ bool parse(const std::string& text, T& number) {
 /// "--output" of "-o,--output".
 std::string long_name(const std::string& flags) { return flags.substr(flags.find("--")); }
 
+/// Long names only: every letter resembles every other.
 std::vector<std::string> option_names(const CLI::App& command) {
   std::vector<std::string> names;
-  for (const CLI::Option* option : command.get_options()) {
+  for (const CLI::Option* option : command.get_options())
     for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
-  }
   return names;
 }
 
@@ -66,6 +65,14 @@ CLI::Option* add_positive_number(CLI::App& command, const std::string& flags,
   return command.add_option_function<std::string>(flags, read, description)->type_name("X");
 }
 
+CLI::Option* add_text(CLI::App& command, const std::string& flags, std::string& value,
+                      const std::string& type, const std::string& description) {
+  const auto not_empty = [](const std::string& text) {
+    return text.empty() ? std::string("expected text, found none") : std::string();
+  };
+  return command.add_option(flags, value, description)->check(not_empty)->type_name(type);
+}
+
 void add_console_options(CLI::App& command, Console& console) {
   command.add_flag("--json", console.json,
                    "Print one JSON object on stdout; text for people goes to stderr");
@@ -94,12 +101,6 @@ void check_no_extras(const CLI::App& program, const CLI::App* command) {
   std::vector<std::string> commands;
   for (const CLI::App* sub : program.get_subcommands({})) commands.push_back(sub->get_name());
   throw InputError("unknown subcommand '" + word + "'" + suggestion(word, commands));
-}
-
-void require(const std::string& value, const std::string& name, const CLI::App& command) {
-  if (value.empty())
-    throw InputError(fmt::format("{}: {} is missing; see 'tangere {} --help'", command.get_name(),
-                                 name, command.get_name()));
 }
 
 void check_not_same_file(const std::string& output, const std::string& input) {

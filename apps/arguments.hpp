@@ -21,15 +21,17 @@ CLI::Option* add_whole_number(CLI::App& command, const std::string& flags, std::
 CLI::Option* add_positive_number(CLI::App& command, const std::string& flags,
                                  std::optional<double>& value, const std::string& description);
 
+/// An argument (`flags` without dashes) or option that takes text; empty text is an error, because
+/// it mostly is a shell variable that was not set.
+CLI::Option* add_text(CLI::App& command, const std::string& flags, std::string& value,
+                      const std::string& type, const std::string& description);
+
 /// --json, -q, -v: the same for every subcommand.
 void add_console_options(CLI::App& command, Console& console);
 
 /// Throws InputError, with the nearest name, when the parser could not place a word; `command` is
 /// the chosen subcommand, null when none was recognised.
 void check_no_extras(const CLI::App& program, const CLI::App* command);
-
-/// Throws InputError when an argument that the command cannot do without is empty.
-void require(const std::string& value, const std::string& name, const CLI::App& command);
 
 /// Throws InputError when writing `output` would replace `input`, --overwrite or not.
 void check_not_same_file(const std::string& output, const std::string& input);

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a subcommand is: a parser's corner, what it prints to, and a function. One file for each.
+// What a subcommand is: a parser's corner and a function. One file for each.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <functional>
-#include <memory>
 #include <string>
-
-#include "apps/console.hpp"
 
 namespace tangere::apps {
 
@@ -19,7 +16,6 @@ struct ProgramInfo {
 
 struct Command {
   CLI::App* app = nullptr;
-  std::shared_ptr<Console> console;
   std::function<int(const ProgramInfo&)> run;  ///< returns an ExitCode; throws InputError, IoError
 };
 

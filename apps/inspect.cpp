@@ -149,8 +149,7 @@ std::string as_text(const Model& model) {
                     kernels::active_isa_name());
 }
 
-int inspect(const Options& options, const Console& console, const CLI::App& app) {
-  require(options.scene, "SCENE", app);
+int inspect(const Options& options, const Console& console) {
   const SceneFile file = read_scene(options.scene, {options.allow_unknown});
   for (const std::string& warning : file.warnings) console.note("warning: " + warning);
   const Model model(file.scene);
@@ -165,12 +164,12 @@ Command add_inspect(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
   CLI::App* app = program.add_subcommand("inspect", "Show what a scene compiles to");
-  app->add_option("SCENE", options->scene, "Scene file (XML)")->type_name("");
+  add_text(*app, "SCENE", options->scene, "", "Scene file (XML)")->required();
   app->add_flag("--allow-unknown", options->allow_unknown,
                 "Unknown elements and attributes are warnings, not errors");
   add_console_options(*app, *console);
   app->footer("Example:\n  tangere inspect scenes/rolling_ball.xml --json");
-  return {app, console, [=](const ProgramInfo&) { return inspect(*options, *console, *app); }};
+  return {app, [=](const ProgramInfo&) { return inspect(*options, *console); }};
 }
 
 }  // namespace tangere::apps

@@ -52,6 +52,18 @@ struct Program {
       if (command.app->parsed()) return &command;
     return nullptr;
   }
+
+  /// "tangere" or "tangere simulate".
+  [[nodiscard]] std::string name() const {
+    const Command* command = chosen();
+    return command == nullptr ? "tangere" : "tangere " + command->app->get_name();
+  }
+
+  /// A word out of place says more than what is missing because of it.
+  void check_words() const {
+    const Command* command = chosen();
+    check_no_extras(parser, command == nullptr ? nullptr : command->app);
+  }
 };
 
 int run(Program& program, int argc, char** argv) {
@@ -59,10 +71,11 @@ int run(Program& program, int argc, char** argv) {
     program.parser.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.parser.exit(error);  // --help, --version
-    throw InputError(error.what());
+    program.check_words();
+    throw InputError(std::string(error.what()) + "; see '" + program.name() + " --help'");
   }
+  program.check_words();
   const Command* command = program.chosen();
-  check_no_extras(program.parser, command == nullptr ? nullptr : command->app);
   if (command == nullptr) throw InputError("no subcommand given; see 'tangere --help'");
   if (*kernels::forced_isa_error() != '\0') throw InputError(kernels::forced_isa_error());
   ProgramInfo info{TANGERE_VERSION, {}};

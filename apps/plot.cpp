@@ -21,9 +21,7 @@ struct Options {
   bool overwrite = false;
 };
 
-int plot(const Options& options, const Console& console, const CLI::App& app) {
-  require(options.input, "FILE", app);
-  require(options.output, "--output", app);
+int plot(const Options& options, const Console& console) {
   check_not_same_file(options.output, options.input);
   PlotOptions what;
   what.sensor = options.sensor;
@@ -55,9 +53,9 @@ Command add_plot(CLI::App& program) {
   Options& o = *options;
   constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
   CLI::App* app = program.add_subcommand("plot", "Draw tactile fields of a trajectory as SVG");
-  app->add_option("FILE", o.input, "HDF5 file written by 'tangere simulate'")->type_name("");
-  app->add_option("-o,--output", o.output, "SVG file to write")->type_name("F.svg");
-  app->add_option("--sensor", o.sensor, "Tactile sensor [default: the first]")->type_name("NAME");
+  add_text(*app, "FILE", o.input, "", "HDF5 file written by 'tangere simulate'")->required();
+  add_text(*app, "-o,--output", o.output, "F.svg", "SVG file to write")->required();
+  add_text(*app, "--sensor", o.sensor, "NAME", "Tactile sensor [default: the first]");
   add_whole_number<std::int64_t>(*app, "--env", o.environment, 0, kMost,
                                  "Environment, counted from 0 [default: 0]");
   CLI::Option* frame = add_whole_number<std::int64_t>(*app, "--frame", o.frame, 0, kMost,
@@ -68,7 +66,7 @@ Command add_plot(CLI::App& program) {
   app->add_flag("--overwrite", o.overwrite, "Replace the output if it exists");
   add_console_options(*app, *console);
   app->footer("Example:\n  tangere plot ball.h5 -o ball.svg --sensor pad --env 2 --strip 4");
-  return {app, console, [=](const ProgramInfo&) { return plot(*options, *console, *app); }};
+  return {app, [=](const ProgramInfo&) { return plot(*options, *console); }};
 }
 
 }  // namespace tangere::apps

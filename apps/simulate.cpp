@@ -43,9 +43,7 @@ Integrator integrator_named(const std::string& name) {
   throw InputError("unknown integrator '" + name + "'" + suggestion(name, names));
 }
 
-void check_arguments(const Options& options, const CLI::App& app) {
-  require(options.scene, "SCENE", app);
-  require(options.output, "--output", app);
+void check_arguments(const Options& options) {
   if (options.precision != "double")
     throw InputError("unknown precision '" + options.precision + "'; expected double");
   check_not_same_file(options.output, options.scene);
@@ -120,7 +118,7 @@ void list_failures(const Console& console, const RolloutSummary& summary) {
     console.fail(fmt::format("environment {} failed in step {}: {}", failures[i].environment,
                              failures[i].step, to_string(failures[i].status)));
   if (failures.size() > kMostFailuresListed)
-    console.fail(fmt::format("and {} more environments; --json and the file name them all",
+    console.fail(fmt::format("failed too, not listed: {}; --json and the file name all",
                              failures.size() - kMostFailuresListed));
 }
 
@@ -133,10 +131,10 @@ int report(const Options& options, const Console& console, const Batch& batch,
                           static_cast<double>(summary.environment_steps);
   list_failures(console, summary);
   console.print(
-      fmt::format("{} steps of {} environments in {:.2f} s: {:.0f} env-steps/s, output included\n"
-                  "{:.2f} Newton iterations per step, {} steps split, {} environments failed\n"
+      fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
+                  "Newton iterations per step: {:.2f}, steps split: {}, environments failed: {}\n"
                   "wrote {} ({} bytes)",
-                  summary.steps, batch.environments(), summary.seconds, rate, per_step,
+                  batch.environments(), summary.steps, summary.seconds, rate, per_step,
                   summary.split_steps, summary.failures.size(), options.output, bytes));
   Json sensors = Json::array();
   for (const SensorInfo& sensor : batch.model().sensors()) {
@@ -167,9 +165,8 @@ int report(const Options& options, const Console& console, const Batch& batch,
   return code;
 }
 
-int simulate(const Options& options, const Console& console, const CLI::App& app,
-             const ProgramInfo& info) {
-  check_arguments(options, app);
+int simulate(const Options& options, const Console& console, const ProgramInfo& info) {
+  check_arguments(options);
   StepperOptions solver{{}, options.timestep, options.tolerance};
   if (!options.integrator.empty()) solver.integrator = integrator_named(options.integrator);
 
@@ -187,8 +184,8 @@ int simulate(const Options& options, const Console& console, const CLI::App& app
   const StopSignals signals;
   TrajectoryFile output(options.output, make_layout(batch, stepper, rollout, info),
                         options.overwrite);
-  console.detail(fmt::format("{} steps of {} environments, {}, h = {} s", rollout.steps,
-                             environments, to_string(stepper.integrator()), stepper.timestep()));
+  console.detail(fmt::format("environments: {}, steps: {}, {}, h = {} s", environments,
+                             rollout.steps, to_string(stepper.integrator()), stepper.timestep()));
   RolloutSummary summary;
   {
     Progress progress(console, rollout.steps, environments);
@@ -210,11 +207,10 @@ Command add_simulate(CLI::App& program) {
   const auto console = std::make_shared<Console>();
   Options& o = *options;
   CLI::App* app = program.add_subcommand("simulate", "Run a scene and write its trajectory");
-  app->add_option("SCENE", o.scene, "Scene file (XML)")->type_name("");
-  app->add_option("-o,--output", o.output, "HDF5 file to write")->type_name("F.h5");
-  app->add_option("--controls", o.controls,
-                  "Table of controls, a row per step, instead of the scene's <control>")
-      ->type_name("U.csv");
+  add_text(*app, "SCENE", o.scene, "", "Scene file (XML)")->required();
+  add_text(*app, "-o,--output", o.output, "F.h5", "HDF5 file to write")->required();
+  add_text(*app, "--controls", o.controls, "U.csv",
+           "Table of controls, a row per step, instead of the scene's <control>");
   add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
                                  "Steps to take [default: as many as the controls last]");
   add_whole_number<int>(*app, "--envs", o.environments, 1, kMostEnvironments,
@@ -222,12 +218,12 @@ Command add_simulate(CLI::App& program) {
   add_whole_number<int>(*app, "--every", o.every, 1, kMostEnvironments,
                         "Tactile fields every N-th step [default: the scene's, or 1]");
   add_positive_number(*app, "--timestep", o.timestep, "Step size in s [default: the scene's]");
-  app->add_option("--integrator", o.integrator,
-                  "BDF1, BDF2, SDIRK2 or linear-implicit [default: the scene's]")
-      ->type_name("NAME");
+  add_text(*app, "--integrator", o.integrator, "NAME",
+           "BDF1, BDF2, SDIRK2 or linear-implicit [default: the scene's]");
   add_positive_number(*app, "--tol", o.tolerance,
                       "Largest scaled residual of a step [default: the scene's]");
-  app->add_option("--precision", o.precision, "double, the only one so far")->type_name("NAME");
+  add_text(*app, "--precision", o.precision, "NAME",
+           "Of the numbers: double, the only one so far [default: double]");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between environments [default: 0]");
   app->add_flag("--overwrite", o.overwrite, "Replace the output if it exists");
@@ -237,8 +233,7 @@ Command add_simulate(CLI::App& program) {
   app->footer(
       "Example:\n"
       "  tangere simulate scenes/rolling_ball.xml --output ball.h5 --envs 4 --every 5 --seed 1");
-  return {app, console,
-          [=](const ProgramInfo& info) { return simulate(*options, *console, *app, info); }};
+  return {app, [=](const ProgramInfo& info) { return simulate(*options, *console, info); }};
 }
 
 }  // namespace tangere::apps

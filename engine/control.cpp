@@ -92,7 +92,7 @@ std::int64_t ControlProgram::steps() const {
   if (const auto* t = std::get_if<CsvControl>(&description_))
     return static_cast<std::int64_t>(t->rows.size());
   if (const auto* p = std::get_if<PiecewiseControl>(&description_); p != nullptr && p->end > 0)
-    return step_at(p->end, timestep_);
+    return std::max<std::int64_t>(step_at(p->end, timestep_), 1);  // a step longer than the run
   return -1;
 }
 
