@@ -85,6 +85,7 @@ class Compiler {
       for (int k = 0; k < dof_count(joint.type); ++k) m_.damping[m_.joints[i].v + k] = joint.damping;
     }
     initial_state();
+    unknown_scales();
     pair_contacts();
     ground_contacts();
     sensors();
@@ -341,6 +342,21 @@ class Compiler {
   }
 
   // --- state and what varies ---
+
+  /// Lengths are rounded against the farthest point of any body from the world's origin at rest.
+  void unknown_scales() {
+    std::vector<Frame<double>> world;
+    double extent = 0;
+    for (const Link& l : m_.links) world.push_back(l.parent < 0 ? l.frame : compose(world[std::size_t(l.parent)], l.frame));
+    for (const CompiledBody& b : m_.bodies) {
+      const Frame<double> at = b.link < 0 ? b.frame : compose(world[std::size_t(b.link)], b.frame);
+      extent = std::max(extent, std::sqrt(dot(at.p, at.p)) + std::sqrt(dot(b.size, b.size)));
+    }
+    for (const Link& l : m_.links) {
+      const bool turns = l.kind == JointKind::revolute || l.kind == JointKind::spherical;
+      m_.unknown_scale.insert(m_.unknown_scale.end(), std::size_t(kernels::dofs(l.kind)), turns ? 1.0 : extent);
+    }
+  }
 
   void initial_state() {
     m_.initial_q.assign(m_.nq, 0);

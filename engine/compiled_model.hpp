@@ -73,6 +73,7 @@ struct CompiledModel {
   std::vector<kernels::GroundContact> grounds;
   std::vector<std::vector<double>> point_storage, tile_storage;  ///< what pairs and grounds point into
   std::vector<double> damping;         ///< (nv)
+  std::vector<double> unknown_scale;   ///< (nv) what an unknown is rounded against: extent of the scene [m], 1 [rad]
   std::vector<double> initial_q, initial_v;
   PatternStorage pattern;
   BlockLayout layout;

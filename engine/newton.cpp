@@ -4,10 +4,13 @@
 // Accepted when a trial x - αΔ passes the natural test ‖D^½ A⁻¹ g(x - αΔ)‖ ≤ (1 - α/4) ‖D^½ Δ‖ with the factor at
 // hand (D = diag M at the first point), or when it already converges:
 //   ‖D^-½ g‖ ≤ tol (‖D^½ v‖ c₀/h + ‖D^½‖ |gravity| + ‖D^-½ f‖),   f the magnitudes of contact, motor, damping forces
-// Both are free of units. The v in the scale is the candidate's own.
+// Both are free of units. The v in the scale is the candidate's own. No residual can be smaller than what one rounding
+// of a position does to it, so ‖D^-½ g‖ ≤ ‖D^-½ φ‖ also converges, φ_i = 4 ε |A_ii| (extent of the scene, or 1 rad):
+// at contact stiffnesses where that floor lies above the tolerance, Newton would only spin on rounding.
 #include "engine/newton.hpp"
 
 #include <cmath>
+#include <limits>
 
 #include "engine/detection.hpp"
 
@@ -50,21 +53,27 @@ struct Search {
         if (has(lanes, l)) w.weight[i][l] = std::sqrt(w.stage.mass_diagonal[i][l]);
   }
 
-  /// Scaled residual of each lane: ‖D^-½ g‖ over what it is measured by. 0/0 is 0: nothing acts, nothing moves.
+  /// Scaled residual of each lane: ‖D^-½ g‖ over what it is measured by; 0 where it is below the rounding floor.
   void scaled_residuals(std::array<double, kGroup>& out) const {
-    std::array<double, kGroup> g{}, motion{}, mass{}, force{};
-    for (int i = 0; i < n(); ++i)
+    std::array<double, kGroup> g{}, motion{}, mass{}, force{}, floor{};
+    const kernels::Pattern& p = model.view.pattern;
+    for (int i = 0; i < n(); ++i) {
+      const LaneRow& diagonal = w.stage.A[p.slot[i * n() + i]];
+      const double rounding = 4 * std::numeric_limits<double>::epsilon() * model.unknown_scale[std::size_t(i)];
       for (int l = 0; l < kGroup; ++l) {
         const double d = w.weight[i][l];
         const double r = w.stage.g[i][l] / d, m = d * w.stage.v[i][l], f = w.stage.force_scale[i][l] / d;
+        const double e = rounding * diagonal[l] / d;
         g[l] += r * r;
         motion[l] += m * m;
         mass[l] += d * d;
         force[l] += f * f;
+        floor[l] += e * e;
       }
+    }
     for (int l = 0; l < kGroup; ++l) {
       const double scale = std::sqrt(motion[l]) * w.stage.c0_over_h[l] + gravity * std::sqrt(mass[l]) + std::sqrt(force[l]);
-      out[l] = g[l] == 0 ? 0 : std::sqrt(g[l]) / scale;
+      out[l] = g[l] <= floor[l] ? 0 : std::sqrt(g[l]) / scale;
     }
   }
 

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// The analytic Jacobian of the residual: three routes on random trees with and without contact, every joint kind.
+#include <gtest/gtest.h>
+
+#include "kernels/dual.hpp"
+#include "tests/engine/random_scene.hpp"
+#include "tests/engine/stage_buffers.hpp"
+
+namespace tangere {
+namespace {
+
+using testing::Random;
+using testing::StageBuffers;
+using D = kernels::Dual<double>;
+
+constexpr double kStep = 0.004, kC0 = 1.5;
+
+double norm_of(const CompiledModel& m, const StageBuffers<double>& b) {
+  double worst = 0;
+  for (int i = 0; i < m.nv; ++i)
+    for (int j = 0; j < m.nv; ++j) worst = std::max(worst, std::abs(b.entry(b.A, i, j)));
+  return worst;
+}
+
+/// Each row is measured by its own largest entry: rows of light and heavy bodies differ by many decades.
+std::vector<double> row_scales(const CompiledModel& m, const StageBuffers<double>& b) {
+  std::vector<double> scale(std::size_t(m.nv), 0);
+  for (int i = 0; i < m.nv; ++i)
+    for (int j = 0; j < m.nv; ++j) scale[std::size_t(i)] = std::max(scale[std::size_t(i)], std::abs(b.entry(b.A, i, j)));
+  return scale;
+}
+
+template <class N>
+void copy_stage(const StageBuffers<double>& from, StageBuffers<N>& to) {
+  const auto copy = [](const std::vector<double>& a, std::vector<N>& b) {
+    for (std::size_t i = 0; i < a.size(); ++i) b[i] = N(a[i]);
+  };
+  copy(from.centre, to.centre);
+  copy(from.x, to.x);
+  copy(from.r, to.r);
+  copy(from.s, to.s);
+  copy(from.tau, to.tau);
+}
+
+void compare_with_dual_numbers(const CompiledModel& m, StageBuffers<double>& b, double tolerance) {
+  b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
+  const std::vector<double> scale = row_scales(m, b);
+  StageBuffers<D> dual(m);
+  copy_stage(b, dual);
+  for (int j = 0; j < m.nv; ++j) {
+    dual.x[std::size_t(j)].epsilon = 1;
+    dual.residual(kC0 / kStep, 1 / kStep);
+    dual.x[std::size_t(j)].epsilon = 0;
+    for (int i = 0; i < m.nv; ++i) {
+      EXPECT_DOUBLE_EQ(dual.g[std::size_t(i)].value, b.g[std::size_t(i)]);
+      EXPECT_NEAR(dual.g[std::size_t(i)].epsilon, b.entry(b.A, i, j), tolerance * scale[std::size_t(i)])
+          << "entry " << i << ", " << j;
+    }
+  }
+}
+
+TEST(Jacobian, TreesMatchDualNumbers) {
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    const auto m = compile(testing::random_tree(seed, 2 + static_cast<int>(seed % 9)));
+    StageBuffers<double> b(*m);
+    Random random(seed);
+    for (int k = 0; k < 5; ++k) {
+      testing::randomise(b, *m, random, kStep);
+      SCOPED_TRACE("seed " + std::to_string(seed));
+      compare_with_dual_numbers(*m, b, 1e-11);
+    }
+  }
+}
+
+class ContactJacobian : public ::testing::TestWithParam<ContactLaw> {};
+
+TEST_P(ContactJacobian, ContactsMatchDualNumbers) {
+  int touched = 0;
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    const auto m = compile(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), GetParam()));
+    StageBuffers<double> b(*m);
+    Random random(seed);
+    for (int k = 0; k < 3; ++k) {
+      testing::randomise(b, *m, random, kStep);
+      SCOPED_TRACE("seed " + std::to_string(seed));
+      compare_with_dual_numbers(*m, b, 1e-11);
+      for (double f : b.force_scale) touched += f > 1e-3;
+    }
+  }
+  EXPECT_GT(touched, 200);
+}
+
+TEST_P(ContactJacobian, ContactsMatchCentralDifferences) {
+  int compared = 0, kinks = 0;
+  for (unsigned seed = 101; seed <= 115; ++seed) {
+    const auto m = compile(testing::random_contacts(seed, 3, GetParam()));
+    StageBuffers<double> b(*m), moved(*m);
+    Random random(seed);
+    testing::randomise(b, *m, random, kStep);
+    b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
+    const double scale = norm_of(*m, b);
+    copy_stage(b, moved);
+    const double e = 1e-9;
+    for (int j = 0; j < m->nv; ++j) {
+      const auto at = [&](double step) {
+        moved.x[std::size_t(j)] = b.x[std::size_t(j)] + step;
+        moved.residual(kC0 / kStep, 1 / kStep);
+        moved.x[std::size_t(j)] = b.x[std::size_t(j)];
+        return moved.g;
+      };
+      const std::vector<double> ahead = at(e), behind = at(-e);
+      for (int i = 0; i < m->nv; ++i) {
+        const std::size_t k = std::size_t(i);
+        const double right = (ahead[k] - b.g[k]) / e, left = (b.g[k] - behind[k]) / e;
+        if (std::abs(right - left) > 1e-4 * scale) {
+          ++kinks;  // a contact or a slip began within ±e
+          continue;
+        }
+        EXPECT_NEAR(0.5 * (right + left), b.entry(b.A, i, j), 1e-5 * scale) << "seed " << seed << " entry " << i << ", " << j;
+        ++compared;
+      }
+    }
+  }
+  EXPECT_GT(compared, 10 * kinks + 100);
+}
+
+INSTANTIATE_TEST_SUITE_P(Laws, ContactJacobian,
+                         ::testing::Values(ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear));
+
+TEST(Jacobian, MassDiagonalIsTheKineticEnergyOfUnitVelocity) {
+  // One free cuboid: ½ m and ½ I exactly.
+  Scene s;
+  LinkDescription l;
+  l.name = "box";
+  l.joint.name = "joint";
+  l.joint.type = JointType::free;
+  l.body.name = "box";
+  l.body.density = 800;
+  l.body.shape = CuboidShape{{0.1, 0.2, 0.3}, {2, 2, 2}};
+  s.links = {l};
+  const auto m = compile(s);
+  StageBuffers<double> b(*m);
+  b.centre[3] = 1;
+  b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
+  const double mass = 800 * 0.1 * 0.2 * 0.3;
+  EXPECT_DOUBLE_EQ(b.mass[0], mass);
+  EXPECT_NEAR(b.mass[3], mass / 12 * (0.04 + 0.09), 1e-15);
+  EXPECT_NEAR(b.mass[5], mass / 12 * (0.01 + 0.04), 1e-15);
+}
+
+TEST(Residual, MovingTheSceneChangesNothing) {
+  for (double distance : {1e3, 1e7}) {
+    Scene near = testing::random_tree(7, 6), far = near;
+    for (LinkDescription& l : far.links)
+      if (l.parent < 0) l.joint.pose.position[0] += distance;
+    const auto m1 = compile(near), m2 = compile(far);
+    StageBuffers<double> a(*m1), b(*m2);
+    Random random(7);
+    testing::randomise(a, *m1, random, kStep);
+    copy_stage(a, b);
+    a.residual_and_jacobian(kC0 / kStep, 1 / kStep);
+    b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
+    EXPECT_EQ(a.g, b.g);
+    EXPECT_EQ(a.A, b.A);
+  }
+}
+
+}  // namespace
+}  // namespace tangere

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// Short runs for tests.
+#pragma once
+
+#include <vector>
+
+#include "engine/readout.hpp"
+#include "engine/stepper.hpp"
+
+namespace tangere::testing {
+
+inline StepperOptions options(Integrator scheme, double timestep, double tolerance = 1e-12) {
+  StepperOptions o;
+  o.integrator = scheme;
+  o.timestep = timestep;
+  o.tolerance = tolerance;
+  return o;
+}
+
+inline std::vector<double> q_of(const Batch& b, int e = 0) {
+  std::vector<double> q(std::size_t(b.model().nq()));
+  b.get_q(e, q);
+  return q;
+}
+inline std::vector<double> v_of(const Batch& b, int e = 0) {
+  std::vector<double> v(std::size_t(b.model().nv()));
+  b.get_v(e, v);
+  return v;
+}
+
+/// The same controls for every environment.
+inline void step_all(Stepper& stepper, Batch& batch, const std::vector<double>& u) {
+  std::vector<double> all;
+  for (int e = 0; e < batch.environments(); ++e) all.insert(all.end(), u.begin(), u.end());
+  stepper.step(batch, all);
+}
+
+}  // namespace tangere::testing

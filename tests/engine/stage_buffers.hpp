@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Everything one evaluation of a stage needs, for any number type: the plain scalar run of the kernels.
+#pragma once
+
+#include <vector>
+
+#include "engine/compiled_model.hpp"
+#include "kernels/jacobian-inl.hpp"
+#include "tests/kernels/random_numbers.hpp"
+
+namespace tangere::testing {
+
+/// All contact points of each pair are candidates: nothing is culled.
+template <class N>
+class StageBuffers {
+ public:
+  explicit StageBuffers(const CompiledModel& m) : model_(m) {
+    const std::size_t nv = std::size_t(m.nv), entries = std::size_t(m.pattern.entries);
+    centre.resize(std::size_t(m.nq));
+    for (auto* v : {&x, &r, &s, &tau, &v_out, &g, &force_scale, &mass}) v->assign(nv, N(0.0));
+    for (auto* e : {&G_q, &C, &A}) e->assign(entries, N(0.0));
+    links_.resize(m.links.size());
+    contacts_.resize(m.pairs.size() + m.grounds.size());
+    columns_.resize(4 * nv);
+    dofs_.resize(2 * nv);
+    excess_.assign(1, N(0.0));
+    for (const kernels::PairContact& p : m.pairs) {
+      points_.emplace_back();
+      for (int k = 0; k < 3 * p.n_points; ++k) points_.back().push_back(N(p.points[k]));
+      references_.emplace_back(12, N(0.0));
+      lists_.push_back({points_.back().data(), p.n_points, references_.back().data(), 1e9});
+    }
+  }
+
+  kernels::StageArgs<N> arguments(double c0_over_h, double inverse_h, const double* block) {
+    kernels::StageArgs<N> a{};
+    a.centre = centre.data();
+    a.x = x.data();
+    a.r = r.data();
+    a.s = s.data();
+    a.tau = tau.data();
+    a.c0_over_h = N(c0_over_h);
+    a.inverse_h = N(inverse_h);
+    a.block = block;
+    a.group = 0;
+    a.candidates = lists_.data();
+    a.links = links_.data();
+    a.contacts = contacts_.data();
+    a.columns = columns_.data();
+    a.v = v_out.data();
+    a.g = g.data();
+    a.force_scale = force_scale.data();
+    a.mass_diagonal = mass.data();
+    a.G_q = G_q.data();
+    a.C = C.data();
+    a.A = A.data();
+    a.excess = excess_.data();
+    return a;
+  }
+
+  void residual(double c0_over_h, double inverse_h, const double* block = nullptr) {
+    kernels::residual<false>(model_.view, arguments(c0_over_h, inverse_h, block));
+  }
+  void residual_and_jacobian(double c0_over_h, double inverse_h, const double* block = nullptr) {
+    const auto a = arguments(c0_over_h, inverse_h, block);
+    kernels::residual<true>(model_.view, a);
+    kernels::jacobian(model_.view, a, dofs_.data());
+  }
+  [[nodiscard]] N entry(const std::vector<N>& matrix, int i, int j) const {
+    const int at = model_.pattern.slot[std::size_t(i * model_.nv + j)];
+    return at < 0 ? N(0.0) : matrix[std::size_t(at)];
+  }
+
+  std::vector<N> centre, x, r, s, tau, v_out, g, force_scale, mass, G_q, C, A;
+
+ private:
+  const CompiledModel& model_;
+  std::vector<kernels::LinkScratch<N>> links_;
+  std::vector<kernels::ContactScratch<N>> contacts_;
+  std::vector<kernels::Vec6<N>> columns_;
+  std::vector<int> dofs_;
+  std::vector<N> excess_;
+  std::vector<std::vector<N>> points_, references_;
+  std::vector<kernels::CandidateList<N>> lists_;
+};
+
+/// A random stage: centre, unknown and history of the size of a step.
+template <class N>
+void randomise(StageBuffers<N>& b, const CompiledModel& m, Random& random, double h) {
+  for (const kernels::Link& l : m.links) {
+    if (l.kind == kernels::JointKind::spherical) {
+      const kernels::Quat<double> q = random.quaternion();
+      const double w[4] = {q.w, q.x, q.y, q.z};
+      for (int k = 0; k < 4; ++k) b.centre[std::size_t(l.q + k)] = N(w[k]);
+    } else {
+      for (int k = 0; k < kernels::dofs(l.kind); ++k) b.centre[std::size_t(l.q + k)] = N(0.05 * random.normal());
+    }
+  }
+  for (int i = 0; i < m.nv; ++i) {
+    const std::size_t k = std::size_t(i);
+    b.x[k] = N(0.5 * h * random.normal());
+    b.r[k] = N(0.1 * h * random.normal());
+    b.s[k] = N(0.3 * random.normal());
+    b.tau[k] = N(0.1 * random.normal());
+  }
+}
+
+}  // namespace tangere::testing
