@@ -54,7 +54,8 @@ bool is_word(std::string_view field) {
 double parse_number(std::string_view field, const std::string& place) {
   if (field.empty()) throw InputError(place + " is empty; expected a number");
   std::string_view digits = field;
-  if (digits.front() == '+') digits.remove_prefix(1);
+  // The library's parser knows no plus sign.
+  if (digits.front() == '+' && !digits.starts_with("+-")) digits.remove_prefix(1);
   double number = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
   if (error == std::errc::result_out_of_range && end == digits.data() + digits.size())

@@ -32,7 +32,7 @@ std::string nearest_name(std::string_view wrong, std::span<const std::string> ca
   constexpr std::size_t kLongest = 200;  // longer words are not typing mistakes
   if (wrong.size() > kLongest) return "";
   std::string best;
-  std::size_t best_distance = wrong.size() / 2 + 1;
+  std::size_t best_distance = (wrong.size() + 1) / 2 + 1;
   for (const std::string& c : candidates) {
     if (c.size() > kLongest) continue;
     const std::size_t d = edit_distance(wrong, c);

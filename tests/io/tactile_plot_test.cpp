@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures: well-formed, with the value where it belongs, and honest when nothing touches.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tinyxml2.h>
+
+#include "io/tactile_plot.hpp"
+#include "tests/io/synthetic_run.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::Folder;
+using testing::layout;
+
+std::string picture(const Folder& folder, const PlotOptions& options, double force = 1e-3) {
+  const TrajectoryLayout l = layout();
+  {
+    TrajectoryFile file(folder / "run.h5", l, true);
+    testing::write_run(file, l, force);
+    file.commit();
+  }
+  const std::string svg = render_tactile_svg(TrajectoryReader(folder / "run.h5"), options);
+  tinyxml2::XMLDocument document;
+  EXPECT_EQ(document.Parse(svg.c_str()), tinyxml2::XML_SUCCESS);
+  EXPECT_STREQ(document.RootElement()->Name(), "svg");
+  return svg;
+}
+
+TEST(TactilePlot, AStripShowsEveryFrameWithUnitsAndScale) {
+  const Folder folder;
+  const std::string svg = picture(folder, {});
+  EXPECT_THAT(svg, HasSubstr("t = 0.020 s (step 2)"));
+  EXPECT_THAT(svg, HasSubstr("t = 0.040 s (step 4)"));
+  EXPECT_THAT(svg, HasSubstr(">mN<"));            // 2 mN at most
+  EXPECT_THAT(svg, HasSubstr(">2<"));             // top of the colour bar
+  EXPECT_THAT(svg, HasSubstr("pressure 2 mN"));   // the sum, positive although it was written negative
+  EXPECT_THAT(svg, HasSubstr("sensor 'skin'"));
+}
+
+TEST(TactilePlot, TheTouchedPointHasTheTopColourAtItsPlace) {
+  const Folder folder;
+  PlotOptions one;
+  one.frame = 1;
+  const std::string svg = picture(folder, one);
+  // 3 × 4 points on 2 × 3 mm: panels are 240 wide, so cells are 60 wide; point (1, 2) starts at 64 + 120.
+  EXPECT_THAT(svg, HasSubstr("<rect x=\"184.00\" y=\"137.33\""));
+  EXPECT_THAT(svg, HasSubstr("fill=\"#faec82\""));
+  EXPECT_THAT(svg, Not(HasSubstr("step 2)")));
+}
+
+TEST(TactilePlot, ShearAlongAxis1PointsToTheRight) {
+  const Folder folder;
+  PlotOptions one;
+  one.frame = 0;
+  const std::string svg = picture(folder, one);
+  const std::size_t at = svg.find("<path d=\"M");
+  ASSERT_NE(at, std::string::npos);
+  double x0, y0, x1, y1;
+  ASSERT_EQ(std::sscanf(svg.c_str() + at, "<path d=\"M%lf %lfL%lf %lf", &x0, &y0, &x1, &y1), 4);
+  EXPECT_GT(x1 - x0, 10);
+  EXPECT_NEAR(y1, y0, 1e-6);
+}
+
+TEST(TactilePlot, NoContactIsSaid) {
+  const Folder folder;
+  EXPECT_THAT(picture(folder, {}, 0.0), HasSubstr("no contact"));
+}
+
+TEST(TactilePlot, WhatIsNotThereIsNamed) {
+  const Folder folder;
+  picture(folder, {});
+  const TrajectoryReader file(folder / "run.h5");
+  const auto message = [&](PlotOptions o) -> std::string {
+    try {
+      (void)render_tactile_svg(file, o);
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  PlotOptions o;
+  o.sensor = "skim";
+  EXPECT_THAT(message(o), HasSubstr("did you mean 'skin'"));
+  o = {};
+  o.environment = 2;
+  EXPECT_THAT(message(o), HasSubstr("0 to 1"));
+  o = {};
+  o.frame = 2;
+  EXPECT_THAT(message(o), HasSubstr("frames 0 to 1"));
+  o = {};
+  o.strip = 0;
+  EXPECT_THAT(message(o), HasSubstr("at least 1"));
+}
+
+}  // namespace
+}  // namespace tangere

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every message of the scene reader: the line, the value, what was expected, the nearest name.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "io/scene_reader.hpp"
+#include "tests/scene/scene_text.hpp"
+
+namespace tangere {
+namespace {
+
+using testing::with;
+
+struct Bad {
+  std::string what, by;              // replacement in the scene
+  std::string line;                  // ":12: " or "" where no line can be told
+  std::vector<std::string> message;  // parts of it
+};
+
+std::string error_of(const std::string& text) {
+  try {
+    parse_scene(text, "s.xml");
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+class SceneError : public ::testing::TestWithParam<Bad> {};
+
+TEST_P(SceneError, NamesLineValueAndWhatWasExpected) {
+  const Bad& bad = GetParam();
+  const std::string message = error_of(with(bad.what, bad.by));
+  ASSERT_NE(message, "") << bad.by;
+  EXPECT_THAT(message, ::testing::HasSubstr("s.xml" + bad.line));
+  for (const std::string& part : bad.message) EXPECT_THAT(message, ::testing::HasSubstr(part));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, SceneError,
+    ::testing::Values(
+        Bad{"<tangere model=\"small\">", "<mujoco>", ":", {"not well-formed"}},
+        Bad{"integrator=\"BDF2\"", "integrator=\"BDF3\"", ":2: ", {"BDF3", "did you mean", "BDF"}},
+        Bad{"timestep=\"5e-3\"", "timestep=\"0\"", ":2: ", {"timestep", "positive"}},
+        Bad{"timestep=\"5e-3\"", "timestep=\"-1\"", ":2: ", {"-1", "positive"}},
+        Bad{"timestep=\"5e-3\"", "timestep=\"5e-3x\"", ":2: ", {"5e-3x", "finite numbers"}},
+        Bad{"timestep=\"5e-3\"", "timestep=\"nan\"", ":2: ", {"finite numbers"}},
+        Bad{"timestep=\"5e-3\"", "timestep=\"1e999\"", ":2: ", {"finite numbers"}},
+        Bad{"timestep=\"5e-3\"", "timestep=\"\"", ":2: ", {"empty"}},
+        Bad{"timestep=\"5e-3\"", "timstep=\"5e-3\"", ":2: ", {"timstep", "did you mean 'timestep'"}},
+        Bad{"gravity=\"0 0 -9.8\"", "gravity=\"0 -9.8\"", ":2: ", {"2 numbers", "expected 3"}},
+        Bad{"unit=\"m-kg\"", "unit=\"mm-kg\"", ":2: ", {"mm-kg", "did you mean 'm-kg'"}},
+        Bad{"max_iter=\"20\"", "max_iter=\"2.5\"", ":3: ", {"2.5", "integer"}},
+        Bad{"<solver_option tol=\"1e-9\"", "<solver_option tol=\"0\"", ":3: ", {"positive"}},
+        Bad{"normal=\"0 0 1\"", "normal=\"0 0 0\"", ":4: ", {"no direction"}},
+        Bad{"<default><tactile kn=\"1\"", "<default><tactil kn=\"1\"", ":5: ", {"tactil", "did you mean 'tactile'"}},
+        Bad{"<default><tactile kn=\"1\"", "<default><tactile k=\"1\"", ":5: ", {"unknown attribute 'k'"}},
+        Bad{"<link name=\"ball\">", "<link name=\"pad\">", ":11: ", {"'pad' is used twice"}},
+        Bad{"name=\"ball_joint\" type=\"free3d\"", "name=\"pad_joint\" type=\"free3d\"", ":12: ", {"'pad_joint' is used twice"}},
+        Bad{"type=\"translational\"", "type=\"translation\"", ":8: ", {"did you mean 'translational'"}},
+        Bad{"damping=\"1\"/>", "damping=\"-1\"/>", ":8: ", {"-1", "zero or more"}},
+        Bad{"damping=\"1\"/>", "damping=\"1\" lim=\"0 1\" lim_stiffness=\"5\"/>", ":8: ", {"limits", "not simulated"}},
+        Bad{"damping=\"1\"/>", "stiffness=\"1\"/>", ":8: ", {"stiffness", "not simulated"}},
+        Bad{"type=\"translational\" pos", "type=\"revolute\" pos", ":8: ", {"'axis' is missing"}},
+        Bad{"pos=\"0 0 0.06\"", "pos=\"0 0 0.06\" quat=\"0 0 0 0\"", ":8: ", {"no rotation"}},
+        Bad{"pos=\"0 0 0.06\"", "pos=\"0 0 0.06\" frame=\"WOLRD\"", ":8: ", {"did you mean 'WORLD'"}},
+        Bad{"size=\"0.05 0.05 0.01\"", "size=\"0.05 0 0.01\"", ":9: ", {"edge", "positive"}},
+        Bad{"size=\"0.05 0.05 0.01\"", "size=\"0.05 0.05\"", ":9: ", {"expected 3"}},
+        Bad{"general_contact_resolution=\"4 4 2\"", "general_contact_resolution=\"4 4 1\"", ":9: ", {"from 2 to"}},
+        Bad{"general_contact_resolution=\"4 4 2\"", "general_contact_resolution=\"4 4 1e9\"", ":9: ", {"from 2 to"}},
+        Bad{"density=\"1000\"", "density=\"0\"", ":9: ", {"positive"}},
+        Bad{"type=\"sphere\"", "type=\"capsule\"", ":13: ", {"capsule", "not simulated", "sphere, cuboid"}},
+        Bad{"radius=\"0.02\"", "radius=\"-0.02\"", ":13: ", {"positive"}},
+        Bad{"radius=\"0.02\" ", "", ":13: ", {"'radius' is missing"}},
+        Bad{"<motor joint=\"pad_joint\"", "<motor joint=\"pad_jiont\"", ":17: ", {"did you mean 'pad_joint'"}},
+        Bad{"<motor joint=\"pad_joint\"", "<motor joint=\"ball_joint\"", ":17: ", {"forces and torques"}},
+        Bad{"ctrl=\"force\"", "ctrl=\"position\"", ":17: ", {"position motors", "not simulated"}},
+        Bad{"ctrl_range=\"-1 1\"", "ctrl_range=\"1 -1\"", ":17: ", {"low, then high"}},
+        Bad{" ctrl_range=\"-1 1\"", "", ":17: ", {"'ctrl_range' is missing"}},
+        Bad{"<ground_contact body=\"ball\"", "<ground_contact body=\"bal\"", ":20: ", {"did you mean 'ball'"}},
+        Bad{"kn=\"5e3\"", "kn=\"-5e3\"", ":20: ", {"zero or more"}},
+        Bad{"kn=\"5e3\"", "kn=\"5e3\" law=\"cubic\"", ":20: ", {"cubic", "clamped, paper, linear"}},
+        Bad{"general_body=\"pad\" primitive_body=\"ball\"", "general_body=\"ball\" primitive_body=\"pad\"", ":21: ", {"no contact points"}},
+        Bad{"primitive_body=\"ball\"", "primitive_body=\"pad\"", ":21: ", {"against itself"}},
+        Bad{"type=\"rect_array\"", "type=\"hemisphere\"", ":24: ", {"not simulated", "rect_array"}},
+        Bad{"axis1=\"1 0 0\"", "axis1=\"0 1 0\"", ":24: ", {"perpendicular"}},
+        Bad{"resolution=\"5 7\"", "resolution=\"0 7\"", ":24: ", {"from 1 to"}},
+        Bad{"resolution=\"5 7\"", "resolution=\"5 7 9\"", ":24: ", {"expected 2"}},
+        Bad{"body=\"pad\" type=\"rect", "body=\"pda\" type=\"rect", ":24: ", {"did you mean 'pad'"}},
+        Bad{"q=\"0.001 0 0 1 0 0 0\"", "q=\"0.001 0 0 0 0 0 0\"", ":27: ", {"quaternion of zero length"}},
+        Bad{"q=\"0.001 0 0 1 0 0 0\"", "q=\"0.001 0 0\"", ":27: ", {"expected 7"}},
+        Bad{"<piecewise end=\"1\">", "<piecewise end=\"0.2\">", ":30: ", {"end"}},
+        Bad{"<at time=\"0\" value", "<at time=\"0.1\" value", ":31: ", {"first must be 0"}},
+        Bad{"value=\"0 0 0.2\"", "value=\"0 0.2\"", ":31: ", {"2 control values", "motors take 3"}},
+        Bad{"uniform=\"-0.003 0.003\"", "uniform=\"0.003 -0.003\"", ":36: ", {"low, then high"}},
+        Bad{"q=\"0\" uniform", "q=\"7\" uniform", ":36: ", {"from 0 to 6"}},
+        Bad{"q=\"0\" uniform=\"-0.003 0.003\"", "q=\"0\"", ":36: ", {"exactly one of uniform"}},
+        Bad{"log_uniform=\"0.005 0.02\"", "log_uniform=\"0 0.02\"", ":37: ", {"positive bounds"}},
+        Bad{"log_uniform=\"0.005 0.02\"", "normal=\"0.01 0.1\"", ":37: ", {"negative coefficient"}},
+        Bad{"name=\"skin\" field", "name=\"skim\" field", ":37: ", {"did you mean 'skin'"}},
+        Bad{"field=\"kt\"", "field=\"kd\"", ":37: ", {"kn"}},
+        Bad{"<randomize>", "<randomise>", ":", {"not well-formed"}},
+        Bad{"<joint name=\"pad_joint\" type=\"translational\" pos=\"0 0 0.06\" damping=\"1\"/>", "", ":7: ", {"no <joint>"}},
+        Bad{"<body name=\"ball\" type=\"sphere\" radius=\"0.02\" density=\"100\"/>", "", ":11: ", {"no <body>"}},
+        Bad{"<sensor>", "<variable><endeffector joint=\"pad_joint\" pos=\"0 0 0\"/></variable>\n<sensor>", ":23: ", {"not simulated"}}));
+
+TEST(SceneError, RootsAndEmptyFilesSayWhatIsExpected) {
+  EXPECT_THAT(error_of("<mujoco/>"), ::testing::HasSubstr("expected the root <redmax> or <tangere>"));
+  EXPECT_THAT(error_of(""), ::testing::HasSubstr("not well-formed"));
+  EXPECT_THAT(error_of("<tangere/>"), ::testing::HasSubstr("no <link>"));
+  EXPECT_THAT(error_of(std::string("<tangere/>") + '\0'), ::testing::HasSubstr("zero byte"));
+}
+
+TEST(SceneError, DeepNestingIsAnErrorNotACrash) {
+  std::string deep = "<tangere><robot>";
+  for (int i = 0; i < 100000; ++i) deep += "<link name=\"l" + std::to_string(i) + "\">";
+  EXPECT_NE(error_of(deep), "");
+}
+
+TEST(SceneError, UnreadableFilesAreInputOutputErrors) {
+  EXPECT_THROW(read_scene("/no/such/scene.xml"), IoError);
+  EXPECT_THROW(read_scene("/"), IoError);
+}
+
+TEST(SceneError, UnknownNamesBecomeWarningsWhenAllowed) {
+  SceneReadOptions options;
+  options.allow_unknown = true;
+  const SceneFile file = parse_scene(with("timestep=\"5e-3\"", "timestep=\"5e-3\" colour=\"red\""), "s.xml", options);
+  ASSERT_EQ(file.warnings.size(), 1U);
+  EXPECT_THAT(file.warnings[0], ::testing::HasSubstr("s.xml:2: <option>: unknown attribute 'colour'"));
+}
+
+}  // namespace
+}  // namespace tangere
