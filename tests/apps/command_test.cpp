@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every subcommand promises: help with an example that works, one JSON object, exit codes that
+// say whose fault it is, messages that name the nearest word, and nothing half-done left behind.
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/apps/program.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using Words = std::vector<std::string>;
+
+const Words kSubcommands{"inspect", "simulate", "plot"};
+
+Words operator+(Words first, const Words& second) {
+  first.insert(first.end(), second.begin(), second.end());
+  return first;
+}
+
+/// `tangere simulate small.xml --output out.h5` and more.
+Words simulate(const Words& more = {}) {
+  return Words{"simulate", scene("rolling_ball_small.xml"), "--output", "out.h5"} + more;
+}
+
+/// The last line of a help text, as words, without "tangere".
+Words example_of(const std::string& help) {
+  std::istringstream line(help.substr(help.find("Example:\n  tangere ") + 19));
+  Words words;
+  for (std::string word; line >> word;) words.push_back(word);
+  return words;
+}
+
+TEST(Command, HelpEndsWithAnExampleThatWorks) {
+  const Folder folder;
+  std::filesystem::create_directory_symlink(TANGERE_SOURCE_DIR "/scenes", folder.path("scenes"));
+  for (const std::string& name : kSubcommands) {
+    const Outcome help = run(folder, {name, "--help"});
+    EXPECT_EQ(help.exit_code, 0) << name;
+    EXPECT_THAT(help.err, IsEmpty());
+    ASSERT_THAT(help.out, HasSubstr("Example:\n  tangere " + name + " "));
+    const Words example = example_of(help.out);
+    const Outcome outcome = run(folder, example);
+    EXPECT_EQ(outcome.exit_code, 0) << help.out << outcome.err;
+  }
+  EXPECT_THAT(folder.files(), testing::ElementsAre("ball.h5", "ball.svg", "scenes"));
+}
+
+TEST(Command, TopLevelHelpNamesEverySubcommandAndExitCode) {
+  const Folder folder;
+  const Outcome help = run(folder, {"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  for (const std::string& name : kSubcommands)
+    EXPECT_THAT(help.out, HasSubstr("\n  " + name + " "));
+  for (const char* code : {"0 done", "1 finished", "2 usage", "3 input", "75 ", "130 "})
+    EXPECT_THAT(help.out, HasSubstr(code));
+}
+
+TEST(Command, VersionNamesInstructionSetAndCompiler) {
+  const Folder folder;
+  const Outcome version = run(folder, {"--version"}, {"TANGERE_ISA=scalar"});
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_THAT(version.out, testing::MatchesRegex("tangere [0-9.]+ \\(scalar, (GCC|Clang) .*\\)\n"));
+}
+
+struct Mistake {
+  const char* name;
+  Words arguments;
+  int exit_code;
+  const char* message;  ///< part of it
+};
+
+void PrintTo(const Mistake& mistake, std::ostream* out) { *out << mistake.name; }
+
+class Mistakes : public testing::TestWithParam<Mistake> {};
+
+TEST_P(Mistakes, SaysWhoseFaultItIsAndLeavesNothing) {
+  const Mistake& mistake = GetParam();
+  const Folder folder;
+  const Outcome text = run(folder, mistake.arguments);
+  EXPECT_EQ(text.exit_code, mistake.exit_code) << text.err;
+  EXPECT_THAT(text.err, HasSubstr(mistake.message));
+  EXPECT_EQ(text.err.rfind("tangere: ", 0), 0U) << text.err;
+  EXPECT_THAT(text.out, IsEmpty());
+
+  const Outcome object = run(folder, mistake.arguments + Words{"--json"});
+  EXPECT_EQ(object.exit_code, mistake.exit_code);
+  const json answer = json::parse(object.out);
+  EXPECT_EQ(answer.at("exit_code"), mistake.exit_code);
+  EXPECT_THAT(answer.at("error").get<std::string>(), HasSubstr(mistake.message));
+  EXPECT_THAT(folder.files(), IsEmpty());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Usage, Mistakes,
+    testing::Values(
+        Mistake{"subcommand",
+                {"simualte", "x"},
+                2,
+                "unknown subcommand 'simualte'; did you mean 'simulate'?"},
+        Mistake{"far_off", {"qqqqqqqqq"}, 2, "expected one of inspect, simulate, plot"},
+        Mistake{"top_option",
+                {"--verison"},
+                2,
+                "unknown option '--verison'; did you mean '--version'?"},
+        Mistake{"option", simulate({"--stesp", "3"}), 2,
+                "unknown option '--stesp'; did you mean '--steps'?"},
+        Mistake{"option_of_what_is_required",
+                {"simulate", "x.xml", "--ouput", "x.h5"},
+                2,
+                "did you mean '--output'?"},
+        Mistake{"no_scene", {"inspect"}, 2, "SCENE is required; see 'tangere inspect --help'"},
+        Mistake{"no_output", {"simulate", "x.xml"}, 2, "--output is required"},
+        Mistake{"two_scenes", {"inspect", "x.xml", "y.xml"}, 2, "unexpected argument 'y.xml'"},
+        Mistake{"empty_scene", {"inspect", ""}, 2, "SCENE: expected text, found none"},
+        Mistake{
+            "empty_output", {"simulate", "x.xml", "--output", ""}, 2, "--output: expected text"},
+        Mistake{"empty_controls", simulate({"--controls", ""}), 2, "--controls: expected text"},
+        Mistake{"no_value", simulate({"--steps"}), 2, "--steps"},
+        Mistake{"twice", simulate({"--steps", "1", "--steps", "2"}), 2, "--steps"},
+        Mistake{"quiet_and_verbose", simulate({"-q", "-v"}), 2, "excludes"},
+        Mistake{"steps_0", simulate({"--steps", "0"}), 2,
+                "--steps 0: expected a whole number from 1"},
+        Mistake{"steps_float", simulate({"--steps", "1e3"}), 2,
+                "--steps 1e3: expected a whole number"},
+        Mistake{"envs_0", simulate({"--envs", "0"}), 2, "--envs 0: expected a whole number from 1"},
+        Mistake{"envs_negative", simulate({"--envs", "-4"}), 2, "--envs -4: expected"},
+        Mistake{"envs_huge", simulate({"--envs", "99999999999999999999"}), 2,
+                "--envs 99999999999999999999: expected"},
+        Mistake{"every_0", simulate({"--every", "0"}), 2, "--every 0: expected"},
+        Mistake{"seed", simulate({"--seed", "-1"}), 2,
+                "--seed -1: expected a whole number from 0 to 18446744073709551615"},
+        Mistake{"timestep_nan", simulate({"--timestep", "nan"}), 2,
+                "--timestep nan: expected a positive number"},
+        Mistake{"timestep_0", simulate({"--timestep", "0"}), 2, "--timestep 0: expected"},
+        Mistake{"timestep_word", simulate({"--timestep", "5ms"}), 2, "--timestep 5ms: expected"},
+        Mistake{"tol", simulate({"--tol", "inf"}), 2, "--tol inf: expected"},
+        Mistake{"integrator", simulate({"--integrator", "BDF3"}), 2,
+                "unknown integrator 'BDF3'; did you mean 'BDF1'?"},
+        Mistake{"precision", simulate({"--precision", "single"}), 2,
+                "unknown precision 'single'; expected double"},
+        Mistake{"strip_and_frame",
+                {"plot", "x.h5", "-o", "x.svg", "--strip", "2", "--frame", "1"},
+                2,
+                "excludes"}),
+    [](const auto& test) { return test.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(
+    Size, Mistakes,
+    testing::Values(
+        Mistake{"memory", simulate({"--envs", "1000000000"}), 2, "--envs 1000000000 needs "},
+        Mistake{"disk", simulate({"--steps", "1000000000000"}), 3, "bytes"},
+        Mistake{"beyond_any_disk", simulate({"--timestep", "1e-300"}), 2, "2^63 bytes"}),
+    [](const auto& test) { return test.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(
+    Files, Mistakes,
+    testing::Values(
+        Mistake{"scene_missing", {"inspect", "nowhere.xml"}, 3, "nowhere.xml"},
+        Mistake{"scene_folder", {"inspect", "."}, 3, "folder"},
+        Mistake{"scene_no_xml", {"inspect", scene("../LICENSE")}, 2, "LICENSE"},
+        Mistake{"output_folder_missing",
+                {"simulate", scene("rolling_ball_small.xml"), "-o", "no/out.h5"},
+                3,
+                "no"},
+        Mistake{
+            "output_is_folder", {"simulate", scene("rolling_ball_small.xml"), "-o", "/"}, 3, "/"},
+        Mistake{"output_unwritable",
+                {"simulate", scene("rolling_ball_small.xml"), "-o", "/proc/out.h5"},
+                3,
+                "/proc/out.h5"},
+        Mistake{"output_is_scene",
+                {"simulate", scene("rolling_ball_small.xml"), "--overwrite", "-o",
+                 scene("rolling_ball_small.xml")},
+                2,
+                "expected another file"},
+        Mistake{"controls_missing", simulate({"--controls", "nowhere.csv"}), 3, "nowhere.csv"},
+        Mistake{"controls_endless", simulate({"--controls", "/dev/zero"}), 2,
+                "/dev/zero:1: line longer"},
+        Mistake{"plot_missing", {"plot", "nowhere.h5", "-o", "x.svg"}, 3, "nowhere.h5"},
+        Mistake{"plot_no_trajectory",
+                {"plot", scene("rolling_ball_small.xml"), "-o", "x.svg"},
+                3,
+                "rolling_ball_small.xml"}),
+    [](const auto& test) { return test.param.name; });
+
+TEST(Command, NothingToDoIsAMistake) {
+  const Folder folder;
+  const Outcome outcome = run(folder, {});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.err, "tangere: no subcommand given; see 'tangere --help'\n");
+  EXPECT_THAT(outcome.out, IsEmpty());
+}
+
+TEST(Command, SceneErrorsNameTheLine) {
+  const Folder folder;
+  folder.write("bad.xml", "<tangere model=\"bad\">\n  <option timestep=\"nan\"/>\n</tangere>\n");
+  for (const Words& words :
+       {Words{"inspect", "bad.xml"}, Words{"simulate", "bad.xml", "-o", "x.h5"}}) {
+    const Outcome outcome = run(folder, words);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("bad.xml:2"));
+  }
+  EXPECT_THAT(folder.files(), testing::ElementsAre("bad.xml"));
+}
+
+TEST(Command, UnknownElementsMayBeAllowed) {
+  const Folder folder;
+  std::string text =
+      "<tangere model=\"odd\"><option unit=\"m-kg\" colour=\"red\"/>"
+      "<robot><link name=\"a\"><joint name=\"a\" type=\"prismatic\" axis=\"0 0 1\"/>"
+      "<body name=\"a\" type=\"sphere\" radius=\"0.1\"/></link></robot></tangere>";
+  folder.write("odd.xml", text);
+  const Outcome strict = run(folder, {"inspect", "odd.xml"});
+  EXPECT_EQ(strict.exit_code, 2);
+  EXPECT_THAT(strict.err, HasSubstr("colour"));
+  const Outcome lenient = run(folder, {"inspect", "odd.xml", "--allow-unknown"});
+  EXPECT_EQ(lenient.exit_code, 0);
+  EXPECT_THAT(lenient.err, testing::AllOf(HasSubstr("warning: "), HasSubstr("colour")));
+  EXPECT_THAT(run(folder, {"inspect", "odd.xml", "--allow-unknown", "-q"}).err, IsEmpty());
+}
+
+TEST(Command, InspectTellsPeopleAndProgramsTheSame) {
+  const Folder folder;
+  const Outcome text = run(folder, {"inspect", scene("rolling_ball.xml")});
+  const Outcome object = run(folder, {"inspect", scene("rolling_ball.xml"), "--json"});
+  EXPECT_EQ(text.exit_code, 0);
+  EXPECT_EQ(object.exit_code, 0);
+  EXPECT_EQ(text.out, object.err);
+  const json answer = json::parse(object.out);
+  EXPECT_EQ(answer.at("command"), "inspect");
+  EXPECT_EQ(answer.at("exit_code"), 0);
+  EXPECT_EQ(answer.at("v_names").size(), 9U);
+  EXPECT_EQ(answer.at("q_names").size(), 10U);
+  EXPECT_EQ(answer.at("u_names").size(), 3U);
+  EXPECT_EQ(answer.at("steps"), 350);
+  EXPECT_EQ(answer.at("control"), "piecewise");
+  const json& pad = answer.at("bodies").at(0);
+  EXPECT_EQ(pad.at("name"), "pad");
+  EXPECT_EQ(pad.at("joint_type"), "translational");
+  EXPECT_EQ(pad.at("parent"), "world");
+  EXPECT_NEAR(pad.at("mass").get<double>(), 1000 * 0.05 * 0.05 * 0.01, 1e-15);
+  const json& sensor = answer.at("sensors").at(0);
+  EXPECT_EQ(sensor.at("rows"), 200);
+  EXPECT_EQ(sensor.at("cols"), 200);
+  EXPECT_EQ(sensor.at("points"), 40'000);
+  EXPECT_EQ(sensor.at("every"), 5);
+  EXPECT_EQ(sensor.at("pressure_sign"), -1);
+  EXPECT_EQ(answer.at("contacts").size(), 2U);
+  EXPECT_EQ(answer.at("randomized").size(), 4U);
+  EXPECT_GT(answer.at("state_bytes_per_environment"), 0);
+  EXPECT_GT(answer.at("workspace_bytes"), 0);
+  for (const json& effect : answer.at("effects")) {
+    EXPECT_FALSE(effect.at("reason").get<std::string>().empty());
+    EXPECT_THAT(text.out, HasSubstr(effect.at("name").get<std::string>()));
+  }
+  for (const json& name : answer.at("v_names"))
+    EXPECT_THAT(text.out, HasSubstr(name.get<std::string>()));
+}
+
+TEST(Command, QuietPrintsErrorsOnly) {
+  const Folder folder;
+  for (const Words& words :
+       {Words{"inspect", scene("rolling_ball_small.xml"), "-q"}, simulate({"--steps", "10", "-q"}),
+        Words{"plot", "out.h5", "-o", "out.svg", "--quiet"}}) {
+    const Outcome outcome = run(folder, words);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_THAT(outcome.out + outcome.err, IsEmpty()) << words[0];
+  }
+  EXPECT_THAT(run(folder, simulate({"-q"})).err, HasSubstr("exists"));
+}
+
+TEST(Command, NoProgressWhereThereIsNoTerminal) {
+  const Folder folder;
+  const Outcome outcome = run(folder, simulate());
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.err, IsEmpty());
+  EXPECT_THAT(outcome.out, Not(HasSubstr("\r")));
+}
+
+TEST(Command, AFullStdoutIsAnIoError) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full on this system";
+  const Folder folder;
+  const Words words{"inspect", scene("rolling_ball_small.xml")};
+  const Outcome outcome = run(folder, words, {}, {"/dev/full", ""});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("stdout"));
+}
+
+TEST(Command, InstructionSetCanBeForcedAndMustExist) {
+  const Folder folder;
+  const Words words{"inspect", scene("rolling_ball_small.xml"), "--json"};
+  const Outcome scalar = run(folder, words, {"TANGERE_ISA=scalar"});
+  EXPECT_EQ(scalar.exit_code, 0);
+  EXPECT_EQ(json::parse(scalar.out).at("instruction_set"), "scalar");
+  const Outcome unknown = run(folder, words, {"TANGERE_ISA=avx1024"});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err, testing::AllOf(HasSubstr("TANGERE_ISA"), HasSubstr("scalar")));
+}
+
+}  // namespace
+}  // namespace tangere::apps

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// fork and exec: no shell comes between a test and what it says.
+#include "tests/apps/program.hpp"
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <system_error>
+
+namespace tangere::apps {
+namespace fs = std::filesystem;
+namespace {
+
+fs::path new_folder() {
+  std::string name = fs::temp_directory_path() / "tangere_test_XXXXXX";
+  if (mkdtemp(name.data()) == nullptr)
+    throw std::system_error(errno, std::generic_category(), "mkdtemp " + name);
+  return name;
+}
+
+std::string read_file(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw std::runtime_error("cannot read " + path.string());
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void redirect(const std::string& path, int descriptor) {
+  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOCTTY, 0600);
+  if (file < 0 || dup2(file, descriptor) < 0) _exit(126);
+  close(file);
+}
+
+/// In the child, between fork and exec.
+[[noreturn]] void become_program(const std::string& folder, const std::vector<std::string>& words,
+                                 const std::vector<std::string>& environment,
+                                 const std::string& out, const std::string& err) {
+  // A test runner in the background has them ignored, and the program would inherit that.
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+  if (chdir(folder.c_str()) != 0) _exit(126);
+  redirect(out, STDOUT_FILENO);
+  redirect(err, STDERR_FILENO);
+  for (const std::string& variable : environment) putenv(const_cast<char*>(variable.c_str()));
+  std::vector<char*> argv;
+  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.push_back(nullptr);
+  execv(TANGERE_PROGRAM, argv.data());
+  _exit(126);
+}
+
+}  // namespace
+
+Folder::Folder() : root_(new_folder()) {}
+Folder::~Folder() { fs::remove_all(root_); }
+
+std::vector<std::string> Folder::files() const {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(root_)) names.push_back(entry.path().filename());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::string Folder::write(const std::string& name, const std::string& text) const {
+  std::ofstream file(root_ / name, std::ios::binary);
+  if (!(file << text)) throw std::runtime_error("cannot write " + path(name));
+  return path(name);
+}
+
+std::string Folder::read(const std::string& name) const { return read_file(root_ / name); }
+
+Program::Program(const Folder& folder, std::vector<std::string> arguments,
+                 const std::vector<std::string>& environment, const Streams& streams)
+    : scratch_(new_folder()) {
+  arguments.insert(arguments.begin(), "tangere");
+  const std::string out = streams.out.empty() ? (scratch_ / "out").string() : streams.out;
+  const std::string err = streams.err.empty() ? (scratch_ / "err").string() : streams.err;
+  process_ = fork();
+  if (process_ == 0) become_program(folder.path(), arguments, environment, out, err);
+  if (process_ < 0) throw std::system_error(errno, std::generic_category(), "fork");
+}
+
+Program::~Program() {
+  if (process_ > 0) {
+    kill(process_, SIGKILL);
+    waitpid(process_, nullptr, 0);
+  }
+  fs::remove_all(scratch_);
+}
+
+void Program::send(int signal) const { kill(process_, signal); }
+
+Outcome Program::wait() {
+  int status = 0;
+  while (waitpid(process_, &status, 0) < 0)
+    if (errno != EINTR) throw std::system_error(errno, std::generic_category(), "waitpid");
+  process_ = -1;
+  Outcome outcome;
+  if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
+  if (WIFSIGNALED(status)) outcome.signal = WTERMSIG(status);
+  if (fs::exists(scratch_ / "out")) outcome.out = read_file(scratch_ / "out");
+  if (fs::exists(scratch_ / "err")) outcome.err = read_file(scratch_ / "err");
+  return outcome;
+}
+
+Outcome run(const Folder& folder, std::vector<std::string> arguments,
+            const std::vector<std::string>& environment, const Streams& streams) {
+  return Program(folder, std::move(arguments), environment, streams).wait();
+}
+
+std::string scene(const std::string& name) { return TANGERE_SOURCE_DIR "/scenes/" + name; }
+
+}  // namespace tangere::apps

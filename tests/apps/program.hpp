@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// The built program in a folder of its own, run the way a user runs it: arguments in; exit code,
+// output and files out.
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace tangere::apps {
+
+/// A folder for one test, deleted at its end. `path("a.h5")` is a file in it.
+class Folder {
+ public:
+  Folder();
+  ~Folder();
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  [[nodiscard]] std::string path(const std::string& name = "") const { return root_ / name; }
+  /// Names of the files in it, sorted.
+  [[nodiscard]] std::vector<std::string> files() const;
+  std::string write(const std::string& name, const std::string& text) const;
+  [[nodiscard]] std::string read(const std::string& name) const;
+
+ private:
+  std::filesystem::path root_;
+};
+
+struct Outcome {
+  int exit_code = -1;  ///< -1: ended by a signal
+  int signal = 0;      ///< that ended it
+  std::string out, err;
+};
+
+/// Where the program's streams go; "": into the outcome.
+struct Streams {
+  std::string out, err;
+};
+
+/// `tangere ARGUMENTS` with the folder as its current one.
+class Program {
+ public:
+  /// Starts it. `environment`: "NAME=value", added to this process's own.
+  Program(const Folder& folder, std::vector<std::string> arguments,
+          const std::vector<std::string>& environment = {}, const Streams& streams = {});
+  ~Program();
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  void send(int signal) const;
+  [[nodiscard]] Outcome wait();
+
+ private:
+  std::filesystem::path scratch_;  // of stdout and stderr: outside the folder that tests look at
+  pid_t process_ = -1;
+};
+
+/// Runs it to its end.
+Outcome run(const Folder& folder, std::vector<std::string> arguments,
+            const std::vector<std::string>& environment = {}, const Streams& streams = {});
+
+/// A scene of the project.
+std::string scene(const std::string& name);
+
+}  // namespace tangere::apps

@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `simulate` and `plot` write: the run that was asked for, the same bytes for the same
+// request.
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "io/h5.hpp"
+#include "tests/apps/program.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using nlohmann::json;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Words = std::vector<std::string>;
+
+/// Runs `tangere simulate SCENE --output out.h5 --json MORE` and returns its object.
+json simulate(const Folder& folder, const std::string& scene_file, const Words& more,
+              int exit_code = 0) {
+  Words words{"simulate", scene_file, "--output", "out.h5", "--json"};
+  words.insert(words.end(), more.begin(), more.end());
+  const Outcome outcome = run(folder, words);
+  EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+  const json answer = json::parse(outcome.out);
+  EXPECT_EQ(answer.at("exit_code"), exit_code);
+  EXPECT_EQ(answer.at("command"), "simulate");
+  return answer;
+}
+
+const std::string kSmall = scene("rolling_ball_small.xml");
+
+struct Array {
+  h5::Dims dims;
+  std::vector<double> values;
+};
+
+Array read_array(const Folder& folder, const std::string& name) {
+  const h5::Id file = h5::open_file(folder.path("out.h5"));
+  const h5::Id dataset = h5::open_dataset(file, name);
+  Array array{h5::dimensions(dataset), {}};
+  std::size_t size = 1;
+  for (const hsize_t n : array.dims) size *= n;
+  array.values.resize(size);
+  h5::read_box(dataset, h5::Dims(array.dims.size(), 0), array.dims, array.values.data());
+  return array;
+}
+
+/// The small scene without its <control>.
+std::string without_control(const Folder& folder) {
+  std::ifstream file(kSmall);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::size_t begin = text.find("<control>"), end = text.find("</control>");
+  text.erase(begin, end + 10 - begin);
+  return folder.write("free.xml", text);
+}
+
+std::string rows(int count, const std::string& row) {
+  std::string text;
+  for (int i = 0; i < count; ++i) text += row + "\n";
+  return text;
+}
+
+TEST(Simulate, SaysWhatItDid) {
+  const Folder folder;
+  const json answer =
+      simulate(folder, kSmall, {"--envs", "3", "--every", "4", "--steps", "42", "--seed", "9"});
+  EXPECT_EQ(answer.at("steps"), 42);
+  EXPECT_EQ(answer.at("environments"), 3);
+  EXPECT_EQ(answer.at("environment_steps"), 126);
+  EXPECT_EQ(answer.at("seed"), 9);
+  EXPECT_EQ(answer.at("timestep"), 5e-3);
+  EXPECT_EQ(answer.at("integrator"), "BDF2");
+  EXPECT_EQ(answer.at("tolerance"), 1e-9);
+  EXPECT_EQ(answer.at("precision"), "double");
+  EXPECT_EQ(answer.at("output"), "out.h5");
+  EXPECT_EQ(answer.at("bytes"), std::filesystem::file_size(folder.path("out.h5")));
+  EXPECT_THAT(answer.at("failed"), IsEmpty());
+  EXPECT_EQ(answer.at("sensors"), json::parse(R"([{"name": "pad", "every": 4, "frames": 10}])"));
+  EXPECT_GT(answer.at("environment_steps_per_second"), 0);
+  EXPECT_GE(answer.at("newton_iterations_per_step"), 1);
+  EXPECT_THAT(folder.files(), ElementsAre("out.h5"));
+  EXPECT_EQ(read_array(folder, "/q").dims, (h5::Dims{43, 3, 10}));
+}
+
+TEST(Simulate, SolverOptionsReachTheStepper) {
+  const Folder folder;
+  const json answer =
+      simulate(folder, kSmall,
+               {"--timestep", "0.01", "--integrator", "SDIRK2", "--tol", "1e-7", "--steps", "3"});
+  EXPECT_EQ(answer.at("timestep"), 0.01);
+  EXPECT_EQ(answer.at("integrator"), "SDIRK2");
+  EXPECT_EQ(answer.at("tolerance"), 1e-7);
+}
+
+TEST(Simulate, SameRequestSameBytes) {
+  const Folder first, second;
+  simulate(first, kSmall, {"--envs", "5", "--seed", "3"});
+  simulate(second, kSmall, {"--envs", "5", "--seed", "3"});
+  EXPECT_EQ(first.read("out.h5"), second.read("out.h5"));
+  const auto start = read_array(first, "/q");
+  simulate(second, kSmall, {"--envs", "5", "--seed", "4", "--overwrite"});
+  EXPECT_NE(start.values, read_array(second, "/q").values);
+}
+
+TEST(Simulate, StepsComeFromWhatDrivesIt) {
+  const Folder folder;
+  EXPECT_EQ(simulate(folder, kSmall, {}).at("steps"), 350);  // its piecewise control ends at 1.75 s
+  EXPECT_EQ(simulate(folder, kSmall, {"--timestep", "0.01", "--overwrite"}).at("steps"), 175);
+  EXPECT_EQ(simulate(folder, kSmall, {"--steps", "7", "--overwrite"}).at("steps"), 7);
+  folder.write("u.csv", rows(12, "0,0,0.2"));
+  EXPECT_EQ(simulate(folder, kSmall, {"--controls", "u.csv", "--overwrite"}).at("steps"), 12);
+  EXPECT_EQ(
+      simulate(folder, kSmall, {"--controls", "u.csv", "--steps", "5", "--overwrite"}).at("steps"),
+      5);
+  const json open = simulate(folder, without_control(folder), {"--overwrite"}, 2);
+  EXPECT_THAT(open.at("error").get<std::string>(), HasSubstr("give --steps"));
+}
+
+TEST(Simulate, ZeroControlsAreNoControls) {
+  const Folder folder;
+  const std::string free = without_control(folder);
+  simulate(folder, free, {"--steps", "100", "--envs", "2"});
+  const Array without = read_array(folder, "/q");
+  folder.write("zero.csv", "# nothing\na,b,c\n" + rows(100, "0, 0.0, -0"));
+  simulate(folder, free, {"--controls", "zero.csv", "--envs", "2", "--overwrite"});
+  EXPECT_EQ(read_array(folder, "/q").values, without.values);
+  for (const double u : read_array(folder, "/u").values) EXPECT_EQ(u, 0);
+  simulate(folder, kSmall, {"--steps", "100", "--envs", "2", "--overwrite"});
+  EXPECT_NE(read_array(folder, "/q").values, without.values);
+}
+
+TEST(Simulate, SaysThatNothingDrivesIt) {
+  const Folder folder;
+  const Words words{"simulate", without_control(folder), "--output", "out.h5", "--steps", "2"};
+  EXPECT_THAT(run(folder, words).err, HasSubstr("every control is 0"));
+}
+
+TEST(Simulate, ControlFilesMustFit) {
+  const Folder folder;
+  const auto complaint = [&](const std::string& text, const Words& more = {}) {
+    folder.write("u.csv", text);
+    Words words{"--controls", "u.csv"};
+    words.insert(words.end(), more.begin(), more.end());
+    return simulate(folder, kSmall, words, 2).at("error").get<std::string>();
+  };
+  EXPECT_EQ(complaint("0,0,0\n0,nan,0\n"), "u.csv:2: column 2: 'nan'; expected a finite number");
+  EXPECT_EQ(complaint("0,0,0\n0,0\n"), "u.csv:2: 2 columns; expected 3, one per control");
+  EXPECT_EQ(complaint(rows(5, "0,0,0"), {"--steps", "6"}),
+            "u.csv: 5 rows of controls for 6 steps; expected a row per step");
+  EXPECT_EQ(complaint("pad_joint.vy,pad_joint.vx,pad_joint.vz\n0,0,0\n"),
+            "u.csv:1: column 1 is headed 'pad_joint.vy'; expected 'pad_joint.vx' there: columns "
+            "follow the motors' order");
+  EXPECT_EQ(complaint(""), "u.csv: no rows of numbers; expected at least one");
+  EXPECT_THAT(folder.files(), ElementsAre("u.csv"));
+}
+
+TEST(Simulate, ControlsAreNotOverwritten) {
+  const Folder folder;
+  folder.write("u.csv", rows(5, "0,0,0"));
+  const Outcome outcome =
+      run(folder, {"simulate", kSmall, "--controls", "u.csv", "-o", "u.csv", "--overwrite"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(folder.read("u.csv"), rows(5, "0,0,0"));
+}
+
+TEST(Simulate, AnOutputThatExistsIsKept) {
+  const Folder folder;
+  folder.write("out.h5", "mine");
+  EXPECT_THAT(simulate(folder, kSmall, {}, 3).at("error").get<std::string>(),
+              HasSubstr("--overwrite"));
+  EXPECT_EQ(folder.read("out.h5"), "mine");
+  simulate(folder, kSmall, {"--overwrite", "--steps", "4"});
+  EXPECT_EQ(read_array(folder, "/q").dims[0], 5U);
+}
+
+TEST(Simulate, FailedEnvironmentsAreListedAndTheFileIsWhole) {
+  // A step of a day cannot be solved: the ball would turn by more than a rotation can say.
+  const Folder folder;
+  const json answer =
+      simulate(folder, kSmall, {"--timestep", "86400", "--steps", "3", "--envs", "25"}, 1);
+  ASSERT_THAT(answer.at("failed"), testing::SizeIs(25));
+  const json& first = answer.at("failed").at(0);
+  EXPECT_EQ(first.at("environment"), 0);
+  EXPECT_EQ(first.at("step"), 0);
+  EXPECT_LT(first.at("status"), 0);
+  EXPECT_FALSE(first.at("reason").get<std::string>().empty());
+  EXPECT_EQ(answer.at("environment_steps"), 25);
+  const Array status = read_array(folder, "/solver/status");
+  EXPECT_EQ(status.dims, (h5::Dims{3, 25}));
+  for (const double s : status.values) EXPECT_LT(s, 0);
+
+  const Outcome text = run(folder, {"simulate", kSmall, "-o", "out.h5", "--overwrite", "--timestep",
+                                    "86400", "--steps", "3", "--envs", "25", "--quiet"});
+  EXPECT_EQ(text.exit_code, 1);
+  EXPECT_THAT(text.err, HasSubstr("environment 0 failed in step 0: "));
+  EXPECT_THAT(text.err, HasSubstr("not listed: 5"));
+}
+
+TEST(Plot, DrawsWhatSimulateWrote) {
+  const Folder folder;
+  simulate(folder, kSmall, {"--envs", "2"});
+  const Outcome outcome =
+      run(folder, {"plot", "out.h5", "-o", "out.svg", "--sensor", "pad", "--env", "1", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json answer = json::parse(outcome.out);
+  EXPECT_EQ(answer.at("sensor"), "pad");
+  EXPECT_EQ(answer.at("environment"), 1);
+  EXPECT_TRUE(answer.at("frame").is_null());
+  const std::string svg = folder.read("out.svg");
+  EXPECT_EQ(answer.at("bytes"), svg.size());
+  EXPECT_THAT(svg, HasSubstr("<svg"));
+  EXPECT_EQ(run(folder, {"plot", "out.h5", "-o", "one.svg", "--frame", "60"}).exit_code, 0);
+  EXPECT_NE(folder.read("one.svg"), svg);
+}
+
+TEST(Plot, NamesWhatIsNotThere) {
+  const Folder folder;
+  simulate(folder, kSmall, {"--steps", "20"});
+  const auto complaint = [&](const Words& more, int exit_code) {
+    Words words{"plot", "out.h5", "-o", "out.svg"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome outcome = run(folder, words);
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_THAT(complaint({"--sensor", "pda"}, 2), HasSubstr("pad"));
+  EXPECT_THAT(complaint({"--env", "1"}, 2), HasSubstr("environment 1"));
+  EXPECT_THAT(complaint({"--frame", "4"}, 2), HasSubstr("frame 4"));
+  EXPECT_THAT(folder.files(), ElementsAre("out.h5"));
+  folder.write("out.svg", "mine");
+  EXPECT_THAT(complaint({}, 3), HasSubstr("--overwrite"));
+  EXPECT_EQ(folder.read("out.svg"), "mine");
+  const Outcome same = run(folder, {"plot", "out.h5", "-o", "out.h5", "--overwrite"});
+  EXPECT_EQ(same.exit_code, 2);
+}
+
+TEST(Plot, ASceneWithoutSensorsHasNoPicture) {
+  const Folder folder;
+  folder.write("bare.xml",
+               "<tangere model=\"bare\"><option unit=\"m-kg\"/>"
+               "<robot><link name=\"a\"><joint name=\"a\" type=\"prismatic\" axis=\"0 0 1\"/>"
+               "<body name=\"a\" type=\"sphere\" radius=\"0.1\"/></link></robot></tangere>");
+  simulate(folder, "bare.xml", {"--steps", "3"});
+  const Outcome outcome = run(folder, {"plot", "out.h5", "-o", "out.svg"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("sensor"));
+  EXPECT_THAT(folder.files(), ElementsAre("bare.xml", "out.h5"));
+}
+
+TEST(Simulate, RunsShorterThanASensorsIntervalHaveNoField) {
+  const Folder folder;
+  const json answer = simulate(folder, kSmall, {"--steps", "3", "--every", "1000000000"});
+  EXPECT_EQ(answer.at("sensors").at(0).at("frames"), 0);
+  EXPECT_NE(run(folder, {"plot", "out.h5", "-o", "out.svg"}).exit_code, 0);
+  EXPECT_THAT(folder.files(), ElementsAre("out.h5"));
+}
+
+}  // namespace
+}  // namespace tangere::apps

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+// A run that is stopped in the middle ends soon, says so, and leaves no file, neither whole nor
+// half.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "tests/apps/program.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+// Much work, so that a signal always finds the run in the middle of it.
+constexpr const char* kManySteps = "500000";
+
+/// Waits for the file that a run writes to; after a minute the machine is not slow but broken.
+void wait_for(const std::string& path) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+  while (!std::filesystem::exists(path)) {
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline) << path << " never appeared";
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+std::vector<std::string> long_run(const std::vector<std::string>& more = {}) {
+  std::vector<std::string> words{
+      "simulate", scene("rolling_ball_small.xml"), "-o", "out.h5", "--steps", kManySteps};
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+class Stop : public testing::TestWithParam<std::pair<int, int>> {};
+
+TEST_P(Stop, LeavesNoFileAndSaysSo) {
+  const auto [signal, exit_code] = GetParam();
+  const Folder folder;
+  Program program(folder, long_run({"--json"}));
+  wait_for(folder.path("out.h5.part"));
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // into the steps
+  program.send(signal);
+  const Outcome outcome = program.wait();
+  EXPECT_EQ(outcome.signal, 0);
+  EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("nothing was written"));
+  EXPECT_EQ(nlohmann::json::parse(outcome.out).at("exit_code"), exit_code);
+  EXPECT_THAT(folder.files(), IsEmpty());
+}
+
+TEST_P(Stop, KeepsTheFileThatWasToBeReplaced) {
+  const auto [signal, exit_code] = GetParam();
+  const Folder folder;
+  folder.write("out.h5", "older");
+  Program program(folder, long_run({"--overwrite"}));
+  wait_for(folder.path("out.h5.part"));
+  program.send(signal);
+  EXPECT_EQ(program.wait().exit_code, exit_code);
+  EXPECT_THAT(folder.files(), ElementsAre("out.h5"));
+  EXPECT_EQ(folder.read("out.h5"), "older");
+}
+
+INSTANTIATE_TEST_SUITE_P(Signals, Stop,
+                         testing::Values(std::pair{SIGINT, 130}, std::pair{SIGTERM, 75}));
+
+TEST(Progress, RewritesOneLineOfATerminal) {
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
+  ASSERT_GE(terminal, 0);
+  ASSERT_EQ(grantpt(terminal), 0);
+  ASSERT_EQ(unlockpt(terminal), 0);
+  const Folder folder;
+  Program program(folder, long_run(), {}, {"", ptsname(terminal)});
+  // Three rewrites, then the stop; a terminal without its program reads as an error.
+  std::string shown;
+  char buffer[256];
+  bool stopped = false;
+  for (ssize_t n; (n = read(terminal, buffer, sizeof buffer)) > 0;) {
+    shown.append(buffer, static_cast<std::size_t>(n));
+    if (!stopped && std::count(shown.begin(), shown.end(), '\r') >= 3) {
+      program.send(SIGINT);
+      stopped = true;
+    }
+  }
+  EXPECT_EQ(program.wait().exit_code, 130);
+  close(terminal);
+  EXPECT_THAT(shown, HasSubstr(std::string("\rstep ")));
+  EXPECT_THAT(shown, HasSubstr(std::string(" of ") + kManySteps + ", "));
+  EXPECT_THAT(shown, HasSubstr("env-steps/s"));
+  // The line is wiped before the last message.
+  EXPECT_THAT(shown, HasSubstr("\r\x1b[Ktangere: stopped by SIGINT"));
+  EXPECT_EQ(shown.find('\n'), shown.rfind('\n')) << "progress made more than one line";
+}
+
+TEST(Kill, LeavesAPartThatTheNextRunTakesOver) {
+  const Folder folder;
+  {
+    Program program(folder, long_run());
+    wait_for(folder.path("out.h5.part"));
+    program.send(SIGKILL);
+    EXPECT_EQ(program.wait().signal, SIGKILL);
+  }
+  EXPECT_THAT(folder.files(), ElementsAre("out.h5.part"));
+  const Outcome next =
+      run(folder, {"simulate", scene("rolling_ball_small.xml"), "-o", "out.h5", "--steps", "10"});
+  EXPECT_EQ(next.exit_code, 0) << next.err;
+  EXPECT_THAT(folder.files(), ElementsAre("out.h5"));
+}
+
+TEST(TwoRuns, OfOneOutputDoNotMeet) {
+  const Folder folder;
+  Program first(folder, long_run());
+  wait_for(folder.path("out.h5.part"));
+  const Outcome second = run(folder, long_run());
+  EXPECT_EQ(second.exit_code, 3);
+  EXPECT_THAT(second.err, HasSubstr("out.h5"));
+  EXPECT_THAT(folder.files(), ElementsAre("out.h5.part"));
+  first.send(SIGTERM);
+  EXPECT_EQ(first.wait().exit_code, 75);
+  EXPECT_THAT(folder.files(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace tangere::apps
