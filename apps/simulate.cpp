@@ -78,6 +78,15 @@ void check_size(const Model& model, int environments) {
                fmt::format("--envs {}", environments));
 }
 
+void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout) {
+  for (const SensorInfo& sensor : model.sensors()) {
+    const int every = tactile_interval(sensor, rollout);
+    if (every > rollout.steps)
+      console.note(fmt::format("sensor {} is read every {} steps: no field in {} steps",
+                               sensor.name, every, rollout.steps));
+  }
+}
+
 TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
                              const RolloutOptions& rollout, const ProgramInfo& info) {
   RunDescription run;
@@ -176,6 +185,7 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
   Stepper stepper(model, solver);
   const ControlProgram controls = make_controls(options, model, stepper, console);
   const RolloutOptions rollout{step_count(options, controls), options.every.value_or(0)};
+  note_empty_sensors(console, model, rollout);
   const int environments = options.environments.value_or(1);
   check_size(model, environments);
   Batch batch(model, environments, options.seed.value_or(0));

@@ -3,7 +3,11 @@
 // say whose fault it is, messages that name the nearest word, and nothing half-done left behind.
 #include <gmock/gmock.h>
 
+#include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <sstream>
 
 #include "tests/apps/program.hpp"
 
@@ -51,6 +55,18 @@ TEST(Command, HelpEndsWithAnExampleThatWorks) {
   EXPECT_THAT(folder.files(), testing::ElementsAre("ball.h5", "ball.svg", "scenes"));
 }
 
+TEST(Command, ThePageNamesEveryOption) {
+  const Folder folder;
+  std::ifstream file(TANGERE_SOURCE_DIR "/docs/command.md");
+  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  for (const std::string& name : kSubcommands) {
+    const std::string help = run(folder, {name, "--help"}).out;
+    const std::regex option("--[a-z-]+");
+    for (std::sregex_iterator at(help.begin(), help.end(), option), end; at != end; ++at)
+      EXPECT_THAT(page, HasSubstr("`" + at->str() + "`")) << name;
+  }
+}
+
 TEST(Command, TopLevelHelpNamesEverySubcommandAndExitCode) {
   const Folder folder;
   const Outcome help = run(folder, {"--help"});
@@ -91,6 +107,7 @@ TEST_P(Mistakes, SaysWhoseFaultItIsAndLeavesNothing) {
   const Outcome object = run(folder, mistake.arguments + Words{"--json"});
   EXPECT_EQ(object.exit_code, mistake.exit_code);
   const json answer = json::parse(object.out);
+  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
   EXPECT_EQ(answer.at("exit_code"), mistake.exit_code);
   EXPECT_THAT(answer.at("error").get<std::string>(), HasSubstr(mistake.message));
   EXPECT_THAT(folder.files(), IsEmpty());
@@ -233,6 +250,7 @@ TEST(Command, InspectTellsPeopleAndProgramsTheSame) {
   EXPECT_EQ(object.exit_code, 0);
   EXPECT_EQ(text.out, object.err);
   const json answer = json::parse(object.out);
+  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
   EXPECT_EQ(answer.at("command"), "inspect");
   EXPECT_EQ(answer.at("exit_code"), 0);
   EXPECT_EQ(answer.at("v_names").size(), 9U);

@@ -114,6 +114,18 @@ Outcome run(const Folder& folder, std::vector<std::string> arguments,
   return Program(folder, std::move(arguments), environment, streams).wait();
 }
 
+std::vector<std::string> undocumented_keys(const nlohmann::json& object) {
+  static const std::string page = read_file(TANGERE_SOURCE_DIR "/docs/command.md");
+  std::vector<std::string> missing;
+  for (const auto& [key, value] : object.items()) {
+    if (object.is_object() && page.find("`" + key + "`") == std::string::npos)
+      missing.push_back(key);
+    if (!value.is_structured()) continue;
+    for (std::string& deeper : undocumented_keys(value)) missing.push_back(std::move(deeper));
+  }
+  return missing;
+}
+
 std::string scene(const std::string& name) { return TANGERE_SOURCE_DIR "/scenes/" + name; }
 
 }  // namespace tangere::apps

@@ -6,6 +6,7 @@
 #include <sys/types.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,9 @@ class Program {
 /// Runs it to its end.
 Outcome run(const Folder& folder, std::vector<std::string> arguments,
             const std::vector<std::string>& environment = {}, const Streams& streams = {});
+
+/// Names of an object's keys that docs/command.md does not mention, nested ones included.
+std::vector<std::string> undocumented_keys(const nlohmann::json& object);
 
 /// A scene of the project.
 std::string scene(const std::string& name);

@@ -28,6 +28,7 @@ json simulate(const Folder& folder, const std::string& scene_file, const Words& 
   const json answer = json::parse(outcome.out);
   EXPECT_EQ(answer.at("exit_code"), exit_code);
   EXPECT_EQ(answer.at("command"), "simulate");
+  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
   return answer;
 }
 
@@ -207,6 +208,7 @@ TEST(Plot, DrawsWhatSimulateWrote) {
       run(folder, {"plot", "out.h5", "-o", "out.svg", "--sensor", "pad", "--env", "1", "--json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const json answer = json::parse(outcome.out);
+  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
   EXPECT_EQ(answer.at("sensor"), "pad");
   EXPECT_EQ(answer.at("environment"), 1);
   EXPECT_TRUE(answer.at("frame").is_null());
@@ -255,8 +257,10 @@ TEST(Simulate, RunsShorterThanASensorsIntervalHaveNoField) {
   const Folder folder;
   const json answer = simulate(folder, kSmall, {"--steps", "3", "--every", "1000000000"});
   EXPECT_EQ(answer.at("sensors").at(0).at("frames"), 0);
-  EXPECT_NE(run(folder, {"plot", "out.h5", "-o", "out.svg"}).exit_code, 0);
-  EXPECT_THAT(folder.files(), ElementsAre("out.h5"));
+  const Outcome text = run(folder, {"simulate", kSmall, "--steps", "3", "-o", "again.h5"});
+  EXPECT_EQ(text.err, "sensor pad is read every 5 steps: no field in 3 steps\n");
+  EXPECT_EQ(run(folder, {"plot", "out.h5", "-o", "out.svg"}).exit_code, 2);
+  EXPECT_THAT(folder.files(), ElementsAre("again.h5", "out.h5"));
 }
 
 }  // namespace
