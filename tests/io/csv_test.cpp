@@ -3,6 +3,7 @@
 #include "io/csv.hpp"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -18,7 +19,7 @@ using Rows = std::vector<std::vector<double>>;
 
 class Csv : public testing::Test {
  protected:
-  Csv() : path_(testing::TempDir() + "tangere_csv_" + test_name() + ".csv") {}
+  Csv() : path_(testing::TempDir() + "tangere_csv_" + std::to_string(getpid()) + test_name()) {}
   ~Csv() override { std::filesystem::remove(path_); }
 
   Rows read(const std::string& text, std::size_t columns,
