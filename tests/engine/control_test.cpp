@@ -93,6 +93,21 @@ TEST(Control, PiecewiseTimesLandOnStepsAtEveryTimestep) {
   }
 }
 
+TEST(Control, PiecewiseTimesMayMissAStepByRounding) {
+  struct Case {
+    double time, timestep;
+    std::int64_t step;
+  };
+  // 1.1 / 0.1 is a little more than 11 in binary; then a millionth of a step either side.
+  for (const auto& [time, timestep, step] :
+       {Case{1.1, 0.1, 11}, Case{0.3, 0.1, 3}, Case{0.5 + 4e-9, 5e-3, 100},
+        Case{0.5 - 4e-9, 5e-3, 100}, Case{0.5 + 6e-9, 5e-3, 101}}) {
+    const ControlProgram program(two_controls(), timestep, 0, steps_up({0, time}, 2));
+    EXPECT_THAT(at(program, step - 1), ElementsAre(0, 0)) << time << " s at " << timestep << " s";
+    EXPECT_THAT(at(program, step), ElementsAre(1, -1)) << time << " s at " << timestep << " s";
+  }
+}
+
 TEST(Control, PiecewiseTimesBetweenStepsWaitForTheNext) {
   const ControlProgram program(two_controls(), 0.1, 0, steps_up({0, 0.25, 0.26, 0.41}, 0.95));
   EXPECT_THAT(at(program, 2), ElementsAre(0, 0));

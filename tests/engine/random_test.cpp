@@ -128,6 +128,12 @@ TEST(Random, NormalWithItsMeanAndDeviation) {
   EXPECT_LT(
       distance(draws, [](double x) { return 0.5 * std::erfc(-(x - 2) / 0.5 / std::sqrt(2)); }),
       kLargestDistance);
+  // Five standard deviations of the sample's own mean and variance.
+  double mean = 0, variance = 0;
+  for (double x : draws) mean += x / kDraws;
+  for (double x : draws) variance += (x - mean) * (x - mean) / kDraws;
+  EXPECT_NEAR(mean, 2, 5 * 0.5 / std::sqrt(double{kDraws}));
+  EXPECT_NEAR(variance / 0.25, 1, 5 * std::sqrt(2.0 / kDraws));
   EXPECT_EQ(normal(of_episode(1), 2, 0), 2);
 }
 
