@@ -446,6 +446,9 @@ void decide_effects(CompiledModel& m) {
   const auto add = [&](const char* name, bool on, std::string reason) {
     m.effects.push_back({name, on, std::move(reason)});
   };
+  const auto counted = [](std::size_t n, const std::string& one, const std::string& many) {
+    return std::to_string(n) + " " + (n == 1 ? one : many);
+  };
   const Vector3& g = m.scene.gravity;
   const bool gravity = g[0] != 0 || g[1] != 0 || g[2] != 0;
   add("gravity", gravity, gravity ? "option gravity is not zero" : "option gravity is zero");
@@ -455,12 +458,12 @@ void decide_effects(CompiledModel& m) {
   add("velocity products", turning, turning ? "some joint turns" : "no joint turns");
   const bool damped = std::any_of(m.damping.begin(), m.damping.end(), [](double c) { return c != 0; });
   add("joint damping", damped, damped ? "some joint has damping" : "no joint has damping");
-  add("force motors", m.nu > 0, std::to_string(m.nu) + " controls");
-  add("pair contact", !m.pairs.empty(), std::to_string(m.pairs.size()) + " pairs declared");
-  add("ground contact", !m.grounds.empty(), std::to_string(m.grounds.size()) + " bodies declared");
-  add("tactile", !m.sensors.empty(), std::to_string(m.sensors.size()) + " sensors declared");
+  add("force motors", m.nu > 0, counted(std::size_t(m.nu), "control", "controls"));
+  add("pair contact", !m.pairs.empty(), counted(m.pairs.size(), "pair declared", "pairs declared"));
+  add("ground contact", !m.grounds.empty(), counted(m.grounds.size(), "body declared", "bodies declared"));
+  add("tactile", !m.sensors.empty(), counted(m.sensors.size(), "sensor declared", "sensors declared"));
   const std::size_t varying = m.layout.rows - m.layout.parameters;
-  add("varying parameters", varying > 0, std::to_string(varying) + " numbers vary by environment");
+  add("varying parameters", varying > 0, counted(varying, "number varies by environment", "numbers vary by environment"));
 }
 
 }  // namespace
