@@ -124,8 +124,12 @@ class Compiler {
     const auto add = [&](JointKind kind, const Vec3<double>& axis) {
       const bool first = joint.link_count == 0;
       const Frame<double>& at = first ? frame : kIdentity;
-      Link link{first ? parent : joint.link, kind, m_.nq, m_.nv, axis, at, !is_identity(at), false, 0, {0, 0, 0},
-                kernels::zero33<double>()};
+      const int up = first ? parent : joint.link;
+      const bool slides = kernels::slides(kind), steady = up < 0 || m_.links[up].still;
+      const bool rotated = !is_identity({at.R, {0, 0, 0}}), turned = !slides || rotated;
+      const bool placed = slides || !is_identity({kIdentity.R, at.p});
+      Link link{up, kind, m_.nq, m_.nv, axis, at, rotated, turned, placed, steady, steady && slides, false, 0,
+                {0, 0, 0}, kernels::zero33<double>()};
       m_.nq += kernels::coordinates(kind);
       m_.nv += kernels::dofs(kind);
       joint.link = static_cast<int>(m_.links.size());
@@ -288,11 +292,29 @@ class Compiler {
       pair.n_tiles = static_cast<int>(tiles.size() / 4);
       pair.reach = reach;
       pair.points = keep(m_.point_storage, std::move(points));
-      pair.tiles = keep(m_.tile_storage, std::move(tiles));
+      lay_out_tiles(pair, tiles);
       m_.pairs.push_back(pair);
       m_.contact_info.push_back({d.general_body, d.primitive_body, pair.n_points, to_string(d.law)});
       touching_.emplace_back(pair.link1, pair.link2);
     }
+  }
+
+  /// Points and bounds of the tiles as vectors read them, padded to whole tiles and whole vectors.
+  void lay_out_tiles(kernels::PairContact& pair, const std::vector<double>& tiles) {
+    constexpr int kTile = kernels::kContactTile, kLanes = kernels::kGroup;
+    AlignedVector<double> points(std::size_t(pair.n_tiles) * 3 * kTile, kernels::kFarAway);
+    for (int k = 0; k < pair.n_points; ++k)
+      for (int c = 0; c < 3; ++c) points[std::size_t((k / kTile * 3 + c) * kTile + k % kTile)] = pair.points[3 * k + c];
+    const int groups = (pair.n_tiles + kLanes - 1) / kLanes;
+    AlignedVector<double> bounds(std::size_t(groups) * 4 * kLanes, kernels::kFarAway);
+    for (int t = 0; t < groups * kLanes; ++t)
+      for (int c = 0; c < 4; ++c)
+        bounds[std::size_t((t / kLanes * 4 + c) * kLanes + t % kLanes)] =
+            t < pair.n_tiles ? tiles[std::size_t(4 * t + c)] : c < 3 ? kernels::kFarAway : 0;
+    m_.tile_storage.push_back(std::move(points));
+    pair.tile_points = m_.tile_storage.back().data();
+    m_.tile_storage.push_back(std::move(bounds));
+    pair.tile_bounds = m_.tile_storage.back().data();
   }
 
   void ground_contacts() {

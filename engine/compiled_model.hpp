@@ -71,7 +71,8 @@ struct CompiledModel {
   std::vector<CompiledSensor> sensors;
   std::vector<kernels::PairContact> pairs;
   std::vector<kernels::GroundContact> grounds;
-  std::vector<std::vector<double>> point_storage, tile_storage;  ///< what pairs and grounds point into
+  std::vector<std::vector<double>> point_storage;  ///< what pairs and grounds point into
+  std::vector<AlignedVector<double>> tile_storage; ///< what pairs' tile_points and tile_bounds point into
   std::vector<double> damping;         ///< (nv)
   std::vector<double> unknown_scale;   ///< (nv) what an unknown is rounded against: extent of the scene [m], 1 [rad]
   std::vector<double> initial_q, initial_v;

@@ -86,7 +86,7 @@ LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, Wo
       set_history_bdf2(w);
       each([&](int i, int l) {
         s.s[i][l] = 0.5 * w.v_before[i][l] - 2 * w.v0[i][l];
-        s.x[i][l] = h * w.v0[i][l];
+        s.x[i][l] = h * (1.5 * w.v0[i][l] - 0.5 * w.v_before[i][l]);
       });
       resolved = solve_one_stage(table, w, lanes, 1.5, h, inside_split, report);
       break;

@@ -2,15 +2,14 @@
 // Newton in lanes. All searching lanes are evaluated together; each lane accepts or halves its own step.
 //
 // Accepted when a trial x - αΔ passes the natural test ‖D^½ A⁻¹ g(x - αΔ)‖ ≤ (1 - α/4) ‖D^½ Δ‖ with the factor at
-// hand (D = diag M at the first point), or when it already converges:
-//   ‖D^-½ g‖ ≤ tol (‖D^½ v‖ c₀/h + ‖D^½‖ |gravity| + ‖D^-½ f‖),   f the magnitudes of contact, motor, damping forces
-// Both are free of units. The v in the scale is the candidate's own. No residual can be smaller than what one rounding
-// of a position does to it, so ‖D^-½ g‖ ≤ ‖D^-½ φ‖ also converges, φ_i = 4 ε |A_ii| (extent of the scene, or 1 rad):
-// at contact stiffnesses where that floor lies above the tolerance, Newton would only spin on rounding.
+// hand (D = diag M at the first point), or when it already converges: its scaled residual (kernels/norms-inl.hpp) is at
+// most the tolerance. The rounding floor in it comes from the last point that a direction was computed at.
+//
+// Whether an evaluation brings the Jacobian along is a guess about cost, never about results: when the residuals of all
+// searching lanes should reach the tolerance by squaring, only they are computed, and the Jacobian when one did not.
 #include "engine/newton.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "engine/detection.hpp"
 
@@ -32,60 +31,51 @@ struct Search {
   LaneBits on_trial = 0;        ///< lanes whose x is a trial along delta
   LaneBits use_pivoted = 0;     ///< lanes whose factor at hand is the pivoted one
   std::array<double, kGroup> alpha{}, delta_norm{};
+  std::array<double, kGroup> last{};      ///< scaled residual of the last accepted point
+  std::array<double, kGroup> expected{};  ///< what the next full step should leave; infinite when there is no telling
+  bool with_jacobian = true;              ///< the last evaluation
   std::array<int, kGroup> halvings{}, directions{};
 
   [[nodiscard]] int n() const { return model.nv; }
 
-  void evaluate() {
-    for (;;) {
-      table.evaluate(model.view, w.stage);
-      LaneBits stale = 0;
-      for (int l = 0; l < kGroup; ++l)
-        if (has(searching, l) && w.stage.excess[0][l] > 0) stale |= 1U << l;
-      if (stale == 0) return;
-      find_candidates(model, table, w, stale);  // at the present x, so the next evaluation is exact
+  /// The only searching lane, or -1.
+  [[nodiscard]] int lone() const {
+    return (searching & (searching - 1)) == 0 ? __builtin_ctz(searching) : -1;
+  }
+
+  /// Poses at x; lists of lanes that have none yet or outran theirs.
+  void locate(bool first) {
+    table.kinematics(model.view, w.stage, w.poses);
+    LaneBits stale = first ? searching : 0;
+    for (int l = 0; l < kGroup; ++l)
+      if (has(searching, l) && w.stage.excess[0][l] > 0) stale |= 1U << l;
+    if (stale != 0) find_candidates(model, table, w, stale);
+    if (lone() < 0) lists_to_rows(table, w, searching);
+  }
+
+  /// The pass that is due: g alone where every lane should be done, else everything.
+  void evaluate(bool first) {
+    locate(first);
+    with_jacobian = first;
+    for (int l = 0; l < kGroup; ++l)
+      if (has(searching, l) && !(expected[l] <= limits.tolerance)) with_jacobian = true;
+    (with_jacobian ? table.evaluate : table.residual)(model.view, w.stage, lone());
+    if (first) {
+      table.set_weights(model.view, w.stage);
+      set_floor(searching);
     }
   }
 
-  void set_weights(LaneBits lanes) {
-    for (int i = 0; i < n(); ++i)
-      for (int l = 0; l < kGroup; ++l)
-        if (has(lanes, l)) w.weight[i][l] = std::sqrt(w.stage.mass_diagonal[i][l]);
+  void set_floor(LaneBits lanes) { table.set_floor(model.view, w.stage, model.unknown_scale.data(), row_of(lanes)); }
+
+  static LaneRow row_of(LaneBits lanes) {
+    LaneRow row;
+    for (int l = 0; l < kGroup; ++l) row[l] = has(lanes, l) ? 1 : 0;
+    return row;
   }
 
-  /// Scaled residual of each lane: ‖D^-½ g‖ over what it is measured by; 0 where it is below the rounding floor.
-  void scaled_residuals(std::array<double, kGroup>& out) const {
-    std::array<double, kGroup> g{}, motion{}, mass{}, force{}, floor{};
-    const kernels::Pattern& p = model.view.pattern;
-    for (int i = 0; i < n(); ++i) {
-      const LaneRow& diagonal = w.stage.A[p.slot[i * n() + i]];
-      const double rounding = 4 * std::numeric_limits<double>::epsilon() * model.unknown_scale[std::size_t(i)];
-      for (int l = 0; l < kGroup; ++l) {
-        const double d = w.weight[i][l];
-        const double r = w.stage.g[i][l] / d, m = d * w.stage.v[i][l], f = w.stage.force_scale[i][l] / d;
-        const double e = rounding * diagonal[l] / d;
-        g[l] += r * r;
-        motion[l] += m * m;
-        mass[l] += d * d;
-        force[l] += f * f;
-        floor[l] += e * e;
-      }
-    }
-    for (int l = 0; l < kGroup; ++l) {
-      const double scale = std::sqrt(motion[l]) * w.stage.c0_over_h[l] + gravity * std::sqrt(mass[l]) + std::sqrt(force[l]);
-      out[l] = g[l] <= floor[l] ? 0 : std::sqrt(g[l]) / scale;
-    }
-  }
-
-  void weighted_norms(const LaneRow* a, std::array<double, kGroup>& out) const {
-    out.fill(0);
-    for (int i = 0; i < n(); ++i)
-      for (int l = 0; l < kGroup; ++l) {
-        const double x = w.weight[i][l] * a[i][l];
-        out[l] += x * x;
-      }
-    for (double& x : out) x = std::sqrt(x);
-  }
+  void scaled_residuals(LaneRow& out) const { table.scaled_residual(model.view, w.stage, gravity, out); }
+  void weighted_norms(const LaneRow* a, LaneRow& out) const { table.weighted_norm(model.view, w.stage, a, out); }
 
   void stop(int l, StepStatus status) {
     report.status[l] = status;
@@ -109,7 +99,7 @@ struct Search {
 
   /// Judges the trials at the present x. Returns the lanes that hold an accepted, unconverged point.
   LaneBits judge() {
-    std::array<double, kGroup> residual{}, test_norm{};
+    LaneRow residual, test_norm{};
     scaled_residuals(residual);
     if (on_trial != 0) {
       table.solve(model.view, w.stage, w.stage.g, w.test);
@@ -127,16 +117,22 @@ struct Search {
       } else if (!has(on_trial, l)) {
         if (std::isfinite(residual[l])) {
           accepted |= 1U << l;
+          last[l] = residual[l];
+          expected[l] = HUGE_VAL;
         } else {
           stop(l, StepStatus::non_finite);
         }
       } else if (test_norm[l] <= (1 - 0.25 * alpha[l]) * delta_norm[l]) {
         accepted |= 1U << l;
         report.residual[l] = residual[l];
+        const double ratio = residual[l] / last[l];
+        expected[l] = residual[l] * ratio * ratio;  // quadratic: each step squares the ratio
+        last[l] = residual[l];
       } else if (++halvings[l] > limits.max_halvings) {
         stop(l, StepStatus::not_converged);
       } else {
         alpha[l] *= 0.5;
+        expected[l] = HUGE_VAL;
         for (int i = 0; i < n(); ++i) w.stage.x[i][l] = w.base[i][l] - alpha[l] * w.delta[i][l];
       }
     }
@@ -145,9 +141,9 @@ struct Search {
 
   /// New directions at the accepted points, and the full step along each as the next trial.
   void new_directions(LaneBits accepted) {
-    LaneRow accept;
-    for (int l = 0; l < kGroup; ++l) accept[l] = has(accepted, l) ? 1 : 0;
-    table.factor(model.view, w.stage, accept);
+    if (!with_jacobian) table.evaluate(model.view, w.stage, lone());
+    set_floor(accepted);
+    table.factor(model.view, w.stage, row_of(accepted));
     table.solve_watched(model.view, w.stage, w.stage.g, w.test, &w.sound);
     for (int l = 0; l < kGroup; ++l) {
       if (!has(accepted, l)) continue;
@@ -157,7 +153,7 @@ struct Search {
       pivoted_factor(l);
       pivoted_solve(l, w.stage.g, w.test);
     }
-    std::array<double, kGroup> norm{};
+    LaneRow norm;
     weighted_norms(w.test, norm);
     for (int l = 0; l < kGroup; ++l) {
       if (!has(accepted, l)) continue;
@@ -189,11 +185,9 @@ double magnitude(const kernels::Vec3<double>& a) { return std::sqrt(dot(a, a)); 
 LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table, Workspace& w, LaneBits lanes,
                      const NewtonLimits& limits, NewtonReport& report) {
   Search s{model, table, w, limits, report, magnitude(model.view.gravity), lanes};
-  find_candidates(model, table, w, lanes);
   bool first = true;
   while (s.searching != 0) {
-    s.evaluate();
-    if (first) s.set_weights(lanes);
+    s.evaluate(first);
     first = false;
     const LaneBits accepted = s.judge();
     if (accepted != 0) s.new_directions(accepted);
@@ -208,10 +202,8 @@ LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& tab
                      NewtonReport& report) {
   static constexpr NewtonLimits kOnce{0, 1, 0};
   Search s{model, table, w, kOnce, report, magnitude(model.view.gravity), lanes};
-  find_candidates(model, table, w, lanes);
-  s.evaluate();
-  s.set_weights(lanes);
-  std::array<double, kGroup> residual{};
+  s.evaluate(true);
+  LaneRow residual;
   s.scaled_residuals(residual);
   for (int l = 0; l < kGroup; ++l) {
     if (!has(lanes, l)) continue;

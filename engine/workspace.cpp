@@ -20,18 +20,24 @@ std::size_t lay_out(const CompiledModel& m, Workspace& w, LaneRow* base) {
   };
   kernels::GroupStage& s = w.stage;
   rows(s.centre, m.nq);
-  for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.v, &s.g, &s.force_scale, &s.mass_diagonal}) rows(*p, m.nv);
+  for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.v, &s.g, &s.force_scale, &s.mass_diagonal, &s.weight, &s.inverse_weight})
+    rows(*p, m.nv);
   for (LaneRow** p : {&s.G_q, &s.C, &s.A}) rows(*p, m.pattern.entries);
   rows(s.LU, m.pattern.factor_entries);
   rows(s.work, std::max(m.pattern.factor_entries, 4 * m.nv));
   rows(s.excess, 1);
   for (LaneRow** p : {&w.q0, &w.q_before, &w.q1}) rows(*p, m.nq);
-  for (LaneRow** p : {&w.v0, &w.v_before, &w.v1, &w.x_gamma, &w.v_gamma, &w.delta, &w.base, &w.test, &w.weight})
+  for (LaneRow** p : {&w.v0, &w.v_before, &w.v1, &w.x_gamma, &w.v_gamma, &w.delta, &w.base, &w.test})
     rows(*p, m.nv);
   rows(w.poses, 12 * static_cast<int>(m.pairs.size()));
   for (std::size_t k = 0; k < w.lists.size(); ++k) {
-    rows(w.lists[k].points, 3 * m.pairs[k].n_points);
-    rows(w.lists[k].reference, 12);
+    kernels::GroupStage::List& list = w.lists[k];
+    list.stride = (m.pairs[k].n_points + kGroup - 1) / kGroup * kGroup;
+    rows(list.points, 3 * list.stride);
+    rows(list.reference, 12);
+    LaneRow* own;
+    rows(own, 3 * list.stride);
+    list.own = reinterpret_cast<double*>(own);
   }
   return used;
 }
@@ -40,14 +46,12 @@ std::size_t lay_out(const CompiledModel& m, Workspace& w, LaneRow* base) {
 
 std::size_t Workspace::bytes(const CompiledModel& m) {
   Workspace w(m);
-  return w.memory.size() * sizeof(LaneRow) + w.scratch.size() + w.dofs.size() * sizeof(int) +
+  return w.memory.size() * sizeof(LaneRow) + w.scratch.size() +
          sizeof(double) * std::size_t(m.nv) * std::size_t(m.nv + 1) * (kGroup + 1);
 }
 
 Workspace::Workspace(const CompiledModel& m)
-    : dofs(std::size_t(2 * m.nv)),
-      lists(m.pairs.size()),
-      list_count(m.pairs.size()),
+    : lists(m.pairs.size()),
       stage{},
       pivoted(kGroup, Eigen::PartialPivLU<Eigen::MatrixXd>(m.nv)),
       dense(1, Eigen::MatrixXd(m.nv, m.nv)),
@@ -67,7 +71,6 @@ Workspace::Workspace(const CompiledModel& m)
   for (std::size_t k = 0; k < lists.size(); ++k) lists[k].margin = m.pairs[k].reach / 200;
   stage.lists = lists.data();
   stage.scratch = scratch.data();
-  stage.dofs = dofs.data();
 }
 
 }  // namespace tangere

@@ -25,17 +25,16 @@ struct Workspace {
   using Rows = AlignedVector<kernels::LaneRow>;
   Rows memory;               ///< every row below, in one allocation
   AlignedVector<std::byte> scratch;
-  std::vector<int> dofs;
   std::vector<kernels::GroupStage::List> lists;
-  std::vector<std::array<int, kernels::kGroup>> list_count;  ///< candidates of each lane
+  LaneBits in_rows = 0;      ///< lanes whose lists stand in the rows as well
   kernels::GroupStage stage;
 
   // The group's states: now, one step before, and the result of the solve in hand.
   kernels::LaneRow *q0, *v0, *q_before, *v_before, *q1, *v1;
   // SDIRK2's first stage, relative to q0.
   kernels::LaneRow *x_gamma, *v_gamma;
-  // Newton: direction, point it starts from, natural test vector, sqrt of the mass diagonal.
-  kernels::LaneRow *delta, *base, *test, *weight, *poses;
+  // Newton: direction, point it starts from, natural test vector.
+  kernels::LaneRow *delta, *base, *test, *poses;
   kernels::LaneRow sound;
   std::vector<Eigen::PartialPivLU<Eigen::MatrixXd>> pivoted;  ///< (8) factor of lanes whose plain LU is useless
   std::vector<Eigen::MatrixXd> dense;                         ///< (1) the matrix being factored

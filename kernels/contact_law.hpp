@@ -8,6 +8,7 @@
 #pragma once
 
 #include "kernels/contact_types.hpp"
+#include "kernels/inverse_sqrt.hpp"
 #include "kernels/linalg.hpp"
 
 namespace tangere::kernels {
@@ -82,14 +83,15 @@ struct Friction {
 template <class N>
 Friction<N> friction(const LawParameters<N>& p, const NormalForce<N>& normal, const Vec3<N>& vt) {
   const N zero(0.0), one(1.0);
-  const N speed = sqrt(dot(vt, vt));
+  const N square = dot(vt, vt);
   const N limit = p.mu * normal.bound;
-  const auto slipping = p.kt * speed > limit;  // false at v_t = 0, so nothing is divided by zero below
-  const N inverse = one / select(slipping, speed, one);
+  const N inverse_speed = inverse_sqrt(square);  // finite at v_t = 0
+  const auto slipping = p.kt * (square * inverse_speed) > limit;  // false at v_t = 0
+  const N inverse = select(slipping, inverse_speed, zero);
   Friction<N> f;
   f.scale = select(slipping, limit * inverse, p.kt);
   f.slip = select(slipping, one, zero);
-  f.direction = (f.slip * inverse) * vt;
+  f.direction = inverse * vt;
   return f;
 }
 

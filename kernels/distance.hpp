@@ -3,6 +3,7 @@
 // d < 0 inside; n = ∇d is a unit vector everywhere, chosen where the distance has a kink (centre, edges, corners).
 #pragma once
 
+#include "kernels/inverse_sqrt.hpp"
 #include "kernels/linalg.hpp"
 
 namespace tangere::kernels {
@@ -21,9 +22,10 @@ struct SphereDistance {
   N radius;
 
   Distance<N> evaluate(const Vec3<N>& y, N& curvature) const {
-    const N length = sqrt(dot(y, y));
-    const auto regular = length > N(1e-150);
-    const N inverse = 1.0 / select(regular, length, N(1.0));
+    const N square = dot(y, y);
+    const N inverse = inverse_sqrt(square);
+    const N length = root_of(square, inverse);
+    const auto regular = square > N(1e-300);
     const N zero(0.0);
     curvature = select(regular, inverse, zero);
     return {length - radius, {select(regular, inverse * y.x, zero), select(regular, inverse * y.y, zero),
@@ -50,9 +52,10 @@ struct CuboidDistance {
     const N pick_y = select(x_first, zero, select(y_first, one, zero));
     const N pick_z = one - pick_x - pick_y;
     const Vec3<N> out = {max(q.x, zero), max(q.y, zero), max(q.z, zero)};
-    const N length = sqrt(dot(out, out));
-    const auto outside = length > zero;
-    const N inverse = one / select(outside, length, one);
+    const N square = dot(out, out);
+    const N inverse = inverse_sqrt(square);
+    const N length = root_of(square, inverse);
+    const auto outside = square > zero;
     return {select(outside, length, largest),
             {sign.x * select(outside, inverse * out.x, pick_x), sign.y * select(outside, inverse * out.y, pick_y),
              sign.z * select(outside, inverse * out.z, pick_z)}};

@@ -3,7 +3,7 @@
 //   f(a + ε a') = f(a) + ε f'(a) a'. Comparisons and select look at the value alone.
 #pragma once
 
-#include "kernels/lanes.hpp"
+#include "kernels/inverse_sqrt.hpp"
 
 namespace tangere::kernels {
 
@@ -92,6 +92,11 @@ template <class N>
 Dual<N> sqrt(const Dual<N>& a) {
   const N r = sqrt(a.value);
   return {r, a.epsilon / (r * 2.0)};
+}
+template <class N>
+Dual<N> inverse_sqrt(const Dual<N>& a) {
+  const N y = inverse_sqrt(a.value);
+  return {y, (N(-0.5) * y) * (y * y) * a.epsilon};
 }
 template <class N>
 Dual<N> abs(const Dual<N>& a) {

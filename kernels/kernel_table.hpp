@@ -15,16 +15,30 @@ struct GroupStage {
   LaneRow c0_over_h, inverse_h;
   const double* block;
   int group;
+  /// Candidate points of a pair: by lane as they are found, and in rows of eight lanes once more than one lane needs them.
   struct List {
-    LaneRow* points;     ///< (capacity, 3)
-    int count;
-    LaneRow* reference;  ///< (12)
+    double* own;           ///< (8, 3, stride): x, y, z of each lane's points, padded to eights with far points
+    int own_count[kGroup]; ///< padding not included
+    int stride;            ///< the number of the pair's points, rounded up to eights: a list cannot overflow
+    LaneRow* points;       ///< (stride, 3)
+    int count;             ///< rows in use
+    LaneRow* reference;    ///< (12) pose the list was made at
     double margin;
   };
   List* lists;           ///< (n_pairs)
   std::byte* scratch;    ///< scratch_bytes(model)
-  int* dofs;             ///< (2 nv)
   LaneRow *v, *g, *force_scale, *mass_diagonal, *G_q, *C, *A, *LU, *work, *excess;
+  LaneRow *weight, *inverse_weight;  ///< (nv) D^½ and D^-½, D the mass diagonal
+  LaneRow floor;                     ///< smallest ‖D^-½ g‖² that one rounding of x lets one see
+};
+
+/// One lane's search for points near a shape.
+struct CandidateSearch {
+  const PairContact* pair;
+  const double* pose;    ///< (12) shape in body 1: R row-major, then p
+  double margin;         ///< points nearer than this to the surface, or inside, are candidates [m]
+  double* points;        ///< (3, stride)
+  int stride;
 };
 
 /// One tactile sensor read for one environment.
@@ -47,10 +61,24 @@ inline constexpr int kTactileTile = 64;
 struct KernelTable {
   const char* name;  ///< "avx512", "avx2", "sse2", "scalar"
   std::size_t (*scratch_bytes)(const ModelView&);
-  /// Poses at x alone: writes shape_in_1 of every pair, (n_pairs, 12) rows: R row-major, then p.
-  void (*pair_poses)(const ModelView&, const GroupStage&, LaneRow* out);
-  /// g, v, force_scale, mass_diagonal, G_q, C, A, excess at x.
-  void (*evaluate)(const ModelView&, const GroupStage&);
+  /// Poses and motions at x, and `excess`; writes shape_in_1 of every pair, (n_pairs, 12) rows: R row-major, then p.
+  void (*kinematics)(const ModelView&, const GroupStage&, LaneRow* poses);
+  /// Fills `points`, padded to whole eights; returns how many without the padding.
+  int (*find_candidates)(const CandidateSearch&);
+  /// The rows of a list from its lanes' points.
+  void (*transpose_list)(GroupStage::List&);
+  /// g, v and force_scale at the x of kinematics(). `lone`: the only lane whose result matters, -1: all do.
+  void (*residual)(const ModelView&, const GroupStage&, int lone);
+  /// The same with mass_diagonal, G_q, C and A. Both give the same bits.
+  void (*evaluate)(const ModelView&, const GroupStage&, int lone);
+  /// weight, inverse_weight from mass_diagonal.
+  void (*set_weights)(const ModelView&, GroupStage&);
+  /// floor from A, in lanes where accept > 0. `unknown_scale`: (nv) what an unknown is rounded against.
+  void (*set_floor)(const ModelView&, GroupStage&, const double* unknown_scale, const LaneRow& accept);
+  /// ‖D^-½ g‖ over what it is measured by; 0 where it is below the floor.
+  void (*scaled_residual)(const ModelView&, const GroupStage&, double gravity, LaneRow& out);
+  /// ‖D^½ a‖.
+  void (*weighted_norm)(const ModelView&, const GroupStage&, const LaneRow* a, LaneRow& out);
   /// LU of A in the lanes where accept > 0.
   void (*factor)(const ModelView&, const GroupStage&, const LaneRow& accept);
   /// out = A⁻¹ b by the factor as it is.

@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 #include <xsimd/xsimd.hpp>
 
 namespace tangere::kernels {
@@ -61,6 +62,10 @@ struct LaneMask<ScalarArch> {
   static constexpr int kRegisters = kGroup;
 };
 
+/// Whether mul_add rounds once.
+template <class Arch>
+inline constexpr bool kFuses = std::is_same_v<Arch, xsimd::avx2> || std::is_same_v<Arch, xsimd::avx512bw>;
+
 namespace detail {
 
 // One register's worth of each operation; overloads on double serve the scalar build.
@@ -72,6 +77,7 @@ inline double magnitude(double a) { return std::fabs(a); }
 inline double larger(double a, double b) { return a > b ? a : b; }
 inline double smaller(double a, double b) { return a < b ? a : b; }
 inline bool any_of(bool m) { return m; }
+inline unsigned bits_of(bool m) { return m ? 1U : 0U; }
 
 #if defined(__AVX2__) && defined(__FMA__)
 inline xsimd::batch<double, xsimd::avx2> fuse(const xsimd::batch<double, xsimd::avx2>& a,
@@ -83,6 +89,9 @@ inline xsimd::batch<double, xsimd::avx2> fuse_negated(const xsimd::batch<double,
                                                       const xsimd::batch<double, xsimd::avx2>& b,
                                                       const xsimd::batch<double, xsimd::avx2>& c) {
   return _mm256_fnmadd_pd(a, b, c);
+}
+inline unsigned bits_of(const xsimd::batch_bool<double, xsimd::avx2>& m) {
+  return static_cast<unsigned>(_mm256_movemask_pd(m));
 }
 #endif
 #if defined(__AVX512F__)
@@ -96,6 +105,7 @@ inline xsimd::batch<double, xsimd::avx512bw> fuse_negated(const xsimd::batch<dou
                                                           const xsimd::batch<double, xsimd::avx512bw>& c) {
   return _mm512_fnmadd_pd(a, b, c);
 }
+inline unsigned bits_of(const xsimd::batch_bool<double, xsimd::avx512bw>& m) { return static_cast<__mmask8>(m); }
 #endif
 inline xsimd::batch<double, xsimd::sse2> fuse(const xsimd::batch<double, xsimd::sse2>& a,
                                               const xsimd::batch<double, xsimd::sse2>& b,
@@ -106,6 +116,9 @@ inline xsimd::batch<double, xsimd::sse2> fuse_negated(const xsimd::batch<double,
                                                       const xsimd::batch<double, xsimd::sse2>& b,
                                                       const xsimd::batch<double, xsimd::sse2>& c) {
   return c - a * b;
+}
+inline unsigned bits_of(const xsimd::batch_bool<double, xsimd::sse2>& m) {
+  return static_cast<unsigned>(_mm_movemask_pd(m));
 }
 template <class A>
 xsimd::batch<double, A> choose(const xsimd::batch_bool<double, A>& m, const xsimd::batch<double, A>& a,
@@ -253,6 +266,15 @@ inline bool any(const LaneMask<A>& m) {
   for (int i = 0; i < LaneMask<A>::kRegisters; ++i)
     if (detail::any_of(m.r[i])) return true;
   return false;
+}
+
+/// Bit l: lane l.
+template <class A>
+inline unsigned lane_bits(const LaneMask<A>& m) {
+  unsigned bits = 0;
+  for (int i = 0; i < LaneMask<A>::kRegisters; ++i)
+    bits |= detail::bits_of(m.r[i]) << (i * (kGroup / LaneMask<A>::kRegisters));
+  return bits;
 }
 
 template <class A>

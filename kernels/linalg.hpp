@@ -101,6 +101,13 @@ Mat3<N> operator-(const Mat3<N>& a, const Mat3<N>& b) {
   return c;
 }
 template <class N>
+Mat3<N> operator-(const Mat3<N>& a) {
+  Mat3<N> c;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) c.m[i][j] = -a.m[i][j];
+  return c;
+}
+template <class N>
 Mat3<N>& operator+=(Mat3<N>& a, const Mat3<N>& b) {
   return a = a + b;
 }

@@ -13,6 +13,8 @@ namespace tangere::kernels {
 /// without mass, then a spherical one; planar is two prismatic links.
 enum class JointKind : std::uint8_t { revolute, prismatic, translational, spherical };
 
+/// The motion subspace has no angular part.
+constexpr bool slides(JointKind k) { return k == JointKind::prismatic || k == JointKind::translational; }
 constexpr int dofs(JointKind k) { return k == JointKind::revolute || k == JointKind::prismatic ? 1 : 3; }
 constexpr int coordinates(JointKind k) {
   return k == JointKind::spherical ? 4 : dofs(k);
@@ -25,7 +27,11 @@ struct Link {
   int q, v;            ///< first coordinate, first dof
   Vec3<double> axis;   ///< revolute, prismatic: unit, same in parent joint frame and child
   Frame<double> frame; ///< joint frame at rest, in the parent link's frame
-  bool offset;         ///< frame is not the identity
+  bool rotated;        ///< frame.R is not the identity
+  bool turned;         ///< the link's axes may differ from its parent's
+  bool placed;         ///< its origin may differ from its parent's
+  bool steady;         ///< no ancestor ever turns: the parent's ω and α are zero
+  bool still;          ///< nor does this joint: ω and α are zero, and of a wrench only the force does work
   bool massive;        ///< false: no inertia of its own
   double mass;         ///< [kg]
   Vec3<double> moment; ///< mass times centre of mass, link axes [kg m]
@@ -52,11 +58,13 @@ struct PairContact {
   double ramp;
   ContactParameters parameters;
   const double* points;         ///< (n_points, 3) in link1's axes (or the world's), sorted into tiles
-  const double* tiles;          ///< (n_tiles, 4) centre and radius of kContactTile consecutive points
+  const double* tile_points;    ///< (n_tiles, 3, 32) the same: x, y, z of kContactTile points, padded with far points
+  const double* tile_bounds;    ///< (ceil(n_tiles/8), 4, 8) centres and radii of the tiles, padded with far ones
   int n_points, n_tiles;
   double reach;                 ///< largest |point| [m]: bounds how far a rotation moves one
 };
 inline constexpr int kContactTile = 32;
+inline constexpr double kFarAway = 1e6;  ///< [m] coordinates of filler points: finite, and no shape is there
 
 /// A body against the half-space below the ground: points of the body, or a sphere's lowest point.
 struct GroundContact {

@@ -8,6 +8,7 @@
 #include "kernels/model_view.hpp"
 #include "kernels/pair_contact.hpp"
 #include "kernels/so3.hpp"
+#include "kernels/sphere_contact.hpp"
 
 namespace tangere::kernels {
 
@@ -37,6 +38,7 @@ struct ContactScratch {
   Vec6<N> Z;            ///< twist of body 2 in body 1's axes, at its origin
   Vec6<N> W;            ///< Z - V₁
   PairSums<N> sums;
+  SphereSums<N> centred;
 };
 
 /// Candidate points of a pair, per lane, and the pose they were found at.
@@ -46,6 +48,18 @@ struct CandidateList {
   int count;
   const N* reference; ///< (12) shape_in_1 when the list was made: R row-major, then p
   double margin;      ///< a point missing from the list was at least this far away [m]
+  const double* own;  ///< (3, stride) candidates of the lane that is evaluated alone, padded to eights with far points
+  int own_count, stride;
+};
+
+/// A dof that moves a body of a pair: S and Ψ̇ in body 1's axes.
+template <class N>
+struct MotionColumn {
+  Vec6<N> S, psi_dot;
+  int dof;
+  bool linear;   ///< S has no angular part
+  bool rates;    ///< Ψ̇ is not zero
+  int unit;      ///< S is the unit vector k of its part, -1: of no special form
 };
 
 template <class N>
@@ -59,10 +73,11 @@ struct StageArgs {
   const double* block;  ///< of the batch, for parameters that vary
   int group;            ///< 0 or 1: which half of the block
   const CandidateList<N>* candidates;  ///< (n_pairs)
+  int lone;          ///< the only lane whose result matters: its contacts are summed across points; -1: all do
   // scratch
   LinkScratch<N>* links;        ///< (n_links)
   ContactScratch<N>* contacts;  ///< (n_pairs + n_grounds)
-  Vec6<N>* columns;             ///< (4 nv) motion columns of a pair
+  MotionColumn<N>* columns;     ///< (2 nv) motion columns of a pair
   // results
   N* v;              ///< (nv)
   N* g;              ///< (nv) residual [N, N m]
@@ -74,31 +89,55 @@ struct StageArgs {
   N* excess;         ///< (1) how far some pair moved beyond its list's margin [m]; > 0: rebuild and evaluate again
 };
 
-/// Column k of a joint's motion subspace.
+/// The unit vector of column k of a joint's motion subspace: its angular part when it turns, its linear part when it slides.
 template <class N>
-Vec6<N> motion_column(const Link& link, int k) {
+Vec3<N> joint_axis(const Link& link, int k) {
+  if (dofs(link.kind) == 1) return broadcast<N>(link.axis);
   const N zero(0.0), one(1.0);
-  const Vec3<N> unit = {k == 0 ? one : zero, k == 1 ? one : zero, k == 2 ? one : zero};
-  switch (link.kind) {
-    case JointKind::revolute: return {broadcast<N>(link.axis), zero3<N>()};
-    case JointKind::prismatic: return {zero3<N>(), broadcast<N>(link.axis)};
-    case JointKind::translational: return {zero3<N>(), unit};
-    case JointKind::spherical: break;
-  }
-  return {unit, zero3<N>()};
+  return {k == 0 ? one : zero, k == 1 ? one : zero, k == 2 ? one : zero};
 }
-
+/// a · s_k without multiplying by ones and zeros.
+template <class N>
+N along_axis(const Link& link, int k, const Vec3<N>& a) {
+  if (dofs(link.kind) == 1) return dot(broadcast<N>(link.axis), a);
+  return k == 0 ? a.x : k == 1 ? a.y : a.z;
+}
+/// a × s_k.
+template <class N>
+Vec3<N> cross_axis(const Link& link, int k, const Vec3<N>& a) {
+  if (dofs(link.kind) == 1) return cross(a, broadcast<N>(link.axis));
+  const N zero(0.0);
+  if (k == 0) return {zero, a.z, -a.y};
+  if (k == 1) return {-a.z, zero, a.x};
+  return {a.y, -a.x, zero};
+}
+/// M s_k.
+template <class N>
+Vec3<N> times_axis(const Link& link, int k, const Mat3<N>& M) {
+  if (dofs(link.kind) == 1) return M * broadcast<N>(link.axis);
+  return {M.m[0][k], M.m[1][k], M.m[2][k]};
+}
 /// S_kᵀ f.
 template <class N>
 N project(const Link& link, int k, const Vec6<N>& f) {
-  const auto component = [k](const Vec3<N>& a) { return k == 0 ? a.x : k == 1 ? a.y : a.z; };
-  switch (link.kind) {
-    case JointKind::revolute: return dot(broadcast<N>(link.axis), f.a);
-    case JointKind::prismatic: return dot(broadcast<N>(link.axis), f.l);
-    case JointKind::translational: return component(f.l);
-    case JointKind::spherical: break;
-  }
-  return component(f.a);
+  return along_axis(link, k, slides(link.kind) ? f.l : f.a);
+}
+
+// Between a link and its parent, leaving out what the joint never does.
+template <class N>
+Vec6<N> motion_to_child(const Link& link, const Frame<N>& x, const Vec6<N>& v) {
+  const Vec3<N> l = link.placed && !link.steady ? v.l + cross(v.a, x.p) : v.l;
+  if (!link.turned) return {v.a, l};
+  return {link.steady ? zero3<N>() : transposed_times(x.R, v.a), transposed_times(x.R, l)};
+}
+template <class N>
+Vec6<N> wrench_to_parent(const Link& link, const Frame<N>& x, const Vec6<N>& f) {
+  const Vec6<N> r = link.turned ? Vec6<N>{x.R * f.a, x.R * f.l} : f;
+  return link.placed ? Vec6<N>{r.a + cross(x.p, r.l), r.l} : r;
+}
+template <class N>
+Frame<N> compose(const Link& link, const Frame<N>& parent, const Frame<N>& x) {
+  return {link.turned ? parent.R * x.R : parent.R, link.placed ? parent.R * x.p + parent.p : parent.p};
 }
 
 /// A parameter of the scene in these lanes.

@@ -4,9 +4,11 @@
 
 #include <new>
 
+#include "kernels/detection-inl.hpp"
 #include "kernels/jacobian-inl.hpp"
 #include "kernels/kernel_table.hpp"
 #include "kernels/lu-inl.hpp"
+#include "kernels/norms-inl.hpp"
 #include "kernels/tactile-inl.hpp"
 
 namespace tangere::kernels {
@@ -22,24 +24,29 @@ struct TableOf {
 
   static std::size_t scratch_bytes(const ModelView& m) {
     return sizeof(LinkScratch<N>) * m.n_links + sizeof(ContactScratch<N>) * (m.n_pairs + m.n_grounds) +
-           sizeof(CandidateList<N>) * (m.n_pairs + 2) + sizeof(Vec6<N>) * 4 * m.nv;
+           sizeof(CandidateList<N>) * m.n_pairs + sizeof(MotionColumn<N>) * 2 * m.nv + 4 * alignof(N);
   }
 
-  static StageArgs<N> arguments(const ModelView& m, const GroupStage& s) {
+  static StageArgs<N> arguments(const ModelView& m, const GroupStage& s, int lone) {
     std::byte* at = s.scratch;
     const auto take = [&at]<class T>(T*, int count) {
       T* p = reinterpret_cast<T*>(at);
-      at += sizeof(T) * count;
+      at += (sizeof(T) * count + sizeof(N) - 1) / sizeof(N) * sizeof(N);
       return p;
     };
     StageArgs<N> a;
     a.links = take(static_cast<LinkScratch<N>*>(nullptr), m.n_links);
     a.contacts = take(static_cast<ContactScratch<N>*>(nullptr), m.n_pairs + m.n_grounds);
-    a.columns = take(static_cast<Vec6<N>*>(nullptr), 4 * m.nv);
+    a.columns = take(static_cast<MotionColumn<N>*>(nullptr), 2 * m.nv);
     auto* lists = take(static_cast<CandidateList<N>*>(nullptr), m.n_pairs);
-    for (int k = 0; k < m.n_pairs; ++k)
-      lists[k] = {view(s.lists[k].points), s.lists[k].count, view(s.lists[k].reference), s.lists[k].margin};
+    for (int k = 0; k < m.n_pairs; ++k) {
+      const GroupStage::List& l = s.lists[k];
+      const int lane = lone < 0 ? 0 : lone;
+      lists[k] = {view(l.points),        l.count, view(l.reference), l.margin, l.own + 3 * l.stride * lane,
+                  l.own_count[lane], l.stride};
+    }
     a.candidates = lists;
+    a.lone = lone;
     a.centre = view(s.centre);
     a.x = view(s.x);
     a.r = view(s.r);
@@ -60,21 +67,38 @@ struct TableOf {
     return a;
   }
 
-  static void pair_poses(const ModelView& m, const GroupStage& s, LaneRow* out) {
-    const StageArgs<N> a = arguments(m, s);
-    outward_sweep(m, a);
+  static void kinematics_lanes(const ModelView& m, const GroupStage& s, LaneRow* poses) {
+    const StageArgs<N> a = arguments(m, s, -1);
+    kinematics(m, a);
     for (int k = 0; k < m.n_pairs; ++k) {
-      pair_motion(m, m.pairs[k], a, a.contacts[k]);
       const Frame<N>& x = a.contacts[k].shape_in_1;
-      N* row = view(out + 12 * k);
+      N* row = view(poses + 12 * k);
       for (int i = 0; i < 9; ++i) row[i] = x.R.m[i / 3][i % 3];
       row[9] = x.p.x, row[10] = x.p.y, row[11] = x.p.z;
     }
   }
-  static void evaluate(const ModelView& m, const GroupStage& s) {
-    const StageArgs<N> a = arguments(m, s);
+  static void residual_lanes(const ModelView& m, const GroupStage& s, int lone) {
+    residual<false>(m, arguments(m, s, lone));
+  }
+  static void evaluate_lanes(const ModelView& m, const GroupStage& s, int lone) {
+    const StageArgs<N> a = arguments(m, s, lone);
     residual<true>(m, a);
-    jacobian(m, a, s.dofs);
+    jacobian(m, a);
+  }
+  static void set_weights_lanes(const ModelView& m, GroupStage& s) {
+    set_weights(m.nv, view(s.mass_diagonal), view(s.weight), view(s.inverse_weight));
+  }
+  static void set_floor_lanes(const ModelView& m, GroupStage& s, const double* unknown_scale, const LaneRow& accept) {
+    const N floor = rounding_floor(m.pattern, view(s.A), view(s.inverse_weight), unknown_scale);
+    *view(&s.floor) = select(*view(&accept) > N(0.0), floor, *view(&s.floor));
+  }
+  static void scaled_residual_lanes(const ModelView& m, const GroupStage& s, double gravity, LaneRow& out) {
+    const ResidualScale<N> scale = {view(s.v), view(s.force_scale), view(s.weight), view(s.inverse_weight),
+                                    load_lanes<Arch>(s.c0_over_h.lane), N(gravity), *view(&s.floor)};
+    *view(&out) = scaled_residual(m.nv, view(s.g), scale);
+  }
+  static void weighted_norm_lanes(const ModelView& m, const GroupStage& s, const LaneRow* a, LaneRow& out) {
+    *view(&out) = weighted_norm(m.nv, view(s.weight), view(a));
   }
   static void factor_lanes(const ModelView& m, const GroupStage& s, const LaneRow& accept) {
     factor(m.pattern, view(s.A), load_lanes<Arch>(accept.lane), view(s.LU), view(s.work));
@@ -93,7 +117,9 @@ struct TableOf {
   }
 
   static constexpr KernelTable make(const char* name) {
-    return {name, scratch_bytes, pair_poses, evaluate, factor_lanes, solve_lanes, solve_watched_lanes, tactile};
+    return {name,           scratch_bytes,     kinematics_lanes,      search_candidates<Arch>,
+            transpose_rows<Arch>, residual_lanes, evaluate_lanes, set_weights_lanes, set_floor_lanes,
+            scaled_residual_lanes, weighted_norm_lanes, factor_lanes, solve_lanes, solve_watched_lanes, tactile};
   }
 };
 

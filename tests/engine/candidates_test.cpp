@@ -47,7 +47,7 @@ Trajectory run(double margin, const kernels::KernelTable& table) {
     std::copy(q0.begin(), q0.end(), w.q_before);
     std::copy(v0.begin(), v0.end(), w.v_before);
     history = kAllLanes;
-    r.rows = std::max(r.rows, w.lists[0].count);
+    r.rows = std::max(r.rows, *std::max_element(w.lists[0].own_count, w.lists[0].own_count + kGroup));
   }
   for (int i = 0; i < m->nq; ++i)
     for (int l = 0; l < kGroup; ++l) r.states.push_back(w.q0[i][l]);
@@ -75,11 +75,12 @@ TEST(Candidates, ALaneThatOutrunsItsListSaysSo) {
   for (int i = 0; i < m->nq; ++i)
     for (double& x : w.stage.centre[i].lane) x = m->initial_q[std::size_t(i)];
   const kernels::KernelTable& table = kernels::active_kernels();
+  table.kinematics(m->view, w.stage, w.poses);
   find_candidates(*m, table, w, kAllLanes);
-  table.evaluate(m->view, w.stage);
+  table.kinematics(m->view, w.stage, w.poses);
   for (double x : w.stage.excess[0].lane) EXPECT_LE(x, 0);
   w.stage.x[2][3] = -2 * w.lists[0].margin;
-  table.evaluate(m->view, w.stage);
+  table.kinematics(m->view, w.stage, w.poses);
   for (int l = 0; l < kGroup; ++l) {
     if (l == 3) {
       EXPECT_GT(w.stage.excess[0][l], 0);

@@ -23,10 +23,18 @@ constexpr double kStep = 0.004, kC0 = 1.5;
 /// A workspace whose candidate lists hold every point, in all lanes.
 void list_everything(const CompiledModel& m, Workspace& w) {
   for (std::size_t k = 0; k < m.pairs.size(); ++k) {
-    w.lists[k].count = m.pairs[k].n_points;
-    w.lists[k].margin = 1e9;
+    kernels::GroupStage::List& list = w.lists[k];
+    list.count = m.pairs[k].n_points;
+    list.margin = 1e9;
     for (int i = 0; i < 3 * m.pairs[k].n_points; ++i)
-      for (double& x : w.lists[k].points[i].lane) x = m.pairs[k].points[i];
+      for (double& x : list.points[i].lane) x = m.pairs[k].points[i];
+    for (int l = 0; l < kGroup; ++l) {
+      list.own_count[l] = m.pairs[k].n_points;
+      for (int i = 0; i < list.stride; ++i)
+        for (int c = 0; c < 3; ++c)
+          list.own[(l * 3 + c) * list.stride + i] =
+              i < m.pairs[k].n_points ? m.pairs[k].points[3 * i + c] : kernels::kFarAway;
+    }
   }
 }
 
@@ -94,9 +102,23 @@ TEST_P(KernelTables, EvaluateMatchesTheScalarReferenceWhateverTheNeighboursHold)
           for (int i = 0; i < m->nv; ++i) w.stage.x[i][l] = poison;
           for (int i = 0; i < m->nq; ++i) w.stage.centre[i][l] = poison;
         }
-        table->evaluate(m->view, w.stage);
+        table->kinematics(m->view, w.stage, w.poses);
+        table->evaluate(m->view, w.stage, -1);
         const Outputs o = outputs(w, *m, lane);
         if (first.g.empty()) first = o;
+        // The residual without its Jacobian, and a lane evaluated alone across points: the same bits.
+        table->kinematics(m->view, w.stage, w.poses);
+        table->residual(m->view, w.stage, -1);
+        EXPECT_EQ(outputs(w, *m, lane).g, o.g);
+        table->kinematics(m->view, w.stage, w.poses);
+        table->evaluate(m->view, w.stage, lane);
+        const Outputs alone = outputs(w, *m, lane);
+        EXPECT_EQ(alone.g, o.g);
+        EXPECT_EQ(alone.A, o.A);
+        EXPECT_EQ(alone.C, o.C);
+        table->kinematics(m->view, w.stage, w.poses);
+        table->residual(m->view, w.stage, lane);
+        EXPECT_EQ(outputs(w, *m, lane).g, o.g);
         EXPECT_EQ(o.g, first.g);  // same bits in any lane, whatever the neighbours hold
         EXPECT_EQ(o.A, first.A);
         EXPECT_EQ(o.C, first.C);

@@ -21,14 +21,13 @@ class StageBuffers {
     for (auto* e : {&G_q, &C, &A}) e->assign(entries, N(0.0));
     links_.resize(m.links.size());
     contacts_.resize(m.pairs.size() + m.grounds.size());
-    columns_.resize(4 * nv);
-    dofs_.resize(2 * nv);
+    columns_.resize(2 * nv);
     excess_.assign(1, N(0.0));
     for (const kernels::PairContact& p : m.pairs) {
       points_.emplace_back();
       for (int k = 0; k < 3 * p.n_points; ++k) points_.back().push_back(N(p.points[k]));
       references_.emplace_back(12, N(0.0));
-      lists_.push_back({points_.back().data(), p.n_points, references_.back().data(), 1e9});
+      lists_.push_back({points_.back().data(), p.n_points, references_.back().data(), 1e9, nullptr, 0, 0});
     }
   }
 
@@ -44,6 +43,7 @@ class StageBuffers {
     a.block = block;
     a.group = 0;
     a.candidates = lists_.data();
+    a.lone = -1;
     a.links = links_.data();
     a.contacts = contacts_.data();
     a.columns = columns_.data();
@@ -59,12 +59,15 @@ class StageBuffers {
   }
 
   void residual(double c0_over_h, double inverse_h, const double* block = nullptr) {
-    kernels::residual<false>(model_.view, arguments(c0_over_h, inverse_h, block));
+    const auto a = arguments(c0_over_h, inverse_h, block);
+    kernels::kinematics(model_.view, a);
+    kernels::residual<false>(model_.view, a);
   }
   void residual_and_jacobian(double c0_over_h, double inverse_h, const double* block = nullptr) {
     const auto a = arguments(c0_over_h, inverse_h, block);
+    kernels::kinematics(model_.view, a);
     kernels::residual<true>(model_.view, a);
-    kernels::jacobian(model_.view, a, dofs_.data());
+    kernels::jacobian(model_.view, a);
   }
   [[nodiscard]] N entry(const std::vector<N>& matrix, int i, int j) const {
     const int at = model_.pattern.slot[std::size_t(i * model_.nv + j)];
@@ -77,8 +80,7 @@ class StageBuffers {
   const CompiledModel& model_;
   std::vector<kernels::LinkScratch<N>> links_;
   std::vector<kernels::ContactScratch<N>> contacts_;
-  std::vector<kernels::Vec6<N>> columns_;
-  std::vector<int> dofs_;
+  std::vector<kernels::MotionColumn<N>> columns_;
   std::vector<N> excess_;
   std::vector<std::vector<N>> points_, references_;
   std::vector<kernels::CandidateList<N>> lists_;

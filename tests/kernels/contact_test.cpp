@@ -4,6 +4,7 @@
 
 #include "kernels/dual.hpp"
 #include "kernels/pair_contact.hpp"
+#include "kernels/sphere_contact.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
 namespace tangere {
@@ -226,6 +227,50 @@ TEST(GroundContact, DerivativesMatchDualNumbersForPointsAndSpheres) {
         expect_close(by_pose, epsilon(pose), 1e-30 + std::sqrt(dot(by_pose, by_pose)), 1e-11);
         expect_close(by_rate, epsilon(rate), 1e-30 + std::sqrt(dot(by_rate, by_rate)), 1e-11);
       }
+}
+
+/// The sums about the sphere's centre, brought to body 1's origin, against the general sums of the same points.
+TEST_P(PairDerivative, SumsAboutTheCentreAreTheSums) {
+  const Case test = GetParam();
+  if (!test.sphere) GTEST_SKIP() << "spheres only";
+  Random random(7);
+  for (int trial = 0; trial < 200; ++trial) {
+    const State s = random_state(random, test);
+    const SphereDistance<double> shape{0.02};
+    const SphereMotion<double> motion = sphere_motion(s.c, {s.omega, s.v}, 0.02);
+    PairSums<double> general = PairSums<double>::zero(), finished, values;
+    SphereSums<double> centred, forces;
+    clear(centred);
+    clear(forces);
+    for (int k = 0; k < 12; ++k) {
+      // Some of them outside, most inside; the state's own point first, then others over the sphere.
+      const Vec3<double> xi = k == 0 ? s.xi : s.c + (0.02 - 1e-3 * random.uniform(-0.3, 1)) * random.direction();
+      accumulate<true>(general, shape, s.law, s.Q, s.c, s.omega, s.v, xi);
+      SpherePoint<double> point;
+      bool touching, slipping;
+      sphere_point<true>(motion, s.law, xi, point, touching, slipping);
+      if (touching) add_point<true>(centred, point, slipping);
+      sphere_point<false>(motion, s.law, xi, point, touching, slipping);
+      if (touching) add_point<false>(forces, point, slipping);
+    }
+    finish_sphere<true>(motion, s.omega, centred, finished);
+    finish_sphere<false>(motion, s.omega, forces, values);
+    const auto close = [](const double* a, const double* b, int count) {
+      double scale = 1e-300;
+      for (int i = 0; i < count; ++i) scale = std::max(scale, std::abs(b[i]));
+      for (int i = 0; i < count; ++i) EXPECT_NEAR(a[i], b[i], 2e-12 * scale) << i;
+    };
+    close(&finished.wrench.l.x, &general.wrench.l.x, 3);
+    close(&finished.wrench.a.x, &general.wrench.a.x, 3);
+    EXPECT_EQ(values.wrench.l.x, finished.wrench.l.x);
+    EXPECT_EQ(values.wrench.a.z, finished.wrench.a.z);
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j) {
+        SCOPED_TRACE(std::to_string(i) + std::to_string(j));
+        close(&finished.k[i][j].m[0][0], &general.k[i][j].m[0][0], 9);
+        close(&finished.d[i][j].m[0][0], &general.d[i][j].m[0][0], 9);
+      }
+  }
 }
 
 }  // namespace

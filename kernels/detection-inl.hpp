@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which points of a body may touch a shape: tiles by their bounding spheres, then points, eight at a time.
+#pragma once
+
+#include "kernels/distance.hpp"
+#include "kernels/kernel_table.hpp"
+
+namespace tangere::kernels {
+
+/// Signed distance of eight places in body 1 from a shape posed there.
+template <class Shape, class N>
+N distance_at(const Shape& shape, const Frame<N>& pose, const Vec3<N>& place) {
+  N unused;
+  const Vec3<N> arm = place - pose.p;
+  if constexpr (Shape::kFlat) {
+    return shape.evaluate(transposed_times(pose.R, arm), unused).d;
+  } else {
+    return shape.evaluate(arm, unused).d;
+  }
+}
+
+template <class A, class Shape>
+int search_shape(const CandidateSearch& s, const Shape& shape, const Frame<Lanes<A>>& pose) {
+  using N = Lanes<A>;
+  const PairContact& pair = *s.pair;
+  const N margin(s.margin);
+  double *x = s.points, *y = x + s.stride, *z = y + s.stride;
+  int count = 0;
+  for (int group = 0; group * kGroup < pair.n_tiles; ++group) {
+    const double* b = pair.tile_bounds + 4 * kGroup * group;
+    const Vec3<N> centre = {load_lanes<A>(b), load_lanes<A>(b + kGroup), load_lanes<A>(b + 2 * kGroup)};
+    const N reach = load_lanes<A>(b + 3 * kGroup) + margin;
+    for (unsigned near = lane_bits(distance_at(shape, pose, centre) < reach); near != 0; near &= near - 1) {
+      const int tile = group * kGroup + __builtin_ctz(near);
+      const double* p = pair.tile_points + 3 * kContactTile * tile;
+      for (int k = 0; k < kContactTile; k += kGroup) {
+        const double *px = p + k, *py = px + kContactTile, *pz = py + kContactTile;
+        const Vec3<N> place = {load_lanes<A>(px), load_lanes<A>(py), load_lanes<A>(pz)};
+        for (unsigned in = lane_bits(distance_at(shape, pose, place) < margin); in != 0; in &= in - 1, ++count) {
+          const int l = __builtin_ctz(in);
+          x[count] = px[l], y[count] = py[l], z[count] = pz[l];
+        }
+      }
+    }
+  }
+  for (int k = count; k % kGroup != 0; ++k) x[k] = y[k] = z[k] = kFarAway;
+  return count;
+}
+
+template <class A>
+int search_candidates(const CandidateSearch& s) {
+  using N = Lanes<A>;
+  Frame<N> pose;
+  for (int i = 0; i < 9; ++i) pose.R.m[i / 3][i % 3] = N(s.pose[i]);
+  pose.p = {N(s.pose[9]), N(s.pose[10]), N(s.pose[11])};
+  if (s.pair->shape == PrimitiveShape::sphere)
+    return search_shape<A>(s, SphereDistance<N>{N(s.pair->size.x)}, pose);
+  return search_shape<A>(s, CuboidDistance<N>{broadcast<N>(s.pair->size)}, pose);
+}
+
+/// Rows of eight lanes from the lanes' own lists; shorter ones end in far points.
+template <class A>
+void transpose_rows(GroupStage::List& list) {
+  list.count = 0;
+  for (int count : list.own_count) list.count = count > list.count ? count : list.count;
+  for (int l = 0; l < kGroup; ++l)
+    for (int c = 0; c < 3; ++c) {
+      const double* from = list.own + (l * 3 + c) * list.stride;
+      for (int k = 0; k < list.own_count[l]; ++k) list.points[3 * k + c][l] = from[k];
+      for (int k = list.own_count[l]; k < list.count; ++k) list.points[3 * k + c][l] = kFarAway;
+    }
+}
+
+}  // namespace tangere::kernels
