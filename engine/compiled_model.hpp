@@ -52,7 +52,8 @@ struct CompiledSensor {
 struct PatternStorage {
   int n = 0, entries = 0, factor_entries = 0;
   std::vector<int> slot, entry_begin, entry_column, permutation, scatter, diagonal;
-  std::vector<int> column_begin, column_slot, column_row, row_begin, row_slot, row_column, target;
+  std::vector<int> row_begin, factor_column, lower_begin, lower_slot, run_begin;
+  std::vector<kernels::EliminationRun> runs;
   [[nodiscard]] kernels::Pattern view() const;
 };
 

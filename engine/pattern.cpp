@@ -87,28 +87,39 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
     for (int i = k + 1; i < nv; ++i)
       for (int j = k + 1; j < nv; ++j) f[i][j] = static_cast<char>(f[i][j] | (f[i][k] & f[k][j]));
   std::vector<int> at(std::size_t(nv) * nv, -1);
-  for (int i = 0; i < nv; ++i)
-    for (int j = 0; j < nv; ++j)
-      if (f[i][j]) at[std::size_t(i) * nv + j] = p.factor_entries++;
+  for (int i = 0; i < nv; ++i) {
+    p.row_begin.push_back(p.factor_entries);
+    for (int j = 0; j < nv; ++j) {
+      if (!f[i][j]) continue;
+      at[std::size_t(i) * nv + j] = p.factor_entries++;
+      p.factor_column.push_back(j);
+    }
+    p.diagonal.push_back(at[std::size_t(i) * nv + i]);
+  }
+  p.row_begin.push_back(p.factor_entries);
   p.scatter.resize(p.entries);
   for (int i = 0; i < nv; ++i)
     for (int e = p.entry_begin[i]; e < p.entry_begin[i + 1]; ++e)
       p.scatter[e] = at[std::size_t(step_of[i]) * nv + step_of[p.entry_column[e]]];
+  const auto slot = [&](int i, int j) { return at[std::size_t(i) * nv + j]; };
   for (int k = 0; k < nv; ++k) {
-    p.diagonal.push_back(at[std::size_t(k) * nv + k]);
-    p.column_begin.push_back(static_cast<int>(p.column_slot.size()));
-    p.row_begin.push_back(static_cast<int>(p.row_slot.size()));
-    for (int j = k + 1; j < nv; ++j) {
-      if (f[j][k]) p.column_slot.push_back(at[std::size_t(j) * nv + k]), p.column_row.push_back(j);
-      if (f[k][j]) p.row_slot.push_back(at[std::size_t(k) * nv + j]), p.row_column.push_back(j);
+    p.lower_begin.push_back(static_cast<int>(p.lower_slot.size()));
+    for (int i = k + 1; i < nv; ++i) {
+      if (!f[i][k]) continue;
+      p.lower_slot.push_back(slot(i, k));
+      p.run_begin.push_back(static_cast<int>(p.runs.size()));
+      bool open = false;
+      for (int j = k + 1; j < nv; ++j) {
+        if (!f[k][j]) continue;
+        open = open && slot(i, j) == p.runs.back().target + p.runs.back().length;
+        if (!open) p.runs.push_back({slot(k, j), slot(i, j), 0});
+        open = true;
+        ++p.runs.back().length;
+      }
     }
-    for (int i = k + 1; i < nv; ++i)
-      if (f[i][k])
-        for (int j = k + 1; j < nv; ++j)
-          if (f[k][j]) p.target.push_back(at[std::size_t(i) * nv + j]);
   }
-  p.column_begin.push_back(static_cast<int>(p.column_slot.size()));
-  p.row_begin.push_back(static_cast<int>(p.row_slot.size()));
+  p.lower_begin.push_back(static_cast<int>(p.lower_slot.size()));
+  p.run_begin.push_back(static_cast<int>(p.runs.size()));
   return p;
 }
 
@@ -121,14 +132,13 @@ kernels::Pattern PatternStorage::view() const {
           factor_entries,
           permutation.data(),
           scatter.data(),
-          diagonal.data(),
-          column_begin.data(),
-          column_slot.data(),
-          column_row.data(),
           row_begin.data(),
-          row_slot.data(),
-          row_column.data(),
-          target.data()};
+          diagonal.data(),
+          factor_column.data(),
+          lower_begin.data(),
+          lower_slot.data(),
+          run_begin.data(),
+          runs.data()};
 }
 
 }  // namespace tangere

@@ -22,9 +22,9 @@ std::size_t lay_out(const CompiledModel& m, Workspace& w, LaneRow* base) {
   rows(s.centre, m.nq);
   for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.v, &s.g, &s.force_scale, &s.mass_diagonal, &s.weight, &s.inverse_weight})
     rows(*p, m.nv);
-  for (LaneRow** p : {&s.G_q, &s.C, &s.A}) rows(*p, m.pattern.entries);
+  rows(s.A, m.pattern.entries);
   rows(s.LU, m.pattern.factor_entries);
-  rows(s.work, std::max(m.pattern.factor_entries, 4 * m.nv));
+  rows(s.work, std::max(m.pattern.factor_entries, 5 * m.nv));
   rows(s.excess, 1);
   for (LaneRow** p : {&w.q0, &w.q_before, &w.q1}) rows(*p, m.nq);
   for (LaneRow** p : {&w.v0, &w.v_before, &w.v1, &w.x_gamma, &w.v_gamma, &w.delta, &w.base, &w.test})
@@ -32,7 +32,7 @@ std::size_t lay_out(const CompiledModel& m, Workspace& w, LaneRow* base) {
   rows(w.poses, 12 * static_cast<int>(m.pairs.size()));
   for (std::size_t k = 0; k < w.lists.size(); ++k) {
     kernels::GroupStage::List& list = w.lists[k];
-    list.stride = (m.pairs[k].n_points + kGroup - 1) / kGroup * kGroup;
+    list.stride = (m.pairs[k].n_points + kGroup - 1) / kGroup * kGroup + kGroup;
     rows(list.points, 3 * list.stride);
     rows(list.reference, 12);
     LaneRow* own;

@@ -80,12 +80,12 @@ struct Friction {
   Vec3<N> direction; ///< v_t / |v_t| when slipping, 0 when sticking
 };
 
+/// `square` = |v_t|², `inverse_speed` = 1/|v_t|, finite at v_t = 0.
 template <class N>
-Friction<N> friction(const LawParameters<N>& p, const NormalForce<N>& normal, const Vec3<N>& vt) {
+Friction<N> friction(const LawParameters<N>& p, const NormalForce<N>& normal, const Vec3<N>& vt, const N& square,
+                     const N& inverse_speed) {
   const N zero(0.0), one(1.0);
-  const N square = dot(vt, vt);
   const N limit = p.mu * normal.bound;
-  const N inverse_speed = inverse_sqrt(square);  // finite at v_t = 0
   const auto slipping = p.kt * (square * inverse_speed) > limit;  // false at v_t = 0
   const N inverse = select(slipping, inverse_speed, zero);
   Friction<N> f;
@@ -93,6 +93,12 @@ Friction<N> friction(const LawParameters<N>& p, const NormalForce<N>& normal, co
   f.slip = select(slipping, one, zero);
   f.direction = inverse * vt;
   return f;
+}
+
+template <class N>
+Friction<N> friction(const LawParameters<N>& p, const NormalForce<N>& normal, const Vec3<N>& vt) {
+  const N square = dot(vt, vt);
+  return friction(p, normal, vt, square, inverse_sqrt(square));
 }
 
 }  // namespace tangere::kernels

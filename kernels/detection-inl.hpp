@@ -7,16 +7,29 @@
 
 namespace tangere::kernels {
 
-/// Signed distance of eight places in body 1 from a shape posed there.
+/// Which of eight places in body 1 are nearer to a shape posed there than m.
 template <class Shape, class N>
-N distance_at(const Shape& shape, const Frame<N>& pose, const Vec3<N>& place) {
-  N unused;
+unsigned near_shape(const Shape& shape, const Frame<N>& pose, const Vec3<N>& place, const N& m) {
   const Vec3<N> arm = place - pose.p;
   if constexpr (Shape::kFlat) {
-    return shape.evaluate(transposed_times(pose.R, arm), unused).d;
+    return lane_bits(nearer_than(shape, transposed_times(pose.R, arm), m));
   } else {
-    return shape.evaluate(arm, unused).d;
+    return lane_bits(nearer_than(shape, arm, m));
   }
+}
+
+/// Appends the lanes in `which`; writes up to eight numbers, whatever their count.
+template <class A>
+void append(const Lanes<A>& a, unsigned which, double* out) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    _mm512_storeu_pd(out, _mm512_maskz_compress_pd(static_cast<__mmask8>(which), a.r[0]));
+    return;
+  }
+#endif
+  alignas(64) double lanes[kGroup];
+  store_lanes(a, lanes);
+  for (; which != 0; which &= which - 1) *out++ = lanes[__builtin_ctz(which)];
 }
 
 template <class A, class Shape>
@@ -30,16 +43,16 @@ int search_shape(const CandidateSearch& s, const Shape& shape, const Frame<Lanes
     const double* b = pair.tile_bounds + 4 * kGroup * group;
     const Vec3<N> centre = {load_lanes<A>(b), load_lanes<A>(b + kGroup), load_lanes<A>(b + 2 * kGroup)};
     const N reach = load_lanes<A>(b + 3 * kGroup) + margin;
-    for (unsigned near = lane_bits(distance_at(shape, pose, centre) < reach); near != 0; near &= near - 1) {
-      const int tile = group * kGroup + __builtin_ctz(near);
-      const double* p = pair.tile_points + 3 * kContactTile * tile;
+    for (unsigned near = near_shape(shape, pose, centre, reach); near != 0; near &= near - 1) {
+      const double* p = pair.tile_points + 3 * kContactTile * (group * kGroup + __builtin_ctz(near));
       for (int k = 0; k < kContactTile; k += kGroup) {
-        const double *px = p + k, *py = px + kContactTile, *pz = py + kContactTile;
-        const Vec3<N> place = {load_lanes<A>(px), load_lanes<A>(py), load_lanes<A>(pz)};
-        for (unsigned in = lane_bits(distance_at(shape, pose, place) < margin); in != 0; in &= in - 1, ++count) {
-          const int l = __builtin_ctz(in);
-          x[count] = px[l], y[count] = py[l], z[count] = pz[l];
-        }
+        const Vec3<N> place = {load_lanes<A>(p + k), load_lanes<A>(p + kContactTile + k),
+                               load_lanes<A>(p + 2 * kContactTile + k)};
+        const unsigned in = near_shape(shape, pose, place, margin);
+        append(place.x, in, x + count);
+        append(place.y, in, y + count);
+        append(place.z, in, z + count);
+        count += __builtin_popcount(in);
       }
     }
   }

@@ -33,6 +33,13 @@ struct SphereDistance {
   }
 };
 
+/// Whether the distance at y is below m > 0, without a root.
+template <class N>
+auto nearer_than(const SphereDistance<N>& shape, const Vec3<N>& y, const N& m) {
+  const N reach = shape.radius + m;
+  return dot(y, y) < reach * reach;
+}
+
 /// Cuboid with half edges s. Inside: the nearest face (the first of x, y, z on ties, outward where y_k = 0 is +).
 /// Outside: the distance to the nearest face, edge or corner. H = 0 inside, the only place where contact looks.
 template <class N>
@@ -75,5 +82,13 @@ struct CuboidDistance {
     return h;
   }
 };
+
+template <class N>
+auto nearer_than(const CuboidDistance<N>& shape, const Vec3<N>& y, const N& m) {
+  const N zero(0.0);
+  const Vec3<N> out = {max(abs(y.x) - shape.half.x, zero), max(abs(y.y) - shape.half.y, zero),
+                       max(abs(y.z) - shape.half.z, zero)};
+  return dot(out, out) < m * m;
+}
 
 }  // namespace tangere::kernels

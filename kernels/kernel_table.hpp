@@ -19,7 +19,7 @@ struct GroupStage {
   struct List {
     double* own;           ///< (8, 3, stride): x, y, z of each lane's points, padded to eights with far points
     int own_count[kGroup]; ///< padding not included
-    int stride;            ///< the number of the pair's points, rounded up to eights: a list cannot overflow
+    int stride;            ///< the number of the pair's points, rounded up to eights, and eight more: a list cannot overflow
     LaneRow* points;       ///< (stride, 3)
     int count;             ///< rows in use
     LaneRow* reference;    ///< (12) pose the list was made at
@@ -27,7 +27,7 @@ struct GroupStage {
   };
   List* lists;           ///< (n_pairs)
   std::byte* scratch;    ///< scratch_bytes(model)
-  LaneRow *v, *g, *force_scale, *mass_diagonal, *G_q, *C, *A, *LU, *work, *excess;
+  LaneRow *v, *g, *force_scale, *mass_diagonal, *A, *LU, *work, *excess;
   LaneRow *weight, *inverse_weight;  ///< (nv) D^½ and D^-½, D the mass diagonal
   LaneRow floor;                     ///< smallest ‖D^-½ g‖² that one rounding of x lets one see
 };
@@ -69,7 +69,7 @@ struct KernelTable {
   void (*transpose_list)(GroupStage::List&);
   /// g, v and force_scale at the x of kinematics(). `lone`: the only lane whose result matters, -1: all do.
   void (*residual)(const ModelView&, const GroupStage&, int lone);
-  /// The same with mass_diagonal, G_q, C and A. Both give the same bits.
+  /// The same with mass_diagonal and A. Both give the same bits.
   void (*evaluate)(const ModelView&, const GroupStage&, int lone);
   /// weight, inverse_weight from mass_diagonal.
   void (*set_weights)(const ModelView&, GroupStage&);
@@ -79,8 +79,8 @@ struct KernelTable {
   void (*scaled_residual)(const ModelView&, const GroupStage&, double gravity, LaneRow& out);
   /// ‖D^½ a‖.
   void (*weighted_norm)(const ModelView&, const GroupStage&, const LaneRow* a, LaneRow& out);
-  /// LU of A in the lanes where accept > 0.
-  void (*factor)(const ModelView&, const GroupStage&, const LaneRow& accept);
+  /// LU of A in the lanes where accept > 0; in all when it is null.
+  void (*factor)(const ModelView&, const GroupStage&, const LaneRow* accept);
   /// out = A⁻¹ b by the factor as it is.
   void (*solve)(const ModelView&, const GroupStage&, const LaneRow* b, LaneRow* out);
   /// The same, refined once; sound[l] = 1 where the result can be trusted.

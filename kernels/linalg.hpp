@@ -204,6 +204,15 @@ template <class N>
 Vec6<N>& operator-=(Vec6<N>& a, const Vec6<N>& b) {
   return a = a - b;
 }
+/// s a + b.
+template <class N>
+Vec6<N> mul_add(const N& s, const Vec6<N>& a, const Vec6<N>& b) {
+  return {mul_add(s, a.a, b.a), mul_add(s, a.l, b.l)};
+}
+template <class N>
+Vec6<N> operator*(const N& s, const Vec6<N>& a) {
+  return {s * a.a, s * a.l};
+}
 /// Power of a wrench on a twist, or any other pairing of the two.
 template <class N>
 N dot(const Vec6<N>& a, const Vec6<N>& b) {

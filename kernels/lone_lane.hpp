@@ -43,7 +43,35 @@ Vec3<Lanes<A>> spread(const Vec3<Lanes<A>>& a, int lane) {
   return {spread(a.x, lane), spread(a.y, lane), spread(a.z, lane)};
 }
 
-/// Adds the candidates of `lane` to the sums, which come back the same in every lane.
+template <class A>
+bool operator<(OneLane<A> a, OneLane<A> b) {
+  return a.x < b.x;
+}
+
+/// Adds the touching points of row i of a chunk of vectors, in order.
+template <bool Derivatives, class A>
+void add_row(const SphereChunk<Lanes<A>>& rows, int i, SphereSums<OneLane<A>>& sums, SphereChunk<OneLane<A>>& chunk) {
+  using Point = SpherePoint<OneLane<A>>;
+  static_assert(sizeof(Point) == Point::kAll * sizeof(double));
+  const unsigned slip = lane_bits(rows.slip[i]);
+  const double* fields = reinterpret_cast<const double*>(&rows.point[i]);
+  chunk.count = chunk.slips = 0;
+  for (unsigned left = lane_bits(rows.touch[i]); left != 0; left &= left - 1) {
+    const int l = __builtin_ctz(left), to = chunk.count;
+    const bool slips = ((slip >> l) & 1U) != 0;
+    const auto copy = [&, point = reinterpret_cast<double*>(&chunk.point[to])](int begin, int end) {
+      for (int f = begin; f < end; ++f) point[f] = fields[f * kGroup + l];
+    };
+    copy(0, Point::kValues);
+    if (Derivatives) copy(Point::kValues, Point::kDerivatives);
+    if (Derivatives && slips) copy(Point::kDerivatives, Point::kAll);
+    chunk.touching[chunk.count++] = to;
+    if (slips) chunk.slipping[chunk.slips++] = to;
+  }
+  add_chunk<Derivatives>(sums, chunk);
+}
+
+/// Sums over the candidates of `lane`, the same in every lane.
 template <bool Derivatives, class A>
 void sum_lone_sphere(const SphereMotion<Lanes<A>>& all, const LawParameters<Lanes<A>>& laws,
                      const CandidateList<Lanes<A>>& list, int lane, SphereSums<Lanes<A>>& sums) {
@@ -52,28 +80,25 @@ void sum_lone_sphere(const SphereMotion<Lanes<A>>& all, const LawParameters<Lane
   const SphereMotion<N> motion = {spread(all.centre, lane), spread(all.q, lane), spread(all.o, lane), all.radius};
   const LawParameters<N> law = {spread(laws.kn, lane), spread(laws.kt, lane),      spread(laws.mu, lane),
                                 spread(laws.damping, lane), laws.law, laws.ramp};
-  SphereSums<One> own;
-  clear(own);
-  SpherePoint<N> points;
-  for (int k = 0; k < list.own_count; k += kGroup) {
-    const double* at = list.own + k;
-    const Vec3<N> xi = {load_lanes<A>(at), load_lanes<A>(at + list.stride), load_lanes<A>(at + 2 * list.stride)};
-    LaneMask<A> touching, slipping;
-    sphere_point<Derivatives>(motion, law, xi, points, touching, slipping);
-    if (!any(touching)) continue;
-    const unsigned touch = lane_bits(touching), slip = lane_bits(slipping);
-    const double* rows = reinterpret_cast<const double*>(&points);
-    for (unsigned left = touch; left != 0; left &= left - 1) {
-      const int l = __builtin_ctz(left);
-      SpherePoint<One> point;
-      double* fields = reinterpret_cast<double*>(&point);
-      for (std::size_t i = 0; i < sizeof(point) / sizeof(double); ++i) fields[i] = rows[i * kGroup + std::size_t(l)];
-      add_point<Derivatives>(own, point, ((slip >> l) & 1U) != 0);
+  constexpr int kRows = SphereChunk<N>::kPoints;
+  alignas(64) SphereSums<One> own;
+  clear<Derivatives>(own);
+  SphereChunk<N> rows;
+  SphereChunk<One> chunk;
+  for (int first = 0; first < list.own_count; first += kRows * kGroup) {
+    const int rest = (list.own_count - first + kGroup - 1) / kGroup, count = rest < kRows ? rest : kRows;
+    Vec3<N> xi[kRows];
+    for (int i = 0; i < count; ++i) {
+      const double* at = list.own + first + i * kGroup;
+      xi[i] = {load_lanes<A>(at), load_lanes<A>(at + list.stride), load_lanes<A>(at + 2 * list.stride)};
     }
+    fill_chunk<Derivatives>(motion, law, xi, count, rows);
+    for (int c = 0; c < rows.count; ++c) add_row<Derivatives>(rows, rows.touching[c], own, chunk);
   }
   const double* from = reinterpret_cast<const double*>(&own);
   N* to = reinterpret_cast<N*>(&sums);
-  for (std::size_t i = 0; i < sizeof(own) / sizeof(double); ++i) to[i] = N(from[i]);
+  constexpr std::size_t count = Derivatives ? sizeof(own) / sizeof(double) : 6;  // f and m come first
+  for (std::size_t i = 0; i < count; ++i) to[i] = N(from[i]);
 }
 
 /// Plain numbers have one lane and no list of its own.

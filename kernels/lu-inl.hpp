@@ -6,43 +6,64 @@
 //   accepted if β = ‖S(b - Ax)‖∞ / (‖SAS‖∞ ‖S⁻¹x‖∞ + ‖Sb‖∞) ≤ 1e-13 and the correction ≤ 1e-6 ‖S⁻¹x‖∞
 #pragma once
 
+#include "kernels/inverse_sqrt.hpp"
 #include "kernels/model_view.hpp"
 
 namespace tangere::kernels {
 
-/// Factors A into LU (factor_entries) where `accept` is 1, keeps LU elsewhere. Unit lower factor; U's diagonal is
-/// stored as its reciprocal. `work`: (factor_entries).
+/// Unit lower factor in place; U's diagonal is stored as its reciprocal.
 template <class N>
-void factor(const Pattern& p, const N* A, const N& accept, N* LU, N* work) {
-  for (int e = 0; e < p.factor_entries; ++e) work[e] = N(0.0);
-  for (int e = 0; e < p.entries; ++e) work[p.scatter[e]] = A[e];
-  const int* target = p.target;
+void eliminate(const Pattern& p, N* work) {
   for (int k = 0; k < p.n; ++k) {
     const N inverse = 1.0 / work[p.diagonal[k]];
     work[p.diagonal[k]] = inverse;
-    for (int c = p.column_begin[k]; c < p.column_begin[k + 1]; ++c) {
-      const N l = work[p.column_slot[c]] * inverse;
-      work[p.column_slot[c]] = l;
-      for (int r = p.row_begin[k]; r < p.row_begin[k + 1]; ++r, ++target)
-        work[*target] = mul_sub_from(l, work[p.row_slot[r]], work[*target]);
+    for (int c = p.lower_begin[k]; c < p.lower_begin[k + 1]; ++c) {
+      const N l = work[p.lower_slot[c]] * inverse;
+      work[p.lower_slot[c]] = l;
+      for (int run = p.run_begin[c]; run < p.run_begin[c + 1]; ++run) {
+        const EliminationRun& e = p.runs[run];
+        const N* from = work + e.source;
+        N* to = work + e.target;
+        for (int r = 0; r < e.length; ++r) to[r] = mul_sub_from(l, from[r], to[r]);
+      }
     }
   }
-  const auto mask = accept > N(0.0);
+}
+
+/// Factors A into LU (factor_entries): everywhere (accept null), or where `accept` is 1, keeping LU elsewhere.
+/// `work`: (factor_entries).
+template <class N>
+void factor(const Pattern& p, const N* A, const N* accept, N* LU, N* work) {
+  N* to = accept == nullptr ? LU : work;
+  if (p.factor_entries != p.entries)
+    for (int e = 0; e < p.factor_entries; ++e) to[e] = N(0.0);
+  for (int e = 0; e < p.entries; ++e) to[p.scatter[e]] = A[e];
+  eliminate(p, to);
+  if (accept == nullptr) return;
+  const auto mask = *accept > N(0.0);
   for (int e = 0; e < p.factor_entries; ++e) LU[e] = select(mask, work[e], LU[e]);
+}
+
+/// b_k less the products of factor slots begin … end - 1 with work, two sums at a time.
+template <class N>
+N reduced(const Pattern& p, const N* LU, int begin, int end, const N& b, const N* work) {
+  N even = b, odd(0.0);
+  int s = begin;
+  for (; s + 1 < end; s += 2) {
+    even = mul_sub_from(LU[s], work[p.factor_column[s]], even);
+    odd = mul_sub_from(LU[s + 1], work[p.factor_column[s + 1]], odd);
+  }
+  if (s < end) even = mul_sub_from(LU[s], work[p.factor_column[s]], even);
+  return even + odd;
 }
 
 /// x = A⁻¹ b from the factor. b and x in dof order; `work`: (n).
 template <class N>
 void solve(const Pattern& p, const N* LU, const N* b, N* x, N* work) {
-  for (int k = 0; k < p.n; ++k) work[k] = b[p.permutation[k]];
   for (int k = 0; k < p.n; ++k)
-    for (int c = p.column_begin[k]; c < p.column_begin[k + 1]; ++c)
-      work[p.column_row[c]] = mul_sub_from(LU[p.column_slot[c]], work[k], work[p.column_row[c]]);
+    work[k] = reduced(p, LU, p.row_begin[k], p.diagonal[k], b[p.permutation[k]], work);
   for (int k = p.n - 1; k >= 0; --k) {
-    N sum = work[k];
-    for (int r = p.row_begin[k]; r < p.row_begin[k + 1]; ++r)
-      sum = mul_sub_from(LU[p.row_slot[r]], work[p.row_column[r]], sum);
-    work[k] = sum * LU[p.diagonal[k]];
+    work[k] = reduced(p, LU, p.diagonal[k] + 1, p.row_begin[k + 1], work[k], work) * LU[p.diagonal[k]];
     x[p.permutation[k]] = work[k];
   }
 }
@@ -58,11 +79,11 @@ void defect(const Pattern& p, const N* A, const N* x, const N* b, N* out) {
   }
 }
 
-/// x = A⁻¹ b, refined once; `sound` is 1 where the result passed the test above. `work`: (4 n).
+/// x = A⁻¹ b, refined once; `sound` is 1 where the result passed the test above. `work`: (5 n).
 template <class N>
 void solve_watched(const Pattern& p, const N* A, const N* LU, const N* b, N* x, N* sound, N* work) {
   const int n = p.n;
-  N *residual = work, *correction = work + n, *scale = work + 2 * n, *scratch = work + 3 * n;
+  N *residual = work, *correction = work + n, *scale = work + 2 * n, *inverse_scale = work + 3 * n, *scratch = work + 4 * n;
   const N zero(0.0), one(1.0);
   solve(p, LU, b, x, scratch);
   defect(p, A, x, b, residual);
@@ -71,14 +92,16 @@ void solve_watched(const Pattern& p, const N* A, const N* LU, const N* b, N* x, 
   defect(p, A, x, b, residual);
   for (int i = 0; i < n; ++i) {
     const N diagonal = abs(A[p.slot[i * n + i]]);
-    scale[i] = one / sqrt(select(diagonal > zero, diagonal, one));
+    const N safe = select(diagonal > zero, diagonal, one);
+    scale[i] = inverse_sqrt(safe);
+    inverse_scale[i] = safe * scale[i];
   }
   N norm_r = zero, norm_b = zero, norm_x = zero, norm_d = zero, norm_a = zero;
   for (int i = 0; i < n; ++i) {
     norm_r = max(abs(residual[i]) * scale[i], norm_r);
     norm_b = max(abs(b[i]) * scale[i], norm_b);
-    norm_x = max(abs(x[i]) / scale[i], norm_x);
-    norm_d = max(abs(correction[i]) / scale[i], norm_d);
+    norm_x = max(abs(x[i]) * inverse_scale[i], norm_x);
+    norm_d = max(abs(correction[i]) * inverse_scale[i], norm_d);
     N row = zero;
     for (int e = p.entry_begin[i]; e < p.entry_begin[i + 1]; ++e)
       row = mul_add(abs(A[e]), scale[p.entry_column[e]], row);

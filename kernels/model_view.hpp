@@ -84,18 +84,23 @@ struct Pattern {
   const int* slot;          ///< (n, n): index of entry (i, j), -1 where always zero
   const int* entry_begin;   ///< (n + 1): entries of row i are entry_begin[i] … entry_begin[i + 1] - 1
   const int* entry_column;  ///< (entries)
-  // LU: entries of A scattered to factor slots, then an interpreted elimination, in elimination order.
+  // LU: entries of A scattered to factor slots, then an interpreted elimination. Factor slots go row by row in
+  // elimination order: L(i, ·), U(i, i), U(i, ·), so that what is right of a pivot lies side by side.
   int factor_entries;
   const int* permutation;   ///< (n) elimination step → dof
   const int* scatter;       ///< (entries) slot of A → slot of LU
-  const int* diagonal;      ///< (n) slot of U(k, k)
-  const int* column_begin;  ///< (n + 1) into column_slot: the entries below the pivot
-  const int* column_slot;   ///< slot of L(i, k)
-  const int* column_row;    ///< its row i, an elimination step
-  const int* row_begin;     ///< (n + 1) into row_slot: entries right of the pivot
-  const int* row_slot;      ///< slot of U(k, j)
-  const int* row_column;    ///< its column j, an elimination step
-  const int* target;        ///< slots of (i, j) for k, each L row, each U column, in loop order
+  const int* row_begin;     ///< (n + 1) first factor slot of row i
+  const int* diagonal;      ///< (n) slot of U(i, i)
+  const int* factor_column; ///< (factor_entries) elimination step j of each slot
+  const int* lower_begin;   ///< (n + 1) into lower_slot: the entries below pivot k
+  const int* lower_slot;    ///< slot of L(i, k)
+  const int* run_begin;     ///< (lower entries + 1) into runs: what row i takes from row k
+  const struct EliminationRun* runs;
+};
+
+/// work[target + r] -= L(i, k) work[source + r] for r < length.
+struct EliminationRun {
+  int source, target, length;
 };
 
 struct ModelView {

@@ -160,16 +160,19 @@ void sum_candidates(const Shape& shape, const LawParameters<N>& law, const Candi
   }
 }
 
-/// Adds the candidates of all lanes, one row of the list after the other.
+/// Sums over the candidates of all lanes, one row of the list after the other.
 template <bool Derivatives, class N>
 void sum_sphere_rows(const SphereMotion<N>& motion, const LawParameters<N>& law, const CandidateList<N>& list,
                      SphereSums<N>& sums) {
-  SpherePoint<N> point;
-  for (int k = 0; k < list.count; ++k) {
-    const Vec3<N> xi = {list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]};
-    decltype(motion.radius < motion.radius) touching, slipping;
-    sphere_point<Derivatives>(motion, law, xi, point, touching, slipping);
-    if (any(touching)) add_point<Derivatives>(sums, point, any(slipping));
+  clear<Derivatives>(sums);
+  SphereChunk<N> chunk;
+  for (int k = 0; k < list.count; k += SphereChunk<N>::kPoints) {
+    const int count = list.count - k < SphereChunk<N>::kPoints ? list.count - k : SphereChunk<N>::kPoints;
+    Vec3<N> xi[SphereChunk<N>::kPoints];
+    for (int i = 0; i < count; ++i)
+      xi[i] = {list.points[3 * (k + i)], list.points[3 * (k + i) + 1], list.points[3 * (k + i) + 2]};
+    fill_chunk<Derivatives>(motion, law, xi, count, chunk);
+    add_chunk<Derivatives>(sums, chunk);
   }
 }
 
@@ -179,13 +182,13 @@ template <bool Derivatives, class N>
 void sum_sphere(const PairContact& pair, const LawParameters<N>& law, const StageArgs<N>& a,
                 const CandidateList<N>& list, ContactScratch<N>& o) {
   const SphereMotion<N> motion = sphere_motion(o.shape_in_1.p, o.W, N(pair.size.x));
-  clear(o.centred);
+  SphereSums<N> sums;
   if (a.lone >= 0) {
-    sum_lone_sphere<Derivatives>(motion, law, list, a.lone, o.centred);
+    sum_lone_sphere<Derivatives>(motion, law, list, a.lone, sums);
   } else {
-    sum_sphere_rows<Derivatives>(motion, law, list, o.centred);
+    sum_sphere_rows<Derivatives>(motion, law, list, sums);
   }
-  finish_sphere<Derivatives>(motion, o.W.a, o.centred, o.sums);
+  finish_sphere<Derivatives>(motion, o.W.a, sums, o.sums);
 }
 
 /// Contact sums of every pair and ground contact; their wrenches are taken from the links' F.
@@ -227,12 +230,14 @@ void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int i = model.n_links - 1; i >= 0; --i) {
     const Link& link = model.links[i];
     const LinkScratch<N>& o = a.links[i];
-    for (int k = 0; k < dofs(link.kind); ++k) {
-      const int d = link.v + k;
-      const N damping = model.damping[d] * a.v[d];
-      a.g[d] = project(link, k, o.F) - a.tau[d] + damping;
-      a.force_scale[d] = abs(a.tau[d]) + abs(damping);
-    }
+    with_kind(link.kind, [&]<JointKind K>() {
+      for (int k = 0; k < dofs(K); ++k) {
+        const int d = link.v + k;
+        const N damping = model.damping[d] * a.v[d];
+        a.g[d] = project<K>(link, k, o.F) - a.tau[d] + damping;
+        a.force_scale[d] = abs(a.tau[d]) + abs(damping);
+      }
+    });
     if (link.parent >= 0) a.links[link.parent].F += wrench_to_parent(link, o.local, o.F);
   }
 }
@@ -241,8 +246,10 @@ void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
 template <class N>
 void add_force_scale(const ModelView& model, const StageArgs<N>& a, int link, Vec6<N> wrench) {
   for (int i = link; i >= 0; i = model.links[i].parent) {
-    for (int k = 0; k < dofs(model.links[i].kind); ++k)
-      a.force_scale[model.links[i].v + k] += abs(project(model.links[i], k, wrench));
+    with_kind(model.links[i].kind, [&]<JointKind K>() {
+      for (int k = 0; k < dofs(K); ++k)
+        a.force_scale[model.links[i].v + k] += abs(project<K>(model.links[i], k, wrench));
+    });
     if (model.links[i].parent >= 0) wrench = wrench_to_parent(model.links[i], a.links[i].local, wrench);
   }
 }

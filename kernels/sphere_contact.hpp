@@ -12,6 +12,8 @@
 // What does not depend on the point comes out of the sums. Derivation: docs/contact.md.
 #pragma once
 
+#include <utility>
+
 #include "kernels/inverse_sqrt.hpp"
 #include "kernels/pair_contact.hpp"
 
@@ -29,80 +31,152 @@ SphereMotion<N> sphere_motion(const Vec3<N>& centre, const Vec6<N>& W, const N& 
   return {centre, -(W.l + cross(W.a, centre)), (-radius) * W.a, radius};
 }
 
-/// What one point adds to the sums: exact zeros if it does not touch.
+/// What one point adds to the sums: exact zeros if it does not touch. Numbers throughout, in the order in which fewer and
+/// fewer of them are set.
 template <class N>
 struct SpherePoint {
-  Vec3<N> n, f, m;              ///< normal, force, n × f
+  Vec3<N> f, m;                 ///< force, n × f
   // With derivatives only.
-  Vec3<N> alpha, g, k, sn;      ///< α, g, k, s n
+  Vec3<N> n, alpha, g, k, sn;   ///< normal, α, g, k, s n
   N s, curvature, spread;       ///< s, κ, N + ḋ s
   // Where it slips only.
-  Vec3<N> t, b, e, turn;        ///< t, b, e, s t - γ n
-  N gamma;                      ///< γ
+  Vec3<N> t, b, st, sb, ke, turn;  ///< t, b, s t, s b, κ e, s t - γ n
+  N k_gamma;                    ///< κ γ
+
+  static constexpr int kValues = 6, kDerivatives = kValues + 18, kAll = kDerivatives + 19;
 };
 
+template <class N>
+struct UpperTriangle {
+  N m[6];
+};
+/// Σ s n, Σ κ s n, Σ κ α, Σ s, Σ κ s, Σ κ (N + ḋ s)
+template <class N>
+struct ScaledSums {
+  Vec3<N> sn, ksn, k_alpha;
+  N s, ks, k_spread;
+};
+
+/// Every sum runs over the points in order, so that chunks may be cut anywhere: what all touching points add and what
+/// slipping ones add are kept apart until the end.
 template <class N>
 struct SphereSums {
-  Vec3<N> f, m;                 ///< Σ f, Σ n × f
-  Mat3<N> f_q, f_o, f_D, m_q, m_D;  ///< the outer products
-  N m_o[6];                     ///< upper triangle of Σ s (n nᵀ + b bᵀ)
-  Vec3<N> sn, ksn, k_alpha, k_gamma_b;  ///< Σ s n, Σ κ s n, Σ κ α, Σ κ γ b
-  N s, ks, k_spread;            ///< Σ s, Σ κ s, Σ κ (N + ḋ s)
+  Vec3<N> f, m;                     ///< Σ f, Σ n × f
+  Mat3<N> alpha_n, g_n, k_n;        ///< Σ α nᵀ, Σ g nᵀ, Σ k nᵀ
+  UpperTriangle<N> s_nn;            ///< Σ s n nᵀ
+  ScaledSums<N> scaled;
+  Mat3<N> s_tt, s_tb, s_t_ke, b_turn, s_b_ke;  ///< Σ s t tᵀ, Σ s t bᵀ, Σ κ s t eᵀ, Σ b (s t - γ n)ᵀ, Σ κ s b eᵀ
+  UpperTriangle<N> s_bb;            ///< Σ s b bᵀ
+  Vec3<N> k_gamma_b;                ///< Σ κ γ b
 };
 
-template <class N>
-void clear(SphereSums<N>& sums) {
-  N* x = reinterpret_cast<N*>(&sums);
-  for (std::size_t i = 0; i < sizeof(sums) / sizeof(N); ++i) x[i] = N(0.0);
+template <bool Derivatives, class N>
+void clear(SphereSums<N>& s) {
+  s.f = s.m = zero3<N>();
+  if constexpr (Derivatives) {
+    s.alpha_n = s.g_n = s.k_n = s.s_tt = s.s_tb = s.s_t_ke = s.b_turn = s.s_b_ke = zero33<N>();
+    for (int i = 0; i < 6; ++i) s.s_nn.m[i] = s.s_bb.m[i] = N(0.0);
+    s.scaled.sn = s.scaled.ksn = s.scaled.k_alpha = s.k_gamma_b = zero3<N>();
+    s.scaled.s = s.scaled.ks = s.scaled.k_spread = N(0.0);
+  }
 }
 
-/// Fills `out`; `touching` and `slipping` say which parts of it are not zero (the rest is not set).
-template <bool Derivatives, class N, class Mask>
-void sphere_point(const SphereMotion<N>& z, const LawParameters<N>& law, const Vec3<N>& xi, SpherePoint<N>& out,
-                  Mask& touching, Mask& slipping) {
+/// A few points on their way through the law, and then into the sums.
+template <class N>
+struct SphereChunk {
+  using Mask = decltype(std::declval<N>() < std::declval<N>());
+  static constexpr int kPoints = sizeof(N) == sizeof(double) ? 8 : 4;  // of lanes, what the first-level cache holds
+  SpherePoint<N> point[kPoints];
+  Mask touch[kPoints], slip[kPoints];        ///< lane by lane, where some lane touches
+  int touching[kPoints], slipping[kPoints];  ///< which touch, and which of them slip, in some lane
+  int count = 0, slips = 0;
+};
+
+/// Between the three passes of a chunk. Each pass waits for one root, so that roots of different points overlap.
+template <class N>
+struct SpherePass {
+  Vec3<N> vt, turned;
+  N d, kappa, rate, square, inverse_speed;
+};
+
+/// n, d, κ; where the point touches.
+template <class N>
+auto sphere_distance(const SphereMotion<N>& z, const Vec3<N>& xi, SpherePoint<N>& out, SpherePass<N>& pass) {
+  const Distance<N> at = SphereDistance<N>{z.radius}.evaluate(xi - z.centre, pass.kappa);
+  out.n = at.n;
+  pass.d = at.d;
+  return at.d < N(0.0);
+}
+
+/// ḋ, v_t, 1/|v_t|.
+template <class N>
+void sphere_slide(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePass<N>& pass) {
+  pass.rate = dot(out.n, z.q);
+  pass.turned = cross(z.o, out.n);
+  pass.vt = z.q + pass.turned - pass.rate * out.n;
+  pass.square = dot(pass.vt, pass.vt);
+  pass.inverse_speed = inverse_sqrt(pass.square);
+}
+
+/// Force and what its derivative needs; where the point slips.
+template <bool Derivatives, class N>
+auto sphere_force(const SphereMotion<N>& z, const LawParameters<N>& law, const SpherePass<N>& pass,
+                  SpherePoint<N>& out) {
   const N zero(0.0);
-  const Vec3<N> D = xi - z.centre;
-  N kappa;
-  const Distance<N> at = SphereDistance<N>{z.radius}.evaluate(D, kappa);
-  touching = at.d < zero;
-  slipping = touching;
-  if (!any(touching)) return;
-  const Vec3<N>& n = at.n;
-  const N rate = dot(n, z.q);
-  const Vec3<N> turned = cross(z.o, n);
-  const Vec3<N> vt = z.q + turned - rate * n;
-  const NormalForce<N> normal = normal_force(law, at.d, rate);
-  const Friction<N> friction_at = friction(law, normal, vt);
+  const Vec3<N>& n = out.n;
+  const auto touching = pass.d < zero;
+  const NormalForce<N> normal = normal_force(law, pass.d, pass.rate);
+  const Friction<N> friction_at = friction(law, normal, pass.vt, pass.square, pass.inverse_speed);
   const N s = select(touching, friction_at.scale, zero);
-  out.n = n;
-  out.f = normal.force * n - s * vt;
+  out.f = normal.force * n - s * pass.vt;
   out.m = cross(n, out.f);
-  if constexpr (!Derivatives) return;
-  slipping = touching & (friction_at.slip > zero);
-  const N two_s = s + s;
+  const auto slipping = touching & (friction_at.slip > zero);
+  if constexpr (!Derivatives) return slipping;
   const N slope = normal.rate_slope + s;
-  const N ks = kappa * s;
+  const N ks = pass.kappa * s;
   out.s = s;
-  out.curvature = kappa;
-  out.spread = mul_add(rate, s, normal.force);
+  out.curvature = pass.kappa;
+  out.spread = mul_add(pass.rate, s, normal.force);
   out.sn = s * n;
-  const N g_n = mul_sub_from(kappa, mul_add(rate, normal.rate_slope + two_s, normal.force), normal.d_slope);
-  const N along = dot(z.o, n);
+  const N g_n =
+      mul_sub_from(pass.kappa, mul_add(pass.rate, normal.rate_slope + (s + s), normal.force), normal.d_slope);
   out.alpha = slope * n;
-  out.g = mul_add(g_n, n, ks * turned);
-  out.k = mul_add(ks, z.o - along * n, (-kappa) * out.m);
-  if (!any(slipping)) return;
+  out.g = mul_add(g_n, n, ks * pass.turned);
+  out.k = mul_add(ks, z.o - dot(z.o, n) * n, (-pass.kappa) * out.m);
+  if (!any(slipping)) return slipping;
   const N gate = select(slipping, N(1.0), zero);
   const Vec3<N> t = gate * friction_at.direction;
   out.t = t;
   out.b = cross(n, t);
-  out.gamma = gate * (law.mu * normal.bound_rate);
-  const N g_t = -(law.mu * normal.bound_d) - kappa * mul_sub_from(rate, out.gamma, s * dot(z.o, out.b));
-  out.alpha -= out.gamma * t;
+  const N gamma = gate * (law.mu * normal.bound_rate);
+  const N g_t = -(law.mu * normal.bound_d) - pass.kappa * mul_sub_from(pass.rate, gamma, s * dot(z.o, out.b));
+  out.alpha -= gamma * t;
   out.g += g_t * t;
   out.k += g_t * out.b;
-  out.e = cross(t, z.o) - rate * t;
-  out.turn = s * t - out.gamma * n;
+  out.st = s * t;
+  out.sb = s * out.b;
+  out.ke = pass.kappa * (cross(t, z.o) - pass.rate * t);
+  out.turn = out.st - gamma * n;
+  out.k_gamma = pass.kappa * gamma;
+  return slipping;
+}
+
+/// Takes `count` ≤ kPoints points through the law.
+template <bool Derivatives, class N>
+void fill_chunk(const SphereMotion<N>& z, const LawParameters<N>& law, const Vec3<N>* xi, int count,
+                SphereChunk<N>& chunk) {
+  SpherePass<N> pass[SphereChunk<N>::kPoints];
+  chunk.count = chunk.slips = 0;
+  for (int i = 0; i < count; ++i) {
+    chunk.touch[i] = sphere_distance(z, xi[i], chunk.point[i], pass[i]);
+    if (any(chunk.touch[i])) chunk.touching[chunk.count++] = i;
+  }
+  for (int c = 0; c < chunk.count; ++c) sphere_slide(z, chunk.point[chunk.touching[c]], pass[chunk.touching[c]]);
+  for (int c = 0; c < chunk.count; ++c) {
+    const int i = chunk.touching[c];
+    chunk.slip[i] = sphere_force<Derivatives>(z, law, pass[i], chunk.point[i]);
+    if (any(chunk.slip[i])) chunk.slipping[chunk.slips++] = i;
+  }
 }
 
 template <class N>
@@ -121,33 +195,44 @@ void add_upper(N (&sum)[6], const Vec3<N>& a, const Vec3<N>& b) {
   sum[5] = mul_add(a.z, b.z, sum[5]);
 }
 
-/// Adds a point that touches in some lane.
+/// Adds points one after the other to a few sums, which stay in registers: f(sum, point).
+template <class Sum, class N, class F>
+void add_each(Sum& sum, const SpherePoint<N>* point, const int* which, int count, const F& f) {
+  Sum local = sum;
+  for (int i = 0; i < count; ++i) f(local, point[which[i]]);
+  sum = local;
+}
+
+/// Adds the points of a chunk in order.
 template <bool Derivatives, class N>
-void add_point(SphereSums<N>& sums, const SpherePoint<N>& p, bool slips) {
-  sums.f += p.f;
-  sums.m += p.m;
+void add_chunk(SphereSums<N>& sums, const SphereChunk<N>& chunk) {
+  using Point = SpherePoint<N>;
+  const auto each = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.touching, chunk.count, f); };
+  const auto slipping = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.slipping, chunk.slips, f); };
+  each(sums.f, [](Vec3<N>& f, const Point& p) { f += p.f; });
+  each(sums.m, [](Vec3<N>& m, const Point& p) { m += p.m; });
   if constexpr (Derivatives) {
-    const N ks = p.curvature * p.s;
-    add_outer(sums.f_q, p.alpha, p.n);
-    add_outer(sums.f_D, p.g, p.n);
-    add_outer(sums.m_D, p.k, p.n);
-    add_upper(sums.m_o, p.sn, p.n);
-    sums.sn += p.sn;
-    sums.ksn = mul_add(p.curvature, p.sn, sums.ksn);
-    sums.k_alpha = mul_add(p.curvature, p.alpha, sums.k_alpha);
-    sums.s += p.s;
-    sums.ks += ks;
-    sums.k_spread = mul_add(p.curvature, p.spread, sums.k_spread);
-    if (!slips) return;
-    const Vec3<N> ke = p.curvature * p.e;
-    const Vec3<N> st = p.s * p.t, sb = p.s * p.b;
-    add_outer(sums.f_q, st, p.t);
-    add_outer(sums.f_o, st, p.b);
-    add_outer(sums.f_D, st, ke);
-    add_outer(sums.m_q, p.b, p.turn);
-    add_upper(sums.m_o, sb, p.b);
-    add_outer(sums.m_D, sb, ke);
-    sums.k_gamma_b = mul_add(p.curvature * p.gamma, p.b, sums.k_gamma_b);
+    each(sums.alpha_n, [](Mat3<N>& m, const Point& p) { add_outer(m, p.alpha, p.n); });
+    each(sums.g_n, [](Mat3<N>& m, const Point& p) { add_outer(m, p.g, p.n); });
+    each(sums.k_n, [](Mat3<N>& m, const Point& p) { add_outer(m, p.k, p.n); });
+    each(sums.s_nn, [](UpperTriangle<N>& m, const Point& p) { add_upper(m.m, p.sn, p.n); });
+    each(sums.scaled, [](ScaledSums<N>& q, const Point& p) {
+      q.sn += p.sn;
+      q.ksn = mul_add(p.curvature, p.sn, q.ksn);
+      q.k_alpha = mul_add(p.curvature, p.alpha, q.k_alpha);
+      q.s += p.s;
+      q.ks = mul_add(p.curvature, p.s, q.ks);
+      q.k_spread = mul_add(p.curvature, p.spread, q.k_spread);
+    });
+    if (chunk.slips > 0) {
+      slipping(sums.s_tt, [](Mat3<N>& m, const Point& p) { add_outer(m, p.st, p.t); });
+      slipping(sums.s_tb, [](Mat3<N>& m, const Point& p) { add_outer(m, p.st, p.b); });
+      slipping(sums.s_t_ke, [](Mat3<N>& m, const Point& p) { add_outer(m, p.st, p.ke); });
+      slipping(sums.b_turn, [](Mat3<N>& m, const Point& p) { add_outer(m, p.b, p.turn); });
+      slipping(sums.s_bb, [](UpperTriangle<N>& m, const Point& p) { add_upper(m.m, p.sb, p.b); });
+      slipping(sums.s_b_ke, [](Mat3<N>& m, const Point& p) { add_outer(m, p.sb, p.ke); });
+      slipping(sums.k_gamma_b, [](Vec3<N>& v, const Point& p) { v = mul_add(p.k_gamma, p.b, v); });
+    }
   }
 }
 
@@ -159,18 +244,21 @@ void finish_sphere(const SphereMotion<N>& z, const Vec3<N>& omega, const SphereS
   out.wrench.l = s.f;
   out.wrench.a = cross(z.centre, s.f) + r * s.m;
   if constexpr (Derivatives) {
-    Mat3<N> f_q = s.f_q, m_q = s.m_q - skew(s.sn);
-    for (int i = 0; i < 3; ++i) f_q.m[i][i] -= s.s;
-    const Mat3<N> f_o = s.f_o + skew(s.sn);
-    Mat3<N> m_o = {{{s.m_o[0] - s.s, s.m_o[1], s.m_o[2]},
-                    {s.m_o[1], s.m_o[3] - s.s, s.m_o[4]},
-                    {s.m_o[2], s.m_o[4], s.m_o[5] - s.s}}};
-    Mat3<N> f_D = s.f_D + outer(s.k_alpha, z.q) - skew(s.ks * z.o);
-    for (int i = 0; i < 3; ++i) f_D.m[i][i] += s.k_spread;
+    const ScaledSums<N>& c = s.scaled;
+    Mat3<N> f_q = s.alpha_n + s.s_tt, f_D = s.g_n + s.s_t_ke + outer(c.k_alpha, z.q) - skew(c.ks * z.o);
+    const Mat3<N> m_q = s.b_turn - skew(c.sn), f_o = s.s_tb + skew(c.sn);
     // Σ κ s u = q Σ κ s + o × Σ κ s n
-    Mat3<N> m_D = s.m_D - outer(s.k_gamma_b, z.q) + skew(mul_add(s.ks, z.q, cross(z.o, s.ksn))) - outer(z.o, s.ksn);
-    const N along = dot(z.o, s.ksn);
-    for (int i = 0; i < 3; ++i) m_D.m[i][i] += along;
+    Mat3<N> m_D = s.k_n + s.s_b_ke - outer(s.k_gamma_b, z.q) + skew(mul_add(c.ks, z.q, cross(z.o, c.ksn))) -
+                  outer(z.o, c.ksn);
+    N m[6];
+    for (int i = 0; i < 6; ++i) m[i] = s.s_nn.m[i] + s.s_bb.m[i];
+    const Mat3<N> m_o = {{{m[0] - c.s, m[1], m[2]}, {m[1], m[3] - c.s, m[4]}, {m[2], m[4], m[5] - c.s}}};
+    const N along = dot(z.o, c.ksn);
+    for (int i = 0; i < 3; ++i) {
+      f_q.m[i][i] -= c.s;
+      f_D.m[i][i] += c.k_spread;
+      m_D.m[i][i] += along;
+    }
     const Mat3<N> f_c = -(f_D + times_skew(f_q, omega)), m_c = (-r) * (m_D + times_skew(m_q, omega));
     out.k[1][1] = f_c;
     out.k[1][0] = -times_skew(f_c, z.centre);

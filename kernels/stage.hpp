@@ -38,7 +38,6 @@ struct ContactScratch {
   Vec6<N> Z;            ///< twist of body 2 in body 1's axes, at its origin
   Vec6<N> W;            ///< Z - V₁
   PairSums<N> sums;
-  SphereSums<N> centred;
 };
 
 /// Candidate points of a pair, per lane, and the pose they were found at.
@@ -52,14 +51,13 @@ struct CandidateList {
   int own_count, stride;
 };
 
-/// A dof that moves a body of a pair: S and Ψ̇ in body 1's axes.
+/// The dofs of a joint that moves a body of a pair: S and Ψ̇ of each in body 1's axes.
 template <class N>
-struct MotionColumn {
-  Vec6<N> S, psi_dot;
-  int dof;
-  bool linear;   ///< S has no angular part
-  bool rates;    ///< Ψ̇ is not zero
-  int unit;      ///< S is the unit vector k of its part, -1: of no special form
+struct JointColumns {
+  Vec6<N> S[3], psi_dot[3];
+  int link;
+  bool rates;  ///< Ψ̇ is set: it may differ from zero
+  bool own;    ///< of body 1's own link: S_k is the unit vector k
 };
 
 template <class N>
@@ -77,50 +75,59 @@ struct StageArgs {
   // scratch
   LinkScratch<N>* links;        ///< (n_links)
   ContactScratch<N>* contacts;  ///< (n_pairs + n_grounds)
-  MotionColumn<N>* columns;     ///< (2 nv) motion columns of a pair
+  JointColumns<N>* columns;     ///< (2 n_links) motion columns of a pair
   // results
   N* v;              ///< (nv)
   N* g;              ///< (nv) residual [N, N m]
   N* force_scale;    ///< (nv) sum of the magnitudes of actuator, damping and contact forces
   N* mass_diagonal;  ///< (nv)
-  N* G_q;            ///< (entries)
-  N* C;              ///< (entries)
   N* A;              ///< (entries)
   N* excess;         ///< (1) how far some pair moved beyond its list's margin [m]; > 0: rebuild and evaluate again
 };
 
-/// The unit vector of column k of a joint's motion subspace: its angular part when it turns, its linear part when it slides.
-template <class N>
+/// Calls `f` with the kind of a joint as a template argument, so that what it asks of the kind costs nothing.
+template <class F>
+void with_kind(JointKind kind, const F& f) {
+  switch (kind) {
+    case JointKind::revolute: return f.template operator()<JointKind::revolute>();
+    case JointKind::prismatic: return f.template operator()<JointKind::prismatic>();
+    case JointKind::translational: return f.template operator()<JointKind::translational>();
+    case JointKind::spherical: return f.template operator()<JointKind::spherical>();
+  }
+}
+
+// Column k of a joint's motion subspace is one unit vector s_k: angular where the joint turns, linear where it slides.
+template <JointKind K, class N>
 Vec3<N> joint_axis(const Link& link, int k) {
-  if (dofs(link.kind) == 1) return broadcast<N>(link.axis);
+  if constexpr (dofs(K) == 1) return broadcast<N>(link.axis);
   const N zero(0.0), one(1.0);
   return {k == 0 ? one : zero, k == 1 ? one : zero, k == 2 ? one : zero};
 }
 /// a · s_k without multiplying by ones and zeros.
-template <class N>
+template <JointKind K, class N>
 N along_axis(const Link& link, int k, const Vec3<N>& a) {
-  if (dofs(link.kind) == 1) return dot(broadcast<N>(link.axis), a);
+  if constexpr (dofs(K) == 1) return dot(broadcast<N>(link.axis), a);
   return k == 0 ? a.x : k == 1 ? a.y : a.z;
 }
 /// a × s_k.
-template <class N>
+template <JointKind K, class N>
 Vec3<N> cross_axis(const Link& link, int k, const Vec3<N>& a) {
-  if (dofs(link.kind) == 1) return cross(a, broadcast<N>(link.axis));
+  if constexpr (dofs(K) == 1) return cross(a, broadcast<N>(link.axis));
   const N zero(0.0);
   if (k == 0) return {zero, a.z, -a.y};
   if (k == 1) return {-a.z, zero, a.x};
   return {a.y, -a.x, zero};
 }
 /// M s_k.
-template <class N>
+template <JointKind K, class N>
 Vec3<N> times_axis(const Link& link, int k, const Mat3<N>& M) {
-  if (dofs(link.kind) == 1) return M * broadcast<N>(link.axis);
+  if constexpr (dofs(K) == 1) return M * broadcast<N>(link.axis);
   return {M.m[0][k], M.m[1][k], M.m[2][k]};
 }
 /// S_kᵀ f.
-template <class N>
+template <JointKind K, class N>
 N project(const Link& link, int k, const Vec6<N>& f) {
-  return along_axis(link, k, slides(link.kind) ? f.l : f.a);
+  return along_axis<K>(link, k, slides(K) ? f.l : f.a);
 }
 
 // Between a link and its parent, leaving out what the joint never does.

@@ -24,7 +24,7 @@ struct TableOf {
 
   static std::size_t scratch_bytes(const ModelView& m) {
     return sizeof(LinkScratch<N>) * m.n_links + sizeof(ContactScratch<N>) * (m.n_pairs + m.n_grounds) +
-           sizeof(CandidateList<N>) * m.n_pairs + sizeof(MotionColumn<N>) * 2 * m.nv + 4 * alignof(N);
+           sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links + 4 * alignof(N);
   }
 
   static StageArgs<N> arguments(const ModelView& m, const GroupStage& s, int lone) {
@@ -37,7 +37,7 @@ struct TableOf {
     StageArgs<N> a;
     a.links = take(static_cast<LinkScratch<N>*>(nullptr), m.n_links);
     a.contacts = take(static_cast<ContactScratch<N>*>(nullptr), m.n_pairs + m.n_grounds);
-    a.columns = take(static_cast<MotionColumn<N>*>(nullptr), 2 * m.nv);
+    a.columns = take(static_cast<JointColumns<N>*>(nullptr), 2 * m.n_links);
     auto* lists = take(static_cast<CandidateList<N>*>(nullptr), m.n_pairs);
     for (int k = 0; k < m.n_pairs; ++k) {
       const GroupStage::List& l = s.lists[k];
@@ -60,8 +60,6 @@ struct TableOf {
     a.g = view(s.g);
     a.force_scale = view(s.force_scale);
     a.mass_diagonal = view(s.mass_diagonal);
-    a.G_q = view(s.G_q);
-    a.C = view(s.C);
     a.A = view(s.A);
     a.excess = view(s.excess);
     return a;
@@ -100,8 +98,8 @@ struct TableOf {
   static void weighted_norm_lanes(const ModelView& m, const GroupStage& s, const LaneRow* a, LaneRow& out) {
     *view(&out) = weighted_norm(m.nv, view(s.weight), view(a));
   }
-  static void factor_lanes(const ModelView& m, const GroupStage& s, const LaneRow& accept) {
-    factor(m.pattern, view(s.A), load_lanes<Arch>(accept.lane), view(s.LU), view(s.work));
+  static void factor_lanes(const ModelView& m, const GroupStage& s, const LaneRow* accept) {
+    factor(m.pattern, view(s.A), view(accept), view(s.LU), view(s.work));
   }
   static void solve_lanes(const ModelView& m, const GroupStage& s, const LaneRow* b, LaneRow* out) {
     solve(m.pattern, view(s.LU), view(b), view(out), view(s.work));

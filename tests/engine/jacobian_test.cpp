@@ -127,40 +127,6 @@ TEST_P(ContactJacobian, ContactsMatchCentralDifferences) {
 INSTANTIATE_TEST_SUITE_P(Laws, ContactJacobian,
                          ::testing::Values(ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear));
 
-/// C = G_v + (c₀/h) M alone: the history r enters through the velocity only, ∂g/∂r = C J / h. With A it fixes G_q.
-TEST_P(ContactJacobian, VelocityBlockMatchesDualNumbers) {
-  for (unsigned seed = 201; seed <= 220; ++seed) {
-    const auto m = compile(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), GetParam()));
-    StageBuffers<double> b(*m);
-    Random random(seed);
-    testing::randomise(b, *m, random, kStep);
-    b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
-    StageBuffers<D> dual(*m);
-    copy_stage(b, dual);
-    for (const kernels::Link& link : m->links) {
-      for (int k = 0; k < kernels::dofs(link.kind); ++k) {
-        dual.r[std::size_t(link.v + k)].epsilon = 1;
-        dual.residual(kC0 / kStep, 1 / kStep);
-        dual.r[std::size_t(link.v + k)].epsilon = 0;
-        // Column k of J: the unit vector, or of the chart of a spherical joint.
-        double column[3] = {k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
-        if (link.kind == kernels::JointKind::spherical) {
-          const double* x = &b.x[std::size_t(link.v)];
-          const kernels::Vec3<double> turn = {x[0], x[1], x[2]};
-          const auto J = right_jacobian(turn, rotation_series(turn));
-          for (int i = 0; i < 3; ++i) column[i] = J.m[i][k];
-        }
-        for (int i = 0; i < m->nv; ++i) {
-          double expected = 0, scale = 1e-300;
-          for (int j = 0; j < kernels::dofs(link.kind); ++j) expected += b.entry(b.C, i, link.v + j) * column[j] / kStep;
-          for (int j = 0; j < m->nv; ++j) scale = std::max(scale, std::abs(b.entry(b.C, i, j)) / kStep);
-          EXPECT_NEAR(dual.g[std::size_t(i)].epsilon, expected, 1e-11 * scale) << "seed " << seed << " row " << i;
-        }
-      }
-    }
-  }
-}
-
 TEST(Jacobian, MassDiagonalIsTheKineticEnergyOfUnitVelocity) {
   // One free cuboid: ½ m and ½ I exactly.
   Scene s;

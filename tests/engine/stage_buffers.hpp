@@ -18,10 +18,10 @@ class StageBuffers {
     const std::size_t nv = std::size_t(m.nv), entries = std::size_t(m.pattern.entries);
     centre.resize(std::size_t(m.nq));
     for (auto* v : {&x, &r, &s, &tau, &v_out, &g, &force_scale, &mass}) v->assign(nv, N(0.0));
-    for (auto* e : {&G_q, &C, &A}) e->assign(entries, N(0.0));
+    A.assign(entries, N(0.0));
     links_.resize(m.links.size());
     contacts_.resize(m.pairs.size() + m.grounds.size());
-    columns_.resize(2 * nv);
+    columns_.resize(2 * m.links.size());
     excess_.assign(1, N(0.0));
     for (const kernels::PairContact& p : m.pairs) {
       points_.emplace_back();
@@ -51,8 +51,6 @@ class StageBuffers {
     a.g = g.data();
     a.force_scale = force_scale.data();
     a.mass_diagonal = mass.data();
-    a.G_q = G_q.data();
-    a.C = C.data();
     a.A = A.data();
     a.excess = excess_.data();
     return a;
@@ -74,13 +72,13 @@ class StageBuffers {
     return at < 0 ? N(0.0) : matrix[std::size_t(at)];
   }
 
-  std::vector<N> centre, x, r, s, tau, v_out, g, force_scale, mass, G_q, C, A;
+  std::vector<N> centre, x, r, s, tau, v_out, g, force_scale, mass, A;
 
  private:
   const CompiledModel& model_;
   std::vector<kernels::LinkScratch<N>> links_;
   std::vector<kernels::ContactScratch<N>> contacts_;
-  std::vector<kernels::MotionColumn<N>> columns_;
+  std::vector<kernels::JointColumns<N>> columns_;
   std::vector<N> excess_;
   std::vector<std::vector<N>> points_, references_;
   std::vector<kernels::CandidateList<N>> lists_;

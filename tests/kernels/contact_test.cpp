@@ -240,18 +240,20 @@ TEST_P(PairDerivative, SumsAboutTheCentreAreTheSums) {
     const SphereMotion<double> motion = sphere_motion(s.c, {s.omega, s.v}, 0.02);
     PairSums<double> general = PairSums<double>::zero(), finished, values;
     SphereSums<double> centred, forces;
-    clear(centred);
-    clear(forces);
-    for (int k = 0; k < 12; ++k) {
-      // Some of them outside, most inside; the state's own point first, then others over the sphere.
-      const Vec3<double> xi = k == 0 ? s.xi : s.c + (0.02 - 1e-3 * random.uniform(-0.3, 1)) * random.direction();
-      accumulate<true>(general, shape, s.law, s.Q, s.c, s.omega, s.v, xi);
-      SpherePoint<double> point;
-      bool touching, slipping;
-      sphere_point<true>(motion, s.law, xi, point, touching, slipping);
-      if (touching) add_point<true>(centred, point, slipping);
-      sphere_point<false>(motion, s.law, xi, point, touching, slipping);
-      if (touching) add_point<false>(forces, point, slipping);
+    clear<true>(centred);
+    clear<false>(forces);
+    SphereChunk<double> chunk;
+    for (int part = 0; part < 2; ++part) {
+      Vec3<double> xi[6];
+      for (int k = 0; k < 6; ++k) {
+        // Some of them outside, most inside; the state's own point first, then others over the sphere.
+        xi[k] = k + part == 0 ? s.xi : s.c + (0.02 - 1e-3 * random.uniform(-0.3, 1)) * random.direction();
+        accumulate<true>(general, shape, s.law, s.Q, s.c, s.omega, s.v, xi[k]);
+      }
+      fill_chunk<true>(motion, s.law, xi, 6, chunk);
+      add_chunk<true>(centred, chunk);
+      fill_chunk<false>(motion, s.law, xi, 6, chunk);
+      add_chunk<false>(forces, chunk);
     }
     finish_sphere<true>(motion, s.omega, centred, finished);
     finish_sphere<false>(motion, s.omega, forces, values);
