@@ -7,7 +7,7 @@
 //
 // The natural test has A⁻¹ g at the new point already: the next step if the factor at hand is used again (a chord step).
 // Such steps leave a fixed share ρ of the residual, about twice what the Newton step before them left of its own, and
-// they cost a third of a Newton step. They are taken where two of them should meet the tolerance. A chord step that fails
+// they cost a third of a Newton step. They are taken where three of them should meet the tolerance. A chord step that fails
 // the natural test is taken back for a Newton step.
 //
 // Whether an evaluation brings the Jacobian along is a guess about cost, never about results: g alone where every lane
@@ -135,7 +135,8 @@ struct Search {
           take_chord(l, test_norm[l]);
         } else {
           accepted |= 1U << l;
-          expected[l] = residual[l] * std::pow(ratio, 6);  // a Newton step squares the ratio, two chord steps follow
+          const double next = ratio * ratio, share = 2 * next;  // a Newton step squares the ratio
+          expected[l] = residual[l] * next * share * share * share;
         }
         last[l] = residual[l];
       } else if (has(chord, l)) {

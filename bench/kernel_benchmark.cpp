@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the parts of a step cost: kernels of one group of eight environments, the rolling ball in contact.
+// Time is that of the whole group; ns/env divides it by eight (or by one where a lane is evaluated alone).
+#include <benchmark/benchmark.h>
+
+#include <vector>
+
+#include "engine/compiled_model.hpp"
+#include "engine/control.hpp"
+#include "engine/detection.hpp"
+#include "engine/group_step.hpp"
+#include "engine/stepper.hpp"
+#include "io/scene_reader.hpp"
+#include "kernels/isa.hpp"
+
+namespace tangere {
+namespace {
+
+using kernels::kGroup;
+using kernels::LaneRow;
+
+/// A group in the middle of the run, at the predicted pose of its next step.
+class Group {
+ public:
+  Group() : model_(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene), work_(model_.compiled()) {
+    Batch batch(model_, kGroup, 1);
+    Stepper stepper(model_);
+    const ControlProgram program(model_, model_.timestep(), 1);
+    const auto nu = std::size_t(model_.nu());
+    std::vector<double> u(kGroup * nu);
+    for (std::int64_t t = 0; t < 200; ++t) {
+      for (std::size_t e = 0; e < kGroup; ++e) program.evaluate(t, std::int64_t(e), {&u[e * nu], nu});
+      stepper.step(batch, u);
+    }
+    const CompiledModel& m = model_.compiled();
+    block_.assign(batch.block(0), batch.block(0) + std::size_t(m.layout.rows) * kernels::kBlock);
+    const double h = stepper.timestep();
+    for (int l = 0; l < kGroup; ++l) {
+      const auto at = [&](int row) { return block_[std::size_t(row * kernels::kBlock + l)]; };
+      for (int i = 0; i < m.nq; ++i) work_.stage.centre[i][l] = at(m.layout.q + i);
+      for (int i = 0; i < m.nv; ++i) {
+        const double v = at(m.layout.v + i);
+        work_.stage.x[i][l] = h * v;
+        work_.stage.s[i][l] = -v;
+        work_.stage.r[i][l] = work_.stage.tau[i][l] = 0;
+      }
+      work_.stage.c0_over_h[l] = work_.stage.inverse_h[l] = 1 / h;
+    }
+    work_.stage.block = block_.data();
+    work_.stage.group = 0;
+    table().kinematics(view(), work_.stage, work_.poses);
+    find_candidates(m, table(), work_, kAllLanes);
+    lists_to_rows(table(), work_, kAllLanes);
+    table().evaluate(view(), work_.stage, -1);
+    table().factor(view(), work_.stage, nullptr);
+  }
+
+  static const kernels::KernelTable& table() { return kernels::active_kernels(); }
+  [[nodiscard]] const kernels::ModelView& view() const { return model_.compiled().view; }
+  [[nodiscard]] const CompiledModel& compiled() const { return model_.compiled(); }
+  Workspace& work() { return work_; }
+
+ private:
+  Model model_;
+  Workspace work_;
+  AlignedVector<double> block_;
+};
+
+template <class F>
+void run(benchmark::State& state, double environments, const F& f) {
+  Group group;
+  for (auto _ : state) {
+    f(group);
+    benchmark::ClobberMemory();
+  }
+  const auto& list = group.work().lists[0];
+  state.counters["ns/env"] = benchmark::Counter(double(state.iterations()) * environments * 1e-9,
+                                                benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["candidates"] = environments == 1 ? list.own_count[0] : list.count;
+  state.SetLabel(kernels::active_isa_name());
+}
+
+void BM_Kinematics(benchmark::State& s) {
+  run(s, kGroup, [](Group& g) { g.table().kinematics(g.view(), g.work().stage, g.work().poses); });
+}
+void BM_FindCandidates(benchmark::State& s) {
+  run(s, kGroup, [](Group& g) { find_candidates(g.compiled(), g.table(), g.work(), kAllLanes); });
+}
+void BM_ListsToRows(benchmark::State& s) {
+  run(s, kGroup, [](Group& g) {
+    g.work().in_rows = 0;
+    lists_to_rows(g.table(), g.work(), kAllLanes);
+  });
+}
+void BM_Residual(benchmark::State& s) {
+  run(s, kGroup, [](Group& g) { g.table().residual(g.view(), g.work().stage, -1); });
+}
+void BM_ResidualOfOneLane(benchmark::State& s) {
+  run(s, 1, [](Group& g) { g.table().residual(g.view(), g.work().stage, 0); });
+}
+void BM_Evaluate(benchmark::State& s) {
+  run(s, kGroup, [](Group& g) { g.table().evaluate(g.view(), g.work().stage, -1); });
+}
+void BM_EvaluateOneLane(benchmark::State& s) {
+  run(s, 1, [](Group& g) { g.table().evaluate(g.view(), g.work().stage, 0); });
+}
+/// Without contact: the difference to the above is what contact costs.
+void BM_EvaluateWithoutCandidates(benchmark::State& s) {
+  run(s, kGroup, [](Group& g) {
+    g.work().lists[0].count = 0;
+    g.table().evaluate(g.view(), g.work().stage, -1);
+  });
+}
+void BM_Factor(benchmark::State& s) {
+  run(s, kGroup, [](Group& g) { g.table().factor(g.view(), g.work().stage, nullptr); });
+}
+void BM_Solve(benchmark::State& s) {
+  run(s, kGroup, [](Group& g) { g.table().solve(g.view(), g.work().stage, g.work().stage.g, g.work().test); });
+}
+void BM_SolveWatched(benchmark::State& s) {
+  run(s, kGroup, [](Group& g) {
+    g.table().solve_watched(g.view(), g.work().stage, g.work().stage.g, g.work().test, &g.work().sound);
+  });
+}
+BENCHMARK(BM_Kinematics);
+BENCHMARK(BM_FindCandidates);
+BENCHMARK(BM_ListsToRows);
+BENCHMARK(BM_Residual);
+BENCHMARK(BM_ResidualOfOneLane);
+BENCHMARK(BM_Evaluate);
+BENCHMARK(BM_EvaluateOneLane);
+BENCHMARK(BM_EvaluateWithoutCandidates);
+BENCHMARK(BM_Factor);
+BENCHMARK(BM_Solve);
+BENCHMARK(BM_SolveWatched);
+
+}  // namespace
+}  // namespace tangere
