@@ -48,11 +48,11 @@ class Group {
     }
     work_.stage.block = block_.data();
     work_.stage.group = 0;
-    table().kinematics(view(), work_.stage, work_.poses);
+    table().group.kinematics(view(), work_.stage, work_.poses);
     find_candidates(m, table(), work_, kAllLanes);
     lists_to_rows(table(), work_, kAllLanes);
-    table().evaluate(view(), work_.stage, -1);
-    table().factor(view(), work_.stage, nullptr);
+    table().group.evaluate(view(), work_.stage, -1);
+    table().group.factor(view(), work_.stage, nullptr);
   }
 
   static const kernels::KernelTable& table() { return kernels::active_kernels(); }
@@ -81,7 +81,7 @@ void run(benchmark::State& state, double environments, const F& f) {
 }
 
 void BM_Kinematics(benchmark::State& s) {
-  run(s, kGroup, [](Group& g) { g.table().kinematics(g.view(), g.work().stage, g.work().poses); });
+  run(s, kGroup, [](Group& g) { g.table().group.kinematics(g.view(), g.work().stage, g.work().poses); });
 }
 void BM_FindCandidates(benchmark::State& s) {
   run(s, kGroup, [](Group& g) { find_candidates(g.compiled(), g.table(), g.work(), kAllLanes); });
@@ -93,33 +93,33 @@ void BM_ListsToRows(benchmark::State& s) {
   });
 }
 void BM_Residual(benchmark::State& s) {
-  run(s, kGroup, [](Group& g) { g.table().residual(g.view(), g.work().stage, -1); });
+  run(s, kGroup, [](Group& g) { g.table().group.residual(g.view(), g.work().stage, -1); });
 }
 void BM_ResidualOfOneLane(benchmark::State& s) {
-  run(s, 1, [](Group& g) { g.table().residual(g.view(), g.work().stage, 0); });
+  run(s, 1, [](Group& g) { g.table().group.residual(g.view(), g.work().stage, 0); });
 }
 void BM_Evaluate(benchmark::State& s) {
-  run(s, kGroup, [](Group& g) { g.table().evaluate(g.view(), g.work().stage, -1); });
+  run(s, kGroup, [](Group& g) { g.table().group.evaluate(g.view(), g.work().stage, -1); });
 }
 void BM_EvaluateOneLane(benchmark::State& s) {
-  run(s, 1, [](Group& g) { g.table().evaluate(g.view(), g.work().stage, 0); });
+  run(s, 1, [](Group& g) { g.table().group.evaluate(g.view(), g.work().stage, 0); });
 }
 /// Without contact: the difference to the above is what contact costs.
 void BM_EvaluateWithoutCandidates(benchmark::State& s) {
   run(s, kGroup, [](Group& g) {
     g.work().lists[0].count = 0;
-    g.table().evaluate(g.view(), g.work().stage, -1);
+    g.table().group.evaluate(g.view(), g.work().stage, -1);
   });
 }
 void BM_Factor(benchmark::State& s) {
-  run(s, kGroup, [](Group& g) { g.table().factor(g.view(), g.work().stage, nullptr); });
+  run(s, kGroup, [](Group& g) { g.table().group.factor(g.view(), g.work().stage, nullptr); });
 }
 void BM_Solve(benchmark::State& s) {
-  run(s, kGroup, [](Group& g) { g.table().solve(g.view(), g.work().stage, g.work().stage.g, g.work().test); });
+  run(s, kGroup, [](Group& g) { g.table().group.solve(g.view(), g.work().stage, g.work().stage.g, g.work().test); });
 }
 void BM_SolveWatched(benchmark::State& s) {
   run(s, kGroup, [](Group& g) {
-    g.table().solve_watched(g.view(), g.work().stage, g.work().stage.g, g.work().test, &g.work().sound);
+    g.table().group.solve_watched(g.view(), g.work().stage, g.work().stage.g, g.work().test, &g.work().sound);
   });
 }
 BENCHMARK(BM_Kinematics);

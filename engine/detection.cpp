@@ -4,23 +4,24 @@
 
 namespace tangere {
 
-using kernels::kGroup;
-using kernels::LaneRow;
 
-void clear_candidates(Workspace& w) {
+template <int L>
+void clear_candidates(BasicWorkspace<L>& w) {
   w.in_rows = 0;
-  for (kernels::GroupStage::List& list : w.lists) {
+  for (auto& list : w.lists) {
     list.count = 0;
     for (int& count : list.own_count) count = 0;
   }
 }
 
-void find_candidates(const CompiledModel& model, const kernels::KernelTable& table, Workspace& w, LaneBits lanes) {
+template <int L>
+void find_candidates(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                     LaneBits lanes) {
   w.in_rows &= ~lanes;
   for (std::size_t k = 0; k < model.pairs.size(); ++k) {
-    kernels::GroupStage::List& list = w.lists[k];
-    const LaneRow* row = w.poses + 12 * k;
-    for (int l = 0; l < kGroup; ++l) {
+    auto& list = w.lists[k];
+    const kernels::Row<L>* row = w.poses + 12 * k;
+    for (int l = 0; l < L; ++l) {
       if (!has(lanes, l)) continue;
       double pose[12];
       for (int i = 0; i < 12; ++i) list.reference[i][l] = pose[i] = row[i][l];
@@ -35,5 +36,10 @@ void lists_to_rows(const kernels::KernelTable& table, Workspace& w, LaneBits lan
   for (kernels::GroupStage::List& list : w.lists) table.transpose_list(list);
   w.in_rows = kAllLanes;
 }
+
+template void clear_candidates(Workspace&);
+template void clear_candidates(SingleWorkspace&);
+template void find_candidates(const CompiledModel&, const kernels::KernelTable&, Workspace&, LaneBits);
+template void find_candidates(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&, LaneBits);
 
 }  // namespace tangere

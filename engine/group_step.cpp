@@ -10,8 +10,7 @@
 namespace tangere {
 
 using kernels::JointKind;
-using kernels::kGroup;
-using kernels::LaneRow;
+using kernels::Row;
 using kernels::Quat;
 using kernels::Vec3;
 
@@ -25,15 +24,18 @@ const double kGamma = 1 - std::sqrt(0.5);
 const double kEta = (1 - kGamma) / kGamma;
 const double kKappa = kEta / kGamma;
 
-Quat<double> quat_at(const LaneRow* q, int lane) { return {q[0][lane], q[1][lane], q[2][lane], q[3][lane]}; }
+template <int L>
+Quat<double> quat_at(const Row<L>* q, int lane) { return {q[0][lane], q[1][lane], q[2][lane], q[3][lane]}; }
 
-void fill(LaneRow& row, double value) {
+template <int L>
+void fill(Row<L>& row, double value) {
   for (double& x : row.lane) x = value;
 }
 
 }  // namespace
 
-LaneBits GroupStep::solve_one_stage(const kernels::KernelTable& table, Workspace& w, LaneBits lanes, double c0,
+template <int L>
+LaneBits GroupStep::solve_one_stage(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes, double c0,
                                     double h, bool inside_split, NewtonReport& report) const {
   fill(w.stage.c0_over_h, c0 / h);
   fill(w.stage.inverse_h, 1 / h);
@@ -43,9 +45,10 @@ LaneBits GroupStep::solve_one_stage(const kernels::KernelTable& table, Workspace
 }
 
 /// r = (q₀ ⊖ q₁)/2 for BDF2; q₁ is the newest state, in q0, and q₀ the one before it.
-void GroupStep::set_history_bdf2(Workspace& w) const {
+template <int L>
+void GroupStep::set_history_bdf2(BasicWorkspace<L>& w) const {
   for (const kernels::Link& link : model_.links) {
-    for (int l = 0; l < kGroup; ++l) {
+    for (int l = 0; l < L; ++l) {
       if (link.kind == JointKind::spherical) {
         const Vec3<double> x = rotation_log(conjugate(quat_at(w.q0 + link.q, l)) * quat_at(w.q_before + link.q, l));
         w.stage.r[link.v][l] = 0.5 * x.x;
@@ -59,15 +62,16 @@ void GroupStep::set_history_bdf2(Workspace& w) const {
   }
 }
 
-LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, Workspace& w, LaneBits lanes, double h,
+template <int L>
+LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes, double h,
                         bool inside_split, NewtonReport& report) const {
   const int n = model_.nv;
   for (int i = 0; i < model_.nq; ++i) w.stage.centre[i] = w.q0[i];
   const auto each = [&](auto&& f) {
     for (int i = 0; i < n; ++i)
-      for (int l = 0; l < kGroup; ++l) f(i, l);
+      for (int l = 0; l < L; ++l) f(i, l);
   };
-  kernels::GroupStage& s = w.stage;
+  kernels::Stage<L>& s = w.stage;
   LaneBits resolved = 0;
   switch (scheme) {
     case Integrator::bdf1:
@@ -110,19 +114,20 @@ LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, Wo
 }
 
 /// q1 = centre ⊕ x, v1 = v. A joint that turned by π or more is not resolved: its chart ends there.
-void GroupStep::finish(Workspace& w, LaneBits lanes, double h, LaneBits& resolved, NewtonReport& report) const {
-  for (int l = 0; l < kGroup; ++l) {
+template <int L>
+void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits& resolved, NewtonReport& report) const {
+  for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
     for (int i = 0; i < model_.nv; ++i) w.v1[i][l] = w.stage.v[i][l];
     for (const kernels::Link& link : model_.links) {
-      const LaneRow* x = w.stage.x + link.v;
+      const Row<L>* x = w.stage.x + link.v;
       if (link.kind != JointKind::spherical) {
         for (int k = 0; k < kernels::dofs(link.kind); ++k)
           w.q1[link.q + k][l] = w.stage.centre[link.q + k][l] + x[k][l];
         continue;
       }
       const Vec3<double> turn = {x[0][l], x[1][l], x[2][l]};
-      const LaneRow* v = w.stage.v + link.v;
+      const Row<L>* v = w.stage.v + link.v;
       const Vec3<double> rate = {v[0][l], v[1][l], v[2][l]};
       if (!(dot(turn, turn) < M_PI * M_PI) || !(dot(rate, rate) * h * h < M_PI * M_PI)) {
         resolved &= ~(1U << l);
@@ -135,7 +140,8 @@ void GroupStep::finish(Workspace& w, LaneBits lanes, double h, LaneBits& resolve
 }
 
 /// Two half steps of one lane from q0, v0, split again where needed. The other lanes of the group wait.
-bool GroupStep::split(const kernels::KernelTable& table, Workspace& w, int lane, double h, int depth,
+template <int L>
+bool GroupStep::split(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane, double h, int depth,
                       NewtonReport& report) const {
   if (depth > kDeepestSplit) return false;
   // Order 2 must survive inside a BDF2 step, and so must its history: SDIRK2 there, not BDF1.
@@ -153,12 +159,13 @@ bool GroupStep::split(const kernels::KernelTable& table, Workspace& w, int lane,
   return true;
 }
 
-void GroupStep::advance(const kernels::KernelTable& table, Workspace& w, LaneBits lanes, LaneBits history,
+template <int L>
+void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes, LaneBits history,
                         NewtonReport& report) const {
   const double h = settings_.timestep;
   LaneBits resolved = 0;
   const auto commit = [&](LaneBits done) {
-    for (int l = 0; l < kGroup; ++l) {
+    for (int l = 0; l < L; ++l) {
       if (!has(done, l)) continue;
       for (int i = 0; i < model_.nq; ++i) w.q0[i][l] = w.q1[i][l];
       for (int i = 0; i < model_.nv; ++i) w.v0[i][l] = w.v1[i][l];
@@ -172,7 +179,7 @@ void GroupStep::advance(const kernels::KernelTable& table, Workspace& w, LaneBit
   } else {
     commit(run(settings_.integrator, table, w, lanes, h, false, report));
   }
-  for (int l = 0; l < kGroup; ++l) {
+  for (int l = 0; l < L; ++l) {
     if (!has(lanes & ~resolved, l)) continue;
     const StepStatus first = report.status[l];
     if (split(table, w, l, h, 1, report)) {
@@ -182,15 +189,18 @@ void GroupStep::advance(const kernels::KernelTable& table, Workspace& w, LaneBit
     }
   }
   // The next step's history is log(R₁ᵀR₀): a turn of π or more in this one would be read as its complement.
-  for (int l = 0; l < kGroup; ++l) {
+  for (int l = 0; l < L; ++l) {
     if (!has(lanes, l) || failed(report.status[l])) continue;
     for (const kernels::Link& link : model_.links) {
       if (link.kind != JointKind::spherical) continue;
-      const LaneRow* v = w.v0 + link.v;
+      const Row<L>* v = w.v0 + link.v;
       const Vec3<double> rate = {v[0][l], v[1][l], v[2][l]};
       if (!(dot(rate, rate) * h * h < M_PI * M_PI)) report.status[l] = StepStatus::rotation;
     }
   }
 }
+
+template void GroupStep::advance(const kernels::KernelTable&, Workspace&, LaneBits, LaneBits, NewtonReport&) const;
+template void GroupStep::advance(const kernels::KernelTable&, SingleWorkspace&, LaneBits, LaneBits, NewtonReport&) const;
 
 }  // namespace tangere

@@ -27,18 +27,24 @@ class GroupStep {
 
   /// Advances `lanes` by one step; `history`: those with a valid state one step before (BDF2). Afterwards q0, v0 hold
   /// the new state of every lane whose status did not fail; rows of other lanes are untouched.
-  void advance(const kernels::KernelTable& table, Workspace& w, LaneBits lanes, LaneBits history,
+  template <int L>
+  void advance(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes, LaneBits history,
                NewtonReport& report) const;
 
  private:
-  LaneBits run(Integrator scheme, const kernels::KernelTable& table, Workspace& w, LaneBits lanes, double h,
+  template <int L>
+  LaneBits run(Integrator scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes, double h,
                bool inside_split, NewtonReport& report) const;
-  LaneBits solve_one_stage(const kernels::KernelTable& table, Workspace& w, LaneBits lanes, double c0, double h,
+  template <int L>
+  LaneBits solve_one_stage(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes, double c0, double h,
                            bool inside_split, NewtonReport& report) const;
-  bool split(const kernels::KernelTable& table, Workspace& w, int lane, double h, int depth,
+  template <int L>
+  bool split(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane, double h, int depth,
              NewtonReport& report) const;
-  void finish(Workspace& w, LaneBits lanes, double h, LaneBits& resolved, NewtonReport& report) const;
-  void set_history_bdf2(Workspace& w) const;
+  template <int L>
+  void finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits& resolved, NewtonReport& report) const;
+  template <int L>
+  void set_history_bdf2(BasicWorkspace<L>& w) const;
 
   const CompiledModel& model_;
   StepSettings settings_;

@@ -20,30 +20,31 @@
 
 namespace tangere {
 
-using kernels::kGroup;
-using kernels::LaneRow;
 
 namespace {
 
+template <int L>
 struct Search {
+  using LaneRow = kernels::Row<L>;
   const CompiledModel& model;
   const kernels::KernelTable& table;
-  Workspace& w;
+  BasicWorkspace<L>& w;
   const NewtonLimits& limits;
   NewtonReport& report;
   double gravity;
   LaneBits searching;
   LaneBits on_trial = 0;        ///< lanes whose x is a trial along delta
   LaneBits use_pivoted = 0;     ///< lanes whose factor at hand is the pivoted one
-  std::array<double, kGroup> alpha{}, delta_norm{};
-  std::array<double, kGroup> last{};      ///< scaled residual of the last accepted point
-  std::array<double, kGroup> expected{};  ///< what should be left once the next point has had its chord step
+  std::array<double, L> alpha{}, delta_norm{};
+  std::array<double, L> last{};      ///< scaled residual of the last accepted point
+  std::array<double, L> expected{};  ///< what should be left once the next point has had its chord step
   LaneBits chord = 0;                     ///< lanes whose trial is a chord step
   LaneBits no_chord = 0;                  ///< lanes that had one fail
   bool with_jacobian = true;              ///< the last evaluation
-  std::array<int, kGroup> halvings{}, directions{};
+  std::array<int, L> halvings{}, directions{};
 
   [[nodiscard]] int n() const { return model.nv; }
+  [[nodiscard]] const kernels::StageKernels<L>& kernel() const { return table.stage<L>(); }
 
   /// The only searching lane, or -1.
   [[nodiscard]] int lone() const {
@@ -52,37 +53,38 @@ struct Search {
 
   /// Poses at x; lists of lanes that have none yet or outran theirs.
   void locate(bool first) {
-    table.kinematics(model.view, w.stage, w.poses);
+    kernel().kinematics(model.view, w.stage, w.poses);
     LaneBits stale = first ? searching : 0;
-    for (int l = 0; l < kGroup; ++l)
+    for (int l = 0; l < L; ++l)
       if (has(searching, l) && w.stage.excess[0][l] > 0) stale |= 1U << l;
     if (stale != 0) find_candidates(model, table, w, stale);
-    if (lone() < 0) lists_to_rows(table, w, searching);
+    if constexpr (L > 1)
+      if (lone() < 0) lists_to_rows(table, w, searching);
   }
 
   /// The pass that is due: g alone where every lane should be done, else everything.
   void evaluate(bool first) {
     locate(first);
     with_jacobian = first;
-    for (int l = 0; l < kGroup; ++l)
+    for (int l = 0; l < L; ++l)
       if (has(searching, l) && !(expected[l] <= limits.tolerance)) with_jacobian = true;
-    (with_jacobian ? table.evaluate : table.residual)(model.view, w.stage, lone());
+    (with_jacobian ? kernel().evaluate : kernel().residual)(model.view, w.stage, lone());
     if (first) {
-      table.set_weights(model.view, w.stage);
+      kernel().set_weights(model.view, w.stage);
       set_floor(searching);
     }
   }
 
-  void set_floor(LaneBits lanes) { table.set_floor(model.view, w.stage, model.unknown_scale.data(), row_of(lanes)); }
+  void set_floor(LaneBits lanes) { kernel().set_floor(model.view, w.stage, model.unknown_scale.data(), row_of(lanes)); }
 
   static LaneRow row_of(LaneBits lanes) {
     LaneRow row;
-    for (int l = 0; l < kGroup; ++l) row[l] = has(lanes, l) ? 1 : 0;
+    for (int l = 0; l < L; ++l) row[l] = has(lanes, l) ? 1 : 0;
     return row;
   }
 
-  void scaled_residuals(LaneRow& out) const { table.scaled_residual(model.view, w.stage, gravity, out); }
-  void weighted_norms(const LaneRow* a, LaneRow& out) const { table.weighted_norm(model.view, w.stage, a, out); }
+  void scaled_residuals(LaneRow& out) const { kernel().scaled_residual(model.view, w.stage, gravity, out); }
+  void weighted_norms(const LaneRow* a, LaneRow& out) const { kernel().weighted_norm(model.view, w.stage, a, out); }
 
   void stop(int l, StepStatus status) {
     report.status[l] = status;
@@ -109,13 +111,13 @@ struct Search {
     LaneRow residual, test_norm{};
     scaled_residuals(residual);
     if (on_trial != 0) {
-      table.solve(model.view, w.stage, w.stage.g, w.test);
-      for (int l = 0; l < kGroup; ++l)
+      kernel().solve(model.view, w.stage, w.stage.g, w.test);
+      for (int l = 0; l < L; ++l)
         if (has(on_trial & use_pivoted, l)) pivoted_solve(l, w.stage.g, w.test);
       weighted_norms(w.test, test_norm);
     }
     LaneBits accepted = 0;
-    for (int l = 0; l < kGroup; ++l) {
+    for (int l = 0; l < L; ++l) {
       if (!has(searching, l)) continue;
       ++report.iterations[l];
       if (residual[l] <= limits.tolerance) {
@@ -177,12 +179,12 @@ struct Search {
 
   /// New directions at the accepted points, and the full step along each as the next trial.
   void new_directions(LaneBits accepted) {
-    if (!with_jacobian) table.evaluate(model.view, w.stage, lone());
+    if (!with_jacobian) kernel().evaluate(model.view, w.stage, lone());
     set_floor(accepted);
     const LaneRow accept = row_of(accepted);
-    table.factor(model.view, w.stage, (searching & ~accepted) == 0 ? nullptr : &accept);
-    table.solve_watched(model.view, w.stage, w.stage.g, w.test, &w.sound);
-    for (int l = 0; l < kGroup; ++l) {
+    kernel().factor(model.view, w.stage, (searching & ~accepted) == 0 ? nullptr : &accept);
+    kernel().solve_watched(model.view, w.stage, w.stage.g, w.test, &w.sound);
+    for (int l = 0; l < L; ++l) {
       if (!has(accepted, l)) continue;
       use_pivoted &= ~(1U << l);
       if (w.sound[l] > 0) continue;
@@ -192,7 +194,7 @@ struct Search {
     }
     LaneRow norm;
     weighted_norms(w.test, norm);
-    for (int l = 0; l < kGroup; ++l) {
+    for (int l = 0; l < L; ++l) {
       if (!has(accepted, l)) continue;
       if (!std::isfinite(norm[l])) {
         stop(l, StepStatus::singular);
@@ -220,9 +222,10 @@ double magnitude(const kernels::Vec3<double>& a) { return std::sqrt(dot(a, a)); 
 
 }  // namespace
 
-LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table, Workspace& w, LaneBits lanes,
+template <int L>
+LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                      const NewtonLimits& limits, NewtonReport& report) {
-  Search s{model, table, w, limits, report, magnitude(model.view.gravity), lanes};
+  Search<L> s{model, table, w, limits, report, magnitude(model.view.gravity), lanes};
   bool first = true;
   while (s.searching != 0) {
     s.evaluate(first);
@@ -231,28 +234,37 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
     if (accepted != 0) s.new_directions(accepted);
   }
   LaneBits converged = 0;
-  for (int l = 0; l < kGroup; ++l)
+  for (int l = 0; l < L; ++l)
     if (has(lanes, l) && report.status[l] == StepStatus::converged) converged |= 1U << l;
   return converged;
 }
 
-LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table, Workspace& w, LaneBits lanes,
+template <int L>
+LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                      NewtonReport& report) {
   static constexpr NewtonLimits kOnce{0, 1, 0};
-  Search s{model, table, w, kOnce, report, magnitude(model.view.gravity), lanes};
+  Search<L> s{model, table, w, kOnce, report, magnitude(model.view.gravity), lanes};
   s.evaluate(true);
-  LaneRow residual;
+  kernels::Row<L> residual;
   s.scaled_residuals(residual);
-  for (int l = 0; l < kGroup; ++l) {
+  for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
     ++report.iterations[l];
     report.residual[l] = residual[l];
     if (!std::isfinite(residual[l])) s.stop(l, StepStatus::non_finite);
   }
   s.new_directions(s.searching);
-  for (int l = 0; l < kGroup; ++l)
+  for (int l = 0; l < L; ++l)
     if (has(s.searching, l)) report.status[l] = StepStatus::converged;
   return s.searching;
 }
+
+template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, Workspace&, LaneBits,
+                              const NewtonLimits&, NewtonReport&);
+template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&, LaneBits,
+                              const NewtonLimits&, NewtonReport&);
+template LaneBits linear_step(const CompiledModel&, const kernels::KernelTable&, Workspace&, LaneBits, NewtonReport&);
+template LaneBits linear_step(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&, LaneBits,
+                              NewtonReport&);
 
 }  // namespace tangere

@@ -11,7 +11,6 @@ namespace tangere {
 
 using kernels::kBlock;
 using kernels::kGroup;
-using kernels::LaneRow;
 
 namespace {
 
@@ -27,26 +26,76 @@ StepSettings settings_of(const Model& model, const StepperOptions& o) {
 
 }  // namespace
 
+/// Lanes of one group of a block: environment `first` + l in lane l.
+struct GroupOfBlock {
+  double* rows;  ///< row r of the block's lane l: rows[r * kBlock + l]
+  int first;
+  LaneBits live = 0, history = 0;
+};
+
 struct Stepper::Impl {
   Model model;
   StepSettings settings;
   GroupStep step;
   Workspace work;
+  SingleWorkspace single;
 
   Impl(const Model& m, const StepSettings& s)
-      : model(m), settings(s), step(model.compiled(), settings), work(model.compiled()) {}
+      : model(m),
+        settings(s),
+        step(model.compiled(), settings),
+        work(model.compiled()),
+        single(model.compiled()) {}
 
   /// Motor forces of one lane. Returns false when a control is not finite.
-  bool set_forces(int lane, std::span<const double> u) {
+  template <int L>
+  bool set_forces(BasicWorkspace<L>& w, int lane, std::span<const double> u) const {
     const CompiledModel& m = model.compiled();
-    for (int i = 0; i < m.nv; ++i) work.stage.tau[i][lane] = 0;
+    for (int i = 0; i < m.nv; ++i) w.stage.tau[i][lane] = 0;
     for (int k = 0; k < m.nu; ++k) {
       if (!std::isfinite(u[k])) return false;
       const CompiledMotor& motor = m.motors[k];
       const double clipped = std::clamp(u[k], -1.0, 1.0);
-      work.stage.tau[motor.dof][lane] += motor.low + (clipped + 1) * (0.5 * (motor.high - motor.low));
+      w.stage.tau[motor.dof][lane] += motor.low + (clipped + 1) * (0.5 * (motor.high - motor.low));
     }
     return true;
+  }
+
+  /// Steps the live lanes of a group; `lane`: which of them stands in lane 0 of a workspace of one.
+  template <int L>
+  void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane) const {
+    const CompiledModel& m = model.compiled();
+    const auto gather = [&](kernels::Row<L>* to, int row, int count) {
+      for (int i = 0; i < count; ++i)
+        for (int l = 0; l < L; ++l) to[i][l] = g.rows[(row + i) * kBlock + lane + l];
+    };
+    gather(w.q0, m.layout.q, m.nq);
+    gather(w.v0, m.layout.v, m.nv);
+    gather(w.q_before, m.layout.previous_q, m.nq);
+    gather(w.v_before, m.layout.previous_v, m.nv);
+    w.stage.block = g.rows + lane;
+    w.stage.group = 0;
+    const LaneBits live = g.live >> lane;
+    NewtonReport report;
+    step.advance(kernels::active_kernels(), w, live, g.history >> lane, report);
+    for (int l = 0; l < L; ++l) {
+      if (!has(live, l)) continue;
+      const std::size_t e = std::size_t(g.first + lane + l);
+      batch.status_[e] = report.status[l];
+      batch.iterations_[e] = report.iterations[l];
+      batch.residual_[e] = report.residual[l];
+      if (failed(report.status[l])) continue;
+      batch.has_history_[e] = 1;
+      const auto shift = [&](int now, int before, const kernels::Row<L>* from, int count) {
+        for (int i = 0; i < count; ++i) {
+          double* row = g.rows + i * kBlock + lane + l;
+          row[before * kBlock] = row[now * kBlock];
+          row[now * kBlock] = from[i][l];
+        }
+      };
+      shift(m.layout.q, m.layout.previous_q, w.q0, m.nq);
+      shift(m.layout.v, m.layout.previous_v, w.v0, m.nv);
+    }
   }
 };
 
@@ -65,53 +114,31 @@ void Stepper::step(Batch& batch, std::span<const double> controls) {
 }
 
 void Stepper::step_block(Batch& batch, int block, std::span<const double> controls) {
-  const CompiledModel& m = impl_->model.compiled();
-  Workspace& w = impl_->work;
-  double* data = batch.block(block);
+  const std::size_t nu = std::size_t(impl_->model.compiled().nu);
   for (int group = 0; group < kBlock / kGroup; ++group) {
-    const int first = block * kBlock + group * kGroup;
-    NewtonReport report;
-    LaneBits live = 0, history = 0;
+    GroupOfBlock g{batch.block(block) + group * kGroup, block * kBlock + group * kGroup};
     for (int l = 0; l < kGroup; ++l) {
-      const std::size_t lane = std::size_t(first + l);
-      if (first + l >= batch.environments() || failed(batch.status_[lane])) continue;
-      if (!impl_->set_forces(l, controls.subspan(lane * std::size_t(m.nu), std::size_t(m.nu)))) {
-        batch.status_[lane] = StepStatus::non_finite;
-        batch.iterations_[lane] = 0;
-        continue;
-      }
-      live |= 1U << l;
-      if (batch.has_history_[lane] != 0) history |= 1U << l;
+      const std::size_t e = std::size_t(g.first + l);
+      if (g.first + l >= batch.environments() || failed(batch.status_[e])) continue;
+      g.live |= 1U << l;
+      if (batch.has_history_[e] != 0) g.history |= 1U << l;
     }
-    if (live == 0) continue;
-    const auto rows = [&](int row) { return reinterpret_cast<LaneRow*>(data + row * kBlock + group * kGroup); };
-    constexpr int kStride = kBlock / kGroup;  // LaneRows between consecutive rows of a block
-    const auto gather = [&](LaneRow* to, int row, int count) {
-      for (int i = 0; i < count; ++i) to[i] = rows(row)[i * kStride];
-    };
-    gather(w.q0, m.layout.q, m.nq);
-    gather(w.v0, m.layout.v, m.nv);
-    gather(w.q_before, m.layout.previous_q, m.nq);
-    gather(w.v_before, m.layout.previous_v, m.nv);
-    w.stage.block = data;
-    w.stage.group = group;
-    impl_->step.advance(kernels::active_kernels(), w, live, history, report);
+    // An environment on its own goes through kernels of one lane: the same bits, a third of the time.
+    const bool alone = g.live != 0 && (g.live & (g.live - 1)) == 0;
     for (int l = 0; l < kGroup; ++l) {
-      if (!has(live, l)) continue;
-      const std::size_t lane = std::size_t(first + l);
-      batch.status_[lane] = report.status[l];
-      batch.iterations_[lane] = report.iterations[l];
-      batch.residual_[lane] = report.residual[l];
-      if (failed(report.status[l])) continue;
-      batch.has_history_[lane] = 1;
-      const auto shift = [&](int now, int before, const LaneRow* from, int count) {
-        for (int i = 0; i < count; ++i) {
-          rows(before)[i * kStride][l] = rows(now)[i * kStride][l];
-          rows(now)[i * kStride][l] = from[i][l];
-        }
-      };
-      shift(m.layout.q, m.layout.previous_q, w.q0, m.nq);
-      shift(m.layout.v, m.layout.previous_v, w.v0, m.nv);
+      if (!has(g.live, l)) continue;
+      const std::size_t e = std::size_t(g.first + l);
+      const std::span<const double> u = controls.subspan(e * nu, nu);
+      if (alone ? impl_->set_forces(impl_->single, 0, u) : impl_->set_forces(impl_->work, l, u)) continue;
+      batch.status_[e] = StepStatus::non_finite;
+      batch.iterations_[e] = 0;
+      g.live &= ~(1U << l);
+    }
+    if (g.live == 0) continue;
+    if (alone) {
+      impl_->step_lanes(batch, impl_->single, g, __builtin_ctz(g.live));
+    } else {
+      impl_->step_lanes(batch, impl_->work, g, 0);
     }
   }
 }

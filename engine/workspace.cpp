@@ -7,18 +7,20 @@
 namespace tangere {
 
 using kernels::kGroup;
-using kernels::LaneRow;
+using kernels::Row;
 
 namespace {
 
 /// Walks over all rows, counting them (base = nullptr) or handing them out.
-std::size_t lay_out(const CompiledModel& m, Workspace& w, LaneRow* base) {
+template <int L>
+std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) {
+  using LaneRow = Row<L>;
   std::size_t used = 0;
   const auto rows = [&](LaneRow*& p, int count) {
     p = base == nullptr ? nullptr : base + used;
     used += std::size_t(count);
   };
-  kernels::GroupStage& s = w.stage;
+  kernels::Stage<L>& s = w.stage;
   rows(s.centre, m.nq);
   for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.v, &s.g, &s.force_scale, &s.mass_diagonal, &s.weight, &s.inverse_weight})
     rows(*p, m.nv);
@@ -31,36 +33,43 @@ std::size_t lay_out(const CompiledModel& m, Workspace& w, LaneRow* base) {
     rows(*p, m.nv);
   rows(w.poses, 12 * static_cast<int>(m.pairs.size()));
   for (std::size_t k = 0; k < w.lists.size(); ++k) {
-    kernels::GroupStage::List& list = w.lists[k];
+    typename kernels::Stage<L>::List& list = w.lists[k];
     list.stride = (m.pairs[k].n_points + kGroup - 1) / kGroup * kGroup + kGroup;
     rows(list.points, 3 * list.stride);
     rows(list.reference, 12);
-    LaneRow* own;
-    rows(own, 3 * list.stride);
-    list.own = reinterpret_cast<double*>(own);
   }
   return used;
 }
 
 }  // namespace
 
-std::size_t Workspace::bytes(const CompiledModel& m) {
-  Workspace w(m);
-  return w.memory.size() * sizeof(LaneRow) + w.scratch.size() +
-         sizeof(double) * std::size_t(m.nv) * std::size_t(m.nv + 1) * (kGroup + 1);
+template <int L>
+std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
+  BasicWorkspace w(m);
+  return w.memory.size() * sizeof(LaneRow) + w.own_points.size() * sizeof(double) + w.scratch.size() +
+         sizeof(double) * std::size_t(m.nv) * std::size_t(m.nv + 1) * (L + 1);
 }
 
-Workspace::Workspace(const CompiledModel& m)
+template <int L>
+BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m)
     : lists(m.pairs.size()),
       stage{},
-      pivoted(kGroup, Eigen::PartialPivLU<Eigen::MatrixXd>(m.nv)),
+      pivoted(L, Eigen::PartialPivLU<Eigen::MatrixXd>(m.nv)),
       dense(1, Eigen::MatrixXd(m.nv, m.nv)),
       rhs(m.nv) {
-  memory.assign(lay_out(m, *this, nullptr), LaneRow{});
-  lay_out(m, *this, memory.data());
+  memory.assign(lay_out<L>(m, *this, nullptr), LaneRow{});
+  lay_out<L>(m, *this, memory.data());
+  std::size_t own = 0;
+  for (const auto& list : lists) own += std::size_t(L * 3 * list.stride);
+  own_points.resize(own);
+  own = 0;
+  for (auto& list : lists) {
+    list.own = own_points.data() + own;
+    own += std::size_t(L * 3 * list.stride);
+  }
   std::size_t bytes = 0;  // any instruction set may be chosen later
   for (const kernels::KernelTable* table : kernels::available_kernels())
-    bytes = std::max(bytes, table->scratch_bytes(m.view));
+    bytes = std::max(bytes, table->stage<L>().scratch_bytes(m.view));
   scratch.resize(bytes);
   // A lane that never lived holds unit quaternions, so that it computes with finite numbers.
   for (const kernels::Link& link : m.links) {
@@ -72,5 +81,8 @@ Workspace::Workspace(const CompiledModel& m)
   stage.lists = lists.data();
   stage.scratch = scratch.data();
 }
+
+template struct BasicWorkspace<kGroup>;
+template struct BasicWorkspace<1>;
 
 }  // namespace tangere

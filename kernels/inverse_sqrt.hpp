@@ -23,6 +23,12 @@ xsimd::batch<double, A> inverse_sqrt_seed(const xsimd::batch<double, A>& a) {
   const Integers half = xsimd::bitwise_cast<Integers>(a) >> 1;
   return xsimd::bitwise_cast<xsimd::batch<double, A>>(Integers(0x5fe6eb50c7b537a9ULL) - half);
 }
+template <class N>
+N inverse_sqrt_step(const N& a, const N& y) {
+  const N e = mul_sub_from(a * y, y, N(1.0));
+  const N slope = mul_add(mul_add(N(0.3125), e, N(0.375)), e, N(0.5));
+  return mul_add(y * e, slope, y);
+}
 }  // namespace detail
 
 /// 1/√a for a ≥ 0.
@@ -30,11 +36,7 @@ template <class A>
 inline Lanes<A> inverse_sqrt(const Lanes<A>& a) {
   Lanes<A> y;
   for (int i = 0; i < Lanes<A>::kRegisters; ++i) y.r[i] = detail::inverse_sqrt_seed(a.r[i]);
-  for (int step = 0; step < 2; ++step) {
-    const Lanes<A> e = mul_sub_from(a * y, y, Lanes<A>(1.0));
-    const Lanes<A> slope = mul_add(mul_add(Lanes<A>(0.3125), e, Lanes<A>(0.375)), e, Lanes<A>(0.5));
-    y = mul_add(y * e, slope, y);
-  }
+  for (int step = 0; step < 2; ++step) y = detail::inverse_sqrt_step(a, y);
   return y;
 }
 inline double inverse_sqrt(double a) { return a > 0 ? 1 / std::sqrt(a) : 1e100; }

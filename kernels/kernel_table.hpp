@@ -8,29 +8,31 @@
 
 namespace tangere::kernels {
 
-/// Everything a group of eight environments needs to evaluate and solve a stage; rows of eight lanes, sized by
+/// Everything a group of L environments needs to evaluate and solve a stage; rows of L lanes (eight, or one), sized by
 /// make_workspace_sizes(). Link and contact scratch is opaque bytes: its layout belongs to the kernels.
-struct GroupStage {
-  LaneRow *centre, *x, *r, *s, *tau;                       // inputs
-  LaneRow c0_over_h, inverse_h;
+template <int L>
+struct Stage {
+  Row<L> *centre, *x, *r, *s, *tau;                       // inputs
+  Row<L> c0_over_h, inverse_h;
   const double* block;
   int group;
   /// Candidate points of a pair: by lane as they are found, and in rows of eight lanes once more than one lane needs them.
   struct List {
-    double* own;           ///< (8, 3, stride): x, y, z of each lane's points, padded to eights with far points
-    int own_count[kGroup]; ///< padding not included
+    double* own;           ///< (L, 3, stride): x, y, z of each lane's points, padded to eights with far points
+    int own_count[L]; ///< padding not included
     int stride;            ///< the number of the pair's points, rounded up to eights, and eight more: a list cannot overflow
-    LaneRow* points;       ///< (stride, 3)
+    Row<L>* points;       ///< (stride, 3)
     int count;             ///< rows in use
-    LaneRow* reference;    ///< (12) pose the list was made at
+    Row<L>* reference;    ///< (12) pose the list was made at
     double margin;
   };
   List* lists;           ///< (n_pairs)
   std::byte* scratch;    ///< scratch_bytes(model)
-  LaneRow *v, *g, *force_scale, *mass_diagonal, *A, *LU, *work, *excess;
-  LaneRow *weight, *inverse_weight;  ///< (nv) D^½ and D^-½, D the mass diagonal
-  LaneRow floor;                     ///< smallest ‖D^-½ g‖² that one rounding of x lets one see
+  Row<L> *v, *g, *force_scale, *mass_diagonal, *A, *LU, *work, *excess;
+  Row<L> *weight, *inverse_weight;  ///< (nv) D^½ and D^-½, D the mass diagonal
+  Row<L> floor;                     ///< smallest ‖D^-½ g‖² that one rounding of x lets one see
 };
+using GroupStage = Stage<kGroup>;
 
 /// One lane's search for points near a shape.
 struct CandidateSearch {
@@ -58,35 +60,51 @@ struct TactileArgs {
 };
 inline constexpr int kTactileTile = 64;
 
-struct KernelTable {
-  const char* name;  ///< "avx512", "avx2", "sse2", "scalar"
+/// Kernels of a stage for groups of L environments.
+template <int L>
+struct StageKernels {
   std::size_t (*scratch_bytes)(const ModelView&);
   /// Poses and motions at x, and `excess`; writes shape_in_1 of every pair, (n_pairs, 12) rows: R row-major, then p.
-  void (*kinematics)(const ModelView&, const GroupStage&, LaneRow* poses);
+  void (*kinematics)(const ModelView&, const Stage<L>&, Row<L>* poses);
+  /// g, v and force_scale at the x of kinematics(). `lone`: the only lane whose result matters, -1: all do.
+  void (*residual)(const ModelView&, const Stage<L>&, int lone);
+  /// The same with mass_diagonal and A. Both give the same bits.
+  void (*evaluate)(const ModelView&, const Stage<L>&, int lone);
+  /// weight, inverse_weight from mass_diagonal.
+  void (*set_weights)(const ModelView&, Stage<L>&);
+  /// floor from A, in lanes where accept > 0. `unknown_scale`: (nv) what an unknown is rounded against.
+  void (*set_floor)(const ModelView&, Stage<L>&, const double* unknown_scale, const Row<L>& accept);
+  /// ‖D^-½ g‖ over what it is measured by; 0 where it is below the floor.
+  void (*scaled_residual)(const ModelView&, const Stage<L>&, double gravity, Row<L>& out);
+  /// ‖D^½ a‖.
+  void (*weighted_norm)(const ModelView&, const Stage<L>&, const Row<L>* a, Row<L>& out);
+  /// LU of A in the lanes where accept > 0; in all when it is null.
+  void (*factor)(const ModelView&, const Stage<L>&, const Row<L>* accept);
+  /// out = A⁻¹ b by the factor as it is.
+  void (*solve)(const ModelView&, const Stage<L>&, const Row<L>* b, Row<L>* out);
+  /// The same, refined once; sound[l] = 1 where the result can be trusted.
+  void (*solve_watched)(const ModelView&, const Stage<L>&, const Row<L>* b, Row<L>* out, Row<L>* sound);
+};
+
+struct KernelTable {
+  const char* name;  ///< "avx512", "avx2", "sse2", "scalar"
+  StageKernels<kGroup> group;
+  StageKernels<1> single;  ///< one environment on its own: the same bits as in a group
   /// Fills `points`, padded to whole eights; returns how many without the padding.
   int (*find_candidates)(const CandidateSearch&);
   /// The rows of a list from its lanes' points.
   void (*transpose_list)(GroupStage::List&);
-  /// g, v and force_scale at the x of kinematics(). `lone`: the only lane whose result matters, -1: all do.
-  void (*residual)(const ModelView&, const GroupStage&, int lone);
-  /// The same with mass_diagonal and A. Both give the same bits.
-  void (*evaluate)(const ModelView&, const GroupStage&, int lone);
-  /// weight, inverse_weight from mass_diagonal.
-  void (*set_weights)(const ModelView&, GroupStage&);
-  /// floor from A, in lanes where accept > 0. `unknown_scale`: (nv) what an unknown is rounded against.
-  void (*set_floor)(const ModelView&, GroupStage&, const double* unknown_scale, const LaneRow& accept);
-  /// ‖D^-½ g‖ over what it is measured by; 0 where it is below the floor.
-  void (*scaled_residual)(const ModelView&, const GroupStage&, double gravity, LaneRow& out);
-  /// ‖D^½ a‖.
-  void (*weighted_norm)(const ModelView&, const GroupStage&, const LaneRow* a, LaneRow& out);
-  /// LU of A in the lanes where accept > 0; in all when it is null.
-  void (*factor)(const ModelView&, const GroupStage&, const LaneRow* accept);
-  /// out = A⁻¹ b by the factor as it is.
-  void (*solve)(const ModelView&, const GroupStage&, const LaneRow* b, LaneRow* out);
-  /// The same, refined once; sound[l] = 1 where the result can be trusted.
-  void (*solve_watched)(const ModelView&, const GroupStage&, const LaneRow* b, LaneRow* out, LaneRow* sound);
   /// Adds the forces of one shape on one sensor, tiles out of reach skipped.
   void (*tactile)(const TactileArgs&);
+
+  template <int L>
+  [[nodiscard]] const StageKernels<L>& stage() const {
+    if constexpr (L == 1) {
+      return single;
+    } else {
+      return group;
+    }
+  }
 };
 
 /// Tables this machine can run, best first; never empty.

@@ -16,12 +16,15 @@ namespace tangere::kernels {
 inline constexpr int kGroup = 8;   ///< lanes that iterate together
 inline constexpr int kBlock = 16;  ///< environments in a block: two groups of double, one vector of float
 
-/// One number of eight environments in memory. Engine code indexes it; kernels read it as Lanes.
-struct alignas(64) LaneRow {
-  double lane[kGroup];
+/// One number of a group of L environments in memory. Engine code indexes it; kernels read it as Lanes, or as OneLane.
+template <int L>
+struct alignas(8 * L) Row {
+  double lane[L];
   double& operator[](int l) { return lane[l]; }
   const double& operator[](int l) const { return lane[l]; }
 };
+
+using LaneRow = Row<kGroup>;
 
 /// Tag of the build that uses no SIMD type at all: plain loops over eight doubles, for other processors and as a check.
 struct ScalarArch {};

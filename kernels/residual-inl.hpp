@@ -5,7 +5,7 @@
 // The base accelerates at -gravity, so gravity needs no term of its own.
 #pragma once
 
-#include "kernels/lone_lane.hpp"
+#include "kernels/sphere_sums.hpp"
 #include "kernels/stage.hpp"
 
 namespace tangere::kernels {
@@ -150,44 +150,32 @@ N list_excess(const PairContact& pair, const CandidateList<N>& list, const Frame
   return moved - list.margin;
 }
 
+/// Sums over a pair with any shape, one candidate after the other.
 template <bool Derivatives, class Shape, class N>
-void sum_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list,
+void sum_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list, int lone,
                     ContactScratch<N>& o) {
   o.sums = PairSums<N>::zero();
-  for (int k = 0; k < list.count; ++k) {
-    const Vec3<N> xi = {list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]};
+  const auto add = [&](const Vec3<N>& xi) {
     accumulate<Derivatives>(o.sums, shape, law, o.shape_in_1.R, o.shape_in_1.p, o.W.a, o.W.l, xi);
+  };
+  if (lone < 0) {
+    for (int k = 0; k < list.count; ++k) add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
+  } else {
+    const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
+    for (int k = 0; k < list.own_count; ++k) add({N(x[k]), N(y[k]), N(z[k])});
   }
 }
 
-/// Sums over the candidates of all lanes, one row of the list after the other.
 template <bool Derivatives, class N>
-void sum_sphere_rows(const SphereMotion<N>& motion, const LawParameters<N>& law, const CandidateList<N>& list,
-                     SphereSums<N>& sums) {
-  clear<Derivatives>(sums);
-  SphereChunk<N> chunk;
-  for (int k = 0; k < list.count; k += SphereChunk<N>::kPoints) {
-    const int count = list.count - k < SphereChunk<N>::kPoints ? list.count - k : SphereChunk<N>::kPoints;
-    Vec3<N> xi[SphereChunk<N>::kPoints];
-    for (int i = 0; i < count; ++i)
-      xi[i] = {list.points[3 * (k + i)], list.points[3 * (k + i) + 1], list.points[3 * (k + i) + 2]};
-    fill_chunk<Derivatives>(motion, law, xi, count, chunk);
-    add_chunk<Derivatives>(sums, chunk);
+void sum_pair(const PairContact& pair, const StageArgs<N>& a, const CandidateList<N>& list, ContactScratch<N>& o) {
+  const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
+  if (pair.shape != PrimitiveShape::sphere) {
+    sum_candidates<Derivatives>(CuboidDistance<N>{broadcast<N>(pair.size)}, law, list, a.lone, o);
+    return;
   }
-}
-
-/// Sums over a pair with a sphere. One lane's points go eight at a time through the law and one after the other into the
-/// sums, in list order: the same bits as row by row, for a third of the work.
-template <bool Derivatives, class N>
-void sum_sphere(const PairContact& pair, const LawParameters<N>& law, const StageArgs<N>& a,
-                const CandidateList<N>& list, ContactScratch<N>& o) {
   const SphereMotion<N> motion = sphere_motion(o.shape_in_1.p, o.W, N(pair.size.x));
   SphereSums<N> sums;
-  if (a.lone >= 0) {
-    sum_lone_sphere<Derivatives>(motion, law, list, a.lone, sums);
-  } else {
-    sum_sphere_rows<Derivatives>(motion, law, list, sums);
-  }
+  sum_sphere_points<Derivatives>(motion, law, list, a.lone, sums);
   finish_sphere<Derivatives>(motion, o.W.a, sums, o.sums);
 }
 
@@ -197,12 +185,7 @@ void contact_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int k = 0; k < model.n_pairs; ++k) {
     const PairContact& pair = model.pairs[k];
     ContactScratch<N>& o = a.contacts[k];
-    const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
-    if (pair.shape == PrimitiveShape::sphere) {
-      sum_sphere<Derivatives>(pair, law, a, a.candidates[k], o);
-    } else {
-      sum_candidates<Derivatives>(CuboidDistance<N>{broadcast<N>(pair.size)}, law, a.candidates[k], o);
-    }
+    sum_pair<Derivatives>(pair, a, a.candidates[k], o);
     if (pair.link1 >= 0) a.links[pair.link1].F -= o.sums.wrench;
     if (pair.link2 >= 0) a.links[pair.link2].F += wrench_to_child(o.link2_in_1, o.sums.wrench);
   }

@@ -13,21 +13,23 @@
 
 namespace tangere::kernels {
 
-// A LaneRow and Lanes<Arch> are both eight consecutive doubles at 64-byte alignment; vector types may alias anything.
-template <class Arch>
-struct TableOf {
-  using N = Lanes<Arch>;
-  static_assert(sizeof(N) == sizeof(LaneRow));
+// A row of L doubles and the number type N of L lanes have the same layout; vector types may alias anything, and OneLane
+// is a double.
+template <class N, int L>
+struct StageTable {
+  static_assert(sizeof(N) == sizeof(Row<L>));
+  using StageOf = Stage<L>;
+  using RowOf = Row<L>;
 
-  static N* view(LaneRow* p) { return reinterpret_cast<N*>(p); }
-  static const N* view(const LaneRow* p) { return reinterpret_cast<const N*>(p); }
+  static N* view(RowOf* p) { return reinterpret_cast<N*>(p); }
+  static const N* view(const RowOf* p) { return reinterpret_cast<const N*>(p); }
 
   static std::size_t scratch_bytes(const ModelView& m) {
     return sizeof(LinkScratch<N>) * m.n_links + sizeof(ContactScratch<N>) * (m.n_pairs + m.n_grounds) +
            sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links + 4 * alignof(N);
   }
 
-  static StageArgs<N> arguments(const ModelView& m, const GroupStage& s, int lone) {
+  static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone) {
     std::byte* at = s.scratch;
     const auto take = [&at]<class T>(T*, int count) {
       T* p = reinterpret_cast<T*>(at);
@@ -40,7 +42,7 @@ struct TableOf {
     a.columns = take(static_cast<JointColumns<N>*>(nullptr), 2 * m.n_links);
     auto* lists = take(static_cast<CandidateList<N>*>(nullptr), m.n_pairs);
     for (int k = 0; k < m.n_pairs; ++k) {
-      const GroupStage::List& l = s.lists[k];
+      const typename StageOf::List& l = s.lists[k];
       const int lane = lone < 0 ? 0 : lone;
       lists[k] = {view(l.points),        l.count, view(l.reference), l.margin, l.own + 3 * l.stride * lane,
                   l.own_count[lane], l.stride};
@@ -52,8 +54,8 @@ struct TableOf {
     a.r = view(s.r);
     a.s = view(s.s);
     a.tau = view(s.tau);
-    a.c0_over_h = load_lanes<Arch>(s.c0_over_h.lane);
-    a.inverse_h = load_lanes<Arch>(s.inverse_h.lane);
+    a.c0_over_h = *view(&s.c0_over_h);
+    a.inverse_h = *view(&s.inverse_h);
     a.block = s.block;
     a.group = s.group;
     a.v = view(s.v);
@@ -65,7 +67,7 @@ struct TableOf {
     return a;
   }
 
-  static void kinematics_lanes(const ModelView& m, const GroupStage& s, LaneRow* poses) {
+  static void kinematics_lanes(const ModelView& m, const StageOf& s, RowOf* poses) {
     const StageArgs<N> a = arguments(m, s, -1);
     kinematics(m, a);
     for (int k = 0; k < m.n_pairs; ++k) {
@@ -75,49 +77,59 @@ struct TableOf {
       row[9] = x.p.x, row[10] = x.p.y, row[11] = x.p.z;
     }
   }
-  static void residual_lanes(const ModelView& m, const GroupStage& s, int lone) {
+  static void residual_lanes(const ModelView& m, const StageOf& s, int lone) {
     residual<false>(m, arguments(m, s, lone));
   }
-  static void evaluate_lanes(const ModelView& m, const GroupStage& s, int lone) {
+  static void evaluate_lanes(const ModelView& m, const StageOf& s, int lone) {
     const StageArgs<N> a = arguments(m, s, lone);
     residual<true>(m, a);
     jacobian(m, a);
   }
-  static void set_weights_lanes(const ModelView& m, GroupStage& s) {
+  static void set_weights_lanes(const ModelView& m, StageOf& s) {
     set_weights(m.nv, view(s.mass_diagonal), view(s.weight), view(s.inverse_weight));
   }
-  static void set_floor_lanes(const ModelView& m, GroupStage& s, const double* unknown_scale, const LaneRow& accept) {
+  static void set_floor_lanes(const ModelView& m, StageOf& s, const double* unknown_scale, const RowOf& accept) {
     const N floor = rounding_floor(m.pattern, view(s.A), view(s.inverse_weight), unknown_scale);
     *view(&s.floor) = select(*view(&accept) > N(0.0), floor, *view(&s.floor));
   }
-  static void scaled_residual_lanes(const ModelView& m, const GroupStage& s, double gravity, LaneRow& out) {
+  static void scaled_residual_lanes(const ModelView& m, const StageOf& s, double gravity, RowOf& out) {
     const ResidualScale<N> scale = {view(s.v), view(s.force_scale), view(s.weight), view(s.inverse_weight),
-                                    load_lanes<Arch>(s.c0_over_h.lane), N(gravity), *view(&s.floor)};
+                                    *view(&s.c0_over_h), N(gravity), *view(&s.floor)};
     *view(&out) = scaled_residual(m.nv, view(s.g), scale);
   }
-  static void weighted_norm_lanes(const ModelView& m, const GroupStage& s, const LaneRow* a, LaneRow& out) {
+  static void weighted_norm_lanes(const ModelView& m, const StageOf& s, const RowOf* a, RowOf& out) {
     *view(&out) = weighted_norm(m.nv, view(s.weight), view(a));
   }
-  static void factor_lanes(const ModelView& m, const GroupStage& s, const LaneRow* accept) {
+  static void factor_lanes(const ModelView& m, const StageOf& s, const RowOf* accept) {
     factor(m.pattern, view(s.A), view(accept), view(s.LU), view(s.work));
   }
-  static void solve_lanes(const ModelView& m, const GroupStage& s, const LaneRow* b, LaneRow* out) {
+  static void solve_lanes(const ModelView& m, const StageOf& s, const RowOf* b, RowOf* out) {
     solve(m.pattern, view(s.LU), view(b), view(out), view(s.work));
   }
-  static void solve_watched_lanes(const ModelView& m, const GroupStage& s, const LaneRow* b, LaneRow* out,
-                                  LaneRow* sound) {
+  static void solve_watched_lanes(const ModelView& m, const StageOf& s, const RowOf* b, RowOf* out,
+                                  RowOf* sound) {
     solve_watched(m.pattern, view(s.A), view(s.LU), view(b), view(out), view(sound), view(s.work));
   }
-  static void tactile(const TactileArgs& a) {
-    tactile_field<N, kGroup>(
-        a, [](const double* p) { return load_lanes<Arch>(p); },
-        [](const N& x, double* p) { store_lanes(x, p); });
+  static constexpr StageKernels<L> make() {
+    return {scratch_bytes,         kinematics_lanes,    residual_lanes, evaluate_lanes, set_weights_lanes, set_floor_lanes,
+            scaled_residual_lanes, weighted_norm_lanes, factor_lanes,   solve_lanes,    solve_watched_lanes};
   }
+};
 
+template <class Arch>
+struct TableOf {
+  static void tactile(const TactileArgs& a) {
+    tactile_field<Lanes<Arch>, kGroup>(
+        a, [](const double* p) { return load_lanes<Arch>(p); },
+        [](const Lanes<Arch>& x, double* p) { store_lanes(x, p); });
+  }
   static constexpr KernelTable make(const char* name) {
-    return {name,           scratch_bytes,     kinematics_lanes,      search_candidates<Arch>,
-            transpose_rows<Arch>, residual_lanes, evaluate_lanes, set_weights_lanes, set_floor_lanes,
-            scaled_residual_lanes, weighted_norm_lanes, factor_lanes, solve_lanes, solve_watched_lanes, tactile};
+    return {name,
+            StageTable<Lanes<Arch>, kGroup>::make(),
+            StageTable<OneLane<Arch>, 1>::make(),
+            search_candidates<Arch>,
+            transpose_rows<Arch>,
+            tactile};
   }
 };
 

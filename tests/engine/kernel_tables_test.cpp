@@ -98,21 +98,21 @@ TEST_P(KernelTables, EvaluateMatchesTheScalarReferenceWhateverTheNeighboursHold)
           for (int i = 0; i < m->nv; ++i) w.stage.x[i][l] = poison;
           for (int i = 0; i < m->nq; ++i) w.stage.centre[i][l] = poison;
         }
-        table->kinematics(m->view, w.stage, w.poses);
-        table->evaluate(m->view, w.stage, -1);
+        table->group.kinematics(m->view, w.stage, w.poses);
+        table->group.evaluate(m->view, w.stage, -1);
         const Outputs o = outputs(w, *m, lane);
         if (first.g.empty()) first = o;
         // The residual without its Jacobian, and a lane evaluated alone across points: the same bits.
-        table->kinematics(m->view, w.stage, w.poses);
-        table->residual(m->view, w.stage, -1);
+        table->group.kinematics(m->view, w.stage, w.poses);
+        table->group.residual(m->view, w.stage, -1);
         EXPECT_EQ(outputs(w, *m, lane).g, o.g);
-        table->kinematics(m->view, w.stage, w.poses);
-        table->evaluate(m->view, w.stage, lane);
+        table->group.kinematics(m->view, w.stage, w.poses);
+        table->group.evaluate(m->view, w.stage, lane);
         const Outputs alone = outputs(w, *m, lane);
         EXPECT_EQ(alone.g, o.g);
         EXPECT_EQ(alone.A, o.A);
-        table->kinematics(m->view, w.stage, w.poses);
-        table->residual(m->view, w.stage, lane);
+        table->group.kinematics(m->view, w.stage, w.poses);
+        table->group.residual(m->view, w.stage, lane);
         EXPECT_EQ(outputs(w, *m, lane).g, o.g);
         EXPECT_EQ(o.g, first.g);  // same bits in any lane, whatever the neighbours hold
         EXPECT_EQ(o.A, first.A);
@@ -152,9 +152,9 @@ TEST_P(KernelTables, LuSolvesAndJudgesItself) {
     }
     LaneRow accept;
     for (double& x : accept.lane) x = 1;
-    table->factor(m->view, w.stage, &accept);
-    table->solve_watched(m->view, w.stage, w.stage.g, w.test, &w.sound);
-    table->solve(m->view, w.stage, w.stage.g, w.delta);
+    table->group.factor(m->view, w.stage, &accept);
+    table->group.solve_watched(m->view, w.stage, w.stage.g, w.test, &w.sound);
+    table->group.solve(m->view, w.stage, w.stage.g, w.delta);
     const Eigen::VectorXd expected = a.partialPivLu().solve(rhs);
     EXPECT_EQ(w.sound[lane], 1);
     for (int i = 0; i < n; ++i) {
@@ -169,7 +169,7 @@ TEST_P(KernelTables, LuSolvesAndJudgesItself) {
     const double kept = w.stage.LU[0][lane];
     for (double& x : accept.lane) x = 0;
     for (int e = 0; e < m->pattern.entries; ++e) w.stage.A[e][lane] *= 2;
-    table->factor(m->view, w.stage, &accept);
+    table->group.factor(m->view, w.stage, &accept);
     EXPECT_EQ(w.stage.LU[0][lane], kept);
   }
 }
@@ -191,8 +191,8 @@ TEST(KernelTable, AUselessFactorIsNotSound) {
       for (double& x : w.stage.g[i].lane) x = random.normal();
     LaneRow accept;
     for (double& x : accept.lane) x = 1;
-    table->factor(m->view, w.stage, &accept);
-    table->solve_watched(m->view, w.stage, w.stage.g, w.test, &w.sound);
+    table->group.factor(m->view, w.stage, &accept);
+    table->group.solve_watched(m->view, w.stage, w.stage.g, w.test, &w.sound);
     for (double s : w.sound.lane) EXPECT_EQ(s, 0) << table->name;
   }
 }
