@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "kernels/kernel_table.hpp"
+#include "tests/engine/random_scene.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"
 
@@ -68,6 +69,44 @@ TEST(Batch, AnEnvironmentHasTheSameBitsInEveryBatchAndLane) {
 TEST(Batch, AThousandNeighboursChangeNothing) {
   const Model model(varied());
   EXPECT_EQ(run(model, 1, 0, 999, 90), run(model, 1000, 999, 0, 90));
+}
+
+/// Trees of random joints, spheres and cuboids in contact, thrown about: an environment on its own against the same one
+/// in a group of eight and in a crowd.
+TEST(Batch, RandomScenesHaveTheSameBitsAloneAndInAGroup) {
+  int touching = 0;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    const Model model(testing::random_contacts(seed, 2 + static_cast<int>(seed % 4), ContactLaw::clamped));
+    const std::size_t nv = std::size_t(model.nv());
+    const auto velocity = [&](int e) {
+      testing::Random random(1000 * seed + static_cast<unsigned>(e));
+      std::vector<double> v(nv);
+      for (double& x : v) x = 0.02 * random.normal();
+      return v;
+    };
+    const auto run_of = [&](int environments, int wanted, int episode) {
+      Batch batch(model, environments);
+      Stepper stepper(model);
+      for (int e = 0; e < environments; ++e)
+        batch.set_state(e, q_of(batch, e), velocity(e == wanted ? episode : 100 + e));
+      const std::vector<double> u(std::size_t(environments * model.nu()));
+      std::vector<double> record;
+      for (int t = 0; t < 8; ++t) {
+        stepper.step(batch, u);
+        for (double x : q_of(batch, wanted)) record.push_back(x);
+        for (double x : v_of(batch, wanted)) record.push_back(x);
+        record.push_back(static_cast<double>(batch.status(wanted)));
+        record.push_back(batch.iterations(wanted));
+      }
+      return record;
+    };
+    const std::vector<double> alone = run_of(1, 0, 3);
+    EXPECT_EQ(alone, run_of(8, 5, 3)) << "seed " << seed;
+    EXPECT_EQ(alone, run_of(17, 16, 3)) << "seed " << seed;
+    EXPECT_EQ(alone, run_of(20, 2, 3)) << "seed " << seed;
+    touching += model.contacts().empty() ? 0 : 1;
+  }
+  EXPECT_GT(touching, 6);
 }
 
 void poison(Batch& batch, int spared) {

@@ -21,14 +21,15 @@ using testing::StageBuffers;
 constexpr double kStep = 0.004, kC0 = 1.5;
 
 /// A workspace whose candidate lists hold every point, in all lanes.
-void list_everything(const CompiledModel& m, Workspace& w) {
+template <int L>
+void list_everything(const CompiledModel& m, BasicWorkspace<L>& w) {
   for (std::size_t k = 0; k < m.pairs.size(); ++k) {
-    kernels::GroupStage::List& list = w.lists[k];
+    auto& list = w.lists[k];
     list.count = m.pairs[k].n_points;
     list.margin = 1e9;
     for (int i = 0; i < 3 * m.pairs[k].n_points; ++i)
       for (double& x : list.points[i].lane) x = m.pairs[k].points[i];
-    for (int l = 0; l < kGroup; ++l) {
+    for (int l = 0; l < L; ++l) {
       list.own_count[l] = m.pairs[k].n_points;
       for (int i = 0; i < list.stride; ++i)
         for (int c = 0; c < 3; ++c)
@@ -38,7 +39,8 @@ void list_everything(const CompiledModel& m, Workspace& w) {
   }
 }
 
-void fill_lane(Workspace& w, const CompiledModel& m, const StageBuffers<double>& b, int lane) {
+template <int L>
+void fill_lane(BasicWorkspace<L>& w, const CompiledModel& m, const StageBuffers<double>& b, int lane) {
   for (int i = 0; i < m.nq; ++i) w.stage.centre[i][lane] = b.centre[std::size_t(i)];
   for (int i = 0; i < m.nv; ++i) {
     const std::size_t k = std::size_t(i);
@@ -46,7 +48,8 @@ void fill_lane(Workspace& w, const CompiledModel& m, const StageBuffers<double>&
   }
 }
 
-void set_constants(Workspace& w) {
+template <int L>
+void set_constants(BasicWorkspace<L>& w) {
   for (double& x : w.stage.c0_over_h.lane) x = kC0 / kStep;
   for (double& x : w.stage.inverse_h.lane) x = 1 / kStep;
   w.stage.block = nullptr;
@@ -56,7 +59,8 @@ void set_constants(Workspace& w) {
 struct Outputs {
   std::vector<double> g, v, A;
 };
-Outputs outputs(const Workspace& w, const CompiledModel& m, int lane) {
+template <int L>
+Outputs outputs(const BasicWorkspace<L>& w, const CompiledModel& m, int lane) {
   Outputs o;
   for (int i = 0; i < m.nv; ++i) o.g.push_back(w.stage.g[i][lane]), o.v.push_back(w.stage.v[i][lane]);
   for (int e = 0; e < m.pattern.entries; ++e) o.A.push_back(w.stage.A[e][lane]);
@@ -117,6 +121,19 @@ TEST_P(KernelTables, EvaluateMatchesTheScalarReferenceWhateverTheNeighboursHold)
         EXPECT_EQ(o.g, first.g);  // same bits in any lane, whatever the neighbours hold
         EXPECT_EQ(o.A, first.A);
       }
+    // The kernels of one lane: the same bits once more.
+    SingleWorkspace single(*m);
+    list_everything(*m, single);
+    set_constants(single);
+    fill_lane(single, *m, b, 0);
+    table->single.kinematics(m->view, single.stage, single.poses);
+    table->single.evaluate(m->view, single.stage, 0);
+    const Outputs own = outputs(single, *m, 0);
+    EXPECT_EQ(own.g, first.g);
+    EXPECT_EQ(own.v, first.v);
+    EXPECT_EQ(own.A, first.A);
+    table->single.residual(m->view, single.stage, 0);
+    EXPECT_EQ(outputs(single, *m, 0).g, first.g);
     expect_close(first.g, b.g, 1e-12);
     expect_close(first.v, b.v_out, 1e-13);
     expect_close(first.A, b.A, 1e-12);
