@@ -96,7 +96,7 @@ class Outputs {
 
 void tell_passes(const Console& console, const BenchRun& run) {
   for (const BenchmarkTime& time : run.result.times)
-    console.detail(fmt::format("{} threads: {:.4f} s, CPU {:.4f} s", run.threads, time.seconds,
+    console.detail(fmt::format("threads {}: {:.4f} s, CPU {:.4f} s", run.threads, time.seconds,
                                time.cpu_seconds));
 }
 

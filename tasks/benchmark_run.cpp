@@ -44,16 +44,6 @@ std::uint64_t mix(std::uint64_t hash, std::uint64_t bits) {
   return std::rotl(hash ^ bits, 29) * 0x9e3779b97f4a7c15U + 0x632be59bd9b4e019U;
 }
 
-/// Continues a chain with the bits of numbers: +0 and -0 differ, equal NaN are equal.
-std::uint64_t chain(std::uint64_t hash, std::span<const double> numbers) {
-  // Four chains beside each other: in a single one each product would wait for the one before.
-  std::array<std::uint64_t, 4> lanes{hash, hash + 1, hash + 2, hash + 3};
-  for (std::size_t i = 0; i < numbers.size(); ++i)
-    lanes[i % 4] = mix(lanes[i % 4], std::bit_cast<std::uint64_t>(numbers[i]));
-  for (const std::uint64_t lane : lanes) hash = mix(hash, lane);
-  return hash;
-}
-
 /// Makes the compiler believe that somebody reads the numbers, at no cost.
 void keep(std::span<const double> numbers) { asm volatile("" : : "r"(numbers.data()) : "memory"); }
 
@@ -144,7 +134,7 @@ class Episode {
     BlockTally tally;
     if (checked)
       for (int e = first; e < last; ++e)
-        checksums_[lanes(e)] = mix(0, static_cast<std::uint64_t>(batch_.episode(e)));
+        checksums_[lanes(e)] = static_cast<std::uint64_t>(batch_.episode(e));
     std::array<bool, kBlock> live{};
     for (int e = first; e < last; ++e) live[lanes(e - first)] = !failed(batch_.status(e));
     for (std::int64_t t = 0; t < options_.rollout.steps; ++t) {
@@ -190,7 +180,7 @@ class Episode {
         const std::span<double> frame(&frames_[lanes(e) * frame_numbers_ + offset], numbers);
         read_frame(worker, e, static_cast<int>(s), frame);
         tally.tactile_points += sensors[s].points;
-        if (checked) checksums_[lanes(e)] = chain(checksums_[lanes(e)], frame);
+        if (checked) checksums_[lanes(e)] = chain_bits(checksums_[lanes(e)], frame);
       }
       offset += numbers;
     }
@@ -207,7 +197,7 @@ class Episode {
     for (int e = first; e < last; ++e) {
       batch_.get_q(e, q);
       batch_.get_v(e, v);
-      checksums_[lanes(e)] = chain(chain(checksums_[lanes(e)], q), v);
+      checksums_[lanes(e)] = chain_bits(chain_bits(checksums_[lanes(e)], q), v);
     }
   }
 
@@ -256,6 +246,15 @@ const char* to_string(FrameKind value) {
     case FrameKind::dense: return "dense";
   }
   return "unknown";
+}
+
+std::uint64_t chain_bits(std::uint64_t checksum, std::span<const double> numbers) {
+  // Four chains beside each other: in a single one each product would wait for the one before.
+  std::array<std::uint64_t, 4> chains{checksum, checksum + 1, checksum + 2, checksum + 3};
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    chains[i % 4] = mix(chains[i % 4], std::bit_cast<std::uint64_t>(numbers[i]));
+  for (const std::uint64_t chain : chains) checksum = mix(checksum, chain);
+  return checksum;
 }
 
 std::uint64_t BenchmarkResult::checksum() const {

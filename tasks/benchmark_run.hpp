@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "engine/batch.hpp"
@@ -51,6 +52,10 @@ struct BenchmarkResult {
   /// Medians of wall clock and of CPU time, each on its own; there must be a pass.
   [[nodiscard]] BenchmarkTime median() const;
 };
+
+/// Continues a checksum with the bits of numbers: +0 and -0 differ. The checksum of an environment begins with the number
+/// of its episode.
+std::uint64_t chain_bits(std::uint64_t checksum, std::span<const double> numbers);
 
 /// Asked before each step of each block, from any thread; false stops the run there.
 using BenchmarkGoOn = std::function<bool()>;
