@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "apps/run_report.hpp"
 #include "io/scaling_plot.hpp"
 
@@ -49,7 +51,7 @@ int common_interval(const Model& model, const RolloutOptions& rollout) {
 
 std::string bench_heading(const BenchSetting& setting) {
   return fmt::format(
-      "{}: {} environments, {} steps, {}, {}, {}\n{}; best of {} passes\n\n"
+      "{}: {} environments, {} steps, {}, {}, {}\n{}; best of {} timed\n\n"
       "{:>7} {:>14} {:>14} {:>9} {:>18} {:>18}\n{:>7} {:>14} {:>14} {:>9} {:>18} {:>18}",
       setting.model, setting.environments, setting.options.rollout.steps, frames_text(setting),
       setting.precision, setting.isa, setting.machine, setting.options.repeat, "threads",
@@ -113,9 +115,11 @@ std::string bench_svg(const BenchSetting& setting, const std::vector<BenchRun>& 
   ScalingCurve curve;
   curve.title = setting.model + ": speed by threads";
   curve.captions = {fmt::format("{}; {}, {}", setting.machine, setting.isa, setting.precision),
-                    fmt::format("{}: {} environments, {} steps, {}; {} passes", setting.scene,
-                                setting.environments, setting.options.rollout.steps,
-                                frames_text(setting), setting.options.repeat)};
+                    fmt::format("scene {}, {} environments, {} steps",
+                                std::filesystem::path(setting.scene).filename().string(),
+                                setting.environments, setting.options.rollout.steps),
+                    fmt::format("{}; {} pass{}", frames_text(setting), setting.options.repeat,
+                                setting.options.repeat == 1 ? "" : "es")};
   for (const BenchRun& run : runs)
     curve.points.push_back({run.threads,
                             rate(run.result.environment_steps, run.result.best().seconds),

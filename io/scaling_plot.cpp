@@ -16,7 +16,7 @@ namespace {
 using svg::text;
 
 constexpr double kWidth = 640, kPlotHeight = 320, kLeft = 88, kRight = 28, kHead = 34, kLine = 17;
-constexpr double kBottom = 78;
+constexpr double kBottom = 78, kMargin = 24;
 constexpr double kLabelWidth = 26;  // labels of threads closer than this would touch
 constexpr const char* kEnd = "text-anchor=\"end\" font-size=\"11\"";
 constexpr const char* kMiddle = "text-anchor=\"middle\" font-size=\"11\"";
@@ -49,9 +49,9 @@ class Picture {
         "font-size=\"12\" fill=\"#222\">\n<rect width=\"100%\" height=\"100%\" "
         "fill=\"#ffffff\"/>\n",
         kWidth, tall);
-    out_ += text(kLeft, kHead - 6, curve_.title, "font-size=\"16\" font-weight=\"bold\"");
+    out_ += text(kMargin, kHead - 6, curve_.title, "font-size=\"16\" font-weight=\"bold\"");
     for (std::size_t k = 0; k < curve_.captions.size(); ++k)
-      out_ += text(kLeft, kHead + kLine * (static_cast<double>(k) + 0.7), curve_.captions[k]);
+      out_ += text(kMargin, kHead + kLine * (static_cast<double>(k) + 0.7), curve_.captions[k]);
     axes();
     curves();
     marks();
