@@ -4,9 +4,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 
 #include "engine/error.hpp"
 #include "io/nearest_name.hpp"
@@ -53,6 +55,25 @@ template CLI::Option* add_whole_number(CLI::App&, const std::string&, std::optio
                                        std::int64_t, std::int64_t, const std::string&);
 template CLI::Option* add_whole_number(CLI::App&, const std::string&, std::optional<std::uint64_t>&,
                                        std::uint64_t, std::uint64_t, const std::string&);
+
+CLI::Option* add_whole_numbers(CLI::App& command, const std::string& flags,
+                               std::vector<int>& values, int low, int high,
+                               const std::string& description) {
+  const auto read = [&values, low, high, name = long_name(flags)](const std::string& text) {
+    std::istringstream words(text + ',');  // a comma ends a word: "1," has an empty second one
+    for (std::string word; std::getline(words, word, ',');) {
+      int number = 0;
+      if (!parse(word, number) || number < low || number > high)
+        throw InputError(
+            fmt::format("{} {}: '{}'; expected whole numbers from {} to {} separated by commas",
+                        name, text, word, low, high));
+      if (std::find(values.begin(), values.end(), number) != values.end())
+        throw InputError(fmt::format("{} {}: {} stands there twice", name, text, number));
+      values.push_back(number);
+    }
+  };
+  return command.add_option_function<std::string>(flags, read, description)->type_name("N,N,...");
+}
 
 CLI::Option* add_positive_number(CLI::App& command, const std::string& flags,
                                  std::optional<double>& value, const std::string& description) {

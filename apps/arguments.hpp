@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/console.hpp"
 
@@ -17,7 +18,12 @@ template <class T>
 CLI::Option* add_whole_number(CLI::App& command, const std::string& flags, std::optional<T>& value,
                               T low, T high, const std::string& description);
 
-/// The same for a positive finite number.
+/// The same for a list of different numbers separated by commas, "1,2,4".
+CLI::Option* add_whole_numbers(CLI::App& command, const std::string& flags,
+                               std::vector<int>& values, int low, int high,
+                               const std::string& description);
+
+/// One positive finite number.
 CLI::Option* add_positive_number(CLI::App& command, const std::string& flags,
                                  std::optional<double>& value, const std::string& description);
 

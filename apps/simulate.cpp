@@ -2,13 +2,13 @@
 // tangere simulate: a scene, a batch, a file. Everything is checked before the first step.
 #include <fmt/format.h>
 
-#include <csignal>
 #include <filesystem>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/memory.hpp"
 #include "apps/progress.hpp"
+#include "apps/run_report.hpp"
 #include "apps/stop_signals.hpp"
 #include "io/csv.hpp"
 #include "io/nearest_name.hpp"
@@ -19,10 +19,6 @@
 
 namespace tangere::apps {
 namespace {
-
-constexpr int kMostEnvironments = 1'000'000'000;
-constexpr std::int64_t kMostSteps = 1'000'000'000'000;
-constexpr std::size_t kMostFailuresListed = 20;
 
 struct Options {
   std::string scene, output, controls, integrator, precision = "double";
@@ -63,28 +59,11 @@ ControlProgram make_controls(const Options& options, const Model& model, const S
   return {model, stepper.timestep(), seed};
 }
 
-std::int64_t step_count(const Options& options, const ControlProgram& controls) {
-  const std::int64_t steps = options.steps.value_or(controls.steps());
-  if (steps < 0)
-    throw InputError("the controls have no end, so the number of steps is not known; give --steps");
-  controls.check_covers(steps);
-  return steps;
-}
-
 void check_size(const Model& model, int environments) {
   const double state = static_cast<double>(model.state_bytes_per_environment());
   check_memory(state * environments + rollout_bytes(model, environments) +
                    static_cast<double>(model.workspace_bytes()),
                fmt::format("--envs {}", environments));
-}
-
-void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout) {
-  for (const SensorInfo& sensor : model.sensors()) {
-    const int every = tactile_interval(sensor, rollout);
-    if (every > rollout.steps)
-      console.note(fmt::format("sensor {} is read every {} steps: no field in {} steps",
-                               sensor.name, every, rollout.steps));
-  }
 }
 
 TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
@@ -101,36 +80,6 @@ TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
   return layout_from(batch, stepper, run);
 }
 
-int report_stop(const Console& console, int signal, std::int64_t done, std::int64_t steps) {
-  const char* name = signal == SIGINT ? "SIGINT" : "SIGTERM";
-  const ExitCode code = signal == SIGINT ? kInterrupted : kTerminated;
-  const std::string text =
-      fmt::format("stopped by {} after {} of {} steps; nothing was written", name, done, steps);
-  console.fail("tangere: " + text);
-  console.result({{"command", "simulate"}, {"exit_code", static_cast<int>(code)}, {"error", text}});
-  return code;
-}
-
-Json failures_of(const RolloutSummary& summary) {
-  Json failures = Json::array();
-  for (const FailedEnvironment& f : summary.failures)
-    failures.push_back({{"environment", f.environment},
-                        {"step", f.step},
-                        {"status", static_cast<int>(f.status)},
-                        {"reason", to_string(f.status)}});
-  return failures;
-}
-
-void list_failures(const Console& console, const RolloutSummary& summary) {
-  const auto& failures = summary.failures;
-  for (std::size_t i = 0; i < failures.size() && i < kMostFailuresListed; ++i)
-    console.fail(fmt::format("environment {} failed in step {}: {}", failures[i].environment,
-                             failures[i].step, to_string(failures[i].status)));
-  if (failures.size() > kMostFailuresListed)
-    console.fail(fmt::format("failed too, not listed: {}; --json and the file name all",
-                             failures.size() - kMostFailuresListed));
-}
-
 int report(const Options& options, const Console& console, const Batch& batch,
            const Stepper& stepper, const RolloutOptions& rollout, const RolloutSummary& summary) {
   const ExitCode code = summary.failures.empty() ? kDone : kSomeFailed;
@@ -138,7 +87,7 @@ int report(const Options& options, const Console& console, const Batch& batch,
   const double rate = static_cast<double>(summary.environment_steps) / summary.seconds;
   const double per_step = static_cast<double>(summary.newton_iterations) /
                           static_cast<double>(summary.environment_steps);
-  list_failures(console, summary);
+  list_failures(console, summary.failures, "--json and the file name all");
   console.print(
       fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
                   "Newton iterations per step: {:.2f}, steps split: {}, environments failed: {}\n"
@@ -170,7 +119,7 @@ int report(const Options& options, const Console& console, const Batch& batch,
                   {"newton_iterations", summary.newton_iterations},
                   {"newton_iterations_per_step", per_step},
                   {"split_steps", summary.split_steps},
-                  {"failed", failures_of(summary)}});
+                  {"failed", failures_of(summary.failures)}});
   return code;
 }
 
@@ -184,7 +133,7 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
   const Model model(file.scene);
   Stepper stepper(model, solver);
   const ControlProgram controls = make_controls(options, model, stepper, console);
-  const RolloutOptions rollout{step_count(options, controls), options.every.value_or(0)};
+  const RolloutOptions rollout{step_count(options.steps, controls), options.every.value_or(0)};
   note_empty_sensors(console, model, rollout);
   const int environments = options.environments.value_or(1);
   check_size(model, environments);
@@ -205,7 +154,8 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
     });
   }
   if (summary.stopped)
-    return report_stop(console, signals.received(), summary.steps, rollout.steps);
+    return report_stop(console, "simulate", signals.received(),
+                       fmt::format("after {} of {} steps", summary.steps, rollout.steps));
   output.commit();
   return report(options, console, batch, stepper, rollout, summary);
 }

@@ -26,7 +26,7 @@ install(TARGETS tangere RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(FILES kernels/contact_types.hpp DESTINATION ${headers}/kernels)
 install(FILES engine/aligned.hpp engine/batch.hpp engine/control.hpp engine/error.hpp engine/model.hpp
   engine/readout.hpp engine/row_sink.hpp engine/scene.hpp engine/stepper.hpp DESTINATION ${headers}/engine)
-install(FILES tasks/rollout.hpp DESTINATION ${headers}/tasks)
+install(FILES tasks/benchmark_run.hpp tasks/rollout.hpp DESTINATION ${headers}/tasks)
 install(FILES io/scene_reader.hpp io/trajectory_file.hpp io/trajectory_layout.hpp DESTINATION ${headers}/io)
 install(DIRECTORY scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tangere/scenes)
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})

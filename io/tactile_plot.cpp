@@ -10,10 +10,14 @@
 #include <vector>
 
 #include "engine/error.hpp"
+#include "io/svg.hpp"
 
 namespace tangere {
 
 namespace {
+
+using svg::round_down;
+using svg::text;
 
 constexpr int kMostCells = 80;    // cells of a map along one side: keeps the file under a megabyte
 constexpr int kMostArrows = 16;   // arrows along one side
@@ -82,30 +86,6 @@ Unit unit_for(double largest) {
   if (largest >= 1e-4) return {1e3, "mN"};
   if (largest >= 1e-7) return {1e6, "µN"};
   return {1e9, "nN"};
-}
-
-/// 1, 2 or 5 times a power of ten, at most x.
-double round_down(double x) {
-  const double base = std::pow(10, std::floor(std::log10(x)));
-  return x >= 5 * base ? 5 * base : x >= 2 * base ? 2 * base : base;
-}
-
-std::string escape(const std::string& s) {
-  std::string out;
-  for (char c : s) {
-    switch (c) {
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '&': out += "&amp;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  }
-  return out;
-}
-
-std::string text(double x, double y, const std::string& content, const char* extra = "") {
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" {}>{}</text>\n", x, y, extra, escape(content));
 }
 
 class Picture {

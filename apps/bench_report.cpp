@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rates are made here, from counts and times: nothing else divides.
+#include "apps/bench_report.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "apps/run_report.hpp"
+#include "io/scaling_plot.hpp"
+
+namespace tangere::apps {
+namespace {
+
+double rate(std::int64_t count, double seconds) { return static_cast<double>(count) / seconds; }
+
+double newton_per_step(const BenchmarkResult& result) {
+  return rate(result.newton_iterations, static_cast<double>(result.environment_steps));
+}
+
+/// Not a number in JSON: many readers keep 53 bits only.
+std::string hexadecimal(std::uint64_t checksum) { return fmt::format("{:016x}", checksum); }
+
+std::string frames_text(const BenchSetting& setting) {
+  const FrameKind frames = setting.options.frames;
+  if (frames == FrameKind::none || setting.every == 0)
+    return fmt::format("frames {}", to_string(frames));
+  return fmt::format("frames {} every {} step{}", to_string(frames), setting.every,
+                     setting.every == 1 ? "" : "s");
+}
+
+std::string csv_field(const Json& value) {
+  if (value.is_array()) return std::to_string(value.size());
+  if (!value.is_string()) return value.dump();
+  std::string text = "\"";
+  for (const char c : value.get<std::string>()) text += c == '"' ? "\"\"" : std::string(1, c);
+  return text + '"';
+}
+
+}  // namespace
+
+int common_interval(const Model& model, const RolloutOptions& rollout) {
+  int common = 0;
+  for (const SensorInfo& sensor : model.sensors()) {
+    const int every = tactile_interval(sensor, rollout);
+    if (common != 0 && common != every) return 0;
+    common = every;
+  }
+  return common;
+}
+
+std::string bench_heading(const BenchSetting& setting) {
+  return fmt::format(
+      "{}: {} environments, {} steps, {}, {}, {}\n{}; best of {} timed\n\n"
+      "{:>7} {:>14} {:>14} {:>9} {:>18} {:>18}\n{:>7} {:>14} {:>14} {:>9} {:>18} {:>18}",
+      setting.model, setting.environments, setting.options.rollout.steps, frames_text(setting),
+      setting.precision, setting.isa, setting.machine, setting.options.repeat, "threads",
+      "env-steps/s", "median", "speed-up", "env-steps/CPU-s", "tactile points/s", "-------",
+      "-----------", "------", "--------", "---------------", "----------------");
+}
+
+std::string bench_row(const BenchRun& run, const BenchRun& first) {
+  const BenchmarkResult& r = run.result;
+  const BenchmarkTime best = r.best();
+  return fmt::format(
+      "{:>7} {:>14.0f} {:>14.0f} {:>9.2f} {:>18.0f} {:>18.4g}", run.threads,
+      rate(r.environment_steps, best.seconds), rate(r.environment_steps, r.median().seconds),
+      first.result.best().seconds / best.seconds, rate(r.environment_steps, best.cpu_seconds),
+      rate(r.tactile_points, best.seconds));
+}
+
+std::string bench_footing(const BenchRun& run) {
+  return fmt::format("\nNewton iterations per step: {:.2f}, environments failed: {}, checksum: {}",
+                     newton_per_step(run.result), run.result.failures.size(),
+                     hexadecimal(run.result.checksum()));
+}
+
+Json bench_entry(const BenchSetting& setting, const BenchRun& run) {
+  const BenchmarkResult& r = run.result;
+  const BenchmarkTime best = r.best(), median = r.median();
+  return {{"threads", run.threads},
+          {"envs", setting.environments},
+          {"steps", setting.options.rollout.steps},
+          {"every", setting.every},
+          {"frames", to_string(setting.options.frames)},
+          {"precision", setting.precision},
+          {"isa", setting.isa},
+          {"repeat", setting.options.repeat},
+          {"seconds", best.seconds},
+          {"cpu_seconds", best.cpu_seconds},
+          {"env_steps_per_second", rate(r.environment_steps, best.seconds)},
+          {"env_steps_per_cpu_second", rate(r.environment_steps, best.cpu_seconds)},
+          {"tactile_points_per_second", rate(r.tactile_points, best.seconds)},
+          {"median_seconds", median.seconds},
+          {"median_cpu_seconds", median.cpu_seconds},
+          {"median_env_steps_per_second", rate(r.environment_steps, median.seconds)},
+          {"median_env_steps_per_cpu_second", rate(r.environment_steps, median.cpu_seconds)},
+          {"median_tactile_points_per_second", rate(r.tactile_points, median.seconds)},
+          {"newton_iterations", newton_per_step(r)},
+          {"failed", failures_of(r.failures)},
+          {"checksum", hexadecimal(r.checksum())}};
+}
+
+std::string bench_csv(const BenchSetting& setting, const Json& entries) {
+  std::string text = "scene,machine";
+  for (const auto& [key, value] : entries.at(0).items()) text += "," + key;
+  for (const Json& entry : entries) {
+    text += "\n" + csv_field(setting.scene) + "," + csv_field(setting.machine);
+    for (const auto& [key, value] : entry.items()) text += "," + csv_field(value);
+  }
+  return text + "\n";
+}
+
+std::string bench_svg(const BenchSetting& setting, const std::vector<BenchRun>& runs) {
+  ScalingCurve curve;
+  curve.title = setting.model + ": speed by threads";
+  curve.captions = {fmt::format("{}; {}, {}", setting.machine, setting.isa, setting.precision),
+                    fmt::format("scene {}, {} environments, {} steps",
+                                std::filesystem::path(setting.scene).filename().string(),
+                                setting.environments, setting.options.rollout.steps),
+                    fmt::format("{}; {} pass{}", frames_text(setting), setting.options.repeat,
+                                setting.options.repeat == 1 ? "" : "es")};
+  for (const BenchRun& run : runs)
+    curve.points.push_back({run.threads,
+                            rate(run.result.environment_steps, run.result.best().seconds),
+                            rate(run.result.environment_steps, run.result.median().seconds)});
+  return render_scaling_svg(curve);
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `tangere bench` measured, as a table for people, an object for programs, a CSV table and a picture.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/console.hpp"
+#include "engine/model.hpp"
+#include "tasks/benchmark_run.hpp"
+
+namespace tangere::apps {
+
+/// What all runs of one call share.
+struct BenchSetting {
+  std::string scene;  ///< path
+  std::string model, machine, isa, precision;
+  int environments = 0;
+  BenchmarkOptions options;  ///< threads: of no meaning here
+  int every = 0;             ///< steps between fields; 0: none, or sensors differ
+};
+
+struct BenchRun {
+  int threads = 1;
+  BenchmarkResult result;
+};
+
+/// Steps between fields when all sensors agree, else 0.
+int common_interval(const Model& model, const RolloutOptions& rollout);
+
+/// Lines above the table, and the two that head it.
+std::string bench_heading(const BenchSetting& setting);
+/// One line of the table; `first`: the run that the speed-up refers to.
+std::string bench_row(const BenchRun& run, const BenchRun& first);
+/// The line below the table: what does not depend on threads.
+std::string bench_footing(const BenchRun& run);
+
+/// One entry of "runs".
+Json bench_entry(const BenchSetting& setting, const BenchRun& run);
+/// Scene, machine and the keys of the entries as columns, one row per entry; failures are counted.
+std::string bench_csv(const BenchSetting& setting, const Json& entries);
+std::string bench_svg(const BenchSetting& setting, const std::vector<BenchRun>& runs);
+
+}  // namespace tangere::apps

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// A picture of speed against threads, beside the straight line that it would be at best. SVG, no window.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace tangere {
+
+struct ScalingPoint {
+  int threads = 1;
+  double best = 0, median = 0;  ///< environment steps per second of wall clock
+};
+
+struct ScalingCurve {
+  std::string title;
+  std::vector<std::string> captions;  ///< lines below the title: machine, what was run
+  std::vector<ScalingPoint> points;   ///< at least one, in any order
+};
+
+/// A dot for the best and a bar down to the median of each thread count; both axes start at zero. The ideal line goes
+/// through zero and the point with the fewest threads. Throws InputError without points, or for one that is not finite
+/// and positive.
+std::string render_scaling_svg(const ScalingCurve& curve);
+
+}  // namespace tangere
