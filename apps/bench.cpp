@@ -9,11 +9,10 @@
 #include "apps/command.hpp"
 #include "apps/machine.hpp"
 #include "apps/memory.hpp"
-#include "apps/run_report.hpp"
+#include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "io/nearest_name.hpp"
 #include "io/part_file.hpp"
-#include "io/scene_reader.hpp"
 #include "kernels/isa.hpp"
 #include "kernels/lanes.hpp"
 
@@ -43,8 +42,7 @@ FrameKind frames_named(const std::string& name) {
 }
 
 void check_arguments(const Options& options) {
-  if (options.precision != "double")
-    throw InputError("unknown precision '" + options.precision + "'; expected double");
+  check_precision(options.precision);
   for (const std::string& output : {options.svg, options.csv})
     if (!output.empty()) check_not_same_file(output, options.scene);
   if (!options.svg.empty() && options.svg == options.csv)
@@ -137,9 +135,7 @@ BenchSetting setting_of(const Options& options, const Model& model,
 int bench(const Options& options, const Console& console) {
   check_arguments(options);
   frames_named(options.frames);  // a wrong word is said before a scene is read
-  SceneFile file = read_scene(options.scene, {options.allow_unknown});
-  for (const std::string& warning : file.warnings) console.note("warning: " + warning);
-  const Model model(file.scene);
+  const Model model(read_scene_for(options.scene, options.allow_unknown, console));
   const std::uint64_t seed = options.seed.value_or(0);
   const ControlProgram controls(model, model.timestep(), seed);
   if (!model.scene().control && model.nu() > 0)
@@ -171,7 +167,7 @@ int bench(const Options& options, const Console& console) {
     tell_passes(console, runs.back());
   }
   console.print(bench_footing(runs.front()));
-  list_failures(console, runs.front().result.failures, "--json names all");
+  list_failures(console, "environment", failures_of(runs.front()), "--json names all");
   outputs.write(setting, runs, entries, console);
   return report(options, console, setting, start, controls, entries);
 }

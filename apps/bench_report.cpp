@@ -6,7 +6,6 @@
 
 #include <filesystem>
 
-#include "apps/run_report.hpp"
 #include "io/scaling_plot.hpp"
 
 namespace tangere::apps {
@@ -38,6 +37,13 @@ std::string csv_field(const Json& value) {
 }
 
 }  // namespace
+
+std::vector<Failure> failures_of(const BenchRun& run) {
+  std::vector<Failure> failures;
+  for (const FailedEnvironment& f : run.result.failures)
+    failures.push_back({f.environment, f.step, f.status});
+  return failures;
+}
 
 int common_interval(const Model& model, const RolloutOptions& rollout) {
   int common = 0;
@@ -97,7 +103,7 @@ Json bench_entry(const BenchSetting& setting, const BenchRun& run) {
           {"median_env_steps_per_cpu_second", rate(r.environment_steps, median.cpu_seconds)},
           {"median_tactile_points_per_second", rate(r.tactile_points, median.seconds)},
           {"newton_iterations", newton_per_step(r)},
-          {"failed", failures_of(r.failures)},
+          {"failed", failures_json("environment", failures_of(run))},
           {"checksum", hexadecimal(r.checksum())}};
 }
 

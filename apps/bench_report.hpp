@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/console.hpp"
+#include "apps/scene_run.hpp"
 #include "engine/model.hpp"
 #include "tasks/benchmark_run.hpp"
 
@@ -24,6 +24,9 @@ struct BenchRun {
   int threads = 1;
   BenchmarkResult result;
 };
+
+/// Of the environments of a run.
+std::vector<Failure> failures_of(const BenchRun& run);
 
 /// Steps between fields when all sensors agree, else 0.
 int common_interval(const Model& model, const RolloutOptions& rollout);

@@ -21,6 +21,7 @@ struct Command {
 
 Command add_inspect(CLI::App& program);
 Command add_simulate(CLI::App& program);
+Command add_generate(CLI::App& program);
 Command add_plot(CLI::App& program);
 Command add_bench(CLI::App& program);
 

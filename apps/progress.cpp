@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <utility>
 
 namespace tangere::apps {
 namespace {
@@ -15,8 +16,9 @@ constexpr auto kLogPause = std::chrono::seconds(10);
 
 }  // namespace
 
-Progress::Progress(const Console& console, std::int64_t steps, int environments)
-    : steps_(steps),
+Progress::Progress(const Console& console, std::string unit, std::int64_t steps, int environments)
+    : unit_(std::move(unit)),
+      steps_(steps),
       environments_(environments),
       terminal_(isatty(STDERR_FILENO) != 0),
       silent_(console.quiet || !(terminal_ || console.verbose)),
@@ -35,8 +37,8 @@ void Progress::update(std::int64_t done) {
   last_ = now;
   const double seconds = std::chrono::duration<double>(now - start_).count();
   const auto steps_done = static_cast<double>(done);
-  const std::string text = fmt::format("step {} of {}, {:.0f} env-steps/s, {:.0f} s left", done,
-                                       steps_, steps_done * environments_ / seconds,
+  const std::string text = fmt::format("{} {} of {}, {:.0f} env-steps/s, {:.0f} s left", unit_,
+                                       done, steps_, steps_done * environments_ / seconds,
                                        seconds / steps_done * static_cast<double>(steps_ - done));
   std::fputs(terminal_ ? ("\r" + text + "\x1b[K").c_str() : (text + "\n").c_str(), stderr);
   line_open_ = terminal_;

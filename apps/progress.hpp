@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <string>
 
 #include "apps/console.hpp"
 
@@ -13,7 +14,8 @@ namespace tangere::apps {
 /// nothing, or a line every ten seconds when verbose; never when quiet.
 class Progress {
  public:
-  Progress(const Console& console, std::int64_t steps, int environments);
+  /// `unit`: what is counted to `steps`, each of them a step of `environments`.
+  Progress(const Console& console, std::string unit, std::int64_t steps, int environments);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -22,6 +24,7 @@ class Progress {
 
  private:
   using Clock = std::chrono::steady_clock;
+  std::string unit_;
   std::int64_t steps_;
   int environments_;
   bool terminal_, silent_;

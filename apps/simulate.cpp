@@ -8,11 +8,9 @@
 #include "apps/command.hpp"
 #include "apps/memory.hpp"
 #include "apps/progress.hpp"
-#include "apps/run_report.hpp"
+#include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
-#include "io/csv.hpp"
 #include "io/nearest_name.hpp"
-#include "io/scene_reader.hpp"
 #include "io/trajectory_file.hpp"
 #include "kernels/isa.hpp"
 #include "tasks/rollout.hpp"
@@ -40,23 +38,9 @@ Integrator integrator_named(const std::string& name) {
 }
 
 void check_arguments(const Options& options) {
-  if (options.precision != "double")
-    throw InputError("unknown precision '" + options.precision + "'; expected double");
+  check_precision(options.precision);
   check_not_same_file(options.output, options.scene);
   if (!options.controls.empty()) check_not_same_file(options.output, options.controls);
-}
-
-ControlProgram make_controls(const Options& options, const Model& model, const Stepper& stepper,
-                             const Console& console) {
-  const std::uint64_t seed = options.seed.value_or(0);
-  if (!options.controls.empty()) {
-    const auto columns = static_cast<std::size_t>(model.nu());
-    CsvControl table{read_csv(options.controls, columns, model.u_names()), options.controls};
-    return {model, stepper.timestep(), seed, std::move(table)};
-  }
-  if (!model.scene().control && model.nu() > 0)
-    console.note("the scene has no <control> and there is no --controls: every control is 0");
-  return {model, stepper.timestep(), seed};
 }
 
 void check_size(const Model& model, int environments) {
@@ -80,6 +64,13 @@ TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
   return layout_from(batch, stepper, run);
 }
 
+std::vector<Failure> failures_of(const RolloutSummary& summary) {
+  std::vector<Failure> failures;
+  for (const FailedEnvironment& f : summary.failures)
+    failures.push_back({f.environment, f.step, f.status});
+  return failures;
+}
+
 int report(const Options& options, const Console& console, const Batch& batch,
            const Stepper& stepper, const RolloutOptions& rollout, const RolloutSummary& summary) {
   const ExitCode code = summary.failures.empty() ? kDone : kSomeFailed;
@@ -87,7 +78,7 @@ int report(const Options& options, const Console& console, const Batch& batch,
   const double rate = static_cast<double>(summary.environment_steps) / summary.seconds;
   const double per_step = static_cast<double>(summary.newton_iterations) /
                           static_cast<double>(summary.environment_steps);
-  list_failures(console, summary.failures, "--json and the file name all");
+  list_failures(console, "environment", failures_of(summary), "--json and the file name all");
   console.print(
       fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
                   "Newton iterations per step: {:.2f}, steps split: {}, environments failed: {}\n"
@@ -119,7 +110,7 @@ int report(const Options& options, const Console& console, const Batch& batch,
                   {"newton_iterations", summary.newton_iterations},
                   {"newton_iterations_per_step", per_step},
                   {"split_steps", summary.split_steps},
-                  {"failed", failures_of(summary.failures)}});
+                  {"failed", failures_json("environment", failures_of(summary))}});
   return code;
 }
 
@@ -128,11 +119,10 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
   StepperOptions solver{{}, options.timestep, options.tolerance};
   if (!options.integrator.empty()) solver.integrator = integrator_named(options.integrator);
 
-  SceneFile file = read_scene(options.scene, {options.allow_unknown});
-  for (const std::string& warning : file.warnings) console.note("warning: " + warning);
-  const Model model(file.scene);
+  const Model model(read_scene_for(options.scene, options.allow_unknown, console));
   Stepper stepper(model, solver);
-  const ControlProgram controls = make_controls(options, model, stepper, console);
+  const ControlProgram controls =
+      make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
   const RolloutOptions rollout{step_count(options.steps, controls), options.every.value_or(0)};
   note_empty_sensors(console, model, rollout);
   const int environments = options.environments.value_or(1);
@@ -147,7 +137,7 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
                              rollout.steps, to_string(stepper.integrator()), stepper.timestep()));
   RolloutSummary summary;
   {
-    Progress progress(console, rollout.steps, environments);
+    Progress progress(console, "step", rollout.steps, environments);
     summary = run_rollout(batch, stepper, controls, rollout, output, [&](std::int64_t done) {
       progress.update(done);
       return signals.received() == 0;

@@ -87,6 +87,11 @@ struct Types<double> {
   static hid_t disk() { return H5T_IEEE_F64LE; }
 };
 template <>
+struct Types<float> {
+  static hid_t memory() { return H5T_NATIVE_FLOAT; }
+  static hid_t disk() { return H5T_IEEE_F32LE; }
+};
+template <>
 struct Types<std::int8_t> {
   static hid_t memory() { return H5T_NATIVE_INT8; }
   static hid_t disk() { return H5T_STD_I8LE; }
@@ -176,12 +181,13 @@ void Id::reset() noexcept {
   id_ = -1;
 }
 
-Id create_file(const std::string& path) {
+Id create_file(const std::string& path, hsize_t description_block) {
   const Quiet quiet;
   const Id access(H5Pcreate(H5P_FILE_ACCESS));
   // 1.8 objects: attributes above 64 KiB (long scenes), and a plain open works after a crash.
   H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
+  H5Pset_meta_block_size(access.get(), description_block);
   H5Pset_file_locking(access.get(), false, true);  // io/part_file.hpp holds the lock
   const Id creation = without_times(H5P_FILE_CREATE);
   Id file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()));
@@ -229,6 +235,11 @@ bool has_link(const Id& parent, const std::string& name) {
   return H5Lexists(parent.get(), name.c_str(), H5P_DEFAULT) > 0;
 }
 
+void remove_link(const Id& parent, const std::string& name) {
+  const Quiet quiet;
+  if (H5Ldelete(parent.get(), name.c_str(), H5P_DEFAULT) < 0) fail("remove", parent, name);
+}
+
 template <class T>
 Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
                   const Storage& storage) {
@@ -237,6 +248,10 @@ Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
   if (space.get() < 0) fail("lay out dataset", parent, name);
   const Id creation = without_times(H5P_DATASET_CREATE);
   const Id access(H5Pcreate(H5P_DATASET_ACCESS));
+  if (storage.reserve) {
+    H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_EARLY);
+    H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
+  }
   if (!storage.chunk.empty()) {
     if (H5Pset_chunk(creation.get(), static_cast<int>(storage.chunk.size()),
                      storage.chunk.data()) < 0)
@@ -251,6 +266,21 @@ Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
                         creation.get(), access.get()));
   if (dataset.get() < 0) fail("create dataset", parent, name);
   return dataset;
+}
+
+void create_flags(const Id& parent, const std::string& name, std::span<const std::int8_t> flags) {
+  const Quiet quiet;
+  const Id type(H5Tenum_create(H5T_NATIVE_INT8));
+  const std::int8_t no = 0, yes = 1;
+  H5Tenum_insert(type.get(), "FALSE", &no);
+  H5Tenum_insert(type.get(), "TRUE", &yes);
+  const Id creation = without_times(H5P_DATASET_CREATE);
+  const Id space = list_space(flags.size());
+  const Id dataset(H5Dcreate2(parent.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT,
+                              creation.get(), H5P_DEFAULT));
+  if (dataset.get() < 0) fail("create dataset", parent, name);
+  if (H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, flags.data()) < 0)
+    fail("write", dataset);
 }
 
 Id open_dataset(const Id& parent, const std::string& name) {
@@ -370,6 +400,7 @@ std::vector<T> read_numbers(const Id& object, const std::string& name) {
   template void write_list<T>(const Id&, const std::string&, std::span<const T>);                 \
   template std::vector<T> read_numbers<T>(const Id&, const std::string&);
 TANGERE_H5_TYPE(double)
+TANGERE_H5_TYPE(float)
 TANGERE_H5_TYPE(std::int8_t)
 TANGERE_H5_TYPE(std::int32_t)
 TANGERE_H5_TYPE(std::int64_t)

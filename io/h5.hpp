@@ -44,8 +44,9 @@ class Id {
 using Dims = std::vector<hsize_t>;
 
 /// Creates a file, replacing what is at `path`. Readable by HDF5 1.8 and later; two runs that write
-/// the same numbers write the same bytes.
-Id create_file(const std::string& path);
+/// the same numbers write the same bytes. Descriptions of objects are put together in blocks of
+/// `description_block` bytes: large ones suit files of many objects.
+Id create_file(const std::string& path, hsize_t description_block = 2048);
 /// Opens a file for reading.
 Id open_file(const std::string& path);
 /// Flushes and closes a file; unlike Id::reset, it reports what could not be written.
@@ -54,17 +55,24 @@ void close_file(Id& file, const std::string& path);
 Id create_group(const Id& parent, const std::string& name);
 Id open_group(const Id& parent, const std::string& name);
 [[nodiscard]] bool has_link(const Id& parent, const std::string& name);
+/// Removes a group or dataset and all below it. Its space in the file stays unused.
+void remove_link(const Id& parent, const std::string& name);
 
 /// How a dataset lies on disk.
 struct Storage {
   Dims chunk;             ///< empty: contiguous
   bool compress = false;  ///< shuffle, then deflate level 1; needs a chunk shape
+  /// The place on disk is fixed when the dataset is created and nothing is filled in, so that the
+  /// order of writes does not show. For contiguous datasets whose every number will be written.
+  bool reserve = false;
 };
 
-/// T: double, std::int8_t, std::int32_t, std::int64_t, std::uint64_t. On disk: little endian.
+/// T: double, float, std::int8_t, std::int32_t, std::int64_t, std::uint64_t. On disk: little endian.
 template <class T>
 Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
                   const Storage& storage = {});
+/// A list of h5py's booleans: an enumeration FALSE = 0, TRUE = 1 of one byte.
+void create_flags(const Id& parent, const std::string& name, std::span<const std::int8_t> flags);
 Id open_dataset(const Id& parent, const std::string& name);
 [[nodiscard]] Dims dimensions(const Id& dataset);
 

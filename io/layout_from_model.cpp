@@ -4,6 +4,7 @@
 
 #include <stdexcept>
 
+#include "io/dataset_layout.hpp"
 #include "io/trajectory_layout.hpp"
 
 namespace tangere {
@@ -95,6 +96,33 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.first_episode = batch.episode(0);
   layout.precision = run.precision;
   layout.command_line = run.command_line;
+  layout.version = run.version;
+  layout.instruction_set = run.instruction_set;
+  return layout;
+}
+
+DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
+                                  const DatasetDescription& run) {
+  const Scene& scene = model.scene();
+  DatasetLayout layout;
+  layout.episodes = run.episodes;
+  layout.steps = run.steps;
+  layout.every = run.every;
+  layout.seed = run.seed;
+  layout.single = run.single;
+  layout.q_names = copy(model.q_names());
+  layout.q_units = copy(model.q_units());
+  layout.v_names = copy(model.v_names());
+  layout.v_units = copy(model.v_units());
+  layout.u_names = copy(model.u_names());
+  for (std::size_t i = 0; i < model.sensors().size(); ++i)
+    layout.sensors.push_back(sensor_layout(model.sensors()[i], scene.sensors[i], run.every));
+  layout.scene_name = scene.name;
+  layout.scene_text = scene.text;
+  layout.integrator = to_string(stepper.integrator());
+  layout.timestep = stepper.timestep();
+  layout.tolerance = stepper.tolerance();
+  layout.precision = run.precision;
   layout.version = run.version;
   layout.instruction_set = run.instruction_set;
   return layout;

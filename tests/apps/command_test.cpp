@@ -120,7 +120,7 @@ INSTANTIATE_TEST_SUITE_P(
                 {"simualte", "x"},
                 2,
                 "unknown subcommand 'simualte'; did you mean 'simulate'?"},
-        Mistake{"far_off", {"qqqqqqqqq"}, 2, "expected one of inspect, simulate, plot, bench"},
+        Mistake{"far_off", {"qqqqqqqqq"}, 2, "expected one of inspect, simulate, generate, plot, bench"},
         Mistake{"top_option",
                 {"--verison"},
                 2,

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// The same words for the same thing, whichever subcommand met it.
+#include "apps/scene_run.hpp"
+
+#include <fmt/format.h>
+
+#include <csignal>
+
+#include "io/csv.hpp"
+#include "io/scene_reader.hpp"
+
+namespace tangere::apps {
+namespace {
+
+constexpr std::size_t kMostFailuresListed = 20;
+
+}  // namespace
+
+void check_precision(const std::string& precision) {
+  if (precision != "double")
+    throw InputError("unknown precision '" + precision + "'; expected double");
+}
+
+Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console) {
+  SceneFile file = read_scene(path, {allow_unknown});
+  for (const std::string& warning : file.warnings) console.note("warning: " + warning);
+  return std::move(file.scene);
+}
+
+ControlProgram make_controls(const std::string& path, std::uint64_t seed, const Model& model,
+                             const Stepper& stepper, const Console& console) {
+  if (!path.empty()) {
+    const auto columns = static_cast<std::size_t>(model.nu());
+    CsvControl table{read_csv(path, columns, model.u_names()), path};
+    return {model, stepper.timestep(), seed, std::move(table)};
+  }
+  if (!model.scene().control && model.nu() > 0)
+    console.note("the scene has no <control> and there is no --controls: every control is 0");
+  return {model, stepper.timestep(), seed};
+}
+
+std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlProgram& controls) {
+  const std::int64_t steps = asked.value_or(controls.steps());
+  if (steps < 0)
+    throw InputError("the controls have no end, so the number of steps is not known; give --steps");
+  controls.check_covers(steps);
+  return steps;
+}
+
+void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout) {
+  for (const SensorInfo& sensor : model.sensors()) {
+    const int every = tactile_interval(sensor, rollout);
+    if (every > rollout.steps)
+      console.note(fmt::format("sensor {} is read every {} steps: no field in {} steps",
+                               sensor.name, every, rollout.steps));
+  }
+}
+
+int report_stop(const Console& console, const std::string& command, int signal,
+                const std::string& when, const std::string& left, const Json& result) {
+  const char* name = signal == SIGINT ? "SIGINT" : "SIGTERM";
+  const ExitCode code = signal == SIGINT ? kInterrupted : kTerminated;
+  const std::string text = fmt::format("stopped by {} {}; {}", name, when, left);
+  console.fail("tangere: " + text);
+  Json object{{"command", command}, {"exit_code", static_cast<int>(code)}, {"error", text}};
+  object.update(result);
+  console.result(object);
+  return code;
+}
+
+void list_failures(const Console& console, const std::string& what,
+                   const std::vector<Failure>& failures, const std::string& where) {
+  for (std::size_t i = 0; i < failures.size() && i < kMostFailuresListed; ++i)
+    console.fail(fmt::format("{} {} failed in step {}: {}", what, failures[i].number,
+                             failures[i].step, to_string(failures[i].status)));
+  if (failures.size() > kMostFailuresListed)
+    console.fail(fmt::format("failed too, not listed: {}; {}",
+                             failures.size() - kMostFailuresListed, where));
+}
+
+Json failures_json(const std::string& what, const std::vector<Failure>& failures) {
+  Json list = Json::array();
+  for (const Failure& f : failures)
+    list.push_back({{what, f.number},
+                    {"step", f.step},
+                    {"status", static_cast<int>(f.status)},
+                    {"reason", to_string(f.status)}});
+  return list;
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run of many episodes hands to whoever stores it. The only place where tasks/ (which
+// produces) and io/ (which stores) meet when episodes are generated.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "engine/batch.hpp"
+
+namespace tangere {
+
+/// Numbers of one name as they are stored: float64 or float32.
+using Observation = std::variant<std::span<const double>, std::span<const float>>;
+
+/// Rows [first_row, first_row + rows) of consecutive episodes. Row j is the state after j K steps;
+/// an episode of R actions has R + 1 of them, the last one without an action.
+struct EpisodeRows {
+  std::int64_t first_episode = 0;  ///< a multiple of 16
+  int episodes = 0;                ///< 16, fewer at the end of the run
+  std::int64_t first_row = 0;
+  int rows = 0;
+  int action_rows = 0;                        ///< rows, one less when the last row is among them
+  std::span<const float> actions;             ///< (episodes, action_rows, nu) in [-1, 1]
+  std::span<const Observation> observations;  ///< q, v, then each sensor: (episodes, rows, width)
+};
+
+/// An episode that no solution was found for.
+struct FailedEpisode {
+  std::int64_t episode = 0;
+  std::int64_t step = 0;  ///< the first that failed
+  StepStatus status = StepStatus::not_converged;
+  std::vector<double> q, v;  ///< the state before that step: (nq), (nv)
+};
+
+/// Receives episodes in pieces: those of one block of 16 in ascending rows, blocks in any order
+/// among each other. Called by one thread at a time. What is stored must depend on the pieces alone,
+/// not on the order of blocks. A sink that cannot store throws IoError; the run stops and passes it
+/// on.
+class EpisodeSink {
+ public:
+  virtual ~EpisodeSink() = default;
+  virtual void write(const EpisodeRows& rows) = 0;
+  /// The last row of the block that begins with this episode has been written.
+  virtual void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) = 0;
+};
+
+}  // namespace tangere

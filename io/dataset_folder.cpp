@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// A lock on the folder itself: nothing is left behind, and a killed process loses it.
+#include "io/dataset_folder.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "engine/error.hpp"
+#include "io/part_file.hpp"
+
+namespace tangere {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+[[noreturn]] void fail(const std::string& operation, const std::string& path, int error) {
+  throw IoError(fmt::format("cannot {} '{}': {}", operation, path, std::strerror(error)));
+}
+
+/// "shard-00042.h5" and a suffix.
+bool is_shard(const std::string& name, const std::string& suffix) {
+  constexpr std::string_view kBegin = "shard-";
+  if (!name.starts_with(kBegin) || !name.ends_with(suffix)) return false;
+  if (name.size() <= kBegin.size() + suffix.size()) return false;
+  return std::all_of(name.begin() + kBegin.size(),
+                     name.end() - static_cast<std::ptrdiff_t>(suffix.size()),
+                     [](char c) { return c >= '0' && c <= '9'; });
+}
+
+}  // namespace
+
+DatasetFolder::Descriptor::~Descriptor() {
+  if (number >= 0) close(number);
+}
+
+DatasetFolder::DatasetFolder(std::string path, bool overwrite) : path_(std::move(path)) {
+  std::error_code error;
+  created_ = fs::create_directory(path_, error);
+  if (error && error != std::errc::file_exists)
+    throw IoError(fmt::format("cannot create the folder '{}': {}", path_, error.message()));
+  if (!fs::is_directory(path_))
+    throw IoError(fmt::format("'{}' exists and is no folder; expected a folder for shards", path_));
+  if (access(path_.c_str(), W_OK | X_OK) != 0) fail("write into", path_, errno);
+  hold();
+  if (!overwrite && !files_ending(".h5").empty())
+    throw IoError(fmt::format("'{}' has shards already; give --overwrite to replace them", path_));
+  // Taken over and dropped: a .part that is being written by somebody else is an error.
+  for (const std::string& part : files_ending(".h5.part"))
+    const PartFile stale(part.substr(0, part.size() - std::strlen(".part")), true);
+}
+
+DatasetFolder::~DatasetFolder() {
+  if (created_) rmdir(path_.c_str());  // refused when there is something in it
+}
+
+void DatasetFolder::hold() {
+  descriptor_.number = open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor_.number < 0) fail("open", path_, errno);
+  // File systems without locks: the .part of each shard still is locked where that is possible.
+  if (flock(descriptor_.number, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+  throw IoError(
+      fmt::format("cannot write into '{}': another process is writing shards there", path_));
+}
+
+std::vector<std::string> DatasetFolder::files_ending(const std::string& suffix) const {
+  std::vector<std::string> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path_))
+    if (is_shard(entry.path().filename().string(), suffix)) files.push_back(entry.path().string());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::string DatasetFolder::shard_path(std::int64_t shard) const {
+  return (fs::path(path_) / fmt::format("shard-{:05}.h5", shard)).string();
+}
+
+double DatasetFolder::free_bytes() const {
+  double bytes = static_cast<double>(fs::space(path_).available);
+  for (const std::string& file : files_ending(".h5"))
+    bytes += static_cast<double>(fs::file_size(file));
+  return bytes;
+}
+
+void DatasetFolder::remove_old_shards() {
+  std::vector<std::string> files = files_ending(".h5");
+  std::reverse(files.begin(), files.end());
+  for (const std::string& file : files)
+    if (unlink(file.c_str()) != 0) fail("remove", file, errno);
+}
+
+}  // namespace tangere

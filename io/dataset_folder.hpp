@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// The folder of a data set: one process at a time, shards of one run only.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace tangere {
+
+class DatasetFolder {
+ public:
+  /// Creates the folder when it is missing, and holds it against other processes. Removes what a
+  /// killed run left unfinished. Throws IoError when it is something else, cannot be written, is
+  /// held by another process, or has shards and `overwrite` is false.
+  DatasetFolder(std::string path, bool overwrite);
+  /// Removes the folder if it was created here and nothing came into it.
+  ~DatasetFolder();
+  DatasetFolder(const DatasetFolder&) = delete;
+  DatasetFolder& operator=(const DatasetFolder&) = delete;
+
+  [[nodiscard]] std::string shard_path(std::int64_t shard) const;
+  /// Space on the disk that shards may fill, those to be removed included [bytes].
+  [[nodiscard]] double free_bytes() const;
+  /// Removes the shards of an earlier run, last one first, so that what is left begins with 0.
+  void remove_old_shards();
+
+ private:
+  void hold();
+  [[nodiscard]] std::vector<std::string> files_ending(const std::string& suffix) const;
+
+  /// Closed, and with it the lock, however the constructor ends.
+  struct Descriptor {
+    int number = -1;
+    Descriptor() = default;
+    ~Descriptor();
+    Descriptor(const Descriptor&) = delete;
+    Descriptor& operator=(const Descriptor&) = delete;
+  };
+
+  std::string path_;
+  bool created_ = false;
+  Descriptor descriptor_;
+};
+
+}  // namespace tangere

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Names, shapes and sizes of a data set.
+#include "io/dataset_layout.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <numeric>
+#include <set>
+
+namespace tangere {
+namespace {
+
+constexpr double kShardBytes = 1 << 30;
+constexpr std::int64_t kBlockEpisodes = 16;
+// Short episodes: creating objects is what costs, and a shard that is lost should be cheap.
+constexpr std::int64_t kMostEpisodes = 4096;
+
+}  // namespace
+
+std::vector<std::string> DatasetLayout::observation_names() const {
+  std::vector<std::string> names{"q", "v"};
+  for (const SensorLayout& sensor : sensors) names.push_back(sensor.name);
+  return names;
+}
+
+std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() const {
+  std::vector<std::vector<std::uint64_t>> shapes{{q_names.size()}, {v_names.size()}};
+  for (const SensorLayout& s : sensors) {
+    if (s.rectangular())
+      shapes.push_back({static_cast<std::uint64_t>(s.rows), static_cast<std::uint64_t>(s.cols), 3});
+    else
+      shapes.push_back({static_cast<std::uint64_t>(s.points), 3});
+  }
+  return shapes;
+}
+
+double DatasetLayout::episode_bytes() const {
+  double numbers = 0;
+  for (const std::vector<std::uint64_t>& shape : observation_shapes())
+    numbers += static_cast<double>(
+        std::accumulate(shape.begin(), shape.end(), std::uint64_t{1}, std::multiplies<>()));
+  const double r = static_cast<double>(rows());
+  const double of_actions = static_cast<double>(u_names.size()) * sizeof(float);
+  constexpr double kRewardAndDone = sizeof(float) + 1;
+  return (r + 1) * numbers * (single ? sizeof(float) : sizeof(double)) +
+         r * (of_actions + kRewardAndDone);
+}
+
+std::int64_t DatasetLayout::episodes_per_shard() const {
+  const double blocks = kShardBytes / (episode_bytes() * kBlockEpisodes);
+  constexpr double kMostBlocks = kMostEpisodes / kBlockEpisodes;
+  return static_cast<std::int64_t>(std::clamp(blocks, 1.0, kMostBlocks)) * kBlockEpisodes;
+}
+
+void DatasetLayout::check() const {
+  std::set<std::string> names{"q", "v"};
+  for (const SensorLayout& sensor : sensors) {
+    const std::string& name = sensor.name;
+    if (name.empty() || name == "." || name.find('/') != std::string::npos)
+      throw InputError(fmt::format(
+          "sensor '{}': a dataset cannot have this name; expected one without '/'", name));
+    if (!names.insert(name).second)
+      throw InputError(
+          fmt::format("sensor '{}': another observation has this name; expected none of q, v and "
+                      "the other sensors",
+                      name));
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// All that the shards of a data set say besides their numbers, and how episodes are dealt to shards.
+// Nothing in it depends on threads, folders or the time, so that the same request gives the same
+// bytes.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "io/trajectory_layout.hpp"
+
+namespace tangere {
+
+struct DatasetLayout {
+  std::int64_t episodes = 0;  ///< N, of all shards
+  std::int64_t steps = 0;     ///< of an episode
+  int every = 1;              ///< K: row j is the state after j K steps
+  std::uint64_t seed = 0;
+  bool single = false;                        ///< observations are float32, else float64
+  std::vector<std::string> q_names, q_units;  ///< (nq)
+  std::vector<std::string> v_names, v_units;  ///< (nv)
+  std::vector<std::string> u_names;           ///< (nu)
+  std::vector<SensorLayout> sensors;
+  std::string scene_name, scene_text;
+  std::string integrator;
+  double timestep = 0;   ///< [s]
+  double tolerance = 0;  ///< of the scaled residual, dimensionless
+  std::string precision, version, instruction_set;
+
+  /// R: actions of an episode.
+  [[nodiscard]] std::int64_t rows() const { return steps / every; }
+  /// Names below obs: q, v, then the sensors.
+  [[nodiscard]] std::vector<std::string> observation_names() const;
+  /// Shapes of one row of each of them: {nq}, {nv}, {rows, cols, 3}.
+  [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
+  /// Numbers of one episode on disk, without HDF5's own [bytes].
+  [[nodiscard]] double episode_bytes() const;
+  /// As many as stay below a gigabyte, a multiple of 16; depends on the data set alone.
+  [[nodiscard]] std::int64_t episodes_per_shard() const;
+  /// Throws InputError when a sensor cannot be a name in a file.
+  void check() const;
+};
+
+/// What the model does not know about a data set.
+struct DatasetDescription {
+  std::int64_t episodes = 0, steps = 0;
+  int every = 1;
+  std::uint64_t seed = 0;
+  bool single = false;  ///< observations are float32
+  std::string precision, version, instruction_set;
+};
+
+DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
+                                  const DatasetDescription& run);
+
+}  // namespace tangere

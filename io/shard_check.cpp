@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reads what was written through a fresh handle and compares with what the file says of itself.
+#include "io/shard_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "engine/error.hpp"
+#include "io/h5.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr std::size_t kReadBytes = std::size_t{4} << 20;
+
+std::uint64_t mix(std::uint64_t hash, std::uint64_t word) {
+  hash = (hash ^ word) * 0x9E3779B97F4A7C15ULL;  // odd: invertible, so no bit of a word is lost
+  return hash ^ (hash >> 32);
+}
+
+std::uint64_t row_hash(std::uint64_t key, const unsigned char* bytes, std::size_t count) {
+  std::uint64_t hash = key, word = 0;
+  for (; count >= sizeof word; bytes += sizeof word, count -= sizeof word) {
+    std::memcpy(&word, bytes, sizeof word);
+    hash = mix(hash, word);
+  }
+  word = 0;
+  std::memcpy(&word, bytes, count);
+  return mix(hash, word);
+}
+
+class ShardChecker {
+ public:
+  explicit ShardChecker(const std::string& path)
+      : path_(path), file_(h5::open_file(path)), scene_(h5::open_group(file_, "scene")) {}
+
+  ShardContent check() {
+    if (h5::read_text(file_, "format") != "tangere dataset") fail("it is no tangere data set");
+    content_.first_episode = number(file_, "first_episode");
+    const std::int64_t end = content_.first_episode + number(file_, "episodes");
+    names_ = h5::read_texts(scene_, "observations");
+    single_ = h5::read_text(scene_, "observation_type") == "float32";
+    rows_ = number(scene_, "steps") / number(scene_, "every");
+    const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
+    for (std::int64_t episode = content_.first_episode; episode < end; ++episode) {
+      const std::string demo = fmt::format("demo_{}", episode);
+      const bool is_demo = h5::has_link(data, demo);
+      if (is_demo == h5::has_link(failed, fmt::format("episode_{}", episode)))
+        fail(fmt::format("episode {} is not in exactly one of /data and /failed", episode));
+      if (is_demo)
+        add_demo(h5::open_group(data, demo), episode);
+      else
+        ++content_.failed;
+    }
+    if (number(data, "total") != content_.rows)
+      fail(fmt::format("/data says {} rows, its demos have {}", number(data, "total"),
+                       content_.rows));
+    const std::uint64_t expected = h5::read_numbers<std::uint64_t>(file_, "content_sum").at(0);
+    if (sum_.value() != expected)
+      fail(fmt::format("the checksum of its numbers is {:016x}, expected {:016x}", sum_.value(),
+                       expected));
+    return content_;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw IoError(fmt::format("'{}' is damaged: {}", path_, what));
+  }
+  static std::int64_t number(const h5::Id& object, const std::string& name) {
+    return h5::read_numbers<std::int64_t>(object, name).at(0);
+  }
+
+  void add_demo(const h5::Id& demo, std::int64_t episode) {
+    if (number(demo, "num_samples") != rows_)
+      fail(fmt::format("demo_{} has {} rows, expected {}", episode, number(demo, "num_samples"),
+                       rows_));
+    for (const char* name : {"rewards", "dones"})
+      check_rows(h5::open_dataset(demo, name), fmt::format("demo_{}/{}", episode, name), rows_);
+    add<float>(demo, "actions", episode, 0, 0, rows_);
+    const h5::Id obs = h5::open_group(demo, "obs"), final_obs = h5::open_group(demo, "final_obs");
+    for (std::size_t k = 0; k < names_.size(); ++k) {
+      if (single_) {
+        add<float>(obs, names_[k], episode, k + 1, 0, rows_);
+        add<float>(final_obs, names_[k], episode, k + 1, rows_, 1);
+      } else {
+        add<double>(obs, names_[k], episode, k + 1, 0, rows_);
+        add<double>(final_obs, names_[k], episode, k + 1, rows_, 1);
+      }
+    }
+    content_.rows += rows_;
+    ++content_.demos;
+  }
+
+  void check_rows(const h5::Id& dataset, const std::string& name, std::int64_t rows) const {
+    const h5::Dims dims = h5::dimensions(dataset);
+    if (dims.empty() || dims[0] != static_cast<hsize_t>(rows))
+      fail(fmt::format("{} has not {} rows", name, rows));
+  }
+
+  /// Adds a dataset whose row 0 is row `first` of the episode.
+  template <class T>
+  void add(const h5::Id& group, const std::string& name, std::int64_t episode, std::size_t index,
+           std::int64_t first, std::int64_t rows) {
+    const h5::Id dataset = h5::open_dataset(group, name);
+    check_rows(dataset, fmt::format("demo_{}: {}", episode, name), rows);
+    h5::Dims count = h5::dimensions(dataset), offset(count.size(), 0);
+    std::size_t width = 1;
+    for (std::size_t i = 1; i < count.size(); ++i) width *= count[i];
+    if (width == 0) return;
+    const auto step =
+        static_cast<std::int64_t>(std::max<std::size_t>(1, kReadBytes / (width * sizeof(T))));
+    auto& buffer = std::get<std::vector<T>>(buffers_);
+    for (std::int64_t row = 0; row < rows; row += step) {
+      count[0] = static_cast<hsize_t>(std::min(step, rows - row));
+      offset[0] = static_cast<hsize_t>(row);
+      buffer.resize(count[0] * width);
+      h5::read_box(dataset, offset, count, buffer.data());
+      sum_.add(episode, index, first + row, static_cast<std::int64_t>(count[0]), width * sizeof(T),
+               buffer.data());
+    }
+  }
+
+  std::string path_;
+  h5::Id file_, scene_;
+  std::vector<std::string> names_;
+  bool single_ = false;
+  std::int64_t rows_ = 0;
+  std::tuple<std::vector<float>, std::vector<double>> buffers_;
+  ContentSum sum_;
+  ShardContent content_;
+};
+
+}  // namespace
+
+void ContentSum::add(std::int64_t episode, std::size_t name, std::int64_t first_row,
+                     std::int64_t rows, std::size_t row_bytes, const void* data) {
+  const auto* bytes = static_cast<const unsigned char*>(data);
+  const std::uint64_t dataset = mix(mix(0, static_cast<std::uint64_t>(episode)), name);
+  if (row_bytes == 0) return;
+  for (std::int64_t row = 0; row < rows; ++row, bytes += row_bytes)
+    sum_ += row_hash(mix(dataset, static_cast<std::uint64_t>(first_row + row)), bytes, row_bytes);
+}
+
+ShardContent check_shard(const std::string& path) { return ShardChecker(path).check(); }
+
+}  // namespace tangere

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether a shard holds what its writer was given: counts, shapes, and a checksum of every number.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+namespace tangere {
+
+/// Order-independent: the sum over rows of a hash of (episode, name, row, bytes), so that rows may
+/// come in any order and be read back in another.
+class ContentSum {
+ public:
+  /// `name` numbers the dataset: 0 actions, then the observations. `rows` rows of `row_bytes` each.
+  void add(std::int64_t episode, std::size_t name, std::int64_t first_row, std::int64_t rows,
+           std::size_t row_bytes, const void* data);
+  void add(const ContentSum& other) { sum_ += other.sum_; }
+  [[nodiscard]] std::uint64_t value() const { return sum_; }
+
+ private:
+  std::uint64_t sum_ = 0;
+};
+
+struct ShardContent {
+  std::int64_t first_episode = 0;
+  std::int64_t demos = 0, failed = 0;  ///< episodes below /data and below /failed
+  std::int64_t rows = 0;               ///< of all demos
+};
+
+/// Reads a shard whole. Throws IoError naming the file and what is missing or differs.
+ShardContent check_shard(const std::string& path);
+
+}  // namespace tangere

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+// The layout that robomimic's loader reads (docs/datasets.md).
+#include "io/shard_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+
+namespace tangere {
+namespace {
+
+constexpr std::int64_t kBlockEpisodes = 16;
+constexpr hsize_t kDescriptionBlock = hsize_t{1} << 20;
+
+/// The text as a JSON string, quotes included. Bytes from 0x80 on are UTF-8 already.
+std::string json_text(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\')
+      out += {'\\', c};
+    else if (static_cast<unsigned char>(c) < 0x20)
+      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    else
+      out += c;
+  }
+  return out + '"';
+}
+
+h5::Dims with_rows(std::int64_t rows, const std::vector<std::uint64_t>& shape) {
+  h5::Dims dims{static_cast<hsize_t>(rows)};
+  dims.insert(dims.end(), shape.begin(), shape.end());
+  return dims;
+}
+
+std::size_t numbers_of(const h5::Dims& dims) {
+  std::size_t numbers = 1;
+  for (const hsize_t n : dims) numbers *= n;
+  return numbers;
+}
+
+h5::Id create(const h5::Id& group, const std::string& name, const h5::Dims& dims, bool single) {
+  const h5::Storage reserved{{}, false, true};
+  return single ? h5::create_dataset<float>(group, name, dims, reserved)
+                : h5::create_dataset<double>(group, name, dims, reserved);
+}
+
+/// Rows [first, first + dims[0]) of a dataset; none when dims hold no numbers.
+template <class T>
+void put(const h5::Id& dataset, std::int64_t first, const h5::Dims& dims, const T* data) {
+  if (numbers_of(dims) == 0) return;
+  h5::Dims offset(dims.size(), 0);
+  offset[0] = static_cast<hsize_t>(first);
+  h5::write_box<T>(dataset, offset, dims, data);
+}
+
+void describe_sensor(const h5::Id& sensors, const SensorLayout& s) {
+  const h5::Id group = h5::create_group(sensors, s.name);
+  h5::write_attribute(group, "units", "N");
+  h5::write_attribute(group, "components",
+                      "f.axis0, f.axis1, -f.(axis0 x axis1); f is the force on the body");
+  h5::write_attribute(group, "body", s.body);
+  h5::write_scalar<std::int64_t>(group, "pressure_sign", s.pressure_sign);
+  const std::int64_t resolution[] = {s.rows, s.cols};
+  h5::write_list<std::int64_t>(group, "resolution", resolution);
+  h5::write_list<double>(group, "corner0", s.corner0);
+  h5::write_list<double>(group, "corner1", s.corner1);
+  h5::write_list<double>(group, "axis0", s.axis0);
+  h5::write_list<double>(group, "axis1", s.axis1);
+}
+
+}  // namespace
+
+ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout,
+                     std::int64_t first_episode, std::int64_t episodes)
+    : layout_(layout),
+      first_episode_(first_episode),
+      end_(first_episode + episodes),
+      created_(first_episode),
+      unfinished_((episodes + kBlockEpisodes - 1) / kBlockEpisodes),
+      names_(layout.observation_names()),
+      shapes_(layout.observation_shapes()),
+      part_(path, false),
+      file_(h5::create_file(part_.path(), kDescriptionBlock)) {
+  try {
+    describe();
+  } catch (...) {
+    part_.empty();
+    throw;
+  }
+}
+
+ShardFile::~ShardFile() {
+  // On a full disk the library can only close its file once there is room again.
+  if (file_.get() >= 0) part_.empty();
+}
+
+void ShardFile::describe() {
+  h5::write_attribute(file_, "format", "tangere dataset");
+  h5::write_scalar<std::int64_t>(file_, "format_version", 1);
+  h5::write_scalar<std::int64_t>(file_, "first_episode", first_episode_);
+  h5::write_scalar<std::int64_t>(file_, "episodes", end_ - first_episode_);
+  h5::write_scalar<std::int64_t>(file_, "dataset_episodes", layout_.episodes);
+  data_ = h5::create_group(file_, "data");
+  h5::write_attribute(data_, "env_args",
+                      fmt::format(R"({{"env_name": {}, "type": 2, "env_kwargs": {{}}}})",
+                                  json_text(layout_.scene_name)));
+  static_cast<void>(h5::create_group(file_, "failed"));
+  const h5::Id scene = h5::create_group(file_, "scene");
+  const auto texts = [&](const char* name, const std::vector<std::string>& list) {
+    h5::write_attribute(scene, name, std::span<const std::string>(list));
+  };
+  h5::write_attribute(scene, "name", layout_.scene_name);
+  h5::write_attribute(scene, "text", layout_.scene_text);
+  h5::write_scalar<std::uint64_t>(scene, "seed", layout_.seed);
+  h5::write_scalar<std::int64_t>(scene, "steps", layout_.steps);
+  h5::write_scalar<std::int64_t>(scene, "every", layout_.every);
+  h5::write_scalar<double>(scene, "timestep", layout_.timestep);
+  h5::write_attribute(scene, "timestep_unit", "s");
+  h5::write_attribute(scene, "integrator", layout_.integrator);
+  h5::write_scalar<double>(scene, "tolerance", layout_.tolerance);
+  h5::write_attribute(scene, "precision", layout_.precision);
+  h5::write_attribute(scene, "tangere_version", layout_.version);
+  h5::write_attribute(scene, "instruction_set", layout_.instruction_set);
+  h5::write_attribute(scene, "quaternion_order", "w x y z");
+  h5::write_attribute(scene, "observation_type", layout_.single ? "float32" : "float64");
+  texts("observations", names_);
+  texts("q_names", layout_.q_names);
+  texts("q_units", layout_.q_units);
+  texts("v_names", layout_.v_names);
+  texts("v_units", layout_.v_units);
+  texts("action_names", layout_.u_names);
+  const h5::Id sensors = h5::create_group(scene, "sensors");
+  for (const SensorLayout& sensor : layout_.sensors) describe_sensor(sensors, sensor);
+}
+
+void ShardFile::create_block(std::int64_t first_episode) {
+  Block& block = blocks_[first_episode];
+  const std::int64_t end = std::min(first_episode + kBlockEpisodes, end_);
+  for (std::int64_t episode = first_episode; episode < end; ++episode)
+    block.push_back(create_demo(episode));
+}
+
+ShardFile::Demo ShardFile::create_demo(std::int64_t episode) {
+  const std::int64_t rows = layout_.rows();
+  const h5::Id group = h5::create_group(data_, fmt::format("demo_{}", episode));
+  h5::write_scalar<std::int64_t>(group, "num_samples", rows);
+  Demo demo;
+  demo.actions = create(group, "actions", with_rows(rows, {layout_.u_names.size()}), true);
+  const std::vector<float> rewards(static_cast<std::size_t>(rows), 0.0F);
+  const h5::Dims list{rewards.size()};
+  put(create(group, "rewards", list, true), 0, list, rewards.data());
+  std::vector<std::int8_t> dones(rewards.size(), 0);
+  dones.back() = 1;
+  h5::create_flags(group, "dones", dones);
+  const h5::Id obs = h5::create_group(group, "obs"), last = h5::create_group(group, "final_obs");
+  for (std::size_t k = 0; k < names_.size(); ++k) {
+    demo.obs.push_back(create(obs, names_[k], with_rows(rows, shapes_[k]), layout_.single));
+    demo.final_obs.push_back(create(last, names_[k], with_rows(1, shapes_[k]), layout_.single));
+  }
+  return demo;
+}
+
+void ShardFile::write(const EpisodeRows& rows) {
+  for (; created_ <= rows.first_episode; created_ += kBlockEpisodes) create_block(created_);
+  Block& block = blocks_.at(rows.first_episode);
+  const std::size_t nu = layout_.u_names.size();
+  const h5::Dims actions{static_cast<hsize_t>(rows.action_rows), nu};
+  for (int e = 0; e < rows.episodes; ++e) {
+    Demo& demo = block[static_cast<std::size_t>(e)];
+    const float* from = rows.actions.data() + static_cast<std::size_t>(e) * numbers_of(actions);
+    put(demo.actions, rows.first_row, actions, from);
+    demo.sum.add(rows.first_episode + e, 0, rows.first_row, rows.action_rows, nu * sizeof(float),
+                 from);
+    for (std::size_t name = 0; name < names_.size(); ++name) write_observation(demo, rows, e, name);
+  }
+}
+
+void ShardFile::write_observation(Demo& demo, const EpisodeRows& rows, int episode,
+                                  std::size_t name) {
+  std::visit(
+      [&](const auto& values) {
+        const std::size_t width = numbers_of(with_rows(1, shapes_[name]));
+        const auto all = static_cast<std::size_t>(rows.rows);
+        const auto* from = values.data() + static_cast<std::size_t>(episode) * all * width;
+        put(demo.obs[name], rows.first_row, with_rows(rows.action_rows, shapes_[name]), from);
+        if (rows.rows > rows.action_rows)
+          put(demo.final_obs[name], 0, with_rows(1, shapes_[name]),
+              from + static_cast<std::size_t>(rows.action_rows) * width);
+        demo.sum.add(rows.first_episode + episode, name + 1, rows.first_row, rows.rows,
+                     width * sizeof *from, from);
+      },
+      rows.observations[name]);
+}
+
+void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) {
+  const auto block = blocks_.find(first_episode);
+  for (const FailedEpisode& failure : failures) {
+    // What was written of it is to disappear.
+    block->second[static_cast<std::size_t>(failure.episode - first_episode)].sum = {};
+    failures_.push_back(failure);
+  }
+  for (const Demo& demo : block->second) sum_.add(demo.sum);
+  blocks_.erase(block);
+  --unfinished_;
+}
+
+void ShardFile::record_failures() {
+  std::sort(failures_.begin(), failures_.end(),
+            [](const FailedEpisode& a, const FailedEpisode& b) { return a.episode < b.episode; });
+  const h5::Id failed = h5::open_group(file_, "failed");
+  for (const FailedEpisode& failure : failures_) {
+    h5::remove_link(data_, fmt::format("demo_{}", failure.episode));
+    const h5::Id group = h5::create_group(failed, fmt::format("episode_{}", failure.episode));
+    h5::write_scalar<std::int64_t>(group, "step", failure.step);
+    h5::write_scalar<std::int8_t>(group, "status", static_cast<std::int8_t>(failure.status));
+    h5::write_attribute(group, "reason", to_string(failure.status));
+    h5::write_list<double>(group, "q", failure.q);
+    h5::write_list<double>(group, "v", failure.v);
+  }
+}
+
+void ShardFile::commit() {
+  record_failures();
+  const auto demos = end_ - first_episode_ - static_cast<std::int64_t>(failures_.size());
+  h5::write_scalar<std::int64_t>(data_, "total", demos * layout_.rows());
+  h5::write_scalar<std::uint64_t>(file_, "content_sum", sum_.value());
+  data_.reset();
+  h5::close_file(file_, part_.path());
+  static_cast<void>(check_shard(part_.path()));
+  part_.commit();
+}
+
+}  // namespace tangere

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+// Row j: observe the state after j K steps, then hold the action of step j K for K steps. The row
+// after the last action is observed only.
+#include "tasks/episode_slot.hpp"
+
+#include <algorithm>
+
+namespace tangere {
+namespace {
+
+constexpr int kForceWidth = 3;
+
+std::size_t size(int n) { return static_cast<std::size_t>(n); }
+
+/// Bytes of one row of one episode in a slot's buffers.
+double row_bytes(const EpisodeShape& shape, const EpisodeOptions& options) {
+  double numbers = 0;
+  for (const std::size_t width : shape.widths) numbers += static_cast<double>(width);
+  const double number = options.observations == ObservationType::float32
+                            ? sizeof(double) + sizeof(float)
+                            : sizeof(double);
+  return numbers * number + static_cast<double>(shape.nu) * sizeof(float);
+}
+
+}  // namespace
+
+EpisodeShape::EpisodeShape(const Model& model, const EpisodeOptions& options)
+    : rows(::tangere::action_rows(options)), nu(size(model.nu())) {
+  widths = {size(model.nq()), size(model.nv())};
+  for (const SensorInfo& sensor : model.sensors())
+    widths.push_back(kForceWidth * size(sensor.points));
+  const double fitting =
+      static_cast<double>(options.piece_bytes) / (kBlockEpisodes * row_bytes(*this, options));
+  constexpr std::int64_t kMostRows = 1 << 20;  // rows without numbers still are counted by an int
+  piece_rows = static_cast<int>(
+      std::clamp(fitting, 1.0, static_cast<double>(std::min(rows + 1, kMostRows))));
+}
+
+double EpisodeShape::piece_bytes(const EpisodeOptions& options) const {
+  return row_bytes(*this, options) * kBlockEpisodes * piece_rows;
+}
+
+EpisodeSlot::EpisodeSlot(const Model& model, const StepperOptions& solver,
+                         const ControlProgram& controls, const EpisodeOptions& options,
+                         const EpisodeShape& shape)
+    : model_(model),
+      controls_(controls),
+      options_(options),
+      shape_(shape),
+      stepper_(model, solver),
+      readout_(model),
+      u_(kBlockEpisodes * shape.nu),
+      values_(shape.widths.size()),
+      singles_(shape.widths.size()),
+      actions_(kBlockEpisodes * size(shape.piece_rows) * shape.nu),
+      observations_(shape.widths.size()),
+      live_(kBlockEpisodes) {
+  for (std::size_t name = 0; name < values_.size(); ++name) {
+    const std::size_t numbers = kBlockEpisodes * size(shape.piece_rows) * shape.widths[name];
+    values_[name].resize(numbers);
+    if (options.observations == ObservationType::float32) singles_[name].resize(numbers);
+  }
+}
+
+void EpisodeSlot::begin(std::int64_t block) {
+  const std::int64_t first = block * kBlockEpisodes;
+  const auto episodes =
+      static_cast<int>(std::min<std::int64_t>(kBlockEpisodes, options_.episodes - first));
+  batch_.emplace(model_, episodes, options_.seed, first);
+  next_row_ = 0;
+  failures_.clear();
+  live_.assign(size(episodes), true);
+}
+
+bool EpisodeSlot::simulate(const StopRequest& stop) {
+  first_row_ = next_row_;
+  rows_ = static_cast<int>(std::min<std::int64_t>(shape_.piece_rows, shape_.rows + 1 - first_row_));
+  action_rows_ = static_cast<int>(std::min<std::int64_t>(rows_, shape_.rows - first_row_));
+  counts_ = {};
+  for (int row = 0; row < rows_; ++row) {
+    observe(row);
+    if (row < action_rows_ && !act(row, stop)) return false;
+  }
+  next_row_ += rows_;
+  return true;
+}
+
+std::span<double> EpisodeSlot::numbers(std::size_t name, int episode, int row) {
+  const std::size_t width = shape_.widths[name];
+  return std::span(values_[name]).subspan((size(episode) * size(rows_) + size(row)) * width, width);
+}
+
+void EpisodeSlot::observe(int row) {
+  constexpr std::size_t kQ = 0, kV = 1, kFirstSensor = 2;
+  for (int e = 0; e < batch_->environments(); ++e) {
+    batch_->get_q(e, numbers(kQ, e, row));
+    batch_->get_v(e, numbers(kV, e, row));
+    for (std::size_t name = kFirstSensor; name < values_.size(); ++name)
+      read_field(static_cast<int>(name - kFirstSensor), e, numbers(name, e, row));
+  }
+}
+
+void EpisodeSlot::read_field(int sensor, int episode, std::span<double> field) {
+  readout_.tactile(*batch_, episode, sensor, field);
+}
+
+bool EpisodeSlot::act(int row, const StopRequest& stop) {
+  const std::int64_t begin = (first_row_ + row) * options_.every;
+  const std::size_t nu = shape_.nu;
+  for (int e = 0; e < batch_->environments(); ++e) {
+    const std::span<double> u = std::span(u_).subspan(size(e) * nu, nu);
+    controls_.evaluate(begin, batch_->episode(e), u);
+    float* const action = actions_.data() + (size(e) * size(action_rows_) + size(row)) * nu;
+    for (std::size_t k = 0; k < nu; ++k)
+      action[k] = static_cast<float>(std::clamp(u[k], -1.0, 1.0));
+  }
+  for (int k = 0; k < options_.every; ++k) {
+    if (stop && stop()) return false;
+    stepper_.step(*batch_, u_);
+    count(begin + k);
+  }
+  return true;
+}
+
+void EpisodeSlot::count(std::int64_t step) {
+  for (int e = 0; e < batch_->environments(); ++e) {
+    if (!live_[size(e)]) continue;
+    const StepStatus status = batch_->status(e);
+    ++counts_.environment_steps;
+    counts_.newton_iterations += batch_->iterations(e);
+    counts_.split_steps += status == StepStatus::split ? 1 : 0;
+    if (!failed(status)) continue;
+    live_[size(e)] = false;
+    FailedEpisode& failure = failures_.emplace_back();
+    failure = {batch_->episode(e), step, status, std::vector<double>(size(model_.nq())),
+               std::vector<double>(size(model_.nv()))};
+    batch_->get_q(e, failure.q);
+    batch_->get_v(e, failure.v);
+  }
+}
+
+void EpisodeSlot::encode() {
+  for (std::size_t name = 0; name < values_.size(); ++name) {
+    const std::size_t numbers = size(batch_->environments()) * size(rows_) * shape_.widths[name];
+    const std::span<const double> values = std::span(values_[name]).first(numbers);
+    if (options_.observations == ObservationType::float64) {
+      observations_[name] = values;
+      continue;
+    }
+    const std::span<float> singles = std::span(singles_[name]).first(numbers);
+    std::transform(values.begin(), values.end(), singles.begin(),
+                   [](double x) { return static_cast<float>(x); });
+    observations_[name] = std::span<const float>(singles);
+  }
+  std::sort(failures_.begin(), failures_.end(),
+            [](const FailedEpisode& a, const FailedEpisode& b) { return a.episode < b.episode; });
+}
+
+EpisodeRows EpisodeSlot::piece() const {
+  const std::size_t actions = size(batch_->environments()) * size(action_rows_) * shape_.nu;
+  return {batch_->episode(0), batch_->environments(),
+          first_row_,         rows_,
+          action_rows_,       std::span(actions_).first(actions),
+          observations_};
+}
+
+}  // namespace tangere
