@@ -5,6 +5,7 @@
 #include <span>
 
 #include "kernels/model_view.hpp"
+#include "kernels/tactile_types.hpp"
 
 namespace tangere::kernels {
 
@@ -27,22 +28,19 @@ struct GroupStage {
   LaneRow *v, *g, *force_scale, *mass_diagonal, *G_q, *C, *A, *LU, *work, *excess;
 };
 
-/// One tactile sensor read for one environment.
-struct TactileArgs {
-  const double* points;   ///< (n_tiles, 3, 64): x, y, z of 8×8 points, padded with far points, sensor link axes
-  const double* bounds;   ///< (n_tiles, 4): centre and radius
-  int n_tiles;
-  PrimitiveShape shape;
-  double size[3];
-  double Q[9], c[3];      ///< shape frame in the sensor's link
-  double omega[3], v[3];  ///< twist of the shape relative to the sensor's link, at its origin, its axes
-  double kn, kt, mu, damping;
-  ContactLaw law;
-  double axes[9];         ///< rows: axis0, axis1, -(axis0 × axis1)
-  double* force;          ///< (n_tiles, 3, 64) [N], added to
-  unsigned char* touched; ///< (n_tiles) set to 1 where a tile was written
+/// World pose and body twist of a link.
+template <class N>
+struct LinkPose {
+  Frame<N> world;
+  Vec6<N> V;
 };
-inline constexpr int kTactileTile = 64;
+
+/// State of eight environments as rows.
+struct GroupState {
+  const LaneRow *q, *v;
+  const LaneRow* zero;  ///< (nv) zeros
+  LaneRow* rates;       ///< (nv) scratch
+};
 
 struct KernelTable {
   const char* name;  ///< "avx512", "avx2", "sse2", "scalar"
@@ -57,8 +55,17 @@ struct KernelTable {
   void (*solve)(const ModelView&, const GroupStage&, const LaneRow* b, LaneRow* out);
   /// The same, refined once; sound[l] = 1 where the result can be trusted.
   void (*solve_watched)(const ModelView&, const GroupStage&, const LaneRow* b, LaneRow* out, LaneRow* sound);
-  /// Adds the forces of one shape on one sensor, tiles out of reach skipped.
-  void (*tactile)(const TactileArgs&);
+  /// Poses and twists of every link, (n_links).
+  void (*link_poses)(const ModelView&, const GroupState&, LinkPose<LaneRow>* out);
+  /// Pose and twist of a shape against a pad, both given in their links (nullptr: the world). Parameters are left alone.
+  void (*pad_touch)(const LinkPose<LaneRow>* sensor, const Frame<double>& pad, const LinkPose<LaneRow>* body,
+                    const Frame<double>& shape, Touch<LaneRow>* out);
+  /// Field of one environment; how many tiles are touched.
+  int (*tactile)(const TactileArgs<double>&);
+  int (*tactile_mixed)(const TactileArgs<float>&);
+  /// Fields of eight and of sixteen environments.
+  void (*tactile_block)(const TactileBlockArgs<double>&);
+  void (*tactile_block_mixed)(const TactileBlockArgs<float>&);
 };
 
 /// Tables this machine can run, best first; never empty.

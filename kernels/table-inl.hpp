@@ -6,8 +6,9 @@
 
 #include "kernels/jacobian-inl.hpp"
 #include "kernels/kernel_table.hpp"
+#include "kernels/link_poses-inl.hpp"
 #include "kernels/lu-inl.hpp"
-#include "kernels/tactile-inl.hpp"
+#include "kernels/tactile_block-inl.hpp"
 
 namespace tangere::kernels {
 
@@ -86,14 +87,29 @@ struct TableOf {
                                   LaneRow* sound) {
     solve_watched(m.pattern, view(s.A), view(s.LU), view(b), view(out), view(sound), view(s.work));
   }
-  static void tactile(const TactileArgs& a) {
-    tactile_field<N, kGroup>(
-        a, [](const double* p) { return load_lanes<Arch>(p); },
-        [](const N& x, double* p) { store_lanes(x, p); });
+  static void poses_of_links(const ModelView& m, const GroupState& s, LinkPose<LaneRow>* out) {
+    StageArgs<N> a{};
+    a.centre = view(s.q);
+    a.x = a.s = view(s.zero);
+    a.r = view(s.v);
+    a.c0_over_h = N(0.0);
+    a.inverse_h = N(1.0);
+    a.v = view(s.rates);
+    link_poses(m, a, reinterpret_cast<LinkPose<N>*>(out));
   }
+  static void touch_of_pad(const LinkPose<LaneRow>* sensor, const Frame<double>& pad, const LinkPose<LaneRow>* body,
+                           const Frame<double>& shape, Touch<LaneRow>* out) {
+    pad_touch(reinterpret_cast<const LinkPose<N>*>(sensor), pad, reinterpret_cast<const LinkPose<N>*>(body), shape,
+              reinterpret_cast<Touch<N>&>(*out));
+  }
+  static int tactile(const TactileArgs<double>& a) { return tactile_field<InDouble<Arch>>(a); }
+  static int tactile_mixed(const TactileArgs<float>& a) { return tactile_field<InMixed<Arch>>(a); }
+  static void tactile_group(const TactileBlockArgs<double>& a) { tactile_block<InDouble<Arch>>(a); }
+  static void tactile_group_mixed(const TactileBlockArgs<float>& a) { tactile_block<InMixed<Arch>>(a); }
 
   static constexpr KernelTable make(const char* name) {
-    return {name, scratch_bytes, pair_poses, evaluate, factor_lanes, solve_lanes, solve_watched_lanes, tactile};
+    return {name,           scratch_bytes, pair_poses,    evaluate,      factor_lanes,       solve_lanes, solve_watched_lanes,
+            poses_of_links, touch_of_pad,  tactile,       tactile_mixed, tactile_group, tactile_group_mixed};
   }
 };
 
