@@ -24,7 +24,7 @@ constexpr int kMostPasses = 1'000'000;
 constexpr int kDefaultEnvironments = 256;  // 16 blocks: a few for each thread of a usual machine
 
 struct Options {
-  std::string scene, frames = "dense", precision = "double", svg, csv;
+  std::string scene, frames = "dense", precision = "mixed", svg, csv;
   std::vector<int> threads;
   std::optional<std::int64_t> steps;
   std::optional<int> environments, every, repeat;
@@ -34,7 +34,7 @@ struct Options {
 
 FrameKind frames_named(const std::string& name) {
   std::vector<std::string> names;
-  for (const FrameKind value : {FrameKind::dense, FrameKind::none}) {
+  for (const FrameKind value : {FrameKind::dense, FrameKind::compact, FrameKind::none}) {
     names.emplace_back(to_string(value));
     if (names.back() == name) return value;
   }
@@ -42,7 +42,6 @@ FrameKind frames_named(const std::string& name) {
 }
 
 void check_arguments(const Options& options) {
-  check_precision(options.precision);
   for (const std::string& output : {options.svg, options.csv})
     if (!output.empty()) check_not_same_file(output, options.scene);
   if (!options.svg.empty() && options.svg == options.csv)
@@ -123,7 +122,7 @@ BenchSetting setting_of(const Options& options, const Model& model,
   setting.model = model.scene().name;
   setting.machine = processor_name();
   setting.isa = kernels::active_isa_name();
-  setting.precision = options.precision;
+  setting.options.precision = precision_named(options.precision);
   setting.environments = options.environments.value_or(kDefaultEnvironments);
   setting.options.rollout = {step_count(options.steps, controls), options.every.value_or(0)};
   setting.options.frames = frames_named(options.frames);
@@ -134,7 +133,9 @@ BenchSetting setting_of(const Options& options, const Model& model,
 
 int bench(const Options& options, const Console& console) {
   check_arguments(options);
-  frames_named(options.frames);  // a wrong word is said before a scene is read
+  // A wrong word is said before a scene is read.
+  frames_named(options.frames);
+  precision_named(options.precision);
   const Model model(read_scene_for(options.scene, options.allow_unknown, console));
   const std::uint64_t seed = options.seed.value_or(0);
   const ControlProgram controls(model, model.timestep(), seed);
@@ -187,11 +188,11 @@ Command add_bench(CLI::App& program) {
   add_whole_numbers(*app, "--threads", o.threads, 1, kMostThreads,
                     "Thread counts to measure [default: 1,2,4,... up to the processors here]");
   add_text(*app, "--precision", o.precision, "NAME",
-           "Of the numbers: double, the only one so far [default: double]");
+           "Of tactile fields: double, or mixed, points in float [default: mixed]");
   add_whole_number<int>(*app, "--every", o.every, 1, kMostEnvironments,
                         "Tactile fields every N-th step [default: the scene's, or 1]");
   add_text(*app, "--frames", o.frames, "NAME",
-           "Of tactile fields: dense, every point; none, do not read them [default: dense]");
+           "Of tactile fields: dense, every point; compact, touched tiles; none [default: dense]");
   add_whole_number<int>(*app, "--repeat", o.repeat, 1, kMostPasses,
                         "Timed passes over the episode; the best counts [default: 3]");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,

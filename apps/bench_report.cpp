@@ -60,7 +60,7 @@ std::string bench_heading(const BenchSetting& setting) {
       "{}: {} environments, {} steps, {}, {}, {}\n{}; best of {} timed\n\n"
       "{:>7} {:>14} {:>14} {:>9} {:>18} {:>18}\n{:>7} {:>14} {:>14} {:>9} {:>18} {:>18}",
       setting.model, setting.environments, setting.options.rollout.steps, frames_text(setting),
-      setting.precision, setting.isa, setting.machine, setting.options.repeat, "threads",
+      to_string(setting.options.precision), setting.isa, setting.machine, setting.options.repeat, "threads",
       "env-steps/s", "median", "speed-up", "env-steps/CPU-s", "tactile points/s", "-------",
       "-----------", "------", "--------", "---------------", "----------------");
 }
@@ -89,7 +89,7 @@ Json bench_entry(const BenchSetting& setting, const BenchRun& run) {
           {"steps", setting.options.rollout.steps},
           {"every", setting.every},
           {"frames", to_string(setting.options.frames)},
-          {"precision", setting.precision},
+          {"precision", to_string(setting.options.precision)},
           {"isa", setting.isa},
           {"repeat", setting.options.repeat},
           {"seconds", best.seconds},
@@ -120,7 +120,7 @@ std::string bench_csv(const BenchSetting& setting, const Json& entries) {
 std::string bench_svg(const BenchSetting& setting, const std::vector<BenchRun>& runs) {
   ScalingCurve curve;
   curve.title = setting.model + ": speed by threads";
-  curve.captions = {fmt::format("{}; {}, {}", setting.machine, setting.isa, setting.precision),
+  curve.captions = {fmt::format("{}; {}, {}", setting.machine, setting.isa, to_string(setting.options.precision)),
                     fmt::format("scene {}, {} environments, {} steps",
                                 std::filesystem::path(setting.scene).filename().string(),
                                 setting.environments, setting.options.rollout.steps),

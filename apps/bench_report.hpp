@@ -14,7 +14,7 @@ namespace tangere::apps {
 /// What all runs of one call share.
 struct BenchSetting {
   std::string scene;  ///< path
-  std::string model, machine, isa, precision;
+  std::string model, machine, isa;
   int environments = 0;
   BenchmarkOptions options;  ///< threads: of no meaning here
   int every = 0;             ///< steps between fields; 0: none, or sensors differ

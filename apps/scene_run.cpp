@@ -7,6 +7,7 @@
 #include <csignal>
 
 #include "io/csv.hpp"
+#include "io/nearest_name.hpp"
 #include "io/scene_reader.hpp"
 
 namespace tangere::apps {
@@ -16,9 +17,13 @@ constexpr std::size_t kMostFailuresListed = 20;
 
 }  // namespace
 
-void check_precision(const std::string& precision) {
-  if (precision != "double")
-    throw InputError("unknown precision '" + precision + "'; expected double");
+Precision precision_named(const std::string& name) {
+  std::vector<std::string> names;
+  for (const Precision value : {Precision::f64, Precision::mixed}) {
+    names.emplace_back(to_string(value));
+    if (names.back() == name) return value;
+  }
+  throw InputError("unknown precision '" + name + "'" + suggestion(name, names));
 }
 
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console) {

@@ -10,6 +10,7 @@
 
 #include "apps/console.hpp"
 #include "engine/control.hpp"
+#include "engine/precision.hpp"
 #include "engine/stepper.hpp"
 #include "tasks/rollout.hpp"
 
@@ -20,7 +21,7 @@ constexpr int kMostEnvironments = 1'000'000'000;
 constexpr std::int64_t kMostSteps = 1'000'000'000'000;
 
 /// Throws InputError for a --precision that there is not.
-void check_precision(const std::string& precision);
+Precision precision_named(const std::string& name);
 
 /// Reads a scene; its warnings go to the console.
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console);

@@ -38,7 +38,6 @@ Integrator integrator_named(const std::string& name) {
 }
 
 void check_arguments(const Options& options) {
-  check_precision(options.precision);
   check_not_same_file(options.output, options.scene);
   if (!options.controls.empty()) check_not_same_file(options.output, options.controls);
 }
@@ -57,7 +56,7 @@ TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
   run.every = rollout.every;
   for (const SensorInfo& sensor : batch.model().sensors())
     run.tactile_intervals.push_back(tactile_interval(sensor, rollout));
-  run.precision = "double";
+  run.precision = to_string(rollout.precision);
   run.command_line = info.command_line;
   run.version = info.version;
   run.instruction_set = kernels::active_isa_name();
@@ -116,6 +115,7 @@ int report(const Options& options, const Console& console, const Batch& batch,
 
 int simulate(const Options& options, const Console& console, const ProgramInfo& info) {
   check_arguments(options);
+  const Precision precision = precision_named(options.precision);
   StepperOptions solver{{}, options.timestep, options.tolerance};
   if (!options.integrator.empty()) solver.integrator = integrator_named(options.integrator);
 
@@ -123,7 +123,7 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
   Stepper stepper(model, solver);
   const ControlProgram controls =
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
-  const RolloutOptions rollout{step_count(options.steps, controls), options.every.value_or(0)};
+  const RolloutOptions rollout{step_count(options.steps, controls), options.every.value_or(0), precision};
   note_empty_sensors(console, model, rollout);
   const int environments = options.environments.value_or(1);
   check_size(model, environments);
@@ -173,7 +173,7 @@ Command add_simulate(CLI::App& program) {
   add_positive_number(*app, "--tol", o.tolerance,
                       "Largest scaled residual of a step [default: the scene's]");
   add_text(*app, "--precision", o.precision, "NAME",
-           "Of the numbers: double, the only one so far [default: double]");
+           "Of tactile fields: double, or mixed, points in float [default: double]");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between environments [default: 0]");
   app->add_flag("--overwrite", o.overwrite, "Replace the output if it exists");

@@ -25,7 +25,8 @@ install(TARGETS tangere_kernels tangere_engine tangere_tasks tangere_io tangere_
 install(TARGETS tangere RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(FILES kernels/contact_types.hpp DESTINATION ${headers}/kernels)
 install(FILES engine/aligned.hpp engine/batch.hpp engine/control.hpp engine/episode_sink.hpp engine/error.hpp engine/model.hpp
-  engine/readout.hpp engine/row_sink.hpp engine/scene.hpp engine/stepper.hpp DESTINATION ${headers}/engine)
+  engine/precision.hpp engine/readout.hpp engine/row_sink.hpp engine/scene.hpp engine/stepper.hpp
+  engine/tactile_frame.hpp DESTINATION ${headers}/engine)
 install(FILES tasks/benchmark_run.hpp tasks/episodes.hpp tasks/rollout.hpp DESTINATION ${headers}/tasks)
 install(FILES io/dataset_layout.hpp io/dataset_writer.hpp io/scene_reader.hpp io/trajectory_file.hpp io/trajectory_layout.hpp DESTINATION ${headers}/io)
 install(DIRECTORY scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tangere/scenes)

@@ -8,6 +8,7 @@
 #include "engine/model.hpp"
 #include "kernels/model_view.hpp"
 #include "kernels/so3.hpp"
+#include "kernels/tactile_types.hpp"
 
 namespace tangere {
 
@@ -34,18 +35,24 @@ struct CompiledMotor {
   double low, high;
 };
 
-/// Points of one sensor in tiles of 8×8, in its link's axes.
+/// Points of one sensor in tiles of 8×8, in its pad's axes (kernels/tactile_types.hpp).
 struct CompiledSensor {
   int body = -1, link = -1;
-  kernels::Frame<double> frame;      ///< body frame in the link
-  AlignedVector<double> points;      ///< (n_tiles, 3, 64), padded with far points
-  std::vector<double> bounds;        ///< (n_tiles, 4) centre and radius
-  std::vector<int> index;            ///< (n_tiles, 64) row-major point index, -1 padding
-  int n_tiles = 0;
-  double axes[9] = {};               ///< rows axis0, axis1, -(axis0 × axis1), link axes
+  kernels::Frame<double> pad;        ///< pad frame in the link: axis0, axis1, their product; the array's middle
+  int rows = 0, cols = 0, tile_rows = 0, tile_cols = 0;
+  AlignedVector<double> tile_x, tile_y, tile_radius;  ///< (n_tiles, padded to 8)
+  std::vector<unsigned char> tile_kind;               ///< (n_tiles)
+  AlignedVector<double> offsets;                      ///< (4, 2, 64)
+  AlignedVector<float> offsets_f;                     ///< (4, 2, 64)
+  bool skewed = false;
+  double axes[9] = {};               ///< rows axis0, axis1, -(axis0 × axis1), pad axes
   kernels::ContactParameters parameters{};
   ContactLaw law = ContactLaw::clamped;
   std::vector<int> targets;          ///< bodies it can feel
+
+  [[nodiscard]] int points() const { return rows * cols; }
+  [[nodiscard]] int n_tiles() const { return tile_rows * tile_cols; }
+  [[nodiscard]] kernels::PadTiles tiles() const;
 };
 
 /// Symbolic analysis of the Jacobian: the storage behind kernels::Pattern.

@@ -1,138 +1,254 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forward kinematics of one environment in plain doubles, then the tactile kernel per touching body.
+// Kinematics in lanes, then the tactile kernel: per environment on large pads, per block on small ones.
 #include "engine/readout.hpp"
 
 #include <algorithm>
-#include <vector>
+#include <array>
+#include <type_traits>
 
-#include "engine/aligned.hpp"
 #include "engine/compiled_model.hpp"
-#include "kernels/kernel_table.hpp"
-#include "kernels/residual-inl.hpp"
+#include "engine/dense_tiles.hpp"
+#include "engine/pad_reader.hpp"
 
 namespace tangere {
 
-using kernels::Frame;
-using kernels::Vec3;
-using kernels::Vec6;
+using kernels::kBlock;
+using kernels::kGroup;
+using kernels::kTactileTile;
 
 struct Readout::Impl {
   Model model;
-  std::vector<kernels::LinkScratch<double>> links;
-  std::vector<double> q, v, zero, joint_v;
-  std::vector<AlignedVector<double>> force;       // per sensor, in tiles, zero between calls
-  std::vector<std::vector<unsigned char>> touched;
+  Precision precision;
+  PadReader reader;
+  AlignedVector<double> wide;   // fields computed in the other type than asked for: one, or those of a block
+  AlignedVector<float> single;
 
-  explicit Impl(const Model& m)
-      : model(m),
-        links(m.compiled().links.size()),
-        q(std::size_t(m.nq())),
-        v(std::size_t(m.nv())),
-        zero(std::size_t(m.nv())),
-        joint_v(std::size_t(m.nv())) {
-    for (const CompiledSensor& s : m.compiled().sensors) {
-      force.emplace_back(std::size_t(s.n_tiles) * 3 * kernels::kTactileTile, 0.0);
-      touched.emplace_back(std::size_t(s.n_tiles), static_cast<unsigned char>(0));
+  Impl(const Model& m, Precision p) : model(m), precision(p), reader(m) {
+    std::size_t room = 0;
+    for (const CompiledSensor& s : m.compiled().sensors)
+      room = std::max({room, std::size_t(s.n_tiles()) * 3 * kTactileTile,
+                       small(s) ? std::size_t(kBlock * 3 * s.points()) : std::size_t(0)});
+    (p == Precision::f64 ? wide.resize(room) : single.resize(room));
+  }
+
+  static bool small(const CompiledSensor& s) { return s.points() <= kSmallPad; }
+  [[nodiscard]] const CompiledSensor& sensor_of(int k) const { return model.compiled().sensors[std::size_t(k)]; }
+  template <class Real>
+  Real* scratch() {
+    if constexpr (std::is_same_v<Real, double>) return wide.data();
+    if constexpr (std::is_same_v<Real, float>) return single.data();
+  }
+
+  static int run(const kernels::TactileArgs<double>& a) { return kernels::active_kernels().tactile(a); }
+  static int run(const kernels::TactileArgs<float>& a) { return kernels::active_kernels().tactile_mixed(a); }
+  static void run(const kernels::TactileBlockArgs<double>& a) { kernels::active_kernels().tactile_block(a); }
+  static void run(const kernels::TactileBlockArgs<float>& a) { kernels::active_kernels().tactile_block_mixed(a); }
+
+  /// Calls `body` with a zero of the type the readout computes in.
+  template <class Body>
+  auto in_precision(const Body& body) {
+    return precision == Precision::f64 ? body(double{}) : body(float{});
+  }
+
+  void place(const Batch& batch, int environment, int sensor) {
+    const int block = environment / kBlock, group = environment % kBlock / kGroup;
+    reader.move(batch, block, group);
+    reader.meet(batch, block, group, sensor);
+  }
+
+  /// Writes the touched tiles of an environment that has been placed; returns how many, listed in reader.active.
+  template <class T>
+  int write_touched(int environment, int sensor, T* dense) {
+    return in_precision([&](auto zero) {
+      using Real = decltype(zero);
+      auto a = reader.arguments<Real>(sensor, environment % kBlock / kGroup, environment % kGroup);
+      if constexpr (std::is_same_v<Real, T>) {
+        a.dense = dense;
+        return run(a);
+      } else {
+        a.values = scratch<Real>();
+        const int count = run(a);
+        for (int k = 0; k < count; ++k)
+          expand_tile(*a.pad, a.active[k], a.values + 3 * kTactileTile * k, dense);
+        return count;
+      }
+    });
+  }
+
+  template <class T>
+  void fill(int environment, int sensor, T* dense) {
+    const int count = write_touched(environment, sensor, dense);
+    clear_tiles_between<T>(sensor_of(sensor).tiles(), {reader.active.data(), std::size_t(count)}, dense);
+  }
+
+  /// Writes what is touched now, zeroes what was and is no longer.
+  template <class T>
+  void refresh(int environment, DenseFrame<T>& frame) {
+    const kernels::PadTiles pad = sensor_of(frame.sensor_).tiles();
+    const int count = write_touched(environment, frame.sensor_, frame.values_.data());
+    for (int old = 0, now = 0; old < frame.count_; ++old) {
+      const int tile = frame.written_[std::size_t(old)];
+      while (now < count && reader.active[std::size_t(now)] < tile) ++now;
+      if (now == count || reader.active[std::size_t(now)] != tile) clear_tile(pad, tile, frame.values_.data());
+    }
+    std::copy(reader.active.begin(), reader.active.begin() + count, frame.written_.begin());
+    frame.count_ = count;
+  }
+
+  /// Touched tiles of a small pad into the arrays of `environments` environments, zeros elsewhere.
+  template <class T>
+  void fill_block(int sensor, int environments, const std::array<T*, kBlock>& dense) {
+    const auto numbers = 3 * std::size_t(sensor_of(sensor).points());
+    in_precision([&](auto zero) {
+      using Real = decltype(zero);
+      std::array<Real*, kBlock> out{};
+      for (std::size_t e = 0; e < std::size_t(environments); ++e) {
+        if constexpr (std::is_same_v<Real, T>) {
+          out[e] = dense[e];
+        } else {
+          out[e] = scratch<Real>() + numbers * e;
+        }
+        std::fill(out[e], out[e] + numbers, Real(0));
+      }
+      constexpr int kLanes = std::is_same_v<Real, float> ? kBlock : kGroup;
+      for (int first = 0; first < environments; first += kLanes) {
+        auto a = reader.block_arguments<Real>(sensor, first / kGroup);
+        a.dense = out.data() + first;
+        run(a);
+      }
+      if constexpr (!std::is_same_v<Real, T>) {
+        for (std::size_t e = 0; e < std::size_t(environments); ++e)
+          std::transform(out[e], out[e] + numbers, dense[e], [](Real x) { return static_cast<T>(x); });
+      }
+    });
+  }
+
+  template <class T>
+  void compact(int environment, CompactFrame<T>& frame) {
+    frame.count_ = in_precision([&](auto zero) {
+      using Real = decltype(zero);
+      auto a = reader.arguments<Real>(frame.sensor_, environment % kBlock / kGroup, environment % kGroup);
+      a.active = frame.tiles_.data();
+      if constexpr (std::is_same_v<Real, T>) {
+        a.values = frame.values_.get();
+        return run(a);
+      } else {
+        a.values = scratch<Real>();
+        const int count = run(a);
+        std::transform(a.values, a.values + std::ptrdiff_t{3} * kTactileTile * count, frame.values_.get(),
+                       [](Real x) { return static_cast<T>(x); });
+        return count;
+      }
+    });
+  }
+
+  /// Both groups of a block; the second even if empty: a vector of floats reads both.
+  void place_block(const Batch& batch, int number, int sensor) {
+    for (int g = 0; g < kBlock / kGroup; ++g) {
+      reader.move(batch, number, g);
+      reader.meet(batch, number, g, sensor);
     }
   }
 
-  /// World poses and body twists of all links. With x = 0 and r = v, the stage's rates are v itself.
-  void kinematics(const Batch& batch, int environment) {
-    batch.get_q(environment, q);
-    batch.get_v(environment, v);
-    kernels::StageArgs<double> a{};
-    a.centre = q.data();
-    a.x = zero.data();
-    a.r = v.data();
-    a.s = zero.data();
-    a.c0_over_h = 0;
-    a.inverse_h = 1;
-    a.links = links.data();
-    a.v = joint_v.data();
-    kernels::outward_sweep(model.compiled().view, a);
+  /// Small pads: all environments at once. Large ones: `one` for each, its group placed.
+  template <class T, class One>
+  void block(const Batch& batch, int number, int sensor, const std::array<T*, kBlock>& dense, const One& one) {
+    const int environments = std::min(kBlock, batch.environments() - number * kBlock);
+    place_block(batch, number, sensor);
+    if (small(sensor_of(sensor))) {
+      fill_block(sensor, environments, dense);
+    } else {
+      for (int e = 0; e < environments; ++e) one(e);
+    }
   }
 
-  [[nodiscard]] Frame<double> world(int link) const {
-    return link < 0 ? Frame<double>{kernels::diagonal(1.0), {0, 0, 0}} : links[std::size_t(link)].world;
-  }
-  [[nodiscard]] Vec6<double> twist(int link) const {
-    return link < 0 ? kernels::zero6<double>() : links[std::size_t(link)].V;
-  }
-
-  /// Adds what `body` does to `sensor`, in tiles.
-  void feel(const Batch& batch, int environment, int sensor, int body) {
-    const CompiledModel& m = model.compiled();
-    const CompiledSensor& s = m.sensors[std::size_t(sensor)];
-    const CompiledBody& b = m.bodies[std::size_t(body)];
-    const Frame<double> link2 = relative(world(s.link), world(b.link));
-    const Frame<double> shape = compose(link2, b.frame);
-    const Vec6<double> W = motion_to_parent(link2, twist(b.link)) - twist(s.link);
-    const double* block = batch.block(environment / kernels::kBlock) + environment % kernels::kBlock;
-    const auto value = [&](const kernels::Parameter& p) {
-      return p.row < 0 ? p.value : block[std::size_t(p.row) * kernels::kBlock];
-    };
-    kernels::TactileArgs a{};
-    a.points = s.points.data();
-    a.bounds = s.bounds.data();
-    a.n_tiles = s.n_tiles;
-    a.shape = b.shape;
-    a.size[0] = b.size.x, a.size[1] = b.size.y, a.size[2] = b.size.z;
-    for (int i = 0; i < 9; ++i) a.Q[i] = shape.R.m[i / 3][i % 3];
-    a.c[0] = shape.p.x, a.c[1] = shape.p.y, a.c[2] = shape.p.z;
-    a.omega[0] = W.a.x, a.omega[1] = W.a.y, a.omega[2] = W.a.z;
-    a.v[0] = W.l.x, a.v[1] = W.l.y, a.v[2] = W.l.z;
-    a.kn = value(s.parameters.kn);
-    a.kt = value(s.parameters.kt);
-    a.mu = value(s.parameters.mu);
-    a.damping = value(s.parameters.damping);
-    a.law = s.law;
-    std::copy(s.axes, s.axes + 9, a.axes);
-    a.force = force[std::size_t(sensor)].data();
-    a.touched = touched[std::size_t(sensor)].data();
-    kernels::active_kernels().tactile(a);
+  template <class T>
+  void block_spans(const Batch& batch, int number, int sensor, std::span<const std::span<T>> fields) {
+    std::array<T*, kBlock> dense{};
+    for (std::size_t e = 0; e < std::min(fields.size(), std::size_t(kBlock)); ++e) dense[e] = fields[e].data();
+    block<T>(batch, number, sensor, dense, [&](int e) { fill(e, sensor, dense[std::size_t(e)]); });
   }
 };
 
-Readout::Readout(const Model& model) : impl_(std::make_unique<Impl>(model)) {}
+Readout::Readout(const Model& model, Precision precision) : impl_(std::make_unique<Impl>(model, precision)) {}
 Readout::~Readout() = default;
 Readout::Readout(Readout&&) noexcept = default;
 Readout& Readout::operator=(Readout&&) noexcept = default;
+Precision Readout::precision() const { return impl_->precision; }
 
 void Readout::bodies(const Batch& batch, int environment, std::span<double> pose, std::span<double> twist) {
-  impl_->kinematics(batch, environment);
+  const int group = environment % kBlock / kGroup, lane = environment % kGroup;
+  impl_->reader.move(batch, environment / kBlock, group);
   const CompiledModel& m = impl_->model.compiled();
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const CompiledBody& body = m.bodies[b];
-    const Frame<double> at = compose(impl_->world(body.link), body.frame);
+    const kernels::LinkPose<double> link = impl_->reader.link(body.link, group, lane);
+    const kernels::Frame<double> at = compose(link.world, body.frame);
     const kernels::Quat<double> o = quaternion_of(at.R);
     const double values[7] = {at.p.x, at.p.y, at.p.z, o.w, o.x, o.y, o.z};
     std::copy(values, values + 7, &pose[7 * b]);
-    const Vec6<double> V = impl_->twist(body.link);
-    const kernels::Mat3<double> R = impl_->world(body.link).R;
-    const Vec3<double> omega = R * V.a, v = R * (V.l + cross(V.a, body.frame.p));
+    const kernels::Vec3<double> omega = link.world.R * link.V.a;
+    const kernels::Vec3<double> v = link.world.R * (link.V.l + cross(link.V.a, body.frame.p));
     const double rates[6] = {omega.x, omega.y, omega.z, v.x, v.y, v.z};
     std::copy(rates, rates + 6, &twist[6 * b]);
   }
 }
 
 void Readout::tactile(const Batch& batch, int environment, int sensor, std::span<double> force) {
-  impl_->kinematics(batch, environment);
-  const CompiledSensor& s = impl_->model.compiled().sensors[std::size_t(sensor)];
-  for (int body : s.targets) impl_->feel(batch, environment, sensor, body);
-  std::fill(force.begin(), force.end(), 0.0);
-  constexpr int kTile = kernels::kTactileTile;
-  for (int t = 0; t < s.n_tiles; ++t) {
-    unsigned char& touched = impl_->touched[std::size_t(sensor)][std::size_t(t)];
-    if (touched == 0) continue;
-    double* tile = impl_->force[std::size_t(sensor)].data() + std::size_t(t) * 3 * kTile;
-    for (int k = 0; k < kTile; ++k) {
-      const int index = s.index[std::size_t(t * kTile + k)];
-      if (index < 0) continue;
-      for (int c = 0; c < 3; ++c) force[std::size_t(3 * index + c)] = tile[c * kTile + k];
-    }
-    std::fill(tile, tile + 3 * kTile, 0.0);
-    touched = 0;
-  }
+  impl_->place(batch, environment, sensor);
+  impl_->fill(environment, sensor, force.data());
 }
+void Readout::tactile(const Batch& batch, int environment, int sensor, std::span<float> force) {
+  impl_->place(batch, environment, sensor);
+  impl_->fill(environment, sensor, force.data());
+}
+
+template <class T>
+void Readout::read(const Batch& batch, int environment, DenseFrame<T>& frame) {
+  impl_->place(batch, environment, frame.sensor_);
+  impl_->refresh(environment, frame);
+}
+
+template <class T>
+void Readout::read(const Batch& batch, int environment, CompactFrame<T>& frame) {
+  impl_->place(batch, environment, frame.sensor_);
+  impl_->compact(environment, frame);
+}
+
+void Readout::read_block(const Batch& batch, int block, int sensor, std::span<const std::span<double>> fields) {
+  impl_->block_spans(batch, block, sensor, fields);
+}
+void Readout::read_block(const Batch& batch, int block, int sensor, std::span<const std::span<float>> fields) {
+  impl_->block_spans(batch, block, sensor, fields);
+}
+
+template <class T>
+void Readout::read_block(const Batch& batch, int block, std::span<DenseFrame<T>> frames) {
+  if (frames.empty()) return;
+  std::array<T*, kBlock> dense{};
+  for (std::size_t e = 0; e < std::min(frames.size(), std::size_t(kBlock)); ++e) {
+    dense[e] = frames[e].values_.data();
+    // Small pads are written whole; whoever reads one of them alone afterwards must find all tiles in the list.
+    if (Impl::small(impl_->sensor_of(frames[e].sensor_))) frames[e].mark_all();
+  }
+  impl_->block<T>(batch, block, frames[0].sensor_, dense, [&](int e) { impl_->refresh(e, frames[std::size_t(e)]); });
+}
+
+template <class T>
+void Readout::read_block(const Batch& batch, int block, std::span<CompactFrame<T>> frames) {
+  if (frames.empty()) return;
+  impl_->place_block(batch, block, frames[0].sensor_);
+  const int environments = std::min(kBlock, batch.environments() - block * kBlock);
+  for (int e = 0; e < environments; ++e) impl_->compact(e, frames[std::size_t(e)]);
+}
+
+template void Readout::read(const Batch&, int, DenseFrame<float>&);
+template void Readout::read(const Batch&, int, DenseFrame<double>&);
+template void Readout::read(const Batch&, int, CompactFrame<float>&);
+template void Readout::read(const Batch&, int, CompactFrame<double>&);
+template void Readout::read_block(const Batch&, int, std::span<DenseFrame<float>>);
+template void Readout::read_block(const Batch&, int, std::span<DenseFrame<double>>);
+template void Readout::read_block(const Batch&, int, std::span<CompactFrame<float>>);
+template void Readout::read_block(const Batch&, int, std::span<CompactFrame<double>>);
 
 }  // namespace tangere

@@ -6,24 +6,50 @@
 #include <span>
 
 #include "engine/batch.hpp"
+#include "engine/precision.hpp"
+#include "engine/tactile_frame.hpp"
 
 namespace tangere {
 
 /// Reads any batch of its model. Owns the scratch of one thread; allocates only when made.
+///
+/// Tactile fields are in [N]: f·axis0, f·axis1, -f·(axis0 × axis1), f the force on the sensor's body. Exactly zero where
+/// nothing touches. They feel every body that can move against the sensor. Every way of reading gives the same numbers:
+/// those of the readout's precision, converted where T is another type. T is float or double.
 class Readout {
  public:
-  explicit Readout(const Model& model);
+  explicit Readout(const Model& model, Precision precision = Precision::f64);
   ~Readout();
   Readout(Readout&&) noexcept;
   Readout& operator=(Readout&&) noexcept;
+
+  [[nodiscard]] Precision precision() const;
 
   /// World poses (nb, 7: x y z qw qx qy qz of the body frame) and twists (nb, 6: angular, then linear velocity of the
   /// body frame's origin, world axes) of one environment, every body of the scene in file order.
   void bodies(const Batch& batch, int environment, std::span<double> pose, std::span<double> twist);
 
-  /// Tactile field of one sensor and environment, (points, 3) [N]: f·axis0, f·axis1, -f·(axis0 × axis1), f the force on
-  /// the sensor's body. Exactly zero where nothing touches. Feels every body that can move against the sensor.
+  /// Field of one sensor and environment into (points, 3), zeros included.
   void tactile(const Batch& batch, int environment, int sensor, std::span<double> force);
+  void tactile(const Batch& batch, int environment, int sensor, std::span<float> force);
+
+  /// Field of the frame's sensor.
+  template <class T>
+  void read(const Batch& batch, int environment, DenseFrame<T>& frame);
+  template <class T>
+  void read(const Batch& batch, int environment, CompactFrame<T>& frame);
+
+  /// Fields of the environments 16 block …, (points, 3) each, one array per environment; those beyond the last environment
+  /// of the batch are left alone and may be missing. Pads of up to kSmallPad points are read in all environments at once.
+  void read_block(const Batch& batch, int block, int sensor, std::span<const std::span<double>> fields);
+  void read_block(const Batch& batch, int block, int sensor, std::span<const std::span<float>> fields);
+  /// The same into one frame per environment, all of one sensor.
+  template <class T>
+  void read_block(const Batch& batch, int block, std::span<DenseFrame<T>> frames);
+  template <class T>
+  void read_block(const Batch& batch, int block, std::span<CompactFrame<T>> frames);
+
+  static constexpr int kSmallPad = 512;
 
  private:
   struct Impl;

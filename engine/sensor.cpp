@@ -13,7 +13,7 @@ using kernels::Vec3;
 
 namespace {
 
-constexpr double kFarAway = 1e6;  // padding points [m]: beyond any shape, finite, so nothing overflows
+constexpr double kFarAway = 1e6;  // missing points and tiles [m]: beyond any shape, finite, so nothing overflows
 
 Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
 
@@ -30,6 +30,49 @@ int find_pressure_sign(const TactileDescription& d, const CompiledBody& body, co
   return dot(normal, outward) >= 0 ? 1 : -1;
 }
 
+/// Spacing of the array's points in pad axes: from row to row, and from column to column [m].
+struct Lattice {
+  double row_x, row_y, col_x, col_y;
+};
+
+/// Points of a tile that starts at `first`, along one axis.
+int points_in(int first, int total) { return std::min(kernels::kTileSide, total - first); }
+
+void place_tiles(CompiledSensor& s, const Lattice& lattice) {
+  constexpr int kSide = kernels::kTileSide;
+  s.tile_rows = (s.rows + kSide - 1) / kSide;
+  s.tile_cols = (s.cols + kSide - 1) / kSide;
+  const std::size_t padded = std::size_t(s.n_tiles() + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
+  s.tile_x.assign(padded, kFarAway);
+  s.tile_y.assign(padded, kFarAway);
+  s.tile_radius.assign(padded, 0.0);
+  s.offsets.assign(std::size_t{4} * 2 * kernels::kTactileTile, kFarAway);
+  s.offsets_f.assign(s.offsets.size(), static_cast<float>(kFarAway));
+  for (int t = 0; t < s.n_tiles(); ++t) {
+    const int i0 = kSide * (t / s.tile_cols), j0 = kSide * (t % s.tile_cols);
+    const int rows = points_in(i0, s.rows), cols = points_in(j0, s.cols);
+    const double i = i0 + 0.5 * (rows - s.rows), j = j0 + 0.5 * (cols - s.cols);  // from the array's middle
+    s.tile_x[std::size_t(t)] = i * lattice.row_x + j * lattice.col_x;
+    s.tile_y[std::size_t(t)] = i * lattice.row_y + j * lattice.col_y;
+    const int kind = (cols < kSide ? 1 : 0) + (rows < kSide ? 2 : 0);
+    s.tile_kind.push_back(static_cast<unsigned char>(kind));
+    double square = 0;
+    for (int k = 0; k < kernels::kTactileTile; ++k) {
+      if (k / kSide >= rows || k % kSide >= cols) continue;
+      const double di = k / kSide - 0.5 * (rows - 1), dj = k % kSide - 0.5 * (cols - 1);
+      const double at[2] = {di * lattice.row_x + dj * lattice.col_x, di * lattice.row_y + dj * lattice.col_y};
+      for (int c = 0; c < 2; ++c) {
+        const auto index = std::size_t((2 * kind + c) * kernels::kTactileTile + k);
+        s.offsets[index] = at[c];
+        s.offsets_f[index] = static_cast<float>(at[c]);
+      }
+      square = std::max(square, at[0] * at[0] + at[1] * at[1]);
+    }
+    // What is left out must not touch in either precision: the margin is far above the rounding of both.
+    s.tile_radius[std::size_t(t)] = std::sqrt(square) * (1 + 1e-5) + 1e-12;
+  }
+}
+
 }  // namespace
 
 CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& body, SensorInfo& info) {
@@ -44,34 +87,23 @@ CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& b
     throw InputError(d.source.prefix() + "tactile sensor '" + d.name + "': axis0 and axis1 must be perpendicular");
 
   s.link = body.link;
-  s.frame = body.frame;
-  constexpr int kSide = 8;
-  for (int i0 = 0; i0 < a.rows; i0 += kSide)
-    for (int j0 = 0; j0 < a.cols; j0 += kSide) {
-      const std::size_t base = s.points.size();
-      s.points.resize(base + 3 * kernels::kTactileTile, kFarAway);
-      double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-      for (int k = 0; k < kernels::kTactileTile; ++k) {
-        const int i = i0 + k / kSide, j = j0 + k % kSide;
-        const bool inside = i < a.rows && j < a.cols;
-        s.index.push_back(inside ? i * a.cols + j : -1);
-        if (!inside) continue;
-        const Vec3<double> at = s.frame.R * (p0 + (i * step0) * axis0 + (j * step1) * axis1) + s.frame.p;
-        const double xyz[3] = {at.x, at.y, at.z};
-        for (int c = 0; c < 3; ++c) {
-          s.points[base + std::size_t(c * kernels::kTactileTile + k)] = xyz[c];
-          low[c] = std::min(low[c], xyz[c]);
-          high[c] = std::max(high[c], xyz[c]);
-        }
-      }
-      double square = 0;
-      for (int c = 0; c < 3; ++c) square += 0.25 * (high[c] - low[c]) * (high[c] - low[c]);
-      s.bounds.insert(s.bounds.end(), {0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2]),
-                                       std::sqrt(square) * (1 + 1e-12) + 1e-300});
-      ++s.n_tiles;
+  s.rows = a.rows;
+  s.cols = a.cols;
+  // Orthonormal to the last digit; what the scene's axes lack of that is made up for in the forces.
+  const Vec3<double> e0 = (1 / std::sqrt(dot(axis0, axis0))) * axis0;
+  const Vec3<double> e2 = (1 / std::sqrt(dot(normal, normal))) * normal;
+  const Vec3<double> e1 = cross(e2, e0);
+  const Vec3<double> middle = p0 + (0.5 * (a.rows - 1) * step0) * axis0 + (0.5 * (a.cols - 1) * step1) * axis1;
+  s.pad = compose(body.frame, {{{{e0.x, e1.x, e2.x}, {e0.y, e1.y, e2.y}, {e0.z, e1.z, e2.z}}}, middle});
+  place_tiles(s, {step0 * dot(axis0, e0), step0 * dot(axis0, e1), step1 * dot(axis1, e0), step1 * dot(axis1, e1)});
+  const Vec3<double> rows[3] = {axis0, axis1, -normal};
+  for (int r = 0; r < 3; ++r) {
+    const double row[3] = {dot(rows[r], e0), dot(rows[r], e1), dot(rows[r], e2)};
+    for (int c = 0; c < 3; ++c) {
+      s.axes[3 * r + c] = row[c];
+      s.skewed |= std::abs(row[c] - (r != c ? 0 : r == 2 ? -1 : 1)) > 1e-12;
     }
-  const Vec3<double> rows[3] = {s.frame.R * axis0, s.frame.R * axis1, -(s.frame.R * normal)};
-  for (int r = 0; r < 3; ++r) s.axes[3 * r] = rows[r].x, s.axes[3 * r + 1] = rows[r].y, s.axes[3 * r + 2] = rows[r].z;
+  }
   s.law = d.law;
 
   info.name = d.name;
@@ -82,6 +114,18 @@ CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& b
   info.every = d.every;
   info.pressure_sign = find_pressure_sign(d, body, normal);
   return s;
+}
+
+kernels::PadTiles CompiledSensor::tiles() const {
+  kernels::PadTiles p{};
+  p.rows = rows, p.cols = cols;
+  p.tile_rows = tile_rows, p.tile_cols = tile_cols;
+  p.x = tile_x.data(), p.y = tile_y.data(), p.radius = tile_radius.data();
+  p.kind = tile_kind.data();
+  p.offsets = offsets.data(), p.offsets_f = offsets_f.data();
+  p.skewed = skewed;
+  std::copy(axes, axes + 9, p.axes);
+  return p;
 }
 
 }  // namespace tangere

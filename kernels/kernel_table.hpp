@@ -5,6 +5,7 @@
 #include <span>
 
 #include "kernels/model_view.hpp"
+#include "kernels/tactile_types.hpp"
 
 namespace tangere::kernels {
 
@@ -43,22 +44,19 @@ struct CandidateSearch {
   int stride;
 };
 
-/// One tactile sensor read for one environment.
-struct TactileArgs {
-  const double* points;   ///< (n_tiles, 3, 64): x, y, z of 8×8 points, padded with far points, sensor link axes
-  const double* bounds;   ///< (n_tiles, 4): centre and radius
-  int n_tiles;
-  PrimitiveShape shape;
-  double size[3];
-  double Q[9], c[3];      ///< shape frame in the sensor's link
-  double omega[3], v[3];  ///< twist of the shape relative to the sensor's link, at its origin, its axes
-  double kn, kt, mu, damping;
-  ContactLaw law;
-  double axes[9];         ///< rows: axis0, axis1, -(axis0 × axis1)
-  double* force;          ///< (n_tiles, 3, 64) [N], added to
-  unsigned char* touched; ///< (n_tiles) set to 1 where a tile was written
+/// World pose and body twist of a link.
+template <class N>
+struct LinkPose {
+  Frame<N> world;
+  Vec6<N> V;
 };
-inline constexpr int kTactileTile = 64;
+
+/// State of eight environments as rows.
+struct GroupState {
+  const LaneRow *q, *v;
+  const LaneRow* zero;  ///< (nv) zeros
+  LaneRow* rates;       ///< (nv) scratch
+};
 
 /// Kernels of a stage for groups of L environments.
 template <int L>
@@ -94,8 +92,17 @@ struct KernelTable {
   int (*find_candidates)(const CandidateSearch&);
   /// The rows of a list from its lanes' points.
   void (*transpose_list)(GroupStage::List&);
-  /// Adds the forces of one shape on one sensor, tiles out of reach skipped.
-  void (*tactile)(const TactileArgs&);
+  /// Poses and twists of every link, (n_links).
+  void (*link_poses)(const ModelView&, const GroupState&, LinkPose<LaneRow>* out);
+  /// Pose and twist of a shape against a pad, both given in their links (nullptr: the world). Parameters are left alone.
+  void (*pad_touch)(const LinkPose<LaneRow>* sensor, const Frame<double>& pad, const LinkPose<LaneRow>* body,
+                    const Frame<double>& shape, Touch<LaneRow>* out);
+  /// Field of one environment; how many tiles are touched.
+  int (*tactile)(const TactileArgs<double>&);
+  int (*tactile_mixed)(const TactileArgs<float>&);
+  /// Fields of eight and of sixteen environments.
+  void (*tactile_block)(const TactileBlockArgs<double>&);
+  void (*tactile_block_mixed)(const TactileBlockArgs<float>&);
 
   template <int L>
   [[nodiscard]] const StageKernels<L>& stage() const {

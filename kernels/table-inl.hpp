@@ -7,9 +7,10 @@
 #include "kernels/detection-inl.hpp"
 #include "kernels/jacobian-inl.hpp"
 #include "kernels/kernel_table.hpp"
+#include "kernels/link_poses-inl.hpp"
 #include "kernels/lu-inl.hpp"
 #include "kernels/norms-inl.hpp"
-#include "kernels/tactile-inl.hpp"
+#include "kernels/tactile_block-inl.hpp"
 
 namespace tangere::kernels {
 
@@ -118,18 +119,40 @@ struct StageTable {
 
 template <class Arch>
 struct TableOf {
-  static void tactile(const TactileArgs& a) {
-    tactile_field<Lanes<Arch>, kGroup>(
-        a, [](const double* p) { return load_lanes<Arch>(p); },
-        [](const Lanes<Arch>& x, double* p) { store_lanes(x, p); });
+  using N = Lanes<Arch>;
+  static N* view(LaneRow* p) { return reinterpret_cast<N*>(p); }
+  static const N* view(const LaneRow* p) { return reinterpret_cast<const N*>(p); }
+  static void poses_of_links(const ModelView& m, const GroupState& s, LinkPose<LaneRow>* out) {
+    StageArgs<N> a{};
+    a.centre = view(s.q);
+    a.x = a.s = view(s.zero);
+    a.r = view(s.v);
+    a.c0_over_h = N(0.0);
+    a.inverse_h = N(1.0);
+    a.v = view(s.rates);
+    link_poses(m, a, reinterpret_cast<LinkPose<N>*>(out));
   }
+  static void touch_of_pad(const LinkPose<LaneRow>* sensor, const Frame<double>& pad, const LinkPose<LaneRow>* body,
+                           const Frame<double>& shape, Touch<LaneRow>* out) {
+    pad_touch(reinterpret_cast<const LinkPose<N>*>(sensor), pad, reinterpret_cast<const LinkPose<N>*>(body), shape,
+              reinterpret_cast<Touch<N>&>(*out));
+  }
+  static int tactile(const TactileArgs<double>& a) { return tactile_field<InDouble<Arch>>(a); }
+  static int tactile_mixed(const TactileArgs<float>& a) { return tactile_field<InMixed<Arch>>(a); }
+  static void tactile_group(const TactileBlockArgs<double>& a) { tactile_block<InDouble<Arch>>(a); }
+  static void tactile_group_mixed(const TactileBlockArgs<float>& a) { tactile_block<InMixed<Arch>>(a); }
   static constexpr KernelTable make(const char* name) {
     return {name,
             StageTable<Lanes<Arch>, kGroup>::make(),
             StageTable<OneLane<Arch>, 1>::make(),
             search_candidates<Arch>,
             transpose_rows<Arch>,
-            tactile};
+            poses_of_links,
+            touch_of_pad,
+            tactile,
+            tactile_mixed,
+            tactile_group,
+            tactile_group_mixed};
   }
 };
 

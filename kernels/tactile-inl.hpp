@@ -1,54 +1,155 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tactile field of one sensor against one shape: eight points at a time, tiles out of reach skipped.
-//
-// A tactile point is a contact point whose force is only read: T = (f·axis0, f·axis1, -f·(axis0 × axis1)).
+// Tactile field of one environment: brackets of eight tiles at a time, then the points of the tiles within reach.
 #pragma once
 
-#include "kernels/kernel_table.hpp"
-#include "kernels/pair_contact.hpp"
+#include "kernels/tactile_point.hpp"
 
 namespace tangere::kernels {
 
-template <class N, int Width, class Shape, class ScalarShape, class Load, class Store>
-void tactile_tiles(const TactileArgs& a, const Shape& shape, const ScalarShape& scalar_shape, const Load& load,
-                   const Store& store) {
-  const Mat3<double> Q0 = {{{a.Q[0], a.Q[1], a.Q[2]}, {a.Q[3], a.Q[4], a.Q[5]}, {a.Q[6], a.Q[7], a.Q[8]}}};
-  const Vec3<double> c0 = {a.c[0], a.c[1], a.c[2]};
-  const Mat3<N> Q = broadcast<N>(Q0);
-  const Vec3<N> c = broadcast<N>(c0);
-  const Vec3<N> omega = {N(a.omega[0]), N(a.omega[1]), N(a.omega[2])};
-  const Vec3<N> v = {N(a.v[0]), N(a.v[1]), N(a.v[2])};
-  const LawParameters<N> law = {N(a.kn), N(a.kt), N(a.mu), N(a.damping), a.law, 0.0};
-  Mat3<N> axes;
-  for (int k = 0; k < 9; ++k) axes.m[k / 3][k % 3] = N(a.axes[k]);
-  for (int tile = 0; tile < a.n_tiles; ++tile) {
-    const double* b = a.bounds + 4 * tile;
-    double unused;
-    const double gap = scalar_shape.evaluate(transposed_times(Q0, Vec3<double>{b[0], b[1], b[2]} - c0), unused).d;
-    if (!(gap < b[3])) continue;  // a distance grows at most as fast as the point moves
-    const double* p = a.points + tile * 3 * kTactileTile;
-    double* f = a.force + tile * 3 * kTactileTile;
-    for (int k = 0; k < kTactileTile; k += Width) {
-      const Vec3<N> xi = {load(p + k), load(p + kTactileTile + k), load(p + 2 * kTactileTile + k)};
-      const PointContact<N> at = point_contact(shape, law, Q, c, omega, v, xi);
-      if (!any(at.d < N(0.0))) continue;
-      a.touched[tile] = 1;
-      const Vec3<N> t = axes * at.force;
-      store(load(f + k) + t.x, f + k);
-      store(load(f + kTactileTile + k) + t.y, f + kTactileTile + k);
-      store(load(f + 2 * kTactileTile + k) + t.z, f + 2 * kTactileTile + k);
+/// Brackets of eight tiles, one column each, and how near they are.
+template <class Real>
+struct TileChunk {
+  alignas(64) Real row[kBracketRows][kGroup];
+  alignas(64) double gap[kGroup];  ///< < 0: within reach
+};
+
+template <class Real, class D>
+void store_row(const D& x, Real* out) {
+  alignas(64) double wide[kGroup];
+  store_lanes(x, wide);
+  for (int l = 0; l < kGroup; ++l) out[l] = static_cast<Real>(wide[l]);
+}
+
+/// False where none of the eight tiles is within reach; then the rows are not written.
+template <class P, class Shape>
+bool chunk_brackets(const PadTiles& pad, int first, const TouchShape& shape,
+                    const Touch<Lanes<typename P::Architecture>>& at, TileChunk<typename P::Real>& out) {
+  using Arch = typename P::Architecture;
+  using D = Lanes<Arch>;
+  const D x = load_lanes<Arch>(pad.x + first), y = load_lanes<Arch>(pad.y + first);
+  D row[kBracketRows];
+  const D gap = Shape::bracket(shape, at, x, y, load_lanes<Arch>(pad.radius + first), row);
+  if (!any(gap < D(0.0))) return false;
+  store_lanes(gap, out.gap);
+  const Vec3<D> u = tile_velocity(at, x, y);
+  row[Shape::kRows - 3] = u.x, row[Shape::kRows - 2] = u.y, row[Shape::kRows - 1] = u.z;
+  for (int i = 0; i < Shape::kRows; ++i) store_row(row[i], out.row[i]);
+  return true;
+}
+
+template <class N>
+Touch<N> broadcast_touch(const Touch<double>& t) {
+  return {broadcast<N>(t.Q), broadcast<N>(t.c), broadcast<N>(t.omega), broadcast<N>(t.v),
+          N(t.kn),           N(t.kt),           N(t.mu),               N(t.damping)};
+}
+template <class N>
+PointLaw<N> point_law(const Touch<double>& t) {
+  return {broadcast<N>(t.omega), N(-t.kn), N(t.kt), N(t.mu), N(t.damping)};
+}
+
+/// The points of one tile. `out` (3, 64): written whole when `fresh` and something touches, else added to.
+template <class P, ContactLaw Law, class Shape>
+bool tile_force(const PadTiles& pad, const Shape& shape, const PointLaw<typename P::N>& law,
+                const typename P::Real* offsets, bool fresh, typename P::Real* out) {
+  using N = typename P::N;
+  bool touched = false;
+  for (int k = 0; k < kTactileTile; k += P::kLanes) {
+    Vec3<N> f;
+    const bool here = point_force<P, Law>(shape, law, P::load(offsets + k), P::load(offsets + kTactileTile + k), f);
+    touched |= here;
+    if (!here) {
+      if (!fresh) continue;
+      f = zero3<N>();
+    } else if (pad.skewed) {
+      f = in_skewed_axes(pad.axes, f);
     }
+    const N* component = &f.x;
+    for (int c = 0; c < 3; ++c) {
+      auto* at = out + c * kTactileTile + k;
+      P::store(fresh ? component[c] : P::load(at) + component[c], at);
+    }
+  }
+  return touched;
+}
+
+/// Adds one shape to eight tiles from `first`; returns the bits of those touched, `written` included.
+template <class P, ContactLaw Law, class Shape>
+unsigned chunk_force(const TactileArgs<typename P::Real>& a, int touch, int first, unsigned written,
+                     typename P::Real* buffer) {
+  using N = typename P::N;
+  using D = Lanes<typename P::Architecture>;
+  const PadTiles& pad = *a.pad;
+  const Touch<double>& at = a.touches[touch];
+  TileChunk<typename P::Real> chunk;
+  if (!chunk_brackets<P, Shape>(pad, first, a.shapes[touch], broadcast_touch<D>(at), chunk)) return written;
+  Shape shape(a.shapes[touch], broadcast<N>(at.Q));
+  const PointLaw<N> law = point_law<N>(at);
+  const int count = pad.tiles() - first < kGroup ? pad.tiles() - first : kGroup;
+  for (int l = 0; l < count; ++l) {
+    if (!(chunk.gap[l] < 0)) continue;
+    N row[Shape::kRows];
+    for (int i = 0; i < Shape::kRows; ++i) row[i] = N(double(chunk.row[i][l]));
+    shape.set(row);
+    shape.u = {row[Shape::kRows - 3], row[Shape::kRows - 2], row[Shape::kRows - 1]};
+    const auto* offsets = P::offsets(pad) + 2 * kTactileTile * pad.kind[first + l];
+    const bool fresh = ((written >> l) & 1U) == 0;
+    if (tile_force<P, Law>(pad, shape, law, offsets, fresh, buffer + 3 * kTactileTile * l)) written |= 1U << l;
+  }
+  return written;
+}
+
+/// (3, 64) to rows of (point, 3) in the array.
+template <class Real>
+void write_dense(const PadTiles& pad, int tile, const Real* from, Real* dense) {
+  const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
+  Real* to = dense + 3 * pad.first_of(tile);
+  const auto copy = [&](int columns) {
+    for (int i = 0; i < rows; ++i, from += kTileSide, to += 3 * pad.cols)
+      for (int j = 0; j < columns; ++j) {
+        to[3 * j] = from[j];
+        to[3 * j + 1] = from[kTactileTile + j];
+        to[3 * j + 2] = from[2 * kTactileTile + j];
+      }
+  };
+  if (cols == kTileSide) {
+    copy(kTileSide);  // a constant, to be unrolled
+  } else {
+    copy(cols);
   }
 }
 
-template <class N, int Width, class Load, class Store>
-void tactile_field(const TactileArgs& a, const Load& load, const Store& store) {
-  if (a.shape == PrimitiveShape::sphere) {
-    tactile_tiles<N, Width>(a, SphereDistance<N>{N(a.size[0])}, SphereDistance<double>{a.size[0]}, load, store);
-  } else {
-    tactile_tiles<N, Width>(a, CuboidDistance<N>{{N(a.size[0]), N(a.size[1]), N(a.size[2])}},
-                            CuboidDistance<double>{{a.size[0], a.size[1], a.size[2]}}, load, store);
+template <class P, ContactLaw Law>
+int tactile_field(const TactileArgs<typename P::Real>& a) {
+  using Real = typename P::Real;
+  alignas(64) Real buffer[kGroup * 3 * kTactileTile];
+  int count = 0;
+  for (int first = 0; first < a.pad->tiles(); first += kGroup) {
+    unsigned written = 0;
+    for (int k = 0; k < a.n_touches; ++k)
+      written = a.shapes[k].shape == PrimitiveShape::sphere
+                    ? chunk_force<P, Law, SpherePad<P>>(a, k, first, written, buffer)
+                    : chunk_force<P, Law, CuboidPad<P>>(a, k, first, written, buffer);
+    for (int l = 0; written != 0; ++l, written >>= 1) {
+      if ((written & 1U) == 0) continue;
+      const Real* tile = buffer + 3 * kTactileTile * l;
+      if (a.values != nullptr)
+        for (int i = 0; i < 3 * kTactileTile; ++i) a.values[3 * kTactileTile * count + i] = tile[i];
+      if (a.dense != nullptr) write_dense(*a.pad, first + l, tile, a.dense);
+      a.active[count++] = first + l;
+    }
   }
+  return count;
+}
+
+/// Returns the number of tiles that something touches.
+template <class P>
+int tactile_field(const TactileArgs<typename P::Real>& a) {
+  switch (a.law) {
+    case ContactLaw::paper: return tactile_field<P, ContactLaw::paper>(a);
+    case ContactLaw::linear: return tactile_field<P, ContactLaw::linear>(a);
+    case ContactLaw::clamped: break;
+  }
+  return tactile_field<P, ContactLaw::clamped>(a);
 }
 
 }  // namespace tangere::kernels

@@ -14,22 +14,20 @@
 #include <bit>
 #include <chrono>
 #include <ctime>
-#include <memory>
 #include <string>
 
-#include "engine/readout.hpp"
 #include "engine/stepper.hpp"
 #include "kernels/lanes.hpp"
+#include "tasks/benchmark_fields.hpp"
 
 namespace tangere {
 namespace {
 
 using kernels::kBlock;
-constexpr std::size_t kForceWidth = 3;
 
 /// Scratch of one thread.
 struct Worker {
-  explicit Worker(const Model& model) : stepper(model), readout(model) {}
+  Worker(const Model& model, Precision precision) : stepper(model), readout(model, precision) {}
   Stepper stepper;
   Readout readout;
 };
@@ -44,22 +42,20 @@ std::uint64_t mix(std::uint64_t hash, std::uint64_t bits) {
   return std::rotl(hash ^ bits, 29) * 0x9e3779b97f4a7c15U + 0x632be59bd9b4e019U;
 }
 
-/// Makes the compiler believe that somebody reads the numbers, at no cost.
-void keep(std::span<const double> numbers) { asm volatile("" : : "r"(numbers.data()) : "memory"); }
+template <class Bits, class T>
+std::uint64_t chain(std::uint64_t checksum, std::span<const T> numbers) {
+  // Four chains beside each other: in a single one each product would wait for the one before.
+  std::array<std::uint64_t, 4> chains{checksum, checksum + 1, checksum + 2, checksum + 3};
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    chains[i % 4] = mix(chains[i % 4], std::bit_cast<Bits>(numbers[i]));
+  for (const std::uint64_t chain : chains) checksum = mix(checksum, chain);
+  return checksum;
+}
 
 double cpu_seconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-/// Numbers in one field of every sensor, 3 per point.
-std::size_t frame_numbers(const Model& model, FrameKind frames) {
-  std::size_t numbers = 0;
-  if (frames == FrameKind::dense)
-    for (const SensorInfo& sensor : model.sensors())
-      numbers += static_cast<std::size_t>(sensor.points) * kForceWidth;
-  return numbers;
 }
 
 /// An episode that can be run again and again, and all memory for it.
@@ -73,16 +69,13 @@ class Episode {
         options_(options),
         go_on_(go_on),
         u_(lanes(start.environments()) * lanes(start.model().nu())),
-        frame_numbers_(frame_numbers(start.model(), options.frames)),
-        // Not filled: the first pass touches the pages from the threads that use them.
-        frames_(
-            std::make_unique_for_overwrite<double[]>(lanes(start.environments()) * frame_numbers_)),
+        fields_(start.model(), start.environments(), options.frames, options.precision),
         tallies_(lanes(start.blocks())),
         checksums_(lanes(start.environments())),
         cap_(tbb::global_control::max_allowed_parallelism, lanes(options.threads)),
         arena_(options.threads) {
     workers_.reserve(lanes(options.threads));
-    for (int i = 0; i < options.threads; ++i) workers_.emplace_back(start.model());
+    for (int i = 0; i < options.threads; ++i) workers_.emplace_back(start.model(), options.precision);
     if (workers_[0].stepper.timestep() != controls.timestep())
       throw InputError("controls laid out for a timestep of " +
                        std::to_string(controls.timestep()) + " s; the scene's is " +
@@ -171,25 +164,16 @@ class Episode {
   void read_fields(int first, int last, std::int64_t done, const std::array<bool, kBlock>& live,
                    Worker& worker, bool checked, BlockTally& tally) {
     const std::span<const SensorInfo> sensors = batch_.model().sensors();
-    std::size_t offset = 0;  // of the sensor in its environment's frames
     for (std::size_t s = 0; s < sensors.size(); ++s) {
-      const std::size_t numbers = lanes(sensors[s].points) * kForceWidth;
-      const bool due = done % tactile_interval(sensors[s], options_.rollout) == 0;
-      for (int e = first; due && e < last; ++e) {
+      const int sensor = static_cast<int>(s);
+      if (done % tactile_interval(sensors[s], options_.rollout) != 0) continue;
+      fields_.read(worker.readout, batch_, first / kBlock, sensor);
+      for (int e = first; e < last; ++e) {
         if (!live[lanes(e - first)]) continue;
-        const std::span<double> frame(&frames_[lanes(e) * frame_numbers_ + offset], numbers);
-        read_frame(worker, e, static_cast<int>(s), frame);
         tally.tactile_points += sensors[s].points;
-        if (checked) checksums_[lanes(e)] = chain_bits(checksums_[lanes(e)], frame);
+        if (checked) checksums_[lanes(e)] = fields_.chain(checksums_[lanes(e)], e, sensor);
       }
-      offset += numbers;
     }
-  }
-
-  /// One sensor of one environment, as `frames` says: the only place that knows how.
-  void read_frame(Worker& worker, int environment, int sensor, std::span<double> frame) const {
-    worker.readout.tactile(batch_, environment, sensor, frame);
-    keep(frame);
   }
 
   void chain_states(int first, int last) {
@@ -207,8 +191,7 @@ class Episode {
   const BenchmarkOptions& options_;
   const BenchmarkGoOn& go_on_;
   std::vector<double> u_;             // (E, nu)
-  std::size_t frame_numbers_;         // per environment
-  std::unique_ptr<double[]> frames_;  // (E, frame_numbers_) [N]
+  BenchmarkFields fields_;
   std::vector<BlockTally> tallies_;
   std::vector<std::uint64_t> checksums_;
   std::vector<Worker> workers_;  // by the thread's index in the arena
@@ -244,17 +227,16 @@ const char* to_string(FrameKind value) {
   switch (value) {
     case FrameKind::none: return "none";
     case FrameKind::dense: return "dense";
+    case FrameKind::compact: return "compact";
   }
   return "unknown";
 }
 
 std::uint64_t chain_bits(std::uint64_t checksum, std::span<const double> numbers) {
-  // Four chains beside each other: in a single one each product would wait for the one before.
-  std::array<std::uint64_t, 4> chains{checksum, checksum + 1, checksum + 2, checksum + 3};
-  for (std::size_t i = 0; i < numbers.size(); ++i)
-    chains[i % 4] = mix(chains[i % 4], std::bit_cast<std::uint64_t>(numbers[i]));
-  for (const std::uint64_t chain : chains) checksum = mix(checksum, chain);
-  return checksum;
+  return chain<std::uint64_t>(checksum, numbers);
+}
+std::uint64_t chain_bits(std::uint64_t checksum, std::span<const float> numbers) {
+  return chain<std::uint32_t>(checksum, numbers);
 }
 
 std::uint64_t BenchmarkResult::checksum() const {
@@ -293,11 +275,10 @@ BenchmarkResult run_benchmark(const Batch& start, const ControlProgram& controls
 }
 
 double benchmark_bytes(const Model& model, int environments, const BenchmarkOptions& options) {
-  const auto frame = static_cast<double>(frame_numbers(model, options.frames));
-  const auto scratch = static_cast<double>(frame_numbers(model, FrameKind::dense));
   const double per_environment = static_cast<double>(model.state_bytes_per_environment()) +
-                                 (frame + model.nu()) * sizeof(double) + sizeof(std::uint64_t);
-  const double per_thread = static_cast<double>(model.workspace_bytes()) + scratch * sizeof(double);
+                                 field_bytes(model, options.frames, options.precision) +
+                                 model.nu() * static_cast<double>(sizeof(double)) + sizeof(std::uint64_t);
+  const double per_thread = static_cast<double>(model.workspace_bytes());
   return environments * per_environment + options.threads * per_thread;
 }
 

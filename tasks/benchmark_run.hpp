@@ -10,20 +10,23 @@
 
 #include "engine/batch.hpp"
 #include "engine/control.hpp"
+#include "engine/precision.hpp"
 #include "tasks/rollout.hpp"
 
 namespace tangere {
 
 /// How tactile fields are read.
 enum class FrameKind {
-  none,   ///< not at all
-  dense,  ///< every point of a sensor, (points, 3) [N], into memory of the environment's own
+  none,     ///< not at all
+  dense,    ///< every point of a sensor, (points, 3) [N], in memory of the environment's own
+  compact,  ///< the 8×8 tiles that something touches
 };
 const char* to_string(FrameKind value);
 
 struct BenchmarkOptions {
   RolloutOptions rollout;  ///< steps, and the interval of fields
   FrameKind frames = FrameKind::dense;
+  Precision precision = Precision::f64;  ///< of the fields: mixed ones are kept in float
   int threads = 1;
   int repeat = 3;  ///< timed passes over the whole episode
 };
@@ -56,6 +59,7 @@ struct BenchmarkResult {
 /// Continues a checksum with the bits of numbers: +0 and -0 differ. The checksum of an environment begins with the number
 /// of its episode.
 std::uint64_t chain_bits(std::uint64_t checksum, std::span<const double> numbers);
+std::uint64_t chain_bits(std::uint64_t checksum, std::span<const float> numbers);
 
 /// Asked before each step of each block, from any thread; false stops the run there.
 using BenchmarkGoOn = std::function<bool()>;

@@ -4,6 +4,8 @@
 #include "tasks/episode_slot.hpp"
 
 #include <algorithm>
+#include <array>
+#include <type_traits>
 
 namespace tangere {
 namespace {
@@ -12,14 +14,17 @@ constexpr int kForceWidth = 3;
 
 std::size_t size(int n) { return static_cast<std::size_t>(n); }
 
-/// Bytes of one row of one episode in a slot's buffers.
+constexpr std::size_t kQ = 0, kV = 1, kFirstSensor = 2;  // names of observations
+
+/// Bytes of one row of one episode in a slot's buffers: q and v are kept in double first, whatever is stored.
 double row_bytes(const EpisodeShape& shape, const EpisodeOptions& options) {
-  double numbers = 0;
-  for (const std::size_t width : shape.widths) numbers += static_cast<double>(width);
-  const double number = options.observations == ObservationType::float32
-                            ? sizeof(double) + sizeof(float)
-                            : sizeof(double);
-  return numbers * number + static_cast<double>(shape.nu) * sizeof(float);
+  const bool single = options.precision == Precision::mixed;
+  double bytes = static_cast<double>(shape.nu) * sizeof(float);
+  for (std::size_t name = 0; name < shape.widths.size(); ++name) {
+    const std::size_t number = !single ? sizeof(double) : name < kFirstSensor ? sizeof(double) + sizeof(float) : sizeof(float);
+    bytes += static_cast<double>(shape.widths[name] * number);
+  }
+  return bytes;
 }
 
 }  // namespace
@@ -48,7 +53,7 @@ EpisodeSlot::EpisodeSlot(const Model& model, const StepperOptions& solver,
       options_(options),
       shape_(shape),
       stepper_(model, solver),
-      readout_(model),
+      readout_(model, options.precision),
       u_(kBlockEpisodes * shape.nu),
       values_(shape.widths.size()),
       singles_(shape.widths.size()),
@@ -57,8 +62,9 @@ EpisodeSlot::EpisodeSlot(const Model& model, const StepperOptions& solver,
       live_(kBlockEpisodes) {
   for (std::size_t name = 0; name < values_.size(); ++name) {
     const std::size_t numbers = kBlockEpisodes * size(shape.piece_rows) * shape.widths[name];
-    values_[name].resize(numbers);
-    if (options.observations == ObservationType::float32) singles_[name].resize(numbers);
+    const bool single = options.precision == Precision::mixed;
+    if (!single || name < kFirstSensor) values_[name].resize(numbers);
+    if (single) singles_[name].resize(numbers);
   }
 }
 
@@ -85,23 +91,38 @@ bool EpisodeSlot::simulate(const StopRequest& stop) {
   return true;
 }
 
-std::span<double> EpisodeSlot::numbers(std::size_t name, int episode, int row) {
+template <class T>
+std::span<T> EpisodeSlot::numbers(std::size_t name, int episode, int row) {
   const std::size_t width = shape_.widths[name];
-  return std::span(values_[name]).subspan((size(episode) * size(rows_) + size(row)) * width, width);
-}
-
-void EpisodeSlot::observe(int row) {
-  constexpr std::size_t kQ = 0, kV = 1, kFirstSensor = 2;
-  for (int e = 0; e < batch_->environments(); ++e) {
-    batch_->get_q(e, numbers(kQ, e, row));
-    batch_->get_v(e, numbers(kV, e, row));
-    for (std::size_t name = kFirstSensor; name < values_.size(); ++name)
-      read_field(static_cast<int>(name - kFirstSensor), e, numbers(name, e, row));
+  const std::size_t first = (size(episode) * size(rows_) + size(row)) * width;
+  if constexpr (std::is_same_v<T, float>) {
+    return std::span(singles_[name]).subspan(first, width);
+  } else {
+    return std::span(values_[name]).subspan(first, width);
   }
 }
 
-void EpisodeSlot::read_field(int sensor, int episode, std::span<double> field) {
-  readout_.tactile(*batch_, episode, sensor, field);
+void EpisodeSlot::observe(int row) {
+  for (int e = 0; e < batch_->environments(); ++e) {
+    batch_->get_q(e, numbers<double>(kQ, e, row));
+    batch_->get_v(e, numbers<double>(kV, e, row));
+  }
+  for (std::size_t name = kFirstSensor; name < shape_.widths.size(); ++name) {
+    const auto sensor = static_cast<int>(name - kFirstSensor);
+    if (options_.precision == Precision::mixed) {
+      read_field<float>(sensor, row);
+    } else {
+      read_field<double>(sensor, row);
+    }
+  }
+}
+
+template <class T>
+void EpisodeSlot::read_field(int sensor, int row) {
+  std::array<std::span<T>, kBlockEpisodes> fields;
+  for (int e = 0; e < batch_->environments(); ++e)
+    fields[size(e)] = numbers<T>(kFirstSensor + size(sensor), e, row);
+  readout_.read_block(*batch_, 0, sensor, fields);
 }
 
 bool EpisodeSlot::act(int row, const StopRequest& stop) {
@@ -142,14 +163,14 @@ void EpisodeSlot::count(std::int64_t step) {
 void EpisodeSlot::encode() {
   for (std::size_t name = 0; name < values_.size(); ++name) {
     const std::size_t numbers = size(batch_->environments()) * size(rows_) * shape_.widths[name];
-    const std::span<const double> values = std::span(values_[name]).first(numbers);
-    if (options_.observations == ObservationType::float64) {
-      observations_[name] = values;
+    if (options_.precision == Precision::f64) {
+      observations_[name] = std::span<const double>(values_[name]).first(numbers);
       continue;
     }
     const std::span<float> singles = std::span(singles_[name]).first(numbers);
-    std::transform(values.begin(), values.end(), singles.begin(),
-                   [](double x) { return static_cast<float>(x); });
+    if (name < kFirstSensor)
+      std::transform(values_[name].begin(), values_[name].begin() + static_cast<std::ptrdiff_t>(numbers),
+                     singles.begin(), [](double x) { return static_cast<float>(x); });
     observations_[name] = std::span<const float>(singles);
   }
   std::sort(failures_.begin(), failures_.end(),

@@ -50,9 +50,11 @@ class EpisodeSlot {
   [[nodiscard]] const std::vector<FailedEpisode>& failures() const { return failures_; }
 
  private:
-  [[nodiscard]] std::span<double> numbers(std::size_t name, int episode, int row);
+  template <class T>
+  [[nodiscard]] std::span<T> numbers(std::size_t name, int episode, int row);
   void observe(int row);
-  void read_field(int sensor, int episode, std::span<double> field);
+  template <class T>
+  void read_field(int sensor, int row);
   [[nodiscard]] bool act(int row, const StopRequest& stop);
   void count(std::int64_t step);
 
@@ -66,8 +68,8 @@ class EpisodeSlot {
   std::int64_t first_row_ = 0, next_row_ = 0;
   int rows_ = 0, action_rows_ = 0;           // of the piece
   std::vector<double> u_;                    // (episodes, nu)
-  std::vector<std::vector<double>> values_;  // per name: (episodes, rows, width)
-  std::vector<std::vector<float>> singles_;  // the same, when float32 is stored
+  std::vector<std::vector<double>> values_;  // per name: (episodes, rows, width); fields only where float64 is stored
+  std::vector<std::vector<float>> singles_;  // the same, where float32 is stored
   std::vector<float> actions_;               // (episodes, action rows, nu)
   std::vector<Observation> observations_;
   std::vector<bool> live_;

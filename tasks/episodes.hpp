@@ -13,19 +13,17 @@
 
 #include "engine/control.hpp"
 #include "engine/episode_sink.hpp"
+#include "engine/precision.hpp"
 #include "engine/stepper.hpp"
 
 namespace tangere {
-
-/// Numbers in which observations leave the run.
-enum class ObservationType { float64, float32 };
 
 struct EpisodeOptions {
   std::int64_t episodes = 0;
   std::int64_t steps = 0;  ///< of an episode, a multiple of `every`
   int every = 1;           ///< K: steps that an action is held for, and between observations
   std::uint64_t seed = 0;
-  ObservationType observations = ObservationType::float64;
+  Precision precision = Precision::f64;  ///< mixed: fields computed in it, observations leave as float32
   int threads = 1;
   int blocks_in_flight = 2;  ///< at most so many blocks of 16 episodes are held in memory
   /// Row buffers of one block in flight [bytes]: a piece has as many rows as fit, at least one.

@@ -3,10 +3,12 @@
 #include "tasks/rollout.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <string>
 
 #include "engine/readout.hpp"
+#include "kernels/lanes.hpp"
 
 namespace tangere {
 namespace {
@@ -24,8 +26,8 @@ std::size_t largest_field(const Model& model) {
 /// Copies a batch row by row into dense arrays and hands them on.
 class Recorder {
  public:
-  Recorder(const Batch& batch, RowSink& sink)
-      : batch_(batch), sink_(sink), readout_(batch.model()), environments_(batch.environments()) {
+  Recorder(const Batch& batch, Precision precision, RowSink& sink)
+      : batch_(batch), sink_(sink), readout_(batch.model(), precision), environments_(batch.environments()) {
     const Model& model = batch.model();
     const auto e = static_cast<std::size_t>(environments_);
     q_.resize(e * static_cast<std::size_t>(model.nq()));
@@ -61,7 +63,12 @@ class Recorder {
         static_cast<std::size_t>(batch_.model().sensors()[static_cast<std::size_t>(sensor)].points);
     const std::span<double> field =
         std::span(force_).first(static_cast<std::size_t>(environments_) * points * kForceWidth);
-    for (int e = 0; e < environments_; ++e) readout_.tactile(batch_, e, sensor, part(field, e));
+    std::array<std::span<double>, kernels::kBlock> fields;
+    for (int block = 0; block < batch_.blocks(); ++block) {
+      const int first = block * kernels::kBlock, last = std::min(first + kernels::kBlock, environments_);
+      for (int e = first; e < last; ++e) fields[static_cast<std::size_t>(e - first)] = part(field, e);
+      readout_.read_block(batch_, block, sensor, fields);
+    }
     sink_.write(TactileRow{sensor, frame, step, field});
   }
 
@@ -132,7 +139,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram&
   const auto sensors = batch.model().sensors();
   const auto environments = static_cast<std::size_t>(batch.environments());
   const auto nu = static_cast<std::size_t>(batch.model().nu());
-  Recorder recorder(batch, sink);
+  Recorder recorder(batch, options.precision, sink);
   RolloutSummary summary;
   std::vector<double> u(environments * nu);
   std::vector<bool> live(environments);

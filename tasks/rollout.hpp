@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An unattended rollout: controls in, rows out. Serial; the flow graph over blocks takes its place
-// later.
+// One unattended rollout of a batch: controls in, every row out. Serial: for many episodes on many threads, tasks/episodes.hpp.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +8,7 @@
 
 #include "engine/batch.hpp"
 #include "engine/control.hpp"
+#include "engine/precision.hpp"
 #include "engine/row_sink.hpp"
 #include "engine/stepper.hpp"
 
@@ -17,6 +17,7 @@ namespace tangere {
 struct RolloutOptions {
   std::int64_t steps = 0;
   int every = 0;  ///< tactile every k-th step; 0: the scene's `every`, or 1 where it has none
+  Precision precision = Precision::f64;  ///< of tactile fields
 };
 
 /// An environment that no solution was found for. It keeps the state before that step.

@@ -60,7 +60,7 @@ TEST(Bench, SaysWhatItMeasured) {
     EXPECT_EQ(entry.at("steps"), 12);
     EXPECT_EQ(entry.at("every"), 4);
     EXPECT_EQ(entry.at("frames"), "dense");
-    EXPECT_EQ(entry.at("precision"), "double");
+    EXPECT_EQ(entry.at("precision"), "mixed");
     EXPECT_EQ(entry.at("repeat"), 1);
     EXPECT_THAT(entry.at("failed"), IsEmpty());
     EXPECT_GE(entry.at("newton_iterations"), 1);
@@ -122,7 +122,7 @@ TEST(Bench, ThePictureHasOneMarkPerThreadCount) {
     ++marks;
   EXPECT_EQ(marks, 3);
   const std::string isa = answer.at("runs")[0].at("isa");
-  for (const std::string& part : {std::string("rolling_ball_small"), isa, std::string("double"),
+  for (const std::string& part : {std::string("rolling_ball_small"), isa, std::string("mixed"),
                                   std::string("4 environments")})
     EXPECT_THAT(svg, HasSubstr(part));
   EXPECT_THAT(folder.files(), ElementsAre("out.svg"));
@@ -213,10 +213,10 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"threads_end", {"--threads", "1,"}, 2, "''; expected whole numbers"},
         Refusal{"threads_twice", {"--threads", "2,1,2"}, 2, "2 stands there twice"},
         Refusal{
-            "frames", {"--frames", "foo"}, 2, "unknown frames 'foo'; expected one of dense, none"},
+            "frames", {"--frames", "foo"}, 2, "unknown frames 'foo'; expected one of dense, compact, none"},
         Refusal{"frames_near", {"--frames", "dens"}, 2, "did you mean 'dense'?"},
         Refusal{
-            "precision", {"--precision", "half"}, 2, "unknown precision 'half'; expected double"},
+            "precision", {"--precision", "half"}, 2, "unknown precision 'half'; expected one of double, mixed"},
         Refusal{"repeat", {"--repeat", "0"}, 2, "--repeat 0: expected a whole number from 1"},
         Refusal{"option", {"--thread", "1"}, 2, "did you mean '--threads'?"},
         Refusal{"memory", {"--envs", "1000000000"}, 2, "--envs 1000000000 needs "},

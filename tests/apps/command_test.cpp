@@ -160,7 +160,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"integrator", simulate({"--integrator", "BDF3"}), 2,
                 "unknown integrator 'BDF3'; did you mean 'BDF1'?"},
         Mistake{"precision", simulate({"--precision", "single"}), 2,
-                "unknown precision 'single'; expected double"},
+                "unknown precision 'single'; expected one of double, mixed"},
         Mistake{"strip_and_frame",
                 {"plot", "x.h5", "-o", "x.svg", "--strip", "2", "--frame", "1"},
                 2,

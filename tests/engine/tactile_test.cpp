@@ -1,143 +1,183 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tactile kernel of every instruction set against one point at a time; padding and culling must not matter.
+// Readings of tactile fields: every way of reading gives the same numbers, in either precision, wherever the environment is.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
+#include <vector>
 
-#include "kernels/kernel_table.hpp"
-#include "kernels/pair_contact.hpp"
+#include "engine/error.hpp"
+#include "engine/readout.hpp"
+#include "kernels/lanes.hpp"
+#include "kernels/so3.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"
-#include "tests/kernels/random_numbers.hpp"
 
 namespace tangere {
 namespace {
 
-using kernels::kTactileTile;
-using kernels::TactileArgs;
 using kernels::Vec3;
-using testing::Random;
 
-/// Tiles of random points near a shape; the last one is mostly padding.
-struct Field {
-  AlignedVector<double> points, force;
-  std::vector<double> bounds;
-  std::vector<unsigned char> touched;
-  TactileArgs args{};
+/// The ball under the pad of environment e, sunk by `depth` [m], turning and sliding; `far` [m] away from the origin.
+void press(Batch& batch, int e, double depth, double where, double far = 0) {
+  std::vector<double> q = testing::q_of(batch, e), v = testing::v_of(batch, e);
+  q[0] = far, q[1] = -far, q[2] = -0.015 - depth + far;
+  q[3] = far + 8e-3 * std::sin(where), q[4] = -far + 5e-3 * std::cos(2 * where), q[5] = far;
+  for (std::size_t i = 0; i < v.size(); ++i) v[i] = 0.05 * std::sin(where + double(i));
+  batch.set_state(e, q, v);
+}
 
-  Field(Random& random, PrimitiveShape shape, int tiles, int real_points) {
-    points.assign(std::size_t(tiles) * 3 * kTactileTile, 1e6);
-    force.assign(points.size(), 0.0);
-    touched.assign(std::size_t(tiles), 0);
-    args.shape = shape;
-    args.size[0] = 0.02, args.size[1] = 0.03, args.size[2] = 0.01;
-    const kernels::Mat3<double> Q = random.rotation();
-    for (int i = 0; i < 9; ++i) args.Q[i] = Q.m[i / 3][i % 3];
-    const Vec3<double> c = random.vector(0.01), omega = random.vector(2), v = random.vector(0.1);
-    args.c[0] = c.x, args.c[1] = c.y, args.c[2] = c.z;
-    args.omega[0] = omega.x, args.omega[1] = omega.y, args.omega[2] = omega.z;
-    args.v[0] = v.x, args.v[1] = v.y, args.v[2] = v.z;
-    args.kn = 30, args.kt = 0.5, args.mu = 0.8, args.damping = 4;
-    args.law = ContactLaw::clamped;
-    for (int i = 0; i < 3; ++i) args.axes[4 * i] = i == 2 ? -1 : 1;
-    for (int t = 0; t < tiles; ++t) {
-      const Vec3<double> centre = random.vector(0.02);
-      double radius = 0;
-      for (int k = 0; k < kTactileTile && t * kTactileTile + k < real_points; ++k) {
-        const Vec3<double> offset = random.vector(0.003);
-        const double p[3] = {centre.x + offset.x, centre.y + offset.y, centre.z + offset.z};
-        for (int i = 0; i < 3; ++i) points[std::size_t((t * 3 + i) * kTactileTile + k)] = p[i];
-        radius = std::max(radius, std::sqrt(dot(offset, offset)));
-      }
-      bounds.insert(bounds.end(), {centre.x, centre.y, centre.z, radius * (1 + 1e-9)});
-    }
-    args.points = points.data();
-    args.bounds = bounds.data();
-    args.n_tiles = tiles;
-    args.force = force.data();
-    args.touched = touched.data();
-  }
+/// Environments with the ball at different places and depths, some without contact.
+Batch pressed(const Model& model, int environments, int moment = 0) {
+  Batch batch(model, environments);
+  for (int e = 0; e < environments; ++e)
+    press(batch, e, (e + moment) % 5 == 4 ? -1e-3 : 2e-4 * (1 + e % 5), double(e) + 0.7 * moment);
+  return batch;
+}
 
-  [[nodiscard]] Vec3<double> reference(int tile, int k) const {
-    const double* p = &points[std::size_t(tile * 3 * kTactileTile + k)];
-    const Vec3<double> xi = {p[0], p[kTactileTile], p[2 * kTactileTile]};
-    kernels::Mat3<double> Q;
-    for (int i = 0; i < 9; ++i) Q.m[i / 3][i % 3] = args.Q[i];
-    const kernels::LawParameters<double> law = {args.kn, args.kt, args.mu, args.damping, args.law, 0};
-    const Vec3<double> c = {args.c[0], args.c[1], args.c[2]}, w = {args.omega[0], args.omega[1], args.omega[2]},
-                       v = {args.v[0], args.v[1], args.v[2]};
-    const auto at = args.shape == PrimitiveShape::sphere
-                        ? point_contact(kernels::SphereDistance<double>{args.size[0]}, law, Q, c, w, v, xi)
-                        : point_contact(kernels::CuboidDistance<double>{{args.size[0], args.size[1], args.size[2]}}, law,
-                                        Q, c, w, v, xi);
-    return {at.force.x, at.force.y, -at.force.z};
-  }
+template <class T>
+std::vector<T> field(Readout& readout, const Batch& batch, int environment) {
+  std::vector<T> force(std::size_t(3 * batch.model().sensors()[0].points), T(-3));
+  readout.tactile(batch, environment, 0, force);
+  return force;
+}
+
+template <class T>
+std::vector<T> values(const DenseFrame<T>& frame) {
+  return {frame.values().begin(), frame.values().end()};
+}
+template <class T>
+std::vector<T> values(const CompactFrame<T>& frame) {
+  std::vector<T> dense(frame.dense_size(), T(-3));
+  frame.expand(dense);
+  return dense;
+}
+
+struct Reading {
+  Precision precision;
+  int resolution;  ///< 20² points are a small pad, 27² a large one with edge tiles
 };
+class TactileReading : public ::testing::TestWithParam<Reading> {};
 
-class TactileKernel : public ::testing::TestWithParam<PrimitiveShape> {};
-
-TEST_P(TactileKernel, MatchesOnePointAtATimeOnEveryInstructionSet) {
-  constexpr int kTiles = 40, kPoints = (kTiles - 1) * kTactileTile + 5;
-  for (unsigned seed = 1; seed <= 20; ++seed) {
-    AlignedVector<double> fused;
-    for (const kernels::KernelTable* table : kernels::available_kernels()) {
-      SCOPED_TRACE(table->name);
-      Random random(seed);
-      Field f(random, GetParam(), kTiles, kPoints);
-      // Padding holds NaN here: it must reach no real point.
-      for (int k = 5; k < kTactileTile; ++k)
-        for (int i = 0; i < 3; ++i)
-          f.points[std::size_t(((kTiles - 1) * 3 + i) * kTactileTile + k)] = std::numeric_limits<double>::quiet_NaN();
-      table->tactile(f.args);
-      double peak = 0;
-      for (int n = 0; n < kPoints; ++n) {
-        const Vec3<double> expected = f.reference(n / kTactileTile, n % kTactileTile);
-        peak = std::max(peak, std::sqrt(dot(expected, expected)));
-      }
-      ASSERT_GT(peak, 0);
-      int touching = 0;
-      for (int n = 0; n < kPoints; ++n) {
-        const int t = n / kTactileTile, k = n % kTactileTile;
-        const Vec3<double> expected = f.reference(t, k);
-        const double* got = &f.force[std::size_t(t * 3 * kTactileTile + k)];
-        EXPECT_NEAR(got[0], expected.x, 1e-13 * peak);
-        EXPECT_NEAR(got[kTactileTile], expected.y, 1e-13 * peak);
-        EXPECT_NEAR(got[2 * kTactileTile], expected.z, 1e-13 * peak);
-        if (dot(expected, expected) == 0) {
-          EXPECT_EQ(got[0], 0);
-        } else {
-          ++touching;
-          EXPECT_EQ(f.touched[std::size_t(t)], 1);
-        }
-      }
-      EXPECT_GT(touching, 50);
-      EXPECT_LT(touching, kPoints - 50);
-      // Culling off: the same bits.
-      Field all = f;
-      all.force.assign(all.force.size(), 0.0);
-      for (std::size_t t = 0; t < kTiles; ++t) all.bounds[4 * t + 3] = 1e9;
-      all.args.points = all.points.data(), all.args.bounds = all.bounds.data(), all.args.force = all.force.data();
-      all.args.touched = all.touched.data();
-      table->tactile(all.args);
-      for (int n = 0; n < kPoints; ++n)
-        for (int i = 0; i < 3; ++i) {
-          const std::size_t at = std::size_t((n / kTactileTile * 3 + i) * kTactileTile + n % kTactileTile);
-          EXPECT_EQ(all.force[at], f.force[at]);
-        }
-      const std::string name = table->name;
-      if (name == "avx512") fused = f.force;
-      if (name == "avx2" && !fused.empty()) {
-        for (int n = 0; n < kPoints; ++n) {
-          const std::size_t at = std::size_t(n / kTactileTile * 3 * kTactileTile + n % kTactileTile);
-          EXPECT_EQ(f.force[at], fused[at]);
-        }
-      }
+/// Frames that live on from reading to reading, alone and by blocks, against fields read whole.
+template <class Frame, class T>
+void check_frames(const Reading& c, int environments) {
+  const Model model(testing::rolling_ball(false, c.resolution));
+  Readout readout(model, c.precision);
+  Frame alone(model, 0);
+  std::vector<Frame> block;
+  for (int e = 0; e < environments; ++e) block.emplace_back(model, 0);
+  for (int moment = 0; moment < 6; ++moment) {
+    const Batch batch = pressed(model, environments, moment);
+    for (int e = 0; e < environments; ++e) {
+      readout.read(batch, e, alone);
+      EXPECT_EQ(values(alone), field<T>(readout, batch, e)) << "environment " << e << ", moment " << moment;
     }
+    for (int b = 0; b < batch.blocks(); ++b) {
+      const std::size_t first = std::size_t(b * kernels::kBlock);
+      const std::size_t count = std::min(block.size() - first, std::size_t(kernels::kBlock));
+      readout.read_block(batch, b, std::span(block).subspan(first, count));
+    }
+    for (int e = 0; e < environments; ++e)
+      EXPECT_EQ(values(block[std::size_t(e)]), field<T>(readout, batch, e)) << "environment " << e << " by block";
+    // One of a block read alone in between.
+    readout.read(pressed(model, environments, moment + 3), 0, block[0]);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Shapes, TactileKernel, ::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid));
+TEST_P(TactileReading, FramesHoldTheField) {
+  for (const int environments : {1, 11, 19}) {
+    check_frames<DenseFrame<double>, double>(GetParam(), environments);
+    check_frames<DenseFrame<float>, float>(GetParam(), environments);
+    check_frames<CompactFrame<double>, double>(GetParam(), environments);
+    check_frames<CompactFrame<float>, float>(GetParam(), environments);
+  }
+}
+
+template <class T>
+void check_blocks(const Reading& c) {
+  const Model model(testing::rolling_ball(false, c.resolution));
+  Readout readout(model, c.precision);
+  const Batch batch = pressed(model, 21);
+  std::vector<std::vector<T>> fields(16, std::vector<T>(std::size_t(3 * c.resolution * c.resolution), T(-3)));
+  const std::vector<T> untouched = fields[0];
+  for (int b = 0; b < 2; ++b) {
+    std::fill(fields.begin(), fields.end(), untouched);
+    const std::vector<std::span<T>> spans(fields.begin(), fields.end());
+    readout.read_block(batch, b, 0, spans);
+    for (int l = 0; l < 16; ++l) {
+      const int e = 16 * b + l;
+      EXPECT_EQ(fields[std::size_t(l)], e < 21 ? field<T>(readout, batch, e) : untouched) << "environment " << e;
+    }
+  }
+}
+TEST_P(TactileReading, BlocksHoldTheFieldsOfTheirEnvironments) {
+  check_blocks<double>(GetParam());
+  check_blocks<float>(GetParam());
+}
+
+TEST_P(TactileReading, AnEnvironmentReadsTheSameInAnyBatch) {
+  const Model model(testing::rolling_ball(false, GetParam().resolution));
+  Readout readout(model, GetParam().precision);
+  const Batch many = pressed(model, 35);
+  for (const int e : {0, 7, 9, 16, 34}) {
+    Batch one(model, 1);
+    one.set_state(0, testing::q_of(many, e), testing::v_of(many, e));
+    EXPECT_EQ(field<float>(readout, one, 0), field<float>(readout, many, e));
+  }
+}
+
+TEST_P(TactileReading, NumbersAreThoseOfThePrecisionWhateverTheirType) {
+  const Model model(testing::rolling_ball(false, GetParam().resolution));
+  Readout readout(model, GetParam().precision);
+  const Batch batch = pressed(model, 3);
+  const std::vector<double> wide = field<double>(readout, batch, 1);
+  const std::vector<float> narrow = field<float>(readout, batch, 1);
+  bool all_floats = true;
+  for (std::size_t k = 0; k < wide.size(); ++k) {
+    EXPECT_EQ(narrow[k], static_cast<float>(wide[k]));
+    all_floats &= wide[k] == double(narrow[k]);
+  }
+  EXPECT_EQ(all_floats, GetParam().precision == Precision::mixed);
+}
+
+INSTANTIATE_TEST_SUITE_P(Pads, TactileReading,
+                         ::testing::Values(Reading{Precision::f64, 20}, Reading{Precision::mixed, 20},
+                                           Reading{Precision::f64, 27}, Reading{Precision::mixed, 27}));
+
+TEST(Tactile, MixedPrecisionKeepsAMillionthOfThePeak) {
+  const Model model(testing::rolling_ball(false, 200));
+  Readout exact(model), mixed(model, Precision::mixed);
+  Batch batch(model, 1);
+  for (const double far : {0.0, 10.0})
+    for (const double depth : {1e-5, 3e-5, 1e-4, 1e-3, 5e-3}) {
+      double worst = 0, peak = 0;
+      for (int where = 0; where < 10; ++where) {
+        press(batch, 0, depth, where, far);
+        const std::vector<double> a = field<double>(exact, batch, 0), b = field<double>(mixed, batch, 0);
+        double largest = 0, error = 0;
+        for (std::size_t k = 0; k < a.size(); ++k) {
+          largest = std::max(largest, std::abs(a[k]));
+          error = std::max(error, std::abs(a[k] - b[k]));
+        }
+        peak = std::max(peak, largest);
+        worst = std::max(worst, error / largest);
+      }
+      EXPECT_GT(peak, 0);
+      EXPECT_LT(worst, 1e-6) << far << " m away, " << depth << " m deep";
+      RecordProperty("worst_at_" + std::to_string(int(1e6 * depth)) + "um_" + std::to_string(int(far)) + "m",
+                     std::to_string(1e9 * worst) + "e-9");
+    }
+}
+
+TEST(Tactile, AFrameNamesTheSensorThatIsMissing) {
+  const Model model(testing::rolling_ball(false, 20));
+  for (const int sensor : {-1, 1}) {
+    EXPECT_THROW(DenseFrame<float>(model, sensor), InputError);
+    EXPECT_THROW(CompactFrame<double>(model, sensor), InputError);
+  }
+}
 
 TEST(Tactile, ForcesOfSeveralBodiesAdd) {
   // A second ball in the same place doubles the field.

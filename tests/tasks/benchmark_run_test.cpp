@@ -27,8 +27,9 @@ const Model& small_ball() {
   return model;
 }
 
-BenchmarkOptions options(int threads, FrameKind frames = FrameKind::dense) {
-  return {{kSteps, kEvery}, frames, threads, /*repeat=*/1};
+BenchmarkOptions options(int threads, FrameKind frames = FrameKind::dense,
+                         Precision precision = Precision::f64) {
+  return {{kSteps, kEvery, {}}, frames, precision, threads, /*repeat=*/1};
 }
 
 BenchmarkResult result_of(const Batch& start, const BenchmarkOptions& what,
@@ -75,22 +76,33 @@ TEST(BenchmarkRun, ChecksumsTellEnvironmentsSeedsFieldsAndStepsApart) {
   EXPECT_NE(result_of(2, shorter).checksum(), plain);
 }
 
+TEST(BenchmarkRun, CompactFramesHoldTheBitsOfDenseOnes) {
+  for (const Precision precision : {Precision::f64, Precision::mixed}) {
+    const BenchmarkResult dense = result_of(20, options(1, FrameKind::dense, precision));
+    const BenchmarkResult compact = result_of(20, options(2, FrameKind::compact, precision));
+    EXPECT_THAT(compact.checksums, ElementsAreArray(dense.checksums)) << to_string(precision);
+    EXPECT_EQ(compact.tactile_points, dense.tactile_points);
+  }
+  EXPECT_NE(result_of(2, options(1, FrameKind::dense, Precision::mixed)).checksum(), result_of(2, options(1)).checksum());
+}
+
 TEST(BenchmarkRun, AChainFeelsEveryBitAndTheOrder) {
+  using Numbers = std::span<const double>;
   const std::vector<double> numbers{0, 1, -2.5, 1e-300, 7, 0, 0};
-  const std::uint64_t plain = chain_bits(1, numbers);
-  EXPECT_NE(chain_bits(2, numbers), plain);
+  const std::uint64_t plain = chain_bits(1, Numbers(numbers));
+  EXPECT_NE(chain_bits(2, Numbers(numbers)), plain);
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     std::vector<double> other = numbers;
     other[i] = -other[i];  // one bit, also where the number is zero
-    EXPECT_NE(chain_bits(1, other), plain) << "sign of number " << i;
+    EXPECT_NE(chain_bits(1, Numbers(other)), plain) << "sign of number " << i;
     std::swap(other[i] = numbers[i], other[(i + 4) % numbers.size()]);
     if (other != numbers) {
-      EXPECT_NE(chain_bits(1, other), plain) << "place of number " << i;
+      EXPECT_NE(chain_bits(1, Numbers(other)), plain) << "place of number " << i;
     }
   }
   std::vector<double> both = numbers;
   both[0] = -both[0], both[4] = -both[4];  // beside each other in one of the chains within
-  EXPECT_NE(chain_bits(1, both), plain);
+  EXPECT_NE(chain_bits(1, Numbers(both)), plain);
 }
 
 TEST(BenchmarkRun, StepsAndReadsWhatARolloutDoes) {

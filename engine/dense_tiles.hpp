@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tiles of a (points, 3) array: zeroed, or filled from (3, 64).
+#pragma once
+
+#include <algorithm>
+#include <span>
+
+#include "kernels/tactile_types.hpp"
+
+namespace tangere {
+
+template <class T>
+void clear_tile(const kernels::PadTiles& pad, int tile, T* dense) {
+  const int rows = pad.rows_of(tile), numbers = 3 * pad.cols_of(tile);
+  T* row = dense + 3 * pad.first_of(tile);
+  for (int i = 0; i < rows; ++i, row += 3 * pad.cols) std::fill(row, row + numbers, T(0));
+}
+
+/// Zeroes every tile that is not in `tiles` (rising): rows of tiles with none of them in one piece.
+template <class T>
+void clear_tiles_between(const kernels::PadTiles& pad, std::span<const int> tiles, T* dense) {
+  std::size_t next = 0;
+  for (int first = 0; first < pad.tiles(); first += pad.tile_cols) {
+    const int end = first + pad.tile_cols;
+    if (next == tiles.size() || tiles[next] >= end) {
+      T* row = dense + 3 * pad.first_of(first);
+      std::fill(row, row + 3 * pad.rows_of(first) * pad.cols, T(0));
+      continue;
+    }
+    for (int tile = first; tile < end; ++tile) {
+      if (next < tiles.size() && tiles[next] == tile) {
+        ++next;
+      } else {
+        clear_tile(pad, tile, dense);
+      }
+    }
+  }
+}
+
+/// (3, 64) to the tile's rows, converted.
+template <class Real, class T>
+void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* dense) {
+  const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
+  T* row = dense + 3 * pad.first_of(tile);
+  for (int i = 0; i < rows; ++i, row += 3 * pad.cols)
+    for (int j = 0; j < cols; ++j)
+      for (int c = 0; c < 3; ++c)
+        row[3 * j + c] = static_cast<T>(from[c * kernels::kTactileTile + i * kernels::kTileSide + j]);
+}
+
+}  // namespace tangere

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which numbers a tactile field is computed with. The state of a batch is always in double.
+#pragma once
+
+#include <cstdint>
+
+namespace tangere {
+
+enum class Precision : std::uint8_t {
+  f64,    ///< "double"
+  mixed,  ///< "mixed": poses and what cancels in double, points in float; 1e-6 of the field's peak (docs/contact.md)
+};
+
+inline const char* to_string(Precision value) { return value == Precision::f64 ? "double" : "mixed"; }
+
+}  // namespace tangere

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// A pad as the tactile kernels see it, and what is put to it. Plain arrays, no ownership.
+//
+// Pad axes: axis0, axis1 and axis0 × axis1 made orthonormal, origin in the pad's plane: every point has z = 0.
+#pragma once
+
+#include "kernels/contact_types.hpp"
+#include "kernels/linalg.hpp"
+
+namespace tangere::kernels {
+
+inline constexpr int kTileSide = 8;
+inline constexpr int kTactileTile = kTileSide * kTileSide;  ///< points in a tile
+
+/// Points in tiles of 8×8, row-major. A point is its tile's centre plus an offset; tiles alike share their offsets.
+struct PadTiles {
+  int rows, cols;             ///< points
+  int tile_rows, tile_cols;
+  const double *x, *y;        ///< (n_tiles, padded to 8 with tiles far away) centres, pad axes [m]
+  const double* radius;       ///< (the same) distance of the farthest point, with a margin for rounding
+  const unsigned char* kind;  ///< (n_tiles) which of the offsets: bit 0 last column, bit 1 last row
+  const double* offsets;      ///< (4, 2, 64): x, then y; missing points of edge tiles are far away
+  const float* offsets_f;     ///< (4, 2, 64) the same in single precision
+  bool skewed;                ///< axis0 and axis1 are not quite unit and perpendicular: forces need `axes`
+  double axes[9];             ///< rows: axis0, axis1, -(axis0 × axis1), pad axes
+
+  [[nodiscard]] int tiles() const { return tile_rows * tile_cols; }
+  /// Points of a tile along axis0 and axis1.
+  [[nodiscard]] int rows_of(int tile) const { return shorter(rows - kTileSide * (tile / tile_cols)); }
+  [[nodiscard]] int cols_of(int tile) const { return shorter(cols - kTileSide * (tile % tile_cols)); }
+  /// Index of its first point in the array.
+  [[nodiscard]] int first_of(int tile) const {
+    return kTileSide * (tile / tile_cols * cols + tile % tile_cols);
+  }
+
+ private:
+  static int shorter(int n) { return n < kTileSide ? n : kTileSide; }
+};
+
+/// A shape in pad axes: pose, twist relative to the pad at the pad's origin, contact parameters of the sensor.
+template <class N>
+struct Touch {
+  Mat3<N> Q;
+  Vec3<N> c;
+  Vec3<N> omega, v;
+  N kn, kt, mu, damping;
+};
+
+struct TouchShape {
+  PrimitiveShape shape;
+  double size[3];  ///< radius, or half edges [m]
+};
+
+/// One environment's field, Real = double or float. The tiles that something touches are returned, in rising order.
+template <class Real>
+struct TactileArgs {
+  const PadTiles* pad;
+  ContactLaw law;
+  int n_touches;
+  const TouchShape* shapes;     ///< (n_touches)
+  const Touch<double>* touches; ///< (n_touches)
+  int* active;                  ///< (n_tiles) out
+  Real* values;                 ///< (n_tiles, 3, 64) out [N], those of active[k] at k; or nullptr
+  Real* dense;                  ///< (rows, cols, 3) out [N], active tiles alone are written; or nullptr
+};
+
+/// The fields of a group of eight environments (double) or of a block of sixteen (float).
+template <class Real>
+struct TactileBlockArgs {
+  const PadTiles* pad;
+  ContactLaw law;
+  int n_touches;
+  const TouchShape* shapes;             ///< (n_touches)
+  const Touch<LaneRow>* const* touches; ///< (n_touches) of one group, or of two in a row
+  Real* const* dense;                   ///< (lanes) (rows, cols, 3) out [N], or nullptr for a lane nobody asks for;
+                                        ///< tiles that nothing touches in any lane are not written
+};
+
+}  // namespace tangere::kernels
