@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Environment-steps per second of the rolling ball on one thread, by batch size: what the whole program can do at best.
+// Environment-steps per second of the rolling ball on one thread, by batch size, size of pad, kind of
+// frame and precision: what the whole program can do at best.
 #include <benchmark/benchmark.h>
 
 #include <cstddef>
@@ -11,6 +12,7 @@
 #include "engine/stepper.hpp"
 #include "io/scene_reader.hpp"
 #include "kernels/isa.hpp"
+#include "tasks/benchmark_fields.hpp"
 #include "tasks/rollout.hpp"
 
 namespace tangere {
@@ -21,12 +23,13 @@ constexpr std::uint64_t kSeed = 1;
 /// The scene's own run: its controls, its length, its tactile interval.
 class RollingBall {
  public:
-  explicit RollingBall(int environments)
-      : model_(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene),
+  RollingBall(int environments, int resolution, FrameKind frames, Precision precision)
+      : model_(scene(resolution)),
         start_(model_, environments, kSeed),
         batch_(start_),
         stepper_(model_),
-        readout_(model_),
+        readout_(model_, precision),
+        fields_(model_, environments, frames, precision),
         program_(model_, model_.timestep(), kSeed),
         row_(std::size_t(environments) * std::size_t(model_.nu())) {
     const auto nu = std::size_t(model_.nu());
@@ -35,10 +38,8 @@ class RollingBall {
       for (int e = 0; e < environments; ++e)
         program_.evaluate(t, start_.episode(e),
                           {&controls_[std::size_t(t) * row_ + std::size_t(e) * nu], nu});
-    for (const SensorInfo& sensor : model_.sensors()) {
-      intervals_.push_back(tactile_interval(sensor, {}));
-      fields_.emplace_back(3 * std::size_t(sensor.points));
-    }
+    for (const SensorInfo& sensor : model_.sensors()) intervals_.push_back(tactile_interval(sensor, {}));
+    if (frames == FrameKind::none) intervals_.clear();
   }
 
   /// Every run starts from the same state and therefore takes the same steps.
@@ -49,7 +50,7 @@ class RollingBall {
     for (std::int64_t t = 0; t < program_.steps(); ++t) {
       stepper_.step(batch_, {&controls_[std::size_t(t) * row_], row_});
       for (const std::int32_t i : batch_.iterations()) passes += i;
-      for (std::size_t s = 0; s < fields_.size(); ++s)
+      for (std::size_t s = 0; s < intervals_.size(); ++s)
         if ((t + 1) % intervals_[s] == 0) read(int(s));
     }
     return passes;
@@ -59,28 +60,30 @@ class RollingBall {
   [[nodiscard]] int failed_count() const { return batch_.failed_count(); }
 
  private:
+  static Scene scene(int resolution) {
+    Scene scene = read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene;
+    scene.sensors[0].array.rows = scene.sensors[0].array.cols = resolution;
+    return scene;
+  }
   void read(int sensor) {
-    for (int e = 0; e < batch_.environments(); ++e) {
-      readout_.tactile(batch_, e, sensor, fields_[std::size_t(sensor)]);
-      benchmark::DoNotOptimize(fields_[std::size_t(sensor)].data());
-      benchmark::ClobberMemory();
-    }
+    for (int block = 0; block < batch_.blocks(); ++block) fields_.read(readout_, batch_, block, sensor);
+    benchmark::ClobberMemory();
   }
 
   Model model_;
   Batch start_, batch_;
   Stepper stepper_;
   Readout readout_;
+  BenchmarkFields fields_;
   ControlProgram program_;
   std::size_t row_;               // numbers in the controls of one step, (E, nu)
   std::vector<double> controls_;  // (T, E, nu)
   std::vector<int> intervals_;
-  std::vector<std::vector<double>> fields_;  // per sensor (points, 3), one environment at a time
 };
 
-void BM_RollingBall(benchmark::State& state) {
-  const auto environments = static_cast<int>(state.range(0));
-  RollingBall ball(environments);
+void BM_RollingBall(benchmark::State& state, FrameKind frames, Precision precision) {
+  const auto environments = static_cast<int>(state.range(0)), resolution = static_cast<int>(state.range(1));
+  RollingBall ball(environments, resolution, frames, precision);
   ball.run();  // warms caches and pages; its state is thrown away
   std::int64_t passes = 0;
   for (auto _ : state) {
@@ -95,13 +98,22 @@ void BM_RollingBall(benchmark::State& state) {
   state.counters["newton/step"] = double(passes) / steps;
   state.SetLabel(kernels::active_isa_name());
 }
-BENCHMARK(BM_RollingBall)
-    ->ArgName("envs")
-    ->Arg(1)
-    ->Arg(16)
-    ->Arg(256)
-    ->Unit(benchmark::kMillisecond)
-    ->UseRealTime();
+
+void sizes(benchmark::internal::Benchmark* b) {
+  b->ArgNames({"envs", "points"})->Unit(benchmark::kMillisecond);
+  for (const int environments : {1, 16, 256})
+    for (const int resolution : {20, 200}) b->Args({environments, resolution});
+}
+BENCHMARK_CAPTURE(BM_RollingBall, none, FrameKind::none, Precision::f64)
+    ->ArgNames({"envs", "points"})
+    ->Args({1, 20})
+    ->Args({16, 20})
+    ->Args({256, 20})
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BM_RollingBall, dense_double, FrameKind::dense, Precision::f64)->Apply(sizes);
+BENCHMARK_CAPTURE(BM_RollingBall, dense_mixed, FrameKind::dense, Precision::mixed)->Apply(sizes);
+BENCHMARK_CAPTURE(BM_RollingBall, compact_double, FrameKind::compact, Precision::f64)->Apply(sizes);
+BENCHMARK_CAPTURE(BM_RollingBall, compact_mixed, FrameKind::compact, Precision::mixed)->Apply(sizes);
 
 }  // namespace
 }  // namespace tangere

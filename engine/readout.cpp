@@ -16,6 +16,9 @@ using kernels::kBlock;
 using kernels::kGroup;
 using kernels::kTactileTile;
 
+/// Fewer environments of a block than this are read one by one: the same bits, less work.
+constexpr int kFewest = 6;
+
 struct Readout::Impl {
   Model model;
   Precision precision;
@@ -150,12 +153,12 @@ struct Readout::Impl {
     }
   }
 
-  /// Small pads: all environments at once. Large ones: `one` for each, its group placed.
+  /// Small pads: all environments at once, unless most lanes would be idle. Large ones: `one` for each, its group placed.
   template <class T, class One>
   void block(const Batch& batch, int number, int sensor, const std::array<T*, kBlock>& dense, const One& one) {
     const int environments = std::min(kBlock, batch.environments() - number * kBlock);
     place_block(batch, number, sensor);
-    if (small(sensor_of(sensor))) {
+    if (small(sensor_of(sensor)) && environments >= kFewest) {
       fill_block(sensor, environments, dense);
     } else {
       for (int e = 0; e < environments; ++e) one(e);

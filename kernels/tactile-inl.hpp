@@ -98,23 +98,51 @@ unsigned chunk_force(const TactileArgs<typename P::Real>& a, int touch, int firs
   return written;
 }
 
-/// (3, 64) to rows of (point, 3) in the array.
 template <class Real>
+struct EightOf;
+template <>
+struct EightOf<double> {
+  typedef double Type __attribute__((vector_size(64)));
+};
+template <>
+struct EightOf<float> {
+  typedef float Type __attribute__((vector_size(32)));
+};
+
+/// x, y, z of eight points to (8, 3), in registers: two shuffles for each third of the result.
+template <class Arch, class Real>
+void interleave_row(const Real* from, Real* to) {
+  using Eight = typename EightOf<Real>::Type;
+  Eight x, y, z;
+  __builtin_memcpy(&x, from, sizeof x);
+  __builtin_memcpy(&y, from + kTactileTile, sizeof y);
+  __builtin_memcpy(&z, from + 2 * kTactileTile, sizeof z);
+  const Eight xy0 = __builtin_shufflevector(x, y, 0, 8, 0, 1, 9, 1, 2, 10),
+              xy1 = __builtin_shufflevector(x, y, 0, 3, 11, 3, 4, 12, 4, 5),
+              xy2 = __builtin_shufflevector(x, y, 13, 5, 6, 14, 6, 7, 15, 7);
+  const Eight first = __builtin_shufflevector(xy0, z, 0, 1, 8, 3, 4, 9, 6, 7),
+              second = __builtin_shufflevector(xy1, z, 10, 1, 2, 11, 4, 5, 12, 7),
+              third = __builtin_shufflevector(xy2, z, 0, 13, 2, 3, 14, 5, 6, 15);
+  __builtin_memcpy(to, &first, sizeof first);
+  __builtin_memcpy(to + 8, &second, sizeof second);
+  __builtin_memcpy(to + 16, &third, sizeof third);
+}
+
+/// (3, 64) to rows of (point, 3) in the array.
+template <class Arch, class Real>
 void write_dense(const PadTiles& pad, int tile, const Real* from, Real* dense) {
   const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
   Real* to = dense + 3 * pad.first_of(tile);
-  const auto copy = [&](int columns) {
-    for (int i = 0; i < rows; ++i, from += kTileSide, to += 3 * pad.cols)
-      for (int j = 0; j < columns; ++j) {
-        to[3 * j] = from[j];
-        to[3 * j + 1] = from[kTactileTile + j];
-        to[3 * j + 2] = from[2 * kTactileTile + j];
-      }
-  };
-  if (cols == kTileSide) {
-    copy(kTileSide);  // a constant, to be unrolled
-  } else {
-    copy(cols);
+  for (int i = 0; i < rows; ++i, from += kTileSide, to += 3 * pad.cols) {
+    if (cols == kTileSide) {
+      interleave_row<Arch>(from, to);
+      continue;
+    }
+    for (int j = 0; j < cols; ++j) {
+      to[3 * j] = from[j];
+      to[3 * j + 1] = from[kTactileTile + j];
+      to[3 * j + 2] = from[2 * kTactileTile + j];
+    }
   }
 }
 
@@ -134,7 +162,7 @@ int tactile_field(const TactileArgs<typename P::Real>& a) {
       const Real* tile = buffer + 3 * kTactileTile * l;
       if (a.values != nullptr)
         for (int i = 0; i < 3 * kTactileTile; ++i) a.values[3 * kTactileTile * count + i] = tile[i];
-      if (a.dense != nullptr) write_dense(*a.pad, first + l, tile, a.dense);
+      if (a.dense != nullptr) write_dense<typename P::Architecture>(*a.pad, first + l, tile, a.dense);
       a.active[count++] = first + l;
     }
   }

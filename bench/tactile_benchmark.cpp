@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a tactile point costs: the kernels alone, on pads that are touched everywhere or in the middle, against one point
+// at a time in plain C++. Fields, lanes and files come after them.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+#include "engine/compiled_model.hpp"
+#include "io/scene_reader.hpp"
+#include "kernels/isa.hpp"
+#include "kernels/kernel_table.hpp"
+#include "kernels/pair_contact.hpp"
+
+namespace tangere {
+namespace {
+
+using kernels::kTactileTile;
+using kernels::Touch;
+using kernels::TouchShape;
+
+/// Operations of a point that a sphere touches, law `clamped`, counted in the machine code of the loops: sums, products,
+/// comparisons and choices one each, a multiply-add two.
+constexpr double kOperationsDouble = 113, kOperationsMixed = 110;
+
+Model pad_model(int resolution) {
+  Scene scene = read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene;
+  scene.sensors[0].array.rows = scene.sensors[0].array.cols = resolution;
+  return Model(scene);
+}
+
+/// A ball whose lowest point is `depth` inside a pad of 5 × 5 cm, rolling.
+struct Press {
+  TouchShape shape;
+  Touch<double> touch;
+
+  Press(double radius, double depth) : shape{PrimitiveShape::sphere, {radius, 0, 0}} {
+    touch.Q = kernels::diagonal(1.0);
+    touch.c = {0.001, -0.002, radius - depth};
+    touch.omega = {0.3, -0.2, 0.1};
+    touch.v = {0.01, 0.02, -0.005};
+    touch.kn = 1, touch.kt = 0.01, touch.mu = 2, touch.damping = 0.003;
+  }
+};
+/// Every point of the pad is inside.
+const Press kEverywhere(0.5, 2e-3);
+/// The ball of the scene, as deep as it gets: a 25th of the points.
+const Press kMiddle(0.02, 1e-3);
+
+int run(const kernels::TactileArgs<double>& a) { return kernels::active_kernels().tactile(a); }
+int run(const kernels::TactileArgs<float>& a) { return kernels::active_kernels().tactile_mixed(a); }
+void run(const kernels::TactileBlockArgs<double>& a) { kernels::active_kernels().tactile_block(a); }
+void run(const kernels::TactileBlockArgs<float>& a) { kernels::active_kernels().tactile_block_mixed(a); }
+
+void count(benchmark::State& state, double points, double operations = 0) {
+  using benchmark::Counter;
+  const double all = double(state.iterations()) * points;
+  state.counters["ns/point"] = Counter(all * 1e-9, Counter::kIsRate | Counter::kInvert);
+  if (operations > 0) state.counters["flop/s"] = Counter(all * operations, Counter::kIsRate);
+  state.SetLabel(kernels::active_isa_name());
+}
+
+/// Tiles into a list (compact) or an array (dense).
+template <class Real>
+void field(benchmark::State& state, const Press& press, int resolution, bool dense) {
+  const Model model = pad_model(resolution);
+  const CompiledSensor& sensor = model.compiled().sensors[0];
+  const kernels::PadTiles pad = sensor.tiles();
+  AlignedVector<Real> values(std::size_t(pad.tiles()) * 3 * kTactileTile), array(std::size_t(sensor.points()) * 3);
+  std::vector<int> active(std::size_t(pad.tiles()));
+  const kernels::TactileArgs<Real> args{&pad,          ContactLaw::clamped, 1,
+                                        &press.shape,  &press.touch,        active.data(),
+                                        dense ? nullptr : values.data(),    dense ? array.data() : nullptr};
+  int tiles = 0;
+  for (auto _ : state) {
+    tiles = run(args);
+    benchmark::ClobberMemory();
+  }
+  const bool all = &press == &kEverywhere;
+  count(state, sensor.points(), all ? (sizeof(Real) == 4 ? kOperationsMixed : kOperationsDouble) : 0);
+  state.counters["tiles"] = tiles;
+}
+
+/// A small pad in every environment of a group or block, points one after the other.
+template <class Real>
+void block(benchmark::State& state, int resolution) {
+  constexpr std::size_t kLanes = sizeof(Real) == 4 ? 16 : 8;
+  const Model model = pad_model(resolution);
+  const CompiledSensor& sensor = model.compiled().sensors[0];
+  const kernels::PadTiles pad = sensor.tiles();
+  AlignedVector<Touch<kernels::LaneRow>> touches(2);
+  const auto* from = reinterpret_cast<const double*>(&kMiddle.touch);
+  for (Touch<kernels::LaneRow>& touch : touches)
+    for (std::size_t k = 0; k < sizeof(Touch<double>) / sizeof(double); ++k)
+      std::fill_n(reinterpret_cast<kernels::LaneRow*>(&touch)[k].lane, kernels::kGroup, from[k]);
+  const Touch<kernels::LaneRow>* of_shape[] = {touches.data()};
+  std::array<std::vector<Real>, kLanes> arrays;
+  std::array<Real*, kLanes> dense;
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    arrays[l].resize(std::size_t(sensor.points()) * 3);
+    dense[l] = arrays[l].data();
+  }
+  const kernels::TactileBlockArgs<Real> args{&pad, ContactLaw::clamped, 1, &kMiddle.shape, of_shape, dense.data()};
+  for (auto _ : state) {
+    run(args);
+    benchmark::ClobberMemory();
+  }
+  count(state, double(sensor.points()) * double(kLanes));
+}
+
+/// The same field point by point, as a textbook would: what the kernels are compared with.
+void BM_OnePointAtATime(benchmark::State& state) {
+  const Model model = pad_model(200);
+  const kernels::PadTiles pad = model.compiled().sensors[0].tiles();
+  const Press& press = kEverywhere;
+  const Touch<double>& t = press.touch;
+  std::vector<double> array(std::size_t(pad.rows * pad.cols) * 3);
+  const kernels::LawParameters<double> law = {t.kn, t.kt, t.mu, t.damping, ContactLaw::clamped, 0};
+  const double step = 0.05 / 199;
+  for (auto _ : state) {
+    double* to = array.data();
+    for (int i = 0; i < pad.rows; ++i)
+      for (int j = 0; j < pad.cols; ++j, to += 3) {
+        const auto at = point_contact(kernels::SphereDistance<double>{press.shape.size[0]}, law, t.Q, t.c, t.omega, t.v,
+                                      {i * step - 0.025, j * step - 0.025, 0});
+        to[0] = at.force.x, to[1] = at.force.y, to[2] = -at.force.z;
+      }
+    benchmark::ClobberMemory();
+  }
+  count(state, pad.rows * pad.cols);
+}
+
+#if defined(__x86_64__)
+// Multiply-adds that wait for nothing: ten chains are more than two units of latency four can take.
+constexpr int kChains = 10, kRounds = 100;
+__attribute__((target("avx512f"))) void multiply_add_512(float* x) {
+  __m512 chain[kChains];
+  for (int c = 0; c < kChains; ++c) chain[c] = _mm512_set1_ps(x[c]);
+  const __m512 a = _mm512_set1_ps(0.5F), b = _mm512_set1_ps(x[kChains]);
+  for (int n = 0; n < kRounds; ++n)
+    for (__m512& y : chain) y = _mm512_fmadd_ps(y, a, b);
+  for (int c = 0; c < kChains; ++c) x[c] = _mm512_cvtss_f32(chain[c]);
+}
+__attribute__((target("avx2,fma"))) void multiply_add_256(float* x) {
+  __m256 chain[kChains];
+  for (int c = 0; c < kChains; ++c) chain[c] = _mm256_set1_ps(x[c]);
+  const __m256 a = _mm256_set1_ps(0.5F), b = _mm256_set1_ps(x[kChains]);
+  for (int n = 0; n < kRounds; ++n)
+    for (__m256& y : chain) y = _mm256_fmadd_ps(y, a, b);
+  for (int c = 0; c < kChains; ++c) x[c] = _mm256_cvtss_f32(chain[c]);
+}
+/// What this core can do in single precision at most; half of it in double.
+void BM_PeakMultiplyAdd(benchmark::State& state) {
+  const std::string_view isa = kernels::active_isa_name();
+  const int width = isa == "avx512" ? 16 : 8;
+  if (isa != "avx512" && isa != "avx2") return state.SkipWithError("this instruction set fuses nothing");
+  std::array<float, kChains + 1> x{};
+  for (auto _ : state) {
+    width == 16 ? multiply_add_512(x.data()) : multiply_add_256(x.data());
+    benchmark::ClobberMemory();
+  }
+  state.counters["flop/s"] =
+      benchmark::Counter(double(state.iterations()) * 2 * kChains * kRounds * width, benchmark::Counter::kIsRate);
+  state.SetLabel(std::string(isa));
+}
+BENCHMARK(BM_PeakMultiplyAdd);
+#endif
+
+void BM_DenseDouble(benchmark::State& s) { field<double>(s, kEverywhere, 200, true); }
+void BM_DenseMixed(benchmark::State& s) { field<float>(s, kEverywhere, 200, true); }
+void BM_CompactDouble(benchmark::State& s) { field<double>(s, kEverywhere, 200, false); }
+void BM_CompactMixed(benchmark::State& s) { field<float>(s, kEverywhere, 200, false); }
+void BM_CulledDouble(benchmark::State& s) { field<double>(s, kMiddle, 200, true); }
+void BM_CulledMixed(benchmark::State& s) { field<float>(s, kMiddle, 200, true); }
+void BM_SmallPadDouble(benchmark::State& s) { field<double>(s, kMiddle, 20, true); }
+void BM_SmallPadMixed(benchmark::State& s) { field<float>(s, kMiddle, 20, true); }
+void BM_SmallPadAcrossEnvironmentsDouble(benchmark::State& s) { block<double>(s, 20); }
+void BM_SmallPadAcrossEnvironmentsMixed(benchmark::State& s) { block<float>(s, 20); }
+BENCHMARK(BM_OnePointAtATime);
+BENCHMARK(BM_DenseDouble);
+BENCHMARK(BM_DenseMixed);
+BENCHMARK(BM_CompactDouble);
+BENCHMARK(BM_CompactMixed);
+
+BENCHMARK(BM_CulledDouble);
+BENCHMARK(BM_CulledMixed);
+BENCHMARK(BM_SmallPadDouble);
+BENCHMARK(BM_SmallPadMixed);
+BENCHMARK(BM_SmallPadAcrossEnvironmentsDouble);
+BENCHMARK(BM_SmallPadAcrossEnvironmentsMixed);
+
+}  // namespace
+}  // namespace tangere
