@@ -55,7 +55,7 @@ std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlP
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout) {
   for (const SensorInfo& sensor : model.sensors()) {
     const int every = tactile_interval(sensor, rollout);
-    if (every > rollout.steps)
+    if (tactile_frames(sensor, rollout) == 0)
       console.note(fmt::format("sensor {} is read every {} steps: no field in {} steps",
                                sensor.name, every, rollout.steps));
   }
@@ -76,8 +76,9 @@ int report_stop(const Console& console, const std::string& command, int signal,
 void list_failures(const Console& console, const std::string& what,
                    const std::vector<Failure>& failures, const std::string& where) {
   for (std::size_t i = 0; i < failures.size() && i < kMostFailuresListed; ++i)
-    console.fail(fmt::format("{} {} failed in step {}: {}", what, failures[i].number,
-                             failures[i].step, to_string(failures[i].status)));
+    console.fail(fmt::format("{} {} failed {}: {}", what, failures[i].number,
+                             failures[i].step < 0 ? "before this run" : fmt::format("in step {}", failures[i].step),
+                             to_string(failures[i].status)));
   if (failures.size() > kMostFailuresListed)
     console.fail(fmt::format("failed too, not listed: {}; {}",
                              failures.size() - kMostFailuresListed, where));

@@ -2,6 +2,7 @@
 // tangere simulate: a scene, a batch, a file. Everything is checked before the first step.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "apps/arguments.hpp"
@@ -11,6 +12,7 @@
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "io/nearest_name.hpp"
+#include "io/saved_state.hpp"
 #include "io/trajectory_file.hpp"
 #include "kernels/isa.hpp"
 #include "tasks/rollout.hpp"
@@ -19,8 +21,8 @@ namespace tangere::apps {
 namespace {
 
 struct Options {
-  std::string scene, output, controls, integrator, precision = "double";
-  std::optional<std::int64_t> steps;
+  std::string scene, output, controls, integrator, precision = "double", state_from;
+  std::optional<std::int64_t> steps, row;
   std::optional<int> environments, every;
   std::optional<double> timestep, tolerance;
   std::optional<std::uint64_t> seed;
@@ -39,7 +41,9 @@ Integrator integrator_named(const std::string& name) {
 
 void check_arguments(const Options& options) {
   check_not_same_file(options.output, options.scene);
-  if (!options.controls.empty()) check_not_same_file(options.output, options.controls);
+  for (const std::string& input : {options.controls, options.state_from})
+    if (!input.empty()) check_not_same_file(options.output, input);
+  if (options.row && options.state_from.empty()) throw InputError("--row without --state-from; expected both");
 }
 
 void check_size(const Model& model, int environments) {
@@ -53,6 +57,7 @@ TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
                              const RolloutOptions& rollout, const ProgramInfo& info) {
   RunDescription run;
   run.steps = rollout.steps;
+  run.first_step = rollout.first_step;
   run.every = rollout.every;
   for (const SensorInfo& sensor : batch.model().sensors())
     run.tactile_intervals.push_back(tactile_interval(sensor, rollout));
@@ -76,7 +81,7 @@ int report(const Options& options, const Console& console, const Batch& batch,
   const auto bytes = std::filesystem::file_size(options.output);
   const double rate = static_cast<double>(summary.environment_steps) / summary.seconds;
   const double per_step = static_cast<double>(summary.newton_iterations) /
-                          static_cast<double>(summary.environment_steps);
+                          static_cast<double>(std::max<std::int64_t>(1, summary.environment_steps));
   list_failures(console, "environment", failures_of(summary), "--json and the file name all");
   console.print(
       fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
@@ -87,7 +92,7 @@ int report(const Options& options, const Console& console, const Batch& batch,
   Json sensors = Json::array();
   for (const SensorInfo& sensor : batch.model().sensors()) {
     const int every = tactile_interval(sensor, rollout);
-    sensors.push_back({{"name", sensor.name}, {"every", every}, {"frames", rollout.steps / every}});
+    sensors.push_back({{"name", sensor.name}, {"every", every}, {"frames", tactile_frames(sensor, rollout)}});
   }
   console.result({{"command", "simulate"},
                   {"exit_code", static_cast<int>(code)},
@@ -95,6 +100,8 @@ int report(const Options& options, const Console& console, const Batch& batch,
                   {"output", options.output},
                   {"bytes", bytes},
                   {"steps", summary.steps},
+                  {"first_step", rollout.first_step},
+                  {"state_from", options.state_from.empty() ? Json() : Json(options.state_from)},
                   {"environments", batch.environments()},
                   {"seed", batch.seed()},
                   {"timestep", stepper.timestep()},
@@ -113,6 +120,49 @@ int report(const Options& options, const Console& console, const Batch& batch,
   return code;
 }
 
+/// Where the run begins: at the scene's start, or at a row of another run.
+struct Start {
+  std::optional<SavedState> saved;
+  std::uint64_t seed = 0;
+  int environments = 1;
+  std::int64_t first_step = 0;
+  bool continues = false;  ///< steps as the run before would have: same step size, with its history
+
+  Start(const Options& options, const Stepper& stepper) {
+    if (!options.state_from.empty()) saved = read_state(options.state_from, options.row);
+    seed = options.seed.value_or(saved ? saved->seed : 0);
+    environments = options.environments.value_or(saved ? saved->environments : 1);
+    continues = saved && saved->timestep == stepper.timestep() && saved->integrator == to_string(stepper.integrator());
+    if (continues) first_step = saved->step;
+  }
+
+  void tell(const Console& console, const Scene& scene, const Stepper& stepper) const {
+    if (!saved) return;
+    if (!continues)
+      console.note(fmt::format("{} was made by {} with steps of {} s, this run takes {} with {} s: it starts anew at time 0 "
+                               "from that state",
+                               saved->path, saved->integrator, saved->timestep, to_string(stepper.integrator()),
+                               stepper.timestep()));
+    else if (saved->row == 0 && saved->step > 0)
+      console.note(fmt::format("row 0 of {} has no row before it: a scheme of two steps starts anew there", saved->path));
+    if (saved->scene_text != scene.text)
+      console.note(fmt::format("the scene is not the one that {} was made with", saved->path));
+    if (saved->seed != seed)
+      console.note(fmt::format("{} was made with seed {}: what varies between environments is another draw", saved->path,
+                               saved->seed));
+  }
+};
+
+/// --steps, or as many as the controls last after the start.
+std::int64_t steps_left(const Options& options, const ControlProgram& controls, std::int64_t first_step) {
+  if (options.steps) return *options.steps;
+  const std::int64_t left = step_count({}, controls) - first_step;
+  if (left < 1)
+    throw InputError(fmt::format("the controls end at step {}, the run starts at step {}; give --steps",
+                                 controls.steps(), first_step));
+  return left;
+}
+
 int simulate(const Options& options, const Console& console, const ProgramInfo& info) {
   check_arguments(options);
   const Precision precision = precision_named(options.precision);
@@ -121,23 +171,26 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
 
   const Model model(read_scene_for(options.scene, options.allow_unknown, console));
   Stepper stepper(model, solver);
-  const ControlProgram controls =
-      make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
-  const RolloutOptions rollout{step_count(options.steps, controls), options.every.value_or(0), precision};
+  const Start start(options, stepper);
+  start.tell(console, model.scene(), stepper);
+  const ControlProgram controls = make_controls(options.controls, start.seed, model, stepper, console);
+  const RolloutOptions rollout{steps_left(options, controls, start.first_step), options.every.value_or(0), precision,
+                               start.first_step};
+  controls.check_covers(rollout.first_step + rollout.steps);
   note_empty_sensors(console, model, rollout);
-  const int environments = options.environments.value_or(1);
-  check_size(model, environments);
-  Batch batch(model, environments, options.seed.value_or(0));
+  check_size(model, start.environments);
+  Batch batch(model, start.environments, start.seed, start.saved ? start.saved->first_episode : 0);
+  if (start.saved) restore_state(*start.saved, start.continues, batch);
 
   // Before the file is created and until it is gone or complete: nothing half-written stays.
   const StopSignals signals;
   TrajectoryFile output(options.output, make_layout(batch, stepper, rollout, info),
                         options.overwrite);
-  console.detail(fmt::format("environments: {}, steps: {}, {}, h = {} s", environments,
+  console.detail(fmt::format("environments: {}, steps: {}, {}, h = {} s", start.environments,
                              rollout.steps, to_string(stepper.integrator()), stepper.timestep()));
   RolloutSummary summary;
   {
-    Progress progress(console, "step", rollout.steps, environments);
+    Progress progress(console, "step", rollout.steps, start.environments);
     summary = run_rollout(batch, stepper, controls, rollout, output, [&](std::int64_t done) {
       progress.update(done);
       return signals.received() == 0;
@@ -164,9 +217,12 @@ Command add_simulate(CLI::App& program) {
   add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
                                  "Steps to take [default: as many as the controls last]");
   add_whole_number<int>(*app, "--envs", o.environments, 1, kMostEnvironments,
-                        "Environments stepped together [default: 1]");
+                        "Environments stepped together [default: 1, or those of --state-from]");
   add_whole_number<int>(*app, "--every", o.every, 1, kMostEnvironments,
                         "Tactile fields every N-th step [default: the scene's, or 1]");
+  add_text(*app, "--state-from", o.state_from, "F.h5",
+           "Start from a row of another run, environment e from its e");
+  add_whole_number<std::int64_t>(*app, "--row", o.row, 0, kMostSteps, "Row of --state-from [default: the last]");
   add_positive_number(*app, "--timestep", o.timestep, "Step size in s [default: the scene's]");
   add_text(*app, "--integrator", o.integrator, "NAME",
            "BDF1, BDF2, SDIRK2 or linear-implicit [default: the scene's]");
@@ -175,7 +231,7 @@ Command add_simulate(CLI::App& program) {
   add_text(*app, "--precision", o.precision, "NAME",
            "Of tactile fields: double, or mixed, points in float [default: double]");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
-                                  "Seed of all that varies between environments [default: 0]");
+                                  "Seed of all that varies between environments [default: 0, or that of --state-from]");
   app->add_flag("--overwrite", o.overwrite, "Replace the output if it exists");
   app->add_flag("--allow-unknown", o.allow_unknown,
                 "Unknown elements and attributes of the scene are warnings, not errors");

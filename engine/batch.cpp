@@ -157,6 +157,12 @@ void Batch::set_state(int environment, std::span<const double> q, std::span<cons
   has_history_[lane] = 1;
 }
 
+void Batch::set_failed(int environment, StepStatus status) {
+  if (!failed(status))
+    throw InputError(std::string("status '") + to_string(status) + "' is none of a failed environment");
+  status_[std::size_t(environment)] = status;
+}
+
 int Batch::failed_count() const {
   const auto all = statuses();
   return static_cast<int>(std::count_if(all.begin(), all.end(), [](StepStatus s) { return failed(s); }));

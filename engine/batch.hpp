@@ -45,6 +45,9 @@ class Batch {
   void set_state(int environment, std::span<const double> q, std::span<const double> v,
                  std::span<const double> previous_q, std::span<const double> previous_v);
 
+  /// Freezes an environment as a failed step would. Throws InputError when `status` is none of failure.
+  void set_failed(int environment, StepStatus status);
+
   [[nodiscard]] StepStatus status(int environment) const { return status_[std::size_t(environment)]; }
   [[nodiscard]] std::int32_t iterations(int environment) const { return iterations_[std::size_t(environment)]; }
   [[nodiscard]] double residual(int environment) const { return residual_[std::size_t(environment)]; }

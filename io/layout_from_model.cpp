@@ -64,6 +64,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
     throw std::logic_error("one tactile interval per sensor is needed");
   TrajectoryLayout layout;
   layout.steps = run.steps;
+  layout.first_step = run.first_step;
   layout.environments = batch.environments();
   layout.q_names = copy(model.q_names());
   layout.q_units = copy(model.q_units());

@@ -95,6 +95,7 @@ struct TrajectoryFile::Impl {
     h5::write_scalar<std::uint64_t>(file, "seed", layout.seed);
     h5::write_scalar<std::int64_t>(file, "first_episode", layout.first_episode);
     h5::write_scalar<std::int64_t>(file, "steps", layout.steps);
+    h5::write_scalar<std::int64_t>(file, "first_step", layout.first_step);
     h5::write_scalar<std::int64_t>(file, "environments", layout.environments);
     h5::write_attribute(file, "quaternion_order", "w x y z");
     h5::write_attribute(file, "world_axes", "right-handed, SI units");
@@ -147,7 +148,7 @@ struct TrajectoryFile::Impl {
   }
 
   void create_sensor(const SensorLayout& s) {
-    const hsize_t E = static_cast<hsize_t>(layout.environments), F = static_cast<hsize_t>(s.frames(layout.steps));
+    const hsize_t E = static_cast<hsize_t>(layout.environments), F = static_cast<hsize_t>(s.frames(layout.steps, layout.first_step));
     if (!h5::has_link(file, "tactile")) h5::create_group(file, "tactile");
     const h5::Id group = h5::create_group(h5::open_group(file, "tactile"), s.name);
     Sensor out;
@@ -239,7 +240,7 @@ void TrajectoryFile::commit() {
   expect("states", f.states, f.layout.steps + 1);
   expect("steps", f.steps, f.layout.steps);
   for (std::size_t i = 0; i < f.sensors.size(); ++i)
-    expect("fields of " + f.layout.sensors[i].name, f.sensors[i].written, f.layout.sensors[i].frames(f.layout.steps));
+    expect("fields of " + f.layout.sensors[i].name, f.sensors[i].written, f.layout.sensors[i].frames(f.layout.steps, f.layout.first_step));
   for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.iterations, &f.status, &f.residual}) d->reset();
   f.sensors.clear();
   h5::close_file(f.file, f.part.path());

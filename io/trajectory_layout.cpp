@@ -45,7 +45,7 @@ void add_small(const TrajectoryLayout& layout, Bytes& bytes) {
   bytes.add({t, e, count_of(layout.u_names), 8});
   bytes.add({t, e, 8 + 4 + 1});  // residual, iterations, status
   bytes.add({e, count_of(layout.randomized_names), 8});
-  for (const SensorLayout& sensor : layout.sensors) bytes.add({sensor.frames(t), 8});
+  for (const SensorLayout& sensor : layout.sensors) bytes.add({sensor.frames(t, layout.first_step), 8});
 }
 
 void check_sensor(const SensorLayout& sensor, std::set<std::string>& names) {
@@ -85,6 +85,7 @@ void TrajectoryLayout::check() const {
       throw InputError(fmt::format("{} names and {} units for {}", names, units, what));
   };
   if (steps < 0) throw InputError(fmt::format("{} steps, expected 0 or more", steps));
+  if (first_step < 0) throw InputError(fmt::format("first step {}, expected 0 or more", first_step));
   if (environments < 1)
     throw InputError(fmt::format("{} environments, expected at least 1", environments));
   same("q", q_names.size(), q_units.size());
@@ -108,7 +109,7 @@ std::uint64_t TrajectoryLayout::bytes() const {
   Bytes sum;
   add_small(*this, sum);
   for (const SensorLayout& sensor : sensors)
-    sum.add({sensor.frames(steps), environments, sensor.points, 3, 8});
+    sum.add({sensor.frames(steps, first_step), environments, sensor.points, 3, 8});
   return sum.sum(*this);
 }
 

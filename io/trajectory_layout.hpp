@@ -18,7 +18,7 @@ struct SensorLayout {
   std::string body;
   int rows = 0, cols = 0;  ///< of a rectangular array, points row-major; both 0: a list of points
   int points = 0;          ///< rows * cols for a rectangular array
-  int every = 1;           ///< K: field k is read from row (k + 1) K of /q
+  int every = 1;           ///< K: fields are read after steps K, 2K, … of the first run of a chain
   int pressure_sign = 1;   ///< times the third force component: positive under pressure
   /// Rectangular arrays: p(i, j) = corner0 + i pitch0 axis0 + j pitch1 axis1, body frame [m].
   std::array<double, 3> corner0{}, corner1{};
@@ -27,8 +27,10 @@ struct SensorLayout {
   [[nodiscard]] bool rectangular() const { return rows > 0; }
   /// {pitch0, pitch1} [m]; negative when the corners run against an axis, 0 for a single row.
   [[nodiscard]] std::array<double, 2> pitch() const;
-  /// Fields that a run of `steps` steps gives.
-  [[nodiscard]] std::int64_t frames(std::int64_t steps) const { return steps / every; }
+  /// Fields that `steps` steps give after `first_step` of an earlier run.
+  [[nodiscard]] std::int64_t frames(std::int64_t steps, std::int64_t first_step) const {
+    return (first_step + steps) / every - first_step / every;
+  }
 };
 
 /// A value of /solver/status and what it means.
@@ -39,6 +41,7 @@ struct StatusMeaning {
 
 struct TrajectoryLayout {
   std::int64_t steps = 0;  ///< T
+  std::int64_t first_step = 0;  ///< steps before row 0, of the runs that this one continues
   int environments = 1;    ///< E
   std::vector<std::string> q_names, q_units;  ///< (nq)
   std::vector<std::string> v_names, v_units;  ///< (nv)
@@ -68,7 +71,7 @@ struct TrajectoryLayout {
 
 /// What the model and the batch do not know about a run.
 struct RunDescription {
-  std::int64_t steps = 0;
+  std::int64_t steps = 0, first_step = 0;
   int every = 0;                      ///< the option as given; 0: each sensor's own
   std::vector<int> tactile_intervals; ///< K in force, one per sensor
   std::string precision, command_line, version, instruction_set;

@@ -98,7 +98,9 @@ void check(const Stepper& stepper, const ControlProgram& controls, const Rollout
   if (controls.timestep() != stepper.timestep())
     throw InputError("controls laid out for a timestep of " + std::to_string(controls.timestep()) +
                      " s; the stepper's is " + std::to_string(stepper.timestep()) + " s");
-  controls.check_covers(options.steps);
+  if (options.first_step < 0)
+    throw InputError("a rollout from step " + std::to_string(options.first_step) + "; expected 0 or more");
+  controls.check_covers(options.first_step + options.steps);
 }
 
 /// Counts one step's outcome into the summary; environments that failed in it leave `live`.
@@ -123,6 +125,11 @@ int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options) {
   return sensor.every > 0 ? sensor.every : 1;
 }
 
+std::int64_t tactile_frames(const SensorInfo& sensor, const RolloutOptions& options) {
+  const int every = tactile_interval(sensor, options);
+  return (options.first_step + options.steps) / every - options.first_step / every;
+}
+
 double rollout_bytes(const Model& model, int environments) {
   const double numbers = model.nq() + model.nv() + model.nu() +
                          double{kPoseWidth + kTwistWidth} * model.nb() +
@@ -143,21 +150,25 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram&
   RolloutSummary summary;
   std::vector<double> u(environments * nu);
   std::vector<bool> live(environments);
-  for (std::size_t e = 0; e < environments; ++e) live[e] = !failed(batch.statuses()[e]);
+  for (std::size_t e = 0; e < environments; ++e) {
+    live[e] = !failed(batch.statuses()[e]);
+    if (!live[e]) summary.failures.push_back({static_cast<int>(e), -1, batch.statuses()[e]});
+  }
 
-  recorder.write_state(0, 0);
+  // Times come from the counter, so that they do not drift.
+  const auto time = [&](std::int64_t row) { return static_cast<double>(options.first_step + row) * stepper.timestep(); };
+  recorder.write_state(0, time(0));
   for (std::int64_t t = 0; t < options.steps; ++t) {
     for (std::size_t e = 0; e < environments; ++e)
-      controls.evaluate(t, batch.episode(static_cast<int>(e)), std::span(u).subspan(e * nu, nu));
+      controls.evaluate(options.first_step + t, batch.episode(static_cast<int>(e)), std::span(u).subspan(e * nu, nu));
     stepper.step(batch, u);
     recorder.write_step(t, u, live);
     count(batch, t, live, summary);
-    // From the counter, so that it does not drift.
-    recorder.write_state(t + 1, static_cast<double>(t + 1) * stepper.timestep());
+    recorder.write_state(t + 1, time(t + 1));
     for (std::size_t s = 0; s < sensors.size(); ++s) {
-      const int every = tactile_interval(sensors[s], options);
-      if ((t + 1) % every == 0)
-        recorder.write_field(static_cast<int>(s), (t + 1) / every - 1, t + 1);
+      const std::int64_t every = tactile_interval(sensors[s], options), done = options.first_step + t + 1;
+      if (done % every == 0)
+        recorder.write_field(static_cast<int>(s), done / every - options.first_step / every - 1, t + 1);
     }
     summary.steps = t + 1;
     summary.stopped = progress && !progress(t + 1);

@@ -18,12 +18,14 @@ struct RolloutOptions {
   std::int64_t steps = 0;
   int every = 0;  ///< tactile every k-th step; 0: the scene's `every`, or 1 where it has none
   Precision precision = Precision::f64;  ///< of tactile fields
+  /// Steps taken before row 0, by a run that this one continues: counted in times, controls and the rhythm of fields.
+  std::int64_t first_step = 0;
 };
 
 /// An environment that no solution was found for. It keeps the state before that step.
 struct FailedEnvironment {
   int environment;
-  std::int64_t step;  ///< the first that failed
+  std::int64_t step;  ///< the first that failed, -1: before this run
   StepStatus status;  ///< why
 };
 
@@ -44,7 +46,7 @@ using RolloutProgress = std::function<bool(std::int64_t done)>;
 /// StepRow, the StateRow after it and the tactile rows due. Rows of a tactile sensor are read after
 /// steps K, 2K, …: field k comes from row (k + 1) K of q. In a StepRow, an environment that failed
 /// earlier has 0 iterations and its last status and residual. Throws InputError when steps < 1,
-/// every < 0, a table of controls is too short or was laid out for another timestep, and passes on
+/// every < 0, first_step < 0, a table of controls is too short or was laid out for another timestep, and passes on
 /// what the sink throws.
 RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram& controls,
                            const RolloutOptions& options, RowSink& sink,
@@ -52,6 +54,8 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram&
 
 /// The step between fields of a sensor under these options.
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options);
+/// Fields that a rollout reads of a sensor.
+std::int64_t tactile_frames(const SensorInfo& sensor, const RolloutOptions& options);
 
 /// Memory that a rollout allocates besides batch and stepper [bytes].
 double rollout_bytes(const Model& model, int environments);

@@ -201,6 +201,81 @@ TEST(Simulate, FailedEnvironmentsAreListedAndTheFileIsWhole) {
   EXPECT_THAT(text.err, HasSubstr("not listed: 5"));
 }
 
+/// Rows from `first` on of a dataset.
+std::vector<double> rows_from(const Array& array, std::size_t first) {
+  const std::size_t width = array.values.size() / array.dims[0];
+  return {array.values.begin() + static_cast<std::ptrdiff_t>(first * width), array.values.end()};
+}
+
+class Continued : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(Continued, GoesOnBitForBit) {
+  const Folder whole, parts;
+  const Words common{"--integrator", GetParam(), "--every", "4", "--envs", "19", "--seed", "7"};
+  const auto with = [&](Words more) {
+    more.insert(more.end(), common.begin(), common.end());
+    return more;
+  };
+  simulate(whole, kSmall, with({"--steps", "90"}));
+  simulate(parts, kSmall, with({"--steps", "60"}));
+  std::filesystem::rename(parts.path("out.h5"), parts.path("first.h5"));
+  const json answer = simulate(parts, kSmall, {"--integrator", GetParam(), "--every", "4", "--steps", "40",
+                                               "--state-from", "first.h5", "--row", "50"});
+  EXPECT_EQ(answer.at("first_step"), 50);
+  EXPECT_EQ(answer.at("environments"), 19);
+  EXPECT_EQ(answer.at("seed"), 7);
+  for (const std::string name : {"/q", "/v", "/time", "/bodies/pose"})
+    EXPECT_EQ(read_array(parts, name).values, rows_from(read_array(whole, name), 50)) << name;
+  for (const std::string name : {"/u", "/solver/iterations", "/solver/residual", "/solver/status"})
+    EXPECT_EQ(read_array(parts, name).values, rows_from(read_array(whole, name), 50)) << name;
+  // Fields after steps 52, 56 … 88: the last ten of 22.
+  EXPECT_EQ(read_array(parts, "/tactile/pad/force").values, rows_from(read_array(whole, "/tactile/pad/force"), 12));
+  EXPECT_EQ(read_array(parts, "/tactile/pad/step").values.front(), 2);
+  // A continued run continued: the last row by default.
+  std::filesystem::rename(parts.path("out.h5"), parts.path("second.h5"));
+  simulate(whole, kSmall, with({"--steps", "95", "--overwrite"}));
+  const json third = simulate(parts, kSmall, {"--integrator", GetParam(), "--every", "4", "--steps", "5",
+                                              "--state-from", "second.h5"});
+  EXPECT_EQ(third.at("first_step"), 90);
+  EXPECT_EQ(read_array(parts, "/q").values, rows_from(read_array(whole, "/q"), 90));
+}
+INSTANTIATE_TEST_SUITE_P(Schemes, Continued, ::testing::Values("BDF1", "BDF2", "SDIRK2", "linear-implicit"),
+                         [](const auto& scheme) { return scheme.param.substr(0, 6); });
+
+TEST(Continue, SaysWhatDoesNotFit) {
+  const Folder folder;
+  simulate(folder, kSmall, {"--steps", "20", "--envs", "2"});
+  std::filesystem::rename(folder.path("out.h5"), folder.path("first.h5"));
+  const auto complaint = [&](const Words& more, int exit_code = 2) {
+    return simulate(folder, kSmall, more, exit_code).at("error").get<std::string>();
+  };
+  EXPECT_EQ(complaint({"--state-from", "first.h5", "--row", "21"}), "row 21 of first.h5; expected 0 to 20");
+  EXPECT_EQ(complaint({"--state-from", "first.h5", "--envs", "3"}), "3 environments; first.h5 has 2");
+  EXPECT_EQ(complaint({"--row", "2"}), "--row without --state-from; expected both");
+  EXPECT_THAT(complaint({"--state-from", "none.h5"}, 3), HasSubstr("none.h5"));
+  folder.write("text.h5", "no HDF5");
+  EXPECT_THAT(complaint({"--state-from", "text.h5"}, 3), HasSubstr("text.h5"));
+  folder.write("u.csv", rows(25, "0,0,0.2"));
+  EXPECT_EQ(complaint({"--state-from", "first.h5", "--controls", "u.csv", "--steps", "6"}),
+            "u.csv: 25 rows of controls for 26 steps; expected a row per step");
+  EXPECT_EQ(simulate(folder, kSmall, {"--state-from", "first.h5", "--controls", "u.csv"}).at("steps"), 5);
+  const Outcome other = run(folder, {"simulate", kSmall, "-o", "out.h5", "--overwrite", "--state-from", "first.h5",
+                                     "--timestep", "0.01", "--seed", "3", "--steps", "2"});
+  EXPECT_THAT(other.err, HasSubstr("starts anew"));
+  EXPECT_THAT(other.err, HasSubstr("seed 0"));
+  EXPECT_EQ(read_array(folder, "/time").values, (std::vector<double>{0, 0.01, 0.02}));
+}
+
+TEST(Continue, AFailedEnvironmentStaysFailed) {
+  const Folder folder;
+  simulate(folder, kSmall, {"--timestep", "86400", "--steps", "3", "--envs", "2"}, 1);
+  std::filesystem::rename(folder.path("out.h5"), folder.path("first.h5"));
+  const json answer = simulate(folder, kSmall, {"--timestep", "86400", "--steps", "2", "--state-from", "first.h5"}, 1);
+  EXPECT_EQ(answer.at("environment_steps"), 0);
+  ASSERT_THAT(answer.at("failed"), testing::SizeIs(2));
+  EXPECT_EQ(answer.at("failed").at(1).at("step"), -1);
+}
+
 TEST(Plot, DrawsWhatSimulateWrote) {
   const Folder folder;
   simulate(folder, kSmall, {"--envs", "2"});
