@@ -19,10 +19,6 @@ struct Options {
   bool allow_unknown = false;
 };
 
-const char* shape_name(const Shape& shape) {
-  return std::holds_alternative<SphereShape>(shape) ? "sphere" : "cuboid";
-}
-
 std::string parent_name(const Scene& scene, const LinkDescription& link) {
   return link.parent < 0 ? "world" : scene.links[static_cast<std::size_t>(link.parent)].body.name;
 }
@@ -105,7 +101,7 @@ std::string bodies_text(const Model& model) {
   std::string text = fmt::format("bodies ({})\n", model.nb());
   for (std::size_t b = 0; b < scene.links.size(); ++b) {
     const LinkDescription& link = scene.links[b];
-    text += fmt::format("  {:<16} {:<7} {:>12.6g} kg, joint {} ({}), parent {}\n", link.body.name,
+    text += fmt::format("  {:<16} {:<8} {:>12.6g} kg, joint {} ({}), parent {}\n", link.body.name,
                         shape_name(link.body.shape), model.mass(static_cast<int>(b)),
                         link.joint.name, to_string(link.joint.type), parent_name(scene, link));
   }

@@ -197,37 +197,44 @@ class Compiler {
     CompiledBody body;
     body.link = joint.link;
     body.frame = compose(joint.frame, to_frame(d.body.pose));
-    Vec3<double> principal{};
-    if (const auto* sphere = std::get_if<SphereShape>(&d.body.shape)) {
-      body.shape = PrimitiveShape::sphere;
-      body.size = {sphere->radius, 0, 0};
-      body.mass = d.body.density * 4.0 / 3.0 * M_PI * sphere->radius * sphere->radius * sphere->radius;
-      const double inertia = 0.4 * body.mass * sphere->radius * sphere->radius;
-      principal = {inertia, inertia, inertia};
-    } else {
-      const Vector3& s = std::get<CuboidShape>(d.body.shape).size;
-      body.shape = PrimitiveShape::cuboid;
-      body.size = {0.5 * s[0], 0.5 * s[1], 0.5 * s[2]};
-      body.mass = d.body.density * s[0] * s[1] * s[2];
-      principal = {body.mass / 12 * (s[1] * s[1] + s[2] * s[2]), body.mass / 12 * (s[0] * s[0] + s[2] * s[2]),
-                   body.mass / 12 * (s[0] * s[0] + s[1] * s[1])};
-    }
-    if (!(body.mass > 0) || !std::isfinite(body.mass))
+    place_shape(d.body.shape, body);
+    const MassProperties properties = mass_properties(d.body.shape, d.body.density);
+    body.mass = properties.mass;
+    const bool massless = body.shape == PrimitiveShape::plane;
+    if (!massless && (!(body.mass > 0) || !std::isfinite(body.mass)))
       throw InputError(d.body.source.prefix() + "body '" + d.body.name + "' has mass " + std::to_string(body.mass) +
                        " kg; expected a positive, finite one");
-    if (body.link >= 0) add_inertia(m_.links[body.link], body, principal);
+    if (body.link >= 0 && !massless) add_inertia(m_.links[body.link], body, properties);
     m_.bodies.push_back(body);
     m_.body_names.push_back(d.body.name);
   }
 
-  static void add_inertia(Link& link, const CompiledBody& body, const Vec3<double>& principal) {
+  static void place_shape(const Shape& shape, CompiledBody& body) {
+    if (const auto* sphere = std::get_if<SphereShape>(&shape)) {
+      body.shape = PrimitiveShape::sphere;
+      body.size = {sphere->radius, 0, 0};
+    } else if (const auto* cuboid = std::get_if<CuboidShape>(&shape)) {
+      body.shape = PrimitiveShape::cuboid;
+      body.size = 0.5 * vec(cuboid->size);
+    } else if (const auto* cylinder = std::get_if<CylinderShape>(&shape)) {
+      body.shape = PrimitiveShape::cylinder;
+      body.size = {cylinder->radius, 0.5 * cylinder->length, 0};
+    } else if (const auto* capsule = std::get_if<CapsuleShape>(&shape)) {
+      body.shape = PrimitiveShape::capsule;
+      body.size = {capsule->radius, 0.5 * capsule->length, 0};
+    } else {
+      body.shape = PrimitiveShape::plane;
+    }
+  }
+
+  static void add_inertia(Link& link, const CompiledBody& body, const MassProperties& properties) {
     const Mat3<double>& R = body.frame.R;
-    const Mat3<double> local = {{{principal.x, 0, 0}, {0, principal.y, 0}, {0, 0, principal.z}}};
-    const Mat3<double> p = kernels::skew(body.frame.p);
+    const Vec3<double> centre = R * properties.centre + body.frame.p;
+    const Mat3<double> p = kernels::skew(centre);
     link.massive = true;
     link.mass += body.mass;
-    link.moment += body.mass * body.frame.p;
-    link.inertia += R * local * kernels::transpose(R) - body.mass * (p * p);
+    link.moment += body.mass * centre;
+    link.inertia += R * properties.inertia * kernels::transpose(R) - body.mass * (p * p);
   }
 
   void motors() {
@@ -264,14 +271,14 @@ class Compiler {
       const int b1 = bodies_.find("body", d.general_body, d.source);
       const int b2 = bodies_.find("body", d.primitive_body, d.source);
       const CompiledBody &first = m_.bodies[b1], &second = m_.bodies[b2];
-      const auto* cuboid = std::get_if<CuboidShape>(&m_.scene.links[b1].body.shape);
-      if (cuboid == nullptr)
-        throw InputError(d.source.prefix() + "general_body '" + d.general_body +
-                         "' is a sphere, which has no contact points; expected a cuboid (swap the two bodies)");
+      const Shape& general = m_.scene.links[b1].body.shape;
+      std::vector<double> points = contact_points(general);
+      if (points.empty())
+        throw InputError(d.source.prefix() + "general_body '" + d.general_body + "' is a " + shape_name(general) +
+                         ", which has no contact points; expected a cuboid, cylinder or capsule (swap the two bodies)");
       if (b1 == b2 || first.link == second.link)
         throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" + d.primitive_body +
                          "' cannot move against each other");
-      std::vector<double> points = cuboid_contact_points(*cuboid);
       double reach = 0;
       for (std::size_t k = 0; k < points.size(); k += 3) {
         const Vec3<double> p = first.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + first.frame.p;
@@ -325,10 +332,10 @@ class Compiler {
       const CompiledBody& body = m_.bodies[b];
       if (body.link < 0) throw InputError(d.source.prefix() + "body '" + d.body + "' is fixed in the world");
       kernels::GroundContact ground{};
-      std::vector<double> points;
-      if (const auto* cuboid = std::get_if<CuboidShape>(&m_.scene.links[b].body.shape)) {
-        points = cuboid_contact_points(*cuboid);
-      } else {
+      std::vector<double> points = contact_points(m_.scene.links[b].body.shape);
+      if (body.shape == PrimitiveShape::plane)
+        throw InputError(d.source.prefix() + "body '" + d.body + "' is a plane, which has no contact points");
+      if (body.shape == PrimitiveShape::sphere) {
         points = {0, 0, 0};
         ground.radius = body.size.x;
       }

@@ -17,7 +17,7 @@ struct CompiledBody {
   int link = -1;
   kernels::Frame<double> frame;  ///< body frame in the link (or the world)
   PrimitiveShape shape = PrimitiveShape::sphere;
-  kernels::Vec3<double> size{};  ///< radius in x, or half edges
+  kernels::Vec3<double> size{};  ///< as in kernels::PairContact
   double mass = 0;               ///< [kg]
 };
 
@@ -95,8 +95,16 @@ struct CompiledModel {
   std::vector<std::string> q_names, v_names, u_names, q_units, v_units, u_units, body_names;
 };
 
-/// Surface nodes of a cuboid's contact grid in its body frame, (n, 3).
-std::vector<double> cuboid_contact_points(const CuboidShape& shape);
+/// Of a body, in its own axes; inertia about its centre of mass.
+struct MassProperties {
+  double mass;                    ///< [kg]
+  kernels::Vec3<double> centre;   ///< of mass, body frame [m]
+  kernels::Mat3<double> inertia;  ///< [kg m²]
+};
+MassProperties mass_properties(const Shape& shape, double density);
+
+/// Points of the body that meet other bodies, in its body frame, (n, 3): empty for spheres and planes.
+std::vector<double> contact_points(const Shape& shape);
 
 /// Reorders (n, 3) points so that every kContactTile consecutive ones are neighbours; returns their (tiles, 4) bounds.
 std::vector<double> sort_into_tiles(std::vector<double>& points, int tile);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where bodies can be touched: surface nodes of a cuboid's grid, ordered so that neighbours share a tile.
+// Where bodies touch others: points on their surface by shape, ordered so that neighbours share a tile.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -8,7 +8,10 @@
 
 namespace tangere {
 
-std::vector<double> cuboid_contact_points(const CuboidShape& shape) {
+namespace {
+
+/// Surface nodes of the grid.
+std::vector<double> points_of(const CuboidShape& shape) {
   const std::array<int, 3>& n = shape.contact_resolution;
   std::vector<double> points;
   const auto coordinate = [&](int axis, int i) {
@@ -24,7 +27,37 @@ std::vector<double> cuboid_contact_points(const CuboidShape& shape) {
   return points;
 }
 
-namespace {
+/// `count` points around z, the first along x.
+void add_ring(std::vector<double>& points, int count, double radius, double z) {
+  for (int j = 0; j < count; ++j) {
+    const double angle = 2 * M_PI * j / count;
+    points.insert(points.end(), {radius * std::cos(angle), radius * std::sin(angle), z});
+  }
+}
+
+std::vector<double> points_of(const CylinderShape& shape) {
+  std::vector<double> points;
+  for (const double z : {-0.5 * shape.length, 0.5 * shape.length}) {
+    points.insert(points.end(), {0, 0, z});
+    for (int k = 1; k <= shape.contact_rings; ++k)
+      add_ring(points, shape.contact_angles, shape.radius * k / shape.contact_rings, z);
+  }
+  return points;
+}
+
+std::vector<double> points_of(const CapsuleShape& shape) {
+  const double pole = 0.5 * shape.length + shape.radius;
+  std::vector<double> points = {0, 0, pole, 0, 0, -pole};
+  const int rings = shape.contact_rings;
+  for (int k = 0; k < rings; ++k) {
+    const double along = rings > 1 ? double(k) / (rings - 1) : 0.5;  // a single ring goes around the middle
+    add_ring(points, shape.contact_angles, shape.radius, shape.length * (along - 0.5));
+  }
+  return points;
+}
+
+std::vector<double> points_of(const SphereShape&) { return {}; }
+std::vector<double> points_of(const PlaneShape&) { return {}; }
 
 /// Splits the longest side of a range in half until it fits a tile. Full tiles first, so only the last is short.
 void split(const std::vector<double>& points, std::vector<int>& order, std::size_t begin, std::size_t end, int tile) {
@@ -48,6 +81,10 @@ void split(const std::vector<double>& points, std::vector<int>& order, std::size
 }
 
 }  // namespace
+
+std::vector<double> contact_points(const Shape& shape) {
+  return std::visit([](const auto& s) { return points_of(s); }, shape);
+}
 
 std::vector<double> sort_into_tiles(std::vector<double>& points, int tile) {
   const std::size_t n = points.size() / 3;

@@ -2,6 +2,8 @@
 // Names and sizes of a scene's enumerations.
 #include "engine/scene.hpp"
 
+#include <iterator>
+
 namespace tangere {
 
 const char* to_string(Integrator value) {
@@ -35,6 +37,12 @@ const char* to_string(ContactLaw value) {
     case ContactLaw::linear: return "linear";
   }
   return "unknown";
+}
+
+const char* shape_name(const Shape& shape) {
+  constexpr const char* kNames[] = {"sphere", "cuboid", "cylinder", "capsule", "plane"};
+  static_assert(std::size(kNames) == std::variant_size_v<Shape>);
+  return kNames[shape.index()];
 }
 
 int position_count(JointType type) {

@@ -51,7 +51,22 @@ struct CuboidShape {
 struct SphereShape {
   double radius = 0;  ///< [m]
 };
-using Shape = std::variant<SphereShape, CuboidShape>;
+/// Closed cylinder along the body's z. Contact points: centres and rings of the two end faces.
+struct CylinderShape {
+  double length = 0, radius = 0;  ///< [m]
+  int contact_angles = 8;         ///< points on a ring
+  int contact_rings = 3;          ///< rings on a face, radii r k/rings
+};
+/// All points within `radius` of a segment of `length` along the body's z. Contact points: two poles, and rings around the
+/// straight part, ends included.
+struct CapsuleShape {
+  double length = 0, radius = 0;  ///< [m]; from pole to pole it is length + 2 radius
+  int contact_rings = 5;
+  int contact_angles = 4;         ///< points on a ring
+};
+/// The half-space z < 0 of the body frame: no mass, no contact points.
+struct PlaneShape {};
+using Shape = std::variant<SphereShape, CuboidShape, CylinderShape, CapsuleShape, PlaneShape>;
 
 struct BodyDescription {
   std::string name;
@@ -191,6 +206,8 @@ struct Scene {
 const char* to_string(Integrator value);
 const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
+/// "sphere", "cuboid" …
+const char* shape_name(const Shape& shape);
 
 /// Number of configuration coordinates and of velocity dofs of a joint type: free is 7 and 6.
 int position_count(JointType type);

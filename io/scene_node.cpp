@@ -145,6 +145,16 @@ int SceneNode::integer(const char* attribute, int lowest, int highest, std::opti
   return static_cast<int>(x);
 }
 
+std::vector<int> SceneNode::integers(const char* attribute, const std::vector<int>& fallback, int lowest,
+                                     int highest) const {
+  if (!has(attribute)) return fallback;
+  const std::vector<double> x = numbers(attribute, fallback.size());
+  for (const double n : x)
+    if (n != std::floor(n) || n < lowest || n > highest)
+      fail(fmt::format("{} has {}; expected integers from {} to {}", attribute, n, lowest, highest));
+  return {x.begin(), x.end()};
+}
+
 Vector3 SceneNode::vector(const char* attribute, std::optional<Vector3> fallback) const {
   if (fallback && !has(attribute)) return *fallback;
   const std::vector<double> x = numbers(attribute, 3);

@@ -57,6 +57,9 @@ class SceneNode {
   [[nodiscard]] double positive(const char* attribute, std::optional<double> fallback = std::nullopt) const;
   [[nodiscard]] double not_negative(const char* attribute, std::optional<double> fallback = std::nullopt) const;
   [[nodiscard]] int integer(const char* attribute, int lowest, int highest, std::optional<int> fallback = std::nullopt) const;
+  /// As many integers as the fallback has, each from `lowest` to `highest`.
+  [[nodiscard]] std::vector<int> integers(const char* attribute, const std::vector<int>& fallback, int lowest,
+                                          int highest) const;
   /// Any number of finite numbers; `count` > 0 asks for exactly so many.
   [[nodiscard]] std::vector<double> numbers(const char* attribute, std::size_t count = 0) const;
   [[nodiscard]] Vector3 vector(const char* attribute, std::optional<Vector3> fallback = std::nullopt) const;

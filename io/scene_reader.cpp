@@ -17,7 +17,7 @@ namespace tangere {
 namespace {
 
 constexpr std::uintmax_t kLargestFile = 64U << 20;  // a scene is text written by people
-constexpr int kLargestResolution = 1000;            // nodes along one edge of a cuboid
+constexpr int kLargestResolution = 1000;            // contact points along one edge or around one ring
 constexpr int kDeepestTree = 200;
 
 const std::vector<std::string> kJointTypes = {"fixed",     "revolute",       "prismatic", "planar",
@@ -127,7 +127,7 @@ class TreeReader {
       used.emplace_back(attribute);
       idle.erase(std::find(idle.begin(), idle.end(), attribute));
     };
-    const std::vector<std::string> types = {"sphere", "cuboid", "cylinder", "capsule", "mesh", "abstract"};
+    const std::vector<std::string> types = {"sphere", "cuboid", "cylinder", "capsule", "plane", "mesh", "abstract"};
     const int type = node.choice("type", types);
     if (type == 0) {
       take("radius");
@@ -136,9 +136,27 @@ class TreeReader {
       take("size");
       take("general_contact_resolution");
       body.shape = read_cuboid(node, length);
+    } else if (type == 2) {
+      for (const char* a : {"length", "radius", "general_contact_angle_resolution", "general_contact_radius_resolution"})
+        take(a);
+      CylinderShape shape{node.positive("length") * length, node.positive("radius") * length};
+      shape.contact_angles = node.integer("general_contact_angle_resolution", 3, kLargestResolution, shape.contact_angles);
+      shape.contact_rings = node.integer("general_contact_radius_resolution", 1, kLargestResolution, shape.contact_rings);
+      body.shape = shape;
+    } else if (type == 3) {
+      for (const char* a : {"length", "radius", "general_contact_resolution"}) take(a);
+      CapsuleShape shape{node.positive("length") * length, node.positive("radius") * length};
+      const std::vector<int> n =
+          node.integers("general_contact_resolution", {shape.contact_rings, shape.contact_angles}, 2, kLargestResolution);
+      shape.contact_rings = n[0], shape.contact_angles = n[1];
+      body.shape = shape;
+    } else if (type == 4) {
+      body.shape = PlaneShape{};
+      used.erase(std::find(used.begin(), used.end(), "density"));
+      idle.emplace_back("density");
     } else {
       node.fail("bodies of type '" + types[std::size_t(type)] +
-                "' are not simulated by this version; supported: sphere, cuboid");
+                "' are not simulated by this version; supported: sphere, cuboid, cylinder, capsule, plane");
     }
     node.check_attributes(used, {"texture"}, idle);
     body.pose.position = scaled(node.vector("pos", Vector3{0, 0, 0}), length);
@@ -157,14 +175,10 @@ class TreeReader {
     shape.size = scaled(node.vector("size"), length);
     for (double s : shape.size)
       if (!(s > 0)) node.fail(fmt::format("size has the edge {} m; expected positive lengths", s));
-    if (node.has("general_contact_resolution")) {
-      const std::vector<double> n = node.numbers("general_contact_resolution", 3);
-      for (int i = 0; i < 3; ++i) {
-        if (n[i] != std::floor(n[i]) || n[i] < 2 || n[i] > kLargestResolution)
-          node.fail(fmt::format("general_contact_resolution has {}; expected integers from 2 to {}", n[i], kLargestResolution));
-        shape.contact_resolution[i] = static_cast<int>(n[i]);
-      }
-    }
+    const std::array<int, 3>& fallback = shape.contact_resolution;
+    const std::vector<int> n = node.integers("general_contact_resolution", {fallback.begin(), fallback.end()}, 2,
+                                             kLargestResolution);
+    std::copy(n.begin(), n.end(), shape.contact_resolution.begin());
     return shape;
   }
 

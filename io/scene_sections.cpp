@@ -103,8 +103,10 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       if (!scene.ground) node.fail("the scene has no <ground> to touch");
       GroundContactDescription d;
       d.source = node.source();
-      find_body(scene, node, "body");
+      const int body = find_body(scene, node, "body");
       d.body = node.text("body");
+      if (std::holds_alternative<PlaneShape>(scene.links[std::size_t(body)].body.shape))
+        node.fail("body '" + d.body + "' is a plane, which has no contact points");
       d.law = kLawOf[node.choice("law", kLaws, 2)];
       d.ramp = read_ramp(node);
       d.coefficients = read_coefficients(node, d.law);
@@ -119,8 +121,11 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       d.general_body = node.text("general_body");
       d.primitive_body = node.text("primitive_body");
       if (general == primitive) node.fail("body '" + d.general_body + "' against itself; expected two bodies");
-      if (std::holds_alternative<SphereShape>(scene.links[std::size_t(general)].body.shape))
-        node.fail("general_body '" + d.general_body + "' is a sphere, which has no contact points; swap the two bodies");
+      const Shape& shape = scene.links[std::size_t(general)].body.shape;
+      if (std::holds_alternative<SphereShape>(shape) || std::holds_alternative<PlaneShape>(shape))
+        node.fail(fmt::format("general_body '{}' is a {}, which has no contact points; expected a cuboid, cylinder or "
+                              "capsule (swap the two bodies)",
+                              d.general_body, shape_name(shape)));
       d.law = kLawOf[node.choice("law", kLaws, 0)];
       d.ramp = read_ramp(node);
       d.coefficients = read_coefficients(node, d.law);

@@ -11,10 +11,10 @@ namespace tangere::kernels {
 template <class Shape, class N>
 unsigned near_shape(const Shape& shape, const Frame<N>& pose, const Vec3<N>& place, const N& m) {
   const Vec3<N> arm = place - pose.p;
-  if constexpr (Shape::kFlat) {
-    return lane_bits(nearer_than(shape, transposed_times(pose.R, arm), m));
-  } else {
+  if constexpr (Shape::kBending == Bending::ball) {
     return lane_bits(nearer_than(shape, arm, m));
+  } else {
+    return lane_bits(nearer_than(shape, transposed_times(pose.R, arm), m));
   }
 }
 
@@ -66,9 +66,8 @@ int search_candidates(const CandidateSearch& s) {
   Frame<N> pose;
   for (int i = 0; i < 9; ++i) pose.R.m[i / 3][i % 3] = N(s.pose[i]);
   pose.p = {N(s.pose[9]), N(s.pose[10]), N(s.pose[11])};
-  if (s.pair->shape == PrimitiveShape::sphere)
-    return search_shape<A>(s, SphereDistance<N>{N(s.pair->size.x)}, pose);
-  return search_shape<A>(s, CuboidDistance<N>{broadcast<N>(s.pair->size)}, pose);
+  return with_distance<N>(s.pair->shape, s.pair->size,
+                          [&](const auto& shape) { return search_shape<A>(s, shape, pose); });
 }
 
 /// Rows of eight lanes from the lanes' own lists; shorter ones end in far points.

@@ -1,24 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 // Signed distances of primitive shapes, with gradient and Hessian, over any number type.
-// d < 0 inside; n = ∇d is a unit vector everywhere, chosen where the distance has a kink (centre, edges, corners).
+// d < 0 inside; n = ∇d is a unit vector everywhere, chosen where the distance has a kink (centre, axis, edges, corners).
 #pragma once
 
+#include "kernels/contact_types.hpp"
 #include "kernels/inverse_sqrt.hpp"
 #include "kernels/linalg.hpp"
 
 namespace tangere::kernels {
 
-/// Value and gradient. Curvature κ comes apart: H = κ (I - n nᵀ), which holds for spheres and (κ = 0) for flat faces.
+/// Value and gradient. Curvature comes apart, as one number κ.
 template <class N>
 struct Distance {
   N d;
   Vec3<N> n;
 };
 
+/// What the Hessian is inside a shape, the only place where contact looks.
+enum class Bending {
+  flat,  ///< H = 0
+  ball,  ///< H = κ (I - n nᵀ), and the shape looks the same from every side: it needs no orientation
+  rod,   ///< H = κ (I - n nᵀ - e z zᵀ), z the shape's axis; e = 1 where the surface is straight along z, else 0
+};
+
 /// Sphere of radius r at the origin: d = |y| - r, H = (I - n nᵀ)/|y|. At the centre: n = z, H = 0.
 template <class N>
 struct SphereDistance {
-  static constexpr bool kFlat = false;
+  static constexpr Bending kBending = Bending::ball;
   N radius;
 
   Distance<N> evaluate(const Vec3<N>& y, N& curvature) const {
@@ -44,7 +52,7 @@ auto nearer_than(const SphereDistance<N>& shape, const Vec3<N>& y, const N& m) {
 /// Outside: the distance to the nearest face, edge or corner. H = 0 inside, the only place where contact looks.
 template <class N>
 struct CuboidDistance {
-  static constexpr bool kFlat = true;
+  static constexpr Bending kBending = Bending::flat;
   Vec3<N> half;
 
   Distance<N> evaluate(const Vec3<N>& y, N& curvature) const {
@@ -89,6 +97,154 @@ auto nearer_than(const CuboidDistance<N>& shape, const Vec3<N>& y, const N& m) {
   const Vec3<N> out = {max(abs(y.x) - shape.half.x, zero), max(abs(y.y) - shape.half.y, zero),
                        max(abs(y.z) - shape.half.z, zero)};
   return dot(out, out) < m * m;
+}
+
+/// Beyond this distance from a half-space's origin there is nothing [m]: what fills up candidate lists lies at 1e6 m and
+/// must not touch it.
+inline constexpr double kPlaneReach = 5e5;
+
+/// The half-space z < 0: d = z, n = z, H = 0.
+template <class N>
+struct PlaneDistance {
+  static constexpr Bending kBending = Bending::flat;
+
+  Distance<N> evaluate(const Vec3<N>& y, N& curvature) const {
+    const N zero(0.0);
+    curvature = zero;
+    const N beyond(kPlaneReach);
+    return {select(dot(y, y) < beyond * beyond, y.z, beyond), {zero, zero, N(1.0)}};
+  }
+  Mat3<N> hessian(const Vec3<N>&) const { return zero33<N>(); }
+};
+
+template <class N>
+auto nearer_than(const PlaneDistance<N>&, const Vec3<N>& y, const N& m) {
+  const N beyond(kPlaneReach);
+  return (y.z < m) & (dot(y, y) < beyond * beyond);
+}
+
+/// Distance from the z axis and the direction away from it; on the axis, x.
+template <class N>
+struct AxisDistance {
+  N rho, inverse;  ///< ρ and 1/ρ; 0 and 0 on the axis
+  N x, y;          ///< unit vector
+
+  explicit AxisDistance(const Vec3<N>& p) {
+    const N zero(0.0), square = mul_add(p.x, p.x, p.y * p.y);
+    const N root = inverse_sqrt(square);
+    const auto regular = square > N(1e-300);
+    rho = root_of(square, root);
+    inverse = select(regular, root, zero);
+    x = select(regular, root * p.x, N(1.0));
+    y = select(regular, root * p.y, zero);
+  }
+};
+
+/// Cylinder with caps: radius r, half length h along z. With a = ρ - r and b = |z| - h, d = max(a, b) inside (the side
+/// on ties) and |max((a, b), 0)| outside, where the rim is nearest when both are positive. z = 0 counts as above.
+template <class N>
+struct CylinderDistance {
+  static constexpr Bending kBending = Bending::rod;
+  N radius, half;
+
+  Distance<N> evaluate(const Vec3<N>& y, N& curvature, N& straight) const {
+    const N zero(0.0), one(1.0);
+    const AxisDistance<N> axis(y);
+    const N a = axis.rho - radius, b = abs(y.z) - half;
+    const N up = select(y.z < zero, -one, one);
+    const auto side = a >= b;
+    const N out_a = max(a, zero), out_b = max(b, zero);
+    const N square = mul_add(out_a, out_a, out_b * out_b);
+    const N inverse = inverse_sqrt(square);
+    const auto outside = square > N(1e-300);
+    const N radial = select(outside, inverse * out_a, select(side, one, zero));
+    const N axial = select(outside, inverse * out_b, select(side, zero, one));
+    curvature = select(side, axis.inverse, zero);
+    straight = one;
+    return {select(outside, root_of(square, inverse), select(side, a, b)),
+            {radial * axis.x, radial * axis.y, axial * up}};
+  }
+
+  /// H = (n_ρ/ρ) t tᵀ, t the direction around the axis; outside the rim, 1/d across it as well.
+  Mat3<N> hessian(const Vec3<N>& y) const {
+    const N zero(0.0), one(1.0);
+    const AxisDistance<N> axis(y);
+    N unused;
+    const Distance<N> at = evaluate(y, unused, unused);
+    const N radial = mul_add(at.n.x, axis.x, at.n.y * axis.y);
+    const Vec3<N> around = {-axis.y, axis.x, zero};
+    const Vec3<N> across = {-(at.n.z * axis.x), -(at.n.z * axis.y), radial};
+    const auto rim = (axis.rho > radius) & (abs(y.z) > half);
+    const N bend = select(rim, one / select(rim, at.d, one), zero);
+    return (radial * axis.inverse) * outer(around, around) + bend * outer(across, across);
+  }
+};
+
+/// Without a root; at the rim, true as well for some points up to √2 m away.
+template <class N>
+auto nearer_than(const CylinderDistance<N>& shape, const Vec3<N>& y, const N& m) {
+  const N reach = shape.radius + m;
+  return (mul_add(y.x, y.x, y.y * y.y) < reach * reach) & (abs(y.z) < shape.half + m);
+}
+
+/// Capsule: all points within r of the segment |z| ≤ h. D = y - (nearest point of the segment), d = |D| - r,
+/// H = (I - n nᵀ - e z zᵀ)/|D| with e = 1 beside the segment. On the segment: n = x, H = 0.
+template <class N>
+struct CapsuleDistance {
+  static constexpr Bending kBending = Bending::rod;
+  N radius, half;
+
+  Distance<N> evaluate(const Vec3<N>& y, N& curvature, N& straight) const {
+    const N zero(0.0), one(1.0);
+    const N nearest = max(min(y.z, half), -half);
+    const Vec3<N> D = {y.x, y.y, y.z - nearest};
+    const N square = dot(D, D);
+    const N inverse = inverse_sqrt(square);
+    const auto regular = square > N(1e-300);
+    curvature = select(regular, inverse, zero);
+    straight = select(abs(y.z) < half, one, zero);
+    return {root_of(square, inverse) - radius,
+            {select(regular, inverse * D.x, one), select(regular, inverse * D.y, zero),
+             select(regular, inverse * D.z, zero)}};
+  }
+
+  Mat3<N> hessian(const Vec3<N>& y) const {
+    N curvature, straight;
+    const Distance<N> at = evaluate(y, curvature, straight);
+    Mat3<N> h = diagonal(N(1.0)) - outer(at.n, at.n);
+    h.m[2][2] -= straight;
+    return curvature * h;
+  }
+};
+
+template <class N>
+auto nearer_than(const CapsuleDistance<N>& shape, const Vec3<N>& y, const N& m) {
+  const N over = max(abs(y.z) - shape.half, N(0.0)), reach = shape.radius + m;
+  return mul_add(over, over, mul_add(y.x, y.x, y.y * y.y)) < reach * reach;
+}
+
+/// Calls f with the distance of a shape; `size` as in PairContact.
+template <class N, class F>
+auto with_distance(PrimitiveShape shape, const Vec3<double>& size, const F& f) {
+  switch (shape) {
+    case PrimitiveShape::sphere: return f(SphereDistance<N>{N(size.x)});
+    case PrimitiveShape::plane: return f(PlaneDistance<N>{});
+    case PrimitiveShape::cylinder: return f(CylinderDistance<N>{N(size.x), N(size.y)});
+    case PrimitiveShape::capsule: return f(CapsuleDistance<N>{N(size.x), N(size.y)});
+    case PrimitiveShape::cuboid: break;
+  }
+  return f(CuboidDistance<N>{broadcast<N>(size)});
+}
+
+/// Value and gradient alone.
+template <class Shape, class N>
+Distance<N> distance_at(const Shape& shape, const Vec3<N>& y) {
+  N curvature, straight;
+  if constexpr (Shape::kBending == Bending::rod) {
+    return shape.evaluate(y, curvature, straight);
+  } else {
+    return shape.evaluate(y, curvature);
+  }
 }
 
 }  // namespace tangere::kernels

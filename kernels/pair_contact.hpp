@@ -26,7 +26,8 @@ struct PointContact {
   NormalForce<N> normal;
   Friction<N> tangential;
   Vec3<N> force;       ///< on body 1, acting at x2
-  N curvature;         ///< H = κ (I - n nᵀ)
+  N curvature;         ///< κ of H (Bending)
+  Vec3<N> axis;        ///< rods only: e z
 };
 
 /// Distance, velocities and force at ξ. `Q`, `c`: shape frame in body 1; `omega`, `v`: W.
@@ -35,10 +36,16 @@ PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, c
                               const Vec3<N>& omega, const Vec3<N>& v, const Vec3<N>& xi) {
   PointContact<N> p;
   const Vec3<N> arm = xi - c;
-  if constexpr (Shape::kFlat) {
+  if constexpr (Shape::kBending == Bending::flat) {
     const Distance<N> at = shape.evaluate(transposed_times(Q, arm), p.curvature);
     p.d = at.d;
     p.n = Q * at.n;
+  } else if constexpr (Shape::kBending == Bending::rod) {
+    N straight;
+    const Distance<N> at = shape.evaluate(transposed_times(Q, arm), p.curvature, straight);
+    p.d = at.d;
+    p.n = Q * at.n;
+    p.axis = straight * Vec3<N>{Q.m[0][2], Q.m[1][2], Q.m[2][2]};
   } else {  // a sphere looks the same from every side
     const Distance<N> at = shape.evaluate(arm, p.curvature);
     p.d = at.d;
@@ -86,12 +93,17 @@ PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact
   const Vec3<N>& t = p.tangential.direction;
   const Mat3<N> nn = outer(n, n);
   const Mat3<N> P = diagonal(one) - nn;
-  // δn = n_rho ρ₂ + n_theta θ; H = κ P; -(I - dH)[n], and P[n] = [n].
-  const Mat3<N> n_rho = Shape::kFlat ? zero33<N>() : (-p.curvature) * P;
-  const N flatten = Shape::kFlat ? one : mul_sub_from(p.d, p.curvature, one);
-  const Mat3<N> n_theta = skew(-(flatten * n));
+  // δn = n_rho ρ₂ + n_theta θ; H = κ (P - e zzᵀ); n_theta = -(I - dH)[n], with P[n] = [n] and zzᵀ[n] = z (z × n)ᵀ.
+  constexpr bool kFlat = Shape::kBending == Bending::flat;
+  Mat3<N> n_rho = kFlat ? zero33<N>() : (-p.curvature) * P;
+  const N flatten = kFlat ? one : mul_sub_from(p.d, p.curvature, one);
+  Mat3<N> n_theta = skew(-(flatten * n));
+  if constexpr (Shape::kBending == Bending::rod) {
+    n_rho += outer(p.curvature * p.axis, p.axis);
+    n_theta = n_theta - outer((p.d * p.curvature) * p.axis, cross(p.axis, n));
+  }
   // δx₂ = nnᵀ ρ₂ - d δn.
-  r.x_rho = Shape::kFlat ? nn : nn - p.d * n_rho;
+  r.x_rho = kFlat ? nn : nn - p.d * n_rho;
   r.x_theta = (-p.d) * n_theta;
   // The force by δn and δu apart: δf = f_n δn + f_u δu + f_d δd.
   //   δḋ = u·δn + n·δu;  δv_t = δu - n δḋ - ḋ δn
@@ -108,7 +120,7 @@ PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact
   const Mat3<N> u_rho = cross_columns(-omega, r.x_rho);
   const Mat3<N> u_theta = cross_columns(-omega, r.x_theta);
   r.f_rho = r.f_u * u_rho - outer(f_depth, n);
-  if constexpr (!Shape::kFlat) r.f_rho += f_n * n_rho;
+  if constexpr (!kFlat) r.f_rho += f_n * n_rho;
   r.f_theta = r.f_u * u_theta + f_n * n_theta;
   return r;
 }

@@ -170,7 +170,9 @@ template <bool Derivatives, class N>
 void sum_pair(const PairContact& pair, const StageArgs<N>& a, const CandidateList<N>& list, ContactScratch<N>& o) {
   const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
   if (pair.shape != PrimitiveShape::sphere) {
-    sum_candidates<Derivatives>(CuboidDistance<N>{broadcast<N>(pair.size)}, law, list, a.lone, o);
+    with_distance<N>(pair.shape, pair.size, [&]<class Shape>(const Shape& shape) {
+      if constexpr (Shape::kBending != Bending::ball) sum_candidates<Derivatives>(shape, law, list, a.lone, o);
+    });
     return;
   }
   const SphereMotion<N> motion = sphere_motion(o.shape_in_1.p, o.W, N(pair.size.x));

@@ -2,7 +2,7 @@
 // Tactile field of one environment: brackets of eight tiles at a time, then the points of the tiles within reach.
 #pragma once
 
-#include "kernels/tactile_point.hpp"
+#include "kernels/tactile_rods.hpp"
 
 namespace tangere::kernels {
 
@@ -146,17 +146,28 @@ void write_dense(const PadTiles& pad, int tile, const Real* from, Real* dense) {
   }
 }
 
+/// f<Shape>() of every shape, in the order of PrimitiveShape: the choice is made once per tile or chunk of tiles.
+template <class P, class F>
+constexpr auto by_shape(const F& f) {
+  using Function = decltype(f.template operator()<SpherePad<P>>());
+  struct Table {
+    Function of[kPrimitiveShapes];
+    Function operator[](PrimitiveShape shape) const { return of[static_cast<int>(shape)]; }
+  };
+  return Table{{f.template operator()<SpherePad<P>>(), f.template operator()<CuboidPad<P>>(),
+                f.template operator()<PlanePad<P>>(), f.template operator()<CylinderPad<P>>(),
+                f.template operator()<CapsulePad<P>>()}};
+}
+
 template <class P, ContactLaw Law>
 int tactile_field(const TactileArgs<typename P::Real>& a) {
   using Real = typename P::Real;
+  static constexpr auto kForce = by_shape<P>([]<class Shape>() { return &chunk_force<P, Law, Shape>; });
   alignas(64) Real buffer[kGroup * 3 * kTactileTile];
   int count = 0;
   for (int first = 0; first < a.pad->tiles(); first += kGroup) {
     unsigned written = 0;
-    for (int k = 0; k < a.n_touches; ++k)
-      written = a.shapes[k].shape == PrimitiveShape::sphere
-                    ? chunk_force<P, Law, SpherePad<P>>(a, k, first, written, buffer)
-                    : chunk_force<P, Law, CuboidPad<P>>(a, k, first, written, buffer);
+    for (int k = 0; k < a.n_touches; ++k) written = kForce[a.shapes[k].shape](a, k, first, written, buffer);
     for (int l = 0; written != 0; ++l, written >>= 1) {
       if ((written & 1U) == 0) continue;
       const Real* tile = buffer + 3 * kTactileTile * l;

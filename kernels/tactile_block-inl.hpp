@@ -72,7 +72,7 @@ bool tile_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, int k, bo
   const PadTiles& pad = *a.pad;
   const Touch<LaneRow>* touch = a.touches[k];
   Mat3<N> pose;
-  if constexpr (Shape::kShape == PrimitiveShape::cuboid)
+  if constexpr (Shape::kTurns)
     for (int i = 0; i < 9; ++i)
       pose.m[i / 3][i % 3] =
           lanes_of<P>(touch, [i](const auto& t) -> const LaneRow& { return t.Q.m[i / 3][i % 3]; });
@@ -119,13 +119,11 @@ void write_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, const ty
 
 template <class P, ContactLaw Law>
 void tactile_block(const TactileBlockArgs<typename P::Real>& a) {
+  static constexpr auto kForce = by_shape<P>([]<class Shape>() { return &tile_lanes<P, Law, Shape>; });
   typename P::N buffer[3 * kTactileTile];
   for (int tile = 0; tile < a.pad->tiles(); ++tile) {
     bool written = false;
-    for (int k = 0; k < a.n_touches; ++k)
-      written |= a.shapes[k].shape == PrimitiveShape::sphere
-                     ? tile_lanes<P, Law, SpherePad<P>>(a, tile, k, !written, buffer)
-                     : tile_lanes<P, Law, CuboidPad<P>>(a, tile, k, !written, buffer);
+    for (int k = 0; k < a.n_touches; ++k) written |= kForce[a.shapes[k].shape](a, tile, k, !written, buffer);
     if (written) write_lanes<P>(a, tile, buffer);
   }
 }

@@ -4,6 +4,7 @@
 // A point is ξ = t + s, t its tile's centre, s the offset. Whatever cancels is a bracket, taken in double once per tile:
 //   sphere: a = t - c;  D = a + s;  D² - r² = s·(s + 2a) + [a² - r²];  d = |D| - r from it
 //   cuboid: y = Qᵀ(t - c);  d = max over the faces of [±y_k - h_k] ± (Qᵀs)_k
+//   half-spaces, cylinders, capsules: tactile_rods.hpp
 //   velocity at x₂ = ξ - d n:  u = [-(v + ω × t)] + ω × (d n - s)
 // Every function acts lane by lane: lanes may be tiles or environments (brackets), points or environments (forces).
 #pragma once
@@ -49,13 +50,13 @@ struct PointLaw {
   N minus_kn, kt, mu, damping;
 };
 
-inline constexpr int kBracketRows = 9;
+inline constexpr int kBracketRows = 10;  ///< the most that a shape has
 
 /// A ball of radius r.
 template <class P>
 struct SpherePad {
   using N = typename P::N;
-  static constexpr PrimitiveShape kShape = PrimitiveShape::sphere;
+  static constexpr bool kTurns = false;  ///< whether its rotation matters
   static constexpr int kRows = 7;  // a, a² - r², u
 
   N radius, minus_radius, inverse_diameter;
@@ -110,7 +111,7 @@ struct SpherePad {
 template <class P>
 struct CuboidPad {
   using N = typename P::N;
-  static constexpr PrimitiveShape kShape = PrimitiveShape::cuboid;
+  static constexpr bool kTurns = true;
   static constexpr int kRows = 9;  // y - h, -y - h, u
 
   Mat3<N> Q;

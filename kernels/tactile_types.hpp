@@ -48,7 +48,7 @@ struct Touch {
 
 struct TouchShape {
   PrimitiveShape shape;
-  double size[3];  ///< radius, or half edges [m]
+  double size[3];  ///< as in PairContact [m]
 };
 
 /// One environment's field, Real = double or float. The tiles that something touches are returned, in rising order.

@@ -195,7 +195,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, KernelTables, ::testing::Range(1U, 13U));
 
 TEST(KernelTable, AUselessFactorIsNotSound) {
   // A leaf whose own block nearly vanishes while it is coupled: plain elimination loses all digits.
-  const auto m = compile(testing::random_contacts(3, 2, ContactLaw::clamped));
+  const auto m = compile(testing::random_contacts(5, 3, ContactLaw::clamped));
   const int n = m->nv;
   for (const kernels::KernelTable* table : kernels::available_kernels()) {
     Workspace w(*m);

@@ -14,6 +14,16 @@ inline Pose random_pose(Random& random, double reach) {
   return {array(random.vector(reach)), {q.w, q.x, q.y, q.z}};
 }
 
+inline Shape random_shape(Random& random) {
+  switch (random.integer(0, 3)) {
+    case 0: return SphereShape{random.uniform(0.02, 0.06)};
+    case 1: return CylinderShape{random.uniform(0.04, 0.1), random.uniform(0.02, 0.05), 5, 2};
+    case 2: return CapsuleShape{random.uniform(0.02, 0.08), random.uniform(0.02, 0.05), 3, 5};
+    default: break;
+  }
+  return CuboidShape{{random.uniform(0.04, 0.1), random.uniform(0.04, 0.1), random.uniform(0.04, 0.1)}, {3, 4, 3}};
+}
+
 /// A tree of `links` links: random joints, frames, shapes and densities, no contacts.
 inline Scene random_tree(unsigned seed, int links) {
   Random random(seed);
@@ -36,20 +46,22 @@ inline Scene random_tree(unsigned seed, int links) {
     l.body.name = "body" + std::to_string(i);
     l.body.pose = random_pose(random, 0.05);
     l.body.density = random.uniform(100, 2000);
-    if (random.uniform(0, 1) < 0.4) {
-      l.body.shape = SphereShape{random.uniform(0.02, 0.06)};
-    } else {
-      l.body.shape = CuboidShape{{random.uniform(0.04, 0.1), random.uniform(0.04, 0.1), random.uniform(0.04, 0.1)}, {3, 4, 3}};
-    }
+    l.body.shape = random_shape(random);
     s.links.push_back(l);
   }
   return s;
 }
 
-/// The same with every cuboid touching every other body it can move against, and the ground in reach.
+/// The same with every body that has contact points touching every other it can move against, and the ground in reach. A
+/// half-space is fixed in the world, or to the first link.
 inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
   Scene s = random_tree(seed, links);
   Random random(seed + 1000);
+  LinkDescription wall;
+  wall.name = wall.joint.name = wall.body.name = "wall";
+  wall.parent = seed % 2 == 0 ? -1 : 0;
+  wall.joint.pose = random_pose(random, 0.05);
+  wall.body.shape = PlaneShape{};
   s.ground = GroundDescription{array(random.vector(0.02)), array(random.direction())};
   const auto coefficients = [&] {
     return ContactCoefficients{random.uniform(50, 500), random.uniform(0.1, 2), random.uniform(0.2, 1.2),
@@ -58,11 +70,14 @@ inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
   for (const LinkDescription& a : s.links) {
     if (a.joint.type == JointType::fixed) continue;  // may not move against what it hangs on
     s.ground_contacts.push_back({a.body.name, coefficients(), law, 1e-5, {}});
-    if (!std::holds_alternative<CuboidShape>(a.body.shape)) continue;
+    if (std::holds_alternative<SphereShape>(a.body.shape)) continue;
+    if (wall.parent < 0 || a.name != s.links[0].name)
+      s.pair_contacts.push_back({a.body.name, wall.body.name, coefficients(), law, 1e-5, {}});
     for (const LinkDescription& b : s.links)
       if (b.name != a.name && b.joint.type != JointType::fixed)
         s.pair_contacts.push_back({a.body.name, b.body.name, coefficients(), law, 1e-5, {}});
   }
+  s.links.push_back(wall);
   return s;
 }
 

@@ -67,11 +67,24 @@ struct PoisonedPad {
 };
 
 TouchShape shape_of(PrimitiveShape shape) {
+  if (shape == PrimitiveShape::cylinder || shape == PrimitiveShape::capsule) return {shape, {0.012, 0.015, 0}};
   return shape == PrimitiveShape::sphere ? TouchShape{shape, {0.02, 0, 0}} : TouchShape{shape, {0.02, 0.015, 0.01}};
 }
+Vec3<double> size_of(const TouchShape& s) { return {s.size[0], s.size[1], s.size[2]}; }
 
-/// A shape that is sunk in the pad somewhere, in any orientation, moving.
-Touch<double> random_touch(Random& random) {
+/// Smallest distance of any point of the pad.
+double deepest(const TouchShape& s, const Touch<double>& t) {
+  static const PoisonedPad pad;
+  return kernels::with_distance<double>(s.shape, size_of(s), [&](const auto& shape) {
+    double least = INFINITY;
+    for (int i = 0; i < pad.tiles.rows; ++i)
+      for (int j = 0; j < pad.tiles.cols; ++j)
+        least = std::min(least, distance_at(shape, transposed_times(t.Q, pad.point(i, j) - t.c)).d);
+    return least;
+  });
+}
+
+Touch<double> random_pose(Random& random) {
   Touch<double> t;
   t.Q = random.rotation();
   t.c = {random.uniform(-0.02, 0.02), random.uniform(-0.02, 0.02), random.uniform(-0.012, 0.012)};
@@ -81,12 +94,24 @@ Touch<double> random_touch(Random& random) {
   return t;
 }
 
+/// A shape that is sunk in the pad somewhere, in any orientation, moving. Half-spaces leave a part of the pad free. Rods are
+/// sunk to half their radius: near the axis the normal turns with the last digit of the position, in any precision.
+Touch<double> random_touch(Random& random, const TouchShape& s) {
+  const bool rod = s.shape == PrimitiveShape::cylinder || s.shape == PrimitiveShape::capsule;
+  for (;;) {
+    const Touch<double> t = random_pose(random);
+    const double least = rod || s.shape == PrimitiveShape::plane ? deepest(s, t) : 0;
+    if (rod && (least > -0.05 * s.size[0] || least < -0.5 * s.size[0])) continue;
+    if (s.shape == PrimitiveShape::plane && (least > -1e-3 || std::abs(t.Q.m[2][2]) > 0.9)) continue;
+    return t;
+  }
+}
+
 Vec3<double> reference(const TouchShape& s, const Touch<double>& t, ContactLaw law, const Vec3<double>& xi) {
   const kernels::LawParameters<double> p = {t.kn, t.kt, t.mu, t.damping, law, 0};
-  const auto at = s.shape == PrimitiveShape::sphere
-                      ? point_contact(kernels::SphereDistance<double>{s.size[0]}, p, t.Q, t.c, t.omega, t.v, xi)
-                      : point_contact(kernels::CuboidDistance<double>{{s.size[0], s.size[1], s.size[2]}}, p, t.Q, t.c,
-                                      t.omega, t.v, xi);
+  const auto at = kernels::with_distance<double>(s.shape, size_of(s), [&](const auto& shape) {
+    return point_contact(shape, p, t.Q, t.c, t.omega, t.v, xi);
+  });
   return {at.force.x, at.force.y, -at.force.z};
 }
 
@@ -145,7 +170,7 @@ template <class Real>
 void check_kernel(const Case& c, double tolerance) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     Random random(seed);
-    const std::vector<Touch<double>> touch = {random_touch(random)};
+    const std::vector<Touch<double>> touch = {random_touch(random, shape_of(c.shape))};
     Result<Real> fused;
     for (const KernelTable* table : kernels::available_kernels()) {
       SCOPED_TRACE(std::string(table->name) + ", seed " + std::to_string(seed));
@@ -171,7 +196,7 @@ template <class Real>
 void check_sum(const Case& c) {
   Random random(5);
   const std::vector<TouchShape> shapes = {shape_of(c.shape), shape_of(PrimitiveShape::sphere)};
-  const std::vector<Touch<double>> touches = {random_touch(random), random_touch(random)};
+  const std::vector<Touch<double>> touches = {random_touch(random, shapes[0]), random_touch(random, shapes[1])};
   for (const KernelTable* table : kernels::available_kernels()) {
     const PoisonedPad pad;
     const auto first = field<Real>(*table, pad.tiles, c.law, {shapes[0]}, {touches[0]});
@@ -190,7 +215,7 @@ void check_tiles(const Case& c) {
   Random random(6);
   for (const KernelTable* table : kernels::available_kernels()) {
     const PoisonedPad pad;
-    const auto got = field<Real>(*table, pad.tiles, c.law, {shape_of(c.shape)}, {random_touch(random)});
+    const auto got = field<Real>(*table, pad.tiles, c.law, {shape_of(c.shape)}, {random_touch(random, shape_of(c.shape))});
     ASSERT_GT(got.active.size(), 0u);
     ASSERT_LT(got.active.size(), std::size_t(pad.tiles.tiles()));
     EXPECT_TRUE(std::is_sorted(got.active.begin(), got.active.end()));
@@ -227,7 +252,7 @@ void check_block(const Case& c) {
     std::vector<Touch<double>> touches;
     AlignedVector<Touch<kernels::LaneRow>> rows(2);
     for (int l = 0; l < kLanes; ++l) {
-      touches.push_back(random_touch(random));
+      touches.push_back(random_touch(random, shape));
       if (l % 7 == 3) touches.back().c.z = 1;  // touches nothing
       if (l == 5) touches.back().c.x = touches.back().v.y = std::numeric_limits<double>::quiet_NaN();
       const auto* from = reinterpret_cast<const double*>(&touches.back());
@@ -254,7 +279,7 @@ TEST_P(TactileKernel, AnEnvironmentHasTheSameBitsAcrossPointsAndAcrossEnvironmen
 
 TEST_P(TactileKernel, AxesThatAreNotQuitePerpendicularGetTheirOwnComponents) {
   Random random(11);
-  const std::vector<Touch<double>> touch = {random_touch(random)};
+  const std::vector<Touch<double>> touch = {random_touch(random, shape_of(GetParam().shape))};
   for (const KernelTable* table : kernels::available_kernels()) {
     PoisonedPad pad;
     const auto plain = field<double>(*table, pad.tiles, GetParam().law, {shape_of(GetParam().shape)}, touch);
@@ -273,13 +298,43 @@ TEST_P(TactileKernel, AxesThatAreNotQuitePerpendicularGetTheirOwnComponents) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Shapes, TactileKernel,
-                         ::testing::Values(Case{PrimitiveShape::sphere, ContactLaw::clamped},
-                                           Case{PrimitiveShape::sphere, ContactLaw::paper},
-                                           Case{PrimitiveShape::sphere, ContactLaw::linear},
-                                           Case{PrimitiveShape::cuboid, ContactLaw::clamped},
-                                           Case{PrimitiveShape::cuboid, ContactLaw::paper},
-                                           Case{PrimitiveShape::cuboid, ContactLaw::linear}));
+/// The axis of a rod through a point of the pad, along and across it; a corner of the rim in the pad; a face in the pad's
+/// plane: finite forces, the same as one point at a time in double precision.
+TEST_P(TactileKernel, KinksHaveTheForceOfOnePoint) {
+  const TouchShape shape = shape_of(GetParam().shape);
+  const PoisonedPad pad;
+  const Vec3<double> on = pad.point(9, 8);
+  Random random(12);
+  for (const double turn : {0.0, 1.0}) {
+    for (const double lift : {0.0, shape.size[1], shape.size[0], -shape.size[0]}) {
+      Touch<double> t = random_pose(random);
+      t.Q = turn == 0 ? kernels::diagonal(1.0)
+                      : kernels::Mat3<double>{{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}};  // the axis lies in the pad
+      t.c = {on.x, on.y, lift};
+      for (const KernelTable* table : kernels::available_kernels()) {
+        SCOPED_TRACE(std::string(table->name) + ", turn " + std::to_string(turn) + ", lift " + std::to_string(lift));
+        const auto got = field<double>(*table, pad.tiles, GetParam().law, {shape}, {t});
+        const Vec3<double> expected = reference(shape, t, GetParam().law, on);
+        const std::size_t n = std::size_t(3 * (9 * pad.tiles.cols + 8));
+        EXPECT_NEAR(got.dense[n], expected.x, 1e-12);
+        EXPECT_NEAR(got.dense[n + 1], expected.y, 1e-12);
+        EXPECT_NEAR(got.dense[n + 2], expected.z, 1e-12);
+        for (const double x : got.dense) EXPECT_TRUE(std::isfinite(x));
+        for (const float x : field<float>(*table, pad.tiles, GetParam().law, {shape}, {t}).dense)
+          EXPECT_TRUE(std::isfinite(x));
+      }
+    }
+  }
+}
+
+std::vector<Case> shapes_and_laws() {
+  std::vector<Case> cases;
+  for (int shape = 0; shape < kPrimitiveShapes; ++shape)
+    for (const ContactLaw law : {ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear})
+      cases.push_back({static_cast<PrimitiveShape>(shape), law});
+  return cases;
+}
+INSTANTIATE_TEST_SUITE_P(Shapes, TactileKernel, ::testing::ValuesIn(shapes_and_laws()));
 
 }  // namespace
 }  // namespace tangere

@@ -135,6 +135,47 @@ TEST(SceneReader, CentimetresAndGramsGiveTheSameScene) {
   same(a.randomizations[1].distribution.b, b.randomizations[1].distribution.b);
 }
 
+TEST(SceneReader, RodsAndPlanesInEitherUnit) {
+  const auto read = [](const char* unit, const std::string& bodies) {
+    return parse_scene("<redmax><option unit=\"" + std::string(unit) + "\"/><robot>" + bodies + "</robot></redmax>", "s.xml");
+  };
+  const std::string link = R"(<link name="$"><joint name="$" type="free3d"/><body name="$" type=)";
+  const auto body = [&](const std::string& name, const std::string& rest) {
+    std::string text = link + rest + "/></link>";
+    for (std::size_t at = 0; (at = text.find('$')) != std::string::npos;) text.replace(at, 1, name);
+    return text;
+  };
+  const SceneFile cm = read("cm-g", body("a", R"("cylinder" length="4" radius="1.5" density="2")") +
+                                        body("b", R"("capsule" length="6" radius="0.5" general_contact_resolution="3 7")"));
+  EXPECT_TRUE(cm.warnings.empty());
+  const auto& cylinder = std::get<CylinderShape>(cm.scene.links[0].body.shape);
+  EXPECT_DOUBLE_EQ(cylinder.length, 0.04);
+  EXPECT_DOUBLE_EQ(cylinder.radius, 0.015);
+  EXPECT_EQ(cylinder.contact_angles, 8);
+  EXPECT_EQ(cylinder.contact_rings, 3);
+  const auto& capsule = std::get<CapsuleShape>(cm.scene.links[1].body.shape);
+  EXPECT_DOUBLE_EQ(capsule.length, 0.06);
+  EXPECT_EQ(capsule.contact_rings, 3);
+  EXPECT_EQ(capsule.contact_angles, 7);
+  EXPECT_NEAR(Model(cm.scene).mass(0), 2000 * M_PI * 0.015 * 0.015 * 0.04, 1e-15);
+
+  const std::string floor = R"(<link name="f"><joint name="f" type="fixed" quat="1 0 1 0"/><body name="f" type="plane" radius="3"/></link>)";
+  const std::string file = body("a", R"("cylinder" length="0.04" radius="0.015" general_contact_angle_resolution="12" general_contact_radius_resolution="1")") + floor;
+  const SceneFile si = read("m-kg", file);
+  ASSERT_EQ(si.warnings.size(), 1U);
+  EXPECT_THAT(si.warnings[0], HasSubstr("'radius' has no effect"));
+  EXPECT_EQ(std::get<CylinderShape>(si.scene.links[0].body.shape).contact_angles, 12);
+  EXPECT_EQ(std::get<CylinderShape>(si.scene.links[0].body.shape).contact_rings, 1);
+  EXPECT_STREQ(shape_name(si.scene.links[1].body.shape), "plane");
+  EXPECT_EQ(Model(si.scene).mass(1), 0);
+}
+
+TEST(SceneReader, APlaneAloneCannotMove) {
+  const std::string text = R"(<redmax><robot><link name="a"><joint name="a" type="free3d"/>
+<body name="a" type="plane"/></link></robot></redmax>)";
+  EXPECT_THROW(Model(parse_scene(text, "s.xml").scene), InputError);
+}
+
 TEST(SceneReader, WorldFramesAreResolvedAgainstTheParent) {
   const std::string text = R"(<tangere><option unit="m-kg"/><robot>
 <link name="a"><joint name="a" type="free3d" pos="1 2 3" quat="1 0 0 1"/><body name="a" type="sphere" radius="0.1"/>
