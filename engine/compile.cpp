@@ -2,9 +2,8 @@
 // compile(scene): names become indices, fixed joints fold into what they hang on, joints become elementary links.
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
 
-#include "engine/compiled_model.hpp"
+#include "engine/compile_joints.hpp"
 
 namespace tangere {
 
@@ -14,62 +13,9 @@ using kernels::Link;
 using kernels::Mat3;
 using kernels::Vec3;
 
-kernels::Frame<double> to_frame(const Pose& pose) {
-  const Quaternion& o = pose.orientation;
-  const double scale = 1 / std::sqrt(o[0] * o[0] + o[1] * o[1] + o[2] * o[2] + o[3] * o[3]);
-  const kernels::Quat<double> q = {scale * o[0], scale * o[1], scale * o[2], scale * o[3]};
-  return {kernels::to_matrix(q), {pose.position[0], pose.position[1], pose.position[2]}};
-}
-
-kernels::Quat<double> quaternion_of(const kernels::Mat3<double>& R) {
-  // The largest of the four squares is divided by: never near zero.
-  const auto& m = R.m;
-  const double w = 1 + m[0][0] + m[1][1] + m[2][2], x = 1 + m[0][0] - m[1][1] - m[2][2];
-  const double y = 1 - m[0][0] + m[1][1] - m[2][2], z = 1 - m[0][0] - m[1][1] + m[2][2];
-  kernels::Quat<double> q;
-  if (w >= x && w >= y && w >= z) {
-    q = {w, m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]};
-  } else if (x >= y && x >= z) {
-    q = {m[2][1] - m[1][2], x, m[0][1] + m[1][0], m[0][2] + m[2][0]};
-  } else if (y >= z) {
-    q = {m[0][2] - m[2][0], m[0][1] + m[1][0], y, m[1][2] + m[2][1]};
-  } else {
-    q = {m[1][0] - m[0][1], m[0][2] + m[2][0], m[1][2] + m[2][1], z};
-  }
-  double scale = 1 / std::sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);
-  if (q.w < 0) scale = -scale;
-  return {scale * q.w, scale * q.x, scale * q.y, scale * q.z};
-}
-
 namespace {
 
-const Frame<double> kIdentity = {kernels::diagonal(1.0), {0, 0, 0}};
-
-bool is_identity(const Frame<double>& f) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      if (f.R.m[i][j] != (i == j ? 1.0 : 0.0)) return false;
-  return f.p.x == 0 && f.p.y == 0 && f.p.z == 0;
-}
-
 Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
-
-/// Name → index of one kind of thing; a second use of a name is an error.
-class NameIndex {
- public:
-  void add(const std::string& kind, const std::string& name, int index, const Source& source) {
-    if (!index_.emplace(name, index).second)
-      throw InputError(source.prefix() + kind + " name '" + name + "' is used twice");
-  }
-  [[nodiscard]] int find(const std::string& kind, const std::string& name, const Source& source) const {
-    const auto it = index_.find(name);
-    if (it == index_.end()) throw InputError(source.prefix() + "no " + kind + " is named '" + name + "'");
-    return it->second;
-  }
-
- private:
-  std::unordered_map<std::string, int> index_;
-};
 
 class Compiler {
  public:
@@ -78,13 +24,10 @@ class Compiler {
   CompiledModel run() {
     for (int i = 0; i < static_cast<int>(m_.scene.links.size()); ++i) add_link(i);
     if (m_.nv == 0) throw InputError(where() + "nothing in the scene can move: every joint is fixed");
-    motors();
-    m_.damping.resize(m_.nv);
-    for (std::size_t i = 0; i < m_.scene.links.size(); ++i) {
-      const JointDescription& joint = m_.scene.links[i].joint;
-      for (int k = 0; k < dof_count(joint.type); ++k) m_.damping[m_.joints[i].v + k] = joint.damping;
-    }
-    initial_state();
+    check_masses(m_);
+    compile_joint_effects(m_);
+    compile_motors(m_, joints_);
+    compile_initial_state(m_, joints_);
     unknown_scales();
     pair_contacts();
     ground_contacts();
@@ -107,90 +50,9 @@ class Compiler {
     if (d.parent >= i || d.parent < -1)
       throw InputError(d.joint.source.prefix() + "link '" + d.name + "': parents must come first");
     const int parent = d.parent < 0 ? -1 : m_.joints[d.parent].link;
-    const Frame<double> base = d.parent < 0 ? kIdentity : m_.joints[d.parent].frame;
-    m_.joints.push_back(add_joint(d.joint, parent, compose(base, to_frame(d.joint.pose))));
+    const Frame<double> base = d.parent < 0 ? kIdentityFrame : m_.joints[d.parent].frame;
+    m_.joints.push_back(add_joint(m_, d.joint, parent, compose(base, to_frame(d.joint.pose))));
     add_body(d, m_.joints.back());
-  }
-
-  CompiledJoint add_joint(const JointDescription& d, int parent, const Frame<double>& frame) {
-    CompiledJoint joint;
-    joint.q = m_.nq;
-    joint.v = m_.nv;
-    joint.first_link = static_cast<int>(m_.links.size());
-    joint.frame = kIdentity;
-    const Vec3<double> x = {1, 0, 0}, y = {0, 1, 0}, z = {0, 0, 1};
-    const Vec3<double> axis0 = vec(d.axis0), axis1 = vec(d.axis1);
-    // Appends an elementary link; only the first carries the joint's rest pose.
-    const auto add = [&](JointKind kind, const Vec3<double>& axis) {
-      const bool first = joint.link_count == 0;
-      const Frame<double>& at = first ? frame : kIdentity;
-      const int up = first ? parent : joint.link;
-      const bool slides = kernels::slides(kind), steady = up < 0 || m_.links[up].still;
-      const bool rotated = !is_identity({at.R, {0, 0, 0}}), turned = !slides || rotated;
-      const bool placed = slides || !is_identity({kIdentity.R, at.p});
-      Link link{up, kind, m_.nq, m_.nv, axis, at, rotated, turned, placed, steady, steady && slides, false, 0,
-                {0, 0, 0}, kernels::zero33<double>()};
-      m_.nq += kernels::coordinates(kind);
-      m_.nv += kernels::dofs(kind);
-      joint.link = static_cast<int>(m_.links.size());
-      m_.links.push_back(link);
-      ++joint.link_count;
-    };
-    switch (d.type) {
-      case JointType::fixed:
-        joint.first_link = -1;
-        joint.link = parent;
-        joint.frame = frame;
-        break;
-      case JointType::revolute: add(JointKind::revolute, axis0); break;
-      case JointType::prismatic: add(JointKind::prismatic, axis0); break;
-      case JointType::planar:
-        add(JointKind::prismatic, axis0);
-        add(JointKind::prismatic, axis1);
-        break;
-      case JointType::translational: add(JointKind::translational, x); break;
-      case JointType::free2d:
-        add(JointKind::prismatic, x);
-        add(JointKind::prismatic, y);
-        add(JointKind::revolute, z);
-        break;
-      case JointType::spherical: add(JointKind::spherical, x); break;
-      case JointType::free:
-        add(JointKind::translational, x);
-        add(JointKind::spherical, x);
-        break;
-    }
-    name_coordinates(d);
-    return joint;
-  }
-
-  void name_coordinates(const JointDescription& d) {
-    struct Coordinate {
-      const char *name, *unit;
-    };
-    std::vector<Coordinate> q, v;
-    switch (d.type) {
-      case JointType::fixed: break;
-      case JointType::revolute: q = {{"angle", "rad"}}, v = {{"rate", "rad/s"}}; break;
-      case JointType::prismatic: q = {{"position", "m"}}, v = {{"rate", "m/s"}}; break;
-      case JointType::planar: q = {{"axis0", "m"}, {"axis1", "m"}}, v = {{"v0", "m/s"}, {"v1", "m/s"}}; break;
-      case JointType::free2d:
-        q = {{"x", "m"}, {"y", "m"}, {"angle", "rad"}};
-        v = {{"vx", "m/s"}, {"vy", "m/s"}, {"rate", "rad/s"}};
-        break;
-      case JointType::translational:
-      case JointType::free:
-        q = {{"x", "m"}, {"y", "m"}, {"z", "m"}};
-        v = {{"vx", "m/s"}, {"vy", "m/s"}, {"vz", "m/s"}};
-        [[fallthrough]];
-      case JointType::spherical:
-        if (d.type == JointType::translational) break;
-        q.insert(q.end(), {{"qw", "1"}, {"qx", "1"}, {"qy", "1"}, {"qz", "1"}});
-        v.insert(v.end(), {{"wx", "rad/s"}, {"wy", "rad/s"}, {"wz", "rad/s"}});
-        break;
-    }
-    for (const Coordinate& c : q) m_.q_names.push_back(d.name + "." + c.name), m_.q_units.emplace_back(c.unit);
-    for (const Coordinate& c : v) m_.v_names.push_back(d.name + "." + c.name), m_.v_units.emplace_back(c.unit);
   }
 
   void add_body(const LinkDescription& d, const CompiledJoint& joint) {
@@ -199,12 +61,11 @@ class Compiler {
     body.frame = compose(joint.frame, to_frame(d.body.pose));
     place_shape(d.body.shape, body);
     const MassProperties properties = mass_properties(d.body.shape, d.body.density);
-    body.mass = properties.mass;
-    const bool massless = body.shape == PrimitiveShape::plane;
-    if (!massless && (!(body.mass > 0) || !std::isfinite(body.mass)))
+    body.mass = body.shape == PrimitiveShape::plane ? 0 : properties.mass;
+    if (!(body.mass >= 0) || !std::isfinite(body.mass))
       throw InputError(d.body.source.prefix() + "body '" + d.body.name + "' has mass " + std::to_string(body.mass) +
-                       " kg; expected a positive, finite one");
-    if (body.link >= 0 && !massless) add_inertia(m_.links[body.link], body, properties);
+                       " kg; expected a finite one, zero or more");
+    if (body.link >= 0 && body.mass > 0) add_inertia(m_.links[body.link], body, properties);
     m_.bodies.push_back(body);
     m_.body_names.push_back(d.body.name);
   }
@@ -235,24 +96,6 @@ class Compiler {
     link.mass += body.mass;
     link.moment += body.mass * centre;
     link.inertia += R * properties.inertia * kernels::transpose(R) - body.mass * (p * p);
-  }
-
-  void motors() {
-    std::vector<char> driven(m_.scene.links.size(), 0);
-    for (const MotorDescription& d : m_.scene.motors) {
-      const int i = joints_.find("joint", d.joint, d.source);
-      const JointType type = m_.scene.links[i].joint.type;
-      if (dof_count(type) == 0) throw InputError(d.source.prefix() + "motor on the fixed joint '" + d.joint + "'");
-      if (driven[i]) throw InputError(d.source.prefix() + "joint '" + d.joint + "' has two motors");
-      driven[i] = 1;
-      for (int k = 0; k < dof_count(type); ++k) {
-        const int dof = m_.joints[i].v + k;
-        m_.motors.push_back({dof, d.low, d.high});
-        m_.u_names.push_back(m_.v_names[dof]);
-        m_.u_units.emplace_back("1");
-      }
-    }
-    m_.nu = static_cast<int>(m_.motors.size());
   }
 
   // --- contacts ---
@@ -387,26 +230,6 @@ class Compiler {
     }
   }
 
-  void initial_state() {
-    m_.initial_q.assign(m_.nq, 0);
-    m_.initial_v.assign(m_.nv, 0);
-    for (const Link& link : m_.links)
-      if (link.kind == JointKind::spherical) m_.initial_q[link.q] = 1;
-    for (const InitialState& d : m_.scene.initial) {
-      const int i = joints_.find("joint", d.joint, d.source);
-      const JointType type = m_.scene.links[i].joint.type;
-      const auto copy = [&](const char* what, const std::vector<double>& from, int count, double* to) {
-        if (from.empty()) return;
-        if (from.size() != std::size_t(count))
-          throw InputError(d.source.prefix() + "initial " + what + " of joint '" + d.joint + "' has " +
-                           std::to_string(from.size()) + " values; expected " + std::to_string(count));
-        std::copy(from.begin(), from.end(), to);
-      };
-      copy("q", d.q, position_count(type), m_.initial_q.data() + m_.joints[i].q);
-      copy("v", d.v, dof_count(type), m_.initial_v.data() + m_.joints[i].v);
-    }
-  }
-
   void randomizations() {
     m_.layout = {0, m_.nq, m_.nq + m_.nv, 2 * m_.nq + m_.nv, 2 * (m_.nq + m_.nv), 0};
     int next = m_.layout.parameters;
@@ -457,43 +280,12 @@ class Compiler {
 
   void symbolic() {
     m_.pattern = analyse_pattern(m_.links, m_.nv, touching_);
-    std::vector<char> carried(m_.links.size(), 0);
-    for (int i = static_cast<int>(m_.links.size()) - 1; i >= 0; --i) {
-      if (m_.links[i].massive) carried[i] = 1;
-      if (!carried[i]) throw InputError(where() + "a joint moves nothing that has mass");
-      if (m_.links[i].parent >= 0) carried[m_.links[i].parent] = 1;
-    }
   }
 
   CompiledModel m_;
   NameIndex links_, joints_, bodies_, sensors_;
   std::vector<std::pair<int, int>> touching_;
 };
-
-/// What the scene calls for, and why: decided here once, printed by `inspect`.
-void decide_effects(CompiledModel& m) {
-  const auto add = [&](const char* name, bool on, std::string reason) {
-    m.effects.push_back({name, on, std::move(reason)});
-  };
-  const auto counted = [](std::size_t n, const std::string& one, const std::string& many) {
-    return std::to_string(n) + " " + (n == 1 ? one : many);
-  };
-  const Vector3& g = m.scene.gravity;
-  const bool gravity = g[0] != 0 || g[1] != 0 || g[2] != 0;
-  add("gravity", gravity, gravity ? "option gravity is not zero" : "option gravity is zero");
-  const bool turning = std::any_of(m.links.begin(), m.links.end(), [](const Link& l) {
-    return l.kind == JointKind::spherical || l.kind == JointKind::revolute;
-  });
-  add("velocity products", turning, turning ? "some joint turns" : "no joint turns");
-  const bool damped = std::any_of(m.damping.begin(), m.damping.end(), [](double c) { return c != 0; });
-  add("joint damping", damped, damped ? "some joint has damping" : "no joint has damping");
-  add("force motors", m.nu > 0, counted(std::size_t(m.nu), "control", "controls"));
-  add("pair contact", !m.pairs.empty(), counted(m.pairs.size(), "pair declared", "pairs declared"));
-  add("ground contact", !m.grounds.empty(), counted(m.grounds.size(), "body declared", "bodies declared"));
-  add("tactile", !m.sensors.empty(), counted(m.sensors.size(), "sensor declared", "sensors declared"));
-  const std::size_t varying = m.layout.rows - m.layout.parameters;
-  add("varying parameters", varying > 0, counted(varying, "number varies by environment", "numbers vary by environment"));
-}
 
 }  // namespace
 
@@ -511,7 +303,7 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   const GroundDescription ground = m->scene.ground.value_or(GroundDescription{});
   v.ground_point = vec(ground.position);
   v.ground_normal = vec(ground.normal);
-  v.damping = m->damping.data();
+  v.effects = m->dof_effects.data();
   v.n_pairs = static_cast<int>(m->pairs.size());
   v.n_grounds = static_cast<int>(m->grounds.size());
   v.pairs = m->pairs.data();

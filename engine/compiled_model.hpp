@@ -29,10 +29,15 @@ struct CompiledJoint {
   kernels::Frame<double> frame;         ///< joint frame in that link
 };
 
-/// Force motor on one dof: force = low + (clip(u) + 1)/2 (high - low).
+/// Motor on one dof. Force motors: force = low + (clip(u) + 1)/2 (high - low). Position motors evaluated at the end of
+/// the step are effects of their joint (kernels/joint_effects-inl.hpp), which u is the target of.
 struct CompiledMotor {
   int dof;
   double low, high;
+  MotorControl control;
+  MotorTiming timing;
+  int link, component;  ///< elementary link, and which of its dofs
+  kernels::Parameter P, D;
 };
 
 /// Points of one sensor in tiles of 8×8, in its pad's axes (kernels/tactile_types.hpp).
@@ -81,7 +86,7 @@ struct CompiledModel {
   std::vector<kernels::GroundContact> grounds;
   std::vector<std::vector<double>> point_storage;  ///< what pairs and grounds point into
   std::vector<AlignedVector<double>> tile_storage; ///< what pairs' tile_points and tile_bounds point into
-  std::vector<double> damping;         ///< (nv)
+  std::vector<kernels::DofEffects> dof_effects;  ///< (nv)
   std::vector<double> unknown_scale;   ///< (nv) what an unknown is rounded against: extent of the scene [m], 1 [rad]
   std::vector<double> initial_q, initial_v;
   PatternStorage pattern;
@@ -91,7 +96,7 @@ struct CompiledModel {
 
   std::vector<SensorInfo> sensor_info;
   std::vector<ContactInfo> contact_info;
-  std::vector<EffectInfo> effects;
+  std::vector<EffectInfo> effects;     ///< of the whole scene
   std::vector<std::string> q_names, v_names, u_names, q_units, v_units, u_units, body_names;
 };
 

@@ -45,6 +45,16 @@ const char* shape_name(const Shape& shape) {
   return kNames[shape.index()];
 }
 
+bool dof_turns(JointType type, int k) {
+  switch (type) {
+    case JointType::revolute:
+    case JointType::spherical: return true;
+    case JointType::free2d: return k == 2;
+    case JointType::free: return k >= 3;
+    default: return false;
+  }
+}
+
 int position_count(JointType type) {
   switch (type) {
     case JointType::fixed: return 0;

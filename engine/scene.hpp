@@ -19,6 +19,9 @@ using Quaternion = std::array<double, 4>;  ///< w x y z, unit length
 
 enum class Integrator { bdf1, bdf2, sdirk2, linear_implicit };
 enum class JointType { fixed, revolute, prismatic, planar, translational, free2d, spherical, free };
+enum class MotorControl { force, position };
+/// end: implicit, stable for any gain. start: the published explicit law, unstable once h D/I exceeds 2.
+enum class MotorTiming { end, start };
 
 /// A frame given in another: x_outer = R(orientation) x_inner + position [m].
 struct Pose {
@@ -34,13 +37,24 @@ struct ContactCoefficients {
   double damping = 0;  ///< k_d [N s/m²]; law linear: c [N s/m]
 };
 
-struct JointDescription {
+/// What acts on every dof of a joint, in SI by the dof's kind. Spherical joints have the components of a rotation vector
+/// in place of q, torques and accelerations in body axes (docs/dynamics.md).
+struct JointEffects {
+  double damping = 0;          ///< force = -damping v [N s/m or N m s/rad]
+  double armature = 0;         ///< inertia that moves with the dof alone, a rotor's [kg or kg m²]
+  double stiffness = 0;        ///< force = -stiffness (q - rest) [N/m or N m/rad]
+  double limit_stiffness = 0;  ///< force = limit_stiffness times how far q is outside the limits
+  std::optional<std::array<double, 2>> limits;  ///< low, high [m or rad]
+};
+
+struct JointDescription : JointEffects {
   std::string name;
   JointType type = JointType::fixed;
   Pose pose;                   ///< joint frame in the parent joint's frame (frame="WORLD" is resolved by the reader)
   Vector3 axis0{0, 0, 1};      ///< revolute, prismatic, planar: unit, in the joint frame
   Vector3 axis1{0, 1, 0};      ///< planar only
-  double damping = 0;          ///< force = -damping v per dof [N s/m or N m s/rad]
+  std::vector<double> rest;    ///< of the spring, one per dof; empty: zeros. free: x y z, then a rotation vector
+  std::optional<JointEffects> turning;  ///< free2d, free: of the dofs that turn, where they differ from those that slide
   Source source;
 };
 
@@ -72,7 +86,7 @@ struct BodyDescription {
   std::string name;
   Shape shape;
   Pose pose;                        ///< body frame in the joint's frame
-  double density = 1;               ///< [kg/m³]
+  double density = 1;               ///< [kg/m³]; 0: massless, so something with mass must move with it
   std::array<double, 4> rgba{0.7, 0.7, 0.7, 1};
   Source source;
 };
@@ -86,11 +100,15 @@ struct LinkDescription {
 };
 
 /// Force motor: u in [-1, 1] per dof of the joint is clipped and mapped linearly to [low, high].
+/// Position motor: u is the target of q (spherical: a rotation vector), force = clip(P (u - q) - D v) to [low, high].
 struct MotorDescription {
   std::string joint;
-  double low = -1;   ///< force at u = -1 [N or N m]
-  double high = 1;   ///< force at u = +1
+  double low = -1;   ///< force at u = -1 [N or N m]; position: smallest force, -infinity for none
+  double high = 1;   ///< force at u = +1; position: largest force, infinity for none
   Source source;
+  MotorControl control = MotorControl::force;
+  double P = 0, D = 0;         ///< position: gains [N/m, N s/m or N m/rad, N m s/rad]
+  MotorTiming timing = MotorTiming::end;  ///< position: which q and v the force is computed from
 };
 
 /// Rectangular array of tactile points: p(i, j) = corner0 + i Δ0 axis0 + j Δ1 axis1, in the body frame [m].
@@ -208,6 +226,9 @@ const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
 /// "sphere", "cuboid" …
 const char* shape_name(const Shape& shape);
+
+/// Dof `k` of a joint type turns; it slides otherwise.
+bool dof_turns(JointType type, int k);
 
 /// Number of configuration coordinates and of velocity dofs of a joint type: free is 7 and 6.
 int position_count(JointType type);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/group_step.hpp"
+#include "engine/motor_force.hpp"
 
 namespace tangere {
 
@@ -47,16 +48,20 @@ struct Stepper::Impl {
         work(model.compiled()),
         single(model.compiled()) {}
 
-  /// Motor forces of one lane. Returns false when a control is not finite.
+  /// What the motors of one lane do: forces known at the start of the step, targets of the others. `state`: the lane's
+  /// column of its block. Returns false when a control is not finite.
   template <int L>
-  bool set_forces(BasicWorkspace<L>& w, int lane, std::span<const double> u) const {
+  bool set_motors(BasicWorkspace<L>& w, int lane, const double* state, std::span<const double> u) const {
     const CompiledModel& m = model.compiled();
     for (int i = 0; i < m.nv; ++i) w.stage.tau[i][lane] = 0;
     for (int k = 0; k < m.nu; ++k) {
       if (!std::isfinite(u[k])) return false;
       const CompiledMotor& motor = m.motors[k];
-      const double clipped = std::clamp(u[k], -1.0, 1.0);
-      w.stage.tau[motor.dof][lane] += motor.low + (clipped + 1) * (0.5 * (motor.high - motor.low));
+      if (motor.control == MotorControl::position && motor.timing == MotorTiming::end) {
+        w.stage.target[motor.dof][lane] = u[k];
+      } else {
+        w.stage.tau[motor.dof][lane] = force_at_start(m, motor, state, u.data() + (k - motor.component));
+      }
     }
     return true;
   }
@@ -129,7 +134,8 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
       if (!has(g.live, l)) continue;
       const std::size_t e = std::size_t(g.first + l);
       const std::span<const double> u = controls.subspan(e * nu, nu);
-      if (alone ? impl_->set_forces(impl_->single, 0, u) : impl_->set_forces(impl_->work, l, u)) continue;
+      const double* state = g.rows + l;
+      if (alone ? impl_->set_motors(impl_->single, 0, state, u) : impl_->set_motors(impl_->work, l, state, u)) continue;
       batch.status_[e] = StepStatus::non_finite;
       batch.iterations_[e] = 0;
       g.live &= ~(1U << l);

@@ -22,7 +22,8 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   };
   kernels::Stage<L>& s = w.stage;
   rows(s.centre, m.nq);
-  for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.v, &s.g, &s.force_scale, &s.mass_diagonal, &s.weight, &s.inverse_weight})
+  for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.target, &s.v, &s.g, &s.force_scale, &s.mass_diagonal, &s.weight,
+                      &s.inverse_weight})
     rows(*p, m.nv);
   rows(s.A, m.pattern.entries);
   rows(s.LU, m.pattern.factor_entries);

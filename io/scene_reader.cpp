@@ -79,11 +79,13 @@ class TreeReader {
     unique("joint", joint.name, node);
     joint.type = kJointTypeOf[node.choice("type", kJointTypes)];
     std::vector<std::string> used = {"name", "type", "pos", "quat", "frame", "damping"};
-    std::vector<std::string> idle = {"lim", "lim_stiffness", "axis", "axis0", "axis1"};
+    std::vector<std::string> idle = {"lim", "lim_stiffness", "stiffness", "rest", "armature", "axis", "axis0", "axis1"};
     const auto take = [&](const char* attribute) {
       used.emplace_back(attribute);
       idle.erase(std::find(idle.begin(), idle.end(), attribute));
     };
+    if (joint.type != JointType::fixed)
+      for (const char* effect : {"lim", "lim_stiffness", "stiffness", "rest", "armature"}) take(effect);
     if (joint.type == JointType::revolute || joint.type == JointType::prismatic) {
       take("axis");
       joint.axis0 = node.direction("axis");
@@ -93,16 +95,11 @@ class TreeReader {
       joint.axis0 = node.direction("axis0");
       joint.axis1 = node.direction("axis1");
     }
-    for (const char* later : {"stiffness", "rest", "armature"})
-      if (node.has(later)) node.fail(fmt::format("'{}' is not simulated by this version; supported: damping", later));
-    if (joint.type != JointType::fixed && node.has("lim") && node.number("lim_stiffness", 0.0) != 0)
-      node.fail("joint limits ('lim' with 'lim_stiffness') are not simulated by this version; remove them");
     node.check_attributes(used, {}, idle);
     joint.pose.position = scaled(node.vector("pos", Vector3{0, 0, 0}), length);
     joint.pose.orientation = node.quaternion("quat");
     if (node.choice("frame", {"LOCAL", "WORLD"}, 0) == 1 && parent >= 0) joint.pose = in_parent(joint.pose, parent);
-    const bool turns = joint.type == JointType::revolute || joint.type == JointType::spherical;
-    joint.damping = node.not_negative("damping", 0.0) * (turns ? node.context().rotational : node.context().damping_force);
+    read_joint_effects(node, joint);
     return joint;
   }
 
@@ -119,7 +116,7 @@ class TreeReader {
     body.source = node.source();
     body.name = node.text("name");
     unique("body", body.name, node);
-    const std::vector<std::string> common = {"name", "type", "pos", "quat", "density", "rgba"};
+    const std::vector<std::string> common = {"name", "type", "pos", "quat", "density", "mass", "rgba"};
     std::vector<std::string> used = common;
     std::vector<std::string> idle = {"scale", "general_contact_resolution", "general_contact_angle_resolution",
                                      "general_contact_radius_resolution", "size", "radius", "length"};
@@ -162,6 +159,10 @@ class TreeReader {
     body.pose.position = scaled(node.vector("pos", Vector3{0, 0, 0}), length);
     body.pose.orientation = node.quaternion("quat");
     body.density = node.positive("density", 1.0) * node.context().density;
+    if (node.has("mass")) {
+      if (node.number("mass") != 0) node.fail("mass=\"" + node.text("mass") + "\"; expected 0 (massless), or a density");
+      body.density = 0;
+    }
     if (node.has("rgba")) {
       const std::vector<double> c = node.numbers("rgba");
       if (c.size() != 3 && c.size() != 4) node.fail(fmt::format("rgba has {} numbers; expected 3 or 4", c.size()));
@@ -204,12 +205,12 @@ void read_solver(Scene& scene, const SceneNode& node) {
 
 void read_defaults(const SceneNode& node) {
   const std::map<std::string, std::vector<std::string>> known = {
-      {"joint", {"damping", "lim_stiffness"}},
+      {"joint", {"damping", "lim_stiffness", "stiffness", "armature"}},
       {"body", {"density", "scale", "rgba"}},
       {"general_primitive_contact", {"kn", "kt", "mu", "damping", "render", "law", "ramp"}},
       {"ground_contact", {"kn", "kt", "mu", "damping", "render", "law", "ramp"}},
       {"tactile", {"kn", "kt", "mu", "damping", "render", "law", "every"}},
-      {"motor", {"P", "D", "ctrl_range"}},
+      {"motor", {"P", "D", "ctrl_range", "timing"}},
       {"endeffector", {"radius", "rgba"}}};
   std::vector<std::string> names;
   for (const auto& [name, attributes] : known) names.push_back(name);

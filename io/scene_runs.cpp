@@ -18,10 +18,14 @@ std::vector<double> read_coordinates(const SceneNode& node, const char* attribut
   return x;
 }
 
-void check_controls(const Scene& scene, const SceneNode& node, std::size_t found) {
-  const int expected = control_count(scene);
-  if (found != std::size_t(expected))
-    node.fail(fmt::format("{} control values; the motors take {}", found, expected));
+/// The attribute `value`: one per control, targets of position motors in the scene's lengths.
+std::vector<double> read_controls(const Scene& scene, const SceneNode& node) {
+  std::vector<double> values = node.numbers("value");
+  const std::vector<double> scales = control_scales(scene, node.context());
+  if (values.size() != scales.size())
+    node.fail(fmt::format("{} control values; the motors take {}", values.size(), scales.size()));
+  for (std::size_t k = 0; k < values.size(); ++k) values[k] *= scales[k];
+  return values;
 }
 
 PiecewiseControl read_piecewise(const Scene& scene, const SceneNode& node) {
@@ -35,8 +39,7 @@ PiecewiseControl read_piecewise(const Scene& scene, const SceneNode& node) {
     if (!control.times.empty() && !(time > control.times.back()))
       at.fail(fmt::format("time=\"{}\" does not come after {}", time, control.times.back()));
     control.times.push_back(time);
-    control.values.push_back(at.numbers("value"));
-    check_controls(scene, at, control.values.back().size());
+    control.values.push_back(read_controls(scene, at));
   }
   if (control.times.empty()) node.fail("no <at time value>; expected at least one");
   if (control.end > 0 && !(control.end > control.times.back()))
@@ -176,9 +179,7 @@ void read_control(Scene& scene, const SceneNode& section) {
   const SceneNode& node = kinds.front();
   if (node.name() == "constant") {
     node.check_attributes({"value"});
-    ConstantControl control{node.numbers("value")};
-    check_controls(scene, node, control.values.size());
-    scene.control = std::move(control);
+    scene.control = ConstantControl{read_controls(scene, node)};
   } else if (node.name() == "piecewise") {
     scene.control = read_piecewise(scene, node);
   } else if (node.name() == "csv") {

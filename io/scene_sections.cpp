@@ -46,55 +46,6 @@ int find_body(const Scene& scene, const SceneNode& node, const char* attribute) 
   return find_named(scene, node, attribute, "body", [](const LinkDescription& l) { return l.body.name; });
 }
 
-double coordinate_scale(JointType type, int index, const SceneContext& c) {
-  switch (type) {
-    case JointType::fixed:
-    case JointType::revolute:
-    case JointType::spherical: return 1;
-    case JointType::prismatic:
-    case JointType::planar:
-    case JointType::translational: return c.length;
-    case JointType::free2d: return index < 2 ? c.length : 1;
-    case JointType::free: break;
-  }
-  return index < 3 ? c.length : 1;
-}
-
-int control_count(const Scene& scene) {
-  int count = 0;
-  for (const MotorDescription& m : scene.motors)
-    for (const LinkDescription& l : scene.links)
-      if (l.joint.name == m.joint) count += dof_count(l.joint.type);
-  return count;
-}
-
-void read_actuators(Scene& scene, const SceneNode& section) {
-  section.check_attributes({});
-  for (const SceneNode& node : section.children({"motor"})) {
-    MotorDescription motor;
-    motor.source = node.source();
-    const int joint = find_joint(scene, node, "joint");
-    const JointType type = scene.links[std::size_t(joint)].joint.type;
-    motor.joint = node.text("joint");
-    if (node.choice("ctrl", {"force", "position"}) == 1)
-      node.fail("position motors are not simulated by this version; supported: ctrl=\"force\"");
-    if (type == JointType::fixed) node.fail("joint '" + motor.joint + "' is fixed; a motor needs a joint that moves");
-    if (type == JointType::free || type == JointType::free2d)
-      node.fail("joint '" + motor.joint + "' mixes forces and torques; a motor needs a joint of one kind");
-    for (const MotorDescription& other : scene.motors)
-      if (other.joint == motor.joint) node.fail("joint '" + motor.joint + "' already has a motor");
-    node.check_attributes({"joint", "ctrl", "ctrl_range"}, {}, {"P", "D", "name"});
-    const bool turns = type == JointType::revolute || type == JointType::spherical;
-    const double scale = turns ? node.context().torque : node.context().force;
-    const std::vector<double> range = node.numbers("ctrl_range", 2);
-    motor.low = range[0] * scale;
-    motor.high = range[1] * scale;
-    if (!(motor.low <= motor.high))
-      node.fail(fmt::format("ctrl_range=\"{} {}\": expected low, then high", range[0], range[1]));
-    scene.motors.push_back(motor);
-  }
-}
-
 void read_contacts(Scene& scene, const SceneNode& section) {
   section.check_attributes({});
   for (const SceneNode& node : section.children({"ground_contact", "general_primitive_contact"})) {

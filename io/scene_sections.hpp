@@ -6,6 +6,8 @@
 
 namespace tangere {
 
+/// Damping, armature, spring and limits of a joint whose type is known.
+void read_joint_effects(const SceneNode& node, JointDescription& joint);
 void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
 void read_sensors(Scene& scene, const SceneNode& section);
@@ -24,5 +26,7 @@ double coordinate_scale(JointType type, int index, const SceneContext& context);
 
 /// Number of controls the motors read so far take.
 int control_count(const Scene& scene);
+/// Factor to SI of each of them: targets of position motors are coordinates, force motors take numbers without a unit.
+std::vector<double> control_scales(const Scene& scene, const SceneContext& context);
 
 }  // namespace tangere

@@ -217,7 +217,7 @@ void walk_ancestors(const ModelView& model, const StageArgs<N>& a, int i, JointW
   }
 }
 
-/// Writes the inertial part and the damping of one joint's rows and columns of A, and its diagonal of M.
+/// Writes the inertial part and the effects of one joint's rows and columns of A, and its diagonal of M.
 template <JointKind K, class N>
 void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
   const Link& link = model.links[i];
@@ -229,17 +229,9 @@ void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
   for (int j = 0; j < dofs(K); ++j) {
     const int d = link.v + j;
     a.mass_diagonal[d] = project<K>(link, j, w.by_a[j]);
-    const N damping(model.damping[d]);
-    for (int k = 0; k < dofs(K); ++k) {
-      N entry = project<K>(link, j, w.by_x[k]);
-      if constexpr (K == JointKind::spherical) {
-        entry = mul_add(o.chart_rate.m[j][k], damping, entry);
-      } else if (j == k) {
-        entry = mul_add(a.c0_over_h, damping, entry);
-      }
-      a.A[model.pattern.slot[d * n + link.v + k]] = entry;
-    }
+    for (int k = 0; k < dofs(K); ++k) a.A[model.pattern.slot[d * n + link.v + k]] = project<K>(link, j, w.by_x[k]);
   }
+  if (link.effects != 0) add_effect_entries<K>(model, a, link);
   if (link.parent < 0) return;
   // Moving the joint turns the subtree's wrench as well: S × F, by x.
   for (int k = 0; k < dofs(K); ++k) {

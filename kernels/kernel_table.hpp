@@ -13,7 +13,7 @@ namespace tangere::kernels {
 /// make_workspace_sizes(). Link and contact scratch is opaque bytes: its layout belongs to the kernels.
 template <int L>
 struct Stage {
-  Row<L> *centre, *x, *r, *s, *tau;                       // inputs
+  Row<L> *centre, *x, *r, *s, *tau, *target;              // inputs
   Row<L> c0_over_h, inverse_h;
   const double* block;
   int group;

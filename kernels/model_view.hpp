@@ -20,6 +20,9 @@ constexpr int coordinates(JointKind k) {
   return k == JointKind::spherical ? 4 : dofs(k);
 }
 
+/// What acts on a joint's dofs beside inertia and contacts; bits of Link::effects.
+enum JointEffect : std::uint8_t { kDamped = 1, kArmoured = 2, kSprung = 4, kLimited = 8, kDriven = 16 };
+
 /// One elementary joint and everything that moves rigidly with it.
 struct Link {
   int parent;          ///< -1: the world
@@ -33,6 +36,7 @@ struct Link {
   bool steady;         ///< no ancestor ever turns: the parent's ω and α are zero
   bool still;          ///< nor does this joint: ω and α are zero, and of a wrench only the force does work
   bool massive;        ///< false: no inertia of its own
+  std::uint8_t effects;///< JointEffect bits: what some dof of the joint has
   double mass;         ///< [kg]
   Vec3<double> moment; ///< mass times centre of mass, link axes [kg m]
   Mat3<double> inertia;///< about the link's origin, link axes [kg m²]
@@ -42,6 +46,15 @@ struct Link {
 struct Parameter {
   double value;
   int row;  ///< row of the block, -1: constant
+};
+
+/// Effects on one dof [SI of its kind]; those that its link's flags leave out are not read.
+struct DofEffects {
+  Parameter damping, armature, stiffness, limit_stiffness;
+  double rest;                   ///< of the spring; spherical: component of a rotation vector [m, rad]
+  double low, high;              ///< limits [m, rad]
+  Parameter P, D;                ///< gains of a position motor evaluated at the end of the step
+  double force_low, force_high;  ///< its range; infinite: none
 };
 
 struct ContactParameters {
@@ -108,7 +121,7 @@ struct ModelView {
   const Link* links;
   Vec3<double> gravity;        ///< world axes [m/s²]
   Vec3<double> ground_point, ground_normal;
-  const double* damping;       ///< (nv) joint damping
+  const DofEffects* effects;   ///< (nv)
   int n_pairs, n_grounds;
   const PairContact* pairs;
   const GroundContact* grounds;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The residual g of a step: kinematics outward, contacts, inverse dynamics inward (RNEA in body axes).
 //
-//   V = V_p + S q̇,  A = A_p + S q̈ + V × (S q̇),  F = I A + V ×* I V - w_ext,  F_p += X* F,  g = Sᵀ F - τ + damping v
+//   V = V_p + S q̇,  A = A_p + S q̈ + V × (S q̇),  F = I A + V ×* I V - w_ext,  F_p += X* F,  g = Sᵀ F - τ - (joint effects)
 // The base accelerates at -gravity, so gravity needs no term of its own.
 #pragma once
 
+#include "kernels/joint_effects-inl.hpp"
 #include "kernels/sphere_sums.hpp"
 #include "kernels/stage.hpp"
 
@@ -218,9 +219,15 @@ void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
     with_kind(link.kind, [&]<JointKind K>() {
       for (int k = 0; k < dofs(K); ++k) {
         const int d = link.v + k;
-        const N damping = model.damping[d] * a.v[d];
-        a.g[d] = project<K>(link, k, o.F) - a.tau[d] + damping;
-        a.force_scale[d] = abs(a.tau[d]) + abs(damping);
+        a.g[d] = project<K>(link, k, o.F) - a.tau[d];
+        a.force_scale[d] = abs(a.tau[d]);
+      }
+      if (link.effects == 0) return;
+      JointLoad<N> load;
+      joint_load<K, false>(model, a, link, load);
+      for (int k = 0; k < dofs(K); ++k) {
+        a.g[link.v + k] -= load.force[k];
+        a.force_scale[link.v + k] += load.magnitude[k];
       }
     });
     if (link.parent >= 0) a.links[link.parent].F += wrench_to_parent(link, o.local, o.F);

@@ -67,6 +67,7 @@ struct StageArgs {
   const N* r;        ///< (nv) history of ẋ
   const N* s;        ///< (nv) history of a
   const N* tau;      ///< (nv) actuator force
+  const N* target;   ///< (nv) of position motors
   N c0_over_h, inverse_h;
   const double* block;  ///< of the batch, for parameters that vary
   int group;            ///< 0 or 1: which half of the block

@@ -56,6 +56,7 @@ struct StageTable {
     a.r = view(s.r);
     a.s = view(s.s);
     a.tau = view(s.tau);
+    a.target = view(s.target);
     a.c0_over_h = *view(&s.c0_over_h);
     a.inverse_h = *view(&s.inverse_h);
     a.block = s.block;

@@ -35,6 +35,7 @@ TANGERE_TWICE(max)
     return TwiceMask<decltype(x.a op y.a)>{x.a op y.a, x.b op y.b};\
   }
 TANGERE_TWICE_COMPARE(<)
+TANGERE_TWICE_COMPARE(>)
 TANGERE_TWICE_COMPARE(>=)
 #undef TANGERE_TWICE_COMPARE
 

@@ -40,6 +40,7 @@ void copy_stage(const StageBuffers<double>& from, StageBuffers<N>& to) {
   copy(from.r, to.r);
   copy(from.s, to.s);
   copy(from.tau, to.tau);
+  copy(from.target, to.target);
 }
 
 void compare_with_dual_numbers(const CompiledModel& m, StageBuffers<double>& b, double tolerance) {
@@ -71,6 +72,108 @@ TEST(Jacobian, TreesMatchDualNumbers) {
     }
   }
 }
+
+TEST(Jacobian, MachinesMatchDualNumbers) {
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    const auto m = compile(testing::random_machine(seed, 2 + static_cast<int>(seed % 9)));
+    StageBuffers<double> b(*m);
+    Random random(seed);
+    for (int k = 0; k < 5; ++k) {
+      testing::randomise(b, *m, random, kStep);
+      SCOPED_TRACE("seed " + std::to_string(seed));
+      compare_with_dual_numbers(*m, b, 1e-11);
+    }
+  }
+}
+
+/// Returns how many entries were compared; those with a kink within ±e are left out.
+int compare_with_central_differences(const CompiledModel& m, StageBuffers<double>& b, double e, double tolerance) {
+  b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
+  const std::vector<double> scale = row_scales(m, b);
+  StageBuffers<double> moved(m);
+  copy_stage(b, moved);
+  int compared = 0;
+  for (int j = 0; j < m.nv; ++j) {
+    const auto at = [&](double step) {
+      moved.x[std::size_t(j)] = b.x[std::size_t(j)] + step;
+      moved.residual(kC0 / kStep, 1 / kStep);
+      moved.x[std::size_t(j)] = b.x[std::size_t(j)];
+      return moved.g;
+    };
+    const std::vector<double> ahead = at(e), behind = at(-e);
+    for (int i = 0; i < m.nv; ++i) {
+      const std::size_t k = std::size_t(i);
+      const double right = (ahead[k] - b.g[k]) / e, left = (b.g[k] - behind[k]) / e;
+      if (std::abs(right - left) > 1e-4 * scale[k]) continue;
+      EXPECT_NEAR((ahead[k] - behind[k]) / (2 * e), b.entry(b.A, i, j), tolerance * scale[k]) << "entry " << i << ", " << j;
+      ++compared;
+    }
+  }
+  return compared;
+}
+
+TEST(Jacobian, MachinesMatchCentralDifferences) {
+  int compared = 0, entries = 0;
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    const auto m = compile(testing::random_machine(seed, 2 + static_cast<int>(seed % 9)));
+    StageBuffers<double> b(*m);
+    Random random(seed);
+    testing::randomise(b, *m, random, kStep);
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    compared += compare_with_central_differences(*m, b, 1e-7, 1e-6);
+    entries += m->nv * m->nv;
+  }
+  EXPECT_GT(compared, entries - entries / 50);
+}
+
+enum class Effect { damping, armature, spring, limit, position_motor, clipped_motor };
+using TypeAndEffect = std::tuple<JointType, Effect>;
+
+class JointEffectJacobian : public ::testing::TestWithParam<TypeAndEffect> {};
+
+/// A joint with one effect between a free body and another: every derivative of it, and that it is there at all.
+TEST_P(JointEffectJacobian, MatchesDualNumbersAndActs) {
+  const auto [type, effect] = GetParam();
+  const bool mixed = type == JointType::free || type == JointType::free2d;
+  if (mixed && effect >= Effect::position_motor) GTEST_SKIP() << "no motor on a joint that slides and turns";
+  Scene bare = testing::random_tree(3, 3);
+  for (std::size_t i = 0; i < 3; ++i) bare.links[i].parent = static_cast<int>(i) - 1, bare.links[i].joint.damping = 0;
+  bare.links[1].joint.type = type;
+  Scene s = bare;
+  JointDescription& joint = s.links[1].joint;
+  if (effect == Effect::damping) joint.damping = 0.3;
+  if (effect == Effect::armature) joint.armature = 0.2;
+  if (effect == Effect::spring) joint.stiffness = 30, joint.rest.assign(std::size_t(dof_count(type)), 0.2);
+  if (effect == Effect::limit) joint.limit_stiffness = 300, joint.limits = {-0.01, 0.02};
+  if (effect >= Effect::position_motor) {
+    MotorDescription motor{joint.name, -HUGE_VAL, HUGE_VAL, {}, MotorControl::position, 40, 0.2};
+    if (effect == Effect::clipped_motor) motor.P = 4, motor.low = -0.5, motor.high = 0.4;
+    s.motors.push_back(motor);
+  }
+  const auto m = compile(s), without = compile(bare);
+  StageBuffers<double> b(*m), plain(*without);
+  Random random(17);
+  int acting = 0, felt = 0;
+  for (int k = 0; k < 20; ++k) {
+    testing::randomise(b, *m, random, kStep);
+    compare_with_dual_numbers(*m, b, 1e-11);
+    copy_stage(b, plain);
+    plain.residual_and_jacobian(kC0 / kStep, 1 / kStep);
+    acting += plain.g != b.g;
+    felt += plain.A != b.A;
+  }
+  // Inside its limits a joint feels nothing; a clipped motor pushes without being felt in A.
+  EXPECT_GT(acting, effect == Effect::limit ? 5 : 19);
+  EXPECT_GT(felt, effect == Effect::limit || effect == Effect::clipped_motor ? 1 : 19);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, JointEffectJacobian,
+                         ::testing::Combine(::testing::Values(JointType::revolute, JointType::prismatic, JointType::planar,
+                                                              JointType::translational, JointType::free2d,
+                                                              JointType::spherical, JointType::free),
+                                            ::testing::Values(Effect::damping, Effect::armature, Effect::spring,
+                                                              Effect::limit, Effect::position_motor,
+                                                              Effect::clipped_motor)));
 
 class ContactJacobian : public ::testing::TestWithParam<ContactLaw> {};
 

@@ -44,7 +44,8 @@ void fill_lane(BasicWorkspace<L>& w, const CompiledModel& m, const StageBuffers<
   for (int i = 0; i < m.nq; ++i) w.stage.centre[i][lane] = b.centre[std::size_t(i)];
   for (int i = 0; i < m.nv; ++i) {
     const std::size_t k = std::size_t(i);
-    w.stage.x[i][lane] = b.x[k], w.stage.r[i][lane] = b.r[k], w.stage.s[i][lane] = b.s[k], w.stage.tau[i][lane] = b.tau[k];
+    w.stage.x[i][lane] = b.x[k], w.stage.r[i][lane] = b.r[k], w.stage.s[i][lane] = b.s[k];
+    w.stage.tau[i][lane] = b.tau[k], w.stage.target[i][lane] = b.target[k];
   }
 }
 

@@ -17,7 +17,7 @@ class StageBuffers {
   explicit StageBuffers(const CompiledModel& m) : model_(m) {
     const std::size_t nv = std::size_t(m.nv), entries = std::size_t(m.pattern.entries);
     centre.resize(std::size_t(m.nq));
-    for (auto* v : {&x, &r, &s, &tau, &v_out, &g, &force_scale, &mass}) v->assign(nv, N(0.0));
+    for (auto* v : {&x, &r, &s, &tau, &target, &v_out, &g, &force_scale, &mass}) v->assign(nv, N(0.0));
     A.assign(entries, N(0.0));
     links_.resize(m.links.size());
     contacts_.resize(m.pairs.size() + m.grounds.size());
@@ -38,6 +38,7 @@ class StageBuffers {
     a.r = r.data();
     a.s = s.data();
     a.tau = tau.data();
+    a.target = target.data();
     a.c0_over_h = N(c0_over_h);
     a.inverse_h = N(inverse_h);
     a.block = block;
@@ -72,7 +73,7 @@ class StageBuffers {
     return at < 0 ? N(0.0) : matrix[std::size_t(at)];
   }
 
-  std::vector<N> centre, x, r, s, tau, v_out, g, force_scale, mass, A;
+  std::vector<N> centre, x, r, s, tau, target, v_out, g, force_scale, mass, A;
 
  private:
   const CompiledModel& model_;
@@ -102,6 +103,7 @@ void randomise(StageBuffers<N>& b, const CompiledModel& m, Random& random, doubl
     b.r[k] = N(0.1 * h * random.normal());
     b.s[k] = N(0.3 * random.normal());
     b.tau[k] = N(0.1 * random.normal());
+    b.target[k] = N(0.3 * random.normal());
   }
 }
 

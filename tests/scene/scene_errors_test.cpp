@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "engine/model.hpp"
 #include "io/scene_reader.hpp"
 #include "tests/scene/scene_text.hpp"
 
@@ -19,7 +20,7 @@ struct Bad {
 
 std::string error_of(const std::string& text) {
   try {
-    parse_scene(text, "s.xml");
+    const Model compiled(parse_scene(text, "s.xml").scene);  // some mistakes only show when it is compiled
   } catch (const InputError& e) {
     return e.what();
   }
@@ -59,8 +60,13 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"name=\"ball_joint\" type=\"free3d\"", "name=\"pad_joint\" type=\"free3d\"", ":12: ", {"'pad_joint' is used twice"}},
         Bad{"type=\"translational\"", "type=\"translation\"", ":8: ", {"did you mean 'translational'"}},
         Bad{"damping=\"1\"/>", "damping=\"-1\"/>", ":8: ", {"-1", "zero or more"}},
-        Bad{"damping=\"1\"/>", "damping=\"1\" lim=\"0 1\" lim_stiffness=\"5\"/>", ":8: ", {"limits", "not simulated"}},
-        Bad{"damping=\"1\"/>", "stiffness=\"1\"/>", ":8: ", {"stiffness", "not simulated"}},
+        Bad{"damping=\"1\"/>", "lim=\"1 0\" lim_stiffness=\"5\"/>", ":8: ", {"lim=\"1 0\"", "low, then high"}},
+        Bad{"damping=\"1\"/>", "lim=\"1\" lim_stiffness=\"5\"/>", ":8: ", {"lim", "expected 2"}},
+        Bad{"damping=\"1\"/>", "lim_stifness=\"5\"/>", ":8: ", {"did you mean 'lim_stiffness'"}},
+        Bad{"damping=\"1\"/>", "stiffness=\"-1\"/>", ":8: ", {"stiffness=\"-1\"", "zero or more"}},
+        Bad{"damping=\"1\"/>", "armature=\"-1\"/>", ":8: ", {"armature", "zero or more"}},
+        Bad{"damping=\"1\"/>", "stiffness=\"1\" rest=\"0 1\"/>", ":8: ", {"rest has 2", "expected 1 or 3"}},
+        Bad{"type=\"free3d\"", "type=\"spherical\" stiffness=\"1\" rest=\"3 1 0\"", ":12: ", {"rest turns by 3.16", "pi"}},
         Bad{"type=\"translational\" pos", "type=\"revolute\" pos", ":8: ", {"'axis' is missing"}},
         Bad{"pos=\"0 0 0.06\"", "pos=\"0 0 0.06\" quat=\"0 0 0 0\"", ":8: ", {"no rotation"}},
         Bad{"pos=\"0 0 0.06\"", "pos=\"0 0 0.06\" frame=\"WOLRD\"", ":8: ", {"did you mean 'WORLD'"}},
@@ -88,7 +94,13 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"radius=\"0.02\" ", "", ":13: ", {"'radius' is missing"}},
         Bad{"<motor joint=\"pad_joint\"", "<motor joint=\"pad_jiont\"", ":17: ", {"did you mean 'pad_joint'"}},
         Bad{"<motor joint=\"pad_joint\"", "<motor joint=\"ball_joint\"", ":17: ", {"forces and torques"}},
-        Bad{"ctrl=\"force\"", "ctrl=\"position\"", ":17: ", {"position motors", "not simulated"}},
+        Bad{"ctrl=\"force\"", "ctrl=\"position\"", ":17: ", {"'P' is missing"}},
+        Bad{"ctrl=\"force\"", "ctrl=\"position\" P=\"-1\"", ":17: ", {"P=\"-1\"", "zero or more"}},
+        Bad{"ctrl=\"force\"", "ctrl=\"positon\"", ":17: ", {"did you mean 'position'"}},
+        Bad{"ctrl=\"force\"", "ctrl=\"position\" P=\"1\" timing=\"begin\"", ":17: ", {"begin", "end, start"}},
+        Bad{"density=\"1000\"", "mass=\"2\"", ":9: ", {"mass=\"2\"", "expected 0"}},
+        Bad{"density=\"1000\"", "mass=\"0\"", ":8: ", {"pad_joint", "nothing that has mass"}},
+        Bad{"type=\"translational\"", "type=\"fixed\"", ":17: ", {"'pad_joint' is fixed", "needs a joint that moves"}},
         Bad{"ctrl_range=\"-1 1\"", "ctrl_range=\"1 -1\"", ":17: ", {"low, then high"}},
         Bad{" ctrl_range=\"-1 1\"", "", ":17: ", {"'ctrl_range' is missing"}},
         Bad{"<ground_contact body=\"ball\"", "<ground_contact body=\"bal\"", ":20: ", {"did you mean 'ball'"}},

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: Apache-2.0
+// What acts on the dofs of a joint: damping, armature, springs, limits, position motors; and its derivatives.
+//
+//   f = -c v - I_a a - k (q - rest) + k_l max(0, lo - q) - k_l max(0, q - hi) + clip(P(u - q) - D v, range)      per dof
+//
+// A spherical joint has rotation vectors in place of q. With φ = log q, φ_s = log(rest⁻¹ q), ψ = log(q⁻¹ exp u), torques in body axes:
+//   spring -k φ_s (the gradient of k|φ_s|²/2, as J_r⁻ᵀ(φ) φ = φ);  limits J_r⁻ᵀ(φ) f(φ), f per component;  motor clip(P ψ - D ω)
+//   ∂φ/∂θ = J_r⁻¹(φ),  ∂ψ/∂θ = -J_r⁻ᵀ(ψ),  θ the right tangent
+// Flags of the link decide outside the lanes what is evaluated. At a bound of a limit the derivative is that of its inside,
+// at a bound of a motor's range that of the unclipped force.
+#pragma once
+
+#include "kernels/rotation_vector.hpp"
+#include "kernels/stage.hpp"
+
+namespace tangere::kernels {
+
+/// Forces on the dofs of one joint [N, N m], and derivatives of -force as the Jacobian wants them.
+template <class N>
+struct JointLoad {
+  N force[3];
+  N magnitude[3];  ///< sum of the magnitudes of its parts, inertia left out
+  N by_q[3];       ///< joints that do not turn freely: diagonal
+  Mat3<N> by_turn; ///< spherical: by the right tangent
+  N by_v[3];       ///< diagonal; c₀/h times the armature included
+  N armature[3];
+};
+
+template <class N>
+N load_parameter(const StageArgs<N>& a, const Parameter& p) {
+  return ParameterLoad<N>::load(p, a.block, a.group);
+}
+
+template <class N>
+void add_force(JointLoad<N>& out, int k, const N& force) {
+  out.force[k] += force;
+  out.magnitude[k] += abs(force);
+}
+
+/// Force of a limit at q; `slope`: derivative of -force.
+template <class N>
+N limit_force(const DofEffects& e, const N& stiffness, const N& q, N& slope) {
+  const N low(e.low), high(e.high), zero(0.0);
+  slope = select(q < low, stiffness, select(q > high, stiffness, zero));
+  return select(q < low, stiffness * (low - q), select(q > high, stiffness * (high - q), zero));
+}
+
+/// Force of a position motor at the distance `error` from its target; `inside`: 1 where it is not clipped.
+template <class N>
+N motor_force(const DofEffects& e, const N& P, const N& D, const N& error, const N& v, N& inside) {
+  const N low(e.force_low), high(e.force_high);
+  const N force = P * error - D * v;
+  inside = select(force < low, N(0.0), select(force > high, N(0.0), N(1.0)));
+  return select(force < low, low, select(force > high, high, force));
+}
+
+template <class N>
+void add_plain_effects(const StageArgs<N>& a, const Link& link, const DofEffects& e, int k, JointLoad<N>& out) {
+  const N q = a.centre[link.q + k] + a.x[link.v + k];
+  if (link.effects & kSprung) {
+    const N stiffness = load_parameter(a, e.stiffness);
+    add_force(out, k, stiffness * (N(e.rest) - q));
+    out.by_q[k] += stiffness;
+  }
+  if (link.effects & kLimited) {
+    N slope;
+    add_force(out, k, limit_force(e, load_parameter(a, e.limit_stiffness), q, slope));
+    out.by_q[k] += slope;
+  }
+  if (link.effects & kDriven) {
+    const N P = load_parameter(a, e.P), D = load_parameter(a, e.D);
+    N inside;
+    add_force(out, k, motor_force(e, P, D, a.target[link.v + k] - q, a.v[link.v + k], inside));
+    out.by_q[k] += inside * P;
+    out.by_v[k] += inside * D;
+  }
+}
+
+template <class N>
+void add_torque(JointLoad<N>& out, const Vec3<N>& torque) {
+  add_force(out, 0, torque.x);
+  add_force(out, 1, torque.y);
+  add_force(out, 2, torque.z);
+}
+
+template <bool Derivatives, class N>
+void add_turning_limits(const StageArgs<N>& a, const DofEffects* e, const Quat<N>& q, JointLoad<N>& out) {
+  const RotationVector<N> at = rotation_vector<Derivatives>(q);
+  const N phi[3] = {at.phi.x, at.phi.y, at.phi.z};
+  N f[3], slope[3];
+  for (int k = 0; k < 3; ++k) f[k] = limit_force(e[k], load_parameter(a, e[k].limit_stiffness), phi[k], slope[k]);
+  const Vec3<N> force = {f[0], f[1], f[2]};
+  const Mat3<N> inverse = inverse_left_jacobian(at);
+  add_torque(out, inverse * force);
+  if constexpr (Derivatives) {
+    Mat3<N> by_phi = -inverse_left_jacobian_derivative(at, force);
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) by_phi.m[i][k] = mul_add(inverse.m[i][k], slope[k], by_phi.m[i][k]);
+    out.by_turn += by_phi * inverse_right_jacobian(at);
+  }
+}
+
+template <bool Derivatives, class N>
+void add_turning_motor(const StageArgs<N>& a, const Link& link, const DofEffects* e, const Quat<N>& q, JointLoad<N>& out) {
+  const N* u = a.target + link.v;
+  const RotationVector<N> error = rotation_vector<false>(conjugate(q) * quaternion_exp(Vec3<N>{u[0], u[1], u[2]}));
+  const N psi[3] = {error.phi.x, error.phi.y, error.phi.z};
+  const Mat3<N> slope = inverse_left_jacobian(error);
+  for (int i = 0; i < 3; ++i) {
+    const N P = load_parameter(a, e[i].P), D = load_parameter(a, e[i].D);
+    N inside;
+    add_force(out, i, motor_force(e[i], P, D, psi[i], a.v[link.v + i], inside));
+    out.by_v[i] += inside * D;
+    for (int k = 0; k < 3 && Derivatives; ++k) out.by_turn.m[i][k] = mul_add(inside * P, slope.m[i][k], out.by_turn.m[i][k]);
+  }
+}
+
+template <bool Derivatives, class N>
+void add_turning_effects(const StageArgs<N>& a, const Link& link, const DofEffects* e, JointLoad<N>& out) {
+  out.by_turn = zero33<N>();
+  const N *c = a.centre + link.q, *x = a.x + link.v;
+  const Quat<N> q = Quat<N>{c[0], c[1], c[2], c[3]} * quaternion_exp(Vec3<N>{x[0], x[1], x[2]});
+  if (link.effects & kSprung) {
+    const Quat<N> rest = quaternion_exp(Vec3<N>{N(e[0].rest), N(e[1].rest), N(e[2].rest)});
+    const RotationVector<N> turn = rotation_vector<false>(conjugate(rest) * q);
+    const N stiffness = load_parameter(a, e[0].stiffness);
+    add_torque(out, -(stiffness * turn.phi));
+    if constexpr (Derivatives) out.by_turn += stiffness * inverse_right_jacobian(turn);
+  }
+  if (link.effects & kLimited) add_turning_limits<Derivatives>(a, e, q, out);
+  if (link.effects & kDriven) add_turning_motor<Derivatives>(a, link, e, q, out);
+}
+
+/// All effects of one joint at the stage's x; a.v of its dofs must be there.
+template <JointKind K, bool Derivatives, class N>
+void joint_load(const ModelView& model, const StageArgs<N>& a, const Link& link, JointLoad<N>& out) {
+  const DofEffects* e = model.effects + link.v;
+  for (int k = 0; k < dofs(K); ++k) {
+    const int d = link.v + k;
+    out.force[k] = out.magnitude[k] = out.by_q[k] = out.by_v[k] = out.armature[k] = N(0.0);
+    if (link.effects & kDamped) {
+      const N damping = load_parameter(a, e[k].damping);
+      add_force(out, k, -(damping * a.v[d]));
+      out.by_v[k] += damping;
+    }
+    if (link.effects & kArmoured) {
+      out.armature[k] = load_parameter(a, e[k].armature);
+      out.force[k] -= out.armature[k] * mul_add(a.c0_over_h, a.v[d], a.inverse_h * a.s[d]);
+      out.by_v[k] = mul_add(a.c0_over_h, out.armature[k], out.by_v[k]);
+    }
+    if constexpr (K != JointKind::spherical)
+      if (link.effects & (kSprung | kLimited | kDriven)) add_plain_effects(a, link, e[k], k, out);
+  }
+  if constexpr (K == JointKind::spherical)
+    if (link.effects & (kSprung | kLimited | kDriven)) add_turning_effects<Derivatives>(a, link, e, out);
+}
+
+/// Adds a joint's effects to its diagonal block of A and to the diagonal of M.
+template <JointKind K, class N>
+void add_effect_entries(const ModelView& model, const StageArgs<N>& a, const Link& link) {
+  const LinkScratch<N>& o = a.links[&link - model.links];
+  JointLoad<N> load;
+  joint_load<K, true>(model, a, link, load);
+  for (int j = 0; j < dofs(K); ++j) {
+    const int d = link.v + j;
+    a.mass_diagonal[d] += load.armature[j];
+    const int* slot = model.pattern.slot + d * model.nv + link.v;
+    if constexpr (K != JointKind::spherical) {
+      N& entry = a.A[slot[j]];
+      entry = mul_add(a.c0_over_h, load.by_v[j], entry) + load.by_q[j];
+    } else {
+      for (int k = 0; k < 3; ++k) {
+        N& entry = a.A[slot[k]];
+        entry = mul_add(o.chart_rate.m[j][k], load.by_v[j], entry);
+        if (!(link.effects & (kSprung | kLimited | kDriven))) continue;
+        for (int i = 0; i < 3; ++i) entry = mul_add(load.by_turn.m[j][i], o.chart.m[i][k], entry);
+      }
+    }
+  }
+}
+
+}  // namespace tangere::kernels
