@@ -22,7 +22,7 @@ std::uint64_t mix(std::uint64_t hash, std::uint64_t word) {
 }
 
 std::uint64_t row_hash(std::uint64_t key, const unsigned char* bytes, std::size_t count) {
-  std::uint64_t hash = key, word = 0;
+  std::uint64_t hash = mix(key, count), word = 0;  // count: a row is not the same row with zeros behind it
   for (; count >= sizeof word; bytes += sizeof word, count -= sizeof word) {
     std::memcpy(&word, bytes, sizeof word);
     hash = mix(hash, word);

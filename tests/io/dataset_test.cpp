@@ -143,7 +143,7 @@ TEST(Dataset, SaysWhatItsNumbersAre) {
 TEST(Dataset, KeepsFailedEpisodesApartWithTheStateBefore) {
   const Folder folder;
   const std::string path = one_shard(folder, dataset_layout(20));
-  const h5::Id group = h5::open_group(h5::open_file(path), "failed/episode_17");
+  const h5::Id file = h5::open_file(path), group = h5::open_group(file, "failed/episode_17");
   EXPECT_EQ(h5::read_numbers<std::int64_t>(group, "step").at(0), 3);
   EXPECT_EQ(h5::read_numbers<std::int8_t>(group, "status").at(0), -3);
   EXPECT_EQ(h5::read_text(group, "reason"), to_string(StepStatus::rotation));
@@ -323,6 +323,32 @@ TEST(Dataset, AFullDiskIsAnErrorAndLeavesWholeShardsOnly) {
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "set"), {}), 1) << part;
     EXPECT_EQ(check_shard(folder / "set/shard-00000.h5").demos, 32) << part;
   }
+}
+
+TEST(Dataset, AShardThatTheDiskChangedDoesNotGetItsName) {
+  const Folder folder;
+  const DatasetLayout l = dataset_layout(20);
+  {
+    DatasetWriter writer(folder / "set", l, false);
+    write_block(writer, l, 0);
+    std::vector<float> row;
+    for (std::size_t k = 0; k < 36; ++k) row.push_back(dataset_number<float>(5, 3, 1, k));
+    const std::string part = folder / "set/shard-00000.h5.part";
+    const std::size_t at = bytes(part).find(
+        std::string(reinterpret_cast<const char*>(row.data()), sizeof(float) * 36));
+    ASSERT_NE(at, std::string::npos) << "not on the disk yet: nothing is tested";
+    std::fstream(part, std::ios::in | std::ios::out | std::ios::binary)
+        .seekp(std::streamoff(at))
+        .put('x');
+    try {
+      write_block(writer, l, 16);
+      ADD_FAILURE() << "nobody read it back";
+    } catch (const IoError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("checksum"));
+    }
+    EXPECT_THAT(writer.shards(), ::testing::IsEmpty());
+  }
+  EXPECT_EQ(folder.entries(), 0U);
 }
 
 TEST(Dataset, AShardThatAppearsMeanwhileIsLeftAsItIs) {

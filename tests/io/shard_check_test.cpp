@@ -57,9 +57,11 @@ class ShardCheck : public ::testing::Test {
     H5Fclose(file);
   }
   static void set(hid_t file, const char* object, const char* name, std::int64_t value) {
-    const hid_t attribute = H5Aopen_by_name(file, object, name, H5P_DEFAULT, H5P_DEFAULT);
+    const hid_t owner = H5Oopen(file, object, H5P_DEFAULT),
+                attribute = H5Aopen(owner, name, H5P_DEFAULT);
     EXPECT_GE(H5Awrite(attribute, H5T_NATIVE_INT64, &value), 0) << name;
     H5Aclose(attribute);
+    H5Oclose(owner);
   }
 
   Folder folder_;
