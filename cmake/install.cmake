@@ -28,7 +28,8 @@ install(FILES engine/aligned.hpp engine/batch.hpp engine/control.hpp engine/epis
   engine/precision.hpp engine/readout.hpp engine/row_sink.hpp engine/scene.hpp engine/stepper.hpp
   engine/tactile_frame.hpp DESTINATION ${headers}/engine)
 install(FILES tasks/benchmark_run.hpp tasks/episodes.hpp tasks/rollout.hpp DESTINATION ${headers}/tasks)
-install(FILES io/dataset_layout.hpp io/dataset_writer.hpp io/scene_reader.hpp io/trajectory_file.hpp io/trajectory_layout.hpp DESTINATION ${headers}/io)
+install(FILES io/dataset_layout.hpp io/dataset_writer.hpp io/scene_reader.hpp io/shard_check.hpp io/trajectory_file.hpp
+  io/trajectory_layout.hpp DESTINATION ${headers}/io)
 install(DIRECTORY scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tangere/scenes)
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 

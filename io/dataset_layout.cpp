@@ -12,7 +12,6 @@
 namespace tangere {
 namespace {
 
-constexpr double kShardBytes = 1 << 30;
 constexpr std::int64_t kBlockEpisodes = 16;
 // Short episodes: creating objects is what costs, and a shard that is lost should be cheap.
 constexpr std::int64_t kMostEpisodes = 4096;
@@ -49,7 +48,7 @@ double DatasetLayout::episode_bytes() const {
 }
 
 std::int64_t DatasetLayout::episodes_per_shard() const {
-  const double blocks = kShardBytes / (episode_bytes() * kBlockEpisodes);
+  const double blocks = shard_bytes / (episode_bytes() * kBlockEpisodes);
   constexpr double kMostBlocks = kMostEpisodes / kBlockEpisodes;
   return static_cast<std::int64_t>(std::clamp(blocks, 1.0, kMostBlocks)) * kBlockEpisodes;
 }

@@ -27,6 +27,7 @@ struct DatasetLayout {
   double timestep = 0;   ///< [s]
   double tolerance = 0;  ///< of the scaled residual, dimensionless
   std::string precision, version, instruction_set;
+  double shard_bytes = 1 << 30;  ///< a shard stays below it, unless 16 episodes are more
 
   /// R: actions of an episode.
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
@@ -36,7 +37,7 @@ struct DatasetLayout {
   [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
   /// Numbers of one episode on disk, without HDF5's own [bytes].
   [[nodiscard]] double episode_bytes() const;
-  /// As many as stay below a gigabyte, a multiple of 16; depends on the data set alone.
+  /// As many as stay below shard_bytes, a multiple of 16; depends on the data set alone.
   [[nodiscard]] std::int64_t episodes_per_shard() const;
   /// Throws InputError when a sensor cannot be a name in a file.
   void check() const;

@@ -20,7 +20,7 @@ using testing::IsEmpty;
 using testing::Not;
 using Words = std::vector<std::string>;
 
-const Words kSubcommands{"inspect", "simulate", "plot", "bench"};
+const Words kSubcommands{"inspect", "simulate", "generate", "plot", "bench"};
 
 Words operator+(Words first, const Words& second) {
   first.insert(first.end(), second.begin(), second.end());
@@ -52,7 +52,7 @@ TEST(Command, HelpEndsWithAnExampleThatWorks) {
     const Outcome outcome = run(folder, example);
     EXPECT_EQ(outcome.exit_code, 0) << help.out << outcome.err;
   }
-  EXPECT_THAT(folder.files(), testing::ElementsAre("ball.h5", "ball.svg", "scenes", "speed.svg"));
+  EXPECT_THAT(folder.files(), testing::ElementsAre("ball.h5", "ball.svg", "balls", "scenes", "speed.svg"));
 }
 
 TEST(Command, ThePageNamesEveryOption) {

@@ -79,11 +79,11 @@ run run-demo
 expect "succeeds" passes
 expect "says that nothing is missing" prints "All packages"
 expect "installs nothing" not_called "apt-get"
-expect "runs the main job" called "tangere simulate scenes/rolling_ball.xml"
+expect "runs the main job" called "tangere generate scenes/rolling_ball.xml"
 expect "draws" called "tangere plot out/rolling_ball.h5"
 run FAKE_PROGRAM=2 run-demo
 expect "fails with the program" fails
-expect "says what failed" prints "the simulation failed"
+expect "says what failed" prints "generating the data set failed"
 run FAKE_CMAKE=3.22.1 run-demo
 expect "refuses an old CMake" fails
 expect "names both versions" prints "3.25 or newer is needed, this machine has 3.22"

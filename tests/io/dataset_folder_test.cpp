@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+// The folder of a data set: one run at a time, no shard lost without being asked for, nothing half-written kept.
+#include "io/dataset_folder.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <memory>
+
+#include "engine/error.hpp"
+#include "io/part_file.hpp"
+#include "tests/io/synthetic_run.hpp"
+
+namespace tangere {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using testing::Folder;
+using ::testing::HasSubstr;
+
+void touch(const std::string& path) { std::ofstream(path) << "x"; }
+
+std::vector<std::string> names(const std::string& folder) {
+  std::vector<std::string> found;
+  for (const auto& entry : fs::directory_iterator(folder)) found.push_back(entry.path().filename());
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::string complaint(const std::string& path, bool overwrite = false) {
+  try {
+    const DatasetFolder folder(path, overwrite);
+  } catch (const IoError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(DatasetFolder, IsMadeAndRemovedWhenNothingComesIntoIt) {
+  const Folder place;
+  {
+    const DatasetFolder folder(place / "set", false);
+    EXPECT_TRUE(fs::is_directory(place / "set"));
+    EXPECT_EQ(folder.shard_path(7), place / "set/shard-00007.h5");
+    EXPECT_EQ(folder.shard_path(123456), place / "set/shard-123456.h5");
+    EXPECT_GT(folder.free_bytes(), 0);
+  }
+  EXPECT_FALSE(fs::exists(place / "set"));
+  {
+    const DatasetFolder folder(place / "set", false);
+    touch(folder.shard_path(0));
+  }
+  EXPECT_THAT(names(place / "set"), ElementsAre("shard-00000.h5"));
+  fs::create_directory(place / "mine");
+  { const DatasetFolder folder(place / "mine", false); }
+  EXPECT_TRUE(fs::exists(place / "mine")) << "it was there before";
+}
+
+TEST(DatasetFolder, WithShardsNeedsLeave) {
+  const Folder place;
+  fs::create_directory(place / "set");
+  touch(place / "set/shard-00004.h5");
+  EXPECT_THAT(complaint(place / "set"), HasSubstr("has shards already; give --overwrite"));
+  EXPECT_EQ(complaint(place / "set", true), "");
+  EXPECT_THAT(names(place / "set"), ElementsAre("shard-00004.h5")) << "nothing is removed yet";
+}
+
+TEST(DatasetFolder, RemovesOldShardsAndNothingElse) {
+  const Folder place;
+  fs::create_directory(place / "set");
+  for (const char* name : {"shard-00000.h5", "shard-00011.h5", "shard-123456.h5", "shard-.h5",
+                           "shard-1x.h5", "my-shard-00000.h5", "shard-00000.h5.bak", "notes.txt"})
+    touch(place / "set/" + name);
+  DatasetFolder folder(place / "set", true);
+  folder.remove_old_shards();
+  EXPECT_THAT(names(place / "set"), ElementsAre("my-shard-00000.h5", "notes.txt", "shard-.h5",
+                                                "shard-00000.h5.bak", "shard-1x.h5"));
+}
+
+TEST(DatasetFolder, CountsShardsThatAreToGoAsFree) {
+  const Folder place;
+  fs::create_directory(place / "set");
+  const DatasetFolder empty(place / "set", true);
+  const double before = empty.free_bytes();
+  touch(place / "set/shard-00000.h5");
+  fs::resize_file(place / "set/shard-00000.h5", std::uintmax_t{1} << 40);  // sparse: takes no room
+  EXPECT_GT(empty.free_bytes(), before + 0.9 * (std::uintmax_t{1} << 40));
+}
+
+TEST(DatasetFolder, CleansWhatAKilledRunLeft) {
+  const Folder place;
+  fs::create_directory(place / "set");
+  for (const char* name : {"shard-00000.h5.part", "shard-00012.h5.part", "other.h5.part"})
+    touch(place / "set/" + name);
+  EXPECT_EQ(complaint(place / "set"), "");
+  EXPECT_THAT(names(place / "set"), ElementsAre("other.h5.part"));
+}
+
+TEST(DatasetFolder, IsHeldByOneAtATime) {
+  const Folder place;
+  {
+    const DatasetFolder first(place / "set", false);
+    EXPECT_THAT(complaint(place / "set"), HasSubstr("another process is writing shards there"));
+    EXPECT_THAT(complaint(place / "set", true),
+                HasSubstr("another process is writing shards there"));
+    EXPECT_TRUE(fs::is_directory(place / "set"))
+        << "the second must not remove the first one's folder";
+  }
+  EXPECT_EQ(complaint(place / "set"), "");
+}
+
+TEST(DatasetFolder, ThatIsNoneIsNamed) {
+  const Folder place;
+  touch(place / "file");
+  EXPECT_THAT(complaint(place / "file"), HasSubstr("exists and is no folder"));
+  EXPECT_THAT(complaint(place / "no/set"), HasSubstr("cannot create the folder"));
+  EXPECT_THAT(complaint(""), HasSubstr("folder"));
+  EXPECT_THAT(names(place / ""), ElementsAre("file"));
+}
+
+TEST(DatasetFolder, ThatCannotBeWrittenIsNamed) {
+  EXPECT_THAT(complaint("/proc/set"), HasSubstr("/proc/set"));
+  if (geteuid() == 0) GTEST_SKIP() << "nothing is forbidden to root";
+  const Folder place;
+  fs::create_directory(place / "set");
+  fs::permissions(place / "set", fs::perms::owner_read | fs::perms::owner_exec);
+  EXPECT_THAT(complaint(place / "set"), HasSubstr("cannot write into"));
+  fs::permissions(place / "set", fs::perms::owner_all);
+}
+
+}  // namespace
+}  // namespace tangere
