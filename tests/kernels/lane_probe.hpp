@@ -4,11 +4,23 @@
 
 #include <span>
 
+#include "kernels/distance.hpp"
+
 namespace tangere::testing {
+
+struct DistanceProbe {
+  PrimitiveShape shape;
+  kernels::Vec3<double> size;
+};
+inline constexpr int kDistanceRows = 6;  ///< d, n, κ, and whether the point is nearer than 0.01
 
 struct LaneProbe {
   const char* name;  ///< as in KernelTable
   void (*inverse_sqrt)(const double* x, double* y);  ///< (8) each, 64-byte aligned
+  /// At y (3, 8): out (kDistanceRows, 8), 64-byte aligned.
+  void (*distance)(const DistanceProbe& shape, const double* y, double* out);
+  /// The same with lanes one at a time.
+  void (*distance_alone)(const DistanceProbe& shape, const double* y, double* out);
 };
 
 /// Those this machine can run; the first is the scalar one.
