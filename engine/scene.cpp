@@ -37,6 +37,18 @@ const char* to_string(ContactLaw value) {
   return "unknown";
 }
 
+const char* to_string(JointField value) {
+  switch (value) {
+    case JointField::damping: return "damping";
+    case JointField::armature: return "armature";
+    case JointField::stiffness: return "stiffness";
+    case JointField::lim_stiffness: return "lim_stiffness";
+    case JointField::P: return "P";
+    case JointField::D: return "D";
+  }
+  return "unknown";
+}
+
 bool dof_turns(JointType type, int k) {
   switch (type) {
     case JointType::revolute:

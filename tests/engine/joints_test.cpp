@@ -263,6 +263,64 @@ TEST(PositionMotor, EveryEnvironmentHasItsOwnTarget) {
   for (int e = 0; e < 19; ++e) EXPECT_NEAR(q_of(batch, e)[0], 0.01 * e - model.mass(0) * 9.8 / 500, 1e-9);
 }
 
+// --- numbers that vary ---
+
+TEST(VariedJoints, ADrawnNumberActsLikeAConstantOne) {
+  Scene s;
+  s.links = {link("arm", JointType::revolute, {0, 0, 0}, kBox, 500), link("ball", JointType::spherical, {1, 0, 0}, kBox, 500)};
+  s.links[0].joint.axis0 = {0, 1, 0};
+  for (LinkDescription& l : s.links) l.body.pose.position = {0.1, 0, 0}, l.joint.limits = {-0.1, 0.05};
+  s.motors = {position_motor("arm_joint", 1, 0.1), position_motor("ball_joint", 1, 0.1, 0.5)};
+  for (MotorTiming timing : {MotorTiming::end, MotorTiming::start})
+    for (JointField field : {JointField::damping, JointField::armature, JointField::stiffness, JointField::lim_stiffness,
+                             JointField::P, JointField::D}) {
+      Scene varied = s;
+      for (MotorDescription& motor : varied.motors) motor.timing = timing;
+      const Scene fixed = varied;
+      const bool motor = field >= JointField::P;
+      for (const LinkDescription& l : s.links) {
+        RandomizationDescription d{motor ? RandomTarget::motor : RandomTarget::joint_effect, l.joint.name, "", 0, {}, {}, {}, field};
+        d.distribution.a = 0.01, d.distribution.b = 0.4;
+        varied.randomizations.push_back(d);
+      }
+      const Model model(varied);
+      Batch batch(model, 11, 3);
+      run(model, batch, Integrator::bdf2, 2e-3, 50, {0.3, 0.1, 0.2, 0.3});
+      for (int e : {0, 4, 10}) {
+        Scene own = fixed;
+        for (std::size_t k = 0; k < 2; ++k) {
+          const double x = batch.randomized_value(e, static_cast<int>(k));
+          ASSERT_GT(x, 0.01);
+          JointDescription& joint = own.links[k].joint;
+          double* const numbers[] = {&joint.damping, &joint.armature, &joint.stiffness, &joint.limit_stiffness,
+                                     &own.motors[k].P, &own.motors[k].D};
+          *numbers[static_cast<int>(field)] = x;
+        }
+        const Model constant(own);
+        Batch alone(constant, 1);
+        run(constant, alone, Integrator::bdf2, 2e-3, 50, {0.3, 0.1, 0.2, 0.3});
+        EXPECT_EQ(q_of(batch, e), q_of(alone)) << to_string(field);
+        EXPECT_EQ(v_of(batch, e), v_of(alone)) << to_string(field);
+      }
+      EXPECT_NE(q_of(batch, 0), q_of(batch, 4)) << to_string(field);
+    }
+}
+
+TEST(VariedJoints, WhatIsNotThereCannotVary) {
+  const auto fails = [](RandomTarget target, JointField field, JointType type) {
+    Scene s = lift({"car_joint", -1, 1, {}});
+    s.links.push_back(link("other", type, {1, 0, 0}, kBox, 500));
+    RandomizationDescription d{target, type == JointType::fixed ? "other_joint" : "car_joint", "", 0, {}, {}, {}, field};
+    s.randomizations = {d};
+    EXPECT_THROW(Model{s}, InputError) << to_string(field);
+  };
+  fails(RandomTarget::motor, JointField::P, JointType::free);        // a force motor
+  fails(RandomTarget::motor, JointField::damping, JointType::free);
+  fails(RandomTarget::joint_effect, JointField::P, JointType::free);
+  fails(RandomTarget::joint_effect, JointField::lim_stiffness, JointType::free);  // no limits
+  fails(RandomTarget::joint_effect, JointField::damping, JointType::fixed);
+}
+
 // --- limits ---
 
 TEST(Limits, StopAFallWhereTheSpringCarriesIt) {
