@@ -5,6 +5,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/inspect_joints.hpp"
 #include "engine/control.hpp"
 #include "engine/model.hpp"
 #include "io/scene_reader.hpp"
@@ -81,6 +82,9 @@ Json as_json(const Model& model) {
           {"q_names", model.q_names()},
           {"v_names", model.v_names()},
           {"u_names", model.u_names()},
+          {"u_units", model.u_units()},
+          {"joint_effects", joint_effects_json(scene)},
+          {"motors", motors_json(scene)},
           {"contacts", contacts},
           {"sensors", sensors},
           {"control", control_name(scene)},
@@ -131,6 +135,7 @@ std::string as_text(const Model& model) {
   text += fmt::format("driven by: {}{}\n", control_name(scene),
                       steps < 0 ? "" : fmt::format(", {} steps", steps));
   text += names_line("varying between environments", randomized_names(scene));
+  text += '\n' + joint_effects_text(scene) + '\n' + motors_text(scene);
   text += fmt::format("\ncontacts ({})\n", model.contacts().size());
   for (const ContactInfo& c : model.contacts())
     text += fmt::format("  {} on {}: {} point{}, law {}\n", c.first, c.second, c.points,

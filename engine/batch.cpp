@@ -21,6 +21,8 @@ Purpose purpose_of(RandomTarget target) {
     case RandomTarget::joint_v: return Purpose::initial_state;
     case RandomTarget::ground_contact:
     case RandomTarget::pair_contact: return Purpose::contact;
+    case RandomTarget::joint_effect:
+    case RandomTarget::motor: return Purpose::joint;
     case RandomTarget::tactile: break;
   }
   return Purpose::tactile;
@@ -39,6 +41,12 @@ double nominal(const CompiledModel& m, const RandomizationDescription& d) {
       return field(c.coefficients);
   for (const auto& c : m.scene.ground_contacts)
     if (d.target == RandomTarget::ground_contact && c.body == d.name) return field(c.coefficients);
+  for (const auto& l : m.scene.links) {
+    const double values[] = {l.joint.damping, l.joint.armature, l.joint.stiffness, l.joint.limit_stiffness};
+    if (d.target == RandomTarget::joint_effect && l.joint.name == d.name) return values[static_cast<int>(d.joint_field)];
+  }
+  for (const auto& motor : m.scene.motors)
+    if (d.target == RandomTarget::motor && motor.joint == d.name) return d.joint_field == JointField::P ? motor.P : motor.D;
   return 0;
 }
 

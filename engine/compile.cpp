@@ -238,6 +238,11 @@ class Compiler {
         m_.randomized_row.push_back(state_row(d));
         continue;
       }
+      if (d.target == RandomTarget::joint_effect || d.target == RandomTarget::motor) {
+        vary_joint(m_, joints_, d, next);
+        m_.randomized_row.push_back(next++);
+        continue;
+      }
       const auto vary = [&](kernels::ContactParameters& p) {
         kernels::Parameter* field[] = {&p.kn, &p.kt, &p.mu, &p.damping};
         field[static_cast<int>(d.field)]->row = next;

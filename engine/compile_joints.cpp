@@ -230,6 +230,41 @@ void compile_initial_state(CompiledModel& m, const NameIndex& joints) {
   }
 }
 
+void vary_joint(CompiledModel& m, const NameIndex& joints, const RandomizationDescription& d, int row) {
+  const auto i = std::size_t(joints.find("joint", d.name, d.source));
+  const JointDescription& joint = m.scene.links[i].joint;
+  const auto fail = [&](const std::string& why) {
+    throw InputError(d.source.prefix() + to_string(d.joint_field) + " of joint '" + d.name + "' varies, but " + why);
+  };
+  bool found = false;
+  if (d.target == RandomTarget::motor) {
+    if (d.joint_field < JointField::P) fail("motors have P and D");
+    for (CompiledMotor& motor : m.motors) {
+      const int k = motor.dof - m.joints[i].v;
+      if (motor.control != MotorControl::position || k < 0 || k >= dof_count(joint.type)) continue;
+      kernels::DofEffects& e = m.dof_effects[std::size_t(motor.dof)];
+      (d.joint_field == JointField::P ? motor.P : motor.D).row = row;
+      (d.joint_field == JointField::P ? e.P : e.D).row = row;
+      found = true;
+    }
+    if (!found) fail("the joint has no position motor");
+    return;
+  }
+  if (d.joint_field >= JointField::P) fail("that is a number of a motor");
+  if (dof_count(joint.type) == 0) fail("the joint is fixed");
+  if (joint.turning) fail("its dofs do not share one number");
+  if (d.joint_field == JointField::lim_stiffness && !joint.limits) fail("the joint has no limits");
+  constexpr std::uint8_t kFlags[] = {kernels::kDamped, kernels::kArmoured, kernels::kSprung, kernels::kLimited};
+  const auto field = static_cast<std::size_t>(d.joint_field);
+  for (int k = 0; k < dof_count(joint.type); ++k) {
+    const int dof = m.joints[i].v + k;
+    kernels::DofEffects& e = m.dof_effects[std::size_t(dof)];
+    kernels::Parameter* parameters[] = {&e.damping, &e.armature, &e.stiffness, &e.limit_stiffness};
+    parameters[field]->row = row;
+    m.links[std::size_t(link_of_dof(m, dof))].effects |= kFlags[field];
+  }
+}
+
 void check_masses(const CompiledModel& m) {
   std::vector<char> carried(m.links.size(), 0);
   for (std::size_t i = m.links.size(); i-- > 0;) {

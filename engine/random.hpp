@@ -23,6 +23,7 @@ enum class Purpose : std::uint8_t {
   contact = 1,        ///< <randomize> of a contact's coefficients
   tactile = 2,        ///< <randomize> of a sensor's coefficients
   control = 3,        ///< knots of a random control
+  joint = 4,          ///< <randomize> of a joint's effects or a motor's gains
 };
 
 /// Names one random number. Different keys give independent numbers; the same key gives the same

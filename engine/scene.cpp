@@ -45,6 +45,18 @@ const char* shape_name(const Shape& shape) {
   return kNames[shape.index()];
 }
 
+const char* to_string(JointField value) {
+  switch (value) {
+    case JointField::damping: return "damping";
+    case JointField::armature: return "armature";
+    case JointField::stiffness: return "stiffness";
+    case JointField::lim_stiffness: return "lim_stiffness";
+    case JointField::P: return "P";
+    case JointField::D: return "D";
+  }
+  return "unknown";
+}
+
 bool dof_turns(JointType type, int k) {
   switch (type) {
     case JointType::revolute:

@@ -184,16 +184,18 @@ struct Distribution {
   double a = 0, b = 0;          ///< uniform, log_uniform: low, high; normal: mean, standard deviation
   std::vector<double> values;   ///< list: equally likely
 };
-enum class RandomTarget { joint_q, joint_v, ground_contact, pair_contact, tactile };
+enum class RandomTarget { joint_q, joint_v, ground_contact, pair_contact, tactile, joint_effect, motor };
 enum class ContactField { kn, kt, mu, damping };
+enum class JointField { damping, armature, stiffness, lim_stiffness, P, D };  ///< the last two: position motors
 struct RandomizationDescription {
   RandomTarget target = RandomTarget::joint_q;
-  std::string name;                 ///< joint, tactile, body of a ground contact, or general body of a pair
+  std::string name;                 ///< joint (its motor), tactile, body of a ground contact, or general body of a pair
   std::string second_name;          ///< primitive body of a pair
   int index = 0;                    ///< joint_q, joint_v: which component
   ContactField field = ContactField::kn;  ///< contacts and tactile
   Distribution distribution;
   Source source;
+  JointField joint_field = JointField::damping;  ///< joint_effect and motor: of all dofs of the joint alike
 };
 
 struct SolverOptions {
@@ -226,6 +228,7 @@ const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
 /// "sphere", "cuboid" …
 const char* shape_name(const Shape& shape);
+const char* to_string(JointField value);
 
 /// Dof `k` of a joint type turns; it slides otherwise.
 bool dof_turns(JointType type, int k);

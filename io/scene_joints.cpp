@@ -14,13 +14,14 @@ namespace {
 /// The effects of the dofs that turn, or of those that slide.
 JointEffects effects_in_si(const SceneNode& node, bool turns) {
   const SceneContext& c = node.context();
+  const auto number = [&](const char* name, JointField field) {
+    return node.not_negative(name, 0.0) * joint_field_scale(field, turns, c);
+  };
   JointEffects e;
-  e.damping = node.not_negative("damping", 0.0) * (turns ? c.rotational : c.damping_force);
-  // An inertia is a mass times a length twice, a torque per angle or per its second derivative alike.
-  const double mass = c.density * c.length * c.length * c.length;
-  e.armature = node.not_negative("armature", 0.0) * (turns ? c.rotational : mass);
-  e.stiffness = node.not_negative("stiffness", 0.0) * (turns ? c.rotational : c.stiffness);
-  e.limit_stiffness = node.not_negative("lim_stiffness", 0.0) * (turns ? c.rotational : c.stiffness);
+  e.damping = number("damping", JointField::damping);
+  e.armature = number("armature", JointField::armature);
+  e.stiffness = number("stiffness", JointField::stiffness);
+  e.limit_stiffness = number("lim_stiffness", JointField::lim_stiffness);
   if (node.has("lim")) {
     const std::vector<double> x = node.numbers("lim", 2);
     if (!(x[0] <= x[1])) node.fail(fmt::format("lim=\"{} {}\": expected low, then high", x[0], x[1]));
@@ -61,8 +62,8 @@ void read_motor(const SceneNode& node, bool turns, MotorDescription& motor) {
   for (const char* name : {"P", "D", "timing"}) (position ? used : idle).emplace_back(name);
   node.check_attributes(used, {}, idle);
   if (position) {
-    motor.P = node.not_negative("P") * (turns ? c.rotational : c.stiffness);
-    motor.D = node.not_negative("D", 0.0) * (turns ? c.rotational : c.damping_force);
+    motor.P = node.not_negative("P") * joint_field_scale(JointField::P, turns, c);
+    motor.D = node.not_negative("D", 0.0) * joint_field_scale(JointField::D, turns, c);
     motor.timing = node.choice("timing", {"end", "start"}, 0) == 1 ? MotorTiming::start : MotorTiming::end;
     motor.high = std::numeric_limits<double>::infinity();
     motor.low = -motor.high;
@@ -89,6 +90,19 @@ double coordinate_scale(JointType type, int index, const SceneContext& c) {
     case JointType::free: break;
   }
   return index < 3 ? c.length : 1;
+}
+
+double joint_field_scale(JointField field, bool turns, const SceneContext& c) {
+  if (turns) return c.rotational;  // torque per angle, its rate or its acceleration: a mass times a length twice
+  switch (field) {
+    case JointField::damping:
+    case JointField::D: return c.damping_force;
+    case JointField::armature: return c.density * c.length * c.length * c.length;
+    case JointField::stiffness:
+    case JointField::lim_stiffness:
+    case JointField::P: break;
+  }
+  return c.stiffness;
 }
 
 void read_joint_effects(const SceneNode& node, JointDescription& joint) {

@@ -82,11 +82,37 @@ void check_coefficient(const SceneNode& node, const Distribution& d) {
   if (negative) node.fail("a coefficient may not be negative");
 }
 
+/// damping, armature, stiffness, lim_stiffness of a joint, or P, D of its motor.
+void read_joint_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
+  const bool motor = node.name() == "motor";
+  const char* by = motor ? "joint" : "name";
+  const JointDescription& joint = scene.links[std::size_t(find_joint(scene, node, by))].joint;
+  node.check_attributes({by, "field", "uniform", "log_uniform", "normal", "list"});
+  d.target = motor ? RandomTarget::motor : RandomTarget::joint_effect;
+  d.name = joint.name;
+  if (motor) {
+    d.joint_field = node.choice("field", {"P", "D"}) == 0 ? JointField::P : JointField::D;
+    bool position = false;
+    for (const MotorDescription& m : scene.motors)
+      position = position || (m.joint == joint.name && m.control == MotorControl::position);
+    if (!position) node.fail("joint '" + joint.name + "' has no position motor; force motors have no gains");
+  } else {
+    d.joint_field = static_cast<JointField>(node.choice("field", {"damping", "armature", "stiffness", "lim_stiffness"}));
+    if (joint.type == JointType::fixed) node.fail("joint '" + joint.name + "' is fixed; nothing of it can vary");
+    if (d.joint_field == JointField::lim_stiffness && !joint.limits) node.fail("joint '" + joint.name + "' has no 'lim'");
+    const bool mixed = joint.type == JointType::free || joint.type == JointType::free2d;
+    if (mixed && node.context().length != 1)
+      node.fail("joint '" + joint.name + "' slides and turns: one number has two units; use unit=\"m-kg\"");
+  }
+  d.distribution = read_distribution(node, joint_field_scale(d.joint_field, dof_turns(joint.type, 0), node.context()));
+  check_coefficient(node, d.distribution);
+}
+
 void read_state_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
   node.check_attributes({"name", "q", "v", "uniform", "log_uniform", "normal", "list"});
   const int joint = find_joint(scene, node, "name");
   const JointType type = scene.links[std::size_t(joint)].joint.type;
-  if (node.has("q") == node.has("v")) node.fail("expected exactly one of q and v: the index of what varies");
+  if (node.has("q") == node.has("v")) node.fail("expected exactly one of q, v (the index of what varies) and field");
   const bool position = node.has("q");
   const int count = position ? position_count(type) : dof_count(type);
   if (count == 0) node.fail("joint '" + node.text("name") + "' is fixed; nothing of it can vary");
@@ -197,17 +223,19 @@ void read_control(Scene& scene, const SceneNode& section) {
 
 void read_randomize(Scene& scene, const SceneNode& section) {
   section.check_attributes({});
-  for (const SceneNode& node : section.children({"joint", "ground_contact", "general_primitive_contact", "tactile"})) {
+  for (const SceneNode& node : section.children({"joint", "motor", "ground_contact", "general_primitive_contact", "tactile"})) {
     RandomizationDescription d;
     d.source = node.source();
-    if (node.name() == "joint") {
+    if (node.name() == "motor" || (node.name() == "joint" && node.has("field"))) {
+      read_joint_variation(scene, node, d);
+    } else if (node.name() == "joint") {
       read_state_variation(scene, node, d);
     } else {
       read_coefficient_variation(scene, node, d);
     }
     for (const RandomizationDescription& other : scene.randomizations)
       if (other.target == d.target && other.name == d.name && other.second_name == d.second_name &&
-          other.index == d.index && other.field == d.field)
+          other.index == d.index && other.field == d.field && other.joint_field == d.joint_field)
         node.fail("this number already varies");
     scene.randomizations.push_back(std::move(d));
   }

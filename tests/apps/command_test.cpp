@@ -281,6 +281,27 @@ TEST(Command, InspectTellsPeopleAndProgramsTheSame) {
     EXPECT_THAT(text.out, HasSubstr(name.get<std::string>()));
 }
 
+TEST(Command, InspectListsJointEffectsAndMotors) {
+  const Folder folder;
+  const std::string path = TANGERE_TEST_DATA "/scenes/every_joint.xml";
+  const Outcome text = run(folder, {"inspect", path});
+  const json answer = json::parse(run(folder, {"inspect", path, "--json"}).out);
+  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
+  const json& motors = answer.at("motors");
+  ASSERT_EQ(motors.size(), 4U);
+  EXPECT_EQ(motors[0].at("control"), "position");
+  EXPECT_EQ(motors[1].at("range"), json({nullptr, nullptr}));
+  EXPECT_EQ(motors[2].at("timing"), "start");
+  EXPECT_EQ(motors[3].at("control"), "force");
+  EXPECT_EQ(answer.at("u_units"), json({"rad", "rad", "rad", "rad", "m", "1", "1"}));
+  for (const char* line : {"  shoulder: damping 1e-06, armature 5e-05, stiffness 0.01 about 0.25, limits -1.5 1.5 of stiffness 0.2\n",
+                           "  puck (sliding): damping 0.007\n", "  puck (turning): damping 7e-07\n",
+                           "  carriage: position, P 200, D 10, range -10 10, from the start of the step\n",
+                           "  wrist: position, P 0.01, D 0.0001, no range, from the end of the step\n",
+                           "  table: force, u from -1 to 1 is -1 to 2\n"})
+    EXPECT_THAT(text.out, HasSubstr(line));
+}
+
 TEST(Command, QuietPrintsErrorsOnly) {
   const Folder folder;
   for (const Words& words :

@@ -122,8 +122,20 @@ class DenseDynamics {
       const S r = S(sphere->radius), m = density * 4 * std::acos(S(-1)) / 3 * r * r * r;
       return {m, M3::Identity() * (2 * m * r * r / 5)};
     }
+    const auto rod = [](S m, S axial, S across) { return Mass{m, M3(V3(across, across, axial).asDiagonal())}; };
+    if (const auto* c = std::get_if<CylinderShape>(&body.shape)) {
+      const S r2 = S(c->radius) * S(c->radius), l = S(c->length), m = density * std::acos(S(-1)) * r2 * l;
+      return rod(m, m * r2 / 2, m * (3 * r2 + l * l) / 12);
+    }
+    if (const auto* c = std::get_if<CapsuleShape>(&body.shape)) {
+      const S r = S(c->radius), l = S(c->length), pi = std::acos(S(-1));
+      const S tube = density * pi * r * r * l, ends = density * 4 * pi / 3 * r * r * r;
+      return rod(tube + ends, tube * r * r / 2 + 2 * ends * r * r / 5,
+                 tube * (3 * r * r + l * l) / 12 + ends * (2 * r * r / 5 + l * l / 4 + 3 * l * r / 8));
+    }
+    if (std::holds_alternative<PlaneShape>(body.shape)) return {0, M3::Zero()};
     const auto* box = std::get_if<CuboidShape>(&body.shape);
-    if (box == nullptr) throw std::logic_error("dense dynamics: spheres and cuboids only");
+    if (box == nullptr) throw std::logic_error("dense dynamics: a shape without a formula here");
     const V3 s = vec(box->size), s2 = s.cwiseProduct(s);
     const S m = density * s.prod();
     return {m, M3(V3(s2.y() + s2.z(), s2.x() + s2.z(), s2.x() + s2.y()).asDiagonal()) * (m / 12)};

@@ -81,9 +81,8 @@ void expect_close(const std::vector<double>& a, const std::vector<double>& b, do
 
 class KernelTables : public ::testing::TestWithParam<unsigned> {};
 
-TEST_P(KernelTables, EvaluateMatchesTheScalarReferenceWhateverTheNeighboursHold) {
-  const unsigned seed = GetParam();
-  const auto m = compile(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped));
+void compare_tables(const Scene& scene, unsigned seed) {
+  const auto m = compile(scene);
   StageBuffers<double> b(*m);
   Random random(seed);
   testing::randomise(b, *m, random, kStep);
@@ -145,6 +144,16 @@ TEST_P(KernelTables, EvaluateMatchesTheScalarReferenceWhateverTheNeighboursHold)
       EXPECT_EQ(fused.A, first.A) << "AVX2 and AVX-512 differ";
     }
   }
+}
+
+TEST_P(KernelTables, EvaluateMatchesTheScalarReferenceWhateverTheNeighboursHold) {
+  const unsigned seed = GetParam();
+  compare_tables(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed);
+}
+
+TEST_P(KernelTables, JointEffectsMatchTheScalarReferenceWhateverTheNeighboursHold) {
+  const unsigned seed = GetParam();
+  compare_tables(testing::random_machine(seed, 2 + static_cast<int>(seed % 7)), seed);
 }
 
 TEST_P(KernelTables, LuSolvesAndJudgesItself) {

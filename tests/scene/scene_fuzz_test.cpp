@@ -66,6 +66,7 @@ TEST(SceneFuzz, TwoThousandMutantsAreReadOrRefused) {
       testing::with("type=\"cuboid\" size=\"0.05 0.05 0.01\"", "type=\"cylinder\" length=\"0.01\" radius=\"0.05\""));
   const std::string sources[] = {testing::kScene, rods, file_text(std::string(TANGERE_TEST_DATA) + "/scenes/two_balls.xml"),
                                  file_text(std::string(TANGERE_TEST_DATA) + "/scenes/published_dialect_pad.xml"),
+                                 file_text(std::string(TANGERE_TEST_DATA) + "/scenes/every_joint.xml"),
                                  file_text(std::string(TANGERE_SOURCE_DIR) + "/scenes/rolling_ball_small.xml")};
   int read = 0, refused = 0;
   for (unsigned seed = 0; seed < 2000; ++seed) {

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Joints and motors of a scene as text and as JSON.
+#include "apps/inspect_joints.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+
+namespace tangere::apps {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Named {
+  std::string joint;
+  const JointEffects* effects;
+  const std::vector<double>* rest;
+};
+
+bool any(const JointEffects& e) {
+  return e.damping != 0 || e.armature != 0 || e.stiffness != 0 || (e.limits && e.limit_stiffness != 0);
+}
+
+/// Joints that have effects; the dofs that turn on their own line where theirs differ.
+std::vector<Named> named_effects(const Scene& scene) {
+  std::vector<Named> list;
+  for (const LinkDescription& l : scene.links) {
+    const JointDescription& j = l.joint;
+    if (j.type == JointType::fixed) continue;
+    if (any(j)) list.push_back({j.turning ? j.name + " (sliding)" : j.name, &j, &j.rest});
+    if (j.turning && any(*j.turning)) list.push_back({j.name + " (turning)", &*j.turning, &j.rest});
+  }
+  return list;
+}
+
+Json finite(double x) { return std::isfinite(x) ? Json(x) : Json(); }
+
+std::string range_text(const MotorDescription& m) {
+  if (std::isinf(m.low) && std::isinf(m.high)) return "no range";
+  return fmt::format("range {:.6g} {:.6g}", m.low, m.high);
+}
+
+}  // namespace
+
+Json joint_effects_json(const Scene& scene) {
+  Json out = Json::array();
+  for (const Named& n : named_effects(scene)) {
+    const JointEffects& e = *n.effects;
+    out.push_back({{"joint", n.joint},
+                   {"damping", e.damping},
+                   {"armature", e.armature},
+                   {"stiffness", e.stiffness},
+                   {"rest", e.stiffness != 0 && !n.rest->empty() ? Json(*n.rest) : Json()},
+                   {"limits", e.limits ? Json(*e.limits) : Json()},
+                   {"lim_stiffness", e.limit_stiffness}});
+  }
+  return out;
+}
+
+std::string joint_effects_text(const Scene& scene) {
+  const std::vector<Named> list = named_effects(scene);
+  std::string text = fmt::format("joint effects ({})\n", list.size());
+  for (const Named& n : list) {
+    const JointEffects& e = *n.effects;
+    std::vector<std::string> parts;
+    if (e.damping != 0) parts.push_back(fmt::format("damping {:.6g}", e.damping));
+    if (e.armature != 0) parts.push_back(fmt::format("armature {:.6g}", e.armature));
+    if (e.stiffness != 0)
+      parts.push_back(n.rest->empty() ? fmt::format("stiffness {:.6g}", e.stiffness)
+                                      : fmt::format("stiffness {:.6g} about {:.6g}", e.stiffness, fmt::join(*n.rest, " ")));
+    if (e.limits && e.limit_stiffness != 0)
+      parts.push_back(fmt::format("limits {:.6g} {:.6g} of stiffness {:.6g}", (*e.limits)[0], (*e.limits)[1], e.limit_stiffness));
+    text += fmt::format("  {}: {}\n", n.joint, fmt::join(parts, ", "));
+  }
+  return text;
+}
+
+Json motors_json(const Scene& scene) {
+  Json out = Json::array();
+  for (const MotorDescription& m : scene.motors) {
+    const bool position = m.control == MotorControl::position;
+    Json motor = {{"joint", m.joint},
+                  {"control", position ? "position" : "force"},
+                  {"range", Json::array({finite(m.low), finite(m.high)})}};
+    if (position) {
+      motor["P"] = m.P;
+      motor["D"] = m.D;
+      motor["timing"] = m.timing == MotorTiming::end ? "end" : "start";
+    }
+    out.push_back(motor);
+  }
+  return out;
+}
+
+std::string motors_text(const Scene& scene) {
+  std::string text = fmt::format("motors ({})\n", scene.motors.size());
+  for (const MotorDescription& m : scene.motors) {
+    if (m.control == MotorControl::force) {
+      text += fmt::format("  {}: force, u from -1 to 1 is {:.6g} to {:.6g}\n", m.joint, m.low, m.high);
+    } else {
+      text += fmt::format("  {}: position, P {:.6g}, D {:.6g}, {}, from the {} of the step\n", m.joint, m.P, m.D, range_text(m),
+                          m.timing == MotorTiming::end ? "end" : "start");
+    }
+  }
+  return text;
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `tangere inspect` says about joints and motors.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "engine/model.hpp"
+
+namespace tangere::apps {
+
+/// What acts on the dofs of every joint that has such effects; numbers in SI, limits and rest null where there are none.
+nlohmann::ordered_json joint_effects_json(const Scene& scene);
+std::string joint_effects_text(const Scene& scene);
+
+/// Motors in file order; a bound of a range that is not there is null.
+nlohmann::ordered_json motors_json(const Scene& scene);
+std::string motors_text(const Scene& scene);
+
+}  // namespace tangere::apps
