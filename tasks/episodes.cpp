@@ -18,6 +18,7 @@
 #include <stdexcept>
 
 #include "tasks/episode_slot.hpp"
+#include "tasks/task_order.hpp"
 
 namespace tangere {
 namespace {
@@ -116,7 +117,8 @@ class EpisodeGraph {
                                           static_cast<std::size_t>(options_.blocks_in_flight));
     flow::function_node<Traveller, Traveller> simulator(
         graph_, flow::unlimited, [this](Traveller t) { return simulate(t); });
-    flow::function_node<Traveller, Traveller> encoder(graph_, flow::unlimited, [](Traveller t) {
+    flow::function_node<Traveller, Traveller> encoder(graph_, flow::unlimited, [this](Traveller t) {
+      const TaskOrder::Task task(order_, t.slot);
       t.slot->encode();
       return t;
     });
@@ -134,8 +136,11 @@ class EpisodeGraph {
     flow::make_edge(encoder, writer);
     flow::make_edge(flow::output_port<0>(writer), simulator);
     flow::make_edge(flow::output_port<1>(writer), limiter.decrementer());
+    order_.begin();
+    const AtEnd at_end{order_};
     blocks.activate();
     graph_.wait_for_all();
+    order_.end();
     summary_.peak_blocks_in_flight = slots_.peak();
     summary_.stopped = stopped_;
     std::sort(summary_.failures.begin(), summary_.failures.end(),
@@ -144,7 +149,14 @@ class EpisodeGraph {
   }
 
  private:
+  /// The order at the end also where waiting throws.
+  struct AtEnd {
+    const TaskOrder& order;
+    ~AtEnd() { order.end(); }
+  };
+
   Traveller next_block(tbb::flow_control& flow) {
+    const TaskOrder::Task task(order_, &next_block_);
     if (next_block_ * kBlockEpisodes >= options_.episodes) {
       flow.stop();
       return {};
@@ -153,10 +165,11 @@ class EpisodeGraph {
   }
 
   Traveller simulate(Traveller t) {
-    if (t.slot == nullptr) {
-      t.slot = slots_.take(make_slot_);
-      t.slot->begin(t.block);
-    }
+    const TaskOrder::Task start(order_, nullptr);
+    const bool first = t.slot == nullptr;
+    if (first) t.slot = slots_.take(make_slot_);
+    const TaskOrder::Task task(order_, t.slot);
+    if (first) t.slot->begin(t.block);
     const auto ends = [this] {
       if (stop_ && stop_()) stopped_ = true;
       return stopped_ || tbb::is_current_task_group_canceling();  // a throw elsewhere
@@ -167,6 +180,7 @@ class EpisodeGraph {
 
   /// True when that was the block's last piece.
   bool write(const Traveller& t) {
+    const TaskOrder::Task writer(order_, &summary_), task(order_, t.slot);
     const EpisodeRows piece = t.slot->piece();
     sink_.write(piece);
     const PieceCounts& counts = t.slot->counts();
@@ -188,6 +202,7 @@ class EpisodeGraph {
 
   const EpisodeOptions& options_;
   EpisodeShape shape_;
+  TaskOrder order_;
   EpisodeSink& sink_;
   const EpisodeProgress& progress_;
   const StopRequest& stop_;
