@@ -137,10 +137,7 @@ class EpisodeGraph {
     flow::make_edge(flow::output_port<0>(writer), simulator);
     flow::make_edge(flow::output_port<1>(writer), limiter.decrementer());
     order_.begin();
-    const AtEnd at_end{order_};
-    blocks.activate();
-    graph_.wait_for_all();
-    order_.end();
+    wait_for_all(blocks);
     summary_.peak_blocks_in_flight = slots_.peak();
     summary_.stopped = stopped_;
     std::sort(summary_.failures.begin(), summary_.failures.end(),
@@ -149,11 +146,17 @@ class EpisodeGraph {
   }
 
  private:
-  /// The order at the end also where waiting throws.
-  struct AtEnd {
-    const TaskOrder& order;
-    ~AtEnd() { order.end(); }
-  };
+  void wait_for_all(flow::input_node<Traveller>& blocks) {
+    struct AtEnd {  // also where waiting throws
+      EpisodeGraph& run;
+      ~AtEnd() {
+        run.order_.end();
+        ordered_after_tasks_of(run.graph_);
+      }
+    } const at_end{*this};
+    blocks.activate();
+    graph_.wait_for_all();
+  }
 
   Traveller next_block(tbb::flow_control& flow) {
     const TaskOrder::Task task(order_, &next_block_);
