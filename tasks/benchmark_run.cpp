@@ -88,19 +88,18 @@ class Episode {
     batch_ = start_;
     const double cpu = cpu_seconds();
     const auto begin = std::chrono::steady_clock::now();
+    const auto run_blocks = [&](const tbb::blocked_range<int>& blocks) {
+      TaskOrder::arrive();
+      Worker& worker = workers_[lanes(tbb::this_task_arena::current_thread_index())];
+      const TaskOrder::Task task(order_, &worker);
+      for (int b = blocks.begin(); b != blocks.end(); ++b) run_block(b, worker, checked);
+    };
     order_.begin();
     arena_.execute([&] {
       // One block at a time to whoever is free: some blocks need more iterations than others, and the machine may have
       // other work on some cores.
-      tbb::parallel_for(
-          tbb::blocked_range<int>(0, batch_.blocks(), 1),
-          [&](const tbb::blocked_range<int>& blocks) {
-            Worker& worker = workers_[lanes(tbb::this_task_arena::current_thread_index())];
-            const TaskOrder::Task task(order_, &worker);
-            for (int b = blocks.begin(); b != blocks.end(); ++b)
-              run_block(b, worker, checked);
-          },
-          tbb::simple_partitioner{});
+      tbb::parallel_for(tbb::blocked_range<int>(0, batch_.blocks(), 1), ByReference<decltype(run_blocks)>{&run_blocks},
+                        tbb::simple_partitioner{});
     });
     order_.end();
     const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - begin;

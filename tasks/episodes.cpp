@@ -112,18 +112,26 @@ class EpisodeGraph {
   EpisodeSummary run() {
     using Exits = std::tuple<Traveller, flow::continue_msg>;
     flow::input_node<Traveller> blocks(
-        graph_, [this](tbb::flow_control& flow) { return next_block(flow); });
+        graph_, [this](tbb::flow_control& flow) {
+          TaskOrder::arrive();
+          return next_block(flow);
+        });
     flow::limiter_node<Traveller> limiter(graph_,
                                           static_cast<std::size_t>(options_.blocks_in_flight));
     flow::function_node<Traveller, Traveller> simulator(
-        graph_, flow::unlimited, [this](Traveller t) { return simulate(t); });
+        graph_, flow::unlimited, [this](Traveller t) {
+          TaskOrder::arrive();
+          return simulate(t);
+        });
     flow::function_node<Traveller, Traveller> encoder(graph_, flow::unlimited, [this](Traveller t) {
+      TaskOrder::arrive();
       const TaskOrder::Task task(order_, t.slot);
       t.slot->encode();
       return t;
     });
     flow::multifunction_node<Traveller, Exits> writer(
         graph_, flow::serial, [this](const Traveller& t, auto& exits) {
+          TaskOrder::arrive();
           if (write(t)) {
             std::get<1>(exits).try_put(flow::continue_msg());
           } else {

@@ -10,6 +10,16 @@
 
 namespace tangere {
 
+/// A function as oneTBB may copy it from task to task: a pointer is all that is copied.
+template <class Function>
+struct ByReference {
+  const Function* function;
+  template <class Argument>
+  void operator()(Argument& argument) const {
+    (*function)(argument);
+  }
+};
+
 /// What this thread did until now comes before what others do after ordered_after() of the same address.
 inline void ordered_before([[maybe_unused]] const void* address) {
 #if defined(__SANITIZE_THREAD__)
@@ -37,13 +47,15 @@ void ordered_after_tasks_of([[maybe_unused]] Graph& graph) {
 class TaskOrder {
  public:
   void begin() const { ordered_before(&begin_); }
+  /// First thing in a task whose function itself, with what it captured, lives where begin() was called.
+  static void arrive() { ordered_after(&begin_); }
   void end() const { ordered_after(&end_); }
 
   /// While a task runs. `mine`: what tasks hand from one to the next and none uses at the same time as another.
   class Task {
    public:
     Task(const TaskOrder& order, const void* mine) : order_(order), mine_(mine) {
-      ordered_after(&order_.begin_);
+      arrive();
       ordered_after(mine_);
     }
     ~Task() {
@@ -59,7 +71,8 @@ class TaskOrder {
   };
 
  private:
-  char begin_ = 0, end_ = 0;  // their addresses matter
+  static inline char begin_ = 0;  // addresses matter, nothing is in them
+  char end_ = 0;
 };
 
 }  // namespace tangere
