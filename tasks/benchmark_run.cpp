@@ -19,6 +19,7 @@
 #include "engine/stepper.hpp"
 #include "kernels/lanes.hpp"
 #include "tasks/benchmark_fields.hpp"
+#include "tasks/task_order.hpp"
 
 namespace tangere {
 namespace {
@@ -87,18 +88,20 @@ class Episode {
     batch_ = start_;
     const double cpu = cpu_seconds();
     const auto begin = std::chrono::steady_clock::now();
+    const auto run_blocks = [&](const tbb::blocked_range<int>& blocks) {
+      TaskOrder::arrive();
+      Worker& worker = workers_[lanes(tbb::this_task_arena::current_thread_index())];
+      const TaskOrder::Task task(order_, &worker);
+      for (int b = blocks.begin(); b != blocks.end(); ++b) run_block(b, worker, checked);
+    };
+    order_.begin();
     arena_.execute([&] {
       // One block at a time to whoever is free: some blocks need more iterations than others, and the machine may have
       // other work on some cores.
-      tbb::parallel_for(
-          tbb::blocked_range<int>(0, batch_.blocks(), 1),
-          [&](const tbb::blocked_range<int>& blocks) {
-            const int thread = tbb::this_task_arena::current_thread_index();
-            for (int b = blocks.begin(); b != blocks.end(); ++b)
-              run_block(b, workers_[lanes(thread)], checked);
-          },
-          tbb::simple_partitioner{});
+      tbb::parallel_for(tbb::blocked_range<int>(0, batch_.blocks(), 1), ByReference<decltype(run_blocks)>{&run_blocks},
+                        tbb::simple_partitioner{});
     });
+    order_.end();
     const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - begin;
     return {wall.count(), cpu_seconds() - cpu};
   }
@@ -196,6 +199,7 @@ class Episode {
   std::vector<std::uint64_t> checksums_;
   std::vector<Worker> workers_;  // by the thread's index in the arena
   std::atomic<bool> stopped_{false};
+  TaskOrder order_;
   // The arena alone is not enough where more threads are asked for than there are cores.
   tbb::global_control cap_;
   tbb::task_arena arena_;

@@ -18,6 +18,7 @@
 #include <stdexcept>
 
 #include "tasks/episode_slot.hpp"
+#include "tasks/task_order.hpp"
 
 namespace tangere {
 namespace {
@@ -111,17 +112,26 @@ class EpisodeGraph {
   EpisodeSummary run() {
     using Exits = std::tuple<Traveller, flow::continue_msg>;
     flow::input_node<Traveller> blocks(
-        graph_, [this](tbb::flow_control& flow) { return next_block(flow); });
+        graph_, [this](tbb::flow_control& flow) {
+          TaskOrder::arrive();
+          return next_block(flow);
+        });
     flow::limiter_node<Traveller> limiter(graph_,
                                           static_cast<std::size_t>(options_.blocks_in_flight));
     flow::function_node<Traveller, Traveller> simulator(
-        graph_, flow::unlimited, [this](Traveller t) { return simulate(t); });
-    flow::function_node<Traveller, Traveller> encoder(graph_, flow::unlimited, [](Traveller t) {
+        graph_, flow::unlimited, [this](Traveller t) {
+          TaskOrder::arrive();
+          return simulate(t);
+        });
+    flow::function_node<Traveller, Traveller> encoder(graph_, flow::unlimited, [this](Traveller t) {
+      TaskOrder::arrive();
+      const TaskOrder::Task task(order_, t.slot);
       t.slot->encode();
       return t;
     });
     flow::multifunction_node<Traveller, Exits> writer(
         graph_, flow::serial, [this](const Traveller& t, auto& exits) {
+          TaskOrder::arrive();
           if (write(t)) {
             std::get<1>(exits).try_put(flow::continue_msg());
           } else {
@@ -134,8 +144,8 @@ class EpisodeGraph {
     flow::make_edge(encoder, writer);
     flow::make_edge(flow::output_port<0>(writer), simulator);
     flow::make_edge(flow::output_port<1>(writer), limiter.decrementer());
-    blocks.activate();
-    graph_.wait_for_all();
+    order_.begin();
+    wait_for_all(blocks);
     summary_.peak_blocks_in_flight = slots_.peak();
     summary_.stopped = stopped_;
     std::sort(summary_.failures.begin(), summary_.failures.end(),
@@ -144,7 +154,20 @@ class EpisodeGraph {
   }
 
  private:
+  void wait_for_all(flow::input_node<Traveller>& blocks) {
+    struct AtEnd {  // also where waiting throws
+      EpisodeGraph& run;
+      ~AtEnd() {
+        run.order_.end();
+        ordered_after_tasks_of(run.graph_);
+      }
+    } const at_end{*this};
+    blocks.activate();
+    graph_.wait_for_all();
+  }
+
   Traveller next_block(tbb::flow_control& flow) {
+    const TaskOrder::Task task(order_, &next_block_);
     if (next_block_ * kBlockEpisodes >= options_.episodes) {
       flow.stop();
       return {};
@@ -153,10 +176,11 @@ class EpisodeGraph {
   }
 
   Traveller simulate(Traveller t) {
-    if (t.slot == nullptr) {
-      t.slot = slots_.take(make_slot_);
-      t.slot->begin(t.block);
-    }
+    const TaskOrder::Task start(order_, nullptr);
+    const bool first = t.slot == nullptr;
+    if (first) t.slot = slots_.take(make_slot_);
+    const TaskOrder::Task task(order_, t.slot);
+    if (first) t.slot->begin(t.block);
     const auto ends = [this] {
       if (stop_ && stop_()) stopped_ = true;
       return stopped_ || tbb::is_current_task_group_canceling();  // a throw elsewhere
@@ -167,6 +191,7 @@ class EpisodeGraph {
 
   /// True when that was the block's last piece.
   bool write(const Traveller& t) {
+    const TaskOrder::Task writer(order_, &summary_), task(order_, t.slot);
     const EpisodeRows piece = t.slot->piece();
     sink_.write(piece);
     const PieceCounts& counts = t.slot->counts();
@@ -188,6 +213,7 @@ class EpisodeGraph {
 
   const EpisodeOptions& options_;
   EpisodeShape shape_;
+  TaskOrder order_;
   EpisodeSink& sink_;
   const EpisodeProgress& progress_;
   const StopRequest& stop_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shards hold what they were given, where docs/datasets.md says; their bytes tell nothing of the order in which it came.
+// Shards hold what they were given where docs/datasets.md says, and the same bytes in whatever order it came.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// What oneTBB orders, told to the thread sanitizer: it cannot see into the distribution's library, which is not built with
+// it, and would call every hand-over a race. Nothing in other builds. Says no more than oneTBB promises (a task starts after
+// what spawned it, a graph's message arrives after it was sent, waiting ends after all tasks), so real races are still found.
+#pragma once
+
+#if defined(__SANITIZE_THREAD__)
+#include <sanitizer/tsan_interface.h>
+#endif
+
+namespace tangere {
+
+/// A function as oneTBB may copy it from task to task: a pointer is all that is copied.
+template <class Function>
+struct ByReference {
+  const Function* function;
+  template <class Argument>
+  void operator()(Argument& argument) const {
+    (*function)(argument);
+  }
+};
+
+/// What this thread did until now comes before what others do after ordered_after() of the same address.
+inline void ordered_before([[maybe_unused]] const void* address) {
+#if defined(__SANITIZE_THREAD__)
+  __tsan_release(const_cast<void*>(address));
+#endif
+}
+
+inline void ordered_after([[maybe_unused]] const void* address) {
+#if defined(__SANITIZE_THREAD__)
+  __tsan_acquire(const_cast<void*>(address));
+#endif
+}
+
+/// After graph.wait_for_all(): what the graph itself did in other threads, the last of it after our bodies, is over. Its tasks
+/// count themselves off in the header, so touching the counter here is enough.
+template <class Graph>
+void ordered_after_tasks_of([[maybe_unused]] Graph& graph) {
+#if defined(__SANITIZE_THREAD__)
+  graph.reserve_wait();
+  graph.release_wait();
+#endif
+}
+
+/// The tasks of one wait: each starts after begin(), and end() comes after all of them.
+class TaskOrder {
+ public:
+  void begin() const { ordered_before(&begin_); }
+  /// First thing in a task whose function itself, with what it captured, lives where begin() was called.
+  static void arrive() { ordered_after(&begin_); }
+  void end() const { ordered_after(&end_); }
+
+  /// While a task runs. `mine`: what tasks hand from one to the next and none uses at the same time as another.
+  class Task {
+   public:
+    Task(const TaskOrder& order, const void* mine) : order_(order), mine_(mine) {
+      arrive();
+      ordered_after(mine_);
+    }
+    ~Task() {
+      ordered_before(mine_);
+      ordered_before(&order_.end_);
+    }
+    Task(const Task&) = delete;
+    Task& operator=(const Task&) = delete;
+
+   private:
+    const TaskOrder& order_;
+    const void* mine_;
+  };
+
+ private:
+  static inline char begin_ = 0;  // addresses matter, nothing is in them
+  char end_ = 0;
+};
+
+}  // namespace tangere
