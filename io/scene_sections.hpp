@@ -6,6 +6,10 @@
 
 namespace tangere {
 
+/// A body in its joint's frame; files that it names are read.
+BodyDescription read_body(const SceneNode& node);
+/// Whether the pose of a mesh is given in the world instead.
+bool placed_in_world(const SceneNode& node, const BodyDescription& body);
 void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
 void read_sensors(Scene& scene, const SceneNode& section);
