@@ -228,7 +228,8 @@ class Compiler {
     } else {
       body.touchable = false;
       const std::vector<double> p = contact_points(shape);
-      for (std::size_t k = 0; k < p.size(); k += 3) body.size.x = std::max(body.size.x, std::hypot(p[k], p[k + 1], p[k + 2]));
+      for (std::size_t k = 0; k < p.size(); k += 3)
+        body.size.x = std::max(body.size.x, std::hypot(p[k], p[k + 1], p[k + 2]));
     }
   }
 

@@ -42,7 +42,7 @@ MassProperties of(const CapsuleShape& c, double density) {
 
 MassProperties of(const PlaneShape&, double) { return principal(0, 0, 0, 0); }
 
-/// Tetrahedra from the first vertex to every triangle, about that vertex: a body far from its frame's origin loses nothing.
+/// Tetrahedra from the first vertex to every triangle, about that vertex: far from its frame's origin a body loses nothing.
 /// With corners a, b, c: volume = a·(b × c)/6, ∫x = volume (a + b + c)/4,
 /// ∫x xᵀ = volume (aaᵀ + bbᵀ + ccᵀ + ssᵀ)/20, s = a + b + c.
 MassProperties of(const MeshShape& mesh, double density) {

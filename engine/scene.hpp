@@ -57,8 +57,8 @@ struct CylinderShape {
   int contact_angles = 8;         ///< points on a ring
   int contact_rings = 3;          ///< rings on a face, radii r k/rings
 };
-/// All points within `radius` of a segment of `length` along the body's z. Contact points: two poles, and rings around the
-/// straight part, ends included.
+/// All points within `radius` of a segment of `length` along the body's z. Contact points: two poles, and rings around
+/// the straight part, ends included.
 struct CapsuleShape {
   double length = 0, radius = 0;  ///< [m]; from pole to pole it is length + 2 radius
   int contact_rings = 5;
@@ -66,13 +66,13 @@ struct CapsuleShape {
 };
 /// The half-space z < 0 of the body frame: no mass, no contact points.
 struct PlaneShape {};
-/// A closed surface of triangles, corners anticlockwise seen from outside. Contact points: its vertices. Nothing touches
-/// its faces: it has no distance.
+/// A closed surface of triangles, corners anticlockwise seen from outside. Contact points: its vertices. Nothing
+/// touches its faces: it has no distance.
 struct MeshShape {
   std::vector<double> vertices;               ///< (n, 3), body frame [m]
   std::vector<std::array<int, 3>> triangles;
 };
-/// Known by its mass, inertia and contact points alone; without a distance. Its centre of mass is the body frame's origin.
+/// Known by its mass, inertia and contact points alone; no distance. Its centre of mass is the body frame's origin.
 struct AbstractShape {
   double mass = 0;                     ///< [kg]; density has no effect
   std::array<double, 6> inertia{};     ///< xx xy xz yy yz zz, body axes [kg m²]

@@ -152,8 +152,9 @@ bool placed_in_world(const SceneNode& node, const BodyDescription& body) {
   if (!std::holds_alternative<MeshShape>(body.shape)) return false;
   const int type = node.choice("transform_type", {"OBJ_TO_JOINT", "OBJ_TO_WORLD", "BODY_TO_JOINT"});
   if (type == 2)
-    node.fail("transform_type BODY_TO_JOINT places the mesh by its principal axes, whose directions are not determined; "
-              "supported: OBJ_TO_JOINT, OBJ_TO_WORLD");
+    node.fail(
+        "transform_type BODY_TO_JOINT places the mesh by its principal axes, whose directions are not determined; "
+        "supported: OBJ_TO_JOINT, OBJ_TO_WORLD");
   return type == 1;
 }
 

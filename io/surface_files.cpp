@@ -143,9 +143,10 @@ void check_closed(const MeshShape& mesh, const std::string& path) {
   };
   for (const auto& [edge, count] : surplus)
     if (count != 0)
-      throw InputError(fmt::format("{}: the surface is open, or its faces disagree on what is outside, at the edge from {} "
-                                   "to {}; expected a closed surface",
-                                   path, place(edge.first), place(edge.second)));
+      throw InputError(
+          fmt::format("{}: the surface is open, or its faces disagree on what is outside, at the edge from {} "
+                      "to {}; expected a closed surface",
+                      path, place(edge.first), place(edge.second)));
 }
 
 /// Six times the volume, from tetrahedra on the first vertex.
@@ -169,7 +170,8 @@ MeshShape read_obj(const std::string& path) {
   if (mesh.triangles.empty()) throw InputError(path + ": no faces; expected a closed surface");
   check_closed(mesh, path);
   const double volume = six_volumes(mesh) / 6;
-  if (volume < 0) throw InputError(path + ": the faces point inwards; expected anticlockwise corners seen from outside");
+  if (volume < 0)
+    throw InputError(path + ": the faces point inwards; expected anticlockwise corners seen from outside");
   if (!(volume > 0)) throw InputError(path + ": the surface encloses no volume");
   return mesh;
 }
@@ -177,7 +179,8 @@ MeshShape read_obj(const std::string& path) {
 std::vector<double> read_contact_points(const std::string& path) {
   WordReader file(path);
   if (!file.next()) throw InputError(path + ": empty; expected a count, then a line x y z per point");
-  if (file.words.size() != 1) file.fail(fmt::format("{} words; expected the number of points alone", file.words.size()));
+  if (file.words.size() != 1)
+    file.fail(fmt::format("{} words; expected the number of points alone", file.words.size()));
   const long count = file.integer(file.words[0], "the number of points");
   if (count < 1) file.fail(fmt::format("{} points; expected one or more", count));
   std::vector<double> points;

@@ -32,7 +32,7 @@ void append(const Lanes<A>& a, unsigned which, double* out) {
   for (; which != 0; which &= which - 1) *out++ = lanes[__builtin_ctz(which)];
 }
 
-/// Shape and pose are its own copies: what is stored to `points` could otherwise change them, for all the compiler knows.
+/// Shape and pose are its own copies: for all the compiler knows, storing to `points` could change them otherwise.
 template <class A, class Shape>
 int search_shape(const CandidateSearch& s, Shape shape) {
   using N = Lanes<A>;

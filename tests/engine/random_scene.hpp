@@ -52,8 +52,8 @@ inline Scene random_tree(unsigned seed, int links) {
   return s;
 }
 
-/// The same with every body that has contact points touching every other it can move against, and the ground in reach. A
-/// half-space is fixed in the world, or to the first link.
+/// The same with every body that has contact points touching every other it can move against, and the ground in reach.
+/// A half-space is fixed in the world, or to the first link.
 inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
   Scene s = random_tree(seed, links);
   Random random(seed + 1000);

@@ -107,7 +107,8 @@ TEST_F(SurfaceFiles, MovedAndShearedMeshesFollowTheirVertices) {
     for (auto& row : A.m)
       for (double& x : row) x = random.uniform(-1, 1);
     const auto& m = A.m;
-    const double det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+    const double det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+                       m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
                        m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
     if (det < 0.05) continue;
     const Vec3<double> b = random.vector(1000);
@@ -158,7 +159,8 @@ TEST_F(SurfaceFiles, WhatIsNoClosedSurfaceIsRefusedWithItsPlace) {
 }
 
 TEST_F(SurfaceFiles, ContactPointsFollowTheirCount) {
-  EXPECT_THAT(read_contact_points(write("p.txt", "2\n1 2 3\n\n-1e-3 0 5\n")), ::testing::ElementsAre(1, 2, 3, -1e-3, 0, 5));
+  EXPECT_THAT(read_contact_points(write("p.txt", "2\n1 2 3\n\n-1e-3 0 5\n")),
+              ::testing::ElementsAre(1, 2, 3, -1e-3, 0, 5));
   EXPECT_THAT(points_error("2\n1 2 3\n"), HasSubstr("p.txt: 1 points follow the count of 2"));
   EXPECT_THAT(points_error("1\n1 2 3\n4 5 6\n"), HasSubstr("2 points follow the count of 1"));
   EXPECT_THAT(points_error("1\n1 2\n"), HasSubstr("p.txt:2: 2 numbers; expected x y z"));
@@ -172,9 +174,11 @@ TEST_F(SurfaceFiles, ContactPointsFollowTheirCount) {
 /// A mesh whose origin is a corner moves exactly as the cuboid placed where the mesh is.
 TEST_F(SurfaceFiles, ACompiledMeshIsTheCuboidInItsPlace) {
   write("box.obj", kBox);
-  const std::string mesh = R"(<body name="a" type="mesh" filename="box.obj" density="2" quat="1 0 1 0" pos="1 2 3" transform_type=)";
+  const std::string mesh =
+      R"(<body name="a" type="mesh" filename="box.obj" density="2" quat="1 0 1 0" pos="1 2 3" transform_type=)";
   const Scene placed = scene(mesh + "\"OBJ_TO_JOINT\" scale=\"2 1 1\"/>").scene;
-  const Scene cuboid = scene(R"(<body name="a" type="cuboid" size="2 2 3" density="2" quat="1 0 1 0" pos="2.5 3 2"/>)").scene;
+  const Scene cuboid =
+      scene(R"(<body name="a" type="cuboid" size="2 2 3" density="2" quat="1 0 1 0" pos="2.5 3 2"/>)").scene;
   const auto a = compile(placed), b = compile(cuboid);
   const kernels::Link &x = a->links.back(), &y = b->links.back();
   EXPECT_NEAR(x.mass, y.mass, 1e-14);
@@ -184,7 +188,10 @@ TEST_F(SurfaceFiles, ACompiledMeshIsTheCuboidInItsPlace) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) EXPECT_NEAR(x.inertia.m[i][j], y.inertia.m[i][j], 1e-16);
   // In the world: the joint stands at (1 0 0) cm, turned by 90° about z.
-  const Scene world = scene(R"(<body name="a" type="mesh" filename="box.obj" quat="1 0 0 1" pos="1 5 0" transform_type="OBJ_TO_WORLD"/>)").scene;
+  const Scene world =
+      scene(
+          R"(<body name="a" type="mesh" filename="box.obj" quat="1 0 0 1" pos="1 5 0" transform_type="OBJ_TO_WORLD"/>)")
+          .scene;
   const Pose& pose = world.links[0].body.pose;
   EXPECT_NEAR(pose.position[0], 0.05, 1e-16);
   EXPECT_NEAR(pose.position[1], 0, 1e-16);
@@ -193,7 +200,8 @@ TEST_F(SurfaceFiles, ACompiledMeshIsTheCuboidInItsPlace) {
 
 TEST_F(SurfaceFiles, AnAbstractBodyIsWhatItsNumbersSay) {
   write("p.txt", "3\n1 0 0\n0 2 0\n0 0 3\n");
-  const SceneFile file = scene(R"(<body name="a" type="abstract" mass="5" inertia="2 0.1 0 3 0 4"><visual mesh="no.obj"/>
+  const SceneFile file =
+      scene(R"(<body name="a" type="abstract" mass="5" inertia="2 0.1 0 3 0 4"><visual mesh="no.obj"/>
 <collision contacts="p.txt" pos="0 0 1" quat="1 0 0 1"/></body>)");
   EXPECT_TRUE(file.warnings.empty());
   const auto& shape = std::get<AbstractShape>(file.scene.links[0].body.shape);
@@ -209,18 +217,27 @@ TEST_F(SurfaceFiles, AnAbstractBodyIsWhatItsNumbersSay) {
 
 TEST_F(SurfaceFiles, ScenesSayWhatIsWrongWithTheirBodies) {
   write("box.obj", kBox);
-  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj"/>)"), HasSubstr("s.xml:3: <body>: attribute 'transform_type' is missing"));
-  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj" transform_type="BODY_TO_JOINT"/>)"), HasSubstr("principal axes"));
-  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOIN"/>)"), HasSubstr("did you mean 'OBJ_TO_JOINT'"));
-  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" transform_type="OBJ_TO_JOINT"/>)"), HasSubstr("'filename' is missing"));
-  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj" scale="1 0 1" transform_type="OBJ_TO_JOINT"/>)"), HasSubstr("scale has 0"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj"/>)"),
+              HasSubstr("s.xml:3: <body>: attribute 'transform_type' is missing"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj" transform_type="BODY_TO_JOINT"/>)"),
+              HasSubstr("principal axes"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOIN"/>)"),
+              HasSubstr("did you mean 'OBJ_TO_JOINT'"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" transform_type="OBJ_TO_JOINT"/>)"),
+              HasSubstr("'filename' is missing"));
+  EXPECT_THAT(
+      scene_error(R"(<body name="a" type="mesh" filename="box.obj" scale="1 0 1" transform_type="OBJ_TO_JOINT"/>)"),
+      HasSubstr("scale has 0"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" inertia="1 1 1"/>)"), HasSubstr("'mass' is missing"));
-  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1"/>)"), HasSubstr("inertia has 2 numbers; expected 3"));
-  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1 3"/>)"), HasSubstr("inertia=\"1 1 3\" is that of no solid body"));
-  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 2 0 1 0 1"/>)"), HasSubstr("no solid body"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1"/>)"),
+              HasSubstr("inertia has 2 numbers; expected 3"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1 3"/>)"),
+              HasSubstr("inertia=\"1 1 3\" is that of no solid body"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 2 0 1 0 1"/>)"),
+              HasSubstr("no solid body"));
 }
 
-/// Without a distance a body can touch but not be touched, in a file and in a scene built in code; sensors do not feel it.
+/// Without a distance a body can touch but not be touched, in a file or in a scene built in code; no sensor feels it.
 TEST_F(SurfaceFiles, NothingTouchesAMesh) {
   write("box.obj", kBox);
   const std::string cans = R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOINT"/></link>
