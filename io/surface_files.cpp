@@ -57,10 +57,11 @@ class WordReader {
 
   [[nodiscard]] double position(std::size_t k) const {
     double x = 0;
-    const std::string_view word = words[k];
+    std::string_view word = words[k];
+    if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);  // the library knows no plus sign
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), x);
     if (error != std::errc() || end != word.data() + word.size() || !(std::abs(x) <= kLargestPosition))
-      fail(fmt::format("'{}'; expected a number of at most {:g}", word.substr(0, 40), kLargestPosition));
+      fail(fmt::format("'{}'; expected a number of at most {:g}", words[k].substr(0, 40), kLargestPosition));
     return x;
   }
   [[nodiscard]] long integer(std::string_view word, const char* expected) const {

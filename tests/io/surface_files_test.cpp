@@ -159,11 +159,12 @@ TEST_F(SurfaceFiles, WhatIsNoClosedSurfaceIsRefusedWithItsPlace) {
 }
 
 TEST_F(SurfaceFiles, ContactPointsFollowTheirCount) {
-  EXPECT_THAT(read_contact_points(write("p.txt", "2\n1 2 3\n\n-1e-3 0 5\n")),
+  EXPECT_THAT(read_contact_points(write("p.txt", "2\n1 +2 3\n\n-1e-3 0 5\n")),
               ::testing::ElementsAre(1, 2, 3, -1e-3, 0, 5));
   EXPECT_THAT(points_error("2\n1 2 3\n"), HasSubstr("p.txt: 1 points follow the count of 2"));
   EXPECT_THAT(points_error("1\n1 2 3\n4 5 6\n"), HasSubstr("2 points follow the count of 1"));
   EXPECT_THAT(points_error("1\n1 2\n"), HasSubstr("p.txt:2: 2 numbers; expected x y z"));
+  EXPECT_THAT(points_error("1\n1 2 +-3\n"), HasSubstr("p.txt:2: '+-3'"));
   EXPECT_THAT(points_error("1\n1 2 inf\n"), HasSubstr("p.txt:2: 'inf'"));
   EXPECT_THAT(points_error("x\n"), HasSubstr("p.txt:1: 'x'; expected the number of points"));
   EXPECT_THAT(points_error("0\n"), HasSubstr("p.txt:1: 0 points; expected one or more"));
