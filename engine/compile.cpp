@@ -61,7 +61,8 @@ class Compiler {
     body.frame = compose(joint.frame, to_frame(d.body.pose));
     place_shape(d.body.shape, body);
     const MassProperties properties = mass_properties(d.body.shape, d.body.density);
-    body.mass = body.shape == PrimitiveShape::plane ? 0 : properties.mass;
+    body.mass = properties.mass;
+    body.centre = properties.centre;
     if (!(body.mass >= 0) || !std::isfinite(body.mass))
       throw InputError(d.body.source.prefix() + "body '" + d.body.name + "' has mass " + std::to_string(body.mass) +
                        " kg; expected a finite one, zero or more");
@@ -83,8 +84,13 @@ class Compiler {
     } else if (const auto* capsule = std::get_if<CapsuleShape>(&shape)) {
       body.shape = PrimitiveShape::capsule;
       body.size = {capsule->radius, 0.5 * capsule->length, 0};
-    } else {
+    } else if (std::holds_alternative<PlaneShape>(shape)) {
       body.shape = PrimitiveShape::plane;
+    } else {
+      body.touchable = false;
+      const std::vector<double> p = contact_points(shape);
+      for (std::size_t k = 0; k < p.size(); k += 3)
+        body.size.x = std::max(body.size.x, std::hypot(p[k], p[k + 1], p[k + 2]));
     }
   }
 
@@ -114,14 +120,17 @@ class Compiler {
       const int b1 = bodies_.find("body", d.general_body, d.source);
       const int b2 = bodies_.find("body", d.primitive_body, d.source);
       const CompiledBody &first = m_.bodies[b1], &second = m_.bodies[b2];
-      const Shape& general = m_.scene.links[b1].body.shape;
-      std::vector<double> points = contact_points(general);
-      if (points.empty())
-        throw InputError(d.source.prefix() + "general_body '" + d.general_body + "' is a " + shape_name(general) +
-                         ", which has no contact points; expected a cuboid, cylinder or capsule (swap the two bodies)");
+      const Shape &general = m_.scene.links[b1].body.shape, &primitive = m_.scene.links[b2].body.shape;
+      if (!has_contact_points(general))
+        throw InputError(d.source.prefix() + "general_body '" + d.general_body + "' (" + shape_name(general) +
+                         ") has no contact points; expected a cuboid, cylinder or capsule (swap the two bodies)");
+      if (!has_distance(primitive))
+        throw InputError(d.source.prefix() + "primitive_body '" + d.primitive_body + "' (" + shape_name(primitive) +
+                         ") has no distance; expected a sphere, cuboid, cylinder, capsule or plane");
       if (b1 == b2 || first.link == second.link)
         throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" + d.primitive_body +
                          "' cannot move against each other");
+      std::vector<double> points = contact_points(general);
       double reach = 0;
       for (std::size_t k = 0; k < points.size(); k += 3) {
         const Vec3<double> p = first.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + first.frame.p;
@@ -175,13 +184,14 @@ class Compiler {
       const CompiledBody& body = m_.bodies[b];
       if (body.link < 0) throw InputError(d.source.prefix() + "body '" + d.body + "' is fixed in the world");
       kernels::GroundContact ground{};
-      std::vector<double> points = contact_points(m_.scene.links[b].body.shape);
-      if (body.shape == PrimitiveShape::plane)
-        throw InputError(d.source.prefix() + "body '" + d.body + "' is a plane, which has no contact points");
-      if (body.shape == PrimitiveShape::sphere) {
+      const Shape& shape = m_.scene.links[b].body.shape;
+      std::vector<double> points = contact_points(shape);
+      if (std::holds_alternative<SphereShape>(shape)) {
         points = {0, 0, 0};
         ground.radius = body.size.x;
       }
+      if (points.empty())
+        throw InputError(d.source.prefix() + "body '" + d.body + "' (" + shape_name(shape) + ") has no contact points");
       for (std::size_t k = 0; k < points.size(); k += 3) {
         const Vec3<double> p = body.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + body.frame.p;
         points[k] = p.x, points[k + 1] = p.y, points[k + 2] = p.z;
@@ -207,7 +217,7 @@ class Compiler {
       sensor.body = b;
       sensor.parameters = constants(d.coefficients);
       for (int t = 0; t < static_cast<int>(m_.bodies.size()); ++t)
-        if (m_.bodies[t].link != sensor.link) sensor.targets.push_back(t);
+        if (m_.bodies[t].link != sensor.link && m_.bodies[t].touchable) sensor.targets.push_back(t);
       m_.sensors.push_back(std::move(sensor));
       m_.sensor_info.push_back(std::move(info));
     }

@@ -16,8 +16,10 @@ namespace tangere {
 struct CompiledBody {
   int link = -1;
   kernels::Frame<double> frame;  ///< body frame in the link (or the world)
+  bool touchable = true;         ///< has a distance; else `shape` says nothing and size.x is its extent
   PrimitiveShape shape = PrimitiveShape::sphere;
   kernels::Vec3<double> size{};  ///< as in kernels::PairContact
+  kernels::Vec3<double> centre{};///< of mass, body frame [m]
   double mass = 0;               ///< [kg]
 };
 

@@ -58,6 +58,8 @@ std::vector<double> points_of(const CapsuleShape& shape) {
 
 std::vector<double> points_of(const SphereShape&) { return {}; }
 std::vector<double> points_of(const PlaneShape&) { return {}; }
+std::vector<double> points_of(const MeshShape& shape) { return shape.vertices; }
+std::vector<double> points_of(const AbstractShape& shape) { return shape.contact_points; }
 
 /// Splits the longest side of a range in half until it fits a tile. Full tiles first, so only the last is short.
 void split(const std::vector<double>& points, std::vector<int>& order, std::size_t begin, std::size_t end, int tile) {

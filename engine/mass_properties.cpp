@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mass and inertia of bodies of uniform density, in closed form.
+// Mass and inertia of bodies of uniform density: closed forms, and volume integrals of meshes.
 #include <cmath>
 
 #include "engine/compiled_model.hpp"
@@ -41,6 +41,37 @@ MassProperties of(const CapsuleShape& c, double density) {
 }
 
 MassProperties of(const PlaneShape&, double) { return principal(0, 0, 0, 0); }
+
+/// Tetrahedra from the first vertex to every triangle, about that vertex: far from its frame's origin a body loses nothing.
+/// With corners a, b, c: volume = a·(b × c)/6, ∫x = volume (a + b + c)/4,
+/// ∫x xᵀ = volume (aaᵀ + bbᵀ + ccᵀ + ssᵀ)/20, s = a + b + c.
+MassProperties of(const MeshShape& mesh, double density) {
+  using kernels::Vec3;
+  const auto vertex = [&](int k) {
+    const double* p = &mesh.vertices[3 * std::size_t(k)];
+    return Vec3<double>{p[0], p[1], p[2]};
+  };
+  const Vec3<double> origin = vertex(0);
+  double volume = 0;
+  Vec3<double> first = {0, 0, 0};
+  kernels::Mat3<double> second = kernels::zero33<double>();
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    const Vec3<double> a = vertex(t[0]) - origin, b = vertex(t[1]) - origin, c = vertex(t[2]) - origin, s = a + b + c;
+    const double part = dot(a, cross(b, c)) / 6;
+    volume += part;
+    first += (part / 4) * s;
+    second += (part / 20) * (outer(a, a) + outer(b, b) + outer(c, c) + outer(s, s));
+  }
+  const Vec3<double> centre = (1 / volume) * first;
+  second = density * (second - volume * outer(centre, centre));
+  const double trace = second.m[0][0] + second.m[1][1] + second.m[2][2];
+  return {density * volume, origin + centre, kernels::diagonal(trace) - second};
+}
+
+MassProperties of(const AbstractShape& a, double) {
+  const std::array<double, 6>& i = a.inertia;
+  return {a.mass, {0, 0, 0}, {{{i[0], i[1], i[2]}, {i[1], i[3], i[4]}, {i[2], i[4], i[5]}}}};
+}
 
 }  // namespace
 

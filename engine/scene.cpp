@@ -40,7 +40,7 @@ const char* to_string(ContactLaw value) {
 }
 
 const char* shape_name(const Shape& shape) {
-  constexpr const char* kNames[] = {"sphere", "cuboid", "cylinder", "capsule", "plane"};
+  constexpr const char* kNames[] = {"sphere", "cuboid", "cylinder", "capsule", "plane", "mesh", "abstract"};
   static_assert(std::size(kNames) == std::variant_size_v<Shape>);
   return kNames[shape.index()];
 }
@@ -65,6 +65,25 @@ bool dof_turns(JointType type, int k) {
     case JointType::free: return k >= 3;
     default: return false;
   }
+}
+
+bool has_distance(const Shape& shape) {
+  return !std::holds_alternative<MeshShape>(shape) && !std::holds_alternative<AbstractShape>(shape);
+}
+
+bool has_contact_points(const Shape& shape) {
+  if (const auto* mesh = std::get_if<MeshShape>(&shape)) return !mesh->vertices.empty();
+  if (const auto* abstract = std::get_if<AbstractShape>(&shape)) return !abstract->contact_points.empty();
+  return !std::holds_alternative<SphereShape>(shape) && !std::holds_alternative<PlaneShape>(shape);
+}
+
+bool is_inertia(const std::array<double, 6>& inertia) {
+  const auto& [xx, xy, xz, yy, yz, zz] = inertia;
+  // ∫ρ x xᵀ = ½ tr(I) 1 - I must be positive definite: leading minors.
+  const double half = 0.5 * (xx + yy + zz), a = half - xx, b = half - yy, c = half - zz;
+  const double second = a * b - xy * xy;
+  const double third = a * (b * c - yz * yz) - xy * (xy * c + yz * xz) - xz * (xy * yz + b * xz);
+  return a > 0 && second > 0 && third > 0;
 }
 
 int position_count(JointType type) {

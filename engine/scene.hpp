@@ -71,8 +71,8 @@ struct CylinderShape {
   int contact_angles = 8;         ///< points on a ring
   int contact_rings = 3;          ///< rings on a face, radii r k/rings
 };
-/// All points within `radius` of a segment of `length` along the body's z. Contact points: two poles, and rings around the
-/// straight part, ends included.
+/// All points within `radius` of a segment of `length` along the body's z. Contact points: two poles, and rings around
+/// the straight part, ends included.
 struct CapsuleShape {
   double length = 0, radius = 0;  ///< [m]; from pole to pole it is length + 2 radius
   int contact_rings = 5;
@@ -80,7 +80,20 @@ struct CapsuleShape {
 };
 /// The half-space z < 0 of the body frame: no mass, no contact points.
 struct PlaneShape {};
-using Shape = std::variant<SphereShape, CuboidShape, CylinderShape, CapsuleShape, PlaneShape>;
+/// A closed surface of triangles, corners anticlockwise seen from outside. Contact points: its vertices. Nothing
+/// touches its faces: it has no distance.
+struct MeshShape {
+  std::vector<double> vertices;               ///< (n, 3), body frame [m]
+  std::vector<std::array<int, 3>> triangles;
+};
+/// Known by its mass, inertia and contact points alone; no distance. Its centre of mass is the body frame's origin.
+struct AbstractShape {
+  double mass = 0;                     ///< [kg]; density has no effect
+  std::array<double, 6> inertia{};     ///< xx xy xz yy yz zz, body axes [kg m²]
+  std::vector<double> contact_points;  ///< (n, 3), body frame [m]
+};
+using Shape =
+    std::variant<SphereShape, CuboidShape, CylinderShape, CapsuleShape, PlaneShape, MeshShape, AbstractShape>;
 
 struct BodyDescription {
   std::string name;
@@ -232,6 +245,12 @@ const char* to_string(JointField value);
 
 /// Dof `k` of a joint type turns; it slides otherwise.
 bool dof_turns(JointType type, int k);
+/// Whether contact points may touch it, and whether it has such points itself.
+bool has_distance(const Shape& shape);
+bool has_contact_points(const Shape& shape);
+/// Whether xx xy xz yy yz zz can be the inertia of a body with volume: principal moments positive, none as large as the
+/// other two together.
+bool is_inertia(const std::array<double, 6>& inertia);
 
 /// Number of configuration coordinates and of velocity dofs of a joint type: free is 7 and 6.
 int position_count(JointType type);

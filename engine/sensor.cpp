@@ -22,6 +22,7 @@ int find_pressure_sign(const TactileDescription& d, const CompiledBody& body, co
   if (d.pressure_sign) return *d.pressure_sign;
   const RectArray& a = d.array;
   const Vec3<double> middle = 0.5 * (vec(a.corner0) + vec(a.corner1));
+  if (!body.touchable) return dot(normal, middle - body.centre) >= 0 ? 1 : -1;
   const Vec3<double> outward = kernels::with_distance<double>(
       body.shape, body.size, [&](const auto& shape) { return kernels::distance_at(shape, middle).n; });
   return dot(normal, outward) >= 0 ? 1 : -1;

@@ -17,7 +17,6 @@ namespace tangere {
 namespace {
 
 constexpr std::uintmax_t kLargestFile = 64U << 20;  // a scene is text written by people
-constexpr int kLargestResolution = 1000;            // contact points along one edge or around one ring
 constexpr int kDeepestTree = 200;
 
 const std::vector<std::string> kJointTypes = {"fixed",     "revolute",       "prismatic", "planar",
@@ -47,6 +46,7 @@ class TreeReader {
     unique("link", link.name, node);
     std::vector<SceneNode> inner;
     int joints = 0, bodies = 0;
+    bool in_world = false;  // whether the body's pose is given there
     for (const SceneNode& child : node.children({"joint", "body", "link"})) {
       if (child.name() == "joint") {
         if (++joints > 1) child.fail("a second joint in link '" + link.name + "'; expected one");
@@ -54,6 +54,8 @@ class TreeReader {
       } else if (child.name() == "body") {
         if (++bodies > 1) child.fail("a second body in link '" + link.name + "'; expected one");
         link.body = read_body(child);
+        unique("body", link.body.name, child);
+        in_world = placed_in_world(child, link.body);
       } else {
         inner.push_back(child);
       }
@@ -63,6 +65,7 @@ class TreeReader {
     const int index = static_cast<int>(scene_.links.size());
     const kernels::Frame<double> at = to_frame(link.joint.pose);
     world_.push_back(parent < 0 ? at : compose(world_[std::size_t(parent)], at));
+    if (in_world) link.body.pose = in_parent(link.body.pose, index);
     scene_.links.push_back(std::move(link));
     for (const SceneNode& child : inner) read_link(child, index, depth + 1);
   }
@@ -108,79 +111,6 @@ class TreeReader {
     const kernels::Frame<double> local = relative(world_[std::size_t(parent)], to_frame(pose));
     const kernels::Quat<double> q = quaternion_of(local.R);
     return {{local.p.x, local.p.y, local.p.z}, {q.w, q.x, q.y, q.z}};
-  }
-
-  BodyDescription read_body(const SceneNode& node) {
-    const double length = node.context().length;
-    BodyDescription body;
-    body.source = node.source();
-    body.name = node.text("name");
-    unique("body", body.name, node);
-    const std::vector<std::string> common = {"name", "type", "pos", "quat", "density", "mass", "rgba"};
-    std::vector<std::string> used = common;
-    std::vector<std::string> idle = {"scale", "general_contact_resolution", "general_contact_angle_resolution",
-                                     "general_contact_radius_resolution", "size", "radius", "length"};
-    const auto take = [&](const char* attribute) {
-      used.emplace_back(attribute);
-      idle.erase(std::find(idle.begin(), idle.end(), attribute));
-    };
-    const std::vector<std::string> types = {"sphere", "cuboid", "cylinder", "capsule", "plane", "mesh", "abstract"};
-    const int type = node.choice("type", types);
-    if (type == 0) {
-      take("radius");
-      body.shape = SphereShape{node.positive("radius") * length};
-    } else if (type == 1) {
-      take("size");
-      take("general_contact_resolution");
-      body.shape = read_cuboid(node, length);
-    } else if (type == 2) {
-      for (const char* a : {"length", "radius", "general_contact_angle_resolution", "general_contact_radius_resolution"})
-        take(a);
-      CylinderShape shape{node.positive("length") * length, node.positive("radius") * length};
-      shape.contact_angles = node.integer("general_contact_angle_resolution", 3, kLargestResolution, shape.contact_angles);
-      shape.contact_rings = node.integer("general_contact_radius_resolution", 1, kLargestResolution, shape.contact_rings);
-      body.shape = shape;
-    } else if (type == 3) {
-      for (const char* a : {"length", "radius", "general_contact_resolution"}) take(a);
-      CapsuleShape shape{node.positive("length") * length, node.positive("radius") * length};
-      const std::vector<int> n =
-          node.integers("general_contact_resolution", {shape.contact_rings, shape.contact_angles}, 2, kLargestResolution);
-      shape.contact_rings = n[0], shape.contact_angles = n[1];
-      body.shape = shape;
-    } else if (type == 4) {
-      body.shape = PlaneShape{};
-      used.erase(std::find(used.begin(), used.end(), "density"));
-      idle.emplace_back("density");
-    } else {
-      node.fail("bodies of type '" + types[std::size_t(type)] +
-                "' are not simulated by this version; supported: sphere, cuboid, cylinder, capsule, plane");
-    }
-    node.check_attributes(used, {"texture"}, idle);
-    body.pose.position = scaled(node.vector("pos", Vector3{0, 0, 0}), length);
-    body.pose.orientation = node.quaternion("quat");
-    body.density = node.positive("density", 1.0) * node.context().density;
-    if (node.has("mass")) {
-      if (node.number("mass") != 0) node.fail("mass=\"" + node.text("mass") + "\"; expected 0 (massless), or a density");
-      body.density = 0;
-    }
-    if (node.has("rgba")) {
-      const std::vector<double> c = node.numbers("rgba");
-      if (c.size() != 3 && c.size() != 4) node.fail(fmt::format("rgba has {} numbers; expected 3 or 4", c.size()));
-      std::copy(c.begin(), c.end(), body.rgba.begin());
-    }
-    return body;
-  }
-
-  static CuboidShape read_cuboid(const SceneNode& node, double length) {
-    CuboidShape shape;
-    shape.size = scaled(node.vector("size"), length);
-    for (double s : shape.size)
-      if (!(s > 0)) node.fail(fmt::format("size has the edge {} m; expected positive lengths", s));
-    const std::array<int, 3>& fallback = shape.contact_resolution;
-    const std::vector<int> n = node.integers("general_contact_resolution", {fallback.begin(), fallback.end()}, 2,
-                                             kLargestResolution);
-    std::copy(n.begin(), n.end(), shape.contact_resolution.begin());
-    return shape;
   }
 
   Scene& scene_;

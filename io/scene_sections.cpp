@@ -33,6 +33,8 @@ ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law) {
           node.not_negative("mu", 0.0), node.not_negative("damping", 0.0) * damping};
 }
 
+std::string with_article(const std::string& shape) { return (shape == "abstract" ? "an " : "a ") + shape + " body"; }
+
 double read_ramp(const SceneNode& node) {
   return node.has("ramp") ? node.not_negative("ramp") * node.context().length : 1e-5;
 }
@@ -56,8 +58,9 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       d.source = node.source();
       const int body = find_body(scene, node, "body");
       d.body = node.text("body");
-      if (std::holds_alternative<PlaneShape>(scene.links[std::size_t(body)].body.shape))
-        node.fail("body '" + d.body + "' is a plane, which has no contact points");
+      const Shape& shape = scene.links[std::size_t(body)].body.shape;
+      if (!has_contact_points(shape) && !std::holds_alternative<SphereShape>(shape))
+        node.fail("body '" + d.body + "' is " + with_article(shape_name(shape)) + ", which has no contact points");
       d.law = kLawOf[node.choice("law", kLaws, 2)];
       d.ramp = read_ramp(node);
       d.coefficients = read_coefficients(node, d.law);
@@ -72,11 +75,16 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       d.general_body = node.text("general_body");
       d.primitive_body = node.text("primitive_body");
       if (general == primitive) node.fail("body '" + d.general_body + "' against itself; expected two bodies");
-      const Shape& shape = scene.links[std::size_t(general)].body.shape;
-      if (std::holds_alternative<SphereShape>(shape) || std::holds_alternative<PlaneShape>(shape))
-        node.fail(fmt::format("general_body '{}' is a {}, which has no contact points; expected a cuboid, cylinder or "
-                              "capsule (swap the two bodies)",
-                              d.general_body, shape_name(shape)));
+      const Shape& points = scene.links[std::size_t(general)].body.shape;
+      if (!has_contact_points(points))
+        node.fail(fmt::format("general_body '{}' is {}, which has no contact points; {}", d.general_body,
+                              with_article(shape_name(points)),
+                              has_distance(points) ? "swap the two bodies" : "give it a <collision contacts>"));
+      const Shape& touched = scene.links[std::size_t(primitive)].body.shape;
+      if (!has_distance(touched))
+        node.fail(fmt::format("primitive_body '{}' is {}, which has no distance function; expected a sphere, cuboid, "
+                              "cylinder, capsule or plane",
+                              d.primitive_body, with_article(shape_name(touched))));
       d.law = kLawOf[node.choice("law", kLaws, 0)];
       d.ramp = read_ramp(node);
       d.coefficients = read_coefficients(node, d.law);

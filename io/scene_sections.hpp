@@ -8,6 +8,10 @@ namespace tangere {
 
 /// Damping, armature, spring and limits of a joint whose type is known.
 void read_joint_effects(const SceneNode& node, JointDescription& joint);
+/// A body in its joint's frame; files that it names are read.
+BodyDescription read_body(const SceneNode& node);
+/// Whether the pose of a mesh is given in the world instead.
+bool placed_in_world(const SceneNode& node, const BodyDescription& body);
 void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
 void read_sensors(Scene& scene, const SceneNode& section);

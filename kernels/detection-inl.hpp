@@ -32,9 +32,13 @@ void append(const Lanes<A>& a, unsigned which, double* out) {
   for (; which != 0; which &= which - 1) *out++ = lanes[__builtin_ctz(which)];
 }
 
+/// Shape and pose are its own copies: for all the compiler knows, storing to `points` could change them otherwise.
 template <class A, class Shape>
-int search_shape(const CandidateSearch& s, const Shape& shape, const Frame<Lanes<A>>& pose) {
+int search_shape(const CandidateSearch& s, Shape shape) {
   using N = Lanes<A>;
+  Frame<N> pose;
+  for (int i = 0; i < 9; ++i) pose.R.m[i / 3][i % 3] = N(s.pose[i]);
+  pose.p = {N(s.pose[9]), N(s.pose[10]), N(s.pose[11])};
   const PairContact& pair = *s.pair;
   const N margin(s.margin);
   double *x = s.points, *y = x + s.stride, *z = y + s.stride;
@@ -62,12 +66,8 @@ int search_shape(const CandidateSearch& s, const Shape& shape, const Frame<Lanes
 
 template <class A>
 int search_candidates(const CandidateSearch& s) {
-  using N = Lanes<A>;
-  Frame<N> pose;
-  for (int i = 0; i < 9; ++i) pose.R.m[i / 3][i % 3] = N(s.pose[i]);
-  pose.p = {N(s.pose[9]), N(s.pose[10]), N(s.pose[11])};
-  return with_distance<N>(s.pair->shape, s.pair->size,
-                          [&](const auto& shape) { return search_shape<A>(s, shape, pose); });
+  return with_distance<Lanes<A>>(s.pair->shape, s.pair->size,
+                                 [&]<class Shape>(const Shape& shape) { return search_shape<A, Shape>(s, shape); });
 }
 
 /// Rows of eight lanes from the lanes' own lists; shorter ones end in far points.

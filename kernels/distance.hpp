@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Signed distances of primitive shapes, with gradient and Hessian, over any number type.
-// d < 0 inside; n = ∇d is a unit vector everywhere, chosen where the distance has a kink (centre, axis, edges, corners).
+// d < 0 inside; n = ∇d is a unit vector everywhere, chosen where the distance has a kink (centre, axis, edge, corner).
 #pragma once
 
 #include "kernels/contact_types.hpp"
@@ -99,8 +99,8 @@ auto nearer_than(const CuboidDistance<N>& shape, const Vec3<N>& y, const N& m) {
   return dot(out, out) < m * m;
 }
 
-/// Beyond this distance from a half-space's origin there is nothing [m]: what fills up candidate lists lies at 1e6 m and
-/// must not touch it.
+/// Beyond this distance from a half-space's origin there is nothing [m]: what fills up candidate lists lies at 1e6 m
+/// and must not touch it.
 inline constexpr double kPlaneReach = 5e5;
 
 /// The half-space z < 0: d = z, n = z, H = 0.

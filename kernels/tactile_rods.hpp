@@ -5,7 +5,7 @@
 //   half-space: d = [y_z] + e_z
 //   cylinder:   side as a sphere in the plane: ρ² - r² = e_x(e_x + 2 y_x) + e_y(e_y + 2 y_y) + [y_x² + y_y² - r²];
 //               caps: d = max([y_z - h] + e_z, [-y_z - h] - e_z)
-//   capsule:    |D|² - r² about the nearest point of the axis: beside it as the cylinder's side, beyond an end at z = ±h
+//   capsule:    |D|² - r² about the nearest point of the axis: beside it as the cylinder's side, beyond an end, z = ±h
 //               [y_x² + y_y² + (y_z ∓ h)² - r²] + e_x(…) + e_y(…) + e_z(e_z + 2 [y_z ∓ h])
 #pragma once
 

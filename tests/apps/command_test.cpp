@@ -55,6 +55,18 @@ TEST(Command, HelpEndsWithAnExampleThatWorks) {
   EXPECT_THAT(folder.files(), testing::ElementsAre("ball.h5", "ball.svg", "balls", "scenes", "speed.svg"));
 }
 
+TEST(Command, EveryBodyTypeIsInspectedSimulatedAndDrawn) {
+  const Folder folder;
+  const std::string shapes = TANGERE_SOURCE_DIR "/tests/data/scenes/shapes.xml";
+  const Outcome inspected = run(folder, {"inspect", shapes});
+  EXPECT_EQ(inspected.exit_code, 0) << inspected.err;
+  for (const char* name : {"cuboid", "cylinder", "capsule", "plane", "mesh", "abstract"})
+    EXPECT_THAT(inspected.out, HasSubstr(name));
+  const Outcome simulated = run(folder, {"simulate", shapes, "-o", "s.h5", "--json"});
+  EXPECT_EQ(simulated.exit_code, 0) << simulated.err;
+  EXPECT_EQ(run(folder, {"plot", "s.h5", "-o", "s.svg"}).exit_code, 0);
+}
+
 TEST(Command, ThePageNamesEveryOption) {
   const Folder folder;
   std::ifstream file(TANGERE_SOURCE_DIR "/docs/command.md");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a body's shape comes to: mass by integration along its axis, where its contact points lie, how it rests and rolls.
+// What a body's shape comes to: mass by integration along its axis, where its contact points lie, how it rests.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,8 @@ using testing::q_of;
 using testing::v_of;
 
 /// Discs of radius R(z), summed by Simpson's rule from piece to piece: mass, I_xx, I_zz.
-std::array<double, 3> integrate(double density, const std::vector<double>& pieces, const std::function<double(double)>& R) {
+std::array<double, 3> integrate(double density, const std::vector<double>& pieces,
+                                const std::function<double(double)>& R) {
   std::array<double, 3> sum{};
   constexpr int kCells = 400;
   for (std::size_t p = 0; p + 1 < pieces.size(); ++p)
@@ -125,10 +126,12 @@ TEST(Shapes, ACylinderRestsOnAPlane) {
 TEST(Shapes, APlateRestsOnRods) {
   for (const Shape& rod : {Shape(CylinderShape{0.4, 0.02}), Shape(CapsuleShape{0.4, 0.02})}) {
     Scene s;
-    s.links = {link("left", JointType::fixed, {-0.05, 0, 0}, rod, 1), link("right", JointType::fixed, {0.05, 0, 0}, rod, 1),
+    s.links = {link("left", JointType::fixed, {-0.05, 0, 0}, rod, 1),
+               link("right", JointType::fixed, {0.05, 0, 0}, rod, 1),
                link("plate", JointType::free, {0, 0, 0.0249}, CuboidShape{{0.1, 0.1, 0.01}, {3, 3, 2}}, 1000)};
     for (LinkDescription& l : s.links)
-      if (l.joint.type == JointType::fixed) l.body.pose.orientation = {std::sqrt(0.5), std::sqrt(0.5), 0, 0};  // along y
+      if (l.joint.type == JointType::fixed)
+        l.body.pose.orientation = {std::sqrt(0.5), std::sqrt(0.5), 0, 0};  // along y
     for (const char* name : {"left", "right"})
       s.pair_contacts.push_back({"plate", name, {300, 5, 0.5, 100}, ContactLaw::clamped, 1e-5, {}});
     const Model model(s);

@@ -94,8 +94,8 @@ Touch<double> random_pose(Random& random) {
   return t;
 }
 
-/// A shape that is sunk in the pad somewhere, in any orientation, moving. Half-spaces leave a part of the pad free. Rods are
-/// sunk to half their radius: near the axis the normal turns with the last digit of the position, in any precision.
+/// A shape that is sunk in the pad somewhere, in any orientation, moving. Half-spaces leave a part of the pad free. Rods
+/// are sunk to half their radius: near the axis the normal turns with the last digit of the position, in any precision.
 Touch<double> random_touch(Random& random, const TouchShape& s) {
   const bool rod = s.shape == PrimitiveShape::cylinder || s.shape == PrimitiveShape::capsule;
   for (;;) {
@@ -215,7 +215,8 @@ void check_tiles(const Case& c) {
   Random random(6);
   for (const KernelTable* table : kernels::available_kernels()) {
     const PoisonedPad pad;
-    const auto got = field<Real>(*table, pad.tiles, c.law, {shape_of(c.shape)}, {random_touch(random, shape_of(c.shape))});
+    const auto got =
+        field<Real>(*table, pad.tiles, c.law, {shape_of(c.shape)}, {random_touch(random, shape_of(c.shape))});
     ASSERT_GT(got.active.size(), 0u);
     ASSERT_LT(got.active.size(), std::size_t(pad.tiles.tiles()));
     EXPECT_TRUE(std::is_sorted(got.active.begin(), got.active.end()));
@@ -298,7 +299,7 @@ TEST_P(TactileKernel, AxesThatAreNotQuitePerpendicularGetTheirOwnComponents) {
   }
 }
 
-/// The axis of a rod through a point of the pad, along and across it; a corner of the rim in the pad; a face in the pad's
+/// The axis of a rod through a point of the pad, along and across it; a corner of the rim in the pad; a face in its
 /// plane: finite forces, the same as one point at a time in double precision.
 TEST_P(TactileKernel, KinksHaveTheForceOfOnePoint) {
   const TouchShape shape = shape_of(GetParam().shape);

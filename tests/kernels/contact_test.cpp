@@ -56,7 +56,8 @@ Vec3<double> point_under(PrimitiveShape shape, Random& random, double depth) {
     case PrimitiveShape::cuboid: return {0.025 - depth, along, random.uniform(-0.008, 0.008)};
     case PrimitiveShape::plane: return {along, 10 * along, -depth};
     case PrimitiveShape::cylinder:
-      return face < 0.5 ? (0.015 - depth) * z + (1 + along) * 0.01 * radial : (0.02 - depth) * radial + along * Vec3<double>{0, 0, 1};
+      return face < 0.5 ? (0.015 - depth) * z + (1 + along) * 0.01 * radial
+                        : (0.02 - depth) * radial + along * Vec3<double>{0, 0, 1};
     case PrimitiveShape::capsule: break;
   }
   Vec3<double> end = random.direction();

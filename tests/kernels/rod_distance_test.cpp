@@ -34,7 +34,8 @@ Real least(const F& f, Real a, Real b) {
   int best = 0;
   for (int k = 1; k <= kSamples; ++k)
     if (f(a + (b - a) * k / kSamples) < f(a + (b - a) * best / kSamples)) best = k;
-  Real low = a + (b - a) * std::max(best - 1, 0) / kSamples, high = a + (b - a) * std::min(best + 1, kSamples) / kSamples;
+  Real low = a + (b - a) * std::max(best - 1, 0) / kSamples,
+       high = a + (b - a) * std::min(best + 1, kSamples) / kSamples;
   for (int k = 0; k < 160; ++k) {
     const Real third = (high - low) / 3;
     (f(low + third) < f(high - third) ? high : low) += f(low + third) < f(high - third) ? -third : third;
@@ -55,7 +56,8 @@ Real reference(PrimitiveShape shape, const Vec3<double>& y) {
       found = std::min(found, least([&](Real a) { return to(a, end); }, 0, r));
     } else {
       const Real sign = end < 0 ? -1 : 1;
-      found = std::min(found, least([&](Real t) { return to(r * std::cos(t), end + sign * r * std::sin(t)); }, 0, quarter));
+      found =
+          std::min(found, least([&](Real t) { return to(r * std::cos(t), end + sign * r * std::sin(t)); }, 0, quarter));
       inside = inside || to(0, end) < r;
     }
   }
@@ -69,13 +71,15 @@ double length(const Vec3<double>& a) { return std::sqrt(dot(a, a)); }
 
 class RodDistance : public ::testing::TestWithParam<PrimitiveShape> {};
 
-/// Random places, and all the places where two formulas meet: axis, ends, faces, rim, seams, origin; also very near them.
+/// Random places, and all the places where two formulas meet: axis, ends, faces, rim, seams, origin; and very near.
 std::vector<Vec3<double>> special_places() {
   std::vector<Vec3<double>> places;
   for (const double rho : {0.0, 1e-300, 1e-160, 1e-20, 0.1, kRadius, std::nextafter(kRadius, 1), kRadius + 1e-9, 0.6})
-    for (const double z : {0.0, 1e-300, 0.2, kHalf - kRadius, kHalf, std::nextafter(kHalf, 1), kHalf + 1e-9, kHalf + kRadius, 2.0})
+    for (const double z :
+         {0.0, 1e-300, 0.2, kHalf - kRadius, kHalf, std::nextafter(kHalf, 1), kHalf + 1e-9, kHalf + kRadius, 2.0})
       for (const double sign : {-1.0, 1.0})
-        for (const double angle : {0.0, 2.0}) places.push_back({rho * std::cos(angle), rho * std::sin(angle), sign * z});
+        for (const double angle : {0.0, 2.0})
+          places.push_back({rho * std::cos(angle), rho * std::sin(angle), sign * z});
   return places;
 }
 
@@ -190,8 +194,8 @@ TEST_P(RodDistance, KinksHaveTheirChosenNormal) {
   }
 }
 
-/// Lanes of every instruction set, and lanes alone, against plain double; AVX2 and AVX-512 bit for bit; NaN stays in its
-/// lane.
+/// Lanes of every instruction set, and lanes alone, against plain double; AVX2 and AVX-512 bit for bit; NaN stays in
+/// its lane.
 TEST_P(RodDistance, LanesAgreeOnEveryInstructionSet) {
   Random random(35);
   std::vector<Vec3<double>> places = special_places();

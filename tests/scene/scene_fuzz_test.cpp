@@ -62,9 +62,11 @@ class Mutator {
 
 TEST(SceneFuzz, TwoThousandMutantsAreReadOrRefused) {
   const std::string rods = testing::with(
-      "type=\"sphere\" radius=\"0.02\"", "type=\"capsule\" length=\"0.03\" radius=\"0.02\" general_contact_resolution=\"3 5\"",
+      "type=\"sphere\" radius=\"0.02\"",
+      "type=\"capsule\" length=\"0.03\" radius=\"0.02\" general_contact_resolution=\"3 5\"",
       testing::with("type=\"cuboid\" size=\"0.05 0.05 0.01\"", "type=\"cylinder\" length=\"0.01\" radius=\"0.05\""));
-  const std::string sources[] = {testing::kScene, rods, file_text(std::string(TANGERE_TEST_DATA) + "/scenes/two_balls.xml"),
+  const std::string sources[] = {testing::kScene, rods,
+                                 file_text(std::string(TANGERE_TEST_DATA) + "/scenes/two_balls.xml"),
                                  file_text(std::string(TANGERE_TEST_DATA) + "/scenes/published_dialect_pad.xml"),
                                  file_text(std::string(TANGERE_TEST_DATA) + "/scenes/every_joint.xml"),
                                  file_text(std::string(TANGERE_SOURCE_DIR) + "/scenes/rolling_ball_small.xml")};
@@ -78,7 +80,8 @@ TEST(SceneFuzz, TwoThousandMutantsAreReadOrRefused) {
         if (auto* box = std::get_if<CuboidShape>(&l.body.shape))
           for (int& n : box->contact_resolution) n = std::min(n, 12);
         if (auto* rod = std::get_if<CapsuleShape>(&l.body.shape)) rod->contact_rings = std::min(rod->contact_rings, 12);
-        if (auto* rod = std::get_if<CylinderShape>(&l.body.shape)) rod->contact_rings = std::min(rod->contact_rings, 12);
+        if (auto* rod = std::get_if<CylinderShape>(&l.body.shape))
+          rod->contact_rings = std::min(rod->contact_rings, 12);
       }
       for (TactileDescription& t : file.scene.sensors) {
         t.array.rows = std::min(t.array.rows, 64);

@@ -60,6 +60,12 @@ TEST(SceneReader, EveryShippedSceneCompiles) {
     EXPECT_EQ(model.sensors()[0].every, 5);
   }
   EXPECT_EQ(Model(read_scene(kFolder + "two_balls.xml").scene).sensors()[0].points, 63);
+  const Model shapes(read_scene(kFolder + "shapes.xml").scene);
+  EXPECT_EQ(shapes.contacts()[0].points, 2 * (1 + 24));
+  EXPECT_EQ(shapes.contacts()[1].points, 2 + 4 * 24);
+  EXPECT_EQ(shapes.contacts()[2].points, 6);
+  EXPECT_EQ(shapes.contacts()[3].points, 3);
+  EXPECT_NEAR(shapes.mass(4), 600 * 0.5 * 0.04 * 0.06 * 0.02, 1e-15);
 }
 
 TEST(SceneReader, ExtensionsComeThrough) {
@@ -139,7 +145,8 @@ TEST(SceneReader, CentimetresAndGramsGiveTheSameScene) {
 
 TEST(SceneReader, RodsAndPlanesInEitherUnit) {
   const auto read = [](const char* unit, const std::string& bodies) {
-    return parse_scene("<redmax><option unit=\"" + std::string(unit) + "\"/><robot>" + bodies + "</robot></redmax>", "s.xml");
+    return parse_scene("<redmax><option unit=\"" + std::string(unit) + "\"/><robot>" + bodies + "</robot></redmax>",
+                       "s.xml");
   };
   const std::string link = R"(<link name="$"><joint name="$" type="free3d"/><body name="$" type=)";
   const auto body = [&](const std::string& name, const std::string& rest) {
@@ -147,8 +154,9 @@ TEST(SceneReader, RodsAndPlanesInEitherUnit) {
     for (std::size_t at = 0; (at = text.find('$')) != std::string::npos;) text.replace(at, 1, name);
     return text;
   };
-  const SceneFile cm = read("cm-g", body("a", R"("cylinder" length="4" radius="1.5" density="2")") +
-                                        body("b", R"("capsule" length="6" radius="0.5" general_contact_resolution="3 7")"));
+  const SceneFile cm =
+      read("cm-g", body("a", R"("cylinder" length="4" radius="1.5" density="2")") +
+                       body("b", R"("capsule" length="6" radius="0.5" general_contact_resolution="3 7")"));
   EXPECT_TRUE(cm.warnings.empty());
   const auto& cylinder = std::get<CylinderShape>(cm.scene.links[0].body.shape);
   EXPECT_DOUBLE_EQ(cylinder.length, 0.04);
@@ -161,8 +169,10 @@ TEST(SceneReader, RodsAndPlanesInEitherUnit) {
   EXPECT_EQ(capsule.contact_angles, 7);
   EXPECT_NEAR(Model(cm.scene).mass(0), 2000 * M_PI * 0.015 * 0.015 * 0.04, 1e-15);
 
-  const std::string floor = R"(<link name="f"><joint name="f" type="fixed" quat="1 0 1 0"/><body name="f" type="plane" radius="3"/></link>)";
-  const std::string file = body("a", R"("cylinder" length="0.04" radius="0.015" general_contact_angle_resolution="12" general_contact_radius_resolution="1")") + floor;
+  const std::string floor =
+      R"(<link name="f"><joint name="f" type="fixed" quat="1 0 1 0"/><body name="f" type="plane" radius="3"/></link>)";
+  const std::string rings = R"( general_contact_angle_resolution="12" general_contact_radius_resolution="1")";
+  const std::string file = body("a", R"("cylinder" length="0.04" radius="0.015")" + rings) + floor;
   const SceneFile si = read("m-kg", file);
   ASSERT_EQ(si.warnings.size(), 1U);
   EXPECT_THAT(si.warnings[0], HasSubstr("'radius' has no effect"));
