@@ -37,28 +37,6 @@ const char* to_string(ContactLaw value) {
   return "unknown";
 }
 
-const char* to_string(JointField value) {
-  switch (value) {
-    case JointField::damping: return "damping";
-    case JointField::armature: return "armature";
-    case JointField::stiffness: return "stiffness";
-    case JointField::lim_stiffness: return "lim_stiffness";
-    case JointField::P: return "P";
-    case JointField::D: return "D";
-  }
-  return "unknown";
-}
-
-bool dof_turns(JointType type, int k) {
-  switch (type) {
-    case JointType::revolute:
-    case JointType::spherical: return true;
-    case JointType::free2d: return k == 2;
-    case JointType::free: return k >= 3;
-    default: return false;
-  }
-}
-
 int position_count(JointType type) {
   switch (type) {
     case JointType::fixed: return 0;
@@ -78,6 +56,28 @@ int dof_count(JointType type) {
     case JointType::spherical: return 3;
     case JointType::free: return 6;
     default: return position_count(type);
+  }
+}
+
+const char* to_string(JointField value) {
+  switch (value) {
+    case JointField::damping: return "damping";
+    case JointField::armature: return "armature";
+    case JointField::stiffness: return "stiffness";
+    case JointField::lim_stiffness: return "lim_stiffness";
+    case JointField::P: return "P";
+    case JointField::D: return "D";
+  }
+  return "unknown";
+}
+
+bool dof_turns(JointType type, int k) {
+  switch (type) {
+    case JointType::revolute:
+    case JointType::spherical: return true;
+    case JointType::free2d: return k == 2;
+    case JointType::free: return k >= 3;
+    default: return false;
   }
 }
 

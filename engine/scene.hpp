@@ -211,13 +211,14 @@ struct Scene {
 const char* to_string(Integrator value);
 const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
-const char* to_string(JointField value);
-
-/// Dof `k` of a joint type turns; it slides otherwise.
-bool dof_turns(JointType type, int k);
 
 /// Number of configuration coordinates and of velocity dofs of a joint type: free is 7 and 6.
 int position_count(JointType type);
 int dof_count(JointType type);
+
+/// Dof `k` of a joint type turns; it slides otherwise.
+bool dof_turns(JointType type, int k);
+
+const char* to_string(JointField value);  ///< "damping", "P" …
 
 }  // namespace tangere

@@ -2,8 +2,6 @@
 // Scenes for tests, built in code: seeded random trees with every joint kind, touching bodies, ground.
 #pragma once
 
-#include <cmath>
-
 #include "engine/scene.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
@@ -48,61 +46,6 @@ inline Scene random_tree(unsigned seed, int links) {
   return s;
 }
 
-/// Damping, armature, a spring and limits, each with probability `share`; coordinates of tests lie around the limits.
-inline JointEffects random_effects(Random& random, double share) {
-  const auto maybe = [&](double low, double high) {
-    const double x = random.uniform(low, high);
-    return random.uniform(0, 1) < share ? x : 0;
-  };
-  JointEffects e;
-  e.damping = maybe(0.01, 0.1);
-  e.armature = maybe(0.001, 0.05);
-  e.stiffness = maybe(1, 20);
-  e.limit_stiffness = maybe(10, 200);
-  const double middle = random.uniform(-0.02, 0.02);
-  e.limits = {middle - random.uniform(0, 0.05), middle + random.uniform(0, 0.05)};
-  return e;
-}
-
-/// The bodies that have something with mass on them lose theirs, some of them.
-inline void drop_masses(Scene& s, Random& random) {
-  std::vector<char> carries(s.links.size(), 0);
-  for (std::size_t i = s.links.size(); i-- > 0;) {
-    BodyDescription& body = s.links[i].body;
-    if (carries[i] != 0 && random.uniform(0, 1) < 0.3) body.density = 0;
-    if (body.density > 0 && s.links[i].parent >= 0) carries[std::size_t(s.links[i].parent)] = 1;
-  }
-}
-
-/// A tree in which every effect of a joint occurs, motors of both kinds and massless bodies too.
-inline Scene random_machine(unsigned seed, int links) {
-  Scene s = random_tree(seed, links);
-  Random random(seed + 5000);
-  for (LinkDescription& l : s.links) {
-    static_cast<JointEffects&>(l.joint) = random_effects(random, 0.5);
-    const int n = dof_count(l.joint.type);
-    if (random.uniform(0, 1) < 0.5)
-      for (int k = 0; k < n; ++k) l.joint.rest.push_back(random.uniform(-0.3, 0.3));
-    if (l.joint.type == JointType::free || l.joint.type == JointType::free2d) {
-      if (random.uniform(0, 1) < 0.5) l.joint.turning = random_effects(random, 0.8);
-      continue;
-    }
-    const int kind = random.integer(0, 3);
-    if (n == 0 || kind == 0) continue;
-    MotorDescription motor{l.joint.name, -2, 3, {}};
-    if (kind > 1) {
-      motor.control = MotorControl::position;
-      motor.P = random.uniform(1, 10);
-      motor.D = random.uniform(0, 0.1);
-      motor.low = kind == 2 ? -HUGE_VAL : random.uniform(-2, -0.5);  // clipped about as often as not
-      motor.high = kind == 2 ? HUGE_VAL : random.uniform(0.5, 2);
-    }
-    s.motors.push_back(motor);
-  }
-  drop_masses(s, random);
-  return s;
-}
-
 /// The same with every cuboid touching every other body it can move against, and the ground in reach.
 inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
   Scene s = random_tree(seed, links);
@@ -112,19 +55,13 @@ inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
     return ContactCoefficients{random.uniform(50, 500), random.uniform(0.1, 2), random.uniform(0.2, 1.2),
                                law == ContactLaw::linear ? random.uniform(0, 0.1) : random.uniform(0, 10)};
   };
-  // The link that a body moves with, -1 the world: bodies on fixed joints follow what they hang on.
-  std::vector<int> moves_with;
-  for (const LinkDescription& l : s.links)
-    moves_with.push_back(l.joint.type != JointType::fixed ? static_cast<int>(moves_with.size())
-                         : l.parent < 0                   ? -1
-                                                          : moves_with[std::size_t(l.parent)]);
-  for (std::size_t a = 0; a < s.links.size(); ++a) {
-    const BodyDescription& first = s.links[a].body;
-    if (moves_with[a] >= 0) s.ground_contacts.push_back({first.name, coefficients(), law, 1e-5, {}});
-    if (!std::holds_alternative<CuboidShape>(first.shape)) continue;
-    for (std::size_t b = 0; b < s.links.size(); ++b)
-      if (moves_with[a] != moves_with[b])
-        s.pair_contacts.push_back({first.name, s.links[b].body.name, coefficients(), law, 1e-5, {}});
+  for (const LinkDescription& a : s.links) {
+    if (a.joint.type == JointType::fixed) continue;  // may not move against what it hangs on
+    s.ground_contacts.push_back({a.body.name, coefficients(), law, 1e-5, {}});
+    if (!std::holds_alternative<CuboidShape>(a.body.shape)) continue;
+    for (const LinkDescription& b : s.links)
+      if (b.name != a.name && b.joint.type != JointType::fixed)
+        s.pair_contacts.push_back({a.body.name, b.body.name, coefficients(), law, 1e-5, {}});
   }
   return s;
 }
