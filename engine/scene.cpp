@@ -45,28 +45,6 @@ const char* shape_name(const Shape& shape) {
   return kNames[shape.index()];
 }
 
-const char* to_string(JointField value) {
-  switch (value) {
-    case JointField::damping: return "damping";
-    case JointField::armature: return "armature";
-    case JointField::stiffness: return "stiffness";
-    case JointField::lim_stiffness: return "lim_stiffness";
-    case JointField::P: return "P";
-    case JointField::D: return "D";
-  }
-  return "unknown";
-}
-
-bool dof_turns(JointType type, int k) {
-  switch (type) {
-    case JointType::revolute:
-    case JointType::spherical: return true;
-    case JointType::free2d: return k == 2;
-    case JointType::free: return k >= 3;
-    default: return false;
-  }
-}
-
 bool has_distance(const Shape& shape) {
   return !std::holds_alternative<MeshShape>(shape) && !std::holds_alternative<AbstractShape>(shape);
 }
@@ -105,6 +83,28 @@ int dof_count(JointType type) {
     case JointType::spherical: return 3;
     case JointType::free: return 6;
     default: return position_count(type);
+  }
+}
+
+const char* to_string(JointField value) {
+  switch (value) {
+    case JointField::damping: return "damping";
+    case JointField::armature: return "armature";
+    case JointField::stiffness: return "stiffness";
+    case JointField::lim_stiffness: return "lim_stiffness";
+    case JointField::P: return "P";
+    case JointField::D: return "D";
+  }
+  return "unknown";
+}
+
+bool dof_turns(JointType type, int k) {
+  switch (type) {
+    case JointType::revolute:
+    case JointType::spherical: return true;
+    case JointType::free2d: return k == 2;
+    case JointType::free: return k >= 3;
+    default: return false;
   }
 }
 

@@ -241,10 +241,7 @@ const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
 /// "sphere", "cuboid" …
 const char* shape_name(const Shape& shape);
-const char* to_string(JointField value);
 
-/// Dof `k` of a joint type turns; it slides otherwise.
-bool dof_turns(JointType type, int k);
 /// Whether contact points may touch it, and whether it has such points itself.
 bool has_distance(const Shape& shape);
 bool has_contact_points(const Shape& shape);
@@ -255,5 +252,10 @@ bool is_inertia(const std::array<double, 6>& inertia);
 /// Number of configuration coordinates and of velocity dofs of a joint type: free is 7 and 6.
 int position_count(JointType type);
 int dof_count(JointType type);
+
+/// Dof `k` of a joint type turns; it slides otherwise.
+bool dof_turns(JointType type, int k);
+
+const char* to_string(JointField value);  ///< "damping", "P" …
 
 }  // namespace tangere

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/engine/dense_dynamics.hpp"
-#include "tests/engine/random_scene.hpp"
+#include "tests/engine/random_machine.hpp"
 #include "tests/engine/stage_buffers.hpp"
 
 namespace tangere {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "kernels/dual.hpp"
-#include "tests/engine/random_scene.hpp"
+#include "tests/engine/random_machine.hpp"
 #include "tests/engine/stage_buffers.hpp"
 
 namespace tangere {
@@ -84,6 +84,22 @@ TEST(Jacobian, MachinesMatchDualNumbers) {
       compare_with_dual_numbers(*m, b, 1e-11);
     }
   }
+}
+
+TEST(Jacobian, ContactsWithFixedBodiesMatchDualNumbers) {
+  int touched = 0;
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    const auto m = compile(testing::random_machine_on_a_base(seed, 3 + static_cast<int>(seed % 5)));
+    StageBuffers<double> b(*m);
+    Random random(seed);
+    for (int k = 0; k < 3; ++k) {
+      testing::randomise(b, *m, random, kStep);
+      SCOPED_TRACE("seed " + std::to_string(seed));
+      compare_with_dual_numbers(*m, b, 1e-11);
+      for (double f : b.force_scale) touched += f > 1e-3;
+    }
+  }
+  EXPECT_GT(touched, 200);
 }
 
 /// Returns how many entries were compared; those with a kink within ±e are left out.

@@ -4,7 +4,6 @@
 
 #include "tests/engine/dense_dynamics.hpp"
 #include "tests/engine/extrapolation.hpp"
-#include "tests/engine/random_scene.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"
 

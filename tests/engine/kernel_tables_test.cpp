@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "engine/workspace.hpp"
-#include "tests/engine/random_scene.hpp"
+#include "tests/engine/random_machine.hpp"
 #include "tests/engine/stage_buffers.hpp"
 
 namespace tangere {
