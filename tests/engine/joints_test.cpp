@@ -22,7 +22,8 @@ MotorDescription position_motor(const std::string& joint, double P, double D, do
   return {joint, -reach, reach, {}, MotorControl::position, P, D};
 }
 
-void run(const Model& model, Batch& batch, Integrator scheme, double timestep, int steps, const std::vector<double>& u) {
+void run(const Model& model, Batch& batch, Integrator scheme, double timestep, int steps,
+         const std::vector<double>& u) {
   Stepper stepper(model, testing::options(scheme, timestep));
   for (int k = 0; k < steps; ++k) testing::step_all(stepper, batch, u);
   EXPECT_EQ(batch.failed_count(), 0);
@@ -38,7 +39,8 @@ Scene thrown_box(bool parts) {
   if (parts) {
     CuboidShape half = kBox;
     half.size[0] = 0.1;
-    s.links = {link("box", JointType::free, start, half, 700), link("half", JointType::fixed, {0.03, 0.04, 0.1}, half, 700),
+    s.links = {link("box", JointType::free, start, half, 700),
+               link("half", JointType::fixed, {0.03, 0.04, 0.1}, half, 700),
                link("ball", JointType::fixed, {-0.03, -0.04, -0.1}, SphereShape{0.02}, 0)};
     s.links[0].body.pose.position = {-0.05, 0, 0};
     s.links[1].parent = 0;
@@ -52,7 +54,8 @@ Scene thrown_box(bool parts) {
     const auto back = kernels::transposed_times(R, kernels::Vec3<double>{-0.03, -0.04, -0.1 - 0.05});
     s.links[2].joint.pose.position = {back.x, back.y, back.z};
   } else {
-    s.links = {link("box", JointType::free, start, kBox, 700), link("ball", JointType::fixed, {0, 0, -0.05}, SphereShape{0.02}, 0)};
+    s.links = {link("box", JointType::free, start, kBox, 700),
+               link("ball", JointType::fixed, {0, 0, -0.05}, SphereShape{0.02}, 0)};
     s.links[1].parent = 0;
   }
   TactileDescription t;
@@ -96,7 +99,8 @@ TEST(FixedJoints, PartsMoveAndFeelLikeOneBody) {
 TEST(FixedJoints, MotorsFollow) {
   // A hinge on a bracket fixed to the world, and the hinge placed there directly.
   Scene s;
-  s.links = {link("bracket", JointType::fixed, {0.1, 0.2, 0.3}, kBox, 500), link("arm", JointType::revolute, {0, 0.1, 0}, kBox, 500)};
+  s.links = {link("bracket", JointType::fixed, {0.1, 0.2, 0.3}, kBox, 500),
+             link("arm", JointType::revolute, {0, 0.1, 0}, kBox, 500)};
   s.links[0].joint.pose.orientation = {0.6, 0, 0, 0.8};
   s.links[1].parent = 0;
   s.links[1].joint.axis0 = {0, 1, 0};
@@ -139,7 +143,8 @@ TEST(FixedJoints, BodiesOfTheWorldAreTouched) {
 
 TEST(PositionMotor, HoldsItsTargetAgainstGravity) {
   Scene s;
-  s.links = {link("arm", JointType::revolute, {0, 0, 0}, kBox, 500), link("car", JointType::prismatic, {0, 1, 0}, kBox, 500)};
+  s.links = {link("arm", JointType::revolute, {0, 0, 0}, kBox, 500),
+             link("car", JointType::prismatic, {0, 1, 0}, kBox, 500)};
   s.links[0].joint.axis0 = {0, -1, 0};  // positive angles lift
   s.links[0].body.pose.position = {0.1, 0, 0};
   s.links[1].joint.axis0 = {0, 0, 1};
@@ -244,7 +249,8 @@ TEST(PositionMotor, ImplicitDampingIsStableWhereTheExplicitOneIsNot) {
   s.motors[0].timing = MotorTiming::start;
   const Model start(s);
   Batch a(end, 1), b(start, 1);
-  Stepper implicit(end, testing::options(Integrator::bdf1, 0.02)), explicit_one(start, testing::options(Integrator::bdf1, 0.02));
+  Stepper implicit(end, testing::options(Integrator::bdf1, 0.02)),
+      explicit_one(start, testing::options(Integrator::bdf1, 0.02));
   for (int k = 0; k < 20; ++k) {
     implicit.step(a, std::vector<double>{0});
     explicit_one.step(b, std::vector<double>{0});
@@ -267,19 +273,21 @@ TEST(PositionMotor, EveryEnvironmentHasItsOwnTarget) {
 
 TEST(VariedJoints, ADrawnNumberActsLikeAConstantOne) {
   Scene s;
-  s.links = {link("arm", JointType::revolute, {0, 0, 0}, kBox, 500), link("ball", JointType::spherical, {1, 0, 0}, kBox, 500)};
+  s.links = {link("arm", JointType::revolute, {0, 0, 0}, kBox, 500),
+             link("ball", JointType::spherical, {1, 0, 0}, kBox, 500)};
   s.links[0].joint.axis0 = {0, 1, 0};
   for (LinkDescription& l : s.links) l.body.pose.position = {0.1, 0, 0}, l.joint.limits = {-0.1, 0.05};
   s.motors = {position_motor("arm_joint", 1, 0.1), position_motor("ball_joint", 1, 0.1, 0.5)};
   for (MotorTiming timing : {MotorTiming::end, MotorTiming::start})
-    for (JointField field : {JointField::damping, JointField::armature, JointField::stiffness, JointField::lim_stiffness,
-                             JointField::P, JointField::D}) {
+    for (JointField field : {JointField::damping, JointField::armature, JointField::stiffness,
+                             JointField::lim_stiffness, JointField::P, JointField::D}) {
       Scene varied = s;
       for (MotorDescription& motor : varied.motors) motor.timing = timing;
       const Scene fixed = varied;
       const bool motor = field >= JointField::P;
       for (const LinkDescription& l : s.links) {
-        RandomizationDescription d{motor ? RandomTarget::motor : RandomTarget::joint_effect, l.joint.name, "", 0, {}, {}, {}, field};
+        RandomizationDescription d{
+            motor ? RandomTarget::motor : RandomTarget::joint_effect, l.joint.name, "", 0, {}, {}, {}, field};
         d.distribution.a = 0.01, d.distribution.b = 0.4;
         varied.randomizations.push_back(d);
       }
@@ -292,8 +300,8 @@ TEST(VariedJoints, ADrawnNumberActsLikeAConstantOne) {
           const double x = batch.randomized_value(e, static_cast<int>(k));
           ASSERT_GT(x, 0.01);
           JointDescription& joint = own.links[k].joint;
-          double* const numbers[] = {&joint.damping, &joint.armature, &joint.stiffness, &joint.limit_stiffness,
-                                     &own.motors[k].P, &own.motors[k].D};
+          double* const numbers[] = {&joint.damping,         &joint.armature,  &joint.stiffness,
+                                     &joint.limit_stiffness, &own.motors[k].P, &own.motors[k].D};
           *numbers[static_cast<int>(field)] = x;
         }
         const Model constant(own);
@@ -310,11 +318,12 @@ TEST(VariedJoints, WhatIsNotThereCannotVary) {
   const auto fails = [](RandomTarget target, JointField field, JointType type) {
     Scene s = lift({"car_joint", -1, 1, {}});
     s.links.push_back(link("other", type, {1, 0, 0}, kBox, 500));
-    RandomizationDescription d{target, type == JointType::fixed ? "other_joint" : "car_joint", "", 0, {}, {}, {}, field};
+    RandomizationDescription d{target, type == JointType::fixed ? "other_joint" : "car_joint", "", 0, {}, {}, {},
+                               field};
     s.randomizations = {d};
     EXPECT_THROW(Model{s}, InputError) << to_string(field);
   };
-  fails(RandomTarget::motor, JointField::P, JointType::free);        // a force motor
+  fails(RandomTarget::motor, JointField::P, JointType::free);  // a force motor
   fails(RandomTarget::motor, JointField::damping, JointType::free);
   fails(RandomTarget::joint_effect, JointField::P, JointType::free);
   fails(RandomTarget::joint_effect, JointField::lim_stiffness, JointType::free);  // no limits
@@ -325,7 +334,8 @@ TEST(VariedJoints, WhatIsNotThereCannotVary) {
 
 TEST(Limits, StopAFallWhereTheSpringCarriesIt) {
   Scene s;
-  s.links = {link("car", JointType::prismatic, {0, 0, 0}, kBox, 500), link("plate", JointType::planar, {1, 0, 0}, kBox, 500)};
+  s.links = {link("car", JointType::prismatic, {0, 0, 0}, kBox, 500),
+             link("plate", JointType::planar, {1, 0, 0}, kBox, 500)};
   s.links[0].joint.limits = {-0.02, 0.5};
   s.links[0].joint.limit_stiffness = 5000;
   s.links[1].joint.axis0 = {0, 0, -1};  // falls towards its upper limit
@@ -350,7 +360,8 @@ TEST(Limits, GiveTheEnergyBack) {
     s.links[0].joint.axis0 = {0, 0, 1};
     s.links[0].joint.limits = {-0.5, 0.4};
     s.links[0].joint.limit_stiffness = 20;
-    s.initial.push_back({"ball_joint", {}, type == JointType::revolute ? std::vector<double>{3} : std::vector<double>{0, 0, 3}, {}});
+    s.initial.push_back(
+        {"ball_joint", {}, type == JointType::revolute ? std::vector<double>{3} : std::vector<double>{0, 0, 3}, {}});
     const Model model(s);
     Batch batch(model, 1);
     Stepper stepper(model, testing::options(Integrator::sdirk2, 5e-4));
