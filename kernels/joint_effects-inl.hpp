@@ -164,8 +164,9 @@ void joint_load(const ModelView& model, const StageArgs<N>& a, const Link& link,
     if (link.effects & kOfPosition) add_turning_effects<Derivatives>(a, link, e, out);
 }
 
+// Kept out of line: inlined, its frame would cost joints that have no such effects.
 template <JointKind K, class N>
-void add_joint_load(const ModelView& model, const StageArgs<N>& a, const Link& link) {
+[[gnu::noinline]] void add_joint_load(const ModelView& model, const StageArgs<N>& a, const Link& link) {
   JointLoad<N> load;
   joint_load<K, false>(model, a, link, load);
   for (int k = 0; k < dofs(K); ++k) {
@@ -187,7 +188,7 @@ void add_by_v(const ModelView& model, const StageArgs<N>& a, const Link& link, i
 }
 
 template <JointKind K, class N>
-void add_load_entries(const ModelView& model, const StageArgs<N>& a, const Link& link) {
+[[gnu::noinline]] void add_load_entries(const ModelView& model, const StageArgs<N>& a, const Link& link) {
   JointLoad<N> load;
   joint_load<K, true>(model, a, link, load);
   for (int j = 0; j < dofs(K); ++j) {
