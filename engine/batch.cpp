@@ -43,10 +43,12 @@ double nominal(const CompiledModel& m, const RandomizationDescription& d) {
     if (d.target == RandomTarget::ground_contact && c.body == d.name) return field(c.coefficients);
   for (const auto& l : m.scene.links) {
     const double values[] = {l.joint.damping, l.joint.armature, l.joint.stiffness, l.joint.limit_stiffness};
-    if (d.target == RandomTarget::joint_effect && l.joint.name == d.name) return values[static_cast<int>(d.joint_field)];
+    if (d.target == RandomTarget::joint_effect && l.joint.name == d.name)
+      return values[static_cast<int>(d.joint_field)];
   }
   for (const auto& motor : m.scene.motors)
-    if (d.target == RandomTarget::motor && motor.joint == d.name) return d.joint_field == JointField::P ? motor.P : motor.D;
+    if (d.target == RandomTarget::motor && motor.joint == d.name)
+      return d.joint_field == JointField::P ? motor.P : motor.D;
   return 0;
 }
 

@@ -29,10 +29,17 @@ void name_coordinates(CompiledModel& m, const JointDescription& d) {
   };
   std::vector<Coordinate> q, v;
   switch (d.type) {
-    case JointType::fixed: break;
-    case JointType::revolute: q = {{"angle", "rad"}}, v = {{"rate", "rad/s"}}; break;
-    case JointType::prismatic: q = {{"position", "m"}}, v = {{"rate", "m/s"}}; break;
-    case JointType::planar: q = {{"axis0", "m"}, {"axis1", "m"}}, v = {{"v0", "m/s"}, {"v1", "m/s"}}; break;
+    case JointType::fixed:
+      break;
+    case JointType::revolute:
+      q = {{"angle", "rad"}}, v = {{"rate", "rad/s"}};
+      break;
+    case JointType::prismatic:
+      q = {{"position", "m"}}, v = {{"rate", "m/s"}};
+      break;
+    case JointType::planar:
+      q = {{"axis0", "m"}, {"axis1", "m"}}, v = {{"v0", "m/s"}, {"v1", "m/s"}};
+      break;
     case JointType::free2d:
       q = {{"x", "m"}, {"y", "m"}, {"angle", "rad"}};
       v = {{"vx", "m/s"}, {"vy", "m/s"}, {"rate", "rad/s"}};
@@ -59,8 +66,10 @@ const JointEffects& effects_of(const JointDescription& d, int k) {
 
 void check_effects(const JointDescription& d, const JointEffects& e) {
   const std::string of = d.source.prefix() + "joint '" + d.name + "': ";
-  const std::pair<const char*, double> numbers[] = {
-      {"damping", e.damping}, {"armature", e.armature}, {"stiffness", e.stiffness}, {"lim_stiffness", e.limit_stiffness}};
+  const std::pair<const char*, double> numbers[] = {{"damping", e.damping},
+                                                    {"armature", e.armature},
+                                                    {"stiffness", e.stiffness},
+                                                    {"lim_stiffness", e.limit_stiffness}};
   for (const auto& [name, value] : numbers)
     if (!(value >= 0) || !std::isfinite(value))
       throw InputError(of + name + " is " + std::to_string(value) + "; expected a finite number, zero or more");
@@ -128,8 +137,22 @@ CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent,
     const bool slides = kernels::slides(kind), steady = up < 0 || m.links[up].still;
     const bool rotated = !is_identity({at.R, {0, 0, 0}}), turned = !slides || rotated;
     const bool placed = slides || !is_identity({kIdentityFrame.R, at.p});
-    Link link{up, kind, m.nq, m.nv, axis, at, rotated, turned, placed, steady, steady && slides, false, 0, 0,
-              {0, 0, 0}, kernels::zero33<double>()};
+    Link link{up,
+              kind,
+              m.nq,
+              m.nv,
+              axis,
+              at,
+              rotated,
+              turned,
+              placed,
+              steady,
+              steady && slides,
+              false,
+              0,
+              0,
+              {0, 0, 0},
+              kernels::zero33<double>()};
     m.nq += kernels::coordinates(kind);
     m.nv += kernels::dofs(kind);
     joint.link = static_cast<int>(m.links.size());
@@ -142,19 +165,27 @@ CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent,
       joint.link = parent;
       joint.frame = frame;
       break;
-    case JointType::revolute: add(JointKind::revolute, axis0); break;
-    case JointType::prismatic: add(JointKind::prismatic, axis0); break;
+    case JointType::revolute:
+      add(JointKind::revolute, axis0);
+      break;
+    case JointType::prismatic:
+      add(JointKind::prismatic, axis0);
+      break;
     case JointType::planar:
       add(JointKind::prismatic, axis0);
       add(JointKind::prismatic, axis1);
       break;
-    case JointType::translational: add(JointKind::translational, x); break;
+    case JointType::translational:
+      add(JointKind::translational, x);
+      break;
     case JointType::free2d:
       add(JointKind::prismatic, x);
       add(JointKind::prismatic, y);
       add(JointKind::revolute, z);
       break;
-    case JointType::spherical: add(JointKind::spherical, x); break;
+    case JointType::spherical:
+      add(JointKind::spherical, x);
+      break;
     case JointType::free:
       add(JointKind::translational, x);
       add(JointKind::spherical, x);
@@ -275,7 +306,8 @@ void check_masses(const CompiledModel& m) {
     const CompiledJoint& joint = m.joints[i];
     if (joint.link_count == 0 || carried[std::size_t(joint.link)] != 0) continue;
     const JointDescription& d = m.scene.links[i].joint;
-    throw InputError(d.source.prefix() + "joint '" + d.name + "' moves nothing that has mass; expected a body with mass on it " +
+    throw InputError(d.source.prefix() + "joint '" + d.name +
+                     "' moves nothing that has mass; expected a body with mass on it " +
                      "or on a joint that it carries");
   }
 }

@@ -50,7 +50,8 @@ void decide_effects(CompiledModel& m) {
   add("ground contact", !m.grounds.empty(), counted(m.grounds.size(), "body declared", "bodies declared"));
   add("tactile", !m.sensors.empty(), counted(m.sensors.size(), "sensor declared", "sensors declared"));
   const std::size_t varying = m.layout.rows - m.layout.parameters;
-  add("varying parameters", varying > 0, counted(varying, "number varies by environment", "numbers vary by environment"));
+  add("varying parameters", varying > 0,
+      counted(varying, "number varies by environment", "numbers vary by environment"));
 }
 
 }  // namespace tangere

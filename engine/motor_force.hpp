@@ -9,8 +9,8 @@
 
 namespace tangere {
 
-/// Force of a motor [N or N m]. `state`: one environment's column of its block; `u`: controls of the motor's joint from the
-/// first dof of its elementary link on.
+/// Force of a motor [N or N m]. `state`: one environment's column of its block; `u`: controls of the motor's joint from
+/// the first dof of its elementary link on.
 inline double force_at_start(const CompiledModel& m, const CompiledMotor& motor, const double* state, const double* u) {
   if (motor.control == MotorControl::force)
     return motor.low + (std::clamp(u[motor.component], -1.0, 1.0) + 1) * (0.5 * (motor.high - motor.low));

@@ -37,8 +37,8 @@ struct ContactCoefficients {
   double damping = 0;  ///< k_d [N s/m²]; law linear: c [N s/m]
 };
 
-/// What acts on every dof of a joint, in SI by the dof's kind. Spherical joints have the components of a rotation vector
-/// in place of q, torques and accelerations in body axes (docs/dynamics.md).
+/// What acts on every dof of a joint, in SI by the dof's kind. Spherical joints have components of a rotation vector in
+/// place of q, torques and accelerations in body axes (docs/dynamics.md).
 struct JointEffects {
   double damping = 0;          ///< force = -damping v [N s/m or N m s/rad]
   double armature = 0;         ///< inertia that moves with the dof alone, a rotor's [kg or kg m²]

@@ -82,12 +82,16 @@ double coordinate_scale(JointType type, int index, const SceneContext& c) {
   switch (type) {
     case JointType::fixed:
     case JointType::revolute:
-    case JointType::spherical: return 1;
+    case JointType::spherical:
+      return 1;
     case JointType::prismatic:
     case JointType::planar:
-    case JointType::translational: return c.length;
-    case JointType::free2d: return index < 2 ? c.length : 1;
-    case JointType::free: break;
+    case JointType::translational:
+      return c.length;
+    case JointType::free2d:
+      return index < 2 ? c.length : 1;
+    case JointType::free:
+      break;
   }
   return index < 3 ? c.length : 1;
 }
@@ -96,11 +100,14 @@ double joint_field_scale(JointField field, bool turns, const SceneContext& c) {
   if (turns) return c.rotational;  // torque per angle, its rate or its acceleration: a mass times a length twice
   switch (field) {
     case JointField::damping:
-    case JointField::D: return c.damping_force;
-    case JointField::armature: return c.density * c.length * c.length * c.length;
+    case JointField::D:
+      return c.damping_force;
+    case JointField::armature:
+      return c.density * c.length * c.length * c.length;
     case JointField::stiffness:
     case JointField::lim_stiffness:
-    case JointField::P: break;
+    case JointField::P:
+      break;
   }
   return c.stiffness;
 }

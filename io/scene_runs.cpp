@@ -97,9 +97,11 @@ void read_joint_variation(const Scene& scene, const SceneNode& node, Randomizati
       position = position || (m.joint == joint.name && m.control == MotorControl::position);
     if (!position) node.fail("joint '" + joint.name + "' has no position motor; force motors have no gains");
   } else {
-    d.joint_field = static_cast<JointField>(node.choice("field", {"damping", "armature", "stiffness", "lim_stiffness"}));
+    const std::vector<std::string> fields = {"damping", "armature", "stiffness", "lim_stiffness"};
+    d.joint_field = static_cast<JointField>(node.choice("field", fields));
     if (joint.type == JointType::fixed) node.fail("joint '" + joint.name + "' is fixed; nothing of it can vary");
-    if (d.joint_field == JointField::lim_stiffness && !joint.limits) node.fail("joint '" + joint.name + "' has no 'lim'");
+    if (d.joint_field == JointField::lim_stiffness && !joint.limits)
+      node.fail("joint '" + joint.name + "' has no 'lim'");
     const bool mixed = joint.type == JointType::free || joint.type == JointType::free2d;
     if (mixed && node.context().length != 1)
       node.fail("joint '" + joint.name + "' slides and turns: one number has two units; use unit=\"m-kg\"");
@@ -223,7 +225,8 @@ void read_control(Scene& scene, const SceneNode& section) {
 
 void read_randomize(Scene& scene, const SceneNode& section) {
   section.check_attributes({});
-  for (const SceneNode& node : section.children({"joint", "motor", "ground_contact", "general_primitive_contact", "tactile"})) {
+  const std::vector<std::string> kinds = {"joint", "motor", "ground_contact", "general_primitive_contact", "tactile"};
+  for (const SceneNode& node : section.children(kinds)) {
     RandomizationDescription d;
     d.source = node.source();
     if (node.name() == "motor" || (node.name() == "joint" && node.has("field"))) {

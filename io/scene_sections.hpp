@@ -6,8 +6,6 @@
 
 namespace tangere {
 
-/// Damping, armature, spring and limits of a joint whose type is known.
-void read_joint_effects(const SceneNode& node, JointDescription& joint);
 /// A body in its joint's frame; files that it names are read.
 BodyDescription read_body(const SceneNode& node);
 /// Whether the pose of a mesh is given in the world instead.
@@ -35,5 +33,8 @@ double joint_field_scale(JointField field, bool turns, const SceneContext& conte
 int control_count(const Scene& scene);
 /// Factor to SI of each of them: targets of position motors are coordinates, force motors take numbers without a unit.
 std::vector<double> control_scales(const Scene& scene, const SceneContext& context);
+
+/// Damping, armature, spring and limits of a joint whose type is known.
+void read_joint_effects(const SceneNode& node, JointDescription& joint);
 
 }  // namespace tangere

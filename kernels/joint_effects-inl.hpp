@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// What acts on the dofs of a joint: damping, armature, springs, limits, position motors; and its derivatives.
+// What acts on the dofs of a joint: damping, armature, springs, limits, position motors; and its derivatives. Per dof
 //
-//   f = -c v - I_a a - k (q - rest) + k_l max(0, lo - q) - k_l max(0, q - hi) + clip(P(u - q) - D v, range)      per dof
+//   f = -c v - I_a a - k (q - rest) + k_l max(0, lo - q) - k_l max(0, q - hi) + clip(P (u - q) - D v, range)
 //
-// A spherical joint has rotation vectors in place of q. With φ = log q, φ_s = log(rest⁻¹ q), ψ = log(q⁻¹ exp u), torques in body axes:
-//   spring -k φ_s (the gradient of k|φ_s|²/2, as J_r⁻ᵀ(φ) φ = φ);  limits J_r⁻ᵀ(φ) f(φ), f per component;  motor clip(P ψ - D ω)
-//   ∂φ/∂θ = J_r⁻¹(φ),  ∂ψ/∂θ = -J_r⁻ᵀ(ψ),  θ the right tangent
-// Flags of the link decide outside the lanes what is evaluated. At a bound of a limit the derivative is that of its inside,
-// at a bound of a motor's range that of the unclipped force.
+// A spherical joint has rotation vectors in place of q, φ = log q, φ_s = log(rest⁻¹ q), ψ = log(q⁻¹ exp u). Torques, body
+// axes: spring -k φ_s (the gradient of k|φ_s|²/2, as J_r⁻ᵀ(φ) φ = φ); limits J_r⁻ᵀ(φ) f(φ), f per component; motor
+// clip(P ψ - D ω). By the right tangent θ: ∂φ/∂θ = J_r⁻¹(φ), ∂ψ/∂θ = -J_r⁻ᵀ(ψ).
+//
+// Flags of the link decide outside the lanes what is evaluated. At a bound of a limit the derivative is that of its
+// inside, at a bound of a motor's range that of the unclipped force.
 #pragma once
 
 #include "kernels/rotation_vector.hpp"
@@ -15,7 +16,7 @@
 
 namespace tangere::kernels {
 
-/// Forces on the dofs of one joint [N, N m], and derivatives of -force as the Jacobian wants them.
+/// Forces on the dofs of one joint [N, N m], damping left out, and derivatives of -force as the Jacobian wants them.
 template <class N>
 struct JointLoad {
   N force[3];
@@ -101,7 +102,8 @@ void add_turning_limits(const StageArgs<N>& a, const DofEffects* e, const Quat<N
 }
 
 template <bool Derivatives, class N>
-void add_turning_motor(const StageArgs<N>& a, const Link& link, const DofEffects* e, const Quat<N>& q, JointLoad<N>& out) {
+void add_turning_motor(const StageArgs<N>& a, const Link& link, const DofEffects* e, const Quat<N>& q,
+                       JointLoad<N>& out) {
   const N* u = a.target + link.v;
   const RotationVector<N> error = rotation_vector<false>(conjugate(q) * quaternion_exp(Vec3<N>{u[0], u[1], u[2]}));
   const N psi[3] = {error.phi.x, error.phi.y, error.phi.z};
@@ -111,7 +113,8 @@ void add_turning_motor(const StageArgs<N>& a, const Link& link, const DofEffects
     N inside;
     add_force(out, i, motor_force(e[i], P, D, psi[i], a.v[link.v + i], inside));
     out.by_v[i] += inside * D;
-    for (int k = 0; k < 3 && Derivatives; ++k) out.by_turn.m[i][k] = mul_add(inside * P, slope.m[i][k], out.by_turn.m[i][k]);
+    if constexpr (Derivatives)
+      for (int k = 0; k < 3; ++k) out.by_turn.m[i][k] = mul_add(inside * P, slope.m[i][k], out.by_turn.m[i][k]);
   }
 }
 
@@ -131,52 +134,85 @@ void add_turning_effects(const StageArgs<N>& a, const Link& link, const DofEffec
   if (link.effects & kDriven) add_turning_motor<Derivatives>(a, link, e, q, out);
 }
 
-/// All effects of one joint at the stage's x; a.v of its dofs must be there.
+/// Damping alone: most joints have nothing else.
+template <JointKind K, class N>
+void add_damping(const ModelView& model, const StageArgs<N>& a, const Link& link) {
+  for (int k = 0; k < dofs(K); ++k) {
+    const int d = link.v + k;
+    const N damping = load_parameter(a, model.effects[d].damping) * a.v[d];
+    a.g[d] += damping;
+    a.force_scale[d] += abs(damping);
+  }
+}
+
+/// All other effects of one joint at the stage's x; a.v of its dofs must be there.
 template <JointKind K, bool Derivatives, class N>
 void joint_load(const ModelView& model, const StageArgs<N>& a, const Link& link, JointLoad<N>& out) {
   const DofEffects* e = model.effects + link.v;
   for (int k = 0; k < dofs(K); ++k) {
     const int d = link.v + k;
     out.force[k] = out.magnitude[k] = out.by_q[k] = out.by_v[k] = out.armature[k] = N(0.0);
-    if (link.effects & kDamped) {
-      const N damping = load_parameter(a, e[k].damping);
-      add_force(out, k, -(damping * a.v[d]));
-      out.by_v[k] += damping;
-    }
     if (link.effects & kArmoured) {
       out.armature[k] = load_parameter(a, e[k].armature);
       out.force[k] -= out.armature[k] * mul_add(a.c0_over_h, a.v[d], a.inverse_h * a.s[d]);
-      out.by_v[k] = mul_add(a.c0_over_h, out.armature[k], out.by_v[k]);
+      out.by_v[k] = a.c0_over_h * out.armature[k];
     }
     if constexpr (K != JointKind::spherical)
-      if (link.effects & (kSprung | kLimited | kDriven)) add_plain_effects(a, link, e[k], k, out);
+      if (link.effects & kOfPosition) add_plain_effects(a, link, e[k], k, out);
   }
   if constexpr (K == JointKind::spherical)
-    if (link.effects & (kSprung | kLimited | kDriven)) add_turning_effects<Derivatives>(a, link, e, out);
+    if (link.effects & kOfPosition) add_turning_effects<Derivatives>(a, link, e, out);
+}
+
+// Kept out of line: inlined, its frame would cost joints that have no such effects.
+template <JointKind K, class N>
+[[gnu::noinline]] void add_joint_load(const ModelView& model, const StageArgs<N>& a, const Link& link) {
+  JointLoad<N> load;
+  joint_load<K, false>(model, a, link, load);
+  for (int k = 0; k < dofs(K); ++k) {
+    a.g[link.v + k] -= load.force[k];
+    a.force_scale[link.v + k] += load.magnitude[k];
+  }
+}
+
+/// Adds a force's derivatives by v, diagonal, to the joint's block of A.
+template <JointKind K, class N>
+void add_by_v(const ModelView& model, const StageArgs<N>& a, const Link& link, int j, const N& by_v) {
+  const int* slot = model.pattern.slot + (link.v + j) * model.nv + link.v;
+  if constexpr (K != JointKind::spherical) {
+    a.A[slot[j]] = mul_add(a.c0_over_h, by_v, a.A[slot[j]]);
+  } else {
+    const LinkScratch<N>& o = a.links[&link - model.links];
+    for (int k = 0; k < 3; ++k) a.A[slot[k]] = mul_add(o.chart_rate.m[j][k], by_v, a.A[slot[k]]);
+  }
+}
+
+template <JointKind K, class N>
+[[gnu::noinline]] void add_load_entries(const ModelView& model, const StageArgs<N>& a, const Link& link) {
+  JointLoad<N> load;
+  joint_load<K, true>(model, a, link, load);
+  for (int j = 0; j < dofs(K); ++j) {
+    a.mass_diagonal[link.v + j] += load.armature[j];
+    add_by_v<K>(model, a, link, j, load.by_v[j]);
+    if (!(link.effects & kOfPosition)) continue;
+    const int* slot = model.pattern.slot + (link.v + j) * model.nv + link.v;
+    if constexpr (K != JointKind::spherical) {
+      a.A[slot[j]] += load.by_q[j];
+    } else {
+      const Mat3<N>& chart = a.links[&link - model.links].chart;
+      for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < 3; ++i) a.A[slot[k]] = mul_add(load.by_turn.m[j][i], chart.m[i][k], a.A[slot[k]]);
+    }
+  }
 }
 
 /// Adds a joint's effects to its diagonal block of A and to the diagonal of M.
 template <JointKind K, class N>
 void add_effect_entries(const ModelView& model, const StageArgs<N>& a, const Link& link) {
-  const LinkScratch<N>& o = a.links[&link - model.links];
-  JointLoad<N> load;
-  joint_load<K, true>(model, a, link, load);
-  for (int j = 0; j < dofs(K); ++j) {
-    const int d = link.v + j;
-    a.mass_diagonal[d] += load.armature[j];
-    const int* slot = model.pattern.slot + d * model.nv + link.v;
-    if constexpr (K != JointKind::spherical) {
-      N& entry = a.A[slot[j]];
-      entry = mul_add(a.c0_over_h, load.by_v[j], entry) + load.by_q[j];
-    } else {
-      for (int k = 0; k < 3; ++k) {
-        N& entry = a.A[slot[k]];
-        entry = mul_add(o.chart_rate.m[j][k], load.by_v[j], entry);
-        if (!(link.effects & (kSprung | kLimited | kDriven))) continue;
-        for (int i = 0; i < 3; ++i) entry = mul_add(load.by_turn.m[j][i], o.chart.m[i][k], entry);
-      }
-    }
-  }
+  if (link.effects & kDamped)
+    for (int j = 0; j < dofs(K); ++j)
+      add_by_v<K>(model, a, link, j, load_parameter(a, model.effects[link.v + j].damping));
+  if (link.effects & kBeyondDamping) add_load_entries<K>(model, a, link);
 }
 
 }  // namespace tangere::kernels

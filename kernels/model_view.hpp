@@ -22,6 +22,7 @@ constexpr int coordinates(JointKind k) {
 
 /// What acts on a joint's dofs beside inertia and contacts; bits of Link::effects.
 enum JointEffect : std::uint8_t { kDamped = 1, kArmoured = 2, kSprung = 4, kLimited = 8, kDriven = 16 };
+inline constexpr int kOfPosition = kSprung | kLimited | kDriven, kBeyondDamping = kOfPosition | kArmoured;
 
 /// One elementary joint and everything that moves rigidly with it.
 struct Link {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The residual g of a step: kinematics outward, contacts, inverse dynamics inward (RNEA in body axes).
 //
-//   V = V_p + S q̇,  A = A_p + S q̈ + V × (S q̇),  F = I A + V ×* I V - w_ext,  F_p += X* F,  g = Sᵀ F - τ - (joint effects)
+//   V = V_p + S q̇,  A = A_p + S q̈ + V × (S q̇),  F = I A + V ×* I V - w_ext,  F_p += X* F
+//   g = Sᵀ F - τ - what acts on the dofs (kernels/joint_effects-inl.hpp)
 // The base accelerates at -gravity, so gravity needs no term of its own.
 #pragma once
 
@@ -222,13 +223,8 @@ void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
         a.g[d] = project<K>(link, k, o.F) - a.tau[d];
         a.force_scale[d] = abs(a.tau[d]);
       }
-      if (link.effects == 0) return;
-      JointLoad<N> load;
-      joint_load<K, false>(model, a, link, load);
-      for (int k = 0; k < dofs(K); ++k) {
-        a.g[link.v + k] -= load.force[k];
-        a.force_scale[link.v + k] += load.magnitude[k];
-      }
+      if (link.effects & kDamped) add_damping<K>(model, a, link);
+      if (link.effects & kBeyondDamping) add_joint_load<K>(model, a, link);
     });
     if (link.parent >= 0) a.links[link.parent].F += wrench_to_parent(link, o.local, o.F);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A second derivation of the equations of motion, for tests: world axes, dense Jacobians of the bodies' centres of mass,
+// A second derivation of the equations of motion, for tests: world axes, dense Jacobians of the centres of mass,
 // Newton and Euler summed over bodies, in any floating-point type. It shares no formula and no code with the kernels.
 //
 //   M = Σ m Jᵀ J + J_ωᵀ I J_ω,   M a + b = Q,   b = Σ Jᵀ m (a₀ - g) + J_ωᵀ (I α₀ + ω × I ω)      (a₀, α₀: with q̈ = 0)
@@ -171,16 +171,26 @@ class DenseDynamics {
       m.columns.push_back({iv + k, world, V3::Zero(), m.p});
     };
     switch (d.type) {
-      case JointType::fixed: break;
-      case JointType::revolute: hinge(0, a0); break;
-      case JointType::prismatic: slide(0, a0); break;
-      case JointType::planar: slide(0, a0), slide(1, a1); break;
+      case JointType::fixed:
+        break;
+      case JointType::revolute:
+        hinge(0, a0);
+        break;
+      case JointType::prismatic:
+        slide(0, a0);
+        break;
+      case JointType::planar:
+        slide(0, a0), slide(1, a1);
+        break;
       case JointType::translational:
       case JointType::free:
         for (int k = 0; k < 3; ++k) slide(k, V3::Unit(k));
         break;
-      case JointType::free2d: slide(0, V3::UnitX()), slide(1, V3::UnitY()), hinge(2, V3::UnitZ()); break;
-      case JointType::spherical: break;
+      case JointType::free2d:
+        slide(0, V3::UnitX()), slide(1, V3::UnitY()), hinge(2, V3::UnitZ());
+        break;
+      case JointType::spherical:
+        break;
     }
     if (!ball(d.type)) return;
     const int a = iq + position_count(d.type) - 4, w = iv + dof_count(d.type) - 3;
@@ -189,7 +199,8 @@ class DenseDynamics {
     for (int k = 0; k < 3; ++k) m.columns.push_back({w + k, m.R.col(k), V3::Zero(), m.p});
   }
 
-  void add_body(const BodyDescription& d, const Mass& body, Motion m, const Vector& v, const V3& gravity, Terms& t) const {
+  void add_body(const BodyDescription& d, const Mass& body, Motion m, const Vector& v, const V3& gravity,
+                Terms& t) const {
     if (body.mass == 0) return;
     shift(m, m.R * vec(d.pose.position));
     const M3 R = m.R * rotation(d.pose.orientation), I = R * body.inertia * R.transpose();

@@ -49,7 +49,8 @@ struct State {
 State random_state(const CompiledModel& m, Random& random) {
   StageBuffers<double> b(m);
   testing::randomise(b, m, random, 1);
-  State s{Eigen::Map<const Vector>(b.centre.data(), m.nq), Vector(m.nv), Eigen::Map<const Vector>(b.target.data(), m.nv)};
+  State s{Eigen::Map<const Vector>(b.centre.data(), m.nq), Vector(m.nv),
+          Eigen::Map<const Vector>(b.target.data(), m.nv)};
   for (int i = 0; i < m.nv; ++i) s.v[i] = 2 * random.normal();
   return s;
 }
@@ -83,7 +84,8 @@ void compare(const Scene& scene, unsigned seed, bool solve) {
     for (int i = 0; i < m->nv; ++i)
       for (int j = 0; j < m->nv; ++j)
         EXPECT_NEAR(M(i, j), t.mass(i, j), 1e-10 * std::sqrt(t.mass(i, i) * t.mass(j, j))) << i << ", " << j;
-    const Vector rest = kernels.residual(Vector::Zero(m->nv)) - middle;  // motors known at the start stand in tau, not here
+    const Vector rest =
+        kernels.residual(Vector::Zero(m->nv)) - middle;  // motors known at the start stand in tau, not here
     const Vector expected = t.bias - t.force;
     const double scale = t.bias.norm() + t.force.norm();
     for (int i = 0; i < m->nv; ++i) EXPECT_NEAR(rest[i], expected[i], 1e-10 * scale) << "dof " << i;

@@ -20,8 +20,8 @@ Scene bars(int count, double damping) {
   const Vector3 axes[] = {{0, 1, 0}, {0.6, 0.8, 0}, {0, 0.6, 0.8}};
   for (int i = 0; i < count; ++i) {
     const std::string name = "bar" + std::to_string(i);
-    s.links.push_back(link(name, JointType::revolute, {i == 0 ? 0 : 0.2, 0, 0},
-                           CuboidShape{{0.2, 0.04, 0.03}, {2, 2, 2}}, 900));
+    s.links.push_back(
+        link(name, JointType::revolute, {i == 0 ? 0 : 0.2, 0, 0}, CuboidShape{{0.2, 0.04, 0.03}, {2, 2, 2}}, 900));
     LinkDescription& l = s.links.back();
     l.parent = i - 1;
     l.joint.axis0 = axes[i % 3];
@@ -191,7 +191,8 @@ TEST(JointConvergence, TheMiddleAxisFlipsAndAngularMomentumStays) {
   const testing::DenseDynamics<double> dense(scene);
   const auto terms = [&](const Batch& b) {
     const std::vector<double> q = testing::q_of(b), v = testing::v_of(b);
-    return dense.terms(Eigen::Map<const Eigen::VectorXd>(q.data(), 7), Eigen::Map<const Eigen::VectorXd>(v.data(), 6), {});
+    return dense.terms(Eigen::Map<const Eigen::VectorXd>(q.data(), 7), Eigen::Map<const Eigen::VectorXd>(v.data(), 6),
+                       {});
   };
   const auto run = [&](int steps) {
     Stepper stepper(model, testing::options(Integrator::sdirk2, 8.0 / steps, 1e-12));

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rotation vectors without an arc tangent: against the library's, closed forms in long double, and dual numbers.
+#include "kernels/rotation_vector.hpp"
+
 #include <gtest/gtest.h>
 
 #include "engine/rotation_log.hpp"
-#include "kernels/rotation_vector.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
 namespace tangere {
@@ -65,12 +66,15 @@ TEST(RotationVector, DerivativesMatchDualNumbers) {
       const Quat<double> q = quaternion_exp(x);
       const Quat<D> still = {D(q.w), D(q.x), D(q.y), D(q.z)}, turn = quaternion_exp(along({0, 0, 0}, e));
       const RotationVector<double> v = rotation_vector<true>(q);
-      EXPECT_LT(length_of(epsilon(rotation_vector<false>(still * turn).phi) - inverse_right_jacobian(v) * e), 1e-13) << length;
-      EXPECT_LT(length_of(epsilon(rotation_vector<false>(turn * still).phi) - inverse_left_jacobian(v) * e), 1e-13) << length;
+      EXPECT_LT(length_of(epsilon(rotation_vector<false>(still * turn).phi) - inverse_right_jacobian(v) * e), 1e-13)
+          << length;
+      EXPECT_LT(length_of(epsilon(rotation_vector<false>(turn * still).phi) - inverse_left_jacobian(v) * e), 1e-13)
+          << length;
       const RotationVector<D> moved = rotation_vector<false>(quaternion_exp(along(x, e)));
       const Vec3<D> force = {D(f.x), D(f.y), D(f.z)};
       EXPECT_LT(length_of(epsilon(inverse_left_jacobian(moved) * force) - inverse_left_jacobian_derivative(v, f) * e),
-                1e-13) << length;
+                1e-13)
+          << length;
     }
 }
 
