@@ -115,8 +115,9 @@ std::string bodies_text(const Model& model) {
 std::string sensors_text(const Model& model) {
   std::string text = fmt::format("sensors ({})\n", model.sensors().size());
   for (const SensorInfo& s : model.sensors())
-    text += fmt::format("  {} on {}: {} x {} = {} points, read {}, pressure reads {}\n", s.name,
-                        s.body, s.rows, s.cols, s.points,
+    text += fmt::format("  {} on {}: {}, read {}, pressure reads {}\n", s.name, s.body,
+                        s.rows > 0 ? fmt::format("{} x {} = {} points", s.rows, s.cols, s.points)
+                                   : fmt::format("{} point{}", s.points, s.points == 1 ? "" : "s"),
                         s.every > 0 ? fmt::format("every {} steps", s.every) : "every step",
                         s.pressure_sign > 0 ? "positive (+1)" : "negative (-1)");
   return text;

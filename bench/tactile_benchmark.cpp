@@ -174,6 +174,41 @@ void BM_PeakMultiplyAdd(benchmark::State& state) {
 BENCHMARK(BM_PeakMultiplyAdd);
 #endif
 
+/// The same points as a list, each with its own axes.
+Model list_model() {
+  Scene scene = pad_model(200).scene();
+  const RectArray& a = scene.sensors[0].array;
+  for (int i = 0; i < 200; ++i)
+    for (int j = 0; j < 200; ++j) {
+      TactilePoint p;
+      for (std::size_t k = 0; k < 3; ++k)
+        p.position[k] = a.corner0[k] + 0.05 / 199 * (i * a.axis0[k] + j * a.axis1[k]);
+      p.axis0 = a.axis0, p.axis1 = a.axis1, p.normal = {0, 0, 1};
+      scene.sensors[0].points.push_back(p);
+    }
+  return Model(scene);
+}
+/// Tiles of a curved pad that is touched everywhere. The pad's axes are the body's: the ball comes from below.
+template <class Real>
+void curved(benchmark::State& state) {
+  const Model model = list_model();
+  const kernels::PadTiles pad = model.compiled().sensors[0].tiles();
+  Press press(0.5, 2e-3);
+  press.touch.c.z = -0.005 - press.touch.c.z;
+  AlignedVector<Real> values(std::size_t(pad.tiles()) * 3 * kTactileTile);
+  std::vector<int> active(std::size_t(pad.tiles()));
+  const kernels::TactileArgs<Real> args{&pad,         ContactLaw::clamped, 1, &press.shape, &press.touch,
+                                        active.data(), values.data(),      nullptr};
+  int tiles = 0;
+  for (auto _ : state) {
+    tiles = run(args);
+    benchmark::ClobberMemory();
+  }
+  count(state, pad.rows);
+  state.counters["tiles"] = tiles;
+}
+void BM_CurvedDouble(benchmark::State& s) { curved<double>(s); }
+void BM_CurvedMixed(benchmark::State& s) { curved<float>(s); }
 void BM_DenseDouble(benchmark::State& s) { field<double>(s, kEverywhere, 200, true); }
 void BM_DenseMixed(benchmark::State& s) { field<float>(s, kEverywhere, 200, true); }
 void BM_CompactDouble(benchmark::State& s) { field<double>(s, kEverywhere, 200, false); }
@@ -190,6 +225,8 @@ BENCHMARK(BM_DenseMixed);
 BENCHMARK(BM_CompactDouble);
 BENCHMARK(BM_CompactMixed);
 
+BENCHMARK(BM_CurvedDouble);
+BENCHMARK(BM_CurvedMixed);
 BENCHMARK(BM_CulledDouble);
 BENCHMARK(BM_CulledMixed);
 BENCHMARK(BM_SmallPadDouble);

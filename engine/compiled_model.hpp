@@ -47,10 +47,13 @@ struct CompiledSensor {
   int body = -1, link = -1;
   kernels::Frame<double> pad;        ///< pad frame in the link: axis0, axis1, their product; the array's middle
   int rows = 0, cols = 0, tile_rows = 0, tile_cols = 0;
-  AlignedVector<double> tile_x, tile_y, tile_radius;  ///< (n_tiles, padded to 8)
-  std::vector<unsigned char> tile_kind;               ///< (n_tiles)
-  AlignedVector<double> offsets;                      ///< (4, 2, 64)
-  AlignedVector<float> offsets_f;                     ///< (4, 2, 64)
+  AlignedVector<double> tile_x, tile_y, tile_z, tile_radius;  ///< (n_tiles, padded to 8)
+  std::vector<int> tile_kind;                                 ///< (n_tiles)
+  AlignedVector<double> offsets;                              ///< (4, 2, 64) flat, (n_tiles, 3, 64) curved
+  AlignedVector<float> offsets_f;
+  std::vector<int> index;                                     ///< (n_tiles, 64) curved, empty: flat
+  AlignedVector<double> frames, factors;                      ///< (n_tiles, 9, 64), (n_tiles, 4, 64) or empty
+  AlignedVector<float> frames_f, factors_f;
   bool skewed = false;
   double axes[9] = {};               ///< rows axis0, axis1, -(axis0 × axis1), pad axes
   kernels::ContactParameters parameters{};
@@ -122,6 +125,12 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
 
 /// Tiles, bounds, axes and pressure sign of a sensor. Throws InputError for degenerate arrays.
 CompiledSensor compile_sensor(const TactileDescription& description, const CompiledBody& body, SensorInfo& info);
+/// The same for a list of points.
+CompiledSensor compile_points(const TactileDescription& description, const CompiledBody& body, SensorInfo& info);
+/// Positive where a direction points out of a body near a place on its surface, body frame.
+double points_outward(const CompiledBody& body, const kernels::Vec3<double>& at, const kernels::Vec3<double>& direction);
+/// Where missing points and tiles are put [m]: beyond any shape, finite, so that nothing overflows.
+inline constexpr double kFarAway = 1e6;
 
 /// Names to indices, joints to elementary links. Throws InputError.
 std::shared_ptr<const CompiledModel> compile(const Scene& scene);

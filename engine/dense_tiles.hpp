@@ -11,6 +11,10 @@ namespace tangere {
 
 template <class T>
 void clear_tile(const kernels::PadTiles& pad, int tile, T* dense) {
+  if (pad.curved()) {
+    for (int k = 0; k < pad.points_of(tile); ++k) std::fill_n(dense + 3 * pad.index[kernels::kTactileTile * tile + k], 3, T(0));
+    return;
+  }
   const int rows = pad.rows_of(tile), numbers = 3 * pad.cols_of(tile);
   T* row = dense + 3 * pad.first_of(tile);
   for (int i = 0; i < rows; ++i, row += 3 * pad.cols) std::fill(row, row + numbers, T(0));
@@ -22,7 +26,7 @@ void clear_tiles_between(const kernels::PadTiles& pad, std::span<const int> tile
   std::size_t next = 0;
   for (int first = 0; first < pad.tiles(); first += pad.tile_cols) {
     const int end = first + pad.tile_cols;
-    if (next == tiles.size() || tiles[next] >= end) {
+    if (!pad.curved() && (next == tiles.size() || tiles[next] >= end)) {
       T* row = dense + 3 * pad.first_of(first);
       std::fill(row, row + 3 * pad.rows_of(first) * pad.cols, T(0));
       continue;
@@ -40,6 +44,12 @@ void clear_tiles_between(const kernels::PadTiles& pad, std::span<const int> tile
 /// (3, 64) to the tile's rows, converted.
 template <class Real, class T>
 void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* dense) {
+  if (pad.curved()) {
+    const int* index = pad.index + kernels::kTactileTile * tile;
+    for (int k = 0; k < pad.points_of(tile); ++k)
+      for (int c = 0; c < 3; ++c) dense[3 * index[k] + c] = static_cast<T>(from[c * kernels::kTactileTile + k]);
+    return;
+  }
   const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
   T* row = dense + 3 * pad.first_of(tile);
   for (int i = 0; i < rows; ++i, row += 3 * pad.cols)

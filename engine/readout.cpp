@@ -34,7 +34,7 @@ struct Readout::Impl {
     (p == Precision::f64 ? wide.resize(room) : single.resize(room));
   }
 
-  static bool small(const CompiledSensor& s) { return s.points() <= kSmallPad; }
+  static bool small(const CompiledSensor& s) { return s.points() <= kSmallPad && s.index.empty(); }
   [[nodiscard]] const CompiledSensor& sensor_of(int k) const { return model.compiled().sensors[std::size_t(k)]; }
   template <class Real>
   Real* scratch() {

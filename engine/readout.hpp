@@ -40,7 +40,7 @@ class Readout {
   void read(const Batch& batch, int environment, CompactFrame<T>& frame);
 
   /// Fields of the environments 16 block …, (points, 3) each, one array per environment; those beyond the last environment
-  /// of the batch are left alone and may be missing. Pads of up to kSmallPad points are read in all environments at once.
+  /// of the batch are left alone and may be missing. Flat pads of up to kSmallPad points are read in all environments at once.
   void read_block(const Batch& batch, int block, int sensor, std::span<const std::span<double>> fields);
   void read_block(const Batch& batch, int block, int sensor, std::span<const std::span<float>> fields);
   /// The same into one frame per environment, all of one sensor.

@@ -131,12 +131,21 @@ struct RectArray {
   int rows = 1, cols = 1;
 };
 
+/// A tactile point of its own, in the body frame.
+struct TactilePoint {
+  Vector3 position{};                        ///< [m]
+  Vector3 normal{}, axis0{}, axis1{};        ///< unit
+  std::array<int, 2> pixel{-1, -1};          ///< row and column in an image; -1: none
+  std::array<double, 4> factors{1, 1, 1, 1}; ///< times the sensor's kn, kt, mu, damping
+};
+
 struct TactileDescription {
   std::string name;
   std::string body;
   ContactCoefficients coefficients;
   ContactLaw law = ContactLaw::clamped;
   RectArray array;
+  std::vector<TactilePoint> points;   ///< a curved pad, in the order of its field; empty: the array
   int every = 0;                      ///< read every k-th step; 0: not given, left to the caller
   std::optional<int> pressure_sign;   ///< +1 or -1; found from the geometry when not given
   Source source;

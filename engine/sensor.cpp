@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A rectangular array of tactile points, cut into 8×8 tiles and moved into its link's axes.
+// A rectangular array of tactile points, cut into 8×8 tiles and moved into its pad's axes; tactile_points.cpp does lists.
 #include <algorithm>
 #include <cmath>
 
@@ -13,19 +13,13 @@ using kernels::Vec3;
 
 namespace {
 
-constexpr double kFarAway = 1e6;  // missing points and tiles [m]: beyond any shape, finite, so nothing overflows
-
 Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
 
 /// +1 when axis0 × axis1 points out of the body: then pressure, a force into the body, reads positive.
 int find_pressure_sign(const TactileDescription& d, const CompiledBody& body, const Vec3<double>& normal) {
   if (d.pressure_sign) return *d.pressure_sign;
   const RectArray& a = d.array;
-  const Vec3<double> middle = 0.5 * (vec(a.corner0) + vec(a.corner1));
-  if (!body.touchable) return dot(normal, middle - body.centre) >= 0 ? 1 : -1;
-  const Vec3<double> outward = kernels::with_distance<double>(
-      body.shape, body.size, [&](const auto& shape) { return kernels::distance_at(shape, middle).n; });
-  return dot(normal, outward) >= 0 ? 1 : -1;
+  return points_outward(body, 0.5 * (vec(a.corner0) + vec(a.corner1)), normal) >= 0 ? 1 : -1;
 }
 
 /// Spacing of the array's points in pad axes: from row to row, and from column to column [m].
@@ -43,6 +37,7 @@ void place_tiles(CompiledSensor& s, const Lattice& lattice) {
   const std::size_t padded = std::size_t(s.n_tiles() + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
   s.tile_x.assign(padded, kFarAway);
   s.tile_y.assign(padded, kFarAway);
+  s.tile_z.assign(padded, 0.0);
   s.tile_radius.assign(padded, 0.0);
   s.offsets.assign(std::size_t{4} * 2 * kernels::kTactileTile, kFarAway);
   s.offsets_f.assign(s.offsets.size(), static_cast<float>(kFarAway));
@@ -53,7 +48,7 @@ void place_tiles(CompiledSensor& s, const Lattice& lattice) {
     s.tile_x[std::size_t(t)] = i * lattice.row_x + j * lattice.col_x;
     s.tile_y[std::size_t(t)] = i * lattice.row_y + j * lattice.col_y;
     const int kind = (cols < kSide ? 1 : 0) + (rows < kSide ? 2 : 0);
-    s.tile_kind.push_back(static_cast<unsigned char>(kind));
+    s.tile_kind.push_back(kind);
     double square = 0;
     for (int k = 0; k < kernels::kTactileTile; ++k) {
       if (k / kSide >= rows || k % kSide >= cols) continue;
@@ -71,9 +66,7 @@ void place_tiles(CompiledSensor& s, const Lattice& lattice) {
   }
 }
 
-}  // namespace
-
-CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& body, SensorInfo& info) {
+CompiledSensor compile_array(const TactileDescription& d, const CompiledBody& body, SensorInfo& info) {
   CompiledSensor s;
   const RectArray& a = d.array;
   const Vec3<double> p0 = vec(a.corner0), axis0 = vec(a.axis0), axis1 = vec(a.axis1);
@@ -102,15 +95,28 @@ CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& b
       s.skewed |= std::abs(row[c] - (r != c ? 0 : r == 2 ? -1 : 1)) > 1e-12;
     }
   }
-  s.law = d.law;
-
-  info.name = d.name;
-  info.body = d.body;
   info.rows = a.rows;
   info.cols = a.cols;
-  info.points = a.rows * a.cols;
-  info.every = d.every;
   info.pressure_sign = find_pressure_sign(d, body, normal);
+  return s;
+}
+
+}  // namespace
+
+double points_outward(const CompiledBody& body, const Vec3<double>& at, const Vec3<double>& direction) {
+  if (!body.touchable) return dot(direction, at - body.centre);
+  return dot(direction, kernels::with_distance<double>(body.shape, body.size, [&](const auto& shape) {
+               return kernels::distance_at(shape, at).n;
+             }));
+}
+
+CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& body, SensorInfo& info) {
+  CompiledSensor s = d.points.empty() ? compile_array(d, body, info) : compile_points(d, body, info);
+  s.law = d.law;
+  info.name = d.name;
+  info.body = d.body;
+  info.points = s.points();
+  info.every = d.every;
   return s;
 }
 
@@ -118,9 +124,14 @@ kernels::PadTiles CompiledSensor::tiles() const {
   kernels::PadTiles p{};
   p.rows = rows, p.cols = cols;
   p.tile_rows = tile_rows, p.tile_cols = tile_cols;
-  p.x = tile_x.data(), p.y = tile_y.data(), p.radius = tile_radius.data();
+  p.x = tile_x.data(), p.y = tile_y.data(), p.z = tile_z.data(), p.radius = tile_radius.data();
   p.kind = tile_kind.data();
   p.offsets = offsets.data(), p.offsets_f = offsets_f.data();
+  if (!index.empty()) {
+    p.index = index.data();
+    p.frames = frames.data(), p.frames_f = frames_f.data();
+  }
+  if (!factors.empty()) p.factors = factors.data(), p.factors_f = factors_f.data();
   p.skewed = skewed;
   std::copy(axes, axes + 9, p.axes);
   return p;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Actuators, contacts and sensors of a scene file.
+// Actuators and contacts of a scene file.
 #include "io/scene_sections.hpp"
 
 #include <fmt/format.h>
@@ -11,7 +11,6 @@ namespace tangere {
 
 namespace {
 
-constexpr int kLargestArray = 4096;               // rows or columns of a tactile array
 const std::vector<std::string> kLaws = {"clamped", "paper", "linear"};
 constexpr ContactLaw kLawOf[] = {ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear};
 
@@ -26,13 +25,6 @@ int find_named(const Scene& scene, const SceneNode& node, const char* attribute,
   node.fail(fmt::format("{}=\"{}\": no {} has this name{}", attribute, wanted, kind, suggestion(wanted, names)));
 }
 
-ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law) {
-  const SceneContext& c = node.context();
-  const double damping = law == ContactLaw::linear ? c.damping_force : c.damping_area;
-  return {node.not_negative("kn", 0.0) * c.stiffness, node.not_negative("kt", 0.0) * c.damping_force,
-          node.not_negative("mu", 0.0), node.not_negative("damping", 0.0) * damping};
-}
-
 std::string with_article(const std::string& shape) { return (shape == "abstract" ? "an " : "a ") + shape + " body"; }
 
 double read_ramp(const SceneNode& node) {
@@ -40,6 +32,13 @@ double read_ramp(const SceneNode& node) {
 }
 
 }  // namespace
+
+ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law) {
+  const SceneContext& c = node.context();
+  const double damping = law == ContactLaw::linear ? c.damping_force : c.damping_area;
+  return {node.not_negative("kn", 0.0) * c.stiffness, node.not_negative("kt", 0.0) * c.damping_force,
+          node.not_negative("mu", 0.0), node.not_negative("damping", 0.0) * damping};
+}
 
 int find_joint(const Scene& scene, const SceneNode& node, const char* attribute) {
   return find_named(scene, node, attribute, "joint", [](const LinkDescription& l) { return l.joint.name; });
@@ -90,51 +89,6 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       d.coefficients = read_coefficients(node, d.law);
       scene.pair_contacts.push_back(std::move(d));
     }
-  }
-}
-
-void read_sensors(Scene& scene, const SceneNode& section) {
-  section.check_attributes({});
-  for (const SceneNode& node : section.children({"tactile"})) {
-    const double length = node.context().length;
-    TactileDescription d;
-    d.source = node.source();
-    find_body(scene, node, "body");
-    d.body = node.text("body");
-    d.name = node.text("name", d.body);
-    if (d.name.find('/') != std::string::npos) node.fail("name \"" + d.name + "\" holds '/', which files use as a separator");
-    for (const TactileDescription& other : scene.sensors)
-      if (other.name == d.name) node.fail("tactile name '" + d.name + "' is used twice");
-    const std::vector<std::string> types = {"rect_array", "abstract", "hemisphere", "cylinder", "mesh"};
-    const int type = node.choice("type", types);
-    if (type != 0)
-      node.fail("tactile type '" + types[std::size_t(type)] + "' is not simulated by this version; supported: rect_array");
-    node.check_attributes({"name", "body", "type", "kn", "kt", "mu", "damping", "law", "every", "rect_pos0", "rect_pos1",
-                           "axis0", "axis1", "resolution", "pressure_sign"},
-                          {"render"}, {"spec", "pos", "quat"});
-    constexpr ContactLaw kTactileLaws[] = {ContactLaw::clamped, ContactLaw::paper};
-    d.law = kTactileLaws[node.choice("law", {"clamped", "paper"}, 0)];
-    d.coefficients = read_coefficients(node, d.law);
-    d.every = node.integer("every", 1, 1000000000, 0);
-    if (node.has("pressure_sign")) {
-      const double sign = node.number("pressure_sign");
-      if (sign != 1 && sign != -1) node.fail(fmt::format("pressure_sign=\"{}\"; expected 1 or -1", sign));
-      d.pressure_sign = static_cast<int>(sign);
-    }
-    d.array.corner0 = scaled(node.vector("rect_pos0"), length);
-    d.array.corner1 = scaled(node.vector("rect_pos1"), length);
-    d.array.axis0 = node.direction("axis0");
-    d.array.axis1 = node.direction("axis1");
-    double slant = 0;
-    for (int i = 0; i < 3; ++i) slant += d.array.axis0[i] * d.array.axis1[i];
-    if (std::abs(slant) > 1e-6) node.fail("axis0 and axis1 are not perpendicular");
-    const std::vector<double> n = node.numbers("resolution", 2);
-    for (double k : n)
-      if (k != std::floor(k) || k < 1 || k > kLargestArray)
-        node.fail(fmt::format("resolution has {}; expected integers from 1 to {}", k, kLargestArray));
-    d.array.rows = static_cast<int>(n[0]);
-    d.array.cols = static_cast<int>(n[1]);
-    scene.sensors.push_back(std::move(d));
   }
 }
 

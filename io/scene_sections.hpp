@@ -17,6 +17,9 @@ void read_initial(Scene& scene, const SceneNode& section);
 void read_control(Scene& scene, const SceneNode& section);
 void read_randomize(Scene& scene, const SceneNode& section);
 
+/// k_n, k_t, μ and the damping that a law means, in SI; all 0 by default.
+ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law);
+
 inline Vector3 scaled(const Vector3& a, double s) { return {s * a[0], s * a[1], s * a[2]}; }
 
 /// Index of the named joint or body; fails at the attribute's element with the nearest name.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "io/sensor_description.hpp"
 namespace tangere {
 namespace {
 
@@ -52,21 +53,6 @@ void put(const h5::Id& dataset, std::int64_t first, const h5::Dims& dims, const 
   h5::Dims offset(dims.size(), 0);
   offset[0] = static_cast<hsize_t>(first);
   h5::write_box<T>(dataset, offset, dims, data);
-}
-
-void describe_sensor(const h5::Id& sensors, const SensorLayout& s) {
-  const h5::Id group = h5::create_group(sensors, s.name);
-  h5::write_attribute(group, "units", "N");
-  h5::write_attribute(group, "components",
-                      "f.axis0, f.axis1, -f.(axis0 x axis1); f is the force on the body");
-  h5::write_attribute(group, "body", s.body);
-  h5::write_scalar<std::int64_t>(group, "pressure_sign", s.pressure_sign);
-  const std::int64_t resolution[] = {s.rows, s.cols};
-  h5::write_list<std::int64_t>(group, "resolution", resolution);
-  h5::write_list<double>(group, "corner0", s.corner0);
-  h5::write_list<double>(group, "corner1", s.corner1);
-  h5::write_list<double>(group, "axis0", s.axis0);
-  h5::write_list<double>(group, "axis1", s.axis1);
 }
 
 }  // namespace
@@ -131,7 +117,10 @@ void ShardFile::describe() {
   texts("v_units", layout_.v_units);
   texts("action_names", layout_.u_names);
   const h5::Id sensors = h5::create_group(scene, "sensors");
-  for (const SensorLayout& sensor : layout_.sensors) describe_sensor(sensors, sensor);
+  for (const SensorLayout& sensor : layout_.sensors) {
+    const h5::Id group = h5::create_group(sensors, sensor.name);
+    describe_sensor(group, group, sensor);
+  }
 }
 
 void ShardFile::create_block(std::int64_t first_episode) {

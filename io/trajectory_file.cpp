@@ -9,6 +9,7 @@
 
 #include "io/h5.hpp"
 #include "io/part_file.hpp"
+#include "io/sensor_description.hpp"
 
 namespace tangere {
 
@@ -159,18 +160,8 @@ struct TrajectoryFile::Impl {
     out.force = h5::create_dataset<double>(group, "force", dims, F > 0 ? field_storage(dims) : h5::Storage{});
     out.step = h5::create_dataset<std::int64_t>(group, "step", {F});
     h5::write_attribute(out.step, "meaning", "row of /q that each field was read from");
-    h5::write_attribute(out.force, "units", "N");
-    h5::write_attribute(out.force, "components", "f.axis0, f.axis1, -f.(axis0 x axis1); f is the force on the body");
-    h5::write_attribute(out.force, "frame", "axis0, axis1 of the sensor, in the body's axes");
-    h5::write_attribute(out.force, "body", s.body);
-    h5::write_scalar<std::int64_t>(out.force, "pressure_sign", s.pressure_sign);
     h5::write_scalar<std::int64_t>(out.force, "every", s.every);
-    const std::int64_t resolution[] = {s.rows, s.cols};
-    h5::write_list<std::int64_t>(out.force, "resolution", resolution);
-    h5::write_list<double>(out.force, "corner0", s.corner0);
-    h5::write_list<double>(out.force, "corner1", s.corner1);
-    h5::write_list<double>(out.force, "axis0", s.axis0);
-    h5::write_list<double>(out.force, "axis1", s.axis1);
+    describe_sensor(out.force, group, s);
     sensors.push_back(std::move(out));
   }
 

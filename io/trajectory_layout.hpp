@@ -24,6 +24,8 @@ struct SensorLayout {
   std::array<double, 3> corner0{}, corner1{};
   std::array<double, 3> axis0{}, axis1{};  ///< unit, orthogonal
 
+  std::vector<TactilePoint> list;          ///< a list of points in the field's order; empty for arrays
+
   [[nodiscard]] bool rectangular() const { return rows > 0; }
   /// {pitch0, pitch1} [m]; negative when the corners run against an axis, 0 for a single row.
   [[nodiscard]] std::array<double, 2> pitch() const;

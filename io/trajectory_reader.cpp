@@ -57,15 +57,15 @@ struct TrajectoryReader::Impl {
       if (x.size() != 3) throw IoError(path + ": attribute '" + attribute + "' is damaged");
       std::copy(x.begin(), x.end(), to.begin());
     };
-    copy("corner0", s.corner0);
-    copy("corner1", s.corner1);
-    copy("axis0", s.axis0);
-    copy("axis1", s.axis1);
     const h5::Dims dims = h5::dimensions(force);
     if (dims.size() == 5) {
       s.rows = static_cast<int>(dims[2]);
       s.cols = static_cast<int>(dims[3]);
       s.points = s.rows * s.cols;
+      copy("corner0", s.corner0);
+      copy("corner1", s.corner1);
+      copy("axis0", s.axis0);
+      copy("axis1", s.axis1);
     } else if (dims.size() == 4) {
       s.points = static_cast<int>(dims[2]);
     } else {

@@ -11,7 +11,6 @@
 #include "kernels/lu-inl.hpp"
 #include "kernels/norms-inl.hpp"
 #include "kernels/tactile_block-inl.hpp"
-#include "kernels/twice.hpp"
 
 namespace tangere::kernels {
 
@@ -139,8 +138,8 @@ struct TableOf {
     pad_touch(reinterpret_cast<const LinkPose<N>*>(sensor), pad, reinterpret_cast<const LinkPose<N>*>(body), shape,
               reinterpret_cast<Touch<N>&>(*out));
   }
-  static int tactile(const TactileArgs<double>& a) { return tactile_field<AcrossPoints<InDouble<Arch>>>(a); }
-  static int tactile_mixed(const TactileArgs<float>& a) { return tactile_field<AcrossPoints<InMixed<Arch>>>(a); }
+  static int tactile(const TactileArgs<double>& a) { return any_field<InDouble<Arch>>(a); }
+  static int tactile_mixed(const TactileArgs<float>& a) { return any_field<InMixed<Arch>>(a); }
   static void tactile_group(const TactileBlockArgs<double>& a) { tactile_block<InDouble<Arch>>(a); }
   static void tactile_group_mixed(const TactileBlockArgs<float>& a) { tactile_block<InMixed<Arch>>(a); }
   static constexpr KernelTable make(const char* name) {

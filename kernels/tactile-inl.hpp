@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kernels/tactile_rods.hpp"
+#include "kernels/twice.hpp"
 
 namespace tangere::kernels {
 
@@ -26,12 +27,12 @@ bool chunk_brackets(const PadTiles& pad, int first, const TouchShape& shape,
                     const Touch<Lanes<typename P::Architecture>>& at, TileChunk<typename P::Real>& out) {
   using Arch = typename P::Architecture;
   using D = Lanes<Arch>;
-  const D x = load_lanes<Arch>(pad.x + first), y = load_lanes<Arch>(pad.y + first);
+  const Vec3<D> t = {load_lanes<Arch>(pad.x + first), load_lanes<Arch>(pad.y + first), load_lanes<Arch>(pad.z + first)};
   D row[kBracketRows];
-  const D gap = Shape::bracket(shape, at, x, y, load_lanes<Arch>(pad.radius + first), row);
+  const D gap = Shape::bracket(shape, at, t, load_lanes<Arch>(pad.radius + first), row);
   if (!any(gap < D(0.0))) return false;
   store_lanes(gap, out.gap);
-  const Vec3<D> u = tile_velocity(at, x, y);
+  const Vec3<D> u = tile_velocity(at, t);
   row[Shape::kRows - 3] = u.x, row[Shape::kRows - 2] = u.y, row[Shape::kRows - 1] = u.z;
   for (int i = 0; i < Shape::kRows; ++i) store_row(row[i], out.row[i]);
   return true;
@@ -47,21 +48,46 @@ PointLaw<N> point_law(const Touch<double>& t) {
   return {broadcast<N>(t.omega), N(-t.kn), N(t.kt), N(t.mu), N(t.damping)};
 }
 
+/// Points k … of a tile, `offsets` (2 or 3, 64).
+template <class P>
+typename P::Offset load_offset(const typename P::Real* offsets, int k) {
+  if constexpr (P::kCurved) {
+    return {P::load(offsets + k), P::load(offsets + kTactileTile + k), P::load(offsets + 2 * kTactileTile + k)};
+  } else {
+    return {P::load(offsets + k), P::load(offsets + kTactileTile + k)};
+  }
+}
+
+/// The force on points k … of a tile in the axes in which it is stored; false where nothing touches.
+template <class P, ContactLaw Law, class Shape, class N = typename P::N>
+bool stored_force(const PadTiles& pad, int tile, int k, const Shape& shape, const PointLaw<N>& law, Vec3<N>& f) {
+  constexpr int kWidth = P::kCurved ? 3 : 2;
+  const typename P::Offset s = load_offset<P>(P::offsets(pad) + kWidth * kTactileTile * pad.kind[tile], k);
+  if constexpr (P::kCurved) {
+    const bool own = pad.factors != nullptr;
+    const auto at = own ? scaled_law<P>(law, P::factors(pad) + 4 * kTactileTile * tile + k) : law;
+    if (!point_force<P, Law>(shape, at, s, f)) return false;
+    f = in_point_axes<P>(P::frames(pad) + 9 * kTactileTile * tile + k, f);
+  } else {
+    if (!point_force<P, Law>(shape, law, s, f)) return false;
+    if (pad.skewed) f = in_skewed_axes(pad.axes, f);
+  }
+  return true;
+}
+
 /// The points of one tile. `out` (3, 64): written whole when `fresh` and something touches, else added to.
 template <class P, ContactLaw Law, class Shape>
-bool tile_force(const PadTiles& pad, const Shape& shape, const PointLaw<typename P::N>& law,
-                const typename P::Real* offsets, bool fresh, typename P::Real* out) {
+bool tile_force(const PadTiles& pad, int tile, const Shape& shape, const PointLaw<typename P::N>& law, bool fresh,
+                typename P::Real* out) {
   using N = typename P::N;
   bool touched = false;
   for (int k = 0; k < kTactileTile; k += P::kLanes) {
     Vec3<N> f;
-    const bool here = point_force<P, Law>(shape, law, P::load(offsets + k), P::load(offsets + kTactileTile + k), f);
+    const bool here = stored_force<P, Law>(pad, tile, k, shape, law, f);
     touched |= here;
     if (!here) {
       if (!fresh) continue;
       f = zero3<N>();
-    } else if (pad.skewed) {
-      f = in_skewed_axes(pad.axes, f);
     }
     const N* component = &f.x;
     for (int c = 0; c < 3; ++c) {
@@ -91,9 +117,8 @@ unsigned chunk_force(const TactileArgs<typename P::Real>& a, int touch, int firs
     for (int i = 0; i < Shape::kRows; ++i) row[i] = N(double(chunk.row[i][l]));
     shape.set(row);
     shape.u = {row[Shape::kRows - 3], row[Shape::kRows - 2], row[Shape::kRows - 1]};
-    const auto* offsets = P::offsets(pad) + 2 * kTactileTile * pad.kind[first + l];
     const bool fresh = ((written >> l) & 1U) == 0;
-    if (tile_force<P, Law>(pad, shape, law, offsets, fresh, buffer + 3 * kTactileTile * l)) written |= 1U << l;
+    if (tile_force<P, Law>(pad, first + l, shape, law, fresh, buffer + 3 * kTactileTile * l)) written |= 1U << l;
   }
   return written;
 }
@@ -128,9 +153,15 @@ void interleave_row(const Real* from, Real* to) {
   __builtin_memcpy(to + 16, &third, sizeof third);
 }
 
-/// (3, 64) to rows of (point, 3) in the array.
+/// (3, 64) to rows of (point, 3) in the array, or to places in a list.
 template <class Arch, class Real>
 void write_dense(const PadTiles& pad, int tile, const Real* from, Real* dense) {
+  if (pad.curved()) {
+    const int* index = pad.index + kTactileTile * tile;
+    for (int k = 0; k < pad.points_of(tile); ++k)
+      for (int c = 0; c < 3; ++c) dense[3 * index[k] + c] = from[c * kTactileTile + k];
+    return;
+  }
   const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
   Real* to = dense + 3 * pad.first_of(tile);
   for (int i = 0; i < rows; ++i, from += kTileSide, to += 3 * pad.cols) {
@@ -182,13 +213,18 @@ int tactile_field(const TactileArgs<typename P::Real>& a) {
 
 /// Returns the number of tiles that something touches.
 template <class P>
-int tactile_field(const TactileArgs<typename P::Real>& a) {
+int tactile_field_of(const TactileArgs<typename P::Real>& a) {
   switch (a.law) {
     case ContactLaw::paper: return tactile_field<P, ContactLaw::paper>(a);
     case ContactLaw::linear: return tactile_field<P, ContactLaw::linear>(a);
     case ContactLaw::clamped: break;
   }
   return tactile_field<P, ContactLaw::clamped>(a);
+}
+
+template <class P>
+int any_field(const TactileArgs<typename P::Real>& a) {
+  return a.pad->curved() ? tactile_field_of<OnCurvedPad<P>>(a) : tactile_field_of<AcrossPoints<P>>(a);
 }
 
 }  // namespace tangere::kernels

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tactile fields of many environments with a small pad: one lane each, the points of a tile one after the other.
+// Tactile fields of many environments with a small, flat pad: one lane each, the points of a tile one after the other.
 //
 // The same arithmetic as across points, lane by lane, so that an environment has the same bits either way.
 #pragma once
@@ -42,13 +42,14 @@ bool lane_brackets(const PadTiles& pad, int tile, const TouchShape& s, const Tou
   using Arch = typename P::Architecture;
   using D = Lanes<Arch>;
   constexpr int kGroups = P::kLanes / kGroup;
-  const D x(pad.x[tile]), y(pad.y[tile]), reach(pad.radius[tile]);
+  const Vec3<D> t = {D(pad.x[tile]), D(pad.y[tile]), D(pad.z[tile])};
+  const D reach(pad.radius[tile]);
   D row[kGroups][kBracketRows];
   bool near = false;
   for (int g = 0; g < kGroups; ++g) {
     const auto& at = reinterpret_cast<const Touch<D>&>(touch[g]);
-    near |= any(Shape::bracket(s, at, x, y, reach, row[g]) < D(0.0));
-    const Vec3<D> u = tile_velocity(at, x, y);
+    near |= any(Shape::bracket(s, at, t, reach, row[g]) < D(0.0));
+    const Vec3<D> u = tile_velocity(at, t);
     row[g][Shape::kRows - 3] = u.x, row[g][Shape::kRows - 2] = u.y, row[g][Shape::kRows - 1] = u.z;
   }
   if (!near) return false;
@@ -87,7 +88,7 @@ bool tile_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, int k, bo
       const int at = i * kTileSide + j;
       Vec3<N> f;
       const bool here =
-          point_force<P, Law>(shape, law, N(double(offsets[at])), N(double(offsets[kTactileTile + at])), f);
+          point_force<P, Law>(shape, law, {N(double(offsets[at])), N(double(offsets[kTactileTile + at]))}, f);
       touched |= here;
       if (!here) {
         if (!fresh) continue;

@@ -17,31 +17,32 @@ namespace tangere::kernels {
 template <class P>
 struct PlanePad {
   using N = typename P::N;
+  using Offset = typename P::Offset;
   static constexpr bool kTurns = true;
   static constexpr int kRows = 4;  // y_z, u
   /// Offsets beyond this are not points but what fills up edge tiles, and a half-space reaches that far [m].
   static constexpr double kFiller = 1e5;
 
-  N slope_x, slope_y;
   Vec3<N> normal;
   N height;
   Vec3<N> u;
 
   PlanePad(const TouchShape&, const Mat3<N>& pose)
-      : slope_x(pose.m[0][2]), slope_y(pose.m[1][2]), normal{pose.m[0][2], pose.m[1][2], pose.m[2][2]} {}
+      : normal{pose.m[0][2], pose.m[1][2], pose.m[2][2]} {}
 
   template <class D>
-  static D bracket(const TouchShape&, const Touch<D>& at, const D& x, const D& y, const D& reach, D* row) {
-    row[0] = mul_add(at.Q.m[0][2], x - at.c.x, mul_add(at.Q.m[1][2], y - at.c.y, -(at.Q.m[2][2] * at.c.z)));
+  static D bracket(const TouchShape&, const Touch<D>& at, const Vec3<D>& t, const D& reach, D* row) {
+    const Vec3<D> arm = t - at.c;
+    row[0] = mul_add(at.Q.m[0][2], arm.x, mul_add(at.Q.m[1][2], arm.y, at.Q.m[2][2] * arm.z));
     return row[0] - reach;
   }
 
   void set(const N* row) { height = row[0]; }
 
-  auto distance(const N& sx, const N& sy, N& d, Vec3<N>& n) const {
-    d = mul_add(slope_x, sx, mul_add(slope_y, sy, height));
+  auto distance(const Offset& s, N& d, Vec3<N>& n) const {
+    d = along(normal.x, normal.y, normal.z, s) + height;
     n = normal;
-    return (d < N(0.0)) & (sx < N(kFiller));
+    return (d < N(0.0)) & (s.x < N(kFiller));
   }
 };
 
@@ -49,6 +50,7 @@ struct PlanePad {
 template <class P>
 struct RodPad {
   using N = typename P::N;
+  using Offset = typename P::Offset;
   static constexpr bool kTurns = true;
 
   Mat3<N> Q;
@@ -60,13 +62,13 @@ struct RodPad {
       : Q(pose), radius(s.size[0]), half(s.size[1]), inverse_diameter(0.5 / s.size[0]) {}
 
   template <class D>
-  static Vec3<D> centre(const Touch<D>& at, const D& x, const D& y) {
-    return transposed_times(at.Q, Vec3<D>{x - at.c.x, y - at.c.y, -at.c.z});
+  static Vec3<D> centre(const Touch<D>& at, const Vec3<D>& t) {
+    return transposed_times(at.Q, t - at.c);
   }
 
-  Vec3<N> offset(const N& sx, const N& sy) const {
-    return {mul_add(Q.m[0][0], sx, Q.m[1][0] * sy), mul_add(Q.m[0][1], sx, Q.m[1][1] * sy),
-            mul_add(Q.m[0][2], sx, Q.m[1][2] * sy)};
+  Vec3<N> offset(const Offset& s) const {
+    return {along(Q.m[0][0], Q.m[1][0], Q.m[2][0], s), along(Q.m[0][1], Q.m[1][1], Q.m[2][1], s),
+            along(Q.m[0][2], Q.m[1][2], Q.m[2][2], s)};
   }
 
   /// e_x(e_x + 2 y_x) + e_y(e_y + 2 y_y) + rest.
@@ -91,6 +93,7 @@ template <class P>
 struct CylinderPad : RodPad<P> {
   using Base = RodPad<P>;
   using N = typename P::N;
+  using Offset = typename P::Offset;
   static constexpr int kRows = 8;  // y_x, y_y, y_z - h, -y_z - h, y_x² + y_y² - r², u
 
   N above, below, rest;
@@ -98,8 +101,8 @@ struct CylinderPad : RodPad<P> {
   using Base::Base;
 
   template <class D>
-  static D bracket(const TouchShape& s, const Touch<D>& at, const D& x, const D& y, const D& reach, D* row) {
-    const Vec3<D> c = Base::centre(at, x, y);
+  static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach, D* row) {
+    const Vec3<D> c = Base::centre(at, t);
     const D square = mul_add(c.x, c.x, c.y * c.y), far = reach + D(s.size[0]);
     row[0] = c.x, row[1] = c.y;
     row[2] = c.z - D(s.size[1]), row[3] = -c.z - D(s.size[1]);
@@ -112,9 +115,9 @@ struct CylinderPad : RodPad<P> {
     above = row[2], below = row[3], rest = row[4];
   }
 
-  auto distance(const N& sx, const N& sy, N& d, Vec3<N>& n) const {
+  auto distance(const Offset& s, N& d, Vec3<N>& n) const {
     const N zero(0.0), one(1.0);
-    const Vec3<N> e = this->offset(sx, sy);
+    const Vec3<N> e = this->offset(s);
     const N x = e.x + this->x0, y = e.y + this->y0, up = above + e.z, down = below - e.z;
     const N square = mul_add(x, x, y * y), inverse = inverse_sqrt(square);
     const N side = this->beyond_radius(square, inverse, this->surplus(e, rest)), cap = max(up, down);
@@ -132,6 +135,7 @@ template <class P>
 struct CapsulePad : RodPad<P> {
   using Base = RodPad<P>;
   using N = typename P::N;
+  using Offset = typename P::Offset;
   static constexpr int kRows = 10;  // y_x, y_y, y_z - h, y_z + h, the rests beside the axis, above and below it, u
 
   N above, below, beside_rest, above_rest, below_rest;
@@ -139,9 +143,9 @@ struct CapsulePad : RodPad<P> {
   using Base::Base;
 
   template <class D>
-  static D bracket(const TouchShape& s, const Touch<D>& at, const D& x, const D& y, const D& reach, D* row) {
+  static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach, D* row) {
     const D zero(0.0);
-    const Vec3<D> c = Base::centre(at, x, y);
+    const Vec3<D> c = Base::centre(at, t);
     const D square = mul_add(c.x, c.x, c.y * c.y), far = reach + D(s.size[0]);
     row[0] = c.x, row[1] = c.y;
     row[2] = c.z - D(s.size[1]), row[3] = c.z + D(s.size[1]);
@@ -158,9 +162,9 @@ struct CapsulePad : RodPad<P> {
     beside_rest = row[4], above_rest = row[5], below_rest = row[6];
   }
 
-  auto distance(const N& sx, const N& sy, N& d, Vec3<N>& n) const {
+  auto distance(const Offset& s, N& d, Vec3<N>& n) const {
     const N zero(0.0), one(1.0);
-    const Vec3<N> e = this->offset(sx, sy);
+    const Vec3<N> e = this->offset(s);
     const N x = e.x + this->x0, y = e.y + this->y0, up = above + e.z, down = below + e.z;
     const N z = max(up, zero) + min(down, zero);  // beyond an end; 0 beside the axis
     const N square = mul_add(x, x, mul_add(y, y, z * z)), inverse = inverse_sqrt(square);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A pad as the tactile kernels see it, and what is put to it. Plain arrays, no ownership.
 //
-// Pad axes: axis0, axis1 and axis0 × axis1 made orthonormal, origin in the pad's plane: every point has z = 0.
+// Flat pads: axes axis0, axis1 and axis0 × axis1 made orthonormal, origin in the pad's plane, every point has z = 0.
+// Curved pads: the body's axes; every point has its own offset in three directions, its own axes, perhaps its own ξ.
 #pragma once
 
 #include "kernels/contact_types.hpp"
@@ -12,19 +13,31 @@ namespace tangere::kernels {
 inline constexpr int kTileSide = 8;
 inline constexpr int kTactileTile = kTileSide * kTileSide;  ///< points in a tile
 
-/// Points in tiles of 8×8, row-major. A point is its tile's centre plus an offset; tiles alike share their offsets.
+/// Points in tiles of 64: 8×8, row-major, or as many of a list that are near each other. A point is its tile's centre plus
+/// an offset; flat tiles alike share their offsets.
 struct PadTiles {
-  int rows, cols;             ///< points
+  int rows, cols;             ///< points; of a list, cols = 1
   int tile_rows, tile_cols;
-  const double *x, *y;        ///< (n_tiles, padded to 8 with tiles far away) centres, pad axes [m]
+  const double *x, *y, *z;    ///< (n_tiles, padded to 8 with tiles far away) centres, pad axes [m]
   const double* radius;       ///< (the same) distance of the farthest point, with a margin for rounding
-  const unsigned char* kind;  ///< (n_tiles) which of the offsets: bit 0 last column, bit 1 last row
-  const double* offsets;      ///< (4, 2, 64): x, then y; missing points of edge tiles are far away
-  const float* offsets_f;     ///< (4, 2, 64) the same in single precision
+  const int* kind;            ///< (n_tiles) which of the offsets; flat: bit 0 last column, bit 1 last row
+  const double* offsets;      ///< (4, 2, 64) flat, (n_tiles, 3, 64) curved: x, y, z; missing points are far away
+  const float* offsets_f;     ///< the same in single precision
+  const int* index;           ///< curved: (n_tiles, 64) the point's place in the list; nullptr: flat
+  const double* frames;       ///< curved: (n_tiles, 9, 64) rows axis0, axis1, -normal of (f·x, f·y, -f·z), pad axes
+  const float* frames_f;
+  const double* factors;      ///< (n_tiles, 4, 64) of kn, kt, mu, damping; nullptr: all 1
+  const float* factors_f;
   bool skewed;                ///< axis0 and axis1 are not quite unit and perpendicular: forces need `axes`
   double axes[9];             ///< rows: axis0, axis1, -(axis0 × axis1), pad axes
 
   [[nodiscard]] int tiles() const { return tile_rows * tile_cols; }
+  [[nodiscard]] bool curved() const { return index != nullptr; }
+  /// Points of a tile of a list.
+  [[nodiscard]] int points_of(int tile) const {
+    const int left = rows - kTactileTile * tile;
+    return left < kTactileTile ? left : kTactileTile;
+  }
   /// Points of a tile along axis0 and axis1.
   [[nodiscard]] int rows_of(int tile) const { return shorter(rows - kTileSide * (tile / tile_cols)); }
   [[nodiscard]] int cols_of(int tile) const { return shorter(cols - kTileSide * (tile % tile_cols)); }

@@ -3,6 +3,8 @@
 // waiting is a hundred operations. Two independent chains in a row are half as long.
 #pragma once
 
+#include "kernels/tactile_point.hpp"
+
 namespace tangere::kernels {
 
 template <class N>
@@ -71,7 +73,8 @@ struct Paired {
   using Architecture = typename P::Architecture;
   using N = Twice<typename P::N>;
   using Real = typename P::Real;
-  static constexpr bool kSingle = P::kSingle;
+  using Offset = PointOffset<N, false>;
+  static constexpr bool kSingle = P::kSingle, kCurved = false;
   static constexpr int kLanes = 2 * P::kLanes;
   static constexpr double kSmallest = P::kSmallest;
   static N load(const Real* p) { return {P::load(p), P::load(p + P::kLanes)}; }
@@ -79,10 +82,9 @@ struct Paired {
     P::store(x.a, p);
     P::store(x.b, p + P::kLanes);
   }
-  template <class Pad>
-  static const Real* offsets(const Pad& pad) {
-    return P::offsets(pad);
-  }
+  static const Real* offsets(const PadTiles& pad) { return P::offsets(pad); }
+  static const Real* frames(const PadTiles& pad) { return P::frames(pad); }
+  static const Real* factors(const PadTiles& pad) { return P::factors(pad); }
 };
 
 /// Paired where a vector is one register; more would not fit.
