@@ -67,6 +67,8 @@ Json as_json(const Model& model) {
                        {"points", s.points},
                        {"every", s.every},
                        {"pressure_sign", s.pressure_sign}});
+  Json variables = Json::array();
+  for (const VariableInfo& v : model.variables()) variables.push_back({{"name", v.name}, {"joint", v.joint}});
   for (const EffectInfo& e : model.effects())
     effects.push_back({{"name", e.name}, {"on", e.on}, {"reason", e.reason}});
   const std::int64_t steps = steps_of(model);
@@ -87,6 +89,7 @@ Json as_json(const Model& model) {
           {"motors", motors_json(scene)},
           {"contacts", contacts},
           {"sensors", sensors},
+          {"variables", variables},
           {"control", control_name(scene)},
           {"steps", steps < 0 ? Json() : Json(steps)},
           {"randomized", randomized_names(scene)},
@@ -123,6 +126,13 @@ std::string sensors_text(const Model& model) {
   return text;
 }
 
+std::string variables_text(const Model& model) {
+  if (model.variables().empty()) return "";
+  std::string text = fmt::format("\nend effectors ({})\n", model.variables().size());
+  for (const VariableInfo& v : model.variables()) text += fmt::format("  {} on joint {}\n", v.name, v.joint);
+  return text;
+}
+
 std::string as_text(const Model& model) {
   const Scene& scene = model.scene();
   std::string text =
@@ -141,7 +151,7 @@ std::string as_text(const Model& model) {
   for (const ContactInfo& c : model.contacts())
     text += fmt::format("  {} on {}: {} point{}, law {}\n", c.first, c.second, c.points,
                         c.points == 1 ? "" : "s", c.law);
-  text += '\n' + sensors_text(model) + "\neffects\n";
+  text += '\n' + sensors_text(model) + variables_text(model) + "\neffects\n";
   for (const EffectInfo& e : model.effects())
     text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);
   return text + fmt::format(

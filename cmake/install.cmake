@@ -24,7 +24,8 @@ install(TARGETS tangere_kernels tangere_engine tangere_tasks tangere_io tangere_
   EXPORT tangere ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS tangere RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(FILES kernels/contact_types.hpp DESTINATION ${headers}/kernels)
-install(FILES engine/aligned.hpp engine/batch.hpp engine/control.hpp engine/episode_sink.hpp engine/error.hpp engine/model.hpp
+install(FILES engine/aligned.hpp engine/batch.hpp engine/control.hpp engine/episode_sink.hpp engine/error.hpp
+  engine/flow_map.hpp engine/model.hpp
   engine/precision.hpp engine/readout.hpp engine/row_sink.hpp engine/scene.hpp engine/stepper.hpp
   engine/tactile_frame.hpp DESTINATION ${headers}/engine)
 install(FILES tasks/benchmark_run.hpp tasks/episodes.hpp tasks/rollout.hpp DESTINATION ${headers}/tasks)

@@ -32,6 +32,7 @@ class Compiler {
     pair_contacts();
     ground_contacts();
     sensors();
+    variables();
     randomizations();
     symbolic();
     return std::move(m_);
@@ -220,6 +221,16 @@ class Compiler {
         if (m_.bodies[t].link != sensor.link && m_.bodies[t].touchable) sensor.targets.push_back(t);
       m_.sensors.push_back(std::move(sensor));
       m_.sensor_info.push_back(std::move(info));
+    }
+  }
+
+  void variables() {
+    NameIndex names;
+    for (const VariableDescription& d : m_.scene.variables) {
+      names.add("endeffector", d.name, static_cast<int>(m_.variables.size()), d.source);
+      const CompiledJoint& joint = m_.joints[joints_.find("joint", d.joint, d.source)];
+      m_.variables.push_back({joint.link, joint.frame.R * vec(d.position) + joint.frame.p});
+      m_.variable_info.push_back({d.name, d.joint});
     }
   }
 

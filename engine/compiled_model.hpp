@@ -65,6 +65,12 @@ struct CompiledSensor {
   [[nodiscard]] kernels::PadTiles tiles() const;
 };
 
+/// An end effector.
+struct CompiledVariable {
+  int link = -1;                  ///< -1: fixed in the world
+  kernels::Vec3<double> point{};  ///< link axes (or the world's) [m]
+};
+
 /// Symbolic analysis of the Jacobian: the storage behind kernels::Pattern.
 struct PatternStorage {
   int n = 0, entries = 0, factor_entries = 0;
@@ -87,6 +93,7 @@ struct CompiledModel {
   std::vector<CompiledBody> bodies;    ///< parallel to scene.links
   std::vector<CompiledMotor> motors;   ///< one per control
   std::vector<CompiledSensor> sensors;
+  std::vector<CompiledVariable> variables;
   std::vector<kernels::PairContact> pairs;
   std::vector<kernels::GroundContact> grounds;
   std::vector<std::vector<double>> point_storage;  ///< what pairs and grounds point into
@@ -100,6 +107,7 @@ struct CompiledModel {
   kernels::ModelView view{};
 
   std::vector<SensorInfo> sensor_info;
+  std::vector<VariableInfo> variable_info;
   std::vector<ContactInfo> contact_info;
   std::vector<EffectInfo> effects;     ///< of the whole scene
   std::vector<std::string> q_names, v_names, u_names, q_units, v_units, u_units, body_names;

@@ -24,7 +24,7 @@ struct EpisodeRows {
   int rows = 0;
   int action_rows = 0;                        ///< rows, one less when the last row is among them
   std::span<const float> actions;             ///< (episodes, action_rows, nu) in [-1, 1]
-  std::span<const Observation> observations;  ///< q, v, then each sensor: (episodes, rows, width)
+  std::span<const Observation> observations;  ///< q, v, end effectors if any, sensors: (episodes, rows, width)
 };
 
 /// An episode that no solution was found for.

@@ -24,6 +24,12 @@ struct SensorInfo {
   int pressure_sign = 1;    ///< +1: the third component is positive under pressure
 };
 
+/// An end effector after compilation.
+struct VariableInfo {
+  std::string name;
+  std::string joint;
+};
+
 /// One contact declared in the scene, after compilation.
 struct ContactInfo {
   std::string first, second;  ///< bodies; second is "ground" for a ground contact
@@ -53,6 +59,7 @@ class Model {
   [[nodiscard]] Integrator integrator() const;
   [[nodiscard]] const SolverOptions& solver() const;
   [[nodiscard]] std::span<const SensorInfo> sensors() const;
+  [[nodiscard]] std::span<const VariableInfo> variables() const;  ///< end effectors, in file order
   [[nodiscard]] std::span<const ContactInfo> contacts() const;
   [[nodiscard]] std::span<const EffectInfo> effects() const;
   [[nodiscard]] std::span<const std::string> q_names() const;  ///< "object_joint.qw" …

@@ -19,6 +19,8 @@ using kernels::kTactileTile;
 /// Fewer environments of a block than this are read one by one: the same bits, less work.
 constexpr int kFewest = 6;
 
+static void write3(const kernels::Vec3<double>& a, double* to) { to[0] = a.x, to[1] = a.y, to[2] = a.z; }
+
 struct Readout::Impl {
   Model model;
   Precision precision;
@@ -51,6 +53,16 @@ struct Readout::Impl {
   template <class Body>
   auto in_precision(const Body& body) {
     return precision == Precision::f64 ? body(double{}) : body(float{});
+  }
+
+  /// In the world, in the group moved last.
+  [[nodiscard]] kernels::Vec3<double> position_of(const CompiledVariable& v, int group, int lane) const {
+    const kernels::Frame<double> at = reader.link(v.link, group, lane).world;
+    return at.R * v.point + at.p;
+  }
+  void write_variables(int group, int lane, std::span<double> position) const {
+    double* to = position.data();
+    for (const CompiledVariable& v : model.compiled().variables) write3(position_of(v, group, lane), to), to += 3;
   }
 
   void place(const Batch& batch, int environment, int sensor) {
@@ -194,6 +206,54 @@ void Readout::bodies(const Batch& batch, int environment, std::span<double> pose
     const kernels::Vec3<double> v = link.world.R * (link.V.l + cross(link.V.a, body.frame.p));
     const double rates[6] = {omega.x, omega.y, omega.z, v.x, v.y, v.z};
     std::copy(rates, rates + 6, &twist[6 * b]);
+  }
+}
+
+void Readout::variables(const Batch& batch, int environment, std::span<double> position, std::span<double> velocity) {
+  const int group = environment % kBlock / kGroup, lane = environment % kGroup;
+  impl_->reader.move(batch, environment / kBlock, group);
+  impl_->write_variables(group, lane, position);
+  const std::vector<CompiledVariable>& all = impl_->model.compiled().variables;
+  for (std::size_t k = 0; k < all.size() && !velocity.empty(); ++k) {
+    const kernels::LinkPose<double> link = impl_->reader.link(all[k].link, group, lane);
+    write3(link.world.R * (link.V.l + cross(link.V.a, all[k].point)), &velocity[3 * k]);
+  }
+}
+
+void Readout::read_variables(const Batch& batch, int block, std::span<const std::span<double>> positions) {
+  const int environments = std::min(kBlock, batch.environments() - block * kBlock);
+  for (int e = 0; e < environments; ++e) {
+    if (e % kGroup == 0) impl_->reader.move(batch, block, e / kGroup);
+    impl_->write_variables(e / kGroup, e % kGroup, positions[std::size_t(e)]);
+  }
+}
+
+void Readout::variable_jacobian(const Batch& batch, int environment, std::span<double> jacobian) {
+  const int group = environment % kBlock / kGroup, lane = environment % kGroup;
+  impl_->reader.move(batch, environment / kBlock, group);
+  const CompiledModel& m = impl_->model.compiled();
+  const auto nv = std::size_t(m.nv);
+  std::fill(jacobian.begin(), jacobian.end(), 0.0);
+  for (std::size_t k = 0; k < m.variables.size(); ++k) {
+    const auto column = [&](int dof, const kernels::Vec3<double>& c) {
+      double* const at = &jacobian[3 * k * nv + std::size_t(dof)];
+      at[0] = c.x, at[nv] = c.y, at[2 * nv] = c.z;
+    };
+    const CompiledVariable& variable = m.variables[k];
+    const kernels::Vec3<double> x = impl_->position_of(variable, group, lane);
+    for (int i = variable.link; i >= 0; i = m.links[std::size_t(i)].parent) {
+      const kernels::Link& link = m.links[std::size_t(i)];
+      const kernels::Frame<double> at = impl_->reader.link(i, group, lane).world;
+      const auto along = [&](const kernels::Vec3<double>& axis) {
+        const kernels::Vec3<double> a = at.R * axis;
+        return kernels::slides(link.kind) ? a : cross(a, x - at.p);
+      };
+      if (kernels::dofs(link.kind) == 1) {
+        column(link.v, along(link.axis));
+      } else {
+        for (int c = 0; c < 3; ++c) column(link.v + c, along({c == 0 ? 1.0 : 0.0, c == 1 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0}));
+      }
+    }
   }
 }
 

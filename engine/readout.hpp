@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a batch is measured by: poses and twists of bodies, tactile fields. Reads the state, changes nothing.
+// What a batch is measured by: poses and twists of bodies, end effectors, tactile fields. Reads the state, changes nothing.
 #pragma once
 
 #include <memory>
@@ -28,6 +28,16 @@ class Readout {
   /// World poses (nb, 7: x y z qw qx qy qz of the body frame) and twists (nb, 6: angular, then linear velocity of the
   /// body frame's origin, world axes) of one environment, every body of the scene in file order.
   void bodies(const Batch& batch, int environment, std::span<double> pose, std::span<double> twist);
+
+  /// World positions of the scene's end effectors (variables, 3) [m] of one environment, file order; with `velocity`,
+  /// theirs too (variables, 3) [m/s], world axes.
+  void variables(const Batch& batch, int environment, std::span<double> position, std::span<double> velocity = {});
+  /// Positions in the environments 16 block …, (variables, 3) each: the same bits, kinematics once for eight environments.
+  /// Environments beyond the last of the batch may be missing.
+  void read_variables(const Batch& batch, int block, std::span<const std::span<double>> positions);
+  /// (variables, 3, nv): derivative of each position by displacements of q along the dofs of v, rotations on the right
+  /// (docs/dynamics.md), so that velocity = jacobian v.
+  void variable_jacobian(const Batch& batch, int environment, std::span<double> jacobian);
 
   /// Field of one sensor and environment into (points, 3), zeros included.
   void tactile(const Batch& batch, int environment, int sensor, std::span<double> force);

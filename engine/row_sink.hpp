@@ -15,6 +15,7 @@ struct StateRow {
   std::span<const double> v;               ///< (E, nv)
   std::span<const double> body_pose;       ///< (E, nb, 7) x y z qw qx qy qz of each body frame in the world
   std::span<const double> body_twist;      ///< (E, nb, 6) angular, then linear velocity of its origin, world axes
+  std::span<const double> variables = {};  ///< (E, n, 3) world positions of the end effectors [m]; empty if n = 0
 };
 
 /// What step t (from row t to row t + 1) used and how its solve went.

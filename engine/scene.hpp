@@ -151,6 +151,16 @@ struct TactileDescription {
   Source source;
 };
 
+/// An end effector: a point that moves with a joint, whose position in the world is an output.
+struct VariableDescription {
+  std::string name;
+  std::string joint;
+  Vector3 position{0, 0, 0};                    ///< in the joint's moving frame, the one that bodies are placed in [m]
+  double radius = 2e-3;                         ///< [m]; for pictures only, as the colour
+  std::array<double, 4> rgba{1, 0, 0, 1};
+  Source source;
+};
+
 struct GroundDescription {
   Vector3 position{0, 0, 0};
   Vector3 normal{0, 0, 1};  ///< unit, pointing out of the half-space
@@ -237,6 +247,7 @@ struct Scene {
   std::vector<LinkDescription> links;
   std::vector<MotorDescription> motors;
   std::vector<TactileDescription> sensors;
+  std::vector<VariableDescription> variables;
   std::vector<GroundContactDescription> ground_contacts;
   std::vector<PairContactDescription> pair_contacts;
   std::vector<InitialState> initial;

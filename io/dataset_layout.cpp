@@ -15,17 +15,20 @@ namespace {
 constexpr std::int64_t kBlockEpisodes = 16;
 // Short episodes: creating objects is what costs, and a shard that is lost should be cheap.
 constexpr std::int64_t kMostEpisodes = 4096;
+constexpr const char* kVariables = "variables";
 
 }  // namespace
 
 std::vector<std::string> DatasetLayout::observation_names() const {
   std::vector<std::string> names{"q", "v"};
+  if (!variable_names.empty()) names.emplace_back(kVariables);
   for (const SensorLayout& sensor : sensors) names.push_back(sensor.name);
   return names;
 }
 
 std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() const {
   std::vector<std::vector<std::uint64_t>> shapes{{q_names.size()}, {v_names.size()}};
+  if (!variable_names.empty()) shapes.push_back({variable_names.size(), 3});
   for (const SensorLayout& s : sensors) {
     if (s.rectangular())
       shapes.push_back({static_cast<std::uint64_t>(s.rows), static_cast<std::uint64_t>(s.cols), 3});
@@ -55,6 +58,7 @@ std::int64_t DatasetLayout::episodes_per_shard() const {
 
 void DatasetLayout::check() const {
   std::set<std::string> names{"q", "v"};
+  if (!variable_names.empty()) names.insert(kVariables);
   for (const SensorLayout& sensor : sensors) {
     const std::string& name = sensor.name;
     if (name.empty() || name == "." || name.find('/') != std::string::npos)
@@ -62,8 +66,8 @@ void DatasetLayout::check() const {
           "sensor '{}': a dataset cannot have this name; expected one without '/'", name));
     if (!names.insert(name).second)
       throw InputError(
-          fmt::format("sensor '{}': another observation has this name; expected none of q, v and "
-                      "the other sensors",
+          fmt::format("sensor '{}': another observation has this name; expected none of q, v, "
+                      "variables (of end effectors) and the other sensors",
                       name));
   }
 }

@@ -21,6 +21,7 @@ struct DatasetLayout {
   std::vector<std::string> q_names, q_units;  ///< (nq)
   std::vector<std::string> v_names, v_units;  ///< (nv)
   std::vector<std::string> u_names;           ///< (nu)
+  std::vector<std::string> variable_names;    ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
   std::string scene_name, scene_text;
   std::string integrator;
@@ -31,9 +32,9 @@ struct DatasetLayout {
 
   /// R: actions of an episode.
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
-  /// Names below obs: q, v, then the sensors.
+  /// Names below obs: q, v, "variables" if there are end effectors, then the sensors.
   [[nodiscard]] std::vector<std::string> observation_names() const;
-  /// Shapes of one row of each of them: {nq}, {nv}, {rows, cols, 3}.
+  /// Shapes of one row of each of them: {nq}, {nv}, {n, 3}, {rows, cols, 3}.
   [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
   /// Numbers of one episode on disk, without HDF5's own [bytes].
   [[nodiscard]] double episode_bytes() const;

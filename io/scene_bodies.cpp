@@ -144,11 +144,7 @@ BodyDescription read_body(const SceneNode& node) {
     if (node.number("mass") != 0) node.fail("mass=\"" + node.text("mass") + "\"; expected 0 (massless), or a density");
     body.density = 0;
   }
-  if (node.has("rgba")) {
-    const std::vector<double> c = node.numbers("rgba");
-    if (c.size() != 3 && c.size() != 4) node.fail(fmt::format("rgba has {} numbers; expected 3 or 4", c.size()));
-    std::copy(c.begin(), c.end(), body.rgba.begin());
-  }
+  read_colour(node, body.rgba);
   return body;
 }
 

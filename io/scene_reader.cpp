@@ -194,9 +194,8 @@ void read_root(const SceneNode& root, Scene& scene) {
   each("actuator", [&](const SceneNode& s) { read_actuators(scene, s); });
   each("contact", [&](const SceneNode& s) { read_contacts(scene, s); });
   each("sensor", [&](const SceneNode& s) { read_sensors(scene, s); });
-  each("variable", [&](const SceneNode& s) {
-    s.fail("variables and end effectors are not simulated by this version; remove them");
-  });
+  each("variable", [&](const SceneNode& s) { read_variables(scene, s); });
+  name_variables(scene);
   each("virtual", [&](const SceneNode& s) { s.warn("shapes for pictures only; ignored"); });
   each("initial", [&](const SceneNode& s) { read_initial(scene, s); });
   once("control", [&](const SceneNode& s) { read_control(scene, s); });

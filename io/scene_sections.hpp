@@ -13,6 +13,9 @@ bool placed_in_world(const SceneNode& node, const BodyDescription& body);
 void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
 void read_sensors(Scene& scene, const SceneNode& section);
+void read_variables(Scene& scene, const SceneNode& section);
+/// Gives end effectors without a name theirs: "endeffector" and a number no other has, by default their place in the file.
+void name_variables(Scene& scene);
 void read_initial(Scene& scene, const SceneNode& section);
 void read_control(Scene& scene, const SceneNode& section);
 void read_randomize(Scene& scene, const SceneNode& section);
@@ -21,6 +24,9 @@ void read_randomize(Scene& scene, const SceneNode& section);
 ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law);
 
 inline Vector3 scaled(const Vector3& a, double s) { return {s * a[0], s * a[1], s * a[2]}; }
+
+/// Three or four numbers; alpha stays 1 if not given. Left alone where the attribute is missing.
+void read_colour(const SceneNode& node, std::array<double, 4>& rgba);
 
 /// Index of the named joint or body; fails at the attribute's element with the nearest name.
 int find_joint(const Scene& scene, const SceneNode& node, const char* attribute);

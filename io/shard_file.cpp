@@ -116,6 +116,11 @@ void ShardFile::describe() {
   texts("v_names", layout_.v_names);
   texts("v_units", layout_.v_units);
   texts("action_names", layout_.u_names);
+  if (!layout_.variable_names.empty()) {
+    texts("variable_names", layout_.variable_names);
+    h5::write_attribute(scene, "variable_units", "m");
+    h5::write_attribute(scene, "variable_frame", "world");
+  }
   const h5::Id sensors = h5::create_group(scene, "sensors");
   for (const SensorLayout& sensor : layout_.sensors) {
     const h5::Id group = h5::create_group(sensors, sensor.name);

@@ -47,7 +47,7 @@ const char* const kTwistComponents[] = {"wx", "wy", "wz", "vx", "vy", "vz"};
 struct TrajectoryFile::Impl {
   TrajectoryLayout layout;
   PartFile part;
-  h5::Id file, time, q, v, u, pose, twist, iterations, status, residual;
+  h5::Id file, time, q, v, u, pose, twist, variables, iterations, status, residual;
   struct Sensor {
     h5::Id force, step;
     h5::Dims frame;  // dimensions of one row of force
@@ -134,6 +134,12 @@ struct TrajectoryFile::Impl {
     h5::write_attribute(twist, "frame", "world axes; velocity of the body frame's origin");
     for (const h5::Id* d : {&pose, &twist})
       h5::write_attribute(*d, "bodies", std::span<const std::string>(layout.body_names));
+    if (!layout.variable_names.empty()) {
+      variables = rows<double>(h5::create_group(file, "variables"), "position", {T + 1, E, layout.variable_names.size(), 3});
+      h5::write_attribute(variables, "names", std::span<const std::string>(layout.variable_names));
+      h5::write_attribute(variables, "units", "m");
+      h5::write_attribute(variables, "frame", "world");
+    }
 
     const h5::Id solver = h5::create_group(file, "solver");
     iterations = rows<std::int32_t>(solver, "iterations", {T, E});
@@ -201,6 +207,12 @@ void TrajectoryFile::write(const StateRow& row) {
   Impl::put<double>(f.v, t, {E, f.layout.v_names.size()}, row.v.data());
   Impl::put<double>(f.pose, t, {E, nb, 7}, row.body_pose.data());
   Impl::put<double>(f.twist, t, {E, nb, 6}, row.body_twist.data());
+  if (const hsize_t n = f.layout.variable_names.size(); n > 0) {
+    if (row.variables.size() != E * n * 3)
+      throw IoError(fmt::format("{}: row {} has {} numbers for {} end effectors of {} environments", f.part.output(), t,
+                                row.variables.size(), n, E));
+    Impl::put<double>(f.variables, t, {E, n, 3}, row.variables.data());
+  }
   ++f.states;
 }
 
@@ -232,7 +244,9 @@ void TrajectoryFile::commit() {
   expect("steps", f.steps, f.layout.steps);
   for (std::size_t i = 0; i < f.sensors.size(); ++i)
     expect("fields of " + f.layout.sensors[i].name, f.sensors[i].written, f.layout.sensors[i].frames(f.layout.steps, f.layout.first_step));
-  for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.iterations, &f.status, &f.residual}) d->reset();
+  for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.variables, &f.iterations, &f.status,
+                    &f.residual})
+    d->reset();
   f.sensors.clear();
   h5::close_file(f.file, f.part.path());
   f.part.commit();

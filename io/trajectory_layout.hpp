@@ -49,6 +49,7 @@ struct TrajectoryLayout {
   std::vector<std::string> v_names, v_units;  ///< (nv)
   std::vector<std::string> u_names, u_units;  ///< (nu)
   std::vector<std::string> body_names;        ///< (nb)
+  std::vector<std::string> variable_names;    ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
   std::vector<StatusMeaning> statuses;
   std::vector<std::string> randomized_names;  ///< (k), empty when nothing varies

@@ -10,18 +10,19 @@
 namespace tangere {
 namespace {
 
-constexpr int kForceWidth = 3;
+constexpr int kForceWidth = 3, kPositionWidth = 3;
 
 std::size_t size(int n) { return static_cast<std::size_t>(n); }
 
-constexpr std::size_t kQ = 0, kV = 1, kFirstSensor = 2;  // names of observations
+constexpr std::size_t kQ = 0, kV = 1, kVariables = 2;  // names of observations; without variables a sensor is the third
 
-/// Bytes of one row of one episode in a slot's buffers: q and v are kept in double first, whatever is stored.
+/// Bytes of one row of one episode in a slot's buffers: what is no field is kept in double first.
 double row_bytes(const EpisodeShape& shape, const EpisodeOptions& options) {
   const bool single = options.precision == Precision::mixed;
   double bytes = static_cast<double>(shape.nu) * sizeof(float);
   for (std::size_t name = 0; name < shape.widths.size(); ++name) {
-    const std::size_t number = !single ? sizeof(double) : name < kFirstSensor ? sizeof(double) + sizeof(float) : sizeof(float);
+    const std::size_t number =
+        !single ? sizeof(double) : name < shape.first_sensor ? sizeof(double) + sizeof(float) : sizeof(float);
     bytes += static_cast<double>(shape.widths[name] * number);
   }
   return bytes;
@@ -32,6 +33,8 @@ double row_bytes(const EpisodeShape& shape, const EpisodeOptions& options) {
 EpisodeShape::EpisodeShape(const Model& model, const EpisodeOptions& options)
     : rows(::tangere::action_rows(options)), nu(size(model.nu())) {
   widths = {size(model.nq()), size(model.nv())};
+  if (!model.variables().empty()) widths.push_back(kPositionWidth * model.variables().size());
+  first_sensor = widths.size();
   for (const SensorInfo& sensor : model.sensors())
     widths.push_back(kForceWidth * size(sensor.points));
   const double fitting =
@@ -63,7 +66,7 @@ EpisodeSlot::EpisodeSlot(const Model& model, const StepperOptions& solver,
   for (std::size_t name = 0; name < values_.size(); ++name) {
     const std::size_t numbers = kBlockEpisodes * size(shape.piece_rows) * shape.widths[name];
     const bool single = options.precision == Precision::mixed;
-    if (!single || name < kFirstSensor) values_[name].resize(numbers);
+    if (!single || name < shape.first_sensor) values_[name].resize(numbers);
     if (single) singles_[name].resize(numbers);
   }
 }
@@ -107,8 +110,13 @@ void EpisodeSlot::observe(int row) {
     batch_->get_q(e, numbers<double>(kQ, e, row));
     batch_->get_v(e, numbers<double>(kV, e, row));
   }
-  for (std::size_t name = kFirstSensor; name < shape_.widths.size(); ++name) {
-    const auto sensor = static_cast<int>(name - kFirstSensor);
+  if (shape_.first_sensor > kVariables) {
+    std::array<std::span<double>, kBlockEpisodes> positions;
+    for (int e = 0; e < batch_->environments(); ++e) positions[size(e)] = numbers<double>(kVariables, e, row);
+    readout_.read_variables(*batch_, 0, positions);
+  }
+  for (std::size_t name = shape_.first_sensor; name < shape_.widths.size(); ++name) {
+    const auto sensor = static_cast<int>(name - shape_.first_sensor);
     if (options_.precision == Precision::mixed) {
       read_field<float>(sensor, row);
     } else {
@@ -121,7 +129,7 @@ template <class T>
 void EpisodeSlot::read_field(int sensor, int row) {
   std::array<std::span<T>, kBlockEpisodes> fields;
   for (int e = 0; e < batch_->environments(); ++e)
-    fields[size(e)] = numbers<T>(kFirstSensor + size(sensor), e, row);
+    fields[size(e)] = numbers<T>(shape_.first_sensor + size(sensor), e, row);
   readout_.read_block(*batch_, 0, sensor, fields);
 }
 
@@ -168,7 +176,7 @@ void EpisodeSlot::encode() {
       continue;
     }
     const std::span<float> singles = std::span(singles_[name]).first(numbers);
-    if (name < kFirstSensor)
+    if (name < shape_.first_sensor)
       std::transform(values_[name].begin(), values_[name].begin() + static_cast<std::ptrdiff_t>(numbers),
                      singles.begin(), [](double x) { return static_cast<float>(x); });
     observations_[name] = std::span<const float>(singles);

@@ -19,7 +19,8 @@ struct EpisodeShape {
   std::int64_t rows = 0;            ///< R, actions of an episode
   int piece_rows = 0;               ///< rows of a piece, fewer at the end
   std::size_t nu = 0;               ///< numbers of an action
-  std::vector<std::size_t> widths;  ///< numbers per row of q, v and each sensor
+  std::vector<std::size_t> widths;  ///< numbers per row of q, v, the end effectors if there are any, and each sensor
+  std::size_t first_sensor = 0;     ///< its place in widths
 
   EpisodeShape(const Model& model, const EpisodeOptions& options);
   /// Buffers of one slot [bytes].

@@ -13,7 +13,7 @@
 namespace tangere {
 namespace {
 
-constexpr int kPoseWidth = 7, kTwistWidth = 6, kForceWidth = 3;
+constexpr int kPoseWidth = 7, kTwistWidth = 6, kForceWidth = 3, kPositionWidth = 3;
 
 /// Numbers of one environment in the largest tactile field.
 std::size_t largest_field(const Model& model) {
@@ -34,6 +34,7 @@ class Recorder {
     v_.resize(e * static_cast<std::size_t>(model.nv()));
     pose_.resize(e * static_cast<std::size_t>(model.nb()) * kPoseWidth);
     twist_.resize(e * static_cast<std::size_t>(model.nb()) * kTwistWidth);
+    variables_.resize(e * model.variables().size() * kPositionWidth);
     force_.resize(e * largest_field(model));
     iterations_.resize(e);
     status_.resize(e);
@@ -45,7 +46,9 @@ class Recorder {
       batch_.get_v(e, part(v_, e));
       readout_.bodies(batch_, e, part(pose_, e), part(twist_, e));
     }
-    sink_.write(StateRow{step, time, q_, v_, pose_, twist_});
+    if (!variables_.empty())
+      each_block(variables_, [&](int block, auto positions) { readout_.read_variables(batch_, block, positions); });
+    sink_.write(StateRow{step, time, q_, v_, pose_, twist_, variables_});
   }
 
   /// `live` is what the environments were before the step.
@@ -63,16 +66,22 @@ class Recorder {
         static_cast<std::size_t>(batch_.model().sensors()[static_cast<std::size_t>(sensor)].points);
     const std::span<double> field =
         std::span(force_).first(static_cast<std::size_t>(environments_) * points * kForceWidth);
-    std::array<std::span<double>, kernels::kBlock> fields;
-    for (int block = 0; block < batch_.blocks(); ++block) {
-      const int first = block * kernels::kBlock, last = std::min(first + kernels::kBlock, environments_);
-      for (int e = first; e < last; ++e) fields[static_cast<std::size_t>(e - first)] = part(field, e);
-      readout_.read_block(batch_, block, sensor, fields);
-    }
+    each_block(field, [&](int block, auto fields) { readout_.read_block(batch_, block, sensor, fields); });
     sink_.write(TactileRow{sensor, frame, step, field});
   }
 
  private:
+  /// Calls `read` with every block and where its environments' numbers go.
+  template <class Read>
+  void each_block(std::span<double> all, const Read& read) const {
+    std::array<std::span<double>, kernels::kBlock> parts;
+    for (int block = 0; block < batch_.blocks(); ++block) {
+      const int first = block * kernels::kBlock, last = std::min(first + kernels::kBlock, environments_);
+      for (int e = first; e < last; ++e) parts[static_cast<std::size_t>(e - first)] = part(all, e);
+      read(block, std::span<const std::span<double>>(parts));
+    }
+  }
+
   [[nodiscard]] std::span<double> part(std::span<double> all, int environment) const {
     const std::size_t width = all.size() / static_cast<std::size_t>(environments_);
     return all.subspan(static_cast<std::size_t>(environment) * width, width);
@@ -82,8 +91,8 @@ class Recorder {
   RowSink& sink_;
   Readout readout_;
   int environments_;
-  std::vector<double> q_, v_, pose_, twist_;  // as in StateRow
-  std::vector<double> force_;                 // shared by the sensors
+  std::vector<double> q_, v_, pose_, twist_, variables_;  // as in StateRow
+  std::vector<double> force_;                             // shared by the sensors
   std::vector<std::int32_t> iterations_;
   std::vector<std::int8_t> status_;
 };
@@ -133,7 +142,7 @@ std::int64_t tactile_frames(const SensorInfo& sensor, const RolloutOptions& opti
 double rollout_bytes(const Model& model, int environments) {
   const double numbers = model.nq() + model.nv() + model.nu() +
                          double{kPoseWidth + kTwistWidth} * model.nb() +
-                         static_cast<double>(largest_field(model));
+                         static_cast<double>(model.variables().size() * kPositionWidth + largest_field(model));
   constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
   return environments * (numbers * sizeof(double) + kFlags);
 }

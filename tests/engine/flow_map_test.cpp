@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+// Flow maps: hand-computed numbers, one scale for all fields, zero without contact, no scale left in the result.
+#include "engine/flow_map.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "engine/error.hpp"
+#include "tests/engine/runs.hpp"
+#include "tests/engine/scenes.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::Each;
+using ::testing::ElementsAre;
+
+template <class T>
+class FlowMap : public ::testing::Test {
+ protected:
+  using Field = std::vector<T>;
+
+  /// Of whole fields, one after the other.
+  Field flow(const std::vector<Field>& fields, double smallest = 0) {
+    std::vector<ShearField<T>> in;
+    std::size_t points = 0;
+    for (const Field& f : fields) in.push_back({f}), points += f.size() / 3;
+    Field out(2 * points, T(7));
+    longest = normalised_flow(std::span<const ShearField<T>>(in), std::span<T>(out), smallest);
+    return out;
+  }
+  static double largest_length(const Field& map) {
+    double largest = 0;
+    for (std::size_t k = 0; k < map.size(); k += 2) largest = std::max(largest, std::hypot(double(map[k]), double(map[k + 1])));
+    return largest;
+  }
+  static Field random_field(unsigned seed, int points, double scale) {
+    std::mt19937 engine(seed);
+    std::normal_distribution<double> normal(0, scale);
+    Field f;
+    for (int k = 0; k < 3 * points; ++k) f.push_back(static_cast<T>(normal(engine)));
+    return f;
+  }
+  double longest = -1;
+};
+using Types = ::testing::Types<float, double>;
+TYPED_TEST_SUITE(FlowMap, Types);
+
+TYPED_TEST(FlowMap, DividesShearByTheLongestOfAllFields) {
+  // Lengths 5, 0 on one pad, 10, 2.5 on the other; pressure is larger than all of them and does not count.
+  const auto map = this->flow({{3, 4, 100, 0, 0, 50}, {-6, 8, -1000, 0, -2.5, 0}});
+  EXPECT_EQ(this->longest, 10);
+  using T = TypeParam;
+  EXPECT_THAT(map, ElementsAre(T(0.3), T(0.4), T(0), T(0), T(-0.6), T(0.8), T(0), T(-0.25)));
+}
+
+TYPED_TEST(FlowMap, OfOnePadAloneHasItsOwnScale) {
+  using T = TypeParam;
+  EXPECT_THAT(this->flow({{3, 4, 100, 0, 0, 50}}), ElementsAre(T(0.6), T(0.8), T(0), T(0)));
+}
+
+TYPED_TEST(FlowMap, TakesTheChangeSinceAnotherField) {
+  using T = TypeParam;
+  const std::vector<T> before = {1, 1, 9, 2, 0, 9}, now = {4, 5, -9, 2, 0, -9};
+  const ShearField<T> fields[] = {{now, before}};
+  std::vector<T> map(4);
+  EXPECT_EQ(normalised_flow(std::span<const ShearField<T>>(fields), std::span<T>(map)), 5);
+  EXPECT_THAT(map, ElementsAre(T(0.6), T(0.8), T(0), T(0)));
+}
+
+TYPED_TEST(FlowMap, IsZeroWithoutShear) {
+  using T = TypeParam;
+  EXPECT_THAT(this->flow({std::vector<T>(12, T(0)), std::vector<T>(6, T(0))}), Each(T(0)));
+  EXPECT_EQ(this->longest, 0);
+  EXPECT_THAT(this->flow({{0, 0, 5, 0, 0, 1}}), Each(T(0)));  // pressure alone
+  EXPECT_TRUE(this->flow({}).empty());
+}
+
+TYPED_TEST(FlowMap, IsZeroUpToTheSmallestThatCounts) {
+  using T = TypeParam;
+  EXPECT_THAT(this->flow({{3, 4, 0}}, 5), ElementsAre(T(0), T(0)));
+  EXPECT_EQ(this->longest, 5);
+  EXPECT_THAT(this->flow({{3, 4, 0}}, 4.99), ElementsAre(T(0.6), T(0.8)));
+}
+
+TYPED_TEST(FlowMap, HasALongestArrowOfOneAndNoScale) {
+  using T = TypeParam;
+  // A power of two changes no digit, another factor the last ones; nor do the ends of the range overflow or vanish.
+  const double tiny = std::ldexp(1.0, sizeof(T) == 4 ? -120 : -1000), huge = std::ldexp(1.0, sizeof(T) == 4 ? 120 : 1000);
+  const double rounding = 4 * double(std::numeric_limits<T>::epsilon());
+  const auto one = this->flow({this->random_field(1, 20, 1), this->random_field(2, 30, 5)});
+  EXPECT_NEAR(this->largest_length(one), 1, rounding);
+  EXPECT_LT(this->largest_length({one.begin(), one.begin() + 40}), 0.9) << "the first pad has a scale of its own";
+  for (const double scale : {1e-3, 7.0, 1e4, tiny, huge}) {
+    std::vector<std::vector<T>> fields = {this->random_field(1, 20, 1), this->random_field(2, 30, 5)};
+    for (auto& f : fields)
+      for (T& x : f) x = static_cast<T>(double(x) * scale);
+    const auto map = this->flow(fields);
+    EXPECT_NEAR(this->largest_length(map), 1, rounding) << scale;
+    for (std::size_t k = 0; k < map.size(); ++k) {
+      if (scale == tiny || scale == huge) EXPECT_EQ(map[k], one[k]) << scale << " [" << k << "]";
+      EXPECT_NEAR(map[k], one[k], rounding) << scale << " [" << k << "]";
+    }
+  }
+}
+
+TYPED_TEST(FlowMap, OfTheSmallestForceThereIsIsNotInfinite) {
+  using T = TypeParam;
+  EXPECT_THAT(this->flow({{std::numeric_limits<T>::denorm_min(), 0, 0}}), ElementsAre(T(1), T(0)));
+}
+
+TYPED_TEST(FlowMap, RefusesSizesThatDoNotFit) {
+  using T = TypeParam;
+  const std::vector<T> six(6), five(5), three(3);
+  std::vector<T> map(4);
+  const auto refused = [&](ShearField<T> field, std::span<T> out) {
+    EXPECT_THROW(normalised_flow(std::span<const ShearField<T>>(&field, 1), out), InputError);
+  };
+  refused({five}, map);
+  refused({six, three}, map);
+  refused({three}, map);
+  refused({six}, std::span<T>(map).first(3));
+}
+
+TEST(FlowMapOfARun, IsZeroBeforeContactAndPointsWithTheFriction) {
+  const Model model(testing::rolling_ball(false, 32));
+  Batch batch(model, 1);
+  Stepper stepper(model);
+  Readout readout(model);
+  const std::size_t points = 32 * 32;
+  std::vector<double> field(3 * points), map(2 * points);
+  const ShearField<double> fields[] = {{field}};
+  double longest = 0;
+  for (int step = 0; step < 130; ++step) {
+    testing::step_all(stepper, batch, testing::rolling_ball_control(step));
+    readout.tactile(batch, 0, 0, field);
+    longest = normalised_flow(fields, map);
+    if (step == 50) {
+      EXPECT_EQ(longest, 0);
+      EXPECT_THAT(map, Each(0.0));
+    }
+  }
+  // The pad is pushed along +x, which is axis1: friction pulls it back.
+  ASSERT_GT(longest, 0);
+  double along = 0, most = 0;
+  for (std::size_t k = 0; k < points; ++k) {
+    along += map[2 * k + 1];
+    most = std::max(most, std::hypot(map[2 * k], map[2 * k + 1]));
+    EXPECT_NEAR(map[2 * k + 1] * longest, field[3 * k + 1], 1e-15);
+  }
+  EXPECT_LT(along, -1);
+  EXPECT_NEAR(most, 1, 1e-15);
+}
+
+}  // namespace
+}  // namespace tangere
