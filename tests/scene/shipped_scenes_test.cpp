@@ -127,7 +127,7 @@ TEST(ShippedScenes, BoxIsPushedAndLeftBehind) {
   EXPECT_EQ(r.failed, 0);
   for (int e = 0; e < kEnvironments; ++e) {
     for (int k = 0; k <= r.at(0.1); ++k) ASSERT_EQ(r.touch(k, e, 0).points, 0) << "out of touch for 0.1 s";
-    for (int k = r.at(0.3); k < r.at(2.2); ++k) ASSERT_GT(r.touch(k, e, 0).pressure, 0.02) << "step " << k;
+    for (int k = r.at(0.3); k < r.at(2.2); ++k) ASSERT_GT(r.touch(k, e, 0).pressure, 0.1) << "step " << k;
     EXPECT_GT(r.q(r.at(2.2), e, "box_slide.x"), 0.1);
     EXPECT_GT(std::abs(r.q(r.at(2.2), e, "box_turn.angle")), 0.01);
     for (int k = r.at(2.3); k < r.steps; ++k) ASSERT_EQ(r.touch(k, e, 0).points, 0) << "step " << k;
