@@ -201,7 +201,9 @@ TEST(EndEffectors, AreTheSameBitsInAnyBatch) {
     EXPECT_EQ(here.velocity, alone.velocity) << e;
     EXPECT_EQ(here.jacobian, alone.jacobian) << e;
     EXPECT_EQ(all[std::size_t(e)], here.position) << e;
-    if (e > 0) EXPECT_NE(all[std::size_t(e)], all[std::size_t(e - 1)]) << e;
+    if (e > 0) {
+      EXPECT_NE(all[std::size_t(e)], all[std::size_t(e - 1)]) << e;
+    }
   }
 }
 

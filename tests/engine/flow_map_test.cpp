@@ -104,7 +104,9 @@ TYPED_TEST(FlowMap, HasALongestArrowOfOneAndNoScale) {
     const auto map = this->flow(fields);
     EXPECT_NEAR(this->largest_length(map), 1, rounding) << scale;
     for (std::size_t k = 0; k < map.size(); ++k) {
-      if (scale == tiny || scale == huge) EXPECT_EQ(map[k], one[k]) << scale << " [" << k << "]";
+      if (scale == tiny || scale == huge) {
+        EXPECT_EQ(map[k], one[k]) << scale << " [" << k << "]";
+      }
       EXPECT_NEAR(map[k], one[k], rounding) << scale << " [" << k << "]";
     }
   }
