@@ -87,6 +87,24 @@ TEST(Simulate, SaysWhatItDid) {
   EXPECT_EQ(read_array(folder, "/q").dims, (h5::Dims{43, 3, 10}));
 }
 
+TEST(Simulate, WritesEndEffectorsBesideTheBodies) {
+  const Folder folder;
+  std::ifstream file(kSmall);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string marks =
+      R"(<variable><endeffector name="mark" joint="pad_joint" pos="0.01 0 -0.005"/></variable>)";
+  folder.write("marked.xml", text.insert(text.find("<sensor>"), marks));
+  simulate(folder, "marked.xml", {"--envs", "3", "--steps", "20"});
+  const Array mark = read_array(folder, "/variables/position"), pose = read_array(folder, "/bodies/pose");
+  ASSERT_EQ(mark.dims, (h5::Dims{21, 3, 1, 3}));
+  ASSERT_EQ(pose.dims, (h5::Dims{21, 3, 2, 7}));
+  const double offset[] = {0.01, 0, -0.005};
+  for (std::size_t row = 0; row < 63; ++row)
+    for (std::size_t c = 0; c < 3; ++c)
+      EXPECT_NEAR(mark.values[3 * row + c], pose.values[14 * row + c] + offset[c], 1e-15);
+  EXPECT_LT(mark.values[62 * 3 + 2], mark.values[2] - 1e-4) << "the pad does not sink: no test";
+}
+
 TEST(Simulate, SolverOptionsReachTheStepper) {
   const Folder folder;
   const json answer =
