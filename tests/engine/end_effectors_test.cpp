@@ -176,7 +176,7 @@ TEST(EndEffectors, VelocityIsThatOfTheMotion) {
     EXPECT_GT(speed, 0.3);
     return largest;
   };
-  const double coarse = error(1e-3), fine = error(2e-4);
+  const double coarse = error(1e-4), fine = error(2e-5);
   EXPECT_LT(coarse, 1e-3);
   EXPECT_LT(fine, coarse / 12);
 }

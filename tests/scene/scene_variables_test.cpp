@@ -63,8 +63,9 @@ TEST(SceneVariables, WithoutNamesGetTheirNumberInTheFile) {
     <endeffector joint="ball_joint" pos="0 0 0" name="endeffector3"/></variable>
     <variable><endeffector joint="ball_joint" pos="0 0 0"/>
     <endeffector joint="ball_joint" pos="0 0 0"/></variable>)");
+  const Model model(s);
   std::vector<std::string> names;
-  for (const VariableInfo& v : Model(s).variables()) names.push_back(v.name);
+  for (const VariableInfo& v : model.variables()) names.push_back(v.name);
   EXPECT_THAT(names, ElementsAre("endeffector0", "endeffector3", "endeffector2", "endeffector4"));
 }
 
