@@ -16,6 +16,7 @@ using nlohmann::json;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using Words = std::vector<std::string>;
 
 /// Runs `tangere simulate SCENE --output out.h5 --json MORE` and returns its object.
@@ -303,6 +304,8 @@ TEST(Plot, DrawsWhatSimulateWrote) {
   const json answer = json::parse(outcome.out);
   EXPECT_THAT(undocumented_keys(answer), IsEmpty());
   EXPECT_EQ(answer.at("sensor"), "pad");
+  EXPECT_EQ(answer.at("sensors"), json({"pad"}));
+  EXPECT_THAT(outcome.err, Not(HasSubstr("can be drawn")));
   EXPECT_EQ(answer.at("environment"), 1);
   EXPECT_TRUE(answer.at("frame").is_null());
   const std::string svg = folder.read("out.svg");
@@ -310,6 +313,25 @@ TEST(Plot, DrawsWhatSimulateWrote) {
   EXPECT_THAT(svg, HasSubstr("<svg"));
   EXPECT_EQ(run(folder, {"plot", "out.h5", "-o", "one.svg", "--frame", "60"}).exit_code, 0);
   EXPECT_NE(folder.read("one.svg"), svg);
+}
+
+TEST(Plot, ListsTheSensorsOfTheFile) {
+  const Folder folder;
+  std::ifstream file(kSmall);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::size_t at = text.find("<tactile name=\"pad\""), end = text.find("/>", at) + 2;
+  std::string second = text.substr(at, end - at);
+  second.replace(second.find("pad"), 3, "twin");
+  folder.write("two.xml", text.insert(end, second));
+  simulate(folder, "two.xml", {"--steps", "5", "--every", "5"});
+  const Outcome first = run(folder, {"plot", "out.h5", "-o", "first.svg", "--json"});
+  const json answer = json::parse(first.out);
+  EXPECT_EQ(answer.at("sensor"), "pad");
+  EXPECT_EQ(answer.at("sensors"), json({"pad", "twin"}));
+  EXPECT_THAT(first.err, HasSubstr("sensors that can be drawn: pad, twin"));
+  const Outcome twin = run(folder, {"plot", "out.h5", "-o", "twin.svg", "--sensor", "twin", "--json"});
+  EXPECT_EQ(json::parse(twin.out).at("sensor"), "twin");
+  EXPECT_THAT(folder.read("twin.svg"), HasSubstr("sensor 'twin'"));
 }
 
 TEST(Plot, NamesWhatIsNotThere) {
