@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tangere plot: tactile fields of a trajectory file as a picture.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <limits>
 
@@ -31,15 +32,19 @@ int plot(const Options& options, const Console& console) {
   const TrajectoryReader file(options.input);
   const std::string svg = render_tactile_svg(file, what);
   write_text_atomically(options.output, svg, options.overwrite);
-  const SensorLayout& sensor = file.sensors()[file.find_sensor(what.sensor)];
+  const std::vector<std::string> drawable = drawable_sensors(file);
+  const std::string& sensor = what.sensor.empty() ? drawable.at(0) : what.sensor;
   console.print(fmt::format("wrote {} ({} bytes): sensor {}, environment {}", options.output,
-                            svg.size(), sensor.name, what.environment));
+                            svg.size(), sensor, what.environment));
+  if (drawable.size() > 1)
+    console.note(fmt::format("sensors that can be drawn: {}", fmt::join(drawable, ", ")));
   console.result({{"command", "plot"},
                   {"exit_code", 0},
                   {"input", options.input},
                   {"output", options.output},
                   {"bytes", svg.size()},
-                  {"sensor", sensor.name},
+                  {"sensor", sensor},
+                  {"sensors", drawable},
                   {"environment", what.environment},
                   {"frame", what.frame ? Json(*what.frame) : Json()}});
   return kDone;
@@ -55,7 +60,7 @@ Command add_plot(CLI::App& program) {
   CLI::App* app = program.add_subcommand("plot", "Draw tactile fields of a trajectory as SVG");
   add_text(*app, "FILE", o.input, "", "HDF5 file written by 'tangere simulate'")->required();
   add_text(*app, "-o,--output", o.output, "F.svg", "SVG file to write")->required();
-  add_text(*app, "--sensor", o.sensor, "NAME", "Tactile sensor [default: the first]");
+  add_text(*app, "--sensor", o.sensor, "NAME", "Tactile sensor, a rectangular array [default: the first]");
   add_whole_number<std::int64_t>(*app, "--env", o.environment, 0, kMost,
                                  "Environment, counted from 0 [default: 0]");
   CLI::Option* frame = add_whole_number<std::int64_t>(*app, "--frame", o.frame, 0, kMost,

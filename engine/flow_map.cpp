@@ -33,7 +33,8 @@ double normalise(std::span<const ShearField<T>> fields, std::span<T> flow, doubl
   T* to = flow.data();
   for (const ShearField<T>& field : fields) {
     for (std::size_t k = 0; k < field.force.size(); k += 3, to += 2) {
-      for (std::size_t c = 0; c < 2; ++c) to[c] = field.force[k + c] - (field.before.empty() ? T(0) : field.before[k + c]);
+      for (std::size_t c = 0; c < 2; ++c)
+        to[c] = field.before.empty() ? field.force[k + c] : field.force[k + c] - field.before[k + c];
       longest = std::max(longest, std::hypot(double(to[0]), double(to[1])));
     }
   }

@@ -13,10 +13,10 @@ struct ShearField {
   std::span<const T> before = {};  ///< a field of the same sensor that is subtracted; empty: nothing is
 };
 
-/// The first two components of every field, divided by the largest length among all points of all of them: pads, steps or
-/// both share one scale. `flow`: (points of the first field, 2), then of the second …, dimensionless, lengths up to 1.
-/// All zero where that length is not above `smallest` [N], so without contact. Returns the length [N]. Throws InputError
-/// when sizes do not fit. Force by force the same whatever the order of fields; T is what is stored, lengths are double.
+/// The first two components of every field, divided by the largest length among all points of all of them: pads, steps
+/// or both share one scale. `flow`: (points of the first field, 2), then of the second …; dimensionless, lengths up to
+/// 1. All zero where that length is not above `smallest` [N], so without contact. Returns the length [N]. Throws
+/// InputError when sizes do not fit. Lengths are computed in double, whatever is stored.
 double normalised_flow(std::span<const ShearField<double>> fields, std::span<double> flow, double smallest = 0);
 double normalised_flow(std::span<const ShearField<float>> fields, std::span<float> flow, double smallest = 0);
 

@@ -251,7 +251,9 @@ void Readout::variable_jacobian(const Batch& batch, int environment, std::span<d
       if (kernels::dofs(link.kind) == 1) {
         column(link.v, along(link.axis));
       } else {
-        for (int c = 0; c < 3; ++c) column(link.v + c, along({c == 0 ? 1.0 : 0.0, c == 1 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0}));
+        column(link.v, along({1, 0, 0}));
+        column(link.v + 1, along({0, 1, 0}));
+        column(link.v + 2, along({0, 0, 1}));
       }
     }
   }

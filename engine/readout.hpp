@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a batch is measured by: poses and twists of bodies, end effectors, tactile fields. Reads the state, changes nothing.
+// What a batch is measured by: poses and twists of bodies, end effectors, tactile fields. Reads the state and changes
+// nothing.
 #pragma once
 
 #include <memory>
@@ -32,7 +33,7 @@ class Readout {
   /// World positions of the scene's end effectors (variables, 3) [m] of one environment, file order; with `velocity`,
   /// theirs too (variables, 3) [m/s], world axes.
   void variables(const Batch& batch, int environment, std::span<double> position, std::span<double> velocity = {});
-  /// Positions in the environments 16 block …, (variables, 3) each: the same bits, kinematics once for eight environments.
+  /// Positions in the environments 16 block …, (variables, 3) each: the same bits, kinematics once for eight of them.
   /// Environments beyond the last of the batch may be missing.
   void read_variables(const Batch& batch, int block, std::span<const std::span<double>> positions);
   /// (variables, 3, nv): derivative of each position by displacements of q along the dofs of v, rotations on the right

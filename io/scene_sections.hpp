@@ -14,7 +14,7 @@ void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
 void read_sensors(Scene& scene, const SceneNode& section);
 void read_variables(Scene& scene, const SceneNode& section);
-/// Gives end effectors without a name theirs: "endeffector" and a number no other has, by default their place in the file.
+/// Gives end effectors without a name theirs: "endeffector" and their place in the file, or the next number that is free.
 void name_variables(Scene& scene);
 void read_initial(Scene& scene, const SceneNode& section);
 void read_control(Scene& scene, const SceneNode& section);

@@ -3,6 +3,7 @@
 #include "io/tactile_plot.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -252,10 +253,21 @@ std::vector<Panel> choose_panels(const TrajectoryReader& file, std::size_t senso
 
 }  // namespace
 
+std::vector<std::string> drawable_sensors(const TrajectoryReader& file) {
+  std::vector<std::string> names;
+  for (const SensorLayout& s : file.sensors())
+    if (s.rectangular()) names.push_back(s.name);
+  return names;
+}
+
 std::string render_tactile_svg(const TrajectoryReader& file, const PlotOptions& o) {
-  const std::size_t sensor = file.find_sensor(o.sensor);
+  const std::vector<std::string> drawable = drawable_sensors(file);
+  const std::size_t sensor = file.find_sensor(o.sensor.empty() && !drawable.empty() ? drawable[0] : o.sensor);
   const SensorLayout& s = file.sensors()[sensor];
-  if (!s.rectangular()) throw InputError("sensor '" + s.name + "' is not a rectangular array; only those can be drawn");
+  if (!s.rectangular())
+    throw InputError(fmt::format("sensor '{}' is not a rectangular array; {}", s.name,
+                                 drawable.empty() ? "only those can be drawn, and the file has none"
+                                                  : fmt::format("those that can be drawn: {}", fmt::join(drawable, ", "))));
   if (o.environment < 0 || o.environment >= file.environments())
     throw InputError(fmt::format("environment {}: the file has 0 to {}", o.environment, file.environments() - 1));
   if (o.strip < 1) throw InputError(fmt::format("a strip of {} frames; expected at least 1", o.strip));

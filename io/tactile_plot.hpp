@@ -5,17 +5,21 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "io/trajectory_reader.hpp"
 
 namespace tangere {
 
 struct PlotOptions {
-  std::string sensor;                 ///< "": the first
+  std::string sensor;                 ///< "": the first that can be drawn
   std::int64_t environment = 0;
   std::optional<std::int64_t> frame;  ///< one frame instead of a strip
   int strip = 6;                      ///< most frames of a strip, spread over those with contact
 };
+
+/// Names of the sensors that can be drawn, rectangular arrays, in the file's order.
+std::vector<std::string> drawable_sensors(const TrajectoryReader& file);
 
 /// Column axis1 runs to the right and row axis0 downwards, as in the array. All frames share one colour scale and one
 /// arrow scale. Throws InputError for a sensor, environment or frame that is not there, or not rectangular.

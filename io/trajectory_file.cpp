@@ -135,7 +135,8 @@ struct TrajectoryFile::Impl {
     for (const h5::Id* d : {&pose, &twist})
       h5::write_attribute(*d, "bodies", std::span<const std::string>(layout.body_names));
     if (!layout.variable_names.empty()) {
-      variables = rows<double>(h5::create_group(file, "variables"), "position", {T + 1, E, layout.variable_names.size(), 3});
+      const h5::Id group = h5::create_group(file, "variables");
+      variables = rows<double>(group, "position", {T + 1, E, layout.variable_names.size(), 3});
       h5::write_attribute(variables, "names", std::span<const std::string>(layout.variable_names));
       h5::write_attribute(variables, "units", "m");
       h5::write_attribute(variables, "frame", "world");

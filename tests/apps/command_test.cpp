@@ -314,6 +314,16 @@ TEST(Command, InspectListsJointEffectsAndMotors) {
     EXPECT_THAT(text.out, HasSubstr(line));
 }
 
+TEST(Command, InspectListsEndEffectors) {
+  const Folder folder;
+  const std::string path = TANGERE_TEST_DATA "/scenes/published_dialect_pad.xml";
+  const json answer = json::parse(run(folder, {"inspect", path, "--json"}).out);
+  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
+  EXPECT_EQ(answer.at("variables"), json::parse(R"([{"name": "endeffector0", "joint": "rim"}])"));
+  EXPECT_THAT(run(folder, {"inspect", path}).out, HasSubstr("end effectors (1)\n  endeffector0 on joint rim\n"));
+  EXPECT_THAT(run(folder, {"inspect", scene("rolling_ball.xml")}).out, Not(HasSubstr("end effectors")));
+}
+
 TEST(Command, QuietPrintsErrorsOnly) {
   const Folder folder;
   for (const Words& words :

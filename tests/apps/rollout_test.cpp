@@ -42,6 +42,7 @@ Model pad_on_ball() {
              rect_pos0="-0.02 0.02 -0.005" rect_pos1="0.02 -0.02 -0.005"
              axis0="0 -1 0" axis1="1 0 0" kn="1" kt="0.01" mu="2" damping="0"/>
   </sensor>
+  <variable><endeffector joint="pad" pos="0.01 0 0"/><endeffector joint="ball" pos="0 0 0.02"/></variable>
 </tangere>)",
                            "pad.xml")
                    .scene);
@@ -50,7 +51,7 @@ Model pad_on_ball() {
 struct StoredState {
   std::int64_t step;
   double time;
-  std::vector<double> q, v, pose, twist;
+  std::vector<double> q, v, pose, twist, variables;
 };
 struct StoredStep {
   std::int64_t step;
@@ -76,7 +77,7 @@ class Memory : public RowSink {
   void write(const StateRow& row) override {
     order += "q" + std::to_string(row.step) + " ";
     states.push_back(
-        {row.step, row.time, copy(row.q), copy(row.v), copy(row.body_pose), copy(row.body_twist)});
+        {row.step, row.time, copy(row.q), copy(row.v), copy(row.body_pose), copy(row.body_twist), copy(row.variables)});
   }
   void write(const StepRow& row) override {
     order += "u" + std::to_string(row.step) + " ";
@@ -142,7 +143,7 @@ TEST_F(Rollout, RowsAreTheBatchStepByStep) {
   Batch again(model_, kEnvironments);
   Stepper stepper(model_);
   Readout readout(model_);
-  std::vector<double> pose(14), twist(12), q(1), v(1), force(49 * 3);
+  std::vector<double> pose(14), twist(12), q(1), v(1), force(49 * 3), variables(6);
   for (std::size_t t = 0;; ++t) {
     const StoredState& row = memory_.states[t];
     EXPECT_EQ(row.step, static_cast<std::int64_t>(t));
@@ -156,6 +157,10 @@ TEST_F(Rollout, RowsAreTheBatchStepByStep) {
       readout.bodies(again, e, pose, twist);
       for (std::size_t i = 0; i < 14; ++i) EXPECT_EQ(row.pose[at * 14 + i], pose[i]);
       for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(row.twist[at * 12 + i], twist[i]);
+      readout.variables(again, e, variables);
+      ASSERT_EQ(row.variables.size(), 6U * kEnvironments);
+      for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(row.variables[at * 6 + i], variables[i]);
+      EXPECT_NEAR(variables[2], 0.0249 + q[0], 1e-15);
       if (t == 0) continue;
       readout.tactile(again, e, 1, force);
       const StoredField& field = memory_.fields[2 * t - 1];

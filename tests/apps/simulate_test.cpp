@@ -16,6 +16,7 @@ using nlohmann::json;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using Words = std::vector<std::string>;
 
 /// Runs `tangere simulate SCENE --output out.h5 --json MORE` and returns its object.
@@ -85,6 +86,24 @@ TEST(Simulate, SaysWhatItDid) {
   EXPECT_GE(answer.at("newton_iterations_per_step"), 1);
   EXPECT_THAT(folder.files(), ElementsAre("out.h5"));
   EXPECT_EQ(read_array(folder, "/q").dims, (h5::Dims{43, 3, 10}));
+}
+
+TEST(Simulate, WritesEndEffectorsBesideTheBodies) {
+  const Folder folder;
+  std::ifstream file(kSmall);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string marks =
+      R"(<variable><endeffector name="mark" joint="pad_joint" pos="0.01 0 -0.005"/></variable>)";
+  folder.write("marked.xml", text.insert(text.find("<sensor>"), marks));
+  simulate(folder, "marked.xml", {"--envs", "3", "--steps", "20"});
+  const Array mark = read_array(folder, "/variables/position"), pose = read_array(folder, "/bodies/pose");
+  ASSERT_EQ(mark.dims, (h5::Dims{21, 3, 1, 3}));
+  ASSERT_EQ(pose.dims, (h5::Dims{21, 3, 2, 7}));
+  const double offset[] = {0.01, 0, -0.005};
+  for (std::size_t row = 0; row < 63; ++row)
+    for (std::size_t c = 0; c < 3; ++c)
+      EXPECT_NEAR(mark.values[3 * row + c], pose.values[14 * row + c] + offset[c], 1e-15);
+  EXPECT_LT(mark.values[62 * 3 + 2], mark.values[2] - 1e-4) << "the pad does not sink: no test";
 }
 
 TEST(Simulate, SolverOptionsReachTheStepper) {
@@ -285,6 +304,8 @@ TEST(Plot, DrawsWhatSimulateWrote) {
   const json answer = json::parse(outcome.out);
   EXPECT_THAT(undocumented_keys(answer), IsEmpty());
   EXPECT_EQ(answer.at("sensor"), "pad");
+  EXPECT_EQ(answer.at("sensors"), json({"pad"}));
+  EXPECT_THAT(outcome.err, Not(HasSubstr("can be drawn")));
   EXPECT_EQ(answer.at("environment"), 1);
   EXPECT_TRUE(answer.at("frame").is_null());
   const std::string svg = folder.read("out.svg");
@@ -292,6 +313,25 @@ TEST(Plot, DrawsWhatSimulateWrote) {
   EXPECT_THAT(svg, HasSubstr("<svg"));
   EXPECT_EQ(run(folder, {"plot", "out.h5", "-o", "one.svg", "--frame", "60"}).exit_code, 0);
   EXPECT_NE(folder.read("one.svg"), svg);
+}
+
+TEST(Plot, ListsTheSensorsOfTheFile) {
+  const Folder folder;
+  std::ifstream file(kSmall);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::size_t at = text.find("<tactile name=\"pad\""), end = text.find("/>", at) + 2;
+  std::string second = text.substr(at, end - at);
+  second.replace(second.find("pad"), 3, "twin");
+  folder.write("two.xml", text.insert(end, second));
+  simulate(folder, "two.xml", {"--steps", "5", "--every", "5"});
+  const Outcome first = run(folder, {"plot", "out.h5", "-o", "first.svg", "--json"});
+  const json answer = json::parse(first.out);
+  EXPECT_EQ(answer.at("sensor"), "pad");
+  EXPECT_EQ(answer.at("sensors"), json({"pad", "twin"}));
+  EXPECT_THAT(first.err, HasSubstr("sensors that can be drawn: pad, twin"));
+  const Outcome twin = run(folder, {"plot", "out.h5", "-o", "twin.svg", "--sensor", "twin", "--json"});
+  EXPECT_EQ(json::parse(twin.out).at("sensor"), "twin");
+  EXPECT_THAT(folder.read("twin.svg"), HasSubstr("sensor 'twin'"));
 }
 
 TEST(Plot, NamesWhatIsNotThere) {

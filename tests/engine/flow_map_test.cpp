@@ -37,7 +37,8 @@ class FlowMap : public ::testing::Test {
   }
   static double largest_length(const Field& map) {
     double largest = 0;
-    for (std::size_t k = 0; k < map.size(); k += 2) largest = std::max(largest, std::hypot(double(map[k]), double(map[k + 1])));
+    for (std::size_t k = 0; k < map.size(); k += 2)
+      largest = std::max(largest, std::hypot(double(map[k]), double(map[k + 1])));
     return largest;
   }
   static Field random_field(unsigned seed, int points, double scale) {
@@ -92,7 +93,8 @@ TYPED_TEST(FlowMap, IsZeroUpToTheSmallestThatCounts) {
 TYPED_TEST(FlowMap, HasALongestArrowOfOneAndNoScale) {
   using T = TypeParam;
   // A power of two changes no digit, another factor the last ones; nor do the ends of the range overflow or vanish.
-  const double tiny = std::ldexp(1.0, sizeof(T) == 4 ? -120 : -1000), huge = std::ldexp(1.0, sizeof(T) == 4 ? 120 : 1000);
+  constexpr int kFar = sizeof(T) == 4 ? 100 : 1000;
+  const double tiny = std::ldexp(1.0, -kFar), huge = std::ldexp(1.0, kFar);
   const double rounding = 4 * double(std::numeric_limits<T>::epsilon());
   const auto one = this->flow({this->random_field(1, 20, 1), this->random_field(2, 30, 5)});
   EXPECT_NEAR(this->largest_length(one), 1, rounding);
@@ -104,10 +106,8 @@ TYPED_TEST(FlowMap, HasALongestArrowOfOneAndNoScale) {
     const auto map = this->flow(fields);
     EXPECT_NEAR(this->largest_length(map), 1, rounding) << scale;
     for (std::size_t k = 0; k < map.size(); ++k) {
-      if (scale == tiny || scale == huge) {
-        EXPECT_EQ(map[k], one[k]) << scale << " [" << k << "]";
-      }
-      EXPECT_NEAR(map[k], one[k], rounding) << scale << " [" << k << "]";
+      const bool exact = scale == tiny || scale == huge;
+      EXPECT_NEAR(map[k], one[k], exact ? 0 : rounding) << scale << " [" << k << "]";
     }
   }
 }
@@ -130,7 +130,7 @@ TYPED_TEST(FlowMap, RefusesSizesThatDoNotFit) {
   refused({six}, std::span<T>(map).first(3));
 }
 
-TEST(FlowMapOfARun, IsZeroBeforeContactAndPointsWithTheFriction) {
+TEST(FlowMapOfARun, IsZeroBeforeContactAndThenTheShearWithoutItsScale) {
   const Model model(testing::rolling_ball(false, 32));
   Batch batch(model, 1);
   Stepper stepper(model);
@@ -148,15 +148,13 @@ TEST(FlowMapOfARun, IsZeroBeforeContactAndPointsWithTheFriction) {
       EXPECT_THAT(map, Each(0.0));
     }
   }
-  // The pad is pushed along +x, which is axis1: friction pulls it back.
   ASSERT_GT(longest, 0);
-  double along = 0, most = 0;
+  double most = 0;
   for (std::size_t k = 0; k < points; ++k) {
-    along += map[2 * k + 1];
     most = std::max(most, std::hypot(map[2 * k], map[2 * k + 1]));
-    EXPECT_NEAR(map[2 * k + 1] * longest, field[3 * k + 1], 1e-15);
+    EXPECT_NEAR(map[2 * k] * longest, field[3 * k], 1e-15 * longest);
+    EXPECT_NEAR(map[2 * k + 1] * longest, field[3 * k + 1], 1e-15 * longest);
   }
-  EXPECT_LT(along, -1);
   EXPECT_NEAR(most, 1, 1e-15);
 }
 

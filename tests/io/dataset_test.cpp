@@ -102,6 +102,33 @@ TEST(Dataset, HoldsEveryNumberWhereThePageSays) {
   }
 }
 
+TEST(Dataset, HoldsEndEffectorsAsAnObservation) {
+  const Folder folder;
+  DatasetLayout l = dataset_layout(20);
+  const double bytes = l.episode_bytes();
+  l.variable_names = {"tip", "heel"};
+  EXPECT_EQ(l.episode_bytes() - bytes, 4 * 6 * sizeof(float));
+  const std::string path = one_shard(folder, l);
+  EXPECT_EQ(check_shard(path).demos, 18);
+  const h5::Id file = h5::open_file(path);
+  expect_dataset<float>(file, "data/demo_7/obs/variables", {3, 2, 3}, 7, 3, 0);
+  expect_dataset<float>(file, "data/demo_7/final_obs/variables", {1, 2, 3}, 7, 3, 3);
+  expect_dataset<float>(file, "data/demo_7/obs/skin", {3, 3, 4, 3}, 7, 4, 0);
+  const h5::Id scene = h5::open_group(file, "scene");
+  EXPECT_THAT(h5::read_texts(scene, "observations"), ElementsAre("q", "v", "variables", "skin"));
+  EXPECT_THAT(h5::read_texts(scene, "variable_names"), ElementsAre("tip", "heel"));
+  EXPECT_EQ(h5::read_text(scene, "variable_units"), "m");
+  EXPECT_EQ(h5::read_text(scene, "variable_frame"), "world");
+}
+
+TEST(Dataset, TakesTheNameOfEndEffectorsOnlyWhereThereAreAny) {
+  DatasetLayout l = dataset_layout(20);
+  l.sensors[0].name = "variables";
+  EXPECT_NO_THROW(l.check());
+  l.variable_names = {"tip"};
+  EXPECT_THROW(l.check(), InputError);
+}
+
 TEST(Dataset, SaysWhatItsNumbersAre) {
   const Folder folder;
   const h5::Id file = h5::open_file(one_shard(folder, dataset_layout(20)));

@@ -37,7 +37,7 @@ inline DatasetLayout dataset_layout(std::int64_t episodes, bool single = true) {
   return l;
 }
 
-/// Number k of a row; name 0 is the actions, then q, v, skin. Exact in float32.
+/// Number k of a row; name 0 is the actions, then q, v, end effectors if any, skin. Exact in float32.
 template <class T>
 T dataset_number(std::int64_t episode, std::size_t name, std::int64_t row, std::size_t k) {
   if (name == 0)
@@ -54,15 +54,16 @@ class SyntheticPiece {
                  int rows) {
     const auto episodes = static_cast<int>(std::min<std::int64_t>(16, l.episodes - first_episode));
     const auto with_action = static_cast<int>(std::min<std::int64_t>(rows, l.rows() - first_row));
-    const std::size_t widths[] = {l.u_names.size(), l.q_names.size(), l.v_names.size(),
-                                  3 * static_cast<std::size_t>(l.sensors[0].points)};
-    values_.resize(3);
+    std::vector<std::size_t> widths = {l.u_names.size(), l.q_names.size(), l.v_names.size()};
+    if (!l.variable_names.empty()) widths.push_back(3 * l.variable_names.size());
+    widths.push_back(3 * static_cast<std::size_t>(l.sensors[0].points));
+    values_.resize(widths.size() - 1);
     for (std::int64_t e = first_episode; e < first_episode + episodes; ++e) {
       for (std::int64_t row = first_row; row < first_row + rows; ++row) {
         for (std::size_t k = 0; k < widths[0] && row < first_row + with_action; ++k)
           actions_.push_back(dataset_number<float>(e, 0, row, k));
       }
-      for (std::size_t name = 1; name < 4; ++name)
+      for (std::size_t name = 1; name < widths.size(); ++name)
         for (std::int64_t row = first_row; row < first_row + rows; ++row)
           for (std::size_t k = 0; k < widths[name]; ++k)
             values_[name - 1].push_back(dataset_number<T>(e, name, row, k));

@@ -69,6 +69,33 @@ TEST(TactilePlot, NoContactIsSaid) {
   EXPECT_THAT(picture(folder, {}, 0.0), HasSubstr("no contact"));
 }
 
+TEST(TactilePlot, DrawsTheFirstRectangularArrayAndNamesThemAll) {
+  const Folder folder;
+  TrajectoryLayout l = layout(0);  // no field is needed to be told which could be drawn
+  SensorLayout rod = l.sensors[0], second = rod;
+  rod.name = "rod";
+  rod.rows = rod.cols = 0;
+  second.name = "second";
+  l.sensors = {rod, l.sensors[0], second};
+  TrajectoryFile file(folder / "run.h5", l, false);
+  testing::write_run(file, l);
+  file.commit();
+  const TrajectoryReader reader(folder / "run.h5");
+  EXPECT_THAT(drawable_sensors(reader), ::testing::ElementsAre("skin", "second"));
+  const auto message = [&](const std::string& sensor) {
+    PlotOptions o;
+    o.sensor = sensor;
+    try {
+      (void)render_tactile_svg(reader, o);
+    } catch (const InputError& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(message(""), HasSubstr("'skin' has no frame"));
+  EXPECT_THAT(message("rod"), HasSubstr("'rod' is not a rectangular array; those that can be drawn: skin, second"));
+}
+
 TEST(TactilePlot, WhatIsNotThereIsNamed) {
   const Folder folder;
   picture(folder, {});

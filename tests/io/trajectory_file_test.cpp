@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "io/h5.hpp"
 #include "io/trajectory_reader.hpp"
 #include "tests/io/synthetic_run.hpp"
 
@@ -83,6 +84,36 @@ TEST(TrajectoryFile, HoldsWhatItPromises) {
   for (const char* name : {"pressure_sign", "units", "axis0", "corner0", "body", "components"})
     EXPECT_GT(H5Aexists_by_name(f, "/tactile/skin/force", name, H5P_DEFAULT), 0) << name;
   H5Fclose(f);
+}
+
+TEST(TrajectoryFile, HoldsEndEffectorsWhereThereAreAny) {
+  const Folder folder;
+  {
+    const h5::Id without = h5::open_file(write_file(folder));
+    EXPECT_FALSE(h5::has_link(without, "variables"));
+  }
+  const Folder other;
+  TrajectoryLayout l = layout();
+  const std::uint64_t bytes = l.bytes();
+  l.variable_names = {"tip", "heel"};
+  EXPECT_EQ(l.bytes() - bytes, 6U * 2 * 2 * 3 * 8);
+  const h5::Id f = h5::open_file(write_file(other, l));
+  const h5::Id d = h5::open_dataset(f, "variables/position");
+  ASSERT_EQ(h5::dimensions(d), (h5::Dims{6, 2, 2, 3}));
+  std::vector<double> x(72);
+  h5::read_box(d, {0, 0, 0, 0}, {6, 2, 2, 3}, x.data());
+  for (std::size_t k = 0; k < 72; ++k) EXPECT_EQ(x[k], number(7, std::int64_t(k / 12), k % 12)) << k;
+  EXPECT_EQ(h5::read_texts(d, "names"), l.variable_names);
+  EXPECT_EQ(h5::read_text(d, "units"), "m");
+  EXPECT_EQ(h5::read_text(d, "frame"), "world");
+}
+
+TEST(TrajectoryFile, RefusesARowWithoutTheEndEffectorsItsLayoutHas) {
+  const Folder folder;
+  TrajectoryLayout l = layout();
+  l.variable_names = {"tip"};
+  TrajectoryFile file(folder / "run.h5", l, false);
+  EXPECT_THROW(testing::write_run(file, layout()), IoError);
 }
 
 TEST(TrajectoryFile, ReaderGivesBackTheFields) {

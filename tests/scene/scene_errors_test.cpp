@@ -27,6 +27,11 @@ std::string error_of(const std::string& text) {
   return "";
 }
 
+/// A section of one element, which is in line 24.
+Bad end_effector(const std::string& element, const std::vector<std::string>& message) {
+  return {"<sensor>", "<variable>\n<" + element + "/></variable>\n<sensor>", ":24: ", message};
+}
+
 class SceneError : public ::testing::TestWithParam<Bad> {};
 
 TEST_P(SceneError, NamesLineValueAndWhatWasExpected) {
@@ -159,10 +164,30 @@ INSTANTIATE_TEST_SUITE_P(
             ":7: ",
             {"no <joint>"}},
         Bad{"<body name=\"ball\" type=\"sphere\" radius=\"0.02\" density=\"100\"/>", "", ":11: ", {"no <body>"}},
-        Bad{"<sensor>",
-            "<variable><endeffector joint=\"pad_joint\" pos=\"0 0 0\"/></variable>\n<sensor>",
-            ":23: ",
-            {"not simulated"}}));
+        end_effector("endeffector joint=\"pad_join\" pos=\"0 0 0\"",
+                     {"<endeffector>: joint=\"pad_join\"", "did you mean 'pad_joint'"}),
+        end_effector("endeffector pos=\"0 0 0\"",
+                     {"'joint' is missing"}),
+        end_effector("endeffector joint=\"pad_joint\"",
+                     {"'pos' is missing"}),
+        end_effector("endeffector joint=\"pad_joint\" pos=\"0 0\"",
+                     {"2 numbers", "expected 3"}),
+        end_effector("endeffector joint=\"pad_joint\" pos=\"0 0 inf\"",
+                     {"finite numbers"}),
+        end_effector("endeffector joint=\"pad_joint\" pos=\"0 0 0\" radius=\"0\"",
+                     {"radius", "positive"}),
+        end_effector("endeffector joint=\"pad_joint\" pos=\"0 0 0\" rgba=\"1\"",
+                     {"rgba has 1 numbers"}),
+        end_effector("endeffector joint=\"pad_joint\" position=\"0 0 0\"",
+                     {"unknown attribute 'position'"}),
+        end_effector("endeffector name=\"\" joint=\"pad_joint\" pos=\"0 0 0\"",
+                     {"'name' is empty"}),
+        end_effector("endefector joint=\"pad_joint\" pos=\"0 0 0\"",
+                     {"did you mean 'endeffector'"}),
+        Bad{"<sensor>", "<variable><endeffector name=\"a\" joint=\"pad_joint\" pos=\"0 0 0\"/></variable>\n<variable>\n"
+                        "<endeffector name=\"a\" joint=\"ball_joint\" pos=\"0 0 0\"/></variable>\n<sensor>",
+            ":25: ", {"name 'a' is used twice"}},
+        Bad{"<default>", "<default><endeffector pos=\"0 0 0\"/>", ":5: ", {"unknown attribute 'pos'"}}));
 
 TEST(SceneError, RootsAndEmptyFilesSayWhatIsExpected) {
   EXPECT_THAT(error_of("<mujoco/>"), ::testing::HasSubstr("expected the root <redmax> or <tangere>"));

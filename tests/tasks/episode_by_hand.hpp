@@ -57,7 +57,7 @@ struct ByHand {
     Stepper stepper(model);
     const ControlProgram controls(model, model.timestep(), o.seed);
     std::vector<double> u(std::size_t(model.nu()));
-    episode.observations.resize(2 + model.sensors().size());
+    episode.observations.resize(first_sensor(model) + model.sensors().size());
     observe(model);
     for (std::int64_t t = 0; t < o.steps; ++t) {
       controls.evaluate(t, number, u);
@@ -72,6 +72,7 @@ struct ByHand {
   }
 
  private:
+  static std::size_t first_sensor(const Model& model) { return model.variables().empty() ? 2 : 3; }
   void step(Stepper& stepper, const std::vector<double>& u, std::int64_t t) {
     std::vector<double> q(std::size_t(batch_.model().nq())), v(std::size_t(batch_.model().nv()));
     batch_.get_q(0, q);
@@ -86,10 +87,15 @@ struct ByHand {
     batch_.get_v(0, v);
     keep(0, std::vector<T>(q.begin(), q.end()));
     keep(1, std::vector<T>(v.begin(), v.end()));
+    if (!model.variables().empty()) {
+      std::vector<double> positions(3 * model.variables().size());
+      readout_.variables(batch_, 0, positions);
+      keep(2, std::vector<T>(positions.begin(), positions.end()));
+    }
     for (std::size_t s = 0; s < model.sensors().size(); ++s) {
       std::vector<T> field(3 * std::size_t(model.sensors()[s].points));
       readout_.tactile(batch_, 0, static_cast<int>(s), field);
-      keep(2 + s, field);
+      keep(first_sensor(model) + s, field);
     }
   }
   void keep(std::size_t name, const std::vector<T>& values) {

@@ -24,7 +24,7 @@ std::string bytes_of(std::span<const T> values) {
 /// Bytes of (rows, width) per name of an episode.
 struct RecordedEpisode {
   std::string actions;
-  std::vector<std::string> observations;  // q, v, then each sensor
+  std::vector<std::string> observations;  // q, v, end effectors if any, then each sensor
   bool operator==(const RecordedEpisode&) const = default;
 };
 

@@ -111,6 +111,32 @@ TEST(Episodes, OfPadsThatAreReadSixteenAtATimeAreTheSame) {
   }
 }
 
+TEST(Episodes, WithEndEffectorsHaveThemBeforeTheSensors) {
+  Scene scene = small_scene();
+  for (const char* joint : {"ball_joint", "pad_joint"}) {
+    VariableDescription& v = scene.variables.emplace_back();
+    v.name = v.joint = joint;
+    v.position = {0.01, 0.02, 0.03};
+  }
+  const Model model(scene);
+  for (const Precision precision : {Precision::f64, Precision::mixed}) {
+    EpisodeOptions o = options(2, precision);
+    o.piece_bytes = 1 << 20;
+    Recorder recorder(kRows);
+    run(model, o, recorder);
+    const RecordedEpisode& episode = recorder.episodes.at(37);
+    ASSERT_EQ(episode.observations.size(), 4U);
+    const std::string& positions = episode.observations[2];
+    const std::size_t row = 6 * (precision == Precision::f64 ? sizeof(double) : sizeof(float));
+    ASSERT_EQ(positions.size(), (kRows + 1) * row);
+    EXPECT_NE(positions.substr(0, row), positions.substr(kRows * row)) << "nothing moves: no test";
+    if (precision == Precision::f64)
+      expect_as_by_hand<double>(model, o, recorder);
+    else
+      expect_as_by_hand<float>(model, o, recorder);
+  }
+}
+
 struct Way {
   int threads, blocks_in_flight;
   std::size_t piece_bytes;
