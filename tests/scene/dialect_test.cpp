@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files in the published dialect: together they use its elements and oddities. They load, say what they leave out, and run;
-// what is not simulated yet is refused by name.
+// Files in the published dialect: together they use its elements and oddities. They load, say what they leave out, and
+// run; what is not simulated yet is refused by name.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
