@@ -160,7 +160,9 @@ TEST(Dialect, WhatIsNotSimulatedIsRefusedByName) {
               AnyOf(HasSubstr("not simulated"), HasSubstr("gone.txt")));
   EXPECT_THAT(refusal("primitive_body=\"ball\"/>", "primitive_body=\"lower\"/>"), HasSubstr("no distance function"));
   EXPECT_THAT(refusal("scale=\"1 1 1\"", "scale=\"1 1 -1\""), HasSubstr("expected positive factors"));  // a mirror
-  EXPECT_THAT(refusal("meshes/tetrahedron.obj", "meshes/tetraeder.obj"), HasSubstr("meshes/tetraeder.obj"));
+  EXPECT_THAT(refusal("meshes/tetrahedron.obj", "meshes/tetraeder.obj"),
+              AllOf(HasSubstr("hand.xml:29: <body>: "), HasSubstr("meshes/tetraeder.obj")));
+  EXPECT_THAT(refusal("./tripod.txt", "./tripot.txt"), HasSubstr("hand.xml:25: <collision>: "));
   EXPECT_THAT(refusal("ctrl=\"position\"/>", "ctrl=\"velocity\"/>"), HasSubstr("velocity"));
   EXPECT_THAT(refusal("integrator=\"BDF1\"", "integrator=\"RK4\""), HasSubstr("BDF1"));
 }
