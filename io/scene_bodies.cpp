@@ -65,16 +65,22 @@ CapsuleShape read_capsule(const SceneNode& node, double length) {
   return shape;
 }
 
-/// A file named by an attribute, beside the scene.
-std::string path_of(const SceneNode& node, const char* attribute) {
-  return (std::filesystem::path(node.context().file).parent_path() / node.text(attribute)).string();
+/// What `read` makes of a file named by an attribute, beside the scene. Errors say who asked.
+template <class Read>
+auto read_beside(const SceneNode& node, const char* attribute, Read&& read) {
+  const std::filesystem::path path = std::filesystem::path(node.context().file).parent_path() / node.text(attribute);
+  try {
+    return read(path.string());
+  } catch (const IoError& e) {
+    throw IoError(node.source().prefix() + "<" + node.name() + ">: " + e.what());
+  }
 }
 
 MeshShape read_mesh(const SceneNode& node, double length) {
   const Vector3 scale = node.vector("scale", Vector3{1, 1, 1});
   for (double s : scale)
     if (!(s > 0)) node.fail(fmt::format("scale has {}; expected positive factors", s));
-  MeshShape shape = read_obj(path_of(node, "filename"));
+  MeshShape shape = read_beside(node, "filename", read_obj);
   for (std::size_t k = 0; k < shape.vertices.size(); ++k) shape.vertices[k] *= scale[k % 3] * length;
   return shape;
 }
@@ -98,7 +104,7 @@ AbstractShape read_abstract(const SceneNode& node, double length) {
     if (!shape.contact_points.empty()) child.fail("given twice; expected once");
     const kernels::Frame<double> at =
         to_frame({scaled(child.vector("pos", Vector3{0, 0, 0}), length), child.quaternion("quat")});
-    const std::vector<double> points = read_contact_points(path_of(child, "contacts"));
+    const std::vector<double> points = read_beside(child, "contacts", read_contact_points);
     for (std::size_t k = 0; k < points.size(); k += 3) {
       const kernels::Vec3<double> p =
           at.R * kernels::Vec3<double>{length * points[k], length * points[k + 1], length * points[k + 2]} + at.p;

@@ -217,6 +217,14 @@ SceneFile parse_scene(const std::string& text, const std::string& name, const Sc
   SceneContext context;
   context.file = name;
   context.allow_unknown = options.allow_unknown;
+  for (const tinyxml2::XMLNode* node = document.FirstChild(); node != nullptr; node = node->NextSibling()) {
+    if (node->ToText() != nullptr)
+      context.warnings.push_back(fmt::format("{}:{}: stray text outside <{}> is ignored", name, node->GetLineNum(),
+                                             root->Name()));
+    if (node->ToElement() != nullptr && node != root)
+      throw InputError(fmt::format("{}:{}: <{}> after the end of <{}>; expected one root", name, node->GetLineNum(),
+                                   node->ToElement()->Name(), root->Name()));
+  }
   SceneFile out;
   read_root(SceneNode(*root, context), out.scene);
   out.scene.path = name;

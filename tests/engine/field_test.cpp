@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a tactile field says about a contact: directions and patterns of shear, uniform pressure, zero after release, and its
-// balance with the wrench of the contact.
+// What a tactile field says about a contact: directions and patterns of shear, uniform pressure, zero after release, and
+// its balance with the wrench of the contact.
 //
-// The pad lies above its object and feels with its lower face. axis0 = x and axis1 = -y of the pad, their product points down and
-// out: the numbers are f_x, -f_y, f_z of the force on the pad, and pressure is positive.
+// The pad lies above its object and feels with its lower face. axis0 = x and axis1 = -y of the pad, their product points
+// down and out: the numbers are f_x, -f_y, f_z of the force on the pad, and pressure is positive.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -243,8 +243,8 @@ TEST(Field, NothingIsLeftAfterRelease) {
   EXPECT_EQ(read_all(0.1), 0);
 }
 
-/// Where points and coefficients of sensor and contact are the same, forces and moments of the field are the wrench that the
-/// dynamics feels, taken from its residual: with the contact less without.
+/// Where points and coefficients of sensor and contact are the same, forces and moments of the field are the wrench that
+/// the dynamics feels, taken from its residual: with the contact less without.
 TEST(Field, SumAndMomentAreTheWrenchOfTheContact) {
   testing::Random random(5);
   for (const bool flat : {false, true}) {
@@ -283,7 +283,8 @@ TEST(Field, SumAndMomentAreTheWrenchOfTheContact) {
         return to_matrix(kernels::Quat<double>{q[at], q[at + 1], q[at + 2], q[at + 3]});
       };
       const kernels::Mat3<double> R1 = rotation(3), R2 = rotation(10);
-      const Vec3<double> p1 = {q[0], q[1], q[2] + model.scene().links[0].joint.pose.position[2]}, p2 = {q[7], q[8], q[9]};
+      const Vec3<double> p1 = {q[0], q[1], q[2] + model.scene().links[0].joint.pose.position[2]};
+      const Vec3<double> p2 = {q[7], q[8], q[9]};
       Vec3<double> force{}, moment1{}, moment2{};
       for (int p = 0; p < f.points(); ++p) {
         if (!f.touched(p)) continue;

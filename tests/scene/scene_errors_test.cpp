@@ -193,6 +193,10 @@ TEST(SceneError, RootsAndEmptyFilesSayWhatIsExpected) {
   EXPECT_THAT(error_of("<mujoco/>"), ::testing::HasSubstr("expected the root <redmax> or <tangere>"));
   EXPECT_THAT(error_of(""), ::testing::HasSubstr("not well-formed"));
   EXPECT_THAT(error_of("<tangere/>"), ::testing::HasSubstr("no <link>"));
+  EXPECT_THAT(error_of(testing::kScene + "\n<tangere/>"), ::testing::HasSubstr("<tangere> after the end of <tangere>"));
+  const SceneFile stray = parse_scene("a word\n" + testing::kScene, "s.xml");
+  ASSERT_EQ(stray.warnings.size(), 1U);
+  EXPECT_THAT(stray.warnings[0], ::testing::HasSubstr("s.xml:1: stray text outside <tangere>"));
   EXPECT_THAT(error_of(std::string("<tangere/>") + '\0'), ::testing::HasSubstr("zero byte"));
 }
 

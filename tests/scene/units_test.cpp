@@ -30,7 +30,8 @@ Series run(const std::string& name) {
   std::vector<double> u(kEnvironments * nu);
   Series s;
   for (int k = 0; k < int(control.steps()); ++k) {
-    for (std::size_t e = 0; e < kEnvironments; ++e) control.evaluate(k, std::int64_t(e), std::span(u).subspan(e * nu, nu));
+    for (std::size_t e = 0; e < kEnvironments; ++e)
+      control.evaluate(k, std::int64_t(e), std::span(u).subspan(e * nu, nu));
     stepper.step(batch, u);
     s.q.emplace_back(kEnvironments * nq);
     s.v.emplace_back(kEnvironments * nv);
