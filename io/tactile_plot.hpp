@@ -18,7 +18,7 @@ struct PlotOptions {
   int strip = 6;                      ///< most frames of a strip, spread over those with contact
 };
 
-/// Names of the sensors that can be drawn, rectangular arrays, in the file's order.
+/// Names of the sensors that can be drawn, rectangular arrays, in alphabetical order, as files list them.
 std::vector<std::string> drawable_sensors(const TrajectoryReader& file);
 
 /// Column axis1 runs to the right and row axis0 downwards, as in the array. All frames share one colour scale and one
