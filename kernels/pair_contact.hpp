@@ -159,13 +159,13 @@ void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& l
 /// The same sums for points or a sphere on the ground, with velocity and force at the body's own point ξ = ξ_c - r m
 /// (r = 0: a material point). m = Rᵀ n_ground, `height` = n·(p - ground point), V = body twist, all in body axes.
 ///   δm = m × θ, δξ = -r m × θ, δd = m·(ρ + θ × ξ_c), u = v + ω × ξ, ḋ = m·u     (θ, ρ of the body itself)
-/// In the pair's convention body 2 is the ground: ε = -δ₁, δW = -δV₁, hence the signs of k and d.
+/// In the pair's convention body 2 is the ground: ε = -δ₁, δW = -δV₁, hence the signs of k and d. False where no lane touches.
 template <bool Derivatives, class N>
-void accumulate_ground(PairSums<N>& sums, const LawParameters<N>& law, const Vec3<N>& m, const N& height,
+bool accumulate_ground(PairSums<N>& sums, const LawParameters<N>& law, const Vec3<N>& m, const N& height,
                        const Vec6<N>& V, const Vec3<N>& centre, const N& radius) {
   const N d = dot(m, centre) + height - radius;
   const auto touching = d < N(0.0);
-  if (!any(touching)) return;
+  if (!any(touching)) return false;
   const Vec3<N> xi = centre - radius * m;
   const Vec3<N> u = V.l + cross(V.a, xi);
   const N rate = dot(m, u);
@@ -200,6 +200,7 @@ void accumulate_ground(PairSums<N>& sums, const LawParameters<N>& law, const Vec
     sums.d[0][0] += cross_columns(xi, f_omega);
     sums.d[0][1] = sums.d[0][1] - cross_columns(xi, f_u);
   }
+  return true;
 }
 
 }  // namespace tangere::kernels

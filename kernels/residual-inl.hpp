@@ -183,12 +183,20 @@ void sum_pair(const PairContact& pair, const StageArgs<N>& a, const CandidateLis
   finish_sphere<Derivatives>(motion, o.W.a, sums, o.sums);
 }
 
+/// -0 to +0: a contact that is near in another lane only adds ±0, which must not show in this lane's bits.
+template <class N>
+void without_negative_zeros(N* x, int count) {
+  for (int i = 0; i < count; ++i) x[i] = x[i] + N(0.0);
+}
+
 /// Contact sums of every pair and ground contact; their wrenches are taken from the links' F.
 template <bool Derivatives, class N>
 void contact_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int k = 0; k < model.n_pairs; ++k) {
     const PairContact& pair = model.pairs[k];
     ContactScratch<N>& o = a.contacts[k];
+    o.near = (a.lone < 0 ? a.candidates[k].count : a.candidates[k].own_count) > 0;
+    if (!o.near) continue;
     sum_pair<Derivatives>(pair, a, a.candidates[k], o);
     if (pair.link1 >= 0) a.links[pair.link1].F -= o.sums.wrench;
     if (pair.link2 >= 0) a.links[pair.link2].F += wrench_to_child(o.link2_in_1, o.sums.wrench);
@@ -202,12 +210,13 @@ void contact_sweep(const ModelView& model, const StageArgs<N>& a) {
     const N height = dot(normal, link.world.p - broadcast<N>(model.ground_point));
     const LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
     o.sums = PairSums<N>::zero();
+    o.near = false;
     for (int i = 0; i < ground.n_points; ++i) {
       const double* p = ground.points + 3 * i;
-      accumulate_ground<Derivatives>(o.sums, law, m, height, link.V, Vec3<N>{N(p[0]), N(p[1]), N(p[2])},
-                                     N(ground.radius));
+      o.near |= accumulate_ground<Derivatives>(o.sums, law, m, height, link.V, Vec3<N>{N(p[0]), N(p[1]), N(p[2])},
+                                               N(ground.radius));
     }
-    a.links[ground.link].F -= o.sums.wrench;
+    if (o.near) a.links[ground.link].F -= o.sums.wrench;
   }
 }
 
@@ -261,12 +270,16 @@ void residual(const ModelView& model, const StageArgs<N>& a) {
   inward_sweep(model, a);
   for (int k = 0; k < model.n_pairs; ++k) {
     const ContactScratch<N>& o = a.contacts[k];
+    if (!o.near) continue;
     add_force_scale(model, a, model.pairs[k].link1, o.sums.wrench);
     if (model.pairs[k].link2 >= 0)
       add_force_scale(model, a, model.pairs[k].link2, wrench_to_child(o.link2_in_1, o.sums.wrench));
   }
-  for (int k = 0; k < model.n_grounds; ++k)
-    add_force_scale(model, a, model.grounds[k].link, a.contacts[model.n_pairs + k].sums.wrench);
+  for (int k = 0; k < model.n_grounds; ++k) {
+    const ContactScratch<N>& o = a.contacts[model.n_pairs + k];
+    if (o.near) add_force_scale(model, a, model.grounds[k].link, o.sums.wrench);
+  }
+  without_negative_zeros(a.g, model.nv);
 }
 
 }  // namespace tangere::kernels

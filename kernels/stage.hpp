@@ -37,7 +37,8 @@ struct ContactScratch {
   Frame<N> shape_in_1;  ///< G of the shape
   Vec6<N> Z;            ///< twist of body 2 in body 1's axes, at its origin
   Vec6<N> W;            ///< Z - V₁
-  PairSums<N> sums;
+  PairSums<N> sums;     ///< valid where `near`
+  bool near;            ///< some lane has a candidate, or a point in the ground; else nothing is added anywhere
 };
 
 /// Candidate points of a pair, per lane, and the pose they were found at.
