@@ -1,0 +1,20 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# No function of the kernels may stand in the objects of two instruction sets: the linker keeps one copy for all, and a
+# machine without AVX-512 would meet the AVX-512 one. Takes the kernels' library.
+set -euo pipefail
+library=$1
+command -v nm >/dev/null || { echo "nm is not there: skipped"; exit 77; }
+shared=$(nm -C "$library" | awk '
+  /^kernels\..*:$/ { member = $1; next }
+  /^[^ ].*:$/ { member = ""; next }
+  member != "" && $2 == "W" { sub(/^[0-9a-f]+ W /, ""); if (!((member, $0) in seen)) { seen[member, $0] = 1; count[$0]++ } }
+  END { for (name in count) if (count[name] > 1) print name }')
+members=$(nm "$library" 2>/dev/null | grep -c '^kernels\..*:$')
+[ "$members" -ge 1 ] || { echo "no objects of kernels in $library"; exit 1; }
+if [ -n "$shared" ]; then
+  echo "in the objects of more than one instruction set:"
+  echo "$shared"
+  exit 1
+fi
+echo "$members instruction sets share no function"
