@@ -68,6 +68,7 @@ TouchShape shape_of(PrimitiveShape shape) {
 
 /// What touches the wave from below, by some of its extent.
 Touch<double> random_touch(Random& random, const TouchShape& s) {
+  static const Scene scene = curved_ball(300);
   Touch<double> t;
   t.Q = random.rotation();
   t.omega = random.vector(2);
@@ -76,7 +77,7 @@ Touch<double> random_touch(Random& random, const TouchShape& s) {
   for (double height = 0.04;; height -= 1e-3) {
     t.c = {random.uniform(-0.01, 0.01), random.uniform(-0.01, 0.01), -0.005 - height};
     double least = 1;
-    for (const TactilePoint& p : curved_ball(300).sensors[0].points)
+    for (const TactilePoint& p : scene.sensors[0].points)
       least = std::min(least, kernels::with_distance<double>(
                                   s.shape, {s.size[0], s.size[1], s.size[2]}, [&](const auto& shape) {
                                     return distance_at(shape, transposed_times(t.Q, vec(p.position) - t.c)).d;
