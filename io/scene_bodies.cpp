@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "engine/compiled_model.hpp"
 #include "io/scene_sections.hpp"
@@ -65,26 +64,6 @@ CapsuleShape read_capsule(const SceneNode& node, double length) {
   return shape;
 }
 
-/// What `read` makes of a file named by an attribute, beside the scene. Errors say who asked.
-template <class Read>
-auto read_beside(const SceneNode& node, const char* attribute, Read&& read) {
-  const std::filesystem::path path = std::filesystem::path(node.context().file).parent_path() / node.text(attribute);
-  try {
-    return read(path.string());
-  } catch (const IoError& e) {
-    throw IoError(node.source().prefix() + "<" + node.name() + ">: " + e.what());
-  }
-}
-
-MeshShape read_mesh(const SceneNode& node, double length) {
-  const Vector3 scale = node.vector("scale", Vector3{1, 1, 1});
-  for (double s : scale)
-    if (!(s > 0)) node.fail(fmt::format("scale has {}; expected positive factors", s));
-  MeshShape shape = read_beside(node, "filename", read_obj);
-  for (std::size_t k = 0; k < shape.vertices.size(); ++k) shape.vertices[k] *= scale[k % 3] * length;
-  return shape;
-}
-
 AbstractShape read_abstract(const SceneNode& node, double length) {
   const SceneContext& c = node.context();
   AbstractShape shape;
@@ -135,6 +114,15 @@ Shape read_shape(const SceneNode& node, Attributes& attributes) {
 }
 
 }  // namespace
+
+MeshShape read_mesh(const SceneNode& node, double length) {
+  const Vector3 scale = node.vector("scale", Vector3{1, 1, 1});
+  for (double s : scale)
+    if (!(s > 0)) node.fail(fmt::format("scale has {}; expected positive factors", s));
+  MeshShape shape = read_beside(node, "filename", read_obj);
+  for (std::size_t k = 0; k < shape.vertices.size(); ++k) shape.vertices[k] *= scale[k % 3] * length;
+  return shape;
+}
 
 BodyDescription read_body(const SceneNode& node) {
   BodyDescription body;

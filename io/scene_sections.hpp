@@ -2,6 +2,9 @@
 // The sections of a scene beside its tree of links. Each appends to the scene; references are checked where they stand.
 #pragma once
 
+#include <filesystem>
+
+#include "engine/error.hpp"
 #include "io/scene_node.hpp"
 
 namespace tangere {
@@ -19,6 +22,20 @@ void name_variables(Scene& scene);
 void read_initial(Scene& scene, const SceneNode& section);
 void read_control(Scene& scene, const SceneNode& section);
 void read_randomize(Scene& scene, const SceneNode& section);
+
+/// What `read` makes of a file named by an attribute, beside the scene. Errors say who asked.
+template <class Read>
+auto read_beside(const SceneNode& node, const char* attribute, Read&& read) {
+  const std::filesystem::path path = std::filesystem::path(node.context().file).parent_path() / node.text(attribute);
+  try {
+    return read(path.string());
+  } catch (const IoError& e) {
+    throw IoError(node.source().prefix() + "<" + node.name() + ">: " + e.what());
+  }
+}
+
+/// The closed surface of `filename`, scaled by `scale` and to metres.
+MeshShape read_mesh(const SceneNode& node, double length);
 
 /// k_n, k_t, μ and the damping that a law means, in SI; all 0 by default.
 ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law);

@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 
 #include "io/scene_sections.hpp"
-#include "io/surface_files.hpp"
 #include "io/tactile_layouts.hpp"
 
 namespace tangere {
@@ -64,25 +62,18 @@ RectArray read_array(const SceneNode& node) {
   return array;
 }
 
-std::string path_of(const SceneNode& node, const char* attribute) {
-  return (std::filesystem::path(node.context().file).parent_path() / node.text(attribute)).string();
-}
-
 std::vector<TactilePoint> read_spec(const SceneNode& node, double length) {
-  std::vector<TactilePoint> points = read_tactile_points(path_of(node, "spec"));
+  std::vector<TactilePoint> points = read_beside(node, "spec", read_tactile_points);
   for (TactilePoint& p : points) p.position = scaled(p.position, length);
   return points;
 }
 
 std::vector<TactilePoint> read_surface(const SceneNode& node, double length) {
-  const Vector3 scale = node.vector("scale", Vector3{1, 1, 1});
-  MeshShape mesh = read_obj(path_of(node, "filename"));
-  for (std::size_t k = 0; k < mesh.vertices.size(); ++k) mesh.vertices[k] *= scale[k % 3] * length;
-  try {
-    return mesh_points(mesh, node.positive("pitch") * length, kMostPoints);
-  } catch (const InputError& error) {
-    node.fail(error.what());
-  }
+  const MeshShape mesh = read_mesh(node, length);
+  const double pitch = node.positive("pitch") * length;
+  const std::vector<TactilePoint> points = mesh_points(mesh, pitch, kMostPoints);
+  if (points.empty()) node.fail(fmt::format("pitch of {} m: more than {} points; expected a larger one", pitch, kMostPoints));
+  return points;
 }
 
 std::vector<TactilePoint> read_points(const SceneNode& node, int type) {

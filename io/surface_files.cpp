@@ -5,80 +5,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <string_view>
 
 #include "engine/error.hpp"
+#include "io/word_reader.hpp"
 
 namespace tangere {
 namespace {
-
-constexpr std::uintmax_t kLargestFile = 256U << 20;
-constexpr double kLargestPosition = 1e6;  // beyond it, nothing is simulated to any accuracy [file's unit]
-
-/// Lines of a text file, cut into words.
-class WordReader {
- public:
-  explicit WordReader(const std::string& path) : path_(path) {
-    std::error_code error;
-    if (std::filesystem::is_directory(path, error)) throw IoError(path + ": is a folder; expected a file");
-    file_.open(path, std::ios::binary);
-    if (!file_) throw IoError(path + ": cannot be opened for reading");
-    if (std::filesystem::file_size(path, error) > kLargestFile && !error)
-      throw InputError(path + ": larger than 256 MiB; expected a surface or a list of points");
-  }
-
-  /// The next line that has words; false at the end. A word that starts with # ends its line.
-  bool next() {
-    while (std::getline(file_, line_)) {
-      ++number_;
-      words.clear();
-      std::string_view rest = line_;
-      for (;;) {
-        const std::size_t begin = rest.find_first_not_of(" \t\r");
-        if (begin == std::string_view::npos || rest[begin] == '#') break;
-        const std::size_t end = std::min(rest.find_first_of(" \t\r", begin), rest.size());
-        words.push_back(rest.substr(begin, end - begin));
-        rest.remove_prefix(end);
-      }
-      if (!words.empty()) return true;
-    }
-    if (file_.bad()) throw IoError(path_ + ": reading failed");
-    return false;
-  }
-
-  [[noreturn]] void fail(const std::string& message) const {
-    throw InputError(Source{path_, number_}.prefix() + message);
-  }
-
-  [[nodiscard]] double position(std::size_t k) const {
-    double x = 0;
-    std::string_view word = words[k];
-    if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);  // the library knows no plus sign
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), x);
-    if (error != std::errc() || end != word.data() + word.size() || !(std::abs(x) <= kLargestPosition))
-      fail(fmt::format("'{}'; expected a number of at most {:g}", words[k].substr(0, 40), kLargestPosition));
-    return x;
-  }
-  [[nodiscard]] long integer(std::string_view word, const char* expected) const {
-    long n = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), n);
-    if (error != std::errc() || end != word.data() + word.size())
-      fail(fmt::format("'{}'; expected {}", word.substr(0, 40), expected));
-    return n;
-  }
-
-  std::vector<std::string_view> words;
-
- private:
-  std::string path_, line_;
-  std::ifstream file_;
-  int number_ = 0;
-};
 
 struct RawMesh {
   std::vector<Vector3> positions;

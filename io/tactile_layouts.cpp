@@ -5,14 +5,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <string_view>
 
 #include "engine/compiled_model.hpp"
 #include "engine/error.hpp"
+#include "io/word_reader.hpp"
 
 namespace tangere {
 namespace {
@@ -34,80 +31,33 @@ TactilePoint point_at(const Vec3<double>& position, const Vec3<double>& normal, 
   return p;
 }
 
-/// A list of points, line by line; quotes are spaces.
-class PointFile {
- public:
-  explicit PointFile(const std::string& path) : path_(path) {
-    std::error_code error;
-    if (std::filesystem::is_directory(path, error)) throw IoError(path + ": is a folder; expected a list of points");
-    file_.open(path, std::ios::binary);
-    if (!file_) throw IoError(path + ": cannot be opened for reading");
-  }
-
-  /// Numbers of the next line that is not empty; false at the end of the file.
-  bool next(std::vector<double>& numbers) {
-    while (std::getline(file_, line_)) {
-      ++number_;
-      std::replace(line_.begin(), line_.end(), '"', ' ');
-      numbers.clear();
-      for (std::string_view rest = line_;;) {
-        const std::size_t begin = rest.find_first_not_of(" \t\r");
-        if (begin == std::string_view::npos || rest[begin] == '#') break;
-        const std::size_t end = std::min(rest.find_first_of(" \t\r", begin), rest.size());
-        numbers.push_back(number(rest.substr(begin, end - begin)));
-        rest.remove_prefix(end);
-      }
-      if (!numbers.empty()) return true;
-    }
-    if (file_.bad()) throw IoError(path_ + ": reading failed");
-    return false;
-  }
-
-  [[noreturn]] void fail(const std::string& message) const {
-    throw InputError(Source{path_, number_}.prefix() + message);
-  }
-
- private:
-  [[nodiscard]] double number(std::string_view word) const {
-    if (word.starts_with('+')) word.remove_prefix(1);
-    double x = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), x);
-    if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(x))
-      fail(fmt::format("'{}'; expected a finite number", word));
-    return x;
-  }
-
-  std::string path_, line_;
-  std::ifstream file_;
-  int number_ = 0;
-};
-
 /// Three numbers from the k-th, of unit length.
-Vector3 direction(const PointFile& file, const std::vector<double>& numbers, std::size_t k, const char* what) {
-  const Vec3<double> a = {numbers[k], numbers[k + 1], numbers[k + 2]};
+Vector3 direction(const WordReader& file, std::size_t k, const char* what) {
+  const Vec3<double> a = {file.number(k), file.number(k + 1), file.number(k + 2)};
   if (!(dot(a, a) > 0)) file.fail(fmt::format("{} has no length; expected a direction", what));
   return array_of(unit(a));
 }
 
-TactilePoint parse_point(const PointFile& file, const std::vector<double>& numbers) {
+TactilePoint parse_point(const WordReader& file) {
   constexpr std::size_t kPlain = 14, kFactors = 18;
-  if (numbers.size() != kPlain && numbers.size() != kFactors)
+  const std::size_t count = file.words.size();
+  if (count != kPlain && count != kFactors)
     file.fail(fmt::format("{} numbers; expected position (3), row and column (2), normal, axis0, axis1 (3 each), and perhaps "
                           "factors of kn, kt, mu, damping (4)",
-                          numbers.size()));
+                          count));
   TactilePoint p;
-  std::copy_n(numbers.begin(), 3, p.position.begin());
+  for (std::size_t k = 0; k < 3; ++k) p.position[k] = file.position(k);
   for (std::size_t k = 0; k < 2; ++k) {
-    const double x = numbers[3 + k];
-    if (x != std::floor(x) || x < -1 || x > kMostPoints) file.fail(fmt::format("pixel {}; expected a whole number, or -1", x));
+    const long x = file.integer(file.words[3 + k], "a whole number, or -1 for no pixel");
+    if (x < -1 || x > kMostPoints) file.fail(fmt::format("pixel {}; expected -1 to {}", x, kMostPoints));
     p.pixel[k] = static_cast<int>(x);
   }
-  p.normal = direction(file, numbers, 5, "the normal");
-  p.axis0 = direction(file, numbers, 8, "axis0");
-  p.axis1 = direction(file, numbers, 11, "axis1");
-  for (std::size_t k = kPlain; k < numbers.size(); ++k) {
-    if (numbers[k] < 0) file.fail(fmt::format("factor {}; expected zero or more", numbers[k]));
-    p.factors[k - kPlain] = numbers[k];
+  p.normal = direction(file, 5, "the normal");
+  p.axis0 = direction(file, 8, "axis0");
+  p.axis1 = direction(file, 11, "axis1");
+  for (std::size_t k = kPlain; k < count; ++k) {
+    p.factors[k - kPlain] = file.number(k);
+    if (p.factors[k - kPlain] < 0) file.fail(fmt::format("factor {}; expected zero or more", p.factors[k - kPlain]));
   }
   return p;
 }
@@ -149,8 +99,7 @@ std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::
     const Vec3<double> area = cross(ab, ac);
     if (!(dot(area, area) > 0)) continue;  // nothing to feel on
     const double longest = std::sqrt(std::max({dot(ab, ab), dot(ac, ac), dot(bc, bc)})), cuts = std::ceil(longest / pitch);
-    if (cuts * cuts + double(points.size()) > double(most))
-      throw InputError(fmt::format("a pitch of {} m gives more than {} points on the mesh; expected a larger one", pitch, most));
+    if (cuts * cuts + double(points.size()) > double(most)) return {};
     const int n = static_cast<int>(cuts);
     const auto add = [&](double u, double v) {
       points.push_back(point_at(a + (u / (3 * n)) * ab + (v / (3 * n)) * ac, unit(area), unit(ab)));
@@ -165,18 +114,17 @@ std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::
 }
 
 std::vector<TactilePoint> read_tactile_points(const std::string& path) {
-  PointFile file(path);
-  std::vector<double> numbers;
-  if (!file.next(numbers)) throw InputError(path + ": empty; expected a count of points");
-  if (numbers.size() != 1 || numbers[0] != std::floor(numbers[0]) || numbers[0] < 1 || numbers[0] > kMostPoints)
-    file.fail("the first line is no count of points");
-  const auto count = static_cast<std::size_t>(numbers[0]);
+  WordReader file(path);
+  if (!file.next()) throw InputError(path + ": empty; expected a count of points");
+  const long count = file.integer(file.words[0], "a count of points");
+  if (file.words.size() != 1 || count < 1 || count > kMostPoints)
+    file.fail(fmt::format("the first line is no count of points from 1 to {}", kMostPoints));
   std::vector<TactilePoint> points;
-  while (points.size() < count) {
-    if (!file.next(numbers)) file.fail(fmt::format("the file ends after {} of {} points", points.size(), count));
-    points.push_back(parse_point(file, numbers));
+  while (std::ssize(points) < count) {
+    if (!file.next()) file.fail(fmt::format("the file ends after {} of {} points", points.size(), count));
+    points.push_back(parse_point(file));
   }
-  if (file.next(numbers)) file.fail(fmt::format("more than the {} points announced", count));
+  if (file.next()) file.fail(fmt::format("more than the {} points announced", count));
   return points;
 }
 

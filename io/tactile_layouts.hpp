@@ -18,7 +18,7 @@ std::vector<TactilePoint> hemisphere_points(double radius, int count);
 std::vector<TactilePoint> cylinder_points(double radius, double length, int along, int around);
 
 /// Every triangle is cut into equal small ones with edges of at most `pitch` [m]; their middles are the points. axis0
-/// lies along the triangle's first edge. Throws InputError when that gives more than `most`.
+/// lies along the triangle's first edge. None where there would be more than `most`.
 std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::size_t most);
 
 /// A count, then a line for each point: "position" "row col" "normal" "axis0" "axis1", and perhaps "kn kt mu damping",

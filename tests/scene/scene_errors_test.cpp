@@ -137,6 +137,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"primitive_body=\"ball\"", "primitive_body=\"pad\"", ":21: ", {"against itself"}},
         Bad{"type=\"rect_array\"", "type=\"hemisphere\"", ":24: ", {"radius"}},
         Bad{"type=\"rect_array\"", "type=\"hemisphere\" radius=\"0\" count=\"9\"", ":24: ", {"radius", "positive"}},
+        Bad{"type=\"rect_array\"", "type=\"mesh\" pitch=\"1\" scale=\"1 -1 1\" filename=\"a.obj\"", ":24: ", {"positive factors"}},
         Bad{"type=\"rect_array\"", "type=\"hemisphere\" radius=\"1\" count=\"0\"", ":24: ", {"count", "0", "1"}},
         Bad{"axis1=\"1 0 0\"", "axis1=\"0 1 0\"", ":24: ", {"perpendicular"}},
         Bad{"resolution=\"5 7\"", "resolution=\"0 7\"", ":24: ", {"from 1 to"}},
