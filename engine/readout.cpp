@@ -165,12 +165,20 @@ struct Readout::Impl {
     }
   }
 
-  /// Small pads: all environments at once, unless most lanes would be idle. Large ones: `one` for each, its group placed.
+  /// Small pads are read in all environments of a block at once, unless most lanes would be idle.
+  [[nodiscard]] bool together(const Batch& batch, int number, int sensor) const {
+    return small(sensor_of(sensor)) && environments_of(batch, number) >= kFewest;
+  }
+  static int environments_of(const Batch& batch, int number) {
+    return std::min(kBlock, batch.environments() - number * kBlock);
+  }
+
+  /// All environments at once, or `one` for each, its group placed.
   template <class T, class One>
   void block(const Batch& batch, int number, int sensor, const std::array<T*, kBlock>& dense, const One& one) {
-    const int environments = std::min(kBlock, batch.environments() - number * kBlock);
+    const int environments = environments_of(batch, number);
     place_block(batch, number, sensor);
-    if (small(sensor_of(sensor)) && environments >= kFewest) {
+    if (together(batch, number, sensor)) {
       fill_block(sensor, environments, dense);
     } else {
       for (int e = 0; e < environments; ++e) one(e);
@@ -221,7 +229,7 @@ void Readout::variables(const Batch& batch, int environment, std::span<double> p
 }
 
 void Readout::read_variables(const Batch& batch, int block, std::span<const std::span<double>> positions) {
-  const int environments = std::min(kBlock, batch.environments() - block * kBlock);
+  const int environments = Impl::environments_of(batch, block);
   for (int e = 0; e < environments; ++e) {
     if (e % kGroup == 0) impl_->reader.move(batch, block, e / kGroup);
     impl_->write_variables(e / kGroup, e % kGroup, positions[std::size_t(e)]);
@@ -291,10 +299,10 @@ template <class T>
 void Readout::read_block(const Batch& batch, int block, std::span<DenseFrame<T>> frames) {
   if (frames.empty()) return;
   std::array<T*, kBlock> dense{};
+  const bool whole = impl_->together(batch, block, frames[0].sensor_);
   for (std::size_t e = 0; e < std::min(frames.size(), std::size_t(kBlock)); ++e) {
     dense[e] = frames[e].values_.data();
-    // Small pads are written whole; whoever reads one of them alone afterwards must find all tiles in the list.
-    if (Impl::small(impl_->sensor_of(frames[e].sensor_))) frames[e].mark_all();
+    if (whole) frames[e].mark_all();  // whoever reads one of them alone afterwards must find all tiles in its list
   }
   impl_->block<T>(batch, block, frames[0].sensor_, dense, [&](int e) { impl_->refresh(e, frames[std::size_t(e)]); });
 }
@@ -303,7 +311,7 @@ template <class T>
 void Readout::read_block(const Batch& batch, int block, std::span<CompactFrame<T>> frames) {
   if (frames.empty()) return;
   impl_->place_block(batch, block, frames[0].sensor_);
-  const int environments = std::min(kBlock, batch.environments() - block * kBlock);
+  const int environments = Impl::environments_of(batch, block);
   for (int e = 0; e < environments; ++e) impl_->compact(e, frames[std::size_t(e)]);
 }
 
