@@ -35,6 +35,25 @@ struct Stage {
 };
 using GroupStage = Stage<kGroup>;
 
+/// How a stage's rates hang on two older states: r = ρ (q_other ⊖ q_centre), s = s_centre v_centre + s_other v_other.
+struct StageHistory {
+  double rho, s_centre, s_other;
+};
+
+/// Cotangents on their way back through a solved stage; every array is (nv), positions by their right tangent
+/// (kernels/adjoint-inl.hpp).
+template <int L>
+struct StageAdjoint {
+  const Row<L> *q_bar, *v_bar;    ///< of the stage's result
+  Row<L> *rhs, *lambda;
+  Row<L> *nu, *mass_lambda;       ///< out: v̄ - Cᵀ λ, M λ
+  Row<L>* target;                 ///< out: of the targets of position motors, zero where there are none
+  const Row<L>* other;            ///< q_other ⊖ q_centre
+  Row<L> *q_centre, *v_centre;    ///< added to
+  Row<L> *q_other, *v_other;      ///< added to
+  StageHistory history;
+};
+
 /// One lane's search for points near a shape.
 struct CandidateSearch {
   const PairContact* pair;
@@ -49,6 +68,12 @@ template <class N>
 struct LinkPose {
   Frame<N> world;
   Vec6<N> V;
+};
+
+/// Cotangents of a link's displacement and body twist, its axes and origin.
+template <class N>
+struct MotionCotangent {
+  Vec6<N> pose, twist;
 };
 
 /// State of eight environments as rows.
@@ -82,6 +107,12 @@ struct StageKernels {
   void (*solve)(const ModelView&, const Stage<L>&, const Row<L>* b, Row<L>* out);
   /// The same, refined once; sound[l] = 1 where the result can be trusted.
   void (*solve_watched)(const ModelView&, const Stage<L>&, const Row<L>* b, Row<L>* out, Row<L>* sound);
+  /// out = A⁻ᵀ b, refined once.
+  void (*solve_transposed)(const ModelView&, const Stage<L>&, const Row<L>* b, Row<L>* out, Row<L>* sound);
+  /// rhs of the adjoint at the x of evaluate().
+  void (*adjoint_rhs)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&);
+  /// Everything that follows from λ.
+  void (*adjoint_products)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&);
 };
 
 struct KernelTable {
@@ -103,6 +134,12 @@ struct KernelTable {
   /// Fields of eight and of sixteen environments.
   void (*tactile_block)(const TactileBlockArgs<double>&);
   void (*tactile_block_mixed)(const TactileBlockArgs<float>&);
+  /// Cotangents of links (n_links; used up) to those of q and v, (nv), added to. `scratch`: pullback_bytes(model).
+  void (*pull_back_links)(const ModelView&, const GroupState&, std::byte* scratch, MotionCotangent<LaneRow>* links,
+                          LaneRow* q_bar, LaneRow* v_bar);
+  std::size_t (*pullback_bytes)(const ModelView&);
+  /// A field in reverse.
+  void (*pull_back_field)(const TactilePullback&);
 
   template <int L>
   [[nodiscard]] const StageKernels<L>& stage() const {
