@@ -6,6 +6,7 @@
 
 #include "engine/group_adjoint.hpp"
 #include "engine/motor_pullback.hpp"
+#include "engine/parameters.hpp"
 #include "engine/step_settings.hpp"
 
 namespace tangere {
@@ -21,7 +22,7 @@ template <int L>
 struct Lanes {
   BasicWorkspace<L> work;
   AdjointWorkspace<L> adjoint;
-  Lanes(const CompiledModel& m, int losses) : work(m), adjoint(m, losses) {}
+  Lanes(const CompiledModel& m, const AdjointOptions& wanted) : work(m), adjoint(m, wanted.losses, wanted.parameters) {}
 };
 
 /// A step of one group: environment `first` + l of the block in lane l of the batch.
@@ -43,18 +44,19 @@ struct Adjoint::Impl {
   std::vector<BlockCotangent> losses;
   AlignedVector<double> rows;  ///< a block as it was before the step: states from the tape, parameters from the batch
 
-  Impl(const Model& m, const StepSettings& s, int count)
+  Impl(const Model& m, const StepSettings& s, const AdjointOptions& wanted)
       : model(m),
         settings(s),
         group(model.compiled()),
-        eight(model.compiled(), count),
-        one(model.compiled(), count),
-        losses(std::size_t(count)),
+        eight(model.compiled(), wanted),
+        one(model.compiled(), wanted),
+        losses(std::size_t(wanted.losses)),
         rows(std::size_t(model.compiled().layout.rows * kBlock)) {
     const std::size_t nv = std::size_t(m.nv()) * kBlock, nu = std::size_t(m.nu()) * kBlock;
     for (BlockCotangent& c : losses) {
       for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v}) x->assign(nv, 0.0);
       c.u.assign(nu, 0.0);
+      if (wanted.parameters) c.parameters.assign(std::size_t(parameter_rows(model.compiled()) * kBlock), 0.0);
     }
   }
 
@@ -102,6 +104,7 @@ struct Adjoint::Impl {
       gather(o.v, losses[k].v.data(), m.nv, g.first);
       for (Row<L>* p : {o.q_centre, o.v_centre, o.q_other, o.v_other, o.tau, o.target})
         std::fill(p, p + m.nv, Row<L>{});
+      if (o.parameters != nullptr) std::fill(o.parameters, o.parameters + kernels::parameter_numbers(m.view), Row<L>{});
     }
   }
 
@@ -170,6 +173,9 @@ struct Adjoint::Impl {
       c.previous_q[at] = o.q_other[i][lane];
       c.previous_v[at] = o.v_other[i][lane];
     }
+    if (o.parameters == nullptr) return;
+    for (int i = 0; i < kernels::parameter_numbers(m.view); ++i)
+      c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];
   }
 
   /// A step that was not taken: both states are the same.
@@ -185,8 +191,8 @@ struct Adjoint::Impl {
   }
 };
 
-Adjoint::Adjoint(const Model& model, const StepperOptions& options, int losses)
-    : impl_(std::make_unique<Impl>(model, step_settings(model, options), losses)) {}
+Adjoint::Adjoint(const Model& model, const StepperOptions& options, const AdjointOptions& wanted)
+    : impl_(std::make_unique<Impl>(model, step_settings(model, options), wanted)) {}
 Adjoint::~Adjoint() = default;
 Adjoint::Adjoint(Adjoint&&) noexcept = default;
 Adjoint& Adjoint::operator=(Adjoint&&) noexcept = default;
@@ -196,7 +202,8 @@ BlockCotangent& Adjoint::loss(int k) { return impl_->losses[std::size_t(k)]; }
 
 void Adjoint::clear() {
   for (BlockCotangent& c : impl_->losses)
-    for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v, &c.u}) std::fill(x->begin(), x->end(), 0.0);
+    for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v, &c.u, &c.parameters})
+      std::fill(x->begin(), x->end(), 0.0);
 }
 
 void Adjoint::reverse_step(const Batch& batch, int block, const BlockTape& tape, std::int64_t step,

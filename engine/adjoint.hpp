@@ -16,12 +16,18 @@ struct BlockCotangent {
   AlignedVector<double> q, v;                    ///< (nv, 16) of the newest state
   AlignedVector<double> previous_q, previous_v;  ///< (nv, 16) of the state one step before it
   AlignedVector<double> u;                       ///< (nu, 16) of the controls of the step reversed last
+  AlignedVector<double> parameters;              ///< (parameter_rows, 16), summed over steps (engine/parameters.hpp); or empty
+};
+
+struct AdjointOptions {
+  int losses = 1;
+  bool parameters = false;  ///< derivatives by the scene's numbers too
 };
 
 /// Owns the scratch of one thread. Reverses steps of any batch of its model that a Stepper with the same options took.
 class Adjoint {
  public:
-  explicit Adjoint(const Model& model, const StepperOptions& options = {}, int losses = 1);
+  explicit Adjoint(const Model& model, const StepperOptions& options = {}, const AdjointOptions& wanted = {});
   ~Adjoint();
   Adjoint(Adjoint&&) noexcept;
   Adjoint& operator=(Adjoint&&) noexcept;

@@ -13,9 +13,11 @@ using kernels::Row;
 using kernels::StageHistory;
 
 template <int L>
-AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count) : losses(std::size_t(loss_count)) {
+AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count, bool parameters)
+    : losses(std::size_t(loss_count)) {
   const std::size_t nv = std::size_t(model.nv), per_loss = 10, shared = 10;
-  memory.assign(nv * (per_loss * losses.size() + shared), Row{});
+  const std::size_t count = parameters ? std::size_t(kernels::parameter_numbers(model.view)) : 0;
+  memory.assign(nv * (per_loss * losses.size() + shared) + count * (losses.size() + 1), Row{});
   Row* at = memory.data();
   const auto take = [&](Row*& p, std::size_t rows) {
     p = at;
@@ -27,6 +29,11 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
   take(v_gamma, nv * losses.size());
   for (Row** p : {&rhs, &lambda, &nu, &mass_lambda, &target, &other, &q_centre, &v_centre, &q_other, &v_other})
     take(*p, nv);
+  numbers = nullptr;
+  for (LossRows<L>& l : losses) l.parameters = nullptr;
+  if (!parameters) return;
+  take(numbers, count);
+  for (LossRows<L>& l : losses) take(l.parameters, count);
 }
 
 namespace {
@@ -59,10 +66,9 @@ void GroupAdjoint::assemble(const StageInHand<L>& s, double c0, double h) const 
   kernel.kinematics(model_.view, w.stage, w.poses);
   clear_candidates(w);
   find_candidates(model_, s.table, w, s.lanes);
-  const int lone = (s.lanes & (s.lanes - 1)) == 0 ? __builtin_ctz(s.lanes) : -1;
   if constexpr (L > 1)
-    if (lone < 0) lists_to_rows(s.table, w, s.lanes);
-  kernel.evaluate(model_.view, w.stage, lone);
+    if (s.lone() < 0) lists_to_rows(s.table, w, s.lanes);
+  kernel.evaluate(model_.view, w.stage, s.lone());
   kernel.factor(model_.view, w.stage, nullptr);
 }
 
@@ -106,6 +112,11 @@ void GroupAdjoint::hand_on(const StageInHand<L>& s, const StageHistory& history,
   add_lanes(route.v_other, a.v_other, n, s.lanes);
   add_lanes(loss.tau, a.lambda, n, s.lanes);
   add_lanes(loss.target, a.target, n, s.lanes);
+  if (loss.parameters == nullptr) return;
+  const int count = kernels::parameter_numbers(model_.view);
+  clear(a.numbers, count);
+  kernel.parameter_products(model_.view, s.w.stage, d, s.lone(), a.numbers);
+  add_lanes(loss.parameters, a.numbers, count, s.lanes);
 }
 
 /// Stage 1 hangs on stage γ and on the start, stage γ on the start alone.

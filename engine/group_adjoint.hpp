@@ -15,18 +15,20 @@ struct LossRows {
   Rows q_centre, v_centre;  ///< out: of the state before it
   Rows q_other, v_other;    ///< out: of the one before that
   Rows tau, target;         ///< out: of forces known when the step begins, of motors' targets
+  Rows parameters;          ///< out: (parameter_numbers), or null
 };
 
 /// Scratch of one thread beside a workspace.
 template <int L>
 struct AdjointWorkspace {
   using Row = kernels::Row<L>;
-  AdjointWorkspace(const CompiledModel& model, int losses);
+  AdjointWorkspace(const CompiledModel& model, int losses, bool parameters);
 
   AlignedVector<Row> memory;
   std::vector<LossRows<L>> losses;
   // One stage: the system, and what it hands on before lanes are picked.
   Row *rhs, *lambda, *nu, *mass_lambda, *target, *other, *q_centre, *v_centre, *q_other, *v_other;
+  Row* numbers;  ///< (parameter_numbers), or null
   // SDIRK2: cotangents of the inner stage, per loss (nv) after one another.
   Row *q_gamma, *v_gamma;
   Row sound;
@@ -56,6 +58,7 @@ class GroupAdjoint {
     BasicWorkspace<L>& w;
     AdjointWorkspace<L>& a;
     LaneBits lanes;
+    [[nodiscard]] int lone() const { return (lanes & (lanes - 1)) == 0 ? __builtin_ctz(lanes) : -1; }
   };
   template <int L>
   void assemble(const StageInHand<L>& s, double c0, double h) const;

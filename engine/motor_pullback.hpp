@@ -45,6 +45,7 @@ struct MotorPullback {
     const double lambda = o.tau[motor.dof][lane], P = number(motor.P);
     o.v_centre[motor.dof][lane] -= number(motor.D) * lambda;
     const kernels::Link& link = m.links[std::size_t(motor.link)];
+    if (o.parameters != nullptr) by_gains(motor, k, lambda, o);
     if (link.kind != kernels::JointKind::spherical) {
       o.q_centre[motor.dof][lane] -= P * lambda;
       u_bar[k * kernels::kBlock] += P * lambda;
@@ -63,6 +64,15 @@ struct MotorPullback {
       o.q_centre[link.v + i][lane] -= to_q[i];
       u_bar[(first + i) * kernels::kBlock] += to_u[i];
     }
+  }
+
+  void by_gains(const CompiledMotor& motor, int k, double lambda, LossRows<L>& o) const {
+    CompiledMotor unit = motor;  // P = 1, D = 0: the error alone
+    unit.P = {1, -1}, unit.D = {0, -1}, unit.low = -HUGE_VAL, unit.high = HUGE_VAL;
+    kernels::Row<L>* numbers = o.parameters + kernels::kContactNumbers * (m.view.n_pairs + m.view.n_grounds) +
+                               kernels::kInertiaNumbers * m.view.n_links + kernels::kDofNumbers * motor.dof;
+    numbers[2][lane] += lambda * force_at_start(m, unit, state, u.data() + (k - motor.component));
+    numbers[3][lane] -= lambda * row(m.layout.v + motor.dof);
   }
 
   [[nodiscard]] kernels::RotationVector<double> way(const kernels::Link& link, const kernels::Vec3<double>& goal) const {

@@ -40,6 +40,13 @@ struct StageHistory {
   double rho, s_centre, s_other;
 };
 
+/// Numbers of a scene with a derivative, as parameter_products() lays them out: of each pair and ground contact kn, kt, mu,
+/// damping; of each link mass, moment, inertia (xx xy xz yy yz zz); of each dof damping, stiffness, P, D.
+inline constexpr int kContactNumbers = 4, kInertiaNumbers = 10, kDofNumbers = 4;
+inline int parameter_numbers(const ModelView& m) {
+  return kContactNumbers * (m.n_pairs + m.n_grounds) + kInertiaNumbers * m.n_links + kDofNumbers * m.nv;
+}
+
 /// Cotangents on their way back through a solved stage; every array is (nv), positions by their right tangent
 /// (kernels/adjoint-inl.hpp).
 template <int L>
@@ -113,6 +120,8 @@ struct StageKernels {
   void (*adjoint_rhs)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&);
   /// Everything that follows from λ.
   void (*adjoint_products)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&);
+  /// Adds -(∂g/∂p)ᵀ λ to (parameter_numbers(model)); after adjoint_products(). `lone` as in evaluate().
+  void (*parameter_products)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&, int lone, Row<L>* out);
 };
 
 struct KernelTable {

@@ -4,13 +4,13 @@
 
 #include <new>
 
-#include "kernels/adjoint-inl.hpp"
 #include "kernels/detection-inl.hpp"
 #include "kernels/jacobian-inl.hpp"
 #include "kernels/kernel_table.hpp"
 #include "kernels/lu-inl.hpp"
 #include "kernels/motion_pullback-inl.hpp"
 #include "kernels/norms-inl.hpp"
+#include "kernels/parameter_adjoint-inl.hpp"
 #include "kernels/tactile_block-inl.hpp"
 #include "kernels/tactile_pullback-inl.hpp"
 
@@ -139,10 +139,15 @@ struct StageTable {
     const StageArgs<N> a = arguments(m, s, -1, scratch);
     adjoint_products(m, a, adjoint_arguments(d, scratch.template take<LinkAdjoint<N>>(m.n_links)));
   }
+  static void parameter_products_lanes(const ModelView& m, const StageOf& s, const StageAdjoint<L>& d, int lone, RowOf* out) {
+    Scratch scratch{s.scratch};
+    const StageArgs<N> a = arguments(m, s, lone, scratch);
+    parameter_products(m, a, adjoint_arguments(d, scratch.template take<LinkAdjoint<N>>(m.n_links)), view(out));
+  }
   static constexpr StageKernels<L> make() {
     return {scratch_bytes,         kinematics_lanes,    residual_lanes, evaluate_lanes, set_weights_lanes, set_floor_lanes,
             scaled_residual_lanes, weighted_norm_lanes, factor_lanes,   solve_lanes,    solve_watched_lanes,
-            solve_transposed_lanes, adjoint_rhs_lanes, adjoint_products_lanes};
+            solve_transposed_lanes, adjoint_rhs_lanes, adjoint_products_lanes, parameter_products_lanes};
   }
 };
 

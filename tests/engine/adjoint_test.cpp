@@ -61,6 +61,18 @@ int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance
   int compared = compare(adjoint.q, difference.q, norm(difference.q), tolerance, "q");
   compared += compare(adjoint.v, difference.v, norm(difference.v), tolerance, "v");
   compared += compare(adjoint.u, difference.u, norm(difference.u), tolerance, "u");
+  const Parameters parameters(model);
+  std::vector<double> a = adjoint.parameters, b = difference.parameters;  // by their relative changes: units differ
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    const double size = parameters.infos()[k].value;
+    a[k] *= size, b[k] *= size;
+  }
+  const double scale = norm(b);
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    if (!std::isfinite(b[k])) continue;
+    EXPECT_NEAR(a[k], b[k], tolerance * scale) << parameters.infos()[k].name;
+    ++compared;
+  }
   return compared;
 }
 
@@ -121,6 +133,7 @@ TEST_P(AdjointScheme, CompanyChangesNothing) {
       EXPECT_EQ(alone.q, among.q) << "seed " << seed << " lane " << lane;
       EXPECT_EQ(alone.v, among.v);
       EXPECT_EQ(alone.u, among.u);
+      EXPECT_EQ(alone.parameters, among.parameters);
     }
   }
 }

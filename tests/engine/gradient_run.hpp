@@ -9,6 +9,7 @@
 
 #include "engine/adjoint.hpp"
 #include "engine/compiled_model.hpp"
+#include "engine/parameters.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
@@ -94,7 +95,7 @@ inline double loss_of_run(const Model& model, const StepperOptions& options, con
 
 /// Gradient: q₀ (nv), v₀ (nv), u (steps, nu).
 struct RunGradient {
-  std::vector<double> q, v, u;
+  std::vector<double> q, v, u, parameters;
   [[nodiscard]] double norm() const {
     double sum = 0;
     for (const auto* x : {&q, &v, &u})
@@ -119,7 +120,7 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
     stepper.step_block(batch, 0, u.back(), &tape);
     if (split_steps != nullptr) *split_steps += batch.status(lane) == StepStatus::split;
   }
-  Adjoint adjoint(model, options);
+  Adjoint adjoint(model, options, {1, true});
   adjoint.clear();
   const auto state = [&](int step, int e) {
     std::vector<double> q(std::size_t(model.nq()));
@@ -139,6 +140,9 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
     g.q.push_back(adjoint.loss(0).q[std::size_t(i * kBlock + lane)]);
     g.v.push_back(adjoint.loss(0).v[std::size_t(i * kBlock + lane)]);
   }
+  const Parameters parameters(model);
+  g.parameters.resize(std::size_t(parameters.count()));
+  parameters.gradient(adjoint.loss(0), lane, g.parameters);
   return g;
 }
 
@@ -174,6 +178,22 @@ inline RunGradient differences_of_run(const Model& model, const StepperOptions& 
   for (std::size_t t = 0; t < in.u.size(); ++t)
     for (int k = 0; k < model.nu(); ++k)
       g.u.push_back(along([&](RunInput& x, double e) { x.u[t][std::size_t(k)] += 10 * e; }) / 10);
+  const Parameters parameters(model);
+  for (int k = 0; k < parameters.count(); ++k) {
+    const double size = parameters.infos()[std::size_t(k)].value;
+    if (size == 0) {  // at a bound of what a scene may say: one-sided
+      g.parameters.push_back(NAN);
+      continue;
+    }
+    g.parameters.push_back(best_difference(
+                               [&](double e) {
+                                 Scene scene = model.scene();
+                                 parameters.in(scene, k) += e * size;
+                                 return loss_of_run(Model(scene), options, in, loss);
+                               },
+                               start) /
+                           size);
+  }
   return g;
 }
 
