@@ -22,11 +22,20 @@ PadMotion<N> pad_motion(const Touch<double>& t, ContactLaw law) {
           {N(t.kn), N(t.kt), N(t.mu), N(t.damping), law, 0.0}};
 }
 
+/// Eight numbers from anywhere: what callers hand in need not be aligned.
+template <class A>
+Lanes<A> load_anywhere(const double* p) {
+  Lanes<A> x;
+  __builtin_memcpy(&x, p, sizeof x);
+  return x;
+}
+
 /// Cotangent of the force, pad axes, from that of the field at points k … of a tile.
 template <class A>
 Vec3<Lanes<A>> force_cotangent(const PadTiles& pad, int tile, int k, const double* field) {
   using N = Lanes<A>;
-  const N t[3] = {load_lanes<A>(field + k), load_lanes<A>(field + kTactileTile + k), load_lanes<A>(field + 2 * kTactileTile + k)};
+  const N t[3] = {load_anywhere<A>(field + k), load_anywhere<A>(field + kTactileTile + k),
+                  load_anywhere<A>(field + 2 * kTactileTile + k)};
   if (pad.curved()) {  // rows act on (f·x, f·y, -f·z)
     const double* frames = pad.frames + 9 * kTactileTile * tile + k;
     N f[3];
