@@ -178,6 +178,21 @@ int Batch::failed_count() const {
   return static_cast<int>(std::count_if(all.begin(), all.end(), [](StepStatus s) { return failed(s); }));
 }
 
+BlockState Batch::save_block(int block) const {
+  const double* rows = this->block(block);
+  const auto lane = std::ptrdiff_t(block) * kBlock;
+  return {{rows, rows + block_stride_},
+          {status_.begin() + lane, status_.begin() + lane + kBlock},
+          {has_history_.begin() + lane, has_history_.begin() + lane + kBlock}};
+}
+
+void Batch::restore_block(int block, const BlockState& state) {
+  const auto lane = std::ptrdiff_t(block) * kBlock;
+  std::copy(state.rows.begin(), state.rows.end(), this->block(block));
+  std::copy(state.status.begin(), state.status.end(), status_.begin() + lane);
+  std::copy(state.has_history.begin(), state.has_history.end(), has_history_.begin() + lane);
+}
+
 double Batch::randomized_value(int environment, int k) const {
   const CompiledModel& m = model_.compiled();
   const RandomizationDescription& d = m.scene.randomizations[k];

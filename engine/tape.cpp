@@ -49,6 +49,10 @@ void BlockTape::append(const Batch& batch, int block) {
   }
 }
 
+void BlockTape::show(std::int64_t step, Batch& batch, int block) const {
+  std::copy_n(state(step), (nq_ + nv_) * kBlock, batch.block(block) + model_.compiled().layout.q * kBlock);
+}
+
 double* BlockTape::next_x_gamma() {
   if (row_count_ == std::size_t(nq_ + nv_)) return nullptr;
   return slot(steps_ + 1) + std::size_t(nq_ + nv_) * kBlock;

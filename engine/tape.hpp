@@ -35,13 +35,16 @@ class BlockTape {
   /// Room for `steps` steps; SDIRK2 keeps its inner stages as well.
   BlockTape(const Model& model, Integrator integrator, std::int64_t steps);
 
-  /// Begins anew with the states of a block.
+  /// Begins anew with the states of a block. Steps are counted from here on.
   void start(const Batch& batch, int block);
   /// Adds the states that a block has now. Lanes that have failed keep theirs.
   void append(const Batch& batch, int block);
   /// Where the inner stages of the step that will be appended next go, rows (nv, 16); null when the scheme has none.
   [[nodiscard]] double* next_x_gamma();
   void add(TapedStep step) { special_.push_back(std::move(step)); }
+
+  /// Puts the states after `step` steps into a block, where they are read; what it needs to go on is not restored.
+  void show(std::int64_t step, Batch& batch, int block) const;
 
   [[nodiscard]] std::int64_t steps() const { return steps_; }
   /// Rows (nq + nv, 16) after `step` steps; -1: one step before the first.
