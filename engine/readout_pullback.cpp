@@ -107,7 +107,7 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles, st
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const auto a = i.reader.arguments<double>(sensor, group, in_group);
   kernels::active_kernels().pull_back_field({a.pad, a.law, a.n_touches, a.shapes, a.touches, static_cast<int>(tiles.size()),
-                                             tiles.data(), cotangents.data(), i.touches.data()});
+                                             tiles.data(), cotangents.data(), !parameters.empty(), i.touches.data()});
   i.used[std::size_t(group)] = true;
   const int row = kernels::parameter_numbers(m.view) + kernels::kContactNumbers * sensor;
   for (std::size_t k = 0; k < s.targets.size(); ++k) {

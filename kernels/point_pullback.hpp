@@ -54,27 +54,23 @@ template <class Shape, class N>
 void pull_back_motion(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& omega, const Vec3<N>& f_bar,
                       TouchCotangent<N>& out) {
   const Vec3<N>&n = p.n, &t = p.tangential.direction;
-  const N along_n = dot(n, f_bar), along_t = dot(t, f_bar);
-  const N slide = law.mu * along_t;
-  N d_bar = p.normal.d_slope * along_n - p.normal.bound_d * slide;
-  N rate_bar = p.normal.rate_slope * along_n - p.normal.bound_rate * slide;
-  const Vec3<N> s_bar = (-p.tangential.scale) * (f_bar - along_t * t);
-  rate_bar -= dot(n, s_bar);
-  const Vec3<N> u_bar = s_bar + rate_bar * n;
-  const Vec3<N> v_bar = -u_bar;
-  out.twist.a += cross(p.x2, v_bar);
-  out.twist.l += v_bar;
+  const N along_n = dot(n, f_bar), along_t = dot(t, f_bar), slide = -(law.mu * along_t);
+  const Vec3<N> s_bar = (-p.tangential.scale) * mul_add(-along_t, t, f_bar);
+  const N rate_bar = mul_add(p.normal.rate_slope, along_n, p.normal.bound_rate * slide) - dot(n, s_bar);
+  const Vec3<N> u_bar = mul_add(rate_bar, n, s_bar);
+  out.twist.a += cross(u_bar, p.x2);
+  out.twist.l -= u_bar;
   const Vec3<N> x_bar = cross(omega, u_bar);
-  d_bar -= dot(n, x_bar);
-  const Vec3<N> n_bar = p.normal.force * f_bar - p.rate * s_bar + rate_bar * p.u - p.d * x_bar;
-  Vec3<N> rho = (-d_bar) * n;
-  Vec3<N> turned = n_bar;
+  const N minus_d_bar = dot(n, x_bar) - mul_add(p.normal.d_slope, along_n, p.normal.bound_d * slide);
+  const Vec3<N> n_bar =
+      mul_add(p.normal.force, f_bar, mul_add(-p.rate, s_bar, mul_add(rate_bar, p.u, (-p.d) * x_bar)));
+  Vec3<N> rho = minus_d_bar * n, turned = n_bar;
   if constexpr (Shape::kBending != Bending::flat) {  // H n̄ = κ (n̄ - n (n·n̄) - e z (z·n̄))
-    Vec3<N> bent = n_bar - dot(n, n_bar) * n;
-    if constexpr (Shape::kBending == Bending::rod) bent -= dot(p.axis, n_bar) * p.axis;
+    Vec3<N> bent = mul_add(-dot(n, n_bar), n, n_bar);
+    if constexpr (Shape::kBending == Bending::rod) bent = mul_add(-dot(p.axis, n_bar), p.axis, bent);
     bent = p.curvature * bent;
     rho -= bent;
-    turned -= p.d * bent;
+    turned = mul_add(-p.d, bent, turned);
   }
   out.displacement.a += cross(p.x2, rho) + cross(n, turned);
   out.displacement.l += rho;

@@ -65,7 +65,7 @@ Vec3<Lanes<A>> tile_points(const PadTiles& pad, int tile, int k) {
 }
 
 /// Adds eight points.
-template <class A, class Shape>
+template <class A, bool OfLaw, class Shape>
 void pull_back_points(const PadTiles& pad, int tile, int k, const double* field, const Shape& shape,
                       const PadMotion<Lanes<A>>& m, TouchCotangent<Lanes<A>>& sums) {
   using N = Lanes<A>;
@@ -81,6 +81,7 @@ void pull_back_points(const PadTiles& pad, int tile, int k, const double* field,
   if (!any(touching)) return;
   const Vec3<N> f_bar = select(touching, N(1.0), N(0.0)) * force_cotangent<A>(pad, tile, k, field);
   pull_back_motion<Shape>(law, p, m.omega, f_bar, sums);
+  if constexpr (!OfLaw) return;
   LawCotangent<N> of_law = {N(0.0), N(0.0), N(0.0), N(0.0)};
   pull_back_law(law, p, f_bar, of_law);
   sums.law.kn = mul_add(factor[0], of_law.kn, sums.law.kn);
@@ -99,7 +100,7 @@ double lane_sum(const N& a) {
   return sum;
 }
 
-template <class A>
+template <class A, bool OfLaw>
 void pull_back_touch(const TactilePullback& a, int touch, TouchCotangent<double>& out) {
   using N = Lanes<A>;
   const PadMotion<N> m = pad_motion<N>(a.touches[touch], a.law);
@@ -111,7 +112,7 @@ void pull_back_touch(const TactilePullback& a, int touch, TouchCotangent<double>
       const Vec3<N> centre = {N(a.pad->x[tile]), N(a.pad->y[tile]), N(a.pad->z[tile])};
       if (!any(distance_at(shape, transposed_times(m.Q, centre - m.c)).d < N(a.pad->radius[tile]))) continue;
       const double* field = a.cotangents + 3 * kTactileTile * i;
-      for (int k = 0; k < kTactileTile; k += kGroup) pull_back_points<A>(*a.pad, tile, k, field, shape, m, sums);
+      for (int k = 0; k < kTactileTile; k += kGroup) pull_back_points<A, OfLaw>(*a.pad, tile, k, field, shape, m, sums);
     }
   });
   const N* from = &sums.displacement.a.x;
@@ -122,7 +123,8 @@ void pull_back_touch(const TactilePullback& a, int touch, TouchCotangent<double>
 
 template <class A>
 void pull_back_field(const TactilePullback& a) {
-  for (int k = 0; k < a.n_touches; ++k) pull_back_touch<A>(a, k, a.out[k]);
+  for (int k = 0; k < a.n_touches; ++k)
+    a.of_law ? pull_back_touch<A, true>(a, k, a.out[k]) : pull_back_touch<A, false>(a, k, a.out[k]);
 }
 
 }  // namespace tangere::kernels

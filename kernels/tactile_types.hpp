@@ -113,6 +113,7 @@ struct TactilePullback {
   int count;                       ///< tiles
   const int* tiles;                ///< (count)
   const double* cotangents;        ///< (count, 3, 64) of the field [loss/N]
+  bool of_law;                     ///< by the coefficients too; else zeros
   TouchCotangent<double>* out;     ///< (n_touches), pad axes and origin; body 1 is the sensor's
 };
 
