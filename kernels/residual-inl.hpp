@@ -7,7 +7,7 @@
 #pragma once
 
 #include "kernels/joint_effects-inl.hpp"
-#include "kernels/sphere_sums.hpp"
+#include "kernels/point_sums.hpp"
 #include "kernels/stage.hpp"
 
 namespace tangere::kernels {
@@ -152,13 +152,12 @@ N list_excess(const PairContact& pair, const CandidateList<N>& list, const Frame
   return moved - list.margin;
 }
 
-/// Sums over a pair with any shape, one candidate after the other.
+/// Adds the points of a capsule, whose ends bend in two directions, one candidate after the other.
 template <bool Derivatives, class Shape, class N>
-void sum_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list, int lone,
-                    ContactScratch<N>& o) {
-  o.sums = PairSums<N>::zero();
+void add_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list, int lone,
+                    const Frame<N>& frame, const Vec6<N>& W, PairSums<N>& sums) {
   const auto add = [&](const Vec3<N>& xi) {
-    accumulate<Derivatives>(o.sums, shape, law, o.shape_in_1.R, o.shape_in_1.p, o.W.a, o.W.l, xi);
+    accumulate<Derivatives>(sums, shape, law, frame.R, frame.p, W.a, W.l, xi);
   };
   if (lone < 0) {
     for (int k = 0; k < list.count; ++k) add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
@@ -171,16 +170,21 @@ void sum_candidates(const Shape& shape, const LawParameters<N>& law, const Candi
 template <bool Derivatives, class N>
 void sum_pair(const PairContact& pair, const StageArgs<N>& a, const CandidateList<N>& list, ContactScratch<N>& o) {
   const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
-  if (pair.shape != PrimitiveShape::sphere) {
-    with_distance<N>(pair.shape, pair.size, [&]<class Shape>(const Shape& shape) {
-      if constexpr (Shape::kBending != Bending::ball) sum_candidates<Derivatives>(shape, law, list, a.lone, o);
-    });
-    return;
-  }
-  const SphereMotion<N> motion = sphere_motion(o.shape_in_1.p, o.W, N(pair.size.x));
-  SphereSums<N> sums;
-  sum_sphere_points<Derivatives>(motion, law, list, a.lone, sums);
-  finish_sphere<Derivatives>(motion, o.W.a, sums, o.sums);
+  const auto add = [&]<class Motion>(const Motion& motion) {
+    typename Motion::Sums sums;
+    sum_points<Derivatives>(motion, law, list, a.lone, sums);
+    add_finished<Derivatives>(motion, o.W, sums, o.sums);
+  };
+  o.sums = PairSums<N>::zero();
+  with_distance<N>(pair.shape, pair.size, [&]<template <class> class Shape>(const Shape<N>& shape) {
+    if constexpr (Shape<N>::kBending == Bending::ball) {
+      add(sphere_motion(o.shape_in_1.p, o.W, shape.radius));
+    } else if constexpr (std::is_same_v<Shape<N>, CapsuleDistance<N>>) {
+      add_candidates<Derivatives>(shape, law, list, a.lone, o.shape_in_1, o.W, o.sums);
+    } else {
+      add(FaceMotion<Shape, N>{o.shape_in_1, o.W, shape});
+    }
+  });
 }
 
 /// -0 to +0: a contact that is near in another lane only adds ±0, which must not show in this lane's bits.

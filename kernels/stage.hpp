@@ -8,7 +8,6 @@
 #include "kernels/model_view.hpp"
 #include "kernels/pair_contact.hpp"
 #include "kernels/so3.hpp"
-#include "kernels/sphere_contact.hpp"
 
 namespace tangere::kernels {
 
