@@ -31,6 +31,7 @@ class Compiler {
     unknown_scales();
     pair_contacts();
     ground_contacts();
+    group_contacts(m_);
     sensors();
     variables();
     randomizations();
@@ -334,6 +335,12 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   v.n_grounds = static_cast<int>(m->grounds.size());
   v.pairs = m->pairs.data();
   v.grounds = m->grounds.data();
+  v.n_link_pairs = static_cast<int>(m->link_pairs.size());
+  v.n_grounded = static_cast<int>(m->grounded.size());
+  v.link_pairs = m->link_pairs.data();
+  v.grounded = m->grounded.data();
+  v.pair_order = m->pair_order.data();
+  v.ground_order = m->ground_order.data();
   v.pattern = m->pattern.view();
   return m;
 }

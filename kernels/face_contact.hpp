@@ -282,9 +282,9 @@ Mat3<N> trace_less(const Mat3<N>& m) {
   return diagonal(m.m[0][0] + m.m[1][1] + m.m[2][2]) - m;
 }
 
-/// Adds wrench, stiffness and damping of the pair.
-template <bool Derivatives, template <class> class Shape, class N>
-void add_finished(const FaceMotion<Shape, N>&, const Vec6<N>& W, const FaceSums<N>& s, PairSums<N>& out) {
+/// Adds wrench, stiffness and damping of all faces that move alike.
+template <bool Derivatives, class N>
+void add_finished(const Vec6<N>& W, const FaceSums<N>& s, PairSums<N>& out) {
   out.wrench.l += s.f;
   out.wrench.a += s.xf;
   if constexpr (Derivatives) {

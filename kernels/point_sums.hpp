@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contact sums over a pair's candidates. Many lanes: row by row of the list. One lane: eight of its points at a time
+// Contact sums over candidates, of one shape after the other. Many lanes: row by row of the list. One lane: eight of its points at a time
 // through the law, then one after the other into the sums, in list order. The same bits, for a third of the work.
 #pragma once
 
@@ -12,10 +12,9 @@ namespace tangere::kernels {
 
 /// One row of the list after the other.
 template <bool Derivatives, class Motion, class N>
-void sum_rows(const Motion& motion, const LawParameters<N>& law, const CandidateList<N>& list,
+void add_rows(const Motion& motion, const LawParameters<N>& law, const CandidateList<N>& list,
               typename Motion::Sums& sums) {
   using Chunk = PointChunk<typename Motion::Point>;
-  clear<Derivatives>(sums);
   Chunk chunk;
   for (int k = 0; k < list.count; k += Chunk::kPoints) {
     const int count = list.count - k < Chunk::kPoints ? list.count - k : Chunk::kPoints;
@@ -50,12 +49,11 @@ void add_row(const Rows& rows, int i, Sums& sums, PointChunk<Point>& chunk) {
   add_chunk<Derivatives>(sums, chunk);
 }
 
-/// Sums over one lane's own candidates; motion and law the same in every lane of the vectors.
+/// Adds one lane's own candidates; motion and law the same in every lane of the vectors.
 template <bool Derivatives, class Motion, class A, class List, class Sums>
-void sum_own_points(const Motion& motion, const LawParameters<Lanes<A>>& law, const List& list, Sums& sums) {
+void add_own_points(const Motion& motion, const LawParameters<Lanes<A>>& law, const List& list, Sums& sums) {
   using Chunk = PointChunk<typename Motion::Point>;
   constexpr int kRows = Chunk::kPoints;
-  clear<Derivatives>(sums);
   Chunk rows;
   PointChunk<typename Motion::template Of<OneLane<A>>::Point> chunk;
   for (int first = 0; first < list.own_count; first += kRows * kGroup) {
@@ -82,39 +80,63 @@ auto in_all_lanes(const Motion& motion, int from) {
   return out;
 }
 
-/// The sums of a stage: by rows, or of the lone lane.
-template <bool Derivatives, class Motion, class N>
-void sum_points(const Motion& motion, const LawParameters<N>& law, const CandidateList<N>& list, int,
-                typename Motion::Sums& sums) {
-  sum_rows<Derivatives>(motion, law, list, sums);
-}
+/// Where the points of a pair of links are added up: row by row of their lists.
+template <bool Derivatives, template <class> class Sums, class N>
+struct PointSums {
+  Sums<N> sums;
 
-template <bool Derivatives, class Motion, class A>
-void sum_points(const Motion& motion, const LawParameters<OneLane<A>>& law, const CandidateList<OneLane<A>>& list, int,
-                typename Motion::Sums& sums) {
-  using N = Lanes<A>;
-  sum_own_points<Derivatives>(in_all_lanes<A>(motion, 0),
-                              LawParameters<N>{N(law.kn.x), N(law.kt.x), N(law.mu.x), N(law.damping.x), law.law, law.ramp},
-                              list, sums);
-}
-
-template <bool Derivatives, class Motion, class A>
-void sum_points(const Motion& motion, const LawParameters<Lanes<A>>& law, const CandidateList<Lanes<A>>& list, int lone,
-                typename Motion::Sums& sums) {
-  if (lone < 0) {
-    sum_rows<Derivatives>(motion, law, list, sums);
-    return;
+  PointSums() { clear<Derivatives>(sums); }
+  template <class Motion>
+  void add(const Motion& motion, const LawParameters<N>& law, const CandidateList<N>& list, int) {
+    add_rows<Derivatives>(motion, law, list, sums);
   }
+  const Sums<N>& result(int) { return sums; }
+};
+
+/// Of a lane on its own: across its points.
+template <bool Derivatives, template <class> class Sums, class A>
+struct PointSums<Derivatives, Sums, OneLane<A>> {
+  Sums<OneLane<A>> sums;
+
+  PointSums() { clear<Derivatives>(sums); }
+  template <class Motion>
+  void add(const Motion& motion, const LawParameters<OneLane<A>>& law, const CandidateList<OneLane<A>>& list, int) {
+    using N = Lanes<A>;
+    const LawParameters<N> all = {N(law.kn.x), N(law.kt.x), N(law.mu.x), N(law.damping.x), law.law, law.ramp};
+    add_own_points<Derivatives>(in_all_lanes<A>(motion, 0), all, list, sums);
+  }
+  const Sums<OneLane<A>>& result(int) { return sums; }
+};
+
+/// Of a group: by rows, or across the points of the lane that is evaluated alone.
+template <bool Derivatives, template <class> class Sums, class A>
+struct PointSums<Derivatives, Sums, Lanes<A>> {
   using N = Lanes<A>;
-  const auto spread = [lone](const N& a) { return N(reinterpret_cast<const double*>(&a)[lone]); };
-  alignas(64) typename Motion::template Of<OneLane<A>>::Sums own;
-  sum_own_points<Derivatives>(
-      in_all_lanes<A>(motion, lone),
-      LawParameters<N>{spread(law.kn), spread(law.kt), spread(law.mu), spread(law.damping), law.law, law.ramp}, list, own);
-  const double* from = reinterpret_cast<const double*>(&own);
-  N* to = reinterpret_cast<N*>(&sums);
-  constexpr std::size_t count = Derivatives ? sizeof(own) / sizeof(double) : 6;  // force and moment come first
-  for (std::size_t i = 0; i < count; ++i) to[i] = N(from[i]);
-}
+  Sums<N> sums;
+  alignas(64) Sums<OneLane<A>> own;
+
+  PointSums() {
+    clear<Derivatives>(sums);
+    clear<Derivatives>(own);
+  }
+  template <class Motion>
+  void add(const Motion& motion, const LawParameters<N>& law, const CandidateList<N>& list, int lone) {
+    if (lone < 0) {
+      add_rows<Derivatives>(motion, law, list, sums);
+      return;
+    }
+    const auto spread = [lone](const N& a) { return N(reinterpret_cast<const double*>(&a)[lone]); };
+    const LawParameters<N> all = {spread(law.kn), spread(law.kt), spread(law.mu), spread(law.damping), law.law, law.ramp};
+    add_own_points<Derivatives>(in_all_lanes<A>(motion, lone), all, list, own);
+  }
+  const Sums<N>& result(int lone) {
+    if (lone < 0) return sums;
+    const double* from = reinterpret_cast<const double*>(&own);
+    N* to = reinterpret_cast<N*>(&sums);
+    constexpr std::size_t count = Derivatives ? sizeof(own) / sizeof(double) : 6;  // force and moment come first
+    for (std::size_t i = 0; i < count; ++i) to[i] = N(from[i]);
+    return sums;
+  }
+};
 
 }  // namespace tangere::kernels

@@ -75,12 +75,12 @@ TEST(Candidates, ALaneThatOutrunsItsListSaysSo) {
   for (int i = 0; i < m->nq; ++i)
     for (double& x : w.stage.centre[i].lane) x = m->initial_q[std::size_t(i)];
   const kernels::KernelTable& table = kernels::active_kernels();
-  table.group.kinematics(m->view, w.stage, w.poses);
+  table.group.kinematics(m->view, w.stage);
   find_candidates(*m, table, w, kAllLanes);
-  table.group.kinematics(m->view, w.stage, w.poses);
+  table.group.kinematics(m->view, w.stage);
   for (double x : w.stage.excess[0].lane) EXPECT_LE(x, 0);
   w.stage.x[2][3] = -2 * w.lists[0].margin;
-  table.group.kinematics(m->view, w.stage, w.poses);
+  table.group.kinematics(m->view, w.stage);
   for (int l = 0; l < kGroup; ++l) {
     if (l == 3) {
       EXPECT_GT(w.stage.excess[0][l], 0);
