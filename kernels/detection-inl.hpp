@@ -79,11 +79,13 @@ int search_shape(const CandidateSearch& s, Shape shape) {
     const Vec3<N> centre = {load_lanes<A>(b), load_lanes<A>(b + kGroup), load_lanes<A>(b + 2 * kGroup)};
     const N reach = load_lanes<A>(b + 3 * kGroup) + margin;
     for (unsigned near = near_shape(shape, pose, centre, reach); near != 0; near &= near - 1) {
-      const double* p = pair.tile_points + 3 * kContactTile * (group * kGroup + __builtin_ctz(near));
-      for (int k = 0; k < kContactTile; k += kGroup) {
+      const int tile = group * kGroup + __builtin_ctz(near), rest = pair.n_points - tile * kContactTile;
+      const double* p = pair.tile_points + 3 * kContactTile * tile;
+      for (int k = 0; k < kContactTile && k < rest; k += kGroup) {
         const Vec3<N> place = {load_lanes<A>(p + k), load_lanes<A>(p + kContactTile + k),
                                load_lanes<A>(p + 2 * kContactTile + k)};
         const unsigned in = near_shape(shape, pose, place, margin);
+        if (in == 0) continue;
         append(place.x, in, x + count);
         append(place.y, in, y + count);
         append(place.z, in, z + count);
@@ -106,6 +108,7 @@ template <class A>
 void transpose_rows(GroupStage::List& list) {
   list.count = 0;
   for (int count : list.own_count) list.count = count > list.count ? count : list.count;
+  if (list.count == 0) return;
   for (int l = 0; l < kGroup; ++l)
     for (int c = 0; c < 3; ++c) {
       const double* from = list.own + (l * 3 + c) * list.stride;

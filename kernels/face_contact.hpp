@@ -223,7 +223,7 @@ auto find_force(const FaceMotion<Shape, N>& z, const LawParameters<N>& law, cons
 
 /// Adds the points of a chunk in order.
 template <bool Derivatives, bool Bent, class N>
-void add_chunk(FaceSums<N>& sums, const PointChunk<FacePoint<N, Bent>>& chunk) {
+[[gnu::noinline]] void add_chunk(FaceSums<N>& sums, const PointChunk<FacePoint<N, Bent>>& chunk) {
   using Point = FacePoint<N, Bent>;
   const auto each = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.touching, chunk.count, f); };
   const auto slipping = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.slipping, chunk.slips, f); };

@@ -45,8 +45,9 @@ void fill_chunk(const Motion& z, const LawParameters<N>& law, const Vec3<N>* xi,
   }
 }
 
+// The sums below live in registers, which GCC's own limits on inlining would make a matter of chance.
 template <class N>
-void add_outer(Mat3<N>& sum, const Vec3<N>& a, const Vec3<N>& b) {
+[[gnu::always_inline]] inline void add_outer(Mat3<N>& sum, const Vec3<N>& a, const Vec3<N>& b) {
   const N x[3] = {a.x, a.y, a.z}, y[3] = {b.x, b.y, b.z};
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) sum.m[i][j] = mul_add(x[i], y[j], sum.m[i][j]);
@@ -59,7 +60,7 @@ struct UpperTriangle {
 };
 /// a bᵀ, known to be symmetric.
 template <class N>
-void add_upper(UpperTriangle<N>& sum, const Vec3<N>& a, const Vec3<N>& b) {
+[[gnu::always_inline]] inline void add_upper(UpperTriangle<N>& sum, const Vec3<N>& a, const Vec3<N>& b) {
   sum.m[0] = mul_add(a.x, b.x, sum.m[0]);
   sum.m[1] = mul_add(a.x, b.y, sum.m[1]);
   sum.m[2] = mul_add(a.x, b.z, sum.m[2]);
@@ -74,7 +75,7 @@ Mat3<N> full(const UpperTriangle<N>& s) {
 
 /// Adds points one after the other to a few sums, which stay in registers: f(sum, point).
 template <class Sum, class P, class F>
-void add_each(Sum& sum, const P* point, const int* which, int count, const F& f) {
+[[gnu::always_inline]] inline void add_each(Sum& sum, const P* point, const int* which, int count, const F& f) {
   Sum local = sum;
   for (int i = 0; i < count; ++i) f(local, point[which[i]]);
   sum = local;

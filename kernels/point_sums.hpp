@@ -85,7 +85,7 @@ template <bool Derivatives, template <class> class Sums, class N>
 struct PointSums {
   Sums<N> sums;
 
-  PointSums() { clear<Derivatives>(sums); }
+  void start(int) { clear<Derivatives>(sums); }
   template <class Motion>
   void add(const Motion& motion, const LawParameters<N>& law, const CandidateList<N>& list, int) {
     add_rows<Derivatives>(motion, law, list, sums);
@@ -98,7 +98,7 @@ template <bool Derivatives, template <class> class Sums, class A>
 struct PointSums<Derivatives, Sums, OneLane<A>> {
   Sums<OneLane<A>> sums;
 
-  PointSums() { clear<Derivatives>(sums); }
+  void start(int) { clear<Derivatives>(sums); }
   template <class Motion>
   void add(const Motion& motion, const LawParameters<OneLane<A>>& law, const CandidateList<OneLane<A>>& list, int) {
     using N = Lanes<A>;
@@ -115,9 +115,12 @@ struct PointSums<Derivatives, Sums, Lanes<A>> {
   Sums<N> sums;
   alignas(64) Sums<OneLane<A>> own;
 
-  PointSums() {
-    clear<Derivatives>(sums);
-    clear<Derivatives>(own);
+  void start(int lone) {
+    if (lone < 0) {
+      clear<Derivatives>(sums);
+    } else {
+      clear<Derivatives>(own);
+    }
   }
   template <class Motion>
   void add(const Motion& motion, const LawParameters<N>& law, const CandidateList<N>& list, int lone) {

@@ -172,32 +172,53 @@ bool has_candidates(const CandidateList<N>& list, int lone) {
   return (lone < 0 ? list.count : list.own_count) > 0;
 }
 
+/// Adds the points around a sphere.
+template <bool Derivatives, class N>
+[[gnu::noinline]] void add_sphere(const SphereMotion<N>& motion, const LawParameters<N>& law,
+                                  const CandidateList<N>& list, int lone, const Vec6<N>& W, PairSums<N>& sums) {
+  PointSums<Derivatives, SphereSums, N> sphere;
+  sphere.start(lone);
+  sphere.add(motion, law, list, lone);
+  add_finished<Derivatives>(motion, W, sphere.result(lone), sums);
+}
+
+/// Zeros; without derivatives, only those of the wrench.
+template <bool Derivatives, class N>
+void start(PairSums<N>& sums) {
+  if constexpr (Derivatives) {
+    sums = PairSums<N>::zero();
+  } else {
+    sums.wrench = zero6<N>();
+  }
+}
+
 /// Sums over all shapes of two links. Flat and bent faces share theirs, which are about body 1's origin.
 template <bool Derivatives, class N>
 void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArgs<N>& a, ContactScratch<N>& o) {
-  o.sums = PairSums<N>::zero();
+  start<Derivatives>(o.sums);
   PointSums<Derivatives, FaceSums, N> faces;
+  bool any_face = false;
   for (int i = 0; i < links.count; ++i) {
     const int k = model.pair_order[links.first + i];
     const PairContact& pair = model.pairs[k];
     const CandidateList<N>& list = a.candidates[k];
     if (!has_candidates(list, a.lone)) continue;
     const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
-    const Frame<N> frame = compose(o.link2_in_1, broadcast<N>(pair.frame2));
+    const auto frame = [&] { return compose(o.link2_in_1, broadcast<N>(pair.frame2)); };
     with_distance<N>(pair.shape, pair.size, [&]<template <class> class Shape>(const Shape<N>& shape) {
       if constexpr (Shape<N>::kBending == Bending::ball) {
-        const SphereMotion<N> motion = sphere_motion(frame.p, o.W, shape.radius);
-        PointSums<Derivatives, SphereSums, N> sphere;
-        sphere.add(motion, law, list, a.lone);
-        add_finished<Derivatives>(motion, o.W, sphere.result(a.lone), o.sums);
+        const Vec3<N> centre = o.link2_in_1.R * broadcast<N>(pair.frame2.p) + o.link2_in_1.p;
+        add_sphere<Derivatives>(sphere_motion(centre, o.W, shape.radius), law, list, a.lone, o.W, o.sums);
       } else if constexpr (std::is_same_v<Shape<N>, CapsuleDistance<N>>) {
-        add_candidates<Derivatives>(shape, law, list, a.lone, frame, o.W, o.sums);
+        add_candidates<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
       } else {
-        faces.add(FaceMotion<Shape, N>{frame, o.W, shape}, law, list, a.lone);
+        if (!any_face) faces.start(a.lone);
+        any_face = true;
+        faces.add(FaceMotion<Shape, N>{frame(), o.W, shape}, law, list, a.lone);
       }
     });
   }
-  add_finished<Derivatives>(o.W, faces.result(a.lone), o.sums);
+  if (any_face) add_finished<Derivatives>(o.W, faces.result(a.lone), o.sums);
 }
 
 /// Points of one link in the ground; false where there are none in any lane.
@@ -206,11 +227,12 @@ bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const St
   const LinkScratch<N>& link = a.links[grounded.link];
   const Vec3<N> m = transposed_times(link.world.R, broadcast<N>(model.ground_normal));
   const N height = dot(broadcast<N>(model.ground_normal), link.world.p - broadcast<N>(model.ground_point));
-  sums = PairSums<N>::zero();
-  bool near = false;
+  bool near = false, started = false;
   for (int i = 0; i < grounded.count; ++i) {
     const GroundContact& ground = model.grounds[model.ground_order[grounded.first + i]];
     if (!any(dot(m, broadcast<N>(ground.middle)) + height < N(ground.extent))) continue;
+    if (!started) start<Derivatives>(sums);
+    started = true;
     const LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
     for (int k = 0; k < ground.n_points; ++k) {
       const double* p = ground.points + 3 * k;

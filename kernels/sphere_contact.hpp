@@ -161,7 +161,7 @@ auto find_force(const SphereMotion<N>& z, const LawParameters<N>& law, const Sph
 
 /// Adds the points of a chunk in order.
 template <bool Derivatives, class N>
-void add_chunk(SphereSums<N>& sums, const PointChunk<SpherePoint<N>>& chunk) {
+[[gnu::noinline]] void add_chunk(SphereSums<N>& sums, const PointChunk<SpherePoint<N>>& chunk) {
   using Point = SpherePoint<N>;
   const auto each = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.touching, chunk.count, f); };
   const auto slipping = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.slipping, chunk.slips, f); };
