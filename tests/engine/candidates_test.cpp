@@ -22,6 +22,7 @@ struct Trajectory {
 Trajectory run(double margin, const kernels::KernelTable& table) {
   const auto m = compile(testing::rolling_ball(false, 8));
   Workspace w(*m);
+  SingleWorkspace alone(*m);
   for (auto& list : w.lists) list.margin = margin;
   const GroupStep step(*m, {Integrator::bdf2, 5e-3, 1e-9, 20});
   for (int i = 0; i < m->nq; ++i)
@@ -42,7 +43,7 @@ Trajectory run(double margin, const kernels::KernelTable& table) {
     // What the stepper does around advance(): the state before becomes the history.
     std::vector<kernels::LaneRow> q0(w.q0, w.q0 + m->nq), v0(w.v0, w.v0 + m->nv);
     NewtonReport report;
-    step.advance(table, w, kAllLanes, history, report);
+    step.advance(table, w, alone, kAllLanes, history, report);
     for (int l = 0; l < kGroup; ++l) EXPECT_FALSE(failed(report.status[l])) << "lane " << l << " step " << t;
     std::copy(q0.begin(), q0.end(), w.q_before);
     std::copy(v0.begin(), v0.end(), w.v_before);
