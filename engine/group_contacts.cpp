@@ -59,10 +59,16 @@ void group_contacts(CompiledModel& m) {
       m.pairs, [](const auto& a, const auto& b) { return a.link1 == b.link1 && a.link2 == b.link2; }, m.pair_order);
   for (std::size_t g = 0; g + 1 < pairs.size(); ++g) {
     const kernels::PairContact& first = m.pairs[std::size_t(m.pair_order[std::size_t(pairs[g])])];
-    kernels::LinkPair links = {first.link1, first.link2, pairs[g], pairs[g + 1] - pairs[g], 0, false, first.frame2.p};
+    kernels::LinkPair links = {first.link1, first.link2, pairs[g], pairs[g + 1] - pairs[g], 0, 0, false, first.frame2.p};
     links.ball = links.count == 1 && first.shape == PrimitiveShape::sphere;
-    for (int i = pairs[g]; i < pairs[g + 1]; ++i)
-      links.reach = std::max(links.reach, m.pairs[std::size_t(m.pair_order[std::size_t(i)])].reach);
+    double pitch = INFINITY;
+    for (int i = pairs[g]; i < pairs[g + 1]; ++i) {
+      const kernels::PairContact& pair = m.pairs[std::size_t(m.pair_order[std::size_t(i)])];
+      links.reach = std::max(links.reach, pair.reach);
+      pitch = std::min(pitch, pair.extent * std::sqrt(4 * M_PI / pair.n_points));
+    }
+    // What a lane may move before it is searched again. Where points are far apart a wide margin lists few more of them.
+    links.margin = std::max(links.reach / 200, pitch / 16);
     m.link_pairs.push_back(links);
   }
   const std::vector<int> grounds =

@@ -87,7 +87,7 @@ BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m)
     const kernels::LinkPair& links = m.link_pairs[g];
     for (int i = 0; i < links.count; ++i) {
       auto& list = lists[std::size_t(m.pair_order[std::size_t(links.first + i)])];
-      list.margin = links.reach / 200;
+      list.margin = links.margin;
       list.reference = references + 12 * g;
     }
   }

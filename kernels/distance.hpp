@@ -179,7 +179,12 @@ struct CylinderDistance {
             {radial * axis.x, radial * axis.y, axial * up}};
   }
 
-  /// The same where d < 0; elsewhere some d ≥ 0 and a unit vector.
+  /// False where d ≥ 0 for certain, without a root.
+  auto may_hold(const Vec3<N>& y) const -> decltype(y.x < y.y) {
+    const N slack(1 + 1e-12);
+    return (mul_add(y.x, y.x, y.y * y.y) < slack * (radius * radius)) & (abs(y.z) < half);
+  }
+  /// The same as evaluate() where d < 0; elsewhere some d ≥ 0 and a unit vector.
   Distance<N> inside(const Vec3<N>& y, N& curvature) const {
     const N zero(0.0), one(1.0);
     const AxisDistance<N> axis(y);

@@ -52,7 +52,7 @@ struct FacePoint {
   Vec3<N> dn, dxn, dwx;             ///< d s ñ; d s (n·ω) x
   N s;
   Vec3<N> t, xt, st, sxt, gt, gxt, e_slip;  ///< t̃, s t̃, γ t̃, s e_t - γ e
-  Vec3<N> r, xr, a, xa;             ///< r and x × r + d κ a × f; a and ξ × a
+  Vec3<N> a, xa, r, xr;             ///< a and ξ × a; r and x × r + d κ a × f
 
   static constexpr int kValues = 6, kDerivatives = kValues + 43, kSlipping = kDerivatives + 21;
   static constexpr int kBent = kSlipping + (Bent ? 12 : 0), kNumbers = kSlipping + 12;
@@ -125,9 +125,14 @@ struct FacePass {
 
 template <template <class> class Shape, class N>
 auto find_distance(const FaceMotion<Shape, N>& z, const Vec3<N>& xi, typename FaceMotion<Shape, N>::Point&,
-                   FacePass<N>& pass) {
+                   FacePass<N>& pass) -> decltype(xi.x < xi.y) {
   const Mat3<N>& Q = z.frame.R;
-  const Distance<N> at = z.shape.inside(transposed_times(Q, xi - z.frame.p), pass.kappa);
+  const Vec3<N> y = transposed_times(Q, xi - z.frame.p);
+  if constexpr (FaceMotion<Shape, N>::kBent) {
+    const auto inside = z.shape.may_hold(y);
+    if (!any(inside)) return inside;
+  }
+  const Distance<N> at = z.shape.inside(y, pass.kappa);
   pass.xi = xi;
   pass.d = at.d;
   pass.n = Q * at.n;

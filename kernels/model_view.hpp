@@ -87,6 +87,7 @@ struct LinkPair {
   int link1, link2;             ///< of all its members
   int first, count;             ///< members: pairs pair_order[first] … pair_order[first + count - 1]
   double reach;                 ///< largest of its members' [m]
+  double margin;                ///< of candidate lists: points this near to a shape are listed [m]
   bool ball;                    ///< its only shape is a sphere, centred at `centre` in link 2: turning it changes nothing
   Vec3<double> centre;
 };

@@ -3,9 +3,7 @@
 // through the law, then one after the other into the sums, in list order. The same bits, for a third of the work.
 #pragma once
 
-#include "kernels/face_contact.hpp"
-#include "kernels/one_lane.hpp"
-#include "kernels/sphere_contact.hpp"
+#include "kernels/packed_face_sums.hpp"
 #include "kernels/stage.hpp"
 
 namespace tangere::kernels {
@@ -96,16 +94,16 @@ struct PointSums {
 /// Of a lane on its own: across its points.
 template <bool Derivatives, template <class> class Sums, class A>
 struct PointSums<Derivatives, Sums, OneLane<A>> {
-  Sums<OneLane<A>> sums;
+  typename OwnSums<Sums, A>::Type own;
 
-  void start(int) { clear<Derivatives>(sums); }
+  void start(int) { clear<Derivatives>(own); }
   template <class Motion>
   void add(const Motion& motion, const LawParameters<OneLane<A>>& law, const CandidateList<OneLane<A>>& list, int) {
     using N = Lanes<A>;
     const LawParameters<N> all = {N(law.kn.x), N(law.kt.x), N(law.mu.x), N(law.damping.x), law.law, law.ramp};
-    add_own_points<Derivatives>(in_all_lanes<A>(motion, 0), all, list, sums);
+    add_own_points<Derivatives>(in_all_lanes<A>(motion, 0), all, list, own);
   }
-  const Sums<OneLane<A>>& result(int) { return sums; }
+  Sums<OneLane<A>> result(int) { return unpacked<Derivatives>(own); }
 };
 
 /// Of a group: by rows, or across the points of the lane that is evaluated alone.
@@ -113,7 +111,7 @@ template <bool Derivatives, template <class> class Sums, class A>
 struct PointSums<Derivatives, Sums, Lanes<A>> {
   using N = Lanes<A>;
   Sums<N> sums;
-  alignas(64) Sums<OneLane<A>> own;
+  alignas(64) typename OwnSums<Sums, A>::Type own;
 
   void start(int lone) {
     if (lone < 0) {
@@ -134,9 +132,10 @@ struct PointSums<Derivatives, Sums, Lanes<A>> {
   }
   const Sums<N>& result(int lone) {
     if (lone < 0) return sums;
-    const double* from = reinterpret_cast<const double*>(&own);
+    alignas(64) const Sums<OneLane<A>> one = unpacked<Derivatives>(own);
+    const double* from = reinterpret_cast<const double*>(&one);
     N* to = reinterpret_cast<N*>(&sums);
-    constexpr std::size_t count = Derivatives ? sizeof(own) / sizeof(double) : 6;  // force and moment come first
+    constexpr std::size_t count = Derivatives ? sizeof(one) / sizeof(double) : 6;  // force and moment come first
     for (std::size_t i = 0; i < count; ++i) to[i] = N(from[i]);
     return sums;
   }
