@@ -320,6 +320,7 @@ class Compiler {
 std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   auto m = std::make_shared<CompiledModel>(Compiler(scene).run());
   decide_effects(*m);
+  list_stages(*m);
   const Vector3& g = m->scene.gravity;
   kernels::ModelView& v = m->view;
   v.n_links = static_cast<int>(m->links.size());

@@ -113,6 +113,7 @@ struct CompiledModel {
   std::vector<VariableInfo> variable_info;
   std::vector<ContactInfo> contact_info;
   std::vector<EffectInfo> effects;     ///< of the whole scene
+  std::vector<StageInfo> stages;
   std::vector<std::string> q_names, v_names, u_names, q_units, v_units, u_units, body_names;
 };
 
@@ -129,6 +130,9 @@ std::vector<double> contact_points(const Shape& shape);
 
 /// Reorders (n, 3) points so that every kContactTile consecutive ones are neighbours; returns their (tiles, 4) bounds.
 std::vector<double> sort_into_tiles(std::vector<double>& points, int tile);
+
+/// What a step runs: fills stages.
+void list_stages(CompiledModel& model);
 
 /// Which contacts share their links: fills link_pairs, grounded and the orders.
 void group_contacts(CompiledModel& model);
