@@ -63,7 +63,7 @@ void GroupAdjoint::assemble(const StageInHand<L>& s, double c0, double h) const 
   fill(w.stage.c0_over_h, c0 / h);
   fill(w.stage.inverse_h, 1 / h);
   for (int i = 0; i < model_.nq; ++i) w.stage.centre[i] = w.q0[i];
-  kernel.kinematics(model_.view, w.stage, w.poses);
+  kernel.kinematics(model_.view, w.stage);
   clear_candidates(w);
   find_candidates(model_, s.table, w, s.lanes);
   if constexpr (L > 1)
@@ -136,7 +136,7 @@ void GroupAdjoint::reverse_sdirk2(const StageInHand<L>& s, double h) const {
   fill(w.stage.c0_over_h, 1 / (kGamma * h));
   fill(w.stage.inverse_h, 1 / h);
   for (int i = 0; i < model_.nq; ++i) w.stage.centre[i] = w.q0[i];
-  s.table.template stage<L>().kinematics(model_.view, w.stage, w.poses);
+  s.table.template stage<L>().kinematics(model_.view, w.stage);
   for (int i = 0; i < n; ++i) w.v_gamma[i] = w.stage.v[i];
 
   state_difference(model_, w.q1, w.q0, w.stage.x);

@@ -47,7 +47,7 @@ struct Stepper::Impl {
 
   /// Steps the live lanes of a group; `lane`: which of them stands in lane 0 of a workspace of one.
   template <int L>
-  void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane, BlockTape* tape) const {
+  void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane, BlockTape* tape) {
     const CompiledModel& m = model.compiled();
     const auto gather = [&](kernels::Row<L>* to, int row, int count) {
       for (int i = 0; i < count; ++i)
@@ -64,7 +64,7 @@ struct Stepper::Impl {
     SolveLog log;
     const int of_block = g.first % kBlock + lane;
     if (tape != nullptr && tape->next_x_gamma() != nullptr) log.x_gamma = tape->next_x_gamma() + of_block;
-    step.advance(kernels::active_kernels(), w, live, g.history >> lane, report, tape == nullptr ? nullptr : &log);
+    step.advance(kernels::active_kernels(), w, single, live, g.history >> lane, report, tape == nullptr ? nullptr : &log);
     for (int l = 0; l < L; ++l)
       if (std::vector<TapedSolve>& solves = log.special[std::size_t(l)]; !solves.empty())
         tape->add({tape->steps(), of_block + l, std::move(solves)});

@@ -100,9 +100,9 @@ Vec6<N> transposed_damping(const PairSums<N>& s, const Vec6<N>& y) {
           transposed_times(s.d[0][1], y.a) + transposed_times(s.d[1][1], y.l)};
 }
 
-/// Y of a pair: the rate at which body 2 moves against body 1 along λ, in body 1's axes at its origin.
+/// Y of a pair of links: the rate at which body 2 moves against body 1 along λ, in body 1's axes at its origin.
 template <class N>
-Vec6<N> adjoint_slip(const PairContact& pair, const ContactScratch<N>& o, const LinkAdjoint<N>* links) {
+Vec6<N> adjoint_slip(const LinkPair& pair, const ContactScratch<N>& o, const LinkAdjoint<N>* links) {
   Vec6<N> y = pair.link2 < 0 ? zero6<N>() : motion_to_parent(o.link2_in_1, links[pair.link2].twist);
   if (pair.link1 >= 0) y -= links[pair.link1].twist;
   return y;
@@ -111,18 +111,18 @@ Vec6<N> adjoint_slip(const PairContact& pair, const ContactScratch<N>& o, const 
 /// What contacts give to V̄: w₁ depends on W = Ad V₂ - V₁.
 template <class N>
 void adjoint_contacts(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
-  for (int k = 0; k < model.n_pairs; ++k) {
-    const PairContact& pair = model.pairs[k];
+  for (int k = 0; k < model.n_link_pairs; ++k) {
+    const LinkPair& pair = model.link_pairs[k];
     const ContactScratch<N>& o = a.contacts[k];
     if (!o.near) continue;
     const Vec6<N> w = transposed_damping(o.sums, adjoint_slip(pair, o, d.links));
     if (pair.link1 >= 0) d.links[pair.link1].by_v -= w;
     if (pair.link2 >= 0) d.links[pair.link2].by_v += wrench_to_child(o.link2_in_1, w);
   }
-  for (int k = 0; k < model.n_grounds; ++k) {
-    const ContactScratch<N>& o = a.contacts[model.n_pairs + k];
+  for (int k = 0; k < model.n_grounded; ++k) {
+    const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
     if (!o.near) continue;
-    LinkAdjoint<N>& link = d.links[model.grounds[k].link];
+    LinkAdjoint<N>& link = d.links[model.grounded[k].link];
     link.by_v += transposed_damping(o.sums, link.twist);
   }
 }

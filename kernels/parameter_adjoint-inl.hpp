@@ -20,63 +20,80 @@ LawCotangent<N> zero_law() {
 }
 
 template <class Shape, class N>
-void pair_law_adjoint(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list, int lone,
-                      const ContactScratch<N>& o, const Vec6<N>& y, LawCotangent<N>& sum) {
+void pair_law_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W, const LawParameters<N>& law,
+                      const CandidateList<N>& list, int lone, const Vec6<N>& slip, LawCotangent<N>& sum) {
   const auto add = [&](const Vec3<N>& xi) {
-    const PointContact<N> p = point_contact(shape, law, o.shape_in_1.R, o.shape_in_1.p, o.W.a, o.W.l, xi);
+    const PointContact<N> p = point_contact(shape, law, at.R, at.p, W.a, W.l, xi);
     const auto touching = p.d < N(0.0);
     if (!any(touching)) return;
-    pull_back_law(law, p, select(touching, N(1.0), N(0.0)) * (y.l + cross(y.a, p.x2)), sum);
+    pull_back_law(law, p, select(touching, N(1.0), N(0.0)) * (slip.l + cross(slip.a, p.x2)), sum);
   };
   if (lone < 0) {
     for (int k = 0; k < list.count; ++k) add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
   } else {
-    const double *x = list.own, *yy = x + list.stride, *z = yy + list.stride;
-    for (int k = 0; k < list.own_count; ++k) add({N(x[k]), N(yy[k]), N(z[k])});
+    const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
+    for (int k = 0; k < list.own_count; ++k) add({N(x[k]), N(y[k]), N(z[k])});
   }
+}
+
+/// Coefficients of every shape of two links.
+template <class N>
+void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const LinkPair& links,
+                          const ContactScratch<N>& o, const LinkAdjoint<N>* adjoint, N* out) {
+  const Vec6<N> slip = adjoint_slip(links, o, adjoint);
+  for (int m = links.first; m < links.first + links.count; ++m) {
+    const int k = model.pair_order[m];
+    const PairContact& pair = model.pairs[k];
+    const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
+    const Frame<N> at = compose(o.link2_in_1, broadcast<N>(pair.frame2));
+    LawCotangent<N> sum = zero_law<N>();
+    with_distance<N>(pair.shape, pair.size, [&]<class Shape>(const Shape& shape) {
+      pair_law_adjoint(shape, at, o.W, law, a.candidates[k], a.lone, slip, sum);
+    });
+    subtract_law(sum, out + kContactNumbers * k);
+  }
+}
+
+/// Of one body against the ground: Y = -Λ.
+template <class N>
+void ground_parameters(const ModelView& model, const StageArgs<N>& a, const GroundContact& ground, const Vec6<N>& twist,
+                       N* out) {
+  const LinkScratch<N>& link = a.links[ground.link];
+  const Vec3<N> normal = broadcast<N>(model.ground_normal);
+  const Vec3<N> m = transposed_times(link.world.R, normal);
+  const N height = dot(normal, link.world.p - broadcast<N>(model.ground_point));
+  const LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
+  LawCotangent<N> sum = zero_law<N>();
+  for (int i = 0; i < ground.n_points; ++i) {
+    const double* place = ground.points + 3 * i;
+    const Vec3<N> centre = {N(place[0]), N(place[1]), N(place[2])}, xi = centre - N(ground.radius) * m;
+    PointContact<N> p;
+    p.d = dot(m, centre) + height - N(ground.radius);
+    const auto touching = p.d < N(0.0);
+    if (!any(touching)) continue;
+    p.n = m;
+    p.u = link.V.l + cross(link.V.a, xi);
+    p.rate = dot(m, p.u);
+    p.vt = p.u - p.rate * m;
+    p.normal = normal_force(law, p.d, p.rate);
+    p.tangential = friction(law, p.normal, p.vt);
+    pull_back_law(law, p, select(touching, N(-1.0), N(0.0)) * (twist.l + cross(twist.a, xi)), sum);
+  }
+  subtract_law(sum, out);
 }
 
 /// Coefficients of every pair and ground contact, four each.
 template <class N>
 void contact_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links, N* out) {
-  for (int k = 0; k < model.n_pairs; ++k, out += 4) {
-    const PairContact& pair = model.pairs[k];
-    const ContactScratch<N>& o = a.contacts[k];
-    if (!o.near) continue;
-    const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
-    const Vec6<N> y = adjoint_slip(pair, o, links);
-    LawCotangent<N> sum = zero_law<N>();
-    with_distance<N>(pair.shape, pair.size, [&]<class Shape>(const Shape& shape) {
-      pair_law_adjoint(shape, law, a.candidates[k], a.lone, o, y, sum);
-    });
-    subtract_law(sum, out);
-  }
-  for (int k = 0; k < model.n_grounds; ++k, out += 4) {
-    const GroundContact& ground = model.grounds[k];
-    if (!a.contacts[model.n_pairs + k].near) continue;
-    const LinkScratch<N>& link = a.links[ground.link];
-    const Vec3<N> normal = broadcast<N>(model.ground_normal);
-    const Vec3<N> m = transposed_times(link.world.R, normal);
-    const N height = dot(normal, link.world.p - broadcast<N>(model.ground_point));
-    const LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
-    LawCotangent<N> sum = zero_law<N>();
-    for (int i = 0; i < ground.n_points; ++i) {
-      const double* at = ground.points + 3 * i;
-      const Vec3<N> centre = {N(at[0]), N(at[1]), N(at[2])}, xi = centre - N(ground.radius) * m;
-      PointContact<N> p;
-      p.d = dot(m, centre) + height - N(ground.radius);
-      const auto touching = p.d < N(0.0);
-      if (!any(touching)) continue;
-      p.n = m;
-      p.u = link.V.l + cross(link.V.a, xi);
-      p.rate = dot(m, p.u);
-      p.vt = p.u - p.rate * m;
-      p.normal = normal_force(law, p.d, p.rate);
-      p.tangential = friction(law, p.normal, p.vt);
-      const Vec6<N>& twist = links[ground.link].twist;  // Y = -Λ
-      pull_back_law(law, p, select(touching, N(-1.0), N(0.0)) * (twist.l + cross(twist.a, xi)), sum);
+  for (int k = 0; k < model.n_link_pairs; ++k)
+    if (a.contacts[k].near) link_pair_parameters(model, a, model.link_pairs[k], a.contacts[k], links, out);
+  for (int k = 0; k < model.n_grounded; ++k) {
+    const GroundedLink& grounded = model.grounded[k];
+    if (!a.contacts[model.n_link_pairs + k].near) continue;
+    for (int m = grounded.first; m < grounded.first + grounded.count; ++m) {
+      const int g = model.ground_order[m];
+      ground_parameters(model, a, model.grounds[g], links[grounded.link].twist, out + kContactNumbers * (model.n_pairs + g));
     }
-    subtract_law(sum, out);
   }
 }
 

@@ -28,7 +28,7 @@ struct StageTable {
   static const N* view(const RowOf* p) { return reinterpret_cast<const N*>(p); }
 
   static std::size_t scratch_bytes(const ModelView& m) {
-    return sizeof(LinkScratch<N>) * m.n_links + sizeof(ContactScratch<N>) * (m.n_pairs + m.n_grounds) +
+    return sizeof(LinkScratch<N>) * m.n_links + sizeof(ContactScratch<N>) * (m.n_link_pairs + m.n_grounded) +
            sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links +
            sizeof(LinkAdjoint<N>) * m.n_links + 5 * alignof(N);
   }
@@ -51,7 +51,7 @@ struct StageTable {
   static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone, Scratch& scratch) {
     StageArgs<N> a;
     a.links = scratch.template take<LinkScratch<N>>(m.n_links);
-    a.contacts = scratch.template take<ContactScratch<N>>(m.n_pairs + m.n_grounds);
+    a.contacts = scratch.template take<ContactScratch<N>>(m.n_link_pairs + m.n_grounded);
     a.columns = scratch.template take<JointColumns<N>>(2 * m.n_links);
     auto* lists = scratch.template take<CandidateList<N>>(m.n_pairs);
     for (int k = 0; k < m.n_pairs; ++k) {
@@ -81,15 +81,9 @@ struct StageTable {
     return a;
   }
 
-  static void kinematics_lanes(const ModelView& m, const StageOf& s, RowOf* poses) {
-    const StageArgs<N> a = arguments(m, s, -1);
-    kinematics(m, a);
-    for (int k = 0; k < m.n_pairs; ++k) {
-      const Frame<N>& x = a.contacts[k].shape_in_1;
-      N* row = view(poses + 12 * k);
-      for (int i = 0; i < 9; ++i) row[i] = x.R.m[i / 3][i % 3];
-      row[9] = x.p.x, row[10] = x.p.y, row[11] = x.p.z;
-    }
+  static void kinematics_lanes(const ModelView& m, const StageOf& s) { kinematics(m, arguments(m, s, -1)); }
+  static void near_pairs_lanes(const ModelView& m, const StageOf& s, NearPairs<L>& out) {
+    near_pairs(m, arguments(m, s, -1), out);
   }
   static void residual_lanes(const ModelView& m, const StageOf& s, int lone) {
     residual<false>(m, arguments(m, s, lone));
@@ -145,8 +139,8 @@ struct StageTable {
     parameter_products(m, a, adjoint_arguments(d, scratch.template take<LinkAdjoint<N>>(m.n_links)), view(out));
   }
   static constexpr StageKernels<L> make() {
-    return {scratch_bytes,         kinematics_lanes,    residual_lanes, evaluate_lanes, set_weights_lanes, set_floor_lanes,
-            scaled_residual_lanes, weighted_norm_lanes, factor_lanes,   solve_lanes,    solve_watched_lanes,
+    return {scratch_bytes,     kinematics_lanes, near_pairs_lanes,      residual_lanes,      evaluate_lanes, set_weights_lanes,
+            set_floor_lanes, scaled_residual_lanes, weighted_norm_lanes, factor_lanes, solve_lanes,    solve_watched_lanes,
             solve_transposed_lanes, adjoint_rhs_lanes, adjoint_products_lanes, parameter_products_lanes};
   }
 };
