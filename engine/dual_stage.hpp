@@ -14,7 +14,7 @@ namespace tangere {
 
 using DualNumber = kernels::Dual<double>;
 
-/// Inputs are set by the caller. Contacts are summed over every point of a pair; none is culled.
+/// Inputs are set by the caller. Contacts are summed over the points that touch.
 class DualStage {
  public:
   explicit DualStage(const CompiledModel& model);
@@ -28,10 +28,17 @@ class DualStage {
   /// kernels/kernel_table.hpp; empty: zeros.
   void set_numbers(const double* column, std::span<const double> tangents = {});
 
+  /// While frozen, the numbers' tangents count as zero.
+  void freeze_numbers(bool frozen);
+
   /// v and g; the tangents of masses included.
   void residual();
   /// v alone.
   void rates();
+
+  /// How the field of a sensor, (points, 3), changes at the state centre ⊕ 0 with twist r (c0_over_h = 0, inverse_h = 1).
+  /// `tangents`: of its kn, kt, mu, damping, or empty.
+  void field(int sensor, const double* column, std::span<const double> tangents, std::span<double> field_dot);
 
   /// For the values: A of residual() by its tangent inputs, (n, n) row-major, and its own tangents.
   void jacobian(std::vector<DualNumber>& A);

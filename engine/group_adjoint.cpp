@@ -172,10 +172,8 @@ template <int L>
 void GroupAdjoint::reverse(Integrator scheme, double h, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                            AdjointWorkspace<L>& a, LaneBits lanes) const {
   const StageInHand<L> s = {table, w, a, lanes};
-  if (scheme == Integrator::sdirk2) {
-    reverse_sdirk2(s, h);
-    return;
-  }
+  if (scheme == Integrator::sdirk2) return reverse_sdirk2(s, h);
+  if (scheme == Integrator::linear_implicit) return reverse_linear(s, h);
   const int n = model_.nv;
   StageHistory history = {0, -1, 0};
   state_difference(model_, w.q1, w.q0, w.stage.x);

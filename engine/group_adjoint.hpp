@@ -3,6 +3,9 @@
 // and solved transposed for every loss (docs/gradients.md).
 #pragma once
 
+#include <memory>
+
+#include "engine/dual_stage.hpp"
 #include "engine/group_step.hpp"
 
 namespace tangere {
@@ -32,6 +35,7 @@ struct AdjointWorkspace {
   // SDIRK2: cotangents of the inner stage, per loss (nv) after one another.
   Row *q_gamma, *v_gamma;
   Row sound;
+  std::unique_ptr<DualStage> dual;  ///< the linearly implicit step's, made when it is first reversed
 };
 
 /// Reverses solves whose states stand in the workspace: q0, v0 where it began, q_before, v_before one step earlier,
@@ -69,6 +73,10 @@ class GroupAdjoint {
                const LossRows<L>& loss) const;
   template <int L>
   void reverse_sdirk2(const StageInHand<L>& s, double h) const;
+  template <int L>
+  void reverse_linear(const StageInHand<L>& in, double h) const;
+  template <int L>
+  void hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o, const std::vector<double>& x, double h, int lane) const;
 
   const CompiledModel& model_;
 };

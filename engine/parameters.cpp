@@ -2,6 +2,8 @@
 // Names, places in the scene, and how each number enters what the kernels differentiate by.
 #include "engine/parameters.hpp"
 
+#include <algorithm>
+
 #include "engine/compiled_model.hpp"
 #include "kernels/kernel_table.hpp"
 
@@ -132,6 +134,12 @@ void Parameters::gradient(const BlockCotangent& cotangent, int lane, std::span<d
       sum += t.coefficient * cotangent.parameters[std::size_t(t.row * kBlock + lane)];
     out[k] = sum;
   }
+}
+
+void Parameters::spread(std::span<const double> change, std::span<double> rows) const {
+  std::fill(rows.begin(), rows.end(), 0.0);
+  for (std::size_t k = 0; k < entries_.size(); ++k)
+    for (const Term& t : entries_[k].terms) rows[std::size_t(t.row)] += t.coefficient * change[k];
 }
 
 }  // namespace tangere

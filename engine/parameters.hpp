@@ -28,6 +28,8 @@ class Parameters {
   [[nodiscard]] double& in(Scene& scene, int k) const;
   /// Derivatives of a loss by all of them, (count), for one lane of a block whose Adjoint was made with parameters.
   void gradient(const BlockCotangent& cotangent, int lane, std::span<double> out) const;
+  /// The other way: how the rows of BlockCotangent::parameters change when these numbers, (count), change so.
+  void spread(std::span<const double> change, std::span<double> rows) const;
 
  private:
   enum class Place { pair, ground, sensor, body, joint, turning, motor };

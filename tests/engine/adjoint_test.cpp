@@ -139,7 +139,7 @@ TEST_P(AdjointScheme, CompanyChangesNothing) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, AdjointScheme,
-                         ::testing::Values(Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2));
+                         ::testing::Values(Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit));
 
 }  // namespace
 }  // namespace tangere
