@@ -59,6 +59,7 @@ std::string randomized_name(const RandomizationDescription& d) {
     case RandomTarget::pair_contact:
       return fmt::format("{}/{}.{}", d.name, d.second_name, field_name(d.field));
     case RandomTarget::tactile: return fmt::format("{}.{}", d.name, field_name(d.field));
+    case RandomTarget::density: return fmt::format("{}.density", d.name);
     case RandomTarget::joint_effect: return fmt::format("{}.{}", d.name, to_string(d.joint_field));
     case RandomTarget::motor: return fmt::format("motor/{}.{}", d.name, to_string(d.joint_field));
   }
