@@ -138,6 +138,8 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.precision = run.precision;
   layout.version = run.version;
   layout.instruction_set = run.instruction_set;
+  layout.task = run.task;
+  layout.policy = run.policy;
   return layout;
 }
 
