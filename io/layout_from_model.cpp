@@ -108,6 +108,8 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.first_episode = batch.episode(0);
   layout.precision = run.precision;
   layout.command_line = run.command_line;
+  layout.task = run.task;
+  layout.policy = run.policy;
   layout.version = run.version;
   layout.instruction_set = run.instruction_set;
   return layout;

@@ -100,7 +100,16 @@ std::span<double> BlockWorker::part(std::vector<double>& of_moments, std::size_t
 
 void BlockWorker::act(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions,
                       VectorCounts& counts) {
-  const TaskSpec& spec = task_.spec();
+  begin(batch, data, block, actions);
+  for (int k = 0; k < task_.spec().steps_per_action; ++k) {
+    ask_for_controls(batch, data, block, k);
+    stepper_.step_block(batch, block, data.u);
+    look_after(batch, block, k, counts);
+  }
+  conclude(batch, data, block, counts);
+}
+
+void BlockWorker::begin(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions) {
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
   for (int e = first; e < last; ++e) {
     data.starting[size(e)] = data.state[size(e)] == EnvironmentState::to_start ? 1 : 0;
@@ -110,19 +119,34 @@ void BlockWorker::act(Batch& batch, EnvironmentData& data, int block, std::span<
       take_action(batch, data, e, actions);
     }
   }
-  std::size_t moment = 0;
-  for (int k = 0; k < spec.steps_per_action; ++k) {
-    if (k % spec.control_every == 0) ask_for_controls(batch, data, first, last, k);
-    stepper_.step_block(batch, block, data.u);
-    for (int e = first; e < last; ++e) {
-      if (batch.held(e) || failed(batch.status(e))) continue;
-      ++counts.simulation_steps;
-      counts.newton_iterations += batch.iterations(e);
-      counts.split_steps += batch.status(e) == StepStatus::split ? 1 : 0;
-    }
-    if (k + 1 == spec.moments[moment]) look(batch, block, moment++);
+}
+
+void BlockWorker::ask_for_controls(const Batch& batch, EnvironmentData& data, int block, int step) const {
+  if (step % task_.spec().control_every != 0) return;
+  const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
+  for (int e = first; e < last; ++e)
+    if (!batch.held(e))
+      task_.controls(view_of(batch, data, e), step, row(data.u, e, size(task_.model().nu())));
+}
+
+void BlockWorker::look_after(const Batch& batch, int block, int step, VectorCounts& counts) {
+  const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
+  for (int e = first; e < last; ++e) {
+    if (batch.held(e) || failed(batch.status(e))) continue;
+    ++counts.simulation_steps;
+    counts.newton_iterations += batch.iterations(e);
+    counts.split_steps += batch.status(e) == StepStatus::split ? 1 : 0;
   }
-  for (int e = first; e < last; ++e) conclude(batch, data, e, counts);
+  const std::vector<int>& moments = task_.spec().moments;
+  const auto moment = std::lower_bound(moments.begin(), moments.end(), step + 1);
+  if (*moment == step + 1) look(batch, block, size(static_cast<int>(moment - moments.begin())));
+}
+
+void BlockWorker::look_at_start(const Batch& batch, int block) { look(batch, block, task_.spec().moments.size() - 1); }
+
+void BlockWorker::conclude(Batch& batch, EnvironmentData& data, int block, VectorCounts& counts) {
+  const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
+  for (int e = first; e < last; ++e) conclude_one(batch, data, e, counts);
 }
 
 void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
@@ -183,12 +207,6 @@ void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environme
   task_.begin_action(view_of(batch, data, environment), row(data.memory, environment, size(task_.spec().memory)));
 }
 
-void BlockWorker::ask_for_controls(const Batch& batch, EnvironmentData& data, int first, int last, int step) const {
-  for (int e = first; e < last; ++e)
-    if (!batch.held(e))
-      task_.controls(view_of(batch, data, e), step, row(data.u, e, size(task_.model().nu())));
-}
-
 void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
   const TaskSpec& spec = task_.spec();
   const int first = block * kBlock, environments = std::min(kBlock, batch.environments() - first);
@@ -212,7 +230,7 @@ void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
   }
 }
 
-void BlockWorker::conclude(Batch& batch, EnvironmentData& data, int environment, VectorCounts& counts) {
+void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environment, VectorCounts& counts) {
   const TaskSpec& spec = task_.spec();
   const std::size_t e = size(environment);
   data.reward[e] = 0;

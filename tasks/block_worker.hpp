@@ -38,15 +38,23 @@ class BlockWorker {
   /// `actions`: (E, action), empty where every environment of the block starts.
   void act(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions, VectorCounts& counts);
 
+  // The parts of act(), for whoever steps the batch himself: begin, for every step k ask, step, look, then conclude.
+  void begin(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions);
+  /// Controls for the step k into data.u.
+  void ask_for_controls(const Batch& batch, EnvironmentData& data, int block, int step) const;
+  void look_after(const Batch& batch, int block, int step, VectorCounts& counts);
+  /// In place of steps and looks: where every environment starts and there is no opening.
+  void look_at_start(const Batch& batch, int block);
+  void conclude(Batch& batch, EnvironmentData& data, int block, VectorCounts& counts);
+
   static double bytes(const Task& task);
 
  private:
   void start(Batch& batch, EnvironmentData& data, int environment);
   void settle(const Batch& batch, EnvironmentData& data, int environment);
   void take_action(Batch& batch, EnvironmentData& data, int environment, std::span<const double> actions);
-  void ask_for_controls(const Batch& batch, EnvironmentData& data, int first, int last, int step) const;
   void look(const Batch& batch, int block, std::size_t moment);
-  void conclude(Batch& batch, EnvironmentData& data, int environment, VectorCounts& counts);
+  void conclude_one(Batch& batch, EnvironmentData& data, int environment, VectorCounts& counts);
   [[nodiscard]] std::span<double> part(std::vector<double>& of_moments, std::size_t moment, int lane) const;
 
   const Task& task_;

@@ -26,6 +26,7 @@ const std::vector<Entry>& entries() {
   static const std::vector<Entry> all{
       entry(declare_ball_rolling, make_ball_rolling, BallPad::large),
       entry(declare_ball_rolling, make_ball_rolling, BallPad::small),
+      {declare_stable_grasp, make_stable_grasp},
       entry(declare_box_pushing, make_box_pushing, Push::tactile),
       entry(declare_box_pushing, make_box_pushing, Push::privileged),
       entry(declare_box_pushing, make_box_pushing, Push::reduced),

@@ -27,6 +27,9 @@ enum class BallPad { large, small };
 TaskSpec declare_ball_rolling(BallPad pad);
 std::unique_ptr<Task> make_ball_rolling(const Scene& scene, BallPad pad);
 
+TaskSpec declare_stable_grasp();
+std::unique_ptr<Task> make_stable_grasp(const Scene& scene);
+
 /// What is observed of the box besides the goal: touch, its pose, nothing.
 enum class PushObservation { tactile, privileged, reduced };
 TaskSpec declare_box_pushing(PushObservation observation);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <functional>
 #include <numbers>
+#include <numeric>
 
 #include "engine/random.hpp"
 #include "tests/tasks/task_check.hpp"
@@ -114,6 +115,110 @@ TEST(BallRolling, GoalsFollowTheirDistribution) {
   for (std::size_t k = 0; k < 2; ++k)
     EXPECT_LT(uniform_distance(column(all, [=](const Start& s) { return s.memory[k] - s.q[3 + k]; }), -0.01, 0.01),
               kUnlikely);
+}
+
+TEST(StableGrasp, BarsBalanceWhereTheyShallAndWeighWhatTheyShall) {
+  const auto all = starts(*task_named("stable_grasp"));
+  const auto sum = [](const Start& s) { return std::accumulate(s.varying.begin(), s.varying.end(), 0.0); };
+  const auto centre = [&](const Start& s) {
+    double moment = 0;
+    for (std::size_t b = 0; b < s.varying.size(); ++b) moment += s.varying[b] * (double(b) + 0.5);
+    return moment / sum(s);
+  };
+  EXPECT_LT(uniform_distance(column(all, centre), 1, 10), kUnlikely);
+  EXPECT_LT(uniform_distance(column(all, sum), 3000, 7000), kUnlikely);
+  EXPECT_LT(uniform_distance(column(all, [&](const Start& s) { return s.varying[std::size_t(centre(s))]; }), 600, 700),
+            kUnlikely);
+  for (const Start& s : all) ASSERT_GT(*std::min_element(s.varying.begin(), s.varying.end()), 0);
+}
+
+/// Where the centre of mass is from the bar's middle [m].
+double offset_of(const Batch& batch, int e) {
+  double moment = 0, sum = 0;
+  for (int b = 0; b < 11; ++b) {
+    const double density = batch.randomized_value(e, b);
+    moment += density * (b - 5) * 0.025;
+    sum += density;
+  }
+  return moment / sum;
+}
+
+/// Of a field of shear (rows, cols), both pads: how much of it a common translation and rotation explain, and the latter.
+struct Vortex {
+  double explained = 0, rotation = 0;
+};
+Vortex vortex_of(std::span<const double> flow) {
+  double fy = 0, fz = 0, moment = 0, square = 0, all = 0;
+  constexpr int kPoints = 130;
+  for (int pad = 0; pad < 2; ++pad)
+    for (int p = 0; p < kPoints; ++p) {
+      const double up = pad == 0 ? 1 : -1, z = up * (p / 10 - 6), y = 4.5 - p % 10;
+      const double a = up * flow[std::size_t(2 * pad * kPoints + p)], b = -flow[std::size_t((2 * pad + 1) * kPoints + p)];
+      fz += a, fy += b, moment += y * a - z * b, square += y * y + z * z, all += a * a + b * b;
+    }
+  const double turning = moment * moment / square;
+  return {((fy * fy + fz * fz) / (2 * kPoints) + turning) / all, moment / square};
+}
+
+/// The paper's Fig. 3: a bar that is not held at its centre of mass turns, the more the farther, and the pads read a vortex.
+TEST(StableGrasp, TiltGrowsWithTheOffsetAndShearIsARotation) {
+  const auto task = task_named("stable_grasp");
+  constexpr int kEnvironments = 64;
+  VectorTask vector(*task, kEnvironments);
+  const std::size_t width = task->spec().observation_size();
+  for (int e = 0; e < kEnvironments; ++e) {
+    const double offset = offset_of(vector.batch(), e);
+    const Vortex vortex = vortex_of(vector.observation(e));
+    const auto flow = vector.observation(e);
+    double longest = 0;
+    for (std::size_t p = 0; p < width / 2; ++p) {
+      const std::size_t at = p / 130 * 260 + p % 130;
+      longest = std::max(longest, std::hypot(flow[at], flow[at + 130]));
+    }
+    EXPECT_NEAR(longest, 1, 1e-12) << "normalised over both pads";
+    EXPECT_GT(vortex.explained, 0.8) << "offset " << offset;
+    if (std::abs(offset) > 0.01) {
+      EXPECT_LT(vortex.rotation * offset, 0) << "turned by its weight: the heavier side goes down";
+    }
+  }
+  vector.step(std::vector<double>(kEnvironments, 0.0));  // at the middle again: its reward tells the tilt
+  std::vector<std::pair<double, double>> by_offset;
+  for (int e = 0; e < kEnvironments; ++e) {
+    const double offset = std::abs(offset_of(vector.batch(), e)), reward = vector.rewards()[std::size_t(e)];
+    by_offset.emplace_back(offset, reward > 0 ? 0 : -reward / 10);
+  }
+  std::sort(by_offset.begin(), by_offset.end());
+  double before = -1;
+  for (std::size_t part = 0; part < 4; ++part) {
+    double mean = 0;
+    for (std::size_t i = 0; i < kEnvironments / 4; ++i) mean += by_offset[part * kEnvironments / 4 + i].second / (kEnvironments / 4);
+    EXPECT_GT(mean, before) << "quarter " << part;
+    before = mean;
+  }
+}
+
+/// Fifty steps of 50 ms reach what 500 steps of 5 ms do: an implicit step of any length ends at rest.
+TEST(StableGrasp, SettlesInFewerStepsToTheSameRest) {
+  const auto task = task_named("stable_grasp");
+  const auto all = starts(*task);
+  const TaskSpec& spec = task->spec();
+  for (std::size_t episode = 0; episode < 4; ++episode) {
+    std::vector<std::vector<double>> rest;
+    for (const bool coarse : {true, false}) {
+      StepperOptions options;
+      if (coarse) options.timestep = spec.settling_timestep;
+      Stepper stepper(task->model(), options);
+      Batch batch(task->model(), 1, 3, std::int64_t(episode));
+      for (int b = 0; b < 11; ++b) batch.set_randomized_value(0, b, all[episode].varying[std::size_t(b)]);
+      batch.set_state(0, all[episode].q, all[episode].v);
+      std::vector<double> u(6), action{0.0};
+      task->controls({3, std::int64_t(episode), 0, all[episode].memory, action, {}}, 0, u);
+      for (int t = 0; t < (coarse ? spec.settling_steps : 500); ++t) stepper.step(batch, u);
+      rest.emplace_back(std::size_t(task->model().nq()));
+      batch.get_q(0, rest.back());
+    }
+    for (std::size_t i = 0; i < rest[0].size(); ++i) EXPECT_NEAR(rest[0][i], rest[1][i], 2e-5) << "coordinate " << i;
+  }
 }
 
 /// A small step of one number of a view, however it is stored.
@@ -275,6 +380,7 @@ void expect_solved(const std::string& name, int episodes, double least) {
 
 TEST(Scripted, HoldsThePad) { expect_solved("dummy", 1000, 1); }
 TEST(Scripted, RollsTheBall) { expect_solved("ball_rolling_small", 1000, 0.99); }
+TEST(Scripted, GraspsTheBar) { expect_solved("stable_grasp", 160, 0.98); }
 TEST(Scripted, PushesTheBox) { expect_solved("box_pushing_privileged", 1000, 0.71); }
 
 TEST(Policy, RandomKeepsTheBoundsAndATableItsRows) {
