@@ -236,8 +236,7 @@ Command add_generate(CLI::App& program) {
   add_console_options(*app, *console);
   app->footer(
       "Example:\n"
-      "  tangere generate scenes/rolling_ball_small.xml --output balls --episodes 32 --seed 1\n"
-      "  tangere generate box_pushing --output pushes --episodes 32");
+      "  tangere generate scenes/rolling_ball_small.xml --output balls --episodes 32 --seed 1");
   return {app, [=](const ProgramInfo& info) { return generate(*options, *console, info); }};
 }
 
