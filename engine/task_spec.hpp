@@ -35,6 +35,7 @@ struct TaskSpec {
   std::vector<int> moments;  ///< steps of an action after which it looks, ascending, the last one steps_per_action
   int horizon = 1;           ///< actions of an episode; then it is truncated
   bool opening = false;      ///< a reset is followed by one action of zeros, which belongs to the reset
+  bool restarts = false;     ///< every action starts from a state that the task gives
   int settling_steps = 0;    ///< a reset ends with so many steps of `settling_timestep` [s]
   double settling_timestep = 0;
   int memory = 0;            ///< numbers of its own that an episode keeps: a goal, a force

@@ -205,6 +205,11 @@ void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environme
     action[k] = std::clamp(asked, spec.low, spec.high);
   }
   task_.begin_action(view_of(batch, data, environment), row(data.memory, environment, size(task_.spec().memory)));
+  if (!task_.spec().restarts) return;
+  const std::span<double> q = row(data.q, environment, size(task_.model().nq()));
+  const std::span<double> v = row(data.v, environment, size(task_.model().nv()));
+  task_.place(view_of(batch, data, environment), q, v);
+  batch.set_state(environment, q, v);
 }
 
 void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {

@@ -35,6 +35,7 @@ std::size_t Task::variables_size() const { return spec_.looks_at_variables ? 3 *
 
 void Task::start(const TaskStart&) const {}
 void Task::begin_action(const TaskView&, std::span<double>) const {}
+void Task::place(const TaskView&, std::span<double>, std::span<double>) const {}
 
 std::size_t Task::coordinate(const std::string& joint) const {
   return place_of(model_.scene(), joint, position_count);

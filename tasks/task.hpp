@@ -77,6 +77,8 @@ class Task {
   virtual void start(const TaskStart& start) const;
   /// Before an action's first step: what the task keeps of it for all of them.
   virtual void begin_action(const TaskView& view, std::span<double> memory) const;
+  /// Of a task that restarts, the state that the action begins from; q and v are where the last one ended.
+  virtual void place(const TaskView& view, std::span<double> q, std::span<double> v) const;
   /// Controls (nu) for the steps of an action from `step` on.
   virtual void controls(const TaskView& view, int step, std::span<double> u) const = 0;
   /// The observations, one behind the other.

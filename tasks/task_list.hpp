@@ -35,4 +35,9 @@ enum class PushObservation { tactile, privileged, reduced };
 TaskSpec declare_box_pushing(PushObservation observation);
 std::unique_ptr<Task> make_box_pushing(const Scene& scene, PushObservation observation);
 
+/// What is off at the start and what an action corrects.
+enum class InsertionMotion { both, translation, rotation };
+TaskSpec declare_insertion(InsertionMotion motion);
+std::unique_ptr<Task> make_insertion(const Scene& scene, InsertionMotion motion);
+
 }  // namespace tangere

@@ -221,6 +221,47 @@ TEST(StableGrasp, SettlesInFewerStepsToTheSameRest) {
   }
 }
 
+TEST(Insertion, StartsFollowTheirDistributions) {
+  const auto all = starts(*task_named("insertion"));
+  const double degree = std::numbers::pi / 180;
+  const std::pair<double, double> memory[] = {{-6e-3, 6e-3}, {-6e-3, 6e-3}, {-10 * degree, 10 * degree}};
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_LT(uniform_distance(column(all, [=](const Start& s) { return s.memory[3 + k]; }), memory[k].first,
+                               memory[k].second),
+              kUnlikely);
+  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.memory[6]; }), -0.01, 5e-3), kUnlikely);
+  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.memory[7]; }), 0.125, 0.8), kUnlikely);
+  const std::pair<double, double> skin[] = {{2e3, 14e3}, {20, 140}, {0.5, 2.5}, {50, 450}, {0.2, 2.3}, {0.5, 2.5}, {0, 100}};
+  for (std::size_t k = 0; k < 7; ++k) {
+    EXPECT_LT(uniform_distance(column(all, [=](const Start& s) { return s.varying[k]; }), skin[k].first, skin[k].second),
+              kUnlikely)
+        << k;
+    ASSERT_EQ(all[5].varying[k], all[5].varying[7 + k]) << "both pads are of one skin";
+  }
+  for (const char* name : {"insertion_rotation", "insertion_translation"}) {
+    const Start one = starts(*task_named(name))[3];
+    const bool rotation = std::string(name) == "insertion_rotation";
+    EXPECT_EQ(one.memory[3] == 0 && one.memory[4] == 0, rotation);
+    EXPECT_EQ(one.memory[5] == 0, !rotation);
+  }
+}
+
+TEST(Insertion, WhatGoesInFeelsNoRim) {
+  const auto task = task_named("insertion_translation");
+  constexpr int kEnvironments = 48;
+  VectorTask vector(*task, kEnvironments);
+  for (int e = 0; e < kEnvironments; ++e) {
+    const auto off = vector.view(e).memory.subspan(3, 2);
+    const bool fits = std::abs(off[0]) < 2e-3 && std::abs(off[1]) < 2e-3;
+    const Moment now = vector.view(e).now();
+    const bool inside = task->judge({0, 0, 1, vector.view(e).memory, vector.actions().subspan(2 * std::size_t(e), 2), {&now, 1}}).success;
+    EXPECT_TRUE(inside || !fits) << off[0] << " " << off[1];
+    if (std::abs(off[0]) > 3e-3 || std::abs(off[1]) > 3e-3) {
+      EXPECT_FALSE(inside) << off[0] << " " << off[1];
+    }
+  }
+}
+
 /// A small step of one number of a view, however it is stored.
 class Differences {
  public:
@@ -381,6 +422,11 @@ void expect_solved(const std::string& name, int episodes, double least) {
 TEST(Scripted, HoldsThePad) { expect_solved("dummy", 1000, 1); }
 TEST(Scripted, RollsTheBall) { expect_solved("ball_rolling_small", 1000, 0.99); }
 TEST(Scripted, GraspsTheBar) { expect_solved("stable_grasp", 160, 0.98); }
+TEST(Scripted, InsertsTheBox) {
+  expect_solved("insertion_rotation", 300, 0.99);
+  expect_solved("insertion_translation", 300, 0.97);
+  expect_solved("insertion", 300, 0.82);
+}
 TEST(Scripted, PushesTheBox) { expect_solved("box_pushing_privileged", 1000, 0.71); }
 
 TEST(Policy, RandomKeepsTheBoundsAndATableItsRows) {
