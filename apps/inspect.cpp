@@ -71,6 +71,8 @@ Json as_json(const Model& model) {
   for (const VariableInfo& v : model.variables()) variables.push_back({{"name", v.name}, {"joint", v.joint}});
   for (const EffectInfo& e : model.effects())
     effects.push_back({{"name", e.name}, {"on", e.on}, {"reason", e.reason}});
+  Json stages = Json::array();
+  for (const StageInfo& s : model.stages()) stages.push_back({{"name", s.name}, {"of", s.of}, {"variant", s.variant}});
   const std::int64_t steps = steps_of(model);
   return {{"command", "inspect"},
           {"exit_code", 0},
@@ -94,6 +96,7 @@ Json as_json(const Model& model) {
           {"steps", steps < 0 ? Json() : Json(steps)},
           {"randomized", randomized_names(scene)},
           {"effects", effects},
+          {"stages", stages},
           {"state_bytes_per_environment", model.state_bytes_per_environment()},
           {"workspace_bytes", model.workspace_bytes()},
           {"instruction_set", kernels::active_isa_name()}};
@@ -154,6 +157,8 @@ std::string as_text(const Model& model) {
   text += '\n' + sensors_text(model) + variables_text(model) + "\neffects\n";
   for (const EffectInfo& e : model.effects())
     text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);
+  text += "\nstages\n";
+  for (const StageInfo& s : model.stages()) text += fmt::format("  {:<16} {}: {}\n", s.name, s.of, s.variant);
   return text + fmt::format(
                     "\nmemory: {} bytes per environment, {} bytes of workspace per thread\n"
                     "instruction set: {}",

@@ -48,7 +48,7 @@ class Group {
     }
     work_.stage.block = block_.data();
     work_.stage.group = 0;
-    table().group.kinematics(view(), work_.stage, work_.poses);
+    table().group.kinematics(view(), work_.stage);
     find_candidates(m, table(), work_, kAllLanes);
     lists_to_rows(table(), work_, kAllLanes);
     table().group.evaluate(view(), work_.stage, -1);
@@ -81,7 +81,7 @@ void run(benchmark::State& state, double environments, const F& f) {
 }
 
 void BM_Kinematics(benchmark::State& s) {
-  run(s, kGroup, [](Group& g) { g.table().group.kinematics(g.view(), g.work().stage, g.work().poses); });
+  run(s, kGroup, [](Group& g) { g.table().group.kinematics(g.view(), g.work().stage); });
 }
 void BM_FindCandidates(benchmark::State& s) {
   run(s, kGroup, [](Group& g) { find_candidates(g.compiled(), g.table(), g.work(), kAllLanes); });

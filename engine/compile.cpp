@@ -31,6 +31,7 @@ class Compiler {
     unknown_scales();
     pair_contacts();
     ground_contacts();
+    group_contacts(m_);
     sensors();
     variables();
     randomizations();
@@ -369,6 +370,7 @@ class Compiler {
 std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   auto m = std::make_shared<CompiledModel>(Compiler(scene).run());
   decide_effects(*m);
+  list_stages(*m);
   const Vector3& g = m->scene.gravity;
   kernels::ModelView& v = m->view;
   v.n_links = static_cast<int>(m->links.size());
@@ -384,6 +386,12 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   v.n_grounds = static_cast<int>(m->grounds.size());
   v.pairs = m->pairs.data();
   v.grounds = m->grounds.data();
+  v.n_link_pairs = static_cast<int>(m->link_pairs.size());
+  v.n_grounded = static_cast<int>(m->grounded.size());
+  v.link_pairs = m->link_pairs.data();
+  v.grounded = m->grounded.data();
+  v.pair_order = m->pair_order.data();
+  v.ground_order = m->ground_order.data();
   v.pattern = m->pattern.view();
   return m;
 }

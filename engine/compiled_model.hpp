@@ -111,6 +111,9 @@ struct CompiledModel {
   std::vector<CompiledVariable> variables;
   std::vector<kernels::PairContact> pairs;
   std::vector<kernels::GroundContact> grounds;
+  std::vector<kernels::LinkPair> link_pairs;
+  std::vector<kernels::GroundedLink> grounded;
+  std::vector<int> pair_order, ground_order;       ///< members of link_pairs and grounded, side by side
   std::vector<std::vector<double>> point_storage;  ///< what pairs and grounds point into
   std::vector<AlignedVector<double>> tile_storage; ///< what pairs' tile_points and tile_bounds point into
   std::vector<VaryingInertia> varying_inertia;
@@ -126,6 +129,7 @@ struct CompiledModel {
   std::vector<VariableInfo> variable_info;
   std::vector<ContactInfo> contact_info;
   std::vector<EffectInfo> effects;     ///< of the whole scene
+  std::vector<StageInfo> stages;
   std::vector<std::string> q_names, v_names, u_names, q_units, v_units, u_units, body_names;
 };
 
@@ -142,6 +146,12 @@ std::vector<double> contact_points(const Shape& shape);
 
 /// Reorders (n, 3) points so that every kContactTile consecutive ones are neighbours; returns their (tiles, 4) bounds.
 std::vector<double> sort_into_tiles(std::vector<double>& points, int tile);
+
+/// What a step runs: fills stages.
+void list_stages(CompiledModel& model);
+
+/// Which contacts share their links: fills link_pairs, grounded and the orders.
+void group_contacts(CompiledModel& model);
 
 /// Minimum-fill elimination of the structure of the tree and of every contact.
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,

@@ -18,13 +18,22 @@ template <int L>
 void find_candidates(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                      LaneBits lanes) {
   w.in_rows &= ~lanes;
+  table.stage<L>().near_pairs(model.view, w.stage, w.near);
+  for (std::size_t g = 0; g < model.link_pairs.size(); ++g) {
+    kernels::Row<L>* reference = w.references + 12 * g;
+    for (int i = 0; i < 12; ++i)
+      for (int l = 0; l < L; ++l)
+        if (has(lanes, l)) reference[i][l] = w.near.link_poses[12 * g + std::size_t(i)][l];
+  }
   for (std::size_t k = 0; k < model.pairs.size(); ++k) {
     auto& list = w.lists[k];
-    const kernels::Row<L>* row = w.poses + 12 * k;
+    const kernels::Row<L>* row = w.near.shape_poses + 12 * k;
     for (int l = 0; l < L; ++l) {
       if (!has(lanes, l)) continue;
+      list.own_count[l] = 0;
+      if (!has(w.near.lanes[k], l)) continue;
       double pose[12];
-      for (int i = 0; i < 12; ++i) list.reference[i][l] = pose[i] = row[i][l];
+      for (int i = 0; i < 12; ++i) pose[i] = row[i][l];
       list.own_count[l] =
           table.find_candidates({&model.pairs[k], pose, list.margin, list.own + 3 * list.stride * l, list.stride});
     }

@@ -139,9 +139,8 @@ void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits&
   }
 }
 
-/// Two half steps of one lane from q0, v0, split again where needed. The other lanes of the group wait.
-template <int L>
-bool GroupStep::split(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane, double h, int depth,
+/// Two half steps from q0, v0, split again where needed.
+bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
                       NewtonReport& report) const {
   if (depth > kDeepestSplit) return false;
   // Order 2 must survive inside a BDF2 step, and so must its history: SDIRK2 there, not BDF1.
@@ -149,19 +148,51 @@ bool GroupStep::split(const kernels::KernelTable& table, BasicWorkspace<L>& w, i
       settings_.integrator == Integrator::bdf2 || settings_.integrator == Integrator::sdirk2;
   const Integrator scheme = second_order ? Integrator::sdirk2 : Integrator::bdf1;
   for (int half = 0; half < 2; ++half) {
-    if (run(scheme, table, w, 1U << lane, 0.5 * h, true, report) != 0) {
-      for (int i = 0; i < model_.nq; ++i) w.q0[i][lane] = w.q1[i][lane];
-      for (int i = 0; i < model_.nv; ++i) w.v0[i][lane] = w.v1[i][lane];
-    } else if (!split(table, w, lane, 0.5 * h, depth + 1, report)) {
+    if (run(scheme, table, w, 1U, 0.5 * h, true, report) != 0) {
+      for (int i = 0; i < model_.nq; ++i) w.q0[i] = w.q1[i];
+      for (int i = 0; i < model_.nv; ++i) w.v0[i] = w.v1[i];
+    } else if (!split(table, w, 0.5 * h, depth + 1, report)) {
       return false;
     }
   }
   return true;
 }
 
+/// Splits the step of one lane of a group; the others wait.
 template <int L>
-void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes, LaneBits history,
-                        NewtonReport& report) const {
+bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane, SingleWorkspace& alone,
+                           NewtonReport& report) const {
+  if constexpr (L == 1) {
+    if (&w == &alone) return split(table, w, settings_.timestep, 1, report);
+  }
+  const auto to_one = [&](const Row<L>* from, Row<1>* to, int count) {
+    for (int i = 0; i < count; ++i) to[i][0] = from[i][lane];
+  };
+  const auto from_one = [&](const Row<1>* from, Row<L>* to, int count) {
+    for (int i = 0; i < count; ++i) to[i][lane] = from[i][0];
+  };
+  to_one(w.q0, alone.q0, model_.nq);
+  to_one(w.v0, alone.v0, model_.nv);
+  to_one(w.stage.tau, alone.stage.tau, model_.nv);
+  to_one(w.stage.target, alone.stage.target, model_.nv);
+  alone.stage.block = w.stage.block == nullptr ? nullptr : w.stage.block + w.stage.group * kernels::kGroup + lane;
+  alone.stage.group = 0;
+  NewtonReport one;
+  one.status[0] = report.status[lane];
+  one.iterations[0] = report.iterations[lane];
+  one.residual[0] = report.residual[lane];
+  const bool done = split(table, alone, settings_.timestep, 1, one);
+  from_one(alone.q0, w.q0, model_.nq);
+  from_one(alone.v0, w.v0, model_.nv);
+  report.status[lane] = one.status[0];
+  report.iterations[lane] = one.iterations[0];
+  report.residual[lane] = one.residual[0];
+  return done;
+}
+
+template <int L>
+void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w, SingleWorkspace& alone, LaneBits lanes,
+                        LaneBits history, NewtonReport& report) const {
   const double h = settings_.timestep;
   LaneBits resolved = 0;
   const auto commit = [&](LaneBits done) {
@@ -182,7 +213,7 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
   for (int l = 0; l < L; ++l) {
     if (!has(lanes & ~resolved, l)) continue;
     const StepStatus first = report.status[l];
-    if (split(table, w, l, h, 1, report)) {
+    if (split_lane(table, w, l, alone, report)) {
       report.status[l] = StepStatus::split;
     } else if (!failed(report.status[l])) {
       report.status[l] = first;
@@ -200,7 +231,9 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
   }
 }
 
-template void GroupStep::advance(const kernels::KernelTable&, Workspace&, LaneBits, LaneBits, NewtonReport&) const;
-template void GroupStep::advance(const kernels::KernelTable&, SingleWorkspace&, LaneBits, LaneBits, NewtonReport&) const;
+template void GroupStep::advance(const kernels::KernelTable&, Workspace&, SingleWorkspace&, LaneBits, LaneBits,
+                                 NewtonReport&) const;
+template void GroupStep::advance(const kernels::KernelTable&, SingleWorkspace&, SingleWorkspace&, LaneBits, LaneBits,
+                                 NewtonReport&) const;
 
 }  // namespace tangere

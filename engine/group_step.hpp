@@ -26,10 +26,11 @@ class GroupStep {
   GroupStep(const CompiledModel& model, const StepSettings& settings) : model_(model), settings_(settings) {}
 
   /// Advances `lanes` by one step; `history`: those with a valid state one step before (BDF2). Afterwards q0, v0 hold
-  /// the new state of every lane whose status did not fail; rows of other lanes are untouched.
+  /// the new state of every lane whose status did not fail; rows of other lanes are untouched. Steps that are split run in
+  /// `alone`, which may be `w` itself: the same bits as in the group, for less.
   template <int L>
-  void advance(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes, LaneBits history,
-               NewtonReport& report) const;
+  void advance(const kernels::KernelTable& table, BasicWorkspace<L>& w, SingleWorkspace& alone, LaneBits lanes,
+               LaneBits history, NewtonReport& report) const;
 
  private:
   template <int L>
@@ -38,9 +39,10 @@ class GroupStep {
   template <int L>
   LaneBits solve_one_stage(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes, double c0, double h,
                            bool inside_split, NewtonReport& report) const;
+  bool split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth, NewtonReport& report) const;
   template <int L>
-  bool split(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane, double h, int depth,
-             NewtonReport& report) const;
+  bool split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane, SingleWorkspace& alone,
+                  NewtonReport& report) const;
   template <int L>
   void finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits& resolved, NewtonReport& report) const;
   template <int L>

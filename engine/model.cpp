@@ -20,6 +20,7 @@ std::span<const SensorInfo> Model::sensors() const { return compiled_->sensor_in
 std::span<const VariableInfo> Model::variables() const { return compiled_->variable_info; }
 std::span<const ContactInfo> Model::contacts() const { return compiled_->contact_info; }
 std::span<const EffectInfo> Model::effects() const { return compiled_->effects; }
+std::span<const StageInfo> Model::stages() const { return compiled_->stages; }
 std::span<const std::string> Model::q_names() const { return compiled_->q_names; }
 std::span<const std::string> Model::v_names() const { return compiled_->v_names; }
 std::span<const std::string> Model::u_names() const { return compiled_->u_names; }

@@ -44,6 +44,11 @@ struct EffectInfo {
   std::string reason;
 };
 
+/// A stage of the step that the scene calls for, what it works on and the variant of its kernel.
+struct StageInfo {
+  std::string name, of, variant;
+};
+
 class Model {
  public:
   /// Compiles a scene. Throws InputError (file:line) for references to nothing, massless leaves, degenerate sensors, …
@@ -62,6 +67,7 @@ class Model {
   [[nodiscard]] std::span<const VariableInfo> variables() const;  ///< end effectors, in file order
   [[nodiscard]] std::span<const ContactInfo> contacts() const;
   [[nodiscard]] std::span<const EffectInfo> effects() const;
+  [[nodiscard]] std::span<const StageInfo> stages() const;  ///< in the order in which they run
   [[nodiscard]] std::span<const std::string> q_names() const;  ///< "object_joint.qw" …
   [[nodiscard]] std::span<const std::string> v_names() const;
   [[nodiscard]] std::span<const std::string> u_names() const;

@@ -53,7 +53,7 @@ struct Search {
 
   /// Poses at x; lists of lanes that have none yet or outran theirs.
   void locate(bool first) {
-    kernel().kinematics(model.view, w.stage, w.poses);
+    kernel().kinematics(model.view, w.stage);
     LaneBits stale = first ? searching : 0;
     for (int l = 0; l < L; ++l)
       if (has(searching, l) && w.stage.excess[0][l] > 0) stale |= 1U << l;

@@ -68,7 +68,7 @@ struct Stepper::Impl {
 
   /// Steps the live lanes of a group; `lane`: which of them stands in lane 0 of a workspace of one.
   template <int L>
-  void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane) const {
+  void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane) {
     const CompiledModel& m = model.compiled();
     const auto gather = [&](kernels::Row<L>* to, int row, int count) {
       for (int i = 0; i < count; ++i)
@@ -82,7 +82,7 @@ struct Stepper::Impl {
     w.stage.group = 0;
     const LaneBits live = g.live >> lane;
     NewtonReport report;
-    step.advance(kernels::active_kernels(), w, live, g.history >> lane, report);
+    step.advance(kernels::active_kernels(), w, single, live, g.history >> lane, report);
     for (int l = 0; l < L; ++l) {
       if (!has(live, l)) continue;
       const std::size_t e = std::size_t(g.first + lane + l);

@@ -32,12 +32,14 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   for (LaneRow** p : {&w.q0, &w.q_before, &w.q1}) rows(*p, m.nq);
   for (LaneRow** p : {&w.v0, &w.v_before, &w.v1, &w.x_gamma, &w.v_gamma, &w.delta, &w.base, &w.test})
     rows(*p, m.nv);
-  rows(w.poses, 12 * static_cast<int>(m.pairs.size()));
+  const int link_pairs = static_cast<int>(m.link_pairs.size());
+  rows(w.references, 12 * link_pairs);
+  rows(w.near.link_poses, 12 * link_pairs);
+  rows(w.near.shape_poses, 12 * static_cast<int>(m.pairs.size()));
   for (std::size_t k = 0; k < w.lists.size(); ++k) {
     typename kernels::Stage<L>::List& list = w.lists[k];
     list.stride = (m.pairs[k].n_points + kGroup - 1) / kGroup * kGroup + kGroup;
     rows(list.points, 3 * list.stride);
-    rows(list.reference, 12);
   }
   return used;
 }
@@ -54,6 +56,8 @@ std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
 template <int L>
 BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m)
     : lists(m.pairs.size()),
+      near_lanes(m.pairs.size()),
+      near{},
       stage{},
       pivoted(L, Eigen::PartialPivLU<Eigen::MatrixXd>(m.nv)),
       dense(1, Eigen::MatrixXd(m.nv, m.nv)),
@@ -78,7 +82,15 @@ BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m)
     for (LaneRow* q : {stage.centre, q0, q_before, q1})
       for (double& w : q[link.q].lane) w = 1;
   }
-  for (std::size_t k = 0; k < lists.size(); ++k) lists[k].margin = m.pairs[k].reach / 200;
+  near.lanes = near_lanes.data();
+  for (std::size_t g = 0; g < m.link_pairs.size(); ++g) {
+    const kernels::LinkPair& links = m.link_pairs[g];
+    for (int i = 0; i < links.count; ++i) {
+      auto& list = lists[std::size_t(m.pair_order[std::size_t(links.first + i)])];
+      list.margin = links.margin;
+      list.reference = references + 12 * g;
+    }
+  }
   stage.lists = lists.data();
   stage.scratch = scratch.data();
 }

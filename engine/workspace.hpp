@@ -31,6 +31,9 @@ struct BasicWorkspace {
   AlignedVector<double> own_points;  ///< the lists' points lane by lane
   std::vector<typename kernels::Stage<L>::List> lists;
   LaneBits in_rows = 0;      ///< lanes whose lists stand in the rows as well
+  LaneRow* references;       ///< (n_link_pairs, 12) what the lists' references point into
+  std::vector<unsigned> near_lanes;
+  kernels::NearPairs<L> near;
   kernels::Stage<L> stage;
 
   // The group's states: now, one step before, and the result of the solve in hand.
@@ -38,7 +41,7 @@ struct BasicWorkspace {
   // SDIRK2's first stage, relative to q0.
   LaneRow *x_gamma, *v_gamma;
   // Newton: direction, point it starts from, natural test vector.
-  LaneRow *delta, *base, *test, *poses;
+  LaneRow *delta, *base, *test;
   LaneRow sound;
   std::vector<Eigen::PartialPivLU<Eigen::MatrixXd>> pivoted;  ///< (L) factor of lanes whose plain LU is useless
   std::vector<Eigen::MatrixXd> dense;                         ///< (1) the matrix being factored

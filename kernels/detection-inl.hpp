@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which points of a body may touch a shape: tiles by their bounding spheres, then points, eight at a time.
+// Which points of a body may touch a shape: all of them by one bounding sphere across environments, then tiles by theirs
+// and points, eight at a time.
 #pragma once
 
 #include "kernels/distance.hpp"
 #include "kernels/kernel_table.hpp"
+#include "kernels/one_lane.hpp"
+#include "kernels/stage.hpp"
 
 namespace tangere::kernels {
 
@@ -15,6 +18,34 @@ unsigned near_shape(const Shape& shape, const Frame<N>& pose, const Vec3<N>& pla
     return lane_bits(nearer_than(shape, arm, m));
   } else {
     return lane_bits(nearer_than(shape, transposed_times(pose.R, arm), m));
+  }
+}
+
+template <class N>
+void store_frame(const Frame<N>& x, N* rows) {
+  for (int i = 0; i < 9; ++i) rows[i] = x.R.m[i / 3][i % 3];
+  rows[9] = x.p.x, rows[10] = x.p.y, rows[11] = x.p.z;
+}
+
+/// Pairs whose points may be near: the ball that holds them against the shape.
+template <class N, int L>
+void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out) {
+  const auto view = [](Row<L>* p) { return reinterpret_cast<N*>(p); };
+  for (int g = 0; g < model.n_link_pairs; ++g) {
+    const LinkPair& links = model.link_pairs[g];
+    const Frame<N>& x = a.contacts[g].link2_in_1;
+    store_frame(x, view(out.link_poses + 12 * g));
+    for (int i = 0; i < links.count; ++i) {
+      const int k = model.pair_order[links.first + i];
+      const PairContact& pair = model.pairs[k];
+      const Vec3<N> in_2 = transposed_times(x.R, broadcast<N>(pair.middle) - x.p);
+      const Vec3<N> y = transposed_times(broadcast<N>(pair.frame2.R), in_2 - broadcast<N>(pair.frame2.p));
+      const N reach(pair.extent + a.candidates[k].margin);
+      out.lanes[k] = with_distance<N>(pair.shape, pair.size, [&](const auto& shape) {
+        return lane_bits(nearer_than(shape, y, reach));
+      });
+      if (out.lanes[k] != 0) store_frame(compose(x, broadcast<N>(pair.frame2)), view(out.shape_poses + 12 * k));
+    }
   }
 }
 
@@ -48,11 +79,13 @@ int search_shape(const CandidateSearch& s, Shape shape) {
     const Vec3<N> centre = {load_lanes<A>(b), load_lanes<A>(b + kGroup), load_lanes<A>(b + 2 * kGroup)};
     const N reach = load_lanes<A>(b + 3 * kGroup) + margin;
     for (unsigned near = near_shape(shape, pose, centre, reach); near != 0; near &= near - 1) {
-      const double* p = pair.tile_points + 3 * kContactTile * (group * kGroup + __builtin_ctz(near));
-      for (int k = 0; k < kContactTile; k += kGroup) {
+      const int tile = group * kGroup + __builtin_ctz(near), rest = pair.n_points - tile * kContactTile;
+      const double* p = pair.tile_points + 3 * kContactTile * tile;
+      for (int k = 0; k < kContactTile && k < rest; k += kGroup) {
         const Vec3<N> place = {load_lanes<A>(p + k), load_lanes<A>(p + kContactTile + k),
                                load_lanes<A>(p + 2 * kContactTile + k)};
         const unsigned in = near_shape(shape, pose, place, margin);
+        if (in == 0) continue;
         append(place.x, in, x + count);
         append(place.y, in, y + count);
         append(place.z, in, z + count);
@@ -75,6 +108,7 @@ template <class A>
 void transpose_rows(GroupStage::List& list) {
   list.count = 0;
   for (int count : list.own_count) list.count = count > list.count ? count : list.count;
+  if (list.count == 0) return;
   for (int l = 0; l < kGroup; ++l)
     for (int c = 0; c < 3; ++c) {
       const double* from = list.own + (l * 3 + c) * list.stride;

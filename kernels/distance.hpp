@@ -76,6 +76,19 @@ struct CuboidDistance {
              sign.z * select(outside, inverse * out.z, pick_z)}};
   }
 
+  /// The same where d < 0; elsewhere some d ≥ 0 and a unit vector, without a root.
+  Distance<N> inside(const Vec3<N>& y, N& curvature) const {
+    const N zero(0.0), one(1.0);
+    curvature = zero;
+    const Vec3<N> q = {abs(y.x) - half.x, abs(y.y) - half.y, abs(y.z) - half.z};
+    const auto x_first = (q.x >= q.y) & (q.x >= q.z);
+    const auto y_first = q.y >= q.z;
+    const Vec3<N> sign = {select(y.x < zero, -one, one), select(y.y < zero, -one, one), select(y.z < zero, -one, one)};
+    return {select(x_first, q.x, select(y_first, q.y, q.z)),
+            {select(x_first, sign.x, zero), select(x_first, zero, select(y_first, sign.y, zero)),
+             select(x_first, zero, select(y_first, zero, sign.z))}};
+  }
+
   /// H = (P - n nᵀ)/d outside, P the axes on which the point lies beyond its face; 0 inside.
   Mat3<N> hessian(const Vec3<N>& y) const {
     const N zero(0.0), one(1.0);
@@ -114,6 +127,7 @@ struct PlaneDistance {
     const N beyond(kPlaneReach);
     return {select(dot(y, y) < beyond * beyond, y.z, beyond), {zero, zero, N(1.0)}};
   }
+  Distance<N> inside(const Vec3<N>& y, N& curvature) const { return evaluate(y, curvature); }
   Mat3<N> hessian(const Vec3<N>&) const { return zero33<N>(); }
 };
 
@@ -163,6 +177,23 @@ struct CylinderDistance {
     straight = one;
     return {select(outside, root_of(square, inverse), select(side, a, b)),
             {radial * axis.x, radial * axis.y, axial * up}};
+  }
+
+  /// False where d ≥ 0 for certain, without a root.
+  auto may_hold(const Vec3<N>& y) const -> decltype(y.x < y.y) {
+    const N slack(1 + 1e-12);
+    return (mul_add(y.x, y.x, y.y * y.y) < slack * (radius * radius)) & (abs(y.z) < half);
+  }
+  /// The same as evaluate() where d < 0; elsewhere some d ≥ 0 and a unit vector.
+  Distance<N> inside(const Vec3<N>& y, N& curvature) const {
+    const N zero(0.0), one(1.0);
+    const AxisDistance<N> axis(y);
+    const N a = axis.rho - radius, b = abs(y.z) - half;
+    const auto side = a >= b;
+    curvature = select(side, axis.inverse, zero);
+    return {select(side, a, b),
+            {select(side, axis.x, zero), select(side, axis.y, zero),
+             select(side, zero, select(y.z < zero, -one, one))}};
   }
 
   /// H = (n_ρ/ρ) t tᵀ, t the direction around the axis; outside the rim, 1/d across it as well.

@@ -145,14 +145,14 @@ void jacobian(const ModelView& model, const StageArgs<N>& a) {
   composite_sweep(model, a);
   for (int i = 0; i < model.n_links; ++i)
     with_kind(model.links[i].kind, [&]<JointKind K>() { joint_jacobian<K>(model, a, i); });
-  for (int k = 0; k < model.n_pairs; ++k) {
-    const PairContact& pair = model.pairs[k];
+  for (int k = 0; k < model.n_link_pairs; ++k) {
+    const LinkPair& pair = model.link_pairs[k];
     if (!a.contacts[k].near) continue;
     contact_jacobian(model, a, pair.link1, pair.link2, a.contacts[k], pair.link2 < 0 ? nullptr : &a.contacts[k].Z);
   }
-  for (int k = 0; k < model.n_grounds; ++k) {
-    const ContactScratch<N>& o = a.contacts[model.n_pairs + k];
-    if (o.near) contact_jacobian<N>(model, a, model.grounds[k].link, -1, o, nullptr);
+  for (int k = 0; k < model.n_grounded; ++k) {
+    const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
+    if (o.near) contact_jacobian<N>(model, a, model.grounded[k].link, -1, o, nullptr);
   }
   without_negative_zeros(a.A, model.pattern.entries);
 }

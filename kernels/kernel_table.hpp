@@ -24,7 +24,7 @@ struct Stage {
     int stride;            ///< the number of the pair's points, rounded up to eights, and eight more: a list cannot overflow
     Row<L>* points;       ///< (stride, 3)
     int count;             ///< rows in use
-    Row<L>* reference;    ///< (12) pose the list was made at
+    Row<L>* reference;    ///< (12) pose of link 2 in link 1 that the list was made at; pairs of the same links share it
     double margin;
   };
   List* lists;           ///< (n_pairs)
@@ -34,6 +34,14 @@ struct Stage {
   Row<L> floor;                     ///< smallest ‖D^-½ g‖² that one rounding of x lets one see
 };
 using GroupStage = Stage<kGroup>;
+
+/// Which pairs are near enough to search, and the poses that the search needs.
+template <int L>
+struct NearPairs {
+  Row<L>* link_poses;    ///< (n_link_pairs, 12) link 2 in link 1: R row-major, then p
+  Row<L>* shape_poses;   ///< (n_pairs, 12) shape in body 1, of pairs with a near lane
+  unsigned* lanes;       ///< (n_pairs) bit l: lane l has points that may be nearer to the shape than the list's margin
+};
 
 /// One lane's search for points near a shape.
 struct CandidateSearch {
@@ -62,8 +70,10 @@ struct GroupState {
 template <int L>
 struct StageKernels {
   std::size_t (*scratch_bytes)(const ModelView&);
-  /// Poses and motions at x, and `excess`; writes shape_in_1 of every pair, (n_pairs, 12) rows: R row-major, then p.
-  void (*kinematics)(const ModelView&, const Stage<L>&, Row<L>* poses);
+  /// Poses and motions at x, and `excess`.
+  void (*kinematics)(const ModelView&, const Stage<L>&);
+  /// Bounds against shapes at the poses of kinematics().
+  void (*near_pairs)(const ModelView&, const Stage<L>&, NearPairs<L>& out);
   /// g, v and force_scale at the x of kinematics(). `lone`: the only lane whose result matters, -1: all do.
   void (*residual)(const ModelView&, const Stage<L>&, int lone);
   /// The same with mass_diagonal and A. Both give the same bits.

@@ -294,6 +294,19 @@ inline Lanes<A> load_lanes(const double* p) {  // 64-byte aligned
   return d;
 }
 template <class A>
+inline Lanes<A> load_lanes_anywhere(const double* p) {
+  Lanes<A> d;
+  constexpr int w = kGroup / Lanes<A>::kRegisters;
+  for (int i = 0; i < Lanes<A>::kRegisters; ++i) {
+    if constexpr (w == 1) {
+      d.r[i] = p[i];
+    } else {
+      d.r[i] = Lanes<A>::Batch::load_unaligned(p + i * w);
+    }
+  }
+  return d;
+}
+template <class A>
 inline void store_lanes(const Lanes<A>& d, double* p) {  // 64-byte aligned
   constexpr int w = kGroup / Lanes<A>::kRegisters;
   for (int i = 0; i < Lanes<A>::kRegisters; ++i) {

@@ -76,10 +76,22 @@ struct PairContact {
   const double* tile_points;    ///< (n_tiles, 3, 32) the same: x, y, z of kContactTile points, padded with far points
   const double* tile_bounds;    ///< (ceil(n_tiles/8), 4, 8) centres and radii of the tiles, padded with far ones
   int n_points, n_tiles;
+  Vec3<double> middle;          ///< of a ball that holds all points, link1's axes
+  double extent;                ///< its radius [m]
   double reach;                 ///< largest |point| [m]: bounds how far a rotation moves one
 };
 inline constexpr int kContactTile = 32;
 inline constexpr double kFarAway = 1e6;  ///< [m] coordinates of filler points: finite, and no shape is there
+
+/// Two links that touch through one shape or several: one relative motion, one 6×6 block.
+struct LinkPair {
+  int link1, link2;             ///< of all its members
+  int first, count;             ///< members: pairs pair_order[first] … pair_order[first + count - 1]
+  double reach;                 ///< largest of its members' [m]
+  double margin;                ///< of candidate lists: points this near to a shape are listed [m]
+  bool ball;                    ///< its only shape is a sphere, centred at `centre` in link 2: turning it changes nothing
+  Vec3<double> centre;
+};
 
 /// A body against the half-space below the ground: points of the body, or a sphere's lowest point.
 struct GroundContact {
@@ -90,6 +102,14 @@ struct GroundContact {
   ContactParameters parameters;
   const double* points;         ///< (n_points, 3), link axes
   int n_points;
+  Vec3<double> middle;          ///< of a ball that holds all of the body's points, link axes
+  double extent;                ///< its radius [m]
+};
+
+/// A link that touches the ground with one body or several: one 6×6 block.
+struct GroundedLink {
+  int link;
+  int first, count;             ///< members: grounds ground_order[first] … ground_order[first + count - 1]
 };
 
 /// Structure of matrices over dofs, shared by every environment and step.
@@ -127,6 +147,10 @@ struct ModelView {
   int n_pairs, n_grounds;
   const PairContact* pairs;
   const GroundContact* grounds;
+  int n_link_pairs, n_grounded;
+  const LinkPair* link_pairs;
+  const GroundedLink* grounded;
+  const int *pair_order, *ground_order;  ///< (n_pairs), (n_grounds): members side by side
   Pattern pattern;
 };
 

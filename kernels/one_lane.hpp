@@ -60,6 +60,7 @@ template <class A>
 inline OneLane<A>& operator-=(OneLane<A>& a, OneLane<A> b) {
   return a = a - b;
 }
+inline unsigned lane_bits(bool m) { return m ? 1U : 0U; }
 /// Fused exactly where Lanes<Arch> fuses.
 template <class A>
 inline OneLane<A> mul_add(OneLane<A> a, OneLane<A> b, OneLane<A> c) {

@@ -7,7 +7,7 @@
 #pragma once
 
 #include "kernels/joint_effects-inl.hpp"
-#include "kernels/sphere_sums.hpp"
+#include "kernels/point_sums.hpp"
 #include "kernels/stage.hpp"
 
 namespace tangere::kernels {
@@ -117,31 +117,31 @@ void inertial_wrenches(const ModelView& model, const StageArgs<N>& a) {
   }
 }
 
-/// Relative pose and twist of a pair's bodies. A body fixed in the world has the world's frame and no twist.
+/// Relative pose and twist of two links. The world has its own frame and no twist.
 template <class N>
-void pair_motion(const ModelView&, const PairContact& pair, const StageArgs<N>& a, ContactScratch<N>& o) {
+void pair_motion(const LinkPair& pair, const StageArgs<N>& a, ContactScratch<N>& o) {
   const Frame<N> origin = {diagonal(N(1.0)), zero3<N>()};
   const Frame<N>& w1 = pair.link1 < 0 ? origin : a.links[pair.link1].world;
   const Frame<N>& w2 = pair.link2 < 0 ? origin : a.links[pair.link2].world;
   o.link2_in_1 = relative(w1, w2);
-  o.shape_in_1 = compose(o.link2_in_1, broadcast<N>(pair.frame2));
   o.Z = pair.link2 < 0 ? zero6<N>() : motion_to_parent(o.link2_in_1, a.links[pair.link2].V);
   o.W = pair.link1 < 0 ? o.Z : o.Z - a.links[pair.link1].V;
 }
 
-/// How far any point of body 1 may have come nearer to the shape since its list was made, beyond the margin.
+/// How far any point of body 1 may have come nearer to a shape since the lists were made, beyond the margin. With G = (R, p)
+/// of the links, a point ξ is at Rᵀ(ξ - p) in body 2 and so in every shape that is fixed there.
 template <class N>
-N list_excess(const PairContact& pair, const CandidateList<N>& list, const Frame<N>& now) {
+N list_excess(const LinkPair& pair, const CandidateList<N>& list, const Frame<N>& now) {
   const N* ref = list.reference;
   const Vec3<N> p0 = {ref[9], ref[10], ref[11]};
+  Mat3<N> R0;
+  for (int k = 0; k < 9; ++k) R0.m[k / 3][k % 3] = ref[k];
+  const Mat3<N> turn = now.R - R0;
   N moved;
-  if (pair.shape == PrimitiveShape::sphere) {
-    const Vec3<N> step = now.p - p0;
+  if (pair.ball) {
+    const Vec3<N> step = turn * broadcast<N>(pair.centre) + (now.p - p0);
     moved = sqrt(dot(step, step));
   } else {
-    Mat3<N> R0;
-    for (int k = 0; k < 9; ++k) R0.m[k / 3][k % 3] = ref[k];
-    const Mat3<N> turn = now.R - R0;
     N square(0.0);
     for (int k = 0; k < 9; ++k) square = mul_add(turn.m[k / 3][k % 3], turn.m[k / 3][k % 3], square);
     const Vec3<N> step = transposed_times(now.R, now.p) - transposed_times(R0, p0);
@@ -150,13 +150,12 @@ N list_excess(const PairContact& pair, const CandidateList<N>& list, const Frame
   return moved - list.margin;
 }
 
-/// Sums over a pair with any shape, one candidate after the other.
+/// Adds the points of a capsule, whose ends bend in two directions, one candidate after the other.
 template <bool Derivatives, class Shape, class N>
-void sum_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list, int lone,
-                    ContactScratch<N>& o) {
-  o.sums = PairSums<N>::zero();
+void add_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list, int lone,
+                    const Frame<N>& frame, const Vec6<N>& W, PairSums<N>& sums) {
   const auto add = [&](const Vec3<N>& xi) {
-    accumulate<Derivatives>(o.sums, shape, law, o.shape_in_1.R, o.shape_in_1.p, o.W.a, o.W.l, xi);
+    accumulate<Derivatives>(sums, shape, law, frame.R, frame.p, W.a, W.l, xi);
   };
   if (lone < 0) {
     for (int k = 0; k < list.count; ++k) add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
@@ -166,19 +165,80 @@ void sum_candidates(const Shape& shape, const LawParameters<N>& law, const Candi
   }
 }
 
+template <class N>
+bool has_candidates(const CandidateList<N>& list, int lone) {
+  return (lone < 0 ? list.count : list.own_count) > 0;
+}
+
+/// Adds the points around a sphere.
 template <bool Derivatives, class N>
-void sum_pair(const PairContact& pair, const StageArgs<N>& a, const CandidateList<N>& list, ContactScratch<N>& o) {
-  const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
-  if (pair.shape != PrimitiveShape::sphere) {
-    with_distance<N>(pair.shape, pair.size, [&]<class Shape>(const Shape& shape) {
-      if constexpr (Shape::kBending != Bending::ball) sum_candidates<Derivatives>(shape, law, list, a.lone, o);
-    });
-    return;
+[[gnu::noinline]] void add_sphere(const SphereMotion<N>& motion, const LawParameters<N>& law,
+                                  const CandidateList<N>& list, int lone, const Vec6<N>& W, PairSums<N>& sums) {
+  PointSums<Derivatives, SphereSums, N> sphere;
+  sphere.start(lone);
+  sphere.add(motion, law, list, lone);
+  add_finished<Derivatives>(motion, W, sphere.result(lone), sums);
+}
+
+/// Zeros; without derivatives, only those of the wrench.
+template <bool Derivatives, class N>
+void start(PairSums<N>& sums) {
+  if constexpr (Derivatives) {
+    sums = PairSums<N>::zero();
+  } else {
+    sums.wrench = zero6<N>();
   }
-  const SphereMotion<N> motion = sphere_motion(o.shape_in_1.p, o.W, N(pair.size.x));
-  SphereSums<N> sums;
-  sum_sphere_points<Derivatives>(motion, law, list, a.lone, sums);
-  finish_sphere<Derivatives>(motion, o.W.a, sums, o.sums);
+}
+
+/// Sums over all shapes of two links. Flat and bent faces share theirs, which are about body 1's origin.
+template <bool Derivatives, class N>
+void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArgs<N>& a, ContactScratch<N>& o) {
+  start<Derivatives>(o.sums);
+  PointSums<Derivatives, FaceSums, N> faces;
+  bool any_face = false;
+  for (int i = 0; i < links.count; ++i) {
+    const int k = model.pair_order[links.first + i];
+    const PairContact& pair = model.pairs[k];
+    const CandidateList<N>& list = a.candidates[k];
+    if (!has_candidates(list, a.lone)) continue;
+    const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
+    const auto frame = [&] { return compose(o.link2_in_1, broadcast<N>(pair.frame2)); };
+    with_distance<N>(pair.shape, pair.size, [&]<template <class> class Shape>(const Shape<N>& shape) {
+      if constexpr (Shape<N>::kBending == Bending::ball) {
+        const Vec3<N> centre = o.link2_in_1.R * broadcast<N>(pair.frame2.p) + o.link2_in_1.p;
+        add_sphere<Derivatives>(sphere_motion(centre, o.W, shape.radius), law, list, a.lone, o.W, o.sums);
+      } else if constexpr (std::is_same_v<Shape<N>, CapsuleDistance<N>>) {
+        add_candidates<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
+      } else {
+        if (!any_face) faces.start(a.lone);
+        any_face = true;
+        faces.add(FaceMotion<Shape, N>{frame(), o.W, shape}, law, list, a.lone);
+      }
+    });
+  }
+  if (any_face) add_finished<Derivatives>(o.W, faces.result(a.lone), o.sums);
+}
+
+/// Points of one link in the ground; false where there are none in any lane.
+template <bool Derivatives, class N>
+bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const StageArgs<N>& a, PairSums<N>& sums) {
+  const LinkScratch<N>& link = a.links[grounded.link];
+  const Vec3<N> m = transposed_times(link.world.R, broadcast<N>(model.ground_normal));
+  const N height = dot(broadcast<N>(model.ground_normal), link.world.p - broadcast<N>(model.ground_point));
+  bool near = false, started = false;
+  for (int i = 0; i < grounded.count; ++i) {
+    const GroundContact& ground = model.grounds[model.ground_order[grounded.first + i]];
+    if (!any(dot(m, broadcast<N>(ground.middle)) + height < N(ground.extent))) continue;
+    if (!started) start<Derivatives>(sums);
+    started = true;
+    const LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
+    for (int k = 0; k < ground.n_points; ++k) {
+      const double* p = ground.points + 3 * k;
+      near |= accumulate_ground<Derivatives>(sums, law, m, height, link.V, Vec3<N>{N(p[0]), N(p[1]), N(p[2])},
+                                             N(ground.radius));
+    }
+  }
+  return near;
 }
 
 /// -0 to +0: a contact that is near in another lane only adds ±0, which must not show in this lane's bits.
@@ -187,34 +247,29 @@ void without_negative_zeros(N* x, int count) {
   for (int i = 0; i < count; ++i) x[i] = x[i] + N(0.0);
 }
 
-/// Contact sums of every pair and ground contact; their wrenches are taken from the links' F.
+template <class N>
+bool near(const ModelView& model, const LinkPair& links, const StageArgs<N>& a) {
+  for (int i = 0; i < links.count; ++i)
+    if (has_candidates(a.candidates[model.pair_order[links.first + i]], a.lone)) return true;
+  return false;
+}
+
+/// Contact sums of every pair of links and grounded link; their wrenches are taken from the links' F.
 template <bool Derivatives, class N>
 void contact_sweep(const ModelView& model, const StageArgs<N>& a) {
-  for (int k = 0; k < model.n_pairs; ++k) {
-    const PairContact& pair = model.pairs[k];
+  for (int k = 0; k < model.n_link_pairs; ++k) {
+    const LinkPair& pair = model.link_pairs[k];
     ContactScratch<N>& o = a.contacts[k];
-    o.near = (a.lone < 0 ? a.candidates[k].count : a.candidates[k].own_count) > 0;
+    o.near = near(model, pair, a);
     if (!o.near) continue;
-    sum_pair<Derivatives>(pair, a, a.candidates[k], o);
+    sum_link_pair<Derivatives>(model, pair, a, o);
     if (pair.link1 >= 0) a.links[pair.link1].F -= o.sums.wrench;
     if (pair.link2 >= 0) a.links[pair.link2].F += wrench_to_child(o.link2_in_1, o.sums.wrench);
   }
-  for (int k = 0; k < model.n_grounds; ++k) {
-    const GroundContact& ground = model.grounds[k];
-    ContactScratch<N>& o = a.contacts[model.n_pairs + k];
-    const LinkScratch<N>& link = a.links[ground.link];
-    const Vec3<N> normal = broadcast<N>(model.ground_normal);
-    const Vec3<N> m = transposed_times(link.world.R, normal);
-    const N height = dot(normal, link.world.p - broadcast<N>(model.ground_point));
-    const LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
-    o.sums = PairSums<N>::zero();
-    o.near = false;
-    for (int i = 0; i < ground.n_points; ++i) {
-      const double* p = ground.points + 3 * i;
-      o.near |= accumulate_ground<Derivatives>(o.sums, law, m, height, link.V, Vec3<N>{N(p[0]), N(p[1]), N(p[2])},
-                                               N(ground.radius));
-    }
-    if (o.near) a.links[ground.link].F -= o.sums.wrench;
+  for (int k = 0; k < model.n_grounded; ++k) {
+    ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
+    o.near = sum_grounded<Derivatives>(model, model.grounded[k], a, o.sums);
+    if (o.near) a.links[model.grounded[k].link].F -= o.sums.wrench;
   }
 }
 
@@ -254,9 +309,11 @@ template <class N>
 void kinematics(const ModelView& model, const StageArgs<N>& a) {
   outward_sweep(model, a);
   a.excess[0] = N(0.0);
-  for (int k = 0; k < model.n_pairs; ++k) {
-    pair_motion(model, model.pairs[k], a, a.contacts[k]);
-    a.excess[0] = max(a.excess[0], list_excess(model.pairs[k], a.candidates[k], a.contacts[k].shape_in_1));
+  for (int k = 0; k < model.n_link_pairs; ++k) {
+    const LinkPair& pair = model.link_pairs[k];
+    const CandidateList<N>& list = a.candidates[model.pair_order[pair.first]];
+    pair_motion(pair, a, a.contacts[k]);
+    a.excess[0] = max(a.excess[0], list_excess(pair, list, a.contacts[k].link2_in_1));
   }
 }
 
@@ -266,16 +323,16 @@ void residual(const ModelView& model, const StageArgs<N>& a) {
   inertial_wrenches(model, a);
   contact_sweep<Derivatives>(model, a);
   inward_sweep(model, a);
-  for (int k = 0; k < model.n_pairs; ++k) {
+  for (int k = 0; k < model.n_link_pairs; ++k) {
     const ContactScratch<N>& o = a.contacts[k];
     if (!o.near) continue;
-    add_force_scale(model, a, model.pairs[k].link1, o.sums.wrench);
-    if (model.pairs[k].link2 >= 0)
-      add_force_scale(model, a, model.pairs[k].link2, wrench_to_child(o.link2_in_1, o.sums.wrench));
+    const LinkPair& pair = model.link_pairs[k];
+    add_force_scale(model, a, pair.link1, o.sums.wrench);
+    if (pair.link2 >= 0) add_force_scale(model, a, pair.link2, wrench_to_child(o.link2_in_1, o.sums.wrench));
   }
-  for (int k = 0; k < model.n_grounds; ++k) {
-    const ContactScratch<N>& o = a.contacts[model.n_pairs + k];
-    if (o.near) add_force_scale(model, a, model.grounds[k].link, o.sums.wrench);
+  for (int k = 0; k < model.n_grounded; ++k) {
+    const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
+    if (o.near) add_force_scale(model, a, model.grounded[k].link, o.sums.wrench);
   }
   without_negative_zeros(a.g, model.nv);
 }

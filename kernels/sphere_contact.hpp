@@ -12,16 +12,27 @@
 // What does not depend on the point comes out of the sums. Derivation: docs/contact.md.
 #pragma once
 
-#include <utility>
-
 #include "kernels/inverse_sqrt.hpp"
 #include "kernels/pair_contact.hpp"
+#include "kernels/point_chunk.hpp"
 
 namespace tangere::kernels {
+
+template <class N>
+struct SpherePoint;
+template <class N>
+struct SpherePass;
+template <class N>
+struct SphereSums;
 
 /// Motion of the sphere relative to body 1, in body 1's axes.
 template <class N>
 struct SphereMotion {
+  using Point = SpherePoint<N>;
+  using Pass = SpherePass<N>;
+  using Sums = SphereSums<N>;
+  template <class M>
+  using Of = SphereMotion<M>;
   Vec3<N> centre, q, o;
   N radius;
 };
@@ -35,6 +46,7 @@ SphereMotion<N> sphere_motion(const Vec3<N>& centre, const Vec6<N>& W, const N& 
 /// fewer of them are set.
 template <class N>
 struct SpherePoint {
+  using Number = N;
   Vec3<N> f, m;                 ///< force, n × f
   // With derivatives only.
   Vec3<N> n, alpha, g, k, sn;   ///< normal, α, g, k, s n
@@ -43,13 +55,10 @@ struct SpherePoint {
   Vec3<N> t, b, st, sb, ke, turn;  ///< t, b, s t, s b, κ e, s t - γ n
   N k_gamma;                    ///< κ γ
 
-  static constexpr int kValues = 6, kDerivatives = kValues + 18, kAll = kDerivatives + 19;
+  static constexpr int kValues = 6, kDerivatives = kValues + 18, kSlipping = kDerivatives + 19;
+  static constexpr int kBent = kSlipping, kNumbers = kSlipping;
 };
 
-template <class N>
-struct UpperTriangle {
-  N m[6];
-};
 /// Σ s n, Σ κ s n, Σ κ α, Σ s, Σ κ s, Σ κ (N + ḋ s)
 template <class N>
 struct ScaledSums {
@@ -81,18 +90,7 @@ void clear(SphereSums<N>& s) {
   }
 }
 
-/// A few points on their way through the law, and then into the sums.
-template <class N>
-struct SphereChunk {
-  using Mask = decltype(std::declval<N>() < std::declval<N>());
-  static constexpr int kPoints = sizeof(N) == sizeof(double) ? 8 : 4;  // of lanes, what the first-level cache holds
-  SpherePoint<N> point[kPoints];
-  Mask touch[kPoints], slip[kPoints];        ///< lane by lane, where some lane touches
-  int touching[kPoints], slipping[kPoints];  ///< which touch, and which of them slip, in some lane
-  int count = 0, slips = 0;
-};
-
-/// Between the three passes of a chunk. Each pass waits for one root, so that roots of different points overlap.
+/// Between the three passes of a chunk.
 template <class N>
 struct SpherePass {
   Vec3<N> vt, turned;
@@ -101,7 +99,7 @@ struct SpherePass {
 
 /// n, d, κ; where the point touches.
 template <class N>
-auto sphere_distance(const SphereMotion<N>& z, const Vec3<N>& xi, SpherePoint<N>& out, SpherePass<N>& pass) {
+auto find_distance(const SphereMotion<N>& z, const Vec3<N>& xi, SpherePoint<N>& out, SpherePass<N>& pass) {
   const Distance<N> at = SphereDistance<N>{z.radius}.evaluate(xi - z.centre, pass.kappa);
   out.n = at.n;
   pass.d = at.d;
@@ -110,7 +108,7 @@ auto sphere_distance(const SphereMotion<N>& z, const Vec3<N>& xi, SpherePoint<N>
 
 /// ḋ, v_t, 1/|v_t|.
 template <class N>
-void sphere_slide(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePass<N>& pass) {
+void find_slide(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePass<N>& pass) {
   pass.rate = dot(out.n, z.q);
   pass.turned = cross(z.o, out.n);
   pass.vt = z.q + pass.turned - pass.rate * out.n;
@@ -120,7 +118,7 @@ void sphere_slide(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePas
 
 /// Force and what its derivative needs; where the point slips.
 template <bool Derivatives, class N>
-auto sphere_force(const SphereMotion<N>& z, const LawParameters<N>& law, const SpherePass<N>& pass,
+auto find_force(const SphereMotion<N>& z, const LawParameters<N>& law, const SpherePass<N>& pass,
                   SpherePoint<N>& out) {
   const N zero(0.0);
   const Vec3<N>& n = out.n;
@@ -161,51 +159,9 @@ auto sphere_force(const SphereMotion<N>& z, const LawParameters<N>& law, const S
   return slipping;
 }
 
-/// Takes `count` ≤ kPoints points through the law.
-template <bool Derivatives, class N>
-void fill_chunk(const SphereMotion<N>& z, const LawParameters<N>& law, const Vec3<N>* xi, int count,
-                SphereChunk<N>& chunk) {
-  SpherePass<N> pass[SphereChunk<N>::kPoints];
-  chunk.count = chunk.slips = 0;
-  for (int i = 0; i < count; ++i) {
-    chunk.touch[i] = sphere_distance(z, xi[i], chunk.point[i], pass[i]);
-    if (any(chunk.touch[i])) chunk.touching[chunk.count++] = i;
-  }
-  for (int c = 0; c < chunk.count; ++c) sphere_slide(z, chunk.point[chunk.touching[c]], pass[chunk.touching[c]]);
-  for (int c = 0; c < chunk.count; ++c) {
-    const int i = chunk.touching[c];
-    chunk.slip[i] = sphere_force<Derivatives>(z, law, pass[i], chunk.point[i]);
-    if (any(chunk.slip[i])) chunk.slipping[chunk.slips++] = i;
-  }
-}
-
-template <class N>
-void add_outer(Mat3<N>& sum, const Vec3<N>& a, const Vec3<N>& b) {
-  const N x[3] = {a.x, a.y, a.z}, y[3] = {b.x, b.y, b.z};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) sum.m[i][j] = mul_add(x[i], y[j], sum.m[i][j]);
-}
-template <class N>
-void add_upper(N (&sum)[6], const Vec3<N>& a, const Vec3<N>& b) {
-  sum[0] = mul_add(a.x, b.x, sum[0]);
-  sum[1] = mul_add(a.x, b.y, sum[1]);
-  sum[2] = mul_add(a.x, b.z, sum[2]);
-  sum[3] = mul_add(a.y, b.y, sum[3]);
-  sum[4] = mul_add(a.y, b.z, sum[4]);
-  sum[5] = mul_add(a.z, b.z, sum[5]);
-}
-
-/// Adds points one after the other to a few sums, which stay in registers: f(sum, point).
-template <class Sum, class N, class F>
-void add_each(Sum& sum, const SpherePoint<N>* point, const int* which, int count, const F& f) {
-  Sum local = sum;
-  for (int i = 0; i < count; ++i) f(local, point[which[i]]);
-  sum = local;
-}
-
 /// Adds the points of a chunk in order.
 template <bool Derivatives, class N>
-void add_chunk(SphereSums<N>& sums, const SphereChunk<N>& chunk) {
+[[gnu::noinline]] void add_chunk(SphereSums<N>& sums, const PointChunk<SpherePoint<N>>& chunk) {
   using Point = SpherePoint<N>;
   const auto each = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.touching, chunk.count, f); };
   const auto slipping = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.slipping, chunk.slips, f); };
@@ -215,7 +171,7 @@ void add_chunk(SphereSums<N>& sums, const SphereChunk<N>& chunk) {
     each(sums.alpha_n, [](Mat3<N>& m, const Point& p) { add_outer(m, p.alpha, p.n); });
     each(sums.g_n, [](Mat3<N>& m, const Point& p) { add_outer(m, p.g, p.n); });
     each(sums.k_n, [](Mat3<N>& m, const Point& p) { add_outer(m, p.k, p.n); });
-    each(sums.s_nn, [](UpperTriangle<N>& m, const Point& p) { add_upper(m.m, p.sn, p.n); });
+    each(sums.s_nn, [](UpperTriangle<N>& m, const Point& p) { add_upper(m, p.sn, p.n); });
     each(sums.scaled, [](ScaledSums<N>& q, const Point& p) {
       q.sn += p.sn;
       q.ksn = mul_add(p.curvature, p.sn, q.ksn);
@@ -229,20 +185,20 @@ void add_chunk(SphereSums<N>& sums, const SphereChunk<N>& chunk) {
       slipping(sums.s_tb, [](Mat3<N>& m, const Point& p) { add_outer(m, p.st, p.b); });
       slipping(sums.s_t_ke, [](Mat3<N>& m, const Point& p) { add_outer(m, p.st, p.ke); });
       slipping(sums.b_turn, [](Mat3<N>& m, const Point& p) { add_outer(m, p.b, p.turn); });
-      slipping(sums.s_bb, [](UpperTriangle<N>& m, const Point& p) { add_upper(m.m, p.sb, p.b); });
+      slipping(sums.s_bb, [](UpperTriangle<N>& m, const Point& p) { add_upper(m, p.sb, p.b); });
       slipping(sums.s_b_ke, [](Mat3<N>& m, const Point& p) { add_outer(m, p.sb, p.ke); });
       slipping(sums.k_gamma_b, [](Vec3<N>& v, const Point& p) { v = mul_add(p.k_gamma, p.b, v); });
     }
   }
 }
 
-/// Wrench, stiffness and damping of the pair about body 1's origin from the sums about the centre: with
+/// Adds wrench, stiffness and damping of the pair about body 1's origin from the sums about the centre: with
 /// δc = ρ + θ × c,  δD = -δc,  δq = -(δv + δω × c) - ω × δc,  δo = -r δω.
 template <bool Derivatives, class N>
-void finish_sphere(const SphereMotion<N>& z, const Vec3<N>& omega, const SphereSums<N>& s, PairSums<N>& out) {
+void add_finished(const SphereMotion<N>& z, const Vec6<N>& W, const SphereSums<N>& s, PairSums<N>& out) {
   const N r = z.radius;
-  out.wrench.l = s.f;
-  out.wrench.a = cross(z.centre, s.f) + r * s.m;
+  out.wrench.l += s.f;
+  out.wrench.a += cross(z.centre, s.f) + r * s.m;
   if constexpr (Derivatives) {
     const ScaledSums<N>& c = s.scaled;
     Mat3<N> f_q = s.alpha_n + s.s_tt, f_D = s.g_n + s.s_t_ke + outer(c.k_alpha, z.q) - skew(c.ks * z.o);
@@ -250,25 +206,24 @@ void finish_sphere(const SphereMotion<N>& z, const Vec3<N>& omega, const SphereS
     // Σ κ s u = q Σ κ s + o × Σ κ s n
     Mat3<N> m_D = s.k_n + s.s_b_ke - outer(s.k_gamma_b, z.q) + skew(mul_add(c.ks, z.q, cross(z.o, c.ksn))) -
                   outer(z.o, c.ksn);
-    N m[6];
-    for (int i = 0; i < 6; ++i) m[i] = s.s_nn.m[i] + s.s_bb.m[i];
-    const Mat3<N> m_o = {{{m[0] - c.s, m[1], m[2]}, {m[1], m[3] - c.s, m[4]}, {m[2], m[4], m[5] - c.s}}};
+    const Mat3<N> m_o = full(s.s_nn) + full(s.s_bb) - diagonal(c.s);
     const N along = dot(z.o, c.ksn);
     for (int i = 0; i < 3; ++i) {
       f_q.m[i][i] -= c.s;
       f_D.m[i][i] += c.k_spread;
       m_D.m[i][i] += along;
     }
-    const Mat3<N> f_c = -(f_D + times_skew(f_q, omega)), m_c = (-r) * (m_D + times_skew(m_q, omega));
-    out.k[1][1] = f_c;
-    out.k[1][0] = -times_skew(f_c, z.centre);
-    out.k[0][1] = cross_columns(z.centre, f_c) - skew(s.f) + m_c;
-    out.k[0][0] = -times_skew(out.k[0][1], z.centre);
-    out.d[1][1] = -f_q;
-    out.d[1][0] = times_skew(f_q, z.centre) - r * f_o;
-    const Mat3<N> m_v = (-r) * m_q;
-    out.d[0][1] = m_v - cross_columns(z.centre, f_q);
-    out.d[0][0] = cross_columns(z.centre, out.d[1][0]) - times_skew(m_v, z.centre) - (r * r) * m_o;
+    const Mat3<N> f_c = -(f_D + times_skew(f_q, W.a)), m_c = (-r) * (m_D + times_skew(m_q, W.a));
+    const Mat3<N> k_al = cross_columns(z.centre, f_c) - skew(s.f) + m_c;
+    const Mat3<N> d_la = times_skew(f_q, z.centre) - r * f_o, m_v = (-r) * m_q;
+    out.k[1][1] += f_c;
+    out.k[1][0] = out.k[1][0] - times_skew(f_c, z.centre);
+    out.k[0][1] += k_al;
+    out.k[0][0] = out.k[0][0] - times_skew(k_al, z.centre);
+    out.d[1][1] = out.d[1][1] - f_q;
+    out.d[1][0] += d_la;
+    out.d[0][1] += m_v - cross_columns(z.centre, f_q);
+    out.d[0][0] += cross_columns(z.centre, d_la) - times_skew(m_v, z.centre) - (r * r) * m_o;
   }
 }
 

@@ -8,7 +8,6 @@
 #include "kernels/model_view.hpp"
 #include "kernels/pair_contact.hpp"
 #include "kernels/so3.hpp"
-#include "kernels/sphere_contact.hpp"
 
 namespace tangere::kernels {
 
@@ -30,23 +29,22 @@ struct LinkScratch {
   Vec6<N> psi_dot[3], psi_ddot[3], s_dot[3];  ///< per dof: Ψ̇ = Vp × S, Ψ̈ = Ap × S + Vp × Ψ̇, Ṡ = V × S
 };
 
-/// Scratch of one contact pair: relative motion and sums. Ground contacts use `sums` alone.
+/// Scratch of a pair of links: relative motion and sums over all their shapes. Grounded links use `sums` alone.
 template <class N>
 struct ContactScratch {
   Frame<N> link2_in_1;  ///< G of the links
-  Frame<N> shape_in_1;  ///< G of the shape
   Vec6<N> Z;            ///< twist of body 2 in body 1's axes, at its origin
   Vec6<N> W;            ///< Z - V₁
   PairSums<N> sums;     ///< valid where `near`
   bool near;            ///< some lane has a candidate, or a point in the ground; else nothing is added anywhere
 };
 
-/// Candidate points of a pair, per lane, and the pose they were found at.
+/// Candidate points of a pair, per lane, and the pose they were found at, which all pairs of the same links share.
 template <class N>
 struct CandidateList {
   const N* points;    ///< (count, 3) in body 1's axes; lanes with fewer hold far points
   int count;
-  const N* reference; ///< (12) shape_in_1 when the list was made: R row-major, then p
+  const N* reference; ///< (12) link2_in_1 when the list was made: R row-major, then p
   double margin;      ///< a point missing from the list was at least this far away [m]
   const double* own;  ///< (3, stride) candidates of the lane that is evaluated alone, padded to eights with far points
   int own_count, stride;
@@ -76,7 +74,7 @@ struct StageArgs {
   int lone;          ///< the only lane whose result matters: its contacts are summed across points; -1: all do
   // scratch
   LinkScratch<N>* links;        ///< (n_links)
-  ContactScratch<N>* contacts;  ///< (n_pairs + n_grounds)
+  ContactScratch<N>* contacts;  ///< (n_link_pairs + n_grounded)
   JointColumns<N>* columns;     ///< (2 n_links) motion columns of a pair
   // results
   N* v;              ///< (nv)

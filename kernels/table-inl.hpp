@@ -26,7 +26,7 @@ struct StageTable {
   static const N* view(const RowOf* p) { return reinterpret_cast<const N*>(p); }
 
   static std::size_t scratch_bytes(const ModelView& m) {
-    return sizeof(LinkScratch<N>) * m.n_links + sizeof(ContactScratch<N>) * (m.n_pairs + m.n_grounds) +
+    return sizeof(LinkScratch<N>) * m.n_links + sizeof(ContactScratch<N>) * (m.n_link_pairs + m.n_grounded) +
            sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links + 4 * alignof(N);
   }
 
@@ -39,7 +39,7 @@ struct StageTable {
     };
     StageArgs<N> a;
     a.links = take(static_cast<LinkScratch<N>*>(nullptr), m.n_links);
-    a.contacts = take(static_cast<ContactScratch<N>*>(nullptr), m.n_pairs + m.n_grounds);
+    a.contacts = take(static_cast<ContactScratch<N>*>(nullptr), m.n_link_pairs + m.n_grounded);
     a.columns = take(static_cast<JointColumns<N>*>(nullptr), 2 * m.n_links);
     auto* lists = take(static_cast<CandidateList<N>*>(nullptr), m.n_pairs);
     for (int k = 0; k < m.n_pairs; ++k) {
@@ -69,15 +69,9 @@ struct StageTable {
     return a;
   }
 
-  static void kinematics_lanes(const ModelView& m, const StageOf& s, RowOf* poses) {
-    const StageArgs<N> a = arguments(m, s, -1);
-    kinematics(m, a);
-    for (int k = 0; k < m.n_pairs; ++k) {
-      const Frame<N>& x = a.contacts[k].shape_in_1;
-      N* row = view(poses + 12 * k);
-      for (int i = 0; i < 9; ++i) row[i] = x.R.m[i / 3][i % 3];
-      row[9] = x.p.x, row[10] = x.p.y, row[11] = x.p.z;
-    }
+  static void kinematics_lanes(const ModelView& m, const StageOf& s) { kinematics(m, arguments(m, s, -1)); }
+  static void near_pairs_lanes(const ModelView& m, const StageOf& s, NearPairs<L>& out) {
+    near_pairs(m, arguments(m, s, -1), out);
   }
   static void residual_lanes(const ModelView& m, const StageOf& s, int lone) {
     residual<false>(m, arguments(m, s, lone));
@@ -113,8 +107,8 @@ struct StageTable {
     solve_watched(m.pattern, view(s.A), view(s.LU), view(b), view(out), view(sound), view(s.work));
   }
   static constexpr StageKernels<L> make() {
-    return {scratch_bytes,         kinematics_lanes,    residual_lanes, evaluate_lanes, set_weights_lanes, set_floor_lanes,
-            scaled_residual_lanes, weighted_norm_lanes, factor_lanes,   solve_lanes,    solve_watched_lanes};
+    return {scratch_bytes,     kinematics_lanes, near_pairs_lanes,      residual_lanes,      evaluate_lanes, set_weights_lanes,
+            set_floor_lanes, scaled_residual_lanes, weighted_norm_lanes, factor_lanes, solve_lanes,    solve_watched_lanes};
   }
 };
 

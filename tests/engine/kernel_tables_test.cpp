@@ -102,20 +102,20 @@ void compare_tables(const Scene& scene, unsigned seed) {
           for (int i = 0; i < m->nv; ++i) w.stage.x[i][l] = poison;
           for (int i = 0; i < m->nq; ++i) w.stage.centre[i][l] = poison;
         }
-        table->group.kinematics(m->view, w.stage, w.poses);
+        table->group.kinematics(m->view, w.stage);
         table->group.evaluate(m->view, w.stage, -1);
         const Outputs o = outputs(w, *m, lane);
         if (first.g.empty()) first = o;
         // The residual without its Jacobian, and a lane evaluated alone across points: the same bits.
-        table->group.kinematics(m->view, w.stage, w.poses);
+        table->group.kinematics(m->view, w.stage);
         table->group.residual(m->view, w.stage, -1);
         EXPECT_EQ(outputs(w, *m, lane).g, o.g);
-        table->group.kinematics(m->view, w.stage, w.poses);
+        table->group.kinematics(m->view, w.stage);
         table->group.evaluate(m->view, w.stage, lane);
         const Outputs alone = outputs(w, *m, lane);
         EXPECT_EQ(alone.g, o.g);
         EXPECT_EQ(alone.A, o.A);
-        table->group.kinematics(m->view, w.stage, w.poses);
+        table->group.kinematics(m->view, w.stage);
         table->group.residual(m->view, w.stage, lane);
         EXPECT_EQ(outputs(w, *m, lane).g, o.g);
         EXPECT_EQ(o.g, first.g);  // same bits in any lane, whatever the neighbours hold
@@ -126,7 +126,7 @@ void compare_tables(const Scene& scene, unsigned seed) {
     list_everything(*m, single);
     set_constants(single);
     fill_lane(single, *m, b, 0);
-    table->single.kinematics(m->view, single.stage, single.poses);
+    table->single.kinematics(m->view, single.stage);
     table->single.evaluate(m->view, single.stage, 0);
     const Outputs own = outputs(single, *m, 0);
     EXPECT_EQ(own.g, first.g);

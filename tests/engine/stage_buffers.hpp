@@ -20,7 +20,7 @@ class StageBuffers {
     for (auto* v : {&x, &r, &s, &tau, &target, &v_out, &g, &force_scale, &mass}) v->assign(nv, N(0.0));
     A.assign(entries, N(0.0));
     links_.resize(m.links.size());
-    contacts_.resize(m.pairs.size() + m.grounds.size());
+    contacts_.resize(m.link_pairs.size() + m.grounded.size());
     columns_.resize(2 * m.links.size());
     excess_.assign(1, N(0.0));
     for (const kernels::PairContact& p : m.pairs) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "kernels/dual.hpp"
+#include "kernels/face_contact.hpp"
 #include "kernels/pair_contact.hpp"
 #include "kernels/sphere_contact.hpp"
 #include "tests/kernels/random_numbers.hpp"
@@ -256,53 +257,71 @@ TEST(GroundContact, DerivativesMatchDualNumbersForPointsAndSpheres) {
       }
 }
 
-/// The sums about the sphere's centre, brought to body 1's origin, against the general sums of the same points.
-class SphereDerivative : public PairDerivative {};
-TEST_P(SphereDerivative, SumsAboutTheCentreAreTheSums) {
+/// Sums in products, chunk by chunk, against the general sums of the same points.
+template <class Motion>
+void expect_same_sums(const Motion& motion, const State& s, const std::vector<Vec3<double>>& xi,
+                      const PairSums<double>& general) {
+  PairSums<double> finished = PairSums<double>::zero(), values = finished;
+  typename Motion::Sums sums, forces;
+  clear<true>(sums);
+  clear<false>(forces);
+  PointChunk<typename Motion::Point> chunk;
+  for (std::size_t k = 0; k < xi.size(); k += 6) {
+    fill_chunk<true>(motion, s.law, &xi[k], 6, chunk);
+    add_chunk<true>(sums, chunk);
+    fill_chunk<false>(motion, s.law, &xi[k], 6, chunk);
+    add_chunk<false>(forces, chunk);
+  }
+  const Vec6<double> W = {s.omega, s.v};
+  if constexpr (std::is_same_v<Motion, SphereMotion<double>>) {
+    add_finished<true>(motion, W, sums, finished);
+    add_finished<false>(motion, W, forces, values);
+  } else {
+    add_finished<true>(W, sums, finished);
+    add_finished<false>(W, forces, values);
+  }
+  const auto close = [](const double* a, const double* b, int count) {
+    double scale = 1e-300;
+    for (int i = 0; i < count; ++i) scale = std::max(scale, std::abs(b[i]));
+    for (int i = 0; i < count; ++i) EXPECT_NEAR(a[i], b[i], 2e-12 * scale) << i;
+  };
+  close(&finished.wrench.l.x, &general.wrench.l.x, 3);
+  close(&finished.wrench.a.x, &general.wrench.a.x, 3);
+  EXPECT_EQ(values.wrench.l.x, finished.wrench.l.x);
+  EXPECT_EQ(values.wrench.a.z, finished.wrench.a.z);
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j) {
+      SCOPED_TRACE(std::to_string(i) + std::to_string(j));
+      close(&finished.k[i][j].m[0][0], &general.k[i][j].m[0][0], 9);
+      close(&finished.d[i][j].m[0][0], &general.d[i][j].m[0][0], 9);
+    }
+}
+
+class ProductSumsOf : public PairDerivative {};
+TEST_P(ProductSumsOf, PointsAreTheGeneralSums) {
   const Case test = GetParam();
   Random random(7);
   for (int trial = 0; trial < 200; ++trial) {
     const State s = random_state(random, test);
-    const SphereDistance<double> shape{0.02};
-    const SphereMotion<double> motion = sphere_motion(s.c, {s.omega, s.v}, 0.02);
-    PairSums<double> general = PairSums<double>::zero(), finished, values;
-    SphereSums<double> centred, forces;
-    clear<true>(centred);
-    clear<false>(forces);
-    SphereChunk<double> chunk;
-    for (int part = 0; part < 2; ++part) {
-      Vec3<double> xi[6];
-      for (int k = 0; k < 6; ++k) {
-        // Some of them outside, most inside; the state's own point first, then others over the sphere.
-        xi[k] = k + part == 0 ? s.xi : s.c + (0.02 - 1e-3 * random.uniform(-0.3, 1)) * random.direction();
-        accumulate<true>(general, shape, s.law, s.Q, s.c, s.omega, s.v, xi[k]);
+    with_distance<double>(test.shape, size_of(test.shape), [&]<template <class> class Shape>(const Shape<double>& shape) {
+      PairSums<double> general = PairSums<double>::zero();
+      std::vector<Vec3<double>> xi;
+      for (int k = 0; k < 12; ++k) {
+        // Some of them outside, most inside; the state's own point first, then others under the surface.
+        const double depth = 1e-3 * random.uniform(-0.3, 1);
+        xi.push_back(k == 0 ? s.xi : s.c + s.Q * point_under(test.shape, random, depth));
+        accumulate<true>(general, shape, s.law, s.Q, s.c, s.omega, s.v, xi.back());
       }
-      fill_chunk<true>(motion, s.law, xi, 6, chunk);
-      add_chunk<true>(centred, chunk);
-      fill_chunk<false>(motion, s.law, xi, 6, chunk);
-      add_chunk<false>(forces, chunk);
-    }
-    finish_sphere<true>(motion, s.omega, centred, finished);
-    finish_sphere<false>(motion, s.omega, forces, values);
-    const auto close = [](const double* a, const double* b, int count) {
-      double scale = 1e-300;
-      for (int i = 0; i < count; ++i) scale = std::max(scale, std::abs(b[i]));
-      for (int i = 0; i < count; ++i) EXPECT_NEAR(a[i], b[i], 2e-12 * scale) << i;
-    };
-    close(&finished.wrench.l.x, &general.wrench.l.x, 3);
-    close(&finished.wrench.a.x, &general.wrench.a.x, 3);
-    EXPECT_EQ(values.wrench.l.x, finished.wrench.l.x);
-    EXPECT_EQ(values.wrench.a.z, finished.wrench.a.z);
-    for (int i = 0; i < 2; ++i)
-      for (int j = 0; j < 2; ++j) {
-        SCOPED_TRACE(std::to_string(i) + std::to_string(j));
-        close(&finished.k[i][j].m[0][0], &general.k[i][j].m[0][0], 9);
-        close(&finished.d[i][j].m[0][0], &general.d[i][j].m[0][0], 9);
+      if constexpr (Shape<double>::kBending == Bending::ball) {
+        expect_same_sums(sphere_motion(s.c, {s.omega, s.v}, shape.radius), s, xi, general);
+      } else if constexpr (!std::is_same_v<Shape<double>, CapsuleDistance<double>>) {
+        expect_same_sums(FaceMotion<Shape, double>{{s.Q, s.c}, {s.omega, s.v}, shape}, s, xi, general);
       }
+    });
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Laws, SphereDerivative, ::testing::ValuesIn(laws_and_shapes(1)));
+INSTANTIATE_TEST_SUITE_P(Laws, ProductSumsOf, ::testing::ValuesIn(laws_and_shapes(4)));
 
 }  // namespace
 }  // namespace tangere
