@@ -22,6 +22,7 @@ struct DualStage::Impl {
   std::vector<kernels::PairContact> pairs;
   std::vector<kernels::GroundContact> grounds;
   std::vector<kernels::DofEffects> effects;
+  std::vector<kernels::Link> bodies;   ///< links with the environment's masses
   std::vector<Parameter> origin;       ///< of every row
   std::vector<int> number;             ///< of every row: which number it is
   std::vector<double> block;           ///< (rows, 16)
@@ -39,7 +40,7 @@ struct DualStage::Impl {
   std::vector<kernels::CandidateList<D>> lists;
 
   explicit Impl(const CompiledModel& model) : m(model), view(model.view), pairs(model.pairs), grounds(model.grounds),
-                                              effects(model.dof_effects) {
+                                              effects(model.dof_effects), bodies(model.links) {
     const auto row = [this](Parameter& p, int which) {
       origin.push_back(p);
       number.push_back(which);
@@ -57,6 +58,8 @@ struct DualStage::Impl {
       row(e.armature, -1);
       row(e.limit_stiffness, -1);
     }
+    for (kernels::Link& link : bodies) link.inertia_row = -1;
+    view.links = bodies.data();
     view.pairs = pairs.data();
     view.grounds = grounds.data();
     view.effects = effects.data();
@@ -104,7 +107,7 @@ struct DualStage::Impl {
 
   /// g and A are linear in masses: what the tangents of masses weigh, without contacts, motors and effects.
   void weigh(const kernels::StageArgs<D>& a, std::vector<D>& g, D* entries) {
-    std::vector<kernels::Link> light = m.links;
+    std::vector<kernels::Link> light = bodies;
     for (std::size_t k = 0; k < light.size(); ++k) {
       const double* n = &inertia[k * kernels::kInertiaNumbers];
       light[k].massive = true;
@@ -169,6 +172,15 @@ void DualStage::set_numbers(const double* column, std::span<const double> tangen
     const Parameter& p = i.origin[k];
     i.block[k * kBlock] = p.row < 0 ? p.value : column[p.row * kBlock];
     i.block[k * kBlock + 1] = tangents.empty() || i.number[k] < 0 ? 0 : tangents[std::size_t(i.number[k])];
+  }
+  for (std::size_t k = 0; k < i.bodies.size(); ++k) {
+    const int first = i.m.links[k].inertia_row;
+    if (first < 0) continue;
+    const auto row = [&](int n) { return column[(first + n) * kBlock]; };
+    kernels::Link& link = i.bodies[k];
+    link.mass = row(0);
+    link.moment = {row(1), row(2), row(3)};
+    link.inertia = {{{row(4), row(5), row(6)}, {row(5), row(7), row(8)}, {row(6), row(8), row(9)}}};
   }
   const auto first = std::size_t(kernels::kContactNumbers * (i.view.n_pairs + i.view.n_grounds));
   for (std::size_t k = 0; k < i.inertia.size(); ++k) i.inertia[k] = tangents.empty() ? 0 : tangents[first + k];

@@ -80,16 +80,14 @@ void adjoint_outward(const ModelView& model, const StageArgs<N>& a, const Adjoin
     if (link.parent >= 0) o.twist += motion_to_child(link, s.local, d.links[link.parent].twist);
     o.by_v = o.by_a = zero6<N>();
     if (!link.massive) continue;
-    const N mass(link.mass);
+    const LinkInertia<N> own = load_inertia<N>(link, a.block, a.group);
     if (link.still) {
-      o.by_a.l = mass * o.twist.l;
+      o.by_a.l = own.mass * o.twist.l;
       continue;
     }
-    const Vec3<N> moment = broadcast<N>(link.moment);
-    const Mat3<N> inertia = broadcast<N>(link.inertia);
-    o.by_a = inertia_times(mass, moment, inertia, o.twist);
-    o.by_v = -(cross_wrench(o.twist, inertia_times(mass, moment, inertia, s.V)) +
-               inertia_times(mass, moment, inertia, cross_motion(s.V, o.twist)));
+    const auto times = [&](const Vec6<N>& x) { return inertia_times(own.mass, own.moment, own.inertia, x); };
+    o.by_a = times(o.twist);
+    o.by_v = -(cross_wrench(o.twist, times(s.V)) + times(cross_motion(s.V, o.twist)));
   }
 }
 
