@@ -24,5 +24,6 @@ Command add_simulate(CLI::App& program);
 Command add_generate(CLI::App& program);
 Command add_plot(CLI::App& program);
 Command add_bench(CLI::App& program);
+Command add_gradcheck(CLI::App& program);
 
 }  // namespace tangere::apps

@@ -127,6 +127,33 @@ double& Parameters::in(Scene& scene, int k) const {
   return e.field == 2 ? scene.motors[at].P : scene.motors[at].D;
 }
 
+int Parameters::randomization(const Scene& scene, int k) const {
+  const Entry& e = entries_[std::size_t(k)];
+  const auto at = static_cast<std::size_t>(e.index);
+  const auto follows = [&](const RandomizationDescription& r) {
+    const bool same_field = static_cast<int>(r.field) == e.field;
+    switch (e.place) {
+      case Place::pair:
+        return r.target == RandomTarget::pair_contact && same_field && r.name == scene.pair_contacts[at].general_body &&
+               r.second_name == scene.pair_contacts[at].primitive_body;
+      case Place::ground:
+        return r.target == RandomTarget::ground_contact && same_field && r.name == scene.ground_contacts[at].body;
+      case Place::sensor: return r.target == RandomTarget::tactile && same_field && r.name == scene.sensors[at].name;
+      case Place::body: return r.target == RandomTarget::density && r.name == scene.links[at].body.name;
+      case Place::joint:
+        return r.target == RandomTarget::joint_effect && r.name == scene.links[at].joint.name &&
+               r.joint_field == (e.field == 0 ? JointField::damping : JointField::stiffness);
+      case Place::turning: return false;
+      case Place::motor: break;
+    }
+    return r.target == RandomTarget::motor && r.name == scene.motors[at].joint &&
+           r.joint_field == (e.field == 2 ? JointField::P : JointField::D);
+  };
+  for (std::size_t i = scene.randomizations.size(); i-- > 0;)  // the last one holds
+    if (follows(scene.randomizations[i])) return static_cast<int>(i);
+  return -1;
+}
+
 void Parameters::gradient(const BlockCotangent& cotangent, int lane, std::span<double> out) const {
   for (std::size_t k = 0; k < entries_.size(); ++k) {
     double sum = 0;

@@ -26,6 +26,8 @@ class Parameters {
   [[nodiscard]] int count() const { return static_cast<int>(infos_.size()); }
   /// Where number k stands in a scene that the model could have been compiled from.
   [[nodiscard]] double& in(Scene& scene, int k) const;
+  /// Which of a scene's randomisations (Scene::randomizations) number k follows; -1: none, it is the scene's.
+  [[nodiscard]] int randomization(const Scene& scene, int k) const;
   /// Derivatives of a loss by all of them, (count), for one lane of a block whose Adjoint was made with parameters.
   void gradient(const BlockCotangent& cotangent, int lane, std::span<double> out) const;
   /// The other way: how the rows of BlockCotangent::parameters change when these numbers, (count), change so.
