@@ -22,6 +22,7 @@ class GradientBlock {
   void run(Batch& batch, int block, const StepControls& controls, std::span<double> u, GradientSummary& out,
            std::vector<FailedEnvironment>& failures);
 
+  void clear_counts() { newton_iterations_ = recomputed_steps_ = 0; }
   [[nodiscard]] std::int64_t newton_iterations() const { return newton_iterations_; }
   [[nodiscard]] std::int64_t recomputed_steps() const { return recomputed_steps_; }
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -43,9 +44,26 @@ struct GradientSummary {
   std::int64_t recomputed_steps = 0;        ///< of blocks, from checkpoints
 };
 
-/// Gradients of every loss over `steps` steps from the states of `start`, which is not changed. The same bits for any number
-/// of threads and whatever tape_bytes. Throws InputError for steps or threads below 1 and for a tape_bytes that does not hold
-/// the states of two steps.
+/// Owns the threads and their scratch: for many rollouts of one model, as in a descent.
+class GradientRollouts {
+ public:
+  /// `losses` must outlive it. Throws InputError for steps or threads below 1 and for a tape_bytes that does not hold the
+  /// states of a rollout with checkpoints.
+  GradientRollouts(const Model& model, const GradientOptions& options, std::span<const RolloutLoss* const> losses);
+  ~GradientRollouts();
+  GradientRollouts(GradientRollouts&&) noexcept;
+  GradientRollouts& operator=(GradientRollouts&&) noexcept;
+
+  /// Gradients of every loss over `steps` steps from the states of `start`, which is not changed. The same bits for any
+  /// number of threads and whatever tape_bytes.
+  GradientSummary run(const Batch& start, const StepControls& controls);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// The same, once.
 GradientSummary rollout_gradients(const Batch& start, const StepControls& controls, const GradientOptions& options,
                                   std::span<const RolloutLoss* const> losses);
 
