@@ -10,7 +10,6 @@
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/scene_run.hpp"
-#include "io/nearest_name.hpp"
 #include "tasks/gradient_check.hpp"
 #include "tasks/losses.hpp"
 
@@ -30,14 +29,9 @@ struct Options {
 };
 
 /// As given; tactile where there is a sensor, else the final state.
-LossKind loss_named(const std::string& name, const Model& model) {
-  if (name.empty()) return model.sensors().empty() ? LossKind::final_state : LossKind::tactile;
-  std::vector<std::string> names;
-  for (const LossKind value : loss_kinds()) {
-    names.emplace_back(to_string(value));
-    if (names.back() == name) return value;
-  }
-  throw InputError("unknown loss '" + name + "'" + suggestion(name, names));
+LossKind loss_of(const std::string& name, const Model& model) {
+  if (!name.empty()) return loss_named(name);
+  return model.sensors().empty() ? LossKind::final_state : LossKind::tactile;
 }
 
 /// A run of the scene's own length, or of a hundred steps where that is longer or has no end.
@@ -83,7 +77,7 @@ int run(const Options& o, const Console& console) {
   options.entries = o.entries.value_or(kDefaultEntries);
   options.seed = o.seed.value_or(0);
   options.stepper.tolerance = std::min(model.solver().tolerance, kTolerance);
-  const LossKind kind = loss_named(o.loss, model);
+  const LossKind kind = loss_of(o.loss, model);
   RolloutOptions rollout;
   rollout.every = o.every.value_or(0);
   int every = 1;

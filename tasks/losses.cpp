@@ -100,6 +100,17 @@ const char* to_string(LossKind value) {
   return "unknown";
 }
 
+const char* loss_meaning(LossKind value) {
+  switch (value) {
+    case LossKind::final_state: return "half the squares of the last state, positions from where the scene starts, number by number";
+    case LossKind::path: return "half the squares of all velocities, summed over steps";
+    case LossKind::tactile: return "half the squares of all tactile forces, summed over fields";
+    case LossKind::shear: return "half the squares of all shear forces, summed over fields";
+    case LossKind::variables: return "half the squares of the end effectors' last positions";
+  }
+  return "";
+}
+
 const std::vector<LossKind>& loss_kinds() {
   static const std::vector<LossKind> kinds = {LossKind::final_state, LossKind::path, LossKind::tactile, LossKind::shear,
                                               LossKind::variables};

@@ -18,6 +18,8 @@ enum class LossKind {
   variables,    ///< ½ |x|² of all end effectors after the last step
 };
 const char* to_string(LossKind value);
+/// In words, for files.
+const char* loss_meaning(LossKind value);
 /// Every kind, in the order in which they are listed.
 const std::vector<LossKind>& loss_kinds();
 
