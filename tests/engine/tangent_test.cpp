@@ -5,6 +5,7 @@
 
 #include "engine/readout.hpp"
 #include "engine/readout_pullback.hpp"
+#include "engine/step_jacobian.hpp"
 #include "engine/tangent.hpp"
 #include "tests/engine/gradient_run.hpp"
 #include "tests/engine/random_machine.hpp"
@@ -182,6 +183,50 @@ TEST_P(TangentScheme, RollingBallHasTheSameProducts) {
   const Products p = products(model, options, in, 3, 5);
   EXPECT_GT(p.size, 0);
   EXPECT_NEAR(p.forward, p.backward, 1e-12 * p.size);
+}
+
+/// Jacobians of single steps times a direction are its tangents.
+TEST_P(TangentScheme, StepJacobiansTimesDirectionsAreTangents) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    const Scene scene = testing::random_machine(seed, 3);
+    const Model model(scene);
+    const StepperOptions options = testing::options(GetParam(), scene.timestep, 1e-11);
+    const RunInput in = random_input(model, seed, 4);
+    Batch batch(model, 1);
+    batch.set_state(0, in.q, in.v);
+    Stepper stepper(model, options);
+    BlockTape tape(model, stepper.integrator(), 4);
+    tape.start(batch, 0);
+    for (const auto& u : in.u) stepper.step_block(batch, 0, u, &tape);
+    Random random(seed);
+    const auto nv = std::size_t(model.nv()), nu = std::size_t(model.nu());
+    StateTangent s{normals(random, nv), normals(random, nv), normals(random, nv), normals(random, nv)};
+    const std::vector<double> u_dot = normals(random, nu);
+    StepJacobians jacobians(model, options);
+    jacobians.evaluate(batch, 0, tape, 2, in.u[2]);
+    StepJacobian J;
+    jacobians.get(0, J);
+    std::vector<double> expected(2 * nv), size(2 * nv);
+    for (std::size_t i = 0; i < 2 * nv; ++i) {
+      const auto add = [&](double entry, double along) {
+        expected[i] += entry * along;
+        size[i] += std::abs(entry * along);
+      };
+      for (std::size_t k = 0; k < nv; ++k) {
+        add(J.state[i * 2 * nv + k], s.q[k]);
+        add(J.state[i * 2 * nv + nv + k], s.v[k]);
+        add(J.previous[i * 2 * nv + k], s.previous_q[k]);
+        add(J.previous[i * 2 * nv + nv + k], s.previous_v[k]);
+      }
+      for (std::size_t k = 0; k < nu; ++k) add(J.u[i * nu + k], u_dot[k]);
+    }
+    Tangent tangent(model, options);
+    tangent.step(batch, 0, 0, tape, 2, in.u[2], u_dot, {}, s);
+    for (std::size_t i = 0; i < nv; ++i) {
+      EXPECT_NEAR(expected[i], s.q[i], 1e-9 * size[i]) << "seed " << seed;
+      EXPECT_NEAR(expected[nv + i], s.v[i], 1e-9 * size[nv + i]) << "seed " << seed;
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(All, TangentScheme,
