@@ -45,7 +45,7 @@ void BlockTape::append(const Batch& batch, int block) {
   copy(batch, block, model_.compiled().layout.q, slot(++steps_));
   for (int l = 0; l < kBlock; ++l) {
     const int e = block * kBlock + l;
-    if (e < batch.environments() && !failed(batch.status(e))) taken_[std::size_t(l)] = steps_;
+    if (e < batch.environments() && !failed(batch.status(e)) && !batch.held(e)) taken_[std::size_t(l)] = steps_;
   }
 }
 

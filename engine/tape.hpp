@@ -37,7 +37,7 @@ class BlockTape {
 
   /// Begins anew with the states of a block. Steps are counted from here on.
   void start(const Batch& batch, int block);
-  /// Adds the states that a block has now. Lanes that have failed keep theirs.
+  /// Adds the states that a block has now. Lanes that have failed or are held keep theirs.
   void append(const Batch& batch, int block);
   /// Where the inner stages of the step that will be appended next go, rows (nv, 16); null when the scheme has none.
   [[nodiscard]] double* next_x_gamma();

@@ -66,6 +66,9 @@ GradientRollouts& GradientRollouts::operator=(GradientRollouts&&) noexcept = def
 
 GradientSummary GradientRollouts::run(const Batch& start, const StepControls& controls) {
   Impl& i = *impl_;
+  if (&start.model().compiled() != &i.model.compiled())
+    throw InputError("a batch of scene '" + start.model().scene().name + "' for gradients of a model of scene '" +
+                     i.model.scene().name + "'; expected the same Model");
   GradientSummary out = empty_summary(i.model, start.environments(), i.options, i.losses);
   Batch batch = start;
   std::vector<double> u(std::size_t(start.environments()) * std::size_t(i.model.nu()));

@@ -55,7 +55,7 @@ class GradientRollouts {
   GradientRollouts& operator=(GradientRollouts&&) noexcept;
 
   /// Gradients of every loss over `steps` steps from the states of `start`, which is not changed. The same bits for any
-  /// number of threads and whatever tape_bytes.
+  /// number of threads and whatever tape_bytes. Throws InputError when `start` is of another Model.
   GradientSummary run(const Batch& start, const StepControls& controls);
 
  private:

@@ -106,7 +106,7 @@ struct RunGradient {
 
 /// Of environment `lane` among `inputs`, which run together.
 inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& options, const std::vector<RunInput>& inputs,
-                                  const StateLoss& loss, int lane, int* split_steps = nullptr) {
+                                  const StateLoss& loss, int lane) {
   const int count = static_cast<int>(inputs.size()), steps = static_cast<int>(inputs[0].u.size());
   Batch batch(model, count);
   for (int e = 0; e < count; ++e) batch.set_state(e, inputs[std::size_t(e)].q, inputs[std::size_t(e)].v);
@@ -118,7 +118,6 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
     u.emplace_back();
     for (const RunInput& in : inputs) u.back().insert(u.back().end(), in.u[std::size_t(t)].begin(), in.u[std::size_t(t)].end());
     stepper.step_block(batch, 0, u.back(), &tape);
-    if (split_steps != nullptr) *split_steps += batch.status(lane) == StepStatus::split;
   }
   Adjoint adjoint(model, options, {1, true});
   adjoint.clear();

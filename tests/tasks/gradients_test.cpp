@@ -74,6 +74,22 @@ TEST(Gradients, TapesThatAreTooSmallAreRefused) {
   EXPECT_THROW(gradients(model, 1, 10, 0, 1e9), InputError);
 }
 
+/// Again and again with batches of any size; not with another model's.
+TEST(Gradients, RolloutsCanBeUsedAgain) {
+  const Model model(shipped("rolling_ball_small"));
+  const ControlProgram program(model, model.timestep(), 5);
+  const auto loss = make_loss(LossKind::shear, model, 5);
+  const RolloutLoss* const losses[] = {loss.get()};
+  GradientOptions options;
+  options.steps = 80;
+  GradientRollouts rollouts(model, options, losses);
+  const GradientSummary large = rollouts.run(Batch(model, 18, 5), controls_of(program));
+  const GradientSummary small = rollouts.run(Batch(model, 2, 5), controls_of(program));
+  const auto per = small.losses[0].u.size() / 2;
+  for (std::size_t i = 0; i < 2 * per; ++i) EXPECT_EQ(small.losses[0].u[i], large.losses[0].u[i]);
+  EXPECT_THROW(rollouts.run(Batch(Model(shipped("box_pushing")), 2), controls_of(program)), InputError);
+}
+
 /// An environment that fails is named, has finite derivatives and leaves its neighbours alone.
 TEST(Gradients, AFailureDisturbsNobody) {
   const Model model(shipped("rolling_ball_small"));
