@@ -50,6 +50,9 @@ void print(const Console& console, const GradientCheck& check) {
   for (const CheckedInput& c : check.inputs)
     console.print(fmt::format("{:<8} {:>7} {:>8} {:>6} {:>12.4e} {:>12.1e} {:>12.1e}  {}", c.name, c.entries, c.compared, c.kinks,
                               c.norm, c.difference_error, c.tangent_error, c.worst));
+  for (const CheckedInput& c : check.inputs)
+    if (!c.influence)
+      console.note(fmt::format("{} do not act on this loss here: nothing to compare", c.name));
   console.print(fmt::format("largest error {:.1e} of a gradient's norm, {} derivatives compared with differences, {} kinks",
                             check.max_relative_error(), check.entries(), check.kinks()));
 }
@@ -61,6 +64,7 @@ Json json_of(const GradientCheck& check) {
                       {"size", c.entries},
                       {"entries", c.compared},
                       {"kinks", c.kinks},
+                      {"influence", c.influence},
                       {"norm", c.norm},
                       {"difference_error", c.difference_error},
                       {"worst", c.worst},

@@ -69,6 +69,8 @@ class Batch {
   [[nodiscard]] std::span<const double> residuals() const { return {residual_.data(), std::size_t(environments_)}; }
   [[nodiscard]] int failed_count() const;
 
+  /// Whether the next step continues a run: the state one step before is known.
+  [[nodiscard]] bool has_history(int environment) const { return has_history_[std::size_t(environment)] != 0; }
   /// A block as it is, and back to that.
   [[nodiscard]] BlockState save_block(int block) const;
   void restore_block(int block, const BlockState& state);

@@ -20,7 +20,8 @@ using kernels::kBlock;
 
 constexpr int kLevels = 8;          // step sizes, each a quarter of the one before: ±, 16 environments
 constexpr double kLargest = 1e-3;   // of the first, times the input's scale
-constexpr double kSettled = 3e-6;   // of the gradient's norm: two neighbouring step sizes agree so far, or there is a kink
+constexpr double kSettled = 3e-6;   // of the gradient's norm: neighbouring step sizes agree so far, or there is a kink
+constexpr double kNoInfluence = 1e-10;  // of the loss: an input whose derivatives are all smaller does not act on it
 constexpr double kControlScale = 10, kVelocityScale = 10;  // controls and velocities change more than positions
 
 /// The inputs of one rollout.
@@ -103,19 +104,22 @@ std::vector<double> losses_of(const Setting& s, const Model& model, const std::v
   return sums;
 }
 
-/// The central difference at which two neighbouring step sizes agree best, and how well.
+/// The central difference at which three neighbouring step sizes agree best, and how well.
 struct Difference {
   double value = NAN, doubt = HUGE_VAL;
 };
 Difference best_of(const std::array<double, kLevels>& ahead, const std::array<double, kLevels>& behind, double scale) {
-  Difference best;
-  double before = NAN, step = kLargest * scale, coarse = NAN;
+  std::array<double, kLevels> values{};  // the error of second order taken out; none at the first
+  double step = kLargest * scale, coarse = NAN;
   for (std::size_t k = 0; k < kLevels; ++k, step *= 0.25) {
     const double central = (ahead[k] - behind[k]) / (2 * step);
-    const double value = (16 * central - coarse) / 15;  // the error of second order taken out
+    values[k] = (16 * central - coarse) / 15;
     coarse = central;
-    if (std::abs(value - before) < best.doubt) best = {value, std::abs(value - before)};
-    before = value;
+  }
+  Difference best;
+  for (std::size_t k = 2; k + 1 < kLevels; ++k) {
+    const double doubt = std::max(std::abs(values[k] - values[k - 1]), std::abs(values[k + 1] - values[k]));
+    if (doubt < best.doubt) best = {values[k], doubt};
   }
   return best;
 }
@@ -155,38 +159,53 @@ double norm_of(std::span<const double> x) {
   return std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0));
 }
 
-/// Which entries are compared: all, or as many as asked for, drawn.
-std::vector<std::size_t> chosen(std::size_t count, const CheckOptions& o, std::uint32_t purpose) {
-  std::vector<std::size_t> all(count);
-  std::iota(all.begin(), all.end(), std::size_t{0});
+/// Which of `all` are compared: every one, or as many as asked for, drawn.
+std::vector<std::size_t> chosen(std::vector<std::size_t> all, const CheckOptions& o, std::uint32_t purpose) {
   const auto wanted = std::size_t(o.entries);
-  if (o.entries == 0 || count <= wanted) return all;
+  if (o.entries == 0 || all.size() <= wanted) return all;
   for (std::size_t i = 0; i < wanted; ++i) {
     RandomKey key{o.seed, 0, static_cast<std::int64_t>(i), Purpose::control, purpose};
-    std::swap(all[i], all[i + std::size_t(uniform(key, 0, double(count - i) - 1e-9))]);
+    std::swap(all[i], all[i + std::size_t(uniform(key, 0, double(all.size() - i) - 1e-9))]);
   }
   all.resize(wanted);
   std::sort(all.begin(), all.end());
   return all;
 }
+std::vector<std::size_t> all_of(std::size_t count) {
+  std::vector<std::size_t> all(count);
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return all;
+}
 
+/// What is not finite is as wrong as can be.
+double finite_error(double error) { return std::isfinite(error) ? error : HUGE_VAL; }
+
+/// `among`: entries that can be moved. `loss`: what an influence is measured by.
 template <class Of, class Name>
-CheckedInput compare(const Setting& s, const char* what, std::span<const double> gradient, std::uint32_t purpose, const Of& of,
-                     const Name& name) {
+CheckedInput compare(const Setting& s, const char* what, std::span<const double> gradient, std::uint32_t purpose, double loss,
+                     const std::vector<std::size_t>& among, const Of& of, const Name& name) {
   CheckedInput c;
   c.name = what;
   c.entries = gradient.size();
   c.norm = norm_of(gradient);
-  const double scale = c.norm > 0 ? c.norm : 1;
-  for (const std::size_t i : chosen(gradient.size(), s.options, purpose)) {
-    const Difference d = of(i);
-    if (!(d.doubt <= kSettled * scale)) {
+  const std::vector<std::size_t> entries = chosen(among, s.options, purpose);
+  std::vector<Difference> differences;
+  double square = 0;
+  for (const std::size_t i : entries) {
+    differences.push_back(of(i));
+    if (std::isfinite(differences.back().value)) square += differences.back().value * differences.back().value;
+  }
+  c.scale = std::max(c.norm, std::sqrt(square));
+  if (!std::isfinite(c.norm)) c.difference_error = HUGE_VAL;
+  c.influence = !(c.scale <= kNoInfluence * std::abs(loss));
+  for (std::size_t k = 0; k < entries.size() && c.influence; ++k) {
+    if (!(differences[k].doubt <= kSettled * c.scale)) {
       ++c.kinks;
       continue;
     }
     ++c.compared;
-    const double error = std::abs(d.value - gradient[i]) / scale;
-    if (error >= c.difference_error) c.difference_error = error, c.worst = name(i);
+    const double error = finite_error(std::abs(differences[k].value - gradient[entries[k]]) / c.scale);
+    if (error >= c.difference_error) c.difference_error = error, c.worst = name(entries[k]);
   }
   return c;
 }
@@ -302,9 +321,9 @@ std::vector<double> direction(std::size_t n, std::uint64_t seed, std::uint32_t p
 }
 
 void compare_tangent(CheckedInput& c, std::span<const double> gradient, const std::vector<double>& d, double along) {
+  if (!c.influence) return;
   const double dot = std::inner_product(gradient.begin(), gradient.end(), d.begin(), 0.0);
-  const double size = c.norm * norm_of(d);
-  c.tangent_error = size > 0 ? std::abs(dot - along) / size : std::abs(along);
+  c.tangent_error = finite_error(std::abs(dot - along) / (c.scale * norm_of(d)));
 }
 
 }  // namespace
@@ -326,6 +345,8 @@ GradientCheck check_gradient(const Batch& start, const StepControls& controls, c
   const Model& model = start.model();
   const CompiledModel& m = model.compiled();
   const auto nu = std::size_t(model.nu());
+  if (start.has_history(0))
+    throw InputError("gradients are checked from a start, and this batch continues a run: what differences move has no past");
   Setting s{start, loss, options, {numbers(model.nq()), numbers(model.nv()), std::vector<double>(std::size_t(options.steps) * nu)}, {}};
   for (std::size_t k = 0; k < model.scene().randomizations.size(); ++k)
     s.varying.push_back(start.randomized_value(0, static_cast<int>(k)));
@@ -345,10 +366,12 @@ GradientCheck check_gradient(const Batch& start, const StepControls& controls, c
       v(g.v.data(), std::size_t(m.nv));
   // By relative changes of what this environment has: units differ.
   std::vector<double> has(std::size_t(parameters.count())), relative(has.size());
+  std::vector<std::size_t> given;  // not zero: there is something to change a little
   for (std::size_t k = 0; k < has.size(); ++k) {
     const int random = parameters.randomization(model.scene(), static_cast<int>(k));
     has[k] = random < 0 ? parameters.infos()[k].value : s.varying[std::size_t(random)];
     relative[k] = g.parameters[k] * has[k];
+    if (has[k] != 0) given.push_back(k);
   }
 
   GradientCheck out;
@@ -358,26 +381,26 @@ GradientCheck check_gradient(const Batch& start, const StepControls& controls, c
   };
   if (nu > 0) {
     out.inputs.push_back(compare(
-        s, "u", u, 0,
+        s, "u", u, 0, out.loss, all_of(u.size()),
         [&](std::size_t i) { return difference_of(s, kControlScale, [i](Inputs& x, double e) { x.u[i] += e; }); },
         [&](std::size_t i) { return "step " + std::to_string(i / nu) + " " + std::string(model.u_names()[i % nu]); }));
     const std::vector<double> d = direction(u.size(), options.seed, 0);
     along(u, d, tangents.along({}, {}, d, {}));
   }
   out.inputs.push_back(compare(
-      s, "q", q, 1,
+      s, "q", q, 1, out.loss, all_of(q.size()),
       [&](std::size_t i) { return difference_of(s, 1, [&, i](Inputs& x, double e) { move(m, x.q, static_cast<int>(i), e); }); },
       [&](std::size_t i) { return std::string(model.v_names()[i]); }));
   std::vector<double> d = direction(q.size(), options.seed, 1);
   along(q, d, tangents.along(d, {}, {}, {}));
   out.inputs.push_back(compare(
-      s, "v", v, 2,
+      s, "v", v, 2, out.loss, all_of(v.size()),
       [&](std::size_t i) { return difference_of(s, kVelocityScale, [i](Inputs& x, double e) { x.v[i] += e; }); },
       [&](std::size_t i) { return std::string(model.v_names()[i]); }));
   d = direction(v.size(), options.seed, 2);
   along(v, d, tangents.along({}, d, {}, {}));
   out.inputs.push_back(compare(
-      s, "numbers", relative, 3,
+      s, "numbers", relative, 3, out.loss, given,
       [&](std::size_t k) { return difference_of_number(s, parameters, static_cast<int>(k)); },
       [&](std::size_t k) { return parameters.infos()[k].name; }));
   d = direction(relative.size(), options.seed, 3);

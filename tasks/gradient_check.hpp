@@ -22,8 +22,10 @@ struct CheckedInput {
   std::string name;                ///< "u", "q", "v", "numbers"
   std::size_t entries = 0;         ///< the gradient has
   std::size_t compared = 0;        ///< with differences
-  std::size_t kinks = 0;           ///< left out: differences that do not settle
+  std::size_t kinks = 0;           ///< left out: differences that do not settle, or whose runs find no solution
   double norm = 0;                 ///< of the gradient
+  double scale = 0;                ///< what errors are measured by: that, or the norm of the differences if it is larger
+  bool influence = true;           ///< false: derivatives and differences are nothing beside the loss; nothing is compared
   double difference_error = 0;     ///< largest among those compared
   std::string worst;               ///< where
   double tangent_error = 0;        ///< |g·d - tangent|/(|g| |d|) along a random direction
@@ -37,7 +39,8 @@ struct GradientCheck {
   [[nodiscard]] std::size_t kinks() const;
 };
 
-/// Of environment 0 of `start`. Throws InputError when a step of its rollout finds no solution.
+/// Of environment 0 of `start`. Throws InputError when a step of its rollout finds no solution, and
+/// when it continues a run of a scheme of two steps.
 GradientCheck check_gradient(const Batch& start, const StepControls& controls, const RolloutLoss& loss,
                              const CheckOptions& options);
 
