@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+// Residuals, their Jacobian, and the fit: minimise ½|r(exp x)|² by (F + λ diag F) δ = −g, F = JᵀJ.
+#include "tasks/identification.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <limits>
+
+#include "engine/compiled_model.hpp"
+#include "engine/parameters.hpp"
+#include "engine/random.hpp"
+#include "engine/readout.hpp"
+
+namespace tangere {
+namespace {
+
+using Vector = Eigen::VectorXd;
+using Matrix = Eigen::MatrixXd;
+
+constexpr double kDifference = 1e-4;  // of logarithms: truncation 1e-8, roundings of a step's tolerance below
+
+/// Place of entry n of a tile among the sensor's points; -1 beyond the edge.
+int point_of(const kernels::PadTiles& pad, int tile, int n) {
+  if (pad.curved()) return n < pad.points_of(tile) ? pad.index[kernels::kTactileTile * tile + n] : -1;
+  const int row = n / kernels::kTileSide, col = n % kernels::kTileSide;
+  return row < pad.rows_of(tile) && col < pad.cols_of(tile) ? pad.first_of(tile) + row * pad.cols + col : -1;
+}
+
+std::size_t numbers_of_fields(const Model& model) {
+  std::size_t n = 0;
+  for (const SensorInfo& s : model.sensors()) n += 3 * std::size_t(s.points);
+  return n;
+}
+
+void check_run(const RecordedRun& run) {
+  if (run.every < 1 || run.steps < run.every)
+    throw InputError(fmt::format("a recording of {} steps read every {}; expected at least one reading", run.steps, run.every));
+}
+
+/// Of the scene with its sought numbers at exp(x).
+class Problem {
+ public:
+  Problem(const Scene& scene, const RecordedRun& run, const FieldSequence& recorded, const std::vector<std::string>& names)
+      : scene_(scene), run_(run), recorded_(recorded), parameters_(Model(scene)) {
+    for (const std::string& name : names) places_.push_back(place_of(name));
+    x_.resize(count());
+    for (Eigen::Index k = 0; k < count(); ++k) {
+      const double value = parameters_.in(scene_, places_[std::size_t(k)]);
+      if (!(value > 0))
+        throw InputError(fmt::format("{}: '{}' is {} at the start of the fit; expected a positive number", scene.path,
+                                     names[std::size_t(k)], value));
+      x_[k] = std::log(value);
+    }
+  }
+
+  [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(places_.size()); }
+  [[nodiscard]] const Vector& start() const { return x_; }
+
+  struct Value {
+    double misfit;    // infinite: the rollout fails there
+    Vector gradient;  // by x
+  };
+  [[nodiscard]] Value evaluate(const Vector& x) const {
+    const Model model(at(x));
+    const FieldMisfit misfit(model, recorded_);
+    const RolloutLoss* const losses[] = {&misfit};
+    GradientOptions options;
+    options.steps = run_.steps;
+    options.parameters = true;
+    const GradientSummary summary = rollout_gradients(Batch(model, 1), run_.controls, options, losses);
+    if (!summary.failures.empty()) return {std::numeric_limits<double>::infinity(), Vector::Zero(count())};
+    Value out{summary.losses[0].value[0], Vector(count())};
+    for (Eigen::Index k = 0; k < count(); ++k)  // ∂/∂ log p = p ∂/∂p
+      out.gradient[k] = std::exp(x[k]) * summary.losses[0].parameters[std::size_t(places_[std::size_t(k)])];
+    return out;
+  }
+
+  /// ∂ fields / ∂x, (numbers of the whole sequence, count).
+  [[nodiscard]] Matrix jacobian(const Vector& x) const {
+    Matrix J;
+    for (Eigen::Index k = 0; k < count(); ++k) {
+      const Vector step = kDifference * Vector::Unit(count(), k);
+      const Vector column = (fields(x + step) - fields(x - step)) / (2 * kDifference);
+      J.conservativeResize(column.size(), k + 1);
+      J.col(k) = column;
+    }
+    return J;
+  }
+  [[nodiscard]] Vector residuals(const Vector& x) const { return fields(x) - flat(recorded_); }
+
+ private:
+  [[nodiscard]] int place_of(const std::string& name) const {
+    std::string known;
+    for (int k = 0; k < parameters_.count(); ++k) {
+      const std::string& other = parameters_.infos()[std::size_t(k)].name;
+      if (other == name) return k;
+      known += (k > 0 ? ", '" : "'") + other + "'";
+    }
+    throw InputError(fmt::format("{}: no number '{}' to fit; expected one of {}", scene_.path, name, known));
+  }
+  [[nodiscard]] Scene at(const Vector& x) const {
+    Scene scene = scene_;
+    for (Eigen::Index k = 0; k < count(); ++k) parameters_.in(scene, places_[std::size_t(k)]) = std::exp(x[k]);
+    return scene;
+  }
+  [[nodiscard]] Vector fields(const Vector& x) const { return flat(simulate_fields(at(x), run_)); }
+  static Vector flat(const FieldSequence& s) {
+    Vector out(static_cast<Eigen::Index>(s.readings.size() * s.readings[0].size()));
+    Eigen::Index row = 0;
+    for (const auto& reading : s.readings)
+      for (double f : reading) out[row++] = f;
+    return out;
+  }
+
+  Scene scene_;
+  const RecordedRun& run_;
+  const FieldSequence& recorded_;
+  Parameters parameters_;
+  std::vector<int> places_;
+  Vector x_;
+};
+
+FitPoint fit_point(const Vector& x, const Problem::Value& value) {
+  FitPoint p;
+  for (Eigen::Index k = 0; k < x.size(); ++k) p.values.push_back(std::exp(x[k]));
+  p.misfit = value.misfit;
+  p.gradient = value.gradient.norm();
+  return p;
+}
+
+/// How well the numbers are known at the end of a fit.
+void judge(const Problem& problem, double misfit, const Matrix& J, Identification& out) {
+  const Eigen::Index n = problem.count();
+  out.noise = std::sqrt(2 * misfit / static_cast<double>(J.rows() - n));
+  // Without noise only roundings are left, of which there is no scale: the information is then that of unit noise.
+  const double scale = out.noise > 0 ? 1 / (out.noise * out.noise) : 1;
+  const Matrix F = scale * (J.transpose() * J);
+  const Eigen::SelfAdjointEigenSolver<Matrix> modes(F);
+  out.condition = modes.eigenvalues().maxCoeff() / modes.eigenvalues().minCoeff();
+  const Matrix covariance = F.inverse();
+  for (Eigen::Index k = 0; k < n; ++k) out.deviation.push_back(std::sqrt(covariance(k, k)));
+  out.information.assign(F.data(), F.data() + F.size());
+}
+
+}  // namespace
+
+FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run) {
+  check_run(run);
+  const Model model(scene);
+  Batch batch(model, 1);
+  Stepper stepper(model);
+  Readout readout(model);
+  std::vector<double> u(std::size_t(model.nu()));
+  FieldSequence out{run.every, {}};
+  for (std::int64_t t = 0; t < run.steps; ++t) {
+    run.controls(t, 0, u);
+    stepper.step(batch, u);
+    if (failed(batch.status(0)))
+      throw InputError(fmt::format("{}: step {} failed ({}); expected a rollout of {} steps", scene.path, t,
+                                   to_string(batch.status(0)), run.steps));
+    if ((t + 1) % run.every != 0) continue;
+    std::vector<double>& reading = out.readings.emplace_back(numbers_of_fields(model));
+    std::size_t first = 0;
+    for (std::size_t s = 0; s < model.sensors().size(); ++s) {
+      const std::size_t size = 3 * std::size_t(model.sensors()[s].points);
+      readout.tactile(batch, 0, static_cast<int>(s), std::span(reading).subspan(first, size));
+      first += size;
+    }
+  }
+  return out;
+}
+
+void add_noise(FieldSequence& sequence, double deviation, std::uint64_t seed) {
+  for (std::size_t k = 0; k < sequence.readings.size(); ++k)
+    for (std::size_t i = 0; i < sequence.readings[k].size(); ++i)
+      // Steps from 1 on: what <randomize> draws for sensors has step 0.
+      sequence.readings[k][i] +=
+          normal({seed, 0, static_cast<std::int64_t>(k) + 1, Purpose::tactile, static_cast<std::uint32_t>(i)}, 0, deviation);
+}
+
+FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded) : model_(model), recorded_(recorded) {
+  for (const auto& reading : recorded.readings) {
+    if (reading.size() != numbers_of_fields(model))
+      throw InputError(fmt::format("a recorded reading of {} numbers; expected {}, three for each tactile point of the scene",
+                                   reading.size(), numbers_of_fields(model)));
+    double sum = 0;
+    for (double f : reading) sum += 0.5 * f * f;
+    squares_.push_back(sum);
+  }
+}
+
+/// Where nothing touches, T = 0 and the share is ½ T_recorded², constant; tiles change it by ½ (T − T_recorded)² − ½ T_recorded².
+double FieldMisfit::evaluate(const LossPoint& at, const LossCotangent& out) const {
+  if (!reads_fields(at.step)) return 0;
+  const auto k = static_cast<std::size_t>(at.step / recorded_.every) - 1;
+  const double* reading = recorded_.readings[k].data();
+  double sum = squares_[k];
+  for (std::size_t s = 0; s < at.fields.size(); ++s) {
+    const CompiledSensor& sensor = model_.compiled().sensors[s];
+    const kernels::PadTiles pad = sensor.tiles();
+    const std::span<const int> tiles = at.fields[s]->tiles();
+    for (std::size_t t = 0; t < tiles.size(); ++t)
+      for (int n = 0; n < kernels::kTactileTile; ++n) {
+        const int point = point_of(pad, tiles[t], n);
+        if (point < 0) continue;
+        for (std::size_t c = 0; c < 3; ++c) {
+          const std::size_t i = (3 * t + c) * kernels::kTactileTile + std::size_t(n);
+          const double force = at.fields[s]->values()[i], measured = reading[3 * std::size_t(point) + c];
+          sum += force * (0.5 * force - measured);
+          out.fields[s][i] += force - measured;
+        }
+      }
+    reading += 3 * sensor.points();
+  }
+  return sum;
+}
+
+Identification identify(const Scene& scene, const RecordedRun& run, const FieldSequence& recorded,
+                        const IdentificationOptions& options) {
+  check_run(run);
+  if (recorded.every != run.every || static_cast<std::int64_t>(recorded.readings.size()) != run.steps / run.every)
+    throw InputError(fmt::format("a recording of {} readings, one every {} steps; expected {}, one every {}",
+                                 recorded.readings.size(), recorded.every, run.steps / run.every, run.every));
+  const Problem problem(scene, run, recorded, options.numbers);
+  Vector x = problem.start();
+  Problem::Value now = problem.evaluate(x);
+  if (!std::isfinite(now.misfit)) throw InputError(scene.path + ": the rollout fails at the start of the fit");
+  Matrix J = problem.jacobian(x);
+  Identification out;
+  out.points.push_back(fit_point(x, now));
+  const Vector by_differences = J.transpose() * problem.residuals(x);
+  out.gradient_difference = (now.gradient - by_differences).norm() / by_differences.norm();
+  double damping = 1e-2;
+  for (int iteration = 0; iteration < options.max_iterations && !out.converged;) {
+    Matrix H = J.transpose() * J;
+    H.diagonal() *= 1 + damping;
+    const Vector step = H.ldlt().solve(-now.gradient);
+    const double size = step.lpNorm<Eigen::Infinity>();
+    const Problem::Value next = problem.evaluate(x + step);
+    out.converged = size < options.tolerance;
+    ++iteration;
+    if (!(next.misfit < now.misfit)) {
+      damping *= 8;
+      continue;
+    }
+    damping /= 8;
+    x += step;
+    now = next;
+    out.points.push_back(fit_point(x, now));
+    if (!out.converged) J = problem.jacobian(x);
+  }
+  judge(problem, now.misfit, J, out);
+  return out;
+}
+
+}  // namespace tangere
