@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -19,7 +20,8 @@ namespace {
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
-constexpr double kDifference = 1e-4;  // of logarithms: truncation 1e-8, roundings of a step's tolerance below
+constexpr double kDifference = 1e-4;  // of logarithms
+constexpr double kRounding = 1e-8;    // of logarithms
 
 /// Place of entry n of a tile among the sensor's points; -1 beyond the edge.
 int point_of(const kernels::PadTiles& pad, int tile, int n) {
@@ -39,24 +41,43 @@ void check_run(const RecordedRun& run) {
     throw InputError(fmt::format("a recording of {} steps read every {}; expected at least one reading", run.steps, run.every));
 }
 
-/// Of the scene with its sought numbers at exp(x).
+std::vector<int> places_of(const Parameters& parameters, const Scene& scene, std::span<const std::string> names) {
+  std::vector<int> out;
+  std::string known;
+  for (const ParameterInfo& info : parameters.infos()) known += (known.empty() ? "'" : ", '") + info.name + "'";
+  for (const std::string& name : names) {
+    const auto infos = parameters.infos();
+    const auto at = std::find_if(infos.begin(), infos.end(), [&](const ParameterInfo& i) { return i.name == name; });
+    if (at == infos.end())
+      throw InputError(fmt::format("{}: no number '{}'; expected one of {}", scene.path, name, known));
+    out.push_back(static_cast<int>(at - infos.begin()));
+  }
+  return out;
+}
+
+/// The sequence as a function of x, logarithms of the sought numbers.
 class Problem {
  public:
   Problem(const Scene& scene, const RecordedRun& run, const FieldSequence& recorded, const std::vector<std::string>& names)
-      : scene_(scene), run_(run), recorded_(recorded), parameters_(Model(scene)) {
-    for (const std::string& name : names) places_.push_back(place_of(name));
-    x_.resize(count());
-    for (Eigen::Index k = 0; k < count(); ++k) {
-      const double value = parameters_.in(scene_, places_[std::size_t(k)]);
-      if (!(value > 0))
-        throw InputError(fmt::format("{}: '{}' is {} at the start of the fit; expected a positive number", scene.path,
-                                     names[std::size_t(k)], value));
-      x_[k] = std::log(value);
-    }
-  }
+      : scene_(scene),
+        run_(run),
+        recorded_(recorded),
+        names_(names),
+        places_(places_of(Parameters(Model(scene)), scene, names)) {}
 
   [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(places_.size()); }
-  [[nodiscard]] const Vector& start() const { return x_; }
+  [[nodiscard]] Vector start() const {
+    const std::vector<double> values = numbers_of(scene_, names_);
+    Vector x(count());
+    for (Eigen::Index k = 0; k < count(); ++k) {
+      const double value = values[std::size_t(k)];
+      if (!(value > 0))
+        throw InputError(fmt::format("{}: '{}' is {} at the start of a fit; expected a positive number", scene_.path,
+                                     names_[std::size_t(k)], value));
+      x[k] = std::log(value);
+    }
+    return x;
+  }
 
   struct Value {
     double misfit;    // infinite: the rollout fails there
@@ -79,31 +100,19 @@ class Problem {
 
   /// ∂ fields / ∂x, (numbers of the whole sequence, count).
   [[nodiscard]] Matrix jacobian(const Vector& x) const {
-    Matrix J;
+    Matrix J(static_cast<Eigen::Index>(recorded_.readings.size() * recorded_.readings[0].size()), count());
     for (Eigen::Index k = 0; k < count(); ++k) {
       const Vector step = kDifference * Vector::Unit(count(), k);
-      const Vector column = (fields(x + step) - fields(x - step)) / (2 * kDifference);
-      J.conservativeResize(column.size(), k + 1);
-      J.col(k) = column;
+      J.col(k) = (fields(x + step) - fields(x - step)) / (2 * kDifference);
     }
     return J;
   }
   [[nodiscard]] Vector residuals(const Vector& x) const { return fields(x) - flat(recorded_); }
 
  private:
-  [[nodiscard]] int place_of(const std::string& name) const {
-    std::string known;
-    for (int k = 0; k < parameters_.count(); ++k) {
-      const std::string& other = parameters_.infos()[std::size_t(k)].name;
-      if (other == name) return k;
-      known += (k > 0 ? ", '" : "'") + other + "'";
-    }
-    throw InputError(fmt::format("{}: no number '{}' to fit; expected one of {}", scene_.path, name, known));
-  }
   [[nodiscard]] Scene at(const Vector& x) const {
-    Scene scene = scene_;
-    for (Eigen::Index k = 0; k < count(); ++k) parameters_.in(scene, places_[std::size_t(k)]) = std::exp(x[k]);
-    return scene;
+    const Vector values = x.array().exp();
+    return with_numbers(scene_, names_, {values.data(), std::size_t(values.size())});
   }
   [[nodiscard]] Vector fields(const Vector& x) const { return flat(simulate_fields(at(x), run_)); }
   static Vector flat(const FieldSequence& s) {
@@ -114,13 +123,19 @@ class Problem {
     return out;
   }
 
-  Scene scene_;
+  const Scene& scene_;
   const RecordedRun& run_;
   const FieldSequence& recorded_;
-  Parameters parameters_;
-  std::vector<int> places_;
-  Vector x_;
+  const std::vector<std::string>& names_;
+  std::vector<int> places_;  // among Parameters::infos()
 };
+
+/// Whether a step, which changes the fields by `change`, is below the tolerance in standard deviations, or is a rounding. A
+/// step that damping made small proves nothing.
+bool is_small(const Vector& change, double misfit, double tolerance, const Vector& step) {
+  const double variance = 2 * misfit / static_cast<double>(change.size());
+  return change.squaredNorm() < tolerance * tolerance * variance || step.lpNorm<Eigen::Infinity>() < kRounding;
+}
 
 FitPoint fit_point(const Vector& x, const Problem::Value& value) {
   FitPoint p;
@@ -134,7 +149,7 @@ FitPoint fit_point(const Vector& x, const Problem::Value& value) {
 void judge(const Problem& problem, double misfit, const Matrix& J, Identification& out) {
   const Eigen::Index n = problem.count();
   out.noise = std::sqrt(2 * misfit / static_cast<double>(J.rows() - n));
-  // Without noise only roundings are left, of which there is no scale: the information is then that of unit noise.
+  // A perfect fit has no scale: the information is then that of unit noise.
   const double scale = out.noise > 0 ? 1 / (out.noise * out.noise) : 1;
   const Matrix F = scale * (J.transpose() * J);
   const Eigen::SelfAdjointEigenSolver<Matrix> modes(F);
@@ -145,6 +160,21 @@ void judge(const Problem& problem, double misfit, const Matrix& J, Identificatio
 }
 
 }  // namespace
+
+std::vector<double> numbers_of(const Scene& scene, std::span<const std::string> names) {
+  const Parameters parameters{Model(scene)};
+  std::vector<double> out;
+  for (int k : places_of(parameters, scene, names)) out.push_back(parameters.infos()[std::size_t(k)].value);
+  return out;
+}
+
+Scene with_numbers(const Scene& scene, std::span<const std::string> names, std::span<const double> values) {
+  const Parameters parameters{Model(scene)};
+  Scene out = scene;
+  std::size_t n = 0;
+  for (int k : places_of(parameters, scene, names)) parameters.in(out, k) = values[n++];
+  return out;
+}
 
 FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run) {
   check_run(run);
@@ -233,14 +263,12 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
   const Vector by_differences = J.transpose() * problem.residuals(x);
   out.gradient_difference = (now.gradient - by_differences).norm() / by_differences.norm();
   double damping = 1e-2;
-  for (int iteration = 0; iteration < options.max_iterations && !out.converged;) {
+  for (int iteration = 0; iteration < options.max_iterations && !out.converged; ++iteration) {
     Matrix H = J.transpose() * J;
     H.diagonal() *= 1 + damping;
     const Vector step = H.ldlt().solve(-now.gradient);
-    const double size = step.lpNorm<Eigen::Infinity>();
     const Problem::Value next = problem.evaluate(x + step);
-    out.converged = size < options.tolerance;
-    ++iteration;
+    out.converged = damping < 1 && is_small(J * step, now.misfit, options.tolerance, step);
     if (!(next.misfit < now.misfit)) {
       damping *= 8;
       continue;
@@ -249,7 +277,7 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
     x += step;
     now = next;
     out.points.push_back(fit_point(x, now));
-    if (!out.converged) J = problem.jacobian(x);
+    J = problem.jacobian(x);
   }
   judge(problem, now.misfit, J, out);
   return out;

@@ -18,6 +18,11 @@ struct FieldSequence {
   std::vector<std::vector<double>> readings;
 };
 
+/// Values of a scene's numbers by Parameters' names ("tactile pad kn"); the scene with others. Both throw InputError for a name
+/// that the scene does not have.
+std::vector<double> numbers_of(const Scene& scene, std::span<const std::string> names);
+Scene with_numbers(const Scene& scene, std::span<const std::string> names, std::span<const double> values);
+
 /// The run that was recorded, from the state that the scene gives.
 struct RecordedRun {
   StepControls controls;  ///< of environment 0
@@ -46,8 +51,8 @@ class FieldMisfit : public RolloutLoss {
 
 struct IdentificationOptions {
   std::vector<std::string> numbers;  ///< what is sought, by Parameters' names; positive, fitted as logarithms
-  int max_iterations = 40;
-  double tolerance = 1e-7;           ///< ends when no logarithm changes by more
+  int max_iterations = 60;           ///< rollouts with gradients, those of rejected steps included
+  double tolerance = 1e-2;           ///< ends at a step of so many standard deviations of the numbers
 };
 
 /// One accepted point of the fit.
@@ -63,7 +68,7 @@ struct Identification {
   double noise = 0;                   ///< standard deviation of a residual at the end [N]
   std::vector<double> deviation;      ///< of the logarithms, from the inverse of the information
   std::vector<double> information;    ///< (n, n) Fisher: JᵀJ / noise², J by logarithms
-  double condition = 0;               ///< largest over smallest eigenvalue of it
+  double condition = 0;               ///< its largest eigenvalue over its smallest
   double gradient_difference = 0;     ///< at the start, |adjoint − Jᵀr| / |Jᵀr|: J is of central differences
 
   [[nodiscard]] const std::vector<double>& values() const { return points.back().values; }
