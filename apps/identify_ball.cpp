@@ -95,11 +95,11 @@ CurvePanel values_panel(const std::vector<double>& truth, const Identification& 
 
 /// Forces of the whole pad over time, recorded and as the fit has them.
 CurvePanel forces_panel(const FieldSequence& recorded, const FieldSequence& fitted, double timestep) {
-  CurvePanel panel{"Force on the whole pad", "time [s]", "force [N]", false, {}};
+  CurvePanel panel{"Force on the whole pad: recorded (dots) and fitted", "time [s]", "force [N]", false, {}};
   const std::array<const char*, 3> names = {"shear along axis0", "shear along axis1", "pressure"};
   for (const FieldSequence* s : {&recorded, &fitted})
     for (std::size_t c = 0; c < 3; ++c) {
-      Curve curve{std::string(names[c]) + (s == &recorded ? ", recorded" : ""), {}, {}, s == &recorded, static_cast<int>(c)};
+      Curve curve{s == &recorded ? "" : names[c], {}, {}, s == &recorded, static_cast<int>(c)};
       for (std::size_t k = 0; k < s->readings.size(); ++k) {
         double sum = 0;
         for (std::size_t i = c; i < s->readings[k].size(); i += 3) sum += s->readings[k][i];

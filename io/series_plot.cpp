@@ -75,15 +75,15 @@ class Panel {
   void axes() {
     const double below = top_ + kPanel, right = kWidth - kRight;
     const double dy = panel_.logarithmic ? std::ceil(step_of(y_, true)) : step_of(y_, false);
-    for (double k = std::ceil(y_.low / dy); k * dy <= y_.high; ++k) {
+    for (double k = std::ceil(y_.low / dy) + 0.0; k * dy <= y_.high; ++k) {
       line(kLeft, y(k * dy), right, y(k * dy), "stroke=\"#ddd\"");
       const std::string label = panel_.logarithmic ? fmt::format("1e{:.0f}", k * dy) : fmt::format("{:.4g}", k * dy + 0.0);
       out_ += text(kLeft - 8, y(k * dy) + 4, label, kEnd);
     }
     const double dx = step_of(x_, false);
-    for (double k = std::ceil(x_.low / dx - 1e-9); k * dx <= x_.high * (1 + 1e-9); ++k) {
+    for (double k = std::ceil(x_.low / dx - 1e-9) + 0.0; k * dx <= x_.high * (1 + 1e-9); ++k) {
       line(x(k * dx), below, x(k * dx), below + 4, "stroke=\"#444\"");
-      out_ += text(x(k * dx), below + 16, fmt::format("{:.4g}", k * dx), kMiddle);
+      out_ += text(x(k * dx), below + 16, fmt::format("{:.4g}", k * dx + 0.0), kMiddle);
     }
     line(kLeft, below, right, below, "stroke=\"#444\"");
     line(kLeft, top_, kLeft, below, "stroke=\"#444\"");
@@ -95,6 +95,7 @@ class Panel {
   void names() {
     double at = kLeft;
     for (const Curve& c : panel_.curves) {
+      if (c.name.empty()) continue;
       const char* const colour = kColours[std::size_t(c.colour) % kColours.size()];
       if (c.dots) {
         out_ += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2\" fill=\"{}\"/>\n", at + 8, top_ - 12, colour);

@@ -9,7 +9,7 @@
 namespace tangere {
 
 struct Curve {
-  std::string name;
+  std::string name;          ///< "": not explained
   std::vector<double> x, y;  ///< as many of each; not finite, or not positive on a logarithmic scale: left out
   bool dots = false;         ///< measured points instead of a line
   int colour = 0;            ///< of six; curves that belong together share one

@@ -23,11 +23,17 @@ using Matrix = Eigen::MatrixXd;
 constexpr double kDifference = 1e-4;  // of logarithms
 constexpr double kRounding = 1e-8;    // of logarithms
 
-/// Place of entry n of a tile among the sensor's points; -1 beyond the edge.
-int point_of(const kernels::PadTiles& pad, int tile, int n) {
-  if (pad.curved()) return n < pad.points_of(tile) ? pad.index[kernels::kTactileTile * tile + n] : -1;
-  const int row = n / kernels::kTileSide, col = n % kernels::kTileSide;
-  return row < pad.rows_of(tile) && col < pad.cols_of(tile) ? pad.first_of(tile) + row * pad.cols + col : -1;
+/// f(point of the sensor, its place 0 … 63 in the tile) for the points of a tile.
+template <class Function>
+void for_points(const kernels::PadTiles& pad, int tile, const Function& f) {
+  if (pad.curved()) {
+    for (int n = 0; n < pad.points_of(tile); ++n)
+      f(static_cast<std::size_t>(pad.index[kernels::kTactileTile * tile + n]), static_cast<std::size_t>(n));
+    return;
+  }
+  for (int i = 0; i < pad.rows_of(tile); ++i)
+    for (int j = 0; j < pad.cols_of(tile); ++j)
+      f(static_cast<std::size_t>(pad.first_of(tile) + i * pad.cols + j), static_cast<std::size_t>(kernels::kTileSide * i + j));
 }
 
 std::size_t numbers_of_fields(const Model& model) {
@@ -130,11 +136,12 @@ class Problem {
   std::vector<int> places_;  // among Parameters::infos()
 };
 
-/// Whether a step, which changes the fields by `change`, is below the tolerance in standard deviations, or is a rounding. A
-/// step that damping made small proves nothing.
-bool is_small(const Vector& change, double misfit, double tolerance, const Vector& step) {
-  const double variance = 2 * misfit / static_cast<double>(change.size());
-  return change.squaredNorm() < tolerance * tolerance * variance || step.lpNorm<Eigen::Infinity>() < kRounding;
+/// Whether a step that changed the misfit by `gain` moved the numbers by no more than `tolerance` standard deviations, which
+/// change it by ½ tolerance² variances, or is a rounding. Creases (points that begin to touch or to slip) may hold a minimum
+/// where the gradient does not vanish: what is left to gain is what counts.
+bool is_end(double gain, double misfit, Eigen::Index residuals, double tolerance, const Vector& step) {
+  const double variance = 2 * misfit / static_cast<double>(residuals);
+  return std::abs(gain) < 0.5 * tolerance * tolerance * variance || step.lpNorm<Eigen::Infinity>() < kRounding;
 }
 
 FitPoint fit_point(const Vector& x, const Problem::Value& value) {
@@ -215,34 +222,50 @@ FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded) : mo
     if (reading.size() != numbers_of_fields(model))
       throw InputError(fmt::format("a recorded reading of {} numbers; expected {}, three for each tactile point of the scene",
                                    reading.size(), numbers_of_fields(model)));
-    double sum = 0;
-    for (double f : reading) sum += 0.5 * f * f;
-    squares_.push_back(sum);
+    std::vector<double>& squares = squares_.emplace_back();
+    const double* of_sensor = reading.data();
+    for (const CompiledSensor& sensor : model.compiled().sensors) {
+      const kernels::PadTiles pad = sensor.tiles();
+      for (int tile = 0; tile < pad.tiles(); ++tile) {
+        double& sum = squares.emplace_back(0);
+        for_points(pad, tile, [&](std::size_t point, std::size_t) {
+          for (std::size_t c = 0; c < 3; ++c) sum += 0.5 * of_sensor[3 * point + c] * of_sensor[3 * point + c];
+        });
+      }
+      of_sensor += 3 * sensor.points();
+    }
   }
 }
 
-/// Where nothing touches, T = 0 and the share is ½ T_recorded², constant; tiles change it by ½ (T − T_recorded)² − ½ T_recorded².
+/// Where nothing touches, T = 0 and the share of a tile is ½ T_recorded²: known beforehand, and constant.
 double FieldMisfit::evaluate(const LossPoint& at, const LossCotangent& out) const {
   if (!reads_fields(at.step)) return 0;
   const auto k = static_cast<std::size_t>(at.step / recorded_.every) - 1;
   const double* reading = recorded_.readings[k].data();
-  double sum = squares_[k];
+  const double* squares = squares_[k].data();
+  double sum = 0;
   for (std::size_t s = 0; s < at.fields.size(); ++s) {
     const CompiledSensor& sensor = model_.compiled().sensors[s];
     const kernels::PadTiles pad = sensor.tiles();
-    const std::span<const int> tiles = at.fields[s]->tiles();
-    for (std::size_t t = 0; t < tiles.size(); ++t)
-      for (int n = 0; n < kernels::kTactileTile; ++n) {
-        const int point = point_of(pad, tiles[t], n);
-        if (point < 0) continue;
-        for (std::size_t c = 0; c < 3; ++c) {
-          const std::size_t i = (3 * t + c) * kernels::kTactileTile + std::size_t(n);
-          const double force = at.fields[s]->values()[i], measured = reading[3 * std::size_t(point) + c];
-          sum += force * (0.5 * force - measured);
-          out.fields[s][i] += force - measured;
-        }
+    const std::span<const int> touched = at.fields[s]->tiles();
+    std::size_t t = 0;
+    for (int tile = 0; tile < pad.tiles(); ++tile) {
+      if (t == touched.size() || touched[t] != tile) {
+        sum += squares[tile];
+        continue;
       }
+      for_points(pad, tile, [&](std::size_t point, std::size_t n) {
+        for (std::size_t c = 0; c < 3; ++c) {
+          const std::size_t i = (3 * t + c) * kernels::kTactileTile + n;
+          const double residual = at.fields[s]->values()[i] - reading[3 * point + c];
+          sum += 0.5 * residual * residual;
+          out.fields[s][i] += residual;
+        }
+      });
+      ++t;
+    }
     reading += 3 * sensor.points();
+    squares += pad.tiles();
   }
   return sum;
 }
@@ -268,7 +291,7 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
     H.diagonal() *= 1 + damping;
     const Vector step = H.ldlt().solve(-now.gradient);
     const Problem::Value next = problem.evaluate(x + step);
-    out.converged = damping < 1 && is_small(J * step, now.misfit, options.tolerance, step);
+    out.converged = is_end(now.misfit - next.misfit, now.misfit, J.rows(), options.tolerance, step);
     if (!(next.misfit < now.misfit)) {
       damping *= 8;
       continue;

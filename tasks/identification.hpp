@@ -46,13 +46,13 @@ class FieldMisfit : public RolloutLoss {
  private:
   Model model_;
   const FieldSequence& recorded_;  // outlives this
-  std::vector<double> squares_;    // ½ |T_recorded|² of each reading
+  std::vector<std::vector<double>> squares_;  // ½ |T_recorded|² of every sensor's tiles in each reading
 };
 
 struct IdentificationOptions {
   std::vector<std::string> numbers;  ///< what is sought, by Parameters' names; positive, fitted as logarithms
   int max_iterations = 60;           ///< rollouts with gradients, those of rejected steps included
-  double tolerance = 1e-2;           ///< ends at a step of so many standard deviations of the numbers
+  double tolerance = 1e-2;           ///< ends at a step that is worth so many standard deviations
 };
 
 /// One accepted point of the fit.
