@@ -2,6 +2,7 @@
 // Gradients that descend: open-loop pushes found by Adam bring a box nearer to its goals.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -11,7 +12,7 @@
 namespace tangere {
 namespace {
 
-constexpr int kEnvironments = 4, kHeld = 5, kActions = 60;
+constexpr int kEnvironments = 16, kHeld = 5, kActions = 60;
 constexpr int kHandControls = 3;  // hand x, y, turn; the other three disturb the box and stay 0
 
 /// Displacement of the box that is asked for [m], from where it starts.
@@ -108,19 +109,20 @@ double mean_distance(const Pushes& p, const ReachGoal& loss) {
 TEST(Descent, FiftyAdamStepsHalveTheDistanceOfAPushedBox) {
   Pushes p{Model(read_scene(TANGERE_SOURCE_DIR "/scenes/box_pushing.xml").scene), {}};
   p.actions.resize(kEnvironments * kActions * kHandControls);
-  // A push that touches and does not move the box: without touch no control has a gradient at the box.
-  for (std::size_t k = 0; k < p.actions.size(); k += kHandControls) p.actions[k] = 0.5;
+  // A little push that brings the pad to the box: out of touch no control has a gradient.
+  for (std::size_t k = 0; k < p.actions.size(); k += kHandControls) p.actions[k] = 0.05;
   const auto names = p.model.q_names();
   const auto box = std::size_t(std::find(names.begin(), names.end(), "box_slide.x") - names.begin());
   ASSERT_LT(box, names.size());
-  const std::array<Goal, kEnvironments> goals = {{{0.08, 0.0}, {0.10, 0.01}, {0.06, -0.01}, {0.12, 0.02}}};
+  std::array<Goal, kEnvironments> goals;  // 60 to 120 mm ahead, up to 20 mm aside
+  for (std::size_t e = 0; e < kEnvironments; ++e) goals[e] = {0.06 + 0.02 * double(e / 4), -0.02 + 0.04 / 3 * double(e % 4)};
   const ReachGoal loss(box, goals);
   const RolloutLoss* const losses[] = {&loss};
   GradientOptions options;
   options.steps = kActions * kHeld;
 
   const double before = mean_distance(p, loss);
-  Adam adam(p.actions.size(), 0.03);
+  Adam adam(p.actions.size(), 0.02);
   for (int k = 0; k < 50; ++k) {
     const GradientSummary g = rollout_gradients(
         Batch(p.model, kEnvironments, 1), [&](std::int64_t t, int e, std::span<double> u) { p.controls(t, e, u); }, options,
