@@ -20,7 +20,7 @@ namespace {
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
-constexpr double kDifference = 1e-4;  // of logarithms
+constexpr double kDifference = 1e-6;  // of logarithms; small, so that few points begin to touch or to slip within it
 constexpr double kRounding = 1e-8;    // of logarithms
 
 /// f(point of the sensor, its place 0 … 63 in the tile) for the points of a tile.
