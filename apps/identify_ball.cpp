@@ -73,7 +73,8 @@ void print_fit(const Scene& scene, const std::vector<double>& truth, const Ident
 }
 
 CurvePanel misfit_panel(const Identification& fit) {
-  CurvePanel panel{"The fit", "iteration", "over its first value", true, {{"misfit", {}, {}, false, 0}, {"|gradient|", {}, {}, false, 1}}};
+  CurvePanel panel{"The fit", "iteration", "over its first value", true,
+                   {{"misfit", {}, {}, false, 0}, {"|gradient|", {}, {}, false, 1}}};
   for (std::size_t k = 0; k < fit.points.size(); ++k) {
     for (Curve& c : panel.curves) c.x.push_back(static_cast<double>(k));
     panel.curves[0].y.push_back(fit.points[k].misfit / fit.points[0].misfit);
@@ -134,7 +135,8 @@ int identify_ball(const Options& o) {
     const std::array<CurvePanel, 3> panels = {misfit_panel(fit), values_panel(truth, fit),
                                               forces_panel(recorded, fitted, model.timestep())};
     const std::array<std::string, 1> captions = {
-        fmt::format("noise {:.3g} % of the peak, seed {}; condition of the information {:.1f}", 100 * share, seed, fit.condition)};
+        fmt::format("noise {:.3g} % of the peak, seed {}; condition of the information {:.1f}", 100 * share, seed,
+                    fit.condition)};
     write_text_atomically(o.svg, render_curves_svg("A skin and a ball from a recording", captions, panels), o.overwrite);
     fmt::print("wrote {}\n", o.svg);
   }

@@ -22,6 +22,7 @@ using Matrix = Eigen::MatrixXd;
 
 constexpr double kDifference = 1e-6;  // of logarithms; small, so that few points begin to touch or to slip within it
 constexpr double kRounding = 1e-8;    // of logarithms
+constexpr double kLongest = 1.5;      // of logarithms in one step: the model is linear
 
 /// f(point of the sensor, its place 0 … 63 in the tile) for the points of a tile.
 template <class Function>
@@ -33,7 +34,8 @@ void for_points(const kernels::PadTiles& pad, int tile, const Function& f) {
   }
   for (int i = 0; i < pad.rows_of(tile); ++i)
     for (int j = 0; j < pad.cols_of(tile); ++j)
-      f(static_cast<std::size_t>(pad.first_of(tile) + i * pad.cols + j), static_cast<std::size_t>(kernels::kTileSide * i + j));
+      f(static_cast<std::size_t>(pad.first_of(tile) + i * pad.cols + j),
+        static_cast<std::size_t>(kernels::kTileSide * i + j));
 }
 
 std::size_t numbers_of_fields(const Model& model) {
@@ -44,7 +46,8 @@ std::size_t numbers_of_fields(const Model& model) {
 
 void check_run(const RecordedRun& run) {
   if (run.every < 1 || run.steps < run.every)
-    throw InputError(fmt::format("a recording of {} steps read every {}; expected at least one reading", run.steps, run.every));
+    throw InputError(fmt::format("a recording of {} steps read every {}; expected at least one reading", run.steps,
+                                 run.every));
 }
 
 std::vector<int> places_of(const Parameters& parameters, const Scene& scene, std::span<const std::string> names) {
@@ -110,6 +113,9 @@ class Problem {
     for (Eigen::Index k = 0; k < count(); ++k) {
       const Vector step = kDifference * Vector::Unit(count(), k);
       J.col(k) = (fields(x + step) - fields(x - step)) / (2 * kDifference);
+      if (J.col(k).isZero(0))
+        throw InputError(fmt::format("{}: the fields do not depend on '{}'; expected numbers that a recording can show",
+                                     scene_.path, names_[std::size_t(k)]));
     }
     return J;
   }
@@ -136,8 +142,8 @@ class Problem {
   std::vector<int> places_;  // among Parameters::infos()
 };
 
-/// Whether a step that changed the misfit by `gain` moved the numbers by no more than `tolerance` standard deviations, which
-/// change it by ½ tolerance² variances, or is a rounding. Creases (points that begin to touch or to slip) may hold a minimum
+/// Whether a step that changed the misfit by `gain` is worth no more than `tolerance` standard deviations of the numbers, which
+/// are ½ tolerance² variances of a residual, or is a rounding. Creases (points that begin to touch or to slip) may hold a minimum
 /// where the gradient does not vanish: what is left to gain is what counts.
 bool is_end(double gain, double misfit, Eigen::Index residuals, double tolerance, const Vector& step) {
   const double variance = 2 * misfit / static_cast<double>(residuals);
@@ -289,7 +295,8 @@ Identification identify(const Scene& scene, const RecordedRun& run, const FieldS
   for (int iteration = 0; iteration < options.max_iterations && !out.converged; ++iteration) {
     Matrix H = J.transpose() * J;
     H.diagonal() *= 1 + damping;
-    const Vector step = H.ldlt().solve(-now.gradient);
+    Vector step = H.ldlt().solve(-now.gradient);
+    step *= std::min(1.0, kLongest / step.lpNorm<Eigen::Infinity>());
     const Problem::Value next = problem.evaluate(x + step);
     out.converged = is_end(now.misfit - next.misfit, now.misfit, J.rows(), options.tolerance, step);
     if (!(next.misfit < now.misfit)) {

@@ -18,8 +18,8 @@ struct FieldSequence {
   std::vector<std::vector<double>> readings;
 };
 
-/// Values of a scene's numbers by Parameters' names ("tactile pad kn"); the scene with others. Both throw InputError for a name
-/// that the scene does not have.
+/// Values of a scene's numbers by Parameters' names ("tactile pad kn"); the scene with others. Both throw InputError for a
+/// name that the scene does not have.
 std::vector<double> numbers_of(const Scene& scene, std::span<const std::string> names);
 Scene with_numbers(const Scene& scene, std::span<const std::string> names, std::span<const double> values);
 
@@ -36,11 +36,13 @@ FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run);
 /// Adds independent normal noise to every number of every field.
 void add_noise(FieldSequence& sequence, double deviation, std::uint64_t seed);
 
-/// ½ Σ (T − T_recorded)² over all readings, points and components [N²].
+/// ½ Σ (T − T_recorded)² over all readings that the rollout comes to, points and components [N²].
 class FieldMisfit : public RolloutLoss {
  public:
   FieldMisfit(const Model& model, const FieldSequence& recorded);
-  [[nodiscard]] bool reads_fields(std::int64_t step) const override { return step > 0 && step % recorded_.every == 0; }
+  [[nodiscard]] bool reads_fields(std::int64_t step) const override {
+    return step > 0 && step % recorded_.every == 0 && step / recorded_.every <= std::int64_t(recorded_.readings.size());
+  }
   double evaluate(const LossPoint& at, const LossCotangent& out) const override;
 
  private:
@@ -76,7 +78,7 @@ struct Identification {
 
 /// Levenberg-Marquardt in logarithms, from the values that `scene` has. The gradient comes from rollout_gradients; JᵀJ from
 /// one central difference of the whole sequence for each number. Throws InputError for a name that is not a number of the
-/// scene, a value that is not positive, a recording that does not fit the run, and a start whose rollout fails.
+/// scene, a value that is not positive, a number that no field depends on, a recording that does not fit the run, and a start whose rollout fails.
 Identification identify(const Scene& scene, const RecordedRun& run, const FieldSequence& recorded,
                         const IdentificationOptions& options);
 

@@ -47,7 +47,8 @@ TEST(SeriesPlot, DecadesAreEquallyFarAndZeroHasNoPlace) {
 }
 
 TEST(SeriesPlot, LinesHaveGapsAndNamesAreEscaped) {
-  const std::string svg = draw({"left & right", "time [s]", "force <N>", false, {{"k<n", {0, 1, 2, 3}, {1, 2, NAN, 1}, false, 1}}});
+  const std::string svg = draw(
+      {"left & right", "time [s]", "force <N>", false, {{"k<n", {0, 1, 2, 3}, {1, 2, NAN, 1}, false, 1}}});
   EXPECT_EQ(dots(svg).size(), 0U);
   for (const char* part : {"a &amp; b", "noise &lt; 1 %", "left &amp; right", "time [s]", "force &lt;N&gt;", "k&lt;n"})
     EXPECT_THAT(svg, HasSubstr(part));

@@ -203,7 +203,8 @@ TEST(ShippedScenes, BallToIdentifyIsPressedRolledAndSlidOver) {
     // A ball rolls half the way of what it carries; sliding, the shear is at the limit of friction, 0.5.
     EXPECT_NEAR(r.q(r.at(0.4), e, "ball_joint.x"), 0.5 * r.q(r.at(0.4), e, "pad_joint.x"), 1e-3);
     EXPECT_GT(r.q(r.at(0.4), e, "ball_joint.x"), 4e-3);
-    for (double time : {0.3, 0.4}) EXPECT_LT(std::abs(r.touch(r.at(time), e, 0).along), 0.2 * r.touch(r.at(time), e, 0).pressure);
+    for (double time : {0.3, 0.4})
+      EXPECT_LT(std::abs(r.touch(r.at(time), e, 0).along), 0.2 * r.touch(r.at(time), e, 0).pressure);
     for (double time : {0.735, 0.765})
       EXPECT_GT(std::abs(r.touch(r.at(time), e, 0).along), 0.45 * r.touch(r.at(time), e, 0).pressure) << time << " s";
   }

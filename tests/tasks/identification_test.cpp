@@ -113,6 +113,7 @@ TEST(Identification, RefusesWhatCannotBeFitted) {
     return std::string();
   };
   EXPECT_THAT(message(r.scene, r.clean, {"tactile pad stiffness"}), HasSubstr("no number 'tactile pad stiffness'"));
+  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball kn"}), testing::IsEmpty()) << "any number of the scene";
   const Scene frictionless = with_numbers(r.scene, {{"tactile pad mu"}}, std::vector<double>{0});
   EXPECT_THAT(message(frictionless, r.clean, kSought), HasSubstr("'tactile pad mu' is 0"));
   FieldSequence short_one = r.clean;
