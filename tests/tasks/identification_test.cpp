@@ -78,7 +78,7 @@ TEST(Identification, IsExactWithoutNoise) {
   EXPECT_TRUE(found.converged);
   for (std::size_t k = 0; k < r.truth.size(); ++k) EXPECT_NEAR(found.values()[k] / r.truth[k], 1, 1e-6) << kSought[k];
   // Differences across points that begin to touch or to slip are not exact.
-  EXPECT_LT(found.gradient_difference, 1e-3);
+  EXPECT_LT(found.gradient_difference, 1e-4);
 }
 
 TEST(Identification, MisfitIsHalfTheSquaresOfAllPoints) {
@@ -114,6 +114,8 @@ TEST(Identification, RefusesWhatCannotBeFitted) {
   };
   EXPECT_THAT(message(r.scene, r.clean, {"tactile pad stiffness"}), HasSubstr("no number 'tactile pad stiffness'"));
   EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball kn"}), testing::IsEmpty()) << "any number of the scene";
+  // The ball never slips on the ground.
+  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball mu"}), HasSubstr("do not depend on 'ground ball mu'"));
   const Scene frictionless = with_numbers(r.scene, {{"tactile pad mu"}}, std::vector<double>{0});
   EXPECT_THAT(message(frictionless, r.clean, kSought), HasSubstr("'tactile pad mu' is 0"));
   FieldSequence short_one = r.clean;
