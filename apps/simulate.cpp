@@ -184,37 +184,46 @@ std::int64_t steps_left(const Options& options, const ControlProgram& controls, 
 struct Gradients {
   std::optional<Batch> start;
   std::unique_ptr<RolloutLoss> loss;
+  std::optional<GradientRollouts> rollouts;
   std::string name;
   std::vector<double> value;
 
-  Gradients(const Options& options, const Batch& batch, const RolloutOptions& rollout) : name(options.gradients) {
+  Gradients(const Options& arguments, const Batch& batch, const Stepper& stepper, const RolloutOptions& rollout)
+      : name(arguments.gradients) {
     if (name.empty()) return;
     const Model& model = batch.model();
     const int every = model.sensors().empty() ? 1 : tactile_interval(model.sensors()[0], rollout);
     loss = make_loss(loss_named(name), model, every);
-    start = batch;
-  }
-  [[nodiscard]] bool wanted() const { return start.has_value(); }
-
-  void write(const Stepper& stepper, const ControlProgram& controls, const RolloutOptions& rollout, TrajectoryFile& output) {
     GradientOptions options;
     options.steps = rollout.steps;
     options.stepper = {stepper.integrator(), stepper.timestep(), stepper.tolerance()};
     options.precision = rollout.precision;
     options.parameters = true;
+    check_memory(gradient_bytes(model, batch.environments(), options, 1),
+                 fmt::format("--gradients of {} environments and {} steps", batch.environments(), rollout.steps));
     const RolloutLoss* const losses[] = {loss.get()};
-    const LossGradient g = rollout_gradients(
-                               *start,
-                               [&](std::int64_t step, int e, std::span<double> u) {
-                                 controls.evaluate(rollout.first_step + step, start->episode(e), u);
-                               },
-                               options, losses)
-                               .losses[0];
+    rollouts.emplace(model, options, losses);
+    start = batch;
+  }
+  [[nodiscard]] bool wanted() const { return start.has_value(); }
+
+  /// False when a signal stopped it.
+  bool write(const ControlProgram& controls, const RolloutOptions& rollout, const StopSignals& signals,
+             TrajectoryFile& output) {
+    const GradientSummary summary = rollouts->run(
+        *start,
+        [&](std::int64_t step, int e, std::span<double> u) {
+          controls.evaluate(rollout.first_step + step, start->episode(e), u);
+        },
+        [&] { return signals.received() == 0; });
+    if (summary.stopped) return false;
+    const LossGradient& g = summary.losses[0];
     std::vector<std::string> names, units;
     const Parameters parameters(start->model());
     for (const ParameterInfo& info : parameters.infos()) names.push_back(info.name), units.push_back(info.unit);
     output.write({name, loss_meaning(loss_named(name)), g.value, g.u, g.q, g.v, g.parameters, names, units});
     value = g.value;
+    return true;
   }
 
   [[nodiscard]] Json json() const {
@@ -304,7 +313,7 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
   check_size(model, start.environments);
   Batch batch(model, start.environments, start.seed, start.saved ? start.saved->first_episode : 0);
   if (start.saved) restore_state(*start.saved, start.continues, batch);
-  Gradients gradients(options, batch, rollout);
+  Gradients gradients(options, batch, stepper, rollout);
 
   // Before the file is created and until it is gone or complete: nothing half-written stays.
   const StopSignals signals;
@@ -314,7 +323,7 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
       options, console, batch, stepper, rollout, output, signals,
       [&](const RolloutProgress& progress) {
         RolloutSummary summary = run_rollout(batch, stepper, controls, rollout, output, progress);
-        if (gradients.wanted() && !summary.stopped) gradients.write(stepper, controls, rollout, output);
+        if (gradients.wanted() && !summary.stopped) summary.stopped = !gradients.write(controls, rollout, signals, output);
         return summary;
       },
       [&] {

@@ -200,6 +200,8 @@ Adjoint& Adjoint::operator=(Adjoint&&) noexcept = default;
 int Adjoint::losses() const { return static_cast<int>(impl_->losses.size()); }
 BlockCotangent& Adjoint::loss(int k) { return impl_->losses[std::size_t(k)]; }
 
+const BlockCotangent& Adjoint::loss(int k) const { return impl_->losses[std::size_t(k)]; }
+
 void Adjoint::clear() {
   for (BlockCotangent& c : impl_->losses)
     for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v, &c.u, &c.parameters})

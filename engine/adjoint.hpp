@@ -37,6 +37,7 @@ class Adjoint {
   [[nodiscard]] int losses() const;
   /// Of loss k: what the caller adds to (q, v) is the derivative of the loss by the newest state.
   [[nodiscard]] BlockCotangent& loss(int k);
+  [[nodiscard]] const BlockCotangent& loss(int k) const;
 
   /// Takes the cotangents of the states after steps `step` + 1 and `step` to those after `step` and `step` - 1, and sets u.
   /// `batch` supplies its parameters, its state is not read; `controls`: (E, nu), those of that step. An environment that

@@ -31,7 +31,7 @@ struct DualStage::Impl {
   bool frozen = false;
   std::vector<double> tangents;        ///< of the rows, while frozen
 
-  std::vector<D> force_scale, mass_diagonal, A, excess, scratch_rows;
+  std::vector<D> force_scale, mass_diagonal, A, excess;
   std::vector<kernels::LinkScratch<D>> links;
   std::vector<kernels::ContactScratch<D>> contacts;
   std::vector<kernels::JointColumns<D>> columns;
@@ -68,7 +68,6 @@ struct DualStage::Impl {
     const std::size_t nv = std::size_t(m.nv);
     force_scale.resize(nv), mass_diagonal.resize(nv), excess.resize(1);
     A.resize(std::size_t(m.pattern.entries));
-    scratch_rows.resize(12 * nv);
     links.resize(m.links.size()), adjoint.resize(m.links.size()), columns.resize(2 * m.links.size());
     contacts.resize(std::size_t(view.n_link_pairs + view.n_grounded));
     for (const kernels::PairContact& p : pairs) {

@@ -27,7 +27,7 @@ class StepJacobians {
 
  private:
   int nv_, nu_;
-  mutable Adjoint adjoint_;
+  Adjoint adjoint_;
 };
 
 }  // namespace tangere

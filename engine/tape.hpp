@@ -55,8 +55,6 @@ class BlockTape {
   [[nodiscard]] const TapedStep* special(std::int64_t step, int lane) const;
   /// Whether the environment took that step.
   [[nodiscard]] bool took(std::int64_t step, int lane) const { return step < taken_[std::size_t(lane)]; }
-  /// Steps that an environment took before it failed, or all.
-  [[nodiscard]] std::int64_t taken(int lane) const { return taken_[std::size_t(lane)]; }
   /// Memory of a block's tape for so many steps.
   static std::size_t bytes(const Model& model, Integrator integrator, std::int64_t steps);
 

@@ -10,7 +10,6 @@
 
 namespace tangere {
 
-/// Writes `<output>.part` and gives it its name on commit(). Destroyed before that, it leaves nothing behind.
 /// Derivatives of a loss over the whole run, for every environment.
 struct GradientArrays {
   std::string loss, meaning;
@@ -21,6 +20,7 @@ struct GradientArrays {
   std::span<const std::string> number_names, number_units;  ///< (k)
 };
 
+/// Writes `<output>.part` and gives it its name on commit(). Destroyed before that, it leaves nothing behind.
 class TrajectoryFile : public RowSink {
  public:
   /// Creates every group, dataset and attribute. Throws IoError when the output exists (and `overwrite` is false), its

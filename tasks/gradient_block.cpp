@@ -69,6 +69,11 @@ void GradientBlock::run(Batch& batch, int block, const StepControls& controls, s
   backward(h);
 }
 
+bool GradientBlock::may_go_on() {
+  if (go_on_ != nullptr && *go_on_ && !(*go_on_)()) stopped_ = true;
+  return !stopped_;
+}
+
 void GradientBlock::step(const InHand& h, std::int64_t t, BlockTape* tape) {
   const std::size_t nu = count(model_.nu());
   for (int e = h.first; e < h.last; ++e) h.controls(t, e, h.u.subspan(count(e) * nu, nu));
@@ -79,9 +84,12 @@ void GradientBlock::forward(const InHand& h, std::vector<FailedEnvironment>& fai
   const bool whole = segment_ == options_.steps;
   checkpoints_.clear();
   std::array<bool, kBlock> live{};
-  for (int e = h.first; e < h.last; ++e) live[count(e - h.first)] = !failed(h.batch.status(e));
+  for (int e = h.first; e < h.last; ++e) {
+    live[count(e - h.first)] = !failed(h.batch.status(e));
+    if (failed(h.batch.status(e))) failures.push_back({e, -1, h.batch.status(e)});
+  }
   if (whole) tape_.start(h.batch, h.block);
-  for (std::int64_t t = 0; t < options_.steps; ++t) {
+  for (std::int64_t t = 0; t < options_.steps && may_go_on(); ++t) {
     if (!whole && t % segment_ == 0) checkpoints_.push_back(h.batch.save_block(h.block));
     step(h, t, whole ? &tape_ : nullptr);
     for (int e = h.first; e < h.last; ++e) {
@@ -96,6 +104,7 @@ void GradientBlock::forward(const InHand& h, std::vector<FailedEnvironment>& fai
 }
 
 void GradientBlock::backward(const InHand& h) {
+  if (stopped_) return;
   adjoint_.clear();
   const std::int64_t steps = options_.steps;
   if (segment_ == steps) {
@@ -110,13 +119,14 @@ void GradientBlock::backward(const InHand& h) {
       reverse_segment(h, begin, end);
     }
   }
+  if (stopped_) return;
   finish(h);
 }
 
 /// From the state after `end` steps to that after `begin`, which is looked at only where the rollout begins.
 void GradientBlock::reverse_segment(const InHand& h, std::int64_t begin, std::int64_t end) {
   const std::size_t nu = count(model_.nu()), steps = count(options_.steps);
-  for (std::int64_t t = end; t > begin; --t) {
+  for (std::int64_t t = end; t > begin && may_go_on(); --t) {
     tape_.show(t - begin, h.batch, h.block);
     look(h, t);
     for (int e = h.first; e < h.last; ++e) h.controls(t - 1, e, h.u.subspan(count(e) * nu, nu));
@@ -128,15 +138,14 @@ void GradientBlock::reverse_segment(const InHand& h, std::int64_t begin, std::in
           h.out.losses[k].u[(count(e) * steps + count(t - 1)) * nu + i] = c.u[i * kBlock + count(e - h.first)];
     }
   }
-  if (begin != 0) return;
+  if (begin != 0 || stopped_) return;
   tape_.show(0, h.batch, h.block);
   look(h, 0);
 }
 
 /// Fields that some loss looks at after `step` steps.
 void GradientBlock::read(const InHand& h, std::int64_t step) {
-  fields_read_ = std::any_of(losses_.begin(), losses_.end(), [&](const RolloutLoss* l) { return l->reads_fields(step); });
-  if (!fields_read_) return;
+  if (std::none_of(losses_.begin(), losses_.end(), [&](const RolloutLoss* l) { return l->reads_fields(step); })) return;
   for (auto& frames : frames_)
     readout_.read_block(h.batch, h.block, std::span(frames).first(count(h.last - h.first)));
 }

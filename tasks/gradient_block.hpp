@@ -22,7 +22,13 @@ class GradientBlock {
   void run(Batch& batch, int block, const StepControls& controls, std::span<double> u, GradientSummary& out,
            std::vector<FailedEnvironment>& failures);
 
-  void clear_counts() { newton_iterations_ = recomputed_steps_ = 0; }
+  /// Counts from 0; `go_on` (empty: always) must outlive the runs that follow.
+  void begin(const GradientGoOn& go_on) {
+    go_on_ = &go_on;
+    newton_iterations_ = recomputed_steps_ = 0;
+    stopped_ = false;
+  }
+  [[nodiscard]] bool stopped() const { return stopped_; }
   [[nodiscard]] std::int64_t newton_iterations() const { return newton_iterations_; }
   [[nodiscard]] std::int64_t recomputed_steps() const { return recomputed_steps_; }
 
@@ -34,6 +40,7 @@ class GradientBlock {
     std::span<double> u;
     GradientSummary& out;
   };
+  [[nodiscard]] bool may_go_on();
   void step(const InHand& h, std::int64_t t, BlockTape* tape);
   void forward(const InHand& h, std::vector<FailedEnvironment>& failures);
   void backward(const InHand& h);
@@ -55,11 +62,12 @@ class GradientBlock {
   std::vector<BlockState> checkpoints_;
   std::vector<std::vector<CompactFrame<double>>> frames_;  // (sensors, 16)
   std::vector<std::vector<double>> field_cotangents_;      // (sensors) of the environment in hand
-  bool fields_read_ = false;                               // at the state in hand
   std::vector<const CompactFrame<double>*> fields_;        // (sensors) of the environment in hand
   std::vector<std::span<double>> cotangents_;              // (sensors) spans of field_cotangents_
   std::vector<double> q_, v_, variables_, q_bar_, v_bar_, u_bar_, variables_bar_;
   Parameters parameters_;
+  const GradientGoOn* go_on_ = nullptr;
+  bool stopped_ = false;
   std::int64_t newton_iterations_ = 0, recomputed_steps_ = 0;
 };
 

@@ -19,6 +19,8 @@ namespace {
 void check(const GradientOptions& options) {
   if (options.steps < 1)
     throw InputError("gradients of " + std::to_string(options.steps) + " steps; expected at least 1");
+  if (!(options.tape_bytes > 0))
+    throw InputError("a tape of " + std::to_string(options.tape_bytes) + " bytes; expected a positive number");
   if (options.threads < 1)
     throw InputError("gradients on " + std::to_string(options.threads) + " threads; expected at least 1");
 }
@@ -64,7 +66,7 @@ GradientRollouts::~GradientRollouts() = default;
 GradientRollouts::GradientRollouts(GradientRollouts&&) noexcept = default;
 GradientRollouts& GradientRollouts::operator=(GradientRollouts&&) noexcept = default;
 
-GradientSummary GradientRollouts::run(const Batch& start, const StepControls& controls) {
+GradientSummary GradientRollouts::run(const Batch& start, const StepControls& controls, const GradientGoOn& go_on) {
   Impl& i = *impl_;
   if (&start.model().compiled() != &i.model.compiled())
     throw InputError("a batch of scene '" + start.model().scene().name + "' for gradients of a model of scene '" +
@@ -73,7 +75,7 @@ GradientSummary GradientRollouts::run(const Batch& start, const StepControls& co
   Batch batch = start;
   std::vector<double> u(std::size_t(start.environments()) * std::size_t(i.model.nu()));
   std::vector<std::vector<FailedEnvironment>> failures(std::size_t(start.blocks()));
-  for (GradientBlock& worker : i.workers) worker.clear_counts();
+  for (GradientBlock& worker : i.workers) worker.begin(go_on);
   const auto run_blocks = [&](const tbb::blocked_range<int>& blocks) {
     TaskOrder::arrive();
     GradientBlock& worker = i.workers[std::size_t(tbb::this_task_arena::current_thread_index())];
@@ -92,8 +94,17 @@ GradientSummary GradientRollouts::run(const Batch& start, const StepControls& co
   for (const GradientBlock& worker : i.workers) {
     out.newton_iterations += worker.newton_iterations();
     out.recomputed_steps += worker.recomputed_steps();
+    out.stopped = out.stopped || worker.stopped();
   }
   return out;
+}
+
+double gradient_bytes(const Model& model, int environments, const GradientOptions& o, int losses) {
+  const double numbers = o.parameters ? Parameters(model).count() : 0;
+  const double results = double(o.steps) * model.nu() + 2.0 * model.nv() + numbers + 1;
+  const Integrator scheme = o.stepper.integrator.value_or(model.integrator());
+  const double tape = std::min(double(BlockTape::bytes(model, scheme, o.steps)), o.tape_bytes);
+  return 8 * results * environments * losses + o.threads * (tape + 2 * double(model.workspace_bytes()));
 }
 
 GradientSummary rollout_gradients(const Batch& start, const StepControls& controls, const GradientOptions& options,

@@ -16,6 +16,8 @@
 
 namespace tangere {
 
+/// Asked before every step; false stops at this safe point.
+using GradientGoOn = std::function<bool()>;
 /// Fills the controls (nu) of one environment's step. Called from several threads, more than once for a step.
 using StepControls = std::function<void(std::int64_t step, int environment, std::span<double> u)>;
 
@@ -25,7 +27,7 @@ struct GradientOptions {
   StepperOptions stepper;
   Precision precision = Precision::f64;  ///< of the tactile fields that losses see; derivatives are taken in double
   bool parameters = false;               ///< by the scene's numbers too (engine/parameters.hpp)
-  /// A thread's tape may take so much [bytes]; a longer rollout is run again from checkpoints, with the same bits.
+  /// The states on a thread's tape may take so much [bytes]; a longer rollout is run again from checkpoints, with the same bits.
   double tape_bytes = 1e9;
 };
 
@@ -42,6 +44,7 @@ struct GradientSummary {
   std::vector<FailedEnvironment> failures;  ///< in the order of environments
   std::int64_t newton_iterations = 0;
   std::int64_t recomputed_steps = 0;        ///< of blocks, from checkpoints
+  bool stopped = false;                     ///< on the way: gradients are not complete
 };
 
 /// Owns the threads and their scratch: for many rollouts of one model, as in a descent.
@@ -56,12 +59,15 @@ class GradientRollouts {
 
   /// Gradients of every loss over `steps` steps from the states of `start`, which is not changed. The same bits for any
   /// number of threads and whatever tape_bytes. Throws InputError when `start` is of another Model.
-  GradientSummary run(const Batch& start, const StepControls& controls);
+  GradientSummary run(const Batch& start, const StepControls& controls, const GradientGoOn& go_on = {});
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Memory of gradients and of the tapes of all threads [bytes].
+double gradient_bytes(const Model& model, int environments, const GradientOptions& options, int losses);
 
 /// The same, once.
 GradientSummary rollout_gradients(const Batch& start, const StepControls& controls, const GradientOptions& options,

@@ -76,7 +76,6 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
   Tangent tangent(model, options);
   StateTangent s{d.q, d.v, std::vector<double>(std::size_t(m.nv)), std::vector<double>(std::size_t(m.nv))};
   double forward_square = 0, loss_square = 0;
-  Adjoint probe(model, options);
   const auto state = [&](int t) {
     std::vector<double> q(std::size_t(m.nq));
     for (std::size_t i = 0; i < q.size(); ++i) q[i] = tape.state(t)[i * kBlock];

@@ -103,7 +103,7 @@ TEST(ShippedScenes, AreAllRunHere) {
   std::set<std::string> found;
   for (const auto& entry : std::filesystem::directory_iterator(std::string(TANGERE_SOURCE_DIR) + "/scenes"))
     if (entry.path().extension() == ".xml") found.insert(entry.path().stem().string());
-  const std::set<std::string> run = {"box_pushing", "cap_opening",  "insertion",
+  const std::set<std::string> run = {"box_pushing",  "cap_opening",        "identify_ball", "insertion",
                                      "rolling_ball", "rolling_ball_small", "stable_grasp"};
   EXPECT_EQ(found, run) << "a scene without a test of what it does, or a test without a scene";
 }
@@ -190,6 +190,23 @@ TEST(ShippedScenes, CapIsTurnedByTwoStrokes) {
       EXPECT_EQ(r.touch(r.at(1.85), e, s).points, 0) << "between the strokes";
       EXPECT_EQ(r.touch(r.steps - 1, e, s).points, 0) << "let go";
     }
+  }
+}
+
+TEST(ShippedScenes, BallToIdentifyIsPressedRolledAndSlidOver) {
+  const SceneRun r("identify_ball");
+  EXPECT_EQ(r.steps, 500);
+  EXPECT_EQ(r.failed, 0);
+  for (int e = 0; e < kEnvironments; ++e) {
+    for (int k = r.at(0.01); k < r.steps; ++k) ASSERT_GT(r.touch(k, e, 0).pressure, 0.1) << "step " << k;
+    EXPECT_NEAR(r.touch(r.at(0.24), e, 0).pressure, 0.6 + 0.245, 0.1) << "motor and weight";
+    // A ball rolls half the way of what it carries; sliding, the shear is at the limit of friction, 0.5.
+    EXPECT_NEAR(r.q(r.at(0.4), e, "ball_joint.x"), 0.5 * r.q(r.at(0.4), e, "pad_joint.x"), 1e-3);
+    EXPECT_GT(r.q(r.at(0.4), e, "ball_joint.x"), 4e-3);
+    for (double time : {0.3, 0.4})
+      EXPECT_LT(std::abs(r.touch(r.at(time), e, 0).along), 0.2 * r.touch(r.at(time), e, 0).pressure);
+    for (double time : {0.735, 0.765})
+      EXPECT_GT(std::abs(r.touch(r.at(time), e, 0).along), 0.45 * r.touch(r.at(time), e, 0).pressure) << time << " s";
   }
 }
 
