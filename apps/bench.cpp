@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere bench: how fast a scene runs here, by threads. Everything is checked before the first step.
+// tangere bench: how fast a scene or a task runs here, by threads. Everything is checked before the first step.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,10 +11,12 @@
 #include "apps/memory.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
+#include "apps/task_run.hpp"
 #include "io/nearest_name.hpp"
 #include "io/part_file.hpp"
 #include "kernels/isa.hpp"
 #include "kernels/lanes.hpp"
+#include "tasks/task_episodes.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -24,7 +26,7 @@ constexpr int kMostPasses = 1'000'000;
 constexpr int kDefaultEnvironments = 256;  // 16 blocks: a few for each thread of a usual machine
 
 struct Options {
-  std::string scene, frames = "dense", precision = "mixed", svg, csv;
+  std::string scene, frames, policy, precision = "mixed", svg, csv;
   std::vector<int> threads;
   std::optional<std::int64_t> steps;
   std::optional<int> environments, every, repeat;
@@ -32,7 +34,9 @@ struct Options {
   bool overwrite = false, allow_unknown = false;
 };
 
+/// As given, or dense.
 FrameKind frames_named(const std::string& name) {
+  if (name.empty()) return FrameKind::dense;
   std::vector<std::string> names;
   for (const FrameKind value : {FrameKind::dense, FrameKind::compact, FrameKind::none}) {
     names.emplace_back(to_string(value));
@@ -98,20 +102,22 @@ void tell_passes(const Console& console, const BenchRun& run) {
 }
 
 int report(const Options& options, const Console& console, const BenchSetting& setting,
-           const Batch& start, const ControlProgram& controls, const Json& entries) {
+           const Model& model, const Json& of_task, const Json& entries) {
   const bool any_failed = !entries.at(0).at("failed").empty();
   const ExitCode code = any_failed ? kSomeFailed : kDone;
-  console.result({{"command", "bench"},
+  Json result{{"command", "bench"},
                   {"exit_code", static_cast<int>(code)},
                   {"scene", options.scene},
                   {"machine", setting.machine},
-                  {"seed", start.seed()},
-                  {"timestep", controls.timestep()},
-                  {"integrator", to_string(start.model().integrator())},
-                  {"tolerance", start.model().solver().tolerance},
+                  {"seed", options.seed.value_or(0)},
+                  {"timestep", model.timestep()},
+                  {"integrator", to_string(model.integrator())},
+                  {"tolerance", model.solver().tolerance},
                   {"svg", options.svg.empty() ? Json() : Json(options.svg)},
                   {"csv", options.csv.empty() ? Json() : Json(options.csv)},
-                  {"runs", entries}});
+                  {"runs", entries}};
+  result.update(of_task);
+  console.result(result);
   return code;
 }
 
@@ -131,26 +137,10 @@ BenchSetting setting_of(const Options& options, const Model& model,
   return setting;
 }
 
-int bench(const Options& options, const Console& console) {
-  check_arguments(options);
-  // A wrong word is said before a scene is read.
-  frames_named(options.frames);
-  precision_named(options.precision);
-  const Model model(read_scene_for(options.scene, options.allow_unknown, console));
-  const std::uint64_t seed = options.seed.value_or(0);
-  const ControlProgram controls(model, model.timestep(), seed);
-  if (!model.scene().control && model.nu() > 0)
-    console.note("the scene has no <control>: every control is 0");
-  BenchSetting setting = setting_of(options, model, controls);
-  const std::vector<int> threads =
-      options.threads.empty() ? default_thread_counts() : options.threads;
-  const int most_threads = *std::max_element(threads.begin(), threads.end());
-  if (setting.options.frames != FrameKind::none)
-    note_empty_sensors(console, model, setting.options.rollout);
-  note_idle_threads(console, setting.environments, most_threads);
-  check_size(model, setting, most_threads);
-  const Batch start(model, setting.environments, seed);
-
+/// Runs `run` with setting.options.threads at each of `threads` and tells what came out.
+template <class Run>
+int measure(const Options& options, const Console& console, BenchSetting& setting, const std::vector<int>& threads,
+            const Model& model, const Json& of_task, const Run& run) {
   const StopSignals signals;
   Outputs outputs(options);
   console.print(bench_heading(setting));
@@ -158,8 +148,7 @@ int bench(const Options& options, const Console& console) {
   Json entries = Json::array();
   for (const int n : threads) {
     setting.options.threads = n;
-    runs.push_back({n, run_benchmark(start, controls, setting.options,
-                                     [&] { return signals.received() == 0; })});
+    runs.push_back({n, run([&] { return signals.received() == 0; })});
     if (runs.back().result.stopped)
       return report_stop(console, "bench", signals.received(),
                          fmt::format("while measuring {} thread{}", n, n == 1 ? "" : "s"));
@@ -170,7 +159,70 @@ int bench(const Options& options, const Console& console) {
   console.print(bench_footing(runs.front()));
   list_failures(console, "environment", failures_of(runs.front()), "--json names all");
   outputs.write(setting, runs, entries, console);
-  return report(options, console, setting, start, controls, entries);
+  return report(options, console, setting, model, of_task, entries);
+}
+
+/// Thread counts asked for, or the usual ones.
+std::vector<int> thread_counts(const Options& options) {
+  return options.threads.empty() ? default_thread_counts() : options.threads;
+}
+
+int bench_task(const Options& options, const Console& console, const Task& task) {
+  refuse_with_task(task, {{"--every", options.every.has_value()}, {"--frames", !options.frames.empty()}});
+  const PolicyKind kind = policy_named(options.policy, "", PolicyKind::random);
+  const Policy policy(task, kind);
+  BenchSetting setting;
+  setting.scene = options.scene;
+  setting.model = "task " + task.spec().name;
+  setting.machine = processor_name();
+  setting.isa = kernels::active_isa_name();
+  setting.environments = options.environments.value_or(kDefaultEnvironments);
+  setting.options.precision = precision_named(options.precision);
+  setting.options.frames = task.spec().looks_at_tactile ? FrameKind::dense : FrameKind::none;
+  setting.options.rollout.steps = options.steps.value_or(task.spec().horizon);
+  setting.options.repeat = options.repeat.value_or(setting.options.repeat);
+  const std::vector<int> threads = thread_counts(options);
+  const int most_threads = *std::max_element(threads.begin(), threads.end());
+  note_idle_threads(console, setting.environments, most_threads);
+  check_memory(VectorTask::bytes(task, setting.environments, most_threads),
+               fmt::format("--envs {}", setting.environments));
+  VectorOptions vector;
+  vector.seed = options.seed.value_or(0);
+  vector.precision = setting.options.precision;
+  const Json of_task{{"task", task.spec().name},
+                     {"policy", to_string(kind)},
+                     {"steps_per_action", task.spec().steps_per_action}};
+  return measure(options, console, setting, threads, task.model(), of_task, [&](const BenchmarkGoOn& go_on) {
+    vector.threads = setting.options.threads;
+    return run_task_benchmark(task, policy, setting.environments, setting.options.rollout.steps, setting.options.repeat,
+                              vector, go_on);
+  });
+}
+
+int bench(const Options& options, const Console& console) {
+  check_arguments(options);
+  // A wrong word is said before a scene is read.
+  frames_named(options.frames);
+  precision_named(options.precision);
+  if (const std::unique_ptr<Task> task = find_task(options.scene, console)) return bench_task(options, console, *task);
+  refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
+  const Model model(read_scene_for(options.scene, options.allow_unknown, console));
+  const std::uint64_t seed = options.seed.value_or(0);
+  const ControlProgram controls(model, model.timestep(), seed);
+  if (!model.scene().control && model.nu() > 0)
+    console.note("the scene has no <control>: every control is 0");
+  BenchSetting setting = setting_of(options, model, controls);
+  const std::vector<int> threads = thread_counts(options);
+  const int most_threads = *std::max_element(threads.begin(), threads.end());
+  if (setting.options.frames != FrameKind::none)
+    note_empty_sensors(console, model, setting.options.rollout);
+  note_idle_threads(console, setting.environments, most_threads);
+  check_size(model, setting, most_threads);
+  const Batch start(model, setting.environments, seed);
+
+  return measure(options, console, setting, threads, model, {{"task", nullptr}}, [&](const BenchmarkGoOn& go_on) {
+    return run_benchmark(start, controls, setting.options, go_on);
+  });
 }
 
 }  // namespace
@@ -179,12 +231,13 @@ Command add_bench(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
   Options& o = *options;
-  CLI::App* app = program.add_subcommand("bench", "Measure how fast a scene runs, by threads");
-  add_text(*app, "SCENE", o.scene, "", "Scene file (XML)")->required();
+  CLI::App* app = program.add_subcommand("bench", "Measure how fast a scene or a task runs, by threads");
+  add_text(*app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task")->required();
   add_whole_number<int>(*app, "--envs", o.environments, 1, kMostEnvironments,
                         "Environments, in blocks of 16 [default: 256]");
   add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
-                                 "Steps of the episode [default: as many as the controls last]");
+                                 "Steps of the episode; of a task, actions [default: as many as the controls last]");
+  add_text(*app, "--policy", o.policy, "NAME", "Of a task: random, hold or scripted [default: random]");
   add_whole_numbers(*app, "--threads", o.threads, 1, kMostThreads,
                     "Thread counts to measure [default: 1,2,4,... up to the processors here]");
   add_text(*app, "--precision", o.precision, "NAME",

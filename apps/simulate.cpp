@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere simulate: a scene, a batch, a file. Everything is checked before the first step.
+// tangere simulate: a scene or a task, a batch, a file. Everything is checked before the first step.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
@@ -11,17 +12,18 @@
 #include "apps/progress.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
+#include "apps/task_run.hpp"
 #include "io/nearest_name.hpp"
 #include "io/saved_state.hpp"
 #include "io/trajectory_file.hpp"
 #include "kernels/isa.hpp"
-#include "tasks/rollout.hpp"
+#include "tasks/task_pilot.hpp"
 
 namespace tangere::apps {
 namespace {
 
 struct Options {
-  std::string scene, output, controls, integrator, precision = "double", state_from;
+  std::string scene, output, controls, policy, integrator, precision = "double", state_from;
   std::optional<std::int64_t> steps, row;
   std::optional<int> environments, every;
   std::optional<double> timestep, tolerance;
@@ -53,9 +55,12 @@ void check_size(const Model& model, int environments) {
                fmt::format("--envs {}", environments));
 }
 
-TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
-                             const RolloutOptions& rollout, const ProgramInfo& info) {
+/// `task`: null for a scene alone.
+TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper, const RolloutOptions& rollout,
+                             const ProgramInfo& info, const Task* task = nullptr, const std::string& policy = {}) {
   RunDescription run;
+  if (task != nullptr) run.task = task->spec();
+  run.policy = policy;
   run.steps = rollout.steps;
   run.first_step = rollout.first_step;
   run.every = rollout.every;
@@ -75,8 +80,14 @@ std::vector<Failure> failures_of(const RolloutSummary& summary) {
   return failures;
 }
 
-int report(const Options& options, const Console& console, const Batch& batch,
-           const Stepper& stepper, const RolloutOptions& rollout, const RolloutSummary& summary) {
+/// What a run of a task adds: keys of the JSON object, a line for people.
+struct TaskReport {
+  Json keys{{"task", nullptr}};
+  std::string line = "no task: every reward is 0";
+};
+
+int report(const Options& options, const Console& console, const Batch& batch, const Stepper& stepper,
+           const RolloutOptions& rollout, const RolloutSummary& summary, const TaskReport& of_task = {}) {
   const ExitCode code = summary.failures.empty() ? kDone : kSomeFailed;
   const auto bytes = std::filesystem::file_size(options.output);
   const double rate = static_cast<double>(summary.environment_steps) / summary.seconds;
@@ -85,16 +96,16 @@ int report(const Options& options, const Console& console, const Batch& batch,
   list_failures(console, "environment", failures_of(summary), "--json and the file name all");
   console.print(
       fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
-                  "Newton iterations per step: {:.2f}, steps split: {}, environments failed: {}\n"
+                  "Newton iterations per step: {:.2f}, steps split: {}, environments failed: {}\n{}\n"
                   "wrote {} ({} bytes)",
                   batch.environments(), summary.steps, summary.seconds, rate, per_step,
-                  summary.split_steps, summary.failures.size(), options.output, bytes));
+                  summary.split_steps, summary.failures.size(), of_task.line, options.output, bytes));
   Json sensors = Json::array();
   for (const SensorInfo& sensor : batch.model().sensors()) {
     const int every = tactile_interval(sensor, rollout);
     sensors.push_back({{"name", sensor.name}, {"every", every}, {"frames", tactile_frames(sensor, rollout)}});
   }
-  console.result({{"command", "simulate"},
+  Json result{{"command", "simulate"},
                   {"exit_code", static_cast<int>(code)},
                   {"scene", options.scene},
                   {"output", options.output},
@@ -116,7 +127,9 @@ int report(const Options& options, const Console& console, const Batch& batch,
                   {"newton_iterations", summary.newton_iterations},
                   {"newton_iterations_per_step", per_step},
                   {"split_steps", summary.split_steps},
-                  {"failed", failures_json("environment", failures_of(summary))}});
+                  {"failed", failures_json("environment", failures_of(summary))}};
+  result.update(of_task.keys);
+  console.result(result);
   return code;
 }
 
@@ -163,9 +176,70 @@ std::int64_t steps_left(const Options& options, const ControlProgram& controls, 
   return left;
 }
 
+/// Steps and writes; `run`: the rollout into the file, told how many steps are done.
+template <class Run>
+int write_run(const Options& options, const Console& console, const Batch& batch, const Stepper& stepper,
+              const RolloutOptions& rollout, TrajectoryFile& output, const StopSignals& signals, const Run& run,
+              const std::function<TaskReport()>& of_task) {
+  console.detail(fmt::format("environments: {}, steps: {}, {}, h = {} s", batch.environments(),
+                             rollout.steps, to_string(stepper.integrator()), stepper.timestep()));
+  RolloutSummary summary;
+  {
+    Progress progress(console, "step", rollout.steps, batch.environments());
+    summary = run([&](std::int64_t done) {
+      progress.update(done);
+      return signals.received() == 0;
+    });
+  }
+  if (summary.stopped)
+    return report_stop(console, "simulate", signals.received(),
+                       fmt::format("after {} of {} steps", summary.steps, rollout.steps));
+  output.commit();
+  return report(options, console, batch, stepper, rollout, summary, of_task());
+}
+
+int simulate_task(const Options& options, const Console& console, const ProgramInfo& info, const Task& task,
+                  Precision precision) {
+  refuse_with_task(task, {{"--steps", options.steps.has_value()},
+                          {"--state-from", !options.state_from.empty()},
+                          {"--timestep", options.timestep.has_value()},
+                          {"--integrator", !options.integrator.empty()},
+                          {"--tol", options.tolerance.has_value()}});
+  const PolicyKind kind = policy_named(options.policy, options.controls, PolicyKind::scripted);
+  const Policy policy = make_policy(task, kind, options.controls);
+  const Model& model = task.model();
+  Stepper stepper(model);
+  const RolloutOptions rollout{TaskPilot::steps(task.spec()), options.every.value_or(0), precision, 0};
+  note_empty_sensors(console, model, rollout);
+  check_size(model, options.environments.value_or(1));
+  Batch batch(model, options.environments.value_or(1), options.seed.value_or(0));
+  TaskPilot pilot(task, policy, batch, precision);
+
+  const StopSignals signals;
+  TrajectoryFile output(options.output, make_layout(batch, stepper, rollout, info, &task, to_string(kind)),
+                        options.overwrite);
+  return write_run(
+      options, console, batch, stepper, rollout, output, signals,
+      [&](const RolloutProgress& progress) { return run_rollout(batch, stepper, pilot, rollout, output, progress); },
+      [&] {
+        const double rate = static_cast<double>(pilot.successes()) / batch.environments();
+        return TaskReport{{{"task", task.spec().name},
+                           {"policy", to_string(kind)},
+                           {"successes", pilot.successes()},
+                           {"success_rate", rate},
+                           {"mean_return", pilot.mean_return()}},
+                          fmt::format("task {}, policy {}: {} of {} episodes solved, mean return {:.4g}",
+                                      task.spec().name, to_string(kind), pilot.successes(), batch.environments(),
+                                      pilot.mean_return())};
+      });
+}
+
 int simulate(const Options& options, const Console& console, const ProgramInfo& info) {
   check_arguments(options);
   const Precision precision = precision_named(options.precision);
+  if (const std::unique_ptr<Task> task = find_task(options.scene, console))
+    return simulate_task(options, console, info, *task, precision);
+  refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
   StepperOptions solver{{}, options.timestep, options.tolerance};
   if (!options.integrator.empty()) solver.integrator = integrator_named(options.integrator);
 
@@ -186,21 +260,10 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
   const StopSignals signals;
   TrajectoryFile output(options.output, make_layout(batch, stepper, rollout, info),
                         options.overwrite);
-  console.detail(fmt::format("environments: {}, steps: {}, {}, h = {} s", start.environments,
-                             rollout.steps, to_string(stepper.integrator()), stepper.timestep()));
-  RolloutSummary summary;
-  {
-    Progress progress(console, "step", rollout.steps, start.environments);
-    summary = run_rollout(batch, stepper, controls, rollout, output, [&](std::int64_t done) {
-      progress.update(done);
-      return signals.received() == 0;
-    });
-  }
-  if (summary.stopped)
-    return report_stop(console, "simulate", signals.received(),
-                       fmt::format("after {} of {} steps", summary.steps, rollout.steps));
-  output.commit();
-  return report(options, console, batch, stepper, rollout, summary);
+  return write_run(
+      options, console, batch, stepper, rollout, output, signals,
+      [&](const RolloutProgress& progress) { return run_rollout(batch, stepper, controls, rollout, output, progress); },
+      [] { return TaskReport{}; });
 }
 
 }  // namespace
@@ -209,11 +272,13 @@ Command add_simulate(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
   Options& o = *options;
-  CLI::App* app = program.add_subcommand("simulate", "Run a scene and write its trajectory");
-  add_text(*app, "SCENE", o.scene, "", "Scene file (XML)")->required();
+  CLI::App* app = program.add_subcommand("simulate", "Run a scene or a task and write its trajectory");
+  add_text(*app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task")->required();
   add_text(*app, "-o,--output", o.output, "F.h5", "HDF5 file to write")->required();
   add_text(*app, "--controls", o.controls, "U.csv",
-           "Table of controls, a row per step, instead of the scene's <control>");
+           "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
+  add_text(*app, "--policy", o.policy, "NAME",
+           "Of a task: random, hold, csv (with --controls) or scripted [default: scripted]");
   add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
                                  "Steps to take [default: as many as the controls last]");
   add_whole_number<int>(*app, "--envs", o.environments, 1, kMostEnvironments,

@@ -27,8 +27,9 @@ install(FILES kernels/contact_types.hpp DESTINATION ${headers}/kernels)
 install(FILES engine/aligned.hpp engine/batch.hpp engine/control.hpp engine/episode_sink.hpp engine/error.hpp
   engine/flow_map.hpp engine/model.hpp
   engine/precision.hpp engine/readout.hpp engine/row_sink.hpp engine/scene.hpp engine/stepper.hpp
-  engine/tactile_frame.hpp DESTINATION ${headers}/engine)
-install(FILES tasks/benchmark_run.hpp tasks/episodes.hpp tasks/rollout.hpp DESTINATION ${headers}/tasks)
+  engine/tactile_frame.hpp engine/task_spec.hpp DESTINATION ${headers}/engine)
+install(FILES tasks/benchmark_run.hpp tasks/episodes.hpp tasks/policy.hpp tasks/rollout.hpp tasks/task.hpp
+  tasks/task_episodes.hpp tasks/task_list.hpp tasks/task_pilot.hpp tasks/vector_task.hpp DESTINATION ${headers}/tasks)
 install(FILES io/dataset_layout.hpp io/dataset_writer.hpp io/scene_reader.hpp io/shard_check.hpp io/trajectory_file.hpp
   io/trajectory_layout.hpp DESTINATION ${headers}/io)
 install(DIRECTORY scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tangere/scenes)

@@ -23,6 +23,7 @@ Purpose purpose_of(RandomTarget target) {
     case RandomTarget::pair_contact: return Purpose::contact;
     case RandomTarget::joint_effect:
     case RandomTarget::motor: return Purpose::joint;
+    case RandomTarget::density: return Purpose::body;
     case RandomTarget::tactile: break;
   }
   return Purpose::tactile;
@@ -46,6 +47,8 @@ double nominal(const CompiledModel& m, const RandomizationDescription& d) {
     if (d.target == RandomTarget::joint_effect && l.joint.name == d.name)
       return values[static_cast<int>(d.joint_field)];
   }
+  for (const auto& l : m.scene.links)
+    if (d.target == RandomTarget::density && l.body.name == d.name) return l.body.density;
   for (const auto& motor : m.scene.motors)
     if (d.target == RandomTarget::motor && motor.joint == d.name)
       return d.joint_field == JointField::P ? motor.P : motor.D;
@@ -67,7 +70,12 @@ const char* to_string(StepStatus value) {
 }
 
 Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int64_t first_episode)
-    : model_(model), environments_(environments), blocks_(0), seed_(seed), first_episode_(first_episode) {
+    : model_(model),
+      environments_(environments),
+      blocks_(0),
+      seed_(seed),
+      q_(std::size_t(model.nq())),
+      v_(std::size_t(model.nv())) {
   if (environments < 1)
     throw InputError("a batch of " + std::to_string(environments) + " environments; expected at least 1");
   const CompiledModel& m = model.compiled();
@@ -80,37 +88,69 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
     iterations_.assign(lanes, 0);
     residual_.assign(lanes, 0.0);
     has_history_.assign(lanes, 0);
+    held_.assign(lanes, 0);
+    episode_.resize(lanes);
   } catch (const std::exception&) {
     throw InputError("no memory for " + std::to_string(environments) + " environments (" +
                      std::to_string(double(block_stride_) * double(blocks_) * sizeof(double) / 1e9) + " GB)");
   }
-  std::vector<double> q(m.nq), v(m.nv);
   for (std::size_t lane = 0; lane < lanes; ++lane) {
-    const int e = static_cast<int>(lane);
-    const bool padding = e >= environments_;
-    double* column = data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock;
-    q = m.initial_q;
-    v = m.initial_v;
-    for (std::size_t k = 0; k < m.scene.randomizations.size(); ++k) {
-      const RandomizationDescription& d = m.scene.randomizations[k];
-      const int row = m.randomized_row[k];
-      const bool of_state = row < m.layout.parameters;
-      if (padding) {
-        if (!of_state) column[std::size_t(row) * kBlock] = nominal(m, d);
-        continue;
-      }
-      const double value =
-          draw(d.distribution, RandomKey{seed, first_episode + e, 0, purpose_of(d.target), std::uint32_t(k)});
-      if (!of_state) {
-        column[std::size_t(row) * kBlock] = value;
-      } else if (d.target == RandomTarget::joint_q) {
-        q[std::size_t(row - m.layout.q)] = value;
-      } else {
-        v[std::size_t(row - m.layout.v)] = value;
-      }
-    }
-    write_state(lane, q, v);
+    episode_[lane] = first_episode + static_cast<std::int64_t>(lane);
+    draw_episode(lane);
   }
+}
+
+double* Batch::column(std::size_t lane) { return data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock; }
+
+/// Padding lanes keep the scene's own numbers.
+void Batch::draw_episode(std::size_t lane) {
+  const CompiledModel& m = model_.compiled();
+  const bool padding = lane >= std::size_t(environments_);
+  q_ = m.initial_q;
+  v_ = m.initial_v;
+  for (std::size_t k = 0; k < m.scene.randomizations.size(); ++k) {
+    const RandomizationDescription& d = m.scene.randomizations[k];
+    const int row = m.randomized_row[k];
+    const bool of_state = row < m.layout.parameters;
+    if (padding) {
+      if (!of_state) column(lane)[std::size_t(row) * kBlock] = nominal(m, d);
+      continue;
+    }
+    const double value =
+        draw(d.distribution, RandomKey{seed_, episode_[lane], 0, purpose_of(d.target), std::uint32_t(k)});
+    if (!of_state) {
+      column(lane)[std::size_t(row) * kBlock] = value;
+    } else if (d.target == RandomTarget::joint_q) {
+      q_[std::size_t(row - m.layout.q)] = value;
+    } else {
+      v_[std::size_t(row - m.layout.v)] = value;
+    }
+  }
+  update_inertia(lane);
+  write_state(lane, q_, v_);
+}
+
+/// Inertia of links whose bodies have densities that vary: a sum that is linear in them.
+void Batch::update_inertia(std::size_t lane) {
+  double* const rows = column(lane);
+  for (const VaryingInertia& link : model_.compiled().varying_inertia) {
+    InertiaRows sum = link.constant;
+    for (const VaryingInertia::Part& part : link.parts)
+      for (std::size_t i = 0; i < sum.size(); ++i)
+        sum[i] += rows[std::size_t(part.row) * kBlock] * part.of_density[i];
+    for (std::size_t i = 0; i < sum.size(); ++i) rows[(std::size_t(link.row) + i) * kBlock] = sum[i];
+  }
+}
+
+void Batch::reset(int environment, std::int64_t episode) {
+  const std::size_t lane = std::size_t(environment);
+  episode_[lane] = episode;
+  draw_episode(lane);
+  status_[lane] = StepStatus::converged;
+  iterations_[lane] = 0;
+  residual_[lane] = 0;
+  has_history_[lane] = 0;
+  held_[lane] = 0;
 }
 
 void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<const double> v) {
@@ -178,11 +218,26 @@ int Batch::failed_count() const {
   return static_cast<int>(std::count_if(all.begin(), all.end(), [](StepStatus s) { return failed(s); }));
 }
 
+bool Batch::is_parameter(int k) const {
+  const CompiledModel& m = model_.compiled();
+  return m.randomized_row[std::size_t(k)] >= m.layout.parameters;
+}
+
 double Batch::randomized_value(int environment, int k) const {
   const CompiledModel& m = model_.compiled();
-  const RandomizationDescription& d = m.scene.randomizations[k];
-  return draw(d.distribution,
-              RandomKey{seed_, first_episode_ + environment, 0, purpose_of(d.target), std::uint32_t(k)});
+  const RandomizationDescription& d = m.scene.randomizations[std::size_t(k)];
+  const int row = m.randomized_row[std::size_t(k)];
+  if (is_parameter(k)) return (block(environment / kBlock) + environment % kBlock)[std::size_t(row) * kBlock];
+  return draw(d.distribution, RandomKey{seed_, episode(environment), 0, purpose_of(d.target), std::uint32_t(k)});
+}
+
+void Batch::set_randomized_value(int environment, int k, double value) {
+  const CompiledModel& m = model_.compiled();
+  const int row = m.randomized_row[std::size_t(k)];
+  if (!is_parameter(k))
+    throw InputError("randomised number " + std::to_string(k) + " is of the starting state; expected a parameter");
+  column(std::size_t(environment))[std::size_t(row) * kBlock] = value;
+  update_inertia(std::size_t(environment));
 }
 
 }  // namespace tangere

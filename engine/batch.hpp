@@ -34,7 +34,13 @@ class Batch {
   [[nodiscard]] int environments() const { return environments_; }
   [[nodiscard]] int blocks() const { return blocks_; }
   [[nodiscard]] std::uint64_t seed() const { return seed_; }
-  [[nodiscard]] std::int64_t episode(int environment) const { return first_episode_ + environment; }
+  [[nodiscard]] std::int64_t episode(int environment) const { return episode_[std::size_t(environment)]; }
+
+  /// Draws another episode into one environment, as a new batch would have it: the same bits wherever it is drawn.
+  void reset(int environment, std::int64_t episode);
+  /// A held environment is not stepped and keeps its state; reset() lets it go as well.
+  void hold(int environment, bool held = true) { held_[std::size_t(environment)] = held ? 1 : 0; }
+  [[nodiscard]] bool held(int environment) const { return held_[std::size_t(environment)] != 0; }
 
   /// One environment's coordinates, copied out of or into its lane: (nq), (nv).
   void get_q(int environment, std::span<double> q) const;
@@ -56,8 +62,13 @@ class Batch {
   [[nodiscard]] std::span<const double> residuals() const { return {residual_.data(), std::size_t(environments_)}; }
   [[nodiscard]] int failed_count() const;
 
-  /// Value of randomised number k (in the order of Scene::randomizations) in an environment.
+  /// Value of randomised number k (in the order of Scene::randomizations) in an environment: what was drawn for it, or
+  /// set since if it is no number of the starting state.
   [[nodiscard]] double randomized_value(int environment, int k) const;
+  /// Whether randomised number k is a parameter, not one of the starting state.
+  [[nodiscard]] bool is_parameter(int k) const;
+  /// Sets randomised number k of an environment until its next reset. Throws InputError for one of the starting state.
+  void set_randomized_value(int environment, int k, double value);
 
   /// First row of a block: row r, lane l at block(b)[r * 16 + l]. For the stepper and the tests.
   double* block(int b) { return data_.data() + std::size_t(b) * block_stride_; }
@@ -66,11 +77,13 @@ class Batch {
  private:
   friend class Stepper;
   void write_state(std::size_t lane, std::span<const double> q, std::span<const double> v);
+  void draw_episode(std::size_t lane);
+  void update_inertia(std::size_t lane);
+  [[nodiscard]] double* column(std::size_t lane);
 
   Model model_;
   int environments_, blocks_;
   std::uint64_t seed_;
-  std::int64_t first_episode_;
   std::size_t block_stride_;           // doubles per block
   AlignedVector<double> data_;
   // Per lane, padding lanes included, so that a block can be handed to a thread whole.
@@ -78,6 +91,9 @@ class Batch {
   std::vector<std::int32_t> iterations_;
   std::vector<double> residual_;
   std::vector<std::uint8_t> has_history_;  // BDF2: the previous state is valid
+  std::vector<std::uint8_t> held_;
+  std::vector<std::int64_t> episode_;
+  std::vector<double> q_, v_;  // (nq), (nv): an episode on its way into its lane
 };
 
 }  // namespace tangere

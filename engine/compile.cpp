@@ -260,6 +260,11 @@ class Compiler {
         m_.randomized_row.push_back(state_row(d));
         continue;
       }
+      if (d.target == RandomTarget::density) {
+        vary_density(d, next);
+        m_.randomized_row.push_back(next++);
+        continue;
+      }
       if (d.target == RandomTarget::joint_effect || d.target == RandomTarget::motor) {
         vary_joint(m_, joints_, d, next);
         m_.randomized_row.push_back(next++);
@@ -272,7 +277,52 @@ class Compiler {
       parameters_of(d, vary);
       m_.randomized_row.push_back(next++);
     }
+    for (VaryingInertia& varying : m_.varying_inertia) {
+      Link& link = *std::find_if(m_.links.begin(), m_.links.end(),
+                                 [&](const Link& l) { return l.inertia_row == varying.row; });
+      link.inertia_row = varying.row = next;
+      next += static_cast<int>(varying.constant.size());
+    }
     m_.layout.rows = next;
+  }
+
+
+  /// What a body adds to the inertia of its link per kg/m³ of density.
+  [[nodiscard]] InertiaRows inertia_of_density(int b) const {
+    const CompiledBody& body = m_.bodies[std::size_t(b)];
+    const MassProperties unit = mass_properties(m_.scene.links[std::size_t(b)].body.shape, 1);
+    Link link{};
+    CompiledBody of_density = body;
+    of_density.mass = unit.mass;
+    add_inertia(link, of_density, unit);
+    const auto& I = link.inertia.m;
+    return {link.mass, link.moment.x, link.moment.y, link.moment.z, I[0][0], I[0][1], I[0][2], I[1][1], I[1][2], I[2][2]};
+  }
+
+  /// Until all rows are known, `row` of a link and of its entry say which of them belong together.
+  void vary_density(const RandomizationDescription& d, int row) {
+    const int b = bodies_.find("body", d.name, d.source);
+    const BodyDescription& body = m_.scene.links[std::size_t(b)].body;
+    const auto fail = [&](const std::string& why) {
+      throw InputError(d.source.prefix() + "density of body '" + d.name + "' varies, but " + why);
+    };
+    if (std::holds_alternative<AbstractShape>(body.shape)) fail("its mass is given; expected a body with volume");
+    if (m_.bodies[std::size_t(b)].link < 0) fail("it is fixed in the world");
+    if (!(body.density > 0)) fail("it is massless; expected a positive density");
+    Link& link = m_.links[std::size_t(m_.bodies[std::size_t(b)].link)];
+    if (link.inertia_row < 0) {
+      const auto& I = link.inertia.m;
+      link.inertia_row = row;
+      m_.varying_inertia.push_back({row,
+                                    {link.mass, link.moment.x, link.moment.y, link.moment.z, I[0][0], I[0][1], I[0][2],
+                                     I[1][1], I[1][2], I[2][2]},
+                                    {}});
+    }
+    VaryingInertia& varying = *std::find_if(m_.varying_inertia.begin(), m_.varying_inertia.end(),
+                                            [&](const VaryingInertia& v) { return v.row == link.inertia_row; });
+    const InertiaRows of_density = inertia_of_density(b);
+    for (std::size_t i = 0; i < of_density.size(); ++i) varying.constant[i] -= body.density * of_density[i];
+    varying.parts.push_back({row, of_density});
   }
 
   int state_row(const RandomizationDescription& d) const {

@@ -2,6 +2,7 @@
 // The arrays behind a Model. Private to the engine: kernels see them through ModelView.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "engine/aligned.hpp"
@@ -85,6 +86,20 @@ struct BlockLayout {
   int q = 0, v = 0, previous_q = 0, previous_v = 0, parameters = 0, rows = 0;
 };
 
+/// Mass [kg], mass times centre of mass x y z [kg m], inertia xx xy xz yy yz zz about a link's origin [kg m²], link axes.
+using InertiaRows = std::array<double, 10>;
+
+/// A link some of whose bodies have densities that vary: rows `row` … of the block are constant + Σ density of_density.
+struct VaryingInertia {
+  struct Part {
+    int row;                 ///< of the block: the density [kg/m³]
+    InertiaRows of_density;  ///< for a density of 1
+  };
+  int row = 0;
+  InertiaRows constant{};
+  std::vector<Part> parts;
+};
+
 struct CompiledModel {
   Scene scene;
   int nq = 0, nv = 0, nu = 0;
@@ -101,6 +116,7 @@ struct CompiledModel {
   std::vector<int> pair_order, ground_order;       ///< members of link_pairs and grounded, side by side
   std::vector<std::vector<double>> point_storage;  ///< what pairs and grounds point into
   std::vector<AlignedVector<double>> tile_storage; ///< what pairs' tile_points and tile_bounds point into
+  std::vector<VaryingInertia> varying_inertia;
   std::vector<kernels::DofEffects> dof_effects;  ///< (nv)
   std::vector<double> unknown_scale;   ///< (nv) what an unknown is rounded against: extent of the scene [m], 1 [rad]
   std::vector<double> initial_q, initial_v;

@@ -15,6 +15,14 @@ namespace tangere {
 /// Numbers of one name as they are stored: float64 or float32.
 using Observation = std::variant<std::span<const double>, std::span<const float>>;
 
+/// How an episode of a task ended.
+struct EpisodeEnd {
+  std::int64_t length = 0;    ///< actions taken: rows behind belong to nothing
+  double total = 0;           ///< sum of its rewards
+  bool terminated = false;    ///< by itself, not for want of time
+  bool success = false;
+};
+
 /// Rows [first_row, first_row + rows) of consecutive episodes. Row j is the state after j K steps;
 /// an episode of R actions has R + 1 of them, the last one without an action.
 struct EpisodeRows {
@@ -24,7 +32,10 @@ struct EpisodeRows {
   int rows = 0;
   int action_rows = 0;                        ///< rows, one less when the last row is among them
   std::span<const float> actions;             ///< (episodes, action_rows, nu) in [-1, 1]
-  std::span<const Observation> observations;  ///< q, v, end effectors if any, sensors: (episodes, rows, width)
+  /// q, v, then of a task its observations, of a scene end effectors if any and sensors: (episodes, rows, width)
+  std::span<const Observation> observations;
+  std::span<const float> rewards = {};    ///< of a task: (episodes, action_rows)
+  std::span<const EpisodeEnd> ends = {};  ///< of a task, whose blocks come whole and in ascending order: (episodes)
 };
 
 /// An episode that no solution was found for.

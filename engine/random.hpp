@@ -24,6 +24,9 @@ enum class Purpose : std::uint8_t {
   tactile = 2,        ///< <randomize> of a sensor's coefficients
   control = 3,        ///< knots of a random control
   joint = 4,          ///< <randomize> of a joint's effects or a motor's gains
+  body = 5,           ///< <randomize> of a body
+  task = 6,           ///< what a task draws at a reset or during an episode
+  policy = 7,         ///< actions of a policy that draws them
 };
 
 /// Names one random number. Different keys give independent numbers; the same key gives the same

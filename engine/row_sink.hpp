@@ -35,6 +35,15 @@ struct TactileRow {
   std::span<const double> force;  ///< (E, points, 3) [N]: f·axis0, f·axis1, -f·(axis0 × axis1)
 };
 
+/// What action j of a task was and came to, all environments. Those whose episode is over take none: their rows hold 0.
+struct ActionRow {
+  std::int64_t action;                      ///< j
+  std::int64_t step;                        ///< row of q after it
+  std::span<const double> u;                ///< (E, width) as the task took it
+  std::span<const double> reward;           ///< (E)
+  std::span<const std::uint8_t> terminated, truncated, success;  ///< (E) of the episode, from its last action on
+};
+
 /// Receives rows in ascending order. A sink that cannot store throws IoError; the rollout stops and passes it on.
 class RowSink {
  public:
@@ -42,6 +51,7 @@ class RowSink {
   virtual void write(const StateRow& row) = 0;
   virtual void write(const StepRow& row) = 0;
   virtual void write(const TactileRow& row) = 0;
+  virtual void write(const ActionRow&) {}  ///< of a task only
 };
 
 }  // namespace tangere

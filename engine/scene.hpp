@@ -216,12 +216,12 @@ struct Distribution {
   double a = 0, b = 0;          ///< uniform, log_uniform: low, high; normal: mean, standard deviation
   std::vector<double> values;   ///< list: equally likely
 };
-enum class RandomTarget { joint_q, joint_v, ground_contact, pair_contact, tactile, joint_effect, motor };
+enum class RandomTarget { joint_q, joint_v, ground_contact, pair_contact, tactile, joint_effect, motor, density };
 enum class ContactField { kn, kt, mu, damping };
 enum class JointField { damping, armature, stiffness, lim_stiffness, P, D };  ///< the last two: position motors
 struct RandomizationDescription {
   RandomTarget target = RandomTarget::joint_q;
-  std::string name;                 ///< joint (its motor), tactile, body of a ground contact, or general body of a pair
+  std::string name;                 ///< joint (its motor), tactile, body (of a ground contact), or general body of a pair
   std::string second_name;          ///< primitive body of a pair
   int index = 0;                    ///< joint_q, joint_v: which component
   ContactField field = ContactField::kn;  ///< contacts and tactile

@@ -124,7 +124,7 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
     GroupOfBlock g{batch.block(block) + group * kGroup, block * kBlock + group * kGroup};
     for (int l = 0; l < kGroup; ++l) {
       const std::size_t e = std::size_t(g.first + l);
-      if (g.first + l >= batch.environments() || failed(batch.status_[e])) continue;
+      if (g.first + l >= batch.environments() || failed(batch.status_[e]) || batch.held_[e] != 0) continue;
       g.live |= 1U << l;
       if (batch.has_history_[e] != 0) g.history |= 1U << l;
     }

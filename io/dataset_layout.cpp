@@ -19,8 +19,19 @@ constexpr const char* kVariables = "variables";
 
 }  // namespace
 
+std::vector<std::string> DatasetLayout::action_names() const {
+  if (!task) return u_names;
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < task->action.size(); ++k) names.push_back(fmt::format("{}[{}]", task->action.name, k));
+  return names;
+}
+
 std::vector<std::string> DatasetLayout::observation_names() const {
   std::vector<std::string> names{"q", "v"};
+  if (task) {
+    for (const TensorSpec& tensor : task->observations) names.push_back(tensor.name);
+    return names;
+  }
   if (!variable_names.empty()) names.emplace_back(kVariables);
   for (const SensorLayout& sensor : sensors) names.push_back(sensor.name);
   return names;
@@ -28,6 +39,10 @@ std::vector<std::string> DatasetLayout::observation_names() const {
 
 std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() const {
   std::vector<std::vector<std::uint64_t>> shapes{{q_names.size()}, {v_names.size()}};
+  if (task) {
+    for (const TensorSpec& tensor : task->observations) shapes.emplace_back(tensor.shape.begin(), tensor.shape.end());
+    return shapes;
+  }
   if (!variable_names.empty()) shapes.push_back({variable_names.size(), 3});
   for (const SensorLayout& s : sensors) {
     if (s.rectangular())
@@ -44,7 +59,7 @@ double DatasetLayout::episode_bytes() const {
     numbers += static_cast<double>(
         std::accumulate(shape.begin(), shape.end(), std::uint64_t{1}, std::multiplies<>()));
   const double r = static_cast<double>(rows());
-  const double of_actions = static_cast<double>(u_names.size()) * sizeof(float);
+  const double of_actions = static_cast<double>(action_names().size()) * sizeof(float);
   constexpr double kRewardAndDone = sizeof(float) + 1;
   return (r + 1) * numbers * (single ? sizeof(float) : sizeof(double)) +
          r * (of_actions + kRewardAndDone);
@@ -64,7 +79,7 @@ void DatasetLayout::check() const {
     if (name.empty() || name == "." || name.find('/') != std::string::npos)
       throw InputError(fmt::format(
           "sensor '{}': a dataset cannot have this name; expected one without '/'", name));
-    if (!names.insert(name).second)
+    if (!task && !names.insert(name).second)
       throw InputError(
           fmt::format("sensor '{}': another observation has this name; expected none of q, v, "
                       "variables (of end effectors) and the other sensors",

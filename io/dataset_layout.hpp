@@ -5,9 +5,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "engine/task_spec.hpp"
 #include "io/trajectory_layout.hpp"
 
 namespace tangere {
@@ -23,6 +25,8 @@ struct DatasetLayout {
   std::vector<std::string> u_names;           ///< (nu)
   std::vector<std::string> variable_names;    ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
+  std::optional<TaskSpec> task;  ///< whose actions, observations and rewards these are; none: a scene alone
+  std::string policy;            ///< of a task
   std::string scene_name, scene_text;
   std::string integrator;
   double timestep = 0;   ///< [s]
@@ -30,11 +34,13 @@ struct DatasetLayout {
   std::string precision, version, instruction_set;
   double shard_bytes = 1 << 30;  ///< a shard stays below it, unless 16 episodes are more
 
-  /// R: actions of an episode.
+  /// R: actions of an episode, of a task at most.
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
-  /// Names below obs: q, v, "variables" if there are end effectors, then the sensors.
+  /// Names of the numbers of an action.
+  [[nodiscard]] std::vector<std::string> action_names() const;
+  /// Names below obs: q, v, then what a task observes, or "variables" if there are end effectors and the sensors.
   [[nodiscard]] std::vector<std::string> observation_names() const;
-  /// Shapes of one row of each of them: {nq}, {nv}, {n, 3}, {rows, cols, 3}.
+  /// Shapes of one row of each of them: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
   [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
   /// Numbers of one episode on disk, without HDF5's own [bytes].
   [[nodiscard]] double episode_bytes() const;
@@ -51,6 +57,8 @@ struct DatasetDescription {
   std::uint64_t seed = 0;
   bool single = false;  ///< observations are float32
   std::string precision, version, instruction_set;
+  std::optional<TaskSpec> task;
+  std::string policy;
 };
 
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,

@@ -59,6 +59,7 @@ std::string randomized_name(const RandomizationDescription& d) {
     case RandomTarget::pair_contact:
       return fmt::format("{}/{}.{}", d.name, d.second_name, field_name(d.field));
     case RandomTarget::tactile: return fmt::format("{}.{}", d.name, field_name(d.field));
+    case RandomTarget::density: return fmt::format("{}.density", d.name);
     case RandomTarget::joint_effect: return fmt::format("{}.{}", d.name, to_string(d.joint_field));
     case RandomTarget::motor: return fmt::format("motor/{}.{}", d.name, to_string(d.joint_field));
   }
@@ -107,6 +108,8 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.first_episode = batch.episode(0);
   layout.precision = run.precision;
   layout.command_line = run.command_line;
+  layout.task = run.task;
+  layout.policy = run.policy;
   layout.version = run.version;
   layout.instruction_set = run.instruction_set;
   return layout;
@@ -137,6 +140,8 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.precision = run.precision;
   layout.version = run.version;
   layout.instruction_set = run.instruction_set;
+  layout.task = run.task;
+  layout.policy = run.policy;
   return layout;
 }
 

@@ -124,6 +124,23 @@ void read_state_variation(const Scene& scene, const SceneNode& node, Randomizati
   d.distribution = read_distribution(node, coordinate_scale(type, d.index, node.context()));
 }
 
+/// The density of a body.
+void read_density_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
+  node.check_attributes({"name", "field", "uniform", "log_uniform", "normal", "list"});
+  const BodyDescription& body = scene.links[std::size_t(find_body(scene, node, "name"))].body;
+  static_cast<void>(node.choice("field", {"density"}));
+  if (std::holds_alternative<AbstractShape>(body.shape))
+    node.fail("body '" + body.name + "' is known by its mass; nothing of it can vary");
+  if (!(body.density > 0)) node.fail("body '" + body.name + "' is massless; expected a positive density");
+  d.target = RandomTarget::density;
+  d.name = body.name;
+  d.distribution = read_distribution(node, node.context().density);
+  check_coefficient(node, d.distribution);
+  bool zero = d.distribution.kind == Distribution::Kind::uniform && d.distribution.a == 0;
+  for (double x : d.distribution.values) zero = zero || x == 0;
+  if (zero) node.fail("a density of 0; expected positive ones");
+}
+
 /// The law decides the unit of `damping`.
 double field_scale(const SceneNode& node, ContactField field, ContactLaw law) {
   const SceneContext& c = node.context();
@@ -225,7 +242,8 @@ void read_control(Scene& scene, const SceneNode& section) {
 
 void read_randomize(Scene& scene, const SceneNode& section) {
   section.check_attributes({});
-  const std::vector<std::string> kinds = {"joint", "motor", "ground_contact", "general_primitive_contact", "tactile"};
+  const std::vector<std::string> kinds = {"joint", "motor", "ground_contact", "general_primitive_contact", "tactile",
+                                          "body"};
   for (const SceneNode& node : section.children(kinds)) {
     RandomizationDescription d;
     d.source = node.source();
@@ -233,6 +251,8 @@ void read_randomize(Scene& scene, const SceneNode& section) {
       read_joint_variation(scene, node, d);
     } else if (node.name() == "joint") {
       read_state_variation(scene, node, d);
+    } else if (node.name() == "body") {
+      read_density_variation(scene, node, d);
     } else {
       read_coefficient_variation(scene, node, d);
     }

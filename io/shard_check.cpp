@@ -44,6 +44,7 @@ class ShardChecker {
     names_ = h5::read_texts(scene_, "observations");
     single_ = h5::read_text(scene_, "observation_type") == "float32";
     rows_ = number(scene_, "steps") / number(scene_, "every");
+    of_task_ = !h5::read_text(scene_, "task").starts_with("none");
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
     for (std::int64_t episode = content_.first_episode; episode < end; ++episode) {
       const std::string demo = fmt::format("demo_{}", episode);
@@ -74,33 +75,37 @@ class ShardChecker {
   }
 
   void add_demo(const h5::Id& demo, std::int64_t episode) {
-    if (number(demo, "num_samples") != rows_)
-      fail(fmt::format("demo_{} has {} rows, expected {}", episode, number(demo, "num_samples"),
-                       rows_));
-    // Known without a checksum: nothing is rewarded, and only the last row ends the episode.
-    check_list<float>(demo, "rewards", episode, 0);
-    check_list<std::int8_t>(demo, "dones", episode, 1);
-    add<float>(demo, "actions", episode, 0, 0, rows_);
+    const std::int64_t rows = number(demo, "num_samples");
+    if (of_task_ ? rows < 1 || rows > rows_ : rows != rows_)
+      fail(fmt::format("demo_{} has {} rows, expected {}{}", episode, rows, of_task_ ? "1 to " : "", rows_));
+    // Known without a checksum: without a task nothing is rewarded, and only the last row ends the episode.
+    if (of_task_) {
+      add<float>(demo, "rewards", episode, names_.size() + 1, 0, rows);
+    } else {
+      check_list<float>(demo, "rewards", episode, rows, 0);
+    }
+    check_list<std::int8_t>(demo, "dones", episode, rows, 1);
+    add<float>(demo, "actions", episode, 0, 0, rows);
     const h5::Id obs = h5::open_group(demo, "obs"), final_obs = h5::open_group(demo, "final_obs");
     for (std::size_t k = 0; k < names_.size(); ++k) {
       if (single_) {
-        add<float>(obs, names_[k], episode, k + 1, 0, rows_);
-        add<float>(final_obs, names_[k], episode, k + 1, rows_, 1);
+        add<float>(obs, names_[k], episode, k + 1, 0, rows);
+        add<float>(final_obs, names_[k], episode, k + 1, rows, 1);
       } else {
-        add<double>(obs, names_[k], episode, k + 1, 0, rows_);
-        add<double>(final_obs, names_[k], episode, k + 1, rows_, 1);
+        add<double>(obs, names_[k], episode, k + 1, 0, rows);
+        add<double>(final_obs, names_[k], episode, k + 1, rows, 1);
       }
     }
-    content_.rows += rows_;
+    content_.rows += rows;
     ++content_.demos;
   }
 
   /// A list of zeros whose last number is `last`.
   template <class T>
-  void check_list(const h5::Id& demo, const std::string& name, std::int64_t episode, T last) const {
+  void check_list(const h5::Id& demo, const std::string& name, std::int64_t episode, std::int64_t rows, T last) const {
     const h5::Id dataset = h5::open_dataset(demo, name);
-    check_rows(dataset, fmt::format("demo_{}: {}", episode, name), rows_);
-    std::vector<T> list(static_cast<std::size_t>(rows_)), expected(list.size(), T{0});
+    check_rows(dataset, fmt::format("demo_{}: {}", episode, name), rows);
+    std::vector<T> list(static_cast<std::size_t>(rows)), expected(list.size(), T{0});
     expected.back() = last;
     h5::read_box(dataset, {0}, {list.size()}, list.data());
     if (list != expected) fail(fmt::format("demo_{}: {} are not what was written", episode, name));
@@ -138,7 +143,7 @@ class ShardChecker {
   std::string path_;
   h5::Id file_, scene_;
   std::vector<std::string> names_;
-  bool single_ = false;
+  bool single_ = false, of_task_ = false;
   std::int64_t rows_ = 0;
   std::tuple<std::vector<float>, std::vector<double>> buffers_;
   ContentSum sum_;

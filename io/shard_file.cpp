@@ -115,8 +115,9 @@ void ShardFile::describe() {
   texts("q_units", layout_.q_units);
   texts("v_names", layout_.v_names);
   texts("v_units", layout_.v_units);
-  texts("action_names", layout_.u_names);
-  if (!layout_.variable_names.empty()) {
+  texts("action_names", layout_.action_names());
+  describe_task(scene);
+  if (!layout_.task && !layout_.variable_names.empty()) {
     texts("variable_names", layout_.variable_names);
     h5::write_attribute(scene, "variable_units", "m");
     h5::write_attribute(scene, "variable_frame", "world");
@@ -128,22 +129,53 @@ void ShardFile::describe() {
   }
 }
 
-void ShardFile::create_block(std::int64_t first_episode) {
+void ShardFile::describe_task(const h5::Id& scene) const {
+  if (!layout_.task) {
+    h5::write_attribute(scene, "task", "none: a scene alone, whose every reward is 0");
+    return;
+  }
+  const TaskSpec& task = *layout_.task;
+  h5::write_attribute(scene, "task", task.name);
+  h5::write_attribute(scene, "policy", layout_.policy);
+  h5::write_attribute(scene, "success", task.success);
+  h5::write_attribute(scene, "action_unit", task.action.unit);
+  h5::write_attribute(scene, "action_meaning", task.action.meaning);
+  h5::write_scalar<double>(scene, "action_low", task.action.low);
+  h5::write_scalar<double>(scene, "action_high", task.action.high);
+  std::vector<std::string> units{"q_units", "v_units"}, meanings{"coordinates", "velocities"};
+  for (const TensorSpec& tensor : task.observations) {
+    units.push_back(tensor.unit);
+    meanings.push_back(tensor.meaning);
+  }
+  h5::write_attribute(scene, "observation_units", std::span<const std::string>(units));
+  h5::write_attribute(scene, "observation_meanings", std::span<const std::string>(meanings));
+}
+
+void ShardFile::create_block(std::int64_t first_episode, std::span<const EpisodeEnd> ends) {
   Block& block = blocks_[first_episode];
   const std::int64_t end = std::min(first_episode + kBlockEpisodes, end_);
   for (std::int64_t episode = first_episode; episode < end; ++episode)
-    block.push_back(create_demo(episode));
+    block.push_back(
+        create_demo(episode, ends.empty() ? nullptr : &ends[static_cast<std::size_t>(episode - first_episode)]));
 }
 
-ShardFile::Demo ShardFile::create_demo(std::int64_t episode) {
-  const std::int64_t rows = layout_.rows();
+ShardFile::Demo ShardFile::create_demo(std::int64_t episode, const EpisodeEnd* end) {
+  // An episode that failed in its first action has no row; it will be removed.
+  const std::int64_t rows = end != nullptr ? std::max<std::int64_t>(1, end->length) : layout_.rows();
   const h5::Id group = h5::create_group(data_, fmt::format("demo_{}", episode));
   h5::write_scalar<std::int64_t>(group, "num_samples", rows);
+  if (end != nullptr) {
+    h5::write_scalar<double>(group, "return", end->total);
+    h5::write_scalar<std::int8_t>(group, "terminated", end->terminated ? 1 : 0);
+    h5::write_scalar<std::int8_t>(group, "success", end->success ? 1 : 0);
+  }
   Demo demo;
-  demo.actions = create(group, "actions", with_rows(rows, {layout_.u_names.size()}), true);
+  demo.length = rows;
+  demo.actions = create(group, "actions", with_rows(rows, {layout_.action_names().size()}), true);
   const std::vector<float> rewards(static_cast<std::size_t>(rows), 0.0F);
   const h5::Dims list{rewards.size()};
-  put(create(group, "rewards", list, true), 0, list, rewards.data());
+  demo.rewards = create(group, "rewards", list, true);
+  if (end == nullptr) put(demo.rewards, 0, list, rewards.data());
   std::vector<std::int8_t> dones(rewards.size(), 0);
   dones.back() = 1;
   h5::create_flags(group, "dones", dones);
@@ -156,18 +188,24 @@ ShardFile::Demo ShardFile::create_demo(std::int64_t episode) {
 }
 
 void ShardFile::write(const EpisodeRows& rows) {
-  for (; created_ <= rows.first_episode; created_ += kBlockEpisodes) create_block(created_);
+  for (; created_ <= rows.first_episode; created_ += kBlockEpisodes) create_block(created_, rows.ends);
   Block& block = blocks_.at(rows.first_episode);
-  const std::size_t nu = layout_.u_names.size();
-  const h5::Dims actions{static_cast<hsize_t>(rows.action_rows), nu};
+  const std::size_t nu = layout_.action_names().size();
   for (int e = 0; e < rows.episodes; ++e) {
     Demo& demo = block[static_cast<std::size_t>(e)];
-    const float* from = rows.actions.data() + static_cast<std::size_t>(e) * numbers_of(actions);
-    put(demo.actions, rows.first_row, actions, from);
-    demo.sum.add(rows.first_episode + e, 0, rows.first_row, rows.action_rows, nu * sizeof(float),
-                 from);
+    const std::int64_t taken = std::min<std::int64_t>(rows.action_rows, demo.length - rows.first_row);
+    const float* from = rows.actions.data() + static_cast<std::size_t>(e) * static_cast<std::size_t>(rows.action_rows) * nu;
+    put(demo.actions, rows.first_row, h5::Dims{static_cast<hsize_t>(taken), nu}, from);
+    demo.sum.add(rows.first_episode + e, 0, rows.first_row, taken, nu * sizeof(float), from);
+    if (!rows.ends.empty()) write_rewards(demo, rows, e);
     for (std::size_t name = 0; name < names_.size(); ++name) write_observation(demo, rows, e, name);
   }
+}
+
+void ShardFile::write_rewards(Demo& demo, const EpisodeRows& rows, int episode) {
+  const float* from = rows.rewards.data() + static_cast<std::size_t>(episode) * static_cast<std::size_t>(rows.action_rows);
+  put(demo.rewards, 0, h5::Dims{static_cast<hsize_t>(demo.length)}, from);
+  demo.sum.add(rows.first_episode + episode, names_.size() + 1, 0, demo.length, sizeof(float), from);
 }
 
 void ShardFile::write_observation(Demo& demo, const EpisodeRows& rows, int episode,
@@ -177,11 +215,12 @@ void ShardFile::write_observation(Demo& demo, const EpisodeRows& rows, int episo
         const std::size_t width = numbers_of(with_rows(1, shapes_[name]));
         const auto all = static_cast<std::size_t>(rows.rows);
         const auto* from = values.data() + static_cast<std::size_t>(episode) * all * width;
-        put(demo.obs[name], rows.first_row, with_rows(rows.action_rows, shapes_[name]), from);
-        if (rows.rows > rows.action_rows)
-          put(demo.final_obs[name], 0, with_rows(1, shapes_[name]),
-              from + static_cast<std::size_t>(rows.action_rows) * width);
-        demo.sum.add(rows.first_episode + episode, name + 1, rows.first_row, rows.rows,
+        const std::int64_t taken = std::min<std::int64_t>(rows.action_rows, demo.length - rows.first_row);
+        const bool last = rows.rows > taken;
+        put(demo.obs[name], rows.first_row, with_rows(taken, shapes_[name]), from);
+        if (last)
+          put(demo.final_obs[name], 0, with_rows(1, shapes_[name]), from + static_cast<std::size_t>(taken) * width);
+        demo.sum.add(rows.first_episode + episode, name + 1, rows.first_row, taken + (last ? 1 : 0),
                      width * sizeof *from, from);
       },
       rows.observations[name]);
@@ -191,10 +230,15 @@ void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode
   const auto block = blocks_.find(first_episode);
   for (const FailedEpisode& failure : failures) {
     // What was written of it is to disappear.
-    block->second[static_cast<std::size_t>(failure.episode - first_episode)].sum = {};
+    Demo& demo = block->second[static_cast<std::size_t>(failure.episode - first_episode)];
+    demo.sum = {};
+    demo.length = 0;
     failures_.push_back(failure);
   }
-  for (const Demo& demo : block->second) sum_.add(demo.sum);
+  for (const Demo& demo : block->second) {
+    sum_.add(demo.sum);
+    rows_ += demo.length;
+  }
   blocks_.erase(block);
   --unfinished_;
 }
@@ -216,8 +260,7 @@ void ShardFile::record_failures() {
 
 void ShardFile::commit() {
   record_failures();
-  const auto demos = end_ - first_episode_ - static_cast<std::int64_t>(failures_.size());
-  h5::write_scalar<std::int64_t>(data_, "total", demos * layout_.rows());
+  h5::write_scalar<std::int64_t>(data_, "total", rows_);
   h5::write_scalar<std::uint64_t>(file_, "content_sum", sum_.value());
   data_.reset();
   h5::close_file(file_, part_.path());

@@ -36,14 +36,18 @@ class ShardFile {
   /// The open datasets of one episode.
   struct Demo {
     h5::Id actions;
+    h5::Id rewards;
     std::vector<h5::Id> obs, final_obs;  // per observation
+    std::int64_t length = 0;             // actions
     ContentSum sum;
   };
   using Block = std::vector<Demo>;
 
   void describe();
-  void create_block(std::int64_t first_episode);
-  Demo create_demo(std::int64_t episode);
+  void describe_task(const h5::Id& scene) const;
+  void create_block(std::int64_t first_episode, std::span<const EpisodeEnd> ends);
+  Demo create_demo(std::int64_t episode, const EpisodeEnd* end);
+  void write_rewards(Demo& demo, const EpisodeRows& rows, int episode);
   void write_observation(Demo& demo, const EpisodeRows& rows, int episode, std::size_t name);
   void record_failures();
 
@@ -56,6 +60,7 @@ class ShardFile {
   h5::Id file_, data_;
   std::map<std::int64_t, Block> blocks_;  // unfinished ones, by their first episode
   std::vector<FailedEpisode> failures_;
+  std::int64_t rows_ = 0;  // of demos, failed ones left out
   ContentSum sum_;
 };
 

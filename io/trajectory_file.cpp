@@ -54,7 +54,10 @@ struct TrajectoryFile::Impl {
     std::int64_t written = 0;
   };
   std::vector<Sensor> sensors;
-  std::int64_t states = 0, steps = 0;
+  struct Task {
+    h5::Id action, step, reward, terminated, truncated, success;
+  } task;
+  std::int64_t states = 0, steps = 0, actions = 0;
 
   Impl(const std::string& output, const TrajectoryLayout& l, bool overwrite)
       : layout((l.check(), l)), part(output, overwrite) {
@@ -67,6 +70,7 @@ struct TrajectoryFile::Impl {
       create_trajectory();
       for (const SensorLayout& s : layout.sensors) create_sensor(s);
       create_randomized();
+      create_task();
     } catch (...) {
       part.empty();
       throw;
@@ -181,6 +185,28 @@ struct TrajectoryFile::Impl {
     h5::write_box<double>(d, {0, 0}, {E, k}, layout.randomized_values.data());
   }
 
+  void create_task() {
+    if (!layout.task) {
+      h5::write_attribute(file, "task", "none: a scene alone, whose every reward is 0");
+      return;
+    }
+    const TaskSpec& spec = *layout.task;
+    h5::write_attribute(file, "task", spec.name);
+    h5::write_attribute(file, "policy", layout.policy);
+    const hsize_t E = static_cast<hsize_t>(layout.environments), A = static_cast<hsize_t>(spec.horizon);
+    const h5::Id group = h5::create_group(file, "task");
+    h5::write_attribute(group, "success", spec.success);
+    task.action = rows<double>(group, "action", {A, E, spec.action.size()});
+    h5::write_attribute(task.action, "unit", spec.action.unit);
+    h5::write_attribute(task.action, "meaning", spec.action.meaning);
+    task.step = h5::create_dataset<std::int64_t>(group, "step", {A});
+    h5::write_attribute(task.step, "meaning", "row of /q after each action");
+    task.reward = rows<double>(group, "reward", {A, E});
+    task.terminated = rows<std::int8_t>(group, "terminated", {A, E});
+    task.truncated = rows<std::int8_t>(group, "truncated", {A, E});
+    task.success = rows<std::int8_t>(group, "success", {A, E});
+  }
+
   /// Row `at` of a dataset whose other dimensions are `row`.
   template <class T>
   static void put(const h5::Id& d, std::int64_t at, h5::Dims row, const T* data) {
@@ -234,6 +260,22 @@ void TrajectoryFile::write(const TactileRow& row) {
   ++s.written;
 }
 
+void TrajectoryFile::write(const ActionRow& row) {
+  Impl& f = *impl_;
+  const hsize_t E = static_cast<hsize_t>(f.layout.environments);
+  Impl::put<double>(f.task.action, row.action, {E, f.layout.task->action.size()}, row.u.data());
+  h5::write_box<std::int64_t>(f.task.step, {static_cast<hsize_t>(row.action)}, {1}, &row.step);
+  Impl::put<double>(f.task.reward, row.action, {E}, row.reward.data());
+  const auto flags = [&](const h5::Id& dataset, std::span<const std::uint8_t> values) {
+    const std::vector<std::int8_t> flags_of(values.begin(), values.end());
+    Impl::put<std::int8_t>(dataset, row.action, {E}, flags_of.data());
+  };
+  flags(f.task.terminated, row.terminated);
+  flags(f.task.truncated, row.truncated);
+  flags(f.task.success, row.success);
+  ++f.actions;
+}
+
 void TrajectoryFile::commit() {
   Impl& f = *impl_;
   const auto expect = [&](const std::string& what, std::int64_t written, std::int64_t expected) {
@@ -243,12 +285,14 @@ void TrajectoryFile::commit() {
   };
   expect("states", f.states, f.layout.steps + 1);
   expect("steps", f.steps, f.layout.steps);
+  expect("actions", f.actions, f.layout.task ? f.layout.task->horizon : 0);
   for (std::size_t i = 0; i < f.sensors.size(); ++i)
     expect("fields of " + f.layout.sensors[i].name, f.sensors[i].written, f.layout.sensors[i].frames(f.layout.steps, f.layout.first_step));
   for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.variables, &f.iterations, &f.status,
                     &f.residual})
     d->reset();
   f.sensors.clear();
+  f.task = {};
   h5::close_file(f.file, f.part.path());
   f.part.commit();
 }

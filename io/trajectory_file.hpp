@@ -22,6 +22,7 @@ class TrajectoryFile : public RowSink {
   void write(const StateRow& row) override;
   void write(const StepRow& row) override;
   void write(const TactileRow& row) override;
+  void write(const ActionRow& row) override;
 
   /// Checks that every row came, closes, syncs and renames. Throws IoError.
   void commit();

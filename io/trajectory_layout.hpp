@@ -4,11 +4,13 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "engine/stepper.hpp"
+#include "engine/task_spec.hpp"
 
 namespace tangere {
 
@@ -63,6 +65,8 @@ struct TrajectoryLayout {
   std::uint64_t seed = 0;
   std::int64_t first_episode = 0;
   std::string precision, command_line, version, instruction_set;
+  std::optional<TaskSpec> task;  ///< that a policy plays here; none: a scene alone
+  std::string policy;            ///< of a task
 
   /// Throws InputError when counts contradict each other or a sensor cannot be a name in a file.
   void check() const;
@@ -78,6 +82,8 @@ struct RunDescription {
   int every = 0;                      ///< the option as given; 0: each sensor's own
   std::vector<int> tactile_intervals; ///< K in force, one per sensor
   std::string precision, command_line, version, instruction_set;
+  std::optional<TaskSpec> task;
+  std::string policy;
 };
 
 /// The layout of a rollout of `batch` by `stepper`.

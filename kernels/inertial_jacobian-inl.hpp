@@ -66,11 +66,12 @@ void composite_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int i = 0; i < model.n_links; ++i) {
     const Link& link = model.links[i];
     LinkScratch<N>& o = a.links[i];
-    o.mass = N(link.mass);
-    o.moment = broadcast<N>(link.moment);
+    const LinkInertia<N> own = load_inertia<N>(link, a.block, a.group);
+    o.mass = own.mass;
+    o.moment = own.moment;
     o.momentum = zero3<N>();
     if (link.still) continue;
-    o.inertia = broadcast<N>(link.inertia);
+    o.inertia = own.inertia;
     if (link.massive) {
       own_bias(o);
     } else {

@@ -41,6 +41,7 @@ struct Link {
   double mass;         ///< [kg]
   Vec3<double> moment; ///< mass times centre of mass, link axes [kg m]
   Mat3<double> inertia;///< about the link's origin, link axes [kg m²]
+  int inertia_row = -1;///< ≥ 0: mass, moment and xx xy xz yy yz zz of the inertia stand in ten rows of the block instead
 };
 
 /// A number of the scene: the same for all environments, or one row of the batch.

@@ -108,13 +108,11 @@ void inertial_wrenches(const ModelView& model, const StageArgs<N>& a) {
     LinkScratch<N>& o = a.links[i];
     o.F = zero6<N>();
     if (!link.massive) continue;
-    const N mass(link.mass);
+    const auto [mass, moment, inertia] = load_inertia<N>(link, a.block, a.group);
     if (link.still) {  // its torque does no work
       o.F.l = mass * o.A.l;
       continue;
     }
-    const Vec3<N> moment = broadcast<N>(link.moment);
-    const Mat3<N> inertia = broadcast<N>(link.inertia);
     o.F = inertia_times(mass, moment, inertia, o.A) + cross_wrench(o.V, inertia_times(mass, moment, inertia, o.V));
   }
 }

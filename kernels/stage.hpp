@@ -160,6 +160,20 @@ struct ParameterLoad<Lanes<Arch>> {
     return p.row < 0 ? Lanes<Arch>(p.value) : load_lanes<Arch>(row_of(block, p.row, group));
   }
 };
+/// Mass, moment and inertia of a link's own bodies.
+template <class N>
+struct LinkInertia {
+  N mass;
+  Vec3<N> moment;
+  Mat3<N> inertia;
+};
+template <class N>
+LinkInertia<N> load_inertia(const Link& link, const double* block, int group) {
+  if (link.inertia_row < 0) return {N(link.mass), broadcast<N>(link.moment), broadcast<N>(link.inertia)};
+  const auto row = [&](int i) { return ParameterLoad<N>::load({0, link.inertia_row + i}, block, group); };
+  const N xy = row(5), xz = row(6), yz = row(8);
+  return {row(0), {row(1), row(2), row(3)}, {{{row(4), xy, xz}, {xy, row(7), yz}, {xz, yz, row(9)}}}};
+}
 template <class N>
 LawParameters<N> load_law(const ContactParameters& p, ContactLaw law, double ramp, const double* block, int group) {
   const auto one = [&](const Parameter& x) { return ParameterLoad<N>::load(x, block, group); };

@@ -51,11 +51,11 @@ class Recorder {
     sink_.write(StateRow{step, time, q_, v_, pose_, twist_, variables_});
   }
 
-  /// `live` is what the environments were before the step.
-  void write_step(std::int64_t step, std::span<const double> u, const std::vector<bool>& live) {
+  /// `stepping`: the environments that took the step.
+  void write_step(std::int64_t step, std::span<const double> u, const std::vector<bool>& stepping) {
     for (int e = 0; e < environments_; ++e) {
       const auto i = static_cast<std::size_t>(e);
-      iterations_[i] = live[i] ? batch_.iterations(e) : 0;
+      iterations_[i] = stepping[i] ? batch_.iterations(e) : 0;
       status_[i] = static_cast<std::int8_t>(batch_.status(e));
     }
     sink_.write(StepRow{step, u, iterations_, status_, batch_.residuals()});
@@ -97,26 +97,39 @@ class Recorder {
   std::vector<std::int8_t> status_;
 };
 
-void check(const Stepper& stepper, const ControlProgram& controls, const RolloutOptions& options) {
+void check(const RolloutOptions& options) {
   if (options.steps < 1)
     throw InputError("a rollout of " + std::to_string(options.steps) +
                      " steps; expected at least 1");
   if (options.every < 0)
     throw InputError("tactile every " + std::to_string(options.every) +
                      " steps; expected 1 or more, or 0 for the scene's own");
-  if (controls.timestep() != stepper.timestep())
-    throw InputError("controls laid out for a timestep of " + std::to_string(controls.timestep()) +
-                     " s; the stepper's is " + std::to_string(stepper.timestep()) + " s");
   if (options.first_step < 0)
     throw InputError("a rollout from step " + std::to_string(options.first_step) + "; expected 0 or more");
-  controls.check_covers(options.first_step + options.steps);
 }
 
+/// Every environment's controls from its episode.
+class ProgramDriver : public RolloutDriver {
+ public:
+  ProgramDriver(const ControlProgram& controls, std::int64_t first_step) : controls_(controls), first_step_(first_step) {}
+
+  void drive(std::int64_t step, Batch& batch, std::span<double> u) override {
+    const auto nu = static_cast<std::size_t>(batch.model().nu());
+    for (int e = 0; e < batch.environments(); ++e)
+      controls_.evaluate(first_step_ + step, batch.episode(e), u.subspan(static_cast<std::size_t>(e) * nu, nu));
+  }
+  void done(std::int64_t, Batch&, RowSink&) override {}
+
+ private:
+  const ControlProgram& controls_;
+  std::int64_t first_step_;
+};
+
 /// Counts one step's outcome into the summary; environments that failed in it leave `live`.
-void count(const Batch& batch, std::int64_t step, std::vector<bool>& live,
+void count(const Batch& batch, std::int64_t step, const std::vector<bool>& stepping, std::vector<bool>& live,
            RolloutSummary& summary) {
   for (int e = 0; e < batch.environments(); ++e) {
-    if (!live[static_cast<std::size_t>(e)]) continue;
+    if (!stepping[static_cast<std::size_t>(e)]) continue;
     const StepStatus status = batch.status(e);
     ++summary.environment_steps;
     summary.newton_iterations += batch.iterations(e);
@@ -150,7 +163,18 @@ double rollout_bytes(const Model& model, int environments) {
 RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram& controls,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress) {
-  check(stepper, controls, options);
+  check(options);
+  if (controls.timestep() != stepper.timestep())
+    throw InputError("controls laid out for a timestep of " + std::to_string(controls.timestep()) +
+                     " s; the stepper's is " + std::to_string(stepper.timestep()) + " s");
+  controls.check_covers(options.first_step + options.steps);
+  ProgramDriver driver(controls, options.first_step);
+  return run_rollout(batch, stepper, driver, options, sink, progress);
+}
+
+RolloutSummary run_rollout(Batch& batch, Stepper& stepper, RolloutDriver& driver, const RolloutOptions& options,
+                           RowSink& sink, const RolloutProgress& progress) {
+  check(options);
   const auto start = std::chrono::steady_clock::now();
   const auto sensors = batch.model().sensors();
   const auto environments = static_cast<std::size_t>(batch.environments());
@@ -158,7 +182,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram&
   Recorder recorder(batch, options.precision, sink);
   RolloutSummary summary;
   std::vector<double> u(environments * nu);
-  std::vector<bool> live(environments);
+  std::vector<bool> live(environments), stepping(environments);
   for (std::size_t e = 0; e < environments; ++e) {
     live[e] = !failed(batch.statuses()[e]);
     if (!live[e]) summary.failures.push_back({static_cast<int>(e), -1, batch.statuses()[e]});
@@ -168,11 +192,12 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram&
   const auto time = [&](std::int64_t row) { return static_cast<double>(options.first_step + row) * stepper.timestep(); };
   recorder.write_state(0, time(0));
   for (std::int64_t t = 0; t < options.steps; ++t) {
-    for (std::size_t e = 0; e < environments; ++e)
-      controls.evaluate(options.first_step + t, batch.episode(static_cast<int>(e)), std::span(u).subspan(e * nu, nu));
+    driver.drive(t, batch, u);
+    for (std::size_t e = 0; e < environments; ++e) stepping[e] = live[e] && !batch.held(static_cast<int>(e));
     stepper.step(batch, u);
-    recorder.write_step(t, u, live);
-    count(batch, t, live, summary);
+    recorder.write_step(t, u, stepping);
+    count(batch, t, stepping, live, summary);
+    driver.done(t, batch, sink);
     recorder.write_state(t + 1, time(t + 1));
     for (std::size_t s = 0; s < sensors.size(); ++s) {
       const std::int64_t every = tactile_interval(sensors[s], options), done = options.first_step + t + 1;

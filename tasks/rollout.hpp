@@ -52,6 +52,18 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram&
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});
 
+/// Drives a rollout in place of a ControlProgram.
+class RolloutDriver {
+ public:
+  virtual ~RolloutDriver() = default;
+  /// Controls (E, nu) of step t, which is about to be taken.
+  virtual void drive(std::int64_t step, Batch& batch, std::span<double> u) = 0;
+  /// Step t has been taken; rows may be handed to the sink.
+  virtual void done(std::int64_t step, Batch& batch, RowSink& sink) = 0;
+};
+RolloutSummary run_rollout(Batch& batch, Stepper& stepper, RolloutDriver& driver, const RolloutOptions& options,
+                           RowSink& sink, const RolloutProgress& progress = {});
+
 /// The step between fields of a sensor under these options.
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options);
 /// Fields that a rollout reads of a sensor.

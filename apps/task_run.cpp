@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// A task carries its scene with it: the program needs no folder of scenes to run one.
+#include "apps/task_run.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "io/csv.hpp"
+#include "io/nearest_name.hpp"
+#include "io/scene_reader.hpp"
+#include "tasks/task_list.hpp"
+
+namespace tangere::apps {
+
+std::unique_ptr<Task> find_task(const std::string& word, const Console& console) {
+  if (is_task(word)) {
+    const TaskSpec spec = task_spec(word);
+    const char* const text = task_scene(spec.scene);
+    if (text == nullptr) throw InputError(fmt::format("task '{}': its scene {} is not there", word, spec.scene));
+    SceneFile file = parse_scene(text, spec.scene);
+    for (const std::string& warning : file.warnings) console.note("warning: " + warning);
+    return make_task(word, file.scene);
+  }
+  const bool plain = word.find('/') == std::string::npos && word.find('.') == std::string::npos;
+  if (plain && !std::filesystem::exists(word))
+    throw InputError(fmt::format("'{}' is neither a file nor a task{}", word, suggestion(word, task_names())));
+  return nullptr;
+}
+
+PolicyKind policy_named(const std::string& name, const std::string& table, PolicyKind fallback) {
+  PolicyKind kind = table.empty() ? fallback : PolicyKind::csv;
+  std::vector<std::string> names;
+  bool found = name.empty();
+  for (const PolicyKind value : {PolicyKind::random, PolicyKind::hold, PolicyKind::csv, PolicyKind::scripted}) {
+    names.emplace_back(to_string(value));
+    if (names.back() != name) continue;
+    found = true;
+    kind = value;
+  }
+  if (!found) throw InputError("unknown policy '" + name + "'" + suggestion(name, names));
+  if (kind == PolicyKind::csv && table.empty()) throw InputError("--policy csv without --controls; expected both");
+  if (kind != PolicyKind::csv && !table.empty())
+    throw InputError(fmt::format("--policy {} with --controls; expected csv, or no --controls", name));
+  return kind;
+}
+
+Policy make_policy(const Task& task, PolicyKind kind, const std::string& table) {
+  if (kind != PolicyKind::csv) return Policy(task, kind);
+  return Policy(task, kind, read_csv(table, task.spec().action.size()));
+}
+
+void refuse_with_task(const Task& task, const std::vector<GivenOption>& options) {
+  for (const GivenOption& option : options)
+    if (option.given)
+      throw InputError(fmt::format("{} with task '{}', which takes at most {} actions of {} steps; expected it with "
+                                   "scenes only",
+                                   option.name, task.spec().name, task.spec().horizon, task.spec().steps_per_action));
+}
+
+void refuse_with_scene(const std::string& scene, const std::vector<GivenOption>& options) {
+  for (const GivenOption& option : options)
+    if (option.given) throw InputError(fmt::format("{} with the scene '{}'; expected a task", option.name, scene));
+}
+
+}  // namespace tangere::apps

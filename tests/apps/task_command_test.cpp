@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tasks on the command line: files with rewards and ends, summaries with successes, and what is refused.
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "io/h5.hpp"
+#include "io/shard_check.hpp"
+#include "tests/apps/program.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Words = std::vector<std::string>;
+
+json run_json(const Folder& folder, Words words) {
+  words.emplace_back("--json");
+  const Outcome outcome = run(folder, words);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json answer = json::parse(outcome.out);
+  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
+  return answer;
+}
+
+TEST(Tasks, GenerateStoresRewardsAndEnds) {
+  const Folder folder;
+  const json answer = run_json(folder, {"generate", "dummy", "-o", "set", "--episodes", "20", "--threads", "2"});
+  EXPECT_EQ(answer.at("task"), "dummy");
+  EXPECT_EQ(answer.at("policy"), "scripted");
+  EXPECT_EQ(answer.at("successes"), 20);
+  EXPECT_EQ(answer.at("success_rate"), 1);
+  EXPECT_EQ(answer.at("rows"), 800);
+  EXPECT_EQ(answer.at("simulation_steps"), 4000);
+  const std::string shard = folder.path("set/shard-00000.h5");
+  EXPECT_EQ(check_shard(shard).rows, 800);
+  const h5::Id file = h5::open_file(shard);
+  EXPECT_EQ(h5::read_text(h5::open_group(file, "scene"), "task"), "dummy");
+  double mean = 0;
+  for (int e = 0; e < 20; ++e) {
+    const h5::Id demo = h5::open_group(file, "data/demo_" + std::to_string(e));
+    std::vector<float> rewards(40);
+    h5::read_box(h5::open_dataset(demo, "rewards"), {0}, {40}, rewards.data());
+    double sum = 0;
+    for (const float r : rewards) sum += r;
+    const double stored = h5::read_numbers<double>(demo, "return").at(0);
+    EXPECT_NEAR(sum, stored, 1e-5 * std::abs(stored));
+    EXPECT_EQ(h5::read_numbers<std::int8_t>(demo, "success").at(0), 1);
+    EXPECT_EQ(h5::dimensions(h5::open_dataset(demo, "obs/error")), (h5::Dims{40, 1}));
+    EXPECT_EQ(h5::dimensions(h5::open_dataset(demo, "obs/q")), (h5::Dims{40, 10}));
+    mean += stored / 20;
+  }
+  EXPECT_NEAR(answer.at("mean_return"), mean, 1e-9 * std::abs(mean));
+}
+
+TEST(Tasks, GenerateWritesTheSameBytesOnAnyNumberOfThreads) {
+  const Folder folder;
+  for (const char* threads : {"1", "3"})
+    run_json(folder, {"generate", "box_pushing", "-o", std::string("set") + threads, "--episodes", "50", "--threads",
+                      threads, "--policy", "random", "--seed", "4"});
+  EXPECT_EQ(folder.read("set1/shard-00000.h5"), folder.read("set3/shard-00000.h5"));
+}
+
+TEST(Tasks, ATableHoldsActions) {
+  const Folder folder;
+  folder.write("a.csv", "0.1\n0.2\n");
+  const json answer = run_json(folder, {"generate", "dummy", "-o", "set", "--episodes", "1", "--controls", "a.csv"});
+  EXPECT_EQ(answer.at("policy"), "csv");
+  std::vector<float> actions(3);
+  h5::read_box(h5::open_dataset(h5::open_file(folder.path("set/shard-00000.h5")), "data/demo_0/actions"), {0, 0}, {3, 1},
+               actions.data());
+  EXPECT_THAT(actions, testing::ElementsAre(0.1F, 0.2F, 0.2F));
+}
+
+TEST(Tasks, SimulateStoresActionsAndRewards) {
+  const Folder folder;
+  const json answer = run_json(folder, {"simulate", "dummy", "-o", "d.h5", "--envs", "18", "--seed", "3"});
+  EXPECT_EQ(answer.at("steps"), 200);
+  EXPECT_EQ(answer.at("successes"), 18);
+  const json set = run_json(folder, {"generate", "dummy", "-o", "set", "--episodes", "18", "--seed", "3", "--precision",
+                                     "double"});
+  EXPECT_DOUBLE_EQ(answer.at("mean_return"), set.at("mean_return"));
+  const h5::Id file = h5::open_file(folder.path("d.h5"));
+  EXPECT_EQ(h5::read_text(file, "task"), "dummy");
+  EXPECT_EQ(h5::dimensions(h5::open_dataset(file, "task/action")), (h5::Dims{40, 18, 1}));
+  // Row 40 of an episode is what both see last.
+  std::vector<double> q(10), final_q(10);
+  h5::read_box(h5::open_dataset(file, "q"), {200, 17, 0}, {1, 1, 10}, q.data());
+  h5::read_box(h5::open_dataset(h5::open_file(folder.path("set/shard-00000.h5")), "data/demo_17/final_obs/q"), {0, 0},
+               {1, 10}, final_q.data());
+  EXPECT_EQ(q, final_q);
+}
+
+TEST(Tasks, ASceneAloneSaysThatItHasNone) {
+  const Folder folder;
+  const std::string small = scene("rolling_ball_small.xml");
+  const json simulated = run_json(folder, {"simulate", small, "-o", "s.h5", "--steps", "5"});
+  EXPECT_TRUE(simulated.at("task").is_null());
+  EXPECT_THAT(h5::read_text(h5::open_file(folder.path("s.h5")), "task"), HasSubstr("every reward is 0"));
+  const json set = run_json(folder, {"generate", small, "-o", "set", "--episodes", "1", "--steps", "5"});
+  EXPECT_TRUE(set.at("task").is_null());
+  const h5::Id shard = h5::open_file(folder.path("set/shard-00000.h5"));
+  EXPECT_THAT(h5::read_text(h5::open_group(shard, "scene"), "task"), HasSubstr("every reward is 0"));
+}
+
+TEST(Tasks, BenchCountsActions) {
+  const Folder folder;
+  const json answer = run_json(folder, {"bench", "box_pushing_reduced", "--envs", "32", "--threads", "1,2", "--repeat", "1"});
+  EXPECT_EQ(answer.at("task"), "box_pushing_reduced");
+  EXPECT_EQ(answer.at("policy"), "random");
+  EXPECT_EQ(answer.at("steps_per_action"), 5);
+  EXPECT_EQ(answer.at("runs").at(0).at("steps"), 100);
+  EXPECT_EQ(answer.at("runs").at(0).at("checksum"), answer.at("runs").at(1).at("checksum"));
+  EXPECT_EQ(answer.at("runs").at(0).at("frames"), "none");
+}
+
+TEST(Tasks, WhatTheyCannotTakeIsAnError) {
+  const Folder folder;
+  const std::string small = scene("rolling_ball_small.xml");
+  struct Case {
+    Words words;
+    const char* says;
+  };
+  const Case cases[] = {
+      {{"generate", "box_pushin", "-o", "s", "--episodes", "1"}, "did you mean 'box_pushing'?"},
+      {{"simulate", "dumy", "-o", "s.h5"}, "did you mean 'dummy'?"},
+      {{"bench", "dumy"}, "neither a file nor a task"},
+      {{"generate", "dummy", "-o", "s", "--episodes", "1", "--steps", "3"}, "--steps with task 'dummy'"},
+      {{"simulate", "dummy", "-o", "s.h5", "--tol", "1e-6"}, "--tol with task 'dummy'"},
+      {{"bench", "dummy", "--every", "2"}, "--every with task 'dummy'"},
+      {{"bench", small, "--policy", "random"}, "expected a task"},
+      {{"generate", "dummy", "-o", "s", "--episodes", "1", "--policy", "scripte"}, "did you mean 'scripted'?"},
+      {{"generate", "dummy", "-o", "s", "--episodes", "1", "--policy", "csv"}, "--policy csv without --controls"},
+      {{"simulate", "dummy", "-o", "s.h5", "--policy", "hold", "--controls", "a.csv"}, "expected csv"},
+  };
+  for (const Case& c : cases) {
+    const Outcome outcome = run(folder, c.words);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(c.says));
+  }
+  EXPECT_THAT(folder.files(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace tangere::apps
