@@ -38,6 +38,11 @@ struct EpisodeRows {
   std::span<const EpisodeEnd> ends = {};  ///< of a task, whose blocks come whole and in ascending order: (episodes)
 };
 
+/// Consecutive episodes [first, end) of a run; both are multiples of 16, the end of the run apart.
+struct EpisodeRange {
+  std::int64_t first = 0, end = 0;
+};
+
 /// An episode that no solution was found for.
 struct FailedEpisode {
   std::int64_t episode = 0;

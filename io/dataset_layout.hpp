@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/episode_sink.hpp"
 #include "engine/task_spec.hpp"
 #include "io/trajectory_layout.hpp"
 
@@ -32,7 +33,10 @@ struct DatasetLayout {
   double timestep = 0;   ///< [s]
   double tolerance = 0;  ///< of the scaled residual, dimensionless
   std::string precision, version, instruction_set;
+  std::string controls = "of the scene";  ///< or which table, by its content
+  std::string command;           ///< that makes this data set, without what does not change it (threads, folder …)
   double shard_bytes = 1 << 30;  ///< a shard stays below it, unless 16 episodes are more
+  std::int64_t shards = 0;       ///< how many; 0: as shard_bytes says
 
   /// R: actions of an episode, of a task at most.
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
@@ -46,7 +50,11 @@ struct DatasetLayout {
   [[nodiscard]] double episode_bytes() const;
   /// As many as stay below shard_bytes, a multiple of 16; depends on the data set alone.
   [[nodiscard]] std::int64_t episodes_per_shard() const;
-  /// Throws InputError when a sensor cannot be a name in a file.
+  [[nodiscard]] std::int64_t shard_count() const;
+  /// Whole blocks of 16 episodes; where `shards` is given, as many in each as in any other, or one more.
+  [[nodiscard]] EpisodeRange shard_episodes(std::int64_t shard) const;
+  [[nodiscard]] std::int64_t shard_of(std::int64_t episode) const;
+  /// Throws InputError when a sensor cannot be a name in a file, or there are more shards than blocks.
   void check() const;
 };
 
@@ -58,7 +66,8 @@ struct DatasetDescription {
   bool single = false;  ///< observations are float32
   std::string precision, version, instruction_set;
   std::optional<TaskSpec> task;
-  std::string policy;
+  std::string policy, controls, command;
+  std::int64_t shards = 0;
 };
 
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,

@@ -11,26 +11,6 @@
 namespace tangere::h5 {
 namespace {
 
-/// While it lives, the library keeps its errors to itself.
-class Quiet {
- public:
-  Quiet() {
-    // A file that a full disk kept from being closed would otherwise be tried again, and complained
-    // about, while the program ends. Refused, harmlessly, when the library is already in use.
-    static const herr_t no_exit_handler = H5dont_atexit();
-    static_cast<void>(no_exit_handler);
-    H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  }
-  ~Quiet() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
-  Quiet(const Quiet&) = delete;
-  Quiet& operator=(const Quiet&) = delete;
-
- private:
-  H5E_auto2_t function_ = nullptr;
-  void* data_ = nullptr;
-};
-
 /// What the library's error stack says, innermost cause first; the operating system's words if any.
 std::string last_reason() {
   std::string text;
@@ -174,6 +154,17 @@ struct OpenAttribute {
 
 }  // namespace
 
+Quiet::Quiet() {
+  // A file that a full disk kept from being closed would otherwise be tried again, and complained
+  // about, while the program ends. Refused, harmlessly, when the library is already in use.
+  static const herr_t no_exit_handler = H5dont_atexit();
+  static_cast<void>(no_exit_handler);
+  H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
+
+Quiet::~Quiet() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
+
 void Id::reset() noexcept {
   if (id_ < 0) return;
   const Quiet quiet;
@@ -193,6 +184,18 @@ Id create_file(const std::string& path, hsize_t description_block) {
   Id file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()));
   if (file.get() < 0)
     throw IoError(fmt::format("cannot create '{}': {}", path, last_reason()));
+  return file;
+}
+
+Id create_memory_file() {
+  const Quiet quiet;
+  const Id access(H5Pcreate(H5P_FILE_ACCESS));
+  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
+  H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
+  constexpr std::size_t kGrowth = std::size_t{1} << 16;
+  H5Pset_fapl_core(access.get(), kGrowth, false);
+  Id file(H5Fcreate("memory", H5F_ACC_TRUNC, H5P_DEFAULT, access.get()));
+  if (file.get() < 0) throw IoError(fmt::format("cannot create a file in memory: {}", last_reason()));
   return file;
 }
 

@@ -41,12 +41,27 @@ class Id {
   hid_t id_ = -1;
 };
 
+/// While it lives, the library keeps its errors to itself.
+class Quiet {
+ public:
+  Quiet();
+  ~Quiet();
+  Quiet(const Quiet&) = delete;
+  Quiet& operator=(const Quiet&) = delete;
+
+ private:
+  H5E_auto2_t function_ = nullptr;
+  void* data_ = nullptr;
+};
+
 using Dims = std::vector<hsize_t>;
 
 /// Creates a file, replacing what is at `path`. Readable by HDF5 1.8 and later; two runs that write
 /// the same numbers write the same bytes. Descriptions of objects are put together in blocks of
 /// `description_block` bytes: large ones suit files of many objects.
 Id create_file(const std::string& path, hsize_t description_block = 2048);
+/// A file that is never on disk.
+Id create_memory_file();
 /// Opens a file for reading.
 Id open_file(const std::string& path);
 /// Flushes and closes a file; unlike Id::reset, it reports what could not be written.

@@ -142,6 +142,9 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.instruction_set = run.instruction_set;
   layout.task = run.task;
   layout.policy = run.policy;
+  layout.controls = run.controls;
+  layout.command = run.command;
+  layout.shards = run.shards;
   return layout;
 }
 

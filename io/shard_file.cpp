@@ -7,26 +7,13 @@
 #include <algorithm>
 #include <cstring>
 
-#include "io/sensor_description.hpp"
+#include "io/dataset_description.hpp"
+
 namespace tangere {
 namespace {
 
 constexpr std::int64_t kBlockEpisodes = 16;
 constexpr hsize_t kDescriptionBlock = hsize_t{1} << 20;
-
-/// The text as a JSON string, quotes included. Bytes from 0x80 on are UTF-8 already.
-std::string json_text(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\')
-      out += {'\\', c};
-    else if (static_cast<unsigned char>(c) < 0x20)
-      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
-    else
-      out += c;
-  }
-  return out + '"';
-}
 
 h5::Dims with_rows(std::int64_t rows, const std::vector<std::uint64_t>& shape) {
   h5::Dims dims{static_cast<hsize_t>(rows)};
@@ -58,15 +45,15 @@ void put(const h5::Id& dataset, std::int64_t first, const h5::Dims& dims, const 
 }  // namespace
 
 ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout,
-                     std::int64_t first_episode, std::int64_t episodes)
+                     EpisodeRange range, bool overwrite)
     : layout_(layout),
-      first_episode_(first_episode),
-      end_(first_episode + episodes),
-      created_(first_episode),
-      unfinished_((episodes + kBlockEpisodes - 1) / kBlockEpisodes),
+      first_episode_(range.first),
+      end_(range.end),
+      created_(range.first),
+      unfinished_((range.end - range.first + kBlockEpisodes - 1) / kBlockEpisodes),
       names_(layout.observation_names()),
       shapes_(layout.observation_shapes()),
-      part_(path, false),
+      part_(path, overwrite),
       file_(h5::create_file(part_.path(), kDescriptionBlock)) {
   try {
     describe();
@@ -82,73 +69,14 @@ ShardFile::~ShardFile() {
 }
 
 void ShardFile::describe() {
-  h5::write_attribute(file_, "format", "tangere dataset");
-  h5::write_scalar<std::int64_t>(file_, "format_version", 1);
+  describe_dataset(file_, layout_);
   h5::write_scalar<std::int64_t>(file_, "first_episode", first_episode_);
   h5::write_scalar<std::int64_t>(file_, "episodes", end_ - first_episode_);
-  h5::write_scalar<std::int64_t>(file_, "dataset_episodes", layout_.episodes);
   data_ = h5::create_group(file_, "data");
   h5::write_attribute(data_, "env_args",
                       fmt::format(R"({{"env_name": {}, "type": 2, "env_kwargs": {{}}}})",
                                   json_text(layout_.scene_name)));
   static_cast<void>(h5::create_group(file_, "failed"));
-  const h5::Id scene = h5::create_group(file_, "scene");
-  const auto texts = [&](const char* name, const std::vector<std::string>& list) {
-    h5::write_attribute(scene, name, std::span<const std::string>(list));
-  };
-  h5::write_attribute(scene, "name", layout_.scene_name);
-  h5::write_attribute(scene, "text", layout_.scene_text);
-  h5::write_scalar<std::uint64_t>(scene, "seed", layout_.seed);
-  h5::write_scalar<std::int64_t>(scene, "steps", layout_.steps);
-  h5::write_scalar<std::int64_t>(scene, "every", layout_.every);
-  h5::write_scalar<double>(scene, "timestep", layout_.timestep);
-  h5::write_attribute(scene, "timestep_unit", "s");
-  h5::write_attribute(scene, "integrator", layout_.integrator);
-  h5::write_scalar<double>(scene, "tolerance", layout_.tolerance);
-  h5::write_attribute(scene, "precision", layout_.precision);
-  h5::write_attribute(scene, "tangere_version", layout_.version);
-  h5::write_attribute(scene, "instruction_set", layout_.instruction_set);
-  h5::write_attribute(scene, "quaternion_order", "w x y z");
-  h5::write_attribute(scene, "observation_type", layout_.single ? "float32" : "float64");
-  texts("observations", names_);
-  texts("q_names", layout_.q_names);
-  texts("q_units", layout_.q_units);
-  texts("v_names", layout_.v_names);
-  texts("v_units", layout_.v_units);
-  texts("action_names", layout_.action_names());
-  describe_task(scene);
-  if (!layout_.task && !layout_.variable_names.empty()) {
-    texts("variable_names", layout_.variable_names);
-    h5::write_attribute(scene, "variable_units", "m");
-    h5::write_attribute(scene, "variable_frame", "world");
-  }
-  const h5::Id sensors = h5::create_group(scene, "sensors");
-  for (const SensorLayout& sensor : layout_.sensors) {
-    const h5::Id group = h5::create_group(sensors, sensor.name);
-    describe_sensor(group, group, sensor);
-  }
-}
-
-void ShardFile::describe_task(const h5::Id& scene) const {
-  if (!layout_.task) {
-    h5::write_attribute(scene, "task", "none: a scene alone, whose every reward is 0");
-    return;
-  }
-  const TaskSpec& task = *layout_.task;
-  h5::write_attribute(scene, "task", task.name);
-  h5::write_attribute(scene, "policy", layout_.policy);
-  h5::write_attribute(scene, "success", task.success);
-  h5::write_attribute(scene, "action_unit", task.action.unit);
-  h5::write_attribute(scene, "action_meaning", task.action.meaning);
-  h5::write_scalar<double>(scene, "action_low", task.action.low);
-  h5::write_scalar<double>(scene, "action_high", task.action.high);
-  std::vector<std::string> units{"q_units", "v_units"}, meanings{"coordinates", "velocities"};
-  for (const TensorSpec& tensor : task.observations) {
-    units.push_back(tensor.unit);
-    meanings.push_back(tensor.meaning);
-  }
-  h5::write_attribute(scene, "observation_units", std::span<const std::string>(units));
-  h5::write_attribute(scene, "observation_meanings", std::span<const std::string>(meanings));
 }
 
 void ShardFile::create_block(std::int64_t first_episode, std::span<const EpisodeEnd> ends) {

@@ -18,9 +18,8 @@ namespace tangere {
 
 class ShardFile {
  public:
-  /// Creates `<path>.part`. Throws IoError. `layout` must outlive it.
-  ShardFile(const std::string& path, const DatasetLayout& layout, std::int64_t first_episode,
-            std::int64_t episodes);
+  /// Creates `<path>.part`. Throws IoError, also when `path` exists and `overwrite` is false. `layout` must outlive it.
+  ShardFile(const std::string& path, const DatasetLayout& layout, EpisodeRange range, bool overwrite);
   ~ShardFile();
   ShardFile(const ShardFile&) = delete;
   ShardFile& operator=(const ShardFile&) = delete;
@@ -44,7 +43,6 @@ class ShardFile {
   using Block = std::vector<Demo>;
 
   void describe();
-  void describe_task(const h5::Id& scene) const;
   void create_block(std::int64_t first_episode, std::span<const EpisodeEnd> ends);
   Demo create_demo(std::int64_t episode, const EpisodeEnd* end);
   void write_rewards(Demo& demo, const EpisodeRows& rows, int episode);

@@ -101,6 +101,8 @@ class EpisodeGraph {
                const StopRequest& stop)
       : options_(options),
         shape_(model, options),
+        ranges_(checked_ranges(options.ranges, options.episodes)),
+        next_episode_(ranges_.front().first),
         sink_(sink),
         progress_(progress),
         stop_(stop),
@@ -167,12 +169,15 @@ class EpisodeGraph {
   }
 
   Traveller next_block(tbb::flow_control& flow) {
-    const TaskOrder::Task task(order_, &next_block_);
-    if (next_block_ * kBlockEpisodes >= options_.episodes) {
+    const TaskOrder::Task task(order_, &next_episode_);
+    if (next_episode_ >= ranges_[range_].end && ++range_ < ranges_.size()) next_episode_ = ranges_[range_].first;
+    if (range_ == ranges_.size()) {
       flow.stop();
       return {};
     }
-    return {next_block_++, nullptr};
+    const std::int64_t block = next_episode_ / kBlockEpisodes;
+    next_episode_ += kBlockEpisodes;
+    return {block, nullptr};
   }
 
   Traveller simulate(Traveller t) {
@@ -213,6 +218,9 @@ class EpisodeGraph {
 
   const EpisodeOptions& options_;
   EpisodeShape shape_;
+  std::vector<EpisodeRange> ranges_;
+  std::size_t range_ = 0;
+  std::int64_t next_episode_;
   TaskOrder order_;
   EpisodeSink& sink_;
   const EpisodeProgress& progress_;
@@ -220,7 +228,6 @@ class EpisodeGraph {
   SlotPool slots_;
   std::function<std::unique_ptr<EpisodeSlot>()> make_slot_;
   flow::graph graph_;
-  std::int64_t next_block_ = 0;
   std::atomic<bool> stopped_{false};
   EpisodeSummary summary_;
 };
@@ -243,6 +250,16 @@ EpisodeSummary run_episodes(const Model& model, const StepperOptions& solver,
   });
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
+}
+
+std::vector<EpisodeRange> checked_ranges(const std::vector<EpisodeRange>& ranges, std::int64_t episodes) {
+  if (ranges.empty()) return {{0, episodes}};
+  for (const EpisodeRange& range : ranges)
+    if (range.first < 0 || range.first % kBlockEpisodes != 0 || range.end <= range.first || range.end > episodes ||
+        (range.end % kBlockEpisodes != 0 && range.end != episodes))
+      throw InputError(fmt::format("episodes {} to {} of {}; expected whole blocks of {}", range.first, range.end,
+                                   episodes, kBlockEpisodes));
+  return ranges;
 }
 
 std::int64_t action_rows(const EpisodeOptions& options) {

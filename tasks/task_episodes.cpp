@@ -98,9 +98,11 @@ class EpisodeRun {
   TaskEpisodeSummary run() {
     const std::int64_t wave = std::int64_t{kBlockEpisodes} * options_.threads;
     std::optional<Rows<T>> rows;
-    for (std::int64_t first = 0; first < options_.episodes && !summary_.run.stopped; first += wave) {
-      const int episodes = static_cast<int>(std::min(wave, options_.episodes - first));
-      if (!rows) rows.emplace(task_, episodes);
+    for (const EpisodeRange& w : waves()) {
+      if (summary_.run.stopped) break;
+      const std::int64_t first = w.first;
+      const int episodes = static_cast<int>(w.end - w.first);
+      if (!rows) rows.emplace(task_, static_cast<int>(std::min(wave, options_.episodes)));
       VectorOptions of_wave;
       of_wave.seed = options_.seed;
       of_wave.first_episode = first;
@@ -116,6 +118,16 @@ class EpisodeRun {
   }
 
  private:
+  /// Ranges cut into what is played side by side.
+  [[nodiscard]] std::vector<EpisodeRange> waves() const {
+    const std::int64_t wave = std::int64_t{kBlockEpisodes} * options_.threads;
+    std::vector<EpisodeRange> waves;
+    for (const EpisodeRange& range : checked_ranges(options_.ranges, options_.episodes))
+      for (std::int64_t first = range.first; first < range.end; first += wave)
+        waves.push_back({first, std::min(first + wave, range.end)});
+    return waves;
+  }
+
   template <class T>
   bool play(VectorTask& vector, Rows<T>& rows) {
     const int episodes = vector.environments();
