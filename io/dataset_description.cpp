@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <sstream>
 
 #include "io/h5_listing.hpp"
@@ -157,6 +158,20 @@ std::vector<std::string> differences(const std::vector<Setting>& there, const st
   for (const Setting& setting : there)
     if (value_in(here, setting.name) == nullptr) lines.push_back(fmt::format("{}: missing here", setting.name));
   return lines;
+}
+
+std::vector<std::int64_t> demo_numbers(const h5::Id& data) {
+  std::vector<std::int64_t> numbers;
+  for (const std::string& name : h5::link_names(data)) {
+    std::int64_t number = -1;
+    const char* const end = name.data() + name.size();
+    constexpr std::string_view kBegin = "demo_";
+    if (!name.starts_with(kBegin)) continue;
+    const auto [at, error] = std::from_chars(name.data() + kBegin.size(), end, number);
+    if (error == std::errc() && at == end) numbers.push_back(number);
+  }
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
 }
 
 }  // namespace tangere

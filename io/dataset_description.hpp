@@ -16,15 +16,14 @@ void describe_dataset(const h5::Id& file, const DatasetLayout& layout);
 /// A JSON string, quotes included. Bytes from 0x80 on are UTF-8 already.
 std::string json_text(const std::string& text);
 
-struct Setting {
-  std::string name, value;
-};
-
 /// All that decides which numbers a data set holds, in a fixed order: of a layout, of a file.
 std::vector<Setting> settings_of(const DatasetLayout& layout);
 std::vector<Setting> read_settings(const h5::Id& file);
 
 /// What differs, a line each: "seed: 9 there, 1 here". Of long texts the first lines that differ. Empty when nothing does.
 std::vector<std::string> differences(const std::vector<Setting>& there, const std::vector<Setting>& here);
+
+/// Numbers of the demos in an open /data, ascending.
+std::vector<std::int64_t> demo_numbers(const h5::Id& data);
 
 }  // namespace tangere

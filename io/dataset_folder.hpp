@@ -6,10 +6,9 @@
 #include <string>
 #include <vector>
 
-namespace tangere {
+#include "io/dataset_layout.hpp"
 
-/// What to do with shards that are there already.
-enum class ExistingShards { refuse, replace, keep };
+namespace tangere {
 
 class DatasetFolder {
  public:

@@ -15,6 +15,14 @@
 
 namespace tangere {
 
+/// What to do with shards that are there already.
+enum class ExistingShards { refuse, replace, keep };
+
+/// What a file says of its data set, as text.
+struct Setting {
+  std::string name, value;
+};
+
 struct DatasetLayout {
   std::int64_t episodes = 0;  ///< N, of all shards
   std::int64_t steps = 0;     ///< of an episode

@@ -13,6 +13,7 @@
 
 #include "engine/error.hpp"
 #include "io/dataset_description.hpp"
+#include "io/dataset_folder.hpp"
 #include "io/h5_listing.hpp"
 #include "io/shard_file.hpp"
 

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "engine/episode_sink.hpp"
-#include "io/dataset_folder.hpp"
 #include "io/dataset_layout.hpp"
 
 namespace tangere {

@@ -172,11 +172,11 @@ void Id::reset() noexcept {
   id_ = -1;
 }
 
-Id create_file(const std::string& path, hsize_t description_block) {
+Id create_file(const std::string& path, hsize_t description_block, bool views) {
   const Quiet quiet;
   const Id access(H5Pcreate(H5P_FILE_ACCESS));
   // 1.8 objects: attributes above 64 KiB (long scenes), and a plain open works after a crash.
-  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
+  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, views ? H5F_LIBVER_V110 : H5F_LIBVER_V18);
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
   H5Pset_meta_block_size(access.get(), description_block);
   H5Pset_file_locking(access.get(), false, true);  // io/part_file.hpp holds the lock

@@ -58,8 +58,9 @@ using Dims = std::vector<hsize_t>;
 
 /// Creates a file, replacing what is at `path`. Readable by HDF5 1.8 and later; two runs that write
 /// the same numbers write the same bytes. Descriptions of objects are put together in blocks of
-/// `description_block` bytes: large ones suit files of many objects.
-Id create_file(const std::string& path, hsize_t description_block = 2048);
+/// `description_block` bytes: large ones suit files of many objects. With `views` HDF5 1.10 is needed to read it, as
+/// virtual datasets are.
+Id create_file(const std::string& path, hsize_t description_block = 2048, bool views = false);
 /// A file that is never on disk.
 Id create_memory_file();
 /// Opens a file for reading.
