@@ -3,6 +3,7 @@
 // before the first step.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -16,6 +17,7 @@
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
 #include "apps/workers.hpp"
+#include "io/nearest_name.hpp"
 #include "kernels/isa.hpp"
 #include "tasks/task_episodes.hpp"
 
@@ -58,6 +60,7 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
   if (policy.empty()) command += fmt::format(" --steps {} --every {}", run.steps, run.every);
   if (!policy.empty()) command += " --policy " + policy;
   if (!options.controls.empty()) command += " --controls " + options.controls;
+  if (options.compress != "none") command += " --compress " + options.compress;
   if (options.shards) command += fmt::format(" --shards {}", *options.shards);
   return command;
 }
@@ -72,6 +75,7 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model, co
   description.controls = controls_named(options.controls);
   description.command = command_of(options, run, policy);
   description.shards = options.shards.value_or(0);
+  description.compression = options.compress;
   description.episodes = run.episodes;
   description.steps = run.steps;
   description.every = run.every;
@@ -111,6 +115,13 @@ TaskReport report_of(const Task& task, PolicyKind policy, const TaskEpisodeSumma
   return report;
 }
 
+/// Which of the three kinds of work kept the others waiting, and for how long all of them were at it.
+std::string limit_of(const EpisodeSummary& summary, const EpisodeOptions& run) {
+  const double simulation = summary.simulation_seconds / run.threads, encoding = summary.encoding_seconds / run.threads;
+  if (summary.writing_seconds >= std::max(simulation, encoding)) return "writing";
+  return simulation >= encoding ? "simulation" : "compression";
+}
+
 int report(const GenerateOptions& options, const Console& console, const Job& job, const JobResult& done,
            const DatasetWriter& output) {
   const EpisodeSummary& summary = done.summary;
@@ -128,9 +139,9 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
                                              output.kept_failed());
   console.print(
       fmt::format("episodes: {}, rows: {}, time: {:.2f} s, {:.0f} env-steps/s with output, "
-                  "threads: {}\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes)",
-                  summary.episodes, summary.rows, summary.seconds, rate, run.threads,
-                  done.task.line, summary.split_steps, summary.failures.size(), kept, options.output,
+                  "threads: {}\nlimited by {}: simulation {:.2f} s and compression {:.2f} s of all threads, writing {:.2f} s of one\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes)",
+                  summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, run),
+                  summary.simulation_seconds, summary.encoding_seconds, summary.writing_seconds, done.task.line, summary.split_steps, summary.failures.size(), kept, options.output,
                   shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes));
   Json result{{"command", "generate"},
               {"exit_code", static_cast<int>(code)},
@@ -153,6 +164,11 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"threads", run.threads},
               {"peak_blocks_in_flight", summary.peak_blocks_in_flight},
               {"seconds", summary.seconds},
+              {"compress", options.compress},
+              {"limited_by", limit_of(summary, run)},
+              {"simulation_seconds", summary.simulation_seconds},
+              {"encoding_seconds", summary.encoding_seconds},
+              {"writing_seconds", summary.writing_seconds},
               {"environment_steps", summary.environment_steps},
               {"environment_steps_per_second", rate},
               {"newton_iterations", summary.newton_iterations},
@@ -223,6 +239,9 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
 int generate(GenerateOptions options, const Console& console, const ProgramInfo& info) {
   static_cast<void>(
       precision_named(options.precision));  // a wrong word is said before a scene is read
+  if (options.compress != "none" && options.compress != "deflate")
+    throw InputError(fmt::format("unknown compression '{}'{}", options.compress,
+                                 suggestion(options.compress, std::vector<std::string>{"none", "deflate"})));
   if (options.resume && options.overwrite)
     throw InputError("--resume with --overwrite; expected one of them: keep shards, or replace them");
   if (!options.shard.empty()) {
@@ -280,6 +299,7 @@ Command add_generate(CLI::App& program) {
            "Of tactile fields: double, or mixed, stored as float32 [default: mixed]");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between episodes [default: 0]");
+  add_text(*app, "--compress", o.compress, "NAME", "Of tactile fields on disk: none or deflate [default: none]");
   add_whole_number<std::int64_t>(*app, "--shards", o.shards, 1, kMostEpisodes,
                                  "Files to cut the data set into [default: below a gigabyte each]");
   add_text(*app, "--shard", o.shard, "k/S", "Make shard k of S alone, k from 0; others may run beside it");

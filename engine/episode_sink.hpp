@@ -52,12 +52,14 @@ struct FailedEpisode {
 };
 
 /// Receives episodes in pieces: those of one block of 16 in ascending rows, blocks in any order
-/// among each other. Called by one thread at a time. What is stored must depend on the pieces alone,
+/// among each other. Called by one thread at a time, prepare() apart. What is stored must depend on the pieces alone,
 /// not on the order of blocks. A sink that cannot store throws IoError; the run stops and passes it
 /// on.
 class EpisodeSink {
  public:
   virtual ~EpisodeSink() = default;
+  /// What can be done to a piece by many threads at once, before write() gets the same piece: compressing it.
+  virtual void prepare(const EpisodeRows&) {}
   virtual void write(const EpisodeRows& rows) = 0;
   /// The last row of the block that begins with this episode has been written.
   virtual void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) = 0;

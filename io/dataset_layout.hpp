@@ -45,6 +45,7 @@ struct DatasetLayout {
   std::string command;           ///< that makes this data set, without what does not change it (threads, folder …)
   double shard_bytes = 1 << 30;  ///< a shard stays below it, unless 16 episodes are more
   std::int64_t shards = 0;       ///< how many; 0: as shard_bytes says
+  std::string compression = "none";  ///< or "deflate": of observations whose rows are large enough
 
   /// R: actions of an episode, of a task at most.
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
@@ -76,6 +77,7 @@ struct DatasetDescription {
   std::optional<TaskSpec> task;
   std::string policy, controls, command;
   std::int64_t shards = 0;
+  std::string compression = "none";
 };
 
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,

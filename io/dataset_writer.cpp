@@ -8,10 +8,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <mutex>
 #include <numeric>
 #include <set>
+#include <stdexcept>
 
 #include "engine/error.hpp"
+#include "io/chunk_codec.hpp"
 #include "io/dataset_description.hpp"
 #include "io/dataset_folder.hpp"
 #include "io/h5_listing.hpp"
@@ -33,11 +36,15 @@ struct DatasetWriter::Impl {
   std::vector<EpisodeRange> missing;
   std::map<std::int64_t, ShardFile> open;
   std::set<std::int64_t> complete;
+  std::vector<std::int64_t> rows_of_chunks;
+  std::mutex prepared_mutex;
+  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<CompressedChunk>> prepared;  // by episode and row
   std::int64_t kept = 0, kept_failed = 0;
   bool started = false;
 
   Impl(const DatasetOutput& o, const DatasetLayout& l)
-      : layout((l.check(), l)), output(o), folder(o.folder, o.existing, o.only.has_value()) {
+      : layout((l.check(), l)), output(o), folder(o.folder, o.existing, o.only.has_value()),
+        rows_of_chunks(chunk_rows(layout)) {
     if (output.existing != ExistingShards::replace) check_settings();
     // Before shards are counted one by one: a slip of the keyboard may ask for billions.
     if (makes_all()) check_space(static_cast<double>(layout.episodes));
@@ -98,6 +105,7 @@ struct DatasetWriter::Impl {
   }
 
   void check_space(double episodes) const {
+    if (layout.compression != "none") return;  // nobody knows before
     const double needed = layout.episode_bytes() * episodes, available = folder.free_bytes();
     if (needed > available)
       throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free", output.folder, needed,
@@ -124,8 +132,25 @@ const std::vector<EpisodeRange>& DatasetWriter::missing() const { return impl_->
 std::int64_t DatasetWriter::kept() const { return impl_->kept; }
 std::int64_t DatasetWriter::kept_failed() const { return impl_->kept_failed; }
 
+void DatasetWriter::prepare(const EpisodeRows& rows) {
+  if (impl_->layout.compression == "none") return;
+  std::vector<CompressedChunk> chunks = compress(impl_->layout, impl_->rows_of_chunks, rows);
+  const std::lock_guard lock(impl_->prepared_mutex);
+  impl_->prepared[{rows.first_episode, rows.first_row}] = std::move(chunks);
+}
+
 void DatasetWriter::write(const EpisodeRows& rows) {
-  impl_->shard_of(rows.first_episode).write(rows);
+  if (impl_->layout.compression == "none") {
+    impl_->shard_of(rows.first_episode).write(rows, {});
+    return;
+  }
+  decltype(impl_->prepared)::node_type chunks;
+  {
+    const std::lock_guard lock(impl_->prepared_mutex);
+    chunks = impl_->prepared.extract({rows.first_episode, rows.first_row});
+  }
+  if (chunks.empty()) throw std::logic_error("a piece that nobody prepared");
+  impl_->shard_of(rows.first_episode).write(rows, chunks.mapped());
 }
 
 void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) {

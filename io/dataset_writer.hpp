@@ -35,6 +35,8 @@ class DatasetWriter : public EpisodeSink {
   [[nodiscard]] std::int64_t kept() const;
   [[nodiscard]] std::int64_t kept_failed() const;
 
+  /// Compresses, where the layout says so.
+  void prepare(const EpisodeRows& rows) override;
   /// The first piece of a run removes the shards of an earlier one, where those are to be replaced.
   void write(const EpisodeRows& rows) override;
   void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) override;

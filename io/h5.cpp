@@ -321,6 +321,13 @@ void read_box(const Id& dataset, const Dims& offset, const Dims& count, T* data)
     fail("read", dataset);
 }
 
+void write_chunk(const Id& dataset, const Dims& offset, std::span<const unsigned char> bytes) {
+  const Quiet quiet;
+  constexpr std::uint32_t kEveryFilter = 0;  // a mask of those that were left out
+  if (H5Dwrite_chunk(dataset.get(), H5P_DEFAULT, kEveryFilter, offset.data(), bytes.size(), bytes.data()) < 0)
+    fail("write a chunk of", dataset);
+}
+
 void write_attribute(const Id& object, const std::string& name, std::string_view text) {
   const Quiet quiet;
   const std::string copy(text);

@@ -99,6 +99,9 @@ void write_box(const Id& dataset, const Dims& offset, const Dims& count, const T
 template <class T>
 void read_box(const Id& dataset, const Dims& offset, const Dims& count, T* data);
 
+/// Writes a chunk that has been through the dataset's filters already, all of them. `offset`: of its first element.
+void write_chunk(const Id& dataset, const Dims& offset, std::span<const unsigned char> bytes);
+
 /// Text attributes are variable-length UTF-8, which h5py shows as str. Text must not contain NUL.
 void write_attribute(const Id& object, const std::string& name, std::string_view text);
 void write_attribute(const Id& object, const std::string& name, std::span<const std::string> texts);

@@ -145,6 +145,7 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.controls = run.controls;
   layout.command = run.command;
   layout.shards = run.shards;
+  layout.compression = run.compression;
   return layout;
 }
 

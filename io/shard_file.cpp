@@ -27,10 +27,15 @@ std::size_t numbers_of(const h5::Dims& dims) {
   return numbers;
 }
 
-h5::Id create(const h5::Id& group, const std::string& name, const h5::Dims& dims, bool single) {
-  const h5::Storage reserved{{}, false, true};
-  return single ? h5::create_dataset<float>(group, name, dims, reserved)
-                : h5::create_dataset<double>(group, name, dims, reserved);
+/// `chunk`: rows of a chunk, 0: contiguous.
+h5::Id create(const h5::Id& group, const std::string& name, const h5::Dims& dims, bool single, std::int64_t chunk = 0) {
+  h5::Storage storage{{}, false, true};
+  if (chunk > 0) {
+    storage = {dims, true, false};
+    storage.chunk[0] = std::min(dims[0], static_cast<hsize_t>(chunk));
+  }
+  return single ? h5::create_dataset<float>(group, name, dims, storage)
+                : h5::create_dataset<double>(group, name, dims, storage);
 }
 
 /// Rows [first, first + dims[0]) of a dataset; none when dims hold no numbers.
@@ -53,6 +58,7 @@ ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout,
       unfinished_((range.end - range.first + kBlockEpisodes - 1) / kBlockEpisodes),
       names_(layout.observation_names()),
       shapes_(layout.observation_shapes()),
+      rows_of_chunks_(chunk_rows(layout)),
       part_(path, overwrite),
       file_(h5::create_file(part_.path(), kDescriptionBlock)) {
   try {
@@ -109,13 +115,19 @@ ShardFile::Demo ShardFile::create_demo(std::int64_t episode, const EpisodeEnd* e
   h5::create_flags(group, "dones", dones);
   const h5::Id obs = h5::create_group(group, "obs"), last = h5::create_group(group, "final_obs");
   for (std::size_t k = 0; k < names_.size(); ++k) {
-    demo.obs.push_back(create(obs, names_[k], with_rows(rows, shapes_[k]), layout_.single));
-    demo.final_obs.push_back(create(last, names_[k], with_rows(1, shapes_[k]), layout_.single));
+    demo.obs.push_back(create(obs, names_[k], with_rows(rows, shapes_[k]), layout_.single, rows_of_chunks_[k]));
+    demo.final_obs.push_back(
+        create(last, names_[k], with_rows(1, shapes_[k]), layout_.single, compresses_last(k) ? 1 : 0));
   }
   return demo;
 }
 
-void ShardFile::write(const EpisodeRows& rows) {
+bool ShardFile::compresses_last(std::size_t name) const {
+  const std::size_t bytes = numbers_of(with_rows(1, shapes_[name])) * (layout_.single ? sizeof(float) : sizeof(double));
+  return rows_of_chunks_[name] > 0 && compresses_last_row(bytes);
+}
+
+void ShardFile::write(const EpisodeRows& rows, std::span<const CompressedChunk> chunks) {
   for (; created_ <= rows.first_episode; created_ += kBlockEpisodes) create_block(created_, rows.ends);
   Block& block = blocks_.at(rows.first_episode);
   const std::size_t nu = layout_.action_names().size();
@@ -127,6 +139,12 @@ void ShardFile::write(const EpisodeRows& rows) {
     demo.sum.add(rows.first_episode + e, 0, rows.first_row, taken, nu * sizeof(float), from);
     if (!rows.ends.empty()) write_rewards(demo, rows, e);
     for (std::size_t name = 0; name < names_.size(); ++name) write_observation(demo, rows, e, name);
+  }
+  for (const CompressedChunk& chunk : chunks) {
+    const Demo& demo = block[static_cast<std::size_t>(chunk.episode)];
+    h5::Dims offset(shapes_[chunk.name].size() + 1, 0);
+    offset[0] = static_cast<hsize_t>(chunk.row);
+    h5::write_chunk(chunk.last ? demo.final_obs[chunk.name] : demo.obs[chunk.name], offset, chunk.bytes);
   }
 }
 
@@ -145,8 +163,8 @@ void ShardFile::write_observation(Demo& demo, const EpisodeRows& rows, int episo
         const auto* from = values.data() + static_cast<std::size_t>(episode) * all * width;
         const std::int64_t taken = std::min<std::int64_t>(rows.action_rows, demo.length - rows.first_row);
         const bool last = rows.rows > taken;
-        put(demo.obs[name], rows.first_row, with_rows(taken, shapes_[name]), from);
-        if (last)
+        if (rows_of_chunks_[name] == 0) put(demo.obs[name], rows.first_row, with_rows(taken, shapes_[name]), from);
+        if (last && !compresses_last(name))
           put(demo.final_obs[name], 0, with_rows(1, shapes_[name]), from + static_cast<std::size_t>(taken) * width);
         demo.sum.add(rows.first_episode + episode, name + 1, rows.first_row, taken + (last ? 1 : 0),
                      width * sizeof *from, from);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/episode_sink.hpp"
+#include "io/chunk_codec.hpp"
 #include "io/dataset_layout.hpp"
 #include "io/h5.hpp"
 #include "io/part_file.hpp"
@@ -24,7 +25,8 @@ class ShardFile {
   ShardFile(const ShardFile&) = delete;
   ShardFile& operator=(const ShardFile&) = delete;
 
-  void write(const EpisodeRows& rows);
+  /// `chunks`: of the same piece, where the layout compresses.
+  void write(const EpisodeRows& rows, std::span<const CompressedChunk> chunks);
   void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures);
   /// Whether every block has finished.
   [[nodiscard]] bool complete() const { return unfinished_ == 0; }
@@ -47,6 +49,7 @@ class ShardFile {
   Demo create_demo(std::int64_t episode, const EpisodeEnd* end);
   void write_rewards(Demo& demo, const EpisodeRows& rows, int episode);
   void write_observation(Demo& demo, const EpisodeRows& rows, int episode, std::size_t name);
+  [[nodiscard]] bool compresses_last(std::size_t name) const;
   void record_failures();
 
   const DatasetLayout& layout_;
@@ -54,6 +57,7 @@ class ShardFile {
   std::int64_t unfinished_;                     // blocks
   std::vector<std::string> names_;
   std::vector<std::vector<std::uint64_t>> shapes_;
+  std::vector<std::int64_t> rows_of_chunks_;
   PartFile part_;
   h5::Id file_, data_;
   std::map<std::int64_t, Block> blocks_;  // unfinished ones, by their first episode

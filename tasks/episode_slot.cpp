@@ -28,6 +28,15 @@ double row_bytes(const EpisodeShape& shape, const EpisodeOptions& options) {
   return bytes;
 }
 
+/// Multiples of 64, below that powers of two: whoever stores rows in chunks of such sizes gets whole ones.
+int whole_rows(int most) {
+  constexpr int kRows = 64;
+  if (most >= kRows) return most / kRows * kRows;
+  int rows = 1;
+  while (2 * rows <= most) rows *= 2;
+  return rows;
+}
+
 }  // namespace
 
 EpisodeShape::EpisodeShape(const Model& model, const EpisodeOptions& options)
@@ -42,6 +51,7 @@ EpisodeShape::EpisodeShape(const Model& model, const EpisodeOptions& options)
   constexpr std::int64_t kMostRows = 1 << 20;  // rows without numbers still are counted by an int
   piece_rows = static_cast<int>(
       std::clamp(fitting, 1.0, static_cast<double>(std::min(rows + 1, kMostRows))));
+  if (piece_rows <= rows) piece_rows = whole_rows(piece_rows);
 }
 
 double EpisodeShape::piece_bytes(const EpisodeOptions& options) const {

@@ -17,6 +17,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "tasks/busy_time.hpp"
 #include "tasks/episode_slot.hpp"
 #include "tasks/task_order.hpp"
 
@@ -128,7 +129,9 @@ class EpisodeGraph {
     flow::function_node<Traveller, Traveller> encoder(graph_, flow::unlimited, [this](Traveller t) {
       TaskOrder::arrive();
       const TaskOrder::Task task(order_, t.slot);
+      const Stopwatch watch(encoding_);
       t.slot->encode();
+      sink_.prepare(t.slot->piece());
       return t;
     });
     flow::multifunction_node<Traveller, Exits> writer(
@@ -150,6 +153,9 @@ class EpisodeGraph {
     wait_for_all(blocks);
     summary_.peak_blocks_in_flight = slots_.peak();
     summary_.stopped = stopped_;
+    summary_.simulation_seconds = simulation_.seconds();
+    summary_.encoding_seconds = encoding_.seconds();
+    summary_.writing_seconds = writing_.seconds();
     std::sort(summary_.failures.begin(), summary_.failures.end(),
               [](const FailedEpisode& a, const FailedEpisode& b) { return a.episode < b.episode; });
     return std::move(summary_);
@@ -190,6 +196,7 @@ class EpisodeGraph {
       if (stop_ && stop_()) stopped_ = true;
       return stopped_ || tbb::is_current_task_group_canceling();  // a throw elsewhere
     };
+    const Stopwatch watch(simulation_);
     if (!t.slot->simulate(ends)) graph_.cancel();
     return t;
   }
@@ -197,6 +204,7 @@ class EpisodeGraph {
   /// True when that was the block's last piece.
   bool write(const Traveller& t) {
     const TaskOrder::Task writer(order_, &summary_), task(order_, t.slot);
+    const Stopwatch watch(writing_);
     const EpisodeRows piece = t.slot->piece();
     sink_.write(piece);
     const PieceCounts& counts = t.slot->counts();
@@ -229,6 +237,7 @@ class EpisodeGraph {
   std::function<std::unique_ptr<EpisodeSlot>()> make_slot_;
   flow::graph graph_;
   std::atomic<bool> stopped_{false};
+  BusyTime simulation_, encoding_, writing_;
   EpisodeSummary summary_;
 };
 

@@ -41,6 +41,9 @@ struct EpisodeSummary {
   int peak_blocks_in_flight = 0;
   bool stopped = false;  ///< StopRequest said so; what was not finished is lost
   double seconds = 0;    ///< wall clock of the whole run, sink included
+  /// Sums over threads: stepping, turning rows into what is stored (compression included), and what the one thread that
+  /// writes was busy for.
+  double simulation_seconds = 0, encoding_seconds = 0, writing_seconds = 0;
 };
 
 /// Called after each piece, by one thread at a time, with the environment steps done.
