@@ -9,14 +9,9 @@ if(NOT TARGET xtl)
   set_property(TARGET xsimd PROPERTY INTERFACE_LINK_LIBRARIES "")
 endif()
 find_package(HDF5 REQUIRED COMPONENTS C)
-# Debian 12's libdeflate comes without files for CMake.
+# Debian 12's libdeflate comes without files for CMake; io links it by its plain name.
 find_path(LIBDEFLATE_INCLUDE_DIR libdeflate.h REQUIRED)
 find_library(LIBDEFLATE_LIBRARY deflate REQUIRED)
-if(NOT TARGET tangere_deflate)
-  add_library(tangere_deflate INTERFACE IMPORTED)
-  set_target_properties(tangere_deflate PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${LIBDEFLATE_INCLUDE_DIR}"
-    INTERFACE_LINK_LIBRARIES "${LIBDEFLATE_LIBRARY}")
-endif()
 find_package(tinyxml2 CONFIG REQUIRED)
 find_package(CLI11 CONFIG REQUIRED)
 find_package(fmt CONFIG REQUIRED)

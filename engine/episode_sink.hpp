@@ -35,6 +35,7 @@ struct EpisodeRows {
   /// q, v, then of a task its observations, of a scene end effectors if any and sensors: (episodes, rows, width)
   std::span<const Observation> observations;
   std::span<const float> rewards = {};    ///< of a task: (episodes, action_rows)
+  std::span<const double> randomized = {};  ///< what varies between episodes: (episodes, as many as the scene varies)
   std::span<const EpisodeEnd> ends = {};  ///< of a task, whose blocks come whole and in ascending order: (episodes)
 };
 

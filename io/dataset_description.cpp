@@ -67,6 +67,10 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   texts("v_names", layout.v_names);
   texts("v_units", layout.v_units);
   texts("action_names", layout.action_names());
+  if (!layout.randomized_names.empty()) {
+    texts("randomized_names", layout.randomized_names);
+    texts("randomized_units", layout.randomized_units);
+  }
   describe_task(scene, layout);
   if (!layout.task && !layout.variable_names.empty()) {
     texts("variable_names", layout.variable_names);

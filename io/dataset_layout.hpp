@@ -34,6 +34,7 @@ struct DatasetLayout {
   std::vector<std::string> u_names;           ///< (nu)
   std::vector<std::string> variable_names;    ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
+  std::vector<std::string> randomized_names, randomized_units;  ///< what varies between episodes
   std::optional<TaskSpec> task;  ///< whose actions, observations and rewards these are; none: a scene alone
   std::string policy;            ///< of a task
   std::string scene_name, scene_text;

@@ -365,6 +365,13 @@ void write_list(const Id& object, const std::string& name, std::span<const T> va
         values.data());
 }
 
+void replace_list(const Id& object, const std::string& name, std::span<const double> values) {
+  const Quiet quiet;
+  const OpenAttribute open(object, name);
+  if (open.elements != values.size() || H5Awrite(open.attribute.get(), H5T_NATIVE_DOUBLE, values.data()) < 0)
+    fail("replace attribute", object, name);
+}
+
 std::vector<std::string> read_texts(const Id& object, const std::string& name) {
   const Quiet quiet;
   const OpenAttribute open(object, name);

@@ -111,6 +111,9 @@ void write_scalar(const Id& object, const std::string& name, T value);
 template <class T>
 void write_list(const Id& object, const std::string& name, std::span<const T> values);
 
+/// New values for a list of numbers that is there, as many of them.
+void replace_list(const Id& object, const std::string& name, std::span<const double> values);
+
 [[nodiscard]] std::string read_text(const Id& object, const std::string& name);
 [[nodiscard]] std::vector<std::string> read_texts(const Id& object, const std::string& name);
 /// The elements of a numeric attribute, whatever its rank (a scalar gives one).

@@ -96,13 +96,16 @@ void ShardFile::create_block(std::int64_t first_episode, std::span<const Episode
 ShardFile::Demo ShardFile::create_demo(std::int64_t episode, const EpisodeEnd* end) {
   // An episode that failed in its first action has no row; it will be removed.
   const std::int64_t rows = end != nullptr ? std::max<std::int64_t>(1, end->length) : layout_.rows();
-  const h5::Id group = h5::create_group(data_, fmt::format("demo_{}", episode));
+  h5::Id group = h5::create_group(data_, fmt::format("demo_{}", episode));
   h5::write_scalar<std::int64_t>(group, "num_samples", rows);
   if (end != nullptr) {
     h5::write_scalar<double>(group, "return", end->total);
     h5::write_scalar<std::int8_t>(group, "terminated", end->terminated ? 1 : 0);
     h5::write_scalar<std::int8_t>(group, "success", end->success ? 1 : 0);
   }
+  // Its room, to be filled when the block comes: blocks before it must not show in the file.
+  if (!layout_.randomized_names.empty())
+    h5::write_list<double>(group, "randomized", std::vector<double>(layout_.randomized_names.size(), 0));
   Demo demo;
   demo.length = rows;
   demo.actions = create(group, "actions", with_rows(rows, {layout_.action_names().size()}), true);
@@ -119,7 +122,16 @@ ShardFile::Demo ShardFile::create_demo(std::int64_t episode, const EpisodeEnd* e
     demo.final_obs.push_back(
         create(last, names_[k], with_rows(1, shapes_[k]), layout_.single, compresses_last(k) ? 1 : 0));
   }
+  demo.group = std::move(group);
   return demo;
+}
+
+void ShardFile::write_randomized(Demo& demo, const EpisodeRows& rows, int episode) const {
+  const std::size_t count = layout_.randomized_names.size();
+  if (count == 0 || rows.first_row != 0) return;
+  const auto values = rows.randomized.subspan(static_cast<std::size_t>(episode) * count, count);
+  demo.randomized.assign(values.begin(), values.end());
+  h5::replace_list(demo.group, "randomized", values);
 }
 
 bool ShardFile::compresses_last(std::size_t name) const {
@@ -137,6 +149,7 @@ void ShardFile::write(const EpisodeRows& rows, std::span<const CompressedChunk> 
     const float* from = rows.actions.data() + static_cast<std::size_t>(e) * static_cast<std::size_t>(rows.action_rows) * nu;
     put(demo.actions, rows.first_row, h5::Dims{static_cast<hsize_t>(taken), nu}, from);
     demo.sum.add(rows.first_episode + e, 0, rows.first_row, taken, nu * sizeof(float), from);
+    write_randomized(demo, rows, e);
     if (!rows.ends.empty()) write_rewards(demo, rows, e);
     for (std::size_t name = 0; name < names_.size(); ++name) write_observation(demo, rows, e, name);
   }
@@ -180,6 +193,7 @@ void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode
     demo.sum = {};
     demo.length = 0;
     failures_.push_back(failure);
+    randomized_of_failures_[failure.episode] = std::move(demo.randomized);
   }
   for (const Demo& demo : block->second) {
     sum_.add(demo.sum);
@@ -201,6 +215,8 @@ void ShardFile::record_failures() {
     h5::write_attribute(group, "reason", to_string(failure.status));
     h5::write_list<double>(group, "q", failure.q);
     h5::write_list<double>(group, "v", failure.v);
+    const std::vector<double>& randomized = randomized_of_failures_[failure.episode];
+    if (!randomized.empty()) h5::write_list<double>(group, "randomized", randomized);
   }
 }
 

@@ -36,10 +36,12 @@ class ShardFile {
  private:
   /// The open datasets of one episode.
   struct Demo {
+    h5::Id group;
     h5::Id actions;
     h5::Id rewards;
     std::vector<h5::Id> obs, final_obs;  // per observation
     std::int64_t length = 0;             // actions
+    std::vector<double> randomized;
     ContentSum sum;
   };
   using Block = std::vector<Demo>;
@@ -47,6 +49,7 @@ class ShardFile {
   void describe();
   void create_block(std::int64_t first_episode, std::span<const EpisodeEnd> ends);
   Demo create_demo(std::int64_t episode, const EpisodeEnd* end);
+  void write_randomized(Demo& demo, const EpisodeRows& rows, int episode) const;
   void write_rewards(Demo& demo, const EpisodeRows& rows, int episode);
   void write_observation(Demo& demo, const EpisodeRows& rows, int episode, std::size_t name);
   [[nodiscard]] bool compresses_last(std::size_t name) const;
@@ -62,6 +65,7 @@ class ShardFile {
   h5::Id file_, data_;
   std::map<std::int64_t, Block> blocks_;  // unfinished ones, by their first episode
   std::vector<FailedEpisode> failures_;
+  std::map<std::int64_t, std::vector<double>> randomized_of_failures_;  // by episode
   std::int64_t rows_ = 0;  // of demos, failed ones left out
   ContentSum sum_;
 };

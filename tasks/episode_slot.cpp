@@ -87,6 +87,10 @@ void EpisodeSlot::begin(std::int64_t block) {
       static_cast<int>(std::min<std::int64_t>(kBlockEpisodes, options_.episodes - first));
   batch_.emplace(model_, episodes, options_.seed, first);
   next_row_ = 0;
+  randomized_.clear();
+  for (int e = 0; e < episodes; ++e)
+    for (int k = 0; k < static_cast<int>(model_.scene().randomizations.size()); ++k)
+      randomized_.push_back(batch_->randomized_value(e, k));
   failures_.clear();
   live_.assign(size(episodes), true);
 }
@@ -197,10 +201,12 @@ void EpisodeSlot::encode() {
 
 EpisodeRows EpisodeSlot::piece() const {
   const std::size_t actions = size(batch_->environments()) * size(action_rows_) * shape_.nu;
-  return {batch_->episode(0), batch_->environments(),
-          first_row_,         rows_,
-          action_rows_,       std::span(actions_).first(actions),
-          observations_};
+  EpisodeRows piece{batch_->episode(0), batch_->environments(),
+                    first_row_,         rows_,
+                    action_rows_,       std::span(actions_).first(actions),
+                    observations_};
+  piece.randomized = randomized_;
+  return piece;
 }
 
 }  // namespace tangere

@@ -98,6 +98,7 @@ class Rows {
 struct EndedBlock {
   std::vector<EpisodeEnd> ends;
   std::vector<FailedEpisode> failures;
+  std::vector<double> randomized;
   EpisodeRows piece;
 };
 
@@ -189,6 +190,7 @@ class EpisodeRun {
       const int first = b * kBlockEpisodes, episodes = std::min(kBlockEpisodes, vector.environments() - first);
       collect(vector, first, episodes, ended[size(b)]);
       ended[size(b)].piece = rows.block(vector, first, episodes, ended[size(b)].ends);
+      ended[size(b)].piece.randomized = ended[size(b)].randomized;
     }
     {
       const Stopwatch watch(preparing_);
@@ -207,7 +209,9 @@ class EpisodeRun {
 
   /// How the episodes of a block ended.
   void collect(const VectorTask& vector, int first, int episodes, EndedBlock& block) {
+    const auto varied = static_cast<int>(task_.model().scene().randomizations.size());
     for (int e = first; e < first + episodes; ++e) {
+      for (int k = 0; k < varied; ++k) block.randomized.push_back(vector.batch().randomized_value(e, k));
       block.ends.push_back({vector.lengths()[size(e)], vector.returns()[size(e)], vector.terminated()[size(e)] != 0,
                             vector.success()[size(e)] != 0});
       if (failed(vector.status(e))) {

@@ -9,6 +9,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "io/h5.hpp"
 #include "io/shard_check.hpp"
 #include "tests/apps/program.hpp"
 
@@ -199,6 +200,27 @@ TEST(GenerateShards, OfAnotherRunAreNotMixedInByAWorker) {
   EXPECT_EQ(mixed.exit_code, 2);
   EXPECT_THAT(mixed.err, HasSubstr("seed: 3 there, 8 here"));
   EXPECT_THAT(bytes(folder, "set"), testing::SizeIs(1));
+}
+
+TEST(GenerateShards, SayWhatVariedInEachEpisode) {
+  const Folder folder;
+  ASSERT_EQ(run(folder, generate({"--shard", "1/5"})).exit_code, 0);
+  const Outcome trajectory = run(folder, {"simulate", scene("rolling_ball_small.xml"), "--output", "t.h5", "--envs", "40",
+                                          "--steps", "1", "--seed", "3"});
+  ASSERT_EQ(trajectory.exit_code, 0) << trajectory.err;
+  const h5::Id shard = h5::open_file(folder.path("set/shard-00001.h5")), file = h5::open_file(folder.path("t.h5"));
+  const h5::Id all = h5::open_dataset(file, "randomized"), scene_group = h5::open_group(shard, "scene");
+  const h5::Dims dims = h5::dimensions(all);
+  std::vector<double> expected(dims.at(0) * dims.at(1));
+  h5::read_box(all, {0, 0}, dims, expected.data());
+  EXPECT_EQ(h5::read_texts(scene_group, "randomized_names"), h5::read_texts(all, "names"));
+  EXPECT_EQ(h5::read_texts(scene_group, "randomized_units").size(), dims[1]);
+  for (const int episode : {16, 31}) {
+    const h5::Id demo = h5::open_group(shard, "data/demo_" + std::to_string(episode));
+    const auto at = expected.begin() + static_cast<std::ptrdiff_t>(dims[1]) * episode;
+    EXPECT_EQ(h5::read_numbers<double>(demo, "randomized"),
+              std::vector<double>(at, at + static_cast<std::ptrdiff_t>(dims[1])));
+  }
 }
 
 TEST(GenerateShards, MistakesAreNamed) {
