@@ -28,5 +28,6 @@ Command add_merge(CLI::App& program);
 Command add_export(CLI::App& program);
 Command add_plot(CLI::App& program);
 Command add_bench(CLI::App& program);
+Command add_gradcheck(CLI::App& program);
 
 }  // namespace tangere::apps

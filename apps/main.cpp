@@ -45,7 +45,7 @@ struct Program {
     parser.require_subcommand(0, 1);
     parser.allow_extras();
     commands = {add_inspect(parser), add_simulate(parser), add_generate(parser), add_validate(parser), add_info(parser),
-                add_merge(parser), add_export(parser), add_plot(parser), add_bench(parser)};
+                add_merge(parser), add_export(parser), add_plot(parser), add_bench(parser), add_gradcheck(parser)};
   }
 
   [[nodiscard]] const Command* chosen() const {

@@ -26,6 +26,15 @@ Precision precision_named(const std::string& name) {
   throw InputError("unknown precision '" + name + "'" + suggestion(name, names));
 }
 
+LossKind loss_named(const std::string& name) {
+  std::vector<std::string> names;
+  for (const LossKind value : loss_kinds()) {
+    names.emplace_back(to_string(value));
+    if (names.back() == name) return value;
+  }
+  throw InputError("unknown loss '" + name + "'" + suggestion(name, names));
+}
+
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console) {
   SceneFile file = read_scene(path, {allow_unknown});
   for (const std::string& warning : file.warnings) console.note("warning: " + warning);

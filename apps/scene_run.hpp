@@ -12,6 +12,7 @@
 #include "engine/control.hpp"
 #include "engine/precision.hpp"
 #include "engine/stepper.hpp"
+#include "tasks/losses.hpp"
 #include "tasks/rollout.hpp"
 
 namespace tangere::apps {
@@ -22,6 +23,9 @@ constexpr std::int64_t kMostSteps = 1'000'000'000'000;
 
 /// Throws InputError for a --precision that there is not.
 Precision precision_named(const std::string& name);
+
+/// Throws InputError for a loss that there is not.
+LossKind loss_named(const std::string& name);
 
 /// Reads a scene; its warnings go to the console.
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console);

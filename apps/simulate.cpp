@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <numeric>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
@@ -13,17 +14,20 @@
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
+#include "engine/parameters.hpp"
 #include "io/nearest_name.hpp"
 #include "io/saved_state.hpp"
 #include "io/trajectory_file.hpp"
 #include "kernels/isa.hpp"
+#include "tasks/gradients.hpp"
+#include "tasks/losses.hpp"
 #include "tasks/task_pilot.hpp"
 
 namespace tangere::apps {
 namespace {
 
 struct Options {
-  std::string scene, output, controls, policy, integrator, precision = "double", state_from;
+  std::string scene, output, controls, policy, integrator, precision = "double", state_from, gradients;
   std::optional<std::int64_t> steps, row;
   std::optional<int> environments, every;
   std::optional<double> timestep, tolerance;
@@ -176,6 +180,50 @@ std::int64_t steps_left(const Options& options, const ControlProgram& controls, 
   return left;
 }
 
+/// --gradients: the loss's derivatives over the run that has just been made.
+struct Gradients {
+  std::optional<Batch> start;
+  std::unique_ptr<RolloutLoss> loss;
+  std::string name;
+  std::vector<double> value;
+
+  Gradients(const Options& options, const Batch& batch, const RolloutOptions& rollout) : name(options.gradients) {
+    if (name.empty()) return;
+    const Model& model = batch.model();
+    const int every = model.sensors().empty() ? 1 : tactile_interval(model.sensors()[0], rollout);
+    loss = make_loss(loss_named(name), model, every);
+    start = batch;
+  }
+  [[nodiscard]] bool wanted() const { return start.has_value(); }
+
+  void write(const Stepper& stepper, const ControlProgram& controls, const RolloutOptions& rollout, TrajectoryFile& output) {
+    GradientOptions options;
+    options.steps = rollout.steps;
+    options.stepper = {stepper.integrator(), stepper.timestep(), stepper.tolerance()};
+    options.precision = rollout.precision;
+    options.parameters = true;
+    const RolloutLoss* const losses[] = {loss.get()};
+    const LossGradient g = rollout_gradients(
+                               *start,
+                               [&](std::int64_t step, int e, std::span<double> u) {
+                                 controls.evaluate(rollout.first_step + step, start->episode(e), u);
+                               },
+                               options, losses)
+                               .losses[0];
+    std::vector<std::string> names, units;
+    const Parameters parameters(start->model());
+    for (const ParameterInfo& info : parameters.infos()) names.push_back(info.name), units.push_back(info.unit);
+    output.write({name, loss_meaning(loss_named(name)), g.value, g.u, g.q, g.v, g.parameters, names, units});
+    value = g.value;
+  }
+
+  [[nodiscard]] Json json() const {
+    if (!wanted()) return nullptr;
+    const double sum = std::accumulate(value.begin(), value.end(), 0.0);
+    return {{"loss_name", name}, {"mean_loss", sum / static_cast<double>(value.size())}};
+  }
+};
+
 /// Steps and writes; `run`: the rollout into the file, told how many steps are done.
 template <class Run>
 int write_run(const Options& options, const Console& console, const Batch& batch, const Stepper& stepper,
@@ -200,7 +248,8 @@ int write_run(const Options& options, const Console& console, const Batch& batch
 
 int simulate_task(const Options& options, const Console& console, const ProgramInfo& info, const Task& task,
                   Precision precision) {
-  refuse_with_task(task, {{"--steps", options.steps.has_value()},
+  refuse_with_task(task, {{"--gradients", !options.gradients.empty()},
+                          {"--steps", options.steps.has_value()},
                           {"--state-from", !options.state_from.empty()},
                           {"--timestep", options.timestep.has_value()},
                           {"--integrator", !options.integrator.empty()},
@@ -255,6 +304,7 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
   check_size(model, start.environments);
   Batch batch(model, start.environments, start.seed, start.saved ? start.saved->first_episode : 0);
   if (start.saved) restore_state(*start.saved, start.continues, batch);
+  Gradients gradients(options, batch, rollout);
 
   // Before the file is created and until it is gone or complete: nothing half-written stays.
   const StopSignals signals;
@@ -262,8 +312,16 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
                         options.overwrite);
   return write_run(
       options, console, batch, stepper, rollout, output, signals,
-      [&](const RolloutProgress& progress) { return run_rollout(batch, stepper, controls, rollout, output, progress); },
-      [] { return TaskReport{}; });
+      [&](const RolloutProgress& progress) {
+        RolloutSummary summary = run_rollout(batch, stepper, controls, rollout, output, progress);
+        if (gradients.wanted() && !summary.stopped) gradients.write(stepper, controls, rollout, output);
+        return summary;
+      },
+      [&] {
+        TaskReport of_run;
+        of_run.keys["gradients"] = gradients.json();
+        return of_run;
+      });
 }
 
 }  // namespace
@@ -293,6 +351,8 @@ Command add_simulate(CLI::App& program) {
            "BDF1, BDF2, SDIRK2 or linear-implicit [default: the scene's]");
   add_positive_number(*app, "--tol", o.tolerance,
                       "Largest scaled residual of a step [default: the scene's]");
+  add_text(*app, "--gradients", o.gradients, "LOSS",
+           "Derivatives of a loss by controls, start and the scene's numbers as well: final, path, tactile, shear or variables");
   add_text(*app, "--precision", o.precision, "NAME",
            "Of tactile fields: double, or mixed, points in float [default: double]");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,

@@ -24,11 +24,12 @@ install(TARGETS tangere_kernels tangere_engine tangere_tasks tangere_io tangere_
   EXPORT tangere ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS tangere RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(FILES kernels/contact_types.hpp DESTINATION ${headers}/kernels)
-install(FILES engine/aligned.hpp engine/batch.hpp engine/control.hpp engine/episode_sink.hpp engine/error.hpp
-  engine/flow_map.hpp engine/model.hpp
+install(FILES engine/adjoint.hpp engine/aligned.hpp engine/batch.hpp engine/control.hpp engine/episode_sink.hpp engine/error.hpp
+  engine/flow_map.hpp engine/loss.hpp engine/model.hpp engine/parameters.hpp engine/readout_pullback.hpp
+  engine/step_jacobian.hpp engine/tape.hpp
   engine/precision.hpp engine/readout.hpp engine/row_sink.hpp engine/scene.hpp engine/stepper.hpp
   engine/tactile_frame.hpp engine/task_spec.hpp DESTINATION ${headers}/engine)
-install(FILES tasks/benchmark_run.hpp tasks/episodes.hpp tasks/policy.hpp tasks/rollout.hpp tasks/task.hpp
+install(FILES tasks/benchmark_run.hpp tasks/episodes.hpp tasks/gradients.hpp tasks/losses.hpp tasks/policy.hpp tasks/rollout.hpp tasks/task.hpp
   tasks/task_episodes.hpp tasks/task_list.hpp tasks/task_pilot.hpp tasks/vector_task.hpp DESTINATION ${headers}/tasks)
 install(FILES io/dataset_export.hpp io/dataset_files.hpp io/dataset_layout.hpp io/dataset_merge.hpp io/dataset_writer.hpp
   io/scene_reader.hpp io/shard_check.hpp io/trajectory_file.hpp

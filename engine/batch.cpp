@@ -218,6 +218,21 @@ int Batch::failed_count() const {
   return static_cast<int>(std::count_if(all.begin(), all.end(), [](StepStatus s) { return failed(s); }));
 }
 
+BlockState Batch::save_block(int block) const {
+  const double* rows = this->block(block);
+  const auto lane = std::ptrdiff_t(block) * kBlock;
+  return {{rows, rows + block_stride_},
+          {status_.begin() + lane, status_.begin() + lane + kBlock},
+          {has_history_.begin() + lane, has_history_.begin() + lane + kBlock}};
+}
+
+void Batch::restore_block(int block, const BlockState& state) {
+  const auto lane = std::ptrdiff_t(block) * kBlock;
+  std::copy(state.rows.begin(), state.rows.end(), this->block(block));
+  std::copy(state.status.begin(), state.status.end(), status_.begin() + lane);
+  std::copy(state.has_history.begin(), state.has_history.end(), has_history_.begin() + lane);
+}
+
 bool Batch::is_parameter(int k) const {
   const CompiledModel& m = model_.compiled();
   return m.randomized_row[std::size_t(k)] >= m.layout.parameters;

@@ -23,6 +23,13 @@ enum class StepStatus : std::int8_t {
 const char* to_string(StepStatus value);
 inline bool failed(StepStatus s) { return static_cast<std::int8_t>(s) < 0; }
 
+/// Everything of one block that a step may change.
+struct BlockState {
+  AlignedVector<double> rows;
+  std::vector<StepStatus> status;
+  std::vector<std::uint8_t> has_history;
+};
+
 /// Environments stepped together. A failed environment keeps its last good state and is not stepped again until reset.
 class Batch {
  public:
@@ -61,6 +68,10 @@ class Batch {
   [[nodiscard]] std::span<const std::int32_t> iterations() const { return {iterations_.data(), std::size_t(environments_)}; }
   [[nodiscard]] std::span<const double> residuals() const { return {residual_.data(), std::size_t(environments_)}; }
   [[nodiscard]] int failed_count() const;
+
+  /// A block as it is, and back to that.
+  [[nodiscard]] BlockState save_block(int block) const;
+  void restore_block(int block, const BlockState& state);
 
   /// Value of randomised number k (in the order of Scene::randomizations) in an environment: what was drawn for it, or
   /// set since if it is no number of the starting state.

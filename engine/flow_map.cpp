@@ -47,7 +47,47 @@ double normalise(std::span<const ShearField<T>> fields, std::span<T> flow, doubl
   return longest;
 }
 
+/// Shear of one point.
+struct Shear {
+  double x, y;
+};
+Shear shear_at(const ShearField<double>& field, std::size_t k) {
+  if (field.before.empty()) return {field.force[k], field.force[k + 1]};
+  return {field.force[k] - field.before[k], field.force[k + 1] - field.before[k + 1]};
+}
+
+void add_shear(const ShearCotangent& to, std::size_t k, double x, double y) {
+  if (!to.force.empty()) to.force[k] += x, to.force[k + 1] += y;
+  if (!to.before.empty()) to.before[k] -= x, to.before[k + 1] -= y;
+}
+
 }  // namespace
+
+void normalised_flow_vjp(std::span<const ShearField<double>> fields, std::span<const double> flow_cotangent,
+                         std::span<const ShearCotangent> out, double smallest) {
+  check(fields, flow_cotangent.size());
+  if (out.size() != fields.size())
+    throw InputError("derivatives by " + std::to_string(out.size()) + " fields; expected " + std::to_string(fields.size()));
+  double longest = 0, product = 0;  // Σ F̄·S
+  std::size_t field_of_longest = 0, place = 0;
+  const double* from = flow_cotangent.data();
+  for (std::size_t f = 0; f < fields.size(); ++f)
+    for (std::size_t k = 0; k < fields[f].force.size(); k += 3, from += 2) {
+      const Shear s = shear_at(fields[f], k);
+      const double length = std::hypot(s.x, s.y);
+      if (length > longest) longest = length, field_of_longest = f, place = k;
+      product += from[0] * s.x + from[1] * s.y;
+    }
+  if (!(longest > smallest)) return;
+  from = flow_cotangent.data();
+  for (std::size_t f = 0; f < fields.size(); ++f)
+    for (std::size_t k = 0; k < fields[f].force.size(); k += 3, from += 2)
+      add_shear(out[f], k, from[0] / longest, from[1] / longest);
+  // F = S/L, L the length at `place`.
+  const Shear s = shear_at(fields[field_of_longest], place);
+  const double by_length = -product / (longest * longest);
+  add_shear(out[field_of_longest], place, by_length * s.x / longest, by_length * s.y / longest);
+}
 
 double normalised_flow(std::span<const ShearField<double>> fields, std::span<double> flow, double smallest) {
   return normalise(fields, flow, smallest);

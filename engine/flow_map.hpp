@@ -20,4 +20,14 @@ struct ShearField {
 double normalised_flow(std::span<const ShearField<double>> fields, std::span<double> flow, double smallest = 0);
 double normalised_flow(std::span<const ShearField<float>> fields, std::span<float> flow, double smallest = 0);
 
+/// Where derivatives by a field are added, as ShearField; empty spans: they are not asked for.
+struct ShearCotangent {
+  std::span<double> force, before;
+};
+
+/// The other way: from the derivatives of a loss by the flow map to those by every field. The largest length changes
+/// with the first point that has it. Nothing is added where the map is all zero.
+void normalised_flow_vjp(std::span<const ShearField<double>> fields, std::span<const double> flow_cotangent,
+                         std::span<const ShearCotangent> out, double smallest = 0);
+
 }  // namespace tangere

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "engine/detection.hpp"
-#include "engine/rotation_log.hpp"
+#include "engine/state_difference.hpp"
 
 namespace tangere {
 
@@ -19,13 +19,6 @@ namespace {
 constexpr int kDeepestSplit = 6;  // h / 2^6
 // Inside a split the search may be long: a short leash there loses runs that a patient one finishes.
 constexpr int kHalvings = 10, kSplitHalvings = 20, kSplitIterations = 40;
-
-const double kGamma = 1 - std::sqrt(0.5);
-const double kEta = (1 - kGamma) / kGamma;
-const double kKappa = kEta / kGamma;
-
-template <int L>
-Quat<double> quat_at(const Row<L>* q, int lane) { return {q[0][lane], q[1][lane], q[2][lane], q[3][lane]}; }
 
 template <int L>
 void fill(Row<L>& row, double value) {
@@ -42,24 +35,6 @@ LaneBits GroupStep::solve_one_stage(const kernels::KernelTable& table, BasicWork
   const NewtonLimits limits = {settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
                                inside_split ? kSplitHalvings : kHalvings};
   return solve_stage(model_, table, w, lanes, limits, report);
-}
-
-/// r = (q₀ ⊖ q₁)/2 for BDF2; q₁ is the newest state, in q0, and q₀ the one before it.
-template <int L>
-void GroupStep::set_history_bdf2(BasicWorkspace<L>& w) const {
-  for (const kernels::Link& link : model_.links) {
-    for (int l = 0; l < L; ++l) {
-      if (link.kind == JointKind::spherical) {
-        const Vec3<double> x = rotation_log(conjugate(quat_at(w.q0 + link.q, l)) * quat_at(w.q_before + link.q, l));
-        w.stage.r[link.v][l] = 0.5 * x.x;
-        w.stage.r[link.v + 1][l] = 0.5 * x.y;
-        w.stage.r[link.v + 2][l] = 0.5 * x.z;
-      } else {
-        for (int k = 0; k < kernels::dofs(link.kind); ++k)
-          w.stage.r[link.v + k][l] = 0.5 * (w.q_before[link.q + k][l] - w.q0[link.q + k][l]);
-      }
-    }
-  }
 }
 
 template <int L>
@@ -87,8 +62,9 @@ LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, Ba
       }
       break;
     case Integrator::bdf2:
-      set_history_bdf2(w);
+      state_difference(model_, w.q_before, w.q0, s.r);  // q₁ is the newest state, in q0
       each([&](int i, int l) {
+        s.r[i][l] = 0.5 * s.r[i][l];
         s.s[i][l] = 0.5 * w.v_before[i][l] - 2 * w.v0[i][l];
         s.x[i][l] = h * (1.5 * w.v0[i][l] - 0.5 * w.v_before[i][l]);
       });
@@ -139,9 +115,22 @@ void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits&
   }
 }
 
+/// Adds the solve that ended in q0, v0.
+template <int L>
+void GroupStep::note(const BasicWorkspace<L>& w, int lane, Integrator scheme, double h, std::vector<TapedSolve>* to) const {
+  if (to == nullptr) return;
+  const auto column = [&](const Row<L>* rows, int count) {
+    std::vector<double> x(static_cast<std::size_t>(count));
+    for (int i = 0; i < count; ++i) x[std::size_t(i)] = rows[i][lane];
+    return x;
+  };
+  to->push_back({scheme, h, column(w.q0, model_.nq), column(w.v0, model_.nv),
+                 column(w.x_gamma, scheme == Integrator::sdirk2 ? model_.nv : 0)});
+}
+
 /// Two half steps from q0, v0, split again where needed.
-bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
-                      NewtonReport& report) const {
+bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth, NewtonReport& report,
+                      std::vector<TapedSolve>* solves) const {
   if (depth > kDeepestSplit) return false;
   // Order 2 must survive inside a BDF2 step, and so must its history: SDIRK2 there, not BDF1.
   const bool second_order =
@@ -151,7 +140,8 @@ bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, dou
     if (run(scheme, table, w, 1U, 0.5 * h, true, report) != 0) {
       for (int i = 0; i < model_.nq; ++i) w.q0[i] = w.q1[i];
       for (int i = 0; i < model_.nv; ++i) w.v0[i] = w.v1[i];
-    } else if (!split(table, w, 0.5 * h, depth + 1, report)) {
+      note(w, 0, scheme, 0.5 * h, solves);
+    } else if (!split(table, w, 0.5 * h, depth + 1, report, solves)) {
       return false;
     }
   }
@@ -161,9 +151,9 @@ bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, dou
 /// Splits the step of one lane of a group; the others wait.
 template <int L>
 bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane, SingleWorkspace& alone,
-                           NewtonReport& report) const {
+                           NewtonReport& report, std::vector<TapedSolve>* solves) const {
   if constexpr (L == 1) {
-    if (&w == &alone) return split(table, w, settings_.timestep, 1, report);
+    if (&w == &alone) return split(table, w, settings_.timestep, 1, report, solves);
   }
   const auto to_one = [&](const Row<L>* from, Row<1>* to, int count) {
     for (int i = 0; i < count; ++i) to[i][0] = from[i][lane];
@@ -181,7 +171,7 @@ bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>&
   one.status[0] = report.status[lane];
   one.iterations[0] = report.iterations[lane];
   one.residual[0] = report.residual[lane];
-  const bool done = split(table, alone, settings_.timestep, 1, one);
+  const bool done = split(table, alone, settings_.timestep, 1, one, solves);
   from_one(alone.q0, w.q0, model_.nq);
   from_one(alone.v0, w.v0, model_.nv);
   report.status[lane] = one.status[0];
@@ -192,7 +182,7 @@ bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>&
 
 template <int L>
 void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w, SingleWorkspace& alone, LaneBits lanes,
-                        LaneBits history, NewtonReport& report) const {
+                        LaneBits history, NewtonReport& report, SolveLog* log) const {
   const double h = settings_.timestep;
   LaneBits resolved = 0;
   const auto commit = [&](LaneBits done) {
@@ -206,14 +196,23 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
   clear_candidates(w);
   if (settings_.integrator == Integrator::bdf2) {
     if ((lanes & history) != 0) commit(run(Integrator::bdf2, table, w, lanes & history, h, false, report));
-    if ((lanes & ~history) != 0) commit(run(Integrator::sdirk2, table, w, lanes & ~history, h, false, report));
+    if (const LaneBits starting = lanes & ~history; starting != 0) {
+      const LaneBits done = run(Integrator::sdirk2, table, w, starting, h, false, report);
+      commit(done);
+      for (int l = 0; l < L; ++l)
+        if (has(done, l)) note(w, l, Integrator::sdirk2, h, log == nullptr ? nullptr : &log->special[std::size_t(l)]);
+    }
   } else {
     commit(run(settings_.integrator, table, w, lanes, h, false, report));
+    if (log != nullptr && settings_.integrator == Integrator::sdirk2)  // before a split of some lane overwrites them
+      for (int i = 0; i < model_.nv; ++i)
+        for (int l = 0; l < L; ++l)
+          if (has(resolved, l)) log->x_gamma[i * kernels::kBlock + l] = w.x_gamma[i][l];
   }
   for (int l = 0; l < L; ++l) {
     if (!has(lanes & ~resolved, l)) continue;
     const StepStatus first = report.status[l];
-    if (split_lane(table, w, l, alone, report)) {
+    if (split_lane(table, w, l, alone, report, log == nullptr ? nullptr : &log->special[std::size_t(l)])) {
       report.status[l] = StepStatus::split;
     } else if (!failed(report.status[l])) {
       report.status[l] = first;
@@ -232,8 +231,8 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
 }
 
 template void GroupStep::advance(const kernels::KernelTable&, Workspace&, SingleWorkspace&, LaneBits, LaneBits,
-                                 NewtonReport&) const;
+                                 NewtonReport&, SolveLog*) const;
 template void GroupStep::advance(const kernels::KernelTable&, SingleWorkspace&, SingleWorkspace&, LaneBits, LaneBits,
-                                 NewtonReport&) const;
+                                 NewtonReport&, SolveLog*) const;
 
 }  // namespace tangere

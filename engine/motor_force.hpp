@@ -3,9 +3,12 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <span>
 
 #include "engine/compiled_model.hpp"
 #include "engine/rotation_log.hpp"
+#include "engine/workspace.hpp"
 
 namespace tangere {
 
@@ -28,6 +31,23 @@ inline double force_at_start(const CompiledModel& m, const CompiledMotor& motor,
     error = u[motor.component] - row(q + motor.component);
   }
   return std::clamp(number(motor.P) * error - number(motor.D) * row(m.layout.v + motor.dof), motor.low, motor.high);
+}
+
+/// What the motors of one lane do: forces known at the start of the step, targets of the others. `state`: the lane's
+/// column of its block. Returns false when a control is not finite.
+template <int L>
+bool set_motors(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const double* state, std::span<const double> u) {
+  for (int i = 0; i < m.nv; ++i) w.stage.tau[i][lane] = 0;
+  for (std::size_t k = 0; k < std::size_t(m.nu); ++k) {
+    if (!std::isfinite(u[k])) return false;
+    const CompiledMotor& motor = m.motors[k];
+    if (motor.control == MotorControl::position && motor.timing == MotorTiming::end) {
+      w.stage.target[motor.dof][lane] = u[k];
+    } else {
+      w.stage.tau[motor.dof][lane] = force_at_start(m, motor, state, u.data() + (k - std::size_t(motor.component)));
+    }
+  }
+  return true;
 }
 
 }  // namespace tangere

@@ -5,17 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/group_step.hpp"
 #include "engine/motor_force.hpp"
+#include "engine/step_settings.hpp"
+#include "engine/tape.hpp"
 
 namespace tangere {
 
 using kernels::kBlock;
 using kernels::kGroup;
 
-namespace {
-
-StepSettings settings_of(const Model& model, const StepperOptions& o) {
+StepSettings step_settings(const Model& model, const StepperOptions& o) {
   const StepSettings s = {o.integrator.value_or(model.integrator()), o.timestep.value_or(model.timestep()),
                           o.tolerance.value_or(model.solver().tolerance), model.solver().max_iterations};
   if (!(s.timestep > 0) || !std::isfinite(s.timestep))
@@ -24,8 +23,6 @@ StepSettings settings_of(const Model& model, const StepperOptions& o) {
     throw InputError("solver tolerance " + std::to_string(s.tolerance) + "; expected a positive number");
   return s;
 }
-
-}  // namespace
 
 /// Lanes of one group of a block: environment `first` + l in lane l.
 struct GroupOfBlock {
@@ -48,27 +45,9 @@ struct Stepper::Impl {
         work(model.compiled()),
         single(model.compiled()) {}
 
-  /// What the motors of one lane do: forces known at the start of the step, targets of the others. `state`: the lane's
-  /// column of its block. Returns false when a control is not finite.
-  template <int L>
-  bool set_motors(BasicWorkspace<L>& w, int lane, const double* state, std::span<const double> u) const {
-    const CompiledModel& m = model.compiled();
-    for (int i = 0; i < m.nv; ++i) w.stage.tau[i][lane] = 0;
-    for (int k = 0; k < m.nu; ++k) {
-      if (!std::isfinite(u[k])) return false;
-      const CompiledMotor& motor = m.motors[k];
-      if (motor.control == MotorControl::position && motor.timing == MotorTiming::end) {
-        w.stage.target[motor.dof][lane] = u[k];
-      } else {
-        w.stage.tau[motor.dof][lane] = force_at_start(m, motor, state, u.data() + (k - motor.component));
-      }
-    }
-    return true;
-  }
-
   /// Steps the live lanes of a group; `lane`: which of them stands in lane 0 of a workspace of one.
   template <int L>
-  void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane) {
+  void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane, BlockTape* tape) {
     const CompiledModel& m = model.compiled();
     const auto gather = [&](kernels::Row<L>* to, int row, int count) {
       for (int i = 0; i < count; ++i)
@@ -82,7 +61,13 @@ struct Stepper::Impl {
     w.stage.group = 0;
     const LaneBits live = g.live >> lane;
     NewtonReport report;
-    step.advance(kernels::active_kernels(), w, single, live, g.history >> lane, report);
+    SolveLog log;
+    const int of_block = g.first % kBlock + lane;
+    if (tape != nullptr && tape->next_x_gamma() != nullptr) log.x_gamma = tape->next_x_gamma() + of_block;
+    step.advance(kernels::active_kernels(), w, single, live, g.history >> lane, report, tape == nullptr ? nullptr : &log);
+    for (int l = 0; l < L; ++l)
+      if (std::vector<TapedSolve>& solves = log.special[std::size_t(l)]; !solves.empty())
+        tape->add({tape->steps(), of_block + l, std::move(solves)});
     for (int l = 0; l < L; ++l) {
       if (!has(live, l)) continue;
       const std::size_t e = std::size_t(g.first + lane + l);
@@ -105,7 +90,7 @@ struct Stepper::Impl {
 };
 
 Stepper::Stepper(const Model& model, const StepperOptions& options)
-    : impl_(std::make_unique<Impl>(model, settings_of(model, options))) {}
+    : impl_(std::make_unique<Impl>(model, step_settings(model, options))) {}
 Stepper::~Stepper() = default;
 Stepper::Stepper(Stepper&&) noexcept = default;
 Stepper& Stepper::operator=(Stepper&&) noexcept = default;
@@ -118,8 +103,9 @@ void Stepper::step(Batch& batch, std::span<const double> controls) {
   for (int b = 0; b < batch.blocks(); ++b) step_block(batch, b, controls);
 }
 
-void Stepper::step_block(Batch& batch, int block, std::span<const double> controls) {
-  const std::size_t nu = std::size_t(impl_->model.compiled().nu);
+void Stepper::step_block(Batch& batch, int block, std::span<const double> controls, BlockTape* tape) {
+  const CompiledModel& model = impl_->model.compiled();
+  const std::size_t nu = std::size_t(model.nu);
   for (int group = 0; group < kBlock / kGroup; ++group) {
     GroupOfBlock g{batch.block(block) + group * kGroup, block * kBlock + group * kGroup};
     for (int l = 0; l < kGroup; ++l) {
@@ -135,18 +121,19 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
       const std::size_t e = std::size_t(g.first + l);
       const std::span<const double> u = controls.subspan(e * nu, nu);
       const double* state = g.rows + l;
-      if (alone ? impl_->set_motors(impl_->single, 0, state, u) : impl_->set_motors(impl_->work, l, state, u)) continue;
+      if (alone ? set_motors(model, impl_->single, 0, state, u) : set_motors(model, impl_->work, l, state, u)) continue;
       batch.status_[e] = StepStatus::non_finite;
       batch.iterations_[e] = 0;
       g.live &= ~(1U << l);
     }
     if (g.live == 0) continue;
     if (alone) {
-      impl_->step_lanes(batch, impl_->single, g, __builtin_ctz(g.live));
+      impl_->step_lanes(batch, impl_->single, g, __builtin_ctz(g.live), tape);
     } else {
-      impl_->step_lanes(batch, impl_->work, g, 0);
+      impl_->step_lanes(batch, impl_->work, g, 0, tape);
     }
   }
+  if (tape != nullptr) tape->append(batch, block);
 }
 
 }  // namespace tangere

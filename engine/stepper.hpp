@@ -10,6 +10,8 @@
 
 namespace tangere {
 
+class BlockTape;
+
 /// What a caller may change about the solve; defaults come from the scene.
 struct StepperOptions {
   std::optional<Integrator> integrator;
@@ -32,8 +34,8 @@ class Stepper {
   /// Advances every environment that has not failed by one step. `controls`: (E, nu), clipped to the motors' range.
   void step(Batch& batch, std::span<const double> controls);
 
-  /// The same for one block of 16; `controls`: (E, nu) of the whole batch.
-  void step_block(Batch& batch, int block, std::span<const double> controls);
+  /// The same for one block of 16; `controls`: (E, nu) of the whole batch. The states after it are added to `tape`.
+  void step_block(Batch& batch, int block, std::span<const double> controls, BlockTape* tape = nullptr);
 
  private:
   struct Impl;

@@ -54,10 +54,15 @@ std::size_t CompactFrame<T>::dense_size() const {
 
 template <class T>
 void CompactFrame<T>::expand(std::span<T> dense) const {
+  spread(values(), dense);
+}
+
+template <class T>
+void CompactFrame<T>::spread(std::span<const T> of_tiles, std::span<T> dense) const {
   const kernels::PadTiles pad = model_.compiled().sensors[std::size_t(sensor_)].tiles();
   clear_tiles_between<T>(pad, tiles(), dense.data());
   for (std::size_t k = 0; k < std::size_t(count_); ++k)
-    expand_tile(pad, tiles_[k], values_.get() + 3 * kernels::kTactileTile * k, dense.data());
+    expand_tile(pad, tiles_[k], of_tiles.data() + 3 * kernels::kTactileTile * k, dense.data());
 }
 
 template class DenseFrame<float>;

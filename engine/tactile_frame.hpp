@@ -49,6 +49,8 @@ class CompactFrame {
   [[nodiscard]] std::size_t dense_size() const;
   /// The whole field, (points, 3), zeros included.
   void expand(std::span<T> dense) const;
+  /// Numbers in the layout of values(), of the same tiles, as a whole field.
+  void spread(std::span<const T> of_tiles, std::span<T> dense) const;
 
  private:
   friend class Readout;

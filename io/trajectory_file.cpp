@@ -276,6 +276,30 @@ void TrajectoryFile::write(const ActionRow& row) {
   ++f.actions;
 }
 
+void TrajectoryFile::write(const GradientArrays& g) {
+  const TrajectoryLayout& l = impl_->layout;
+  const hsize_t E = static_cast<hsize_t>(l.environments), T = static_cast<hsize_t>(l.steps), nv = l.v_names.size(),
+                nu = l.u_names.size();
+  const h5::Id group = h5::create_group(impl_->file, "gradients");
+  h5::write_attribute(group, "loss", g.loss);
+  h5::write_attribute(group, "meaning", g.meaning);
+  const auto put = [&](const std::string& name, const h5::Dims& dims, std::span<const double> values,
+                       const std::string& meaning, std::span<const std::string> names) {
+    const h5::Id d = h5::create_dataset<double>(group, name, dims, rows_of(dims, sizeof(double)));
+    h5::write_attribute(d, "meaning", meaning);
+    if (!names.empty()) h5::write_attribute(d, "names", names);
+    if (!values.empty()) h5::write_box<double>(d, h5::Dims(dims.size(), 0), dims, values.data());
+  };
+  put("loss", {E}, g.value, "the loss of each environment", {});
+  if (nu > 0) put("grad_u", {E, T, nu}, g.u, "derivative of the loss by the controls of every step", l.u_names);
+  put("grad_q", {E, nv}, g.q, "by the initial positions, along the dofs of v; rotations on the right", l.v_names);
+  put("grad_v", {E, nv}, g.v, "by the initial velocities", l.v_names);
+  put("grad_numbers", {E, g.number_names.size()}, g.numbers, "by the numbers of the scene, in the units given",
+      g.number_names);
+  const h5::Id numbers = h5::open_dataset(group, "grad_numbers");
+  h5::write_attribute(numbers, "units", g.number_units);
+}
+
 void TrajectoryFile::commit() {
   Impl& f = *impl_;
   const auto expect = [&](const std::string& what, std::int64_t written, std::int64_t expected) {

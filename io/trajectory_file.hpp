@@ -11,6 +11,16 @@
 namespace tangere {
 
 /// Writes `<output>.part` and gives it its name on commit(). Destroyed before that, it leaves nothing behind.
+/// Derivatives of a loss over the whole run, for every environment.
+struct GradientArrays {
+  std::string loss, meaning;
+  std::span<const double> value;    ///< (E)
+  std::span<const double> u;        ///< (E, T, nu)
+  std::span<const double> q, v;     ///< (E, nv) by the initial state
+  std::span<const double> numbers;  ///< (E, k) by the scene's numbers
+  std::span<const std::string> number_names, number_units;  ///< (k)
+};
+
 class TrajectoryFile : public RowSink {
  public:
   /// Creates every group, dataset and attribute. Throws IoError when the output exists (and `overwrite` is false), its
@@ -23,6 +33,8 @@ class TrajectoryFile : public RowSink {
   void write(const StepRow& row) override;
   void write(const TactileRow& row) override;
   void write(const ActionRow& row) override;
+  /// Once, at most. Sizes are those of the layout.
+  void write(const GradientArrays& gradients);
 
   /// Checks that every row came, closes, syncs and renames. Throws IoError.
   void commit();

@@ -35,6 +35,32 @@ struct Stage {
 };
 using GroupStage = Stage<kGroup>;
 
+/// How a stage's rates hang on two older states: r = ρ (q_other ⊖ q_centre), s = s_centre v_centre + s_other v_other.
+struct StageHistory {
+  double rho, s_centre, s_other;
+};
+
+/// Numbers of a scene with a derivative, as parameter_products() lays them out: of each pair and ground contact kn, kt, mu,
+/// damping; of each link mass, moment, inertia (xx xy xz yy yz zz); of each dof damping, stiffness, P, D.
+inline constexpr int kContactNumbers = 4, kInertiaNumbers = 10, kDofNumbers = 4;
+inline int parameter_numbers(const ModelView& m) {
+  return kContactNumbers * (m.n_pairs + m.n_grounds) + kInertiaNumbers * m.n_links + kDofNumbers * m.nv;
+}
+
+/// Cotangents on their way back through a solved stage; every array is (nv), positions by their right tangent
+/// (kernels/adjoint-inl.hpp).
+template <int L>
+struct StageAdjoint {
+  const Row<L> *q_bar, *v_bar;    ///< of the stage's result
+  Row<L> *rhs, *lambda;
+  Row<L> *nu, *mass_lambda;       ///< out: v̄ - Cᵀ λ, M λ
+  Row<L>* target;                 ///< out: of the targets of position motors, zero where there are none
+  const Row<L>* other;            ///< q_other ⊖ q_centre
+  Row<L> *q_centre, *v_centre;    ///< added to
+  Row<L> *q_other, *v_other;      ///< added to
+  StageHistory history;
+};
+
 /// Which pairs are near enough to search, and the poses that the search needs.
 template <int L>
 struct NearPairs {
@@ -57,6 +83,12 @@ template <class N>
 struct LinkPose {
   Frame<N> world;
   Vec6<N> V;
+};
+
+/// Cotangents of a link's displacement and body twist, its axes and origin.
+template <class N>
+struct MotionCotangent {
+  Vec6<N> pose, twist;
 };
 
 /// State of eight environments as rows.
@@ -92,6 +124,14 @@ struct StageKernels {
   void (*solve)(const ModelView&, const Stage<L>&, const Row<L>* b, Row<L>* out);
   /// The same, refined once; sound[l] = 1 where the result can be trusted.
   void (*solve_watched)(const ModelView&, const Stage<L>&, const Row<L>* b, Row<L>* out, Row<L>* sound);
+  /// out = A⁻ᵀ b, refined once.
+  void (*solve_transposed)(const ModelView&, const Stage<L>&, const Row<L>* b, Row<L>* out, Row<L>* sound);
+  /// rhs of the adjoint at the x of evaluate().
+  void (*adjoint_rhs)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&);
+  /// Everything that follows from λ.
+  void (*adjoint_products)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&);
+  /// Adds -(∂g/∂p)ᵀ λ to (parameter_numbers(model)); after adjoint_products(). `lone` as in evaluate().
+  void (*parameter_products)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&, int lone, Row<L>* out);
 };
 
 struct KernelTable {
@@ -113,6 +153,12 @@ struct KernelTable {
   /// Fields of eight and of sixteen environments.
   void (*tactile_block)(const TactileBlockArgs<double>&);
   void (*tactile_block_mixed)(const TactileBlockArgs<float>&);
+  /// Cotangents of links (n_links; used up) to those of q and v, (nv), added to. `scratch`: pullback_bytes(model).
+  void (*pull_back_links)(const ModelView&, const GroupState&, std::byte* scratch, MotionCotangent<LaneRow>* links,
+                          LaneRow* q_bar, LaneRow* v_bar);
+  std::size_t (*pullback_bytes)(const ModelView&);
+  /// A field in reverse.
+  void (*pull_back_field)(const TactilePullback&);
 
   template <int L>
   [[nodiscard]] const StageKernels<L>& stage() const {

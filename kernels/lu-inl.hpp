@@ -68,9 +68,33 @@ void solve(const Pattern& p, const N* LU, const N* b, N* x, N* work) {
   }
 }
 
-/// b - A x.
+/// x = A⁻ᵀ b from the same factor: Uᵀ, then Lᵀ, row by row of the factor.
 template <class N>
+void solve_transposed(const Pattern& p, const N* LU, const N* b, N* x, N* work) {
+  const auto take = [&](int begin, int end, const N& y) {
+    for (int s = begin; s < end; ++s) work[p.factor_column[s]] = mul_sub_from(LU[s], y, work[p.factor_column[s]]);
+  };
+  for (int k = 0; k < p.n; ++k) work[k] = b[p.permutation[k]];
+  for (int k = 0; k < p.n; ++k) {
+    work[k] = work[k] * LU[p.diagonal[k]];
+    take(p.diagonal[k] + 1, p.row_begin[k + 1], work[k]);
+  }
+  for (int k = p.n - 1; k >= 0; --k) {
+    take(p.row_begin[k], p.diagonal[k], work[k]);
+    x[p.permutation[k]] = work[k];
+  }
+}
+
+/// b - A x, or b - Aᵀ x.
+template <bool Transposed, class N>
 void defect(const Pattern& p, const N* A, const N* x, const N* b, N* out) {
+  if constexpr (Transposed) {
+    for (int i = 0; i < p.n; ++i) out[i] = b[i];
+    for (int i = 0; i < p.n; ++i)
+      for (int e = p.entry_begin[i]; e < p.entry_begin[i + 1]; ++e)
+        out[p.entry_column[e]] = mul_sub_from(A[e], x[i], out[p.entry_column[e]]);
+    return;
+  }
   for (int i = 0; i < p.n; ++i) {
     N sum = b[i];
     for (int e = p.entry_begin[i]; e < p.entry_begin[i + 1]; ++e)
@@ -79,33 +103,47 @@ void defect(const Pattern& p, const N* A, const N* x, const N* b, N* out) {
   }
 }
 
-/// x = A⁻¹ b, refined once; `sound` is 1 where the result passed the test above. `work`: (5 n).
-template <class N>
+/// Largest row sum of |S A S|, of its columns for the transposed.
+template <bool Transposed, class N>
+N scaled_norm(const Pattern& p, const N* A, const N* scale, N* sums) {
+  N norm(0.0);
+  for (int i = 0; i < p.n; ++i) sums[i] = N(0.0);
+  for (int i = 0; i < p.n; ++i)
+    for (int e = p.entry_begin[i]; e < p.entry_begin[i + 1]; ++e) {
+      N& sum = sums[Transposed ? p.entry_column[e] : i];
+      sum = mul_add(abs(A[e]), scale[Transposed ? i : p.entry_column[e]], sum);
+    }
+  for (int i = 0; i < p.n; ++i) norm = max(sums[i] * scale[i], norm);
+  return norm;
+}
+
+/// x = A⁻¹ b or A⁻ᵀ b, refined once; `sound` is 1 where the result passed the test above. `work`: (5 n).
+template <bool Transposed, class N>
 void solve_watched(const Pattern& p, const N* A, const N* LU, const N* b, N* x, N* sound, N* work) {
   const int n = p.n;
   N *residual = work, *correction = work + n, *scale = work + 2 * n, *inverse_scale = work + 3 * n, *scratch = work + 4 * n;
   const N zero(0.0), one(1.0);
-  solve(p, LU, b, x, scratch);
-  defect(p, A, x, b, residual);
-  solve(p, LU, residual, correction, scratch);
+  const auto solve_for = [&](const N* from, N* to) {
+    Transposed ? solve_transposed(p, LU, from, to, scratch) : solve(p, LU, from, to, scratch);
+  };
+  solve_for(b, x);
+  defect<Transposed>(p, A, x, b, residual);
+  solve_for(residual, correction);
   for (int i = 0; i < n; ++i) x[i] = x[i] + correction[i];
-  defect(p, A, x, b, residual);
+  defect<Transposed>(p, A, x, b, residual);
   for (int i = 0; i < n; ++i) {
     const N diagonal = abs(A[p.slot[i * n + i]]);
     const N safe = select(diagonal > zero, diagonal, one);
     scale[i] = inverse_sqrt(safe);
     inverse_scale[i] = safe * scale[i];
   }
-  N norm_r = zero, norm_b = zero, norm_x = zero, norm_d = zero, norm_a = zero;
+  const N norm_a = scaled_norm<Transposed>(p, A, scale, scratch);
+  N norm_r = zero, norm_b = zero, norm_x = zero, norm_d = zero;
   for (int i = 0; i < n; ++i) {
     norm_r = max(abs(residual[i]) * scale[i], norm_r);
     norm_b = max(abs(b[i]) * scale[i], norm_b);
     norm_x = max(abs(x[i]) * inverse_scale[i], norm_x);
     norm_d = max(abs(correction[i]) * inverse_scale[i], norm_d);
-    N row = zero;
-    for (int e = p.entry_begin[i]; e < p.entry_begin[i + 1]; ++e)
-      row = mul_add(abs(A[e]), scale[p.entry_column[e]], row);
-    norm_a = max(row * scale[i], norm_a);
   }
   // A NaN anywhere reaches x and fails the finiteness test, because max() above drops it.
   N finite = zero;

@@ -5,6 +5,7 @@
 //   g = ID(q, v, a) - τ - Σ J_cᵀ f_c;   A = ∂g/∂x = G_q J + C V_x,   C = G_v + (c₀/h) M     (docs/solver.md)
 #pragma once
 
+#include "kernels/dual.hpp"
 #include "kernels/model_view.hpp"
 #include "kernels/pair_contact.hpp"
 #include "kernels/so3.hpp"
@@ -158,6 +159,15 @@ template <class Arch>
 struct ParameterLoad<Lanes<Arch>> {
   static Lanes<Arch> load(const Parameter& p, const double* block, int group) {
     return p.row < 0 ? Lanes<Arch>(p.value) : load_lanes<Arch>(row_of(block, p.row, group));
+  }
+};
+/// In dual numbers one environment has a block to itself: values in lane 0, tangents in lane 1.
+template <>
+struct ParameterLoad<Dual<double>> {
+  static Dual<double> load(const Parameter& p, const double* block, int group) {
+    if (p.row < 0) return p.value;
+    const double* row = row_of(block, p.row, group);
+    return {row[0], row[1]};
   }
 };
 /// Mass, moment and inertia of a link's own bodies.

@@ -7,10 +7,12 @@
 #include "kernels/detection-inl.hpp"
 #include "kernels/jacobian-inl.hpp"
 #include "kernels/kernel_table.hpp"
-#include "kernels/link_poses-inl.hpp"
 #include "kernels/lu-inl.hpp"
+#include "kernels/motion_pullback-inl.hpp"
 #include "kernels/norms-inl.hpp"
+#include "kernels/parameter_adjoint-inl.hpp"
 #include "kernels/tactile_block-inl.hpp"
+#include "kernels/tactile_pullback-inl.hpp"
 
 namespace tangere::kernels {
 
@@ -27,21 +29,31 @@ struct StageTable {
 
   static std::size_t scratch_bytes(const ModelView& m) {
     return sizeof(LinkScratch<N>) * m.n_links + sizeof(ContactScratch<N>) * (m.n_link_pairs + m.n_grounded) +
-           sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links + 4 * alignof(N);
+           sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links +
+           sizeof(LinkAdjoint<N>) * m.n_links + 5 * alignof(N);
   }
 
-  static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone) {
-    std::byte* at = s.scratch;
-    const auto take = [&at]<class T>(T*, int count) {
+  /// Hands out arrays from a stage's scratch, one after the other.
+  struct Scratch {
+    std::byte* at;
+    template <class T>
+    T* take(int count) {
       T* p = reinterpret_cast<T*>(at);
       at += (sizeof(T) * count + sizeof(N) - 1) / sizeof(N) * sizeof(N);
       return p;
-    };
+    }
+  };
+  static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone) {
+    Scratch scratch{s.scratch};
+    return arguments(m, s, lone, scratch);
+  }
+
+  static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone, Scratch& scratch) {
     StageArgs<N> a;
-    a.links = take(static_cast<LinkScratch<N>*>(nullptr), m.n_links);
-    a.contacts = take(static_cast<ContactScratch<N>*>(nullptr), m.n_link_pairs + m.n_grounded);
-    a.columns = take(static_cast<JointColumns<N>*>(nullptr), 2 * m.n_links);
-    auto* lists = take(static_cast<CandidateList<N>*>(nullptr), m.n_pairs);
+    a.links = scratch.template take<LinkScratch<N>>(m.n_links);
+    a.contacts = scratch.template take<ContactScratch<N>>(m.n_link_pairs + m.n_grounded);
+    a.columns = scratch.template take<JointColumns<N>>(2 * m.n_links);
+    auto* lists = scratch.template take<CandidateList<N>>(m.n_pairs);
     for (int k = 0; k < m.n_pairs; ++k) {
       const typename StageOf::List& l = s.lists[k];
       const int lane = lone < 0 ? 0 : lone;
@@ -104,11 +116,32 @@ struct StageTable {
   }
   static void solve_watched_lanes(const ModelView& m, const StageOf& s, const RowOf* b, RowOf* out,
                                   RowOf* sound) {
-    solve_watched(m.pattern, view(s.A), view(s.LU), view(b), view(out), view(sound), view(s.work));
+    solve_watched<false>(m.pattern, view(s.A), view(s.LU), view(b), view(out), view(sound), view(s.work));
+  }
+  static void solve_transposed_lanes(const ModelView& m, const StageOf& s, const RowOf* b, RowOf* out, RowOf* sound) {
+    solve_watched<true>(m.pattern, view(s.A), view(s.LU), view(b), view(out), view(sound), view(s.work));
+  }
+  static AdjointArgs<N> adjoint_arguments(const StageAdjoint<L>& d, LinkAdjoint<N>* links) {
+    return {view(d.q_bar), view(d.v_bar),    view(d.rhs),      view(d.lambda),  view(d.nu),      view(d.mass_lambda), view(d.target),
+            view(d.other), view(d.q_centre), view(d.v_centre), view(d.q_other), view(d.v_other), d.history,           links};
+  }
+  static void adjoint_rhs_lanes(const ModelView& m, const StageOf& s, const StageAdjoint<L>& d) {
+    adjoint_rhs(m, arguments(m, s, -1), adjoint_arguments(d, nullptr));
+  }
+  static void adjoint_products_lanes(const ModelView& m, const StageOf& s, const StageAdjoint<L>& d) {
+    Scratch scratch{s.scratch};
+    const StageArgs<N> a = arguments(m, s, -1, scratch);
+    adjoint_products(m, a, adjoint_arguments(d, scratch.template take<LinkAdjoint<N>>(m.n_links)));
+  }
+  static void parameter_products_lanes(const ModelView& m, const StageOf& s, const StageAdjoint<L>& d, int lone, RowOf* out) {
+    Scratch scratch{s.scratch};
+    const StageArgs<N> a = arguments(m, s, lone, scratch);
+    parameter_products(m, a, adjoint_arguments(d, scratch.template take<LinkAdjoint<N>>(m.n_links)), view(out));
   }
   static constexpr StageKernels<L> make() {
     return {scratch_bytes,     kinematics_lanes, near_pairs_lanes,      residual_lanes,      evaluate_lanes, set_weights_lanes,
-            set_floor_lanes, scaled_residual_lanes, weighted_norm_lanes, factor_lanes, solve_lanes,    solve_watched_lanes};
+            set_floor_lanes, scaled_residual_lanes, weighted_norm_lanes, factor_lanes, solve_lanes,    solve_watched_lanes,
+            solve_transposed_lanes, adjoint_rhs_lanes, adjoint_products_lanes, parameter_products_lanes};
   }
 };
 
@@ -117,7 +150,7 @@ struct TableOf {
   using N = Lanes<Arch>;
   static N* view(LaneRow* p) { return reinterpret_cast<N*>(p); }
   static const N* view(const LaneRow* p) { return reinterpret_cast<const N*>(p); }
-  static void poses_of_links(const ModelView& m, const GroupState& s, LinkPose<LaneRow>* out) {
+  static StageArgs<N> at_state(const GroupState& s) {
     StageArgs<N> a{};
     a.centre = view(s.q);
     a.x = a.s = view(s.zero);
@@ -125,8 +158,17 @@ struct TableOf {
     a.c0_over_h = N(0.0);
     a.inverse_h = N(1.0);
     a.v = view(s.rates);
-    link_poses(m, a, reinterpret_cast<LinkPose<N>*>(out));
+    return a;
   }
+  static void poses_of_links(const ModelView& m, const GroupState& s, LinkPose<LaneRow>* out) {
+    link_poses(m, at_state(s), reinterpret_cast<LinkPose<N>*>(out));
+  }
+  static void motion_of_links(const ModelView& m, const GroupState& s, std::byte* scratch, MotionCotangent<LaneRow>* links,
+                              LaneRow* q_bar, LaneRow* v_bar) {
+    pull_back_links(m, at_state(s), reinterpret_cast<LinkMotion<N>*>(scratch), reinterpret_cast<MotionCotangent<N>*>(links),
+                    view(q_bar), view(v_bar));
+  }
+  static std::size_t pullback_bytes(const ModelView& m) { return sizeof(LinkMotion<N>) * std::size_t(m.n_links); }
   static void touch_of_pad(const LinkPose<LaneRow>* sensor, const Frame<double>& pad, const LinkPose<LaneRow>* body,
                            const Frame<double>& shape, Touch<LaneRow>* out) {
     pad_touch(reinterpret_cast<const LinkPose<N>*>(sensor), pad, reinterpret_cast<const LinkPose<N>*>(body), shape,
@@ -147,7 +189,10 @@ struct TableOf {
             tactile,
             tactile_mixed,
             tactile_group,
-            tactile_group_mixed};
+            tactile_group_mixed,
+            motion_of_links,
+            pullback_bytes,
+            pull_back_field<Arch>};
   }
 };
 

@@ -89,4 +89,32 @@ struct TactileBlockArgs {
                                         ///< tiles that nothing touches in any lane are not written
 };
 
+/// Cotangents of the coefficients of a contact.
+template <class N>
+struct LawCotangent {
+  N kn, kt, mu, damping;
+};
+
+/// Of a pad's shape, or of a pair: what all its points add up to.
+template <class N>
+struct TouchCotangent {
+  Vec6<N> displacement;  ///< (θ̄; ρ̄) of body 2 relative to body 1, body 1's axes and origin
+  Vec6<N> twist;         ///< W̄
+  LawCotangent<N> law;
+};
+
+/// One environment's field on its way back: cotangents of its touched tiles to those of each shape's motion.
+struct TactilePullback {
+  const PadTiles* pad;
+  ContactLaw law;
+  int n_touches;
+  const TouchShape* shapes;        ///< (n_touches)
+  const Touch<double>* touches;    ///< (n_touches)
+  int count;                       ///< tiles
+  const int* tiles;                ///< (count)
+  const double* cotangents;        ///< (count, 3, 64) of the field [loss/N]
+  bool of_law;                     ///< by the coefficients too; else zeros
+  TouchCotangent<double>* out;     ///< (n_touches), pad axes and origin; body 1 is the sensor's
+};
+
 }  // namespace tangere::kernels

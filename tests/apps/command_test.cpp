@@ -293,6 +293,35 @@ TEST(Command, InspectTellsPeopleAndProgramsTheSame) {
     EXPECT_THAT(text.out, HasSubstr(name.get<std::string>()));
 }
 
+TEST(Command, GradcheckTellsPeopleAndProgramsTheSame) {
+  const Folder folder;
+  const Words words{"gradcheck", scene("rolling_ball_small.xml"), "--loss", "shear", "--steps", "90", "--entries", "4"};
+  const Outcome text = run(folder, words);
+  const Outcome object = run(folder, words + Words{"--json"});
+  EXPECT_EQ(text.exit_code, 0);
+  EXPECT_EQ(object.exit_code, 0);
+  EXPECT_EQ(text.out, object.err);
+  const json answer = json::parse(object.out);
+  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
+  EXPECT_EQ(answer.at("command"), "gradcheck");
+  EXPECT_EQ(answer.at("loss_name"), "shear");
+  EXPECT_EQ(answer.at("steps"), 90);
+  EXPECT_EQ(answer.at("inputs").size(), 4U);
+  EXPECT_GT(answer.at("entries"), 8);
+  EXPECT_LT(answer.at("max_relative_error"), 1e-5);
+  for (const json& input : answer.at("inputs")) EXPECT_THAT(text.out, HasSubstr(input.at("input").get<std::string>()));
+}
+
+TEST(Command, GradcheckRefusesLossesThatThereAreNot) {
+  const Folder folder;
+  const Outcome typo = run(folder, {"gradcheck", scene("rolling_ball_small.xml"), "--loss", "shaer"});
+  EXPECT_EQ(typo.exit_code, 2);
+  EXPECT_THAT(typo.err, HasSubstr("unknown loss 'shaer'; did you mean 'shear'?"));
+  const Outcome none = run(folder, {"gradcheck", scene("rolling_ball_small.xml"), "--loss", "variables"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("no end effector"));
+}
+
 TEST(Command, InspectListsJointEffectsAndMotors) {
   const Folder folder;
   const std::string path = TANGERE_TEST_DATA "/scenes/every_joint.xml";

@@ -3,6 +3,7 @@
 // request.
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -64,6 +65,50 @@ std::string rows(int count, const std::string& row) {
   std::string text;
   for (int i = 0; i < count; ++i) text += row + "\n";
   return text;
+}
+
+/// The loss is that of the fields beside it, and a control's derivative that of two runs whose tables differ in it.
+TEST(Simulate, WritesGradientsBesideTheTrajectory) {
+  const Folder folder;
+  const auto table = [&](double first) {
+    std::string text;
+    for (int t = 0; t < 90; ++t) text += (t == 5 ? std::to_string(first) : std::string("0.05")) + ",0,0.2\n";
+    return folder.write("u.csv", text);
+  };
+  const auto shear_loss = [&](int environment) {
+    const Array force = read_array(folder, "/tactile/pad/force");  // (F, E, rows, cols, 3)
+    const std::size_t field = force.dims[2] * force.dims[3] * 3;
+    double sum = 0;
+    for (std::size_t f = 0; f < force.dims[0]; ++f)
+      for (std::size_t i = 0; i < field; ++i)
+        if (i % 3 != 2) {
+          const double x = force.values[(f * force.dims[1] + std::size_t(environment)) * field + i];
+          sum += 0.5 * x * x;
+        }
+    return sum;
+  };
+  const Words words{"--envs", "2", "--overwrite", "--tol", "1e-12", "--gradients", "shear", "--controls"};
+  const auto loss_at = [&](double first) {
+    Words all = words;
+    all.push_back(table(first));
+    const json answer = simulate(folder, kSmall, all);
+    EXPECT_EQ(answer.at("gradients").at("loss_name"), "shear");
+    return shear_loss(1);
+  };
+  const double ahead = loss_at(0.0501), behind = loss_at(0.0499), middle = loss_at(0.05);
+  const Array loss = read_array(folder, "/gradients/loss"), by_u = read_array(folder, "/gradients/grad_u");
+  EXPECT_NEAR(loss.values[1], middle, 1e-12 * middle);
+  EXPECT_EQ(by_u.dims, (h5::Dims{2, 90, 3}));
+  const double derivative = by_u.values[(90 + 5) * 3];
+  EXPECT_NE(derivative, 0);
+  EXPECT_NEAR((ahead - behind) / 2e-4, derivative, 1e-3 * std::abs(derivative));
+  EXPECT_EQ(read_array(folder, "/gradients/grad_q").dims, (h5::Dims{2, 9}));
+  EXPECT_EQ(read_array(folder, "/gradients/grad_v").dims, (h5::Dims{2, 9}));
+  const Array by_numbers = read_array(folder, "/gradients/grad_numbers");
+  const h5::Id file = h5::open_file(folder.path("out.h5"));
+  const auto names = h5::read_texts(h5::open_dataset(file, "/gradients/grad_numbers"), "names");
+  EXPECT_EQ(by_numbers.dims, (h5::Dims{2, names.size()}));
+  EXPECT_THAT(names, testing::Contains("tactile pad kn"));
 }
 
 TEST(Simulate, SaysWhatItDid) {

@@ -158,5 +158,47 @@ TEST(FlowMapOfARun, IsZeroBeforeContactAndThenTheShearWithoutItsScale) {
   EXPECT_NEAR(most, 1, 1e-15);
 }
 
+/// Derivatives against differences, by every number of two fields, one of them less a field before.
+TEST(FlowMap, DerivativesMatchDifferences) {
+  std::vector<double> first, second, before, weights;
+  for (int i = 0; i < 15; ++i) first.push_back(std::sin(3.0 * i)), second.push_back(std::cos(5.0 * i)), before.push_back(0.3 * std::sin(i));
+  for (int i = 0; i < 20; ++i) weights.push_back(std::sin(7.0 * i + 1));
+  const auto value = [&] {
+    const ShearField<double> fields[] = {{first, {}}, {second, before}};
+    std::vector<double> flow(20);
+    normalised_flow(fields, flow);
+    double sum = 0;
+    for (std::size_t i = 0; i < 20; ++i) sum += weights[i] * flow[i];
+    return sum;
+  };
+  std::vector<double> by_first(15), by_second(15), by_before(15);
+  const ShearField<double> fields[] = {{first, {}}, {second, before}};
+  const ShearCotangent out[] = {{by_first, {}}, {by_second, by_before}};
+  normalised_flow_vjp(fields, weights, out);
+  const auto check = [&](std::vector<double>& numbers, const std::vector<double>& derivatives) {
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const double at = numbers[i], e = 1e-6;
+      numbers[i] = at + e;
+      const double ahead = value();
+      numbers[i] = at - e;
+      const double behind = value();
+      numbers[i] = at;
+      EXPECT_NEAR((ahead - behind) / (2 * e), derivatives[i], 1e-8) << i;
+    }
+  };
+  check(first, by_first);
+  check(second, by_second);
+  check(before, by_before);
+}
+
+TEST(FlowMap, WithoutContactHasNoDerivatives) {
+  const std::vector<double> nothing(6), weights(4, 1.0);
+  std::vector<double> out(6);
+  const ShearField<double> fields[] = {{nothing, {}}};
+  const ShearCotangent cotangents[] = {{out, {}}};
+  normalised_flow_vjp(fields, weights, cotangents);
+  for (const double x : out) EXPECT_EQ(x, 0.0);
+}
+
 }  // namespace
 }  // namespace tangere

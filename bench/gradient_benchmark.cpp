@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rollouts with gradients against the same rollouts without, one after the other in one run, on one thread.
+#include <benchmark/benchmark.h>
+
+#include <ctime>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "engine/control.hpp"
+#include "engine/readout.hpp"
+#include "engine/tape.hpp"
+#include "io/scene_reader.hpp"
+#include "kernels/isa.hpp"
+#include "tasks/benchmark_fields.hpp"
+#include "tasks/gradients.hpp"
+
+namespace tangere {
+namespace {
+
+double cpu_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
+}
+
+/// ½ |v|² after the last step, `number` its weight.
+class LastSpeed : public RolloutLoss {
+ public:
+  explicit LastSpeed(double weight) : weight_(weight) {}
+  double evaluate(const LossPoint& at, const LossCotangent& out) const override {
+    if (at.step != at.steps) return 0;
+    double sum = 0;
+    for (std::size_t i = 0; i < at.v.size(); ++i) {
+      sum += 0.5 * weight_ * at.v[i] * at.v[i];
+      out.v[i] += weight_ * at.v[i];
+    }
+    return sum;
+  }
+
+ private:
+  double weight_;
+};
+
+/// ½ |T|² of all sensors' fields, every k-th step.
+class FieldSquare : public RolloutLoss {
+ public:
+  explicit FieldSquare(int every) : every_(every) {}
+  [[nodiscard]] bool reads_fields(std::int64_t step) const override { return step > 0 && step % every_ == 0; }
+  double evaluate(const LossPoint& at, const LossCotangent& out) const override {
+    double sum = 0;
+    for (std::size_t s = 0; s < at.fields.size(); ++s) {
+      const std::span<const double> values = at.fields[s]->values();
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        sum += 0.5 * values[i] * values[i];
+        out.fields[s][i] += values[i];
+      }
+    }
+    return sum;
+  }
+
+ private:
+  int every_;
+};
+
+class Rollout {
+ public:
+  Rollout(const char* scene, int environments, bool tactile, int losses)
+      : model_(read_scene(std::string(TANGERE_SOURCE_DIR "/scenes/") + scene + ".xml").scene),
+        start_(model_, environments, 1),
+        program_(model_, model_.timestep(), 1),
+        stepper_(model_),
+        readout_(model_, Precision::f64),
+        fields_(model_, environments, tactile ? FrameKind::compact : FrameKind::none, Precision::f64) {
+    options_.steps = program_.steps();
+    if (tactile) {
+      owned_.push_back(std::make_unique<FieldSquare>(kEvery));
+    } else {
+      for (int k = 0; k < losses; ++k) owned_.push_back(std::make_unique<LastSpeed>(k + 1));
+    }
+    for (const auto& l : owned_) losses_.push_back(l.get());
+    tactile_ = tactile;
+  }
+
+  [[nodiscard]] double steps() const { return double(options_.steps) * start_.environments(); }
+
+  /// The rollout alone, with the fields its loss looks at. Returns its processor time.
+  double forward() {
+    Batch batch = start_;
+    std::vector<double> u(std::size_t(batch.environments() * model_.nu()));
+    const auto nu = std::size_t(model_.nu());
+    const double begin = cpu_seconds();
+    for (int b = 0; b < batch.blocks(); ++b)
+      for (std::int64_t t = 0; t < options_.steps; ++t) {
+        for (int e = 16 * b; e < std::min(16 * b + 16, batch.environments()); ++e)
+          program_.evaluate(t, e, std::span(u).subspan(std::size_t(e) * nu, nu));
+        stepper_.step_block(batch, b, u);
+        if (tactile_ && (t + 1) % kEvery == 0)
+          for (int s = 0; s < int(model_.sensors().size()); ++s) fields_.read(readout_, batch, b, s);
+      }
+    return cpu_seconds() - begin;
+  }
+  double with_gradients(bool parameters) {
+    if (!rollouts_) {
+      options_.parameters = parameters;
+      rollouts_.emplace(model_, options_, losses_);
+    }
+    const double begin = cpu_seconds();
+    const GradientSummary g =
+        rollouts_->run(start_, [&](std::int64_t step, int e, std::span<double> u) { program_.evaluate(step, e, u); });
+    benchmark::DoNotOptimize(g.losses[0].u.data());
+    return cpu_seconds() - begin;
+  }
+  [[nodiscard]] double tape_bytes() const {
+    return double(BlockTape::bytes(model_, model_.integrator(), options_.steps)) / 16 / double(options_.steps);
+  }
+
+ private:
+  static constexpr int kEvery = 5;
+  Model model_;
+  Batch start_;
+  ControlProgram program_;
+  Stepper stepper_;
+  Readout readout_;
+  BenchmarkFields fields_;
+  GradientOptions options_;
+  std::vector<std::unique_ptr<RolloutLoss>> owned_;
+  std::vector<const RolloutLoss*> losses_;
+  std::optional<GradientRollouts> rollouts_;
+  bool tactile_ = false;
+};
+
+void BM_Gradients(benchmark::State& state, const char* scene, bool tactile, int losses, bool parameters) {
+  Rollout rollout(scene, int(state.range(0)), tactile, losses);
+  rollout.forward();
+  rollout.with_gradients(parameters);
+  double alone = 1e300, both = 1e300;
+  for (auto _ : state) {
+    alone = std::min(alone, rollout.forward());
+    both = std::min(both, rollout.with_gradients(parameters));
+  }
+  state.counters["forward/s"] = rollout.steps() / alone;
+  state.counters["with_gradients/s"] = rollout.steps() / both;
+  state.counters["ratio"] = both / alone;
+  state.counters["tape_bytes/step"] = rollout.tape_bytes();
+  state.SetLabel(kernels::active_isa_name());
+}
+
+#define TANGERE_GRADIENTS(name, scene, tactile, losses, parameters)             \
+  BENCHMARK_CAPTURE(BM_Gradients, name, scene, tactile, losses, parameters)     \
+      ->ArgName("envs")                                                         \
+      ->Arg(1)                                                                  \
+      ->Arg(256)                                                                \
+      ->Unit(benchmark::kMillisecond)                                           \
+      ->Iterations(3)
+
+TANGERE_GRADIENTS(rolling_ball, "rolling_ball", false, 1, false);
+TANGERE_GRADIENTS(rolling_ball_8_losses, "rolling_ball", false, 8, false);
+TANGERE_GRADIENTS(rolling_ball_parameters, "rolling_ball", false, 1, true);
+TANGERE_GRADIENTS(rolling_ball_tactile, "rolling_ball", true, 1, false);
+TANGERE_GRADIENTS(box_pushing, "box_pushing", false, 1, false);
+TANGERE_GRADIENTS(box_pushing_tactile, "box_pushing", true, 1, false);
+TANGERE_GRADIENTS(stable_grasp, "stable_grasp", false, 1, false);
+TANGERE_GRADIENTS(stable_grasp_tactile, "stable_grasp", true, 1, false);
+TANGERE_GRADIENTS(cap_opening, "cap_opening", false, 1, false);
+TANGERE_GRADIENTS(insertion, "insertion", false, 1, false);
+
+}  // namespace
+}  // namespace tangere

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+// -(∂g/∂p)ᵀ λ for the numbers of a scene, after adjoint_products(): φ = λᵀ g is linear in masses, dampings, stiffnesses and
+// gains, and what a contact's coefficients do to its points' forces is weighed by Y, the slip along λ:
+//   ∂φ/∂p = Σ (Y_l + Y_a × x₂)·∂f/∂p           ∂φ/∂(m, c, J) of Λᵀ I X = Λ_a·(J α + c × a) + Λ_l·(m a - c × α), X = (α; a)
+// with X = A, and with X = V and -V × Λ in place of Λ.
+#pragma once
+
+#include "kernels/adjoint-inl.hpp"
+#include "kernels/point_pullback.hpp"
+
+namespace tangere::kernels {
+
+template <class N>
+void subtract_law(const LawCotangent<N>& c, N* out) {
+  out[0] -= c.kn, out[1] -= c.kt, out[2] -= c.mu, out[3] -= c.damping;
+}
+template <class N>
+LawCotangent<N> zero_law() {
+  return {N(0.0), N(0.0), N(0.0), N(0.0)};
+}
+
+template <class Shape, class N>
+void pair_law_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W, const LawParameters<N>& law,
+                      const CandidateList<N>& list, int lone, const Vec6<N>& slip, LawCotangent<N>& sum) {
+  const auto add = [&](const Vec3<N>& xi) {
+    const PointContact<N> p = point_contact(shape, law, at.R, at.p, W.a, W.l, xi);
+    const auto touching = p.d < N(0.0);
+    if (!any(touching)) return;
+    pull_back_law(law, p, select(touching, N(1.0), N(0.0)) * (slip.l + cross(slip.a, p.x2)), sum);
+  };
+  if (lone < 0) {
+    for (int k = 0; k < list.count; ++k) add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
+  } else {
+    const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
+    for (int k = 0; k < list.own_count; ++k) add({N(x[k]), N(y[k]), N(z[k])});
+  }
+}
+
+/// Coefficients of every shape of two links.
+template <class N>
+void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const LinkPair& links,
+                          const ContactScratch<N>& o, const LinkAdjoint<N>* adjoint, N* out) {
+  const Vec6<N> slip = adjoint_slip(links, o, adjoint);
+  for (int m = links.first; m < links.first + links.count; ++m) {
+    const int k = model.pair_order[m];
+    const PairContact& pair = model.pairs[k];
+    const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
+    const Frame<N> at = compose(o.link2_in_1, broadcast<N>(pair.frame2));
+    LawCotangent<N> sum = zero_law<N>();
+    with_distance<N>(pair.shape, pair.size, [&]<class Shape>(const Shape& shape) {
+      pair_law_adjoint(shape, at, o.W, law, a.candidates[k], a.lone, slip, sum);
+    });
+    subtract_law(sum, out + kContactNumbers * k);
+  }
+}
+
+/// Of one body against the ground: Y = -Λ.
+template <class N>
+void ground_parameters(const ModelView& model, const StageArgs<N>& a, const GroundContact& ground, const Vec6<N>& twist,
+                       N* out) {
+  const LinkScratch<N>& link = a.links[ground.link];
+  const Vec3<N> normal = broadcast<N>(model.ground_normal);
+  const Vec3<N> m = transposed_times(link.world.R, normal);
+  const N height = dot(normal, link.world.p - broadcast<N>(model.ground_point));
+  const LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
+  LawCotangent<N> sum = zero_law<N>();
+  for (int i = 0; i < ground.n_points; ++i) {
+    const double* place = ground.points + 3 * i;
+    const Vec3<N> centre = {N(place[0]), N(place[1]), N(place[2])}, xi = centre - N(ground.radius) * m;
+    PointContact<N> p;
+    p.d = dot(m, centre) + height - N(ground.radius);
+    const auto touching = p.d < N(0.0);
+    if (!any(touching)) continue;
+    p.n = m;
+    p.u = link.V.l + cross(link.V.a, xi);
+    p.rate = dot(m, p.u);
+    p.vt = p.u - p.rate * m;
+    p.normal = normal_force(law, p.d, p.rate);
+    p.tangential = friction(law, p.normal, p.vt);
+    pull_back_law(law, p, select(touching, N(-1.0), N(0.0)) * (twist.l + cross(twist.a, xi)), sum);
+  }
+  subtract_law(sum, out);
+}
+
+/// Coefficients of every pair and ground contact, four each.
+template <class N>
+void contact_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links, N* out) {
+  for (int k = 0; k < model.n_link_pairs; ++k)
+    if (a.contacts[k].near) link_pair_parameters(model, a, model.link_pairs[k], a.contacts[k], links, out);
+  for (int k = 0; k < model.n_grounded; ++k) {
+    const GroundedLink& grounded = model.grounded[k];
+    if (!a.contacts[model.n_link_pairs + k].near) continue;
+    for (int m = grounded.first; m < grounded.first + grounded.count; ++m) {
+      const int g = model.ground_order[m];
+      ground_parameters(model, a, model.grounds[g], links[grounded.link].twist, out + kContactNumbers * (model.n_pairs + g));
+    }
+  }
+}
+
+/// Adds ∂(Λᵀ I X) by (m, c, J), times -1; J as xx xy xz yy yz zz.
+template <class N>
+void subtract_inertia(const Vec6<N>& twist, const Vec6<N>& x, N* out) {
+  out[0] -= dot(twist.l, x.l);
+  const Vec3<N> c = cross(x.l, twist.a) - cross(x.a, twist.l);
+  out[1] -= c.x, out[2] -= c.y, out[3] -= c.z;
+  const Vec3<N>&t = twist.a, &w = x.a;
+  out[4] -= t.x * w.x;
+  out[5] -= mul_add(t.x, w.y, t.y * w.x);
+  out[6] -= mul_add(t.x, w.z, t.z * w.x);
+  out[7] -= t.y * w.y;
+  out[8] -= mul_add(t.y, w.z, t.z * w.y);
+  out[9] -= t.z * w.z;
+}
+
+/// Mass, moment and inertia of every link, ten each.
+template <class N>
+void inertia_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links, N* out) {
+  for (int i = 0; i < model.n_links; ++i, out += kInertiaNumbers) {
+    const LinkScratch<N>& s = a.links[i];
+    if (model.links[i].still) {
+      out[0] -= dot(links[i].twist.l, s.A.l);
+      continue;
+    }
+    subtract_inertia(links[i].twist, s.A, out);
+    subtract_inertia(-cross_motion(s.V, links[i].twist), s.V, out);
+  }
+}
+
+/// Damping, stiffness, P and D of a joint's dofs; a ball joint has one stiffness, that of its first dof.
+template <JointKind K, class N>
+void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link& link, const N* lambda, N* out) {
+  const DofEffects* e = model.effects + link.v;
+  const N *c = a.centre + link.q, *x = a.x + link.v, *u = a.target + link.v;
+  const auto motor = [&](int k, const N& error) {
+    N inside;
+    const N& v = a.v[link.v + k];
+    motor_force(e[k], load_parameter(a, e[k].P), load_parameter(a, e[k].D), error, v, inside);
+    out[kDofNumbers * k + 2] += inside * lambda[link.v + k] * error;
+    out[kDofNumbers * k + 3] -= inside * lambda[link.v + k] * v;
+  };
+  for (int k = 0; k < dofs(K); ++k) out[kDofNumbers * k] -= lambda[link.v + k] * a.v[link.v + k];
+  if constexpr (K != JointKind::spherical) {
+    for (int k = 0; k < dofs(K); ++k) {
+      const N q = c[k] + x[k];
+      if (link.effects & kSprung) out[kDofNumbers * k + 1] += lambda[link.v + k] * (N(e[k].rest) - q);
+      if (link.effects & kDriven) motor(k, u[k] - q);
+    }
+  } else {
+    const Quat<N> q = Quat<N>{c[0], c[1], c[2], c[3]} * quaternion_exp(Vec3<N>{x[0], x[1], x[2]});
+    if (link.effects & kSprung) {
+      const Quat<N> rest = quaternion_exp(Vec3<N>{N(e[0].rest), N(e[1].rest), N(e[2].rest)});
+      const Vec3<N> phi = rotation_vector<false>(conjugate(rest) * q).phi;
+      out[1] -= dot(phi, Vec3<N>{lambda[link.v], lambda[link.v + 1], lambda[link.v + 2]});
+    }
+    if (link.effects & kDriven) {
+      const Vec3<N> psi = rotation_vector<false>(conjugate(q) * quaternion_exp(Vec3<N>{u[0], u[1], u[2]})).phi;
+      motor(0, psi.x), motor(1, psi.y), motor(2, psi.z);
+    }
+  }
+}
+
+/// Adds to (parameter_numbers(model)): contacts, links, dofs.
+template <class N>
+void parameter_products(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d, N* out) {
+  contact_parameters(model, a, d.links, out);
+  out += kContactNumbers * (model.n_pairs + model.n_grounds);
+  inertia_parameters(model, a, d.links, out);
+  out += kInertiaNumbers * model.n_links;
+  for (int i = 0; i < model.n_links; ++i) {
+    const Link& link = model.links[i];
+    with_kind(link.kind, [&]<JointKind K>() {
+      joint_parameters<K>(model, a, link, d.lambda, out + kDofNumbers * link.v);
+    });
+  }
+}
+
+}  // namespace tangere::kernels

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reverse mode through one touching point (kernels/pair_contact.hpp): from a cotangent f̄ of its force on body 1 to those of
+// the displacement ε = (θ; ρ) and relative twist W of body 2, and of the contact's coefficients. Some 150 operations, no
+// matrices. With m̄ = μ t (t = 0 when sticking), B the bound of friction over μ:
+//   d̄ = (N_d n - B_d m̄)·f̄,  r̄ = (N_ḋ n - B_ḋ m̄)·f̄,  n̄ = N f̄,  s̄ = -s (f̄ - t (t·f̄))          through f = N n + f_t(v_t, B)
+//   r̄ -= n·s̄,  n̄ -= ḋ s̄                                                                       through v_t = u - ḋ n
+//   n̄ += r̄ u,  ū = s̄ + r̄ n                                                                    through ḋ = n·u
+//   W̄ = (x₂ × v̄; v̄), v̄ = -ū;  x̄ = ω × ū                                                        through u = -(v + ω × x₂)
+//   d̄ -= n·x̄,  n̄ -= d x̄                                                                        through x₂ = ξ - d n
+//   ρ̄ = -d̄ n - H n̄,  θ̄ = x₂ × ρ̄ + n × (I - dH) n̄                                              through d and n
+#pragma once
+
+#include "kernels/pair_contact.hpp"
+#include "kernels/tactile_types.hpp"
+
+namespace tangere::kernels {
+
+/// From cotangents of N and of B to those of k_n and k_d. Zero where the normal force is clamped.
+template <class N>
+void pull_back_normal_force(const LawParameters<N>& p, const N& d, const N& rate, const NormalForce<N>& at, const N& force,
+                            const N& bound, LawCotangent<N>& out) {
+  const N zero(0.0), one(1.0);
+  const auto pulling = at.force < zero;  // law paper: B = -N
+  const N both = force + select(pulling, -bound, bound);
+  if (p.law == ContactLaw::linear) {
+    const N pushing = select(at.force > zero, one, zero);
+    const N ramp = p.ramp > 0 ? min(abs(d) * N(1.0 / (p.ramp > 0 ? p.ramp : 1)), one) : one;
+    if (p.ramp > 0) {
+      out.kn -= pushing * both * d;
+      out.damping -= pushing * both * ramp * rate;
+    } else {  // B = k_n |d|
+      out.kn -= (pushing * force + bound) * d;
+      out.damping -= pushing * force * rate;
+    }
+    return;
+  }
+  const N active = p.law == ContactLaw::paper ? one : select(at.force > zero, one, zero);
+  out.kn -= active * both * d;
+  out.damping = mul_add(active * both, d * rate, out.damping);
+}
+
+/// Cotangents of the law's coefficients; f̄ zero where nothing touches.
+template <class N>
+void pull_back_law(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& f_bar, LawCotangent<N>& out) {
+  const N along_t = dot(p.tangential.direction, f_bar);
+  const N slip = p.tangential.slip;
+  out.kt -= (N(1.0) - slip) * dot(p.vt, f_bar);
+  out.mu -= p.normal.bound * along_t;
+  pull_back_normal_force(law, p.d, p.rate, p.normal, dot(p.n, f_bar), -(law.mu * along_t), out);
+}
+
+/// Adds the motion's share of one point; f̄ zero where nothing touches.
+template <class Shape, class N>
+void pull_back_motion(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& omega, const Vec3<N>& f_bar,
+                      TouchCotangent<N>& out) {
+  const Vec3<N>&n = p.n, &t = p.tangential.direction;
+  const N along_n = dot(n, f_bar), along_t = dot(t, f_bar), slide = -(law.mu * along_t);
+  const Vec3<N> s_bar = (-p.tangential.scale) * mul_add(-along_t, t, f_bar);
+  const N rate_bar = mul_add(p.normal.rate_slope, along_n, p.normal.bound_rate * slide) - dot(n, s_bar);
+  const Vec3<N> u_bar = mul_add(rate_bar, n, s_bar);
+  out.twist.a += cross(u_bar, p.x2);
+  out.twist.l -= u_bar;
+  const Vec3<N> x_bar = cross(omega, u_bar);
+  const N minus_d_bar = dot(n, x_bar) - mul_add(p.normal.d_slope, along_n, p.normal.bound_d * slide);
+  const Vec3<N> n_bar =
+      mul_add(p.normal.force, f_bar, mul_add(-p.rate, s_bar, mul_add(rate_bar, p.u, (-p.d) * x_bar)));
+  Vec3<N> rho = minus_d_bar * n, turned = n_bar;
+  if constexpr (Shape::kBending != Bending::flat) {  // H n̄ = κ (n̄ - n (n·n̄) - e z (z·n̄))
+    Vec3<N> bent = mul_add(-dot(n, n_bar), n, n_bar);
+    if constexpr (Shape::kBending == Bending::rod) bent = mul_add(-dot(p.axis, n_bar), p.axis, bent);
+    bent = p.curvature * bent;
+    rho -= bent;
+    turned = mul_add(-p.d, bent, turned);
+  }
+  out.displacement.a += cross(p.x2, rho) + cross(n, turned);
+  out.displacement.l += rho;
+}
+
+}  // namespace tangere::kernels

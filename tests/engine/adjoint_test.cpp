@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// Gradients of rollouts: the adjoint against differences of whole runs, for every scheme, joint kind, contact law and motor.
+#include <gtest/gtest.h>
+
+#include "tests/engine/gradient_run.hpp"
+#include "tests/engine/random_machine.hpp"
+
+namespace tangere {
+namespace {
+
+using testing::Random;
+using testing::RunGradient;
+using testing::RunInput;
+using testing::StateLoss;
+
+constexpr int kSteps = 6;
+
+RunInput random_input(const Model& model, unsigned seed) {
+  Random random(seed);
+  RunInput in;
+  Batch batch(model, 1);
+  in.q = testing::q_of(batch);
+  for (int i = 0; i < model.nv(); ++i) {
+    in.q = testing::moved(model, in.q, i, 0.05 * random.normal());
+    in.v.push_back(0.3 * random.normal());
+  }
+  for (int t = 0; t < kSteps; ++t) {
+    in.u.emplace_back();
+    for (int k = 0; k < model.nu(); ++k) in.u.back().push_back(0.4 * random.normal());
+  }
+  return in;
+}
+
+/// Every entry relative to the gradient's norm over its group; returns how many were compared.
+int compare(const std::vector<double>& a, const std::vector<double>& b, double scale, double tolerance, const char* what) {
+  int compared = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!std::isfinite(b[i])) continue;
+    EXPECT_NEAR(a[i], b[i], tolerance * scale) << what << " " << i;
+    ++compared;
+  }
+  return compared;
+}
+
+double norm(const std::vector<double>& x) {
+  double sum = 0;
+  for (double a : x)
+    if (std::isfinite(a)) sum += a * a;
+  return std::sqrt(sum);
+}
+
+/// Returns how many derivatives were compared: none where a step of the run finds no solution.
+int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance) {
+  const Model model(scene);
+  const StepperOptions options = testing::options(scheme, scene.timestep, 1e-13);
+  const RunInput in = random_input(model, seed);
+  const StateLoss loss(model, kSteps, seed + 1);
+  if (!std::isfinite(testing::loss_of_run(model, options, in, loss))) return 0;
+  const RunGradient adjoint = testing::adjoint_of_run(model, options, {in}, loss, 0);
+  const RunGradient difference = testing::differences_of_run(model, options, in, loss);
+  int compared = compare(adjoint.q, difference.q, norm(difference.q), tolerance, "q");
+  compared += compare(adjoint.v, difference.v, norm(difference.v), tolerance, "v");
+  compared += compare(adjoint.u, difference.u, norm(difference.u), tolerance, "u");
+  const Parameters parameters(model);
+  std::vector<double> a = adjoint.parameters, b = difference.parameters;  // by their relative changes: units differ
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    const double size = parameters.infos()[k].value;
+    a[k] *= size, b[k] *= size;
+  }
+  const double scale = norm(b);
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    if (!std::isfinite(b[k])) continue;
+    EXPECT_NEAR(a[k], b[k], tolerance * scale) << parameters.infos()[k].name;
+    ++compared;
+  }
+  return compared;
+}
+
+class AdjointScheme : public ::testing::TestWithParam<Integrator> {};
+
+TEST_P(AdjointScheme, TreesMatchDifferences) {
+  int compared = 0;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    compared += check(testing::random_tree(seed, 2 + static_cast<int>(seed % 5)), GetParam(), seed, 1e-7);
+  }
+  EXPECT_GT(compared, 300);
+}
+
+TEST_P(AdjointScheme, MachinesMatchDifferences) {
+  int compared = 0;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    compared += check(testing::random_machine(seed, 2 + static_cast<int>(seed % 5)), GetParam(), seed, 1e-7);
+  }
+  EXPECT_GT(compared, 450);
+}
+
+TEST_P(AdjointScheme, ContactsMatchDifferences) {
+  int compared = 0;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    compared += check(testing::random_contacts(seed, 2 + static_cast<int>(seed % 2), ContactLaw(seed % 3)), GetParam(), seed, 1e-6);
+  }
+  EXPECT_GT(compared, 200);
+}
+
+/// Position motors whose force is that of the step's start, one of them on a ball joint.
+TEST_P(AdjointScheme, MotorsTimedAtTheStartMatchDifferences) {
+  int motors = 0, compared = 0;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    Scene s = testing::random_machine(seed, 3 + static_cast<int>(seed % 3));
+    for (MotorDescription& m : s.motors) m.timing = MotorTiming::start, motors += m.control == MotorControl::position;
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    compared += check(s, GetParam(), seed, 1e-7);
+  }
+  EXPECT_GT(motors, 10);
+  EXPECT_GT(compared, 500);
+}
+
+/// Together with others, alone in its group or in a batch of one: the same bits.
+TEST_P(AdjointScheme, CompanyChangesNothing) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const Scene scene = testing::random_contacts(seed, 3, ContactLaw(seed % 3));
+    const Model model(scene);
+    const StepperOptions options = testing::options(GetParam(), scene.timestep, 1e-9);
+    std::vector<RunInput> inputs;
+    for (unsigned k = 0; k < 9; ++k) inputs.push_back(random_input(model, seed + 10 * k));
+    const StateLoss loss(model, kSteps, seed);
+    for (int lane : {0, 5, 8}) {
+      const RunGradient alone = testing::adjoint_of_run(model, options, {inputs[std::size_t(lane)]}, loss, 0);
+      const RunGradient among = testing::adjoint_of_run(model, options, inputs, loss, lane);
+      EXPECT_EQ(alone.q, among.q) << "seed " << seed << " lane " << lane;
+      EXPECT_EQ(alone.v, among.v);
+      EXPECT_EQ(alone.u, among.u);
+      EXPECT_EQ(alone.parameters, among.parameters);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, AdjointScheme,
+                         ::testing::Values(Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit));
+
+}  // namespace
+}  // namespace tangere

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+// Short rollouts with a loss that is linear in every state: their gradients by the adjoint and by differences.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "engine/adjoint.hpp"
+#include "engine/compiled_model.hpp"
+#include "engine/parameters.hpp"
+#include "tests/engine/runs.hpp"
+#include "tests/kernels/random_numbers.hpp"
+
+namespace tangere::testing {
+
+using kernels::kBlock;
+
+/// q ⊕ e along dof i.
+inline std::vector<double> moved(const Model& model, std::vector<double> q, int dof, double e) {
+  for (const kernels::Link& l : model.compiled().links) {
+    if (dof < l.v || dof >= l.v + kernels::dofs(l.kind)) continue;
+    if (l.kind != kernels::JointKind::spherical) {
+      q[std::size_t(l.q + dof - l.v)] += e;
+      return q;
+    }
+    kernels::Vec3<double> turn = {0, 0, 0};
+    (&turn.x)[dof - l.v] = e;
+    double* at = &q[std::size_t(l.q)];
+    const kernels::Quat<double> r = kernels::rotate_by(kernels::Quat<double>{at[0], at[1], at[2], at[3]}, turn);
+    at[0] = r.w, at[1] = r.x, at[2] = r.y, at[3] = r.z;
+  }
+  return q;
+}
+
+/// Where a run starts and what drives it.
+struct RunInput {
+  std::vector<double> q, v;
+  std::vector<std::vector<double>> u;  ///< one row per step
+};
+
+/// Σ_t weight(t)·(q_t, v_t) with random weights; quaternions enter with their four components.
+class StateLoss {
+ public:
+  StateLoss(const Model& model, int steps, unsigned seed) : model_(model), nq_(model.nq()), nv_(model.nv()) {
+    Random random(seed);
+    weights_.resize(std::size_t((steps + 1) * (nq_ + nv_)));
+    for (double& w : weights_) w = random.normal();
+  }
+  [[nodiscard]] double value(int step, const std::vector<double>& q, const std::vector<double>& v) const {
+    const double* w = at(step);
+    double sum = 0;
+    for (int i = 0; i < nq_; ++i) sum += w[i] * q[std::size_t(i)];
+    for (int i = 0; i < nv_; ++i) sum += w[nq_ + i] * v[std::size_t(i)];
+    return sum;
+  }
+  /// Adds to the cotangents of one lane.
+  void add(int step, const std::vector<double>& q, BlockCotangent& c, int lane) const {
+    const double* w = at(step);
+    for (int i = 0; i < nv_; ++i) c.v[std::size_t(i * kBlock + lane)] += w[nq_ + i];
+    for (const kernels::Link& l : model_.compiled().links) {
+      const double *p = w + l.q, *a = &q[std::size_t(l.q)];
+      double* out = &c.q[std::size_t(l.v * kBlock + lane)];
+      if (l.kind != kernels::JointKind::spherical) {
+        for (int k = 0; k < kernels::dofs(l.kind); ++k) out[k * kBlock] += p[k];
+        continue;
+      }
+      // δq = q ⊗ (0, θ)/2
+      out[0] += 0.5 * (-a[1] * p[0] + a[0] * p[1] + a[3] * p[2] - a[2] * p[3]);
+      out[kBlock] += 0.5 * (-a[2] * p[0] - a[3] * p[1] + a[0] * p[2] + a[1] * p[3]);
+      out[2 * kBlock] += 0.5 * (-a[3] * p[0] + a[2] * p[1] - a[1] * p[2] + a[0] * p[3]);
+    }
+  }
+
+ private:
+  [[nodiscard]] const double* at(int step) const { return &weights_[std::size_t(step * (nq_ + nv_))]; }
+  Model model_;
+  int nq_, nv_;
+  std::vector<double> weights_;
+};
+
+inline double loss_of_run(const Model& model, const StepperOptions& options, const RunInput& in, const StateLoss& loss) {
+  Batch batch(model, 1);
+  batch.set_state(0, in.q, in.v);
+  Stepper stepper(model, options);
+  double sum = loss.value(0, q_of(batch), v_of(batch));
+  for (std::size_t t = 0; t < in.u.size(); ++t) {
+    stepper.step(batch, in.u[t]);
+    if (failed(batch.status(0))) return NAN;
+    sum += loss.value(static_cast<int>(t) + 1, q_of(batch), v_of(batch));
+  }
+  return sum;
+}
+
+/// Gradient: q₀ (nv), v₀ (nv), u (steps, nu).
+struct RunGradient {
+  std::vector<double> q, v, u, parameters;
+  [[nodiscard]] double norm() const {
+    double sum = 0;
+    for (const auto* x : {&q, &v, &u})
+      for (double g : *x) sum += g * g;
+    return std::sqrt(sum);
+  }
+};
+
+/// Of environment `lane` among `inputs`, which run together.
+inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& options, const std::vector<RunInput>& inputs,
+                                  const StateLoss& loss, int lane, int* split_steps = nullptr) {
+  const int count = static_cast<int>(inputs.size()), steps = static_cast<int>(inputs[0].u.size());
+  Batch batch(model, count);
+  for (int e = 0; e < count; ++e) batch.set_state(e, inputs[std::size_t(e)].q, inputs[std::size_t(e)].v);
+  Stepper stepper(model, options);
+  BlockTape tape(model, stepper.integrator(), steps);
+  tape.start(batch, 0);
+  std::vector<std::vector<double>> u;
+  for (int t = 0; t < steps; ++t) {
+    u.emplace_back();
+    for (const RunInput& in : inputs) u.back().insert(u.back().end(), in.u[std::size_t(t)].begin(), in.u[std::size_t(t)].end());
+    stepper.step_block(batch, 0, u.back(), &tape);
+    if (split_steps != nullptr) *split_steps += batch.status(lane) == StepStatus::split;
+  }
+  Adjoint adjoint(model, options, {1, true});
+  adjoint.clear();
+  const auto state = [&](int step, int e) {
+    std::vector<double> q(std::size_t(model.nq()));
+    for (std::size_t i = 0; i < q.size(); ++i) q[i] = tape.state(step)[i * kBlock + std::size_t(e)];
+    return q;
+  };
+  RunGradient g;
+  g.u.resize(std::size_t(steps * model.nu()));
+  for (int t = steps; t >= 0; --t) {
+    for (int e = 0; e < count; ++e) loss.add(t, state(t, e), adjoint.loss(0), e);
+    if (t == 0) break;
+    adjoint.reverse_step(batch, 0, tape, t - 1, u[std::size_t(t - 1)]);
+    for (int k = 0; k < model.nu(); ++k)
+      g.u[std::size_t((t - 1) * model.nu() + k)] = adjoint.loss(0).u[std::size_t(k * kBlock + lane)];
+  }
+  for (int i = 0; i < model.nv(); ++i) {
+    g.q.push_back(adjoint.loss(0).q[std::size_t(i * kBlock + lane)]);
+    g.v.push_back(adjoint.loss(0).v[std::size_t(i * kBlock + lane)]);
+  }
+  const Parameters parameters(model);
+  g.parameters.resize(std::size_t(parameters.count()));
+  parameters.gradient(adjoint.loss(0), lane, g.parameters);
+  return g;
+}
+
+/// The central difference that changes least from one step size to the next; NaN where none settles (a kink).
+inline double best_difference(const std::function<double(double)>& f, double start) {
+  double best = NAN, least = HUGE_VAL, before = NAN;
+  for (double e = start; e > 1e-4 * start; e *= 0.25) {
+    // Richardson's: the error of second order taken out.
+    const double coarse = (f(2 * e) - f(-2 * e)) / (4 * e), fine = (f(e) - f(-e)) / (2 * e);
+    const double value = (4 * fine - coarse) / 3;
+    if (std::abs(value - before) < least) least = std::abs(value - before), best = value;
+    before = value;
+  }
+  return best;
+}
+
+inline RunGradient differences_of_run(const Model& model, const StepperOptions& options, const RunInput& in,
+                                      const StateLoss& loss, double start = 1e-3) {
+  RunGradient g;
+  const auto along = [&](const std::function<void(RunInput&, double)>& change) {
+    return best_difference(
+        [&](double e) {
+          RunInput other = in;
+          change(other, e);
+          return loss_of_run(model, options, other, loss);
+        },
+        start);
+  };
+  for (int i = 0; i < model.nv(); ++i) {
+    g.q.push_back(along([&](RunInput& x, double e) { x.q = moved(model, x.q, i, e); }));
+    g.v.push_back(along([&](RunInput& x, double e) { x.v[std::size_t(i)] += 10 * e; }) / 10);
+  }
+  for (std::size_t t = 0; t < in.u.size(); ++t)
+    for (int k = 0; k < model.nu(); ++k)
+      g.u.push_back(along([&](RunInput& x, double e) { x.u[t][std::size_t(k)] += 10 * e; }) / 10);
+  const Parameters parameters(model);
+  for (int k = 0; k < parameters.count(); ++k) {
+    const double size = parameters.infos()[std::size_t(k)].value;
+    if (size == 0) {  // at a bound of what a scene may say: one-sided
+      g.parameters.push_back(NAN);
+      continue;
+    }
+    g.parameters.push_back(best_difference(
+                               [&](double e) {
+                                 Scene scene = model.scene();
+                                 parameters.in(scene, k) += e * size;
+                                 return loss_of_run(Model(scene), options, in, loss);
+                               },
+                               start) /
+                           size);
+  }
+  return g;
+}
+
+}  // namespace tangere::testing
