@@ -22,6 +22,10 @@ struct Command {
 Command add_inspect(CLI::App& program);
 Command add_simulate(CLI::App& program);
 Command add_generate(CLI::App& program);
+Command add_validate(CLI::App& program);
+Command add_info(CLI::App& program);
+Command add_merge(CLI::App& program);
+Command add_export(CLI::App& program);
 Command add_plot(CLI::App& program);
 Command add_bench(CLI::App& program);
 Command add_gradcheck(CLI::App& program);

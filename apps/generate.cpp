@@ -3,16 +3,21 @@
 // before the first step.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/generate_job.hpp"
 #include "apps/memory.hpp"
 #include "apps/progress.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
-#include "io/dataset_writer.hpp"
+#include "apps/workers.hpp"
+#include "io/nearest_name.hpp"
 #include "kernels/isa.hpp"
 #include "tasks/task_episodes.hpp"
 
@@ -23,15 +28,7 @@ constexpr std::int64_t kMostEpisodes = 1'000'000'000;
 constexpr int kMostInterval = 1'000'000'000;
 constexpr int kMostThreads = 4096;
 
-struct Options {
-  std::string scene, output, controls, policy, precision = "mixed";
-  std::optional<std::int64_t> episodes, steps;
-  std::optional<int> every, threads;
-  std::optional<std::uint64_t> seed;
-  bool overwrite = false, allow_unknown = false;
-};
-
-EpisodeOptions episode_options(const Options& options, const Model& model,
+EpisodeOptions episode_options(const GenerateOptions& options, const Model& model,
                                const ControlProgram& controls) {
   EpisodeOptions run;
   run.episodes = options.episodes.value_or(0);
@@ -43,16 +40,42 @@ EpisodeOptions episode_options(const Options& options, const Model& model,
   // One more than can be simulated: a thread need not wait for the one that writes.
   run.blocks_in_flight = run.threads + 1;
   static_cast<void>(action_rows(run));
-  check_memory(episode_bytes(model, run), fmt::format("--threads {}", run.threads));
   return run;
 }
 
+/// A table by what it says, not by its name: a path may lead elsewhere on the next machine.
+std::string controls_named(const std::string& path) {
+  if (path.empty()) return "of the scene";
+  std::ifstream file(path, std::ios::binary);
+  std::uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
+  for (std::istreambuf_iterator<char> at(file), end; at != end; ++at)
+    hash = (hash ^ static_cast<unsigned char>(*at)) * 0x100000001B3ULL;
+  return fmt::format("a table of checksum {:016x}", hash);
+}
+
+/// What makes the same data set again, wherever and on however many threads.
+std::string command_of(const GenerateOptions& options, const EpisodeOptions& run, const std::string& policy) {
+  std::string command = fmt::format("tangere generate {} --episodes {} --seed {} --precision {}", options.scene,
+                                    run.episodes, run.seed, options.precision);
+  if (policy.empty()) command += fmt::format(" --steps {} --every {}", run.steps, run.every);
+  if (!policy.empty()) command += " --policy " + policy;
+  if (!options.controls.empty()) command += " --controls " + options.controls;
+  if (options.compress != "none") command += " --compress " + options.compress;
+  if (options.shards) command += fmt::format(" --shards {}", *options.shards);
+  return command;
+}
+
 /// `task`: null for a scene alone.
-DatasetLayout make_layout(const Model& model, const Stepper& stepper, const EpisodeOptions& run,
-                          const ProgramInfo& info, const Task* task = nullptr, const std::string& policy = {}) {
+DatasetLayout make_layout(const GenerateOptions& options, const Model& model, const Stepper& stepper,
+                          const EpisodeOptions& run, const ProgramInfo& info, const Task* task = nullptr,
+                          const std::string& policy = {}) {
   DatasetDescription description;
   if (task != nullptr) description.task = task->spec();
   description.policy = policy;
+  description.controls = controls_named(options.controls);
+  description.command = command_of(options, run, policy);
+  description.shards = options.shards.value_or(0);
+  description.compression = options.compress;
   description.episodes = run.episodes;
   description.steps = run.steps;
   description.every = run.every;
@@ -64,17 +87,19 @@ DatasetLayout make_layout(const Model& model, const Stepper& stepper, const Epis
   return dataset_layout_from(model, stepper, description);
 }
 
+std::vector<std::string> effects_of(const Model& model) {
+  std::vector<std::string> names;
+  for (const EffectInfo& effect : model.effects()) {
+    if (effect.on) names.emplace_back(effect.name);
+  }
+  return names;
+}
+
 std::vector<Failure> failures_of(const EpisodeSummary& summary) {
   std::vector<Failure> failures;
   for (const FailedEpisode& f : summary.failures) failures.push_back({f.episode, f.step, f.status});
   return failures;
 }
-
-/// What a run of a task adds: keys of the JSON object, a line for people.
-struct TaskReport {
-  Json keys{{"task", nullptr}};
-  std::string line = "no task: every reward is 0";
-};
 
 TaskReport report_of(const Task& task, PolicyKind policy, const TaskEpisodeSummary& summary) {
   const auto played = summary.run.episodes - static_cast<std::int64_t>(summary.run.failures.size());
@@ -90,93 +115,142 @@ TaskReport report_of(const Task& task, PolicyKind policy, const TaskEpisodeSumma
   return report;
 }
 
-int report(const Options& options, const Console& console, const Stepper& stepper,
-           const EpisodeOptions& run, const EpisodeSummary& summary,
-           const std::vector<std::string>& shards, const TaskReport& of_task) {
-  const ExitCode code = summary.failures.empty() ? kDone : kSomeFailed;
+/// Which of the three kinds of work kept the others waiting, and for how long all of them were at it.
+std::string limit_of(const EpisodeSummary& summary, const EpisodeOptions& run) {
+  const double simulation = summary.simulation_seconds / run.threads, encoding = summary.encoding_seconds / run.threads;
+  if (summary.writing_seconds >= std::max(simulation, encoding)) return "writing";
+  return simulation >= encoding ? "simulation" : "compression";
+}
+
+int report(const GenerateOptions& options, const Console& console, const Job& job, const JobResult& done,
+           const DatasetWriter& output) {
+  const EpisodeSummary& summary = done.summary;
+  const EpisodeOptions& run = job.run;
+  const std::vector<std::string> shards = output.shards();
+  const ExitCode code = summary.failures.empty() && output.kept_failed() == 0 ? kDone : kSomeFailed;
   std::uintmax_t bytes = 0;
   for (const std::string& shard : shards) bytes += std::filesystem::file_size(shard);
-  const double rate = static_cast<double>(summary.environment_steps) / summary.seconds;
+  const double rate =
+      summary.seconds > 0 ? static_cast<double>(summary.environment_steps) / summary.seconds : 0;
   list_failures(console, "episode", failures_of(summary), "--json and the shards name all");
+  const std::string kept = output.kept() == 0
+                               ? ""
+                               : fmt::format("kept: {} of them, episodes failed in these: {}\n", output.kept(),
+                                             output.kept_failed());
   console.print(
       fmt::format("episodes: {}, rows: {}, time: {:.2f} s, {:.0f} env-steps/s with output, "
-                  "threads: {}\n{}\nsteps split: {}, episodes failed: {}\nwrote {}: {} ({} bytes)",
-                  summary.episodes, summary.rows, summary.seconds, rate, run.threads,
-                  of_task.line, summary.split_steps, summary.failures.size(), options.output,
+                  "threads: {}\nlimited by {}: simulation {:.2f} s and compression {:.2f} s of all threads, writing {:.2f} s of one\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes)",
+                  summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, run),
+                  summary.simulation_seconds, summary.encoding_seconds, summary.writing_seconds, done.task.line, summary.split_steps, summary.failures.size(), kept, options.output,
                   shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes));
   Json result{{"command", "generate"},
-                  {"exit_code", static_cast<int>(code)},
-                  {"scene", options.scene},
-                  {"output", options.output},
-                  {"shards", shards},
-                  {"bytes", bytes},
-                  {"episodes", summary.episodes},
-                  {"rows", summary.rows},
-                  {"steps", run.steps},
-                  {"every", run.every},
-                  {"seed", run.seed},
-                  {"timestep", stepper.timestep()},
-                  {"integrator", to_string(stepper.integrator())},
-                  {"tolerance", stepper.tolerance()},
-                  {"precision", options.precision},
-                  {"instruction_set", kernels::active_isa_name()},
-                  {"threads", run.threads},
-                  {"peak_blocks_in_flight", summary.peak_blocks_in_flight},
-                  {"seconds", summary.seconds},
-                  {"environment_steps", summary.environment_steps},
-                  {"environment_steps_per_second", rate},
-                  {"newton_iterations", summary.newton_iterations},
-                  {"split_steps", summary.split_steps},
-                  {"failed", failures_json("episode", failures_of(summary))}};
-  result.update(of_task.keys);
+              {"exit_code", static_cast<int>(code)},
+              {"scene", options.scene},
+              {"output", options.output},
+              {"shards", shards},
+              {"bytes", bytes},
+              {"kept", output.kept()},
+              {"kept_failed", output.kept_failed()},
+              {"episodes", summary.episodes},
+              {"rows", summary.rows},
+              {"steps", run.steps},
+              {"every", run.every},
+              {"seed", run.seed},
+              {"timestep", job.layout.timestep},
+              {"integrator", job.layout.integrator},
+              {"tolerance", job.layout.tolerance},
+              {"precision", options.precision},
+              {"instruction_set", kernels::active_isa_name()},
+              {"threads", run.threads},
+              {"peak_blocks_in_flight", summary.peak_blocks_in_flight},
+              {"seconds", summary.seconds},
+              {"compress", options.compress},
+              {"limited_by", limit_of(summary, run)},
+              {"simulation_seconds", summary.simulation_seconds},
+              {"encoding_seconds", summary.encoding_seconds},
+              {"writing_seconds", summary.writing_seconds},
+              {"environment_steps", summary.environment_steps},
+              {"environment_steps_per_second", rate},
+              {"newton_iterations", summary.newton_iterations},
+              {"split_steps", summary.split_steps},
+              {"failed", failures_json("episode", failures_of(summary))}};
+  result.update(done.task.keys);
   console.result(result);
   return code;
 }
 
-int stopped(const Options& options, const Console& console, int signal, std::int64_t episodes, std::int64_t asked,
-            const DatasetWriter& output) {
+int stopped(const GenerateOptions& options, const Console& console, int signal, std::int64_t episodes,
+            std::int64_t asked, const DatasetWriter& output) {
   return report_stop(console, "generate", signal, fmt::format("after {} of {} episodes", episodes, asked),
                      fmt::format("complete shards in '{}': {}", options.output, output.shards().size()),
                      {{"shards", output.shards()}});
 }
 
-int generate_task(const Options& options, const Console& console, const ProgramInfo& info, const Task& task) {
+/// Makes what is missing.
+int make(const GenerateOptions& options, const Console& console, const Job& job) {
+  if (options.dry_run) return dry_run(options, console, job);
+  // Before the folder is made and until it is gone or complete: nothing half-written stays.
+  const StopSignals signals;
+  DatasetWriter output(output_for(options, job.layout, console), job.layout);
+  EpisodeOptions run = job.run;
+  run.ranges = output.missing();
+  std::int64_t episodes = 0;
+  for (const EpisodeRange& range : run.ranges) episodes += range.end - range.first;
+  console.detail(fmt::format("episodes: {}, steps: {}, a row every {}, threads: {}, shards kept: {}", episodes,
+                             run.steps, run.every, run.threads, output.kept()));
+  JobResult done;
+  if (episodes > 0) {
+    Progress progress(console, job.unit, episodes * (job.layout.task ? job.layout.rows() : run.steps), 1);
+    done = job.simulate(
+        run, output, [&](std::int64_t steps) { progress.update(steps); }, [&] { return signals.received() != 0; });
+  }
+  if (done.summary.stopped)
+    return stopped(options, console, signals.received(), done.summary.episodes, episodes, output);
+  return report(options, console, job, done, output);
+}
+
+int generate_task(const GenerateOptions& options, const Console& console, const ProgramInfo& info, const Task& task) {
   refuse_with_task(task, {{"--steps", options.steps.has_value()}, {"--every", options.every.has_value()}});
   const PolicyKind kind = policy_named(options.policy, options.controls, PolicyKind::scripted);
   const Policy policy = make_policy(task, kind, options.controls);
-  TaskEpisodeOptions of_task;
-  of_task.episodes = options.episodes.value_or(0);
-  of_task.seed = options.seed.value_or(0);
-  of_task.precision = precision_named(options.precision);
-  of_task.threads = options.threads.value_or(available_threads());
-  check_memory(task_episode_bytes(task, of_task), fmt::format("--threads {}", of_task.threads));
-  EpisodeOptions run;
-  run.episodes = of_task.episodes;
-  run.every = task.spec().steps_per_action;
-  run.steps = static_cast<std::int64_t>(task.spec().horizon) * run.every;
-  run.seed = of_task.seed;
-  run.precision = of_task.precision;
-  run.threads = of_task.threads;
-  const Stepper stepper(task.model());
-
-  const StopSignals signals;
-  DatasetWriter output(options.output, make_layout(task.model(), stepper, run, info, &task, to_string(kind)),
-                       options.overwrite);
-  TaskEpisodeSummary summary;
-  {
-    Progress progress(console, "action", run.episodes * task.spec().horizon, 1);
-    summary = run_task_episodes(
-        task, policy, of_task, output, [&](std::int64_t done) { progress.update(done); },
-        [&] { return signals.received() != 0; });
-  }
-  if (summary.run.stopped)
-    return stopped(options, console, signals.received(), summary.run.episodes, run.episodes, output);
-  return report(options, console, stepper, run, summary.run, output.shards(), report_of(task, kind, summary));
+  Job job;
+  job.run.episodes = options.episodes.value_or(0);
+  job.run.every = task.spec().steps_per_action;
+  job.run.steps = static_cast<std::int64_t>(task.spec().horizon) * job.run.every;
+  job.run.seed = options.seed.value_or(0);
+  job.run.precision = precision_named(options.precision);
+  job.run.threads = options.threads.value_or(available_threads());
+  const auto of_task = [](const EpisodeOptions& run) {
+    return TaskEpisodeOptions{run.episodes, run.ranges, run.seed, run.precision, run.threads};
+  };
+  job.memory_bytes = task_episode_bytes(task, of_task(job.run));
+  check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
+  job.unit = "action";
+  job.effects = effects_of(task.model());
+  job.layout = make_layout(options, task.model(), Stepper(task.model()), job.run, info, &task, to_string(kind));
+  job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
+                     const StopRequest& stop) -> JobResult {
+    const TaskEpisodeSummary summary = run_task_episodes(task, policy, of_task(run), sink, progress, stop);
+    return {summary.run, report_of(task, kind, summary)};
+  };
+  return make(options, console, job);
 }
 
-int generate(const Options& options, const Console& console, const ProgramInfo& info) {
+int generate(GenerateOptions options, const Console& console, const ProgramInfo& info) {
   static_cast<void>(
       precision_named(options.precision));  // a wrong word is said before a scene is read
+  if (options.compress != "none" && options.compress != "deflate")
+    throw InputError(fmt::format("unknown compression '{}'{}", options.compress,
+                                 suggestion(options.compress, std::vector<std::string>{"none", "deflate"})));
+  if (options.resume && options.overwrite)
+    throw InputError("--resume with --overwrite; expected one of them: keep shards, or replace them");
+  if (!options.shard.empty()) {
+    const Worker shard = worker_named(options.shard);
+    if (options.shards.value_or(shard.count) != shard.count)
+      throw InputError(fmt::format("--shard {} with --shards {}; expected the same number of shards", options.shard,
+                                   *options.shards));
+    options.shards = shard.count;
+  }
   if (const std::unique_ptr<Task> task = find_task(options.scene, console))
     return generate_task(options, console, info, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
@@ -184,31 +258,26 @@ int generate(const Options& options, const Console& console, const ProgramInfo& 
   const Stepper stepper(model);
   const ControlProgram controls =
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
-  const EpisodeOptions run = episode_options(options, model, controls);
-
-  // Before the folder is made and until it is gone or complete: nothing half-written stays.
-  const StopSignals signals;
-  DatasetWriter output(options.output, make_layout(model, stepper, run, info), options.overwrite);
-  console.detail(fmt::format("episodes: {}, steps: {}, a row every {}, threads: {}", run.episodes,
-                             run.steps, run.every, run.threads));
-  EpisodeSummary summary;
-  {
-    Progress progress(console, "environment step", run.episodes * run.steps, 1);
-    summary = run_episodes(
-        model, {}, controls, run, output, [&](std::int64_t done) { progress.update(done); },
-        [&] { return signals.received() != 0; });
-  }
-  if (summary.stopped)
-    return stopped(options, console, signals.received(), summary.episodes, run.episodes, output);
-  return report(options, console, stepper, run, summary, output.shards(), {});
+  Job job;
+  job.run = episode_options(options, model, controls);
+  job.memory_bytes = episode_bytes(model, job.run);
+  check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
+  job.unit = "environment step";
+  job.effects = effects_of(model);
+  job.layout = make_layout(options, model, stepper, job.run, info);
+  job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
+                     const StopRequest& stop) -> JobResult {
+    return {run_episodes(model, {}, controls, run, sink, progress, stop), {}};
+  };
+  return make(options, console, job);
 }
 
 }  // namespace
 
 Command add_generate(CLI::App& program) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<GenerateOptions>();
   const auto console = std::make_shared<Console>();
-  Options& o = *options;
+  GenerateOptions& o = *options;
   CLI::App* app =
       program.add_subcommand("generate", "Run many episodes of a scene or a task and write a data set");
   add_text(*app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task")->required();
@@ -230,6 +299,12 @@ Command add_generate(CLI::App& program) {
            "Of tactile fields: double, or mixed, stored as float32 [default: mixed]");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between episodes [default: 0]");
+  add_text(*app, "--compress", o.compress, "NAME", "Of tactile fields on disk: none or deflate [default: none]");
+  add_whole_number<std::int64_t>(*app, "--shards", o.shards, 1, kMostEpisodes,
+                                 "Files to cut the data set into [default: below a gigabyte each]");
+  add_text(*app, "--shard", o.shard, "k/S", "Make shard k of S alone, k from 0; others may run beside it");
+  app->add_flag("--resume", o.resume, "Keep the shards in the folder, of the same settings, and make the rest");
+  app->add_flag("--dry-run", o.dry_run, "Say what would be made, and how long it may take");
   app->add_flag("--overwrite", o.overwrite, "Replace the shards in the folder");
   app->add_flag("--allow-unknown", o.allow_unknown,
                 "Unknown elements and attributes of the scene are warnings, not errors");

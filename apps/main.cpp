@@ -44,8 +44,8 @@ struct Program {
     // What the parser cannot place is reported by us, with the nearest name.
     parser.require_subcommand(0, 1);
     parser.allow_extras();
-    commands = {add_inspect(parser), add_simulate(parser), add_generate(parser), add_plot(parser),
-                add_bench(parser), add_gradcheck(parser)};
+    commands = {add_inspect(parser), add_simulate(parser), add_generate(parser), add_validate(parser), add_info(parser),
+                add_merge(parser), add_export(parser), add_plot(parser), add_bench(parser), add_gradcheck(parser)};
   }
 
   [[nodiscard]] const Command* chosen() const {

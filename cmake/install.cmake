@@ -31,7 +31,8 @@ install(FILES engine/adjoint.hpp engine/aligned.hpp engine/batch.hpp engine/cont
   engine/tactile_frame.hpp engine/task_spec.hpp DESTINATION ${headers}/engine)
 install(FILES tasks/benchmark_run.hpp tasks/episodes.hpp tasks/gradients.hpp tasks/identification.hpp tasks/losses.hpp tasks/policy.hpp tasks/rollout.hpp tasks/task.hpp
   tasks/task_episodes.hpp tasks/task_list.hpp tasks/task_pilot.hpp tasks/vector_task.hpp DESTINATION ${headers}/tasks)
-install(FILES io/dataset_layout.hpp io/dataset_writer.hpp io/scene_reader.hpp io/shard_check.hpp io/trajectory_file.hpp
+install(FILES io/dataset_export.hpp io/dataset_files.hpp io/dataset_layout.hpp io/dataset_merge.hpp io/dataset_writer.hpp
+  io/scene_reader.hpp io/shard_check.hpp io/trajectory_file.hpp
   io/trajectory_layout.hpp DESTINATION ${headers}/io)
 install(DIRECTORY scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tangere/scenes)
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})

@@ -35,7 +35,13 @@ struct EpisodeRows {
   /// q, v, then of a task its observations, of a scene end effectors if any and sensors: (episodes, rows, width)
   std::span<const Observation> observations;
   std::span<const float> rewards = {};    ///< of a task: (episodes, action_rows)
+  std::span<const double> randomized = {};  ///< what varies between episodes: (episodes, as many as the scene varies)
   std::span<const EpisodeEnd> ends = {};  ///< of a task, whose blocks come whole and in ascending order: (episodes)
+};
+
+/// Consecutive episodes [first, end) of a run; both are multiples of 16, the end of the run apart.
+struct EpisodeRange {
+  std::int64_t first = 0, end = 0;
 };
 
 /// An episode that no solution was found for.
@@ -47,12 +53,14 @@ struct FailedEpisode {
 };
 
 /// Receives episodes in pieces: those of one block of 16 in ascending rows, blocks in any order
-/// among each other. Called by one thread at a time. What is stored must depend on the pieces alone,
+/// among each other. Called by one thread at a time, prepare() apart. What is stored must depend on the pieces alone,
 /// not on the order of blocks. A sink that cannot store throws IoError; the run stops and passes it
 /// on.
 class EpisodeSink {
  public:
   virtual ~EpisodeSink() = default;
+  /// What can be done to a piece by many threads at once, before write() gets the same piece: compressing it.
+  virtual void prepare(const EpisodeRows&) {}
   virtual void write(const EpisodeRows& rows) = 0;
   /// The last row of the block that begins with this episode has been written.
   virtual void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) = 0;

@@ -41,7 +41,8 @@ DatasetFolder::Descriptor::~Descriptor() {
   if (number >= 0) close(number);
 }
 
-DatasetFolder::DatasetFolder(std::string path, bool overwrite) : path_(std::move(path)) {
+DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool shared)
+    : path_(std::move(path)), existing_(existing), shared_(shared) {
   std::error_code error;
   created_ = fs::create_directory(path_, error);
   if (error && error != std::errc::file_exists)
@@ -50,22 +51,25 @@ DatasetFolder::DatasetFolder(std::string path, bool overwrite) : path_(std::move
     throw IoError(fmt::format("'{}' exists and is no folder; expected a folder for shards", path_));
   if (access(path_.c_str(), W_OK | X_OK) != 0) fail("write into", path_, errno);
   hold();
-  if (!overwrite && !files_ending(".h5").empty())
-    throw IoError(fmt::format("'{}' has shards already; give --overwrite to replace them", path_));
+  if (shared_) return;
+  if (existing == ExistingShards::refuse && !shards().empty())
+    throw IoError(fmt::format(
+        "'{}' has shards already; give --overwrite to replace them, or --resume to keep them and make the rest", path_));
   // Taken over and dropped: a .part that is being written by somebody else is an error.
   for (const std::string& part : files_ending(".h5.part"))
     const PartFile stale(part.substr(0, part.size() - std::strlen(".part")), true);
 }
 
 DatasetFolder::~DatasetFolder() {
-  if (created_) rmdir(path_.c_str());  // refused when there is something in it
+  // Another process may be about to write into a shared one.
+  if (created_ && !shared_) rmdir(path_.c_str());  // refused when there is something in it
 }
 
 void DatasetFolder::hold() {
   descriptor_.number = open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor_.number < 0) fail("open", path_, errno);
   // File systems without locks: the .part of each shard still is locked where that is possible.
-  if (flock(descriptor_.number, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+  if (flock(descriptor_.number, (shared_ ? LOCK_SH : LOCK_EX) | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
   throw IoError(
       fmt::format("cannot write into '{}': another process is writing shards there", path_));
 }
@@ -84,13 +88,15 @@ std::string DatasetFolder::shard_path(std::int64_t shard) const {
 
 double DatasetFolder::free_bytes() const {
   double bytes = static_cast<double>(fs::space(path_).available);
-  for (const std::string& file : files_ending(".h5"))
+  if (existing_ != ExistingShards::replace || shared_) return bytes;
+  for (const std::string& file : shards())
     bytes += static_cast<double>(fs::file_size(file));
   return bytes;
 }
 
 void DatasetFolder::remove_old_shards() {
-  std::vector<std::string> files = files_ending(".h5");
+  if (existing_ != ExistingShards::replace || shared_) return;
+  std::vector<std::string> files = shards();
   std::reverse(files.begin(), files.end());
   for (const std::string& file : files)
     if (unlink(file.c_str()) != 0) fail("remove", file, errno);

@@ -6,23 +6,29 @@
 #include <string>
 #include <vector>
 
+#include "io/dataset_layout.hpp"
+
 namespace tangere {
 
 class DatasetFolder {
  public:
-  /// Creates the folder when it is missing, and holds it against other processes. Removes what a
-  /// killed run left unfinished. Throws IoError when it is something else, cannot be written, is
-  /// held by another process, or has shards and `overwrite` is false.
-  DatasetFolder(std::string path, bool overwrite);
+  /// Creates the folder when it is missing, and holds it against other processes; `shared`: against those alone that
+  /// want it for themselves. Removes what a killed run left unfinished, unless it is shared. Throws IoError when it is
+  /// something else, cannot be written, is held by another process, or is not shared and has shards that it should
+  /// not have.
+  DatasetFolder(std::string path, ExistingShards existing, bool shared = false);
   /// Removes the folder if it was created here and nothing came into it.
   ~DatasetFolder();
   DatasetFolder(const DatasetFolder&) = delete;
   DatasetFolder& operator=(const DatasetFolder&) = delete;
 
   [[nodiscard]] std::string shard_path(std::int64_t shard) const;
+  /// Paths of all that is called like a shard, sorted.
+  [[nodiscard]] std::vector<std::string> shards() const { return files_ending(".h5"); }
   /// Space on the disk that shards may fill, those to be removed included [bytes].
   [[nodiscard]] double free_bytes() const;
-  /// Removes the shards of an earlier run, last one first, so that what is left begins with 0.
+  /// Removes the shards of an earlier run where they are to be replaced, last one first, so that what is left begins
+  /// with 0. Not in a shared folder, where each shard is replaced by its own.
   void remove_old_shards();
 
  private:
@@ -39,7 +45,8 @@ class DatasetFolder {
   };
 
   std::string path_;
-  bool created_ = false;
+  ExistingShards existing_;
+  bool shared_ = false, created_ = false;
   Descriptor descriptor_;
 };
 

@@ -15,6 +15,8 @@ namespace {
 constexpr std::int64_t kBlockEpisodes = 16;
 // Short episodes: creating objects is what costs, and a shard that is lost should be cheap.
 constexpr std::int64_t kMostEpisodes = 4096;
+std::int64_t blocks_of(std::int64_t episodes) { return (episodes + kBlockEpisodes - 1) / kBlockEpisodes; }
+
 constexpr const char* kVariables = "variables";
 
 }  // namespace
@@ -71,7 +73,30 @@ std::int64_t DatasetLayout::episodes_per_shard() const {
   return static_cast<std::int64_t>(std::clamp(blocks, 1.0, kMostBlocks)) * kBlockEpisodes;
 }
 
+std::int64_t DatasetLayout::shard_count() const {
+  if (shards > 0) return shards;
+  const std::int64_t each = episodes_per_shard();
+  return (episodes + each - 1) / each;
+}
+
+EpisodeRange DatasetLayout::shard_episodes(std::int64_t shard) const {
+  const auto first = [&](std::int64_t s) {
+    if (shards == 0) return std::min(episodes, s * episodes_per_shard());
+    return std::min(episodes, s * blocks_of(episodes) / shards * kBlockEpisodes);
+  };
+  return {first(shard), first(shard + 1)};
+}
+
+std::int64_t DatasetLayout::shard_of(std::int64_t episode) const {
+  if (shards == 0) return episode / episodes_per_shard();
+  // The last shard whose first block, floor(s B / S), is not behind this one.
+  return ((episode / kBlockEpisodes + 1) * shards - 1) / blocks_of(episodes);
+}
+
 void DatasetLayout::check() const {
+  if (shards > blocks_of(episodes))
+    throw InputError(fmt::format("{} shards of {} episodes; expected at most {}, one for each block of {}", shards,
+                                 episodes, blocks_of(episodes), kBlockEpisodes));
   std::set<std::string> names{"q", "v"};
   if (!variable_names.empty()) names.insert(kVariables);
   for (const SensorLayout& sensor : sensors) {

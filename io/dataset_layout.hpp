@@ -9,10 +9,19 @@
 #include <string>
 #include <vector>
 
+#include "engine/episode_sink.hpp"
 #include "engine/task_spec.hpp"
 #include "io/trajectory_layout.hpp"
 
 namespace tangere {
+
+/// What to do with shards that are there already.
+enum class ExistingShards { refuse, replace, keep };
+
+/// What a file says of its data set, as text.
+struct Setting {
+  std::string name, value;
+};
 
 struct DatasetLayout {
   std::int64_t episodes = 0;  ///< N, of all shards
@@ -25,6 +34,7 @@ struct DatasetLayout {
   std::vector<std::string> u_names;           ///< (nu)
   std::vector<std::string> variable_names;    ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
+  std::vector<std::string> randomized_names, randomized_units;  ///< what varies between episodes
   std::optional<TaskSpec> task;  ///< whose actions, observations and rewards these are; none: a scene alone
   std::string policy;            ///< of a task
   std::string scene_name, scene_text;
@@ -32,7 +42,11 @@ struct DatasetLayout {
   double timestep = 0;   ///< [s]
   double tolerance = 0;  ///< of the scaled residual, dimensionless
   std::string precision, version, instruction_set;
+  std::string controls = "of the scene";  ///< or which table, by its content
+  std::string command;           ///< that makes this data set, without what does not change it (threads, folder …)
   double shard_bytes = 1 << 30;  ///< a shard stays below it, unless 16 episodes are more
+  std::int64_t shards = 0;       ///< how many; 0: as shard_bytes says
+  std::string compression = "none";  ///< or "deflate": of observations whose rows are large enough
 
   /// R: actions of an episode, of a task at most.
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
@@ -46,7 +60,11 @@ struct DatasetLayout {
   [[nodiscard]] double episode_bytes() const;
   /// As many as stay below shard_bytes, a multiple of 16; depends on the data set alone.
   [[nodiscard]] std::int64_t episodes_per_shard() const;
-  /// Throws InputError when a sensor cannot be a name in a file.
+  [[nodiscard]] std::int64_t shard_count() const;
+  /// Whole blocks of 16 episodes; where `shards` is given, as many in each as in any other, or one more.
+  [[nodiscard]] EpisodeRange shard_episodes(std::int64_t shard) const;
+  [[nodiscard]] std::int64_t shard_of(std::int64_t episode) const;
+  /// Throws InputError when a sensor cannot be a name in a file, or there are more shards than blocks.
   void check() const;
 };
 
@@ -58,7 +76,9 @@ struct DatasetDescription {
   bool single = false;  ///< observations are float32
   std::string precision, version, instruction_set;
   std::optional<TaskSpec> task;
-  std::string policy;
+  std::string policy, controls, command;
+  std::int64_t shards = 0;
+  std::string compression = "none";
 };
 
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,

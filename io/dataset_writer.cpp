@@ -3,52 +3,154 @@
 #include "io/dataset_writer.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
+#include <mutex>
+#include <numeric>
 #include <set>
+#include <stdexcept>
 
+#include "engine/error.hpp"
+#include "io/chunk_codec.hpp"
+#include "io/dataset_description.hpp"
 #include "io/dataset_folder.hpp"
+#include "io/h5_listing.hpp"
 #include "io/shard_file.hpp"
 
 namespace tangere {
+namespace {
+
+std::int64_t number(const h5::Id& file, const char* name) {
+  return h5::read_numbers<std::int64_t>(file, name).at(0);
+}
+
+}  // namespace
 
 struct DatasetWriter::Impl {
   DatasetLayout layout;
-  std::int64_t per_shard;
+  DatasetOutput output;
   DatasetFolder folder;
+  std::vector<EpisodeRange> missing;
   std::map<std::int64_t, ShardFile> open;
   std::set<std::int64_t> complete;
+  std::vector<std::int64_t> rows_of_chunks;
+  std::mutex prepared_mutex;
+  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<CompressedChunk>> prepared;  // by episode and row
+  std::int64_t kept = 0, kept_failed = 0;
   bool started = false;
 
-  Impl(const std::string& path, const DatasetLayout& l, bool overwrite)
-      : layout((l.check(), l)), per_shard(layout.episodes_per_shard()), folder(path, overwrite) {
-    const double needed = layout.episode_bytes() * static_cast<double>(layout.episodes);
-    const double available = folder.free_bytes();
+  Impl(const DatasetOutput& o, const DatasetLayout& l)
+      : layout((l.check(), l)), output(o), folder(o.folder, o.existing, o.only.has_value()),
+        rows_of_chunks(chunk_rows(layout)) {
+    if (output.existing != ExistingShards::replace) check_settings();
+    // Before shards are counted one by one: a slip of the keyboard may ask for billions.
+    if (makes_all()) check_space(static_cast<double>(layout.episodes));
+    for (const std::int64_t shard : to_make()) look_at(shard);
+    double episodes = 0;
+    for (const EpisodeRange& range : missing) episodes += static_cast<double>(range.end - range.first);
+    check_space(episodes);
+  }
+
+  /// Whether all shards are to be made.
+  [[nodiscard]] bool makes_all() const {
+    return !output.only && (output.existing != ExistingShards::keep || folder.shards().empty());
+  }
+
+  [[nodiscard]] std::vector<std::int64_t> to_make() const {
+    if (output.only) return *output.only;
+    std::vector<std::int64_t> all(static_cast<std::size_t>(layout.shard_count()));
+    std::iota(all.begin(), all.end(), 0);
+    return all;
+  }
+
+  /// Of every shard that is there, whoever made it: a data set is of one run.
+  void check_settings() const {
+    const std::vector<std::string> files = folder.shards();
+    if (files.empty()) return;
+    const std::vector<Setting> here = settings_of(layout);
+    for (const std::string& file : files) {
+      const std::vector<std::string> lines = differences(read_settings(h5::open_file(file)), here);
+      if (lines.empty()) continue;
+      throw InputError(fmt::format("'{}' is of another run, so this one cannot continue it: {}; expected the same "
+                                   "settings, another folder, or --overwrite",
+                                   file, fmt::join(lines, "; ")));
+    }
+  }
+
+  /// A shard that is there is complete: only complete ones have the name.
+  void look_at(std::int64_t shard) {
+    const EpisodeRange range = layout.shard_episodes(shard);
+    const std::string path = folder.shard_path(shard);
+    if (output.existing == ExistingShards::replace || !std::filesystem::exists(path)) {
+      if (!missing.empty() && missing.back().end == range.first) {
+        missing.back().end = range.end;
+      } else {
+        missing.push_back(range);
+      }
+      return;
+    }
+    if (output.existing == ExistingShards::refuse)
+      throw IoError(fmt::format("'{}' exists already; give --resume to keep it, or --overwrite to replace it", path));
+    const h5::Id file = h5::open_file(path);
+    const EpisodeRange there{number(file, "first_episode"), number(file, "first_episode") + number(file, "episodes")};
+    if (there.first != range.first || there.end != range.end)
+      throw InputError(fmt::format("'{}' holds episodes {} to {}, expected {} to {}", path, there.first, there.end - 1,
+                                   range.first, range.end - 1));
+    ++kept;
+    kept_failed += static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
+    complete.insert(shard);
+  }
+
+  void check_space(double episodes) const {
+    if (layout.compression != "none") return;  // nobody knows before
+    const double needed = layout.episode_bytes() * episodes, available = folder.free_bytes();
     if (needed > available)
-      throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free",
-                                path, needed, available));
+      throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free", output.folder, needed,
+                                available));
   }
 
   ShardFile& shard_of(std::int64_t episode) {
-    const std::int64_t shard = episode / per_shard, first = shard * per_shard;
+    const std::int64_t shard = layout.shard_of(episode);
     const auto found = open.find(shard);
     if (found != open.end()) return found->second;
     if (!started) folder.remove_old_shards();
     started = true;
-    return open
-        .try_emplace(shard, folder.shard_path(shard), layout, first,
-                     std::min(per_shard, layout.episodes - first))
+    const bool replace = output.only && output.existing == ExistingShards::replace;
+    return open.try_emplace(shard, folder.shard_path(shard), layout, layout.shard_episodes(shard), replace)
         .first->second;
   }
 };
 
-DatasetWriter::DatasetWriter(const std::string& folder, const DatasetLayout& layout, bool overwrite)
-    : impl_(std::make_unique<Impl>(folder, layout, overwrite)) {}
+DatasetWriter::DatasetWriter(const DatasetOutput& output, const DatasetLayout& layout)
+    : impl_(std::make_unique<Impl>(output, layout)) {}
 DatasetWriter::~DatasetWriter() = default;
 
+const std::vector<EpisodeRange>& DatasetWriter::missing() const { return impl_->missing; }
+std::int64_t DatasetWriter::kept() const { return impl_->kept; }
+std::int64_t DatasetWriter::kept_failed() const { return impl_->kept_failed; }
+
+void DatasetWriter::prepare(const EpisodeRows& rows) {
+  if (impl_->layout.compression == "none") return;
+  std::vector<CompressedChunk> chunks = compress(impl_->layout, impl_->rows_of_chunks, rows);
+  const std::lock_guard lock(impl_->prepared_mutex);
+  impl_->prepared[{rows.first_episode, rows.first_row}] = std::move(chunks);
+}
+
 void DatasetWriter::write(const EpisodeRows& rows) {
-  impl_->shard_of(rows.first_episode).write(rows);
+  if (impl_->layout.compression == "none") {
+    impl_->shard_of(rows.first_episode).write(rows, {});
+    return;
+  }
+  decltype(impl_->prepared)::node_type chunks;
+  {
+    const std::lock_guard lock(impl_->prepared_mutex);
+    chunks = impl_->prepared.extract({rows.first_episode, rows.first_row});
+  }
+  if (chunks.empty()) throw std::logic_error("a piece that nobody prepared");
+  impl_->shard_of(rows.first_episode).write(rows, chunks.mapped());
 }
 
 void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) {
@@ -56,7 +158,7 @@ void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpi
   shard.finish(first_episode, failures);
   if (!shard.complete()) return;
   shard.commit();
-  const std::int64_t number = first_episode / impl_->per_shard;
+  const std::int64_t number = impl_->layout.shard_of(first_episode);
   impl_->open.erase(number);
   impl_->complete.insert(number);
 }

@@ -11,26 +11,6 @@
 namespace tangere::h5 {
 namespace {
 
-/// While it lives, the library keeps its errors to itself.
-class Quiet {
- public:
-  Quiet() {
-    // A file that a full disk kept from being closed would otherwise be tried again, and complained
-    // about, while the program ends. Refused, harmlessly, when the library is already in use.
-    static const herr_t no_exit_handler = H5dont_atexit();
-    static_cast<void>(no_exit_handler);
-    H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  }
-  ~Quiet() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
-  Quiet(const Quiet&) = delete;
-  Quiet& operator=(const Quiet&) = delete;
-
- private:
-  H5E_auto2_t function_ = nullptr;
-  void* data_ = nullptr;
-};
-
 /// What the library's error stack says, innermost cause first; the operating system's words if any.
 std::string last_reason() {
   std::string text;
@@ -174,6 +154,17 @@ struct OpenAttribute {
 
 }  // namespace
 
+Quiet::Quiet() {
+  // A file that a full disk kept from being closed would otherwise be tried again, and complained
+  // about, while the program ends. Refused, harmlessly, when the library is already in use.
+  static const herr_t no_exit_handler = H5dont_atexit();
+  static_cast<void>(no_exit_handler);
+  H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+}
+
+Quiet::~Quiet() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
+
 void Id::reset() noexcept {
   if (id_ < 0) return;
   const Quiet quiet;
@@ -181,11 +172,11 @@ void Id::reset() noexcept {
   id_ = -1;
 }
 
-Id create_file(const std::string& path, hsize_t description_block) {
+Id create_file(const std::string& path, hsize_t description_block, bool views) {
   const Quiet quiet;
   const Id access(H5Pcreate(H5P_FILE_ACCESS));
   // 1.8 objects: attributes above 64 KiB (long scenes), and a plain open works after a crash.
-  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
+  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, views ? H5F_LIBVER_V110 : H5F_LIBVER_V18);
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
   H5Pset_meta_block_size(access.get(), description_block);
   H5Pset_file_locking(access.get(), false, true);  // io/part_file.hpp holds the lock
@@ -193,6 +184,18 @@ Id create_file(const std::string& path, hsize_t description_block) {
   Id file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()));
   if (file.get() < 0)
     throw IoError(fmt::format("cannot create '{}': {}", path, last_reason()));
+  return file;
+}
+
+Id create_memory_file() {
+  const Quiet quiet;
+  const Id access(H5Pcreate(H5P_FILE_ACCESS));
+  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
+  H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
+  constexpr std::size_t kGrowth = std::size_t{1} << 16;
+  H5Pset_fapl_core(access.get(), kGrowth, false);
+  Id file(H5Fcreate("memory", H5F_ACC_TRUNC, H5P_DEFAULT, access.get()));
+  if (file.get() < 0) throw IoError(fmt::format("cannot create a file in memory: {}", last_reason()));
   return file;
 }
 
@@ -318,6 +321,13 @@ void read_box(const Id& dataset, const Dims& offset, const Dims& count, T* data)
     fail("read", dataset);
 }
 
+void write_chunk(const Id& dataset, const Dims& offset, std::span<const unsigned char> bytes) {
+  const Quiet quiet;
+  constexpr std::uint32_t kEveryFilter = 0;  // a mask of those that were left out
+  if (H5Dwrite_chunk(dataset.get(), H5P_DEFAULT, kEveryFilter, offset.data(), bytes.size(), bytes.data()) < 0)
+    fail("write a chunk of", dataset);
+}
+
 void write_attribute(const Id& object, const std::string& name, std::string_view text) {
   const Quiet quiet;
   const std::string copy(text);
@@ -353,6 +363,13 @@ void write_list(const Id& object, const std::string& name, std::span<const T> va
   const Quiet quiet;
   store(object, name, Types<T>::disk(), Types<T>::memory(), list_space(values.size()),
         values.data());
+}
+
+void replace_list(const Id& object, const std::string& name, std::span<const double> values) {
+  const Quiet quiet;
+  const OpenAttribute open(object, name);
+  if (open.elements != values.size() || H5Awrite(open.attribute.get(), H5T_NATIVE_DOUBLE, values.data()) < 0)
+    fail("replace attribute", object, name);
 }
 
 std::vector<std::string> read_texts(const Id& object, const std::string& name) {

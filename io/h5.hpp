@@ -41,12 +41,28 @@ class Id {
   hid_t id_ = -1;
 };
 
+/// While it lives, the library keeps its errors to itself.
+class Quiet {
+ public:
+  Quiet();
+  ~Quiet();
+  Quiet(const Quiet&) = delete;
+  Quiet& operator=(const Quiet&) = delete;
+
+ private:
+  H5E_auto2_t function_ = nullptr;
+  void* data_ = nullptr;
+};
+
 using Dims = std::vector<hsize_t>;
 
 /// Creates a file, replacing what is at `path`. Readable by HDF5 1.8 and later; two runs that write
 /// the same numbers write the same bytes. Descriptions of objects are put together in blocks of
-/// `description_block` bytes: large ones suit files of many objects.
-Id create_file(const std::string& path, hsize_t description_block = 2048);
+/// `description_block` bytes: large ones suit files of many objects. With `views` HDF5 1.10 is needed to read it, as
+/// virtual datasets are.
+Id create_file(const std::string& path, hsize_t description_block = 2048, bool views = false);
+/// A file that is never on disk.
+Id create_memory_file();
 /// Opens a file for reading.
 Id open_file(const std::string& path);
 /// Flushes and closes a file; unlike Id::reset, it reports what could not be written.
@@ -83,6 +99,9 @@ void write_box(const Id& dataset, const Dims& offset, const Dims& count, const T
 template <class T>
 void read_box(const Id& dataset, const Dims& offset, const Dims& count, T* data);
 
+/// Writes a chunk that has been through the dataset's filters already, all of them. `offset`: of its first element.
+void write_chunk(const Id& dataset, const Dims& offset, std::span<const unsigned char> bytes);
+
 /// Text attributes are variable-length UTF-8, which h5py shows as str. Text must not contain NUL.
 void write_attribute(const Id& object, const std::string& name, std::string_view text);
 void write_attribute(const Id& object, const std::string& name, std::span<const std::string> texts);
@@ -91,6 +110,9 @@ template <class T>
 void write_scalar(const Id& object, const std::string& name, T value);
 template <class T>
 void write_list(const Id& object, const std::string& name, std::span<const T> values);
+
+/// New values for a list of numbers that is there, as many of them.
+void replace_list(const Id& object, const std::string& name, std::span<const double> values);
 
 [[nodiscard]] std::string read_text(const Id& object, const std::string& name);
 [[nodiscard]] std::vector<std::string> read_texts(const Id& object, const std::string& name);

@@ -48,6 +48,21 @@ const char* field_name(ContactField field) {
   throw std::logic_error("a contact field without a name");
 }
 
+/// Stiffnesses and gains have the units of their law, joint and kind of sensor; all are SI.
+const char* randomized_unit(const RandomizationDescription& d) {
+  switch (d.target) {
+    case RandomTarget::joint_q: return "m, rad or 1, as in q_units";
+    case RandomTarget::joint_v: return "m/s or rad/s, as in v_units";
+    case RandomTarget::density: return "kg/m^3";
+    case RandomTarget::ground_contact:
+    case RandomTarget::pair_contact:
+    case RandomTarget::tactile: return d.field == ContactField::mu ? "1" : "SI";
+    case RandomTarget::joint_effect:
+    case RandomTarget::motor: return "SI";
+  }
+  throw std::logic_error("a randomised number without a unit");
+}
+
 }  // namespace
 
 std::string randomized_name(const RandomizationDescription& d) {
@@ -132,6 +147,10 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.variable_names = variable_names(model);
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(sensor_layout(model.sensors()[i], scene.sensors[i], run.every));
+  for (const RandomizationDescription& description : scene.randomizations) {
+    layout.randomized_names.push_back(randomized_name(description));
+    layout.randomized_units.emplace_back(randomized_unit(description));
+  }
   layout.scene_name = scene.name;
   layout.scene_text = scene.text;
   layout.integrator = to_string(stepper.integrator());
@@ -142,6 +161,10 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.instruction_set = run.instruction_set;
   layout.task = run.task;
   layout.policy = run.policy;
+  layout.controls = run.controls;
+  layout.command = run.command;
+  layout.shards = run.shards;
+  layout.compression = run.compression;
   return layout;
 }
 

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <vector>
 
@@ -32,13 +33,18 @@ std::uint64_t row_hash(std::uint64_t key, const unsigned char* bytes, std::size_
   return mix(hash, word);
 }
 
+constexpr std::size_t kMostProblems = 100;  // of a shard: a thousand lines say no more
+
 class ShardChecker {
  public:
-  explicit ShardChecker(const std::string& path)
-      : path_(path), file_(h5::open_file(path)), scene_(h5::open_group(file_, "scene")) {}
+  ShardChecker(const std::string& path, bool finite)
+      : finite_(finite), file_(h5::open_file(path)), scene_(h5::open_group(file_, "scene")) {}
 
-  ShardContent check() {
-    if (h5::read_text(file_, "format") != "tangere dataset") fail("it is no tangere data set");
+  ShardReport check() {
+    if (h5::read_text(file_, "format") != "tangere dataset") {
+      fail("it is no tangere data set");
+      return {content_, problems_};
+    }
     content_.first_episode = number(file_, "first_episode");
     const std::int64_t end = content_.first_episode + number(file_, "episodes");
     names_ = h5::read_texts(scene_, "observations");
@@ -52,23 +58,32 @@ class ShardChecker {
       if (is_demo == h5::has_link(failed, fmt::format("episode_{}", episode)))
         fail(fmt::format("episode {} is not in exactly one of /data and /failed", episode));
       if (is_demo)
-        add_demo(h5::open_group(data, demo), episode);
+        try_demo(data, demo, episode);
       else
         ++content_.failed;
     }
     if (number(data, "total") != content_.rows)
       fail(fmt::format("/data says {} rows, its demos have {}", number(data, "total"),
                        content_.rows));
+    // Numbers that are known to be missing or wrong in count change the sum as well.
     const std::uint64_t expected = h5::read_numbers<std::uint64_t>(file_, "content_sum").at(0);
-    if (sum_.value() != expected)
+    if (problems_.empty() && sum_.value() != expected)
       fail(fmt::format("the checksum of its numbers is {:016x}, expected {:016x}", sum_.value(),
                        expected));
-    return content_;
+    problems_.insert(problems_.end(), not_finite_.begin(), not_finite_.end());
+    return {content_, problems_};
   }
 
  private:
-  [[noreturn]] void fail(const std::string& what) const {
-    throw IoError(fmt::format("'{}' is damaged: {}", path_, what));
+  void fail(const std::string& what) {
+    if (problems_.size() < kMostProblems) problems_.push_back(what);
+  }
+  void try_demo(const h5::Id& data, const std::string& demo, std::int64_t episode) {
+    try {
+      add_demo(h5::open_group(data, demo), episode);
+    } catch (const IoError& error) {
+      fail(fmt::format("{}: {}", demo, error.what()));
+    }
   }
   static std::int64_t number(const h5::Id& object, const std::string& name) {
     return h5::read_numbers<std::int64_t>(object, name).at(0);
@@ -77,7 +92,7 @@ class ShardChecker {
   void add_demo(const h5::Id& demo, std::int64_t episode) {
     const std::int64_t rows = number(demo, "num_samples");
     if (of_task_ ? rows < 1 || rows > rows_ : rows != rows_)
-      fail(fmt::format("demo_{} has {} rows, expected {}{}", episode, rows, of_task_ ? "1 to " : "", rows_));
+      return fail(fmt::format("demo_{} has {} rows, expected {}{}", episode, rows, of_task_ ? "1 to " : "", rows_));
     // Known without a checksum: without a task nothing is rewarded, and only the last row ends the episode.
     if (of_task_) {
       add<float>(demo, "rewards", episode, names_.size() + 1, 0, rows);
@@ -102,19 +117,29 @@ class ShardChecker {
 
   /// A list of zeros whose last number is `last`.
   template <class T>
-  void check_list(const h5::Id& demo, const std::string& name, std::int64_t episode, std::int64_t rows, T last) const {
+  void check_list(const h5::Id& demo, const std::string& name, std::int64_t episode, std::int64_t rows, T last) {
     const h5::Id dataset = h5::open_dataset(demo, name);
-    check_rows(dataset, fmt::format("demo_{}: {}", episode, name), rows);
+    if (!has_rows(dataset, fmt::format("demo_{}: {}", episode, name), rows)) return;
     std::vector<T> list(static_cast<std::size_t>(rows)), expected(list.size(), T{0});
     expected.back() = last;
     h5::read_box(dataset, {0}, {list.size()}, list.data());
     if (list != expected) fail(fmt::format("demo_{}: {} are not what was written", episode, name));
   }
 
-  void check_rows(const h5::Id& dataset, const std::string& name, std::int64_t rows) const {
+  bool has_rows(const h5::Id& dataset, const std::string& name, std::int64_t rows) {
     const h5::Dims dims = h5::dimensions(dataset);
-    if (dims.empty() || dims[0] != static_cast<hsize_t>(rows))
-      fail(fmt::format("{} has not {} rows", name, rows));
+    const bool right = !dims.empty() && dims[0] == static_cast<hsize_t>(rows);
+    if (!right) fail(fmt::format("{} has not {} rows", name, rows));
+    return right;
+  }
+
+  template <class T>
+  void check_finite(const std::vector<T>& numbers, const std::string& name, std::int64_t first, std::size_t width) {
+    const auto bad = std::find_if(numbers.begin(), numbers.end(), [](T x) { return !std::isfinite(x); });
+    if (!finite_ || bad == numbers.end() || not_finite_.size() >= kMostProblems) return;
+    const auto at = static_cast<std::size_t>(bad - numbers.begin());
+    not_finite_.push_back(fmt::format("{}: row {} has a number that is {}, expected finite ones", name,
+                                      first + static_cast<std::int64_t>(at / width), *bad));
   }
 
   /// Adds a dataset whose row 0 is row `first` of the episode.
@@ -122,7 +147,8 @@ class ShardChecker {
   void add(const h5::Id& group, const std::string& name, std::int64_t episode, std::size_t index,
            std::int64_t first, std::int64_t rows) {
     const h5::Id dataset = h5::open_dataset(group, name);
-    check_rows(dataset, fmt::format("demo_{}: {}", episode, name), rows);
+    const std::string full = fmt::format("demo_{}: {}", episode, name);
+    if (!has_rows(dataset, full, rows)) return;
     h5::Dims count = h5::dimensions(dataset), offset(count.size(), 0);
     std::size_t width = 1;
     for (std::size_t i = 1; i < count.size(); ++i) width *= count[i];
@@ -135,12 +161,14 @@ class ShardChecker {
       offset[0] = static_cast<hsize_t>(row);
       buffer.resize(count[0] * width);
       h5::read_box(dataset, offset, count, buffer.data());
+      check_finite(buffer, full, first + row, width);
       sum_.add(episode, index, first + row, static_cast<std::int64_t>(count[0]), width * sizeof(T),
                buffer.data());
     }
   }
 
-  std::string path_;
+  bool finite_;
+  std::vector<std::string> problems_, not_finite_;
   h5::Id file_, scene_;
   std::vector<std::string> names_;
   bool single_ = false, of_task_ = false;
@@ -161,6 +189,18 @@ void ContentSum::add(std::int64_t episode, std::size_t name, std::int64_t first_
     sum_ += row_hash(mix(dataset, static_cast<std::uint64_t>(first_row + row)), bytes, row_bytes);
 }
 
-ShardContent check_shard(const std::string& path) { return ShardChecker(path).check(); }
+ShardReport examine_shard(const std::string& path) {
+  try {
+    return ShardChecker(path, true).check();
+  } catch (const IoError& error) {
+    return {{}, {error.what()}};
+  }
+}
+
+ShardContent check_shard(const std::string& path) {
+  const ShardReport report = ShardChecker(path, false).check();
+  if (!report.problems.empty()) throw IoError(fmt::format("'{}' is damaged: {}", path, report.problems.front()));
+  return report.content;
+}
 
 }  // namespace tangere

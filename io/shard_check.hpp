@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace tangere {
 
@@ -27,6 +28,15 @@ struct ShardContent {
   std::int64_t demos = 0, failed = 0;  ///< episodes below /data and below /failed
   std::int64_t rows = 0;               ///< of all demos
 };
+
+struct ShardReport {
+  ShardContent content;
+  std::vector<std::string> problems;  ///< each with the dataset it is about; a hundred at most
+};
+
+/// Reads a shard whole and tells all that is wrong with it, numbers that are not finite among it. Throws nothing for a
+/// file that cannot be read: that is a problem like others.
+ShardReport examine_shard(const std::string& path);
 
 /// Reads a shard whole. Throws IoError naming the file and what is missing or differs.
 ShardContent check_shard(const std::string& path);

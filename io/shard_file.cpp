@@ -7,26 +7,13 @@
 #include <algorithm>
 #include <cstring>
 
-#include "io/sensor_description.hpp"
+#include "io/dataset_description.hpp"
+
 namespace tangere {
 namespace {
 
 constexpr std::int64_t kBlockEpisodes = 16;
 constexpr hsize_t kDescriptionBlock = hsize_t{1} << 20;
-
-/// The text as a JSON string, quotes included. Bytes from 0x80 on are UTF-8 already.
-std::string json_text(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\')
-      out += {'\\', c};
-    else if (static_cast<unsigned char>(c) < 0x20)
-      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
-    else
-      out += c;
-  }
-  return out + '"';
-}
 
 h5::Dims with_rows(std::int64_t rows, const std::vector<std::uint64_t>& shape) {
   h5::Dims dims{static_cast<hsize_t>(rows)};
@@ -40,10 +27,15 @@ std::size_t numbers_of(const h5::Dims& dims) {
   return numbers;
 }
 
-h5::Id create(const h5::Id& group, const std::string& name, const h5::Dims& dims, bool single) {
-  const h5::Storage reserved{{}, false, true};
-  return single ? h5::create_dataset<float>(group, name, dims, reserved)
-                : h5::create_dataset<double>(group, name, dims, reserved);
+/// `chunk`: rows of a chunk, 0: contiguous.
+h5::Id create(const h5::Id& group, const std::string& name, const h5::Dims& dims, bool single, std::int64_t chunk = 0) {
+  h5::Storage storage{{}, false, true};
+  if (chunk > 0) {
+    storage = {dims, true, false};
+    storage.chunk[0] = std::min(dims[0], static_cast<hsize_t>(chunk));
+  }
+  return single ? h5::create_dataset<float>(group, name, dims, storage)
+                : h5::create_dataset<double>(group, name, dims, storage);
 }
 
 /// Rows [first, first + dims[0]) of a dataset; none when dims hold no numbers.
@@ -58,15 +50,16 @@ void put(const h5::Id& dataset, std::int64_t first, const h5::Dims& dims, const 
 }  // namespace
 
 ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout,
-                     std::int64_t first_episode, std::int64_t episodes)
+                     EpisodeRange range, bool overwrite)
     : layout_(layout),
-      first_episode_(first_episode),
-      end_(first_episode + episodes),
-      created_(first_episode),
-      unfinished_((episodes + kBlockEpisodes - 1) / kBlockEpisodes),
+      first_episode_(range.first),
+      end_(range.end),
+      created_(range.first),
+      unfinished_((range.end - range.first + kBlockEpisodes - 1) / kBlockEpisodes),
       names_(layout.observation_names()),
       shapes_(layout.observation_shapes()),
-      part_(path, false),
+      rows_of_chunks_(chunk_rows(layout)),
+      part_(path, overwrite),
       file_(h5::create_file(part_.path(), kDescriptionBlock)) {
   try {
     describe();
@@ -82,73 +75,14 @@ ShardFile::~ShardFile() {
 }
 
 void ShardFile::describe() {
-  h5::write_attribute(file_, "format", "tangere dataset");
-  h5::write_scalar<std::int64_t>(file_, "format_version", 1);
+  describe_dataset(file_, layout_);
   h5::write_scalar<std::int64_t>(file_, "first_episode", first_episode_);
   h5::write_scalar<std::int64_t>(file_, "episodes", end_ - first_episode_);
-  h5::write_scalar<std::int64_t>(file_, "dataset_episodes", layout_.episodes);
   data_ = h5::create_group(file_, "data");
   h5::write_attribute(data_, "env_args",
                       fmt::format(R"({{"env_name": {}, "type": 2, "env_kwargs": {{}}}})",
                                   json_text(layout_.scene_name)));
   static_cast<void>(h5::create_group(file_, "failed"));
-  const h5::Id scene = h5::create_group(file_, "scene");
-  const auto texts = [&](const char* name, const std::vector<std::string>& list) {
-    h5::write_attribute(scene, name, std::span<const std::string>(list));
-  };
-  h5::write_attribute(scene, "name", layout_.scene_name);
-  h5::write_attribute(scene, "text", layout_.scene_text);
-  h5::write_scalar<std::uint64_t>(scene, "seed", layout_.seed);
-  h5::write_scalar<std::int64_t>(scene, "steps", layout_.steps);
-  h5::write_scalar<std::int64_t>(scene, "every", layout_.every);
-  h5::write_scalar<double>(scene, "timestep", layout_.timestep);
-  h5::write_attribute(scene, "timestep_unit", "s");
-  h5::write_attribute(scene, "integrator", layout_.integrator);
-  h5::write_scalar<double>(scene, "tolerance", layout_.tolerance);
-  h5::write_attribute(scene, "precision", layout_.precision);
-  h5::write_attribute(scene, "tangere_version", layout_.version);
-  h5::write_attribute(scene, "instruction_set", layout_.instruction_set);
-  h5::write_attribute(scene, "quaternion_order", "w x y z");
-  h5::write_attribute(scene, "observation_type", layout_.single ? "float32" : "float64");
-  texts("observations", names_);
-  texts("q_names", layout_.q_names);
-  texts("q_units", layout_.q_units);
-  texts("v_names", layout_.v_names);
-  texts("v_units", layout_.v_units);
-  texts("action_names", layout_.action_names());
-  describe_task(scene);
-  if (!layout_.task && !layout_.variable_names.empty()) {
-    texts("variable_names", layout_.variable_names);
-    h5::write_attribute(scene, "variable_units", "m");
-    h5::write_attribute(scene, "variable_frame", "world");
-  }
-  const h5::Id sensors = h5::create_group(scene, "sensors");
-  for (const SensorLayout& sensor : layout_.sensors) {
-    const h5::Id group = h5::create_group(sensors, sensor.name);
-    describe_sensor(group, group, sensor);
-  }
-}
-
-void ShardFile::describe_task(const h5::Id& scene) const {
-  if (!layout_.task) {
-    h5::write_attribute(scene, "task", "none: a scene alone, whose every reward is 0");
-    return;
-  }
-  const TaskSpec& task = *layout_.task;
-  h5::write_attribute(scene, "task", task.name);
-  h5::write_attribute(scene, "policy", layout_.policy);
-  h5::write_attribute(scene, "success", task.success);
-  h5::write_attribute(scene, "action_unit", task.action.unit);
-  h5::write_attribute(scene, "action_meaning", task.action.meaning);
-  h5::write_scalar<double>(scene, "action_low", task.action.low);
-  h5::write_scalar<double>(scene, "action_high", task.action.high);
-  std::vector<std::string> units{"q_units", "v_units"}, meanings{"coordinates", "velocities"};
-  for (const TensorSpec& tensor : task.observations) {
-    units.push_back(tensor.unit);
-    meanings.push_back(tensor.meaning);
-  }
-  h5::write_attribute(scene, "observation_units", std::span<const std::string>(units));
-  h5::write_attribute(scene, "observation_meanings", std::span<const std::string>(meanings));
 }
 
 void ShardFile::create_block(std::int64_t first_episode, std::span<const EpisodeEnd> ends) {
@@ -162,13 +96,16 @@ void ShardFile::create_block(std::int64_t first_episode, std::span<const Episode
 ShardFile::Demo ShardFile::create_demo(std::int64_t episode, const EpisodeEnd* end) {
   // An episode that failed in its first action has no row; it will be removed.
   const std::int64_t rows = end != nullptr ? std::max<std::int64_t>(1, end->length) : layout_.rows();
-  const h5::Id group = h5::create_group(data_, fmt::format("demo_{}", episode));
+  h5::Id group = h5::create_group(data_, fmt::format("demo_{}", episode));
   h5::write_scalar<std::int64_t>(group, "num_samples", rows);
   if (end != nullptr) {
     h5::write_scalar<double>(group, "return", end->total);
     h5::write_scalar<std::int8_t>(group, "terminated", end->terminated ? 1 : 0);
     h5::write_scalar<std::int8_t>(group, "success", end->success ? 1 : 0);
   }
+  // Its room, to be filled when the block comes: blocks before it must not show in the file.
+  if (!layout_.randomized_names.empty())
+    h5::write_list<double>(group, "randomized", std::vector<double>(layout_.randomized_names.size(), 0));
   Demo demo;
   demo.length = rows;
   demo.actions = create(group, "actions", with_rows(rows, {layout_.action_names().size()}), true);
@@ -181,13 +118,28 @@ ShardFile::Demo ShardFile::create_demo(std::int64_t episode, const EpisodeEnd* e
   h5::create_flags(group, "dones", dones);
   const h5::Id obs = h5::create_group(group, "obs"), last = h5::create_group(group, "final_obs");
   for (std::size_t k = 0; k < names_.size(); ++k) {
-    demo.obs.push_back(create(obs, names_[k], with_rows(rows, shapes_[k]), layout_.single));
-    demo.final_obs.push_back(create(last, names_[k], with_rows(1, shapes_[k]), layout_.single));
+    demo.obs.push_back(create(obs, names_[k], with_rows(rows, shapes_[k]), layout_.single, rows_of_chunks_[k]));
+    demo.final_obs.push_back(
+        create(last, names_[k], with_rows(1, shapes_[k]), layout_.single, compresses_last(k) ? 1 : 0));
   }
+  demo.group = std::move(group);
   return demo;
 }
 
-void ShardFile::write(const EpisodeRows& rows) {
+void ShardFile::write_randomized(Demo& demo, const EpisodeRows& rows, int episode) const {
+  const std::size_t count = layout_.randomized_names.size();
+  if (count == 0 || rows.first_row != 0) return;
+  const auto values = rows.randomized.subspan(static_cast<std::size_t>(episode) * count, count);
+  demo.randomized.assign(values.begin(), values.end());
+  h5::replace_list(demo.group, "randomized", values);
+}
+
+bool ShardFile::compresses_last(std::size_t name) const {
+  const std::size_t bytes = numbers_of(with_rows(1, shapes_[name])) * (layout_.single ? sizeof(float) : sizeof(double));
+  return rows_of_chunks_[name] > 0 && compresses_last_row(bytes);
+}
+
+void ShardFile::write(const EpisodeRows& rows, std::span<const CompressedChunk> chunks) {
   for (; created_ <= rows.first_episode; created_ += kBlockEpisodes) create_block(created_, rows.ends);
   Block& block = blocks_.at(rows.first_episode);
   const std::size_t nu = layout_.action_names().size();
@@ -197,8 +149,15 @@ void ShardFile::write(const EpisodeRows& rows) {
     const float* from = rows.actions.data() + static_cast<std::size_t>(e) * static_cast<std::size_t>(rows.action_rows) * nu;
     put(demo.actions, rows.first_row, h5::Dims{static_cast<hsize_t>(taken), nu}, from);
     demo.sum.add(rows.first_episode + e, 0, rows.first_row, taken, nu * sizeof(float), from);
+    write_randomized(demo, rows, e);
     if (!rows.ends.empty()) write_rewards(demo, rows, e);
     for (std::size_t name = 0; name < names_.size(); ++name) write_observation(demo, rows, e, name);
+  }
+  for (const CompressedChunk& chunk : chunks) {
+    const Demo& demo = block[static_cast<std::size_t>(chunk.episode)];
+    h5::Dims offset(shapes_[chunk.name].size() + 1, 0);
+    offset[0] = static_cast<hsize_t>(chunk.row);
+    h5::write_chunk(chunk.last ? demo.final_obs[chunk.name] : demo.obs[chunk.name], offset, chunk.bytes);
   }
 }
 
@@ -217,8 +176,8 @@ void ShardFile::write_observation(Demo& demo, const EpisodeRows& rows, int episo
         const auto* from = values.data() + static_cast<std::size_t>(episode) * all * width;
         const std::int64_t taken = std::min<std::int64_t>(rows.action_rows, demo.length - rows.first_row);
         const bool last = rows.rows > taken;
-        put(demo.obs[name], rows.first_row, with_rows(taken, shapes_[name]), from);
-        if (last)
+        if (rows_of_chunks_[name] == 0) put(demo.obs[name], rows.first_row, with_rows(taken, shapes_[name]), from);
+        if (last && !compresses_last(name))
           put(demo.final_obs[name], 0, with_rows(1, shapes_[name]), from + static_cast<std::size_t>(taken) * width);
         demo.sum.add(rows.first_episode + episode, name + 1, rows.first_row, taken + (last ? 1 : 0),
                      width * sizeof *from, from);
@@ -234,6 +193,7 @@ void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode
     demo.sum = {};
     demo.length = 0;
     failures_.push_back(failure);
+    randomized_of_failures_[failure.episode] = std::move(demo.randomized);
   }
   for (const Demo& demo : block->second) {
     sum_.add(demo.sum);
@@ -255,6 +215,8 @@ void ShardFile::record_failures() {
     h5::write_attribute(group, "reason", to_string(failure.status));
     h5::write_list<double>(group, "q", failure.q);
     h5::write_list<double>(group, "v", failure.v);
+    const std::vector<double>& randomized = randomized_of_failures_[failure.episode];
+    if (!randomized.empty()) h5::write_list<double>(group, "randomized", randomized);
   }
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/episode_sink.hpp"
+#include "io/chunk_codec.hpp"
 #include "io/dataset_layout.hpp"
 #include "io/h5.hpp"
 #include "io/part_file.hpp"
@@ -18,14 +19,14 @@ namespace tangere {
 
 class ShardFile {
  public:
-  /// Creates `<path>.part`. Throws IoError. `layout` must outlive it.
-  ShardFile(const std::string& path, const DatasetLayout& layout, std::int64_t first_episode,
-            std::int64_t episodes);
+  /// Creates `<path>.part`. Throws IoError, also when `path` exists and `overwrite` is false. `layout` must outlive it.
+  ShardFile(const std::string& path, const DatasetLayout& layout, EpisodeRange range, bool overwrite);
   ~ShardFile();
   ShardFile(const ShardFile&) = delete;
   ShardFile& operator=(const ShardFile&) = delete;
 
-  void write(const EpisodeRows& rows);
+  /// `chunks`: of the same piece, where the layout compresses.
+  void write(const EpisodeRows& rows, std::span<const CompressedChunk> chunks);
   void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures);
   /// Whether every block has finished.
   [[nodiscard]] bool complete() const { return unfinished_ == 0; }
@@ -35,20 +36,23 @@ class ShardFile {
  private:
   /// The open datasets of one episode.
   struct Demo {
+    h5::Id group;
     h5::Id actions;
     h5::Id rewards;
     std::vector<h5::Id> obs, final_obs;  // per observation
     std::int64_t length = 0;             // actions
+    std::vector<double> randomized;
     ContentSum sum;
   };
   using Block = std::vector<Demo>;
 
   void describe();
-  void describe_task(const h5::Id& scene) const;
   void create_block(std::int64_t first_episode, std::span<const EpisodeEnd> ends);
   Demo create_demo(std::int64_t episode, const EpisodeEnd* end);
+  void write_randomized(Demo& demo, const EpisodeRows& rows, int episode) const;
   void write_rewards(Demo& demo, const EpisodeRows& rows, int episode);
   void write_observation(Demo& demo, const EpisodeRows& rows, int episode, std::size_t name);
+  [[nodiscard]] bool compresses_last(std::size_t name) const;
   void record_failures();
 
   const DatasetLayout& layout_;
@@ -56,10 +60,12 @@ class ShardFile {
   std::int64_t unfinished_;                     // blocks
   std::vector<std::string> names_;
   std::vector<std::vector<std::uint64_t>> shapes_;
+  std::vector<std::int64_t> rows_of_chunks_;
   PartFile part_;
   h5::Id file_, data_;
   std::map<std::int64_t, Block> blocks_;  // unfinished ones, by their first episode
   std::vector<FailedEpisode> failures_;
+  std::map<std::int64_t, std::vector<double>> randomized_of_failures_;  // by episode
   std::int64_t rows_ = 0;  // of demos, failed ones left out
   ContentSum sum_;
 };

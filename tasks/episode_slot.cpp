@@ -28,6 +28,15 @@ double row_bytes(const EpisodeShape& shape, const EpisodeOptions& options) {
   return bytes;
 }
 
+/// Multiples of 64, below that powers of two: whoever stores rows in chunks of such sizes gets whole ones.
+int whole_rows(int most) {
+  constexpr int kRows = 64;
+  if (most >= kRows) return most / kRows * kRows;
+  int rows = 1;
+  while (2 * rows <= most) rows *= 2;
+  return rows;
+}
+
 }  // namespace
 
 EpisodeShape::EpisodeShape(const Model& model, const EpisodeOptions& options)
@@ -42,6 +51,7 @@ EpisodeShape::EpisodeShape(const Model& model, const EpisodeOptions& options)
   constexpr std::int64_t kMostRows = 1 << 20;  // rows without numbers still are counted by an int
   piece_rows = static_cast<int>(
       std::clamp(fitting, 1.0, static_cast<double>(std::min(rows + 1, kMostRows))));
+  if (piece_rows <= rows) piece_rows = whole_rows(piece_rows);
 }
 
 double EpisodeShape::piece_bytes(const EpisodeOptions& options) const {
@@ -77,6 +87,10 @@ void EpisodeSlot::begin(std::int64_t block) {
       static_cast<int>(std::min<std::int64_t>(kBlockEpisodes, options_.episodes - first));
   batch_.emplace(model_, episodes, options_.seed, first);
   next_row_ = 0;
+  randomized_.clear();
+  for (int e = 0; e < episodes; ++e)
+    for (int k = 0; k < static_cast<int>(model_.scene().randomizations.size()); ++k)
+      randomized_.push_back(batch_->randomized_value(e, k));
   failures_.clear();
   live_.assign(size(episodes), true);
 }
@@ -187,10 +201,12 @@ void EpisodeSlot::encode() {
 
 EpisodeRows EpisodeSlot::piece() const {
   const std::size_t actions = size(batch_->environments()) * size(action_rows_) * shape_.nu;
-  return {batch_->episode(0), batch_->environments(),
-          first_row_,         rows_,
-          action_rows_,       std::span(actions_).first(actions),
-          observations_};
+  EpisodeRows piece{batch_->episode(0), batch_->environments(),
+                    first_row_,         rows_,
+                    action_rows_,       std::span(actions_).first(actions),
+                    observations_};
+  piece.randomized = randomized_;
+  return piece;
 }
 
 }  // namespace tangere

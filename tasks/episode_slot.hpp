@@ -68,6 +68,7 @@ class EpisodeSlot {
   std::optional<Batch> batch_;
   std::int64_t first_row_ = 0, next_row_ = 0;
   int rows_ = 0, action_rows_ = 0;           // of the piece
+  std::vector<double> randomized_;           // (episodes, what varies)
   std::vector<double> u_;                    // (episodes, nu)
   std::vector<std::vector<double>> values_;  // per name: (episodes, rows, width); fields only where float64 is stored
   std::vector<std::vector<float>> singles_;  // the same, where float32 is stored

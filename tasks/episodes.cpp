@@ -17,6 +17,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "tasks/busy_time.hpp"
 #include "tasks/episode_slot.hpp"
 #include "tasks/task_order.hpp"
 
@@ -101,6 +102,8 @@ class EpisodeGraph {
                const StopRequest& stop)
       : options_(options),
         shape_(model, options),
+        ranges_(checked_ranges(options.ranges, options.episodes)),
+        next_episode_(ranges_.front().first),
         sink_(sink),
         progress_(progress),
         stop_(stop),
@@ -126,7 +129,9 @@ class EpisodeGraph {
     flow::function_node<Traveller, Traveller> encoder(graph_, flow::unlimited, [this](Traveller t) {
       TaskOrder::arrive();
       const TaskOrder::Task task(order_, t.slot);
+      const Stopwatch watch(encoding_);
       t.slot->encode();
+      sink_.prepare(t.slot->piece());
       return t;
     });
     flow::multifunction_node<Traveller, Exits> writer(
@@ -148,6 +153,9 @@ class EpisodeGraph {
     wait_for_all(blocks);
     summary_.peak_blocks_in_flight = slots_.peak();
     summary_.stopped = stopped_;
+    summary_.simulation_seconds = simulation_.seconds();
+    summary_.encoding_seconds = encoding_.seconds();
+    summary_.writing_seconds = writing_.seconds();
     std::sort(summary_.failures.begin(), summary_.failures.end(),
               [](const FailedEpisode& a, const FailedEpisode& b) { return a.episode < b.episode; });
     return std::move(summary_);
@@ -167,12 +175,15 @@ class EpisodeGraph {
   }
 
   Traveller next_block(tbb::flow_control& flow) {
-    const TaskOrder::Task task(order_, &next_block_);
-    if (next_block_ * kBlockEpisodes >= options_.episodes) {
+    const TaskOrder::Task task(order_, &next_episode_);
+    if (next_episode_ >= ranges_[range_].end && ++range_ < ranges_.size()) next_episode_ = ranges_[range_].first;
+    if (range_ == ranges_.size()) {
       flow.stop();
       return {};
     }
-    return {next_block_++, nullptr};
+    const std::int64_t block = next_episode_ / kBlockEpisodes;
+    next_episode_ += kBlockEpisodes;
+    return {block, nullptr};
   }
 
   Traveller simulate(Traveller t) {
@@ -185,6 +196,7 @@ class EpisodeGraph {
       if (stop_ && stop_()) stopped_ = true;
       return stopped_ || tbb::is_current_task_group_canceling();  // a throw elsewhere
     };
+    const Stopwatch watch(simulation_);
     if (!t.slot->simulate(ends)) graph_.cancel();
     return t;
   }
@@ -192,6 +204,7 @@ class EpisodeGraph {
   /// True when that was the block's last piece.
   bool write(const Traveller& t) {
     const TaskOrder::Task writer(order_, &summary_), task(order_, t.slot);
+    const Stopwatch watch(writing_);
     const EpisodeRows piece = t.slot->piece();
     sink_.write(piece);
     const PieceCounts& counts = t.slot->counts();
@@ -213,6 +226,9 @@ class EpisodeGraph {
 
   const EpisodeOptions& options_;
   EpisodeShape shape_;
+  std::vector<EpisodeRange> ranges_;
+  std::size_t range_ = 0;
+  std::int64_t next_episode_;
   TaskOrder order_;
   EpisodeSink& sink_;
   const EpisodeProgress& progress_;
@@ -220,8 +236,8 @@ class EpisodeGraph {
   SlotPool slots_;
   std::function<std::unique_ptr<EpisodeSlot>()> make_slot_;
   flow::graph graph_;
-  std::int64_t next_block_ = 0;
   std::atomic<bool> stopped_{false};
+  BusyTime simulation_, encoding_, writing_;
   EpisodeSummary summary_;
 };
 
@@ -243,6 +259,16 @@ EpisodeSummary run_episodes(const Model& model, const StepperOptions& solver,
   });
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
+}
+
+std::vector<EpisodeRange> checked_ranges(const std::vector<EpisodeRange>& ranges, std::int64_t episodes) {
+  if (ranges.empty()) return {{0, episodes}};
+  for (const EpisodeRange& range : ranges)
+    if (range.first < 0 || range.first % kBlockEpisodes != 0 || range.end <= range.first || range.end > episodes ||
+        (range.end % kBlockEpisodes != 0 && range.end != episodes))
+      throw InputError(fmt::format("episodes {} to {} of {}; expected whole blocks of {}", range.first, range.end,
+                                   episodes, kBlockEpisodes));
+  return ranges;
 }
 
 std::int64_t action_rows(const EpisodeOptions& options) {

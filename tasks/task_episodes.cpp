@@ -3,11 +3,16 @@
 #include "tasks/task_episodes.hpp"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <chrono>
 #include <ctime>
+#include <map>
 #include <memory>
+
+#include "tasks/busy_time.hpp"
 
 namespace tangere {
 namespace {
@@ -56,10 +61,11 @@ class Rows {
 
   /// Of the block that begins with environment `first`.
   [[nodiscard]] EpisodeRows block(const VectorTask& vector, int first, int episodes, std::span<const EpisodeEnd> ends) {
-    observations_.clear();
+    std::vector<Observation>& observations = observations_[first];
+    observations.clear();
     for (std::size_t name = 0; name < widths_.size(); ++name) {
       const std::size_t numbers = (rows_ + 1) * widths_[name];
-      observations_.emplace_back(std::span<const T>(values_[name]).subspan(size(first) * numbers, size(episodes) * numbers));
+      observations.emplace_back(std::span<const T>(values_[name]).subspan(size(first) * numbers, size(episodes) * numbers));
     }
     EpisodeRows piece;
     piece.first_episode = vector.episodes()[size(first)];
@@ -69,7 +75,7 @@ class Rows {
     piece.actions = std::span<const float>(actions_).subspan(size(first) * rows_ * actions_width_,
                                                              size(episodes) * rows_ * actions_width_);
     piece.rewards = std::span<const float>(rewards_).subspan(size(first) * rows_, size(episodes) * rows_);
-    piece.observations = observations_;
+    piece.observations = observations;
     piece.ends = ends;
     return piece;
   }
@@ -85,22 +91,32 @@ class Rows {
   std::size_t actions_width_, rows_;
   std::vector<std::vector<T>> values_;  // per name (episodes, rows + 1, width)
   std::vector<float> actions_, rewards_;
-  std::vector<Observation> observations_;
+  std::map<int, std::vector<Observation>> observations_;  // of a block, by its first environment
+};
+
+/// A block whose episodes have ended.
+struct EndedBlock {
+  std::vector<EpisodeEnd> ends;
+  std::vector<FailedEpisode> failures;
+  std::vector<double> randomized;
+  EpisodeRows piece;
 };
 
 class EpisodeRun {
  public:
   EpisodeRun(const Task& task, const Policy& policy, const TaskEpisodeOptions& options, EpisodeSink& sink,
              const EpisodeProgress& progress, const StopRequest& stop)
-      : task_(task), policy_(policy), options_(options), sink_(sink), progress_(progress), stop_(stop) {}
+      : task_(task), policy_(policy), options_(options), sink_(sink), progress_(progress), stop_(stop), arena_(options.threads) {}
 
   template <class T>
   TaskEpisodeSummary run() {
     const std::int64_t wave = std::int64_t{kBlockEpisodes} * options_.threads;
     std::optional<Rows<T>> rows;
-    for (std::int64_t first = 0; first < options_.episodes && !summary_.run.stopped; first += wave) {
-      const int episodes = static_cast<int>(std::min(wave, options_.episodes - first));
-      if (!rows) rows.emplace(task_, episodes);
+    for (const EpisodeRange& w : waves()) {
+      if (summary_.run.stopped) break;
+      const std::int64_t first = w.first;
+      const int episodes = static_cast<int>(w.end - w.first);
+      if (!rows) rows.emplace(task_, static_cast<int>(std::min(wave, options_.episodes)));
       VectorOptions of_wave;
       of_wave.seed = options_.seed;
       of_wave.first_episode = first;
@@ -108,14 +124,33 @@ class EpisodeRun {
       of_wave.precision = options_.precision;
       of_wave.autoreset = false;
       VectorTask vector(task_, episodes, of_wave);
-      if (play(vector, *rows)) store(vector, *rows);
+      bool ended = false;
+      {
+        const Stopwatch watch(playing_);
+        ended = play(vector, *rows);
+      }
+      if (ended) store(vector, *rows);
     }
+    // Of all threads, as where blocks travel on their own; here each of the three waits for the one before.
+    summary_.run.simulation_seconds = playing_.seconds() * options_.threads;
+    summary_.run.encoding_seconds = preparing_.seconds() * options_.threads;
+    summary_.run.writing_seconds = writing_.seconds();
     const std::int64_t played = summary_.run.episodes - static_cast<std::int64_t>(summary_.run.failures.size());
     summary_.mean_return = played > 0 ? total_ / static_cast<double>(played) : 0;
     return std::move(summary_);
   }
 
  private:
+  /// Ranges cut into what is played side by side.
+  [[nodiscard]] std::vector<EpisodeRange> waves() const {
+    const std::int64_t wave = std::int64_t{kBlockEpisodes} * options_.threads;
+    std::vector<EpisodeRange> waves;
+    for (const EpisodeRange& range : checked_ranges(options_.ranges, options_.episodes))
+      for (std::int64_t first = range.first; first < range.end; first += wave)
+        waves.push_back({first, std::min(first + wave, range.end)});
+    return waves;
+  }
+
   template <class T>
   bool play(VectorTask& vector, Rows<T>& rows) {
     const int episodes = vector.environments();
@@ -150,26 +185,42 @@ class EpisodeRun {
     summary_.simulation_steps += counts.simulation_steps;
     const int blocks = (vector.environments() + kBlockEpisodes - 1) / kBlockEpisodes;
     summary_.run.peak_blocks_in_flight = std::max(summary_.run.peak_blocks_in_flight, blocks);
-    for (int first = 0; first < vector.environments(); first += kBlockEpisodes) {
-      const int episodes = std::min(kBlockEpisodes, vector.environments() - first);
-      std::vector<EpisodeEnd> ends;
-      std::vector<FailedEpisode> failures;
-      for (int e = first; e < first + episodes; ++e) {
-        ends.push_back({vector.lengths()[size(e)], vector.returns()[size(e)], vector.terminated()[size(e)] != 0,
-                        vector.success()[size(e)] != 0});
-        if (failed(vector.status(e))) {
-          failures.push_back(failure(vector, e));
-          continue;
-        }
-        summary_.run.rows += ends.back().length;
-        summary_.successes += ends.back().success ? 1 : 0;
-        total_ += ends.back().total;
+    std::vector<EndedBlock> ended(size(blocks));
+    for (int b = 0; b < blocks; ++b) {
+      const int first = b * kBlockEpisodes, episodes = std::min(kBlockEpisodes, vector.environments() - first);
+      collect(vector, first, episodes, ended[size(b)]);
+      ended[size(b)].piece = rows.block(vector, first, episodes, ended[size(b)].ends);
+      ended[size(b)].piece.randomized = ended[size(b)].randomized;
+    }
+    {
+      const Stopwatch watch(preparing_);
+      arena_.execute([&] {
+        tbb::parallel_for(0, blocks, [&](int b) { sink_.prepare(ended[size(b)].piece); });
+      });
+    }
+    const Stopwatch watch(writing_);
+    for (const EndedBlock& block : ended) {
+      sink_.write(block.piece);
+      sink_.finish(block.piece.first_episode, block.failures);
+      summary_.run.episodes += block.piece.episodes;
+      summary_.run.failures.insert(summary_.run.failures.end(), block.failures.begin(), block.failures.end());
+    }
+  }
+
+  /// How the episodes of a block ended.
+  void collect(const VectorTask& vector, int first, int episodes, EndedBlock& block) {
+    const auto varied = static_cast<int>(task_.model().scene().randomizations.size());
+    for (int e = first; e < first + episodes; ++e) {
+      for (int k = 0; k < varied; ++k) block.randomized.push_back(vector.batch().randomized_value(e, k));
+      block.ends.push_back({vector.lengths()[size(e)], vector.returns()[size(e)], vector.terminated()[size(e)] != 0,
+                            vector.success()[size(e)] != 0});
+      if (failed(vector.status(e))) {
+        block.failures.push_back(failure(vector, e));
+        continue;
       }
-      const EpisodeRows piece = rows.block(vector, first, episodes, ends);
-      sink_.write(piece);
-      sink_.finish(piece.first_episode, failures);
-      summary_.run.episodes += episodes;
-      summary_.run.failures.insert(summary_.run.failures.end(), failures.begin(), failures.end());
+      summary_.run.rows += block.ends.back().length;
+      summary_.successes += block.ends.back().success ? 1 : 0;
+      total_ += block.ends.back().total;
     }
   }
 
@@ -191,6 +242,8 @@ class EpisodeRun {
   const EpisodeProgress& progress_;
   const StopRequest& stop_;
   double total_ = 0;
+  BusyTime playing_, preparing_, writing_;
+  tbb::task_arena arena_;
   TaskEpisodeSummary summary_;
 };
 

@@ -10,6 +10,7 @@ namespace tangere {
 
 struct TaskEpisodeOptions {
   std::int64_t episodes = 0;
+  std::vector<EpisodeRange> ranges = {};  ///< those of them to play, ascending; none: all
   std::uint64_t seed = 0;
   Precision precision = Precision::mixed;  ///< mixed: observations leave as float32
   int threads = 1;
@@ -22,7 +23,7 @@ struct TaskEpisodeSummary {
   double mean_return = 0;
 };
 
-/// Plays episodes 0 … episodes - 1 and hands them to the sink: as many blocks of 16 at a time as there are threads, in
+/// Plays episodes 0 … episodes - 1, or the ranges of them, and hands them to the sink: as many blocks of 16 at a time as there are threads, in
 /// ascending order. Neither threads nor the number of episodes changes a bit of one. Throws InputError for episodes or
 /// threads below 1 and passes on what the sink throws.
 TaskEpisodeSummary run_task_episodes(const Task& task, const Policy& policy, const TaskEpisodeOptions& options,

@@ -20,7 +20,7 @@ using testing::IsEmpty;
 using testing::Not;
 using Words = std::vector<std::string>;
 
-const Words kSubcommands{"inspect", "simulate", "generate", "plot", "bench"};
+const Words kSubcommands{"inspect", "simulate", "generate", "validate", "info", "merge", "export", "plot", "bench"};
 
 Words operator+(Words first, const Words& second) {
   first.insert(first.end(), second.begin(), second.end());
@@ -52,7 +52,7 @@ TEST(Command, HelpEndsWithAnExampleThatWorks) {
     const Outcome outcome = run(folder, example);
     EXPECT_EQ(outcome.exit_code, 0) << help.out << outcome.err;
   }
-  EXPECT_THAT(folder.files(), testing::ElementsAre("ball.h5", "ball.svg", "balls", "scenes", "speed.svg"));
+  EXPECT_THAT(folder.files(), testing::ElementsAre("ball.h5", "ball.svg", "balls", "balls.csv", "scenes", "speed.svg"));
 }
 
 TEST(Command, EveryBodyTypeIsInspectedSimulatedAndDrawn) {
@@ -132,7 +132,7 @@ INSTANTIATE_TEST_SUITE_P(
                 {"simualte", "x"},
                 2,
                 "unknown subcommand 'simualte'; did you mean 'simulate'?"},
-        Mistake{"far_off", {"qqqqqqqqq"}, 2, "expected one of inspect, simulate, generate, plot, bench"},
+        Mistake{"far_off", {"qqqqqqqqq"}, 2, "expected one of inspect, simulate, generate, validate, info, merge, export, plot, bench"},
         Mistake{"top_option",
                 {"--verison"},
                 2,

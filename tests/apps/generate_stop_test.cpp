@@ -120,6 +120,34 @@ TEST_F(GenerateStop, KilledAtAnyMomentItLeavesWholeShardsAndTheNextRunIsAsIfNoth
   EXPECT_TRUE(bytes() == expected);
 }
 
+TEST_F(GenerateStop, KilledAgainAndAgainItResumesToTheSameBytes) {
+  const Words all = words(kTwoShards, {"--shards", "6"});
+  const auto begin = steady_clock::now();
+  ASSERT_EQ(run(folder_, all).exit_code, 0);
+  const auto undisturbed = std::chrono::duration_cast<milliseconds>(steady_clock::now() - begin);
+  const std::map<std::string, std::string> expected = bytes();
+  ASSERT_EQ(expected.size(), 6U);
+  Words resume = all;
+  resume.emplace_back("--resume");
+  std::mt19937 random(2);
+  std::uniform_int_distribution<milliseconds::rep> moment(0, undisturbed.count() / 2);
+  int killed = 0;
+  for (int round = 0; round < 3; ++round) {
+    fs::remove_all(folder_.path("set"));
+    for (int attempt = 0; attempt < 4; ++attempt) {
+      Program program(folder_, resume);
+      if (attempt == 0) wait_for(kFirst);
+      if (attempt > 0) std::this_thread::sleep_for(milliseconds(moment(random)));
+      program.send(SIGKILL);
+      killed += program.wait().signal == SIGKILL ? 1 : 0;
+    }
+    const Outcome last = run(folder_, resume);
+    ASSERT_EQ(last.exit_code, 0) << last.err;
+    EXPECT_TRUE(bytes() == expected) << "round " << round;
+  }
+  EXPECT_GE(killed, 3);
+}
+
 TEST_F(GenerateStop, APartOfAKilledRunIsCleanedWithoutAsking) {
   {
     Program program(folder_, words(kManyShards));

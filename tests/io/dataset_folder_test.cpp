@@ -32,7 +32,7 @@ std::vector<std::string> names(const std::string& folder) {
 
 std::string complaint(const std::string& path, bool overwrite = false) {
   try {
-    const DatasetFolder folder(path, overwrite);
+    const DatasetFolder folder(path, overwrite ? ExistingShards::replace : ExistingShards::refuse);
   } catch (const IoError& error) {
     return error.what();
   }
@@ -42,7 +42,7 @@ std::string complaint(const std::string& path, bool overwrite = false) {
 TEST(DatasetFolder, IsMadeAndRemovedWhenNothingComesIntoIt) {
   const Folder place;
   {
-    const DatasetFolder folder(place / "set", false);
+    const DatasetFolder folder(place / "set", ExistingShards::refuse);
     EXPECT_TRUE(fs::is_directory(place / "set"));
     EXPECT_EQ(folder.shard_path(7), place / "set/shard-00007.h5");
     EXPECT_EQ(folder.shard_path(123456), place / "set/shard-123456.h5");
@@ -50,12 +50,12 @@ TEST(DatasetFolder, IsMadeAndRemovedWhenNothingComesIntoIt) {
   }
   EXPECT_FALSE(fs::exists(place / "set"));
   {
-    const DatasetFolder folder(place / "set", false);
+    const DatasetFolder folder(place / "set", ExistingShards::refuse);
     touch(folder.shard_path(0));
   }
   EXPECT_THAT(names(place / "set"), ElementsAre("shard-00000.h5"));
   fs::create_directory(place / "mine");
-  { const DatasetFolder folder(place / "mine", false); }
+  { const DatasetFolder folder(place / "mine", ExistingShards::refuse); }
   EXPECT_TRUE(fs::exists(place / "mine")) << "it was there before";
 }
 
@@ -74,7 +74,7 @@ TEST(DatasetFolder, RemovesOldShardsAndNothingElse) {
   for (const char* name : {"shard-00000.h5", "shard-00011.h5", "shard-123456.h5", "shard-.h5",
                            "shard-1x.h5", "my-shard-00000.h5", "shard-00000.h5.bak", "notes.txt"})
     touch(place / "set/" + name);
-  DatasetFolder folder(place / "set", true);
+  DatasetFolder folder(place / "set", ExistingShards::replace);
   folder.remove_old_shards();
   EXPECT_THAT(names(place / "set"), ElementsAre("my-shard-00000.h5", "notes.txt", "shard-.h5",
                                                 "shard-00000.h5.bak", "shard-1x.h5"));
@@ -83,7 +83,7 @@ TEST(DatasetFolder, RemovesOldShardsAndNothingElse) {
 TEST(DatasetFolder, CountsShardsThatAreToGoAsFree) {
   const Folder place;
   fs::create_directory(place / "set");
-  const DatasetFolder empty(place / "set", true);
+  const DatasetFolder empty(place / "set", ExistingShards::replace);
   const double before = empty.free_bytes();
   touch(place / "set/shard-00000.h5");
   fs::resize_file(place / "set/shard-00000.h5", std::uintmax_t{1} << 40);  // sparse: takes no room
@@ -102,7 +102,7 @@ TEST(DatasetFolder, CleansWhatAKilledRunLeft) {
 TEST(DatasetFolder, IsHeldByOneAtATime) {
   const Folder place;
   {
-    const DatasetFolder first(place / "set", false);
+    const DatasetFolder first(place / "set", ExistingShards::refuse);
     EXPECT_THAT(complaint(place / "set"), HasSubstr("another process is writing shards there"));
     EXPECT_THAT(complaint(place / "set", true),
                 HasSubstr("another process is writing shards there"));

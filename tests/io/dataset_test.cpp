@@ -31,7 +31,7 @@ std::string bytes(const std::string& path) {
 
 /// The only shard of a data set of 20 episodes, of which 2 and 17 failed.
 std::string one_shard(const Folder& folder, const DatasetLayout& l) {
-  DatasetWriter writer(folder / "set", l, false);
+  DatasetWriter writer({folder / "set"}, l);
   write_block(writer, l, 0, {failure(2)});
   EXPECT_THAT(writer.shards(), ::testing::IsEmpty());
   write_block(writer, l, 16, {failure(17)});
@@ -187,14 +187,14 @@ TEST(Dataset, BytesDoNotDependOnTheOrderOfBlocksNorOnPieces) {
   const DatasetLayout l = dataset_layout(70);
   const Folder ascending, mixed;
   {
-    DatasetWriter writer(ascending / "set", l, false);
+    DatasetWriter writer({ascending / "set"}, l);
     for (const std::int64_t block : {0, 16, 32, 48, 64})
       write_block(
           writer, l, block,
           block == 32 ? std::vector{failure(33), failure(40)} : std::vector<FailedEpisode>{});
   }
   {
-    DatasetWriter writer(mixed / "set", l, false);
+    DatasetWriter writer({mixed / "set"}, l);
     write_piece(writer, l, 48, 0, 1);
     write_piece(writer, l, 32, 0, 2);
     write_block(writer, l, 64);
@@ -218,12 +218,12 @@ TEST(Dataset, LongOnesAreSeveralShards) {
   const Folder one, other;
   const auto shard = [](std::int64_t s) { return "set/shard-0000" + std::to_string(s) + ".h5"; };
   {
-    DatasetWriter writer(one / "set", l, false);
+    DatasetWriter writer({one / "set"}, l);
     for (const std::int64_t block : {0, 16, 32, 48, 64}) write_block(writer, l, block);
     EXPECT_THAT(writer.shards(), ElementsAre(one / shard(0), one / shard(1), one / shard(2)));
   }
   {
-    DatasetWriter writer(other / "set", l, false);
+    DatasetWriter writer({other / "set"}, l);
     for (const std::int64_t block : {64, 48, 0, 32, 16}) write_block(writer, l, block);
     EXPECT_THAT(writer.shards(), ElementsAre(other / shard(0), other / shard(1), other / shard(2)));
   }
@@ -252,14 +252,14 @@ TEST(Dataset, WhatIsNotCompleteLeavesNothing) {
   l.shard_bytes = 33 * l.episode_bytes();
   const Folder folder;
   {
-    DatasetWriter writer(folder / "set", l, false);
+    DatasetWriter writer({folder / "set"}, l);
     write_block(writer, l, 32);  // of the second shard
     write_piece(writer, l, 0, 0, 2);
     EXPECT_TRUE(std::filesystem::exists(folder / "set/shard-00001.h5.part"));
   }
   EXPECT_EQ(folder.entries(), 0U) << "the folder was made for it and nothing came";
   {
-    DatasetWriter writer(folder / "set", l, false);
+    DatasetWriter writer({folder / "set"}, l);
     write_block(writer, l, 64);  // the whole third shard
     write_block(writer, l, 32);
     EXPECT_THAT(writer.shards(), ElementsAre(folder / "set/shard-00002.h5"));
@@ -276,7 +276,7 @@ TEST(Dataset, NamesThatNoFileCanHoldAreRefused) {
     l.sensors[0].name = name;
     l.sensors[1].name = second;
     try {
-      const DatasetWriter writer(folder / "set", l, false);
+      const DatasetWriter writer({folder / "set"}, l);
     } catch (const InputError& e) {
       return std::string(e.what());
     }
@@ -293,7 +293,7 @@ TEST(Dataset, NamesThatNoFileCanHoldAreRefused) {
 
 TEST(Dataset, MoreThanTheDiskHoldsIsRefusedBeforeAnythingIsWritten) {
   const Folder folder;
-  EXPECT_THROW(DatasetWriter(folder / "set", dataset_layout(std::int64_t{1} << 50), false),
+  EXPECT_THROW(DatasetWriter({folder / "set"}, dataset_layout(std::int64_t{1} << 50)),
                IoError);
   EXPECT_EQ(folder.entries(), 0U);
 }
@@ -325,7 +325,7 @@ TEST(Dataset, AFullDiskIsAnErrorAndLeavesWholeShardsOnly) {
   std::uintmax_t size = 0;
   {
     const Folder measured;
-    DatasetWriter writer(measured / "set", l, false);
+    DatasetWriter writer({measured / "set"}, l);
     write_block(writer, l, 0);
     write_block(writer, l, 16);
     size = std::filesystem::file_size(measured / "set/shard-00000.h5");
@@ -334,7 +334,7 @@ TEST(Dataset, AFullDiskIsAnErrorAndLeavesWholeShardsOnly) {
   for (const double part : {0.0, 0.01, 0.2, 0.5, 0.8, 0.95, 0.999}) {
     const Folder folder;
     {
-      DatasetWriter writer(folder / "set", l, false);
+      DatasetWriter writer({folder / "set"}, l);
       write_block(writer, l, 0);
       write_block(writer, l, 16);
       write_block(writer, l, 32);  // half of the second shard
@@ -356,7 +356,7 @@ TEST(Dataset, AShardThatTheDiskChangedDoesNotGetItsName) {
   const Folder folder;
   const DatasetLayout l = dataset_layout(20);
   {
-    DatasetWriter writer(folder / "set", l, false);
+    DatasetWriter writer({folder / "set"}, l);
     write_block(writer, l, 0);
     std::vector<float> row;
     for (std::size_t k = 0; k < 36; ++k) row.push_back(dataset_number<float>(5, 3, 1, k));
@@ -382,7 +382,7 @@ TEST(Dataset, AShardThatAppearsMeanwhileIsLeftAsItIs) {
   const Folder folder;
   const DatasetLayout l = dataset_layout(4);
   {
-    DatasetWriter writer(folder / "set", l, false);
+    DatasetWriter writer({folder / "set"}, l);
     write_piece(writer, l, 0, 0, 4);
     std::ofstream(folder / "set/shard-00000.h5") << "somebody's";
     EXPECT_THROW(writer.finish(0, {}), IoError);

@@ -26,7 +26,7 @@ class ShardCheck : public ::testing::Test {
  protected:
   ShardCheck() {
     const DatasetLayout l = dataset_layout(20);
-    DatasetWriter writer(folder_ / "set", l, false);
+    DatasetWriter writer({folder_ / "set"}, l);
     testing::write_block(writer, l, 0);
     testing::write_block(writer, l, 16, {testing::failure(17)});
   }

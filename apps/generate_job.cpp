@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is known of a data set before its first step.
+#include "apps/generate_job.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "apps/workers.hpp"
+#include "engine/error.hpp"
+
+namespace tangere::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Takes episodes and forgets them.
+class NoSink : public EpisodeSink {
+ public:
+  void write(const EpisodeRows&) override {}
+  void finish(std::int64_t, std::span<const FailedEpisode>) override {}
+};
+
+struct Extent {
+  std::vector<std::string> shards;  // paths
+  std::int64_t episodes = 0, kept = 0;
+};
+
+/// What this process would make; nothing is opened or created.
+Extent extent_of(const GenerateOptions& options, const DatasetLayout& layout, const DatasetOutput& output) {
+  Extent extent;
+  for (std::int64_t shard = 0; shard < layout.shard_count(); ++shard) {
+    if (output.only && !std::binary_search(output.only->begin(), output.only->end(), shard)) continue;
+    const std::string path = (fs::path(options.output) / fmt::format("shard-{:05}.h5", shard)).string();
+    if (options.resume && fs::exists(path)) {
+      ++extent.kept;
+      continue;
+    }
+    const EpisodeRange range = layout.shard_episodes(shard);
+    extent.shards.push_back(path);
+    extent.episodes += range.end - range.first;
+  }
+  return extent;
+}
+
+/// Environment steps per second of a first block for each thread, over as many steps as take about a second.
+double measured_rate(const Job& job) {
+  EpisodeOptions some = job.run;
+  some.ranges.clear();
+  some.episodes = std::min<std::int64_t>(job.run.episodes, 16LL * job.run.threads);
+  NoSink sink;
+  const bool by_steps = !job.layout.task;  // a task plays whole episodes
+  if (by_steps) some.steps = std::min<std::int64_t>(job.run.steps, some.every);
+  for (;;) {
+    const EpisodeSummary summary = job.simulate(some, sink, {}, {}).summary;
+    if (!by_steps || some.steps >= job.run.steps || summary.seconds > 0.5)
+      return static_cast<double>(summary.environment_steps) / summary.seconds;
+    some.steps = std::min(job.run.steps, some.steps * 4);
+  }
+}
+
+/// Of the nearest folder that exists.
+double free_bytes_at(const std::string& path) {
+  fs::path folder = fs::absolute(path);
+  while (!fs::exists(folder) && folder.has_parent_path() && folder != folder.parent_path())
+    folder = folder.parent_path();
+  return static_cast<double>(fs::space(folder).available);
+}
+
+}  // namespace
+
+DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& layout, const Console& console) {
+  DatasetOutput output{options.output, ExistingShards::refuse, std::nullopt};
+  if (options.resume) output.existing = ExistingShards::keep;
+  if (options.overwrite) output.existing = ExistingShards::replace;
+  const std::int64_t shards = layout.shard_count();
+  if (!options.shard.empty()) {
+    output.only = std::vector<std::int64_t>{worker_named(options.shard).index};
+    return output;
+  }
+  const Worker worker = worker_from_environment();
+  if (worker.source.empty()) return output;
+  output.only = shards_of(worker, shards);
+  console.note(fmt::format("process {} of {} ({}): makes {} of {} shards", worker.index, worker.count, worker.source,
+                           output.only->size(), shards));
+  return output;
+}
+
+int dry_run(const GenerateOptions& options, const Console& console, const Job& job) {
+  job.layout.check();
+  const Extent extent = extent_of(options, job.layout, output_for(options, job.layout, console));
+  const double of_one = job.layout.episode_bytes(), bytes = of_one * static_cast<double>(extent.episodes);
+  const double free = free_bytes_at(options.output), rate = measured_rate(job);
+  // Of a task: actions, if every episode lasts as long as it may.
+  const double steps = static_cast<double>(extent.episodes) *
+                       static_cast<double>(job.layout.task ? job.layout.rows() : job.layout.steps);
+  const double seconds = steps / rate;
+  console.print(fmt::format(
+      "would make {} episodes of {} steps, {} rows each, in {} (kept: {})\n{:.0f} bytes each, {:.0f} in all at least; "
+      "free on the disk: {:.0f}\nmemory for {} threads: {:.0f} bytes\nabout {:.0f} s of simulation, at {:.0f} env-steps/s "
+      "as measured now, without output\neffects: {}\nnothing was written",
+      extent.episodes, job.layout.steps, job.layout.rows(),
+      extent.shards.size() == 1 ? "1 shard" : fmt::format("{} shards", extent.shards.size()), extent.kept, of_one,
+      bytes, free, job.run.threads, job.memory_bytes, seconds, rate, fmt::join(job.effects, ", ")));
+  console.result({{"command", "generate"},
+                  {"exit_code", static_cast<int>(kDone)},
+                  {"dry_run", true},
+                  {"scene", options.scene},
+                  {"output", options.output},
+                  {"shards", extent.shards},
+                  {"kept", extent.kept},
+                  {"episodes", extent.episodes},
+                  {"steps", job.layout.steps},
+                  {"every", job.layout.every},
+                  {"rows_per_episode", job.layout.rows()},
+                  {"bytes_per_episode", of_one},
+                  {"bytes", bytes},
+                  {"free_bytes", free},
+                  {"memory_bytes", job.memory_bytes},
+                  {"threads", job.run.threads},
+                  {"environment_steps_per_second", rate},
+                  {"estimated_seconds", seconds},
+                  {"effects", job.effects}});
+  return kDone;
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// A data set that was asked for, checked and ready to be made: what scenes and tasks do differently is behind one call.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/command.hpp"
+#include "apps/console.hpp"
+#include "io/dataset_writer.hpp"
+#include "tasks/episodes.hpp"
+
+namespace tangere::apps {
+
+struct GenerateOptions {
+  std::string scene, output, controls, policy, shard, precision = "mixed", compress = "none";
+  std::optional<std::int64_t> episodes, steps, shards;
+  std::optional<int> every, threads;
+  std::optional<std::uint64_t> seed;
+  bool overwrite = false, resume = false, dry_run = false, allow_unknown = false;
+};
+
+/// What a run of a task adds: keys of the JSON object, a line for people.
+struct TaskReport {
+  Json keys{{"task", nullptr}};
+  std::string line = "no task: every reward is 0";
+};
+
+struct JobResult {
+  EpisodeSummary summary;
+  TaskReport task;
+};
+
+struct Job {
+  DatasetLayout layout;
+  EpisodeOptions run;
+  double memory_bytes = 0;                  ///< of the simulation, without the program itself
+  std::string unit;                         ///< what progress counts: "environment step", "action"
+  std::vector<std::string> effects;         ///< that are on
+  std::function<JobResult(const EpisodeOptions&, EpisodeSink&, const EpisodeProgress&, const StopRequest&)> simulate;
+};
+
+/// Shards that this process is to make, and what becomes of those that are there. Says so where it is not alone.
+DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& layout, const Console& console);
+
+/// Says what would be made, and how long that may take: some episodes are simulated for it. Writes nothing.
+int dry_run(const GenerateOptions& options, const Console& console, const Job& job);
+
+}  // namespace tangere::apps

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// tangere info: what a data set is, without reading its numbers.
+#include <fmt/format.h>
+
+#include "apps/arguments.hpp"
+#include "apps/command.hpp"
+#include "io/dataset_files.hpp"
+
+namespace tangere::apps {
+namespace {
+
+constexpr std::size_t kLongValue = 200;  // bytes: beyond it a setting is for --json
+
+int info(const std::string& path, const Console& console) {
+  const DatasetFiles dataset = find_dataset(path);
+  const DatasetSummary summary = summarise(dataset);
+  Json settings = Json::object(), shapes = Json::object();
+  std::string text;
+  for (const Setting& setting : dataset.settings) {
+    settings[setting.name] = setting.value;
+    if (setting.value.size() <= kLongValue && setting.name.find('/') == std::string::npos)
+      text += fmt::format("  {}: {}\n", setting.name, setting.value);
+  }
+  text += "datasets of a demo\n";
+  for (const auto& [name, shape] : summary.shapes) {
+    shapes[name] = shape;
+    text += fmt::format("  {} {}\n", name, shape);
+  }
+  text += fmt::format("files: {}, demos: {}, failed episodes: {}, rows: {}, {} bytes", dataset.files.size(),
+                      summary.demos, summary.failed, summary.rows, summary.bytes);
+  if (summary.has_success) text += fmt::format(", episodes solved: {}", summary.successes);
+  console.print("settings\n" + text);
+  for (const std::string& file : dataset.missing) console.note("missing: " + file);
+  console.result({{"command", "info"},
+                  {"exit_code", static_cast<int>(kDone)},
+                  {"input", path},
+                  {"files", dataset.files},
+                  {"missing", dataset.missing},
+                  {"demos", summary.demos},
+                  {"failed_episodes", summary.failed},
+                  {"rows", summary.rows},
+                  {"bytes", summary.bytes},
+                  {"successes", summary.has_success ? Json(summary.successes) : Json()},
+                  {"settings", settings},
+                  {"datasets", shapes}});
+  return kDone;
+}
+
+}  // namespace
+
+Command add_info(CLI::App& program) {
+  const auto input = std::make_shared<std::string>();
+  const auto console = std::make_shared<Console>();
+  CLI::App* app = program.add_subcommand("info", "Say what a data set is: settings, shapes, counts");
+  add_text(*app, "DIR", *input, "", "Folder of shards, or one file of a data set")->required();
+  add_console_options(*app, *console);
+  app->footer("Example:\n  tangere info balls");
+  return {app, [=](const ProgramInfo&) { return info(*input, *console); }};
+}
+
+}  // namespace tangere::apps

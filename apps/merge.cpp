@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// tangere merge: one file for a folder of shards, and the view that Minari reads.
+#include <fmt/format.h>
+
+#include "apps/arguments.hpp"
+#include "apps/command.hpp"
+#include "io/dataset_merge.hpp"
+
+namespace tangere::apps {
+namespace {
+
+int merge(const std::string& path, const MergeOptions& options, const Console& console) {
+  const MergeResult result = merge_dataset(find_dataset(path), options);
+  console.print(fmt::format("wrote {} ({} bytes, {}): {} demos, {} to train on and {} to validate; failed episodes: {}",
+                            result.file, result.bytes, options.copy ? "a copy of all numbers" : "links to the shards",
+                            result.demos, result.train, result.valid, result.failed));
+  if (!result.minari.empty()) console.print(fmt::format("wrote {}: {} for Minari", result.minari, result.minari_id));
+  console.result({{"command", "merge"},
+                  {"exit_code", static_cast<int>(kDone)},
+                  {"input", path},
+                  {"output", result.file},
+                  {"bytes", result.bytes},
+                  {"copy", options.copy},
+                  {"minari", result.minari.empty() ? Json() : Json(result.minari)},
+                  {"minari_id", result.minari.empty() ? Json() : Json(result.minari_id)},
+                  {"demos", result.demos},
+                  {"train", result.train},
+                  {"valid", result.valid},
+                  {"failed_episodes", result.failed}});
+  return kDone;
+}
+
+}  // namespace
+
+Command add_merge(CLI::App& program) {
+  const auto input = std::make_shared<std::string>();
+  const auto options = std::make_shared<MergeOptions>();
+  const auto console = std::make_shared<Console>();
+  CLI::App* app = program.add_subcommand("merge", "Show a folder of shards as one file, and to Minari");
+  add_text(*app, "DIR", *input, "", "Folder of shards, all of them there")->required();
+  app->add_flag("--copy", options->copy, "Copy all numbers, for a file that needs no shards beside it");
+  app->add_flag("--overwrite", options->overwrite, "Replace what an earlier merge wrote");
+  add_console_options(*app, *console);
+  app->footer("Example:\n  tangere merge balls");
+  return {app, [=](const ProgramInfo&) { return merge(*input, *options, *console); }};
+}
+
+}  // namespace tangere::apps

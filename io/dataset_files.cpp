@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+// A shard that is not there is an error of whoever wants all, never a gap in silence.
+#include "io/dataset_files.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <regex>
+
+#include "engine/error.hpp"
+#include "io/dataset_description.hpp"
+#include "io/h5_listing.hpp"
+#include "io/shard_check.hpp"
+
+namespace tangere {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kMostShards = 100'000'000;  // a damaged count must not become a loop for ever
+
+std::vector<std::string> shards_in(const std::string& folder) {
+  static const std::regex pattern("shard-[0-9]+\\.h5");
+  std::vector<std::string> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (std::regex_match(entry.path().filename().string(), pattern)) files.push_back(entry.path().string());
+  std::sort(files.begin(), files.end(), [](const std::string& a, const std::string& b) {
+    return std::pair(a.size(), a) < std::pair(b.size(), b);
+  });
+  return files;
+}
+
+/// Shards that the settings count and the folder does not have.
+std::vector<std::string> missing_of(const DatasetFiles& dataset) {
+  std::vector<std::string> missing;
+  const std::string text = value_of(dataset.settings, "dataset_shards");
+  std::int64_t count = 0;
+  std::from_chars(text.data(), text.data() + text.size(), count);
+  for (std::int64_t shard = 0; shard < std::min(count, kMostShards); ++shard) {
+    const std::string path = (fs::path(dataset.folder) / fmt::format("shard-{:05}.h5", shard)).string();
+    if (!std::binary_search(dataset.files.begin(), dataset.files.end(), path,
+                            [](const std::string& a, const std::string& b) {
+                              return std::pair(a.size(), a) < std::pair(b.size(), b);
+                            }))
+      missing.push_back(path);
+  }
+  return missing;
+}
+
+/// Settings of a file, and what differs from those of the data set; damage counts as a difference.
+std::vector<std::string> differences_of(const std::string& file, const std::vector<Setting>& settings) {
+  try {
+    return differences(read_settings(h5::open_file(file)), settings);
+  } catch (const IoError& error) {
+    return {error.what()};
+  }
+}
+
+void add_shape(const h5::Id& group, const std::string& name, const std::string& prefix, DatasetSummary& summary) {
+  const h5::Id dataset = h5::open_dataset(group, name);
+  const h5::Id type(H5Dget_type(dataset.get()));
+  const std::size_t bits = 8 * H5Tget_size(type.get());
+  const H5T_class_t kind = H5Tget_class(type.get());
+  const std::string word = kind == H5T_ENUM ? "bool" : fmt::format("{}{}", kind == H5T_FLOAT ? "float" : "int", bits);
+  summary.shapes.emplace_back(prefix + name, fmt::format("({}) {}", fmt::join(h5::dimensions(dataset), ", "), word));
+}
+
+void add_shapes(const h5::Id& group, const std::string& prefix, DatasetSummary& summary) {
+  for (const std::string& name : h5::link_names(group)) {
+    if (h5::is_dataset(group, name)) {
+      add_shape(group, name, prefix, summary);
+    } else {
+      add_shapes(h5::open_group(group, name), prefix + name + "/", summary);
+    }
+  }
+}
+
+void summarise_file(const std::string& path, DatasetSummary& summary) {
+  const h5::Id file = h5::open_file(path), data = h5::open_group(file, "data");
+  for (const std::int64_t demo : demo_numbers(data)) {
+    const h5::Id group = h5::open_group(data, fmt::format("demo_{}", demo));
+    summary.rows += h5::read_numbers<std::int64_t>(group, "num_samples").at(0);
+    if (summary.shapes.empty()) add_shapes(group, "", summary);
+    ++summary.demos;
+    const std::vector<std::string> names = h5::attribute_names(group);
+    if (!std::binary_search(names.begin(), names.end(), "success")) continue;
+    summary.has_success = true;
+    summary.successes += h5::read_numbers<std::int64_t>(group, "success").at(0) != 0 ? 1 : 0;
+  }
+  summary.failed += static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
+  summary.bytes += fs::file_size(path);
+}
+
+}  // namespace
+
+std::string value_of(const std::vector<Setting>& settings, const std::string& name) {
+  for (const Setting& setting : settings)
+    if (setting.name == name) return setting.value;
+  return {};
+}
+
+DatasetFiles find_dataset(const std::string& path) {
+  DatasetFiles dataset;
+  if (!fs::exists(path)) throw IoError(fmt::format("'{}' does not exist; expected a folder of shards or a file", path));
+  if (fs::is_directory(path)) {
+    dataset.folder = path;
+    dataset.files = shards_in(path);
+    if (dataset.files.empty())
+      throw IoError(fmt::format("'{}' has no shards; expected files like shard-00000.h5", path));
+  } else {
+    dataset.files = {path};
+  }
+  std::string reason;
+  for (const std::string& file : dataset.files) {
+    try {
+      dataset.settings = read_settings(h5::open_file(file));
+      break;
+    } catch (const IoError& error) {
+      if (reason.empty()) reason = error.what();
+    }
+  }
+  if (dataset.settings.empty()) throw IoError(fmt::format("'{}' is no data set: {}", path, reason));
+  if (!dataset.folder.empty()) dataset.missing = missing_of(dataset);
+  return dataset;
+}
+
+void check_complete(const DatasetFiles& dataset) {
+  if (!dataset.missing.empty())
+    throw IoError(fmt::format("'{}' is missing{}; make it with 'tangere generate … --resume'", dataset.missing.front(),
+                              dataset.missing.size() == 1
+                                  ? ""
+                                  : fmt::format(", and {} more shards are", dataset.missing.size() - 1)));
+  for (const std::string& file : dataset.files) {
+    const std::vector<std::string> lines = differences_of(file, dataset.settings);
+    if (!lines.empty())
+      throw IoError(fmt::format("'{}' is not of the same run as '{}': {}", file, dataset.files.front(),
+                                fmt::join(lines, "; ")));
+  }
+}
+
+DatasetReport examine_dataset(const DatasetFiles& dataset) {
+  DatasetReport report;
+  for (const std::string& file : dataset.missing) report.problems.push_back(file + ": missing");
+  for (const std::string& file : dataset.files) {
+    for (const std::string& line : differences_of(file, dataset.settings))
+      report.problems.push_back(fmt::format("{}: {}", file, line));
+    const ShardReport shard = examine_shard(file);
+    for (const std::string& problem : shard.problems) report.problems.push_back(fmt::format("{}: {}", file, problem));
+    ++report.shards;
+    report.demos += shard.content.demos;
+    report.failed += shard.content.failed;
+    report.rows += shard.content.rows;
+    report.bytes += fs::file_size(file);
+  }
+  return report;
+}
+
+DatasetSummary summarise(const DatasetFiles& dataset) {
+  DatasetSummary summary;
+  for (const std::string& file : dataset.files) summarise_file(file, summary);
+  return summary;
+}
+
+}  // namespace tangere

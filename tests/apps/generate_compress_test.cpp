@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compressed shards: the same numbers, in chunks that HDF5's own filters read.
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "io/h5.hpp"
+#include "io/shard_check.hpp"
+#include "tests/apps/program.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using nlohmann::json;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using Words = std::vector<std::string>;
+
+const std::string kShard = "/shard-00000.h5";
+
+json generate(const Folder& folder, const std::string& what, const std::string& set, Words more) {
+  Words words{"generate", what, "--output", set, "--json", "--seed", "5"};
+  words.insert(words.end(), more.begin(), more.end());
+  const Outcome outcome = run(folder, words);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json answer = json::parse(outcome.out);
+  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
+  return answer;
+}
+
+std::uint64_t sum(const Folder& folder, const std::string& set) {
+  return h5::read_numbers<std::uint64_t>(h5::open_file(folder.path(set + kShard)), "content_sum").at(0);
+}
+
+struct Layout {
+  std::vector<hsize_t> chunk;  ///< none: contiguous
+  std::vector<H5Z_filter_t> filters;
+};
+
+Layout layout_of(const Folder& folder, const std::string& set, const std::string& name) {
+  const h5::Id file = h5::open_file(folder.path(set + kShard)), dataset = h5::open_dataset(file, name);
+  const h5::Id properties(H5Dget_create_plist(dataset.get()));
+  Layout layout;
+  if (H5Pget_layout(properties.get()) != H5D_CHUNKED) return layout;
+  layout.chunk.resize(h5::dimensions(dataset).size());
+  H5Pget_chunk(properties.get(), static_cast<int>(layout.chunk.size()), layout.chunk.data());
+  for (int i = 0; i < H5Pget_nfilters(properties.get()); ++i) {
+    unsigned flags = 0, config = 0;
+    std::size_t count = 0;
+    layout.filters.push_back(
+        H5Pget_filter2(properties.get(), static_cast<unsigned>(i), &flags, &count, nullptr, 0, nullptr, &config));
+  }
+  return layout;
+}
+
+TEST(GenerateCompress, KeepsEveryNumberInBothPrecisionsOnAnyThreads) {
+  for (const char* precision : {"mixed", "double"}) {
+    const Folder folder;
+    const std::string small = scene("rolling_ball_small.xml");
+    const Words size{"--episodes", "20", "--steps", "200", "--every", "5", "--precision", precision};
+    const auto with = [&](Words more) {
+      more.insert(more.end(), size.begin(), size.end());
+      return more;
+    };
+    generate(folder, small, "none", with({}));
+    const json answer = generate(folder, small, "one", with({"--compress", "deflate", "--threads", "1"}));
+    generate(folder, small, "three", with({"--compress", "deflate", "--threads", "3"}));
+    EXPECT_EQ(answer.at("compress"), "deflate");
+    EXPECT_THAT(answer.at("limited_by").get<std::string>(), testing::AnyOf("simulation", "compression", "writing"));
+    EXPECT_EQ(sum(folder, "one"), sum(folder, "none"));
+    EXPECT_EQ(sum(folder, "three"), sum(folder, "none"));
+    EXPECT_EQ(check_shard(folder.path("three" + kShard)).demos, 20);  // reads through HDF5's own filters
+    EXPECT_LT(std::filesystem::file_size(folder.path("one" + kShard)),
+              std::filesystem::file_size(folder.path("none" + kShard)) / 2);
+  }
+}
+
+TEST(GenerateCompress, ChunksAreOfAFewRowsAndSmallRowsStayAsTheyAre) {
+  const Folder folder;
+  generate(folder, scene("rolling_ball_small.xml"), "set",
+           {"--episodes", "3", "--steps", "200", "--every", "5", "--compress", "deflate"});
+  const Layout pad = layout_of(folder, "set", "data/demo_1/obs/pad");
+  EXPECT_THAT(pad.chunk, ElementsAre(4, 32, 32, 3));  // 48 KiB
+  EXPECT_THAT(pad.filters, ElementsAre(H5Z_FILTER_SHUFFLE, H5Z_FILTER_DEFLATE));
+  EXPECT_THAT(layout_of(folder, "set", "data/demo_1/final_obs/pad").chunk, ElementsAre(1, 32, 32, 3));
+  for (const char* name : {"obs/q", "obs/v", "actions", "rewards", "final_obs/q"})
+    EXPECT_THAT(layout_of(folder, "set", std::string("data/demo_1/") + name).chunk, IsEmpty()) << name;
+}
+
+TEST(GenerateCompress, EpisodesOfATaskShorterThanAChunkAreOneChunk) {
+  const Folder folder;
+  const Words size{"--episodes", "40"};
+  generate(folder, "box_pushing", "none", size);
+  generate(folder, "box_pushing", "deflate", {"--episodes", "40", "--compress", "deflate"});
+  EXPECT_EQ(sum(folder, "none"), sum(folder, "deflate"));
+  EXPECT_EQ(run(folder, {"validate", "deflate"}).exit_code, 0);
+}
+
+TEST(GenerateCompress, IsASettingOfItsOwn) {
+  const Folder folder;
+  const Words size{"--episodes", "3", "--steps", "20"};
+  generate(folder, scene("rolling_ball_small.xml"), "set", size);
+  const Outcome other = run(folder, {"generate", scene("rolling_ball_small.xml"), "--output", "set", "--episodes", "3",
+                                     "--steps", "20", "--seed", "5", "--resume", "--compress", "deflate"});
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr("compression: none there, deflate here"));
+  const Outcome wrong = run(folder, {"generate", scene("rolling_ball_small.xml"), "--output", "x", "--episodes", "3",
+                                     "--compress", "defalte"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("unknown compression 'defalte'; did you mean 'deflate'?"));
+}
+
+}  // namespace
+}  // namespace tangere::apps
