@@ -20,7 +20,7 @@ using testing::IsEmpty;
 using testing::Not;
 using Words = std::vector<std::string>;
 
-const Words kSubcommands{"inspect", "simulate", "generate", "validate", "info", "merge", "export", "plot", "bench"};
+const Words kSubcommands{"inspect", "simulate", "generate", "validate", "info", "merge", "export", "plot", "bench", "gradcheck"};
 
 Words operator+(Words first, const Words& second) {
   first.insert(first.end(), second.begin(), second.end());
