@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cap opening: three fingers turn a cap, whose damping nobody tells, by an eighth of a turn (Xu et al., fourth experiment).
+// Cap opening: three fingers turn a cap, whose damping nobody tells, by an eighth of a turn (Xu et al., fourth
+// experiment).
 //   reward = -0.5 for each finger that does not touch - min(θ - π/4, 0)² - 0.005 |a|²,
 //   and 50 with the end if θ > π/4, or -50 with the end if a fingertip is above 50 mm
 // θ: angle of the cap. a: the action; each angle's target is the angle plus 0.06 rad times a.
@@ -16,16 +17,18 @@ namespace {
 
 constexpr std::size_t kFingers = 3, kAngles = 9, kRows = 12, kCols = 12, kField = 3 * kRows * kCols;
 constexpr int kActions = 200;
-constexpr double kStep = 0.06;                                     // of a target, at a = 1 [rad]
-constexpr double kOpen = std::numbers::pi / 4;                     // [rad]
-constexpr double kHighest = 0.05;                                  // of a fingertip [m]
-constexpr double kIdle = 0.5, kEffort = 0.005, kEnd = 50;          // of the reward
-constexpr FingerAngles kStart{0, -0.5, 0.8};                       // [rad]
-constexpr double kSpread = 0.05, kLeast = 1e-3;                    // of the start [rad]; a pad starts so far from the cap [m]
+constexpr double kStep = 0.06;                             // of a target, at a = 1 [rad]
+constexpr double kOpen = std::numbers::pi / 4;             // [rad]
+constexpr double kHighest = 0.05;                          // of a fingertip [m]
+constexpr double kIdle = 0.5, kEffort = 0.005, kEnd = 50;  // of the reward
+constexpr FingerAngles kStart{0, -0.5, 0.8};               // [rad]
+constexpr double kSpread = 0.05;                           // of the start [rad]
+constexpr double kLeast = 1e-3;                            // a pad starts so far from the cap, or farther [m]
 
 /// The scene with the cap's damping as what varies; how an episode starts is up to the task.
 Scene with_damping_alone(Scene scene) {
-  std::erase_if(scene.randomizations, [](const RandomizationDescription& d) { return d.target != RandomTarget::joint_effect; });
+  std::erase_if(scene.randomizations,
+                [](const RandomizationDescription& d) { return d.target != RandomTarget::joint_effect; });
   return scene;
 }
 
@@ -39,7 +42,8 @@ class CapOpening : public Task {
         script_(model().scene()) {
     const Scene& s = model().scene();
     if (model().variables().size() != kFingers || tactile_size() != kFingers * kField || s.motors.size() != kAngles)
-      throw InputError(s.path + ": cap opening needs nine motors, three end effectors and three pads of 12 × 12 points");
+      throw InputError(s.path + ": cap opening needs nine motors, three end effectors, three pads of 12 × 12 points");
+    if (script_.gap(kStart) < kLeast) throw InputError(s.path + ": the fingers of cap opening would start in the cap");
     for (std::size_t k = 0; k < kAngles; ++k)
       for (const LinkDescription& link : s.links)
         if (link.joint.name == s.motors[k].joint) limits_[k] = link.joint.limits.value_or(limits_[k]);
@@ -51,7 +55,8 @@ class CapOpening : public Task {
     for (std::size_t f = 0; f < kFingers; ++f) {
       FingerAngles q{};
       do {
-        for (std::size_t k = 0; k < q.size(); ++k) q[k] = kStart[k] + task_normal(s.seed, s.episode, 0, drawn++, kSpread);
+        for (std::size_t k = 0; k < q.size(); ++k)
+          q[k] = kStart[k] + task_normal(s.seed, s.episode, 0, drawn++, kSpread);
       } while (script_.gap(q) < kLeast);
       std::copy(q.begin(), q.end(), s.q.begin() + static_cast<std::ptrdiff_t>(finger_ + f * q.size()));
     }
@@ -91,7 +96,8 @@ class CapOpening : public Task {
     for (std::size_t k = 0; k < kAngles; ++k) out.action[k] -= weight * 2 * kEffort * view.action[k];
   }
 
-  void controls_vjp(const TaskView& view, int, std::span<const double> weight, const ViewCotangent& out) const override {
+  void controls_vjp(const TaskView& view, int, std::span<const double> weight,
+                    const ViewCotangent& out) const override {
     for (std::size_t k = 0; k < kAngles; ++k) {
       const double to = target(view, k);
       if (to < limits_[k][0] || to > limits_[k][1]) continue;
@@ -104,7 +110,8 @@ class CapOpening : public Task {
   void scripted(const TaskView& view, std::span<const double>, std::span<double> action) const override {
     for (std::size_t f = 0; f < kFingers; ++f) {
       const FingerAngles q = angles(view, f), to = script_.targets(q, view.memory[f] != 0);
-      for (std::size_t k = 0; k < q.size(); ++k) action[f * q.size() + k] = std::clamp((to[k] - q[k]) / kStep, -1.0, 1.0);
+      for (std::size_t k = 0; k < q.size(); ++k)
+        action[f * q.size() + k] = std::clamp((to[k] - q[k]) / kStep, -1.0, 1.0);
     }
   }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A finger is a swing about its radius and, in the plane that it swings, two links of nearly one length. A flat pad that moves
-// along a cap rolls off it: a stroke is no longer than the pad is wide.
+// A finger is a swing about its radius and two links in the plane that it swings. A cap rolls along a flat pad that moves
+// past it: a stroke is no longer than the pad is wide, and turns the cap by less than it must.
 #include "tasks/cap_opening_script.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a finger turns a cap when everything is known: where its pad is, where it should go, and the angles for that. A finger
+// How a finger turns a cap when everything is known: where its pad is, where it should go, and the angles for that. It
 // goes back out of touch, presses, and moves along the cap until it runs out of pad.
 #pragma once
 
