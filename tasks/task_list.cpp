@@ -30,6 +30,8 @@ const std::vector<Entry>& entries() {
       entry(declare_box_pushing, make_box_pushing, Push::tactile),
       entry(declare_box_pushing, make_box_pushing, Push::privileged),
       entry(declare_box_pushing, make_box_pushing, Push::reduced),
+      entry(declare_cap_opening, make_cap_opening, CapObservation::tactile),
+      entry(declare_cap_opening, make_cap_opening, CapObservation::blind),
       entry(declare_insertion, make_insertion, InsertionMotion::both),
       entry(declare_insertion, make_insertion, InsertionMotion::translation),
       entry(declare_insertion, make_insertion, InsertionMotion::rotation),

@@ -35,6 +35,11 @@ enum class PushObservation { tactile, privileged, reduced };
 TaskSpec declare_box_pushing(PushObservation observation);
 std::unique_ptr<Task> make_box_pushing(const Scene& scene, PushObservation observation);
 
+/// What is observed besides angles and fingertips: touch, nothing.
+enum class CapObservation { tactile, blind };
+TaskSpec declare_cap_opening(CapObservation observation);
+std::unique_ptr<Task> make_cap_opening(const Scene& scene, CapObservation observation);
+
 /// What is off at the start and what an action corrects.
 enum class InsertionMotion { both, translation, rotation };
 TaskSpec declare_insertion(InsertionMotion motion);

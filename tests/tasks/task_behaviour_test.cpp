@@ -9,55 +9,21 @@
 
 #include "engine/random.hpp"
 #include "tests/tasks/task_check.hpp"
+#include "tests/tasks/task_starts.hpp"
 
 namespace tangere {
 namespace {
 
+using testing::column;
+using testing::kDraws;
+using testing::kUnlikely;
 using testing::OwnView;
 using testing::play_episodes;
 using testing::Played;
+using testing::Start;
+using testing::starts;
 using testing::task_named;
-
-/// Largest distance between the distribution of `x` and the uniform one on [low, high], times √n: below 1.63 with
-/// probability 0.99 (Kolmogorov, Smirnov).
-double uniform_distance(std::vector<double> x, double low, double high) {
-  std::sort(x.begin(), x.end());
-  double most = 0;
-  const auto n = double(x.size());
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    const double expected = (x[i] - low) / (high - low);
-    most = std::max({most, expected - double(i) / n, double(i + 1) / n - expected});
-  }
-  return most * std::sqrt(n);
-}
-constexpr double kUnlikely = 1.63;
-constexpr int kDraws = 10000;
-
-/// Starts of 10 000 episodes.
-struct Start {
-  std::vector<double> q, v, varying, memory;
-};
-std::vector<Start> starts(const Task& task) {
-  std::vector<Start> all;
-  Batch batch(task.model(), 1, 3);
-  for (std::int64_t episode = 0; episode < kDraws; ++episode) {
-    batch.reset(0, episode);
-    Start s{std::vector<double>(std::size_t(task.model().nq())), std::vector<double>(std::size_t(task.model().nv())), {},
-            std::vector<double>(std::size_t(task.spec().memory))};
-    batch.get_q(0, s.q);
-    batch.get_v(0, s.v);
-    for (std::size_t k = 0; k < task.model().scene().randomizations.size(); ++k)
-      s.varying.push_back(batch.randomized_value(0, int(k)));
-    task.start({3, episode, s.q, s.v, s.varying, s.memory});
-    all.push_back(std::move(s));
-  }
-  return all;
-}
-std::vector<double> column(const std::vector<Start>& all, const std::function<double(const Start&)>& of) {
-  std::vector<double> x;
-  for (const Start& s : all) x.push_back(of(s));
-  return x;
-}
+using testing::uniform_distance;
 
 TEST(BoxPushing, StartsFollowTheirDistributions) {
   const auto all = starts(*task_named("box_pushing"));
@@ -427,6 +393,7 @@ TEST(Scripted, InsertsTheBox) {
   expect_solved("insertion_translation", 300, 0.97);
   expect_solved("insertion", 300, 0.80);
 }
+TEST(Scripted, OpensTheCap) { expect_solved("cap_opening_blind", 300, 1); }
 TEST(Scripted, PushesTheBox) { expect_solved("box_pushing_privileged", 1000, 0.71); }
 
 TEST(Policy, RandomKeepsTheBoundsAndATableItsRows) {

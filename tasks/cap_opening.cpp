@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cap opening: three fingers turn a cap, whose damping nobody tells, by an eighth of a turn (Xu et al., fourth
+// experiment).
+//   reward = -0.5 for each finger that does not touch - min(θ - π/4, 0)² - 0.005 |a|²,
+//   and 50 with the end if θ > π/4, or -50 with the end if a fingertip is above 50 mm
+// θ: angle of the cap. a: the action; each angle's target is the angle plus 0.06 rad times a.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "tasks/cap_opening_script.hpp"
+#include "tasks/task_list.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr std::size_t kFingers = 3, kAngles = 9, kRows = 12, kCols = 12, kField = 3 * kRows * kCols;
+constexpr int kActions = 200;
+constexpr double kStep = 0.06;                             // of a target, at a = 1 [rad]
+constexpr double kOpen = std::numbers::pi / 4;             // [rad]
+constexpr double kHighest = 0.05;                          // of a fingertip [m]
+constexpr double kIdle = 0.5, kEffort = 0.005, kEnd = 50;  // of the reward
+constexpr FingerAngles kStart{0, -0.5, 0.8};               // [rad]
+constexpr double kSpread = 0.05;                           // of the start [rad]
+constexpr double kLeast = 1e-3;                            // a pad starts so far from the cap, or farther [m]
+
+/// The scene with the cap's damping as what varies; how an episode starts is up to the task.
+Scene with_damping_alone(Scene scene) {
+  std::erase_if(scene.randomizations,
+                [](const RandomizationDescription& d) { return d.target != RandomTarget::joint_effect; });
+  return scene;
+}
+
+class CapOpening : public Task {
+ public:
+  CapOpening(const Scene& scene, CapObservation observation)
+      : Task(with_damping_alone(scene), declare_cap_opening(observation)),
+        observation_(observation),
+        cap_(coordinate("cap")),
+        finger_(coordinate("swing_1")),
+        script_(model().scene()) {
+    const Scene& s = model().scene();
+    if (model().variables().size() != kFingers || tactile_size() != kFingers * kField || s.motors.size() != kAngles)
+      throw InputError(s.path + ": cap opening needs nine motors, three end effectors, three pads of 12 × 12 points");
+    if (script_.gap(kStart) < kLeast) throw InputError(s.path + ": the fingers of cap opening would start in the cap");
+    for (std::size_t k = 0; k < kAngles; ++k)
+      for (const LinkDescription& link : s.links)
+        if (link.joint.name == s.motors[k].joint) limits_[k] = link.joint.limits.value_or(limits_[k]);
+  }
+
+  /// Every angle is off by chance; a finger that would begin in the cap is drawn again.
+  void start(const TaskStart& s) const override {
+    std::uint32_t drawn = 0;
+    for (std::size_t f = 0; f < kFingers; ++f) {
+      FingerAngles q{};
+      do {
+        for (std::size_t k = 0; k < q.size(); ++k)
+          q[k] = kStart[k] + task_normal(s.seed, s.episode, 0, drawn++, kSpread);
+      } while (script_.gap(q) < kLeast);
+      std::copy(q.begin(), q.end(), s.q.begin() + static_cast<std::ptrdiff_t>(finger_ + f * q.size()));
+    }
+  }
+
+  /// The memory is the script's: which fingers press.
+  void begin_action(const TaskView& view, std::span<double> memory) const override {
+    for (std::size_t f = 0; f < kFingers; ++f) memory[f] = script_.presses(angles(view, f), memory[f] != 0) ? 1 : 0;
+  }
+
+  void controls(const TaskView& view, int, std::span<double> u) const override {
+    for (std::size_t k = 0; k < kAngles; ++k) u[k] = std::clamp(target(view, k), limits_[k][0], limits_[k][1]);
+  }
+
+  void observe(const TaskView& view, std::span<double> o) const override {
+    const Moment& now = view.now();
+    for (std::size_t k = 0; k < kAngles; ++k) o[k] = now.q[finger_ + k];
+    std::copy(now.variables.begin(), now.variables.end(), o.begin() + kAngles);
+    if (observation_ == CapObservation::tactile)
+      std::copy(now.tactile.begin(), now.tactile.end(), o.begin() + 2 * kAngles);
+  }
+
+  Verdict judge(const TaskView& view) const override {
+    double reward = 0;
+    for (std::size_t f = 0; f < kFingers; ++f) reward -= touches(view.now(), f) ? 0 : kIdle;
+    const double missing = std::min(view.now().q[cap_] - kOpen, 0.0);
+    reward -= missing * missing;
+    for (const double a : view.action) reward -= kEffort * a * a;
+    if (left(view.now())) return {reward - kEnd, true, false};
+    if (view.now().q[cap_] > kOpen) return {reward + kEnd, true, true};
+    return {reward, false, false};
+  }
+
+  void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
+    // Every joint here turns about one axis: coordinates and dofs have the same places.
+    out.moments.back().q[cap_] -= weight * 2 * std::min(view.now().q[cap_] - kOpen, 0.0);
+    for (std::size_t k = 0; k < kAngles; ++k) out.action[k] -= weight * 2 * kEffort * view.action[k];
+  }
+
+  void controls_vjp(const TaskView& view, int, std::span<const double> weight,
+                    const ViewCotangent& out) const override {
+    for (std::size_t k = 0; k < kAngles; ++k) {
+      const double to = target(view, k);
+      if (to < limits_[k][0] || to > limits_[k][1]) continue;
+      out.action[k] += weight[k] * kStep;
+      out.moments.back().q[finger_ + k] += weight[k];
+    }
+  }
+
+  /// Feedback of the state, whatever is observed.
+  void scripted(const TaskView& view, std::span<const double>, std::span<double> action) const override {
+    for (std::size_t f = 0; f < kFingers; ++f) {
+      const FingerAngles q = angles(view, f), to = script_.targets(q, view.memory[f] != 0);
+      for (std::size_t k = 0; k < q.size(); ++k)
+        action[f * q.size() + k] = std::clamp((to[k] - q[k]) / kStep, -1.0, 1.0);
+    }
+  }
+
+ private:
+  [[nodiscard]] FingerAngles angles(const TaskView& view, std::size_t finger) const {
+    const double* const q = &view.now().q[finger_ + 3 * finger];
+    return {q[0], q[1], q[2]};
+  }
+  /// Of an angle, before its limits.
+  [[nodiscard]] double target(const TaskView& view, std::size_t k) const {
+    return view.now().q[finger_ + k] + kStep * view.action[k];
+  }
+  /// A field is exactly zero where nothing touches.
+  static bool touches(const Moment& m, std::size_t finger) {
+    const std::span<const double> field = m.tactile.subspan(finger * kField, kField);
+    return std::any_of(field.begin(), field.end(), [](double force) { return force != 0; });
+  }
+  static bool left(const Moment& m) {
+    for (std::size_t f = 0; f < kFingers; ++f)
+      if (m.variables[3 * f + 2] > kHighest) return true;
+    return false;
+  }
+
+  CapObservation observation_;
+  std::size_t cap_, finger_;  // coordinates: the cap's, the first of nine in a row
+  std::array<std::array<double, 2>, kAngles> limits_ = [] {
+    std::array<std::array<double, 2>, kAngles> none{};
+    none.fill({-TensorSpec::kUnbounded, TensorSpec::kUnbounded});
+    return none;
+  }();
+  CapScript script_;
+};
+
+}  // namespace
+
+TaskSpec declare_cap_opening(CapObservation observation) {
+  TaskSpec spec;
+  spec.name = "cap_opening";
+  spec.summary = "Three fingers turn a cap by 45 degrees; angles, fingertips and the fields of the pads are observed.";
+  spec.scene = "cap_opening.xml";
+  spec.success = "the cap is turned by more than 45 degrees";
+  spec.action = {"step", {kAngles}, "1", "of every angle's target from the angle, times 0.06 rad", -1, 1};
+  spec.observations = {{"angles", {kAngles}, "rad", "swing, upper and lower of each finger"},
+                       {"tips", {kFingers, 3}, "m", "middles of the pads' faces"}};
+  spec.steps_per_action = 5;
+  spec.moments = {5};
+  spec.horizon = kActions;
+  spec.memory = kFingers;
+  spec.looks_at_variables = true;
+  spec.looks_at_tactile = true;  // the reward asks which fingers touch
+  if (observation == CapObservation::tactile) {
+    spec.observations.push_back({"tactile", {kFingers, kRows, kCols, 3}, "N", "fields of the pads"});
+  } else {
+    spec.name = "cap_opening_blind";
+    spec.summary = "The same; angles and fingertips alone are observed.";
+  }
+  return spec;
+}
+
+std::unique_ptr<Task> make_cap_opening(const Scene& scene, CapObservation observation) {
+  return std::make_unique<CapOpening>(scene, observation);
+}
+
+}  // namespace tangere

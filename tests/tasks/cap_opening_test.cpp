@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cap opening: what it draws, pays, shows and makes of an action. Derivatives and the script are tested with those of
+// all tasks.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/tasks/task_check.hpp"
+#include "tests/tasks/task_starts.hpp"
+
+namespace tangere {
+namespace {
+
+using testing::column;
+using testing::kDraws;
+using testing::kUnlikely;
+using testing::OwnView;
+using testing::Start;
+using testing::starts;
+using testing::task_named;
+using testing::uniform_distance;
+
+TEST(CapOpening, StartsFollowTheirDistributionsOutsideTheCap) {
+  const auto task = task_named("cap_opening");
+  const auto all = starts(*task);
+  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.varying.at(0); }), 0.01, 0.7), kUnlikely);
+  EXPECT_EQ(all[0].varying.size(), 1U) << "nothing but the cap's damping varies";
+  double mean = 0, square = 0;
+  for (const Start& s : all) {
+    ASSERT_EQ(s.q[0], 0) << "the cap";
+    for (const std::size_t swing : {1U, 4U, 7U}) mean += s.q[swing], square += s.q[swing] * s.q[swing];
+    // Of the first finger: the hip is 28.1 mm from the axis, links are 120 mm, a pad is 6 mm thick and the cap 40 mm.
+    ASSERT_GT(0.0281 - 0.12 * std::sin(s.q[2]) - 0.12 * std::sin(s.q[2] + s.q[3]) - 0.003, 0.041);
+  }
+  // Swings move a pad along the cap only: none of their draws is refused, whatever it is.
+  EXPECT_NEAR(mean / (3 * kDraws), 0, 2.58 * 0.05 / std::sqrt(3 * kDraws));
+  EXPECT_NEAR(std::sqrt(square / (3 * kDraws)), 0.05, 2.58 * 0.05 / std::sqrt(6 * kDraws));
+  VectorTask vector(*task, 64);
+  const std::size_t observed = task->spec().observation_size();
+  for (int e = 0; e < 64; ++e) {
+    const auto o = vector.observation(e);
+    EXPECT_THAT(std::vector<double>(o.begin() + 18, o.end()), ::testing::Each(0.0)) << "a pad touches at the start";
+    ASSERT_EQ(o.size(), observed);
+  }
+}
+
+TEST(CapOpening, PaysWhatThePaperSays) {
+  const auto task = task_named("cap_opening");
+  OwnView own(*task);
+  for (const std::size_t k : {0U, 3U}) own.action[k] = 0.5;
+  own.tactile[0][3 * 144 + 7] = 0.01;  // the second finger touches
+  own.q[0][0] = std::numbers::pi / 4 - 0.2;
+  const double plain = -0.5 * 2 - 0.04 - 0.005 * 0.5;
+  Verdict verdict = task->judge(own.view());
+  EXPECT_NEAR(verdict.reward, plain, 1e-12);
+  EXPECT_FALSE(verdict.terminated || verdict.success);
+  own.variables[0][8] = 0.051;  // the third fingertip is too high
+  verdict = task->judge(own.view());
+  EXPECT_NEAR(verdict.reward, plain - 50, 1e-12);
+  EXPECT_TRUE(verdict.terminated);
+  EXPECT_FALSE(verdict.success);
+  own.variables[0][8] = 0.049;
+  own.q[0][0] = std::numbers::pi / 4 + 0.2;
+  verdict = task->judge(own.view());
+  EXPECT_NEAR(verdict.reward, plain + 0.04 + 50, 1e-12);
+  EXPECT_TRUE(verdict.terminated && verdict.success);
+}
+
+TEST(CapOpening, TargetsFollowTheAnglesWithinTheirLimits) {
+  const auto task = task_named("cap_opening_blind");
+  OwnView own(*task);
+  own.q[0] = {0.3, -0.44, -0.5, 0.8, 0, 1.99, 0, 0, 0, -1.99};
+  own.action = {-1, 1, -0.5, 0, 1, 0, 0, 0, -1};
+  std::vector<double> u(9), q(10), v(10), action(9);
+  task->controls(own.view(), 0, u);
+  const std::vector<double> expected{-0.45, -0.44, 0.77, 0, 2, 0, 0, 0, -2};
+  for (std::size_t k = 0; k < u.size(); ++k) EXPECT_NEAR(u[k], expected[k], 1e-15) << k;
+  const std::vector<MomentCotangent> to{{q, v, {}, {}}};
+  task->controls_vjp(own.view(), 0, std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9}, {to, action});
+  EXPECT_THAT(q, ::testing::ElementsAre(0, 0, 2, 3, 4, 0, 6, 7, 8, 0)) << "a target at its limit stays there";
+  EXPECT_THAT(v, ::testing::Each(0.0));
+}
+
+TEST(CapOpening, RefusesACapThatTheFingersWouldStartIn) {
+  Scene scene = read_scene(TANGERE_SOURCE_DIR "/scenes/cap_opening.xml").scene;
+  for (LinkDescription& link : scene.links)
+    if (link.joint.name == "cap") std::get<CylinderShape>(link.body.shape).radius = 0.05;
+  EXPECT_THROW(static_cast<void>(make_task("cap_opening", scene)), InputError);
+}
+
+TEST(CapOpening, ObservesTouchOrNot) {
+  const auto task = task_named("cap_opening"), blind = task_named("cap_opening_blind");
+  EXPECT_EQ(blind->spec().observation_size(), 18U);
+  EXPECT_EQ(task->spec().observation_size(), 18U + 3 * 12 * 12 * 3);
+  VectorTask seeing(*task, 2), unseeing(*blind, 2);
+  for (std::size_t k = 0; k < 18; ++k) EXPECT_EQ(seeing.observation(1)[k], unseeing.observation(1)[k]);
+  // Every fingertip stands where its angles put it: so far from the axis, and a third of a turn from the next.
+  for (std::size_t f = 0; f < 3; ++f) {
+    const auto o = seeing.observation(1);
+    const double *q = &o[3 * f], *tip = &o[9 + 3 * f];
+    const double turn = 2 * std::numbers::pi / 3 * double(f), tilt = q[1] + q[2] - 0.3;
+    const double out = 0.0281 - 0.12 * std::sin(q[1]) - 0.12 * std::sin(q[1] + q[2]) - 0.003 * std::cos(tilt);
+    EXPECT_NEAR(std::cos(turn) * tip[0] + std::sin(turn) * tip[1], out, 1e-6) << "finger " << f + 1;
+  }
+}
+
+}  // namespace
+}  // namespace tangere
