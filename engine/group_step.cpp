@@ -19,6 +19,7 @@ namespace {
 constexpr int kDeepestSplit = 6;  // h / 2^6
 // Inside a split the search may be long: a short leash there loses runs that a patient one finishes.
 constexpr int kHalvings = 10, kSplitHalvings = 20, kSplitIterations = 40;
+constexpr int kPatience = 2, kSplitPatience = 40;
 
 template <int L>
 void fill(Row<L>& row, double value) {
@@ -33,7 +34,7 @@ LaneBits GroupStep::solve_one_stage(const kernels::KernelTable& table, BasicWork
   fill(w.stage.c0_over_h, c0 / h);
   fill(w.stage.inverse_h, 1 / h);
   const NewtonLimits limits = {settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
-                               inside_split ? kSplitHalvings : kHalvings};
+                               inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience};
   return solve_stage(model_, table, w, lanes, limits, report);
 }
 

@@ -2,8 +2,11 @@
 // Newton in lanes. All searching lanes are evaluated together; each lane accepts or halves its own step.
 //
 // Accepted when a trial x - αΔ passes the natural test ‖D^½ A⁻¹ g(x - αΔ)‖ ≤ (1 - α/4) ‖D^½ Δ‖ with the factor at
-// hand (D = diag M at the first point), or when it already converges: its scaled residual (kernels/norms-inl.hpp) is at
-// most the tolerance. The rounding floor in it comes from the last point that a direction was computed at.
+// hand (D = diag M at the first point), when its scaled residual r (kernels/norms-inl.hpp) is at most (1 - α/4) of the
+// last point's, or when r is at most the tolerance. One test alone stalls at first touches: the natural test where a factor
+// from before the touch says nothing of the forces after it, the residual where a long way must first be gone uphill.
+// The rounding floor in r comes from the last point that a direction was computed at. A lane whose residual reaches no new
+// low in `patience` directions goes back and forth over a kink: it gives up.
 //
 // The natural test has A⁻¹ g at the new point already: the next step if the factor at hand is used again (a chord step).
 // Such steps leave a fixed share ρ of the residual, about twice what the Newton step before them left of its own, and
@@ -37,11 +40,13 @@ struct Search {
   LaneBits use_pivoted = 0;     ///< lanes whose factor at hand is the pivoted one
   std::array<double, L> alpha{}, delta_norm{};
   std::array<double, L> last{};      ///< scaled residual of the last accepted point
+  std::array<double, L> lowest{};    ///< of all accepted points
   std::array<double, L> expected{};  ///< what should be left once the next point has had its chord step
   LaneBits chord = 0;                     ///< lanes whose trial is a chord step
   LaneBits no_chord = 0;                  ///< lanes that had one fail
   bool with_jacobian = true;              ///< the last evaluation
   std::array<int, L> halvings{}, directions{};
+  std::array<int, L> idle{};              ///< directions since the lowest residual
 
   [[nodiscard]] int n() const { return model.nv; }
   [[nodiscard]] const kernels::StageKernels<L>& kernel() const { return table.stage<L>(); }
@@ -126,15 +131,17 @@ struct Search {
       } else if (!has(on_trial, l)) {
         if (std::isfinite(residual[l])) {
           accepted |= 1U << l;
-          last[l] = residual[l];
+          last[l] = lowest[l] = residual[l];
         } else {
           stop(l, StepStatus::non_finite);
         }
-      } else if (test_norm[l] <= (1 - 0.25 * alpha[l]) * delta_norm[l]) {
+      } else if (descends(l, test_norm[l], residual[l])) {
         report.residual[l] = residual[l];
         const double ratio = residual[l] / last[l];
         if (chord_suffices(l, residual[l], has(chord, l) ? ratio : 2 * ratio)) {
           take_chord(l, test_norm[l]);
+        } else if (stalls(l, residual[l])) {
+          stop(l, StepStatus::not_converged);
         } else {
           accepted |= 1U << l;
           const double next = ratio * ratio, share = 2 * next;  // a Newton step squares the ratio
@@ -152,6 +159,20 @@ struct Search {
       }
     }
     return accepted;
+  }
+
+  /// Of a chord step only the natural test counts: what its factor leaves is what decides about the next.
+  [[nodiscard]] bool descends(int l, double test_norm, double residual) const {
+    const double share = 1 - 0.25 * alpha[l];
+    return test_norm <= share * delta_norm[l] || (!has(chord, l) && residual <= share * last[l]);
+  }
+  [[nodiscard]] bool stalls(int l, double residual) {
+    if (residual < lowest[l]) {
+      lowest[l] = residual;
+      idle[l] = 0;
+      return false;
+    }
+    return ++idle[l] > limits.patience;
   }
 
   [[nodiscard]] bool chord_suffices(int l, double residual, double share) const {
@@ -242,7 +263,7 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
 template <int L>
 LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                      NewtonReport& report) {
-  static constexpr NewtonLimits kOnce{0, 1, 0};
+  static constexpr NewtonLimits kOnce{0, 1, 0, 0};
   Search<L> s{model, table, w, kOnce, report, magnitude(model.view.gravity), lanes};
   s.evaluate(true);
   kernels::Row<L> residual;

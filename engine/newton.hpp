@@ -13,6 +13,7 @@ struct NewtonLimits {
   double tolerance;    ///< on the scaled residual
   int max_iterations;  ///< Newton directions
   int max_halvings;    ///< per direction
+  int patience;        ///< directions in a row without a new lowest residual
 };
 
 /// Per lane: how the solve went. Lanes that were not asked for keep what they had.
