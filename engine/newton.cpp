@@ -14,7 +14,8 @@
 // the natural test is taken back for a Newton step.
 //
 // Whether an evaluation brings the Jacobian along is a guess about cost, never about results: g alone where every lane
-// should be done or take a chord step, and the Jacobian after it when one was not.
+// should be done or take a chord step, and the Jacobian after it when one was not. The Jacobian of one lane costs its contacts
+// a third of a group's: where a single lane needs one, it comes after g too.
 #include "engine/newton.hpp"
 
 #include <cmath>
@@ -51,10 +52,8 @@ struct Search {
   [[nodiscard]] int n() const { return model.nv; }
   [[nodiscard]] const kernels::StageKernels<L>& kernel() const { return table.stage<L>(); }
 
-  /// The only searching lane, or -1.
-  [[nodiscard]] int lone() const {
-    return (searching & (searching - 1)) == 0 ? __builtin_ctz(searching) : -1;
-  }
+  /// The only one of `lanes`, of which there are some, or -1.
+  static int lone(LaneBits lanes) { return (lanes & (lanes - 1)) == 0 ? __builtin_ctz(lanes) : -1; }
 
   /// Poses at x; lists of lanes that have none yet or outran theirs.
   void locate(bool first) {
@@ -64,16 +63,17 @@ struct Search {
       if (has(searching, l) && w.stage.excess[0][l] > 0) stale |= 1U << l;
     if (stale != 0) find_candidates(model, table, w, stale);
     if constexpr (L > 1)
-      if (lone() < 0) lists_to_rows(table, w, searching);
+      if (lone(searching) < 0) lists_to_rows(table, w, searching);
   }
 
-  /// The pass that is due: g alone where every lane should be done, else everything.
+  /// The pass that is due: g alone where all lanes but one should be done, else everything.
   void evaluate(bool first) {
     locate(first);
-    with_jacobian = first;
+    LaneBits open = 0;
     for (int l = 0; l < L; ++l)
-      if (has(searching, l) && !(expected[l] <= limits.tolerance)) with_jacobian = true;
-    (with_jacobian ? kernel().evaluate : kernel().residual)(model.view, w.stage, lone());
+      if (has(searching, l) && !(expected[l] <= limits.tolerance)) open |= 1U << l;
+    with_jacobian = first || (open != 0 && (lone(open) < 0 || open == searching));
+    (with_jacobian ? kernel().evaluate : kernel().residual)(model.view, w.stage, lone(searching));
     if (first) {
       kernel().set_weights(model.view, w.stage);
       set_floor(searching);
@@ -200,7 +200,7 @@ struct Search {
 
   /// New directions at the accepted points, and the full step along each as the next trial.
   void new_directions(LaneBits accepted) {
-    if (!with_jacobian) kernel().evaluate(model.view, w.stage, lone());
+    if (!with_jacobian) kernel().evaluate(model.view, w.stage, lone(accepted));
     set_floor(accepted);
     const LaneRow accept = row_of(accepted);
     kernel().factor(model.view, w.stage, (searching & ~accepted) == 0 ? nullptr : &accept);
