@@ -19,7 +19,7 @@ namespace {
 constexpr int kDeepestSplit = 6;  // h / 2^6
 // Inside a split the search may be long: a short leash there loses runs that a patient one finishes.
 constexpr int kHalvings = 10, kSplitHalvings = 20, kSplitIterations = 40;
-constexpr int kPatience = 2, kSplitPatience = 40;
+constexpr int kPatience = 4, kSplitPatience = 40;
 
 template <int L>
 void fill(Row<L>& row, double value) {

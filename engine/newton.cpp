@@ -5,8 +5,12 @@
 // hand (D = diag M at the first point), when its scaled residual r (kernels/norms-inl.hpp) is at most (1 - α/4) of the
 // last point's, or when r is at most the tolerance. One test alone stalls at first touches: the natural test where a factor
 // from before the touch says nothing of the forces after it, the residual where a long way must first be gone uphill.
-// The rounding floor in r comes from the last point that a direction was computed at. A lane whose residual reaches no new
-// low in `patience` directions goes back and forth over a kink: it gives up.
+// The rounding floor in r comes from the last point that a direction was computed at.
+//
+// Where a direction brings no new lowest residual, the search goes back and forth between sticking and slipping: the slope of
+// one side leads far into the other. The next directions then take friction by its secant, -s v_t with s as it is. That
+// converges slowly from anywhere, so any decrease will do, and a few such directions reach the side that the root is on. A
+// lane that finds no new lowest residual for `patience` directions gives up.
 //
 // The natural test has A⁻¹ g at the new point already: the next step if the factor at hand is used again (a chord step).
 // Such steps leave a fixed share ρ of the residual, about twice what the Newton step before them left of its own, and
@@ -26,6 +30,11 @@ namespace tangere {
 
 
 namespace {
+
+// Decrease that a trial must bring, per α: of Newton's directions and of those by the secant, of which there are `kSecants`
+// in a row.
+constexpr double kDecrease = 0.25, kSecantDecrease = 0.01;
+constexpr int kSecants = 3;
 
 template <int L>
 struct Search {
@@ -48,6 +57,7 @@ struct Search {
   bool with_jacobian = true;              ///< the last evaluation
   std::array<int, L> halvings{}, directions{};
   std::array<int, L> idle{};              ///< directions since the lowest residual
+  std::array<int, L> secants{};           ///< directions left that take friction by its secant
 
   [[nodiscard]] int n() const { return model.nv; }
   [[nodiscard]] const kernels::StageKernels<L>& kernel() const { return table.stage<L>(); }
@@ -163,16 +173,24 @@ struct Search {
 
   /// Of a chord step only the natural test counts: what its factor leaves is what decides about the next.
   [[nodiscard]] bool descends(int l, double test_norm, double residual) const {
-    const double share = 1 - 0.25 * alpha[l];
+    const double share = 1 - (secants[l] > 0 ? kSecantDecrease : kDecrease) * alpha[l];
     return test_norm <= share * delta_norm[l] || (!has(chord, l) && residual <= share * last[l]);
   }
+  /// Chooses how the next direction takes friction; whether there should be none.
   [[nodiscard]] bool stalls(int l, double residual) {
     if (residual < lowest[l]) {
       lowest[l] = residual;
       idle[l] = 0;
+      if (secants[l] > 0) use_secant(l, secants[l] - 1);
       return false;
     }
+    use_secant(l, kSecants);
     return ++idle[l] > limits.patience;
+  }
+  void use_secant(int l, int directions_left) {
+    if ((secants[l] > 0) != (directions_left > 0)) with_jacobian = false;  // the one at hand is of the other kind
+    secants[l] = directions_left;
+    w.stage.friction_tangent[l] = directions_left > 0 ? 0 : 1;
   }
 
   [[nodiscard]] bool chord_suffices(int l, double residual, double share) const {
@@ -254,6 +272,7 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
     const LaneBits accepted = s.judge();
     if (accepted != 0) s.new_directions(accepted);
   }
+  for (int l = 0; l < L; ++l) w.stage.friction_tangent[l] = 1;
   LaneBits converged = 0;
   for (int l = 0; l < L; ++l)
     if (has(lanes, l) && report.status[l] == StepStatus::converged) converged |= 1U << l;

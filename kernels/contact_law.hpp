@@ -18,6 +18,8 @@ struct LawParameters {
   N kn, kt, mu, damping;
   ContactLaw law;
   double ramp;
+  /// Whether slipping points bring the derivative of -scale v_t (1) or, by its secant, -scale alone (0).
+  N friction_tangent = N(1.0);
 };
 
 /// N and the friction bound over μ, with their slopes.
@@ -76,22 +78,22 @@ NormalForce<N> normal_force(const LawParameters<N>& p, const N& d, const N& rate
 template <class N>
 struct Friction {
   N scale;           ///< k_t when sticking, μ B / |v_t| when slipping
-  N slip;            ///< 1 when slipping, 0 when sticking
-  Vec3<N> direction; ///< v_t / |v_t| when slipping, 0 when sticking
+  N slip;            ///< 1 when slipping and its derivative counts, else 0
+  Vec3<N> direction; ///< v_t / |v_t| where slip is 1, else 0
 };
 
 /// `square` = |v_t|², `inverse_speed` = 1/|v_t|, finite at v_t = 0.
 template <class N>
 Friction<N> friction(const LawParameters<N>& p, const NormalForce<N>& normal, const Vec3<N>& vt, const N& square,
                      const N& inverse_speed) {
-  const N zero(0.0), one(1.0);
+  const N zero(0.0);
   const N limit = p.mu * normal.bound;
   const auto slipping = p.kt * (square * inverse_speed) > limit;  // false at v_t = 0
   const N inverse = select(slipping, inverse_speed, zero);
   Friction<N> f;
   f.scale = select(slipping, limit * inverse, p.kt);
-  f.slip = select(slipping, one, zero);
-  f.direction = inverse * vt;
+  f.slip = select(slipping, p.friction_tangent, zero);
+  f.direction = (f.slip * inverse) * vt;
   return f;
 }
 

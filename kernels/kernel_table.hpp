@@ -31,6 +31,7 @@ struct Stage {
   std::byte* scratch;    ///< scratch_bytes(model)
   Row<L> *v, *g, *force_scale, *mass_diagonal, *A, *LU, *work, *excess;
   Row<L> *weight, *inverse_weight;  ///< (nv) D^½ and D^-½, D the mass diagonal
+  Row<L> friction_tangent = Row<L>::all(1);  ///< 1: the Jacobian is that of g; 0: friction of slipping points by its secant
   Row<L> floor;                     ///< smallest ‖D^-½ g‖² that one rounding of x lets one see
 };
 using GroupStage = Stage<kGroup>;

@@ -22,6 +22,11 @@ struct alignas(8 * L) Row {
   double lane[L];
   double& operator[](int l) { return lane[l]; }
   const double& operator[](int l) const { return lane[l]; }
+  static Row all(double x) {
+    Row row;
+    for (double& y : row.lane) y = x;
+    return row;
+  }
 };
 
 using LaneRow = Row<kGroup>;

@@ -201,7 +201,8 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
     const PairContact& pair = model.pairs[k];
     const CandidateList<N>& list = a.candidates[k];
     if (!has_candidates(list, a.lone)) continue;
-    const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
+    LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
+    law.friction_tangent = a.friction_tangent;
     const auto frame = [&] { return compose(o.link2_in_1, broadcast<N>(pair.frame2)); };
     with_distance<N>(pair.shape, pair.size, [&]<template <class> class Shape>(const Shape<N>& shape) {
       if constexpr (Shape<N>::kBending == Bending::ball) {
@@ -231,7 +232,8 @@ bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const St
     if (!any(dot(m, broadcast<N>(ground.middle)) + height < N(ground.extent))) continue;
     if (!started) start<Derivatives>(sums);
     started = true;
-    const LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
+    LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
+    law.friction_tangent = a.friction_tangent;
     for (int k = 0; k < ground.n_points; ++k) {
       const double* p = ground.points + 3 * k;
       near |= accumulate_ground<Derivatives>(sums, law, m, height, link.V, Vec3<N>{N(p[0]), N(p[1]), N(p[2])},

@@ -69,6 +69,7 @@ struct StageArgs {
   const N* tau;      ///< (nv) actuator force
   const N* target;   ///< (nv) of position motors
   N c0_over_h, inverse_h;
+  N friction_tangent = N(1.0);  ///< of a derivative: kernels/contact_law.hpp
   const double* block;  ///< of the batch, for parameters that vary
   int group;            ///< 0 or 1: which half of the block
   const CandidateList<N>* candidates;  ///< (n_pairs)

@@ -70,6 +70,7 @@ struct StageTable {
     a.target = view(s.target);
     a.c0_over_h = *view(&s.c0_over_h);
     a.inverse_h = *view(&s.inverse_h);
+    a.friction_tangent = *view(&s.friction_tangent);
     a.block = s.block;
     a.group = s.group;
     a.v = view(s.v);

@@ -81,11 +81,13 @@ void expect_close(const std::vector<double>& a, const std::vector<double>& b, do
 
 class KernelTables : public ::testing::TestWithParam<unsigned> {};
 
-void compare_tables(const Scene& scene, unsigned seed) {
+/// `friction_tangent`: of the lane that is looked at; its neighbours have the other.
+void compare_tables(const Scene& scene, unsigned seed, double friction_tangent = 1) {
   const auto m = compile(scene);
   StageBuffers<double> b(*m);
   Random random(seed);
   testing::randomise(b, *m, random, kStep);
+  b.friction_tangent = friction_tangent;
   b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
   Outputs fused;
   for (const kernels::KernelTable* table : kernels::available_kernels()) {
@@ -96,6 +98,7 @@ void compare_tables(const Scene& scene, unsigned seed) {
         Workspace w(*m);
         list_everything(*m, w);
         set_constants(w);
+        for (int l = 0; l < kGroup; ++l) w.stage.friction_tangent[l] = l == lane ? friction_tangent : 1 - friction_tangent;
         for (int l = 0; l < kGroup; ++l) fill_lane(w, *m, b, l);
         for (int l = 0; l < kGroup; ++l) {
           if (l == lane) continue;
@@ -125,6 +128,7 @@ void compare_tables(const Scene& scene, unsigned seed) {
     SingleWorkspace single(*m);
     list_everything(*m, single);
     set_constants(single);
+    single.stage.friction_tangent[0] = friction_tangent;
     fill_lane(single, *m, b, 0);
     table->single.kinematics(m->view, single.stage);
     table->single.evaluate(m->view, single.stage, 0);
@@ -149,6 +153,11 @@ void compare_tables(const Scene& scene, unsigned seed) {
 TEST_P(KernelTables, EvaluateMatchesTheScalarReferenceWhateverTheNeighboursHold) {
   const unsigned seed = GetParam();
   compare_tables(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed);
+}
+
+TEST_P(KernelTables, FrictionBySecantMatchesTheScalarReferenceWhateverTheNeighboursTake) {
+  const unsigned seed = GetParam();
+  compare_tables(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed, 0);
 }
 
 TEST_P(KernelTables, JointEffectsMatchTheScalarReferenceWhateverTheNeighboursHold) {

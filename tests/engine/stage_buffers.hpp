@@ -41,6 +41,7 @@ class StageBuffers {
     a.target = target.data();
     a.c0_over_h = N(c0_over_h);
     a.inverse_h = N(inverse_h);
+    a.friction_tangent = N(friction_tangent);
     a.block = block;
     a.group = 0;
     a.candidates = lists_.data();
@@ -74,6 +75,7 @@ class StageBuffers {
   }
 
   std::vector<N> centre, x, r, s, tau, target, v_out, g, force_scale, mass, A;
+  double friction_tangent = 1;  ///< 0: the Jacobian takes friction by its secant
 
  private:
   const CompiledModel& model_;

@@ -2,6 +2,7 @@
 // The law of one point: values against the formulas written out, derivatives against dual numbers and differences.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <utility>
 #include <vector>
 
@@ -207,6 +208,38 @@ TEST(ContactLaw, FrictionNeverExceedsItsBoundAndNeverDividesByZero) {
       }
     }
   }
+}
+
+TEST(ContactLaw, FrictionBySecantHasTheSameForceAndAConstantScale) {
+  Random random(29);
+  int slips = 0;
+  for (int k = 0; k < 200; ++k) {
+    LawParameters<double> law = {random.uniform(100, 1e4), random.uniform(1, 100), random.uniform(0.1, 2), 10,
+                                 ContactLaw::clamped, 0};
+    const Vec3<double> omega = random.vector(1), v = random.vector(1), xi = {0, 0, 0};
+    const auto sums = [&](double tangent) {
+      law.friction_tangent = tangent;
+      PairSums<double> s = PairSums<double>::zero();
+      accumulate<true>(s, SphereDistance<double>{0.02}, law, diagonal(1.0), Vec3<double>{0, 0, 0.019}, omega, v, xi);
+      return s;
+    };
+    const PairSums<double> exact = sums(1), secant = sums(0);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ((&exact.wrench.l.x)[i], (&secant.wrench.l.x)[i]);
+    // The normal is z: of a point that slips, what the force across it is by the velocity across it. In the derivative
+    // that is -s (I - t tᵀ), by the secant -s I.
+    const auto block = [](const PairSums<double>& s) { return std::array{s.d[1][1].m[0][0], s.d[1][1].m[0][1], s.d[1][1].m[1][1]}; };
+    const std::array<double, 3> e = block(exact), s = block(secant);
+    EXPECT_NEAR(s[0], s[2], 1e-12 * std::abs(s[0]));
+    EXPECT_NEAR(s[1], 0, 1e-12 * std::abs(s[0]));
+    if (std::abs(s[0]) < law.kt * (1 - 1e-9)) {  // slips
+      ++slips;
+      EXPECT_NEAR(e[0] + e[2], s[0], 1e-9 * std::abs(s[0])) << "one of two directions is free";
+      EXPECT_NEAR(e[0] * e[2] - e[1] * e[1], 0, 1e-9 * s[0] * s[0]);
+    } else {
+      EXPECT_NEAR(e[0], s[0], 1e-12 * std::abs(s[0]));
+    }
+  }
+  EXPECT_GT(slips, 50);
 }
 
 TEST(ContactLaw, NoContactIsExactlyZero) {
