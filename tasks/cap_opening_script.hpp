@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a finger turns a cap when everything is known: where its pad is, where it should go, and the angles for that. It
-// goes back out of touch, presses, and moves along the cap until it runs out of pad.
+// How a finger turns a cap when everything is known: where its tip is, where it should go, and the angles for that. It
+// goes back out of touch, presses, and goes around the cap as far as it reaches.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ class CapScript {
   /// Takes lengths from the scene: all three fingers are like the first.
   explicit CapScript(const Scene& scene);
 
-  /// From the cap to the nearest edge of the pad's face, along the finger's radius [m]; negative: it would touch.
+  /// From the cap to the tip [m]; negative: they would touch.
   [[nodiscard]] double gap(const FingerAngles& q) const;
   /// Whether a finger presses next, given whether it does now.
   [[nodiscard]] bool presses(const FingerAngles& q, bool now) const;
@@ -25,14 +25,17 @@ class CapScript {
   [[nodiscard]] FingerAngles targets(const FingerAngles& q, bool pressing) const;
 
  private:
-  /// Of the pad's middle [m]: from the cap's axis outward, along the stroke, below the hip.
-  [[nodiscard]] std::array<double, 3> place(const FingerAngles& q) const;
-  [[nodiscard]] FingerAngles angles_at(const std::array<double, 3>& place) const;
+  /// Of the middle of the tip's sphere: from the cap's axis [m], around it [rad] from where the finger points.
+  struct Place {
+    double out, around;
+  };
+  [[nodiscard]] Place place(const FingerAngles& q) const;
+  /// Angles at which a tip is there, at the height of the cap's middle.
+  [[nodiscard]] FingerAngles angles_at(const Place& place) const;
 
   double hip_ = 0, upper_ = 0, lower_ = 0;  // hip from the axis, lengths of the links [m]
-  double radius_ = 0;                       // of the cap [m]
-  double half_height_ = 0, half_thickness_ = 0;  // of a pad [m]
-  double below_ = 0;                             // pads work so far below the hip: at the middle of the cap [m]
+  double radius_ = 0, tip_ = 0;             // of the cap and of a tip [m]
+  double below_ = 0;                        // tips work so far below the hip: at the middle of the cap [m]
 };
 
 }  // namespace tangere
