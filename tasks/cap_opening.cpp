@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cap opening: three fingers turn a cap, whose damping nobody tells, by an eighth of a turn (Xu et al., fourth
+// Cap opening: three fingers turn a cap, whose damping, radius and place nobody tells, by an eighth of a turn (Xu et al., fourth
 // experiment).
 //   reward = -0.5 for each finger that does not touch - min(θ - π/4, 0)² - 0.005 |a|²,
 //   and 50 with the end if θ > π/4, or -50 with the end if a fingertip is above 50 mm
@@ -27,19 +27,32 @@ constexpr double kHighest = 0.05;                          // of a fingertip [m]
 constexpr double kIdle = 0.5, kEffort = 0.005, kEnd = 50;  // of the reward
 constexpr FingerAngles kStart{0, -0.5, 0.8};               // [rad]
 constexpr double kSpread = 0.05;                           // of the start [rad]
+constexpr double kSmallest = 0.02, kLargest = 0.08;        // radius of the cap [m]
+constexpr double kOffset = 0.02;                           // of its axis, along x and y [m]
 constexpr double kLeast = 1e-3;                            // a tip starts so far from the cap, or farther [m]
 
-/// The scene with the cap's damping as what varies; how an episode starts is up to the task.
-Scene with_damping_alone(Scene scene) {
+/// The scene with the cap's damping, radius and place as what varies, in this order; how an episode starts is up to the task.
+Scene with_cap_varying(Scene scene) {
   std::erase_if(scene.randomizations,
                 [](const RandomizationDescription& d) { return d.target != RandomTarget::joint_effect; });
+  const auto vary = [&](RandomTarget target, int index, double low, double high) {
+    RandomizationDescription d;
+    d.target = target;
+    d.name = "cap";
+    d.index = index;
+    d.distribution.a = low;
+    d.distribution.b = high;
+    scene.randomizations.push_back(d);
+  };
+  vary(RandomTarget::size, 0, kSmallest, kLargest);
+  for (const int axis : {0, 1}) vary(RandomTarget::place, axis, -kOffset, kOffset);
   return scene;
 }
 
 class CapOpening : public Task {
  public:
   CapOpening(const Scene& scene, CapObservation observation)
-      : Task(with_damping_alone(scene), declare_cap_opening(observation)),
+      : Task(with_cap_varying(scene), declare_cap_opening(observation)),
         observation_(observation),
         cap_(coordinate("cap")),
         finger_(coordinate("swing_1")),
@@ -48,7 +61,8 @@ class CapOpening : public Task {
     if (model().variables().size() != kFingers || s.sensors.size() != kFingers || s.motors.size() != kAngles)
       throw InputError(s.path + ": cap opening needs nine motors, three end effectors and three tactile sensors");
     for (const TactileDescription& tip : s.sensors) draw(tip, s.path);
-    if (script_.gap(kStart) < kLeast) throw InputError(s.path + ": the fingers of cap opening would start in the cap");
+    if (script_.gap(kStart, {kLargest, kOffset, kOffset}) < kLeast)
+      throw InputError(s.path + ": the fingers of cap opening would start in the cap");
     for (std::size_t k = 0; k < kAngles; ++k)
       for (const LinkDescription& link : s.links)
         if (link.joint.name == s.motors[k].joint) limits_[k] = link.joint.limits.value_or(limits_[k]);
@@ -56,20 +70,22 @@ class CapOpening : public Task {
 
   /// Every angle is off by chance; a finger that would begin in the cap is drawn again.
   void start(const TaskStart& s) const override {
+    std::copy_n(s.varying.end() - 3, 3, s.memory.begin() + kFingers);
     std::uint32_t drawn = 0;
     for (std::size_t f = 0; f < kFingers; ++f) {
       FingerAngles q{};
       do {
         for (std::size_t k = 0; k < q.size(); ++k)
           q[k] = kStart[k] + task_normal(s.seed, s.episode, 0, drawn++, kSpread);
-      } while (script_.gap(q) < kLeast);
+      } while (script_.gap(q, cap(s.memory, f)) < kLeast);
       std::copy(q.begin(), q.end(), s.q.begin() + static_cast<std::ptrdiff_t>(finger_ + f * q.size()));
     }
   }
 
-  /// The memory is the script's: which fingers press.
+  /// The memory is the script's: which fingers press; radius and place of the cap.
   void begin_action(const TaskView& view, std::span<double> memory) const override {
-    for (std::size_t f = 0; f < kFingers; ++f) memory[f] = script_.presses(angles(view, f), memory[f] != 0) ? 1 : 0;
+    for (std::size_t f = 0; f < kFingers; ++f)
+      memory[f] = script_.presses(angles(view, f), cap(memory, f), memory[f] != 0) ? 1 : 0;
   }
 
   void controls(const TaskView& view, int, std::span<double> u) const override {
@@ -117,7 +133,7 @@ class CapOpening : public Task {
   /// Feedback of the state, whatever is observed.
   void scripted(const TaskView& view, std::span<const double>, std::span<double> action) const override {
     for (std::size_t f = 0; f < kFingers; ++f) {
-      const FingerAngles q = angles(view, f), to = script_.targets(q, view.memory[f] != 0);
+      const FingerAngles q = angles(view, f), to = script_.targets(q, cap(view.memory, f), view.memory[f] != 0);
       for (std::size_t k = 0; k < q.size(); ++k)
         action[f * q.size() + k] = std::clamp((to[k] - q[k]) / kStep, -1.0, 1.0);
     }
@@ -137,6 +153,12 @@ class CapOpening : public Task {
     if (!fits)
       throw InputError(fmt::format("{}: tactile sensor '{}'; cap opening needs {} points, each with a pixel of its own of {} × {}",
                                    path, tip.name, kPoints, kSide, kSide));
+  }
+  /// The cap as a finger sees it: the fingers stand a third of a turn apart.
+  static CapSeen cap(std::span<const double> memory, std::size_t finger) {
+    const double turn = 2 * std::numbers::pi / kFingers * static_cast<double>(finger), c = std::cos(turn), s = std::sin(turn);
+    const double x = memory[kFingers + 1], y = memory[kFingers + 2];
+    return {memory[kFingers], c * x + s * y, c * y - s * x};
   }
   [[nodiscard]] FingerAngles angles(const TaskView& view, std::size_t finger) const {
     const double* const q = &view.now().q[finger_ + 3 * finger];
@@ -182,7 +204,7 @@ TaskSpec declare_cap_opening(CapObservation observation) {
   spec.steps_per_action = 5;
   spec.moments = {5};
   spec.horizon = kActions;
-  spec.memory = kFingers;
+  spec.memory = kFingers + 3;
   spec.looks_at_variables = true;
   spec.looks_at_tactile = true;  // the reward asks which fingers touch
   if (observation == CapObservation::tactile) {

@@ -9,13 +9,14 @@
 namespace tangere {
 namespace {
 
-constexpr double kBack = -0.5, kEnd = 0.5;  // of a stroke, around the cap [rad]
+constexpr double kWidest = 0.65;            // a stroke goes so far around to either side: tips stay apart [rad]
+constexpr double kFarthest = 0.046;         // or as far as this is along the cap, if that is less [m]
 constexpr double kReached = 0.05;           // [rad]
-constexpr double kInto = 0.02;              // a pressing tip aims so far into the cap [m]
+constexpr double kInto = 0.015;             // a pressing tip aims so far into the cap [m]
 constexpr double kAway = 6e-3;              // a tip goes back so far from the cap [m]
 constexpr double kClear = 2e-3;             // and around when it is so far away [m]
 constexpr double kTouching = 5e-4;          // closer it goes around with the cap [m]
-constexpr double kAhead = 0.03;             // around, farther ahead of itself than an action reaches [m]
+constexpr double kAhead = 0.012;            // and so far ahead of itself [m]
 
 /// Of contact points about the middle of their hemisphere.
 double tip_radius(const BodyDescription& body) {
@@ -39,20 +40,19 @@ CapScript::CapScript(const Scene& scene) {
     if (link.joint.name == "lower_1") upper_ = -p[2];
     if (link.joint.name == "tip_1") lower_ = -p[2], tip_ = tip_radius(link.body);
     if (link.joint.name == "bottle" || link.joint.name == "cap") height += p[2];
-    if (link.joint.name != "cap") continue;
-    if (const auto* cap = std::get_if<CylinderShape>(&link.body.shape)) radius_ = cap->radius;
   }
   below_ = hip_height - height;
 }
 
-CapScript::Place CapScript::place(const FingerAngles& q) const {
-  const double out = hip_ - upper_ * std::sin(q[1]) - lower_ * std::sin(q[1] + q[2]);
-  const double down = upper_ * std::cos(q[1]) + lower_ * std::cos(q[1] + q[2]), along = down * std::sin(q[0]);
+CapScript::Place CapScript::place(const FingerAngles& q, const CapSeen& cap) const {
+  const double out = hip_ - upper_ * std::sin(q[1]) - lower_ * std::sin(q[1] + q[2]) - cap.out;
+  const double down = upper_ * std::cos(q[1]) + lower_ * std::cos(q[1] + q[2]), along = down * std::sin(q[0]) - cap.left;
   return {std::hypot(out, along), std::atan2(along, out)};
 }
 
-FingerAngles CapScript::angles_at(const Place& place) const {
-  const double along = place.out * std::sin(place.around), in = hip_ - place.out * std::cos(place.around);
+FingerAngles CapScript::angles_at(const Place& place, const CapSeen& cap) const {
+  const double along = place.out * std::sin(place.around) + cap.left;
+  const double in = hip_ - place.out * std::cos(place.around) - cap.out;
   const double down = std::hypot(along, below_), reach = std::hypot(in, down);
   const double bend = (reach * reach - upper_ * upper_ - lower_ * lower_) / (2 * upper_ * lower_);
   const double lower = std::acos(std::clamp(bend, -1.0, 1.0));
@@ -60,17 +60,23 @@ FingerAngles CapScript::angles_at(const Place& place) const {
   return {std::atan2(along, below_), upper, lower};
 }
 
-double CapScript::gap(const FingerAngles& q) const { return place(q).out - radius_ - tip_; }
+double CapScript::gap(const FingerAngles& q, const CapSeen& cap) const { return place(q, cap).out - cap.radius - tip_; }
 
-bool CapScript::presses(const FingerAngles& q, bool now) const {
-  const double around = place(q).around;
-  return now ? around < kEnd : std::abs(around - kBack) < kReached;
+double CapScript::end(const CapSeen& cap) const { return std::min(kWidest, kFarthest / (cap.radius + tip_)); }
+
+bool CapScript::presses(const FingerAngles& q, const CapSeen& cap, bool now) const {
+  const double around = place(q, cap).around;
+  return now ? around < end(cap) : std::abs(around + end(cap)) < kReached;
 }
 
-FingerAngles CapScript::targets(const FingerAngles& q, bool pressing) const {
-  const double around = place(q).around, off = gap(q), middle = radius_ + tip_;
-  if (pressing) return angles_at({middle - kInto, off < kTouching ? around + kAhead / middle : kBack});
-  return angles_at({middle + kAway, off > kClear ? kBack : around});
+FingerAngles CapScript::targets(const FingerAngles& q, const CapSeen& cap, bool pressing) const {
+  const double around = place(q, cap).around, off = gap(q, cap), middle = cap.radius + tip_;
+  if (pressing && off < kTouching) {  // inward from where it is, and along the cap
+    const double inward = middle - kInto;
+    return angles_at({std::hypot(inward, kAhead), around + std::atan2(kAhead, inward)}, cap);
+  }
+  if (pressing) return angles_at({middle - kInto, around}, cap);
+  return angles_at({middle + kAway, off > kClear ? -end(cap) : around}, cap);
 }
 
 }  // namespace tangere

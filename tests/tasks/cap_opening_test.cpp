@@ -25,20 +25,26 @@ TEST(CapOpening, StartsFollowTheirDistributionsOutsideTheCap) {
   const auto task = task_named("cap_opening");
   const auto all = starts(*task);
   EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.varying.at(0); }), 0.01, 0.7), kUnlikely);
-  EXPECT_EQ(all[0].varying.size(), 1U) << "nothing but the cap's damping varies";
+  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.varying.at(1); }), 0.02, 0.08), kUnlikely);
+  for (const std::size_t axis : {2U, 3U})
+    EXPECT_LT(uniform_distance(column(all, [axis](const Start& s) { return s.varying.at(axis); }), -0.02, 0.02), kUnlikely);
+  EXPECT_EQ(all[0].varying.size(), 4U) << "damping, radius and place of the cap vary, nothing else";
   double mean = 0, square = 0;
   for (const Start& s : all) {
     ASSERT_EQ(s.q[0], 0) << "the cap";
     for (const std::size_t swing : {1U, 4U, 7U}) mean += s.q[swing], square += s.q[swing] * s.q[swing];
-    // Of the first finger: the hip is 37.1 mm from the axis, links are 120 mm, a tip is 12 mm and the cap 40 mm.
-    const double out = 0.0371 - 0.12 * std::sin(s.q[2]) - 0.12 * std::sin(s.q[2] + s.q[3]);
-    const double along = 0.12 * (std::cos(s.q[2]) + std::cos(s.q[2] + s.q[3])) * std::sin(s.q[1]);
-    ASSERT_GT(std::hypot(out, along), 0.053);
+    // Every tip stands clear of the cap: hips are 97 mm from the middle, links are 120 mm, a tip is 12 mm.
+    for (std::size_t f = 0; f < 3; ++f) {
+      const double *q = &s.q[1 + 3 * f], turn = 2 * std::numbers::pi / 3 * double(f);
+      const double out = 0.097 - 0.12 * std::sin(q[1]) - 0.12 * std::sin(q[1] + q[2]);
+      const double left = 0.12 * (std::cos(q[1]) + std::cos(q[1] + q[2])) * std::sin(q[0]);
+      const double x = std::cos(turn) * out - std::sin(turn) * left, y = std::sin(turn) * out + std::cos(turn) * left;
+      ASSERT_GT(std::hypot(x - s.varying[2], y - s.varying[3]), s.varying[1] + 0.013 - 1e-12);
+    }
   }
-  // A swing to either side moves a tip a little away from the cap: large ones are refused less often.
+  // Few draws are refused, and those of a swing nearly as often to either side.
   EXPECT_NEAR(mean / (3 * kDraws), 0, 2.58 * 0.05 / std::sqrt(3 * kDraws));
-  EXPECT_GT(std::sqrt(square / (3 * kDraws)), 0.05);
-  EXPECT_LT(std::sqrt(square / (3 * kDraws)), 0.053);
+  EXPECT_NEAR(std::sqrt(square / (3 * kDraws)), 0.05, 1e-3);
   VectorTask vector(*task, 64);
   const std::size_t observed = task->spec().observation_size();
   for (int e = 0; e < 64; ++e) {
@@ -85,10 +91,10 @@ TEST(CapOpening, TargetsFollowTheAnglesWithinTheirLimits) {
   EXPECT_THAT(v, ::testing::Each(0.0));
 }
 
-TEST(CapOpening, RefusesACapThatTheFingersWouldStartIn) {
+TEST(CapOpening, RefusesFingersThatWouldStartInTheCap) {
   Scene scene = read_scene(TANGERE_SOURCE_DIR "/scenes/cap_opening.xml").scene;
   for (LinkDescription& link : scene.links)
-    if (link.joint.name == "cap") std::get<CylinderShape>(link.body.shape).radius = 0.05;
+    if (link.joint.name == "mount_1") link.joint.pose.position[0] = 0.07;
   EXPECT_THROW(static_cast<void>(make_task("cap_opening", scene)), InputError);
 }
 
@@ -130,7 +136,7 @@ TEST(CapOpening, ObservesTouchOrNot) {
     const auto o = seeing.observation(1);
     const double *q = &o[3 * f], *tip = &o[9 + 3 * f];
     const double turn = 2 * std::numbers::pi / 3 * double(f);
-    const double out = 0.0371 - 0.12 * std::sin(q[1]) - 0.12 * std::sin(q[1] + q[2]);
+    const double out = 0.097 - 0.12 * std::sin(q[1]) - 0.12 * std::sin(q[1] + q[2]);
     EXPECT_NEAR(std::cos(turn) * tip[0] + std::sin(turn) * tip[1], out, 1e-6) << "finger " << f + 1;
   }
 }
