@@ -18,7 +18,8 @@ namespace {
 
 InertiaRows rows_of(const Link& link) {
   const auto& I = link.inertia.m;
-  return {link.mass, link.moment.x, link.moment.y, link.moment.z, I[0][0], I[0][1], I[0][2], I[1][1], I[1][2], I[2][2]};
+  return {link.mass, link.moment.x, link.moment.y, link.moment.z, I[0][0],
+          I[0][1],   I[0][2],       I[1][1],       I[1][2],       I[2][2]};
 }
 
 /// What a body adds to the inertia of its link per kg/m³ of density.
@@ -67,12 +68,14 @@ void vary_density(CompiledModel& m, int body, const RandomizationDescription& d,
     throw InputError(d.source.prefix() + "density of body '" + d.name + "' varies, but " + why);
   };
   const int link = m.bodies[std::size_t(body)].link;
-  if (std::holds_alternative<AbstractShape>(b.shape)) fail("its mass is given; expected a body with volume");
+  if (std::holds_alternative<AbstractShape>(b.shape))
+    fail("its mass is given; expected a body with volume");
   if (link < 0) fail("it is fixed in the world");
   if (!(b.density > 0)) fail("it is massless; expected a positive density");
   VaryingInertia& varying = varying_inertia(m, link);
   const InertiaRows of_density = inertia_of_density(m, body);
-  for (std::size_t i = 0; i < of_density.size(); ++i) varying.constant[i] -= b.density * of_density[i];
+  for (std::size_t i = 0; i < of_density.size(); ++i)
+    varying.constant[i] -= b.density * of_density[i];
   varying.parts.push_back({body, row, of_density});
 }
 
@@ -83,13 +86,20 @@ void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, in
   const auto fail = [&](const std::string& why) {
     throw InputError(d.source.prefix() + name + " of body '" + d.name + "' varies, but " + why);
   };
-  if (size_number(b.shape, d.index) == nullptr) fail(std::string("a ") + shape_name(b.shape) + " has none");
+  if (size_number(b.shape, d.index) == nullptr)
+    fail(std::string("a ") + shape_name(b.shape) + " has none");
   const Distribution& x = d.distribution;
   const bool listed = x.kind == Distribution::Kind::list;
-  const double least = listed && !x.values.empty() ? *std::min_element(x.values.begin(), x.values.end()) : listed ? 0 : x.a;
-  if (x.kind == Distribution::Kind::normal || !(least > 0)) fail("not all that may be drawn is positive");
+  const double least = listed && !x.values.empty()
+                           ? *std::min_element(x.values.begin(), x.values.end())
+                       : listed ? 0
+                                : x.a;
+  if (x.kind == Distribution::Kind::normal || !(least > 0))
+    fail("not all that may be drawn is positive");
   for (const PairContactDescription& c : m.scene.pair_contacts)
-    if (c.general_body == d.name) fail("its contact points do not; expected a body that touches nothing with points of its own");
+    if (c.general_body == d.name)
+      fail(
+          "its contact points do not; expected a body that touches nothing with points of its own");
   for (const TactileDescription& t : m.scene.sensors)
     if (t.body == d.name) fail("the points of its tactile sensor '" + t.name + "' do not");
   for (std::size_t k = 0; k < m.grounds.size(); ++k)
@@ -116,7 +126,10 @@ void vary_place(CompiledModel& m, int joint, const RandomizationDescription& d, 
       return;
     }
   const int parent = m.scene.links[std::size_t(joint)].parent;
-  m.varying_places.push_back({joint, 0, parent < 0 ? kIdentityFrame : m.joints[std::size_t(parent)].frame, {{d.index, row}}});
+  m.varying_places.push_back({joint,
+                              0,
+                              parent < 0 ? kIdentityFrame : m.joints[std::size_t(parent)].frame,
+                              {{d.index, row}}});
 }
 
 int add_derived_rows(CompiledModel& m, int next) {
@@ -130,9 +143,12 @@ int add_derived_rows(CompiledModel& m, int next) {
     for (std::size_t k = 0; k < m.pairs.size(); ++k)
       if (m.scene.pair_contacts[k].primitive_body == name) m.pairs[k].size_row = next;
     for (std::size_t k = 0; k < m.grounds.size(); ++k)
-      if (m.scene.ground_contacts[k].body == name) m.grounds[k].radius_row = next, m.grounds[k].extent = 0;
+      if (m.scene.ground_contacts[k].body == name)
+        m.grounds[k].radius_row = next, m.grounds[k].extent = 0;
     for (CompiledSensor& sensor : m.sensors)
-      if (std::find(sensor.targets.begin(), sensor.targets.end(), size.body) != sensor.targets.end()) sensor.sizes_vary = true;
+      if (std::find(sensor.targets.begin(), sensor.targets.end(), size.body) !=
+          sensor.targets.end())
+        sensor.sizes_vary = true;
     next += 3;
   }
   for (VaryingPlace& place : m.varying_places) {
@@ -154,18 +170,21 @@ void update_derived_rows(const CompiledModel& m, double* column) {
     for (const VaryingInertia::Part& part : varying.parts)
       for (std::size_t i = 0; i < sum.size() && !varying.anew; ++i)
         sum[i] += column[part.row * kBlock] * part.of_density[i];
-    for (std::size_t i = 0; i < sum.size(); ++i) column[(varying.row + static_cast<int>(i)) * kBlock] = sum[i];
+    for (std::size_t i = 0; i < sum.size(); ++i)
+      column[(varying.row + static_cast<int>(i)) * kBlock] = sum[i];
   }
   for (const VaryingSize& size : m.varying_sizes) {
     Shape shape = m.scene.links[std::size_t(size.body)].body.shape;
-    for (const VaryingNumber& n : size.numbers) *size_number(shape, n.which) = column[n.row * kBlock];
+    for (const VaryingNumber& n : size.numbers)
+      *size_number(shape, n.which) = column[n.row * kBlock];
     CompiledBody body;
     place_shape(shape, body);
     put(size.row, body.size);
   }
   for (const VaryingPlace& place : m.varying_places) {
     Pose pose = m.scene.links[std::size_t(place.joint)].joint.pose;
-    for (const VaryingNumber& n : place.numbers) pose.position[std::size_t(n.which)] = column[n.row * kBlock];
+    for (const VaryingNumber& n : place.numbers)
+      pose.position[std::size_t(n.which)] = column[n.row * kBlock];
     put(place.row, compose(place.base, to_frame(pose)).p);
   }
 }

@@ -32,7 +32,8 @@ LinkDescription& link_of(Scene& scene, const std::string& name) {
   throw std::runtime_error("no link " + name);
 }
 
-RandomizationDescription varying(RandomTarget target, const std::string& name, int index, double low, double high) {
+RandomizationDescription varying(RandomTarget target, const std::string& name, int index,
+                                 double low, double high) {
   RandomizationDescription d;
   d.target = target;
   d.name = name;
@@ -47,7 +48,8 @@ RandomizationDescription varying(RandomTarget target, const std::string& name, i
 Scene pad_on(const Shape& shape, const std::vector<RandomizationDescription>& numbers) {
   Scene s;
   s.integrator = Integrator::bdf2;
-  s.links = {link("pad", JointType::translational, {0, 0, 0.0555}, CuboidShape{{0.08, 0.08, 0.01}, {14, 14, 2}}, 500),
+  s.links = {link("pad", JointType::translational, {0, 0, 0.0555},
+                  CuboidShape{{0.08, 0.08, 0.01}, {14, 14, 2}}, 500),
              link("arm", JointType::revolute, {0.01, 0, -0.03}, SphereShape{0.01}, 2000),
              link("anvil", JointType::spherical, {0.02, 0.005, 0.05}, shape, 800)};
   s.links[0].joint.damping = 2;
@@ -61,7 +63,12 @@ Scene pad_on(const Shape& shape, const std::vector<RandomizationDescription>& nu
   TactileDescription t;
   t.name = t.body = "pad";
   t.coefficients = {1, 0.01, 2, 0.003};
-  t.array = {{-0.03, 0.03, -0.005}, {0.03, -0.03, -0.005}, {0, -1, 0}, {1, 0, 0}, 12, 12};  // small: read in lanes otherwise
+  t.array = {{-0.03, 0.03, -0.005},
+             {0.03, -0.03, -0.005},
+             {0, -1, 0},
+             {1, 0, 0},
+             12,
+             12};  // small: read in lanes otherwise
   s.sensors.push_back(t);
   s.control = PiecewiseControl{{0, 0.1}, {{0, 0, 0.05}, {0.1, 0.05, 0.05}}, 0};
   s.randomizations = numbers;
@@ -88,7 +95,7 @@ struct Result {
   std::vector<std::vector<double>> q, v;
   std::vector<std::vector<double>> fields;  ///< of all sensors, environment by environment
   std::vector<std::vector<float>> mixed;
-  double touch = 0;                         ///< the largest force on any point
+  double touch = 0;  ///< the largest force on any point
 };
 
 Result run(const Model& model, Batch& batch, int steps) {
@@ -110,7 +117,8 @@ Result run(const Model& model, Batch& batch, int steps) {
   for (std::size_t s = 0; s < model.sensors().size(); ++s) {
     const std::size_t numbers = 3 * std::size_t(model.sensors()[s].points);
     for (int b = 0; b < batch.blocks(); ++b) {
-      const std::size_t first = std::size_t(b) * kernels::kBlock, count = std::min(n - first, std::size_t(kernels::kBlock));
+      const std::size_t first = std::size_t(b) * kernels::kBlock,
+                        count = std::min(n - first, std::size_t(kernels::kBlock));
       std::vector<std::vector<double>> fields(count, std::vector<double>(numbers));
       std::vector<std::vector<float>> singles(count, std::vector<float>(numbers));
       std::vector<std::span<double>> to(fields.begin(), fields.end());
@@ -152,9 +160,10 @@ struct Case {
 std::vector<Case> cases() {
   using enum RandomTarget;
   Scene cap = scene_named("cap_opening");
-  cap.randomizations = {varying(size, "cap", 0, 0.03, 0.045), varying(place, "cap", 0, -0.004, 0.004),
-                        varying(place, "cap", 1, -0.004, 0.004), varying(density, "cap", 0, 300, 900),
-                        varying(joint_effect, "cap", 0, 0.01, 0.7), varying(size, "cap", 1, 0.02, 0.03)};
+  cap.randomizations = {
+      varying(size, "cap", 0, 0.03, 0.045),       varying(place, "cap", 0, -0.004, 0.004),
+      varying(place, "cap", 1, -0.004, 0.004),    varying(density, "cap", 0, 300, 900),
+      varying(joint_effect, "cap", 0, 0.01, 0.7), varying(size, "cap", 1, 0.02, 0.03)};
   Scene ball = scene_named("rolling_ball_small");
   ball.randomizations = {varying(size, "ball", 0, 0.018, 0.0205)};
   const auto anvil = [](RandomizationDescription d) {
@@ -171,9 +180,18 @@ std::vector<Case> cases() {
   return {{"cap_opening", cap, 160},
           {"rolling_ball_small", ball, 160},
           {"sphere", on(SphereShape{0.03}, {varying(size, "", 0, 0.028, 0.032)}), 60},
-          {"cuboid", on(CuboidShape{{0.06, 0.05, 0.06}, {}}, {varying(size, "", 2, 0.055, 0.06), varying(size, "", 4, 0.05, 0.06)}), 60},
-          {"cylinder", on(CylinderShape{0.06, 0.03, 8, 3}, {varying(size, "", 0, 0.028, 0.032), varying(size, "", 1, 0.05, 0.06)}), 60},
-          {"capsule", on(CapsuleShape{0.03, 0.03, 5, 4}, {varying(size, "", 0, 0.028, 0.032), varying(size, "", 1, 0.02, 0.03)}), 60}};
+          {"cuboid",
+           on(CuboidShape{{0.06, 0.05, 0.06}, {}},
+              {varying(size, "", 2, 0.055, 0.06), varying(size, "", 4, 0.05, 0.06)}),
+           60},
+          {"cylinder",
+           on(CylinderShape{0.06, 0.03, 8, 3},
+              {varying(size, "", 0, 0.028, 0.032), varying(size, "", 1, 0.05, 0.06)}),
+           60},
+          {"capsule",
+           on(CapsuleShape{0.03, 0.03, 5, 4},
+              {varying(size, "", 0, 0.028, 0.032), varying(size, "", 1, 0.02, 0.03)}),
+           60}};
 }
 
 /// Bit for bit.
@@ -209,9 +227,12 @@ TEST(VaryingGeometry, NeighboursDoNotMatterWhateverTheyHave) {
       const Model model(c.scene);
       Batch clean(model, 10, 3), poisoned(model, 10, 3);
       for (int e = 0; e < 10; ++e)
-        for (int k = 0; k < static_cast<int>(c.scene.randomizations.size()) && e != 4 && e != 9; ++k)
-          poisoned.set_randomized_value(e, k, e % 2 == 0 ? std::numeric_limits<double>::quiet_NaN() : 1e30);
-      const Result expected = run(model, clean, c.steps / 2), found = run(model, poisoned, c.steps / 2);
+        for (int k = 0; k < static_cast<int>(c.scene.randomizations.size()) && e != 4 && e != 9;
+             ++k)
+          poisoned.set_randomized_value(
+              e, k, e % 2 == 0 ? std::numeric_limits<double>::quiet_NaN() : 1e30);
+      const Result expected = run(model, clean, c.steps / 2),
+                   found = run(model, poisoned, c.steps / 2);
       for (const std::size_t e : {4U, 9U}) {
         EXPECT_EQ(found.q[e], expected.q[e]) << e;
         EXPECT_EQ(found.fields[e], expected.fields[e]) << e;
@@ -225,7 +246,8 @@ TEST(VaryingGeometry, NumbersCanBeSetAndAResetDrawsThemAgain) {
   const Case c = cases()[0];
   const Model model(c.scene);
   Batch batch(model, 2, 7);
-  const std::vector<double> before(batch.block(0), batch.block(0) + model.compiled().layout.rows * kernels::kBlock);
+  const std::vector<double> before(batch.block(0),
+                                   batch.block(0) + model.compiled().layout.rows * kernels::kBlock);
   for (int k = 0; k < 3; ++k) batch.set_randomized_value(1, k, 0.035 - k);
   EXPECT_EQ(batch.randomized_value(1, 0), 0.035);
   const int size_row = model.compiled().pairs[0].size_row;
@@ -264,11 +286,13 @@ TEST(VaryingGeometry, IsReadFromAScene) {
   const auto with = [&](const std::string& line) {
     return parse_scene(text.substr(0, at) + line + text.substr(at), path).scene.randomizations[0];
   };
-  const RandomizationDescription edge = with("<body name=\"box\" size=\"2\" uniform=\"0.04 0.05\"/>");
+  const RandomizationDescription edge =
+      with("<body name=\"box\" size=\"2\" uniform=\"0.04 0.05\"/>");
   EXPECT_EQ(edge.target, RandomTarget::size);
   EXPECT_EQ(edge.index, 4);
   EXPECT_EQ(edge.distribution.b, 0.05);
-  const RandomizationDescription y = with("<joint name=\"box_slide\" pos=\"1\" normal=\"-0.1 0.2\"/>");
+  const RandomizationDescription y =
+      with("<joint name=\"box_slide\" pos=\"1\" normal=\"-0.1 0.2\"/>");
   EXPECT_EQ(y.target, RandomTarget::place);
   EXPECT_EQ(y.index, 1);
   EXPECT_EQ(y.distribution.a, -0.1);
@@ -280,14 +304,21 @@ TEST(VaryingGeometry, IsReadFromAScene) {
     }
     return std::string("accepted");
   };
-  EXPECT_THAT(error("<body name=\"box\" field=\"radius\" uniform=\"1 2\"/>"), HasSubstr("'box' is a cuboid, which has no radius"));
-  EXPECT_THAT(error("<body name=\"box\" field=\"raduis\" uniform=\"1 2\"/>"), HasSubstr("did you mean 'radius'"));
+  EXPECT_THAT(error("<body name=\"box\" field=\"radius\" uniform=\"1 2\"/>"),
+              HasSubstr("'box' is a cuboid, which has no radius"));
+  EXPECT_THAT(error("<body name=\"box\" field=\"raduis\" uniform=\"1 2\"/>"),
+              HasSubstr("did you mean 'radius'"));
   EXPECT_THAT(error("<body name=\"box\" size=\"3\" uniform=\"1 2\"/>"), HasSubstr("size=\"3\""));
-  EXPECT_THAT(error("<body name=\"box\" size=\"0\" uniform=\"0 2\"/>"), HasSubstr("a size[0] of 0; expected positive ones"));
-  EXPECT_THAT(error("<body name=\"box\" size=\"0\" normal=\"1 2\"/>"), HasSubstr("normal can draw a negative size[0]"));
-  EXPECT_THAT(error("<body name=\"box\" size=\"0\" field=\"density\" uniform=\"1 2\"/>"), HasSubstr("exactly one of field and size"));
-  EXPECT_THAT(error("<joint name=\"box_slide\" pos=\"3\" uniform=\"1 2\"/>"), HasSubstr("pos=\"3\""));
-  EXPECT_THAT(error("<joint name=\"box_slide\" pos=\"0\" q=\"0\" uniform=\"1 2\"/>"), HasSubstr("exactly one of q, v, pos"));
+  EXPECT_THAT(error("<body name=\"box\" size=\"0\" uniform=\"0 2\"/>"),
+              HasSubstr("a size[0] of 0; expected positive ones"));
+  EXPECT_THAT(error("<body name=\"box\" size=\"0\" normal=\"1 2\"/>"),
+              HasSubstr("normal can draw a negative size[0]"));
+  EXPECT_THAT(error("<body name=\"box\" size=\"0\" field=\"density\" uniform=\"1 2\"/>"),
+              HasSubstr("exactly one of field and size"));
+  EXPECT_THAT(error("<joint name=\"box_slide\" pos=\"3\" uniform=\"1 2\"/>"),
+              HasSubstr("pos=\"3\""));
+  EXPECT_THAT(error("<joint name=\"box_slide\" pos=\"0\" q=\"0\" uniform=\"1 2\"/>"),
+              HasSubstr("exactly one of q, v, pos"));
 }
 
 std::string refusal(Scene scene, const RandomizationDescription& d) {
@@ -303,12 +334,18 @@ std::string refusal(Scene scene, const RandomizationDescription& d) {
 TEST(VaryingGeometry, WhatCannotVaryIsAnError) {
   using enum RandomTarget;
   const Scene cap = scene_named("cap_opening"), box = scene_named("box_pushing");
-  EXPECT_THAT(refusal(box, varying(size, "box", 2, 0.1, 0.2)), HasSubstr("the points that touch the ground do not"));
-  EXPECT_THAT(refusal(cap, varying(size, "tip_1", 0, 0.1, 0.2)), HasSubstr("radius of body 'tip_1' varies, but a"));
-  EXPECT_THAT(refusal(cap, varying(size, "cap", 3, 0.1, 0.2)), HasSubstr("size[1] of body 'cap' varies, but a cylinder has none"));
-  EXPECT_THAT(refusal(cap, varying(size, "cap", 0, 0, 0.2)), HasSubstr("not all that may be drawn is positive"));
-  EXPECT_THAT(refusal(pad_on(SphereShape{0.03}, {}), varying(size, "pad", 2, 0.1, 0.2)), HasSubstr("its contact points do not"));
-  EXPECT_THAT(refusal(cap, varying(place, "bottle", 0, 0, 0.2)), HasSubstr("pos of joint 'bottle' varies, but the joint is fixed"));
+  EXPECT_THAT(refusal(box, varying(size, "box", 2, 0.1, 0.2)),
+              HasSubstr("the points that touch the ground do not"));
+  EXPECT_THAT(refusal(cap, varying(size, "tip_1", 0, 0.1, 0.2)),
+              HasSubstr("radius of body 'tip_1' varies, but a"));
+  EXPECT_THAT(refusal(cap, varying(size, "cap", 3, 0.1, 0.2)),
+              HasSubstr("size[1] of body 'cap' varies, but a cylinder has none"));
+  EXPECT_THAT(refusal(cap, varying(size, "cap", 0, 0, 0.2)),
+              HasSubstr("not all that may be drawn is positive"));
+  EXPECT_THAT(refusal(pad_on(SphereShape{0.03}, {}), varying(size, "pad", 2, 0.1, 0.2)),
+              HasSubstr("its contact points do not"));
+  EXPECT_THAT(refusal(cap, varying(place, "bottle", 0, 0, 0.2)),
+              HasSubstr("pos of joint 'bottle' varies, but the joint is fixed"));
   EXPECT_THAT(refusal(cap, varying(place, "cap", 3, 0, 0.2)), HasSubstr("index 3"));
   EXPECT_THAT(refusal(cap, varying(size, "cop", 0, 0.1, 0.2)), HasSubstr("no body is named 'cop'"));
   Scene felt = pad_on(SphereShape{0.03}, {});

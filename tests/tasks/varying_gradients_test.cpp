@@ -19,7 +19,8 @@ Scene varied(const std::string& name, const std::string& lines) {
 }
 
 StepControls controls_of(const ControlProgram& program) {
-  return [&program](std::int64_t step, int e, std::span<double> u) { program.evaluate(step, e, u); };
+  return
+      [&program](std::int64_t step, int e, std::span<double> u) { program.evaluate(step, e, u); };
 }
 
 struct Case {
@@ -53,11 +54,12 @@ constexpr const char* kCap = R"(<body name="cap" field="radius" uniform="0.038 0
 <joint name="cap" pos="0" uniform="-0.003 0.003"/><joint name="cap" pos="1" uniform="-0.003 0.003"/>
 <body name="cap" field="density" uniform="400 800"/>)";
 constexpr const char* kBall = R"(<body name="ball" field="radius" uniform="0.019 0.0203"/>)";
-INSTANTIATE_TEST_SUITE_P(Scenes, VaryingNumbers,
-                         ::testing::Values(Case{"cap_opening", kCap, LossKind::final_state, 100},
-                                           Case{"cap_opening", kCap, LossKind::tactile, 100},
-                                           Case{"rolling_ball_small", kBall, LossKind::tactile, 100},
-                                           Case{"rolling_ball_small", kBall, LossKind::shear, 120}));
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, VaryingNumbers,
+    ::testing::Values(Case{"cap_opening", kCap, LossKind::final_state, 100},
+                      Case{"cap_opening", kCap, LossKind::tactile, 100},
+                      Case{"rolling_ball_small", kBall, LossKind::tactile, 100},
+                      Case{"rolling_ball_small", kBall, LossKind::shear, 120}));
 
 /// The gradient of an environment among others is that of its numbers alone.
 TEST(VaryingGradients, OfABatchAreThoseOfScenesOfTheirOwn) {
@@ -70,23 +72,26 @@ TEST(VaryingGradients, OfABatchAreThoseOfScenesOfTheirOwn) {
   options.steps = 100;
   const RolloutLoss* const losses[] = {loss.get()};
   const GradientSummary all = rollout_gradients(start, controls_of(program), options, losses);
-  const std::size_t nv = std::size_t(model.nv()), nu = std::size_t(options.steps) * std::size_t(model.nu());
+  const std::size_t nv = std::size_t(model.nv()),
+                    nu = std::size_t(options.steps) * std::size_t(model.nu());
   const auto part = [](const std::vector<double>& x, std::size_t i, std::size_t n) {
-    return std::vector<double>(x.begin() + std::ptrdiff_t(i * n), x.begin() + std::ptrdiff_t((i + 1) * n));
+    return std::vector<double>(x.begin() + std::ptrdiff_t(i * n),
+                               x.begin() + std::ptrdiff_t((i + 1) * n));
   };
   for (const std::size_t e : {0U, 8U}) {
     Scene own = scene;
     for (LinkDescription& link : own.links)
       if (link.body.name == "ball")
-        std::get<SphereShape>(link.body.shape).radius =
-            start.randomized_value(static_cast<int>(e), static_cast<int>(scene.randomizations.size()) - 1);
+        std::get<SphereShape>(link.body.shape).radius = start.randomized_value(
+            static_cast<int>(e), static_cast<int>(scene.randomizations.size()) - 1);
     own.randomizations.pop_back();
     const Model alone(own);
     const Batch one(alone, 1, 3, static_cast<std::int64_t>(e));
     const ControlProgram same(alone, alone.timestep(), 3);
     const auto own_loss = make_loss(LossKind::tactile, alone, 5);
     const RolloutLoss* const own_losses[] = {own_loss.get()};
-    const LossGradient expected = rollout_gradients(one, controls_of(same), options, own_losses).losses[0];
+    const LossGradient expected =
+        rollout_gradients(one, controls_of(same), options, own_losses).losses[0];
     EXPECT_EQ(all.losses[0].value[e], expected.value[0]);
     EXPECT_EQ(part(all.losses[0].u, e, nu), expected.u) << e;
     EXPECT_EQ(part(all.losses[0].q, e, nv), expected.q) << e;
