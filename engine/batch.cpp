@@ -6,7 +6,7 @@
 #include <cmath>
 #include <new>
 
-#include "engine/compiled_model.hpp"
+#include "engine/compile_variations.hpp"
 #include "engine/random.hpp"
 
 namespace tangere {
@@ -23,6 +23,8 @@ Purpose purpose_of(RandomTarget target) {
     case RandomTarget::pair_contact: return Purpose::contact;
     case RandomTarget::joint_effect:
     case RandomTarget::motor: return Purpose::joint;
+    case RandomTarget::size:
+    case RandomTarget::place:
     case RandomTarget::density: return Purpose::body;
     case RandomTarget::tactile: break;
   }
@@ -49,6 +51,11 @@ double nominal(const CompiledModel& m, const RandomizationDescription& d) {
   }
   for (const auto& l : m.scene.links)
     if (d.target == RandomTarget::density && l.body.name == d.name) return l.body.density;
+  for (const auto& l : m.scene.links) {
+    Shape shape = l.body.shape;
+    if (d.target == RandomTarget::size && l.body.name == d.name) return *size_number(shape, d.index);
+    if (d.target == RandomTarget::place && l.joint.name == d.name) return l.joint.pose.position[std::size_t(d.index)];
+  }
   for (const auto& motor : m.scene.motors)
     if (d.target == RandomTarget::motor && motor.joint == d.name)
       return d.joint_field == JointField::P ? motor.P : motor.D;
@@ -126,20 +133,8 @@ void Batch::draw_episode(std::size_t lane) {
       v_[std::size_t(row - m.layout.v)] = value;
     }
   }
-  update_inertia(lane);
+  update_derived_rows(m, column(lane));
   write_state(lane, q_, v_);
-}
-
-/// Inertia of links whose bodies have densities that vary: a sum that is linear in them.
-void Batch::update_inertia(std::size_t lane) {
-  double* const rows = column(lane);
-  for (const VaryingInertia& link : model_.compiled().varying_inertia) {
-    InertiaRows sum = link.constant;
-    for (const VaryingInertia::Part& part : link.parts)
-      for (std::size_t i = 0; i < sum.size(); ++i)
-        sum[i] += rows[std::size_t(part.row) * kBlock] * part.of_density[i];
-    for (std::size_t i = 0; i < sum.size(); ++i) rows[(std::size_t(link.row) + i) * kBlock] = sum[i];
-  }
 }
 
 void Batch::reset(int environment, std::int64_t episode) {
@@ -252,7 +247,7 @@ void Batch::set_randomized_value(int environment, int k, double value) {
   if (!is_parameter(k))
     throw InputError("randomised number " + std::to_string(k) + " is of the starting state; expected a parameter");
   column(std::size_t(environment))[std::size_t(row) * kBlock] = value;
-  update_inertia(std::size_t(environment));
+  update_derived_rows(m, column(std::size_t(environment)));
 }
 
 }  // namespace tangere

@@ -91,7 +91,6 @@ class Batch {
   friend class Stepper;
   void write_state(std::size_t lane, std::span<const double> q, std::span<const double> v);
   void draw_episode(std::size_t lane);
-  void update_inertia(std::size_t lane);
   [[nodiscard]] double* column(std::size_t lane);
 
   Model model_;

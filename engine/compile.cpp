@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "engine/compile_joints.hpp"
+#include "engine/compile_variations.hpp"
 
 namespace tangere {
 
@@ -71,39 +72,6 @@ class Compiler {
     if (body.link >= 0 && body.mass > 0) add_inertia(m_.links[body.link], body, properties);
     m_.bodies.push_back(body);
     m_.body_names.push_back(d.body.name);
-  }
-
-  static void place_shape(const Shape& shape, CompiledBody& body) {
-    if (const auto* sphere = std::get_if<SphereShape>(&shape)) {
-      body.shape = PrimitiveShape::sphere;
-      body.size = {sphere->radius, 0, 0};
-    } else if (const auto* cuboid = std::get_if<CuboidShape>(&shape)) {
-      body.shape = PrimitiveShape::cuboid;
-      body.size = 0.5 * vec(cuboid->size);
-    } else if (const auto* cylinder = std::get_if<CylinderShape>(&shape)) {
-      body.shape = PrimitiveShape::cylinder;
-      body.size = {cylinder->radius, 0.5 * cylinder->length, 0};
-    } else if (const auto* capsule = std::get_if<CapsuleShape>(&shape)) {
-      body.shape = PrimitiveShape::capsule;
-      body.size = {capsule->radius, 0.5 * capsule->length, 0};
-    } else if (std::holds_alternative<PlaneShape>(shape)) {
-      body.shape = PrimitiveShape::plane;
-    } else {
-      body.touchable = false;
-      const std::vector<double> p = contact_points(shape);
-      for (std::size_t k = 0; k < p.size(); k += 3)
-        body.size.x = std::max(body.size.x, std::hypot(p[k], p[k + 1], p[k + 2]));
-    }
-  }
-
-  static void add_inertia(Link& link, const CompiledBody& body, const MassProperties& properties) {
-    const Mat3<double>& R = body.frame.R;
-    const Vec3<double> centre = R * properties.centre + body.frame.p;
-    const Mat3<double> p = kernels::skew(centre);
-    link.massive = true;
-    link.mass += body.mass;
-    link.moment += body.mass * centre;
-    link.inertia += R * properties.inertia * kernels::transpose(R) - body.mass * (p * p);
   }
 
   // --- contacts ---
@@ -261,7 +229,17 @@ class Compiler {
         continue;
       }
       if (d.target == RandomTarget::density) {
-        vary_density(d, next);
+        vary_density(m_, bodies_.find("body", d.name, d.source), d, next);
+        m_.randomized_row.push_back(next++);
+        continue;
+      }
+      if (d.target == RandomTarget::size) {
+        vary_size(m_, bodies_.find("body", d.name, d.source), d, next);
+        m_.randomized_row.push_back(next++);
+        continue;
+      }
+      if (d.target == RandomTarget::place) {
+        vary_place(m_, joints_.find("joint", d.name, d.source), d, next);
         m_.randomized_row.push_back(next++);
         continue;
       }
@@ -277,52 +255,7 @@ class Compiler {
       parameters_of(d, vary);
       m_.randomized_row.push_back(next++);
     }
-    for (VaryingInertia& varying : m_.varying_inertia) {
-      Link& link = *std::find_if(m_.links.begin(), m_.links.end(),
-                                 [&](const Link& l) { return l.inertia_row == varying.row; });
-      link.inertia_row = varying.row = next;
-      next += static_cast<int>(varying.constant.size());
-    }
-    m_.layout.rows = next;
-  }
-
-
-  /// What a body adds to the inertia of its link per kg/m³ of density.
-  [[nodiscard]] InertiaRows inertia_of_density(int b) const {
-    const CompiledBody& body = m_.bodies[std::size_t(b)];
-    const MassProperties unit = mass_properties(m_.scene.links[std::size_t(b)].body.shape, 1);
-    Link link{};
-    CompiledBody of_density = body;
-    of_density.mass = unit.mass;
-    add_inertia(link, of_density, unit);
-    const auto& I = link.inertia.m;
-    return {link.mass, link.moment.x, link.moment.y, link.moment.z, I[0][0], I[0][1], I[0][2], I[1][1], I[1][2], I[2][2]};
-  }
-
-  /// Until all rows are known, `row` of a link and of its entry say which of them belong together.
-  void vary_density(const RandomizationDescription& d, int row) {
-    const int b = bodies_.find("body", d.name, d.source);
-    const BodyDescription& body = m_.scene.links[std::size_t(b)].body;
-    const auto fail = [&](const std::string& why) {
-      throw InputError(d.source.prefix() + "density of body '" + d.name + "' varies, but " + why);
-    };
-    if (std::holds_alternative<AbstractShape>(body.shape)) fail("its mass is given; expected a body with volume");
-    if (m_.bodies[std::size_t(b)].link < 0) fail("it is fixed in the world");
-    if (!(body.density > 0)) fail("it is massless; expected a positive density");
-    Link& link = m_.links[std::size_t(m_.bodies[std::size_t(b)].link)];
-    if (link.inertia_row < 0) {
-      const auto& I = link.inertia.m;
-      link.inertia_row = row;
-      m_.varying_inertia.push_back({row,
-                                    {link.mass, link.moment.x, link.moment.y, link.moment.z, I[0][0], I[0][1], I[0][2],
-                                     I[1][1], I[1][2], I[2][2]},
-                                    {}});
-    }
-    VaryingInertia& varying = *std::find_if(m_.varying_inertia.begin(), m_.varying_inertia.end(),
-                                            [&](const VaryingInertia& v) { return v.row == link.inertia_row; });
-    const InertiaRows of_density = inertia_of_density(b);
-    for (std::size_t i = 0; i < of_density.size(); ++i) varying.constant[i] -= body.density * of_density[i];
-    varying.parts.push_back({row, of_density});
+    m_.layout.rows = add_derived_rows(m_, next);
   }
 
   int state_row(const RandomizationDescription& d) const {

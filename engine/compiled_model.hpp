@@ -22,6 +22,7 @@ struct CompiledBody {
   kernels::Vec3<double> size{};  ///< as in kernels::PairContact
   kernels::Vec3<double> centre{};///< of mass, body frame [m]
   double mass = 0;               ///< [kg]
+  int size_row = -1;             ///< ≥ 0: size stands in three rows of the block instead
 };
 
 /// A joint of the scene: its elementary links and its coordinates.
@@ -60,6 +61,7 @@ struct CompiledSensor {
   kernels::ContactParameters parameters{};
   ContactLaw law = ContactLaw::clamped;
   std::vector<int> targets;          ///< bodies it can feel
+  bool sizes_vary = false;           ///< of some of them
 
   [[nodiscard]] int points() const { return rows * cols; }
   [[nodiscard]] int n_tiles() const { return tile_rows * tile_cols; }
@@ -92,12 +94,33 @@ using InertiaRows = std::array<double, 10>;
 /// A link some of whose bodies have densities that vary: rows `row` … of the block are constant + Σ density of_density.
 struct VaryingInertia {
   struct Part {
+    int body;
     int row;                 ///< of the block: the density [kg/m³]
     InertiaRows of_density;  ///< for a density of 1
   };
+  int link = -1;
   int row = 0;
+  bool anew = false;         ///< sizes vary too: the sum over all bodies is made anew instead
   InertiaRows constant{};
   std::vector<Part> parts;
+};
+
+/// A number that a row of the block holds: which of a size (size_name), or which component.
+struct VaryingNumber {
+  int which, row;
+};
+/// Rows `row` … of the block: size as in CompiledBody.
+struct VaryingSize {
+  int body = -1;
+  int row = 0;
+  std::vector<VaryingNumber> numbers;
+};
+/// Rows `row` … of the block: where the first link of a joint is at rest, in its parent link.
+struct VaryingPlace {
+  int joint = -1;
+  int row = 0;
+  kernels::Frame<double> base;  ///< that the scene gives the joint's place in
+  std::vector<VaryingNumber> numbers;
 };
 
 struct CompiledModel {
@@ -117,6 +140,8 @@ struct CompiledModel {
   std::vector<std::vector<double>> point_storage;  ///< what pairs and grounds point into
   std::vector<AlignedVector<double>> tile_storage; ///< what pairs' tile_points and tile_bounds point into
   std::vector<VaryingInertia> varying_inertia;
+  std::vector<VaryingSize> varying_sizes;
+  std::vector<VaryingPlace> varying_places;
   std::vector<kernels::DofEffects> dof_effects;  ///< (nv)
   std::vector<double> unknown_scale;   ///< (nv) what an unknown is rounded against: extent of the scene [m], 1 [rad]
   std::vector<double> initial_q, initial_v;
@@ -140,6 +165,10 @@ struct MassProperties {
   kernels::Mat3<double> inertia;  ///< [kg m²]
 };
 MassProperties mass_properties(const Shape& shape, double density);
+/// Adds a body to its link.
+void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProperties& properties);
+/// Shape and size of a body, and whether it can be touched.
+void place_shape(const Shape& shape, CompiledBody& body);
 
 /// Points of the body that meet other bodies, in its body frame, (n, 3): empty for spheres and planes.
 std::vector<double> contact_points(const Shape& shape);

@@ -58,7 +58,15 @@ struct DualStage::Impl {
       row(e.armature, -1);
       row(e.limit_stiffness, -1);
     }
-    for (kernels::Link& link : bodies) link.inertia_row = -1;
+    const auto side_by_side = [this](int& first, int count) {
+      if (first < 0) return;
+      const int from = first;
+      first = static_cast<int>(origin.size());
+      for (int i = 0; i < count; ++i) origin.push_back({0, from + i}), number.push_back(-1);
+    };
+    for (auto& p : pairs) side_by_side(p.size_row, 3);
+    for (auto& g : grounds) side_by_side(g.radius_row, 1);
+    for (kernels::Link& link : bodies) link.inertia_row = -1, side_by_side(link.place_row, 3);
     view.links = bodies.data();
     view.pairs = pairs.data();
     view.grounds = grounds.data();
@@ -89,12 +97,13 @@ struct DualStage::Impl {
         for (int e = 0; e < 9; ++e) in_1.R.m[e / 3][e % 3] = dual.R.m[e / 3][e % 3].value;
         in_1.p = {dual.p.x.value, dual.p.y.value, dual.p.z.value};
         const kernels::Frame<double> shape = compose(in_1, pair.frame2);
+        const kernels::Vec3<double> size = kernels::load_vector<double>(pair.size, pair.size_row, block.data(), 0);
         std::vector<D>& list = points[std::size_t(at)];
         int count = 0;
         for (int i = 0; i < pair.n_points; ++i) {
           const double* p = pair.points + 3 * i;
           const kernels::Vec3<double> y = transposed_times(shape.R, kernels::Vec3<double>{p[0], p[1], p[2]} - shape.p);
-          const double d = kernels::with_distance<double>(pair.shape, pair.size, [&](const auto& s) { return distance_at(s, y).d; });
+          const double d = kernels::with_distance<double>(pair.shape, size, [&](const auto& s) { return distance_at(s, y).d; });
           if (!(d < 1e-9)) continue;  // [m] beyond rounding
           for (int c = 0; c < 3; ++c) list[std::size_t(3 * count + c)] = D(p[c]);
           ++count;
@@ -302,7 +311,8 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
     const kernels::LinkPose<D> other = pose(body.link);
     kernels::Touch<D> t;
     kernels::pad_touch(&hand, felt.pad, &other, body.frame, t);
-    kernels::with_distance<D>(body.shape, body.size, [&](const auto& shape) {
+    const kernels::Vec3<double> size = kernels::load_vector<double>(body.size, body.size_row, column, 0);
+    kernels::with_distance<D>(body.shape, size, [&](const auto& shape) {
       for (int k = 0; k < pad.tiles() * kernels::kTactileTile; ++k) {
         const PadPoint p = pad_point(pad, k / kernels::kTactileTile, k % kernels::kTactileTile);
         if (p.index < 0) continue;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mass and inertia of bodies of uniform density: closed forms, and volume integrals of meshes.
+// Mass and inertia of bodies of uniform density: closed forms, and volume integrals of meshes; what kernels call their size.
+#include <algorithm>
 #include <cmath>
 
 #include "engine/compiled_model.hpp"
@@ -77,6 +78,39 @@ MassProperties of(const AbstractShape& a, double) {
 
 MassProperties mass_properties(const Shape& shape, double density) {
   return std::visit([&](const auto& s) { return of(s, density); }, shape);
+}
+
+void place_shape(const Shape& shape, CompiledBody& body) {
+  if (const auto* sphere = std::get_if<SphereShape>(&shape)) {
+    body.shape = PrimitiveShape::sphere;
+    body.size = {sphere->radius, 0, 0};
+  } else if (const auto* cuboid = std::get_if<CuboidShape>(&shape)) {
+    body.shape = PrimitiveShape::cuboid;
+    body.size = {0.5 * cuboid->size[0], 0.5 * cuboid->size[1], 0.5 * cuboid->size[2]};
+  } else if (const auto* cylinder = std::get_if<CylinderShape>(&shape)) {
+    body.shape = PrimitiveShape::cylinder;
+    body.size = {cylinder->radius, 0.5 * cylinder->length, 0};
+  } else if (const auto* capsule = std::get_if<CapsuleShape>(&shape)) {
+    body.shape = PrimitiveShape::capsule;
+    body.size = {capsule->radius, 0.5 * capsule->length, 0};
+  } else if (std::holds_alternative<PlaneShape>(shape)) {
+    body.shape = PrimitiveShape::plane;
+  } else {
+    body.touchable = false;
+    const std::vector<double> p = contact_points(shape);
+    for (std::size_t k = 0; k < p.size(); k += 3)
+      body.size.x = std::max(body.size.x, std::hypot(p[k], p[k + 1], p[k + 2]));
+  }
+}
+
+void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProperties& properties) {
+  const kernels::Mat3<double>& R = body.frame.R;
+  const kernels::Vec3<double> centre = R * properties.centre + body.frame.p;
+  const kernels::Mat3<double> p = kernels::skew(centre);
+  link.massive = true;
+  link.mass += body.mass;
+  link.moment += body.mass * centre;
+  link.inertia += R * properties.inertia * kernels::transpose(R) - body.mass * (p * p);
 }
 
 }  // namespace tangere

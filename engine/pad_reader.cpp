@@ -44,6 +44,8 @@ PadReader::PadReader(const Model& model)
   touches_.resize(kGroups * targets);
   touch_of_group_.resize(targets);
   one_.resize(targets);
+  one_shapes_.resize(targets);
+  sizes_.resize(std::size_t{3} * kGroups * targets);
 }
 
 void PadReader::move(const Batch& batch, int block, int group) {
@@ -57,7 +59,7 @@ void PadReader::move(const Batch& batch, int block, int group) {
   };
   load(q_.data(), m.layout.q, m.nq);
   load(v_.data(), m.layout.v, m.nv);
-  kernels::active_kernels().link_poses(m.view, {q_.data(), v_.data(), zero_.data(), rates_.data()},
+  kernels::active_kernels().link_poses(m.view, {q_.data(), v_.data(), zero_.data(), rates_.data(), rows, group},
                                        links_.data() + std::size_t(group) * m.links.size());
 }
 
@@ -88,7 +90,23 @@ void PadReader::meet(const Batch& batch, int block, int group, int sensor) {
     parameter(s.parameters.kt, touch.kt);
     parameter(s.parameters.mu, touch.mu);
     parameter(s.parameters.damping, touch.damping);
+    for (int i = 0; i < 3 && body.size_row >= 0; ++i)
+      parameter({0, body.size_row + i}, sizes_[3 * (kGroups * k + std::size_t(group)) + std::size_t(i)]);
   }
+}
+
+const kernels::TouchShape* PadReader::shapes(int sensor, int group, int lane) {
+  const CompiledModel& m = model_.compiled();
+  const CompiledSensor& s = m.sensors[std::size_t(sensor)];
+  const std::vector<kernels::TouchShape>& constant = pads_[std::size_t(sensor)].shapes;
+  if (!s.sizes_vary) return constant.data();
+  for (std::size_t k = 0; k < s.targets.size(); ++k) {
+    one_shapes_[k] = constant[k];
+    if (m.bodies[std::size_t(s.targets[k])].size_row < 0) continue;
+    const LaneRow* const size = &sizes_[3 * (kGroups * k + std::size_t(group))];
+    for (int i = 0; i < 3; ++i) one_shapes_[k].size[i] = size[i][lane];
+  }
+  return one_shapes_.data();
 }
 
 template <class Real>
@@ -101,7 +119,7 @@ kernels::TactileArgs<Real> PadReader::arguments(int sensor, int group, int lane)
                t.kn[lane],         t.kt[lane],         t.mu[lane],             t.damping[lane]};
   }
   return {&pad.tiles,           s.law,       static_cast<int>(s.targets.size()),
-          pad.shapes.data(),    one_.data(), active.data(),
+          shapes(sensor, group, lane), one_.data(), active.data(),
           nullptr,              nullptr};
 }
 

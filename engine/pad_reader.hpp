@@ -36,6 +36,9 @@ class PadReader {
   using Rows = AlignedVector<kernels::LaneRow>;
   static constexpr int kGroups = kernels::kBlock / kernels::kGroup;
 
+  /// The shapes that a sensor can feel, of the sizes that one lane has.
+  const kernels::TouchShape* shapes(int sensor, int group, int lane);
+
   struct Pad {
     kernels::PadTiles tiles;
     std::vector<kernels::TouchShape> shapes;
@@ -47,6 +50,8 @@ class PadReader {
   AlignedVector<kernels::Touch<kernels::LaneRow>> touches_;   // (targets, kGroups)
   std::vector<const kernels::Touch<kernels::LaneRow>*> touch_of_group_;
   std::vector<kernels::Touch<double>> one_;                   // (targets) one environment's
+  std::vector<kernels::TouchShape> one_shapes_;               // (targets)
+  AlignedVector<kernels::LaneRow> sizes_;                     // (targets, kGroups, 3) of those that vary
 };
 
 }  // namespace tangere

@@ -49,13 +49,14 @@ void Parameters::add_coefficients(const std::string& of, bool linear, Place plac
   for (int k = 0; k < 4; ++k) add(of + " " + names[k], units[k], {place, index, k, {{row + k, 1}}});
 }
 
-/// Mass, moment and inertia of a body are proportional to its density; abstract bodies have none.
+/// Mass, moment and inertia of a body are proportional to its density; abstract bodies have none. Where sizes vary, the
+/// factor is each environment's own: such a density is left out.
 void Parameters::add_densities(const CompiledModel& m, int row) {
   for (std::size_t i = 0; i < m.bodies.size(); ++i) {
     const BodyDescription& d = m.scene.links[i].body;
     const CompiledBody& body = m.bodies[i];
     const MassProperties unit = mass_properties(d.shape, 1);
-    if (body.link < 0 || body.mass <= 0 || std::holds_alternative<AbstractShape>(d.shape)) continue;
+    if (body.link < 0 || body.mass <= 0 || body.size_row >= 0 || std::holds_alternative<AbstractShape>(d.shape)) continue;
     const kernels::Mat3<double>& R = body.frame.R;
     const kernels::Vec3<double> centre = R * unit.centre + body.frame.p, moment = unit.mass * centre;
     const kernels::Mat3<double> p = kernels::skew(centre);

@@ -165,9 +165,10 @@ struct Readout::Impl {
     }
   }
 
-  /// Small pads are read in all environments of a block at once, unless most lanes would be idle.
+  /// Small pads are read in all environments of a block at once, unless most lanes would be idle or feel shapes of sizes
+  /// of their own.
   [[nodiscard]] bool together(const Batch& batch, int number, int sensor) const {
-    return small(sensor_of(sensor)) && environments_of(batch, number) >= kFewest;
+    return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary && environments_of(batch, number) >= kFewest;
   }
   static int environments_of(const Batch& batch, int number) {
     return std::min(kBlock, batch.environments() - number * kBlock);

@@ -145,8 +145,8 @@ void ReadoutPullback::finish(BlockCotangent& out) {
     load(q, m.layout.q, m.nq);
     load(v, m.layout.v, m.nv);
     std::fill(q_bar, v_bar + m.nv, LaneRow{});
-    kernels::active_kernels().pull_back_links(m.view, {q, v, zero, rates}, i.scratch.data(), i.links[std::size_t(g)].data(),
-                                              q_bar, v_bar);
+    kernels::active_kernels().pull_back_links(m.view, {q, v, zero, rates, i.batch->block(i.block), g}, i.scratch.data(),
+                                              i.links[std::size_t(g)].data(), q_bar, v_bar);
     for (int k = 0; k < m.nv; ++k)
       for (int l = 0; l < kGroup; ++l) {
         out.q[std::size_t(k * kBlock + g * kGroup + l)] += q_bar[k][l];

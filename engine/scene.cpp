@@ -98,6 +98,21 @@ const char* to_string(JointField value) {
   return "unknown";
 }
 
+double* size_number(Shape& shape, int which) {
+  if (auto* cuboid = std::get_if<CuboidShape>(&shape))
+    return which >= 2 && which <= 4 ? &cuboid->size[std::size_t(which - 2)] : nullptr;
+  if (auto* sphere = std::get_if<SphereShape>(&shape)) return which == 0 ? &sphere->radius : nullptr;
+  const auto of_rod = [&](auto* rod) { return which == 0 ? &rod->radius : which == 1 ? &rod->length : nullptr; };
+  if (auto* cylinder = std::get_if<CylinderShape>(&shape)) return of_rod(cylinder);
+  if (auto* capsule = std::get_if<CapsuleShape>(&shape)) return of_rod(capsule);
+  return nullptr;
+}
+
+const char* size_name(int which) {
+  constexpr const char* kNames[] = {"radius", "length", "size[0]", "size[1]", "size[2]"};
+  return which >= 0 && which < 5 ? kNames[which] : "unknown";
+}
+
 bool dof_turns(JointType type, int k) {
   switch (type) {
     case JointType::revolute:

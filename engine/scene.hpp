@@ -216,14 +216,15 @@ struct Distribution {
   double a = 0, b = 0;          ///< uniform, log_uniform: low, high; normal: mean, standard deviation
   std::vector<double> values;   ///< list: equally likely
 };
-enum class RandomTarget { joint_q, joint_v, ground_contact, pair_contact, tactile, joint_effect, motor, density };
+enum class RandomTarget { joint_q, joint_v, ground_contact, pair_contact, tactile, joint_effect, motor, density, size, place };
 enum class ContactField { kn, kt, mu, damping };
 enum class JointField { damping, armature, stiffness, lim_stiffness, P, D };  ///< the last two: position motors
 struct RandomizationDescription {
   RandomTarget target = RandomTarget::joint_q;
   std::string name;                 ///< joint (its motor), tactile, body (of a ground contact), or general body of a pair
   std::string second_name;          ///< primitive body of a pair
-  int index = 0;                    ///< joint_q, joint_v: which component
+  int index = 0;                    ///< joint_q, joint_v, place (of the joint in its parent's frame): which component; size:
+                                    ///< which number (size_name)
   ContactField field = ContactField::kn;  ///< contacts and tactile
   Distribution distribution;
   Source source;
@@ -261,6 +262,10 @@ const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
 /// "sphere", "cuboid" …
 const char* shape_name(const Shape& shape);
+
+/// The numbers of a size: 0 radius, 1 length, 2 … 4 edges of a cuboid [m]. nullptr where a shape has no such number.
+double* size_number(Shape& shape, int which);
+const char* size_name(int which);  ///< "radius", "length", "size[0]" …
 
 /// Whether contact points may touch it, and whether it has such points itself.
 bool has_distance(const Shape& shape);

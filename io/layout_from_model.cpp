@@ -54,6 +54,8 @@ const char* randomized_unit(const RandomizationDescription& d) {
     case RandomTarget::joint_q: return "m, rad or 1, as in q_units";
     case RandomTarget::joint_v: return "m/s or rad/s, as in v_units";
     case RandomTarget::density: return "kg/m^3";
+    case RandomTarget::size:
+    case RandomTarget::place: return "m";
     case RandomTarget::ground_contact:
     case RandomTarget::pair_contact:
     case RandomTarget::tactile: return d.field == ContactField::mu ? "1" : "SI";
@@ -75,6 +77,8 @@ std::string randomized_name(const RandomizationDescription& d) {
       return fmt::format("{}/{}.{}", d.name, d.second_name, field_name(d.field));
     case RandomTarget::tactile: return fmt::format("{}.{}", d.name, field_name(d.field));
     case RandomTarget::density: return fmt::format("{}.density", d.name);
+    case RandomTarget::size: return fmt::format("{}.{}", d.name, size_name(d.index));
+    case RandomTarget::place: return fmt::format("{}.pos[{}]", d.name, d.index);
     case RandomTarget::joint_effect: return fmt::format("{}.{}", d.name, to_string(d.joint_field));
     case RandomTarget::motor: return fmt::format("motor/{}.{}", d.name, to_string(d.joint_field));
   }

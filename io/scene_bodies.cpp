@@ -7,12 +7,14 @@
 #include "engine/compiled_model.hpp"
 #include "io/scene_sections.hpp"
 #include "io/surface_files.hpp"
+#include "io/tactile_layouts.hpp"
 
 namespace tangere {
 
 namespace {
 
 constexpr int kLargestResolution = 1000;  // contact points along one edge or around one ring
+constexpr int kMostPoints = 1 << 20;      // of a hemisphere
 
 using Names = std::vector<std::string>;
 
@@ -64,6 +66,19 @@ CapsuleShape read_capsule(const SceneNode& node, double length) {
   return shape;
 }
 
+/// Contact points of an abstract body, in the scene's unit: those of a file, or of a hemisphere.
+std::vector<double> read_collision(const SceneNode& node) {
+  const bool generated = node.has("radius") || node.has("count");
+  if (generated == node.has("contacts"))
+    node.fail(fmt::format("{}; expected 'contacts' (a file), or 'radius' and 'count' (a hemisphere)",
+                          generated ? "both 'contacts' and a hemisphere" : "no contact points"));
+  if (!generated) return read_beside(node, "contacts", read_contact_points);
+  std::vector<double> points;
+  for (const TactilePoint& p : hemisphere_points(node.positive("radius"), node.integer("count", 1, kMostPoints)))
+    points.insert(points.end(), p.position.begin(), p.position.end());
+  return points;
+}
+
 AbstractShape read_abstract(const SceneNode& node, double length) {
   const SceneContext& c = node.context();
   AbstractShape shape;
@@ -79,11 +94,11 @@ AbstractShape read_abstract(const SceneNode& node, double length) {
       child.check_attributes({}, {"mesh", "pos", "quat"});
       continue;
     }
-    child.check_attributes({"contacts", "pos", "quat"});
+    child.check_attributes({"contacts", "radius", "count", "pos", "quat"});
     if (!shape.contact_points.empty()) child.fail("given twice; expected once");
     const kernels::Frame<double> at =
         to_frame({scaled(child.vector("pos", Vector3{0, 0, 0}), length), child.quaternion("quat")});
-    const std::vector<double> points = read_beside(child, "contacts", read_contact_points);
+    const std::vector<double> points = read_collision(child);
     for (std::size_t k = 0; k < points.size(); k += 3) {
       const kernels::Vec3<double> p =
           at.R * kernels::Vec3<double>{length * points[k], length * points[k + 1], length * points[k + 2]} + at.p;

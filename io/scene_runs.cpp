@@ -2,6 +2,7 @@
 // What a run of a scene starts from, is driven by, and varies: <initial>, <control>, <randomize>.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -111,10 +112,19 @@ void read_joint_variation(const Scene& scene, const SceneNode& node, Randomizati
 }
 
 void read_state_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
-  node.check_attributes({"name", "q", "v", "uniform", "log_uniform", "normal", "list"});
+  node.check_attributes({"name", "q", "v", "pos", "uniform", "log_uniform", "normal", "list"});
   const int joint = find_joint(scene, node, "name");
   const JointType type = scene.links[std::size_t(joint)].joint.type;
-  if (node.has("q") == node.has("v")) node.fail("expected exactly one of q, v (the index of what varies) and field");
+  if (int{node.has("q")} + int{node.has("v")} + int{node.has("pos")} != 1)
+    node.fail("expected exactly one of q, v, pos (the index of what varies) and field");
+  if (node.has("pos")) {
+    if (type == JointType::fixed) node.fail("joint '" + node.text("name") + "' is fixed; expected one that moves");
+    d.target = RandomTarget::place;
+    d.name = node.text("name");
+    d.index = node.integer("pos", 0, 2);
+    d.distribution = read_distribution(node, node.context().length);
+    return;
+  }
   const bool position = node.has("q");
   const int count = position ? position_count(type) : dof_count(type);
   if (count == 0) node.fail("joint '" + node.text("name") + "' is fixed; nothing of it can vary");
@@ -124,21 +134,42 @@ void read_state_variation(const Scene& scene, const SceneNode& node, Randomizati
   d.distribution = read_distribution(node, coordinate_scale(type, d.index, node.context()));
 }
 
-/// The density of a body.
-void read_density_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
-  node.check_attributes({"name", "field", "uniform", "log_uniform", "normal", "list"});
+/// Masses and sizes are positive whatever is drawn.
+void check_positive(const SceneNode& node, const Distribution& d, const std::string& what) {
+  if (d.kind == Distribution::Kind::normal)
+    node.fail("normal can draw a negative " + what + "; expected uniform, log_uniform or list");
+  double least = d.a;
+  if (d.kind == Distribution::Kind::list) least = *std::min_element(d.values.begin(), d.values.end());
+  if (!(least > 0)) node.fail(fmt::format("a {} of {:g}; expected positive ones", what, least));
+}
+
+/// The density of a body, or a number of its size.
+void read_body_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
+  node.check_attributes({"name", "field", "size", "uniform", "log_uniform", "normal", "list"});
   const BodyDescription& body = scene.links[std::size_t(find_body(scene, node, "name"))].body;
-  static_cast<void>(node.choice("field", {"density"}));
+  d.name = body.name;
+  if (node.has("field") == node.has("size")) node.fail("expected exactly one of field and size (the index of an edge)");
+  if (node.has("size")) {
+    d.index = 2 + node.integer("size", 0, 2);
+  } else {
+    d.index = node.choice("field", {"radius", "length", "density"});
+  }
+  if (node.has("size") || d.index < 2) {
+    d.target = RandomTarget::size;
+    Shape shape = body.shape;
+    if (size_number(shape, d.index) == nullptr)
+      node.fail(fmt::format("body '{}' is a {}, which has no {}", body.name, shape_name(shape), size_name(d.index)));
+    d.distribution = read_distribution(node, node.context().length);
+    check_positive(node, d.distribution, size_name(d.index));
+    return;
+  }
+  d.index = 0;
   if (std::holds_alternative<AbstractShape>(body.shape))
     node.fail("body '" + body.name + "' is known by its mass; nothing of it can vary");
   if (!(body.density > 0)) node.fail("body '" + body.name + "' is massless; expected a positive density");
   d.target = RandomTarget::density;
-  d.name = body.name;
   d.distribution = read_distribution(node, node.context().density);
-  check_coefficient(node, d.distribution);
-  bool zero = d.distribution.kind == Distribution::Kind::uniform && d.distribution.a == 0;
-  for (double x : d.distribution.values) zero = zero || x == 0;
-  if (zero) node.fail("a density of 0; expected positive ones");
+  check_positive(node, d.distribution, "density");
 }
 
 /// The law decides the unit of `damping`.
@@ -252,7 +283,7 @@ void read_randomize(Scene& scene, const SceneNode& section) {
     } else if (node.name() == "joint") {
       read_state_variation(scene, node, d);
     } else if (node.name() == "body") {
-      read_density_variation(scene, node, d);
+      read_body_variation(scene, node, d);
     } else {
       read_coefficient_variation(scene, node, d);
     }

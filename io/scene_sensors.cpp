@@ -21,7 +21,7 @@ Names attributes_of(int type) {
   switch (type) {
     case 0: return {"rect_pos0", "rect_pos1", "axis0", "axis1", "resolution"};
     case 1: return {"spec", "pos", "quat"};
-    case 2: return {"radius", "count", "pos", "quat"};
+    case 2: return {"radius", "count", "resolution", "pos", "quat"};
     case 3: return {"radius", "length", "resolution", "pos", "quat"};
     default: return {"filename", "pitch", "scale", "pos", "quat"};
   }
@@ -76,13 +76,25 @@ std::vector<TactilePoint> read_surface(const SceneNode& node, double length) {
   return points;
 }
 
+/// With a resolution, every point has a pixel of its own.
+std::vector<TactilePoint> read_hemisphere(const SceneNode& node, double radius) {
+  std::vector<TactilePoint> points = hemisphere_points(radius, node.integer("count", 1, kMostPoints));
+  if (!node.has("resolution")) return points;
+  const auto [rows, cols] = read_resolution(node);
+  if (static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols) < points.size())
+    node.fail(fmt::format("resolution=\"{}\" has {} pixels for {} points; expected one for each at least",
+                          node.text("resolution"), rows * cols, points.size()));
+  draw_hemisphere(rows, cols, points);
+  return points;
+}
+
 std::vector<TactilePoint> read_points(const SceneNode& node, int type) {
   const double length = node.context().length;
   const auto points = [&] {
     if (type == 1) return read_spec(node, length);
     if (type == 4) return read_surface(node, length);
     const double radius = node.positive("radius") * length;
-    if (type == 2) return hemisphere_points(radius, node.integer("count", 1, kMostPoints));
+    if (type == 2) return read_hemisphere(node, radius);
     const auto [along, around] = read_resolution(node);
     return cylinder_points(radius, node.positive("length") * length, along, around);
   };

@@ -62,6 +62,14 @@ TactilePoint parse_point(const WordReader& file) {
   return p;
 }
 
+/// Of a direction on the half z ≥ 0: its place in the square [-1, 1]². Rings about the pole become square rings that hold the
+/// same share of the area, and an eighth of a ring one half of an edge.
+std::array<double, 2> square_place(const Vec3<double>& n) {
+  const double ring = std::sqrt(std::max(0.0, 1 - n.z)), x = std::abs(n.x), y = std::abs(n.y);
+  const double along = ring * std::atan2(std::min(x, y), std::max(x, y)) * 4 / M_PI;
+  return {std::copysign(x >= y ? ring : along, n.x), std::copysign(x >= y ? along : ring, n.y)};
+}
+
 }  // namespace
 
 std::vector<TactilePoint> hemisphere_points(double radius, int count) {
@@ -74,6 +82,25 @@ std::vector<TactilePoint> hemisphere_points(double radius, int count) {
     points.push_back(point_at(radius * normal, normal, {z * c, z * s, -across}));
   }
   return points;
+}
+
+void draw_hemisphere(int rows, int cols, std::vector<TactilePoint>& points) {
+  std::vector<bool> taken(static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols));
+  const auto at = [&](int i, int j) { return static_cast<std::size_t>(i) * static_cast<std::size_t>(cols) + j; };
+  for (TactilePoint& p : points) {
+    const auto [x, y] = square_place(vec(p.normal));
+    const double row = rows * (1 + x) / 2, col = cols * (1 + y) / 2;
+    const int i0 = static_cast<int>(row), j0 = static_cast<int>(col);
+    double nearest = INFINITY;
+    // Pixels outside a window of ± reach are farther away than reach.
+    for (int reach = 1; !(nearest < double(reach) * reach) && reach < 2 * std::max(rows, cols); reach *= 2)
+      for (int i = std::max(0, i0 - reach); i <= std::min(rows - 1, i0 + reach); ++i)
+        for (int j = std::max(0, j0 - reach); j <= std::min(cols - 1, j0 + reach); ++j) {
+          const double away = std::pow(i + 0.5 - row, 2) + std::pow(j + 0.5 - col, 2);
+          if (away < nearest && !taken[at(i, j)]) nearest = away, p.pixel = {i, j};
+        }
+    taken[at(p.pixel[0], p.pixel[1])] = true;
+  }
 }
 
 std::vector<TactilePoint> cylinder_points(double radius, double length, int along, int around) {

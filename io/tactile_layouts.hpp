@@ -13,6 +13,11 @@ namespace tangere {
 /// axis0 points away from the pole, axis1 = normal × axis0, normals outward. No image.
 std::vector<TactilePoint> hemisphere_points(double radius, int count);
 
+/// Gives each point of a hemisphere a pixel of its own: equal areas of the hemisphere are equal areas of the image, the
+/// pole is its middle, x goes down the rows and y along the columns. A point whose pixel an earlier one has takes the nearest
+/// that is free. rows × cols must be as many as the points, or more.
+void draw_hemisphere(int rows, int cols, std::vector<TactilePoint>& points);
+
 /// Rings of `around` points about z, `along` of them from z = -length/2 to length/2, ends included [m]. axis0 goes
 /// around, axis1 along z, normals outward. Image: row = ring, column = around.
 std::vector<TactilePoint> cylinder_points(double radius, double length, int along, int around);

@@ -12,6 +12,7 @@
 
 #include "engine/error.hpp"
 #include "io/svg.hpp"
+#include "io/tactile_drawing.hpp"
 
 namespace tangere {
 
@@ -29,42 +30,43 @@ struct Panel {
   std::int64_t frame = 0, step = 0;
   int rows = 0, cols = 0, arrow_rows = 0, arrow_cols = 0;
   std::vector<double> pressure;                  // (rows, cols) [N]
-  std::vector<std::array<double, 2>> shear;      // (arrow_rows, arrow_cols): along axis0, axis1 [N]
+  std::vector<std::array<double, 2>> shear;      // (arrow_rows, arrow_cols): down, right [N]
   double total_pressure = 0, total_shear[2] = {0, 0};
   bool touched = false;
 };
 
 Panel make_panel(const TrajectoryReader& file, std::size_t sensor, std::int64_t frame, std::int64_t environment) {
   const SensorLayout& s = file.sensors()[sensor];
+  const TactileDrawing d = drawing_of(s);
   const std::vector<double> force = file.force(sensor, frame, environment);
   Panel p;
   p.frame = frame;
   p.step = file.step(sensor, frame);
-  p.rows = std::min(s.rows, kMostCells);
-  p.cols = std::min(s.cols, kMostCells);
-  p.arrow_rows = std::min(s.rows, kMostArrows);
-  p.arrow_cols = std::min(s.cols, kMostArrows);
+  p.rows = std::min(d.rows, kMostCells);
+  p.cols = std::min(d.cols, kMostCells);
+  p.arrow_rows = std::min(d.rows, kMostArrows);
+  p.arrow_cols = std::min(d.cols, kMostArrows);
   p.pressure.assign(std::size_t(p.rows) * p.cols, 0);
   p.shear.assign(std::size_t(p.arrow_rows) * p.arrow_cols, {0, 0});
   std::vector<int> cells(p.pressure.size(), 0), points(p.shear.size(), 0);
-  for (int i = 0; i < s.rows; ++i)
-    for (int j = 0; j < s.cols; ++j) {
-      const double* f = &force[3 * (std::size_t(i) * s.cols + j)];
-      const std::size_t cell = std::size_t(i * p.rows / s.rows) * p.cols + std::size_t(j * p.cols / s.cols);
-      const std::size_t arrow =
-          std::size_t(i * p.arrow_rows / s.rows) * p.arrow_cols + std::size_t(j * p.arrow_cols / s.cols);
-      p.pressure[cell] += s.pressure_sign * f[2];
-      ++cells[cell];
-      p.shear[arrow][0] += f[0];
-      p.shear[arrow][1] += f[1];
-      ++points[arrow];
-      p.total_pressure += s.pressure_sign * f[2];
-      p.total_shear[0] += f[0];
-      p.total_shear[1] += f[1];
-      p.touched = p.touched || f[0] != 0 || f[1] != 0 || f[2] != 0;
-    }
-  for (std::size_t k = 0; k < cells.size(); ++k) p.pressure[k] /= cells[k];
-  for (std::size_t k = 0; k < points.size(); ++k) p.shear[k][0] /= points[k], p.shear[k][1] /= points[k];
+  for (std::size_t k = 0; k < d.cell.size(); ++k) {
+    const double* f = &force[3 * k];
+    const std::array<double, 2> shear = d.shear(k, f[0], f[1]);
+    p.total_pressure += s.pressure_sign * f[2];
+    for (int c = 0; c < 2; ++c) p.total_shear[c] += shear[c];
+    p.touched = p.touched || f[0] != 0 || f[1] != 0 || f[2] != 0;
+    if (d.cell[k][0] < 0) continue;
+    const std::int64_t i = d.cell[k][0], j = d.cell[k][1];
+    const std::size_t cell = std::size_t(i * p.rows / d.rows * p.cols + j * p.cols / d.cols);
+    const std::size_t arrow = std::size_t(i * p.arrow_rows / d.rows * p.arrow_cols + j * p.arrow_cols / d.cols);
+    p.pressure[cell] += s.pressure_sign * f[2];
+    ++cells[cell];
+    for (int c = 0; c < 2; ++c) p.shear[arrow][c] += shear[c];
+    ++points[arrow];
+  }
+  for (std::size_t k = 0; k < cells.size(); ++k) p.pressure[k] /= std::max(cells[k], 1);
+  for (std::size_t k = 0; k < points.size(); ++k)
+    for (double& x : p.shear[k]) x /= std::max(points[k], 1);
   return p;
 }
 
@@ -92,10 +94,9 @@ Unit unit_for(double largest) {
 class Picture {
  public:
   Picture(const TrajectoryReader& file, std::size_t sensor, std::vector<Panel> panels, std::int64_t environment)
-      : file_(file), s_(file.sensors()[sensor]), panels_(std::move(panels)), environment_(environment) {
-    const auto pitch = s_.pitch();
-    height_m_ = std::abs(pitch[0]) * (s_.rows - 1);
-    width_m_ = std::abs(pitch[1]) * (s_.cols - 1);
+      : file_(file), s_(file.sensors()[sensor]), drawing_(drawing_of(s_)), panels_(std::move(panels)), environment_(environment) {
+    height_m_ = drawing_.height;
+    width_m_ = drawing_.width;
     if (!(height_m_ > 0)) height_m_ = width_m_ > 0 ? width_m_ : 1e-3;
     if (!(width_m_ > 0)) width_m_ = height_m_;
     const double scale = kPanel / std::max(width_m_, height_m_);
@@ -117,8 +118,10 @@ class Picture {
         "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n", total, tall);
     out_ += text(kLeft, 28, fmt::format("{}: sensor '{}', environment {}", file_.scene_name(), s_.name, environment_),
                  "font-size=\"16\" font-weight=\"bold\"");
-    out_ += text(kLeft, 48, fmt::format("{} × {} points; colour: normal force per point (pressure positive); arrows: shear force on the body",
-                                        s_.rows, s_.cols));
+    const std::string points = s_.rectangular()
+                                   ? fmt::format("{} × {} points", s_.rows, s_.cols)
+                                   : fmt::format("{} points in an image of {} × {}", s_.points, drawing_.rows, drawing_.cols);
+    out_ += text(kLeft, 48, points + "; colour: normal force per point (pressure positive); arrows: shear force on the body");
     for (std::size_t k = 0; k < panels_.size(); ++k) panel(panels_[k], kLeft + double(k) * (width_ + kGap), k == 0);
     bar(kLeft + double(panels_.size()) * (width_ + kGap));
     captions(tall);
@@ -159,13 +162,10 @@ class Picture {
     if (!(longest_ > 0)) return;
     const double cell_w = width_ / p.arrow_cols, cell_h = height_ / p.arrow_rows;
     const double scale = 0.95 * std::max(cell_w, cell_h) / longest_;
-    // Along axis0 is down the page when the rows run along it, and likewise axis1 to the right.
-    const auto pitch = s_.pitch();
-    const double down = pitch[0] < 0 ? -1 : 1, right = pitch[1] < 0 ? -1 : 1;
     for (int i = 0; i < p.arrow_rows; ++i)
       for (int j = 0; j < p.arrow_cols; ++j) {
         const auto& f = p.shear[std::size_t(i) * p.arrow_cols + j];
-        const double dx = right * f[1] * scale, dy = down * f[0] * scale, length = std::hypot(dx, dy);
+        const double dx = f[1] * scale, dy = f[0] * scale, length = std::hypot(dx, dy);
         if (length < 1) continue;
         const double x = x0 + (j + 0.5) * cell_w - dx / 2, y = kTop + (i + 0.5) * cell_h - dy / 2;
         const double head = std::min(4.0, 0.4 * length), ux = dx / length, uy = dy / length;
@@ -180,12 +180,12 @@ class Picture {
     const double below = kTop + height_;
     out_ += text(x0, below + 16, "0", "text-anchor=\"middle\" font-size=\"11\"");
     out_ += text(x0 + width_, below + 16, fmt::format("{:.3g}", width_m_ * 1e3), "text-anchor=\"middle\" font-size=\"11\"");
-    out_ += text(x0 + width_ / 2, below + 16, "axis1 [mm]", "text-anchor=\"middle\" font-size=\"11\"");
+    out_ += text(x0 + width_ / 2, below + 16, s_.rectangular() ? "axis1 [mm]" : "columns [mm]", "text-anchor=\"middle\" font-size=\"11\"");
     if (!first) return;
     out_ += text(x0 - 6, kTop + 8, "0", "text-anchor=\"end\" font-size=\"11\"");
     out_ += text(x0 - 6, below, fmt::format("{:.3g}", height_m_ * 1e3), "text-anchor=\"end\" font-size=\"11\"");
-    out_ += fmt::format("<text transform=\"translate({:.1f} {:.1f}) rotate(-90)\" text-anchor=\"middle\" font-size=\"11\">axis0 [mm]</text>\n",
-                        x0 - 34, kTop + height_ / 2);
+    out_ += fmt::format("<text transform=\"translate({:.1f} {:.1f}) rotate(-90)\" text-anchor=\"middle\" font-size=\"11\">{} [mm]</text>\n",
+                        x0 - 34, kTop + height_ / 2, s_.rectangular() ? "axis0" : "rows");
   }
 
   void bar(double x0) {
@@ -204,7 +204,7 @@ class Picture {
   }
 
   void captions(double tall) {
-    const bool pooled = s_.rows > kMostCells || s_.cols > kMostCells;
+    const bool pooled = drawing_.rows > kMostCells || drawing_.cols > kMostCells;
     std::string note = pooled ? fmt::format("Colours are means over cells of a {} × {} grid. ", panels_[0].rows, panels_[0].cols) : "";
     if (longest_ > 0) {
       const Unit u = unit_for(longest_);
@@ -221,6 +221,7 @@ class Picture {
 
   const TrajectoryReader& file_;
   const SensorLayout& s_;
+  TactileDrawing drawing_;
   std::vector<Panel> panels_;
   std::int64_t environment_;
   double width_m_ = 0, height_m_ = 0, width_ = 0, height_ = 0;
@@ -256,18 +257,18 @@ std::vector<Panel> choose_panels(const TrajectoryReader& file, std::size_t senso
 std::vector<std::string> drawable_sensors(const TrajectoryReader& file) {
   std::vector<std::string> names;
   for (const SensorLayout& s : file.sensors())
-    if (s.rectangular()) names.push_back(s.name);
+    if (drawable(s)) names.push_back(s.name);
   return names;
 }
 
 std::string render_tactile_svg(const TrajectoryReader& file, const PlotOptions& o) {
-  const std::vector<std::string> drawable = drawable_sensors(file);
-  const std::size_t sensor = file.find_sensor(o.sensor.empty() && !drawable.empty() ? drawable[0] : o.sensor);
+  const std::vector<std::string> names = drawable_sensors(file);
+  const std::size_t sensor = file.find_sensor(o.sensor.empty() && !names.empty() ? names[0] : o.sensor);
   const SensorLayout& s = file.sensors()[sensor];
-  if (!s.rectangular())
-    throw InputError(fmt::format("sensor '{}' is not a rectangular array; {}", s.name,
-                                 drawable.empty() ? "only those can be drawn, and the file has none"
-                                                  : fmt::format("those that can be drawn: {}", fmt::join(drawable, ", "))));
+  if (!drawable(s))
+    throw InputError(fmt::format("sensor '{}' is no rectangular array and has no image; {}", s.name,
+                                 names.empty() ? "only those can be drawn, and the file has none"
+                                               : fmt::format("those that can be drawn: {}", fmt::join(names, ", "))));
   if (o.environment < 0 || o.environment >= file.environments())
     throw InputError(fmt::format("environment {}: the file has 0 to {}", o.environment, file.environments() - 1));
   if (o.strip < 1) throw InputError(fmt::format("a strip of {} frames; expected at least 1", o.strip));

@@ -18,11 +18,12 @@ struct PlotOptions {
   int strip = 6;                      ///< most frames of a strip, spread over those with contact
 };
 
-/// Names of the sensors that can be drawn, rectangular arrays, in alphabetical order, as files list them.
+/// Names of the sensors that can be drawn, rectangular arrays and those with an image, in alphabetical order, as files list
+/// them.
 std::vector<std::string> drawable_sensors(const TrajectoryReader& file);
 
-/// Column axis1 runs to the right and row axis0 downwards, as in the array. All frames share one colour scale and one
-/// arrow scale. Throws InputError for a sensor, environment or frame that is not there, or not rectangular.
+/// Column axis1 runs to the right and row axis0 downwards, as in the array; or columns and rows of the image. All frames share one colour scale and one
+/// arrow scale. Throws InputError for a sensor, environment or frame that is not there, or cannot be drawn.
 std::string render_tactile_svg(const TrajectoryReader& file, const PlotOptions& options);
 
 }  // namespace tangere

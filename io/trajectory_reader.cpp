@@ -12,6 +12,10 @@
 
 namespace tangere {
 
+namespace {
+constexpr std::int64_t kLargestImage = std::int64_t{1} << 30;  // pixels along one side
+}
+
 struct TrajectoryReader::Impl {
   std::string path, scene_name;
   h5::Id file;
@@ -45,6 +49,28 @@ struct TrajectoryReader::Impl {
     return values[0];
   }
 
+  /// What a picture of a list of points needs.
+  void read_image(const h5::Id& group, SensorLayout& s) const {
+    const auto n = static_cast<hsize_t>(s.points);
+    s.list.resize(n);
+    std::vector<std::int64_t> pixels(2 * n);
+    h5::read_box<std::int64_t>(h5::open_dataset(group, "pixel"), {0, 0}, {n, 2}, pixels.data());
+    for (std::size_t p = 0; p < n; ++p)
+      for (std::size_t k = 0; k < 2; ++k) {
+        const std::int64_t x = pixels[2 * p + k];
+        if (x < -1 || x >= kLargestImage) throw IoError(fmt::format("{}: sensor '{}' has pixel {}", path, s.name, x));
+        s.list[p].pixel[k] = static_cast<int>(x);
+      }
+    const auto vectors = [&](const char* name, Vector3 TactilePoint::*to) {
+      std::vector<double> x(3 * n);
+      h5::read_box<double>(h5::open_dataset(group, name), {0, 0}, {n, 3}, x.data());
+      for (std::size_t p = 0; p < n; ++p) std::copy_n(&x[3 * p], 3, (s.list[p].*to).begin());
+    };
+    vectors("position", &TactilePoint::position);
+    vectors("axis0", &TactilePoint::axis0);
+    vectors("axis1", &TactilePoint::axis1);
+  }
+
   void add_sensor(const h5::Id& group, const std::string& name) {
     const h5::Id force = h5::open_dataset(group, "force");
     SensorLayout s;
@@ -68,6 +94,7 @@ struct TrajectoryReader::Impl {
       copy("axis1", s.axis1);
     } else if (dims.size() == 4) {
       s.points = static_cast<int>(dims[2]);
+      if (h5::has_link(group, "pixel")) read_image(group, s);
     } else {
       throw IoError(fmt::format("{}: sensor '{}' has {} dimensions; expected 4 or 5", path, name, dims.size()));
     }

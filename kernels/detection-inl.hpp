@@ -41,7 +41,8 @@ void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out
       const Vec3<N> in_2 = transposed_times(x.R, broadcast<N>(pair.middle) - x.p);
       const Vec3<N> y = transposed_times(broadcast<N>(pair.frame2.R), in_2 - broadcast<N>(pair.frame2.p));
       const N reach(pair.extent + a.candidates[k].margin);
-      out.lanes[k] = with_distance<N>(pair.shape, pair.size, [&](const auto& shape) {
+      const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
+      out.lanes[k] = with_distance<N>(pair.shape, size, [&](const auto& shape) {
         return lane_bits(nearer_than(shape, y, reach));
       });
       if (out.lanes[k] != 0) store_frame(compose(x, broadcast<N>(pair.frame2)), view(out.shape_poses + 12 * k));
@@ -99,7 +100,7 @@ int search_shape(const CandidateSearch& s, Shape shape) {
 
 template <class A>
 int search_candidates(const CandidateSearch& s) {
-  return with_distance<Lanes<A>>(s.pair->shape, s.pair->size,
+  return with_distance<Lanes<A>>(s.pair->shape, s.size,
                                  [&]<class Shape>(const Shape& shape) { return search_shape<A, Shape>(s, shape); });
 }
 

@@ -256,15 +256,21 @@ auto nearer_than(const CapsuleDistance<N>& shape, const Vec3<N>& y, const N& m) 
 
 /// Calls f with the distance of a shape; `size` as in PairContact.
 template <class N, class F>
-auto with_distance(PrimitiveShape shape, const Vec3<double>& size, const F& f) {
+auto with_distance(PrimitiveShape shape, const Vec3<N>& size, const F& f) {
   switch (shape) {
-    case PrimitiveShape::sphere: return f(SphereDistance<N>{N(size.x)});
+    case PrimitiveShape::sphere: return f(SphereDistance<N>{size.x});
     case PrimitiveShape::plane: return f(PlaneDistance<N>{});
-    case PrimitiveShape::cylinder: return f(CylinderDistance<N>{N(size.x), N(size.y)});
-    case PrimitiveShape::capsule: return f(CapsuleDistance<N>{N(size.x), N(size.y)});
+    case PrimitiveShape::cylinder: return f(CylinderDistance<N>{size.x, size.y});
+    case PrimitiveShape::capsule: return f(CapsuleDistance<N>{size.x, size.y});
     case PrimitiveShape::cuboid: break;
   }
-  return f(CuboidDistance<N>{broadcast<N>(size)});
+  return f(CuboidDistance<N>{size});
+}
+/// The same size in every lane.
+template <class N, class F>
+  requires(!std::is_same_v<N, double>)
+auto with_distance(PrimitiveShape shape, const Vec3<double>& size, const F& f) {
+  return with_distance<N>(shape, broadcast<N>(size), f);
 }
 
 /// Value and gradient alone.

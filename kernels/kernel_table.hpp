@@ -73,6 +73,7 @@ struct NearPairs {
 /// One lane's search for points near a shape.
 struct CandidateSearch {
   const PairContact* pair;
+  Vec3<double> size;     ///< the lane's, as in PairContact
   const double* pose;    ///< (12) shape in body 1: R row-major, then p
   double margin;         ///< points nearer than this to the surface, or inside, are candidates [m]
   double* points;        ///< (3, stride)
@@ -97,6 +98,8 @@ struct GroupState {
   const LaneRow *q, *v;
   const LaneRow* zero;  ///< (nv) zeros
   LaneRow* rates;       ///< (nv) scratch
+  const double* block = nullptr;  ///< of the batch, for places that vary
+  int group = 0;                  ///< which half of it
 };
 
 /// Kernels of a stage for groups of L environments.

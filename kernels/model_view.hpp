@@ -42,6 +42,7 @@ struct Link {
   Vec3<double> moment; ///< mass times centre of mass, link axes [kg m]
   Mat3<double> inertia;///< about the link's origin, link axes [kg m²]
   int inertia_row = -1;///< ≥ 0: mass, moment and xx xy xz yy yz zz of the inertia stand in ten rows of the block instead
+  int place_row = -1;  ///< ≥ 0: frame.p stands in three rows of the block instead
 };
 
 /// A number of the scene: the same for all environments, or one row of the batch.
@@ -79,6 +80,7 @@ struct PairContact {
   Vec3<double> middle;          ///< of a ball that holds all points, link1's axes
   double extent;                ///< its radius [m]
   double reach;                 ///< largest |point| [m]: bounds how far a rotation moves one
+  int size_row = -1;            ///< ≥ 0: size stands in three rows of the block instead
 };
 inline constexpr int kContactTile = 32;
 inline constexpr double kFarAway = 1e6;  ///< [m] coordinates of filler points: finite, and no shape is there
@@ -104,6 +106,7 @@ struct GroundContact {
   int n_points;
   Vec3<double> middle;          ///< of a ball that holds all of the body's points, link axes
   double extent;                ///< its radius [m]
+  int radius_row = -1;          ///< ≥ 0: a sphere's radius stands there instead, and is not in `extent`
 };
 
 /// A link that touches the ground with one body or several: one 6×6 block.

@@ -47,7 +47,8 @@ void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const L
     const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
     const Frame<N> at = compose(o.link2_in_1, broadcast<N>(pair.frame2));
     LawCotangent<N> sum = zero_law<N>();
-    with_distance<N>(pair.shape, pair.size, [&]<class Shape>(const Shape& shape) {
+    const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
+    with_distance<N>(pair.shape, size, [&]<class Shape>(const Shape& shape) {
       pair_law_adjoint(shape, at, o.W, law, a.candidates[k], a.lone, slip, sum);
     });
     subtract_law(sum, out + kContactNumbers * k);
@@ -63,12 +64,13 @@ void ground_parameters(const ModelView& model, const StageArgs<N>& a, const Grou
   const Vec3<N> m = transposed_times(link.world.R, normal);
   const N height = dot(normal, link.world.p - broadcast<N>(model.ground_point));
   const LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
+  const N radius = ground_radius<N>(ground, a.block, a.group);
   LawCotangent<N> sum = zero_law<N>();
   for (int i = 0; i < ground.n_points; ++i) {
     const double* place = ground.points + 3 * i;
-    const Vec3<N> centre = {N(place[0]), N(place[1]), N(place[2])}, xi = centre - N(ground.radius) * m;
+    const Vec3<N> centre = {N(place[0]), N(place[1]), N(place[2])}, xi = centre - radius * m;
     PointContact<N> p;
-    p.d = dot(m, centre) + height - N(ground.radius);
+    p.d = dot(m, centre) + height - radius;
     const auto touching = p.d < N(0.0);
     if (!any(touching)) continue;
     p.n = m;

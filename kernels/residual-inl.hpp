@@ -64,7 +64,7 @@ void joint_motion(const Link& link, const StageArgs<N>& a, LinkScratch<N>& out, 
       break;
     }
   }
-  const Frame<N> base = broadcast<N>(link.frame);
+  const Frame<N> base = {broadcast<N>(link.frame.R), load_vector<N>(link.frame.p, link.place_row, a.block, a.group)};
   out.local.R = link.rotated ? (turns ? base.R * moved.R : base.R) : moved.R;
   out.local.p = slides(link.kind) ? (link.rotated ? base.R * moved.p : moved.p) + base.p : base.p;
 }
@@ -204,7 +204,8 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
     LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
     law.friction_tangent = a.friction_tangent;
     const auto frame = [&] { return compose(o.link2_in_1, broadcast<N>(pair.frame2)); };
-    with_distance<N>(pair.shape, pair.size, [&]<template <class> class Shape>(const Shape<N>& shape) {
+    const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
+    with_distance<N>(pair.shape, size, [&]<template <class> class Shape>(const Shape<N>& shape) {
       if constexpr (Shape<N>::kBending == Bending::ball) {
         const Vec3<N> centre = o.link2_in_1.R * broadcast<N>(pair.frame2.p) + o.link2_in_1.p;
         add_sphere<Derivatives>(sphere_motion(centre, o.W, shape.radius), law, list, a.lone, o.W, o.sums);
@@ -229,7 +230,9 @@ bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const St
   bool near = false, started = false;
   for (int i = 0; i < grounded.count; ++i) {
     const GroundContact& ground = model.grounds[model.ground_order[grounded.first + i]];
-    if (!any(dot(m, broadcast<N>(ground.middle)) + height < N(ground.extent))) continue;
+    const N radius = ground_radius<N>(ground, a.block, a.group);
+    const N extent = ground.radius_row < 0 ? N(ground.extent) : N(ground.extent) + radius;
+    if (!any(dot(m, broadcast<N>(ground.middle)) + height < extent)) continue;
     if (!started) start<Derivatives>(sums);
     started = true;
     LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
@@ -237,7 +240,7 @@ bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const St
     for (int k = 0; k < ground.n_points; ++k) {
       const double* p = ground.points + 3 * k;
       near |= accumulate_ground<Derivatives>(sums, law, m, height, link.V, Vec3<N>{N(p[0]), N(p[1]), N(p[2])},
-                                             N(ground.radius));
+                                             radius);
     }
   }
   return near;

@@ -171,6 +171,18 @@ struct ParameterLoad<Dual<double>> {
     return {row[0], row[1]};
   }
 };
+/// Three numbers that stand side by side in the block; row < 0: the same in all lanes.
+template <class N>
+Vec3<N> load_vector(const Vec3<double>& value, int row, const double* block, int group) {
+  if (row < 0) return broadcast<N>(value);
+  const auto one = [&](int i) { return ParameterLoad<N>::load({0, row + i}, block, group); };
+  return {one(0), one(1), one(2)};
+}
+/// Of a sphere on the ground; 0: points.
+template <class N>
+N ground_radius(const GroundContact& ground, const double* block, int group) {
+  return ParameterLoad<N>::load({ground.radius, ground.radius_row}, block, group);
+}
 /// Mass, moment and inertia of a link's own bodies.
 template <class N>
 struct LinkInertia {

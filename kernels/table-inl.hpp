@@ -159,6 +159,8 @@ struct TableOf {
     a.c0_over_h = N(0.0);
     a.inverse_h = N(1.0);
     a.v = view(s.rates);
+    a.block = s.block;
+    a.group = s.group;
     return a;
   }
   static void poses_of_links(const ModelView& m, const GroupState& s, LinkPose<LaneRow>* out) {

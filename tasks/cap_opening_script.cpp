@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A finger is a swing about its radius and two links in the plane that it swings. A cap rolls along a flat pad that moves
-// past it: a stroke is no longer than the pad is wide, and turns the cap by less than it must.
+// A finger is a swing about its radius and two links in the plane that it swings. A tip does not turn while it goes around
+// the cap, so it rolls on it, and its contact moves across the hemisphere.
 #include "tasks/cap_opening_script.hpp"
 
 #include <algorithm>
@@ -9,14 +9,26 @@
 namespace tangere {
 namespace {
 
-constexpr double kUpright = 0.3;                // upper + lower of a pad that stands upright [rad]
-constexpr double kBack = -0.012, kEnd = 0.012;  // of a stroke [m]
-constexpr double kReached = 2e-3;               // [m]
-constexpr double kInto = 0.03;                  // a pressing pad aims so far into the cap: as hard as an action can [m]
-constexpr double kAway = 6e-3;                  // a pad goes back so far from the cap [m]
-constexpr double kClear = 2e-3;                 // and moves along when it is so far away [m]
-constexpr double kTouching = 5e-4;              // closer it moves along the cap [m]
-constexpr double kAhead = 0.013;                // along the stroke, as far ahead of itself as an action reaches [m]
+constexpr double kWidest = 0.65;            // a stroke goes so far around to either side: tips stay apart [rad]
+constexpr double kFarthest = 0.046;         // or as far as this is along the cap, if that is less [m]
+constexpr double kReached = 0.05;           // [rad]
+constexpr double kInto = 0.015;             // a pressing tip aims so far into the cap [m]
+constexpr double kAway = 6e-3;              // a tip goes back so far from the cap [m]
+constexpr double kClear = 2e-3;             // and around when it is so far away [m]
+constexpr double kTouching = 5e-4;          // closer it goes around with the cap [m]
+constexpr double kAhead = 0.012;            // and so far ahead of itself [m]
+
+/// Of contact points about the middle of their hemisphere.
+double tip_radius(const BodyDescription& body) {
+  const auto* shape = std::get_if<AbstractShape>(&body.shape);
+  double square = 0;
+  for (std::size_t k = 0; shape && k < shape->contact_points.size(); k += 3) {
+    double sum = 0;
+    for (std::size_t c = 0; c < 3; ++c) sum += std::pow(shape->contact_points[k + c] + body.pose.position[c], 2);
+    square = std::max(square, sum);
+  }
+  return std::sqrt(square);
+}
 
 }  // namespace
 
@@ -26,47 +38,45 @@ CapScript::CapScript(const Scene& scene) {
     const Vector3& p = link.joint.pose.position;
     if (link.joint.name == "mount_1") hip_ = std::hypot(p[0], p[1]), hip_height = p[2];
     if (link.joint.name == "lower_1") upper_ = -p[2];
-    if (link.joint.name == "tip_1") {
-      lower_ = -p[2];
-      if (const auto* pad = std::get_if<CuboidShape>(&link.body.shape))
-        half_height_ = pad->size[0] / 2, half_thickness_ = pad->size[2] / 2;
-    }
+    if (link.joint.name == "tip_1") lower_ = -p[2], tip_ = tip_radius(link.body);
     if (link.joint.name == "bottle" || link.joint.name == "cap") height += p[2];
-    if (link.joint.name != "cap") continue;
-    if (const auto* cap = std::get_if<CylinderShape>(&link.body.shape)) radius_ = cap->radius;
   }
   below_ = hip_height - height;
 }
 
-std::array<double, 3> CapScript::place(const FingerAngles& q) const {
-  const double out = hip_ - upper_ * std::sin(q[1]) - lower_ * std::sin(q[1] + q[2]);
-  const double down = upper_ * std::cos(q[1]) + lower_ * std::cos(q[1] + q[2]);
-  return {out, down * std::sin(q[0]), down * std::cos(q[0])};
+CapScript::Place CapScript::place(const FingerAngles& q, const CapSeen& cap) const {
+  const double out = hip_ - upper_ * std::sin(q[1]) - lower_ * std::sin(q[1] + q[2]) - cap.out;
+  const double down = upper_ * std::cos(q[1]) + lower_ * std::cos(q[1] + q[2]), along = down * std::sin(q[0]) - cap.left;
+  return {std::hypot(out, along), std::atan2(along, out)};
 }
 
-FingerAngles CapScript::angles_at(const std::array<double, 3>& place) const {
-  const double in = hip_ - place[0], down = std::hypot(place[1], place[2]), reach = std::hypot(in, down);
+FingerAngles CapScript::angles_at(const Place& place, const CapSeen& cap) const {
+  const double along = place.out * std::sin(place.around) + cap.left;
+  const double in = hip_ - place.out * std::cos(place.around) - cap.out;
+  const double down = std::hypot(along, below_), reach = std::hypot(in, down);
   const double bend = (reach * reach - upper_ * upper_ - lower_ * lower_) / (2 * upper_ * lower_);
   const double lower = std::acos(std::clamp(bend, -1.0, 1.0));
   const double upper = std::atan2(in, down) - std::atan2(lower_ * std::sin(lower), upper_ + lower_ * std::cos(lower));
-  return {std::atan2(place[1], place[2]), upper, lower};
+  return {std::atan2(along, below_), upper, lower};
 }
 
-double CapScript::gap(const FingerAngles& q) const {
-  const double tilt = q[1] + q[2] - kUpright;
-  return place(q)[0] - half_thickness_ * std::cos(tilt) - half_height_ * std::abs(std::sin(tilt)) - radius_;
+double CapScript::gap(const FingerAngles& q, const CapSeen& cap) const { return place(q, cap).out - cap.radius - tip_; }
+
+double CapScript::end(const CapSeen& cap) const { return std::min(kWidest, kFarthest / (cap.radius + tip_)); }
+
+bool CapScript::presses(const FingerAngles& q, const CapSeen& cap, bool now) const {
+  const double around = place(q, cap).around;
+  return now ? around < end(cap) : std::abs(around + end(cap)) < kReached;
 }
 
-bool CapScript::presses(const FingerAngles& q, bool now) const {
-  const double along = place(q)[1];
-  return now ? along < kEnd : along < kBack + kReached && along > kBack - kReached;
-}
-
-FingerAngles CapScript::targets(const FingerAngles& q, bool pressing) const {
-  const std::array<double, 3> at = place(q);
-  const double off = gap(q), face = radius_ + half_thickness_;
-  if (pressing) return angles_at({face - kInto, off < kTouching ? at[1] + kAhead : kBack, below_});
-  return angles_at({face + kAway, off > kClear ? kBack : at[1], below_});
+FingerAngles CapScript::targets(const FingerAngles& q, const CapSeen& cap, bool pressing) const {
+  const double around = place(q, cap).around, off = gap(q, cap), middle = cap.radius + tip_;
+  if (pressing && off < kTouching) {  // inward from where it is, and along the cap
+    const double inward = middle - kInto;
+    return angles_at({std::hypot(inward, kAhead), around + std::atan2(kAhead, inward)}, cap);
+  }
+  if (pressing) return angles_at({middle - kInto, around}, cap);
+  return angles_at({middle + kAway, off > kClear ? -end(cap) : around}, cap);
 }
 
 }  // namespace tangere

@@ -11,6 +11,7 @@
 
 #include "engine/compiled_model.hpp"
 #include "io/scene_reader.hpp"
+#include "io/tactile_layouts.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
 namespace tangere {
@@ -214,6 +215,34 @@ TEST_F(SurfaceFiles, AnAbstractBodyIsWhatItsNumbersSay) {
   EXPECT_NEAR(shape.contact_points[2], 0.01, 1e-17);
   const auto model = compile(file.scene);
   EXPECT_NEAR(model->links.back().inertia.m[0][1], 0.1e-7, 1e-22);
+}
+
+/// The same points as a tactile hemisphere of that radius and count, in the scene's unit, where pos and quat put them.
+TEST_F(SurfaceFiles, AnAbstractBodyMayTouchWithAHemisphere) {
+  const std::string text = R"(<body name="a" type="abstract" mass="5" inertia="2 2 3">
+<collision radius="2" count="144" pos="0 0 -0.75" quat="1 0 0 1"/></body>)";
+  const Scene s = scene(text).scene;
+  const auto& points = std::get<AbstractShape>(s.links[0].body.shape).contact_points;
+  const std::vector<TactilePoint> expected = hemisphere_points(0.02, 144);
+  ASSERT_EQ(points.size(), 3 * expected.size());
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    const Vector3& p = expected[k].position;
+    EXPECT_NEAR(points[3 * k], -p[1], 1e-16);  // a quarter turn about z
+    EXPECT_NEAR(points[3 * k + 1], p[0], 1e-16);
+    EXPECT_NEAR(points[3 * k + 2], p[2] - 0.0075, 1e-16);
+  }
+  const auto refusal = [&](const std::string& from, const std::string& to) {
+    std::string wrong = text;
+    return scene_error(wrong.replace(wrong.find(from), from.size(), to));
+  };
+  EXPECT_THAT(refusal(" radius=\"2\"", ""), HasSubstr("s.xml:4: <collision>: attribute 'radius' is missing"));
+  EXPECT_THAT(refusal(" count=\"144\"", ""), HasSubstr("s.xml:4: <collision>: attribute 'count' is missing"));
+  EXPECT_THAT(refusal("radius=\"2\" count=\"144\"", ""), HasSubstr("no contact points; expected 'contacts' (a file)"));
+  EXPECT_THAT(refusal("radius=\"2\"", "radius=\"2\" contacts=\"p.txt\""), HasSubstr("both 'contacts' and a hemisphere"));
+  EXPECT_THAT(refusal("radius=\"2\"", "radius=\"-2\""), HasSubstr("s.xml:4: <collision>: radius=\"-2\""));
+  EXPECT_THAT(refusal("count=\"144\"", "count=\"0\""), HasSubstr("s.xml:4: <collision>: count=\"0\""));
+  EXPECT_THAT(refusal("count=\"144\"", "count=\"1.5\""), HasSubstr("count=\"1.5\""));
+  EXPECT_THAT(refusal("radius=\"2\"", "radus=\"2\""), HasSubstr("did you mean 'radius'"));
 }
 
 TEST_F(SurfaceFiles, ScenesSayWhatIsWrongWithTheirBodies) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "engine/error.hpp"
 #include "engine/model.hpp"
@@ -84,6 +85,38 @@ TEST(TactileLayouts, AHemisphereIsCoveredEvenly) {
   }
 }
 
+TEST(TactileLayouts, AHemisphereIsDrawnWithOnePixelAPoint) {
+  std::vector<TactilePoint> points = hemisphere_points(0.01, 302);
+  draw_hemisphere(20, 20, points);
+  std::set<std::array<int, 2>> taken;
+  std::array<std::array<int, 2>, 2> halves{};
+  for (const TactilePoint& p : points) {
+    const auto [row, col] = p.pixel;
+    ASSERT_TRUE(row >= 0 && row < 20 && col >= 0 && col < 20);
+    EXPECT_TRUE(taken.insert(p.pixel).second) << row << ' ' << col;
+    // Lower rows are at negative x and columns at negative y, but for those that gave way.
+    if (std::abs(p.position[0]) > 2e-3) {
+      EXPECT_EQ(row >= 10, p.position[0] > 0);
+    }
+    if (std::abs(p.position[1]) > 2e-3) {
+      EXPECT_EQ(col >= 10, p.position[1] > 0);
+    }
+    // A square ring holds the share of points that it has of the area.
+    const double ring = std::max(std::abs(row - 9.5), std::abs(col - 9.5)) / 10;
+    EXPECT_NEAR(ring, std::sqrt(1 - p.normal[2]), 0.15);
+    ++halves[0][row >= 10], ++halves[1][col >= 10];
+  }
+  for (const auto& half : halves) EXPECT_NEAR(half[0], 151, 5);
+  points = hemisphere_points(0.01, 400);
+  draw_hemisphere(20, 20, points);
+  taken.clear();
+  for (const TactilePoint& p : points) taken.insert(p.pixel);
+  EXPECT_EQ(taken.size(), 400U) << "every pixel is some point's";
+  points = hemisphere_points(1, 1);
+  draw_hemisphere(1, 1, points);
+  EXPECT_EQ(points[0].pixel, (std::array<int, 2>{0, 0}));
+}
+
 TEST(TactileLayouts, ACylinderIsAnImageRolledUp) {
   const std::vector<TactilePoint> points = cylinder_points(0.02, 0.06, 4, 12);
   ASSERT_EQ(points.size(), 48U);
@@ -150,7 +183,7 @@ TEST(TactileLayouts, FilesSayWhatIsWrongAndWhere) {
 TEST(TactileLayouts, ScenesPutThemOnBodiesInTheirUnit) {
   const std::string scene = R"(<redmax><option unit="cm-g"/><robot><link name="a"><joint name="a" type="free3d"/>
 <body name="a" type="sphere" radius="2"/></link></robot><sensor>
-<tactile name="h" body="a" type="hemisphere" radius="2" count="100" pos="0 0 1"/>
+<tactile name="h" body="a" type="hemisphere" radius="2" count="100" resolution="10 12" pos="0 0 1"/>
 <tactile name="c" body="a" type="cylinder" radius="1" length="3" resolution="5 8" quat="0.7071067811865476 0 0.7071067811865476 0"/>
 </sensor></redmax>)";
   const Scene s = parse_scene(scene, "s.xml").scene;
@@ -160,6 +193,15 @@ TEST(TactileLayouts, ScenesPutThemOnBodiesInTheirUnit) {
   const Model model(s);
   EXPECT_EQ(model.sensors()[0].points, 100);
   EXPECT_EQ(model.sensors()[0].pressure_sign, 1);
+  EXPECT_EQ(s.sensors[0].points[0].pixel, (std::array<int, 2>{5, 5})) << "next to the pole";
+  std::string few = scene;
+  few.replace(few.find("10 12"), 5, "9 11");
+  try {
+    parse_scene(few, "s.xml");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("s.xml:3: <tactile>: resolution=\"9 11\" has 99 pixels for 100 points; expected"));
+  }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <tinyxml2.h>
 
+#include "io/tactile_drawing.hpp"
 #include "io/tactile_plot.hpp"
 #include "tests/io/synthetic_run.hpp"
 
@@ -93,7 +94,45 @@ TEST(TactilePlot, DrawsTheFirstRectangularArrayAndNamesThemAll) {
     return std::string();
   };
   EXPECT_THAT(message(""), HasSubstr("'second' has no frame"));
-  EXPECT_THAT(message("rod"), HasSubstr("'rod' is not a rectangular array; those that can be drawn: second, skin"));
+  EXPECT_THAT(message("rod"), HasSubstr("'rod' is no rectangular array and has no image; those that can be drawn: second, skin"));
+}
+
+/// Points that go round: down is -z of the body, right is y, wherever their own axes point.
+TEST(TactilePlot, AnImageHasItsPointsAtTheirPixelsAndShearAlongRowsAndColumns) {
+  SensorLayout s = layout().sensors[0];
+  s.rows = s.cols = 0;
+  for (int k = 0; k < 5; ++k) {
+    TactilePoint p;
+    p.position = {0.001, 0.004 * (k % 2), -0.002 * (k / 2)};
+    p.normal = {1, 0, 0}, p.axis0 = {0, 0, 1}, p.axis1 = {0, -1, 0};
+    p.pixel = k == 4 ? std::array{-1, -1} : std::array{k / 2, k % 2};
+    s.list.push_back(p);
+  }
+  s.points = 5;
+  const TactileDrawing d = drawing_of(s);
+  EXPECT_TRUE(drawable(s));
+  EXPECT_EQ(d.rows * 10 + d.cols, 22);
+  EXPECT_NEAR(d.height, 0.002, 1e-15);
+  EXPECT_NEAR(d.width, 0.004, 1e-15);
+  EXPECT_EQ(d.cell[3], (std::array{1, 1}));
+  EXPECT_EQ(d.cell[4][0], -1);
+  EXPECT_NEAR(d.shear(2, 3, 5)[0], -3, 1e-15);
+  EXPECT_NEAR(d.shear(2, 3, 5)[1], -5, 1e-15);
+  for (TactilePoint& p : s.list) p.pixel = {-1, -1};
+  EXPECT_FALSE(drawable(s));
+
+  const Folder folder;
+  TrajectoryLayout l = layout(0);
+  for (std::size_t k = 0; k < 4; ++k) s.list[k].pixel = {static_cast<int>(k / 2), static_cast<int>(k % 2)};
+  l.sensors = {s};
+  TrajectoryFile file(folder / "run.h5", l, false);
+  testing::write_run(file, l);
+  file.commit();
+  const TrajectoryReader reader(folder / "run.h5");
+  ASSERT_THAT(drawable_sensors(reader), ::testing::ElementsAre("skin"));
+  const TactileDrawing again = drawing_of(reader.sensors()[0]);
+  EXPECT_EQ(again.cell[3], (std::array{1, 1}));
+  EXPECT_EQ(again.turn, drawing_of(s).turn);
 }
 
 TEST(TactilePlot, WhatIsNotThereIsNamed) {

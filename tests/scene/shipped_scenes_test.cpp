@@ -178,16 +178,18 @@ TEST(ShippedScenes, CapIsTurnedByTwoStrokes) {
   EXPECT_EQ(r.steps, 720);
   EXPECT_EQ(r.failed, 0);
   for (int e = 0; e < kEnvironments; ++e) {
-    const double once = r.q(r.at(1.7), e, "cap.angle"), twice = r.q(r.steps - 1, e, "cap.angle");
-    EXPECT_GT(once, 0.3);
-    EXPECT_GT(twice, once + 0.3);
+    const double once = r.q(r.at(1.8), e, "cap.angle"), twice = r.q(r.steps - 1, e, "cap.angle");
+    EXPECT_GT(once, 0.2);
+    EXPECT_GT(twice, once + 0.2);
+    EXPECT_LT(twice, 2 * 1.3) << "a cap without damping rolls along, 1.3 rad a stroke";
     for (int s = 0; s < 3; ++s) {
       for (int k = 0; k < r.at(0.1); ++k) ASSERT_EQ(r.touch(k, e, s).points, 0) << "before they close";
-      for (double time : {0.6, 1.2, 1.6, 2.4, 3.0, 3.4}) {
-        EXPECT_GT(r.touch(r.at(time), e, s).pressure, 0.5) << "finger " << s + 1 << " at " << time << " s";
+      for (double time : {0.6, 1.0, 1.4, 2.4, 2.8, 3.2}) {
+        EXPECT_NEAR(r.touch(r.at(time), e, s).pressure, 10, 1) << "finger " << s + 1 << " at " << time << " s";
+        EXPECT_GT(r.touch(r.at(time), e, s).points, 15);
         EXPECT_GT(r.touch(r.at(time), e, s).shear, 1e-4);
       }
-      EXPECT_EQ(r.touch(r.at(1.85), e, s).points, 0) << "between the strokes";
+      EXPECT_EQ(r.touch(r.at(1.8), e, s).points, 0) << "between the strokes";
       EXPECT_EQ(r.touch(r.steps - 1, e, s).points, 0) << "let go";
     }
   }

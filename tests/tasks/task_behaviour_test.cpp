@@ -393,7 +393,7 @@ TEST(Scripted, InsertsTheBox) {
   expect_solved("insertion_translation", 300, 0.97);
   expect_solved("insertion", 300, 0.80);
 }
-TEST(Scripted, OpensTheCap) { expect_solved("cap_opening_blind", 300, 1); }
+TEST(Scripted, OpensTheCap) { expect_solved("cap_opening_blind", 300, 0.96); }
 TEST(Scripted, PushesTheBox) { expect_solved("box_pushing_privileged", 1000, 0.71); }
 
 TEST(Policy, RandomKeepsTheBoundsAndATableItsRows) {
