@@ -2,6 +2,8 @@
 // Forward with checkpoints, then segment by segment back: each is run again onto the tape unless it is the only one.
 #include "tasks/gradient_block.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -25,8 +27,7 @@ std::int64_t segment_length(const Model& model, Integrator integrator, const Gra
   const auto best = std::clamp<std::int64_t>(std::llround(std::sqrt(double(o.steps) * checkpoint / step)), 1, o.steps);
   const double needed = tape(best) + checkpoint * std::ceil(double(o.steps) / double(best));
   if (needed > o.tape_bytes)
-    throw InputError("a tape of " + std::to_string(o.tape_bytes) + " bytes for " + std::to_string(o.steps) +
-                     " steps; expected at least " + std::to_string(needed));
+    throw InputError(fmt::format("tapes of {:.0f} bytes for {} steps; expected at least {:.0f}", o.tape_bytes, o.steps, needed));
   return best;
 }
 

@@ -4,9 +4,10 @@
 //   r = judge(moments, m⁺, a);  x_(k+1) = step(x_k, controls(x_0, m⁺, a));  x_0 = place(x, m⁺, a);  m⁺ = begin_action(x, m, a)
 #include "tasks/task_gradient_block.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 namespace tangere {
 
@@ -37,8 +38,7 @@ std::int64_t segment_length(const Task& task, const TaskGradientOptions& o) {
   const auto best = std::clamp<std::int64_t>(std::llround(std::sqrt(ratio)), 1, o.actions);
   const double needed = bytes_with(task, o, best);
   if (needed > o.tape_bytes)
-    throw InputError("tapes of " + std::to_string(o.tape_bytes) + " bytes for " + std::to_string(o.actions) +
-                     " actions; expected at least " + std::to_string(needed));
+    throw InputError(fmt::format("tapes of {:.0f} bytes for {} actions; expected at least {:.0f}", o.tape_bytes, o.actions, needed));
   return best;
 }
 

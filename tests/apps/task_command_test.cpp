@@ -162,7 +162,9 @@ TEST(Tasks, GradcheckChecksTheReturn) {
 TEST(Tasks, GradcheckRefusesWhatIsOfScenesAlone) {
   const Folder folder;
   for (const Words& option : {Words{"--loss", "path"}, Words{"--steps", "3"}, Words{"--every", "2"}, Words{"--actions", "101"}}) {
-    const Outcome outcome = run(folder, Words{"gradcheck", "box_pushing"} + option);
+    Words words{"gradcheck", "box_pushing"};
+    words.insert(words.end(), option.begin(), option.end());
+    const Outcome outcome = run(folder, words);
     EXPECT_EQ(outcome.exit_code, 2);
     EXPECT_THAT(outcome.err, HasSubstr(option[0]));
   }
