@@ -12,7 +12,7 @@ namespace tangere {
 namespace {
 
 constexpr double kLargest = 1e-3;       // step size, times the input's scale
-constexpr double kSettled = 3e-6;       // of the gradient's norm: neighbouring step sizes agree so far, or there is a kink
+constexpr double kSettled = 1e-6;       // of the gradient's norm: neighbouring step sizes agree so far, or there is a kink
 constexpr double kNoInfluence = 1e-10;  // of the loss: an input whose derivatives are all smaller does not act on it
 
 double norm_of(std::span<const double> x) {
