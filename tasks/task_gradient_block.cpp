@@ -84,14 +84,14 @@ bool TaskGradientBlock::may_go_on() {
   return !stopped_;
 }
 
-void TaskGradientBlock::run(std::int64_t block, const TaskActions& actions, TaskGradients& out, std::vector<LostEpisode>& lost) {
-  const std::int64_t first = block * kBlock, last = std::min(first + kBlock, options_.episodes);
+void TaskGradientBlock::run(std::int64_t first, int count, const TaskActions& actions, std::int64_t to, TaskGradients& out,
+                            std::vector<LostEpisode>& lost) {
   std::vector<std::int64_t> episodes;
-  for (std::int64_t e = first; e < last; ++e) episodes.push_back(options_.first_episode + e);
+  for (int e = 0; e < count; ++e) episodes.push_back(first + e);
   rollout_.start(options_.seed, episodes);
   forward(actions, lost);
   if (!stopped_) backward();
-  if (!stopped_) finish(first, out);
+  if (!stopped_) finish(to, out);
 }
 
 void TaskGradientBlock::forward(const TaskActions& actions, std::vector<LostEpisode>& lost) {
@@ -244,19 +244,19 @@ void TaskGradientBlock::reverse_start(const ActionRecord& r, std::int64_t action
   }
 }
 
-void TaskGradientBlock::finish(std::int64_t first, TaskGradients& out) {
+void TaskGradientBlock::finish(std::int64_t to, TaskGradients& out) {
   const TensorSpec& spec = task_.spec().action;
   const std::size_t width = spec.size(), nv = size(task_.model().nv()), numbers = size(parameters_.count());
   for (int l = 0; l < rollout_.lanes(); ++l) {
-    const std::size_t e = size(first + l);
+    const std::size_t e = size(to + l);
     out.value[e] = rollout_.data().returns[size(l)];
     out.length[e] = rollout_.data().length[size(l)];
     for (std::size_t a = 0; a < size(out.length[e]); ++a)
       for (std::size_t k = 0; k < width; ++k) {
-        const std::size_t to = (e * size(options_.actions) + a) * width + k;
+        const std::size_t at = (e * size(options_.actions) + a) * width + k;
         const double asked = part(records_[a].asked, l)[k];
-        out.action[to] = asked;
-        out.by_action[to] = asked < spec.low || asked > spec.high ? 0 : part(by_action_[a], l)[k];
+        out.action[at] = asked;
+        out.by_action[at] = asked < spec.low || asked > spec.high ? 0 : part(by_action_[a], l)[k];
       }
     const BlockCotangent& c = adjoint_.loss(0);
     for (std::size_t i = 0; i < nv; ++i) {

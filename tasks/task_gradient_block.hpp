@@ -17,8 +17,9 @@ class TaskGradientBlock {
   /// `options.actions` is the number there are.
   TaskGradientBlock(const Task& task, const TaskGradientOptions& options);
 
-  /// Episodes of block `block`, 16 each, of those of `options`. Results go to their places in `out`.
-  void run(std::int64_t block, const TaskActions& actions, TaskGradients& out, std::vector<LostEpisode>& lost);
+  /// Up to 16 episodes from number `first` on. Results go to places `to`, to + 1 … of `out`.
+  void run(std::int64_t first, int episodes, const TaskActions& actions, std::int64_t to, TaskGradients& out,
+           std::vector<LostEpisode>& lost);
 
   /// Counts from 0; `go_on` (empty: always) must outlive the runs that follow.
   void begin(const GradientGoOn& go_on);
@@ -36,7 +37,7 @@ class TaskGradientBlock {
   void add_fields(std::size_t moment, int lane);
   void reverse_controls(const ActionRecord& r, std::int64_t action, int step, const BlockTape& tape);
   void reverse_start(const ActionRecord& r, std::int64_t action);
-  void finish(std::int64_t first, TaskGradients& out);
+  void finish(std::int64_t to, TaskGradients& out);
 
   /// A cotangent's part of a lane.
   [[nodiscard]] std::span<double> part(std::vector<double>& all, int lane) const;

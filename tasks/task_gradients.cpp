@@ -29,7 +29,9 @@ TaskGradientOptions checked(const Task& task, TaskGradientOptions o) {
   return o;
 }
 
-TaskGradients empty_gradients(const Task& task, const TaskGradientOptions& o) {
+}  // namespace
+
+TaskGradients empty_task_gradients(const Task& task, const TaskGradientOptions& o) {
   const std::size_t episodes = size(o.episodes), actions = size(o.actions) * task.spec().action.size();
   TaskGradients out;
   out.value.resize(episodes);
@@ -42,13 +44,11 @@ TaskGradients empty_gradients(const Task& task, const TaskGradientOptions& o) {
   return out;
 }
 
-}  // namespace
-
 TaskGradients task_gradients(const Task& task, const TaskActions& actions, const TaskGradientOptions& asked,
                              const GradientGoOn& go_on) {
   const TaskGradientOptions o = checked(task, asked);
   const auto blocks = static_cast<int>((o.episodes + kernels::kBlock - 1) / kernels::kBlock);
-  TaskGradients out = empty_gradients(task, o);
+  TaskGradients out = empty_task_gradients(task, o);
   std::vector<std::vector<LostEpisode>> lost(size(blocks));
   std::vector<TaskGradientBlock> workers;  // by the thread's index in the arena
   workers.reserve(size(o.threads));
@@ -60,7 +60,11 @@ TaskGradients task_gradients(const Task& task, const TaskActions& actions, const
     TaskOrder::arrive();
     TaskGradientBlock& worker = workers[size(tbb::this_task_arena::current_thread_index())];
     const TaskOrder::Task task_of_thread(order, &worker);
-    for (int b = range.begin(); b != range.end(); ++b) worker.run(b, actions, out, lost[size(b)]);
+    for (int b = range.begin(); b != range.end(); ++b) {
+      const std::int64_t first = std::int64_t{b} * kernels::kBlock;
+      const auto count = static_cast<int>(std::min<std::int64_t>(kernels::kBlock, o.episodes - first));
+      worker.run(o.first_episode + first, count, actions, first, out, lost[size(b)]);
+    }
   };
   order.begin();
   arena.execute([&] {

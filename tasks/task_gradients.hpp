@@ -49,6 +49,9 @@ struct TaskGradients {
 TaskGradients task_gradients(const Task& task, const TaskActions& actions, const TaskGradientOptions& options,
                              const GradientGoOn& go_on = {});
 
+/// Room for them, zeros; options.actions is the number there are.
+TaskGradients empty_task_gradients(const Task& task, const TaskGradientOptions& options);
+
 /// Memory that it takes [bytes].
 double task_gradient_bytes(const Task& task, const TaskGradientOptions& options);
 

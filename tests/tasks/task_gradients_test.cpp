@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/compiled_model.hpp"
 #include "io/scene_reader.hpp"
 #include "tasks/policy.hpp"
+#include "tasks/row_jacobians.hpp"
 #include "tasks/task_gradient_check.hpp"
 #include "tasks/task_list.hpp"
 #include "tests/tasks/task_check.hpp"
@@ -263,6 +265,87 @@ TEST(TaskGradients, RefusesWhatItCannotDo) {
   options.episodes = 1;
   EXPECT_THROW(task_gradients(*task, [](const TaskView&, std::span<const double>, std::span<double> a) { a[0] = NAN; }, options),
                InputError);
+}
+
+/// The state of every lane after one more action, from where its own change has put it.
+struct Lanes {
+  std::vector<std::vector<double>> q, v;
+};
+
+/// What the states after action `last` are, with the state before it or the action itself moved lane by lane.
+template <class Change>
+Lanes after(const Task& task, std::int64_t last, const TaskActions& actions, const Change& change) {
+  TaskRollout rollout(task, {{}, {}, 1e-12}, Precision::f64);
+  rollout.start(2, std::vector<std::int64_t>(kernels::kBlock, 3));
+  ActionRecord record(task);
+  for (std::int64_t a = 0; a <= last; ++a) {
+    rollout.choose(actions, record);
+    if (a == last) change(rollout, record);
+    rollout.begin(record);
+    rollout.take_steps(nullptr);
+    rollout.conclude();
+  }
+  Lanes out;
+  for (int l = 0; l < rollout.lanes(); ++l) {
+    out.q.emplace_back(std::size_t(task.model().nq()));
+    out.v.emplace_back(std::size_t(task.model().nv()));
+    rollout.batch().get_q(l, out.q.back());
+    rollout.batch().get_v(l, out.v.back());
+  }
+  return out;
+}
+
+/// Columns of a row's Jacobian against differences, in v and in the coordinates before the first quaternion.
+void check_row(const Task& task, std::int64_t last) {
+  const Policy policy(task, PolicyKind::random);
+  const TaskActions actions = actions_of(policy);
+  TaskRollout rollout(task, {{}, {}, 1e-12}, Precision::f64);
+  rollout.start(2, std::vector<std::int64_t>(kernels::kBlock, 3));
+  ActionRecord record(task);
+  BlockTape tape(task.model(), rollout.integrator(), task.spec().steps_per_action);
+  ActionJacobians jacobians(task, {{}, {}, 1e-12});
+  for (std::int64_t a = 0; a <= last; ++a) {
+    rollout.choose(actions, record);
+    rollout.begin(record);
+    rollout.take_steps(&tape);
+    if (a == last) jacobians.evaluate(rollout, record, a, tape);
+    rollout.conclude();
+  }
+  const RowJacobian& j = jacobians.of(5);
+  const std::size_t nv = std::size_t(task.model().nv()), width = task.spec().action.size();
+  std::size_t plain = 0;
+  while (plain < nv && task.model().compiled().links[plain].kind != kernels::JointKind::spherical) ++plain;  // one link each there
+  double norm = 0;
+  for (const double x : j.state) norm = std::max(norm, std::abs(x));
+  for (const double x : j.others) norm = std::max(norm, std::abs(x));
+  for (std::size_t column = 0; column < 2 * nv + width; ++column) {
+    constexpr double kMove = 1e-6;
+    const Lanes moved = after(task, last, actions, [&](TaskRollout& r, ActionRecord& asked) {
+      for (int l = 0; l < 2; ++l) {
+        const double e = l == 0 ? kMove : -kMove;
+        const Moment now = view_of(r.batch(), r.data(), l).now();
+        std::vector<double> q(now.q.begin(), now.q.end()), v(now.v.begin(), now.v.end());
+        if (column < nv) move_along(task.model().compiled(), q, static_cast<int>(column), e);
+        if (column >= nv && column < 2 * nv) v[column - nv] += e;
+        if (column >= 2 * nv) asked.asked[std::size_t(l) * width + column - 2 * nv] += e;
+        r.displace(l, q, v);
+      }
+    });
+    for (std::size_t i = 0; i < nv; ++i) {
+      const auto at = [&](std::size_t row) { return column < 2 * nv ? j.state[row * 2 * nv + column] : j.others[row * width + column - 2 * nv]; };
+      if (i < plain) {
+        EXPECT_NEAR(at(i), (moved.q[0][i] - moved.q[1][i]) / (2 * kMove), 2e-5 * norm) << "q " << i << " by " << column;
+      }
+      EXPECT_NEAR(at(nv + i), (moved.v[0][i] - moved.v[1][i]) / (2 * kMove), 2e-5 * norm) << "v " << i << " by " << column;
+    }
+  }
+}
+
+TEST(RowJacobians, AreThoseOfDifferences) {
+  check_row(*task_named("box_pushing"), 7);
+  check_row(*task_named("cap_opening_blind"), 4);
+  check_row(*task_named("insertion_translation"), 1);
+  check_row(*everything(scene_of("rolling_ball_small")), 3);
 }
 
 }  // namespace
