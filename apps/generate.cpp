@@ -19,6 +19,8 @@
 #include "apps/workers.hpp"
 #include "io/nearest_name.hpp"
 #include "kernels/isa.hpp"
+#include "tasks/episode_gradients.hpp"
+#include "tasks/losses.hpp"
 #include "tasks/task_episodes.hpp"
 
 namespace tangere::apps {
@@ -62,13 +64,15 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
   if (!options.controls.empty()) command += " --controls " + options.controls;
   if (options.compress != "none") command += " --compress " + options.compress;
   if (options.shards) command += fmt::format(" --shards {}", *options.shards);
+  if (options.gradients != "none") command += " --gradients " + options.gradients;
+  if (!options.loss.empty()) command += " --loss " + options.loss;
   return command;
 }
 
 /// `task`: null for a scene alone.
 DatasetLayout make_layout(const GenerateOptions& options, const Model& model, const Stepper& stepper,
-                          const EpisodeOptions& run, const ProgramInfo& info, const Task* task = nullptr,
-                          const std::string& policy = {}) {
+                          const EpisodeOptions& run, const ProgramInfo& info, const GradientPlan& gradients,
+                          const Task* task = nullptr, const std::string& policy = {}) {
   DatasetDescription description;
   if (task != nullptr) description.task = task->spec();
   description.policy = policy;
@@ -76,6 +80,8 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model, co
   description.command = command_of(options, run, policy);
   description.shards = options.shards.value_or(0);
   description.compression = options.compress;
+  description.gradients_of = options.loss.empty() ? options.gradients : options.gradients + " " + options.loss;
+  description.gradients = gradients.arrays;
   description.episodes = run.episodes;
   description.steps = run.steps;
   description.every = run.every;
@@ -115,11 +121,18 @@ TaskReport report_of(const Task& task, PolicyKind policy, const TaskEpisodeSumma
   return report;
 }
 
+/// What is done to finished blocks by many threads: gradients are taken there, too.
+std::string preparation_of(const Job& job) {
+  if (job.layout.gradients.empty()) return "compression";
+  return job.layout.compression == "none" ? "gradients" : "gradients and compression";
+}
+
 /// Which of the three kinds of work kept the others waiting, and for how long all of them were at it.
-std::string limit_of(const EpisodeSummary& summary, const EpisodeOptions& run) {
+std::string limit_of(const EpisodeSummary& summary, const Job& job) {
+  const EpisodeOptions& run = job.run;
   const double simulation = summary.simulation_seconds / run.threads, encoding = summary.encoding_seconds / run.threads;
   if (summary.writing_seconds >= std::max(simulation, encoding)) return "writing";
-  return simulation >= encoding ? "simulation" : "compression";
+  return simulation >= encoding ? "simulation" : preparation_of(job);
 }
 
 int report(const GenerateOptions& options, const Console& console, const Job& job, const JobResult& done,
@@ -139,9 +152,9 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
                                              output.kept_failed());
   console.print(
       fmt::format("episodes: {}, rows: {}, time: {:.2f} s, {:.0f} env-steps/s with output, "
-                  "threads: {}\nlimited by {}: simulation {:.2f} s and compression {:.2f} s of all threads, writing {:.2f} s of one\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes)",
-                  summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, run),
-                  summary.simulation_seconds, summary.encoding_seconds, summary.writing_seconds, done.task.line, summary.split_steps, summary.failures.size(), kept, options.output,
+                  "threads: {}\nlimited by {}: simulation {:.2f} s and {} {:.2f} s of all threads, writing {:.2f} s of one\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes)",
+                  summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, job),
+                  summary.simulation_seconds, preparation_of(job), summary.encoding_seconds, summary.writing_seconds, done.task.line, summary.split_steps, summary.failures.size(), kept, options.output,
                   shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes));
   Json result{{"command", "generate"},
               {"exit_code", static_cast<int>(code)},
@@ -165,7 +178,8 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"peak_blocks_in_flight", summary.peak_blocks_in_flight},
               {"seconds", summary.seconds},
               {"compress", options.compress},
-              {"limited_by", limit_of(summary, run)},
+              {"gradients", job.layout.gradients.empty() ? Json() : Json(job.layout.gradients_of)},
+              {"limited_by", limit_of(summary, job)},
               {"simulation_seconds", summary.simulation_seconds},
               {"encoding_seconds", summary.encoding_seconds},
               {"writing_seconds", summary.writing_seconds},
@@ -184,6 +198,45 @@ int stopped(const GenerateOptions& options, const Console& console, int signal, 
   return report_stop(console, "generate", signal, fmt::format("after {} of {} episodes", episodes, asked),
                      fmt::format("complete shards in '{}': {}", options.output, output.shards().size()),
                      {{"shards", output.shards()}});
+}
+
+GradientKind gradient_kind_named(const std::string& name) {
+  std::vector<std::string> names;
+  for (const GradientKind kind : {GradientKind::none, GradientKind::returns, GradientKind::jacobians}) {
+    names.emplace_back(to_string(kind));
+    if (names.back() == name) return kind;
+  }
+  throw InputError("unknown gradients '" + name + "'" + suggestion(name, names));
+}
+
+/// What --gradients and its companions ask for, of a scene or a task.
+GradientKind gradients_wanted(const GenerateOptions& options, bool of_task) {
+  const GradientKind kind = gradient_kind_named(options.gradients);
+  if (options.tape_memory && kind != GradientKind::returns)
+    throw InputError(fmt::format("--tape-memory with --gradients {}; expected --gradients return", options.gradients));
+  if (!options.loss.empty() && (of_task || kind != GradientKind::returns))
+    throw InputError(fmt::format("--loss {} with {}; expected a scene and --gradients return", options.loss,
+                                 of_task ? "a task" : "--gradients " + options.gradients));
+  if (!of_task && kind == GradientKind::returns && options.loss.empty())
+    throw InputError("--gradients return of a scene, which has no rewards; expected --loss as well");
+  return kind;
+}
+
+/// Says before anything is made what cannot be done: tapes that are too small.
+GradientPlan checked(GradientPlan plan) {
+  if (plan.make) static_cast<void>(plan.make());
+  return plan;
+}
+
+/// Of one thread's tapes.
+double tape_bytes(const GenerateOptions& options, int threads) { return options.tape_memory.value_or(1e9 * threads) / threads; }
+
+/// Runs with what adds derivatives in between, if any are asked for.
+template <class Run>
+auto with_gradients(const GradientPlan& plan, EpisodeSink& sink, const Run& run) {
+  if (plan.arrays.empty()) return run(sink);
+  GradientSink adding(plan, sink);
+  return run(adding);
 }
 
 /// Makes what is missing.
@@ -223,14 +276,24 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   const auto of_task = [](const EpisodeOptions& run) {
     return TaskEpisodeOptions{run.episodes, run.ranges, run.seed, run.precision, run.threads};
   };
-  job.memory_bytes = task_episode_bytes(task, of_task(job.run));
+  const GradientKind gradients = gradients_wanted(options, true);
+  const TaskActions actions = [&](const TaskView& view, std::span<const double> observation, std::span<double> action) {
+    policy.act(view, observation, action);
+  };
+  const auto plan_of = [&](const EpisodeOptions& run) {
+    return task_episode_gradients(task, actions, run, gradients, tape_bytes(options, run.threads));
+  };
+  const GradientPlan plan = checked(plan_of(job.run));
+  job.memory_bytes = task_episode_bytes(task, of_task(job.run)) + job.run.threads * plan.bytes;
   check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
   job.unit = "action";
   job.effects = effects_of(task.model());
-  job.layout = make_layout(options, task.model(), Stepper(task.model()), job.run, info, &task, to_string(kind));
+  job.layout = make_layout(options, task.model(), Stepper(task.model()), job.run, info, plan, &task, to_string(kind));
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
-    const TaskEpisodeSummary summary = run_task_episodes(task, policy, of_task(run), sink, progress, stop);
+    const TaskEpisodeSummary summary = with_gradients(plan_of(run), sink, [&](EpisodeSink& to) {
+      return run_task_episodes(task, policy, of_task(run), to, progress, stop);
+    });
     return {summary.run, report_of(task, kind, summary)};
   };
   return make(options, console, job);
@@ -260,14 +323,22 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
   Job job;
   job.run = episode_options(options, model, controls);
-  job.memory_bytes = episode_bytes(model, job.run);
+  const GradientKind gradients = gradients_wanted(options, false);
+  std::unique_ptr<RolloutLoss> loss;
+  if (!options.loss.empty()) loss = make_loss(loss_named(options.loss), model, job.run.every);
+  const auto plan_of = [&](const EpisodeOptions& run) {
+    return scene_gradients(model, controls, run, gradients, loss.get(), loss ? loss_meaning(loss_named(options.loss)) : "",
+                           tape_bytes(options, run.threads));
+  };
+  const GradientPlan plan = checked(plan_of(job.run));
+  job.memory_bytes = episode_bytes(model, job.run) + job.run.threads * plan.bytes;
   check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
   job.unit = "environment step";
   job.effects = effects_of(model);
-  job.layout = make_layout(options, model, stepper, job.run, info);
+  job.layout = make_layout(options, model, stepper, job.run, info, plan);
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
-    return {run_episodes(model, {}, controls, run, sink, progress, stop), {}};
+    return {with_gradients(plan_of(run), sink, [&](EpisodeSink& to) { return run_episodes(model, {}, controls, run, to, progress, stop); }), {}};
   };
   return make(options, console, job);
 }
@@ -300,6 +371,12 @@ Command add_generate(CLI::App& program) {
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between episodes [default: 0]");
   add_text(*app, "--compress", o.compress, "NAME", "Of tactile fields on disk: none or deflate [default: none]");
+  add_text(*app, "--gradients", o.gradients, "KIND",
+           "Derivatives as well: none, return (of a scene: with --loss), or jacobians, row by row [default: none]");
+  add_text(*app, "--loss", o.loss, "NAME",
+           "Of a scene, with --gradients return: final, path, tactile, shear or variables");
+  add_memory_size(*app, "--tape-memory", o.tape_memory,
+                  "With --gradients return: states kept for them by all threads [default: 1GB each]");
   add_whole_number<std::int64_t>(*app, "--shards", o.shards, 1, kMostEpisodes,
                                  "Files to cut the data set into [default: below a gigabyte each]");
   add_text(*app, "--shard", o.shard, "k/S", "Make shard k of S alone, k from 0; others may run beside it");

@@ -15,10 +15,11 @@
 namespace tangere::apps {
 
 struct GenerateOptions {
-  std::string scene, output, controls, policy, shard, precision = "mixed", compress = "none";
+  std::string scene, output, controls, policy, shard, precision = "mixed", compress = "none", gradients = "none", loss;
   std::optional<std::int64_t> episodes, steps, shards;
   std::optional<int> every, threads;
   std::optional<std::uint64_t> seed;
+  std::optional<double> tape_memory;
   bool overwrite = false, resume = false, dry_run = false, allow_unknown = false;
 };
 

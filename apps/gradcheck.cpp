@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere gradcheck: are the gradients of this scene right? A table per input, and one number.
+// tangere gradcheck: are the gradients of this scene, or of this task's return, right? A table per input, and one number.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,8 +10,11 @@
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/scene_run.hpp"
+#include "apps/task_run.hpp"
 #include "tasks/gradient_check.hpp"
 #include "tasks/losses.hpp"
+#include "tasks/task_gradient_check.hpp"
+#include "tasks/task_list.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -21,8 +24,8 @@ constexpr int kDefaultEntries = 24;
 constexpr double kTolerance = 1e-12;  // what a solve leaves is what differences of rollouts cannot see through
 
 struct Options {
-  std::string scene, loss, controls;
-  std::optional<std::int64_t> steps;
+  std::string scene, loss, controls, policy;
+  std::optional<std::int64_t> steps, actions;
   std::optional<int> every, entries;
   std::optional<std::uint64_t> seed;
   bool allow_unknown = false;
@@ -72,7 +75,63 @@ Json json_of(const GradientCheck& check) {
   return inputs;
 }
 
+/// What scenes and tasks have in common.
+Json json_of_check(const GradientCheck& check, std::uint64_t seed, const Stepper& stepper) {
+  return {{"command", "gradcheck"},
+          {"exit_code", static_cast<int>(kDone)},
+          {"loss", check.loss},
+          {"seed", seed},
+          {"integrator", to_string(stepper.integrator())},
+          {"max_relative_error", check.max_relative_error()},
+          {"entries", check.entries()},
+          {"kinks", check.kinks()},
+          {"inputs", json_of(check)}};
+}
+
+/// --actions, or as many as take a hundred steps.
+std::int64_t actions_of(const Options& o, const TaskSpec& spec) {
+  if (o.actions.value_or(0) > spec.horizon)
+    throw InputError(fmt::format("--actions {} with task '{}'; expected at most {}, its horizon", *o.actions, spec.name, spec.horizon));
+  return o.actions.value_or(std::clamp<std::int64_t>(kDefaultSteps / spec.steps_per_action, 1, spec.horizon));
+}
+
+int run_task(const Options& o, const Console& console, const Task& task) {
+  refuse_with_task(task, {{"--loss", !o.loss.empty()},
+                          {"--steps", o.steps.has_value()},
+                          {"--every", o.every.has_value()},
+                          {"--allow-unknown", o.allow_unknown}});
+  const PolicyKind kind = policy_named(o.policy, o.controls, PolicyKind::scripted);
+  const Policy policy = make_policy(task, kind, o.controls);
+  const TaskSpec& spec = task.spec();
+  TaskCheckOptions options;
+  options.actions = actions_of(o, spec);
+  options.entries = o.entries.value_or(kDefaultEntries);
+  options.seed = o.seed.value_or(0);
+  options.stepper.tolerance = std::min(task.model().solver().tolerance, kTolerance);
+  const Stepper stepper(task.model());
+  console.print(fmt::format("task {}: at most {} actions of {} steps of {:g} s, {}, policy {}", spec.name, options.actions,
+                            spec.steps_per_action, stepper.timestep(), to_string(stepper.integrator()), to_string(kind)));
+  const TaskGradientCheck check = check_task_gradient(
+      task, [&](const Scene& scene) { return make_task(spec.name, scene); },
+      [&](const TaskView& view, std::span<const double> observation, std::span<double> action) {
+        policy.act(view, observation, action);
+      },
+      options);
+  console.print(fmt::format("return {:.9g} of {} actions", check.loss, check.actions));
+  print(console, check);
+  Json result = json_of_check(check, options.seed, stepper);
+  result.update({{"task", spec.name},
+                 {"policy", to_string(kind)},
+                 {"actions", check.actions},
+                 {"loss_name", "return"},
+                 {"steps", check.actions * spec.steps_per_action}});
+  console.result(result);
+  return kDone;
+}
+
 int run(const Options& o, const Console& console) {
+  if (const std::unique_ptr<Task> task = find_task(o.scene, console)) return run_task(o, console, *task);
+  refuse_with_scene(o.scene, {{"--actions", o.actions.has_value()}, {"--policy", !o.policy.empty()}});
   const Model model(read_scene_for(o.scene, o.allow_unknown, console));
   const Stepper stepper(model);
   const ControlProgram controls = make_controls(o.controls, o.seed.value_or(0), model, stepper, console);
@@ -94,19 +153,9 @@ int run(const Options& o, const Console& console) {
       start, [&](std::int64_t step, int, std::span<double> u) { controls.evaluate(step, 0, u); }, *loss, options);
   console.print(fmt::format("loss {:.9g}", check.loss));
   print(console, check);
-  console.result({{"command", "gradcheck"},
-                  {"exit_code", static_cast<int>(kDone)},
-                  {"scene", o.scene},
-                  {"loss_name", to_string(kind)},
-                  {"loss", check.loss},
-                  {"steps", options.steps},
-                  {"every", every},
-                  {"seed", options.seed},
-                  {"integrator", to_string(stepper.integrator())},
-                  {"max_relative_error", check.max_relative_error()},
-                  {"entries", check.entries()},
-                  {"kinks", check.kinks()},
-                  {"inputs", json_of(check)}});
+  Json result = json_of_check(check, options.seed, stepper);
+  result.update({{"scene", o.scene}, {"task", nullptr}, {"loss_name", to_string(kind)}, {"steps", options.steps}, {"every", every}});
+  console.result(result);
   return kDone;
 }
 
@@ -116,20 +165,24 @@ Command add_gradcheck(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
   Options& o = *options;
-  CLI::App* app = program.add_subcommand("gradcheck", "Check a scene's gradients against differences and tangents");
-  add_text(*app, "SCENE", o.scene, "", "Scene file (XML)")->required();
+  CLI::App* app = program.add_subcommand("gradcheck", "Check gradients of a scene or a task against differences and tangents");
+  add_text(*app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task: then of its return")->required();
   add_text(*app, "--loss", o.loss, "NAME",
            "final: last state; path: speeds; tactile, shear: fields; variables: end effectors [default: tactile, or final "
            "where there is no sensor]");
   add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
                                  "Steps of the rollout [default: as many as the controls last, 100 at most]");
+  add_whole_number<std::int64_t>(*app, "--actions", o.actions, 1, kMostSteps,
+                                 "Of a task: actions of the episode at most [default: as many as take a hundred steps]");
+  add_text(*app, "--policy", o.policy, "NAME",
+           "Of a task: random, hold, csv (with --controls) or scripted [default: scripted]");
   add_whole_number<int>(*app, "--every", o.every, 1, std::numeric_limits<int>::max(),
                         "Tactile fields every N-th step [default: the scene's, or 1]");
   add_whole_number<int>(*app, "--entries", o.entries, 0, std::numeric_limits<int>::max(),
                         "Derivatives of each input compared with differences, drawn; 0: all [default: 24]");
-  add_text(*app, "--controls", o.controls, "F.csv", "Controls, one row per step, one column per control");
+  add_text(*app, "--controls", o.controls, "F.csv", "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, std::numeric_limits<std::uint64_t>::max(),
-                                  "Seed of the environment, of the draw and of the directions [default: 0]");
+                                  "Seed of the environment or episode, of the draw and of the directions [default: 0]");
   app->add_flag("--allow-unknown", o.allow_unknown,
                 "Unknown elements and attributes of the scene are warnings, not errors");
   add_console_options(*app, *console);

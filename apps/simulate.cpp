@@ -30,7 +30,7 @@ struct Options {
   std::string scene, output, controls, policy, integrator, precision = "double", state_from, gradients;
   std::optional<std::int64_t> steps, row;
   std::optional<int> environments, every;
-  std::optional<double> timestep, tolerance;
+  std::optional<double> timestep, tolerance, tape_memory;
   std::optional<std::uint64_t> seed;
   bool overwrite = false, allow_unknown = false;
 };
@@ -49,6 +49,8 @@ void check_arguments(const Options& options) {
   check_not_same_file(options.output, options.scene);
   for (const std::string& input : {options.controls, options.state_from})
     if (!input.empty()) check_not_same_file(options.output, input);
+  if (options.tape_memory && options.gradients.empty())
+    throw InputError("--tape-memory without --gradients; expected both");
   if (options.row && options.state_from.empty()) throw InputError("--row without --state-from; expected both");
 }
 
@@ -187,6 +189,7 @@ struct Gradients {
   std::optional<GradientRollouts> rollouts;
   std::string name;
   std::vector<double> value;
+  std::int64_t recomputed_steps = 0;
 
   Gradients(const Options& arguments, const Batch& batch, const Stepper& stepper, const RolloutOptions& rollout)
       : name(arguments.gradients) {
@@ -199,6 +202,7 @@ struct Gradients {
     options.stepper = {stepper.integrator(), stepper.timestep(), stepper.tolerance()};
     options.precision = rollout.precision;
     options.parameters = true;
+    if (arguments.tape_memory) options.tape_bytes = *arguments.tape_memory;
     check_memory(gradient_bytes(model, batch.environments(), options, 1),
                  fmt::format("--gradients of {} environments and {} steps", batch.environments(), rollout.steps));
     const RolloutLoss* const losses[] = {loss.get()};
@@ -223,13 +227,16 @@ struct Gradients {
     for (const ParameterInfo& info : parameters.infos()) names.push_back(info.name), units.push_back(info.unit);
     output.write({name, loss_meaning(loss_named(name)), g.value, g.u, g.q, g.v, g.parameters, names, units});
     value = g.value;
+    recomputed_steps = summary.recomputed_steps;
     return true;
   }
 
   [[nodiscard]] Json json() const {
     if (!wanted()) return nullptr;
     const double sum = std::accumulate(value.begin(), value.end(), 0.0);
-    return {{"loss_name", name}, {"mean_loss", sum / static_cast<double>(value.size())}};
+    return {{"loss_name", name},
+            {"mean_loss", sum / static_cast<double>(value.size())},
+            {"recomputed_steps", recomputed_steps}};
   }
 };
 
@@ -362,6 +369,8 @@ Command add_simulate(CLI::App& program) {
                       "Largest scaled residual of a step [default: the scene's]");
   add_text(*app, "--gradients", o.gradients, "LOSS",
            "Derivatives of a loss by controls, start and the scene's numbers as well: final, path, tactile, shear or variables");
+  add_memory_size(*app, "--tape-memory", o.tape_memory,
+                  "With --gradients: states kept for them; a longer run is taken again from checkpoints [default: 1GB]");
   add_text(*app, "--precision", o.precision, "NAME",
            "Of tactile fields: double, or mixed, points in float [default: double]");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,

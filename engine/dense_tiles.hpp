@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tiles of a (points, 3) array: zeroed, or filled from (3, 64).
+// Tiles of a (points, 3) array: zeroed, filled from (3, 64), or read into it.
 #pragma once
 
 #include <algorithm>
@@ -56,6 +56,29 @@ void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* de
     for (int j = 0; j < cols; ++j)
       for (int c = 0; c < 3; ++c)
         row[3 * j + c] = static_cast<T>(from[c * kernels::kTactileTile + i * kernels::kTileSide + j]);
+}
+
+/// The other way, zeros where the tile has no point; false where all of it is zero.
+template <class T, class Real>
+bool gather_tile(const kernels::PadTiles& pad, int tile, const T* dense, Real* to) {
+  std::fill_n(to, 3 * kernels::kTactileTile, Real(0));
+  bool any = false;
+  const auto take = [&](int point, const T* from) {
+    for (int c = 0; c < 3; ++c) {
+      to[c * kernels::kTactileTile + point] = static_cast<Real>(from[c]);
+      any = any || from[c] != T(0);
+    }
+  };
+  if (pad.curved()) {
+    const int* index = pad.index + kernels::kTactileTile * tile;
+    for (int k = 0; k < pad.points_of(tile); ++k) take(k, dense + 3 * index[k]);
+    return any;
+  }
+  const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
+  const T* row = dense + 3 * pad.first_of(tile);
+  for (int i = 0; i < rows; ++i, row += 3 * pad.cols)
+    for (int j = 0; j < cols; ++j) take(i * kernels::kTileSide + j, row + 3 * j);
+  return any;
 }
 
 }  // namespace tangere

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -23,6 +24,20 @@ struct EpisodeEnd {
   bool success = false;
 };
 
+/// Derivatives that are stored beside an episode's numbers, as float64.
+struct GradientArray {
+  std::string name;                   ///< "grad_actions"
+  std::vector<std::uint64_t> shape;   ///< of a row, or of all of it
+  bool by_row = false;                ///< one for every row with an action
+  std::string meaning;
+  std::vector<std::string> by_names, by_units;  ///< what the derivatives are by, along the last dimension
+  [[nodiscard]] std::size_t width() const {
+    std::size_t numbers = 1;
+    for (const std::uint64_t n : shape) numbers *= n;
+    return numbers;
+  }
+};
+
 /// Rows [first_row, first_row + rows) of consecutive episodes. Row j is the state after j K steps;
 /// an episode of R actions has R + 1 of them, the last one without an action.
 struct EpisodeRows {
@@ -37,6 +52,8 @@ struct EpisodeRows {
   std::span<const float> rewards = {};    ///< of a task: (episodes, action_rows)
   std::span<const double> randomized = {};  ///< what varies between episodes: (episodes, as many as the scene varies)
   std::span<const EpisodeEnd> ends = {};  ///< of a task, whose blocks come whole and in ascending order: (episodes)
+  /// With the last row, of the whole episodes: for each GradientArray of the run (episodes, [actions of an episode at most,] shape).
+  std::span<const std::span<const double>> gradients = {};
 };
 
 /// Consecutive episodes [first, end) of a run; both are multiples of 16, the end of the run apart.

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 
+#include "engine/dense_tiles.hpp"
 #include "engine/pad_reader.hpp"
 #include "engine/parameters.hpp"
 
@@ -44,6 +45,8 @@ struct ReadoutPullback::Impl {
   AlignedVector<LaneRow> rows;         ///< q, v, zeros, rates, q̄, v̄ of one group
   AlignedVector<std::byte> scratch;
   std::vector<kernels::TouchCotangent<double>> touches;
+  std::vector<int> tiles;          ///< of a whole field: those that are not zero
+  std::vector<double> of_tiles;
 
   explicit Impl(const Model& m) : model(m), reader(m), met(kGroups, -1) {
     const CompiledModel& c = m.compiled();
@@ -117,6 +120,17 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles, st
     const double of_law[] = {c.law.kn, c.law.kt, c.law.mu, c.law.damping};
     for (int n = 0; n < kernels::kContactNumbers; ++n) parameters[std::size_t((row + n) * kBlock + lane)] += of_law[n];
   }
+}
+
+void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents, std::span<double> parameters) {
+  const kernels::PadTiles pad = impl_->model.compiled().sensors[std::size_t(sensor)].tiles();
+  std::vector<int>& tiles = impl_->tiles;
+  std::vector<double>& values = impl_->of_tiles;
+  tiles.clear();
+  values.resize(std::size_t(pad.tiles()) * 3 * kernels::kTactileTile);
+  for (int tile = 0; tile < pad.tiles(); ++tile)
+    if (gather_tile(pad, tile, cotangents.data(), values.data() + 3 * kernels::kTactileTile * tiles.size())) tiles.push_back(tile);
+  field(lane, sensor, tiles, std::span(values).first(3 * kernels::kTactileTile * tiles.size()), parameters);
 }
 
 void ReadoutPullback::variable(int lane, int variable, std::span<const double> cotangent) {

@@ -27,6 +27,8 @@ class ReadoutPullback {
   /// `parameters`: (parameter_rows, 16) of the loss to add those by the sensor's coefficients to, or empty.
   void field(int lane, int sensor, std::span<const int> tiles, std::span<const double> cotangents,
              std::span<double> parameters = {});
+  /// The same with `cotangents` of the whole field, (points, 3).
+  void dense_field(int lane, int sensor, std::span<const double> cotangents, std::span<double> parameters = {});
   /// Of the world position of an end effector, (3).
   void variable(int lane, int variable, std::span<const double> cotangent);
   /// Adds what was collected to q and v of `out`, all lanes.

@@ -14,6 +14,8 @@
 namespace tangere {
 namespace {
 
+constexpr const char* kGradients = "gradients";  // of /scene: the attribute and the group
+constexpr const char* kByRow = "one for each action";
 constexpr std::size_t kLongText = 60;  // bytes: beyond it a value is shown by the line that differs
 
 void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
@@ -84,6 +86,20 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   }
 }
 
+void describe_gradients(const h5::Id& scene, const DatasetLayout& layout) {
+  if (layout.gradients.empty()) return;
+  h5::write_attribute(scene, "gradients", layout.gradients_of);
+  const h5::Id all = h5::create_group(scene, kGradients);
+  for (const GradientArray& array : layout.gradients) {
+    const h5::Id group = h5::create_group(all, array.name);
+    h5::write_attribute(group, "meaning", array.meaning);
+    h5::write_attribute(group, "rows", array.by_row ? kByRow : "one for the episode");
+    if (array.by_names.empty()) continue;
+    h5::write_attribute(group, "by_names", std::span<const std::string>(array.by_names));
+    h5::write_attribute(group, "by_units", std::span<const std::string>(array.by_units));
+  }
+}
+
 void add_attributes(const h5::Id& object, const std::string& prefix, std::vector<Setting>& settings) {
   for (const std::string& name : h5::attribute_names(object))
     settings.push_back({prefix + name, h5::attribute_text(object, name)});
@@ -125,6 +141,7 @@ void describe_dataset(const h5::Id& file, const DatasetLayout& layout) {
   const h5::Id scene = h5::create_group(file, "scene");
   describe_run(scene, layout);
   describe_numbers(scene, layout);
+  describe_gradients(scene, layout);
 }
 
 std::vector<Setting> settings_of(const DatasetLayout& layout) {
@@ -141,6 +158,8 @@ std::vector<Setting> read_settings(const h5::Id& file) {
   add_attributes(scene, "", settings);
   for (const std::string& sensor : h5::link_names(sensors))
     add_attributes(h5::open_group(sensors, sensor), "sensors/" + sensor + "/", settings);
+  for (const std::string& name : gradient_names(scene))
+    add_attributes(h5::open_group(h5::open_group(scene, kGradients), name), std::string(kGradients) + "/" + name + "/", settings);
   return settings;
 }
 
@@ -163,6 +182,15 @@ std::vector<std::string> differences(const std::vector<Setting>& there, const st
   for (const Setting& setting : there)
     if (value_in(here, setting.name) == nullptr) lines.push_back(fmt::format("{}: missing here", setting.name));
   return lines;
+}
+
+std::vector<std::string> gradient_names(const h5::Id& scene) {
+  if (!h5::has_link(scene, kGradients)) return {};
+  return h5::link_names(h5::open_group(scene, kGradients));
+}
+
+bool gradient_by_row(const h5::Id& scene, const std::string& name) {
+  return h5::read_text(h5::open_group(h5::open_group(scene, kGradients), name), "rows") == kByRow;
 }
 
 std::vector<std::int64_t> demo_numbers(const h5::Id& data) {

@@ -63,8 +63,11 @@ double DatasetLayout::episode_bytes() const {
   const double r = static_cast<double>(rows());
   const double of_actions = static_cast<double>(action_names().size()) * sizeof(float);
   constexpr double kRewardAndDone = sizeof(float) + 1;
+  double of_gradients = 0;
+  for (const GradientArray& array : gradients)
+    of_gradients += sizeof(double) * static_cast<double>(array.width()) * (array.by_row ? r : 1);
   return (r + 1) * numbers * (single ? sizeof(float) : sizeof(double)) +
-         r * (of_actions + kRewardAndDone);
+         r * (of_actions + kRewardAndDone) + of_gradients;
 }
 
 std::int64_t DatasetLayout::episodes_per_shard() const {

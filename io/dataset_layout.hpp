@@ -47,6 +47,8 @@ struct DatasetLayout {
   double shard_bytes = 1 << 30;  ///< a shard stays below it, unless 16 episodes are more
   std::int64_t shards = 0;       ///< how many; 0: as shard_bytes says
   std::string compression = "none";  ///< or "deflate": of observations whose rows are large enough
+  std::string gradients_of;               ///< what derivatives are of, in words; empty: there are none
+  std::vector<GradientArray> gradients;   ///< those stored with an episode
 
   /// R: actions of an episode, of a task at most.
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
@@ -79,6 +81,8 @@ struct DatasetDescription {
   std::string policy, controls, command;
   std::int64_t shards = 0;
   std::string compression = "none";
+  std::string gradients_of;
+  std::vector<GradientArray> gradients;
 };
 
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,

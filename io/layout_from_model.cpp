@@ -169,6 +169,8 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.command = run.command;
   layout.shards = run.shards;
   layout.compression = run.compression;
+  layout.gradients_of = run.gradients_of;
+  layout.gradients = run.gradients;
   return layout;
 }
 

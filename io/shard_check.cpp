@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/error.hpp"
+#include "io/dataset_description.hpp"
 #include "io/h5.hpp"
 
 namespace tangere {
@@ -51,6 +52,7 @@ class ShardChecker {
     single_ = h5::read_text(scene_, "observation_type") == "float32";
     rows_ = number(scene_, "steps") / number(scene_, "every");
     of_task_ = !h5::read_text(scene_, "task").starts_with("none");
+    gradients_ = gradient_names(scene_);
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
     for (std::int64_t episode = content_.first_episode; episode < end; ++episode) {
       const std::string demo = fmt::format("demo_{}", episode);
@@ -111,6 +113,12 @@ class ShardChecker {
         add<double>(final_obs, names_[k], episode, k + 1, rows, 1);
       }
     }
+    for (std::size_t k = 0; k < gradients_.size(); ++k) {
+      const h5::Dims dims = h5::dimensions(h5::open_dataset(demo, gradients_[k]));
+      if (dims.empty()) return fail(fmt::format("demo_{}: {} is one number, expected a list", episode, gradients_[k]));
+      const bool by_row = gradient_by_row(scene_, gradients_[k]);
+      add<double>(demo, gradients_[k], episode, names_.size() + 2 + k, 0, by_row ? rows : static_cast<std::int64_t>(dims[0]));
+    }
     content_.rows += rows;
     ++content_.demos;
   }
@@ -170,7 +178,7 @@ class ShardChecker {
   bool finite_;
   std::vector<std::string> problems_, not_finite_;
   h5::Id file_, scene_;
-  std::vector<std::string> names_;
+  std::vector<std::string> names_, gradients_;
   bool single_ = false, of_task_ = false;
   std::int64_t rows_ = 0;
   std::tuple<std::vector<float>, std::vector<double>> buffers_;

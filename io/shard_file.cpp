@@ -123,7 +123,33 @@ ShardFile::Demo ShardFile::create_demo(std::int64_t episode, const EpisodeEnd* e
         create(last, names_[k], with_rows(1, shapes_[k]), layout_.single, compresses_last(k) ? 1 : 0));
   }
   demo.group = std::move(group);
+  create_gradients(demo);
   return demo;
+}
+
+void ShardFile::create_gradients(Demo& demo) const {
+  for (const GradientArray& array : layout_.gradients) {
+    const h5::Dims once(array.shape.begin(), array.shape.end());
+    demo.gradients.push_back(create(demo.group, array.name, array.by_row ? with_rows(demo.length, array.shape) : once, false));
+    h5::write_attribute(demo.gradients.back(), "meaning", array.meaning);
+  }
+}
+
+void ShardFile::write_gradients(Demo& demo, const EpisodeRows& rows, int episode) const {
+  for (std::size_t k = 0; k < rows.gradients.size(); ++k) {
+    const GradientArray& array = layout_.gradients[k];
+    const std::size_t each = rows.gradients[k].size() / static_cast<std::size_t>(rows.episodes);
+    const double* from = rows.gradients[k].data() + static_cast<std::size_t>(episode) * each;
+    h5::Dims dims(array.shape.begin(), array.shape.end());
+    if (array.by_row) dims = with_rows(demo.length, array.shape);
+    put(demo.gradients[k], 0, dims, from);
+    // Among names in their order, as who reads the file finds them.
+    const auto before = std::count_if(layout_.gradients.begin(), layout_.gradients.end(),
+                                      [&](const GradientArray& other) { return other.name < array.name; });
+    const auto count = static_cast<std::int64_t>(dims[0]);
+    demo.sum.add(rows.first_episode + episode, names_.size() + 2 + static_cast<std::size_t>(before), 0, count,
+                 numbers_of(dims) / dims[0] * sizeof(double), from);
+  }
 }
 
 void ShardFile::write_randomized(Demo& demo, const EpisodeRows& rows, int episode) const {
@@ -152,6 +178,7 @@ void ShardFile::write(const EpisodeRows& rows, std::span<const CompressedChunk> 
     write_randomized(demo, rows, e);
     if (!rows.ends.empty()) write_rewards(demo, rows, e);
     for (std::size_t name = 0; name < names_.size(); ++name) write_observation(demo, rows, e, name);
+    write_gradients(demo, rows, e);
   }
   for (const CompressedChunk& chunk : chunks) {
     const Demo& demo = block[static_cast<std::size_t>(chunk.episode)];

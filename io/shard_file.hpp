@@ -40,6 +40,7 @@ class ShardFile {
     h5::Id actions;
     h5::Id rewards;
     std::vector<h5::Id> obs, final_obs;  // per observation
+    std::vector<h5::Id> gradients;       // per array
     std::int64_t length = 0;             // actions
     std::vector<double> randomized;
     ContentSum sum;
@@ -52,6 +53,8 @@ class ShardFile {
   void write_randomized(Demo& demo, const EpisodeRows& rows, int episode) const;
   void write_rewards(Demo& demo, const EpisodeRows& rows, int episode);
   void write_observation(Demo& demo, const EpisodeRows& rows, int episode, std::size_t name);
+  void create_gradients(Demo& demo) const;
+  void write_gradients(Demo& demo, const EpisodeRows& rows, int episode) const;
   [[nodiscard]] bool compresses_last(std::size_t name) const;
   void record_failures();
 

@@ -50,8 +50,11 @@ class BallRolling : public Task {
   }
 
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
-    for (std::size_t k = 0; k < 2; ++k)
-      out.moments.back().q[ball_v_ + k] += weight * 2 * to_goal(view, k) / (kLength * kLength);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double by_ball = weight * 2 * to_goal(view, k) / (kLength * kLength);
+      out.moments.back().q[ball_v_ + k] += by_ball;
+      out.memory[k] -= by_ball;
+    }
     for (std::size_t k = 0; k < 3; ++k) out.action[k] -= weight * 2 * kEffort * view.action[k];
   }
 

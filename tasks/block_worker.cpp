@@ -149,6 +149,11 @@ void BlockWorker::conclude(Batch& batch, EnvironmentData& data, int block, Vecto
   for (int e = first; e < last; ++e) conclude_one(batch, data, e, counts);
 }
 
+std::span<const Moment> BlockWorker::moments(int lane) const {
+  const std::size_t count = task_.spec().moments.size();
+  return std::span(moments_).subspan(size(lane) * count, count);
+}
+
 void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
   const TaskSpec& spec = task_.spec();
   const std::size_t e = size(environment);
@@ -241,7 +246,7 @@ void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environm
   data.reward[e] = 0;
   if (data.state[e] == EnvironmentState::over) return;
   TaskView view = view_of(batch, data, environment);
-  const auto moments = std::span<const Moment>(moments_).subspan((e % kBlock) * spec.moments.size(), spec.moments.size());
+  const std::span<const Moment> moments = this->moments(environment % kBlock);
   view.moments = moments;
   const Moment& now = moments.back();
   std::copy(now.q.begin(), now.q.end(), row(data.q, environment, now.q.size()).begin());

@@ -46,6 +46,8 @@ class BlockWorker {
   /// In place of steps and looks: where every environment starts and there is no opening.
   void look_at_start(const Batch& batch, int block);
   void conclude(Batch& batch, EnvironmentData& data, int block, VectorCounts& counts);
+  /// What was seen of a lane of the block looked at last, one of each of the task's moments.
+  [[nodiscard]] std::span<const Moment> moments(int lane) const;
 
   static double bytes(const Task& task);
 

@@ -96,17 +96,27 @@ class BoxPushing : public Task {
     const MomentCotangent& to = out.moments.back();
     // Every joint here slides or turns about one axis: coordinates and dofs have the same places.
     for (std::size_t k = 0; k < 2; ++k) {
-      to.q[box_ + k] -= weight * 2 * kPosition * off[k] / square(kLengthUnit);
+      const double by_place = weight * 2 * kPosition * off[k] / square(kLengthUnit);
+      to.q[box_ + k] -= by_place;
+      out.memory[kGoal + k] += by_place;
       const double gap = weight * 2 * (now.variables[kTip + k] - now.variables[kFace + k]) / square(kGap);
       to.variables[kTip + k] -= gap;
       to.variables[kFace + k] += gap;
     }
-    to.q[box_turn_] -= weight * 2 * kAngle * off[2] / square(kAngleUnit);
+    const double by_yaw = weight * 2 * kAngle * off[2] / square(kAngleUnit);
+    to.q[box_turn_] -= by_yaw;
+    out.memory[kGoal + 2] += by_yaw;
     for (std::size_t k = 0; k < 3; ++k) out.action[k] -= weight * 2 * kEffort * view.action[k];
   }
 
   void controls_vjp(const TaskView& view, int, std::span<const double> weight, const ViewCotangent& out) const override {
     for (std::size_t k = 0; k < 3; ++k) out.action[k] += weight[k] * (1 - square(std::tanh(view.action[k])));
+    for (std::size_t k = 0; k < 2; ++k) out.memory[kPush + k] += weight[3 + k];
+  }
+
+  void begin_action_vjp(const TaskView& view, std::span<double> memory, const ViewCotangent&) const override {
+    if (view.actions % kPushActions != 0) return;
+    memory[kPush] = memory[kPush + 1] = 0;  // drawn
   }
 
   /// Feedback of the state, whatever is observed.

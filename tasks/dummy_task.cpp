@@ -33,6 +33,7 @@ class Dummy : public Task {
   }
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
     out.moments.back().q[vz_] += weight * 2e4 * error(view);
+    out.memory[0] -= weight * 2e4 * error(view);
   }
   void controls_vjp(const TaskView&, int, std::span<const double> weight, const ViewCotangent& out) const override {
     out.action[0] += weight[2];

@@ -2,6 +2,8 @@
 // Forward with checkpoints, then segment by segment back: each is run again onto the tape unless it is the only one.
 #include "tasks/gradient_block.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -25,8 +27,7 @@ std::int64_t segment_length(const Model& model, Integrator integrator, const Gra
   const auto best = std::clamp<std::int64_t>(std::llround(std::sqrt(double(o.steps) * checkpoint / step)), 1, o.steps);
   const double needed = tape(best) + checkpoint * std::ceil(double(o.steps) / double(best));
   if (needed > o.tape_bytes)
-    throw InputError("a tape of " + std::to_string(o.tape_bytes) + " bytes for " + std::to_string(o.steps) +
-                     " steps; expected at least " + std::to_string(needed));
+    throw InputError(fmt::format("tapes of {:.0f} bytes for {} steps; expected at least {:.0f}", o.tape_bytes, o.steps, needed));
   return best;
 }
 
@@ -43,16 +44,7 @@ GradientBlock::GradientBlock(const Model& model, const GradientOptions& options,
       pullback_(model),
       adjoint_(model, options.stepper, {static_cast<int>(losses.size()), options.parameters}),
       tape_(model, stepper_.integrator(), segment_length(model, stepper_.integrator(), options)),
-      field_cotangents_(model.sensors().size()),
-      fields_(model.sensors().size()),
-      cotangents_(model.sensors().size()),
-      q_(count(model.nq())),
-      v_(count(model.nv())),
-      variables_(3 * model.variables().size()),
-      q_bar_(count(model.nv())),
-      v_bar_(count(model.nv())),
-      u_bar_(count(model.nu())),
-      variables_bar_(3 * model.variables().size()),
+      reading_(model),
       parameters_(model) {
   segment_ = segment_length(model, stepper_.integrator(), options);
   for (std::size_t s = 0; s < model.sensors().size(); ++s) {
@@ -171,40 +163,25 @@ void GradientBlock::judge(const InHand& h, std::int64_t step, std::size_t loss, 
   const RolloutLoss& l = *losses_[loss];
   const int lane = e - h.first;
   const std::size_t nu = count(model_.nu()), steps = count(options_.steps);
-  const bool fields = l.reads_fields(step), variables = l.reads_variables(step);
-  h.batch.get_q(e, q_);
-  h.batch.get_v(e, v_);
+  const bool fields = l.reads_fields(step);
   std::span<const double> u;
-  std::span<double> u_bar;
   if (step < options_.steps) {
     h.controls(step, e, h.u.subspan(count(e) * nu, nu));
     u = h.u.subspan(count(e) * nu, nu);
-    u_bar = u_bar_;
   }
-  for (auto* x : {&q_bar_, &v_bar_, &u_bar_, &variables_bar_}) std::fill(x->begin(), x->end(), 0.0);
-  if (variables) readout_.variables(h.batch, e, variables_);
-  for (std::size_t s = 0; s < frames_.size() && fields; ++s) {
-    fields_[s] = &frames_[s][count(lane)];
-    field_cotangents_[s].assign(fields_[s]->values().size(), 0.0);
-    cotangents_[s] = field_cotangents_[s];
-  }
-  const std::span<double> no_numbers;
-  const LossPoint at{step, options_.steps, e, q_, v_, u, variables ? std::span<const double>(variables_) : no_numbers,
-                     fields ? std::span(fields_) : std::span<const CompactFrame<double>* const>()};
-  const LossCotangent out{q_bar_, v_bar_, u_bar, variables ? std::span(variables_bar_) : no_numbers,
-                          fields ? std::span(cotangents_) : std::span<const std::span<double>>()};
+  for (std::size_t s = 0; s < frames_.size() && fields; ++s) reading_.set_field(s, frames_[s][count(lane)]);
   LossGradient& result = h.out.losses[loss];
-  result.value[count(e)] += l.evaluate(at, out);
+  result.value[count(e)] += reading_.evaluate(l, h.batch, readout_, e, step, options_.steps, u);
   BlockCotangent& c = adjoint_.loss(static_cast<int>(loss));
-  for (std::size_t i = 0; i < q_bar_.size(); ++i) {
-    c.q[i * kBlock + count(lane)] += q_bar_[i];
-    c.v[i * kBlock + count(lane)] += v_bar_[i];
+  for (std::size_t i = 0; i < count(model_.nv()); ++i) {
+    c.q[i * kBlock + count(lane)] += reading_.q_bar()[i];
+    c.v[i * kBlock + count(lane)] += reading_.v_bar()[i];
   }
-  for (std::size_t i = 0; i < u_bar.size(); ++i) result.u[(count(e) * steps + count(step)) * nu + i] += u_bar[i];
+  for (std::size_t i = 0; i < u.size(); ++i) result.u[(count(e) * steps + count(step)) * nu + i] += reading_.u_bar()[i];
   for (std::size_t s = 0; s < frames_.size() && fields; ++s)
-    pullback_.field(lane, static_cast<int>(s), fields_[s]->tiles(), cotangents_[s], c.parameters);
-  for (std::size_t k = 0; k < model_.variables().size() && variables; ++k)
-    pullback_.variable(lane, static_cast<int>(k), std::span<const double>(variables_bar_).subspan(3 * k, 3));
+    pullback_.field(lane, static_cast<int>(s), frames_[s][count(lane)].tiles(), reading_.field_bar(s), c.parameters);
+  for (std::size_t k = 0; k < model_.variables().size() && l.reads_variables(step); ++k)
+    pullback_.variable(lane, static_cast<int>(k), reading_.variables_bar().subspan(3 * k, 3));
 }
 
 /// Gradients by the initial state and by the scene's numbers.

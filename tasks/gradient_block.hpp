@@ -9,6 +9,7 @@
 #include "engine/readout.hpp"
 #include "engine/readout_pullback.hpp"
 #include "tasks/gradients.hpp"
+#include "tasks/loss_reading.hpp"
 
 namespace tangere {
 
@@ -61,10 +62,7 @@ class GradientBlock {
   BlockTape tape_;
   std::vector<BlockState> checkpoints_;
   std::vector<std::vector<CompactFrame<double>>> frames_;  // (sensors, 16)
-  std::vector<std::vector<double>> field_cotangents_;      // (sensors) of the environment in hand
-  std::vector<const CompactFrame<double>*> fields_;        // (sensors) of the environment in hand
-  std::vector<std::span<double>> cotangents_;              // (sensors) spans of field_cotangents_
-  std::vector<double> q_, v_, variables_, q_bar_, v_bar_, u_bar_, variables_bar_;
+  LossReading reading_;
   Parameters parameters_;
   const GradientGoOn* go_on_ = nullptr;
   bool stopped_ = false;

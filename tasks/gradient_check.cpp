@@ -3,26 +3,17 @@
 #include "tasks/gradient_check.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
-#include "engine/compiled_model.hpp"
 #include "engine/parameters.hpp"
-#include "engine/random.hpp"
 #include "engine/readout.hpp"
 #include "engine/tangent.hpp"
+#include "tasks/loss_reading.hpp"
 
 namespace tangere {
 namespace {
-
-using kernels::kBlock;
-
-constexpr int kLevels = 8;          // step sizes, each a quarter of the one before: ±, 16 environments
-constexpr double kLargest = 1e-3;   // of the first, times the input's scale
-constexpr double kSettled = 3e-6;   // of the gradient's norm: neighbouring step sizes agree so far, or there is a kink
-constexpr double kNoInfluence = 1e-10;  // of the loss: an input whose derivatives are all smaller does not act on it
-constexpr double kControlScale = 10, kVelocityScale = 10;  // controls and velocities change more than positions
 
 /// The inputs of one rollout.
 struct Inputs {
@@ -35,25 +26,39 @@ struct Setting {
   const CheckOptions& options;
   Inputs at;
   std::vector<double> varying;  ///< what the scene randomises, in its order
+
+  [[nodiscard]] std::span<const double> u(const Inputs& of, std::int64_t step) const {
+    const auto nu = std::size_t(start.model().nu());
+    if (step == options.steps) return {};
+    return std::span(of.u).subspan(std::size_t(step) * nu, nu);
+  }
 };
 
 std::vector<double> numbers(int n) { return std::vector<double>(std::size_t(n)); }
 
-/// q ⊕ e along a dof.
-void move(const CompiledModel& m, std::vector<double>& q, int dof, double e) {
-  for (const kernels::Link& link : m.links) {
-    if (dof < link.v || dof >= link.v + kernels::dofs(link.kind)) continue;
-    if (link.kind != kernels::JointKind::spherical) {
-      q[std::size_t(link.q + dof - link.v)] += e;
-      return;
+/// Reads a loss where one environment is, fields included.
+class Look {
+ public:
+  explicit Look(const Model& model) : readout_(model), reading_(model) {
+    for (std::size_t k = 0; k < model.sensors().size(); ++k) {
+      frames_.push_back(std::make_unique<CompactFrame<double>>(model, static_cast<int>(k)));
+      reading_.set_field(k, *frames_.back());
     }
-    kernels::Vec3<double> turn = {0, 0, 0};
-    (dof == link.v ? turn.x : dof == link.v + 1 ? turn.y : turn.z) = e;
-    double* a = &q[std::size_t(link.q)];
-    const kernels::Quat<double> r = rotate_by(kernels::Quat<double>{a[0], a[1], a[2], a[3]}, turn);
-    a[0] = r.w, a[1] = r.x, a[2] = r.y, a[3] = r.z;
   }
-}
+  double at(const Setting& s, const Batch& batch, int e, std::int64_t step, std::span<const double> u) {
+    if (s.loss.reads_fields(step))
+      for (auto& frame : frames_) readout_.read(batch, e, *frame);
+    return reading_.evaluate(s.loss, batch, readout_, e, step, s.options.steps, u);
+  }
+  [[nodiscard]] const LossReading& reading() const { return reading_; }
+  [[nodiscard]] Readout& readout() { return readout_; }
+  [[nodiscard]] const CompactFrame<double>& frame(std::size_t sensor) const { return *frames_[sensor]; }
+
+ private:
+  Readout readout_;
+  LossReading reading_;
+  std::vector<std::unique_ptr<CompactFrame<double>>> frames_;
+};
 
 /// Loss of each of `inputs`, as environments of one batch; NaN where a step finds no solution.
 std::vector<double> losses_of(const Setting& s, const Model& model, const std::vector<Inputs>& inputs,
@@ -67,147 +72,43 @@ std::vector<double> losses_of(const Setting& s, const Model& model, const std::v
     batch.set_state(e, inputs[std::size_t(e)].q, inputs[std::size_t(e)].v);
   }
   Stepper stepper(model, s.options.stepper);
-  Readout readout(model);
+  Look look(model);
   std::vector<double> sums(inputs.size()), u(inputs.size() * nu);
-  std::vector<double> q = numbers(model.nq()), v = numbers(model.nv()), x(3 * model.variables().size());
-  std::vector<double> unused_q = numbers(model.nv()), unused_v = unused_q, unused_u(nu), unused_x = x;
-  std::vector<CompactFrame<double>> frames;
-  for (std::size_t k = 0; k < model.sensors().size(); ++k) frames.emplace_back(model, static_cast<int>(k));
-  std::vector<std::vector<double>> unused_fields(frames.size());
-  const auto look = [&](std::int64_t t, std::size_t e) {
-    batch.get_q(static_cast<int>(e), q);
-    batch.get_v(static_cast<int>(e), v);
-    std::vector<const CompactFrame<double>*> fields;
-    std::vector<std::span<double>> cotangents;
-    if (s.loss.reads_variables(t)) readout.variables(batch, static_cast<int>(e), x);
-    for (std::size_t k = 0; k < frames.size() && s.loss.reads_fields(t); ++k) {
-      readout.read(batch, static_cast<int>(e), frames[k]);
-      unused_fields[k].assign(frames[k].values().size(), 0.0);
-      fields.push_back(&frames[k]);
-      cotangents.emplace_back(unused_fields[k]);
+  for (std::int64_t t = 0; t <= s.options.steps; ++t) {
+    for (std::size_t e = 0; e < inputs.size(); ++e) {
+      const std::span<const double> own = s.u(inputs[e], t);
+      sums[e] += look.at(s, batch, static_cast<int>(e), t, own);
+      std::copy(own.begin(), own.end(), u.begin() + std::ptrdiff_t(e * nu));
     }
-    const std::span<const double> controls =
-        t < s.options.steps ? std::span(inputs[e].u).subspan(std::size_t(t) * nu, nu) : std::span<const double>();
-    const std::span<const double> positions = s.loss.reads_variables(t) ? std::span<const double>(x) : std::span<const double>();
-    sums[e] += s.loss.evaluate({t, s.options.steps, static_cast<int>(e), q, v, controls, positions, fields},
-                               {unused_q, unused_v, unused_u, unused_x, cotangents});
-  };
-  for (std::size_t e = 0; e < inputs.size(); ++e) look(0, e);
-  for (std::int64_t t = 0; t < s.options.steps; ++t) {
-    for (std::size_t e = 0; e < inputs.size(); ++e)
-      std::copy_n(inputs[e].u.begin() + std::ptrdiff_t(std::size_t(t) * nu), nu, u.begin() + std::ptrdiff_t(e * nu));
-    stepper.step(batch, u);
-    for (std::size_t e = 0; e < inputs.size(); ++e) look(t + 1, e);
+    if (t < s.options.steps) stepper.step(batch, u);
   }
   for (std::size_t e = 0; e < inputs.size(); ++e)
     if (failed(batch.status(static_cast<int>(e)))) sums[e] = NAN;
   return sums;
 }
 
-/// The central difference at which three neighbouring step sizes agree best, and how well.
-struct Difference {
-  double value = NAN, doubt = HUGE_VAL;
-};
-Difference best_of(const std::array<double, kLevels>& ahead, const std::array<double, kLevels>& behind, double scale) {
-  std::array<double, kLevels> values{};  // the error of second order taken out; none at the first
-  double step = kLargest * scale, coarse = NAN;
-  for (std::size_t k = 0; k < kLevels; ++k, step *= 0.25) {
-    const double central = (ahead[k] - behind[k]) / (2 * step);
-    values[k] = (16 * central - coarse) / 15;
-    coarse = central;
-  }
-  Difference best;
-  for (std::size_t k = 2; k + 1 < kLevels; ++k) {
-    const double doubt = std::max(std::abs(values[k] - values[k - 1]), std::abs(values[k + 1] - values[k]));
-    if (doubt < best.doubt) best = {values[k], doubt};
-  }
-  return best;
-}
-
 /// change(inputs, e): one entry of the inputs moved by e.
 template <class Change>
 Difference difference_of(const Setting& s, double scale, const Change& change) {
   std::vector<Inputs> all;
-  double step = kLargest * scale;
-  for (int k = 0; k < kLevels; ++k, step *= 0.25)
-    for (const double sign : {1.0, -1.0}) {
-      all.push_back(s.at);
-      change(all.back(), sign * step);
-    }
-  const std::vector<double> losses = losses_of(s, s.start.model(), all, s.varying);
-  std::array<double, kLevels> ahead{}, behind{};
-  for (std::size_t k = 0; k < kLevels; ++k) ahead[k] = losses[2 * k], behind[k] = losses[2 * k + 1];
-  return best_of(ahead, behind, scale);
+  for (const double e : sweep(scale)) {
+    all.push_back(s.at);
+    change(all.back(), e);
+  }
+  return best_difference(losses_of(s, s.start.model(), all, s.varying), scale);
 }
 
 /// Of number k of the scene, by its relative change.
 Difference difference_of_number(const Setting& s, const Parameters& parameters, int k) {
-  std::array<double, kLevels> ahead{}, behind{};
-  double step = kLargest;
-  for (std::size_t level = 0; level < kLevels; ++level, step *= 0.25)
-    for (const double sign : {1.0, -1.0}) {
-      Scene scene = s.start.model().scene();
-      std::vector<double> varying = s.varying;
-      const int random = parameters.randomization(scene, k);
-      (random < 0 ? parameters.in(scene, k) : varying[std::size_t(random)]) *= 1 + sign * step;
-      (sign > 0 ? ahead : behind)[level] = losses_of(s, Model(scene), {s.at}, varying)[0];
-    }
-  return best_of(ahead, behind, 1);
-}
-
-double norm_of(std::span<const double> x) {
-  return std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0));
-}
-
-/// Which of `all` are compared: every one, or as many as asked for, drawn.
-std::vector<std::size_t> chosen(std::vector<std::size_t> all, const CheckOptions& o, std::uint32_t purpose) {
-  const auto wanted = std::size_t(o.entries);
-  if (o.entries == 0 || all.size() <= wanted) return all;
-  for (std::size_t i = 0; i < wanted; ++i) {
-    RandomKey key{o.seed, 0, static_cast<std::int64_t>(i), Purpose::control, purpose};
-    std::swap(all[i], all[i + std::size_t(uniform(key, 0, double(all.size() - i) - 1e-9))]);
+  std::vector<double> losses;
+  for (const double e : sweep(1)) {
+    Scene scene = s.start.model().scene();
+    std::vector<double> varying = s.varying;
+    const int random = parameters.randomization(scene, k);
+    (random < 0 ? parameters.in(scene, k) : varying[std::size_t(random)]) *= 1 + e;
+    losses.push_back(losses_of(s, Model(scene), {s.at}, varying)[0]);
   }
-  all.resize(wanted);
-  std::sort(all.begin(), all.end());
-  return all;
-}
-std::vector<std::size_t> all_of(std::size_t count) {
-  std::vector<std::size_t> all(count);
-  std::iota(all.begin(), all.end(), std::size_t{0});
-  return all;
-}
-
-/// What is not finite is as wrong as can be.
-double finite_error(double error) { return std::isfinite(error) ? error : HUGE_VAL; }
-
-/// `among`: entries that can be moved. `loss`: what an influence is measured by.
-template <class Of, class Name>
-CheckedInput compare(const Setting& s, const char* what, std::span<const double> gradient, std::uint32_t purpose, double loss,
-                     const std::vector<std::size_t>& among, const Of& of, const Name& name) {
-  CheckedInput c;
-  c.name = what;
-  c.entries = gradient.size();
-  c.norm = norm_of(gradient);
-  const std::vector<std::size_t> entries = chosen(among, s.options, purpose);
-  std::vector<Difference> differences;
-  double square = 0;
-  for (const std::size_t i : entries) {
-    differences.push_back(of(i));
-    if (std::isfinite(differences.back().value)) square += differences.back().value * differences.back().value;
-  }
-  c.scale = std::max(c.norm, std::sqrt(square));
-  if (!std::isfinite(c.norm)) c.difference_error = HUGE_VAL;
-  c.influence = !(c.scale <= kNoInfluence * std::abs(loss));
-  for (std::size_t k = 0; k < entries.size() && c.influence; ++k) {
-    if (!(differences[k].doubt <= kSettled * c.scale)) {
-      ++c.kinks;
-      continue;
-    }
-    ++c.compared;
-    const double error = finite_error(std::abs(differences[k].value - gradient[entries[k]]) / c.scale);
-    if (error >= c.difference_error) c.difference_error = error, c.worst = name(entries[k]);
-  }
-  return c;
+  return best_difference(losses, 1);
 }
 
 /// Tangents along one direction per input.
@@ -222,8 +123,9 @@ class Directions {
     const auto nu = std::size_t(model.nu());
     std::vector<double> u(std::size_t(batch.environments()) * nu);
     for (std::int64_t t = 0; t < s.options.steps; ++t) {
+      const std::span<const double> own = s.u(s.at, t);
       for (int e = 0; e < batch.environments(); ++e)
-        std::copy_n(s.at.u.begin() + std::ptrdiff_t(std::size_t(t) * nu), nu, u.begin() + std::ptrdiff_t(std::size_t(e) * nu));
+        std::copy(own.begin(), own.end(), u.begin() + std::ptrdiff_t(std::size_t(e) * nu));
       stepper.step_block(batch, 0, u, &*tape_);
       if (failed(batch.status(0)))
         throw InputError("step " + std::to_string(t) + " of the rollout finds no solution: " + to_string(batch.status(0)));
@@ -244,61 +146,41 @@ class Directions {
     }
     Tangent tangent(model, s_.options.stepper);
     Batch batch = s_.start;
-    Readout readout(model);
+    Look look(model);
     double sum = 0;
     for (std::int64_t t = 0; t <= s_.options.steps; ++t) {
       const std::span<const double> u_dot =
           u.empty() || t == s_.options.steps ? std::span<const double>(no_u) : std::span(u).subspan(std::size_t(t) * nu, nu);
       tape_->show(t, batch, 0);
-      sum += look(batch, readout, tangent, t, state, u_dot, rows);
+      sum += change_at(batch, look, tangent, t, state, u_dot, rows);
       if (t == s_.options.steps) break;
-      tangent.step(batch, 0, 0, *tape_, t, std::span(s_.at.u).subspan(std::size_t(t) * nu, nu), u_dot, rows, state);
+      tangent.step(batch, 0, 0, *tape_, t, s_.u(s_.at, t), u_dot, rows, state);
     }
     return sum;
   }
 
  private:
   /// The loss's own derivatives at a state, times how that changes.
-  double look(const Batch& batch, Readout& readout, Tangent& tangent, std::int64_t t, const StateTangent& state,
-              std::span<const double> u_dot, std::span<const double> rows) {
+  double change_at(const Batch& batch, Look& look, Tangent& tangent, std::int64_t t, const StateTangent& state,
+                   std::span<const double> u_dot, std::span<const double> rows) {
     const Model& model = batch.model();
-    const auto nu = std::size_t(model.nu()), nv = std::size_t(model.nv());
-    std::vector<double> q = numbers(model.nq()), v = numbers(model.nv()), x(3 * model.variables().size());
-    batch.get_q(0, q);
-    batch.get_v(0, v);
-    std::vector<double> q_bar(nv), v_bar(nv), u_bar(nu), x_bar(x.size());
-    const bool of_fields = s_.loss.reads_fields(t), of_variables = s_.loss.reads_variables(t);
-    std::vector<CompactFrame<double>> frames;
-    std::vector<const CompactFrame<double>*> fields;
-    std::vector<std::vector<double>> bars;
-    std::vector<std::span<double>> spans;
-    for (std::size_t k = 0; k < model.sensors().size() && of_fields; ++k) {
-      frames.emplace_back(model, static_cast<int>(k));
-      readout.read(batch, 0, frames.back());
-      bars.emplace_back(frames.back().values().size());
-    }
-    for (std::size_t k = 0; k < frames.size(); ++k) fields.push_back(&frames[k]), spans.emplace_back(bars[k]);
-    if (of_variables) readout.variables(batch, 0, x);
-    const std::span<const double> u =
-        t < s_.options.steps ? std::span(s_.at.u).subspan(std::size_t(t) * nu, nu) : std::span<const double>();
-    s_.loss.evaluate({t, s_.options.steps, 0, q, v, u, of_variables ? std::span<const double>(x) : std::span<const double>(), fields},
-                     {q_bar, v_bar, u_bar, of_variables ? std::span<double>(x_bar) : std::span<double>(), spans});
+    look.at(s_, batch, 0, t, s_.u(s_.at, t));
+    const LossReading& bar = look.reading();
     double sum = 0;
-    for (std::size_t i = 0; i < nv; ++i) sum += q_bar[i] * state.q[i] + v_bar[i] * state.v[i];
-    for (std::size_t i = 0; i < nu; ++i) sum += u_bar[i] * u_dot[i];
-    for (std::size_t k = 0; k < frames.size(); ++k) {
-      std::vector<double> change(frames[k].dense_size()), of_tiles(change.size());
+    for (std::size_t i = 0; i < state.q.size(); ++i) sum += bar.q_bar()[i] * state.q[i] + bar.v_bar()[i] * state.v[i];
+    for (std::size_t i = 0; i < u_dot.size(); ++i) sum += bar.u_bar()[i] * u_dot[i];
+    for (std::size_t k = 0; k < model.sensors().size() && s_.loss.reads_fields(t); ++k) {
+      std::vector<double> change(look.frame(k).dense_size()), of_tiles(change.size());
       tangent.field(batch, 0, 0, *tape_, t, static_cast<int>(k), rows, state, change);
       // The cotangents' layout is that of the tiles: spread them as the frame spreads its values.
-      frames[k].spread(bars[k], of_tiles);
+      look.frame(k).spread(bar.field_bar(k), of_tiles);
       sum += std::inner_product(change.begin(), change.end(), of_tiles.begin(), 0.0);
     }
-    if (of_variables) sum += along_variables(batch, readout, x_bar, state);
+    if (s_.loss.reads_variables(t)) sum += along_variables(batch, look.readout(), bar.variables_bar(), state);
     return sum;
   }
 
-  static double along_variables(const Batch& batch, Readout& readout, const std::vector<double>& x_bar,
-                                const StateTangent& state) {
+  static double along_variables(const Batch& batch, Readout& readout, std::span<const double> x_bar, const StateTangent& state) {
     const auto nv = state.q.size();
     std::vector<double> jacobian(x_bar.size() * nv);
     readout.variable_jacobian(batch, 0, jacobian);
@@ -313,18 +195,86 @@ class Directions {
   std::optional<BlockTape> tape_;
 };
 
-std::vector<double> direction(std::size_t n, std::uint64_t seed, std::uint32_t purpose) {
-  std::vector<double> d(n);
-  for (std::size_t i = 0; i < n; ++i)
-    d[i] = uniform({seed, 1, static_cast<std::int64_t>(i), Purpose::control, purpose}, -1, 1);
-  return d;
+Setting setting_of(const Batch& start, const StepControls& controls, const RolloutLoss& loss, const CheckOptions& options) {
+  const Model& model = start.model();
+  const auto nu = std::size_t(model.nu());
+  if (start.has_history(0))
+    throw InputError("gradients are checked from a start, and this batch continues a run: what differences move has no past");
+  Setting s{start, loss, options, {numbers(model.nq()), numbers(model.nv()), std::vector<double>(std::size_t(options.steps) * nu)}, {}};
+  for (std::size_t k = 0; k < model.scene().randomizations.size(); ++k)
+    s.varying.push_back(start.randomized_value(0, static_cast<int>(k)));
+  start.get_q(0, s.at.q);
+  start.get_v(0, s.at.v);
+  for (std::int64_t t = 0; t < options.steps; ++t) controls(t, 0, std::span(s.at.u).subspan(std::size_t(t) * nu, nu));
+  return s;
 }
 
-void compare_tangent(CheckedInput& c, std::span<const double> gradient, const std::vector<double>& d, double along) {
-  if (!c.influence) return;
-  const double dot = std::inner_product(gradient.begin(), gradient.end(), d.begin(), 0.0);
-  c.tangent_error = finite_error(std::abs(dot - along) / (c.scale * norm_of(d)));
+LossGradient gradient_of(const Batch& start, const StepControls& controls, const RolloutLoss& loss, const CheckOptions& options) {
+  GradientOptions wanted;
+  wanted.steps = options.steps;
+  wanted.stepper = options.stepper;
+  wanted.parameters = true;
+  const RolloutLoss* const losses[] = {&loss};
+  return rollout_gradients(start, controls, wanted, losses).losses[0];
 }
+
+/// The four inputs, one after the other.
+class Check {
+ public:
+  Check(const Setting& s, const LossGradient& g) : s_(s), g_(g), parameters_(s.start.model()), tangents_(s, parameters_) {
+    out.loss = g.value[0];
+  }
+
+  void controls() {
+    const Model& model = s_.start.model();
+    const auto nu = std::size_t(model.nu());
+    const std::span<const double> u = std::span(g_.u).first(std::size_t(s_.options.steps) * nu);
+    add({"u", u, all_of(u.size()),
+         [&](std::size_t i) { return difference_of(s_, kControlScale, [i](Inputs& x, double e) { x.u[i] += e; }); },
+         [&](std::size_t i) { return "step " + std::to_string(i / nu) + " " + std::string(model.u_names()[i % nu]); }},
+        0, [&](const std::vector<double>& d) { return tangents_.along({}, {}, d, {}); });
+  }
+  void positions() {
+    const CompiledModel& m = s_.start.model().compiled();
+    const std::span<const double> q = std::span(g_.q).first(std::size_t(m.nv));
+    const auto move = [&m](std::size_t i) {
+      return [&m, i](Inputs& x, double e) { move_along(m, x.q, static_cast<int>(i), e); };
+    };
+    add({"q", q, all_of(q.size()), [&](std::size_t i) { return difference_of(s_, 1, move(i)); }, dof_name()}, 1,
+        [&](const std::vector<double>& d) { return tangents_.along(d, {}, {}, {}); });
+  }
+  void velocities() {
+    const std::span<const double> v = std::span(g_.v).first(std::size_t(s_.start.model().nv()));
+    add({"v", v, all_of(v.size()),
+         [&](std::size_t i) { return difference_of(s_, kVelocityScale, [i](Inputs& x, double e) { x.v[i] += e; }); }, dof_name()},
+        2, [&](const std::vector<double>& d) { return tangents_.along({}, d, {}, {}); });
+  }
+  /// By relative changes of what this environment has: units differ.
+  void numbers_of_scene() {
+    const Model& model = s_.start.model();
+    const RelativeGradient r(parameters_, model.scene(), s_.varying, std::span(g_.parameters).first(std::size_t(parameters_.count())));
+    add({"numbers", r.gradient, r.given, [&](std::size_t k) { return difference_of_number(s_, parameters_, static_cast<int>(k)); },
+         [&](std::size_t k) { return parameters_.infos()[k].name; }},
+        3, [&](const std::vector<double>& d) { return tangents_.along({}, {}, {}, r.change(d)); });
+  }
+
+  GradientCheck out;
+
+ private:
+  void add(const Comparison& c, std::uint32_t purpose, const std::function<double(const std::vector<double>&)>& along) {
+    out.inputs.push_back(compare(c, out.loss, s_.options.entries, s_.options.seed, purpose));
+    const std::vector<double> d = random_direction(c.gradient.size(), s_.options.seed, purpose);
+    compare_along(out.inputs.back(), c.gradient, d, along(d));
+  }
+  [[nodiscard]] std::function<std::string(std::size_t)> dof_name() const {
+    return [this](std::size_t i) { return std::string(s_.start.model().v_names()[i]); };
+  }
+
+  const Setting& s_;
+  const LossGradient& g_;
+  Parameters parameters_;
+  Directions tangents_;
+};
 
 }  // namespace
 
@@ -342,72 +292,14 @@ std::size_t GradientCheck::kinks() const {
 
 GradientCheck check_gradient(const Batch& start, const StepControls& controls, const RolloutLoss& loss,
                              const CheckOptions& options) {
-  const Model& model = start.model();
-  const CompiledModel& m = model.compiled();
-  const auto nu = std::size_t(model.nu());
-  if (start.has_history(0))
-    throw InputError("gradients are checked from a start, and this batch continues a run: what differences move has no past");
-  Setting s{start, loss, options, {numbers(model.nq()), numbers(model.nv()), std::vector<double>(std::size_t(options.steps) * nu)}, {}};
-  for (std::size_t k = 0; k < model.scene().randomizations.size(); ++k)
-    s.varying.push_back(start.randomized_value(0, static_cast<int>(k)));
-  start.get_q(0, s.at.q);
-  start.get_v(0, s.at.v);
-  for (std::int64_t t = 0; t < options.steps; ++t) controls(t, 0, std::span(s.at.u).subspan(std::size_t(t) * nu, nu));
-  const Parameters parameters(model);
-  Directions tangents(s, parameters);
-
-  GradientOptions wanted;
-  wanted.steps = options.steps;
-  wanted.stepper = options.stepper;
-  wanted.parameters = true;
-  const RolloutLoss* const losses[] = {&loss};
-  const LossGradient g = rollout_gradients(start, controls, wanted, losses).losses[0];
-  const std::span<const double> u(g.u.data(), std::size_t(options.steps) * nu), q(g.q.data(), std::size_t(m.nv)),
-      v(g.v.data(), std::size_t(m.nv));
-  // By relative changes of what this environment has: units differ.
-  std::vector<double> has(std::size_t(parameters.count())), relative(has.size());
-  std::vector<std::size_t> given;  // not zero: there is something to change a little
-  for (std::size_t k = 0; k < has.size(); ++k) {
-    const int random = parameters.randomization(model.scene(), static_cast<int>(k));
-    has[k] = random < 0 ? parameters.infos()[k].value : s.varying[std::size_t(random)];
-    relative[k] = g.parameters[k] * has[k];
-    if (has[k] != 0) given.push_back(k);
-  }
-
-  GradientCheck out;
-  out.loss = g.value[0];
-  const auto along = [&](std::span<const double> gradient, const std::vector<double>& d, double value) {
-    compare_tangent(out.inputs.back(), gradient, d, value);
-  };
-  if (nu > 0) {
-    out.inputs.push_back(compare(
-        s, "u", u, 0, out.loss, all_of(u.size()),
-        [&](std::size_t i) { return difference_of(s, kControlScale, [i](Inputs& x, double e) { x.u[i] += e; }); },
-        [&](std::size_t i) { return "step " + std::to_string(i / nu) + " " + std::string(model.u_names()[i % nu]); }));
-    const std::vector<double> d = direction(u.size(), options.seed, 0);
-    along(u, d, tangents.along({}, {}, d, {}));
-  }
-  out.inputs.push_back(compare(
-      s, "q", q, 1, out.loss, all_of(q.size()),
-      [&](std::size_t i) { return difference_of(s, 1, [&, i](Inputs& x, double e) { move(m, x.q, static_cast<int>(i), e); }); },
-      [&](std::size_t i) { return std::string(model.v_names()[i]); }));
-  std::vector<double> d = direction(q.size(), options.seed, 1);
-  along(q, d, tangents.along(d, {}, {}, {}));
-  out.inputs.push_back(compare(
-      s, "v", v, 2, out.loss, all_of(v.size()),
-      [&](std::size_t i) { return difference_of(s, kVelocityScale, [i](Inputs& x, double e) { x.v[i] += e; }); },
-      [&](std::size_t i) { return std::string(model.v_names()[i]); }));
-  d = direction(v.size(), options.seed, 2);
-  along(v, d, tangents.along({}, d, {}, {}));
-  out.inputs.push_back(compare(
-      s, "numbers", relative, 3, out.loss, given,
-      [&](std::size_t k) { return difference_of_number(s, parameters, static_cast<int>(k)); },
-      [&](std::size_t k) { return parameters.infos()[k].name; }));
-  d = direction(relative.size(), options.seed, 3);
-  std::vector<double> change(d.size());
-  for (std::size_t k = 0; k < d.size(); ++k) change[k] = d[k] * has[k];
-  along(relative, d, tangents.along({}, {}, {}, change));
-  return out;
+  const Setting s = setting_of(start, controls, loss, options);
+  const LossGradient g = gradient_of(start, controls, loss, options);
+  Check check(s, g);
+  if (start.model().nu() > 0) check.controls();
+  check.positions();
+  check.velocities();
+  check.numbers_of_scene();
+  return check.out;
 }
 
 }  // namespace tangere

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "tasks/gradient_compare.hpp"
 #include "tasks/gradients.hpp"
 
 namespace tangere {
@@ -15,20 +16,6 @@ struct CheckOptions {
   int entries = 24;        ///< of each input that differences are taken of, drawn if there are more; 0: all
   std::uint64_t seed = 0;  ///< of that draw and of the directions
   StepperOptions stepper;
-};
-
-/// One kind of input. Errors are relative to the norm of the gradient by it, (numbers of the scene: by their relative change).
-struct CheckedInput {
-  std::string name;                ///< "u", "q", "v", "numbers"
-  std::size_t entries = 0;         ///< the gradient has
-  std::size_t compared = 0;        ///< with differences
-  std::size_t kinks = 0;           ///< left out: differences that do not settle, or whose runs find no solution
-  double norm = 0;                 ///< of the gradient
-  double scale = 0;                ///< what errors are measured by: that, or the norm of the differences if it is larger
-  bool influence = true;           ///< false: derivatives and differences are nothing beside the loss; nothing is compared
-  double difference_error = 0;     ///< largest among those compared
-  std::string worst;               ///< where
-  double tangent_error = 0;        ///< |g·d - tangent|/(|g| |d|) along a random direction
 };
 
 struct GradientCheck {

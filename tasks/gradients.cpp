@@ -25,7 +25,9 @@ void check(const GradientOptions& options) {
     throw InputError("gradients on " + std::to_string(options.threads) + " threads; expected at least 1");
 }
 
-GradientSummary empty_summary(const Model& model, int environments, const GradientOptions& o, std::size_t losses) {
+}  // namespace
+
+GradientSummary empty_gradients(const Model& model, int environments, const GradientOptions& o, std::size_t losses) {
   const auto size = [environments](std::int64_t each) { return std::size_t(environments) * std::size_t(each); };
   GradientSummary out;
   const int numbers = o.parameters ? Parameters(model).count() : 0;
@@ -34,8 +36,6 @@ GradientSummary empty_summary(const Model& model, int environments, const Gradie
                              std::vector<double>(size(numbers))});
   return out;
 }
-
-}  // namespace
 
 struct GradientRollouts::Impl {
   Model model;
@@ -71,7 +71,7 @@ GradientSummary GradientRollouts::run(const Batch& start, const StepControls& co
   if (&start.model().compiled() != &i.model.compiled())
     throw InputError("a batch of scene '" + start.model().scene().name + "' for gradients of a model of scene '" +
                      i.model.scene().name + "'; expected the same Model");
-  GradientSummary out = empty_summary(i.model, start.environments(), i.options, i.losses);
+  GradientSummary out = empty_gradients(i.model, start.environments(), i.options, i.losses);
   Batch batch = start;
   std::vector<double> u(std::size_t(start.environments()) * std::size_t(i.model.nu()));
   std::vector<std::vector<FailedEnvironment>> failures(std::size_t(start.blocks()));

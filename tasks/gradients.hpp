@@ -66,6 +66,9 @@ class GradientRollouts {
   std::unique_ptr<Impl> impl_;
 };
 
+/// Room for them, zeros.
+GradientSummary empty_gradients(const Model& model, int environments, const GradientOptions& options, std::size_t losses);
+
 /// Memory of gradients and of the tapes of all threads [bytes].
 double gradient_bytes(const Model& model, int environments, const GradientOptions& options, int losses);
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "engine/flow_map.hpp"
 #include "tasks/task_list.hpp"
@@ -60,7 +61,10 @@ class Insertion : public Task {
         hand_(coordinate("hand_slide")),
         turn_(coordinate("hand_turn")),
         finger_(coordinate("left_finger")),
-        box_(coordinate("box")) {
+        box_(coordinate("box")),
+        hand_v_(dof("hand_slide")),
+        turn_v_(dof("hand_turn")),
+        box_v_(dof("box")) {
     for (const LinkDescription& link : model().scene().links)
       if (link.joint.name == "box") rest_ = link.joint.pose.position;
     if (model().sensors().size() != kPads || static_cast<std::size_t>(model().sensors()[0].points) != kPoints)
@@ -127,16 +131,30 @@ class Insertion : public Task {
 
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
     if (judge(view).success) return;
-    const std::array<double, 3> e = off(view);
-    for (std::size_t a = 0; a < moved_.size(); ++a) {
-      const std::size_t k = moved_[a];
-      out.action[a] -= weight * 2 * e[k] / (kOff[k] * kOff[k]) * kAct[k];
-    }
+    std::array<double, 3> by_off = off(view);
+    for (std::size_t k = 0; k < 3; ++k) by_off[k] *= -weight * 2 / (kOff[k] * kOff[k]);
+    off_vjp(by_off, out);
   }
 
   void controls_vjp(const TaskView&, int, std::span<const double> weight, const ViewCotangent& out) const override {
-    constexpr std::array<std::size_t, 3> kControl{0, 1, 3};
-    for (std::size_t a = 0; a < moved_.size(); ++a) out.action[a] += weight[kControl[moved_[a]]] * kAct[moved_[a]];
+    off_vjp({weight[0], weight[1], weight[3]}, out);
+    out.memory[kHeight] += weight[2];
+    out.memory[kGrip] += weight[4] + weight[5];
+  }
+
+  void begin_action_vjp(const TaskView&, std::span<double> memory, const ViewCotangent& out) const override {
+    for (std::size_t a = 0; a < moved_.size(); ++a) {
+      const std::size_t k = moved_[a];
+      out.action[a] += kAct[k] * (memory[kNow + k] + (k == 2 ? memory[kTurned] : 0));
+    }
+    for (std::size_t k = 0; k < 3; ++k) memory[kNow + k] += std::exchange(memory[kBefore + k], 0.0);
+  }
+
+  /// Of hold(): hand and box turn about the same axis.
+  void place_vjp(const TaskView&, std::span<const double> q, std::span<const double>, const ViewCotangent& out) const override {
+    for (std::size_t k = 0; k < 2; ++k) out.memory[kNow + k] += q[hand_v_ + k] + q[box_v_ + k];
+    out.memory[kNow + 2] += q[turn_v_] + q[box_v_ + 5];
+    out.memory[kHeight] += q[hand_v_ + 2];
   }
 
   void scripted(const TaskView& view, std::span<const double> o, std::span<double> action) const override;
@@ -161,6 +179,11 @@ class Insertion : public Task {
     return e;
   }
 
+  void off_vjp(const std::array<double, 3>& by_off, const ViewCotangent& out) const {
+    for (std::size_t k = 0; k < 3; ++k) out.memory[kBefore + k] += by_off[k];
+    for (std::size_t a = 0; a < moved_.size(); ++a) out.action[a] += kAct[moved_[a]] * by_off[moved_[a]];
+  }
+
   void hold(const TaskView& view, std::span<double> q, std::span<double> v) const {
     const std::span<const double> e = view.memory.subspan(kNow, 3);
     std::fill(v.begin(), v.end(), 0.0);
@@ -178,7 +201,8 @@ class Insertion : public Task {
   }
 
   std::vector<std::size_t> moved_;  // which of e an action changes
-  std::size_t hand_, turn_, finger_, box_;
+  std::size_t hand_, turn_, finger_, box_;  // coordinates
+  std::size_t hand_v_, turn_v_, box_v_;     // dofs
   Vector3 rest_{};                  // of the box's joint
 };
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "engine/flow_map.hpp"
 #include "tasks/task_list.hpp"
@@ -128,7 +129,17 @@ class StableGrasp : public Task {
 
   void controls_vjp(const TaskView& view, int step, std::span<const double> weight,
                     const ViewCotangent& out) const override {
-    if (std::abs(place(view)) < kFarthest) out.action[0] += weight[1] * ramp(step, 0, 10) * kReach;
+    const double moved = ramp(step, 0, 10);
+    const bool within = within_reach(view.memory[kBefore], view.action[0]);
+    out.memory[kBefore] += weight[1] * (within ? 1 : 1 - moved);
+    if (within) out.action[0] += weight[1] * moved * kReach;
+  }
+
+  void begin_action_vjp(const TaskView& view, std::span<double> memory, const ViewCotangent& out) const override {
+    if (view.actions == 0) out.moments.back().q[bar_v_ + 2] += std::exchange(memory[kRest], 0.0);
+    const double by_place = within_reach(view.memory[kPlace], view.action[0]) ? memory[kPlace] : 0;
+    out.action[0] += by_place * kReach;
+    memory[kPlace] = by_place + std::exchange(memory[kBefore], 0.0);
   }
 
   /// Towards the heavier side. The bar slides and turns in the grip at rates that its weight and its moment drive, and
@@ -162,6 +173,7 @@ class StableGrasp : public Task {
   static double place(const TaskView& view) {
     return std::clamp(view.memory[kBefore] + kReach * view.action[0], -kFarthest, kFarthest);
   }
+  static bool within_reach(double before, double action) { return std::abs(before + kReach * action) <= kFarthest; }
   static const Moment& lifted(const TaskView& view) { return view.moments.front(); }
   /// e_z · R e_y.
   [[nodiscard]] double slope(const Moment& m) const {

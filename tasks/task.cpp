@@ -37,6 +37,13 @@ void Task::start(const TaskStart&) const {}
 void Task::begin_action(const TaskView&, std::span<double>) const {}
 void Task::place(const TaskView&, std::span<double>, std::span<double>) const {}
 
+void Task::begin_action_vjp(const TaskView&, std::span<double>, const ViewCotangent&) const {}
+void Task::place_vjp(const TaskView&, std::span<const double>, std::span<const double>, const ViewCotangent&) const {
+  throw InputError(fmt::format("task {} restarts at every action and has no derivative of the states it restarts from; "
+                               "expected Task::place_vjp",
+                               spec_.name));
+}
+
 std::size_t Task::coordinate(const std::string& joint) const {
   return place_of(model_.scene(), joint, position_count);
 }

@@ -58,6 +58,7 @@ struct MomentCotangent {
 struct ViewCotangent {
   std::span<const MomentCotangent> moments;  ///< parallel to TaskView::moments
   std::span<double> action;
+  std::span<double> memory = {};  ///< (memory)
 };
 
 class Task {
@@ -85,11 +86,19 @@ class Task {
   virtual void observe(const TaskView& view, std::span<double> observation) const = 0;
   virtual Verdict judge(const TaskView& view) const = 0;
 
-  /// Adds `weight` times the derivative of the reward to `out`.
+  /// Adds `weight` times the derivative of the reward to `out`. What only chooses between cases has none.
   virtual void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const = 0;
-  /// Adds ∂(weight · u)/∂(action, q and v of the action's start) of controls(view, step, u), `weight`: (nu).
+  /// Adds ∂(weight · u)/∂(action, memory, q and v of the action's start) of controls(view, step, u), `weight`: (nu).
   virtual void controls_vjp(const TaskView& view, int step, std::span<const double> weight,
                             const ViewCotangent& out) const = 0;
+
+  /// begin_action in reverse. `memory` holds derivatives by what it leaves and gets those by what it found, view.memory; those
+  /// by the action, and by q and v of its start, are added to `out`. As it stands: nothing that it writes has a derivative.
+  virtual void begin_action_vjp(const TaskView& view, std::span<double> memory, const ViewCotangent& out) const;
+  /// place in reverse: adds ∂(q̄·q + v̄·v)/∂(action, memory, q and v where the last action ended), `q`, `v`: (nv). A task that
+  /// restarts has to have it; as it stands it throws InputError.
+  virtual void place_vjp(const TaskView& view, std::span<const double> q, std::span<const double> v,
+                         const ViewCotangent& out) const;
 
   /// An action that solves the task without having learned anything.
   virtual void scripted(const TaskView& view, std::span<const double> observation, std::span<double> action) const = 0;

@@ -111,6 +111,35 @@ TEST(Simulate, WritesGradientsBesideTheTrajectory) {
   EXPECT_THAT(names, testing::Contains("tactile pad kn"));
 }
 
+TEST(Simulate, TapeMemoryChangesNoGradient) {
+  const Folder folder;
+  const Words words{"--envs", "3", "--steps", "120", "--gradients", "shear", "--overwrite"};
+  const auto with = [&](const char* memory) {
+    Words all = words;
+    if (memory != nullptr) all.insert(all.end(), {"--tape-memory", memory});
+    return simulate(folder, kSmall, all).at("gradients").at("recomputed_steps").get<int>();
+  };
+  const std::vector<std::string> names{"loss", "grad_u", "grad_q", "grad_v", "grad_numbers"};
+  EXPECT_EQ(with(nullptr), 0);
+  std::vector<std::vector<double>> stored;
+  for (const std::string& name : names) stored.push_back(read_array(folder, "/gradients/" + name).values);
+  for (const char* memory : {"200kB", "0.2MiB"}) {
+    EXPECT_EQ(with(memory), 120);
+    for (std::size_t k = 0; k < names.size(); ++k) EXPECT_EQ(read_array(folder, "/gradients/" + names[k]).values, stored[k]);
+  }
+  const std::vector<std::pair<const char*, const char*>> wrong{
+      {"2", "expected a positive number and its unit"}, {"-2GB", "as in 2GiB"}, {"0GB", "as in 2GiB"}, {"1gb", "as in 2GiB"}, {"30kB", "expected at least"}};
+  for (const auto& [memory, message] : wrong) {
+    Words all{"simulate", kSmall, "-o", "none.h5", "--steps", "120", "--gradients", "shear", "--tape-memory", memory};
+    const Outcome outcome = run(folder, all);
+    EXPECT_EQ(outcome.exit_code, 2) << memory;
+    EXPECT_THAT(outcome.err, HasSubstr(message));
+  }
+  const Outcome alone = run(folder, {"simulate", kSmall, "-o", "none.h5", "--tape-memory", "2GiB"});
+  EXPECT_EQ(alone.exit_code, 2);
+  EXPECT_THAT(alone.err, HasSubstr("without --gradients"));
+}
+
 TEST(Simulate, SaysWhatItDid) {
   const Folder folder;
   const json answer =

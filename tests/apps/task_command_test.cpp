@@ -143,5 +143,35 @@ TEST(Tasks, WhatTheyCannotTakeIsAnError) {
   EXPECT_THAT(folder.files(), IsEmpty());
 }
 
+TEST(Tasks, GradcheckChecksTheReturn) {
+  const Folder folder;
+  const json answer = run_json(folder, {"gradcheck", "box_pushing", "--actions", "12", "--entries", "4", "--seed", "3"});
+  EXPECT_EQ(answer.at("command"), "gradcheck");
+  EXPECT_EQ(answer.at("task"), "box_pushing");
+  EXPECT_EQ(answer.at("policy"), "scripted");
+  EXPECT_EQ(answer.at("loss_name"), "return");
+  EXPECT_LT(answer.at("loss"), 0);
+  EXPECT_EQ(answer.at("actions"), 12);
+  EXPECT_EQ(answer.at("steps"), 60);
+  EXPECT_LT(answer.at("max_relative_error"), 1e-6);
+  EXPECT_GE(answer.at("entries"), 8);
+  EXPECT_EQ(answer.at("inputs").at(0).at("input"), "actions");
+  EXPECT_EQ(answer.at("inputs").at(0).at("size"), 36);
+}
+
+TEST(Tasks, GradcheckRefusesWhatIsOfScenesAlone) {
+  const Folder folder;
+  for (const Words& option : {Words{"--loss", "path"}, Words{"--steps", "3"}, Words{"--every", "2"}, Words{"--actions", "101"}}) {
+    Words words{"gradcheck", "box_pushing"};
+    words.insert(words.end(), option.begin(), option.end());
+    const Outcome outcome = run(folder, words);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr(option[0]));
+  }
+  const Outcome scene_alone = run(folder, {"gradcheck", scene("rolling_ball_small.xml"), "--actions", "3"});
+  EXPECT_EQ(scene_alone.exit_code, 2);
+  EXPECT_THAT(scene_alone.err, HasSubstr("expected a task"));
+}
+
 }  // namespace
 }  // namespace tangere::apps
