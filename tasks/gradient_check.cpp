@@ -262,7 +262,7 @@ class Check {
 
  private:
   void add(const Comparison& c, std::uint32_t purpose, const std::function<double(const std::vector<double>&)>& along) {
-    out.inputs.push_back(compare(c, out.loss, s_.options.entries, s_.options.seed, purpose));
+    out.inputs.push_back(compare(c, out.loss, s_.options, purpose));
     const std::vector<double> d = random_direction(c.gradient.size(), s_.options.seed, purpose);
     compare_along(out.inputs.back(), c.gradient, d, along(d));
   }

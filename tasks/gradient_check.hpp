@@ -11,10 +11,8 @@
 
 namespace tangere {
 
-struct CheckOptions {
+struct CheckOptions : CompareOptions {
   std::int64_t steps = 0;
-  int entries = 24;        ///< of each input that differences are taken of, drawn if there are more; 0: all
-  std::uint64_t seed = 0;  ///< of that draw and of the directions
   StepperOptions stepper;
 };
 

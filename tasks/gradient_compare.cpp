@@ -12,7 +12,6 @@ namespace tangere {
 namespace {
 
 constexpr double kLargest = 1e-3;       // step size, times the input's scale
-constexpr double kSettled = 1e-6;       // of the gradient's norm: neighbouring step sizes agree so far, or there is a kink
 constexpr double kNoInfluence = 1e-10;  // of the loss: an input whose derivatives are all smaller does not act on it
 
 double norm_of(std::span<const double> x) {
@@ -62,12 +61,12 @@ Difference best_difference(std::span<const double> values, double scale) {
   return best;
 }
 
-CheckedInput compare(const Comparison& of, double loss, int wanted, std::uint64_t seed, std::uint32_t purpose) {
+CheckedInput compare(const Comparison& of, double loss, const CompareOptions& o, std::uint32_t purpose) {
   CheckedInput c;
   c.name = of.name;
   c.entries = of.gradient.size();
   c.norm = norm_of(of.gradient);
-  const std::vector<std::size_t> entries = chosen(of.among, static_cast<std::size_t>(wanted), seed, purpose);
+  const std::vector<std::size_t> entries = chosen(of.among, static_cast<std::size_t>(o.entries), o.seed, purpose);
   std::vector<Difference> differences;
   double square = 0;
   for (const std::size_t i : entries) {
@@ -78,7 +77,7 @@ CheckedInput compare(const Comparison& of, double loss, int wanted, std::uint64_
   if (!std::isfinite(c.norm)) c.difference_error = HUGE_VAL;
   c.influence = !(c.scale <= kNoInfluence * std::abs(loss));
   for (std::size_t k = 0; k < entries.size() && c.influence; ++k) {
-    if (!(differences[k].doubt <= kSettled * c.scale)) {
+    if (!(differences[k].doubt <= o.settled * c.scale)) {
       ++c.kinks;
       continue;
     }

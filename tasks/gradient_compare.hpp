@@ -42,6 +42,12 @@ Difference best_difference(std::span<const double> values, double scale);
 /// Changes of positions are as they are, times 1 m or rad; velocities and controls change more.
 inline constexpr double kVelocityScale = 10, kControlScale = 10;
 
+struct CompareOptions {
+  int entries = 24;        ///< of each input that differences are taken of, drawn if there are more; 0: all
+  std::uint64_t seed = 0;  ///< of that draw and of the directions
+  double settled = 3e-6;   ///< of the gradient's norm: neighbouring step sizes agree so far, or it counts as a kink
+};
+
 /// What is compared of one input.
 struct Comparison {
   std::string name;
@@ -50,8 +56,8 @@ struct Comparison {
   std::function<Difference(std::size_t)> difference;    ///< by entry
   std::function<std::string(std::size_t)> entry_name;
 };
-/// `loss`: what an influence is measured by; `entries` of them are compared, drawn by `seed` and `purpose`; 0: all.
-CheckedInput compare(const Comparison& c, double loss, int entries, std::uint64_t seed, std::uint32_t purpose);
+/// `loss`: what an influence is measured by; `purpose` keys the draw of entries.
+CheckedInput compare(const Comparison& c, double loss, const CompareOptions& options, std::uint32_t purpose);
 /// `along`: the derivative along `direction` by another way.
 void compare_along(CheckedInput& c, std::span<const double> gradient, std::span<const double> direction, double along);
 

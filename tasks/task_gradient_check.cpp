@@ -146,7 +146,7 @@ class Check {
   }
 
   void add(const Comparison& c, std::uint32_t purpose, const std::function<EpisodeDirection(std::span<const double>)>& along) {
-    out.inputs.push_back(compare(c, out.loss, options_.entries, options_.seed, purpose));
+    out.inputs.push_back(compare(c, out.loss, options_, purpose));
     const std::vector<double> d = random_direction(c.gradient.size(), options_.seed, purpose);
     compare_along(out.inputs.back(), c.gradient, d, tangent_->along(along(d)));
   }

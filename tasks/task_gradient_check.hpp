@@ -11,10 +11,9 @@
 
 namespace tangere {
 
-struct TaskCheckOptions {
+/// The seed is the episode's as well.
+struct TaskCheckOptions : CompareOptions {
   std::int64_t episode = 0, actions = 0;  ///< actions: at most so many, 0: the task's horizon
-  int entries = 24;                       ///< of each input that differences are taken of, drawn if there are more; 0: all
-  std::uint64_t seed = 0;                 ///< of the episode, of that draw and of the directions
   StepperOptions stepper;
 };
 

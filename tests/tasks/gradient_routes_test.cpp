@@ -26,6 +26,7 @@ GradientCheck check(const Scene& scene, LossKind kind, std::int64_t steps, int e
   CheckOptions options;
   options.steps = steps;
   options.entries = entries;
+  options.settled = 1e-6;
   options.stepper.tolerance = 1e-12;
   return check_gradient(
       start, [&](std::int64_t step, int e, std::span<double> u) { program.evaluate(step, e, u); }, *loss, options);
