@@ -14,6 +14,7 @@
 #include "kernels/isa.hpp"
 #include "tasks/benchmark_fields.hpp"
 #include "tasks/gradients.hpp"
+#include "tasks/losses.hpp"
 
 namespace tangere {
 namespace {
@@ -42,27 +43,6 @@ class LastSpeed : public RolloutLoss {
   double weight_;
 };
 
-/// ½ |T|² of all sensors' fields, every k-th step.
-class FieldSquare : public RolloutLoss {
- public:
-  explicit FieldSquare(int every) : every_(every) {}
-  [[nodiscard]] bool reads_fields(std::int64_t step) const override { return step > 0 && step % every_ == 0; }
-  double evaluate(const LossPoint& at, const LossCotangent& out) const override {
-    double sum = 0;
-    for (std::size_t s = 0; s < at.fields.size(); ++s) {
-      const std::span<const double> values = at.fields[s]->values();
-      for (std::size_t i = 0; i < values.size(); ++i) {
-        sum += 0.5 * values[i] * values[i];
-        out.fields[s][i] += values[i];
-      }
-    }
-    return sum;
-  }
-
- private:
-  int every_;
-};
-
 class Rollout {
  public:
   Rollout(const char* scene, int environments, bool tactile, int losses)
@@ -74,7 +54,7 @@ class Rollout {
         fields_(model_, environments, tactile ? FrameKind::compact : FrameKind::none, Precision::f64) {
     options_.steps = program_.steps();
     if (tactile) {
-      owned_.push_back(std::make_unique<FieldSquare>(kEvery));
+      owned_.push_back(make_loss(LossKind::tactile, model_, kEvery));
     } else {
       for (int k = 0; k < losses; ++k) owned_.push_back(std::make_unique<LastSpeed>(k + 1));
     }

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <optional>
 
+#include "engine/displacement.hpp"
 #include "engine/parameters.hpp"
 #include "engine/readout.hpp"
 #include "engine/tangent.hpp"
@@ -238,7 +239,7 @@ class Check {
     const CompiledModel& m = s_.start.model().compiled();
     const std::span<const double> q = std::span(g_.q).first(std::size_t(m.nv));
     const auto move = [&m](std::size_t i) {
-      return [&m, i](Inputs& x, double e) { move_along(m, x.q, static_cast<int>(i), e); };
+      return [&m, i](Inputs& x, double e) { displace(m, x.q, static_cast<int>(i), e); };
     };
     add({"q", q, all_of(q.size()), [&](std::size_t i) { return difference_of(s_, 1, move(i)); }, dof_name()}, 1,
         [&](const std::vector<double>& d) { return tangents_.along(d, {}, {}, {}); });

@@ -123,19 +123,4 @@ std::vector<double> random_direction(std::size_t n, std::uint64_t seed, std::uin
   return d;
 }
 
-void move_along(const CompiledModel& m, std::span<double> q, int dof, double e) {
-  for (const kernels::Link& link : m.links) {
-    if (dof < link.v || dof >= link.v + kernels::dofs(link.kind)) continue;
-    if (link.kind != kernels::JointKind::spherical) {
-      q[std::size_t(link.q + dof - link.v)] += e;
-      return;
-    }
-    kernels::Vec3<double> turn = {0, 0, 0};
-    (dof == link.v ? turn.x : dof == link.v + 1 ? turn.y : turn.z) = e;
-    double* a = &q[std::size_t(link.q)];
-    const kernels::Quat<double> r = rotate_by(kernels::Quat<double>{a[0], a[1], a[2], a[3]}, turn);
-    a[0] = r.w, a[1] = r.x, a[2] = r.y, a[3] = r.z;
-  }
-}
-
 }  // namespace tangere

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "engine/compiled_model.hpp"
 #include "engine/parameters.hpp"
 
 namespace tangere {
@@ -75,8 +74,5 @@ struct RelativeGradient {
 std::vector<std::size_t> all_of(std::size_t count);
 /// Numbers in [-1, 1].
 std::vector<double> random_direction(std::size_t n, std::uint64_t seed, std::uint32_t purpose);
-
-/// q ⊕ e along a dof.
-void move_along(const CompiledModel& m, std::span<double> q, int dof, double e);
 
 }  // namespace tangere

@@ -2,7 +2,7 @@
 // Half squares: their derivatives are the numbers themselves.
 #include "tasks/losses.hpp"
 
-#include "engine/compiled_model.hpp"
+#include "engine/displacement.hpp"
 
 namespace tangere {
 namespace {
@@ -18,20 +18,12 @@ class FinalState : public RolloutLoss {
       out.v[i] += at.v[i];
     }
     const CompiledModel& m = model_.compiled();
-    for (const kernels::Link& link : m.links) {
-      const auto q = std::size_t(link.q), v = std::size_t(link.v);
-      const auto off = [&](std::size_t k) { return at.q[q + k] - m.initial_q[q + k]; };
-      for (std::size_t k = 0; k < std::size_t(kernels::coordinates(link.kind)); ++k) sum += 0.5 * off(k) * off(k);
-      if (link.kind != kernels::JointKind::spherical) {
-        for (std::size_t k = 0; k < std::size_t(kernels::dofs(link.kind)); ++k) out.q[v + k] += off(k);
-        continue;
-      }
-      // δq = q ⊗ (0, θ)/2
-      const double *a = &at.q[q], p[] = {off(0), off(1), off(2), off(3)};
-      out.q[v] += 0.5 * (-a[1] * p[0] + a[0] * p[1] + a[3] * p[2] - a[2] * p[3]);
-      out.q[v + 1] += 0.5 * (-a[2] * p[0] - a[3] * p[1] + a[0] * p[2] + a[1] * p[3]);
-      out.q[v + 2] += 0.5 * (-a[3] * p[0] + a[2] * p[1] - a[1] * p[2] + a[0] * p[3]);
+    std::vector<double> off(at.q.begin(), at.q.end());
+    for (std::size_t i = 0; i < off.size(); ++i) {
+      off[i] -= m.initial_q[i];
+      sum += 0.5 * off[i] * off[i];
     }
+    add_along_dofs(m, at.q, off, out.q);
     return sum;
   }
 

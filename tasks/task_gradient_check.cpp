@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/displacement.hpp"
 #include "tasks/task_tangent.hpp"
 
 namespace tangere {
@@ -51,7 +52,7 @@ class Check {
   }
   void positions() {
     const auto move = [this](std::size_t i) {
-      return [this, i](Inputs& x, double e) { move_along(task_.model().compiled(), x.q, static_cast<int>(i), e); };
+      return [this, i](Inputs& x, double e) { displace(task_.model().compiled(), x.q, static_cast<int>(i), e); };
     };
     add({"q", gradient_.by_q, all_of(gradient_.by_q.size()), [&](std::size_t i) { return difference(1, move(i)); }, dof_name()}, 1,
         [](std::span<const double> d) { return EpisodeDirection{{}, d, {}, {}}; });

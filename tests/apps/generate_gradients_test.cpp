@@ -189,6 +189,20 @@ TEST(GenerateGradients, AreCheckedAndCompared) {
   EXPECT_THAT(examine_shard(shard).problems, testing::Not(IsEmpty()));
 }
 
+/// What is no demo has no derivatives either.
+TEST(GenerateGradients, FailedEpisodesLeaveNone) {
+  const Folder folder;
+  std::string text = bytes_of(kSmall);
+  const std::string step = "timestep=\"5e-3\"";
+  folder.write("days.xml", text.replace(text.find(step), step.size(), "timestep=\"86400\""));
+  for (const Words& kind : {Words{"jacobians"}, Words{"return", "--loss", "path"}}) {
+    const Outcome outcome = run(folder, Words{"generate", "days.xml", "-o", "set", "--episodes", "3", "--steps", "2", "--every", "1",
+                                              "--overwrite", "--gradients"} + kind);
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+    EXPECT_EQ(check_shard(folder.path("set/shard-00000.h5")).failed, 3);
+  }
+}
+
 TEST(GenerateGradients, RefusesWhatFitsNot) {
   const Folder folder;
   const auto refused = [&](const Words& words, const char* message) {

@@ -8,28 +8,12 @@
 namespace tangere {
 namespace {
 
-using testing::Random;
+using testing::random_input;
 using testing::RunGradient;
 using testing::RunInput;
 using testing::StateLoss;
 
 constexpr int kSteps = 6;
-
-RunInput random_input(const Model& model, unsigned seed) {
-  Random random(seed);
-  RunInput in;
-  Batch batch(model, 1);
-  in.q = testing::q_of(batch);
-  for (int i = 0; i < model.nv(); ++i) {
-    in.q = testing::moved(model, in.q, i, 0.05 * random.normal());
-    in.v.push_back(0.3 * random.normal());
-  }
-  for (int t = 0; t < kSteps; ++t) {
-    in.u.emplace_back();
-    for (int k = 0; k < model.nu(); ++k) in.u.back().push_back(0.4 * random.normal());
-  }
-  return in;
-}
 
 /// Every entry relative to the gradient's norm over its group; returns how many were compared.
 int compare(const std::vector<double>& a, const std::vector<double>& b, double scale, double tolerance, const char* what) {
@@ -53,7 +37,7 @@ double norm(const std::vector<double>& x) {
 int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance) {
   const Model model(scene);
   const StepperOptions options = testing::options(scheme, scene.timestep, 1e-13);
-  const RunInput in = random_input(model, seed);
+  const RunInput in = random_input(model, seed, kSteps);
   const StateLoss loss(model, kSteps, seed + 1);
   if (!std::isfinite(testing::loss_of_run(model, options, in, loss))) return 0;
   const RunGradient adjoint = testing::adjoint_of_run(model, options, {in}, loss, 0);
@@ -125,7 +109,7 @@ TEST_P(AdjointScheme, CompanyChangesNothing) {
     const Model model(scene);
     const StepperOptions options = testing::options(GetParam(), scene.timestep, 1e-9);
     std::vector<RunInput> inputs;
-    for (unsigned k = 0; k < 9; ++k) inputs.push_back(random_input(model, seed + 10 * k));
+    for (unsigned k = 0; k < 9; ++k) inputs.push_back(random_input(model, seed + 10 * k, kSteps));
     const StateLoss loss(model, kSteps, seed);
     for (int lane : {0, 5, 8}) {
       const RunGradient alone = testing::adjoint_of_run(model, options, {inputs[std::size_t(lane)]}, loss, 0);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/adjoint.hpp"
-#include "engine/compiled_model.hpp"
+#include "engine/displacement.hpp"
 #include "engine/parameters.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/kernels/random_numbers.hpp"
@@ -19,18 +19,7 @@ using kernels::kBlock;
 
 /// q ⊕ e along dof i.
 inline std::vector<double> moved(const Model& model, std::vector<double> q, int dof, double e) {
-  for (const kernels::Link& l : model.compiled().links) {
-    if (dof < l.v || dof >= l.v + kernels::dofs(l.kind)) continue;
-    if (l.kind != kernels::JointKind::spherical) {
-      q[std::size_t(l.q + dof - l.v)] += e;
-      return q;
-    }
-    kernels::Vec3<double> turn = {0, 0, 0};
-    (&turn.x)[dof - l.v] = e;
-    double* at = &q[std::size_t(l.q)];
-    const kernels::Quat<double> r = kernels::rotate_by(kernels::Quat<double>{at[0], at[1], at[2], at[3]}, turn);
-    at[0] = r.w, at[1] = r.x, at[2] = r.y, at[3] = r.z;
-  }
+  displace(model.compiled(), q, dof, e);
   return q;
 }
 
@@ -39,6 +28,23 @@ struct RunInput {
   std::vector<double> q, v;
   std::vector<std::vector<double>> u;  ///< one row per step
 };
+
+/// Near the scene's start, moving, with controls about zero.
+inline RunInput random_input(const Model& model, unsigned seed, int steps) {
+  Random random(seed);
+  RunInput in;
+  const Batch batch(model, 1);
+  in.q = q_of(batch);
+  for (int i = 0; i < model.nv(); ++i) {
+    in.q = moved(model, in.q, i, 0.05 * random.normal());
+    in.v.push_back(0.3 * random.normal());
+  }
+  for (int t = 0; t < steps; ++t) {
+    in.u.emplace_back();
+    for (int k = 0; k < model.nu(); ++k) in.u.back().push_back(0.4 * random.normal());
+  }
+  return in;
+}
 
 /// Σ_t weight(t)·(q_t, v_t) with random weights; quaternions enter with their four components.
 class StateLoss {
@@ -59,18 +65,9 @@ class StateLoss {
   void add(int step, const std::vector<double>& q, BlockCotangent& c, int lane) const {
     const double* w = at(step);
     for (int i = 0; i < nv_; ++i) c.v[std::size_t(i * kBlock + lane)] += w[nq_ + i];
-    for (const kernels::Link& l : model_.compiled().links) {
-      const double *p = w + l.q, *a = &q[std::size_t(l.q)];
-      double* out = &c.q[std::size_t(l.v * kBlock + lane)];
-      if (l.kind != kernels::JointKind::spherical) {
-        for (int k = 0; k < kernels::dofs(l.kind); ++k) out[k * kBlock] += p[k];
-        continue;
-      }
-      // δq = q ⊗ (0, θ)/2
-      out[0] += 0.5 * (-a[1] * p[0] + a[0] * p[1] + a[3] * p[2] - a[2] * p[3]);
-      out[kBlock] += 0.5 * (-a[2] * p[0] - a[3] * p[1] + a[0] * p[2] + a[1] * p[3]);
-      out[2 * kBlock] += 0.5 * (-a[3] * p[0] + a[2] * p[1] - a[1] * p[2] + a[0] * p[3]);
-    }
+    std::vector<double> along(static_cast<std::size_t>(nv_));
+    add_along_dofs(model_.compiled(), q, {w, static_cast<std::size_t>(nq_)}, along);
+    for (int i = 0; i < nv_; ++i) c.q[std::size_t(i * kBlock + lane)] += along[std::size_t(i)];
   }
 
  private:

@@ -16,6 +16,7 @@ namespace {
 
 using testing::kBlock;
 using testing::Random;
+using testing::random_input;
 using testing::RunInput;
 using testing::StateLoss;
 
@@ -138,20 +139,6 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
     p.backward += adjoint.loss(0).q[i * kBlock] * d.q[i] + adjoint.loss(0).v[i * kBlock] * d.v[i];
   for (std::size_t i = 0; i < d.numbers.size(); ++i) p.backward += adjoint.loss(0).parameters[i * kBlock] * d.numbers[i];
   return p;
-}
-
-RunInput random_input(const Model& model, unsigned seed, int steps) {
-  Random random(seed);
-  Batch batch(model, 1);
-  RunInput in{testing::q_of(batch), {}, {}};
-  for (int i = 0; i < model.nv(); ++i) {
-    in.q = testing::moved(model, in.q, i, 0.05 * random.normal());
-    in.v.push_back(0.3 * random.normal());
-  }
-  for (int t = 0; t < steps; ++t) in.u.push_back(normals(random, std::size_t(model.nu())));
-  for (auto& u : in.u)
-    for (double& x : u) x *= 0.4;
-  return in;
 }
 
 class TangentScheme : public ::testing::TestWithParam<Integrator> {};

@@ -6,6 +6,7 @@
 #include <functional>
 #include <numeric>
 
+#include "engine/displacement.hpp"
 #include "engine/random.hpp"
 #include "tasks/task_list.hpp"
 #include "tests/tasks/task_check.hpp"
@@ -64,33 +65,12 @@ class Differences {
     const double expected = weight * (above - below) / (2 * kStep);
     EXPECT_NEAR(slope, expected, 1e-5 * (1 + std::abs(expected))) << what;
   }
-  /// Along dof i; a quaternion turns on the right.
   Move displaced(std::size_t m, std::size_t dof) {
     std::vector<double>& q = own_.q[m];
-    const std::vector<double> at = q;
-    std::size_t c = 0, d = 0;
-    for (const LinkDescription& link : task_.model().scene().links) {
-      const JointType type = link.joint.type;
-      const std::size_t count = std::size_t(dof_count(type));
-      if (dof >= d + count) {
-        c += std::size_t(position_count(type)), d += count;
-        continue;
-      }
-      const std::size_t k = dof - d, slides = type == JointType::free ? 3 : 0;
-      if ((type != JointType::free && type != JointType::spherical) || k < slides)
-        return [&q, at, i = c + k](double x) { q[i] = at[i] + x; };
-      return [&q, at, i = c + slides, axis = k - slides](double x) {
-        const double w = std::cos(x / 2), s = std::sin(x / 2);
-        double r[3] = {0, 0, 0};
-        r[axis] = s;
-        const double *a = &at[i];
-        q[i] = a[0] * w - a[1] * r[0] - a[2] * r[1] - a[3] * r[2];
-        q[i + 1] = a[0] * r[0] + a[1] * w + a[2] * r[2] - a[3] * r[1];
-        q[i + 2] = a[0] * r[1] - a[1] * r[2] + a[2] * w + a[3] * r[0];
-        q[i + 3] = a[0] * r[2] + a[1] * r[1] - a[2] * r[0] + a[3] * w;
-      };
-    }
-    throw std::logic_error("no such dof");
+    return [this, &q, at = q, dof](double x) {
+      q = at;
+      displace(task_.model().compiled(), q, static_cast<int>(dof), x);
+    };
   }
 
   const Task& task_;
@@ -228,46 +208,27 @@ TEST_P(EveryTask, WhatAnActionKeepsHasTheDerivativesOfDifferences) {
   }
 }
 
-/// Along dofs: a quaternion's change turns on the right.
 TEST_P(EveryTask, RestartsHaveTheDerivativesOfDifferences) {
   const auto task = task_named(GetParam());
   OwnView own(*task);
   draw(own, 10);
   const std::size_t nq = std::size_t(task->model().nq()), nv = std::size_t(task->model().nv());
-  std::vector<double> weight_q(nv), weight_v(nv);
-  for (std::size_t k = 0; k < nv; ++k) {
-    weight_q[k] = uniform({11, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
-    weight_v[k] = uniform({12, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
-  }
+  std::vector<double> by_q(nq), by_v(nv), along(nv), start(nq), speed(nv);
+  for (std::size_t k = 0; k < nq; ++k) by_q[k] = uniform({11, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
+  for (std::size_t k = 0; k < nv; ++k) by_v[k] = uniform({12, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
   ViewDerivatives slopes(*task, own);
   if (!task->spec().restarts) {
-    EXPECT_THROW(task->place_vjp(own.view(), weight_q, weight_v, slopes.out()), InputError);
+    EXPECT_THROW(task->place_vjp(own.view(), along, by_v, slopes.out()), InputError);
     return;
   }
-  std::vector<double> start(nq), v(nv);
-  task->place(own.view(), start, v);
-  task->place_vjp(own.view(), weight_q, weight_v, slopes.out());
+  task->place(own.view(), start, speed);
+  add_along_dofs(task->model().compiled(), start, by_q, along);
+  task->place_vjp(own.view(), along, by_v, slopes.out());
   slopes.check(
       [&] {
-        std::vector<double> q(nq), speed(nv);
-        task->place(own.view(), q, speed);
-        double sum = std::inner_product(speed.begin(), speed.end(), weight_v.begin(), 0.0);
-        std::size_t c = 0, d = 0;
-        for (const LinkDescription& link : task->model().scene().links) {
-          const JointType type = link.joint.type;
-          const bool turns = type == JointType::free || type == JointType::spherical;
-          const std::size_t plain = turns ? std::size_t(position_count(type)) - 4 : std::size_t(position_count(type));
-          for (std::size_t k = 0; k < plain; ++k) sum += weight_q[d + k] * q[c + k];
-          c += plain, d += plain;
-          if (!turns) continue;
-          // Twice the vector part of conj(start) q.
-          const double *a = &start[c], *b = &q[c];
-          sum += 2 * weight_q[d] * (a[0] * b[1] - a[1] * b[0] - a[2] * b[3] + a[3] * b[2]);
-          sum += 2 * weight_q[d + 1] * (a[0] * b[2] - a[2] * b[0] - a[3] * b[1] + a[1] * b[3]);
-          sum += 2 * weight_q[d + 2] * (a[0] * b[3] - a[3] * b[0] - a[1] * b[2] + a[2] * b[1]);
-          c += 4, d += 3;
-        }
-        return sum;
+        std::vector<double> q(nq), v(nv);
+        task->place(own.view(), q, v);
+        return std::inner_product(q.begin(), q.end(), by_q.begin(), 0.0) + std::inner_product(v.begin(), v.end(), by_v.begin(), 0.0);
       },
       plain_coordinates(*task), "place");
 }

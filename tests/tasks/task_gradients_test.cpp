@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/compiled_model.hpp"
+#include "engine/displacement.hpp"
 #include "io/scene_reader.hpp"
 #include "tasks/policy.hpp"
 #include "tasks/row_jacobians.hpp"
@@ -325,7 +325,7 @@ void check_row(const Task& task, std::int64_t last) {
         const double e = l == 0 ? kMove : -kMove;
         const Moment now = view_of(r.batch(), r.data(), l).now();
         std::vector<double> q(now.q.begin(), now.q.end()), v(now.v.begin(), now.v.end());
-        if (column < nv) move_along(task.model().compiled(), q, static_cast<int>(column), e);
+        if (column < nv) displace(task.model().compiled(), q, static_cast<int>(column), e);
         if (column >= nv && column < 2 * nv) v[column - nv] += e;
         if (column >= 2 * nv) asked.asked[std::size_t(l) * width + column - 2 * nv] += e;
         r.displace(l, q, v);
