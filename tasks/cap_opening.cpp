@@ -87,6 +87,9 @@ class CapOpening : public Task {
     for (std::size_t f = 0; f < kFingers; ++f)
       memory[f] = script_.presses(angles(view, f), cap(memory, f), memory[f] != 0) ? 1 : 0;
   }
+  void begin_action_vjp(const TaskView&, std::span<double> memory, const ViewCotangent&) const override {
+    std::fill_n(memory.begin(), kFingers, 0.0);  // yes or no
+  }
 
   void controls(const TaskView& view, int, std::span<double> u) const override {
     for (std::size_t k = 0; k < kAngles; ++k) u[k] = std::clamp(target(view, k), limits_[k][0], limits_[k][1]);
