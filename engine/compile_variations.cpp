@@ -101,7 +101,7 @@ void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, in
       fail(
           "its contact points do not; expected a body that touches nothing with points of its own");
   for (const TactileDescription& t : m.scene.sensors)
-    if (t.body == d.name) fail("the points of its tactile sensor '" + t.name + "' do not");
+    if (t.body == d.name) fail("the points of its tactile sensor '" + t.name + "' do not; expected a body without one");
   for (std::size_t k = 0; k < m.grounds.size(); ++k)
     if (m.scene.ground_contacts[k].body == d.name && !std::holds_alternative<SphereShape>(b.shape))
       fail("the points that touch the ground do not; expected a sphere there");

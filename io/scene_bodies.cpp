@@ -82,13 +82,16 @@ std::vector<double> read_collision(const SceneNode& node) {
 AbstractShape read_abstract(const SceneNode& node, double length) {
   const SceneContext& c = node.context();
   AbstractShape shape;
-  shape.mass = node.positive("mass") * c.density * c.length * c.length * c.length;
+  shape.mass = node.not_negative("mass") * c.density * c.length * c.length * c.length;
   std::vector<double> inertia = node.numbers("inertia");
   if (inertia.size() == 3) inertia = {inertia[0], 0, 0, inertia[1], 0, inertia[2]};
   if (inertia.size() != 6)
     node.fail(fmt::format("inertia has {} numbers; expected 3 (xx yy zz) or 6 (xx xy xz yy yz zz)", inertia.size()));
   for (std::size_t k = 0; k < 6; ++k) shape.inertia[k] = inertia[k] * c.torque;
-  if (!is_inertia(shape.inertia)) node.fail("inertia=\"" + node.text("inertia") + "\" is that of no solid body");
+  const bool weightless = std::all_of(shape.inertia.begin(), shape.inertia.end(), [](double x) { return x == 0; });
+  if (shape.mass == 0 ? !weightless : !is_inertia(shape.inertia))
+    node.fail(fmt::format("inertia=\"{}\" is that of no solid body of mass {}; expected positive moments, none more than the sum of "
+                          "the other two, or zeros with mass 0", node.text("inertia"), node.text("mass")));
   for (const SceneNode& child : node.children({"visual", "collision"})) {
     if (child.name() == "visual") {
       child.check_attributes({}, {"mesh", "pos", "quat"});

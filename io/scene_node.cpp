@@ -26,6 +26,11 @@ void SceneNode::fail(const std::string& message) const {
   throw InputError(source().prefix() + "<" + name() + ">: " + message);
 }
 
+void SceneNode::fail_at(const char* attribute, const std::string& message) const {
+  const SceneContext::Default* given = element_->Attribute(attribute) == nullptr ? find_default(attribute) : nullptr;
+  fail(given == nullptr ? message : fmt::format("{} (from <default>, line {})", message, given->line));
+}
+
 void SceneNode::warn(const std::string& message) const {
   context_->warnings.push_back(source().prefix() + "<" + name() + ">: " + message);
 }
@@ -74,16 +79,21 @@ std::vector<SceneNode> SceneNode::children(const std::vector<std::string>& known
 
 const char* SceneNode::find(const char* attribute) const {
   if (const char* value = element_->Attribute(attribute)) return value;
+  const SceneContext::Default* given = find_default(attribute);
+  return given == nullptr ? nullptr : given->value.c_str();
+}
+
+const SceneContext::Default* SceneNode::find_default(const char* attribute) const {
   const auto element = context_->defaults.find(name());
   if (element == context_->defaults.end()) return nullptr;
   const auto value = element->second.find(attribute);
-  return value == element->second.end() ? nullptr : value->second.c_str();
+  return value == element->second.end() ? nullptr : &value->second;
 }
 
 std::string SceneNode::text(const char* attribute) const {
   const char* value = find(attribute);
   if (value == nullptr) fail(fmt::format("attribute '{}' is missing", attribute));
-  if (*value == '\0') fail(fmt::format("attribute '{}' is empty", attribute));
+  if (*value == '\0') fail_at(attribute, fmt::format("attribute '{}' is empty; expected a value", attribute));
   return value;
 }
 
@@ -95,7 +105,7 @@ int SceneNode::choice(const char* attribute, const std::vector<std::string>& wor
   if (fallback && !has(attribute)) return *fallback;
   const std::string value = text(attribute);
   const auto it = std::find(words.begin(), words.end(), value);
-  if (it == words.end()) fail(fmt::format("{}=\"{}\" is not known{}", attribute, value, suggestion(value, words)));
+  if (it == words.end()) fail_at(attribute, fmt::format("{}=\"{}\" is not known{}", attribute, value, suggestion(value, words)));
   return static_cast<int>(it - words.begin());
 }
 
@@ -110,13 +120,13 @@ std::vector<double> SceneNode::numbers(const char* attribute, std::size_t count)
     const double x = std::strtod(p, &end);
     const bool whole = end != p && (*end == '\0' || *end == ',' || std::isspace(static_cast<unsigned char>(*end)) != 0);
     if (!whole || !std::isfinite(x))
-      fail(fmt::format("{}=\"{}\": expected finite numbers, found '{}'", attribute, value.substr(0, 80),
+      fail_at(attribute, fmt::format("{}=\"{}\": expected finite numbers, found '{}'", attribute, value.substr(0, 80),
                        std::string(p).substr(0, 20)));
     out.push_back(x);
     p = end;
   }
   if (count > 0 && out.size() != count)
-    fail(fmt::format("{}=\"{}\" has {} numbers; expected {}", attribute, value.substr(0, 80), out.size(), count));
+    fail_at(attribute, fmt::format("{}=\"{}\" has {} numbers; expected {}", attribute, value.substr(0, 80), out.size(), count));
   return out;
 }
 
@@ -127,13 +137,13 @@ double SceneNode::number(const char* attribute, std::optional<double> fallback) 
 
 double SceneNode::positive(const char* attribute, std::optional<double> fallback) const {
   const double x = number(attribute, fallback);
-  if (!(x > 0)) fail(fmt::format("{}=\"{}\"; expected a positive number", attribute, x));
+  if (!(x > 0)) fail_at(attribute, fmt::format("{}=\"{}\"; expected a positive number", attribute, x));
   return x;
 }
 
 double SceneNode::not_negative(const char* attribute, std::optional<double> fallback) const {
   const double x = number(attribute, fallback);
-  if (!(x >= 0)) fail(fmt::format("{}=\"{}\"; expected zero or more", attribute, x));
+  if (!(x >= 0)) fail_at(attribute, fmt::format("{}=\"{}\"; expected zero or more", attribute, x));
   return x;
 }
 
@@ -141,7 +151,7 @@ int SceneNode::integer(const char* attribute, int lowest, int highest, std::opti
   if (fallback && !has(attribute)) return *fallback;
   const double x = number(attribute);
   if (x != std::floor(x) || x < lowest || x > highest)
-    fail(fmt::format("{}=\"{}\"; expected an integer from {} to {}", attribute, x, lowest, highest));
+    fail_at(attribute, fmt::format("{}=\"{}\"; expected an integer from {} to {}", attribute, x, lowest, highest));
   return static_cast<int>(x);
 }
 
@@ -151,7 +161,7 @@ std::vector<int> SceneNode::integers(const char* attribute, const std::vector<in
   const std::vector<double> x = numbers(attribute, fallback.size());
   for (const double n : x)
     if (n != std::floor(n) || n < lowest || n > highest)
-      fail(fmt::format("{} has {}; expected integers from {} to {}", attribute, n, lowest, highest));
+      fail_at(attribute, fmt::format("{} has {}; expected integers from {} to {}", attribute, n, lowest, highest));
   return {x.begin(), x.end()};
 }
 
@@ -165,7 +175,7 @@ Vector3 SceneNode::direction(const char* attribute, std::optional<Vector3> fallb
   Vector3 a = vector(attribute, fallback);
   const double length = std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
   if (!(length > 1e-100) || !std::isfinite(length))
-    fail(fmt::format("{}=\"{} {} {}\" has no direction; expected a vector of positive length", attribute, a[0], a[1], a[2]));
+    fail_at(attribute, fmt::format("{}=\"{} {} {}\" has no direction; expected a vector of positive length", attribute, a[0], a[1], a[2]));
   if (std::abs(length - 1) > 1e-15)
     for (double& x : a) x /= length;
   return a;
@@ -176,7 +186,7 @@ Quaternion SceneNode::quaternion(const char* attribute) const {
   const std::vector<double> q = numbers(attribute, 4);
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!(length > 1e-100) || !std::isfinite(length))
-    fail(fmt::format("{}=\"{} {} {} {}\" is no rotation; expected w x y z, not all zero", attribute, q[0], q[1], q[2], q[3]));
+    fail_at(attribute, fmt::format("{}=\"{} {} {} {}\" is no rotation; expected w x y z, not all zero", attribute, q[0], q[1], q[2], q[3]));
   return {q[0] / length, q[1] / length, q[2] / length, q[3] / length};
 }
 

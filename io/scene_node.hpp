@@ -20,8 +20,13 @@ struct SceneContext {
   std::string file;
   bool allow_unknown = false;
   std::vector<std::string> warnings;
-  /// Attribute values for elements that leave them out: [element][attribute], from <default>.
-  std::map<std::string, std::map<std::string, std::string>> defaults;
+  /// A value from <default> and the line it stands in.
+  struct Default {
+    std::string value;
+    int line;
+  };
+  /// Attribute values for elements that leave them out: [element][attribute].
+  std::map<std::string, std::map<std::string, Default>> defaults;
 
   // Factors to SI, by dimension.
   double length = 1, stiffness = 1, damping_force = 1, damping_area = 1, density = 1, force = 1, torque = 1,
@@ -37,6 +42,8 @@ class SceneNode {
   [[nodiscard]] Source source() const { return {context_->file, element_->GetLineNum()}; }
   [[nodiscard]] SceneContext& context() const { return *context_; }
   [[noreturn]] void fail(const std::string& message) const;
+  /// Because of an attribute's value: says so where it comes from <default>.
+  [[noreturn]] void fail_at(const char* attribute, const std::string& message) const;
   void warn(const std::string& message) const;
 
   /// Refuses attributes outside the three lists: `used` are read, `pictures` only matter to a viewer and pass silently,
@@ -68,6 +75,7 @@ class SceneNode {
 
  private:
   [[nodiscard]] const char* find(const char* attribute) const;
+  [[nodiscard]] const SceneContext::Default* find_default(const char* attribute) const;
 
   const tinyxml2::XMLElement* element_;
   SceneContext* context_;

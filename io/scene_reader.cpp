@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <set>
+#include <map>
 
 #include "engine/compiled_model.hpp"
 #include "io/scene_sections.hpp"
@@ -71,7 +71,8 @@ class TreeReader {
   }
 
   void unique(const std::string& kind, const std::string& name, const SceneNode& node) {
-    if (!names_.insert(kind + "/" + name).second) node.fail(kind + " name '" + name + "' is used twice");
+    const auto [first, is_new] = names_.try_emplace(kind + "/" + name, node.source().line);
+    if (!is_new) node.fail(fmt::format("{} name '{}' is used twice, first in line {}", kind, name, first->second));
   }
 
   JointDescription read_joint(const SceneNode& node, int parent) {
@@ -114,7 +115,7 @@ class TreeReader {
   }
 
   Scene& scene_;
-  std::set<std::string> names_;
+  std::map<std::string, int> names_;  // kind/name, line
   std::vector<kernels::Frame<double>> world_;  // rest pose of each joint
 };
 
@@ -148,7 +149,7 @@ void read_defaults(const SceneNode& node) {
     const std::vector<std::string>& attributes = known.at(child.name());
     child.check_attributes(attributes);
     for (const std::string& a : attributes)
-      if (child.has(a.c_str())) node.context().defaults[child.name()][a] = child.text(a.c_str());
+      if (child.has(a.c_str())) node.context().defaults[child.name()][a] = {child.text(a.c_str()), child.source().line};
   }
 }
 
@@ -202,6 +203,20 @@ void read_root(const SceneNode& root, Scene& scene) {
   once("randomize", [&](const SceneNode& s) { read_randomize(scene, s); });
 }
 
+/// What the parser stumbled over.
+const char* fault_of(tinyxml2::XMLError error) {
+  switch (error) {
+    case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT: return "an element is closed by another's end tag, or never";
+    case tinyxml2::XML_ERROR_PARSING_ELEMENT: return "a tag that is no <name attribute=\"value\">";
+    case tinyxml2::XML_ERROR_PARSING_ATTRIBUTE: return "an attribute that is no name=\"value\"";
+    case tinyxml2::XML_ERROR_PARSING_COMMENT: return "a comment without its end -->";
+    case tinyxml2::XML_ERROR_PARSING_DECLARATION: return "a declaration without its end ?>";
+    case tinyxml2::XML_ERROR_EMPTY_DOCUMENT: return "no element; expected the root <redmax> or <tangere>";
+    case tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED: return "elements nested too deep";
+    default: return tinyxml2::XMLDocument::ErrorIDToName(error);
+  }
+}
+
 }  // namespace
 
 SceneFile parse_scene(const std::string& text, const std::string& name, const SceneReadOptions& options) {
@@ -209,8 +224,7 @@ SceneFile parse_scene(const std::string& text, const std::string& name, const Sc
   if (text.find('\0') != std::string::npos) throw InputError(name + ": holds a zero byte; expected XML text");
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
     const int line = document.ErrorLineNum();
-    throw InputError(fmt::format("{}:{}: not well-formed XML ({})", name, std::max(line, 1),
-                                 tinyxml2::XMLDocument::ErrorIDToName(document.ErrorID())));
+    throw InputError(fmt::format("{}:{}: not well-formed XML: {}", name, std::max(line, 1), fault_of(document.ErrorID())));
   }
   const tinyxml2::XMLElement* root = document.RootElement();
   if (root == nullptr) throw InputError(name + ":1: no element; expected the root <redmax> or <tangere>");

@@ -60,7 +60,7 @@ Distribution read_distribution(const SceneNode& node, double scale) {
     std::vector<double> x = node.numbers(kinds[k], k < 3 ? 2 : 0);
     for (double& value : x) value *= scale;
     if (k == 3) {
-      if (x.empty()) node.fail("list is empty");
+      if (x.empty()) node.fail("list=\"\"; expected one value or more");
       d.values = x;
       continue;
     }
@@ -140,7 +140,8 @@ void check_positive(const SceneNode& node, const Distribution& d, const std::str
     node.fail("normal can draw a negative " + what + "; expected uniform, log_uniform or list");
   double least = d.a;
   if (d.kind == Distribution::Kind::list) least = *std::min_element(d.values.begin(), d.values.end());
-  if (!(least > 0)) node.fail(fmt::format("a {} of {:g}; expected positive ones", what, least));
+  if (!(least > 0))
+    node.fail(fmt::format("{} can be {:g}, in SI units; expected positive values only", what, least));
 }
 
 /// The density of a body, or a number of its size.
@@ -158,7 +159,8 @@ void read_body_variation(const Scene& scene, const SceneNode& node, Randomizatio
     d.target = RandomTarget::size;
     Shape shape = body.shape;
     if (size_number(shape, d.index) == nullptr)
-      node.fail(fmt::format("body '{}' is a {}, which has no {}", body.name, shape_name(shape), size_name(d.index)));
+      node.fail(fmt::format("body '{}' is {} {}, which has no {}; expected a body that has one", body.name,
+                            std::holds_alternative<AbstractShape>(shape) ? "an" : "a", shape_name(shape), size_name(d.index)));
     d.distribution = read_distribution(node, node.context().length);
     check_positive(node, d.distribution, size_name(d.index));
     return;
@@ -263,6 +265,7 @@ void read_control(Scene& scene, const SceneNode& section) {
     const std::filesystem::path beside = std::filesystem::path(node.context().file).parent_path();
     CsvControl control;
     control.path = (beside / node.text("file")).string();
+    if (!std::filesystem::exists(control.path)) node.fail(fmt::format("file=\"{}\": there is no {}", node.text("file"), control.path));
     control.rows = read_csv(control.path, std::size_t(control_count(scene)));
     scene.control = std::move(control);
   } else {

@@ -310,7 +310,7 @@ TEST(VaryingGeometry, IsReadFromAScene) {
               HasSubstr("did you mean 'radius'"));
   EXPECT_THAT(error("<body name=\"box\" size=\"3\" uniform=\"1 2\"/>"), HasSubstr("size=\"3\""));
   EXPECT_THAT(error("<body name=\"box\" size=\"0\" uniform=\"0 2\"/>"),
-              HasSubstr("a size[0] of 0; expected positive ones"));
+              HasSubstr("size[0] can be 0, in SI units; expected positive values only"));
   EXPECT_THAT(error("<body name=\"box\" size=\"0\" normal=\"1 2\"/>"),
               HasSubstr("normal can draw a negative size[0]"));
   EXPECT_THAT(error("<body name=\"box\" size=\"0\" field=\"density\" uniform=\"1 2\"/>"),
