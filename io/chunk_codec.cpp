@@ -5,6 +5,7 @@
 #include <libdeflate.h>
 
 #include <algorithm>
+#include <cstring>
 #include <functional>
 #include <memory>
 #include <new>
@@ -41,28 +42,31 @@ libdeflate_compressor* compressor_of_thread() {
   return compressor.get();
 }
 
-/// HDF5's shuffle: byte 0 of all numbers, then byte 1 of all …; rows behind the last one are zeros.
-template <std::size_t kWidth>
-std::vector<unsigned char> shuffled(const unsigned char* data, std::size_t used, std::size_t bytes) {
-  const std::size_t numbers = bytes / kWidth;
-  std::vector<unsigned char> out(bytes, 0);
-  for (std::size_t k = 0; k < used / kWidth; ++k)
-    for (std::size_t b = 0; b < kWidth; ++b) out[b * numbers + k] = data[k * kWidth + b];
-  return out;
+/// Byte b of every number to its place from b * `stride` on. Shifted words, because compilers make vectors of those.
+template <class Word>
+void split(const unsigned char* data, std::size_t numbers, unsigned char* out, std::size_t stride) {
+  constexpr std::size_t kTogether = 1024;  // stay in the first cache
+  for (std::size_t first = 0; first < numbers; first += kTogether) {
+    const std::size_t count = std::min(kTogether, numbers - first);
+    for (std::size_t b = 0; b < sizeof(Word); ++b) {
+      unsigned char* const plane = out + b * stride + first;
+      const unsigned char* const from = data + first * sizeof(Word);
+      for (std::size_t k = 0; k < count; ++k) {
+        Word word;
+        std::memcpy(&word, from + k * sizeof word, sizeof word);
+        plane[k] = static_cast<unsigned char>(word >> (8 * b));
+      }
+    }
+  }
 }
 
-/// `used` bytes of data in a chunk of `bytes`.
-template <class T>
-std::vector<unsigned char> deflated(const T* data, std::size_t used, std::size_t bytes) {
-  const std::vector<unsigned char> plain =
-      shuffled<sizeof(T)>(reinterpret_cast<const unsigned char*>(data), used, bytes);
+std::vector<unsigned char> deflated(const std::vector<unsigned char>& plain) {
   libdeflate_compressor* const compressor = compressor_of_thread();
-  std::vector<unsigned char> out(libdeflate_zlib_compress_bound(compressor, bytes));
-  const std::size_t size = libdeflate_zlib_compress(compressor, plain.data(), bytes, out.data(), out.size());
+  thread_local std::vector<unsigned char> room;
+  room.resize(std::max(room.size(), libdeflate_zlib_compress_bound(compressor, plain.size())));
+  const std::size_t size = libdeflate_zlib_compress(compressor, plain.data(), plain.size(), room.data(), room.size());
   if (size == 0) throw std::logic_error("deflate needs more room than its own bound");
-  out.resize(size);
-  out.shrink_to_fit();
-  return out;
+  return {room.begin(), room.begin() + static_cast<std::ptrdiff_t>(size)};
 }
 
 }  // namespace
@@ -84,39 +88,30 @@ std::vector<std::int64_t> chunk_rows(const DatasetLayout& layout) {
 
 bool compresses_last_row(std::size_t row_bytes) { return row_bytes >= kLeastLastBytes; }
 
-std::vector<CompressedChunk> compress(const DatasetLayout& layout, const std::vector<std::int64_t>& rows_of_chunks,
-                                      const EpisodeRows& piece) {
-  std::vector<CompressedChunk> chunks;
-  for (std::size_t name = 0; name < rows_of_chunks.size(); ++name) {
-    if (rows_of_chunks[name] == 0) continue;
-    if (piece.first_row % rows_of_chunks[name] != 0) throw std::logic_error("a piece begins within a chunk");
-    std::visit(
-        [&](const auto& values) {
-          using T = typename std::decay_t<decltype(values)>::value_type;
-          const std::size_t width = values.size() / static_cast<std::size_t>(piece.episodes) /
-                                    static_cast<std::size_t>(piece.rows);
-          for (int e = 0; e < piece.episodes; ++e) {
-            const std::int64_t length = piece.ends.empty() ? layout.rows()
-                                                           : std::max<std::int64_t>(1, piece.ends[static_cast<std::size_t>(e)].length);
-            const std::int64_t each = std::min(rows_of_chunks[name], length);
-            const std::int64_t end = std::min<std::int64_t>(piece.first_row + piece.rows, length);
-            const auto row_at = [&](std::int64_t row) {
-              return values.data() + (static_cast<std::size_t>(e) * static_cast<std::size_t>(piece.rows) +
-                                      static_cast<std::size_t>(row - piece.first_row)) * width;
-            };
-            const std::size_t row_bytes = width * sizeof(T);
-            for (std::int64_t row = piece.first_row; row < end; row += each)
-              chunks.push_back({e, name, row, false,
-                                deflated(row_at(row), static_cast<std::size_t>(std::min(each, end - row)) * row_bytes,
-                                         static_cast<std::size_t>(each) * row_bytes)});
-            const bool has_last = length >= piece.first_row && length < piece.first_row + piece.rows;
-            if (has_last && compresses_last_row(row_bytes))
-              chunks.push_back({e, name, 0, true, deflated(row_at(length), row_bytes, row_bytes)});
-          }
-        },
-        piece.observations[name]);
-  }
-  return chunks;
+std::vector<h5::FileFilter> file_filters(const std::string& compression, std::size_t number_bytes) {
+  constexpr std::uint16_t kDeflate = 1, kShuffle = 2;
+  if (compression == "none") return {};
+  return {{kShuffle, {}, {static_cast<std::uint32_t>(number_bytes)}}, {kDeflate, {}, {kDeflateLevel}}};
+}
+
+void shuffle(const unsigned char* data, std::size_t used, std::size_t width, std::vector<unsigned char>& out) {
+  const std::size_t numbers = out.size() / width, given = used / width;
+  if (width == sizeof(std::uint32_t))
+    split<std::uint32_t>(data, given, out.data(), numbers);
+  else if (width == sizeof(std::uint64_t))
+    split<std::uint64_t>(data, given, out.data(), numbers);
+  else
+    throw std::logic_error("numbers that are neither of four nor of eight bytes");
+  for (std::size_t b = 0; b < width; ++b)
+    std::fill_n(out.begin() + static_cast<std::ptrdiff_t>(b * numbers + given), numbers - given, static_cast<unsigned char>(0));
+}
+
+std::vector<unsigned char> compressed(const DatasetLayout& layout, const unsigned char* data, std::size_t used,
+                                      std::size_t bytes) {
+  thread_local std::vector<unsigned char> plain;
+  plain.resize(bytes);
+  shuffle(data, used, layout.single ? sizeof(float) : sizeof(double), plain);
+  return deflated(plain);
 }
 
 }  // namespace tangere

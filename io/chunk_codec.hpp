@@ -4,10 +4,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
-#include "engine/episode_sink.hpp"
 #include "io/dataset_layout.hpp"
+#include "io/h5_objects.hpp"
 
 namespace tangere {
 
@@ -20,16 +21,14 @@ std::vector<std::int64_t> chunk_rows(const DatasetLayout& layout);
 /// Whether the one row of final_obs is compressed as well.
 bool compresses_last_row(std::size_t row_bytes);
 
-struct CompressedChunk {
-  int episode = 0;       ///< in the piece
-  std::size_t name = 0;  ///< observation
-  std::int64_t row = 0;  ///< its first
-  bool last = false;     ///< the row of final_obs
-  std::vector<unsigned char> bytes;
-};
+/// What a file says of its chunks, numbers of `number_bytes` each.
+std::vector<h5::FileFilter> file_filters(const std::string& compression, std::size_t number_bytes);
+/// `used` bytes of data in a chunk of `bytes`, the rest of it zeros. Thread-safe.
+std::vector<unsigned char> compressed(const DatasetLayout& layout, const unsigned char* data, std::size_t used,
+                                      std::size_t bytes);
 
-/// All chunks of a piece. Thread-safe.
-std::vector<CompressedChunk> compress(const DatasetLayout& layout, const std::vector<std::int64_t>& rows_of_chunks,
-                                      const EpisodeRows& piece);
+/// HDF5's shuffle: byte 0 of all numbers, then byte 1 of all …. `out` has room for all of them; numbers from `used` bytes on are
+/// zeros. `width`: bytes of a number.
+void shuffle(const unsigned char* data, std::size_t used, std::size_t width, std::vector<unsigned char>& out);
 
 }  // namespace tangere

@@ -70,6 +70,7 @@ TEST(GenerateCompress, KeepsEveryNumberInBothPrecisionsOnAnyThreads) {
     EXPECT_THAT(answer.at("limited_by").get<std::string>(), testing::AnyOf("simulation", "compression", "writing"));
     EXPECT_EQ(sum(folder, "one"), sum(folder, "none"));
     EXPECT_EQ(sum(folder, "three"), sum(folder, "none"));
+    EXPECT_TRUE(folder.read("three" + kShard) == folder.read("one" + kShard));
     EXPECT_EQ(check_shard(folder.path("three" + kShard)).demos, 20);  // reads through HDF5's own filters
     EXPECT_LT(std::filesystem::file_size(folder.path("one" + kShard)),
               std::filesystem::file_size(folder.path("none" + kShard)) / 2);

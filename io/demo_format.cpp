@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// The layout that robomimic's loader reads (docs/datasets.md).
+#include "io/demo_format.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <functional>
+#include <numeric>
+
+#include "io/chunk_codec.hpp"
+
+namespace tangere {
+namespace {
+
+template <class T>
+std::array<unsigned char, sizeof(T)> bytes_of_number(T value) {
+  return std::bit_cast<std::array<unsigned char, sizeof(T)>>(value);
+}
+
+std::size_t aligned(std::size_t bytes) { return (bytes + 7) / 8 * 8; }
+
+}  // namespace
+
+DemoFormat::DemoFormat(const DatasetLayout& layout)
+    : of_task_(layout.task.has_value()),
+      randomized_(layout.randomized_names.size()),
+      names_(layout.observation_names()),
+      chunk_rows_(::tangere::chunk_rows(layout)) {
+  using h5::NumberType;
+  const NumberType number = layout.single ? NumberType::float32 : NumberType::float64;
+  shapes_ = {{layout.action_names().size()}, {}, {}};
+  types_ = {NumberType::float32, NumberType::float32, NumberType::boolean};
+  const std::vector<std::vector<std::uint64_t>> observed = layout.observation_shapes();
+  for (int twice = 0; twice < 2; ++twice) {
+    shapes_.insert(shapes_.end(), observed.begin(), observed.end());
+    types_.insert(types_.end(), observed.size(), number);
+  }
+  for (std::size_t k = 0; k < shapes_.size(); ++k)
+    row_bytes_.push_back(std::accumulate(shapes_[k].begin(), shapes_[k].end(), h5::bytes_of(types_[k]), std::multiplies<>()));
+  filters_ = file_filters(layout.compression, h5::bytes_of(number));
+  h5::Bytes of_one;
+  DemoFacts facts{1, std::nullopt, std::vector<double>(randomized_)};
+  if (of_task_) facts.end.emplace();
+  static_cast<void>(describe(of_one, 0, facts, std::vector<std::uint64_t>(datasets())));
+  header_bytes_ = of_one.size();
+}
+
+std::int64_t DemoFormat::chunk_rows(std::size_t dataset, std::int64_t rows) const {
+  if (dataset < kFirst) return 0;
+  const std::int64_t most = chunk_rows_[(dataset - kFirst) % names_.size()];
+  if (dataset >= final_obs(0)) return most > 0 && compresses_last_row(row_bytes_[dataset]) ? 1 : 0;
+  return std::min(most, rows);
+}
+
+std::size_t DemoFormat::data_bytes(std::int64_t rows) const {
+  std::size_t bytes = 0;
+  for (std::size_t k = 0; k < datasets(); ++k) bytes += aligned(static_cast<std::size_t>(rows_of(k, rows)) * row_bytes_[k]);
+  return bytes;
+}
+
+void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows, std::uint64_t address) const {
+  h5::FileDataset file;
+  file.type = types_[dataset];
+  file.dims = {static_cast<std::uint64_t>(rows_of(dataset, rows))};
+  file.dims.insert(file.dims.end(), shapes_[dataset].begin(), shapes_[dataset].end());
+  file.chunk_rows = static_cast<std::uint64_t>(chunk_rows(dataset, rows));
+  file.address = address;
+  if (file.chunk_rows > 0) file.filters = filters_;
+  h5::add_dataset(out, file);
+}
+
+std::uint64_t DemoFormat::describe_observations(h5::Bytes& out, std::uint64_t base, std::int64_t rows, std::size_t first,
+                                                std::span<const std::uint64_t> addresses) const {
+  std::vector<h5::FileLink> links;
+  for (std::size_t name = 0; name < names_.size(); ++name) {
+    links.push_back({names_[name], base + out.size()});
+    describe_dataset(out, first + name, rows, addresses[first + name]);
+  }
+  const std::uint64_t group = base + out.size();
+  h5::add_group(out, links);
+  return group;
+}
+
+std::uint64_t DemoFormat::describe(h5::Bytes& out, std::uint64_t base, const DemoFacts& facts,
+                                   std::span<const std::uint64_t> addresses) const {
+  std::vector<h5::FileLink> links;
+  for (const std::size_t dataset : {kActions, kRewards, kDones}) {
+    constexpr std::array<std::string_view, kFirst> kNames{"actions", "rewards", "dones"};
+    links.push_back({kNames[dataset], base + out.size()});
+    describe_dataset(out, dataset, facts.rows, addresses[dataset]);
+  }
+  links.push_back({"obs", describe_observations(out, base, facts.rows, obs(0), addresses)});
+  links.push_back({"final_obs", describe_observations(out, base, facts.rows, final_obs(0), addresses)});
+  const auto samples = bytes_of_number(facts.rows);
+  std::vector<h5::FileAttribute> attributes{{"num_samples", h5::NumberType::int64, false, samples}};
+  const EpisodeEnd end = facts.end.value_or(EpisodeEnd{});
+  const auto total = bytes_of_number(end.total);
+  const auto terminated = bytes_of_number<std::int8_t>(end.terminated ? 1 : 0);
+  const auto success = bytes_of_number<std::int8_t>(end.success ? 1 : 0);
+  if (facts.end) {
+    attributes.push_back({"return", h5::NumberType::float64, false, total});
+    attributes.push_back({"terminated", h5::NumberType::int8, false, terminated});
+    attributes.push_back({"success", h5::NumberType::int8, false, success});
+  }
+  const std::span randomized(reinterpret_cast<const unsigned char*>(facts.randomized.data()),
+                             facts.randomized.size() * sizeof(double));
+  if (randomized_ > 0) attributes.push_back({"randomized", h5::NumberType::float64, true, randomized});
+  const std::uint64_t group = base + out.size();
+  h5::add_group(out, links, attributes);
+  return group;
+}
+
+}  // namespace tangere
