@@ -53,6 +53,18 @@ std::string controls_named(const std::string& path) {
   return fmt::format("a table of checksum {:016x}", hash);
 }
 
+/// Of a list separated by commas. Throws InputError for empty words.
+std::vector<std::string> words_of(const std::string& list) {
+  std::vector<std::string> words;
+  if (list.empty()) return words;
+  for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
+    end = list.find(',', begin);
+    words.push_back(list.substr(begin, end == std::string::npos ? end : end - begin));
+    if (words.back().empty()) throw InputError(fmt::format("--record '{}'; expected names separated by commas", list));
+  }
+  return words;
+}
+
 /// What makes the same data set again, wherever and on however many threads.
 std::string command_of(const GenerateOptions& options, const EpisodeOptions& run, const std::string& policy) {
   std::string command = fmt::format("tangere generate {} --episodes {} --seed {} --precision {}", options.scene,
@@ -61,6 +73,8 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
   if (!policy.empty()) command += " --policy " + policy;
   if (!options.controls.empty()) command += " --controls " + options.controls;
   if (options.compress != "none") command += " --compress " + options.compress;
+  if (options.tactile != "dense") command += " --tactile " + options.tactile;
+  if (!options.record.empty()) command += " --record " + options.record;
   if (options.shards) command += fmt::format(" --shards {}", *options.shards);
   return command;
 }
@@ -76,6 +90,8 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model, co
   description.command = command_of(options, run, policy);
   description.shards = options.shards.value_or(0);
   description.compression = options.compress;
+  description.record = words_of(options.record);
+  description.sparse = options.tactile == "sparse";
   description.episodes = run.episodes;
   description.steps = run.steps;
   description.every = run.every;
@@ -165,6 +181,7 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"peak_blocks_in_flight", summary.peak_blocks_in_flight},
               {"seconds", summary.seconds},
               {"compress", options.compress},
+              {"tactile", options.tactile},
               {"limited_by", limit_of(summary, run)},
               {"simulation_seconds", summary.simulation_seconds},
               {"encoding_seconds", summary.encoding_seconds},
@@ -236,12 +253,18 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   return make(options, console, job);
 }
 
+void check_word(const char* what, const std::string& word, const std::vector<std::string>& known) {
+  if (std::find(known.begin(), known.end(), word) == known.end())
+    throw InputError(fmt::format("unknown {} '{}'{}", what, word, suggestion(word, known)));
+}
+
 int generate(GenerateOptions options, const Console& console, const ProgramInfo& info) {
   static_cast<void>(
       precision_named(options.precision));  // a wrong word is said before a scene is read
-  if (options.compress != "none" && options.compress != "deflate")
-    throw InputError(fmt::format("unknown compression '{}'{}", options.compress,
-                                 suggestion(options.compress, std::vector<std::string>{"none", "deflate"})));
+  check_word("compression", options.compress, {"none", "deflate", "lz4"});
+  check_word("kind of tactile fields", options.tactile, {"dense", "sparse"});
+  if (options.compress == "lz4")
+    console.note("compressed with LZ4: other programs need the HDF5 plug-in for filter 32004 to read it");
   if (options.resume && options.overwrite)
     throw InputError("--resume with --overwrite; expected one of them: keep shards, or replace them");
   if (!options.shard.empty()) {
@@ -299,7 +322,11 @@ Command add_generate(CLI::App& program) {
            "Of tactile fields: double, or mixed, stored as float32 [default: mixed]");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between episodes [default: 0]");
-  add_text(*app, "--compress", o.compress, "NAME", "Of tactile fields on disk: none or deflate [default: none]");
+  add_text(*app, "--compress", o.compress, "NAME", "Of tactile fields on disk: none, deflate or lz4, which needs a plug-in to read [default: none]");
+  add_text(*app, "--tactile", o.tactile, "KIND",
+           "Of large fields on disk: dense, or sparse: tiles of zeros left out [default: dense]");
+  add_text(*app, "--record", o.record, "LIST",
+           "Observations to store, separated by commas [default: all]");
   add_whole_number<std::int64_t>(*app, "--shards", o.shards, 1, kMostEpisodes,
                                  "Files to cut the data set into [default: below a gigabyte each]");
   add_text(*app, "--shard", o.shard, "k/S", "Make shard k of S alone, k from 0; others may run beside it");

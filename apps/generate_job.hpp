@@ -15,7 +15,7 @@
 namespace tangere::apps {
 
 struct GenerateOptions {
-  std::string scene, output, controls, policy, shard, precision = "mixed", compress = "none";
+  std::string scene, output, controls, policy, shard, precision = "mixed", compress = "none", tactile = "dense", record;
   std::optional<std::int64_t> episodes, steps, shards;
   std::optional<int> every, threads;
   std::optional<std::uint64_t> seed;

@@ -87,8 +87,10 @@ class Block {
 };
 
 /// Whole shards: prepared, written, read back, synced, renamed.
-void write_shards(benchmark::State& state, std::int64_t episodes, std::int64_t rows, int side, const char* compression) {
-  const DatasetLayout l = layout_of(episodes, rows, side, compression);
+void write_shards(benchmark::State& state, std::int64_t episodes, std::int64_t rows, int side, const char* compression,
+                  bool sparse = false) {
+  DatasetLayout l = layout_of(episodes, rows, side, compression);
+  l.sparse = sparse;
   const Block block(l);
   std::uintmax_t bytes = 0;
   for (auto _ : state) {
@@ -119,11 +121,17 @@ void long_episodes(benchmark::State& state) { write_shards(state, 256, 200, 16, 
 void long_episodes_deflate(benchmark::State& state) { write_shards(state, 256, 200, 16, "deflate"); }
 void large_fields(benchmark::State& state) { write_shards(state, 16, 20, 200, "none"); }
 void large_fields_deflate(benchmark::State& state) { write_shards(state, 16, 20, 200, "deflate"); }
+void large_fields_lz4(benchmark::State& state) { write_shards(state, 16, 20, 200, "lz4"); }
+void large_fields_sparse(benchmark::State& state) { write_shards(state, 16, 20, 200, "none", true); }
+void large_fields_sparse_deflate(benchmark::State& state) { write_shards(state, 16, 20, 200, "deflate", true); }
 BENCHMARK(short_episodes)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 BENCHMARK(long_episodes)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 BENCHMARK(long_episodes_deflate)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 BENCHMARK(large_fields)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 BENCHMARK(large_fields_deflate)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+BENCHMARK(large_fields_lz4)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+BENCHMARK(large_fields_sparse)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+BENCHMARK(large_fields_sparse_deflate)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 
 /// What the library takes for a demo like those: why the writer lays objects out itself.
 void library_objects(benchmark::State& state) {
@@ -159,6 +167,7 @@ void chunk(benchmark::State& state, const char* compression) {
   state.counters["of_size"] = static_cast<double>(size) / static_cast<double>(bytes);
 }
 BENCHMARK_CAPTURE(chunk, deflate, "deflate");
+BENCHMARK_CAPTURE(chunk, lz4, "lz4");
 
 void shuffling(benchmark::State& state) {
   const std::vector<float> numbers = field(21, 16);

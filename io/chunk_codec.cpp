@@ -3,6 +3,7 @@
 #include "io/chunk_codec.hpp"
 
 #include <libdeflate.h>
+#include <lz4.h>
 
 #include <algorithm>
 #include <cstring>
@@ -16,10 +17,13 @@ namespace tangere {
 namespace {
 
 constexpr double kChunkBytes = 64 << 10;      // a loader's random access reads a whole chunk
+constexpr double kTileBytes = 24 << 10;        // a tile in touch for one row is stored for all rows of its chunk
 constexpr double kTogetherBytes = 512 << 10;  // rows of all observations in the span of a chunk: a piece holds at least as many
 constexpr std::int64_t kMostRows = 64;
 constexpr std::size_t kLeastRowBytes = 256;      // smaller rows: a chunk's index would cost more than compression gives
-constexpr std::size_t kLeastLastBytes = 8 << 10;
+constexpr std::size_t kLeastLastBytes = 8 << 10, kLeastTiledBytes = 8 << 10;
+// Tiles of a field, of which those that nothing touches are left out: points a side, of large fields twice as many; of a curved pad.
+constexpr std::uint64_t kTileSide = 16, kLargeSide = 128, kTilePoints = 256;
 
 std::size_t numbers_of(const std::vector<std::uint64_t>& shape) {
   return std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
@@ -69,29 +73,72 @@ std::vector<unsigned char> deflated(const std::vector<unsigned char>& plain) {
   return {room.begin(), room.begin() + static_cast<std::ptrdiff_t>(size)};
 }
 
+void add_big_endian(std::vector<unsigned char>& out, std::uint64_t value, std::size_t bytes) {
+  for (std::size_t k = bytes; k-- > 0;) out.push_back(static_cast<unsigned char>(value >> (8 * k)));
+}
+
+/// One block, as the plug-in of the HDF Group reads it: size of all and of a block, then each block's size and bytes, big-endian.
+std::vector<unsigned char> lz4(const std::vector<unsigned char>& plain) {
+  const auto bytes = static_cast<int>(plain.size());
+  thread_local std::vector<char> room;
+  room.resize(std::max(room.size(), static_cast<std::size_t>(LZ4_compressBound(bytes))));
+  const int size = LZ4_compress_default(reinterpret_cast<const char*>(plain.data()), room.data(), bytes,
+                                        static_cast<int>(room.size()));
+  if (size <= 0) throw std::logic_error("LZ4 needs more room than its own bound");
+  const bool smaller = size < bytes;  // a block of its own size is not compressed
+  std::vector<unsigned char> out;
+  add_big_endian(out, plain.size(), 8);
+  add_big_endian(out, plain.size(), 4);
+  add_big_endian(out, static_cast<std::uint64_t>(smaller ? size : bytes), 4);
+  if (smaller)
+    out.insert(out.end(), room.begin(), room.begin() + size);
+  else
+    out.insert(out.end(), plain.begin(), plain.end());
+  return out;
+}
+
+ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_t>& shape, std::size_t row_bytes,
+                     double together) {
+  const bool sparse = layout.sparse && (shape.size() == 2 || shape.size() == 3) && row_bytes >= kLeastTiledBytes;
+  ChunkPlan plan;
+  plan.tile = shape;
+  if (sparse) {
+    plan.may_be_absent = true;
+    std::size_t tiled = shape.size() - 1;  // the last dimension, x y z, stays whole
+    const std::uint64_t side = tiled == 1 ? kTilePoints : *std::max_element(shape.begin(), shape.end()) < kLargeSide ? kTileSide : 2 * kTileSide;
+    for (std::size_t k = 0; k < tiled; ++k) plan.tile[k] = std::min(shape[k], side);
+  } else if (layout.compression == "none" || row_bytes < kLeastRowBytes) {
+    return plan;
+  }
+  const double tile_bytes = static_cast<double>(numbers_of(plan.tile)) / static_cast<double>(numbers_of(shape)) * static_cast<double>(row_bytes);
+  plan.rows = power_of_two_below(std::min((sparse ? kTileBytes : kChunkBytes) / tile_bytes, (sparse ? 2 : 1) * kTogetherBytes / together));
+  plan.last_row = sparse || row_bytes >= kLeastLastBytes;
+  return plan;
+}
+
 }  // namespace
 
-std::vector<std::int64_t> chunk_rows(const DatasetLayout& layout) {
+std::vector<ChunkPlan> chunk_plans(const DatasetLayout& layout) {
   const std::vector<std::vector<std::uint64_t>> shapes = layout.observation_shapes();
-  std::vector<std::int64_t> rows(shapes.size(), 0);
-  if (layout.compression == "none") return rows;
   const std::size_t width = layout.single ? sizeof(float) : sizeof(double);
   double together = 0;
   for (const auto& shape : shapes) together += static_cast<double>(numbers_of(shape) * width);
-  for (std::size_t name = 0; name < shapes.size(); ++name) {
-    const std::size_t bytes = numbers_of(shapes[name]) * width;
-    if (bytes < kLeastRowBytes) continue;
-    rows[name] = power_of_two_below(std::min(kChunkBytes / static_cast<double>(bytes), kTogetherBytes / together));
-  }
-  return rows;
+  std::vector<ChunkPlan> plans;
+  for (const auto& shape : shapes) plans.push_back(chunk_plan(layout, shape, numbers_of(shape) * width, together));
+  return plans;
 }
 
-bool compresses_last_row(std::size_t row_bytes) { return row_bytes >= kLeastLastBytes; }
+bool has_chunks(const DatasetLayout& layout) {
+  const std::vector<ChunkPlan> plans = chunk_plans(layout);
+  return std::any_of(plans.begin(), plans.end(), [](const ChunkPlan& plan) { return plan.rows > 0; });
+}
 
 std::vector<h5::FileFilter> file_filters(const std::string& compression, std::size_t number_bytes) {
   constexpr std::uint16_t kDeflate = 1, kShuffle = 2;
   if (compression == "none") return {};
-  return {{kShuffle, {}, {static_cast<std::uint32_t>(number_bytes)}}, {kDeflate, {}, {kDeflateLevel}}};
+  const h5::FileFilter shuffled{kShuffle, {}, {static_cast<std::uint32_t>(number_bytes)}};
+  if (compression == "lz4") return {shuffled, {h5::kLz4Filter, "lz4", {0}}};
+  return {shuffled, {kDeflate, {}, {kDeflateLevel}}};
 }
 
 void shuffle(const unsigned char* data, std::size_t used, std::size_t width, std::vector<unsigned char>& out) {
@@ -108,10 +155,15 @@ void shuffle(const unsigned char* data, std::size_t used, std::size_t width, std
 
 std::vector<unsigned char> compressed(const DatasetLayout& layout, const unsigned char* data, std::size_t used,
                                       std::size_t bytes) {
+  if (layout.compression == "none") {
+    std::vector<unsigned char> same(data, data + used);
+    same.resize(bytes, 0);
+    return same;
+  }
   thread_local std::vector<unsigned char> plain;
   plain.resize(bytes);
   shuffle(data, used, layout.single ? sizeof(float) : sizeof(double), plain);
-  return deflated(plain);
+  return layout.compression == "lz4" ? lz4(plain) : deflated(plain);
 }
 
 }  // namespace tangere

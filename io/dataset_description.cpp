@@ -35,6 +35,11 @@ void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
     units.push_back(tensor.unit);
     meanings.push_back(tensor.meaning);
   }
+  for (std::vector<std::string>* list : {&units, &meanings}) {
+    std::vector<std::string> stored;
+    for (const std::size_t k : layout.recorded()) stored.push_back((*list)[k]);
+    *list = std::move(stored);
+  }
   h5::write_attribute(scene, "observation_units", std::span<const std::string>(units));
   h5::write_attribute(scene, "observation_meanings", std::span<const std::string>(meanings));
 }
@@ -42,6 +47,7 @@ void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
 void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "name", layout.scene_name);
   h5::write_attribute(scene, "text", layout.scene_text);
+  h5::write_attribute(scene, "tables", layout.tables);
   h5::write_attribute(scene, "controls", layout.controls);
   h5::write_scalar<std::uint64_t>(scene, "seed", layout.seed);
   h5::write_scalar<std::int64_t>(scene, "steps", layout.steps);
@@ -52,6 +58,7 @@ void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_scalar<double>(scene, "tolerance", layout.tolerance);
   h5::write_attribute(scene, "precision", layout.precision);
   h5::write_attribute(scene, "compression", layout.compression);
+  h5::write_attribute(scene, "tactile", layout.sparse ? "sparse" : "dense");
   h5::write_attribute(scene, "tangere_version", layout.version);
   h5::write_attribute(scene, "instruction_set", layout.instruction_set);
 }

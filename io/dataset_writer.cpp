@@ -106,7 +106,7 @@ struct DatasetWriter::Impl {
   }
 
   void check_space(double episodes) const {
-    if (layout.compression != "none") return;  // nobody knows before
+    if (has_chunks(layout)) return;  // nobody knows before
     const double needed = layout.episode_bytes() * episodes, available = folder.free_bytes();
     if (needed > available)
       throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free", output.folder, needed,

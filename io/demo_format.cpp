@@ -8,8 +8,6 @@
 #include <functional>
 #include <numeric>
 
-#include "io/chunk_codec.hpp"
-
 namespace tangere {
 namespace {
 
@@ -26,7 +24,8 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
     : of_task_(layout.task.has_value()),
       randomized_(layout.randomized_names.size()),
       names_(layout.observation_names()),
-      chunk_rows_(::tangere::chunk_rows(layout)) {
+      sources_(layout.recorded()),
+      plans_(chunk_plans(layout)) {
   using h5::NumberType;
   const NumberType number = layout.single ? NumberType::float32 : NumberType::float64;
   shapes_ = {{layout.action_names().size()}, {}, {}};
@@ -48,9 +47,9 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
 
 std::int64_t DemoFormat::chunk_rows(std::size_t dataset, std::int64_t rows) const {
   if (dataset < kFirst) return 0;
-  const std::int64_t most = chunk_rows_[(dataset - kFirst) % names_.size()];
-  if (dataset >= final_obs(0)) return most > 0 && compresses_last_row(row_bytes_[dataset]) ? 1 : 0;
-  return std::min(most, rows);
+  const ChunkPlan& cut = plan(dataset);
+  if (dataset >= final_obs(0)) return cut.rows > 0 && cut.last_row ? 1 : 0;
+  return std::min(cut.rows, rows);
 }
 
 std::size_t DemoFormat::data_bytes(std::int64_t rows) const {
@@ -64,9 +63,13 @@ void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int6
   file.type = types_[dataset];
   file.dims = {static_cast<std::uint64_t>(rows_of(dataset, rows))};
   file.dims.insert(file.dims.end(), shapes_[dataset].begin(), shapes_[dataset].end());
-  file.chunk_rows = static_cast<std::uint64_t>(chunk_rows(dataset, rows));
   file.address = address;
-  if (file.chunk_rows > 0) file.filters = filters_;
+  if (const std::int64_t chunk = chunk_rows(dataset, rows); chunk > 0) {
+    const std::vector<std::uint64_t>& tile = plan(dataset).tile;
+    file.chunk = {static_cast<std::uint64_t>(chunk)};
+    file.chunk.insert(file.chunk.end(), tile.begin(), tile.end());
+    file.filters = filters_;
+  }
   h5::add_dataset(out, file);
 }
 

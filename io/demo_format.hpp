@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "engine/episode_sink.hpp"
+#include "io/chunk_codec.hpp"
 #include "io/dataset_layout.hpp"
 #include "io/h5_objects.hpp"
 
@@ -38,8 +39,14 @@ class DemoFormat {
   [[nodiscard]] std::int64_t rows_of(std::size_t dataset, std::int64_t rows) const {
     return dataset >= final_obs(0) ? 1 : rows;
   }
-  /// Rows of a chunk, 0: contiguous.
+  /// Rows of a chunk of a demo of `rows`, 0: contiguous.
   [[nodiscard]] std::int64_t chunk_rows(std::size_t dataset, std::int64_t rows) const;
+  /// How it is cut, if it is.
+  [[nodiscard]] const ChunkPlan& plan(std::size_t dataset) const { return plans_[(dataset - kFirst) % names_.size()]; }
+  /// Where pieces have it.
+  [[nodiscard]] std::size_t source(std::size_t name) const { return sources_[name]; }
+  /// Of a row.
+  [[nodiscard]] const std::vector<std::uint64_t>& shape(std::size_t dataset) const { return shapes_[dataset]; }
   /// Bytes of all datasets of an uncompressed demo, each to a multiple of eight.
   [[nodiscard]] std::size_t data_bytes(std::int64_t rows) const;
   /// Bytes of a demo's description: the same for all.
@@ -58,7 +65,8 @@ class DemoFormat {
   bool of_task_;
   std::size_t randomized_;
   std::vector<std::string> names_;
-  std::vector<std::int64_t> chunk_rows_;                // per observation
+  std::vector<std::size_t> sources_;
+  std::vector<ChunkPlan> plans_;                        // per observation
   std::vector<std::vector<std::uint64_t>> shapes_;      // of a row, per dataset
   std::vector<h5::NumberType> types_;
   std::vector<std::size_t> row_bytes_;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/error.hpp"
+#include "io/h5_lz4.hpp"
 
 namespace tangere::h5 {
 namespace {
@@ -201,6 +202,7 @@ Id create_memory_file() {
 
 Id open_file(const std::string& path) {
   const Quiet quiet;
+  allow_lz4();
   const Id access(H5Pcreate(H5P_FILE_ACCESS));
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
   H5Pset_file_locking(access.get(), false, true);  // read-only folders and network mounts

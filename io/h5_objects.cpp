@@ -122,7 +122,7 @@ void add_type(Bytes& out, NumberType type) {
 void add_layout(Bytes& out, const FileDataset& dataset) {
   constexpr std::uint8_t kVersion = 3, kContiguous = 1, kChunked = 2;
   out.number(kVersion);
-  if (dataset.chunk_rows == 0) {
+  if (dataset.chunk.empty()) {
     std::uint64_t size = bytes_of(dataset.type);
     for (const std::uint64_t n : dataset.dims) size *= n;
     out.number(kContiguous);
@@ -133,8 +133,7 @@ void add_layout(Bytes& out, const FileDataset& dataset) {
   out.number(kChunked);
   out.number(static_cast<std::uint8_t>(dataset.dims.size() + 1));
   out.number(dataset.address);
-  out.number(static_cast<std::uint32_t>(dataset.chunk_rows));
-  for (std::size_t k = 1; k < dataset.dims.size(); ++k) out.number(static_cast<std::uint32_t>(dataset.dims[k]));
+  for (const std::uint64_t n : dataset.chunk) out.number(static_cast<std::uint32_t>(n));
   out.number(static_cast<std::uint32_t>(bytes_of(dataset.type)));
 }
 
@@ -247,7 +246,7 @@ void add_dataset(Bytes& out, const FileDataset& dataset) {
   header.message(kDatatype, [&](Bytes& to) { add_type(to, dataset.type); });
   header.message(kFillValue, [&](Bytes& to) {
     to.number(kVersion);
-    to.number<std::uint8_t>(dataset.chunk_rows == 0 ? kEarly | kNeverFilled : kIncremental | kFilledIfSet);
+    to.number<std::uint8_t>(dataset.chunk.empty() ? kEarly | kNeverFilled : kIncremental | kFilledIfSet);
   });
   header.message(kLayout, [&](Bytes& to) { add_layout(to, dataset); });
   if (!dataset.filters.empty()) header.message(kFilters, [&](Bytes& to) { add_filters(to, dataset.filters); });

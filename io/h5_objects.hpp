@@ -42,6 +42,9 @@ class Bytes {
 /// The library's checksum of what describes objects: Jenkins' lookup3.
 std::uint32_t object_checksum(std::span<const unsigned char> bytes);
 
+/// LZ4's number among registered filters: readers need its plug-in, or allow_lz4() of io/h5_lz4.hpp.
+inline constexpr std::uint16_t kLz4Filter = 32004;
+
 /// The head of a file that the library made for readers of HDF5 1.8.
 inline constexpr std::size_t kSuperblockBytes = 48;
 /// Where the file ends, for a file that was made longer.
@@ -57,11 +60,11 @@ struct FileFilter {
   std::vector<std::uint32_t> values = {};
 };
 
-/// A dataset. Rows are chunked along the first dimension only.
+/// A dataset. What its chunks leave out is zero.
 struct FileDataset {
   NumberType type = NumberType::float32;
   std::vector<std::uint64_t> dims;
-  std::uint64_t chunk_rows = 0;      ///< 0: contiguous
+  std::vector<std::uint64_t> chunk = {};  ///< empty: contiguous
   std::uint64_t address = kNowhere;  ///< of its numbers, or of the index of its chunks
   std::span<const FileFilter> filters = {};
 };

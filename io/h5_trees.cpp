@@ -124,18 +124,24 @@ std::vector<std::uint64_t> add_leaves(Bytes& out, std::uint64_t base, const std:
 
 std::uint64_t add_chunk_index(Bytes& out, std::uint64_t base, std::span<const FileChunk> chunks, std::size_t rank,
                               std::uint64_t chunk_rows) {
+  if (chunks.empty()) return kNowhere;
   std::vector<std::uint64_t> addresses;
   for (const FileChunk& chunk : chunks) addresses.push_back(chunk.address);
   return add_tree(out, base, chunk_tree(rank), addresses, [&](Bytes& to, std::size_t i) {
     const bool behind = i == chunks.size();
     to.number<std::uint32_t>(behind ? 0 : chunks[i].bytes);
     to.number<std::uint32_t>(0);  // no filter was left out
-    to.number(behind ? chunks.back().row + chunk_rows : chunks[i].row);
-    to.zeros(8 * rank);  // the other dimensions, and within a number
+    // One dimension more than the dataset has: within a number.
+    for (std::size_t k = 0; k <= rank; ++k) {
+      const std::uint64_t past = k == 0 ? chunks.back().first[0] + chunk_rows : 0;
+      to.number(behind ? past : k < chunks[i].first.size() ? chunks[i].first[k] : std::uint64_t{0});
+    }
   });
 }
 
-std::size_t chunk_index_bytes(std::size_t chunks, std::size_t rank) { return tree_bytes(chunk_tree(rank), chunks); }
+std::size_t chunk_index_bytes(std::size_t chunks, std::size_t rank) {
+  return chunks == 0 ? 0 : tree_bytes(chunk_tree(rank), chunks);
+}
 
 std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::vector<FileMember> members) {
   std::sort(members.begin(), members.end(), [](const FileMember& a, const FileMember& b) { return a.name < b.name; });

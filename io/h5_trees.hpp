@@ -3,6 +3,7 @@
 // a group of thousands.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -14,13 +15,13 @@ namespace tangere::h5 {
 
 /// A chunk on disk, all filters applied.
 struct FileChunk {
-  std::uint64_t row = 0;  ///< its first
+  std::array<std::uint64_t, 3> first{};  ///< of its numbers, in the first dimensions; 0 in the others
   std::uint64_t address = 0;
   std::uint32_t bytes = 0;
 };
 
-/// Appends the index of a dataset's chunks, ascending in rows, to what begins at `base` in the file. Returns its address.
-/// `rank`: of the dataset, whose chunks have `chunk_rows` rows each.
+/// Appends the index of a dataset's chunks, ascending, to what begins at `base` in the file. Returns its address; that of no
+/// chunks leads nowhere. `rank`: of the dataset, whose chunks have `chunk_rows` rows each.
 std::uint64_t add_chunk_index(Bytes& out, std::uint64_t base, std::span<const FileChunk> chunks, std::size_t rank,
                               std::uint64_t chunk_rows);
 /// Bytes that it takes.

@@ -2,6 +2,7 @@
 // What can be done to a piece of episodes before the one thread that writes has it: sums and compressed chunks.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -27,7 +28,7 @@ std::vector<PieceSlice> slices_of(const DemoFormat& format, const EpisodeRows& p
 struct PreparedChunk {
   int episode = 0;          ///< in the piece
   std::size_t dataset = 0;
-  std::int64_t row = 0;     ///< its first
+  std::array<std::uint64_t, 3> first{};  ///< row, then where the tile begins
   std::vector<unsigned char> bytes;
 };
 

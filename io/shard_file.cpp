@@ -41,6 +41,7 @@ ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const
       end_(range.end),
       unfinished_((range.end - range.first + kBlockEpisodes - 1) / kBlockEpisodes),
       next_(range.first),
+      cut_(has_chunks(layout)),
       part_(path, overwrite),
       placed_(part_),
       no_rewards_(static_cast<std::size_t>(layout.rows()), 0.0F),
@@ -144,7 +145,7 @@ std::span<const unsigned char> ShardFile::constant(std::size_t dataset, std::int
 
 void ShardFile::hold(Block& block, std::vector<PreparedChunk>& chunks) {
   for (PreparedChunk& chunk : chunks) {
-    Chunk held{{static_cast<std::uint64_t>(chunk.row), 0, static_cast<std::uint32_t>(chunk.bytes.size())},
+    Chunk held{{chunk.first, 0, static_cast<std::uint32_t>(chunk.bytes.size())},
                std::move(chunk.bytes)};
     held_bytes_ += held.bytes.size();
     if (held_bytes_ > kMostHeld) {  // memory is bounded; where it lies then depends on the order of pieces
@@ -187,7 +188,7 @@ void ShardFile::give_place_to_held(Block& block) {
   std::size_t indexes = 0;
   for (const Demo& demo : block.demos)
     for (std::size_t k = 0; k < format_.datasets(); ++k)
-      if (!demo.chunks[k].empty()) indexes += h5::chunk_index_bytes(demo.chunks[k].size(), format_.rank(k));
+      indexes += h5::chunk_index_bytes(demo.chunks[k].size(), format_.rank(k));
   const std::uint64_t first_index = block.base + block.demos.size() * format_.header_bytes();
   std::uint64_t at = first_index + indexes;
   h5::Bytes index;
@@ -217,7 +218,8 @@ void ShardFile::write_held(Block& block) {
   for (const Demo& demo : block.demos)
     for (std::size_t k = 0; k < format_.datasets(); ++k) {
       const std::span<const unsigned char> same = constant(k, demo.facts.rows);
-      if (demo.chunks[k].empty()) placed_.add(demo.addresses[k], same.empty() ? std::span(demo.held[k]) : same);
+      if (format_.chunk_rows(k, demo.facts.rows) == 0)
+        placed_.add(demo.addresses[k], same.empty() ? std::span<const unsigned char>(demo.held[k]) : same);
       for (const Chunk& chunk : demo.chunks[k]) {
         held_bytes_ -= chunk.bytes.size();
         placed_.add(chunk.place.address, chunk.bytes);

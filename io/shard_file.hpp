@@ -59,7 +59,7 @@ class ShardFile {
 
   void describe();
   void complete_description(std::uint64_t data);
-  [[nodiscard]] bool waits() const { return layout_.compression != "none"; }  // sizes are known when a block has ended
+  [[nodiscard]] bool waits() const { return cut_; }  // sizes are known when a block has ended
   Block& block_of(const EpisodeRows& rows);
   void give_place(Block& block, std::int64_t first_episode);
   void write_slices(Block& block, const EpisodeRows& rows, int episode);
@@ -73,6 +73,7 @@ class ShardFile {
   const DatasetLayout& layout_;
   const DemoFormat& format_;
   std::int64_t first_episode_, end_, unfinished_, next_;  // blocks that are unfinished; the first one without a place
+  bool cut_;  // into chunks
   PartFile part_;
   PlacedFile placed_;
   h5::Id file_;

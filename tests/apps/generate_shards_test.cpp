@@ -187,6 +187,27 @@ TEST(GenerateShards, OfAnotherSceneAreNotContinued) {
   EXPECT_THAT(outcome.err, HasSubstr("'<!-- heavier -->' here"));
 }
 
+TEST(GenerateShards, OfAnotherTableOfPointsAreNotContinued) {
+  const Folder folder;
+  std::string text = folder.read(scene("rolling_ball_small.xml"));
+  const std::size_t begin = text.find("<body name=\"pad\""), end = text.find("/>", begin) + 2;
+  text.replace(begin, end - begin,
+               "<body name=\"pad\" type=\"abstract\" mass=\"0.025\" inertia=\"1e-5 1e-5 1e-5\">"
+               "<collision contacts=\"points.txt\"/></body>");
+  folder.write("s.xml", text);
+  folder.write("points.txt", "2\n0.01 0 -0.005\n-0.01 0 -0.005\n");
+  Words words = generate();
+  words[1] = "s.xml";
+  const Outcome first = run(folder, words);
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  words.emplace_back("--resume");
+  EXPECT_EQ(run(folder, words).exit_code, 0);
+  folder.write("points.txt", "2\n0.01 0 -0.005\n-0.01 0 -0.0051\n");
+  const Outcome other = run(folder, words);
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr("tables: of checksum "));
+}
+
 TEST(GenerateShards, OfAnotherRunAreNotMixedInByAWorker) {
   const Folder folder;
   ASSERT_EQ(run(folder, generate({"--shard", "0/5"})).exit_code, 0);

@@ -80,7 +80,7 @@ TEST(H5Objects, ADatasetHoldsItsNumbersWhereverTheyAre) {
   const std::uint64_t data = file.here();
   file.objects().add(raw(numbers));
   const std::uint64_t dataset = file.here();
-  h5::add_dataset(file.objects(), {h5::NumberType::float32, {2, 3}, 0, data});
+  h5::add_dataset(file.objects(), {h5::NumberType::float32, {2, 3}, {}, data});
   const h5::Id opened = file.open(dataset), object = h5::open_dataset(opened, "object");
   ASSERT_EQ(h5::dimensions(object), (h5::Dims{2, 3}));
   std::vector<float> read(6);
@@ -102,7 +102,7 @@ TEST(H5Objects, EveryTypeIsTheLibrarysOwn) {
                                                             {h5::NumberType::boolean, boolean.get()}};
   for (std::size_t k = 0; k < types.size(); ++k) {
     Extended file(folder / ("file" + std::to_string(k) + ".h5"));
-    h5::add_dataset(file.objects(), {types[k].first, {0}, 0, h5::kNowhere});
+    h5::add_dataset(file.objects(), {types[k].first, {0}, {}, h5::kNowhere});
     const h5::Id opened = file.open(file.base()), object = h5::open_dataset(opened, "object");
     EXPECT_GT(H5Tequal(h5::Id(H5Dget_type(object.get())).get(), types[k].second), 0) << k;
     EXPECT_EQ(h5::dimensions(object), h5::Dims{0}) << "without numbers";
@@ -120,7 +120,7 @@ TEST(H5Objects, ChunksAreFoundThroughIndexesOfAnyDepth) {
     for (std::size_t k = 0; k < count; ++k) {
       const auto first = static_cast<float>(4 * k);
       const std::vector<float> chunk{first, first + 1, first + 2, first + 3};
-      chunks.push_back({kRows * k, file.here(), 16});
+      chunks.push_back({{kRows * k}, file.here(), 16});
       file.objects().add(raw(chunk));
       numbers.insert(numbers.end(), chunk.begin(), chunk.end());
     }
@@ -129,7 +129,7 @@ TEST(H5Objects, ChunksAreFoundThroughIndexesOfAnyDepth) {
     EXPECT_EQ(file.here() - before, h5::chunk_index_bytes(count, 2));
     const std::uint64_t dataset = file.here();
     // The last chunk has a row more than the dataset.
-    h5::add_dataset(file.objects(), {h5::NumberType::float32, {kRows * count - 1, 2}, kRows, index});
+    h5::add_dataset(file.objects(), {h5::NumberType::float32, {kRows * count - 1, 2}, {kRows, 2}, index});
     const h5::Id opened = file.open(dataset), object = h5::open_dataset(opened, "object");
     numbers.resize(numbers.size() - 2);
     std::vector<float> read(numbers.size());
