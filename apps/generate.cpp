@@ -139,8 +139,9 @@ std::string limit_of(const EpisodeSummary& summary, const EpisodeOptions& run) {
 }
 
 int report(const GenerateOptions& options, const Console& console, const Job& job, const JobResult& done,
-           const DatasetWriter& output) {
+           DatasetWriter& output) {
   const EpisodeSummary& summary = done.summary;
+  const Merged merged = merge_if_complete(options, output);
   const EpisodeOptions& run = job.run;
   const std::vector<std::string> shards = output.shards();
   const ExitCode code = summary.failures.empty() && output.kept_failed() == 0 ? kDone : kSomeFailed;
@@ -155,10 +156,10 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
                                              output.kept_failed());
   console.print(
       fmt::format("episodes: {}, rows: {}, time: {:.2f} s, {:.0f} env-steps/s with output, "
-                  "threads: {}\nlimited by {}: simulation {:.2f} s and compression {:.2f} s of all threads, writing {:.2f} s of one\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes)",
+                  "threads: {}\nlimited by {}: simulation {:.2f} s and compression {:.2f} s of all threads, writing {:.2f} s of one\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes){}",
                   summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, run),
                   summary.simulation_seconds, summary.encoding_seconds, summary.writing_seconds, done.task.line, summary.split_steps, summary.failures.size(), kept, options.output,
-                  shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes));
+                  shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes, merged.line));
   Json result{{"command", "generate"},
               {"exit_code", static_cast<int>(code)},
               {"scene", options.scene},
@@ -192,6 +193,7 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"split_steps", summary.split_steps},
               {"failed", failures_json("episode", failures_of(summary))}};
   result.update(done.task.keys);
+  result.update(merged.keys);
   console.result(result);
   return code;
 }
@@ -331,6 +333,7 @@ Command add_generate(CLI::App& program) {
                                  "Files to cut the data set into [default: below a gigabyte each]");
   add_text(*app, "--shard", o.shard, "k/S", "Make shard k of S alone, k from 0; others may run beside it");
   app->add_flag("--resume", o.resume, "Keep the shards in the folder, of the same settings, and make the rest");
+  app->add_flag("--no-merge", o.no_merge, "Shards alone: do not merge them when all are there");
   app->add_flag("--dry-run", o.dry_run, "Say what would be made, and how long it may take");
   app->add_flag("--overwrite", o.overwrite, "Replace the shards in the folder");
   app->add_flag("--allow-unknown", o.allow_unknown,

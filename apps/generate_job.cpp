@@ -10,6 +10,7 @@
 
 #include "apps/workers.hpp"
 #include "engine/error.hpp"
+#include "io/dataset_merge.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -86,6 +87,20 @@ DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& la
   console.note(fmt::format("process {} of {} ({}): makes {} of {} shards", worker.index, worker.count, worker.source,
                            output.only->size(), shards));
   return output;
+}
+
+Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output) {
+  Merged merged;
+  if (options.no_merge || !output.complete()) return merged;
+  MergeOptions replace;
+  replace.overwrite = true;  // links of an earlier run lead to other shards, or to as many
+  const MergeResult result = merge_dataset(find_dataset(options.output), replace);
+  merged.keys["merged"] = result.file;
+  merged.line = fmt::format("\nmerged: {}", result.file);
+  if (result.minari_id.empty()) return merged;
+  merged.keys["minari_id"] = result.minari_id;
+  merged.line += fmt::format(", {} for Minari", result.minari_id);
+  return merged;
 }
 
 int dry_run(const GenerateOptions& options, const Console& console, const Job& job) {

@@ -19,7 +19,7 @@ struct GenerateOptions {
   std::optional<std::int64_t> episodes, steps, shards;
   std::optional<int> every, threads;
   std::optional<std::uint64_t> seed;
-  bool overwrite = false, resume = false, dry_run = false, allow_unknown = false;
+  bool overwrite = false, resume = false, dry_run = false, no_merge = false, allow_unknown = false;
 };
 
 /// What a run of a task adds: keys of the JSON object, a line for people.
@@ -44,6 +44,13 @@ struct Job {
 
 /// Shards that this process is to make, and what becomes of those that are there. Says so where it is not alone.
 DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& layout, const Console& console);
+
+/// What a complete data set is shown as: paths for the JSON object, null where it is not complete or not wanted.
+struct Merged {
+  Json keys{{"merged", nullptr}, {"minari_id", nullptr}};
+  std::string line;
+};
+Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output);
 
 /// Says what would be made, and how long that may take: some episodes are simulated for it. Writes nothing.
 int dry_run(const GenerateOptions& options, const Console& console, const Job& job);

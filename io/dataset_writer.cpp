@@ -159,6 +159,11 @@ void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpi
   impl_->complete.insert(number);
 }
 
+bool DatasetWriter::complete() {
+  // Held first: the last of several to let go sees the shards of all.
+  return impl_->folder.hold_alone() && std::ssize(impl_->folder.shards()) == impl_->layout.shard_count();
+}
+
 std::vector<std::string> DatasetWriter::shards() const {
   std::vector<std::string> paths;
   for (const std::int64_t shard : impl_->complete) paths.push_back(impl_->folder.shard_path(shard));

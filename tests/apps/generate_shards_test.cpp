@@ -187,6 +187,36 @@ TEST(GenerateShards, OfAnotherSceneAreNotContinued) {
   EXPECT_THAT(outcome.err, HasSubstr("'<!-- heavier -->' here"));
 }
 
+TEST(GenerateShards, AreMergedByTheLastProcessAndNotBefore) {
+  const Folder folder;
+  const std::string merged = folder.path("set/robomimic.hdf5");
+  for (int shard = 0; shard < kShards; ++shard) {
+    EXPECT_FALSE(fs::exists(merged)) << shard;
+    const json answer = answer_of(run(folder, generate({"--json", "--shard", std::to_string(shard) + "/5"})));
+    EXPECT_EQ(answer.at("merged").is_null(), shard + 1 < kShards);
+  }
+  EXPECT_TRUE(fs::exists(merged));
+  EXPECT_TRUE(fs::exists(folder.path("set/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5")));
+  EXPECT_EQ(run(folder, {"validate", "set/robomimic.hdf5"}).exit_code, 0);
+  // Nothing is left to do, and it is merged again.
+  const json again = answer_of(run(folder, generate({"--json", "--resume"})));
+  EXPECT_EQ(again.at("merged"), "set/robomimic.hdf5");
+  EXPECT_EQ(again.at("minari_id"), "tangere/rolling_ball_small-v0");
+  // Of an earlier run nothing stays that could be taken for this one's.
+  EXPECT_TRUE(answer_of(run(folder, generate({"--json", "--overwrite", "--no-merge"}))).at("merged").is_null());
+  EXPECT_FALSE(fs::exists(merged));
+  EXPECT_FALSE(fs::exists(folder.path("set/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5")));
+}
+
+TEST(GenerateShards, OfProcessesThatEndTogetherAreMerged) {
+  const Folder folder;
+  std::vector<Words> environments;
+  for (int rank = 0; rank < 3; ++rank)
+    environments.push_back({"PMI_RANK=" + std::to_string(rank), "PMI_SIZE=3"});
+  run_beside(folder, generate(), environments);
+  EXPECT_EQ(run(folder, {"validate", "set/robomimic.hdf5"}).exit_code, 0);
+}
+
 TEST(GenerateShards, OfAnotherTableOfPointsAreNotContinued) {
   const Folder folder;
   std::string text = folder.read(scene("rolling_ball_small.xml"));

@@ -43,7 +43,6 @@ TEST(Readers, OfThePageReadADataSet) {
                          "sparse", "--quiet"})
                 .exit_code,
             0);
-  ASSERT_EQ(run(folder, {"merge", "balls", "--quiet"}).exit_code, 0);
   const std::vector<std::string> blocks = readers();
   ASSERT_GE(blocks.size(), 4U);
   int tried = 0;
