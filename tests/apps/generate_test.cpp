@@ -266,17 +266,17 @@ double peak_memory() {
 TEST(Generate, MemoryDoesNotGrowWithTheNumberOfEpisodes) {
   for (const Words& kind : {Words{}, Words{"--compress", "deflate"}, Words{"--compress", "lz4", "--tactile", "sparse"}}) {
     double before = 0;
-    for (const std::string episodes : {"64", "2048"}) {
+    for (const std::string episodes : {"64", "1024"}) {
       const Folder folder;
       Words words{"generate", scene("rolling_ball_small.xml"), "--output", "set", "--steps", "50", "--every", "5",
-                  "--threads", "2", "--episodes", episodes};
+                  "--threads", "2", "--no-merge", "--episodes", episodes};
       words.insert(words.end(), kind.begin(), kind.end());
       ASSERT_EQ(run(folder, words).exit_code, 0);
       if (episodes == "64") before = peak_memory();
     }
-    // Two thousand episodes are 260 MB.
-    EXPECT_LT(peak_memory() - before, 64 << 20) << "from " << before;
-    EXPECT_LT(peak_memory(), 264 << 20);
+    // A thousand episodes are 135 MB.
+    EXPECT_LT(peak_memory() - before, 48 << 20) << "from " << before;
+    EXPECT_LT(peak_memory(), 232 << 20);
   }
 }
 
