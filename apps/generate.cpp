@@ -55,6 +55,18 @@ std::string controls_named(const std::string& path) {
   return fmt::format("a table of checksum {:016x}", hash);
 }
 
+/// Of a list separated by commas. Throws InputError for empty words.
+std::vector<std::string> words_of(const std::string& list) {
+  std::vector<std::string> words;
+  if (list.empty()) return words;
+  for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
+    end = list.find(',', begin);
+    words.push_back(list.substr(begin, end == std::string::npos ? end : end - begin));
+    if (words.back().empty()) throw InputError(fmt::format("--record '{}'; expected names separated by commas", list));
+  }
+  return words;
+}
+
 /// What makes the same data set again, wherever and on however many threads.
 std::string command_of(const GenerateOptions& options, const EpisodeOptions& run, const std::string& policy) {
   std::string command = fmt::format("tangere generate {} --episodes {} --seed {} --precision {}", options.scene,
@@ -63,6 +75,8 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
   if (!policy.empty()) command += " --policy " + policy;
   if (!options.controls.empty()) command += " --controls " + options.controls;
   if (options.compress != "none") command += " --compress " + options.compress;
+  if (options.tactile != "dense") command += " --tactile " + options.tactile;
+  if (!options.record.empty()) command += " --record " + options.record;
   if (options.shards) command += fmt::format(" --shards {}", *options.shards);
   if (options.gradients != "none") command += " --gradients " + options.gradients;
   if (!options.loss.empty()) command += " --loss " + options.loss;
@@ -80,6 +94,8 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model, co
   description.command = command_of(options, run, policy);
   description.shards = options.shards.value_or(0);
   description.compression = options.compress;
+  description.record = words_of(options.record);
+  description.sparse = options.tactile == "sparse";
   description.gradients_of = options.loss.empty() ? options.gradients : options.gradients + " " + options.loss;
   description.gradients = gradients.arrays;
   description.episodes = run.episodes;
@@ -136,8 +152,9 @@ std::string limit_of(const EpisodeSummary& summary, const Job& job) {
 }
 
 int report(const GenerateOptions& options, const Console& console, const Job& job, const JobResult& done,
-           const DatasetWriter& output) {
+           DatasetWriter& output) {
   const EpisodeSummary& summary = done.summary;
+  const Merged merged = merge_if_complete(options, output);
   const EpisodeOptions& run = job.run;
   const std::vector<std::string> shards = output.shards();
   const ExitCode code = summary.failures.empty() && output.kept_failed() == 0 ? kDone : kSomeFailed;
@@ -152,10 +169,10 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
                                              output.kept_failed());
   console.print(
       fmt::format("episodes: {}, rows: {}, time: {:.2f} s, {:.0f} env-steps/s with output, "
-                  "threads: {}\nlimited by {}: simulation {:.2f} s and {} {:.2f} s of all threads, writing {:.2f} s of one\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes)",
+                  "threads: {}\nlimited by {}: simulation {:.2f} s and {} {:.2f} s of all threads, writing {:.2f} s of one\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes){}",
                   summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, job),
                   summary.simulation_seconds, preparation_of(job), summary.encoding_seconds, summary.writing_seconds, done.task.line, summary.split_steps, summary.failures.size(), kept, options.output,
-                  shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes));
+                  shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes, merged.line));
   Json result{{"command", "generate"},
               {"exit_code", static_cast<int>(code)},
               {"scene", options.scene},
@@ -178,6 +195,7 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"peak_blocks_in_flight", summary.peak_blocks_in_flight},
               {"seconds", summary.seconds},
               {"compress", options.compress},
+              {"tactile", options.tactile},
               {"gradients", job.layout.gradients.empty() ? Json() : Json(job.layout.gradients_of)},
               {"limited_by", limit_of(summary, job)},
               {"simulation_seconds", summary.simulation_seconds},
@@ -189,6 +207,7 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"split_steps", summary.split_steps},
               {"failed", failures_json("episode", failures_of(summary))}};
   result.update(done.task.keys);
+  result.update(merged.keys);
   console.result(result);
   return code;
 }
@@ -200,36 +219,11 @@ int stopped(const GenerateOptions& options, const Console& console, int signal, 
                      {{"shards", output.shards()}});
 }
 
-GradientKind gradient_kind_named(const std::string& name) {
-  std::vector<std::string> names;
-  for (const GradientKind kind : {GradientKind::none, GradientKind::returns, GradientKind::jacobians}) {
-    names.emplace_back(to_string(kind));
-    if (names.back() == name) return kind;
-  }
-  throw InputError("unknown gradients '" + name + "'" + suggestion(name, names));
-}
-
-/// What --gradients and its companions ask for, of a scene or a task.
-GradientKind gradients_wanted(const GenerateOptions& options, bool of_task) {
-  const GradientKind kind = gradient_kind_named(options.gradients);
-  if (options.tape_memory && kind != GradientKind::returns)
-    throw InputError(fmt::format("--tape-memory with --gradients {}; expected --gradients return", options.gradients));
-  if (!options.loss.empty() && (of_task || kind != GradientKind::returns))
-    throw InputError(fmt::format("--loss {} with {}; expected a scene and --gradients return", options.loss,
-                                 of_task ? "a task" : "--gradients " + options.gradients));
-  if (!of_task && kind == GradientKind::returns && options.loss.empty())
-    throw InputError("--gradients return of a scene, which has no rewards; expected --loss as well");
-  return kind;
-}
-
 /// Says before anything is made what cannot be done: tapes that are too small.
 GradientPlan checked(GradientPlan plan) {
   if (plan.make) static_cast<void>(plan.make());
   return plan;
 }
-
-/// Of one thread's tapes.
-double tape_bytes(const GenerateOptions& options, int threads) { return options.tape_memory.value_or(1e9 * threads) / threads; }
 
 /// Runs with what adds derivatives in between, if any are asked for.
 template <class Run>
@@ -299,12 +293,18 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   return make(options, console, job);
 }
 
+void check_word(const char* what, const std::string& word, const std::vector<std::string>& known) {
+  if (std::find(known.begin(), known.end(), word) == known.end())
+    throw InputError(fmt::format("unknown {} '{}'{}", what, word, suggestion(word, known)));
+}
+
 int generate(GenerateOptions options, const Console& console, const ProgramInfo& info) {
   static_cast<void>(
       precision_named(options.precision));  // a wrong word is said before a scene is read
-  if (options.compress != "none" && options.compress != "deflate")
-    throw InputError(fmt::format("unknown compression '{}'{}", options.compress,
-                                 suggestion(options.compress, std::vector<std::string>{"none", "deflate"})));
+  check_word("compression", options.compress, {"none", "deflate", "lz4"});
+  check_word("kind of tactile fields", options.tactile, {"dense", "sparse"});
+  if (options.compress == "lz4")
+    console.note("compressed with LZ4: other programs need the HDF5 plug-in for filter 32004 to read it");
   if (options.resume && options.overwrite)
     throw InputError("--resume with --overwrite; expected one of them: keep shards, or replace them");
   if (!options.shard.empty()) {
@@ -370,7 +370,11 @@ Command add_generate(CLI::App& program) {
            "Of tactile fields: double, or mixed, stored as float32 [default: mixed]");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between episodes [default: 0]");
-  add_text(*app, "--compress", o.compress, "NAME", "Of tactile fields on disk: none or deflate [default: none]");
+  add_text(*app, "--compress", o.compress, "NAME", "Of tactile fields on disk: none, deflate or lz4, which needs a plug-in to read [default: none]");
+  add_text(*app, "--tactile", o.tactile, "KIND",
+           "Of large fields on disk: dense, or sparse: tiles of zeros left out [default: dense]");
+  add_text(*app, "--record", o.record, "LIST",
+           "Observations to store, separated by commas [default: all]");
   add_text(*app, "--gradients", o.gradients, "KIND",
            "Derivatives as well: none, return (of a scene: with --loss), or jacobians, row by row [default: none]");
   add_text(*app, "--loss", o.loss, "NAME",
@@ -381,6 +385,7 @@ Command add_generate(CLI::App& program) {
                                  "Files to cut the data set into [default: below a gigabyte each]");
   add_text(*app, "--shard", o.shard, "k/S", "Make shard k of S alone, k from 0; others may run beside it");
   app->add_flag("--resume", o.resume, "Keep the shards in the folder, of the same settings, and make the rest");
+  app->add_flag("--no-merge", o.no_merge, "Shards alone: do not merge them when all are there");
   app->add_flag("--dry-run", o.dry_run, "Say what would be made, and how long it may take");
   app->add_flag("--overwrite", o.overwrite, "Replace the shards in the folder");
   app->add_flag("--allow-unknown", o.allow_unknown,

@@ -10,6 +10,8 @@
 
 #include "apps/workers.hpp"
 #include "engine/error.hpp"
+#include "io/dataset_merge.hpp"
+#include "io/nearest_name.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -69,7 +71,30 @@ double free_bytes_at(const std::string& path) {
   return static_cast<double>(fs::space(folder).available);
 }
 
+GradientKind gradient_kind_named(const std::string& name) {
+  std::vector<std::string> names;
+  for (const GradientKind kind : {GradientKind::none, GradientKind::returns, GradientKind::jacobians}) {
+    names.emplace_back(to_string(kind));
+    if (names.back() == name) return kind;
+  }
+  throw InputError("unknown gradients '" + name + "'" + suggestion(name, names));
+}
+
 }  // namespace
+
+GradientKind gradients_wanted(const GenerateOptions& options, bool of_task) {
+  const GradientKind kind = gradient_kind_named(options.gradients);
+  if (options.tape_memory && kind != GradientKind::returns)
+    throw InputError(fmt::format("--tape-memory with --gradients {}; expected --gradients return", options.gradients));
+  if (!options.loss.empty() && (of_task || kind != GradientKind::returns))
+    throw InputError(fmt::format("--loss {} with {}; expected a scene and --gradients return", options.loss,
+                                 of_task ? "a task" : "--gradients " + options.gradients));
+  if (!of_task && kind == GradientKind::returns && options.loss.empty())
+    throw InputError("--gradients return of a scene, which has no rewards; expected --loss as well");
+  return kind;
+}
+
+double tape_bytes(const GenerateOptions& options, int threads) { return options.tape_memory.value_or(1e9 * threads) / threads; }
 
 DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& layout, const Console& console) {
   DatasetOutput output{options.output, ExistingShards::refuse, std::nullopt};
@@ -86,6 +111,20 @@ DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& la
   console.note(fmt::format("process {} of {} ({}): makes {} of {} shards", worker.index, worker.count, worker.source,
                            output.only->size(), shards));
   return output;
+}
+
+Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output) {
+  Merged merged;
+  if (options.no_merge || !output.complete()) return merged;
+  MergeOptions replace;
+  replace.overwrite = true;  // links of an earlier run lead to other shards, or to as many
+  const MergeResult result = merge_dataset(find_dataset(options.output), replace);
+  merged.keys["merged"] = result.file;
+  merged.line = fmt::format("\nmerged: {}", result.file);
+  if (result.minari_id.empty()) return merged;
+  merged.keys["minari_id"] = result.minari_id;
+  merged.line += fmt::format(", {} for Minari", result.minari_id);
+  return merged;
 }
 
 int dry_run(const GenerateOptions& options, const Console& console, const Job& job) {

@@ -10,17 +10,19 @@
 #include "apps/command.hpp"
 #include "apps/console.hpp"
 #include "io/dataset_writer.hpp"
+#include "tasks/episode_gradients.hpp"
 #include "tasks/episodes.hpp"
 
 namespace tangere::apps {
 
 struct GenerateOptions {
-  std::string scene, output, controls, policy, shard, precision = "mixed", compress = "none", gradients = "none", loss;
+  std::string scene, output, controls, policy, shard, precision = "mixed", compress = "none", tactile = "dense", record;
+  std::string gradients = "none", loss;
   std::optional<std::int64_t> episodes, steps, shards;
   std::optional<int> every, threads;
   std::optional<std::uint64_t> seed;
   std::optional<double> tape_memory;
-  bool overwrite = false, resume = false, dry_run = false, allow_unknown = false;
+  bool overwrite = false, resume = false, dry_run = false, no_merge = false, allow_unknown = false;
 };
 
 /// What a run of a task adds: keys of the JSON object, a line for people.
@@ -43,8 +45,20 @@ struct Job {
   std::function<JobResult(const EpisodeOptions&, EpisodeSink&, const EpisodeProgress&, const StopRequest&)> simulate;
 };
 
+/// What --gradients and its companions ask for, of a scene or a task. Throws InputError for what does not go together.
+GradientKind gradients_wanted(const GenerateOptions& options, bool of_task);
+/// Of one thread's tapes.
+double tape_bytes(const GenerateOptions& options, int threads);
+
 /// Shards that this process is to make, and what becomes of those that are there. Says so where it is not alone.
 DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& layout, const Console& console);
+
+/// What a complete data set is shown as: paths for the JSON object, null where it is not complete or not wanted.
+struct Merged {
+  Json keys{{"merged", nullptr}, {"minari_id", nullptr}};
+  std::string line;
+};
+Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output);
 
 /// Says what would be made, and how long that may take: some episodes are simulated for it. Writes nothing.
 int dry_run(const GenerateOptions& options, const Console& console, const Job& job);

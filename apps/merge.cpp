@@ -41,7 +41,7 @@ Command add_merge(CLI::App& program) {
   app->add_flag("--copy", options->copy, "Copy all numbers, for a file that needs no shards beside it");
   app->add_flag("--overwrite", options->overwrite, "Replace what an earlier merge wrote");
   add_console_options(*app, *console);
-  app->footer("Example:\n  tangere merge balls");
+  app->footer("Example:\n  tangere merge balls --overwrite");
   return {app, [=](const ProgramInfo&) { return merge(*input, *options, *console); }};
 }
 

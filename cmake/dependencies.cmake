@@ -9,9 +9,11 @@ if(NOT TARGET xtl)
   set_property(TARGET xsimd PROPERTY INTERFACE_LINK_LIBRARIES "")
 endif()
 find_package(HDF5 REQUIRED COMPONENTS C)
-# Debian 12's libdeflate comes without files for CMake; io links it by its plain name.
+# Debian 12's libdeflate and liblz4 come without files for CMake; io links them by their plain names.
 find_path(LIBDEFLATE_INCLUDE_DIR libdeflate.h REQUIRED)
 find_library(LIBDEFLATE_LIBRARY deflate REQUIRED)
+find_path(LIBLZ4_INCLUDE_DIR lz4.h REQUIRED)
+find_library(LIBLZ4_LIBRARY lz4 REQUIRED)
 find_package(tinyxml2 CONFIG REQUIRED)
 find_package(CLI11 CONFIG REQUIRED)
 find_package(fmt CONFIG REQUIRED)

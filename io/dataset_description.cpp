@@ -14,6 +14,7 @@
 namespace tangere {
 namespace {
 
+constexpr std::int64_t kFormatVersion = 2;
 constexpr const char* kGradients = "gradients";  // of /scene: the attribute and the group
 constexpr const char* kByRow = "one for each action";
 constexpr std::size_t kLongText = 60;  // bytes: beyond it a value is shown by the line that differs
@@ -36,6 +37,11 @@ void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
     units.push_back(tensor.unit);
     meanings.push_back(tensor.meaning);
   }
+  for (std::vector<std::string>* list : {&units, &meanings}) {
+    std::vector<std::string> stored;
+    for (const std::size_t k : layout.recorded()) stored.push_back((*list)[k]);
+    *list = std::move(stored);
+  }
   h5::write_attribute(scene, "observation_units", std::span<const std::string>(units));
   h5::write_attribute(scene, "observation_meanings", std::span<const std::string>(meanings));
 }
@@ -43,6 +49,7 @@ void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
 void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "name", layout.scene_name);
   h5::write_attribute(scene, "text", layout.scene_text);
+  h5::write_attribute(scene, "tables", layout.tables);
   h5::write_attribute(scene, "controls", layout.controls);
   h5::write_scalar<std::uint64_t>(scene, "seed", layout.seed);
   h5::write_scalar<std::int64_t>(scene, "steps", layout.steps);
@@ -53,6 +60,7 @@ void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_scalar<double>(scene, "tolerance", layout.tolerance);
   h5::write_attribute(scene, "precision", layout.precision);
   h5::write_attribute(scene, "compression", layout.compression);
+  h5::write_attribute(scene, "tactile", layout.sparse ? "sparse" : "dense");
   h5::write_attribute(scene, "tangere_version", layout.version);
   h5::write_attribute(scene, "instruction_set", layout.instruction_set);
 }
@@ -134,7 +142,7 @@ std::string json_text(const std::string& text) {
 
 void describe_dataset(const h5::Id& file, const DatasetLayout& layout) {
   h5::write_attribute(file, "format", "tangere dataset");
-  h5::write_scalar<std::int64_t>(file, "format_version", 1);
+  h5::write_scalar<std::int64_t>(file, "format_version", kFormatVersion);
   h5::write_scalar<std::int64_t>(file, "dataset_episodes", layout.episodes);
   h5::write_scalar<std::int64_t>(file, "dataset_shards", layout.shard_count());
   h5::write_attribute(file, "command", layout.command);
@@ -158,8 +166,10 @@ std::vector<Setting> read_settings(const h5::Id& file) {
   add_attributes(scene, "", settings);
   for (const std::string& sensor : h5::link_names(sensors))
     add_attributes(h5::open_group(sensors, sensor), "sensors/" + sensor + "/", settings);
-  for (const std::string& name : gradient_names(scene))
-    add_attributes(h5::open_group(h5::open_group(scene, kGradients), name), std::string(kGradients) + "/" + name + "/", settings);
+  if (!h5::has_link(scene, kGradients)) return settings;
+  const h5::Id gradients = h5::open_group(scene, kGradients);
+  for (const std::string& name : h5::link_names(gradients))
+    add_attributes(h5::open_group(gradients, name), std::string(kGradients) + "/" + name + "/", settings);
   return settings;
 }
 
@@ -184,13 +194,15 @@ std::vector<std::string> differences(const std::vector<Setting>& there, const st
   return lines;
 }
 
-std::vector<std::string> gradient_names(const h5::Id& scene) {
-  if (!h5::has_link(scene, kGradients)) return {};
-  return h5::link_names(h5::open_group(scene, kGradients));
-}
-
-bool gradient_by_row(const h5::Id& scene, const std::string& name) {
-  return h5::read_text(h5::open_group(h5::open_group(scene, kGradients), name), "rows") == kByRow;
+std::vector<GradientSaid> gradients_said(const h5::Id& scene) {
+  std::vector<GradientSaid> list;
+  if (!h5::has_link(scene, kGradients)) return list;
+  const h5::Id all = h5::open_group(scene, kGradients);
+  for (const std::string& name : h5::link_names(all)) {
+    const h5::Id one = h5::open_group(all, name);
+    list.push_back({name, h5::read_text(one, "meaning"), h5::read_text(one, "rows") == kByRow});
+  }
+  return list;
 }
 
 std::vector<std::int64_t> demo_numbers(const h5::Id& data) {

@@ -23,9 +23,13 @@ std::vector<Setting> read_settings(const h5::Id& file);
 /// What differs, a line each: "seed: 9 there, 1 here". Of long texts the first lines that differ. Empty when nothing does.
 std::vector<std::string> differences(const std::vector<Setting>& there, const std::vector<Setting>& here);
 
-/// Derivatives that every demo of a file has, sorted; none in most. Whether one has a row for each action.
-std::vector<std::string> gradient_names(const h5::Id& scene);
-bool gradient_by_row(const h5::Id& scene, const std::string& name);
+/// What a file says of a derivative that each of its demos has.
+struct GradientSaid {
+  std::string name, meaning;
+  bool by_row = false;  ///< a row for each action
+};
+/// By name; none in most.
+std::vector<GradientSaid> gradients_said(const h5::Id& scene);
 
 /// Numbers of the demos in an open /data, ascending.
 std::vector<std::int64_t> demo_numbers(const h5::Id& data);

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
-#include <regex>
+#include <string_view>
 
 #include "engine/error.hpp"
 #include "io/dataset_description.hpp"
@@ -22,11 +22,18 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t kMostShards = 100'000'000;  // a damaged count must not become a loop for ever
 
+/// "shard-00042.h5".
+bool is_shard(std::string_view name) {
+  constexpr std::string_view kBegin = "shard-", kEnd = ".h5";
+  if (!name.starts_with(kBegin) || !name.ends_with(kEnd) || name.size() <= kBegin.size() + kEnd.size()) return false;
+  const std::string_view number = name.substr(kBegin.size(), name.size() - kBegin.size() - kEnd.size());
+  return number.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
 std::vector<std::string> shards_in(const std::string& folder) {
-  static const std::regex pattern("shard-[0-9]+\\.h5");
   std::vector<std::string> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    if (std::regex_match(entry.path().filename().string(), pattern)) files.push_back(entry.path().string());
+    if (is_shard(entry.path().filename().string())) files.push_back(entry.path().string());
   std::sort(files.begin(), files.end(), [](const std::string& a, const std::string& b) {
     return std::pair(a.size(), a) < std::pair(b.size(), b);
   });

@@ -74,11 +74,27 @@ void DatasetFolder::hold() {
       fmt::format("cannot write into '{}': another process is writing shards there", path_));
 }
 
+bool DatasetFolder::hold_alone() {
+  if (!shared_) return true;
+  return flock(descriptor_.number, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;  // as in hold()
+}
+
 std::vector<std::string> DatasetFolder::files_ending(const std::string& suffix) const {
   std::vector<std::string> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(path_))
     if (is_shard(entry.path().filename().string(), suffix)) files.push_back(entry.path().string());
   std::sort(files.begin(), files.end());
+  return files;
+}
+
+/// As io/dataset_merge.hpp and io/minari_view.hpp name them.
+std::vector<std::string> DatasetFolder::merged_files() const {
+  std::vector<std::string> files;
+  std::error_code none_there;
+  for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(path_) / "minari" / "tangere", none_there))
+    files.push_back((entry.path() / "data" / "main_data.hdf5").string());
+  files.push_back((fs::path(path_) / "robomimic.hdf5").string());
+  std::erase_if(files, [](const std::string& file) { return !fs::is_regular_file(file); });
   return files;
 }
 
@@ -97,6 +113,7 @@ double DatasetFolder::free_bytes() const {
 void DatasetFolder::remove_old_shards() {
   if (existing_ != ExistingShards::replace || shared_) return;
   std::vector<std::string> files = shards();
+  for (const std::string& merged : merged_files()) files.push_back(merged);
   std::reverse(files.begin(), files.end());
   for (const std::string& file : files)
     if (unlink(file.c_str()) != 0) fail("remove", file, errno);

@@ -22,17 +22,20 @@ class DatasetFolder {
   DatasetFolder(const DatasetFolder&) = delete;
   DatasetFolder& operator=(const DatasetFolder&) = delete;
 
+  /// Whether this process holds the folder alone, or could from now on; where others hold it as well, it lets go of it.
+  [[nodiscard]] bool hold_alone();
   [[nodiscard]] std::string shard_path(std::int64_t shard) const;
   /// Paths of all that is called like a shard, sorted.
   [[nodiscard]] std::vector<std::string> shards() const { return files_ending(".h5"); }
   /// Space on the disk that shards may fill, those to be removed included [bytes].
   [[nodiscard]] double free_bytes() const;
   /// Removes the shards of an earlier run where they are to be replaced, last one first, so that what is left begins
-  /// with 0. Not in a shared folder, where each shard is replaced by its own.
+  /// with 0; before them what shows them as one. Not in a shared folder, where each shard is replaced by its own.
   void remove_old_shards();
 
  private:
   void hold();
+  [[nodiscard]] std::vector<std::string> merged_files() const;
   [[nodiscard]] std::vector<std::string> files_ending(const std::string& suffix) const;
 
   /// Closed, and with it the lock, however the constructor ends.

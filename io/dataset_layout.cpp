@@ -9,6 +9,8 @@
 #include <numeric>
 #include <set>
 
+#include "io/nearest_name.hpp"
+
 namespace tangere {
 namespace {
 
@@ -19,6 +21,13 @@ std::int64_t blocks_of(std::int64_t episodes) { return (episodes + kBlockEpisode
 
 constexpr const char* kVariables = "variables";
 
+template <class T>
+std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>& places) {
+  std::vector<T> some;
+  for (const std::size_t k : places) some.push_back(all[k]);
+  return some;
+}
+
 }  // namespace
 
 std::vector<std::string> DatasetLayout::action_names() const {
@@ -28,7 +37,17 @@ std::vector<std::string> DatasetLayout::action_names() const {
   return names;
 }
 
-std::vector<std::string> DatasetLayout::observation_names() const {
+std::vector<std::string> DatasetLayout::observation_names() const { return chosen(all_observation_names(), recorded()); }
+
+std::vector<std::size_t> DatasetLayout::recorded() const {
+  const std::vector<std::string> names = all_observation_names();
+  std::vector<std::size_t> places;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    if (record.empty() || std::find(record.begin(), record.end(), names[k]) != record.end()) places.push_back(k);
+  return places;
+}
+
+std::vector<std::string> DatasetLayout::all_observation_names() const {
   std::vector<std::string> names{"q", "v"};
   if (task) {
     for (const TensorSpec& tensor : task->observations) names.push_back(tensor.name);
@@ -43,7 +62,7 @@ std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() cons
   std::vector<std::vector<std::uint64_t>> shapes{{q_names.size()}, {v_names.size()}};
   if (task) {
     for (const TensorSpec& tensor : task->observations) shapes.emplace_back(tensor.shape.begin(), tensor.shape.end());
-    return shapes;
+    return chosen(shapes, recorded());
   }
   if (!variable_names.empty()) shapes.push_back({variable_names.size(), 3});
   for (const SensorLayout& s : sensors) {
@@ -52,7 +71,7 @@ std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() cons
     else
       shapes.push_back({static_cast<std::uint64_t>(s.points), 3});
   }
-  return shapes;
+  return chosen(shapes, recorded());
 }
 
 double DatasetLayout::episode_bytes() const {
@@ -100,6 +119,10 @@ void DatasetLayout::check() const {
   if (shards > blocks_of(episodes))
     throw InputError(fmt::format("{} shards of {} episodes; expected at most {}, one for each block of {}", shards,
                                  episodes, blocks_of(episodes), kBlockEpisodes));
+  const std::vector<std::string> all = all_observation_names();
+  for (const std::string& name : record)
+    if (std::find(all.begin(), all.end(), name) == all.end())
+      throw InputError(fmt::format("--record: unknown observation '{}'{}", name, suggestion(name, all)));
   std::set<std::string> names{"q", "v"};
   if (!variable_names.empty()) names.insert(kVariables);
   for (const SensorLayout& sensor : sensors) {

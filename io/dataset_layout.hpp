@@ -38,6 +38,7 @@ struct DatasetLayout {
   std::optional<TaskSpec> task;  ///< whose actions, observations and rewards these are; none: a scene alone
   std::string policy;            ///< of a task
   std::string scene_name, scene_text;
+  std::string tables = "none";  ///< of files that the text refers to: their checksum
   std::string integrator;
   double timestep = 0;   ///< [s]
   double tolerance = 0;  ///< of the scaled residual, dimensionless
@@ -46,7 +47,9 @@ struct DatasetLayout {
   std::string command;           ///< that makes this data set, without what does not change it (threads, folder …)
   double shard_bytes = 1 << 30;  ///< a shard stays below it, unless 16 episodes are more
   std::int64_t shards = 0;       ///< how many; 0: as shard_bytes says
-  std::string compression = "none";  ///< or "deflate": of observations whose rows are large enough
+  std::string compression = "none";  ///< or "deflate", "lz4": of observations whose rows are large enough
+  bool sparse = false;               ///< parts of large fields that are zero are left out
+  std::vector<std::string> record;   ///< observations to store; none: all there are
   std::string gradients_of;               ///< what derivatives are of, in words; empty: there are none
   std::vector<GradientArray> gradients;   ///< those stored with an episode
 
@@ -54,7 +57,11 @@ struct DatasetLayout {
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
   /// Names of the numbers of an action.
   [[nodiscard]] std::vector<std::string> action_names() const;
-  /// Names below obs: q, v, then what a task observes, or "variables" if there are end effectors and the sensors.
+  /// All there are: q, v, then what a task observes, or "variables" if there are end effectors and the sensors.
+  [[nodiscard]] std::vector<std::string> all_observation_names() const;
+  /// Places in that list, and in pieces of episodes, of those that are stored, ascending.
+  [[nodiscard]] std::vector<std::size_t> recorded() const;
+  /// Names below obs.
   [[nodiscard]] std::vector<std::string> observation_names() const;
   /// Shapes of one row of each of them: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
   [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
@@ -66,7 +73,8 @@ struct DatasetLayout {
   /// Whole blocks of 16 episodes; where `shards` is given, as many in each as in any other, or one more.
   [[nodiscard]] EpisodeRange shard_episodes(std::int64_t shard) const;
   [[nodiscard]] std::int64_t shard_of(std::int64_t episode) const;
-  /// Throws InputError when a sensor cannot be a name in a file, or there are more shards than blocks.
+  /// Throws InputError when a sensor cannot be a name in a file, there are more shards than blocks, or what is to be
+  /// recorded is not there.
   void check() const;
 };
 
@@ -83,6 +91,8 @@ struct DatasetDescription {
   std::string compression = "none";
   std::string gradients_of;
   std::vector<GradientArray> gradients;
+  bool sparse = false;
+  std::vector<std::string> record = {};
 };
 
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,

@@ -14,10 +14,11 @@
 #include <stdexcept>
 
 #include "engine/error.hpp"
-#include "io/chunk_codec.hpp"
 #include "io/dataset_description.hpp"
 #include "io/dataset_folder.hpp"
+#include "io/demo_format.hpp"
 #include "io/h5_listing.hpp"
+#include "io/prepared_piece.hpp"
 #include "io/shard_file.hpp"
 
 namespace tangere {
@@ -33,18 +34,18 @@ struct DatasetWriter::Impl {
   DatasetLayout layout;
   DatasetOutput output;
   DatasetFolder folder;
+  DemoFormat format;
   std::vector<EpisodeRange> missing;
   std::map<std::int64_t, ShardFile> open;
   std::set<std::int64_t> complete;
-  std::vector<std::int64_t> rows_of_chunks;
   std::mutex prepared_mutex;
-  std::map<std::pair<std::int64_t, std::int64_t>, std::vector<CompressedChunk>> prepared;  // by episode and row
+  std::map<std::pair<std::int64_t, std::int64_t>, PreparedPiece> prepared;  // by episode and row
   std::int64_t kept = 0, kept_failed = 0;
   bool started = false;
 
   Impl(const DatasetOutput& o, const DatasetLayout& l)
       : layout((l.check(), l)), output(o), folder(o.folder, o.existing, o.only.has_value()),
-        rows_of_chunks(chunk_rows(layout)) {
+        format(layout) {
     if (output.existing != ExistingShards::replace) check_settings();
     // Before shards are counted one by one: a slip of the keyboard may ask for billions.
     if (makes_all()) check_space(static_cast<double>(layout.episodes));
@@ -105,7 +106,7 @@ struct DatasetWriter::Impl {
   }
 
   void check_space(double episodes) const {
-    if (layout.compression != "none") return;  // nobody knows before
+    if (has_chunks(layout)) return;  // nobody knows before
     const double needed = layout.episode_bytes() * episodes, available = folder.free_bytes();
     if (needed > available)
       throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free", output.folder, needed,
@@ -119,7 +120,7 @@ struct DatasetWriter::Impl {
     if (!started) folder.remove_old_shards();
     started = true;
     const bool replace = output.only && output.existing == ExistingShards::replace;
-    return open.try_emplace(shard, folder.shard_path(shard), layout, layout.shard_episodes(shard), replace)
+    return open.try_emplace(shard, folder.shard_path(shard), layout, format, layout.shard_episodes(shard), replace)
         .first->second;
   }
 };
@@ -133,24 +134,19 @@ std::int64_t DatasetWriter::kept() const { return impl_->kept; }
 std::int64_t DatasetWriter::kept_failed() const { return impl_->kept_failed; }
 
 void DatasetWriter::prepare(const EpisodeRows& rows) {
-  if (impl_->layout.compression == "none") return;
-  std::vector<CompressedChunk> chunks = compress(impl_->layout, impl_->rows_of_chunks, rows);
+  PreparedPiece piece = prepare_piece(impl_->layout, impl_->format, rows);
   const std::lock_guard lock(impl_->prepared_mutex);
-  impl_->prepared[{rows.first_episode, rows.first_row}] = std::move(chunks);
+  impl_->prepared[{rows.first_episode, rows.first_row}] = std::move(piece);
 }
 
 void DatasetWriter::write(const EpisodeRows& rows) {
-  if (impl_->layout.compression == "none") {
-    impl_->shard_of(rows.first_episode).write(rows, {});
-    return;
-  }
-  decltype(impl_->prepared)::node_type chunks;
+  decltype(impl_->prepared)::node_type prepared;
   {
     const std::lock_guard lock(impl_->prepared_mutex);
-    chunks = impl_->prepared.extract({rows.first_episode, rows.first_row});
+    prepared = impl_->prepared.extract({rows.first_episode, rows.first_row});
   }
-  if (chunks.empty()) throw std::logic_error("a piece that nobody prepared");
-  impl_->shard_of(rows.first_episode).write(rows, chunks.mapped());
+  impl_->shard_of(rows.first_episode)
+      .write(rows, prepared.empty() ? prepare_piece(impl_->layout, impl_->format, rows) : std::move(prepared.mapped()));
 }
 
 void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) {
@@ -161,6 +157,11 @@ void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpi
   const std::int64_t number = impl_->layout.shard_of(first_episode);
   impl_->open.erase(number);
   impl_->complete.insert(number);
+}
+
+bool DatasetWriter::complete() {
+  // Held first: the last of several to let go sees the shards of all.
+  return impl_->folder.hold_alone() && std::ssize(impl_->folder.shards()) == impl_->layout.shard_count();
 }
 
 std::vector<std::string> DatasetWriter::shards() const {

@@ -43,6 +43,9 @@ class DatasetWriter : public EpisodeSink {
 
   /// Paths of the complete shards, kept ones among them, in ascending order.
   [[nodiscard]] std::vector<std::string> shards() const;
+  /// Whether the data set is complete and no other process writes into its folder: of several that end at the same time, at
+  /// least one is told so. Nothing may be written afterwards.
+  [[nodiscard]] bool complete();
 
  private:
   struct Impl;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/error.hpp"
+#include "io/h5_lz4.hpp"
 
 namespace tangere::h5 {
 namespace {
@@ -201,12 +202,31 @@ Id create_memory_file() {
 
 Id open_file(const std::string& path) {
   const Quiet quiet;
+  allow_lz4();
   const Id access(H5Pcreate(H5P_FILE_ACCESS));
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
   H5Pset_file_locking(access.get(), false, true);  // read-only folders and network mounts
   Id file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()));
   if (file.get() < 0) throw IoError(fmt::format("cannot read '{}': {}", path, last_reason()));
   return file;
+}
+
+Id change_file(const std::string& path) {
+  const Quiet quiet;
+  const Id access(H5Pcreate(H5P_FILE_ACCESS));
+  H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
+  H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
+  H5Pset_file_locking(access.get(), false, true);
+  Id file(H5Fopen(path.c_str(), H5F_ACC_RDWR, access.get()));
+  if (file.get() < 0) throw IoError(fmt::format("cannot write into '{}': {}", path, last_reason()));
+  return file;
+}
+
+void link_object(const Id& parent, const std::string& name, std::uint64_t address) {
+  const Quiet quiet;
+  const Id object(H5Oopen_by_addr(parent.get(), address));
+  if (object.get() < 0 || H5Olink(object.get(), parent.get(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT) < 0)
+    fail("link", parent, name);
 }
 
 void close_file(Id& file, const std::string& path) {
@@ -238,11 +258,6 @@ bool has_link(const Id& parent, const std::string& name) {
   return H5Lexists(parent.get(), name.c_str(), H5P_DEFAULT) > 0;
 }
 
-void remove_link(const Id& parent, const std::string& name) {
-  const Quiet quiet;
-  if (H5Ldelete(parent.get(), name.c_str(), H5P_DEFAULT) < 0) fail("remove", parent, name);
-}
-
 template <class T>
 Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
                   const Storage& storage) {
@@ -251,10 +266,6 @@ Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
   if (space.get() < 0) fail("lay out dataset", parent, name);
   const Id creation = without_times(H5P_DATASET_CREATE);
   const Id access(H5Pcreate(H5P_DATASET_ACCESS));
-  if (storage.reserve) {
-    H5Pset_alloc_time(creation.get(), H5D_ALLOC_TIME_EARLY);
-    H5Pset_fill_time(creation.get(), H5D_FILL_TIME_NEVER);
-  }
   if (!storage.chunk.empty()) {
     if (H5Pset_chunk(creation.get(), static_cast<int>(storage.chunk.size()),
                      storage.chunk.data()) < 0)
@@ -321,13 +332,6 @@ void read_box(const Id& dataset, const Dims& offset, const Dims& count, T* data)
     fail("read", dataset);
 }
 
-void write_chunk(const Id& dataset, const Dims& offset, std::span<const unsigned char> bytes) {
-  const Quiet quiet;
-  constexpr std::uint32_t kEveryFilter = 0;  // a mask of those that were left out
-  if (H5Dwrite_chunk(dataset.get(), H5P_DEFAULT, kEveryFilter, offset.data(), bytes.size(), bytes.data()) < 0)
-    fail("write a chunk of", dataset);
-}
-
 void write_attribute(const Id& object, const std::string& name, std::string_view text) {
   const Quiet quiet;
   const std::string copy(text);
@@ -363,13 +367,6 @@ void write_list(const Id& object, const std::string& name, std::span<const T> va
   const Quiet quiet;
   store(object, name, Types<T>::disk(), Types<T>::memory(), list_space(values.size()),
         values.data());
-}
-
-void replace_list(const Id& object, const std::string& name, std::span<const double> values) {
-  const Quiet quiet;
-  const OpenAttribute open(object, name);
-  if (open.elements != values.size() || H5Awrite(open.attribute.get(), H5T_NATIVE_DOUBLE, values.data()) < 0)
-    fail("replace attribute", object, name);
 }
 
 std::vector<std::string> read_texts(const Id& object, const std::string& name) {

@@ -65,22 +65,21 @@ Id create_file(const std::string& path, hsize_t description_block = 2048, bool v
 Id create_memory_file();
 /// Opens a file for reading.
 Id open_file(const std::string& path);
+/// Opens a file for reading and writing, as create_file left it.
+Id change_file(const std::string& path);
+/// Gives an object that is at an address of the file its name.
+void link_object(const Id& parent, const std::string& name, std::uint64_t address);
 /// Flushes and closes a file; unlike Id::reset, it reports what could not be written.
 void close_file(Id& file, const std::string& path);
 
 Id create_group(const Id& parent, const std::string& name);
 Id open_group(const Id& parent, const std::string& name);
 [[nodiscard]] bool has_link(const Id& parent, const std::string& name);
-/// Removes a group or dataset and all below it. Its space in the file stays unused.
-void remove_link(const Id& parent, const std::string& name);
 
 /// How a dataset lies on disk.
 struct Storage {
   Dims chunk;             ///< empty: contiguous
   bool compress = false;  ///< shuffle, then deflate level 1; needs a chunk shape
-  /// The place on disk is fixed when the dataset is created and nothing is filled in, so that the
-  /// order of writes does not show. For contiguous datasets whose every number will be written.
-  bool reserve = false;
 };
 
 /// T: double, float, std::int8_t, std::int32_t, std::int64_t, std::uint64_t. On disk: little endian.
@@ -99,9 +98,6 @@ void write_box(const Id& dataset, const Dims& offset, const Dims& count, const T
 template <class T>
 void read_box(const Id& dataset, const Dims& offset, const Dims& count, T* data);
 
-/// Writes a chunk that has been through the dataset's filters already, all of them. `offset`: of its first element.
-void write_chunk(const Id& dataset, const Dims& offset, std::span<const unsigned char> bytes);
-
 /// Text attributes are variable-length UTF-8, which h5py shows as str. Text must not contain NUL.
 void write_attribute(const Id& object, const std::string& name, std::string_view text);
 void write_attribute(const Id& object, const std::string& name, std::span<const std::string> texts);
@@ -110,9 +106,6 @@ template <class T>
 void write_scalar(const Id& object, const std::string& name, T value);
 template <class T>
 void write_list(const Id& object, const std::string& name, std::span<const T> values);
-
-/// New values for a list of numbers that is there, as many of them.
-void replace_list(const Id& object, const std::string& name, std::span<const double> values);
 
 [[nodiscard]] std::string read_text(const Id& object, const std::string& name);
 [[nodiscard]] std::vector<std::string> read_texts(const Id& object, const std::string& name);

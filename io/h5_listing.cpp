@@ -30,6 +30,13 @@ std::vector<std::string> link_names(const Id& group) {
   return names;
 }
 
+std::size_t link_count(const Id& group) {
+  const Quiet quiet;
+  H5G_info_t info;
+  if (H5Gget_info(group.get(), &info) < 0) throw IoError("cannot count the links of a group: HDF5 finds them damaged");
+  return info.nlinks;
+}
+
 std::vector<std::string> attribute_names(const Id& object) {
   const Quiet quiet;
   std::vector<std::string> names;

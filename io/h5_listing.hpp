@@ -11,6 +11,7 @@ namespace tangere::h5 {
 
 /// Names of a group's links, sorted. Throws IoError.
 std::vector<std::string> link_names(const Id& group);
+std::size_t link_count(const Id& group);
 /// Names of an object's attributes, sorted. Throws IoError.
 std::vector<std::string> attribute_names(const Id& object);
 /// Elements separated by ", "; numbers in the fewest digits that give them back. Throws IoError.

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "io/dataset_layout.hpp"
+#include "io/scene_tables.hpp"
 #include "io/trajectory_layout.hpp"
 
 namespace tangere {
@@ -171,6 +172,9 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.compression = run.compression;
   layout.gradients_of = run.gradients_of;
   layout.gradients = run.gradients;
+  layout.sparse = run.sparse;
+  layout.tables = tables_of(model.scene());
+  layout.record = run.record;
   return layout;
 }
 

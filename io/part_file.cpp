@@ -9,6 +9,7 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -163,6 +164,44 @@ void PartFile::write(std::string_view bytes) {
     }
     bytes.remove_prefix(static_cast<std::size_t>(written));
   }
+}
+
+void PartFile::write_at(std::uint64_t offset, std::span<iovec> pieces) {
+  constexpr std::size_t kMostPieces = 1024;  // IOV_MAX of Linux
+  while (!pieces.empty()) {
+    const auto count = static_cast<int>(std::min(pieces.size(), kMostPieces));
+    const ssize_t result = pwritev(descriptor_, pieces.data(), count, static_cast<off_t>(offset));
+    if (result < 0) {
+      if (errno == EINTR) continue;
+      fail("write", path_, errno);
+    }
+    auto written = static_cast<std::size_t>(result);
+    offset += written;
+    while (!pieces.empty() && written >= pieces.front().iov_len) {
+      written -= pieces.front().iov_len;
+      pieces = pieces.subspan(1);
+    }
+    if (written == 0) continue;
+    pieces.front().iov_base = static_cast<unsigned char*>(pieces.front().iov_base) + written;
+    pieces.front().iov_len -= written;
+  }
+}
+
+void PartFile::read_at(std::uint64_t offset, std::span<unsigned char> bytes) const {
+  while (!bytes.empty()) {
+    const ssize_t result = pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (result < 0 && errno == EINTR) continue;
+    if (result < 0) fail("read", path_, errno);
+    if (result == 0) throw IoError(fmt::format("'{}' ends at byte {}, expected more of it", path_, offset));
+    offset += static_cast<std::uint64_t>(result);
+    bytes = bytes.subspan(static_cast<std::size_t>(result));
+  }
+}
+
+std::uint64_t PartFile::size() const {
+  struct stat info {};
+  if (fstat(descriptor_, &info) != 0) fail("look at", path_, errno);
+  return static_cast<std::uint64_t>(info.st_size);
 }
 
 void PartFile::empty() noexcept {

@@ -2,7 +2,10 @@
 // An output appears under its name whole or not at all: it is written beside it as <name>.part.
 #pragma once
 
+#include <sys/uio.h>
+
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -27,6 +30,11 @@ class PartFile {
   [[nodiscard]] std::uint64_t free_bytes() const;
 
   void write(std::string_view bytes);
+  /// At a place of the file, one piece after the other. Leaves `pieces` as it likes.
+  void write_at(std::uint64_t offset, std::span<iovec> pieces);
+  /// Throws IoError where the file ends before.
+  void read_at(std::uint64_t offset, std::span<unsigned char> bytes) const;
+  [[nodiscard]] std::uint64_t size() const;
   /// Gives the space back at once, so that a library can close its file on a disk that is full.
   void empty() noexcept;
   /// Forces the bytes to the disk and renames the .part to the output. Throws IoError.

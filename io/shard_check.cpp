@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "engine/error.hpp"
 #include "io/dataset_description.hpp"
 #include "io/h5.hpp"
+#include "io/h5_listing.hpp"
 
 namespace tangere {
 namespace {
@@ -23,15 +25,19 @@ std::uint64_t mix(std::uint64_t hash, std::uint64_t word) {
   return hash ^ (hash >> 32);
 }
 
+/// Four words side by side: a multiplication takes as long as four do one after the other.
 std::uint64_t row_hash(std::uint64_t key, const unsigned char* bytes, std::size_t count) {
-  std::uint64_t hash = mix(key, count), word = 0;  // count: a row is not the same row with zeros behind it
-  for (; count >= sizeof word; bytes += sizeof word, count -= sizeof word) {
-    std::memcpy(&word, bytes, sizeof word);
-    hash = mix(hash, word);
+  std::array<std::uint64_t, 4> hash{}, words{};
+  hash[0] = mix(key, count);  // count: a row is not the same row with zeros behind it
+  for (std::size_t lane = 1; lane < hash.size(); ++lane) hash[lane] = mix(hash[lane - 1], lane);
+  for (; count >= sizeof words; bytes += sizeof words, count -= sizeof words) {
+    std::memcpy(words.data(), bytes, sizeof words);
+    for (std::size_t lane = 0; lane < hash.size(); ++lane) hash[lane] = mix(hash[lane], words[lane]);
   }
-  word = 0;
-  std::memcpy(&word, bytes, count);
-  return mix(hash, word);
+  words = {};
+  std::memcpy(words.data(), bytes, count);
+  for (std::size_t lane = 0; lane < hash.size(); ++lane) hash[lane] = mix(hash[lane], words[lane]);
+  return mix(mix(mix(hash[0], hash[1]), hash[2]), hash[3]);
 }
 
 constexpr std::size_t kMostProblems = 100;  // of a shard: a thousand lines say no more
@@ -41,29 +47,31 @@ class ShardChecker {
   ShardChecker(const std::string& path, bool finite)
       : finite_(finite), file_(h5::open_file(path)), scene_(h5::open_group(file_, "scene")) {}
 
+  /// Of the first and the last episode everything but sums, of the others that they are counted.
+  ShardReport sample() {
+    const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
+    read_description();
+    for (const std::int64_t episode : {content_.first_episode, end_ - 1}) add_episode(data, failed, episode);
+    const auto demos = static_cast<std::int64_t>(h5::link_count(data));
+    const auto lost = static_cast<std::int64_t>(h5::link_count(failed));
+    if (demos + lost != end_ - content_.first_episode)
+      fail(fmt::format("it has {} demos and {} failed episodes, expected {} together", demos, lost,
+                       end_ - content_.first_episode));
+    return {content_, problems_};
+  }
+
   ShardReport check() {
     if (h5::read_text(file_, "format") != "tangere dataset") {
       fail("it is no tangere data set");
       return {content_, problems_};
     }
-    content_.first_episode = number(file_, "first_episode");
-    const std::int64_t end = content_.first_episode + number(file_, "episodes");
-    names_ = h5::read_texts(scene_, "observations");
-    single_ = h5::read_text(scene_, "observation_type") == "float32";
-    rows_ = number(scene_, "steps") / number(scene_, "every");
-    of_task_ = !h5::read_text(scene_, "task").starts_with("none");
-    gradients_ = gradient_names(scene_);
-    const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
-    for (std::int64_t episode = content_.first_episode; episode < end; ++episode) {
-      const std::string demo = fmt::format("demo_{}", episode);
-      const bool is_demo = h5::has_link(data, demo);
-      if (is_demo == h5::has_link(failed, fmt::format("episode_{}", episode)))
-        fail(fmt::format("episode {} is not in exactly one of /data and /failed", episode));
-      if (is_demo)
-        try_demo(data, demo, episode);
-      else
-        ++content_.failed;
+    if (const std::int64_t version = number(file_, "format_version"); version != 2) {
+      fail(fmt::format("its format_version is {}, expected 2", version));
+      return {content_, problems_};
     }
+    read_description();
+    const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
+    for (std::int64_t episode = content_.first_episode; episode < end_; ++episode) add_episode(data, failed, episode);
     if (number(data, "total") != content_.rows)
       fail(fmt::format("/data says {} rows, its demos have {}", number(data, "total"),
                        content_.rows));
@@ -77,6 +85,25 @@ class ShardChecker {
   }
 
  private:
+  void read_description() {
+    content_.first_episode = number(file_, "first_episode");
+    end_ = content_.first_episode + number(file_, "episodes");
+    names_ = h5::read_texts(scene_, "observations");
+    single_ = h5::read_text(scene_, "observation_type") == "float32";
+    rows_ = number(scene_, "steps") / number(scene_, "every");
+    of_task_ = !h5::read_text(scene_, "task").starts_with("none");
+    gradients_ = gradients_said(scene_);
+  }
+  void add_episode(const h5::Id& data, const h5::Id& failed, std::int64_t episode) {
+    const std::string demo = fmt::format("demo_{}", episode);
+    const bool is_demo = h5::has_link(data, demo);
+    if (is_demo == h5::has_link(failed, fmt::format("episode_{}", episode)))
+      fail(fmt::format("episode {} is not in exactly one of /data and /failed", episode));
+    if (is_demo)
+      try_demo(data, demo, episode);
+    else
+      ++content_.failed;
+  }
   void fail(const std::string& what) {
     if (problems_.size() < kMostProblems) problems_.push_back(what);
   }
@@ -113,14 +140,18 @@ class ShardChecker {
         add<double>(final_obs, names_[k], episode, k + 1, rows, 1);
       }
     }
-    for (std::size_t k = 0; k < gradients_.size(); ++k) {
-      const h5::Dims dims = h5::dimensions(h5::open_dataset(demo, gradients_[k]));
-      if (dims.empty()) return fail(fmt::format("demo_{}: {} is one number, expected a list", episode, gradients_[k]));
-      const bool by_row = gradient_by_row(scene_, gradients_[k]);
-      add<double>(demo, gradients_[k], episode, names_.size() + 2 + k, 0, by_row ? rows : static_cast<std::int64_t>(dims[0]));
-    }
+    for (std::size_t k = 0; k < gradients_.size(); ++k) add_gradient(demo, gradients_[k], episode, names_.size() + 2 + k, rows);
     content_.rows += rows;
     ++content_.demos;
+  }
+
+  void add_gradient(const h5::Id& demo, const GradientSaid& said, std::int64_t episode, std::size_t index, std::int64_t rows) {
+    const h5::Id dataset = h5::open_dataset(demo, said.name);
+    if (h5::read_text(dataset, "meaning") != said.meaning)
+      fail(fmt::format("demo_{}: {} says another meaning than /scene", episode, said.name));
+    const h5::Dims dims = h5::dimensions(dataset);
+    if (dims.empty()) return fail(fmt::format("demo_{}: {} is one number, expected a list", episode, said.name));
+    add<double>(demo, said.name, episode, index, 0, said.by_row ? rows : static_cast<std::int64_t>(dims[0]));
   }
 
   /// A list of zeros whose last number is `last`.
@@ -178,9 +209,10 @@ class ShardChecker {
   bool finite_;
   std::vector<std::string> problems_, not_finite_;
   h5::Id file_, scene_;
-  std::vector<std::string> names_, gradients_;
+  std::vector<std::string> names_;
+  std::vector<GradientSaid> gradients_;
   bool single_ = false, of_task_ = false;
-  std::int64_t rows_ = 0;
+  std::int64_t rows_ = 0, end_ = 0;
   std::tuple<std::vector<float>, std::vector<double>> buffers_;
   ContentSum sum_;
   ShardContent content_;
@@ -203,6 +235,11 @@ ShardReport examine_shard(const std::string& path) {
   } catch (const IoError& error) {
     return {{}, {error.what()}};
   }
+}
+
+void sample_shard(const std::string& path) {
+  const ShardReport report = ShardChecker(path, false).sample();
+  if (!report.problems.empty()) throw IoError(fmt::format("'{}' is damaged: {}", path, report.problems.front()));
 }
 
 ShardContent check_shard(const std::string& path) {

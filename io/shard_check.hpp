@@ -41,4 +41,8 @@ ShardReport examine_shard(const std::string& path);
 /// Reads a shard whole. Throws IoError naming the file and what is missing or differs.
 ShardContent check_shard(const std::string& path);
 
+/// Counts all episodes and reads the first and the last one: of a shard whose bytes are known, whether they are a data set.
+/// Throws IoError as check_shard().
+void sample_shard(const std::string& path);
+
 }  // namespace tangere

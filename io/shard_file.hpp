@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One HDF5 file of a data set: all places are fixed block by block in ascending order, then filled
-// in any order, so that its bytes do not depend on the order in which blocks are finished.
+// One HDF5 file of a data set, whose bytes do not depend on the order in which blocks are finished. The library writes what the
+// file says of the data set; demos, thousands of them, are laid out here.
 #pragma once
 
 #include <cstdint>
@@ -9,64 +9,81 @@
 #include <vector>
 
 #include "engine/episode_sink.hpp"
-#include "io/chunk_codec.hpp"
 #include "io/dataset_layout.hpp"
+#include "io/demo_format.hpp"
 #include "io/h5.hpp"
+#include "io/h5_trees.hpp"
 #include "io/part_file.hpp"
-#include "io/shard_check.hpp"
+#include "io/placed_file.hpp"
+#include "io/prepared_piece.hpp"
 
 namespace tangere {
 
 class ShardFile {
  public:
-  /// Creates `<path>.part`. Throws IoError, also when `path` exists and `overwrite` is false. `layout` must outlive it.
-  ShardFile(const std::string& path, const DatasetLayout& layout, EpisodeRange range, bool overwrite);
+  /// Creates `<path>.part`. Throws IoError, also when `path` exists and `overwrite` is false. `layout` and `format` must
+  /// outlive it.
+  ShardFile(const std::string& path, const DatasetLayout& layout, const DemoFormat& format, EpisodeRange range,
+            bool overwrite);
   ~ShardFile();
   ShardFile(const ShardFile&) = delete;
   ShardFile& operator=(const ShardFile&) = delete;
 
-  /// `chunks`: of the same piece, where the layout compresses.
-  void write(const EpisodeRows& rows, std::span<const CompressedChunk> chunks);
+  /// `prepared`: of the same piece.
+  void write(const EpisodeRows& rows, PreparedPiece prepared);
   void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures);
   /// Whether every block has finished.
   [[nodiscard]] bool complete() const { return unfinished_ == 0; }
-  /// Moves failed episodes out of /data, closes, reads everything back, syncs and renames.
+  /// Names the demos that did not fail, reads everything back, syncs and renames.
   void commit();
 
  private:
-  /// The open datasets of one episode.
-  struct Demo {
-    h5::Id group;
-    h5::Id actions;
-    h5::Id rewards;
-    std::vector<h5::Id> obs, final_obs;  // per observation
-    std::vector<h5::Id> gradients;       // per array
-    std::int64_t length = 0;             // actions
-    std::vector<double> randomized;
-    ContentSum sum;
+  /// In memory until its block has a place; or, where memory is full, on disk already.
+  struct Chunk {
+    h5::FileChunk place;
+    std::vector<unsigned char> bytes;
   };
-  using Block = std::vector<Demo>;
+  struct Demo {
+    DemoFacts facts;
+    bool failed = false;
+    ContentSum sum;
+    std::vector<std::uint64_t> addresses;          // per dataset, once known
+    std::vector<std::vector<unsigned char>> held;  // per dataset: numbers of a block without a place
+    std::vector<std::vector<Chunk>> chunks;        // per dataset
+  };
+  struct Block {
+    std::vector<Demo> demos;
+    std::uint64_t base = 0;
+    bool finished = false;
+  };
 
   void describe();
-  void create_block(std::int64_t first_episode, std::span<const EpisodeEnd> ends);
-  Demo create_demo(std::int64_t episode, const EpisodeEnd* end);
-  void write_randomized(Demo& demo, const EpisodeRows& rows, int episode) const;
-  void write_rewards(Demo& demo, const EpisodeRows& rows, int episode);
-  void write_observation(Demo& demo, const EpisodeRows& rows, int episode, std::size_t name);
-  void create_gradients(Demo& demo) const;
-  void write_gradients(Demo& demo, const EpisodeRows& rows, int episode) const;
-  [[nodiscard]] bool compresses_last(std::size_t name) const;
+  void complete_description(std::uint64_t data);
+  [[nodiscard]] bool waits() const { return cut_; }  // sizes are known when a block has ended
+  Block& block_of(const EpisodeRows& rows);
+  void give_place(Block& block, std::int64_t first_episode);
+  void write_slices(Block& block, const EpisodeRows& rows, int episode);
+  [[nodiscard]] std::span<const unsigned char> constant(std::size_t dataset, std::int64_t rows) const;
+  void hold(Block& block, std::vector<PreparedChunk>& chunks);
+  void give_place_to_held(Block& block);
+  void write_held(Block& block);
+  void close_block(Block& block, std::int64_t first_episode, const h5::Bytes& indexes);
   void record_failures();
 
   const DatasetLayout& layout_;
-  std::int64_t first_episode_, end_, created_;  // created_: the first episode without a place
-  std::int64_t unfinished_;                     // blocks
-  std::vector<std::string> names_;
-  std::vector<std::vector<std::uint64_t>> shapes_;
-  std::vector<std::int64_t> rows_of_chunks_;
+  const DemoFormat& format_;
+  std::int64_t first_episode_, end_, unfinished_, next_;  // blocks that are unfinished; the first one without a place
+  bool cut_;  // into chunks
   PartFile part_;
-  h5::Id file_, data_;
-  std::map<std::int64_t, Block> blocks_;  // unfinished ones, by their first episode
+  PlacedFile placed_;
+  h5::Id file_;
+  std::uint64_t texts_ = 0, begin_ = 0;   // of what demos refer to; of the blocks
+  std::uint64_t free_ = 0;                // behind the last byte that is taken
+  std::map<std::int64_t, Block> blocks_;  // by their first episode
+  std::size_t held_bytes_ = 0;            // of chunks
+  std::vector<float> no_rewards_;
+  std::vector<std::int8_t> dones_;
+  std::vector<h5::FileMember> members_;
   std::vector<FailedEpisode> failures_;
   std::map<std::int64_t, std::vector<double>> randomized_of_failures_;  // by episode
   std::int64_t rows_ = 0;  // of demos, failed ones left out

@@ -14,6 +14,9 @@ namespace {
 
 using kernels::kBlock;
 
+/// Of a task: one that a thread plays and those that wait for an earlier one to be written (tasks/task_episodes.cpp).
+constexpr double kBlocksOfThread = 3;
+
 std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 std::vector<std::string> texts(std::span<const std::string> all) { return {all.begin(), all.end()}; }
@@ -312,7 +315,7 @@ GradientPlan task_episode_gradients(const Task& task, const TaskActions& actions
   const Model& model = task.model();
   if (kind == GradientKind::jacobians) {
     plan.arrays = arrays_of_jacobians(model, actions_of(task));
-    plan.bytes = bytes_of(plan.arrays, task.spec().horizon) + double(model.workspace_bytes()) * (2 + 2 * model.nv());
+    plan.bytes = kBlocksOfThread * bytes_of(plan.arrays, task.spec().horizon) + double(model.workspace_bytes()) * (2 + 2 * model.nv());
     plan.make = [&task, &actions, &run, arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
       return std::make_unique<TaskJacobians>(task, actions, run, arrays);
     };
@@ -326,7 +329,7 @@ GradientPlan task_episode_gradients(const Task& task, const TaskActions& actions
   options.precision = run.precision;
   options.parameters = true;
   options.tape_bytes = tape_bytes;
-  plan.bytes = bytes_of(plan.arrays, task.spec().horizon) + task_gradient_bytes(task, options);
+  plan.bytes = kBlocksOfThread * bytes_of(plan.arrays, task.spec().horizon) + task_gradient_bytes(task, options);
   plan.make = [&task, &actions, options, arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
     return std::make_unique<TaskReturns>(task, actions, options, arrays);
   };

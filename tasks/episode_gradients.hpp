@@ -31,7 +31,7 @@ class EpisodeGradients {
 struct GradientPlan {
   std::vector<GradientArray> arrays;
   std::function<std::unique_ptr<EpisodeGradients>()> make;
-  double bytes = 0;  ///< memory of one thread's scratch and of a block's results
+  double bytes = 0;  ///< memory of one thread's scratch and of its blocks' results
 };
 
 /// Of a scene's episodes. `loss`, of returns alone, and all else must outlive the plan; `loss_meaning` says what it is.

@@ -23,8 +23,8 @@ struct TaskEpisodeSummary {
   double mean_return = 0;
 };
 
-/// Plays episodes 0 … episodes - 1, or the ranges of them, and hands them to the sink: as many blocks of 16 at a time as there are threads, in
-/// ascending order. Neither threads nor the number of episodes changes a bit of one. Throws InputError for episodes or
+/// Plays episodes 0 … episodes - 1, or the ranges of them, and hands them to the sink: each block of 16 on one thread, in ascending order, while others
+/// are played. Neither threads nor the number of episodes changes a bit of one. `policy` and `progress` are called by many threads, `progress` by one at a time. Throws InputError for episodes or
 /// threads below 1 and passes on what the sink throws.
 TaskEpisodeSummary run_task_episodes(const Task& task, const Policy& policy, const TaskEpisodeOptions& options,
                                      EpisodeSink& sink, const EpisodeProgress& progress = {},

@@ -25,7 +25,7 @@ class DatasetCommand : public testing::Test {
  protected:
   DatasetCommand() {
     const Outcome outcome = run(folder_, {"generate", scene("rolling_ball_small.xml"), "--output", "set", "--episodes",
-                                          "40", "--steps", "20", "--seed", "3", "--shards", "3"});
+                                          "40", "--steps", "20", "--seed", "3", "--shards", "3", "--no-merge"});
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   }
   json answer(Words words, int exit_code = 0) const {
@@ -98,7 +98,7 @@ TEST_F(DatasetCommand, DamageAndStrangersAreProblemsNotCrashes) {
   for (const char* file : {"set/shard-00001.h5: ", "set/shard-00002.h5: "})
     EXPECT_THAT(report.at("problems").get<Words>(), testing::Contains(HasSubstr(file)));
   ASSERT_EQ(run(folder_, {"generate", scene("rolling_ball_small.xml"), "--output", "other", "--episodes", "40",
-                          "--steps", "20", "--seed", "4", "--shards", "3"})
+                          "--steps", "20", "--seed", "4", "--shards", "3", "--no-merge"})
                 .exit_code,
             0);
   for (const char* name : {"1", "2"}) {

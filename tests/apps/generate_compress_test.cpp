@@ -70,6 +70,7 @@ TEST(GenerateCompress, KeepsEveryNumberInBothPrecisionsOnAnyThreads) {
     EXPECT_THAT(answer.at("limited_by").get<std::string>(), testing::AnyOf("simulation", "compression", "writing"));
     EXPECT_EQ(sum(folder, "one"), sum(folder, "none"));
     EXPECT_EQ(sum(folder, "three"), sum(folder, "none"));
+    EXPECT_TRUE(folder.read("three" + kShard) == folder.read("one" + kShard));
     EXPECT_EQ(check_shard(folder.path("three" + kShard)).demos, 20);  // reads through HDF5's own filters
     EXPECT_LT(std::filesystem::file_size(folder.path("one" + kShard)),
               std::filesystem::file_size(folder.path("none" + kShard)) / 2);
@@ -95,6 +96,65 @@ TEST(GenerateCompress, EpisodesOfATaskShorterThanAChunkAreOneChunk) {
   generate(folder, "box_pushing", "deflate", {"--episodes", "40", "--compress", "deflate"});
   EXPECT_EQ(sum(folder, "none"), sum(folder, "deflate"));
   EXPECT_EQ(run(folder, {"validate", "deflate"}).exit_code, 0);
+}
+
+TEST(GenerateCompress, EveryKindHoldsTheSameNumbers) {
+  const Folder folder;
+  const Words size{"--episodes", "20", "--steps", "100", "--every", "5"};
+  const auto with = [&](Words more) {
+    more.insert(more.end(), size.begin(), size.end());
+    return more;
+  };
+  const std::string small = scene("rolling_ball_small.xml");
+  generate(folder, small, "plain", with({}));
+  for (const char* compress : {"none", "deflate", "lz4"}) {
+    const std::string set = std::string("sparse-") + compress;
+    const json answer = generate(folder, small, set, with({"--compress", compress, "--tactile", "sparse", "--threads", "1"}));
+    EXPECT_EQ(answer.at("tactile"), "sparse");
+    EXPECT_EQ(sum(folder, set), sum(folder, "plain"));
+    EXPECT_EQ(run(folder, {"validate", set}).exit_code, 0);
+    EXPECT_THAT(layout_of(folder, set, "data/demo_1/obs/pad").chunk, ElementsAre(testing::_, 16, 16, 3));
+    generate(folder, small, set + "2", with({"--compress", compress, "--tactile", "sparse", "--threads", "3"}));
+    EXPECT_TRUE(folder.read(set + kShard) == folder.read(set + "2" + kShard)) << compress;
+    EXPECT_LT(std::filesystem::file_size(folder.path(set + kShard)), std::filesystem::file_size(folder.path("plain" + kShard)));
+  }
+  const Outcome lz4 = run(folder, {"generate", small, "--output", "lz4", "--episodes", "3", "--steps", "20", "--compress", "lz4"});
+  EXPECT_THAT(lz4.err, HasSubstr("plug-in"));
+  EXPECT_THAT(layout_of(folder, "lz4", "data/demo_1/obs/pad").filters, ElementsAre(H5Z_FILTER_SHUFFLE, 32004));
+  // Copied as they are, and read through links.
+  EXPECT_EQ(run(folder, {"merge", "sparse-lz4", "--copy", "--overwrite"}).exit_code, 0);
+  EXPECT_EQ(run(folder, {"validate", "sparse-lz4/robomimic.hdf5"}).exit_code, 0);
+  EXPECT_EQ(run(folder, {"merge", "sparse-none", "--overwrite"}).exit_code, 0);
+  EXPECT_EQ(run(folder, {"validate", "sparse-none/robomimic.hdf5"}).exit_code, 0);
+}
+
+TEST(GenerateCompress, RecordsWhatWasAskedFor) {
+  const Folder folder;
+  const Words size{"--episodes", "20"};
+  generate(folder, "box_pushing", "some", {"--episodes", "20", "--record", "goal,q"});
+  generate(folder, "box_pushing", "all", size);
+  const h5::Id some = h5::open_file(folder.path("some" + kShard)), all = h5::open_file(folder.path("all" + kShard));
+  EXPECT_THAT(h5::read_texts(h5::open_group(some, "scene"), "observations"), ElementsAre("q", "goal"));
+  EXPECT_EQ(h5::read_texts(h5::open_group(some, "scene"), "observation_units").size(), 2U);
+  EXPECT_FALSE(h5::has_link(h5::open_group(some, "data/demo_7/obs"), "tactile"));
+  for (const char* name : {"data/demo_7/obs/goal", "data/demo_7/obs/q", "data/demo_7/final_obs/q", "data/demo_7/rewards"}) {
+    const h5::Id a = h5::open_dataset(some, name), b = h5::open_dataset(all, name);
+    const h5::Dims dims = h5::dimensions(a);
+    ASSERT_EQ(dims, h5::dimensions(b)) << name;
+    std::size_t count = 1;
+    for (const hsize_t n : dims) count *= n;
+    std::vector<float> of_a(count), of_b(count);
+    h5::read_box(a, h5::Dims(dims.size(), 0), dims, of_a.data());
+    h5::read_box(b, h5::Dims(dims.size(), 0), dims, of_b.data());
+    EXPECT_EQ(of_a, of_b) << name;
+  }
+  EXPECT_EQ(run(folder, {"validate", "some"}).exit_code, 0);
+  for (const auto& [list, message] : std::vector<std::pair<std::string, std::string>>{
+           {"q,tactil", "did you mean 'tactile'?"}, {"q,,v", "expected names separated by commas"}}) {
+    const Outcome wrong = run(folder, {"generate", "box_pushing", "--output", "x", "--episodes", "3", "--record", list});
+    EXPECT_EQ(wrong.exit_code, 2) << list;
+    EXPECT_THAT(wrong.err, HasSubstr(message));
+  }
 }
 
 TEST(GenerateCompress, IsASettingOfItsOwn) {

@@ -9,6 +9,7 @@
 #include "engine/control.hpp"
 #include "engine/step_jacobian.hpp"
 #include "io/h5.hpp"
+#include "io/h5_listing.hpp"
 #include "io/scene_reader.hpp"
 #include "io/shard_check.hpp"
 #include "tasks/losses.hpp"
@@ -200,6 +201,45 @@ TEST(GenerateGradients, FailedEpisodesLeaveNone) {
                                               "--overwrite", "--gradients"} + kind);
     EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
     EXPECT_EQ(check_shard(folder.path("set/shard-00000.h5")).failed, 3);
+  }
+}
+
+/// However observations are stored, derivatives are the same numbers, contiguous, with what they mean.
+TEST(GenerateGradients, AreTheSameBesideAnyObservations) {
+  const Folder folder;
+  const Words task{"box_pushing", "--episodes", "20", "--gradients", "return"};
+  const Words scene{kSmall, "--episodes", "20", "--steps", "100", "--every", "5", "--gradients", "jacobians"};
+  const std::vector<std::pair<std::string, Words>> ways{{"deflate", {"--compress", "deflate"}},
+                                                        {"lz4", {"--compress", "lz4"}},
+                                                        {"sparse", {"--tactile", "sparse"}},
+                                                        {"some", {"--record", "q"}}};
+  for (const auto& [what, words] : {std::pair{std::string("task"), task}, std::pair{std::string("scene"), scene}}) {
+    generate(folder, words + Words{"-o", what});
+    const h5::Id plain = h5::open_file(folder.path(what + "/shard-00000.h5"));
+    const h5::Id said = h5::open_group(plain, "scene/gradients");
+    const std::vector<std::string> names = h5::link_names(said);
+    ASSERT_GE(names.size(), 2U);
+    for (const auto& [way, more] : ways) {
+      const std::string set = what + "_" + way;
+      generate(folder, words + more + Words{"-o", set, "--threads", "1"});
+      generate(folder, words + more + Words{"-o", set + "_3", "--threads", "3"});
+      const std::string shard = folder.path(set + "/shard-00000.h5");
+      EXPECT_TRUE(bytes_of(shard) == bytes_of(folder.path(set + "_3/shard-00000.h5"))) << set;
+      EXPECT_EQ(run(folder, {"validate", set}).exit_code, 0) << set;
+      EXPECT_EQ(run(folder, {"validate", set + "/robomimic.hdf5"}).exit_code, 0) << set;
+      const h5::Id file = h5::open_file(shard);
+      for (const int episode : {0, 15, 19})
+        for (const std::string& name : names) {
+          const Array a = read(plain, episode, name), b = read(file, episode, name);
+          EXPECT_EQ(a.dims, b.dims);
+          EXPECT_EQ(a.values, b.values) << set << " " << name;
+          const h5::Id dataset = h5::open_dataset(file, "data/demo_" + std::to_string(episode) + "/" + name);
+          EXPECT_EQ(h5::read_text(dataset, "meaning"), h5::read_text(h5::open_group(said, name), "meaning"));
+        }
+    }
+    EXPECT_EQ(run(folder, {"merge", what, "--copy", "--overwrite"}).exit_code, 0);
+    EXPECT_EQ(run(folder, {"validate", what + "/robomimic.hdf5"}).exit_code, 0);
+    EXPECT_EQ(run(folder, {"export", what, "--csv", what + ".csv"}).exit_code, 0);
   }
 }
 

@@ -187,6 +187,57 @@ TEST(GenerateShards, OfAnotherSceneAreNotContinued) {
   EXPECT_THAT(outcome.err, HasSubstr("'<!-- heavier -->' here"));
 }
 
+TEST(GenerateShards, AreMergedByTheLastProcessAndNotBefore) {
+  const Folder folder;
+  const std::string merged = folder.path("set/robomimic.hdf5");
+  for (int shard = 0; shard < kShards; ++shard) {
+    EXPECT_FALSE(fs::exists(merged)) << shard;
+    const json answer = answer_of(run(folder, generate({"--json", "--shard", std::to_string(shard) + "/5"})));
+    EXPECT_EQ(answer.at("merged").is_null(), shard + 1 < kShards);
+  }
+  EXPECT_TRUE(fs::exists(merged));
+  EXPECT_TRUE(fs::exists(folder.path("set/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5")));
+  EXPECT_EQ(run(folder, {"validate", "set/robomimic.hdf5"}).exit_code, 0);
+  // Nothing is left to do, and it is merged again.
+  const json again = answer_of(run(folder, generate({"--json", "--resume"})));
+  EXPECT_EQ(again.at("merged"), "set/robomimic.hdf5");
+  EXPECT_EQ(again.at("minari_id"), "tangere/rolling_ball_small-v0");
+  // Of an earlier run nothing stays that could be taken for this one's.
+  EXPECT_TRUE(answer_of(run(folder, generate({"--json", "--overwrite", "--no-merge"}))).at("merged").is_null());
+  EXPECT_FALSE(fs::exists(merged));
+  EXPECT_FALSE(fs::exists(folder.path("set/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5")));
+}
+
+TEST(GenerateShards, OfProcessesThatEndTogetherAreMerged) {
+  const Folder folder;
+  std::vector<Words> environments;
+  for (int rank = 0; rank < 3; ++rank)
+    environments.push_back({"PMI_RANK=" + std::to_string(rank), "PMI_SIZE=3"});
+  run_beside(folder, generate(), environments);
+  EXPECT_EQ(run(folder, {"validate", "set/robomimic.hdf5"}).exit_code, 0);
+}
+
+TEST(GenerateShards, OfAnotherTableOfPointsAreNotContinued) {
+  const Folder folder;
+  std::string text = folder.read(scene("rolling_ball_small.xml"));
+  const std::size_t begin = text.find("<body name=\"pad\""), end = text.find("/>", begin) + 2;
+  text.replace(begin, end - begin,
+               "<body name=\"pad\" type=\"abstract\" mass=\"0.025\" inertia=\"1e-5 1e-5 1e-5\">"
+               "<collision contacts=\"points.txt\"/></body>");
+  folder.write("s.xml", text);
+  folder.write("points.txt", "2\n0.01 0 -0.005\n-0.01 0 -0.005\n");
+  Words words = generate();
+  words[1] = "s.xml";
+  const Outcome first = run(folder, words);
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  words.emplace_back("--resume");
+  EXPECT_EQ(run(folder, words).exit_code, 0);
+  folder.write("points.txt", "2\n0.01 0 -0.005\n-0.01 0 -0.0051\n");
+  const Outcome other = run(folder, words);
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr("tables: of checksum "));
+}
+
 TEST(GenerateShards, OfAnotherRunAreNotMixedInByAWorker) {
   const Folder folder;
   ASSERT_EQ(run(folder, generate({"--shard", "0/5"})).exit_code, 0);

@@ -42,7 +42,7 @@ class GenerateStop : public testing::Test {
   /// `generate` of a shard of 4096 episodes and what is left of `episodes`.
   static Words words(const std::string& episodes, const Words& more = {}) {
     Words all{"generate", "free.xml", "--output", "set",       "--episodes",
-              episodes,   "--steps",  "2",        "--threads", "2"};
+              episodes,   "--steps",  "2",        "--threads", "2", "--no-merge"};
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }

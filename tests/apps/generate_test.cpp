@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `tangere generate` as users meet it: its keys, its shards, its refusals; the same bytes on any number of threads.
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -254,6 +255,30 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"disk", {"--episodes", "1000000000"}, 3, "needs at least"},
         Refusal{"no_controls", {"--controls", "nowhere.csv"}, 3, "nowhere.csv"}),
     [](const auto& test) { return test.param.name; });
+
+/// Largest memory of any program that this one has started [bytes].
+double peak_memory() {
+  struct rusage usage {};
+  getrusage(RUSAGE_CHILDREN, &usage);
+  return 1024.0 * static_cast<double>(usage.ru_maxrss);
+}
+
+TEST(Generate, MemoryDoesNotGrowWithTheNumberOfEpisodes) {
+  for (const Words& kind : {Words{}, Words{"--compress", "deflate"}, Words{"--compress", "lz4", "--tactile", "sparse"}}) {
+    double before = 0;
+    for (const std::string episodes : {"64", "1024"}) {
+      const Folder folder;
+      Words words{"generate", scene("rolling_ball_small.xml"), "--output", "set", "--steps", "50", "--every", "5",
+                  "--threads", "2", "--no-merge", "--episodes", episodes};
+      words.insert(words.end(), kind.begin(), kind.end());
+      ASSERT_EQ(run(folder, words).exit_code, 0);
+      if (episodes == "64") before = peak_memory();
+    }
+    // A thousand episodes are 135 MB.
+    EXPECT_LT(peak_memory() - before, 48 << 20) << "from " << before;
+    EXPECT_LT(peak_memory(), 232 << 20);
+  }
+}
 
 TEST(Generate, PlacesThatAreNoFoldersAreNamed) {
   const Folder folder;
