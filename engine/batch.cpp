@@ -80,9 +80,7 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
     : model_(model),
       environments_(environments),
       blocks_(0),
-      seed_(seed),
-      q_(std::size_t(model.nq())),
-      v_(std::size_t(model.nv())) {
+      seed_(seed) {
   if (environments < 1)
     throw InputError("a batch of " + std::to_string(environments) + " environments; expected at least 1");
   const CompiledModel& m = model.compiled();
@@ -113,28 +111,20 @@ double* Batch::column(std::size_t lane) { return data_.data() + (lane / kBlock) 
 void Batch::draw_episode(std::size_t lane) {
   const CompiledModel& m = model_.compiled();
   const bool padding = lane >= std::size_t(environments_);
-  q_ = m.initial_q;
-  v_ = m.initial_v;
+  double* const own = column(lane);
+  for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = m.initial_q[std::size_t(i)];
+  for (int i = 0; i < m.nv; ++i) own[(m.layout.v + i) * kBlock] = m.initial_v[std::size_t(i)];
   for (std::size_t k = 0; k < m.scene.randomizations.size(); ++k) {
     const RandomizationDescription& d = m.scene.randomizations[k];
     const int row = m.randomized_row[k];
-    const bool of_state = row < m.layout.parameters;
-    if (padding) {
-      if (!of_state) column(lane)[std::size_t(row) * kBlock] = nominal(m, d);
-      continue;
-    }
-    const double value =
-        draw(d.distribution, RandomKey{seed_, episode_[lane], 0, purpose_of(d.target), std::uint32_t(k)});
-    if (!of_state) {
-      column(lane)[std::size_t(row) * kBlock] = value;
-    } else if (d.target == RandomTarget::joint_q) {
-      q_[std::size_t(row - m.layout.q)] = value;
-    } else {
-      v_[std::size_t(row - m.layout.v)] = value;
+    if (!padding) {
+      own[row * kBlock] = draw(d.distribution, RandomKey{seed_, episode_[lane], 0, purpose_of(d.target), std::uint32_t(k)});
+    } else if (row >= m.layout.parameters) {
+      own[row * kBlock] = nominal(m, d);
     }
   }
-  update_derived_rows(m, column(lane));
-  write_state(lane, q_, v_);
+  update_derived_rows(m, own);
+  complete_state(lane);
 }
 
 void Batch::reset(int environment, std::int64_t episode) {
@@ -150,18 +140,26 @@ void Batch::reset(int environment, std::int64_t episode) {
 
 void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<const double> v) {
   const CompiledModel& m = model_.compiled();
-  double* column = data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock;
-  const auto at = [&](int row) -> double& { return column[std::size_t(row) * kBlock]; };
-  for (int i = 0; i < m.nq; ++i) at(m.layout.q + i) = q[i];
-  for (int i = 0; i < m.nv; ++i) at(m.layout.v + i) = v[i];
+  double* const own = column(lane);
+  for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = q[std::size_t(i)];
+  for (int i = 0; i < m.nv; ++i) own[(m.layout.v + i) * kBlock] = v[std::size_t(i)];
+  complete_state(lane);
+}
+
+/// Quaternions of length one; the state before is the same.
+void Batch::complete_state(std::size_t lane) {
+  const CompiledModel& m = model_.compiled();
+  double* const own = column(lane);
+  const auto at = [&](int row) -> double& { return own[row * kBlock]; };
   for (const kernels::Link& link : m.links) {
     if (link.kind != kernels::JointKind::spherical) continue;
+    const int first = m.layout.q + link.q;
     double square = 0;
-    for (int k = 0; k < 4; ++k) square += q[link.q + k] * q[link.q + k];
+    for (int k = 0; k < 4; ++k) square += at(first + k) * at(first + k);
     // Already unit to rounding: kept as it is, so that a stored state continues bit for bit.
     if (std::abs(square - 1) < 1e-14) continue;
     const double scale = 1 / std::sqrt(square);
-    for (int k = 0; k < 4; ++k) at(m.layout.q + link.q + k) *= scale;
+    for (int k = 0; k < 4; ++k) at(first + k) *= scale;
   }
   for (int i = 0; i < m.nq; ++i) at(m.layout.previous_q + i) = at(m.layout.q + i);
   for (int i = 0; i < m.nv; ++i) at(m.layout.previous_v + i) = at(m.layout.v + i);

@@ -43,7 +43,8 @@ class Batch {
   [[nodiscard]] std::uint64_t seed() const { return seed_; }
   [[nodiscard]] std::int64_t episode(int environment) const { return episode_[std::size_t(environment)]; }
 
-  /// Draws another episode into one environment, as a new batch would have it: the same bits wherever it is drawn.
+  /// Draws another episode into one environment, as a new batch would have it: the same bits wherever it is drawn. Environments
+  /// of different blocks may be reset from different threads.
   void reset(int environment, std::int64_t episode);
   /// A held environment is not stepped and keeps its state; reset() lets it go as well.
   void hold(int environment, bool held = true) { held_[std::size_t(environment)] = held ? 1 : 0; }
@@ -90,6 +91,7 @@ class Batch {
  private:
   friend class Stepper;
   void write_state(std::size_t lane, std::span<const double> q, std::span<const double> v);
+  void complete_state(std::size_t lane);
   void draw_episode(std::size_t lane);
   [[nodiscard]] double* column(std::size_t lane);
 
@@ -105,7 +107,6 @@ class Batch {
   std::vector<std::uint8_t> has_history_;  // BDF2: the previous state is valid
   std::vector<std::uint8_t> held_;
   std::vector<std::int64_t> episode_;
-  std::vector<double> q_, v_;  // (nq), (nv): an episode on its way into its lane
 };
 
 }  // namespace tangere

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <thread>
 
 #include "kernels/kernel_table.hpp"
 #include "tests/engine/random_scene.hpp"
@@ -118,6 +119,25 @@ void poison(Batch& batch, int spared) {
     if (e % 3 == 1) q[2] = 1e30;
     if (e % 3 == 2) v[7] = 1e200;
     batch.set_state(e, q, v);
+  }
+}
+
+TEST(Batch, BlocksAreResetFromManyThreadsAtOnce) {
+  const Model model(varied());
+  constexpr int kThreads = 4, kRounds = 3000;
+  Batch batch(model, kThreads * kernels::kBlock, 5);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < kThreads; ++t)
+    threads.emplace_back([&, t] {
+      for (int round = 0; round < kRounds; ++round)
+        for (int e = t * kernels::kBlock; e < (t + 1) * kernels::kBlock; ++e) batch.reset(e, e + 100 * (round % 7));
+    });
+  for (std::thread& thread : threads) thread.join();
+  const int last = (kRounds - 1) % 7;
+  for (int e = 0; e < batch.environments(); ++e) {
+    const Batch alone(model, 1, 5, e + 100 * last);
+    EXPECT_EQ(q_of(batch, e), q_of(alone)) << e;
+    EXPECT_EQ(v_of(batch, e), v_of(alone)) << e;
   }
 }
 
