@@ -80,9 +80,7 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
     : model_(model),
       environments_(environments),
       blocks_(0),
-      seed_(seed),
-      q_(std::size_t(model.nq())),
-      v_(std::size_t(model.nv())) {
+      seed_(seed) {
   if (environments < 1)
     throw InputError("a batch of " + std::to_string(environments) + " environments; expected at least 1");
   const CompiledModel& m = model.compiled();
@@ -109,12 +107,11 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
 
 double* Batch::column(std::size_t lane) { return data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock; }
 
-/// Padding lanes keep the scene's own numbers.
+/// Padding lanes keep the scene's own numbers. Lanes of different blocks may be drawn by several threads at once.
 void Batch::draw_episode(std::size_t lane) {
   const CompiledModel& m = model_.compiled();
   const bool padding = lane >= std::size_t(environments_);
-  q_ = m.initial_q;
-  v_ = m.initial_v;
+  std::vector<double> q(m.initial_q.begin(), m.initial_q.end()), v(m.initial_v.begin(), m.initial_v.end());
   for (std::size_t k = 0; k < m.scene.randomizations.size(); ++k) {
     const RandomizationDescription& d = m.scene.randomizations[k];
     const int row = m.randomized_row[k];
@@ -128,13 +125,13 @@ void Batch::draw_episode(std::size_t lane) {
     if (!of_state) {
       column(lane)[std::size_t(row) * kBlock] = value;
     } else if (d.target == RandomTarget::joint_q) {
-      q_[std::size_t(row - m.layout.q)] = value;
+      q[std::size_t(row - m.layout.q)] = value;
     } else {
-      v_[std::size_t(row - m.layout.v)] = value;
+      v[std::size_t(row - m.layout.v)] = value;
     }
   }
   update_derived_rows(m, column(lane));
-  write_state(lane, q_, v_);
+  write_state(lane, q, v);
 }
 
 void Batch::reset(int environment, std::int64_t episode) {

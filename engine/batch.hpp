@@ -105,7 +105,6 @@ class Batch {
   std::vector<std::uint8_t> has_history_;  // BDF2: the previous state is valid
   std::vector<std::uint8_t> held_;
   std::vector<std::int64_t> episode_;
-  std::vector<double> q_, v_;  // (nq), (nv): an episode on its way into its lane
 };
 
 }  // namespace tangere
