@@ -14,7 +14,7 @@ namespace {
 double rate(std::int64_t count, double seconds) { return static_cast<double>(count) / seconds; }
 
 double newton_per_step(const BenchmarkResult& result) {
-  return rate(result.newton_iterations, static_cast<double>(result.environment_steps));
+  return rate(result.newton_iterations, static_cast<double>(result.simulation_steps));
 }
 
 /// Not a number in JSON: many readers keep 53 bits only.
@@ -76,7 +76,7 @@ std::string bench_row(const BenchRun& run, const BenchRun& first) {
 }
 
 std::string bench_footing(const BenchRun& run) {
-  return fmt::format("\nNewton iterations per step: {:.2f}, environments failed: {}, checksum: {}",
+  return fmt::format("\nNewton iterations per simulation step: {:.2f}, environments failed: {}, checksum: {}",
                      newton_per_step(run.result), run.result.failures.size(),
                      hexadecimal(run.result.checksum()));
 }

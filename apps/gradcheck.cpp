@@ -47,7 +47,24 @@ std::int64_t steps_of(const Options& o, const ControlProgram& controls) {
   return own < 0 ? kDefaultSteps : std::min(own, kDefaultSteps);
 }
 
-void print(const Console& console, const GradientCheck& check) {
+/// A check that compares nothing shows nothing.
+ExitCode exit_code(const GradientCheck& check) { return check.entries() == 0 ? kSomeFailed : kDone; }
+
+/// Why, and what may help. `what`: the loss.
+std::string nothing_compared(const GradientCheck& check, const char* what, const char* try_instead) {
+  const auto without = std::count_if(check.inputs.begin(), check.inputs.end(), [](const CheckedInput& c) { return !c.influence; });
+  std::string why;
+  if (check.kinks() == 0)
+    why = fmt::format("no input acts on the {} here, its gradient is zero", what);
+  else if (without == 0)
+    why = fmt::format("all {} derivatives looked at lie at kinks of the {}", check.kinks(), what);
+  else
+    why = fmt::format("{} derivatives lie at kinks of the {}, and other inputs do not act on it here", check.kinks(), what);
+  return fmt::format("nothing could be compared with differences: {}; try {}", why, try_instead);
+}
+
+/// `what`: the loss; `try_instead`: where nothing can be compared.
+void print(const Console& console, const GradientCheck& check, const char* what, const char* try_instead) {
   console.print(fmt::format("{:<8} {:>7} {:>8} {:>6} {:>12} {:>12} {:>12}  {}", "input", "entries", "compared", "kinks", "norm",
                             "differences", "tangent", "largest difference at"));
   for (const CheckedInput& c : check.inputs)
@@ -56,6 +73,10 @@ void print(const Console& console, const GradientCheck& check) {
   for (const CheckedInput& c : check.inputs)
     if (!c.influence)
       console.note(fmt::format("{} do not act on this loss here: nothing to compare", c.name));
+  if (check.entries() == 0) {
+    console.fail(nothing_compared(check, what, try_instead));
+    return;
+  }
   console.print(fmt::format("largest error {:.1e} of a gradient's norm, {} derivatives compared with differences, {} kinks",
                             check.max_relative_error(), check.entries(), check.kinks()));
 }
@@ -78,7 +99,7 @@ Json json_of(const GradientCheck& check) {
 /// What scenes and tasks have in common.
 Json json_of_check(const GradientCheck& check, std::uint64_t seed, const Stepper& stepper) {
   return {{"command", "gradcheck"},
-          {"exit_code", static_cast<int>(kDone)},
+          {"exit_code", static_cast<int>(exit_code(check))},
           {"loss", check.loss},
           {"seed", seed},
           {"integrator", to_string(stepper.integrator())},
@@ -118,7 +139,7 @@ int run_task(const Options& o, const Console& console, const Task& task) {
       },
       options);
   console.print(fmt::format("return {:.9g} of {} actions", check.loss, check.actions));
-  print(console, check);
+  print(console, check, "return", "another --seed or --policy, or more --actions");
   Json result = json_of_check(check, options.seed, stepper);
   result.update({{"task", spec.name},
                  {"policy", to_string(kind)},
@@ -126,7 +147,7 @@ int run_task(const Options& o, const Console& console, const Task& task) {
                  {"loss_name", "return"},
                  {"steps", check.actions * spec.steps_per_action}});
   console.result(result);
-  return kDone;
+  return exit_code(check);
 }
 
 int run(const Options& o, const Console& console) {
@@ -152,11 +173,11 @@ int run(const Options& o, const Console& console) {
   const GradientCheck check = check_gradient(
       start, [&](std::int64_t step, int, std::span<double> u) { controls.evaluate(step, 0, u); }, *loss, options);
   console.print(fmt::format("loss {:.9g}", check.loss));
-  print(console, check);
+  print(console, check, "loss", "another --seed, --loss or --steps");
   Json result = json_of_check(check, options.seed, stepper);
   result.update({{"scene", o.scene}, {"task", nullptr}, {"loss_name", to_string(kind)}, {"steps", options.steps}, {"every", every}});
   console.result(result);
-  return kDone;
+  return exit_code(check);
 }
 
 }  // namespace

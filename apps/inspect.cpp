@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere inspect: what a scene compiles to.
+// tangere inspect: what a scene compiles to, and what a task declares.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/inspect_joints.hpp"
+#include "apps/inspect_task.hpp"
+#include "apps/scene_run.hpp"
+#include "apps/task_run.hpp"
 #include "engine/control.hpp"
 #include "engine/model.hpp"
-#include "io/scene_reader.hpp"
 #include "io/trajectory_layout.hpp"
 #include "kernels/isa.hpp"
 
@@ -166,13 +168,22 @@ std::string as_text(const Model& model) {
                     kernels::active_isa_name());
 }
 
-int inspect(const Options& options, const Console& console) {
-  const SceneFile file = read_scene(options.scene, {options.allow_unknown});
-  for (const std::string& warning : file.warnings) console.note("warning: " + warning);
-  const Model model(file.scene);
+/// `task`: null for a scene alone.
+int report(const Model& model, const TaskSpec* task, const Console& console) {
+  if (task != nullptr) console.print(task_text(*task));
   console.print(as_text(model));
-  console.result(as_json(model));
+  Json result = as_json(model);
+  result["task"] = task != nullptr ? task_json(*task) : Json();
+  console.result(result);
   return kDone;
+}
+
+int inspect(const Options& options, const Console& console) {
+  if (const std::unique_ptr<Task> task = find_task(options.scene, console)) {
+    refuse_with_task(*task, {{"--allow-unknown", options.allow_unknown}});
+    return report(task->model(), &task->spec(), console);
+  }
+  return report(Model(read_scene_for(options.scene, options.allow_unknown, console)), nullptr, console);
 }
 
 }  // namespace
@@ -180,8 +191,8 @@ int inspect(const Options& options, const Console& console) {
 Command add_inspect(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
-  CLI::App* app = program.add_subcommand("inspect", "Show what a scene compiles to");
-  add_text(*app, "SCENE", options->scene, "", "Scene file (XML)")->required();
+  CLI::App* app = program.add_subcommand("inspect", "Show what a scene compiles to, and what a task declares");
+  add_text(*app, "SCENE", options->scene, "", "Scene file (XML), or the name of a task")->required();
   app->add_flag("--allow-unknown", options->allow_unknown,
                 "Unknown elements and attributes are warnings, not errors");
   add_console_options(*app, *console);

@@ -112,6 +112,7 @@ class Episode {
   void report(BenchmarkResult& result) const {
     for (const BlockTally& tally : tallies_) {
       result.environment_steps += tally.environment_steps;
+      result.simulation_steps += tally.environment_steps;
       result.newton_iterations += tally.newton_iterations;
       result.tactile_points += tally.tactile_points;
       result.failures.insert(result.failures.end(), tally.failures.begin(), tally.failures.end());

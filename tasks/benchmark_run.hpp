@@ -40,7 +40,8 @@ struct BenchmarkTime {
 struct BenchmarkResult {
   std::vector<BenchmarkTime> times;         ///< one per timed pass, in their order
   std::int64_t environment_steps = 0;       ///< tried in one pass, failing ones included
-  std::int64_t newton_iterations = 0;       ///< of one pass
+  std::int64_t simulation_steps = 0;        ///< the same of a scene; of a task those of its actions, resets included
+  std::int64_t newton_iterations = 0;       ///< of one pass, over simulation_steps
   std::int64_t tactile_points = 0;          ///< read in one pass
   std::vector<FailedEnvironment> failures;  ///< in the order of their steps
   /// One per environment: chains the bits of every field in the order of time, then of the final state. Depends on the

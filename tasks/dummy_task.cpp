@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The smallest task, to be copied: hold a pad at the height of a goal. docs/tasks.md goes through it line by line.
+// The smallest task, to be copied: hold a pad at the height of a goal. docs/tasks.md says what each part of it is for.
 #include <algorithm>
 
 #include "tasks/task_list.hpp"

@@ -107,13 +107,19 @@ class Insertion : public Task {
 
   void observe(const TaskView& view, std::span<double> o) const override {
     const std::span<const double> before = view.moments[0].tactile, after = view.moments[1].tactile;
-    std::array<double, 3 * kPads * kPoints> read{};
-    for (std::size_t i = 0; i < read.size(); ++i)
-      read[i] = after[i] + task_normal(view.seed, view.episode, 1 + view.actions, static_cast<std::uint32_t>(i), kNoise);
+    constexpr std::size_t kReading = 3 * kPads * kPoints;
+    std::array<double, kReading> read{}, first{};
+    const auto noise = [&](std::size_t i) {
+      return task_normal(view.seed, view.episode, 1 + view.actions, static_cast<std::uint32_t>(i), kNoise);
+    };
+    for (std::size_t i = 0; i < kReading; ++i) {
+      read[i] = after[i] + noise(i);
+      first[i] = before[i] + noise(kReading + i);
+    }
     std::array<ShearField<double>, kPads> pads;
     for (std::size_t pad = 0; pad < kPads; ++pad)
       pads[pad] = {std::span<const double>(read).subspan(3 * kPoints * pad, 3 * kPoints),
-                   before.subspan(3 * kPoints * pad, 3 * kPoints)};
+                   std::span<const double>(first).subspan(3 * kPoints * pad, 3 * kPoints)};
     std::array<double, 2 * kPads * kPoints> flow{};
     normalised_flow(pads, flow, kTooLittle);
     for (std::size_t pad = 0; pad < kPads; ++pad)

@@ -65,6 +65,7 @@ BenchmarkResult run_task_benchmark(const Task& task, const Policy& policy, int e
   // Counts of one pass; the others take the same steps.
   const VectorCounts counts = vector.counts();
   result.environment_steps = counts.environment_steps;
+  result.simulation_steps = counts.simulation_steps;
   result.newton_iterations = counts.newton_iterations;
   result.tactile_points = tactile_points(task) * environments * actions;
   return result;

@@ -14,6 +14,7 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using Words = std::vector<std::string>;
 
 json run_json(const Folder& folder, Words words) {
@@ -114,6 +115,9 @@ TEST(Tasks, BenchCountsActions) {
   EXPECT_EQ(answer.at("runs").at(0).at("steps"), 100);
   EXPECT_EQ(answer.at("runs").at(0).at("checksum"), answer.at("runs").at(1).at("checksum"));
   EXPECT_EQ(answer.at("runs").at(0).at("frames"), "none");
+  const double passes = answer.at("runs").at(0).at("newton_iterations");
+  EXPECT_GE(passes, 1) << "of each of the five steps of an action";
+  EXPECT_LT(passes, 4) << "not of an action";
 }
 
 TEST(Tasks, WhatTheyCannotTakeIsAnError) {
@@ -157,6 +161,52 @@ TEST(Tasks, GradcheckChecksTheReturn) {
   EXPECT_GE(answer.at("entries"), 8);
   EXPECT_EQ(answer.at("inputs").at(0).at("input"), "actions");
   EXPECT_EQ(answer.at("inputs").at(0).at("size"), 36);
+}
+
+/// A grasp that is lifted level pays 100, whatever acts on it a little.
+TEST(Tasks, GradcheckThatComparesNothingFails) {
+  const Folder folder;
+  const Words words{"gradcheck", "stable_grasp", "--actions", "1"};
+  const Outcome text = run(folder, words);
+  EXPECT_EQ(text.exit_code, 1);
+  EXPECT_THAT(text.err, HasSubstr("nothing could be compared with differences: no input acts on the return here"));
+  EXPECT_THAT(text.err, HasSubstr("try another --seed or --policy"));
+  EXPECT_THAT(text.out, Not(HasSubstr("largest error")));
+  Words with_json = words;
+  with_json.emplace_back("--json");
+  const json answer = json::parse(run(folder, with_json).out);
+  EXPECT_EQ(answer.at("exit_code"), 1);
+  EXPECT_EQ(answer.at("entries"), 0);
+}
+
+/// Every observation, shape and unit that a task declares; then the scene, with what the task varies.
+TEST(Tasks, InspectShowsWhatATaskDeclares) {
+  const Folder folder;
+  const Outcome text = run(folder, {"inspect", "box_pushing"});
+  EXPECT_EQ(text.exit_code, 0) << text.err;
+  for (const char* says : {"task box_pushing: ", "action u (3) [1]", "tactile (13, 10, 3) [N]", "5 steps per action",
+                           "at most 100 actions", "scene box_pushing", "effects\n", "stages\n"})
+    EXPECT_THAT(text.out, HasSubstr(says));
+  const json answer = run_json(folder, {"inspect", "insertion"});
+  const json& task = answer.at("task");
+  EXPECT_EQ(task.at("name"), "insertion");
+  EXPECT_EQ(task.at("action").at("shape"), json({3}));
+  EXPECT_EQ(task.at("action").at("low"), -1);
+  EXPECT_EQ(task.at("observations").at(0).at("name"), "flow");
+  EXPECT_EQ(task.at("observations").at(0).at("shape"), json({4, 13, 10}));
+  EXPECT_EQ(task.at("moments"), json({6, 44, 45}));
+  EXPECT_EQ(task.at("steps_per_action"), 45);
+  EXPECT_EQ(task.at("horizon"), 14);
+  EXPECT_EQ(task.at("opening"), true);
+  EXPECT_EQ(answer.at("randomized").size(), 14U) << "the skin of two pads, which the task varies";
+  EXPECT_TRUE(run_json(folder, {"inspect", scene("insertion.xml")}).at("task").is_null());
+  EXPECT_TRUE(run_json(folder, {"inspect", "dummy"}).at("task").at("observations").at(0).at("low").is_null());
+  const Outcome typo = run(folder, {"inspect", "box_pushin"});
+  EXPECT_EQ(typo.exit_code, 2);
+  EXPECT_THAT(typo.err, HasSubstr("did you mean 'box_pushing'?"));
+  const Outcome unknown = run(folder, {"inspect", "dummy", "--allow-unknown"});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("--allow-unknown with task 'dummy'"));
 }
 
 TEST(Tasks, GradcheckRefusesWhatIsOfScenesAlone) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tasks draw, what they pay, and whether they can be solved.
+// What tasks draw, what they pay, and what policies are.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -17,8 +17,6 @@ using testing::column;
 using testing::kDraws;
 using testing::kUnlikely;
 using testing::OwnView;
-using testing::play_episodes;
-using testing::Played;
 using testing::Start;
 using testing::starts;
 using testing::task_named;
@@ -226,27 +224,6 @@ TEST(Insertion, WhatGoesInFeelsNoRim) {
     }
   }
 }
-
-/// `least`: what the task's scripted policy reaches, less its 95 % interval at this number of episodes.
-void expect_solved(const std::string& name, int episodes, double least) {
-  const auto task = task_named(name);
-  const Played scripted = play_episodes(*task, PolicyKind::scripted, episodes);
-  EXPECT_GE(scripted.rate() + scripted.half_width(), least) << name << ": " << scripted.rate();
-  EXPECT_EQ(scripted.failures, 0);
-  const Played idle = play_episodes(*task, PolicyKind::hold, episodes / 4);
-  EXPECT_GT(scripted.rate(), idle.rate() + 2 * idle.half_width());
-}
-
-TEST(Scripted, HoldsThePad) { expect_solved("dummy", 1000, 1); }
-TEST(Scripted, RollsTheBall) { expect_solved("ball_rolling_small", 1000, 0.99); }
-TEST(Scripted, GraspsTheBar) { expect_solved("stable_grasp", 160, 0.98); }
-TEST(Scripted, InsertsTheBox) {
-  expect_solved("insertion_rotation", 300, 0.99);
-  expect_solved("insertion_translation", 300, 0.97);
-  expect_solved("insertion", 300, 0.80);
-}
-TEST(Scripted, OpensTheCap) { expect_solved("cap_opening_blind", 300, 0.96); }
-TEST(Scripted, PushesTheBox) { expect_solved("box_pushing_privileged", 1000, 0.71); }
 
 TEST(Policy, RandomKeepsTheBoundsAndATableItsRows) {
   const auto task = task_named("dummy");

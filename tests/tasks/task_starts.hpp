@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "engine/batch.hpp"
@@ -12,17 +13,25 @@
 
 namespace tangere::testing {
 
-/// Largest distance between the distribution of `x` and the uniform one on [low, high], times √n: below 1.63 with
-/// probability 0.99 (Kolmogorov, Smirnov).
-inline double uniform_distance(std::vector<double> x, double low, double high) {
+/// Largest distance between the distribution of `x` and the one that is below y with probability `below(y)`, times √n: below
+/// 1.63 with probability 0.99 (Kolmogorov, Smirnov).
+inline double distance_from(std::vector<double> x, const std::function<double(double)>& below) {
   std::sort(x.begin(), x.end());
   double most = 0;
   const auto n = double(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) {
-    const double expected = (x[i] - low) / (high - low);
+    const double expected = below(x[i]);
     most = std::max({most, expected - double(i) / n, double(i + 1) / n - expected});
   }
   return most * std::sqrt(n);
+}
+/// From the uniform distribution on [low, high].
+inline double uniform_distance(std::vector<double> x, double low, double high) {
+  return distance_from(std::move(x), [=](double y) { return (y - low) / (high - low); });
+}
+/// From the normal distribution.
+inline double normal_distance(std::vector<double> x, double mean, double deviation) {
+  return distance_from(std::move(x), [=](double y) { return 0.5 * std::erfc((mean - y) / (deviation * std::sqrt(2.0))); });
 }
 inline constexpr double kUnlikely = 1.63;
 inline constexpr int kDraws = 10000;

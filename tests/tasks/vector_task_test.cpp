@@ -3,6 +3,9 @@
 // ends and starts is Gymnasium's.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <iterator>
+
 #include "tests/tasks/task_check.hpp"
 
 namespace tangere {
@@ -27,19 +30,20 @@ TEST_P(EveryTask, DeclaresWhatItDoes) {
   EXPECT_THROW(vector.step(std::vector<double>(1)), InputError);
 }
 
-/// The first steps of 19 environments against each of them played alone with another number of threads.
+/// The first steps of 1000 environments, where they are cheap, else of 19, against some of them played alone with another
+/// number of threads.
 TEST_P(EveryTask, AnEpisodeIsTheSameAloneOrAmongOthers) {
   const auto task = task_named(GetParam());
   VectorOptions options;
   options.seed = 11;
   options.autoreset = false;  // the episode after depends on how many environments there are
-  constexpr int kEnvironments = 19;
+  const int environments = GetParam() == "dummy" || GetParam() == "box_pushing" ? 1000 : 19;
   const int steps = task->spec().steps_per_action > 20 ? 3 : 8;
-  const std::vector<Shown> among = play(*task, PolicyKind::random, kEnvironments, steps, options);
+  const std::vector<Shown> among = play(*task, PolicyKind::random, environments, steps, options);
   options.threads = 3;
-  EXPECT_EQ(play(*task, PolicyKind::random, kEnvironments, steps, options), among);
+  EXPECT_EQ(play(*task, PolicyKind::random, environments, steps, options), among);
   options.threads = 1;
-  for (const int e : {0, 7, 18}) {
+  for (const int e : {0, 7, environments - 1}) {
     options.first_episode = e;
     EXPECT_EQ(play(*task, PolicyKind::random, 1, steps, options)[0], among[std::size_t(e)]) << "episode " << e;
   }
@@ -47,6 +51,30 @@ TEST_P(EveryTask, AnEpisodeIsTheSameAloneOrAmongOthers) {
 
 INSTANTIATE_TEST_SUITE_P(Tasks, EveryTask, ::testing::ValuesIn(task_names()),
                          [](const auto& given) { return given.param; });
+
+/// Resets of many environments by several threads at once: what an episode draws is its own on its way into its lane.
+TEST(VectorTask, DrawsTheSameStartsOnAnyNumberOfThreads) {
+  const auto task = task_named("dummy");
+  constexpr int kEnvironments = 1000;
+  const auto starts = [&](const VectorTask& vector) {
+    std::vector<double> all;
+    for (int e = 0; e < kEnvironments; ++e) {
+      const auto q = vector.view(e).now().q;
+      all.insert(all.end(), q.begin(), q.end());
+    }
+    return all;
+  };
+  const std::vector<double> expected = starts(VectorTask(*task, kEnvironments));
+  VectorOptions options;
+  options.threads = 4;
+  VectorTask vector(*task, kEnvironments, options);
+  for (int round = 0; round < 30; ++round) {
+    const std::vector<double> found = starts(vector);
+    const auto differ = std::mismatch(expected.begin(), expected.end(), found.begin()).first - expected.begin();
+    ASSERT_EQ(differ, std::ssize(expected)) << "round " << round << ", environment " << differ / task->model().nq();
+    vector.reset(0);
+  }
+}
 
 TEST(VectorTask, StartsTheNextEpisodeInTheStepAfterAnEnd) {
   const auto task = task_named("dummy");

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tasks can be solved without learning: the shares of 1000 episodes that docs/tasks.md states.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "tests/tasks/task_check.hpp"
+
+namespace tangere {
+namespace {
+
+using testing::play_episodes;
+using testing::Played;
+using testing::task_named;
+
+constexpr int kEpisodes = 1000;
+
+/// `documented`: the share that docs/tasks.md states; not less, but for half of its 95 % interval.
+void expect_solved(const std::string& name, double documented) {
+  const auto task = task_named(name);
+  const Played scripted = play_episodes(*task, PolicyKind::scripted, kEpisodes);
+  const double half_width = 1.96 * std::sqrt(documented * (1 - documented) / kEpisodes);
+  EXPECT_GE(scripted.rate(), documented - half_width) << name;
+  EXPECT_EQ(scripted.failures, 0);
+  const Played idle = play_episodes(*task, PolicyKind::hold, kEpisodes / 10);
+  EXPECT_GT(scripted.rate(), idle.rate() + 2 * idle.half_width()) << name;
+}
+
+TEST(Scripted, HoldsThePad) { expect_solved("dummy", 1); }
+TEST(Scripted, RollsTheBall) { expect_solved("ball_rolling_small", 1); }
+TEST(Scripted, GraspsTheBar) { expect_solved("stable_grasp", 0.997); }
+TEST(Scripted, TurnsTheBoxIntoTheHole) { expect_solved("insertion_rotation", 1); }
+TEST(Scripted, MovesTheBoxIntoTheHole) { expect_solved("insertion_translation", 0.981); }
+TEST(Scripted, InsertsTheBox) { expect_solved("insertion", 0.809); }
+TEST(Scripted, OpensTheCap) { expect_solved("cap_opening_blind", 0.969); }
+TEST(Scripted, PushesTheBox) { expect_solved("box_pushing_privileged", 0.711); }
+
+}  // namespace
+}  // namespace tangere
