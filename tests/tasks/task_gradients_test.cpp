@@ -214,10 +214,10 @@ TEST(TaskGradients, CheckpointsChangeNothing) {
   EXPECT_EQ(stored.recomputed_steps, 0);
   EXPECT_EQ(again.recomputed_steps, 2 * 12 * 5);
   expect_same(stored, again);
-  const auto insertion = task_named("insertion_translation");
-  const TaskGradients ended = gradients(*insertion, 16, 1, 1e9, 6);
+  const auto insertion = task_named("insertion");
+  const TaskGradients ended = gradients(*insertion, 5, 1, 1e9, 6);
   EXPECT_NE(*std::min_element(ended.length.begin(), ended.length.end()), *std::max_element(ended.length.begin(), ended.length.end()));
-  const TaskGradients ended_again = gradients(*insertion, 16, 1, 6e5, 6);
+  const TaskGradients ended_again = gradients(*insertion, 5, 1, 6e5, 6);
   EXPECT_GT(ended_again.recomputed_steps, 0);
   expect_same(ended, ended_again);
 }
