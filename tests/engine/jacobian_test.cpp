@@ -130,7 +130,7 @@ int compare_with_central_differences(const CompiledModel& m, StageBuffers<double
 
 TEST(Jacobian, MachinesMatchCentralDifferences) {
   int compared = 0, entries = 0;
-  for (unsigned seed = 1; seed <= 30; ++seed) {
+  for (unsigned seed = 1; seed <= 200; ++seed) {
     const auto m = compile(testing::random_machine(seed, 2 + static_cast<int>(seed % 9)));
     StageBuffers<double> b(*m);
     Random random(seed);
@@ -170,7 +170,7 @@ TEST_P(JointEffectJacobian, MatchesDualNumbersAndActs) {
   StageBuffers<double> b(*m), plain(*without);
   Random random(17);
   int acting = 0, felt = 0;
-  for (int k = 0; k < 20; ++k) {
+  for (int k = 0; k < 1000; ++k) {
     testing::randomise(b, *m, random, kStep);
     compare_with_dual_numbers(*m, b, 1e-11);
     copy_stage(b, plain);
@@ -195,11 +195,11 @@ class ContactJacobian : public ::testing::TestWithParam<ContactLaw> {};
 
 TEST_P(ContactJacobian, ContactsMatchDualNumbers) {
   int touched = 0;
-  for (unsigned seed = 1; seed <= 30; ++seed) {
+  for (unsigned seed = 1; seed <= 200; ++seed) {
     const auto m = compile(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), GetParam()));
     StageBuffers<double> b(*m);
     Random random(seed);
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 5; ++k) {
       testing::randomise(b, *m, random, kStep);
       SCOPED_TRACE("seed " + std::to_string(seed));
       compare_with_dual_numbers(*m, b, 1e-11);
@@ -211,7 +211,7 @@ TEST_P(ContactJacobian, ContactsMatchDualNumbers) {
 
 TEST_P(ContactJacobian, ContactsMatchCentralDifferences) {
   int compared = 0, kinks = 0;
-  for (unsigned seed = 101; seed <= 115; ++seed) {
+  for (unsigned seed = 101; seed <= 300; ++seed) {
     const auto m = compile(testing::random_contacts(seed, 3, GetParam()));
     StageBuffers<double> b(*m), moved(*m);
     Random random(seed);
