@@ -32,7 +32,7 @@ struct Options {
   std::optional<int> environments, every;
   std::optional<double> timestep, tolerance, tape_memory;
   std::optional<std::uint64_t> seed;
-  bool overwrite = false, allow_unknown = false;
+  bool point_gradients = false, overwrite = false, allow_unknown = false;
 };
 
 Integrator integrator_named(const std::string& name) {
@@ -51,6 +51,8 @@ void check_arguments(const Options& options) {
     if (!input.empty()) check_not_same_file(options.output, input);
   if (options.tape_memory && options.gradients.empty())
     throw InputError("--tape-memory without --gradients; expected both");
+  if (options.point_gradients && options.gradients.empty())
+    throw InputError("--point-gradients without --gradients; expected both");
   if (options.row && options.state_from.empty()) throw InputError("--row without --state-from; expected both");
 }
 
@@ -202,6 +204,7 @@ struct Gradients {
     options.stepper = {stepper.integrator(), stepper.timestep(), stepper.tolerance()};
     options.precision = rollout.precision;
     options.parameters = true;
+    options.points = arguments.point_gradients;
     if (arguments.tape_memory) options.tape_bytes = *arguments.tape_memory;
     check_memory(gradient_bytes(model, batch.environments(), options, 1),
                  fmt::format("--gradients of {} environments and {} steps", batch.environments(), rollout.steps));
@@ -225,7 +228,7 @@ struct Gradients {
     std::vector<std::string> names, units;
     const Parameters parameters(start->model());
     for (const ParameterInfo& info : parameters.infos()) names.push_back(info.name), units.push_back(info.unit);
-    output.write({name, loss_meaning(loss_named(name)), g.value, g.u, g.q, g.v, g.parameters, names, units});
+    output.write({name, loss_meaning(loss_named(name)), g.value, g.u, g.q, g.v, g.parameters, names, units, g.points});
     value = g.value;
     recomputed_steps = summary.recomputed_steps;
     return true;
@@ -369,6 +372,7 @@ Command add_simulate(CLI::App& program) {
                       "Largest scaled residual of a step [default: the scene's]");
   add_text(*app, "--gradients", o.gradients, "LOSS",
            "Derivatives of a loss by controls, start and the scene's numbers as well: final, path, tactile, shear or variables");
+  app->add_flag("--point-gradients", o.point_gradients, "With --gradients: by place and coefficients of every tactile point, too");
   add_memory_size(*app, "--tape-memory", o.tape_memory,
                   "With --gradients: states kept for them; a longer run is taken again from checkpoints [default: 1GB]");
   add_text(*app, "--precision", o.precision, "NAME",

@@ -25,7 +25,7 @@ install(TARGETS tangere_kernels tangere_engine tangere_tasks tangere_io tangere_
 install(TARGETS tangere RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(FILES kernels/contact_types.hpp DESTINATION ${headers}/kernels)
 install(FILES engine/adjoint.hpp engine/aligned.hpp engine/batch.hpp engine/control.hpp engine/episode_sink.hpp engine/error.hpp
-  engine/flow_map.hpp engine/loss.hpp engine/model.hpp engine/parameters.hpp engine/readout_pullback.hpp
+  engine/field_tangent.hpp engine/flow_map.hpp engine/loss.hpp engine/model.hpp engine/parameters.hpp engine/point_numbers.hpp engine/readout_pullback.hpp
   engine/step_jacobian.hpp engine/tape.hpp
   engine/precision.hpp engine/readout.hpp engine/row_sink.hpp engine/scene.hpp engine/stepper.hpp
   engine/tactile_frame.hpp engine/task_spec.hpp DESTINATION ${headers}/engine)

@@ -7,6 +7,7 @@
 #include "engine/group_adjoint.hpp"
 #include "engine/motor_pullback.hpp"
 #include "engine/parameters.hpp"
+#include "engine/point_numbers.hpp"
 #include "engine/step_settings.hpp"
 
 namespace tangere {
@@ -56,6 +57,7 @@ struct Adjoint::Impl {
     for (BlockCotangent& c : losses) {
       for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v}) x->assign(nv, 0.0);
       c.u.assign(nu, 0.0);
+      if (wanted.points) c.points.assign(std::size_t(kBlock) * std::size_t(tactile_points(m) * kPointNumbers), 0.0);
       if (wanted.parameters) c.parameters.assign(std::size_t(parameter_rows(model.compiled()) * kBlock), 0.0);
     }
   }
@@ -191,6 +193,14 @@ struct Adjoint::Impl {
   }
 };
 
+std::span<double> BlockCotangent::points_of(const Model& model, int sensor, int lane) {
+  if (points.empty()) return {};
+  const auto size = [](int n) { return std::size_t(n) * std::size_t(kPointNumbers); };
+  return std::span(points)
+      .subspan(points.size() / kBlock * std::size_t(lane))
+      .subspan(size(first_tactile_point(model, sensor)), size(model.sensors()[std::size_t(sensor)].points));
+}
+
 Adjoint::Adjoint(const Model& model, const StepperOptions& options, const AdjointOptions& wanted)
     : impl_(std::make_unique<Impl>(model, step_settings(model, options), wanted)) {}
 Adjoint::~Adjoint() = default;
@@ -204,7 +214,7 @@ const BlockCotangent& Adjoint::loss(int k) const { return impl_->losses[std::siz
 
 void Adjoint::clear() {
   for (BlockCotangent& c : impl_->losses)
-    for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v, &c.u, &c.parameters})
+    for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v, &c.u, &c.parameters, &c.points})
       std::fill(x->begin(), x->end(), 0.0);
 }
 

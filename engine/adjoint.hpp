@@ -17,11 +17,16 @@ struct BlockCotangent {
   AlignedVector<double> previous_q, previous_v;  ///< (nv, 16) of the state one step before it
   AlignedVector<double> u;                       ///< (nu, 16) of the controls of the step reversed last
   AlignedVector<double> parameters;              ///< (parameter_rows, 16), summed over steps (engine/parameters.hpp); or empty
+  AlignedVector<double> points;                  ///< (16, tactile points, kPointNumbers), the same (engine/point_numbers.hpp)
+
+  /// A lane's part of those, of one sensor; empty if there are none.
+  [[nodiscard]] std::span<double> points_of(const Model& model, int sensor, int lane);
 };
 
 struct AdjointOptions {
   int losses = 1;
   bool parameters = false;  ///< derivatives by the scene's numbers too
+  bool points = false;      ///< and by every tactile point's own
 };
 
 /// Owns the scratch of one thread. Reverses steps of any batch of its model that a Stepper with the same options took.

@@ -120,6 +120,8 @@ class Compiler {
       pair.n_points = static_cast<int>(points.size() / 3);
       pair.n_tiles = static_cast<int>(tiles.size() / 4);
       pair.reach = reach;
+      pair.body1 = b1;
+      pair.body2 = b2;
       pair.points = keep(m_.point_storage, std::move(points));
       lay_out_tiles(pair, tiles);
       m_.pairs.push_back(pair);
@@ -167,6 +169,7 @@ class Compiler {
         points[k] = p.x, points[k + 1] = p.y, points[k + 2] = p.z;
       }
       ground.link = body.link;
+      ground.body = b;
       ground.law = d.law;
       ground.ramp = d.ramp;
       ground.parameters = constants(d.coefficients);
@@ -325,6 +328,9 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   v.grounded = m->grounded.data();
   v.pair_order = m->pair_order.data();
   v.ground_order = m->ground_order.data();
+  for (std::size_t k = 0; k < m->bodies.size(); ++k) m->solids.push_back(solid_of(m->scene.links[k].body.shape, m->bodies[k]));
+  v.n_solids = static_cast<int>(m->solids.size());
+  v.solids = m->solids.data();
   v.pattern = m->pattern.view();
   return m;
 }

@@ -16,27 +16,11 @@ using kernels::Vec3;
 
 namespace {
 
-InertiaRows rows_of(const Link& link) {
-  const auto& I = link.inertia.m;
-  return {link.mass, link.moment.x, link.moment.y, link.moment.z, I[0][0],
-          I[0][1],   I[0][2],       I[1][1],       I[1][2],       I[2][2]};
-}
-
-/// What a body adds to the inertia of its link per kg/m³ of density.
-InertiaRows inertia_of_density(const CompiledModel& m, int b) {
-  const MassProperties unit = mass_properties(m.scene.links[std::size_t(b)].body.shape, 1);
-  Link link{};
-  CompiledBody of_density = m.bodies[std::size_t(b)];
-  of_density.mass = unit.mass;
-  add_inertia(link, of_density, unit);
-  return rows_of(link);
-}
-
 /// The entry of a link, made when it is first asked for.
 VaryingInertia& varying_inertia(CompiledModel& m, int link) {
   for (VaryingInertia& v : m.varying_inertia)
     if (v.link == link) return v;
-  m.varying_inertia.push_back({link, 0, false, rows_of(m.links[std::size_t(link)]), {}});
+  m.varying_inertia.push_back({link, 0, false, inertia_rows(m.links[std::size_t(link)]), {}});
   return m.varying_inertia.back();
 }
 
@@ -57,7 +41,7 @@ InertiaRows sum_anew(const CompiledModel& m, const VaryingInertia& varying, cons
     body.mass = properties.mass;
     if (body.mass > 0) add_inertia(link, body, properties);
   }
-  return rows_of(link);
+  return inertia_rows(link);
 }
 
 }  // namespace
@@ -73,7 +57,7 @@ void vary_density(CompiledModel& m, int body, const RandomizationDescription& d,
   if (link < 0) fail("it is fixed in the world");
   if (!(b.density > 0)) fail("it is massless; expected a positive density");
   VaryingInertia& varying = varying_inertia(m, link);
-  const InertiaRows of_density = inertia_of_density(m, body);
+  const InertiaRows of_density = inertia_rows(m.bodies[std::size_t(body)], mass_properties(b.shape, 1));
   for (std::size_t i = 0; i < of_density.size(); ++i)
     varying.constant[i] -= b.density * of_density[i];
   varying.parts.push_back({body, row, of_density});

@@ -134,6 +134,7 @@ struct CompiledModel {
   std::vector<CompiledVariable> variables;
   std::vector<kernels::PairContact> pairs;
   std::vector<kernels::GroundContact> grounds;
+  std::vector<kernels::Solid> solids;  ///< parallel to bodies
   std::vector<kernels::LinkPair> link_pairs;
   std::vector<kernels::GroundedLink> grounded;
   std::vector<int> pair_order, ground_order;       ///< members of link_pairs and grounded, side by side
@@ -165,6 +166,12 @@ struct MassProperties {
   kernels::Mat3<double> inertia;  ///< [kg m²]
 };
 MassProperties mass_properties(const Shape& shape, double density);
+/// Its derivative by a number of the shape's size (size_name) that it has; the centre of mass stays.
+MassProperties mass_properties_by_size(const Shape& shape, double density, int which);
+/// What a body of these adds to its link.
+InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& properties);
+/// A link's own.
+InertiaRows inertia_rows(const kernels::Link& link);
 /// Adds a body to its link.
 void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProperties& properties);
 /// Shape and size of a body, and whether it can be touched.
@@ -172,6 +179,8 @@ void place_shape(const Shape& shape, CompiledBody& body);
 
 /// Points of the body that meet other bodies, in its body frame, (n, 3): empty for spheres and planes.
 std::vector<double> contact_points(const Shape& shape);
+/// A body whose points these are.
+kernels::Solid solid_of(const Shape& shape, const CompiledBody& body);
 
 /// Reorders (n, 3) points so that every kContactTile consecutive ones are neighbours; returns their (tiles, 4) bounds.
 std::vector<double> sort_into_tiles(std::vector<double>& points, int tile);

@@ -88,6 +88,12 @@ std::vector<double> contact_points(const Shape& shape) {
   return std::visit([](const auto& s) { return points_of(s); }, shape);
 }
 
+kernels::Solid solid_of(const Shape& shape, const CompiledBody& body) {
+  const bool stretches = std::holds_alternative<CuboidShape>(shape) || std::holds_alternative<CylinderShape>(shape) ||
+                         std::holds_alternative<CapsuleShape>(shape);
+  return {body.frame, stretches, body.shape, body.size};
+}
+
 std::vector<double> sort_into_tiles(std::vector<double>& points, int tile) {
   const std::size_t n = points.size() / 3;
   std::vector<int> order(n);

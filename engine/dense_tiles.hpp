@@ -58,26 +58,30 @@ void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* de
         row[3 * j + c] = static_cast<T>(from[c * kernels::kTactileTile + i * kernels::kTileSide + j]);
 }
 
+/// f(slot in the tile, point of the array) for all points of a tile.
+template <class F>
+void for_points_of_tile(const kernels::PadTiles& pad, int tile, const F& f) {
+  if (pad.curved()) {
+    for (int k = 0; k < pad.points_of(tile); ++k) f(k, pad.index[kernels::kTactileTile * tile + k]);
+    return;
+  }
+  const int rows = pad.rows_of(tile), cols = pad.cols_of(tile), first = pad.first_of(tile);
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < cols; ++j) f(i * kernels::kTileSide + j, first + i * pad.cols + j);
+}
+
 /// The other way, zeros where the tile has no point; false where all of it is zero.
 template <class T, class Real>
 bool gather_tile(const kernels::PadTiles& pad, int tile, const T* dense, Real* to) {
   std::fill_n(to, 3 * kernels::kTactileTile, Real(0));
   bool any = false;
-  const auto take = [&](int point, const T* from) {
+  const auto take = [&](int slot, const T* from) {
     for (int c = 0; c < 3; ++c) {
-      to[c * kernels::kTactileTile + point] = static_cast<Real>(from[c]);
+      to[c * kernels::kTactileTile + slot] = static_cast<Real>(from[c]);
       any = any || from[c] != T(0);
     }
   };
-  if (pad.curved()) {
-    const int* index = pad.index + kernels::kTactileTile * tile;
-    for (int k = 0; k < pad.points_of(tile); ++k) take(k, dense + 3 * index[k]);
-    return any;
-  }
-  const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
-  const T* row = dense + 3 * pad.first_of(tile);
-  for (int i = 0; i < rows; ++i, row += 3 * pad.cols)
-    for (int j = 0; j < cols; ++j) take(i * kernels::kTileSide + j, row + 3 * j);
+  for_points_of_tile(pad, tile, [&](int slot, int point) { take(slot, dense + 3 * point); });
   return any;
 }
 

@@ -30,12 +30,14 @@ struct DualStage::Impl {
   bool heavier = false;                ///< some of them are not zero
   bool frozen = false;
   std::vector<double> tangents;        ///< of the rows, while frozen
+  std::vector<double> stretch;         ///< tangents of the solids' sizes, (n_solids, 3)
 
   std::vector<D> force_scale, mass_diagonal, A, excess;
   std::vector<kernels::LinkScratch<D>> links;
   std::vector<kernels::ContactScratch<D>> contacts;
   std::vector<kernels::JointColumns<D>> columns;
   std::vector<kernels::LinkAdjoint<D>> adjoint;
+  std::vector<std::vector<double>> ground_points;  ///< places, then their tangents
   std::vector<std::vector<D>> points, references;
   std::vector<kernels::CandidateList<D>> lists;
 
@@ -58,21 +60,35 @@ struct DualStage::Impl {
       row(e.armature, -1);
       row(e.limit_stiffness, -1);
     }
-    const auto side_by_side = [this](int& first, int count) {
-      if (first < 0) return;
+    // `first`: row of the block that held the first of them, or -1: they are `values`.
+    const auto side_by_side = [this](int& first, int count, const double* values, int which) {
       const int from = first;
       first = static_cast<int>(origin.size());
-      for (int i = 0; i < count; ++i) origin.push_back({0, from + i}), number.push_back(-1);
+      for (int i = 0; i < count; ++i) {
+        origin.push_back(from < 0 ? Parameter{values[i], -1} : Parameter{0, from + i});
+        number.push_back(which < 0 ? -1 : which + i);
+      }
     };
-    for (auto& p : pairs) side_by_side(p.size_row, 3);
-    for (auto& g : grounds) side_by_side(g.radius_row, 1);
-    for (kernels::Link& link : bodies) link.inertia_row = -1, side_by_side(link.place_row, 3);
+    const auto size_of = [this](int body) { return kernels::first_size_number(view) + kernels::kSizeNumbers * body; };
+    for (auto& p : pairs) side_by_side(p.size_row, 3, &p.size.x, size_of(p.body2));
+    for (auto& g : grounds)
+      if (g.radius > 0) side_by_side(g.radius_row, 1, &g.radius, size_of(g.body));
+    for (auto& g : grounds) {
+      ground_points.emplace_back(g.points, g.points + 3 * g.n_points);
+      ground_points.back().resize(std::size_t(6 * g.n_points));
+      g.points = ground_points.back().data();
+    }
+    for (kernels::Link& link : bodies) {
+      link.inertia_row = -1;
+      if (link.place_row >= 0) side_by_side(link.place_row, 3, nullptr, -1);
+    }
     view.links = bodies.data();
     view.pairs = pairs.data();
     view.grounds = grounds.data();
     view.effects = effects.data();
     block.assign(origin.size() * kBlock, 0.0);
     inertia.assign(std::size_t(kernels::kInertiaNumbers * view.n_links), 0.0);
+    stretch.assign(std::size_t(kernels::kSizeNumbers * view.n_solids), 0.0);
     const std::size_t nv = std::size_t(m.nv);
     force_scale.resize(nv), mass_diagonal.resize(nv), excess.resize(1);
     A.resize(std::size_t(m.pattern.entries));
@@ -85,8 +101,36 @@ struct DualStage::Impl {
     }
   }
 
-  /// Lists of the points that touch at the poses of kinematics(); the others add nothing to values or tangents.
+  /// How a contact point of a body, link axes, moves with the body's size.
+  [[nodiscard]] kernels::Vec3<double> stretched(int body, const kernels::Vec3<double>& at) const {
+    const kernels::Solid& s = m.solids[std::size_t(body)];
+    if (!s.stretches) return kernels::zero3<double>();
+    const double* by = &stretch[std::size_t(kernels::kSizeNumbers * body)];
+    const kernels::Vec3<double> y = transposed_times(s.frame.R, at - s.frame.p);
+    if (s.shape == PrimitiveShape::cuboid)
+      return s.frame.R * kernels::Vec3<double>{y.x / s.size.x * by[0], y.y / s.size.y * by[1], y.z / s.size.z * by[2]};
+    const double radius = s.size.x, half = s.size.y;
+    const bool pole = s.shape == PrimitiveShape::capsule && std::abs(y.z) > half * (1 + 1e-9);
+    const double up = pole ? std::copysign(1, y.z) * (by[0] + by[1]) : y.z / half * by[1];
+    return s.frame.R * kernels::Vec3<double>{y.x / radius * by[0], y.y / radius * by[0], up};
+  }
+
+  /// Tangents of the points in the ground.
+  void stretch_grounds() {
+    for (std::size_t g = 0; g < grounds.size(); ++g) {
+      std::vector<double>& p = ground_points[g];
+      const std::size_t half = p.size() / 2;
+      for (std::size_t k = 0; k < half; k += 3) {
+        const kernels::Vec3<double> moves = frozen ? kernels::zero3<double>() : stretched(grounds[g].body, {p[k], p[k + 1], p[k + 2]});
+        p[half + k] = moves.x, p[half + k + 1] = moves.y, p[half + k + 2] = moves.z;
+      }
+    }
+  }
+
+  /// Lists of the points that touch at the poses of kinematics(); the others add nothing to values or tangents. Points move
+  /// with the sizes of their bodies.
   void find_touching() {
+    stretch_grounds();
     for (int k = 0; k < view.n_link_pairs; ++k) {
       const kernels::LinkPair& link_pair = view.link_pairs[k];
       for (int member = link_pair.first; member < link_pair.first + link_pair.count; ++member) {
@@ -105,7 +149,10 @@ struct DualStage::Impl {
           const kernels::Vec3<double> y = transposed_times(shape.R, kernels::Vec3<double>{p[0], p[1], p[2]} - shape.p);
           const double d = kernels::with_distance<double>(pair.shape, size, [&](const auto& s) { return distance_at(s, y).d; });
           if (!(d < 1e-9)) continue;  // [m] beyond rounding
-          for (int c = 0; c < 3; ++c) list[std::size_t(3 * count + c)] = D(p[c]);
+          const kernels::Vec3<double> moves = frozen ? kernels::zero3<double>() : stretched(pair.body1, {p[0], p[1], p[2]});
+          list[std::size_t(3 * count)] = {p[0], moves.x};
+          list[std::size_t(3 * count + 1)] = {p[1], moves.y};
+          list[std::size_t(3 * count + 2)] = {p[2], moves.z};
           ++count;
         }
         lists[std::size_t(at)].count = count;
@@ -190,8 +237,9 @@ void DualStage::set_numbers(const double* column, std::span<const double> tangen
     link.moment = {row(1), row(2), row(3)};
     link.inertia = {{{row(4), row(5), row(6)}, {row(5), row(7), row(8)}, {row(6), row(8), row(9)}}};
   }
-  const auto first = std::size_t(kernels::kContactNumbers * (i.view.n_pairs + i.view.n_grounds));
+  const auto first = std::size_t(kernels::first_inertia_number(i.view)), sizes = std::size_t(kernels::first_size_number(i.view));
   for (std::size_t k = 0; k < i.inertia.size(); ++k) i.inertia[k] = tangents.empty() ? 0 : tangents[first + k];
+  for (std::size_t k = 0; k < i.stretch.size(); ++k) i.stretch[k] = tangents.empty() ? 0 : tangents[sizes + k];
   i.heavier = std::any_of(i.inertia.begin(), i.inertia.end(), [](double t) { return t != 0; });
 }
 
@@ -290,7 +338,8 @@ PadPoint pad_point(const kernels::PadTiles& pad, int tile, int k) {
 
 }  // namespace
 
-void DualStage::field(int sensor, const double* column, std::span<const double> tangents, std::span<double> field_dot) {
+void DualStage::field(int sensor, const double* column, std::span<const double> numbers, std::span<const double> points,
+                      std::span<double> field_dot) {
   Impl& i = *impl_;
   const CompiledSensor& felt = i.m.sensors[std::size_t(sensor)];
   const kernels::PadTiles pad = felt.tiles();
@@ -299,11 +348,13 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
     return link < 0 ? kernels::LinkPose<D>{{kernels::diagonal(D(1.0)), kernels::zero3<D>()}, kernels::zero6<D>()}
                     : kernels::LinkPose<D>{i.links[std::size_t(link)].world, i.links[std::size_t(link)].V};
   };
+  const auto tangent = [&](int first, int k) { return numbers.empty() ? 0.0 : numbers[std::size_t(first + k)]; };
   const Parameter* const given[] = {&felt.parameters.kn, &felt.parameters.kt, &felt.parameters.mu, &felt.parameters.damping};
-  D numbers[4];
+  const int first = kernels::parameter_numbers(i.m.view) + kernels::kContactNumbers * sensor;
+  D coefficients[4];
   for (int k = 0; k < 4; ++k)
-    numbers[k] = D(given[k]->row < 0 ? given[k]->value : column[given[k]->row * kBlock],
-                   tangents.empty() ? 0 : tangents[std::size_t(k)]);
+    coefficients[k] = D(given[k]->row < 0 ? given[k]->value : column[given[k]->row * kBlock], tangent(first, k));
+  const kernels::Mat3<double> turn = transpose(felt.pad.R) * i.m.bodies[std::size_t(felt.body)].frame.R;
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
   const kernels::LinkPose<D> hand = pose(felt.link);
   for (const int number : felt.targets) {
@@ -311,14 +362,19 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
     const kernels::LinkPose<D> other = pose(body.link);
     kernels::Touch<D> t;
     kernels::pad_touch(&hand, felt.pad, &other, body.frame, t);
-    const kernels::Vec3<double> size = kernels::load_vector<double>(body.size, body.size_row, column, 0);
+    const int first_size = kernels::first_size_number(i.m.view) + kernels::kSizeNumbers * number;
+    const kernels::Vec3<double> has = kernels::load_vector<double>(body.size, body.size_row, column, 0);
+    const kernels::Vec3<D> size = {{has.x, tangent(first_size, 0)}, {has.y, tangent(first_size, 1)}, {has.z, tangent(first_size, 2)}};
     kernels::with_distance<D>(body.shape, size, [&](const auto& shape) {
       for (int k = 0; k < pad.tiles() * kernels::kTactileTile; ++k) {
         const PadPoint p = pad_point(pad, k / kernels::kTactileTile, k % kernels::kTactileTile);
         if (p.index < 0) continue;
-        const kernels::LawParameters<D> law = {D(p.factors[0]) * numbers[0], D(p.factors[1]) * numbers[1],
-                                               D(p.factors[2]) * numbers[2], D(p.factors[3]) * numbers[3], felt.law, 0.0};
-        const auto at = kernels::point_contact(shape, law, t.Q, t.c, t.omega, t.v, kernels::broadcast<D>(p.at));
+        const auto own = [&](int n) { return points.empty() ? 0.0 : points[std::size_t(p.index * kernels::kPointNumbers + n)]; };
+        const kernels::Vec3<double> moves = turn * kernels::Vec3<double>{own(0), own(1), own(2)};
+        const auto coefficient = [&](int n) { return D(p.factors[n]) * coefficients[n] + D(0.0, own(3 + n)); };
+        const kernels::LawParameters<D> law = {coefficient(0), coefficient(1), coefficient(2), coefficient(3), felt.law, 0.0};
+        const kernels::Vec3<D> xi = {{p.at.x, moves.x}, {p.at.y, moves.y}, {p.at.z, moves.z}};
+        const auto at = kernels::point_contact(shape, law, t.Q, t.c, t.omega, t.v, xi);
         const double f[3] = {at.force.x.epsilon, at.force.y.epsilon, at.force.z.epsilon};
         for (int c = 0; c < 3; ++c)
           for (int e = 0; e < 3; ++e) field_dot[std::size_t(3 * p.index + c)] += p.rows[3 * c + e] * f[e];

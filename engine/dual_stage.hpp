@@ -37,8 +37,10 @@ class DualStage {
   void rates();
 
   /// How the field of a sensor, (points, 3), changes at the state centre ⊕ 0 with twist r (c0_over_h = 0, inverse_h = 1).
-  /// `tangents`: of its kn, kt, mu, damping, or empty.
-  void field(int sensor, const double* column, std::span<const double> tangents, std::span<double> field_dot);
+  /// `numbers`: tangents as rows of BlockCotangent::parameters, `points`: (points, kPointNumbers) of every point's own; or
+  /// empty.
+  void field(int sensor, const double* column, std::span<const double> numbers, std::span<const double> points,
+             std::span<double> field_dot);
 
   /// For the values: A of residual() by its tangent inputs, (n, n) row-major, and its own tangents.
   void jacobian(std::vector<DualNumber>& A);

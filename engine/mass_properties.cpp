@@ -4,44 +4,54 @@
 #include <cmath>
 
 #include "engine/compiled_model.hpp"
+#include "kernels/dual.hpp"
 
 namespace tangere {
 
 namespace {
 
-MassProperties principal(double mass, double xx, double yy, double zz) {
-  return {mass, {0, 0, 0}, {{{xx, 0, 0}, {0, yy, 0}, {0, 0, zz}}}};
+/// Mass and principal inertia, over any number type.
+template <class T>
+struct Principal {
+  T mass, xx, yy, zz;
+};
+
+template <class T>
+Principal<T> of_ball(double density, const T& r) {
+  const T mass = density * 4.0 / 3.0 * M_PI * r * r * r, inertia = 0.4 * mass * r * r;
+  return {mass, inertia, inertia, inertia};
 }
 
-MassProperties of(const SphereShape& s, double density) {
-  const double mass = density * 4.0 / 3.0 * M_PI * s.radius * s.radius * s.radius;
-  const double inertia = 0.4 * mass * s.radius * s.radius;
-  return principal(mass, inertia, inertia, inertia);
+template <class T>
+Principal<T> of_cuboid(double density, const T& x, const T& y, const T& z) {
+  const T mass = density * x * y * z;
+  return {mass, mass / 12 * (y * y + z * z), mass / 12 * (x * x + z * z), mass / 12 * (x * x + y * y)};
 }
 
-MassProperties of(const CuboidShape& c, double density) {
-  const Vector3& s = c.size;
-  const double mass = density * s[0] * s[1] * s[2];
-  return principal(mass, mass / 12 * (s[1] * s[1] + s[2] * s[2]), mass / 12 * (s[0] * s[0] + s[2] * s[2]),
-                   mass / 12 * (s[0] * s[0] + s[1] * s[1]));
-}
-
-MassProperties of(const CylinderShape& c, double density) {
-  const double square = c.radius * c.radius, mass = density * M_PI * square * c.length;
-  const double across = mass / 12 * (3 * square + c.length * c.length);
-  return principal(mass, across, across, mass / 2 * square);
+template <class T>
+Principal<T> of_cylinder(double density, const T& r, const T& l) {
+  const T square = r * r, mass = density * M_PI * square * l;
+  const T across = mass / 12 * (3 * square + l * l);
+  return {mass, across, across, mass / 2 * square};
 }
 
 /// A cylinder and two half balls, each with its centre of mass 3 r/8 beyond the cylinder's end.
-MassProperties of(const CapsuleShape& c, double density) {
-  const double r = c.radius, l = c.length;
-  const double tube = density * M_PI * r * r * l, ball = density * 4.0 / 3.0 * M_PI * r * r * r;
-  const double across =
-      tube * (l * l / 12 + r * r / 4) + ball * (0.4 * r * r + l * l / 4 + 0.375 * l * r);
-  return principal(tube + ball, across, across, tube * r * r / 2 + 0.4 * ball * r * r);
+template <class T>
+Principal<T> of_capsule(double density, const T& r, const T& l) {
+  const T tube = density * M_PI * r * r * l, ball = density * 4.0 / 3.0 * M_PI * r * r * r;
+  const T across = tube * (l * l / 12 + r * r / 4) + ball * (0.4 * r * r + l * l / 4 + 0.375 * l * r);
+  return {tube + ball, across, across, tube * r * r / 2 + 0.4 * ball * r * r};
 }
 
-MassProperties of(const PlaneShape&, double) { return principal(0, 0, 0, 0); }
+MassProperties centred(const Principal<double>& p) {
+  return {p.mass, {0, 0, 0}, {{{p.xx, 0, 0}, {0, p.yy, 0}, {0, 0, p.zz}}}};
+}
+
+MassProperties of(const SphereShape& s, double density) { return centred(of_ball(density, s.radius)); }
+MassProperties of(const CuboidShape& c, double density) { return centred(of_cuboid(density, c.size[0], c.size[1], c.size[2])); }
+MassProperties of(const CylinderShape& c, double density) { return centred(of_cylinder(density, c.radius, c.length)); }
+MassProperties of(const CapsuleShape& c, double density) { return centred(of_capsule(density, c.radius, c.length)); }
+MassProperties of(const PlaneShape&, double) { return centred({0, 0, 0, 0}); }
 
 /// Tetrahedra from the first vertex to every triangle, about that vertex: far from its frame's origin a body loses nothing.
 /// With corners a, b, c: volume = a·(b × c)/6, ∫x = volume (a + b + c)/4,
@@ -78,6 +88,31 @@ MassProperties of(const AbstractShape& a, double) {
 
 MassProperties mass_properties(const Shape& shape, double density) {
   return std::visit([&](const auto& s) { return of(s, density); }, shape);
+}
+
+MassProperties mass_properties_by_size(const Shape& shape, double density, int which) {
+  using D = kernels::Dual<double>;
+  const auto number = [which](double x, int k) { return D(x, k == which ? 1 : 0); };
+  const auto slope = [](const Principal<D>& p) { return centred({p.mass.epsilon, p.xx.epsilon, p.yy.epsilon, p.zz.epsilon}); };
+  if (const auto* s = std::get_if<SphereShape>(&shape)) return slope(of_ball(density, number(s->radius, 0)));
+  if (const auto* c = std::get_if<CuboidShape>(&shape))
+    return slope(of_cuboid(density, number(c->size[0], 2), number(c->size[1], 3), number(c->size[2], 4)));
+  if (const auto* c = std::get_if<CylinderShape>(&shape)) return slope(of_cylinder(density, number(c->radius, 0), number(c->length, 1)));
+  const auto& c = std::get<CapsuleShape>(shape);
+  return slope(of_capsule(density, number(c.radius, 0), number(c.length, 1)));
+}
+
+InertiaRows inertia_rows(const kernels::Link& link) {
+  const auto& I = link.inertia.m;
+  return {link.mass, link.moment.x, link.moment.y, link.moment.z, I[0][0],
+          I[0][1],   I[0][2],       I[1][1],       I[1][2],       I[2][2]};
+}
+InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& properties) {
+  kernels::Link link{};
+  CompiledBody of_these = body;
+  of_these.mass = properties.mass;
+  add_inertia(link, of_these, properties);
+  return inertia_rows(link);
 }
 
 void place_shape(const Shape& shape, CompiledBody& body) {

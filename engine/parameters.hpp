@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The numbers of a scene that gradients are taken by: coefficients of contacts and sensors, densities, damping, stiffness,
-// gains of position motors.
+// The numbers of a scene that gradients are taken by: coefficients of contacts and sensors, densities and sizes of bodies,
+// damping, stiffness, gains of position motors.
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,7 +13,8 @@
 namespace tangere {
 
 struct ParameterInfo {
-  std::string name;  ///< "contact pad ball kn", "ground ball mu", "tactile pad kt", "body ball density", "joint arm damping"
+  std::string name;  ///< "contact pad ball kn", "ground ball mu", "tactile pad kt", "body ball density", "body pad size[0]",
+                     ///< "joint arm damping", "motor arm P"
   std::string unit;  ///< SI
   double value;      ///< in the scene; environments may differ where <randomize> says so
 };
@@ -28,13 +30,14 @@ class Parameters {
   [[nodiscard]] double& in(Scene& scene, int k) const;
   /// Which of a scene's randomisations (Scene::randomizations) number k follows; -1: none, it is the scene's.
   [[nodiscard]] int randomization(const Scene& scene, int k) const;
-  /// Derivatives of a loss by all of them, (count), for one lane of a block whose Adjoint was made with parameters.
-  void gradient(const BlockCotangent& cotangent, int lane, std::span<double> out) const;
-  /// The other way: how the rows of BlockCotangent::parameters change when these numbers, (count), change so.
-  void spread(std::span<const double> change, std::span<double> rows) const;
+  /// Derivatives of a loss by all of them, (count), for an environment of the batch that an Adjoint made with parameters has
+  /// reversed.
+  void gradient(const BlockCotangent& cotangent, const Batch& batch, int environment, std::span<double> out) const;
+  /// The other way: how the rows of BlockCotangent::parameters change when these numbers of an environment, (count), do.
+  void spread(std::span<const double> change, const Batch& batch, int environment, std::span<double> rows) const;
 
  private:
-  enum class Place { pair, ground, sensor, body, joint, turning, motor };
+  enum class Place { pair, ground, sensor, density, size, joint, turning, motor };
   struct Term {
     int row;             ///< of BlockCotangent::parameters
     double coefficient;
@@ -43,12 +46,24 @@ class Parameters {
     Place place;
     int index, field;
     std::vector<Term> terms;
+    bool varies = false;  ///< how masses follow is each environment's own, and not among the terms
   };
+  using Masses = std::array<double, 10>;  ///< rows of a link's mass, moment and inertia
   void add(std::string name, std::string unit, Entry entry);
   void add_coefficients(const std::string& of, bool linear, Place place, int index, int row);
-  void add_densities(const CompiledModel& m, int row);
-  void add_joints(const CompiledModel& m, int row);
+  void add_contacts();
+  void add_bodies();
+  void add_joints();
+  void add_motors();
+  /// Of a joint's dofs from `first` on.
+  [[nodiscard]] Entry of_dofs(Place place, int joint, int field, int first, int end) const;
+  /// How the masses of its link change with an entry of a body that is so.
+  [[nodiscard]] Masses masses_by(const Entry& entry, const Shape& shape, double density) const;
+  /// The same in an environment of its own density and size.
+  [[nodiscard]] Masses masses_by(const Entry& entry, const Batch& batch, int environment) const;
+  [[nodiscard]] int mass_row(const Entry& entry) const;
 
+  Model model_;
   std::vector<ParameterInfo> infos_;
   std::vector<Entry> entries_;
 };

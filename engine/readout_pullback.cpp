@@ -11,6 +11,7 @@
 #include "engine/dense_tiles.hpp"
 #include "engine/pad_reader.hpp"
 #include "engine/parameters.hpp"
+#include "engine/point_numbers.hpp"
 
 namespace tangere {
 
@@ -47,6 +48,7 @@ struct ReadoutPullback::Impl {
   std::vector<kernels::TouchCotangent<double>> touches;
   std::vector<int> tiles;          ///< of a whole field: those that are not zero
   std::vector<double> of_tiles;
+  AlignedVector<double> own;       ///< (tiles, kPointNumbers, 64)
 
   explicit Impl(const Model& m) : model(m), reader(m), met(kGroups, -1) {
     const CompiledModel& c = m.compiled();
@@ -60,6 +62,21 @@ struct ReadoutPullback::Impl {
   }
 
   kernels::MotionCotangent<LaneRow>& link(int group, int link) { return links[std::size_t(group)][std::size_t(link)]; }
+
+  /// Own numbers of the points of tiles, from pad axes to the body's.
+  void hand_on_points(const CompiledSensor& s, std::span<const int> touched, std::span<double> points) const {
+    const kernels::PadTiles pad = s.tiles();
+    const kernels::Mat3<double> turn = transpose(model.compiled().bodies[std::size_t(s.body)].frame.R) * s.pad.R;
+    for (std::size_t i = 0; i < touched.size(); ++i)
+      for_points_of_tile(pad, touched[i], [&](int slot, int point) {
+        const double* from = &own[i * kPointNumbers * kernels::kTactileTile + std::size_t(slot)];
+        const auto number = [&](int k) { return from[k * kernels::kTactileTile]; };
+        const Vec3<double> place = turn * Vec3<double>{number(0), number(1), number(2)};
+        double* to = &points[std::size_t(point * kPointNumbers)];
+        to[0] += place.x, to[1] += place.y, to[2] += place.z;
+        for (int k = 3; k < kPointNumbers; ++k) to[k] += number(k);
+      });
+  }
 
   /// One shape's sums, in pad axes, to its link and the sensor's.
   void hand_on(const kernels::TouchCotangent<double>& c, const CompiledSensor& s, const CompiledBody& body, int group,
@@ -98,7 +115,7 @@ void ReadoutPullback::clear() {
 }
 
 void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles, std::span<const double> cotangents,
-                            std::span<double> parameters) {
+                            std::span<double> parameters, std::span<double> points) {
   if (tiles.empty()) return;
   Impl& i = *impl_;
   const int group = lane / kGroup, in_group = lane % kGroup;
@@ -109,20 +126,27 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles, st
   const CompiledModel& m = i.model.compiled();
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const auto a = i.reader.arguments<double>(sensor, group, in_group);
+  if (!points.empty()) i.own.assign(tiles.size() * kPointNumbers * kernels::kTactileTile, 0.0);
   kernels::active_kernels().pull_back_field({a.pad, a.law, a.n_touches, a.shapes, a.touches, static_cast<int>(tiles.size()),
-                                             tiles.data(), cotangents.data(), !parameters.empty(), i.touches.data()});
+                                             tiles.data(), cotangents.data(), !parameters.empty(),
+                                             points.empty() ? nullptr : i.own.data(), i.touches.data()});
+  if (!points.empty()) i.hand_on_points(s, tiles, points);
   i.used[std::size_t(group)] = true;
   const int row = kernels::parameter_numbers(m.view) + kernels::kContactNumbers * sensor;
   for (std::size_t k = 0; k < s.targets.size(); ++k) {
     const kernels::TouchCotangent<double>& c = i.touches[k];
     i.hand_on(c, s, m.bodies[std::size_t(s.targets[k])], group, in_group);
     if (parameters.empty()) continue;
-    const double of_law[] = {c.law.kn, c.law.kt, c.law.mu, c.law.damping};
-    for (int n = 0; n < kernels::kContactNumbers; ++n) parameters[std::size_t((row + n) * kBlock + lane)] += of_law[n];
+    const auto add = [&](int first, std::initializer_list<double> numbers) {
+      for (const double x : numbers) parameters[std::size_t(first++ * kBlock + lane)] += x;
+    };
+    add(row, {c.law.kn, c.law.kt, c.law.mu, c.law.damping});
+    add(kernels::first_size_number(m.view) + kernels::kSizeNumbers * s.targets[k], {c.size.x, c.size.y, c.size.z});
   }
 }
 
-void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents, std::span<double> parameters) {
+void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents, std::span<double> parameters,
+                                  std::span<double> points) {
   const kernels::PadTiles pad = impl_->model.compiled().sensors[std::size_t(sensor)].tiles();
   std::vector<int>& tiles = impl_->tiles;
   std::vector<double>& values = impl_->of_tiles;
@@ -130,7 +154,7 @@ void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> 
   values.resize(std::size_t(pad.tiles()) * 3 * kernels::kTactileTile);
   for (int tile = 0; tile < pad.tiles(); ++tile)
     if (gather_tile(pad, tile, cotangents.data(), values.data() + 3 * kernels::kTactileTile * tiles.size())) tiles.push_back(tile);
-  field(lane, sensor, tiles, std::span(values).first(3 * kernels::kTactileTile * tiles.size()), parameters);
+  field(lane, sensor, tiles, std::span(values).first(3 * kernels::kTactileTile * tiles.size()), parameters, points);
 }
 
 void ReadoutPullback::variable(int lane, int variable, std::span<const double> cotangent) {

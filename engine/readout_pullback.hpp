@@ -24,11 +24,14 @@ class ReadoutPullback {
   void clear();
   /// Of the field of a sensor in lane `lane` of the block, as `tiles` of 8 × 8 points (CompactFrame::tiles) with
   /// `cotangents` (tiles, 3, 8, 8). Points outside the tiles, or where nothing touches, have no derivative.
-  /// `parameters`: (parameter_rows, 16) of the loss to add those by the sensor's coefficients to, or empty.
+  /// `parameters`: (parameter_rows, 16) of the loss to add those by the sensor's coefficients and the sizes of what touches it
+  /// to, or empty. `points`: (points, kPointNumbers) of the sensor to add those by every point's own numbers to
+  /// (engine/point_numbers.hpp), or empty.
   void field(int lane, int sensor, std::span<const int> tiles, std::span<const double> cotangents,
-             std::span<double> parameters = {});
+             std::span<double> parameters = {}, std::span<double> points = {});
   /// The same with `cotangents` of the whole field, (points, 3).
-  void dense_field(int lane, int sensor, std::span<const double> cotangents, std::span<double> parameters = {});
+  void dense_field(int lane, int sensor, std::span<const double> cotangents, std::span<double> parameters = {},
+                   std::span<double> points = {});
   /// Of the world position of an end effector, (3).
   void variable(int lane, int variable, std::span<const double> cotangent);
   /// Adds what was collected to q and v of `out`, all lanes.

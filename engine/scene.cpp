@@ -109,8 +109,8 @@ double* size_number(Shape& shape, int which) {
 }
 
 const char* size_name(int which) {
-  constexpr const char* kNames[] = {"radius", "length", "size[0]", "size[1]", "size[2]"};
-  return which >= 0 && which < 5 ? kNames[which] : "unknown";
+  constexpr const char* kNames[kSizeNames] = {"radius", "length", "size[0]", "size[1]", "size[2]"};
+  return which >= 0 && which < kSizeNames ? kNames[which] : "unknown";
 }
 
 bool dof_turns(JointType type, int k) {

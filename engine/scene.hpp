@@ -266,6 +266,7 @@ const char* shape_name(const Shape& shape);
 /// The numbers of a size: 0 radius, 1 length, 2 … 4 edges of a cuboid [m]. nullptr where a shape has no such number.
 double* size_number(Shape& shape, int which);
 const char* size_name(int which);  ///< "radius", "length", "size[0]" …
+inline constexpr int kSizeNames = 5;
 
 /// Whether contact points may touch it, and whether it has such points itself.
 bool has_distance(const Shape& shape);

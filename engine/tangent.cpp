@@ -237,8 +237,7 @@ struct Tangent::Impl {
   /// Motors, as set_motors() does it.
   void set_motors(const DualState& at, std::span<const double> u, std::span<const double> u_dot,
                   std::span<const double> numbers_dot, const double* column) {
-    const int first_dof = kernels::kContactNumbers * (m().view.n_pairs + m().view.n_grounds) +
-                          kernels::kInertiaNumbers * m().view.n_links;
+    const int first_dof = kernels::first_dof_number(m().view);
     for (std::size_t i = 0; i < stage.tau.size(); ++i) stage.tau[i] = stage.target[i] = D(0.0);
     for (std::size_t k = 0; k < std::size_t(m().nu); ++k) {
       const CompiledMotor& motor = m().motors[k];
@@ -307,7 +306,8 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
 }
 
 void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step, int sensor,
-                    std::span<const double> numbers_dot, const StateTangent& state, std::span<double> field_dot) {
+                    std::span<const double> numbers_dot, std::span<const double> points_dot, const StateTangent& state,
+                    std::span<double> field_dot) {
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
   const double* row = tape.state(step) + lane;
@@ -316,10 +316,7 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
   for (std::size_t k = 0; k < v.size(); ++k) i.stage.x[k] = i.stage.s[k] = D(0.0), i.stage.r[k] = v[k];
   i.stage.c0_over_h = 0;
   i.stage.inverse_h = 1;
-  const int first = kernels::parameter_numbers(m.view) + kernels::kContactNumbers * sensor;
-  i.stage.field(sensor, batch.block(block) + lane,
-                numbers_dot.empty() ? numbers_dot : numbers_dot.subspan(std::size_t(first), kernels::kContactNumbers),
-                field_dot);
+  i.stage.field(sensor, batch.block(block) + lane, numbers_dot, points_dot, field_dot);
 }
 
 }  // namespace tangere

@@ -29,9 +29,11 @@ class Tangent {
   void step(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step, std::span<const double> u,
             std::span<const double> u_dot, std::span<const double> numbers_dot, StateTangent& state);
 
-  /// How a sensor's field (points, 3) changes with a state of the tape and with the sensor's coefficients.
+  /// How a sensor's field (points, 3) changes with a state of the tape, with the scene's numbers, and with `points_dot`,
+  /// (points, kPointNumbers): every point's own numbers (engine/point_numbers.hpp), or empty.
   void field(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step, int sensor,
-             std::span<const double> numbers_dot, const StateTangent& state, std::span<double> field_dot);
+             std::span<const double> numbers_dot, std::span<const double> points_dot, const StateTangent& state,
+             std::span<double> field_dot);
 
  private:
   struct Impl;

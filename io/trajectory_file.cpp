@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "engine/point_numbers.hpp"
 #include "io/h5.hpp"
 #include "io/part_file.hpp"
 #include "io/sensor_description.hpp"
@@ -80,6 +81,23 @@ struct TrajectoryFile::Impl {
   template <class T>
   h5::Id rows(const h5::Id& parent, const std::string& name, h5::Dims dims) {
     return h5::create_dataset<T>(parent, name, dims, rows_of(dims, sizeof(T)));
+  }
+
+  /// A dataset for each sensor from (E, points of all, kPointNumbers).
+  void put_points(const h5::Id& gradients, std::span<const double> of_all) {
+    const h5::Id group = h5::create_group(gradients, "grad_points");
+    h5::write_attribute(group, "meaning", "derivative of the loss by each tactile point's place in its body's axes and its own coefficients");
+    h5::write_attribute(group, "names", std::vector<std::string>{"x", "y", "z", "kn", "kt", "mu", "damping"});
+    h5::write_attribute(group, "units", std::vector<std::string>{"m", "m", "m", "N/m", "N s/m", "1", "N s/m^2; law linear: N s/m"});
+    const hsize_t E = static_cast<hsize_t>(layout.environments);
+    const double* next = of_all.data();
+    for (const SensorLayout& s : layout.sensors) {
+      const hsize_t points = static_cast<hsize_t>(s.points);
+      const h5::Id dataset = rows<double>(group, s.name, {E, points, kPointNumbers});
+      for (hsize_t e = 0; e < E; ++e)
+        h5::write_box<double>(dataset, {e, 0, 0}, {1, points, kPointNumbers}, next + e * (of_all.size() / E));
+      next += points * kPointNumbers;
+    }
   }
 
   void describe_run() {
@@ -298,6 +316,7 @@ void TrajectoryFile::write(const GradientArrays& g) {
       g.number_names);
   const h5::Id numbers = h5::open_dataset(group, "grad_numbers");
   h5::write_attribute(numbers, "units", g.number_units);
+  if (!g.points.empty()) impl_->put_points(group, g.points);
 }
 
 void TrajectoryFile::commit() {

@@ -18,6 +18,7 @@ struct GradientArrays {
   std::span<const double> q, v;     ///< (E, nv) by the initial state
   std::span<const double> numbers;  ///< (E, k) by the scene's numbers
   std::span<const std::string> number_names, number_units;  ///< (k)
+  std::span<const double> points;   ///< (E, all tactile points, kPointNumbers) by their own numbers (engine/point_numbers.hpp); or empty
 };
 
 /// Writes `<output>.part` and gives it its name on commit(). Destroyed before that, it leaves nothing behind.

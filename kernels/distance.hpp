@@ -89,6 +89,11 @@ struct CuboidDistance {
              select(x_first, zero, select(y_first, zero, sign.z))}};
   }
 
+  /// Inside: by half edges, from a cotangent ρ of the shape's place. A face moves along its normal.
+  Vec3<N> size_share(const Vec3<N>&, const Vec3<N>& n, const Vec3<N>& rho) const {
+    return {n.x * rho.x, n.y * rho.y, n.z * rho.z};
+  }
+
   /// H = (P - n nᵀ)/d outside, P the axes on which the point lies beyond its face; 0 inside.
   Mat3<N> hessian(const Vec3<N>& y) const {
     const N zero(0.0), one(1.0);
@@ -128,6 +133,7 @@ struct PlaneDistance {
     return {select(dot(y, y) < beyond * beyond, y.z, beyond), {zero, zero, N(1.0)}};
   }
   Distance<N> inside(const Vec3<N>& y, N& curvature) const { return evaluate(y, curvature); }
+  Vec3<N> size_share(const Vec3<N>&, const Vec3<N>&, const Vec3<N>&) const { return zero3<N>(); }
   Mat3<N> hessian(const Vec3<N>&) const { return zero33<N>(); }
 };
 
@@ -196,6 +202,11 @@ struct CylinderDistance {
              select(side, zero, select(y.z < zero, -one, one))}};
   }
 
+  /// Inside: by radius and half length, from a cotangent ρ of the shape's place (n is radial or axial).
+  Vec3<N> size_share(const Vec3<N>&, const Vec3<N>& n, const Vec3<N>& rho) const {
+    return {mul_add(n.x, rho.x, n.y * rho.y), n.z * rho.z, N(0.0)};
+  }
+
   /// H = (n_ρ/ρ) t tᵀ, t the direction around the axis; outside the rim, 1/d across it as well.
   Mat3<N> hessian(const Vec3<N>& y) const {
     const N zero(0.0), one(1.0);
@@ -237,6 +248,12 @@ struct CapsuleDistance {
     return {root_of(square, inverse) - radius,
             {select(regular, inverse * D.x, one), select(regular, inverse * D.y, zero),
              select(regular, inverse * D.z, zero)}};
+  }
+
+  /// By radius and half length, from a cotangent ρ of the shape's place: beyond an end that half ball moves with it.
+  Vec3<N> size_share(const Vec3<N>& y, const Vec3<N>& n, const Vec3<N>& rho) const {
+    const N zero(0.0);
+    return {dot(n, rho), select(y.z > half, rho.z, select(y.z < -half, -rho.z, zero)), zero};
   }
 
   Mat3<N> hessian(const Vec3<N>& y) const {

@@ -42,11 +42,13 @@ struct StageHistory {
 };
 
 /// Numbers of a scene with a derivative, as parameter_products() lays them out: of each pair and ground contact kn, kt, mu,
-/// damping; of each link mass, moment, inertia (xx xy xz yy yz zz); of each dof damping, stiffness, P, D.
-inline constexpr int kContactNumbers = 4, kInertiaNumbers = 10, kDofNumbers = 4;
-inline int parameter_numbers(const ModelView& m) {
-  return kContactNumbers * (m.n_pairs + m.n_grounds) + kInertiaNumbers * m.n_links + kDofNumbers * m.nv;
-}
+/// damping; of each link mass, moment, inertia (xx xy xz yy yz zz); of each dof damping, stiffness, P, D; of each solid its
+/// size as contacts see it, masses left alone.
+inline constexpr int kContactNumbers = 4, kInertiaNumbers = 10, kDofNumbers = 4, kSizeNumbers = 3;
+inline int first_inertia_number(const ModelView& m) { return kContactNumbers * (m.n_pairs + m.n_grounds); }
+inline int first_dof_number(const ModelView& m) { return first_inertia_number(m) + kInertiaNumbers * m.n_links; }
+inline int first_size_number(const ModelView& m) { return first_dof_number(m) + kDofNumbers * m.nv; }
+inline int parameter_numbers(const ModelView& m) { return first_size_number(m) + kSizeNumbers * m.n_solids; }
 
 /// Cotangents on their way back through a solved stage; every array is (nv), positions by their right tangent
 /// (kernels/adjoint-inl.hpp).
@@ -163,6 +165,8 @@ struct KernelTable {
   std::size_t (*pullback_bytes)(const ModelView&);
   /// A field in reverse.
   void (*pull_back_field)(const TactilePullback&);
+  /// A field along a change of motion.
+  void (*field_tangent)(const TactileTangent&);
 
   template <int L>
   [[nodiscard]] const StageKernels<L>& stage() const {

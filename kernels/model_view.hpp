@@ -81,6 +81,7 @@ struct PairContact {
   double extent;                ///< its radius [m]
   double reach;                 ///< largest |point| [m]: bounds how far a rotation moves one
   int size_row = -1;            ///< ≥ 0: size stands in three rows of the block instead
+  int body1 = -1, body2 = -1;   ///< of ModelView::solids
 };
 inline constexpr int kContactTile = 32;
 inline constexpr double kFarAway = 1e6;  ///< [m] coordinates of filler points: finite, and no shape is there
@@ -107,6 +108,15 @@ struct GroundContact {
   Vec3<double> middle;          ///< of a ball that holds all of the body's points, link axes
   double extent;                ///< its radius [m]
   int radius_row = -1;          ///< ≥ 0: a sphere's radius stands there instead, and is not in `extent`
+  int body = -1;                ///< of ModelView::solids
+};
+
+/// A body of the scene, for derivatives by its size: its own contact points keep their place on its surface.
+struct Solid {
+  Frame<double> frame;          ///< in its link (or the world)
+  bool stretches;               ///< its contact points follow its size; else they are given, or it has none
+  PrimitiveShape shape;
+  Vec3<double> size;            ///< as in PairContact
 };
 
 /// A link that touches the ground with one body or several: one 6×6 block.
@@ -154,6 +164,8 @@ struct ModelView {
   const LinkPair* link_pairs;
   const GroundedLink* grounded;
   const int *pair_order, *ground_order;  ///< (n_pairs), (n_grounds): members side by side
+  int n_solids;
+  const Solid* solids;         ///< (n_solids) every body of the scene
   Pattern pattern;
 };
 

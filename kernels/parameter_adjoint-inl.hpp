@@ -2,7 +2,9 @@
 // -(∂g/∂p)ᵀ λ for the numbers of a scene, after adjoint_products(): φ = λᵀ g is linear in masses, dampings, stiffnesses and
 // gains, and what a contact's coefficients do to its points' forces is weighed by Y, the slip along λ:
 //   ∂φ/∂p = Σ (Y_l + Y_a × x₂)·∂f/∂p           ∂φ/∂(m, c, J) of Λᵀ I X = Λ_a·(J α + c × a) + Λ_l·(m a - c × α), X = (α; a)
-// with X = A, and with X = V and -V × Λ in place of Λ.
+// with X = A, and with X = V and -V × Λ in place of Λ. Sizes act through d and n where a body is touched, and through the
+// places ξ of its own points, which move with its surface: with ξ̄, ρ̄ from f̄ = Y_l + Y_a × x₂ and x̄ = f × Y_a
+// (kernels/point_pullback.hpp), a size's share is that of ρ̄ (kernels/distance.hpp) and Σ ξ̄·∂ξ/∂size.
 #pragma once
 
 #include "kernels/adjoint-inl.hpp"
@@ -14,20 +16,55 @@ template <class N>
 void subtract_law(const LawCotangent<N>& c, N* out) {
   out[0] -= c.kn, out[1] -= c.kt, out[2] -= c.mu, out[3] -= c.damping;
 }
+
+/// Of one pair or ground contact: what its points add up to.
 template <class N>
-LawCotangent<N> zero_law() {
-  return {N(0.0), N(0.0), N(0.0), N(0.0)};
+struct ContactCotangent {
+  LawCotangent<N> law;
+  Vec3<N> size, stretch;  ///< of the touched shape; of the body whose points touch
+};
+template <class N>
+ContactCotangent<N> zero_contact() {
+  return {{N(0.0), N(0.0), N(0.0), N(0.0)}, zero3<N>(), zero3<N>()};
+}
+
+/// Σ ξ̄·∂ξ/∂size for a point of a body at ξ, link axes: points keep their place on a cuboid's grid, a rod's rings and poles.
+template <class N>
+Vec3<N> stretch_share(const Solid& body, const Vec3<N>& xi, const Vec3<N>& xi_bar) {
+  if (!body.stretches) return zero3<N>();
+  const Mat3<N> R = broadcast<N>(body.frame.R);
+  const Vec3<N> y = transposed_times(R, xi - broadcast<N>(body.frame.p)), bar = transposed_times(R, xi_bar);
+  const Vec3<double>& s = body.size;
+  if (body.shape == PrimitiveShape::cuboid)
+    return {bar.x * y.x * N(1 / s.x), bar.y * y.y * N(1 / s.y), bar.z * y.z * N(1 / s.z)};
+  const N on_axis = body.shape == PrimitiveShape::capsule ? max(min(y.z, N(s.y)), N(-s.y)) : y.z;
+  const N around = mul_add(bar.x, y.x, bar.y * y.y);
+  return {mul_add(bar.z, y.z - on_axis, around) * N(1 / s.x), bar.z * on_axis * N(1 / s.y), N(0.0)};
+}
+
+/// One point of a pair; `slip`: Y. Nothing where it does not touch.
+template <class Shape, class N>
+void add_point(const Shape& shape, const Frame<N>& at, const Vec6<N>& W, const LawParameters<N>& law, const Solid& body,
+               const Vec6<N>& slip, const Vec3<N>& xi, ContactCotangent<N>& sum) {
+  const PointContact<N> p = point_contact(shape, law, at.R, at.p, W.a, W.l, xi);
+  const auto touching = p.d < N(0.0);
+  if (!any(touching)) return;
+  const N gate = select(touching, N(1.0), N(0.0));
+  const Vec3<N> f_bar = gate * (slip.l + cross(slip.a, p.x2));
+  pull_back_law(law, p, f_bar, sum.law);
+  TouchCotangent<N> unused;
+  unused.twist = unused.displacement = zero6<N>();
+  const PlaceCotangent<N> of_force = pull_back_motion<Shape>(law, p, W.a, f_bar, unused);
+  const PlaceCotangent<N> of_arm = pull_back_place<Shape>(p, cross(p.force, slip.a));
+  const Vec3<N> rho = of_force.rho + of_arm.rho;
+  sum.size += pull_back_size(shape, p, at.R, at.p, xi, rho);
+  sum.stretch += gate * stretch_share(body, xi, of_force.x + of_arm.x - rho);
 }
 
 template <class Shape, class N>
-void pair_law_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W, const LawParameters<N>& law,
-                      const CandidateList<N>& list, int lone, const Vec6<N>& slip, LawCotangent<N>& sum) {
-  const auto add = [&](const Vec3<N>& xi) {
-    const PointContact<N> p = point_contact(shape, law, at.R, at.p, W.a, W.l, xi);
-    const auto touching = p.d < N(0.0);
-    if (!any(touching)) return;
-    pull_back_law(law, p, select(touching, N(1.0), N(0.0)) * (slip.l + cross(slip.a, p.x2)), sum);
-  };
+void pair_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W, const LawParameters<N>& law, const Solid& body,
+                  const CandidateList<N>& list, int lone, const Vec6<N>& slip, ContactCotangent<N>& sum) {
+  const auto add = [&](const Vec3<N>& xi) { add_point(shape, at, W, law, body, slip, xi, sum); };
   if (lone < 0) {
     for (int k = 0; k < list.count; ++k) add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
   } else {
@@ -36,57 +73,80 @@ void pair_law_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W, 
   }
 }
 
-/// Coefficients of every shape of two links.
+/// Where contacts add what they find.
+template <class N>
+struct ContactRows {
+  N* law;   ///< (n_pairs + n_grounds, kContactNumbers)
+  N* size;  ///< (n_solids, kSizeNumbers)
+};
+template <class N>
+void subtract(const Vec3<N>& sum, N* out) {
+  out[0] -= sum.x, out[1] -= sum.y, out[2] -= sum.z;
+}
+
+/// Coefficients and sizes of every shape of two links.
 template <class N>
 void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const LinkPair& links,
-                          const ContactScratch<N>& o, const LinkAdjoint<N>* adjoint, N* out) {
+                          const ContactScratch<N>& o, const LinkAdjoint<N>* adjoint, const ContactRows<N>& out) {
   const Vec6<N> slip = adjoint_slip(links, o, adjoint);
   for (int m = links.first; m < links.first + links.count; ++m) {
     const int k = model.pair_order[m];
     const PairContact& pair = model.pairs[k];
     const LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
     const Frame<N> at = compose(o.link2_in_1, broadcast<N>(pair.frame2));
-    LawCotangent<N> sum = zero_law<N>();
+    ContactCotangent<N> sum = zero_contact<N>();
     const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
     with_distance<N>(pair.shape, size, [&]<class Shape>(const Shape& shape) {
-      pair_law_adjoint(shape, at, o.W, law, a.candidates[k], a.lone, slip, sum);
+      pair_adjoint(shape, at, o.W, law, model.solids[pair.body1], a.candidates[k], a.lone, slip, sum);
     });
-    subtract_law(sum, out + kContactNumbers * k);
+    subtract_law(sum.law, out.law + kContactNumbers * k);
+    subtract(sum.size, out.size + kSizeNumbers * pair.body2);
+    subtract(sum.stretch, out.size + kSizeNumbers * pair.body1);
   }
 }
 
-/// Of one body against the ground: Y = -Λ.
+/// Of one body against the ground: Y = -Λ. Forces act at ξ = ξ_c - r m itself, ξ_c a point of the body or a ball's centre.
 template <class N>
-void ground_parameters(const ModelView& model, const StageArgs<N>& a, const GroundContact& ground, const Vec6<N>& twist,
-                       N* out) {
+ContactCotangent<N> ground_adjoint(const ModelView& model, const StageArgs<N>& a, const GroundContact& ground,
+                                   const Vec6<N>& twist) {
   const LinkScratch<N>& link = a.links[ground.link];
   const Vec3<N> normal = broadcast<N>(model.ground_normal);
   const Vec3<N> m = transposed_times(link.world.R, normal);
   const N height = dot(normal, link.world.p - broadcast<N>(model.ground_point));
   const LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
   const N radius = ground_radius<N>(ground, a.block, a.group);
-  LawCotangent<N> sum = zero_law<N>();
+  const bool ball = ground.radius > 0;
+  ContactCotangent<N> sum = zero_contact<N>();
   for (int i = 0; i < ground.n_points; ++i) {
-    const double* place = ground.points + 3 * i;
-    const Vec3<N> centre = {N(place[0]), N(place[1]), N(place[2])}, xi = centre - radius * m;
+    const Vec3<N> centre = ground_point<N>(ground, i), xi = centre - radius * m;
     PointContact<N> p;
     p.d = dot(m, centre) + height - radius;
     const auto touching = p.d < N(0.0);
     if (!any(touching)) continue;
+    const N gate = select(touching, N(1.0), N(0.0));
     p.n = m;
     p.u = link.V.l + cross(link.V.a, xi);
     p.rate = dot(m, p.u);
     p.vt = p.u - p.rate * m;
     p.normal = normal_force(law, p.d, p.rate);
     p.tangential = friction(law, p.normal, p.vt);
-    pull_back_law(law, p, select(touching, N(-1.0), N(0.0)) * (twist.l + cross(twist.a, xi)), sum);
+    const Vec3<N> f_bar = (-gate) * (twist.l + cross(twist.a, xi));
+    pull_back_law(law, p, f_bar, sum.law);
+    const ForceCotangent<N> bar = pull_back_force(law, p, f_bar);
+    const Vec3<N> force = gate * (p.normal.force * m - p.tangential.scale * p.vt);
+    const Vec3<N> xi_bar = cross(bar.u, link.V.a) - cross(force, twist.a);
+    if (ball) {
+      sum.size.x -= dot(m, xi_bar) + bar.d;
+    } else {
+      sum.stretch += stretch_share(model.solids[ground.body], centre, xi_bar + bar.d * m);
+    }
   }
-  subtract_law(sum, out);
+  return sum;
 }
 
-/// Coefficients of every pair and ground contact, four each.
+/// Of every pair and ground contact.
 template <class N>
-void contact_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links, N* out) {
+void contact_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links, const ContactRows<N>& out) {
   for (int k = 0; k < model.n_link_pairs; ++k)
     if (a.contacts[k].near) link_pair_parameters(model, a, model.link_pairs[k], a.contacts[k], links, out);
   for (int k = 0; k < model.n_grounded; ++k) {
@@ -94,7 +154,9 @@ void contact_parameters(const ModelView& model, const StageArgs<N>& a, const Lin
     if (!a.contacts[model.n_link_pairs + k].near) continue;
     for (int m = grounded.first; m < grounded.first + grounded.count; ++m) {
       const int g = model.ground_order[m];
-      ground_parameters(model, a, model.grounds[g], links[grounded.link].twist, out + kContactNumbers * (model.n_pairs + g));
+      const ContactCotangent<N> sum = ground_adjoint(model, a, model.grounds[g], links[grounded.link].twist);
+      subtract_law(sum.law, out.law + kContactNumbers * (model.n_pairs + g));
+      subtract(sum.size + sum.stretch, out.size + kSizeNumbers * model.grounds[g].body);
     }
   }
 }
@@ -161,13 +223,12 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
   }
 }
 
-/// Adds to (parameter_numbers(model)): contacts, links, dofs.
+/// Adds to (parameter_numbers(model)).
 template <class N>
 void parameter_products(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d, N* out) {
-  contact_parameters(model, a, d.links, out);
-  out += kContactNumbers * (model.n_pairs + model.n_grounds);
-  inertia_parameters(model, a, d.links, out);
-  out += kInertiaNumbers * model.n_links;
+  contact_parameters<N>(model, a, d.links, {out, out + first_size_number(model)});
+  inertia_parameters(model, a, d.links, out + first_inertia_number(model));
+  out += first_dof_number(model);
   for (int i = 0; i < model.n_links; ++i) {
     const Link& link = model.links[i];
     with_kind(link.kind, [&]<JointKind K>() {

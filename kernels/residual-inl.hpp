@@ -237,11 +237,8 @@ bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const St
     started = true;
     LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
     law.friction_tangent = a.friction_tangent;
-    for (int k = 0; k < ground.n_points; ++k) {
-      const double* p = ground.points + 3 * k;
-      near |= accumulate_ground<Derivatives>(sums, law, m, height, link.V, Vec3<N>{N(p[0]), N(p[1]), N(p[2])},
-                                             radius);
-    }
+    for (int k = 0; k < ground.n_points; ++k)
+      near |= accumulate_ground<Derivatives>(sums, law, m, height, link.V, ground_point<N>(ground, k), radius);
   }
   return near;
 }

@@ -13,6 +13,7 @@
 #include "kernels/parameter_adjoint-inl.hpp"
 #include "kernels/tactile_block-inl.hpp"
 #include "kernels/tactile_pullback-inl.hpp"
+#include "kernels/tactile_tangent-inl.hpp"
 
 namespace tangere::kernels {
 
@@ -195,7 +196,7 @@ struct TableOf {
             tactile_group_mixed,
             motion_of_links,
             pullback_bytes,
-            pull_back_field<Arch>};
+            pull_back_field<Arch>, field_tangent<Arch>};
   }
 };
 

@@ -101,7 +101,11 @@ struct TouchCotangent {
   Vec6<N> displacement;  ///< (θ̄; ρ̄) of body 2 relative to body 1, body 1's axes and origin
   Vec6<N> twist;         ///< W̄
   LawCotangent<N> law;
+  Vec3<N> size;          ///< of body 2, as in PairContact
 };
+
+/// Numbers of a tactile point with a derivative: its place x y z, then its own kn, kt, mu, damping.
+inline constexpr int kPointNumbers = 7;
 
 /// One environment's field on its way back: cotangents of its touched tiles to those of each shape's motion.
 struct TactilePullback {
@@ -113,8 +117,27 @@ struct TactilePullback {
   int count;                       ///< tiles
   const int* tiles;                ///< (count)
   const double* cotangents;        ///< (count, 3, 64) of the field [loss/N]
-  bool of_law;                     ///< by the coefficients too; else zeros
+  bool of_law;                     ///< by the coefficients and the shapes' sizes too; else zeros
+  double* of_points;               ///< (count, kPointNumbers, 64) by every point's own numbers, added to; or nullptr
   TouchCotangent<double>* out;     ///< (n_touches), pad axes and origin; body 1 is the sensor's
+};
+
+/// How a shape moves against a pad: displacement ε and change of twist δW, pad axes and origin.
+struct TouchTangent {
+  Vec6<double> displacement, twist;
+};
+
+/// One environment's field along a change of its shapes' motion.
+struct TactileTangent {
+  const PadTiles* pad;
+  ContactLaw law;
+  int n_touches;
+  const TouchShape* shapes;        ///< (n_touches)
+  const Touch<double>* touches;    ///< (n_touches)
+  const TouchTangent* tangents;    ///< (n_touches)
+  int count;                       ///< tiles
+  const int* tiles;                ///< (count)
+  double* change;                  ///< (count, 3, 64) out [N]
 };
 
 }  // namespace tangere::kernels

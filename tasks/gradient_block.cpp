@@ -42,7 +42,7 @@ GradientBlock::GradientBlock(const Model& model, const GradientOptions& options,
       stepper_(model, options.stepper),
       readout_(model, options.precision),
       pullback_(model),
-      adjoint_(model, options.stepper, {static_cast<int>(losses.size()), options.parameters}),
+      adjoint_(model, options.stepper, {static_cast<int>(losses.size()), options.parameters, options.points}),
       tape_(model, stepper_.integrator(), segment_length(model, stepper_.integrator(), options)),
       reading_(model),
       parameters_(model) {
@@ -179,7 +179,8 @@ void GradientBlock::judge(const InHand& h, std::int64_t step, std::size_t loss, 
   }
   for (std::size_t i = 0; i < u.size(); ++i) result.u[(count(e) * steps + count(step)) * nu + i] += reading_.u_bar()[i];
   for (std::size_t s = 0; s < frames_.size() && fields; ++s)
-    pullback_.field(lane, static_cast<int>(s), frames_[s][count(lane)].tiles(), reading_.field_bar(s), c.parameters);
+    pullback_.field(lane, static_cast<int>(s), frames_[s][count(lane)].tiles(), reading_.field_bar(s), c.parameters,
+                    c.points_of(model_, static_cast<int>(s), lane));
   for (std::size_t k = 0; k < model_.variables().size() && l.reads_variables(step); ++k)
     pullback_.variable(lane, static_cast<int>(k), reading_.variables_bar().subspan(3 * k, 3));
 }
@@ -190,13 +191,16 @@ void GradientBlock::finish(const InHand& h) {
   for (std::size_t k = 0; k < losses_.size(); ++k) {
     const BlockCotangent& c = adjoint_.loss(static_cast<int>(k));
     LossGradient& result = h.out.losses[k];
+    const std::size_t points = c.points.size() / kBlock;
     for (int e = h.first; e < h.last; ++e) {
       for (std::size_t i = 0; i < nv; ++i) {
         result.q[count(e) * nv + i] = c.q[i * kBlock + count(e - h.first)];
         result.v[count(e) * nv + i] = c.v[i * kBlock + count(e - h.first)];
       }
       if (options_.parameters)
-        parameters_.gradient(c, e - h.first, std::span(result.parameters).subspan(count(e) * numbers, numbers));
+        parameters_.gradient(c, h.batch, e, std::span(result.parameters).subspan(count(e) * numbers, numbers));
+      std::copy_n(c.points.begin() + std::ptrdiff_t(count(e - h.first) * points), points,
+                  result.points.begin() + std::ptrdiff_t(count(e) * points));
     }
   }
 }

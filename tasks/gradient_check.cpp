@@ -9,6 +9,7 @@
 
 #include "engine/displacement.hpp"
 #include "engine/parameters.hpp"
+#include "engine/point_numbers.hpp"
 #include "engine/readout.hpp"
 #include "engine/tangent.hpp"
 #include "tasks/loss_reading.hpp"
@@ -112,6 +113,54 @@ Difference difference_of_number(const Setting& s, const Parameters& parameters, 
   return best_difference(losses, 1);
 }
 
+/// Changes of all points of a sensor at once, by one of their numbers: random from point to point, places by parts of the
+/// sensor's size, coefficients of what they are.
+struct PointChange {
+  int sensor, number;
+  std::vector<double> of_scene;  ///< (points, kPointNumbers) as add_to_points() takes it
+  std::vector<double> own;       ///< the same in the units of the points' own numbers
+};
+
+double extent_of(const TactileDescription& sensor) {
+  const std::vector<TactilePoint> points = sensor.points.empty() ? list_points(sensor.array) : sensor.points;
+  double extent = 0;
+  for (const TactilePoint& p : points)
+    for (std::size_t k = 0; k < 3; ++k) extent = std::max(extent, std::abs(p.position[k] - points[0].position[k]));
+  return extent;
+}
+
+std::vector<PointChange> point_changes(const Model& model, std::span<const double> coefficients, std::uint64_t seed) {
+  std::vector<PointChange> changes;
+  for (int s = 0; s < static_cast<int>(model.sensors().size()); ++s) {
+    const auto points = std::size_t(model.sensors()[std::size_t(s)].points);
+    const double extent = extent_of(model.scene().sensors[std::size_t(s)]);
+    for (int number = 0; number < kPointNumbers; ++number) {
+      const std::vector<double> d = random_direction(points, seed, std::uint32_t(4 + changes.size()));
+      const double size = number < 3 ? extent : 1, has = number < 3 ? 1 : coefficients[std::size_t(4 * s + number - 3)];
+      if (has == 0) continue;
+      PointChange c{s, number, std::vector<double>(points * kPointNumbers), std::vector<double>(points * kPointNumbers)};
+      for (std::size_t i = 0; i < points; ++i) {
+        c.of_scene[i * kPointNumbers + std::size_t(number)] = size * d[i];
+        c.own[i * kPointNumbers + std::size_t(number)] = has * size * d[i];
+      }
+      changes.push_back(std::move(c));
+    }
+  }
+  return changes;
+}
+
+Difference difference_of_points(const Setting& s, const PointChange& change) {
+  std::vector<double> losses;
+  for (const double e : sweep(1)) {
+    Scene scene = s.start.model().scene();
+    std::vector<double> moved = change.of_scene;
+    for (double& x : moved) x *= e;
+    add_to_points(scene.sensors[std::size_t(change.sensor)], moved);
+    losses.push_back(losses_of(s, Model(scene), {s.at}, s.varying)[0]);
+  }
+  return best_difference(losses, 1);
+}
+
 /// Tangents along one direction per input.
 class Directions {
  public:
@@ -133,9 +182,9 @@ class Directions {
     }
   }
 
-  /// dL along (q, v, u, numbers), each empty for zeros.
+  /// dL along (q, v, u, numbers), each empty for zeros, and the points' own numbers, by sensor.
   double along(const std::vector<double>& q, const std::vector<double>& v, const std::vector<double>& u,
-               const std::vector<double>& change) {
+               const std::vector<double>& change, const std::vector<std::vector<double>>& points = {}) {
     const Model& model = s_.start.model();
     const auto nu = std::size_t(model.nu());
     const std::vector<double> zero = numbers(model.nv()), no_u(nu);
@@ -143,7 +192,7 @@ class Directions {
     std::vector<double> rows;
     if (!change.empty()) {
       rows.resize(std::size_t(parameter_rows(model.compiled())));
-      parameters_.spread(change, rows);
+      parameters_.spread(change, s_.start, 0, rows);
     }
     Tangent tangent(model, s_.options.stepper);
     Batch batch = s_.start;
@@ -153,7 +202,7 @@ class Directions {
       const std::span<const double> u_dot =
           u.empty() || t == s_.options.steps ? std::span<const double>(no_u) : std::span(u).subspan(std::size_t(t) * nu, nu);
       tape_->show(t, batch, 0);
-      sum += change_at(batch, look, tangent, t, state, u_dot, rows);
+      sum += change_at(batch, look, tangent, t, state, u_dot, rows, points);
       if (t == s_.options.steps) break;
       tangent.step(batch, 0, 0, *tape_, t, s_.u(s_.at, t), u_dot, rows, state);
     }
@@ -163,7 +212,8 @@ class Directions {
  private:
   /// The loss's own derivatives at a state, times how that changes.
   double change_at(const Batch& batch, Look& look, Tangent& tangent, std::int64_t t, const StateTangent& state,
-                   std::span<const double> u_dot, std::span<const double> rows) {
+                   std::span<const double> u_dot, std::span<const double> rows,
+                   const std::vector<std::vector<double>>& points) {
     const Model& model = batch.model();
     look.at(s_, batch, 0, t, s_.u(s_.at, t));
     const LossReading& bar = look.reading();
@@ -172,7 +222,8 @@ class Directions {
     for (std::size_t i = 0; i < u_dot.size(); ++i) sum += bar.u_bar()[i] * u_dot[i];
     for (std::size_t k = 0; k < model.sensors().size() && s_.loss.reads_fields(t); ++k) {
       std::vector<double> change(look.frame(k).dense_size()), of_tiles(change.size());
-      tangent.field(batch, 0, 0, *tape_, t, static_cast<int>(k), rows, state, change);
+      tangent.field(batch, 0, 0, *tape_, t, static_cast<int>(k), rows, points.empty() ? std::span<const double>{} : points[k],
+                    state, change);
       // The cotangents' layout is that of the tiles: spread them as the frame spreads its values.
       look.frame(k).spread(bar.field_bar(k), of_tiles);
       sum += std::inner_product(change.begin(), change.end(), of_tiles.begin(), 0.0);
@@ -210,16 +261,23 @@ Setting setting_of(const Batch& start, const StepControls& controls, const Rollo
   return s;
 }
 
+bool reads_fields(const RolloutLoss& loss, const CheckOptions& options) {
+  for (std::int64_t t = 0; t <= options.steps; ++t)
+    if (loss.reads_fields(t)) return true;
+  return false;
+}
+
 LossGradient gradient_of(const Batch& start, const StepControls& controls, const RolloutLoss& loss, const CheckOptions& options) {
   GradientOptions wanted;
   wanted.steps = options.steps;
   wanted.stepper = options.stepper;
   wanted.parameters = true;
+  wanted.points = reads_fields(loss, options);
   const RolloutLoss* const losses[] = {&loss};
   return rollout_gradients(start, controls, wanted, losses).losses[0];
 }
 
-/// The four inputs, one after the other.
+/// The inputs, one after the other.
 class Check {
  public:
   Check(const Setting& s, const LossGradient& g) : s_(s), g_(g), parameters_(s.start.model()), tangents_(s, parameters_) {
@@ -259,9 +317,35 @@ class Check {
         3, [&](const std::vector<double>& d) { return tangents_.along({}, {}, {}, r.change(d)); });
   }
 
+  /// By places and coefficients of all points of a sensor at once.
+  void points() {
+    const Model& model = s_.start.model();
+    const RelativeGradient r(parameters_, model.scene(), s_.varying, std::span(g_.parameters).first(std::size_t(parameters_.count())));
+    std::vector<double> coefficients;
+    for (std::size_t k = 0; k < r.has.size(); ++k)
+      if (parameters_.infos()[k].name.rfind("tactile ", 0) == 0) coefficients.push_back(r.has[k]);
+    const std::vector<PointChange> changes = point_changes(model, coefficients, s_.options.seed);
+    const std::span<const double> all = std::span(g_.points).first(std::size_t(tactile_points(model) * kPointNumbers));
+    std::vector<double> gradient;
+    for (const PointChange& c : changes)
+      gradient.push_back(std::inner_product(c.own.begin(), c.own.end(), all.begin() + first_tactile_point(model, c.sensor) * kPointNumbers, 0.0));
+    constexpr const char* kNames[kPointNumbers] = {"x", "y", "z", "kn", "kt", "mu", "damping"};
+    add({"points", gradient, all_of(gradient.size()), [&](std::size_t k) { return difference_of_points(s_, changes[k]); },
+         [&](std::size_t k) { return model.sensors()[std::size_t(changes[k].sensor)].name + " " + kNames[changes[k].number]; }},
+        4, [&](const std::vector<double>& d) { return tangents_.along({}, {}, {}, {}, together(model, changes, d)); });
+  }
+
   GradientCheck out;
 
  private:
+  static std::vector<std::vector<double>> together(const Model& model, const std::vector<PointChange>& changes,
+                                                   const std::vector<double>& d) {
+    std::vector<std::vector<double>> sum;
+    for (const SensorInfo& s : model.sensors()) sum.emplace_back(std::size_t(s.points * kPointNumbers));
+    for (std::size_t k = 0; k < changes.size(); ++k)
+      for (std::size_t i = 0; i < changes[k].own.size(); ++i) sum[std::size_t(changes[k].sensor)][i] += d[k] * changes[k].own[i];
+    return sum;
+  }
   void add(const Comparison& c, std::uint32_t purpose, const std::function<double(const std::vector<double>&)>& along) {
     out.inputs.push_back(compare(c, out.loss, s_.options, purpose));
     const std::vector<double> d = random_direction(c.gradient.size(), s_.options.seed, purpose);
@@ -300,6 +384,7 @@ GradientCheck check_gradient(const Batch& start, const StepControls& controls, c
   check.positions();
   check.velocities();
   check.numbers_of_scene();
+  if (reads_fields(loss, options)) check.points();
   return check.out;
 }
 

@@ -14,7 +14,7 @@ namespace tangere {
 
 /// One kind of input. Errors are relative to the norm of the gradient by it, (numbers of the scene: by their relative change).
 struct CheckedInput {
-  std::string name;                ///< "u" or "actions", "q", "v", "numbers"
+  std::string name;                ///< "u" or "actions", "q", "v", "numbers", "points"
   std::size_t entries = 0;         ///< the gradient has
   std::size_t compared = 0;        ///< with differences
   std::size_t kinks = 0;           ///< left out: differences that do not settle, or whose runs find no solution

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <string>
 
+#include "engine/point_numbers.hpp"
 #include "tasks/gradient_block.hpp"
 #include "tasks/task_order.hpp"
 
@@ -25,6 +26,10 @@ void check(const GradientOptions& options) {
     throw InputError("gradients on " + std::to_string(options.threads) + " threads; expected at least 1");
 }
 
+std::int64_t point_count(const Model& model, const GradientOptions& o) {
+  return o.points ? std::int64_t{tactile_points(model)} * kPointNumbers : 0;
+}
+
 }  // namespace
 
 GradientSummary empty_gradients(const Model& model, int environments, const GradientOptions& o, std::size_t losses) {
@@ -33,7 +38,7 @@ GradientSummary empty_gradients(const Model& model, int environments, const Grad
   const int numbers = o.parameters ? Parameters(model).count() : 0;
   out.losses.assign(losses, {std::vector<double>(size(1)), std::vector<double>(size(o.steps * model.nu())),
                              std::vector<double>(size(model.nv())), std::vector<double>(size(model.nv())),
-                             std::vector<double>(size(numbers))});
+                             std::vector<double>(size(numbers)), std::vector<double>(size(point_count(model, o)))});
   return out;
 }
 
@@ -101,7 +106,7 @@ GradientSummary GradientRollouts::run(const Batch& start, const StepControls& co
 
 double gradient_bytes(const Model& model, int environments, const GradientOptions& o, int losses) {
   const double numbers = o.parameters ? Parameters(model).count() : 0;
-  const double results = double(o.steps) * model.nu() + 2.0 * model.nv() + numbers + 1;
+  const double results = double(o.steps) * model.nu() + 2.0 * model.nv() + numbers + double(point_count(model, o)) + 1;
   const Integrator scheme = o.stepper.integrator.value_or(model.integrator());
   const double tape = std::min(double(BlockTape::bytes(model, scheme, o.steps)), o.tape_bytes);
   return 8 * results * environments * losses + o.threads * (tape + 2 * double(model.workspace_bytes()));

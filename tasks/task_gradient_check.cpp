@@ -70,7 +70,7 @@ class Check {
          [&](std::size_t k) { return parameters_.infos()[k].name; }},
         3, [&](std::span<const double> d) {
           std::fill(rows.begin(), rows.end(), 0.0);
-          parameters_.spread(r.change(d), rows);
+          parameters_.spread(r.change(d), rollout_->batch(), 0, rows);
           return EpisodeDirection{{}, {}, {}, rows};
         });
   }

@@ -151,7 +151,7 @@ void TaskTangent::look(std::size_t action, std::size_t moment, const EpisodeDire
   const auto sensors = task_.model().sensors();
   for (std::size_t s = 0; s < sensors.size(); ++s) {
     std::vector<double> change(3 * size(sensors[s].points));
-    tangent_.field(rollout_.batch(), 0, 0, tape, step, static_cast<int>(s), d.numbers, state_, change);
+    tangent_.field(rollout_.batch(), 0, 0, tape, step, static_cast<int>(s), d.numbers, {}, state_, change);
     seen.tactile[moment].insert(seen.tactile[moment].end(), change.begin(), change.end());
   }
 }

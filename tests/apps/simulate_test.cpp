@@ -111,6 +111,36 @@ TEST(Simulate, WritesGradientsBesideTheTrajectory) {
   EXPECT_THAT(names, testing::Contains("tactile pad kn"));
 }
 
+/// The sensor's coefficients act on all of its points: their derivatives are sums over points.
+TEST(Simulate, WritesGradientsOfTactilePoints) {
+  const Folder folder;
+  simulate(folder, kSmall, {"--envs", "2", "--steps", "90", "--gradients", "shear", "--point-gradients", "--overwrite"});
+  const Array points = read_array(folder, "/gradients/grad_points/pad"), numbers = read_array(folder, "/gradients/grad_numbers");
+  const h5::Id file = h5::open_file(folder.path("out.h5"));
+  const auto names = h5::read_texts(h5::open_dataset(file, "/gradients/grad_numbers"), "names");
+  const auto own = h5::read_texts(h5::open_group(file, "/gradients/grad_points"), "names");
+  ASSERT_EQ(points.dims.size(), 3U);
+  EXPECT_EQ(points.dims[0], 2U);
+  EXPECT_EQ(points.dims[2], own.size());
+  for (std::size_t e = 0; e < 2; ++e)
+    for (const std::string coefficient : {"kn", "kt", "mu"}) {
+      const auto column = std::size_t(std::find(own.begin(), own.end(), coefficient) - own.begin());
+      const auto whole = std::size_t(std::find(names.begin(), names.end(), "tactile pad " + coefficient) - names.begin());
+      ASSERT_LT(column, own.size());
+      ASSERT_LT(whole, names.size());
+      double sum = 0, size = 0;
+      for (std::size_t k = 0; k < points.dims[1]; ++k) {
+        const double x = points.values[(e * points.dims[1] + k) * points.dims[2] + column];
+        sum += x, size += std::abs(x);
+      }
+      EXPECT_GT(size, 0) << coefficient;
+      EXPECT_NEAR(numbers.values[e * names.size() + whole], sum, 1e-12 * size) << coefficient;
+    }
+  const Outcome refused = run(folder, {"simulate", kSmall, "-o", "none.h5", "--point-gradients"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, testing::HasSubstr("--point-gradients without --gradients; expected both"));
+}
+
 TEST(Simulate, TapeMemoryChangesNoGradient) {
   const Folder folder;
   const Words words{"--envs", "3", "--steps", "120", "--gradients", "shear", "--overwrite"};

@@ -138,7 +138,7 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
   }
   const Parameters parameters(model);
   g.parameters.resize(std::size_t(parameters.count()));
-  parameters.gradient(adjoint.loss(0), lane, g.parameters);
+  parameters.gradient(adjoint.loss(0), batch, lane, g.parameters);
   return g;
 }
 

@@ -66,7 +66,7 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
   const Parameters parameters(model);
   std::vector<double> change;
   for (const ParameterInfo& info : parameters.infos()) change.push_back(info.value * random.normal());
-  parameters.spread(change, d.numbers);
+  parameters.spread(change, batch, 0, d.numbers);
   for (int t = 0; t < steps; ++t) d.u.push_back(normals(random, std::size_t(m.nu)));
 
   const std::size_t field_size = every > 0 ? std::size_t(3 * model.sensors()[0].points) : 0;
@@ -93,7 +93,7 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
     }
     if (every == 0 || t % every != 0) return;
     std::vector<double> of_field(field_size);
-    tangent.field(batch, 0, 0, tape, t, 0, d.numbers, s, of_field);
+    tangent.field(batch, 0, 0, tape, t, 0, d.numbers, {}, s, of_field);
     p.forward += dot(field_weights[std::size_t(t)], of_field);
     forward_square += dot(of_field, of_field);
     loss_square += double(field_size);
