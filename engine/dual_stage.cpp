@@ -37,7 +37,7 @@ struct DualStage::Impl {
   std::vector<kernels::ContactScratch<D>> contacts;
   std::vector<kernels::JointColumns<D>> columns;
   std::vector<kernels::LinkAdjoint<D>> adjoint;
-  std::vector<std::vector<double>> ground_points;  ///< places, then their tangents
+  std::vector<std::vector<double>> ground_tangents;  ///< of the points in the ground
   std::vector<std::vector<D>> points, references;
   std::vector<kernels::CandidateList<D>> lists;
 
@@ -73,11 +73,7 @@ struct DualStage::Impl {
     for (auto& p : pairs) side_by_side(p.size_row, 3, &p.size.x, size_of(p.body2));
     for (auto& g : grounds)
       if (g.radius > 0) side_by_side(g.radius_row, 1, &g.radius, size_of(g.body));
-    for (auto& g : grounds) {
-      ground_points.emplace_back(g.points, g.points + 3 * g.n_points);
-      ground_points.back().resize(std::size_t(6 * g.n_points));
-      g.points = ground_points.back().data();
-    }
+    for (auto& g : grounds) g.point_tangents = ground_tangents.emplace_back(std::size_t(3 * g.n_points)).data();
     for (kernels::Link& link : bodies) {
       link.inertia_row = -1;
       if (link.place_row >= 0) side_by_side(link.place_row, 3, nullptr, -1);
@@ -118,11 +114,11 @@ struct DualStage::Impl {
   /// Tangents of the points in the ground.
   void stretch_grounds() {
     for (std::size_t g = 0; g < grounds.size(); ++g) {
-      std::vector<double>& p = ground_points[g];
-      const std::size_t half = p.size() / 2;
-      for (std::size_t k = 0; k < half; k += 3) {
+      const double* p = grounds[g].points;
+      std::vector<double>& t = ground_tangents[g];
+      for (std::size_t k = 0; k < t.size(); k += 3) {
         const kernels::Vec3<double> moves = frozen ? kernels::zero3<double>() : stretched(grounds[g].body, {p[k], p[k + 1], p[k + 2]});
-        p[half + k] = moves.x, p[half + k + 1] = moves.y, p[half + k + 2] = moves.z;
+        t[k] = moves.x, t[k + 1] = moves.y, t[k + 2] = moves.z;
       }
     }
   }

@@ -109,6 +109,7 @@ struct GroundContact {
   double extent;                ///< its radius [m]
   int radius_row = -1;          ///< ≥ 0: a sphere's radius stands there instead, and is not in `extent`
   int body = -1;                ///< of ModelView::solids
+  const double* point_tangents = nullptr;  ///< (n_points, 3) of `points`, for dual numbers alone; nullptr: they stay
 };
 
 /// A body of the scene, for derivatives by its size: its own contact points keep their place on its surface.

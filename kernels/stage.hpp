@@ -183,16 +183,13 @@ template <class N>
 N ground_radius(const GroundContact& ground, const double* block, int group) {
   return ParameterLoad<N>::load({ground.radius, ground.radius_row}, block, group);
 }
-/// Place k of a body's points; in dual numbers the tangents of all places follow them.
+/// Place k of a body's points; in dual numbers it may move.
 template <class N>
 Vec3<N> ground_point(const GroundContact& ground, int k) {
   const double* p = ground.points + 3 * k;
-  if constexpr (std::is_same_v<N, Dual<double>>) {
-    const double* t = p + 3 * ground.n_points;
-    return {{p[0], t[0]}, {p[1], t[1]}, {p[2], t[2]}};
-  } else {
-    return {N(p[0]), N(p[1]), N(p[2])};
-  }
+  if constexpr (std::is_same_v<N, Dual<double>>)
+    if (const double* t = ground.point_tangents; t != nullptr) return {{p[0], t[3 * k]}, {p[1], t[3 * k + 1]}, {p[2], t[3 * k + 2]}};
+  return {N(p[0]), N(p[1]), N(p[2])};
 }
 /// Mass, moment and inertia of a link's own bodies.
 template <class N>
