@@ -143,7 +143,7 @@ std::size_t chunk_index_bytes(std::size_t chunks, std::size_t rank) {
   return chunks == 0 ? 0 : tree_bytes(chunk_tree(rank), chunks);
 }
 
-std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::vector<FileMember> members) {
+std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::vector<FileMember> members, bool root) {
   std::sort(members.begin(), members.end(), [](const FileMember& a, const FileMember& b) { return a.name < b.name; });
   const Names names(members);
   const std::uint64_t heap = add_names(out, base, names);
@@ -159,7 +159,7 @@ std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::vector<FileMe
   out.number(kVersion);
   out.zeros(1);
   out.number<std::uint16_t>(1);       // messages
-  out.number<std::uint32_t>(0);       // links to it
+  out.number<std::uint32_t>(root ? 1 : 0);  // links to it
   out.number<std::uint32_t>(8 + kBytes);
   out.zeros(4);
   out.number(kSymbolTable);

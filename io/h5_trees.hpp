@@ -33,7 +33,7 @@ struct FileMember {
 };
 
 /// Appends a group of any number of members, in any order. Returns the address of the group, whose count of links to it is
-/// 0: link it.
-std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::vector<FileMember> members);
+/// 0: link it. With `root` it is 1, for the group "/".
+std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::vector<FileMember> members, bool root = false);
 
 }  // namespace tangere::h5

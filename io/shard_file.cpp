@@ -17,15 +17,6 @@ constexpr std::size_t kMostHeld = std::size_t{64} << 20;
 
 std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 7) / 8 * 8; }
 
-/// Tells the library where the file ends.
-void set_end(PartFile& part, std::uint64_t end) {
-  std::array<unsigned char, h5::kSuperblockBytes> superblock{};
-  part.read_at(0, superblock);
-  h5::set_end_of_file(superblock, end);
-  std::array<iovec, 1> pieces{{{superblock.data(), superblock.size()}}};
-  part.write_at(0, pieces);
-}
-
 template <class T>
 std::span<const unsigned char> bytes_of(std::span<const T> numbers) {
   return {reinterpret_cast<const unsigned char*>(numbers.data()), numbers.size_bytes()};
@@ -282,7 +273,7 @@ void ShardFile::commit() {
   placed_.add(free_, members);
   placed_.flush();
   placed_.write_unchecked(data, group);  // the library will add to it
-  set_end(part_, free_ + out.size());
+  placed_.end_at(free_ + out.size());
   try {
     complete_description(data);
     h5::close_file(file_, part_.path());
