@@ -24,6 +24,7 @@ enum Message : std::uint8_t {
   kGroupInfo = 0x0A,
   kFilters = 0x0B,
   kAttribute = 0x0C,
+  kAttributeInfo = 0x15,
 };
 
 /// Writes the header around messages that are added while it lives.
@@ -250,6 +251,15 @@ void add_attribute(Bytes& out, const FileText& text) {
   add_attribute(out, text.name, type, space, place.all());
 }
 
+/// Without it the library finds attributes by name and counts none.
+void add_attribute_info(Header& header) {
+  header.message(kAttributeInfo, [](Bytes& to) {
+    to.number<std::uint16_t>(0);  // version, flags
+    to.number(kNowhere);
+    to.number(kNowhere);
+  });
+}
+
 }  // namespace
 
 std::uint32_t object_checksum(std::span<const unsigned char> bytes) {
@@ -337,6 +347,7 @@ void add_dataset(Bytes& out, const FileDataset& dataset) {
   header.message(kFillValue, [&](Bytes& to) { add_fill(to, dataset); });
   header.message(kLayout, [&](Bytes& to) { add_layout(to, dataset); });
   if (!dataset.filters.empty()) header.message(kFilters, [&](Bytes& to) { add_filters(to, dataset.filters); });
+  if (!dataset.texts.empty()) add_attribute_info(header);
   for (const FileText& text : dataset.texts) header.message(kAttribute, [&](Bytes& to) { add_attribute(to, text); });
   header.close();
 }
@@ -349,6 +360,7 @@ void add_group(Bytes& out, std::span<const FileLink> links, std::span<const File
     to.number(kNowhere);
   });
   header.message(kGroupInfo, [](Bytes& to) { to.zeros(2); });
+  if (!attributes.empty()) add_attribute_info(header);
   for (const FileAttribute& attribute : attributes)
     header.message(kAttribute, [&](Bytes& to) { add_attribute(to, attribute); });
   for (const FileLink& link : links) header.message(kLink, [&](Bytes& to) { add_link(to, link); });
