@@ -47,7 +47,7 @@ class Merger {
       file_.close();
     for (const std::string& shard : dataset_.files) add(shard);
     if (!options_.copy) {
-      const std::uint64_t data = file_.append_group(std::move(linked_));
+      const std::uint64_t data = file_.append_group("demo_", std::move(linked_));
       file_.open();
       h5::link_object(file_.file(), "data", data);
     }
@@ -102,8 +102,8 @@ class Merger {
       for (const LinkedDemo& demo : batch) copy(data, demo);
     } else {
       h5::Bytes out;
-      for (h5::FileMember& group : add_demo_links(out, file_.here(), *members_, shard, batch))
-        linked_.push_back(std::move(group));
+      for (const h5::FileMember& group : add_demo_links(out, file_.here(), *members_, shard, batch))
+        linked_.push_back(group);
       file_.append(out);
     }
     if (!view_) view_.emplace(dataset_, *members_, options_.overwrite);
@@ -151,9 +151,7 @@ class Merger {
     const h5::Id masks = h5::create_group(file_.file(), "mask");
     for (auto* list : {&train, &valid}) {
       std::sort(list->begin(), list->end());
-      std::vector<std::string> names;
-      for (const std::int64_t number : *list) names.push_back(fmt::format("demo_{}", number));
-      h5::write_names(masks, list == &train ? "train" : "valid", names);
+      h5::write_names(masks, list == &train ? "train" : "valid", "demo_", *list);
     }
     result_.train = static_cast<std::int64_t>(train.size());
     result_.valid = static_cast<std::int64_t>(valid.size());

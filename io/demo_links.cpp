@@ -131,7 +131,7 @@ std::vector<h5::FileMember> add_demo_links(Bytes& out, std::uint64_t base, const
     std::vector<h5::FileLink> links;
     for (std::size_t k = 0; k < paths.size(); ++k) links.push_back({members.names[k], h5::kNowhere, file, paths[k]});
     links.push_back({"next_obs", next.add(demo.facts)});
-    groups.push_back({fmt::format("demo_{}", demo.number), base + out.size()});
+    groups.push_back({demo.number, base + out.size()});
     h5::add_group(out, links, DemoAttributes(demo.facts).all());
   }
   return groups;
@@ -164,7 +164,7 @@ std::vector<h5::FileMember> add_minari_episodes(Bytes& out, std::uint64_t base, 
     const std::array attributes{h5::FileAttribute{"id", h5::NumberType::int64, false, id},
                                 h5::FileAttribute{"total_steps", h5::NumberType::int64, false, rows},
                                 h5::FileAttribute{"demo", h5::NumberType::int64, false, number}};
-    groups.push_back({fmt::format("episode_{}", episode), base + out.size()});
+    groups.push_back({episode, base + out.size()});
     h5::add_group(out, links, attributes);
   }
   return groups;

@@ -30,9 +30,10 @@ void GrownFile::append(const h5::Bytes& bytes) {
   here_ = aligned(here_ + bytes.size());
 }
 
-std::uint64_t GrownFile::append_group(std::vector<h5::FileMember> members, bool root) {
+std::uint64_t GrownFile::append_group(std::string_view prefix, std::vector<h5::FileMember> members, bool root) {
   h5::Bytes out;
-  const std::uint64_t group = h5::add_large_group(out, here_, std::move(members), root);
+  const std::uint64_t group = h5::add_large_group(out, here_, prefix, std::move(members), root,
+                                                  [this](const h5::Bytes& bytes) { append(bytes); });
   placed_.add(here_, out.all().first(group - here_));
   placed_.flush();
   placed_.write_unchecked(group, out.from(group - here_));

@@ -92,16 +92,21 @@ void create_virtual(const Id& group, const std::string& name, const Id& like, co
   check(dataset.get() >= 0, "create dataset", name);
 }
 
-void write_names(const Id& group, const std::string& name, const std::vector<std::string>& names) {
+void write_names(const Id& group, const std::string& name, const std::string& prefix, const std::vector<std::int64_t>& numbers) {
   const Quiet quiet;
-  std::size_t longest = 1;
-  for (const std::string& text : names) longest = std::max(longest, text.size());
+  const std::int64_t largest = numbers.empty() ? 0 : *std::max_element(numbers.begin(), numbers.end());
+  const std::size_t longest = prefix.size() + std::to_string(largest).size();
   std::string bytes;
-  for (const std::string& text : names) bytes += text + std::string(longest - text.size(), '\0');
+  bytes.reserve(longest * numbers.size());
+  for (const std::int64_t number : numbers) {
+    const std::string text = prefix + std::to_string(number);
+    bytes += text;
+    bytes.append(longest - text.size(), '\0');
+  }
   const Id type(H5Tcopy(H5T_C_S1));
   H5Tset_size(type.get(), longest);
   H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
-  const hsize_t count = names.size();
+  const hsize_t count = numbers.size();
   const Id space(H5Screate_simple(1, &count, nullptr)), creation(H5Pcreate(H5P_DATASET_CREATE));
   H5Pset_obj_track_times(creation.get(), false);
   const Id dataset(H5Dcreate2(group.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT, creation.get(),

@@ -26,7 +26,7 @@ struct Source {
 void create_virtual(const Id& group, const std::string& name, const Id& like, const Source& first, const Source& last,
                     hsize_t skipped = 0);
 
-/// Byte strings of equal length, padded with zeros: what NumPy calls S.
-void write_names(const Id& group, const std::string& name, const std::vector<std::string>& names);
+/// Names that are `prefix` and a number, as byte strings of equal length, padded with zeros: what NumPy calls S.
+void write_names(const Id& group, const std::string& name, const std::string& prefix, const std::vector<std::int64_t>& numbers);
 
 }  // namespace tangere::h5

@@ -74,16 +74,16 @@ MinariView::MinariView(const DatasetFiles& dataset, const DemoMembers& members, 
 
 void MinariView::add(std::string_view file, std::span<const LinkedDemo> demos) {
   h5::Bytes out;
-  for (h5::FileMember& episode :
+  for (const h5::FileMember& episode :
        add_minari_episodes(out, file_->here(), members_, fmt::format("{}{}", kToFolder, file), demos, count_))
-    episodes_.push_back(std::move(episode));
+    episodes_.push_back(episode);
   file_->append(out);
   count_ += std::ssize(demos);
   for (const LinkedDemo& demo : demos) steps_ += demo.facts.rows;
 }
 
 void MinariView::commit() {
-  file_->open(file_->append_group(std::move(episodes_), true));
+  file_->open(file_->append_group("episode_", std::move(episodes_), true));
   h5::write_scalar<std::int64_t>(file_->file(), "total_episodes", count_);
   h5::write_scalar<std::int64_t>(file_->file(), "total_steps", steps_);
   file_->commit();

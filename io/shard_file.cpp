@@ -255,7 +255,7 @@ void ShardFile::close_block(Block& block, std::int64_t first_episode, const h5::
     const Demo& demo = block.demos[e];
     const std::uint64_t group = format_.describe(descriptions, block.base, demo.facts, demo.addresses, texts_);
     if (demo.failed) continue;  // its bytes stay, nothing leads to them
-    members_.push_back({fmt::format("demo_{}", first_episode + static_cast<std::int64_t>(e)), group});
+    members_.push_back({first_episode + static_cast<std::int64_t>(e), group});
     rows_ += demo.facts.rows;
     sum_.add(demo.sum);
   }
@@ -295,7 +295,7 @@ void ShardFile::complete_description(std::uint64_t data) {
 
 void ShardFile::commit() {
   h5::Bytes out;
-  const std::uint64_t data = h5::add_large_group(out, free_, std::move(members_));
+  const std::uint64_t data = h5::add_large_group(out, free_, "demo_", std::move(members_));
   const std::span<const unsigned char> members = out.all().first(data - free_), group = out.all().subspan(data - free_);
   placed_.add(free_, members);
   placed_.flush();
