@@ -41,12 +41,14 @@ struct LinkedDemo {
 
 /// Appends groups demo_<i> to what begins at `base`: attributes and members of the demos of `file`, given relative to the folder of
 /// the file that is written, and next_obs: row j is row j + 1 of obs, the last one final_obs. Returns the groups.
-std::vector<h5::FileMember> add_demo_links(h5::Bytes& out, std::uint64_t base, const DemoMembers& members,
-                                           std::string_view file, std::span<const LinkedDemo> demos);
+std::vector<h5::FileMember> add_demo_links(h5::Bytes& out, std::uint64_t base,
+                                           const DemoMembers& members, std::string_view file,
+                                           std::span<const LinkedDemo> demos);
 
 /// The same as groups episode_<j>, j from `first`, as Minari lays them out.
-std::vector<h5::FileMember> add_minari_episodes(h5::Bytes& out, std::uint64_t base, const DemoMembers& members,
-                                                std::string_view file, std::span<const LinkedDemo> demos,
+std::vector<h5::FileMember> add_minari_episodes(h5::Bytes& out, std::uint64_t base,
+                                                const DemoMembers& members, std::string_view file,
+                                                std::span<const LinkedDemo> demos,
                                                 std::int64_t first);
 
 }  // namespace tangere

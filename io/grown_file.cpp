@@ -12,7 +12,9 @@ std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 7) / 8 * 8; }
 }  // namespace
 
 GrownFile::GrownFile(const std::string& path, bool overwrite, bool views)
-    : part_(path, overwrite), placed_(part_), file_(h5::create_file(part_.path(), kDescriptionBlock, views)) {}
+    : part_(path, overwrite),
+      placed_(part_),
+      file_(h5::create_file(part_.path(), kDescriptionBlock, views)) {}
 
 GrownFile::~GrownFile() {
   // On a full disk the library can only close its file once there is room again.
@@ -30,10 +32,12 @@ void GrownFile::append(const h5::Bytes& bytes) {
   here_ = aligned(here_ + bytes.size());
 }
 
-std::uint64_t GrownFile::append_group(std::string_view prefix, std::vector<h5::FileMember> members, bool root) {
+std::uint64_t GrownFile::append_group(std::string_view prefix, std::vector<h5::FileMember> members,
+                                      bool root) {
   h5::Bytes out;
-  const std::uint64_t group = h5::add_large_group(out, here_, prefix, std::move(members), root,
-                                                  [this](const h5::Bytes& bytes) { append(bytes); });
+  const std::uint64_t group =
+      h5::add_large_group(out, here_, prefix, std::move(members), root,
+                          [this](const h5::Bytes& bytes) { append(bytes); });
   placed_.add(here_, out.all().first(group - here_));
   placed_.flush();
   placed_.write_unchecked(group, out.from(group - here_));

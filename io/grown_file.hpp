@@ -32,7 +32,8 @@ class GrownFile {
   [[nodiscard]] std::uint64_t here() const { return here_; }
   void append(const h5::Bytes& bytes);
   /// A group to which the library may add; arguments as for h5::add_large_group. Returns its address.
-  std::uint64_t append_group(std::string_view prefix, std::vector<h5::FileMember> members, bool root = false);
+  std::uint64_t append_group(std::string_view prefix, std::vector<h5::FileMember> members,
+                             bool root = false);
   /// `root`: address of the group "/"; that of the beginning if it leads nowhere.
   void open(std::uint64_t root = h5::kNowhere);
 

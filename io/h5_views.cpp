@@ -20,7 +20,8 @@ void add_whole(Bytes& out) {
 }
 
 /// A box that has all of the dimensions behind the first.
-void add_rows(Bytes& out, std::uint64_t first, std::uint64_t rows, const std::vector<std::uint64_t>& dims) {
+void add_rows(Bytes& out, std::uint64_t first, std::uint64_t rows,
+              const std::vector<std::uint64_t>& dims) {
   constexpr std::uint32_t kBoxes = 2, kOne = 1;
   const std::size_t rank = dims.size();
   out.number(kBoxes);
@@ -40,7 +41,8 @@ void add_rows(Bytes& out, std::uint64_t first, std::uint64_t rows, const std::ve
 std::string shown_rows(std::span<const ShownRows> parts, const std::vector<std::uint64_t>& dims) {
   constexpr std::uint8_t kVersion = 0;
   for (const std::uint64_t n : dims)
-    if (n == 0 || n > UINT32_MAX) throw std::logic_error("a virtual dataset of a size that its file cannot say");
+    if (n == 0 || n > UINT32_MAX)
+      throw std::logic_error("a virtual dataset of a size that its file cannot say");
   Bytes out;
   out.number(kVersion);
   out.number<std::uint64_t>(parts.size());

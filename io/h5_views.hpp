@@ -12,10 +12,10 @@ namespace tangere::h5 {
 
 /// Rows [first, first + rows) of a dataset of another file; of a shape like the one that shows them.
 struct ShownRows {
-  std::string_view file;         ///< relative to the folder of the file with the virtual dataset
-  std::string_view path;         ///< in that file
+  std::string_view file;  ///< relative to the folder of the file with the virtual dataset
+  std::string_view path;  ///< in that file
   std::uint64_t first = 0, rows = 0;
-  std::uint64_t of = 0;          ///< rows that the dataset has
+  std::uint64_t of = 0;  ///< rows that the dataset has
 };
 
 /// The text that a FileView refers to: rows one behind the other, together those of a dataset of `dims`, none of which is 0.
