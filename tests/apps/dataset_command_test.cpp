@@ -229,8 +229,10 @@ TEST_F(DatasetCommand, MergedFilesGrowByTheSameForEachEpisode) {
       EXPECT_NEAR(then, first, 0.02 * first) << "bytes per episode";
       EXPECT_LT(then, 2000);
     }
+#ifndef __SANITIZE_ADDRESS__  // which keeps what was freed
   // Seven thousand episodes more; whoever kept 5 kB of each would need 35 MB.
   EXPECT_LT(peak_memory() - memory, 32 << 20) << "from " << memory;
+#endif
 }
 
 TEST_F(DatasetCommand, MasksShareOutEveryDemoOnce) {
