@@ -2,6 +2,7 @@
 // tangere generate: a scene or a task, many episodes on all cores, a folder of shards. Everything is checked
 // before the first step.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -137,10 +138,13 @@ TaskReport report_of(const Task& task, PolicyKind policy, const TaskEpisodeSumma
   return report;
 }
 
-/// What is done to finished blocks by many threads: gradients are taken there, too.
+/// What is done to finished blocks by many threads: gradients are taken there, too. Checksums always are; they take least.
 std::string preparation_of(const Job& job) {
-  if (job.layout.gradients.empty()) return "compression";
-  return job.layout.compression == "none" ? "gradients" : "gradients and compression";
+  std::vector<std::string> kinds;
+  if (!job.layout.gradients.empty()) kinds.emplace_back("gradients");
+  if (job.layout.sparse) kinds.emplace_back("tiles");
+  if (job.layout.compression != "none") kinds.emplace_back("compression");
+  return kinds.empty() ? "checksums" : fmt::format("{}", fmt::join(kinds, " and "));
 }
 
 /// Which of the three kinds of work kept the others waiting, and for how long all of them were at it.

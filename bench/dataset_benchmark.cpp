@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The writer of data sets alone, one thread: episodes, HDF5 objects and bytes per second, by length of episode and
-// compression; and its parts. Numbers are those of a field that is pressed in the middle. Files go to the folder of temporary
+// compression; its parts; and merging. Numbers are those of a field that is pressed in the middle. Files go to the folder of temporary
 // files.
 #include <benchmark/benchmark.h>
 
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "io/chunk_codec.hpp"
+#include "io/dataset_merge.hpp"
 #include "io/dataset_writer.hpp"
 #include "io/h5.hpp"
 #include "io/shard_check.hpp"
@@ -20,6 +21,10 @@ namespace {
 
 constexpr int kBlock = 16;
 constexpr std::size_t kObjects = 12;  // of a demo: three groups, actions, rewards, dones, three observations twice
+
+// Of a demo in both files: its group and next_obs, its episode and observations; three virtual datasets twice, flags, five and
+// three links.
+constexpr std::size_t kMergedObjects = 4 + 6 + 1 + 8;
 
 struct Folder {
   std::string path;
@@ -132,6 +137,30 @@ BENCHMARK(large_fields_deflate)->Unit(benchmark::kMillisecond)->MeasureProcessCP
 BENCHMARK(large_fields_lz4)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 BENCHMARK(large_fields_sparse)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 BENCHMARK(large_fields_sparse_deflate)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+
+/// One file of links and the view for Minari, of episodes as above: time must grow as their number does.
+void merge(benchmark::State& state) {
+  const std::int64_t episodes = state.range(0);
+  const DatasetLayout l = layout_of(episodes, 5, 4, "none");
+  const Block block(l);
+  const Folder folder;
+  {
+    DatasetWriter writer({folder.path + "/set"}, l);
+    for (std::int64_t first = 0; first < episodes; first += kBlock) {
+      writer.write(block.rows(first));
+      writer.finish(first, {});
+    }
+  }
+  const DatasetFiles dataset = find_dataset(folder.path + "/set");
+  std::uint64_t bytes = 0;
+  for (auto _ : state) bytes = merge_dataset(dataset, {false, true}).bytes;
+  using benchmark::Counter;
+  const double made = static_cast<double>(episodes) * static_cast<double>(state.iterations());
+  state.counters["episodes/s"] = Counter(made, Counter::kIsRate);
+  state.counters["us/object"] = Counter(1e-6 * made * kMergedObjects, Counter::kIsRate | Counter::kInvert);
+  state.counters["bytes/episode"] = static_cast<double>(bytes) / static_cast<double>(episodes);
+}
+BENCHMARK(merge)->RangeMultiplier(4)->Range(1024, 65536)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 
 /// What the library takes for a demo like those: why the writer lays objects out itself.
 void library_objects(benchmark::State& state) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// External links to whole demos: thousands of shards make one small file.
+// Links to the members of demos: thousands of shards make one small file.
 #include "io/dataset_merge.hpp"
 
 #include <fmt/format.h>
@@ -9,17 +9,18 @@
 
 #include "engine/error.hpp"
 #include "io/dataset_description.hpp"
+#include "io/demo_links.hpp"
+#include "io/grown_file.hpp"
 #include "io/h5_links.hpp"
 #include "io/h5_listing.hpp"
 #include "io/minari_view.hpp"
-#include "io/part_file.hpp"
 
 namespace tangere {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr hsize_t kDescriptionBlock = hsize_t{1} << 16;
+constexpr std::size_t kBatch = 16;       // demos that are laid out together
 constexpr std::size_t kValidShare = 10;  // one demo in ten is kept for validation
 
 /// SplitMix64: which demos are for validation looks random and is the same for everybody.
@@ -30,98 +31,142 @@ std::uint64_t scramble(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-/// Writes the file; numbers stay where they are unless they are to be copied.
+/// Writes both; numbers stay where they are unless they are to be copied.
 class Merger {
  public:
-  Merger(const std::string& path, const MergeOptions& options) : options_(options), part_(path, options.overwrite) {}
-  ~Merger() {
-    if (file_.get() >= 0) part_.empty();
-  }
-  Merger(const Merger&) = delete;
-  Merger& operator=(const Merger&) = delete;
+  Merger(const DatasetFiles& dataset, const MergeOptions& options)
+      : dataset_(dataset),
+        options_(options),
+        file_((fs::path(dataset.folder) / "robomimic.hdf5").string(), options.overwrite, options.copy) {}
 
-  MergeResult merge(const DatasetFiles& dataset) {
-    file_ = h5::create_file(part_.path(), kDescriptionBlock);
-    data_ = h5::create_group(file_, "data");
-    failed_ = h5::create_group(file_, "failed");
-    describe(dataset.files.front());
-    for (const std::string& shard : dataset.files) add(shard);
-    write_masks();
-    h5::write_scalar<std::int64_t>(data_, "total", rows_);
-    h5::write_scalar<std::uint64_t>(file_, "content_sum", sum_);
-    data_.reset();
-    failed_.reset();
-    h5::close_file(file_, part_.path());
-    result_.bytes = fs::file_size(part_.path());
-    part_.commit();
-    result_.file = part_.output();
+  MergeResult merge() {
+    describe(dataset_.files.front());
+    if (options_.copy)
+      copied_ = h5::create_group(file_.file(), "data");
+    else
+      file_.close();
+    for (const std::string& shard : dataset_.files) add(shard);
+    if (!options_.copy) {
+      const std::uint64_t data = file_.append_group("demo_", std::move(linked_));
+      file_.open();
+      h5::link_object(file_.file(), "data", data);
+    }
+    complete();
+    copied_.reset();
+    result_.bytes = file_.commit();
+    result_.file = file_.output();
+    if (view_) {  // without a demo there is none: Minari has no way to say that there is nothing
+      view_->commit();
+      result_.minari_id = view_->id();
+      result_.minari = (fs::path(dataset_.folder) / "minari" / view_->id()).string();
+    }
     return result_;
   }
-  [[nodiscard]] const std::vector<DemoPlace>& demos() const { return demos_; }
 
  private:
   void describe(const std::string& shard) {
     const h5::Id from = h5::open_file(shard);
-    for (const char* name : {"format", "command"}) h5::write_attribute(file_, name, h5::read_text(from, name));
+    for (const char* name : {"format", "command"}) h5::write_attribute(file_.file(), name, h5::read_text(from, name));
     const auto number = [&](const char* name) { return h5::read_numbers<std::int64_t>(from, name).at(0); };
-    h5::write_scalar<std::int64_t>(file_, "format_version", number("format_version"));
+    h5::write_scalar<std::int64_t>(file_.file(), "format_version", number("format_version"));
     for (const char* name : {"dataset_episodes", "dataset_shards"})
-      h5::write_scalar<std::int64_t>(file_, name, number(name));
-    h5::write_scalar<std::int64_t>(file_, "first_episode", 0);
-    h5::write_scalar<std::int64_t>(file_, "episodes", number("dataset_episodes"));
-    h5::write_attribute(data_, "env_args", h5::read_text(h5::open_group(from, "data"), "env_args"));
-    h5::copy_group(from, "scene", file_, "scene");
+      h5::write_scalar<std::int64_t>(file_.file(), name, number(name));
+    h5::write_scalar<std::int64_t>(file_.file(), "first_episode", 0);
+    h5::write_scalar<std::int64_t>(file_.file(), "episodes", number("dataset_episodes"));
+    env_args_ = h5::read_text(h5::open_group(from, "data"), "env_args");
+    h5::copy_group(from, "scene", file_.file(), "scene");
   }
 
   void add(const std::string& shard) {
     const h5::Id from = h5::open_file(shard);
     const h5::Id data = h5::open_group(from, "data"), failed = h5::open_group(from, "failed");
     const std::string name = fs::path(shard).filename();
+    std::vector<LinkedDemo> batch;
     for (const std::int64_t number : demo_numbers(data)) {
-      put(data, data_, fmt::format("demo_{}", number), name, "/data/");
-      demos_.push_back({number, options_.copy ? fs::path(part_.output()).filename().string() : name});
-      ++result_.demos;
+      const h5::Id demo = h5::open_group(data, fmt::format("demo_{}", number));
+      if (!members_) members_ = members_of(demo);
+      batch.push_back({number, facts_of(demo, *members_)});
+      demos_.push_back(number);
+      if (batch.size() == kBatch) put(data, name, batch);
     }
-    for (const std::string& episode : h5::link_names(failed)) {
-      put(failed, failed_, episode, name, "/failed/");
-      ++result_.failed;
-    }
+    put(data, name, batch);
+    for (const std::string& episode : h5::link_names(failed)) failed_.push_back({name, episode});
     rows_ += h5::read_numbers<std::int64_t>(data, "total").at(0);
     sum_ += h5::read_numbers<std::uint64_t>(from, "content_sum").at(0);  // modulo 2⁶⁴, as within a shard
   }
 
-  void put(const h5::Id& from, const h5::Id& to, const std::string& name, const std::string& file,
-           const std::string& group) {
+  /// Empties the batch.
+  void put(const h5::Id& data, const std::string& shard, std::vector<LinkedDemo>& batch) {
+    if (batch.empty()) return;
     if (options_.copy) {
-      h5::copy_group(from, name, to, name);
+      for (const LinkedDemo& demo : batch) copy(data, demo);
     } else {
-      h5::link_external(to, name, file, group + name);
+      h5::Bytes out;
+      for (const h5::FileMember& group : add_demo_links(out, file_.here(), *members_, shard, batch))
+        linked_.push_back(group);
+      file_.append(out);
     }
+    if (!view_) view_.emplace(dataset_, *members_, options_.overwrite);
+    view_->add(options_.copy ? fs::path(file_.output()).filename().string() : shard, batch);
+    batch.clear();
+  }
+
+  void copy(const h5::Id& data, const LinkedDemo& demo) {
+    const std::string name = fmt::format("demo_{}", demo.number), path = "/data/" + name;
+    h5::copy_group(data, name, copied_, name);
+    const h5::Id made = h5::open_group(copied_, name), next = h5::create_group(made, "next_obs");
+    for (const DemoArray& array : members_->observations)
+      h5::create_virtual(next, array.name, h5::open_dataset(made, "obs/" + array.name), {".", path + "/obs/" + array.name},
+                         {".", path + "/final_obs/" + array.name}, 1);
+  }
+
+  void complete() {
+    const h5::Id data = h5::open_group(file_.file(), "data"), failed = h5::create_group(file_.file(), "failed");
+    h5::write_attribute(data, "env_args", env_args_);
+    h5::write_scalar<std::int64_t>(data, "total", rows_);
+    std::string open;
+    h5::Id shard;
+    for (const auto& [file, episode] : failed_) {
+      if (!options_.copy) {
+        h5::link_external(failed, episode, file, "/failed/" + episode);
+        continue;
+      }
+      if (file != open) shard = h5::open_file((fs::path(dataset_.folder) / file).string());
+      open = file;
+      h5::copy_group(h5::open_group(shard, "failed"), episode, failed, episode);
+    }
+    write_masks();
+    h5::write_scalar<std::uint64_t>(file_.file(), "content_sum", sum_);
+    result_.demos = std::ssize(demos_);
+    result_.failed = std::ssize(failed_);
   }
 
   void write_masks() {
     std::vector<std::pair<std::uint64_t, std::int64_t>> order;
-    for (const DemoPlace& demo : demos_)
-      order.emplace_back(scramble(static_cast<std::uint64_t>(demo.number)), demo.number);
+    for (const std::int64_t demo : demos_) order.emplace_back(scramble(static_cast<std::uint64_t>(demo)), demo);
     std::sort(order.begin(), order.end());
     const std::size_t few = order.size() < 2 ? 0 : std::max<std::size_t>(1, order.size() / kValidShare);
     std::vector<std::int64_t> valid, train;
     for (std::size_t i = 0; i < order.size(); ++i) (i < few ? valid : train).push_back(order[i].second);
-    const h5::Id masks = h5::create_group(file_, "mask");
+    const h5::Id masks = h5::create_group(file_.file(), "mask");
     for (auto* list : {&train, &valid}) {
       std::sort(list->begin(), list->end());
-      std::vector<std::string> names;
-      for (const std::int64_t number : *list) names.push_back(fmt::format("demo_{}", number));
-      h5::write_names(masks, list == &train ? "train" : "valid", names);
+      h5::write_names(masks, list == &train ? "train" : "valid", "demo_", *list);
     }
     result_.train = static_cast<std::int64_t>(train.size());
     result_.valid = static_cast<std::int64_t>(valid.size());
   }
 
+  const DatasetFiles& dataset_;
   const MergeOptions& options_;
-  PartFile part_;
-  h5::Id file_, data_, failed_;
-  std::vector<DemoPlace> demos_;
+  GrownFile file_;
+  h5::Id copied_;  // group of demos
+  std::string env_args_;
+  std::optional<DemoMembers> members_;
+  std::optional<MinariView> view_;
+  std::vector<std::int64_t> demos_;                           // their numbers
+  std::vector<h5::FileMember> linked_;                        // groups of demos
+  std::vector<std::pair<std::string, std::string>> failed_;  // shard, episode
   std::int64_t rows_ = 0;
   std::uint64_t sum_ = 0;
   MergeResult result_;
@@ -133,12 +178,7 @@ MergeResult merge_dataset(const DatasetFiles& dataset, const MergeOptions& optio
   if (dataset.folder.empty())
     throw IoError(fmt::format("'{}' is a file; expected the folder of its shards", dataset.files.front()));
   check_complete(dataset);
-  Merger merger((fs::path(dataset.folder) / "robomimic.hdf5").string(), options);
-  MergeResult result = merger.merge(dataset);
-  if (merger.demos().empty()) return result;  // Minari has no way to say that there is nothing
-  result.minari_id = write_minari_view(dataset, merger.demos(), options.overwrite);
-  result.minari = (fs::path(dataset.folder) / "minari" / result.minari_id).string();
-  return result;
+  return Merger(dataset, options).merge();
 }
 
 }  // namespace tangere

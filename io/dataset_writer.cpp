@@ -36,6 +36,7 @@ struct DatasetWriter::Impl {
   DatasetFolder folder;
   DemoFormat format;
   std::vector<EpisodeRange> missing;
+  std::size_t held_bytes = 0;  // in memory of open shards
   std::map<std::int64_t, ShardFile> open;
   std::set<std::int64_t> complete;
   std::mutex prepared_mutex;
@@ -120,7 +121,8 @@ struct DatasetWriter::Impl {
     if (!started) folder.remove_old_shards();
     started = true;
     const bool replace = output.only && output.existing == ExistingShards::replace;
-    return open.try_emplace(shard, folder.shard_path(shard), layout, format, layout.shard_episodes(shard), replace)
+    return open.try_emplace(shard, folder.shard_path(shard), layout, format, layout.shard_episodes(shard), replace,
+                            held_bytes)
         .first->second;
   }
 };

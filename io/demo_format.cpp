@@ -20,6 +20,22 @@ std::size_t aligned(std::size_t bytes) { return (bytes + 7) / 8 * 8; }
 
 }  // namespace
 
+DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_number(facts.rows)) {
+  const EpisodeEnd end = facts.end.value_or(EpisodeEnd{});
+  total_ = bytes_of_number(end.total);
+  terminated_ = bytes_of_number<std::int8_t>(end.terminated ? 1 : 0);
+  success_ = bytes_of_number<std::int8_t>(end.success ? 1 : 0);
+  all_.push_back({"num_samples", h5::NumberType::int64, false, samples_});
+  if (facts.end) {
+    all_.push_back({"return", h5::NumberType::float64, false, total_});
+    all_.push_back({"terminated", h5::NumberType::int8, false, terminated_});
+    all_.push_back({"success", h5::NumberType::int8, false, success_});
+  }
+  const std::span randomized(reinterpret_cast<const unsigned char*>(facts.randomized.data()),
+                             facts.randomized.size() * sizeof(double));
+  if (!randomized.empty()) all_.push_back({"randomized", h5::NumberType::float64, true, randomized});
+}
+
 DemoFormat::DemoFormat(const DatasetLayout& layout)
     : of_task_(layout.task.has_value()),
       randomized_(layout.randomized_names.size()),
@@ -128,22 +144,8 @@ std::uint64_t DemoFormat::describe(h5::Bytes& out, std::uint64_t base, const Dem
     links.push_back({gradients_[k].name, base + out.size()});
     describe_dataset(out, gradient(k), facts.rows, addresses[gradient(k)], meaning);
   }
-  const auto samples = bytes_of_number(facts.rows);
-  std::vector<h5::FileAttribute> attributes{{"num_samples", h5::NumberType::int64, false, samples}};
-  const EpisodeEnd end = facts.end.value_or(EpisodeEnd{});
-  const auto total = bytes_of_number(end.total);
-  const auto terminated = bytes_of_number<std::int8_t>(end.terminated ? 1 : 0);
-  const auto success = bytes_of_number<std::int8_t>(end.success ? 1 : 0);
-  if (facts.end) {
-    attributes.push_back({"return", h5::NumberType::float64, false, total});
-    attributes.push_back({"terminated", h5::NumberType::int8, false, terminated});
-    attributes.push_back({"success", h5::NumberType::int8, false, success});
-  }
-  const std::span randomized(reinterpret_cast<const unsigned char*>(facts.randomized.data()),
-                             facts.randomized.size() * sizeof(double));
-  if (randomized_ > 0) attributes.push_back({"randomized", h5::NumberType::float64, true, randomized});
   const std::uint64_t group = base + out.size();
-  h5::add_group(out, links, attributes);
+  h5::add_group(out, links, DemoAttributes(facts).all());
   return group;
 }
 

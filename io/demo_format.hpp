@@ -2,6 +2,7 @@
 // What the datasets of a demo are, in the order of the file, and the bytes that describe them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -20,6 +21,20 @@ struct DemoFacts {
   std::int64_t rows = 0;           ///< R
   std::optional<EpisodeEnd> end;   ///< of a task
   std::vector<double> randomized;  ///< as many as the layout has names
+};
+
+/// They as the attributes of a demo's group. Refers to what it was made of, and to itself.
+class DemoAttributes {
+ public:
+  explicit DemoAttributes(const DemoFacts& facts);
+  DemoAttributes(const DemoAttributes&) = delete;
+  DemoAttributes& operator=(const DemoAttributes&) = delete;
+  [[nodiscard]] std::span<const h5::FileAttribute> all() const { return all_; }
+
+ private:
+  std::array<unsigned char, 8> samples_, total_;
+  std::array<unsigned char, 1> terminated_, success_;
+  std::vector<h5::FileAttribute> all_;
 };
 
 /// Datasets of a demo: actions, rewards, dones, obs/<name> …, final_obs/<name> …, then derivatives in the order of their names.

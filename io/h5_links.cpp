@@ -57,42 +57,56 @@ void copy_group(const Id& from, const std::string& name, const Id& to, const std
   }
 }
 
-void create_virtual(const Id& group, const std::string& name, const Id& like, const Source& first, const Source& last) {
+void create_virtual(const Id& group, const std::string& name, const Id& like, const Source& first, const Source& last,
+                    hsize_t skipped) {
   const Quiet quiet;
-  Dims dims = dimensions(like), row = dims, offset(dims.size(), 0);
-  const Id first_space(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr));
-  row[0] = 1;
-  const Id last_space(H5Screate_simple(static_cast<int>(row.size()), row.data(), nullptr));
-  const Dims whole = dims;
-  dims[0] += 1;
-  const Id space(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr));
-  const Id type(H5Dget_type(like.get()));
-  const Id creation(H5Pcreate(H5P_DATASET_CREATE));
+  const Dims source = dimensions(like), start(source.size(), 0);
+  const auto rows = [&](hsize_t count) {
+    Dims dims = source;
+    dims[0] = count;
+    return dims;
+  };
+  const auto space_of = [](const Dims& dims) { return Id(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr)); };
+  const auto select = [&](const Id& space, hsize_t from, hsize_t count) {
+    Dims at = start;
+    at[0] = from;
+    H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, at.data(), nullptr, rows(count).data(), nullptr);
+  };
+  const hsize_t kept = source[0] - skipped;
+  const Id space = space_of(rows(kept + 1)), from_first = space_of(source), from_last = space_of(rows(1));
+  const Id type(H5Dget_type(like.get())), creation(H5Pcreate(H5P_DATASET_CREATE));
   H5Pset_obj_track_times(creation.get(), false);
   const double nothing = std::numeric_limits<double>::quiet_NaN();
   H5Pset_fill_value(creation.get(), H5T_NATIVE_DOUBLE, &nothing);
-  H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, offset.data(), nullptr, whole.data(), nullptr);
-  check(H5Pset_virtual(creation.get(), space.get(), first.file.c_str(), first.path.c_str(), first_space.get()) >= 0,
-        "map", name);
-  offset[0] = whole[0];
-  H5Sselect_hyperslab(space.get(), H5S_SELECT_SET, offset.data(), nullptr, row.data(), nullptr);
-  check(H5Pset_virtual(creation.get(), space.get(), last.file.c_str(), last.path.c_str(), last_space.get()) >= 0, "map",
-        name);
-  const Id dataset(H5Dcreate2(group.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT, creation.get(),
-                              H5P_DEFAULT));
+  const auto map = [&](const Source& from, const Id& selected) {
+    check(H5Pset_virtual(creation.get(), space.get(), from.file.c_str(), from.path.c_str(), selected.get()) >= 0, "map", name);
+  };
+  if (kept > 0) {
+    if (skipped > 0) select(from_first, skipped, kept);
+    select(space, 0, kept);
+    map(first, from_first);
+  }
+  select(space, kept, 1);
+  map(last, from_last);
+  const Id dataset(H5Dcreate2(group.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT, creation.get(), H5P_DEFAULT));
   check(dataset.get() >= 0, "create dataset", name);
 }
 
-void write_names(const Id& group, const std::string& name, const std::vector<std::string>& names) {
+void write_names(const Id& group, const std::string& name, const std::string& prefix, const std::vector<std::int64_t>& numbers) {
   const Quiet quiet;
-  std::size_t longest = 1;
-  for (const std::string& text : names) longest = std::max(longest, text.size());
+  const std::int64_t largest = numbers.empty() ? 0 : *std::max_element(numbers.begin(), numbers.end());
+  const std::size_t longest = prefix.size() + std::to_string(largest).size();
   std::string bytes;
-  for (const std::string& text : names) bytes += text + std::string(longest - text.size(), '\0');
+  bytes.reserve(longest * numbers.size());
+  for (const std::int64_t number : numbers) {
+    const std::string text = prefix + std::to_string(number);
+    bytes += text;
+    bytes.append(longest - text.size(), '\0');
+  }
   const Id type(H5Tcopy(H5T_C_S1));
   H5Tset_size(type.get(), longest);
   H5Tset_strpad(type.get(), H5T_STR_NULLPAD);
-  const hsize_t count = names.size();
+  const hsize_t count = numbers.size();
   const Id space(H5Screate_simple(1, &count, nullptr)), creation(H5Pcreate(H5P_DATASET_CREATE));
   H5Pset_obj_track_times(creation.get(), false);
   const Id dataset(H5Dcreate2(group.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT, creation.get(),

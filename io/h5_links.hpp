@@ -18,14 +18,15 @@ void copy_group(const Id& from, const std::string& name, const Id& to, const std
 
 /// A dataset of another file, all of it.
 struct Source {
-  std::string file;  ///< as for link_external
+  std::string file;  ///< as for link_external; ".": the one with the virtual dataset
   std::string path;
 };
-/// `first` and the one row of `last` behind it, as one dataset. `like`: the open dataset that `first` names. Reading it
-/// gives NaN where a file is missing.
-void create_virtual(const Id& group, const std::string& name, const Id& like, const Source& first, const Source& last);
+/// `first` without its first `skipped` rows and the one row of `last` behind it, as one dataset. `like`: the open dataset that
+/// `first` names. Reading it gives NaN where a file is missing.
+void create_virtual(const Id& group, const std::string& name, const Id& like, const Source& first, const Source& last,
+                    hsize_t skipped = 0);
 
-/// Byte strings of equal length, padded with zeros: what NumPy calls S.
-void write_names(const Id& group, const std::string& name, const std::vector<std::string>& names);
+/// Names that are `prefix` and a number, as byte strings of equal length, padded with zeros: what NumPy calls S.
+void write_names(const Id& group, const std::string& name, const std::string& prefix, const std::vector<std::int64_t>& numbers);
 
 }  // namespace tangere::h5

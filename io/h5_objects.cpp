@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 
 namespace tangere::h5 {
@@ -23,6 +24,7 @@ enum Message : std::uint8_t {
   kGroupInfo = 0x0A,
   kFilters = 0x0B,
   kAttribute = 0x0C,
+  kAttributeInfo = 0x15,
 };
 
 /// Writes the header around messages that are added while it lives.
@@ -121,7 +123,14 @@ void add_type(Bytes& out, NumberType type) {
 }
 
 void add_layout(Bytes& out, const FileDataset& dataset) {
-  constexpr std::uint8_t kVersion = 3, kContiguous = 1, kChunked = 2;
+  constexpr std::uint8_t kVersion = 3, kContiguous = 1, kChunked = 2, kVersionOfViews = 4, kView = 3;
+  if (dataset.view) {
+    out.number(kVersionOfViews);
+    out.number(kView);
+    out.number(dataset.view->texts);
+    out.number(dataset.view->number + 1);  // 0 is what is free
+    return;
+  }
   out.number(kVersion);
   if (dataset.chunk.empty()) {
     std::uint64_t size = bytes_of(dataset.type);
@@ -136,6 +145,23 @@ void add_layout(Bytes& out, const FileDataset& dataset) {
   out.number(dataset.address);
   for (const std::uint64_t n : dataset.chunk) out.number(static_cast<std::uint32_t>(n));
   out.number(static_cast<std::uint32_t>(bytes_of(dataset.type)));
+}
+
+/// What is where nothing was stored.
+void add_fill(Bytes& out, const FileDataset& dataset) {
+  constexpr std::uint8_t kVersion = 3, kEarly = 1, kLate = 2, kIncremental = 3, kNeverFilled = 1 << 2, kFilledIfSet = 2 << 2;
+  constexpr std::uint8_t kNumberFollows = 1 << 5;
+  out.number(kVersion);
+  if (dataset.view) {
+    out.number<std::uint8_t>(kLate | kFilledIfSet | kNumberFollows);
+    out.number(static_cast<std::uint32_t>(bytes_of(dataset.type)));
+    if (dataset.type == NumberType::float32)
+      out.number(std::bit_cast<std::uint32_t>(std::numeric_limits<float>::quiet_NaN()));
+    else
+      out.number(std::bit_cast<std::uint64_t>(std::numeric_limits<double>::quiet_NaN()));
+  } else {
+    out.number<std::uint8_t>(dataset.chunk.empty() ? kEarly | kNeverFilled : kIncremental | kFilledIfSet);
+  }
 }
 
 void add_filters(Bytes& out, std::span<const FileFilter> filters) {
@@ -157,14 +183,26 @@ void add_filters(Bytes& out, std::span<const FileFilter> filters) {
 }
 
 void add_link(Bytes& out, const FileLink& link) {
-  constexpr std::uint8_t kVersion = 1, kCharacterSet = 0x10, kUtf8 = 1;
+  constexpr std::uint8_t kVersion = 1, kTypeFollows = 0x08, kCharacterSet = 0x10, kUtf8 = 1, kExternal = 64;
   if (link.name.size() > UINT8_MAX) throw std::logic_error("a name above 255 bytes in a file");
+  const bool external = !link.file.empty();
   out.number(kVersion);
-  out.number(kCharacterSet);  // and a hard link, a length of one byte, no order of creation
+  // Otherwise a hard link; a length of one byte, no order of creation.
+  out.number<std::uint8_t>(external ? kCharacterSet | kTypeFollows : kCharacterSet);
+  if (external) out.number(kExternal);
   out.number(kUtf8);
   out.number(static_cast<std::uint8_t>(link.name.size()));
   out.text(link.name);
-  out.number(link.address);
+  if (!external) {
+    out.number(link.address);
+    return;
+  }
+  out.number(static_cast<std::uint16_t>(1 + link.file.size() + 1 + link.path.size() + 1));
+  out.number<std::uint8_t>(0);  // version, flags
+  for (const std::string_view text : {link.file, link.path}) {
+    out.text(text);
+    out.zeros(1);
+  }
 }
 
 /// Text of any length in UTF-8: where it is stands in its place.
@@ -213,6 +251,15 @@ void add_attribute(Bytes& out, const FileText& text) {
   add_attribute(out, text.name, type, space, place.all());
 }
 
+/// Without it the library finds attributes by name and counts none.
+void add_attribute_info(Header& header) {
+  header.message(kAttributeInfo, [](Bytes& to) {
+    to.number<std::uint16_t>(0);  // version, flags
+    to.number(kNowhere);
+    to.number(kNowhere);
+  });
+}
+
 }  // namespace
 
 std::uint32_t object_checksum(std::span<const unsigned char> bytes) {
@@ -247,11 +294,12 @@ std::uint32_t object_checksum(std::span<const unsigned char> bytes) {
   return c;
 }
 
-void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std::uint64_t end) {
-  constexpr std::size_t kVersion = 8, kEnd = 28, kChecksum = 44;
+void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std::uint64_t end, std::uint64_t root) {
+  constexpr std::size_t kVersion = 8, kEnd = 28, kRoot = 36, kChecksum = 44;
   if (superblock[kVersion] != 2 && superblock[kVersion] != 3)
     throw std::logic_error("a file whose superblock has another version than asked for");
   std::memcpy(&superblock[kEnd], &end, sizeof end);
+  if (root != kNowhere) std::memcpy(&superblock[kRoot], &root, sizeof root);
   const std::uint32_t sum = object_checksum(std::span<const unsigned char>(superblock).first(kChecksum));
   std::memcpy(&superblock[kChecksum], &sum, sizeof sum);
 }
@@ -293,16 +341,13 @@ void add_texts(Bytes& out, std::span<const std::string_view> texts) {
 }
 
 void add_dataset(Bytes& out, const FileDataset& dataset) {
-  constexpr std::uint8_t kVersion = 3, kEarly = 1, kIncremental = 3, kNeverFilled = 1 << 2, kFilledIfSet = 2 << 2;
   Header header(out);
   header.message(kDataspace, [&](Bytes& to) { add_dataspace(to, dataset.dims, false); });
   header.message(kDatatype, [&](Bytes& to) { add_type(to, dataset.type); });
-  header.message(kFillValue, [&](Bytes& to) {
-    to.number(kVersion);
-    to.number<std::uint8_t>(dataset.chunk.empty() ? kEarly | kNeverFilled : kIncremental | kFilledIfSet);
-  });
+  header.message(kFillValue, [&](Bytes& to) { add_fill(to, dataset); });
   header.message(kLayout, [&](Bytes& to) { add_layout(to, dataset); });
   if (!dataset.filters.empty()) header.message(kFilters, [&](Bytes& to) { add_filters(to, dataset.filters); });
+  if (!dataset.texts.empty()) add_attribute_info(header);
   for (const FileText& text : dataset.texts) header.message(kAttribute, [&](Bytes& to) { add_attribute(to, text); });
   header.close();
 }
@@ -315,6 +360,7 @@ void add_group(Bytes& out, std::span<const FileLink> links, std::span<const File
     to.number(kNowhere);
   });
   header.message(kGroupInfo, [](Bytes& to) { to.zeros(2); });
+  if (!attributes.empty()) add_attribute_info(header);
   for (const FileAttribute& attribute : attributes)
     header.message(kAttribute, [&](Bytes& to) { add_attribute(to, attribute); });
   for (const FileLink& link : links) header.message(kLink, [&](Bytes& to) { add_link(to, link); });

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -47,8 +48,8 @@ inline constexpr std::uint16_t kLz4Filter = 32004;
 
 /// The head of a file that the library made for readers of HDF5 1.8.
 inline constexpr std::size_t kSuperblockBytes = 48;
-/// Where the file ends, for a file that was made longer.
-void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std::uint64_t end);
+/// Where the file ends, for a file that was made longer; and, unless it leads nowhere, the address of its group "/".
+void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std::uint64_t end, std::uint64_t root = kNowhere);
 
 /// Types on disk, as the format has them.
 enum class NumberType { float32, float64, int8, int64, boolean };
@@ -60,6 +61,12 @@ struct FileFilter {
   std::vector<std::uint32_t> values = {};
 };
 
+/// Where a virtual dataset says whose rows it shows: a text of a list that add_texts made.
+struct FileView {
+  std::uint64_t texts = 0;   ///< address of the list
+  std::uint32_t number = 0;  ///< in the list
+};
+
 /// A text of a list that add_texts made. Objects may share it in files that are read only: who changes it through one of them takes
 /// it from the others.
 struct FileText {
@@ -69,7 +76,7 @@ struct FileText {
   std::uint32_t bytes = 0;
 };
 
-/// A dataset. What its chunks leave out is zero.
+/// A dataset. What its chunks leave out is zero; what a view does not find is NaN.
 struct FileDataset {
   NumberType type = NumberType::float32;
   std::vector<std::uint64_t> dims;
@@ -77,11 +84,14 @@ struct FileDataset {
   std::uint64_t address = kNowhere;  ///< of its numbers, or of the index of its chunks
   std::span<const FileFilter> filters = {};
   std::span<const FileText> texts = {};  ///< attributes
+  std::optional<FileView> view = {};     ///< it has no numbers of its own; of floating-point numbers
 };
 
 struct FileLink {
   std::string_view name;
-  std::uint64_t address;  ///< of the object
+  std::uint64_t address = kNowhere;  ///< of the object, where it is in the same file
+  std::string_view file = {};        ///< of another file, relative to the folder of this one
+  std::string_view path = {};        ///< in that file
 };
 
 /// A number, or a list of them.
@@ -92,7 +102,7 @@ struct FileAttribute {
   std::span<const unsigned char> values;  ///< little-endian
 };
 
-/// Appends texts for attributes to refer to; none of none.
+/// Appends texts, or bytes of other kinds, for attributes and views to refer to; none of none.
 void add_texts(Bytes& out, std::span<const std::string_view> texts);
 /// Appends a dataset's description.
 void add_dataset(Bytes& out, const FileDataset& dataset);

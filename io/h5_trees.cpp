@@ -3,6 +3,7 @@
 #include "io/h5_trees.hpp"
 
 #include <algorithm>
+#include <string>
 
 namespace tangere::h5 {
 namespace {
@@ -69,53 +70,86 @@ std::size_t tree_bytes(const TreeKind& kind, std::size_t children) {
   }
 }
 
-/// Names, each ended by zeros up to a multiple of eight, and where each begins; 0 is the empty name.
-struct Names {
-  Bytes bytes;
-  std::vector<std::uint64_t> begins;
-  explicit Names(const std::vector<FileMember>& members) {
-    bytes.zeros(8);
-    for (const FileMember& member : members) {
-      begins.push_back(bytes.size());
-      bytes.text(member.name);
-      bytes.zeros(1);
-      bytes.align();
-    }
+/// Bytes of a group, taken away now and then.
+class GroupBytes {
+ public:
+  GroupBytes(Bytes& bytes, std::uint64_t base, const Spill& spill) : out(bytes), base_(base), spill_(spill) {}
+  /// The address of what is appended next.
+  [[nodiscard]] std::uint64_t here() const { return base_ + out.size(); }
+  /// Of the first byte that is still there.
+  [[nodiscard]] std::uint64_t base() const { return base_; }
+  void breathe() {
+    constexpr std::size_t kMost = std::size_t{1} << 20;
+    if (!spill_ || out.size() < kMost) return;
+    spill_(out);
+    base_ += out.size();
+    out.clear();
   }
+
+  Bytes& out;
+
+ private:
+  std::uint64_t base_;
+  const Spill& spill_;
 };
 
-std::uint64_t add_names(Bytes& out, std::uint64_t base, const Names& names) {
+std::string name_of(std::string_view prefix, const FileMember& member) {
+  return std::string(prefix) + std::to_string(member.number);
+}
+
+/// Where the name of each member begins among all, each ended by zeros up to a multiple of eight, and where the last one ends; 0
+/// is the empty name.
+std::vector<std::uint64_t> name_begins(std::string_view prefix, const std::vector<FileMember>& members) {
+  std::vector<std::uint64_t> begins;
+  begins.reserve(members.size() + 1);
+  std::uint64_t at = 8;
+  for (const FileMember& member : members) {
+    begins.push_back(at);
+    at += (name_of(prefix, member).size() / 8 + 1) * 8;
+  }
+  begins.push_back(at);
+  return begins;
+}
+
+std::uint64_t add_names(GroupBytes& to, std::string_view prefix, const std::vector<FileMember>& members, std::uint64_t bytes) {
   constexpr std::uint64_t kNothingFree = 1;
-  const std::uint64_t heap = base + out.size();
-  out.text("HEAP");
-  out.zeros(4);  // version
-  out.number(static_cast<std::uint64_t>(names.bytes.size()));
-  out.number(kNothingFree);
-  out.number(heap + 32);
-  out.add(names.bytes.all());
+  const std::uint64_t heap = to.here();
+  to.out.text("HEAP");
+  to.out.zeros(4);  // version
+  to.out.number(bytes);
+  to.out.number(kNothingFree);
+  to.out.number(heap + 32);
+  to.out.zeros(8);
+  for (const FileMember& member : members) {
+    const std::string name = name_of(prefix, member);
+    to.out.text(name);
+    to.out.zeros(8 - name.size() % 8);
+    to.breathe();
+  }
   return heap;
 }
 
 /// Symbol nodes of up to 2 kLeafHalf members each; `ends`: members up to the end of each.
-std::vector<std::uint64_t> add_leaves(Bytes& out, std::uint64_t base, const std::vector<FileMember>& members,
-                                      const Names& names, std::vector<std::size_t>& ends) {
+std::vector<std::uint64_t> add_leaves(GroupBytes& to, const std::vector<FileMember>& members,
+                                      const std::vector<std::uint64_t>& begins, std::vector<std::size_t>& ends) {
   constexpr std::size_t kMost = 2 * kLeafHalf, kEntry = 40, kHead = 8;
   constexpr std::uint8_t kVersion = 1;
   std::vector<std::uint64_t> leaves;
   for (std::size_t first = 0; first < members.size(); first += kMost) {
-    const std::size_t at = out.size(), end = std::min(first + kMost, members.size());
-    leaves.push_back(base + at);
-    out.text("SNOD");
-    out.number(kVersion);
-    out.zeros(1);
-    out.number(static_cast<std::uint16_t>(end - first));
+    const std::size_t at = to.out.size(), end = std::min(first + kMost, members.size());
+    leaves.push_back(to.here());
+    to.out.text("SNOD");
+    to.out.number(kVersion);
+    to.out.zeros(1);
+    to.out.number(static_cast<std::uint16_t>(end - first));
     for (std::size_t i = first; i < end; ++i) {
-      out.number(names.begins[i]);
-      out.number(members[i].address);
-      out.zeros(kEntry - 2 * kAddress);  // nothing of the object is kept here
+      to.out.number(begins[i]);
+      to.out.number(members[i].address);
+      to.out.zeros(kEntry - 2 * kAddress);  // nothing of the object is kept here
     }
-    out.zeros(at + kHead + kMost * kEntry - out.size());
+    to.out.zeros(at + kHead + kMost * kEntry - to.out.size());
     ends.push_back(end);
+    to.breathe();
   }
   return leaves;
 }
@@ -143,23 +177,27 @@ std::size_t chunk_index_bytes(std::size_t chunks, std::size_t rank) {
   return chunks == 0 ? 0 : tree_bytes(chunk_tree(rank), chunks);
 }
 
-std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::vector<FileMember> members) {
-  std::sort(members.begin(), members.end(), [](const FileMember& a, const FileMember& b) { return a.name < b.name; });
-  const Names names(members);
-  const std::uint64_t heap = add_names(out, base, names);
+std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::string_view prefix, std::vector<FileMember> members,
+                              bool root, const Spill& spill) {
+  std::sort(members.begin(), members.end(), [](const FileMember& a, const FileMember& b) {
+    return std::to_string(a.number) < std::to_string(b.number);  // as names are
+  });
+  const std::vector<std::uint64_t> begins = name_begins(prefix, members);
+  GroupBytes to(out, base, spill);
+  const std::uint64_t heap = add_names(to, prefix, members, begins.back());
   std::vector<std::size_t> ends;
-  const std::vector<std::uint64_t> leaves = add_leaves(out, base, members, names, ends);
+  const std::vector<std::uint64_t> leaves = add_leaves(to, members, begins, ends);
   // Key i: the last name before child i, the empty one before the first.
-  const std::uint64_t tree = add_tree(out, base, group_tree(), leaves, [&](Bytes& to, std::size_t i) {
-    to.number(i == 0 ? std::uint64_t{0} : names.begins[ends[i - 1] - 1]);
+  const std::uint64_t tree = add_tree(out, to.base(), group_tree(), leaves, [&](Bytes& keys, std::size_t i) {
+    keys.number(i == 0 ? std::uint64_t{0} : begins[ends[i - 1] - 1]);
   });
   constexpr std::uint8_t kVersion = 1;
   constexpr std::uint16_t kSymbolTable = 0x11, kBytes = 16;
-  const std::uint64_t group = base + out.size();
+  const std::uint64_t group = to.here();
   out.number(kVersion);
   out.zeros(1);
   out.number<std::uint16_t>(1);       // messages
-  out.number<std::uint32_t>(0);       // links to it
+  out.number<std::uint32_t>(root ? 1 : 0);  // links to it
   out.number<std::uint32_t>(8 + kBytes);
   out.zeros(4);
   out.number(kSymbolTable);

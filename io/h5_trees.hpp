@@ -5,8 +5,9 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
-#include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/h5_objects.hpp"
@@ -27,13 +28,19 @@ std::uint64_t add_chunk_index(Bytes& out, std::uint64_t base, std::span<const Fi
 /// Bytes that it takes.
 std::size_t chunk_index_bytes(std::size_t chunks, std::size_t rank);
 
+/// A group's member, called by what all members begin with and its number.
 struct FileMember {
-  std::string name;
+  std::int64_t number = 0;    ///< from 0 on
   std::uint64_t address = 0;  ///< of the object
 };
 
+/// Takes bytes away that go behind those it took before.
+using Spill = std::function<void(const Bytes&)>;
+
 /// Appends a group of any number of members, in any order. Returns the address of the group, whose count of links to it is
-/// 0: link it.
-std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::vector<FileMember> members);
+/// 0: link it. With `root` it is 1, for the group "/". With `spill`, bytes are taken away as they come, but for the last ones, among
+/// them the group itself: what is left in `out` follows them.
+std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::string_view prefix, std::vector<FileMember> members,
+                              bool root = false, const Spill& spill = {});
 
 }  // namespace tangere::h5

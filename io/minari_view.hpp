@@ -3,20 +3,40 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "io/dataset_files.hpp"
+#include "io/demo_links.hpp"
+#include "io/grown_file.hpp"
 
 namespace tangere {
 
-/// Where the numbers of a demo are.
-struct DemoPlace {
-  std::int64_t number = 0;  ///< of the episode
-  std::string file;         ///< in the data set's folder, without its path
-};
+/// FOLDER/minari/tangere/NAME-v0/data. Everything throws IoError.
+class MinariView {
+ public:
+  /// Begins it; `members` must outlive it.
+  MinariView(const DatasetFiles& dataset, const DemoMembers& members, bool overwrite);
 
-/// Writes FOLDER/minari/tangere/NAME-v0/data and returns "tangere/NAME-v0". Throws IoError.
-std::string write_minari_view(const DatasetFiles& dataset, const std::vector<DemoPlace>& demos, bool overwrite);
+  /// Demos of a file of the data set's folder, given without its path, in ascending order.
+  void add(std::string_view file, std::span<const LinkedDemo> demos);
+  /// Writes what is left, and metadata.json.
+  void commit();
+  /// "tangere/NAME-v0".
+  [[nodiscard]] const std::string& id() const { return id_; }
+
+ private:
+  [[nodiscard]] std::string metadata() const;
+
+  const DemoMembers& members_;
+  bool overwrite_;
+  std::string id_, folder_, command_, low_ = "-1.0", high_ = "1.0";
+  std::optional<GrownFile> file_;
+  std::vector<h5::FileMember> episodes_;
+  std::int64_t count_ = 0, steps_ = 0;
+};
 
 }  // namespace tangere

@@ -54,6 +54,13 @@ void PlacedFile::write_unchecked(std::uint64_t address, std::span<const unsigned
   part_.write_at(address, pieces);
 }
 
+void PlacedFile::end_at(std::uint64_t end, std::uint64_t root) {
+  std::array<unsigned char, h5::kSuperblockBytes> superblock{};
+  part_.read_at(0, superblock);
+  h5::set_end_of_file(superblock, end, root);
+  write_unchecked(0, superblock);
+}
+
 void PlacedFile::verify() const {
   std::vector<Place> places = places_;
   std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.address < b.address; });

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "io/h5_objects.hpp"
 #include "io/part_file.hpp"
 #include "io/shard_check.hpp"
 
@@ -35,6 +36,9 @@ class PlacedFile {
 
   /// At once; verify() does not look at it.
   void write_unchecked(std::uint64_t address, std::span<const unsigned char> bytes);
+
+  /// Tells the library where the file ends, and where its group "/" is unless that leads nowhere; verify() does not look at it.
+  void end_at(std::uint64_t end, std::uint64_t root = h5::kNowhere);
 
   /// Reads all that was written. Throws IoError when it is not the same.
   void verify() const;

@@ -141,6 +141,9 @@ class ShardChecker {
       }
     }
     for (std::size_t k = 0; k < gradients_.size(); ++k) add_gradient(demo, gradients_[k], episode, names_.size() + 2 + k, rows);
+    if (h5::has_link(demo, "next_obs"))
+      for (const std::string& name : names_)
+        single_ ? check_next<float>(demo, name, episode, rows) : check_next<double>(demo, name, episode, rows);
     content_.rows += rows;
     ++content_.demos;
   }
@@ -163,6 +166,38 @@ class ShardChecker {
     expected.back() = last;
     h5::read_box(dataset, {0}, {list.size()}, list.data());
     if (list != expected) fail(fmt::format("demo_{}: {} are not what was written", episode, name));
+  }
+
+  /// Of merged files: obs from its second row on, then final_obs.
+  template <class T>
+  void check_next(const h5::Id& demo, const std::string& name, std::int64_t episode, std::int64_t rows) {
+    const h5::Id next = h5::open_dataset(demo, "next_obs/" + name), obs = h5::open_dataset(demo, "obs/" + name),
+                 last = h5::open_dataset(demo, "final_obs/" + name);
+    const std::string full = fmt::format("demo_{}: next_obs/{}", episode, name);
+    if (!has_rows(next, full, rows)) return;
+    h5::Dims count = h5::dimensions(next);
+    count[0] = 1;
+    std::size_t width = 1;
+    for (std::size_t i = 1; i < count.size(); ++i) width *= count[i];
+    if (width == 0) return;
+    const auto step = static_cast<std::int64_t>(std::max<std::size_t>(1, kReadBytes / (width * sizeof(T))));
+    std::vector<T> shown, there;
+    const auto read = [&](const h5::Id& dataset, std::int64_t first, std::int64_t taken, std::vector<T>& into) {
+      h5::Dims offset(count.size(), 0);
+      offset[0] = static_cast<hsize_t>(first);
+      count[0] = static_cast<hsize_t>(taken);
+      into.resize(count[0] * width);
+      h5::read_box(dataset, offset, count, into.data());
+    };
+    for (std::int64_t row = 0; row < rows;) {
+      const bool at_last = row + 1 == rows;
+      const std::int64_t taken = at_last ? 1 : std::min(step, rows - 1 - row);
+      read(next, row, taken, shown);
+      read(at_last ? last : obs, at_last ? 0 : row + 1, taken, there);
+      if (std::memcmp(shown.data(), there.data(), shown.size() * sizeof(T)) != 0)
+        return fail(fmt::format("{} is not obs one row later, in rows {} to {}", full, row, row + taken - 1));
+      row += taken;
+    }
   }
 
   bool has_rows(const h5::Id& dataset, const std::string& name, std::int64_t rows) {

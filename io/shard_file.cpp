@@ -17,15 +17,6 @@ constexpr std::size_t kMostHeld = std::size_t{64} << 20;
 
 std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 7) / 8 * 8; }
 
-/// Tells the library where the file ends.
-void set_end(PartFile& part, std::uint64_t end) {
-  std::array<unsigned char, h5::kSuperblockBytes> superblock{};
-  part.read_at(0, superblock);
-  h5::set_end_of_file(superblock, end);
-  std::array<iovec, 1> pieces{{{superblock.data(), superblock.size()}}};
-  part.write_at(0, pieces);
-}
-
 template <class T>
 std::span<const unsigned char> bytes_of(std::span<const T> numbers) {
   return {reinterpret_cast<const unsigned char*>(numbers.data()), numbers.size_bytes()};
@@ -34,7 +25,7 @@ std::span<const unsigned char> bytes_of(std::span<const T> numbers) {
 }  // namespace
 
 ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const DemoFormat& format, EpisodeRange range,
-                     bool overwrite)
+                     bool overwrite, std::size_t& held_bytes)
     : layout_(layout),
       format_(format),
       first_episode_(range.first),
@@ -42,6 +33,7 @@ ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const
       unfinished_((range.end - range.first + kBlockEpisodes - 1) / kBlockEpisodes),
       next_(range.first),
       cut_(has_chunks(layout)),
+      held_bytes_(held_bytes),
       part_(path, overwrite),
       placed_(part_),
       no_rewards_(static_cast<std::size_t>(layout.rows()), 0.0F),
@@ -126,15 +118,14 @@ void ShardFile::write_slices(Block& block, const EpisodeRows& rows, int episode)
   const std::vector<PieceSlice> slices = slices_of(format_, rows, episode, demo.facts.rows);
   for (std::size_t k = 0; k < format_.datasets(); ++k) {
     const PieceSlice& slice = slices[k];
-    const std::size_t bytes = static_cast<std::size_t>(slice.rows.rows) * slice.rows.row_bytes;
     if (!waits()) {
       const std::span<const unsigned char> same = constant(k, demo.facts.rows);
       if (same.empty())
         placed_.add(demo.addresses[k] + static_cast<std::uint64_t>(slice.first) * slice.rows.row_bytes, slice.rows, slice.data);
       else if (rows.first_row == 0)
         placed_.add(demo.addresses[k], same);
-    } else if (format_.chunk_rows(k, demo.facts.rows) == 0 && bytes > 0) {
-      demo.held[k].insert(demo.held[k].end(), slice.data, slice.data + bytes);
+    } else if (format_.chunk_rows(k, demo.facts.rows) == 0 && slice.rows.rows > 0) {
+      hold(demo, k, slice);
     }
   }
 }
@@ -162,6 +153,28 @@ void ShardFile::hold(Block& block, std::vector<PreparedChunk>& chunks) {
     }
     block.demos[static_cast<std::size_t>(chunk.episode)].chunks[chunk.dataset].push_back(std::move(held));
   }
+}
+
+/// The same for rows: where memory is full, all of the dataset gets its place.
+void ShardFile::hold(Demo& demo, std::size_t dataset, const PieceSlice& slice) {
+  HeldRows& held = demo.held[dataset];
+  const std::span<const unsigned char> bytes(slice.data, static_cast<std::size_t>(slice.rows.rows) * slice.rows.row_bytes);
+  if (held.address == h5::kNowhere) {
+    if (held_bytes_ + bytes.size() <= kMostHeld) {
+      held.bytes.insert(held.bytes.end(), bytes.begin(), bytes.end());
+      held_bytes_ += bytes.size();
+      return;
+    }
+    held.address = free_;
+    const auto rows = static_cast<std::uint64_t>(format_.rows_of(dataset, demo.facts.rows));
+    free_ = aligned(free_ + rows * slice.rows.row_bytes);
+    placed_.add(held.address, held.bytes);
+    placed_.flush();
+    held_bytes_ -= held.bytes.size();
+    held.bytes = {};
+  }
+  placed_.add(held.address + static_cast<std::uint64_t>(slice.first) * slice.rows.row_bytes, bytes);
+  placed_.flush();
 }
 
 void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) {
@@ -200,6 +213,10 @@ void ShardFile::give_place_to_held(Block& block) {
     for (std::size_t k = 0; k < format_.datasets(); ++k) {
       demo.addresses[k] = at;
       const std::int64_t rows = format_.chunk_rows(k, demo.facts.rows);
+      if (demo.held[k].address != h5::kNowhere) {
+        demo.addresses[k] = demo.held[k].address;
+        continue;
+      }
       if (rows == 0) {
         at += aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) * format_.row_bytes(k));
         continue;
@@ -223,7 +240,8 @@ void ShardFile::write_held(Block& block) {
     for (std::size_t k = 0; k < format_.datasets(); ++k) {
       const std::span<const unsigned char> same = constant(k, demo.facts.rows);
       if (format_.chunk_rows(k, demo.facts.rows) == 0)
-        placed_.add(demo.addresses[k], same.empty() ? std::span<const unsigned char>(demo.held[k]) : same);
+        placed_.add(demo.addresses[k], same.empty() ? std::span<const unsigned char>(demo.held[k].bytes) : same);
+      held_bytes_ -= demo.held[k].bytes.size();
       for (const Chunk& chunk : demo.chunks[k]) {
         held_bytes_ -= chunk.bytes.size();
         placed_.add(chunk.place.address, chunk.bytes);
@@ -237,7 +255,7 @@ void ShardFile::close_block(Block& block, std::int64_t first_episode, const h5::
     const Demo& demo = block.demos[e];
     const std::uint64_t group = format_.describe(descriptions, block.base, demo.facts, demo.addresses, texts_);
     if (demo.failed) continue;  // its bytes stay, nothing leads to them
-    members_.push_back({fmt::format("demo_{}", first_episode + static_cast<std::int64_t>(e)), group});
+    members_.push_back({first_episode + static_cast<std::int64_t>(e), group});
     rows_ += demo.facts.rows;
     sum_.add(demo.sum);
   }
@@ -277,12 +295,12 @@ void ShardFile::complete_description(std::uint64_t data) {
 
 void ShardFile::commit() {
   h5::Bytes out;
-  const std::uint64_t data = h5::add_large_group(out, free_, std::move(members_));
+  const std::uint64_t data = h5::add_large_group(out, free_, "demo_", std::move(members_));
   const std::span<const unsigned char> members = out.all().first(data - free_), group = out.all().subspan(data - free_);
   placed_.add(free_, members);
   placed_.flush();
   placed_.write_unchecked(data, group);  // the library will add to it
-  set_end(part_, free_ + out.size());
+  placed_.end_at(free_ + out.size());
   try {
     complete_description(data);
     h5::close_file(file_, part_.path());

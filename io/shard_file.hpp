@@ -21,10 +21,10 @@ namespace tangere {
 
 class ShardFile {
  public:
-  /// Creates `<path>.part`. Throws IoError, also when `path` exists and `overwrite` is false. `layout` and `format` must
-  /// outlive it.
+  /// Creates `<path>.part`. Throws IoError, also when `path` exists and `overwrite` is false. `layout`, `format` and
+  /// `held_bytes`, what all shards of a data set together keep in memory, must outlive it.
   ShardFile(const std::string& path, const DatasetLayout& layout, const DemoFormat& format, EpisodeRange range,
-            bool overwrite);
+            bool overwrite, std::size_t& held_bytes);
   ~ShardFile();
   ShardFile(const ShardFile&) = delete;
   ShardFile& operator=(const ShardFile&) = delete;
@@ -43,13 +43,18 @@ class ShardFile {
     h5::FileChunk place;
     std::vector<unsigned char> bytes;
   };
+  /// Numbers of a contiguous dataset, of a block without a place. The same: once they have an address, they are there.
+  struct HeldRows {
+    std::vector<unsigned char> bytes;
+    std::uint64_t address = h5::kNowhere;
+  };
   struct Demo {
     DemoFacts facts;
     bool failed = false;
     ContentSum sum;
-    std::vector<std::uint64_t> addresses;          // per dataset, once known
-    std::vector<std::vector<unsigned char>> held;  // per dataset: numbers of a block without a place
-    std::vector<std::vector<Chunk>> chunks;        // per dataset
+    std::vector<std::uint64_t> addresses;    // per dataset, once known
+    std::vector<HeldRows> held;              // per dataset
+    std::vector<std::vector<Chunk>> chunks;  // per dataset
   };
   struct Block {
     std::vector<Demo> demos;
@@ -65,6 +70,7 @@ class ShardFile {
   void write_slices(Block& block, const EpisodeRows& rows, int episode);
   [[nodiscard]] std::span<const unsigned char> constant(std::size_t dataset, std::int64_t rows) const;
   void hold(Block& block, std::vector<PreparedChunk>& chunks);
+  void hold(Demo& demo, std::size_t dataset, const PieceSlice& slice);
   void give_place_to_held(Block& block);
   void write_held(Block& block);
   void close_block(Block& block, std::int64_t first_episode, const h5::Bytes& indexes);
@@ -73,14 +79,14 @@ class ShardFile {
   const DatasetLayout& layout_;
   const DemoFormat& format_;
   std::int64_t first_episode_, end_, unfinished_, next_;  // blocks that are unfinished; the first one without a place
-  bool cut_;  // into chunks
+  bool cut_;                  // into chunks
+  std::size_t& held_bytes_;  // of chunks and rows, of all shards
   PartFile part_;
   PlacedFile placed_;
   h5::Id file_;
   std::uint64_t texts_ = 0, begin_ = 0;   // of what demos refer to; of the blocks
   std::uint64_t free_ = 0;                // behind the last byte that is taken
   std::map<std::int64_t, Block> blocks_;  // by their first episode
-  std::size_t held_bytes_ = 0;            // of chunks
   std::vector<float> no_rewards_;
   std::vector<std::int8_t> dones_;
   std::vector<h5::FileMember> members_;

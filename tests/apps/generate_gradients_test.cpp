@@ -243,6 +243,28 @@ TEST(GenerateGradients, AreTheSameBesideAnyObservations) {
   }
 }
 
+/// What is done between simulation and disk is called by what was asked for, no more and no less.
+TEST(GenerateGradients, SayWhatTheyWereMadeWith) {
+  const std::vector<std::pair<Words, std::string>> ways{
+      {{}, "checksums"},
+      {{"--tactile", "sparse"}, "tiles"},
+      {{"--compress", "lz4"}, "compression"},
+      {{"--tactile", "sparse", "--compress", "deflate"}, "tiles and compression"},
+      {{"--gradients", "jacobians"}, "gradients"},
+      {{"--gradients", "jacobians", "--tactile", "sparse"}, "gradients and tiles"},
+      {{"--gradients", "jacobians", "--compress", "deflate"}, "gradients and compression"},
+      {{"--gradients", "jacobians", "--tactile", "sparse", "--compress", "deflate"}, "gradients and tiles and compression"}};
+  const Folder folder;
+  for (const auto& [more, name] : ways) {
+    const Words words = Words{"generate", kSmall, "-o", "set", "--episodes", "16", "--steps", "10", "--overwrite"} + more;
+    const Outcome people = run(folder, words), program = run(folder, words + Words{"--json"});
+    ASSERT_EQ(people.exit_code, 0) << people.err;
+    EXPECT_THAT(people.out + people.err, testing::HasSubstr(" s and " + name + " 0.")) << "in the summary";
+    EXPECT_THAT(nlohmann::json::parse(program.out).at("limited_by").get<std::string>(),
+                testing::AnyOf("simulation", name, "writing"));
+  }
+}
+
 TEST(GenerateGradients, RefusesWhatFitsNot) {
   const Folder folder;
   const auto refused = [&](const Words& words, const char* message) {

@@ -168,6 +168,52 @@ TEST(ChunkCodec, BlocksThatWaitTakeBoundedMemoryAndLoseNothing) {
   EXPECT_EQ(check_shard(writer.shards().at(0)).demos, 112);
 }
 
+TEST(ChunkCodec, RowsThatWaitBesideChunksAreBoundedAsWell) {
+  const Folder folder;
+  DatasetLayout l = layout_of(true, "deflate", false);
+  l.episodes = 112;
+  l.gradients_of = "jacobians";
+  l.gradients = {{"grad_wide", {64, 64}, true, "numbers that are not compressed", {}, {}}};
+  for (int k = 0; k < 64; ++k) {
+    l.gradients[0].by_names.push_back(std::to_string(k));
+    l.gradients[0].by_units.emplace_back("1");
+  }
+  const auto all = static_cast<int>(l.rows()) + 1;
+  const double block = 16.0 * static_cast<double>(l.rows()) * 64 * 64 * sizeof(double);  // 19 MB
+  DatasetWriter writer({folder / "set"}, l);
+  const auto part = [&] {
+    for (const auto& entry : std::filesystem::directory_iterator(folder / "set"))
+      if (entry.path().extension() == ".part") return static_cast<double>(entry.file_size());
+    return 0.0;
+  };
+  double waiting = 0;
+  for (const std::int64_t first : {96, 80, 64, 48, 32, 16, 0}) {
+    std::vector<double> gradient(16UL * static_cast<std::size_t>(l.rows()) * l.gradients[0].width());
+    for (std::size_t k = 0; k < gradient.size(); ++k) gradient[k] = static_cast<double>(first) + 1e-6 * static_cast<double>(k);
+    const std::span<const double> all_of_it(gradient);
+    // In two pieces, the derivatives with the last one.
+    for (const int row : {0, 16}) {
+      const Piece<float> piece(l, first, row, row == 0 ? 16 : all - 16);
+      EpisodeRows rows = piece.rows();
+      if (row > 0) rows.gradients = {&all_of_it, 1};
+      writer.write(rows);
+    }
+    if (first == 0) break;
+    writer.finish(first, {});
+    waiting += block;
+    EXPECT_GT(part() + (64 << 20), waiting) << "no more than 64 MiB are kept in memory";
+  }
+  writer.finish(0, {});
+  EXPECT_EQ(check_shard(writer.shards().at(0)).demos, 112);
+  const h5::Id file = h5::open_file(writer.shards().at(0));
+  for (const int demo : {0, 20, 99}) {
+    double number = 0;
+    h5::read_box(h5::open_dataset(file, "data/demo_" + std::to_string(demo) + "/grad_wide"), {2, 3, 5}, {1, 1, 1}, &number);
+    const int first = demo / 16 * 16;
+    EXPECT_EQ(number, first + 1e-6 * (((demo - first) * static_cast<double>(l.rows()) + 2) * 4096 + 3 * 64 + 5)) << demo;
+  }
+}
+
 TEST(ChunkCodec, DamagedLz4IsAnErrorOrChangesNothing) {
   const Folder folder;
   const std::string shard = write<float>(folder, "set", layout_of(true, "lz4", false), false);

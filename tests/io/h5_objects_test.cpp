@@ -6,13 +6,20 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <iterator>
+#include <numeric>
 
+#include "engine/error.hpp"
+#include "io/grown_file.hpp"
 #include "io/h5.hpp"
+#include "io/h5_links.hpp"
 #include "io/h5_listing.hpp"
 #include "io/h5_trees.hpp"
+#include "io/h5_views.hpp"
 #include "tests/io/synthetic_run.hpp"
 
 namespace tangere {
@@ -175,15 +182,15 @@ TEST(H5Objects, GroupsOfAnySizeListAndFindTheirMembers) {
     std::vector<h5::FileMember> members;
     std::vector<std::string> names;
     for (int k = 0; k < count; ++k) {
-      members.push_back({"demo_" + std::to_string(k), file.here()});
-      names.push_back(members.back().name);
+      members.push_back({k, file.here()});
+      names.push_back("demo_" + std::to_string(k));
       const auto number = static_cast<std::int64_t>(k);
       std::array<unsigned char, sizeof number> bytes{};
       std::memcpy(bytes.data(), &number, sizeof number);
       const std::array attributes{h5::FileAttribute{"k", h5::NumberType::int64, false, bytes}};
       h5::add_group(file.objects(), {}, attributes);
     }
-    const std::uint64_t address = h5::add_large_group(file.objects(), file.base(), members);
+    const std::uint64_t address = h5::add_large_group(file.objects(), file.base(), "demo_", members);
     const h5::Id opened = file.open(address), group = h5::open_group(opened, "object");
     std::sort(names.begin(), names.end());
     EXPECT_EQ(h5::link_names(group), names);
@@ -209,6 +216,140 @@ TEST(H5Objects, AGroupHoldsLinksAndLists) {
   EXPECT_THAT(h5::link_names(group), ::testing::ElementsAre("größe"));
   EXPECT_THAT(h5::read_numbers<double>(group, "values"), ::testing::ElementsAre(1.5, -2, 1e300));
   EXPECT_TRUE(h5::link_names(h5::open_group(group, "größe")).empty());
+  H5O_info_t info;
+  ASSERT_GE(H5Oget_info2(group.get(), &info, H5O_INFO_NUM_ATTRS), 0);
+  EXPECT_EQ(info.num_attrs, 1U) << "h5py's len(), and what h5diff compares";
+}
+
+/// A file of two datasets of `shape` per row: "many" of five rows, "one" of one, numbered through.
+void write_sources(const std::string& path, h5::Dims shape, bool single) {
+  h5::Id file = h5::create_file(path);
+  double next = 0;
+  for (const hsize_t rows : {hsize_t{5}, hsize_t{1}}) {
+    shape[0] = rows;
+    std::vector<double> numbers;
+    for (hsize_t k = 0; k < std::accumulate(shape.begin(), shape.end(), hsize_t{1}, std::multiplies<>()); ++k) numbers.push_back(next++);
+    const char* const name = rows == 1 ? "one" : "many";
+    const h5::Id dataset = single ? h5::create_dataset<float>(file, name, shape) : h5::create_dataset<double>(file, name, shape);
+    h5::write_box(dataset, h5::Dims(shape.size(), 0), shape, numbers.data());
+  }
+  h5::close_file(file, path);
+}
+
+/// What a virtual dataset shows, as the library understands it.
+struct Shown {
+  h5::Dims dims;
+  std::vector<std::string> sources;
+  std::vector<std::vector<hsize_t>> boxes;  ///< of each source, then where it is shown
+  std::vector<double> numbers;
+  friend bool operator==(const Shown&, const Shown&) = default;
+};
+
+Shown shown(const h5::Id& dataset) {
+  Shown said;
+  said.dims = h5::dimensions(dataset);
+  const h5::Id creation(H5Dget_create_plist(dataset.get()));
+  std::size_t count = 0;
+  EXPECT_GE(H5Pget_virtual_count(creation.get(), &count), 0);
+  for (std::size_t k = 0; k < count; ++k) {
+    std::array<char, 64> file{}, path{};
+    H5Pget_virtual_filename(creation.get(), k, file.data(), file.size());
+    H5Pget_virtual_dsetname(creation.get(), k, path.data(), path.size());
+    said.sources.push_back(std::string(file.data()) + ":" + path.data());
+    for (const hid_t id : {H5Pget_virtual_srcspace(creation.get(), k), H5Pget_virtual_vspace(creation.get(), k)}) {
+      const h5::Id space(id);
+      std::vector<hsize_t> first(said.dims.size()), last(said.dims.size());
+      if (H5Sget_select_type(id) == H5S_SEL_ALL) continue;
+      EXPECT_GE(H5Sget_select_bounds(id, first.data(), last.data()), 0);
+      first.insert(first.end(), last.begin(), last.end());
+      said.boxes.push_back(first);
+    }
+  }
+  const h5::Id type(H5Dget_type(dataset.get()));
+  said.numbers.resize(std::accumulate(said.dims.begin(), said.dims.end(), hsize_t{1}, std::multiplies<>()));
+  h5::read_box(dataset, h5::Dims(said.dims.size(), 0), said.dims, said.numbers.data());
+  return said;
+}
+
+TEST(H5Objects, AViewIsTheLibrarysOwn) {
+  for (const bool single : {true, false})
+    for (const h5::Dims& shape : {h5::Dims{0}, h5::Dims{0, 3}, h5::Dims{0, 2, 3, 4}})
+      for (const std::uint64_t skipped : {0U, 1U, 4U, 5U}) {
+        const Folder folder;
+        write_sources(folder / "source.h5", shape, single);
+        h5::Id library = h5::create_file(folder / "library.h5", 2048, true);
+        {
+          const h5::Id source = h5::open_file(folder / "source.h5");
+          h5::create_virtual(library, "object", h5::open_dataset(source, "many"), {"source.h5", "/many"}, {"source.h5", "/one"}, skipped);
+        }
+        h5::close_file(library, folder / "library.h5");
+        Extended file(folder / "file.h5");
+        h5::FileDataset dataset{single ? h5::NumberType::float32 : h5::NumberType::float64, {shape.begin(), shape.end()}};
+        dataset.dims[0] = 6 - skipped;
+        std::vector<h5::ShownRows> parts;
+        if (skipped < 5) parts.push_back({"source.h5", "/many", skipped, 5 - skipped, 5});
+        parts.push_back({"source.h5", "/one", 0, 1, 1});
+        const std::string text = h5::shown_rows(parts, dataset.dims);
+        // The second in its list.
+        h5::add_texts(file.objects(), std::array<std::string_view, 2>{"another", text});
+        dataset.view = h5::FileView{file.base(), 1};
+        const std::uint64_t address = file.here();
+        h5::add_dataset(file.objects(), dataset);
+        {
+          const h5::Id opened = file.open(address), expected = h5::open_file(folder / "library.h5");
+          const h5::Id object = h5::open_dataset(opened, "object"), like = h5::open_dataset(expected, "object");
+          const Shown said = shown(object);
+          EXPECT_EQ(said, shown(like)) << "from row " << skipped;
+          EXPECT_EQ(said.numbers.front(), static_cast<double>(skipped * said.numbers.size() / (6 - skipped)));
+          EXPECT_GT(H5Tequal(h5::Id(H5Dget_type(object.get())).get(), h5::Id(H5Dget_type(like.get())).get()), 0);
+        }
+        std::filesystem::remove(folder / "source.h5");
+        const h5::Id opened = h5::open_file(folder / "file.h5");
+        EXPECT_TRUE(std::isnan(shown(h5::open_dataset(opened, "object")).numbers.front())) << "the source is missing";
+      }
+}
+
+TEST(H5Objects, AGroupLinksToOtherFiles) {
+  const Folder folder;
+  write_sources(folder / "source.h5", {0, 2}, true);
+  Extended file(folder / "file.h5");
+  const std::array links{h5::FileLink{"fünf", h5::kNowhere, "source.h5", "/many"},
+                         h5::FileLink{"nowhere", h5::kNowhere, "absent.h5", "/one"}};
+  h5::add_group(file.objects(), links);
+  const h5::Id opened = file.open(file.base()), group = h5::open_group(opened, "object");
+  EXPECT_THAT(h5::link_names(group), ::testing::ElementsAre("fünf", "nowhere"));
+  float last = 0;
+  h5::read_box(h5::open_dataset(group, "fünf"), {4, 1}, {1, 1}, &last);
+  EXPECT_EQ(last, 9);
+  EXPECT_THROW(static_cast<void>(h5::open_dataset(group, "nowhere")), IoError);
+  H5L_info_t info;
+  ASSERT_GE(H5Lget_info(group.get(), "fünf", &info, H5P_DEFAULT), 0);
+  EXPECT_EQ(info.type, H5L_TYPE_EXTERNAL);
+}
+
+TEST(H5Objects, TheFirstGroupOfAFileMayBeALargeOne) {
+  const Folder folder;
+  const std::string path = folder / "file.h5";
+  GrownFile file(path, false, true);
+  file.close();
+  std::vector<h5::FileMember> members;
+  h5::Bytes out;
+  constexpr int kMany = 50000;  // bytes leave memory on the way
+  for (int k = 0; k < kMany; ++k) {
+    members.push_back({k, file.here() + out.size()});
+    h5::add_group(out, {});
+  }
+  file.append(out);
+  file.open(file.append_group("episode_", members, true));
+  h5::write_scalar<std::int64_t>(file.file(), "total", kMany);
+  EXPECT_FALSE(std::filesystem::exists(path));
+  const std::uint64_t bytes = file.commit();
+  EXPECT_EQ(bytes, std::filesystem::file_size(path));
+  const h5::Id opened = h5::open_file(path);
+  EXPECT_EQ(h5::link_count(opened), kMany);
+  EXPECT_EQ(h5::read_numbers<std::int64_t>(opened, "total").at(0), kMany);
+  for (int k = 0; k < kMany; k += 7) EXPECT_TRUE(h5::has_link(opened, "episode_" + std::to_string(k)));
+  EXPECT_TRUE(h5::link_names(h5::open_group(opened, "/episode_49999")).empty());
 }
 
 }  // namespace

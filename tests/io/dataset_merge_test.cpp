@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// What merging makes of data sets with gaps: of failed episodes, and of several shards.
+#include "io/dataset_merge.hpp"
+
+#include <gmock/gmock.h>
+
+#include <functional>
+#include <numeric>
+
+#include "io/dataset_writer.hpp"
+#include "io/h5.hpp"
+#include "io/h5_listing.hpp"
+#include "io/shard_check.hpp"
+#include "tests/io/synthetic_episodes.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::tangere::testing::dataset_layout;
+using ::tangere::testing::failure;
+using ::tangere::testing::Folder;
+using ::tangere::testing::write_block;
+
+/// 40 episodes in three shards; all of the second shard failed, and some of the first.
+DatasetFiles write_with_gaps(const Folder& folder, bool single, const std::string& compression) {
+  DatasetLayout l = dataset_layout(40, single);
+  l.shards = 3;
+  l.compression = compression;
+  DatasetWriter writer({folder / "set"}, l);
+  std::vector<FailedEpisode> all_of_it;
+  for (std::int64_t e = 16; e < 32; ++e) all_of_it.push_back(failure(e));
+  write_block(writer, l, 0, {failure(0), failure(7)});
+  write_block(writer, l, 16, all_of_it);
+  write_block(writer, l, 32);
+  return find_dataset(folder / "set");
+}
+
+std::vector<double> row(const h5::Id& file, const std::string& dataset, hsize_t at) {
+  const h5::Id opened = h5::open_dataset(file, dataset);
+  h5::Dims dims = h5::dimensions(opened), offset(dims.size(), 0);
+  offset[0] = at;
+  dims[0] = 1;
+  std::vector<double> numbers(std::accumulate(dims.begin(), dims.end(), hsize_t{1}, std::multiplies<>()));
+  h5::read_box(opened, offset, dims, numbers.data());
+  return numbers;
+}
+
+TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
+  for (const bool single : {true, false})
+    for (const bool copy : {false, true}) {
+      const Folder folder;
+      const DatasetFiles dataset = write_with_gaps(folder, single, single ? "none" : "deflate");
+      const MergeResult result = merge_dataset(dataset, {copy, false});
+      EXPECT_EQ(result.demos, 22);
+      EXPECT_EQ(result.failed, 18);
+      EXPECT_EQ(result.train + result.valid, 22);
+      EXPECT_THAT(examine_shard(result.file).problems, IsEmpty());
+      const h5::Id merged = h5::open_file(result.file), data = h5::open_group(merged, "data");
+      EXPECT_EQ(h5::link_count(data), 22U);
+      EXPECT_FALSE(h5::has_link(data, "demo_7"));
+      EXPECT_EQ(h5::read_numbers<double>(h5::open_group(merged, "failed/episode_20"), "q").at(1), 20);
+      // Three rows: 1 and 2 of obs, then final_obs, which is row 3.
+      for (hsize_t j = 0; j < 3; ++j)
+        for (std::size_t k = 0; k < 2; ++k)
+          EXPECT_EQ(row(merged, "data/demo_33/next_obs/v", j)[k],
+                    tangere::testing::dataset_number<double>(33, 2, static_cast<std::int64_t>(j) + 1, k));
+      const h5::Id view = h5::open_file(result.minari + "/data/main_data.hdf5");
+      EXPECT_EQ(h5::link_count(view), 22U);
+      std::vector<std::int64_t> demos;
+      for (int j = 0; j < 22; ++j) {
+        const h5::Id episode = h5::open_group(view, "episode_" + std::to_string(j));
+        EXPECT_EQ(h5::read_numbers<std::int64_t>(episode, "id").at(0), j);
+        demos.push_back(h5::read_numbers<std::int64_t>(episode, "demo").at(0));
+      }
+      EXPECT_THAT(demos, ElementsAre(1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 32, 33, 34, 35, 36, 37, 38, 39));
+    }
+}
+
+}  // namespace
+}  // namespace tangere
