@@ -306,7 +306,7 @@ TEST(Command, GradcheckTellsPeopleAndProgramsTheSame) {
   EXPECT_EQ(answer.at("command"), "gradcheck");
   EXPECT_EQ(answer.at("loss_name"), "shear");
   EXPECT_EQ(answer.at("steps"), 90);
-  EXPECT_EQ(answer.at("inputs").size(), 4U);
+  EXPECT_EQ(answer.at("inputs").size(), 5U);  // u, q, v, numbers, points
   EXPECT_GT(answer.at("entries"), 8);
   EXPECT_LT(answer.at("max_relative_error"), 1e-5);
   for (const json& input : answer.at("inputs")) EXPECT_THAT(text.out, HasSubstr(input.at("input").get<std::string>()));
