@@ -130,7 +130,7 @@ void BM_Gradients(benchmark::State& state, const char* scene, bool tactile, int 
   BENCHMARK_CAPTURE(BM_Gradients, name, scene, tactile, losses, parameters)     \
       ->ArgName("envs")                                                         \
       ->Arg(1)                                                                  \
-      ->Arg(256)                                                                \
+      ->Arg(1024)                                                               \
       ->Unit(benchmark::kMillisecond)                                           \
       ->Iterations(3)
 

@@ -28,7 +28,7 @@ GradientSummary gradients(const Model& model, int environments, std::int64_t ste
   GradientOptions options;
   options.steps = steps;
   options.threads = threads;
-  options.parameters = true;
+  options.parameters = options.points = true;
   options.tape_bytes = tape_bytes;
   return rollout_gradients(start, controls_of(program), options, std::span(both).first(std::size_t(losses)));
 }
@@ -40,6 +40,7 @@ void expect_same(const GradientSummary& a, const GradientSummary& b, std::size_t
     EXPECT_EQ(a.losses[k].q, b.losses[k].q);
     EXPECT_EQ(a.losses[k].v, b.losses[k].v);
     EXPECT_EQ(a.losses[k].parameters, b.losses[k].parameters);
+    EXPECT_EQ(a.losses[k].points, b.losses[k].points);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "engine/control.hpp"
+#include "engine/parameters.hpp"
 #include "io/scene_reader.hpp"
 #include "tasks/gradient_check.hpp"
 #include "tasks/losses.hpp"
@@ -103,6 +104,7 @@ TEST(VaryingGradients, OfABatchAreThoseOfScenesOfTheirOwn) {
     const auto loss = make_loss(LossKind::tactile, model, 5);
     GradientOptions options;
     options.steps = 100;
+    options.parameters = options.points = true;
     const RolloutLoss* const losses[] = {loss.get()};
     const LossGradient all =
         rollout_gradients(start, controls_of(program), options, losses).losses[0];
@@ -121,6 +123,12 @@ TEST(VaryingGradients, OfABatchAreThoseOfScenesOfTheirOwn) {
       EXPECT_EQ(part(all.u, e, nu), own.u) << e;
       EXPECT_EQ(part(all.q, e, nv), own.q) << e;
       EXPECT_EQ(part(all.v, e, nv), own.v) << e;
+      EXPECT_EQ(part(all.points, e, own.points.size()), own.points) << e;
+      ASSERT_EQ(all.parameters.size(), 9 * own.parameters.size());
+      const Parameters numbers(alone);
+      for (std::size_t k = 0; k < own.parameters.size(); ++k)
+        EXPECT_NEAR(all.parameters[e * own.parameters.size() + k], own.parameters[k], 1e-13 * std::abs(own.parameters[k]))
+            << numbers.infos()[k].name;
     }
     EXPECT_NE(part(all.q, 0, nv), part(all.q, 8, nv));
   }
