@@ -198,7 +198,10 @@ struct Gradients {
     if (name.empty()) return;
     const Model& model = batch.model();
     const int every = model.sensors().empty() ? 1 : tactile_interval(model.sensors()[0], rollout);
-    loss = make_loss(loss_named(name), model, every);
+    const LossKind kind = loss_named(name);
+    if (arguments.point_gradients && kind != LossKind::tactile && kind != LossKind::shear)
+      throw InputError("--point-gradients with --gradients " + name + "; expected a loss that reads fields, tactile or shear");
+    loss = make_loss(kind, model, every);
     GradientOptions options;
     options.steps = rollout.steps;
     options.stepper = {stepper.integrator(), stepper.timestep(), stepper.tolerance()};

@@ -38,6 +38,7 @@ struct FieldTangent::Impl {
   PadReader reader;
   const Batch* batch = nullptr;
   int block = 0, lane = 0;
+  int met_group = -1, met_sensor = -1;  ///< whose shapes the reader holds
   std::vector<LinkTangent> links;
   std::vector<kernels::TouchTangent> touches;
 
@@ -74,6 +75,7 @@ FieldTangent& FieldTangent::operator=(FieldTangent&&) noexcept = default;
 void FieldTangent::place(const Batch& batch, int block) {
   impl_->batch = &batch;
   impl_->block = block;
+  impl_->met_group = impl_->met_sensor = -1;
   for (int g = 0; g < kBlock / kGroup; ++g) impl_->reader.move(batch, block, g);
 }
 
@@ -97,7 +99,8 @@ void FieldTangent::field(int sensor, std::span<const int> tiles, std::span<doubl
   const CompiledModel& m = i.model.compiled();
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const int group = i.lane / kGroup;
-  i.reader.meet(*i.batch, i.block, group, sensor);
+  if (i.met_group != group || i.met_sensor != sensor) i.reader.meet(*i.batch, i.block, group, sensor);
+  i.met_group = group, i.met_sensor = sensor;
   const auto a = i.reader.arguments<double>(sensor, group, i.lane % kGroup);
   for (std::size_t k = 0; k < s.targets.size(); ++k) i.touches[k] = i.against(s, m.bodies[std::size_t(s.targets[k])]);
   kernels::active_kernels().field_tangent({a.pad, a.law, a.n_touches, a.shapes, a.touches, i.touches.data(),

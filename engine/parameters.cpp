@@ -76,7 +76,7 @@ bool varies(const Scene& scene, const std::string& body) {
 
 }  // namespace
 
-/// Density, where a body has one, and every number of its size.
+/// Density, or the mass of an abstract body, and every number of a size.
 void Parameters::add_bodies() {
   const CompiledModel& m = model_.compiled();
   const int first_size = kernels::first_size_number(m.view);
@@ -90,8 +90,9 @@ void Parameters::add_bodies() {
       for (std::size_t k = 0; k < masses.size(); ++k) entry.terms.push_back({mass_row(entry) + static_cast<int>(k), masses[k]});
       return entry;
     };
-    if (massive && !std::holds_alternative<AbstractShape>(d.shape))
-      add("body " + d.name + " density", "kg/m^3", with_masses({Place::density, b, 0, {}}));
+    const bool given = std::holds_alternative<AbstractShape>(d.shape);  // its inertia stays as given
+    if (massive && given) add("body " + d.name + " mass", "kg", with_masses({Place::mass, b, 0, {}}));
+    if (massive && !given) add("body " + d.name + " density", "kg/m^3", with_masses({Place::density, b, 0, {}}));
     Shape shape = d.shape;
     for (int which = 0; which < kSizeNames && size_matters(m, b); ++which) {
       if (size_number(shape, which) == nullptr) continue;
@@ -107,8 +108,9 @@ int Parameters::mass_row(const Entry& entry) const {
 }
 
 Parameters::Masses Parameters::masses_by(const Entry& entry, const Shape& shape, double density) const {
-  const MassProperties by = entry.place == Place::density ? mass_properties(shape, 1) : mass_properties_by_size(shape, density, entry.field);
-  return inertia_rows(model_.compiled().bodies[std::size_t(entry.index)], by);
+  const CompiledBody& body = model_.compiled().bodies[std::size_t(entry.index)];
+  if (entry.place == Place::mass) return inertia_rows(body, {1, body.centre, kernels::zero33<double>()});
+  return inertia_rows(body, entry.place == Place::density ? mass_properties(shape, 1) : mass_properties_by_size(shape, density, entry.field));
 }
 
 Parameters::Masses Parameters::masses_by(const Entry& entry, const Batch& batch, int environment) const {
@@ -183,6 +185,7 @@ double& Parameters::in(Scene& scene, int k) const {
     case Place::ground: return coefficient(scene.ground_contacts[at].coefficients);
     case Place::sensor: return coefficient(scene.sensors[at].coefficients);
     case Place::density: return scene.links[at].body.density;
+    case Place::mass: return std::get<AbstractShape>(scene.links[at].body.shape).mass;
     case Place::size: return *size_number(scene.links[at].body.shape, e.field);
     case Place::joint: return effect(scene.links[at].joint);
     case Place::turning: return effect(*scene.links[at].joint.turning);
@@ -204,6 +207,7 @@ int Parameters::randomization(const Scene& scene, int k) const {
         return r.target == RandomTarget::ground_contact && same_field && r.name == scene.ground_contacts[at].body;
       case Place::sensor: return r.target == RandomTarget::tactile && same_field && r.name == scene.sensors[at].name;
       case Place::density: return r.target == RandomTarget::density && r.name == scene.links[at].body.name;
+      case Place::mass: return false;
       case Place::size:
         return r.target == RandomTarget::size && r.index == e.field && r.name == scene.links[at].body.name;
       case Place::joint:

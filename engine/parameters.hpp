@@ -13,7 +13,8 @@
 namespace tangere {
 
 struct ParameterInfo {
-  std::string name;  ///< "contact pad ball kn", "ground ball mu", "tactile pad kt", "body ball density", "body pad size[0]",
+  std::string name;  ///< "contact pad ball kn", "ground ball mu", "tactile pad kt", "body ball density", "body tip mass",
+                     ///< "body pad size[0]",
                      ///< "joint arm damping", "motor arm P"
   std::string unit;  ///< SI
   double value;      ///< in the scene; environments may differ where <randomize> says so
@@ -37,7 +38,7 @@ class Parameters {
   void spread(std::span<const double> change, const Batch& batch, int environment, std::span<double> rows) const;
 
  private:
-  enum class Place { pair, ground, sensor, density, size, joint, turning, motor };
+  enum class Place { pair, ground, sensor, density, mass, size, joint, turning, motor };
   struct Term {
     int row;             ///< of BlockCotangent::parameters
     double coefficient;

@@ -39,11 +39,24 @@ std::vector<TactilePoint> list_points(const RectArray& a) {
 
 void add_to_points(TactileDescription& sensor, std::span<const double> change) {
   if (sensor.points.empty()) sensor.points = list_points(sensor.array);
-  const double* of_point = change.data();
+  const std::size_t expected = sensor.points.size() * kPointNumbers;
+  if (change.size() != expected)
+    throw InputError(sensor.source.prefix() + "tactile sensor '" + sensor.name + "': " + std::to_string(change.size()) +
+                     " numbers for its points; expected " + std::to_string(expected));
+  const ContactCoefficients& c = sensor.coefficients;
+  const double of_sensor[] = {c.kn, c.kt, c.mu, c.damping};
+  const char* const names[] = {"kn", "kt", "mu", "damping"};
+  const double* own = change.data();
   for (TactilePoint& p : sensor.points) {
-    for (std::size_t k = 0; k < 3; ++k) p.position[k] += of_point[k];
-    for (std::size_t k = 0; k < 4; ++k) p.factors[k] += of_point[3 + k];
-    of_point += kPointNumbers;
+    for (std::size_t k = 0; k < 3; ++k) p.position[k] += own[k];
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (own[3 + k] == 0) continue;
+      if (of_sensor[k] == 0)
+        throw InputError(sensor.source.prefix() + "tactile sensor '" + sensor.name + "': points of their own " + names[k] +
+                         "; expected a sensor whose " + names[k] + " is not 0");
+      p.factors[k] += own[3 + k] / of_sensor[k];
+    }
+    own += kPointNumbers;
   }
 }
 

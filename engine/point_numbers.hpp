@@ -19,11 +19,12 @@ int tactile_points(const Model& model);
 /// Of which these come before those of a sensor.
 int first_tactile_point(const Model& model, int sensor);
 
-/// The points of an array, row by row, with its axes: what a sensor is whose points are given one by one, field included.
+/// The points of an array, row by row, with its axes: given one by one they have the same field.
 std::vector<TactilePoint> list_points(const RectArray& array);
 
-/// Changes the points of a sensor; an array becomes a list. `change`: (points, kPointNumbers), [m] and parts of the sensor's
-/// coefficients (what is added to TactilePoint::factors).
+/// Adds to the own numbers of a sensor's points, (points, kPointNumbers), in their units; an array becomes a list, which has
+/// neither rows nor columns. Throws InputError for a change of another size, and for one of coefficients that the sensor has
+/// as 0: points have parts of the sensor's.
 void add_to_points(TactileDescription& sensor, std::span<const double> change);
 
 }  // namespace tangere

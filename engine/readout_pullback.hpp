@@ -10,7 +10,7 @@
 
 namespace tangere {
 
-/// Owns the scratch of one thread; allocates only when made. For each state: place(), then for each loss clear(), any number
+/// Owns the scratch of one thread; allocates when made, and for more tiles at once than ever before. For each state: place(), then for each loss clear(), any number
 /// of fields and variables, and finish(). Fields are computed anew in double; nothing is kept of how they were read.
 class ReadoutPullback {
  public:

@@ -117,8 +117,7 @@ Difference difference_of_number(const Setting& s, const Parameters& parameters, 
 /// sensor's size, coefficients of what they are.
 struct PointChange {
   int sensor, number;
-  std::vector<double> of_scene;  ///< (points, kPointNumbers) as add_to_points() takes it
-  std::vector<double> own;       ///< the same in the units of the points' own numbers
+  std::vector<double> own;  ///< (points, kPointNumbers)
 };
 
 double extent_of(const TactileDescription& sensor) {
@@ -138,24 +137,25 @@ std::vector<PointChange> point_changes(const Model& model, std::span<const doubl
       const std::vector<double> d = random_direction(points, seed, std::uint32_t(4 + changes.size()));
       const double size = number < 3 ? extent : 1, has = number < 3 ? 1 : coefficients[std::size_t(4 * s + number - 3)];
       if (has == 0) continue;
-      PointChange c{s, number, std::vector<double>(points * kPointNumbers), std::vector<double>(points * kPointNumbers)};
-      for (std::size_t i = 0; i < points; ++i) {
-        c.of_scene[i * kPointNumbers + std::size_t(number)] = size * d[i];
-        c.own[i * kPointNumbers + std::size_t(number)] = has * size * d[i];
-      }
+      PointChange c{s, number, std::vector<double>(points * kPointNumbers)};
+      for (std::size_t i = 0; i < points; ++i) c.own[i * kPointNumbers + std::size_t(number)] = has * size * d[i];
       changes.push_back(std::move(c));
     }
   }
   return changes;
 }
 
-Difference difference_of_points(const Setting& s, const PointChange& change) {
+/// `coefficients`: what this environment's sensors have, (sensors, 4); points have parts of them.
+Difference difference_of_points(const Setting& s, const PointChange& change, std::span<const double> coefficients) {
   std::vector<double> losses;
   for (const double e : sweep(1)) {
     Scene scene = s.start.model().scene();
-    std::vector<double> moved = change.of_scene;
+    std::vector<double> moved = change.own;
     for (double& x : moved) x *= e;
-    add_to_points(scene.sensors[std::size_t(change.sensor)], moved);
+    TactileDescription& sensor = scene.sensors[std::size_t(change.sensor)];
+    const double* has = &coefficients[std::size_t(4 * change.sensor)];
+    sensor.coefficients = {has[0], has[1], has[2], has[3]};
+    add_to_points(sensor, moved);
     losses.push_back(losses_of(s, Model(scene), {s.at}, s.varying)[0]);
   }
   return best_difference(losses, 1);
@@ -330,7 +330,7 @@ class Check {
     for (const PointChange& c : changes)
       gradient.push_back(std::inner_product(c.own.begin(), c.own.end(), all.begin() + first_tactile_point(model, c.sensor) * kPointNumbers, 0.0));
     constexpr const char* kNames[kPointNumbers] = {"x", "y", "z", "kn", "kt", "mu", "damping"};
-    add({"points", gradient, all_of(gradient.size()), [&](std::size_t k) { return difference_of_points(s_, changes[k]); },
+    add({"points", gradient, all_of(gradient.size()), [&](std::size_t k) { return difference_of_points(s_, changes[k], coefficients); },
          [&](std::size_t k) { return model.sensors()[std::size_t(changes[k].sensor)].name + " " + kNames[changes[k].number]; }},
         4, [&](const std::vector<double>& d) { return tangents_.along({}, {}, {}, {}, together(model, changes, d)); });
   }

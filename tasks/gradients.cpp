@@ -11,6 +11,7 @@
 #include <string>
 
 #include "engine/point_numbers.hpp"
+#include "kernels/lanes.hpp"
 #include "tasks/gradient_block.hpp"
 #include "tasks/task_order.hpp"
 
@@ -109,7 +110,8 @@ double gradient_bytes(const Model& model, int environments, const GradientOption
   const double results = double(o.steps) * model.nu() + 2.0 * model.nv() + numbers + double(point_count(model, o)) + 1;
   const Integrator scheme = o.stepper.integrator.value_or(model.integrator());
   const double tape = std::min(double(BlockTape::bytes(model, scheme, o.steps)), o.tape_bytes);
-  return 8 * results * environments * losses + o.threads * (tape + 2 * double(model.workspace_bytes()));
+  const double of_points = double(kernels::kBlock) * double(point_count(model, o)) * losses;  // every thread's own sums
+  return 8 * results * environments * losses + o.threads * (tape + 2 * double(model.workspace_bytes()) + 8 * of_points);
 }
 
 GradientSummary rollout_gradients(const Batch& start, const StepControls& controls, const GradientOptions& options,

@@ -263,7 +263,7 @@ void TaskGradientBlock::finish(std::int64_t to, TaskGradients& out) {
       out.by_q[e * nv + i] = c.q[i * kBlock + size(l)];
       out.by_v[e * nv + i] = c.v[i * kBlock + size(l)];
     }
-    if (options_.parameters) 
+    if (options_.parameters)
       parameters_.gradient(c, rollout_.batch(), l, std::span(out.by_parameter).subspan(e * numbers, numbers));
   }
 }

@@ -69,7 +69,6 @@ class Check {
     add({"numbers", r.gradient, r.given, [&](std::size_t k) { return difference_of_number(static_cast<int>(k)); },
          [&](std::size_t k) { return parameters_.infos()[k].name; }},
         3, [&](std::span<const double> d) {
-          std::fill(rows.begin(), rows.end(), 0.0);
           parameters_.spread(r.change(d), rollout_->batch(), 0, rows);
           return EpisodeDirection{{}, {}, {}, rows};
         });

@@ -139,6 +139,9 @@ TEST(Simulate, WritesGradientsOfTactilePoints) {
   const Outcome refused = run(folder, {"simulate", kSmall, "-o", "none.h5", "--point-gradients"});
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, testing::HasSubstr("--point-gradients without --gradients; expected both"));
+  const Outcome blind = run(folder, {"simulate", kSmall, "-o", "none.h5", "--steps", "5", "--gradients", "final", "--point-gradients"});
+  EXPECT_EQ(blind.exit_code, 2);
+  EXPECT_THAT(blind.err, testing::HasSubstr("--point-gradients with --gradients final; expected a loss that reads fields"));
 }
 
 TEST(Simulate, TapeMemoryChangesNoGradient) {

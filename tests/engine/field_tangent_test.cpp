@@ -100,9 +100,8 @@ TEST_P(AlongADirection, MatchesDualNumbersAndTheReverse) {
 Scene moved_points(Scene s, std::size_t number, const std::vector<double>& direction, double e) {
   TactileDescription& t = s.sensors[0];
   t.pressure_sign = 1;
-  const double of_sensor[] = {1, 1, 1, t.coefficients.kn, t.coefficients.kt, t.coefficients.mu, t.coefficients.damping};
   std::vector<double> change(direction.size() * kPointNumbers);
-  for (std::size_t i = 0; i < direction.size(); ++i) change[i * kPointNumbers + number] = e * direction[i] / of_sensor[number];
+  for (std::size_t i = 0; i < direction.size(); ++i) change[i * kPointNumbers + number] = e * direction[i];
   add_to_points(t, change);
   return s;
 }

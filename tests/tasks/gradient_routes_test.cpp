@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
 
 #include "engine/control.hpp"
 #include "engine/parameters.hpp"
@@ -50,6 +52,7 @@ std::vector<std::int64_t> lengths(LossKind loss) {
 TEST_P(EveryScene, ThreeRoutesAgreeOverAnyLength) {
   Scene scene = shipped(GetParam().scene);
   scene.integrator = GetParam().scheme;
+  std::map<std::string, std::size_t> compared;
   for (const std::int64_t steps : lengths(GetParam().loss)) {
     const GradientCheck c = check(scene, GetParam().loss, steps, steps > 100 ? 1 : 3);
     const double tolerance = steps > 100 ? 1e-5 : 1e-6;
@@ -58,9 +61,12 @@ TEST_P(EveryScene, ThreeRoutesAgreeOverAnyLength) {
       EXPECT_LE(i.tangent_error, tolerance) << i.name << ", " << steps << " steps";
       EXPECT_TRUE(i.norm > 0 || steps < 100) << i.name << ", " << steps << " steps";
     }
+    if (steps == 20 || steps == 100)
+      for (const CheckedInput& i : c.inputs) compared[i.name] += i.compared;
     // By the start of cap opening, whose motors have long since forgotten it, differences drown in the loss.
     EXPECT_TRUE(steps != 100 || c.entries() > 0) << c.kinks() << " kinks";
   }
+  for (const auto& [input, count] : compared) EXPECT_GT(count, 0U) << input;
 }
 
 std::vector<Routes> all_routes() {
