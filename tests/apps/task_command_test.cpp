@@ -166,7 +166,7 @@ TEST(Tasks, GradcheckChecksTheReturn) {
 /// A grasp that is lifted level pays 100, whatever acts on it a little.
 TEST(Tasks, GradcheckThatComparesNothingFails) {
   const Folder folder;
-  const Words words{"gradcheck", "stable_grasp", "--actions", "1"};
+  const Words words{"gradcheck", "stable_grasp", "--actions", "1", "--entries", "1"};
   const Outcome text = run(folder, words);
   EXPECT_EQ(text.exit_code, 1);
   EXPECT_THAT(text.err, HasSubstr("nothing could be compared with differences: no input acts on the return here"));
