@@ -3,13 +3,12 @@
 // say whose fault it is, messages that name the nearest word, and nothing half-done left behind.
 #include <gmock/gmock.h>
 
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <sstream>
 
 #include "tests/apps/program.hpp"
+#include "tests/files.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -69,8 +68,7 @@ TEST(Command, EveryBodyTypeIsInspectedSimulatedAndDrawn) {
 
 TEST(Command, ThePageNamesEveryOption) {
   const Folder folder;
-  std::ifstream file(TANGERE_SOURCE_DIR "/docs/command.md");
-  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  const std::string page = file_bytes(TANGERE_SOURCE_DIR "/docs/command.md");
   for (const std::string& name : kSubcommands) {
     const std::string help = run(folder, {name, "--help"}).out;
     const std::regex option("--[a-z-]+");

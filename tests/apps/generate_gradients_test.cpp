@@ -17,6 +17,7 @@
 #include "tasks/task_gradients.hpp"
 #include "tasks/task_list.hpp"
 #include "tests/apps/program.hpp"
+#include "tests/files.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -56,11 +57,6 @@ Array read(const h5::Id& file, int episode, const std::string& name) {
   a.values.resize(count);
   h5::read_box(dataset, h5::Dims(a.dims.size(), 0), a.dims, a.values.data());
   return a;
-}
-
-std::string bytes_of(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 TEST(GenerateGradients, OfATasksReturnAreThoseOfTheLibrary) {
@@ -159,11 +155,11 @@ TEST(GenerateGradients, AreTheSameBytesOnAnyNumberOfThreads) {
     generate(folder, words + Words{"-o", std::string("one_") + kind, "--threads", "1"});
     generate(folder, words + Words{"-o", std::string("three_") + kind, "--threads", "3"});
     for (const char* shard : {"shard-00000.h5", "shard-00001.h5"})
-      EXPECT_EQ(bytes_of(folder.path(std::string("one_") + kind + "/" + shard)), bytes_of(folder.path(std::string("three_") + kind + "/" + shard)));
+      EXPECT_EQ(file_bytes(folder.path(std::string("one_") + kind + "/" + shard)), file_bytes(folder.path(std::string("three_") + kind + "/" + shard)));
   }
   const Words words{"dummy", "--episodes", "40", "--gradients", "return", "--shards", "2", "--threads", "1"};
   generate(folder, words + Words{"-o", "tight", "--tape-memory", "2MB"});
-  EXPECT_EQ(bytes_of(folder.path("tight/shard-00001.h5")), bytes_of(folder.path("one_return/shard-00001.h5"))) << "from checkpoints";
+  EXPECT_EQ(file_bytes(folder.path("tight/shard-00001.h5")), file_bytes(folder.path("one_return/shard-00001.h5"))) << "from checkpoints";
   generate(folder, {"dummy", "--episodes", "40", "--shards", "2", "-o", "plain"});
   const h5::Id plain = h5::open_file(folder.path("plain/shard-00000.h5")), with = h5::open_file(folder.path("one_return/shard-00000.h5"));
   EXPECT_EQ(read(plain, 7, "obs/q").values, read(with, 7, "obs/q").values) << "derivatives change nothing";
@@ -181,7 +177,7 @@ TEST(GenerateGradients, AreCheckedAndCompared) {
   }
   const std::string shard = folder.path("set/shard-00000.h5");
   EXPECT_EQ(check_shard(shard).demos, 16);
-  std::string bytes = bytes_of(shard);
+  std::string bytes = file_bytes(shard);
   const double number = read(h5::open_file(shard), 4, "grad_actions").values[7];
   const std::size_t at = bytes.find(std::string(reinterpret_cast<const char*>(&number), sizeof number));
   ASSERT_NE(at, std::string::npos);
@@ -193,7 +189,7 @@ TEST(GenerateGradients, AreCheckedAndCompared) {
 /// What is no demo has no derivatives either.
 TEST(GenerateGradients, FailedEpisodesLeaveNone) {
   const Folder folder;
-  std::string text = bytes_of(kSmall);
+  std::string text = file_bytes(kSmall);
   const std::string step = "timestep=\"5e-3\"";
   folder.write("days.xml", text.replace(text.find(step), step.size(), "timestep=\"86400\""));
   for (const Words& kind : {Words{"jacobians"}, Words{"return", "--loss", "path"}}) {
@@ -224,7 +220,7 @@ TEST(GenerateGradients, AreTheSameBesideAnyObservations) {
       generate(folder, words + more + Words{"-o", set, "--threads", "1"});
       generate(folder, words + more + Words{"-o", set + "_3", "--threads", "3"});
       const std::string shard = folder.path(set + "/shard-00000.h5");
-      EXPECT_TRUE(bytes_of(shard) == bytes_of(folder.path(set + "_3/shard-00000.h5"))) << set;
+      EXPECT_TRUE(file_bytes(shard) == file_bytes(folder.path(set + "_3/shard-00000.h5"))) << set;
       EXPECT_EQ(run(folder, {"validate", set}).exit_code, 0) << set;
       EXPECT_EQ(run(folder, {"validate", set + "/robomimic.hdf5"}).exit_code, 0) << set;
       const h5::Id file = h5::open_file(shard);

@@ -4,11 +4,11 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "io/h5.hpp"
 #include "tests/apps/program.hpp"
+#include "tests/files.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -54,8 +54,7 @@ Array read_array(const Folder& folder, const std::string& name) {
 
 /// The small scene without its <control>.
 std::string without_control(const Folder& folder) {
-  std::ifstream file(kSmall);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::string text = file_bytes(kSmall);
   const std::size_t begin = text.find("<control>"), end = text.find("</control>");
   text.erase(begin, end + 10 - begin);
   return folder.write("free.xml", text);
@@ -164,8 +163,7 @@ TEST(Simulate, SaysWhatItDid) {
 
 TEST(Simulate, WritesEndEffectorsBesideTheBodies) {
   const Folder folder;
-  std::ifstream file(kSmall);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::string text = file_bytes(kSmall);
   const std::string marks =
       R"(<variable><endeffector name="mark" joint="pad_joint" pos="0.01 0 -0.005"/></variable>)";
   folder.write("marked.xml", text.insert(text.find("<sensor>"), marks));
@@ -391,8 +389,7 @@ TEST(Plot, DrawsWhatSimulateWrote) {
 
 TEST(Plot, ListsTheSensorsOfTheFile) {
   const Folder folder;
-  std::ifstream file(kSmall);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::string text = file_bytes(kSmall);
   const std::size_t at = text.find("<tactile name=\"pad\""), end = text.find("/>", at) + 2;
   std::string second = text.substr(at, end - at);
   second.replace(second.find("pad"), 3, "twin");

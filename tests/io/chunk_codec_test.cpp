@@ -6,13 +6,13 @@
 
 #include <algorithm>
 #include <fstream>
-#include <iterator>
 #include <random>
 
 #include "engine/error.hpp"
 #include "io/dataset_writer.hpp"
 #include "io/h5.hpp"
 #include "io/shard_check.hpp"
+#include "tests/files.hpp"
 #include "tests/io/synthetic_episodes.hpp"
 
 namespace tangere {
@@ -114,11 +114,6 @@ std::uint64_t sum_of(const std::string& shard) {
   return h5::read_numbers<std::uint64_t>(h5::open_file(shard), "content_sum").at(0);
 }
 
-std::string bytes(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 template <class T>
 void check_every_kind(bool single) {
   const Folder folder;
@@ -133,7 +128,7 @@ void check_every_kind(bool single) {
       if (sparse || l.compression != "none") {
         EXPECT_LT(std::filesystem::file_size(whole), std::filesystem::file_size(plain) * 2 / 3) << name;
       }
-      EXPECT_TRUE(bytes(write<T>(folder, name + "2", l, true)) == bytes(whole)) << name << " depends on pieces";
+      EXPECT_TRUE(file_bytes(write<T>(folder, name + "2", l, true)) == file_bytes(whole)) << name << " depends on pieces";
     }
 }
 
@@ -183,7 +178,7 @@ TEST(ChunkCodec, DamagedLz4IsAnErrorOrChangesNothing) {
   unsigned filters = 0;
   const h5::Id space(H5Dget_space(image.get()));
   ASSERT_GE(H5Dget_chunk_info(image.get(), space.get(), 0, nullptr, &filters, &address, &size), 0);
-  const std::string whole = bytes(shard);
+  const std::string whole = file_bytes(shard);
   std::mt19937 random(3);
   int found = 0;
   for (int trial = 0; trial < 100; ++trial) {

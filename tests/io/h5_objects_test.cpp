@@ -8,11 +8,11 @@
 #include <array>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 
 #include "io/h5.hpp"
 #include "io/h5_listing.hpp"
 #include "io/h5_trees.hpp"
+#include "tests/files.hpp"
 #include "tests/io/synthetic_run.hpp"
 
 namespace tangere {
@@ -49,10 +49,7 @@ class Extended {
   }
 
  private:
-  [[nodiscard]] std::string read() const {
-    std::ifstream file(path_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  [[nodiscard]] std::string read() const { return file_bytes(path_); }
   std::string path_;
   std::uint64_t base_ = 0;
   Bytes objects_;
