@@ -18,7 +18,6 @@ using nlohmann::json;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using Words = std::vector<std::string>;
 
 /// 40 episodes of four rows in three shards.
 class DatasetCommand : public testing::Test {

@@ -26,24 +26,10 @@ using nlohmann::json;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using Words = std::vector<std::string>;
-
-Words operator+(Words first, const Words& second) {
-  first.insert(first.end(), second.begin(), second.end());
-  return first;
-}
 
 const std::string kSmall = scene("rolling_ball_small.xml"), kBox = scene("box_pushing.xml");
 
-json generate(const Folder& folder, Words words) {
-  words.insert(words.begin(), {"generate"});
-  words.emplace_back("--json");
-  const Outcome outcome = run(folder, words);
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  const json answer = json::parse(outcome.out);
-  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
-  return answer;
-}
+json generate(const Folder& folder, const Words& words) { return run_json(folder, Words{"generate"} + words); }
 
 struct Array {
   h5::Dims dims;

@@ -3,6 +3,7 @@
 #include "tests/apps/program.hpp"
 
 #include <fcntl.h>
+#include <gmock/gmock.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -25,7 +26,6 @@ fs::path new_folder() {
     throw std::system_error(errno, std::generic_category(), "mkdtemp " + name);
   return name;
 }
-
 
 void redirect(const std::string& path, int descriptor) {
   const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOCTTY, 0600);
@@ -120,6 +120,17 @@ std::vector<std::string> undocumented_keys(const nlohmann::json& object) {
     for (std::string& deeper : undocumented_keys(value)) missing.push_back(std::move(deeper));
   }
   return missing;
+}
+
+nlohmann::json run_json(const Folder& folder, const Words& words, int exit_code) {
+  const Outcome outcome = run(folder, words + Words{"--json"});
+  const std::string what = testing::PrintToString(words);
+  EXPECT_EQ(outcome.exit_code, exit_code) << what << ": " << outcome.err;
+  nlohmann::json answer = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(answer.at("exit_code"), exit_code) << what;
+  EXPECT_EQ(answer.at("command"), words.at(0)) << what;
+  EXPECT_THAT(undocumented_keys(answer), testing::IsEmpty()) << what;
+  return answer;
 }
 
 std::string scene(const std::string& name) { return TANGERE_SOURCE_DIR "/scenes/" + name; }

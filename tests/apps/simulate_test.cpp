@@ -18,20 +18,11 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
-using Words = std::vector<std::string>;
 
 /// Runs `tangere simulate SCENE --output out.h5 --json MORE` and returns its object.
 json simulate(const Folder& folder, const std::string& scene_file, const Words& more,
               int exit_code = 0) {
-  Words words{"simulate", scene_file, "--output", "out.h5", "--json"};
-  words.insert(words.end(), more.begin(), more.end());
-  const Outcome outcome = run(folder, words);
-  EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
-  const json answer = json::parse(outcome.out);
-  EXPECT_EQ(answer.at("exit_code"), exit_code);
-  EXPECT_EQ(answer.at("command"), "simulate");
-  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
-  return answer;
+  return run_json(folder, Words{"simulate", scene_file, "--output", "out.h5"} + more, exit_code);
 }
 
 const std::string kSmall = scene("rolling_ball_small.xml");
