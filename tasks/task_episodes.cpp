@@ -124,17 +124,20 @@ class EpisodeRun {
   TaskEpisodeSummary run() {
     using tbb::filter_mode;
     const auto next = [this](tbb::flow_control& flow) {
+      TaskOrder::arrive();
       const TaskOrder::Task task_of_thread(order_, &next_);
       Block<T>* const block = next_block();
       if (block == nullptr) flow.stop();
       return block;
     };
     const auto play = [this](Block<T>* block) {
+      TaskOrder::arrive();
       const TaskOrder::Task task_of_thread(order_, block);
       play_block(*block);
       return block;
     };
     const auto write = [this](Block<T>* block) {
+      TaskOrder::arrive();
       const TaskOrder::Task task_of_thread(order_, &next_), of_block(order_, block);
       write_block(*block);
       const std::lock_guard lock(free_mutex_);
@@ -145,9 +148,9 @@ class EpisodeRun {
       const TaskOrder& order;
       ~AtEnd() { order.end(); }
     } const at_end{order_};
-    tbb::parallel_pipeline(free_.size(), tbb::make_filter<void, Block<T>*>(filter_mode::serial_in_order, next) &
-                                             tbb::make_filter<Block<T>*, Block<T>*>(filter_mode::parallel, play) &
-                                             tbb::make_filter<Block<T>*, void>(filter_mode::serial_in_order, write));
+    tbb::parallel_pipeline(free_.size(), tbb::make_filter<void, Block<T>*>(filter_mode::serial_in_order, ByReference{&next}) &
+                                             tbb::make_filter<Block<T>*, Block<T>*>(filter_mode::parallel, ByReference{&play}) &
+                                             tbb::make_filter<Block<T>*, void>(filter_mode::serial_in_order, ByReference{&write}));
     summary_.run.stopped = stopped_;
     summary_.run.simulation_seconds = playing_.seconds();
     summary_.run.encoding_seconds = preparing_.seconds();

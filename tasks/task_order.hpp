@@ -4,6 +4,8 @@
 // what spawned it, a graph's message arrives after it was sent, waiting ends after all tasks), so real races are still found.
 #pragma once
 
+#include <utility>
+
 #if defined(__SANITIZE_THREAD__)
 #include <sanitizer/tsan_interface.h>
 #endif
@@ -15,10 +17,12 @@ template <class Function>
 struct ByReference {
   const Function* function;
   template <class Argument>
-  void operator()(Argument& argument) const {
-    (*function)(argument);
+  auto operator()(Argument&& argument) const {
+    return (*function)(std::forward<Argument>(argument));
   }
 };
+template <class Function>
+ByReference(const Function*) -> ByReference<Function>;
 
 /// What this thread did until now comes before what others do after ordered_after() of the same address.
 inline void ordered_before([[maybe_unused]] const void* address) {

@@ -20,7 +20,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
-using Words = std::vector<std::string>;
 
 const std::string kSmall = scene("rolling_ball_small.xml");
 
@@ -33,16 +32,9 @@ Words bench(const Words& more, const std::string& scene_file = kSmall) {
   return words;
 }
 
-json bench_json(const Folder& folder, Words more, int exit_code = 0,
+json bench_json(const Folder& folder, const Words& more, int exit_code = 0,
                 const std::string& scene_file = kSmall) {
-  more.emplace_back("--json");
-  const Outcome outcome = run(folder, bench(more, scene_file));
-  EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
-  const json answer = json::parse(outcome.out);
-  EXPECT_EQ(answer.at("exit_code"), exit_code);
-  EXPECT_EQ(answer.at("command"), "bench");
-  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
-  return answer;
+  return run_json(folder, bench(more, scene_file), exit_code);
 }
 
 TEST(Bench, SaysWhatItMeasured) {

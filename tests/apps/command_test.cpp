@@ -3,13 +3,12 @@
 // say whose fault it is, messages that name the nearest word, and nothing half-done left behind.
 #include <gmock/gmock.h>
 
-#include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <sstream>
 
 #include "tests/apps/program.hpp"
+#include "tests/files.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -18,14 +17,8 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
-using Words = std::vector<std::string>;
 
 const Words kSubcommands{"inspect", "simulate", "generate", "validate", "info", "merge", "export", "plot", "bench", "gradcheck"};
-
-Words operator+(Words first, const Words& second) {
-  first.insert(first.end(), second.begin(), second.end());
-  return first;
-}
 
 /// `tangere simulate small.xml --output out.h5` and more.
 Words simulate(const Words& more = {}) {
@@ -69,8 +62,7 @@ TEST(Command, EveryBodyTypeIsInspectedSimulatedAndDrawn) {
 
 TEST(Command, ThePageNamesEveryOption) {
   const Folder folder;
-  std::ifstream file(TANGERE_SOURCE_DIR "/docs/command.md");
-  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  const std::string page = file_bytes(TANGERE_SOURCE_DIR "/docs/command.md");
   for (const std::string& name : kSubcommands) {
     const std::string help = run(folder, {name, "--help"}).out;
     const std::regex option("--[a-z-]+");

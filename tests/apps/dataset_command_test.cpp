@@ -22,7 +22,6 @@ using nlohmann::json;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using Words = std::vector<std::string>;
 
 /// Largest memory of any program that this one has started [bytes].
 double peak_memory() {

@@ -15,18 +15,11 @@ using nlohmann::json;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using Words = std::vector<std::string>;
 
 const std::string kShard = "/shard-00000.h5";
 
-json generate(const Folder& folder, const std::string& what, const std::string& set, Words more) {
-  Words words{"generate", what, "--output", set, "--json", "--seed", "5"};
-  words.insert(words.end(), more.begin(), more.end());
-  const Outcome outcome = run(folder, words);
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  const json answer = json::parse(outcome.out);
-  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
-  return answer;
+json generate(const Folder& folder, const std::string& what, const std::string& set, const Words& more) {
+  return run_json(folder, Words{"generate", what, "--output", set, "--seed", "5"} + more);
 }
 
 std::uint64_t sum(const Folder& folder, const std::string& set) {
@@ -59,13 +52,9 @@ TEST(GenerateCompress, KeepsEveryNumberInBothPrecisionsOnAnyThreads) {
     const Folder folder;
     const std::string small = scene("rolling_ball_small.xml");
     const Words size{"--episodes", "20", "--steps", "200", "--every", "5", "--precision", precision};
-    const auto with = [&](Words more) {
-      more.insert(more.end(), size.begin(), size.end());
-      return more;
-    };
-    generate(folder, small, "none", with({}));
-    const json answer = generate(folder, small, "one", with({"--compress", "deflate", "--threads", "1"}));
-    generate(folder, small, "three", with({"--compress", "deflate", "--threads", "3"}));
+    generate(folder, small, "none", size);
+    const json answer = generate(folder, small, "one", size + Words{"--compress", "deflate", "--threads", "1"});
+    generate(folder, small, "three", size + Words{"--compress", "deflate", "--threads", "3"});
     EXPECT_EQ(answer.at("compress"), "deflate");
     EXPECT_THAT(answer.at("limited_by").get<std::string>(), testing::AnyOf("simulation", "compression", "writing"));
     EXPECT_EQ(sum(folder, "one"), sum(folder, "none"));
@@ -91,9 +80,8 @@ TEST(GenerateCompress, ChunksAreOfAFewRowsAndSmallRowsStayAsTheyAre) {
 
 TEST(GenerateCompress, EpisodesOfATaskShorterThanAChunkAreOneChunk) {
   const Folder folder;
-  const Words size{"--episodes", "40"};
-  generate(folder, "box_pushing", "none", size);
-  generate(folder, "box_pushing", "deflate", {"--episodes", "40", "--compress", "deflate"});
+  generate(folder, "box_pushing", "none", {"--episodes", "18"});
+  generate(folder, "box_pushing", "deflate", {"--episodes", "18", "--compress", "deflate"});
   EXPECT_EQ(sum(folder, "none"), sum(folder, "deflate"));
   EXPECT_EQ(run(folder, {"validate", "deflate"}).exit_code, 0);
 }
@@ -101,20 +89,16 @@ TEST(GenerateCompress, EpisodesOfATaskShorterThanAChunkAreOneChunk) {
 TEST(GenerateCompress, EveryKindHoldsTheSameNumbers) {
   const Folder folder;
   const Words size{"--episodes", "20", "--steps", "100", "--every", "5"};
-  const auto with = [&](Words more) {
-    more.insert(more.end(), size.begin(), size.end());
-    return more;
-  };
   const std::string small = scene("rolling_ball_small.xml");
-  generate(folder, small, "plain", with({}));
+  generate(folder, small, "plain", size);
   for (const char* compress : {"none", "deflate", "lz4"}) {
     const std::string set = std::string("sparse-") + compress;
-    const json answer = generate(folder, small, set, with({"--compress", compress, "--tactile", "sparse", "--threads", "1"}));
+    const json answer = generate(folder, small, set, size + Words{"--compress", compress, "--tactile", "sparse", "--threads", "1"});
     EXPECT_EQ(answer.at("tactile"), "sparse");
     EXPECT_EQ(sum(folder, set), sum(folder, "plain"));
     EXPECT_EQ(run(folder, {"validate", set}).exit_code, 0);
     EXPECT_THAT(layout_of(folder, set, "data/demo_1/obs/pad").chunk, ElementsAre(testing::_, 16, 16, 3));
-    generate(folder, small, set + "2", with({"--compress", compress, "--tactile", "sparse", "--threads", "3"}));
+    generate(folder, small, set + "2", size + Words{"--compress", compress, "--tactile", "sparse", "--threads", "3"});
     EXPECT_TRUE(folder.read(set + kShard) == folder.read(set + "2" + kShard)) << compress;
     EXPECT_LT(std::filesystem::file_size(folder.path(set + kShard)), std::filesystem::file_size(folder.path("plain" + kShard)));
   }

@@ -22,7 +22,6 @@ using std::chrono::steady_clock;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using Words = std::vector<std::string>;
 
 const std::string kFirst = "set/shard-00000.h5";
 

@@ -3,6 +3,7 @@
 #include "tests/apps/program.hpp"
 
 #include <fcntl.h>
+#include <gmock/gmock.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -10,9 +11,10 @@
 #include <cerrno>
 #include <csignal>
 #include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <system_error>
+
+#include "tests/files.hpp"
 
 namespace tangere::apps {
 namespace fs = std::filesystem;
@@ -23,12 +25,6 @@ fs::path new_folder() {
   if (mkdtemp(name.data()) == nullptr)
     throw std::system_error(errno, std::generic_category(), "mkdtemp " + name);
   return name;
-}
-
-std::string read_file(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error("cannot read " + path.string());
-  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 void redirect(const std::string& path, int descriptor) {
@@ -73,7 +69,7 @@ std::string Folder::write(const std::string& name, const std::string& text) cons
   return path(name);
 }
 
-std::string Folder::read(const std::string& name) const { return read_file(root_ / name); }
+std::string Folder::read(const std::string& name) const { return file_bytes(root_ / name); }
 
 Program::Program(const Folder& folder, std::vector<std::string> arguments,
                  const std::vector<std::string>& environment, const Streams& streams)
@@ -104,8 +100,8 @@ Outcome Program::wait() {
   Outcome outcome;
   if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
   if (WIFSIGNALED(status)) outcome.signal = WTERMSIG(status);
-  if (fs::exists(scratch_ / "out")) outcome.out = read_file(scratch_ / "out");
-  if (fs::exists(scratch_ / "err")) outcome.err = read_file(scratch_ / "err");
+  if (fs::exists(scratch_ / "out")) outcome.out = file_bytes(scratch_ / "out");
+  if (fs::exists(scratch_ / "err")) outcome.err = file_bytes(scratch_ / "err");
   return outcome;
 }
 
@@ -115,7 +111,7 @@ Outcome run(const Folder& folder, std::vector<std::string> arguments,
 }
 
 std::vector<std::string> undocumented_keys(const nlohmann::json& object) {
-  static const std::string page = read_file(TANGERE_SOURCE_DIR "/docs/command.md");
+  static const std::string page = file_bytes(TANGERE_SOURCE_DIR "/docs/command.md");
   std::vector<std::string> missing;
   for (const auto& [key, value] : object.items()) {
     if (object.is_object() && page.find("`" + key + "`") == std::string::npos)
@@ -124,6 +120,17 @@ std::vector<std::string> undocumented_keys(const nlohmann::json& object) {
     for (std::string& deeper : undocumented_keys(value)) missing.push_back(std::move(deeper));
   }
   return missing;
+}
+
+nlohmann::json run_json(const Folder& folder, const Words& words, int exit_code) {
+  const Outcome outcome = run(folder, words + Words{"--json"});
+  const std::string what = testing::PrintToString(words);
+  EXPECT_EQ(outcome.exit_code, exit_code) << what << ": " << outcome.err;
+  nlohmann::json answer = nlohmann::json::parse(outcome.out);
+  EXPECT_EQ(answer.at("exit_code"), exit_code) << what;
+  EXPECT_EQ(answer.at("command"), words.at(0)) << what;
+  EXPECT_THAT(undocumented_keys(answer), testing::IsEmpty()) << what;
+  return answer;
 }
 
 std::string scene(const std::string& name) { return TANGERE_SOURCE_DIR "/scenes/" + name; }

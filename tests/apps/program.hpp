@@ -12,6 +12,12 @@
 
 namespace tangere::apps {
 
+using Words = std::vector<std::string>;
+inline Words operator+(Words first, const Words& second) {
+  first.insert(first.end(), second.begin(), second.end());
+  return first;
+}
+
 /// A folder for one test, deleted at its end. `path("a.h5")` is a file in it.
 class Folder {
  public:
@@ -65,6 +71,9 @@ Outcome run(const Folder& folder, std::vector<std::string> arguments,
 
 /// Names of an object's keys that docs/command.md does not mention, nested ones included.
 std::vector<std::string> undocumented_keys(const nlohmann::json& object);
+
+/// `tangere WORDS --json`: the object that it prints, which names the subcommand, the exit code and documented keys alone.
+nlohmann::json run_json(const Folder& folder, const Words& words, int exit_code = 0);
 
 /// A scene of the project.
 std::string scene(const std::string& name);

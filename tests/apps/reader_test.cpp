@@ -4,10 +4,9 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 
 #include "tests/apps/program.hpp"
+#include "tests/files.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -20,8 +19,7 @@ std::string python() {
 }
 
 std::vector<std::string> readers() {
-  std::ifstream file(TANGERE_SOURCE_DIR "/docs/datasets.md");
-  std::string page{std::istreambuf_iterator<char>(file), {}};
+  std::string page = file_bytes(TANGERE_SOURCE_DIR "/docs/datasets.md");
   const std::string begin = "```python\n", end = "```";
   std::vector<std::string> blocks;
   for (std::size_t at = page.find(begin); at != std::string::npos; at = page.find(begin, at)) {

@@ -4,11 +4,11 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "io/h5.hpp"
 #include "tests/apps/program.hpp"
+#include "tests/files.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -18,20 +18,11 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
-using Words = std::vector<std::string>;
 
 /// Runs `tangere simulate SCENE --output out.h5 --json MORE` and returns its object.
 json simulate(const Folder& folder, const std::string& scene_file, const Words& more,
               int exit_code = 0) {
-  Words words{"simulate", scene_file, "--output", "out.h5", "--json"};
-  words.insert(words.end(), more.begin(), more.end());
-  const Outcome outcome = run(folder, words);
-  EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
-  const json answer = json::parse(outcome.out);
-  EXPECT_EQ(answer.at("exit_code"), exit_code);
-  EXPECT_EQ(answer.at("command"), "simulate");
-  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
-  return answer;
+  return run_json(folder, Words{"simulate", scene_file, "--output", "out.h5"} + more, exit_code);
 }
 
 const std::string kSmall = scene("rolling_ball_small.xml");
@@ -54,8 +45,7 @@ Array read_array(const Folder& folder, const std::string& name) {
 
 /// The small scene without its <control>.
 std::string without_control(const Folder& folder) {
-  std::ifstream file(kSmall);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::string text = file_bytes(kSmall);
   const std::size_t begin = text.find("<control>"), end = text.find("</control>");
   text.erase(begin, end + 10 - begin);
   return folder.write("free.xml", text);
@@ -197,8 +187,7 @@ TEST(Simulate, SaysWhatItDid) {
 
 TEST(Simulate, WritesEndEffectorsBesideTheBodies) {
   const Folder folder;
-  std::ifstream file(kSmall);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::string text = file_bytes(kSmall);
   const std::string marks =
       R"(<variable><endeffector name="mark" joint="pad_joint" pos="0.01 0 -0.005"/></variable>)";
   folder.write("marked.xml", text.insert(text.find("<sensor>"), marks));
@@ -424,8 +413,7 @@ TEST(Plot, DrawsWhatSimulateWrote) {
 
 TEST(Plot, ListsTheSensorsOfTheFile) {
   const Folder folder;
-  std::ifstream file(kSmall);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::string text = file_bytes(kSmall);
   const std::size_t at = text.find("<tactile name=\"pad\""), end = text.find("/>", at) + 2;
   std::string second = text.substr(at, end - at);
   second.replace(second.find("pad"), 3, "twin");

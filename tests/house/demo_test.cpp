@@ -4,8 +4,6 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <regex>
 #include <string>
@@ -13,16 +11,14 @@
 
 #include "io/h5.hpp"
 #include "io/shard_check.hpp"
+#include "tests/files.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
 namespace h5 = tangere::h5;
 
-std::string demo_text() {
-  std::ifstream file(TANGERE_SOURCE_DIR "/run-demo");
-  return {std::istreambuf_iterator<char>(file), {}};
-}
+std::string demo_text() { return tangere::file_bytes(TANGERE_SOURCE_DIR "/run-demo"); }
 
 /// Dataset → shape, from lines such as "  data/demo_0/obs/q   (35, 10)   m".
 std::map<std::string, h5::Dims> promised_shapes() {

@@ -20,7 +20,7 @@ machine() {
   cp "$project"/run-demo "$project"/run-tests "$project"/CMakePresets.json "$home/project"
   cp "$project"/cmake/shell.sh "$project"/cmake/packages.txt "$home/project/cmake"
   local tool
-  for tool in bash sed grep tr sort head awk env nproc dirname readlink cat mkdir ls ctest sleep; do
+  for tool in bash sed grep tr sort head awk env nproc dirname readlink cat mkdir rm ls ctest sleep; do
     ln -s "$(type -P "$tool")" "$bin/$tool"
   done
   fake id 'echo "${FAKE_UID:-0}"'
@@ -58,6 +58,7 @@ expect() {
 passes() { [ "$status" -eq 0 ]; }
 fails() { [ "$status" -ne 0 ]; }
 prints() { grep -qF -- "$1" <<<"$output"; }
+not_prints() { ! prints "$1"; }
 called() { grep -qF -- "$1" "$log"; }
 not_called() { ! called "$1"; }
 
@@ -148,17 +149,22 @@ test_in release true
 test_in asan true
 run run-tests
 expect "passes" passes
-expect "ends with ctest's closing lines" grep -q "^Total Test time" <<<"$(tail -n 1 <<<"$output")"
+expect "ends with ctest's closing lines and what was run" grep -q "^Total Test time" <<<"$(tail -n 2 <<<"$output" | head -n 1)"
+ends_with() { grep -qF -- "$1" <<<"$(tail -n 4 <<<"$output")"; }
+expect "says what was run" ends_with "Every test of build/release passed"
 expect "counts" prints "100% tests passed, 0 tests failed out of 1"
 test_in asan false
 run run-tests
 expect "fails when a sanitizer finds something" fails
-expect "says where" prints "failed under the sanitizers"
+expect "runs the others all the same" prints "100% tests passed, 0 tests failed out of 1"
+expect "names it at the end" ends_with "asan: one"
 test_in asan true
 test_in release false
 run run-tests
 expect "fails with a test" fails
 expect "shows it" prints "0% tests passed, 1 tests failed out of 1"
+expect "names it at the end" ends_with "release: one"
+expect "names no older one" not_prints "asan: one"
 : >"$home/project/build/release/CTestTestfile.cmake"
 run run-tests
 expect "fails when no test ran" fails

@@ -9,6 +9,7 @@
 #include "io/dataset_writer.hpp"
 #include "io/h5.hpp"
 #include "io/shard_check.hpp"
+#include "tests/files.hpp"
 #include "tests/io/synthetic_episodes.hpp"
 
 namespace tangere {
@@ -23,11 +24,6 @@ using ::testing::HasSubstr;
 using testing::write_block;
 using testing::write_piece;
 
-std::string bytes(const std::string& path) {
-  std::ifstream f(path, std::ios::binary);
-  EXPECT_TRUE(f) << path;
-  return {std::istreambuf_iterator<char>(f), {}};
-}
 
 /// The only shard of a data set of 20 episodes, of which 2 and 17 failed.
 std::string one_shard(const Folder& folder, const DatasetLayout& l) {
@@ -206,7 +202,7 @@ TEST(Dataset, BytesDoNotDependOnTheOrderOfBlocksNorOnPieces) {
     writer.finish(48, {});
     write_block(writer, l, 16);
   }
-  EXPECT_TRUE(bytes(ascending / "set/shard-00000.h5") == bytes(mixed / "set/shard-00000.h5"));
+  EXPECT_TRUE(file_bytes(ascending / "set/shard-00000.h5") == file_bytes(mixed / "set/shard-00000.h5"));
 }
 
 TEST(Dataset, LongOnesAreSeveralShards) {
@@ -231,7 +227,7 @@ TEST(Dataset, LongOnesAreSeveralShards) {
     const ShardContent content = check_shard(one / shard(s));
     EXPECT_EQ(content.first_episode, 32 * s);
     EXPECT_EQ(content.demos, s < 2 ? 32 : 6);
-    EXPECT_TRUE(bytes(one / shard(s)) == bytes(other / shard(s))) << shard(s);
+    EXPECT_TRUE(file_bytes(one / shard(s)) == file_bytes(other / shard(s))) << shard(s);
   }
   expect_demo<float>(h5::open_file(one / shard(2)), 69);
 }
@@ -361,7 +357,7 @@ TEST(Dataset, AShardThatTheDiskChangedDoesNotGetItsName) {
     std::vector<float> row;
     for (std::size_t k = 0; k < 36; ++k) row.push_back(dataset_number<float>(5, 3, 1, k));
     const std::string part = folder / "set/shard-00000.h5.part";
-    const std::size_t at = bytes(part).find(
+    const std::size_t at = file_bytes(part).find(
         std::string(reinterpret_cast<const char*>(row.data()), sizeof(float) * 36));
     ASSERT_NE(at, std::string::npos) << "not on the disk yet: nothing is tested";
     std::fstream(part, std::ios::in | std::ios::out | std::ios::binary)
@@ -387,7 +383,7 @@ TEST(Dataset, AShardThatAppearsMeanwhileIsLeftAsItIs) {
     std::ofstream(folder / "set/shard-00000.h5") << "somebody's";
     EXPECT_THROW(writer.finish(0, {}), IoError);
   }
-  EXPECT_EQ(bytes(folder / "set/shard-00000.h5"), "somebody's");
+  EXPECT_EQ(file_bytes(folder / "set/shard-00000.h5"), "somebody's");
   EXPECT_FALSE(std::filesystem::exists(folder / "set/shard-00000.h5.part"));
 }
 

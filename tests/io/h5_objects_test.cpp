@@ -10,7 +10,6 @@
 #include <cstring>
 #include <fstream>
 #include <functional>
-#include <iterator>
 #include <numeric>
 
 #include "engine/error.hpp"
@@ -20,6 +19,7 @@
 #include "io/h5_listing.hpp"
 #include "io/h5_trees.hpp"
 #include "io/h5_views.hpp"
+#include "tests/files.hpp"
 #include "tests/io/synthetic_run.hpp"
 
 namespace tangere {
@@ -56,10 +56,7 @@ class Extended {
   }
 
  private:
-  [[nodiscard]] std::string read() const {
-    std::ifstream file(path_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  [[nodiscard]] std::string read() const { return file_bytes(path_); }
   std::string path_;
   std::uint64_t base_ = 0;
   Bytes objects_;

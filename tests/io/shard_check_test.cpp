@@ -11,6 +11,7 @@
 
 #include "io/dataset_writer.hpp"
 #include "io/trajectory_file.hpp"
+#include "tests/files.hpp"
 #include "tests/io/synthetic_episodes.hpp"
 
 namespace tangere {
@@ -41,10 +42,7 @@ class ShardCheck : public ::testing::Test {
     return "";
   }
 
-  [[nodiscard]] std::string read() const {
-    std::ifstream f(path_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(f), {}};
-  }
+  [[nodiscard]] std::string read() const { return file_bytes(path_); }
   void write(const std::string& bytes) const {
     std::ofstream(path_, std::ios::binary | std::ios::trunc) << bytes;
   }

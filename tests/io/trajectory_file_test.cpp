@@ -11,6 +11,7 @@
 
 #include "io/h5.hpp"
 #include "io/trajectory_reader.hpp"
+#include "tests/files.hpp"
 #include "tests/io/synthetic_run.hpp"
 
 namespace tangere {
@@ -134,11 +135,7 @@ TEST(TrajectoryFile, ReaderGivesBackTheFields) {
 
 TEST(TrajectoryFile, TheSameRunGivesTheSameBytes) {
   const Folder a, b;
-  const auto bytes = [](const std::string& path) {
-    std::ifstream f(path, std::ios::binary);
-    return std::string((std::istreambuf_iterator<char>(f)), std::istreambuf_iterator<char>());
-  };
-  EXPECT_EQ(bytes(write_file(a)), bytes(write_file(b)));
+  EXPECT_EQ(file_bytes(write_file(a)), file_bytes(write_file(b)));
 }
 
 TEST(TrajectoryFile, UncommittedRunsLeaveNothing) {

@@ -2,22 +2,17 @@
 // 2 000 mutated scenes: each is read and compiled, or refused with a message. Nothing else may happen.
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <iterator>
 #include <random>
 
 #include "engine/batch.hpp"
 #include "io/scene_reader.hpp"
+#include "tests/files.hpp"
 #include "tests/scene/scene_text.hpp"
 
 namespace tangere {
 namespace {
 
-std::string file_text(const std::string& path) {
-  std::ifstream file(path);
-  EXPECT_TRUE(file) << path;
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
 
 class Mutator {
  public:
@@ -66,10 +61,10 @@ TEST(SceneFuzz, TwoThousandMutantsAreReadOrRefused) {
       "type=\"capsule\" length=\"0.03\" radius=\"0.02\" general_contact_resolution=\"3 5\"",
       testing::with("type=\"cuboid\" size=\"0.05 0.05 0.01\"", "type=\"cylinder\" length=\"0.01\" radius=\"0.05\""));
   const std::string sources[] = {testing::kScene, rods,
-                                 file_text(std::string(TANGERE_TEST_DATA) + "/scenes/two_balls.xml"),
-                                 file_text(std::string(TANGERE_TEST_DATA) + "/scenes/published_dialect_pad.xml"),
-                                 file_text(std::string(TANGERE_TEST_DATA) + "/scenes/every_joint.xml"),
-                                 file_text(std::string(TANGERE_SOURCE_DIR) + "/scenes/rolling_ball_small.xml")};
+                                 file_bytes(std::string(TANGERE_TEST_DATA) + "/scenes/two_balls.xml"),
+                                 file_bytes(std::string(TANGERE_TEST_DATA) + "/scenes/published_dialect_pad.xml"),
+                                 file_bytes(std::string(TANGERE_TEST_DATA) + "/scenes/every_joint.xml"),
+                                 file_bytes(std::string(TANGERE_SOURCE_DIR) + "/scenes/rolling_ball_small.xml")};
   int read = 0, refused = 0;
   for (unsigned seed = 0; seed < 2000; ++seed) {
     const std::string text = Mutator(seed)(sources[seed % std::size(sources)]);
