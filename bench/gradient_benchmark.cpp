@@ -8,7 +8,11 @@
 #include <vector>
 
 #include "engine/control.hpp"
+#include "engine/field_tangent.hpp"
+#include "engine/parameters.hpp"
+#include "engine/point_numbers.hpp"
 #include "engine/readout.hpp"
+#include "engine/readout_pullback.hpp"
 #include "engine/tape.hpp"
 #include "io/scene_reader.hpp"
 #include "kernels/isa.hpp"
@@ -144,6 +148,59 @@ TANGERE_GRADIENTS(stable_grasp, "stable_grasp", false, 1, false);
 TANGERE_GRADIENTS(stable_grasp_tactile, "stable_grasp", true, 1, false);
 TANGERE_GRADIENTS(cap_opening, "cap_opening", false, 1, false);
 TANGERE_GRADIENTS(insertion, "insertion", false, 1, false);
+
+/// Nanoseconds of processor time per point of the touched tiles, best of several.
+template <class F>
+double per_point(std::size_t tiles, const F& f) {
+  constexpr int kRepeats = 200;
+  double best = 1e300;
+  for (int round = 0; round < 5; ++round) {
+    const double begin = cpu_seconds();
+    for (int i = 0; i < kRepeats; ++i) f();
+    best = std::min(best, cpu_seconds() - begin);
+  }
+  return 1e9 * best / kRepeats / (64 * double(tiles));
+}
+
+/// The field of the rolling ball in the middle of its run: read, along a direction of the state, in reverse; in reverse by the
+/// scene's numbers too, and by every point's own.
+void BM_FieldDerivatives(benchmark::State& state) {
+  const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene);
+  Batch batch(model, 16, 1);
+  const ControlProgram program(model, model.timestep(), 1);
+  Stepper stepper(model);
+  std::vector<double> u(16 * std::size_t(model.nu()));
+  for (std::int64_t t = 0; t < program.steps() / 2; ++t) {
+    for (int e = 0; e < 16; ++e) program.evaluate(t, e, std::span(u).subspan(std::size_t(e * model.nu()), std::size_t(model.nu())));
+    stepper.step(batch, u);
+  }
+  Readout readout(model);
+  CompactFrame<double> frame(model, 0);
+  readout.read(batch, 3, frame);
+  const std::vector<double> direction(std::size_t(model.nv()), 0.1), cotangents(frame.values().size(), 1.0);
+  std::vector<double> change(frame.values().size());
+  AlignedVector<double> rows(16 * std::size_t(parameter_rows(model.compiled())));
+  std::vector<double> points(std::size_t(tactile_points(model) * kPointNumbers));
+  FieldTangent tangent(model);
+  tangent.place(batch, 0);
+  ReadoutPullback pullback(model);
+  pullback.place(batch, 0);
+  pullback.clear();
+  const std::size_t tiles = frame.tiles().size();
+  for (auto _ : state) {
+    state.counters["read"] = per_point(tiles, [&] { readout.read(batch, 3, frame); });
+    state.counters["tangent"] = per_point(tiles, [&] {
+      tangent.move(3, direction, direction);
+      tangent.field(0, frame.tiles(), change);
+    });
+    state.counters["reverse"] = per_point(tiles, [&] { pullback.field(3, 0, frame.tiles(), cotangents); });
+    state.counters["numbers"] = per_point(tiles, [&] { pullback.field(3, 0, frame.tiles(), cotangents, rows); });
+    state.counters["points"] = per_point(tiles, [&] { pullback.field(3, 0, frame.tiles(), cotangents, rows, points); });
+  }
+  state.counters["tiles"] = double(tiles);
+  state.SetLabel(kernels::active_isa_name());
+}
+BENCHMARK(BM_FieldDerivatives)->Unit(benchmark::kMillisecond)->Iterations(1);
 
 }  // namespace
 }  // namespace tangere

@@ -3,6 +3,7 @@
 #include "engine/parameters.hpp"
 
 #include <algorithm>
+#include <optional>
 
 #include "engine/compiled_model.hpp"
 #include "kernels/kernel_table.hpp"
@@ -116,15 +117,17 @@ Parameters::Masses Parameters::masses_by(const Entry& entry, const Shape& shape,
 Parameters::Masses Parameters::masses_by(const Entry& entry, const Batch& batch, int environment) const {
   const Scene& scene = model_.scene();
   const BodyDescription& d = scene.links[std::size_t(entry.index)].body;
-  Shape shape = d.shape;
+  std::optional<Shape> sized;  // a mesh, whose size cannot vary, is not copied
   double density = d.density;
   for (std::size_t k = 0; k < scene.randomizations.size(); ++k) {  // the last one holds
     const RandomizationDescription& r = scene.randomizations[k];
     if (r.name != d.name) continue;
     if (r.target == RandomTarget::density) density = batch.randomized_value(environment, static_cast<int>(k));
-    if (r.target == RandomTarget::size) *size_number(shape, r.index) = batch.randomized_value(environment, static_cast<int>(k));
+    if (r.target != RandomTarget::size) continue;
+    if (!sized) sized = d.shape;
+    *size_number(*sized, r.index) = batch.randomized_value(environment, static_cast<int>(k));
   }
-  return masses_by(entry, shape, density);
+  return masses_by(entry, sized ? *sized : d.shape, density);
 }
 
 Parameters::Entry Parameters::of_dofs(Place place, int joint, int field, int first, int end) const {
