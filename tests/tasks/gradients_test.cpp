@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "engine/point_numbers.hpp"
 #include "engine/control.hpp"
 #include "engine/tape.hpp"
 #include "io/scene_reader.hpp"
@@ -76,6 +77,18 @@ TEST(Gradients, TapesThatAreTooSmallAreRefused) {
 }
 
 /// Again and again with batches of any size; not with another model's.
+/// By points: a result of each environment, and the sums of sixteen on every thread.
+TEST(Gradients, MemoryOfPointsIsCounted) {
+  const Model model(shipped("rolling_ball_small"));
+  GradientOptions options;
+  options.steps = 10;
+  options.threads = 3;
+  const double without = gradient_bytes(model, 40, options, 2);
+  options.points = true;
+  const double numbers = double(tactile_points(model)) * kPointNumbers;
+  EXPECT_DOUBLE_EQ(gradient_bytes(model, 40, options, 2) - without, 8 * numbers * 2 * (40 + 3 * 16));
+}
+
 TEST(Gradients, RolloutsCanBeUsedAgain) {
   const Model model(shipped("rolling_ball_small"));
   const ControlProgram program(model, model.timestep(), 5);
