@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "engine/point_numbers.hpp"
 #include "engine/control.hpp"
+#include "engine/point_numbers.hpp"
 #include "engine/tape.hpp"
 #include "io/scene_reader.hpp"
 #include "tasks/gradient_check.hpp"
