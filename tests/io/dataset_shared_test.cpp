@@ -2,6 +2,8 @@
 // Several writers of one folder: the last of them says that it is complete, of one run, and none keeps another out.
 #include <gmock/gmock.h>
 
+#include "engine/error.hpp"
+#include "io/dataset_files.hpp"
 #include "io/dataset_writer.hpp"
 #include "io/folder_lock.hpp"
 #include "tests/io/synthetic_episodes.hpp"
@@ -12,6 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::dataset_layout;
 using testing::Folder;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::write_block;
@@ -82,6 +85,17 @@ TEST(DatasetShared, IsNotCompleteWithAFileThatIsNoneOfItsShards) {
   DatasetWriter again({folder / "set", ExistingShards::keep}, l);
   EXPECT_FALSE(again.complete());
   EXPECT_THAT(again.obstacle(), HasSubstr("shard-00007.h5' is none of the 3 shards of this run"));
+  // Whoever reads or merges the folder says so as well.
+  const DatasetFiles files = find_dataset(folder / "set");
+  EXPECT_THAT(files.missing, IsEmpty());
+  EXPECT_THAT(files.surplus, ElementsAre(folder / "set/shard-00007.h5"));
+  EXPECT_THAT(examine_dataset(files).problems, ElementsAre(HasSubstr("shard-00007.h5: none of the shards that are counted")));
+  try {
+    check_complete(files);
+    FAIL() << "one is too many";
+  } catch (const IoError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("shard-00007.h5' is none of the 3 shards that '"));
+  }
 }
 
 }  // namespace
