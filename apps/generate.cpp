@@ -158,12 +158,12 @@ std::string limit_of(const EpisodeSummary& summary, const Job& job) {
 int report(const GenerateOptions& options, const Console& console, const Job& job, const JobResult& done,
            DatasetWriter& output) {
   const EpisodeSummary& summary = done.summary;
-  const Merged merged = merge_if_complete(options, output);
   const EpisodeOptions& run = job.run;
   const std::vector<std::string> shards = output.shards();
   const ExitCode code = summary.failures.empty() && output.kept_failed() == 0 ? kDone : kSomeFailed;
   std::uintmax_t bytes = 0;
   for (const std::string& shard : shards) bytes += std::filesystem::file_size(shard);
+  const Merged merged = merge_if_complete(options, output);  // from now on others may replace the shards
   const double rate =
       summary.seconds > 0 ? static_cast<double>(summary.environment_steps) / summary.seconds : 0;
   list_failures(console, "episode", failures_of(summary), "--json and the shards name all");

@@ -115,7 +115,13 @@ DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& la
 
 Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output) {
   Merged merged;
-  if (options.no_merge || !output.complete()) return merged;
+  if (options.no_merge) return merged;
+  if (!output.complete()) {
+    if (output.obstacle().empty()) return merged;
+    merged.keys["not_merged"] = output.obstacle();
+    merged.line = fmt::format("\nnot merged: {}", output.obstacle());
+    return merged;
+  }
   MergeOptions replace;
   replace.overwrite = true;  // links of an earlier run lead to other shards, or to as many
   const MergeResult result = merge_dataset(find_dataset(options.output), replace);

@@ -53,9 +53,10 @@ double tape_bytes(const GenerateOptions& options, int threads);
 /// Shards that this process is to make, and what becomes of those that are there. Says so where it is not alone.
 DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& layout, const Console& console);
 
-/// What a complete data set is shown as: paths for the JSON object, null where it is not complete or not wanted.
+/// What a complete data set is shown as: paths for the JSON object, null where it is not complete or not wanted; and why
+/// not, where all shards seem to be there.
 struct Merged {
-  Json keys{{"merged", nullptr}, {"minari_id", nullptr}};
+  Json keys{{"merged", nullptr}, {"minari_id", nullptr}, {"not_merged", nullptr}};
   std::string line;
 };
 Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output);

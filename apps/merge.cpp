@@ -2,14 +2,25 @@
 // tangere merge: one file for a folder of shards, and the view that Minari reads.
 #include <fmt/format.h>
 
+#include <filesystem>
+#include <optional>
+
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "engine/error.hpp"
 #include "io/dataset_merge.hpp"
+#include "io/folder_lock.hpp"
 
 namespace tangere::apps {
 namespace {
 
 int merge(const std::string& path, const MergeOptions& options, const Console& console) {
+  // Alone: whoever replaces shards shares the folder, and would mix them in while links are made.
+  std::optional<FolderLock> lock;
+  if (std::filesystem::is_directory(path)) lock.emplace(path);
+  if (lock && !lock->take(FolderLock::Kind::alone))
+    throw IoError(fmt::format("cannot merge '{}': another process writes shards there or merges them; expected a folder that "
+                              "nobody writes into, merge when it has ended", path));
   const MergeResult result = merge_dataset(find_dataset(path), options);
   console.print(fmt::format("wrote {} ({} bytes, {}): {} demos, {} to train on and {} to validate; failed episodes: {}",
                             result.file, result.bytes, options.copy ? "a copy of all numbers" : "links to the shards",

@@ -30,31 +30,32 @@ bool is_shard(std::string_view name) {
   return number.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
+/// By number: names of more digits come later.
+bool before(const std::string& a, const std::string& b) { return std::pair(a.size(), a) < std::pair(b.size(), b); }
+
 std::vector<std::string> shards_in(const std::string& folder) {
   std::vector<std::string> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder))
     if (is_shard(entry.path().filename().string())) files.push_back(entry.path().string());
-  std::sort(files.begin(), files.end(), [](const std::string& a, const std::string& b) {
-    return std::pair(a.size(), a) < std::pair(b.size(), b);
-  });
+  std::sort(files.begin(), files.end(), before);
   return files;
 }
 
-/// Shards that the settings count and the folder does not have.
-std::vector<std::string> missing_of(const DatasetFiles& dataset) {
-  std::vector<std::string> missing;
+/// Compares the files with the shards that the settings count.
+void count_shards(DatasetFiles& dataset) {
   const std::string text = value_of(dataset.settings, "dataset_shards");
   std::int64_t count = 0;
   std::from_chars(text.data(), text.data() + text.size(), count);
+  auto file = dataset.files.begin();
   for (std::int64_t shard = 0; shard < std::min(count, kMostShards); ++shard) {
     const std::string path = (fs::path(dataset.folder) / fmt::format("shard-{:05}.h5", shard)).string();
-    if (!std::binary_search(dataset.files.begin(), dataset.files.end(), path,
-                            [](const std::string& a, const std::string& b) {
-                              return std::pair(a.size(), a) < std::pair(b.size(), b);
-                            }))
-      missing.push_back(path);
+    for (; file != dataset.files.end() && before(*file, path); ++file) dataset.surplus.push_back(*file);
+    if (file != dataset.files.end() && *file == path)
+      ++file;
+    else
+      dataset.missing.push_back(path);
   }
-  return missing;
+  dataset.surplus.insert(dataset.surplus.end(), file, dataset.files.end());
 }
 
 /// Settings of a file, and what differs from those of the data set; damage counts as a difference.
@@ -130,7 +131,7 @@ DatasetFiles find_dataset(const std::string& path) {
     }
   }
   if (dataset.settings.empty()) throw IoError(fmt::format("'{}' is no data set: {}", path, reason));
-  if (!dataset.folder.empty()) dataset.missing = missing_of(dataset);
+  if (!dataset.folder.empty()) count_shards(dataset);
   return dataset;
 }
 
@@ -146,11 +147,15 @@ void check_complete(const DatasetFiles& dataset) {
       throw IoError(fmt::format("'{}' is not of the same run as '{}': {}", file, dataset.files.front(),
                                 fmt::join(lines, "; ")));
   }
+  if (!dataset.surplus.empty())
+    throw IoError(fmt::format("'{}' is none of the {} shards that '{}' counts; expected no others, remove it", dataset.surplus.front(),
+                              value_of(dataset.settings, "dataset_shards"), dataset.files.front()));
 }
 
 DatasetReport examine_dataset(const DatasetFiles& dataset) {
   DatasetReport report;
   for (const std::string& file : dataset.missing) report.problems.push_back(file + ": missing");
+  for (const std::string& file : dataset.surplus) report.problems.push_back(file + ": none of the shards that are counted");
   for (const std::string& file : dataset.files) {
     for (const std::string& line : differences_of(file, dataset.settings))
       report.problems.push_back(fmt::format("{}: {}", file, line));

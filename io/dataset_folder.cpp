@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// A lock on the folder itself: nothing is left behind, and a killed process loses it.
+// What is removed is removed under the lock: what shows shards as one before the shards.
 #include "io/dataset_folder.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <set>
 
 #include "engine/error.hpp"
 #include "io/part_file.hpp"
@@ -20,6 +19,8 @@ namespace tangere {
 namespace fs = std::filesystem;
 
 namespace {
+
+constexpr std::string_view kPart = ".part";
 
 [[noreturn]] void fail(const std::string& operation, const std::string& path, int error) {
   throw IoError(fmt::format("cannot {} '{}': {}", operation, path, std::strerror(error)));
@@ -37,12 +38,8 @@ bool is_shard(const std::string& name, const std::string& suffix) {
 
 }  // namespace
 
-DatasetFolder::Descriptor::~Descriptor() {
-  if (number >= 0) close(number);
-}
-
-DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool shared)
-    : path_(std::move(path)), existing_(existing), shared_(shared) {
+DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool shared, FolderPatience patience)
+    : path_(std::move(path)), existing_(existing), shared_(shared), patience_(std::move(patience)) {
   std::error_code error;
   created_ = fs::create_directory(path_, error);
   if (error && error != std::errc::file_exists)
@@ -51,13 +48,10 @@ DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool sha
     throw IoError(fmt::format("'{}' exists and is no folder; expected a folder for shards", path_));
   if (access(path_.c_str(), W_OK | X_OK) != 0) fail("write into", path_, errno);
   hold();
-  if (shared_) return;
-  if (existing == ExistingShards::refuse && !shards().empty())
+  if (!shared_ && existing == ExistingShards::refuse && !shards().empty())
     throw IoError(fmt::format(
         "'{}' has shards already; give --overwrite to replace them, or --resume to keep them and make the rest", path_));
-  // Taken over and dropped: a .part that is being written by somebody else is an error.
-  for (const std::string& part : files_ending(".h5.part"))
-    const PartFile stale(part.substr(0, part.size() - std::strlen(".part")), true);
+  clean();
 }
 
 DatasetFolder::~DatasetFolder() {
@@ -66,17 +60,36 @@ DatasetFolder::~DatasetFolder() {
 }
 
 void DatasetFolder::hold() {
-  descriptor_.number = open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor_.number < 0) fail("open", path_, errno);
-  // File systems without locks: the .part of each shard still is locked where that is possible.
-  if (flock(descriptor_.number, (shared_ ? LOCK_SH : LOCK_EX) | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+  lock_.emplace(path_);
+  if (shared_ ? lock_->take(FolderLock::Kind::shared, patience_.to_share) : lock_->take(FolderLock::Kind::alone)) return;
   throw IoError(
-      fmt::format("cannot write into '{}': another process is writing shards there", path_));
+      fmt::format("cannot write into '{}': another process is writing shards there{}; start again when it has ended", path_,
+                  shared_ ? " and does not share the folder, or merges them" : ""));
+}
+
+void DatasetFolder::let_go() {
+  if (shared_) lock_->let_go();
 }
 
 bool DatasetFolder::hold_alone() {
-  if (!shared_) return true;
-  return flock(descriptor_.number, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;  // as in hold()
+  return !shared_ || lock_->take(FolderLock::Kind::alone, patience_.to_be_alone);
+}
+
+void DatasetFolder::clean() {
+  // Taken over and dropped: a .part that is being written by somebody else is an error.
+  const auto remove = [](const std::string& part) {
+    const PartFile stale(part.substr(0, part.size() - kPart.size()), true);
+  };
+  if (!shared_)
+    for (const std::string& part : files_ending(fmt::format(".h5{}", kPart))) remove(part);
+  // Nobody merges while this process holds the folder: the merge was killed, and at most another process cleans up after it.
+  for (const std::string& part : merged_files(std::string(kPart))) {
+    try {
+      remove(part);
+    } catch (const IoError&) {
+      if (!shared_) throw;
+    }
+  }
 }
 
 std::vector<std::string> DatasetFolder::files_ending(const std::string& suffix) const {
@@ -87,13 +100,14 @@ std::vector<std::string> DatasetFolder::files_ending(const std::string& suffix) 
   return files;
 }
 
-/// As io/dataset_merge.hpp and io/minari_view.hpp name them.
-std::vector<std::string> DatasetFolder::merged_files() const {
+/// As io/dataset_merge.hpp and io/minari_view.hpp name them, those that are there; robomimic's last.
+std::vector<std::string> DatasetFolder::merged_files(const std::string& suffix) const {
   std::vector<std::string> files;
   std::error_code none_there;
   for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(path_) / "minari" / "tangere", none_there))
-    files.push_back((entry.path() / "data" / "main_data.hdf5").string());
+    for (const char* name : {"metadata.json", "main_data.hdf5"}) files.push_back((entry.path() / "data" / name).string());
   files.push_back((fs::path(path_) / "robomimic.hdf5").string());
+  for (std::string& file : files) file += suffix;
   std::erase_if(files, [](const std::string& file) { return !fs::is_regular_file(file); });
   return files;
 }
@@ -110,13 +124,18 @@ double DatasetFolder::free_bytes() const {
   return bytes;
 }
 
-void DatasetFolder::remove_old_shards() {
-  if (existing_ != ExistingShards::replace || shared_) return;
+void DatasetFolder::remove_old_shards(std::int64_t count) {
+  if (existing_ != ExistingShards::replace) return;
   std::vector<std::string> files = shards();
+  if (shared_) {
+    std::set<std::string> ours;
+    for (std::int64_t shard = 0; shard < count; ++shard) ours.insert(shard_path(shard));
+    std::erase_if(files, [&](const std::string& file) { return ours.contains(file); });
+  }
   for (const std::string& merged : merged_files()) files.push_back(merged);
   std::reverse(files.begin(), files.end());
   for (const std::string& file : files)
-    if (unlink(file.c_str()) != 0) fail("remove", file, errno);
+    if (unlink(file.c_str()) != 0 && errno != ENOENT) fail("remove", file, errno);  // gone: others that share it do the same
 }
 
 }  // namespace tangere

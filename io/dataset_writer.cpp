@@ -43,6 +43,7 @@ struct DatasetWriter::Impl {
   std::map<std::pair<std::int64_t, std::int64_t>, PreparedPiece> prepared;  // by episode and row
   std::int64_t kept = 0, kept_failed = 0;
   bool started = false;
+  std::string obstacle;
 
   Impl(const DatasetOutput& o, const DatasetLayout& l)
       : layout((l.check(), l)), output(o), folder(o.folder, o.existing, o.only.has_value()),
@@ -106,6 +107,33 @@ struct DatasetWriter::Impl {
     complete.insert(shard);
   }
 
+  /// Of this data set or of another one that has as many.
+  [[nodiscard]] bool all_there() const {
+    const std::vector<std::string> files = folder.shards();
+    if (std::ssize(files) < layout.shard_count()) return false;
+    const std::set<std::string> there(files.begin(), files.end());
+    for (std::int64_t shard = 0; shard < layout.shard_count(); ++shard)
+      if (!there.contains(folder.shard_path(shard))) return false;
+    return true;
+  }
+
+  /// What is wrong with the first shard that is not of this one, which others may be about to replace; empty if there is none.
+  [[nodiscard]] std::string of_another_run() const {
+    const std::vector<Setting> here = settings_of(layout);
+    std::vector<std::string> files = folder.shards();
+    for (const std::string& file : files) {
+      try {
+        const std::vector<std::string> lines = differences(read_settings(h5::open_file(file)), here);
+        if (!lines.empty()) return fmt::format("'{}' is of another run: {}", file, fmt::join(lines, "; "));
+      } catch (const IoError& error) {
+        return error.what();
+      }
+    }
+    if (std::ssize(files) == layout.shard_count()) return {};
+    for (std::int64_t shard = 0; shard < layout.shard_count(); ++shard) std::erase(files, folder.shard_path(shard));
+    return fmt::format("'{}' is none of the {} shards of this run", files.front(), layout.shard_count());
+  }
+
   void check_space(double episodes) const {
     if (has_chunks(layout)) return;  // nobody knows before
     const double needed = layout.episode_bytes() * episodes, available = folder.free_bytes();
@@ -118,7 +146,7 @@ struct DatasetWriter::Impl {
     const std::int64_t shard = layout.shard_of(episode);
     const auto found = open.find(shard);
     if (found != open.end()) return found->second;
-    if (!started) folder.remove_old_shards();
+    if (!started) folder.remove_old_shards(layout.shard_count());
     started = true;
     const bool replace = output.only && output.existing == ExistingShards::replace;
     return open.try_emplace(shard, folder.shard_path(shard), layout, format, layout.shard_episodes(shard), replace,
@@ -162,9 +190,23 @@ void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpi
 }
 
 bool DatasetWriter::complete() {
-  // Held first: the last of several to let go sees the shards of all.
-  return impl_->folder.hold_alone() && std::ssize(impl_->folder.shards()) == impl_->layout.shard_count();
+  impl_->folder.let_go();
+  // Let go of first: whoever looks last sees the shards of all, and none of those who looked before is in its way.
+  if (!impl_->all_there()) return false;
+  if (!impl_->folder.hold_alone()) {
+    impl_->obstacle = fmt::format("other processes hold '{0}'; the last of them that makes shards merges, or 'tangere merge {0}'",
+                                  impl_->output.folder);
+    return false;
+  }
+  if (impl_->all_there()) {
+    impl_->obstacle = impl_->of_another_run();
+    if (impl_->obstacle.empty()) return true;
+  }
+  impl_->folder.let_go();
+  return false;
 }
+
+const std::string& DatasetWriter::obstacle() const { return impl_->obstacle; }
 
 std::vector<std::string> DatasetWriter::shards() const {
   std::vector<std::string> paths;

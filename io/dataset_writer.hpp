@@ -43,9 +43,11 @@ class DatasetWriter : public EpisodeSink {
 
   /// Paths of the complete shards, kept ones among them, in ascending order.
   [[nodiscard]] std::vector<std::string> shards() const;
-  /// Whether the data set is complete and no other process writes into its folder: of several that end at the same time, at
-  /// least one is told so. Nothing may be written afterwards.
+  /// Whether the data set is complete and no other process writes into its folder, nor can from now on: of several that end
+  /// at the same time, at least one is told so. Nothing may be written afterwards; where it is not complete, others may.
   [[nodiscard]] bool complete();
+  /// Why complete() said no although as many shards as are wanted are there; else empty.
+  [[nodiscard]] const std::string& obstacle() const;
 
  private:
   struct Impl;

@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <fstream>
+#include <functional>
 #include <memory>
+#include <optional>
 
 #include "engine/error.hpp"
 #include "io/part_file.hpp"
@@ -75,7 +77,7 @@ TEST(DatasetFolder, RemovesOldShardsAndNothingElse) {
                            "shard-1x.h5", "my-shard-00000.h5", "shard-00000.h5.bak", "notes.txt"})
     touch(place / "set/" + name);
   DatasetFolder folder(place / "set", ExistingShards::replace);
-  folder.remove_old_shards();
+  folder.remove_old_shards(1);
   EXPECT_THAT(names(place / "set"), ElementsAre("my-shard-00000.h5", "notes.txt", "shard-.h5",
                                                 "shard-00000.h5.bak", "shard-1x.h5"));
 }
@@ -110,6 +112,80 @@ TEST(DatasetFolder, IsHeldByOneAtATime) {
         << "the second must not remove the first one's folder";
   }
   EXPECT_EQ(complaint(place / "set"), "");
+}
+
+/// Tries and what is done between them, in place of waiting.
+LockPatience tries(int count, std::function<void()> between) { return {count, std::move(between)}; }
+
+TEST(DatasetFolder, IsSharedOnceTheOneThatMergesHasEnded) {
+  const Folder place;
+  fs::create_directory(place / "set");
+  std::optional<FolderLock> merging(place / "set");
+  ASSERT_TRUE(merging->take(FolderLock::Kind::alone));
+  int pauses = 0;
+  const auto share = [&](std::function<void()> between) {
+    const DatasetFolder folder(place / "set", ExistingShards::keep, true, {tries(3, std::move(between)), {}});
+  };
+  try {
+    share([&] { ++pauses; });
+    FAIL() << "it is held";
+  } catch (const IoError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("/set': another process is writing shards there and does not share the folder"));
+  }
+  EXPECT_EQ(pauses, 2);
+  EXPECT_NO_THROW(share([&] { merging.reset(); }));
+}
+
+TEST(DatasetFolder, IsHeldAloneOnceOthersHaveLetGo) {
+  const Folder place;
+  std::optional<DatasetFolder> other;
+  int pauses = 0;
+  DatasetFolder waits(place / "set", ExistingShards::keep, true, {{}, tries(4, [&] {
+                                                                    if (++pauses == 5) other->let_go();
+                                                                  })});
+  other.emplace(place / "set", ExistingShards::keep, true);
+  EXPECT_FALSE(waits.hold_alone());
+  EXPECT_EQ(pauses, 3);
+  EXPECT_TRUE(waits.hold_alone()) << "in its third try the other one has let go";
+  EXPECT_EQ(pauses, 5);
+  EXPECT_FALSE(other->hold_alone());
+  // Of those that failed none keeps anything.
+  waits.let_go();
+  EXPECT_TRUE(other->hold_alone());
+}
+
+TEST(DatasetFolder, CleansWhatAKilledMergeLeft) {
+  for (const bool shared : {false, true}) {
+    const Folder place;
+    const std::string data = place / "set/minari/tangere/x-v0/data";
+    fs::create_directories(data);
+    for (const std::string& part : {place / "set/robomimic.hdf5.part", data + "/main_data.hdf5.part", data + "/metadata.json.part",
+                                    place / "set/shard-00003.h5.part"})
+      touch(part);
+    touch(place / "set/robomimic.hdf5");
+    { const DatasetFolder folder(place / "set", ExistingShards::keep, shared); }
+    EXPECT_TRUE(fs::is_empty(data));
+    EXPECT_TRUE(fs::exists(place / "set/robomimic.hdf5"));
+    EXPECT_FALSE(fs::exists(place / "set/robomimic.hdf5.part"));
+    EXPECT_EQ(fs::exists(place / "set/shard-00003.h5.part"), shared) << "another process may be writing it";
+    if (!shared) continue;
+    const PartFile cleaned_by_another(place / "set/robomimic.hdf5", true);
+    EXPECT_NO_THROW(DatasetFolder(place / "set", ExistingShards::keep, true));
+    EXPECT_TRUE(fs::exists(place / "set/robomimic.hdf5.part"));
+  }
+}
+
+TEST(DatasetFolder, SharedLosesWhatIsNoneOfItsShardsAndWhatShowsThemAsOne) {
+  const Folder place;
+  fs::create_directories(place / "set/minari/tangere/x-v0/data");
+  for (const char* name : {"shard-00000.h5", "shard-00002.h5", "shard-00003.h5", "shard-000001.h5", "shard-99999999999999999999.h5",
+                           "robomimic.hdf5", "minari/tangere/x-v0/data/main_data.hdf5", "notes.txt"})
+    touch(place / "set/" + name);
+  DatasetFolder(place / "set", ExistingShards::keep, true).remove_old_shards(3);
+  EXPECT_THAT(names(place / "set"), ::testing::SizeIs(8)) << "they are to be kept";
+  DatasetFolder(place / "set", ExistingShards::replace, true).remove_old_shards(3);
+  EXPECT_THAT(names(place / "set"), ElementsAre("minari", "notes.txt", "shard-00000.h5", "shard-00002.h5"));
+  EXPECT_TRUE(fs::is_empty(place / "set/minari/tangere/x-v0/data"));
 }
 
 TEST(DatasetFolder, ThatIsNoneIsNamed) {
