@@ -320,6 +320,7 @@ void add_texts(Bytes& out, std::span<const std::string_view> texts) {
   constexpr std::uint8_t kVersion = 1;
   constexpr std::size_t kHead = 16, kLeast = 4096;
   if (texts.empty()) return;
+  if (texts.size() > UINT16_MAX) throw std::logic_error("a list of more than 65535 texts in a file");
   Bytes objects;
   std::uint16_t index = 0;
   for (const std::string_view text : texts) {

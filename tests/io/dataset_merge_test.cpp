@@ -78,5 +78,34 @@ TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
     }
 }
 
+/// 20 episodes in two shards, of a sensor with this name.
+DatasetFiles write_named(const Folder& folder, const std::string& sensor) {
+  DatasetLayout l = dataset_layout(20);
+  l.shards = 2;
+  l.sensors[0].name = sensor;
+  DatasetWriter writer({folder / "set"}, l);
+  write_block(writer, l, 0);
+  write_block(writer, l, 16);
+  return find_dataset(folder / "set");
+}
+
+/// HDF5 takes the sources of virtual datasets for patterns.
+TEST(DatasetMerge, ShowsSensorsWhosePercentSignsAreNoPattern) {
+  for (const std::string sensor : {"p%c", "p%%c", "%b", "100%"})
+    for (const bool copy : {false, true}) {
+      const Folder folder;
+      const MergeResult result = merge_dataset(write_named(folder, sensor), {copy, false});
+      EXPECT_THAT(examine_shard(result.file).problems, IsEmpty()) << sensor;
+      {
+        const h5::Id merged = h5::open_file(result.file);
+        EXPECT_EQ(row(merged, "data/demo_17/next_obs/" + sensor, 2), row(merged, "data/demo_17/final_obs/" + sensor, 0)) << sensor;
+      }
+      const h5::Id view = h5::open_file(result.minari + "/data/main_data.hdf5");
+      for (hsize_t j = 0; j < 4; ++j)
+        EXPECT_EQ(row(view, "episode_17/observations/" + sensor, j)[5],
+                  tangere::testing::dataset_number<double>(17, 3, static_cast<std::int64_t>(j), 5));
+    }
+}
+
 }  // namespace
 }  // namespace tangere
