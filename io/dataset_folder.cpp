@@ -92,7 +92,8 @@ std::vector<std::string> DatasetFolder::merged_files() const {
   std::vector<std::string> files;
   std::error_code none_there;
   for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(path_) / "minari" / "tangere", none_there))
-    files.push_back((entry.path() / "data" / "main_data.hdf5").string());
+    for (const char* name : {"main_data.hdf5", "metadata.json"})  // the last is removed first: without it there is no data set
+      files.push_back((entry.path() / "data" / name).string());
   files.push_back((fs::path(path_) / "robomimic.hdf5").string());
   std::erase_if(files, [](const std::string& file) { return !fs::is_regular_file(file); });
   return files;
@@ -117,6 +118,13 @@ void DatasetFolder::remove_old_shards() {
   std::reverse(files.begin(), files.end());
   for (const std::string& file : files)
     if (unlink(file.c_str()) != 0) fail("remove", file, errno);
+  const fs::path views = fs::path(path_) / "minari" / "tangere";
+  std::vector<fs::path> emptied;
+  std::error_code none_there;
+  for (const fs::directory_entry& entry : fs::directory_iterator(views, none_there))
+    emptied.insert(emptied.end(), {entry.path() / "data", entry.path()});
+  emptied.insert(emptied.end(), {views, views.parent_path()});
+  for (const fs::path& folder : emptied) rmdir(folder.c_str());  // refused when there is something in it
 }
 
 }  // namespace tangere

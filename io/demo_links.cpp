@@ -132,6 +132,22 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
   return facts;
 }
 
+void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFacts& facts) {
+  const auto check = [](const h5::Id& group, const DemoArray& array, std::int64_t rows) {
+    const h5::Id dataset = h5::open_dataset(group, array.name);
+    if (!std::ranges::equal(h5::dimensions(dataset), dims_of(static_cast<std::uint64_t>(rows), array)) || type_of(dataset) != array.type)
+      throw IoError(fmt::format("{} is not of {} rows, of the shape and type of the first demo", array.name, rows));
+  };
+  for (const std::string& name : members.names)
+    if (name != "obs" && name != "final_obs" && name != members.actions.name) h5::open_dataset(demo, name);
+  check(demo, members.actions, facts.rows);
+  const h5::Id obs = h5::open_group(demo, "obs"), last = h5::open_group(demo, "final_obs");
+  for (const DemoArray& array : members.observations) {
+    check(obs, array, facts.rows);
+    check(last, array, 1);
+  }
+}
+
 std::vector<h5::FileMember> add_demo_links(Bytes& out, std::uint64_t base,
                                            const DemoMembers& members, std::string_view file,
                                            std::span<const LinkedDemo> demos) {

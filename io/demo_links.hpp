@@ -33,6 +33,8 @@ struct DemoMembers {
 DemoMembers members_of(const h5::Id& demo);
 /// Throws IoError.
 DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members);
+/// Opens every member, without its numbers. Throws IoError where one is missing, damaged, or of another shape or type.
+void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFacts& facts);
 
 struct LinkedDemo {
   std::int64_t number = 0;

@@ -120,6 +120,12 @@ TEST(H5Objects, ADatasetSharesTextsThatTheLibraryReadsAndCopies) {
   }
 }
 
+TEST(H5Objects, AListHasAsManyTextsAsItCanNumber) {
+  h5::Bytes out;
+  EXPECT_NO_THROW(h5::add_texts(out, std::vector<std::string_view>(65535, "x")));
+  EXPECT_THROW(h5::add_texts(out, std::vector<std::string_view>(65536, "x")), std::logic_error);
+}
+
 TEST(H5Objects, EveryTypeIsTheLibrarysOwn) {
   const Folder folder;
   const h5::Id boolean(H5Tenum_create(H5T_STD_I8LE));
