@@ -59,6 +59,7 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
   command_ = h5::read_text(h5::open_group(shard, "/"), "command");
   const std::string task = h5::read_text(scene, "task");
   id_ = fmt::format("tangere/{}-v0", dataset_name(task.starts_with("none") ? h5::read_text(scene, "name") : task));
+  seed_ = h5::read_numbers<std::uint64_t>(scene, "seed").at(0);
   if (members.of_task) {
     low_ = bound(h5::read_numbers<double>(scene, "action_low").at(0));
     high_ = bound(h5::read_numbers<double>(scene, "action_high").at(0));
@@ -74,7 +75,7 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
 void MinariView::add(std::string_view file, std::span<const LinkedDemo> demos) {
   h5::Bytes out;
   for (const h5::FileMember& episode :
-       add_minari_episodes(out, file_->here(), members_, fmt::format("{}{}", kToFolder, file), demos, count_))
+       add_minari_episodes(out, file_->here(), members_, fmt::format("{}{}", kToFolder, file), demos, count_, seed_))
     episodes_.push_back(episode);
   file_->append(out);
   count_ += std::ssize(demos);

@@ -35,6 +35,7 @@ class MinariView {
   std::optional<GrownFile> file_;
   std::vector<h5::FileMember> episodes_;
   std::int64_t count_ = 0, steps_ = 0;
+  std::uint64_t seed_ = 0;
 };
 
 }  // namespace tangere
