@@ -22,6 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kBatch = 16;       // demos that are laid out together
+// Descriptions that were used are forgotten in shards as they are by default. In larger ones, or in copying, the library would take
+// longer for each the more there are.
+constexpr std::int64_t kFewEpisodes = 4096;
 constexpr std::size_t kValidShare = 10;  // one demo in ten is kept for validation
 
 /// SplitMix64: which demos are for validation looks random and is the same for everybody.
@@ -77,6 +80,7 @@ class Merger {
       h5::write_scalar<std::int64_t>(file_.file(), name, number(name));
     h5::write_scalar<std::int64_t>(file_.file(), "first_episode", 0);
     h5::write_scalar<std::int64_t>(file_.file(), "episodes", number("dataset_episodes"));
+    few_each_ = number("dataset_episodes") <= kFewEpisodes * std::ssize(dataset_.files);
     env_args_ = h5::read_text(h5::open_group(from, "data"), "env_args");
     h5::copy_group(from, "scene", file_.file(), "scene");
   }
@@ -93,7 +97,7 @@ class Merger {
 
   void add(const std::string& shard) {
     sample_shard(shard);
-    const h5::Id from = h5::open_file(shard, !options_.copy);  // copying would be slow
+    const h5::Id from = h5::open_file(shard, !options_.copy && few_each_);
     const h5::Id data = h5::open_group(from, "data"), failed = h5::open_group(from, "failed");
     const std::string name = fs::path(shard).filename();
     std::vector<LinkedDemo> batch;
@@ -196,6 +200,7 @@ class Merger {
   GrownFile file_;
   h5::Id copied_;  // group of demos
   std::string env_args_;
+  bool few_each_ = false;  // episodes in a shard
   std::optional<DemoMembers> members_;
   std::optional<MinariView> view_;
   std::vector<std::int64_t> demos_;                           // their numbers
