@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <exception>
+#include <filesystem>
 #include <new>
 #include <vector>
 
@@ -105,8 +107,13 @@ int guarded(int argc, char** argv) {
     return report(program, argc, argv, kUsage, error.what());
   } catch (const IoError& error) {
     return report(program, argc, argv, kInputOutput, error.what());
+  } catch (const std::filesystem::filesystem_error& error) {
+    return report(program, argc, argv, kInputOutput, error.what());
   } catch (const std::bad_alloc&) {
     return report(program, argc, argv, kUsage, "out of memory; ask for fewer environments");
+  } catch (const std::exception& error) {
+    return report(program, argc, argv, kInputOutput,
+                  fmt::format("{}; this is a mistake in tangere itself: please report it with the command and its files", error.what()));
   }
 }
 

@@ -105,7 +105,8 @@ std::vector<std::string> DatasetFolder::merged_files(const std::string& suffix) 
   std::vector<std::string> files;
   std::error_code none_there;
   for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(path_) / "minari" / "tangere", none_there))
-    for (const char* name : {"metadata.json", "main_data.hdf5"}) files.push_back((entry.path() / "data" / name).string());
+    for (const char* name : {"main_data.hdf5", "metadata.json"})  // the last is removed first: without it there is no data set
+      files.push_back((entry.path() / "data" / name).string());
   files.push_back((fs::path(path_) / "robomimic.hdf5").string());
   for (std::string& file : files) file += suffix;
   std::erase_if(files, [](const std::string& file) { return !fs::is_regular_file(file); });
@@ -136,6 +137,13 @@ void DatasetFolder::remove_old_shards(std::int64_t count) {
   std::reverse(files.begin(), files.end());
   for (const std::string& file : files)
     if (unlink(file.c_str()) != 0 && errno != ENOENT) fail("remove", file, errno);  // gone: others that share it do the same
+  const fs::path views = fs::path(path_) / "minari" / "tangere";
+  std::vector<fs::path> emptied;
+  std::error_code none_there;
+  for (const fs::directory_entry& entry : fs::directory_iterator(views, none_there))
+    emptied.insert(emptied.end(), {entry.path() / "data", entry.path()});
+  emptied.insert(emptied.end(), {views, views.parent_path()});
+  for (const fs::path& folder : emptied) rmdir(folder.c_str());  // refused when there is something in it
 }
 
 }  // namespace tangere

@@ -21,6 +21,21 @@ std::int64_t blocks_of(std::int64_t episodes) { return (episodes + kBlockEpisode
 
 constexpr const char* kVariables = "variables";
 
+/// What the format of a group in a file has room for.
+void check_lengths(const std::vector<std::string>& observations) {
+  constexpr std::size_t kLongest = 255, kShown = 32, kAll = 65000, kBesidesName = 16;
+  std::size_t bytes = 0;
+  for (const std::string& name : observations) {
+    if (name.size() > kLongest)
+      throw InputError(fmt::format("observation '{}…': a name of {} bytes; expected at most {}, what a dataset may be called",
+                                   name.substr(0, kShown), name.size(), kLongest));
+    bytes += name.size() + kBesidesName;
+  }
+  if (bytes > kAll)
+    throw InputError(fmt::format("{} observations whose names take {} bytes; expected at most {}, what a group has room for",
+                                 observations.size(), bytes, kAll));
+}
+
 template <class T>
 std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>& places) {
   std::vector<T> some;
@@ -123,6 +138,7 @@ void DatasetLayout::check() const {
   for (const std::string& name : record)
     if (std::find(all.begin(), all.end(), name) == all.end())
       throw InputError(fmt::format("--record: unknown observation '{}'{}", name, suggestion(name, all)));
+  check_lengths(all);
   std::set<std::string> names{"q", "v"};
   if (!variable_names.empty()) names.insert(kVariables);
   for (const SensorLayout& sensor : sensors) {

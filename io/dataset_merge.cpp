@@ -14,6 +14,7 @@
 #include "io/h5_links.hpp"
 #include "io/h5_listing.hpp"
 #include "io/minari_view.hpp"
+#include "io/shard_check.hpp"
 
 namespace tangere {
 namespace {
@@ -21,6 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kBatch = 16;       // demos that are laid out together
+// Descriptions that were used are forgotten in shards as they are by default. In larger ones, or in copying, the library would take
+// longer for each the more there are.
+constexpr std::int64_t kFewEpisodes = 4096;
 constexpr std::size_t kValidShare = 10;  // one demo in ten is kept for validation
 
 /// SplitMix64: which demos are for validation looks random and is the same for everybody.
@@ -53,10 +57,13 @@ class Merger {
     }
     complete();
     copied_.reset();
-    result_.bytes = file_.commit();
+    // The view first: it is replaced without being asked for as long as the file is not there.
+    result_.bytes = file_.commit([this](const std::string& part) {
+      if (options_.copy) check_copy(part);
+      if (view_) view_->commit();
+    });
     result_.file = file_.output();
     if (view_) {  // without a demo there is none: Minari has no way to say that there is nothing
-      view_->commit();
       result_.minari_id = view_->id();
       result_.minari = (fs::path(dataset_.folder) / "minari" / view_->id()).string();
     }
@@ -73,19 +80,29 @@ class Merger {
       h5::write_scalar<std::int64_t>(file_.file(), name, number(name));
     h5::write_scalar<std::int64_t>(file_.file(), "first_episode", 0);
     h5::write_scalar<std::int64_t>(file_.file(), "episodes", number("dataset_episodes"));
+    few_each_ = number("dataset_episodes") <= kFewEpisodes * std::ssize(dataset_.files);
     env_args_ = h5::read_text(h5::open_group(from, "data"), "env_args");
     h5::copy_group(from, "scene", file_.file(), "scene");
   }
 
+  /// Reads the copy whole. Where it is damaged, a shard most likely was: then that is named.
+  void check_copy(const std::string& part) const {
+    try {
+      check_shard(part);
+    } catch (const IoError&) {
+      for (const std::string& shard : dataset_.files) check_shard(shard);
+      throw;
+    }
+  }
+
   void add(const std::string& shard) {
-    const h5::Id from = h5::open_file(shard);
+    sample_shard(shard);
+    const h5::Id from = h5::open_file(shard, !options_.copy && few_each_);
     const h5::Id data = h5::open_group(from, "data"), failed = h5::open_group(from, "failed");
     const std::string name = fs::path(shard).filename();
     std::vector<LinkedDemo> batch;
     for (const std::int64_t number : demo_numbers(data)) {
-      const h5::Id demo = h5::open_group(data, fmt::format("demo_{}", number));
-      if (!members_) members_ = members_of(demo);
-      batch.push_back({number, facts_of(demo, *members_)});
+      batch.push_back(described(shard, data, number));
       demos_.push_back(number);
       if (batch.size() == kBatch) put(data, name, batch);
     }
@@ -95,20 +112,41 @@ class Merger {
     sum_ += h5::read_numbers<std::uint64_t>(from, "content_sum").at(0);  // modulo 2⁶⁴, as within a shard
   }
 
+  LinkedDemo described(const std::string& shard, const h5::Id& data, std::int64_t number) {
+    try {
+      const h5::Id demo = h5::open_group(data, fmt::format("demo_{}", number));
+      if (!members_) members_ = members_of(demo);
+      LinkedDemo linked{number, facts_of(demo, *members_)};
+      check_members(demo, *members_, linked.facts);
+      return linked;
+    } catch (const IoError& error) {
+      throw IoError(fmt::format("'{}' is damaged: demo_{}: {}", shard, number, error.what()));
+    }
+  }
+
   /// Empties the batch.
   void put(const h5::Id& data, const std::string& shard, std::vector<LinkedDemo>& batch) {
     if (batch.empty()) return;
     if (options_.copy) {
-      for (const LinkedDemo& demo : batch) copy(data, demo);
+      for (const LinkedDemo& demo : batch) try_copy(data, shard, demo);
     } else {
       h5::Bytes out;
       for (const h5::FileMember& group : add_demo_links(out, file_.here(), *members_, shard, batch))
         linked_.push_back(group);
       file_.append(out);
     }
-    if (!view_) view_.emplace(dataset_, *members_, options_.overwrite);
+    if (!view_) view_.emplace(dataset_.folder, data, *members_);
     view_->add(options_.copy ? fs::path(file_.output()).filename().string() : shard, batch);
     batch.clear();
+  }
+
+  void try_copy(const h5::Id& data, const std::string& shard, const LinkedDemo& demo) {
+    try {
+      copy(data, demo);
+    } catch (const IoError&) {
+      check_shard((fs::path(dataset_.folder) / shard).string());  // says more if that is why
+      throw;
+    }
   }
 
   void copy(const h5::Id& data, const LinkedDemo& demo) {
@@ -162,6 +200,7 @@ class Merger {
   GrownFile file_;
   h5::Id copied_;  // group of demos
   std::string env_args_;
+  bool few_each_ = false;  // episodes in a shard
   std::optional<DemoMembers> members_;
   std::optional<MinariView> view_;
   std::vector<std::int64_t> demos_;                           // their numbers

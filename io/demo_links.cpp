@@ -106,6 +106,8 @@ DemoMembers members_of(const h5::Id& demo) {
   // Virtual datasets of their own are laid out anew.
   members.names.erase(std::remove(members.names.begin(), members.names.end(), "next_obs"),
                       members.names.end());
+  for (const std::string& name : members.names)
+    if (name.starts_with("grad_") || name == "loss") members.derivatives.push_back(name);
   const h5::Id obs = h5::open_group(demo, "obs");
   for (const std::string& name : h5::link_names(obs))
     members.observations.push_back(array_of(obs, name));
@@ -132,6 +134,22 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
   return facts;
 }
 
+void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFacts& facts) {
+  const auto check = [](const h5::Id& group, const DemoArray& array, std::int64_t rows) {
+    const h5::Id dataset = h5::open_dataset(group, array.name);
+    if (!std::ranges::equal(h5::dimensions(dataset), dims_of(static_cast<std::uint64_t>(rows), array)) || type_of(dataset) != array.type)
+      throw IoError(fmt::format("{} is not of {} rows, of the shape and type of the first demo", array.name, rows));
+  };
+  for (const std::string& name : members.names)
+    if (name != "obs" && name != "final_obs" && name != members.actions.name) h5::open_dataset(demo, name);
+  check(demo, members.actions, facts.rows);
+  const h5::Id obs = h5::open_group(demo, "obs"), last = h5::open_group(demo, "final_obs");
+  for (const DemoArray& array : members.observations) {
+    check(obs, array, facts.rows);
+    check(last, array, 1);
+  }
+}
+
 std::vector<h5::FileMember> add_demo_links(Bytes& out, std::uint64_t base,
                                            const DemoMembers& members, std::string_view file,
                                            std::span<const LinkedDemo> demos) {
@@ -153,7 +171,7 @@ std::vector<h5::FileMember> add_demo_links(Bytes& out, std::uint64_t base,
 std::vector<h5::FileMember> add_minari_episodes(Bytes& out, std::uint64_t base,
                                                 const DemoMembers& members, std::string_view file,
                                                 std::span<const LinkedDemo> demos,
-                                                std::int64_t first) {
+                                                std::int64_t first, std::uint64_t seed) {
   using Number = std::array<unsigned char, sizeof(std::int64_t)>;
   ShownObservations observations(out, base, members, file, demos, 0);
   std::vector<h5::FileMember> groups;
@@ -171,16 +189,25 @@ std::vector<h5::FileMember> add_minari_episodes(Bytes& out, std::uint64_t base,
         out,
         {h5::NumberType::boolean, {static_cast<std::uint64_t>(demo.facts.rows)}, {}, all_false});
     const std::uint64_t shown = observations.add(demo.facts);
+    std::vector<std::string> paths;
+    for (const std::string& name : members.derivatives) paths.push_back(path_of(demo.number, name));
+    std::vector<h5::FileLink> derivatives;
+    for (std::size_t k = 0; k < paths.size(); ++k)
+      derivatives.push_back({members.derivatives[k], h5::kNowhere, file, paths[k]});
+    const std::uint64_t infos = base + out.size();
+    h5::add_group(out, derivatives);  // empty where there are none: Minari prints no episode without it
     const std::array links{
-        h5::FileLink{"actions", h5::kNowhere, file, actions}, h5::FileLink{"observations", shown},
+        h5::FileLink{"actions", h5::kNowhere, file, actions}, h5::FileLink{"infos", infos},
+        h5::FileLink{"observations", shown},
         h5::FileLink{"rewards", h5::kNowhere, file, rewards},
         h5::FileLink{terminated ? "terminations" : "truncations", h5::kNowhere, file, dones},
         h5::FileLink{terminated ? "truncations" : "terminations", never}};
     const auto id = std::bit_cast<Number>(episode), rows = std::bit_cast<Number>(demo.facts.rows),
-               number = std::bit_cast<Number>(demo.number);
+               number = std::bit_cast<Number>(demo.number), drawn = std::bit_cast<Number>(seed);
     const std::array attributes{
         h5::FileAttribute{"id", h5::NumberType::int64, false, id},
         h5::FileAttribute{"total_steps", h5::NumberType::int64, false, rows},
+        h5::FileAttribute{"seed", h5::NumberType::uint64, false, drawn},
         h5::FileAttribute{"demo", h5::NumberType::int64, false, number}};
     groups.push_back({episode, base + out.size()});
     h5::add_group(out, links, attributes);

@@ -26,6 +26,7 @@ struct DemoMembers {
   std::vector<std::string> names;       ///< of its links
   std::vector<DemoArray> observations;  ///< below obs
   DemoArray actions;
+  std::vector<std::string> derivatives;  ///< grad_… and the loss, among `names`
   bool of_task = false, varies = false;
 };
 
@@ -33,6 +34,8 @@ struct DemoMembers {
 DemoMembers members_of(const h5::Id& demo);
 /// Throws IoError.
 DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members);
+/// Opens every member, without its numbers. Throws IoError where one is missing, damaged, or of another shape or type.
+void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFacts& facts);
 
 struct LinkedDemo {
   std::int64_t number = 0;
@@ -45,10 +48,10 @@ std::vector<h5::FileMember> add_demo_links(h5::Bytes& out, std::uint64_t base,
                                            const DemoMembers& members, std::string_view file,
                                            std::span<const LinkedDemo> demos);
 
-/// The same as groups episode_<j>, j from `first`, as Minari lays them out.
+/// The same as groups episode_<j>, j from `first`, as Minari lays them out; derivatives below infos. `seed`: of the data set.
 std::vector<h5::FileMember> add_minari_episodes(h5::Bytes& out, std::uint64_t base,
                                                 const DemoMembers& members, std::string_view file,
                                                 std::span<const LinkedDemo> demos,
-                                                std::int64_t first);
+                                                std::int64_t first, std::uint64_t seed);
 
 }  // namespace tangere

@@ -50,9 +50,10 @@ void GrownFile::open(std::uint64_t root) {
   file_ = h5::change_file(part_.path());
 }
 
-std::uint64_t GrownFile::commit() {
+std::uint64_t GrownFile::commit(const std::function<void(const std::string&)>& last) {
   h5::close_file(file_, part_.path());
   placed_.verify();
+  if (last) last(part_.path());
   const std::uint64_t bytes = part_.size();
   part_.commit();
   return bytes;

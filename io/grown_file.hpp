@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -37,8 +38,8 @@ class GrownFile {
   /// `root`: address of the group "/"; that of the beginning if it leads nowhere.
   void open(std::uint64_t root = h5::kNowhere);
 
-  /// Reads back what was appended, syncs, renames. Returns the size in bytes.
-  std::uint64_t commit();
+  /// Reads back what was appended, calls `last` with the path of the .part, syncs, renames. Returns the size in bytes.
+  std::uint64_t commit(const std::function<void(const std::string&)>& last = {});
 
  private:
   PartFile part_;

@@ -200,12 +200,13 @@ Id create_memory_file() {
   return file;
 }
 
-Id open_file(const std::string& path) {
+Id open_file(const std::string& path, bool forget) {
   const Quiet quiet;
   allow_lz4();
   const Id access(H5Pcreate(H5P_FILE_ACCESS));
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
   H5Pset_file_locking(access.get(), false, true);  // read-only folders and network mounts
+  H5Pset_evict_on_close(access.get(), forget);
   Id file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()));
   if (file.get() < 0) throw IoError(fmt::format("cannot read '{}': {}", path, last_reason()));
   return file;

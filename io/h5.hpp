@@ -63,8 +63,8 @@ using Dims = std::vector<hsize_t>;
 Id create_file(const std::string& path, hsize_t description_block = 2048, bool views = false);
 /// A file that is never on disk.
 Id create_memory_file();
-/// Opens a file for reading.
-Id open_file(const std::string& path);
+/// Opens a file for reading. `forget`: descriptions of objects that were closed are not kept; among tens of thousands of them that is slow.
+Id open_file(const std::string& path, bool forget = false);
 /// Opens a file for reading and writing, as create_file left it.
 Id change_file(const std::string& path);
 /// Gives an object that is at an address of the file its name.

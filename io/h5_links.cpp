@@ -9,6 +9,7 @@
 
 #include "engine/error.hpp"
 #include "io/h5_listing.hpp"
+#include "io/h5_views.hpp"
 
 namespace tangere::h5 {
 namespace {
@@ -79,7 +80,8 @@ void create_virtual(const Id& group, const std::string& name, const Id& like, co
   const double nothing = std::numeric_limits<double>::quiet_NaN();
   H5Pset_fill_value(creation.get(), H5T_NATIVE_DOUBLE, &nothing);
   const auto map = [&](const Source& from, const Id& selected) {
-    check(H5Pset_virtual(creation.get(), space.get(), from.file.c_str(), from.path.c_str(), selected.get()) >= 0, "map", name);
+    const std::string file = view_source(from.file), path = view_source(from.path);
+    check(H5Pset_virtual(creation.get(), space.get(), file.c_str(), path.c_str(), selected.get()) >= 0, "map", name);
   };
   if (kept > 0) {
     if (skipped > 0) select(from_first, skipped, kept);

@@ -118,6 +118,7 @@ void add_type(Bytes& out, NumberType type) {
     case NumberType::float64: return add_float(out, 8, kExponentOf64);
     case NumberType::int8: return add_integer(out, 1);
     case NumberType::int64: return add_integer(out, 8);
+    case NumberType::uint64: return add_integer(out, 8, false);
     case NumberType::boolean: return add_boolean(out);
   }
 }
@@ -308,7 +309,8 @@ std::size_t bytes_of(NumberType type) {
   switch (type) {
     case NumberType::float32: return 4;
     case NumberType::float64:
-    case NumberType::int64: return 8;
+    case NumberType::int64:
+    case NumberType::uint64: return 8;
     case NumberType::int8:
     case NumberType::boolean: return 1;
   }
@@ -320,6 +322,7 @@ void add_texts(Bytes& out, std::span<const std::string_view> texts) {
   constexpr std::uint8_t kVersion = 1;
   constexpr std::size_t kHead = 16, kLeast = 4096;
   if (texts.empty()) return;
+  if (texts.size() > UINT16_MAX) throw std::logic_error("a list of more than 65535 texts in a file");
   Bytes objects;
   std::uint16_t index = 0;
   for (const std::string_view text : texts) {

@@ -52,7 +52,7 @@ inline constexpr std::size_t kSuperblockBytes = 48;
 void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std::uint64_t end, std::uint64_t root = kNowhere);
 
 /// Types on disk, as the format has them.
-enum class NumberType { float32, float64, int8, int64, boolean };
+enum class NumberType { float32, float64, int8, int64, uint64, boolean };
 std::size_t bytes_of(NumberType type);
 
 struct FileFilter {

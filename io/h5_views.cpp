@@ -38,6 +38,12 @@ void add_rows(Bytes& out, std::uint64_t first, std::uint64_t rows,
 
 }  // namespace
 
+std::string view_source(std::string_view name) {
+  std::string escaped;
+  for (const char c : name) escaped.append(c == '%' ? 2 : 1, c);
+  return escaped;
+}
+
 std::string shown_rows(std::span<const ShownRows> parts, const std::vector<std::uint64_t>& dims) {
   constexpr std::uint8_t kVersion = 0;
   for (const std::uint64_t n : dims)
@@ -49,7 +55,7 @@ std::string shown_rows(std::span<const ShownRows> parts, const std::vector<std::
   std::uint64_t row = 0;
   for (const ShownRows& part : parts) {
     for (const std::string_view text : {part.file, part.path}) {
-      out.text(text);
+      out.text(view_source(text));
       out.zeros(1);
     }
     if (part.first == 0 && part.rows == part.of)

@@ -18,6 +18,10 @@ struct ShownRows {
   std::uint64_t of = 0;  ///< rows that the dataset has
 };
 
+/// The name of a file or dataset as the source of a virtual dataset: readers take these for printf patterns, so '%' is doubled.
+/// Links take names as they are.
+std::string view_source(std::string_view name);
+
 /// The text that a FileView refers to: rows one behind the other, together those of a dataset of `dims`, none of which is 0.
 std::string shown_rows(std::span<const ShownRows> parts, const std::vector<std::uint64_t>& dims);
 

@@ -54,28 +54,28 @@ std::string bound(double value) {
 
 }  // namespace
 
-MinariView::MinariView(const DatasetFiles& dataset, const DemoMembers& members, bool overwrite)
-    : members_(members), overwrite_(overwrite) {
-  const h5::Id first = h5::open_file(dataset.files.front()), scene = h5::open_group(first, "scene");
-  command_ = h5::read_text(first, "command");
+MinariView::MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members) : members_(members) {
+  const h5::Id scene = h5::open_group(shard, "/scene");
+  command_ = h5::read_text(h5::open_group(shard, "/"), "command");
   const std::string task = h5::read_text(scene, "task");
   id_ = fmt::format("tangere/{}-v0", dataset_name(task.starts_with("none") ? h5::read_text(scene, "name") : task));
+  seed_ = h5::read_numbers<std::uint64_t>(scene, "seed").at(0);
   if (members.of_task) {
     low_ = bound(h5::read_numbers<double>(scene, "action_low").at(0));
     high_ = bound(h5::read_numbers<double>(scene, "action_high").at(0));
   }
-  folder_ = (fs::path(dataset.folder) / "minari" / id_ / "data").string();
+  folder_ = (fs::path(folder) / "minari" / id_ / "data").string();
   std::error_code error;
   fs::create_directories(folder_, error);
   if (error) throw IoError(fmt::format("cannot create the folder '{}': {}", folder_, error.message()));
-  file_.emplace((fs::path(folder_) / "main_data.hdf5").string(), overwrite, true);
+  file_.emplace((fs::path(folder_) / "main_data.hdf5").string(), true, true);
   file_->close();
 }
 
 void MinariView::add(std::string_view file, std::span<const LinkedDemo> demos) {
   h5::Bytes out;
   for (const h5::FileMember& episode :
-       add_minari_episodes(out, file_->here(), members_, fmt::format("{}{}", kToFolder, file), demos, count_))
+       add_minari_episodes(out, file_->here(), members_, fmt::format("{}{}", kToFolder, file), demos, count_, seed_))
     episodes_.push_back(episode);
   file_->append(out);
   count_ += std::ssize(demos);
@@ -87,7 +87,7 @@ void MinariView::commit() {
   h5::write_scalar<std::int64_t>(file_->file(), "total_episodes", count_);
   h5::write_scalar<std::int64_t>(file_->file(), "total_steps", steps_);
   file_->commit();
-  write_text_atomically((fs::path(folder_) / "metadata.json").string(), metadata(), overwrite_);
+  write_text_atomically((fs::path(folder_) / "metadata.json").string(), metadata(), true);
 }
 
 std::string MinariView::metadata() const {

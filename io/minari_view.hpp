@@ -9,7 +9,6 @@
 #include <string_view>
 #include <vector>
 
-#include "io/dataset_files.hpp"
 #include "io/demo_links.hpp"
 #include "io/grown_file.hpp"
 
@@ -18,8 +17,8 @@ namespace tangere {
 /// FOLDER/minari/tangere/NAME-v0/data. Everything throws IoError.
 class MinariView {
  public:
-  /// Begins it; `members` must outlive it.
-  MinariView(const DatasetFiles& dataset, const DemoMembers& members, bool overwrite);
+  /// Begins it, in place of one that is there; `shard`: anything in one of the folder's shards; `members` must outlive it.
+  MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members);
 
   /// Demos of a file of the data set's folder, given without its path, in ascending order.
   void add(std::string_view file, std::span<const LinkedDemo> demos);
@@ -32,11 +31,11 @@ class MinariView {
   [[nodiscard]] std::string metadata() const;
 
   const DemoMembers& members_;
-  bool overwrite_;
   std::string id_, folder_, command_, low_ = "-1.0", high_ = "1.0";
   std::optional<GrownFile> file_;
   std::vector<h5::FileMember> episodes_;
   std::int64_t count_ = 0, steps_ = 0;
+  std::uint64_t seed_ = 0;
 };
 
 }  // namespace tangere

@@ -124,6 +124,7 @@ TEST_F(DatasetCommand, DamageAndStrangersAreProblemsNotCrashes) {
     EXPECT_EQ(run(folder_, {command, "."}).exit_code, 3);
   }
   EXPECT_FALSE(fs::exists(folder_.path("set/robomimic.hdf5")));
+  EXPECT_THAT(answer({"validate", std::string(300, 'x')}, 3).at("error").get<std::string>(), HasSubstr("too long"));
 }
 
 TEST_F(DatasetCommand, MergedItIsOneFileOfLinksOrOfCopies) {

@@ -74,7 +74,8 @@ TEST(Readers, SeeDerivativesAndNextObservationsAsDescribed) {
   if (interpreter.empty()) GTEST_SKIP() << "no python3 with h5py: derivatives and next_obs were NOT read through it";
   const Folder folder;
   const std::vector<std::string> words{"generate", scene("rolling_ball_small.xml"), "--output", "set", "--episodes", "20",
-                                       "--steps", "30", "--every", "5", "--gradients", "jacobians", "--quiet"};
+                                       "--steps", "30", "--every", "5", "--gradients", "jacobians", "--seed",
+                                       "18446744073709551615", "--quiet"};
   ASSERT_EQ(run(folder, words).exit_code, 0);
   EXPECT_EQ(run_python(folder, interpreter, R"(
 import glob, h5py, numpy as np
@@ -105,7 +106,9 @@ for path in glob.glob("set/minari/*/*/data/main_data.hdf5"):
     with h5py.File(path) as f:
         assert len(f.attrs) == 2 and f.attrs["total_episodes"] == len(f) == 20
         episode = f["episode_19"]
-        assert len(episode.attrs) == 3 and episode.attrs["id"] == 19
+        assert len(episode.attrs) == 4 and episode.attrs["id"] == 19 and episode.attrs["seed"] == 2**64 - 1
+        assert sorted(episode["infos"]) == ["grad_state_by_action", "grad_state_by_previous", "grad_state_by_state"]
+        assert episode["infos/grad_state_by_action"].shape[0] == 6 and np.isfinite(episode["infos/grad_state_by_action"][:]).all()
         assert episode["observations/pad"].shape == (7, 32, 32, 3) and episode["terminations"].dtype == bool
         assert not episode["terminations"][:].any() and list(episode["truncations"][:]) == [False] * 5 + [True]
         print("read")

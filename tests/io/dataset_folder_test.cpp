@@ -82,6 +82,25 @@ TEST(DatasetFolder, RemovesOldShardsAndNothingElse) {
                                                 "shard-00000.h5.bak", "shard-1x.h5"));
 }
 
+TEST(DatasetFolder, RemovesWhatMergingMadeWithItsFolders) {
+  const Folder place;
+  for (const char* name : {"one-v0", "two-v0"}) {
+    const std::string data = place / "set/minari/tangere/" + name + "/data";
+    fs::create_directories(data);
+    for (const char* file : {"/main_data.hdf5", "/metadata.json"}) touch(data + file);
+  }
+  for (const char* name : {"robomimic.hdf5", "shard-00000.h5", "notes.txt"}) touch(place / "set/" + name);
+  touch(place / "set/minari/tangere/two-v0/mine.txt");
+  DatasetFolder folder(place / "set", ExistingShards::replace);
+  folder.remove_old_shards();
+  EXPECT_THAT(names(place / "set"), ElementsAre("minari", "notes.txt"));
+  EXPECT_THAT(names(place / "set/minari/tangere"), ElementsAre("two-v0"));
+  EXPECT_THAT(names(place / "set/minari/tangere/two-v0"), ElementsAre("mine.txt"));
+  fs::remove(place / "set/minari/tangere/two-v0/mine.txt");
+  folder.remove_old_shards();
+  EXPECT_THAT(names(place / "set"), ElementsAre("notes.txt"));
+}
+
 TEST(DatasetFolder, CountsShardsThatAreToGoAsFree) {
   const Folder place;
   fs::create_directory(place / "set");

@@ -4,9 +4,12 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
+#include <filesystem>
 #include <functional>
 #include <numeric>
 
+#include "engine/error.hpp"
 #include "io/dataset_writer.hpp"
 #include "io/h5.hpp"
 #include "io/h5_listing.hpp"
@@ -16,7 +19,9 @@
 namespace tangere {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::tangere::testing::dataset_layout;
 using ::tangere::testing::failure;
@@ -76,6 +81,93 @@ TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
       }
       EXPECT_THAT(demos, ElementsAre(1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 32, 33, 34, 35, 36, 37, 38, 39));
     }
+}
+
+/// 20 episodes in two shards, of a sensor with this name.
+DatasetFiles write_named(const Folder& folder, const std::string& sensor) {
+  DatasetLayout l = dataset_layout(20);
+  l.shards = 2;
+  l.sensors[0].name = sensor;
+  DatasetWriter writer({folder / "set"}, l);
+  write_block(writer, l, 0);
+  write_block(writer, l, 16);
+  return find_dataset(folder / "set");
+}
+
+/// HDF5 takes the sources of virtual datasets for patterns.
+TEST(DatasetMerge, ShowsSensorsWhosePercentSignsAreNoPattern) {
+  for (const std::string sensor : {"p%c", "p%%c", "%b", "100%"})
+    for (const bool copy : {false, true}) {
+      const Folder folder;
+      const MergeResult result = merge_dataset(write_named(folder, sensor), {copy, false});
+      EXPECT_THAT(examine_shard(result.file).problems, IsEmpty()) << sensor;
+      {
+        const h5::Id merged = h5::open_file(result.file);
+        EXPECT_EQ(row(merged, "data/demo_17/next_obs/" + sensor, 2), row(merged, "data/demo_17/final_obs/" + sensor, 0)) << sensor;
+      }
+      const h5::Id view = h5::open_file(result.minari + "/data/main_data.hdf5");
+      for (hsize_t j = 0; j < 4; ++j)
+        EXPECT_EQ(row(view, "episode_17/observations/" + sensor, j)[5],
+                  tangere::testing::dataset_number<double>(17, 3, static_cast<std::int64_t>(j), 5));
+    }
+}
+
+std::string complaint(const DatasetFiles& dataset, bool copy) {
+  try {
+    merge_dataset(dataset, {copy, false});
+  } catch (const IoError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+void change(const std::string& file, const std::function<void(hid_t)>& by) {
+  const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  by(opened);
+  H5Fclose(opened);
+}
+
+TEST(DatasetMerge, NamesTheShardAndTheMemberThatCannotBeOpened) {
+  for (const bool copy : {false, true}) {
+    const Folder folder;
+    const DatasetFiles dataset = write_named(folder, "skin");
+    change(folder / "set/shard-00000.h5", [](hid_t file) { EXPECT_GE(H5Ldelete(file, "data/demo_9/final_obs/skin", H5P_DEFAULT), 0); });
+    EXPECT_THAT(complaint(dataset, copy), AllOf(HasSubstr("shard-00000.h5' is damaged: demo_9: "), HasSubstr("skin")));
+    EXPECT_FALSE(std::filesystem::exists(folder / "set/robomimic.hdf5"));
+  }
+}
+
+TEST(DatasetMerge, NamesTheShardThatHasNotAllItsEpisodes) {
+  const Folder folder;
+  const DatasetFiles dataset = write_named(folder, "skin");
+  change(folder / "set/shard-00000.h5", [](hid_t file) { EXPECT_GE(H5Ldelete(file, "data/demo_9", H5P_DEFAULT), 0); });
+  EXPECT_THAT(complaint(dataset, false), HasSubstr("shard-00000.h5' is damaged: it has 15 demos and 0 failed episodes, expected 16"));
+}
+
+/// Links show what is in the shards, and validate says what is wrong with it; a copy is not made of it.
+TEST(DatasetMerge, CopiesNoNumbersThatAreNotThoseWritten) {
+  const Folder folder;
+  const DatasetFiles dataset = write_named(folder, "skin");
+  change(folder / "set/shard-00001.h5", [](hid_t file) {
+    const hid_t actions = H5Dopen2(file, "data/demo_18/actions", H5P_DEFAULT);
+    const std::array<float, 6> others{0.25F, 0, 0, 0, 0, 0};
+    EXPECT_GE(H5Dwrite(actions, H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, others.data()), 0);
+    H5Dclose(actions);
+  });
+  EXPECT_THAT(complaint(dataset, true), HasSubstr("shard-00001.h5' is damaged: the checksum of its numbers is "));
+  EXPECT_FALSE(std::filesystem::exists(folder / "set/robomimic.hdf5"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "set/robomimic.hdf5.part"));
+}
+
+/// A run that was killed between the two leaves the view alone.
+TEST(DatasetMerge, ReplacesAViewWithoutItsFile) {
+  const Folder folder;
+  const DatasetFiles dataset = write_named(folder, "skin");
+  const MergeResult first = merge_dataset(dataset, {});
+  EXPECT_THAT(complaint(dataset, false), HasSubstr("robomimic.hdf5' exists already"));
+  std::filesystem::remove(first.file);
+  EXPECT_EQ(complaint(dataset, false), "");
+  EXPECT_TRUE(std::filesystem::exists(first.file));
 }
 
 }  // namespace

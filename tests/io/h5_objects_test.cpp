@@ -120,6 +120,12 @@ TEST(H5Objects, ADatasetSharesTextsThatTheLibraryReadsAndCopies) {
   }
 }
 
+TEST(H5Objects, AListHasAsManyTextsAsItCanNumber) {
+  h5::Bytes out;
+  EXPECT_NO_THROW(h5::add_texts(out, std::vector<std::string_view>(65535, "x")));
+  EXPECT_THROW(h5::add_texts(out, std::vector<std::string_view>(65536, "x")), std::logic_error);
+}
+
 TEST(H5Objects, EveryTypeIsTheLibrarysOwn) {
   const Folder folder;
   const h5::Id boolean(H5Tenum_create(H5T_STD_I8LE));
@@ -130,6 +136,7 @@ TEST(H5Objects, EveryTypeIsTheLibrarysOwn) {
                                                             {h5::NumberType::float64, H5T_IEEE_F64LE},
                                                             {h5::NumberType::int8, H5T_STD_I8LE},
                                                             {h5::NumberType::int64, H5T_STD_I64LE},
+                                                            {h5::NumberType::uint64, H5T_STD_U64LE},
                                                             {h5::NumberType::boolean, boolean.get()}};
   for (std::size_t k = 0; k < types.size(); ++k) {
     Extended file(folder / ("file" + std::to_string(k) + ".h5"));
