@@ -92,12 +92,12 @@ TEST(DatasetFolder, RemovesWhatMergingMadeWithItsFolders) {
   for (const char* name : {"robomimic.hdf5", "shard-00000.h5", "notes.txt"}) touch(place / "set/" + name);
   touch(place / "set/minari/tangere/two-v0/mine.txt");
   DatasetFolder folder(place / "set", ExistingShards::replace);
-  folder.remove_old_shards();
+  folder.remove_old_shards(1);
   EXPECT_THAT(names(place / "set"), ElementsAre("minari", "notes.txt"));
   EXPECT_THAT(names(place / "set/minari/tangere"), ElementsAre("two-v0"));
   EXPECT_THAT(names(place / "set/minari/tangere/two-v0"), ElementsAre("mine.txt"));
   fs::remove(place / "set/minari/tangere/two-v0/mine.txt");
-  folder.remove_old_shards();
+  folder.remove_old_shards(1);
   EXPECT_THAT(names(place / "set"), ElementsAre("notes.txt"));
 }
 
