@@ -320,10 +320,10 @@ class Check {
   /// By places and coefficients of all points of a sensor at once.
   void points() {
     const Model& model = s_.start.model();
-    const RelativeGradient r(parameters_, model.scene(), s_.varying, std::span(g_.parameters).first(std::size_t(parameters_.count())));
-    std::vector<double> coefficients;
-    for (std::size_t k = 0; k < r.has.size(); ++k)
-      if (parameters_.infos()[k].name.rfind("tactile ", 0) == 0) coefficients.push_back(r.has[k]);
+    std::vector<double> coefficients;  // this environment's
+    for (const CompiledSensor& s : model.compiled().sensors)
+      for (const kernels::Parameter& p : {s.parameters.kn, s.parameters.kt, s.parameters.mu, s.parameters.damping})
+        coefficients.push_back(p.row < 0 ? p.value : s_.start.block(0)[p.row * kernels::kBlock]);
     const std::vector<PointChange> changes = point_changes(model, coefficients, s_.options.seed);
     const std::span<const double> all = std::span(g_.points).first(std::size_t(tactile_points(model) * kPointNumbers));
     std::vector<double> gradient;

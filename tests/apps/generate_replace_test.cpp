@@ -13,7 +13,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
-using testing::IsEmpty;
 
 /// 80 episodes, five blocks.
 Words generate(const std::string& seed, const Words& more) {
@@ -22,13 +21,7 @@ Words generate(const std::string& seed, const Words& more) {
 
 class GenerateReplace : public testing::Test {
  protected:
-  [[nodiscard]] json make(const std::string& seed, const Words& more) const {
-    const Outcome outcome = run(folder_, generate(seed, more + Words{"--json"}));
-    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-    const json answer = json::parse(outcome.out);
-    EXPECT_THAT(undocumented_keys(answer), IsEmpty());
-    return answer;
-  }
+  [[nodiscard]] json make(const std::string& seed, const Words& more) const { return run_json(folder_, generate(seed, more)); }
   [[nodiscard]] bool merged() const {
     const bool robomimic = fs::exists(folder_.path("set/robomimic.hdf5"));
     EXPECT_EQ(fs::exists(folder_.path("set/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5")), robomimic);
