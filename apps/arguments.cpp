@@ -87,19 +87,21 @@ CLI::Option* add_positive_number(CLI::App& command, const std::string& flags,
   return command.add_option_function<std::string>(flags, read, description)->type_name("X");
 }
 
-CLI::Option* add_memory_size(CLI::App& command, const std::string& flags, std::optional<double>& bytes,
-                             const std::string& description) {
-  static const std::map<std::string, double> units{{"B", 1},           {"kB", 1e3},         {"MB", 1e6},
-                                                   {"GB", 1e9},        {"TB", 1e12},        {"KiB", 0x1p10},
-                                                   {"MiB", 0x1p20},    {"GiB", 0x1p30},     {"TiB", 0x1p40}};
+CLI::Option* add_memory_size(CLI::App& command, const std::string& flags,
+                             std::optional<double>& bytes, const std::string& description) {
+  static const std::map<std::string, double> units{
+      {"B", 1},        {"kB", 1e3},     {"MB", 1e6},     {"GB", 1e9},    {"TB", 1e12},
+      {"KiB", 0x1p10}, {"MiB", 0x1p20}, {"GiB", 0x1p30}, {"TiB", 0x1p40}};
   const auto read = [&bytes, name = long_name(flags)](const std::string& text) {
     const std::size_t end = std::min(text.find_first_not_of("0123456789."), text.size());
     const auto unit = units.find(text.substr(end));
     double number = 0;
     if (unit == units.end() || !parse(text.substr(0, end), number) || !(number > 0))
-      throw InputError(fmt::format("{} {}: expected a positive number and its unit, B, kB, MB, GB, TB, KiB, MiB, GiB or TiB, "
-                                   "as in 2GiB",
-                                   name, text));
+      throw InputError(
+          fmt::format("{} {}: expected a positive number and its unit, B, kB, MB, GB, TB, KiB, "
+                      "MiB, GiB or TiB, "
+                      "as in 2GiB",
+                      name, text));
     bytes = number * unit->second;
   };
   return command.add_option_function<std::string>(flags, read, description)->type_name("SIZE");

@@ -27,9 +27,10 @@ CLI::Option* add_whole_numbers(CLI::App& command, const std::string& flags,
 CLI::Option* add_positive_number(CLI::App& command, const std::string& flags,
                                  std::optional<double>& value, const std::string& description);
 
-/// An amount of memory in bytes: a positive number and B, kB, MB, GB, TB (powers of 1000) or KiB, MiB, GiB, TiB (of 1024).
-CLI::Option* add_memory_size(CLI::App& command, const std::string& flags, std::optional<double>& bytes,
-                             const std::string& description);
+/// An amount of memory in bytes: a positive number and B, kB, MB, GB, TB (powers of 1000) or KiB,
+/// MiB, GiB, TiB (of 1024).
+CLI::Option* add_memory_size(CLI::App& command, const std::string& flags,
+                             std::optional<double>& bytes, const std::string& description);
 
 /// An argument (`flags` without dashes) or option that takes text; empty text is an error, because
 /// it mostly is a shell variable that was not set.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere bench: how fast a scene or a task runs here, by threads. Everything is checked before the first step.
+// tangere bench: how fast a scene or a task runs here, by threads. Everything is checked before the
+// first step.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -106,16 +107,16 @@ int report(const Options& options, const Console& console, const BenchSetting& s
   const bool any_failed = !entries.at(0).at("failed").empty();
   const ExitCode code = any_failed ? kSomeFailed : kDone;
   Json result{{"command", "bench"},
-                  {"exit_code", static_cast<int>(code)},
-                  {"scene", options.scene},
-                  {"machine", setting.machine},
-                  {"seed", options.seed.value_or(0)},
-                  {"timestep", model.timestep()},
-                  {"integrator", to_string(model.integrator())},
-                  {"tolerance", model.solver().tolerance},
-                  {"svg", options.svg.empty() ? Json() : Json(options.svg)},
-                  {"csv", options.csv.empty() ? Json() : Json(options.csv)},
-                  {"runs", entries}};
+              {"exit_code", static_cast<int>(code)},
+              {"scene", options.scene},
+              {"machine", setting.machine},
+              {"seed", options.seed.value_or(0)},
+              {"timestep", model.timestep()},
+              {"integrator", to_string(model.integrator())},
+              {"tolerance", model.solver().tolerance},
+              {"svg", options.svg.empty() ? Json() : Json(options.svg)},
+              {"csv", options.csv.empty() ? Json() : Json(options.csv)},
+              {"runs", entries}};
   result.update(of_task);
   console.result(result);
   return code;
@@ -139,8 +140,9 @@ BenchSetting setting_of(const Options& options, const Model& model,
 
 /// Runs `run` with setting.options.threads at each of `threads` and tells what came out.
 template <class Run>
-int measure(const Options& options, const Console& console, BenchSetting& setting, const std::vector<int>& threads,
-            const Model& model, const Json& of_task, const Run& run) {
+int measure(const Options& options, const Console& console, BenchSetting& setting,
+            const std::vector<int>& threads, const Model& model, const Json& of_task,
+            const Run& run) {
   const StopSignals signals;
   Outputs outputs(options);
   console.print(bench_heading(setting));
@@ -168,7 +170,8 @@ std::vector<int> thread_counts(const Options& options) {
 }
 
 int bench_task(const Options& options, const Console& console, const Task& task) {
-  refuse_with_task(task, {{"--every", options.every.has_value()}, {"--frames", !options.frames.empty()}});
+  refuse_with_task(task,
+                   {{"--every", options.every.has_value()}, {"--frames", !options.frames.empty()}});
   const PolicyKind kind = policy_named(options.policy, "", PolicyKind::random);
   const Policy policy(task, kind);
   BenchSetting setting;
@@ -192,11 +195,12 @@ int bench_task(const Options& options, const Console& console, const Task& task)
   const Json of_task{{"task", task.spec().name},
                      {"policy", to_string(kind)},
                      {"steps_per_action", task.spec().steps_per_action}};
-  return measure(options, console, setting, threads, task.model(), of_task, [&](const BenchmarkGoOn& go_on) {
-    vector.threads = setting.options.threads;
-    return run_task_benchmark(task, policy, setting.environments, setting.options.rollout.steps, setting.options.repeat,
-                              vector, go_on);
-  });
+  return measure(
+      options, console, setting, threads, task.model(), of_task, [&](const BenchmarkGoOn& go_on) {
+        vector.threads = setting.options.threads;
+        return run_task_benchmark(task, policy, setting.environments, setting.options.rollout.steps,
+                                  setting.options.repeat, vector, go_on);
+      });
 }
 
 int bench(const Options& options, const Console& console) {
@@ -204,7 +208,8 @@ int bench(const Options& options, const Console& console) {
   // A wrong word is said before a scene is read.
   frames_named(options.frames);
   precision_named(options.precision);
-  if (const std::unique_ptr<Task> task = find_task(options.scene, console)) return bench_task(options, console, *task);
+  if (const std::unique_ptr<Task> task = find_task(options.scene, console))
+    return bench_task(options, console, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
   const Model model(read_scene_for(options.scene, options.allow_unknown, console));
   const std::uint64_t seed = options.seed.value_or(0);
@@ -220,9 +225,10 @@ int bench(const Options& options, const Console& console) {
   check_size(model, setting, most_threads);
   const Batch start(model, setting.environments, seed);
 
-  return measure(options, console, setting, threads, model, {{"task", nullptr}}, [&](const BenchmarkGoOn& go_on) {
-    return run_benchmark(start, controls, setting.options, go_on);
-  });
+  return measure(options, console, setting, threads, model, {{"task", nullptr}},
+                 [&](const BenchmarkGoOn& go_on) {
+                   return run_benchmark(start, controls, setting.options, go_on);
+                 });
 }
 
 }  // namespace
@@ -231,13 +237,16 @@ Command add_bench(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
   Options& o = *options;
-  CLI::App* app = program.add_subcommand("bench", "Measure how fast a scene or a task runs, by threads");
+  CLI::App* app =
+      program.add_subcommand("bench", "Measure how fast a scene or a task runs, by threads");
   add_text(*app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task")->required();
   add_whole_number<int>(*app, "--envs", o.environments, 1, kMostEnvironments,
                         "Environments, in blocks of 16 [default: 256]");
-  add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
-                                 "Steps of the episode; of a task, actions [default: as many as the controls last]");
-  add_text(*app, "--policy", o.policy, "NAME", "Of a task: random, hold or scripted [default: random]");
+  add_whole_number<std::int64_t>(
+      *app, "--steps", o.steps, 1, kMostSteps,
+      "Steps of the episode; of a task, actions [default: as many as the controls last]");
+  add_text(*app, "--policy", o.policy, "NAME",
+           "Of a task: random, hold or scripted [default: random]");
   add_whole_numbers(*app, "--threads", o.threads, 1, kMostThreads,
                     "Thread counts to measure [default: 1,2,4,... up to the processors here]");
   add_text(*app, "--precision", o.precision, "NAME",

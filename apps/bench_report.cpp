@@ -60,9 +60,9 @@ std::string bench_heading(const BenchSetting& setting) {
       "{}: {} environments, {} steps, {}, {}, {}\n{}; best of {} timed\n\n"
       "{:>7} {:>14} {:>14} {:>9} {:>18} {:>18}\n{:>7} {:>14} {:>14} {:>9} {:>18} {:>18}",
       setting.model, setting.environments, setting.options.rollout.steps, frames_text(setting),
-      to_string(setting.options.precision), setting.isa, setting.machine, setting.options.repeat, "threads",
-      "env-steps/s", "median", "speed-up", "env-steps/CPU-s", "tactile points/s", "-------",
-      "-----------", "------", "--------", "---------------", "----------------");
+      to_string(setting.options.precision), setting.isa, setting.machine, setting.options.repeat,
+      "threads", "env-steps/s", "median", "speed-up", "env-steps/CPU-s", "tactile points/s",
+      "-------", "-----------", "------", "--------", "---------------", "----------------");
 }
 
 std::string bench_row(const BenchRun& run, const BenchRun& first) {
@@ -76,9 +76,9 @@ std::string bench_row(const BenchRun& run, const BenchRun& first) {
 }
 
 std::string bench_footing(const BenchRun& run) {
-  return fmt::format("\nNewton iterations per simulation step: {:.2f}, environments failed: {}, checksum: {}",
-                     newton_per_step(run.result), run.result.failures.size(),
-                     hexadecimal(run.result.checksum()));
+  return fmt::format(
+      "\nNewton iterations per simulation step: {:.2f}, environments failed: {}, checksum: {}",
+      newton_per_step(run.result), run.result.failures.size(), hexadecimal(run.result.checksum()));
 }
 
 Json bench_entry(const BenchSetting& setting, const BenchRun& run) {
@@ -120,12 +120,13 @@ std::string bench_csv(const BenchSetting& setting, const Json& entries) {
 std::string bench_svg(const BenchSetting& setting, const std::vector<BenchRun>& runs) {
   ScalingCurve curve;
   curve.title = setting.model + ": speed by threads";
-  curve.captions = {fmt::format("{}; {}, {}", setting.machine, setting.isa, to_string(setting.options.precision)),
-                    fmt::format("scene {}, {} environments, {} steps",
-                                std::filesystem::path(setting.scene).filename().string(),
-                                setting.environments, setting.options.rollout.steps),
-                    fmt::format("{}; {} pass{}", frames_text(setting), setting.options.repeat,
-                                setting.options.repeat == 1 ? "" : "es")};
+  curve.captions = {
+      fmt::format("{}; {}, {}", setting.machine, setting.isa, to_string(setting.options.precision)),
+      fmt::format("scene {}, {} environments, {} steps",
+                  std::filesystem::path(setting.scene).filename().string(), setting.environments,
+                  setting.options.rollout.steps),
+      fmt::format("{}; {} pass{}", frames_text(setting), setting.options.repeat,
+                  setting.options.repeat == 1 ? "" : "es")};
   for (const BenchRun& run : runs)
     curve.points.push_back({run.threads,
                             rate(run.result.environment_steps, run.result.best().seconds),

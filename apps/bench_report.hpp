@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `tangere bench` measured, as a table for people, an object for programs, a CSV table and a picture.
+// What `tangere bench` measured, as a table for people, an object for programs, a CSV table and a
+// picture.
 #pragma once
 
 #include <string>

@@ -18,9 +18,11 @@ struct Options {
 int export_table(const Options& options, const Console& console) {
   check_not_same_file(options.output, options.input);
   const ExportResult result = export_csv(find_dataset(options.input), options.output, options.what);
-  console.print(fmt::format("wrote {}: {} rows of {} columns", options.output, result.rows, result.columns));
+  console.print(
+      fmt::format("wrote {}: {} rows of {} columns", options.output, result.rows, result.columns));
   if (!result.left_out.empty())
-    console.note(fmt::format("too wide for a table, left out: {}", fmt::join(result.left_out, ", ")));
+    console.note(
+        fmt::format("too wide for a table, left out: {}", fmt::join(result.left_out, ", ")));
   console.result({{"command", "export"},
                   {"exit_code", static_cast<int>(kDone)},
                   {"input", options.input},
@@ -40,7 +42,8 @@ Command add_export(CLI::App& program) {
   CLI::App* app = program.add_subcommand("export", "Write rows of a data set as a table");
   add_text(*app, "DIR", o.input, "", "Folder of shards, or one file of a data set")->required();
   add_text(*app, "--csv", o.output, "F.csv", "Table to write")->required();
-  add_whole_number<std::int64_t>(*app, "--episode", o.what.episode, 0, 1'000'000'000, "That episode alone");
+  add_whole_number<std::int64_t>(*app, "--episode", o.what.episode, 0, 1'000'000'000,
+                                 "That episode alone");
   app->add_flag("--overwrite", o.what.overwrite, "Replace the output if it exists");
   add_console_options(*app, *console);
   app->footer("Example:\n  tangere export balls --csv balls.csv --episode 3");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere generate: a scene or a task, many episodes on all cores, a folder of shards. Everything is checked
-// before the first step.
+// tangere generate: a scene or a task, many episodes on all cores, a folder of shards. Everything
+// is checked before the first step.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -63,15 +63,17 @@ std::vector<std::string> words_of(const std::string& list) {
   for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
     end = list.find(',', begin);
     words.push_back(list.substr(begin, end == std::string::npos ? end : end - begin));
-    if (words.back().empty()) throw InputError(fmt::format("--record '{}'; expected names separated by commas", list));
+    if (words.back().empty())
+      throw InputError(fmt::format("--record '{}'; expected names separated by commas", list));
   }
   return words;
 }
 
 /// What makes the same data set again, wherever and on however many threads.
-std::string command_of(const GenerateOptions& options, const EpisodeOptions& run, const std::string& policy) {
-  std::string command = fmt::format("tangere generate {} --episodes {} --seed {} --precision {}", options.scene,
-                                    run.episodes, run.seed, options.precision);
+std::string command_of(const GenerateOptions& options, const EpisodeOptions& run,
+                       const std::string& policy) {
+  std::string command = fmt::format("tangere generate {} --episodes {} --seed {} --precision {}",
+                                    options.scene, run.episodes, run.seed, options.precision);
   if (policy.empty()) command += fmt::format(" --steps {} --every {}", run.steps, run.every);
   if (!policy.empty()) command += " --policy " + policy;
   if (!options.controls.empty()) command += " --controls " + options.controls;
@@ -85,8 +87,9 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
 }
 
 /// `task`: null for a scene alone.
-DatasetLayout make_layout(const GenerateOptions& options, const Model& model, const Stepper& stepper,
-                          const EpisodeOptions& run, const ProgramInfo& info, const GradientPlan& gradients,
+DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
+                          const Stepper& stepper, const EpisodeOptions& run,
+                          const ProgramInfo& info, const GradientPlan& gradients,
                           const Task* task = nullptr, const std::string& policy = {}) {
   DatasetDescription description;
   if (task != nullptr) description.task = task->spec();
@@ -97,7 +100,8 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model, co
   description.compression = options.compress;
   description.record = words_of(options.record);
   description.sparse = options.tactile == "sparse";
-  description.gradients_of = options.loss.empty() ? options.gradients : options.gradients + " " + options.loss;
+  description.gradients_of =
+      options.loss.empty() ? options.gradients : options.gradients + " " + options.loss;
   description.gradients = gradients.arrays;
   description.episodes = run.episodes;
   description.steps = run.steps;
@@ -130,15 +134,19 @@ TaskReport report_of(const Task& task, PolicyKind policy, const TaskEpisodeSumma
   report.keys = {{"task", task.spec().name},
                  {"policy", to_string(policy)},
                  {"successes", summary.successes},
-                 {"success_rate", played > 0 ? Json(static_cast<double>(summary.successes) / static_cast<double>(played)) : Json()},
+                 {"success_rate", played > 0 ? Json(static_cast<double>(summary.successes) /
+                                                    static_cast<double>(played))
+                                             : Json()},
                  {"mean_return", played > 0 ? Json(summary.mean_return) : Json()},
                  {"simulation_steps", summary.simulation_steps}};
-  report.line = fmt::format("task {}, policy {}: {} of {} episodes solved, mean return {:.4g}", task.spec().name,
-                            to_string(policy), summary.successes, played, summary.mean_return);
+  report.line = fmt::format("task {}, policy {}: {} of {} episodes solved, mean return {:.4g}",
+                            task.spec().name, to_string(policy), summary.successes, played,
+                            summary.mean_return);
   return report;
 }
 
-/// What is done to finished blocks by many threads: gradients are taken there, too. Checksums always are; they take least.
+/// What is done to finished blocks by many threads: gradients are taken there, too. Checksums
+/// always are; they take least.
 std::string preparation_of(const Job& job) {
   std::vector<std::string> kinds;
   if (!job.layout.gradients.empty()) kinds.emplace_back("gradients");
@@ -147,36 +155,42 @@ std::string preparation_of(const Job& job) {
   return kinds.empty() ? "checksums" : fmt::format("{}", fmt::join(kinds, " and "));
 }
 
-/// Which of the three kinds of work kept the others waiting, and for how long all of them were at it.
+/// Which of the three kinds of work kept the others waiting, and for how long all of them were at
+/// it.
 std::string limit_of(const EpisodeSummary& summary, const Job& job) {
   const EpisodeOptions& run = job.run;
-  const double simulation = summary.simulation_seconds / run.threads, encoding = summary.encoding_seconds / run.threads;
+  const double simulation = summary.simulation_seconds / run.threads,
+               encoding = summary.encoding_seconds / run.threads;
   if (summary.writing_seconds >= std::max(simulation, encoding)) return "writing";
   return simulation >= encoding ? "simulation" : preparation_of(job);
 }
 
-int report(const GenerateOptions& options, const Console& console, const Job& job, const JobResult& done,
-           DatasetWriter& output) {
+int report(const GenerateOptions& options, const Console& console, const Job& job,
+           const JobResult& done, DatasetWriter& output) {
   const EpisodeSummary& summary = done.summary;
   const EpisodeOptions& run = job.run;
   const std::vector<std::string> shards = output.shards();
   const ExitCode code = summary.failures.empty() && output.kept_failed() == 0 ? kDone : kSomeFailed;
   std::uintmax_t bytes = 0;
   for (const std::string& shard : shards) bytes += std::filesystem::file_size(shard);
-  const Merged merged = merge_if_complete(options, output);  // from now on others may replace the shards
+  const Merged merged =
+      merge_if_complete(options, output);  // from now on others may replace the shards
   const double rate =
       summary.seconds > 0 ? static_cast<double>(summary.environment_steps) / summary.seconds : 0;
   list_failures(console, "episode", failures_of(summary), "--json and the shards name all");
   const std::string kept = output.kept() == 0
                                ? ""
-                               : fmt::format("kept: {} of them, episodes failed in these: {}\n", output.kept(),
-                                             output.kept_failed());
-  console.print(
-      fmt::format("episodes: {}, rows: {}, time: {:.2f} s, {:.0f} env-steps/s with output, "
-                  "threads: {}\nlimited by {}: simulation {:.2f} s and {} {:.2f} s of all threads, writing {:.2f} s of one\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes){}",
-                  summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, job),
-                  summary.simulation_seconds, preparation_of(job), summary.encoding_seconds, summary.writing_seconds, done.task.line, summary.split_steps, summary.failures.size(), kept, options.output,
-                  shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes, merged.line));
+                               : fmt::format("kept: {} of them, episodes failed in these: {}\n",
+                                             output.kept(), output.kept_failed());
+  console.print(fmt::format(
+      "episodes: {}, rows: {}, time: {:.2f} s, {:.0f} env-steps/s with output, "
+      "threads: {}\nlimited by {}: simulation {:.2f} s and {} {:.2f} s of all threads, writing "
+      "{:.2f} s of one\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes){}",
+      summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, job),
+      summary.simulation_seconds, preparation_of(job), summary.encoding_seconds,
+      summary.writing_seconds, done.task.line, summary.split_steps, summary.failures.size(), kept,
+      options.output, shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()),
+      bytes, merged.line));
   Json result{{"command", "generate"},
               {"exit_code", static_cast<int>(code)},
               {"scene", options.scene},
@@ -216,11 +230,12 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
   return code;
 }
 
-int stopped(const GenerateOptions& options, const Console& console, int signal, std::int64_t episodes,
-            std::int64_t asked, const DatasetWriter& output) {
-  return report_stop(console, "generate", signal, fmt::format("after {} of {} episodes", episodes, asked),
-                     fmt::format("complete shards in '{}': {}", options.output, output.shards().size()),
-                     {{"shards", output.shards()}});
+int stopped(const GenerateOptions& options, const Console& console, int signal,
+            std::int64_t episodes, std::int64_t asked, const DatasetWriter& output) {
+  return report_stop(
+      console, "generate", signal, fmt::format("after {} of {} episodes", episodes, asked),
+      fmt::format("complete shards in '{}': {}", options.output, output.shards().size()),
+      {{"shards", output.shards()}});
 }
 
 /// Says before anything is made what cannot be done: tapes that are too small.
@@ -247,21 +262,26 @@ int make(const GenerateOptions& options, const Console& console, const Job& job)
   run.ranges = output.missing();
   std::int64_t episodes = 0;
   for (const EpisodeRange& range : run.ranges) episodes += range.end - range.first;
-  console.detail(fmt::format("episodes: {}, steps: {}, a row every {}, threads: {}, shards kept: {}", episodes,
-                             run.steps, run.every, run.threads, output.kept()));
+  console.detail(
+      fmt::format("episodes: {}, steps: {}, a row every {}, threads: {}, shards kept: {}", episodes,
+                  run.steps, run.every, run.threads, output.kept()));
   JobResult done;
   if (episodes > 0) {
-    Progress progress(console, job.unit, episodes * (job.layout.task ? job.layout.rows() : run.steps), 1);
+    Progress progress(console, job.unit,
+                      episodes * (job.layout.task ? job.layout.rows() : run.steps), 1);
     done = job.simulate(
-        run, output, [&](std::int64_t steps) { progress.update(steps); }, [&] { return signals.received() != 0; });
+        run, output, [&](std::int64_t steps) { progress.update(steps); },
+        [&] { return signals.received() != 0; });
   }
   if (done.summary.stopped)
     return stopped(options, console, signals.received(), done.summary.episodes, episodes, output);
   return report(options, console, job, done, output);
 }
 
-int generate_task(const GenerateOptions& options, const Console& console, const ProgramInfo& info, const Task& task) {
-  refuse_with_task(task, {{"--steps", options.steps.has_value()}, {"--every", options.every.has_value()}});
+int generate_task(const GenerateOptions& options, const Console& console, const ProgramInfo& info,
+                  const Task& task) {
+  refuse_with_task(
+      task, {{"--steps", options.steps.has_value()}, {"--every", options.every.has_value()}});
   const PolicyKind kind = policy_named(options.policy, options.controls, PolicyKind::scripted);
   const Policy policy = make_policy(task, kind, options.controls);
   Job job;
@@ -275,7 +295,8 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
     return TaskEpisodeOptions{run.episodes, run.ranges, run.seed, run.precision, run.threads};
   };
   const GradientKind gradients = gradients_wanted(options, true);
-  const TaskActions actions = [&](const TaskView& view, std::span<const double> observation, std::span<double> action) {
+  const TaskActions actions = [&](const TaskView& view, std::span<const double> observation,
+                                  std::span<double> action) {
     policy.act(view, observation, action);
   };
   const auto plan_of = [&](const EpisodeOptions& run) {
@@ -286,7 +307,8 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
   job.unit = "action";
   job.effects = effects_of(task.model());
-  job.layout = make_layout(options, task.model(), Stepper(task.model()), job.run, info, plan, &task, to_string(kind));
+  job.layout = make_layout(options, task.model(), Stepper(task.model()), job.run, info, plan, &task,
+                           to_string(kind));
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
     const TaskEpisodeSummary summary = with_gradients(plan_of(run), sink, [&](EpisodeSink& to) {
@@ -308,14 +330,17 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   check_word("compression", options.compress, {"none", "deflate", "lz4"});
   check_word("kind of tactile fields", options.tactile, {"dense", "sparse"});
   if (options.compress == "lz4")
-    console.note("compressed with LZ4: other programs need the HDF5 plug-in for filter 32004 to read it");
+    console.note(
+        "compressed with LZ4: other programs need the HDF5 plug-in for filter 32004 to read it");
   if (options.resume && options.overwrite)
-    throw InputError("--resume with --overwrite; expected one of them: keep shards, or replace them");
+    throw InputError(
+        "--resume with --overwrite; expected one of them: keep shards, or replace them");
   if (!options.shard.empty()) {
     const Worker shard = worker_named(options.shard);
     if (options.shards.value_or(shard.count) != shard.count)
-      throw InputError(fmt::format("--shard {} with --shards {}; expected the same number of shards", options.shard,
-                                   *options.shards));
+      throw InputError(
+          fmt::format("--shard {} with --shards {}; expected the same number of shards",
+                      options.shard, *options.shards));
     options.shards = shard.count;
   }
   if (const std::unique_ptr<Task> task = find_task(options.scene, console))
@@ -331,7 +356,8 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   std::unique_ptr<RolloutLoss> loss;
   if (!options.loss.empty()) loss = make_loss(loss_named(options.loss), model, job.run.every);
   const auto plan_of = [&](const EpisodeOptions& run) {
-    return scene_gradients(model, controls, run, gradients, loss.get(), loss ? loss_meaning(loss_named(options.loss)) : "",
+    return scene_gradients(model, controls, run, gradients, loss.get(),
+                           loss ? loss_meaning(loss_named(options.loss)) : "",
                            tape_bytes(options, run.threads));
   };
   const GradientPlan plan = checked(plan_of(job.run));
@@ -342,7 +368,11 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   job.layout = make_layout(options, model, stepper, job.run, info, plan);
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
-    return {with_gradients(plan_of(run), sink, [&](EpisodeSink& to) { return run_episodes(model, {}, controls, run, to, progress, stop); }), {}};
+    return {with_gradients(plan_of(run), sink,
+                           [&](EpisodeSink& to) {
+                             return run_episodes(model, {}, controls, run, to, progress, stop);
+                           }),
+            {}};
   };
   return make(options, console, job);
 }
@@ -353,15 +383,16 @@ Command add_generate(CLI::App& program) {
   const auto options = std::make_shared<GenerateOptions>();
   const auto console = std::make_shared<Console>();
   GenerateOptions& o = *options;
-  CLI::App* app =
-      program.add_subcommand("generate", "Run many episodes of a scene or a task and write a data set");
+  CLI::App* app = program.add_subcommand(
+      "generate", "Run many episodes of a scene or a task and write a data set");
   add_text(*app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task")->required();
   add_text(*app, "-o,--output", o.output, "DIR", "Folder to write shards into")->required();
   add_whole_number<std::int64_t>(*app, "--episodes", o.episodes, 1, kMostEpisodes,
                                  "Episodes to simulate")
       ->required();
-  add_text(*app, "--controls", o.controls, "U.csv",
-           "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
+  add_text(
+      *app, "--controls", o.controls, "U.csv",
+      "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
   add_text(*app, "--policy", o.policy, "NAME",
            "Of a task: random, hold, csv (with --controls) or scripted [default: scripted]");
   add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
@@ -374,21 +405,27 @@ Command add_generate(CLI::App& program) {
            "Of tactile fields: double, or mixed, stored as float32 [default: mixed]");
   add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between episodes [default: 0]");
-  add_text(*app, "--compress", o.compress, "NAME", "Of tactile fields on disk: none, deflate or lz4, which needs a plug-in to read [default: none]");
+  add_text(*app, "--compress", o.compress, "NAME",
+           "Of tactile fields on disk: none, deflate or lz4, which needs a plug-in to read "
+           "[default: none]");
   add_text(*app, "--tactile", o.tactile, "KIND",
            "Of large fields on disk: dense, or sparse: tiles of zeros left out [default: dense]");
   add_text(*app, "--record", o.record, "LIST",
            "Observations to store, separated by commas [default: all]");
   add_text(*app, "--gradients", o.gradients, "KIND",
-           "Derivatives as well: none, return (of a scene: with --loss), or jacobians, row by row [default: none]");
+           "Derivatives as well: none, return (of a scene: with --loss), or jacobians, row by row "
+           "[default: none]");
   add_text(*app, "--loss", o.loss, "NAME",
            "Of a scene, with --gradients return: final, path, tactile, shear or variables");
-  add_memory_size(*app, "--tape-memory", o.tape_memory,
-                  "With --gradients return: states kept for them by all threads [default: 1GB each]");
+  add_memory_size(
+      *app, "--tape-memory", o.tape_memory,
+      "With --gradients return: states kept for them by all threads [default: 1GB each]");
   add_whole_number<std::int64_t>(*app, "--shards", o.shards, 1, kMostEpisodes,
                                  "Files to cut the data set into [default: below a gigabyte each]");
-  add_text(*app, "--shard", o.shard, "k/S", "Make shard k of S alone, k from 0; others may run beside it");
-  app->add_flag("--resume", o.resume, "Keep the shards in the folder, of the same settings, and make the rest");
+  add_text(*app, "--shard", o.shard, "k/S",
+           "Make shard k of S alone, k from 0; others may run beside it");
+  app->add_flag("--resume", o.resume,
+                "Keep the shards in the folder, of the same settings, and make the rest");
   app->add_flag("--no-merge", o.no_merge, "Shards alone: do not merge them when all are there");
   app->add_flag("--dry-run", o.dry_run, "Say what would be made, and how long it may take");
   app->add_flag("--overwrite", o.overwrite, "Replace the shards in the folder");

@@ -31,11 +31,14 @@ struct Extent {
 };
 
 /// What this process would make; nothing is opened or created.
-Extent extent_of(const GenerateOptions& options, const DatasetLayout& layout, const DatasetOutput& output) {
+Extent extent_of(const GenerateOptions& options, const DatasetLayout& layout,
+                 const DatasetOutput& output) {
   Extent extent;
   for (std::int64_t shard = 0; shard < layout.shard_count(); ++shard) {
-    if (output.only && !std::binary_search(output.only->begin(), output.only->end(), shard)) continue;
-    const std::string path = (fs::path(options.output) / fmt::format("shard-{:05}.h5", shard)).string();
+    if (output.only && !std::binary_search(output.only->begin(), output.only->end(), shard))
+      continue;
+    const std::string path =
+        (fs::path(options.output) / fmt::format("shard-{:05}.h5", shard)).string();
     if (options.resume && fs::exists(path)) {
       ++extent.kept;
       continue;
@@ -47,7 +50,8 @@ Extent extent_of(const GenerateOptions& options, const DatasetLayout& layout, co
   return extent;
 }
 
-/// Environment steps per second of a first block for each thread, over as many steps as take about a second.
+/// Environment steps per second of a first block for each thread, over as many steps as take about
+/// a second.
 double measured_rate(const Job& job) {
   EpisodeOptions some = job.run;
   some.ranges.clear();
@@ -73,7 +77,8 @@ double free_bytes_at(const std::string& path) {
 
 GradientKind gradient_kind_named(const std::string& name) {
   std::vector<std::string> names;
-  for (const GradientKind kind : {GradientKind::none, GradientKind::returns, GradientKind::jacobians}) {
+  for (const GradientKind kind :
+       {GradientKind::none, GradientKind::returns, GradientKind::jacobians}) {
     names.emplace_back(to_string(kind));
     if (names.back() == name) return kind;
   }
@@ -85,18 +90,24 @@ GradientKind gradient_kind_named(const std::string& name) {
 GradientKind gradients_wanted(const GenerateOptions& options, bool of_task) {
   const GradientKind kind = gradient_kind_named(options.gradients);
   if (options.tape_memory && kind != GradientKind::returns)
-    throw InputError(fmt::format("--tape-memory with --gradients {}; expected --gradients return", options.gradients));
+    throw InputError(fmt::format("--tape-memory with --gradients {}; expected --gradients return",
+                                 options.gradients));
   if (!options.loss.empty() && (of_task || kind != GradientKind::returns))
-    throw InputError(fmt::format("--loss {} with {}; expected a scene and --gradients return", options.loss,
+    throw InputError(fmt::format("--loss {} with {}; expected a scene and --gradients return",
+                                 options.loss,
                                  of_task ? "a task" : "--gradients " + options.gradients));
   if (!of_task && kind == GradientKind::returns && options.loss.empty())
-    throw InputError("--gradients return of a scene, which has no rewards; expected --loss as well");
+    throw InputError(
+        "--gradients return of a scene, which has no rewards; expected --loss as well");
   return kind;
 }
 
-double tape_bytes(const GenerateOptions& options, int threads) { return options.tape_memory.value_or(1e9 * threads) / threads; }
+double tape_bytes(const GenerateOptions& options, int threads) {
+  return options.tape_memory.value_or(1e9 * threads) / threads;
+}
 
-DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& layout, const Console& console) {
+DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& layout,
+                         const Console& console) {
   DatasetOutput output{options.output, ExistingShards::refuse, std::nullopt};
   if (options.resume) output.existing = ExistingShards::keep;
   if (options.overwrite) output.existing = ExistingShards::replace;
@@ -108,8 +119,8 @@ DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& la
   const Worker worker = worker_from_environment();
   if (worker.source.empty()) return output;
   output.only = shards_of(worker, shards);
-  console.note(fmt::format("process {} of {} ({}): makes {} of {} shards", worker.index, worker.count, worker.source,
-                           output.only->size(), shards));
+  console.note(fmt::format("process {} of {} ({}): makes {} of {} shards", worker.index,
+                           worker.count, worker.source, output.only->size(), shards));
   return output;
 }
 
@@ -136,19 +147,23 @@ Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output) 
 int dry_run(const GenerateOptions& options, const Console& console, const Job& job) {
   job.layout.check();
   const Extent extent = extent_of(options, job.layout, output_for(options, job.layout, console));
-  const double of_one = job.layout.episode_bytes(), bytes = of_one * static_cast<double>(extent.episodes);
+  const double of_one = job.layout.episode_bytes(),
+               bytes = of_one * static_cast<double>(extent.episodes);
   const double free = free_bytes_at(options.output), rate = measured_rate(job);
   // Of a task: actions, if every episode lasts as long as it may.
   const double steps = static_cast<double>(extent.episodes) *
                        static_cast<double>(job.layout.task ? job.layout.rows() : job.layout.steps);
   const double seconds = steps / rate;
   console.print(fmt::format(
-      "would make {} episodes of {} steps, {} rows each, in {} (kept: {})\n{:.0f} bytes each, {:.0f} in all at least; "
-      "free on the disk: {:.0f}\nmemory for {} threads: {:.0f} bytes\nabout {:.0f} s of simulation, at {:.0f} env-steps/s "
+      "would make {} episodes of {} steps, {} rows each, in {} (kept: {})\n{:.0f} bytes each, "
+      "{:.0f} in all at least; "
+      "free on the disk: {:.0f}\nmemory for {} threads: {:.0f} bytes\nabout {:.0f} s of "
+      "simulation, at {:.0f} env-steps/s "
       "as measured now, without output\neffects: {}\nnothing was written",
       extent.episodes, job.layout.steps, job.layout.rows(),
-      extent.shards.size() == 1 ? "1 shard" : fmt::format("{} shards", extent.shards.size()), extent.kept, of_one,
-      bytes, free, job.run.threads, job.memory_bytes, seconds, rate, fmt::join(job.effects, ", ")));
+      extent.shards.size() == 1 ? "1 shard" : fmt::format("{} shards", extent.shards.size()),
+      extent.kept, of_one, bytes, free, job.run.threads, job.memory_bytes, seconds, rate,
+      fmt::join(job.effects, ", ")));
   console.result({{"command", "generate"},
                   {"exit_code", static_cast<int>(kDone)},
                   {"dry_run", true},

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere gradcheck: are the gradients of this scene, or of this task's return, right? A table per input, and one number.
+// tangere gradcheck: are the gradients of this scene, or of this task's return, right? A table per
+// input, and one number.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,7 +22,8 @@ namespace {
 
 constexpr std::int64_t kDefaultSteps = 100;
 constexpr int kDefaultEntries = 24;
-constexpr double kTolerance = 1e-12;  // what a solve leaves is what differences of rollouts cannot see through
+constexpr double kTolerance =
+    1e-12;  // what a solve leaves is what differences of rollouts cannot see through
 
 struct Options {
   std::string scene, loss, controls, policy;
@@ -48,28 +50,37 @@ std::int64_t steps_of(const Options& o, const ControlProgram& controls) {
 }
 
 /// A check that compares nothing shows nothing.
-ExitCode exit_code(const GradientCheck& check) { return check.entries() == 0 ? kSomeFailed : kDone; }
+ExitCode exit_code(const GradientCheck& check) {
+  return check.entries() == 0 ? kSomeFailed : kDone;
+}
 
 /// Why, and what may help. `what`: the loss.
-std::string nothing_compared(const GradientCheck& check, const char* what, const char* try_instead) {
-  const auto without = std::count_if(check.inputs.begin(), check.inputs.end(), [](const CheckedInput& c) { return !c.influence; });
+std::string nothing_compared(const GradientCheck& check, const char* what,
+                             const char* try_instead) {
+  const auto without = std::count_if(check.inputs.begin(), check.inputs.end(),
+                                     [](const CheckedInput& c) { return !c.influence; });
   std::string why;
   if (check.kinks() == 0)
     why = fmt::format("no input acts on the {} here, its gradient is zero", what);
   else if (without == 0)
     why = fmt::format("all {} derivatives looked at lie at kinks of the {}", check.kinks(), what);
   else
-    why = fmt::format("{} derivatives lie at kinks of the {}, and other inputs do not act on it here", check.kinks(), what);
+    why =
+        fmt::format("{} derivatives lie at kinks of the {}, and other inputs do not act on it here",
+                    check.kinks(), what);
   return fmt::format("nothing could be compared with differences: {}; try {}", why, try_instead);
 }
 
 /// `what`: the loss; `try_instead`: where nothing can be compared.
-void print(const Console& console, const GradientCheck& check, const char* what, const char* try_instead) {
-  console.print(fmt::format("{:<8} {:>7} {:>8} {:>6} {:>12} {:>12} {:>12}  {}", "input", "entries", "compared", "kinks", "norm",
-                            "differences", "tangent", "largest difference at"));
+void print(const Console& console, const GradientCheck& check, const char* what,
+           const char* try_instead) {
+  console.print(fmt::format("{:<8} {:>7} {:>8} {:>6} {:>12} {:>12} {:>12}  {}", "input", "entries",
+                            "compared", "kinks", "norm", "differences", "tangent",
+                            "largest difference at"));
   for (const CheckedInput& c : check.inputs)
-    console.print(fmt::format("{:<8} {:>7} {:>8} {:>6} {:>12.4e} {:>12.1e} {:>12.1e}  {}", c.name, c.entries, c.compared, c.kinks,
-                              c.norm, c.difference_error, c.tangent_error, c.worst));
+    console.print(fmt::format("{:<8} {:>7} {:>8} {:>6} {:>12.4e} {:>12.1e} {:>12.1e}  {}", c.name,
+                              c.entries, c.compared, c.kinks, c.norm, c.difference_error,
+                              c.tangent_error, c.worst));
   for (const CheckedInput& c : check.inputs)
     if (!c.influence)
       console.note(fmt::format("{} do not act on this loss here: nothing to compare", c.name));
@@ -77,8 +88,10 @@ void print(const Console& console, const GradientCheck& check, const char* what,
     console.fail(nothing_compared(check, what, try_instead));
     return;
   }
-  console.print(fmt::format("largest error {:.1e} of a gradient's norm, {} derivatives compared with differences, {} kinks",
-                            check.max_relative_error(), check.entries(), check.kinks()));
+  console.print(
+      fmt::format("largest error {:.1e} of a gradient's norm, {} derivatives compared with "
+                  "differences, {} kinks",
+                  check.max_relative_error(), check.entries(), check.kinks()));
 }
 
 Json json_of(const GradientCheck& check) {
@@ -112,8 +125,10 @@ Json json_of_check(const GradientCheck& check, std::uint64_t seed, const Stepper
 /// --actions, or as many as take a hundred steps.
 std::int64_t actions_of(const Options& o, const TaskSpec& spec) {
   if (o.actions.value_or(0) > spec.horizon)
-    throw InputError(fmt::format("--actions {} with task '{}'; expected at most {}, its horizon", *o.actions, spec.name, spec.horizon));
-  return o.actions.value_or(std::clamp<std::int64_t>(kDefaultSteps / spec.steps_per_action, 1, spec.horizon));
+    throw InputError(fmt::format("--actions {} with task '{}'; expected at most {}, its horizon",
+                                 *o.actions, spec.name, spec.horizon));
+  return o.actions.value_or(
+      std::clamp<std::int64_t>(kDefaultSteps / spec.steps_per_action, 1, spec.horizon));
 }
 
 int run_task(const Options& o, const Console& console, const Task& task) {
@@ -130,8 +145,9 @@ int run_task(const Options& o, const Console& console, const Task& task) {
   options.seed = o.seed.value_or(0);
   options.stepper.tolerance = std::min(task.model().solver().tolerance, kTolerance);
   const Stepper stepper(task.model());
-  console.print(fmt::format("task {}: at most {} actions of {} steps of {:g} s, {}, policy {}", spec.name, options.actions,
-                            spec.steps_per_action, stepper.timestep(), to_string(stepper.integrator()), to_string(kind)));
+  console.print(fmt::format("task {}: at most {} actions of {} steps of {:g} s, {}, policy {}",
+                            spec.name, options.actions, spec.steps_per_action, stepper.timestep(),
+                            to_string(stepper.integrator()), to_string(kind)));
   const TaskGradientCheck check = check_task_gradient(
       task, [&](const Scene& scene) { return make_task(spec.name, scene); },
       [&](const TaskView& view, std::span<const double> observation, std::span<double> action) {
@@ -151,11 +167,14 @@ int run_task(const Options& o, const Console& console, const Task& task) {
 }
 
 int run(const Options& o, const Console& console) {
-  if (const std::unique_ptr<Task> task = find_task(o.scene, console)) return run_task(o, console, *task);
-  refuse_with_scene(o.scene, {{"--actions", o.actions.has_value()}, {"--policy", !o.policy.empty()}});
+  if (const std::unique_ptr<Task> task = find_task(o.scene, console))
+    return run_task(o, console, *task);
+  refuse_with_scene(o.scene,
+                    {{"--actions", o.actions.has_value()}, {"--policy", !o.policy.empty()}});
   const Model model(read_scene_for(o.scene, o.allow_unknown, console));
   const Stepper stepper(model);
-  const ControlProgram controls = make_controls(o.controls, o.seed.value_or(0), model, stepper, console);
+  const ControlProgram controls =
+      make_controls(o.controls, o.seed.value_or(0), model, stepper, console);
   CheckOptions options;
   options.steps = steps_of(o, controls);
   options.entries = o.entries.value_or(kDefaultEntries);
@@ -168,14 +187,20 @@ int run(const Options& o, const Console& console) {
   if (!model.sensors().empty()) every = tactile_interval(model.sensors()[0], rollout);
   const auto loss = make_loss(kind, model, every);
   const Batch start(model, 1, o.seed.value_or(0));
-  console.print(fmt::format("{}: {} steps of {:g} s, {}, loss {}", model.scene().name, options.steps, stepper.timestep(),
-                            to_string(stepper.integrator()), to_string(kind)));
+  console.print(fmt::format("{}: {} steps of {:g} s, {}, loss {}", model.scene().name,
+                            options.steps, stepper.timestep(), to_string(stepper.integrator()),
+                            to_string(kind)));
   const GradientCheck check = check_gradient(
-      start, [&](std::int64_t step, int, std::span<double> u) { controls.evaluate(step, 0, u); }, *loss, options);
+      start, [&](std::int64_t step, int, std::span<double> u) { controls.evaluate(step, 0, u); },
+      *loss, options);
   console.print(fmt::format("loss {:.9g}", check.loss));
   print(console, check, "loss", "another --seed, --loss or --steps");
   Json result = json_of_check(check, options.seed, stepper);
-  result.update({{"scene", o.scene}, {"task", nullptr}, {"loss_name", to_string(kind)}, {"steps", options.steps}, {"every", every}});
+  result.update({{"scene", o.scene},
+                 {"task", nullptr},
+                 {"loss_name", to_string(kind)},
+                 {"steps", options.steps},
+                 {"every", every}});
   console.result(result);
   return exit_code(check);
 }
@@ -186,28 +211,39 @@ Command add_gradcheck(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
   Options& o = *options;
-  CLI::App* app = program.add_subcommand("gradcheck", "Check gradients of a scene or a task against differences and tangents");
-  add_text(*app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task: then of its return")->required();
+  CLI::App* app = program.add_subcommand(
+      "gradcheck", "Check gradients of a scene or a task against differences and tangents");
+  add_text(*app, "SCENE", o.scene, "",
+           "Scene file (XML), or the name of a task: then of its return")
+      ->required();
   add_text(*app, "--loss", o.loss, "NAME",
-           "final: last state; path: speeds; tactile, shear: fields; variables: end effectors [default: tactile, or final "
+           "final: last state; path: speeds; tactile, shear: fields; variables: end effectors "
+           "[default: tactile, or final "
            "where there is no sensor]");
-  add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
-                                 "Steps of the rollout [default: as many as the controls last, 100 at most]");
-  add_whole_number<std::int64_t>(*app, "--actions", o.actions, 1, kMostSteps,
-                                 "Of a task: actions of the episode at most [default: as many as take a hundred steps]");
+  add_whole_number<std::int64_t>(
+      *app, "--steps", o.steps, 1, kMostSteps,
+      "Steps of the rollout [default: as many as the controls last, 100 at most]");
+  add_whole_number<std::int64_t>(
+      *app, "--actions", o.actions, 1, kMostSteps,
+      "Of a task: actions of the episode at most [default: as many as take a hundred steps]");
   add_text(*app, "--policy", o.policy, "NAME",
            "Of a task: random, hold, csv (with --controls) or scripted [default: scripted]");
   add_whole_number<int>(*app, "--every", o.every, 1, std::numeric_limits<int>::max(),
                         "Tactile fields every N-th step [default: the scene's, or 1]");
-  add_whole_number<int>(*app, "--entries", o.entries, 0, std::numeric_limits<int>::max(),
-                        "Derivatives of each input compared with differences, drawn; 0: all [default: 24]");
-  add_text(*app, "--controls", o.controls, "F.csv", "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
-  add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, std::numeric_limits<std::uint64_t>::max(),
-                                  "Seed of the environment or episode, of the draw and of the directions [default: 0]");
+  add_whole_number<int>(
+      *app, "--entries", o.entries, 0, std::numeric_limits<int>::max(),
+      "Derivatives of each input compared with differences, drawn; 0: all [default: 24]");
+  add_text(
+      *app, "--controls", o.controls, "F.csv",
+      "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
+  add_whole_number<std::uint64_t>(
+      *app, "--seed", o.seed, 0, std::numeric_limits<std::uint64_t>::max(),
+      "Seed of the environment or episode, of the draw and of the directions [default: 0]");
   app->add_flag("--allow-unknown", o.allow_unknown,
                 "Unknown elements and attributes of the scene are warnings, not errors");
   add_console_options(*app, *console);
-  app->footer("Example:\n  tangere gradcheck scenes/rolling_ball_small.xml --loss shear --steps 100");
+  app->footer(
+      "Example:\n  tangere gradcheck scenes/rolling_ball_small.xml --loss shear --steps 100");
   return {app, [=](const ProgramInfo&) { return run(*options, *console); }};
 }
 

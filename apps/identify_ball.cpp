@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An example: the stiffness, damping and friction of a tactile skin and the mass of a ball from one noisy recording.
+// An example: the stiffness, damping and friction of a tactile skin and the mass of a ball from one
+// noisy recording.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -20,7 +21,8 @@ namespace tangere::apps {
 namespace {
 
 /// A sphere's density stands for its mass.
-const std::vector<std::string> kSought = {"tactile pad kn", "tactile pad kt", "tactile pad mu", "body ball density"};
+const std::vector<std::string> kSought = {"tactile pad kn", "tactile pad kt", "tactile pad mu",
+                                          "body ball density"};
 constexpr std::array<const char*, 4> kShort = {"kn", "kt", "mu", "mass"};
 constexpr std::array<const char*, 4> kUnits = {"N/m", "N s/m", "1", "g"};
 
@@ -34,7 +36,8 @@ struct Options {
 /// Values of the sought numbers as they are printed: the last a mass [g].
 std::vector<double> shown(const Scene& scene, std::vector<double> values) {
   for (const LinkDescription& link : scene.links)
-    if (const auto* ball = std::get_if<SphereShape>(&link.body.shape); ball != nullptr && link.body.name == "ball")
+    if (const auto* ball = std::get_if<SphereShape>(&link.body.shape);
+        ball != nullptr && link.body.name == "ball")
       values[3] *= 1e3 * 4.0 / 3.0 * std::numbers::pi * std::pow(ball->radius, 3);
   return values;
 }
@@ -55,25 +58,32 @@ std::vector<double> wrong_start(const std::vector<double>& truth, std::uint64_t 
 }
 
 void print_fit(const Scene& scene, const std::vector<double>& truth, const Identification& fit) {
-  fmt::print("{:>4} {:>12} {:>10}   {:>9} {:>9} {:>9} {:>9}\n", "", "misfit [N^2]", "|gradient|", "kn [N/m]", "kt [N s/m]",
-             "mu", "mass [g]");
+  fmt::print("{:>4} {:>12} {:>10}   {:>9} {:>9} {:>9} {:>9}\n", "", "misfit [N^2]", "|gradient|",
+             "kn [N/m]", "kt [N s/m]", "mu", "mass [g]");
   for (std::size_t k = 0; k < fit.points.size(); ++k) {
     const std::vector<double> v = shown(scene, fit.points[k].values);
-    fmt::print("{:>4} {:>12.5e} {:>10.2e}   {:>9.5f} {:>9.5f}  {:>9.5f} {:>9.5f}\n", k, fit.points[k].misfit,
-               fit.points[k].gradient, v[0], v[1], v[2], v[3]);
+    fmt::print("{:>4} {:>12.5e} {:>10.2e}   {:>9.5f} {:>9.5f}  {:>9.5f} {:>9.5f}\n", k,
+               fit.points[k].misfit, fit.points[k].gradient, v[0], v[1], v[2], v[3]);
   }
-  fmt::print("\n{:>5} {:>10} {:>10} {:>10} {:>12} {:>14}\n", "", "true", "found", "unit", "error [%]", "deviation [%]");
+  fmt::print("\n{:>5} {:>10} {:>10} {:>10} {:>12} {:>14}\n", "", "true", "found", "unit",
+             "error [%]", "deviation [%]");
   const std::vector<double> t = shown(scene, truth), found = shown(scene, fit.values());
   for (std::size_t k = 0; k < t.size(); ++k)
-    fmt::print("{:>5} {:>10.5f} {:>10.5f} {:>10} {:>12.3f} {:>14.3f}\n", kShort[k], t[k], found[k], kUnits[k],
-               100 * (found[k] / t[k] - 1), 100 * fit.deviation[k]);
-  fmt::print("\n{}; noise of a number: {:.3e} N; condition of the Fisher information (of logarithms): {:.1f}\n",
-             fit.converged ? "converged" : "NOT converged", fit.noise, fit.condition);
-  fmt::print("adjoint gradient against central differences at the start: {:.1e} of its norm\n", fit.gradient_difference);
+    fmt::print("{:>5} {:>10.5f} {:>10.5f} {:>10} {:>12.3f} {:>14.3f}\n", kShort[k], t[k], found[k],
+               kUnits[k], 100 * (found[k] / t[k] - 1), 100 * fit.deviation[k]);
+  fmt::print(
+      "\n{}; noise of a number: {:.3e} N; condition of the Fisher information (of logarithms): "
+      "{:.1f}\n",
+      fit.converged ? "converged" : "NOT converged", fit.noise, fit.condition);
+  fmt::print("adjoint gradient against central differences at the start: {:.1e} of its norm\n",
+             fit.gradient_difference);
 }
 
 CurvePanel misfit_panel(const Identification& fit) {
-  CurvePanel panel{"The fit", "iteration", "over its first value", true,
+  CurvePanel panel{"The fit",
+                   "iteration",
+                   "over its first value",
+                   true,
                    {{"misfit", {}, {}, false, 0}, {"|gradient|", {}, {}, false, 1}}};
   for (std::size_t k = 0; k < fit.points.size(); ++k) {
     for (Curve& c : panel.curves) c.x.push_back(static_cast<double>(k));
@@ -95,8 +105,10 @@ CurvePanel values_panel(const std::vector<double>& truth, const Identification& 
 }
 
 /// Forces of the whole pad over time, recorded and as the fit has them.
-CurvePanel forces_panel(const FieldSequence& recorded, const FieldSequence& fitted, double timestep) {
-  CurvePanel panel{"Force on the whole pad: recorded (dots) and fitted", "time [s]", "force [N]", false, {}};
+CurvePanel forces_panel(const FieldSequence& recorded, const FieldSequence& fitted,
+                        double timestep) {
+  CurvePanel panel{
+      "Force on the whole pad: recorded (dots) and fitted", "time [s]", "force [N]", false, {}};
   const std::array<const char*, 3> names = {"shear along axis0", "shear along axis1", "pressure"};
   for (const FieldSequence* s : {&recorded, &fitted})
     for (std::size_t c = 0; c < 3; ++c) {
@@ -119,13 +131,14 @@ int identify_ball(const Options& o) {
   const Model model(scene);
   const std::vector<double> truth = numbers_of(scene, kSought), start = wrong_start(truth, seed);
   const ControlProgram program(model, model.timestep(), 0);
-  const RecordedRun run{[&](std::int64_t t, int e, std::span<double> u) { program.evaluate(t, e, u); }, program.steps(),
-                        std::max(1, model.sensors()[0].every)};
+  const RecordedRun run{
+      [&](std::int64_t t, int e, std::span<double> u) { program.evaluate(t, e, u); },
+      program.steps(), std::max(1, model.sensors()[0].every)};
   FieldSequence recorded = simulate_fields(scene, run);
   const double noise = share * peak_of(recorded);
   add_noise(recorded, noise, seed);
-  fmt::print("{}: {} readings of {} points, noise {:.3e} N ({:.3g} % of the peak)\n", o.scene, recorded.readings.size(),
-             model.sensors()[0].points, noise, 100 * share);
+  fmt::print("{}: {} readings of {} points, noise {:.3e} N ({:.3g} % of the peak)\n", o.scene,
+             recorded.readings.size(), model.sensors()[0].points, noise, 100 * share);
   IdentificationOptions options;
   options.numbers = kSought;
   const Identification fit = identify(with_numbers(scene, kSought, start), run, recorded, options);
@@ -135,9 +148,11 @@ int identify_ball(const Options& o) {
     const std::array<CurvePanel, 3> panels = {misfit_panel(fit), values_panel(truth, fit),
                                               forces_panel(recorded, fitted, model.timestep())};
     const std::array<std::string, 1> captions = {
-        fmt::format("noise {:.3g} % of the peak, seed {}; condition of the information {:.1f}", 100 * share, seed,
-                    fit.condition)};
-    write_text_atomically(o.svg, render_curves_svg("A skin and a ball from a recording", captions, panels), o.overwrite);
+        fmt::format("noise {:.3g} % of the peak, seed {}; condition of the information {:.1f}",
+                    100 * share, seed, fit.condition)};
+    write_text_atomically(o.svg,
+                          render_curves_svg("A skin and a ball from a recording", captions, panels),
+                          o.overwrite);
     fmt::print("wrote {}\n", o.svg);
   }
   return fit.converged ? kDone : kSomeFailed;
@@ -145,13 +160,19 @@ int identify_ball(const Options& o) {
 
 int guarded(int argc, char** argv) {
   Options o;
-  CLI::App parser{"Finds k_n, k_t and mu of a tactile skin and the mass of a ball from a noisy recording.", "identify_ball"};
-  add_text(parser, "SCENE", o.scene, "", "Scene with a pad 'pad' and a ball 'ball' [default: scenes/identify_ball.xml]");
-  add_positive_number(parser, "--noise", o.noise, "Standard deviation over the fields' largest number [default: 0.01]");
-  add_whole_number<std::uint64_t>(parser, "--seed", o.seed, 0, 1000000, "Of the noise and of the wrong start [default: 1]");
+  CLI::App parser{
+      "Finds k_n, k_t and mu of a tactile skin and the mass of a ball from a noisy recording.",
+      "identify_ball"};
+  add_text(parser, "SCENE", o.scene, "",
+           "Scene with a pad 'pad' and a ball 'ball' [default: scenes/identify_ball.xml]");
+  add_positive_number(parser, "--noise", o.noise,
+                      "Standard deviation over the fields' largest number [default: 0.01]");
+  add_whole_number<std::uint64_t>(parser, "--seed", o.seed, 0, 1000000,
+                                  "Of the noise and of the wrong start [default: 1]");
   add_text(parser, "--svg", o.svg, "FILE", "Picture of the fit to write");
   parser.add_flag("--overwrite", o.overwrite, "Replace the picture if it exists");
-  parser.footer("Example:\n  identify_ball scenes/identify_ball.xml --noise 0.02 --seed 3 --svg fit.svg");
+  parser.footer(
+      "Example:\n  identify_ball scenes/identify_ball.xml --noise 0.02 --seed 3 --svg fit.svg");
   try {
     parser.parse(argc, argv);
     return identify_ball(o);

@@ -26,8 +26,9 @@ int info(const std::string& path, const Console& console) {
     shapes[name] = shape;
     text += fmt::format("  {} {}\n", name, shape);
   }
-  text += fmt::format("files: {}, demos: {}, failed episodes: {}, rows: {}, {} bytes", dataset.files.size(),
-                      summary.demos, summary.failed, summary.rows, summary.bytes);
+  text +=
+      fmt::format("files: {}, demos: {}, failed episodes: {}, rows: {}, {} bytes",
+                  dataset.files.size(), summary.demos, summary.failed, summary.rows, summary.bytes);
   if (summary.has_success) text += fmt::format(", episodes solved: {}", summary.successes);
   console.print("settings\n" + text);
   for (const std::string& file : dataset.missing) console.note("missing: " + file);
@@ -51,7 +52,8 @@ int info(const std::string& path, const Console& console) {
 Command add_info(CLI::App& program) {
   const auto input = std::make_shared<std::string>();
   const auto console = std::make_shared<Console>();
-  CLI::App* app = program.add_subcommand("info", "Say what a data set is: settings, shapes, counts");
+  CLI::App* app =
+      program.add_subcommand("info", "Say what a data set is: settings, shapes, counts");
   add_text(*app, "DIR", *input, "", "Folder of shards, or one file of a data set")->required();
   add_console_options(*app, *console);
   app->footer("Example:\n  tangere info balls");

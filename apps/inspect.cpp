@@ -70,11 +70,13 @@ Json as_json(const Model& model) {
                        {"every", s.every},
                        {"pressure_sign", s.pressure_sign}});
   Json variables = Json::array();
-  for (const VariableInfo& v : model.variables()) variables.push_back({{"name", v.name}, {"joint", v.joint}});
+  for (const VariableInfo& v : model.variables())
+    variables.push_back({{"name", v.name}, {"joint", v.joint}});
   for (const EffectInfo& e : model.effects())
     effects.push_back({{"name", e.name}, {"on", e.on}, {"reason", e.reason}});
   Json stages = Json::array();
-  for (const StageInfo& s : model.stages()) stages.push_back({{"name", s.name}, {"of", s.of}, {"variant", s.variant}});
+  for (const StageInfo& s : model.stages())
+    stages.push_back({{"name", s.name}, {"of", s.of}, {"variant", s.variant}});
   const std::int64_t steps = steps_of(model);
   return {{"command", "inspect"},
           {"exit_code", 0},
@@ -134,7 +136,8 @@ std::string sensors_text(const Model& model) {
 std::string variables_text(const Model& model) {
   if (model.variables().empty()) return "";
   std::string text = fmt::format("\nend effectors ({})\n", model.variables().size());
-  for (const VariableInfo& v : model.variables()) text += fmt::format("  {} on joint {}\n", v.name, v.joint);
+  for (const VariableInfo& v : model.variables())
+    text += fmt::format("  {} on joint {}\n", v.name, v.joint);
   return text;
 }
 
@@ -160,7 +163,8 @@ std::string as_text(const Model& model) {
   for (const EffectInfo& e : model.effects())
     text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);
   text += "\nstages\n";
-  for (const StageInfo& s : model.stages()) text += fmt::format("  {:<16} {}: {}\n", s.name, s.of, s.variant);
+  for (const StageInfo& s : model.stages())
+    text += fmt::format("  {:<16} {}: {}\n", s.name, s.of, s.variant);
   return text + fmt::format(
                     "\nmemory: {} bytes per environment, {} bytes of workspace per thread\n"
                     "instruction set: {}",
@@ -183,7 +187,8 @@ int inspect(const Options& options, const Console& console) {
     refuse_with_task(*task, {{"--allow-unknown", options.allow_unknown}});
     return report(task->model(), &task->spec(), console);
   }
-  return report(Model(read_scene_for(options.scene, options.allow_unknown, console)), nullptr, console);
+  return report(Model(read_scene_for(options.scene, options.allow_unknown, console)), nullptr,
+                console);
 }
 
 }  // namespace
@@ -191,8 +196,10 @@ int inspect(const Options& options, const Console& console) {
 Command add_inspect(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
-  CLI::App* app = program.add_subcommand("inspect", "Show what a scene compiles to, and what a task declares");
-  add_text(*app, "SCENE", options->scene, "", "Scene file (XML), or the name of a task")->required();
+  CLI::App* app =
+      program.add_subcommand("inspect", "Show what a scene compiles to, and what a task declares");
+  add_text(*app, "SCENE", options->scene, "", "Scene file (XML), or the name of a task")
+      ->required();
   app->add_flag("--allow-unknown", options->allow_unknown,
                 "Unknown elements and attributes are warnings, not errors");
   add_console_options(*app, *console);

@@ -19,7 +19,8 @@ struct Named {
 };
 
 bool any(const JointEffects& e) {
-  return e.damping != 0 || e.armature != 0 || e.stiffness != 0 || (e.limits && e.limit_stiffness != 0);
+  return e.damping != 0 || e.armature != 0 || e.stiffness != 0 ||
+         (e.limits && e.limit_stiffness != 0);
 }
 
 /// Joints that have effects; the dofs that turn on their own line where theirs differ.
@@ -67,12 +68,12 @@ std::string joint_effects_text(const Scene& scene) {
     if (e.damping != 0) parts.push_back(fmt::format("damping {:.6g}", e.damping));
     if (e.armature != 0) parts.push_back(fmt::format("armature {:.6g}", e.armature));
     if (e.stiffness != 0)
-      parts.push_back(n.rest->empty()
-                          ? fmt::format("stiffness {:.6g}", e.stiffness)
-                          : fmt::format("stiffness {:.6g} about {:.6g}", e.stiffness, fmt::join(*n.rest, " ")));
+      parts.push_back(n.rest->empty() ? fmt::format("stiffness {:.6g}", e.stiffness)
+                                      : fmt::format("stiffness {:.6g} about {:.6g}", e.stiffness,
+                                                    fmt::join(*n.rest, " ")));
     if (e.limits && e.limit_stiffness != 0)
-      parts.push_back(
-          fmt::format("limits {:.6g} {:.6g} of stiffness {:.6g}", (*e.limits)[0], (*e.limits)[1], e.limit_stiffness));
+      parts.push_back(fmt::format("limits {:.6g} {:.6g} of stiffness {:.6g}", (*e.limits)[0],
+                                  (*e.limits)[1], e.limit_stiffness));
     text += fmt::format("  {}: {}\n", n.joint, fmt::join(parts, ", "));
   }
   return text;
@@ -99,10 +100,12 @@ std::string motors_text(const Scene& scene) {
   std::string text = fmt::format("motors ({})\n", scene.motors.size());
   for (const MotorDescription& m : scene.motors) {
     if (m.control == MotorControl::force) {
-      text += fmt::format("  {}: force, u from -1 to 1 is {:.6g} to {:.6g}\n", m.joint, m.low, m.high);
+      text +=
+          fmt::format("  {}: force, u from -1 to 1 is {:.6g} to {:.6g}\n", m.joint, m.low, m.high);
     } else {
-      text += fmt::format("  {}: position, P {:.6g}, D {:.6g}, {}, from the {} of the step\n", m.joint, m.P, m.D,
-                          range_text(m), m.timing == MotorTiming::end ? "end" : "start");
+      text +=
+          fmt::format("  {}: position, P {:.6g}, D {:.6g}, {}, from the {} of the step\n", m.joint,
+                      m.P, m.D, range_text(m), m.timing == MotorTiming::end ? "end" : "start");
     }
   }
   return text;

@@ -9,7 +9,8 @@
 
 namespace tangere::apps {
 
-/// What acts on the dofs of every joint that has such effects; SI, limits and rest null where there are none.
+/// What acts on the dofs of every joint that has such effects; SI, limits and rest null where there
+/// are none.
 nlohmann::ordered_json joint_effects_json(const Scene& scene);
 std::string joint_effects_text(const Scene& scene);
 

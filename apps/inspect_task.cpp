@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 Json finite(double x) { return std::isfinite(x) ? Json(x) : Json(); }
 
 Json tensor_json(const TensorSpec& t) {
-  return {{"name", t.name}, {"shape", t.shape},        {"unit", t.unit},
+  return {{"name", t.name},       {"shape", t.shape},     {"unit", t.unit},
           {"meaning", t.meaning}, {"low", finite(t.low)}, {"high", finite(t.high)}};
 }
 
@@ -29,8 +29,10 @@ std::string tensor_text(const TensorSpec& t) {
 std::string reset_text(const TaskSpec& spec) {
   std::string text;
   if (spec.settling_steps > 0)
-    text += fmt::format("a reset settles for {} steps of {:g} s\n", spec.settling_steps, spec.settling_timestep);
-  if (spec.opening) text += "a reset ends with one action of zeros, whose observation is the first\n";
+    text += fmt::format("a reset settles for {} steps of {:g} s\n", spec.settling_steps,
+                        spec.settling_timestep);
+  if (spec.opening)
+    text += "a reset ends with one action of zeros, whose observation is the first\n";
   if (spec.restarts) text += "every action starts from a state that the task gives\n";
   return text;
 }
@@ -57,14 +59,17 @@ Json task_json(const TaskSpec& spec) {
 }
 
 std::string task_text(const TaskSpec& spec) {
-  std::string text = fmt::format("task {}: {}\nsuccess: {}\naction {}\nobservations ({} numbers)\n", spec.name, spec.summary,
-                                 spec.success, tensor_text(spec.action), spec.observation_size());
+  std::string text =
+      fmt::format("task {}: {}\nsuccess: {}\naction {}\nobservations ({} numbers)\n", spec.name,
+                  spec.summary, spec.success, tensor_text(spec.action), spec.observation_size());
   for (const TensorSpec& o : spec.observations) text += fmt::format("  {}\n", tensor_text(o));
-  text += fmt::format("{} steps per action, controls {}, a look after step{} {}; at most {} actions\n", spec.steps_per_action,
-                      spec.control_every == 0   ? "once per action"
-                      : spec.control_every == 1 ? "at every step"
-                                                : fmt::format("every {} steps", spec.control_every),
-                      spec.moments.size() == 1 ? "" : "s", fmt::join(spec.moments, ", "), spec.horizon);
+  text +=
+      fmt::format("{} steps per action, controls {}, a look after step{} {}; at most {} actions\n",
+                  spec.steps_per_action,
+                  spec.control_every == 0   ? "once per action"
+                  : spec.control_every == 1 ? "at every step"
+                                            : fmt::format("every {} steps", spec.control_every),
+                  spec.moments.size() == 1 ? "" : "s", fmt::join(spec.moments, ", "), spec.horizon);
   return text + reset_text(spec);
 }
 

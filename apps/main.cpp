@@ -46,8 +46,10 @@ struct Program {
     // What the parser cannot place is reported by us, with the nearest name.
     parser.require_subcommand(0, 1);
     parser.allow_extras();
-    commands = {add_inspect(parser), add_simulate(parser), add_generate(parser), add_validate(parser), add_info(parser),
-                add_merge(parser), add_export(parser), add_plot(parser), add_bench(parser), add_gradcheck(parser)};
+    commands = {add_inspect(parser),  add_simulate(parser), add_generate(parser),
+                add_validate(parser), add_info(parser),     add_merge(parser),
+                add_export(parser),   add_plot(parser),     add_bench(parser),
+                add_gradcheck(parser)};
   }
 
   [[nodiscard]] const Command* chosen() const {
@@ -113,7 +115,9 @@ int guarded(int argc, char** argv) {
     return report(program, argc, argv, kUsage, "out of memory; ask for fewer environments");
   } catch (const std::exception& error) {
     return report(program, argc, argv, kInputOutput,
-                  fmt::format("{}; this is a mistake in tangere itself: please report it with the command and its files", error.what()));
+                  fmt::format("{}; this is a mistake in tangere itself: please report it with the "
+                              "command and its files",
+                              error.what()));
   }
 }
 

@@ -19,13 +19,18 @@ int merge(const std::string& path, const MergeOptions& options, const Console& c
   std::optional<FolderLock> lock;
   if (std::filesystem::is_directory(path)) lock.emplace(path);
   if (lock && !lock->take(FolderLock::Kind::alone))
-    throw IoError(fmt::format("cannot merge '{}': another process writes shards there or merges them; expected a folder that "
-                              "nobody writes into, merge when it has ended", path));
+    throw IoError(
+        fmt::format("cannot merge '{}': another process writes shards there or merges them; "
+                    "expected a folder that "
+                    "nobody writes into, merge when it has ended",
+                    path));
   const MergeResult result = merge_dataset(find_dataset(path), options);
-  console.print(fmt::format("wrote {} ({} bytes, {}): {} demos, {} to train on and {} to validate; failed episodes: {}",
-                            result.file, result.bytes, options.copy ? "a copy of all numbers" : "links to the shards",
-                            result.demos, result.train, result.valid, result.failed));
-  if (!result.minari.empty()) console.print(fmt::format("wrote {}: {} for Minari", result.minari, result.minari_id));
+  console.print(fmt::format(
+      "wrote {} ({} bytes, {}): {} demos, {} to train on and {} to validate; failed episodes: {}",
+      result.file, result.bytes, options.copy ? "a copy of all numbers" : "links to the shards",
+      result.demos, result.train, result.valid, result.failed));
+  if (!result.minari.empty())
+    console.print(fmt::format("wrote {}: {} for Minari", result.minari, result.minari_id));
   console.result({{"command", "merge"},
                   {"exit_code", static_cast<int>(kDone)},
                   {"input", path},
@@ -47,9 +52,11 @@ Command add_merge(CLI::App& program) {
   const auto input = std::make_shared<std::string>();
   const auto options = std::make_shared<MergeOptions>();
   const auto console = std::make_shared<Console>();
-  CLI::App* app = program.add_subcommand("merge", "Show a folder of shards as one file, and to Minari");
+  CLI::App* app =
+      program.add_subcommand("merge", "Show a folder of shards as one file, and to Minari");
   add_text(*app, "DIR", *input, "", "Folder of shards, all of them there")->required();
-  app->add_flag("--copy", options->copy, "Copy all numbers, for a file that needs no shards beside it");
+  app->add_flag("--copy", options->copy,
+                "Copy all numbers, for a file that needs no shards beside it");
   app->add_flag("--overwrite", options->overwrite, "Replace what an earlier merge wrote");
   add_console_options(*app, *console);
   app->footer("Example:\n  tangere merge balls --overwrite");

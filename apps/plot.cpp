@@ -60,7 +60,8 @@ Command add_plot(CLI::App& program) {
   CLI::App* app = program.add_subcommand("plot", "Draw tactile fields of a trajectory as SVG");
   add_text(*app, "FILE", o.input, "", "HDF5 file written by 'tangere simulate'")->required();
   add_text(*app, "-o,--output", o.output, "F.svg", "SVG file to write")->required();
-  add_text(*app, "--sensor", o.sensor, "NAME", "Tactile sensor, a rectangular array or one with an image [default: the first by name]");
+  add_text(*app, "--sensor", o.sensor, "NAME",
+           "Tactile sensor, a rectangular array or one with an image [default: the first by name]");
   add_whole_number<std::int64_t>(*app, "--env", o.environment, 0, kMost,
                                  "Environment, counted from 0 [default: 0]");
   CLI::Option* frame = add_whole_number<std::int64_t>(*app, "--frame", o.frame, 0, kMost,

@@ -85,9 +85,10 @@ int report_stop(const Console& console, const std::string& command, int signal,
 void list_failures(const Console& console, const std::string& what,
                    const std::vector<Failure>& failures, const std::string& where) {
   for (std::size_t i = 0; i < failures.size() && i < kMostFailuresListed; ++i)
-    console.fail(fmt::format("{} {} failed {}: {}", what, failures[i].number,
-                             failures[i].step < 0 ? "before this run" : fmt::format("in step {}", failures[i].step),
-                             to_string(failures[i].status)));
+    console.fail(fmt::format(
+        "{} {} failed {}: {}", what, failures[i].number,
+        failures[i].step < 0 ? "before this run" : fmt::format("in step {}", failures[i].step),
+        to_string(failures[i].status)));
   if (failures.size() > kMostFailuresListed)
     console.fail(fmt::format("failed too, not listed: {}; {}",
                              failures.size() - kMostFailuresListed, where));

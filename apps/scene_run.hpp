@@ -40,8 +40,8 @@ std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlP
 /// Remarks on sensors that are read less often than there are steps.
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout);
 
-/// Says that a signal ended the run, when ("after 3 of 9 steps") and what is left of it; returns its
-/// exit code. `result` comes along in the JSON object.
+/// Says that a signal ended the run, when ("after 3 of 9 steps") and what is left of it; returns
+/// its exit code. `result` comes along in the JSON object.
 int report_stop(const Console& console, const std::string& command, int signal,
                 const std::string& when, const std::string& left = "nothing was written",
                 const Json& result = Json::object());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere simulate: a scene or a task, a batch, a file. Everything is checked before the first step.
+// tangere simulate: a scene or a task, a batch, a file. Everything is checked before the first
+// step.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -27,7 +28,8 @@ namespace tangere::apps {
 namespace {
 
 struct Options {
-  std::string scene, output, controls, policy, integrator, precision = "double", state_from, gradients;
+  std::string scene, output, controls, policy, integrator, precision = "double", state_from,
+                                                           gradients;
   std::optional<std::int64_t> steps, row;
   std::optional<int> environments, every;
   std::optional<double> timestep, tolerance, tape_memory;
@@ -53,7 +55,8 @@ void check_arguments(const Options& options) {
     throw InputError("--tape-memory without --gradients; expected both");
   if (options.point_gradients && options.gradients.empty())
     throw InputError("--point-gradients without --gradients; expected both");
-  if (options.row && options.state_from.empty()) throw InputError("--row without --state-from; expected both");
+  if (options.row && options.state_from.empty())
+    throw InputError("--row without --state-from; expected both");
 }
 
 void check_size(const Model& model, int environments) {
@@ -64,8 +67,9 @@ void check_size(const Model& model, int environments) {
 }
 
 /// `task`: null for a scene alone.
-TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper, const RolloutOptions& rollout,
-                             const ProgramInfo& info, const Task* task = nullptr, const std::string& policy = {}) {
+TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
+                             const RolloutOptions& rollout, const ProgramInfo& info,
+                             const Task* task = nullptr, const std::string& policy = {}) {
   RunDescription run;
   if (task != nullptr) run.task = task->spec();
   run.policy = policy;
@@ -94,48 +98,50 @@ struct TaskReport {
   std::string line = "no task: every reward is 0";
 };
 
-int report(const Options& options, const Console& console, const Batch& batch, const Stepper& stepper,
-           const RolloutOptions& rollout, const RolloutSummary& summary, const TaskReport& of_task = {}) {
+int report(const Options& options, const Console& console, const Batch& batch,
+           const Stepper& stepper, const RolloutOptions& rollout, const RolloutSummary& summary,
+           const TaskReport& of_task = {}) {
   const ExitCode code = summary.failures.empty() ? kDone : kSomeFailed;
   const auto bytes = std::filesystem::file_size(options.output);
   const double rate = static_cast<double>(summary.environment_steps) / summary.seconds;
   const double per_step = static_cast<double>(summary.newton_iterations) /
                           static_cast<double>(std::max<std::int64_t>(1, summary.environment_steps));
   list_failures(console, "environment", failures_of(summary), "--json and the file name all");
-  console.print(
-      fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
-                  "Newton iterations per step: {:.2f}, steps split: {}, environments failed: {}\n{}\n"
-                  "wrote {} ({} bytes)",
-                  batch.environments(), summary.steps, summary.seconds, rate, per_step,
-                  summary.split_steps, summary.failures.size(), of_task.line, options.output, bytes));
+  console.print(fmt::format(
+      "environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
+      "Newton iterations per step: {:.2f}, steps split: {}, environments failed: {}\n{}\n"
+      "wrote {} ({} bytes)",
+      batch.environments(), summary.steps, summary.seconds, rate, per_step, summary.split_steps,
+      summary.failures.size(), of_task.line, options.output, bytes));
   Json sensors = Json::array();
   for (const SensorInfo& sensor : batch.model().sensors()) {
     const int every = tactile_interval(sensor, rollout);
-    sensors.push_back({{"name", sensor.name}, {"every", every}, {"frames", tactile_frames(sensor, rollout)}});
+    sensors.push_back(
+        {{"name", sensor.name}, {"every", every}, {"frames", tactile_frames(sensor, rollout)}});
   }
   Json result{{"command", "simulate"},
-                  {"exit_code", static_cast<int>(code)},
-                  {"scene", options.scene},
-                  {"output", options.output},
-                  {"bytes", bytes},
-                  {"steps", summary.steps},
-                  {"first_step", rollout.first_step},
-                  {"state_from", options.state_from.empty() ? Json() : Json(options.state_from)},
-                  {"environments", batch.environments()},
-                  {"seed", batch.seed()},
-                  {"timestep", stepper.timestep()},
-                  {"integrator", to_string(stepper.integrator())},
-                  {"tolerance", stepper.tolerance()},
-                  {"precision", options.precision},
-                  {"instruction_set", kernels::active_isa_name()},
-                  {"sensors", sensors},
-                  {"seconds", summary.seconds},
-                  {"environment_steps", summary.environment_steps},
-                  {"environment_steps_per_second", rate},
-                  {"newton_iterations", summary.newton_iterations},
-                  {"newton_iterations_per_step", per_step},
-                  {"split_steps", summary.split_steps},
-                  {"failed", failures_json("environment", failures_of(summary))}};
+              {"exit_code", static_cast<int>(code)},
+              {"scene", options.scene},
+              {"output", options.output},
+              {"bytes", bytes},
+              {"steps", summary.steps},
+              {"first_step", rollout.first_step},
+              {"state_from", options.state_from.empty() ? Json() : Json(options.state_from)},
+              {"environments", batch.environments()},
+              {"seed", batch.seed()},
+              {"timestep", stepper.timestep()},
+              {"integrator", to_string(stepper.integrator())},
+              {"tolerance", stepper.tolerance()},
+              {"precision", options.precision},
+              {"instruction_set", kernels::active_isa_name()},
+              {"sensors", sensors},
+              {"seconds", summary.seconds},
+              {"environment_steps", summary.environment_steps},
+              {"environment_steps_per_second", rate},
+              {"newton_iterations", summary.newton_iterations},
+              {"newton_iterations_per_step", per_step},
+              {"split_steps", summary.split_steps},
+              {"failed", failures_json("environment", failures_of(summary))}};
   result.update(of_task.keys);
   console.result(result);
   return code;
@@ -153,34 +159,42 @@ struct Start {
     if (!options.state_from.empty()) saved = read_state(options.state_from, options.row);
     seed = options.seed.value_or(saved ? saved->seed : 0);
     environments = options.environments.value_or(saved ? saved->environments : 1);
-    continues = saved && saved->timestep == stepper.timestep() && saved->integrator == to_string(stepper.integrator());
+    continues = saved && saved->timestep == stepper.timestep() &&
+                saved->integrator == to_string(stepper.integrator());
     if (continues) first_step = saved->step;
   }
 
   void tell(const Console& console, const Scene& scene, const Stepper& stepper) const {
     if (!saved) return;
     if (!continues)
-      console.note(fmt::format("{} was made by {} with steps of {} s, this run takes {} with {} s: it starts anew at time 0 "
-                               "from that state",
-                               saved->path, saved->integrator, saved->timestep, to_string(stepper.integrator()),
-                               stepper.timestep()));
+      console.note(
+          fmt::format("{} was made by {} with steps of {} s, this run takes {} with {} s: it "
+                      "starts anew at time 0 "
+                      "from that state",
+                      saved->path, saved->integrator, saved->timestep,
+                      to_string(stepper.integrator()), stepper.timestep()));
     else if (saved->row == 0 && saved->step > 0)
-      console.note(fmt::format("row 0 of {} has no row before it: a scheme of two steps starts anew there", saved->path));
+      console.note(
+          fmt::format("row 0 of {} has no row before it: a scheme of two steps starts anew there",
+                      saved->path));
     if (saved->scene_text != scene.text)
       console.note(fmt::format("the scene is not the one that {} was made with", saved->path));
     if (saved->seed != seed)
-      console.note(fmt::format("{} was made with seed {}: what varies between environments is another draw", saved->path,
-                               saved->seed));
+      console.note(
+          fmt::format("{} was made with seed {}: what varies between environments is another draw",
+                      saved->path, saved->seed));
   }
 };
 
 /// --steps, or as many as the controls last after the start.
-std::int64_t steps_left(const Options& options, const ControlProgram& controls, std::int64_t first_step) {
+std::int64_t steps_left(const Options& options, const ControlProgram& controls,
+                        std::int64_t first_step) {
   if (options.steps) return *options.steps;
   const std::int64_t left = step_count({}, controls) - first_step;
   if (left < 1)
-    throw InputError(fmt::format("the controls end at step {}, the run starts at step {}; give --steps",
-                                 controls.steps(), first_step));
+    throw InputError(
+        fmt::format("the controls end at step {}, the run starts at step {}; give --steps",
+                    controls.steps(), first_step));
   return left;
 }
 
@@ -193,14 +207,16 @@ struct Gradients {
   std::vector<double> value;
   std::int64_t recomputed_steps = 0;
 
-  Gradients(const Options& arguments, const Batch& batch, const Stepper& stepper, const RolloutOptions& rollout)
+  Gradients(const Options& arguments, const Batch& batch, const Stepper& stepper,
+            const RolloutOptions& rollout)
       : name(arguments.gradients) {
     if (name.empty()) return;
     const Model& model = batch.model();
     const int every = model.sensors().empty() ? 1 : tactile_interval(model.sensors()[0], rollout);
     const LossKind kind = loss_named(name);
     if (arguments.point_gradients && kind != LossKind::tactile && kind != LossKind::shear)
-      throw InputError("--point-gradients with --gradients " + name + "; expected a loss that reads fields, tactile or shear");
+      throw InputError("--point-gradients with --gradients " + name +
+                       "; expected a loss that reads fields, tactile or shear");
     loss = make_loss(kind, model, every);
     GradientOptions options;
     options.steps = rollout.steps;
@@ -210,7 +226,8 @@ struct Gradients {
     options.points = arguments.point_gradients;
     if (arguments.tape_memory) options.tape_bytes = *arguments.tape_memory;
     check_memory(gradient_bytes(model, batch.environments(), options, 1),
-                 fmt::format("--gradients of {} environments and {} steps", batch.environments(), rollout.steps));
+                 fmt::format("--gradients of {} environments and {} steps", batch.environments(),
+                             rollout.steps));
     const RolloutLoss* const losses[] = {loss.get()};
     rollouts.emplace(model, options, losses);
     start = batch;
@@ -218,8 +235,8 @@ struct Gradients {
   [[nodiscard]] bool wanted() const { return start.has_value(); }
 
   /// False when a signal stopped it.
-  bool write(const ControlProgram& controls, const RolloutOptions& rollout, const StopSignals& signals,
-             TrajectoryFile& output) {
+  bool write(const ControlProgram& controls, const RolloutOptions& rollout,
+             const StopSignals& signals, TrajectoryFile& output) {
     const GradientSummary summary = rollouts->run(
         *start,
         [&](std::int64_t step, int e, std::span<double> u) {
@@ -230,8 +247,10 @@ struct Gradients {
     const LossGradient& g = summary.losses[0];
     std::vector<std::string> names, units;
     const Parameters parameters(start->model());
-    for (const ParameterInfo& info : parameters.infos()) names.push_back(info.name), units.push_back(info.unit);
-    output.write({name, loss_meaning(loss_named(name)), g.value, g.u, g.q, g.v, g.parameters, names, units, g.points});
+    for (const ParameterInfo& info : parameters.infos())
+      names.push_back(info.name), units.push_back(info.unit);
+    output.write({name, loss_meaning(loss_named(name)), g.value, g.u, g.q, g.v, g.parameters, names,
+                  units, g.points});
     value = g.value;
     recomputed_steps = summary.recomputed_steps;
     return true;
@@ -248,8 +267,9 @@ struct Gradients {
 
 /// Steps and writes; `run`: the rollout into the file, told how many steps are done.
 template <class Run>
-int write_run(const Options& options, const Console& console, const Batch& batch, const Stepper& stepper,
-              const RolloutOptions& rollout, TrajectoryFile& output, const StopSignals& signals, const Run& run,
+int write_run(const Options& options, const Console& console, const Batch& batch,
+              const Stepper& stepper, const RolloutOptions& rollout, TrajectoryFile& output,
+              const StopSignals& signals, const Run& run,
               const std::function<TaskReport()>& of_task) {
   console.detail(fmt::format("environments: {}, steps: {}, {}, h = {} s", batch.environments(),
                              rollout.steps, to_string(stepper.integrator()), stepper.timestep()));
@@ -268,8 +288,8 @@ int write_run(const Options& options, const Console& console, const Batch& batch
   return report(options, console, batch, stepper, rollout, summary, of_task());
 }
 
-int simulate_task(const Options& options, const Console& console, const ProgramInfo& info, const Task& task,
-                  Precision precision) {
+int simulate_task(const Options& options, const Console& console, const ProgramInfo& info,
+                  const Task& task, Precision precision) {
   refuse_with_task(task, {{"--gradients", !options.gradients.empty()},
                           {"--steps", options.steps.has_value()},
                           {"--state-from", !options.state_from.empty()},
@@ -280,28 +300,33 @@ int simulate_task(const Options& options, const Console& console, const ProgramI
   const Policy policy = make_policy(task, kind, options.controls);
   const Model& model = task.model();
   Stepper stepper(model);
-  const RolloutOptions rollout{TaskPilot::steps(task.spec()), options.every.value_or(0), precision, 0};
+  const RolloutOptions rollout{TaskPilot::steps(task.spec()), options.every.value_or(0), precision,
+                               0};
   note_empty_sensors(console, model, rollout);
   check_size(model, options.environments.value_or(1));
   Batch batch(model, options.environments.value_or(1), options.seed.value_or(0));
   TaskPilot pilot(task, policy, batch, precision);
 
   const StopSignals signals;
-  TrajectoryFile output(options.output, make_layout(batch, stepper, rollout, info, &task, to_string(kind)),
+  TrajectoryFile output(options.output,
+                        make_layout(batch, stepper, rollout, info, &task, to_string(kind)),
                         options.overwrite);
   return write_run(
       options, console, batch, stepper, rollout, output, signals,
-      [&](const RolloutProgress& progress) { return run_rollout(batch, stepper, pilot, rollout, output, progress); },
+      [&](const RolloutProgress& progress) {
+        return run_rollout(batch, stepper, pilot, rollout, output, progress);
+      },
       [&] {
         const double rate = static_cast<double>(pilot.successes()) / batch.environments();
-        return TaskReport{{{"task", task.spec().name},
-                           {"policy", to_string(kind)},
-                           {"successes", pilot.successes()},
-                           {"success_rate", rate},
-                           {"mean_return", pilot.mean_return()}},
-                          fmt::format("task {}, policy {}: {} of {} episodes solved, mean return {:.4g}",
-                                      task.spec().name, to_string(kind), pilot.successes(), batch.environments(),
-                                      pilot.mean_return())};
+        return TaskReport{
+            {{"task", task.spec().name},
+             {"policy", to_string(kind)},
+             {"successes", pilot.successes()},
+             {"success_rate", rate},
+             {"mean_return", pilot.mean_return()}},
+            fmt::format("task {}, policy {}: {} of {} episodes solved, mean return {:.4g}",
+                        task.spec().name, to_string(kind), pilot.successes(), batch.environments(),
+                        pilot.mean_return())};
       });
 }
 
@@ -318,9 +343,10 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
   Stepper stepper(model, solver);
   const Start start(options, stepper);
   start.tell(console, model.scene(), stepper);
-  const ControlProgram controls = make_controls(options.controls, start.seed, model, stepper, console);
-  const RolloutOptions rollout{steps_left(options, controls, start.first_step), options.every.value_or(0), precision,
-                               start.first_step};
+  const ControlProgram controls =
+      make_controls(options.controls, start.seed, model, stepper, console);
+  const RolloutOptions rollout{steps_left(options, controls, start.first_step),
+                               options.every.value_or(0), precision, start.first_step};
   controls.check_covers(rollout.first_step + rollout.steps);
   note_empty_sensors(console, model, rollout);
   check_size(model, start.environments);
@@ -336,7 +362,8 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
       options, console, batch, stepper, rollout, output, signals,
       [&](const RolloutProgress& progress) {
         RolloutSummary summary = run_rollout(batch, stepper, controls, rollout, output, progress);
-        if (gradients.wanted() && !summary.stopped) summary.stopped = !gradients.write(controls, rollout, signals, output);
+        if (gradients.wanted() && !summary.stopped)
+          summary.stopped = !gradients.write(controls, rollout, signals, output);
         return summary;
       },
       [&] {
@@ -352,11 +379,13 @@ Command add_simulate(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
   Options& o = *options;
-  CLI::App* app = program.add_subcommand("simulate", "Run a scene or a task and write its trajectory");
+  CLI::App* app =
+      program.add_subcommand("simulate", "Run a scene or a task and write its trajectory");
   add_text(*app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task")->required();
   add_text(*app, "-o,--output", o.output, "F.h5", "HDF5 file to write")->required();
-  add_text(*app, "--controls", o.controls, "U.csv",
-           "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
+  add_text(
+      *app, "--controls", o.controls, "U.csv",
+      "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
   add_text(*app, "--policy", o.policy, "NAME",
            "Of a task: random, hold, csv (with --controls) or scripted [default: scripted]");
   add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
@@ -367,21 +396,26 @@ Command add_simulate(CLI::App& program) {
                         "Tactile fields every N-th step [default: the scene's, or 1]");
   add_text(*app, "--state-from", o.state_from, "F.h5",
            "Start from a row of another run, environment e from its e");
-  add_whole_number<std::int64_t>(*app, "--row", o.row, 0, kMostSteps, "Row of --state-from [default: the last]");
+  add_whole_number<std::int64_t>(*app, "--row", o.row, 0, kMostSteps,
+                                 "Row of --state-from [default: the last]");
   add_positive_number(*app, "--timestep", o.timestep, "Step size in s [default: the scene's]");
   add_text(*app, "--integrator", o.integrator, "NAME",
            "BDF1, BDF2, SDIRK2 or linear-implicit [default: the scene's]");
   add_positive_number(*app, "--tol", o.tolerance,
                       "Largest scaled residual of a step [default: the scene's]");
   add_text(*app, "--gradients", o.gradients, "LOSS",
-           "Derivatives of a loss by controls, start and the scene's numbers as well: final, path, tactile, shear or variables");
-  app->add_flag("--point-gradients", o.point_gradients, "With --gradients: by place and coefficients of every tactile point, too");
+           "Derivatives of a loss by controls, start and the scene's numbers as well: final, path, "
+           "tactile, shear or variables");
+  app->add_flag("--point-gradients", o.point_gradients,
+                "With --gradients: by place and coefficients of every tactile point, too");
   add_memory_size(*app, "--tape-memory", o.tape_memory,
-                  "With --gradients: states kept for them; a longer run is taken again from checkpoints [default: 1GB]");
+                  "With --gradients: states kept for them; a longer run is taken again from "
+                  "checkpoints [default: 1GB]");
   add_text(*app, "--precision", o.precision, "NAME",
            "Of tactile fields: double, or mixed, points in float [default: double]");
-  add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
-                                  "Seed of all that varies between environments [default: 0, or that of --state-from]");
+  add_whole_number<std::uint64_t>(
+      *app, "--seed", o.seed, 0, UINT64_MAX,
+      "Seed of all that varies between environments [default: 0, or that of --state-from]");
   app->add_flag("--overwrite", o.overwrite, "Replace the output if it exists");
   app->add_flag("--allow-unknown", o.allow_unknown,
                 "Unknown elements and attributes of the scene are warnings, not errors");

@@ -17,14 +17,16 @@ std::unique_ptr<Task> find_task(const std::string& word, const Console& console)
   if (is_task(word)) {
     const TaskSpec spec = task_spec(word);
     const char* const text = task_scene(spec.scene);
-    if (text == nullptr) throw InputError(fmt::format("task '{}': its scene {} is not there", word, spec.scene));
+    if (text == nullptr)
+      throw InputError(fmt::format("task '{}': its scene {} is not there", word, spec.scene));
     SceneFile file = parse_scene(text, spec.scene);
     for (const std::string& warning : file.warnings) console.note("warning: " + warning);
     return make_task(word, file.scene);
   }
   const bool plain = word.find('/') == std::string::npos && word.find('.') == std::string::npos;
   if (plain && !std::filesystem::exists(word))
-    throw InputError(fmt::format("'{}' is neither a file nor a task{}", word, suggestion(word, task_names())));
+    throw InputError(
+        fmt::format("'{}' is neither a file nor a task{}", word, suggestion(word, task_names())));
   return nullptr;
 }
 
@@ -32,16 +34,19 @@ PolicyKind policy_named(const std::string& name, const std::string& table, Polic
   PolicyKind kind = table.empty() ? fallback : PolicyKind::csv;
   std::vector<std::string> names;
   bool found = name.empty();
-  for (const PolicyKind value : {PolicyKind::random, PolicyKind::hold, PolicyKind::csv, PolicyKind::scripted}) {
+  for (const PolicyKind value :
+       {PolicyKind::random, PolicyKind::hold, PolicyKind::csv, PolicyKind::scripted}) {
     names.emplace_back(to_string(value));
     if (names.back() != name) continue;
     found = true;
     kind = value;
   }
   if (!found) throw InputError("unknown policy '" + name + "'" + suggestion(name, names));
-  if (kind == PolicyKind::csv && table.empty()) throw InputError("--policy csv without --controls; expected both");
+  if (kind == PolicyKind::csv && table.empty())
+    throw InputError("--policy csv without --controls; expected both");
   if (kind != PolicyKind::csv && !table.empty())
-    throw InputError(fmt::format("--policy {} with --controls; expected csv, or no --controls", name));
+    throw InputError(
+        fmt::format("--policy {} with --controls; expected csv, or no --controls", name));
   return kind;
 }
 
@@ -53,14 +58,16 @@ Policy make_policy(const Task& task, PolicyKind kind, const std::string& table) 
 void refuse_with_task(const Task& task, const std::vector<GivenOption>& options) {
   for (const GivenOption& option : options)
     if (option.given)
-      throw InputError(fmt::format("{} with task '{}', which takes at most {} actions of {} steps; expected it with "
-                                   "scenes only",
-                                   option.name, task.spec().name, task.spec().horizon, task.spec().steps_per_action));
+      throw InputError(fmt::format(
+          "{} with task '{}', which takes at most {} actions of {} steps; expected it with "
+          "scenes only",
+          option.name, task.spec().name, task.spec().horizon, task.spec().steps_per_action));
 }
 
 void refuse_with_scene(const std::string& scene, const std::vector<GivenOption>& options) {
   for (const GivenOption& option : options)
-    if (option.given) throw InputError(fmt::format("{} with the scene '{}'; expected a task", option.name, scene));
+    if (option.given)
+      throw InputError(fmt::format("{} with the scene '{}'; expected a task", option.name, scene));
 }
 
 }  // namespace tangere::apps

@@ -13,9 +13,10 @@ int validate(const std::string& path, const Console& console) {
   const DatasetReport report = examine_dataset(find_dataset(path));
   const ExitCode code = report.problems.empty() ? kDone : kInputOutput;
   for (const std::string& problem : report.problems) console.fail("tangere: " + problem);
-  console.print(fmt::format("shards: {}, demos: {}, failed episodes: {}, rows: {}, {} bytes: {}", report.shards,
-                            report.demos, report.failed, report.rows, report.bytes,
-                            report.problems.empty() ? "whole" : fmt::format("{} problems", report.problems.size())));
+  console.print(fmt::format(
+      "shards: {}, demos: {}, failed episodes: {}, rows: {}, {} bytes: {}", report.shards,
+      report.demos, report.failed, report.rows, report.bytes,
+      report.problems.empty() ? "whole" : fmt::format("{} problems", report.problems.size())));
   Json result{{"command", "validate"},
               {"exit_code", static_cast<int>(code)},
               {"input", path},
@@ -35,7 +36,8 @@ int validate(const std::string& path, const Console& console) {
 Command add_validate(CLI::App& program) {
   const auto input = std::make_shared<std::string>();
   const auto console = std::make_shared<Console>();
-  CLI::App* app = program.add_subcommand("validate", "Read a data set whole and name all that is wrong with it");
+  CLI::App* app = program.add_subcommand(
+      "validate", "Read a data set whole and name all that is wrong with it");
   add_text(*app, "DIR", *input, "", "Folder of shards, or one file of a data set")->required();
   add_console_options(*app, *console);
   app->footer("Example:\n  tangere validate balls");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The variables are those of Open MPI, of MPICH and its relatives (PMI), and of Slurm. No library of theirs is needed.
+// The variables are those of Open MPI, of MPICH and its relatives (PMI), and of Slurm. No library
+// of theirs is needed.
 #include "apps/workers.hpp"
 
 #include <fmt/format.h>
@@ -19,8 +20,9 @@ struct Variables {
   const char* count;
 };
 
-// mpirun within a Slurm job: Slurm's own numbers then are those of the nodes' daemons, so they come last.
-// SLURM_STEP_NUM_TASKS, not SLURM_NTASKS: the latter also is in a batch script, whose plain commands run once.
+// mpirun within a Slurm job: Slurm's own numbers then are those of the nodes' daemons, so they come
+// last. SLURM_STEP_NUM_TASKS, not SLURM_NTASKS: the latter also is in a batch script, whose plain
+// commands run once.
 constexpr Variables kProcess[] = {{"OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"},
                                   {"PMI_RANK", "PMI_SIZE"},
                                   {"SLURM_PROCID", "SLURM_STEP_NUM_TASKS"}};
@@ -35,7 +37,8 @@ std::optional<std::int64_t> whole_number(const char* text) {
 
 std::int64_t number_of(const char* variable) {
   const char* const text = std::getenv(variable);
-  if (text == nullptr) throw InputError(fmt::format("{} is not set, but the variables beside it are", variable));
+  if (text == nullptr)
+    throw InputError(fmt::format("{} is not set, but the variables beside it are", variable));
   const std::optional<std::int64_t> value = whole_number(text);
   if (!value) throw InputError(fmt::format("{}={}; expected a whole number", variable, text));
   return *value;
@@ -43,19 +46,24 @@ std::int64_t number_of(const char* variable) {
 
 void check_below(const char* variable, std::int64_t index, std::int64_t count) {
   if (index < 0 || index >= count)
-    throw InputError(fmt::format("{} says number {} of {}; expected 0 to {}", variable, index, count, count - 1));
+    throw InputError(fmt::format("{} says number {} of {}; expected 0 to {}", variable, index,
+                                 count, count - 1));
 }
 
 /// Position in the array's list of numbers, which may begin anywhere and leave some out.
 std::optional<Worker> array_worker() {
   if (std::getenv("SLURM_ARRAY_TASK_ID") == nullptr) return std::nullopt;
-  const std::int64_t id = number_of("SLURM_ARRAY_TASK_ID"), count = number_of("SLURM_ARRAY_TASK_COUNT");
-  const std::int64_t low = std::getenv("SLURM_ARRAY_TASK_MIN") == nullptr ? 0 : number_of("SLURM_ARRAY_TASK_MIN");
-  const std::int64_t step = std::getenv("SLURM_ARRAY_TASK_STEP") == nullptr ? 1 : number_of("SLURM_ARRAY_TASK_STEP");
+  const std::int64_t id = number_of("SLURM_ARRAY_TASK_ID"),
+                     count = number_of("SLURM_ARRAY_TASK_COUNT");
+  const std::int64_t low =
+      std::getenv("SLURM_ARRAY_TASK_MIN") == nullptr ? 0 : number_of("SLURM_ARRAY_TASK_MIN");
+  const std::int64_t step =
+      std::getenv("SLURM_ARRAY_TASK_STEP") == nullptr ? 1 : number_of("SLURM_ARRAY_TASK_STEP");
   if (step < 1 || (id - low) % step != 0)
-    throw InputError(fmt::format("SLURM_ARRAY_TASK_ID={} is not SLURM_ARRAY_TASK_MIN={} and multiples of "
-                                 "SLURM_ARRAY_TASK_STEP={}; expected an array like 0-99",
-                                 id, low, step));
+    throw InputError(
+        fmt::format("SLURM_ARRAY_TASK_ID={} is not SLURM_ARRAY_TASK_MIN={} and multiples of "
+                    "SLURM_ARRAY_TASK_STEP={}; expected an array like 0-99",
+                    id, low, step));
   const std::int64_t index = (id - low) / step;
   check_below("SLURM_ARRAY_TASK_ID", index, count);
   return Worker{index, count, "SLURM_ARRAY_TASK_ID"};
@@ -63,7 +71,8 @@ std::optional<Worker> array_worker() {
 
 std::optional<Worker> process_worker() {
   for (const Variables& variables : kProcess) {
-    if (std::getenv(variables.index) == nullptr || std::getenv(variables.count) == nullptr) continue;
+    if (std::getenv(variables.index) == nullptr || std::getenv(variables.count) == nullptr)
+      continue;
     const Worker worker{number_of(variables.index), number_of(variables.count), variables.index};
     check_below(variables.index, worker.index, worker.count);
     return worker;
@@ -83,16 +92,20 @@ Worker worker_from_environment() {
 
 Worker worker_named(const std::string& words) {
   const std::size_t slash = words.find('/');
-  const std::string before = words.substr(0, slash), after = slash == std::string::npos ? "" : words.substr(slash + 1);
-  const std::optional<std::int64_t> index = whole_number(before.c_str()), count = whole_number(after.c_str());
+  const std::string before = words.substr(0, slash),
+                    after = slash == std::string::npos ? "" : words.substr(slash + 1);
+  const std::optional<std::int64_t> index = whole_number(before.c_str()),
+                                    count = whole_number(after.c_str());
   if (before.empty() || after.empty() || !index || !count || *index >= *count)
-    throw InputError(fmt::format("--shard {}; expected k/S, shard k of S, with k from 0 to S - 1", words));
+    throw InputError(
+        fmt::format("--shard {}; expected k/S, shard k of S, with k from 0 to S - 1", words));
   return {*index, *count, "--shard"};
 }
 
 std::vector<std::int64_t> shards_of(const Worker& worker, std::int64_t shards) {
   std::vector<std::int64_t> mine;
-  for (std::int64_t shard = worker.index; shard < shards; shard += worker.count) mine.push_back(shard);
+  for (std::int64_t shard = worker.index; shard < shards; shard += worker.count)
+    mine.push_back(shard);
   return mine;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The writer of data sets alone, one thread: episodes, HDF5 objects and bytes per second, by length of episode and
-// compression; its parts; and merging. Numbers are those of a field that is pressed in the middle. Files go to the folder of temporary
-// files.
+// The writer of data sets alone, one thread: episodes, HDF5 objects and bytes per second, by length
+// of episode and compression; its parts; and merging. Numbers are those of a field that is pressed
+// in the middle. Files go to the folder of temporary files.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -20,10 +20,11 @@ namespace tangere {
 namespace {
 
 constexpr int kBlock = 16;
-constexpr std::size_t kObjects = 12;  // of a demo: three groups, actions, rewards, dones, three observations twice
+constexpr std::size_t kObjects =
+    12;  // of a demo: three groups, actions, rewards, dones, three observations twice
 
-// Of a demo in both files: its group and next_obs, its episode and observations; three virtual datasets twice, flags, five and
-// three links.
+// Of a demo in both files: its group and next_obs, its episode and observations; three virtual
+// datasets twice, flags, five and three links.
 constexpr std::size_t kMergedObjects = 4 + 6 + 1 + 8;
 
 struct Folder {
@@ -34,7 +35,8 @@ struct Folder {
   ~Folder() { std::filesystem::remove_all(path); }
 };
 
-DatasetLayout layout_of(std::int64_t episodes, std::int64_t rows, int side, const std::string& compression) {
+DatasetLayout layout_of(std::int64_t episodes, std::int64_t rows, int side,
+                        const std::string& compression) {
   DatasetLayout l;
   l.episodes = episodes;
   l.steps = rows;
@@ -63,7 +65,8 @@ std::vector<float> field(std::size_t frames, int side) {
   for (std::size_t f = 0; f < frames; ++f)
     for (int r = 0; r < side; ++r)
       for (int c = 0; c < side; ++c) {
-        const double x = (r + 0.5) / side - 0.5, y = (c + 0.5) / side - 0.5, depth = 0.1 - x * x - y * y;
+        const double x = (r + 0.5) / side - 0.5, y = (c + 0.5) / side - 0.5,
+                     depth = 0.1 - x * x - y * y;
         const auto force = static_cast<float>(std::max(0.0, depth));
         for (int k = 0; k < 3; ++k) numbers.push_back(force > 0 ? force * noise(random) : 0.0F);
       }
@@ -76,9 +79,11 @@ class Block {
   explicit Block(const DatasetLayout& l) : rows_(static_cast<int>(l.rows())) {
     const auto frames = static_cast<std::size_t>(kBlock * (rows_ + 1));
     actions_.resize(static_cast<std::size_t>(kBlock * rows_) * l.u_names.size());
-    values_ = {std::vector<float>(frames * l.q_names.size(), 0.25F), std::vector<float>(frames * l.v_names.size(), 0.5F),
+    values_ = {std::vector<float>(frames * l.q_names.size(), 0.25F),
+               std::vector<float>(frames * l.v_names.size(), 0.5F),
                field(frames, l.sensors[0].rows)};
-    for (const std::vector<float>& v : values_) observations_.emplace_back(std::span<const float>(v));
+    for (const std::vector<float>& v : values_)
+      observations_.emplace_back(std::span<const float>(v));
   }
   [[nodiscard]] EpisodeRows rows(std::int64_t first) const {
     return {first, kBlock, 0, rows_ + 1, rows_, actions_, observations_};
@@ -92,8 +97,8 @@ class Block {
 };
 
 /// Whole shards: prepared, written, read back, synced, renamed.
-void write_shards(benchmark::State& state, std::int64_t episodes, std::int64_t rows, int side, const char* compression,
-                  bool sparse = false) {
+void write_shards(benchmark::State& state, std::int64_t episodes, std::int64_t rows, int side,
+                  const char* compression, bool sparse = false) {
   DatasetLayout l = layout_of(episodes, rows, side, compression);
   l.sparse = sparse;
   const Block block(l);
@@ -116,19 +121,27 @@ void write_shards(benchmark::State& state, std::int64_t episodes, std::int64_t r
   using benchmark::Counter;
   const double made = static_cast<double>(episodes) * static_cast<double>(state.iterations());
   state.counters["episodes/s"] = Counter(made, Counter::kIsRate);
-  state.counters["us/object"] = Counter(1e-6 * made * kObjects, Counter::kIsRate | Counter::kInvert);
+  state.counters["us/object"] =
+      Counter(1e-6 * made * kObjects, Counter::kIsRate | Counter::kInvert);
   state.counters["MB/s"] = Counter(1e-6 * made * l.episode_bytes(), Counter::kIsRate);
-  state.counters["of_size"] = static_cast<double>(bytes) / (static_cast<double>(episodes) * l.episode_bytes());
+  state.counters["of_size"] =
+      static_cast<double>(bytes) / (static_cast<double>(episodes) * l.episode_bytes());
 }
 
 void short_episodes(benchmark::State& state) { write_shards(state, 4096, 5, 4, "none"); }
 void long_episodes(benchmark::State& state) { write_shards(state, 256, 200, 16, "none"); }
-void long_episodes_deflate(benchmark::State& state) { write_shards(state, 256, 200, 16, "deflate"); }
+void long_episodes_deflate(benchmark::State& state) {
+  write_shards(state, 256, 200, 16, "deflate");
+}
 void large_fields(benchmark::State& state) { write_shards(state, 16, 20, 200, "none"); }
 void large_fields_deflate(benchmark::State& state) { write_shards(state, 16, 20, 200, "deflate"); }
 void large_fields_lz4(benchmark::State& state) { write_shards(state, 16, 20, 200, "lz4"); }
-void large_fields_sparse(benchmark::State& state) { write_shards(state, 16, 20, 200, "none", true); }
-void large_fields_sparse_deflate(benchmark::State& state) { write_shards(state, 16, 20, 200, "deflate", true); }
+void large_fields_sparse(benchmark::State& state) {
+  write_shards(state, 16, 20, 200, "none", true);
+}
+void large_fields_sparse_deflate(benchmark::State& state) {
+  write_shards(state, 16, 20, 200, "deflate", true);
+}
 BENCHMARK(short_episodes)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 BENCHMARK(long_episodes)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 BENCHMARK(long_episodes_deflate)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
@@ -138,7 +151,8 @@ BENCHMARK(large_fields_lz4)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTim
 BENCHMARK(large_fields_sparse)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 BENCHMARK(large_fields_sparse_deflate)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 
-/// One file of links and the view for Minari, of episodes as above: time must grow as their number does.
+/// One file of links and the view for Minari, of episodes as above: time must grow as their number
+/// does.
 void merge(benchmark::State& state) {
   const std::int64_t episodes = state.range(0);
   const DatasetLayout l = layout_of(episodes, 5, 4, "none");
@@ -157,10 +171,15 @@ void merge(benchmark::State& state) {
   using benchmark::Counter;
   const double made = static_cast<double>(episodes) * static_cast<double>(state.iterations());
   state.counters["episodes/s"] = Counter(made, Counter::kIsRate);
-  state.counters["us/object"] = Counter(1e-6 * made * kMergedObjects, Counter::kIsRate | Counter::kInvert);
+  state.counters["us/object"] =
+      Counter(1e-6 * made * kMergedObjects, Counter::kIsRate | Counter::kInvert);
   state.counters["bytes/episode"] = static_cast<double>(bytes) / static_cast<double>(episodes);
 }
-BENCHMARK(merge)->RangeMultiplier(4)->Range(1024, 65536)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
+BENCHMARK(merge)
+    ->RangeMultiplier(4)
+    ->Range(1024, 65536)
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime();
 
 /// What the library takes for a demo like those: why the writer lays objects out itself.
 void library_objects(benchmark::State& state) {
@@ -178,8 +197,9 @@ void library_objects(benchmark::State& state) {
         static_cast<void>(h5::create_dataset<float>(group, dataset, {5}));
     }
   }
-  state.counters["us/object"] = benchmark::Counter(1e-6 * kDemos * kObjects * static_cast<double>(state.iterations()),
-                                                   benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["us/object"] =
+      benchmark::Counter(1e-6 * kDemos * kObjects * static_cast<double>(state.iterations()),
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 BENCHMARK(library_objects)->Unit(benchmark::kMillisecond);
 
@@ -190,9 +210,11 @@ void chunk(benchmark::State& state, const char* compression) {
   const std::size_t bytes = numbers.size() * sizeof(float);
   std::size_t size = 0;
   for (auto _ : state)
-    size = compressed(l, reinterpret_cast<const unsigned char*>(numbers.data()), bytes, bytes).size();
-  state.counters["MB/s"] = benchmark::Counter(1e-6 * static_cast<double>(bytes) * static_cast<double>(state.iterations()),
-                                              benchmark::Counter::kIsRate);
+    size =
+        compressed(l, reinterpret_cast<const unsigned char*>(numbers.data()), bytes, bytes).size();
+  state.counters["MB/s"] = benchmark::Counter(
+      1e-6 * static_cast<double>(bytes) * static_cast<double>(state.iterations()),
+      benchmark::Counter::kIsRate);
   state.counters["of_size"] = static_cast<double>(size) / static_cast<double>(bytes);
 }
 BENCHMARK_CAPTURE(chunk, deflate, "deflate");

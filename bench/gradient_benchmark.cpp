@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rollouts with gradients against the same rollouts without, one after the other in one run, on one thread.
+// Rollouts with gradients against the same rollouts without, one after the other in one run, on one
+// thread.
 #include <benchmark/benchmark.h>
 
 #include <ctime>
@@ -55,7 +56,8 @@ class Rollout {
         program_(model_, model_.timestep(), 1),
         stepper_(model_),
         readout_(model_, Precision::f64),
-        fields_(model_, environments, tactile ? FrameKind::compact : FrameKind::none, Precision::f64) {
+        fields_(model_, environments, tactile ? FrameKind::compact : FrameKind::none,
+                Precision::f64) {
     options_.steps = program_.steps();
     if (tactile) {
       owned_.push_back(make_loss(LossKind::tactile, model_, kEvery));
@@ -80,7 +82,8 @@ class Rollout {
           program_.evaluate(t, e, std::span(u).subspan(std::size_t(e) * nu, nu));
         stepper_.step_block(batch, b, u);
         if (tactile_ && (t + 1) % kEvery == 0)
-          for (int s = 0; s < int(model_.sensors().size()); ++s) fields_.read(readout_, batch, b, s);
+          for (int s = 0; s < int(model_.sensors().size()); ++s)
+            fields_.read(readout_, batch, b, s);
       }
     return cpu_seconds() - begin;
   }
@@ -90,13 +93,15 @@ class Rollout {
       rollouts_.emplace(model_, options_, losses_);
     }
     const double begin = cpu_seconds();
-    const GradientSummary g =
-        rollouts_->run(start_, [&](std::int64_t step, int e, std::span<double> u) { program_.evaluate(step, e, u); });
+    const GradientSummary g = rollouts_->run(
+        start_,
+        [&](std::int64_t step, int e, std::span<double> u) { program_.evaluate(step, e, u); });
     benchmark::DoNotOptimize(g.losses[0].u.data());
     return cpu_seconds() - begin;
   }
   [[nodiscard]] double tape_bytes() const {
-    return double(BlockTape::bytes(model_, model_.integrator(), options_.steps)) / 16 / double(options_.steps);
+    return double(BlockTape::bytes(model_, model_.integrator(), options_.steps)) / 16 /
+           double(options_.steps);
   }
 
  private:
@@ -114,7 +119,8 @@ class Rollout {
   bool tactile_ = false;
 };
 
-void BM_Gradients(benchmark::State& state, const char* scene, bool tactile, int losses, bool parameters) {
+void BM_Gradients(benchmark::State& state, const char* scene, bool tactile, int losses,
+                  bool parameters) {
   Rollout rollout(scene, int(state.range(0)), tactile, losses);
   rollout.forward();
   rollout.with_gradients(parameters);
@@ -130,12 +136,12 @@ void BM_Gradients(benchmark::State& state, const char* scene, bool tactile, int 
   state.SetLabel(kernels::active_isa_name());
 }
 
-#define TANGERE_GRADIENTS(name, scene, tactile, losses, parameters)             \
-  BENCHMARK_CAPTURE(BM_Gradients, name, scene, tactile, losses, parameters)     \
-      ->ArgName("envs")                                                         \
-      ->Arg(1)                                                                  \
-      ->Arg(1024)                                                               \
-      ->Unit(benchmark::kMillisecond)                                           \
+#define TANGERE_GRADIENTS(name, scene, tactile, losses, parameters)         \
+  BENCHMARK_CAPTURE(BM_Gradients, name, scene, tactile, losses, parameters) \
+      ->ArgName("envs")                                                     \
+      ->Arg(1)                                                              \
+      ->Arg(1024)                                                           \
+      ->Unit(benchmark::kMillisecond)                                       \
       ->Iterations(3)
 
 TANGERE_GRADIENTS(rolling_ball, "rolling_ball", false, 1, false);
@@ -162,8 +168,8 @@ double per_point(std::size_t tiles, const F& f) {
   return 1e9 * best / kRepeats / (64 * double(tiles));
 }
 
-/// The field of the rolling ball in the middle of its run: read, along a direction of the state, in reverse; in reverse by the
-/// scene's numbers too, and by every point's own.
+/// The field of the rolling ball in the middle of its run: read, along a direction of the state, in
+/// reverse; in reverse by the scene's numbers too, and by every point's own.
 void BM_FieldDerivatives(benchmark::State& state) {
   const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene);
   Batch batch(model, 16, 1);
@@ -171,13 +177,16 @@ void BM_FieldDerivatives(benchmark::State& state) {
   Stepper stepper(model);
   std::vector<double> u(16 * std::size_t(model.nu()));
   for (std::int64_t t = 0; t < program.steps() / 2; ++t) {
-    for (int e = 0; e < 16; ++e) program.evaluate(t, e, std::span(u).subspan(std::size_t(e * model.nu()), std::size_t(model.nu())));
+    for (int e = 0; e < 16; ++e)
+      program.evaluate(t, e,
+                       std::span(u).subspan(std::size_t(e * model.nu()), std::size_t(model.nu())));
     stepper.step(batch, u);
   }
   Readout readout(model);
   CompactFrame<double> frame(model, 0);
   readout.read(batch, 3, frame);
-  const std::vector<double> direction(std::size_t(model.nv()), 0.1), cotangents(frame.values().size(), 1.0);
+  const std::vector<double> direction(std::size_t(model.nv()), 0.1),
+      cotangents(frame.values().size(), 1.0);
   std::vector<double> change(frame.values().size());
   AlignedVector<double> rows(16 * std::size_t(parameter_rows(model.compiled())));
   std::vector<double> points(std::size_t(tactile_points(model) * kPointNumbers));
@@ -193,9 +202,12 @@ void BM_FieldDerivatives(benchmark::State& state) {
       tangent.move(3, direction, direction);
       tangent.field(0, frame.tiles(), change);
     });
-    state.counters["reverse"] = per_point(tiles, [&] { pullback.field(3, 0, frame.tiles(), cotangents); });
-    state.counters["numbers"] = per_point(tiles, [&] { pullback.field(3, 0, frame.tiles(), cotangents, rows); });
-    state.counters["points"] = per_point(tiles, [&] { pullback.field(3, 0, frame.tiles(), cotangents, rows, points); });
+    state.counters["reverse"] =
+        per_point(tiles, [&] { pullback.field(3, 0, frame.tiles(), cotangents); });
+    state.counters["numbers"] =
+        per_point(tiles, [&] { pullback.field(3, 0, frame.tiles(), cotangents, rows); });
+    state.counters["points"] =
+        per_point(tiles, [&] { pullback.field(3, 0, frame.tiles(), cotangents, rows, points); });
   }
   state.counters["tiles"] = double(tiles);
   state.SetLabel(kernels::active_isa_name());

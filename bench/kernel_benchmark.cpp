@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the parts of a step cost: kernels of one group of eight environments, the rolling ball in contact.
-// Time is that of the whole group; ns/env divides it by eight (or by one where a lane is evaluated alone).
+// What the parts of a step cost: kernels of one group of eight environments, the rolling ball in
+// contact. Time is that of the whole group; ns/env divides it by eight (or by one where a lane is
+// evaluated alone).
 #include <benchmark/benchmark.h>
 
 #include <vector>
@@ -22,14 +23,17 @@ using kernels::LaneRow;
 /// A group in the middle of the run, at the predicted pose of its next step.
 class Group {
  public:
-  Group() : model_(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene), work_(model_.compiled()) {
+  Group()
+      : model_(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene),
+        work_(model_.compiled()) {
     Batch batch(model_, kGroup, 1);
     Stepper stepper(model_);
     const ControlProgram program(model_, model_.timestep(), 1);
     const auto nu = std::size_t(model_.nu());
     std::vector<double> u(kGroup * nu);
     for (std::int64_t t = 0; t < 200; ++t) {
-      for (std::size_t e = 0; e < kGroup; ++e) program.evaluate(t, std::int64_t(e), {&u[e * nu], nu});
+      for (std::size_t e = 0; e < kGroup; ++e)
+        program.evaluate(t, std::int64_t(e), {&u[e * nu], nu});
       stepper.step(batch, u);
     }
     const CompiledModel& m = model_.compiled();
@@ -74,8 +78,9 @@ void run(benchmark::State& state, double environments, const F& f) {
     benchmark::ClobberMemory();
   }
   const auto& list = group.work().lists[0];
-  state.counters["ns/env"] = benchmark::Counter(double(state.iterations()) * environments * 1e-9,
-                                                benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["ns/env"] =
+      benchmark::Counter(double(state.iterations()) * environments * 1e-9,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
   state.counters["candidates"] = environments == 1 ? list.own_count[0] : list.count;
   state.SetLabel(kernels::active_isa_name());
 }
@@ -115,11 +120,14 @@ void BM_Factor(benchmark::State& s) {
   run(s, kGroup, [](Group& g) { g.table().group.factor(g.view(), g.work().stage, nullptr); });
 }
 void BM_Solve(benchmark::State& s) {
-  run(s, kGroup, [](Group& g) { g.table().group.solve(g.view(), g.work().stage, g.work().stage.g, g.work().test); });
+  run(s, kGroup, [](Group& g) {
+    g.table().group.solve(g.view(), g.work().stage, g.work().stage.g, g.work().test);
+  });
 }
 void BM_SolveWatched(benchmark::State& s) {
   run(s, kGroup, [](Group& g) {
-    g.table().group.solve_watched(g.view(), g.work().stage, g.work().stage.g, g.work().test, &g.work().sound);
+    g.table().group.solve_watched(g.view(), g.work().stage, g.work().stage.g, g.work().test,
+                                  &g.work().sound);
   });
 }
 BENCHMARK(BM_Kinematics);

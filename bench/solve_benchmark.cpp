@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Factor and solve of a tree with 30 dofs: eight environments in lanes on the scene's pattern, against Eigen's dense LU
-// with pivoting, one environment at a time. Both in one run: their ratio counts.
-#include <Eigen/LU>
+// Factor and solve of a tree with 30 dofs: eight environments in lanes on the scene's pattern,
+// against Eigen's dense LU with pivoting, one environment at a time. Both in one run: their ratio
+// counts.
 #include <benchmark/benchmark.h>
+#include <Eigen/LU>
 
 #include <string>
 
@@ -38,12 +39,14 @@ Scene hand() {
   for (int f = 0; f < kFingers; ++f)
     for (int j = 0; j < kJoints; ++j) {
       const int parent = j == 0 ? 0 : static_cast<int>(s.links.size()) - 1;
-      s.links.push_back(link("link_" + std::to_string(f) + std::to_string(j), parent, JointType::revolute));
+      s.links.push_back(
+          link("link_" + std::to_string(f) + std::to_string(j), parent, JointType::revolute));
     }
   return s;
 }
 
-/// Matrices on the hand's pattern, each as lanes and dense; diagonals dominate, as masses over h² do.
+/// Matrices on the hand's pattern, each as lanes and dense; diagonals dominate, as masses over h²
+/// do.
 struct Systems {
   std::shared_ptr<const CompiledModel> model = compile(hand());
   Workspace work{*model};
@@ -52,7 +55,9 @@ struct Systems {
 
   Systems() {
     std::uint32_t drawn = 0;
-    const auto number = [&drawn] { return uniform(RandomKey{1, 0, 0, Purpose::contact, drawn++}, -1, 1); };
+    const auto number = [&drawn] {
+      return uniform(RandomKey{1, 0, 0, Purpose::contact, drawn++}, -1, 1);
+    };
     const kernels::Pattern& p = model->view.pattern;
     for (int l = 0; l < kGroup; ++l) {
       dense[l].setZero();
@@ -69,8 +74,9 @@ struct Systems {
 };
 
 void count(benchmark::State& state, double environments) {
-  state.counters["ns/env"] = benchmark::Counter(double(state.iterations()) * environments * 1e-9,
-                                                benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+  state.counters["ns/env"] =
+      benchmark::Counter(double(state.iterations()) * environments * 1e-9,
+                         benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
 void BM_LanesOnThePattern(benchmark::State& state) {

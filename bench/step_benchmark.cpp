@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Environment-steps per second of the rolling ball on one thread, by batch size, size of pad, kind of
-// frame and precision: what the whole program can do at best.
+// Environment-steps per second of the rolling ball on one thread, by batch size, size of pad, kind
+// of frame and precision: what the whole program can do at best.
 #include <benchmark/benchmark.h>
 
 #include <cstddef>
@@ -38,7 +38,8 @@ class RollingBall {
       for (int e = 0; e < environments; ++e)
         program_.evaluate(t, start_.episode(e),
                           {&controls_[std::size_t(t) * row_ + std::size_t(e) * nu], nu});
-    for (const SensorInfo& sensor : model_.sensors()) intervals_.push_back(tactile_interval(sensor, {}));
+    for (const SensorInfo& sensor : model_.sensors())
+      intervals_.push_back(tactile_interval(sensor, {}));
     if (frames == FrameKind::none) intervals_.clear();
   }
 
@@ -66,7 +67,8 @@ class RollingBall {
     return scene;
   }
   void read(int sensor) {
-    for (int block = 0; block < batch_.blocks(); ++block) fields_.read(readout_, batch_, block, sensor);
+    for (int block = 0; block < batch_.blocks(); ++block)
+      fields_.read(readout_, batch_, block, sensor);
     benchmark::ClobberMemory();
   }
 
@@ -82,7 +84,8 @@ class RollingBall {
 };
 
 void BM_RollingBall(benchmark::State& state, FrameKind frames, Precision precision) {
-  const auto environments = static_cast<int>(state.range(0)), resolution = static_cast<int>(state.range(1));
+  const auto environments = static_cast<int>(state.range(0)),
+             resolution = static_cast<int>(state.range(1));
   RollingBall ball(environments, resolution, frames, precision);
   ball.run();  // warms caches and pages; its state is thrown away
   std::int64_t passes = 0;
@@ -113,7 +116,8 @@ BENCHMARK_CAPTURE(BM_RollingBall, none, FrameKind::none, Precision::f64)
 BENCHMARK_CAPTURE(BM_RollingBall, dense_double, FrameKind::dense, Precision::f64)->Apply(sizes);
 BENCHMARK_CAPTURE(BM_RollingBall, dense_mixed, FrameKind::dense, Precision::mixed)->Apply(sizes);
 BENCHMARK_CAPTURE(BM_RollingBall, compact_double, FrameKind::compact, Precision::f64)->Apply(sizes);
-BENCHMARK_CAPTURE(BM_RollingBall, compact_mixed, FrameKind::compact, Precision::mixed)->Apply(sizes);
+BENCHMARK_CAPTURE(BM_RollingBall, compact_mixed, FrameKind::compact, Precision::mixed)
+    ->Apply(sizes);
 
 }  // namespace
 }  // namespace tangere

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a tactile point costs: the kernels alone, on pads that are touched everywhere or in the middle, against one point
-// at a time in plain C++. Fields, lanes and files come after them.
+// What a tactile point costs: the kernels alone, on pads that are touched everywhere or in the
+// middle, against one point at a time in plain C++. Fields, lanes and files come after them.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -27,8 +27,8 @@ using kernels::kTactileTile;
 using kernels::Touch;
 using kernels::TouchShape;
 
-/// Operations of a point that a sphere touches, law `clamped`, counted in the machine code of the loops: sums, products,
-/// comparisons and choices one each, a multiply-add two.
+/// Operations of a point that a sphere touches, law `clamped`, counted in the machine code of the
+/// loops: sums, products, comparisons and choices one each, a multiply-add two.
 constexpr double kOperationsDouble = 113, kOperationsMixed = 110;
 
 Model pad_model(int resolution) {
@@ -58,7 +58,9 @@ const Press kMiddle(0.02, 1e-3);
 int run(const kernels::TactileArgs<double>& a) { return kernels::active_kernels().tactile(a); }
 int run(const kernels::TactileArgs<float>& a) { return kernels::active_kernels().tactile_mixed(a); }
 void run(const kernels::TactileBlockArgs<double>& a) { kernels::active_kernels().tactile_block(a); }
-void run(const kernels::TactileBlockArgs<float>& a) { kernels::active_kernels().tactile_block_mixed(a); }
+void run(const kernels::TactileBlockArgs<float>& a) {
+  kernels::active_kernels().tactile_block_mixed(a);
+}
 
 void count(benchmark::State& state, double points, double operations = 0) {
   using benchmark::Counter;
@@ -74,18 +76,25 @@ void field(benchmark::State& state, const Press& press, int resolution, bool den
   const Model model = pad_model(resolution);
   const CompiledSensor& sensor = model.compiled().sensors[0];
   const kernels::PadTiles pad = sensor.tiles();
-  AlignedVector<Real> values(std::size_t(pad.tiles()) * 3 * kTactileTile), array(std::size_t(sensor.points()) * 3);
+  AlignedVector<Real> values(std::size_t(pad.tiles()) * 3 * kTactileTile),
+      array(std::size_t(sensor.points()) * 3);
   std::vector<int> active(std::size_t(pad.tiles()));
-  const kernels::TactileArgs<Real> args{&pad,          ContactLaw::clamped, 1,
-                                        &press.shape,  &press.touch,        active.data(),
-                                        dense ? nullptr : values.data(),    dense ? array.data() : nullptr};
+  const kernels::TactileArgs<Real> args{&pad,
+                                        ContactLaw::clamped,
+                                        1,
+                                        &press.shape,
+                                        &press.touch,
+                                        active.data(),
+                                        dense ? nullptr : values.data(),
+                                        dense ? array.data() : nullptr};
   int tiles = 0;
   for (auto _ : state) {
     tiles = run(args);
     benchmark::ClobberMemory();
   }
   const bool all = &press == &kEverywhere;
-  count(state, sensor.points(), all ? (sizeof(Real) == 4 ? kOperationsMixed : kOperationsDouble) : 0);
+  count(state, sensor.points(),
+        all ? (sizeof(Real) == 4 ? kOperationsMixed : kOperationsDouble) : 0);
   state.counters["tiles"] = tiles;
 }
 
@@ -108,7 +117,8 @@ void block(benchmark::State& state, int resolution) {
     arrays[l].resize(std::size_t(sensor.points()) * 3);
     dense[l] = arrays[l].data();
   }
-  const kernels::TactileBlockArgs<Real> args{&pad, ContactLaw::clamped, 1, &kMiddle.shape, of_shape, dense.data()};
+  const kernels::TactileBlockArgs<Real> args{&pad,     ContactLaw::clamped, 1, &kMiddle.shape,
+                                             of_shape, dense.data()};
   for (auto _ : state) {
     run(args);
     benchmark::ClobberMemory();
@@ -129,8 +139,9 @@ void BM_OnePointAtATime(benchmark::State& state) {
     double* to = array.data();
     for (int i = 0; i < pad.rows; ++i)
       for (int j = 0; j < pad.cols; ++j, to += 3) {
-        const auto at = point_contact(kernels::SphereDistance<double>{press.shape.size[0]}, law, t.Q, t.c, t.omega, t.v,
-                                      {i * step - 0.025, j * step - 0.025, 0});
+        const auto at =
+            point_contact(kernels::SphereDistance<double>{press.shape.size[0]}, law, t.Q, t.c,
+                          t.omega, t.v, {i * step - 0.025, j * step - 0.025, 0});
         to[0] = at.force.x, to[1] = at.force.y, to[2] = -at.force.z;
       }
     benchmark::ClobberMemory();
@@ -161,14 +172,15 @@ __attribute__((target("avx2,fma"))) void multiply_add_256(float* x) {
 void BM_PeakMultiplyAdd(benchmark::State& state) {
   const std::string_view isa = kernels::active_isa_name();
   const int width = isa == "avx512" ? 16 : 8;
-  if (isa != "avx512" && isa != "avx2") return state.SkipWithError("this instruction set fuses nothing");
+  if (isa != "avx512" && isa != "avx2")
+    return state.SkipWithError("this instruction set fuses nothing");
   std::array<float, kChains + 1> x{};
   for (auto _ : state) {
     width == 16 ? multiply_add_512(x.data()) : multiply_add_256(x.data());
     benchmark::ClobberMemory();
   }
-  state.counters["flop/s"] =
-      benchmark::Counter(double(state.iterations()) * 2 * kChains * kRounds * width, benchmark::Counter::kIsRate);
+  state.counters["flop/s"] = benchmark::Counter(
+      double(state.iterations()) * 2 * kChains * kRounds * width, benchmark::Counter::kIsRate);
   state.SetLabel(std::string(isa));
 }
 BENCHMARK(BM_PeakMultiplyAdd);
@@ -188,7 +200,8 @@ Model list_model() {
     }
   return Model(scene);
 }
-/// Tiles of a curved pad that is touched everywhere. The pad's axes are the body's: the ball comes from below.
+/// Tiles of a curved pad that is touched everywhere. The pad's axes are the body's: the ball comes
+/// from below.
 template <class Real>
 void curved(benchmark::State& state) {
   const Model model = list_model();
@@ -197,8 +210,9 @@ void curved(benchmark::State& state) {
   press.touch.c.z = -0.005 - press.touch.c.z;
   AlignedVector<Real> values(std::size_t(pad.tiles()) * 3 * kTactileTile);
   std::vector<int> active(std::size_t(pad.tiles()));
-  const kernels::TactileArgs<Real> args{&pad,         ContactLaw::clamped, 1, &press.shape, &press.touch,
-                                        active.data(), values.data(),      nullptr};
+  const kernels::TactileArgs<Real> args{
+      &pad,          ContactLaw::clamped, 1,      &press.shape, &press.touch,
+      active.data(), values.data(),       nullptr};
   int tiles = 0;
   for (auto _ : state) {
     tiles = run(args);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the task layer costs: box pushing through a VectorTask, and the same states, controls and fields through a bare
-// Stepper and Readout, on one thread.
+// What the task layer costs: box pushing through a VectorTask, and the same states, controls and
+// fields through a bare Stepper and Readout, on one thread.
 #include <benchmark/benchmark.h>
 
 #include <array>
@@ -84,10 +84,12 @@ void BM_Bare(benchmark::State& state) {
     state.ResumeTiming();
     for (const std::vector<double>& u : p.controls)
       for (int block = 0; block < batch.blocks(); ++block) {
-        for (int k = 0; k < p.task->spec().steps_per_action; ++k) stepper.step_block(batch, block, u);
+        for (int k = 0; k < p.task->spec().steps_per_action; ++k)
+          stepper.step_block(batch, block, u);
         std::array<std::span<double>, kernels::kBlock> parts;
         for (std::size_t l = 0; l < parts.size(); ++l)
-          parts[l] = std::span(fields).subspan((std::size_t(block) * parts.size() + l) * numbers, numbers);
+          parts[l] =
+              std::span(fields).subspan((std::size_t(block) * parts.size() + l) * numbers, numbers);
         readout.read_block(batch, block, 0, std::span<const std::span<double>>(parts));
       }
     benchmark::ClobberMemory();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between the tape and the group: gathers states and cotangents of eight lanes, reverses their step, scatters.
+// Between the tape and the group: gathers states and cotangents of eight lanes, reverses their
+// step, scatters.
 #include "engine/adjoint.hpp"
 
 #include <algorithm>
@@ -23,7 +24,8 @@ template <int L>
 struct Lanes {
   BasicWorkspace<L> work;
   AdjointWorkspace<L> adjoint;
-  Lanes(const CompiledModel& m, const AdjointOptions& wanted) : work(m), adjoint(m, wanted.losses, wanted.parameters) {}
+  Lanes(const CompiledModel& m, const AdjointOptions& wanted)
+      : work(m), adjoint(m, wanted.losses, wanted.parameters) {}
 };
 
 /// A step of one group: environment `first` + l of the block in lane l of the batch.
@@ -43,7 +45,8 @@ struct Adjoint::Impl {
   Lanes<kGroup> eight;
   Lanes<1> one;
   std::vector<BlockCotangent> losses;
-  AlignedVector<double> rows;  ///< a block as it was before the step: states from the tape, parameters from the batch
+  AlignedVector<double>
+      rows;  ///< a block as it was before the step: states from the tape, parameters from the batch
 
   Impl(const Model& m, const StepSettings& s, const AdjointOptions& wanted)
       : model(m),
@@ -57,8 +60,10 @@ struct Adjoint::Impl {
     for (BlockCotangent& c : losses) {
       for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v}) x->assign(nv, 0.0);
       c.u.assign(nu, 0.0);
-      if (wanted.points) c.points.assign(std::size_t(kBlock) * std::size_t(tactile_points(m) * kPointNumbers), 0.0);
-      if (wanted.parameters) c.parameters.assign(std::size_t(parameter_rows(model.compiled()) * kBlock), 0.0);
+      if (wanted.points)
+        c.points.assign(std::size_t(kBlock) * std::size_t(tactile_points(m) * kPointNumbers), 0.0);
+      if (wanted.parameters)
+        c.parameters.assign(std::size_t(parameter_rows(model.compiled()) * kBlock), 0.0);
     }
   }
 
@@ -66,7 +71,8 @@ struct Adjoint::Impl {
   void restore(const Batch& batch, int block, const BlockTape& tape, std::int64_t step) {
     const BlockLayout& layout = model.compiled().layout;
     const double* now = batch.block(block);
-    std::copy(now + layout.parameters * kBlock, now + layout.rows * kBlock, rows.data() + layout.parameters * kBlock);
+    std::copy(now + layout.parameters * kBlock, now + layout.rows * kBlock,
+              rows.data() + layout.parameters * kBlock);
     const std::size_t count = std::size_t((model.nq() + model.nv()) * kBlock);
     std::copy_n(tape.state(step), count, rows.data() + layout.q * kBlock);
     std::copy_n(tape.state(step - 1), count, rows.data() + layout.previous_q * kBlock);
@@ -97,7 +103,8 @@ struct Adjoint::Impl {
     gather(w.q_before, &rows[std::size_t(m.layout.previous_q * kBlock)], m.nq, g.first);
     gather(w.v_before, &rows[std::size_t(m.layout.previous_v * kBlock)], m.nv, g.first);
     gather(w.q1, g.tape.state(g.step + 1), m.nq, g.first);
-    if (settings.integrator == Integrator::sdirk2) gather(w.x_gamma, g.tape.x_gamma(g.step), m.nv, g.first);
+    if (settings.integrator == Integrator::sdirk2)
+      gather(w.x_gamma, g.tape.x_gamma(g.step), m.nv, g.first);
     w.stage.block = rows.data() + g.first;
     w.stage.group = 0;
     for (std::size_t k = 0; k < losses.size(); ++k) {
@@ -106,11 +113,13 @@ struct Adjoint::Impl {
       gather(o.v, losses[k].v.data(), m.nv, g.first);
       for (Row<L>* p : {o.q_centre, o.v_centre, o.q_other, o.v_other, o.tau, o.target})
         std::fill(p, p + m.nv, Row<L>{});
-      if (o.parameters != nullptr) std::fill(o.parameters, o.parameters + kernels::parameter_numbers(m.view), Row<L>{});
+      if (o.parameters != nullptr)
+        std::fill(o.parameters, o.parameters + kernels::parameter_numbers(m.view), Row<L>{});
     }
   }
 
-  /// The solves of one lane's special step, last first. What the step's result hands to its inner states stays in the lane.
+  /// The solves of one lane's special step, last first. What the step's result hands to its inner
+  /// states stays in the lane.
   template <int L>
   void reverse_special(Lanes<L>& x, const TapedStep& special, int lane, const GroupStepInHand& g) {
     BasicWorkspace<L>& w = x.work;
@@ -148,11 +157,13 @@ struct Adjoint::Impl {
     LaneBits plain = 0;
     for (int l = 0; l < L; ++l) {
       if (!has(g.live, l)) continue;
-      set_motors(m, x.work, l, rows.data() + g.first + l, controls.subspan(std::size_t((g.first + l) * m.nu), std::size_t(m.nu)));
+      set_motors(m, x.work, l, rows.data() + g.first + l,
+                 controls.subspan(std::size_t((g.first + l) * m.nu), std::size_t(m.nu)));
       if (g.tape.special(g.step, g.first + l) == nullptr) plain |= 1U << l;
     }
     if (plain != 0)
-      group.reverse(settings.integrator, settings.timestep, kernels::active_kernels(), x.work, x.adjoint, plain);
+      group.reverse(settings.integrator, settings.timestep, kernels::active_kernels(), x.work,
+                    x.adjoint, plain);
     for (int l = 0; l < L; ++l)
       if (has(g.live & ~plain, l)) reverse_special(x, *g.tape.special(g.step, g.first + l), l, g);
     for (std::size_t k = 0; k < losses.size(); ++k)
@@ -160,11 +171,14 @@ struct Adjoint::Impl {
         if (has(g.live, l)) scatter(x.adjoint.losses[k], losses[k], l, g.first + l, controls);
   }
 
-  /// One lane's results to its column; forces known at the start hang on the state there and on the controls.
+  /// One lane's results to its column; forces known at the start hang on the state there and on the
+  /// controls.
   template <int L>
-  void scatter(LossRows<L>& o, BlockCotangent& c, int lane, int column, std::span<const double> controls) {
+  void scatter(LossRows<L>& o, BlockCotangent& c, int lane, int column,
+               std::span<const double> controls) {
     const CompiledModel& m = model.compiled();
-    const std::span<const double> u = controls.subspan(std::size_t(column * m.nu), std::size_t(m.nu));
+    const std::span<const double> u =
+        controls.subspan(std::size_t(column * m.nu), std::size_t(m.nu));
     MotorPullback<L> pullback{m, rows.data() + column, u, lane};
     for (std::size_t k = 0; k < std::size_t(m.nu); ++k) c.u[k * kBlock + std::size_t(column)] = 0;
     pullback.run(o, c.u.data() + column);
@@ -198,7 +212,8 @@ std::span<double> BlockCotangent::points_of(const Model& model, int sensor, int 
   const auto size = [](int n) { return std::size_t(n) * std::size_t(kPointNumbers); };
   return std::span(points)
       .subspan(points.size() / kBlock * std::size_t(lane))
-      .subspan(size(first_tactile_point(model, sensor)), size(model.sensors()[std::size_t(sensor)].points));
+      .subspan(size(first_tactile_point(model, sensor)),
+               size(model.sensors()[std::size_t(sensor)].points));
 }
 
 Adjoint::Adjoint(const Model& model, const StepperOptions& options, const AdjointOptions& wanted)
@@ -233,7 +248,8 @@ void Adjoint::reverse_step(const Batch& batch, int block, const BlockTape& tape,
       }
     }
     if (g.live == 0) continue;
-    if ((g.live & (g.live - 1)) == 0) {  // as in the step: the same bits either way, a third of the time
+    if ((g.live & (g.live - 1)) ==
+        0) {  // as in the step: the same bits either way, a third of the time
       g.first += __builtin_ctz(g.live);
       g.live = 1;
       impl_->reverse<1>(g, of_block);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The reverse sweep over a taped rollout, block by block and step by step, for any number of losses at once.
+// The reverse sweep over a taped rollout, block by block and step by step, for any number of losses
+// at once.
 #pragma once
 
 #include <memory>
@@ -10,14 +11,16 @@
 
 namespace tangere {
 
-/// Cotangents of one loss in one block, rows of 16 lanes: dof i of lane l at [i * 16 + l]. Positions by their right tangent
-/// (docs/gradients.md).
+/// Cotangents of one loss in one block, rows of 16 lanes: dof i of lane l at [i * 16 + l].
+/// Positions by their right tangent (docs/gradients.md).
 struct BlockCotangent {
   AlignedVector<double> q, v;                    ///< (nv, 16) of the newest state
   AlignedVector<double> previous_q, previous_v;  ///< (nv, 16) of the state one step before it
-  AlignedVector<double> u;                       ///< (nu, 16) of the controls of the step reversed last
-  AlignedVector<double> parameters;              ///< (parameter_rows, 16), summed over steps (engine/parameters.hpp); or empty
-  AlignedVector<double> points;                  ///< (16, tactile points, kPointNumbers), the same (engine/point_numbers.hpp)
+  AlignedVector<double> u;  ///< (nu, 16) of the controls of the step reversed last
+  AlignedVector<double>
+      parameters;  ///< (parameter_rows, 16), summed over steps (engine/parameters.hpp); or empty
+  AlignedVector<double>
+      points;  ///< (16, tactile points, kPointNumbers), the same (engine/point_numbers.hpp)
 
   /// A lane's part of those, of one sensor; empty if there are none.
   [[nodiscard]] std::span<double> points_of(const Model& model, int sensor, int lane);
@@ -29,10 +32,12 @@ struct AdjointOptions {
   bool points = false;      ///< and by every tactile point's own
 };
 
-/// Owns the scratch of one thread. Reverses steps of any batch of its model that a Stepper with the same options took.
+/// Owns the scratch of one thread. Reverses steps of any batch of its model that a Stepper with the
+/// same options took.
 class Adjoint {
  public:
-  explicit Adjoint(const Model& model, const StepperOptions& options = {}, const AdjointOptions& wanted = {});
+  explicit Adjoint(const Model& model, const StepperOptions& options = {},
+                   const AdjointOptions& wanted = {});
   ~Adjoint();
   Adjoint(Adjoint&&) noexcept;
   Adjoint& operator=(Adjoint&&) noexcept;
@@ -44,9 +49,10 @@ class Adjoint {
   [[nodiscard]] BlockCotangent& loss(int k);
   [[nodiscard]] const BlockCotangent& loss(int k) const;
 
-  /// Takes the cotangents of the states after steps `step` + 1 and `step` to those after `step` and `step` - 1, and sets u.
-  /// `batch` supplies its parameters, its state is not read; `controls`: (E, nu), those of that step. An environment that
-  /// failed stands still from then on: its cotangents pass through steps that it did not take.
+  /// Takes the cotangents of the states after steps `step` + 1 and `step` to those after `step` and
+  /// `step` - 1, and sets u. `batch` supplies its parameters, its state is not read; `controls`:
+  /// (E, nu), those of that step. An environment that failed stands still from then on: its
+  /// cotangents pass through steps that it did not take.
   void reverse_step(const Batch& batch, int block, const BlockTape& tape, std::int64_t step,
                     std::span<const double> controls);
 

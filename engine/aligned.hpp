@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory for lanes: 64-byte aligned, so that every row of eight doubles is one cache line and one AVX-512 load.
+// Memory for lanes: 64-byte aligned, so that every row of eight doubles is one cache line and one
+// AVX-512 load.
 #pragma once
 
 #include <cstddef>
@@ -20,7 +21,9 @@ struct LaneAllocator {
     if (n > static_cast<std::size_t>(-1) / sizeof(T)) throw std::bad_array_new_length();
     return static_cast<T*>(::operator new(n * sizeof(T), std::align_val_t(kLaneAlignment)));
   }
-  void deallocate(T* p, std::size_t) noexcept { ::operator delete(p, std::align_val_t(kLaneAlignment)); }
+  void deallocate(T* p, std::size_t) noexcept {
+    ::operator delete(p, std::align_val_t(kLaneAlignment));
+  }
   template <class U>
   bool operator==(const LaneAllocator<U>&) const noexcept {
     return true;

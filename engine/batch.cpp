@@ -40,12 +40,14 @@ double nominal(const CompiledModel& m, const RandomizationDescription& d) {
   for (const auto& s : m.scene.sensors)
     if (d.target == RandomTarget::tactile && s.name == d.name) return field(s.coefficients);
   for (const auto& c : m.scene.pair_contacts)
-    if (d.target == RandomTarget::pair_contact && c.general_body == d.name && c.primitive_body == d.second_name)
+    if (d.target == RandomTarget::pair_contact && c.general_body == d.name &&
+        c.primitive_body == d.second_name)
       return field(c.coefficients);
   for (const auto& c : m.scene.ground_contacts)
     if (d.target == RandomTarget::ground_contact && c.body == d.name) return field(c.coefficients);
   for (const auto& l : m.scene.links) {
-    const double values[] = {l.joint.damping, l.joint.armature, l.joint.stiffness, l.joint.limit_stiffness};
+    const double values[] = {l.joint.damping, l.joint.armature, l.joint.stiffness,
+                             l.joint.limit_stiffness};
     if (d.target == RandomTarget::joint_effect && l.joint.name == d.name)
       return values[static_cast<int>(d.joint_field)];
   }
@@ -53,8 +55,10 @@ double nominal(const CompiledModel& m, const RandomizationDescription& d) {
     if (d.target == RandomTarget::density && l.body.name == d.name) return l.body.density;
   for (const auto& l : m.scene.links) {
     Shape shape = l.body.shape;
-    if (d.target == RandomTarget::size && l.body.name == d.name) return *size_number(shape, d.index);
-    if (d.target == RandomTarget::place && l.joint.name == d.name) return l.joint.pose.position[std::size_t(d.index)];
+    if (d.target == RandomTarget::size && l.body.name == d.name)
+      return *size_number(shape, d.index);
+    if (d.target == RandomTarget::place && l.joint.name == d.name)
+      return l.joint.pose.position[std::size_t(d.index)];
   }
   for (const auto& motor : m.scene.motors)
     if (d.target == RandomTarget::motor && motor.joint == d.name)
@@ -77,12 +81,10 @@ const char* to_string(StepStatus value) {
 }
 
 Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int64_t first_episode)
-    : model_(model),
-      environments_(environments),
-      blocks_(0),
-      seed_(seed) {
+    : model_(model), environments_(environments), blocks_(0), seed_(seed) {
   if (environments < 1)
-    throw InputError("a batch of " + std::to_string(environments) + " environments; expected at least 1");
+    throw InputError("a batch of " + std::to_string(environments) +
+                     " environments; expected at least 1");
   const CompiledModel& m = model.compiled();
   blocks_ = environments / kBlock + (environments % kBlock != 0);
   block_stride_ = std::size_t(m.layout.rows) * kBlock;
@@ -96,8 +98,9 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
     held_.assign(lanes, 0);
     episode_.resize(lanes);
   } catch (const std::exception&) {
-    throw InputError("no memory for " + std::to_string(environments) + " environments (" +
-                     std::to_string(double(block_stride_) * double(blocks_) * sizeof(double) / 1e9) + " GB)");
+    throw InputError(
+        "no memory for " + std::to_string(environments) + " environments (" +
+        std::to_string(double(block_stride_) * double(blocks_) * sizeof(double) / 1e9) + " GB)");
   }
   for (std::size_t lane = 0; lane < lanes; ++lane) {
     episode_[lane] = first_episode + static_cast<std::int64_t>(lane);
@@ -105,7 +108,9 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
   }
 }
 
-double* Batch::column(std::size_t lane) { return data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock; }
+double* Batch::column(std::size_t lane) {
+  return data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock;
+}
 
 /// Padding lanes keep the scene's own numbers.
 void Batch::draw_episode(std::size_t lane) {
@@ -118,7 +123,8 @@ void Batch::draw_episode(std::size_t lane) {
     const RandomizationDescription& d = m.scene.randomizations[k];
     const int row = m.randomized_row[k];
     if (!padding) {
-      own[row * kBlock] = draw(d.distribution, RandomKey{seed_, episode_[lane], 0, purpose_of(d.target), std::uint32_t(k)});
+      own[row * kBlock] = draw(d.distribution, RandomKey{seed_, episode_[lane], 0,
+                                                         purpose_of(d.target), std::uint32_t(k)});
     } else if (row >= m.layout.parameters) {
       own[row * kBlock] = nominal(m, d);
     }
@@ -194,21 +200,25 @@ void Batch::set_state(int environment, std::span<const double> q, std::span<cons
   get_q(environment, before_q);
   get_v(environment, before_v);
   write_state(lane, q, v);
-  for (int i = 0; i < m.nq; ++i) column[std::size_t(m.layout.previous_q + i) * kBlock] = before_q[i];
-  for (int i = 0; i < m.nv; ++i) column[std::size_t(m.layout.previous_v + i) * kBlock] = before_v[i];
+  for (int i = 0; i < m.nq; ++i)
+    column[std::size_t(m.layout.previous_q + i) * kBlock] = before_q[i];
+  for (int i = 0; i < m.nv; ++i)
+    column[std::size_t(m.layout.previous_v + i) * kBlock] = before_v[i];
   status_[lane] = StepStatus::converged;
   has_history_[lane] = 1;
 }
 
 void Batch::set_failed(int environment, StepStatus status) {
   if (!failed(status))
-    throw InputError(std::string("status '") + to_string(status) + "' is none of a failed environment");
+    throw InputError(std::string("status '") + to_string(status) +
+                     "' is none of a failed environment");
   status_[std::size_t(environment)] = status;
 }
 
 int Batch::failed_count() const {
   const auto all = statuses();
-  return static_cast<int>(std::count_if(all.begin(), all.end(), [](StepStatus s) { return failed(s); }));
+  return static_cast<int>(
+      std::count_if(all.begin(), all.end(), [](StepStatus s) { return failed(s); }));
 }
 
 BlockState Batch::save_block(int block) const {
@@ -235,15 +245,18 @@ double Batch::randomized_value(int environment, int k) const {
   const CompiledModel& m = model_.compiled();
   const RandomizationDescription& d = m.scene.randomizations[std::size_t(k)];
   const int row = m.randomized_row[std::size_t(k)];
-  if (is_parameter(k)) return (block(environment / kBlock) + environment % kBlock)[std::size_t(row) * kBlock];
-  return draw(d.distribution, RandomKey{seed_, episode(environment), 0, purpose_of(d.target), std::uint32_t(k)});
+  if (is_parameter(k))
+    return (block(environment / kBlock) + environment % kBlock)[std::size_t(row) * kBlock];
+  return draw(d.distribution,
+              RandomKey{seed_, episode(environment), 0, purpose_of(d.target), std::uint32_t(k)});
 }
 
 void Batch::set_randomized_value(int environment, int k, double value) {
   const CompiledModel& m = model_.compiled();
   const int row = m.randomized_row[std::size_t(k)];
   if (!is_parameter(k))
-    throw InputError("randomised number " + std::to_string(k) + " is of the starting state; expected a parameter");
+    throw InputError("randomised number " + std::to_string(k) +
+                     " is of the starting state; expected a parameter");
   column(std::size_t(environment))[std::size_t(row) * kBlock] = value;
   update_derived_rows(m, column(std::size_t(environment)));
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// compile(scene): names become indices, fixed joints fold into what they hang on, joints become elementary links.
+// compile(scene): names become indices, fixed joints fold into what they hang on, joints become
+// elementary links.
 #include <algorithm>
 #include <cmath>
 
@@ -24,7 +25,8 @@ class Compiler {
 
   CompiledModel run() {
     for (int i = 0; i < static_cast<int>(m_.scene.links.size()); ++i) add_link(i);
-    if (m_.nv == 0) throw InputError(where() + "nothing in the scene can move: every joint is fixed");
+    if (m_.nv == 0)
+      throw InputError(where() + "nothing in the scene can move: every joint is fixed");
     check_masses(m_);
     compile_joint_effects(m_);
     compile_motors(m_, joints_);
@@ -41,7 +43,9 @@ class Compiler {
   }
 
  private:
-  [[nodiscard]] std::string where() const { return m_.scene.path.empty() ? "" : m_.scene.path + ": "; }
+  [[nodiscard]] std::string where() const {
+    return m_.scene.path.empty() ? "" : m_.scene.path + ": ";
+  }
 
   // --- tree ---
 
@@ -67,8 +71,8 @@ class Compiler {
     body.mass = properties.mass;
     body.centre = properties.centre;
     if (!(body.mass >= 0) || !std::isfinite(body.mass))
-      throw InputError(d.body.source.prefix() + "body '" + d.body.name + "' has mass " + std::to_string(body.mass) +
-                       " kg; expected a finite one, zero or more");
+      throw InputError(d.body.source.prefix() + "body '" + d.body.name + "' has mass " +
+                       std::to_string(body.mass) + " kg; expected a finite one, zero or more");
     if (body.link >= 0 && body.mass > 0) add_inertia(m_.links[body.link], body, properties);
     m_.bodies.push_back(body);
     m_.body_names.push_back(d.body.name);
@@ -90,20 +94,26 @@ class Compiler {
       const int b1 = bodies_.find("body", d.general_body, d.source);
       const int b2 = bodies_.find("body", d.primitive_body, d.source);
       const CompiledBody &first = m_.bodies[b1], &second = m_.bodies[b2];
-      const Shape &general = m_.scene.links[b1].body.shape, &primitive = m_.scene.links[b2].body.shape;
+      const Shape &general = m_.scene.links[b1].body.shape,
+                  &primitive = m_.scene.links[b2].body.shape;
       if (!has_contact_points(general))
-        throw InputError(d.source.prefix() + "general_body '" + d.general_body + "' (" + shape_name(general) +
-                         ") has no contact points; expected a cuboid, cylinder or capsule (swap the two bodies)");
+        throw InputError(d.source.prefix() + "general_body '" + d.general_body + "' (" +
+                         shape_name(general) +
+                         ") has no contact points; expected a cuboid, cylinder or capsule (swap "
+                         "the two bodies)");
       if (!has_distance(primitive))
-        throw InputError(d.source.prefix() + "primitive_body '" + d.primitive_body + "' (" + shape_name(primitive) +
-                         ") has no distance; expected a sphere, cuboid, cylinder, capsule or plane");
+        throw InputError(
+            d.source.prefix() + "primitive_body '" + d.primitive_body + "' (" +
+            shape_name(primitive) +
+            ") has no distance; expected a sphere, cuboid, cylinder, capsule or plane");
       if (b1 == b2 || first.link == second.link)
-        throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" + d.primitive_body +
-                         "' cannot move against each other");
+        throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" +
+                         d.primitive_body + "' cannot move against each other");
       std::vector<double> points = contact_points(general);
       double reach = 0;
       for (std::size_t k = 0; k < points.size(); k += 3) {
-        const Vec3<double> p = first.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + first.frame.p;
+        const Vec3<double> p =
+            first.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + first.frame.p;
         points[k] = p.x, points[k + 1] = p.y, points[k + 2] = p.z;
         reach = std::max(reach, std::sqrt(dot(p, p)));
       }
@@ -125,7 +135,8 @@ class Compiler {
       pair.points = keep(m_.point_storage, std::move(points));
       lay_out_tiles(pair, tiles);
       m_.pairs.push_back(pair);
-      m_.contact_info.push_back({d.general_body, d.primitive_body, pair.n_points, to_string(d.law)});
+      m_.contact_info.push_back(
+          {d.general_body, d.primitive_body, pair.n_points, to_string(d.law)});
       touching_.emplace_back(pair.link1, pair.link2);
     }
   }
@@ -135,13 +146,16 @@ class Compiler {
     constexpr int kTile = kernels::kContactTile, kLanes = kernels::kGroup;
     AlignedVector<double> points(std::size_t(pair.n_tiles) * 3 * kTile, kernels::kFarAway);
     for (int k = 0; k < pair.n_points; ++k)
-      for (int c = 0; c < 3; ++c) points[std::size_t((k / kTile * 3 + c) * kTile + k % kTile)] = pair.points[3 * k + c];
+      for (int c = 0; c < 3; ++c)
+        points[std::size_t((k / kTile * 3 + c) * kTile + k % kTile)] = pair.points[3 * k + c];
     const int groups = (pair.n_tiles + kLanes - 1) / kLanes;
     AlignedVector<double> bounds(std::size_t(groups) * 4 * kLanes, kernels::kFarAway);
     for (int t = 0; t < groups * kLanes; ++t)
       for (int c = 0; c < 4; ++c)
         bounds[std::size_t((t / kLanes * 4 + c) * kLanes + t % kLanes)] =
-            t < pair.n_tiles ? tiles[std::size_t(4 * t + c)] : c < 3 ? kernels::kFarAway : 0;
+            t < pair.n_tiles ? tiles[std::size_t(4 * t + c)]
+            : c < 3          ? kernels::kFarAway
+                             : 0;
     m_.tile_storage.push_back(std::move(points));
     pair.tile_points = m_.tile_storage.back().data();
     m_.tile_storage.push_back(std::move(bounds));
@@ -151,10 +165,12 @@ class Compiler {
   void ground_contacts() {
     for (const GroundContactDescription& d : m_.scene.ground_contacts) {
       if (!m_.scene.ground)
-        throw InputError(d.source.prefix() + "ground_contact of '" + d.body + "', but the scene has no <ground>");
+        throw InputError(d.source.prefix() + "ground_contact of '" + d.body +
+                         "', but the scene has no <ground>");
       const int b = bodies_.find("body", d.body, d.source);
       const CompiledBody& body = m_.bodies[b];
-      if (body.link < 0) throw InputError(d.source.prefix() + "body '" + d.body + "' is fixed in the world");
+      if (body.link < 0)
+        throw InputError(d.source.prefix() + "body '" + d.body + "' is fixed in the world");
       kernels::GroundContact ground{};
       const Shape& shape = m_.scene.links[b].body.shape;
       std::vector<double> points = contact_points(shape);
@@ -163,9 +179,11 @@ class Compiler {
         ground.radius = body.size.x;
       }
       if (points.empty())
-        throw InputError(d.source.prefix() + "body '" + d.body + "' (" + shape_name(shape) + ") has no contact points");
+        throw InputError(d.source.prefix() + "body '" + d.body + "' (" + shape_name(shape) +
+                         ") has no contact points");
       for (std::size_t k = 0; k < points.size(); k += 3) {
-        const Vec3<double> p = body.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + body.frame.p;
+        const Vec3<double> p =
+            body.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + body.frame.p;
         points[k] = p.x, points[k + 1] = p.y, points[k + 2] = p.z;
       }
       ground.link = body.link;
@@ -212,14 +230,16 @@ class Compiler {
   void unknown_scales() {
     std::vector<Frame<double>> world;
     double extent = 0;
-    for (const Link& l : m_.links) world.push_back(l.parent < 0 ? l.frame : compose(world[std::size_t(l.parent)], l.frame));
+    for (const Link& l : m_.links)
+      world.push_back(l.parent < 0 ? l.frame : compose(world[std::size_t(l.parent)], l.frame));
     for (const CompiledBody& b : m_.bodies) {
       const Frame<double> at = b.link < 0 ? b.frame : compose(world[std::size_t(b.link)], b.frame);
       extent = std::max(extent, std::sqrt(dot(at.p, at.p)) + std::sqrt(dot(b.size, b.size)));
     }
     for (const Link& l : m_.links) {
       const bool turns = l.kind == JointKind::revolute || l.kind == JointKind::spherical;
-      m_.unknown_scale.insert(m_.unknown_scale.end(), std::size_t(kernels::dofs(l.kind)), turns ? 1.0 : extent);
+      m_.unknown_scale.insert(m_.unknown_scale.end(), std::size_t(kernels::dofs(l.kind)),
+                              turns ? 1.0 : extent);
     }
   }
 
@@ -268,9 +288,10 @@ class Compiler {
     const int count = position ? position_count(type) : dof_count(type);
     if (d.index < 0 || d.index >= count)
       throw InputError(d.source.prefix() + "joint '" + d.name + "' has " + std::to_string(count) +
-                       (position ? " coordinates" : " velocities") + "; index " + std::to_string(d.index) +
-                       " is not one of them");
-    return position ? m_.layout.q + m_.joints[i].q + d.index : m_.layout.v + m_.joints[i].v + d.index;
+                       (position ? " coordinates" : " velocities") + "; index " +
+                       std::to_string(d.index) + " is not one of them");
+    return position ? m_.layout.q + m_.joints[i].q + d.index
+                    : m_.layout.v + m_.joints[i].v + d.index;
   }
 
   template <class Vary>
@@ -282,7 +303,8 @@ class Compiler {
     }
     for (std::size_t k = 0; k < m_.pairs.size() && d.target == RandomTarget::pair_contact; ++k) {
       const PairContactDescription& pair = m_.scene.pair_contacts[k];
-      if (pair.general_body == d.name && pair.primitive_body == d.second_name) vary(m_.pairs[k].parameters), found = true;
+      if (pair.general_body == d.name && pair.primitive_body == d.second_name)
+        vary(m_.pairs[k].parameters), found = true;
     }
     for (std::size_t k = 0; k < m_.grounds.size() && d.target == RandomTarget::ground_contact; ++k)
       if (m_.scene.ground_contacts[k].body == d.name) vary(m_.grounds[k].parameters), found = true;
@@ -291,9 +313,7 @@ class Compiler {
                        (d.second_name.empty() ? "ground" : d.second_name) + "' is declared");
   }
 
-  void symbolic() {
-    m_.pattern = analyse_pattern(m_.links, m_.nv, touching_);
-  }
+  void symbolic() { m_.pattern = analyse_pattern(m_.links, m_.nv, touching_); }
 
   CompiledModel m_;
   NameIndex links_, joints_, bodies_, sensors_;
@@ -302,7 +322,8 @@ class Compiler {
 
 }  // namespace
 
-/// Everything of a model, views included. The result must not be copied: its view points into its own vectors.
+/// Everything of a model, views included. The result must not be copied: its view points into its
+/// own vectors.
 std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   auto m = std::make_shared<CompiledModel>(Compiler(scene).run());
   decide_effects(*m);
@@ -328,7 +349,8 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   v.grounded = m->grounded.data();
   v.pair_order = m->pair_order.data();
   v.ground_order = m->ground_order.data();
-  for (std::size_t k = 0; k < m->bodies.size(); ++k) m->solids.push_back(solid_of(m->scene.links[k].body.shape, m->bodies[k]));
+  for (std::size_t k = 0; k < m->bodies.size(); ++k)
+    m->solids.push_back(solid_of(m->scene.links[k].body.shape, m->bodies[k]));
   v.n_solids = static_cast<int>(m->solids.size());
   v.solids = m->solids.data();
   v.pattern = m->pattern.view();

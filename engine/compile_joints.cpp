@@ -29,14 +29,9 @@ void name_coordinates(CompiledModel& m, const JointDescription& d) {
   };
   std::vector<Coordinate> q, v;
   switch (d.type) {
-    case JointType::fixed:
-      break;
-    case JointType::revolute:
-      q = {{"angle", "rad"}}, v = {{"rate", "rad/s"}};
-      break;
-    case JointType::prismatic:
-      q = {{"position", "m"}}, v = {{"rate", "m/s"}};
-      break;
+    case JointType::fixed: break;
+    case JointType::revolute: q = {{"angle", "rad"}}, v = {{"rate", "rad/s"}}; break;
+    case JointType::prismatic: q = {{"position", "m"}}, v = {{"rate", "m/s"}}; break;
     case JointType::planar:
       q = {{"axis0", "m"}, {"axis1", "m"}}, v = {{"v0", "m/s"}, {"v1", "m/s"}};
       break;
@@ -55,8 +50,10 @@ void name_coordinates(CompiledModel& m, const JointDescription& d) {
       v.insert(v.end(), {{"wx", "rad/s"}, {"wy", "rad/s"}, {"wz", "rad/s"}});
       break;
   }
-  for (const Coordinate& c : q) m.q_names.push_back(d.name + "." + c.name), m.q_units.emplace_back(c.unit);
-  for (const Coordinate& c : v) m.v_names.push_back(d.name + "." + c.name), m.v_units.emplace_back(c.unit);
+  for (const Coordinate& c : q)
+    m.q_names.push_back(d.name + "." + c.name), m.q_units.emplace_back(c.unit);
+  for (const Coordinate& c : v)
+    m.v_names.push_back(d.name + "." + c.name), m.v_units.emplace_back(c.unit);
 }
 
 /// The numbers that hold for one dof of a joint.
@@ -72,10 +69,11 @@ void check_effects(const JointDescription& d, const JointEffects& e) {
                                                     {"lim_stiffness", e.limit_stiffness}};
   for (const auto& [name, value] : numbers)
     if (!(value >= 0) || !std::isfinite(value))
-      throw InputError(of + name + " is " + std::to_string(value) + "; expected a finite number, zero or more");
+      throw InputError(of + name + " is " + std::to_string(value) +
+                       "; expected a finite number, zero or more");
   if (e.limits && !((*e.limits)[0] <= (*e.limits)[1]))
-    throw InputError(of + "limits " + std::to_string((*e.limits)[0]) + " and " + std::to_string((*e.limits)[1]) +
-                     "; expected low, then high");
+    throw InputError(of + "limits " + std::to_string((*e.limits)[0]) + " and " +
+                     std::to_string((*e.limits)[1]) + "; expected low, then high");
 }
 
 kernels::DofEffects dof_effects(const JointEffects& e, double rest) {
@@ -111,9 +109,11 @@ int link_of_dof(const CompiledModel& m, int dof) {
 
 void check_motor(const MotorDescription& d) {
   if (!(d.low <= d.high))
-    throw InputError(d.source.prefix() + "motor of joint '" + d.joint + "': range " + std::to_string(d.low) + " " +
-                     std::to_string(d.high) + "; expected low, then high");
-  const bool finite = std::isfinite(d.low) && std::isfinite(d.high) && std::isfinite(d.P) && std::isfinite(d.D);
+    throw InputError(d.source.prefix() + "motor of joint '" + d.joint + "': range " +
+                     std::to_string(d.low) + " " + std::to_string(d.high) +
+                     "; expected low, then high");
+  const bool finite =
+      std::isfinite(d.low) && std::isfinite(d.high) && std::isfinite(d.P) && std::isfinite(d.D);
   if (d.control == MotorControl::force ? !finite : !(d.P >= 0 && d.D >= 0))
     throw InputError(d.source.prefix() + "motor of joint '" + d.joint +
                      "': expected a finite range, or gains P and D of zero or more");
@@ -121,7 +121,8 @@ void check_motor(const MotorDescription& d) {
 
 }  // namespace
 
-CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent, const Frame<double>& frame) {
+CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent,
+                        const Frame<double>& frame) {
   CompiledJoint joint;
   joint.q = m.nq;
   joint.v = m.nv;
@@ -165,27 +166,19 @@ CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent,
       joint.link = parent;
       joint.frame = frame;
       break;
-    case JointType::revolute:
-      add(JointKind::revolute, axis0);
-      break;
-    case JointType::prismatic:
-      add(JointKind::prismatic, axis0);
-      break;
+    case JointType::revolute: add(JointKind::revolute, axis0); break;
+    case JointType::prismatic: add(JointKind::prismatic, axis0); break;
     case JointType::planar:
       add(JointKind::prismatic, axis0);
       add(JointKind::prismatic, axis1);
       break;
-    case JointType::translational:
-      add(JointKind::translational, x);
-      break;
+    case JointType::translational: add(JointKind::translational, x); break;
     case JointType::free2d:
       add(JointKind::prismatic, x);
       add(JointKind::prismatic, y);
       add(JointKind::revolute, z);
       break;
-    case JointType::spherical:
-      add(JointKind::spherical, x);
-      break;
+    case JointType::spherical: add(JointKind::spherical, x); break;
     case JointType::free:
       add(JointKind::translational, x);
       add(JointKind::spherical, x);
@@ -201,8 +194,9 @@ void compile_joint_effects(CompiledModel& m) {
     const JointDescription& d = m.scene.links[i].joint;
     const int count = dof_count(d.type);
     if (!d.rest.empty() && d.rest.size() != std::size_t(count))
-      throw InputError(d.source.prefix() + "joint '" + d.name + "': rest has " + std::to_string(d.rest.size()) +
-                       " values; expected " + std::to_string(count));
+      throw InputError(d.source.prefix() + "joint '" + d.name + "': rest has " +
+                       std::to_string(d.rest.size()) + " values; expected " +
+                       std::to_string(count));
     for (int k = 0; k < count; ++k) {
       const int dof = m.joints[i].v + k;
       const JointEffects& e = effects_of(d, k);
@@ -218,14 +212,17 @@ void compile_motors(CompiledModel& m, const NameIndex& joints) {
   for (const MotorDescription& d : m.scene.motors) {
     const auto i = std::size_t(joints.find("joint", d.joint, d.source));
     const JointType type = m.scene.links[i].joint.type;
-    if (dof_count(type) == 0) throw InputError(d.source.prefix() + "motor on the fixed joint '" + d.joint + "'");
-    if (driven[i] != 0) throw InputError(d.source.prefix() + "joint '" + d.joint + "' has two motors");
+    if (dof_count(type) == 0)
+      throw InputError(d.source.prefix() + "motor on the fixed joint '" + d.joint + "'");
+    if (driven[i] != 0)
+      throw InputError(d.source.prefix() + "joint '" + d.joint + "' has two motors");
     driven[i] = 1;
     check_motor(d);
     for (int k = 0; k < dof_count(type); ++k) {
       const int dof = m.joints[i].v + k, at = link_of_dof(m, dof);
       Link& link = m.links[std::size_t(at)];
-      m.motors.push_back({dof, d.low, d.high, d.control, d.timing, at, dof - link.v, {d.P, -1}, {d.D, -1}});
+      m.motors.push_back(
+          {dof, d.low, d.high, d.control, d.timing, at, dof - link.v, {d.P, -1}, {d.D, -1}});
       m.u_names.push_back(m.v_names[std::size_t(dof)]);
       const bool position = d.control == MotorControl::position;
       m.u_units.emplace_back(!position ? "1" : dof_turns(type, k) ? "rad" : "m");
@@ -249,11 +246,13 @@ void compile_initial_state(CompiledModel& m, const NameIndex& joints) {
   for (const InitialState& d : m.scene.initial) {
     const int i = joints.find("joint", d.joint, d.source);
     const JointType type = m.scene.links[i].joint.type;
-    const auto copy = [&](const char* what, const std::vector<double>& from, int count, double* to) {
+    const auto copy = [&](const char* what, const std::vector<double>& from, int count,
+                          double* to) {
       if (from.empty()) return;
       if (from.size() != std::size_t(count))
-        throw InputError(d.source.prefix() + "initial " + what + " of joint '" + d.joint + "' has " +
-                         std::to_string(from.size()) + " values; expected " + std::to_string(count));
+        throw InputError(d.source.prefix() + "initial " + what + " of joint '" + d.joint +
+                         "' has " + std::to_string(from.size()) + " values; expected " +
+                         std::to_string(count));
       std::copy(from.begin(), from.end(), to);
     };
     copy("q", d.q, position_count(type), m.initial_q.data() + m.joints[i].q);
@@ -261,11 +260,13 @@ void compile_initial_state(CompiledModel& m, const NameIndex& joints) {
   }
 }
 
-void vary_joint(CompiledModel& m, const NameIndex& joints, const RandomizationDescription& d, int row) {
+void vary_joint(CompiledModel& m, const NameIndex& joints, const RandomizationDescription& d,
+                int row) {
   const auto i = std::size_t(joints.find("joint", d.name, d.source));
   const JointDescription& joint = m.scene.links[i].joint;
   const auto fail = [&](const std::string& why) {
-    throw InputError(d.source.prefix() + to_string(d.joint_field) + " of joint '" + d.name + "' varies, but " + why);
+    throw InputError(d.source.prefix() + to_string(d.joint_field) + " of joint '" + d.name +
+                     "' varies, but " + why);
   };
   bool found = false;
   if (d.target == RandomTarget::motor) {
@@ -285,7 +286,8 @@ void vary_joint(CompiledModel& m, const NameIndex& joints, const RandomizationDe
   if (dof_count(joint.type) == 0) fail("the joint is fixed");
   if (joint.turning) fail("its dofs do not share one number");
   if (d.joint_field == JointField::lim_stiffness && !joint.limits) fail("the joint has no limits");
-  constexpr std::uint8_t kFlags[] = {kernels::kDamped, kernels::kArmoured, kernels::kSprung, kernels::kLimited};
+  constexpr std::uint8_t kFlags[] = {kernels::kDamped, kernels::kArmoured, kernels::kSprung,
+                                     kernels::kLimited};
   const auto field = static_cast<std::size_t>(d.joint_field);
   for (int k = 0; k < dof_count(joint.type); ++k) {
     const int dof = m.joints[i].v + k;

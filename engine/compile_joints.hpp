@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The joints of a scene: elementary links, coordinates, what acts on them, where they start. Steps of compile().
+// The joints of a scene: elementary links, coordinates, what acts on them, where they start. Steps
+// of compile().
 #pragma once
 
 #include "engine/compiled_model.hpp"
@@ -9,8 +10,10 @@ namespace tangere {
 
 inline const kernels::Frame<double> kIdentityFrame = {kernels::diagonal(1.0), {0, 0, 0}};
 
-/// Appends a joint's elementary links. `parent`: the link it hangs on, -1 the world; `frame`: its rest pose there.
-CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent, const kernels::Frame<double>& frame);
+/// Appends a joint's elementary links. `parent`: the link it hangs on, -1 the world; `frame`: its
+/// rest pose there.
+CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent,
+                        const kernels::Frame<double>& frame);
 
 /// Damping, springs, armature and limits per dof, and the flags of the links.
 void compile_joint_effects(CompiledModel& m);
@@ -21,7 +24,8 @@ void compile_motors(CompiledModel& m, const NameIndex& joints);
 void compile_initial_state(CompiledModel& m, const NameIndex& joints);
 
 /// Lets a number of a joint or of its motor come from a row of the block.
-void vary_joint(CompiledModel& m, const NameIndex& joints, const RandomizationDescription& d, int row);
+void vary_joint(CompiledModel& m, const NameIndex& joints, const RandomizationDescription& d,
+                int row);
 
 /// Throws where nothing with mass moves with a joint: its mass matrix would be singular.
 void check_masses(const CompiledModel& m);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A body's size is what a scene gives it: the half lengths that kernels read, mass and inertia follow. A joint's place moves
-// the frame of its first link.
+// A body's size is what a scene gives it: the half lengths that kernels read, mass and inertia
+// follow. A joint's place moves the frame of its first link.
 #include "engine/compile_variations.hpp"
 
 #include <algorithm>
@@ -57,7 +57,8 @@ void vary_density(CompiledModel& m, int body, const RandomizationDescription& d,
   if (link < 0) fail("it is fixed in the world");
   if (!(b.density > 0)) fail("it is massless; expected a positive density");
   VaryingInertia& varying = varying_inertia(m, link);
-  const InertiaRows of_density = inertia_rows(m.bodies[std::size_t(body)], mass_properties(b.shape, 1));
+  const InertiaRows of_density =
+      inertia_rows(m.bodies[std::size_t(body)], mass_properties(b.shape, 1));
   for (std::size_t i = 0; i < of_density.size(); ++i)
     varying.constant[i] -= b.density * of_density[i];
   varying.parts.push_back({body, row, of_density});
@@ -85,7 +86,8 @@ void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, in
       fail(
           "its contact points do not; expected a body that touches nothing with points of its own");
   for (const TactileDescription& t : m.scene.sensors)
-    if (t.body == d.name) fail("the points of its tactile sensor '" + t.name + "' do not; expected a body without one");
+    if (t.body == d.name)
+      fail("the points of its tactile sensor '" + t.name + "' do not; expected a body without one");
   for (std::size_t k = 0; k < m.grounds.size(); ++k)
     if (m.scene.ground_contacts[k].body == d.name && !std::holds_alternative<SphereShape>(b.shape))
       fail("the points that touch the ground do not; expected a sphere there");

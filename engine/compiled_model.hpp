@@ -17,12 +17,12 @@ namespace tangere {
 struct CompiledBody {
   int link = -1;
   kernels::Frame<double> frame;  ///< body frame in the link (or the world)
-  bool touchable = true;         ///< has a distance; else `shape` says nothing and size.x is its extent
+  bool touchable = true;  ///< has a distance; else `shape` says nothing and size.x is its extent
   PrimitiveShape shape = PrimitiveShape::sphere;
-  kernels::Vec3<double> size{};  ///< as in kernels::PairContact
-  kernels::Vec3<double> centre{};///< of mass, body frame [m]
-  double mass = 0;               ///< [kg]
-  int size_row = -1;             ///< ≥ 0: size stands in three rows of the block instead
+  kernels::Vec3<double> size{};    ///< as in kernels::PairContact
+  kernels::Vec3<double> centre{};  ///< of mass, body frame [m]
+  double mass = 0;                 ///< [kg]
+  int size_row = -1;               ///< ≥ 0: size stands in three rows of the block instead
 };
 
 /// A joint of the scene: its elementary links and its coordinates.
@@ -33,8 +33,9 @@ struct CompiledJoint {
   kernels::Frame<double> frame;         ///< joint frame in that link
 };
 
-/// Motor on one dof. Force motors: force = low + (clip(u) + 1)/2 (high - low). Position motors evaluated at the end of
-/// the step are effects of their joint (kernels/joint_effects-inl.hpp), which u is the target of.
+/// Motor on one dof. Force motors: force = low + (clip(u) + 1)/2 (high - low). Position motors
+/// evaluated at the end of the step are effects of their joint (kernels/joint_effects-inl.hpp),
+/// which u is the target of.
 struct CompiledMotor {
   int dof;
   double low, high;
@@ -47,21 +48,22 @@ struct CompiledMotor {
 /// Points of one sensor in tiles of 8×8, in its pad's axes (kernels/tactile_types.hpp).
 struct CompiledSensor {
   int body = -1, link = -1;
-  kernels::Frame<double> pad;        ///< pad frame in the link: axis0, axis1, their product; the array's middle
+  kernels::Frame<double>
+      pad;  ///< pad frame in the link: axis0, axis1, their product; the array's middle
   int rows = 0, cols = 0, tile_rows = 0, tile_cols = 0;
   AlignedVector<double> tile_x, tile_y, tile_z, tile_radius;  ///< (n_tiles, padded to 8)
   std::vector<int> tile_kind;                                 ///< (n_tiles)
-  AlignedVector<double> offsets;                              ///< (4, 2, 64) flat, (n_tiles, 3, 64) curved
+  AlignedVector<double> offsets;  ///< (4, 2, 64) flat, (n_tiles, 3, 64) curved
   AlignedVector<float> offsets_f;
-  std::vector<int> index;                                     ///< (n_tiles, 64) curved, empty: flat
-  AlignedVector<double> frames, factors;                      ///< (n_tiles, 9, 64), (n_tiles, 4, 64) or empty
+  std::vector<int> index;                 ///< (n_tiles, 64) curved, empty: flat
+  AlignedVector<double> frames, factors;  ///< (n_tiles, 9, 64), (n_tiles, 4, 64) or empty
   AlignedVector<float> frames_f, factors_f;
   bool skewed = false;
-  double axes[9] = {};               ///< rows axis0, axis1, -(axis0 × axis1), pad axes
+  double axes[9] = {};  ///< rows axis0, axis1, -(axis0 × axis1), pad axes
   kernels::ContactParameters parameters{};
   ContactLaw law = ContactLaw::clamped;
-  std::vector<int> targets;          ///< bodies it can feel
-  bool sizes_vary = false;           ///< of some of them
+  std::vector<int> targets;  ///< bodies it can feel
+  bool sizes_vary = false;   ///< of some of them
 
   [[nodiscard]] int points() const { return rows * cols; }
   [[nodiscard]] int n_tiles() const { return tile_rows * tile_cols; }
@@ -88,10 +90,12 @@ struct BlockLayout {
   int q = 0, v = 0, previous_q = 0, previous_v = 0, parameters = 0, rows = 0;
 };
 
-/// Mass [kg], mass times centre of mass x y z [kg m], inertia xx xy xz yy yz zz about a link's origin [kg m²], link axes.
+/// Mass [kg], mass times centre of mass x y z [kg m], inertia xx xy xz yy yz zz about a link's
+/// origin [kg m²], link axes.
 using InertiaRows = std::array<double, 10>;
 
-/// A link some of whose bodies have densities that vary: rows `row` … of the block are constant + Σ density of_density.
+/// A link some of whose bodies have densities that vary: rows `row` … of the block are constant + Σ
+/// density of_density.
 struct VaryingInertia {
   struct Part {
     int body;
@@ -100,7 +104,7 @@ struct VaryingInertia {
   };
   int link = -1;
   int row = 0;
-  bool anew = false;         ///< sizes vary too: the sum over all bodies is made anew instead
+  bool anew = false;  ///< sizes vary too: the sum over all bodies is made anew instead
   InertiaRows constant{};
   std::vector<Part> parts;
 };
@@ -127,9 +131,9 @@ struct CompiledModel {
   Scene scene;
   int nq = 0, nv = 0, nu = 0;
   std::vector<kernels::Link> links;
-  std::vector<CompiledJoint> joints;   ///< parallel to scene.links
-  std::vector<CompiledBody> bodies;    ///< parallel to scene.links
-  std::vector<CompiledMotor> motors;   ///< one per control
+  std::vector<CompiledJoint> joints;  ///< parallel to scene.links
+  std::vector<CompiledBody> bodies;   ///< parallel to scene.links
+  std::vector<CompiledMotor> motors;  ///< one per control
   std::vector<CompiledSensor> sensors;
   std::vector<CompiledVariable> variables;
   std::vector<kernels::PairContact> pairs;
@@ -137,24 +141,27 @@ struct CompiledModel {
   std::vector<kernels::Solid> solids;  ///< parallel to bodies
   std::vector<kernels::LinkPair> link_pairs;
   std::vector<kernels::GroundedLink> grounded;
-  std::vector<int> pair_order, ground_order;       ///< members of link_pairs and grounded, side by side
+  std::vector<int> pair_order, ground_order;  ///< members of link_pairs and grounded, side by side
   std::vector<std::vector<double>> point_storage;  ///< what pairs and grounds point into
-  std::vector<AlignedVector<double>> tile_storage; ///< what pairs' tile_points and tile_bounds point into
+  std::vector<AlignedVector<double>>
+      tile_storage;  ///< what pairs' tile_points and tile_bounds point into
   std::vector<VaryingInertia> varying_inertia;
   std::vector<VaryingSize> varying_sizes;
   std::vector<VaryingPlace> varying_places;
   std::vector<kernels::DofEffects> dof_effects;  ///< (nv)
-  std::vector<double> unknown_scale;   ///< (nv) what an unknown is rounded against: extent of the scene [m], 1 [rad]
+  std::vector<double>
+      unknown_scale;  ///< (nv) what an unknown is rounded against: extent of the scene [m], 1 [rad]
   std::vector<double> initial_q, initial_v;
   PatternStorage pattern;
   BlockLayout layout;
-  std::vector<int> randomized_row;     ///< parallel to scene.randomizations: row of a block, or coordinate -1 - index
+  std::vector<int> randomized_row;  ///< parallel to scene.randomizations: row of a block, or
+                                    ///< coordinate -1 - index
   kernels::ModelView view{};
 
   std::vector<SensorInfo> sensor_info;
   std::vector<VariableInfo> variable_info;
   std::vector<ContactInfo> contact_info;
-  std::vector<EffectInfo> effects;     ///< of the whole scene
+  std::vector<EffectInfo> effects;  ///< of the whole scene
   std::vector<StageInfo> stages;
   std::vector<std::string> q_names, v_names, u_names, q_units, v_units, u_units, body_names;
 };
@@ -166,7 +173,8 @@ struct MassProperties {
   kernels::Mat3<double> inertia;  ///< [kg m²]
 };
 MassProperties mass_properties(const Shape& shape, double density);
-/// Its derivative by a number of the shape's size (size_name) that it has; the centre of mass stays.
+/// Its derivative by a number of the shape's size (size_name) that it has; the centre of mass
+/// stays.
 MassProperties mass_properties_by_size(const Shape& shape, double density, int which);
 /// What a body of these adds to its link.
 InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& properties);
@@ -177,12 +185,14 @@ void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProper
 /// Shape and size of a body, and whether it can be touched.
 void place_shape(const Shape& shape, CompiledBody& body);
 
-/// Points of the body that meet other bodies, in its body frame, (n, 3): empty for spheres and planes.
+/// Points of the body that meet other bodies, in its body frame, (n, 3): empty for spheres and
+/// planes.
 std::vector<double> contact_points(const Shape& shape);
 /// A body whose points these are.
 kernels::Solid solid_of(const Shape& shape, const CompiledBody& body);
 
-/// Reorders (n, 3) points so that every kContactTile consecutive ones are neighbours; returns their (tiles, 4) bounds.
+/// Reorders (n, 3) points so that every kContactTile consecutive ones are neighbours; returns their
+/// (tiles, 4) bounds.
 std::vector<double> sort_into_tiles(std::vector<double>& points, int tile);
 
 /// What a step runs: fills stages.
@@ -196,11 +206,14 @@ PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching);
 
 /// Tiles, bounds, axes and pressure sign of a sensor. Throws InputError for degenerate arrays.
-CompiledSensor compile_sensor(const TactileDescription& description, const CompiledBody& body, SensorInfo& info);
+CompiledSensor compile_sensor(const TactileDescription& description, const CompiledBody& body,
+                              SensorInfo& info);
 /// The same for a list of points.
-CompiledSensor compile_points(const TactileDescription& description, const CompiledBody& body, SensorInfo& info);
+CompiledSensor compile_points(const TactileDescription& description, const CompiledBody& body,
+                              SensorInfo& info);
 /// Positive where a direction points out of a body near a place on its surface, body frame.
-double points_outward(const CompiledBody& body, const kernels::Vec3<double>& at, const kernels::Vec3<double>& direction);
+double points_outward(const CompiledBody& body, const kernels::Vec3<double>& at,
+                      const kernels::Vec3<double>& direction);
 /// Where missing points and tiles are put [m]: beyond any shape, finite, so that nothing overflows.
 inline constexpr double kFarAway = 1e6;
 

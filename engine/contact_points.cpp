@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where bodies touch others: points on their surface by shape, ordered so that neighbours share a tile.
+// Where bodies touch others: points on their surface by shape, ordered so that neighbours share a
+// tile.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -50,7 +51,8 @@ std::vector<double> points_of(const CapsuleShape& shape) {
   std::vector<double> points = {0, 0, pole, 0, 0, -pole};
   const int rings = shape.contact_rings;
   for (int k = 0; k < rings; ++k) {
-    const double along = rings > 1 ? double(k) / (rings - 1) : 0.5;  // a single ring goes around the middle
+    const double along =
+        rings > 1 ? double(k) / (rings - 1) : 0.5;  // a single ring goes around the middle
     add_ring(points, shape.contact_angles, shape.radius, shape.length * (along - 0.5));
   }
   return points;
@@ -61,8 +63,10 @@ std::vector<double> points_of(const PlaneShape&) { return {}; }
 std::vector<double> points_of(const MeshShape& shape) { return shape.vertices; }
 std::vector<double> points_of(const AbstractShape& shape) { return shape.contact_points; }
 
-/// Splits the longest side of a range in half until it fits a tile. Full tiles first, so only the last is short.
-void split(const std::vector<double>& points, std::vector<int>& order, std::size_t begin, std::size_t end, int tile) {
+/// Splits the longest side of a range in half until it fits a tile. Full tiles first, so only the
+/// last is short.
+void split(const std::vector<double>& points, std::vector<int>& order, std::size_t begin,
+           std::size_t end, int tile) {
   if (end - begin <= std::size_t(tile)) return;
   double low[3], high[3];
   for (int a = 0; a < 3; ++a) low[a] = INFINITY, high[a] = -INFINITY;
@@ -89,7 +93,8 @@ std::vector<double> contact_points(const Shape& shape) {
 }
 
 kernels::Solid solid_of(const Shape& shape, const CompiledBody& body) {
-  const bool stretches = std::holds_alternative<CuboidShape>(shape) || std::holds_alternative<CylinderShape>(shape) ||
+  const bool stretches = std::holds_alternative<CuboidShape>(shape) ||
+                         std::holds_alternative<CylinderShape>(shape) ||
                          std::holds_alternative<CapsuleShape>(shape);
   return {body.frame, stretches, body.shape, body.size};
 }
@@ -100,7 +105,8 @@ std::vector<double> sort_into_tiles(std::vector<double>& points, int tile) {
   std::iota(order.begin(), order.end(), 0);
   split(points, order, 0, n, tile);
   std::vector<double> sorted(points.size());
-  for (std::size_t k = 0; k < n; ++k) std::copy_n(&points[3 * std::size_t(order[k])], 3, &sorted[3 * k]);
+  for (std::size_t k = 0; k < n; ++k)
+    std::copy_n(&points[3 * std::size_t(order[k])], 3, &sorted[3 * k]);
   points = std::move(sorted);
   std::vector<double> bounds;
   for (std::size_t begin = 0; begin < n; begin += std::size_t(tile)) {
@@ -108,16 +114,20 @@ std::vector<double> sort_into_tiles(std::vector<double>& points, int tile) {
     double low[3], high[3], centre[3];
     for (int a = 0; a < 3; ++a) low[a] = INFINITY, high[a] = -INFINITY;
     for (std::size_t k = begin; k < end; ++k)
-      for (int a = 0; a < 3; ++a) low[a] = std::min(low[a], points[3 * k + a]), high[a] = std::max(high[a], points[3 * k + a]);
+      for (int a = 0; a < 3; ++a)
+        low[a] = std::min(low[a], points[3 * k + a]),
+        high[a] = std::max(high[a], points[3 * k + a]);
     for (int a = 0; a < 3; ++a) centre[a] = 0.5 * (low[a] + high[a]);
     double square = 0;
     for (std::size_t k = begin; k < end; ++k) {
       double r = 0;
-      for (int a = 0; a < 3; ++a) r += (points[3 * k + a] - centre[a]) * (points[3 * k + a] - centre[a]);
+      for (int a = 0; a < 3; ++a)
+        r += (points[3 * k + a] - centre[a]) * (points[3 * k + a] - centre[a]);
       square = std::max(square, r);
     }
     // Rounded up: a bound that is short by one bit would be no bound.
-    bounds.insert(bounds.end(), {centre[0], centre[1], centre[2], std::sqrt(square) * (1 + 1e-12) + 1e-300});
+    bounds.insert(bounds.end(),
+                  {centre[0], centre[1], centre[2], std::sqrt(square) * (1 + 1e-12) + 1e-300});
   }
   return bounds;
 }

@@ -24,31 +24,36 @@ void decide_effects(CompiledModel& m) {
   });
   add("velocity products", turning, turning ? "some joint turns" : "no joint turns");
   const auto joints_with = [&](kernels::JointEffect effect) {
-    return std::size_t(std::count_if(m.joints.begin(), m.joints.end(), [&](const CompiledJoint& joint) {
-      return std::any_of(m.links.begin() + std::max(joint.first_link, 0),
-                         m.links.begin() + std::max(joint.first_link, 0) + joint.link_count,
-                         [&](const Link& l) { return (l.effects & effect) != 0; });
-    }));
+    return std::size_t(
+        std::count_if(m.joints.begin(), m.joints.end(), [&](const CompiledJoint& joint) {
+          return std::any_of(m.links.begin() + std::max(joint.first_link, 0),
+                             m.links.begin() + std::max(joint.first_link, 0) + joint.link_count,
+                             [&](const Link& l) { return (l.effects & effect) != 0; });
+        }));
   };
-  const std::pair<const char*, kernels::JointEffect> of_joints[] = {{"joint damping", kernels::kDamped},
-                                                                    {"joint springs", kernels::kSprung},
-                                                                    {"joint limits", kernels::kLimited},
-                                                                    {"armature", kernels::kArmoured}};
+  const std::pair<const char*, kernels::JointEffect> of_joints[] = {
+      {"joint damping", kernels::kDamped},
+      {"joint springs", kernels::kSprung},
+      {"joint limits", kernels::kLimited},
+      {"armature", kernels::kArmoured}};
   for (const auto& [name, effect] : of_joints) {
     const std::size_t n = joints_with(effect);
     add(name, n > 0, counted(n, "joint", "joints"));
   }
   const auto controls_of = [&](MotorControl control) {
-    return std::size_t(std::count_if(m.motors.begin(), m.motors.end(),
-                                     [&](const CompiledMotor& motor) { return motor.control == control; }));
+    return std::size_t(
+        std::count_if(m.motors.begin(), m.motors.end(),
+                      [&](const CompiledMotor& motor) { return motor.control == control; }));
   };
   add("force motors", controls_of(MotorControl::force) > 0,
       counted(controls_of(MotorControl::force), "control", "controls"));
   add("position motors", controls_of(MotorControl::position) > 0,
       counted(controls_of(MotorControl::position), "control", "controls"));
   add("pair contact", !m.pairs.empty(), counted(m.pairs.size(), "pair declared", "pairs declared"));
-  add("ground contact", !m.grounds.empty(), counted(m.grounds.size(), "body declared", "bodies declared"));
-  add("tactile", !m.sensors.empty(), counted(m.sensors.size(), "sensor declared", "sensors declared"));
+  add("ground contact", !m.grounds.empty(),
+      counted(m.grounds.size(), "body declared", "bodies declared"));
+  add("tactile", !m.sensors.empty(),
+      counted(m.sensors.size(), "sensor declared", "sensors declared"));
   const std::size_t varying = m.layout.rows - m.layout.parameters;
   add("varying parameters", varying > 0,
       counted(varying, "number varies by environment", "numbers vary by environment"));

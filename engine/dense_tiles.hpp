@@ -12,7 +12,8 @@ namespace tangere {
 template <class T>
 void clear_tile(const kernels::PadTiles& pad, int tile, T* dense) {
   if (pad.curved()) {
-    for (int k = 0; k < pad.points_of(tile); ++k) std::fill_n(dense + 3 * pad.index[kernels::kTactileTile * tile + k], 3, T(0));
+    for (int k = 0; k < pad.points_of(tile); ++k)
+      std::fill_n(dense + 3 * pad.index[kernels::kTactileTile * tile + k], 3, T(0));
     return;
   }
   const int rows = pad.rows_of(tile), numbers = 3 * pad.cols_of(tile);
@@ -47,7 +48,8 @@ void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* de
   if (pad.curved()) {
     const int* index = pad.index + kernels::kTactileTile * tile;
     for (int k = 0; k < pad.points_of(tile); ++k)
-      for (int c = 0; c < 3; ++c) dense[3 * index[k] + c] = static_cast<T>(from[c * kernels::kTactileTile + k]);
+      for (int c = 0; c < 3; ++c)
+        dense[3 * index[k] + c] = static_cast<T>(from[c * kernels::kTactileTile + k]);
     return;
   }
   const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
@@ -55,7 +57,8 @@ void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* de
   for (int i = 0; i < rows; ++i, row += 3 * pad.cols)
     for (int j = 0; j < cols; ++j)
       for (int c = 0; c < 3; ++c)
-        row[3 * j + c] = static_cast<T>(from[c * kernels::kTactileTile + i * kernels::kTileSide + j]);
+        row[3 * j + c] =
+            static_cast<T>(from[c * kernels::kTactileTile + i * kernels::kTileSide + j]);
 }
 
 /// f(slot in the tile, point of the array) for all points of a tile.

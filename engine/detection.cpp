@@ -4,7 +4,6 @@
 
 namespace tangere {
 
-
 template <int L>
 void clear_candidates(BasicWorkspace<L>& w) {
   w.in_rows = 0;
@@ -16,15 +15,18 @@ void clear_candidates(BasicWorkspace<L>& w) {
 
 /// Size of a pair's shape in one lane.
 template <int L>
-kernels::Vec3<double> size_of(const kernels::PairContact& pair, const kernels::Stage<L>& stage, int lane) {
+kernels::Vec3<double> size_of(const kernels::PairContact& pair, const kernels::Stage<L>& stage,
+                              int lane) {
   if (pair.size_row < 0) return pair.size;
-  const auto one = [&](int i) { return kernels::row_of(stage.block, pair.size_row + i, stage.group)[lane]; };
+  const auto one = [&](int i) {
+    return kernels::row_of(stage.block, pair.size_row + i, stage.group)[lane];
+  };
   return {one(0), one(1), one(2)};
 }
 
 template <int L>
-void find_candidates(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                     LaneBits lanes) {
+void find_candidates(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, LaneBits lanes) {
   w.in_rows &= ~lanes;
   table.stage<L>().near_pairs(model.view, w.stage, w.near);
   for (std::size_t g = 0; g < model.link_pairs.size(); ++g) {
@@ -43,8 +45,8 @@ void find_candidates(const CompiledModel& model, const kernels::KernelTable& tab
       double pose[12];
       for (int i = 0; i < 12; ++i) pose[i] = row[i][l];
       list.own_count[l] =
-          table.find_candidates({&model.pairs[k], size_of<L>(model.pairs[k], w.stage, l), pose, list.margin,
-                                 list.own + 3 * list.stride * l, list.stride});
+          table.find_candidates({&model.pairs[k], size_of<L>(model.pairs[k], w.stage, l), pose,
+                                 list.margin, list.own + 3 * list.stride * l, list.stride});
     }
   }
 }
@@ -57,7 +59,9 @@ void lists_to_rows(const kernels::KernelTable& table, Workspace& w, LaneBits lan
 
 template void clear_candidates(Workspace&);
 template void clear_candidates(SingleWorkspace&);
-template void find_candidates(const CompiledModel&, const kernels::KernelTable&, Workspace&, LaneBits);
-template void find_candidates(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&, LaneBits);
+template void find_candidates(const CompiledModel&, const kernels::KernelTable&, Workspace&,
+                              LaneBits);
+template void find_candidates(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
+                              LaneBits);
 
 }  // namespace tangere

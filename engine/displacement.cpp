@@ -20,7 +20,8 @@ void displace(const CompiledModel& m, std::span<double> q, int dof, double e) {
   }
 }
 
-void add_along_dofs(const CompiledModel& m, std::span<const double> q, std::span<const double> by_q, std::span<double> out) {
+void add_along_dofs(const CompiledModel& m, std::span<const double> q, std::span<const double> by_q,
+                    std::span<double> out) {
   for (const kernels::Link& link : m.links) {
     const double *a = &q[std::size_t(link.q)], *p = &by_q[std::size_t(link.q)];
     double* to = &out[std::size_t(link.v)];

@@ -18,19 +18,20 @@ using Observation = std::variant<std::span<const double>, std::span<const float>
 
 /// How an episode of a task ended.
 struct EpisodeEnd {
-  std::int64_t length = 0;    ///< actions taken: rows behind belong to nothing
-  double total = 0;           ///< sum of its rewards
-  bool terminated = false;    ///< by itself, not for want of time
+  std::int64_t length = 0;  ///< actions taken: rows behind belong to nothing
+  double total = 0;         ///< sum of its rewards
+  bool terminated = false;  ///< by itself, not for want of time
   bool success = false;
 };
 
 /// Derivatives that are stored beside an episode's numbers, as float64.
 struct GradientArray {
-  std::string name;                   ///< "grad_actions"
-  std::vector<std::uint64_t> shape;   ///< of a row, or of all of it
-  bool by_row = false;                ///< one for every row with an action
+  std::string name;                  ///< "grad_actions"
+  std::vector<std::uint64_t> shape;  ///< of a row, or of all of it
+  bool by_row = false;               ///< one for every row with an action
   std::string meaning;
-  std::vector<std::string> by_names, by_units;  ///< what the derivatives are by, along the last dimension
+  std::vector<std::string> by_names,
+      by_units;  ///< what the derivatives are by, along the last dimension
   [[nodiscard]] std::size_t width() const {
     std::size_t numbers = 1;
     for (const std::uint64_t n : shape) numbers *= n;
@@ -45,14 +46,18 @@ struct EpisodeRows {
   int episodes = 0;                ///< 16, fewer at the end of the run
   std::int64_t first_row = 0;
   int rows = 0;
-  int action_rows = 0;                        ///< rows, one less when the last row is among them
-  std::span<const float> actions;             ///< (episodes, action_rows, nu) in [-1, 1]
-  /// q, v, then of a task its observations, of a scene end effectors if any and sensors: (episodes, rows, width)
+  int action_rows = 0;             ///< rows, one less when the last row is among them
+  std::span<const float> actions;  ///< (episodes, action_rows, nu) in [-1, 1]
+  /// q, v, then of a task its observations, of a scene end effectors if any and sensors: (episodes,
+  /// rows, width)
   std::span<const Observation> observations;
-  std::span<const float> rewards = {};    ///< of a task: (episodes, action_rows)
-  std::span<const double> randomized = {};  ///< what varies between episodes: (episodes, as many as the scene varies)
-  std::span<const EpisodeEnd> ends = {};  ///< of a task, whose blocks come whole and in ascending order: (episodes)
-  /// With the last row, of the whole episodes: for each GradientArray of the run (episodes, [actions of an episode at most,] shape).
+  std::span<const float> rewards = {};  ///< of a task: (episodes, action_rows)
+  std::span<const double> randomized =
+      {};  ///< what varies between episodes: (episodes, as many as the scene varies)
+  std::span<const EpisodeEnd> ends =
+      {};  ///< of a task, whose blocks come whole and in ascending order: (episodes)
+  /// With the last row, of the whole episodes: for each GradientArray of the run (episodes,
+  /// [actions of an episode at most,] shape).
   std::span<const std::span<const double>> gradients = {};
 };
 
@@ -70,13 +75,14 @@ struct FailedEpisode {
 };
 
 /// Receives episodes in pieces: those of one block of 16 in ascending rows, blocks in any order
-/// among each other. Called by one thread at a time, prepare() apart. What is stored must depend on the pieces alone,
-/// not on the order of blocks. A sink that cannot store throws IoError; the run stops and passes it
-/// on.
+/// among each other. Called by one thread at a time, prepare() apart. What is stored must depend on
+/// the pieces alone, not on the order of blocks. A sink that cannot store throws IoError; the run
+/// stops and passes it on.
 class EpisodeSink {
  public:
   virtual ~EpisodeSink() = default;
-  /// What can be done to a piece by many threads at once, before write() gets the same piece: compressing it.
+  /// What can be done to a piece by many threads at once, before write() gets the same piece:
+  /// compressing it.
   virtual void prepare(const EpisodeRows&) {}
   virtual void write(const EpisodeRows& rows) = 0;
   /// The last row of the block that begins with this episode has been written.

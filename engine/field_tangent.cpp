@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tangents of links outward, in doubles, then of fields across points. With δ = (θ; ρ) a link's displacement and δV the
-// change of its twist, both in its axes, and V_p its parent's twist there:
-//   δ = X δ_p + S q̇;  δV = X δV_p + V_p × (S q̇) + S v̇;      ε = Ad δ₂ - δ₁,  δW = Ad δV₂ - δV₁ - Z × ε  in a pad's axes
+// Tangents of links outward, in doubles, then of fields across points. With δ = (θ; ρ) a link's
+// displacement and δV the change of its twist, both in its axes, and V_p its parent's twist there:
+//   δ = X δ_p + S q̇;  δV = X δV_p + V_p × (S q̇) + S v̇;      ε = Ad δ₂ - δ₁,
+//       δW = Ad δV₂ - δV₁ - Z × ε  in a pad's axes
 #include "engine/field_tangent.hpp"
 
 #include "engine/pad_reader.hpp"
@@ -26,7 +27,8 @@ struct LinkTangent {
 /// S x of a joint.
 Vec6<double> along_joint(const Link& link, std::span<const double> x) {
   const auto v = std::size_t(link.v);
-  const Vec3<double> sum = kernels::dofs(link.kind) == 1 ? x[v] * link.axis : Vec3<double>{x[v], x[v + 1], x[v + 2]};
+  const Vec3<double> sum =
+      kernels::dofs(link.kind) == 1 ? x[v] * link.axis : Vec3<double>{x[v], x[v + 1], x[v + 2]};
   const Vec3<double> none = {0, 0, 0};
   return kernels::slides(link.kind) ? Vec6<double>{none, sum} : Vec6<double>{sum, none};
 }
@@ -44,17 +46,22 @@ struct FieldTangent::Impl {
 
   explicit Impl(const Model& m) : model(m), reader(m), links(m.compiled().links.size()) {
     std::size_t targets = 0;
-    for (const CompiledSensor& s : m.compiled().sensors) targets = std::max(targets, s.targets.size());
+    for (const CompiledSensor& s : m.compiled().sensors)
+      targets = std::max(targets, s.targets.size());
     touches.resize(targets);
   }
 
-  [[nodiscard]] LinkPose<double> pose(int link) const { return reader.link(link, lane / kGroup, lane % kGroup); }
+  [[nodiscard]] LinkPose<double> pose(int link) const {
+    return reader.link(link, lane / kGroup, lane % kGroup);
+  }
   [[nodiscard]] LinkTangent tangent(int link) const {
-    return link < 0 ? LinkTangent{kernels::zero6<double>(), kernels::zero6<double>()} : links[std::size_t(link)];
+    return link < 0 ? LinkTangent{kernels::zero6<double>(), kernels::zero6<double>()}
+                    : links[std::size_t(link)];
   }
 
   /// Of one shape against a pad.
-  [[nodiscard]] kernels::TouchTangent against(const CompiledSensor& s, const CompiledBody& body) const {
+  [[nodiscard]] kernels::TouchTangent against(const CompiledSensor& s,
+                                              const CompiledBody& body) const {
     const LinkPose<double> one = pose(s.link), two = pose(body.link);
     const LinkTangent first = tangent(s.link), second = tangent(body.link);
     const Frame<double> second_in_first = relative(one.world, two.world);
@@ -90,7 +97,8 @@ void FieldTangent::move(int lane, std::span<const double> q, std::span<const dou
     const Frame<double> local = relative(parent.world, own.world);
     const Vec6<double> moved = along_joint(link, q);
     i.links[k] = {motion_to_child(local, before.pose) + moved,
-                  motion_to_child(local, before.twist) + cross_motion(motion_to_child(local, parent.V), moved) + along_joint(link, v)};
+                  motion_to_child(local, before.twist) +
+                      cross_motion(motion_to_child(local, parent.V), moved) + along_joint(link, v)};
   }
 }
 
@@ -99,12 +107,15 @@ void FieldTangent::field(int sensor, std::span<const int> tiles, std::span<doubl
   const CompiledModel& m = i.model.compiled();
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const int group = i.lane / kGroup;
-  if (i.met_group != group || i.met_sensor != sensor) i.reader.meet(*i.batch, i.block, group, sensor);
+  if (i.met_group != group || i.met_sensor != sensor)
+    i.reader.meet(*i.batch, i.block, group, sensor);
   i.met_group = group, i.met_sensor = sensor;
   const auto a = i.reader.arguments<double>(sensor, group, i.lane % kGroup);
-  for (std::size_t k = 0; k < s.targets.size(); ++k) i.touches[k] = i.against(s, m.bodies[std::size_t(s.targets[k])]);
-  kernels::active_kernels().field_tangent({a.pad, a.law, a.n_touches, a.shapes, a.touches, i.touches.data(),
-                                           static_cast<int>(tiles.size()), tiles.data(), change.data()});
+  for (std::size_t k = 0; k < s.targets.size(); ++k)
+    i.touches[k] = i.against(s, m.bodies[std::size_t(s.targets[k])]);
+  kernels::active_kernels().field_tangent({a.pad, a.law, a.n_touches, a.shapes, a.touches,
+                                           i.touches.data(), static_cast<int>(tiles.size()),
+                                           tiles.data(), change.data()});
 }
 
 }  // namespace tangere

@@ -16,14 +16,17 @@ void check(std::span<const ShearField<T>> fields, std::size_t room) {
   std::size_t numbers = 0;
   for (const ShearField<T>& field : fields) {
     if (field.force.size() % 3 != 0)
-      throw InputError("a tactile field of " + std::to_string(field.force.size()) + " numbers; expected three a point");
+      throw InputError("a tactile field of " + std::to_string(field.force.size()) +
+                       " numbers; expected three a point");
     if (!field.before.empty() && field.before.size() != field.force.size())
-      throw InputError("tactile fields of " + std::to_string(field.force.size()) + " and, before, " +
-                       std::to_string(field.before.size()) + " numbers; expected the same sensor");
+      throw InputError("tactile fields of " + std::to_string(field.force.size()) +
+                       " and, before, " + std::to_string(field.before.size()) +
+                       " numbers; expected the same sensor");
     numbers += field.force.size() / 3 * 2;
   }
   if (numbers != room)
-    throw InputError("a flow map of " + std::to_string(room) + " numbers; expected " + std::to_string(numbers));
+    throw InputError("a flow map of " + std::to_string(room) + " numbers; expected " +
+                     std::to_string(numbers));
 }
 
 template <class T>
@@ -34,7 +37,8 @@ double normalise(std::span<const ShearField<T>> fields, std::span<T> flow, doubl
   for (const ShearField<T>& field : fields) {
     for (std::size_t k = 0; k < field.force.size(); k += 3, to += 2) {
       for (std::size_t c = 0; c < 2; ++c)
-        to[c] = field.before.empty() ? field.force[k + c] : field.force[k + c] - field.before[k + c];
+        to[c] =
+            field.before.empty() ? field.force[k + c] : field.force[k + c] - field.before[k + c];
       longest = std::max(longest, std::hypot(double(to[0]), double(to[1])));
     }
   }
@@ -63,11 +67,13 @@ void add_shear(const ShearCotangent& to, std::size_t k, double x, double y) {
 
 }  // namespace
 
-void normalised_flow_vjp(std::span<const ShearField<double>> fields, std::span<const double> flow_cotangent,
+void normalised_flow_vjp(std::span<const ShearField<double>> fields,
+                         std::span<const double> flow_cotangent,
                          std::span<const ShearCotangent> out, double smallest) {
   check(fields, flow_cotangent.size());
   if (out.size() != fields.size())
-    throw InputError("derivatives by " + std::to_string(out.size()) + " fields; expected " + std::to_string(fields.size()));
+    throw InputError("derivatives by " + std::to_string(out.size()) + " fields; expected " +
+                     std::to_string(fields.size()));
   double longest = 0, product = 0;  // Σ F̄·S
   std::size_t field_of_longest = 0, place = 0;
   const double* from = flow_cotangent.data();
@@ -89,10 +95,12 @@ void normalised_flow_vjp(std::span<const ShearField<double>> fields, std::span<c
   add_shear(out[field_of_longest], place, by_length * s.x / longest, by_length * s.y / longest);
 }
 
-double normalised_flow(std::span<const ShearField<double>> fields, std::span<double> flow, double smallest) {
+double normalised_flow(std::span<const ShearField<double>> fields, std::span<double> flow,
+                       double smallest) {
   return normalise(fields, flow, smallest);
 }
-double normalised_flow(std::span<const ShearField<float>> fields, std::span<float> flow, double smallest) {
+double normalised_flow(std::span<const ShearField<float>> fields, std::span<float> flow,
+                       double smallest) {
   return normalise(fields, flow, smallest);
 }
 

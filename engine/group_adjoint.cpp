@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The schemes of engine/group_step.hpp backwards. Lanes outside the mask compute with what stands there and change nothing.
+// The schemes of engine/group_step.hpp backwards. Lanes outside the mask compute with what stands
+// there and change nothing.
 #include "engine/group_adjoint.hpp"
 
 #include <algorithm>
@@ -24,10 +25,13 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
     at += rows;
   };
   for (LossRows<L>& l : losses)
-    for (Row** p : {&l.q, &l.v, &l.q_centre, &l.v_centre, &l.q_other, &l.v_other, &l.tau, &l.target}) take(*p, nv);
+    for (Row** p :
+         {&l.q, &l.v, &l.q_centre, &l.v_centre, &l.q_other, &l.v_other, &l.tau, &l.target})
+      take(*p, nv);
   take(q_gamma, nv * losses.size());
   take(v_gamma, nv * losses.size());
-  for (Row** p : {&rhs, &lambda, &nu, &mass_lambda, &target, &other, &q_centre, &v_centre, &q_other, &v_other})
+  for (Row** p : {&rhs, &lambda, &nu, &mass_lambda, &target, &other, &q_centre, &v_centre, &q_other,
+                  &v_other})
     take(*p, nv);
   numbers = nullptr;
   for (LossRows<L>& l : losses) l.parameters = nullptr;
@@ -95,13 +99,14 @@ void GroupAdjoint::solve(const StageInHand<L>& s) const {
 
 /// One loss through the stage in hand.
 template <int L>
-void GroupAdjoint::hand_on(const StageInHand<L>& s, const StageHistory& history, const Route<L>& route,
-                           const LossRows<L>& loss) const {
+void GroupAdjoint::hand_on(const StageInHand<L>& s, const StageHistory& history,
+                           const Route<L>& route, const LossRows<L>& loss) const {
   AdjointWorkspace<L>& a = s.a;
   const int n = model_.nv;
   const kernels::StageKernels<L>& kernel = s.table.template stage<L>();
-  const kernels::StageAdjoint<L> d = {route.q,  route.v,    a.rhs,      a.lambda,  a.nu,      a.mass_lambda, a.target,
-                                      a.other,  a.q_centre, a.v_centre, a.q_other, a.v_other, history};
+  const kernels::StageAdjoint<L> d = {route.q,       route.v,   a.rhs,   a.lambda,   a.nu,
+                                      a.mass_lambda, a.target,  a.other, a.q_centre, a.v_centre,
+                                      a.q_other,     a.v_other, history};
   kernel.adjoint_rhs(model_.view, s.w.stage, d);
   solve(s);
   for (Row<L>* rows : {a.q_centre, a.v_centre, a.q_other, a.v_other}) clear(rows, n);
@@ -163,14 +168,15 @@ void GroupAdjoint::reverse_sdirk2(const StageInHand<L>& s, double h) const {
   const StageHistory first = {0, -1 / kGamma, 0};
   for (std::size_t k = 0; k < a.losses.size(); ++k) {
     const LossRows<L>& o = a.losses[k];
-    const Row<L>*q_gamma = a.q_gamma + k * std::size_t(n), *v_gamma = a.v_gamma + k * std::size_t(n);
+    const Row<L>*q_gamma = a.q_gamma + k * std::size_t(n),
+          *v_gamma = a.v_gamma + k * std::size_t(n);
     hand_on(s, first, {q_gamma, v_gamma, o.q_centre, o.v_centre, o.q_other, o.v_other}, o);
   }
 }
 
 template <int L>
-void GroupAdjoint::reverse(Integrator scheme, double h, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                           AdjointWorkspace<L>& a, LaneBits lanes) const {
+void GroupAdjoint::reverse(Integrator scheme, double h, const kernels::KernelTable& table,
+                           BasicWorkspace<L>& w, AdjointWorkspace<L>& a, LaneBits lanes) const {
   const StageInHand<L> s = {table, w, a, lanes};
   if (scheme == Integrator::sdirk2) return reverse_sdirk2(s, h);
   if (scheme == Integrator::linear_implicit) return reverse_linear(s, h);
@@ -188,14 +194,15 @@ void GroupAdjoint::reverse(Integrator scheme, double h, const kernels::KernelTab
       if (history.s_other != 0) w.stage.s[i][l] += history.s_other * w.v_before[i][l];
     }
   assemble(s, scheme == Integrator::bdf2 ? 1.5 : 1, h);
-  for (const LossRows<L>& o : a.losses) hand_on(s, history, {o.q, o.v, o.q_centre, o.v_centre, o.q_other, o.v_other}, o);
+  for (const LossRows<L>& o : a.losses)
+    hand_on(s, history, {o.q, o.v, o.q_centre, o.v_centre, o.q_other, o.v_other}, o);
 }
 
 template struct AdjointWorkspace<kernels::kGroup>;
 template struct AdjointWorkspace<1>;
 template void GroupAdjoint::reverse(Integrator, double, const kernels::KernelTable&, Workspace&,
                                     AdjointWorkspace<kernels::kGroup>&, LaneBits) const;
-template void GroupAdjoint::reverse(Integrator, double, const kernels::KernelTable&, SingleWorkspace&, AdjointWorkspace<1>&,
-                                    LaneBits) const;
+template void GroupAdjoint::reverse(Integrator, double, const kernels::KernelTable&,
+                                    SingleWorkspace&, AdjointWorkspace<1>&, LaneBits) const;
 
 }  // namespace tangere

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One step of a group in reverse: the stages of its scheme backwards, each assembled and factored anew at its accepted state
-// and solved transposed for every loss (docs/gradients.md).
+// One step of a group in reverse: the stages of its scheme backwards, each assembled and factored
+// anew at its accepted state and solved transposed for every loss (docs/gradients.md).
 #pragma once
 
 #include <memory>
@@ -35,19 +35,21 @@ struct AdjointWorkspace {
   // SDIRK2: cotangents of the inner stage, per loss (nv) after one another.
   Row *q_gamma, *v_gamma;
   Row sound;
-  std::unique_ptr<DualStage> dual;  ///< the linearly implicit step's, made when it is first reversed
+  std::unique_ptr<DualStage>
+      dual;  ///< the linearly implicit step's, made when it is first reversed
 };
 
-/// Reverses solves whose states stand in the workspace: q0, v0 where it began, q_before, v_before one step earlier,
-/// q1 its result, x_gamma SDIRK2's inner stage; tau, target and the block of parameters as in the step.
+/// Reverses solves whose states stand in the workspace: q0, v0 where it began, q_before, v_before
+/// one step earlier, q1 its result, x_gamma SDIRK2's inner stage; tau, target and the block of
+/// parameters as in the step.
 class GroupAdjoint {
  public:
   explicit GroupAdjoint(const CompiledModel& model) : model_(model) {}
 
   /// Adds to q_centre … target of every loss, in `lanes`.
   template <int L>
-  void reverse(Integrator scheme, double h, const kernels::KernelTable& table, BasicWorkspace<L>& w, AdjointWorkspace<L>& a,
-               LaneBits lanes) const;
+  void reverse(Integrator scheme, double h, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+               AdjointWorkspace<L>& a, LaneBits lanes) const;
 
  private:
   /// One stage: where a loss's cotangents come from and go to.
@@ -62,7 +64,9 @@ class GroupAdjoint {
     BasicWorkspace<L>& w;
     AdjointWorkspace<L>& a;
     LaneBits lanes;
-    [[nodiscard]] int lone() const { return (lanes & (lanes - 1)) == 0 ? __builtin_ctz(lanes) : -1; }
+    [[nodiscard]] int lone() const {
+      return (lanes & (lanes - 1)) == 0 ? __builtin_ctz(lanes) : -1;
+    }
   };
   template <int L>
   void assemble(const StageInHand<L>& s, double c0, double h) const;
@@ -76,7 +80,8 @@ class GroupAdjoint {
   template <int L>
   void reverse_linear(const StageInHand<L>& in, double h) const;
   template <int L>
-  void hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o, const std::vector<double>& x, double h, int lane) const;
+  void hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o, const std::vector<double>& x,
+                      double h, int lane) const;
 
   const CompiledModel& model_;
 };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contacts of the same links, side by side: folding leaves many shapes on one link, which all move alike.
+// Contacts of the same links, side by side: folding leaves many shapes on one link, which all move
+// alike.
 #include <algorithm>
 #include <cmath>
 
@@ -21,15 +22,17 @@ void bound(const double* points, int n, kernels::Vec3<double>& middle, double& e
   middle = 0.5 * (low + high);
   double square = 0;
   for (int k = 0; k < n; ++k) {
-    const kernels::Vec3<double> arm = kernels::Vec3<double>{points[3 * k], points[3 * k + 1], points[3 * k + 2]} - middle;
+    const kernels::Vec3<double> arm =
+        kernels::Vec3<double>{points[3 * k], points[3 * k + 1], points[3 * k + 2]} - middle;
     square = std::max(square, dot(arm, arm));
   }
-  // Rounded up, by far more than poses are rounded: a bound that is short by one bit would be no bound.
+  // Rounded up, by far more than poses are rounded: a bound that is short by one bit would be no
+  // bound.
   extent = std::sqrt(square) * (1 + 1e-9) + 1e-9;
 }
 
-/// Indices of `items` group by group, in the order of first appearance; `same` tells which belong together. Returns where
-/// each group begins, and the end.
+/// Indices of `items` group by group, in the order of first appearance; `same` tells which belong
+/// together. Returns where each group begins, and the end.
 template <class Item, class Same>
 std::vector<int> gather(const std::vector<Item>& items, const Same& same, std::vector<int>& order) {
   std::vector<int> begins;
@@ -56,10 +59,13 @@ void group_contacts(CompiledModel& m) {
     g.extent += g.radius;
   }
   const std::vector<int> pairs = gather(
-      m.pairs, [](const auto& a, const auto& b) { return a.link1 == b.link1 && a.link2 == b.link2; }, m.pair_order);
+      m.pairs,
+      [](const auto& a, const auto& b) { return a.link1 == b.link1 && a.link2 == b.link2; },
+      m.pair_order);
   for (std::size_t g = 0; g + 1 < pairs.size(); ++g) {
     const kernels::PairContact& first = m.pairs[std::size_t(m.pair_order[std::size_t(pairs[g])])];
-    kernels::LinkPair links = {first.link1, first.link2, pairs[g], pairs[g + 1] - pairs[g], 0, 0, false, first.frame2.p};
+    kernels::LinkPair links = {first.link1, first.link2, pairs[g], pairs[g + 1] - pairs[g],
+                               0,           0,           false,    first.frame2.p};
     links.ball = links.count == 1 && first.shape == PrimitiveShape::sphere;
     double pitch = INFINITY;
     for (int i = pairs[g]; i < pairs[g + 1]; ++i) {
@@ -67,15 +73,16 @@ void group_contacts(CompiledModel& m) {
       links.reach = std::max(links.reach, pair.reach);
       pitch = std::min(pitch, pair.extent * std::sqrt(4 * M_PI / pair.n_points));
     }
-    // What a lane may move before it is searched again. Where points are far apart a wide margin lists few more of them.
+    // What a lane may move before it is searched again. Where points are far apart a wide margin
+    // lists few more of them.
     links.margin = std::max(links.reach / 200, pitch / 16);
     m.link_pairs.push_back(links);
   }
-  const std::vector<int> grounds =
-      gather(m.grounds, [](const auto& a, const auto& b) { return a.link == b.link; }, m.ground_order);
+  const std::vector<int> grounds = gather(
+      m.grounds, [](const auto& a, const auto& b) { return a.link == b.link; }, m.ground_order);
   for (std::size_t g = 0; g + 1 < grounds.size(); ++g)
-    m.grounded.push_back({m.grounds[std::size_t(m.ground_order[std::size_t(grounds[g])])].link, grounds[g],
-                          grounds[g + 1] - grounds[g]});
+    m.grounded.push_back({m.grounds[std::size_t(m.ground_order[std::size_t(grounds[g])])].link,
+                          grounds[g], grounds[g + 1] - grounds[g]});
 }
 
 }  // namespace tangere

@@ -10,14 +10,15 @@
 namespace tangere {
 
 using kernels::JointKind;
-using kernels::Row;
 using kernels::Quat;
+using kernels::Row;
 using kernels::Vec3;
 
 namespace {
 
 constexpr int kDeepestSplit = 6;  // h / 2^6
-// Inside a split the search may be long: a short leash there loses runs that a patient one finishes.
+// Inside a split the search may be long: a short leash there loses runs that a patient one
+// finishes.
 constexpr int kHalvings = 10, kSplitHalvings = 20, kSplitIterations = 40;
 constexpr int kPatience = 4, kSplitPatience = 40;
 
@@ -29,18 +30,20 @@ void fill(Row<L>& row, double value) {
 }  // namespace
 
 template <int L>
-LaneBits GroupStep::solve_one_stage(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes, double c0,
-                                    double h, bool inside_split, NewtonReport& report) const {
+LaneBits GroupStep::solve_one_stage(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                                    LaneBits lanes, double c0, double h, bool inside_split,
+                                    NewtonReport& report) const {
   fill(w.stage.c0_over_h, c0 / h);
   fill(w.stage.inverse_h, 1 / h);
-  const NewtonLimits limits = {settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
-                               inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience};
+  const NewtonLimits limits = {
+      settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
+      inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience};
   return solve_stage(model_, table, w, lanes, limits, report);
 }
 
 template <int L>
-LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes, double h,
-                        bool inside_split, NewtonReport& report) const {
+LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                        LaneBits lanes, double h, bool inside_split, NewtonReport& report) const {
   const int n = model_.nv;
   for (int i = 0; i < model_.nq; ++i) w.stage.centre[i] = w.q0[i];
   const auto each = [&](auto&& f) {
@@ -52,7 +55,9 @@ LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, Ba
   switch (scheme) {
     case Integrator::bdf1:
     case Integrator::linear_implicit:
-      each([&](int i, int l) { s.r[i][l] = 0, s.s[i][l] = -w.v0[i][l], s.x[i][l] = h * w.v0[i][l]; });
+      each([&](int i, int l) {
+        s.r[i][l] = 0, s.s[i][l] = -w.v0[i][l], s.x[i][l] = h * w.v0[i][l];
+      });
       if (scheme == Integrator::bdf1) {
         resolved = solve_one_stage(table, w, lanes, 1, h, inside_split, report);
       } else {
@@ -92,7 +97,8 @@ LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, Ba
 
 /// q1 = centre ⊕ x, v1 = v. A joint that turned by π or more is not resolved: its chart ends there.
 template <int L>
-void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits& resolved, NewtonReport& report) const {
+void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits& resolved,
+                       NewtonReport& report) const {
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
     for (int i = 0; i < model_.nv; ++i) w.v1[i][l] = w.stage.v[i][l];
@@ -111,14 +117,16 @@ void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits&
         report.status[l] = StepStatus::rotation;
       }
       const Quat<double> q = rotate_by(quat_at(w.stage.centre + link.q, l), turn);
-      w.q1[link.q][l] = q.w, w.q1[link.q + 1][l] = q.x, w.q1[link.q + 2][l] = q.y, w.q1[link.q + 3][l] = q.z;
+      w.q1[link.q][l] = q.w, w.q1[link.q + 1][l] = q.x, w.q1[link.q + 2][l] = q.y,
+      w.q1[link.q + 3][l] = q.z;
     }
   }
 }
 
 /// Adds the solve that ended in q0, v0.
 template <int L>
-void GroupStep::note(const BasicWorkspace<L>& w, int lane, Integrator scheme, double h, std::vector<TapedSolve>* to) const {
+void GroupStep::note(const BasicWorkspace<L>& w, int lane, Integrator scheme, double h,
+                     std::vector<TapedSolve>* to) const {
   if (to == nullptr) return;
   const auto column = [&](const Row<L>* rows, int count) {
     std::vector<double> x(static_cast<std::size_t>(count));
@@ -130,8 +138,8 @@ void GroupStep::note(const BasicWorkspace<L>& w, int lane, Integrator scheme, do
 }
 
 /// Two half steps from q0, v0, split again where needed.
-bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth, NewtonReport& report,
-                      std::vector<TapedSolve>* solves) const {
+bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
+                      NewtonReport& report, std::vector<TapedSolve>* solves) const {
   if (depth > kDeepestSplit) return false;
   // Order 2 must survive inside a BDF2 step, and so must its history: SDIRK2 there, not BDF1.
   const bool second_order =
@@ -151,8 +159,9 @@ bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, dou
 
 /// Splits the step of one lane of a group; the others wait.
 template <int L>
-bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane, SingleWorkspace& alone,
-                           NewtonReport& report, std::vector<TapedSolve>* solves) const {
+bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane,
+                           SingleWorkspace& alone, NewtonReport& report,
+                           std::vector<TapedSolve>* solves) const {
   if constexpr (L == 1) {
     if (&w == &alone) return split(table, w, settings_.timestep, 1, report, solves);
   }
@@ -166,7 +175,8 @@ bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>&
   to_one(w.v0, alone.v0, model_.nv);
   to_one(w.stage.tau, alone.stage.tau, model_.nv);
   to_one(w.stage.target, alone.stage.target, model_.nv);
-  alone.stage.block = w.stage.block == nullptr ? nullptr : w.stage.block + w.stage.group * kernels::kGroup + lane;
+  alone.stage.block =
+      w.stage.block == nullptr ? nullptr : w.stage.block + w.stage.group * kernels::kGroup + lane;
   alone.stage.group = 0;
   NewtonReport one;
   one.status[0] = report.status[lane];
@@ -182,8 +192,9 @@ bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>&
 }
 
 template <int L>
-void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w, SingleWorkspace& alone, LaneBits lanes,
-                        LaneBits history, NewtonReport& report, SolveLog* log) const {
+void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                        SingleWorkspace& alone, LaneBits lanes, LaneBits history,
+                        NewtonReport& report, SolveLog* log) const {
   const double h = settings_.timestep;
   LaneBits resolved = 0;
   const auto commit = [&](LaneBits done) {
@@ -196,16 +207,20 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
   };
   clear_candidates(w);
   if (settings_.integrator == Integrator::bdf2) {
-    if ((lanes & history) != 0) commit(run(Integrator::bdf2, table, w, lanes & history, h, false, report));
+    if ((lanes & history) != 0)
+      commit(run(Integrator::bdf2, table, w, lanes & history, h, false, report));
     if (const LaneBits starting = lanes & ~history; starting != 0) {
       const LaneBits done = run(Integrator::sdirk2, table, w, starting, h, false, report);
       commit(done);
       for (int l = 0; l < L; ++l)
-        if (has(done, l)) note(w, l, Integrator::sdirk2, h, log == nullptr ? nullptr : &log->special[std::size_t(l)]);
+        if (has(done, l))
+          note(w, l, Integrator::sdirk2, h,
+               log == nullptr ? nullptr : &log->special[std::size_t(l)]);
     }
   } else {
     commit(run(settings_.integrator, table, w, lanes, h, false, report));
-    if (log != nullptr && settings_.integrator == Integrator::sdirk2)  // before a split of some lane overwrites them
+    if (log != nullptr &&
+        settings_.integrator == Integrator::sdirk2)  // before a split of some lane overwrites them
       for (int i = 0; i < model_.nv; ++i)
         for (int l = 0; l < L; ++l)
           if (has(resolved, l)) log->x_gamma[i * kernels::kBlock + l] = w.x_gamma[i][l];
@@ -213,13 +228,15 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
   for (int l = 0; l < L; ++l) {
     if (!has(lanes & ~resolved, l)) continue;
     const StepStatus first = report.status[l];
-    if (split_lane(table, w, l, alone, report, log == nullptr ? nullptr : &log->special[std::size_t(l)])) {
+    if (split_lane(table, w, l, alone, report,
+                   log == nullptr ? nullptr : &log->special[std::size_t(l)])) {
       report.status[l] = StepStatus::split;
     } else if (!failed(report.status[l])) {
       report.status[l] = first;
     }
   }
-  // The next step's history is log(R₁ᵀR₀): a turn of π or more in this one would be read as its complement.
+  // The next step's history is log(R₁ᵀR₀): a turn of π or more in this one would be read as its
+  // complement.
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l) || failed(report.status[l])) continue;
     for (const kernels::Link& link : model_.links) {
@@ -231,9 +248,9 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
   }
 }
 
-template void GroupStep::advance(const kernels::KernelTable&, Workspace&, SingleWorkspace&, LaneBits, LaneBits,
-                                 NewtonReport&, SolveLog*) const;
-template void GroupStep::advance(const kernels::KernelTable&, SingleWorkspace&, SingleWorkspace&, LaneBits, LaneBits,
-                                 NewtonReport&, SolveLog*) const;
+template void GroupStep::advance(const kernels::KernelTable&, Workspace&, SingleWorkspace&,
+                                 LaneBits, LaneBits, NewtonReport&, SolveLog*) const;
+template void GroupStep::advance(const kernels::KernelTable&, SingleWorkspace&, SingleWorkspace&,
+                                 LaneBits, LaneBits, NewtonReport&, SolveLog*) const;
 
 }  // namespace tangere

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The linearly implicit step in reverse. x = x_p - s, s = A(x_p)⁻¹ g(x_p): A itself hangs on what the step begins with, so
-// every derivative G_z of g enters as Ĝ_z = G_z - (dG_z/dx) s, the value less the tangent at x_p + ε s:
+// The linearly implicit step in reverse. x = x_p - s, s = A(x_p)⁻¹ g(x_p): A itself hangs on what
+// the step begins with, so every derivative G_z of g enters as Ĝ_z = G_z - (dG_z/dx) s, the value
+// less the tangent at x_p + ε s:
 //   x̄ = Jᵀ(x) q̄ + v̄/h,  Aᵀ λ = x̄,  x̄_p = x̄ - Ĝ_xᵀ λ
-//   v̄₀ += h x̄_p - Ĝ_v₀ᵀ λ,  q̄₀ += exp(x) q̄ - Ĝ_q₀ᵀ λ,  ū -= Ĝ_uᵀ λ,  p̄ -= Ĝ_pᵀ λ       (x_p = h v₀, v = x/h)
+//   v̄₀ += h x̄_p - Ĝ_v₀ᵀ λ,  q̄₀ += exp(x) q̄ - Ĝ_q₀ᵀ λ,  ū -= Ĝ_uᵀ λ,  p̄ -= Ĝ_pᵀ λ
+//       (x_p = h v₀, v = x/h)
 // One environment after the other, in dual numbers.
 #include "engine/dual_stage.hpp"
 #include "engine/group_adjoint.hpp"
@@ -28,22 +30,25 @@ Vec3<N> three(const std::vector<N>& a, int i) {
 }
 
 /// exp(x) J⁻ᵀ (Aᵀ λ - V_xᵀ Cᵀ λ) of a spherical joint, by the tangent of q₀.
-Vec3<D> by_turned_centre(const Vec3<D>& x, double h, const Vec3<D>& a_lambda, const Vec3<D>& c_lambda) {
+Vec3<D> by_turned_centre(const Vec3<D>& x, double h, const Vec3<D>& a_lambda,
+                         const Vec3<D>& c_lambda) {
   const kernels::RotationSeries<D> k = kernels::rotation_series(x);
   const D inverse_h(1 / h);
   const Mat3<D> J = kernels::right_jacobian(x, k);
   const Mat3<D> rate = inverse_h * J + kernels::right_jacobian_derivative(x, k, inverse_h * x);
   const Vec3<D> by_q = a_lambda - transposed_times(rate, c_lambda);
-  const kernels::RotationVector<D> inverse = kernels::rotation_vector<false>(kernels::quaternion_exp(x));
-  return kernels::rotation_exp(x, k) * (transposed_times(kernels::inverse_right_jacobian(inverse), by_q));
+  const kernels::RotationVector<D> inverse =
+      kernels::rotation_vector<false>(kernels::quaternion_exp(x));
+  return kernels::rotation_exp(x, k) *
+         (transposed_times(kernels::inverse_right_jacobian(inverse), by_q));
 }
 
 }  // namespace
 
 /// Cotangents of the predictor's neighbours for one lane; λ stands in a.lambda.
 template <int L>
-void GroupAdjoint::hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o, const std::vector<double>& x, double h,
-                                  int lane) const {
+void GroupAdjoint::hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o,
+                                  const std::vector<double>& x, double h, int lane) const {
   AdjointWorkspace<L>& a = in.a;
   BasicWorkspace<L>& w = in.w;
   DualStage& dual = *a.dual;
@@ -63,9 +68,11 @@ void GroupAdjoint::hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o
   std::vector<D> A, c_lambda, m_lambda, targets, a_lambda(static_cast<std::size_t>(n), D(0.0));
   dual.jacobian(A);
   for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) a_lambda[std::size_t(j)] += A[std::size_t(i * n + j)] * D(lambda[std::size_t(i)]);
+    for (int j = 0; j < n; ++j)
+      a_lambda[std::size_t(j)] += A[std::size_t(i * n + j)] * D(lambda[std::size_t(i)]);
   std::vector<D> numbers;
-  if (o.parameters != nullptr) numbers.assign(std::size_t(kernels::parameter_numbers(model_.view)), D(0.0));
+  if (o.parameters != nullptr)
+    numbers.assign(std::size_t(kernels::parameter_numbers(model_.view)), D(0.0));
   dual.products(lambda, c_lambda, m_lambda, targets, o.parameters == nullptr ? nullptr : &numbers);
   for (int i = 0; i < n; ++i) {
     const auto k = std::size_t(i);
@@ -81,11 +88,14 @@ void GroupAdjoint::hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o
       }
       continue;
     }
-    const Vec3<D> by_q = by_turned_centre(three(dual.x, link.v), h, three(a_lambda, link.v), three(c_lambda, link.v));
+    const Vec3<D> by_q = by_turned_centre(three(dual.x, link.v), h, three(a_lambda, link.v),
+                                          three(c_lambda, link.v));
     const Vec3<double> turn = three(x, link.v);
-    const Vec3<double> kept = kernels::rotation_exp(turn, kernels::rotation_series(turn)) *
-                              Vec3<double>{o.q[link.v][lane], o.q[link.v + 1][lane], o.q[link.v + 2][lane]};
-    const double to[3] = {kept.x - hatted(by_q.x), kept.y - hatted(by_q.y), kept.z - hatted(by_q.z)};
+    const Vec3<double> kept =
+        kernels::rotation_exp(turn, kernels::rotation_series(turn)) *
+        Vec3<double>{o.q[link.v][lane], o.q[link.v + 1][lane], o.q[link.v + 2][lane]};
+    const double to[3] = {kept.x - hatted(by_q.x), kept.y - hatted(by_q.y),
+                          kept.z - hatted(by_q.z)};
     for (int i = 0; i < 3; ++i) o.q_centre[link.v + i][lane] += to[i];
   }
   for (std::size_t k = 0; k < numbers.size(); ++k) o.parameters[k][lane] += hatted(numbers[k]);
@@ -109,12 +119,15 @@ void GroupAdjoint::reverse_linear(const StageInHand<L>& in, double h) const {
     for (const kernels::Link& link : model_.links) {
       for (int l = 0; l < L; ++l) {
         if (link.kind != kernels::JointKind::spherical) {
-          for (int i = link.v; i < link.v + kernels::dofs(link.kind); ++i) a.rhs[i][l] = o.q[i][l] + o.v[i][l] / h;
+          for (int i = link.v; i < link.v + kernels::dofs(link.kind); ++i)
+            a.rhs[i][l] = o.q[i][l] + o.v[i][l] / h;
           continue;
         }
-        const Vec3<double> turn = {a.other[link.v][l], a.other[link.v + 1][l], a.other[link.v + 2][l]};
-        const Vec3<double> q = transposed_times(kernels::right_jacobian(turn, kernels::rotation_series(turn)),
-                                                Vec3<double>{o.q[link.v][l], o.q[link.v + 1][l], o.q[link.v + 2][l]});
+        const Vec3<double> turn = {a.other[link.v][l], a.other[link.v + 1][l],
+                                   a.other[link.v + 2][l]};
+        const Vec3<double> q =
+            transposed_times(kernels::right_jacobian(turn, kernels::rotation_series(turn)),
+                             Vec3<double>{o.q[link.v][l], o.q[link.v + 1][l], o.q[link.v + 2][l]});
         const double by_q[3] = {q.x, q.y, q.z};
         for (int i = 0; i < 3; ++i) a.rhs[link.v + i][l] = by_q[i] + o.v[link.v + i][l] / h;
       }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stages of a step that this scene calls for, and which variant of its kernel each one runs, as `inspect` tells it.
+// The stages of a step that this scene calls for, and which variant of its kernel each one runs, as
+// `inspect` tells it.
 #include <algorithm>
 
 #include "engine/compiled_model.hpp"
@@ -42,31 +43,37 @@ std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links)
     if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) shapes.push_back(shape);
   }
   std::string text;
-  for (const PrimitiveShape shape : shapes) text += std::string(name_of(shape)) + ": " + sums_of(shape) + "; ";
+  for (const PrimitiveShape shape : shapes)
+    text += std::string(name_of(shape)) + ": " + sums_of(shape) + "; ";
   if (links.link1 < 0 || links.link2 < 0) return text + "one body moves";
   return text + "both bodies move";
 }
 
-/// The body of a link (-1: the world) that a contact declares, and how many more contacts share its links.
+/// The body of a link (-1: the world) that a contact declares, and how many more contacts share its
+/// links.
 std::string pair_name(const CompiledModel& m, const kernels::LinkPair& links) {
   const ContactInfo& first = m.contact_info[std::size_t(m.pair_order[std::size_t(links.first)])];
   std::string text = first.first + " on " + first.second;
-  if (links.count > 1) text += " and " + std::to_string(links.count - 1) + " more of the same links";
+  if (links.count > 1)
+    text += " and " + std::to_string(links.count - 1) + " more of the same links";
   return text;
 }
 
 const char* motion_variant(const std::vector<Link>& links) {
-  if (std::all_of(links.begin(), links.end(), [](const Link& l) { return l.still; })) return "nothing turns";
-  if (std::any_of(links.begin(), links.end(), [](const Link& l) { return l.still; })) return "some links never turn";
+  if (std::all_of(links.begin(), links.end(), [](const Link& l) { return l.still; }))
+    return "nothing turns";
+  if (std::any_of(links.begin(), links.end(), [](const Link& l) { return l.still; }))
+    return "some links never turn";
   return "every link may turn";
 }
 
 std::string effects_variant(std::uint8_t effects) {
-  const std::pair<kernels::JointEffect, const char*> names[] = {{kernels::kDamped, "damping"},
-                                                                {kernels::kArmoured, "armature"},
-                                                                {kernels::kSprung, "spring"},
-                                                                {kernels::kLimited, "limits"},
-                                                                {kernels::kDriven, "position motor"}};
+  const std::pair<kernels::JointEffect, const char*> names[] = {
+      {kernels::kDamped, "damping"},
+      {kernels::kArmoured, "armature"},
+      {kernels::kSprung, "spring"},
+      {kernels::kLimited, "limits"},
+      {kernels::kDriven, "position motor"}};
   std::string text;
   for (const auto& [bit, name] : names)
     if ((effects & bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name);
@@ -76,7 +83,9 @@ std::string effects_variant(std::uint8_t effects) {
 std::string field_variant(const CompiledSensor& s) {
   const std::string law = std::string("law ") + to_string(s.law);
   if (!s.index.empty()) return "tiles of curved points, lanes are points; " + law;
-  return (s.points() <= Readout::kSmallPad ? "flat pad, lanes are environments; " : "flat tiles, lanes are points; ") + law;
+  return (s.points() <= Readout::kSmallPad ? "flat pad, lanes are environments; "
+                                           : "flat tiles, lanes are points; ") +
+         law;
 }
 
 }  // namespace
@@ -87,8 +96,10 @@ void list_stages(CompiledModel& m) {
   };
   add("kinematics", counted(m.links.size(), "link", "links"), motion_variant(m.links));
   if (!m.pairs.empty())
-    add("search", counted(m.pairs.size(), "pair of shapes", "pairs of shapes"), "one sphere, tiles of 32, points");
-  for (const kernels::LinkPair& links : m.link_pairs) add("pair contact", pair_name(m, links), pair_variant(m, links));
+    add("search", counted(m.pairs.size(), "pair of shapes", "pairs of shapes"),
+        "one sphere, tiles of 32, points");
+  for (const kernels::LinkPair& links : m.link_pairs)
+    add("pair contact", pair_name(m, links), pair_variant(m, links));
   for (const kernels::GroundedLink& grounded : m.grounded) {
     const int first = m.ground_order[std::size_t(grounded.first)];
     add("ground contact", m.contact_info[m.pairs.size() + std::size_t(first)].first,
@@ -98,15 +109,18 @@ void list_stages(CompiledModel& m) {
   for (std::size_t j = 0; j < m.joints.size(); ++j) {
     std::uint8_t effects = 0;
     for (int i = 0; i < m.joints[j].link_count; ++i)
-      effects = static_cast<std::uint8_t>(effects | m.links[std::size_t(m.joints[j].first_link + i)].effects);
+      effects = static_cast<std::uint8_t>(effects |
+                                          m.links[std::size_t(m.joints[j].first_link + i)].effects);
     if (effects != 0) add("joint effects", m.scene.links[j].joint.name, effects_variant(effects));
   }
-  add("Jacobian", counted(std::size_t(m.pattern.entries), "entry", "entries"), "composite inertia, one block per contact");
+  add("Jacobian", counted(std::size_t(m.pattern.entries), "entry", "entries"),
+      "composite inertia, one block per contact");
   add("factor and solve", counted(std::size_t(m.pattern.factor_entries), "entry", "entries"),
-      m.pattern.factor_entries == m.pattern.entries ? "no fill"
-                                                    : std::to_string(m.pattern.factor_entries - m.pattern.entries) +
-                                                          " filled in");
-  for (std::size_t i = 0; i < m.sensors.size(); ++i) add("field", m.sensor_info[i].name, field_variant(m.sensors[i]));
+      m.pattern.factor_entries == m.pattern.entries
+          ? "no fill"
+          : std::to_string(m.pattern.factor_entries - m.pattern.entries) + " filled in");
+  for (std::size_t i = 0; i < m.sensors.size(); ++i)
+    add("field", m.sensor_info[i].name, field_variant(m.sensors[i]));
 }
 
 }  // namespace tangere

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mass and inertia of bodies of uniform density: closed forms, and volume integrals of meshes; what kernels call their size.
+// Mass and inertia of bodies of uniform density: closed forms, and volume integrals of meshes; what
+// kernels call their size.
 #include <algorithm>
 #include <cmath>
 
@@ -25,7 +26,8 @@ Principal<T> of_ball(double density, const T& r) {
 template <class T>
 Principal<T> of_cuboid(double density, const T& x, const T& y, const T& z) {
   const T mass = density * x * y * z;
-  return {mass, mass / 12 * (y * y + z * z), mass / 12 * (x * x + z * z), mass / 12 * (x * x + y * y)};
+  return {mass, mass / 12 * (y * y + z * z), mass / 12 * (x * x + z * z),
+          mass / 12 * (x * x + y * y)};
 }
 
 template <class T>
@@ -39,7 +41,8 @@ Principal<T> of_cylinder(double density, const T& r, const T& l) {
 template <class T>
 Principal<T> of_capsule(double density, const T& r, const T& l) {
   const T tube = density * M_PI * r * r * l, ball = density * 4.0 / 3.0 * M_PI * r * r * r;
-  const T across = tube * (l * l / 12 + r * r / 4) + ball * (0.4 * r * r + l * l / 4 + 0.375 * l * r);
+  const T across =
+      tube * (l * l / 12 + r * r / 4) + ball * (0.4 * r * r + l * l / 4 + 0.375 * l * r);
   return {tube + ball, across, across, tube * r * r / 2 + 0.4 * ball * r * r};
 }
 
@@ -47,15 +50,23 @@ MassProperties centred(const Principal<double>& p) {
   return {p.mass, {0, 0, 0}, {{{p.xx, 0, 0}, {0, p.yy, 0}, {0, 0, p.zz}}}};
 }
 
-MassProperties of(const SphereShape& s, double density) { return centred(of_ball(density, s.radius)); }
-MassProperties of(const CuboidShape& c, double density) { return centred(of_cuboid(density, c.size[0], c.size[1], c.size[2])); }
-MassProperties of(const CylinderShape& c, double density) { return centred(of_cylinder(density, c.radius, c.length)); }
-MassProperties of(const CapsuleShape& c, double density) { return centred(of_capsule(density, c.radius, c.length)); }
+MassProperties of(const SphereShape& s, double density) {
+  return centred(of_ball(density, s.radius));
+}
+MassProperties of(const CuboidShape& c, double density) {
+  return centred(of_cuboid(density, c.size[0], c.size[1], c.size[2]));
+}
+MassProperties of(const CylinderShape& c, double density) {
+  return centred(of_cylinder(density, c.radius, c.length));
+}
+MassProperties of(const CapsuleShape& c, double density) {
+  return centred(of_capsule(density, c.radius, c.length));
+}
 MassProperties of(const PlaneShape&, double) { return centred({0, 0, 0, 0}); }
 
-/// Tetrahedra from the first vertex to every triangle, about that vertex: far from its frame's origin a body loses nothing.
-/// With corners a, b, c: volume = a·(b × c)/6, ∫x = volume (a + b + c)/4,
-/// ∫x xᵀ = volume (aaᵀ + bbᵀ + ccᵀ + ssᵀ)/20, s = a + b + c.
+/// Tetrahedra from the first vertex to every triangle, about that vertex: far from its frame's
+/// origin a body loses nothing. With corners a, b, c: volume = a·(b × c)/6, ∫x = volume (a + b +
+/// c)/4, ∫x xᵀ = volume (aaᵀ + bbᵀ + ccᵀ + ssᵀ)/20, s = a + b + c.
 MassProperties of(const MeshShape& mesh, double density) {
   using kernels::Vec3;
   const auto vertex = [&](int k) {
@@ -67,7 +78,8 @@ MassProperties of(const MeshShape& mesh, double density) {
   Vec3<double> first = {0, 0, 0};
   kernels::Mat3<double> second = kernels::zero33<double>();
   for (const std::array<int, 3>& t : mesh.triangles) {
-    const Vec3<double> a = vertex(t[0]) - origin, b = vertex(t[1]) - origin, c = vertex(t[2]) - origin, s = a + b + c;
+    const Vec3<double> a = vertex(t[0]) - origin, b = vertex(t[1]) - origin,
+                       c = vertex(t[2]) - origin, s = a + b + c;
     const double part = dot(a, cross(b, c)) / 6;
     volume += part;
     first += (part / 4) * s;
@@ -93,11 +105,16 @@ MassProperties mass_properties(const Shape& shape, double density) {
 MassProperties mass_properties_by_size(const Shape& shape, double density, int which) {
   using D = kernels::Dual<double>;
   const auto number = [which](double x, int k) { return D(x, k == which ? 1 : 0); };
-  const auto slope = [](const Principal<D>& p) { return centred({p.mass.epsilon, p.xx.epsilon, p.yy.epsilon, p.zz.epsilon}); };
-  if (const auto* s = std::get_if<SphereShape>(&shape)) return slope(of_ball(density, number(s->radius, 0)));
+  const auto slope = [](const Principal<D>& p) {
+    return centred({p.mass.epsilon, p.xx.epsilon, p.yy.epsilon, p.zz.epsilon});
+  };
+  if (const auto* s = std::get_if<SphereShape>(&shape))
+    return slope(of_ball(density, number(s->radius, 0)));
   if (const auto* c = std::get_if<CuboidShape>(&shape))
-    return slope(of_cuboid(density, number(c->size[0], 2), number(c->size[1], 3), number(c->size[2], 4)));
-  if (const auto* c = std::get_if<CylinderShape>(&shape)) return slope(of_cylinder(density, number(c->radius, 0), number(c->length, 1)));
+    return slope(
+        of_cuboid(density, number(c->size[0], 2), number(c->size[1], 3), number(c->size[2], 4)));
+  if (const auto* c = std::get_if<CylinderShape>(&shape))
+    return slope(of_cylinder(density, number(c->radius, 0), number(c->length, 1)));
   const auto& c = std::get<CapsuleShape>(shape);
   return slope(of_capsule(density, number(c.radius, 0), number(c.length, 1)));
 }

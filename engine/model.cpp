@@ -31,7 +31,8 @@ std::span<const std::string> Model::body_names() const { return compiled_->body_
 
 std::size_t Model::state_bytes_per_environment() const {
   // Rows of the block, then status, iterations, residual and the history flag.
-  return sizeof(double) * compiled_->layout.rows + sizeof(std::int8_t) + sizeof(std::int32_t) + sizeof(double) + 1;
+  return sizeof(double) * compiled_->layout.rows + sizeof(std::int8_t) + sizeof(std::int32_t) +
+         sizeof(double) + 1;
 }
 std::size_t Model::workspace_bytes() const { return Workspace::bytes(*compiled_); }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A compiled scene: indices and constants, no strings on any hot path. Immutable; shared by every batch and thread.
+// A compiled scene: indices and constants, no strings on any hot path. Immutable; shared by every
+// batch and thread.
 #pragma once
 
 #include <cstddef>
@@ -12,16 +13,17 @@
 
 namespace tangere {
 
-struct CompiledModel;  // engine/compiled_model.hpp: the arrays kernels read; not part of the installed interface
+struct CompiledModel;  // engine/compiled_model.hpp: the arrays kernels read; not part of the
+                       // installed interface
 
 /// A tactile sensor after compilation.
 struct SensorInfo {
   std::string name;
   std::string body;
-  int rows = 0, cols = 0;   ///< of a rectangular array; points = rows * cols, row-major
+  int rows = 0, cols = 0;  ///< of a rectangular array; points = rows * cols, row-major
   int points = 0;
-  int every = 0;            ///< as in the scene; 0: the caller decides
-  int pressure_sign = 1;    ///< +1: the third component is positive under pressure
+  int every = 0;          ///< as in the scene; 0: the caller decides
+  int pressure_sign = 1;  ///< +1: the third component is positive under pressure
 };
 
 /// An end effector after compilation.
@@ -51,29 +53,31 @@ struct StageInfo {
 
 class Model {
  public:
-  /// Compiles a scene. Throws InputError (file:line) for references to nothing, massless leaves, degenerate sensors, …
+  /// Compiles a scene. Throws InputError (file:line) for references to nothing, massless leaves,
+  /// degenerate sensors, …
   explicit Model(const Scene& scene);
 
   [[nodiscard]] const Scene& scene() const;
-  [[nodiscard]] int nq() const;  ///< configuration coordinates (quaternions count 4)
-  [[nodiscard]] int nv() const;  ///< velocity dofs
-  [[nodiscard]] int nu() const;  ///< controls: motors in file order, each dof in turn
-  [[nodiscard]] int nb() const;  ///< bodies of the scene, folded or not, in file order
-  [[nodiscard]] double mass(int body) const;     ///< [kg]
-  [[nodiscard]] double timestep() const;         ///< [s]
+  [[nodiscard]] int nq() const;               ///< configuration coordinates (quaternions count 4)
+  [[nodiscard]] int nv() const;               ///< velocity dofs
+  [[nodiscard]] int nu() const;               ///< controls: motors in file order, each dof in turn
+  [[nodiscard]] int nb() const;               ///< bodies of the scene, folded or not, in file order
+  [[nodiscard]] double mass(int body) const;  ///< [kg]
+  [[nodiscard]] double timestep() const;      ///< [s]
   [[nodiscard]] Integrator integrator() const;
   [[nodiscard]] const SolverOptions& solver() const;
   [[nodiscard]] std::span<const SensorInfo> sensors() const;
   [[nodiscard]] std::span<const VariableInfo> variables() const;  ///< end effectors, in file order
   [[nodiscard]] std::span<const ContactInfo> contacts() const;
   [[nodiscard]] std::span<const EffectInfo> effects() const;
-  [[nodiscard]] std::span<const StageInfo> stages() const;  ///< in the order in which they run
+  [[nodiscard]] std::span<const StageInfo> stages() const;     ///< in the order in which they run
   [[nodiscard]] std::span<const std::string> q_names() const;  ///< "object_joint.qw" …
   [[nodiscard]] std::span<const std::string> v_names() const;
   [[nodiscard]] std::span<const std::string> u_names() const;
   [[nodiscard]] std::span<const std::string> q_units() const;  ///< "m", "rad", "1"
   [[nodiscard]] std::span<const std::string> v_units() const;
-  [[nodiscard]] std::span<const std::string> u_units() const;  ///< "1": controls are dimensionless for force motors
+  [[nodiscard]] std::span<const std::string> u_units()
+      const;  ///< "1": controls are dimensionless for force motors
   [[nodiscard]] std::span<const std::string> body_names() const;
   [[nodiscard]] std::size_t state_bytes_per_environment() const;  ///< of a Batch
   [[nodiscard]] std::size_t workspace_bytes() const;              ///< of a Stepper, once per thread

@@ -16,9 +16,11 @@ class NameIndex {
     if (!index_.emplace(name, index).second)
       throw InputError(source.prefix() + kind + " name '" + name + "' is used twice");
   }
-  [[nodiscard]] int find(const std::string& kind, const std::string& name, const Source& source) const {
+  [[nodiscard]] int find(const std::string& kind, const std::string& name,
+                         const Source& source) const {
     const auto it = index_.find(name);
-    if (it == index_.end()) throw InputError(source.prefix() + "no " + kind + " is named '" + name + "'");
+    if (it == index_.end())
+      throw InputError(source.prefix() + "no " + kind + " is named '" + name + "'");
     return it->second;
   }
 

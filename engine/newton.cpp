@@ -1,25 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
-// Newton in lanes. All searching lanes are evaluated together; each lane accepts or halves its own step.
+// Newton in lanes. All searching lanes are evaluated together; each lane accepts or halves its own
+// step.
 //
-// Accepted when a trial x - αΔ passes the natural test ‖D^½ A⁻¹ g(x - αΔ)‖ ≤ (1 - α/4) ‖D^½ Δ‖ with the factor at
-// hand (D = diag M at the first point), when its scaled residual r (kernels/norms-inl.hpp) is at most (1 - α/4) of the
-// last point's, or when r is at most the tolerance. One test alone stalls at first touches: the natural test where a factor
-// from before the touch says nothing of the forces after it, the residual where a long way must first be gone uphill.
-// The rounding floor in r comes from the last point that a direction was computed at.
+// Accepted when a trial x - αΔ passes the natural test ‖D^½ A⁻¹ g(x - αΔ)‖ ≤ (1 - α/4) ‖D^½ Δ‖ with
+// the factor at hand (D = diag M at the first point), when its scaled residual r
+// (kernels/norms-inl.hpp) is at most (1 - α/4) of the last point's, or when r is at most the
+// tolerance. One test alone stalls at first touches: the natural test where a factor from before
+// the touch says nothing of the forces after it, the residual where a long way must first be gone
+// uphill. The rounding floor in r comes from the last point that a direction was computed at.
 //
-// Where a direction brings no new lowest residual, the search goes back and forth between sticking and slipping: the slope of
-// one side leads far into the other. The next directions then take friction by its secant, -s v_t with s as it is. That
-// converges slowly from anywhere, so any decrease will do, and a few such directions reach the side that the root is on. A
-// lane that finds no new lowest residual for `patience` directions gives up.
+// Where a direction brings no new lowest residual, the search goes back and forth between sticking
+// and slipping: the slope of one side leads far into the other. The next directions then take
+// friction by its secant, -s v_t with s as it is. That converges slowly from anywhere, so any
+// decrease will do, and a few such directions reach the side that the root is on. A lane that finds
+// no new lowest residual for `patience` directions gives up.
 //
-// The natural test has A⁻¹ g at the new point already: the next step if the factor at hand is used again (a chord step).
-// Such steps leave a fixed share ρ of the residual, about twice what the Newton step before them left of its own, and
-// they cost a third of a Newton step. They are taken where three of them should meet the tolerance. A chord step that fails
-// the natural test is taken back for a Newton step.
+// The natural test has A⁻¹ g at the new point already: the next step if the factor at hand is used
+// again (a chord step). Such steps leave a fixed share ρ of the residual, about twice what the
+// Newton step before them left of its own, and they cost a third of a Newton step. They are taken
+// where three of them should meet the tolerance. A chord step that fails the natural test is taken
+// back for a Newton step.
 //
-// Whether an evaluation brings the Jacobian along is a guess about cost, never about results: g alone where every lane
-// should be done or take a chord step, and the Jacobian after it when one was not. The Jacobian of one lane costs its contacts
-// a third of a group's: where a single lane needs one, it comes after g too.
+// Whether an evaluation brings the Jacobian along is a guess about cost, never about results: g
+// alone where every lane should be done or take a chord step, and the Jacobian after it when one
+// was not. The Jacobian of one lane costs its contacts a third of a group's: where a single lane
+// needs one, it comes after g too.
 #include "engine/newton.hpp"
 
 #include <cmath>
@@ -28,11 +33,10 @@
 
 namespace tangere {
 
-
 namespace {
 
-// Decrease that a trial must bring, per α: of Newton's directions and of those by the secant, of which there are `kSecants`
-// in a row.
+// Decrease that a trial must bring, per α: of Newton's directions and of those by the secant, of
+// which there are `kSecants` in a row.
 constexpr double kDecrease = 0.25, kSecantDecrease = 0.01;
 constexpr int kSecants = 3;
 
@@ -46,18 +50,19 @@ struct Search {
   NewtonReport& report;
   double gravity;
   LaneBits searching;
-  LaneBits on_trial = 0;        ///< lanes whose x is a trial along delta
-  LaneBits use_pivoted = 0;     ///< lanes whose factor at hand is the pivoted one
+  LaneBits on_trial = 0;     ///< lanes whose x is a trial along delta
+  LaneBits use_pivoted = 0;  ///< lanes whose factor at hand is the pivoted one
   std::array<double, L> alpha{}, delta_norm{};
-  std::array<double, L> last{};      ///< scaled residual of the last accepted point
-  std::array<double, L> lowest{};    ///< of all accepted points
-  std::array<double, L> expected{};  ///< what should be left once the next point has had its chord step
-  LaneBits chord = 0;                     ///< lanes whose trial is a chord step
-  LaneBits no_chord = 0;                  ///< lanes that had one fail
-  bool with_jacobian = true;              ///< the last evaluation
+  std::array<double, L> last{};    ///< scaled residual of the last accepted point
+  std::array<double, L> lowest{};  ///< of all accepted points
+  std::array<double, L>
+      expected{};             ///< what should be left once the next point has had its chord step
+  LaneBits chord = 0;         ///< lanes whose trial is a chord step
+  LaneBits no_chord = 0;      ///< lanes that had one fail
+  bool with_jacobian = true;  ///< the last evaluation
   std::array<int, L> halvings{}, directions{};
-  std::array<int, L> idle{};              ///< directions since the lowest residual
-  std::array<int, L> secants{};           ///< directions left that take friction by its secant
+  std::array<int, L> idle{};     ///< directions since the lowest residual
+  std::array<int, L> secants{};  ///< directions left that take friction by its secant
 
   [[nodiscard]] int n() const { return model.nv; }
   [[nodiscard]] const kernels::StageKernels<L>& kernel() const { return table.stage<L>(); }
@@ -90,7 +95,9 @@ struct Search {
     }
   }
 
-  void set_floor(LaneBits lanes) { kernel().set_floor(model.view, w.stage, model.unknown_scale.data(), row_of(lanes)); }
+  void set_floor(LaneBits lanes) {
+    kernel().set_floor(model.view, w.stage, model.unknown_scale.data(), row_of(lanes));
+  }
 
   static LaneRow row_of(LaneBits lanes) {
     LaneRow row;
@@ -98,8 +105,12 @@ struct Search {
     return row;
   }
 
-  void scaled_residuals(LaneRow& out) const { kernel().scaled_residual(model.view, w.stage, gravity, out); }
-  void weighted_norms(const LaneRow* a, LaneRow& out) const { kernel().weighted_norm(model.view, w.stage, a, out); }
+  void scaled_residuals(LaneRow& out) const {
+    kernel().scaled_residual(model.view, w.stage, gravity, out);
+  }
+  void weighted_norms(const LaneRow* a, LaneRow& out) const {
+    kernel().weighted_norm(model.view, w.stage, a, out);
+  }
 
   void stop(int l, StepStatus status) {
     report.status[l] = status;
@@ -117,11 +128,13 @@ struct Search {
     Eigen::MatrixXd& a = w.dense[0];
     const kernels::Pattern& p = model.view.pattern;
     for (int i = 0; i < n(); ++i)
-      for (int j = 0; j < n(); ++j) a(i, j) = p.slot[i * n() + j] < 0 ? 0 : w.stage.A[p.slot[i * n() + j]][l];
+      for (int j = 0; j < n(); ++j)
+        a(i, j) = p.slot[i * n() + j] < 0 ? 0 : w.stage.A[p.slot[i * n() + j]][l];
     w.pivoted[l].compute(a);
   }
 
-  /// Judges the trials at the present x. Returns the lanes that hold an accepted, unconverged point.
+  /// Judges the trials at the present x. Returns the lanes that hold an accepted, unconverged
+  /// point.
   LaneBits judge() {
     LaneRow residual, test_norm{};
     scaled_residuals(residual);
@@ -171,7 +184,8 @@ struct Search {
     return accepted;
   }
 
-  /// Of a chord step only the natural test counts: what its factor leaves is what decides about the next.
+  /// Of a chord step only the natural test counts: what its factor leaves is what decides about the
+  /// next.
   [[nodiscard]] bool descends(int l, double test_norm, double residual) const {
     const double share = 1 - (secants[l] > 0 ? kSecantDecrease : kDecrease) * alpha[l];
     return test_norm <= share * delta_norm[l] || (!has(chord, l) && residual <= share * last[l]);
@@ -188,13 +202,15 @@ struct Search {
     return ++idle[l] > limits.patience;
   }
   void use_secant(int l, int directions_left) {
-    if ((secants[l] > 0) != (directions_left > 0)) with_jacobian = false;  // the one at hand is of the other kind
+    if ((secants[l] > 0) != (directions_left > 0))
+      with_jacobian = false;  // the one at hand is of the other kind
     secants[l] = directions_left;
     w.stage.friction_tangent[l] = directions_left > 0 ? 0 : 1;
   }
 
   [[nodiscard]] bool chord_suffices(int l, double residual, double share) const {
-    return alpha[l] == 1 && !has(no_chord, l) && residual * share * share * share <= limits.tolerance;
+    return alpha[l] == 1 && !has(no_chord, l) &&
+           residual * share * share * share <= limits.tolerance;
   }
   /// The natural test's vector as the next step.
   void take_chord(int l, double norm) {
@@ -262,8 +278,9 @@ double magnitude(const kernels::Vec3<double>& a) { return std::sqrt(dot(a, a)); 
 }  // namespace
 
 template <int L>
-LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
-                     const NewtonLimits& limits, NewtonReport& report) {
+LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, LaneBits lanes, const NewtonLimits& limits,
+                     NewtonReport& report) {
   Search<L> s{model, table, w, limits, report, magnitude(model.view.gravity), lanes};
   bool first = true;
   while (s.searching != 0) {
@@ -280,8 +297,8 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
 }
 
 template <int L>
-LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
-                     NewtonReport& report) {
+LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report) {
   static constexpr NewtonLimits kOnce{0, 1, 0, 0};
   Search<L> s{model, table, w, kOnce, report, magnitude(model.view.gravity), lanes};
   s.evaluate(true);
@@ -299,12 +316,13 @@ LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& tab
   return s.searching;
 }
 
-template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, Workspace&, LaneBits,
-                              const NewtonLimits&, NewtonReport&);
-template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&, LaneBits,
-                              const NewtonLimits&, NewtonReport&);
-template LaneBits linear_step(const CompiledModel&, const kernels::KernelTable&, Workspace&, LaneBits, NewtonReport&);
-template LaneBits linear_step(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&, LaneBits,
-                              NewtonReport&);
+template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, Workspace&,
+                              LaneBits, const NewtonLimits&, NewtonReport&);
+template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
+                              LaneBits, const NewtonLimits&, NewtonReport&);
+template LaneBits linear_step(const CompiledModel&, const kernels::KernelTable&, Workspace&,
+                              LaneBits, NewtonReport&);
+template LaneBits linear_step(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
+                              LaneBits, NewtonReport&);
 
 }  // namespace tangere

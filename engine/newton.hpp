@@ -23,16 +23,18 @@ struct NewtonReport {
   std::array<double, kernels::kGroup> residual{};  ///< scaled residual at the last accepted point
 };
 
-/// Solves g(x) = 0 for the lanes in `lanes`, from the x in the stage. On return the stage's x and v hold the solution
-/// of converged lanes. Returns the lanes that converged; the others have a failure in `report.status`.
+/// Solves g(x) = 0 for the lanes in `lanes`, from the x in the stage. On return the stage's x and v
+/// hold the solution of converged lanes. Returns the lanes that converged; the others have a
+/// failure in `report.status`.
 template <int L>
-LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
-                     const NewtonLimits& limits, NewtonReport& report);
-
-/// One direction from the x in the stage, without a test: the linearly implicit step. Returns the lanes where it is
-/// finite.
-template <int L>
-LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
+LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, LaneBits lanes, const NewtonLimits& limits,
                      NewtonReport& report);
+
+/// One direction from the x in the stage, without a test: the linearly implicit step. Returns the
+/// lanes where it is finite.
+template <int L>
+LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report);
 
 }  // namespace tangere

@@ -13,7 +13,9 @@ using kernels::Touch;
 
 namespace {
 
-kernels::Vec3<double> lane_of(const kernels::Vec3<LaneRow>& a, int l) { return {a.x[l], a.y[l], a.z[l]}; }
+kernels::Vec3<double> lane_of(const kernels::Vec3<LaneRow>& a, int l) {
+  return {a.x[l], a.y[l], a.z[l]};
+}
 kernels::Mat3<double> lane_of(const kernels::Mat3<LaneRow>& a, int l) {
   kernels::Mat3<double> c;
   for (int i = 0; i < 9; ++i) c.m[i / 3][i % 3] = a.m[i / 3][i % 3][l];
@@ -59,14 +61,17 @@ void PadReader::move(const Batch& batch, int block, int group) {
   };
   load(q_.data(), m.layout.q, m.nq);
   load(v_.data(), m.layout.v, m.nv);
-  kernels::active_kernels().link_poses(m.view, {q_.data(), v_.data(), zero_.data(), rates_.data(), rows, group},
-                                       links_.data() + std::size_t(group) * m.links.size());
+  kernels::active_kernels().link_poses(
+      m.view, {q_.data(), v_.data(), zero_.data(), rates_.data(), rows, group},
+      links_.data() + std::size_t(group) * m.links.size());
 }
 
 LinkPose<double> PadReader::link(int link, int group, int lane) const {
   if (link < 0) return {{kernels::diagonal(1.0), {0, 0, 0}}, kernels::zero6<double>()};
-  const LinkPose<LaneRow>& p = links_[std::size_t(group) * model_.compiled().links.size() + std::size_t(link)];
-  return {{lane_of(p.world.R, lane), lane_of(p.world.p, lane)}, {lane_of(p.V.a, lane), lane_of(p.V.l, lane)}};
+  const LinkPose<LaneRow>& p =
+      links_[std::size_t(group) * model_.compiled().links.size() + std::size_t(link)];
+  return {{lane_of(p.world.R, lane), lane_of(p.world.p, lane)},
+          {lane_of(p.V.a, lane), lane_of(p.V.l, lane)}};
 }
 
 void PadReader::meet(const Batch& batch, int block, int group, int sensor) {
@@ -91,7 +96,8 @@ void PadReader::meet(const Batch& batch, int block, int group, int sensor) {
     parameter(s.parameters.mu, touch.mu);
     parameter(s.parameters.damping, touch.damping);
     for (int i = 0; i < 3 && body.size_row >= 0; ++i)
-      parameter({0, body.size_row + i}, sizes_[3 * (kGroups * k + std::size_t(group)) + std::size_t(i)]);
+      parameter({0, body.size_row + i},
+                sizes_[3 * (kGroups * k + std::size_t(group)) + std::size_t(i)]);
   }
 }
 
@@ -115,12 +121,18 @@ kernels::TactileArgs<Real> PadReader::arguments(int sensor, int group, int lane)
   const Pad& pad = pads_[std::size_t(sensor)];
   for (std::size_t k = 0; k < s.targets.size(); ++k) {
     const Touch<LaneRow>& t = touches_[kGroups * k + std::size_t(group)];
-    one_[k] = {lane_of(t.Q, lane), lane_of(t.c, lane), lane_of(t.omega, lane), lane_of(t.v, lane),
-               t.kn[lane],         t.kt[lane],         t.mu[lane],             t.damping[lane]};
+    one_[k] = {lane_of(t.Q, lane), lane_of(t.c, lane), lane_of(t.omega, lane),
+               lane_of(t.v, lane), t.kn[lane],         t.kt[lane],
+               t.mu[lane],         t.damping[lane]};
   }
-  return {&pad.tiles,           s.law,       static_cast<int>(s.targets.size()),
-          shapes(sensor, group, lane), one_.data(), active.data(),
-          nullptr,              nullptr};
+  return {&pad.tiles,
+          s.law,
+          static_cast<int>(s.targets.size()),
+          shapes(sensor, group, lane),
+          one_.data(),
+          active.data(),
+          nullptr,
+          nullptr};
 }
 
 template <class Real>
@@ -129,7 +141,12 @@ kernels::TactileBlockArgs<Real> PadReader::block_arguments(int sensor, int group
   const Pad& pad = pads_[std::size_t(sensor)];
   for (std::size_t k = 0; k < s.targets.size(); ++k)
     touch_of_group_[k] = &touches_[kGroups * k + std::size_t(group)];
-  return {&pad.tiles, s.law, static_cast<int>(s.targets.size()), pad.shapes.data(), touch_of_group_.data(), nullptr};
+  return {&pad.tiles,
+          s.law,
+          static_cast<int>(s.targets.size()),
+          pad.shapes.data(),
+          touch_of_group_.data(),
+          nullptr};
 }
 
 template kernels::TactileArgs<float> PadReader::arguments(int, int, int);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kinematics of eight environments at a time and the shapes that meet a pad, handed to the tactile kernels.
+// Kinematics of eight environments at a time and the shapes that meet a pad, handed to the tactile
+// kernels.
 #pragma once
 
 #include <vector>
@@ -23,7 +24,8 @@ class PadReader {
 
   /// Every shape the sensor can feel, in its pad's axes, in the group moved last.
   void meet(const Batch& batch, int block, int group, int sensor);
-  /// Arguments for one environment of a group that was met. No output is set but the list of tiles, `active`.
+  /// Arguments for one environment of a group that was met. No output is set but the list of tiles,
+  /// `active`.
   template <class Real>
   kernels::TactileArgs<Real> arguments(int sensor, int group, int lane);
   /// Arguments for a group (double) or both (float).
@@ -49,9 +51,9 @@ class PadReader {
   std::vector<Pad> pads_;                                     // per sensor
   AlignedVector<kernels::Touch<kernels::LaneRow>> touches_;   // (targets, kGroups)
   std::vector<const kernels::Touch<kernels::LaneRow>*> touch_of_group_;
-  std::vector<kernels::Touch<double>> one_;                   // (targets) one environment's
-  std::vector<kernels::TouchShape> one_shapes_;               // (targets)
-  AlignedVector<kernels::LaneRow> sizes_;                     // (targets, kGroups, 3) of those that vary
+  std::vector<kernels::Touch<double>> one_;      // (targets) one environment's
+  std::vector<kernels::TouchShape> one_shapes_;  // (targets)
+  AlignedVector<kernels::LaneRow> sizes_;        // (targets, kGroups, 3) of those that vary
 };
 
 }  // namespace tangere

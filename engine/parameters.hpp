@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The numbers of a scene that gradients are taken by: coefficients of contacts and sensors, densities and sizes of bodies,
-// damping, stiffness, gains of position motors.
+// The numbers of a scene that gradients are taken by: coefficients of contacts and sensors,
+// densities and sizes of bodies, damping, stiffness, gains of position motors.
 #pragma once
 
 #include <array>
@@ -13,14 +13,15 @@
 namespace tangere {
 
 struct ParameterInfo {
-  std::string name;  ///< "contact pad ball kn", "ground ball mu", "tactile pad kt", "body ball density", "body tip mass",
-                     ///< "body pad size[0]",
-                     ///< "joint arm damping", "motor arm P"
+  std::string
+      name;  ///< "contact pad ball kn", "ground ball mu", "tactile pad kt", "body ball density",
+             ///< "body tip mass", "body pad size[0]", "joint arm damping", "motor arm P"
   std::string unit;  ///< SI
   double value;      ///< in the scene; environments may differ where <randomize> says so
 };
 
-/// Every such number of a model, once: a number that a scene gives for a whole joint has one derivative.
+/// Every such number of a model, once: a number that a scene gives for a whole joint has one
+/// derivative.
 class Parameters {
  public:
   explicit Parameters(const Model& model);
@@ -29,18 +30,22 @@ class Parameters {
   [[nodiscard]] int count() const { return static_cast<int>(infos_.size()); }
   /// Where number k stands in a scene that the model could have been compiled from.
   [[nodiscard]] double& in(Scene& scene, int k) const;
-  /// Which of a scene's randomisations (Scene::randomizations) number k follows; -1: none, it is the scene's.
+  /// Which of a scene's randomisations (Scene::randomizations) number k follows; -1: none, it is
+  /// the scene's.
   [[nodiscard]] int randomization(const Scene& scene, int k) const;
-  /// Derivatives of a loss by all of them, (count), for an environment of the batch that an Adjoint made with parameters has
-  /// reversed.
-  void gradient(const BlockCotangent& cotangent, const Batch& batch, int environment, std::span<double> out) const;
-  /// The other way: how the rows of BlockCotangent::parameters change when these numbers of an environment, (count), do.
-  void spread(std::span<const double> change, const Batch& batch, int environment, std::span<double> rows) const;
+  /// Derivatives of a loss by all of them, (count), for an environment of the batch that an Adjoint
+  /// made with parameters has reversed.
+  void gradient(const BlockCotangent& cotangent, const Batch& batch, int environment,
+                std::span<double> out) const;
+  /// The other way: how the rows of BlockCotangent::parameters change when these numbers of an
+  /// environment, (count), do.
+  void spread(std::span<const double> change, const Batch& batch, int environment,
+              std::span<double> rows) const;
 
  private:
   enum class Place { pair, ground, sensor, density, mass, size, joint, turning, motor };
   struct Term {
-    int row;             ///< of BlockCotangent::parameters
+    int row;  ///< of BlockCotangent::parameters
     double coefficient;
   };
   struct Entry {
@@ -69,7 +74,8 @@ class Parameters {
   std::vector<Entry> entries_;
 };
 
-/// Rows of BlockCotangent::parameters: those of the kernels, then kn, kt, mu, damping of every sensor.
+/// Rows of BlockCotangent::parameters: those of the kernels, then kn, kt, mu, damping of every
+/// sensor.
 int parameter_rows(const CompiledModel& model);
 
 }  // namespace tangere

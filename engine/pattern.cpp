@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Symbolic analysis, once per scene: which entries of the Jacobian exist, in which order to eliminate, what fills in.
+// Symbolic analysis, once per scene: which entries of the Jacobian exist, in which order to
+// eliminate, what fills in.
 #include <algorithm>
 #include <utility>
 

@@ -14,12 +14,15 @@ int first_tactile_point(const Model& model, int sensor) {
   return count;
 }
 
-int tactile_points(const Model& model) { return first_tactile_point(model, static_cast<int>(model.sensors().size())); }
+int tactile_points(const Model& model) {
+  return first_tactile_point(model, static_cast<int>(model.sensors().size()));
+}
 
 std::vector<TactilePoint> list_points(const RectArray& a) {
   using kernels::Vec3;
   const auto vec = [](const Vector3& x) { return Vec3<double>{x[0], x[1], x[2]}; };
-  const Vec3<double> p0 = vec(a.corner0), axis0 = vec(a.axis0), axis1 = vec(a.axis1), diagonal = vec(a.corner1) - p0;
+  const Vec3<double> p0 = vec(a.corner0), axis0 = vec(a.axis0), axis1 = vec(a.axis1),
+                     diagonal = vec(a.corner1) - p0;
   const Vec3<double> normal = cross(axis0, axis1);
   const double step0 = a.rows > 1 ? dot(diagonal, axis0) / (a.rows - 1) : 0;
   const double step1 = a.cols > 1 ? dot(diagonal, axis1) / (a.cols - 1) : 0;
@@ -41,8 +44,9 @@ void add_to_points(TactileDescription& sensor, std::span<const double> change) {
   if (sensor.points.empty()) sensor.points = list_points(sensor.array);
   const std::size_t expected = sensor.points.size() * kPointNumbers;
   if (change.size() != expected)
-    throw InputError(sensor.source.prefix() + "tactile sensor '" + sensor.name + "': " + std::to_string(change.size()) +
-                     " numbers for its points; expected " + std::to_string(expected));
+    throw InputError(sensor.source.prefix() + "tactile sensor '" + sensor.name +
+                     "': " + std::to_string(change.size()) + " numbers for its points; expected " +
+                     std::to_string(expected));
   const ContactCoefficients& c = sensor.coefficients;
   const double of_sensor[] = {c.kn, c.kt, c.mu, c.damping};
   const char* const names[] = {"kn", "kt", "mu", "damping"};
@@ -52,8 +56,9 @@ void add_to_points(TactileDescription& sensor, std::span<const double> change) {
     for (std::size_t k = 0; k < 4; ++k) {
       if (own[3 + k] == 0) continue;
       if (of_sensor[k] == 0)
-        throw InputError(sensor.source.prefix() + "tactile sensor '" + sensor.name + "': points of their own " + names[k] +
-                         "; expected a sensor whose " + names[k] + " is not 0");
+        throw InputError(sensor.source.prefix() + "tactile sensor '" + sensor.name +
+                         "': points of their own " + names[k] + "; expected a sensor whose " +
+                         names[k] + " is not 0");
       p.factors[k] += own[3 + k] / of_sensor[k];
     }
     own += kPointNumbers;

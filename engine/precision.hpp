@@ -8,9 +8,12 @@ namespace tangere {
 
 enum class Precision : std::uint8_t {
   f64,    ///< "double"
-  mixed,  ///< "mixed": poses and what cancels in double, points in float; 1e-6 of the field's peak (docs/contact.md)
+  mixed,  ///< "mixed": poses and what cancels in double, points in float; 1e-6 of the field's peak
+          ///< (docs/contact.md)
 };
 
-inline const char* to_string(Precision value) { return value == Precision::f64 ? "double" : "mixed"; }
+inline const char* to_string(Precision value) {
+  return value == Precision::f64 ? "double" : "mixed";
+}
 
 }  // namespace tangere

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kinematics in lanes, then the tactile kernel: per environment on large pads, per block on small ones.
+// Kinematics in lanes, then the tactile kernel: per environment on large pads, per block on small
+// ones.
 #include "engine/readout.hpp"
 
 #include <algorithm>
@@ -19,13 +20,16 @@ using kernels::kTactileTile;
 /// Fewer environments of a block than this are read one by one: the same bits, less work.
 constexpr int kFewest = 6;
 
-static void write3(const kernels::Vec3<double>& a, double* to) { to[0] = a.x, to[1] = a.y, to[2] = a.z; }
+static void write3(const kernels::Vec3<double>& a, double* to) {
+  to[0] = a.x, to[1] = a.y, to[2] = a.z;
+}
 
 struct Readout::Impl {
   Model model;
   Precision precision;
   PadReader reader;
-  AlignedVector<double> wide;   // fields computed in the other type than asked for: one, or those of a block
+  AlignedVector<double>
+      wide;  // fields computed in the other type than asked for: one, or those of a block
   AlignedVector<float> single;
 
   Impl(const Model& m, Precision p) : model(m), precision(p), reader(m) {
@@ -37,17 +41,27 @@ struct Readout::Impl {
   }
 
   static bool small(const CompiledSensor& s) { return s.points() <= kSmallPad && s.index.empty(); }
-  [[nodiscard]] const CompiledSensor& sensor_of(int k) const { return model.compiled().sensors[std::size_t(k)]; }
+  [[nodiscard]] const CompiledSensor& sensor_of(int k) const {
+    return model.compiled().sensors[std::size_t(k)];
+  }
   template <class Real>
   Real* scratch() {
     if constexpr (std::is_same_v<Real, double>) return wide.data();
     if constexpr (std::is_same_v<Real, float>) return single.data();
   }
 
-  static int run(const kernels::TactileArgs<double>& a) { return kernels::active_kernels().tactile(a); }
-  static int run(const kernels::TactileArgs<float>& a) { return kernels::active_kernels().tactile_mixed(a); }
-  static void run(const kernels::TactileBlockArgs<double>& a) { kernels::active_kernels().tactile_block(a); }
-  static void run(const kernels::TactileBlockArgs<float>& a) { kernels::active_kernels().tactile_block_mixed(a); }
+  static int run(const kernels::TactileArgs<double>& a) {
+    return kernels::active_kernels().tactile(a);
+  }
+  static int run(const kernels::TactileArgs<float>& a) {
+    return kernels::active_kernels().tactile_mixed(a);
+  }
+  static void run(const kernels::TactileBlockArgs<double>& a) {
+    kernels::active_kernels().tactile_block(a);
+  }
+  static void run(const kernels::TactileBlockArgs<float>& a) {
+    kernels::active_kernels().tactile_block_mixed(a);
+  }
 
   /// Calls `body` with a zero of the type the readout computes in.
   template <class Body>
@@ -56,13 +70,15 @@ struct Readout::Impl {
   }
 
   /// In the world, in the group moved last.
-  [[nodiscard]] kernels::Vec3<double> position_of(const CompiledVariable& v, int group, int lane) const {
+  [[nodiscard]] kernels::Vec3<double> position_of(const CompiledVariable& v, int group,
+                                                  int lane) const {
     const kernels::Frame<double> at = reader.link(v.link, group, lane).world;
     return at.R * v.point + at.p;
   }
   void write_variables(int group, int lane, std::span<double> position) const {
     double* to = position.data();
-    for (const CompiledVariable& v : model.compiled().variables) write3(position_of(v, group, lane), to), to += 3;
+    for (const CompiledVariable& v : model.compiled().variables)
+      write3(position_of(v, group, lane), to), to += 3;
   }
 
   void place(const Batch& batch, int environment, int sensor) {
@@ -71,7 +87,8 @@ struct Readout::Impl {
     reader.meet(batch, block, group, sensor);
   }
 
-  /// Writes the touched tiles of an environment that has been placed; returns how many, listed in reader.active.
+  /// Writes the touched tiles of an environment that has been placed; returns how many, listed in
+  /// reader.active.
   template <class T>
   int write_touched(int environment, int sensor, T* dense) {
     return in_precision([&](auto zero) {
@@ -93,7 +110,8 @@ struct Readout::Impl {
   template <class T>
   void fill(int environment, int sensor, T* dense) {
     const int count = write_touched(environment, sensor, dense);
-    clear_tiles_between<T>(sensor_of(sensor).tiles(), {reader.active.data(), std::size_t(count)}, dense);
+    clear_tiles_between<T>(sensor_of(sensor).tiles(), {reader.active.data(), std::size_t(count)},
+                           dense);
   }
 
   /// Writes what is touched now, zeroes what was and is no longer.
@@ -104,7 +122,8 @@ struct Readout::Impl {
     for (int old = 0, now = 0; old < frame.count_; ++old) {
       const int tile = frame.written_[std::size_t(old)];
       while (now < count && reader.active[std::size_t(now)] < tile) ++now;
-      if (now == count || reader.active[std::size_t(now)] != tile) clear_tile(pad, tile, frame.values_.data());
+      if (now == count || reader.active[std::size_t(now)] != tile)
+        clear_tile(pad, tile, frame.values_.data());
     }
     std::copy(reader.active.begin(), reader.active.begin() + count, frame.written_.begin());
     frame.count_ = count;
@@ -133,7 +152,8 @@ struct Readout::Impl {
       }
       if constexpr (!std::is_same_v<Real, T>) {
         for (std::size_t e = 0; e < std::size_t(environments); ++e)
-          std::transform(out[e], out[e] + numbers, dense[e], [](Real x) { return static_cast<T>(x); });
+          std::transform(out[e], out[e] + numbers, dense[e],
+                         [](Real x) { return static_cast<T>(x); });
       }
     });
   }
@@ -142,7 +162,8 @@ struct Readout::Impl {
   void compact(int environment, CompactFrame<T>& frame) {
     frame.count_ = in_precision([&](auto zero) {
       using Real = decltype(zero);
-      auto a = reader.arguments<Real>(frame.sensor_, environment % kBlock / kGroup, environment % kGroup);
+      auto a = reader.arguments<Real>(frame.sensor_, environment % kBlock / kGroup,
+                                      environment % kGroup);
       a.active = frame.tiles_.data();
       if constexpr (std::is_same_v<Real, T>) {
         a.values = frame.values_.get();
@@ -150,8 +171,8 @@ struct Readout::Impl {
       } else {
         a.values = scratch<Real>();
         const int count = run(a);
-        std::transform(a.values, a.values + std::ptrdiff_t{3} * kTactileTile * count, frame.values_.get(),
-                       [](Real x) { return static_cast<T>(x); });
+        std::transform(a.values, a.values + std::ptrdiff_t{3} * kTactileTile * count,
+                       frame.values_.get(), [](Real x) { return static_cast<T>(x); });
         return count;
       }
     });
@@ -165,10 +186,11 @@ struct Readout::Impl {
     }
   }
 
-  /// Small pads are read in all environments of a block at once, unless most lanes would be idle or feel shapes of sizes
-  /// of their own.
+  /// Small pads are read in all environments of a block at once, unless most lanes would be idle or
+  /// feel shapes of sizes of their own.
   [[nodiscard]] bool together(const Batch& batch, int number, int sensor) const {
-    return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary && environments_of(batch, number) >= kFewest;
+    return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary &&
+           environments_of(batch, number) >= kFewest;
   }
   static int environments_of(const Batch& batch, int number) {
     return std::min(kBlock, batch.environments() - number * kBlock);
@@ -176,7 +198,8 @@ struct Readout::Impl {
 
   /// All environments at once, or `one` for each, its group placed.
   template <class T, class One>
-  void block(const Batch& batch, int number, int sensor, const std::array<T*, kBlock>& dense, const One& one) {
+  void block(const Batch& batch, int number, int sensor, const std::array<T*, kBlock>& dense,
+             const One& one) {
     const int environments = environments_of(batch, number);
     place_block(batch, number, sensor);
     if (together(batch, number, sensor)) {
@@ -187,20 +210,24 @@ struct Readout::Impl {
   }
 
   template <class T>
-  void block_spans(const Batch& batch, int number, int sensor, std::span<const std::span<T>> fields) {
+  void block_spans(const Batch& batch, int number, int sensor,
+                   std::span<const std::span<T>> fields) {
     std::array<T*, kBlock> dense{};
-    for (std::size_t e = 0; e < std::min(fields.size(), std::size_t(kBlock)); ++e) dense[e] = fields[e].data();
+    for (std::size_t e = 0; e < std::min(fields.size(), std::size_t(kBlock)); ++e)
+      dense[e] = fields[e].data();
     block<T>(batch, number, sensor, dense, [&](int e) { fill(e, sensor, dense[std::size_t(e)]); });
   }
 };
 
-Readout::Readout(const Model& model, Precision precision) : impl_(std::make_unique<Impl>(model, precision)) {}
+Readout::Readout(const Model& model, Precision precision)
+    : impl_(std::make_unique<Impl>(model, precision)) {}
 Readout::~Readout() = default;
 Readout::Readout(Readout&&) noexcept = default;
 Readout& Readout::operator=(Readout&&) noexcept = default;
 Precision Readout::precision() const { return impl_->precision; }
 
-void Readout::bodies(const Batch& batch, int environment, std::span<double> pose, std::span<double> twist) {
+void Readout::bodies(const Batch& batch, int environment, std::span<double> pose,
+                     std::span<double> twist) {
   const int group = environment % kBlock / kGroup, lane = environment % kGroup;
   impl_->reader.move(batch, environment / kBlock, group);
   const CompiledModel& m = impl_->model.compiled();
@@ -218,7 +245,8 @@ void Readout::bodies(const Batch& batch, int environment, std::span<double> pose
   }
 }
 
-void Readout::variables(const Batch& batch, int environment, std::span<double> position, std::span<double> velocity) {
+void Readout::variables(const Batch& batch, int environment, std::span<double> position,
+                        std::span<double> velocity) {
   const int group = environment % kBlock / kGroup, lane = environment % kGroup;
   impl_->reader.move(batch, environment / kBlock, group);
   impl_->write_variables(group, lane, position);
@@ -229,7 +257,8 @@ void Readout::variables(const Batch& batch, int environment, std::span<double> p
   }
 }
 
-void Readout::read_variables(const Batch& batch, int block, std::span<const std::span<double>> positions) {
+void Readout::read_variables(const Batch& batch, int block,
+                             std::span<const std::span<double>> positions) {
   const int environments = Impl::environments_of(batch, block);
   for (int e = 0; e < environments; ++e) {
     if (e % kGroup == 0) impl_->reader.move(batch, block, e / kGroup);
@@ -289,10 +318,12 @@ void Readout::read(const Batch& batch, int environment, CompactFrame<T>& frame) 
   impl_->compact(environment, frame);
 }
 
-void Readout::read_block(const Batch& batch, int block, int sensor, std::span<const std::span<double>> fields) {
+void Readout::read_block(const Batch& batch, int block, int sensor,
+                         std::span<const std::span<double>> fields) {
   impl_->block_spans(batch, block, sensor, fields);
 }
-void Readout::read_block(const Batch& batch, int block, int sensor, std::span<const std::span<float>> fields) {
+void Readout::read_block(const Batch& batch, int block, int sensor,
+                         std::span<const std::span<float>> fields) {
   impl_->block_spans(batch, block, sensor, fields);
 }
 
@@ -303,9 +334,12 @@ void Readout::read_block(const Batch& batch, int block, std::span<DenseFrame<T>>
   const bool whole = impl_->together(batch, block, frames[0].sensor_);
   for (std::size_t e = 0; e < std::min(frames.size(), std::size_t(kBlock)); ++e) {
     dense[e] = frames[e].values_.data();
-    if (whole) frames[e].mark_all();  // whoever reads one of them alone afterwards must find all tiles in its list
+    if (whole)
+      frames[e].mark_all();  // whoever reads one of them alone afterwards must find all tiles in
+                             // its list
   }
-  impl_->block<T>(batch, block, frames[0].sensor_, dense, [&](int e) { impl_->refresh(e, frames[std::size_t(e)]); });
+  impl_->block<T>(batch, block, frames[0].sensor_, dense,
+                  [&](int e) { impl_->refresh(e, frames[std::size_t(e)]); });
 }
 
 template <class T>

@@ -43,30 +43,35 @@ struct ReadoutPullback::Impl {
   std::vector<int> met;  ///< (kGroups) sensor whose shapes the reader holds, -1
   std::array<AlignedVector<kernels::MotionCotangent<LaneRow>>, kGroups> links;
   std::array<bool, kGroups> used{};
-  AlignedVector<LaneRow> rows;         ///< q, v, zeros, rates, q̄, v̄ of one group
+  AlignedVector<LaneRow> rows;  ///< q, v, zeros, rates, q̄, v̄ of one group
   AlignedVector<std::byte> scratch;
   std::vector<kernels::TouchCotangent<double>> touches;
-  std::vector<int> tiles;          ///< of a whole field: those that are not zero
+  std::vector<int> tiles;  ///< of a whole field: those that are not zero
   std::vector<double> of_tiles;
-  AlignedVector<double> own;       ///< (tiles, kPointNumbers, 64)
+  AlignedVector<double> own;  ///< (tiles, kPointNumbers, 64)
 
   explicit Impl(const Model& m) : model(m), reader(m), met(kGroups, -1) {
     const CompiledModel& c = m.compiled();
     for (auto& l : links) l.resize(c.links.size());
     rows.resize(std::size_t(c.nq + 5 * c.nv));
     std::size_t bytes = 0, targets = 0;
-    for (const kernels::KernelTable* t : kernels::available_kernels()) bytes = std::max(bytes, t->pullback_bytes(c.view));
+    for (const kernels::KernelTable* t : kernels::available_kernels())
+      bytes = std::max(bytes, t->pullback_bytes(c.view));
     for (const CompiledSensor& s : c.sensors) targets = std::max(targets, s.targets.size());
     scratch.resize(bytes);
     touches.resize(targets);
   }
 
-  kernels::MotionCotangent<LaneRow>& link(int group, int link) { return links[std::size_t(group)][std::size_t(link)]; }
+  kernels::MotionCotangent<LaneRow>& link(int group, int link) {
+    return links[std::size_t(group)][std::size_t(link)];
+  }
 
   /// Own numbers of the points of tiles, from pad axes to the body's.
-  void hand_on_points(const CompiledSensor& s, std::span<const int> touched, std::span<double> points) const {
+  void hand_on_points(const CompiledSensor& s, std::span<const int> touched,
+                      std::span<double> points) const {
     const kernels::PadTiles pad = s.tiles();
-    const kernels::Mat3<double> turn = transpose(model.compiled().bodies[std::size_t(s.body)].frame.R) * s.pad.R;
+    const kernels::Mat3<double> turn =
+        transpose(model.compiled().bodies[std::size_t(s.body)].frame.R) * s.pad.R;
     for (std::size_t i = 0; i < touched.size(); ++i)
       for_points_of_tile(pad, touched[i], [&](int slot, int point) {
         const double* from = &own[i * kPointNumbers * kernels::kTactileTile + std::size_t(slot)];
@@ -79,9 +84,10 @@ struct ReadoutPullback::Impl {
   }
 
   /// One shape's sums, in pad axes, to its link and the sensor's.
-  void hand_on(const kernels::TouchCotangent<double>& c, const CompiledSensor& s, const CompiledBody& body, int group,
-               int lane) {
-    const LinkPose<double> one = reader.link(s.link, group, lane), two = reader.link(body.link, group, lane);
+  void hand_on(const kernels::TouchCotangent<double>& c, const CompiledSensor& s,
+               const CompiledBody& body, int group, int lane) {
+    const LinkPose<double> one = reader.link(s.link, group, lane),
+                           two = reader.link(body.link, group, lane);
     const Frame<double> second_in_first = relative(one.world, two.world);
     const Vec6<double> Z = motion_to_child(s.pad, motion_to_parent(second_in_first, two.V));
     const Vec6<double> pose = wrench_to_parent(s.pad, c.displacement + cross_wrench(Z, c.twist));
@@ -110,12 +116,14 @@ void ReadoutPullback::place(const Batch& batch, int block) {
 }
 
 void ReadoutPullback::clear() {
-  for (auto& group : impl_->links) std::fill(group.begin(), group.end(), kernels::MotionCotangent<LaneRow>{});
+  for (auto& group : impl_->links)
+    std::fill(group.begin(), group.end(), kernels::MotionCotangent<LaneRow>{});
   impl_->used.fill(false);
 }
 
-void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles, std::span<const double> cotangents,
-                            std::span<double> parameters, std::span<double> points) {
+void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
+                            std::span<const double> cotangents, std::span<double> parameters,
+                            std::span<double> points) {
   if (tiles.empty()) return;
   Impl& i = *impl_;
   const int group = lane / kGroup, in_group = lane % kGroup;
@@ -127,9 +135,10 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles, st
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const auto a = i.reader.arguments<double>(sensor, group, in_group);
   if (!points.empty()) i.own.assign(tiles.size() * kPointNumbers * kernels::kTactileTile, 0.0);
-  kernels::active_kernels().pull_back_field({a.pad, a.law, a.n_touches, a.shapes, a.touches, static_cast<int>(tiles.size()),
-                                             tiles.data(), cotangents.data(), !parameters.empty(),
-                                             points.empty() ? nullptr : i.own.data(), i.touches.data()});
+  kernels::active_kernels().pull_back_field(
+      {a.pad, a.law, a.n_touches, a.shapes, a.touches, static_cast<int>(tiles.size()), tiles.data(),
+       cotangents.data(), !parameters.empty(), points.empty() ? nullptr : i.own.data(),
+       i.touches.data()});
   if (!points.empty()) i.hand_on_points(s, tiles, points);
   i.used[std::size_t(group)] = true;
   const int row = kernels::parameter_numbers(m.view) + kernels::kContactNumbers * sensor;
@@ -141,20 +150,24 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles, st
       for (const double x : numbers) parameters[std::size_t(first++ * kBlock + lane)] += x;
     };
     add(row, {c.law.kn, c.law.kt, c.law.mu, c.law.damping});
-    add(kernels::first_size_number(m.view) + kernels::kSizeNumbers * s.targets[k], {c.size.x, c.size.y, c.size.z});
+    add(kernels::first_size_number(m.view) + kernels::kSizeNumbers * s.targets[k],
+        {c.size.x, c.size.y, c.size.z});
   }
 }
 
-void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents, std::span<double> parameters,
-                                  std::span<double> points) {
+void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents,
+                                  std::span<double> parameters, std::span<double> points) {
   const kernels::PadTiles pad = impl_->model.compiled().sensors[std::size_t(sensor)].tiles();
   std::vector<int>& tiles = impl_->tiles;
   std::vector<double>& values = impl_->of_tiles;
   tiles.clear();
   values.resize(std::size_t(pad.tiles()) * 3 * kernels::kTactileTile);
   for (int tile = 0; tile < pad.tiles(); ++tile)
-    if (gather_tile(pad, tile, cotangents.data(), values.data() + 3 * kernels::kTactileTile * tiles.size())) tiles.push_back(tile);
-  field(lane, sensor, tiles, std::span(values).first(3 * kernels::kTactileTile * tiles.size()), parameters, points);
+    if (gather_tile(pad, tile, cotangents.data(),
+                    values.data() + 3 * kernels::kTactileTile * tiles.size()))
+      tiles.push_back(tile);
+  field(lane, sensor, tiles, std::span(values).first(3 * kernels::kTactileTile * tiles.size()),
+        parameters, points);
 }
 
 void ReadoutPullback::variable(int lane, int variable, std::span<const double> cotangent) {
@@ -163,7 +176,8 @@ void ReadoutPullback::variable(int lane, int variable, std::span<const double> c
   if (v.link < 0) return;
   const int group = lane / kGroup;
   const LinkPose<double> at = i.reader.link(v.link, group, lane % kGroup);
-  const Vec3<double> f = transposed_times(at.world.R, Vec3<double>{cotangent[0], cotangent[1], cotangent[2]});
+  const Vec3<double> f =
+      transposed_times(at.world.R, Vec3<double>{cotangent[0], cotangent[1], cotangent[2]});
   add_lane(i.link(group, v.link).pose, {cross(v.point, f), f}, lane % kGroup, 1);
   i.used[std::size_t(group)] = true;
 }
@@ -171,7 +185,8 @@ void ReadoutPullback::variable(int lane, int variable, std::span<const double> c
 void ReadoutPullback::finish(BlockCotangent& out) {
   Impl& i = *impl_;
   const CompiledModel& m = i.model.compiled();
-  LaneRow *q = i.rows.data(), *v = q + m.nq, *zero = v + m.nv, *rates = zero + m.nv, *q_bar = rates + m.nv, *v_bar = q_bar + m.nv;
+  LaneRow *q = i.rows.data(), *v = q + m.nq, *zero = v + m.nv, *rates = zero + m.nv,
+          *q_bar = rates + m.nv, *v_bar = q_bar + m.nv;
   for (int g = 0; g < kGroups; ++g) {
     if (!i.used[std::size_t(g)]) continue;
     const auto load = [&](LaneRow* to, int first, int count) {
@@ -183,8 +198,9 @@ void ReadoutPullback::finish(BlockCotangent& out) {
     load(q, m.layout.q, m.nq);
     load(v, m.layout.v, m.nv);
     std::fill(q_bar, v_bar + m.nv, LaneRow{});
-    kernels::active_kernels().pull_back_links(m.view, {q, v, zero, rates, i.batch->block(i.block), g}, i.scratch.data(),
-                                              i.links[std::size_t(g)].data(), q_bar, v_bar);
+    kernels::active_kernels().pull_back_links(
+        m.view, {q, v, zero, rates, i.batch->block(i.block), g}, i.scratch.data(),
+        i.links[std::size_t(g)].data(), q_bar, v_bar);
     for (int k = 0; k < m.nv; ++k)
       for (int l = 0; l < kGroup; ++l) {
         out.q[std::size_t(k * kBlock + g * kGroup + l)] += q_bar[k][l];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// log of a rotation through its quaternion: exact up to π, where only the sign of the vector is undetermined.
+// log of a rotation through its quaternion: exact up to π, where only the sign of the vector is
+// undetermined.
 #pragma once
 
 #include <cmath>
@@ -8,7 +9,8 @@
 
 namespace tangere {
 
-/// Rotation vector x with exp(x) = q, |x| ≤ π. θ = 2 atan2(|u|, w), x = θ u/|u|; a series where |u| is small.
+/// Rotation vector x with exp(x) = q, |x| ≤ π. θ = 2 atan2(|u|, w), x = θ u/|u|; a series where |u|
+/// is small.
 inline kernels::Vec3<double> rotation_log(kernels::Quat<double> q) {
   if (q.w < 0) q = {-q.w, -q.x, -q.y, -q.z};
   const kernels::Vec3<double> u = {q.x, q.y, q.z};

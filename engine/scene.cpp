@@ -40,7 +40,8 @@ const char* to_string(ContactLaw value) {
 }
 
 const char* shape_name(const Shape& shape) {
-  constexpr const char* kNames[] = {"sphere", "cuboid", "cylinder", "capsule", "plane", "mesh", "abstract"};
+  constexpr const char* kNames[] = {"sphere", "cuboid", "cylinder", "capsule",
+                                    "plane",  "mesh",   "abstract"};
   static_assert(std::size(kNames) == std::variant_size_v<Shape>);
   return kNames[shape.index()];
 }
@@ -51,7 +52,8 @@ bool has_distance(const Shape& shape) {
 
 bool has_contact_points(const Shape& shape) {
   if (const auto* mesh = std::get_if<MeshShape>(&shape)) return !mesh->vertices.empty();
-  if (const auto* abstract = std::get_if<AbstractShape>(&shape)) return !abstract->contact_points.empty();
+  if (const auto* abstract = std::get_if<AbstractShape>(&shape))
+    return !abstract->contact_points.empty();
   return !std::holds_alternative<SphereShape>(shape) && !std::holds_alternative<PlaneShape>(shape);
 }
 
@@ -101,8 +103,11 @@ const char* to_string(JointField value) {
 double* size_number(Shape& shape, int which) {
   if (auto* cuboid = std::get_if<CuboidShape>(&shape))
     return which >= 2 && which <= 4 ? &cuboid->size[std::size_t(which - 2)] : nullptr;
-  if (auto* sphere = std::get_if<SphereShape>(&shape)) return which == 0 ? &sphere->radius : nullptr;
-  const auto of_rod = [&](auto* rod) { return which == 0 ? &rod->radius : which == 1 ? &rod->length : nullptr; };
+  if (auto* sphere = std::get_if<SphereShape>(&shape))
+    return which == 0 ? &sphere->radius : nullptr;
+  const auto of_rod = [&](auto* rod) {
+    return which == 0 ? &rod->radius : which == 1 ? &rod->length : nullptr;
+  };
   if (auto* cylinder = std::get_if<CylinderShape>(&shape)) return of_rod(cylinder);
   if (auto* capsule = std::get_if<CapsuleShape>(&shape)) return of_rod(capsule);
   return nullptr;

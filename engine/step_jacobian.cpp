@@ -11,8 +11,8 @@ using kernels::kBlock;
 StepJacobians::StepJacobians(const Model& model, const StepperOptions& options)
     : nv_(model.nv()), nu_(model.nu()), adjoint_(model, options, {2 * model.nv(), false}) {}
 
-void StepJacobians::evaluate(const Batch& batch, int block, const BlockTape& tape, std::int64_t step,
-                             std::span<const double> controls) {
+void StepJacobians::evaluate(const Batch& batch, int block, const BlockTape& tape,
+                             std::int64_t step, std::span<const double> controls) {
   adjoint_.clear();
   for (int i = 0; i < nv_; ++i)
     for (int l = 0; l < kBlock; ++l) {
@@ -29,7 +29,9 @@ void StepJacobians::get(int lane, StepJacobian& out) const {
   out.u.resize(width * controls);
   for (std::size_t row = 0; row < width; ++row) {
     const BlockCotangent& c = adjoint_.loss(static_cast<int>(row));
-    const auto at = [&](const AlignedVector<double>& x, std::size_t i) { return x[i * kBlock + std::size_t(lane)]; };
+    const auto at = [&](const AlignedVector<double>& x, std::size_t i) {
+      return x[i * kBlock + std::size_t(lane)];
+    };
     for (std::size_t i = 0; i < n; ++i) {
       out.state[row * width + i] = at(c.q, i);
       out.state[row * width + n + i] = at(c.v, i);

@@ -15,12 +15,14 @@ using kernels::kBlock;
 using kernels::kGroup;
 
 StepSettings step_settings(const Model& model, const StepperOptions& o) {
-  const StepSettings s = {o.integrator.value_or(model.integrator()), o.timestep.value_or(model.timestep()),
-                          o.tolerance.value_or(model.solver().tolerance), model.solver().max_iterations};
+  const StepSettings s = {
+      o.integrator.value_or(model.integrator()), o.timestep.value_or(model.timestep()),
+      o.tolerance.value_or(model.solver().tolerance), model.solver().max_iterations};
   if (!(s.timestep > 0) || !std::isfinite(s.timestep))
     throw InputError("timestep " + std::to_string(s.timestep) + " s; expected a positive number");
   if (!(s.tolerance > 0) || !std::isfinite(s.tolerance))
-    throw InputError("solver tolerance " + std::to_string(s.tolerance) + "; expected a positive number");
+    throw InputError("solver tolerance " + std::to_string(s.tolerance) +
+                     "; expected a positive number");
   return s;
 }
 
@@ -47,7 +49,8 @@ struct Stepper::Impl {
 
   /// Steps the live lanes of a group; `lane`: which of them stands in lane 0 of a workspace of one.
   template <int L>
-  void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane, BlockTape* tape) {
+  void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane,
+                  BlockTape* tape) {
     const CompiledModel& m = model.compiled();
     const auto gather = [&](kernels::Row<L>* to, int row, int count) {
       for (int i = 0; i < count; ++i)
@@ -63,8 +66,10 @@ struct Stepper::Impl {
     NewtonReport report;
     SolveLog log;
     const int of_block = g.first % kBlock + lane;
-    if (tape != nullptr && tape->next_x_gamma() != nullptr) log.x_gamma = tape->next_x_gamma() + of_block;
-    step.advance(kernels::active_kernels(), w, single, live, g.history >> lane, report, tape == nullptr ? nullptr : &log);
+    if (tape != nullptr && tape->next_x_gamma() != nullptr)
+      log.x_gamma = tape->next_x_gamma() + of_block;
+    step.advance(kernels::active_kernels(), w, single, live, g.history >> lane, report,
+                 tape == nullptr ? nullptr : &log);
     for (int l = 0; l < L; ++l)
       if (std::vector<TapedSolve>& solves = log.special[std::size_t(l)]; !solves.empty())
         tape->add({tape->steps(), of_block + l, std::move(solves)});
@@ -103,25 +108,30 @@ void Stepper::step(Batch& batch, std::span<const double> controls) {
   for (int b = 0; b < batch.blocks(); ++b) step_block(batch, b, controls);
 }
 
-void Stepper::step_block(Batch& batch, int block, std::span<const double> controls, BlockTape* tape) {
+void Stepper::step_block(Batch& batch, int block, std::span<const double> controls,
+                         BlockTape* tape) {
   const CompiledModel& model = impl_->model.compiled();
   const std::size_t nu = std::size_t(model.nu);
   for (int group = 0; group < kBlock / kGroup; ++group) {
     GroupOfBlock g{batch.block(block) + group * kGroup, block * kBlock + group * kGroup};
     for (int l = 0; l < kGroup; ++l) {
       const std::size_t e = std::size_t(g.first + l);
-      if (g.first + l >= batch.environments() || failed(batch.status_[e]) || batch.held_[e] != 0) continue;
+      if (g.first + l >= batch.environments() || failed(batch.status_[e]) || batch.held_[e] != 0)
+        continue;
       g.live |= 1U << l;
       if (batch.has_history_[e] != 0) g.history |= 1U << l;
     }
-    // An environment on its own goes through kernels of one lane: the same bits, a third of the time.
+    // An environment on its own goes through kernels of one lane: the same bits, a third of the
+    // time.
     const bool alone = g.live != 0 && (g.live & (g.live - 1)) == 0;
     for (int l = 0; l < kGroup; ++l) {
       if (!has(g.live, l)) continue;
       const std::size_t e = std::size_t(g.first + l);
       const std::span<const double> u = controls.subspan(e * nu, nu);
       const double* state = g.rows + l;
-      if (alone ? set_motors(model, impl_->single, 0, state, u) : set_motors(model, impl_->work, l, state, u)) continue;
+      if (alone ? set_motors(model, impl_->single, 0, state, u)
+                : set_motors(model, impl_->work, l, state, u))
+        continue;
       batch.status_[e] = StepStatus::non_finite;
       batch.iterations_[e] = 0;
       g.live &= ~(1U << l);

@@ -16,7 +16,8 @@ namespace {
 const CompiledSensor& checked(const Model& model, int sensor) {
   const auto& sensors = model.compiled().sensors;
   if (sensor < 0 || std::size_t(sensor) >= sensors.size())
-    throw InputError("no tactile sensor " + std::to_string(sensor) + ": the scene has " + std::to_string(sensors.size()));
+    throw InputError("no tactile sensor " + std::to_string(sensor) + ": the scene has " +
+                     std::to_string(sensors.size()));
   return sensors[std::size_t(sensor)];
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a tactile field is kept between readings, so that reading again costs what is touched, not what there is.
+// Where a tactile field is kept between readings, so that reading again costs what is touched, not
+// what there is.
 #pragma once
 
 #include <memory>
@@ -11,8 +12,8 @@
 
 namespace tangere {
 
-/// One field as (points, 3), row-major [N]. Reading zeroes the tiles that the reading before wrote, and no others.
-/// T is float or double.
+/// One field as (points, 3), row-major [N]. Reading zeroes the tiles that the reading before wrote,
+/// and no others. T is float or double.
 template <class T>
 class DenseFrame {
  public:
@@ -28,7 +29,8 @@ class DenseFrame {
   Model model_;
   int sensor_;
   AlignedVector<T> values_;
-  std::vector<int> written_;  // (tiles), `count_` of them in use: those that may hold something, in rising order
+  std::vector<int>
+      written_;  // (tiles), `count_` of them in use: those that may hold something, in rising order
   int count_ = 0;
 };
 
@@ -40,11 +42,14 @@ class CompactFrame {
   CompactFrame(const Model& model, int sensor);
 
   [[nodiscard]] int sensor() const { return sensor_; }
-  /// Indices of the touched tiles, rising; tile t holds rows 8 (t / tile_cols()) … and columns 8 (t % tile_cols()) ….
+  /// Indices of the touched tiles, rising; tile t holds rows 8 (t / tile_cols()) … and columns 8 (t
+  /// % tile_cols()) ….
   [[nodiscard]] std::span<const int> tiles() const { return {tiles_.data(), std::size_t(count_)}; }
   [[nodiscard]] int tile_cols() const;
   /// (tiles().size(), 3, 8, 8) [N], zero for points beyond the edge of the array.
-  [[nodiscard]] std::span<const T> values() const { return {values_.get(), std::size_t(count_) * 192}; }
+  [[nodiscard]] std::span<const T> values() const {
+    return {values_.get(), std::size_t(count_) * 192};
+  }
   /// Numbers of the whole field, 3 per point.
   [[nodiscard]] std::size_t dense_size() const;
   /// The whole field, (points, 3), zeros included.

@@ -45,21 +45,25 @@ void cut_tiles(const std::vector<TactilePoint>& points, std::span<int> which) {
     return;
   }
   const std::size_t side = Box(points, which).longest(), first = (tiles + 1) / 2 * kTactileTile;
-  std::nth_element(which.begin(), which.begin() + std::ptrdiff_t(first), which.end(), [&](int a, int b) {
-    const double x = points[std::size_t(a)].position[side], y = points[std::size_t(b)].position[side];
-    return x != y ? x < y : a < b;
-  });
+  std::nth_element(which.begin(), which.begin() + std::ptrdiff_t(first), which.end(),
+                   [&](int a, int b) {
+                     const double x = points[std::size_t(a)].position[side],
+                                  y = points[std::size_t(b)].position[side];
+                     return x != y ? x < y : a < b;
+                   });
   cut_tiles(points, which.first(first));
   cut_tiles(points, which.subspan(first));
 }
 
 /// Row `row` of what a point is stored with, point k of a tile.
-double& entry(AlignedVector<double>& all, std::size_t rows, std::size_t tile, std::size_t row, std::size_t k) {
+double& entry(AlignedVector<double>& all, std::size_t rows, std::size_t tile, std::size_t row,
+              std::size_t k) {
   return all[(tile * rows + row) * kTactileTile + k];
 }
 
 void place_point(const TactilePoint& p, std::size_t tile, std::size_t k, CompiledSensor& s) {
-  const Vec3<double> offset = vec(p.position) - Vec3<double>{s.tile_x[tile], s.tile_y[tile], s.tile_z[tile]};
+  const Vec3<double> offset =
+      vec(p.position) - Vec3<double>{s.tile_x[tile], s.tile_y[tile], s.tile_z[tile]};
   const double place[3] = {offset.x, offset.y, offset.z};
   for (std::size_t c = 0; c < 3; ++c) entry(s.offsets, 3, tile, c, k) = place[c];
   // Times (f·x, f·y, -f·z), as the kernels give the force: the sign of the third is turned back.
@@ -71,25 +75,29 @@ void place_point(const TactilePoint& p, std::size_t tile, std::size_t k, Compile
   }
   if (!s.factors.empty())
     for (std::size_t c = 0; c < 4; ++c) entry(s.factors, 4, tile, c, k) = p.factors[c];
-  s.tile_radius[tile] = std::max(s.tile_radius[tile], std::sqrt(dot(offset, offset)) * (1 + 1e-5) + 1e-12);
+  s.tile_radius[tile] =
+      std::max(s.tile_radius[tile], std::sqrt(dot(offset, offset)) * (1 + 1e-5) + 1e-12);
 }
 
 AlignedVector<float> narrowed(const AlignedVector<double>& from) {
   AlignedVector<float> to(from.size());
-  std::transform(from.begin(), from.end(), to.begin(), [](double x) { return static_cast<float>(x); });
+  std::transform(from.begin(), from.end(), to.begin(),
+                 [](double x) { return static_cast<float>(x); });
   return to;
 }
 
 /// Pressure reads positive where most normals point out of the body.
 int sign_of_most(const std::vector<TactilePoint>& points, const CompiledBody& body) {
   std::ptrdiff_t outward = 0;
-  for (const TactilePoint& p : points) outward += points_outward(body, vec(p.position), vec(p.normal)) >= 0 ? 1 : -1;
+  for (const TactilePoint& p : points)
+    outward += points_outward(body, vec(p.position), vec(p.normal)) >= 0 ? 1 : -1;
   return outward >= 0 ? 1 : -1;
 }
 
 }  // namespace
 
-CompiledSensor compile_points(const TactileDescription& d, const CompiledBody& body, SensorInfo& info) {
+CompiledSensor compile_points(const TactileDescription& d, const CompiledBody& body,
+                              SensorInfo& info) {
   const std::vector<TactilePoint>& points = d.points;
   CompiledSensor s;
   s.link = body.link;
@@ -108,17 +116,21 @@ CompiledSensor compile_points(const TactileDescription& d, const CompiledBody& b
   std::iota(s.tile_kind.begin(), s.tile_kind.end(), 0);
   s.offsets.assign(3 * slots, kFarAway);
   s.frames.assign(9 * slots, 0.0);
-  const auto plain = [](const TactilePoint& p) { return p.factors == std::array<double, 4>{1, 1, 1, 1}; };
+  const auto plain = [](const TactilePoint& p) {
+    return p.factors == std::array<double, 4>{1, 1, 1, 1};
+  };
   if (!std::all_of(points.begin(), points.end(), plain)) s.factors.assign(4 * slots, 1.0);
   s.index.assign(slots, 0);
   const std::span<int> order(s.index.data(), points.size());
   std::iota(order.begin(), order.end(), 0);
   cut_tiles(points, order);
   for (std::size_t t = 0; t < tiles; ++t) {
-    const std::size_t first = t * kTactileTile, count = std::min(points.size() - first, std::size_t(kTactileTile));
+    const std::size_t first = t * kTactileTile,
+                      count = std::min(points.size() - first, std::size_t(kTactileTile));
     const Vec3<double> middle = Box(points, order.subspan(first, count)).middle();
     s.tile_x[t] = middle.x, s.tile_y[t] = middle.y, s.tile_z[t] = middle.z;
-    for (std::size_t k = 0; k < count; ++k) place_point(points[std::size_t(order[first + k])], t, k, s);
+    for (std::size_t k = 0; k < count; ++k)
+      place_point(points[std::size_t(order[first + k])], t, k, s);
   }
   s.offsets_f = narrowed(s.offsets);
   s.frames_f = narrowed(s.frames);

@@ -44,13 +44,15 @@ void put(Duals& to, int i, const Vec3<D>& x) {
 D scaled(double a, const D& x) { return {a * x.value, a * x.epsilon}; }
 
 /// q with its tangent along the dofs of v.
-Duals with_tangent(const CompiledModel& m, const double* q, int stride, const std::vector<double>& dot) {
+Duals with_tangent(const CompiledModel& m, const double* q, int stride,
+                   const std::vector<double>& dot) {
   Duals out(std::size_t(m.nq));
   for (int i = 0; i < m.nq; ++i) out[std::size_t(i)] = D(q[i * stride]);
   for (const Link& link : m.links) {
     const auto v = std::size_t(link.v);
     if (link.kind != JointKind::spherical) {
-      for (int k = 0; k < kernels::dofs(link.kind); ++k) out[std::size_t(link.q + k)].epsilon = dot[v + std::size_t(k)];
+      for (int k = 0; k < kernels::dofs(link.kind); ++k)
+        out[std::size_t(link.q + k)].epsilon = dot[v + std::size_t(k)];
       continue;
     }
     const double* a = q + link.q * stride;  // q̇ = q ⊗ (0, θ)/2
@@ -74,7 +76,8 @@ std::vector<double> tangent_of(const CompiledModel& m, const Duals& q) {
   for (const Link& link : m.links) {
     const auto v = std::size_t(link.v);
     if (link.kind != JointKind::spherical) {
-      for (int k = 0; k < kernels::dofs(link.kind); ++k) out[v + std::size_t(k)] = q[std::size_t(link.q + k)].epsilon;
+      for (int k = 0; k < kernels::dofs(link.kind); ++k)
+        out[v + std::size_t(k)] = q[std::size_t(link.q + k)].epsilon;
       continue;
     }
     const Quat<D> a = quat_at(q, link.q);  // θ = 2 q̄ ⊗ q̇
@@ -90,7 +93,9 @@ Duals difference(const CompiledModel& m, const Duals& to, const Duals& from) {
   Duals out(std::size_t(m.nv));
   for (const Link& link : m.links) {
     if (link.kind == JointKind::spherical) {
-      put(out, link.v, kernels::rotation_vector<false>(conjugate(quat_at(from, link.q)) * quat_at(to, link.q)).phi);
+      put(out, link.v,
+          kernels::rotation_vector<false>(conjugate(quat_at(from, link.q)) * quat_at(to, link.q))
+              .phi);
     } else {
       for (int k = 0; k < kernels::dofs(link.kind); ++k)
         out[std::size_t(link.v + k)] = to[std::size_t(link.q + k)] - from[std::size_t(link.q + k)];
@@ -159,8 +164,10 @@ struct Tangent::Impl {
       const auto v = std::size_t(link.v), q = std::size_t(link.q);
       const double* to = q1 + link.q * stride;
       if (link.kind == JointKind::spherical) {
-        const Quat<double> c = {from[q].value, from[q + 1].value, from[q + 2].value, from[q + 3].value};
-        const Vec3<double> turn = rotation_log(conjugate(c) * Quat<double>{to[0], to[stride], to[2 * stride], to[3 * stride]});
+        const Quat<double> c = {from[q].value, from[q + 1].value, from[q + 2].value,
+                                from[q + 3].value};
+        const Vec3<double> turn = rotation_log(
+            conjugate(c) * Quat<double>{to[0], to[stride], to[2 * stride], to[3 * stride]});
         x[v] = turn.x, x[v + 1] = turn.y, x[v + 2] = turn.z;
       } else {
         for (std::size_t k = 0; k < std::size_t(kernels::dofs(link.kind)); ++k)
@@ -170,9 +177,10 @@ struct Tangent::Impl {
     return x;
   }
 
-  /// One solve of `scheme` from `at`; `before` for BDF2. q1: its result, x_gamma: SDIRK2's inner stage, `stride` apart.
-  DualState solve_step(Integrator scheme, double h, const DualState& at, const DualState& before, const double* q1,
-                       const double* x_gamma, int stride) {
+  /// One solve of `scheme` from `at`; `before` for BDF2. q1: its result, x_gamma: SDIRK2's inner
+  /// stage, `stride` apart.
+  DualState solve_step(Integrator scheme, double h, const DualState& at, const DualState& before,
+                       const double* q1, const double* x_gamma, int stride) {
     const std::size_t n = at.v.size();
     stage.centre = at.q;
     stage.inverse_h = 1 / h;
@@ -183,21 +191,28 @@ struct Tangent::Impl {
     const std::vector<double> x1 = chart(at.q, q1, stride);
     switch (scheme) {
       case Integrator::bdf1:
-        history(1, [](std::size_t) { return D(0.0); }, [&](std::size_t i) { return -at.v[i]; });
+        history(
+            1, [](std::size_t) { return D(0.0); }, [&](std::size_t i) { return -at.v[i]; });
         break;
       case Integrator::bdf2: {
         const Duals y = difference(m(), before.q, at.q);
-        history(1.5, [&](std::size_t i) { return scaled(0.5, y[i]); },
-                [&](std::size_t i) { return scaled(0.5, before.v[i]) - scaled(2, at.v[i]); });
+        history(
+            1.5, [&](std::size_t i) { return scaled(0.5, y[i]); },
+            [&](std::size_t i) { return scaled(0.5, before.v[i]) - scaled(2, at.v[i]); });
         break;
       }
       case Integrator::sdirk2: {
-        history(1 / kGamma, [](std::size_t) { return D(0.0); }, [&](std::size_t i) { return scaled(-1 / kGamma, at.v[i]); });
+        history(
+            1 / kGamma, [](std::size_t) { return D(0.0); },
+            [&](std::size_t i) { return scaled(-1 / kGamma, at.v[i]); });
         std::vector<double> inner(n);
         for (std::size_t i = 0; i < n; ++i) inner[i] = x_gamma[i * std::size_t(stride)];
         const Duals x = solve(inner), v = stage.v;
-        history(1 / kGamma, [&](std::size_t i) { return scaled(-kKappa, x[i]); },
-                [&](std::size_t i) { return scaled(-1 / kGamma, at.v[i] + scaled(kEta, v[i] - at.v[i])); });
+        history(
+            1 / kGamma, [&](std::size_t i) { return scaled(-kKappa, x[i]); },
+            [&](std::size_t i) {
+              return scaled(-1 / kGamma, at.v[i] + scaled(kEta, v[i] - at.v[i]));
+            });
         break;
       }
       case Integrator::linear_implicit: return linear(h, at);
@@ -211,7 +226,8 @@ struct Tangent::Impl {
     const std::size_t n = at.v.size();
     const auto index = [](std::size_t i) { return Eigen::Index(i); };
     stage.c0_over_h = 1 / h;
-    for (std::size_t i = 0; i < n; ++i) stage.r[i] = D(0.0), stage.s[i] = -at.v[i], stage.x[i] = scaled(h, at.v[i]);
+    for (std::size_t i = 0; i < n; ++i)
+      stage.r[i] = D(0.0), stage.s[i] = -at.v[i], stage.x[i] = scaled(h, at.v[i]);
     const Duals predicted = stage.x;
     stage.residual();
     const Duals g = stage.g;
@@ -222,7 +238,8 @@ struct Tangent::Impl {
     for (std::size_t i = 0; i < n; ++i) {
       value[index(i)] = g[i].value, dot[index(i)] = g[i].epsilon;
       for (std::size_t j = 0; j < n; ++j)
-        A(index(i), index(j)) = entries[i * n + j].value, A_dot(index(i), index(j)) = entries[i * n + j].epsilon;
+        A(index(i), index(j)) = entries[i * n + j].value,
+                    A_dot(index(i), index(j)) = entries[i * n + j].epsilon;
     }
     const auto factor = A.partialPivLu();
     const Eigen::VectorXd s = factor.solve(value), s_dot = factor.solve(dot - A_dot * s);
@@ -244,7 +261,8 @@ struct Tangent::Impl {
       const auto dof = std::size_t(motor.dof);
       if (motor.control == MotorControl::force) {
         const double half = 0.5 * (motor.high - motor.low);
-        stage.tau[dof] = D(motor.low + (std::clamp(u[k], -1.0, 1.0) + 1) * half, std::abs(u[k]) <= 1 ? half * u_dot[k] : 0);
+        stage.tau[dof] = D(motor.low + (std::clamp(u[k], -1.0, 1.0) + 1) * half,
+                           std::abs(u[k]) <= 1 ? half * u_dot[k] : 0);
         continue;
       }
       if (motor.timing == MotorTiming::end) {
@@ -256,19 +274,24 @@ struct Tangent::Impl {
         const int row = first_dof + kernels::kDofNumbers * motor.dof + field;
         return D(value, numbers_dot.empty() ? 0 : numbers_dot[std::size_t(row)]);
       };
-      const D force = gain(motor.P, 2) * error_of(motor, k, at, u, u_dot) - gain(motor.D, 3) * at.v[dof];
-      stage.tau[dof] = force.value < motor.low ? D(motor.low) : force.value > motor.high ? D(motor.high) : force;
+      const D force =
+          gain(motor.P, 2) * error_of(motor, k, at, u, u_dot) - gain(motor.D, 3) * at.v[dof];
+      stage.tau[dof] = force.value < motor.low    ? D(motor.low)
+                       : force.value > motor.high ? D(motor.high)
+                                                  : force;
     }
   }
 
-  [[nodiscard]] D error_of(const CompiledMotor& motor, std::size_t k, const DualState& at, std::span<const double> u,
-                           std::span<const double> u_dot) const {
+  [[nodiscard]] D error_of(const CompiledMotor& motor, std::size_t k, const DualState& at,
+                           std::span<const double> u, std::span<const double> u_dot) const {
     const Link& link = m().links[std::size_t(motor.link)];
-    if (link.kind != JointKind::spherical) return D(u[k], u_dot[k]) - at.q[std::size_t(link.q + motor.component)];
+    if (link.kind != JointKind::spherical)
+      return D(u[k], u_dot[k]) - at.q[std::size_t(link.q + motor.component)];
     const std::size_t f = k - std::size_t(motor.component);
     const Vec3<D> goal = {D(u[f], u_dot[f]), D(u[f + 1], u_dot[f + 1]), D(u[f + 2], u_dot[f + 2])};
-    const Vec3<D> way =
-        kernels::rotation_vector<false>(conjugate(quat_at(at.q, link.q)) * kernels::quaternion_exp(goal)).phi;
+    const Vec3<D> way = kernels::rotation_vector<false>(conjugate(quat_at(at.q, link.q)) *
+                                                        kernels::quaternion_exp(goal))
+                            .phi;
     return motor.component == 0 ? way.x : motor.component == 1 ? way.y : way.z;
   }
 };
@@ -277,16 +300,19 @@ Tangent::Tangent(const Model& model, const StepperOptions& options)
     : impl_(std::make_unique<Impl>(model, step_settings(model, options))) {}
 Tangent::~Tangent() = default;
 
-void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step,
-                   std::span<const double> u, std::span<const double> u_dot, std::span<const double> numbers_dot,
-                   StateTangent& state) {
+void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tape,
+                   std::int64_t step, std::span<const double> u, std::span<const double> u_dot,
+                   std::span<const double> numbers_dot, StateTangent& state) {
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
   const auto rows = [&](std::int64_t t) { return tape.state(t) + lane; };
-  const auto dual = [&](std::int64_t t, const std::vector<double>& q, const std::vector<double>& v) {
-    return DualState{with_tangent(m, rows(t), kBlock, q), with_tangent(rows(t) + m.nq * kBlock, kBlock, v)};
+  const auto dual = [&](std::int64_t t, const std::vector<double>& q,
+                        const std::vector<double>& v) {
+    return DualState{with_tangent(m, rows(t), kBlock, q),
+                     with_tangent(rows(t) + m.nq * kBlock, kBlock, v)};
   };
-  const DualState start = dual(step, state.q, state.v), before = dual(step - 1, state.previous_q, state.previous_v);
+  const DualState start = dual(step, state.q, state.v),
+                  before = dual(step - 1, state.previous_q, state.previous_v);
   const double* column = batch.block(block) + lane;
   i.stage.set_numbers(column, numbers_dot);
   i.set_motors(start, u, u_dot, numbers_dot, column);
@@ -295,8 +321,10 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
     for (const TapedSolve& s : special->solves)
       end = i.solve_step(s.scheme, s.h, end, before, s.q.data(), s.x_gamma.data(), 1);
   } else {
-    const double* x_gamma = i.settings.integrator == Integrator::sdirk2 ? tape.x_gamma(step) + lane : nullptr;
-    end = i.solve_step(i.settings.integrator, i.settings.timestep, start, before, rows(step + 1), x_gamma, kBlock);
+    const double* x_gamma =
+        i.settings.integrator == Integrator::sdirk2 ? tape.x_gamma(step) + lane : nullptr;
+    end = i.solve_step(i.settings.integrator, i.settings.timestep, start, before, rows(step + 1),
+                       x_gamma, kBlock);
   }
   state.previous_q = std::move(state.q);
   state.previous_v = std::move(state.v);
@@ -305,15 +333,17 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
   for (std::size_t k = 0; k < end.v.size(); ++k) state.v[k] = end.v[k].epsilon;
 }
 
-void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step, int sensor,
-                    std::span<const double> numbers_dot, std::span<const double> points_dot, const StateTangent& state,
+void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& tape,
+                    std::int64_t step, int sensor, std::span<const double> numbers_dot,
+                    std::span<const double> points_dot, const StateTangent& state,
                     std::span<double> field_dot) {
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
   const double* row = tape.state(step) + lane;
   i.stage.centre = with_tangent(m, row, kBlock, state.q);
   const Duals v = with_tangent(row + m.nq * kBlock, kBlock, state.v);
-  for (std::size_t k = 0; k < v.size(); ++k) i.stage.x[k] = i.stage.s[k] = D(0.0), i.stage.r[k] = v[k];
+  for (std::size_t k = 0; k < v.size(); ++k)
+    i.stage.x[k] = i.stage.s[k] = D(0.0), i.stage.r[k] = v[k];
   i.stage.c0_over_h = 0;
   i.stage.inverse_h = 1;
   i.stage.field(sensor, batch.block(block) + lane, numbers_dot, points_dot, field_dot);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forward derivatives of taped steps along one direction, in dual numbers through the kernels' own templates: the second
-// route that gradients are checked by. One environment at a time, a hundred times slower than a step.
+// Forward derivatives of taped steps along one direction, in dual numbers through the kernels' own
+// templates: the second route that gradients are checked by. One environment at a time, a hundred
+// times slower than a step.
 #pragma once
 
 #include <memory>
@@ -23,17 +24,20 @@ class Tangent {
   explicit Tangent(const Model& model, const StepperOptions& options = {});
   ~Tangent();
 
-  /// Takes the tangent of the state after `step` steps to that after one more, along a step that environment `lane` of the
-  /// block took. `u`, `u_dot`: (nu) its controls and how they change; `numbers_dot`: how the scene's numbers change, as rows
-  /// of BlockCotangent::parameters, or empty.
-  void step(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step, std::span<const double> u,
-            std::span<const double> u_dot, std::span<const double> numbers_dot, StateTangent& state);
+  /// Takes the tangent of the state after `step` steps to that after one more, along a step that
+  /// environment `lane` of the block took. `u`, `u_dot`: (nu) its controls and how they change;
+  /// `numbers_dot`: how the scene's numbers change, as rows of BlockCotangent::parameters, or
+  /// empty.
+  void step(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step,
+            std::span<const double> u, std::span<const double> u_dot,
+            std::span<const double> numbers_dot, StateTangent& state);
 
-  /// How a sensor's field (points, 3) changes with a state of the tape, with the scene's numbers, and with `points_dot`,
-  /// (points, kPointNumbers): every point's own numbers (engine/point_numbers.hpp), or empty.
-  void field(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step, int sensor,
-             std::span<const double> numbers_dot, std::span<const double> points_dot, const StateTangent& state,
-             std::span<double> field_dot);
+  /// How a sensor's field (points, 3) changes with a state of the tape, with the scene's numbers,
+  /// and with `points_dot`, (points, kPointNumbers): every point's own numbers
+  /// (engine/point_numbers.hpp), or empty.
+  void field(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step,
+             int sensor, std::span<const double> numbers_dot, std::span<const double> points_dot,
+             const StateTangent& state, std::span<double> field_dot);
 
  private:
   struct Impl;

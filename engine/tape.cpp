@@ -45,12 +45,14 @@ void BlockTape::append(const Batch& batch, int block) {
   copy(batch, block, model_.compiled().layout.q, slot(++steps_));
   for (int l = 0; l < kBlock; ++l) {
     const int e = block * kBlock + l;
-    if (e < batch.environments() && !failed(batch.status(e)) && !batch.held(e)) taken_[std::size_t(l)] = steps_;
+    if (e < batch.environments() && !failed(batch.status(e)) && !batch.held(e))
+      taken_[std::size_t(l)] = steps_;
   }
 }
 
 void BlockTape::show(std::int64_t step, Batch& batch, int block) const {
-  std::copy_n(state(step), (nq_ + nv_) * kBlock, batch.block(block) + model_.compiled().layout.q * kBlock);
+  std::copy_n(state(step), (nq_ + nv_) * kBlock,
+              batch.block(block) + model_.compiled().layout.q * kBlock);
 }
 
 double* BlockTape::next_x_gamma() {
@@ -59,8 +61,9 @@ double* BlockTape::next_x_gamma() {
 }
 
 const TapedStep* BlockTape::special(std::int64_t step, int lane) const {
-  const auto at = std::lower_bound(special_.begin(), special_.end(), step,
-                                   [](const TapedStep& s, std::int64_t value) { return s.step < value; });
+  const auto at =
+      std::lower_bound(special_.begin(), special_.end(), step,
+                       [](const TapedStep& s, std::int64_t value) { return s.step < value; });
   for (auto s = at; s != special_.end() && s->step == step; ++s)
     if (s->lane == lane) return &*s;
   return nullptr;

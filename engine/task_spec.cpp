@@ -22,10 +22,13 @@ std::size_t TaskSpec::observation_size() const {
 }
 
 void TaskSpec::check() const {
-  const auto fail = [&](const std::string& what) { throw InputError(fmt::format("task '{}': {}", name, what)); };
+  const auto fail = [&](const std::string& what) {
+    throw InputError(fmt::format("task '{}': {}", name, what));
+  };
   if (name.empty() || scene.empty()) fail("expected a name and a scene");
   if (steps_per_action < 1 || horizon < 1)
-    fail(fmt::format("{} steps per action, {} actions; expected at least 1", steps_per_action, horizon));
+    fail(fmt::format("{} steps per action, {} actions; expected at least 1", steps_per_action,
+                     horizon));
   if (control_every < 0 || settling_steps < 0 || memory < 0) fail("a count is negative");
   if (moments.empty() || moments.front() < 1 || moments.back() != steps_per_action)
     fail(fmt::format("it must look after its last step, {}", steps_per_action));
@@ -33,10 +36,13 @@ void TaskSpec::check() const {
     if (moments[i] <= moments[i - 1]) fail("the steps after which it looks must ascend");
   if (action.size() == 0 || observation_size() == 0) fail("expected an action and an observation");
   for (const TensorSpec& tensor : observations) {
-    if (tensor.name.empty() || tensor.name.find('/') != std::string::npos || tensor.name == "q" || tensor.name == "v")
-      fail(fmt::format("observation '{}'; expected another name than q and v, without '/'", tensor.name));
+    if (tensor.name.empty() || tensor.name.find('/') != std::string::npos || tensor.name == "q" ||
+        tensor.name == "v")
+      fail(fmt::format("observation '{}'; expected another name than q and v, without '/'",
+                       tensor.name));
     for (const TensorSpec& other : observations)
-      if (&other != &tensor && other.name == tensor.name) fail("two observations are named " + tensor.name);
+      if (&other != &tensor && other.name == tensor.name)
+        fail("two observations are named " + tensor.name);
   }
 }
 

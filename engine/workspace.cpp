@@ -22,15 +22,16 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   };
   kernels::Stage<L>& s = w.stage;
   rows(s.centre, m.nq);
-  for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.target, &s.v, &s.g, &s.force_scale, &s.mass_diagonal, &s.weight,
-                      &s.inverse_weight})
+  for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.target, &s.v, &s.g, &s.force_scale,
+                      &s.mass_diagonal, &s.weight, &s.inverse_weight})
     rows(*p, m.nv);
   rows(s.A, m.pattern.entries);
   rows(s.LU, m.pattern.factor_entries);
   rows(s.work, std::max(m.pattern.factor_entries, 5 * m.nv));
   rows(s.excess, 1);
   for (LaneRow** p : {&w.q0, &w.q_before, &w.q1}) rows(*p, m.nq);
-  for (LaneRow** p : {&w.v0, &w.v_before, &w.v1, &w.x_gamma, &w.v_gamma, &w.delta, &w.base, &w.test})
+  for (LaneRow** p :
+       {&w.v0, &w.v_before, &w.v1, &w.x_gamma, &w.v_gamma, &w.delta, &w.base, &w.test})
     rows(*p, m.nv);
   const int link_pairs = static_cast<int>(m.link_pairs.size());
   rows(w.references, 12 * link_pairs);
@@ -49,8 +50,8 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
 template <int L>
 std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   BasicWorkspace w(m);
-  return w.memory.size() * sizeof(LaneRow) + w.own_points.size() * sizeof(double) + w.scratch.size() +
-         sizeof(double) * std::size_t(m.nv) * std::size_t(m.nv + 1) * (L + 1);
+  return w.memory.size() * sizeof(LaneRow) + w.own_points.size() * sizeof(double) +
+         w.scratch.size() + sizeof(double) * std::size_t(m.nv) * std::size_t(m.nv + 1) * (L + 1);
 }
 
 template <int L>

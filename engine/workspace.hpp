@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scratch of one thread: one group of eight lanes, or a single one, through one step. Nothing here outlives a step.
+// Scratch of one thread: one group of eight lanes, or a single one, through one step. Nothing here
+// outlives a step.
 #pragma once
 
 #include <Eigen/LU>
@@ -26,12 +27,12 @@ struct BasicWorkspace {
   static std::size_t bytes(const CompiledModel& model);
 
   using Rows = AlignedVector<LaneRow>;
-  Rows memory;               ///< every row below, in one allocation
+  Rows memory;  ///< every row below, in one allocation
   AlignedVector<std::byte> scratch;
   AlignedVector<double> own_points;  ///< the lists' points lane by lane
   std::vector<typename kernels::Stage<L>::List> lists;
-  LaneBits in_rows = 0;      ///< lanes whose lists stand in the rows as well
-  LaneRow* references;       ///< (n_link_pairs, 12) what the lists' references point into
+  LaneBits in_rows = 0;  ///< lanes whose lists stand in the rows as well
+  LaneRow* references;   ///< (n_link_pairs, 12) what the lists' references point into
   std::vector<unsigned> near_lanes;
   kernels::NearPairs<L> near;
   kernels::Stage<L> stage;
@@ -43,8 +44,9 @@ struct BasicWorkspace {
   // Newton: direction, point it starts from, natural test vector.
   LaneRow *delta, *base, *test;
   LaneRow sound;
-  std::vector<Eigen::PartialPivLU<Eigen::MatrixXd>> pivoted;  ///< (L) factor of lanes whose plain LU is useless
-  std::vector<Eigen::MatrixXd> dense;                         ///< (1) the matrix being factored
+  std::vector<Eigen::PartialPivLU<Eigen::MatrixXd>>
+      pivoted;                         ///< (L) factor of lanes whose plain LU is useless
+  std::vector<Eigen::MatrixXd> dense;  ///< (1) the matrix being factored
   Eigen::VectorXd rhs;
 };
 using Workspace = BasicWorkspace<kernels::kGroup>;

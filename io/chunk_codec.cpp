@@ -16,13 +16,17 @@
 namespace tangere {
 namespace {
 
-constexpr double kChunkBytes = 64 << 10;      // a loader's random access reads a whole chunk
-constexpr double kTileBytes = 24 << 10;        // a tile in touch for one row is stored for all rows of its chunk
-constexpr double kTogetherBytes = 512 << 10;  // rows of all observations in the span of a chunk: a piece holds at least as many
+constexpr double kChunkBytes = 64 << 10;  // a loader's random access reads a whole chunk
+constexpr double kTileBytes =
+    24 << 10;  // a tile in touch for one row is stored for all rows of its chunk
+constexpr double kTogetherBytes =
+    512 << 10;  // rows of all observations in the span of a chunk: a piece holds at least as many
 constexpr std::int64_t kMostRows = 64;
-constexpr std::size_t kLeastRowBytes = 256;      // smaller rows: a chunk's index would cost more than compression gives
+constexpr std::size_t kLeastRowBytes =
+    256;  // smaller rows: a chunk's index would cost more than compression gives
 constexpr std::size_t kLeastLastBytes = 8 << 10, kLeastTiledBytes = 8 << 10;
-// Tiles of a field, of which those that nothing touches are left out: points a side, of large fields twice as many; of a curved pad.
+// Tiles of a field, of which those that nothing touches are left out: points a side, of large
+// fields twice as many; of a curved pad.
 constexpr std::uint64_t kTileSide = 16, kLargeSide = 128, kTilePoints = 256;
 
 std::size_t numbers_of(const std::vector<std::uint64_t>& shape) {
@@ -36,7 +40,9 @@ std::int64_t power_of_two_below(double most) {
 }
 
 struct Free {
-  void operator()(libdeflate_compressor* compressor) const { libdeflate_free_compressor(compressor); }
+  void operator()(libdeflate_compressor* compressor) const {
+    libdeflate_free_compressor(compressor);
+  }
 };
 
 libdeflate_compressor* compressor_of_thread() {
@@ -46,7 +52,8 @@ libdeflate_compressor* compressor_of_thread() {
   return compressor.get();
 }
 
-/// Byte b of every number to its place from b * `stride` on. Shifted words, because compilers make vectors of those.
+/// Byte b of every number to its place from b * `stride` on. Shifted words, because compilers make
+/// vectors of those.
 template <class Word>
 void split(const unsigned char* data, std::size_t numbers, unsigned char* out, std::size_t stride) {
   constexpr std::size_t kTogether = 1024;  // stay in the first cache
@@ -68,7 +75,8 @@ std::vector<unsigned char> deflated(const std::vector<unsigned char>& plain) {
   libdeflate_compressor* const compressor = compressor_of_thread();
   thread_local std::vector<unsigned char> room;
   room.resize(std::max(room.size(), libdeflate_zlib_compress_bound(compressor, plain.size())));
-  const std::size_t size = libdeflate_zlib_compress(compressor, plain.data(), plain.size(), room.data(), room.size());
+  const std::size_t size =
+      libdeflate_zlib_compress(compressor, plain.data(), plain.size(), room.data(), room.size());
   if (size == 0) throw std::logic_error("deflate needs more room than its own bound");
   return {room.begin(), room.begin() + static_cast<std::ptrdiff_t>(size)};
 }
@@ -77,13 +85,14 @@ void add_big_endian(std::vector<unsigned char>& out, std::uint64_t value, std::s
   for (std::size_t k = bytes; k-- > 0;) out.push_back(static_cast<unsigned char>(value >> (8 * k)));
 }
 
-/// One block, as the plug-in of the HDF Group reads it: size of all and of a block, then each block's size and bytes, big-endian.
+/// One block, as the plug-in of the HDF Group reads it: size of all and of a block, then each
+/// block's size and bytes, big-endian.
 std::vector<unsigned char> lz4(const std::vector<unsigned char>& plain) {
   const auto bytes = static_cast<int>(plain.size());
   thread_local std::vector<char> room;
   room.resize(std::max(room.size(), static_cast<std::size_t>(LZ4_compressBound(bytes))));
-  const int size = LZ4_compress_default(reinterpret_cast<const char*>(plain.data()), room.data(), bytes,
-                                        static_cast<int>(room.size()));
+  const int size = LZ4_compress_default(reinterpret_cast<const char*>(plain.data()), room.data(),
+                                        bytes, static_cast<int>(room.size()));
   if (size <= 0) throw std::logic_error("LZ4 needs more room than its own bound");
   const bool smaller = size < bytes;  // a block of its own size is not compressed
   std::vector<unsigned char> out;
@@ -97,21 +106,27 @@ std::vector<unsigned char> lz4(const std::vector<unsigned char>& plain) {
   return out;
 }
 
-ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_t>& shape, std::size_t row_bytes,
-                     double together) {
-  const bool sparse = layout.sparse && (shape.size() == 2 || shape.size() == 3) && row_bytes >= kLeastTiledBytes;
+ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_t>& shape,
+                     std::size_t row_bytes, double together) {
+  const bool sparse =
+      layout.sparse && (shape.size() == 2 || shape.size() == 3) && row_bytes >= kLeastTiledBytes;
   ChunkPlan plan;
   plan.tile = shape;
   if (sparse) {
     plan.may_be_absent = true;
     std::size_t tiled = shape.size() - 1;  // the last dimension, x y z, stays whole
-    const std::uint64_t side = tiled == 1 ? kTilePoints : *std::max_element(shape.begin(), shape.end()) < kLargeSide ? kTileSide : 2 * kTileSide;
+    const std::uint64_t side = tiled == 1 ? kTilePoints
+                               : *std::max_element(shape.begin(), shape.end()) < kLargeSide
+                                   ? kTileSide
+                                   : 2 * kTileSide;
     for (std::size_t k = 0; k < tiled; ++k) plan.tile[k] = std::min(shape[k], side);
   } else if (layout.compression == "none" || row_bytes < kLeastRowBytes) {
     return plan;
   }
-  const double tile_bytes = static_cast<double>(numbers_of(plan.tile)) / static_cast<double>(numbers_of(shape)) * static_cast<double>(row_bytes);
-  plan.rows = power_of_two_below(std::min((sparse ? kTileBytes : kChunkBytes) / tile_bytes, (sparse ? 2 : 1) * kTogetherBytes / together));
+  const double tile_bytes = static_cast<double>(numbers_of(plan.tile)) /
+                            static_cast<double>(numbers_of(shape)) * static_cast<double>(row_bytes);
+  plan.rows = power_of_two_below(std::min((sparse ? kTileBytes : kChunkBytes) / tile_bytes,
+                                          (sparse ? 2 : 1) * kTogetherBytes / together));
   plan.last_row = sparse || row_bytes >= kLeastLastBytes;
   return plan;
 }
@@ -124,13 +139,15 @@ std::vector<ChunkPlan> chunk_plans(const DatasetLayout& layout) {
   double together = 0;
   for (const auto& shape : shapes) together += static_cast<double>(numbers_of(shape) * width);
   std::vector<ChunkPlan> plans;
-  for (const auto& shape : shapes) plans.push_back(chunk_plan(layout, shape, numbers_of(shape) * width, together));
+  for (const auto& shape : shapes)
+    plans.push_back(chunk_plan(layout, shape, numbers_of(shape) * width, together));
   return plans;
 }
 
 bool has_chunks(const DatasetLayout& layout) {
   const std::vector<ChunkPlan> plans = chunk_plans(layout);
-  return std::any_of(plans.begin(), plans.end(), [](const ChunkPlan& plan) { return plan.rows > 0; });
+  return std::any_of(plans.begin(), plans.end(),
+                     [](const ChunkPlan& plan) { return plan.rows > 0; });
 }
 
 std::vector<h5::FileFilter> file_filters(const std::string& compression, std::size_t number_bytes) {
@@ -141,7 +158,8 @@ std::vector<h5::FileFilter> file_filters(const std::string& compression, std::si
   return {shuffled, {kDeflate, {}, {kDeflateLevel}}};
 }
 
-void shuffle(const unsigned char* data, std::size_t used, std::size_t width, std::vector<unsigned char>& out) {
+void shuffle(const unsigned char* data, std::size_t used, std::size_t width,
+             std::vector<unsigned char>& out) {
   const std::size_t numbers = out.size() / width, given = used / width;
   if (width == sizeof(std::uint32_t))
     split<std::uint32_t>(data, given, out.data(), numbers);
@@ -150,11 +168,12 @@ void shuffle(const unsigned char* data, std::size_t used, std::size_t width, std
   else
     throw std::logic_error("numbers that are neither of four nor of eight bytes");
   for (std::size_t b = 0; b < width; ++b)
-    std::fill_n(out.begin() + static_cast<std::ptrdiff_t>(b * numbers + given), numbers - given, static_cast<unsigned char>(0));
+    std::fill_n(out.begin() + static_cast<std::ptrdiff_t>(b * numbers + given), numbers - given,
+                static_cast<unsigned char>(0));
 }
 
-std::vector<unsigned char> compressed(const DatasetLayout& layout, const unsigned char* data, std::size_t used,
-                                      std::size_t bytes) {
+std::vector<unsigned char> compressed(const DatasetLayout& layout, const unsigned char* data,
+                                      std::size_t used, std::size_t bytes) {
   if (layout.compression == "none") {
     std::vector<unsigned char> same(data, data + used);
     same.resize(bytes, 0);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings are compared as a file would hold them: what is written cannot be forgotten in the comparison.
+// Settings are compared as a file would hold them: what is written cannot be forgotten in the
+// comparison.
 #include "io/dataset_description.hpp"
 
 #include <fmt/format.h>
@@ -108,7 +109,8 @@ void describe_gradients(const h5::Id& scene, const DatasetLayout& layout) {
   }
 }
 
-void add_attributes(const h5::Id& object, const std::string& prefix, std::vector<Setting>& settings) {
+void add_attributes(const h5::Id& object, const std::string& prefix,
+                    std::vector<Setting>& settings) {
   for (const std::string& name : h5::attribute_names(object))
     settings.push_back({prefix + name, h5::attribute_text(object, name)});
 }
@@ -118,10 +120,12 @@ std::string line_of_difference(const std::string& there, const std::string& here
   std::istringstream a(there), b(here);
   for (int line = 1;; ++line) {
     std::string of_a, of_b;
-    const bool more_a = static_cast<bool>(std::getline(a, of_a)), more_b = static_cast<bool>(std::getline(b, of_b));
+    const bool more_a = static_cast<bool>(std::getline(a, of_a)),
+               more_b = static_cast<bool>(std::getline(b, of_b));
     if (!more_a && !more_b) return "they differ in how they end";
     if (more_a == more_b && of_a == of_b) continue;
-    return fmt::format("line {} is '{}' there, '{}' here", line, of_a.substr(0, kLongText), of_b.substr(0, kLongText));
+    return fmt::format("line {} is '{}' there, '{}' here", line, of_a.substr(0, kLongText),
+                       of_b.substr(0, kLongText));
   }
 }
 
@@ -169,13 +173,17 @@ std::vector<Setting> read_settings(const h5::Id& file) {
   if (!h5::has_link(scene, kGradients)) return settings;
   const h5::Id gradients = h5::open_group(scene, kGradients);
   for (const std::string& name : h5::link_names(gradients))
-    add_attributes(h5::open_group(gradients, name), std::string(kGradients) + "/" + name + "/", settings);
+    add_attributes(h5::open_group(gradients, name), std::string(kGradients) + "/" + name + "/",
+                   settings);
   return settings;
 }
 
-std::vector<std::string> differences(const std::vector<Setting>& there, const std::vector<Setting>& here) {
-  const auto value_in = [](const std::vector<Setting>& list, const std::string& name) -> const std::string* {
-    const auto found = std::find_if(list.begin(), list.end(), [&](const Setting& s) { return s.name == name; });
+std::vector<std::string> differences(const std::vector<Setting>& there,
+                                     const std::vector<Setting>& here) {
+  const auto value_in = [](const std::vector<Setting>& list,
+                           const std::string& name) -> const std::string* {
+    const auto found =
+        std::find_if(list.begin(), list.end(), [&](const Setting& s) { return s.name == name; });
     return found == list.end() ? nullptr : &found->value;
   };
   std::vector<std::string> lines;
@@ -185,12 +193,14 @@ std::vector<std::string> differences(const std::vector<Setting>& there, const st
       lines.push_back(fmt::format("{}: missing there", setting.name));
     } else if (*other != setting.value) {
       const bool is_long = std::max(other->size(), setting.value.size()) > kLongText;
-      lines.push_back(is_long ? fmt::format("{}: {}", setting.name, line_of_difference(*other, setting.value))
-                              : fmt::format("{}: {} there, {} here", setting.name, *other, setting.value));
+      lines.push_back(
+          is_long ? fmt::format("{}: {}", setting.name, line_of_difference(*other, setting.value))
+                  : fmt::format("{}: {} there, {} here", setting.name, *other, setting.value));
     }
   }
   for (const Setting& setting : there)
-    if (value_in(here, setting.name) == nullptr) lines.push_back(fmt::format("{}: missing here", setting.name));
+    if (value_in(here, setting.name) == nullptr)
+      lines.push_back(fmt::format("{}: missing here", setting.name));
   return lines;
 }
 

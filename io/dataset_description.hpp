@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every shard of a data set says the same: its settings, written once and compared before shards are put together.
+// What every shard of a data set says the same: its settings, written once and compared before
+// shards are put together.
 #pragma once
 
 #include <string>
@@ -20,8 +21,10 @@ std::string json_text(const std::string& text);
 std::vector<Setting> settings_of(const DatasetLayout& layout);
 std::vector<Setting> read_settings(const h5::Id& file);
 
-/// What differs, a line each: "seed: 9 there, 1 here". Of long texts the first lines that differ. Empty when nothing does.
-std::vector<std::string> differences(const std::vector<Setting>& there, const std::vector<Setting>& here);
+/// What differs, a line each: "seed: 9 there, 1 here". Of long texts the first lines that differ.
+/// Empty when nothing does.
+std::vector<std::string> differences(const std::vector<Setting>& there,
+                                     const std::vector<Setting>& here);
 
 /// What a file says of a derivative that each of its demos has.
 struct GradientSaid {

@@ -33,7 +33,8 @@ Column read_column(const h5::Id& group, const std::string& name) {
   column.values.resize((dims.empty() ? 0 : dims[0]) * column.width);
   const h5::Id type(H5Dget_type(dataset.get()));
   column.single = H5Tget_class(type.get()) == H5T_FLOAT && H5Tget_size(type.get()) == sizeof(float);
-  if (!column.values.empty()) h5::read_box(dataset, h5::Dims(dims.size(), 0), dims, column.values.data());
+  if (!column.values.empty())
+    h5::read_box(dataset, h5::Dims(dims.size(), 0), dims, column.values.data());
   return column;
 }
 
@@ -50,16 +51,19 @@ class CsvExport {
       : options_(options), part_(path, options.overwrite) {}
 
   ExportResult run(const DatasetFiles& dataset) {
-    part_.write("# " + value_of(dataset.settings, "name") + ", seed " + value_of(dataset.settings, "seed") + "\n");
+    part_.write("# " + value_of(dataset.settings, "name") + ", seed " +
+                value_of(dataset.settings, "seed") + "\n");
     for (const std::string& path : dataset.files) {
       const h5::Id file = h5::open_file(path), data = h5::open_group(file, "data");
       for (const std::int64_t demo : demo_numbers(data))
         if (demo == options_.episode.value_or(demo))
-          add(h5::open_group(data, fmt::format("demo_{}", demo)), h5::open_group(file, "scene"), demo);
+          add(h5::open_group(data, fmt::format("demo_{}", demo)), h5::open_group(file, "scene"),
+              demo);
     }
     if (options_.episode && result_.rows == 0)
-      throw IoError(fmt::format("'{}' has no episode {}, or it failed; 'tangere info' says how many there are",
-                                dataset.folder.empty() ? dataset.files.front() : dataset.folder, *options_.episode));
+      throw IoError(fmt::format(
+          "'{}' has no episode {}, or it failed; 'tangere info' says how many there are",
+          dataset.folder.empty() ? dataset.files.front() : dataset.folder, *options_.episode));
     part_.commit();
     return result_;
   }
@@ -93,13 +97,16 @@ class CsvExport {
   void add(const h5::Id& demo, const h5::Id& scene, std::int64_t number) {
     if (result_.columns == 0) write_header(demo, scene);
     std::vector<Column> columns;
-    for (const char* name : {"actions", "rewards", "dones"}) columns.push_back(read_column(demo, name));
+    for (const char* name : {"actions", "rewards", "dones"})
+      columns.push_back(read_column(demo, name));
     const h5::Id obs = h5::open_group(demo, "obs");
     for (const std::string& name : names_) columns.push_back(read_column(obs, name));
-    const auto rows = static_cast<std::size_t>(h5::read_numbers<std::int64_t>(demo, "num_samples").at(0));
+    const auto rows =
+        static_cast<std::size_t>(h5::read_numbers<std::int64_t>(demo, "num_samples").at(0));
     for (const Column& column : columns)
       if (column.values.size() != rows * column.width)
-        throw IoError(fmt::format("demo_{}: its datasets differ in rows; 'tangere validate' says where", number));
+        throw IoError(fmt::format(
+            "demo_{}: its datasets differ in rows; 'tangere validate' says where", number));
     fmt::memory_buffer text;
     for (std::size_t row = 0; row < rows; ++row) {
       fmt::format_to(std::back_inserter(text), "{},{}", number, row);
@@ -126,7 +133,8 @@ class CsvExport {
 
 }  // namespace
 
-ExportResult export_csv(const DatasetFiles& dataset, const std::string& path, const ExportOptions& options) {
+ExportResult export_csv(const DatasetFiles& dataset, const std::string& path,
+                        const ExportOptions& options) {
   if (!dataset.folder.empty() && !options.episode) check_complete(dataset);
   return CsvExport(path, options).run(dataset);
 }

@@ -21,7 +21,9 @@ struct ExportResult {
   std::vector<std::string> left_out;  ///< observations too wide for a table, tactile fields mostly
 };
 
-/// One line per row: episode, row, actions, reward, done, then every observation of at most 64 numbers. Throws IoError.
-ExportResult export_csv(const DatasetFiles& dataset, const std::string& path, const ExportOptions& options);
+/// One line per row: episode, row, actions, reward, done, then every observation of at most 64
+/// numbers. Throws IoError.
+ExportResult export_csv(const DatasetFiles& dataset, const std::string& path,
+                        const ExportOptions& options);
 
 }  // namespace tangere

@@ -20,18 +20,24 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kMostShards = 100'000'000;  // a damaged count must not become a loop for ever
+constexpr std::int64_t kMostShards =
+    100'000'000;  // a damaged count must not become a loop for ever
 
 /// "shard-00042.h5".
 bool is_shard(std::string_view name) {
   constexpr std::string_view kBegin = "shard-", kEnd = ".h5";
-  if (!name.starts_with(kBegin) || !name.ends_with(kEnd) || name.size() <= kBegin.size() + kEnd.size()) return false;
-  const std::string_view number = name.substr(kBegin.size(), name.size() - kBegin.size() - kEnd.size());
+  if (!name.starts_with(kBegin) || !name.ends_with(kEnd) ||
+      name.size() <= kBegin.size() + kEnd.size())
+    return false;
+  const std::string_view number =
+      name.substr(kBegin.size(), name.size() - kBegin.size() - kEnd.size());
   return number.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
 /// By number: names of more digits come later.
-bool before(const std::string& a, const std::string& b) { return std::pair(a.size(), a) < std::pair(b.size(), b); }
+bool before(const std::string& a, const std::string& b) {
+  return std::pair(a.size(), a) < std::pair(b.size(), b);
+}
 
 std::vector<std::string> shards_in(const std::string& folder) {
   std::vector<std::string> files;
@@ -48,8 +54,10 @@ void count_shards(DatasetFiles& dataset) {
   std::from_chars(text.data(), text.data() + text.size(), count);
   auto file = dataset.files.begin();
   for (std::int64_t shard = 0; shard < std::min(count, kMostShards); ++shard) {
-    const std::string path = (fs::path(dataset.folder) / fmt::format("shard-{:05}.h5", shard)).string();
-    for (; file != dataset.files.end() && before(*file, path); ++file) dataset.surplus.push_back(*file);
+    const std::string path =
+        (fs::path(dataset.folder) / fmt::format("shard-{:05}.h5", shard)).string();
+    for (; file != dataset.files.end() && before(*file, path); ++file)
+      dataset.surplus.push_back(*file);
     if (file != dataset.files.end() && *file == path)
       ++file;
     else
@@ -59,7 +67,8 @@ void count_shards(DatasetFiles& dataset) {
 }
 
 /// Settings of a file, and what differs from those of the data set; damage counts as a difference.
-std::vector<std::string> differences_of(const std::string& file, const std::vector<Setting>& settings) {
+std::vector<std::string> differences_of(const std::string& file,
+                                        const std::vector<Setting>& settings) {
   try {
     return differences(read_settings(h5::open_file(file)), settings);
   } catch (const IoError& error) {
@@ -67,13 +76,16 @@ std::vector<std::string> differences_of(const std::string& file, const std::vect
   }
 }
 
-void add_shape(const h5::Id& group, const std::string& name, const std::string& prefix, DatasetSummary& summary) {
+void add_shape(const h5::Id& group, const std::string& name, const std::string& prefix,
+               DatasetSummary& summary) {
   const h5::Id dataset = h5::open_dataset(group, name);
   const h5::Id type(H5Dget_type(dataset.get()));
   const std::size_t bits = 8 * H5Tget_size(type.get());
   const H5T_class_t kind = H5Tget_class(type.get());
-  const std::string word = kind == H5T_ENUM ? "bool" : fmt::format("{}{}", kind == H5T_FLOAT ? "float" : "int", bits);
-  summary.shapes.emplace_back(prefix + name, fmt::format("({}) {}", fmt::join(h5::dimensions(dataset), ", "), word));
+  const std::string word =
+      kind == H5T_ENUM ? "bool" : fmt::format("{}{}", kind == H5T_FLOAT ? "float" : "int", bits);
+  summary.shapes.emplace_back(
+      prefix + name, fmt::format("({}) {}", fmt::join(h5::dimensions(dataset), ", "), word));
 }
 
 void add_shapes(const h5::Id& group, const std::string& prefix, DatasetSummary& summary) {
@@ -98,7 +110,8 @@ void summarise_file(const std::string& path, DatasetSummary& summary) {
     summary.has_success = true;
     summary.successes += h5::read_numbers<std::int64_t>(group, "success").at(0) != 0 ? 1 : 0;
   }
-  summary.failed += static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
+  summary.failed +=
+      static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
   summary.bytes += fs::file_size(path);
 }
 
@@ -112,7 +125,8 @@ std::string value_of(const std::vector<Setting>& settings, const std::string& na
 
 DatasetFiles find_dataset(const std::string& path) {
   DatasetFiles dataset;
-  if (!fs::exists(path)) throw IoError(fmt::format("'{}' does not exist; expected a folder of shards or a file", path));
+  if (!fs::exists(path))
+    throw IoError(fmt::format("'{}' does not exist; expected a folder of shards or a file", path));
   if (fs::is_directory(path)) {
     dataset.folder = path;
     dataset.files = shards_in(path);
@@ -137,30 +151,35 @@ DatasetFiles find_dataset(const std::string& path) {
 
 void check_complete(const DatasetFiles& dataset) {
   if (!dataset.missing.empty())
-    throw IoError(fmt::format("'{}' is missing{}; make it with 'tangere generate … --resume'", dataset.missing.front(),
-                              dataset.missing.size() == 1
-                                  ? ""
-                                  : fmt::format(", and {} more shards are", dataset.missing.size() - 1)));
+    throw IoError(fmt::format(
+        "'{}' is missing{}; make it with 'tangere generate … --resume'", dataset.missing.front(),
+        dataset.missing.size() == 1
+            ? ""
+            : fmt::format(", and {} more shards are", dataset.missing.size() - 1)));
   for (const std::string& file : dataset.files) {
     const std::vector<std::string> lines = differences_of(file, dataset.settings);
     if (!lines.empty())
-      throw IoError(fmt::format("'{}' is not of the same run as '{}': {}", file, dataset.files.front(),
-                                fmt::join(lines, "; ")));
+      throw IoError(fmt::format("'{}' is not of the same run as '{}': {}", file,
+                                dataset.files.front(), fmt::join(lines, "; ")));
   }
   if (!dataset.surplus.empty())
-    throw IoError(fmt::format("'{}' is none of the {} shards that '{}' counts; expected no others, remove it", dataset.surplus.front(),
-                              value_of(dataset.settings, "dataset_shards"), dataset.files.front()));
+    throw IoError(
+        fmt::format("'{}' is none of the {} shards that '{}' counts; expected no others, remove it",
+                    dataset.surplus.front(), value_of(dataset.settings, "dataset_shards"),
+                    dataset.files.front()));
 }
 
 DatasetReport examine_dataset(const DatasetFiles& dataset) {
   DatasetReport report;
   for (const std::string& file : dataset.missing) report.problems.push_back(file + ": missing");
-  for (const std::string& file : dataset.surplus) report.problems.push_back(file + ": none of the shards that are counted");
+  for (const std::string& file : dataset.surplus)
+    report.problems.push_back(file + ": none of the shards that are counted");
   for (const std::string& file : dataset.files) {
     for (const std::string& line : differences_of(file, dataset.settings))
       report.problems.push_back(fmt::format("{}: {}", file, line));
     const ShardReport shard = examine_shard(file);
-    for (const std::string& problem : shard.problems) report.problems.push_back(fmt::format("{}: {}", file, problem));
+    for (const std::string& problem : shard.problems)
+      report.problems.push_back(fmt::format("{}: {}", file, problem));
     ++report.shards;
     report.demos += shard.content.demos;
     report.failed += shard.content.failed;

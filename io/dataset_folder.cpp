@@ -38,7 +38,8 @@ bool is_shard(const std::string& name, const std::string& suffix) {
 
 }  // namespace
 
-DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool shared, FolderPatience patience)
+DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool shared,
+                             FolderPatience patience)
     : path_(std::move(path)), existing_(existing), shared_(shared), patience_(std::move(patience)) {
   std::error_code error;
   created_ = fs::create_directory(path_, error);
@@ -49,8 +50,10 @@ DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool sha
   if (access(path_.c_str(), W_OK | X_OK) != 0) fail("write into", path_, errno);
   hold();
   if (!shared_ && existing == ExistingShards::refuse && !shards().empty())
-    throw IoError(fmt::format(
-        "'{}' has shards already; give --overwrite to replace them, or --resume to keep them and make the rest", path_));
+    throw IoError(
+        fmt::format("'{}' has shards already; give --overwrite to replace them, or --resume to "
+                    "keep them and make the rest",
+                    path_));
   clean();
 }
 
@@ -61,10 +64,13 @@ DatasetFolder::~DatasetFolder() {
 
 void DatasetFolder::hold() {
   lock_.emplace(path_);
-  if (shared_ ? lock_->take(FolderLock::Kind::shared, patience_.to_share) : lock_->take(FolderLock::Kind::alone)) return;
+  if (shared_ ? lock_->take(FolderLock::Kind::shared, patience_.to_share)
+              : lock_->take(FolderLock::Kind::alone))
+    return;
   throw IoError(
-      fmt::format("cannot write into '{}': another process is writing shards there{}; start again when it has ended", path_,
-                  shared_ ? " and does not share the folder, or merges them" : ""));
+      fmt::format("cannot write into '{}': another process is writing shards there{}; start again "
+                  "when it has ended",
+                  path_, shared_ ? " and does not share the folder, or merges them" : ""));
 }
 
 void DatasetFolder::let_go() {
@@ -82,7 +88,8 @@ void DatasetFolder::clean() {
   };
   if (!shared_)
     for (const std::string& part : files_ending(fmt::format(".h5{}", kPart))) remove(part);
-  // Nobody merges while this process holds the folder: the merge was killed, and at most another process cleans up after it.
+  // Nobody merges while this process holds the folder: the merge was killed, and at most another
+  // process cleans up after it.
   for (const std::string& part : merged_files(std::string(kPart))) {
     try {
       remove(part);
@@ -100,12 +107,16 @@ std::vector<std::string> DatasetFolder::files_ending(const std::string& suffix) 
   return files;
 }
 
-/// As io/dataset_merge.hpp and io/minari_view.hpp name them, those that are there; robomimic's last.
+/// As io/dataset_merge.hpp and io/minari_view.hpp name them, those that are there; robomimic's
+/// last.
 std::vector<std::string> DatasetFolder::merged_files(const std::string& suffix) const {
   std::vector<std::string> files;
   std::error_code none_there;
-  for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(path_) / "minari" / "tangere", none_there))
-    for (const char* name : {"main_data.hdf5", "metadata.json"})  // the last is removed first: without it there is no data set
+  for (const fs::directory_entry& entry :
+       fs::directory_iterator(fs::path(path_) / "minari" / "tangere", none_there))
+    for (const char* name :
+         {"main_data.hdf5",
+          "metadata.json"})  // the last is removed first: without it there is no data set
       files.push_back((entry.path() / "data" / name).string());
   files.push_back((fs::path(path_) / "robomimic.hdf5").string());
   for (std::string& file : files) file += suffix;
@@ -120,8 +131,7 @@ std::string DatasetFolder::shard_path(std::int64_t shard) const {
 double DatasetFolder::free_bytes() const {
   double bytes = static_cast<double>(fs::space(path_).available);
   if (existing_ != ExistingShards::replace || shared_) return bytes;
-  for (const std::string& file : shards())
-    bytes += static_cast<double>(fs::file_size(file));
+  for (const std::string& file : shards()) bytes += static_cast<double>(fs::file_size(file));
   return bytes;
 }
 
@@ -136,14 +146,16 @@ void DatasetFolder::remove_old_shards(std::int64_t count) {
   for (const std::string& merged : merged_files()) files.push_back(merged);
   std::reverse(files.begin(), files.end());
   for (const std::string& file : files)
-    if (unlink(file.c_str()) != 0 && errno != ENOENT) fail("remove", file, errno);  // gone: others that share it do the same
+    if (unlink(file.c_str()) != 0 && errno != ENOENT)
+      fail("remove", file, errno);  // gone: others that share it do the same
   const fs::path views = fs::path(path_) / "minari" / "tangere";
   std::vector<fs::path> emptied;
   std::error_code none_there;
   for (const fs::directory_entry& entry : fs::directory_iterator(views, none_there))
     emptied.insert(emptied.end(), {entry.path() / "data", entry.path()});
   emptied.insert(emptied.end(), {views, views.parent_path()});
-  for (const fs::path& folder : emptied) rmdir(folder.c_str());  // refused when there is something in it
+  for (const fs::path& folder : emptied)
+    rmdir(folder.c_str());  // refused when there is something in it
 }
 
 }  // namespace tangere

@@ -12,18 +12,20 @@
 
 namespace tangere {
 
-/// For those who share a folder: until the one that merges has ended, until nobody who looks at it is in the way of merging.
+/// For those who share a folder: until the one that merges has ended, until nobody who looks at it
+/// is in the way of merging.
 struct FolderPatience {
   LockPatience to_share = LockPatience::seconds(10), to_be_alone = LockPatience::seconds(1);
 };
 
 class DatasetFolder {
  public:
-  /// Creates the folder when it is missing, and holds it against other processes; `shared`: against those alone that
-  /// want it for themselves. Removes what a killed run or merge left unfinished, shards of others that share it excepted. Throws
-  /// IoError when it is something else, cannot be written, is held by another process, or is not shared and has shards
-  /// that it should not have.
-  DatasetFolder(std::string path, ExistingShards existing, bool shared = false, FolderPatience patience = {});
+  /// Creates the folder when it is missing, and holds it against other processes; `shared`: against
+  /// those alone that want it for themselves. Removes what a killed run or merge left unfinished,
+  /// shards of others that share it excepted. Throws IoError when it is something else, cannot be
+  /// written, is held by another process, or is not shared and has shards that it should not have.
+  DatasetFolder(std::string path, ExistingShards existing, bool shared = false,
+                FolderPatience patience = {});
   /// Removes the folder if it was created here and nothing came into it.
   ~DatasetFolder();
   DatasetFolder(const DatasetFolder&) = delete;
@@ -38,9 +40,9 @@ class DatasetFolder {
   [[nodiscard]] std::vector<std::string> shards() const { return files_ending(".h5"); }
   /// Space on the disk that shards may fill, those to be removed included [bytes].
   [[nodiscard]] double free_bytes() const;
-  /// Where an earlier run is to be replaced, removes what shows its shards as one, then the shards, last one first, so that what
-  /// is left begins with 0. In a shared folder, where each shard is replaced by its own, only those that are none of
-  /// `count` shards.
+  /// Where an earlier run is to be replaced, removes what shows its shards as one, then the shards,
+  /// last one first, so that what is left begins with 0. In a shared folder, where each shard is
+  /// replaced by its own, only those that are none of `count` shards.
   void remove_old_shards(std::int64_t count);
 
  private:

@@ -17,7 +17,9 @@ namespace {
 constexpr std::int64_t kBlockEpisodes = 16;
 // Short episodes: creating objects is what costs, and a shard that is lost should be cheap.
 constexpr std::int64_t kMostEpisodes = 4096;
-std::int64_t blocks_of(std::int64_t episodes) { return (episodes + kBlockEpisodes - 1) / kBlockEpisodes; }
+std::int64_t blocks_of(std::int64_t episodes) {
+  return (episodes + kBlockEpisodes - 1) / kBlockEpisodes;
+}
 
 constexpr const char* kVariables = "variables";
 
@@ -27,13 +29,16 @@ void check_lengths(const std::vector<std::string>& observations) {
   std::size_t bytes = 0;
   for (const std::string& name : observations) {
     if (name.size() > kLongest)
-      throw InputError(fmt::format("observation '{}…': a name of {} bytes; expected at most {}, what a dataset may be called",
-                                   name.substr(0, kShown), name.size(), kLongest));
+      throw InputError(
+          fmt::format("observation '{}…': a name of {} bytes; expected at most {}, what a dataset "
+                      "may be called",
+                      name.substr(0, kShown), name.size(), kLongest));
     bytes += name.size() + kBesidesName;
   }
   if (bytes > kAll)
-    throw InputError(fmt::format("{} observations whose names take {} bytes; expected at most {}, what a group has room for",
-                                 observations.size(), bytes, kAll));
+    throw InputError(fmt::format(
+        "{} observations whose names take {} bytes; expected at most {}, what a group has room for",
+        observations.size(), bytes, kAll));
 }
 
 template <class T>
@@ -48,17 +53,21 @@ std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>&
 std::vector<std::string> DatasetLayout::action_names() const {
   if (!task) return u_names;
   std::vector<std::string> names;
-  for (std::size_t k = 0; k < task->action.size(); ++k) names.push_back(fmt::format("{}[{}]", task->action.name, k));
+  for (std::size_t k = 0; k < task->action.size(); ++k)
+    names.push_back(fmt::format("{}[{}]", task->action.name, k));
   return names;
 }
 
-std::vector<std::string> DatasetLayout::observation_names() const { return chosen(all_observation_names(), recorded()); }
+std::vector<std::string> DatasetLayout::observation_names() const {
+  return chosen(all_observation_names(), recorded());
+}
 
 std::vector<std::size_t> DatasetLayout::recorded() const {
   const std::vector<std::string> names = all_observation_names();
   std::vector<std::size_t> places;
   for (std::size_t k = 0; k < names.size(); ++k)
-    if (record.empty() || std::find(record.begin(), record.end(), names[k]) != record.end()) places.push_back(k);
+    if (record.empty() || std::find(record.begin(), record.end(), names[k]) != record.end())
+      places.push_back(k);
   return places;
 }
 
@@ -76,7 +85,8 @@ std::vector<std::string> DatasetLayout::all_observation_names() const {
 std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() const {
   std::vector<std::vector<std::uint64_t>> shapes{{q_names.size()}, {v_names.size()}};
   if (task) {
-    for (const TensorSpec& tensor : task->observations) shapes.emplace_back(tensor.shape.begin(), tensor.shape.end());
+    for (const TensorSpec& tensor : task->observations)
+      shapes.emplace_back(tensor.shape.begin(), tensor.shape.end());
     return chosen(shapes, recorded());
   }
   if (!variable_names.empty()) shapes.push_back({variable_names.size(), 3});
@@ -132,12 +142,14 @@ std::int64_t DatasetLayout::shard_of(std::int64_t episode) const {
 
 void DatasetLayout::check() const {
   if (shards > blocks_of(episodes))
-    throw InputError(fmt::format("{} shards of {} episodes; expected at most {}, one for each block of {}", shards,
-                                 episodes, blocks_of(episodes), kBlockEpisodes));
+    throw InputError(
+        fmt::format("{} shards of {} episodes; expected at most {}, one for each block of {}",
+                    shards, episodes, blocks_of(episodes), kBlockEpisodes));
   const std::vector<std::string> all = all_observation_names();
   for (const std::string& name : record)
     if (std::find(all.begin(), all.end(), name) == all.end())
-      throw InputError(fmt::format("--record: unknown observation '{}'{}", name, suggestion(name, all)));
+      throw InputError(
+          fmt::format("--record: unknown observation '{}'{}", name, suggestion(name, all)));
   check_lengths(all);
   std::set<std::string> names{"q", "v"};
   if (!variable_names.empty()) names.insert(kVariables);

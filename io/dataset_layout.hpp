@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// All that the shards of a data set say besides their numbers, and how episodes are dealt to shards.
-// Nothing in it depends on threads, folders or the time, so that the same request gives the same
-// bytes.
+// All that the shards of a data set say besides their numbers, and how episodes are dealt to
+// shards. Nothing in it depends on threads, folders or the time, so that the same request gives the
+// same bytes.
 #pragma once
 
 #include <cstdint>
@@ -35,8 +35,9 @@ struct DatasetLayout {
   std::vector<std::string> variable_names;    ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
   std::vector<std::string> randomized_names, randomized_units;  ///< what varies between episodes
-  std::optional<TaskSpec> task;  ///< whose actions, observations and rewards these are; none: a scene alone
-  std::string policy;            ///< of a task
+  std::optional<TaskSpec>
+      task;            ///< whose actions, observations and rewards these are; none: a scene alone
+  std::string policy;  ///< of a task
   std::string scene_name, scene_text;
   std::string tables = "none";  ///< of files that the text refers to: their checksum
   std::string integrator;
@@ -44,20 +45,23 @@ struct DatasetLayout {
   double tolerance = 0;  ///< of the scaled residual, dimensionless
   std::string precision, version, instruction_set;
   std::string controls = "of the scene";  ///< or which table, by its content
-  std::string command;           ///< that makes this data set, without what does not change it (threads, folder …)
+  std::string
+      command;  ///< that makes this data set, without what does not change it (threads, folder …)
   double shard_bytes = 1 << 30;  ///< a shard stays below it, unless 16 episodes are more
   std::int64_t shards = 0;       ///< how many; 0: as shard_bytes says
-  std::string compression = "none";  ///< or "deflate", "lz4": of observations whose rows are large enough
-  bool sparse = false;               ///< parts of large fields that are zero are left out
-  std::vector<std::string> record;   ///< observations to store; none: all there are
-  std::string gradients_of;               ///< what derivatives are of, in words; empty: there are none
-  std::vector<GradientArray> gradients;   ///< those stored with an episode
+  std::string compression =
+      "none";           ///< or "deflate", "lz4": of observations whose rows are large enough
+  bool sparse = false;  ///< parts of large fields that are zero are left out
+  std::vector<std::string> record;  ///< observations to store; none: all there are
+  std::string gradients_of;         ///< what derivatives are of, in words; empty: there are none
+  std::vector<GradientArray> gradients;  ///< those stored with an episode
 
   /// R: actions of an episode, of a task at most.
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
   /// Names of the numbers of an action.
   [[nodiscard]] std::vector<std::string> action_names() const;
-  /// All there are: q, v, then what a task observes, or "variables" if there are end effectors and the sensors.
+  /// All there are: q, v, then what a task observes, or "variables" if there are end effectors and
+  /// the sensors.
   [[nodiscard]] std::vector<std::string> all_observation_names() const;
   /// Places in that list, and in pieces of episodes, of those that are stored, ascending.
   [[nodiscard]] std::vector<std::size_t> recorded() const;
@@ -70,11 +74,12 @@ struct DatasetLayout {
   /// As many as stay below shard_bytes, a multiple of 16; depends on the data set alone.
   [[nodiscard]] std::int64_t episodes_per_shard() const;
   [[nodiscard]] std::int64_t shard_count() const;
-  /// Whole blocks of 16 episodes; where `shards` is given, as many in each as in any other, or one more.
+  /// Whole blocks of 16 episodes; where `shards` is given, as many in each as in any other, or one
+  /// more.
   [[nodiscard]] EpisodeRange shard_episodes(std::int64_t shard) const;
   [[nodiscard]] std::int64_t shard_of(std::int64_t episode) const;
-  /// Throws InputError when a sensor cannot be a name in a file, there are more shards than blocks, or what is to be
-  /// recorded is not there.
+  /// Throws InputError when a sensor cannot be a name in a file, there are more shards than blocks,
+  /// or what is to be recorded is not there.
   void check() const;
 };
 

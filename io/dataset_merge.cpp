@@ -21,9 +21,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kBatch = 16;       // demos that are laid out together
-// Descriptions that were used are forgotten in shards as they are by default. In larger ones, or in copying, the library would take
-// longer for each the more there are.
+constexpr std::size_t kBatch = 16;  // demos that are laid out together
+// Descriptions that were used are forgotten in shards as they are by default. In larger ones, or in
+// copying, the library would take longer for each the more there are.
 constexpr std::int64_t kFewEpisodes = 4096;
 constexpr std::size_t kValidShare = 10;  // one demo in ten is kept for validation
 
@@ -41,7 +41,8 @@ class Merger {
   Merger(const DatasetFiles& dataset, const MergeOptions& options)
       : dataset_(dataset),
         options_(options),
-        file_((fs::path(dataset.folder) / "robomimic.hdf5").string(), options.overwrite, options.copy) {}
+        file_((fs::path(dataset.folder) / "robomimic.hdf5").string(), options.overwrite,
+              options.copy) {}
 
   MergeResult merge() {
     describe(dataset_.files.front());
@@ -73,8 +74,11 @@ class Merger {
  private:
   void describe(const std::string& shard) {
     const h5::Id from = h5::open_file(shard);
-    for (const char* name : {"format", "command"}) h5::write_attribute(file_.file(), name, h5::read_text(from, name));
-    const auto number = [&](const char* name) { return h5::read_numbers<std::int64_t>(from, name).at(0); };
+    for (const char* name : {"format", "command"})
+      h5::write_attribute(file_.file(), name, h5::read_text(from, name));
+    const auto number = [&](const char* name) {
+      return h5::read_numbers<std::int64_t>(from, name).at(0);
+    };
     h5::write_scalar<std::int64_t>(file_.file(), "format_version", number("format_version"));
     for (const char* name : {"dataset_episodes", "dataset_shards"})
       h5::write_scalar<std::int64_t>(file_.file(), name, number(name));
@@ -109,7 +113,8 @@ class Merger {
     put(data, name, batch);
     for (const std::string& episode : h5::link_names(failed)) failed_.push_back({name, episode});
     rows_ += h5::read_numbers<std::int64_t>(data, "total").at(0);
-    sum_ += h5::read_numbers<std::uint64_t>(from, "content_sum").at(0);  // modulo 2⁶⁴, as within a shard
+    sum_ += h5::read_numbers<std::uint64_t>(from, "content_sum")
+                .at(0);  // modulo 2⁶⁴, as within a shard
   }
 
   LinkedDemo described(const std::string& shard, const h5::Id& data, std::int64_t number) {
@@ -154,12 +159,14 @@ class Merger {
     h5::copy_group(data, name, copied_, name);
     const h5::Id made = h5::open_group(copied_, name), next = h5::create_group(made, "next_obs");
     for (const DemoArray& array : members_->observations)
-      h5::create_virtual(next, array.name, h5::open_dataset(made, "obs/" + array.name), {".", path + "/obs/" + array.name},
+      h5::create_virtual(next, array.name, h5::open_dataset(made, "obs/" + array.name),
+                         {".", path + "/obs/" + array.name},
                          {".", path + "/final_obs/" + array.name}, 1);
   }
 
   void complete() {
-    const h5::Id data = h5::open_group(file_.file(), "data"), failed = h5::create_group(file_.file(), "failed");
+    const h5::Id data = h5::open_group(file_.file(), "data"),
+                 failed = h5::create_group(file_.file(), "failed");
     h5::write_attribute(data, "env_args", env_args_);
     h5::write_scalar<std::int64_t>(data, "total", rows_);
     std::string open;
@@ -181,11 +188,14 @@ class Merger {
 
   void write_masks() {
     std::vector<std::pair<std::uint64_t, std::int64_t>> order;
-    for (const std::int64_t demo : demos_) order.emplace_back(scramble(static_cast<std::uint64_t>(demo)), demo);
+    for (const std::int64_t demo : demos_)
+      order.emplace_back(scramble(static_cast<std::uint64_t>(demo)), demo);
     std::sort(order.begin(), order.end());
-    const std::size_t few = order.size() < 2 ? 0 : std::max<std::size_t>(1, order.size() / kValidShare);
+    const std::size_t few =
+        order.size() < 2 ? 0 : std::max<std::size_t>(1, order.size() / kValidShare);
     std::vector<std::int64_t> valid, train;
-    for (std::size_t i = 0; i < order.size(); ++i) (i < few ? valid : train).push_back(order[i].second);
+    for (std::size_t i = 0; i < order.size(); ++i)
+      (i < few ? valid : train).push_back(order[i].second);
     const h5::Id masks = h5::create_group(file_.file(), "mask");
     for (auto* list : {&train, &valid}) {
       std::sort(list->begin(), list->end());
@@ -203,8 +213,8 @@ class Merger {
   bool few_each_ = false;  // episodes in a shard
   std::optional<DemoMembers> members_;
   std::optional<MinariView> view_;
-  std::vector<std::int64_t> demos_;                           // their numbers
-  std::vector<h5::FileMember> linked_;                        // groups of demos
+  std::vector<std::int64_t> demos_;                          // their numbers
+  std::vector<h5::FileMember> linked_;                       // groups of demos
   std::vector<std::pair<std::string, std::string>> failed_;  // shard, episode
   std::int64_t rows_ = 0;
   std::uint64_t sum_ = 0;
@@ -215,7 +225,8 @@ class Merger {
 
 MergeResult merge_dataset(const DatasetFiles& dataset, const MergeOptions& options) {
   if (dataset.folder.empty())
-    throw IoError(fmt::format("'{}' is a file; expected the folder of its shards", dataset.files.front()));
+    throw IoError(
+        fmt::format("'{}' is a file; expected the folder of its shards", dataset.files.front()));
   check_complete(dataset);
   return Merger(dataset, options).merge();
 }

@@ -15,15 +15,16 @@ struct MergeOptions {
 };
 
 struct MergeResult {
-  std::string file;      ///< FOLDER/robomimic.hdf5
-  std::string minari;    ///< FOLDER/minari/tangere/NAME-v0; FOLDER/minari is a root for Minari
-  std::string minari_id; ///< tangere/NAME-v0
+  std::string file;       ///< FOLDER/robomimic.hdf5
+  std::string minari;     ///< FOLDER/minari/tangere/NAME-v0; FOLDER/minari is a root for Minari
+  std::string minari_id;  ///< tangere/NAME-v0
   std::int64_t demos = 0, failed = 0, train = 0, valid = 0;
   std::uint64_t bytes = 0;  ///< of the file
 };
 
-/// Merges a folder's shards. Opens every member that it links, reads all numbers that it copies. Throws IoError when a shard is missing, damaged or of other settings, when it finds its own output and
-/// `overwrite` is false, or cannot write. Each output appears whole or not at all.
+/// Merges a folder's shards. Opens every member that it links, reads all numbers that it copies.
+/// Throws IoError when a shard is missing, damaged or of other settings, when it finds its own
+/// output and `overwrite` is false, or cannot write. Each output appears whole or not at all.
 MergeResult merge_dataset(const DatasetFiles& dataset, const MergeOptions& options);
 
 }  // namespace tangere

@@ -46,14 +46,17 @@ struct DatasetWriter::Impl {
   std::string obstacle;
 
   Impl(const DatasetOutput& o, const DatasetLayout& l)
-      : layout((l.check(), l)), output(o), folder(o.folder, o.existing, o.only.has_value()),
+      : layout((l.check(), l)),
+        output(o),
+        folder(o.folder, o.existing, o.only.has_value()),
         format(layout) {
     if (output.existing != ExistingShards::replace) check_settings();
     // Before shards are counted one by one: a slip of the keyboard may ask for billions.
     if (makes_all()) check_space(static_cast<double>(layout.episodes));
     for (const std::int64_t shard : to_make()) look_at(shard);
     double episodes = 0;
-    for (const EpisodeRange& range : missing) episodes += static_cast<double>(range.end - range.first);
+    for (const EpisodeRange& range : missing)
+      episodes += static_cast<double>(range.end - range.first);
     check_space(episodes);
   }
 
@@ -77,9 +80,10 @@ struct DatasetWriter::Impl {
     for (const std::string& file : files) {
       const std::vector<std::string> lines = differences(read_settings(h5::open_file(file)), here);
       if (lines.empty()) continue;
-      throw InputError(fmt::format("'{}' is of another run, so this one cannot continue it: {}; expected the same "
-                                   "settings, another folder, or --overwrite",
-                                   file, fmt::join(lines, "; ")));
+      throw InputError(fmt::format(
+          "'{}' is of another run, so this one cannot continue it: {}; expected the same "
+          "settings, another folder, or --overwrite",
+          file, fmt::join(lines, "; ")));
     }
   }
 
@@ -96,12 +100,14 @@ struct DatasetWriter::Impl {
       return;
     }
     if (output.existing == ExistingShards::refuse)
-      throw IoError(fmt::format("'{}' exists already; give --resume to keep it, or --overwrite to replace it", path));
+      throw IoError(fmt::format(
+          "'{}' exists already; give --resume to keep it, or --overwrite to replace it", path));
     const h5::Id file = h5::open_file(path);
-    const EpisodeRange there{number(file, "first_episode"), number(file, "first_episode") + number(file, "episodes")};
+    const EpisodeRange there{number(file, "first_episode"),
+                             number(file, "first_episode") + number(file, "episodes")};
     if (there.first != range.first || there.end != range.end)
-      throw InputError(fmt::format("'{}' holds episodes {} to {}, expected {} to {}", path, there.first, there.end - 1,
-                                   range.first, range.end - 1));
+      throw InputError(fmt::format("'{}' holds episodes {} to {}, expected {} to {}", path,
+                                   there.first, there.end - 1, range.first, range.end - 1));
     ++kept;
     kept_failed += static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
     complete.insert(shard);
@@ -117,29 +123,34 @@ struct DatasetWriter::Impl {
     return true;
   }
 
-  /// What is wrong with the first shard that is not of this one, which others may be about to replace; empty if there is none.
+  /// What is wrong with the first shard that is not of this one, which others may be about to
+  /// replace; empty if there is none.
   [[nodiscard]] std::string of_another_run() const {
     const std::vector<Setting> here = settings_of(layout);
     std::vector<std::string> files = folder.shards();
     for (const std::string& file : files) {
       try {
-        const std::vector<std::string> lines = differences(read_settings(h5::open_file(file)), here);
-        if (!lines.empty()) return fmt::format("'{}' is of another run: {}", file, fmt::join(lines, "; "));
+        const std::vector<std::string> lines =
+            differences(read_settings(h5::open_file(file)), here);
+        if (!lines.empty())
+          return fmt::format("'{}' is of another run: {}", file, fmt::join(lines, "; "));
       } catch (const IoError& error) {
         return error.what();
       }
     }
     if (std::ssize(files) == layout.shard_count()) return {};
-    for (std::int64_t shard = 0; shard < layout.shard_count(); ++shard) std::erase(files, folder.shard_path(shard));
-    return fmt::format("'{}' is none of the {} shards of this run", files.front(), layout.shard_count());
+    for (std::int64_t shard = 0; shard < layout.shard_count(); ++shard)
+      std::erase(files, folder.shard_path(shard));
+    return fmt::format("'{}' is none of the {} shards of this run", files.front(),
+                       layout.shard_count());
   }
 
   void check_space(double episodes) const {
     if (has_chunks(layout)) return;  // nobody knows before
     const double needed = layout.episode_bytes() * episodes, available = folder.free_bytes();
     if (needed > available)
-      throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free", output.folder, needed,
-                                available));
+      throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free",
+                                output.folder, needed, available));
   }
 
   ShardFile& shard_of(std::int64_t episode) {
@@ -149,8 +160,9 @@ struct DatasetWriter::Impl {
     if (!started) folder.remove_old_shards(layout.shard_count());
     started = true;
     const bool replace = output.only && output.existing == ExistingShards::replace;
-    return open.try_emplace(shard, folder.shard_path(shard), layout, format, layout.shard_episodes(shard), replace,
-                            held_bytes)
+    return open
+        .try_emplace(shard, folder.shard_path(shard), layout, format, layout.shard_episodes(shard),
+                     replace, held_bytes)
         .first->second;
   }
 };
@@ -176,7 +188,8 @@ void DatasetWriter::write(const EpisodeRows& rows) {
     prepared = impl_->prepared.extract({rows.first_episode, rows.first_row});
   }
   impl_->shard_of(rows.first_episode)
-      .write(rows, prepared.empty() ? prepare_piece(impl_->layout, impl_->format, rows) : std::move(prepared.mapped()));
+      .write(rows, prepared.empty() ? prepare_piece(impl_->layout, impl_->format, rows)
+                                    : std::move(prepared.mapped()));
 }
 
 void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) {
@@ -191,11 +204,14 @@ void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpi
 
 bool DatasetWriter::complete() {
   impl_->folder.let_go();
-  // Let go of first: whoever looks last sees the shards of all, and none of those who looked before is in its way.
+  // Let go of first: whoever looks last sees the shards of all, and none of those who looked before
+  // is in its way.
   if (!impl_->all_there()) return false;
   if (!impl_->folder.hold_alone()) {
-    impl_->obstacle = fmt::format("other processes hold '{0}'; the last of them that makes shards merges, or 'tangere merge {0}'",
-                                  impl_->output.folder);
+    impl_->obstacle = fmt::format(
+        "other processes hold '{0}'; the last of them that makes shards merges, or 'tangere merge "
+        "{0}'",
+        impl_->output.folder);
     return false;
   }
   if (impl_->all_there()) {

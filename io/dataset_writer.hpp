@@ -15,7 +15,8 @@ namespace tangere {
 struct DatasetOutput {
   std::string folder;
   ExistingShards existing = ExistingShards::refuse;
-  /// Shards to make, ascending; others may be made by other processes at the same time. None: all, alone.
+  /// Shards to make, ascending; others may be made by other processes at the same time. None: all,
+  /// alone.
   std::optional<std::vector<std::int64_t>> only = {};
 };
 
@@ -23,9 +24,10 @@ struct DatasetOutput {
 /// read back; destroyed before that, it leaves nothing behind.
 class DatasetWriter : public EpisodeSink {
  public:
-  /// Creates the folder; touches no shard. Throws InputError for names no file can hold and for shards to keep that
-  /// other settings made, naming what differs; IoError when the folder cannot be written, is being written by another
-  /// process, has shards that are neither to be kept nor replaced, or the disk has no room for the data set.
+  /// Creates the folder; touches no shard. Throws InputError for names no file can hold and for
+  /// shards to keep that other settings made, naming what differs; IoError when the folder cannot
+  /// be written, is being written by another process, has shards that are neither to be kept nor
+  /// replaced, or the disk has no room for the data set.
   DatasetWriter(const DatasetOutput& output, const DatasetLayout& layout);
   ~DatasetWriter() override;
 
@@ -43,8 +45,9 @@ class DatasetWriter : public EpisodeSink {
 
   /// Paths of the complete shards, kept ones among them, in ascending order.
   [[nodiscard]] std::vector<std::string> shards() const;
-  /// Whether the data set is complete and no other process writes into its folder, nor can from now on: of several that end
-  /// at the same time, at least one is told so. Nothing may be written afterwards; where it is not complete, others may.
+  /// Whether the data set is complete and no other process writes into its folder, nor can from now
+  /// on: of several that end at the same time, at least one is told so. Nothing may be written
+  /// afterwards; where it is not complete, others may.
   [[nodiscard]] bool complete();
   /// Why complete() said no although as many shards as are wanted are there; else empty.
   [[nodiscard]] const std::string& obstacle() const;

@@ -33,7 +33,8 @@ DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_numbe
   }
   const std::span randomized(reinterpret_cast<const unsigned char*>(facts.randomized.data()),
                              facts.randomized.size() * sizeof(double));
-  if (!randomized.empty()) all_.push_back({"randomized", h5::NumberType::float64, true, randomized});
+  if (!randomized.empty())
+    all_.push_back({"randomized", h5::NumberType::float64, true, randomized});
 }
 
 DemoFormat::DemoFormat(const DatasetLayout& layout)
@@ -46,8 +47,9 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
   const NumberType number = layout.single ? NumberType::float32 : NumberType::float64;
   gradient_sources_.resize(layout.gradients.size());
   std::iota(gradient_sources_.begin(), gradient_sources_.end(), std::size_t{0});
-  std::sort(gradient_sources_.begin(), gradient_sources_.end(),
-            [&](std::size_t a, std::size_t b) { return layout.gradients[a].name < layout.gradients[b].name; });
+  std::sort(gradient_sources_.begin(), gradient_sources_.end(), [&](std::size_t a, std::size_t b) {
+    return layout.gradients[a].name < layout.gradients[b].name;
+  });
   for (const std::size_t k : gradient_sources_) gradients_.push_back(layout.gradients[k]);
   shapes_ = {{layout.action_names().size()}, {}, {}};
   types_ = {NumberType::float32, NumberType::float32, NumberType::boolean};
@@ -57,12 +59,15 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
     types_.insert(types_.end(), observed.size(), number);
   }
   for (const GradientArray& array : gradients_) {
-    const auto from = array.shape.begin() + (array.by_row ? 0 : 1);  // one for the episode: its first dimension counts its rows
+    const auto from =
+        array.shape.begin() +
+        (array.by_row ? 0 : 1);  // one for the episode: its first dimension counts its rows
     shapes_.emplace_back(from, array.shape.end());
     types_.push_back(NumberType::float64);
   }
   for (std::size_t k = 0; k < shapes_.size(); ++k)
-    row_bytes_.push_back(std::accumulate(shapes_[k].begin(), shapes_[k].end(), h5::bytes_of(types_[k]), std::multiplies<>()));
+    row_bytes_.push_back(std::accumulate(shapes_[k].begin(), shapes_[k].end(),
+                                         h5::bytes_of(types_[k]), std::multiplies<>()));
   filters_ = file_filters(layout.compression, h5::bytes_of(number));
   h5::Bytes of_one;
   DemoFacts facts{1, std::nullopt, std::vector<double>(randomized_)};
@@ -87,7 +92,8 @@ std::int64_t DemoFormat::chunk_rows(std::size_t dataset, std::int64_t rows) cons
 
 std::size_t DemoFormat::data_bytes(std::int64_t rows) const {
   std::size_t bytes = 0;
-  for (std::size_t k = 0; k < datasets(); ++k) bytes += aligned(static_cast<std::size_t>(rows_of(k, rows)) * row_bytes_[k]);
+  for (std::size_t k = 0; k < datasets(); ++k)
+    bytes += aligned(static_cast<std::size_t>(rows_of(k, rows)) * row_bytes_[k]);
   return bytes;
 }
 
@@ -99,7 +105,8 @@ h5::Bytes DemoFormat::texts() const {
   return out;
 }
 
-void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows, std::uint64_t address,
+void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows,
+                                  std::uint64_t address,
                                   std::span<const h5::FileText> texts) const {
   h5::FileDataset file;
   file.type = types_[dataset];
@@ -116,7 +123,8 @@ void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int6
   h5::add_dataset(out, file);
 }
 
-std::uint64_t DemoFormat::describe_observations(h5::Bytes& out, std::uint64_t base, std::int64_t rows, std::size_t first,
+std::uint64_t DemoFormat::describe_observations(h5::Bytes& out, std::uint64_t base,
+                                                std::int64_t rows, std::size_t first,
                                                 std::span<const std::uint64_t> addresses) const {
   std::vector<h5::FileLink> links;
   for (std::size_t name = 0; name < names_.size(); ++name) {
@@ -129,7 +137,8 @@ std::uint64_t DemoFormat::describe_observations(h5::Bytes& out, std::uint64_t ba
 }
 
 std::uint64_t DemoFormat::describe(h5::Bytes& out, std::uint64_t base, const DemoFacts& facts,
-                                   std::span<const std::uint64_t> addresses, std::uint64_t texts) const {
+                                   std::span<const std::uint64_t> addresses,
+                                   std::uint64_t texts) const {
   std::vector<h5::FileLink> links;
   for (const std::size_t dataset : {kActions, kRewards, kDones}) {
     constexpr std::array<std::string_view, kFirst> kNames{"actions", "rewards", "dones"};
@@ -137,10 +146,12 @@ std::uint64_t DemoFormat::describe(h5::Bytes& out, std::uint64_t base, const Dem
     describe_dataset(out, dataset, facts.rows, addresses[dataset]);
   }
   links.push_back({"obs", describe_observations(out, base, facts.rows, obs(0), addresses)});
-  links.push_back({"final_obs", describe_observations(out, base, facts.rows, final_obs(0), addresses)});
+  links.push_back(
+      {"final_obs", describe_observations(out, base, facts.rows, final_obs(0), addresses)});
   for (std::size_t k = 0; k < gradients_.size(); ++k) {
-    const std::array meaning{h5::FileText{"meaning", texts, static_cast<std::uint32_t>(k),
-                                          static_cast<std::uint32_t>(gradients_[k].meaning.size())}};
+    const std::array meaning{
+        h5::FileText{"meaning", texts, static_cast<std::uint32_t>(k),
+                     static_cast<std::uint32_t>(gradients_[k].meaning.size())}};
     links.push_back({gradients_[k].name, base + out.size()});
     describe_dataset(out, gradient(k), facts.rows, addresses[gradient(k)], meaning);
   }

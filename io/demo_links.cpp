@@ -137,11 +137,15 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
 void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFacts& facts) {
   const auto check = [](const h5::Id& group, const DemoArray& array, std::int64_t rows) {
     const h5::Id dataset = h5::open_dataset(group, array.name);
-    if (!std::ranges::equal(h5::dimensions(dataset), dims_of(static_cast<std::uint64_t>(rows), array)) || type_of(dataset) != array.type)
-      throw IoError(fmt::format("{} is not of {} rows, of the shape and type of the first demo", array.name, rows));
+    if (!std::ranges::equal(h5::dimensions(dataset),
+                            dims_of(static_cast<std::uint64_t>(rows), array)) ||
+        type_of(dataset) != array.type)
+      throw IoError(fmt::format("{} is not of {} rows, of the shape and type of the first demo",
+                                array.name, rows));
   };
   for (const std::string& name : members.names)
-    if (name != "obs" && name != "final_obs" && name != members.actions.name) h5::open_dataset(demo, name);
+    if (name != "obs" && name != "final_obs" && name != members.actions.name)
+      h5::open_dataset(demo, name);
   check(demo, members.actions, facts.rows);
   const h5::Id obs = h5::open_group(demo, "obs"), last = h5::open_group(demo, "final_obs");
   for (const DemoArray& array : members.observations) {
@@ -195,9 +199,11 @@ std::vector<h5::FileMember> add_minari_episodes(Bytes& out, std::uint64_t base,
     for (std::size_t k = 0; k < paths.size(); ++k)
       derivatives.push_back({members.derivatives[k], h5::kNowhere, file, paths[k]});
     const std::uint64_t infos = base + out.size();
-    h5::add_group(out, derivatives);  // empty where there are none: Minari prints no episode without it
+    h5::add_group(out,
+                  derivatives);  // empty where there are none: Minari prints no episode without it
     const std::array links{
-        h5::FileLink{"actions", h5::kNowhere, file, actions}, h5::FileLink{"infos", infos},
+        h5::FileLink{"actions", h5::kNowhere, file, actions},
+        h5::FileLink{"infos", infos},
         h5::FileLink{"observations", shown},
         h5::FileLink{"rewards", h5::kNowhere, file, rewards},
         h5::FileLink{terminated ? "terminations" : "truncations", h5::kNowhere, file, dones},

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who may write into a folder: one process alone, or several that share it. Nothing is left behind, and a killed process loses it.
+// Who may write into a folder: one process alone, or several that share it. Nothing is left behind,
+// and a killed process loses it.
 #pragma once
 
 #include <functional>
@@ -26,8 +27,9 @@ class FolderLock {
   FolderLock(const FolderLock&) = delete;
   FolderLock& operator=(const FolderLock&) = delete;
 
-  /// Whether it is held now; where others hold it, none is, not even the one of before. True on file systems without
-  /// locks: there the .part of each file keeps writers apart where that is possible.
+  /// Whether it is held now; where others hold it, none is, not even the one of before. True on
+  /// file systems without locks: there the .part of each file keeps writers apart where that is
+  /// possible.
   [[nodiscard]] bool take(Kind kind, const LockPatience& patience = {});
   void let_go();
 

@@ -15,7 +15,8 @@
 
 namespace tangere {
 
-/// In this order: file() → close() → append() … → open() → file() → commit(). Everything throws IoError.
+/// In this order: file() → close() → append() … → open() → file() → commit(). Everything throws
+/// IoError.
 class GrownFile {
  public:
   /// Begins `<path>.part`; `views` as for h5::create_file.
@@ -32,13 +33,15 @@ class GrownFile {
   /// Where the next bytes will be.
   [[nodiscard]] std::uint64_t here() const { return here_; }
   void append(const h5::Bytes& bytes);
-  /// A group to which the library may add; arguments as for h5::add_large_group. Returns its address.
+  /// A group to which the library may add; arguments as for h5::add_large_group. Returns its
+  /// address.
   std::uint64_t append_group(std::string_view prefix, std::vector<h5::FileMember> members,
                              bool root = false);
   /// `root`: address of the group "/"; that of the beginning if it leads nowhere.
   void open(std::uint64_t root = h5::kNowhere);
 
-  /// Reads back what was appended, calls `last` with the path of the .part, syncs, renames. Returns the size in bytes.
+  /// Reads back what was appended, calls `last` with the path of the .part, syncs, renames. Returns
+  /// the size in bytes.
   std::uint64_t commit(const std::function<void(const std::string&)>& last = {});
 
  private:

@@ -129,7 +129,8 @@ struct Box {
         memory(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr)) {
     const int rank = H5Sget_simple_extent_ndims(disk.get());
     if (rank != static_cast<int>(offset.size()) || rank != static_cast<int>(count.size()))
-      fail("select a box of", dataset, {}, fmt::format("it has rank {}, not {}", rank, count.size()));
+      fail("select a box of", dataset, {},
+           fmt::format("it has rank {}, not {}", rank, count.size()));
     if (H5Sselect_hyperslab(disk.get(), H5S_SELECT_SET, offset.data(), nullptr, count.data(),
                             nullptr) < 0 ||
         H5Sselect_valid(disk.get()) <= 0)
@@ -183,8 +184,7 @@ Id create_file(const std::string& path, hsize_t description_block, bool views) {
   H5Pset_file_locking(access.get(), false, true);  // io/part_file.hpp holds the lock
   const Id creation = without_times(H5P_FILE_CREATE);
   Id file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()));
-  if (file.get() < 0)
-    throw IoError(fmt::format("cannot create '{}': {}", path, last_reason()));
+  if (file.get() < 0) throw IoError(fmt::format("cannot create '{}': {}", path, last_reason()));
   return file;
 }
 
@@ -196,7 +196,8 @@ Id create_memory_file() {
   constexpr std::size_t kGrowth = std::size_t{1} << 16;
   H5Pset_fapl_core(access.get(), kGrowth, false);
   Id file(H5Fcreate("memory", H5F_ACC_TRUNC, H5P_DEFAULT, access.get()));
-  if (file.get() < 0) throw IoError(fmt::format("cannot create a file in memory: {}", last_reason()));
+  if (file.get() < 0)
+    throw IoError(fmt::format("cannot create a file in memory: {}", last_reason()));
   return file;
 }
 
@@ -226,7 +227,8 @@ Id change_file(const std::string& path) {
 void link_object(const Id& parent, const std::string& name, std::uint64_t address) {
   const Quiet quiet;
   const Id object(H5Oopen_by_addr(parent.get(), address));
-  if (object.get() < 0 || H5Olink(object.get(), parent.get(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT) < 0)
+  if (object.get() < 0 ||
+      H5Olink(object.get(), parent.get(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT) < 0)
     fail("link", parent, name);
 }
 
@@ -268,8 +270,8 @@ Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
   const Id creation = without_times(H5P_DATASET_CREATE);
   const Id access(H5Pcreate(H5P_DATASET_ACCESS));
   if (!storage.chunk.empty()) {
-    if (H5Pset_chunk(creation.get(), static_cast<int>(storage.chunk.size()),
-                     storage.chunk.data()) < 0)
+    if (H5Pset_chunk(creation.get(), static_cast<int>(storage.chunk.size()), storage.chunk.data()) <
+        0)
       fail("lay out the chunks of", parent, name);
     // Whole chunks are written: a cache would only put errors off to the moment of closing.
     H5Pset_chunk_cache(access.get(), 0, 0, 1);
@@ -407,12 +409,12 @@ std::vector<T> read_numbers(const Id& object, const std::string& name) {
   return values;
 }
 
-#define TANGERE_H5_TYPE(T)                                                                        \
-  template Id create_dataset<T>(const Id&, const std::string&, const Dims&, const Storage&);      \
-  template void write_box<T>(const Id&, const Dims&, const Dims&, const T*);                      \
-  template void read_box<T>(const Id&, const Dims&, const Dims&, T*);                             \
-  template void write_scalar<T>(const Id&, const std::string&, T);                                \
-  template void write_list<T>(const Id&, const std::string&, std::span<const T>);                 \
+#define TANGERE_H5_TYPE(T)                                                                   \
+  template Id create_dataset<T>(const Id&, const std::string&, const Dims&, const Storage&); \
+  template void write_box<T>(const Id&, const Dims&, const Dims&, const T*);                 \
+  template void read_box<T>(const Id&, const Dims&, const Dims&, T*);                        \
+  template void write_scalar<T>(const Id&, const std::string&, T);                           \
+  template void write_list<T>(const Id&, const std::string&, std::span<const T>);            \
   template std::vector<T> read_numbers<T>(const Id&, const std::string&);
 TANGERE_H5_TYPE(double)
 TANGERE_H5_TYPE(float)

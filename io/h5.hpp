@@ -58,12 +58,13 @@ using Dims = std::vector<hsize_t>;
 
 /// Creates a file, replacing what is at `path`. Readable by HDF5 1.8 and later; two runs that write
 /// the same numbers write the same bytes. Descriptions of objects are put together in blocks of
-/// `description_block` bytes: large ones suit files of many objects. With `views` HDF5 1.10 is needed to read it, as
-/// virtual datasets are.
+/// `description_block` bytes: large ones suit files of many objects. With `views` HDF5 1.10 is
+/// needed to read it, as virtual datasets are.
 Id create_file(const std::string& path, hsize_t description_block = 2048, bool views = false);
 /// A file that is never on disk.
 Id create_memory_file();
-/// Opens a file for reading. `forget`: descriptions of objects that were closed are not kept; among tens of thousands of them that is slow.
+/// Opens a file for reading. `forget`: descriptions of objects that were closed are not kept; among
+/// tens of thousands of them that is slow.
 Id open_file(const std::string& path, bool forget = false);
 /// Opens a file for reading and writing, as create_file left it.
 Id change_file(const std::string& path);
@@ -82,7 +83,8 @@ struct Storage {
   bool compress = false;  ///< shuffle, then deflate level 1; needs a chunk shape
 };
 
-/// T: double, float, std::int8_t, std::int32_t, std::int64_t, std::uint64_t. On disk: little endian.
+/// T: double, float, std::int8_t, std::int32_t, std::int64_t, std::uint64_t. On disk: little
+/// endian.
 template <class T>
 Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
                   const Storage& storage = {});

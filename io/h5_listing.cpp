@@ -33,7 +33,8 @@ std::vector<std::string> link_names(const Id& group) {
 std::size_t link_count(const Id& group) {
   const Quiet quiet;
   H5G_info_t info;
-  if (H5Gget_info(group.get(), &info) < 0) throw IoError("cannot count the links of a group: HDF5 finds them damaged");
+  if (H5Gget_info(group.get(), &info) < 0)
+    throw IoError("cannot count the links of a group: HDF5 finds them damaged");
   return info.nlinks;
 }
 
@@ -62,7 +63,8 @@ std::string attribute_text(const Id& object, const std::string& name) {
   }
   if (kind == H5T_STRING) return fmt::format("{}", fmt::join(read_texts(object, name), ", "));
   if (kind == H5T_FLOAT) return numbers_as_text<double>(object, name);
-  if (kind == H5T_INTEGER && sign == H5T_SGN_NONE) return numbers_as_text<std::uint64_t>(object, name);
+  if (kind == H5T_INTEGER && sign == H5T_SGN_NONE)
+    return numbers_as_text<std::uint64_t>(object, name);
   if (kind == H5T_INTEGER) return numbers_as_text<std::int64_t>(object, name);
   throw IoError(fmt::format("attribute '{}' is neither text nor numbers", name));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The format of the HDF Group's LZ4 plug-in: u64 size of all, u32 size of a block, then each block's u32 size and bytes; all
-// big-endian. A block as large as it is decompressed is not compressed.
+// The format of the HDF Group's LZ4 plug-in: u64 size of all, u32 size of a block, then each
+// block's u32 size and bytes; all big-endian. A block as large as it is decompressed is not
+// compressed.
 #include "io/h5_lz4.hpp"
 
 #include <hdf5.h>
@@ -15,7 +16,8 @@
 namespace tangere::h5 {
 namespace {
 
-constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 32;  // of a chunk, whatever a damaged file says
+constexpr std::uint64_t kMostBytes = std::uint64_t{1}
+                                     << 32;  // of a chunk, whatever a damaged file says
 
 std::uint64_t big_endian(const unsigned char* from, std::size_t bytes) {
   std::uint64_t value = 0;
@@ -24,7 +26,8 @@ std::uint64_t big_endian(const unsigned char* from, std::size_t bytes) {
 }
 
 /// Decompresses `in` into `out`; false where it is damaged.
-bool decompress(const unsigned char* in, std::size_t size, unsigned char* out, std::uint64_t total, std::uint64_t block) {
+bool decompress(const unsigned char* in, std::size_t size, unsigned char* out, std::uint64_t total,
+                std::uint64_t block) {
   constexpr std::size_t kLength = 4;
   for (std::uint64_t done = 0; done < total;) {
     if (size < kLength) return false;
@@ -34,8 +37,9 @@ bool decompress(const unsigned char* in, std::size_t size, unsigned char* out, s
     if (packed > size || packed > INT32_MAX || wanted > INT32_MAX) return false;
     if (packed == wanted) {
       std::memcpy(out + done, in, wanted);
-    } else if (LZ4_decompress_safe(reinterpret_cast<const char*>(in), reinterpret_cast<char*>(out + done),
-                                   static_cast<int>(packed), static_cast<int>(wanted)) != static_cast<int>(wanted)) {
+    } else if (LZ4_decompress_safe(reinterpret_cast<const char*>(in),
+                                   reinterpret_cast<char*>(out + done), static_cast<int>(packed),
+                                   static_cast<int>(wanted)) != static_cast<int>(wanted)) {
       return false;
     }
     in += packed;
@@ -46,11 +50,13 @@ bool decompress(const unsigned char* in, std::size_t size, unsigned char* out, s
 }
 
 /// As H5Z calls it: 0 is failure. Only reading is needed; chunks are written by our own threads.
-std::size_t filter(unsigned flags, std::size_t, const unsigned*, std::size_t size, std::size_t* room, void** buffer) {
+std::size_t filter(unsigned flags, std::size_t, const unsigned*, std::size_t size,
+                   std::size_t* room, void** buffer) {
   constexpr std::size_t kHead = 12, kTotal = 8;
   if ((flags & H5Z_FLAG_REVERSE) == 0 || size < kHead) return 0;
   const auto* const in = static_cast<const unsigned char*>(*buffer);
-  const std::uint64_t total = big_endian(in, kTotal), block = big_endian(in + kTotal, kHead - kTotal);
+  const std::uint64_t total = big_endian(in, kTotal),
+                      block = big_endian(in + kTotal, kHead - kTotal);
   if (total == 0 || total > kMostBytes || block == 0) return 0;
   void* const out = H5allocate_memory(total, false);
   if (out == nullptr) return 0;
@@ -67,9 +73,11 @@ std::size_t filter(unsigned flags, std::size_t, const unsigned*, std::size_t siz
 }  // namespace
 
 void allow_lz4() {
-  static const H5Z_class2_t kind{H5Z_CLASS_T_VERS, kLz4Filter, 0, 1, "lz4", nullptr, nullptr, filter};
+  static const H5Z_class2_t kind{H5Z_CLASS_T_VERS, kLz4Filter, 0,     1, "lz4",
+                                 nullptr,          nullptr,    filter};
   static const herr_t registered = H5Zregister(&kind);
-  static_cast<void>(registered);  // refused: files with such chunks cannot be read, and the error says so
+  static_cast<void>(
+      registered);  // refused: files with such chunks cannot be read, and the error says so
 }
 
 }  // namespace tangere::h5

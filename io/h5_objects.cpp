@@ -10,7 +10,8 @@
 
 namespace tangere::h5 {
 
-static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
+static_assert(std::endian::native == std::endian::little,
+              "numbers are written as they lie in memory");
 
 namespace {
 
@@ -43,7 +44,8 @@ class Header {
     messages_.add(scratch_.all());
   }
   void close() {
-    if (messages_.size() > UINT16_MAX) throw std::logic_error("an object whose description is above 64 KiB");
+    if (messages_.size() > UINT16_MAX)
+      throw std::logic_error("an object whose description is above 64 KiB");
     constexpr std::uint8_t kVersion = 2, kSizeOfTwoBytes = 1;
     out_.text("OHDR");
     out_.number(kVersion);
@@ -106,7 +108,9 @@ void add_boolean(Bytes& out) {
   out.zeros(1);
   out.number<std::uint32_t>(1);
   add_integer(out, 1);
-  for (const std::string_view name : {std::string_view("FALSE\0\0\0", 8), std::string_view("TRUE\0\0\0\0", 8)}) out.text(name);
+  for (const std::string_view name :
+       {std::string_view("FALSE\0\0\0", 8), std::string_view("TRUE\0\0\0\0", 8)})
+    out.text(name);
   out.number<std::uint8_t>(0);
   out.number<std::uint8_t>(1);
 }
@@ -124,7 +128,8 @@ void add_type(Bytes& out, NumberType type) {
 }
 
 void add_layout(Bytes& out, const FileDataset& dataset) {
-  constexpr std::uint8_t kVersion = 3, kContiguous = 1, kChunked = 2, kVersionOfViews = 4, kView = 3;
+  constexpr std::uint8_t kVersion = 3, kContiguous = 1, kChunked = 2, kVersionOfViews = 4,
+                         kView = 3;
   if (dataset.view) {
     out.number(kVersionOfViews);
     out.number(kView);
@@ -150,7 +155,8 @@ void add_layout(Bytes& out, const FileDataset& dataset) {
 
 /// What is where nothing was stored.
 void add_fill(Bytes& out, const FileDataset& dataset) {
-  constexpr std::uint8_t kVersion = 3, kEarly = 1, kLate = 2, kIncremental = 3, kNeverFilled = 1 << 2, kFilledIfSet = 2 << 2;
+  constexpr std::uint8_t kVersion = 3, kEarly = 1, kLate = 2, kIncremental = 3,
+                         kNeverFilled = 1 << 2, kFilledIfSet = 2 << 2;
   constexpr std::uint8_t kNumberFollows = 1 << 5;
   out.number(kVersion);
   if (dataset.view) {
@@ -161,7 +167,8 @@ void add_fill(Bytes& out, const FileDataset& dataset) {
     else
       out.number(std::bit_cast<std::uint64_t>(std::numeric_limits<double>::quiet_NaN()));
   } else {
-    out.number<std::uint8_t>(dataset.chunk.empty() ? kEarly | kNeverFilled : kIncremental | kFilledIfSet);
+    out.number<std::uint8_t>(dataset.chunk.empty() ? kEarly | kNeverFilled
+                                                   : kIncremental | kFilledIfSet);
   }
 }
 
@@ -184,7 +191,8 @@ void add_filters(Bytes& out, std::span<const FileFilter> filters) {
 }
 
 void add_link(Bytes& out, const FileLink& link) {
-  constexpr std::uint8_t kVersion = 1, kTypeFollows = 0x08, kCharacterSet = 0x10, kUtf8 = 1, kExternal = 64;
+  constexpr std::uint8_t kVersion = 1, kTypeFollows = 0x08, kCharacterSet = 0x10, kUtf8 = 1,
+                         kExternal = 64;
   if (link.name.size() > UINT8_MAX) throw std::logic_error("a name above 255 bytes in a file");
   const bool external = !link.file.empty();
   out.number(kVersion);
@@ -295,13 +303,15 @@ std::uint32_t object_checksum(std::span<const unsigned char> bytes) {
   return c;
 }
 
-void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std::uint64_t end, std::uint64_t root) {
+void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std::uint64_t end,
+                     std::uint64_t root) {
   constexpr std::size_t kVersion = 8, kEnd = 28, kRoot = 36, kChecksum = 44;
   if (superblock[kVersion] != 2 && superblock[kVersion] != 3)
     throw std::logic_error("a file whose superblock has another version than asked for");
   std::memcpy(&superblock[kEnd], &end, sizeof end);
   if (root != kNowhere) std::memcpy(&superblock[kRoot], &root, sizeof root);
-  const std::uint32_t sum = object_checksum(std::span<const unsigned char>(superblock).first(kChecksum));
+  const std::uint32_t sum =
+      object_checksum(std::span<const unsigned char>(superblock).first(kChecksum));
   std::memcpy(&superblock[kChecksum], &sum, sizeof sum);
 }
 
@@ -317,12 +327,14 @@ std::size_t bytes_of(NumberType type) {
   return 0;
 }
 
-/// A global heap collection, in which every object has a head of 16 bytes, the free rest among them.
+/// A global heap collection, in which every object has a head of 16 bytes, the free rest among
+/// them.
 void add_texts(Bytes& out, std::span<const std::string_view> texts) {
   constexpr std::uint8_t kVersion = 1;
   constexpr std::size_t kHead = 16, kLeast = 4096;
   if (texts.empty()) return;
-  if (texts.size() > UINT16_MAX) throw std::logic_error("a list of more than 65535 texts in a file");
+  if (texts.size() > UINT16_MAX)
+    throw std::logic_error("a list of more than 65535 texts in a file");
   Bytes objects;
   std::uint16_t index = 0;
   for (const std::string_view text : texts) {
@@ -349,13 +361,16 @@ void add_dataset(Bytes& out, const FileDataset& dataset) {
   header.message(kDatatype, [&](Bytes& to) { add_type(to, dataset.type); });
   header.message(kFillValue, [&](Bytes& to) { add_fill(to, dataset); });
   header.message(kLayout, [&](Bytes& to) { add_layout(to, dataset); });
-  if (!dataset.filters.empty()) header.message(kFilters, [&](Bytes& to) { add_filters(to, dataset.filters); });
+  if (!dataset.filters.empty())
+    header.message(kFilters, [&](Bytes& to) { add_filters(to, dataset.filters); });
   if (!dataset.texts.empty()) add_attribute_info(header);
-  for (const FileText& text : dataset.texts) header.message(kAttribute, [&](Bytes& to) { add_attribute(to, text); });
+  for (const FileText& text : dataset.texts)
+    header.message(kAttribute, [&](Bytes& to) { add_attribute(to, text); });
   header.close();
 }
 
-void add_group(Bytes& out, std::span<const FileLink> links, std::span<const FileAttribute> attributes) {
+void add_group(Bytes& out, std::span<const FileLink> links,
+               std::span<const FileAttribute> attributes) {
   Header header(out);
   header.message(kLinkInfo, [](Bytes& to) {
     to.zeros(2);  // version, flags

@@ -16,20 +16,24 @@ constexpr std::size_t kNodeHead = 24, kAddress = 8;
 struct TreeKind {
   std::uint8_t type;
   std::size_t most, key_bytes;
-  [[nodiscard]] std::size_t node_bytes() const { return kNodeHead + most * kAddress + (most + 1) * key_bytes; }
+  [[nodiscard]] std::size_t node_bytes() const {
+    return kNodeHead + most * kAddress + (most + 1) * key_bytes;
+  }
 };
 
 TreeKind group_tree() { return {0, 2 * kGroupNodeHalf, kAddress}; }
 TreeKind chunk_tree(std::size_t rank) { return {1, 2 * kChunkNodeHalf, 8 + 8 * (rank + 1)}; }
 
 /// Nodes of one level over n children.
-std::size_t nodes_over(std::size_t n, std::size_t most) { return std::max<std::size_t>(1, (n + most - 1) / most); }
+std::size_t nodes_over(std::size_t n, std::size_t most) {
+  return std::max<std::size_t>(1, (n + most - 1) / most);
+}
 
-/// Children in order. `key(out, i)` appends key i of the leaves: i = 0 before the first child, the count of children behind the
-/// last one.
+/// Children in order. `key(out, i)` appends key i of the leaves: i = 0 before the first child, the
+/// count of children behind the last one.
 template <class Key>
-std::uint64_t add_tree(Bytes& out, std::uint64_t base, const TreeKind& kind, std::vector<std::uint64_t> children,
-                       const Key& key) {
+std::uint64_t add_tree(Bytes& out, std::uint64_t base, const TreeKind& kind,
+                       std::vector<std::uint64_t> children, const Key& key) {
   std::vector<std::size_t> ends(children.size());  // leaf children up to the end of each child
   for (std::size_t i = 0; i < ends.size(); ++i) ends[i] = i + 1;
   for (std::uint8_t level = 0;; ++level) {
@@ -38,7 +42,8 @@ std::uint64_t add_tree(Bytes& out, std::uint64_t base, const TreeKind& kind, std
     std::vector<std::size_t> parent_ends;
     const std::uint64_t first = base + out.size();
     for (std::size_t node = 0; node < nodes; ++node) {
-      const std::size_t begin = children.size() * node / nodes, end = children.size() * (node + 1) / nodes;
+      const std::size_t begin = children.size() * node / nodes,
+                        end = children.size() * (node + 1) / nodes;
       const std::size_t at = out.size();
       parents.push_back(base + at);
       out.text("TREE");
@@ -73,7 +78,8 @@ std::size_t tree_bytes(const TreeKind& kind, std::size_t children) {
 /// Bytes of a group, taken away now and then.
 class GroupBytes {
  public:
-  GroupBytes(Bytes& bytes, std::uint64_t base, const Spill& spill) : out(bytes), base_(base), spill_(spill) {}
+  GroupBytes(Bytes& bytes, std::uint64_t base, const Spill& spill)
+      : out(bytes), base_(base), spill_(spill) {}
   /// The address of what is appended next.
   [[nodiscard]] std::uint64_t here() const { return base_ + out.size(); }
   /// Of the first byte that is still there.
@@ -97,9 +103,10 @@ std::string name_of(std::string_view prefix, const FileMember& member) {
   return std::string(prefix) + std::to_string(member.number);
 }
 
-/// Where the name of each member begins among all, each ended by zeros up to a multiple of eight, and where the last one ends; 0
-/// is the empty name.
-std::vector<std::uint64_t> name_begins(std::string_view prefix, const std::vector<FileMember>& members) {
+/// Where the name of each member begins among all, each ended by zeros up to a multiple of eight,
+/// and where the last one ends; 0 is the empty name.
+std::vector<std::uint64_t> name_begins(std::string_view prefix,
+                                       const std::vector<FileMember>& members) {
   std::vector<std::uint64_t> begins;
   begins.reserve(members.size() + 1);
   std::uint64_t at = 8;
@@ -111,7 +118,8 @@ std::vector<std::uint64_t> name_begins(std::string_view prefix, const std::vecto
   return begins;
 }
 
-std::uint64_t add_names(GroupBytes& to, std::string_view prefix, const std::vector<FileMember>& members, std::uint64_t bytes) {
+std::uint64_t add_names(GroupBytes& to, std::string_view prefix,
+                        const std::vector<FileMember>& members, std::uint64_t bytes) {
   constexpr std::uint64_t kNothingFree = 1;
   const std::uint64_t heap = to.here();
   to.out.text("HEAP");
@@ -131,7 +139,8 @@ std::uint64_t add_names(GroupBytes& to, std::string_view prefix, const std::vect
 
 /// Symbol nodes of up to 2 kLeafHalf members each; `ends`: members up to the end of each.
 std::vector<std::uint64_t> add_leaves(GroupBytes& to, const std::vector<FileMember>& members,
-                                      const std::vector<std::uint64_t>& begins, std::vector<std::size_t>& ends) {
+                                      const std::vector<std::uint64_t>& begins,
+                                      std::vector<std::size_t>& ends) {
   constexpr std::size_t kMost = 2 * kLeafHalf, kEntry = 40, kHead = 8;
   constexpr std::uint8_t kVersion = 1;
   std::vector<std::uint64_t> leaves;
@@ -156,8 +165,8 @@ std::vector<std::uint64_t> add_leaves(GroupBytes& to, const std::vector<FileMemb
 
 }  // namespace
 
-std::uint64_t add_chunk_index(Bytes& out, std::uint64_t base, std::span<const FileChunk> chunks, std::size_t rank,
-                              std::uint64_t chunk_rows) {
+std::uint64_t add_chunk_index(Bytes& out, std::uint64_t base, std::span<const FileChunk> chunks,
+                              std::size_t rank, std::uint64_t chunk_rows) {
   if (chunks.empty()) return kNowhere;
   std::vector<std::uint64_t> addresses;
   for (const FileChunk& chunk : chunks) addresses.push_back(chunk.address);
@@ -177,8 +186,8 @@ std::size_t chunk_index_bytes(std::size_t chunks, std::size_t rank) {
   return chunks == 0 ? 0 : tree_bytes(chunk_tree(rank), chunks);
 }
 
-std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::string_view prefix, std::vector<FileMember> members,
-                              bool root, const Spill& spill) {
+std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::string_view prefix,
+                              std::vector<FileMember> members, bool root, const Spill& spill) {
   std::sort(members.begin(), members.end(), [](const FileMember& a, const FileMember& b) {
     return std::to_string(a.number) < std::to_string(b.number);  // as names are
   });
@@ -188,15 +197,16 @@ std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::string_view p
   std::vector<std::size_t> ends;
   const std::vector<std::uint64_t> leaves = add_leaves(to, members, begins, ends);
   // Key i: the last name before child i, the empty one before the first.
-  const std::uint64_t tree = add_tree(out, to.base(), group_tree(), leaves, [&](Bytes& keys, std::size_t i) {
-    keys.number(i == 0 ? std::uint64_t{0} : begins[ends[i - 1] - 1]);
-  });
+  const std::uint64_t tree =
+      add_tree(out, to.base(), group_tree(), leaves, [&](Bytes& keys, std::size_t i) {
+        keys.number(i == 0 ? std::uint64_t{0} : begins[ends[i - 1] - 1]);
+      });
   constexpr std::uint8_t kVersion = 1;
   constexpr std::uint16_t kSymbolTable = 0x11, kBytes = 16;
   const std::uint64_t group = to.here();
   out.number(kVersion);
   out.zeros(1);
-  out.number<std::uint16_t>(1);       // messages
+  out.number<std::uint16_t>(1);             // messages
   out.number<std::uint32_t>(root ? 1 : 0);  // links to it
   out.number<std::uint32_t>(8 + kBytes);
   out.zeros(4);

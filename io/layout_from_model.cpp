@@ -108,8 +108,8 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));
   for (const StepStatus status :
-       {StepStatus::converged, StepStatus::split, StepStatus::not_converged,
-        StepStatus::non_finite, StepStatus::rotation, StepStatus::singular})
+       {StepStatus::converged, StepStatus::split, StepStatus::not_converged, StepStatus::non_finite,
+        StepStatus::rotation, StepStatus::singular})
     layout.statuses.push_back({static_cast<std::int8_t>(status), to_string(status)});
   for (const RandomizationDescription& description : scene.randomizations)
     layout.randomized_names.push_back(randomized_name(description));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Minari wants episodes numbered without gaps, one more observation than actions, and both ends of an episode apart.
+// Minari wants episodes numbered without gaps, one more observation than actions, and both ends of
+// an episode apart.
 #include "io/minari_view.hpp"
 
 #include <fmt/format.h>
@@ -19,20 +20,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kMinariVersion = "0.5.3";   // the layout that is written here
-constexpr const char* kToFolder = "../../../../"; // from …/minari/tangere/NAME-v0/data
+constexpr const char* kMinariVersion = "0.5.3";    // the layout that is written here
+constexpr const char* kToFolder = "../../../../";  // from …/minari/tangere/NAME-v0/data
 
 /// Letters, digits, - and _ are what Minari accepts.
 std::string dataset_name(std::string name) {
   for (char& c : name) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '-' || c == '_';
     if (!plain) c = '-';
   }
   return name.empty() ? "dataset" : name;
 }
 
 /// A number in as many lists as a shape says: all bounds are the same.
-std::string nested(const std::vector<std::uint64_t>& shape, std::size_t from, const std::string& number) {
+std::string nested(const std::vector<std::uint64_t>& shape, std::size_t from,
+                   const std::string& number) {
   if (from == shape.size()) return number;
   const std::string inner = nested(shape, from + 1, number);
   std::string text = "[";
@@ -43,8 +46,9 @@ std::string nested(const std::vector<std::uint64_t>& shape, std::size_t from, co
 /// A Gymnasium Box as Minari writes it; infinite bounds are bare words there.
 std::string box(const DemoArray& array, const std::string& low, const std::string& high) {
   return fmt::format(R"({{"type": "Box", "dtype": "{}", "shape": [{}], "low": {}, "high": {}}})",
-                     array.type == h5::NumberType::float32 ? "float32" : "float64", fmt::join(array.shape, ", "),
-                     nested(array.shape, 0, low), nested(array.shape, 0, high));
+                     array.type == h5::NumberType::float32 ? "float32" : "float64",
+                     fmt::join(array.shape, ", "), nested(array.shape, 0, low),
+                     nested(array.shape, 0, high));
 }
 
 std::string bound(double value) {
@@ -54,11 +58,13 @@ std::string bound(double value) {
 
 }  // namespace
 
-MinariView::MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members) : members_(members) {
+MinariView::MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members)
+    : members_(members) {
   const h5::Id scene = h5::open_group(shard, "/scene");
   command_ = h5::read_text(h5::open_group(shard, "/"), "command");
   const std::string task = h5::read_text(scene, "task");
-  id_ = fmt::format("tangere/{}-v0", dataset_name(task.starts_with("none") ? h5::read_text(scene, "name") : task));
+  id_ = fmt::format("tangere/{}-v0",
+                    dataset_name(task.starts_with("none") ? h5::read_text(scene, "name") : task));
   seed_ = h5::read_numbers<std::uint64_t>(scene, "seed").at(0);
   if (members.of_task) {
     low_ = bound(h5::read_numbers<double>(scene, "action_low").at(0));
@@ -67,7 +73,8 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
   folder_ = (fs::path(folder) / "minari" / id_ / "data").string();
   std::error_code error;
   fs::create_directories(folder_, error);
-  if (error) throw IoError(fmt::format("cannot create the folder '{}': {}", folder_, error.message()));
+  if (error)
+    throw IoError(fmt::format("cannot create the folder '{}': {}", folder_, error.message()));
   file_.emplace((fs::path(folder_) / "main_data.hdf5").string(), true, true);
   file_->close();
 }
@@ -75,7 +82,8 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
 void MinariView::add(std::string_view file, std::span<const LinkedDemo> demos) {
   h5::Bytes out;
   for (const h5::FileMember& episode :
-       add_minari_episodes(out, file_->here(), members_, fmt::format("{}{}", kToFolder, file), demos, count_, seed_))
+       add_minari_episodes(out, file_->here(), members_, fmt::format("{}{}", kToFolder, file),
+                           demos, count_, seed_))
     episodes_.push_back(episode);
   file_->append(out);
   count_ += std::ssize(demos);
@@ -93,14 +101,18 @@ void MinariView::commit() {
 std::string MinariView::metadata() const {
   std::string subspaces;
   for (const DemoArray& array : members_.observations)
-    subspaces += fmt::format("{}{}: {}", subspaces.empty() ? "" : ", ", json_text(array.name), box(array, "-Infinity", "Infinity"));
-  const std::string observation = fmt::format(R"({{"type": "Dict", "subspaces": {{{}}}}})", subspaces);
+    subspaces += fmt::format("{}{}: {}", subspaces.empty() ? "" : ", ", json_text(array.name),
+                             box(array, "-Infinity", "Infinity"));
+  const std::string observation =
+      fmt::format(R"({{"type": "Dict", "subspaces": {{{}}}}})", subspaces);
   return fmt::format(
-      "{{\"dataset_id\": {}, \"data_format\": \"hdf5\", \"minari_version\": \"{}\", \"total_episodes\": {}, "
-      "\"total_steps\": {}, \"observation_space\": {}, \"action_space\": {}, \"algorithm_name\": {}, "
+      "{{\"dataset_id\": {}, \"data_format\": \"hdf5\", \"minari_version\": \"{}\", "
+      "\"total_episodes\": {}, "
+      "\"total_steps\": {}, \"observation_space\": {}, \"action_space\": {}, \"algorithm_name\": "
+      "{}, "
       "\"description\": {}}}\n",
-      json_text(id_), kMinariVersion, count_, steps_, json_text(observation), json_text(box(members_.actions, low_, high_)),
-      json_text("tangere"), json_text(command_));
+      json_text(id_), kMinariVersion, count_, steps_, json_text(observation),
+      json_text(box(members_.actions, low_, high_)), json_text("tangere"), json_text(command_));
 }
 
 }  // namespace tangere

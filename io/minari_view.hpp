@@ -17,7 +17,8 @@ namespace tangere {
 /// FOLDER/minari/tangere/NAME-v0/data. Everything throws IoError.
 class MinariView {
  public:
-  /// Begins it, in place of one that is there; `shard`: anything in one of the folder's shards; `members` must outlive it.
+  /// Begins it, in place of one that is there; `shard`: anything in one of the folder's shards;
+  /// `members` must outlive it.
   MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members);
 
   /// Demos of a file of the data set's folder, given without its path, in ascending order.

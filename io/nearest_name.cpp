@@ -47,7 +47,8 @@ std::string suggestion(std::string_view wrong, std::span<const std::string> cand
   if (candidates.empty()) return "";
   constexpr std::size_t kMost = 24;
   std::string list = "; expected one of ";
-  for (std::size_t i = 0; i < candidates.size() && i < kMost; ++i) list += (i > 0 ? ", " : "") + candidates[i];
+  for (std::size_t i = 0; i < candidates.size() && i < kMost; ++i)
+    list += (i > 0 ? ", " : "") + candidates[i];
   return candidates.size() > kMost ? list + ", …" : list;
 }
 

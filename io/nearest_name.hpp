@@ -8,7 +8,8 @@
 
 namespace tangere {
 
-/// The candidate with the smallest edit distance; "" when none is near (more than about half of it would change).
+/// The candidate with the smallest edit distance; "" when none is near (more than about half of it
+/// would change).
 std::string nearest_name(std::string_view wrong, std::span<const std::string> candidates);
 
 /// "; did you mean 'x'?" or "; expected one of a, b, c" or "" when there are no candidates.

@@ -34,8 +34,8 @@ void check_folder(const std::string& output) {
   struct stat info {};
   if (stat(folder.c_str(), &info) != 0) {
     if (errno == ENOENT)
-      throw IoError(fmt::format("cannot write '{}': the folder '{}' does not exist; create it first",
-                                output, folder));
+      throw IoError(fmt::format(
+          "cannot write '{}': the folder '{}' does not exist; create it first", output, folder));
     fail("look at the folder", folder, errno);
   }
   if (!S_ISDIR(info.st_mode))
@@ -59,7 +59,8 @@ void check_output(const std::string& output, bool overwrite) {
 
 /// Whether the open file still is the one at `path`: its owner may have renamed it meanwhile.
 bool is_at(int descriptor, const std::string& path) {
-  struct stat ours {}, there {};
+  struct stat ours {
+  }, there{};
   return fstat(descriptor, &ours) == 0 && lstat(path.c_str(), &there) == 0 &&
          ours.st_dev == there.st_dev && ours.st_ino == there.st_ino;
 }
@@ -189,10 +190,12 @@ void PartFile::write_at(std::uint64_t offset, std::span<iovec> pieces) {
 
 void PartFile::read_at(std::uint64_t offset, std::span<unsigned char> bytes) const {
   while (!bytes.empty()) {
-    const ssize_t result = pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    const ssize_t result =
+        pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (result < 0 && errno == EINTR) continue;
     if (result < 0) fail("read", path_, errno);
-    if (result == 0) throw IoError(fmt::format("'{}' ends at byte {}, expected more of it", path_, offset));
+    if (result == 0)
+      throw IoError(fmt::format("'{}' ends at byte {}, expected more of it", path_, offset));
     offset += static_cast<std::uint64_t>(result);
     bytes = bytes.subspan(static_cast<std::size_t>(result));
   }

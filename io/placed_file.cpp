@@ -16,7 +16,9 @@ constexpr std::size_t kReadBytes = std::size_t{1} << 20;
 constexpr std::size_t kMostQueued = 1024;
 constexpr std::size_t kRawName = ~std::size_t{0};  // no dataset has this number
 
-std::size_t bytes_of(const PlacedRows& rows) { return static_cast<std::size_t>(rows.rows) * rows.row_bytes; }
+std::size_t bytes_of(const PlacedRows& rows) {
+  return static_cast<std::size_t>(rows.rows) * rows.row_bytes;
+}
 
 }  // namespace
 
@@ -63,7 +65,8 @@ void PlacedFile::end_at(std::uint64_t end, std::uint64_t root) {
 
 void PlacedFile::verify() const {
   std::vector<Place> places = places_;
-  std::sort(places.begin(), places.end(), [](const Place& a, const Place& b) { return a.address < b.address; });
+  std::sort(places.begin(), places.end(),
+            [](const Place& a, const Place& b) { return a.address < b.address; });
   ContentSum sum;
   std::vector<unsigned char> buffer;
   for (std::size_t first = 0; first < places.size();) {
@@ -79,12 +82,14 @@ void PlacedFile::verify() const {
     part_.read_at(begin, std::span(buffer).first(bytes));
     for (; first < end; ++first) {
       const PlacedRows& r = places[first].rows;
-      sum.add(r.episode, r.name, r.first_row, r.rows, r.row_bytes, buffer.data() + (places[first].address - begin));
+      sum.add(r.episode, r.name, r.first_row, r.rows, r.row_bytes,
+              buffer.data() + (places[first].address - begin));
     }
   }
   if (sum.value() != expected_.value())
-    throw IoError(fmt::format("'{}' is damaged: read back, the checksum of what was written is {:016x}, expected {:016x}",
-                              part_.path(), sum.value(), expected_.value()));
+    throw IoError(fmt::format(
+        "'{}' is damaged: read back, the checksum of what was written is {:016x}, expected {:016x}",
+        part_.path(), sum.value(), expected_.value()));
 }
 
 }  // namespace tangere

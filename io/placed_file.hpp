@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file that is written in places, in any order, and read back afterwards: whether the disk has what it was given.
+// A file that is written in places, in any order, and read back afterwards: whether the disk has
+// what it was given.
 #pragma once
 
 #include <sys/uio.h>
@@ -26,7 +27,8 @@ class PlacedFile {
  public:
   explicit PlacedFile(PartFile& part) : part_(part) {}
 
-  /// Rows whose sum somebody else knows: expect() it. `data` must stay until flush(), as below. Places ascend until then.
+  /// Rows whose sum somebody else knows: expect() it. `data` must stay until flush(), as below.
+  /// Places ascend until then.
   void add(std::uint64_t address, const PlacedRows& rows, const void* data);
   void expect(const ContentSum& sum) { expected_.add(sum); }
   /// Bytes of which nothing is known.
@@ -37,7 +39,8 @@ class PlacedFile {
   /// At once; verify() does not look at it.
   void write_unchecked(std::uint64_t address, std::span<const unsigned char> bytes);
 
-  /// Tells the library where the file ends, and where its group "/" is unless that leads nowhere; verify() does not look at it.
+  /// Tells the library where the file ends, and where its group "/" is unless that leads nowhere;
+  /// verify() does not look at it.
   void end_at(std::uint64_t end, std::uint64_t root = h5::kNowhere);
 
   /// Reads all that was written. Throws IoError when it is not the same.

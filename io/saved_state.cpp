@@ -22,11 +22,13 @@ std::vector<double> read_row(const h5::Id& dataset, std::int64_t row) {
   const h5::Dims dims = h5::dimensions(dataset);
   std::vector<double> values(dims[1] * dims[2]);
   if (!values.empty())
-    h5::read_box<double>(dataset, {static_cast<hsize_t>(row), 0, 0}, {1, dims[1], dims[2]}, values.data());
+    h5::read_box<double>(dataset, {static_cast<hsize_t>(row), 0, 0}, {1, dims[1], dims[2]},
+                         values.data());
   return values;
 }
 
-std::vector<StepStatus> read_status(const h5::Id& file, std::int64_t step, std::size_t environments) {
+std::vector<StepStatus> read_status(const h5::Id& file, std::int64_t step,
+                                    std::size_t environments) {
   std::vector<std::int8_t> values(environments);
   h5::read_box<std::int8_t>(h5::open_dataset(h5::open_group(file, "solver"), "status"),
                             {static_cast<hsize_t>(step), 0}, {1, environments}, values.data());
@@ -38,11 +40,12 @@ std::vector<StepStatus> read_status(const h5::Id& file, std::int64_t step, std::
 void check_names(const SavedState& from, const char* what, const std::vector<std::string>& names,
                  std::span<const std::string> expected) {
   if (names.size() != expected.size())
-    throw InputError(fmt::format("{}: {} numbers in {}; the scene has {}", from.path, names.size(), what, expected.size()));
+    throw InputError(fmt::format("{}: {} numbers in {}; the scene has {}", from.path, names.size(),
+                                 what, expected.size()));
   for (std::size_t i = 0; i < names.size(); ++i)
     if (names[i] != expected[i])
-      throw InputError(fmt::format("{}: number {} of {} is '{}'; in the scene it is '{}'", from.path, i, what, names[i],
-                                   expected[i]));
+      throw InputError(fmt::format("{}: number {} of {} is '{}'; in the scene it is '{}'",
+                                   from.path, i, what, names[i], expected[i]));
 }
 
 }  // namespace
@@ -88,14 +91,16 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
   check_names(from, "q", from.q_names, model.q_names());
   check_names(from, "v", from.v_names, model.v_names());
   if (batch.environments() > from.environments)
-    throw InputError(fmt::format("{} environments; {} has {}", batch.environments(), from.path, from.environments));
+    throw InputError(fmt::format("{} environments; {} has {}", batch.environments(), from.path,
+                                 from.environments));
   const auto nq = static_cast<std::size_t>(model.nq()), nv = static_cast<std::size_t>(model.nv());
   for (int e = 0; e < batch.environments(); ++e) {
     const auto part = [e](const std::vector<double>& all, std::size_t width) {
       return std::span(all).subspan(static_cast<std::size_t>(e) * width, width);
     };
     if (continues && from.row > 0) {
-      batch.set_state(e, part(from.q, nq), part(from.v, nv), part(from.previous_q, nq), part(from.previous_v, nv));
+      batch.set_state(e, part(from.q, nq), part(from.v, nv), part(from.previous_q, nq),
+                      part(from.previous_v, nv));
     } else {
       batch.set_state(e, part(from.q, nq), part(from.v, nv));
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layout: captions, the axes, a line that explains the marks. Lengths in SVG units (pixels at 96 dpi).
+// Layout: captions, the axes, a line that explains the marks. Lengths in SVG units (pixels at 96
+// dpi).
 #include "io/scaling_plot.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A picture of speed against threads, beside the straight line that it would be at best. SVG, no window.
+// A picture of speed against threads, beside the straight line that it would be at best. SVG, no
+// window.
 #pragma once
 
 #include <string>
@@ -18,9 +19,9 @@ struct ScalingCurve {
   std::vector<ScalingPoint> points;   ///< at least one, in any order
 };
 
-/// A dot for the best and a bar down to the median of each thread count; both axes start at zero. The ideal line goes
-/// through zero and the point with the fewest threads. Throws InputError without points, or for one that is not finite
-/// and positive.
+/// A dot for the best and a bar down to the median of each thread count; both axes start at zero.
+/// The ideal line goes through zero and the point with the fewest threads. Throws InputError
+/// without points, or for one that is not finite and positive.
 std::string render_scaling_svg(const ScalingCurve& curve);
 
 }  // namespace tangere

@@ -24,7 +24,8 @@ JointEffects effects_in_si(const SceneNode& node, bool turns) {
   e.limit_stiffness = number("lim_stiffness", JointField::lim_stiffness);
   if (node.has("lim")) {
     const std::vector<double> x = node.numbers("lim", 2);
-    if (!(x[0] <= x[1])) node.fail(fmt::format("lim=\"{} {}\": expected low, then high", x[0], x[1]));
+    if (!(x[0] <= x[1]))
+      node.fail(fmt::format("lim=\"{} {}\": expected low, then high", x[0], x[1]));
     const double length = turns ? 1 : c.length;
     e.limits = {x[0] * length, x[1] * length};
   }
@@ -37,16 +38,19 @@ std::vector<double> read_rest(const SceneNode& node, JointType type) {
   const auto count = std::size_t(dof_count(type));
   if (rest.size() == 1) rest.assign(count, rest[0]);
   if (rest.size() != count)
-    node.fail(count == 1 ? fmt::format("rest has {} numbers; expected 1", rest.size())
-                         : fmt::format("rest has {} numbers; expected 1 or {}", rest.size(), count));
+    node.fail(count == 1
+                  ? fmt::format("rest has {} numbers; expected 1", rest.size())
+                  : fmt::format("rest has {} numbers; expected 1 or {}", rest.size(), count));
   double square = 0;
   for (std::size_t k = 0; k < count; ++k) {
     if (!dof_turns(type, static_cast<int>(k))) rest[k] *= node.context().length;
-    if ((type == JointType::spherical || type == JointType::free) && dof_turns(type, static_cast<int>(k)))
+    if ((type == JointType::spherical || type == JointType::free) &&
+        dof_turns(type, static_cast<int>(k)))
       square += rest[k] * rest[k];
   }
   if (!(square < M_PI * M_PI))
-    node.fail(fmt::format("rest turns by {} rad; expected a rotation vector shorter than pi", std::sqrt(square)));
+    node.fail(fmt::format("rest turns by {} rad; expected a rotation vector shorter than pi",
+                          std::sqrt(square)));
   return rest;
 }
 
@@ -64,7 +68,8 @@ void read_motor(const SceneNode& node, bool turns, MotorDescription& motor) {
   if (position) {
     motor.P = node.not_negative("P") * joint_field_scale(JointField::P, turns, c);
     motor.D = node.not_negative("D", 0.0) * joint_field_scale(JointField::D, turns, c);
-    motor.timing = node.choice("timing", {"end", "start"}, 0) == 1 ? MotorTiming::start : MotorTiming::end;
+    motor.timing =
+        node.choice("timing", {"end", "start"}, 0) == 1 ? MotorTiming::start : MotorTiming::end;
     motor.high = std::numeric_limits<double>::infinity();
     motor.low = -motor.high;
     if (!node.has("ctrl_range")) return;
@@ -82,32 +87,27 @@ double coordinate_scale(JointType type, int index, const SceneContext& c) {
   switch (type) {
     case JointType::fixed:
     case JointType::revolute:
-    case JointType::spherical:
-      return 1;
+    case JointType::spherical: return 1;
     case JointType::prismatic:
     case JointType::planar:
-    case JointType::translational:
-      return c.length;
-    case JointType::free2d:
-      return index < 2 ? c.length : 1;
-    case JointType::free:
-      break;
+    case JointType::translational: return c.length;
+    case JointType::free2d: return index < 2 ? c.length : 1;
+    case JointType::free: break;
   }
   return index < 3 ? c.length : 1;
 }
 
 double joint_field_scale(JointField field, bool turns, const SceneContext& c) {
-  if (turns) return c.rotational;  // torque per angle, its rate or its acceleration: a mass times a length twice
+  if (turns)
+    return c
+        .rotational;  // torque per angle, its rate or its acceleration: a mass times a length twice
   switch (field) {
     case JointField::damping:
-    case JointField::D:
-      return c.damping_force;
-    case JointField::armature:
-      return c.density * c.length * c.length * c.length;
+    case JointField::D: return c.damping_force;
+    case JointField::armature: return c.density * c.length * c.length * c.length;
     case JointField::stiffness:
     case JointField::lim_stiffness:
-    case JointField::P:
-      break;
+    case JointField::P: break;
   }
   return c.stiffness;
 }
@@ -115,14 +115,17 @@ double joint_field_scale(JointField field, bool turns, const SceneContext& c) {
 void read_joint_effects(const SceneNode& node, JointDescription& joint) {
   const bool mixed = joint.type == JointType::free || joint.type == JointType::free2d;
   if (joint.type == JointType::fixed) {
-    joint.damping = node.not_negative("damping", 0.0) * node.context().damping_force;  // checked, though nothing moves
+    joint.damping = node.not_negative("damping", 0.0) *
+                    node.context().damping_force;  // checked, though nothing moves
     return;
   }
   static_cast<JointEffects&>(joint) = effects_in_si(node, !mixed && dof_turns(joint.type, 0));
   if (mixed && has_effect(joint)) joint.turning = effects_in_si(node, true);
   if (node.has("rest")) joint.rest = read_rest(node, joint.type);
-  if (node.has("rest") && joint.stiffness == 0) node.warn("'rest' has no effect without 'stiffness'");
-  if (node.has("lim") && joint.limit_stiffness == 0) node.warn("'lim' has no effect without 'lim_stiffness'");
+  if (node.has("rest") && joint.stiffness == 0)
+    node.warn("'rest' has no effect without 'stiffness'");
+  if (node.has("lim") && joint.limit_stiffness == 0)
+    node.warn("'lim' has no effect without 'lim_stiffness'");
 }
 
 std::vector<double> control_scales(const Scene& scene, const SceneContext& c) {
@@ -130,7 +133,8 @@ std::vector<double> control_scales(const Scene& scene, const SceneContext& c) {
   for (const MotorDescription& m : scene.motors)
     for (const LinkDescription& l : scene.links)
       for (int k = 0; l.joint.name == m.joint && k < dof_count(l.joint.type); ++k)
-        scales.push_back(m.control == MotorControl::position && !dof_turns(l.joint.type, k) ? c.length : 1);
+        scales.push_back(
+            m.control == MotorControl::position && !dof_turns(l.joint.type, k) ? c.length : 1);
   return scales;
 }
 
@@ -149,10 +153,13 @@ void read_actuators(Scene& scene, const SceneNode& section) {
     motor.source = node.source();
     const JointType type = scene.links[std::size_t(find_joint(scene, node, "joint"))].joint.type;
     motor.joint = node.text("joint");
-    motor.control = node.choice("ctrl", {"force", "position"}) == 1 ? MotorControl::position : MotorControl::force;
-    if (type == JointType::fixed) node.fail("joint '" + motor.joint + "' is fixed; a motor needs a joint that moves");
+    motor.control = node.choice("ctrl", {"force", "position"}) == 1 ? MotorControl::position
+                                                                    : MotorControl::force;
+    if (type == JointType::fixed)
+      node.fail("joint '" + motor.joint + "' is fixed; a motor needs a joint that moves");
     if (type == JointType::free || type == JointType::free2d)
-      node.fail("joint '" + motor.joint + "' mixes forces and torques; a motor needs a joint of one kind");
+      node.fail("joint '" + motor.joint +
+                "' mixes forces and torques; a motor needs a joint of one kind");
     for (const MotorDescription& other : scene.motors)
       if (other.joint == motor.joint) node.fail("joint '" + motor.joint + "' already has a motor");
     read_motor(node, dof_turns(type, 0), motor);

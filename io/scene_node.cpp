@@ -27,15 +27,18 @@ void SceneNode::fail(const std::string& message) const {
 }
 
 void SceneNode::fail_at(const char* attribute, const std::string& message) const {
-  const SceneContext::Default* given = element_->Attribute(attribute) == nullptr ? find_default(attribute) : nullptr;
-  fail(given == nullptr ? message : fmt::format("{} (from <default>, line {})", message, given->line));
+  const SceneContext::Default* given =
+      element_->Attribute(attribute) == nullptr ? find_default(attribute) : nullptr;
+  fail(given == nullptr ? message
+                        : fmt::format("{} (from <default>, line {})", message, given->line));
 }
 
 void SceneNode::warn(const std::string& message) const {
   context_->warnings.push_back(source().prefix() + "<" + name() + ">: " + message);
 }
 
-void SceneNode::check_attributes(const std::vector<std::string>& used, const std::vector<std::string>& pictures,
+void SceneNode::check_attributes(const std::vector<std::string>& used,
+                                 const std::vector<std::string>& pictures,
                                  const std::vector<std::string>& unused) const {
   const auto in = [](const std::vector<std::string>& list, const std::string& word) {
     return std::find(list.begin(), list.end(), word) != list.end();
@@ -70,8 +73,8 @@ std::vector<SceneNode> SceneNode::children(const std::vector<std::string>& known
     } else if (const tinyxml2::XMLText* t = n->ToText()) {
       const std::string text = t->Value();
       if (!std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isspace(c); }))
-        context_->warnings.push_back(fmt::format("{}:{}: stray text inside <{}> is ignored", context_->file,
-                                                 n->GetLineNum(), name()));
+        context_->warnings.push_back(fmt::format("{}:{}: stray text inside <{}> is ignored",
+                                                 context_->file, n->GetLineNum(), name()));
     }
   }
   return out;
@@ -93,7 +96,8 @@ const SceneContext::Default* SceneNode::find_default(const char* attribute) cons
 std::string SceneNode::text(const char* attribute) const {
   const char* value = find(attribute);
   if (value == nullptr) fail(fmt::format("attribute '{}' is missing", attribute));
-  if (*value == '\0') fail_at(attribute, fmt::format("attribute '{}' is empty; expected a value", attribute));
+  if (*value == '\0')
+    fail_at(attribute, fmt::format("attribute '{}' is empty; expected a value", attribute));
   return value;
 }
 
@@ -101,11 +105,14 @@ std::string SceneNode::text(const char* attribute, const std::string& fallback) 
   return has(attribute) ? text(attribute) : fallback;
 }
 
-int SceneNode::choice(const char* attribute, const std::vector<std::string>& words, std::optional<int> fallback) const {
+int SceneNode::choice(const char* attribute, const std::vector<std::string>& words,
+                      std::optional<int> fallback) const {
   if (fallback && !has(attribute)) return *fallback;
   const std::string value = text(attribute);
   const auto it = std::find(words.begin(), words.end(), value);
-  if (it == words.end()) fail_at(attribute, fmt::format("{}=\"{}\" is not known{}", attribute, value, suggestion(value, words)));
+  if (it == words.end())
+    fail_at(attribute,
+            fmt::format("{}=\"{}\" is not known{}", attribute, value, suggestion(value, words)));
   return static_cast<int>(it - words.begin());
 }
 
@@ -118,15 +125,17 @@ std::vector<double> SceneNode::numbers(const char* attribute, std::size_t count)
     if (*p == '\0') break;
     char* end = nullptr;
     const double x = std::strtod(p, &end);
-    const bool whole = end != p && (*end == '\0' || *end == ',' || std::isspace(static_cast<unsigned char>(*end)) != 0);
+    const bool whole = end != p && (*end == '\0' || *end == ',' ||
+                                    std::isspace(static_cast<unsigned char>(*end)) != 0);
     if (!whole || !std::isfinite(x))
-      fail_at(attribute, fmt::format("{}=\"{}\": expected finite numbers, found '{}'", attribute, value.substr(0, 80),
-                       std::string(p).substr(0, 20)));
+      fail_at(attribute, fmt::format("{}=\"{}\": expected finite numbers, found '{}'", attribute,
+                                     value.substr(0, 80), std::string(p).substr(0, 20)));
     out.push_back(x);
     p = end;
   }
   if (count > 0 && out.size() != count)
-    fail_at(attribute, fmt::format("{}=\"{}\" has {} numbers; expected {}", attribute, value.substr(0, 80), out.size(), count));
+    fail_at(attribute, fmt::format("{}=\"{}\" has {} numbers; expected {}", attribute,
+                                   value.substr(0, 80), out.size(), count));
   return out;
 }
 
@@ -137,7 +146,8 @@ double SceneNode::number(const char* attribute, std::optional<double> fallback) 
 
 double SceneNode::positive(const char* attribute, std::optional<double> fallback) const {
   const double x = number(attribute, fallback);
-  if (!(x > 0)) fail_at(attribute, fmt::format("{}=\"{}\"; expected a positive number", attribute, x));
+  if (!(x > 0))
+    fail_at(attribute, fmt::format("{}=\"{}\"; expected a positive number", attribute, x));
   return x;
 }
 
@@ -147,21 +157,24 @@ double SceneNode::not_negative(const char* attribute, std::optional<double> fall
   return x;
 }
 
-int SceneNode::integer(const char* attribute, int lowest, int highest, std::optional<int> fallback) const {
+int SceneNode::integer(const char* attribute, int lowest, int highest,
+                       std::optional<int> fallback) const {
   if (fallback && !has(attribute)) return *fallback;
   const double x = number(attribute);
   if (x != std::floor(x) || x < lowest || x > highest)
-    fail_at(attribute, fmt::format("{}=\"{}\"; expected an integer from {} to {}", attribute, x, lowest, highest));
+    fail_at(attribute, fmt::format("{}=\"{}\"; expected an integer from {} to {}", attribute, x,
+                                   lowest, highest));
   return static_cast<int>(x);
 }
 
-std::vector<int> SceneNode::integers(const char* attribute, const std::vector<int>& fallback, int lowest,
-                                     int highest) const {
+std::vector<int> SceneNode::integers(const char* attribute, const std::vector<int>& fallback,
+                                     int lowest, int highest) const {
   if (!has(attribute)) return fallback;
   const std::vector<double> x = numbers(attribute, fallback.size());
   for (const double n : x)
     if (n != std::floor(n) || n < lowest || n > highest)
-      fail_at(attribute, fmt::format("{} has {}; expected integers from {} to {}", attribute, n, lowest, highest));
+      fail_at(attribute, fmt::format("{} has {}; expected integers from {} to {}", attribute, n,
+                                     lowest, highest));
   return {x.begin(), x.end()};
 }
 
@@ -175,7 +188,9 @@ Vector3 SceneNode::direction(const char* attribute, std::optional<Vector3> fallb
   Vector3 a = vector(attribute, fallback);
   const double length = std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
   if (!(length > 1e-100) || !std::isfinite(length))
-    fail_at(attribute, fmt::format("{}=\"{} {} {}\" has no direction; expected a vector of positive length", attribute, a[0], a[1], a[2]));
+    fail_at(attribute,
+            fmt::format("{}=\"{} {} {}\" has no direction; expected a vector of positive length",
+                        attribute, a[0], a[1], a[2]));
   if (std::abs(length - 1) > 1e-15)
     for (double& x : a) x /= length;
   return a;
@@ -186,7 +201,9 @@ Quaternion SceneNode::quaternion(const char* attribute) const {
   const std::vector<double> q = numbers(attribute, 4);
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!(length > 1e-100) || !std::isfinite(length))
-    fail_at(attribute, fmt::format("{}=\"{} {} {} {}\" is no rotation; expected w x y z, not all zero", attribute, q[0], q[1], q[2], q[3]));
+    fail_at(attribute,
+            fmt::format("{}=\"{} {} {} {}\" is no rotation; expected w x y z, not all zero",
+                        attribute, q[0], q[1], q[2], q[3]));
   return {q[0] / length, q[1] / length, q[2] / length, q[3] / length};
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The file as a whole: options, defaults, the tree of links. What hangs on the tree is read in scene_sections.cpp.
+// The file as a whole: options, defaults, the tree of links. What hangs on the tree is read in
+// scene_sections.cpp.
 #include "io/scene_reader.hpp"
 
 #include <fmt/format.h>
@@ -19,13 +20,13 @@ namespace {
 constexpr std::uintmax_t kLargestFile = 64U << 20;  // a scene is text written by people
 constexpr int kDeepestTree = 200;
 
-const std::vector<std::string> kJointTypes = {"fixed",     "revolute",       "prismatic", "planar",
-                                              "free2d",    "translational",  "spherical", "spherical-euler",
-                                              "spherical-exp", "free3d",     "free3d-euler", "free3d-exp"};
-constexpr JointType kJointTypeOf[] = {JointType::fixed,     JointType::revolute,      JointType::prismatic,
-                                      JointType::planar,    JointType::free2d,        JointType::translational,
-                                      JointType::spherical, JointType::spherical,     JointType::spherical,
-                                      JointType::free,      JointType::free,          JointType::free};
+const std::vector<std::string> kJointTypes = {
+    "fixed",     "revolute",        "prismatic",     "planar", "free2d",       "translational",
+    "spherical", "spherical-euler", "spherical-exp", "free3d", "free3d-euler", "free3d-exp"};
+constexpr JointType kJointTypeOf[] = {
+    JointType::fixed,     JointType::revolute,      JointType::prismatic, JointType::planar,
+    JointType::free2d,    JointType::translational, JointType::spherical, JointType::spherical,
+    JointType::spherical, JointType::free,          JointType::free,      JointType::free};
 
 class TreeReader {
  public:
@@ -72,7 +73,9 @@ class TreeReader {
 
   void unique(const std::string& kind, const std::string& name, const SceneNode& node) {
     const auto [first, is_new] = names_.try_emplace(kind + "/" + name, node.source().line);
-    if (!is_new) node.fail(fmt::format("{} name '{}' is used twice, first in line {}", kind, name, first->second));
+    if (!is_new)
+      node.fail(
+          fmt::format("{} name '{}' is used twice, first in line {}", kind, name, first->second));
   }
 
   JointDescription read_joint(const SceneNode& node, int parent) {
@@ -83,13 +86,15 @@ class TreeReader {
     unique("joint", joint.name, node);
     joint.type = kJointTypeOf[node.choice("type", kJointTypes)];
     std::vector<std::string> used = {"name", "type", "pos", "quat", "frame", "damping"};
-    std::vector<std::string> idle = {"lim", "lim_stiffness", "stiffness", "rest", "armature", "axis", "axis0", "axis1"};
+    std::vector<std::string> idle = {"lim",      "lim_stiffness", "stiffness", "rest",
+                                     "armature", "axis",          "axis0",     "axis1"};
     const auto take = [&](const char* attribute) {
       used.emplace_back(attribute);
       idle.erase(std::find(idle.begin(), idle.end(), attribute));
     };
     if (joint.type != JointType::fixed)
-      for (const char* effect : {"lim", "lim_stiffness", "stiffness", "rest", "armature"}) take(effect);
+      for (const char* effect : {"lim", "lim_stiffness", "stiffness", "rest", "armature"})
+        take(effect);
     if (joint.type == JointType::revolute || joint.type == JointType::prismatic) {
       take("axis");
       joint.axis0 = node.direction("axis");
@@ -102,7 +107,8 @@ class TreeReader {
     node.check_attributes(used, {}, idle);
     joint.pose.position = scaled(node.vector("pos", Vector3{0, 0, 0}), length);
     joint.pose.orientation = node.quaternion("quat");
-    if (node.choice("frame", {"LOCAL", "WORLD"}, 0) == 1 && parent >= 0) joint.pose = in_parent(joint.pose, parent);
+    if (node.choice("frame", {"LOCAL", "WORLD"}, 0) == 1 && parent >= 0)
+      joint.pose = in_parent(joint.pose, parent);
     read_joint_effects(node, joint);
     return joint;
   }
@@ -115,7 +121,7 @@ class TreeReader {
   }
 
   Scene& scene_;
-  std::map<std::string, int> names_;  // kind/name, line
+  std::map<std::string, int> names_;           // kind/name, line
   std::vector<kernels::Frame<double>> world_;  // rest pose of each joint
 };
 
@@ -124,8 +130,10 @@ void read_option(Scene& scene, const SceneNode& node) {
   node.check_attributes({"gravity", "timestep", "integrator", "unit"});
   scene.gravity = scaled(node.vector("gravity", Vector3{0, 0, -9.8 / c.length}), c.length);
   scene.timestep = node.positive("timestep", 0.02);
-  constexpr Integrator kBy[] = {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit};
-  scene.integrator = kBy[node.choice("integrator", {"BDF1", "BDF2", "SDIRK2", "linear-implicit"}, 0)];
+  constexpr Integrator kBy[] = {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2,
+                                Integrator::linear_implicit};
+  scene.integrator =
+      kBy[node.choice("integrator", {"BDF1", "BDF2", "SDIRK2", "linear-implicit"}, 0)];
 }
 
 void read_solver(Scene& scene, const SceneNode& node) {
@@ -149,7 +157,8 @@ void read_defaults(const SceneNode& node) {
     const std::vector<std::string>& attributes = known.at(child.name());
     child.check_attributes(attributes);
     for (const std::string& a : attributes)
-      if (child.has(a.c_str())) node.context().defaults[child.name()][a] = {child.text(a.c_str()), child.source().line};
+      if (child.has(a.c_str()))
+        node.context().defaults[child.name()][a] = {child.text(a.c_str()), child.source().line};
   }
 }
 
@@ -159,8 +168,8 @@ void read_root(const SceneNode& root, Scene& scene) {
   root.check_attributes({"model", "name"});
   scene.name = root.text("model", root.text("name", "scene"));
   const std::vector<SceneNode> sections =
-      root.children({"option", "solver_option", "ground", "default", "robot", "actuator", "sensor", "contact",
-                     "variable", "virtual", "initial", "control", "randomize"});
+      root.children({"option", "solver_option", "ground", "default", "robot", "actuator", "sensor",
+                     "contact", "variable", "virtual", "initial", "control", "randomize"});
   const auto each = [&](const char* name, auto&& read) {
     for (const SceneNode& s : sections)
       if (s.name() == name) read(s);
@@ -206,12 +215,14 @@ void read_root(const SceneNode& root, Scene& scene) {
 /// What the parser stumbled over.
 const char* fault_of(tinyxml2::XMLError error) {
   switch (error) {
-    case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT: return "an element is closed by another's end tag, or never";
+    case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT:
+      return "an element is closed by another's end tag, or never";
     case tinyxml2::XML_ERROR_PARSING_ELEMENT: return "a tag that is no <name attribute=\"value\">";
     case tinyxml2::XML_ERROR_PARSING_ATTRIBUTE: return "an attribute that is no name=\"value\"";
     case tinyxml2::XML_ERROR_PARSING_COMMENT: return "a comment without its end -->";
     case tinyxml2::XML_ERROR_PARSING_DECLARATION: return "a declaration without its end ?>";
-    case tinyxml2::XML_ERROR_EMPTY_DOCUMENT: return "no element; expected the root <redmax> or <tangere>";
+    case tinyxml2::XML_ERROR_EMPTY_DOCUMENT:
+      return "no element; expected the root <redmax> or <tangere>";
     case tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED: return "elements nested too deep";
     default: return tinyxml2::XMLDocument::ErrorIDToName(error);
   }
@@ -219,25 +230,30 @@ const char* fault_of(tinyxml2::XMLError error) {
 
 }  // namespace
 
-SceneFile parse_scene(const std::string& text, const std::string& name, const SceneReadOptions& options) {
+SceneFile parse_scene(const std::string& text, const std::string& name,
+                      const SceneReadOptions& options) {
   tinyxml2::XMLDocument document;
-  if (text.find('\0') != std::string::npos) throw InputError(name + ": holds a zero byte; expected XML text");
+  if (text.find('\0') != std::string::npos)
+    throw InputError(name + ": holds a zero byte; expected XML text");
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
     const int line = document.ErrorLineNum();
-    throw InputError(fmt::format("{}:{}: not well-formed XML: {}", name, std::max(line, 1), fault_of(document.ErrorID())));
+    throw InputError(fmt::format("{}:{}: not well-formed XML: {}", name, std::max(line, 1),
+                                 fault_of(document.ErrorID())));
   }
   const tinyxml2::XMLElement* root = document.RootElement();
-  if (root == nullptr) throw InputError(name + ":1: no element; expected the root <redmax> or <tangere>");
+  if (root == nullptr)
+    throw InputError(name + ":1: no element; expected the root <redmax> or <tangere>");
   SceneContext context;
   context.file = name;
   context.allow_unknown = options.allow_unknown;
-  for (const tinyxml2::XMLNode* node = document.FirstChild(); node != nullptr; node = node->NextSibling()) {
+  for (const tinyxml2::XMLNode* node = document.FirstChild(); node != nullptr;
+       node = node->NextSibling()) {
     if (node->ToText() != nullptr)
-      context.warnings.push_back(fmt::format("{}:{}: stray text outside <{}> is ignored", name, node->GetLineNum(),
-                                             root->Name()));
+      context.warnings.push_back(fmt::format("{}:{}: stray text outside <{}> is ignored", name,
+                                             node->GetLineNum(), root->Name()));
     if (node->ToElement() != nullptr && node != root)
-      throw InputError(fmt::format("{}:{}: <{}> after the end of <{}>; expected one root", name, node->GetLineNum(),
-                                   node->ToElement()->Name(), root->Name()));
+      throw InputError(fmt::format("{}:{}: <{}> after the end of <{}>; expected one root", name,
+                                   node->GetLineNum(), node->ToElement()->Name(), root->Name()));
   }
   SceneFile out;
   read_root(SceneNode(*root, context), out.scene);
@@ -249,7 +265,8 @@ SceneFile parse_scene(const std::string& text, const std::string& name, const Sc
 
 SceneFile read_scene(const std::filesystem::path& path, const SceneReadOptions& options) {
   std::error_code error;
-  if (std::filesystem::is_directory(path, error)) throw IoError(path.string() + ": is a folder; expected a scene file");
+  if (std::filesystem::is_directory(path, error))
+    throw IoError(path.string() + ": is a folder; expected a scene file");
   std::ifstream file(path, std::ios::binary);
   if (!file) throw IoError(path.string() + ": cannot be opened for reading");
   if (std::filesystem::file_size(path, error) > kLargestFile && !error)

@@ -13,7 +13,8 @@ namespace tangere {
 
 namespace {
 
-std::vector<double> read_coordinates(const SceneNode& node, const char* attribute, JointType type, int count) {
+std::vector<double> read_coordinates(const SceneNode& node, const char* attribute, JointType type,
+                                     int count) {
   std::vector<double> x = node.numbers(attribute, std::size_t(count));
   for (int i = 0; i < count; ++i) x[std::size_t(i)] *= coordinate_scale(type, i, node.context());
   return x;
@@ -36,7 +37,8 @@ PiecewiseControl read_piecewise(const Scene& scene, const SceneNode& node) {
   for (const SceneNode& at : node.children({"at"})) {
     at.check_attributes({"time", "value"});
     const double time = at.not_negative("time");
-    if (control.times.empty() && time != 0) at.fail(fmt::format("time=\"{}\"; the first must be 0", time));
+    if (control.times.empty() && time != 0)
+      at.fail(fmt::format("time=\"{}\"; the first must be 0", time));
     if (!control.times.empty() && !(time > control.times.back()))
       at.fail(fmt::format("time=\"{}\" does not come after {}", time, control.times.back()));
     control.times.push_back(time);
@@ -44,7 +46,8 @@ PiecewiseControl read_piecewise(const Scene& scene, const SceneNode& node) {
   }
   if (control.times.empty()) node.fail("no <at time value>; expected at least one");
   if (control.end > 0 && !(control.end > control.times.back()))
-    node.fail(fmt::format("end=\"{}\" does not come after the last time {}", control.end, control.times.back()));
+    node.fail(fmt::format("end=\"{}\" does not come after the last time {}", control.end,
+                          control.times.back()));
   return control;
 }
 
@@ -68,13 +71,15 @@ Distribution read_distribution(const SceneNode& node, double scale) {
     d.b = x[1];
     if (k < 2 && !(d.a <= d.b)) node.fail(fmt::format("{}: expected low, then high", kinds[k]));
     if (k == 1 && !(d.a > 0)) node.fail("log_uniform: expected positive bounds");
-    if (k == 2 && !(d.b >= 0)) node.fail("normal: expected mean, then a standard deviation of zero or more");
+    if (k == 2 && !(d.b >= 0))
+      node.fail("normal: expected mean, then a standard deviation of zero or more");
   }
   if (found != 1) node.fail("expected exactly one of uniform, log_uniform, normal, list");
   return d;
 }
 
-/// A coefficient must stay zero or more whatever is drawn, so a normal distribution has no place there.
+/// A coefficient must stay zero or more whatever is drawn, so a normal distribution has no place
+/// there.
 void check_coefficient(const SceneNode& node, const Distribution& d) {
   if (d.kind == Distribution::Kind::normal)
     node.fail("normal can draw a negative coefficient; expected uniform, log_uniform or list");
@@ -96,18 +101,22 @@ void read_joint_variation(const Scene& scene, const SceneNode& node, Randomizati
     bool position = false;
     for (const MotorDescription& m : scene.motors)
       position = position || (m.joint == joint.name && m.control == MotorControl::position);
-    if (!position) node.fail("joint '" + joint.name + "' has no position motor; force motors have no gains");
+    if (!position)
+      node.fail("joint '" + joint.name + "' has no position motor; force motors have no gains");
   } else {
     const std::vector<std::string> fields = {"damping", "armature", "stiffness", "lim_stiffness"};
     d.joint_field = static_cast<JointField>(node.choice("field", fields));
-    if (joint.type == JointType::fixed) node.fail("joint '" + joint.name + "' is fixed; nothing of it can vary");
+    if (joint.type == JointType::fixed)
+      node.fail("joint '" + joint.name + "' is fixed; nothing of it can vary");
     if (d.joint_field == JointField::lim_stiffness && !joint.limits)
       node.fail("joint '" + joint.name + "' has no 'lim'");
     const bool mixed = joint.type == JointType::free || joint.type == JointType::free2d;
     if (mixed && node.context().length != 1)
-      node.fail("joint '" + joint.name + "' slides and turns: one number has two units; use unit=\"m-kg\"");
+      node.fail("joint '" + joint.name +
+                "' slides and turns: one number has two units; use unit=\"m-kg\"");
   }
-  d.distribution = read_distribution(node, joint_field_scale(d.joint_field, dof_turns(joint.type, 0), node.context()));
+  d.distribution = read_distribution(
+      node, joint_field_scale(d.joint_field, dof_turns(joint.type, 0), node.context()));
   check_coefficient(node, d.distribution);
 }
 
@@ -118,7 +127,8 @@ void read_state_variation(const Scene& scene, const SceneNode& node, Randomizati
   if (int{node.has("q")} + int{node.has("v")} + int{node.has("pos")} != 1)
     node.fail("expected exactly one of q, v, pos (the index of what varies) and field");
   if (node.has("pos")) {
-    if (type == JointType::fixed) node.fail("joint '" + node.text("name") + "' is fixed; expected one that moves");
+    if (type == JointType::fixed)
+      node.fail("joint '" + node.text("name") + "' is fixed; expected one that moves");
     d.target = RandomTarget::place;
     d.name = node.text("name");
     d.index = node.integer("pos", 0, 2);
@@ -139,9 +149,11 @@ void check_positive(const SceneNode& node, const Distribution& d, const std::str
   if (d.kind == Distribution::Kind::normal)
     node.fail("normal can draw a negative " + what + "; expected uniform, log_uniform or list");
   double least = d.a;
-  if (d.kind == Distribution::Kind::list) least = *std::min_element(d.values.begin(), d.values.end());
+  if (d.kind == Distribution::Kind::list)
+    least = *std::min_element(d.values.begin(), d.values.end());
   if (!(least > 0))
-    node.fail(fmt::format("{} can be {:g}, in SI units; expected positive values only", what, least));
+    node.fail(
+        fmt::format("{} can be {:g}, in SI units; expected positive values only", what, least));
 }
 
 /// The density of a body, or a number of its size.
@@ -149,7 +161,8 @@ void read_body_variation(const Scene& scene, const SceneNode& node, Randomizatio
   node.check_attributes({"name", "field", "size", "uniform", "log_uniform", "normal", "list"});
   const BodyDescription& body = scene.links[std::size_t(find_body(scene, node, "name"))].body;
   d.name = body.name;
-  if (node.has("field") == node.has("size")) node.fail("expected exactly one of field and size (the index of an edge)");
+  if (node.has("field") == node.has("size"))
+    node.fail("expected exactly one of field and size (the index of an edge)");
   if (node.has("size")) {
     d.index = 2 + node.integer("size", 0, 2);
   } else {
@@ -159,8 +172,9 @@ void read_body_variation(const Scene& scene, const SceneNode& node, Randomizatio
     d.target = RandomTarget::size;
     Shape shape = body.shape;
     if (size_number(shape, d.index) == nullptr)
-      node.fail(fmt::format("body '{}' is {} {}, which has no {}; expected a body that has one", body.name,
-                            std::holds_alternative<AbstractShape>(shape) ? "an" : "a", shape_name(shape), size_name(d.index)));
+      node.fail(fmt::format("body '{}' is {} {}, which has no {}; expected a body that has one",
+                            body.name, std::holds_alternative<AbstractShape>(shape) ? "an" : "a",
+                            shape_name(shape), size_name(d.index)));
     d.distribution = read_distribution(node, node.context().length);
     check_positive(node, d.distribution, size_name(d.index));
     return;
@@ -168,7 +182,8 @@ void read_body_variation(const Scene& scene, const SceneNode& node, Randomizatio
   d.index = 0;
   if (std::holds_alternative<AbstractShape>(body.shape))
     node.fail("body '" + body.name + "' is known by its mass; nothing of it can vary");
-  if (!(body.density > 0)) node.fail("body '" + body.name + "' is massless; expected a positive density");
+  if (!(body.density > 0))
+    node.fail("body '" + body.name + "' is massless; expected a positive density");
   d.target = RandomTarget::density;
   d.distribution = read_distribution(node, node.context().density);
   check_positive(node, d.distribution, "density");
@@ -186,8 +201,10 @@ double field_scale(const SceneNode& node, ContactField field, ContactLaw law) {
   return law == ContactLaw::linear ? c.damping_force : c.damping_area;
 }
 
-void read_coefficient_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
-  const bool ground = node.name() == "ground_contact", pair = node.name() == "general_primitive_contact";
+void read_coefficient_variation(const Scene& scene, const SceneNode& node,
+                                RandomizationDescription& d) {
+  const bool ground = node.name() == "ground_contact",
+             pair = node.name() == "general_primitive_contact";
   std::vector<std::string> attributes = {"field", "uniform", "log_uniform", "normal", "list"};
   ContactLaw law = ContactLaw::clamped;
   bool found = false;
@@ -216,7 +233,8 @@ void read_coefficient_variation(const Scene& scene, const SceneNode& node, Rando
       names.push_back(s.name);
       if (s.name == d.name) found = true;
     }
-    if (!found) node.fail("no tactile sensor is named '" + d.name + "'" + suggestion(d.name, names));
+    if (!found)
+      node.fail("no tactile sensor is named '" + d.name + "'" + suggestion(d.name, names));
   }
   if (!found) node.fail("no such contact is declared in <contact>");
   node.check_attributes(attributes);
@@ -238,13 +256,16 @@ void read_initial(Scene& scene, const SceneNode& section) {
     state.joint = node.text("name");
     for (const InitialState& other : scene.initial)
       if (other.joint == state.joint) node.fail("joint '" + state.joint + "' is given twice");
-    if (type == JointType::fixed) node.fail("joint '" + state.joint + "' is fixed; it has no state");
+    if (type == JointType::fixed)
+      node.fail("joint '" + state.joint + "' is fixed; it has no state");
     if (node.has("q")) state.q = read_coordinates(node, "q", type, position_count(type));
     if (node.has("v")) state.v = read_coordinates(node, "v", type, dof_count(type));
     if (type == JointType::spherical || type == JointType::free) {
       double square = 0;
-      for (std::size_t k = 0; k < 4 && !state.q.empty(); ++k) square += std::pow(state.q[state.q.size() - 4 + k], 2);
-      if (!state.q.empty() && !(square > 1e-100)) node.fail("q ends in a quaternion of zero length");
+      for (std::size_t k = 0; k < 4 && !state.q.empty(); ++k)
+        square += std::pow(state.q[state.q.size() - 4 + k], 2);
+      if (!state.q.empty() && !(square > 1e-100))
+        node.fail("q ends in a quaternion of zero length");
     }
     scene.initial.push_back(std::move(state));
   }
@@ -253,7 +274,8 @@ void read_initial(Scene& scene, const SceneNode& section) {
 void read_control(Scene& scene, const SceneNode& section) {
   section.check_attributes({});
   const std::vector<SceneNode> kinds = section.children({"constant", "piecewise", "csv", "random"});
-  if (kinds.size() != 1) section.fail(fmt::format("{} ways to drive the scene; expected one", kinds.size()));
+  if (kinds.size() != 1)
+    section.fail(fmt::format("{} ways to drive the scene; expected one", kinds.size()));
   const SceneNode& node = kinds.front();
   if (node.name() == "constant") {
     node.check_attributes({"value"});
@@ -265,19 +287,21 @@ void read_control(Scene& scene, const SceneNode& section) {
     const std::filesystem::path beside = std::filesystem::path(node.context().file).parent_path();
     CsvControl control;
     control.path = (beside / node.text("file")).string();
-    if (!std::filesystem::exists(control.path)) node.fail(fmt::format("file=\"{}\": there is no {}", node.text("file"), control.path));
+    if (!std::filesystem::exists(control.path))
+      node.fail(fmt::format("file=\"{}\": there is no {}", node.text("file"), control.path));
     control.rows = read_csv(control.path, std::size_t(control_count(scene)));
     scene.control = std::move(control);
   } else {
     node.check_attributes({"amplitude", "period"});
-    scene.control = RandomControl{node.not_negative("amplitude", 1.0), node.positive("period", 0.1)};
+    scene.control =
+        RandomControl{node.not_negative("amplitude", 1.0), node.positive("period", 0.1)};
   }
 }
 
 void read_randomize(Scene& scene, const SceneNode& section) {
   section.check_attributes({});
-  const std::vector<std::string> kinds = {"joint", "motor", "ground_contact", "general_primitive_contact", "tactile",
-                                          "body"};
+  const std::vector<std::string> kinds = {
+      "joint", "motor", "ground_contact", "general_primitive_contact", "tactile", "body"};
   for (const SceneNode& node : section.children(kinds)) {
     RandomizationDescription d;
     d.source = node.source();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sections of a scene beside its tree of links. Each appends to the scene; references are checked where they stand.
+// The sections of a scene beside its tree of links. Each appends to the scene; references are
+// checked where they stand.
 #pragma once
 
 #include <filesystem>
@@ -17,7 +18,8 @@ void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
 void read_sensors(Scene& scene, const SceneNode& section);
 void read_variables(Scene& scene, const SceneNode& section);
-/// Gives end effectors without a name theirs: "endeffector" and their place in the file, or the next number that is free.
+/// Gives end effectors without a name theirs: "endeffector" and their place in the file, or the
+/// next number that is free.
 void name_variables(Scene& scene);
 void read_initial(Scene& scene, const SceneNode& section);
 void read_control(Scene& scene, const SceneNode& section);
@@ -26,7 +28,8 @@ void read_randomize(Scene& scene, const SceneNode& section);
 /// What `read` makes of a file named by an attribute, beside the scene. Errors say who asked.
 template <class Read>
 auto read_beside(const SceneNode& node, const char* attribute, Read&& read) {
-  const std::filesystem::path path = std::filesystem::path(node.context().file).parent_path() / node.text(attribute);
+  const std::filesystem::path path =
+      std::filesystem::path(node.context().file).parent_path() / node.text(attribute);
   try {
     return read(path.string());
   } catch (const IoError& e) {
@@ -49,7 +52,8 @@ void read_colour(const SceneNode& node, std::array<double, 4>& rgba);
 int find_joint(const Scene& scene, const SceneNode& node, const char* attribute);
 int find_body(const Scene& scene, const SceneNode& node, const char* attribute);
 
-/// Factor to SI of coordinate `index` of a joint type, and of velocity `index`: both have lengths in the same places.
+/// Factor to SI of coordinate `index` of a joint type, and of velocity `index`: both have lengths
+/// in the same places.
 double coordinate_scale(JointType type, int index, const SceneContext& context);
 
 /// Factor to SI of a number of a joint or motor whose dofs turn or slide.
@@ -57,7 +61,8 @@ double joint_field_scale(JointField field, bool turns, const SceneContext& conte
 
 /// Number of controls the motors read so far take.
 int control_count(const Scene& scene);
-/// Factor to SI of each of them: targets of position motors are coordinates, force motors take numbers without a unit.
+/// Factor to SI of each of them: targets of position motors are coordinates, force motors take
+/// numbers without a unit.
 std::vector<double> control_scales(const Scene& scene, const SceneContext& context);
 
 /// Damping, armature, spring and limits of a joint whose type is known.

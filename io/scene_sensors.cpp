@@ -11,9 +11,10 @@
 namespace tangere {
 namespace {
 
-constexpr int kLargestArray = 4096;        // rows or columns of a tactile array
-constexpr int kMostPoints = 1 << 20;       // of a list
-const std::vector<std::string> kTypes = {"rect_array", "abstract", "hemisphere", "cylinder", "mesh"};
+constexpr int kLargestArray = 4096;   // rows or columns of a tactile array
+constexpr int kMostPoints = 1 << 20;  // of a list
+const std::vector<std::string> kTypes = {"rect_array", "abstract", "hemisphere", "cylinder",
+                                         "mesh"};
 using Names = std::vector<std::string>;
 
 /// Attributes that only some layouts use, and which.
@@ -28,12 +29,15 @@ Names attributes_of(int type) {
 }
 
 void check_attributes(const SceneNode& node, int type) {
-  Names used = {"name", "body", "type", "kn", "kt", "mu", "damping", "law", "every", "pressure_sign"}, idle;
+  Names used = {"name", "body",    "type", "kn",    "kt",
+                "mu",   "damping", "law",  "every", "pressure_sign"},
+        idle;
   const Names own = attributes_of(type);
   used.insert(used.end(), own.begin(), own.end());
   for (int other = 0; other < static_cast<int>(kTypes.size()); ++other)
     for (const std::string& name : attributes_of(other))
-      if (std::find(used.begin(), used.end(), name) == used.end() && std::find(idle.begin(), idle.end(), name) == idle.end())
+      if (std::find(used.begin(), used.end(), name) == used.end() &&
+          std::find(idle.begin(), idle.end(), name) == idle.end())
         idle.push_back(name);
   node.check_attributes(used, {"render"}, idle);
 }
@@ -72,18 +76,22 @@ std::vector<TactilePoint> read_surface(const SceneNode& node, double length) {
   const MeshShape mesh = read_mesh(node, length);
   const double pitch = node.positive("pitch") * length;
   const std::vector<TactilePoint> points = mesh_points(mesh, pitch, kMostPoints);
-  if (points.empty()) node.fail(fmt::format("pitch of {} m: more than {} points; expected a larger one", pitch, kMostPoints));
+  if (points.empty())
+    node.fail(fmt::format("pitch of {} m: more than {} points; expected a larger one", pitch,
+                          kMostPoints));
   return points;
 }
 
 /// With a resolution, every point has a pixel of its own.
 std::vector<TactilePoint> read_hemisphere(const SceneNode& node, double radius) {
-  std::vector<TactilePoint> points = hemisphere_points(radius, node.integer("count", 1, kMostPoints));
+  std::vector<TactilePoint> points =
+      hemisphere_points(radius, node.integer("count", 1, kMostPoints));
   if (!node.has("resolution")) return points;
   const auto [rows, cols] = read_resolution(node);
   if (static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols) < points.size())
-    node.fail(fmt::format("resolution=\"{}\" has {} pixels for {} points; expected one for each at least",
-                          node.text("resolution"), rows * cols, points.size()));
+    node.fail(
+        fmt::format("resolution=\"{}\" has {} pixels for {} points; expected one for each at least",
+                    node.text("resolution"), rows * cols, points.size()));
   draw_hemisphere(rows, cols, points);
   return points;
 }
@@ -113,7 +121,8 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     find_body(scene, node, "body");
     d.body = node.text("body");
     d.name = node.text("name", d.body);
-    if (d.name.find('/') != std::string::npos) node.fail("name \"" + d.name + "\" holds '/', which files use as a separator");
+    if (d.name.find('/') != std::string::npos)
+      node.fail("name \"" + d.name + "\" holds '/', which files use as a separator");
     for (const TactileDescription& other : scene.sensors)
       if (other.name == d.name) node.fail("tactile name '" + d.name + "' is used twice");
     const int type = node.choice("type", kTypes);
@@ -124,7 +133,8 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     d.every = node.integer("every", 1, 1000000000, 0);
     if (node.has("pressure_sign")) {
       const double sign = node.number("pressure_sign");
-      if (sign != 1 && sign != -1) node.fail(fmt::format("pressure_sign=\"{}\"; expected 1 or -1", sign));
+      if (sign != 1 && sign != -1)
+        node.fail(fmt::format("pressure_sign=\"{}\"; expected 1 or -1", sign));
       d.pressure_sign = static_cast<int>(sign);
     }
     if (type == 0) {

@@ -22,7 +22,9 @@ class Checksum {
     mix({reinterpret_cast<const unsigned char*>(&count), sizeof count});
     mix({reinterpret_cast<const unsigned char*>(numbers.data()), numbers.size_bytes()});
   }
-  [[nodiscard]] std::string text() const { return any_ ? fmt::format("of checksum {:016x}", hash_) : "none"; }
+  [[nodiscard]] std::string text() const {
+    return any_ ? fmt::format("of checksum {:016x}", hash_) : "none";
+  }
 
  private:
   void mix(std::span<const unsigned char> bytes) {

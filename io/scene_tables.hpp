@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a scene has from files of its own (meshes, lists of points, tables), told apart by content: names may stay while the files
-// change.
+// What a scene has from files of its own (meshes, lists of points, tables), told apart by content:
+// names may stay while the files change.
 #pragma once
 
 #include <string>

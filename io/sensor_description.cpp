@@ -7,10 +7,11 @@
 namespace tangere {
 namespace {
 
-void write_vectors(const h5::Id& group, const char* name, const SensorLayout& sensor, Vector3 TactilePoint::* member,
-                   const char* units) {
+void write_vectors(const h5::Id& group, const char* name, const SensorLayout& sensor,
+                   Vector3 TactilePoint::*member, const char* units) {
   std::vector<double> numbers;
-  for (const TactilePoint& p : sensor.list) numbers.insert(numbers.end(), (p.*member).begin(), (p.*member).end());
+  for (const TactilePoint& p : sensor.list)
+    numbers.insert(numbers.end(), (p.*member).begin(), (p.*member).end());
   const h5::Dims dims{sensor.list.size(), 3};
   const h5::Id dataset = h5::create_dataset<double>(group, name, dims);
   h5::write_attribute(dataset, "units", units);
@@ -19,7 +20,8 @@ void write_vectors(const h5::Id& group, const char* name, const SensorLayout& se
 }
 
 void describe_array(const h5::Id& object, const SensorLayout& s) {
-  h5::write_attribute(object, "components", "f.axis0, f.axis1, -f.(axis0 x axis1); f is the force on the body");
+  h5::write_attribute(object, "components",
+                      "f.axis0, f.axis1, -f.(axis0 x axis1); f is the force on the body");
   h5::write_attribute(object, "frame", "axis0, axis1 of the sensor, in the body's axes");
   const std::int64_t resolution[] = {s.rows, s.cols};
   h5::write_list<std::int64_t>(object, "resolution", resolution);
@@ -30,13 +32,16 @@ void describe_array(const h5::Id& object, const SensorLayout& s) {
 }
 
 void describe_list(const h5::Id& object, const h5::Id& group, const SensorLayout& s) {
-  h5::write_attribute(object, "components", "f.axis0, f.axis1, -f.normal; f is the force on the body");
+  h5::write_attribute(object, "components",
+                      "f.axis0, f.axis1, -f.normal; f is the force on the body");
   h5::write_attribute(object, "frame", "axis0, axis1, normal of each point, in the body's axes");
   write_vectors(group, "position", s, &TactilePoint::position, "m");
   write_vectors(group, "normal", s, &TactilePoint::normal, "1");
   write_vectors(group, "axis0", s, &TactilePoint::axis0, "1");
   write_vectors(group, "axis1", s, &TactilePoint::axis1, "1");
-  if (std::all_of(s.list.begin(), s.list.end(), [](const TactilePoint& p) { return p.pixel[0] < 0; })) return;
+  if (std::all_of(s.list.begin(), s.list.end(),
+                  [](const TactilePoint& p) { return p.pixel[0] < 0; }))
+    return;
   std::vector<std::int64_t> pixels;
   for (const TactilePoint& p : s.list) pixels.insert(pixels.end(), {p.pixel[0], p.pixel[1]});
   const h5::Dims dims{s.list.size(), 2};

@@ -9,10 +9,11 @@
 namespace tangere {
 
 struct Curve {
-  std::string name;          ///< "": not explained
-  std::vector<double> x, y;  ///< as many of each; not finite, or not positive on a logarithmic scale: left out
-  bool dots = false;         ///< measured points instead of a line
-  int colour = 0;            ///< of six; curves that belong together share one
+  std::string name;  ///< "": not explained
+  std::vector<double> x,
+      y;  ///< as many of each; not finite, or not positive on a logarithmic scale: left out
+  bool dots = false;  ///< measured points instead of a line
+  int colour = 0;     ///< of six; curves that belong together share one
 };
 
 struct CurvePanel {
@@ -21,8 +22,8 @@ struct CurvePanel {
   std::vector<Curve> curves;
 };
 
-/// Every panel has its own axes, which hold all of its curves. Throws InputError for a panel without a point to draw, or a
-/// curve with unequal numbers of x and y.
+/// Every panel has its own axes, which hold all of its curves. Throws InputError for a panel
+/// without a point to draw, or a curve with unequal numbers of x and y.
 std::string render_curves_svg(const std::string& title, std::span<const std::string> captions,
                               std::span<const CurvePanel> panels);
 

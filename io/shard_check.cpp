@@ -32,7 +32,8 @@ std::uint64_t row_hash(std::uint64_t key, const unsigned char* bytes, std::size_
   for (std::size_t lane = 1; lane < hash.size(); ++lane) hash[lane] = mix(hash[lane - 1], lane);
   for (; count >= sizeof words; bytes += sizeof words, count -= sizeof words) {
     std::memcpy(words.data(), bytes, sizeof words);
-    for (std::size_t lane = 0; lane < hash.size(); ++lane) hash[lane] = mix(hash[lane], words[lane]);
+    for (std::size_t lane = 0; lane < hash.size(); ++lane)
+      hash[lane] = mix(hash[lane], words[lane]);
   }
   words = {};
   std::memcpy(words.data(), bytes, count);
@@ -51,7 +52,8 @@ class ShardChecker {
   ShardReport sample() {
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
     read_description();
-    for (const std::int64_t episode : {content_.first_episode, end_ - 1}) add_episode(data, failed, episode);
+    for (const std::int64_t episode : {content_.first_episode, end_ - 1})
+      add_episode(data, failed, episode);
     const auto demos = static_cast<std::int64_t>(h5::link_count(data));
     const auto lost = static_cast<std::int64_t>(h5::link_count(failed));
     if (demos + lost != end_ - content_.first_episode)
@@ -71,7 +73,8 @@ class ShardChecker {
     }
     read_description();
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
-    for (std::int64_t episode = content_.first_episode; episode < end_; ++episode) add_episode(data, failed, episode);
+    for (std::int64_t episode = content_.first_episode; episode < end_; ++episode)
+      add_episode(data, failed, episode);
     if (number(data, "total") != content_.rows)
       fail(fmt::format("/data says {} rows, its demos have {}", number(data, "total"),
                        content_.rows));
@@ -121,8 +124,10 @@ class ShardChecker {
   void add_demo(const h5::Id& demo, std::int64_t episode) {
     const std::int64_t rows = number(demo, "num_samples");
     if (of_task_ ? rows < 1 || rows > rows_ : rows != rows_)
-      return fail(fmt::format("demo_{} has {} rows, expected {}{}", episode, rows, of_task_ ? "1 to " : "", rows_));
-    // Known without a checksum: without a task nothing is rewarded, and only the last row ends the episode.
+      return fail(fmt::format("demo_{} has {} rows, expected {}{}", episode, rows,
+                              of_task_ ? "1 to " : "", rows_));
+    // Known without a checksum: without a task nothing is rewarded, and only the last row ends the
+    // episode.
     if (of_task_) {
       add<float>(demo, "rewards", episode, names_.size() + 1, 0, rows);
     } else {
@@ -140,26 +145,32 @@ class ShardChecker {
         add<double>(final_obs, names_[k], episode, k + 1, rows, 1);
       }
     }
-    for (std::size_t k = 0; k < gradients_.size(); ++k) add_gradient(demo, gradients_[k], episode, names_.size() + 2 + k, rows);
+    for (std::size_t k = 0; k < gradients_.size(); ++k)
+      add_gradient(demo, gradients_[k], episode, names_.size() + 2 + k, rows);
     if (h5::has_link(demo, "next_obs"))
       for (const std::string& name : names_)
-        single_ ? check_next<float>(demo, name, episode, rows) : check_next<double>(demo, name, episode, rows);
+        single_ ? check_next<float>(demo, name, episode, rows)
+                : check_next<double>(demo, name, episode, rows);
     content_.rows += rows;
     ++content_.demos;
   }
 
-  void add_gradient(const h5::Id& demo, const GradientSaid& said, std::int64_t episode, std::size_t index, std::int64_t rows) {
+  void add_gradient(const h5::Id& demo, const GradientSaid& said, std::int64_t episode,
+                    std::size_t index, std::int64_t rows) {
     const h5::Id dataset = h5::open_dataset(demo, said.name);
     if (h5::read_text(dataset, "meaning") != said.meaning)
       fail(fmt::format("demo_{}: {} says another meaning than /scene", episode, said.name));
     const h5::Dims dims = h5::dimensions(dataset);
-    if (dims.empty()) return fail(fmt::format("demo_{}: {} is one number, expected a list", episode, said.name));
-    add<double>(demo, said.name, episode, index, 0, said.by_row ? rows : static_cast<std::int64_t>(dims[0]));
+    if (dims.empty())
+      return fail(fmt::format("demo_{}: {} is one number, expected a list", episode, said.name));
+    add<double>(demo, said.name, episode, index, 0,
+                said.by_row ? rows : static_cast<std::int64_t>(dims[0]));
   }
 
   /// A list of zeros whose last number is `last`.
   template <class T>
-  void check_list(const h5::Id& demo, const std::string& name, std::int64_t episode, std::int64_t rows, T last) {
+  void check_list(const h5::Id& demo, const std::string& name, std::int64_t episode,
+                  std::int64_t rows, T last) {
     const h5::Id dataset = h5::open_dataset(demo, name);
     if (!has_rows(dataset, fmt::format("demo_{}: {}", episode, name), rows)) return;
     std::vector<T> list(static_cast<std::size_t>(rows)), expected(list.size(), T{0});
@@ -170,8 +181,10 @@ class ShardChecker {
 
   /// Of merged files: obs from its second row on, then final_obs.
   template <class T>
-  void check_next(const h5::Id& demo, const std::string& name, std::int64_t episode, std::int64_t rows) {
-    const h5::Id next = h5::open_dataset(demo, "next_obs/" + name), obs = h5::open_dataset(demo, "obs/" + name),
+  void check_next(const h5::Id& demo, const std::string& name, std::int64_t episode,
+                  std::int64_t rows) {
+    const h5::Id next = h5::open_dataset(demo, "next_obs/" + name),
+                 obs = h5::open_dataset(demo, "obs/" + name),
                  last = h5::open_dataset(demo, "final_obs/" + name);
     const std::string full = fmt::format("demo_{}: next_obs/{}", episode, name);
     if (!has_rows(next, full, rows)) return;
@@ -180,9 +193,11 @@ class ShardChecker {
     std::size_t width = 1;
     for (std::size_t i = 1; i < count.size(); ++i) width *= count[i];
     if (width == 0) return;
-    const auto step = static_cast<std::int64_t>(std::max<std::size_t>(1, kReadBytes / (width * sizeof(T))));
+    const auto step =
+        static_cast<std::int64_t>(std::max<std::size_t>(1, kReadBytes / (width * sizeof(T))));
     std::vector<T> shown, there;
-    const auto read = [&](const h5::Id& dataset, std::int64_t first, std::int64_t taken, std::vector<T>& into) {
+    const auto read = [&](const h5::Id& dataset, std::int64_t first, std::int64_t taken,
+                          std::vector<T>& into) {
       h5::Dims offset(count.size(), 0);
       offset[0] = static_cast<hsize_t>(first);
       count[0] = static_cast<hsize_t>(taken);
@@ -195,7 +210,8 @@ class ShardChecker {
       read(next, row, taken, shown);
       read(at_last ? last : obs, at_last ? 0 : row + 1, taken, there);
       if (std::memcmp(shown.data(), there.data(), shown.size() * sizeof(T)) != 0)
-        return fail(fmt::format("{} is not obs one row later, in rows {} to {}", full, row, row + taken - 1));
+        return fail(fmt::format("{} is not obs one row later, in rows {} to {}", full, row,
+                                row + taken - 1));
       row += taken;
     }
   }
@@ -208,12 +224,14 @@ class ShardChecker {
   }
 
   template <class T>
-  void check_finite(const std::vector<T>& numbers, const std::string& name, std::int64_t first, std::size_t width) {
-    const auto bad = std::find_if(numbers.begin(), numbers.end(), [](T x) { return !std::isfinite(x); });
+  void check_finite(const std::vector<T>& numbers, const std::string& name, std::int64_t first,
+                    std::size_t width) {
+    const auto bad =
+        std::find_if(numbers.begin(), numbers.end(), [](T x) { return !std::isfinite(x); });
     if (!finite_ || bad == numbers.end() || not_finite_.size() >= kMostProblems) return;
     const auto at = static_cast<std::size_t>(bad - numbers.begin());
-    not_finite_.push_back(fmt::format("{}: row {} has a number that is {}, expected finite ones", name,
-                                      first + static_cast<std::int64_t>(at / width), *bad));
+    not_finite_.push_back(fmt::format("{}: row {} has a number that is {}, expected finite ones",
+                                      name, first + static_cast<std::int64_t>(at / width), *bad));
   }
 
   /// Adds a dataset whose row 0 is row `first` of the episode.
@@ -274,12 +292,14 @@ ShardReport examine_shard(const std::string& path) {
 
 void sample_shard(const std::string& path) {
   const ShardReport report = ShardChecker(path, false).sample();
-  if (!report.problems.empty()) throw IoError(fmt::format("'{}' is damaged: {}", path, report.problems.front()));
+  if (!report.problems.empty())
+    throw IoError(fmt::format("'{}' is damaged: {}", path, report.problems.front()));
 }
 
 ShardContent check_shard(const std::string& path) {
   const ShardReport report = ShardChecker(path, false).check();
-  if (!report.problems.empty()) throw IoError(fmt::format("'{}' is damaged: {}", path, report.problems.front()));
+  if (!report.problems.empty())
+    throw IoError(fmt::format("'{}' is damaged: {}", path, report.problems.front()));
   return report.content;
 }
 

@@ -24,8 +24,8 @@ std::span<const unsigned char> bytes_of(std::span<const T> numbers) {
 
 }  // namespace
 
-ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const DemoFormat& format, EpisodeRange range,
-                     bool overwrite, std::size_t& held_bytes)
+ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const DemoFormat& format,
+                     EpisodeRange range, bool overwrite, std::size_t& held_bytes)
     : layout_(layout),
       format_(format),
       first_episode_(range.first),
@@ -78,7 +78,8 @@ ShardFile::Block& ShardFile::block_of(const EpisodeRows& rows) {
     // Pieces that no engine made may say nothing of what varied.
     demo.facts.randomized.assign(varied, 0);
     if (!rows.randomized.empty())
-      std::copy_n(rows.randomized.begin() + static_cast<std::ptrdiff_t>(i * varied), varied, demo.facts.randomized.begin());
+      std::copy_n(rows.randomized.begin() + static_cast<std::ptrdiff_t>(i * varied), varied,
+                  demo.facts.randomized.begin());
     demo.addresses.resize(format_.datasets(), h5::kNowhere);
     demo.held.resize(format_.datasets());
     demo.chunks.resize(format_.datasets());
@@ -87,7 +88,8 @@ ShardFile::Block& ShardFile::block_of(const EpisodeRows& rows) {
   return block;
 }
 
-/// Demos of a scene are of one size, so the place of a block follows from its number; those of a task come in ascending order.
+/// Demos of a scene are of one size, so the place of a block follows from its number; those of a
+/// task come in ascending order.
 void ShardFile::give_place(Block& block, std::int64_t first_episode) {
   const std::uint64_t of_demo = format_.header_bytes() + format_.data_bytes(layout_.rows());
   const auto before = static_cast<std::uint64_t>(first_episode - first_episode_);
@@ -96,7 +98,8 @@ void ShardFile::give_place(Block& block, std::int64_t first_episode) {
   for (Demo& demo : block.demos)
     for (std::size_t k = 0; k < format_.datasets(); ++k) {
       demo.addresses[k] = at;
-      at += aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) * format_.row_bytes(k));
+      at += aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) *
+                    format_.row_bytes(k));
     }
   free_ = std::max(free_, at);
 }
@@ -121,7 +124,9 @@ void ShardFile::write_slices(Block& block, const EpisodeRows& rows, int episode)
     if (!waits()) {
       const std::span<const unsigned char> same = constant(k, demo.facts.rows);
       if (same.empty())
-        placed_.add(demo.addresses[k] + static_cast<std::uint64_t>(slice.first) * slice.rows.row_bytes, slice.rows, slice.data);
+        placed_.add(
+            demo.addresses[k] + static_cast<std::uint64_t>(slice.first) * slice.rows.row_bytes,
+            slice.rows, slice.data);
       else if (rows.first_row == 0)
         placed_.add(demo.addresses[k], same);
     } else if (format_.chunk_rows(k, demo.facts.rows) == 0 && slice.rows.rows > 0) {
@@ -134,7 +139,8 @@ void ShardFile::write_slices(Block& block, const EpisodeRows& rows, int episode)
 std::span<const unsigned char> ShardFile::constant(std::size_t dataset, std::int64_t rows) const {
   const auto count = static_cast<std::size_t>(rows);
   if (dataset == DemoFormat::kDones) return bytes_of(std::span(dones_).last(count));
-  if (dataset == DemoFormat::kRewards && !layout_.task) return bytes_of(std::span(no_rewards_).first(count));
+  if (dataset == DemoFormat::kRewards && !layout_.task)
+    return bytes_of(std::span(no_rewards_).first(count));
   return {};
 }
 
@@ -143,7 +149,8 @@ void ShardFile::hold(Block& block, std::vector<PreparedChunk>& chunks) {
     Chunk held{{chunk.first, 0, static_cast<std::uint32_t>(chunk.bytes.size())},
                std::move(chunk.bytes)};
     held_bytes_ += held.bytes.size();
-    if (held_bytes_ > kMostHeld) {  // memory is bounded; where it lies then depends on the order of pieces
+    if (held_bytes_ >
+        kMostHeld) {  // memory is bounded; where it lies then depends on the order of pieces
       held_bytes_ -= held.bytes.size();
       held.place.address = free_;
       placed_.add(free_, held.bytes);
@@ -151,14 +158,16 @@ void ShardFile::hold(Block& block, std::vector<PreparedChunk>& chunks) {
       free_ = aligned(free_ + held.bytes.size());
       held.bytes = {};
     }
-    block.demos[static_cast<std::size_t>(chunk.episode)].chunks[chunk.dataset].push_back(std::move(held));
+    block.demos[static_cast<std::size_t>(chunk.episode)].chunks[chunk.dataset].push_back(
+        std::move(held));
   }
 }
 
 /// The same for rows: where memory is full, all of the dataset gets its place.
 void ShardFile::hold(Demo& demo, std::size_t dataset, const PieceSlice& slice) {
   HeldRows& held = demo.held[dataset];
-  const std::span<const unsigned char> bytes(slice.data, static_cast<std::size_t>(slice.rows.rows) * slice.rows.row_bytes);
+  const std::span<const unsigned char> bytes(
+      slice.data, static_cast<std::size_t>(slice.rows.rows) * slice.rows.row_bytes);
   if (held.address == h5::kNowhere) {
     if (held_bytes_ + bytes.size() <= kMostHeld) {
       held.bytes.insert(held.bytes.end(), bytes.begin(), bytes.end());
@@ -183,7 +192,8 @@ void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode
     Demo& demo = block.demos[static_cast<std::size_t>(failure.episode - first_episode)];
     demo.failed = true;
     failures_.push_back(failure);
-    if (!layout_.randomized_names.empty()) randomized_of_failures_[failure.episode] = demo.facts.randomized;
+    if (!layout_.randomized_names.empty())
+      randomized_of_failures_[failure.episode] = demo.facts.randomized;
   }
   block.finished = true;
   --unfinished_;
@@ -192,7 +202,8 @@ void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode
     blocks_.erase(first_episode);
     return;
   }
-  for (auto next = blocks_.find(next_); next != blocks_.end() && next->second.finished; next = blocks_.find(next_)) {
+  for (auto next = blocks_.find(next_); next != blocks_.end() && next->second.finished;
+       next = blocks_.find(next_)) {
     give_place_to_held(next->second);
     blocks_.erase(next);
     next_ += kBlockEpisodes;
@@ -218,7 +229,8 @@ void ShardFile::give_place_to_held(Block& block) {
         continue;
       }
       if (rows == 0) {
-        at += aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) * format_.row_bytes(k));
+        at += aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) *
+                      format_.row_bytes(k));
         continue;
       }
       std::vector<h5::FileChunk> places;
@@ -229,7 +241,8 @@ void ShardFile::give_place_to_held(Block& block) {
         }
         places.push_back(chunk.place);
       }
-      demo.addresses[k] = h5::add_chunk_index(index, first_index, places, format_.rank(k), static_cast<std::uint64_t>(rows));
+      demo.addresses[k] = h5::add_chunk_index(index, first_index, places, format_.rank(k),
+                                              static_cast<std::uint64_t>(rows));
     }
   free_ = at;
   close_block(block, next_, index);
@@ -240,7 +253,8 @@ void ShardFile::write_held(Block& block) {
     for (std::size_t k = 0; k < format_.datasets(); ++k) {
       const std::span<const unsigned char> same = constant(k, demo.facts.rows);
       if (format_.chunk_rows(k, demo.facts.rows) == 0)
-        placed_.add(demo.addresses[k], same.empty() ? std::span<const unsigned char>(demo.held[k].bytes) : same);
+        placed_.add(demo.addresses[k],
+                    same.empty() ? std::span<const unsigned char>(demo.held[k].bytes) : same);
       held_bytes_ -= demo.held[k].bytes.size();
       for (const Chunk& chunk : demo.chunks[k]) {
         held_bytes_ -= chunk.bytes.size();
@@ -253,7 +267,8 @@ void ShardFile::close_block(Block& block, std::int64_t first_episode, const h5::
   h5::Bytes descriptions;
   for (std::size_t e = 0; e < block.demos.size(); ++e) {
     const Demo& demo = block.demos[e];
-    const std::uint64_t group = format_.describe(descriptions, block.base, demo.facts, demo.addresses, texts_);
+    const std::uint64_t group =
+        format_.describe(descriptions, block.base, demo.facts, demo.addresses, texts_);
     if (demo.failed) continue;  // its bytes stay, nothing leads to them
     members_.push_back({first_episode + static_cast<std::int64_t>(e), group});
     rows_ += demo.facts.rows;
@@ -287,7 +302,8 @@ void ShardFile::complete_description(std::uint64_t data) {
   h5::link_object(file_, "data", data);
   const h5::Id group = h5::open_group(file_, "data");
   h5::write_attribute(group, "env_args",
-                      fmt::format(R"({{"env_name": {}, "type": 2, "env_kwargs": {{}}}})", json_text(layout_.scene_name)));
+                      fmt::format(R"({{"env_name": {}, "type": 2, "env_kwargs": {{}}}})",
+                                  json_text(layout_.scene_name)));
   h5::write_scalar<std::int64_t>(group, "total", rows_);
   record_failures();
   h5::write_scalar<std::uint64_t>(file_, "content_sum", sum_.value());
@@ -296,7 +312,8 @@ void ShardFile::complete_description(std::uint64_t data) {
 void ShardFile::commit() {
   h5::Bytes out;
   const std::uint64_t data = h5::add_large_group(out, free_, "demo_", std::move(members_));
-  const std::span<const unsigned char> members = out.all().first(data - free_), group = out.all().subspan(data - free_);
+  const std::span<const unsigned char> members = out.all().first(data - free_),
+                                       group = out.all().subspan(data - free_);
   placed_.add(free_, members);
   placed_.flush();
   placed_.write_unchecked(data, group);  // the library will add to it

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One HDF5 file of a data set, whose bytes do not depend on the order in which blocks are finished. The library writes what the
-// file says of the data set; demos, thousands of them, are laid out here.
+// One HDF5 file of a data set, whose bytes do not depend on the order in which blocks are finished.
+// The library writes what the file says of the data set; demos, thousands of them, are laid out
+// here.
 #pragma once
 
 #include <cstdint>
@@ -21,10 +22,11 @@ namespace tangere {
 
 class ShardFile {
  public:
-  /// Creates `<path>.part`. Throws IoError, also when `path` exists and `overwrite` is false. `layout`, `format` and
-  /// `held_bytes`, what all shards of a data set together keep in memory, must outlive it.
-  ShardFile(const std::string& path, const DatasetLayout& layout, const DemoFormat& format, EpisodeRange range,
-            bool overwrite, std::size_t& held_bytes);
+  /// Creates `<path>.part`. Throws IoError, also when `path` exists and `overwrite` is false.
+  /// `layout`, `format` and `held_bytes`, what all shards of a data set together keep in memory,
+  /// must outlive it.
+  ShardFile(const std::string& path, const DatasetLayout& layout, const DemoFormat& format,
+            EpisodeRange range, bool overwrite, std::size_t& held_bytes);
   ~ShardFile();
   ShardFile(const ShardFile&) = delete;
   ShardFile& operator=(const ShardFile&) = delete;
@@ -43,7 +45,8 @@ class ShardFile {
     h5::FileChunk place;
     std::vector<unsigned char> bytes;
   };
-  /// Numbers of a contiguous dataset, of a block without a place. The same: once they have an address, they are there.
+  /// Numbers of a contiguous dataset, of a block without a place. The same: once they have an
+  /// address, they are there.
   struct HeldRows {
     std::vector<unsigned char> bytes;
     std::uint64_t address = h5::kNowhere;
@@ -68,7 +71,8 @@ class ShardFile {
   Block& block_of(const EpisodeRows& rows);
   void give_place(Block& block, std::int64_t first_episode);
   void write_slices(Block& block, const EpisodeRows& rows, int episode);
-  [[nodiscard]] std::span<const unsigned char> constant(std::size_t dataset, std::int64_t rows) const;
+  [[nodiscard]] std::span<const unsigned char> constant(std::size_t dataset,
+                                                        std::int64_t rows) const;
   void hold(Block& block, std::vector<PreparedChunk>& chunks);
   void hold(Demo& demo, std::size_t dataset, const PieceSlice& slice);
   void give_place_to_held(Block& block);
@@ -78,8 +82,9 @@ class ShardFile {
 
   const DatasetLayout& layout_;
   const DemoFormat& format_;
-  std::int64_t first_episode_, end_, unfinished_, next_;  // blocks that are unfinished; the first one without a place
-  bool cut_;                  // into chunks
+  std::int64_t first_episode_, end_, unfinished_,
+      next_;                 // blocks that are unfinished; the first one without a place
+  bool cut_;                 // into chunks
   std::size_t& held_bytes_;  // of chunks and rows, of all shards
   PartFile part_;
   PlacedFile placed_;

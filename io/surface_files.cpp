@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A surface is closed when every directed edge has as many partners the other way round: then its volume is defined.
+// A surface is closed when every directed edge has as many partners the other way round: then its
+// volume is defined.
 #include "io/surface_files.hpp"
 
 #include <fmt/format.h>
@@ -30,25 +31,31 @@ int corner(const WordReader& file, std::string_view word, std::size_t vertices) 
 }
 
 RawMesh parse_obj(WordReader& file) {
-  static const std::vector<std::string_view> kSkipped = {"vt", "vn", "vp", "o", "g", "s", "usemtl", "mtllib", "l", "p"};
+  static const std::vector<std::string_view> kSkipped = {"vt", "vn",     "vp",     "o", "g",
+                                                         "s",  "usemtl", "mtllib", "l", "p"};
   RawMesh mesh;
   while (file.next()) {
     const std::vector<std::string_view>& words = file.words;
     if (words[0] == "v") {
-      if (words.size() < 4) file.fail(fmt::format("a vertex of {} numbers; expected x y z", words.size() - 1));
+      if (words.size() < 4)
+        file.fail(fmt::format("a vertex of {} numbers; expected x y z", words.size() - 1));
       mesh.positions.push_back({file.position(1), file.position(2), file.position(3)});
     } else if (words[0] == "f") {
-      if (words.size() < 4) file.fail(fmt::format("a face of {} vertices; expected three or more", words.size() - 1));
+      if (words.size() < 4)
+        file.fail(fmt::format("a face of {} vertices; expected three or more", words.size() - 1));
       const auto at = [&](std::size_t k) { return corner(file, words[k], mesh.positions.size()); };
-      for (std::size_t k = 2; k + 1 < words.size(); ++k) mesh.triangles.push_back({at(1), at(k), at(k + 1)});
+      for (std::size_t k = 2; k + 1 < words.size(); ++k)
+        mesh.triangles.push_back({at(1), at(k), at(k + 1)});
     } else if (std::find(kSkipped.begin(), kSkipped.end(), words[0]) == kSkipped.end()) {
-      file.fail(fmt::format("'{}'; expected v, f or another element of an OBJ file", words[0].substr(0, 40)));
+      file.fail(fmt::format("'{}'; expected v, f or another element of an OBJ file",
+                            words[0].substr(0, 40)));
     }
   }
   return mesh;
 }
 
-/// One vertex per position that a face uses, in order of use; faces without area by equal corners are dropped.
+/// One vertex per position that a face uses, in order of use; faces without area by equal corners
+/// are dropped.
 MeshShape weld(const RawMesh& raw) {
   MeshShape mesh;
   std::map<Vector3, int> index;
@@ -61,7 +68,8 @@ MeshShape weld(const RawMesh& raw) {
       if (fresh) mesh.vertices.insert(mesh.vertices.end(), at.begin(), at.end());
       welded[k] = found->second;
     }
-    if (welded[0] != welded[1] && welded[1] != welded[2] && welded[2] != welded[0]) mesh.triangles.push_back(welded);
+    if (welded[0] != welded[1] && welded[1] != welded[2] && welded[2] != welded[0])
+      mesh.triangles.push_back(welded);
   }
   return mesh;
 }
@@ -79,10 +87,10 @@ void check_closed(const MeshShape& mesh, const std::string& path) {
   };
   for (const auto& [edge, count] : surplus)
     if (count != 0)
-      throw InputError(
-          fmt::format("{}: the surface is open, or its faces disagree on what is outside, at the edge from {} "
-                      "to {}; expected a closed surface",
-                      path, place(edge.first), place(edge.second)));
+      throw InputError(fmt::format(
+          "{}: the surface is open, or its faces disagree on what is outside, at the edge from {} "
+          "to {}; expected a closed surface",
+          path, place(edge.first), place(edge.second)));
 }
 
 /// Six times the volume, from tetrahedra on the first vertex.
@@ -91,8 +99,10 @@ double six_volumes(const MeshShape& mesh) {
   for (const std::array<int, 3>& t : mesh.triangles) {
     double e[3][3];
     for (std::size_t k = 0; k < 3; ++k)
-      for (std::size_t c = 0; c < 3; ++c) e[k][c] = mesh.vertices[3 * std::size_t(t[k]) + c] - mesh.vertices[c];
-    sum += e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) + e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
+      for (std::size_t c = 0; c < 3; ++c)
+        e[k][c] = mesh.vertices[3 * std::size_t(t[k]) + c] - mesh.vertices[c];
+    sum += e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) +
+           e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
   }
   return sum;
@@ -107,26 +117,30 @@ MeshShape read_obj(const std::string& path) {
   check_closed(mesh, path);
   const double volume = six_volumes(mesh) / 6;
   if (volume < 0)
-    throw InputError(path + ": the faces point inwards; expected anticlockwise corners seen from outside");
+    throw InputError(path +
+                     ": the faces point inwards; expected anticlockwise corners seen from outside");
   if (!(volume > 0)) throw InputError(path + ": the surface encloses no volume");
   return mesh;
 }
 
 std::vector<double> read_contact_points(const std::string& path) {
   WordReader file(path);
-  if (!file.next()) throw InputError(path + ": empty; expected a count, then a line x y z per point");
+  if (!file.next())
+    throw InputError(path + ": empty; expected a count, then a line x y z per point");
   if (file.words.size() != 1)
     file.fail(fmt::format("{} words; expected the number of points alone", file.words.size()));
   const long count = file.integer(file.words[0], "the number of points");
   if (count < 1) file.fail(fmt::format("{} points; expected one or more", count));
   std::vector<double> points;
   while (file.next()) {
-    if (file.words.size() != 3) file.fail(fmt::format("{} numbers; expected x y z", file.words.size()));
+    if (file.words.size() != 3)
+      file.fail(fmt::format("{} numbers; expected x y z", file.words.size()));
     for (std::size_t k = 0; k < 3; ++k) points.push_back(file.position(k));
   }
   if (points.size() / 3 != std::size_t(count))
-    throw InputError(fmt::format("{}: {} points follow the count of {}; expected as many as it says", path,
-                                 points.size() / 3, count));
+    throw InputError(
+        fmt::format("{}: {} points follow the count of {}; expected as many as it says", path,
+                    points.size() / 3, count));
   return points;
 }
 

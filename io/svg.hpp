@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The few pieces of SVG that all pictures share: text that stays well-formed, round numbers for scales.
+// The few pieces of SVG that all pictures share: text that stays well-formed, round numbers for
+// scales.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Of an image, down is the way in which points lie farther along the body the higher their row: the sum of their places,
-// each times its row; likewise to the right.
+// Of an image, down is the way in which points lie farther along the body the higher their row: the
+// sum of their places, each times its row; likewise to the right.
 #include "io/tactile_drawing.hpp"
 
 #include <algorithm>
@@ -21,7 +21,8 @@ Vector3 direction(const std::vector<TactilePoint>& points, std::size_t which) {
   mean /= count;
   Vector3 sum{};
   for (const TactilePoint& p : points)
-    for (std::size_t k = 0; k < 3 && has_pixel(p); ++k) sum[k] += (p.pixel[which] - mean) * p.position[k];
+    for (std::size_t k = 0; k < 3 && has_pixel(p); ++k)
+      sum[k] += (p.pixel[which] - mean) * p.position[k];
   const double length = std::sqrt(dot(sum, sum));
   for (double& x : sum) x = length > 0 ? x / length : 0;
   return sum;
@@ -30,19 +31,22 @@ Vector3 direction(const std::vector<TactilePoint>& points, std::size_t which) {
 double extent(const std::vector<TactilePoint>& points, const Vector3& along) {
   double low = INFINITY, high = -INFINITY;
   for (const TactilePoint& p : points)
-    if (has_pixel(p)) low = std::min(low, dot(p.position, along)), high = std::max(high, dot(p.position, along));
+    if (has_pixel(p))
+      low = std::min(low, dot(p.position, along)), high = std::max(high, dot(p.position, along));
   return high - low;
 }
 
 TactileDrawing image_of(const std::vector<TactilePoint>& points) {
   TactileDrawing d;
   for (const TactilePoint& p : points)
-    if (has_pixel(p)) d.rows = std::max(d.rows, p.pixel[0] + 1), d.cols = std::max(d.cols, p.pixel[1] + 1);
+    if (has_pixel(p))
+      d.rows = std::max(d.rows, p.pixel[0] + 1), d.cols = std::max(d.cols, p.pixel[1] + 1);
   const Vector3 down = direction(points, 0), right = direction(points, 1);
   d.height = extent(points, down), d.width = extent(points, right);
   for (const TactilePoint& p : points) {
     d.cell.push_back(has_pixel(p) ? p.pixel : std::array{-1, -1});
-    d.turn.push_back({dot(p.axis0, down), dot(p.axis1, down), dot(p.axis0, right), dot(p.axis1, right)});
+    d.turn.push_back(
+        {dot(p.axis0, down), dot(p.axis1, down), dot(p.axis0, right), dot(p.axis1, right)});
   }
   return d;
 }

@@ -22,7 +22,8 @@ Vector3 array_of(const Vec3<double>& a) { return {a.x, a.y, a.z}; }
 Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
 Vec3<double> unit(const Vec3<double>& a) { return (1 / std::sqrt(dot(a, a))) * a; }
 
-TactilePoint point_at(const Vec3<double>& position, const Vec3<double>& normal, const Vec3<double>& axis0) {
+TactilePoint point_at(const Vec3<double>& position, const Vec3<double>& normal,
+                      const Vec3<double>& axis0) {
   TactilePoint p;
   p.position = array_of(position);
   p.normal = array_of(normal);
@@ -42,14 +43,17 @@ TactilePoint parse_point(const WordReader& file) {
   constexpr std::size_t kPlain = 14, kFactors = 18;
   const std::size_t count = file.words.size();
   if (count != kPlain && count != kFactors)
-    file.fail(fmt::format("{} numbers; expected position (3), row and column (2), normal, axis0, axis1 (3 each), and perhaps "
-                          "factors of kn, kt, mu, damping (4)",
-                          count));
+    file.fail(
+        fmt::format("{} numbers; expected position (3), row and column (2), normal, axis0, axis1 "
+                    "(3 each), and perhaps "
+                    "factors of kn, kt, mu, damping (4)",
+                    count));
   TactilePoint p;
   for (std::size_t k = 0; k < 3; ++k) p.position[k] = file.position(k);
   for (std::size_t k = 0; k < 2; ++k) {
     const long x = file.integer(file.words[3 + k], "a whole number, or -1 for no pixel");
-    if (x < -1 || x > kMostPoints) file.fail(fmt::format("pixel {}; expected -1 to {}", x, kMostPoints));
+    if (x < -1 || x > kMostPoints)
+      file.fail(fmt::format("pixel {}; expected -1 to {}", x, kMostPoints));
     p.pixel[k] = static_cast<int>(x);
   }
   p.normal = direction(file, 5, "the normal");
@@ -57,13 +61,14 @@ TactilePoint parse_point(const WordReader& file) {
   p.axis1 = direction(file, 11, "axis1");
   for (std::size_t k = kPlain; k < count; ++k) {
     p.factors[k - kPlain] = file.number(k);
-    if (p.factors[k - kPlain] < 0) file.fail(fmt::format("factor {}; expected zero or more", p.factors[k - kPlain]));
+    if (p.factors[k - kPlain] < 0)
+      file.fail(fmt::format("factor {}; expected zero or more", p.factors[k - kPlain]));
   }
   return p;
 }
 
-/// Of a direction on the half z ≥ 0: its place in the square [-1, 1]². Rings about the pole become square rings that hold the
-/// same share of the area, and an eighth of a ring one half of an edge.
+/// Of a direction on the half z ≥ 0: its place in the square [-1, 1]². Rings about the pole become
+/// square rings that hold the same share of the area, and an eighth of a ring one half of an edge.
 std::array<double, 2> square_place(const Vec3<double>& n) {
   const double ring = std::sqrt(std::max(0.0, 1 - n.z)), x = std::abs(n.x), y = std::abs(n.y);
   const double along = ring * std::atan2(std::min(x, y), std::max(x, y)) * 4 / M_PI;
@@ -86,14 +91,17 @@ std::vector<TactilePoint> hemisphere_points(double radius, int count) {
 
 void draw_hemisphere(int rows, int cols, std::vector<TactilePoint>& points) {
   std::vector<bool> taken(static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols));
-  const auto at = [&](int i, int j) { return static_cast<std::size_t>(i) * static_cast<std::size_t>(cols) + j; };
+  const auto at = [&](int i, int j) {
+    return static_cast<std::size_t>(i) * static_cast<std::size_t>(cols) + j;
+  };
   for (TactilePoint& p : points) {
     const auto [x, y] = square_place(vec(p.normal));
     const double row = rows * (1 + x) / 2, col = cols * (1 + y) / 2;
     const int i0 = static_cast<int>(row), j0 = static_cast<int>(col);
     double nearest = INFINITY;
     // Pixels outside a window of ± reach are farther away than reach.
-    for (int reach = 1; !(nearest < double(reach) * reach) && reach < 2 * std::max(rows, cols); reach *= 2)
+    for (int reach = 1; !(nearest < double(reach) * reach) && reach < 2 * std::max(rows, cols);
+         reach *= 2)
       for (int i = std::max(0, i0 - reach); i <= std::min(rows - 1, i0 + reach); ++i)
         for (int j = std::max(0, j0 - reach); j <= std::min(cols - 1, j0 + reach); ++j) {
           const double away = std::pow(i + 0.5 - row, 2) + std::pow(j + 0.5 - col, 2);
@@ -107,7 +115,8 @@ std::vector<TactilePoint> cylinder_points(double radius, double length, int alon
   std::vector<TactilePoint> points;
   for (int i = 0; i < along; ++i)
     for (int j = 0; j < around; ++j) {
-      const double z = along > 1 ? length * (double(i) / (along - 1) - 0.5) : 0, turn = 2 * M_PI * j / around;
+      const double z = along > 1 ? length * (double(i) / (along - 1) - 0.5) : 0,
+                   turn = 2 * M_PI * j / around;
       const double c = std::cos(turn), s = std::sin(turn);
       points.push_back(point_at({radius * c, radius * s, z}, {c, s, 0}, {-s, c, 0}));
       points.back().pixel = {i, j};
@@ -125,7 +134,8 @@ std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::
     const Vec3<double> a = vertex(t[0]), ab = vertex(t[1]) - a, ac = vertex(t[2]) - a, bc = ac - ab;
     const Vec3<double> area = cross(ab, ac);
     if (!(dot(area, area) > 0)) continue;  // nothing to feel on
-    const double longest = std::sqrt(std::max({dot(ab, ab), dot(ac, ac), dot(bc, bc)})), cuts = std::ceil(longest / pitch);
+    const double longest = std::sqrt(std::max({dot(ab, ab), dot(ac, ac), dot(bc, bc)})),
+                 cuts = std::ceil(longest / pitch);
     if (cuts * cuts + double(points.size()) > double(most)) return {};
     const int n = static_cast<int>(cuts);
     const auto add = [&](double u, double v) {
@@ -148,7 +158,8 @@ std::vector<TactilePoint> read_tactile_points(const std::string& path) {
     file.fail(fmt::format("the first line is no count of points from 1 to {}", kMostPoints));
   std::vector<TactilePoint> points;
   while (std::ssize(points) < count) {
-    if (!file.next()) file.fail(fmt::format("the file ends after {} of {} points", points.size(), count));
+    if (!file.next())
+      file.fail(fmt::format("the file ends after {} of {} points", points.size(), count));
     points.push_back(parse_point(file));
   }
   if (file.next()) file.fail(fmt::format("more than the {} points announced", count));

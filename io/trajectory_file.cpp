@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Everything is created before the first step, so that a run cannot fail late for a reason known early.
+// Everything is created before the first step, so that a run cannot fail late for a reason known
+// early.
 #include "io/trajectory_file.hpp"
 
 #include <fmt/format.h>
@@ -64,7 +65,8 @@ struct TrajectoryFile::Impl {
       : layout((l.check(), l)), part(output, overwrite) {
     const std::uint64_t needed = layout.bytes_without_tactile(), available = part.free_bytes();
     if (needed > available)
-      throw IoError(fmt::format("{}: needs at least {} bytes and the disk has {} free", output, needed, available));
+      throw IoError(fmt::format("{}: needs at least {} bytes and the disk has {} free", output,
+                                needed, available));
     file = h5::create_file(part.path());
     try {
       describe_run();
@@ -86,16 +88,22 @@ struct TrajectoryFile::Impl {
   /// A dataset for each sensor from (E, points of all, kPointNumbers).
   void put_points(const h5::Id& gradients, std::span<const double> of_all) {
     const h5::Id group = h5::create_group(gradients, "grad_points");
-    h5::write_attribute(group, "meaning", "derivative of the loss by each tactile point's place in its body's axes and its own coefficients");
-    h5::write_attribute(group, "names", std::vector<std::string>{"x", "y", "z", "kn", "kt", "mu", "damping"});
-    h5::write_attribute(group, "units", std::vector<std::string>{"m", "m", "m", "N/m", "N s/m", "1", "N s/m^2; law linear: N s/m"});
+    h5::write_attribute(group, "meaning",
+                        "derivative of the loss by each tactile point's place in its body's axes "
+                        "and its own coefficients");
+    h5::write_attribute(group, "names",
+                        std::vector<std::string>{"x", "y", "z", "kn", "kt", "mu", "damping"});
+    h5::write_attribute(
+        group, "units",
+        std::vector<std::string>{"m", "m", "m", "N/m", "N s/m", "1", "N s/m^2; law linear: N s/m"});
     const hsize_t E = static_cast<hsize_t>(layout.environments);
     const double* next = of_all.data();
     for (const SensorLayout& s : layout.sensors) {
       const hsize_t points = static_cast<hsize_t>(s.points);
       const h5::Id dataset = rows<double>(group, s.name, {E, points, kPointNumbers});
       for (hsize_t e = 0; e < E; ++e)
-        h5::write_box<double>(dataset, {e, 0, 0}, {1, points, kPointNumbers}, next + e * (of_all.size() / E));
+        h5::write_box<double>(dataset, {e, 0, 0}, {1, points, kPointNumbers},
+                              next + e * (of_all.size() / E));
       next += points * kPointNumbers;
     }
   }
@@ -125,8 +133,10 @@ struct TrajectoryFile::Impl {
   }
 
   void create_trajectory() {
-    const hsize_t T = static_cast<hsize_t>(layout.steps), E = static_cast<hsize_t>(layout.environments);
-    const auto named = [](const h5::Id& d, const std::vector<std::string>& names, const std::vector<std::string>& units) {
+    const hsize_t T = static_cast<hsize_t>(layout.steps),
+                  E = static_cast<hsize_t>(layout.environments);
+    const auto named = [](const h5::Id& d, const std::vector<std::string>& names,
+                          const std::vector<std::string>& units) {
       h5::write_attribute(d, "names", std::span<const std::string>(names));
       h5::write_attribute(d, "units", std::span<const std::string>(units));
     };
@@ -134,24 +144,29 @@ struct TrajectoryFile::Impl {
     h5::write_attribute(time, "units", "s");
     q = rows<double>(file, "q", {T + 1, E, layout.q_names.size()});
     named(q, layout.q_names, layout.q_units);
-    h5::write_attribute(q, "frame", "each joint's fixed frame; quaternions turn the moving frame into it");
+    h5::write_attribute(q, "frame",
+                        "each joint's fixed frame; quaternions turn the moving frame into it");
     v = rows<double>(file, "v", {T + 1, E, layout.v_names.size()});
     named(v, layout.v_names, layout.v_units);
-    h5::write_attribute(v, "frame", "linear: axes of the joint's fixed frame; angular: axes of the moving frame");
+    h5::write_attribute(
+        v, "frame", "linear: axes of the joint's fixed frame; angular: axes of the moving frame");
     if (!layout.u_names.empty()) {
       u = rows<double>(file, "u", {T, E, layout.u_names.size()});
       named(u, layout.u_names, layout.u_units);
-      h5::write_attribute(u, "meaning", "as given; clipped to [-1, 1], then mapped to the motor's range");
+      h5::write_attribute(u, "meaning",
+                          "as given; clipped to [-1, 1], then mapped to the motor's range");
     }
     const h5::Id bodies = h5::create_group(file, "bodies");
     h5::write_attribute(bodies, "names", std::span<const std::string>(layout.body_names));
     const hsize_t nb = layout.body_names.size();
     pose = rows<double>(bodies, "pose", {T + 1, E, nb, 7});
-    const std::vector<std::string> pose_names(std::begin(kPoseComponents), std::end(kPoseComponents));
+    const std::vector<std::string> pose_names(std::begin(kPoseComponents),
+                                              std::end(kPoseComponents));
     named(pose, pose_names, {"m", "m", "m", "1", "1", "1", "1"});
     h5::write_attribute(pose, "frame", "body frame in the world");
     twist = rows<double>(bodies, "twist", {T + 1, E, nb, 6});
-    const std::vector<std::string> twist_names(std::begin(kTwistComponents), std::end(kTwistComponents));
+    const std::vector<std::string> twist_names(std::begin(kTwistComponents),
+                                               std::end(kTwistComponents));
     named(twist, twist_names, {"rad/s", "rad/s", "rad/s", "m/s", "m/s", "m/s"});
     h5::write_attribute(twist, "frame", "world axes; velocity of the body frame's origin");
     for (const h5::Id* d : {&pose, &twist})
@@ -170,7 +185,8 @@ struct TrajectoryFile::Impl {
     status = rows<std::int8_t>(solver, "status", {T, E});
     std::vector<std::string> meanings;
     std::vector<std::int8_t> values;
-    for (const StatusMeaning& s : layout.statuses) values.push_back(s.value), meanings.push_back(s.meaning);
+    for (const StatusMeaning& s : layout.statuses)
+      values.push_back(s.value), meanings.push_back(s.meaning);
     h5::write_list<std::int8_t>(status, "values", values);
     h5::write_attribute(status, "meanings", std::span<const std::string>(meanings));
     residual = rows<double>(solver, "residual", {T, E});
@@ -178,15 +194,18 @@ struct TrajectoryFile::Impl {
   }
 
   void create_sensor(const SensorLayout& s) {
-    const hsize_t E = static_cast<hsize_t>(layout.environments), F = static_cast<hsize_t>(s.frames(layout.steps, layout.first_step));
+    const hsize_t E = static_cast<hsize_t>(layout.environments),
+                  F = static_cast<hsize_t>(s.frames(layout.steps, layout.first_step));
     if (!h5::has_link(file, "tactile")) h5::create_group(file, "tactile");
     const h5::Id group = h5::create_group(h5::open_group(file, "tactile"), s.name);
     Sensor out;
     out.frame = {E, static_cast<hsize_t>(s.points), 3};
-    if (s.rectangular()) out.frame = {E, static_cast<hsize_t>(s.rows), static_cast<hsize_t>(s.cols), 3};
+    if (s.rectangular())
+      out.frame = {E, static_cast<hsize_t>(s.rows), static_cast<hsize_t>(s.cols), 3};
     h5::Dims dims = out.frame;
     dims.insert(dims.begin(), F);
-    out.force = h5::create_dataset<double>(group, "force", dims, F > 0 ? field_storage(dims) : h5::Storage{});
+    out.force = h5::create_dataset<double>(group, "force", dims,
+                                           F > 0 ? field_storage(dims) : h5::Storage{});
     out.step = h5::create_dataset<std::int64_t>(group, "step", {F});
     h5::write_attribute(out.step, "meaning", "row of /q that each field was read from");
     h5::write_scalar<std::int64_t>(out.force, "every", s.every);
@@ -211,7 +230,8 @@ struct TrajectoryFile::Impl {
     const TaskSpec& spec = *layout.task;
     h5::write_attribute(file, "task", spec.name);
     h5::write_attribute(file, "policy", layout.policy);
-    const hsize_t E = static_cast<hsize_t>(layout.environments), A = static_cast<hsize_t>(spec.horizon);
+    const hsize_t E = static_cast<hsize_t>(layout.environments),
+                  A = static_cast<hsize_t>(spec.horizon);
     const h5::Id group = h5::create_group(file, "task");
     h5::write_attribute(group, "success", spec.success);
     task.action = rows<double>(group, "action", {A, E, spec.action.size()});
@@ -235,7 +255,8 @@ struct TrajectoryFile::Impl {
   }
 };
 
-TrajectoryFile::TrajectoryFile(const std::string& output, const TrajectoryLayout& layout, bool overwrite)
+TrajectoryFile::TrajectoryFile(const std::string& output, const TrajectoryLayout& layout,
+                               bool overwrite)
     : impl_(std::make_unique<Impl>(output, layout, overwrite)) {}
 TrajectoryFile::~TrajectoryFile() {
   // On a full disk the library can only close its file once there is room again.
@@ -254,8 +275,8 @@ void TrajectoryFile::write(const StateRow& row) {
   Impl::put<double>(f.twist, t, {E, nb, 6}, row.body_twist.data());
   if (const hsize_t n = f.layout.variable_names.size(); n > 0) {
     if (row.variables.size() != E * n * 3)
-      throw IoError(fmt::format("{}: row {} has {} numbers for {} end effectors of {} environments", f.part.output(), t,
-                                row.variables.size(), n, E));
+      throw IoError(fmt::format("{}: row {} has {} numbers for {} end effectors of {} environments",
+                                f.part.output(), t, row.variables.size(), n, E));
     Impl::put<double>(f.variables, t, {E, n, 3}, row.variables.data());
   }
   ++f.states;
@@ -264,7 +285,8 @@ void TrajectoryFile::write(const StateRow& row) {
 void TrajectoryFile::write(const StepRow& row) {
   Impl& f = *impl_;
   const hsize_t E = static_cast<hsize_t>(f.layout.environments);
-  if (!f.layout.u_names.empty()) Impl::put<double>(f.u, row.step, {E, f.layout.u_names.size()}, row.u.data());
+  if (!f.layout.u_names.empty())
+    Impl::put<double>(f.u, row.step, {E, f.layout.u_names.size()}, row.u.data());
   Impl::put<std::int32_t>(f.iterations, row.step, {E}, row.iterations.data());
   Impl::put<std::int8_t>(f.status, row.step, {E}, row.status.data());
   Impl::put<double>(f.residual, row.step, {E}, row.residual.data());
@@ -296,24 +318,28 @@ void TrajectoryFile::write(const ActionRow& row) {
 
 void TrajectoryFile::write(const GradientArrays& g) {
   const TrajectoryLayout& l = impl_->layout;
-  const hsize_t E = static_cast<hsize_t>(l.environments), T = static_cast<hsize_t>(l.steps), nv = l.v_names.size(),
-                nu = l.u_names.size();
+  const hsize_t E = static_cast<hsize_t>(l.environments), T = static_cast<hsize_t>(l.steps),
+                nv = l.v_names.size(), nu = l.u_names.size();
   const h5::Id group = h5::create_group(impl_->file, "gradients");
   h5::write_attribute(group, "loss", g.loss);
   h5::write_attribute(group, "meaning", g.meaning);
-  const auto put = [&](const std::string& name, const h5::Dims& dims, std::span<const double> values,
-                       const std::string& meaning, std::span<const std::string> names) {
+  const auto put = [&](const std::string& name, const h5::Dims& dims,
+                       std::span<const double> values, const std::string& meaning,
+                       std::span<const std::string> names) {
     const h5::Id d = h5::create_dataset<double>(group, name, dims, rows_of(dims, sizeof(double)));
     h5::write_attribute(d, "meaning", meaning);
     if (!names.empty()) h5::write_attribute(d, "names", names);
     if (!values.empty()) h5::write_box<double>(d, h5::Dims(dims.size(), 0), dims, values.data());
   };
   put("loss", {E}, g.value, "the loss of each environment", {});
-  if (nu > 0) put("grad_u", {E, T, nu}, g.u, "derivative of the loss by the controls of every step", l.u_names);
-  put("grad_q", {E, nv}, g.q, "by the initial positions, along the dofs of v; rotations on the right", l.v_names);
+  if (nu > 0)
+    put("grad_u", {E, T, nu}, g.u, "derivative of the loss by the controls of every step",
+        l.u_names);
+  put("grad_q", {E, nv}, g.q,
+      "by the initial positions, along the dofs of v; rotations on the right", l.v_names);
   put("grad_v", {E, nv}, g.v, "by the initial velocities", l.v_names);
-  put("grad_numbers", {E, g.number_names.size()}, g.numbers, "by the numbers of the scene, in the units given",
-      g.number_names);
+  put("grad_numbers", {E, g.number_names.size()}, g.numbers,
+      "by the numbers of the scene, in the units given", g.number_names);
   const h5::Id numbers = h5::open_dataset(group, "grad_numbers");
   h5::write_attribute(numbers, "units", g.number_units);
   if (!g.points.empty()) impl_->put_points(group, g.points);
@@ -323,16 +349,17 @@ void TrajectoryFile::commit() {
   Impl& f = *impl_;
   const auto expect = [&](const std::string& what, std::int64_t written, std::int64_t expected) {
     if (written != expected)
-      throw IoError(fmt::format("{}: {} {} of {} were written; the file is incomplete", f.part.output(), written, what,
-                                expected));
+      throw IoError(fmt::format("{}: {} {} of {} were written; the file is incomplete",
+                                f.part.output(), written, what, expected));
   };
   expect("states", f.states, f.layout.steps + 1);
   expect("steps", f.steps, f.layout.steps);
   expect("actions", f.actions, f.layout.task ? f.layout.task->horizon : 0);
   for (std::size_t i = 0; i < f.sensors.size(); ++i)
-    expect("fields of " + f.layout.sensors[i].name, f.sensors[i].written, f.layout.sensors[i].frames(f.layout.steps, f.layout.first_step));
-  for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.variables, &f.iterations, &f.status,
-                    &f.residual})
+    expect("fields of " + f.layout.sensors[i].name, f.sensors[i].written,
+           f.layout.sensors[i].frames(f.layout.steps, f.layout.first_step));
+  for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.variables, &f.iterations,
+                    &f.status, &f.residual})
     d->reset();
   f.sensors.clear();
   f.task = {};

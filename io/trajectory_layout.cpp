@@ -38,15 +38,16 @@ void add_small(const TrajectoryLayout& layout, Bytes& bytes) {
   constexpr std::int64_t kPoseAndTwist = 13;
   bytes.add({t, 8});
   bytes.add({8});
-  const std::int64_t row =
-      count_of(layout.q_names) + count_of(layout.v_names) + kPoseAndTwist * count_of(layout.body_names) +
-      3 * count_of(layout.variable_names);
+  const std::int64_t row = count_of(layout.q_names) + count_of(layout.v_names) +
+                           kPoseAndTwist * count_of(layout.body_names) +
+                           3 * count_of(layout.variable_names);
   bytes.add({t, e, row, 8});
   bytes.add({e, row, 8});
   bytes.add({t, e, count_of(layout.u_names), 8});
   bytes.add({t, e, 8 + 4 + 1});  // residual, iterations, status
   bytes.add({e, count_of(layout.randomized_names), 8});
-  for (const SensorLayout& sensor : layout.sensors) bytes.add({sensor.frames(t, layout.first_step), 8});
+  for (const SensorLayout& sensor : layout.sensors)
+    bytes.add({sensor.frames(t, layout.first_step), 8});
 }
 
 void check_sensor(const SensorLayout& sensor, std::set<std::string>& names) {
@@ -56,14 +57,13 @@ void check_sensor(const SensorLayout& sensor, std::set<std::string>& names) {
         "sensor '{}': a dataset cannot have this name; expected one without '/'", name));
   if (!names.insert(name).second) throw InputError(fmt::format("two sensors named '{}'", name));
   if (sensor.every < 1)
-    throw InputError(fmt::format("sensor '{}': every = {}, expected at least 1", name,
-                                 sensor.every));
+    throw InputError(
+        fmt::format("sensor '{}': every = {}, expected at least 1", name, sensor.every));
   if (sensor.pressure_sign != 1 && sensor.pressure_sign != -1)
     throw InputError(fmt::format("sensor '{}': pressure_sign = {}, expected 1 or -1", name,
                                  sensor.pressure_sign));
-  const bool fits = sensor.rectangular()
-                        ? std::int64_t{sensor.rows} * sensor.cols == sensor.points
-                        : sensor.rows == 0 && sensor.cols == 0;
+  const bool fits = sensor.rectangular() ? std::int64_t{sensor.rows} * sensor.cols == sensor.points
+                                         : sensor.rows == 0 && sensor.cols == 0;
   if (!fits || sensor.points < 1)
     throw InputError(fmt::format("sensor '{}': {} points in {} rows of {}", name, sensor.points,
                                  sensor.rows, sensor.cols));
@@ -86,7 +86,8 @@ void TrajectoryLayout::check() const {
       throw InputError(fmt::format("{} names and {} units for {}", names, units, what));
   };
   if (steps < 0) throw InputError(fmt::format("{} steps, expected 0 or more", steps));
-  if (first_step < 0) throw InputError(fmt::format("first step {}, expected 0 or more", first_step));
+  if (first_step < 0)
+    throw InputError(fmt::format("first step {}, expected 0 or more", first_step));
   if (environments < 1)
     throw InputError(fmt::format("{} environments, expected at least 1", environments));
   same("q", q_names.size(), q_units.size());

@@ -25,7 +25,8 @@ struct TrajectoryReader::Impl {
   std::vector<std::int64_t> frames;
 
   explicit Impl(const std::string& p) : path(p), file(h5::open_file(p)) {
-    if (H5Aexists(file.get(), "format") <= 0 || h5::read_text(file, "format") != "tangere trajectory")
+    if (H5Aexists(file.get(), "format") <= 0 ||
+        h5::read_text(file, "format") != "tangere trajectory")
       throw IoError(path + ": not a trajectory file of 'tangere simulate'");
     scene_name = h5::read_text(file, "scene_name");
     environments = one<std::int64_t>(file, "environments");
@@ -36,7 +37,8 @@ struct TrajectoryReader::Impl {
     H5Gget_info(group.get(), &info);
     for (hsize_t i = 0; i < info.nlinks; ++i) {
       char name[1024];
-      if (H5Lget_name_by_idx(group.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, name, sizeof name, H5P_DEFAULT) < 0)
+      if (H5Lget_name_by_idx(group.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, name, sizeof name,
+                             H5P_DEFAULT) < 0)
         throw IoError(path + ": the list of sensors is damaged");
       add_sensor(h5::open_group(group, name), name);
     }
@@ -58,7 +60,8 @@ struct TrajectoryReader::Impl {
     for (std::size_t p = 0; p < n; ++p)
       for (std::size_t k = 0; k < 2; ++k) {
         const std::int64_t x = pixels[2 * p + k];
-        if (x < -1 || x >= kLargestImage) throw IoError(fmt::format("{}: sensor '{}' has pixel {}", path, s.name, x));
+        if (x < -1 || x >= kLargestImage)
+          throw IoError(fmt::format("{}: sensor '{}' has pixel {}", path, s.name, x));
         s.list[p].pixel[k] = static_cast<int>(x);
       }
     const auto vectors = [&](const char* name, Vector3 TactilePoint::*to) {
@@ -96,14 +99,16 @@ struct TrajectoryReader::Impl {
       s.points = static_cast<int>(dims[2]);
       if (h5::has_link(group, "pixel")) read_image(group, s);
     } else {
-      throw IoError(fmt::format("{}: sensor '{}' has {} dimensions; expected 4 or 5", path, name, dims.size()));
+      throw IoError(fmt::format("{}: sensor '{}' has {} dimensions; expected 4 or 5", path, name,
+                                dims.size()));
     }
     sensors.push_back(std::move(s));
     frames.push_back(static_cast<std::int64_t>(dims[0]));
   }
 
   [[nodiscard]] h5::Id open(std::size_t sensor, const char* dataset) const {
-    return h5::open_dataset(h5::open_group(h5::open_group(file, "tactile"), sensors[sensor].name), dataset);
+    return h5::open_dataset(h5::open_group(h5::open_group(file, "tactile"), sensors[sensor].name),
+                            dataset);
   }
 };
 
@@ -131,14 +136,17 @@ std::int64_t TrajectoryReader::frames(std::size_t sensor) const { return impl_->
 
 std::int64_t TrajectoryReader::step(std::size_t sensor, std::int64_t frame) const {
   std::int64_t value = 0;
-  h5::read_box<std::int64_t>(impl_->open(sensor, "step"), {static_cast<hsize_t>(frame)}, {1}, &value);
+  h5::read_box<std::int64_t>(impl_->open(sensor, "step"), {static_cast<hsize_t>(frame)}, {1},
+                             &value);
   return value;
 }
 
-std::vector<double> TrajectoryReader::force(std::size_t sensor, std::int64_t frame, std::int64_t environment) const {
+std::vector<double> TrajectoryReader::force(std::size_t sensor, std::int64_t frame,
+                                            std::int64_t environment) const {
   const SensorLayout& s = impl_->sensors[sensor];
   std::vector<double> values(std::size_t(s.points) * 3);
-  h5::Dims offset = {static_cast<hsize_t>(frame), static_cast<hsize_t>(environment)}, count = {1, 1};
+  h5::Dims offset = {static_cast<hsize_t>(frame), static_cast<hsize_t>(environment)},
+           count = {1, 1};
   if (s.rectangular()) {
     offset.insert(offset.end(), {0, 0, 0});
     count.insert(count.end(), {static_cast<hsize_t>(s.rows), static_cast<hsize_t>(s.cols), 3});

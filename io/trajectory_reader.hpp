@@ -29,7 +29,8 @@ class TrajectoryReader {
   /// Row of /q that a frame was read from.
   [[nodiscard]] std::int64_t step(std::size_t sensor, std::int64_t frame) const;
   /// (points, 3) [N].
-  [[nodiscard]] std::vector<double> force(std::size_t sensor, std::int64_t frame, std::int64_t environment) const;
+  [[nodiscard]] std::vector<double> force(std::size_t sensor, std::int64_t frame,
+                                          std::int64_t environment) const;
 
  private:
   struct Impl;

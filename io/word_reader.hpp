@@ -20,8 +20,9 @@ class WordReader {
   /// Throws InputError with file and line.
   [[noreturn]] void fail(const std::string& message) const;
 
-  /// Word k of the line as a finite number; as one of at most a million, beyond which nothing is simulated to any
-  /// accuracy; as a whole number, where `expected` says what is wanted. Fail otherwise.
+  /// Word k of the line as a finite number; as one of at most a million, beyond which nothing is
+  /// simulated to any accuracy; as a whole number, where `expected` says what is wanted. Fail
+  /// otherwise.
   [[nodiscard]] double number(std::size_t k) const;
   [[nodiscard]] double position(std::size_t k) const;
   [[nodiscard]] long integer(std::string_view word, const char* expected) const;

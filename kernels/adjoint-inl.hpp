@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// The reverse sweep through one solved stage, after residual<true>() and jacobian() at its accepted x (docs/gradients.md).
+// The reverse sweep through one solved stage, after residual<true>() and jacobian() at its accepted
+// x (docs/gradients.md).
 //
-//   Aᵀ λ = Jᵀ q̄ + V_xᵀ v̄;   ν = v̄ - Cᵀ λ,  C = G_v + (c₀/h) M;   then the history takes (∂v/∂q_k)ᵀ ν and -(∂a/∂v_k)ᵀ M λ
+//   Aᵀ λ = Jᵀ q̄ + V_xᵀ v̄;   ν = v̄ - Cᵀ λ,  C = G_v + (c₀/h) M;
+//       then the history takes (∂v/∂q_k)ᵀ ν and -(∂a/∂v_k)ᵀ M λ
 //
-// Products with Cᵀ and M need no matrix. φ = λᵀ g is the power of all wrenches along the twists Λ = X Λ_p + S λ:
+// Products with Cᵀ and M need no matrix. φ = λᵀ g is the power of all wrenches along the twists Λ =
+// X Λ_p + S λ:
 //   φ = Σ Λᵀ (I A + V ×* I V) + Σ_pairs Yᵀ w₁ - λᵀ τ …,   Y = Ad Λ₂ - Λ₁
-// and one inward sweep of Ā = I Λ, V̄ = -Λ ×* I V - I (V × Λ) + contacts gives all its derivatives by v at fixed q:
-//   V̄ += (S q̇) ×* Ā;   (M λ)_i = Sᵀ Ā;   (Cᵀ λ)_i = Sᵀ (V̄ - V ×* Ā) + (c₀/h) Sᵀ Ā;   Ā_p += X* Ā, V̄_p += X* V̄
+// and one inward sweep of Ā = I Λ, V̄ = -Λ ×* I V - I (V × Λ) + contacts gives all its derivatives
+// by v at fixed q:
+//   V̄ += (S q̇) ×* Ā;   (M λ)_i = Sᵀ Ā;   (Cᵀ λ)_i = Sᵀ (V̄ - V ×* Ā) + (c₀/h) Sᵀ Ā;
+//       Ā_p += X* Ā, V̄_p += X* V̄
 #pragma once
 
 #include "kernels/inertial_jacobian-inl.hpp"
@@ -17,24 +22,24 @@ namespace tangere::kernels {
 /// What the sweeps pass on per link, in its axes.
 template <class N>
 struct LinkAdjoint {
-  Vec6<N> twist;   ///< Λ
-  Vec6<N> rate;    ///< S q̇
-  Vec6<N> by_v;    ///< V̄
-  Vec6<N> by_a;    ///< Ā
+  Vec6<N> twist;  ///< Λ
+  Vec6<N> rate;   ///< S q̇
+  Vec6<N> by_v;   ///< V̄
+  Vec6<N> by_a;   ///< Ā
 };
 
 template <class N>
 struct AdjointArgs {
-  const N *q_bar, *v_bar;       ///< (nv) cotangents of the stage's result, q by its right tangent
-  N* rhs;                       ///< (nv) out: Jᵀ q̄ + V_xᵀ v̄
-  const N* lambda;              ///< (nv) the solution
-  N *nu, *mass_lambda;          ///< (nv) out: ν, M λ
-  N* target;                    ///< (nv) out: cotangent of the targets of position motors, zero where there are none
-  const N* other;               ///< (nv) q_other ⊖ q_centre
-  N *q_centre, *v_centre;       ///< (nv) added to
-  N *q_other, *v_other;         ///< (nv) added to; not read where ρ and s_other are zero
+  const N *q_bar, *v_bar;  ///< (nv) cotangents of the stage's result, q by its right tangent
+  N* rhs;                  ///< (nv) out: Jᵀ q̄ + V_xᵀ v̄
+  const N* lambda;         ///< (nv) the solution
+  N *nu, *mass_lambda;     ///< (nv) out: ν, M λ
+  N* target;  ///< (nv) out: cotangent of the targets of position motors, zero where there are none
+  const N* other;          ///< (nv) q_other ⊖ q_centre
+  N *q_centre, *v_centre;  ///< (nv) added to
+  N *q_other, *v_other;    ///< (nv) added to; not read where ρ and s_other are zero
   StageHistory history;
-  LinkAdjoint<N>* links;        ///< (n_links) scratch
+  LinkAdjoint<N>* links;  ///< (n_links) scratch
 };
 
 /// Jᵀ q̄ + V_xᵀ v̄.
@@ -85,7 +90,9 @@ void adjoint_outward(const ModelView& model, const StageArgs<N>& a, const Adjoin
       o.by_a.l = own.mass * o.twist.l;
       continue;
     }
-    const auto times = [&](const Vec6<N>& x) { return inertia_times(own.mass, own.moment, own.inertia, x); };
+    const auto times = [&](const Vec6<N>& x) {
+      return inertia_times(own.mass, own.moment, own.inertia, x);
+    };
     o.by_a = times(o.twist);
     o.by_v = -(cross_wrench(o.twist, times(s.V)) + times(cross_motion(s.V, o.twist)));
   }
@@ -98,9 +105,11 @@ Vec6<N> transposed_damping(const PairSums<N>& s, const Vec6<N>& y) {
           transposed_times(s.d[0][1], y.a) + transposed_times(s.d[1][1], y.l)};
 }
 
-/// Y of a pair of links: the rate at which body 2 moves against body 1 along λ, in body 1's axes at its origin.
+/// Y of a pair of links: the rate at which body 2 moves against body 1 along λ, in body 1's axes at
+/// its origin.
 template <class N>
-Vec6<N> adjoint_slip(const LinkPair& pair, const ContactScratch<N>& o, const LinkAdjoint<N>* links) {
+Vec6<N> adjoint_slip(const LinkPair& pair, const ContactScratch<N>& o,
+                     const LinkAdjoint<N>* links) {
   Vec6<N> y = pair.link2 < 0 ? zero6<N>() : motion_to_parent(o.link2_in_1, links[pair.link2].twist);
   if (pair.link1 >= 0) y -= links[pair.link1].twist;
   return y;
@@ -127,7 +136,8 @@ void adjoint_contacts(const ModelView& model, const StageArgs<N>& a, const Adjoi
 
 /// Cotangents of the targets of one joint's motors: (∂force/∂u)ᵀ λ.
 template <JointKind K, class N>
-void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& link, const N* lambda, N* target) {
+void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& link,
+                     const N* lambda, N* target) {
   const DofEffects* e = model.effects + link.v;
   const N *c = a.centre + link.q, *x = a.x + link.v, *u = a.target + link.v, *v = a.v + link.v;
   N pull[3];
@@ -147,7 +157,8 @@ void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& 
     const Vec3<N> goal = {u[0], u[1], u[2]};
     const RotationVector<N> error = rotation_vector<false>(conjugate(q) * quaternion_exp(goal));
     pulled(0, error.phi.x), pulled(1, error.phi.y), pulled(2, error.phi.z);
-    const Vec3<N> by_psi = transposed_times(inverse_right_jacobian(error), Vec3<N>{pull[0], pull[1], pull[2]});
+    const Vec3<N> by_psi =
+        transposed_times(inverse_right_jacobian(error), Vec3<N>{pull[0], pull[1], pull[2]});
     const Vec3<N> by_u = transposed_times(right_jacobian(goal, rotation_series(goal)), by_psi);
     target[link.v] = by_u.x, target[link.v + 1] = by_u.y, target[link.v + 2] = by_u.z;
   }
@@ -155,10 +166,12 @@ void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& 
 
 /// What acts on the dofs of one joint, on top of the sweep's Cᵀ λ and M λ.
 template <JointKind K, class N>
-void adjoint_effects(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d, const Link& link, N* by_v) {
+void adjoint_effects(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
+                     const Link& link, N* by_v) {
   if (link.effects & kDamped)
     for (int k = 0; k < dofs(K); ++k)
-      by_v[k] = mul_add(load_parameter(a, model.effects[link.v + k].damping), d.lambda[link.v + k], by_v[k]);
+      by_v[k] = mul_add(load_parameter(a, model.effects[link.v + k].damping), d.lambda[link.v + k],
+                        by_v[k]);
   if (!(link.effects & kBeyondDamping)) return;
   JointLoad<N> load;
   joint_load<K, true>(model, a, link, load);
@@ -212,11 +225,11 @@ RotationVector<N> with_inverse_jacobians(const N* x) {
   return r;
 }
 
-/// ∂v/∂q_k at a fixed newest pose: by the centre -V_x J_l⁻¹(x) - (ρ/h) J_r(x) J_l⁻¹(y), by the other (ρ/h) J_r(x) J_r⁻¹(y),
-/// y = q_other ⊖ q_centre.
+/// ∂v/∂q_k at a fixed newest pose: by the centre -V_x J_l⁻¹(x) - (ρ/h) J_r(x) J_l⁻¹(y), by the
+/// other (ρ/h) J_r(x) J_r⁻¹(y), y = q_other ⊖ q_centre.
 template <class N>
-void adjoint_turning_history(const StageArgs<N>& a, const AdjointArgs<N>& d, const Link& link, const LinkScratch<N>& o,
-                             const N& rho_over_h) {
+void adjoint_turning_history(const StageArgs<N>& a, const AdjointArgs<N>& d, const Link& link,
+                             const LinkScratch<N>& o, const N& rho_over_h) {
   const int v = link.v;
   const Vec3<N> nu = {d.nu[v], d.nu[v + 1], d.nu[v + 2]};
   const RotationVector<N> x = with_inverse_jacobians(a.x + v);

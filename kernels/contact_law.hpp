@@ -18,15 +18,16 @@ struct LawParameters {
   N kn, kt, mu, damping;
   ContactLaw law;
   double ramp;
-  /// Whether slipping points bring the derivative of -scale v_t (1) or, by its secant, -scale alone (0).
+  /// Whether slipping points bring the derivative of -scale v_t (1) or, by its secant, -scale alone
+  /// (0).
   N friction_tangent = N(1.0);
 };
 
 /// N and the friction bound over μ, with their slopes.
 template <class N>
 struct NormalForce {
-  N force, d_slope, rate_slope;        ///< N, ∂N/∂d, ∂N/∂ḋ
-  N bound, bound_d, bound_rate;        ///< B with |f_t| ≤ μ B, and its slopes
+  N force, d_slope, rate_slope;  ///< N, ∂N/∂d, ∂N/∂ḋ
+  N bound, bound_d, bound_rate;  ///< B with |f_t| ≤ μ B, and its slopes
 };
 
 /// Values for d < 0; zero force and slopes elsewhere and where clamped.
@@ -77,15 +78,15 @@ NormalForce<N> normal_force(const LawParameters<N>& p, const N& d, const N& rate
 /// f_t = -scale v_t, and what its derivative needs.
 template <class N>
 struct Friction {
-  N scale;           ///< k_t when sticking, μ B / |v_t| when slipping
-  N slip;            ///< 1 when slipping and its derivative counts, else 0
-  Vec3<N> direction; ///< v_t / |v_t| where slip is 1, else 0
+  N scale;            ///< k_t when sticking, μ B / |v_t| when slipping
+  N slip;             ///< 1 when slipping and its derivative counts, else 0
+  Vec3<N> direction;  ///< v_t / |v_t| where slip is 1, else 0
 };
 
 /// `square` = |v_t|², `inverse_speed` = 1/|v_t|, finite at v_t = 0.
 template <class N>
-Friction<N> friction(const LawParameters<N>& p, const NormalForce<N>& normal, const Vec3<N>& vt, const N& square,
-                     const N& inverse_speed) {
+Friction<N> friction(const LawParameters<N>& p, const NormalForce<N>& normal, const Vec3<N>& vt,
+                     const N& square, const N& inverse_speed) {
   const N zero(0.0);
   const N limit = p.mu * normal.bound;
   const auto slipping = p.kt * (square * inverse_speed) > limit;  // false at v_t = 0

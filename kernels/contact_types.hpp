@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The enumerations that a scene and a kernel share: which law a contact follows, which shape is touched.
+// The enumerations that a scene and a kernel share: which law a contact follows, which shape is
+// touched.
 #pragma once
 
 #include <cstdint>

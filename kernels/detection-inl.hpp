@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which points of a body may touch a shape: all of them by one bounding sphere across environments, then tiles by theirs
-// and points, eight at a time.
+// Which points of a body may touch a shape: all of them by one bounding sphere across environments,
+// then tiles by theirs and points, eight at a time.
 #pragma once
 
 #include "kernels/distance.hpp"
@@ -39,13 +39,15 @@ void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out
       const int k = model.pair_order[links.first + i];
       const PairContact& pair = model.pairs[k];
       const Vec3<N> in_2 = transposed_times(x.R, broadcast<N>(pair.middle) - x.p);
-      const Vec3<N> y = transposed_times(broadcast<N>(pair.frame2.R), in_2 - broadcast<N>(pair.frame2.p));
+      const Vec3<N> y =
+          transposed_times(broadcast<N>(pair.frame2.R), in_2 - broadcast<N>(pair.frame2.p));
       const N reach(pair.extent + a.candidates[k].margin);
       const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
       out.lanes[k] = with_distance<N>(pair.shape, size, [&](const auto& shape) {
         return lane_bits(nearer_than(shape, y, reach));
       });
-      if (out.lanes[k] != 0) store_frame(compose(x, broadcast<N>(pair.frame2)), view(out.shape_poses + 12 * k));
+      if (out.lanes[k] != 0)
+        store_frame(compose(x, broadcast<N>(pair.frame2)), view(out.shape_poses + 12 * k));
     }
   }
 }
@@ -64,7 +66,8 @@ void append(const Lanes<A>& a, unsigned which, double* out) {
   for (; which != 0; which &= which - 1) *out++ = lanes[__builtin_ctz(which)];
 }
 
-/// Shape and pose are its own copies: for all the compiler knows, storing to `points` could change them otherwise.
+/// Shape and pose are its own copies: for all the compiler knows, storing to `points` could change
+/// them otherwise.
 template <class A, class Shape>
 int search_shape(const CandidateSearch& s, Shape shape) {
   using N = Lanes<A>;
@@ -77,10 +80,12 @@ int search_shape(const CandidateSearch& s, Shape shape) {
   int count = 0;
   for (int group = 0; group * kGroup < pair.n_tiles; ++group) {
     const double* b = pair.tile_bounds + 4 * kGroup * group;
-    const Vec3<N> centre = {load_lanes<A>(b), load_lanes<A>(b + kGroup), load_lanes<A>(b + 2 * kGroup)};
+    const Vec3<N> centre = {load_lanes<A>(b), load_lanes<A>(b + kGroup),
+                            load_lanes<A>(b + 2 * kGroup)};
     const N reach = load_lanes<A>(b + 3 * kGroup) + margin;
     for (unsigned near = near_shape(shape, pose, centre, reach); near != 0; near &= near - 1) {
-      const int tile = group * kGroup + __builtin_ctz(near), rest = pair.n_points - tile * kContactTile;
+      const int tile = group * kGroup + __builtin_ctz(near),
+                rest = pair.n_points - tile * kContactTile;
       const double* p = pair.tile_points + 3 * kContactTile * tile;
       for (int k = 0; k < kContactTile && k < rest; k += kGroup) {
         const Vec3<N> place = {load_lanes<A>(p + k), load_lanes<A>(p + kContactTile + k),
@@ -100,8 +105,9 @@ int search_shape(const CandidateSearch& s, Shape shape) {
 
 template <class A>
 int search_candidates(const CandidateSearch& s) {
-  return with_distance<Lanes<A>>(s.pair->shape, s.size,
-                                 [&]<class Shape>(const Shape& shape) { return search_shape<A, Shape>(s, shape); });
+  return with_distance<Lanes<A>>(s.pair->shape, s.size, [&]<class Shape>(const Shape& shape) {
+    return search_shape<A, Shape>(s, shape);
+  });
 }
 
 /// Rows of eight lanes from the lanes' own lists; shorter ones end in far points.

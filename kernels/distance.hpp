@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Signed distances of primitive shapes, with gradient and Hessian, over any number type.
-// d < 0 inside; n = ∇d is a unit vector everywhere, chosen where the distance has a kink (centre, axis, edge, corner).
+// d < 0 inside; n = ∇d is a unit vector everywhere, chosen where the distance has a kink (centre,
+// axis, edge, corner).
 #pragma once
 
 #include "kernels/contact_types.hpp"
@@ -19,8 +20,10 @@ struct Distance {
 /// What the Hessian is inside a shape, the only place where contact looks.
 enum class Bending {
   flat,  ///< H = 0
-  ball,  ///< H = κ (I - n nᵀ), and the shape looks the same from every side: it needs no orientation
-  rod,   ///< H = κ (I - n nᵀ - e z zᵀ), z the shape's axis; e = 1 where the surface is straight along z, else 0
+  ball,  ///< H = κ (I - n nᵀ), and the shape looks the same from every side: it needs no
+         ///< orientation
+  rod,  ///< H = κ (I - n nᵀ - e z zᵀ), z the shape's axis; e = 1 where the surface is straight
+        ///< along z, else 0
 };
 
 /// Sphere of radius r at the origin: d = |y| - r, H = (I - n nᵀ)/|y|. At the centre: n = z, H = 0.
@@ -36,8 +39,9 @@ struct SphereDistance {
     const auto regular = square > N(1e-300);
     const N zero(0.0);
     curvature = select(regular, inverse, zero);
-    return {length - radius, {select(regular, inverse * y.x, zero), select(regular, inverse * y.y, zero),
-                              select(regular, inverse * y.z, N(1.0))}};
+    return {length - radius,
+            {select(regular, inverse * y.x, zero), select(regular, inverse * y.y, zero),
+             select(regular, inverse * y.z, N(1.0))}};
   }
 };
 
@@ -48,8 +52,9 @@ auto nearer_than(const SphereDistance<N>& shape, const Vec3<N>& y, const N& m) {
   return dot(y, y) < reach * reach;
 }
 
-/// Cuboid with half edges s. Inside: the nearest face (the first of x, y, z on ties, outward where y_k = 0 is +).
-/// Outside: the distance to the nearest face, edge or corner. H = 0 inside, the only place where contact looks.
+/// Cuboid with half edges s. Inside: the nearest face (the first of x, y, z on ties, outward where
+/// y_k = 0 is +). Outside: the distance to the nearest face, edge or corner. H = 0 inside, the only
+/// place where contact looks.
 template <class N>
 struct CuboidDistance {
   static constexpr Bending kBending = Bending::flat;
@@ -59,7 +64,8 @@ struct CuboidDistance {
     const N zero(0.0), one(1.0);
     curvature = zero;
     const Vec3<N> q = {abs(y.x) - half.x, abs(y.y) - half.y, abs(y.z) - half.z};
-    const Vec3<N> sign = {select(y.x < zero, -one, one), select(y.y < zero, -one, one), select(y.z < zero, -one, one)};
+    const Vec3<N> sign = {select(y.x < zero, -one, one), select(y.y < zero, -one, one),
+                          select(y.z < zero, -one, one)};
     const auto x_first = (q.x >= q.y) & (q.x >= q.z);
     const auto y_first = q.y >= q.z;
     const N largest = select(x_first, q.x, select(y_first, q.y, q.z));
@@ -72,7 +78,8 @@ struct CuboidDistance {
     const N length = root_of(square, inverse);
     const auto outside = square > zero;
     return {select(outside, length, largest),
-            {sign.x * select(outside, inverse * out.x, pick_x), sign.y * select(outside, inverse * out.y, pick_y),
+            {sign.x * select(outside, inverse * out.x, pick_x),
+             sign.y * select(outside, inverse * out.y, pick_y),
              sign.z * select(outside, inverse * out.z, pick_z)}};
   }
 
@@ -83,7 +90,8 @@ struct CuboidDistance {
     const Vec3<N> q = {abs(y.x) - half.x, abs(y.y) - half.y, abs(y.z) - half.z};
     const auto x_first = (q.x >= q.y) & (q.x >= q.z);
     const auto y_first = q.y >= q.z;
-    const Vec3<N> sign = {select(y.x < zero, -one, one), select(y.y < zero, -one, one), select(y.z < zero, -one, one)};
+    const Vec3<N> sign = {select(y.x < zero, -one, one), select(y.y < zero, -one, one),
+                          select(y.z < zero, -one, one)};
     return {select(x_first, q.x, select(y_first, q.y, q.z)),
             {select(x_first, sign.x, zero), select(x_first, zero, select(y_first, sign.y, zero)),
              select(x_first, zero, select(y_first, zero, sign.z))}};
@@ -117,8 +125,8 @@ auto nearer_than(const CuboidDistance<N>& shape, const Vec3<N>& y, const N& m) {
   return dot(out, out) < m * m;
 }
 
-/// Beyond this distance from a half-space's origin there is nothing [m]: what fills up candidate lists lies at 1e6 m
-/// and must not touch it.
+/// Beyond this distance from a half-space's origin there is nothing [m]: what fills up candidate
+/// lists lies at 1e6 m and must not touch it.
 inline constexpr double kPlaneReach = 5e5;
 
 /// The half-space z < 0: d = z, n = z, H = 0.
@@ -160,8 +168,9 @@ struct AxisDistance {
   }
 };
 
-/// Cylinder with caps: radius r, half length h along z. With a = ρ - r and b = |z| - h, d = max(a, b) inside (the side
-/// on ties) and |max((a, b), 0)| outside, where the rim is nearest when both are positive. z = 0 counts as above.
+/// Cylinder with caps: radius r, half length h along z. With a = ρ - r and b = |z| - h, d = max(a,
+/// b) inside (the side on ties) and |max((a, b), 0)| outside, where the rim is nearest when both
+/// are positive. z = 0 counts as above.
 template <class N>
 struct CylinderDistance {
   static constexpr Bending kBending = Bending::rod;
@@ -202,7 +211,8 @@ struct CylinderDistance {
              select(side, zero, select(y.z < zero, -one, one))}};
   }
 
-  /// Inside: by radius and half length, from a cotangent ρ of the shape's place (n is radial or axial).
+  /// Inside: by radius and half length, from a cotangent ρ of the shape's place (n is radial or
+  /// axial).
   Vec3<N> size_share(const Vec3<N>&, const Vec3<N>& n, const Vec3<N>& rho) const {
     return {mul_add(n.x, rho.x, n.y * rho.y), n.z * rho.z, N(0.0)};
   }
@@ -229,8 +239,9 @@ auto nearer_than(const CylinderDistance<N>& shape, const Vec3<N>& y, const N& m)
   return (mul_add(y.x, y.x, y.y * y.y) < reach * reach) & (abs(y.z) < shape.half + m);
 }
 
-/// Capsule: all points within r of the segment |z| ≤ h. D = y - (nearest point of the segment), d = |D| - r,
-/// H = (I - n nᵀ - e z zᵀ)/|D| with e = 1 beside the segment. On the segment: n = x, H = 0.
+/// Capsule: all points within r of the segment |z| ≤ h. D = y - (nearest point of the segment), d =
+/// |D| - r, H = (I - n nᵀ - e z zᵀ)/|D| with e = 1 beside the segment. On the segment: n = x, H =
+/// 0.
 template <class N>
 struct CapsuleDistance {
   static constexpr Bending kBending = Bending::rod;
@@ -250,7 +261,8 @@ struct CapsuleDistance {
              select(regular, inverse * D.z, zero)}};
   }
 
-  /// By radius and half length, from a cotangent ρ of the shape's place: beyond an end that half ball moves with it.
+  /// By radius and half length, from a cotangent ρ of the shape's place: beyond an end that half
+  /// ball moves with it.
   Vec3<N> size_share(const Vec3<N>& y, const Vec3<N>& n, const Vec3<N>& rho) const {
     const N zero(0.0);
     return {dot(n, rho), select(y.z > half, rho.z, select(y.z < -half, -rho.z, zero)), zero};
@@ -285,8 +297,8 @@ auto with_distance(PrimitiveShape shape, const Vec3<N>& size, const F& f) {
 }
 /// The same size in every lane.
 template <class N, class F>
-  requires(!std::is_same_v<N, double>)
-auto with_distance(PrimitiveShape shape, const Vec3<double>& size, const F& f) {
+requires(!std::is_same_v<N, double>) auto with_distance(PrimitiveShape shape,
+                                                        const Vec3<double>& size, const F& f) {
   return with_distance<N>(shape, broadcast<N>(size), f);
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forward-mode dual numbers, value + ε part: the second of the three routes every derivative is checked by.
+// Forward-mode dual numbers, value + ε part: the second of the three routes every derivative is
+// checked by.
 //   f(a + ε a') = f(a) + ε f'(a) a'. Comparisons and select look at the value alone.
 #pragma once
 
@@ -38,14 +39,14 @@ Dual<N> operator/(const Dual<N>& a, const Dual<N>& b) {
   return {q, mul_sub_from(q, b.epsilon, a.epsilon) / b.value};
 }
 
-#define TANGERE_DUAL_MIXED(op)                                 \
-  template <class N>                                           \
-  Dual<N> operator op(const Dual<N>& a, double b) {            \
-    return a op Dual<N>(b);                                    \
-  }                                                            \
-  template <class N>                                           \
-  Dual<N> operator op(double a, const Dual<N>& b) {            \
-    return Dual<N>(a) op b;                                    \
+#define TANGERE_DUAL_MIXED(op)                      \
+  template <class N>                                \
+  Dual<N> operator op(const Dual<N>& a, double b) { \
+    return a op Dual<N>(b);                         \
+  }                                                 \
+  template <class N>                                \
+  Dual<N> operator op(double a, const Dual<N>& b) { \
+    return Dual<N>(a) op b;                         \
   }
 TANGERE_DUAL_MIXED(+)
 TANGERE_DUAL_MIXED(-)
@@ -53,14 +54,14 @@ TANGERE_DUAL_MIXED(*)
 TANGERE_DUAL_MIXED(/)
 #undef TANGERE_DUAL_MIXED
 
-#define TANGERE_DUAL_COMPARE(op)                               \
-  template <class N>                                           \
-  auto operator op(const Dual<N>& a, const Dual<N>& b) {       \
-    return a.value op b.value;                                 \
-  }                                                            \
-  template <class N>                                           \
-  auto operator op(const Dual<N>& a, double b) {               \
-    return a.value op b;                                       \
+#define TANGERE_DUAL_COMPARE(op)                         \
+  template <class N>                                     \
+  auto operator op(const Dual<N>& a, const Dual<N>& b) { \
+    return a.value op b.value;                           \
+  }                                                      \
+  template <class N>                                     \
+  auto operator op(const Dual<N>& a, double b) {         \
+    return a.value op b;                                 \
   }
 TANGERE_DUAL_COMPARE(<)
 TANGERE_DUAL_COMPARE(<=)
@@ -78,7 +79,8 @@ Dual<N>& operator-=(Dual<N>& a, const Dual<N>& b) {
 }
 template <class N>
 Dual<N> mul_add(const Dual<N>& a, const Dual<N>& b, const Dual<N>& c) {
-  return {mul_add(a.value, b.value, c.value), mul_add(a.epsilon, b.value, mul_add(a.value, b.epsilon, c.epsilon))};
+  return {mul_add(a.value, b.value, c.value),
+          mul_add(a.epsilon, b.value, mul_add(a.value, b.epsilon, c.epsilon))};
 }
 template <class N>
 Dual<N> mul_sub_from(const Dual<N>& a, const Dual<N>& b, const Dual<N>& c) {

@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of body 1 against faces: planes, cuboids and cylinders, whose surface bends in one direction at most.
+// Points of body 1 against faces: planes, cuboids and cylinders, whose surface bends in one
+// direction at most.
 //
-// Inside, H = κ a aᵀ with a the unit vector around a cylinder's side (κ = 0 on flat faces). Everything is in body 1's axes;
-// ε = (θ; ρ), δW and the rest as in kernels/pair_contact.hpp. A vector b at a place x is the wrench b̃ = (x × b; b), so that
+// Inside, H = κ a aᵀ with a the unit vector around a cylinder's side (κ = 0 on flat faces).
+// Everything is in body 1's axes;
+// ε = (θ; ρ), δW and the rest as in kernels/pair_contact.hpp. A vector b at a place x is the wrench
+// b̃ = (x × b; b), so that
 // b·(ρ + θ × x) = b̃·ε. At the surface point x = ξ - d n, with h = a·(ρ + θ × ξ):
 //   δd = -ñ·ε,  δn = θ × n - κ a h,  δx = n (ñ·ε) - d δn,  δu = -Γ δW - ω × δx
 //   ∂f/∂u = α nᵀ + s t tᵀ - s I,  α = A n - γ t,  A = ∂N/∂ḋ + s,  γ = μ ∂B/∂ḋ,  m = N + ḋ s
-//   M v = m v - d s ω × v + α (v_t + d n × ω)·v + s t (-ḋ t + d t × ω)·v      for v ⊥ n: what δn = v does to f
+//   M v = m v - d s ω × v + α (v_t + d n × ω)·v + s t (-ḋ t + d t × ω)·v
+//       for v ⊥ n: what δn = v does to f
 // so that δf = p (ñ·ε) + M(θ × n) + r h - ∂f/∂u Γ δW, with
 //   p = -∂N/∂d n + μ ∂B/∂d t + s (ω × n) - s t (t·(ω × n)),  r = -κ M a
 //   M(θ × n) = m θ × n + d s (n ωᵀ - (n·ω) I) θ + α e·θ + s t e_t·θ
 //   e = n × v_t + d (n (n·ω) - ω),  e_t = d (n·ω) t - ḋ n × t
-// and moments gain δx × f = (n × f)(ñ·ε) - d (θ × n) × f + d κ (a × f) h. Derivation: docs/contact.md.
+// and moments gain δx × f = (n × f)(ñ·ε) - d (θ × n) × f + d κ (a × f) h. Derivation:
+// docs/contact.md.
 #pragma once
 
 #include "kernels/pair_contact.hpp"
@@ -40,19 +45,20 @@ struct FaceMotion {
   [[no_unique_address]] Shape<N> shape;
 };
 
-/// What one point adds to the sums: exact zeros if it does not touch. Numbers throughout: those of the value, those of the
-/// derivative, those that only slipping points set, those that only bent faces set.
+/// What one point adds to the sums: exact zeros if it does not touch. Numbers throughout: those of
+/// the value, those of the derivative, those that only slipping points set, those that only bent
+/// faces set.
 template <class N, bool Bent>
 struct FacePoint {
   using Number = N;
-  Vec3<N> f, xf;                    ///< force, x × f
-  Vec3<N> n, xn, an, axn;           ///< ñ and A ñ
-  Vec3<N> p, xp, e;                 ///< p and x × p + n × f; e
-  Vec3<N> x, sx, mn, turn;          ///< x, s x, m n, m x + d f
-  Vec3<N> dn, dxn, dwx;             ///< d s ñ; d s (n·ω) x
+  Vec3<N> f, xf;            ///< force, x × f
+  Vec3<N> n, xn, an, axn;   ///< ñ and A ñ
+  Vec3<N> p, xp, e;         ///< p and x × p + n × f; e
+  Vec3<N> x, sx, mn, turn;  ///< x, s x, m n, m x + d f
+  Vec3<N> dn, dxn, dwx;     ///< d s ñ; d s (n·ω) x
   N s;
   Vec3<N> t, xt, st, sxt, gt, gxt, e_slip;  ///< t̃, s t̃, γ t̃, s e_t - γ e
-  Vec3<N> a, xa, r, xr;             ///< a and ξ × a; r and x × r + d κ a × f
+  Vec3<N> a, xa, r, xr;                     ///< a and ξ × a; r and x × r + d κ a × f
 
   static constexpr int kValues = 6, kDerivatives = kValues + 43, kSlipping = kDerivatives + 21;
   static constexpr int kBent = kSlipping + (Bent ? 12 : 0), kNumbers = kSlipping + 12;
@@ -82,14 +88,14 @@ struct TurnSums {
   Vec3<N> dn, dxn, dwx;
 };
 
-/// Every sum runs over the points in order, so that chunks may be cut anywhere: what all touching points add and what
-/// slipping ones add are kept apart until the end.
+/// Every sum runs over the points in order, so that chunks may be cut anywhere: what all touching
+/// points add and what slipping ones add are kept apart until the end.
 template <class N>
 struct FaceSums {
   Vec3<N> f, xf;
-  SymmetricSums<N> nn, tt;          ///< Σ A ñ ñᵀ, Σ s t̃ t̃ᵀ
-  ProductSums<N> pn, tn;            ///< Σ p̃ ñᵀ + r̃ ãᵀ, Σ γ t̃ ñᵀ
-  Mat3<N> ne[2], te[2];             ///< Σ A ñ eᵀ, Σ t̃ (s e_t - γ e)ᵀ: torque, force
+  SymmetricSums<N> nn, tt;  ///< Σ A ñ ñᵀ, Σ s t̃ t̃ᵀ
+  ProductSums<N> pn, tn;    ///< Σ p̃ ñᵀ + r̃ ãᵀ, Σ γ t̃ ñᵀ
+  Mat3<N> ne[2], te[2];     ///< Σ A ñ eᵀ, Σ t̃ (s e_t - γ e)ᵀ: torque, force
   MomentSums<N> moments;
   TurnSums<N> turns;
 };
@@ -124,8 +130,9 @@ struct FacePass {
 };
 
 template <template <class> class Shape, class N>
-auto find_distance(const FaceMotion<Shape, N>& z, const Vec3<N>& xi, typename FaceMotion<Shape, N>::Point&,
-                   FacePass<N>& pass) -> decltype(xi.x < xi.y) {
+auto find_distance(const FaceMotion<Shape, N>& z, const Vec3<N>& xi,
+                   typename FaceMotion<Shape, N>::Point&, FacePass<N>& pass)
+    -> decltype(xi.x < xi.y) {
   const Mat3<N>& Q = z.frame.R;
   const Vec3<N> y = transposed_times(Q, xi - z.frame.p);
   if constexpr (FaceMotion<Shape, N>::kBent) {
@@ -136,12 +143,14 @@ auto find_distance(const FaceMotion<Shape, N>& z, const Vec3<N>& xi, typename Fa
   pass.xi = xi;
   pass.d = at.d;
   pass.n = Q * at.n;
-  if constexpr (FaceMotion<Shape, N>::kBent) pass.a = cross(Vec3<N>{Q.m[0][2], Q.m[1][2], Q.m[2][2]}, pass.n);
+  if constexpr (FaceMotion<Shape, N>::kBent)
+    pass.a = cross(Vec3<N>{Q.m[0][2], Q.m[1][2], Q.m[2][2]}, pass.n);
   return at.d < N(0.0);
 }
 
 template <template <class> class Shape, class N>
-void find_slide(const FaceMotion<Shape, N>& z, const typename FaceMotion<Shape, N>::Point&, FacePass<N>& pass) {
+void find_slide(const FaceMotion<Shape, N>& z, const typename FaceMotion<Shape, N>::Point&,
+                FacePass<N>& pass) {
   pass.x = pass.xi - pass.d * pass.n;
   const Vec3<N> u = -(z.W.l + cross(z.W.a, pass.x));
   pass.rate = dot(pass.n, u);
@@ -152,7 +161,8 @@ void find_slide(const FaceMotion<Shape, N>& z, const typename FaceMotion<Shape, 
 
 /// r̃ and ã of a bent face where nothing slips; `out` has f, x and s already.
 template <class N>
-void bend(const Vec3<N>& omega, const FacePass<N>& pass, const N& m, const N& slope, FacePoint<N, true>& out) {
+void bend(const Vec3<N>& omega, const FacePass<N>& pass, const N& m, const N& slope,
+          FacePoint<N, true>& out) {
   const Vec3<N>& a = pass.a;
   const N q = dot(a, pass.vt) + pass.d * dot(a, cross(pass.n, omega));
   const Vec3<N> Ma = m * a - (pass.d * out.s) * cross(omega, a) + (slope * q) * pass.n;
@@ -161,10 +171,11 @@ void bend(const Vec3<N>& omega, const FacePass<N>& pass, const N& m, const N& sl
   out.xa = cross(pass.xi, a);
 }
 
-/// What slipping adds to p and sets in `out`. `gamma`, `gamma_d`: μ ∂B/∂ḋ, μ ∂B/∂d; all zero where nothing slips.
+/// What slipping adds to p and sets in `out`. `gamma`, `gamma_d`: μ ∂B/∂ḋ, μ ∂B/∂d; all zero where
+/// nothing slips.
 template <bool Bent, class N>
-void slip(const Vec3<N>& omega, const FacePass<N>& pass, const Vec3<N>& t, const N& gamma, const N& gamma_d,
-          FacePoint<N, Bent>& out) {
+void slip(const Vec3<N>& omega, const FacePass<N>& pass, const Vec3<N>& t, const N& gamma,
+          const N& gamma_d, FacePoint<N, Bent>& out) {
   const N& d = pass.d;
   out.t = t;
   out.xt = cross(pass.x, t);
@@ -219,7 +230,7 @@ auto find_force(const FaceMotion<Shape, N>& z, const LawParameters<N>& law, cons
   if (any(slipping)) {
     const N gate = select(slipping, N(1.0), zero);
     slip(omega, pass, gate * friction_at.direction, gate * (law.mu * normal.bound_rate),
-                gate * (law.mu * normal.bound_d), out);
+         gate * (law.mu * normal.bound_d), out);
   }
   out.xp = cross(x, out.p) + cross(n, out.f);
   if constexpr (kBent) out.xr = cross(x, out.r) + (d * pass.kappa) * cross(pass.a, out.f);
@@ -230,8 +241,12 @@ auto find_force(const FaceMotion<Shape, N>& z, const LawParameters<N>& law, cons
 template <bool Derivatives, bool Bent, class N>
 [[gnu::noinline]] void add_chunk(FaceSums<N>& sums, const PointChunk<FacePoint<N, Bent>>& chunk) {
   using Point = FacePoint<N, Bent>;
-  const auto each = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.touching, chunk.count, f); };
-  const auto slipping = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.slipping, chunk.slips, f); };
+  const auto each = [&](auto& sum, const auto& f) {
+    add_each(sum, chunk.point, chunk.touching, chunk.count, f);
+  };
+  const auto slipping = [&](auto& sum, const auto& f) {
+    add_each(sum, chunk.point, chunk.slipping, chunk.slips, f);
+  };
   each(sums.f, [](Vec3<N>& f, const Point& p) { f += p.f; });
   each(sums.xf, [](Vec3<N>& m, const Point& p) { m += p.xf; });
   if constexpr (Derivatives) {
@@ -297,8 +312,10 @@ void add_finished(const Vec6<N>& W, const FaceSums<N>& s, PairSums<N>& out) {
     const TurnSums<N>& t = s.turns;
     out.k[1][1] += s.pn.m[1][1];
     out.k[0][1] += s.pn.m[0][1];
-    out.k[1][0] += s.pn.m[1][0] + s.ne[1] + s.te[1] - skew(c.mn) + outer(t.dn, W.a) - diagonal(dot(W.a, t.dn));
-    out.k[0][0] += s.pn.m[0][0] + s.ne[0] + s.te[0] + trace_less(t.n_turn) + outer(t.dxn, W.a) - skew(t.dwx);
+    out.k[1][0] +=
+        s.pn.m[1][0] + s.ne[1] + s.te[1] - skew(c.mn) + outer(t.dn, W.a) - diagonal(dot(W.a, t.dn));
+    out.k[0][0] +=
+        s.pn.m[0][0] + s.ne[0] + s.te[0] + trace_less(t.n_turn) + outer(t.dxn, W.a) - skew(t.dwx);
     // -(A ñ ñᵀ - γ t̃ ñᵀ + s t̃ t̃ᵀ - s ΓᵀΓ), ΓᵀΓ = {|x|² I - x xᵀ, [x]; -[x], I}
     const Mat3<N> al = s.nn.al + s.tt.al, sx = skew(c.sx);
     out.d[0][0] += s.tn.m[0][0] - full(s.nn.aa) - full(s.tt.aa) + trace_less(full(c.sxx));

@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// The inertial part of the Jacobian A = ∂g/∂x after residual<true>() has filled the scratch. Wrenches by q and by v of a joint's
-// columns are combined into wrenches by x before anything is projected:
-//   A = G_q J + C V_x,  C = G_v + (c₀/h) M;  J = 1, V_x = c₀/h but for spherical joints (kernels/stage.hpp)
+// The inertial part of the Jacobian A = ∂g/∂x after residual<true>() has filled the scratch.
+// Wrenches by q and by v of a joint's columns are combined into wrenches by x before anything is
+// projected:
+//   A = G_q J + C V_x,  C = G_v + (c₀/h) M;
+//       J = 1, V_x = c₀/h but for spherical joints (kernels/stage.hpp)
 //
-// Inertial part, composites Iᶜ, Bᶜ, Fᶜ of subtrees (Fᶜ is the F of the inward sweep), for dof i and ancestor-or-self j:
-//   ∂ID_j/∂q_i = S_jᵀ(Bᶜ Ψ̇_i + Iᶜ Ψ̈_i + [j ≠ i] Fᶜ ×̄* S_i)     ∂ID_i/∂q_j = S_iᵀ(Bᶜ Ψ̇_j + Iᶜ Ψ̈_j)
-//   ∂ID_j/∂v_i = S_jᵀ(Bᶜ S_i + Iᶜ (Ψ̇_i + Ṡ_i))                  ∂ID_i/∂v_j = S_iᵀ(Bᶜ S_j + Iᶜ (Ψ̇_j + Ṡ_j))
+// Inertial part, composites Iᶜ, Bᶜ, Fᶜ of subtrees (Fᶜ is the F of the inward sweep), for dof i and
+// ancestor-or-self j:
+//   ∂ID_j/∂q_i = S_jᵀ(Bᶜ Ψ̇_i + Iᶜ Ψ̈_i + [j ≠ i] Fᶜ ×̄* S_i)
+//       ∂ID_i/∂q_j = S_iᵀ(Bᶜ Ψ̇_j + Iᶜ Ψ̈_j)
+//   ∂ID_j/∂v_i = S_jᵀ(Bᶜ S_i + Iᶜ (Ψ̇_i + Ṡ_i))
+//       ∂ID_i/∂v_j = S_iᵀ(Bᶜ S_j + Iᶜ (Ψ̇_j + Ṡ_j))
 //   M_ji = S_jᵀ Iᶜ S_i
-// B of a rigid body acts on the angular part alone, (bias; -2 [momentum]), and stays so when moved and summed.
+// B of a rigid body acts on the angular part alone, (bias; -2 [momentum]), and stays so when moved
+// and summed.
 #pragma once
 
 #include "kernels/residual-inl.hpp"
@@ -24,12 +30,14 @@ Vec6<N> turned(const Vec6<N>& f, const Vec6<N>& m) {
   return cross_wrench(m, f);
 }
 
-/// Own bias B = V×* I - I V× + (I V) ×̄*: upper left W J - J W - (U C + C U) - [h], W = [ω], U = [v], C = [moment].
+/// Own bias B = V×* I - I V× + (I V) ×̄*: upper left W J - J W - (U C + C U) - [h], W = [ω], U =
+/// [v], C = [moment].
 template <class N>
 void own_bias(LinkScratch<N>& o) {
   const Vec6<N> h = inertia_times(o.mass, o.moment, o.inertia, o.V);
   const Mat3<N> uc = cross_columns(o.V.l, skew(o.moment));
-  o.bias = cross_columns(o.V.a, o.inertia) - times_skew(o.inertia, o.V.a) - (uc + transpose(uc)) - skew(h.a);
+  o.bias = cross_columns(o.V.a, o.inertia) - times_skew(o.inertia, o.V.a) - (uc + transpose(uc)) -
+           skew(h.a);
   o.momentum = h.l;
 }
 
@@ -60,7 +68,8 @@ void add_composites(const Link& link, const LinkScratch<N>& o, LinkScratch<N>& p
   p.bias += bias;
 }
 
-/// Own inertia and bias of each link, then sums over subtrees. Of a link that never turns only the mass is asked for.
+/// Own inertia and bias of each link, then sums over subtrees. Of a link that never turns only the
+/// mass is asked for.
 template <class N>
 void composite_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int i = 0; i < model.n_links; ++i) {
@@ -141,7 +150,8 @@ Vec6<N> inertia_times_linear(const LinkScratch<N>& o, const Vec3<N>& l) {
 }
 
 template <JointKind K, class N>
-void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_h, JointWrenches<N>& w) {
+void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_h,
+                    JointWrenches<N>& w) {
   if (slides(K) && link.still) {  // of everything only the force by a matters
     for (int k = 0; k < dofs(K); ++k) {
       w.by_a[k] = {zero3<N>(), o.mass * joint_axis<K, N>(link, k)};
@@ -161,12 +171,14 @@ void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_
     } else {
       w.by_a[k] = {times_axis<K>(link, k, o.inertia), -cross_axis<K>(link, k, o.moment)};
       w.row[k] = times_axis<K>(link, k, transpose(o.bias));
-      by_v[k] = inertia_times(o.mass, o.moment, o.inertia, rate) +
-                Vec6<N>{times_axis<K>(link, k, o.bias), N(-2.0) * cross_axis<K>(link, k, o.momentum)};
+      by_v[k] =
+          inertia_times(o.mass, o.moment, o.inertia, rate) +
+          Vec6<N>{times_axis<K>(link, k, o.bias), N(-2.0) * cross_axis<K>(link, k, o.momentum)};
       if (link.steady) {
         by_q[k] = inertia_times_linear(o, o.psi_ddot[k].l);
       } else {
-        by_q[k] = bias_times(o, o.psi_dot[k]) + inertia_times(o.mass, o.moment, o.inertia, o.psi_ddot[k]);
+        by_q[k] =
+            bias_times(o, o.psi_dot[k]) + inertia_times(o.mass, o.moment, o.inertia, o.psi_ddot[k]);
       }
     }
     by_v[k] = mul_add(c0_over_h, w.by_a[k], by_v[k]);
@@ -176,8 +188,8 @@ void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_
 
 /// Entries of dof d and the dofs of one ancestor's joint, everything in the ancestor's axes.
 template <JointKind K, class N>
-void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int d, const Vec6<N>& by_x,
-                      const Vec6<N>& by_a, const Vec3<N>& row) {
+void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int d,
+                      const Vec6<N>& by_x, const Vec6<N>& by_a, const Vec3<N>& row) {
   const int n = model.nv;
   const Link& ancestor = model.links[up];
   const LinkScratch<N>& p = a.links[up];
@@ -213,12 +225,14 @@ void walk_ancestors(const ModelView& model, const StageArgs<N>& a, int i, JointW
       }
     }
     with_kind(model.links[up].kind, [&]<JointKind K>() {
-      for (int k = 0; k < count; ++k) ancestor_entries<K>(model, a, up, first + k, w.by_x[k], w.by_a[k], w.row[k]);
+      for (int k = 0; k < count; ++k)
+        ancestor_entries<K>(model, a, up, first + k, w.by_x[k], w.by_a[k], w.row[k]);
     });
   }
 }
 
-/// Writes the inertial part and the effects of one joint's rows and columns of A, and its diagonal of M.
+/// Writes the inertial part and the effects of one joint's rows and columns of A, and its diagonal
+/// of M.
 template <JointKind K, class N>
 void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
   const Link& link = model.links[i];
@@ -230,7 +244,8 @@ void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
   for (int j = 0; j < dofs(K); ++j) {
     const int d = link.v + j;
     a.mass_diagonal[d] = project<K>(link, j, w.by_a[j]);
-    for (int k = 0; k < dofs(K); ++k) a.A[model.pattern.slot[d * n + link.v + k]] = project<K>(link, j, w.by_x[k]);
+    for (int k = 0; k < dofs(K); ++k)
+      a.A[model.pattern.slot[d * n + link.v + k]] = project<K>(link, j, w.by_x[k]);
   }
   if (link.effects != 0) add_effect_entries<K>(model, a, link);
   if (link.parent < 0) return;
@@ -239,8 +254,9 @@ void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
     if constexpr (slides(K)) {
       if (!link.still) w.by_x[k].a -= cross_axis<K>(link, k, o.F.l);
     } else {
-      const Vec3<N> s = K == JointKind::spherical ? Vec3<N>{o.chart.m[0][k], o.chart.m[1][k], o.chart.m[2][k]}
-                                                  : joint_axis<K, N>(link, k);
+      const Vec3<N> s = K == JointKind::spherical
+                            ? Vec3<N>{o.chart.m[0][k], o.chart.m[1][k], o.chart.m[2][k]}
+                            : joint_axis<K, N>(link, k);
       w.by_x[k] += Vec6<N>{cross(s, o.F.a), cross(s, o.F.l)};
     }
   }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// 1/√a from an integer seed and two steps of order four: the same bits on every machine, a fifth of the cycles of the
-// square root and the division that it replaces.
+// 1/√a from an integer seed and two steps of order four: the same bits on every machine, a fifth of
+// the cycles of the square root and the division that it replaces.
 //
-//   y₀ = bits(0x5fe6eb50c7b537a9 - bits(a) / 2), |a y₀² - 1| < 0.07;   e = 1 - a y²,  y ← y + y e (1/2 + 3/8 e + 5/16 e²)
-// After two steps e is at rounding: relative error below 4e-16. For a = 0 the result is large and finite, so that
-// a · inverse_sqrt(a) is 0, not NaN.
+//   y₀ = bits(0x5fe6eb50c7b537a9 - bits(a) / 2), |a y₀² - 1| < 0.07;   e = 1 - a y²,
+//       y ← y + y e (1/2 + 3/8 e + 5/16 e²)
+// After two steps e is at rounding: relative error below 4e-16. For a = 0 the result is large and
+// finite, so that a · inverse_sqrt(a) is 0, not NaN.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,8 @@ namespace tangere::kernels {
 
 namespace detail {
 inline double inverse_sqrt_seed(double a) {
-  return __builtin_bit_cast(double, 0x5fe6eb50c7b537a9ULL - (__builtin_bit_cast(std::uint64_t, a) >> 1));
+  return __builtin_bit_cast(double,
+                            0x5fe6eb50c7b537a9ULL - (__builtin_bit_cast(std::uint64_t, a) >> 1));
 }
 template <class A>
 xsimd::batch<double, A> inverse_sqrt_seed(const xsimd::batch<double, A>& a) {
@@ -41,7 +43,8 @@ inline Lanes<A> inverse_sqrt(const Lanes<A>& a) {
 }
 inline double inverse_sqrt(double a) { return a > 0 ? 1 / std::sqrt(a) : 1e100; }
 
-/// √a from its inverse root, one correction deep: within an ulp where products are fused. 0 for a = 0.
+/// √a from its inverse root, one correction deep: within an ulp where products are fused. 0 for a =
+/// 0.
 template <class N>
 N root_of(const N& a, const N& inverse) {
   const N root = a * inverse;

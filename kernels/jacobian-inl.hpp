@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // The analytic Jacobian A = ∂g/∂x: what inertia and damping give, then what every contact adds.
 //
-// Contacts: δw₁ = K ε + D δW per column of the two bodies' joints, in body 1's axes; ε = S for dofs of body 2 and -S for
-// dofs of body 1. Rows of body 1 take -δw₁, rows of body 2 the reaction δw₁ - w₁ × S. Dofs that move both bodies alike
-// have ε = 0 and only appear as rows.
+// Contacts: δw₁ = K ε + D δW per column of the two bodies' joints, in body 1's axes; ε = S for dofs
+// of body 2 and -S for dofs of body 1. Rows of body 1 take -δw₁, rows of body 2 the reaction δw₁ -
+// w₁ × S. Dofs that move both bodies alike have ε = 0 and only appear as rows.
 #pragma once
 
 #include "kernels/inertial_jacobian-inl.hpp"
 
 namespace tangere::kernels {
 
-/// Columns of one body of a pair, in body 1's axes, joint by joint from the body to the root. Returns how many joints.
-/// `in_1`: frame of the body's link in body 1, null for body 1 itself.
+/// Columns of one body of a pair, in body 1's axes, joint by joint from the body to the root.
+/// Returns how many joints. `in_1`: frame of the body's link in body 1, null for body 1 itself.
 template <class N>
-int body_columns(const ModelView& model, const StageArgs<N>& a, int body, const Frame<N>* in_1, JointColumns<N>* out) {
+int body_columns(const ModelView& model, const StageArgs<N>& a, int body, const Frame<N>* in_1,
+                 JointColumns<N>* out) {
   int count = 0;
   Frame<N> x;
   bool moved = in_1 != nullptr;
@@ -60,11 +61,12 @@ Vec6<N> times_column(const Mat3<N> (&m)[2][2], const JointColumns<N>& c, int k) 
           {m[1][part].m[0][k], m[1][part].m[1][k], m[1][part].m[2][k]}};
 }
 
-/// δw₁ and the reaction by x of one joint's columns, unsigned. `Z`: twist of body 2 in body 1's axes, null when it is
-/// fixed in the world.
+/// δw₁ and the reaction by x of one joint's columns, unsigned. `Z`: twist of body 2 in body 1's
+/// axes, null when it is fixed in the world.
 template <JointKind K, class N>
-void column_wrenches(const LinkScratch<N>& link, const ContactScratch<N>& o, const JointColumns<N>& c,
-                     const Vec6<N>* Z, const N& c0_over_h, Vec6<N>* by_x, Vec6<N>* reaction) {
+void column_wrenches(const LinkScratch<N>& link, const ContactScratch<N>& o,
+                     const JointColumns<N>& c, const Vec6<N>* Z, const N& c0_over_h, Vec6<N>* by_x,
+                     Vec6<N>* reaction) {
   Vec6<N> by_q[3], by_v[3], turn[3];
   for (int k = 0; k < dofs(K); ++k) {
     by_v[k] = times_column<K>(o.sums.d, c, k);
@@ -78,7 +80,9 @@ void column_wrenches(const LinkScratch<N>& link, const ContactScratch<N>& o, con
       }
       by_q[k] += times<slides(K)>(o.sums.d, rate);
     }
-    if (Z != nullptr) turn[k] = slides(K) ? Vec6<N>{cross(S.l, o.sums.wrench.l), zero3<N>()} : turned(o.sums.wrench, S);
+    if (Z != nullptr)
+      turn[k] =
+          slides(K) ? Vec6<N>{cross(S.l, o.sums.wrench.l), zero3<N>()} : turned(o.sums.wrench, S);
   }
   combine<K>(link, c0_over_h, by_q, by_v, by_x);
   if (Z == nullptr) return;
@@ -89,8 +93,8 @@ void column_wrenches(const LinkScratch<N>& link, const ContactScratch<N>& o, con
 
 /// Adds ± Sᵀ w for every row of one joint and every column of another.
 template <JointKind K, class N>
-void add_block(const ModelView& model, const StageArgs<N>& a, const JointColumns<N>& row, const Link& column,
-               const Vec6<N>* wrench, bool positive) {
+void add_block(const ModelView& model, const StageArgs<N>& a, const JointColumns<N>& row,
+               const Link& column, const Vec6<N>* wrench, bool positive) {
   const int first = model.links[row.link].v;
   const N sign(positive ? 1.0 : -1.0);
   for (int k = 0; k < dofs(column.kind); ++k) {
@@ -112,11 +116,12 @@ void add_block(const ModelView& model, const StageArgs<N>& a, const JointColumns
 }
 
 template <class N>
-void contact_jacobian(const ModelView& model, const StageArgs<N>& a, int body1, int body2, const ContactScratch<N>& o,
-                      const Vec6<N>* Z) {
+void contact_jacobian(const ModelView& model, const StageArgs<N>& a, int body1, int body2,
+                      const ContactScratch<N>& o, const Vec6<N>* Z) {
   JointColumns<N>* joints = a.columns;
   const int n1 = body_columns<N>(model, a, body1, nullptr, joints);
-  const int total = n1 + (body2 < 0 ? 0 : body_columns<N>(model, a, body2, &o.link2_in_1, joints + n1));
+  const int total =
+      n1 + (body2 < 0 ? 0 : body_columns<N>(model, a, body2, &o.link2_in_1, joints + n1));
   const auto shared = [&](int c) {
     for (int k = c < n1 ? n1 : 0, end = c < n1 ? total : n1; k < end; ++k)
       if (joints[k].link == joints[c].link) return true;
@@ -132,7 +137,8 @@ void contact_jacobian(const ModelView& model, const StageArgs<N>& a, int body1, 
     for (int r = 0; r < total; ++r) {
       const bool first_body = r < n1;
       with_kind(model.links[joints[r].link].kind, [&]<JointKind K>() {
-        add_block<K>(model, a, joints[r], column, first_body || Z == nullptr ? by_x : reaction, first_body == (c < n1));
+        add_block<K>(model, a, joints[r], column, first_body || Z == nullptr ? by_x : reaction,
+                     first_body == (c < n1));
       });
     }
   }
@@ -148,7 +154,8 @@ void jacobian(const ModelView& model, const StageArgs<N>& a) {
   for (int k = 0; k < model.n_link_pairs; ++k) {
     const LinkPair& pair = model.link_pairs[k];
     if (!a.contacts[k].near) continue;
-    contact_jacobian(model, a, pair.link1, pair.link2, a.contacts[k], pair.link2 < 0 ? nullptr : &a.contacts[k].Z);
+    contact_jacobian(model, a, pair.link1, pair.link2, a.contacts[k],
+                     pair.link2 < 0 ? nullptr : &a.contacts[k].Z);
   }
   for (int k = 0; k < model.n_grounded; ++k) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which tables the processor can run. Asked of the compiler's own detection, which also checks the operating system.
+// Which tables the processor can run. Asked of the compiler's own detection, which also checks the
+// operating system.
 #include "kernels/kernel_table.hpp"
 
 #include <array>
@@ -43,7 +44,9 @@ struct Registry {
         return;
       }
     }
-    error = "TANGERE_ISA names an instruction set this machine does not run; known names are avx512, avx2, sse2, scalar";
+    error =
+        "TANGERE_ISA names an instruction set this machine does not run; known names are avx512, "
+        "avx2, sse2, scalar";
   }
 };
 
@@ -54,7 +57,9 @@ Registry& registry() {
 
 }  // namespace
 
-std::span<const KernelTable* const> available_kernels() { return {registry().tables.data(), registry().count}; }
+std::span<const KernelTable* const> available_kernels() {
+  return {registry().tables.data(), registry().count};
+}
 const KernelTable& active_kernels() { return *registry().active; }
 const char* forced_isa_error() { return registry().error; }
 void use_kernels(const KernelTable& table) { registry().active = &table; }

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Eight doubles, one per environment, on any instruction set: the number type that kernels run on.
 //
-// A group is always eight lanes, however wide the registers are, so that layout and results do not depend on the
-// machine. Every operation acts lane by lane; nothing here mixes lanes except any(). The scalar and SSE2 builds round a
-// product before adding (mul_add(a, b, c) = a * b + c); AVX2 and AVX-512 fuse it, and agree with each other bit for bit.
+// A group is always eight lanes, however wide the registers are, so that layout and results do not
+// depend on the machine. Every operation acts lane by lane; nothing here mixes lanes except any().
+// The scalar and SSE2 builds round a product before adding (mul_add(a, b, c) = a * b + c); AVX2 and
+// AVX-512 fuse it, and agree with each other bit for bit.
 #pragma once
 
 #include <cmath>
@@ -13,10 +14,12 @@
 
 namespace tangere::kernels {
 
-inline constexpr int kGroup = 8;   ///< lanes that iterate together
-inline constexpr int kBlock = 16;  ///< environments in a block: two groups of double, one vector of float
+inline constexpr int kGroup = 8;  ///< lanes that iterate together
+inline constexpr int kBlock =
+    16;  ///< environments in a block: two groups of double, one vector of float
 
-/// One number of a group of L environments in memory. Engine code indexes it; kernels read it as Lanes, or as OneLane.
+/// One number of a group of L environments in memory. Engine code indexes it; kernels read it as
+/// Lanes, or as OneLane.
 template <int L>
 struct alignas(8 * L) Row {
   double lane[L];
@@ -31,7 +34,8 @@ struct alignas(8 * L) Row {
 
 using LaneRow = Row<kGroup>;
 
-/// Tag of the build that uses no SIMD type at all: plain loops over eight doubles, for other processors and as a check.
+/// Tag of the build that uses no SIMD type at all: plain loops over eight doubles, for other
+/// processors and as a check.
 struct ScalarArch {};
 
 /// Registers of Arch holding eight lanes.
@@ -72,7 +76,8 @@ struct LaneMask<ScalarArch> {
 
 /// Whether mul_add rounds once.
 template <class Arch>
-inline constexpr bool kFuses = std::is_same_v<Arch, xsimd::avx2> || std::is_same_v<Arch, xsimd::avx512bw>;
+inline constexpr bool kFuses =
+    std::is_same_v<Arch, xsimd::avx2> || std::is_same_v<Arch, xsimd::avx512bw>;
 
 namespace detail {
 
@@ -108,12 +113,14 @@ inline xsimd::batch<double, xsimd::avx512bw> fuse(const xsimd::batch<double, xsi
                                                   const xsimd::batch<double, xsimd::avx512bw>& c) {
   return _mm512_fmadd_pd(a, b, c);
 }
-inline xsimd::batch<double, xsimd::avx512bw> fuse_negated(const xsimd::batch<double, xsimd::avx512bw>& a,
-                                                          const xsimd::batch<double, xsimd::avx512bw>& b,
-                                                          const xsimd::batch<double, xsimd::avx512bw>& c) {
+inline xsimd::batch<double, xsimd::avx512bw> fuse_negated(
+    const xsimd::batch<double, xsimd::avx512bw>& a, const xsimd::batch<double, xsimd::avx512bw>& b,
+    const xsimd::batch<double, xsimd::avx512bw>& c) {
   return _mm512_fnmadd_pd(a, b, c);
 }
-inline unsigned bits_of(const xsimd::batch_bool<double, xsimd::avx512bw>& m) { return static_cast<__mmask8>(m); }
+inline unsigned bits_of(const xsimd::batch_bool<double, xsimd::avx512bw>& m) {
+  return static_cast<__mmask8>(m);
+}
 #endif
 inline xsimd::batch<double, xsimd::sse2> fuse(const xsimd::batch<double, xsimd::sse2>& a,
                                               const xsimd::batch<double, xsimd::sse2>& b,
@@ -129,8 +136,8 @@ inline unsigned bits_of(const xsimd::batch_bool<double, xsimd::sse2>& m) {
   return static_cast<unsigned>(_mm_movemask_pd(m));
 }
 template <class A>
-xsimd::batch<double, A> choose(const xsimd::batch_bool<double, A>& m, const xsimd::batch<double, A>& a,
-                               const xsimd::batch<double, A>& b) {
+xsimd::batch<double, A> choose(const xsimd::batch_bool<double, A>& m,
+                               const xsimd::batch<double, A>& a, const xsimd::batch<double, A>& b) {
   return xsimd::select(m, a, b);
 }
 template <class A>
@@ -147,7 +154,8 @@ xsimd::batch<double, A> larger(const xsimd::batch<double, A>& a, const xsimd::ba
   return xsimd::select(a > b, a, b);
 }
 template <class A>
-xsimd::batch<double, A> smaller(const xsimd::batch<double, A>& a, const xsimd::batch<double, A>& b) {
+xsimd::batch<double, A> smaller(const xsimd::batch<double, A>& a,
+                                const xsimd::batch<double, A>& b) {
   return xsimd::select(a < b, a, b);
 }
 template <class A>
@@ -157,20 +165,20 @@ bool any_of(const xsimd::batch_bool<double, A>& m) {
 
 }  // namespace detail
 
-#define TANGERE_LANES_BINARY(op)                                                   \
-  template <class A>                                                               \
-  inline Lanes<A> operator op(const Lanes<A>& a, const Lanes<A>& b) {              \
-    Lanes<A> c;                                                                    \
-    for (int i = 0; i < Lanes<A>::kRegisters; ++i) c.r[i] = a.r[i] op b.r[i];      \
-    return c;                                                                      \
-  }                                                                                \
-  template <class A>                                                               \
-  inline Lanes<A> operator op(const Lanes<A>& a, double b) {                       \
-    return a op Lanes<A>(b);                                                       \
-  }                                                                                \
-  template <class A>                                                               \
-  inline Lanes<A> operator op(double a, const Lanes<A>& b) {                       \
-    return Lanes<A>(a) op b;                                                       \
+#define TANGERE_LANES_BINARY(op)                                              \
+  template <class A>                                                          \
+  inline Lanes<A> operator op(const Lanes<A>& a, const Lanes<A>& b) {         \
+    Lanes<A> c;                                                               \
+    for (int i = 0; i < Lanes<A>::kRegisters; ++i) c.r[i] = a.r[i] op b.r[i]; \
+    return c;                                                                 \
+  }                                                                           \
+  template <class A>                                                          \
+  inline Lanes<A> operator op(const Lanes<A>& a, double b) {                  \
+    return a op Lanes<A>(b);                                                  \
+  }                                                                           \
+  template <class A>                                                          \
+  inline Lanes<A> operator op(double a, const Lanes<A>& b) {                  \
+    return Lanes<A>(a) op b;                                                  \
   }
 TANGERE_LANES_BINARY(+)
 TANGERE_LANES_BINARY(-)
@@ -178,16 +186,16 @@ TANGERE_LANES_BINARY(*)
 TANGERE_LANES_BINARY(/)
 #undef TANGERE_LANES_BINARY
 
-#define TANGERE_LANES_COMPARE(op)                                                  \
-  template <class A>                                                               \
-  inline LaneMask<A> operator op(const Lanes<A>& a, const Lanes<A>& b) {           \
-    LaneMask<A> m;                                                                 \
-    for (int i = 0; i < Lanes<A>::kRegisters; ++i) m.r[i] = a.r[i] op b.r[i];      \
-    return m;                                                                      \
-  }                                                                                \
-  template <class A>                                                               \
-  inline LaneMask<A> operator op(const Lanes<A>& a, double b) {                    \
-    return a op Lanes<A>(b);                                                       \
+#define TANGERE_LANES_COMPARE(op)                                             \
+  template <class A>                                                          \
+  inline LaneMask<A> operator op(const Lanes<A>& a, const Lanes<A>& b) {      \
+    LaneMask<A> m;                                                            \
+    for (int i = 0; i < Lanes<A>::kRegisters; ++i) m.r[i] = a.r[i] op b.r[i]; \
+    return m;                                                                 \
+  }                                                                           \
+  template <class A>                                                          \
+  inline LaneMask<A> operator op(const Lanes<A>& a, double b) {               \
+    return a op Lanes<A>(b);                                                  \
   }
 TANGERE_LANES_COMPARE(<)
 TANGERE_LANES_COMPARE(<=)
@@ -233,7 +241,8 @@ inline Lanes<A> mul_add(const Lanes<A>& a, const Lanes<A>& b, const Lanes<A>& c)
 template <class A>
 inline Lanes<A> mul_sub_from(const Lanes<A>& a, const Lanes<A>& b, const Lanes<A>& c) {
   Lanes<A> d;
-  for (int i = 0; i < Lanes<A>::kRegisters; ++i) d.r[i] = detail::fuse_negated(a.r[i], b.r[i], c.r[i]);
+  for (int i = 0; i < Lanes<A>::kRegisters; ++i)
+    d.r[i] = detail::fuse_negated(a.r[i], b.r[i], c.r[i]);
   return d;
 }
 /// Lane by lane: m ? a : b.
@@ -323,14 +332,16 @@ inline void store_lanes(const Lanes<A>& d, double* p) {  // 64-byte aligned
   }
 }
 
-/// The nearest integer, ties to even, for |a| < 2^51: adding 1.5 · 2^52 leaves no bits for a fraction.
+/// The nearest integer, ties to even, for |a| < 2^51: adding 1.5 · 2^52 leaves no bits for a
+/// fraction.
 template <class A>
 inline Lanes<A> round_nearest(const Lanes<A>& a) {
   const Lanes<A> shift(6755399441055744.0);
   return (a + shift) - shift;
 }
 
-// The same names on plain double, so that templates over the number type run on it as the scalar reference.
+// The same names on plain double, so that templates over the number type run on it as the scalar
+// reference.
 inline double mul_add(double a, double b, double c) { return a * b + c; }
 inline double mul_sub_from(double a, double b, double c) { return c - a * b; }
 inline double select(bool m, double a, double b) { return m ? a : b; }

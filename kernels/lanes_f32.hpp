@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sixteen floats on any instruction set: points of a tile, or the environments of a block, in single precision.
+// Sixteen floats on any instruction set: points of a tile, or the environments of a block, in
+// single precision.
 //
-// The same rules as in lanes.hpp: sixteen lanes however wide the registers are, every operation lane by lane, products
-// fused by mul_add alone and only on AVX2 and AVX-512, which agree with each other bit for bit.
+// The same rules as in lanes.hpp: sixteen lanes however wide the registers are, every operation
+// lane by lane, products fused by mul_add alone and only on AVX2 and AVX-512, which agree with each
+// other bit for bit.
 #pragma once
 
 #include <cstdint>
@@ -44,7 +46,9 @@ inline float inverse_sqrt_seed(float x) {
 #if defined(__SSE2__)
 using FloatSse = xsimd::batch<float, xsimd::sse2>;
 inline FloatSse fuse(const FloatSse& a, const FloatSse& b, const FloatSse& c) { return a * b + c; }
-inline FloatSse fuse_negated(const FloatSse& a, const FloatSse& b, const FloatSse& c) { return c - a * b; }
+inline FloatSse fuse_negated(const FloatSse& a, const FloatSse& b, const FloatSse& c) {
+  return c - a * b;
+}
 inline FloatSse larger(const FloatSse& a, const FloatSse& b) { return _mm_max_ps(a, b); }
 inline FloatSse smaller(const FloatSse& a, const FloatSse& b) { return _mm_min_ps(a, b); }
 inline FloatSse inverse_sqrt_seed(const FloatSse& x) {
@@ -57,7 +61,9 @@ inline FloatSse narrow(const Lanes<xsimd::sse2>& x, int k, FloatSse) {
 #endif
 #if defined(__AVX2__) && defined(__FMA__)
 using FloatAvx2 = xsimd::batch<float, xsimd::avx2>;
-inline FloatAvx2 fuse(const FloatAvx2& a, const FloatAvx2& b, const FloatAvx2& c) { return _mm256_fmadd_ps(a, b, c); }
+inline FloatAvx2 fuse(const FloatAvx2& a, const FloatAvx2& b, const FloatAvx2& c) {
+  return _mm256_fmadd_ps(a, b, c);
+}
 inline FloatAvx2 fuse_negated(const FloatAvx2& a, const FloatAvx2& b, const FloatAvx2& c) {
   return _mm256_fnmadd_ps(a, b, c);
 }
@@ -65,7 +71,8 @@ inline FloatAvx2 larger(const FloatAvx2& a, const FloatAvx2& b) { return _mm256_
 inline FloatAvx2 smaller(const FloatAvx2& a, const FloatAvx2& b) { return _mm256_min_ps(a, b); }
 inline FloatAvx2 inverse_sqrt_seed(const FloatAvx2& x) {
   const __m256i half = _mm256_srli_epi32(_mm256_castps_si256(x), 1);
-  return _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_set1_epi32(static_cast<int>(kInverseSqrtSeedF)), half));
+  return _mm256_castsi256_ps(
+      _mm256_sub_epi32(_mm256_set1_epi32(static_cast<int>(kInverseSqrtSeedF)), half));
 }
 inline FloatAvx2 narrow(const Lanes<xsimd::avx2>& x, int k, FloatAvx2) {
   return _mm256_set_m128(_mm256_cvtpd_ps(x.r[2 * k + 1]), _mm256_cvtpd_ps(x.r[2 * k]));
@@ -79,11 +86,16 @@ inline FloatAvx512 fuse(const FloatAvx512& a, const FloatAvx512& b, const FloatA
 inline FloatAvx512 fuse_negated(const FloatAvx512& a, const FloatAvx512& b, const FloatAvx512& c) {
   return _mm512_fnmadd_ps(a, b, c);
 }
-inline FloatAvx512 larger(const FloatAvx512& a, const FloatAvx512& b) { return _mm512_max_ps(a, b); }
-inline FloatAvx512 smaller(const FloatAvx512& a, const FloatAvx512& b) { return _mm512_min_ps(a, b); }
+inline FloatAvx512 larger(const FloatAvx512& a, const FloatAvx512& b) {
+  return _mm512_max_ps(a, b);
+}
+inline FloatAvx512 smaller(const FloatAvx512& a, const FloatAvx512& b) {
+  return _mm512_min_ps(a, b);
+}
 inline FloatAvx512 inverse_sqrt_seed(const FloatAvx512& x) {
   const __m512i half = _mm512_srli_epi32(_mm512_castps_si512(x), 1);
-  return _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(static_cast<int>(kInverseSqrtSeedF)), half));
+  return _mm512_castsi512_ps(
+      _mm512_sub_epi32(_mm512_set1_epi32(static_cast<int>(kInverseSqrtSeedF)), half));
 }
 #endif
 template <class A>
@@ -149,7 +161,8 @@ inline LanesF<A> mul_add(const LanesF<A>& a, const LanesF<A>& b, const LanesF<A>
 template <class A>
 inline LanesF<A> mul_sub_from(const LanesF<A>& a, const LanesF<A>& b, const LanesF<A>& c) {
   LanesF<A> d;
-  for (int i = 0; i < LanesF<A>::kRegisters; ++i) d.r[i] = detail::fuse_negated(a.r[i], b.r[i], c.r[i]);
+  for (int i = 0; i < LanesF<A>::kRegisters; ++i)
+    d.r[i] = detail::fuse_negated(a.r[i], b.r[i], c.r[i]);
   return d;
 }
 /// Lane by lane: m ? a : b.
@@ -198,8 +211,8 @@ inline LanesF<A> narrow(const Lanes<A>& low, const Lanes<A>& high) {
   if constexpr (LanesF<A>::kRegisters == 1) {
 #if defined(__AVX512F__)
     const __m512 both = _mm512_castps256_ps512(_mm512_cvtpd_ps(low.r[0]));
-    d.r[0] = _mm512_castpd_ps(
-        _mm512_insertf64x4(_mm512_castps_pd(both), _mm256_castps_pd(_mm512_cvtpd_ps(high.r[0])), 1));
+    d.r[0] = _mm512_castpd_ps(_mm512_insertf64x4(_mm512_castps_pd(both),
+                                                 _mm256_castps_pd(_mm512_cvtpd_ps(high.r[0])), 1));
 #endif
   } else if constexpr (LanesF<A>::kRegisters == kLanesF) {
     for (int i = 0; i < kGroup; ++i) {
@@ -216,8 +229,8 @@ inline LanesF<A> narrow(const Lanes<A>& low, const Lanes<A>& high) {
   return d;
 }
 
-/// 1/√x for normal, positive, finite x, relative error at most 2e-7: an integer seed, e = 1 - x y², then (1 - e)^-½ by
-/// the polynomial that is best for |e| < 0.07 (2.6e-8 relative).
+/// 1/√x for normal, positive, finite x, relative error at most 2e-7: an integer seed, e = 1 - x y²,
+/// then (1 - e)^-½ by the polynomial that is best for |e| < 0.07 (2.6e-8 relative).
 template <class A>
 inline LanesF<A> inverse_sqrt(const LanesF<A>& x) {
   LanesF<A> y;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // 3-vectors, 3×3 matrices and spatial (6-D) vectors over any number type: double, Lanes, Dual.
-// Spatial vectors are (angular; linear) in body axes, the linear part at the body frame's origin (docs/dynamics.md §1).
+// Spatial vectors are (angular; linear) in body axes, the linear part at the body frame's origin
+// (docs/dynamics.md §1).
 #pragma once
 
 #include "kernels/lanes.hpp"
@@ -62,7 +63,8 @@ N dot(const Vec3<N>& a, const Vec3<N>& b) {
 }
 template <class N>
 Vec3<N> cross(const Vec3<N>& a, const Vec3<N>& b) {
-  return {mul_sub_from(a.z, b.y, a.y * b.z), mul_sub_from(a.x, b.z, a.z * b.x), mul_sub_from(a.y, b.x, a.x * b.y)};
+  return {mul_sub_from(a.z, b.y, a.y * b.z), mul_sub_from(a.x, b.z, a.z * b.x),
+          mul_sub_from(a.y, b.x, a.x * b.y)};
 }
 template <class M, class N>
 Vec3<N> select(const M& m, const Vec3<N>& a, const Vec3<N>& b) {
@@ -121,14 +123,16 @@ Mat3<N> operator*(const N& s, const Mat3<N>& a) {
 template <class N>
 Vec3<N> operator*(const Mat3<N>& a, const Vec3<N>& b) {
   N c[3];
-  for (int i = 0; i < 3; ++i) c[i] = mul_add(a.m[i][0], b.x, mul_add(a.m[i][1], b.y, a.m[i][2] * b.z));
+  for (int i = 0; i < 3; ++i)
+    c[i] = mul_add(a.m[i][0], b.x, mul_add(a.m[i][1], b.y, a.m[i][2] * b.z));
   return {c[0], c[1], c[2]};
 }
 /// aᵀ b.
 template <class N>
 Vec3<N> transposed_times(const Mat3<N>& a, const Vec3<N>& b) {
   N c[3];
-  for (int i = 0; i < 3; ++i) c[i] = mul_add(a.m[0][i], b.x, mul_add(a.m[1][i], b.y, a.m[2][i] * b.z));
+  for (int i = 0; i < 3; ++i)
+    c[i] = mul_add(a.m[0][i], b.x, mul_add(a.m[1][i], b.y, a.m[2][i] * b.z));
   return {c[0], c[1], c[2]};
 }
 template <class N>
@@ -136,7 +140,8 @@ Mat3<N> operator*(const Mat3<N>& a, const Mat3<N>& b) {
   Mat3<N> c;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
-      c.m[i][j] = mul_add(a.m[i][0], b.m[0][j], mul_add(a.m[i][1], b.m[1][j], a.m[i][2] * b.m[2][j]));
+      c.m[i][j] =
+          mul_add(a.m[i][0], b.m[0][j], mul_add(a.m[i][1], b.m[1][j], a.m[i][2] * b.m[2][j]));
   return c;
 }
 template <class N>
@@ -148,7 +153,9 @@ Mat3<N> transpose(const Mat3<N>& a) {
 }
 template <class N>
 Mat3<N> outer(const Vec3<N>& a, const Vec3<N>& b) {
-  return {{{a.x * b.x, a.x * b.y, a.x * b.z}, {a.y * b.x, a.y * b.y, a.y * b.z}, {a.z * b.x, a.z * b.y, a.z * b.z}}};
+  return {{{a.x * b.x, a.x * b.y, a.x * b.z},
+           {a.y * b.x, a.y * b.y, a.y * b.z},
+           {a.z * b.x, a.z * b.y, a.z * b.z}}};
 }
 /// [a], the matrix of a ×.
 template <class N>
@@ -255,7 +262,8 @@ template <class N>
 Frame<N> compose(const Frame<N>& ab, const Frame<N>& bc) {
   return {ab.R * bc.R, ab.R * bc.p + ab.p};
 }
-/// Frame 2 in frame 1, from both in the world: only the difference of the two origins meets rounding.
+/// Frame 2 in frame 1, from both in the world: only the difference of the two origins meets
+/// rounding.
 template <class N>
 Frame<N> relative(const Frame<N>& w1, const Frame<N>& w2) {
   return {transpose(w1.R) * w2.R, transposed_times(w1.R, w2.p - w1.p)};

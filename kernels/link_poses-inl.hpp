@@ -7,7 +7,8 @@
 
 namespace tangere::kernels {
 
-/// Poses and body twists at (centre, r): with x = 0, c₀/h = 0 and 1/h = 1 the rates of a stage are r itself.
+/// Poses and body twists at (centre, r): with x = 0, c₀/h = 0 and 1/h = 1 the rates of a stage are
+/// r itself.
 template <class N>
 void link_poses(const ModelView& model, const StageArgs<N>& a, LinkPose<N>* out) {
   LinkScratch<N> scratch;
@@ -19,7 +20,8 @@ void link_poses(const ModelView& model, const StageArgs<N>& a, LinkPose<N>* out)
       out[i] = {scratch.local, rate};
     } else {
       const LinkPose<N>& parent = out[link.parent];
-      out[i] = {compose(parent.world, scratch.local), motion_to_child(scratch.local, parent.V) + rate};
+      out[i] = {compose(parent.world, scratch.local),
+                motion_to_child(scratch.local, parent.V) + rate};
     }
   }
 }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sparse LU without pivoting in lanes, on the scene's pattern, and a watched solve.
 //
-// The elimination is interpreted: all lanes share one list of slots. Without pivoting a factor can be useless, so each
-// solve is refined once and judged in the scaling S = diag(|a_ii|^-1/2), which makes the figures free of units:
-//   accepted if β = ‖S(b - Ax)‖∞ / (‖SAS‖∞ ‖S⁻¹x‖∞ + ‖Sb‖∞) ≤ 1e-13 and the correction ≤ 1e-6 ‖S⁻¹x‖∞
+// The elimination is interpreted: all lanes share one list of slots. Without pivoting a factor can
+// be useless, so each solve is refined once and judged in the scaling S = diag(|a_ii|^-1/2), which
+// makes the figures free of units:
+//   accepted if β = ‖S(b - Ax)‖∞ / (‖SAS‖∞ ‖S⁻¹x‖∞ + ‖Sb‖∞) ≤ 1e-13 and the correction ≤ 1e-6
+//       ‖S⁻¹x‖∞
 #pragma once
 
 #include "kernels/inverse_sqrt.hpp"
@@ -30,8 +32,8 @@ void eliminate(const Pattern& p, N* work) {
   }
 }
 
-/// Factors A into LU (factor_entries): everywhere (accept null), or where `accept` is 1, keeping LU elsewhere.
-/// `work`: (factor_entries).
+/// Factors A into LU (factor_entries): everywhere (accept null), or where `accept` is 1, keeping LU
+/// elsewhere. `work`: (factor_entries).
 template <class N>
 void factor(const Pattern& p, const N* A, const N* accept, N* LU, N* work) {
   N* to = accept == nullptr ? LU : work;
@@ -63,7 +65,8 @@ void solve(const Pattern& p, const N* LU, const N* b, N* x, N* work) {
   for (int k = 0; k < p.n; ++k)
     work[k] = reduced(p, LU, p.row_begin[k], p.diagonal[k], b[p.permutation[k]], work);
   for (int k = p.n - 1; k >= 0; --k) {
-    work[k] = reduced(p, LU, p.diagonal[k] + 1, p.row_begin[k + 1], work[k], work) * LU[p.diagonal[k]];
+    work[k] =
+        reduced(p, LU, p.diagonal[k] + 1, p.row_begin[k + 1], work[k], work) * LU[p.diagonal[k]];
     x[p.permutation[k]] = work[k];
   }
 }
@@ -72,7 +75,8 @@ void solve(const Pattern& p, const N* LU, const N* b, N* x, N* work) {
 template <class N>
 void solve_transposed(const Pattern& p, const N* LU, const N* b, N* x, N* work) {
   const auto take = [&](int begin, int end, const N& y) {
-    for (int s = begin; s < end; ++s) work[p.factor_column[s]] = mul_sub_from(LU[s], y, work[p.factor_column[s]]);
+    for (int s = begin; s < end; ++s)
+      work[p.factor_column[s]] = mul_sub_from(LU[s], y, work[p.factor_column[s]]);
   };
   for (int k = 0; k < p.n; ++k) work[k] = b[p.permutation[k]];
   for (int k = 0; k < p.n; ++k) {
@@ -117,11 +121,13 @@ N scaled_norm(const Pattern& p, const N* A, const N* scale, N* sums) {
   return norm;
 }
 
-/// x = A⁻¹ b or A⁻ᵀ b, refined once; `sound` is 1 where the result passed the test above. `work`: (5 n).
+/// x = A⁻¹ b or A⁻ᵀ b, refined once; `sound` is 1 where the result passed the test above. `work`:
+/// (5 n).
 template <bool Transposed, class N>
 void solve_watched(const Pattern& p, const N* A, const N* LU, const N* b, N* x, N* sound, N* work) {
   const int n = p.n;
-  N *residual = work, *correction = work + n, *scale = work + 2 * n, *inverse_scale = work + 3 * n, *scratch = work + 4 * n;
+  N *residual = work, *correction = work + n, *scale = work + 2 * n, *inverse_scale = work + 3 * n,
+    *scratch = work + 4 * n;
   const N zero(0.0), one(1.0);
   const auto solve_for = [&](const N* from, N* to) {
     Transposed ? solve_transposed(p, LU, from, to, scratch) : solve(p, LU, from, to, scratch);
@@ -148,7 +154,8 @@ void solve_watched(const Pattern& p, const N* A, const N* LU, const N* b, N* x, 
   // A NaN anywhere reaches x and fails the finiteness test, because max() above drops it.
   N finite = zero;
   for (int i = 0; i < n; ++i) finite = mul_add(zero, x[i], finite);
-  const auto ok = (norm_r <= 1e-13 * mul_add(norm_a, norm_x, norm_b)) & (norm_d <= 1e-6 * norm_x) & (finite <= zero);
+  const auto ok = (norm_r <= 1e-13 * mul_add(norm_a, norm_x, norm_b)) & (norm_d <= 1e-6 * norm_x) &
+                  (finite <= zero);
   *sound = select(ok, one, zero);
 }
 

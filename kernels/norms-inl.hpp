@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a residual is measured by. With D the diagonal of the mass matrix:
-//   ‖D^-½ g‖ / (‖D^½ v‖ c₀/h + ‖D^½‖ |gravity| + ‖D^-½ f‖),  f the magnitudes of contact, motor and damping forces
-// is free of units. No residual can be smaller than what one rounding of a position does to it: below the floor
-// ‖D^-½ φ‖², φ_i = 4 ε |A_ii| (extent of the scene, or 1 rad), it counts as zero.
+//   ‖D^-½ g‖ / (‖D^½ v‖ c₀/h + ‖D^½‖ |gravity| + ‖D^-½ f‖),
+//       f the magnitudes of contact, motor and damping forces
+// is free of units. No residual can be smaller than what one rounding of a position does to it:
+// below the floor ‖D^-½ φ‖², φ_i = 4 ε |A_ii| (extent of the scene, or 1 rad), it counts as zero.
 #pragma once
 
 #include <limits>
@@ -21,10 +22,12 @@ void set_weights(int n, const N* mass_diagonal, N* weight, N* inverse_weight) {
 }
 
 template <class N>
-N rounding_floor(const Pattern& p, const N* A, const N* inverse_weight, const double* unknown_scale) {
+N rounding_floor(const Pattern& p, const N* A, const N* inverse_weight,
+                 const double* unknown_scale) {
   N sum(0.0);
   for (int i = 0; i < p.n; ++i) {
-    const N e = N(4 * std::numeric_limits<double>::epsilon() * unknown_scale[i]) * A[p.slot[i * p.n + i]] * inverse_weight[i];
+    const N e = N(4 * std::numeric_limits<double>::epsilon() * unknown_scale[i]) *
+                A[p.slot[i * p.n + i]] * inverse_weight[i];
     sum = mul_add(e, e, sum);
   }
   return sum;
@@ -56,13 +59,15 @@ template <class N>
 N scaled_residual(int n, const N* g, const ResidualScale<N>& s) {
   N residual(0.0), motion(0.0), mass(0.0), force(0.0);
   for (int i = 0; i < n; ++i) {
-    const N r = s.inverse_weight[i] * g[i], m = s.weight[i] * s.v[i], f = s.inverse_weight[i] * s.force_scale[i];
+    const N r = s.inverse_weight[i] * g[i], m = s.weight[i] * s.v[i],
+            f = s.inverse_weight[i] * s.force_scale[i];
     residual = mul_add(r, r, residual);
     motion = mul_add(m, m, motion);
     mass = mul_add(s.weight[i], s.weight[i], mass);
     force = mul_add(f, f, force);
   }
-  const N scale = mul_add(norm_of(motion), s.c0_over_h, mul_add(s.gravity, norm_of(mass), norm_of(force)));
+  const N scale =
+      mul_add(norm_of(motion), s.c0_over_h, mul_add(s.gravity, norm_of(mass), norm_of(force)));
   return select(residual <= s.floor, N(0.0), norm_of(residual) / scale);
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One lane of Lanes<Arch> on its own: a number that rounds like a lane in every operation, so that a lone environment can
-// go through the same templates with an eighth of the memory and get the same bits.
+// One lane of Lanes<Arch> on its own: a number that rounds like a lane in every operation, so that
+// a lone environment can go through the same templates with an eighth of the memory and get the
+// same bits.
 #pragma once
 
 #include "kernels/inverse_sqrt.hpp"
@@ -11,21 +12,22 @@ template <class Arch>
 struct OneLane {
   double x;
   OneLane() = default;
-  OneLane(double value) : x(value) {}  // NOLINT(google-explicit-constructor): constants read like numbers
+  OneLane(double value)
+      : x(value) {}  // NOLINT(google-explicit-constructor): constants read like numbers
 };
 
-#define TANGERE_ONE_LANE_BINARY(op)                                                           \
-  template <class A>                                                                          \
-  inline OneLane<A> operator op(OneLane<A> a, OneLane<A> b) {                                 \
-    return a.x op b.x;                                                                        \
-  }                                                                                           \
-  template <class A>                                                                          \
-  inline OneLane<A> operator op(OneLane<A> a, double b) {                                     \
-    return a.x op b;                                                                          \
-  }                                                                                           \
-  template <class A>                                                                          \
-  inline OneLane<A> operator op(double a, OneLane<A> b) {                                     \
-    return a op b.x;                                                                          \
+#define TANGERE_ONE_LANE_BINARY(op)                           \
+  template <class A>                                          \
+  inline OneLane<A> operator op(OneLane<A> a, OneLane<A> b) { \
+    return a.x op b.x;                                        \
+  }                                                           \
+  template <class A>                                          \
+  inline OneLane<A> operator op(OneLane<A> a, double b) {     \
+    return a.x op b;                                          \
+  }                                                           \
+  template <class A>                                          \
+  inline OneLane<A> operator op(double a, OneLane<A> b) {     \
+    return a op b.x;                                          \
   }
 TANGERE_ONE_LANE_BINARY(+)
 TANGERE_ONE_LANE_BINARY(-)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The face sums of a lone lane, eight of them in a vector: a product of two wrenches is six vectors instead of 36 numbers.
-// Numbers are added in the same order and with the same roundings as in FaceSums, so the bits are the same.
+// The face sums of a lone lane, eight of them in a vector: a product of two wrenches is six vectors
+// instead of 36 numbers. Numbers are added in the same order and with the same roundings as in
+// FaceSums, so the bits are the same.
 #pragma once
 
 #include "kernels/face_contact.hpp"
@@ -9,15 +10,16 @@
 
 namespace tangere::kernels {
 
-/// Row i of a product: component i of its left wrench (force, then torque) times its right wrench in lanes 0 … 5.
-/// Columns k of a product with a vector: component k of the vector times the wrench. Other lanes hold leftovers.
+/// Row i of a product: component i of its left wrench (force, then torque) times its right wrench
+/// in lanes 0 … 5. Columns k of a product with a vector: component k of the vector times the
+/// wrench. Other lanes hold leftovers.
 template <class A>
 struct PackedFaceSums {
   using N = Lanes<A>;
-  N wrench;                 ///< f, x × f
+  N wrench;  ///< f, x × f
   N nn[6], pn[6];
   N ne[3], sxx[3], n_turn[3];
-  N linear, spins, rest;    ///< s x, m n; d s ñ; from lane 4: d s (n·ω) x, s
+  N linear, spins, rest;  ///< s x, m n; d s ñ; from lane 4: d s (n·ω) x, s
   N tt[6], tn[6], te[3];
 };
 
@@ -35,7 +37,8 @@ Lanes<A> eight_from(const Vec3<OneLane<A>>& first) {
 }
 /// sum[i] += left_i right for `Count` numbers from a vector on.
 template <int Count, class A>
-[[gnu::always_inline]] inline void add_products(Lanes<A> (&sum)[Count], const Vec3<OneLane<A>>& left,
+[[gnu::always_inline]] inline void add_products(Lanes<A> (&sum)[Count],
+                                                const Vec3<OneLane<A>>& left,
                                                 const Lanes<A>& right) {
   const double* x = &left.x.x;
   for (int i = 0; i < Count; ++i) sum[i] = mul_add(Lanes<A>(x[i]), right, sum[i]);
@@ -76,7 +79,9 @@ void add_chunk(PackedFaceSums<A>& sums, const PointChunk<FacePoint<OneLane<A>, B
 /// The same sums one by one.
 template <bool Derivatives, class A>
 FaceSums<OneLane<A>> unpacked(const PackedFaceSums<A>& s) {
-  const auto at = [](const Lanes<A>& row, int i) { return OneLane<A>(reinterpret_cast<const double*>(&row)[i]); };
+  const auto at = [](const Lanes<A>& row, int i) {
+    return OneLane<A>(reinterpret_cast<const double*>(&row)[i]);
+  };
   const auto vector = [&](const Lanes<A>& row, int first) {
     return Vec3<OneLane<A>>{at(row, first), at(row, first + 1), at(row, first + 2)};
   };
@@ -88,14 +93,18 @@ FaceSums<OneLane<A>> unpacked(const PackedFaceSums<A>& s) {
     return m;
   };
   const auto upper = [](const Mat3<OneLane<A>>& m) {
-    return UpperTriangle<OneLane<A>>{{m.m[0][0], m.m[0][1], m.m[0][2], m.m[1][1], m.m[1][2], m.m[2][2]}};
+    return UpperTriangle<OneLane<A>>{
+        {m.m[0][0], m.m[0][1], m.m[0][2], m.m[1][1], m.m[1][2], m.m[2][2]}};
   };
   const auto symmetric = [&](const Lanes<A>* rows) {
-    return SymmetricSums<OneLane<A>>{upper(block(rows, 3, 3)), upper(block(rows, 0, 0)), block(rows, 3, 0)};
+    return SymmetricSums<OneLane<A>>{upper(block(rows, 3, 3)), upper(block(rows, 0, 0)),
+                                     block(rows, 3, 0)};
   };
-  const auto product = [&](const Lanes<A>* rows) {  // torques stand first in blocks, forces in vectors
-    return ProductSums<OneLane<A>>{{{block(rows, 3, 3), block(rows, 3, 0)}, {block(rows, 0, 3), block(rows, 0, 0)}}};
-  };
+  const auto product =
+      [&](const Lanes<A>* rows) {  // torques stand first in blocks, forces in vectors
+        return ProductSums<OneLane<A>>{
+            {{block(rows, 3, 3), block(rows, 3, 0)}, {block(rows, 0, 3), block(rows, 0, 0)}}};
+      };
   FaceSums<OneLane<A>> out;
   out.f = vector(s.wrench, 0);
   out.xf = vector(s.wrench, 3);
@@ -108,7 +117,8 @@ FaceSums<OneLane<A>> unpacked(const PackedFaceSums<A>& s) {
       out.ne[part] = transpose(block(s.ne, 0, 3 - 3 * part));
       out.te[part] = transpose(block(s.te, 0, 3 - 3 * part));
     }
-    out.moments = {at(s.rest, 7), vector(s.linear, 0), vector(s.linear, 3), upper(block(s.sxx, 0, 0))};
+    out.moments = {at(s.rest, 7), vector(s.linear, 0), vector(s.linear, 3),
+                   upper(block(s.sxx, 0, 0))};
     out.turns = {block(s.n_turn, 0, 0), vector(s.spins, 0), vector(s.spins, 3), vector(s.rest, 4)};
   }
   return out;

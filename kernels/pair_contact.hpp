@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // Force and derivative of one touching point, and their sums over a pair of bodies.
 //
-// Everything is in the axes of body 1, which carries the point ξ. G = (Q, c) is body 2's shape frame there, W = (ω; v)
-// the twist of body 2 relative to body 1 at body 1's origin. d, n = distance and gradient at ξ; x₂ = ξ - d n is the
-// nearest point on the touched surface, where velocities are compared and forces act:
-//   u = -(v + ω × x₂)  velocity of body 1 relative to body 2 at x₂;  ḋ = n·u;  v_t = u - ḋ n;  f on body 1.
-// Derivative with respect to ε = (θ; ρ), the displacement of body 2 relative to body 1, and to δW. With ρ₂ = ρ + θ × x₂
-// the displacement of body 2's material at x₂, and H the Hessian of d:
+// Everything is in the axes of body 1, which carries the point ξ. G = (Q, c) is body 2's shape
+// frame there, W = (ω; v)
+// the twist of body 2 relative to body 1 at body 1's origin. d, n = distance and gradient at ξ; x₂
+// = ξ - d n is the nearest point on the touched surface, where velocities are compared and forces
+// act:
+//   u = -(v + ω × x₂)  velocity of body 1 relative to body 2 at x₂;  ḋ = n·u;  v_t = u - ḋ n;
+//       f on body 1.
+// Derivative with respect to ε = (θ; ρ), the displacement of body 2 relative to body 1, and to δW.
+// With ρ₂ = ρ + θ × x₂ the displacement of body 2's material at x₂, and H the Hessian of d:
 //   δd = -n·ρ₂,  δn = -H ρ₂ + (I - dH)(θ × n),  δx₂ = -δd n - d δn,  δu = -(δv + δω × x₂) - ω × δx₂
 //   δḋ = δn·u + n·δu,  δv_t = δu - δḋ n - ḋ δn,  δN = N_d δd + N_ḋ δḋ
-//   δf = δN n + N δn + δf_t,  δf_t = -s (δv_t - t (t·δv_t)) - μ t δB    (t = 0 and no δB when sticking)
+//   δf = δN n + N δn + δf_t,  δf_t = -s (δv_t - t (t·δv_t)) - μ t δB
+//       (t = 0 and no δB when sticking)
 // Wrench on body 1 about its origin: w₁ = Σ (x₂ × f; f),  δw₁ = K ε + D δW.
 #pragma once
 
@@ -21,19 +25,20 @@ namespace tangere::kernels {
 /// What a point of body 1 meets on body 2, in body 1's axes.
 template <class N>
 struct PointContact {
-  N d, rate;           ///< d, ḋ
+  N d, rate;  ///< d, ḋ
   Vec3<N> n, x2, u, vt;
   NormalForce<N> normal;
   Friction<N> tangential;
-  Vec3<N> force;       ///< on body 1, acting at x2
-  N curvature;         ///< κ of H (Bending)
-  Vec3<N> axis;        ///< rods only: e z
+  Vec3<N> force;  ///< on body 1, acting at x2
+  N curvature;    ///< κ of H (Bending)
+  Vec3<N> axis;   ///< rods only: e z
 };
 
 /// Distance, velocities and force at ξ. `Q`, `c`: shape frame in body 1; `omega`, `v`: W.
 template <class Shape, class N>
-PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, const Mat3<N>& Q, const Vec3<N>& c,
-                              const Vec3<N>& omega, const Vec3<N>& v, const Vec3<N>& xi) {
+PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, const Mat3<N>& Q,
+                              const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
+                              const Vec3<N>& xi) {
   PointContact<N> p;
   const Vec3<N> arm = xi - c;
   if constexpr (Shape::kBending == Bending::flat) {
@@ -62,8 +67,8 @@ PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, c
   return p;
 }
 
-/// Sums over the points of a pair, in body 1's axes about its origin: wrench, and 6×6 stiffness and damping in blocks
-/// {torque, force} × {angular, linear}.
+/// Sums over the points of a pair, in body 1's axes about its origin: wrench, and 6×6 stiffness and
+/// damping in blocks {torque, force} × {angular, linear}.
 template <class N>
 struct PairSums {
   Vec6<N> wrench;
@@ -86,14 +91,16 @@ struct PointDerivative {
 };
 
 template <class Shape, class N>
-PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& omega) {
+PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact<N>& p,
+                                 const Vec3<N>& omega) {
   PointDerivative<N> r;
   const N one(1.0);
   const Vec3<N>& n = p.n;
   const Vec3<N>& t = p.tangential.direction;
   const Mat3<N> nn = outer(n, n);
   const Mat3<N> P = diagonal(one) - nn;
-  // δn = n_rho ρ₂ + n_theta θ; H = κ (P - e zzᵀ); n_theta = -(I - dH)[n], with P[n] = [n] and zzᵀ[n] = z (z × n)ᵀ.
+  // δn = n_rho ρ₂ + n_theta θ; H = κ (P - e zzᵀ); n_theta = -(I - dH)[n], with P[n] = [n] and
+  // zzᵀ[n] = z (z × n)ᵀ.
   constexpr bool kFlat = Shape::kBending == Bending::flat;
   Mat3<N> n_rho = kFlat ? zero33<N>() : (-p.curvature) * P;
   const N flatten = kFlat ? one : mul_sub_from(p.d, p.curvature, one);
@@ -127,8 +134,9 @@ PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact
 
 /// Adds one point. Points that do not touch (d ≥ 0) add exact zeros.
 template <bool Derivatives, class Shape, class N>
-void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& law, const Mat3<N>& Q,
-                const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v, const Vec3<N>& xi) {
+void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& law,
+                const Mat3<N>& Q, const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
+                const Vec3<N>& xi) {
   const PointContact<N> p = point_contact(shape, law, Q, c, omega, v, xi);
   const auto touching = p.d < N(0.0);
   if (!any(touching)) return;
@@ -156,13 +164,16 @@ void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& l
   }
 }
 
-/// The same sums for points or a sphere on the ground, with velocity and force at the body's own point ξ = ξ_c - r m
-/// (r = 0: a material point). m = Rᵀ n_ground, `height` = n·(p - ground point), V = body twist, all in body axes.
-///   δm = m × θ, δξ = -r m × θ, δd = m·(ρ + θ × ξ_c), u = v + ω × ξ, ḋ = m·u     (θ, ρ of the body itself)
-/// In the pair's convention body 2 is the ground: ε = -δ₁, δW = -δV₁, hence the signs of k and d. False where no lane touches.
+/// The same sums for points or a sphere on the ground, with velocity and force at the body's own
+/// point ξ = ξ_c - r m (r = 0: a material point). m = Rᵀ n_ground, `height` = n·(p - ground point),
+/// V = body twist, all in body axes.
+///   δm = m × θ, δξ = -r m × θ, δd = m·(ρ + θ × ξ_c), u = v + ω × ξ, ḋ = m·u     (θ, ρ of the body
+///   itself)
+/// In the pair's convention body 2 is the ground: ε = -δ₁, δW = -δV₁, hence the signs of k and d.
+/// False where no lane touches.
 template <bool Derivatives, class N>
-bool accumulate_ground(PairSums<N>& sums, const LawParameters<N>& law, const Vec3<N>& m, const N& height,
-                       const Vec6<N>& V, const Vec3<N>& centre, const N& radius) {
+bool accumulate_ground(PairSums<N>& sums, const LawParameters<N>& law, const Vec3<N>& m,
+                       const N& height, const Vec6<N>& V, const Vec3<N>& centre, const N& radius) {
   const N d = dot(m, centre) + height - radius;
   const auto touching = d < N(0.0);
   if (!any(touching)) return false;

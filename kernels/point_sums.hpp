@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contact sums over candidates, of one shape after the other. Many lanes: row by row of the list. One lane: eight of its points at a time
-// through the law, then one after the other into the sums, in list order. The same bits, for a third of the work.
+// Contact sums over candidates, of one shape after the other. Many lanes: row by row of the list.
+// One lane: eight of its points at a time through the law, then one after the other into the sums,
+// in list order. The same bits, for a third of the work.
 #pragma once
 
 #include "kernels/packed_face_sums.hpp"
@@ -18,7 +19,8 @@ void add_rows(const Motion& motion, const LawParameters<N>& law, const Candidate
     const int count = list.count - k < Chunk::kPoints ? list.count - k : Chunk::kPoints;
     Vec3<N> xi[Chunk::kPoints];
     for (int i = 0; i < count; ++i)
-      xi[i] = {list.points[3 * (k + i)], list.points[3 * (k + i) + 1], list.points[3 * (k + i) + 2]};
+      xi[i] = {list.points[3 * (k + i)], list.points[3 * (k + i) + 1],
+               list.points[3 * (k + i) + 2]};
     fill_chunk<Derivatives>(motion, law, xi, count, chunk);
     add_chunk<Derivatives>(sums, chunk);
   }
@@ -49,17 +51,20 @@ void add_row(const Rows& rows, int i, Sums& sums, PointChunk<Point>& chunk) {
 
 /// Adds one lane's own candidates; motion and law the same in every lane of the vectors.
 template <bool Derivatives, class Motion, class A, class List, class Sums>
-void add_own_points(const Motion& motion, const LawParameters<Lanes<A>>& law, const List& list, Sums& sums) {
+void add_own_points(const Motion& motion, const LawParameters<Lanes<A>>& law, const List& list,
+                    Sums& sums) {
   using Chunk = PointChunk<typename Motion::Point>;
   constexpr int kRows = Chunk::kPoints;
   Chunk rows;
   PointChunk<typename Motion::template Of<OneLane<A>>::Point> chunk;
   for (int first = 0; first < list.own_count; first += kRows * kGroup) {
-    const int rest = (list.own_count - first + kGroup - 1) / kGroup, count = rest < kRows ? rest : kRows;
+    const int rest = (list.own_count - first + kGroup - 1) / kGroup,
+              count = rest < kRows ? rest : kRows;
     Vec3<Lanes<A>> xi[kRows];
     for (int i = 0; i < count; ++i) {
       const double* at = list.own + first + i * kGroup;
-      xi[i] = {load_lanes<A>(at), load_lanes<A>(at + list.stride), load_lanes<A>(at + 2 * list.stride)};
+      xi[i] = {load_lanes<A>(at), load_lanes<A>(at + list.stride),
+               load_lanes<A>(at + 2 * list.stride)};
     }
     fill_chunk<Derivatives>(motion, law, xi, count, rows);
     for (int c = 0; c < rows.count; ++c) add_row<Derivatives>(rows, rows.touching[c], sums, chunk);
@@ -74,7 +79,8 @@ auto in_all_lanes(const Motion& motion, int from) {
   To out;
   const double* x = reinterpret_cast<const double*>(&motion);
   Lanes<A>* y = reinterpret_cast<Lanes<A>*>(&out);
-  for (std::size_t i = 0; i < sizeof(To) / sizeof(Lanes<A>); ++i) y[i] = Lanes<A>(x[i * kStep + from]);
+  for (std::size_t i = 0; i < sizeof(To) / sizeof(Lanes<A>); ++i)
+    y[i] = Lanes<A>(x[i * kStep + from]);
   return out;
 }
 
@@ -98,10 +104,16 @@ struct PointSums<Derivatives, Sums, OneLane<A>> {
 
   void start(int) { clear<Derivatives>(own); }
   template <class Motion>
-  void add(const Motion& motion, const LawParameters<OneLane<A>>& law, const CandidateList<OneLane<A>>& list, int) {
+  void add(const Motion& motion, const LawParameters<OneLane<A>>& law,
+           const CandidateList<OneLane<A>>& list, int) {
     using N = Lanes<A>;
-    const LawParameters<N> all = {N(law.kn.x),      N(law.kt.x), N(law.mu.x),
-                                  N(law.damping.x), law.law,     law.ramp,    N(law.friction_tangent.x)};
+    const LawParameters<N> all = {N(law.kn.x),
+                                  N(law.kt.x),
+                                  N(law.mu.x),
+                                  N(law.damping.x),
+                                  law.law,
+                                  law.ramp,
+                                  N(law.friction_tangent.x)};
     add_own_points<Derivatives>(in_all_lanes<A>(motion, 0), all, list, own);
   }
   Sums<OneLane<A>> result(int) { return unpacked<Derivatives>(own); }
@@ -122,14 +134,20 @@ struct PointSums<Derivatives, Sums, Lanes<A>> {
     }
   }
   template <class Motion>
-  void add(const Motion& motion, const LawParameters<N>& law, const CandidateList<N>& list, int lone) {
+  void add(const Motion& motion, const LawParameters<N>& law, const CandidateList<N>& list,
+           int lone) {
     if (lone < 0) {
       add_rows<Derivatives>(motion, law, list, sums);
       return;
     }
     const auto spread = [lone](const N& a) { return N(reinterpret_cast<const double*>(&a)[lone]); };
-    const LawParameters<N> all = {spread(law.kn),      spread(law.kt), spread(law.mu),
-                                  spread(law.damping), law.law,        law.ramp,    spread(law.friction_tangent)};
+    const LawParameters<N> all = {spread(law.kn),
+                                  spread(law.kt),
+                                  spread(law.mu),
+                                  spread(law.damping),
+                                  law.law,
+                                  law.ramp,
+                                  spread(law.friction_tangent)};
     add_own_points<Derivatives>(in_all_lanes<A>(motion, lone), all, list, own);
   }
   const Sums<N>& result(int lone) {
@@ -137,7 +155,8 @@ struct PointSums<Derivatives, Sums, Lanes<A>> {
     alignas(64) const Sums<OneLane<A>> one = unpacked<Derivatives>(own);
     const double* from = reinterpret_cast<const double*>(&one);
     N* to = reinterpret_cast<N*>(&sums);
-    constexpr std::size_t count = Derivatives ? sizeof(one) / sizeof(double) : 6;  // force and moment come first
+    constexpr std::size_t count =
+        Derivatives ? sizeof(one) / sizeof(double) : 6;  // force and moment come first
     for (std::size_t i = 0; i < count; ++i) to[i] = N(from[i]);
     return sums;
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The residual g of a step: kinematics outward, contacts, inverse dynamics inward (RNEA in body axes).
+// The residual g of a step: kinematics outward, contacts, inverse dynamics inward (RNEA in body
+// axes).
 //
 //   V = V_p + S q̇,  A = A_p + S q̈ + V × (S q̇),  F = I A + V ×* I V - w_ext,  F_p += X* F
 //   g = Sᵀ F - τ - what acts on the dofs (kernels/joint_effects-inl.hpp)
@@ -12,12 +13,18 @@
 
 namespace tangere::kernels {
 
-/// Pose of a child link in its parent, and its joint's rates. q̇ and q̈ come back in `rate` and `acceleration`.
+/// Pose of a child link in its parent, and its joint's rates. q̇ and q̈ come back in `rate` and
+/// `acceleration`.
 template <class N>
-void joint_motion(const Link& link, const StageArgs<N>& a, LinkScratch<N>& out, Vec6<N>& rate, Vec6<N>& acceleration) {
+void joint_motion(const Link& link, const StageArgs<N>& a, LinkScratch<N>& out, Vec6<N>& rate,
+                  Vec6<N>& acceleration) {
   const int i = link.v;
-  const auto slope = [&](int k) { return mul_add(a.c0_over_h, a.x[i + k], a.inverse_h * a.r[i + k]); };
-  const auto acceleration_of = [&](int k, const N& v) { return mul_add(a.c0_over_h, v, a.inverse_h * a.s[i + k]); };
+  const auto slope = [&](int k) {
+    return mul_add(a.c0_over_h, a.x[i + k], a.inverse_h * a.r[i + k]);
+  };
+  const auto acceleration_of = [&](int k, const N& v) {
+    return mul_add(a.c0_over_h, v, a.inverse_h * a.s[i + k]);
+  };
   rate = acceleration = zero6<N>();
   Frame<N> moved = {diagonal(N(1.0)), zero3<N>()};
   bool turns = false;
@@ -42,7 +49,8 @@ void joint_motion(const Link& link, const StageArgs<N>& a, LinkScratch<N>& out, 
     }
     case JointKind::translational: {
       const Vec3<N> v = {slope(0), slope(1), slope(2)};
-      moved.p = {a.centre[link.q] + a.x[i], a.centre[link.q + 1] + a.x[i + 1], a.centre[link.q + 2] + a.x[i + 2]};
+      moved.p = {a.centre[link.q] + a.x[i], a.centre[link.q + 1] + a.x[i + 1],
+                 a.centre[link.q + 2] + a.x[i + 2]};
       a.v[i] = v.x, a.v[i + 1] = v.y, a.v[i + 2] = v.z;
       rate.l = v;
       acceleration.l = {acceleration_of(0, v.x), acceleration_of(1, v.y), acceleration_of(2, v.z)};
@@ -64,14 +72,16 @@ void joint_motion(const Link& link, const StageArgs<N>& a, LinkScratch<N>& out, 
       break;
     }
   }
-  const Frame<N> base = {broadcast<N>(link.frame.R), load_vector<N>(link.frame.p, link.place_row, a.block, a.group)};
+  const Frame<N> base = {broadcast<N>(link.frame.R),
+                         load_vector<N>(link.frame.p, link.place_row, a.block, a.group)};
   out.local.R = link.rotated ? (turns ? base.R * moved.R : base.R) : moved.R;
   out.local.p = slides(link.kind) ? (link.rotated ? base.R * moved.p : moved.p) + base.p : base.p;
 }
 
 /// I m for a rigid body: (J ω + c × v; m v - c × ω), c = mass times centre of mass.
 template <class N>
-Vec6<N> inertia_times(const N& mass, const Vec3<N>& moment, const Mat3<N>& inertia, const Vec6<N>& m) {
+Vec6<N> inertia_times(const N& mass, const Vec3<N>& moment, const Mat3<N>& inertia,
+                      const Vec6<N>& m) {
   return {inertia * m.a + cross(moment, m.l), mass * m.l - cross(moment, m.a)};
 }
 
@@ -113,7 +123,8 @@ void inertial_wrenches(const ModelView& model, const StageArgs<N>& a) {
       o.F.l = mass * o.A.l;
       continue;
     }
-    o.F = inertia_times(mass, moment, inertia, o.A) + cross_wrench(o.V, inertia_times(mass, moment, inertia, o.V));
+    o.F = inertia_times(mass, moment, inertia, o.A) +
+          cross_wrench(o.V, inertia_times(mass, moment, inertia, o.V));
   }
 }
 
@@ -128,8 +139,9 @@ void pair_motion(const LinkPair& pair, const StageArgs<N>& a, ContactScratch<N>&
   o.W = pair.link1 < 0 ? o.Z : o.Z - a.links[pair.link1].V;
 }
 
-/// How far any point of body 1 may have come nearer to a shape since the lists were made, beyond the margin. With G = (R, p)
-/// of the links, a point ξ is at Rᵀ(ξ - p) in body 2 and so in every shape that is fixed there.
+/// How far any point of body 1 may have come nearer to a shape since the lists were made, beyond
+/// the margin. With G = (R, p) of the links, a point ξ is at Rᵀ(ξ - p) in body 2 and so in every
+/// shape that is fixed there.
 template <class N>
 N list_excess(const LinkPair& pair, const CandidateList<N>& list, const Frame<N>& now) {
   const N* ref = list.reference;
@@ -143,7 +155,8 @@ N list_excess(const LinkPair& pair, const CandidateList<N>& list, const Frame<N>
     moved = sqrt(dot(step, step));
   } else {
     N square(0.0);
-    for (int k = 0; k < 9; ++k) square = mul_add(turn.m[k / 3][k % 3], turn.m[k / 3][k % 3], square);
+    for (int k = 0; k < 9; ++k)
+      square = mul_add(turn.m[k / 3][k % 3], turn.m[k / 3][k % 3], square);
     const Vec3<N> step = transposed_times(now.R, now.p) - transposed_times(R0, p0);
     moved = sqrt(square) * N(pair.reach) + sqrt(dot(step, step));
   }
@@ -152,13 +165,14 @@ N list_excess(const LinkPair& pair, const CandidateList<N>& list, const Frame<N>
 
 /// Adds the points of a capsule, whose ends bend in two directions, one candidate after the other.
 template <bool Derivatives, class Shape, class N>
-void add_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list, int lone,
-                    const Frame<N>& frame, const Vec6<N>& W, PairSums<N>& sums) {
+void add_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list,
+                    int lone, const Frame<N>& frame, const Vec6<N>& W, PairSums<N>& sums) {
   const auto add = [&](const Vec3<N>& xi) {
     accumulate<Derivatives>(sums, shape, law, frame.R, frame.p, W.a, W.l, xi);
   };
   if (lone < 0) {
-    for (int k = 0; k < list.count; ++k) add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
+    for (int k = 0; k < list.count; ++k)
+      add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
   } else {
     const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
     for (int k = 0; k < list.own_count; ++k) add({N(x[k]), N(y[k]), N(z[k])});
@@ -173,7 +187,8 @@ bool has_candidates(const CandidateList<N>& list, int lone) {
 /// Adds the points around a sphere.
 template <bool Derivatives, class N>
 [[gnu::noinline]] void add_sphere(const SphereMotion<N>& motion, const LawParameters<N>& law,
-                                  const CandidateList<N>& list, int lone, const Vec6<N>& W, PairSums<N>& sums) {
+                                  const CandidateList<N>& list, int lone, const Vec6<N>& W,
+                                  PairSums<N>& sums) {
   PointSums<Derivatives, SphereSums, N> sphere;
   sphere.start(lone);
   sphere.add(motion, law, list, lone);
@@ -190,9 +205,11 @@ void start(PairSums<N>& sums) {
   }
 }
 
-/// Sums over all shapes of two links. Flat and bent faces share theirs, which are about body 1's origin.
+/// Sums over all shapes of two links. Flat and bent faces share theirs, which are about body 1's
+/// origin.
 template <bool Derivatives, class N>
-void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArgs<N>& a, ContactScratch<N>& o) {
+void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArgs<N>& a,
+                   ContactScratch<N>& o) {
   start<Derivatives>(o.sums);
   PointSums<Derivatives, FaceSums, N> faces;
   bool any_face = false;
@@ -208,7 +225,8 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
     with_distance<N>(pair.shape, size, [&]<template <class> class Shape>(const Shape<N>& shape) {
       if constexpr (Shape<N>::kBending == Bending::ball) {
         const Vec3<N> centre = o.link2_in_1.R * broadcast<N>(pair.frame2.p) + o.link2_in_1.p;
-        add_sphere<Derivatives>(sphere_motion(centre, o.W, shape.radius), law, list, a.lone, o.W, o.sums);
+        add_sphere<Derivatives>(sphere_motion(centre, o.W, shape.radius), law, list, a.lone, o.W,
+                                o.sums);
       } else if constexpr (std::is_same_v<Shape<N>, CapsuleDistance<N>>) {
         add_candidates<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
       } else {
@@ -223,10 +241,12 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
 
 /// Points of one link in the ground; false where there are none in any lane.
 template <bool Derivatives, class N>
-bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const StageArgs<N>& a, PairSums<N>& sums) {
+bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const StageArgs<N>& a,
+                  PairSums<N>& sums) {
   const LinkScratch<N>& link = a.links[grounded.link];
   const Vec3<N> m = transposed_times(link.world.R, broadcast<N>(model.ground_normal));
-  const N height = dot(broadcast<N>(model.ground_normal), link.world.p - broadcast<N>(model.ground_point));
+  const N height =
+      dot(broadcast<N>(model.ground_normal), link.world.p - broadcast<N>(model.ground_point));
   bool near = false, started = false;
   for (int i = 0; i < grounded.count; ++i) {
     const GroundContact& ground = model.grounds[model.ground_order[grounded.first + i]];
@@ -235,15 +255,18 @@ bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const St
     if (!any(dot(m, broadcast<N>(ground.middle)) + height < extent)) continue;
     if (!started) start<Derivatives>(sums);
     started = true;
-    LawParameters<N> law = load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
+    LawParameters<N> law =
+        load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
     law.friction_tangent = a.friction_tangent;
     for (int k = 0; k < ground.n_points; ++k)
-      near |= accumulate_ground<Derivatives>(sums, law, m, height, link.V, ground_point<N>(ground, k), radius);
+      near |= accumulate_ground<Derivatives>(sums, law, m, height, link.V,
+                                             ground_point<N>(ground, k), radius);
   }
   return near;
 }
 
-/// -0 to +0: a contact that is near in another lane only adds ±0, which must not show in this lane's bits.
+/// -0 to +0: a contact that is near in another lane only adds ±0, which must not show in this
+/// lane's bits.
 template <class N>
 void without_negative_zeros(N* x, int count) {
   for (int i = 0; i < count; ++i) x[i] = x[i] + N(0.0);
@@ -256,7 +279,8 @@ bool near(const ModelView& model, const LinkPair& links, const StageArgs<N>& a) 
   return false;
 }
 
-/// Contact sums of every pair of links and grounded link; their wrenches are taken from the links' F.
+/// Contact sums of every pair of links and grounded link; their wrenches are taken from the links'
+/// F.
 template <bool Derivatives, class N>
 void contact_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int k = 0; k < model.n_link_pairs; ++k) {
@@ -294,7 +318,8 @@ void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
   }
 }
 
-/// Adds |generalised force| of one contact wrench on a link to the scale of every dof that carries it.
+/// Adds |generalised force| of one contact wrench on a link to the scale of every dof that carries
+/// it.
 template <class N>
 void add_force_scale(const ModelView& model, const StageArgs<N>& a, int link, Vec6<N> wrench) {
   for (int i = link; i >= 0; i = model.links[i].parent) {
@@ -302,7 +327,8 @@ void add_force_scale(const ModelView& model, const StageArgs<N>& a, int link, Ve
       for (int k = 0; k < dofs(K); ++k)
         a.force_scale[model.links[i].v + k] += abs(project<K>(model.links[i], k, wrench));
     });
-    if (model.links[i].parent >= 0) wrench = wrench_to_parent(model.links[i], a.links[i].local, wrench);
+    if (model.links[i].parent >= 0)
+      wrench = wrench_to_parent(model.links[i], a.links[i].local, wrench);
   }
 }
 
@@ -330,7 +356,8 @@ void residual(const ModelView& model, const StageArgs<N>& a) {
     if (!o.near) continue;
     const LinkPair& pair = model.link_pairs[k];
     add_force_scale(model, a, pair.link1, o.sums.wrench);
-    if (pair.link2 >= 0) add_force_scale(model, a, pair.link2, wrench_to_child(o.link2_in_1, o.sums.wrench));
+    if (pair.link2 >= 0)
+      add_force_scale(model, a, pair.link2, wrench_to_child(o.link2_in_1, o.sums.wrench));
   }
   for (int k = 0; k < model.n_grounded; ++k) {
     const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rotation vectors of quaternions, for springs, limits and motors of spherical joints: log and the inverse Jacobians.
+// Rotation vectors of quaternions, for springs, limits and motors of spherical joints: log and the
+// inverse Jacobians.
 //
 //   q = (w, u), w ≥ 0 after a sign flip;  m = u/(1 + w) = tan(θ/4) φ/θ,  r = |m|²
 //   S = √(1 + r),  r₂ = tan²(θ/8) = r/(1 + S)²
-//   B₂ = Σ (-1)^k r₂^k/(2k + 3),  A₂ = 1 - r₂ B₂ = (θ/8)/tan(θ/8)      (r₂ ≤ 0.172: twenty terms reach rounding)
+//   B₂ = Σ (-1)^k r₂^k/(2k + 3),  A₂ = 1 - r₂ B₂ = (θ/8)/tan(θ/8)
+//       (r₂ ≤ 0.172: twenty terms reach rounding)
 //   A = (θ/4)/tan(θ/4) = 2 A₂/(1 + S),  B = (1 - A)/r = (1/(1 + S) + 2 B₂/(1 + S)²)/(1 + S)
-//   φ = log q = 4 A m;   J_r⁻¹ = I + X/2 + e X²,  X = [φ],  e = (1 - (θ/2) cot(θ/2))/θ² = (A + B)/(16 A²)
+//   φ = log q = 4 A m;   J_r⁻¹ = I + X/2 + e X²,  X = [φ],
+//       e = (1 - (θ/2) cot(θ/2))/θ² = (A + B)/(16 A²)
 //
-// Halving the angle twice leaves no root of a small number and no difference of nearly equal ones: exact near 0 and up
-// to π, where only the sign of φ is undetermined. The lanes have no arc tangent.
+// Halving the angle twice leaves no root of a small number and no difference of nearly equal ones:
+// exact near 0 and up to π, where only the sign of φ is undetermined. The lanes have no arc
+// tangent.
 #pragma once
 
 #include "kernels/dual.hpp"

@@ -2,8 +2,10 @@
 // Rotations in a chart re-centred at every step: R = R_c exp([x]), |x| < π.
 //
 //   exp = I + sX + bX²,  J_r = I - bX + cX²,  X = [x],  t = |x|²
-//   s, b, c = Σ_k (-1)^k t^k / (2k + o)!,  o = 1, 2, 3       (power series: no branch, no root, no loss near 0)
-//   D(x, w) = ∂(J_r(x) w)/∂x = b[w] + (c₁ x×(x×w) - b₁ x×w) xᵀ - c([x×w] + [x][w]),  b₁ = 2 db/dt, c₁ = 2 dc/dt
+//   s, b, c = Σ_k (-1)^k t^k / (2k + o)!,  o = 1, 2, 3
+//       (power series: no branch, no root, no loss near 0)
+//   D(x, w) = ∂(J_r(x) w)/∂x = b[w] + (c₁ x×(x×w) - b₁ x×w) xᵀ - c([x×w] + [x][w]),
+//       b₁ = 2 db/dt, c₁ = 2 dc/dt
 //
 // Fourteen terms reach rounding for |x| ≤ π; the closed forms lose all digits near 0.
 #pragma once
@@ -51,7 +53,8 @@ N series(const N& t) {
 template <int Offset, class N>
 N series_slope(const N& t) {
   N sum = N((kSeriesTerms - 1) * kSeries<Offset>.value[kSeriesTerms - 1]);
-  for (int k = kSeriesTerms - 2; k >= 1; --k) sum = mul_add(sum, t, N(k * kSeries<Offset>.value[k]));
+  for (int k = kSeriesTerms - 2; k >= 1; --k)
+    sum = mul_add(sum, t, N(k * kSeries<Offset>.value[k]));
   return sum;
 }
 }  // namespace detail
@@ -59,8 +62,8 @@ N series_slope(const N& t) {
 template <class N>
 RotationSeries<N> rotation_series(const Vec3<N>& x) {
   const N t = dot(x, x);
-  return {detail::series<1>(t), detail::series<2>(t), detail::series<3>(t), 2.0 * detail::series_slope<2>(t),
-          2.0 * detail::series_slope<3>(t)};
+  return {detail::series<1>(t), detail::series<2>(t), detail::series<3>(t),
+          2.0 * detail::series_slope<2>(t), 2.0 * detail::series_slope<3>(t)};
 }
 
 /// α I + β X + γ X², X² = x xᵀ - t I.
@@ -91,11 +94,13 @@ Mat3<N> right_jacobian_derivative(const Vec3<N>& x, const RotationSeries<N>& k, 
   return k.b * skew(w) + outer(g, x) - k.c * (skew(xw) + cross_columns(x, skew(w)));
 }
 
-/// The angle of a revolute joint, brought into [-π, π] where the series holds; 2π in two parts (Cody and Waite).
+/// The angle of a revolute joint, brought into [-π, π] where the series holds; 2π in two parts
+/// (Cody and Waite).
 template <class N>
 N reduce_angle(const N& q) {
   const N turns = round_nearest(N(0.15915494309189535) * q);
-  return mul_sub_from(turns, N(2.4492935982947064e-16), mul_sub_from(turns, N(6.283185307179586), q));
+  return mul_sub_from(turns, N(2.4492935982947064e-16),
+                      mul_sub_from(turns, N(6.283185307179586), q));
 }
 
 template <class N>
@@ -113,8 +118,9 @@ Quat<N> conjugate(const Quat<N>& q) {
 }
 template <class N>
 Quat<N> operator*(const Quat<N>& a, const Quat<N>& b) {
-  return {a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-          a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
+  return {
+      a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+      a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
 }
 /// (cos|x|/2, sin(|x|/2) x/|x|), by the same series at x/2.
 template <class N>

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of body 1 against a sphere of body 2, about the sphere's centre c, where most of a point's derivative vanishes.
+// Points of body 1 against a sphere of body 2, about the sphere's centre c, where most of a point's
+// derivative vanishes.
 //
-// D = ξ - c = (r + d) n, forces act at c + r n, and with q = -(v + ω × c), o = -r ω, the same for all points,
+// D = ξ - c = (r + d) n, forces act at c + r n, and with q = -(v + ω × c), o = -r ω, the same for
+// all points,
 //   u = q + o × n,  ḋ = n·q,  v_t = u - ḋ n,  f = N n - s v_t,  moment about c: r n × f
-//   κ = 1/|D|,  γ = μ ∂B/∂ḋ,  t = v_t/|v_t| when slipping, else 0,  b = n × t,  α = (∂N/∂ḋ + s) n - γ t,  e = t × o - ḋ t
+//   κ = 1/|D|,  γ = μ ∂B/∂ḋ,  t = v_t/|v_t| when slipping, else 0,  b = n × t,
+//       α = (∂N/∂ḋ + s) n - γ t,  e = t × o - ḋ t
 //   ∂f/∂q = α nᵀ + s t tᵀ - s I                        ∂(n×f)/∂q = b (s t - γ n)ᵀ - s [n]
 //   ∂f/∂o = s t bᵀ + s [n]                             ∂(n×f)/∂o = s n nᵀ + s b bᵀ - s I
 //   ∂f/∂D = g nᵀ + κ(α qᵀ + s t eᵀ + (N + ḋ s) I - s [o])
@@ -42,18 +45,18 @@ SphereMotion<N> sphere_motion(const Vec3<N>& centre, const Vec6<N>& W, const N& 
   return {centre, -(W.l + cross(W.a, centre)), (-radius) * W.a, radius};
 }
 
-/// What one point adds to the sums: exact zeros if it does not touch. Numbers throughout, in the order in which fewer and
-/// fewer of them are set.
+/// What one point adds to the sums: exact zeros if it does not touch. Numbers throughout, in the
+/// order in which fewer and fewer of them are set.
 template <class N>
 struct SpherePoint {
   using Number = N;
-  Vec3<N> f, m;                 ///< force, n × f
+  Vec3<N> f, m;  ///< force, n × f
   // With derivatives only.
-  Vec3<N> n, alpha, g, k, sn;   ///< normal, α, g, k, s n
-  N s, curvature, spread;       ///< s, κ, N + ḋ s
+  Vec3<N> n, alpha, g, k, sn;  ///< normal, α, g, k, s n
+  N s, curvature, spread;      ///< s, κ, N + ḋ s
   // Where it slips only.
   Vec3<N> t, b, st, sb, ke, turn;  ///< t, b, s t, s b, κ e, s t - γ n
-  N k_gamma;                    ///< κ γ
+  N k_gamma;                       ///< κ γ
 
   static constexpr int kValues = 6, kDerivatives = kValues + 18, kSlipping = kDerivatives + 19;
   static constexpr int kBent = kSlipping, kNumbers = kSlipping;
@@ -66,17 +69,18 @@ struct ScaledSums {
   N s, ks, k_spread;
 };
 
-/// Every sum runs over the points in order, so that chunks may be cut anywhere: what all touching points add and what
-/// slipping ones add are kept apart until the end.
+/// Every sum runs over the points in order, so that chunks may be cut anywhere: what all touching
+/// points add and what slipping ones add are kept apart until the end.
 template <class N>
 struct SphereSums {
-  Vec3<N> f, m;                     ///< Σ f, Σ n × f
-  Mat3<N> alpha_n, g_n, k_n;        ///< Σ α nᵀ, Σ g nᵀ, Σ k nᵀ
-  UpperTriangle<N> s_nn;            ///< Σ s n nᵀ
+  Vec3<N> f, m;               ///< Σ f, Σ n × f
+  Mat3<N> alpha_n, g_n, k_n;  ///< Σ α nᵀ, Σ g nᵀ, Σ k nᵀ
+  UpperTriangle<N> s_nn;      ///< Σ s n nᵀ
   ScaledSums<N> scaled;
-  Mat3<N> s_tt, s_tb, s_t_ke, b_turn, s_b_ke;  ///< Σ s t tᵀ, Σ s t bᵀ, Σ κ s t eᵀ, Σ b (s t - γ n)ᵀ, Σ κ s b eᵀ
-  UpperTriangle<N> s_bb;            ///< Σ s b bᵀ
-  Vec3<N> k_gamma_b;                ///< Σ κ γ b
+  Mat3<N> s_tt, s_tb, s_t_ke, b_turn,
+      s_b_ke;  ///< Σ s t tᵀ, Σ s t bᵀ, Σ κ s t eᵀ, Σ b (s t - γ n)ᵀ, Σ κ s b eᵀ
+  UpperTriangle<N> s_bb;  ///< Σ s b bᵀ
+  Vec3<N> k_gamma_b;      ///< Σ κ γ b
 };
 
 template <bool Derivatives, class N>
@@ -99,7 +103,8 @@ struct SpherePass {
 
 /// n, d, κ; where the point touches.
 template <class N>
-auto find_distance(const SphereMotion<N>& z, const Vec3<N>& xi, SpherePoint<N>& out, SpherePass<N>& pass) {
+auto find_distance(const SphereMotion<N>& z, const Vec3<N>& xi, SpherePoint<N>& out,
+                   SpherePass<N>& pass) {
   const Distance<N> at = SphereDistance<N>{z.radius}.evaluate(xi - z.centre, pass.kappa);
   out.n = at.n;
   pass.d = at.d;
@@ -119,7 +124,7 @@ void find_slide(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePass<
 /// Force and what its derivative needs; where the point slips.
 template <bool Derivatives, class N>
 auto find_force(const SphereMotion<N>& z, const LawParameters<N>& law, const SpherePass<N>& pass,
-                  SpherePoint<N>& out) {
+                SpherePoint<N>& out) {
   const N zero(0.0);
   const Vec3<N>& n = out.n;
   const auto touching = pass.d < zero;
@@ -136,8 +141,8 @@ auto find_force(const SphereMotion<N>& z, const LawParameters<N>& law, const Sph
   out.curvature = pass.kappa;
   out.spread = mul_add(pass.rate, s, normal.force);
   out.sn = s * n;
-  const N g_n =
-      mul_sub_from(pass.kappa, mul_add(pass.rate, normal.rate_slope + (s + s), normal.force), normal.d_slope);
+  const N g_n = mul_sub_from(
+      pass.kappa, mul_add(pass.rate, normal.rate_slope + (s + s), normal.force), normal.d_slope);
   out.alpha = slope * n;
   out.g = mul_add(g_n, n, ks * pass.turned);
   out.k = mul_add(ks, z.o - dot(z.o, n) * n, (-pass.kappa) * out.m);
@@ -147,7 +152,8 @@ auto find_force(const SphereMotion<N>& z, const LawParameters<N>& law, const Sph
   out.t = t;
   out.b = cross(n, t);
   const N gamma = gate * (law.mu * normal.bound_rate);
-  const N g_t = -(law.mu * normal.bound_d) - pass.kappa * mul_sub_from(pass.rate, gamma, s * dot(z.o, out.b));
+  const N g_t =
+      -(law.mu * normal.bound_d) - pass.kappa * mul_sub_from(pass.rate, gamma, s * dot(z.o, out.b));
   out.alpha -= gamma * t;
   out.g += g_t * t;
   out.k += g_t * out.b;
@@ -163,8 +169,12 @@ auto find_force(const SphereMotion<N>& z, const LawParameters<N>& law, const Sph
 template <bool Derivatives, class N>
 [[gnu::noinline]] void add_chunk(SphereSums<N>& sums, const PointChunk<SpherePoint<N>>& chunk) {
   using Point = SpherePoint<N>;
-  const auto each = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.touching, chunk.count, f); };
-  const auto slipping = [&](auto& sum, const auto& f) { add_each(sum, chunk.point, chunk.slipping, chunk.slips, f); };
+  const auto each = [&](auto& sum, const auto& f) {
+    add_each(sum, chunk.point, chunk.touching, chunk.count, f);
+  };
+  const auto slipping = [&](auto& sum, const auto& f) {
+    add_each(sum, chunk.point, chunk.slipping, chunk.slips, f);
+  };
   each(sums.f, [](Vec3<N>& f, const Point& p) { f += p.f; });
   each(sums.m, [](Vec3<N>& m, const Point& p) { m += p.m; });
   if constexpr (Derivatives) {
@@ -192,20 +202,22 @@ template <bool Derivatives, class N>
   }
 }
 
-/// Adds wrench, stiffness and damping of the pair about body 1's origin from the sums about the centre: with
-/// δc = ρ + θ × c,  δD = -δc,  δq = -(δv + δω × c) - ω × δc,  δo = -r δω.
+/// Adds wrench, stiffness and damping of the pair about body 1's origin from the sums about the
+/// centre: with δc = ρ + θ × c,  δD = -δc,  δq = -(δv + δω × c) - ω × δc,  δo = -r δω.
 template <bool Derivatives, class N>
-void add_finished(const SphereMotion<N>& z, const Vec6<N>& W, const SphereSums<N>& s, PairSums<N>& out) {
+void add_finished(const SphereMotion<N>& z, const Vec6<N>& W, const SphereSums<N>& s,
+                  PairSums<N>& out) {
   const N r = z.radius;
   out.wrench.l += s.f;
   out.wrench.a += cross(z.centre, s.f) + r * s.m;
   if constexpr (Derivatives) {
     const ScaledSums<N>& c = s.scaled;
-    Mat3<N> f_q = s.alpha_n + s.s_tt, f_D = s.g_n + s.s_t_ke + outer(c.k_alpha, z.q) - skew(c.ks * z.o);
+    Mat3<N> f_q = s.alpha_n + s.s_tt,
+            f_D = s.g_n + s.s_t_ke + outer(c.k_alpha, z.q) - skew(c.ks * z.o);
     const Mat3<N> m_q = s.b_turn - skew(c.sn), f_o = s.s_tb + skew(c.sn);
     // Σ κ s u = q Σ κ s + o × Σ κ s n
-    Mat3<N> m_D = s.k_n + s.s_b_ke - outer(s.k_gamma_b, z.q) + skew(mul_add(c.ks, z.q, cross(z.o, c.ksn))) -
-                  outer(z.o, c.ksn);
+    Mat3<N> m_D = s.k_n + s.s_b_ke - outer(s.k_gamma_b, z.q) +
+                  skew(mul_add(c.ks, z.q, cross(z.o, c.ksn))) - outer(z.o, c.ksn);
     const Mat3<N> m_o = full(s.s_nn) + full(s.s_bb) - diagonal(c.s);
     const N along = dot(z.o, c.ksn);
     for (int i = 0; i < 3; ++i) {

@@ -2,7 +2,8 @@
 // What one evaluation of the step's residual reads and writes, over any number type.
 //
 // Unknown x (nv), centre c: q = c ⊕ x.  ẋ = (c₀x + r)/h;  v = J(x)ẋ;  a = (c₀v + s)/h
-//   g = ID(q, v, a) - τ - Σ J_cᵀ f_c;   A = ∂g/∂x = G_q J + C V_x,   C = G_v + (c₀/h) M     (docs/solver.md)
+//   g = ID(q, v, a) - τ - Σ J_cᵀ f_c;   A = ∂g/∂x = G_q J + C V_x,   C = G_v + (c₀/h) M
+//       (docs/solver.md)
 #pragma once
 
 #include "kernels/dual.hpp"
@@ -15,39 +16,44 @@ namespace tangere::kernels {
 /// Scratch of one link: everything the sweeps pass on.
 template <class N>
 struct LinkScratch {
-  Frame<N> local;     ///< in the parent link
+  Frame<N> local;  ///< in the parent link
   Frame<N> world;
-  Vec6<N> Vp, Ap;     ///< parent's twist and acceleration, in this link's axes
-  Vec6<N> V, A;       ///< twist; acceleration, gravity included as -g at the base
-  Vec6<N> F;          ///< wrench through the joint: inertial minus external, of the whole subtree
-  Mat3<N> chart;      ///< spherical: J = J_r(x)
-  Mat3<N> chart_rate; ///< spherical: V_x = (c₀/h) J + D(x, ẋ)
-  N mass;             ///< composite inertia of the subtree: mass, moment, inertia about this origin
+  Vec6<N> Vp, Ap;      ///< parent's twist and acceleration, in this link's axes
+  Vec6<N> V, A;        ///< twist; acceleration, gravity included as -g at the base
+  Vec6<N> F;           ///< wrench through the joint: inertial minus external, of the whole subtree
+  Mat3<N> chart;       ///< spherical: J = J_r(x)
+  Mat3<N> chart_rate;  ///< spherical: V_x = (c₀/h) J + D(x, ẋ)
+  N mass;  ///< composite inertia of the subtree: mass, moment, inertia about this origin
   Vec3<N> moment;
   Mat3<N> inertia;
-  Mat3<N> bias;       ///< composite B: B m = (bias m.a; -2 momentum × m.a)
+  Mat3<N> bias;  ///< composite B: B m = (bias m.a; -2 momentum × m.a)
   Vec3<N> momentum;
-  Vec6<N> psi_dot[3], psi_ddot[3], s_dot[3];  ///< per dof: Ψ̇ = Vp × S, Ψ̈ = Ap × S + Vp × Ψ̇, Ṡ = V × S
+  Vec6<N> psi_dot[3], psi_ddot[3],
+      s_dot[3];  ///< per dof: Ψ̇ = Vp × S, Ψ̈ = Ap × S + Vp × Ψ̇, Ṡ = V × S
 };
 
-/// Scratch of a pair of links: relative motion and sums over all their shapes. Grounded links use `sums` alone.
+/// Scratch of a pair of links: relative motion and sums over all their shapes. Grounded links use
+/// `sums` alone.
 template <class N>
 struct ContactScratch {
   Frame<N> link2_in_1;  ///< G of the links
   Vec6<N> Z;            ///< twist of body 2 in body 1's axes, at its origin
   Vec6<N> W;            ///< Z - V₁
   PairSums<N> sums;     ///< valid where `near`
-  bool near;            ///< some lane has a candidate, or a point in the ground; else nothing is added anywhere
+  bool near;  ///< some lane has a candidate, or a point in the ground; else nothing is added
+              ///< anywhere
 };
 
-/// Candidate points of a pair, per lane, and the pose they were found at, which all pairs of the same links share.
+/// Candidate points of a pair, per lane, and the pose they were found at, which all pairs of the
+/// same links share.
 template <class N>
 struct CandidateList {
-  const N* points;    ///< (count, 3) in body 1's axes; lanes with fewer hold far points
+  const N* points;  ///< (count, 3) in body 1's axes; lanes with fewer hold far points
   int count;
-  const N* reference; ///< (12) link2_in_1 when the list was made: R row-major, then p
-  double margin;      ///< a point missing from the list was at least this far away [m]
-  const double* own;  ///< (3, stride) candidates of the lane that is evaluated alone, padded to eights with far points
+  const N* reference;  ///< (12) link2_in_1 when the list was made: R row-major, then p
+  double margin;       ///< a point missing from the list was at least this far away [m]
+  const double* own;   ///< (3, stride) candidates of the lane that is evaluated alone, padded to
+                       ///< eights with far points
   int own_count, stride;
 };
 
@@ -62,18 +68,19 @@ struct JointColumns {
 
 template <class N>
 struct StageArgs {
-  const N* centre;   ///< (nq) quaternions w x y z
-  const N* x;        ///< (nv)
-  const N* r;        ///< (nv) history of ẋ
-  const N* s;        ///< (nv) history of a
-  const N* tau;      ///< (nv) actuator force
-  const N* target;   ///< (nv) of position motors
+  const N* centre;  ///< (nq) quaternions w x y z
+  const N* x;       ///< (nv)
+  const N* r;       ///< (nv) history of ẋ
+  const N* s;       ///< (nv) history of a
+  const N* tau;     ///< (nv) actuator force
+  const N* target;  ///< (nv) of position motors
   N c0_over_h, inverse_h;
-  N friction_tangent = N(1.0);  ///< of a derivative: kernels/contact_law.hpp
-  const double* block;  ///< of the batch, for parameters that vary
-  int group;            ///< 0 or 1: which half of the block
+  N friction_tangent = N(1.0);         ///< of a derivative: kernels/contact_law.hpp
+  const double* block;                 ///< of the batch, for parameters that vary
+  int group;                           ///< 0 or 1: which half of the block
   const CandidateList<N>* candidates;  ///< (n_pairs)
-  int lone;          ///< the only lane whose result matters: its contacts are summed across points; -1: all do
+  int lone;  ///< the only lane whose result matters: its contacts are summed across points; -1: all
+             ///< do
   // scratch
   LinkScratch<N>* links;        ///< (n_links)
   ContactScratch<N>* contacts;  ///< (n_link_pairs + n_grounded)
@@ -84,10 +91,12 @@ struct StageArgs {
   N* force_scale;    ///< (nv) sum of the magnitudes of actuator, damping and contact forces
   N* mass_diagonal;  ///< (nv)
   N* A;              ///< (entries)
-  N* excess;         ///< (1) how far some pair moved beyond its list's margin [m]; > 0: rebuild and evaluate again
+  N* excess;         ///< (1) how far some pair moved beyond its list's margin [m]; > 0: rebuild and
+                     ///< evaluate again
 };
 
-/// Calls `f` with the kind of a joint as a template argument, so that what it asks of the kind costs nothing.
+/// Calls `f` with the kind of a joint as a template argument, so that what it asks of the kind
+/// costs nothing.
 template <class F>
 void with_kind(JointKind kind, const F& f) {
   switch (kind) {
@@ -98,7 +107,8 @@ void with_kind(JointKind kind, const F& f) {
   }
 }
 
-// Column k of a joint's motion subspace is one unit vector s_k: angular where the joint turns, linear where it slides.
+// Column k of a joint's motion subspace is one unit vector s_k: angular where the joint turns,
+// linear where it slides.
 template <JointKind K, class N>
 Vec3<N> joint_axis(const Link& link, int k) {
   if constexpr (dofs(K) == 1) return broadcast<N>(link.axis);
@@ -146,7 +156,8 @@ Vec6<N> wrench_to_parent(const Link& link, const Frame<N>& x, const Vec6<N>& f) 
 }
 template <class N>
 Frame<N> compose(const Link& link, const Frame<N>& parent, const Frame<N>& x) {
-  return {link.turned ? parent.R * x.R : parent.R, link.placed ? parent.R * x.p + parent.p : parent.p};
+  return {link.turned ? parent.R * x.R : parent.R,
+          link.placed ? parent.R * x.p + parent.p : parent.p};
 }
 
 /// A parameter of the scene in these lanes.
@@ -188,7 +199,8 @@ template <class N>
 Vec3<N> ground_point(const GroundContact& ground, int k) {
   const double* p = ground.points + 3 * k;
   if constexpr (std::is_same_v<N, Dual<double>>)
-    if (const double* t = ground.point_tangents; t != nullptr) return {{p[0], t[3 * k]}, {p[1], t[3 * k + 1]}, {p[2], t[3 * k + 2]}};
+    if (const double* t = ground.point_tangents; t != nullptr)
+      return {{p[0], t[3 * k]}, {p[1], t[3 * k + 1]}, {p[2], t[3 * k + 2]}};
   return {N(p[0]), N(p[1]), N(p[2])};
 }
 /// Mass, moment and inertia of a link's own bodies.
@@ -200,13 +212,18 @@ struct LinkInertia {
 };
 template <class N>
 LinkInertia<N> load_inertia(const Link& link, const double* block, int group) {
-  if (link.inertia_row < 0) return {N(link.mass), broadcast<N>(link.moment), broadcast<N>(link.inertia)};
-  const auto row = [&](int i) { return ParameterLoad<N>::load({0, link.inertia_row + i}, block, group); };
+  if (link.inertia_row < 0)
+    return {N(link.mass), broadcast<N>(link.moment), broadcast<N>(link.inertia)};
+  const auto row = [&](int i) {
+    return ParameterLoad<N>::load({0, link.inertia_row + i}, block, group);
+  };
   const N xy = row(5), xz = row(6), yz = row(8);
-  return {row(0), {row(1), row(2), row(3)}, {{{row(4), xy, xz}, {xy, row(7), yz}, {xz, yz, row(9)}}}};
+  return {
+      row(0), {row(1), row(2), row(3)}, {{{row(4), xy, xz}, {xy, row(7), yz}, {xz, yz, row(9)}}}};
 }
 template <class N>
-LawParameters<N> load_law(const ContactParameters& p, ContactLaw law, double ramp, const double* block, int group) {
+LawParameters<N> load_law(const ContactParameters& p, ContactLaw law, double ramp,
+                          const double* block, int group) {
   const auto one = [&](const Parameter& x) { return ParameterLoad<N>::load(x, block, group); };
   return {one(p.kn), one(p.kt), one(p.mu), one(p.damping), law, ramp};
 }

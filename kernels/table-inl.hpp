@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Builds the table of one instruction set. Included once by each generated kernels.<isa>.cpp, nowhere else.
+// Builds the table of one instruction set. Included once by each generated kernels.<isa>.cpp,
+// nowhere else.
 #pragma once
 
 #include <new>
@@ -17,8 +18,8 @@
 
 namespace tangere::kernels {
 
-// A row of L doubles and the number type N of L lanes have the same layout; vector types may alias anything, and OneLane
-// is a double.
+// A row of L doubles and the number type N of L lanes have the same layout; vector types may alias
+// anything, and OneLane is a double.
 template <class N, int L>
 struct StageTable {
   static_assert(sizeof(N) == sizeof(Row<L>));
@@ -29,7 +30,8 @@ struct StageTable {
   static const N* view(const RowOf* p) { return reinterpret_cast<const N*>(p); }
 
   static std::size_t scratch_bytes(const ModelView& m) {
-    return sizeof(LinkScratch<N>) * m.n_links + sizeof(ContactScratch<N>) * (m.n_link_pairs + m.n_grounded) +
+    return sizeof(LinkScratch<N>) * m.n_links +
+           sizeof(ContactScratch<N>) * (m.n_link_pairs + m.n_grounded) +
            sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links +
            sizeof(LinkAdjoint<N>) * m.n_links + 5 * alignof(N);
   }
@@ -58,8 +60,9 @@ struct StageTable {
     for (int k = 0; k < m.n_pairs; ++k) {
       const typename StageOf::List& l = s.lists[k];
       const int lane = lone < 0 ? 0 : lone;
-      lists[k] = {view(l.points),        l.count, view(l.reference), l.margin, l.own + 3 * l.stride * lane,
-                  l.own_count[lane], l.stride};
+      lists[k] = {
+          view(l.points),    l.count, view(l.reference), l.margin, l.own + 3 * l.stride * lane,
+          l.own_count[lane], l.stride};
     }
     a.candidates = lists;
     a.lone = lone;
@@ -83,7 +86,9 @@ struct StageTable {
     return a;
   }
 
-  static void kinematics_lanes(const ModelView& m, const StageOf& s) { kinematics(m, arguments(m, s, -1)); }
+  static void kinematics_lanes(const ModelView& m, const StageOf& s) {
+    kinematics(m, arguments(m, s, -1));
+  }
   static void near_pairs_lanes(const ModelView& m, const StageOf& s, NearPairs<L>& out) {
     near_pairs(m, arguments(m, s, -1), out);
   }
@@ -98,16 +103,20 @@ struct StageTable {
   static void set_weights_lanes(const ModelView& m, StageOf& s) {
     set_weights(m.nv, view(s.mass_diagonal), view(s.weight), view(s.inverse_weight));
   }
-  static void set_floor_lanes(const ModelView& m, StageOf& s, const double* unknown_scale, const RowOf& accept) {
+  static void set_floor_lanes(const ModelView& m, StageOf& s, const double* unknown_scale,
+                              const RowOf& accept) {
     const N floor = rounding_floor(m.pattern, view(s.A), view(s.inverse_weight), unknown_scale);
     *view(&s.floor) = select(*view(&accept) > N(0.0), floor, *view(&s.floor));
   }
-  static void scaled_residual_lanes(const ModelView& m, const StageOf& s, double gravity, RowOf& out) {
-    const ResidualScale<N> scale = {view(s.v), view(s.force_scale), view(s.weight), view(s.inverse_weight),
-                                    *view(&s.c0_over_h), N(gravity), *view(&s.floor)};
+  static void scaled_residual_lanes(const ModelView& m, const StageOf& s, double gravity,
+                                    RowOf& out) {
+    const ResidualScale<N> scale = {
+        view(s.v),           view(s.force_scale), view(s.weight), view(s.inverse_weight),
+        *view(&s.c0_over_h), N(gravity),          *view(&s.floor)};
     *view(&out) = scaled_residual(m.nv, view(s.g), scale);
   }
-  static void weighted_norm_lanes(const ModelView& m, const StageOf& s, const RowOf* a, RowOf& out) {
+  static void weighted_norm_lanes(const ModelView& m, const StageOf& s, const RowOf* a,
+                                  RowOf& out) {
     *view(&out) = weighted_norm(m.nv, view(s.weight), view(a));
   }
   static void factor_lanes(const ModelView& m, const StageOf& s, const RowOf* accept) {
@@ -118,32 +127,56 @@ struct StageTable {
   }
   static void solve_watched_lanes(const ModelView& m, const StageOf& s, const RowOf* b, RowOf* out,
                                   RowOf* sound) {
-    solve_watched<false>(m.pattern, view(s.A), view(s.LU), view(b), view(out), view(sound), view(s.work));
+    solve_watched<false>(m.pattern, view(s.A), view(s.LU), view(b), view(out), view(sound),
+                         view(s.work));
   }
-  static void solve_transposed_lanes(const ModelView& m, const StageOf& s, const RowOf* b, RowOf* out, RowOf* sound) {
-    solve_watched<true>(m.pattern, view(s.A), view(s.LU), view(b), view(out), view(sound), view(s.work));
+  static void solve_transposed_lanes(const ModelView& m, const StageOf& s, const RowOf* b,
+                                     RowOf* out, RowOf* sound) {
+    solve_watched<true>(m.pattern, view(s.A), view(s.LU), view(b), view(out), view(sound),
+                        view(s.work));
   }
   static AdjointArgs<N> adjoint_arguments(const StageAdjoint<L>& d, LinkAdjoint<N>* links) {
-    return {view(d.q_bar), view(d.v_bar),    view(d.rhs),      view(d.lambda),  view(d.nu),      view(d.mass_lambda), view(d.target),
-            view(d.other), view(d.q_centre), view(d.v_centre), view(d.q_other), view(d.v_other), d.history,           links};
+    return {view(d.q_bar),    view(d.v_bar),
+            view(d.rhs),      view(d.lambda),
+            view(d.nu),       view(d.mass_lambda),
+            view(d.target),   view(d.other),
+            view(d.q_centre), view(d.v_centre),
+            view(d.q_other),  view(d.v_other),
+            d.history,        links};
   }
   static void adjoint_rhs_lanes(const ModelView& m, const StageOf& s, const StageAdjoint<L>& d) {
     adjoint_rhs(m, arguments(m, s, -1), adjoint_arguments(d, nullptr));
   }
-  static void adjoint_products_lanes(const ModelView& m, const StageOf& s, const StageAdjoint<L>& d) {
+  static void adjoint_products_lanes(const ModelView& m, const StageOf& s,
+                                     const StageAdjoint<L>& d) {
     Scratch scratch{s.scratch};
     const StageArgs<N> a = arguments(m, s, -1, scratch);
     adjoint_products(m, a, adjoint_arguments(d, scratch.template take<LinkAdjoint<N>>(m.n_links)));
   }
-  static void parameter_products_lanes(const ModelView& m, const StageOf& s, const StageAdjoint<L>& d, int lone, RowOf* out) {
+  static void parameter_products_lanes(const ModelView& m, const StageOf& s,
+                                       const StageAdjoint<L>& d, int lone, RowOf* out) {
     Scratch scratch{s.scratch};
     const StageArgs<N> a = arguments(m, s, lone, scratch);
-    parameter_products(m, a, adjoint_arguments(d, scratch.template take<LinkAdjoint<N>>(m.n_links)), view(out));
+    parameter_products(m, a, adjoint_arguments(d, scratch.template take<LinkAdjoint<N>>(m.n_links)),
+                       view(out));
   }
   static constexpr StageKernels<L> make() {
-    return {scratch_bytes,     kinematics_lanes, near_pairs_lanes,      residual_lanes,      evaluate_lanes, set_weights_lanes,
-            set_floor_lanes, scaled_residual_lanes, weighted_norm_lanes, factor_lanes, solve_lanes,    solve_watched_lanes,
-            solve_transposed_lanes, adjoint_rhs_lanes, adjoint_products_lanes, parameter_products_lanes};
+    return {scratch_bytes,
+            kinematics_lanes,
+            near_pairs_lanes,
+            residual_lanes,
+            evaluate_lanes,
+            set_weights_lanes,
+            set_floor_lanes,
+            scaled_residual_lanes,
+            weighted_norm_lanes,
+            factor_lanes,
+            solve_lanes,
+            solve_watched_lanes,
+            solve_transposed_lanes,
+            adjoint_rhs_lanes,
+            adjoint_products_lanes,
+            parameter_products_lanes};
   }
 };
 
@@ -167,21 +200,26 @@ struct TableOf {
   static void poses_of_links(const ModelView& m, const GroupState& s, LinkPose<LaneRow>* out) {
     link_poses(m, at_state(s), reinterpret_cast<LinkPose<N>*>(out));
   }
-  static void motion_of_links(const ModelView& m, const GroupState& s, std::byte* scratch, MotionCotangent<LaneRow>* links,
-                              LaneRow* q_bar, LaneRow* v_bar) {
-    pull_back_links(m, at_state(s), reinterpret_cast<LinkMotion<N>*>(scratch), reinterpret_cast<MotionCotangent<N>*>(links),
-                    view(q_bar), view(v_bar));
+  static void motion_of_links(const ModelView& m, const GroupState& s, std::byte* scratch,
+                              MotionCotangent<LaneRow>* links, LaneRow* q_bar, LaneRow* v_bar) {
+    pull_back_links(m, at_state(s), reinterpret_cast<LinkMotion<N>*>(scratch),
+                    reinterpret_cast<MotionCotangent<N>*>(links), view(q_bar), view(v_bar));
   }
-  static std::size_t pullback_bytes(const ModelView& m) { return sizeof(LinkMotion<N>) * std::size_t(m.n_links); }
-  static void touch_of_pad(const LinkPose<LaneRow>* sensor, const Frame<double>& pad, const LinkPose<LaneRow>* body,
-                           const Frame<double>& shape, Touch<LaneRow>* out) {
-    pad_touch(reinterpret_cast<const LinkPose<N>*>(sensor), pad, reinterpret_cast<const LinkPose<N>*>(body), shape,
-              reinterpret_cast<Touch<N>&>(*out));
+  static std::size_t pullback_bytes(const ModelView& m) {
+    return sizeof(LinkMotion<N>) * std::size_t(m.n_links);
+  }
+  static void touch_of_pad(const LinkPose<LaneRow>* sensor, const Frame<double>& pad,
+                           const LinkPose<LaneRow>* body, const Frame<double>& shape,
+                           Touch<LaneRow>* out) {
+    pad_touch(reinterpret_cast<const LinkPose<N>*>(sensor), pad,
+              reinterpret_cast<const LinkPose<N>*>(body), shape, reinterpret_cast<Touch<N>&>(*out));
   }
   static int tactile(const TactileArgs<double>& a) { return any_field<InDouble<Arch>>(a); }
   static int tactile_mixed(const TactileArgs<float>& a) { return any_field<InMixed<Arch>>(a); }
   static void tactile_group(const TactileBlockArgs<double>& a) { tactile_block<InDouble<Arch>>(a); }
-  static void tactile_group_mixed(const TactileBlockArgs<float>& a) { tactile_block<InMixed<Arch>>(a); }
+  static void tactile_group_mixed(const TactileBlockArgs<float>& a) {
+    tactile_block<InMixed<Arch>>(a);
+  }
   static constexpr KernelTable make(const char* name) {
     return {name,
             StageTable<Lanes<Arch>, kGroup>::make(),
@@ -196,7 +234,8 @@ struct TableOf {
             tactile_group_mixed,
             motion_of_links,
             pullback_bytes,
-            pull_back_field<Arch>, field_tangent<Arch>};
+            pull_back_field<Arch>,
+            field_tangent<Arch>};
   }
 };
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tactile field of one environment: brackets of eight tiles at a time, then the points of the tiles within reach.
+// Tactile field of one environment: brackets of eight tiles at a time, then the points of the tiles
+// within reach.
 #pragma once
 
 #include "kernels/tactile_rods.hpp"
@@ -24,10 +25,12 @@ void store_row(const D& x, Real* out) {
 /// False where none of the eight tiles is within reach; then the rows are not written.
 template <class P, class Shape>
 bool chunk_brackets(const PadTiles& pad, int first, const TouchShape& shape,
-                    const Touch<Lanes<typename P::Architecture>>& at, TileChunk<typename P::Real>& out) {
+                    const Touch<Lanes<typename P::Architecture>>& at,
+                    TileChunk<typename P::Real>& out) {
   using Arch = typename P::Architecture;
   using D = Lanes<Arch>;
-  const Vec3<D> t = {load_lanes<Arch>(pad.x + first), load_lanes<Arch>(pad.y + first), load_lanes<Arch>(pad.z + first)};
+  const Vec3<D> t = {load_lanes<Arch>(pad.x + first), load_lanes<Arch>(pad.y + first),
+                     load_lanes<Arch>(pad.z + first)};
   D row[kBracketRows];
   const D gap = Shape::bracket(shape, at, t, load_lanes<Arch>(pad.radius + first), row);
   if (!any(gap < D(0.0))) return false;
@@ -40,8 +43,8 @@ bool chunk_brackets(const PadTiles& pad, int first, const TouchShape& shape,
 
 template <class N>
 Touch<N> broadcast_touch(const Touch<double>& t) {
-  return {broadcast<N>(t.Q), broadcast<N>(t.c), broadcast<N>(t.omega), broadcast<N>(t.v),
-          N(t.kn),           N(t.kt),           N(t.mu),               N(t.damping)};
+  return {broadcast<N>(t.Q), broadcast<N>(t.c), broadcast<N>(t.omega), broadcast<N>(t.v), N(t.kn),
+          N(t.kt),           N(t.mu),           N(t.damping)};
 }
 template <class N>
 PointLaw<N> point_law(const Touch<double>& t) {
@@ -52,17 +55,21 @@ PointLaw<N> point_law(const Touch<double>& t) {
 template <class P>
 typename P::Offset load_offset(const typename P::Real* offsets, int k) {
   if constexpr (P::kCurved) {
-    return {P::load(offsets + k), P::load(offsets + kTactileTile + k), P::load(offsets + 2 * kTactileTile + k)};
+    return {P::load(offsets + k), P::load(offsets + kTactileTile + k),
+            P::load(offsets + 2 * kTactileTile + k)};
   } else {
     return {P::load(offsets + k), P::load(offsets + kTactileTile + k)};
   }
 }
 
-/// The force on points k … of a tile in the axes in which it is stored; false where nothing touches.
+/// The force on points k … of a tile in the axes in which it is stored; false where nothing
+/// touches.
 template <class P, ContactLaw Law, class Shape, class N = typename P::N>
-bool stored_force(const PadTiles& pad, int tile, int k, const Shape& shape, const PointLaw<N>& law, Vec3<N>& f) {
+bool stored_force(const PadTiles& pad, int tile, int k, const Shape& shape, const PointLaw<N>& law,
+                  Vec3<N>& f) {
   constexpr int kWidth = P::kCurved ? 3 : 2;
-  const typename P::Offset s = load_offset<P>(P::offsets(pad) + kWidth * kTactileTile * pad.kind[tile], k);
+  const typename P::Offset s =
+      load_offset<P>(P::offsets(pad) + kWidth * kTactileTile * pad.kind[tile], k);
   if constexpr (P::kCurved) {
     const bool own = pad.factors != nullptr;
     const auto at = own ? scaled_law<P>(law, P::factors(pad) + 4 * kTactileTile * tile + k) : law;
@@ -75,10 +82,11 @@ bool stored_force(const PadTiles& pad, int tile, int k, const Shape& shape, cons
   return true;
 }
 
-/// The points of one tile. `out` (3, 64): written whole when `fresh` and something touches, else added to.
+/// The points of one tile. `out` (3, 64): written whole when `fresh` and something touches, else
+/// added to.
 template <class P, ContactLaw Law, class Shape>
-bool tile_force(const PadTiles& pad, int tile, const Shape& shape, const PointLaw<typename P::N>& law, bool fresh,
-                typename P::Real* out) {
+bool tile_force(const PadTiles& pad, int tile, const Shape& shape,
+                const PointLaw<typename P::N>& law, bool fresh, typename P::Real* out) {
   using N = typename P::N;
   bool touched = false;
   for (int k = 0; k < kTactileTile; k += P::kLanes) {
@@ -98,7 +106,8 @@ bool tile_force(const PadTiles& pad, int tile, const Shape& shape, const PointLa
   return touched;
 }
 
-/// Adds one shape to eight tiles from `first`; returns the bits of those touched, `written` included.
+/// Adds one shape to eight tiles from `first`; returns the bits of those touched, `written`
+/// included.
 template <class P, ContactLaw Law, class Shape>
 unsigned chunk_force(const TactileArgs<typename P::Real>& a, int touch, int first, unsigned written,
                      typename P::Real* buffer) {
@@ -107,7 +116,8 @@ unsigned chunk_force(const TactileArgs<typename P::Real>& a, int touch, int firs
   const PadTiles& pad = *a.pad;
   const Touch<double>& at = a.touches[touch];
   TileChunk<typename P::Real> chunk;
-  if (!chunk_brackets<P, Shape>(pad, first, a.shapes[touch], broadcast_touch<D>(at), chunk)) return written;
+  if (!chunk_brackets<P, Shape>(pad, first, a.shapes[touch], broadcast_touch<D>(at), chunk))
+    return written;
   Shape shape(a.shapes[touch], broadcast<N>(at.Q));
   const PointLaw<N> law = point_law<N>(at);
   const int count = pad.tiles() - first < kGroup ? pad.tiles() - first : kGroup;
@@ -118,7 +128,8 @@ unsigned chunk_force(const TactileArgs<typename P::Real>& a, int touch, int firs
     shape.set(row);
     shape.u = {row[Shape::kRows - 3], row[Shape::kRows - 2], row[Shape::kRows - 1]};
     const bool fresh = ((written >> l) & 1U) == 0;
-    if (tile_force<P, Law>(pad, first + l, shape, law, fresh, buffer + 3 * kTactileTile * l)) written |= 1U << l;
+    if (tile_force<P, Law>(pad, first + l, shape, law, fresh, buffer + 3 * kTactileTile * l))
+      written |= 1U << l;
   }
   return written;
 }
@@ -177,7 +188,8 @@ void write_dense(const PadTiles& pad, int tile, const Real* from, Real* dense) {
   }
 }
 
-/// f<Shape>() of every shape, in the order of PrimitiveShape: the choice is made once per tile or chunk of tiles.
+/// f<Shape>() of every shape, in the order of PrimitiveShape: the choice is made once per tile or
+/// chunk of tiles.
 template <class P, class F>
 constexpr auto by_shape(const F& f) {
   using Function = decltype(f.template operator()<SpherePad<P>>());
@@ -193,18 +205,21 @@ constexpr auto by_shape(const F& f) {
 template <class P, ContactLaw Law>
 int tactile_field(const TactileArgs<typename P::Real>& a) {
   using Real = typename P::Real;
-  static constexpr auto kForce = by_shape<P>([]<class Shape>() { return &chunk_force<P, Law, Shape>; });
+  static constexpr auto kForce =
+      by_shape<P>([]<class Shape>() { return &chunk_force<P, Law, Shape>; });
   alignas(64) Real buffer[kGroup * 3 * kTactileTile];
   int count = 0;
   for (int first = 0; first < a.pad->tiles(); first += kGroup) {
     unsigned written = 0;
-    for (int k = 0; k < a.n_touches; ++k) written = kForce[a.shapes[k].shape](a, k, first, written, buffer);
+    for (int k = 0; k < a.n_touches; ++k)
+      written = kForce[a.shapes[k].shape](a, k, first, written, buffer);
     for (int l = 0; written != 0; ++l, written >>= 1) {
       if ((written & 1U) == 0) continue;
       const Real* tile = buffer + 3 * kTactileTile * l;
       if (a.values != nullptr)
         for (int i = 0; i < 3 * kTactileTile; ++i) a.values[3 * kTactileTile * count + i] = tile[i];
-      if (a.dense != nullptr) write_dense<typename P::Architecture>(*a.pad, first + l, tile, a.dense);
+      if (a.dense != nullptr)
+        write_dense<typename P::Architecture>(*a.pad, first + l, tile, a.dense);
       a.active[count++] = first + l;
     }
   }
@@ -224,7 +239,8 @@ int tactile_field_of(const TactileArgs<typename P::Real>& a) {
 
 template <class P>
 int any_field(const TactileArgs<typename P::Real>& a) {
-  return a.pad->curved() ? tactile_field_of<OnCurvedPad<P>>(a) : tactile_field_of<AcrossPoints<P>>(a);
+  return a.pad->curved() ? tactile_field_of<OnCurvedPad<P>>(a)
+                         : tactile_field_of<AcrossPoints<P>>(a);
 }
 
 }  // namespace tangere::kernels

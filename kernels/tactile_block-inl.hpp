@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tactile fields of many environments with a small, flat pad: one lane each, the points of a tile one after the other.
+// Tactile fields of many environments with a small, flat pad: one lane each, the points of a tile
+// one after the other.
 //
-// The same arithmetic as across points, lane by lane, so that an environment has the same bits either way.
+// The same arithmetic as across points, lane by lane, so that an environment has the same bits
+// either way.
 #pragma once
 
 #include "kernels/tactile-inl.hpp"
@@ -20,7 +22,7 @@ typename P::N lanes_of(const Touch<LaneRow>* touch, const Pick& pick) {
 }
 
 template <class P>
-Vec3<typename P::N> lanes_of(const Touch<LaneRow>* touch, Vec3<LaneRow> Touch<LaneRow>::* v) {
+Vec3<typename P::N> lanes_of(const Touch<LaneRow>* touch, Vec3<LaneRow> Touch<LaneRow>::*v) {
   return {lanes_of<P>(touch, [v](const auto& t) -> const LaneRow& { return (t.*v).x; }),
           lanes_of<P>(touch, [v](const auto& t) -> const LaneRow& { return (t.*v).y; }),
           lanes_of<P>(touch, [v](const auto& t) -> const LaneRow& { return (t.*v).z; })};
@@ -29,16 +31,17 @@ Vec3<typename P::N> lanes_of(const Touch<LaneRow>* touch, Vec3<LaneRow> Touch<La
 template <class P>
 PointLaw<typename P::N> point_law(const Touch<LaneRow>* touch) {
   using N = typename P::N;
-  const auto one = [&](LaneRow Touch<LaneRow>::* m) {
+  const auto one = [&](LaneRow Touch<LaneRow>::*m) {
     return lanes_of<P>(touch, [m](const auto& t) -> const LaneRow& { return t.*m; });
   };
-  return {lanes_of<P>(touch, &Touch<LaneRow>::omega), N(0.0) - one(&Touch<LaneRow>::kn), one(&Touch<LaneRow>::kt),
-          one(&Touch<LaneRow>::mu), one(&Touch<LaneRow>::damping)};
+  return {lanes_of<P>(touch, &Touch<LaneRow>::omega), N(0.0) - one(&Touch<LaneRow>::kn),
+          one(&Touch<LaneRow>::kt), one(&Touch<LaneRow>::mu), one(&Touch<LaneRow>::damping)};
 }
 
 /// The brackets of one tile in every environment; false where it is out of reach of all.
 template <class P, class Shape>
-bool lane_brackets(const PadTiles& pad, int tile, const TouchShape& s, const Touch<LaneRow>* touch, Shape& shape) {
+bool lane_brackets(const PadTiles& pad, int tile, const TouchShape& s, const Touch<LaneRow>* touch,
+                   Shape& shape) {
   using Arch = typename P::Architecture;
   using D = Lanes<Arch>;
   constexpr int kGroups = P::kLanes / kGroup;
@@ -66,9 +69,11 @@ bool lane_brackets(const PadTiles& pad, int tile, const TouchShape& s, const Tou
   return true;
 }
 
-/// One shape on one tile: `out` (64, 3) lanes, written whole when `fresh` and something touches, else added to.
+/// One shape on one tile: `out` (64, 3) lanes, written whole when `fresh` and something touches,
+/// else added to.
 template <class P, ContactLaw Law, class Shape>
-bool tile_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, int k, bool fresh, typename P::N* out) {
+bool tile_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, int k, bool fresh,
+                typename P::N* out) {
   using N = typename P::N;
   const PadTiles& pad = *a.pad;
   const Touch<LaneRow>* touch = a.touches[k];
@@ -87,8 +92,8 @@ bool tile_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, int k, bo
     for (int j = 0; j < cols; ++j) {
       const int at = i * kTileSide + j;
       Vec3<N> f;
-      const bool here =
-          point_force<P, Law>(shape, law, {N(double(offsets[at])), N(double(offsets[kTactileTile + at]))}, f);
+      const bool here = point_force<P, Law>(
+          shape, law, {N(double(offsets[at])), N(double(offsets[kTactileTile + at]))}, f);
       touched |= here;
       if (!here) {
         if (!fresh) continue;
@@ -120,11 +125,13 @@ void write_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, const ty
 
 template <class P, ContactLaw Law>
 void tactile_block(const TactileBlockArgs<typename P::Real>& a) {
-  static constexpr auto kForce = by_shape<P>([]<class Shape>() { return &tile_lanes<P, Law, Shape>; });
+  static constexpr auto kForce =
+      by_shape<P>([]<class Shape>() { return &tile_lanes<P, Law, Shape>; });
   typename P::N buffer[3 * kTactileTile];
   for (int tile = 0; tile < a.pad->tiles(); ++tile) {
     bool written = false;
-    for (int k = 0; k < a.n_touches; ++k) written |= kForce[a.shapes[k].shape](a, tile, k, !written, buffer);
+    for (int k = 0; k < a.n_touches; ++k)
+      written |= kForce[a.shapes[k].shape](a, tile, k, !written, buffer);
     if (written) write_lanes<P>(a, tile, buffer);
   }
 }

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// The force on tactile points, relative to their tile, so that single precision loses nothing (docs/contact.md).
+// The force on tactile points, relative to their tile, so that single precision loses nothing
+// (docs/contact.md).
 //
-// A point is ξ = t + s, t its tile's centre, s the offset. Whatever cancels is a bracket, taken in double once per tile:
+// A point is ξ = t + s, t its tile's centre, s the offset. Whatever cancels is a bracket, taken in
+// double once per tile:
 //   sphere: a = t - c;  D = a + s;  D² - r² = s·(s + 2a) + [a² - r²];  d = |D| - r from it
 //   cuboid: y = Qᵀ(t - c);  d = max over the faces of [±y_k - h_k] ± (Qᵀs)_k
 //   half-spaces, cylinders, capsules: tactile_rods.hpp
 //   velocity at x₂ = ξ - d n:  u = [-(v + ω × t)] + ω × (d n - s)
-// Every function acts lane by lane: lanes may be tiles or environments (brackets), points or environments (forces).
+// Every function acts lane by lane: lanes may be tiles or environments (brackets), points or
+// environments (forces).
 #pragma once
 
 #include "kernels/inverse_sqrt.hpp"
@@ -90,7 +93,7 @@ struct SpherePad {
   using N = typename P::N;
   using Offset = typename P::Offset;
   static constexpr bool kTurns = false;  ///< whether its rotation matters
-  static constexpr int kRows = 7;  // a, a² - r², u
+  static constexpr int kRows = 7;        // a, a² - r², u
 
   N radius, minus_radius, inverse_diameter;
   N ax, ay, az, twice_ax, twice_ay, twice_az, square_az, excess;
@@ -102,9 +105,11 @@ struct SpherePad {
 
   /// Negative where the shape may reach a tile at t. `row`: its brackets, all but the velocity.
   template <class D>
-  static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach, D* row) {
+  static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach,
+                   D* row) {
     const D ax = t.x - at.c.x, ay = t.y - at.c.y, height = t.z - at.c.z;
-    // Off the plane by some unmeasurable distance: then |D| is never zero, and the normal at the centre is ±z.
+    // Off the plane by some unmeasurable distance: then |D| is never zero, and the normal at the
+    // centre is ±z.
     const D smallest(P::kSmallest);
     const D az = select(abs(height) < smallest, smallest, height);
     const D square = mul_add(ax, ax, mul_add(ay, ay, az * az));
@@ -124,13 +129,14 @@ struct SpherePad {
     N z = az, square_z = square_az, rest = excess;
     if constexpr (P::kCurved) {
       z = s.z + az;
-      square_z = max(z * z, N(P::kSmallest * P::kSmallest));  // at the centre the force is tangential
+      square_z =
+          max(z * z, N(P::kSmallest * P::kSmallest));  // at the centre the force is tangential
       rest = mul_add(s.z, s.z + twice_az, excess);
     }
     const N square = mul_add(x, x, mul_add(y, y, square_z));
     if constexpr (P::kSingle) {
-      // |D| rounded, then one Newton step on D² - r², whose value does not cancel. Its slope 2|D| is taken at the surface,
-      // where |D| - r cancels; deep inside nothing does.
+      // |D| rounded, then one Newton step on D² - r², whose value does not cancel. Its slope 2|D|
+      // is taken at the surface, where |D| - r cancels; deep inside nothing does.
       const N surplus = mul_add(s.x, s.x + twice_ax, mul_add(s.y, s.y + twice_ay, rest));
       const N inverse = inverse_sqrt(square);
       const N length = square * inverse, rounded = length - radius;
@@ -146,7 +152,8 @@ struct SpherePad {
   }
 };
 
-/// A cuboid with half edges h. Only inside do forces act: there d is the largest of six signed face distances.
+/// A cuboid with half edges h. Only inside do forces act: there d is the largest of six signed face
+/// distances.
 template <class P>
 struct CuboidPad {
   using N = typename P::N;
@@ -161,7 +168,8 @@ struct CuboidPad {
   CuboidPad(const TouchShape&, const Mat3<N>& pose) : Q(pose) {}
 
   template <class D>
-  static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach, D* row) {
+  static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach,
+                   D* row) {
     const Vec3<D> centre = transposed_times(at.Q, t - at.c);
     const D c[3] = {centre.x, centre.y, centre.z};
     D gap(0.0);
@@ -188,10 +196,13 @@ struct CuboidPad {
     }
     const auto x_first = (q[0] >= q[1]) & (q[0] >= q[2]);  // the first of x, y, z on ties
     const auto y_first = q[1] >= q[2];
-    const auto pick = [&](const N& x, const N& y, const N& z) { return select(x_first, x, select(y_first, y, z)); };
+    const auto pick = [&](const N& x, const N& y, const N& z) {
+      return select(x_first, x, select(y_first, y, z));
+    };
     d = pick(q[0], q[1], q[2]);
     const N outward = pick(sign[0], sign[1], sign[2]);
-    n = {outward * pick(Q.m[0][0], Q.m[0][1], Q.m[0][2]), outward * pick(Q.m[1][0], Q.m[1][1], Q.m[1][2]),
+    n = {outward * pick(Q.m[0][0], Q.m[0][1], Q.m[0][2]),
+         outward * pick(Q.m[1][0], Q.m[1][1], Q.m[1][2]),
          outward * pick(Q.m[2][0], Q.m[2][1], Q.m[2][2])};
     return d < N(0.0);
   }
@@ -203,9 +214,11 @@ Vec3<D> tile_velocity(const Touch<D>& at, const Vec3<D>& t) {
   return cross(t, at.omega) - at.v;
 }
 
-/// Normal force and the bound of friction over μ (contact_law.hpp; `linear` with ramp 0). d = 0 gives zeros.
+/// Normal force and the bound of friction over μ (contact_law.hpp; `linear` with ramp 0). d = 0
+/// gives zeros.
 template <ContactLaw Law, class N, class M>
-void pad_normal_force(const PointLaw<N>& law, const N& d, const N& rate, const M& touching, N& force, N& bound) {
+void pad_normal_force(const PointLaw<N>& law, const N& d, const N& rate, const M& touching,
+                      N& force, N& bound) {
   const N zero(0.0);
   if constexpr (Law == ContactLaw::linear) {
     bound = law.minus_kn * d;
@@ -217,10 +230,11 @@ void pad_normal_force(const PointLaw<N>& law, const N& d, const N& rate, const M
   }
 }
 
-/// Force on the points at offset s: (f·e0, f·e1, -f·e2) in pad axes, +0 where nothing touches. False, and
-/// `force` left alone, where nothing touches in any lane.
+/// Force on the points at offset s: (f·e0, f·e1, -f·e2) in pad axes, +0 where nothing touches.
+/// False, and `force` left alone, where nothing touches in any lane.
 template <class P, ContactLaw Law, class Shape, class N = typename P::N>
-bool point_force(const Shape& shape, const PointLaw<N>& law, const typename P::Offset& s, Vec3<N>& force) {
+bool point_force(const Shape& shape, const PointLaw<N>& law, const typename P::Offset& s,
+                 Vec3<N>& force) {
   N d;
   Vec3<N> n;
   const auto touching = shape.distance(s, d, n);
@@ -233,10 +247,12 @@ bool point_force(const Shape& shape, const PointLaw<N>& law, const typename P::O
                      mul_sub_from(w.x, arm.z, mul_add(w.z, arm.x, shape.u.y)),
                      mul_sub_from(w.y, arm.x, mul_add(w.x, arm.y, shape.u.z))};
   const N rate = dot(n, u);
-  const Vec3<N> slide = {mul_sub_from(rate, n.x, u.x), mul_sub_from(rate, n.y, u.y), mul_sub_from(rate, n.z, u.z)};
+  const Vec3<N> slide = {mul_sub_from(rate, n.x, u.x), mul_sub_from(rate, n.y, u.y),
+                         mul_sub_from(rate, n.z, u.z)};
   N normal, bound;
   pad_normal_force<Law>(law, select(touching, d, zero), rate, touching, normal, bound);
-  // Stick or slip: the smaller of k_t and μ B/|v_t|. Without sliding the second is huge, never a division by zero.
+  // Stick or slip: the smaller of k_t and μ B/|v_t|. Without sliding the second is huge, never a
+  // division by zero.
   const N square = max(dot(slide, slide), N(P::kSmallest * P::kSmallest));
   const N scale = min(law.kt, law.mu * bound * inverse_sqrt(square));
   // Each sum starts from +0, so that no -0 is left where a factor is zero.
@@ -250,7 +266,8 @@ bool point_force(const Shape& shape, const PointLaw<N>& law, const typename P::O
 template <class P, class N = typename P::N>
 PointLaw<N> scaled_law(const PointLaw<N>& law, const typename P::Real* factors) {
   const auto factor = [&](int k) { return P::load(factors + k * kTactileTile); };
-  return {law.omega, law.minus_kn * factor(0), law.kt * factor(1), law.mu * factor(2), law.damping * factor(3)};
+  return {law.omega, law.minus_kn * factor(0), law.kt * factor(1), law.mu * factor(2),
+          law.damping * factor(3)};
 }
 
 /// The same in the points' own axes; `frames` (9, 64).

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tactile field in reverse: cotangents of its touched tiles to displacements and twists of every shape, eight points at a
-// time, in double. The field itself is computed anew; nothing of it is stored.
+// A tactile field in reverse: cotangents of its touched tiles to displacements and twists of every
+// shape, eight points at a time, in double. The field itself is computed anew; nothing of it is
+// stored.
 #pragma once
 
 #include "kernels/point_pullback.hpp"
@@ -18,7 +19,10 @@ struct PadMotion {
 
 template <class N>
 PadMotion<N> pad_motion(const Touch<double>& t, ContactLaw law) {
-  return {broadcast<N>(t.Q), broadcast<N>(t.c), broadcast<N>(t.omega), broadcast<N>(t.v),
+  return {broadcast<N>(t.Q),
+          broadcast<N>(t.c),
+          broadcast<N>(t.omega),
+          broadcast<N>(t.v),
           {N(t.kn), N(t.kt), N(t.mu), N(t.damping), law, 0.0}};
 }
 
@@ -49,7 +53,8 @@ Vec3<Lanes<A>> force_cotangent(const PadTiles& pad, int tile, int k, const doubl
   if (!pad.skewed) return {t[0], t[1], -t[2]};
   N f[3];
   for (int c = 0; c < 3; ++c)
-    f[c] = mul_add(N(pad.axes[c]), t[0], mul_add(N(pad.axes[3 + c]), t[1], N(pad.axes[6 + c]) * t[2]));
+    f[c] =
+        mul_add(N(pad.axes[c]), t[0], mul_add(N(pad.axes[3 + c]), t[1], N(pad.axes[6 + c]) * t[2]));
   return {f[0], f[1], f[2]};
 }
 
@@ -71,10 +76,13 @@ void store_anywhere(const N& x, double* p) {
 
 /// Coefficients of eight points: the sensor's, or times factors of their own.
 template <class A>
-LawParameters<Lanes<A>> law_of_points(const PadTiles& pad, int tile, int k, const LawParameters<Lanes<A>>& of_sensor) {
+LawParameters<Lanes<A>> law_of_points(const PadTiles& pad, int tile, int k,
+                                      const LawParameters<Lanes<A>>& of_sensor) {
   LawParameters<Lanes<A>> law = of_sensor;
   if (pad.factors == nullptr) return law;
-  const auto factor = [&](int i) { return load_lanes<A>(pad.factors + (4 * tile + i) * kTactileTile + k); };
+  const auto factor = [&](int i) {
+    return load_lanes<A>(pad.factors + (4 * tile + i) * kTactileTile + k);
+  };
   law.kn = law.kn * factor(0), law.kt = law.kt * factor(1);
   law.mu = law.mu * factor(2), law.damping = law.damping * factor(3);
   return law;
@@ -89,7 +97,8 @@ bool reaches(const Shape& shape, const PadMotion<N>& m, const PadTiles& pad, int
 
 /// Adds to eight points' own numbers; `to`: (kPointNumbers, 64) at the first of them.
 template <class A>
-void add_to_points(const PlaceCotangent<Lanes<A>>& place, const LawCotangent<Lanes<A>>& law, double* to) {
+void add_to_points(const PlaceCotangent<Lanes<A>>& place, const LawCotangent<Lanes<A>>& law,
+                   double* to) {
   const Vec3<Lanes<A>> xi = place.x - place.rho;
   const Lanes<A> numbers[kPointNumbers] = {xi.x, xi.y, xi.z, law.kn, law.kt, law.mu, law.damping};
   for (int i = 0; i < kPointNumbers; ++i)
@@ -114,7 +123,8 @@ void pull_back_points(const PadTiles& pad, int tile, int k, const double* field,
   pull_back_law(law, p, f_bar, of_law);
   if (own != nullptr) add_to_points<A>(place, of_law, own + k);
   const auto factor = [&](int i) {
-    return pad.factors == nullptr ? N(1.0) : load_lanes<A>(pad.factors + (4 * tile + i) * kTactileTile + k);
+    return pad.factors == nullptr ? N(1.0)
+                                  : load_lanes<A>(pad.factors + (4 * tile + i) * kTactileTile + k);
   };
   sums.law.kn = mul_add(factor(0), of_law.kn, sums.law.kn);
   sums.law.kt = mul_add(factor(1), of_law.kt, sums.law.kt);
@@ -138,16 +148,18 @@ void pull_back_touch(const TactilePullback& a, int touch, TouchCotangent<double>
   const PadMotion<N> m = pad_motion<N>(a.touches[touch], a.law);
   const TouchShape& s = a.shapes[touch];
   TouchCotangent<N> sums = {zero6<N>(), zero6<N>(), {N(0.0), N(0.0), N(0.0), N(0.0)}, zero3<N>()};
-  with_distance<N>(s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]}, [&]<class Shape>(const Shape& shape) {
-    for (int i = 0; i < a.count; ++i) {
-      const int tile = a.tiles[i];
-      if (!reaches(shape, m, *a.pad, tile)) continue;
-      const double* field = a.cotangents + 3 * kTactileTile * i;
-      double* own = a.of_points == nullptr ? nullptr : a.of_points + kPointNumbers * kTactileTile * i;
-      for (int k = 0; k < kTactileTile; k += kGroup)
-        pull_back_points<A, OfLaw>(*a.pad, tile, k, field, shape, m, own, sums);
-    }
-  });
+  with_distance<N>(
+      s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]}, [&]<class Shape>(const Shape& shape) {
+        for (int i = 0; i < a.count; ++i) {
+          const int tile = a.tiles[i];
+          if (!reaches(shape, m, *a.pad, tile)) continue;
+          const double* field = a.cotangents + 3 * kTactileTile * i;
+          double* own =
+              a.of_points == nullptr ? nullptr : a.of_points + kPointNumbers * kTactileTile * i;
+          for (int k = 0; k < kTactileTile; k += kGroup)
+            pull_back_points<A, OfLaw>(*a.pad, tile, k, field, shape, m, own, sums);
+        }
+      });
   const N* from = &sums.displacement.a.x;
   double* to = &out.displacement.a.x;
   constexpr int kSums = sizeof(TouchCotangent<double>) / sizeof(double);
@@ -157,7 +169,8 @@ void pull_back_touch(const TactilePullback& a, int touch, TouchCotangent<double>
 template <class A>
 void pull_back_field(const TactilePullback& a) {
   for (int k = 0; k < a.n_touches; ++k)
-    a.of_law || a.of_points != nullptr ? pull_back_touch<A, true>(a, k, a.out[k]) : pull_back_touch<A, false>(a, k, a.out[k]);
+    a.of_law || a.of_points != nullptr ? pull_back_touch<A, true>(a, k, a.out[k])
+                                       : pull_back_touch<A, false>(a, k, a.out[k]);
 }
 
 }  // namespace tangere::kernels

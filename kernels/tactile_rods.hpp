@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Half-spaces, cylinders and capsules under a pad, in the shape's own axes, relative to the tile.
 //
-// y = Qᵀ(t - c) is the tile's centre there, e = Qᵀs the point's offset from it. Brackets, taken in double:
+// y = Qᵀ(t - c) is the tile's centre there, e = Qᵀs the point's offset from it. Brackets, taken in
+// double:
 //   half-space: d = [y_z] + e_z
-//   cylinder:   side as a sphere in the plane: ρ² - r² = e_x(e_x + 2 y_x) + e_y(e_y + 2 y_y) + [y_x² + y_y² - r²];
+//   cylinder:   side as a sphere in the plane: ρ² - r² = e_x(e_x + 2 y_x) + e_y(e_y + 2 y_y) +
+//       [y_x² + y_y² - r²];
 //               caps: d = max([y_z - h] + e_z, [-y_z - h] - e_z)
-//   capsule:    |D|² - r² about the nearest point of the axis: beside it as the cylinder's side, beyond an end, z = ±h
+//   capsule:    |D|² - r² about the nearest point of the axis: beside it as the cylinder's side,
+//       beyond an end, z = ±h
 //               [y_x² + y_y² + (y_z ∓ h)² - r²] + e_x(…) + e_y(…) + e_z(e_z + 2 [y_z ∓ h])
 #pragma once
 
@@ -20,7 +23,8 @@ struct PlanePad {
   using Offset = typename P::Offset;
   static constexpr bool kTurns = true;
   static constexpr int kRows = 4;  // y_z, u
-  /// Offsets beyond this are not points but what fills up edge tiles, and a half-space reaches that far [m].
+  /// Offsets beyond this are not points but what fills up edge tiles, and a half-space reaches that
+  /// far [m].
   static constexpr double kFiller = 1e5;
 
   Vec3<N> normal;
@@ -31,7 +35,8 @@ struct PlanePad {
       : normal{pose.m[0][2], pose.m[1][2], pose.m[2][2]} {}
 
   template <class D>
-  static D bracket(const TouchShape&, const Touch<D>& at, const Vec3<D>& t, const D& reach, D* row) {
+  static D bracket(const TouchShape&, const Touch<D>& at, const Vec3<D>& t, const D& reach,
+                   D* row) {
     const Vec3<D> arm = t - at.c;
     row[0] = mul_add(at.Q.m[0][2], arm.x, mul_add(at.Q.m[1][2], arm.y, at.Q.m[2][2] * arm.z));
     return row[0] - reach;
@@ -76,7 +81,8 @@ struct RodPad {
     return mul_add(e.x, e.x + (x0 + x0), mul_add(e.y, e.y + (y0 + y0), rest));
   }
 
-  /// |D| - r, from |D|² and, in single precision, one Newton step on |D|² - r², which does not cancel (SpherePad).
+  /// |D| - r, from |D|² and, in single precision, one Newton step on |D|² - r², which does not
+  /// cancel (SpherePad).
   N beyond_radius(const N& square, const N& inverse, const N& excess) const {
     const N length = square * inverse, rounded = length - radius;
     if constexpr (P::kSingle) {
@@ -101,7 +107,8 @@ struct CylinderPad : RodPad<P> {
   using Base::Base;
 
   template <class D>
-  static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach, D* row) {
+  static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach,
+                   D* row) {
     const Vec3<D> c = Base::centre(at, t);
     const D square = mul_add(c.x, c.x, c.y * c.y), far = reach + D(s.size[0]);
     row[0] = c.x, row[1] = c.y;
@@ -120,7 +127,8 @@ struct CylinderPad : RodPad<P> {
     const Vec3<N> e = this->offset(s);
     const N x = e.x + this->x0, y = e.y + this->y0, up = above + e.z, down = below - e.z;
     const N square = mul_add(x, x, y * y), inverse = inverse_sqrt(square);
-    const N side = this->beyond_radius(square, inverse, this->surplus(e, rest)), cap = max(up, down);
+    const N side = this->beyond_radius(square, inverse, this->surplus(e, rest)),
+            cap = max(up, down);
     const auto on_side = side >= cap, regular = Base::regular(square);
     d = select(on_side, side, cap);
     const N nx = select(on_side, select(regular, inverse * x, one), zero);
@@ -136,14 +144,16 @@ struct CapsulePad : RodPad<P> {
   using Base = RodPad<P>;
   using N = typename P::N;
   using Offset = typename P::Offset;
-  static constexpr int kRows = 10;  // y_x, y_y, y_z - h, y_z + h, the rests beside the axis, above and below it, u
+  static constexpr int kRows =
+      10;  // y_x, y_y, y_z - h, y_z + h, the rests beside the axis, above and below it, u
 
   N above, below, beside_rest, above_rest, below_rest;
 
   using Base::Base;
 
   template <class D>
-  static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach, D* row) {
+  static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach,
+                   D* row) {
     const D zero(0.0);
     const Vec3<D> c = Base::centre(at, t);
     const D square = mul_add(c.x, c.x, c.y * c.y), far = reach + D(s.size[0]);
@@ -168,8 +178,9 @@ struct CapsulePad : RodPad<P> {
     const N x = e.x + this->x0, y = e.y + this->y0, up = above + e.z, down = below + e.z;
     const N z = max(up, zero) + min(down, zero);  // beyond an end; 0 beside the axis
     const N square = mul_add(x, x, mul_add(y, y, z * z)), inverse = inverse_sqrt(square);
-    const N end = select(up > zero, mul_add(e.z, e.z + (above + above), above_rest),
-                         select(down < zero, mul_add(e.z, e.z + (below + below), below_rest), beside_rest));
+    const N end =
+        select(up > zero, mul_add(e.z, e.z + (above + above), above_rest),
+               select(down < zero, mul_add(e.z, e.z + (below + below), below_rest), beside_rest));
     d = this->beyond_radius(square, inverse, this->surplus(e, end));
     const auto regular = Base::regular(square);
     n = this->Q * Vec3<N>{select(regular, inverse * x, one), select(regular, inverse * y, zero),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a tactile field changes with the motion of the shapes on it, eight points at a time, in double
-// (the δ's of kernels/pair_contact.hpp). What reverse mode is in kernels/tactile_pullback-inl.hpp, forward.
+// How a tactile field changes with the motion of the shapes on it, eight points at a time, in
+// double (the δ's of kernels/pair_contact.hpp). What reverse mode is in
+// kernels/tactile_pullback-inl.hpp, forward.
 #pragma once
 
 #include "kernels/tactile_pullback-inl.hpp"
@@ -9,8 +10,8 @@ namespace tangere::kernels {
 
 /// δf of one touching point for the displacement ε = (θ; ρ) and δW of body 2.
 template <class Shape, class N>
-Vec3<N> force_tangent(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& omega, const Vec6<N>& displacement,
-                      const Vec6<N>& twist) {
+Vec3<N> force_tangent(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& omega,
+                      const Vec6<N>& displacement, const Vec6<N>& twist) {
   const Vec3<N>&n = p.n, &t = p.tangential.direction;
   const Vec3<N> rho = displacement.l + cross(displacement.a, p.x2), turn = cross(displacement.a, n);
   const N d = -dot(n, rho);
@@ -30,7 +31,8 @@ Vec3<N> force_tangent(const LawParameters<N>& law, const PointContact<N>& p, con
 template <class A>
 Vec3<Lanes<A>> field_of_force(const PadTiles& pad, int tile, int k, const Vec3<Lanes<A>>& f) {
   const Vec3<Lanes<A>> turned = {f.x, f.y, -f.z};
-  if (pad.curved()) return in_point_axes<InDouble<A>>(pad.frames + 9 * kTactileTile * tile + k, turned);
+  if (pad.curved())
+    return in_point_axes<InDouble<A>>(pad.frames + 9 * kTactileTile * tile + k, turned);
   return pad.skewed ? in_skewed_axes(pad.axes, turned) : turned;
 }
 
@@ -41,26 +43,31 @@ void add_touch_tangent(const TactileTangent& a, int touch) {
   const PadMotion<N> m = pad_motion<N>(a.touches[touch], a.law);
   const TouchShape& s = a.shapes[touch];
   const TouchTangent& moves = a.tangents[touch];
-  const Vec6<N> displacement = {broadcast<N>(moves.displacement.a), broadcast<N>(moves.displacement.l)};
+  const Vec6<N> displacement = {broadcast<N>(moves.displacement.a),
+                                broadcast<N>(moves.displacement.l)};
   const Vec6<N> twist = {broadcast<N>(moves.twist.a), broadcast<N>(moves.twist.l)};
-  with_distance<N>(s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]}, [&]<class Shape>(const Shape& shape) {
-    for (int i = 0; i < a.count; ++i) {
-      const int tile = a.tiles[i];
-      if (!reaches(shape, m, *a.pad, tile)) continue;
-      for (int k = 0; k < kTactileTile; k += kGroup) {
-        const LawParameters<N> law = law_of_points<A>(*a.pad, tile, k, m.law);
-        const PointContact<N> p = point_contact(shape, law, m.Q, m.c, m.omega, m.v, tile_points<A>(*a.pad, tile, k));
-        const auto touching = p.d < N(0.0);
-        if (!any(touching)) continue;
-        const Vec3<N> f = select(touching, N(1.0), N(0.0)) * force_tangent<Shape>(law, p, m.omega, displacement, twist);
-        const Vec3<N> field = field_of_force<A>(*a.pad, tile, k, f);
-        double* to = a.change + 3 * kTactileTile * i + k;
-        store_anywhere(load_anywhere<A>(to) + field.x, to);
-        store_anywhere(load_anywhere<A>(to + kTactileTile) + field.y, to + kTactileTile);
-        store_anywhere(load_anywhere<A>(to + 2 * kTactileTile) + field.z, to + 2 * kTactileTile);
-      }
-    }
-  });
+  with_distance<N>(
+      s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]}, [&]<class Shape>(const Shape& shape) {
+        for (int i = 0; i < a.count; ++i) {
+          const int tile = a.tiles[i];
+          if (!reaches(shape, m, *a.pad, tile)) continue;
+          for (int k = 0; k < kTactileTile; k += kGroup) {
+            const LawParameters<N> law = law_of_points<A>(*a.pad, tile, k, m.law);
+            const PointContact<N> p =
+                point_contact(shape, law, m.Q, m.c, m.omega, m.v, tile_points<A>(*a.pad, tile, k));
+            const auto touching = p.d < N(0.0);
+            if (!any(touching)) continue;
+            const Vec3<N> f = select(touching, N(1.0), N(0.0)) *
+                              force_tangent<Shape>(law, p, m.omega, displacement, twist);
+            const Vec3<N> field = field_of_force<A>(*a.pad, tile, k, f);
+            double* to = a.change + 3 * kTactileTile * i + k;
+            store_anywhere(load_anywhere<A>(to) + field.x, to);
+            store_anywhere(load_anywhere<A>(to + kTactileTile) + field.y, to + kTactileTile);
+            store_anywhere(load_anywhere<A>(to + 2 * kTactileTile) + field.z,
+                           to + 2 * kTactileTile);
+          }
+        }
+      });
 }
 
 template <class A>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two vectors side by side as one number: the force on a point is a chain of some 150 cycles, and what a processor keeps
-// waiting is a hundred operations. Two independent chains in a row are half as long.
+// Two vectors side by side as one number: the force on a point is a chain of some 150 cycles, and
+// what a processor keeps waiting is a hundred operations. Two independent chains in a row are half
+// as long.
 #pragma once
 
 #include "kernels/tactile_point.hpp"
@@ -11,7 +12,8 @@ template <class N>
 struct Twice {
   N a, b;
   Twice() = default;
-  Twice(double x) : a(x), b(x) {}  // NOLINT(google-explicit-constructor): constants read like numbers
+  Twice(double x)
+      : a(x), b(x) {}  // NOLINT(google-explicit-constructor): constants read like numbers
   Twice(const N& first, const N& second) : a(first), b(second) {}
 };
 template <class M>
@@ -19,10 +21,10 @@ struct TwiceMask {
   M a, b;
 };
 
-#define TANGERE_TWICE(name)                                        \
-  template <class N>                                               \
-  inline Twice<N> name(const Twice<N>& x, const Twice<N>& y) {     \
-    return {name(x.a, y.a), name(x.b, y.b)};                       \
+#define TANGERE_TWICE(name)                                    \
+  template <class N>                                           \
+  inline Twice<N> name(const Twice<N>& x, const Twice<N>& y) { \
+    return {name(x.a, y.a), name(x.b, y.b)};                   \
   }
 TANGERE_TWICE(operator+)
 TANGERE_TWICE(operator-)
@@ -31,10 +33,10 @@ TANGERE_TWICE(min)
 TANGERE_TWICE(max)
 #undef TANGERE_TWICE
 
-#define TANGERE_TWICE_COMPARE(op)                                  \
-  template <class N>                                               \
-  inline auto operator op(const Twice<N>& x, const Twice<N>& y) {  \
-    return TwiceMask<decltype(x.a op y.a)>{x.a op y.a, x.b op y.b};\
+#define TANGERE_TWICE_COMPARE(op)                                   \
+  template <class N>                                                \
+  inline auto operator op(const Twice<N>& x, const Twice<N>& y) {   \
+    return TwiceMask<decltype(x.a op y.a)>{x.a op y.a, x.b op y.b}; \
   }
 TANGERE_TWICE_COMPARE(<)
 TANGERE_TWICE_COMPARE(>)

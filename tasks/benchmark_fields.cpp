@@ -39,13 +39,16 @@ std::uint64_t chain_field(std::uint64_t checksum, const CompactFrame<T>& frame) 
 template <class T>
 double bytes_of(const SensorInfo& sensor, FrameKind kind) {
   if (kind == FrameKind::dense) return 3.0 * sensor.points * sizeof(T);
-  const double tiles = double((sensor.rows + kTileSide - 1) / kTileSide) * ((sensor.cols + kTileSide - 1) / kTileSide);
-  return kind == FrameKind::none ? 0 : tiles * (3.0 * kTileSide * kTileSide * sizeof(T) + sizeof(int));
+  const double tiles = double((sensor.rows + kTileSide - 1) / kTileSide) *
+                       ((sensor.cols + kTileSide - 1) / kTileSide);
+  return kind == FrameKind::none ? 0
+                                 : tiles * (3.0 * kTileSide * kTileSide * sizeof(T) + sizeof(int));
 }
 
 }  // namespace
 
-BenchmarkFields::BenchmarkFields(const Model& model, int environments, FrameKind kind, Precision precision) {
+BenchmarkFields::BenchmarkFields(const Model& model, int environments, FrameKind kind,
+                                 Precision precision) {
   const bool wide = precision == Precision::f64;
   if (kind == FrameKind::dense && wide) frames_ = make<DenseFrame<double>>(model, environments);
   if (kind == FrameKind::dense && !wide) frames_ = make<DenseFrame<float>>(model, environments);
@@ -59,7 +62,9 @@ void BenchmarkFields::read(Readout& readout, const Batch& batch, int block, int 
         if constexpr (!std::is_same_v<std::decay_t<decltype(store)>, std::monostate>) {
           auto& frames = store[size(sensor)];
           const std::size_t first = size(block * kBlock);
-          readout.read_block(batch, block, std::span(frames).subspan(first, std::min(frames.size() - first, size(kBlock))));
+          readout.read_block(
+              batch, block,
+              std::span(frames).subspan(first, std::min(frames.size() - first, size(kBlock))));
         }
       },
       frames_);
@@ -80,7 +85,8 @@ std::uint64_t BenchmarkFields::chain(std::uint64_t checksum, int environment, in
 double field_bytes(const Model& model, FrameKind kind, Precision precision) {
   double bytes = 0;
   for (const SensorInfo& sensor : model.sensors())
-    bytes += precision == Precision::f64 ? bytes_of<double>(sensor, kind) : bytes_of<float>(sensor, kind);
+    bytes += precision == Precision::f64 ? bytes_of<double>(sensor, kind)
+                                         : bytes_of<float>(sensor, kind);
   return bytes;
 }
 

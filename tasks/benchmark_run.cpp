@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A thread takes a block and steps it through the whole episode: its state stays in that thread's cache, and no thread
-// waits for another between steps.
+// A thread takes a block and steps it through the whole episode: its state stays in that thread's
+// cache, and no thread waits for another between steps.
 #include "tasks/benchmark_run.hpp"
 
 #include <tbb/blocked_range.h>
@@ -76,7 +76,8 @@ class Episode {
         cap_(tbb::global_control::max_allowed_parallelism, lanes(options.threads)),
         arena_(options.threads) {
     workers_.reserve(lanes(options.threads));
-    for (int i = 0; i < options.threads; ++i) workers_.emplace_back(start.model(), options.precision);
+    for (int i = 0; i < options.threads; ++i)
+      workers_.emplace_back(start.model(), options.precision);
     if (workers_[0].stepper.timestep() != controls.timestep())
       throw InputError("controls laid out for a timestep of " +
                        std::to_string(controls.timestep()) + " s; the scene's is " +
@@ -96,10 +97,10 @@ class Episode {
     };
     order_.begin();
     arena_.execute([&] {
-      // One block at a time to whoever is free: some blocks need more iterations than others, and the machine may have
-      // other work on some cores.
-      tbb::parallel_for(tbb::blocked_range<int>(0, batch_.blocks(), 1), ByReference<decltype(run_blocks)>{&run_blocks},
-                        tbb::simple_partitioner{});
+      // One block at a time to whoever is free: some blocks need more iterations than others, and
+      // the machine may have other work on some cores.
+      tbb::parallel_for(tbb::blocked_range<int>(0, batch_.blocks(), 1),
+                        ByReference<decltype(run_blocks)>{&run_blocks}, tbb::simple_partitioner{});
     });
     order_.end();
     const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - begin;
@@ -194,7 +195,7 @@ class Episode {
   const ControlProgram& controls_;
   const BenchmarkOptions& options_;
   const BenchmarkGoOn& go_on_;
-  std::vector<double> u_;             // (E, nu)
+  std::vector<double> u_;  // (E, nu)
   BenchmarkFields fields_;
   std::vector<BlockTally> tallies_;
   std::vector<std::uint64_t> checksums_;
@@ -282,7 +283,8 @@ BenchmarkResult run_benchmark(const Batch& start, const ControlProgram& controls
 double benchmark_bytes(const Model& model, int environments, const BenchmarkOptions& options) {
   const double per_environment = static_cast<double>(model.state_bytes_per_environment()) +
                                  field_bytes(model, options.frames, options.precision) +
-                                 model.nu() * static_cast<double>(sizeof(double)) + sizeof(std::uint64_t);
+                                 model.nu() * static_cast<double>(sizeof(double)) +
+                                 sizeof(std::uint64_t);
   const double per_thread = static_cast<double>(model.workspace_bytes());
   return environments * per_environment + options.threads * per_thread;
 }

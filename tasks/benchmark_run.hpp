@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whole episodes for the clock: scene's controls in, every tactile field read, nothing written. Blocks of environments are
-// spread over threads and never wait for each other.
+// Whole episodes for the clock: scene's controls in, every tactile field read, nothing written.
+// Blocks of environments are spread over threads and never wait for each other.
 #pragma once
 
 #include <cstdint>
@@ -38,14 +38,15 @@ struct BenchmarkTime {
 };
 
 struct BenchmarkResult {
-  std::vector<BenchmarkTime> times;         ///< one per timed pass, in their order
-  std::int64_t environment_steps = 0;       ///< tried in one pass, failing ones included
-  std::int64_t simulation_steps = 0;        ///< the same of a scene; of a task those of its actions, resets included
+  std::vector<BenchmarkTime> times;    ///< one per timed pass, in their order
+  std::int64_t environment_steps = 0;  ///< tried in one pass, failing ones included
+  std::int64_t simulation_steps =
+      0;  ///< the same of a scene; of a task those of its actions, resets included
   std::int64_t newton_iterations = 0;       ///< of one pass, over simulation_steps
   std::int64_t tactile_points = 0;          ///< read in one pass
   std::vector<FailedEnvironment> failures;  ///< in the order of their steps
-  /// One per environment: chains the bits of every field in the order of time, then of the final state. Depends on the
-  /// environment's episode, not on threads, blocks or the size of the batch.
+  /// One per environment: chains the bits of every field in the order of time, then of the final
+  /// state. Depends on the environment's episode, not on threads, blocks or the size of the batch.
   std::vector<std::uint64_t> checksums;
   bool stopped = false;  ///< `go_on` returned false; the times are of complete passes only
 
@@ -57,18 +58,19 @@ struct BenchmarkResult {
   [[nodiscard]] BenchmarkTime median() const;
 };
 
-/// Continues a checksum with the bits of numbers: +0 and -0 differ. The checksum of an environment begins with the number
-/// of its episode.
+/// Continues a checksum with the bits of numbers: +0 and -0 differ. The checksum of an environment
+/// begins with the number of its episode.
 std::uint64_t chain_bits(std::uint64_t checksum, std::span<const double> numbers);
 std::uint64_t chain_bits(std::uint64_t checksum, std::span<const float> numbers);
 
 /// Asked before each step of each block, from any thread; false stops the run there.
 using BenchmarkGoOn = std::function<bool()>;
 
-/// Runs the episode that begins with `start` once for checksums, which also warms caches, pages and threads, then
-/// `repeat` times against the clock with nothing but controls, steps and readings between start and stop. An environment
-/// that fails is not read again. Throws InputError for threads or repeat < 1 and for what a rollout refuses: steps < 1,
-/// every < 0, controls that are too short or laid out for another timestep than the scene's.
+/// Runs the episode that begins with `start` once for checksums, which also warms caches, pages and
+/// threads, then `repeat` times against the clock with nothing but controls, steps and readings
+/// between start and stop. An environment that fails is not read again. Throws InputError for
+/// threads or repeat < 1 and for what a rollout refuses: steps < 1, every < 0, controls that are
+/// too short or laid out for another timestep than the scene's.
 BenchmarkResult run_benchmark(const Batch& start, const ControlProgram& controls,
                               const BenchmarkOptions& options, const BenchmarkGoOn& go_on = {});
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An action of a block, in order: start or take actions, K steps with looks in between, then rewards and observations.
+// An action of a block, in order: start or take actions, K steps with looks in between, then
+// rewards and observations.
 #include "tasks/block_worker.hpp"
 
 #include <algorithm>
@@ -38,7 +39,8 @@ EnvironmentData::EnvironmentData(const Task& task, int environments) {
   q.resize(e * size(model.nq()));
   v.resize(e * size(model.nv()));
   for (std::vector<double>* numbers : {&reward, &returns}) numbers->resize(e);
-  for (std::vector<std::uint8_t>* flags : {&terminated, &truncated, &success, &starting}) flags->resize(e);
+  for (std::vector<std::uint8_t>* flags : {&terminated, &truncated, &success, &starting})
+    flags->resize(e);
   length.resize(e);
   episodes.resize(e);
   next_episode.resize(e);
@@ -50,14 +52,15 @@ EnvironmentData::EnvironmentData(const Task& task, int environments) {
 double EnvironmentData::bytes(const Task& task) {
   const TaskSpec& spec = task.spec();
   const Model& model = task.model();
-  const std::size_t numbers = size(spec.memory) + spec.action.size() + spec.observation_size() + size(model.nu()) +
-                              size(model.nq()) + size(model.nv()) + 5;
+  const std::size_t numbers = size(spec.memory) + spec.action.size() + spec.observation_size() +
+                              size(model.nu()) + size(model.nq()) + size(model.nv()) + 5;
   return static_cast<double>(numbers * sizeof(double) + 5 + sizeof(Moment));
 }
 
 TaskView view_of(const Batch& batch, const EnvironmentData& data, int environment) {
   const std::size_t e = size(environment), environments = data.reward.size();
-  const std::size_t memory = data.memory.size() / environments, action = data.action.size() / environments;
+  const std::size_t memory = data.memory.size() / environments,
+                    action = data.action.size() / environments;
   return {batch.seed(),
           data.episodes[e],
           data.length[e],
@@ -79,7 +82,8 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
   tactile_.resize(moments * kBlock * task.tactile_size());
   for (int lane = 0; lane < kBlock; ++lane)
     for (std::size_t m = 0; m < moments; ++m)
-      moments_.push_back({part(q_, m, lane), part(v_, m, lane), part(variables_, m, lane), part(tactile_, m, lane)});
+      moments_.push_back({part(q_, m, lane), part(v_, m, lane), part(variables_, m, lane),
+                          part(tactile_, m, lane)});
   if (spec.settling_steps == 0) return;
   StepperOptions options;
   options.timestep = spec.settling_timestep;
@@ -87,19 +91,20 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
 }
 
 double BlockWorker::bytes(const Task& task) {
-  const std::size_t numbers = size(task.model().nq()) + size(task.model().nv()) + task.variables_size() +
-                              task.tactile_size();
+  const std::size_t numbers = size(task.model().nq()) + size(task.model().nv()) +
+                              task.variables_size() + task.tactile_size();
   return static_cast<double>(task.spec().moments.size() * kBlock * numbers * sizeof(double)) +
          static_cast<double>(task.model().workspace_bytes());
 }
 
-std::span<double> BlockWorker::part(std::vector<double>& of_moments, std::size_t moment, int lane) const {
+std::span<double> BlockWorker::part(std::vector<double>& of_moments, std::size_t moment,
+                                    int lane) const {
   const std::size_t width = of_moments.size() / (task_.spec().moments.size() * kBlock);
   return std::span(of_moments).subspan((moment * kBlock + size(lane)) * width, width);
 }
 
-void BlockWorker::act(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions,
-                      VectorCounts& counts) {
+void BlockWorker::act(Batch& batch, EnvironmentData& data, int block,
+                      std::span<const double> actions, VectorCounts& counts) {
   begin(batch, data, block, actions);
   for (int k = 0; k < task_.spec().steps_per_action; ++k) {
     ask_for_controls(batch, data, block, k);
@@ -109,7 +114,8 @@ void BlockWorker::act(Batch& batch, EnvironmentData& data, int block, std::span<
   conclude(batch, data, block, counts);
 }
 
-void BlockWorker::begin(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions) {
+void BlockWorker::begin(Batch& batch, EnvironmentData& data, int block,
+                        std::span<const double> actions) {
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
   for (int e = first; e < last; ++e) {
     data.starting[size(e)] = data.state[size(e)] == EnvironmentState::to_start ? 1 : 0;
@@ -121,7 +127,8 @@ void BlockWorker::begin(Batch& batch, EnvironmentData& data, int block, std::spa
   }
 }
 
-void BlockWorker::ask_for_controls(const Batch& batch, EnvironmentData& data, int block, int step) const {
+void BlockWorker::ask_for_controls(const Batch& batch, EnvironmentData& data, int block,
+                                   int step) const {
   if (step % task_.spec().control_every != 0) return;
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
   for (int e = first; e < last; ++e)
@@ -142,7 +149,9 @@ void BlockWorker::look_after(const Batch& batch, int block, int step, VectorCoun
   if (*moment == step + 1) look(batch, block, size(static_cast<int>(moment - moments.begin())));
 }
 
-void BlockWorker::look_at_start(const Batch& batch, int block) { look(batch, block, task_.spec().moments.size() - 1); }
+void BlockWorker::look_at_start(const Batch& batch, int block) {
+  look(batch, block, task_.spec().moments.size() - 1);
+}
 
 void BlockWorker::conclude(Batch& batch, EnvironmentData& data, int block, VectorCounts& counts) {
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
@@ -201,7 +210,8 @@ void BlockWorker::settle(const Batch& batch, EnvironmentData& data, int environm
   settling_->get_v(0, row(data.v, environment, now.v.size()));
 }
 
-void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environment, std::span<const double> actions) {
+void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environment,
+                              std::span<const double> actions) {
   const TensorSpec& spec = task_.spec().action;
   const std::span<double> action = row(data.action, environment, spec.size());
   for (std::size_t k = 0; k < action.size(); ++k) {
@@ -209,7 +219,8 @@ void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environme
     // clamp() lets NaN pass: the controls are NaN then, and the step says so.
     action[k] = std::clamp(asked, spec.low, spec.high);
   }
-  task_.begin_action(view_of(batch, data, environment), row(data.memory, environment, size(task_.spec().memory)));
+  task_.begin_action(view_of(batch, data, environment),
+                     row(data.memory, environment, size(task_.spec().memory)));
   if (!task_.spec().restarts) return;
   const std::span<double> q = row(data.q, environment, size(task_.model().nq()));
   const std::span<double> v = row(data.v, environment, size(task_.model().nv()));
@@ -226,7 +237,8 @@ void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
     batch.get_v(first + lane, part(v_, moment, lane));
   }
   if (task_.variables_size() > 0) {
-    for (int lane = 0; lane < environments; ++lane) parts[size(lane)] = part(variables_, moment, lane);
+    for (int lane = 0; lane < environments; ++lane)
+      parts[size(lane)] = part(variables_, moment, lane);
     readout_.read_variables(batch, block, parts);
   }
   if (!spec.looks_at_tactile) return;
@@ -235,12 +247,14 @@ void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
     const std::size_t numbers = 3 * size(task_.model().sensors()[s].points);
     for (int lane = 0; lane < environments; ++lane)
       parts[size(lane)] = part(tactile_, moment, lane).subspan(offset, numbers);
-    readout_.read_block(batch, block, static_cast<int>(s), std::span<const std::span<double>>(parts));
+    readout_.read_block(batch, block, static_cast<int>(s),
+                        std::span<const std::span<double>>(parts));
     offset += numbers;
   }
 }
 
-void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environment, VectorCounts& counts) {
+void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environment,
+                               VectorCounts& counts) {
   const TaskSpec& spec = task_.spec();
   const std::size_t e = size(environment);
   data.reward[e] = 0;

@@ -18,7 +18,8 @@ enum class EnvironmentState : std::uint8_t {
   over,
 };
 
-/// What a VectorTask knows of its environments besides their states, (E, width) each. A block's part is one thread's.
+/// What a VectorTask knows of its environments besides their states, (E, width) each. A block's
+/// part is one thread's.
 struct EnvironmentData {
   EnvironmentData(const Task& task, int environments);
   static double bytes(const Task& task);  ///< of one environment
@@ -36,9 +37,11 @@ class BlockWorker {
   BlockWorker(const Task& task, Precision precision);
 
   /// `actions`: (E, action), empty where every environment of the block starts.
-  void act(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions, VectorCounts& counts);
+  void act(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions,
+           VectorCounts& counts);
 
-  // The parts of act(), for whoever steps the batch himself: begin, for every step k ask, step, look, then conclude.
+  // The parts of act(), for whoever steps the batch himself: begin, for every step k ask, step,
+  // look, then conclude.
   void begin(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions);
   /// Controls for the step k into data.u.
   void ask_for_controls(const Batch& batch, EnvironmentData& data, int block, int step) const;
@@ -54,19 +57,21 @@ class BlockWorker {
  private:
   void start(Batch& batch, EnvironmentData& data, int environment);
   void settle(const Batch& batch, EnvironmentData& data, int environment);
-  void take_action(Batch& batch, EnvironmentData& data, int environment, std::span<const double> actions);
+  void take_action(Batch& batch, EnvironmentData& data, int environment,
+                   std::span<const double> actions);
   void look(const Batch& batch, int block, std::size_t moment);
   void conclude_one(Batch& batch, EnvironmentData& data, int environment, VectorCounts& counts);
-  [[nodiscard]] std::span<double> part(std::vector<double>& of_moments, std::size_t moment, int lane) const;
+  [[nodiscard]] std::span<double> part(std::vector<double>& of_moments, std::size_t moment,
+                                       int lane) const;
 
   const Task& task_;
   Stepper stepper_;
   Readout readout_;
   std::optional<Stepper> settling_stepper_;
-  std::optional<Batch> settling_;       // one environment
-  std::vector<double> varying_;         // of the environment that starts
+  std::optional<Batch> settling_;                    // one environment
+  std::vector<double> varying_;                      // of the environment that starts
   std::vector<double> q_, v_, variables_, tactile_;  // (moments, 16, width)
-  std::vector<Moment> moments_;         // (16, moments): views of them
+  std::vector<Moment> moments_;                      // (16, moments): views of them
 };
 
 /// What a task may look at of an environment between two actions.

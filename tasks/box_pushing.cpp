@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Box pushing: a finger pushes a box to a pose while somebody else pushes it too (Xu et al., third experiment).
+// Box pushing: a finger pushes a box to a pose while somebody else pushes it too (Xu et al., third
+// experiment).
 //   reward = -0.01 |Δp/10 mm|² - 0.1 (Δθ/5°)² - |x_tip - x_face|²/(20 mm)² - 0.1 |u|²
-// Δp, Δθ: box to goal; x_tip, x_face: middle of the pad and of the face that it pushes, horizontal; u: the action, whose
-// tanh drives the motors.
+// Δp, Δθ: box to goal; x_tip, x_face: middle of the pad and of the face that it pushes, horizontal;
+// u: the action, whose tanh drives the motors.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -38,7 +39,8 @@ class BoxPushing : public Task {
         box_(coordinate("box_slide")),
         box_turn_(coordinate("box_turn")),
         script_(model().scene()) {
-    if (model().variables().size() != 2 || model().variables()[0].name != "tip" || model().variables()[1].name != "face")
+    if (model().variables().size() != 2 || model().variables()[0].name != "tip" ||
+        model().variables()[1].name != "face")
       throw InputError(model().scene().path + ": box pushing needs the end effectors tip and face");
   }
 
@@ -74,18 +76,21 @@ class BoxPushing : public Task {
     const Moment& now = view.now();
     in_hand(now, {view.memory[kGoal], view.memory[kGoal + 1], view.memory[kGoal + 2]}, o.first(3));
     if (observation_ == PushObservation::privileged) in_hand(now, box_pose(now), o.subspan(3));
-    if (observation_ == PushObservation::tactile) std::copy(now.tactile.begin(), now.tactile.end(), o.begin() + 3);
+    if (observation_ == PushObservation::tactile)
+      std::copy(now.tactile.begin(), now.tactile.end(), o.begin() + 3);
   }
 
   Verdict judge(const TaskView& view) const override {
     const std::array<double, 3> off = to_goal(view);
     const Moment& now = view.now();
     double gap = 0, effort = 0;
-    for (std::size_t k = 0; k < 2; ++k) gap += square(now.variables[kTip + k] - now.variables[kFace + k]);
+    for (std::size_t k = 0; k < 2; ++k)
+      gap += square(now.variables[kTip + k] - now.variables[kFace + k]);
     for (const double u : view.action) effort += u * u;
     const double distance = square(off[0]) + square(off[1]);
-    const double reward = -kPosition * distance / square(kLengthUnit) - kAngle * square(off[2] / kAngleUnit) -
-                          gap / square(kGap) - kEffort * effort;
+    const double reward = -kPosition * distance / square(kLengthUnit) -
+                          kAngle * square(off[2] / kAngleUnit) - gap / square(kGap) -
+                          kEffort * effort;
     const bool there = distance < square(kNear) && std::abs(off[2]) < kAligned;
     return {reward, false, view.actions == kActions && there};
   }
@@ -99,7 +104,8 @@ class BoxPushing : public Task {
       const double by_place = weight * 2 * kPosition * off[k] / square(kLengthUnit);
       to.q[box_ + k] -= by_place;
       out.memory[kGoal + k] += by_place;
-      const double gap = weight * 2 * (now.variables[kTip + k] - now.variables[kFace + k]) / square(kGap);
+      const double gap =
+          weight * 2 * (now.variables[kTip + k] - now.variables[kFace + k]) / square(kGap);
       to.variables[kTip + k] -= gap;
       to.variables[kFace + k] += gap;
     }
@@ -109,18 +115,22 @@ class BoxPushing : public Task {
     for (std::size_t k = 0; k < 3; ++k) out.action[k] -= weight * 2 * kEffort * view.action[k];
   }
 
-  void controls_vjp(const TaskView& view, int, std::span<const double> weight, const ViewCotangent& out) const override {
-    for (std::size_t k = 0; k < 3; ++k) out.action[k] += weight[k] * (1 - square(std::tanh(view.action[k])));
+  void controls_vjp(const TaskView& view, int, std::span<const double> weight,
+                    const ViewCotangent& out) const override {
+    for (std::size_t k = 0; k < 3; ++k)
+      out.action[k] += weight[k] * (1 - square(std::tanh(view.action[k])));
     for (std::size_t k = 0; k < 2; ++k) out.memory[kPush + k] += weight[3 + k];
   }
 
-  void begin_action_vjp(const TaskView& view, std::span<double> memory, const ViewCotangent&) const override {
+  void begin_action_vjp(const TaskView& view, std::span<double> memory,
+                        const ViewCotangent&) const override {
     if (view.actions % kPushActions != 0) return;
     memory[kPush] = memory[kPush + 1] = 0;  // drawn
   }
 
   /// Feedback of the state, whatever is observed.
-  void scripted(const TaskView& view, std::span<const double>, std::span<double> action) const override {
+  void scripted(const TaskView& view, std::span<const double>,
+                std::span<double> action) const override {
     const Moment& now = view.now();
     const std::array<double, 3> box = box_pose(now);
     const PushState state = {now.q[turn_],
@@ -136,7 +146,8 @@ class BoxPushing : public Task {
 
   /// x, y [m] and yaw [rad] in the world.
   [[nodiscard]] std::array<double, 3> box_pose(const Moment& now) const {
-    return {script_.box_rest()[0] + now.q[box_], script_.box_rest()[1] + now.q[box_ + 1], now.q[box_turn_]};
+    return {script_.box_rest()[0] + now.q[box_], script_.box_rest()[1] + now.q[box_ + 1],
+            now.q[box_turn_]};
   }
   /// The box from its goal.
   [[nodiscard]] std::array<double, 3> to_goal(const TaskView& view) const {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How to push a box to a pose when everything is known: the velocity that the box should have, the hand's that gives it,
-// and the forces for that.
+// How to push a box to a pose when everything is known: the velocity that the box should have, the
+// hand's that gives it, and the forces for that.
 #pragma once
 
 #include <array>
@@ -23,7 +23,9 @@ class PushScript {
 
   /// Of the hand's motors: x, y, turn; beyond ±1 where they are too weak.
   [[nodiscard]] std::array<double, 3> controls(const PushState& state) const;
-  [[nodiscard]] const std::array<double, 2>& box_rest() const { return box_rest_; }  ///< where q = 0 is [m]
+  [[nodiscard]] const std::array<double, 2>& box_rest() const {
+    return box_rest_;
+  }  ///< where q = 0 is [m]
 
  private:
   std::array<double, 2> base_{}, tip_{}, face_{}, box_rest_{};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cap opening: three fingers turn a cap, whose damping, radius and place nobody tells, by an eighth of a turn (Xu et al., fourth
-// experiment).
+// Cap opening: three fingers turn a cap, whose damping, radius and place nobody tells, by an eighth
+// of a turn (Xu et al., fourth experiment).
 //   reward = -0.5 for each finger that does not touch - min(θ - π/4, 0)² - 0.005 |a|²,
 //   and 50 with the end if θ > π/4, or -50 with the end if a fingertip is above 50 mm
 // θ: angle of the cap. a: the action; each angle's target is the angle plus 0.06 rad times a.
@@ -29,12 +29,14 @@ constexpr FingerAngles kStart{0, -0.5, 0.8};               // [rad]
 constexpr double kSpread = 0.05;                           // of the start [rad]
 constexpr double kSmallest = 0.02, kLargest = 0.08;        // radius of the cap [m]
 constexpr double kOffset = 0.02;                           // of its axis, along x and y [m]
-constexpr double kLeast = 1e-3;                            // a tip starts so far from the cap, or farther [m]
+constexpr double kLeast = 1e-3;  // a tip starts so far from the cap, or farther [m]
 
-/// The scene with the cap's damping, radius and place as what varies, in this order; how an episode starts is up to the task.
+/// The scene with the cap's damping, radius and place as what varies, in this order; how an episode
+/// starts is up to the task.
 Scene with_cap_varying(Scene scene) {
-  std::erase_if(scene.randomizations,
-                [](const RandomizationDescription& d) { return d.target != RandomTarget::joint_effect; });
+  std::erase_if(scene.randomizations, [](const RandomizationDescription& d) {
+    return d.target != RandomTarget::joint_effect;
+  });
   const auto vary = [&](RandomTarget target, int index, double low, double high) {
     RandomizationDescription d;
     d.target = target;
@@ -58,14 +60,18 @@ class CapOpening : public Task {
         finger_(coordinate("swing_1")),
         script_(model().scene()) {
     const Scene& s = model().scene();
-    if (model().variables().size() != kFingers || s.sensors.size() != kFingers || s.motors.size() != kAngles)
-      throw InputError(s.path + ": cap opening needs nine motors, three end effectors and three tactile sensors");
+    if (model().variables().size() != kFingers || s.sensors.size() != kFingers ||
+        s.motors.size() != kAngles)
+      throw InputError(
+          s.path +
+          ": cap opening needs nine motors, three end effectors and three tactile sensors");
     for (const TactileDescription& tip : s.sensors) draw(tip, s.path);
     if (script_.gap(kStart, {kLargest, kOffset, kOffset}) < kLeast)
       throw InputError(s.path + ": the fingers of cap opening would start in the cap");
     for (std::size_t k = 0; k < kAngles; ++k)
       for (const LinkDescription& link : s.links)
-        if (link.joint.name == s.motors[k].joint) limits_[k] = link.joint.limits.value_or(limits_[k]);
+        if (link.joint.name == s.motors[k].joint)
+          limits_[k] = link.joint.limits.value_or(limits_[k]);
   }
 
   /// Every angle is off by chance; a finger that would begin in the cap is drawn again.
@@ -78,7 +84,8 @@ class CapOpening : public Task {
         for (std::size_t k = 0; k < q.size(); ++k)
           q[k] = kStart[k] + task_normal(s.seed, s.episode, 0, drawn++, kSpread);
       } while (script_.gap(q, cap(s.memory, f)) < kLeast);
-      std::copy(q.begin(), q.end(), s.q.begin() + static_cast<std::ptrdiff_t>(finger_ + f * q.size()));
+      std::copy(q.begin(), q.end(),
+                s.q.begin() + static_cast<std::ptrdiff_t>(finger_ + f * q.size()));
     }
   }
 
@@ -87,12 +94,14 @@ class CapOpening : public Task {
     for (std::size_t f = 0; f < kFingers; ++f)
       memory[f] = script_.presses(angles(view, f), cap(memory, f), memory[f] != 0) ? 1 : 0;
   }
-  void begin_action_vjp(const TaskView&, std::span<double> memory, const ViewCotangent&) const override {
+  void begin_action_vjp(const TaskView&, std::span<double> memory,
+                        const ViewCotangent&) const override {
     std::fill_n(memory.begin(), kFingers, 0.0);  // yes or no
   }
 
   void controls(const TaskView& view, int, std::span<double> u) const override {
-    for (std::size_t k = 0; k < kAngles; ++k) u[k] = std::clamp(target(view, k), limits_[k][0], limits_[k][1]);
+    for (std::size_t k = 0; k < kAngles; ++k)
+      u[k] = std::clamp(target(view, k), limits_[k][0], limits_[k][1]);
   }
 
   void observe(const TaskView& view, std::span<double> o) const override {
@@ -120,7 +129,8 @@ class CapOpening : public Task {
   void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
     // Every joint here turns about one axis: coordinates and dofs have the same places.
     out.moments.back().q[cap_] -= weight * 2 * std::min(view.now().q[cap_] - kOpen, 0.0);
-    for (std::size_t k = 0; k < kAngles; ++k) out.action[k] -= weight * 2 * kEffort * view.action[k];
+    for (std::size_t k = 0; k < kAngles; ++k)
+      out.action[k] -= weight * 2 * kEffort * view.action[k];
   }
 
   void controls_vjp(const TaskView& view, int, std::span<const double> weight,
@@ -134,9 +144,11 @@ class CapOpening : public Task {
   }
 
   /// Feedback of the state, whatever is observed.
-  void scripted(const TaskView& view, std::span<const double>, std::span<double> action) const override {
+  void scripted(const TaskView& view, std::span<const double>,
+                std::span<double> action) const override {
     for (std::size_t f = 0; f < kFingers; ++f) {
-      const FingerAngles q = angles(view, f), to = script_.targets(q, cap(view.memory, f), view.memory[f] != 0);
+      const FingerAngles q = angles(view, f),
+                         to = script_.targets(q, cap(view.memory, f), view.memory[f] != 0);
       for (std::size_t k = 0; k < q.size(); ++k)
         action[f * q.size() + k] = std::clamp((to[k] - q[k]) / kStep, -1.0, 1.0);
     }
@@ -154,12 +166,15 @@ class CapOpening : public Task {
              std::find(pixel_.begin(), pixel_.end() - 1, pixel_.back()) == pixel_.end() - 1;
     }
     if (!fits)
-      throw InputError(fmt::format("{}: tactile sensor '{}'; cap opening needs {} points, each with a pixel of its own of {} × {}",
-                                   path, tip.name, kPoints, kSide, kSide));
+      throw InputError(
+          fmt::format("{}: tactile sensor '{}'; cap opening needs {} points, each with a pixel of "
+                      "its own of {} × {}",
+                      path, tip.name, kPoints, kSide, kSide));
   }
   /// The cap as a finger sees it: the fingers stand a third of a turn apart.
   static CapSeen cap(std::span<const double> memory, std::size_t finger) {
-    const double turn = 2 * std::numbers::pi / kFingers * static_cast<double>(finger), c = std::cos(turn), s = std::sin(turn);
+    const double turn = 2 * std::numbers::pi / kFingers * static_cast<double>(finger),
+                 c = std::cos(turn), s = std::sin(turn);
     const double x = memory[kFingers + 1], y = memory[kFingers + 2];
     return {memory[kFingers], c * x + s * y, c * y - s * x};
   }
@@ -198,10 +213,13 @@ class CapOpening : public Task {
 TaskSpec declare_cap_opening(CapObservation observation) {
   TaskSpec spec;
   spec.name = "cap_opening";
-  spec.summary = "Three fingers turn a cap by 45 degrees; angles, fingertips and what they feel, as images, are observed.";
+  spec.summary =
+      "Three fingers turn a cap by 45 degrees; angles, fingertips and what they feel, as images, "
+      "are observed.";
   spec.scene = "cap_opening.xml";
   spec.success = "the cap is turned by more than 45 degrees";
-  spec.action = {"step", {kAngles}, "1", "of every angle's target from the angle, times 0.06 rad", -1, 1};
+  spec.action = {"step", {kAngles}, "1", "of every angle's target from the angle, times 0.06 rad",
+                 -1,     1};
   spec.observations = {{"angles", {kAngles}, "rad", "swing, upper and lower of each finger"},
                        {"tips", {kFingers, 3}, "m", "middles of the fingertips' spheres"}};
   spec.steps_per_action = 5;
@@ -211,8 +229,11 @@ TaskSpec declare_cap_opening(CapObservation observation) {
   spec.looks_at_variables = true;
   spec.looks_at_tactile = true;  // the reward asks which fingers touch
   if (observation == CapObservation::tactile) {
-    spec.observations.push_back({"tactile", {kFingers, kSide, kSide, 3}, "N",
-                                 "fields of the tips: rows up, columns to the left, zero where no point is"});
+    spec.observations.push_back(
+        {"tactile",
+         {kFingers, kSide, kSide, 3},
+         "N",
+         "fields of the tips: rows up, columns to the left, zero where no point is"});
   } else {
     spec.name = "cap_opening_blind";
     spec.summary = "The same; angles and fingertips alone are observed.";

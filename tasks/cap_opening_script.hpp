@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a finger turns a cap when everything is known: where its tip is, where it should go, and the angles for that. It
-// goes back out of touch, presses, and goes around the cap as far as it reaches.
+// How a finger turns a cap when everything is known: where its tip is, where it should go, and the
+// angles for that. It goes back out of touch, presses, and goes around the cap as far as it
+// reaches.
 #pragma once
 
 #include <array>
@@ -12,8 +13,8 @@ namespace tangere {
 /// Angles of a finger: swing, upper, lower [rad].
 using FingerAngles = std::array<double, 3>;
 
-/// A cap as a finger sees it: its radius, and where its axis is from the one that the fingers stand around, along the finger's
-/// radius and to its left [m].
+/// A cap as a finger sees it: its radius, and where its axis is from the one that the fingers stand
+/// around, along the finger's radius and to its left [m].
 struct CapSeen {
   double radius = 0, out = 0, left = 0;
 };
@@ -28,10 +29,12 @@ class CapScript {
   /// Whether a finger presses next, given whether it does now.
   [[nodiscard]] bool presses(const FingerAngles& q, const CapSeen& cap, bool now) const;
   /// Where the angles should go.
-  [[nodiscard]] FingerAngles targets(const FingerAngles& q, const CapSeen& cap, bool pressing) const;
+  [[nodiscard]] FingerAngles targets(const FingerAngles& q, const CapSeen& cap,
+                                     bool pressing) const;
 
  private:
-  /// Of the middle of the tip's sphere: from the cap's axis [m], around it [rad] from where the finger points.
+  /// Of the middle of the tip's sphere: from the cap's axis [m], around it [rad] from where the
+  /// finger points.
   struct Place {
     double out, around;
   };
@@ -43,7 +46,7 @@ class CapScript {
 
   double hip_ = 0, upper_ = 0, lower_ = 0;  // hip from its axis, lengths of the links [m]
   double tip_ = 0;                          // radius of a tip [m]
-  double below_ = 0;                        // tips work so far below the hip: at the middle of the cap [m]
+  double below_ = 0;  // tips work so far below the hip: at the middle of the cap [m]
 };
 
 }  // namespace tangere

@@ -14,17 +14,21 @@ namespace {
 
 using kernels::kBlock;
 
-/// Of a task: one that a thread plays and those that wait for an earlier one to be written (tasks/task_episodes.cpp).
+/// Of a task: one that a thread plays and those that wait for an earlier one to be written
+/// (tasks/task_episodes.cpp).
 constexpr double kBlocksOfThread = 3;
 
 std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
-std::vector<std::string> texts(std::span<const std::string> all) { return {all.begin(), all.end()}; }
+std::vector<std::string> texts(std::span<const std::string> all) {
+  return {all.begin(), all.end()};
+}
 
 /// Units of displacements along dofs.
 std::vector<std::string> displacement_units(const Model& model) {
   std::vector<std::string> units;
-  for (const std::string& unit : model.v_units()) units.emplace_back(unit.substr(0, unit.rfind("/s")));
+  for (const std::string& unit : model.v_units())
+    units.emplace_back(unit.substr(0, unit.rfind("/s")));
   return units;
 }
 
@@ -37,11 +41,14 @@ struct Named {
 };
 Named displacements(const Model& model) {
   Named n{{}, displacement_units(model)};
-  for (const auto& name : model.v_names()) n.names.push_back("displacement of " + std::string(name));
+  for (const auto& name : model.v_names())
+    n.names.push_back("displacement of " + std::string(name));
   return n;
 }
 Named velocities(const Model& model) { return {texts(model.v_names()), texts(model.v_units())}; }
-Named actions_of(const Model& model) { return {texts(model.u_names()), std::vector<std::string>(size(model.nu()), "1")}; }
+Named actions_of(const Model& model) {
+  return {texts(model.u_names()), std::vector<std::string>(size(model.nu()), "1")};
+}
 Named actions_of(const Task& task) {
   Named n;
   for (std::size_t k = 0; k < task.spec().action.size(); ++k) {
@@ -51,12 +58,15 @@ Named actions_of(const Task& task) {
   return n;
 }
 
-GradientArray array(const char* name, std::vector<std::uint64_t> shape, bool by_row, std::string meaning, Named by) {
-  return {name, std::move(shape), by_row, std::move(meaning), std::move(by.names), std::move(by.units)};
+GradientArray array(const char* name, std::vector<std::uint64_t> shape, bool by_row,
+                    std::string meaning, Named by) {
+  return {
+      name, std::move(shape), by_row, std::move(meaning), std::move(by.names), std::move(by.units)};
 }
 
 /// `of`: "the return", "the loss".
-std::vector<GradientArray> arrays_of_return(const Model& model, const Named& actions, const std::string& of) {
+std::vector<GradientArray> arrays_of_return(const Model& model, const Named& actions,
+                                            const std::string& of) {
   const std::uint64_t nv = size(model.nv());
   Named numbers;
   const Parameters parameters(model);
@@ -65,11 +75,18 @@ std::vector<GradientArray> arrays_of_return(const Model& model, const Named& act
     numbers.units.push_back(info.unit);
   }
   std::vector<GradientArray> all;
-  all.push_back(array("grad_actions", {actions.names.size()}, true, "derivative of " + of + " by the action of each row", actions));
-  all.push_back(array("grad_q", {nv}, false, "derivative of " + of + " by the first state's displacement along the dofs, rotations on the right", displacements(model)));
-  all.push_back(array("grad_v", {nv}, false, "derivative of " + of + " by the first state's velocity", velocities(model)));
+  all.push_back(array("grad_actions", {actions.names.size()}, true,
+                      "derivative of " + of + " by the action of each row", actions));
+  all.push_back(
+      array("grad_q", {nv}, false,
+            "derivative of " + of +
+                " by the first state's displacement along the dofs, rotations on the right",
+            displacements(model)));
+  all.push_back(array("grad_v", {nv}, false,
+                      "derivative of " + of + " by the first state's velocity", velocities(model)));
   if (!numbers.names.empty())
-    all.push_back(array("grad_numbers", {numbers.names.size()}, false, "derivative of " + of + " by the scene's numbers", numbers));
+    all.push_back(array("grad_numbers", {numbers.names.size()}, false,
+                        "derivative of " + of + " by the scene's numbers", numbers));
   return all;
 }
 
@@ -77,17 +94,22 @@ std::vector<GradientArray> arrays_of_jacobians(const Model& model, const Named& 
   const std::uint64_t n = 2 * size(model.nv());
   Named state = displacements(model);
   state.append(velocities(model));
-  const std::string of = "derivative of the next row's state (displacement along the dofs, then velocity)";
+  const std::string of =
+      "derivative of the next row's state (displacement along the dofs, then velocity)";
   std::vector<GradientArray> all;
   all.push_back(array("grad_state_by_state", {n, n}, true, of + " by the row's state", state));
   if (model.integrator() == Integrator::bdf2)
-    all.push_back(array("grad_state_by_previous", {n, n}, true, of + " by the state one step before the row's, which BDF2 goes on from", state));
-  all.push_back(array("grad_state_by_action", {n, actions.names.size()}, true, of + " by the row's action", actions));
+    all.push_back(array("grad_state_by_previous", {n, n}, true,
+                        of + " by the state one step before the row's, which BDF2 goes on from",
+                        state));
+  all.push_back(array("grad_state_by_action", {n, actions.names.size()}, true,
+                      of + " by the row's action", actions));
   return all;
 }
 
 /// Zeros for `episodes` episodes of at most `rows` rows.
-void make_room(const std::vector<GradientArray>& arrays, int episodes, std::int64_t rows, std::vector<std::vector<double>>& out) {
+void make_room(const std::vector<GradientArray>& arrays, int episodes, std::int64_t rows,
+               std::vector<std::vector<double>>& out) {
   out.resize(arrays.size());
   for (std::size_t k = 0; k < arrays.size(); ++k)
     out[k].assign(size(episodes) * arrays[k].width() * (arrays[k].by_row ? size(rows) : 1), 0.0);
@@ -95,14 +117,17 @@ void make_room(const std::vector<GradientArray>& arrays, int episodes, std::int6
 
 double bytes_of(const std::vector<GradientArray>& arrays, std::int64_t rows) {
   double numbers = 0;
-  for (const GradientArray& a : arrays) numbers += double(a.width()) * (a.by_row ? double(rows) : 1);
+  for (const GradientArray& a : arrays)
+    numbers += double(a.width()) * (a.by_row ? double(rows) : 1);
   return 8.0 * kBlock * numbers;
 }
 
 /// A lane's row into the arrays of Jacobians.
-void put_row(const RowJacobian& j, bool with_previous, std::size_t row, std::vector<std::vector<double>>& out) {
+void put_row(const RowJacobian& j, bool with_previous, std::size_t row,
+             std::vector<std::vector<double>>& out) {
   const auto put = [row](const std::vector<double>& from, std::vector<double>& to) {
-    std::copy(from.begin(), from.end(), to.begin() + static_cast<std::ptrdiff_t>(row * from.size()));
+    std::copy(from.begin(), from.end(),
+              to.begin() + static_cast<std::ptrdiff_t>(row * from.size()));
   };
   put(j.state, out[0]);
   if (with_previous) put(j.previous, out[1]);
@@ -111,9 +136,15 @@ void put_row(const RowJacobian& j, bool with_previous, std::size_t row, std::vec
 
 class SceneReturns : public EpisodeGradients {
  public:
-  SceneReturns(const Model& model, const ControlProgram& controls, const EpisodeOptions& run, const GradientOptions& options,
-               const RolloutLoss* loss, const std::vector<GradientArray>& arrays)
-      : model_(model), controls_(controls), run_(run), options_(options), arrays_(arrays), block_(model, options, {&loss, 1}) {}
+  SceneReturns(const Model& model, const ControlProgram& controls, const EpisodeOptions& run,
+               const GradientOptions& options, const RolloutLoss* loss,
+               const std::vector<GradientArray>& arrays)
+      : model_(model),
+        controls_(controls),
+        run_(run),
+        options_(options),
+        arrays_(arrays),
+        block_(model, options, {&loss, 1}) {}
 
   void compute(std::int64_t first, int episodes, std::vector<std::vector<double>>& out) override {
     Batch batch(model_, episodes, run_.seed, first);
@@ -122,8 +153,10 @@ class SceneReturns : public EpisodeGradients {
     std::vector<FailedEnvironment> failures;
     block_.run(
         batch, 0,
-        [&](std::int64_t step, int e, std::span<double> to) { controls_.evaluate(step / run_.every * run_.every, first + e, to); }, u,
-        summary, failures);
+        [&](std::int64_t step, int e, std::span<double> to) {
+          controls_.evaluate(step / run_.every * run_.every, first + e, to);
+        },
+        u, summary, failures);
     LossGradient& g = summary.losses[0];
     make_room(arrays_, episodes, run_.steps / run_.every, out);
     const std::size_t nu = size(model_.nu());
@@ -231,7 +264,8 @@ class TaskReturns : public EpisodeGradients {
 
 class TaskJacobians : public EpisodeGradients {
  public:
-  TaskJacobians(const Task& task, const TaskActions& actions, const EpisodeOptions& run, const std::vector<GradientArray>& arrays)
+  TaskJacobians(const Task& task, const TaskActions& actions, const EpisodeOptions& run,
+                const std::vector<GradientArray>& arrays)
       : task_(task),
         actions_(actions),
         run_(run),
@@ -253,7 +287,8 @@ class TaskJacobians : public EpisodeGradients {
       rollout_.take_steps(&tape_);
       jacobians_.evaluate(rollout_, record_, a, tape_);
       for (int e = 0; e < episodes; ++e)
-        if (record_.taken[size(e)]) put_row(jacobians_.of(e), out.size() == 3, size(e) * size(rows) + size(a), out);
+        if (record_.taken[size(e)])
+          put_row(jacobians_.of(e), out.size() == 3, size(e) * size(rows) + size(a), out);
       rollout_.conclude();
     }
   }
@@ -280,16 +315,19 @@ const char* to_string(GradientKind kind) {
   return "unknown";
 }
 
-GradientPlan scene_gradients(const Model& model, const ControlProgram& controls, const EpisodeOptions& run, GradientKind kind,
-                             const RolloutLoss* loss, const std::string& loss_meaning, double tape_bytes) {
+GradientPlan scene_gradients(const Model& model, const ControlProgram& controls,
+                             const EpisodeOptions& run, GradientKind kind, const RolloutLoss* loss,
+                             const std::string& loss_meaning, double tape_bytes) {
   GradientPlan plan;
   if (kind == GradientKind::none) return plan;
   const std::int64_t rows = run.steps / run.every;
   const Named actions = actions_of(model);
   if (kind == GradientKind::jacobians) {
     plan.arrays = arrays_of_jacobians(model, actions);
-    plan.bytes = bytes_of(plan.arrays, rows) + double(model.workspace_bytes()) * (2 + 2 * model.nv());
-    plan.make = [&model, &controls, &run, arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
+    plan.bytes =
+        bytes_of(plan.arrays, rows) + double(model.workspace_bytes()) * (2 + 2 * model.nv());
+    plan.make = [&model, &controls, &run,
+                 arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
       return std::make_unique<SceneJacobians>(model, controls, run, arrays);
     };
     return plan;
@@ -302,21 +340,25 @@ GradientPlan scene_gradients(const Model& model, const ControlProgram& controls,
   options.parameters = true;
   options.tape_bytes = tape_bytes;
   plan.bytes = bytes_of(plan.arrays, rows) + gradient_bytes(model, kBlock, options, 1);
-  plan.make = [&model, &controls, &run, options, loss, arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
+  plan.make = [&model, &controls, &run, options, loss,
+               arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
     return std::make_unique<SceneReturns>(model, controls, run, options, loss, arrays);
   };
   return plan;
 }
 
-GradientPlan task_episode_gradients(const Task& task, const TaskActions& actions, const EpisodeOptions& run, GradientKind kind,
+GradientPlan task_episode_gradients(const Task& task, const TaskActions& actions,
+                                    const EpisodeOptions& run, GradientKind kind,
                                     double tape_bytes) {
   GradientPlan plan;
   if (kind == GradientKind::none) return plan;
   const Model& model = task.model();
   if (kind == GradientKind::jacobians) {
     plan.arrays = arrays_of_jacobians(model, actions_of(task));
-    plan.bytes = kBlocksOfThread * bytes_of(plan.arrays, task.spec().horizon) + double(model.workspace_bytes()) * (2 + 2 * model.nv());
-    plan.make = [&task, &actions, &run, arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
+    plan.bytes = kBlocksOfThread * bytes_of(plan.arrays, task.spec().horizon) +
+                 double(model.workspace_bytes()) * (2 + 2 * model.nv());
+    plan.make = [&task, &actions, &run,
+                 arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
       return std::make_unique<TaskJacobians>(task, actions, run, arrays);
     };
     return plan;
@@ -329,8 +371,10 @@ GradientPlan task_episode_gradients(const Task& task, const TaskActions& actions
   options.precision = run.precision;
   options.parameters = true;
   options.tape_bytes = tape_bytes;
-  plan.bytes = kBlocksOfThread * bytes_of(plan.arrays, task.spec().horizon) + task_gradient_bytes(task, options);
-  plan.make = [&task, &actions, options, arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
+  plan.bytes = kBlocksOfThread * bytes_of(plan.arrays, task.spec().horizon) +
+               task_gradient_bytes(task, options);
+  plan.make = [&task, &actions, options,
+               arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
     return std::make_unique<TaskReturns>(task, actions, options, arrays);
   };
   return plan;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Derivatives of the episodes of a data set, block by block, between those who simulate them and those who store them.
+// Derivatives of the episodes of a data set, block by block, between those who simulate them and
+// those who store them.
 #pragma once
 
 #include <functional>
@@ -15,7 +16,8 @@
 
 namespace tangere {
 
-/// What is stored of each episode: derivatives of a return or a loss, or of every row's state by the row before.
+/// What is stored of each episode: derivatives of a return or a loss, or of every row's state by
+/// the row before.
 enum class GradientKind { none, returns, jacobians };
 const char* to_string(GradientKind kind);
 
@@ -24,7 +26,8 @@ class EpisodeGradients {
  public:
   virtual ~EpisodeGradients() = default;
   /// Into one list of numbers per array, as EpisodeRows::gradients has them, all rows.
-  virtual void compute(std::int64_t first_episode, int episodes, std::vector<std::vector<double>>& out) = 0;
+  virtual void compute(std::int64_t first_episode, int episodes,
+                       std::vector<std::vector<double>>& out) = 0;
 };
 
 /// What is stored and who computes it: `make` is called once for each thread.
@@ -34,14 +37,18 @@ struct GradientPlan {
   double bytes = 0;  ///< memory of one thread's scratch and of its blocks' results
 };
 
-/// Of a scene's episodes. `loss`, of returns alone, and all else must outlive the plan; `loss_meaning` says what it is.
-GradientPlan scene_gradients(const Model& model, const ControlProgram& controls, const EpisodeOptions& run, GradientKind kind,
-                             const RolloutLoss* loss, const std::string& loss_meaning, double tape_bytes);
+/// Of a scene's episodes. `loss`, of returns alone, and all else must outlive the plan;
+/// `loss_meaning` says what it is.
+GradientPlan scene_gradients(const Model& model, const ControlProgram& controls,
+                             const EpisodeOptions& run, GradientKind kind, const RolloutLoss* loss,
+                             const std::string& loss_meaning, double tape_bytes);
 /// Of a task's episodes that `actions` plays.
-GradientPlan task_episode_gradients(const Task& task, const TaskActions& actions, const EpisodeOptions& run, GradientKind kind,
+GradientPlan task_episode_gradients(const Task& task, const TaskActions& actions,
+                                    const EpisodeOptions& run, GradientKind kind,
                                     double tape_bytes);
 
-/// Adds them to the pieces on their way to another sink, as many blocks at a time as there are threads that prepare.
+/// Adds them to the pieces on their way to another sink, as many blocks at a time as there are
+/// threads that prepare.
 class GradientSink : public EpisodeSink {
  public:
   /// Both must outlive it.

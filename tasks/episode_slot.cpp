@@ -14,21 +14,25 @@ constexpr int kForceWidth = 3, kPositionWidth = 3;
 
 std::size_t size(int n) { return static_cast<std::size_t>(n); }
 
-constexpr std::size_t kQ = 0, kV = 1, kVariables = 2;  // names of observations; without variables a sensor is the third
+constexpr std::size_t kQ = 0, kV = 1,
+                      kVariables =
+                          2;  // names of observations; without variables a sensor is the third
 
 /// Bytes of one row of one episode in a slot's buffers: what is no field is kept in double first.
 double row_bytes(const EpisodeShape& shape, const EpisodeOptions& options) {
   const bool single = options.precision == Precision::mixed;
   double bytes = static_cast<double>(shape.nu) * sizeof(float);
   for (std::size_t name = 0; name < shape.widths.size(); ++name) {
-    const std::size_t number =
-        !single ? sizeof(double) : name < shape.first_sensor ? sizeof(double) + sizeof(float) : sizeof(float);
+    const std::size_t number = !single                     ? sizeof(double)
+                               : name < shape.first_sensor ? sizeof(double) + sizeof(float)
+                                                           : sizeof(float);
     bytes += static_cast<double>(shape.widths[name] * number);
   }
   return bytes;
 }
 
-/// Multiples of 64, below that powers of two: whoever stores rows in chunks of such sizes gets whole ones.
+/// Multiples of 64, below that powers of two: whoever stores rows in chunks of such sizes gets
+/// whole ones.
 int whole_rows(int most) {
   constexpr int kRows = 64;
   if (most >= kRows) return most / kRows * kRows;
@@ -126,7 +130,8 @@ void EpisodeSlot::observe(int row) {
   }
   if (shape_.first_sensor > kVariables) {
     std::array<std::span<double>, kBlockEpisodes> positions;
-    for (int e = 0; e < batch_->environments(); ++e) positions[size(e)] = numbers<double>(kVariables, e, row);
+    for (int e = 0; e < batch_->environments(); ++e)
+      positions[size(e)] = numbers<double>(kVariables, e, row);
     readout_.read_variables(*batch_, 0, positions);
   }
   for (std::size_t name = shape_.first_sensor; name < shape_.widths.size(); ++name) {
@@ -191,8 +196,9 @@ void EpisodeSlot::encode() {
     }
     const std::span<float> singles = std::span(singles_[name]).first(numbers);
     if (name < shape_.first_sensor)
-      std::transform(values_[name].begin(), values_[name].begin() + static_cast<std::ptrdiff_t>(numbers),
-                     singles.begin(), [](double x) { return static_cast<float>(x); });
+      std::transform(values_[name].begin(),
+                     values_[name].begin() + static_cast<std::ptrdiff_t>(numbers), singles.begin(),
+                     [](double x) { return static_cast<float>(x); });
     observations_[name] = std::span<const float>(singles);
   }
   std::sort(failures_.begin(), failures_.end(),

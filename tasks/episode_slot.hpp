@@ -16,11 +16,12 @@ inline constexpr int kBlockEpisodes = 16;  // lanes of a block of a Batch: one s
 
 /// Sizes that all blocks of a run share.
 struct EpisodeShape {
-  std::int64_t rows = 0;            ///< R, actions of an episode
-  int piece_rows = 0;               ///< rows of a piece, fewer at the end
-  std::size_t nu = 0;               ///< numbers of an action
-  std::vector<std::size_t> widths;  ///< numbers per row of q, v, the end effectors if there are any, and each sensor
-  std::size_t first_sensor = 0;     ///< its place in widths
+  std::int64_t rows = 0;  ///< R, actions of an episode
+  int piece_rows = 0;     ///< rows of a piece, fewer at the end
+  std::size_t nu = 0;     ///< numbers of an action
+  std::vector<std::size_t>
+      widths;  ///< numbers per row of q, v, the end effectors if there are any, and each sensor
+  std::size_t first_sensor = 0;  ///< its place in widths
 
   EpisodeShape(const Model& model, const EpisodeOptions& options);
   /// Buffers of one slot [bytes].
@@ -67,10 +68,11 @@ class EpisodeSlot {
   Readout readout_;
   std::optional<Batch> batch_;
   std::int64_t first_row_ = 0, next_row_ = 0;
-  int rows_ = 0, action_rows_ = 0;           // of the piece
-  std::vector<double> randomized_;           // (episodes, what varies)
-  std::vector<double> u_;                    // (episodes, nu)
-  std::vector<std::vector<double>> values_;  // per name: (episodes, rows, width); fields only where float64 is stored
+  int rows_ = 0, action_rows_ = 0;  // of the piece
+  std::vector<double> randomized_;  // (episodes, what varies)
+  std::vector<double> u_;           // (episodes, nu)
+  std::vector<std::vector<double>>
+      values_;  // per name: (episodes, rows, width); fields only where float64 is stored
   std::vector<std::vector<float>> singles_;  // the same, where float32 is stored
   std::vector<float> actions_;               // (episodes, action rows, nu)
   std::vector<Observation> observations_;

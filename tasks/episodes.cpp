@@ -114,18 +114,17 @@ class EpisodeGraph {
 
   EpisodeSummary run() {
     using Exits = std::tuple<Traveller, flow::continue_msg>;
-    flow::input_node<Traveller> blocks(
-        graph_, [this](tbb::flow_control& flow) {
-          TaskOrder::arrive();
-          return next_block(flow);
-        });
+    flow::input_node<Traveller> blocks(graph_, [this](tbb::flow_control& flow) {
+      TaskOrder::arrive();
+      return next_block(flow);
+    });
     flow::limiter_node<Traveller> limiter(graph_,
                                           static_cast<std::size_t>(options_.blocks_in_flight));
-    flow::function_node<Traveller, Traveller> simulator(
-        graph_, flow::unlimited, [this](Traveller t) {
-          TaskOrder::arrive();
-          return simulate(t);
-        });
+    flow::function_node<Traveller, Traveller> simulator(graph_, flow::unlimited,
+                                                        [this](Traveller t) {
+                                                          TaskOrder::arrive();
+                                                          return simulate(t);
+                                                        });
     flow::function_node<Traveller, Traveller> encoder(graph_, flow::unlimited, [this](Traveller t) {
       TaskOrder::arrive();
       const TaskOrder::Task task(order_, t.slot);
@@ -176,7 +175,8 @@ class EpisodeGraph {
 
   Traveller next_block(tbb::flow_control& flow) {
     const TaskOrder::Task task(order_, &next_episode_);
-    if (next_episode_ >= ranges_[range_].end && ++range_ < ranges_.size()) next_episode_ = ranges_[range_].first;
+    if (next_episode_ >= ranges_[range_].end && ++range_ < ranges_.size())
+      next_episode_ = ranges_[range_].first;
     if (range_ == ranges_.size()) {
       flow.stop();
       return {};
@@ -261,13 +261,14 @@ EpisodeSummary run_episodes(const Model& model, const StepperOptions& solver,
   return summary;
 }
 
-std::vector<EpisodeRange> checked_ranges(const std::vector<EpisodeRange>& ranges, std::int64_t episodes) {
+std::vector<EpisodeRange> checked_ranges(const std::vector<EpisodeRange>& ranges,
+                                         std::int64_t episodes) {
   if (ranges.empty()) return {{0, episodes}};
   for (const EpisodeRange& range : ranges)
-    if (range.first < 0 || range.first % kBlockEpisodes != 0 || range.end <= range.first || range.end > episodes ||
-        (range.end % kBlockEpisodes != 0 && range.end != episodes))
-      throw InputError(fmt::format("episodes {} to {} of {}; expected whole blocks of {}", range.first, range.end,
-                                   episodes, kBlockEpisodes));
+    if (range.first < 0 || range.first % kBlockEpisodes != 0 || range.end <= range.first ||
+        range.end > episodes || (range.end % kBlockEpisodes != 0 && range.end != episodes))
+      throw InputError(fmt::format("episodes {} to {} of {}; expected whole blocks of {}",
+                                   range.first, range.end, episodes, kBlockEpisodes));
   return ranges;
 }
 

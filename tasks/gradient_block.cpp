@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forward with checkpoints, then segment by segment back: each is run again onto the tape unless it is the only one.
+// Forward with checkpoints, then segment by segment back: each is run again onto the tape unless it
+// is the only one.
 #include "tasks/gradient_block.hpp"
 
 #include <fmt/format.h>
@@ -18,16 +19,21 @@ namespace {
 
 std::size_t count(std::int64_t n) { return static_cast<std::size_t>(n); }
 
-/// Steps on the tape at a time: all, or as many as make tape and checkpoints together smallest, if that fits.
+/// Steps on the tape at a time: all, or as many as make tape and checkpoints together smallest, if
+/// that fits.
 std::int64_t segment_length(const Model& model, Integrator integrator, const GradientOptions& o) {
-  const auto tape = [&](std::int64_t steps) { return double(BlockTape::bytes(model, integrator, steps)); };
+  const auto tape = [&](std::int64_t steps) {
+    return double(BlockTape::bytes(model, integrator, steps));
+  };
   if (tape(o.steps) <= o.tape_bytes) return o.steps;
   const double checkpoint = double(model.state_bytes_per_environment()) * kBlock;
   const double step = tape(2) - tape(1);
-  const auto best = std::clamp<std::int64_t>(std::llround(std::sqrt(double(o.steps) * checkpoint / step)), 1, o.steps);
+  const auto best = std::clamp<std::int64_t>(
+      std::llround(std::sqrt(double(o.steps) * checkpoint / step)), 1, o.steps);
   const double needed = tape(best) + checkpoint * std::ceil(double(o.steps) / double(best));
   if (needed > o.tape_bytes)
-    throw InputError(fmt::format("tapes of {:.0f} bytes for {} steps; expected at least {:.0f}", o.tape_bytes, o.steps, needed));
+    throw InputError(fmt::format("tapes of {:.0f} bytes for {} steps; expected at least {:.0f}",
+                                 o.tape_bytes, o.steps, needed));
   return best;
 }
 
@@ -42,7 +48,8 @@ GradientBlock::GradientBlock(const Model& model, const GradientOptions& options,
       stepper_(model, options.stepper),
       readout_(model, options.precision),
       pullback_(model),
-      adjoint_(model, options.stepper, {static_cast<int>(losses.size()), options.parameters, options.points}),
+      adjoint_(model, options.stepper,
+               {static_cast<int>(losses.size()), options.parameters, options.points}),
       tape_(model, stepper_.integrator(), segment_length(model, stepper_.integrator(), options)),
       reading_(model),
       parameters_(model) {
@@ -53,10 +60,11 @@ GradientBlock::GradientBlock(const Model& model, const GradientOptions& options,
   }
 }
 
-void GradientBlock::run(Batch& batch, int block, const StepControls& controls, std::span<double> u, GradientSummary& out,
-                        std::vector<FailedEnvironment>& failures) {
+void GradientBlock::run(Batch& batch, int block, const StepControls& controls, std::span<double> u,
+                        GradientSummary& out, std::vector<FailedEnvironment>& failures) {
   const int first = block * kBlock;
-  const InHand h{batch, block, first, std::min(first + kBlock, batch.environments()), controls, u, out};
+  const InHand h{batch,    block, first, std::min(first + kBlock, batch.environments()),
+                 controls, u,     out};
   forward(h, failures);
   backward(h);
 }
@@ -103,7 +111,8 @@ void GradientBlock::backward(const InHand& h) {
     reverse_segment(h, 0, steps);
   } else {
     for (std::size_t k = checkpoints_.size(); k-- > 0;) {
-      const std::int64_t begin = std::int64_t(k) * segment_, end = std::min(begin + segment_, steps);
+      const std::int64_t begin = std::int64_t(k) * segment_,
+                         end = std::min(begin + segment_, steps);
       h.batch.restore_block(h.block, checkpoints_[k]);
       tape_.start(h.batch, h.block);
       for (std::int64_t t = begin; t < end; ++t) step(h, t, &tape_);
@@ -115,7 +124,8 @@ void GradientBlock::backward(const InHand& h) {
   finish(h);
 }
 
-/// From the state after `end` steps to that after `begin`, which is looked at only where the rollout begins.
+/// From the state after `end` steps to that after `begin`, which is looked at only where the
+/// rollout begins.
 void GradientBlock::reverse_segment(const InHand& h, std::int64_t begin, std::int64_t end) {
   const std::size_t nu = count(model_.nu()), steps = count(options_.steps);
   for (std::int64_t t = end; t > begin && may_go_on(); --t) {
@@ -127,7 +137,8 @@ void GradientBlock::reverse_segment(const InHand& h, std::int64_t begin, std::in
       const BlockCotangent& c = adjoint_.loss(static_cast<int>(k));
       for (int e = h.first; e < h.last; ++e)
         for (std::size_t i = 0; i < nu; ++i)
-          h.out.losses[k].u[(count(e) * steps + count(t - 1)) * nu + i] = c.u[i * kBlock + count(e - h.first)];
+          h.out.losses[k].u[(count(e) * steps + count(t - 1)) * nu + i] =
+              c.u[i * kBlock + count(e - h.first)];
     }
   }
   if (begin != 0 || stopped_) return;
@@ -137,7 +148,9 @@ void GradientBlock::reverse_segment(const InHand& h, std::int64_t begin, std::in
 
 /// Fields that some loss looks at after `step` steps.
 void GradientBlock::read(const InHand& h, std::int64_t step) {
-  if (std::none_of(losses_.begin(), losses_.end(), [&](const RolloutLoss* l) { return l->reads_fields(step); })) return;
+  if (std::none_of(losses_.begin(), losses_.end(),
+                   [&](const RolloutLoss* l) { return l->reads_fields(step); }))
+    return;
   for (auto& frames : frames_)
     readout_.read_block(h.batch, h.block, std::span(frames).first(count(h.last - h.first)));
 }
@@ -147,7 +160,8 @@ void GradientBlock::look(const InHand& h, std::int64_t step) {
   read(h, step);
   bool placed = false;
   for (std::size_t k = 0; k < losses_.size(); ++k) {
-    const bool fields = losses_[k]->reads_fields(step), variables = losses_[k]->reads_variables(step);
+    const bool fields = losses_[k]->reads_fields(step),
+               variables = losses_[k]->reads_variables(step);
     if ((fields || variables) && !placed) {
       pullback_.place(h.batch, h.block);
       placed = true;
@@ -169,7 +183,8 @@ void GradientBlock::judge(const InHand& h, std::int64_t step, std::size_t loss, 
     h.controls(step, e, h.u.subspan(count(e) * nu, nu));
     u = h.u.subspan(count(e) * nu, nu);
   }
-  for (std::size_t s = 0; s < frames_.size() && fields; ++s) reading_.set_field(s, frames_[s][count(lane)]);
+  for (std::size_t s = 0; s < frames_.size() && fields; ++s)
+    reading_.set_field(s, frames_[s][count(lane)]);
   LossGradient& result = h.out.losses[loss];
   result.value[count(e)] += reading_.evaluate(l, h.batch, readout_, e, step, options_.steps, u);
   BlockCotangent& c = adjoint_.loss(static_cast<int>(loss));
@@ -177,9 +192,11 @@ void GradientBlock::judge(const InHand& h, std::int64_t step, std::size_t loss, 
     c.q[i * kBlock + count(lane)] += reading_.q_bar()[i];
     c.v[i * kBlock + count(lane)] += reading_.v_bar()[i];
   }
-  for (std::size_t i = 0; i < u.size(); ++i) result.u[(count(e) * steps + count(step)) * nu + i] += reading_.u_bar()[i];
+  for (std::size_t i = 0; i < u.size(); ++i)
+    result.u[(count(e) * steps + count(step)) * nu + i] += reading_.u_bar()[i];
   for (std::size_t s = 0; s < frames_.size() && fields; ++s)
-    pullback_.field(lane, static_cast<int>(s), frames_[s][count(lane)].tiles(), reading_.field_bar(s), c.parameters,
+    pullback_.field(lane, static_cast<int>(s), frames_[s][count(lane)].tiles(),
+                    reading_.field_bar(s), c.parameters,
                     c.points_of(model_, static_cast<int>(s), lane));
   for (std::size_t k = 0; k < model_.variables().size() && l.reads_variables(step); ++k)
     pullback_.variable(lane, static_cast<int>(k), reading_.variables_bar().subspan(3 * k, 3));
@@ -198,7 +215,8 @@ void GradientBlock::finish(const InHand& h) {
         result.v[count(e) * nv + i] = c.v[i * kBlock + count(e - h.first)];
       }
       if (options_.parameters)
-        parameters_.gradient(c, h.batch, e, std::span(result.parameters).subspan(count(e) * numbers, numbers));
+        parameters_.gradient(c, h.batch, e,
+                             std::span(result.parameters).subspan(count(e) * numbers, numbers));
       std::copy_n(c.points.begin() + std::ptrdiff_t(count(e - h.first) * points), points,
                   result.points.begin() + std::ptrdiff_t(count(e) * points));
     }

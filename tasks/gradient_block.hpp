@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One block through a rollout and back: the tape, the readings that losses look at, and the reverse sweep.
+// One block through a rollout and back: the tape, the readings that losses look at, and the reverse
+// sweep.
 #pragma once
 
 #include <array>
@@ -16,12 +17,13 @@ namespace tangere {
 /// Scratch of one thread.
 class GradientBlock {
  public:
-  GradientBlock(const Model& model, const GradientOptions& options, std::span<const RolloutLoss* const> losses);
+  GradientBlock(const Model& model, const GradientOptions& options,
+                std::span<const RolloutLoss* const> losses);
 
-  /// Steps block `block` of `batch` forward and back. Results go to `out`, failures and counts included; blocks of one batch
-  /// may run at the same time.
-  void run(Batch& batch, int block, const StepControls& controls, std::span<double> u, GradientSummary& out,
-           std::vector<FailedEnvironment>& failures);
+  /// Steps block `block` of `batch` forward and back. Results go to `out`, failures and counts
+  /// included; blocks of one batch may run at the same time.
+  void run(Batch& batch, int block, const StepControls& controls, std::span<double> u,
+           GradientSummary& out, std::vector<FailedEnvironment>& failures);
 
   /// Counts from 0; `go_on` (empty: always) must outlive the runs that follow.
   void begin(const GradientGoOn& go_on) {
@@ -54,7 +56,7 @@ class GradientBlock {
   Model model_;
   GradientOptions options_;
   std::vector<const RolloutLoss*> losses_;
-  std::int64_t segment_;                    // steps on the tape at a time
+  std::int64_t segment_;  // steps on the tape at a time
   Stepper stepper_;
   Readout readout_;
   ReadoutPullback pullback_;

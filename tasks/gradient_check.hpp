@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of one environment's rollout, checked on the spot: the adjoint against central differences of whole rollouts and
-// against tangents in dual numbers.
+// Gradients of one environment's rollout, checked on the spot: the adjoint against central
+// differences of whole rollouts and against tangents in dual numbers.
 #pragma once
 
 #include <string>
@@ -26,7 +26,7 @@ struct GradientCheck {
 
 /// Of environment 0 of `start`. Throws InputError when a step of its rollout finds no solution, and
 /// when it continues a run of a scheme of two steps.
-GradientCheck check_gradient(const Batch& start, const StepControls& controls, const RolloutLoss& loss,
-                             const CheckOptions& options);
+GradientCheck check_gradient(const Batch& start, const StepControls& controls,
+                             const RolloutLoss& loss, const CheckOptions& options);
 
 }  // namespace tangere

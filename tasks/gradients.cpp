@@ -20,11 +20,14 @@ namespace {
 
 void check(const GradientOptions& options) {
   if (options.steps < 1)
-    throw InputError("gradients of " + std::to_string(options.steps) + " steps; expected at least 1");
+    throw InputError("gradients of " + std::to_string(options.steps) +
+                     " steps; expected at least 1");
   if (!(options.tape_bytes > 0))
-    throw InputError("a tape of " + std::to_string(options.tape_bytes) + " bytes; expected a positive number");
+    throw InputError("a tape of " + std::to_string(options.tape_bytes) +
+                     " bytes; expected a positive number");
   if (options.threads < 1)
-    throw InputError("gradients on " + std::to_string(options.threads) + " threads; expected at least 1");
+    throw InputError("gradients on " + std::to_string(options.threads) +
+                     " threads; expected at least 1");
 }
 
 std::int64_t point_count(const Model& model, const GradientOptions& o) {
@@ -33,13 +36,18 @@ std::int64_t point_count(const Model& model, const GradientOptions& o) {
 
 }  // namespace
 
-GradientSummary empty_gradients(const Model& model, int environments, const GradientOptions& o, std::size_t losses) {
-  const auto size = [environments](std::int64_t each) { return std::size_t(environments) * std::size_t(each); };
+GradientSummary empty_gradients(const Model& model, int environments, const GradientOptions& o,
+                                std::size_t losses) {
+  const auto size = [environments](std::int64_t each) {
+    return std::size_t(environments) * std::size_t(each);
+  };
   GradientSummary out;
   const int numbers = o.parameters ? Parameters(model).count() : 0;
-  out.losses.assign(losses, {std::vector<double>(size(1)), std::vector<double>(size(o.steps * model.nu())),
-                             std::vector<double>(size(model.nv())), std::vector<double>(size(model.nv())),
-                             std::vector<double>(size(numbers)), std::vector<double>(size(point_count(model, o)))});
+  out.losses.assign(
+      losses,
+      {std::vector<double>(size(1)), std::vector<double>(size(o.steps * model.nu())),
+       std::vector<double>(size(model.nv())), std::vector<double>(size(model.nv())),
+       std::vector<double>(size(numbers)), std::vector<double>(size(point_count(model, o)))});
   return out;
 }
 
@@ -72,11 +80,13 @@ GradientRollouts::~GradientRollouts() = default;
 GradientRollouts::GradientRollouts(GradientRollouts&&) noexcept = default;
 GradientRollouts& GradientRollouts::operator=(GradientRollouts&&) noexcept = default;
 
-GradientSummary GradientRollouts::run(const Batch& start, const StepControls& controls, const GradientGoOn& go_on) {
+GradientSummary GradientRollouts::run(const Batch& start, const StepControls& controls,
+                                      const GradientGoOn& go_on) {
   Impl& i = *impl_;
   if (&start.model().compiled() != &i.model.compiled())
-    throw InputError("a batch of scene '" + start.model().scene().name + "' for gradients of a model of scene '" +
-                     i.model.scene().name + "'; expected the same Model");
+    throw InputError("a batch of scene '" + start.model().scene().name +
+                     "' for gradients of a model of scene '" + i.model.scene().name +
+                     "'; expected the same Model");
   GradientSummary out = empty_gradients(i.model, start.environments(), i.options, i.losses);
   Batch batch = start;
   std::vector<double> u(std::size_t(start.environments()) * std::size_t(i.model.nu()));
@@ -91,12 +101,14 @@ GradientSummary GradientRollouts::run(const Batch& start, const StepControls& co
   };
   i.order.begin();
   i.arena.execute([&] {
-    tbb::parallel_for(tbb::blocked_range<int>(0, batch.blocks(), 1), ByReference<decltype(run_blocks)>{&run_blocks},
-                      tbb::simple_partitioner{});
+    tbb::parallel_for(tbb::blocked_range<int>(0, batch.blocks(), 1),
+                      ByReference<decltype(run_blocks)>{&run_blocks}, tbb::simple_partitioner{});
   });
   i.order.end();
-  for (const auto& of_block : failures) out.failures.insert(out.failures.end(), of_block.begin(), of_block.end());
-  std::sort(out.failures.begin(), out.failures.end(), [](const auto& a, const auto& b) { return a.environment < b.environment; });
+  for (const auto& of_block : failures)
+    out.failures.insert(out.failures.end(), of_block.begin(), of_block.end());
+  std::sort(out.failures.begin(), out.failures.end(),
+            [](const auto& a, const auto& b) { return a.environment < b.environment; });
   for (const GradientBlock& worker : i.workers) {
     out.newton_iterations += worker.newton_iterations();
     out.recomputed_steps += worker.recomputed_steps();
@@ -107,14 +119,18 @@ GradientSummary GradientRollouts::run(const Batch& start, const StepControls& co
 
 double gradient_bytes(const Model& model, int environments, const GradientOptions& o, int losses) {
   const double numbers = o.parameters ? Parameters(model).count() : 0;
-  const double results = double(o.steps) * model.nu() + 2.0 * model.nv() + numbers + double(point_count(model, o)) + 1;
+  const double results =
+      double(o.steps) * model.nu() + 2.0 * model.nv() + numbers + double(point_count(model, o)) + 1;
   const Integrator scheme = o.stepper.integrator.value_or(model.integrator());
   const double tape = std::min(double(BlockTape::bytes(model, scheme, o.steps)), o.tape_bytes);
-  const double of_points = double(kernels::kBlock) * double(point_count(model, o)) * losses;  // every thread's own sums
-  return 8 * results * environments * losses + o.threads * (tape + 2 * double(model.workspace_bytes()) + 8 * of_points);
+  const double of_points =
+      double(kernels::kBlock) * double(point_count(model, o)) * losses;  // every thread's own sums
+  return 8 * results * environments * losses +
+         o.threads * (tape + 2 * double(model.workspace_bytes()) + 8 * of_points);
 }
 
-GradientSummary rollout_gradients(const Batch& start, const StepControls& controls, const GradientOptions& options,
+GradientSummary rollout_gradients(const Batch& start, const StepControls& controls,
+                                  const GradientOptions& options,
                                   std::span<const RolloutLoss* const> losses) {
   return GradientRollouts(start.model(), options, losses).run(start, controls);
 }

@@ -20,16 +20,18 @@ namespace {
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
-constexpr double kDifference = 1e-6;  // of logarithms; small, so that few points begin to touch or to slip within it
-constexpr double kRounding = 1e-8;    // of logarithms
-constexpr double kLongest = 1.5;      // of logarithms in one step: the model is linear
+constexpr double kDifference =
+    1e-6;  // of logarithms; small, so that few points begin to touch or to slip within it
+constexpr double kRounding = 1e-8;  // of logarithms
+constexpr double kLongest = 1.5;    // of logarithms in one step: the model is linear
 
 /// f(point of the sensor, its place 0 … 63 in the tile) for the points of a tile.
 template <class Function>
 void for_points(const kernels::PadTiles& pad, int tile, const Function& f) {
   if (pad.curved()) {
     for (int n = 0; n < pad.points_of(tile); ++n)
-      f(static_cast<std::size_t>(pad.index[kernels::kTactileTile * tile + n]), static_cast<std::size_t>(n));
+      f(static_cast<std::size_t>(pad.index[kernels::kTactileTile * tile + n]),
+        static_cast<std::size_t>(n));
     return;
   }
   for (int i = 0; i < pad.rows_of(tile); ++i)
@@ -46,19 +48,24 @@ std::size_t numbers_of_fields(const Model& model) {
 
 void check_run(const RecordedRun& run) {
   if (run.every < 1 || run.steps < run.every)
-    throw InputError(fmt::format("a recording of {} steps read every {}; expected at least one reading", run.steps,
-                                 run.every));
+    throw InputError(
+        fmt::format("a recording of {} steps read every {}; expected at least one reading",
+                    run.steps, run.every));
 }
 
-std::vector<int> places_of(const Parameters& parameters, const Scene& scene, std::span<const std::string> names) {
+std::vector<int> places_of(const Parameters& parameters, const Scene& scene,
+                           std::span<const std::string> names) {
   std::vector<int> out;
   std::string known;
-  for (const ParameterInfo& info : parameters.infos()) known += (known.empty() ? "'" : ", '") + info.name + "'";
+  for (const ParameterInfo& info : parameters.infos())
+    known += (known.empty() ? "'" : ", '") + info.name + "'";
   for (const std::string& name : names) {
     const auto infos = parameters.infos();
-    const auto at = std::find_if(infos.begin(), infos.end(), [&](const ParameterInfo& i) { return i.name == name; });
+    const auto at = std::find_if(infos.begin(), infos.end(),
+                                 [&](const ParameterInfo& i) { return i.name == name; });
     if (at == infos.end())
-      throw InputError(fmt::format("{}: no number '{}'; expected one of {}", scene.path, name, known));
+      throw InputError(
+          fmt::format("{}: no number '{}'; expected one of {}", scene.path, name, known));
     out.push_back(static_cast<int>(at - infos.begin()));
   }
   return out;
@@ -67,7 +74,8 @@ std::vector<int> places_of(const Parameters& parameters, const Scene& scene, std
 /// The sequence as a function of x, logarithms of the sought numbers.
 class Problem {
  public:
-  Problem(const Scene& scene, const RecordedRun& run, const FieldSequence& recorded, const std::vector<std::string>& names)
+  Problem(const Scene& scene, const RecordedRun& run, const FieldSequence& recorded,
+          const std::vector<std::string>& names)
       : scene_(scene),
         run_(run),
         recorded_(recorded),
@@ -81,8 +89,9 @@ class Problem {
     for (Eigen::Index k = 0; k < count(); ++k) {
       const double value = values[std::size_t(k)];
       if (!(value > 0))
-        throw InputError(fmt::format("{}: '{}' is {} at the start of a fit; expected a positive number", scene_.path,
-                                     names_[std::size_t(k)], value));
+        throw InputError(
+            fmt::format("{}: '{}' is {} at the start of a fit; expected a positive number",
+                        scene_.path, names_[std::size_t(k)], value));
       x[k] = std::log(value);
     }
     return x;
@@ -99,23 +108,28 @@ class Problem {
     GradientOptions options;
     options.steps = run_.steps;
     options.parameters = true;
-    const GradientSummary summary = rollout_gradients(Batch(model, 1), run_.controls, options, losses);
-    if (!summary.failures.empty()) return {std::numeric_limits<double>::infinity(), Vector::Zero(count())};
+    const GradientSummary summary =
+        rollout_gradients(Batch(model, 1), run_.controls, options, losses);
+    if (!summary.failures.empty())
+      return {std::numeric_limits<double>::infinity(), Vector::Zero(count())};
     Value out{summary.losses[0].value[0], Vector(count())};
     for (Eigen::Index k = 0; k < count(); ++k)  // ∂/∂ log p = p ∂/∂p
-      out.gradient[k] = std::exp(x[k]) * summary.losses[0].parameters[std::size_t(places_[std::size_t(k)])];
+      out.gradient[k] =
+          std::exp(x[k]) * summary.losses[0].parameters[std::size_t(places_[std::size_t(k)])];
     return out;
   }
 
   /// ∂ fields / ∂x, (numbers of the whole sequence, count).
   [[nodiscard]] Matrix jacobian(const Vector& x) const {
-    Matrix J(static_cast<Eigen::Index>(recorded_.readings.size() * recorded_.readings[0].size()), count());
+    Matrix J(static_cast<Eigen::Index>(recorded_.readings.size() * recorded_.readings[0].size()),
+             count());
     for (Eigen::Index k = 0; k < count(); ++k) {
       const Vector step = kDifference * Vector::Unit(count(), k);
       J.col(k) = (fields(x + step) - fields(x - step)) / (2 * kDifference);
       if (J.col(k).isZero(0))
-        throw InputError(fmt::format("{}: the fields do not depend on '{}'; expected numbers that a recording can show",
-                                     scene_.path, names_[std::size_t(k)]));
+        throw InputError(fmt::format(
+            "{}: the fields do not depend on '{}'; expected numbers that a recording can show",
+            scene_.path, names_[std::size_t(k)]));
     }
     return J;
   }
@@ -142,12 +156,15 @@ class Problem {
   std::vector<int> places_;  // among Parameters::infos()
 };
 
-/// Whether a step that changed the misfit by `gain` is worth no more than `tolerance` standard deviations of the numbers, which
-/// are ½ tolerance² variances of a residual, or is a rounding. Creases (points that begin to touch or to slip) may hold a minimum
-/// where the gradient does not vanish: what is left to gain is what counts.
-bool is_end(double gain, double misfit, Eigen::Index residuals, double tolerance, const Vector& step) {
+/// Whether a step that changed the misfit by `gain` is worth no more than `tolerance` standard
+/// deviations of the numbers, which are ½ tolerance² variances of a residual, or is a rounding.
+/// Creases (points that begin to touch or to slip) may hold a minimum where the gradient does not
+/// vanish: what is left to gain is what counts.
+bool is_end(double gain, double misfit, Eigen::Index residuals, double tolerance,
+            const Vector& step) {
   const double variance = 2 * misfit / static_cast<double>(residuals);
-  return std::abs(gain) < 0.5 * tolerance * tolerance * variance || step.lpNorm<Eigen::Infinity>() < kRounding;
+  return std::abs(gain) < 0.5 * tolerance * tolerance * variance ||
+         step.lpNorm<Eigen::Infinity>() < kRounding;
 }
 
 FitPoint fit_point(const Vector& x, const Problem::Value& value) {
@@ -177,11 +194,13 @@ void judge(const Problem& problem, double misfit, const Matrix& J, Identificatio
 std::vector<double> numbers_of(const Scene& scene, std::span<const std::string> names) {
   const Parameters parameters{Model(scene)};
   std::vector<double> out;
-  for (int k : places_of(parameters, scene, names)) out.push_back(parameters.infos()[std::size_t(k)].value);
+  for (int k : places_of(parameters, scene, names))
+    out.push_back(parameters.infos()[std::size_t(k)].value);
   return out;
 }
 
-Scene with_numbers(const Scene& scene, std::span<const std::string> names, std::span<const double> values) {
+Scene with_numbers(const Scene& scene, std::span<const std::string> names,
+                   std::span<const double> values) {
   const Parameters parameters{Model(scene)};
   Scene out = scene;
   std::size_t n = 0;
@@ -201,8 +220,8 @@ FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run) {
     run.controls(t, 0, u);
     stepper.step(batch, u);
     if (failed(batch.status(0)))
-      throw InputError(fmt::format("{}: step {} failed ({}); expected a rollout of {} steps", scene.path, t,
-                                   to_string(batch.status(0)), run.steps));
+      throw InputError(fmt::format("{}: step {} failed ({}); expected a rollout of {} steps",
+                                   scene.path, t, to_string(batch.status(0)), run.steps));
     if ((t + 1) % run.every != 0) continue;
     std::vector<double>& reading = out.readings.emplace_back(numbers_of_fields(model));
     std::size_t first = 0;
@@ -219,15 +238,19 @@ void add_noise(FieldSequence& sequence, double deviation, std::uint64_t seed) {
   for (std::size_t k = 0; k < sequence.readings.size(); ++k)
     for (std::size_t i = 0; i < sequence.readings[k].size(); ++i)
       // Steps from 1 on: what <randomize> draws for sensors has step 0.
-      sequence.readings[k][i] +=
-          normal({seed, 0, static_cast<std::int64_t>(k) + 1, Purpose::tactile, static_cast<std::uint32_t>(i)}, 0, deviation);
+      sequence.readings[k][i] += normal({seed, 0, static_cast<std::int64_t>(k) + 1,
+                                         Purpose::tactile, static_cast<std::uint32_t>(i)},
+                                        0, deviation);
 }
 
-FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded) : model_(model), recorded_(recorded) {
+FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded)
+    : model_(model), recorded_(recorded) {
   for (const auto& reading : recorded.readings) {
     if (reading.size() != numbers_of_fields(model))
-      throw InputError(fmt::format("a recorded reading of {} numbers; expected {}, three for each tactile point of the scene",
-                                   reading.size(), numbers_of_fields(model)));
+      throw InputError(
+          fmt::format("a recorded reading of {} numbers; expected {}, three for each tactile point "
+                      "of the scene",
+                      reading.size(), numbers_of_fields(model)));
     std::vector<double>& squares = squares_.emplace_back();
     const double* of_sensor = reading.data();
     for (const CompiledSensor& sensor : model.compiled().sensors) {
@@ -235,7 +258,8 @@ FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded) : mo
       for (int tile = 0; tile < pad.tiles(); ++tile) {
         double& sum = squares.emplace_back(0);
         for_points(pad, tile, [&](std::size_t point, std::size_t) {
-          for (std::size_t c = 0; c < 3; ++c) sum += 0.5 * of_sensor[3 * point + c] * of_sensor[3 * point + c];
+          for (std::size_t c = 0; c < 3; ++c)
+            sum += 0.5 * of_sensor[3 * point + c] * of_sensor[3 * point + c];
         });
       }
       of_sensor += 3 * sensor.points();
@@ -243,7 +267,8 @@ FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded) : mo
   }
 }
 
-/// Where nothing touches, T = 0 and the share of a tile is ½ T_recorded²: known beforehand, and constant.
+/// Where nothing touches, T = 0 and the share of a tile is ½ T_recorded²: known beforehand, and
+/// constant.
 double FieldMisfit::evaluate(const LossPoint& at, const LossCotangent& out) const {
   if (!reads_fields(at.step)) return 0;
   const auto k = static_cast<std::size_t>(at.step / recorded_.every) - 1;
@@ -279,13 +304,16 @@ double FieldMisfit::evaluate(const LossPoint& at, const LossCotangent& out) cons
 Identification identify(const Scene& scene, const RecordedRun& run, const FieldSequence& recorded,
                         const IdentificationOptions& options) {
   check_run(run);
-  if (recorded.every != run.every || static_cast<std::int64_t>(recorded.readings.size()) != run.steps / run.every)
-    throw InputError(fmt::format("a recording of {} readings, one every {} steps; expected {}, one every {}",
-                                 recorded.readings.size(), recorded.every, run.steps / run.every, run.every));
+  if (recorded.every != run.every ||
+      static_cast<std::int64_t>(recorded.readings.size()) != run.steps / run.every)
+    throw InputError(
+        fmt::format("a recording of {} readings, one every {} steps; expected {}, one every {}",
+                    recorded.readings.size(), recorded.every, run.steps / run.every, run.every));
   const Problem problem(scene, run, recorded, options.numbers);
   Vector x = problem.start();
   Problem::Value now = problem.evaluate(x);
-  if (!std::isfinite(now.misfit)) throw InputError(scene.path + ": the rollout fails at the start of the fit");
+  if (!std::isfinite(now.misfit))
+    throw InputError(scene.path + ": the rollout fails at the start of the fit");
   Matrix J = problem.jacobian(x);
   Identification out;
   out.points.push_back(fit_point(x, now));

@@ -18,8 +18,9 @@ LossReading::LossReading(const Model& model)
       field_bars_(fields_.size()),
       field_spans_(fields_.size()) {}
 
-double LossReading::evaluate(const RolloutLoss& loss, const Batch& batch, Readout& readout, int environment, std::int64_t step,
-                             std::int64_t steps, std::span<const double> u) {
+double LossReading::evaluate(const RolloutLoss& loss, const Batch& batch, Readout& readout,
+                             int environment, std::int64_t step, std::int64_t steps,
+                             std::span<const double> u) {
   const bool reads_fields = loss.reads_fields(step), reads_variables = loss.reads_variables(step);
   batch.get_q(environment, q_);
   batch.get_v(environment, v_);

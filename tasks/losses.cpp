@@ -48,7 +48,9 @@ class Path : public RolloutLoss {
 class Fields : public RolloutLoss {
  public:
   Fields(int every, std::size_t components) : every_(every), components_(components) {}
-  [[nodiscard]] bool reads_fields(std::int64_t step) const override { return step > 0 && step % every_ == 0; }
+  [[nodiscard]] bool reads_fields(std::int64_t step) const override {
+    return step > 0 && step % every_ == 0;
+  }
   double evaluate(const LossPoint& at, const LossCotangent& out) const override {
     constexpr std::size_t kLanes = 8, kTile = 64;
     double squares[kLanes] = {};  // side by side: one sum would wait for itself at every number
@@ -102,7 +104,9 @@ const char* to_string(LossKind value) {
 
 const char* loss_meaning(LossKind value) {
   switch (value) {
-    case LossKind::final_state: return "half the squares of the last state, positions from where the scene starts, number by number";
+    case LossKind::final_state:
+      return "half the squares of the last state, positions from where the scene starts, number by "
+             "number";
     case LossKind::path: return "half the squares of all velocities, summed over steps";
     case LossKind::tactile: return "half the squares of all tactile forces, summed over fields";
     case LossKind::shear: return "half the squares of all shear forces, summed over fields";
@@ -112,7 +116,8 @@ const char* loss_meaning(LossKind value) {
 }
 
 const std::vector<LossKind>& loss_kinds() {
-  static const std::vector<LossKind> kinds = {LossKind::final_state, LossKind::path, LossKind::tactile, LossKind::shear,
+  static const std::vector<LossKind> kinds = {LossKind::final_state, LossKind::path,
+                                              LossKind::tactile, LossKind::shear,
                                               LossKind::variables};
   return kinds;
 }
@@ -120,7 +125,8 @@ const std::vector<LossKind>& loss_kinds() {
 std::unique_ptr<RolloutLoss> make_loss(LossKind kind, const Model& model, int every) {
   const bool of_fields = kind == LossKind::tactile || kind == LossKind::shear;
   if (of_fields && model.sensors().empty())
-    throw InputError(std::string("loss '") + to_string(kind) + "': the scene has no tactile sensor");
+    throw InputError(std::string("loss '") + to_string(kind) +
+                     "': the scene has no tactile sensor");
   if (kind == LossKind::variables && model.variables().empty())
     throw InputError("loss 'variables': the scene has no end effector");
   switch (kind) {

@@ -23,7 +23,8 @@ const char* loss_meaning(LossKind value);
 /// Every kind, in the order in which they are listed.
 const std::vector<LossKind>& loss_kinds();
 
-/// `every`: of fields. Throws InputError where a scene has no sensors, or no end effectors, for a loss on them.
+/// `every`: of fields. Throws InputError where a scene has no sensors, or no end effectors, for a
+/// loss on them.
 std::unique_ptr<RolloutLoss> make_loss(LossKind kind, const Model& model, int every);
 
 }  // namespace tangere

@@ -28,17 +28,21 @@ Policy::Policy(const Task& task, PolicyKind kind, std::vector<std::vector<double
   const std::size_t width = task.spec().action.size();
   for (const std::vector<double>& row : table_)
     if (row.size() != width)
-      throw InputError(fmt::format("a row of {} numbers in a table of actions; expected {}", row.size(), width));
+      throw InputError(
+          fmt::format("a row of {} numbers in a table of actions; expected {}", row.size(), width));
 }
 
-void Policy::act(const TaskView& view, std::span<const double> observation, std::span<double> action) const {
+void Policy::act(const TaskView& view, std::span<const double> observation,
+                 std::span<double> action) const {
   switch (kind_) {
     case PolicyKind::random: {
       const TensorSpec& spec = task_.spec().action;
-      const double low = std::isfinite(spec.low) ? spec.low : -1, high = std::isfinite(spec.high) ? spec.high : 1;
+      const double low = std::isfinite(spec.low) ? spec.low : -1,
+                   high = std::isfinite(spec.high) ? spec.high : 1;
       for (std::size_t k = 0; k < action.size(); ++k)
-        action[k] = uniform({view.seed, view.episode, view.actions, Purpose::policy, static_cast<std::uint32_t>(k)},
-                            low, high);
+        action[k] = uniform(
+            {view.seed, view.episode, view.actions, Purpose::policy, static_cast<std::uint32_t>(k)},
+            low, high);
       return;
     }
     case PolicyKind::hold: std::fill(action.begin(), action.end(), 0.0); return;

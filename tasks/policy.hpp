@@ -12,7 +12,8 @@
 namespace tangere {
 
 enum class PolicyKind {
-  random,    ///< uniform within the bounds of the action, ±1 where it has none; keyed by (seed, episode, action)
+  random,    ///< uniform within the bounds of the action, ±1 where it has none; keyed by (seed,
+             ///< episode, action)
   hold,      ///< zeros
   csv,       ///< row j of a table for action j of every episode; its last row beyond its end
   scripted,  ///< the task's own solution
@@ -21,11 +22,13 @@ const char* to_string(PolicyKind kind);
 
 class Policy {
  public:
-  /// `table`: (rows, action) of csv. Throws InputError when a row does not fit the task's action or there is none.
+  /// `table`: (rows, action) of csv. Throws InputError when a row does not fit the task's action or
+  /// there is none.
   Policy(const Task& task, PolicyKind kind, std::vector<std::vector<double>> table = {});
 
   /// The next action of an environment that shows `view` and `observation`.
-  void act(const TaskView& view, std::span<const double> observation, std::span<double> action) const;
+  void act(const TaskView& view, std::span<const double> observation,
+           std::span<double> action) const;
   /// Those of all environments, (E, action).
   void act(const VectorTask& environments, std::span<double> actions) const;
 

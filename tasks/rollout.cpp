@@ -27,7 +27,10 @@ std::size_t largest_field(const Model& model) {
 class Recorder {
  public:
   Recorder(const Batch& batch, Precision precision, RowSink& sink)
-      : batch_(batch), sink_(sink), readout_(batch.model(), precision), environments_(batch.environments()) {
+      : batch_(batch),
+        sink_(sink),
+        readout_(batch.model(), precision),
+        environments_(batch.environments()) {
     const Model& model = batch.model();
     const auto e = static_cast<std::size_t>(environments_);
     q_.resize(e * static_cast<std::size_t>(model.nq()));
@@ -47,7 +50,9 @@ class Recorder {
       readout_.bodies(batch_, e, part(pose_, e), part(twist_, e));
     }
     if (!variables_.empty())
-      each_block(variables_, [&](int block, auto positions) { readout_.read_variables(batch_, block, positions); });
+      each_block(variables_, [&](int block, auto positions) {
+        readout_.read_variables(batch_, block, positions);
+      });
     sink_.write(StateRow{step, time, q_, v_, pose_, twist_, variables_});
   }
 
@@ -66,7 +71,8 @@ class Recorder {
         static_cast<std::size_t>(batch_.model().sensors()[static_cast<std::size_t>(sensor)].points);
     const std::span<double> field =
         std::span(force_).first(static_cast<std::size_t>(environments_) * points * kForceWidth);
-    each_block(field, [&](int block, auto fields) { readout_.read_block(batch_, block, sensor, fields); });
+    each_block(field,
+               [&](int block, auto fields) { readout_.read_block(batch_, block, sensor, fields); });
     sink_.write(TactileRow{sensor, frame, step, field});
   }
 
@@ -76,7 +82,8 @@ class Recorder {
   void each_block(std::span<double> all, const Read& read) const {
     std::array<std::span<double>, kernels::kBlock> parts;
     for (int block = 0; block < batch_.blocks(); ++block) {
-      const int first = block * kernels::kBlock, last = std::min(first + kernels::kBlock, environments_);
+      const int first = block * kernels::kBlock,
+                last = std::min(first + kernels::kBlock, environments_);
       for (int e = first; e < last; ++e) parts[static_cast<std::size_t>(e - first)] = part(all, e);
       read(block, std::span<const std::span<double>>(parts));
     }
@@ -105,18 +112,21 @@ void check(const RolloutOptions& options) {
     throw InputError("tactile every " + std::to_string(options.every) +
                      " steps; expected 1 or more, or 0 for the scene's own");
   if (options.first_step < 0)
-    throw InputError("a rollout from step " + std::to_string(options.first_step) + "; expected 0 or more");
+    throw InputError("a rollout from step " + std::to_string(options.first_step) +
+                     "; expected 0 or more");
 }
 
 /// Every environment's controls from its episode.
 class ProgramDriver : public RolloutDriver {
  public:
-  ProgramDriver(const ControlProgram& controls, std::int64_t first_step) : controls_(controls), first_step_(first_step) {}
+  ProgramDriver(const ControlProgram& controls, std::int64_t first_step)
+      : controls_(controls), first_step_(first_step) {}
 
   void drive(std::int64_t step, Batch& batch, std::span<double> u) override {
     const auto nu = static_cast<std::size_t>(batch.model().nu());
     for (int e = 0; e < batch.environments(); ++e)
-      controls_.evaluate(first_step_ + step, batch.episode(e), u.subspan(static_cast<std::size_t>(e) * nu, nu));
+      controls_.evaluate(first_step_ + step, batch.episode(e),
+                         u.subspan(static_cast<std::size_t>(e) * nu, nu));
   }
   void done(std::int64_t, Batch&, RowSink&) override {}
 
@@ -126,8 +136,8 @@ class ProgramDriver : public RolloutDriver {
 };
 
 /// Counts one step's outcome into the summary; environments that failed in it leave `live`.
-void count(const Batch& batch, std::int64_t step, const std::vector<bool>& stepping, std::vector<bool>& live,
-           RolloutSummary& summary) {
+void count(const Batch& batch, std::int64_t step, const std::vector<bool>& stepping,
+           std::vector<bool>& live, RolloutSummary& summary) {
   for (int e = 0; e < batch.environments(); ++e) {
     if (!stepping[static_cast<std::size_t>(e)]) continue;
     const StepStatus status = batch.status(e);
@@ -153,9 +163,9 @@ std::int64_t tactile_frames(const SensorInfo& sensor, const RolloutOptions& opti
 }
 
 double rollout_bytes(const Model& model, int environments) {
-  const double numbers = model.nq() + model.nv() + model.nu() +
-                         double{kPoseWidth + kTwistWidth} * model.nb() +
-                         static_cast<double>(model.variables().size() * kPositionWidth + largest_field(model));
+  const double numbers =
+      model.nq() + model.nv() + model.nu() + double{kPoseWidth + kTwistWidth} * model.nb() +
+      static_cast<double>(model.variables().size() * kPositionWidth + largest_field(model));
   constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
   return environments * (numbers * sizeof(double) + kFlags);
 }
@@ -172,8 +182,9 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram&
   return run_rollout(batch, stepper, driver, options, sink, progress);
 }
 
-RolloutSummary run_rollout(Batch& batch, Stepper& stepper, RolloutDriver& driver, const RolloutOptions& options,
-                           RowSink& sink, const RolloutProgress& progress) {
+RolloutSummary run_rollout(Batch& batch, Stepper& stepper, RolloutDriver& driver,
+                           const RolloutOptions& options, RowSink& sink,
+                           const RolloutProgress& progress) {
   check(options);
   const auto start = std::chrono::steady_clock::now();
   const auto sensors = batch.model().sensors();
@@ -189,20 +200,25 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, RolloutDriver& driver
   }
 
   // Times come from the counter, so that they do not drift.
-  const auto time = [&](std::int64_t row) { return static_cast<double>(options.first_step + row) * stepper.timestep(); };
+  const auto time = [&](std::int64_t row) {
+    return static_cast<double>(options.first_step + row) * stepper.timestep();
+  };
   recorder.write_state(0, time(0));
   for (std::int64_t t = 0; t < options.steps; ++t) {
     driver.drive(t, batch, u);
-    for (std::size_t e = 0; e < environments; ++e) stepping[e] = live[e] && !batch.held(static_cast<int>(e));
+    for (std::size_t e = 0; e < environments; ++e)
+      stepping[e] = live[e] && !batch.held(static_cast<int>(e));
     stepper.step(batch, u);
     recorder.write_step(t, u, stepping);
     count(batch, t, stepping, live, summary);
     driver.done(t, batch, sink);
     recorder.write_state(t + 1, time(t + 1));
     for (std::size_t s = 0; s < sensors.size(); ++s) {
-      const std::int64_t every = tactile_interval(sensors[s], options), done = options.first_step + t + 1;
+      const std::int64_t every = tactile_interval(sensors[s], options),
+                         done = options.first_step + t + 1;
       if (done % every == 0)
-        recorder.write_field(static_cast<int>(s), done / every - options.first_step / every - 1, t + 1);
+        recorder.write_field(static_cast<int>(s), done / every - options.first_step / every - 1,
+                             t + 1);
     }
     summary.steps = t + 1;
     summary.stopped = progress && !progress(t + 1);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One unattended rollout of a batch: controls in, every row out. Serial: for many episodes on many threads, tasks/episodes.hpp.
+// One unattended rollout of a batch: controls in, every row out. Serial: for many episodes on many
+// threads, tasks/episodes.hpp.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,8 @@ struct RolloutOptions {
   std::int64_t steps = 0;
   int every = 0;  ///< tactile every k-th step; 0: the scene's `every`, or 1 where it has none
   Precision precision = Precision::f64;  ///< of tactile fields
-  /// Steps taken before row 0, by a run that this one continues: counted in times, controls and the rhythm of fields.
+  /// Steps taken before row 0, by a run that this one continues: counted in times, controls and the
+  /// rhythm of fields.
   std::int64_t first_step = 0;
 };
 
@@ -46,8 +48,8 @@ using RolloutProgress = std::function<bool(std::int64_t done)>;
 /// StepRow, the StateRow after it and the tactile rows due. Rows of a tactile sensor are read after
 /// steps K, 2K, …: field k comes from row (k + 1) K of q. In a StepRow, an environment that failed
 /// earlier has 0 iterations and its last status and residual. Throws InputError when steps < 1,
-/// every < 0, first_step < 0, a table of controls is too short or was laid out for another timestep, and passes on
-/// what the sink throws.
+/// every < 0, first_step < 0, a table of controls is too short or was laid out for another
+/// timestep, and passes on what the sink throws.
 RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram& controls,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});
@@ -61,8 +63,9 @@ class RolloutDriver {
   /// Step t has been taken; rows may be handed to the sink.
   virtual void done(std::int64_t step, Batch& batch, RowSink& sink) = 0;
 };
-RolloutSummary run_rollout(Batch& batch, Stepper& stepper, RolloutDriver& driver, const RolloutOptions& options,
-                           RowSink& sink, const RolloutProgress& progress = {});
+RolloutSummary run_rollout(Batch& batch, Stepper& stepper, RolloutDriver& driver,
+                           const RolloutOptions& options, RowSink& sink,
+                           const RolloutProgress& progress = {});
 
 /// The step between fields of a sensor under these options.
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// J⁺ = S J + P J⁻ + U D: S, P, U of the step by the state before it, the one before that and its controls; D of the controls.
+// J⁺ = S J + P J⁻ + U D: S, P, U of the step by the state before it, the one before that and its
+// controls; D of the controls.
 #include "tasks/row_jacobians.hpp"
 
 #include <algorithm>
@@ -13,8 +14,8 @@ namespace {
 std::size_t size(int n) { return static_cast<std::size_t>(n); }
 
 /// to (rows, columns) += a (rows, inner) times b (inner, columns).
-void add_product(std::span<double> to, std::span<const double> a, std::span<const double> b, std::size_t inner,
-                 std::size_t columns) {
+void add_product(std::span<double> to, std::span<const double> a, std::span<const double> b,
+                 std::size_t inner, std::size_t columns) {
   const std::size_t rows = to.size() / columns;
   for (std::size_t i = 0; i < rows; ++i)
     for (std::size_t k = 0; k < inner; ++k) {
@@ -34,7 +35,8 @@ struct Bars {
   std::vector<double> state, action, memory;  // (2 nv), …
   MomentCotangent moment;
 
-  Bars(std::size_t two_nv, std::size_t width, std::size_t memories) : state(two_nv), action(width), memory(memories) {
+  Bars(std::size_t two_nv, std::size_t width, std::size_t memories)
+      : state(two_nv), action(width), memory(memories) {
     moment = {std::span(state).first(two_nv / 2), std::span(state).subspan(two_nv / 2), {}, {}};
   }
   Bars(const Bars&) = delete;
@@ -48,7 +50,8 @@ void add_times(std::span<double> to, double x, std::span<const double> from) {
 
 }  // namespace
 
-RowChain::RowChain(int nv, std::size_t others) : state_(2 * size(nv)), others_(others), columns_(2 * state_ + others) {
+RowChain::RowChain(int nv, std::size_t others)
+    : state_(2 * size(nv)), others_(others), columns_(2 * state_ + others) {
   for (auto* x : {&now_, &before_, &next_}) x->resize(state_ * columns_);
 }
 
@@ -69,7 +72,8 @@ void RowChain::add(const StepJacobian& step, std::span<const double> controls) {
     for (std::size_t k = 0; k < nu; ++k) {
       const std::span<const double> row = controls.subspan(k * given, given);
       add_times(std::span(next_).subspan(i * columns_, state_), step.u[i * nu + k], row);
-      add_times(std::span(next_).subspan(i * columns_ + 2 * state_, others_), step.u[i * nu + k], row.subspan(state_));
+      add_times(std::span(next_).subspan(i * columns_ + 2 * state_, others_), step.u[i * nu + k],
+                row.subspan(state_));
     }
   std::swap(before_, now_);
   std::swap(now_, next_);
@@ -80,7 +84,8 @@ void RowChain::get(RowJacobian& out) const {
   out.previous.clear();
   out.others.clear();
   for (std::size_t i = 0; i < state_; ++i) {
-    const auto row = now_.begin() + static_cast<std::ptrdiff_t>(i * columns_), one = row + static_cast<std::ptrdiff_t>(state_);
+    const auto row = now_.begin() + static_cast<std::ptrdiff_t>(i * columns_),
+               one = row + static_cast<std::ptrdiff_t>(state_);
     const auto two = one + static_cast<std::ptrdiff_t>(state_);
     out.state.insert(out.state.end(), row, one);
     out.previous.insert(out.previous.end(), one, two);
@@ -98,7 +103,8 @@ ActionJacobians::ActionJacobians(const Task& task, const StepperOptions& options
       controls_(kBlock, std::vector<double>(size(task.model().nu()) * (state_ + width_ + memory_))),
       rows_(kBlock) {}
 
-void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std::int64_t action, const BlockTape& tape) {
+void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std::int64_t action,
+                               const BlockTape& tape) {
   const TaskSpec& spec = task_.spec();
   for (RowChain& chain : chains_) chain.begin();
   StepJacobian step;
@@ -116,9 +122,10 @@ void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std:
   for (int l = 0; l < rollout.lanes(); ++l) compose(rollout, r, action, l);
 }
 
-/// How a lane's controls from `step` on hang on the action's first state, the action and the memory.
-void ActionJacobians::ask(TaskRollout& rollout, const ActionRecord& r, std::int64_t action, int step, const BlockTape& tape,
-                          int lane) {
+/// How a lane's controls from `step` on hang on the action's first state, the action and the
+/// memory.
+void ActionJacobians::ask(TaskRollout& rollout, const ActionRecord& r, std::int64_t action,
+                          int step, const BlockTape& tape, int lane) {
   std::vector<double>& d = controls_[size(lane)];
   std::fill(d.begin(), d.end(), 0.0);
   if (!r.taken[size(lane)]) return;
@@ -128,24 +135,30 @@ void ActionJacobians::ask(TaskRollout& rollout, const ActionRecord& r, std::int6
     std::vector<double> weight(nu);
     weight[k] = 1;
     const Moment first = rollout.first_moment(tape, lane);
-    task_.controls_vjp(rollout.view(r, action, lane, of_lane(r.memory, lane), {&first, 1}), step, weight, bars.out());
+    task_.controls_vjp(rollout.view(r, action, lane, of_lane(r.memory, lane), {&first, 1}), step,
+                       weight, bars.out());
     auto to = d.begin() + static_cast<std::ptrdiff_t>(k * given);
-    for (const auto* part : {&bars.state, &bars.action, &bars.memory}) to = std::copy(part->begin(), part->end(), to);
+    for (const auto* part : {&bars.state, &bars.action, &bars.memory})
+      to = std::copy(part->begin(), part->end(), to);
   }
 }
 
 /// From the first state, the action and the memory to where the action was chosen.
-void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::int64_t action, int lane) {
+void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::int64_t action,
+                              int lane) {
   RowJacobian chain;
   chains_[size(lane)].get(chain);
   RowJacobian& out = rows_[size(lane)];
   out = {chain.state, chain.previous, std::vector<double>(state_ * width_)};
   std::vector<double> by_memory(state_ * memory_);
-  const auto row = [](std::vector<double>& all, std::size_t i, std::size_t width) { return std::span(all).subspan(i * width, width); };
+  const auto row = [](std::vector<double>& all, std::size_t i, std::size_t width) {
+    return std::span(all).subspan(i * width, width);
+  };
   for (std::size_t i = 0; i < state_; ++i) {
     const std::span<const double> others = row(chain.others, i, width_ + memory_);
     std::copy_n(others.begin(), width_, row(out.others, i, width_).begin());
-    std::copy_n(others.begin() + static_cast<std::ptrdiff_t>(width_), memory_, row(by_memory, i, memory_).begin());
+    std::copy_n(others.begin() + static_cast<std::ptrdiff_t>(width_), memory_,
+                row(by_memory, i, memory_).begin());
   }
   if (!r.taken[size(lane)]) return;
   const Moment seen{of_lane(r.q, lane), of_lane(r.v, lane), {}, {}};
@@ -156,8 +169,9 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
       Bars bars(state_, width_, memory_);
       std::vector<double> weight(state_);
       weight[k] = 1;
-      task_.place_vjp(rollout.view(r, action, lane, of_lane(r.memory, lane), {&seen, 1}), std::span(weight).first(state_ / 2),
-                      std::span(weight).subspan(state_ / 2), bars.out());
+      task_.place_vjp(rollout.view(r, action, lane, of_lane(r.memory, lane), {&seen, 1}),
+                      std::span(weight).first(state_ / 2), std::span(weight).subspan(state_ / 2),
+                      bars.out());
       for (std::size_t i = 0; i < state_; ++i) {
         const double by_placed = chain.state[i * state_ + k];
         add_times(row(out.state, i, state_), by_placed, bars.state);
@@ -169,8 +183,8 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
   for (std::size_t k = 0; k < memory_; ++k) {
     Bars bars(state_, width_, memory_);
     bars.memory[k] = 1;
-    task_.begin_action_vjp(rollout.view(r, action, lane, of_lane(r.found, lane), {&seen, 1}), bars.memory,
-                           {{&bars.moment, 1}, bars.action});
+    task_.begin_action_vjp(rollout.view(r, action, lane, of_lane(r.found, lane), {&seen, 1}),
+                           bars.memory, {{&bars.moment, 1}, bars.action});
     for (std::size_t i = 0; i < state_; ++i) {
       add_times(row(out.state, i, state_), by_memory[i * memory_ + k], bars.state);
       add_times(row(out.others, i, width_), by_memory[i * memory_ + k], bars.action);
@@ -179,7 +193,8 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
   const TensorSpec& spec = task_.spec().action;
   for (std::size_t k = 0; k < width_; ++k) {
     const double asked = of_lane(r.asked, lane)[k];
-    for (std::size_t i = 0; i < state_ && (asked < spec.low || asked > spec.high); ++i) out.others[i * width_ + k] = 0;
+    for (std::size_t i = 0; i < state_ && (asked < spec.low || asked > spec.high); ++i)
+      out.others[i * width_ + k] = 0;
   }
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A task: a scene plus how an episode starts, what an action does, what is seen, what it is worth and when it ends.
-// Every function is pure: it looks at numbers of one environment and fills numbers of it, so that any of them can be
-// called alone, from any thread, and differentiated.
+// A task: a scene plus how an episode starts, what an action does, what is seen, what it is worth
+// and when it ends. Every function is pure: it looks at numbers of one environment and fills
+// numbers of it, so that any of them can be called alone, from any thread, and differentiated.
 #pragma once
 
 #include <cstdint>
@@ -17,17 +17,19 @@ namespace tangere {
 struct Moment {
   std::span<const double> q, v;       ///< (nq), (nv)
   std::span<const double> variables;  ///< (n, 3) end effectors [m], if the task looks at them
-  std::span<const double> tactile;    ///< every sensor's (points, 3) [N] one behind the other, if the task looks at them
+  std::span<const double>
+      tactile;  ///< every sensor's (points, 3) [N] one behind the other, if the task looks at them
 };
 
 /// What a task may look at.
 struct TaskView {
   std::uint64_t seed = 0;
   std::int64_t episode = 0;
-  std::int64_t actions = 0;          ///< of this episode, taken until now
-  std::span<const double> memory;    ///< (memory)
-  std::span<const double> action;    ///< the one being taken or just taken; empty before the first
-  std::span<const Moment> moments;   ///< of that action, as declared; before an action only where it starts
+  std::int64_t actions = 0;        ///< of this episode, taken until now
+  std::span<const double> memory;  ///< (memory)
+  std::span<const double> action;  ///< the one being taken or just taken; empty before the first
+  std::span<const Moment>
+      moments;  ///< of that action, as declared; before an action only where it starts
 
   [[nodiscard]] const Moment& now() const { return moments.back(); }
 };
@@ -37,7 +39,8 @@ struct TaskStart {
   std::uint64_t seed = 0;
   std::int64_t episode = 0;
   std::span<double> q, v;     ///< (nq), (nv)
-  std::span<double> varying;  ///< values of what the scene randomises, in its order; those of the state change nothing
+  std::span<double> varying;  ///< values of what the scene randomises, in its order; those of the
+                              ///< state change nothing
   std::span<double> memory;   ///< (memory), zeros
 };
 
@@ -48,8 +51,9 @@ struct Verdict {
   bool success = false;
 };
 
-/// Where derivatives of a moment are added; q by displacements along the dofs of v, rotations on the right
-/// (docs/dynamics.md), the others component by component. What the task does not look at is empty.
+/// Where derivatives of a moment are added; q by displacements along the dofs of v, rotations on
+/// the right (docs/dynamics.md), the others component by component. What the task does not look at
+/// is empty.
 struct MomentCotangent {
   std::span<double> q, v;       ///< (nv), (nv)
   std::span<double> variables;  ///< (n, 3)
@@ -78,7 +82,8 @@ class Task {
   virtual void start(const TaskStart& start) const;
   /// Before an action's first step: what the task keeps of it for all of them.
   virtual void begin_action(const TaskView& view, std::span<double> memory) const;
-  /// Of a task that restarts, the state that the action begins from; q and v are where the last one ended.
+  /// Of a task that restarts, the state that the action begins from; q and v are where the last one
+  /// ended.
   virtual void place(const TaskView& view, std::span<double> q, std::span<double> v) const;
   /// Controls (nu) for the steps of an action from `step` on.
   virtual void controls(const TaskView& view, int step, std::span<double> u) const = 0;
@@ -86,25 +91,31 @@ class Task {
   virtual void observe(const TaskView& view, std::span<double> observation) const = 0;
   virtual Verdict judge(const TaskView& view) const = 0;
 
-  /// Adds `weight` times the derivative of the reward to `out`. What only chooses between cases has none.
+  /// Adds `weight` times the derivative of the reward to `out`. What only chooses between cases has
+  /// none.
   virtual void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const = 0;
-  /// Adds ∂(weight · u)/∂(action, memory, q and v of the action's start) of controls(view, step, u), `weight`: (nu).
+  /// Adds ∂(weight · u)/∂(action, memory, q and v of the action's start) of controls(view, step,
+  /// u), `weight`: (nu).
   virtual void controls_vjp(const TaskView& view, int step, std::span<const double> weight,
                             const ViewCotangent& out) const = 0;
 
-  /// begin_action in reverse. `memory` holds derivatives by what it leaves and gets those by what it found, view.memory; those
-  /// by the action, and by q and v of its start, are added to `out`. As it stands: nothing that it writes has a derivative.
-  virtual void begin_action_vjp(const TaskView& view, std::span<double> memory, const ViewCotangent& out) const;
-  /// place in reverse: adds ∂(q̄·q + v̄·v)/∂(action, memory, q and v where the last action ended), `q`, `v`: (nv). A task that
-  /// restarts has to have it; as it stands it throws InputError.
+  /// begin_action in reverse. `memory` holds derivatives by what it leaves and gets those by what
+  /// it found, view.memory; those by the action, and by q and v of its start, are added to `out`.
+  /// As it stands: nothing that it writes has a derivative.
+  virtual void begin_action_vjp(const TaskView& view, std::span<double> memory,
+                                const ViewCotangent& out) const;
+  /// place in reverse: adds ∂(q̄·q + v̄·v)/∂(action, memory, q and v where the last action ended),
+  /// `q`, `v`: (nv). A task that restarts has to have it; as it stands it throws InputError.
   virtual void place_vjp(const TaskView& view, std::span<const double> q, std::span<const double> v,
                          const ViewCotangent& out) const;
 
   /// An action that solves the task without having learned anything.
-  virtual void scripted(const TaskView& view, std::span<const double> observation, std::span<double> action) const = 0;
+  virtual void scripted(const TaskView& view, std::span<const double> observation,
+                        std::span<double> action) const = 0;
 
  protected:
-  /// First coordinate of a joint of the scene, or its first dof. Throws InputError when the scene has no such joint.
+  /// First coordinate of a joint of the scene, or its first dof. Throws InputError when the scene
+  /// has no such joint.
   [[nodiscard]] std::size_t coordinate(const std::string& joint) const;
   [[nodiscard]] std::size_t dof(const std::string& joint) const;
 
@@ -114,8 +125,9 @@ class Task {
 };
 
 /// A number in [low, high] of an episode: `step` and `index` tell it from the task's others.
-double task_uniform(std::uint64_t seed, std::int64_t episode, std::int64_t step, std::uint32_t index, double low,
-                    double high);
-double task_normal(std::uint64_t seed, std::int64_t episode, std::int64_t step, std::uint32_t index, double deviation);
+double task_uniform(std::uint64_t seed, std::int64_t episode, std::int64_t step,
+                    std::uint32_t index, double low, double high);
+double task_normal(std::uint64_t seed, std::int64_t episode, std::int64_t step, std::uint32_t index,
+                   double deviation);
 
 }  // namespace tangere

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Environment steps of a task for the clock: policy, steps, looks, rewards and resets, nothing stored.
+// Environment steps of a task for the clock: policy, steps, looks, rewards and resets, nothing
+// stored.
 #include <fmt/format.h>
 
 #include <array>
@@ -20,10 +21,11 @@ double cpu_seconds() {
 void chain(const VectorTask& vector, std::vector<std::uint64_t>& checksums) {
   for (int e = 0; e < vector.environments(); ++e) {
     const auto i = static_cast<std::size_t>(e);
-    const std::array<double, 4> rest{vector.rewards()[i], static_cast<double>(vector.terminated()[i]),
-                                     static_cast<double>(vector.truncated()[i]),
-                                     static_cast<double>(vector.success()[i])};
-    checksums[i] = chain_bits(chain_bits(checksums[i], vector.observation(e)), std::span<const double>(rest));
+    const std::array<double, 4> rest{
+        vector.rewards()[i], static_cast<double>(vector.terminated()[i]),
+        static_cast<double>(vector.truncated()[i]), static_cast<double>(vector.success()[i])};
+    checksums[i] =
+        chain_bits(chain_bits(checksums[i], vector.observation(e)), std::span<const double>(rest));
   }
 }
 
@@ -33,15 +35,18 @@ std::int64_t tactile_points(const Task& task) {
 
 }  // namespace
 
-BenchmarkResult run_task_benchmark(const Task& task, const Policy& policy, int environments, std::int64_t actions,
-                                   int repeat, const VectorOptions& options, const BenchmarkGoOn& go_on) {
+BenchmarkResult run_task_benchmark(const Task& task, const Policy& policy, int environments,
+                                   std::int64_t actions, int repeat, const VectorOptions& options,
+                                   const BenchmarkGoOn& go_on) {
   if (actions < 1 || repeat < 1)
-    throw InputError(fmt::format("{} environment steps, {} passes; expected at least 1", actions, repeat));
+    throw InputError(
+        fmt::format("{} environment steps, {} passes; expected at least 1", actions, repeat));
   VectorTask vector(task, environments, options);
   std::vector<double> u(static_cast<std::size_t>(environments) * task.spec().action.size());
   BenchmarkResult result;
   for (int e = 0; e < environments; ++e)
-    result.checksums.push_back(static_cast<std::uint64_t>(vector.episodes()[static_cast<std::size_t>(e)]));
+    result.checksums.push_back(
+        static_cast<std::uint64_t>(vector.episodes()[static_cast<std::size_t>(e)]));
   for (int pass = 0; pass <= repeat; ++pass) {
     if (pass > 0) vector.reset(options.seed);
     const double cpu = cpu_seconds();

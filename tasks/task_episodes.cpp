@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blocks of 16 episodes are played by all threads, each by one; their rows are kept until the block's last episode has ended, for
-// only then is an episode's length known. They are written in ascending order while others are played.
+// Blocks of 16 episodes are played by all threads, each by one; their rows are kept until the
+// block's last episode has ended, for only then is an episode's length known. They are written in
+// ascending order while others are played.
 #include "tasks/task_episodes.hpp"
 
 #include <fmt/format.h>
@@ -40,8 +41,11 @@ template <class T>
 class Rows {
  public:
   explicit Rows(const Task& task)
-      : widths_(widths_of(task)), actions_width_(task.spec().action.size()), rows_(size(task.spec().horizon)) {
-    for (const std::size_t width : widths_) values_.emplace_back(kBlockEpisodes * (rows_ + 1) * width);
+      : widths_(widths_of(task)),
+        actions_width_(task.spec().action.size()),
+        rows_(size(task.spec().horizon)) {
+    for (const std::size_t width : widths_)
+      values_.emplace_back(kBlockEpisodes * (rows_ + 1) * width);
     actions_.resize(kBlockEpisodes * rows_ * actions_width_);
     rewards_.resize(kBlockEpisodes * rows_);
   }
@@ -61,7 +65,8 @@ class Rows {
   void act(const VectorTask& vector, int e, std::int64_t row) {
     const std::size_t at = size(e) * rows_ + size(row);
     const auto action = vector.actions().subspan(size(e) * actions_width_, actions_width_);
-    std::transform(action.begin(), action.end(), actions_.begin() + static_cast<std::ptrdiff_t>(at * actions_width_),
+    std::transform(action.begin(), action.end(),
+                   actions_.begin() + static_cast<std::ptrdiff_t>(at * actions_width_),
                    [](double x) { return static_cast<float>(x); });
     rewards_[at] = static_cast<float>(vector.rewards()[size(e)]);
   }
@@ -70,7 +75,8 @@ class Rows {
     const std::size_t episodes = size(vector.environments());
     observations_.clear();
     for (std::size_t name = 0; name < widths_.size(); ++name)
-      observations_.emplace_back(std::span<const T>(values_[name]).first(episodes * (rows_ + 1) * widths_[name]));
+      observations_.emplace_back(
+          std::span<const T>(values_[name]).first(episodes * (rows_ + 1) * widths_[name]));
     EpisodeRows piece;
     piece.first_episode = vector.episodes()[0];
     piece.episodes = vector.environments();
@@ -85,7 +91,8 @@ class Rows {
  private:
   void put(std::size_t name, int e, std::int64_t row, std::span<const double> from) {
     const std::size_t at = (size(e) * (rows_ + 1) + size(row)) * widths_[name];
-    std::transform(from.begin(), from.end(), values_[name].begin() + static_cast<std::ptrdiff_t>(at),
+    std::transform(from.begin(), from.end(),
+                   values_[name].begin() + static_cast<std::ptrdiff_t>(at),
                    [](double x) { return static_cast<T>(x); });
   }
 
@@ -114,10 +121,16 @@ struct Block {
 template <class T>
 class EpisodeRun {
  public:
-  EpisodeRun(const Task& task, const Policy& policy, const TaskEpisodeOptions& options, EpisodeSink& sink,
-             const EpisodeProgress& progress, const StopRequest& stop)
-      : task_(task), policy_(policy), options_(options), sink_(sink), progress_(progress), stop_(stop),
-        ranges_(checked_ranges(options.ranges, options.episodes)), next_(ranges_.front().first) {
+  EpisodeRun(const Task& task, const Policy& policy, const TaskEpisodeOptions& options,
+             EpisodeSink& sink, const EpisodeProgress& progress, const StopRequest& stop)
+      : task_(task),
+        policy_(policy),
+        options_(options),
+        sink_(sink),
+        progress_(progress),
+        stop_(stop),
+        ranges_(checked_ranges(options.ranges, options.episodes)),
+        next_(ranges_.front().first) {
     for (int k = 0; k < blocks_in_flight(options); ++k) free_.push_back(nullptr);
   }
 
@@ -148,15 +161,18 @@ class EpisodeRun {
       const TaskOrder& order;
       ~AtEnd() { order.end(); }
     } const at_end{order_};
-    tbb::parallel_pipeline(free_.size(), tbb::make_filter<void, Block<T>*>(filter_mode::serial_in_order, ByReference{&next}) &
-                                             tbb::make_filter<Block<T>*, Block<T>*>(filter_mode::parallel, ByReference{&play}) &
-                                             tbb::make_filter<Block<T>*, void>(filter_mode::serial_in_order, ByReference{&write}));
+    tbb::parallel_pipeline(
+        free_.size(),
+        tbb::make_filter<void, Block<T>*>(filter_mode::serial_in_order, ByReference{&next}) &
+            tbb::make_filter<Block<T>*, Block<T>*>(filter_mode::parallel, ByReference{&play}) &
+            tbb::make_filter<Block<T>*, void>(filter_mode::serial_in_order, ByReference{&write}));
     summary_.run.stopped = stopped_;
     summary_.run.simulation_seconds = playing_.seconds();
     summary_.run.encoding_seconds = preparing_.seconds();
     summary_.run.writing_seconds = writing_.seconds();
     summary_.run.peak_blocks_in_flight = static_cast<int>(blocks_.size());
-    const std::int64_t played = summary_.run.episodes - static_cast<std::int64_t>(summary_.run.failures.size());
+    const std::int64_t played =
+        summary_.run.episodes - static_cast<std::int64_t>(summary_.run.failures.size());
     summary_.mean_return = played > 0 ? total_ / static_cast<double>(played) : 0;
     return std::move(summary_);
   }
@@ -202,10 +218,13 @@ class EpisodeRun {
   bool play(VectorTask& vector, Rows<T>& rows) {
     const int episodes = vector.environments();
     std::vector<double> actions(size(episodes) * task_.spec().action.size());
-    const auto over = [&](int e) { return vector.terminated()[size(e)] != 0 || vector.truncated()[size(e)] != 0; };
+    const auto over = [&](int e) {
+      return vector.terminated()[size(e)] != 0 || vector.truncated()[size(e)] != 0;
+    };
     for (int e = 0; e < episodes; ++e) rows.observe(vector, e, 0);
     std::vector<bool> live(size(episodes), true);
-    for (std::int64_t row = 0; row < task_.spec().horizon && std::count(live.begin(), live.end(), true) > 0; ++row) {
+    for (std::int64_t row = 0;
+         row < task_.spec().horizon && std::count(live.begin(), live.end(), true) > 0; ++row) {
       if (stop_ && stop_()) stopped_ = true;
       if (stopped_ || tbb::is_current_task_group_canceling()) return false;
       const std::int64_t before = vector.counts().environment_steps;
@@ -243,7 +262,8 @@ class EpisodeRun {
     run.failures.insert(run.failures.end(), block.failures.begin(), block.failures.end());
     auto failure = block.failures.begin();
     for (std::size_t e = 0; e < block.ends.size(); ++e) {
-      if (failure != block.failures.end() && failure->episode == block.range.first + static_cast<std::int64_t>(e)) {
+      if (failure != block.failures.end() &&
+          failure->episode == block.range.first + static_cast<std::int64_t>(e)) {
         ++failure;
         continue;
       }
@@ -260,9 +280,10 @@ class EpisodeRun {
     block.failures.clear();
     block.randomized.clear();
     for (int e = 0; e < vector.environments(); ++e) {
-      for (int k = 0; k < varied; ++k) block.randomized.push_back(vector.batch().randomized_value(e, k));
-      block.ends.push_back({vector.lengths()[size(e)], vector.returns()[size(e)], vector.terminated()[size(e)] != 0,
-                            vector.success()[size(e)] != 0});
+      for (int k = 0; k < varied; ++k)
+        block.randomized.push_back(vector.batch().randomized_value(e, k));
+      block.ends.push_back({vector.lengths()[size(e)], vector.returns()[size(e)],
+                            vector.terminated()[size(e)] != 0, vector.success()[size(e)] != 0});
       if (failed(vector.status(e))) block.failures.push_back(failure(vector, e));
     }
     block.piece = block.rows.piece(vector);
@@ -303,24 +324,30 @@ class EpisodeRun {
 
 }  // namespace
 
-TaskEpisodeSummary run_task_episodes(const Task& task, const Policy& policy, const TaskEpisodeOptions& options,
-                                     EpisodeSink& sink, const EpisodeProgress& progress, const StopRequest& stop) {
+TaskEpisodeSummary run_task_episodes(const Task& task, const Policy& policy,
+                                     const TaskEpisodeOptions& options, EpisodeSink& sink,
+                                     const EpisodeProgress& progress, const StopRequest& stop) {
   if (options.episodes < 1 || options.threads < 1)
-    throw InputError(fmt::format("{} episodes on {} threads; expected at least 1", options.episodes, options.threads));
+    throw InputError(fmt::format("{} episodes on {} threads; expected at least 1", options.episodes,
+                                 options.threads));
   const auto start = std::chrono::steady_clock::now();
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.threads));
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<std::size_t>(options.threads));
   tbb::task_arena arena(options.threads);
   TaskEpisodeSummary summary = arena.execute([&] {
-    return options.precision == Precision::mixed ? EpisodeRun<float>(task, policy, options, sink, progress, stop).run()
-                                                 : EpisodeRun<double>(task, policy, options, sink, progress, stop).run();
+    return options.precision == Precision::mixed
+               ? EpisodeRun<float>(task, policy, options, sink, progress, stop).run()
+               : EpisodeRun<double>(task, policy, options, sink, progress, stop).run();
   });
-  summary.run.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  summary.run.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
 }
 
 double task_episode_bytes(const Task& task, const TaskEpisodeOptions& options) {
   const std::int64_t needed = (options.episodes + kBlockEpisodes - 1) / kBlockEpisodes;
-  const auto blocks = static_cast<double>(std::min<std::int64_t>(blocks_in_flight(options), needed));
+  const auto blocks =
+      static_cast<double>(std::min<std::int64_t>(blocks_in_flight(options), needed));
   const auto playing = static_cast<double>(std::min<std::int64_t>(options.threads, needed));
   double row = 0;
   for (const std::size_t width : widths_of(task)) row += static_cast<double>(width);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forward with a tape for each action, or a checkpoint every so many; then action by action back. Of an action that begins at
-// x, with memory m found and m⁺ left, K steps and looks in between:
-//   r = judge(moments, m⁺, a);  x_(k+1) = step(x_k, controls(x_0, m⁺, a));  x_0 = place(x, m⁺, a);  m⁺ = begin_action(x, m, a)
+// Forward with a tape for each action, or a checkpoint every so many; then action by action back.
+// Of an action that begins at x, with memory m found and m⁺ left, K steps and looks in between:
+//   r = judge(moments, m⁺, a);  x_(k+1) = step(x_k, controls(x_0, m⁺, a));
+//       x_0 = place(x, m⁺, a);  m⁺ = begin_action(x, m, a)
 #include "tasks/task_gradient_block.hpp"
 
 #include <fmt/format.h>
@@ -17,7 +18,9 @@ namespace {
 
 std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
-double checkpoint_bytes(const Model& model) { return double(model.state_bytes_per_environment()) * kBlock; }
+double checkpoint_bytes(const Model& model) {
+  return double(model.state_bytes_per_environment()) * kBlock;
+}
 
 double tape_bytes(const Task& task, const TaskGradientOptions& o) {
   const Integrator scheme = o.stepper.integrator.value_or(task.model().integrator());
@@ -27,18 +30,22 @@ double tape_bytes(const Task& task, const TaskGradientOptions& o) {
 /// Of tapes of `segment` actions and checkpoints between them.
 double bytes_with(const Task& task, const TaskGradientOptions& o, std::int64_t segment) {
   const double records = double(o.actions) * ActionRecord::bytes(task);
-  const double checkpoints = segment == o.actions ? 0 : std::ceil(double(o.actions) / double(segment)) * checkpoint_bytes(task.model());
+  const double checkpoints = segment == o.actions ? 0
+                                                  : std::ceil(double(o.actions) / double(segment)) *
+                                                        checkpoint_bytes(task.model());
   return records + double(segment) * tape_bytes(task, o) + checkpoints;
 }
 
-/// Actions on tapes at a time: all, or as many as make tapes and checkpoints together smallest, if that fits.
+/// Actions on tapes at a time: all, or as many as make tapes and checkpoints together smallest, if
+/// that fits.
 std::int64_t segment_length(const Task& task, const TaskGradientOptions& o) {
   if (bytes_with(task, o, o.actions) <= o.tape_bytes) return o.actions;
   const double ratio = double(o.actions) * checkpoint_bytes(task.model()) / tape_bytes(task, o);
   const auto best = std::clamp<std::int64_t>(std::llround(std::sqrt(ratio)), 1, o.actions);
   const double needed = bytes_with(task, o, best);
   if (needed > o.tape_bytes)
-    throw InputError(fmt::format("tapes of {:.0f} bytes for {} actions; expected at least {:.0f}", o.tape_bytes, o.actions, needed));
+    throw InputError(fmt::format("tapes of {:.0f} bytes for {} actions; expected at least {:.0f}",
+                                 o.tape_bytes, o.actions, needed));
   return best;
 }
 
@@ -75,8 +82,8 @@ void TaskGradientBlock::begin(const GradientGoOn& go_on) {
 }
 
 double TaskGradientBlock::bytes(const Task& task, const TaskGradientOptions& options) {
-  return std::min(bytes_with(task, options, options.actions), options.tape_bytes) + BlockWorker::bytes(task) +
-         2 * double(task.model().workspace_bytes());
+  return std::min(bytes_with(task, options, options.actions), options.tape_bytes) +
+         BlockWorker::bytes(task) + 2 * double(task.model().workspace_bytes());
 }
 
 bool TaskGradientBlock::may_go_on() {
@@ -84,8 +91,8 @@ bool TaskGradientBlock::may_go_on() {
   return !stopped_;
 }
 
-void TaskGradientBlock::run(std::int64_t first, int count, const TaskActions& actions, std::int64_t to, TaskGradients& out,
-                            std::vector<LostEpisode>& lost) {
+void TaskGradientBlock::run(std::int64_t first, int count, const TaskActions& actions,
+                            std::int64_t to, TaskGradients& out, std::vector<LostEpisode>& lost) {
   std::vector<std::int64_t> episodes;
   for (int e = 0; e < count; ++e) episodes.push_back(first + e);
   rollout_.start(options_.seed, episodes);
@@ -136,22 +143,26 @@ void TaskGradientBlock::backward() {
   }
 }
 
-/// From the state after an action, whose cotangents stand in the adjoint, to that in which it was chosen.
+/// From the state after an action, whose cotangents stand in the adjoint, to that in which it was
+/// chosen.
 void TaskGradientBlock::reverse(std::int64_t action, const BlockTape& tape) {
   const ActionRecord& r = records_[size(action)];
   const std::vector<int>& looks = task_.spec().moments;
   const int every = task_.spec().control_every;
-  for (std::vector<double>* x : {&start_q_, &start_v_, &by_u_, &by_action_[size(action)]}) std::fill(x->begin(), x->end(), 0.0);
+  for (std::vector<double>* x : {&start_q_, &start_v_, &by_u_, &by_action_[size(action)]})
+    std::fill(x->begin(), x->end(), 0.0);
   rollout_.look_again(tape);
   reverse_rewards(r, action);
   std::size_t next = looks.size();
   for (int t = task_.spec().steps_per_action; t > 0; --t) {
     if (next > 0 && looks[next - 1] == t) add_moment(--next, tape);
-    if (t % every == 0 || t == task_.spec().steps_per_action) rollout_.ask_again(r, action, (t - 1) / every * every, tape);
+    if (t % every == 0 || t == task_.spec().steps_per_action)
+      rollout_.ask_again(r, action, (t - 1) / every * every, tape);
     adjoint_.reverse_step(rollout_.batch(), 0, tape, t - 1, rollout_.u());
     for (int l = 0; l < rollout_.lanes(); ++l) {
       const std::span<double> by_u = part(by_u_, l);
-      for (std::size_t k = 0; k < by_u.size(); ++k) by_u[k] += adjoint_.loss(0).u[k * kBlock + size(l)];
+      for (std::size_t k = 0; k < by_u.size(); ++k)
+        by_u[k] += adjoint_.loss(0).u[k * kBlock + size(l)];
     }
     if ((t - 1) % every == 0) reverse_controls(r, action, t - 1, tape);
   }
@@ -160,7 +171,8 @@ void TaskGradientBlock::reverse(std::int64_t action, const BlockTape& tape) {
 
 void TaskGradientBlock::reverse_rewards(const ActionRecord& r, std::int64_t action) {
   for (MomentRows& m : moments_)
-    for (std::vector<double>* x : {&m.q, &m.v, &m.variables, &m.tactile}) std::fill(x->begin(), x->end(), 0.0);
+    for (std::vector<double>* x : {&m.q, &m.v, &m.variables, &m.tactile})
+      std::fill(x->begin(), x->end(), 0.0);
   std::vector<MomentCotangent> to(moments_.size());
   for (int l = 0; l < rollout_.lanes(); ++l) {
     if (!r.taken[size(l)]) continue;
@@ -197,18 +209,21 @@ void TaskGradientBlock::add_fields(std::size_t moment, int lane) {
   const auto sensors = task_.model().sensors();
   for (std::size_t s = 0; s < sensors.size() && !fields.empty(); ++s) {
     const std::size_t numbers = 3 * size(sensors[s].points);
-    pullback_.dense_field(lane, static_cast<int>(s), fields.first(numbers), adjoint_.loss(0).parameters);
+    pullback_.dense_field(lane, static_cast<int>(s), fields.first(numbers),
+                          adjoint_.loss(0).parameters);
     fields = fields.subspan(numbers);
   }
 }
 
 /// Of the controls that hold from `step` on.
-void TaskGradientBlock::reverse_controls(const ActionRecord& r, std::int64_t action, int step, const BlockTape& tape) {
+void TaskGradientBlock::reverse_controls(const ActionRecord& r, std::int64_t action, int step,
+                                         const BlockTape& tape) {
   for (int l = 0; l < rollout_.lanes(); ++l) {
     if (!r.taken[size(l)]) continue;
     const Moment first = rollout_.first_moment(tape, l);
     const MomentCotangent to{part(start_q_, l), part(start_v_, l), {}, {}};
-    task_.controls_vjp(rollout_.view(r, action, l, part(r.memory, l), {&first, 1}), step, part(by_u_, l),
+    task_.controls_vjp(rollout_.view(r, action, l, part(r.memory, l), {&first, 1}), step,
+                       part(by_u_, l),
                        {{&to, 1}, part(by_action_[size(action)], l), part(by_memory_, l)});
   }
   std::fill(by_u_.begin(), by_u_.end(), 0.0);
@@ -220,8 +235,11 @@ void TaskGradientBlock::reverse_start(const ActionRecord& r, std::int64_t action
   const std::size_t nv = size(task_.model().nv());
   for (int l = 0; l < rollout_.lanes(); ++l) {
     if (!r.taken[size(l)]) continue;
-    const auto at = [l](AlignedVector<double>& rows, std::size_t i) -> double& { return rows[i * kBlock + size(l)]; };
-    const std::span<double> q = part(start_q_, l), v = part(start_v_, l), memory = part(by_memory_, l);
+    const auto at = [l](AlignedVector<double>& rows, std::size_t i) -> double& {
+      return rows[i * kBlock + size(l)];
+    };
+    const std::span<double> q = part(start_q_, l), v = part(start_v_, l),
+                            memory = part(by_memory_, l);
     const std::span<double> by_action = part(by_action_[size(action)], l);
     const Moment seen{part(r.q, l), part(r.v, l), {}, {}};
     if (task_.spec().restarts) {
@@ -232,11 +250,12 @@ void TaskGradientBlock::reverse_start(const ActionRecord& r, std::int64_t action
         q[i] = v[i] = at(c.q, i) = at(c.v, i) = at(c.previous_q, i) = at(c.previous_v, i) = 0;
       }
       const MomentCotangent to{q, v, {}, {}};
-      task_.place_vjp(rollout_.view(r, action, l, part(r.memory, l), {&seen, 1}), placed_q, placed_v,
-                      {{&to, 1}, by_action, memory});
+      task_.place_vjp(rollout_.view(r, action, l, part(r.memory, l), {&seen, 1}), placed_q,
+                      placed_v, {{&to, 1}, by_action, memory});
     }
     const MomentCotangent to{q, v, {}, {}};
-    task_.begin_action_vjp(rollout_.view(r, action, l, part(r.found, l), {&seen, 1}), memory, {{&to, 1}, by_action, {}});
+    task_.begin_action_vjp(rollout_.view(r, action, l, part(r.found, l), {&seen, 1}), memory,
+                           {{&to, 1}, by_action, {}});
     for (std::size_t i = 0; i < nv; ++i) {
       at(c.q, i) += q[i];
       at(c.v, i) += v[i];
@@ -246,7 +265,8 @@ void TaskGradientBlock::reverse_start(const ActionRecord& r, std::int64_t action
 
 void TaskGradientBlock::finish(std::int64_t to, TaskGradients& out) {
   const TensorSpec& spec = task_.spec().action;
-  const std::size_t width = spec.size(), nv = size(task_.model().nv()), numbers = size(parameters_.count());
+  const std::size_t width = spec.size(), nv = size(task_.model().nv()),
+                    numbers = size(parameters_.count());
   for (int l = 0; l < rollout_.lanes(); ++l) {
     const std::size_t e = size(to + l);
     out.value[e] = rollout_.data().returns[size(l)];
@@ -264,7 +284,8 @@ void TaskGradientBlock::finish(std::int64_t to, TaskGradients& out) {
       out.by_v[e * nv + i] = c.v[i * kBlock + size(l)];
     }
     if (options_.parameters)
-      parameters_.gradient(c, rollout_.batch(), l, std::span(out.by_parameter).subspan(e * numbers, numbers));
+      parameters_.gradient(c, rollout_.batch(), l,
+                           std::span(out.by_parameter).subspan(e * numbers, numbers));
   }
 }
 

@@ -13,7 +13,8 @@
 namespace tangere {
 namespace {
 
-constexpr double kMargin = 2e-2;  // actions stay so far within their bounds: more than differences move them
+constexpr double kMargin =
+    2e-2;  // actions stay so far within their bounds: more than differences move them
 
 std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
@@ -24,12 +25,14 @@ struct Inputs {
 
 class Check {
  public:
-  Check(const Task& task, const TaskMaker& make, const TaskActions& actions, const TaskCheckOptions& o)
+  Check(const Task& task, const TaskMaker& make, const TaskActions& actions,
+        const TaskCheckOptions& o)
       : task_(task), make_(make), options_(o), parameters_(task.model()) {
     gradient_ = task_gradients(task, within_bounds(actions), wanted());
     if (!gradient_.lost.empty())
-      throw InputError(fmt::format("action {} of episode {} of task {} finds no solution: {}", gradient_.lost[0].action, o.episode,
-                                   task.spec().name, to_string(gradient_.lost[0].status)));
+      throw InputError(fmt::format("action {} of episode {} of task {} finds no solution: {}",
+                                   gradient_.lost[0].action, o.episode, task.spec().name,
+                                   to_string(gradient_.lost[0].status)));
     out.loss = gradient_.value[0];
     out.actions = gradient_.length[0];
     gradient_.action.resize(size(out.actions) * task.spec().action.size());
@@ -46,27 +49,44 @@ class Check {
   void actions() {
     const std::size_t width = task_.spec().action.size();
     add({"actions", gradient_.by_action, all_of(gradient_.by_action.size()),
-         [&](std::size_t i) { return difference(kControlScale, [i](Inputs& x, double e) { x.actions[i] += e; }); },
-         [&, width](std::size_t i) { return fmt::format("action {} {}[{}]", i / width, task_.spec().action.name, i % width); }},
-        0, [](std::span<const double> d) { return EpisodeDirection{d, {}, {}, {}}; });
+         [&](std::size_t i) {
+           return difference(kControlScale, [i](Inputs& x, double e) { x.actions[i] += e; });
+         },
+         [&, width](std::size_t i) {
+           return fmt::format("action {} {}[{}]", i / width, task_.spec().action.name, i % width);
+         }},
+        0, [](std::span<const double> d) {
+          return EpisodeDirection{d, {}, {}, {}};
+        });
   }
   void positions() {
     const auto move = [this](std::size_t i) {
-      return [this, i](Inputs& x, double e) { displace(task_.model().compiled(), x.q, static_cast<int>(i), e); };
+      return [this, i](Inputs& x, double e) {
+        displace(task_.model().compiled(), x.q, static_cast<int>(i), e);
+      };
     };
-    add({"q", gradient_.by_q, all_of(gradient_.by_q.size()), [&](std::size_t i) { return difference(1, move(i)); }, dof_name()}, 1,
-        [](std::span<const double> d) { return EpisodeDirection{{}, d, {}, {}}; });
+    add({"q", gradient_.by_q, all_of(gradient_.by_q.size()),
+         [&](std::size_t i) { return difference(1, move(i)); }, dof_name()},
+        1, [](std::span<const double> d) {
+          return EpisodeDirection{{}, d, {}, {}};
+        });
   }
   void velocities() {
     add({"v", gradient_.by_v, all_of(gradient_.by_v.size()),
-         [&](std::size_t i) { return difference(kVelocityScale, [i](Inputs& x, double e) { x.v[i] += e; }); }, dof_name()},
-        2, [](std::span<const double> d) { return EpisodeDirection{{}, {}, d, {}}; });
+         [&](std::size_t i) {
+           return difference(kVelocityScale, [i](Inputs& x, double e) { x.v[i] += e; });
+         },
+         dof_name()},
+        2, [](std::span<const double> d) {
+          return EpisodeDirection{{}, {}, d, {}};
+        });
   }
   /// By relative changes of what this episode has: units differ.
   void numbers() {
     const RelativeGradient r(parameters_, task_.model().scene(), varying_, gradient_.by_parameter);
     std::vector<double> rows(size(parameter_rows(task_.model().compiled())));
-    add({"numbers", r.gradient, r.given, [&](std::size_t k) { return difference_of_number(static_cast<int>(k)); },
+    add({"numbers", r.gradient, r.given,
+         [&](std::size_t k) { return difference_of_number(static_cast<int>(k)); },
          [&](std::size_t k) { return parameters_.infos()[k].name; }},
         3, [&](std::span<const double> d) {
           parameters_.spread(r.change(d), rollout_->batch(), 0, rows);
@@ -79,7 +99,8 @@ class Check {
  private:
   TaskActions within_bounds(const TaskActions& actions) const {
     const double low = task_.spec().action.low + kMargin, high = task_.spec().action.high - kMargin;
-    return [&actions, low, high](const TaskView& view, std::span<const double> observation, std::span<double> action) {
+    return [&actions, low, high](const TaskView& view, std::span<const double> observation,
+                                 std::span<double> action) {
       actions(view, observation, action);
       for (double& a : action) a = std::clamp(a, low, high);
     };
@@ -111,7 +132,8 @@ class Check {
     ActionRecord record(task);
     for (std::int64_t a = 0; a < out.actions; ++a) {
       for (std::size_t l = 0; l < inputs.size(); ++l)
-        std::copy_n(inputs[l].actions.begin() + a * std::int64_t(width), width, record.asked.begin() + std::ptrdiff_t(l * width));
+        std::copy_n(inputs[l].actions.begin() + a * std::int64_t(width), width,
+                    record.asked.begin() + std::ptrdiff_t(l * width));
       rollout.begin(record);
       rollout.take_steps(nullptr);
       rollout.conclude();
@@ -123,7 +145,8 @@ class Check {
   }
 
   /// change(inputs, e): one entry of the inputs moved by e.
-  [[nodiscard]] Difference difference(double scale, const std::function<void(Inputs&, double)>& change) const {
+  [[nodiscard]] Difference difference(double scale,
+                                      const std::function<void(Inputs&, double)>& change) const {
     std::vector<Inputs> all;
     for (const double e : sweep(scale)) {
       all.push_back(at_);
@@ -145,7 +168,8 @@ class Check {
     return best_difference(values, 1);
   }
 
-  void add(const Comparison& c, std::uint32_t purpose, const std::function<EpisodeDirection(std::span<const double>)>& along) {
+  void add(const Comparison& c, std::uint32_t purpose,
+           const std::function<EpisodeDirection(std::span<const double>)>& along) {
     out.inputs.push_back(compare(c, out.loss, options_, purpose));
     const std::vector<double> d = random_direction(c.gradient.size(), options_.seed, purpose);
     compare_along(out.inputs.back(), c.gradient, d, tangent_->along(along(d)));
@@ -167,8 +191,8 @@ class Check {
 
 }  // namespace
 
-TaskGradientCheck check_task_gradient(const Task& task, const TaskMaker& make, const TaskActions& actions,
-                                      const TaskCheckOptions& options) {
+TaskGradientCheck check_task_gradient(const Task& task, const TaskMaker& make,
+                                      const TaskActions& actions, const TaskCheckOptions& options) {
   Check check(task, make, actions, options);
   check.actions();
   check.positions();

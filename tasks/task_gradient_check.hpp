@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The gradient of one episode's return, checked on the spot: against central differences of whole episodes and against
-// tangents in dual numbers through the steps.
+// The gradient of one episode's return, checked on the spot: against central differences of whole
+// episodes and against tangents in dual numbers through the steps.
 #pragma once
 
 #include <functional>
@@ -24,10 +24,11 @@ struct TaskGradientCheck : GradientCheck {
   std::int64_t actions = 0;  ///< until the end
 };
 
-/// Differences move the actions that `actions` has chosen, drawn in a little where they reach their bounds, the state of the first
-/// one and the scene's numbers; everything drawn stays. The tangent takes the task's own derivatives forward, those of the
-/// steps in dual numbers. Throws InputError when the episode finds no solution.
-TaskGradientCheck check_task_gradient(const Task& task, const TaskMaker& make, const TaskActions& actions,
-                                      const TaskCheckOptions& options);
+/// Differences move the actions that `actions` has chosen, drawn in a little where they reach their
+/// bounds, the state of the first one and the scene's numbers; everything drawn stays. The tangent
+/// takes the task's own derivatives forward, those of the steps in dual numbers. Throws InputError
+/// when the episode finds no solution.
+TaskGradientCheck check_task_gradient(const Task& task, const TaskMaker& make,
+                                      const TaskActions& actions, const TaskCheckOptions& options);
 
 }  // namespace tangere

@@ -18,7 +18,8 @@ struct Entry {
 /// A task with variants: `variant` goes to both functions.
 template <class Declare, class Make, class Variant>
 Entry entry(Declare declare, Make make, Variant variant) {
-  return {[=] { return declare(variant); }, [=](const Scene& scene) { return make(scene, variant); }};
+  return {[=] { return declare(variant); },
+          [=](const Scene& scene) { return make(scene, variant); }};
 }
 
 const std::vector<Entry>& entries() {
@@ -43,7 +44,8 @@ const std::vector<Entry>& entries() {
 const Entry& find(const std::string& name) {
   for (const Entry& e : entries())
     if (e.declare().name == name) return e;
-  throw InputError(fmt::format("no task is named '{}'; expected one of {}", name, fmt::join(task_names(), ", ")));
+  throw InputError(fmt::format("no task is named '{}'; expected one of {}", name,
+                               fmt::join(task_names(), ", ")));
 }
 
 }  // namespace
@@ -60,6 +62,8 @@ bool is_task(const std::string& name) {
 }
 
 TaskSpec task_spec(const std::string& name) { return find(name).declare(); }
-std::unique_ptr<Task> make_task(const std::string& name, const Scene& scene) { return find(name).make(scene); }
+std::unique_ptr<Task> make_task(const std::string& name, const Scene& scene) {
+  return find(name).make(scene);
+}
 
 }  // namespace tangere

@@ -15,8 +15,9 @@ std::vector<std::string> task_names();
 bool is_task(const std::string& name);
 /// What a task declares. Throws InputError for a name that is none.
 TaskSpec task_spec(const std::string& name);
-/// The task of that name on its scene (spec.scene, as read from its file); its own distributions replace what the file
-/// randomises. Throws InputError for a name that is none and for a scene that is not the task's.
+/// The task of that name on its scene (spec.scene, as read from its file); its own distributions
+/// replace what the file randomises. Throws InputError for a name that is none and for a scene that
+/// is not the task's.
 std::unique_ptr<Task> make_task(const std::string& name, const Scene& scene);
 
 TaskSpec declare_dummy();

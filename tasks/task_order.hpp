@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What oneTBB orders, told to the thread sanitizer: it cannot see into the distribution's library, which is not built with
-// it, and would call every hand-over a race. Nothing in other builds. Says no more than oneTBB promises (a task starts after
-// what spawned it, a graph's message arrives after it was sent, waiting ends after all tasks), so real races are still found.
+// What oneTBB orders, told to the thread sanitizer: it cannot see into the distribution's library,
+// which is not built with it, and would call every hand-over a race. Nothing in other builds. Says
+// no more than oneTBB promises (a task starts after what spawned it, a graph's message arrives
+// after it was sent, waiting ends after all tasks), so real races are still found.
 #pragma once
 
 #include <utility>
@@ -24,7 +25,8 @@ struct ByReference {
 template <class Function>
 ByReference(const Function*) -> ByReference<Function>;
 
-/// What this thread did until now comes before what others do after ordered_after() of the same address.
+/// What this thread did until now comes before what others do after ordered_after() of the same
+/// address.
 inline void ordered_before([[maybe_unused]] const void* address) {
 #if defined(__SANITIZE_THREAD__)
   __tsan_release(const_cast<void*>(address));
@@ -37,8 +39,9 @@ inline void ordered_after([[maybe_unused]] const void* address) {
 #endif
 }
 
-/// After graph.wait_for_all(): what the graph itself did in other threads, the last of it after our bodies, is over. Its tasks
-/// count themselves off in the header, so touching the counter here is enough.
+/// After graph.wait_for_all(): what the graph itself did in other threads, the last of it after our
+/// bodies, is over. Its tasks count themselves off in the header, so touching the counter here is
+/// enough.
 template <class Graph>
 void ordered_after_tasks_of([[maybe_unused]] Graph& graph) {
 #if defined(__SANITIZE_THREAD__)
@@ -51,11 +54,13 @@ void ordered_after_tasks_of([[maybe_unused]] Graph& graph) {
 class TaskOrder {
  public:
   void begin() const { ordered_before(&begin_); }
-  /// First thing in a task whose function itself, with what it captured, lives where begin() was called.
+  /// First thing in a task whose function itself, with what it captured, lives where begin() was
+  /// called.
   static void arrive() { ordered_after(&begin_); }
   void end() const { ordered_after(&end_); }
 
-  /// While a task runs. `mine`: what tasks hand from one to the next and none uses at the same time as another.
+  /// While a task runs. `mine`: what tasks hand from one to the next and none uses at the same time
+  /// as another.
   class Task {
    public:
     Task(const TaskOrder& order, const void* mine) : order_(order), mine_(mine) {

@@ -43,7 +43,8 @@ struct TaskPilot::Impl {
   void choose(const Batch& batch) {
     const std::size_t width = task.spec().action.size(), seen = task.spec().observation_size();
     for (int e = 0; e < batch.environments(); ++e)
-      policy.act(view_of(batch, data, e), std::span(data.observation).subspan(static_cast<std::size_t>(e) * seen, seen),
+      policy.act(view_of(batch, data, e),
+                 std::span(data.observation).subspan(static_cast<std::size_t>(e) * seen, seen),
                  std::span(actions).subspan(static_cast<std::size_t>(e) * width, width));
   }
 };
@@ -70,7 +71,8 @@ void TaskPilot::done(std::int64_t step, Batch& batch, RowSink& sink) {
   if (k + 1 != p.task.spec().steps_per_action) return;
   p.each_block([&](BlockWorker& worker, int b) { worker.conclude(batch, p.data, b, p.counts); });
   if (const std::int64_t action = p.action_of(step); action >= 0)
-    sink.write(ActionRow{action, step + 1, p.data.action, p.data.reward, p.data.terminated, p.data.truncated, p.data.success});
+    sink.write(ActionRow{action, step + 1, p.data.action, p.data.reward, p.data.terminated,
+                         p.data.truncated, p.data.success});
 }
 
 std::int64_t TaskPilot::steps(const TaskSpec& spec) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Drives a rollout as a policy plays a task: one episode in every environment, step by step, for files of trajectories.
+// Drives a rollout as a policy plays a task: one episode in every environment, step by step, for
+// files of trajectories.
 #pragma once
 
 #include <memory>
@@ -16,7 +17,8 @@ class TaskPilot : public RolloutDriver {
   ~TaskPilot() override;
 
   void drive(std::int64_t step, Batch& batch, std::span<double> u) override;
-  /// After the last step of an action: an ActionRow. An environment whose episode is over is held from then on.
+  /// After the last step of an action: an ActionRow. An environment whose episode is over is held
+  /// from then on.
   void done(std::int64_t step, Batch& batch, RowSink& sink) override;
 
   /// Simulation steps of a whole episode, an opening included.

@@ -37,8 +37,8 @@ ActionRecord::ActionRecord(const Task& task) {
 }
 
 double ActionRecord::bytes(const Task& task) {
-  const std::size_t numbers = size(task.model().nq()) + size(task.model().nv()) + 2 * size(task.spec().memory) +
-                              2 * task.spec().action.size();
+  const std::size_t numbers = size(task.model().nq()) + size(task.model().nv()) +
+                              2 * size(task.spec().memory) + 2 * task.spec().action.size();
   return static_cast<double>(numbers * kBlock * sizeof(double) + sizeof(ActionRecord));
 }
 
@@ -92,13 +92,15 @@ void TaskRollout::choose(const TaskActions& actions, ActionRecord& r) {
     actions(view_of(*batch_, *data_, l), row(data_->observation, l, seen), asked);
     for (std::size_t k = 0; k < width; ++k)
       if (!std::isfinite(asked[k]))
-        throw InputError(fmt::format("number {} of action {} of episode {} is {}; expected a finite number", k,
-                                     data_->length[size(l)], data_->episodes[size(l)], asked[k]));
+        throw InputError(
+            fmt::format("number {} of action {} of episode {} is {}; expected a finite number", k,
+                        data_->length[size(l)], data_->episodes[size(l)], asked[k]));
   }
 }
 
 void TaskRollout::begin(ActionRecord& r) {
-  for (int l = 0; l < lanes(); ++l) r.taken[size(l)] = data_->state[size(l)] == EnvironmentState::running;
+  for (int l = 0; l < lanes(); ++l)
+    r.taken[size(l)] = data_->state[size(l)] == EnvironmentState::running;
   const auto keep = [&](const std::vector<double>& from, std::vector<double>& to) {
     std::copy(from.begin(), from.end(), to.begin());
   };
@@ -129,7 +131,8 @@ void TaskRollout::place_again(const ActionRecord& r, std::int64_t action) {
     std::copy(q.begin(), q.end(), q_.begin());
     std::copy(v.begin(), v.end(), v_.begin());
     const Moment seen{q, v, {}, {}};
-    task_.place(view(r, action, l, row(r.memory, l, size(task_.spec().memory)), {&seen, 1}), q_, v_);
+    task_.place(view(r, action, l, row(r.memory, l, size(task_.spec().memory)), {&seen, 1}), q_,
+                v_);
     batch_->set_state(l, q_, v_);
   }
 }
@@ -144,12 +147,14 @@ void TaskRollout::retake_steps(const ActionRecord& r, std::int64_t action, Block
   }
 }
 
-void TaskRollout::ask_again(const ActionRecord& r, std::int64_t action, int step, const BlockTape& tape) {
+void TaskRollout::ask_again(const ActionRecord& r, std::int64_t action, int step,
+                            const BlockTape& tape) {
   const std::size_t memory = size(task_.spec().memory);
   for (int l = 0; l < lanes(); ++l) {
     if (!r.taken[size(l)]) continue;
     const Moment first = first_moment(tape, l);
-    task_.controls(view(r, action, l, row(r.memory, l, memory), {&first, 1}), step, row(u_, l, size(task_.model().nu())));
+    task_.controls(view(r, action, l, row(r.memory, l, memory), {&first, 1}), step,
+                   row(u_, l, size(task_.model().nu())));
   }
 }
 
@@ -160,11 +165,14 @@ void TaskRollout::look_again(const BlockTape& tape) {
   }
 }
 
-TaskView TaskRollout::view(const ActionRecord& r, std::int64_t action, int lane, std::span<const double> memory,
-                           std::span<const Moment> now) const {
-  return {batch_->seed(), data_->episodes[size(lane)],
-          action,         memory,
-          row(r.action, lane, task_.spec().action.size()), now};
+TaskView TaskRollout::view(const ActionRecord& r, std::int64_t action, int lane,
+                           std::span<const double> memory, std::span<const Moment> now) const {
+  return {batch_->seed(),
+          data_->episodes[size(lane)],
+          action,
+          memory,
+          row(r.action, lane, task_.spec().action.size()),
+          now};
 }
 
 Moment TaskRollout::first_moment(const BlockTape& tape, int lane) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Up to sixteen episodes side by side, an action at a time, with what their derivatives need to know of it.
+// Up to sixteen episodes side by side, an action at a time, with what their derivatives need to
+// know of it.
 #pragma once
 
 #include <array>
@@ -14,15 +15,15 @@
 namespace tangere {
 
 /// Fills the action of an episode that shows `view` and `observation`. Called from several threads.
-using TaskActions =
-    std::function<void(const TaskView& view, std::span<const double> observation, std::span<double> action)>;
+using TaskActions = std::function<void(const TaskView& view, std::span<const double> observation,
+                                       std::span<double> action)>;
 
 /// An action as it began, of every lane.
 struct ActionRecord {
-  std::vector<double> q, v;                        ///< (16, nq), (16, nv) where it was chosen: before a task restarts
-  std::vector<double> found, memory;               ///< (16, memory) before and after begin_action
-  std::vector<double> asked, action;               ///< (16, action): as chosen, as taken
-  std::array<bool, kernels::kBlock> taken{};       ///< false: the episode had ended
+  std::vector<double> q, v;  ///< (16, nq), (16, nv) where it was chosen: before a task restarts
+  std::vector<double> found, memory;          ///< (16, memory) before and after begin_action
+  std::vector<double> asked, action;          ///< (16, action): as chosen, as taken
+  std::array<bool, kernels::kBlock> taken{};  ///< false: the episode had ended
 
   explicit ActionRecord(const Task& task);
   static double bytes(const Task& task);
@@ -39,7 +40,8 @@ class TaskRollout {
   void displace(int lane, std::span<const double> q, std::span<const double> v);
 
   [[nodiscard]] bool running() const;  ///< whether some episode goes on
-  /// Chooses the next action of who is running, into record.asked. Throws InputError for one that is not finite.
+  /// Chooses the next action of who is running, into record.asked. Throws InputError for one that
+  /// is not finite.
   void choose(const TaskActions& actions, ActionRecord& record);
   /// Begins record.asked and fills in the rest.
   void begin(ActionRecord& record);
@@ -51,7 +53,8 @@ class TaskRollout {
   void retake_steps(const ActionRecord& record, std::int64_t action, BlockTape& tape);
   /// Puts a lane where a task restarts.
   void place_again(const ActionRecord& record, std::int64_t action);
-  /// Controls for the steps of an action from `step` on into u(), of lanes that took it; the action's first state is at 0 of `tape`.
+  /// Controls for the steps of an action from `step` on into u(), of lanes that took it; the
+  /// action's first state is at 0 of `tape`.
   void ask_again(const ActionRecord& record, std::int64_t action, int step, const BlockTape& tape);
   /// What was seen during an action: on its tape again.
   void look_again(const BlockTape& tape);
@@ -67,8 +70,8 @@ class TaskRollout {
   [[nodiscard]] const VectorCounts& counts() const { return counts_; }
 
   /// What the task saw when it took action number `action`, of which `memory` and `now` are given.
-  [[nodiscard]] TaskView view(const ActionRecord& record, std::int64_t action, int lane, std::span<const double> memory,
-                              std::span<const Moment> now) const;
+  [[nodiscard]] TaskView view(const ActionRecord& record, std::int64_t action, int lane,
+                              std::span<const double> memory, std::span<const Moment> now) const;
   /// A lane's first state of an action, from its tape.
   [[nodiscard]] Moment first_moment(const BlockTape& tape, int lane);
 

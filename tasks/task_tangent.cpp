@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A row of a task's derivative is what its reverse gives for one number; a tangent is all rows times the change.
+// A row of a task's derivative is what its reverse gives for one number; a tangent is all rows
+// times the change.
 #include "tasks/task_tangent.hpp"
 
 #include <algorithm>
@@ -15,7 +16,9 @@ double dot(std::span<const double> a, std::span<const double> b) {
 }
 
 /// Lane 0 of rows by lane.
-std::span<const double> of_lane(const std::vector<double>& all) { return std::span(all).first(all.size() / kernels::kBlock); }
+std::span<const double> of_lane(const std::vector<double>& all) {
+  return std::span(all).first(all.size() / kernels::kBlock);
+}
 
 }  // namespace
 
@@ -25,7 +28,8 @@ struct TaskTangent::OwnCotangent {
   std::vector<double> memory, action;
   std::vector<MomentCotangent> moments;
 
-  OwnCotangent(const Task& task, std::size_t count) : memory(size(task.spec().memory)), action(task.spec().action.size()) {
+  OwnCotangent(const Task& task, std::size_t count)
+      : memory(size(task.spec().memory)), action(task.spec().action.size()) {
     const std::vector<double> dofs(size(task.model().nv()));
     for (std::size_t m = 0; m < count; ++m) {
       q.push_back(dofs);
@@ -33,16 +37,19 @@ struct TaskTangent::OwnCotangent {
       variables.emplace_back(task.variables_size());
       tactile.emplace_back(task.tactile_size());
     }
-    for (std::size_t m = 0; m < count; ++m) moments.push_back({q[m], v[m], variables[m], tactile[m]});
+    for (std::size_t m = 0; m < count; ++m)
+      moments.push_back({q[m], v[m], variables[m], tactile[m]});
   }
   [[nodiscard]] ViewCotangent out() { return {moments, action, memory}; }
   /// Times the changes of an action's start.
-  [[nodiscard]] double start_dot(const StateTangent& x, const std::vector<double>& dm, const std::vector<double>& da) const {
+  [[nodiscard]] double start_dot(const StateTangent& x, const std::vector<double>& dm,
+                                 const std::vector<double>& da) const {
     return dot(q[0], x.q) + dot(v[0], x.v) + dot(memory, dm) + dot(action, da);
   }
 };
 
-TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions, const StepperOptions& options)
+TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
+                         const StepperOptions& options)
     : rollout_(rollout),
       task_(rollout.task()),
       tangent_(task_.model(), options),
@@ -69,7 +76,9 @@ double TaskTangent::along(const EpisodeDirection& d) {
   std::fill(memory_.begin(), memory_.end(), 0.0);
   double sum = 0;
   for (std::size_t a = 0; a < records_.size(); ++a) {
-    action_ = given(d.actions.empty() ? d.actions : d.actions.subspan(a * action_.size(), action_.size()), action_.size());
+    action_ =
+        given(d.actions.empty() ? d.actions : d.actions.subspan(a * action_.size(), action_.size()),
+              action_.size());
     rollout_.look_again(tapes_[a]);
     begin(a);
     ViewTangent seen;
@@ -90,19 +99,21 @@ void TaskTangent::begin(std::size_t action) {
   for (std::size_t k = 0; k < memory.size(); ++k) {
     OwnCotangent bar(task_, 1);
     bar.memory[k] = 1;
-    task_.begin_action_vjp(rollout_.view(r, std::int64_t(action), 0, of_lane(r.found), {&seen, 1}), bar.memory,
-                           {bar.moments, bar.action});
+    task_.begin_action_vjp(rollout_.view(r, std::int64_t(action), 0, of_lane(r.found), {&seen, 1}),
+                           bar.memory, {bar.moments, bar.action});
     memory[k] = bar.start_dot(state_, memory_, action_);
   }
   memory_ = memory;
   if (!task_.spec().restarts) return;
   const std::size_t nv = state_.q.size();
-  StateTangent placed{std::vector<double>(nv), std::vector<double>(nv), std::vector<double>(nv), std::vector<double>(nv)};
+  StateTangent placed{std::vector<double>(nv), std::vector<double>(nv), std::vector<double>(nv),
+                      std::vector<double>(nv)};
   for (std::size_t i = 0; i < 2 * nv; ++i) {
     OwnCotangent bar(task_, 1);
     std::vector<double> q(nv), v(nv);
     (i < nv ? q[i] : v[i - nv]) = 1;
-    task_.place_vjp(rollout_.view(r, std::int64_t(action), 0, of_lane(r.memory), {&seen, 1}), q, v, bar.out());
+    task_.place_vjp(rollout_.view(r, std::int64_t(action), 0, of_lane(r.memory), {&seen, 1}), q, v,
+                    bar.out());
     (i < nv ? placed.q[i] : placed.v[i - nv]) = bar.start_dot(state_, memory_, action_);
   }
   state_ = placed;
@@ -124,17 +135,21 @@ void TaskTangent::take_steps(std::size_t action, const EpisodeDirection& d, View
         std::vector<double> weight(nu);
         weight[k] = 1;
         const Moment first = rollout_.first_moment(tape, 0);
-        task_.controls_vjp(rollout_.view(r, std::int64_t(action), 0, of_lane(r.memory), {&first, 1}), t, weight, bar.out());
+        task_.controls_vjp(
+            rollout_.view(r, std::int64_t(action), 0, of_lane(r.memory), {&first, 1}), t, weight,
+            bar.out());
         u_dot[k] = bar.start_dot(start, memory_, action_);
       }
     }
     tape.show(t, rollout_.batch(), 0);
-    tangent_.step(rollout_.batch(), 0, 0, tape, t, rollout_.u().first(nu), u_dot, d.numbers, state_);
+    tangent_.step(rollout_.batch(), 0, 0, tape, t, rollout_.u().first(nu), u_dot, d.numbers,
+                  state_);
     if (spec.moments[next] == t + 1) look(action, next++, d, seen);
   }
 }
 
-void TaskTangent::look(std::size_t action, std::size_t moment, const EpisodeDirection& d, ViewTangent& seen) {
+void TaskTangent::look(std::size_t action, std::size_t moment, const EpisodeDirection& d,
+                       ViewTangent& seen) {
   const BlockTape& tape = tapes_[action];
   const int step = task_.spec().moments[moment];
   seen.q[moment] = state_.q;
@@ -151,7 +166,8 @@ void TaskTangent::look(std::size_t action, std::size_t moment, const EpisodeDire
   const auto sensors = task_.model().sensors();
   for (std::size_t s = 0; s < sensors.size(); ++s) {
     std::vector<double> change(3 * size(sensors[s].points));
-    tangent_.field(rollout_.batch(), 0, 0, tape, step, static_cast<int>(s), d.numbers, {}, state_, change);
+    tangent_.field(rollout_.batch(), 0, 0, tape, step, static_cast<int>(s), d.numbers, {}, state_,
+                   change);
     seen.tactile[moment].insert(seen.tactile[moment].end(), change.begin(), change.end());
   }
 }
@@ -159,11 +175,13 @@ void TaskTangent::look(std::size_t action, std::size_t moment, const EpisodeDire
 double TaskTangent::reward(std::size_t action, const ViewTangent& seen) {
   const ActionRecord& r = records_[action];
   OwnCotangent bar(task_, seen.q.size());
-  task_.reward_vjp(rollout_.view(r, std::int64_t(action) + 1, 0, of_lane(r.memory), rollout_.moments(0)), 1, bar.out());
+  task_.reward_vjp(
+      rollout_.view(r, std::int64_t(action) + 1, 0, of_lane(r.memory), rollout_.moments(0)), 1,
+      bar.out());
   double sum = dot(bar.memory, seen.memory) + dot(bar.action, seen.action);
   for (std::size_t m = 0; m < seen.q.size(); ++m)
-    sum += dot(bar.q[m], seen.q[m]) + dot(bar.v[m], seen.v[m]) + dot(bar.variables[m], seen.variables[m]) +
-           dot(bar.tactile[m], seen.tactile[m]);
+    sum += dot(bar.q[m], seen.q[m]) + dot(bar.v[m], seen.v[m]) +
+           dot(bar.variables[m], seen.variables[m]) + dot(bar.tactile[m], seen.tactile[m]);
   return sum;
 }
 

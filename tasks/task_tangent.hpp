@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How an episode's return changes along a direction, forward: a task's own derivatives row by row, its steps in dual numbers.
-// The second route that gradients of returns are checked by.
+// How an episode's return changes along a direction, forward: a task's own derivatives row by row,
+// its steps in dual numbers. The second route that gradients of returns are checked by.
 #pragma once
 
 #include <span>
@@ -20,7 +20,8 @@ struct EpisodeDirection {
 
 class TaskTangent {
  public:
-  /// Plays lane 0 of `rollout`, which has just started, with `actions`: (A, action), within their bounds.
+  /// Plays lane 0 of `rollout`, which has just started, with `actions`: (A, action), within their
+  /// bounds.
   TaskTangent(TaskRollout& rollout, std::span<const double> actions, const StepperOptions& options);
 
   [[nodiscard]] double along(const EpisodeDirection& direction);
@@ -44,7 +45,8 @@ class TaskTangent {
   std::vector<ActionRecord> records_;
   std::vector<BlockTape> tapes_;
   StateTangent state_;
-  std::vector<double> memory_, action_;  // how they change: what begin_action left, the action in hand
+  std::vector<double> memory_,
+      action_;  // how they change: what begin_action left, the action in hand
 };
 
 }  // namespace tangere

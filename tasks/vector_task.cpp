@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A thread takes a block of 16 environments through one action: start those whose episode is over, step, look, judge.
+// A thread takes a block of 16 environments through one action: start those whose episode is over,
+// step, look, judge.
 #include "tasks/vector_task.hpp"
 
 #include <tbb/blocked_range.h>
@@ -24,7 +25,8 @@ struct VectorTask::Impl {
         batch(t.model(), environments, o.seed, o.first_episode),
         arena(o.threads) {
     workers.reserve(static_cast<std::size_t>(o.threads));
-    for (int i = 0; i < o.threads; ++i) workers.push_back(std::make_unique<BlockWorker>(t, o.precision));
+    for (int i = 0; i < o.threads; ++i)
+      workers.push_back(std::make_unique<BlockWorker>(t, o.precision));
     tallies.resize(static_cast<std::size_t>(batch.blocks()));
   }
 
@@ -39,21 +41,23 @@ struct VectorTask::Impl {
                                   static_cast<std::size_t>(options.threads));
     const auto run = [&](const tbb::blocked_range<int>& blocks) {
       TaskOrder::arrive();
-      BlockWorker& worker = *workers[static_cast<std::size_t>(tbb::this_task_arena::current_thread_index())];
+      BlockWorker& worker =
+          *workers[static_cast<std::size_t>(tbb::this_task_arena::current_thread_index())];
       const TaskOrder::Task task_of_thread(order, &worker);
       for (int b = blocks.begin(); b != blocks.end(); ++b) body(worker, b);
     };
     order.begin();
     arena.execute([&] {
-      tbb::parallel_for(tbb::blocked_range<int>(0, batch.blocks(), 1), ByReference<decltype(run)>{&run},
-                        tbb::simple_partitioner{});
+      tbb::parallel_for(tbb::blocked_range<int>(0, batch.blocks(), 1),
+                        ByReference<decltype(run)>{&run}, tbb::simple_partitioner{});
     });
     order.end();
   }
 
   void reset(std::uint64_t seed) {
     options.seed = seed;
-    if (batch.seed() != seed) batch = Batch(task.model(), batch.environments(), seed, options.first_episode);
+    if (batch.seed() != seed)
+      batch = Batch(task.model(), batch.environments(), seed, options.first_episode);
     for (int e = 0; e < batch.environments(); ++e)
       data.next_episode[static_cast<std::size_t>(e)] = options.first_episode + e;
     std::fill(data.state.begin(), data.state.end(), EnvironmentState::to_start);
@@ -99,7 +103,8 @@ void VectorTask::reset(std::uint64_t seed) { impl_->reset(seed); }
 void VectorTask::step(std::span<const double> actions) {
   const std::size_t expected = impl_->data.action.size();
   if (actions.size() != expected)
-    throw InputError(std::to_string(actions.size()) + " numbers of actions; expected " + std::to_string(expected));
+    throw InputError(std::to_string(actions.size()) + " numbers of actions; expected " +
+                     std::to_string(expected));
   impl_->run(actions);
 }
 
@@ -120,7 +125,9 @@ std::span<const double> VectorTask::returns() const { return impl_->data.returns
 std::span<const std::int64_t> VectorTask::lengths() const { return impl_->data.length; }
 std::span<const std::int64_t> VectorTask::episodes() const { return impl_->data.episodes; }
 StepStatus VectorTask::status(int environment) const { return impl_->batch.status(environment); }
-TaskView VectorTask::view(int environment) const { return view_of(impl_->batch, impl_->data, environment); }
+TaskView VectorTask::view(int environment) const {
+  return view_of(impl_->batch, impl_->data, environment);
+}
 const Batch& VectorTask::batch() const { return impl_->batch; }
 
 VectorCounts VectorTask::counts() const {

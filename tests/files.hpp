@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A whole file as a string, in one call: byte by byte, a sanitizer makes minutes of the larger ones.
+// A whole file as a string, in one call: byte by byte, a sanitizer makes minutes of the larger
+// ones.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +13,8 @@ namespace tangere {
 inline std::string file_bytes(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::string bytes(std::filesystem::file_size(path), '\0');
-  if (!file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) throw std::runtime_error("cannot read " + path);
+  if (!file.read(bytes.data(), static_cast<std::streamsize>(bytes.size())))
+    throw std::runtime_error("cannot read " + path);
   return bytes;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `tangere bench` as users meet it: its keys, its files, its refusals. No test looks at how long anything took.
+// `tangere bench` as users meet it: its keys, its files, its refusals. No test looks at how long
+// anything took.
 #include <gmock/gmock.h>
 #include <tinyxml2.h>
 
@@ -204,11 +205,15 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"threads_empty", {"--threads", "1,,2"}, 2, "''; expected whole numbers"},
         Refusal{"threads_end", {"--threads", "1,"}, 2, "''; expected whole numbers"},
         Refusal{"threads_twice", {"--threads", "2,1,2"}, 2, "2 stands there twice"},
-        Refusal{
-            "frames", {"--frames", "foo"}, 2, "unknown frames 'foo'; expected one of dense, compact, none"},
+        Refusal{"frames",
+                {"--frames", "foo"},
+                2,
+                "unknown frames 'foo'; expected one of dense, compact, none"},
         Refusal{"frames_near", {"--frames", "dens"}, 2, "did you mean 'dense'?"},
-        Refusal{
-            "precision", {"--precision", "half"}, 2, "unknown precision 'half'; expected one of double, mixed"},
+        Refusal{"precision",
+                {"--precision", "half"},
+                2,
+                "unknown precision 'half'; expected one of double, mixed"},
         Refusal{"repeat", {"--repeat", "0"}, 2, "--repeat 0: expected a whole number from 1"},
         Refusal{"option", {"--thread", "1"}, 2, "did you mean '--threads'?"},
         Refusal{"memory", {"--envs", "1000000000"}, 2, "--envs 1000000000 needs "},

@@ -18,7 +18,8 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-const Words kSubcommands{"inspect", "simulate", "generate", "validate", "info", "merge", "export", "plot", "bench", "gradcheck"};
+const Words kSubcommands{"inspect", "simulate", "generate", "validate", "info",
+                         "merge",   "export",   "plot",     "bench",    "gradcheck"};
 
 /// `tangere simulate small.xml --output out.h5` and more.
 Words simulate(const Words& more = {}) {
@@ -45,7 +46,8 @@ TEST(Command, HelpEndsWithAnExampleThatWorks) {
     const Outcome outcome = run(folder, example);
     EXPECT_EQ(outcome.exit_code, 0) << help.out << outcome.err;
   }
-  EXPECT_THAT(folder.files(), testing::ElementsAre("ball.h5", "ball.svg", "balls", "balls.csv", "scenes", "speed.svg"));
+  EXPECT_THAT(folder.files(), testing::ElementsAre("ball.h5", "ball.svg", "balls", "balls.csv",
+                                                   "scenes", "speed.svg"));
 }
 
 TEST(Command, EveryBodyTypeIsInspectedSimulatedAndDrawn) {
@@ -124,7 +126,11 @@ INSTANTIATE_TEST_SUITE_P(
                 {"simualte", "x"},
                 2,
                 "unknown subcommand 'simualte'; did you mean 'simulate'?"},
-        Mistake{"far_off", {"qqqqqqqqq"}, 2, "expected one of inspect, simulate, generate, validate, info, merge, export, plot, bench"},
+        Mistake{"far_off",
+                {"qqqqqqqqq"},
+                2,
+                "expected one of inspect, simulate, generate, validate, info, merge, export, plot, "
+                "bench"},
         Mistake{"top_option",
                 {"--verison"},
                 2,
@@ -287,7 +293,9 @@ TEST(Command, InspectTellsPeopleAndProgramsTheSame) {
 
 TEST(Command, GradcheckTellsPeopleAndProgramsTheSame) {
   const Folder folder;
-  const Words words{"gradcheck", scene("rolling_ball_small.xml"), "--loss", "shear", "--steps", "90", "--entries", "4"};
+  const Words words{
+      "gradcheck", scene("rolling_ball_small.xml"), "--loss", "shear", "--steps", "90", "--entries",
+      "4"};
   const Outcome text = run(folder, words);
   const Outcome object = run(folder, words + Words{"--json"});
   EXPECT_EQ(text.exit_code, 0);
@@ -301,15 +309,18 @@ TEST(Command, GradcheckTellsPeopleAndProgramsTheSame) {
   EXPECT_EQ(answer.at("inputs").size(), 5U);  // u, q, v, numbers, points
   EXPECT_GT(answer.at("entries"), 8);
   EXPECT_LT(answer.at("max_relative_error"), 1e-5);
-  for (const json& input : answer.at("inputs")) EXPECT_THAT(text.out, HasSubstr(input.at("input").get<std::string>()));
+  for (const json& input : answer.at("inputs"))
+    EXPECT_THAT(text.out, HasSubstr(input.at("input").get<std::string>()));
 }
 
 TEST(Command, GradcheckRefusesLossesThatThereAreNot) {
   const Folder folder;
-  const Outcome typo = run(folder, {"gradcheck", scene("rolling_ball_small.xml"), "--loss", "shaer"});
+  const Outcome typo =
+      run(folder, {"gradcheck", scene("rolling_ball_small.xml"), "--loss", "shaer"});
   EXPECT_EQ(typo.exit_code, 2);
   EXPECT_THAT(typo.err, HasSubstr("unknown loss 'shaer'; did you mean 'shear'?"));
-  const Outcome none = run(folder, {"gradcheck", scene("rolling_ball_small.xml"), "--loss", "variables"});
+  const Outcome none =
+      run(folder, {"gradcheck", scene("rolling_ball_small.xml"), "--loss", "variables"});
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("no end effector"));
 }
@@ -327,11 +338,13 @@ TEST(Command, InspectListsJointEffectsAndMotors) {
   EXPECT_EQ(motors[2].at("timing"), "start");
   EXPECT_EQ(motors[3].at("control"), "force");
   EXPECT_EQ(answer.at("u_units"), json({"rad", "rad", "rad", "rad", "m", "1", "1"}));
-  for (const char* line : {"  shoulder: damping 1e-06, armature 5e-05, stiffness 0.01 about 0.25, limits -1.5 1.5 of stiffness 0.2\n",
-                           "  puck (sliding): damping 0.007\n", "  puck (turning): damping 7e-07\n",
-                           "  carriage: position, P 200, D 10, range -10 10, from the start of the step\n",
-                           "  wrist: position, P 0.01, D 0.0001, no range, from the end of the step\n",
-                           "  table: force, u from -1 to 1 is -1 to 2\n"})
+  for (const char* line :
+       {"  shoulder: damping 1e-06, armature 5e-05, stiffness 0.01 about 0.25, limits -1.5 1.5 of "
+        "stiffness 0.2\n",
+        "  puck (sliding): damping 0.007\n", "  puck (turning): damping 7e-07\n",
+        "  carriage: position, P 200, D 10, range -10 10, from the start of the step\n",
+        "  wrist: position, P 0.01, D 0.0001, no range, from the end of the step\n",
+        "  table: force, u from -1 to 1 is -1 to 2\n"})
     EXPECT_THAT(text.out, HasSubstr(line));
 }
 
@@ -341,8 +354,10 @@ TEST(Command, InspectListsEndEffectors) {
   const json answer = json::parse(run(folder, {"inspect", path, "--json"}).out);
   EXPECT_THAT(undocumented_keys(answer), IsEmpty());
   EXPECT_EQ(answer.at("variables"), json::parse(R"([{"name": "endeffector0", "joint": "rim"}])"));
-  EXPECT_THAT(run(folder, {"inspect", path}).out, HasSubstr("end effectors (1)\n  endeffector0 on joint rim\n"));
-  EXPECT_THAT(run(folder, {"inspect", scene("rolling_ball.xml")}).out, Not(HasSubstr("end effectors")));
+  EXPECT_THAT(run(folder, {"inspect", path}).out,
+              HasSubstr("end effectors (1)\n  endeffector0 on joint rim\n"));
+  EXPECT_THAT(run(folder, {"inspect", scene("rolling_ball.xml")}).out,
+              Not(HasSubstr("end effectors")));
 }
 
 TEST(Command, QuietPrintsErrorsOnly) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// validate, info, merge and export: what they say of a data set that is whole, and of one that is not.
+// validate, info, merge and export: what they say of a data set that is whole, and of one that is
+// not.
 #include <gmock/gmock.h>
 
 #include <sys/resource.h>
@@ -35,8 +36,9 @@ double peak_memory() {
 class DatasetCommand : public testing::Test {
  protected:
   DatasetCommand() {
-    const Outcome outcome = run(folder_, {"generate", scene("rolling_ball_small.xml"), "--output", "set", "--episodes",
-                                          "40", "--steps", "20", "--seed", "3", "--shards", "3", "--no-merge"});
+    const Outcome outcome =
+        run(folder_, {"generate", scene("rolling_ball_small.xml"), "--output", "set", "--episodes",
+                      "40", "--steps", "20", "--seed", "3", "--shards", "3", "--no-merge"});
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   }
   json answer(Words words, int exit_code = 0) const {
@@ -94,8 +96,10 @@ TEST_F(DatasetCommand, EveryProblemIsNamedWithItsFileAndDataset) {
   const json report = answer({"validate", "set"}, 3);
   const std::vector<std::string> problems = report.at("problems");
   EXPECT_THAT(problems, testing::Contains("set/shard-00002.h5: missing"));
-  EXPECT_THAT(problems, testing::Contains(HasSubstr("set/shard-00000.h5: the checksum of its numbers is ")));
-  EXPECT_THAT(problems, testing::Contains(HasSubstr("set/shard-00001.h5: demo_20: v: row 1 has a number that is nan")));
+  EXPECT_THAT(problems,
+              testing::Contains(HasSubstr("set/shard-00000.h5: the checksum of its numbers is ")));
+  EXPECT_THAT(problems, testing::Contains(HasSubstr(
+                            "set/shard-00001.h5: demo_20: v: row 1 has a number that is nan")));
   EXPECT_EQ(report.at("error"), problems.front());
   const json info = answer({"info", "set"});
   EXPECT_THAT(info.at("missing"), ElementsAre("set/shard-00002.h5"));
@@ -108,23 +112,27 @@ TEST_F(DatasetCommand, DamageAndStrangersAreProblemsNotCrashes) {
   const json report = answer({"validate", "set"}, 3);
   for (const char* file : {"set/shard-00001.h5: ", "set/shard-00002.h5: "})
     EXPECT_THAT(report.at("problems").get<Words>(), testing::Contains(HasSubstr(file)));
-  ASSERT_EQ(run(folder_, {"generate", scene("rolling_ball_small.xml"), "--output", "other", "--episodes", "40",
-                          "--steps", "20", "--seed", "4", "--shards", "3", "--no-merge"})
-                .exit_code,
-            0);
+  ASSERT_EQ(
+      run(folder_, {"generate", scene("rolling_ball_small.xml"), "--output", "other", "--episodes",
+                    "40", "--steps", "20", "--seed", "4", "--shards", "3", "--no-merge"})
+          .exit_code,
+      0);
   for (const char* name : {"1", "2"}) {
     const std::string shard = std::string("/shard-0000") + name + ".h5";
-    fs::copy_file(folder_.path("other" + shard), folder_.path("set" + shard), fs::copy_options::overwrite_existing);
+    fs::copy_file(folder_.path("other" + shard), folder_.path("set" + shard),
+                  fs::copy_options::overwrite_existing);
   }
   EXPECT_THAT(answer({"validate", "set"}, 3).at("problems").get<Words>(),
               testing::Contains("set/shard-00001.h5: seed: 4 there, 3 here"));
-  EXPECT_THAT(answer({"merge", "set"}, 3).at("error").get<std::string>(), HasSubstr("seed: 4 there, 3 here"));
+  EXPECT_THAT(answer({"merge", "set"}, 3).at("error").get<std::string>(),
+              HasSubstr("seed: 4 there, 3 here"));
   for (const char* command : {"validate", "info", "merge"}) {
     EXPECT_EQ(run(folder_, {command, "nowhere"}).exit_code, 3);
     EXPECT_EQ(run(folder_, {command, "."}).exit_code, 3);
   }
   EXPECT_FALSE(fs::exists(folder_.path("set/robomimic.hdf5")));
-  EXPECT_THAT(answer({"validate", std::string(300, 'x')}, 3).at("error").get<std::string>(), HasSubstr("too long"));
+  EXPECT_THAT(answer({"validate", std::string(300, 'x')}, 3).at("error").get<std::string>(),
+              HasSubstr("too long"));
 }
 
 TEST_F(DatasetCommand, MergedItIsOneFileOfLinksOrOfCopies) {
@@ -133,11 +141,13 @@ TEST_F(DatasetCommand, MergedItIsOneFileOfLinksOrOfCopies) {
   EXPECT_EQ(merged.at("demos"), 40);
   EXPECT_EQ(merged.at("train"), 36);
   EXPECT_EQ(merged.at("valid"), 4);
-  EXPECT_EQ(answer({"merge", "set"}, 3).at("error"), "'set/robomimic.hdf5' exists already; give --overwrite to replace it");
+  EXPECT_EQ(answer({"merge", "set"}, 3).at("error"),
+            "'set/robomimic.hdf5' exists already; give --overwrite to replace it");
   // Links lead on where the folder is moved, and shards cannot be missed in silence.
   fs::rename(folder_.path("set"), folder_.path("moved"));
   EXPECT_EQ(answer({"validate", "moved/robomimic.hdf5"}).at("rows"), 160);
-  EXPECT_EQ(answer({"info", "moved/robomimic.hdf5"}).at("settings"), answer({"info", "moved"}).at("settings"));
+  EXPECT_EQ(answer({"info", "moved/robomimic.hdf5"}).at("settings"),
+            answer({"info", "moved"}).at("settings"));
   EXPECT_EQ(answer({"merge", "moved", "--copy", "--overwrite"}).at("copy"), true);
   fs::rename(folder_.path("moved/shard-00001.h5"), folder_.path("aside.h5"));
   EXPECT_EQ(answer({"validate", "moved/robomimic.hdf5"}).at("demos"), 40);
@@ -154,7 +164,8 @@ TEST_F(DatasetCommand, MergedItIsOneFileOfLinksOrOfCopies) {
 std::vector<float> numbers(const h5::Id& group, const std::string& name) {
   const h5::Id dataset = h5::open_dataset(group, name);
   const h5::Dims dims = h5::dimensions(dataset);
-  std::vector<float> values(std::accumulate(dims.begin(), dims.end(), hsize_t{1}, std::multiplies<>()));
+  std::vector<float> values(
+      std::accumulate(dims.begin(), dims.end(), hsize_t{1}, std::multiplies<>()));
   h5::read_box(dataset, h5::Dims(dims.size(), 0), dims, values.data());
   return values;
 }
@@ -167,29 +178,39 @@ TEST_F(DatasetCommand, MergedDemosHaveNextObservationsAndAllThatTheirShardsSay) 
       const std::string demo = "data/demo_" + std::to_string(number);
       Words said, names;
       {
-        const h5::Id shard = h5::open_file(folder_.path("set/shard-0000" + std::to_string(number < 16 ? 0 : number < 32 ? 1 : 2) + ".h5"));
+        const h5::Id shard = h5::open_file(folder_.path("set/shard-0000" +
+                                                        std::to_string(number < 16   ? 0
+                                                                       : number < 32 ? 1
+                                                                                     : 2) +
+                                                        ".h5"));
         const h5::Id group = h5::open_group(shard, demo);
-        for (const std::string& name : h5::attribute_names(group)) said.push_back(name + h5::attribute_text(group, name));
+        for (const std::string& name : h5::attribute_names(group))
+          said.push_back(name + h5::attribute_text(group, name));
         names = h5::link_names(group);
       }
-      const h5::Id file = h5::open_file(folder_.path("set/robomimic.hdf5")), group = h5::open_group(file, demo);
+      const h5::Id file = h5::open_file(folder_.path("set/robomimic.hdf5")),
+                   group = h5::open_group(file, demo);
       Words here;
-      for (const std::string& name : h5::attribute_names(group)) here.push_back(name + h5::attribute_text(group, name));
+      for (const std::string& name : h5::attribute_names(group))
+        here.push_back(name + h5::attribute_text(group, name));
       EXPECT_EQ(here, said);
       EXPECT_THAT(here, testing::Contains("num_samples4"));
       names.emplace_back("next_obs");
       EXPECT_THAT(h5::link_names(group), testing::UnorderedElementsAreArray(names));
       for (const std::string name : {"q", "v", "pad"}) {
         std::vector<float> expected = numbers(group, "obs/" + name);
-        const std::vector<float> last = numbers(group, "final_obs/" + name), next = numbers(group, "next_obs/" + name);
+        const std::vector<float> last = numbers(group, "final_obs/" + name),
+                                 next = numbers(group, "next_obs/" + name);
         expected.erase(expected.begin(), expected.begin() + std::ssize(last));
         expected.insert(expected.end(), last.begin(), last.end());
         EXPECT_EQ(next, expected) << how << " " << demo << " " << name;
-        const h5::Id dataset = h5::open_dataset(group, "next_obs/" + name), plan(H5Dget_create_plist(dataset.get()));
+        const h5::Id dataset = h5::open_dataset(group, "next_obs/" + name),
+                     plan(H5Dget_create_plist(dataset.get()));
         EXPECT_EQ(H5Pget_layout(plan.get()), H5D_VIRTUAL) << "no number twice";
       }
     }
-    EXPECT_EQ(answer({"info", "set/robomimic.hdf5"}).at("datasets").at("next_obs/pad"), "(4, 32, 32, 3) float32");
+    EXPECT_EQ(answer({"info", "set/robomimic.hdf5"}).at("datasets").at("next_obs/pad"),
+              "(4, 32, 32, 3) float32");
   }
 }
 
@@ -204,8 +225,9 @@ TEST_F(DatasetCommand, NextObservationsThatAreNotThoseOfTheNextRowAreAProblem) {
   H5Gclose(group);
   H5Gclose(other);
   H5Fclose(file);
-  EXPECT_THAT(answer({"validate", "set/robomimic.hdf5"}, 3).at("problems").get<Words>(),
-              ElementsAre(HasSubstr("demo_3: next_obs/q is not obs one row later, in rows 0 to 2")));
+  EXPECT_THAT(
+      answer({"validate", "set/robomimic.hdf5"}, 3).at("problems").get<Words>(),
+      ElementsAre(HasSubstr("demo_3: next_obs/q is not obs one row later, in rows 0 to 2")));
 }
 
 TEST_F(DatasetCommand, MergedFilesGrowByTheSameForEachEpisode) {
@@ -213,19 +235,21 @@ TEST_F(DatasetCommand, MergedFilesGrowByTheSameForEachEpisode) {
   double memory = 0;
   for (const int episodes : {1024, 2048, 4096, 8192}) {
     const std::string set = "of" + std::to_string(episodes);
-    ASSERT_EQ(run(folder_, {"generate", scene("rolling_ball_small.xml"), "--output", set, "--episodes",
-                            std::to_string(episodes), "--steps", "1", "--every", "1", "--record", "q", "--quiet"})
+    ASSERT_EQ(run(folder_, {"generate", scene("rolling_ball_small.xml"), "--output", set,
+                            "--episodes", std::to_string(episodes), "--steps", "1", "--every", "1",
+                            "--record", "q", "--quiet"})
                   .exit_code,
               0);
     robomimic.push_back(static_cast<double>(fs::file_size(folder_.path(set + "/robomimic.hdf5"))));
-    minari.push_back(static_cast<double>(
-        fs::file_size(folder_.path(set + "/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5"))));
+    minari.push_back(static_cast<double>(fs::file_size(
+        folder_.path(set + "/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5"))));
     fs::remove_all(folder_.path(set));
     if (memory == 0) memory = peak_memory();
   }
   for (const std::vector<double>* size : {&robomimic, &minari})
     for (std::size_t k = 1; k + 1 < size->size(); ++k) {
-      const double first = ((*size)[k] - (*size)[k - 1]) / 1024.0 / static_cast<double>(1 << (k - 1));
+      const double first =
+          ((*size)[k] - (*size)[k - 1]) / 1024.0 / static_cast<double>(1 << (k - 1));
       const double then = ((*size)[k + 1] - (*size)[k]) / 1024.0 / static_cast<double>(1 << k);
       EXPECT_NEAR(then, first, 0.02 * first) << "bytes per episode";
       EXPECT_LT(then, 2000);
@@ -246,7 +270,8 @@ TEST_F(DatasetCommand, MasksShareOutEveryDemoOnce) {
     std::string bytes(size * h5::dimensions(dataset).at(0), '\0');
     EXPECT_GE(H5Dread(dataset.get(), type, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()), 0);
     H5Tclose(type);
-    for (std::size_t at = 0; at < bytes.size(); at += size) all.emplace_back(bytes.substr(at, size).c_str());
+    for (std::size_t at = 0; at < bytes.size(); at += size)
+      all.emplace_back(bytes.substr(at, size).c_str());
   }
   std::sort(all.begin(), all.end());
   EXPECT_EQ(all, h5::link_names(h5::open_group(file, "data")));
@@ -263,7 +288,8 @@ TEST_F(DatasetCommand, TheViewForMinariShowsTheSameNumbers) {
   EXPECT_THAT(metadata.at("observation_space").get<std::string>(), HasSubstr("-Infinity"));
   // One file at a time: the library follows no link to a file that is open in another way.
   const auto read = [&](const std::string& file_name, const std::string& name) {
-    const h5::Id file = h5::open_file(folder_.path(file_name)), dataset = h5::open_dataset(file, name);
+    const h5::Id file = h5::open_file(folder_.path(file_name)),
+                 dataset = h5::open_dataset(file, name);
     const h5::Dims dims = h5::dimensions(dataset);
     std::vector<float> values(dims.at(0) * dims.at(1));
     h5::read_box(dataset, {0, 0}, dims, values.data());
@@ -273,7 +299,8 @@ TEST_F(DatasetCommand, TheViewForMinariShowsTheSameNumbers) {
   const std::vector<float> last = read("set/shard-00001.h5", "data/demo_17/final_obs/q");
   expected.insert(expected.end(), last.begin(), last.end());
   EXPECT_EQ(read(place + "main_data.hdf5", "episode_17/observations/q"), expected);
-  EXPECT_EQ(read(place + "main_data.hdf5", "episode_17/actions"), read("set/shard-00001.h5", "data/demo_17/actions"));
+  EXPECT_EQ(read(place + "main_data.hdf5", "episode_17/actions"),
+            read("set/shard-00001.h5", "data/demo_17/actions"));
 }
 
 TEST_F(DatasetCommand, ATableHasALineForEachRow) {
@@ -288,10 +315,13 @@ TEST_F(DatasetCommand, ATableHasALineForEachRow) {
   std::getline(lines, line);
   EXPECT_THAT(line, testing::StartsWith("episode,row,actions/"));
   int rows = 0;
-  for (; std::getline(lines, line); ++rows) EXPECT_EQ(std::count(line.begin(), line.end(), ','), 25);
+  for (; std::getline(lines, line); ++rows)
+    EXPECT_EQ(std::count(line.begin(), line.end(), ','), 25);
   EXPECT_EQ(rows, 160);
   EXPECT_EQ(answer({"export", "set", "--csv", "one.csv", "--episode", "39"}).at("rows"), 4);
-  EXPECT_THAT(answer({"export", "set", "--csv", "none.csv", "--episode", "40"}, 3).at("error").get<std::string>(),
+  EXPECT_THAT(answer({"export", "set", "--csv", "none.csv", "--episode", "40"}, 3)
+                  .at("error")
+                  .get<std::string>(),
               HasSubstr("has no episode 40"));
   EXPECT_EQ(run(folder_, {"export", "set", "--csv", "t.csv"}).exit_code, 3);
   EXPECT_THAT(folder_.files(), ElementsAre("one.csv", "set", "t.csv"));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A shared folder whose shards are replaced one by one: what shows them as one is never of two runs, nor made while they change.
+// A shared folder whose shards are replaced one by one: what shows them as one is never of two
+// runs, nor made while they change.
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
@@ -16,15 +17,24 @@ using testing::HasSubstr;
 
 /// 80 episodes, five blocks.
 Words generate(const std::string& seed, const Words& more) {
-  return Words{"generate", scene("rolling_ball_small.xml"), "--output", "set", "--episodes", "80", "--steps", "10", "--seed", seed} + more;
+  return Words{"generate",   scene("rolling_ball_small.xml"),
+               "--output",   "set",
+               "--episodes", "80",
+               "--steps",    "10",
+               "--seed",     seed} +
+         more;
 }
 
 class GenerateReplace : public testing::Test {
  protected:
-  [[nodiscard]] json make(const std::string& seed, const Words& more) const { return run_json(folder_, generate(seed, more)); }
+  [[nodiscard]] json make(const std::string& seed, const Words& more) const {
+    return run_json(folder_, generate(seed, more));
+  }
   [[nodiscard]] bool merged() const {
     const bool robomimic = fs::exists(folder_.path("set/robomimic.hdf5"));
-    EXPECT_EQ(fs::exists(folder_.path("set/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5")), robomimic);
+    EXPECT_EQ(
+        fs::exists(folder_.path("set/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5")),
+        robomimic);
     return robomimic;
   }
 
@@ -36,7 +46,8 @@ TEST_F(GenerateReplace, WhatShowsShardsAsOneGoesWithTheFirstThatIsReplaced) {
   ASSERT_TRUE(merged());
   const json first = make("2", {"--shard", "0/3", "--overwrite"});
   EXPECT_TRUE(first.at("merged").is_null());
-  EXPECT_THAT(first.at("not_merged").get<std::string>(), HasSubstr("'set/shard-00001.h5' is of another run: seed: 1 there, 2 here"));
+  EXPECT_THAT(first.at("not_merged").get<std::string>(),
+              HasSubstr("'set/shard-00001.h5' is of another run: seed: 1 there, 2 here"));
   EXPECT_FALSE(merged()) << "it would show the shard of seed 2 with those of seed 1";
   const Outcome second = run(folder_, generate("2", {"--shard", "1/3", "--overwrite"}));
   EXPECT_EQ(second.exit_code, 0) << second.err;
@@ -76,7 +87,10 @@ TEST_F(GenerateReplace, NothingIsMergedByHandWhileShardsAreWritten) {
     ASSERT_TRUE(writing.take(FolderLock::Kind::shared));
     const Outcome refused = run(folder_, {"merge", "set"});
     EXPECT_EQ(refused.exit_code, 3);
-    EXPECT_THAT(refused.err, HasSubstr("cannot merge 'set': another process writes shards there or merges them; expected"));
+    EXPECT_THAT(
+        refused.err,
+        HasSubstr(
+            "cannot merge 'set': another process writes shards there or merges them; expected"));
     EXPECT_FALSE(merged());
   }
   EXPECT_EQ(run(folder_, {"merge", "set"}).exit_code, 0);

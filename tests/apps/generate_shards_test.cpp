@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A data set cut into shards: the same by one process or by several, at once or in turns, and never of two minds.
+// A data set cut into shards: the same by one process or by several, at once or in turns, and never
+// of two minds.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -25,8 +26,12 @@ constexpr int kShards = 5;
 
 /// 100 episodes, seven blocks, in five shards.
 Words generate(const Words& more = {}, const std::string& folder = "set") {
-  Words words{"generate", scene("rolling_ball_small.xml"), "--output", folder, "--episodes", "100", "--steps", "20",
-              "--seed", "3", "--shards", std::to_string(kShards)};
+  Words words{"generate",   scene("rolling_ball_small.xml"),
+              "--output",   folder,
+              "--episodes", "100",
+              "--steps",    "20",
+              "--seed",     "3",
+              "--shards",   std::to_string(kShards)};
   words.insert(words.end(), more.begin(), more.end());
   return words;
 }
@@ -82,7 +87,8 @@ TEST(GenerateShards, OneByOneOrByThreeProcessesTheyAreTheSame) {
   for (int k = kShards - 1; k >= 0; --k)
     ASSERT_EQ(run(folder, generate({"--shard", std::to_string(k) + "/5"}, "by_one")).exit_code, 0);
   EXPECT_TRUE(bytes(folder, "by_one") == alone);
-  const auto three = [](const std::string& index, const std::string& count, const Words& more = {}) {
+  const auto three = [](const std::string& index, const std::string& count,
+                        const Words& more = {}) {
     std::vector<Words> environments;
     for (int k = 0; k < 3; ++k) {
       environments.push_back({index + "=" + std::to_string(k), count + "=3"});
@@ -90,25 +96,30 @@ TEST(GenerateShards, OneByOneOrByThreeProcessesTheyAreTheSame) {
     }
     return environments;
   };
-  run_beside(folder, generate({"--threads", "1"}, "openmpi"), three("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"));
+  run_beside(folder, generate({"--threads", "1"}, "openmpi"),
+             three("OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"));
   run_beside(folder, generate({"--threads", "2"}, "pmi"), three("PMI_RANK", "PMI_SIZE"));
-  run_beside(folder, generate({"--threads", "1"}, "srun"), three("SLURM_PROCID", "SLURM_STEP_NUM_TASKS"));
+  run_beside(folder, generate({"--threads", "1"}, "srun"),
+             three("SLURM_PROCID", "SLURM_STEP_NUM_TASKS"));
   // An array that begins at 4 and goes in steps of 2 is three tasks all the same.
   std::vector<Words> array;
   for (const char* id : {"4", "6", "8"})
-    array.push_back({std::string("SLURM_ARRAY_TASK_ID=") + id, "SLURM_ARRAY_TASK_COUNT=3", "SLURM_ARRAY_TASK_MIN=4",
-                     "SLURM_ARRAY_TASK_STEP=2"});
+    array.push_back({std::string("SLURM_ARRAY_TASK_ID=") + id, "SLURM_ARRAY_TASK_COUNT=3",
+                     "SLURM_ARRAY_TASK_MIN=4", "SLURM_ARRAY_TASK_STEP=2"});
   run_beside(folder, generate({"--threads", "1"}, "array"), array);
-  for (const char* set : {"openmpi", "pmi", "srun", "array"}) EXPECT_TRUE(bytes(folder, set) == alone) << set;
+  for (const char* set : {"openmpi", "pmi", "srun", "array"})
+    EXPECT_TRUE(bytes(folder, set) == alone) << set;
 }
 
 TEST(GenerateShards, UnderMpirun) {
   if (std::system("command -v mpirun >/dev/null") != 0) GTEST_SKIP() << "mpirun is not installed";
   const Folder folder;
   ASSERT_EQ(run(folder, generate()).exit_code, 0);
-  std::string command = "cd " + folder.path() + " && OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 " +
+  std::string command = "cd " + folder.path() +
+                        " && OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 " +
                         "OMPI_MCA_rmaps_base_oversubscribe=1 mpirun -np 3 " TANGERE_PROGRAM;
-  for (const std::string& word : generate({"--threads", "1", "--quiet"}, "mpi")) command += " " + word;
+  for (const std::string& word : generate({"--threads", "1", "--quiet"}, "mpi"))
+    command += " " + word;
   ASSERT_EQ(std::system(command.c_str()), 0) << command;
   EXPECT_TRUE(bytes(folder, "mpi") == bytes(folder, "set"));
 }
@@ -117,7 +128,8 @@ TEST(GenerateShards, ResumeKeepsWhatIsThereAndMakesTheRest) {
   const Folder folder;
   ASSERT_EQ(run(folder, generate()).exit_code, 0);
   const auto whole = bytes(folder, "set");
-  for (const char* shard : {"set/shard-00001.h5", "set/shard-00004.h5"}) fs::remove(folder.path(shard));
+  for (const char* shard : {"set/shard-00001.h5", "set/shard-00004.h5"})
+    fs::remove(folder.path(shard));
   const auto before = fs::last_write_time(folder.path("set/shard-00000.h5"));
   const Outcome outcome = run(folder, generate({"--resume", "--json"}));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
@@ -132,7 +144,8 @@ TEST(GenerateShards, ResumeKeepsWhatIsThereAndMakesTheRest) {
   EXPECT_EQ(nothing.at("episodes"), 0);
   EXPECT_EQ(nothing.at("kept"), 5);
   // A folder that is not there yet, and a task.
-  const Words task{"generate", "dummy", "--output", "task", "--episodes", "40", "--shards", "3", "--resume"};
+  const Words task{"generate", "dummy",    "--output", "task",    "--episodes",
+                   "40",       "--shards", "3",        "--resume"};
   ASSERT_EQ(run(folder, task).exit_code, 0);
   const auto of_task = bytes(folder, "task");
   fs::remove(folder.path("task/shard-00001.h5"));
@@ -144,7 +157,8 @@ TEST(GenerateShards, ResumeNamesEverySettingThatDiffers) {
   const Folder folder;
   ASSERT_EQ(run(folder, generate()).exit_code, 0);
   const auto before = bytes(folder, "set");
-  const auto refusal = [&](const std::string& option, const std::string& value, const Words& environment = {}) {
+  const auto refusal = [&](const std::string& option, const std::string& value,
+                           const Words& environment = {}) {
     Words words = generate({"--resume"});
     const auto at = std::find(words.begin(), words.end(), option);
     if (at == words.end()) {
@@ -169,7 +183,8 @@ TEST(GenerateShards, ResumeNamesEverySettingThatDiffers) {
   std::ofstream table(folder.path("u.csv"), std::ios::app);
   for (int i = 0; i < 20; ++i) table << "0,0,0\n";
   table.close();
-  EXPECT_THAT(refusal("--controls", "u.csv"), HasSubstr("controls: of the scene there, a table of checksum "));
+  EXPECT_THAT(refusal("--controls", "u.csv"),
+              HasSubstr("controls: of the scene there, a table of checksum "));
 }
 
 TEST(GenerateShards, OfAnotherSceneAreNotContinued) {
@@ -191,20 +206,25 @@ TEST(GenerateShards, AreMergedByTheLastProcessAndNotBefore) {
   const std::string merged = folder.path("set/robomimic.hdf5");
   for (int shard = 0; shard < kShards; ++shard) {
     EXPECT_FALSE(fs::exists(merged)) << shard;
-    const json answer = answer_of(run(folder, generate({"--json", "--shard", std::to_string(shard) + "/5"})));
+    const json answer =
+        answer_of(run(folder, generate({"--json", "--shard", std::to_string(shard) + "/5"})));
     EXPECT_EQ(answer.at("merged").is_null(), shard + 1 < kShards);
   }
   EXPECT_TRUE(fs::exists(merged));
-  EXPECT_TRUE(fs::exists(folder.path("set/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5")));
+  EXPECT_TRUE(
+      fs::exists(folder.path("set/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5")));
   EXPECT_EQ(run(folder, {"validate", "set/robomimic.hdf5"}).exit_code, 0);
   // Nothing is left to do, and it is merged again.
   const json again = answer_of(run(folder, generate({"--json", "--resume"})));
   EXPECT_EQ(again.at("merged"), "set/robomimic.hdf5");
   EXPECT_EQ(again.at("minari_id"), "tangere/rolling_ball_small-v0");
   // Of an earlier run nothing stays that could be taken for this one's.
-  EXPECT_TRUE(answer_of(run(folder, generate({"--json", "--overwrite", "--no-merge"}))).at("merged").is_null());
+  EXPECT_TRUE(answer_of(run(folder, generate({"--json", "--overwrite", "--no-merge"})))
+                  .at("merged")
+                  .is_null());
   EXPECT_FALSE(fs::exists(merged));
-  EXPECT_FALSE(fs::exists(folder.path("set/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5")));
+  EXPECT_FALSE(
+      fs::exists(folder.path("set/minari/tangere/rolling_ball_small-v0/data/main_data.hdf5")));
 }
 
 TEST(GenerateShards, OfProcessesThatEndTogetherAreMerged) {
@@ -255,11 +275,13 @@ TEST(GenerateShards, OfAnotherRunAreNotMixedInByAWorker) {
 TEST(GenerateShards, SayWhatVariedInEachEpisode) {
   const Folder folder;
   ASSERT_EQ(run(folder, generate({"--shard", "1/5"})).exit_code, 0);
-  const Outcome trajectory = run(folder, {"simulate", scene("rolling_ball_small.xml"), "--output", "t.h5", "--envs", "40",
-                                          "--steps", "1", "--seed", "3"});
+  const Outcome trajectory = run(folder, {"simulate", scene("rolling_ball_small.xml"), "--output",
+                                          "t.h5", "--envs", "40", "--steps", "1", "--seed", "3"});
   ASSERT_EQ(trajectory.exit_code, 0) << trajectory.err;
-  const h5::Id shard = h5::open_file(folder.path("set/shard-00001.h5")), file = h5::open_file(folder.path("t.h5"));
-  const h5::Id all = h5::open_dataset(file, "randomized"), scene_group = h5::open_group(shard, "scene");
+  const h5::Id shard = h5::open_file(folder.path("set/shard-00001.h5")),
+               file = h5::open_file(folder.path("t.h5"));
+  const h5::Id all = h5::open_dataset(file, "randomized"),
+               scene_group = h5::open_group(shard, "scene");
   const h5::Dims dims = h5::dimensions(all);
   std::vector<double> expected(dims.at(0) * dims.at(1));
   h5::read_box(all, {0, 0}, dims, expected.data());
@@ -282,12 +304,15 @@ TEST(GenerateShards, MistakesAreNamed) {
   };
   for (const char* wrong : {"5/5", "-1/5", "2", "a/5", "1/", "/5", "1/5/5", "1/x", "0/0"})
     EXPECT_THAT(message({"--shard", wrong}), HasSubstr("expected k/S, shard k of S"));
-  EXPECT_THAT(message({"--shard", "1/4"}), HasSubstr("--shard 1/4 with --shards 5; expected the same"));
+  EXPECT_THAT(message({"--shard", "1/4"}),
+              HasSubstr("--shard 1/4 with --shards 5; expected the same"));
   EXPECT_THAT(message({"--resume", "--overwrite"}), HasSubstr("--resume with --overwrite"));
   EXPECT_THAT(message({}, {"OMPI_COMM_WORLD_RANK=3", "OMPI_COMM_WORLD_SIZE=3"}),
               HasSubstr("OMPI_COMM_WORLD_RANK says number 3 of 3; expected 0 to 2"));
-  EXPECT_THAT(message({}, {"PMI_RANK=x", "PMI_SIZE=3"}), HasSubstr("PMI_RANK=x; expected a whole number"));
-  EXPECT_THAT(message({}, {"SLURM_ARRAY_TASK_ID=1"}), HasSubstr("SLURM_ARRAY_TASK_COUNT is not set"));
+  EXPECT_THAT(message({}, {"PMI_RANK=x", "PMI_SIZE=3"}),
+              HasSubstr("PMI_RANK=x; expected a whole number"));
+  EXPECT_THAT(message({}, {"SLURM_ARRAY_TASK_ID=1"}),
+              HasSubstr("SLURM_ARRAY_TASK_COUNT is not set"));
   Words many = generate();
   many.back() = "8";
   const Outcome outcome = run(folder, many);
@@ -314,7 +339,8 @@ TEST(GenerateShards, ADryRunSaysWhatWouldBeMadeAndMakesNothing) {
   const json rest = answer_of(run(folder, generate({"--dry-run", "--resume", "--json"})));
   EXPECT_EQ(rest.at("kept"), 1);
   EXPECT_EQ(rest.at("shards").size(), 4U);
-  const Outcome task = run(folder, {"generate", "dummy", "--output", "x", "--episodes", "20", "--dry-run"});
+  const Outcome task =
+      run(folder, {"generate", "dummy", "--output", "x", "--episodes", "20", "--dry-run"});
   EXPECT_EQ(task.exit_code, 0) << task.err;
   EXPECT_THAT(task.out, HasSubstr("nothing was written"));
 }

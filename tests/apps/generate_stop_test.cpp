@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A data set whose run is killed or stopped at any moment holds whole shards and nothing that looks like one.
+// A data set whose run is killed or stopped at any moment holds whole shards and nothing that looks
+// like one.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -40,8 +41,8 @@ class GenerateStop : public testing::Test {
 
   /// `generate` of a shard of 4096 episodes and what is left of `episodes`.
   static Words words(const std::string& episodes, const Words& more = {}) {
-    Words all{"generate", "free.xml", "--output", "set",       "--episodes",
-              episodes,   "--steps",  "2",        "--threads", "2", "--no-merge"};
+    Words all{"generate", "free.xml", "--output",  "set", "--episodes", episodes,
+              "--steps",  "2",        "--threads", "2",   "--no-merge"};
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }

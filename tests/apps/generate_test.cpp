@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `tangere generate` as users meet it: its keys, its shards, its refusals; the same bytes on any number of threads.
+// `tangere generate` as users meet it: its keys, its shards, its refusals; the same bytes on any
+// number of threads.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
@@ -256,12 +257,18 @@ double peak_memory() {
 
 TEST(Generate, MemoryDoesNotGrowWithTheNumberOfEpisodes) {
   if (kSanitized) GTEST_SKIP() << "sanitizers keep memory that was given back";
-  for (const Words& kind : {Words{}, Words{"--compress", "deflate"}, Words{"--compress", "lz4", "--tactile", "sparse"}}) {
+  for (const Words& kind : {Words{}, Words{"--compress", "deflate"},
+                            Words{"--compress", "lz4", "--tactile", "sparse"}}) {
     double before = 0;
     for (const std::string episodes : {"64", "1024"}) {
       const Folder folder;
-      Words words{"generate", scene("rolling_ball_small.xml"), "--output", "set", "--steps", "50", "--every", "5",
-                  "--threads", "2", "--no-merge", "--episodes", episodes};
+      Words words{"generate",   scene("rolling_ball_small.xml"),
+                  "--output",   "set",
+                  "--steps",    "50",
+                  "--every",    "5",
+                  "--threads",  "2",
+                  "--no-merge", "--episodes",
+                  episodes};
       words.insert(words.end(), kind.begin(), kind.end());
       ASSERT_EQ(run(folder, words).exit_code, 0);
       if (episodes == "64") before = peak_memory();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The example as a user runs it: a table with four numbers within 1 %, a picture, and words for what is wrong.
+// The example as a user runs it: a table with four numbers within 1 %, a picture, and words for
+// what is wrong.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,14 +24,16 @@ std::vector<double> errors(const std::string& output) {
     std::istringstream words(line);
     std::vector<std::string> w(std::istream_iterator<std::string>(words), {});
     for (const char* name : {"kn", "kt", "mu", "mass"})
-      if (w.size() >= 6 && w[0] == name && w[1] != "[N/m]") out.push_back(std::stod(w[w.size() - 2]));
+      if (w.size() >= 6 && w[0] == name && w[1] != "[N/m]")
+        out.push_back(std::stod(w[w.size() - 2]));
   }
   return out;
 }
 
 TEST(IdentifyBall, PrintsNumbersWithinOnePercentAndDraws) {
   const Folder folder;
-  const Outcome r = run(folder, {scene("identify_ball.xml"), "--noise", "0.02", "--seed", "4", "--svg", "fit.svg"});
+  const Outcome r = run(
+      folder, {scene("identify_ball.xml"), "--noise", "0.02", "--seed", "4", "--svg", "fit.svg"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
   EXPECT_THAT(r.out, HasSubstr("condition of the Fisher information"));
   const std::vector<double> e = errors(r.out);

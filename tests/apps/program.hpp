@@ -72,7 +72,8 @@ Outcome run(const Folder& folder, std::vector<std::string> arguments,
 /// Names of an object's keys that docs/command.md does not mention, nested ones included.
 std::vector<std::string> undocumented_keys(const nlohmann::json& object);
 
-/// `tangere WORDS --json`: the object that it prints, which names the subcommand, the exit code and documented keys alone.
+/// `tangere WORDS --json`: the object that it prints, which names the subcommand, the exit code and
+/// documented keys alone.
 nlohmann::json run_json(const Folder& folder, const Words& words, int exit_code = 0);
 
 /// A scene of the project.

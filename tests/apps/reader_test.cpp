@@ -14,7 +14,8 @@ namespace {
 /// A Python that has h5py; empty when there is none.
 std::string python() {
   for (const char* name : {"python3", "/usr/bin/python3"})
-    if (std::system((std::string(name) + " -c 'import h5py, numpy' >/dev/null 2>&1").c_str()) == 0) return name;
+    if (std::system((std::string(name) + " -c 'import h5py, numpy' >/dev/null 2>&1").c_str()) == 0)
+      return name;
   return {};
 }
 
@@ -30,35 +31,40 @@ std::vector<std::string> readers() {
 }
 
 /// Runs a program in the folder. Returns what it printed.
-std::string run_python(const Folder& folder, const std::string& interpreter, const std::string& program) {
+std::string run_python(const Folder& folder, const std::string& interpreter,
+                       const std::string& program) {
   folder.write("reader.py", program);
-  const std::string command = "cd " + folder.path() + " && " + interpreter + " reader.py >out.txt 2>err.txt";
+  const std::string command =
+      "cd " + folder.path() + " && " + interpreter + " reader.py >out.txt 2>err.txt";
   EXPECT_EQ(std::system(command.c_str()), 0) << program << folder.read("err.txt");
   return folder.read("out.txt");
 }
 
 TEST(Readers, OfThePageReadADataSet) {
   const std::string interpreter = python();
-  if (interpreter.empty()) GTEST_SKIP() << "no python3 with h5py: the readers of docs/datasets.md were NOT tried";
+  if (interpreter.empty())
+    GTEST_SKIP() << "no python3 with h5py: the readers of docs/datasets.md were NOT tried";
   const Folder folder;
-  ASSERT_EQ(run(folder, {"generate", scene("rolling_ball_small.xml"), "--output", "balls", "--episodes", "32", "--seed",
-                         "1", "--quiet"})
+  ASSERT_EQ(run(folder, {"generate", scene("rolling_ball_small.xml"), "--output", "balls",
+                         "--episodes", "32", "--seed", "1", "--quiet"})
                 .exit_code,
             0);
-  ASSERT_EQ(run(folder, {"generate", scene("rolling_ball_small.xml"), "--output", "sparse", "--episodes", "4", "--tactile",
-                         "sparse", "--quiet"})
+  ASSERT_EQ(run(folder, {"generate", scene("rolling_ball_small.xml"), "--output", "sparse",
+                         "--episodes", "4", "--tactile", "sparse", "--quiet"})
                 .exit_code,
             0);
-  ASSERT_EQ(run(folder, {"generate", scene("rolling_ball_small.xml"), "--output", "derived", "--episodes", "4", "--steps",
-                         "20", "--every", "5", "--gradients", "jacobians", "--quiet"})
-                .exit_code,
-            0);
+  ASSERT_EQ(
+      run(folder, {"generate", scene("rolling_ball_small.xml"), "--output", "derived", "--episodes",
+                   "4", "--steps", "20", "--every", "5", "--gradients", "jacobians", "--quiet"})
+          .exit_code,
+      0);
   const std::vector<std::string> blocks = readers();
   ASSERT_GE(blocks.size(), 5U);
   int tried = 0;
   for (const std::string& block : blocks) {
     const bool needs_minari = block.find("import minari") != std::string::npos;
-    if (needs_minari && std::system((interpreter + " -c 'import minari' >/dev/null 2>&1").c_str()) != 0) {
+    if (needs_minari &&
+        std::system((interpreter + " -c 'import minari' >/dev/null 2>&1").c_str()) != 0) {
       std::printf("Minari is not installed: its reader was NOT tried\n");
       continue;
     }
@@ -71,11 +77,17 @@ TEST(Readers, OfThePageReadADataSet) {
 /// What h5py makes of types, texts and counts: HDF5's C library hides mistakes in these.
 TEST(Readers, SeeDerivativesAndNextObservationsAsDescribed) {
   const std::string interpreter = python();
-  if (interpreter.empty()) GTEST_SKIP() << "no python3 with h5py: derivatives and next_obs were NOT read through it";
+  if (interpreter.empty())
+    GTEST_SKIP() << "no python3 with h5py: derivatives and next_obs were NOT read through it";
   const Folder folder;
-  const std::vector<std::string> words{"generate", scene("rolling_ball_small.xml"), "--output", "set", "--episodes", "20",
-                                       "--steps", "30", "--every", "5", "--gradients", "jacobians", "--seed",
-                                       "18446744073709551615", "--quiet"};
+  const std::vector<std::string> words{"generate",    scene("rolling_ball_small.xml"),
+                                       "--output",    "set",
+                                       "--episodes",  "20",
+                                       "--steps",     "30",
+                                       "--every",     "5",
+                                       "--gradients", "jacobians",
+                                       "--seed",      "18446744073709551615",
+                                       "--quiet"};
   ASSERT_EQ(run(folder, words).exit_code, 0);
   EXPECT_EQ(run_python(folder, interpreter, R"(
 import glob, h5py, numpy as np

@@ -76,8 +76,8 @@ class Memory : public RowSink {
  public:
   void write(const StateRow& row) override {
     order += "q" + std::to_string(row.step) + " ";
-    states.push_back(
-        {row.step, row.time, copy(row.q), copy(row.v), copy(row.body_pose), copy(row.body_twist), copy(row.variables)});
+    states.push_back({row.step, row.time, copy(row.q), copy(row.v), copy(row.body_pose),
+                      copy(row.body_twist), copy(row.variables)});
   }
   void write(const StepRow& row) override {
     order += "u" + std::to_string(row.step) + " ";

@@ -57,12 +57,14 @@ std::string rows(int count, const std::string& row) {
   return text;
 }
 
-/// The loss is that of the fields beside it, and a control's derivative that of two runs whose tables differ in it.
+/// The loss is that of the fields beside it, and a control's derivative that of two runs whose
+/// tables differ in it.
 TEST(Simulate, WritesGradientsBesideTheTrajectory) {
   const Folder folder;
   const auto table = [&](double first) {
     std::string text;
-    for (int t = 0; t < 90; ++t) text += (t == 5 ? std::to_string(first) : std::string("0.05")) + ",0,0.2\n";
+    for (int t = 0; t < 90; ++t)
+      text += (t == 5 ? std::to_string(first) : std::string("0.05")) + ",0,0.2\n";
     return folder.write("u.csv", text);
   };
   const auto shear_loss = [&](int environment) {
@@ -77,7 +79,8 @@ TEST(Simulate, WritesGradientsBesideTheTrajectory) {
         }
     return sum;
   };
-  const Words words{"--envs", "2", "--overwrite", "--tol", "1e-12", "--gradients", "shear", "--controls"};
+  const Words words{"--envs", "2",           "--overwrite", "--tol",
+                    "1e-12",  "--gradients", "shear",       "--controls"};
   const auto loss_at = [&](double first) {
     Words all = words;
     all.push_back(table(first));
@@ -86,7 +89,8 @@ TEST(Simulate, WritesGradientsBesideTheTrajectory) {
     return shear_loss(1);
   };
   const double ahead = loss_at(0.0501), behind = loss_at(0.0499), middle = loss_at(0.05);
-  const Array loss = read_array(folder, "/gradients/loss"), by_u = read_array(folder, "/gradients/grad_u");
+  const Array loss = read_array(folder, "/gradients/loss"),
+              by_u = read_array(folder, "/gradients/grad_u");
   EXPECT_NEAR(loss.values[1], middle, 1e-12 * middle);
   EXPECT_EQ(by_u.dims, (h5::Dims{2, 90, 3}));
   const double derivative = by_u.values[(90 + 5) * 3];
@@ -104,8 +108,11 @@ TEST(Simulate, WritesGradientsBesideTheTrajectory) {
 /// The sensor's coefficients act on all of its points: their derivatives are sums over points.
 TEST(Simulate, WritesGradientsOfTactilePoints) {
   const Folder folder;
-  simulate(folder, kSmall, {"--envs", "2", "--steps", "90", "--gradients", "shear", "--point-gradients", "--overwrite"});
-  const Array points = read_array(folder, "/gradients/grad_points/pad"), numbers = read_array(folder, "/gradients/grad_numbers");
+  simulate(
+      folder, kSmall,
+      {"--envs", "2", "--steps", "90", "--gradients", "shear", "--point-gradients", "--overwrite"});
+  const Array points = read_array(folder, "/gradients/grad_points/pad"),
+              numbers = read_array(folder, "/gradients/grad_numbers");
   const h5::Id file = h5::open_file(folder.path("out.h5"));
   const auto names = h5::read_texts(h5::open_dataset(file, "/gradients/grad_numbers"), "names");
   const auto own = h5::read_texts(h5::open_group(file, "/gradients/grad_points"), "names");
@@ -115,7 +122,8 @@ TEST(Simulate, WritesGradientsOfTactilePoints) {
   for (std::size_t e = 0; e < 2; ++e)
     for (const std::string coefficient : {"kn", "kt", "mu"}) {
       const auto column = std::size_t(std::find(own.begin(), own.end(), coefficient) - own.begin());
-      const auto whole = std::size_t(std::find(names.begin(), names.end(), "tactile pad " + coefficient) - names.begin());
+      const auto whole = std::size_t(
+          std::find(names.begin(), names.end(), "tactile pad " + coefficient) - names.begin());
       ASSERT_LT(column, own.size());
       ASSERT_LT(whole, names.size());
       double sum = 0, size = 0;
@@ -128,10 +136,14 @@ TEST(Simulate, WritesGradientsOfTactilePoints) {
     }
   const Outcome refused = run(folder, {"simulate", kSmall, "-o", "none.h5", "--point-gradients"});
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.err, testing::HasSubstr("--point-gradients without --gradients; expected both"));
-  const Outcome blind = run(folder, {"simulate", kSmall, "-o", "none.h5", "--steps", "5", "--gradients", "final", "--point-gradients"});
+  EXPECT_THAT(refused.err,
+              testing::HasSubstr("--point-gradients without --gradients; expected both"));
+  const Outcome blind = run(folder, {"simulate", kSmall, "-o", "none.h5", "--steps", "5",
+                                     "--gradients", "final", "--point-gradients"});
   EXPECT_EQ(blind.exit_code, 2);
-  EXPECT_THAT(blind.err, testing::HasSubstr("--point-gradients with --gradients final; expected a loss that reads fields"));
+  EXPECT_THAT(blind.err,
+              testing::HasSubstr(
+                  "--point-gradients with --gradients final; expected a loss that reads fields"));
 }
 
 TEST(Simulate, TapeMemoryChangesNoGradient) {
@@ -145,15 +157,22 @@ TEST(Simulate, TapeMemoryChangesNoGradient) {
   const std::vector<std::string> names{"loss", "grad_u", "grad_q", "grad_v", "grad_numbers"};
   EXPECT_EQ(with(nullptr), 0);
   std::vector<std::vector<double>> stored;
-  for (const std::string& name : names) stored.push_back(read_array(folder, "/gradients/" + name).values);
+  for (const std::string& name : names)
+    stored.push_back(read_array(folder, "/gradients/" + name).values);
   for (const char* memory : {"200kB", "0.2MiB"}) {
     EXPECT_EQ(with(memory), 120);
-    for (std::size_t k = 0; k < names.size(); ++k) EXPECT_EQ(read_array(folder, "/gradients/" + names[k]).values, stored[k]);
+    for (std::size_t k = 0; k < names.size(); ++k)
+      EXPECT_EQ(read_array(folder, "/gradients/" + names[k]).values, stored[k]);
   }
   const std::vector<std::pair<const char*, const char*>> wrong{
-      {"2", "expected a positive number and its unit"}, {"-2GB", "as in 2GiB"}, {"0GB", "as in 2GiB"}, {"1gb", "as in 2GiB"}, {"30kB", "expected at least"}};
+      {"2", "expected a positive number and its unit"},
+      {"-2GB", "as in 2GiB"},
+      {"0GB", "as in 2GiB"},
+      {"1gb", "as in 2GiB"},
+      {"30kB", "expected at least"}};
   for (const auto& [memory, message] : wrong) {
-    Words all{"simulate", kSmall, "-o", "none.h5", "--steps", "120", "--gradients", "shear", "--tape-memory", memory};
+    Words all{"simulate", kSmall,        "-o",    "none.h5",       "--steps",
+              "120",      "--gradients", "shear", "--tape-memory", memory};
     const Outcome outcome = run(folder, all);
     EXPECT_EQ(outcome.exit_code, 2) << memory;
     EXPECT_THAT(outcome.err, HasSubstr(message));
@@ -192,7 +211,8 @@ TEST(Simulate, WritesEndEffectorsBesideTheBodies) {
       R"(<variable><endeffector name="mark" joint="pad_joint" pos="0.01 0 -0.005"/></variable>)";
   folder.write("marked.xml", text.insert(text.find("<sensor>"), marks));
   simulate(folder, "marked.xml", {"--envs", "3", "--steps", "20"});
-  const Array mark = read_array(folder, "/variables/position"), pose = read_array(folder, "/bodies/pose");
+  const Array mark = read_array(folder, "/variables/position"),
+              pose = read_array(folder, "/bodies/pose");
   ASSERT_EQ(mark.dims, (h5::Dims{21, 3, 1, 3}));
   ASSERT_EQ(pose.dims, (h5::Dims{21, 3, 2, 7}));
   const double offset[] = {0.01, 0, -0.005};
@@ -334,8 +354,9 @@ TEST_P(Continued, GoesOnBitForBit) {
   simulate(whole, kSmall, with({"--steps", "90"}));
   simulate(parts, kSmall, with({"--steps", "60"}));
   std::filesystem::rename(parts.path("out.h5"), parts.path("first.h5"));
-  const json answer = simulate(parts, kSmall, {"--integrator", GetParam(), "--every", "4", "--steps", "40",
-                                               "--state-from", "first.h5", "--row", "50"});
+  const json answer = simulate(parts, kSmall,
+                               {"--integrator", GetParam(), "--every", "4", "--steps", "40",
+                                "--state-from", "first.h5", "--row", "50"});
   EXPECT_EQ(answer.at("first_step"), 50);
   EXPECT_EQ(answer.at("environments"), 19);
   EXPECT_EQ(answer.at("seed"), 7);
@@ -344,17 +365,20 @@ TEST_P(Continued, GoesOnBitForBit) {
   for (const std::string name : {"/u", "/solver/iterations", "/solver/residual", "/solver/status"})
     EXPECT_EQ(read_array(parts, name).values, rows_from(read_array(whole, name), 50)) << name;
   // Fields after steps 52, 56 … 88: the last ten of 22.
-  EXPECT_EQ(read_array(parts, "/tactile/pad/force").values, rows_from(read_array(whole, "/tactile/pad/force"), 12));
+  EXPECT_EQ(read_array(parts, "/tactile/pad/force").values,
+            rows_from(read_array(whole, "/tactile/pad/force"), 12));
   EXPECT_EQ(read_array(parts, "/tactile/pad/step").values.front(), 2);
   // A continued run continued: the last row by default.
   std::filesystem::rename(parts.path("out.h5"), parts.path("second.h5"));
   simulate(whole, kSmall, with({"--steps", "95", "--overwrite"}));
-  const json third = simulate(parts, kSmall, {"--integrator", GetParam(), "--every", "4", "--steps", "5",
-                                              "--state-from", "second.h5"});
+  const json third = simulate(
+      parts, kSmall,
+      {"--integrator", GetParam(), "--every", "4", "--steps", "5", "--state-from", "second.h5"});
   EXPECT_EQ(third.at("first_step"), 90);
   EXPECT_EQ(read_array(parts, "/q").values, rows_from(read_array(whole, "/q"), 90));
 }
-INSTANTIATE_TEST_SUITE_P(Schemes, Continued, ::testing::Values("BDF1", "BDF2", "SDIRK2", "linear-implicit"),
+INSTANTIATE_TEST_SUITE_P(Schemes, Continued,
+                         ::testing::Values("BDF1", "BDF2", "SDIRK2", "linear-implicit"),
                          [](const auto& scheme) { return scheme.param.substr(0, 6); });
 
 TEST(Continue, SaysWhatDoesNotFit) {
@@ -364,8 +388,10 @@ TEST(Continue, SaysWhatDoesNotFit) {
   const auto complaint = [&](const Words& more, int exit_code = 2) {
     return simulate(folder, kSmall, more, exit_code).at("error").get<std::string>();
   };
-  EXPECT_EQ(complaint({"--state-from", "first.h5", "--row", "21"}), "row 21 of first.h5; expected 0 to 20");
-  EXPECT_EQ(complaint({"--state-from", "first.h5", "--envs", "3"}), "3 environments; first.h5 has 2");
+  EXPECT_EQ(complaint({"--state-from", "first.h5", "--row", "21"}),
+            "row 21 of first.h5; expected 0 to 20");
+  EXPECT_EQ(complaint({"--state-from", "first.h5", "--envs", "3"}),
+            "3 environments; first.h5 has 2");
   EXPECT_EQ(complaint({"--row", "2"}), "--row without --state-from; expected both");
   EXPECT_THAT(complaint({"--state-from", "none.h5"}, 3), HasSubstr("none.h5"));
   folder.write("text.h5", "no HDF5");
@@ -373,9 +399,11 @@ TEST(Continue, SaysWhatDoesNotFit) {
   folder.write("u.csv", rows(25, "0,0,0.2"));
   EXPECT_EQ(complaint({"--state-from", "first.h5", "--controls", "u.csv", "--steps", "6"}),
             "u.csv: 25 rows of controls for 26 steps; expected a row per step");
-  EXPECT_EQ(simulate(folder, kSmall, {"--state-from", "first.h5", "--controls", "u.csv"}).at("steps"), 5);
-  const Outcome other = run(folder, {"simulate", kSmall, "-o", "out.h5", "--overwrite", "--state-from", "first.h5",
-                                     "--timestep", "0.01", "--seed", "3", "--steps", "2"});
+  EXPECT_EQ(
+      simulate(folder, kSmall, {"--state-from", "first.h5", "--controls", "u.csv"}).at("steps"), 5);
+  const Outcome other =
+      run(folder, {"simulate", kSmall, "-o", "out.h5", "--overwrite", "--state-from", "first.h5",
+                   "--timestep", "0.01", "--seed", "3", "--steps", "2"});
   EXPECT_THAT(other.err, HasSubstr("starts anew"));
   EXPECT_THAT(other.err, HasSubstr("seed 0"));
   EXPECT_EQ(read_array(folder, "/time").values, (std::vector<double>{0, 0.01, 0.02}));
@@ -385,7 +413,8 @@ TEST(Continue, AFailedEnvironmentStaysFailed) {
   const Folder folder;
   simulate(folder, kSmall, {"--timestep", "86400", "--steps", "3", "--envs", "2"}, 1);
   std::filesystem::rename(folder.path("out.h5"), folder.path("first.h5"));
-  const json answer = simulate(folder, kSmall, {"--timestep", "86400", "--steps", "2", "--state-from", "first.h5"}, 1);
+  const json answer = simulate(
+      folder, kSmall, {"--timestep", "86400", "--steps", "2", "--state-from", "first.h5"}, 1);
   EXPECT_EQ(answer.at("environment_steps"), 0);
   ASSERT_THAT(answer.at("failed"), testing::SizeIs(2));
   EXPECT_EQ(answer.at("failed").at(1).at("step"), -1);
@@ -424,7 +453,8 @@ TEST(Plot, ListsTheSensorsOfTheFile) {
   EXPECT_EQ(answer.at("sensor"), "pad");
   EXPECT_EQ(answer.at("sensors"), json({"pad", "twin"}));
   EXPECT_THAT(first.err, HasSubstr("sensors that can be drawn: pad, twin"));
-  const Outcome twin = run(folder, {"plot", "out.h5", "-o", "twin.svg", "--sensor", "twin", "--json"});
+  const Outcome twin =
+      run(folder, {"plot", "out.h5", "-o", "twin.svg", "--sensor", "twin", "--json"});
   EXPECT_EQ(json::parse(twin.out).at("sensor"), "twin");
   EXPECT_THAT(folder.read("twin.svg"), HasSubstr("sensor 'twin'"));
 }

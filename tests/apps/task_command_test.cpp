@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tasks on the command line: files with rewards and ends, summaries with successes, and what is refused.
+// Tasks on the command line: files with rewards and ends, summaries with successes, and what is
+// refused.
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
@@ -18,7 +19,8 @@ using testing::Not;
 
 TEST(Tasks, GenerateStoresRewardsAndEnds) {
   const Folder folder;
-  const json answer = run_json(folder, {"generate", "dummy", "-o", "set", "--episodes", "20", "--threads", "2"});
+  const json answer =
+      run_json(folder, {"generate", "dummy", "-o", "set", "--episodes", "20", "--threads", "2"});
   EXPECT_EQ(answer.at("task"), "dummy");
   EXPECT_EQ(answer.at("policy"), "scripted");
   EXPECT_EQ(answer.at("successes"), 20);
@@ -49,29 +51,32 @@ TEST(Tasks, GenerateStoresRewardsAndEnds) {
 TEST(Tasks, GenerateWritesTheSameBytesOnAnyNumberOfThreads) {
   const Folder folder;
   for (const char* threads : {"1", "3"})
-    run_json(folder, {"generate", "box_pushing", "-o", std::string("set") + threads, "--episodes", "50", "--threads",
-                      threads, "--policy", "random", "--seed", "4"});
+    run_json(folder, {"generate", "box_pushing", "-o", std::string("set") + threads, "--episodes",
+                      "50", "--threads", threads, "--policy", "random", "--seed", "4"});
   EXPECT_EQ(folder.read("set1/shard-00000.h5"), folder.read("set3/shard-00000.h5"));
 }
 
 TEST(Tasks, ATableHoldsActions) {
   const Folder folder;
   folder.write("a.csv", "0.1\n0.2\n");
-  const json answer = run_json(folder, {"generate", "dummy", "-o", "set", "--episodes", "1", "--controls", "a.csv"});
+  const json answer = run_json(
+      folder, {"generate", "dummy", "-o", "set", "--episodes", "1", "--controls", "a.csv"});
   EXPECT_EQ(answer.at("policy"), "csv");
   std::vector<float> actions(3);
-  h5::read_box(h5::open_dataset(h5::open_file(folder.path("set/shard-00000.h5")), "data/demo_0/actions"), {0, 0}, {3, 1},
-               actions.data());
+  h5::read_box(
+      h5::open_dataset(h5::open_file(folder.path("set/shard-00000.h5")), "data/demo_0/actions"),
+      {0, 0}, {3, 1}, actions.data());
   EXPECT_THAT(actions, testing::ElementsAre(0.1F, 0.2F, 0.2F));
 }
 
 TEST(Tasks, SimulateStoresActionsAndRewards) {
   const Folder folder;
-  const json answer = run_json(folder, {"simulate", "dummy", "-o", "d.h5", "--envs", "18", "--seed", "3"});
+  const json answer =
+      run_json(folder, {"simulate", "dummy", "-o", "d.h5", "--envs", "18", "--seed", "3"});
   EXPECT_EQ(answer.at("steps"), 200);
   EXPECT_EQ(answer.at("successes"), 18);
-  const json set = run_json(folder, {"generate", "dummy", "-o", "set", "--episodes", "18", "--seed", "3", "--precision",
-                                     "double"});
+  const json set = run_json(folder, {"generate", "dummy", "-o", "set", "--episodes", "18", "--seed",
+                                     "3", "--precision", "double"});
   EXPECT_DOUBLE_EQ(answer.at("mean_return"), set.at("mean_return"));
   const h5::Id file = h5::open_file(folder.path("d.h5"));
   EXPECT_EQ(h5::read_text(file, "task"), "dummy");
@@ -79,8 +84,9 @@ TEST(Tasks, SimulateStoresActionsAndRewards) {
   // Row 40 of an episode is what both see last.
   std::vector<double> q(10), final_q(10);
   h5::read_box(h5::open_dataset(file, "q"), {200, 17, 0}, {1, 1, 10}, q.data());
-  h5::read_box(h5::open_dataset(h5::open_file(folder.path("set/shard-00000.h5")), "data/demo_17/final_obs/q"), {0, 0},
-               {1, 10}, final_q.data());
+  h5::read_box(h5::open_dataset(h5::open_file(folder.path("set/shard-00000.h5")),
+                                "data/demo_17/final_obs/q"),
+               {0, 0}, {1, 10}, final_q.data());
   EXPECT_EQ(q, final_q);
 }
 
@@ -89,16 +95,20 @@ TEST(Tasks, ASceneAloneSaysThatItHasNone) {
   const std::string small = scene("rolling_ball_small.xml");
   const json simulated = run_json(folder, {"simulate", small, "-o", "s.h5", "--steps", "5"});
   EXPECT_TRUE(simulated.at("task").is_null());
-  EXPECT_THAT(h5::read_text(h5::open_file(folder.path("s.h5")), "task"), HasSubstr("every reward is 0"));
-  const json set = run_json(folder, {"generate", small, "-o", "set", "--episodes", "1", "--steps", "5"});
+  EXPECT_THAT(h5::read_text(h5::open_file(folder.path("s.h5")), "task"),
+              HasSubstr("every reward is 0"));
+  const json set =
+      run_json(folder, {"generate", small, "-o", "set", "--episodes", "1", "--steps", "5"});
   EXPECT_TRUE(set.at("task").is_null());
   const h5::Id shard = h5::open_file(folder.path("set/shard-00000.h5"));
-  EXPECT_THAT(h5::read_text(h5::open_group(shard, "scene"), "task"), HasSubstr("every reward is 0"));
+  EXPECT_THAT(h5::read_text(h5::open_group(shard, "scene"), "task"),
+              HasSubstr("every reward is 0"));
 }
 
 TEST(Tasks, BenchCountsActions) {
   const Folder folder;
-  const json answer = run_json(folder, {"bench", "box_pushing_reduced", "--envs", "32", "--threads", "1,2", "--repeat", "1"});
+  const json answer = run_json(folder, {"bench", "box_pushing_reduced", "--envs", "32", "--threads",
+                                        "1,2", "--repeat", "1"});
   EXPECT_EQ(answer.at("task"), "box_pushing_reduced");
   EXPECT_EQ(answer.at("policy"), "random");
   EXPECT_EQ(answer.at("steps_per_action"), 5);
@@ -121,13 +131,17 @@ TEST(Tasks, WhatTheyCannotTakeIsAnError) {
       {{"generate", "box_pushin", "-o", "s", "--episodes", "1"}, "did you mean 'box_pushing'?"},
       {{"simulate", "dumy", "-o", "s.h5"}, "did you mean 'dummy'?"},
       {{"bench", "dumy"}, "neither a file nor a task"},
-      {{"generate", "dummy", "-o", "s", "--episodes", "1", "--steps", "3"}, "--steps with task 'dummy'"},
+      {{"generate", "dummy", "-o", "s", "--episodes", "1", "--steps", "3"},
+       "--steps with task 'dummy'"},
       {{"simulate", "dummy", "-o", "s.h5", "--tol", "1e-6"}, "--tol with task 'dummy'"},
       {{"bench", "dummy", "--every", "2"}, "--every with task 'dummy'"},
       {{"bench", small, "--policy", "random"}, "expected a task"},
-      {{"generate", "dummy", "-o", "s", "--episodes", "1", "--policy", "scripte"}, "did you mean 'scripted'?"},
-      {{"generate", "dummy", "-o", "s", "--episodes", "1", "--policy", "csv"}, "--policy csv without --controls"},
-      {{"simulate", "dummy", "-o", "s.h5", "--policy", "hold", "--controls", "a.csv"}, "expected csv"},
+      {{"generate", "dummy", "-o", "s", "--episodes", "1", "--policy", "scripte"},
+       "did you mean 'scripted'?"},
+      {{"generate", "dummy", "-o", "s", "--episodes", "1", "--policy", "csv"},
+       "--policy csv without --controls"},
+      {{"simulate", "dummy", "-o", "s.h5", "--policy", "hold", "--controls", "a.csv"},
+       "expected csv"},
   };
   for (const Case& c : cases) {
     const Outcome outcome = run(folder, c.words);
@@ -139,7 +153,8 @@ TEST(Tasks, WhatTheyCannotTakeIsAnError) {
 
 TEST(Tasks, GradcheckChecksTheReturn) {
   const Folder folder;
-  const json answer = run_json(folder, {"gradcheck", "box_pushing", "--actions", "12", "--entries", "4", "--seed", "3"});
+  const json answer = run_json(
+      folder, {"gradcheck", "box_pushing", "--actions", "12", "--entries", "4", "--seed", "3"});
   EXPECT_EQ(answer.at("command"), "gradcheck");
   EXPECT_EQ(answer.at("task"), "box_pushing");
   EXPECT_EQ(answer.at("policy"), "scripted");
@@ -159,19 +174,23 @@ TEST(Tasks, GradcheckThatComparesNothingFails) {
   const Words words{"gradcheck", "stable_grasp", "--actions", "1", "--entries", "1"};
   const Outcome text = run(folder, words);
   EXPECT_EQ(text.exit_code, 1);
-  EXPECT_THAT(text.err, HasSubstr("nothing could be compared with differences: no input acts on the return here"));
+  EXPECT_THAT(
+      text.err,
+      HasSubstr("nothing could be compared with differences: no input acts on the return here"));
   EXPECT_THAT(text.err, HasSubstr("try another --seed or --policy"));
   EXPECT_THAT(text.out, Not(HasSubstr("largest error")));
   EXPECT_EQ(run_json(folder, words, 1).at("entries"), 0);
 }
 
-/// Every observation, shape and unit that a task declares; then the scene, with what the task varies.
+/// Every observation, shape and unit that a task declares; then the scene, with what the task
+/// varies.
 TEST(Tasks, InspectShowsWhatATaskDeclares) {
   const Folder folder;
   const Outcome text = run(folder, {"inspect", "box_pushing"});
   EXPECT_EQ(text.exit_code, 0) << text.err;
-  for (const char* says : {"task box_pushing: ", "action u (3) [1]", "tactile (13, 10, 3) [N]", "5 steps per action",
-                           "at most 100 actions", "scene box_pushing", "effects\n", "stages\n"})
+  for (const char* says :
+       {"task box_pushing: ", "action u (3) [1]", "tactile (13, 10, 3) [N]", "5 steps per action",
+        "at most 100 actions", "scene box_pushing", "effects\n", "stages\n"})
     EXPECT_THAT(text.out, HasSubstr(says));
   const json answer = run_json(folder, {"inspect", "insertion"});
   const json& task = answer.at("task");
@@ -186,7 +205,12 @@ TEST(Tasks, InspectShowsWhatATaskDeclares) {
   EXPECT_EQ(task.at("opening"), true);
   EXPECT_EQ(answer.at("randomized").size(), 14U) << "the skin of two pads, which the task varies";
   EXPECT_TRUE(run_json(folder, {"inspect", scene("insertion.xml")}).at("task").is_null());
-  EXPECT_TRUE(run_json(folder, {"inspect", "dummy"}).at("task").at("observations").at(0).at("low").is_null());
+  EXPECT_TRUE(run_json(folder, {"inspect", "dummy"})
+                  .at("task")
+                  .at("observations")
+                  .at(0)
+                  .at("low")
+                  .is_null());
   const Outcome typo = run(folder, {"inspect", "box_pushin"});
   EXPECT_EQ(typo.exit_code, 2);
   EXPECT_THAT(typo.err, HasSubstr("did you mean 'box_pushing'?"));
@@ -197,14 +221,16 @@ TEST(Tasks, InspectShowsWhatATaskDeclares) {
 
 TEST(Tasks, GradcheckRefusesWhatIsOfScenesAlone) {
   const Folder folder;
-  for (const Words& option : {Words{"--loss", "path"}, Words{"--steps", "3"}, Words{"--every", "2"}, Words{"--actions", "101"}}) {
+  for (const Words& option : {Words{"--loss", "path"}, Words{"--steps", "3"}, Words{"--every", "2"},
+                              Words{"--actions", "101"}}) {
     Words words{"gradcheck", "box_pushing"};
     words.insert(words.end(), option.begin(), option.end());
     const Outcome outcome = run(folder, words);
     EXPECT_EQ(outcome.exit_code, 2);
     EXPECT_THAT(outcome.err, HasSubstr(option[0]));
   }
-  const Outcome scene_alone = run(folder, {"gradcheck", scene("rolling_ball_small.xml"), "--actions", "3"});
+  const Outcome scene_alone =
+      run(folder, {"gradcheck", scene("rolling_ball_small.xml"), "--actions", "3"});
   EXPECT_EQ(scene_alone.exit_code, 2);
   EXPECT_THAT(scene_alone.err, HasSubstr("expected a task"));
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of rollouts: the adjoint against differences of whole runs, for every scheme, joint kind, contact law and motor.
+// Gradients of rollouts: the adjoint against differences of whole runs, for every scheme, joint
+// kind, contact law and motor.
 #include <gtest/gtest.h>
 
 #include "tests/engine/gradient_run.hpp"
@@ -16,7 +17,8 @@ using testing::StateLoss;
 constexpr int kSteps = 6;
 
 /// Every entry relative to the gradient's norm over its group; returns how many were compared.
-int compare(const std::vector<double>& a, const std::vector<double>& b, double scale, double tolerance, const char* what) {
+int compare(const std::vector<double>& a, const std::vector<double>& b, double scale,
+            double tolerance, const char* what) {
   int compared = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (!std::isfinite(b[i])) continue;
@@ -46,7 +48,8 @@ int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance
   compared += compare(adjoint.v, difference.v, norm(difference.v), tolerance, "v");
   compared += compare(adjoint.u, difference.u, norm(difference.u), tolerance, "u");
   const Parameters parameters(model);
-  std::vector<double> a = adjoint.parameters, b = difference.parameters;  // by their relative changes: units differ
+  std::vector<double> a = adjoint.parameters,
+                      b = difference.parameters;  // by their relative changes: units differ
   for (std::size_t k = 0; k < a.size(); ++k) {
     const double size = parameters.infos()[k].value;
     a[k] *= size, b[k] *= size;
@@ -66,7 +69,8 @@ TEST_P(AdjointScheme, TreesMatchDifferences) {
   int compared = 0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    compared += check(testing::random_tree(seed, 2 + static_cast<int>(seed % 5)), GetParam(), seed, 1e-7);
+    compared +=
+        check(testing::random_tree(seed, 2 + static_cast<int>(seed % 5)), GetParam(), seed, 1e-7);
   }
   EXPECT_GT(compared, 150);
 }
@@ -75,7 +79,8 @@ TEST_P(AdjointScheme, MachinesMatchDifferences) {
   int compared = 0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    compared += check(testing::random_machine(seed, 2 + static_cast<int>(seed % 5)), GetParam(), seed, 1e-7);
+    compared += check(testing::random_machine(seed, 2 + static_cast<int>(seed % 5)), GetParam(),
+                      seed, 1e-7);
   }
   EXPECT_GT(compared, 350);
 }
@@ -84,7 +89,9 @@ TEST_P(AdjointScheme, ContactsMatchDifferences) {
   int compared = 0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    compared += check(testing::random_contacts(seed, 2 + static_cast<int>(seed % 2), ContactLaw(seed % 3)), GetParam(), seed, 1e-6);
+    compared +=
+        check(testing::random_contacts(seed, 2 + static_cast<int>(seed % 2), ContactLaw(seed % 3)),
+              GetParam(), seed, 1e-6);
   }
   EXPECT_GT(compared, 150);
 }
@@ -94,7 +101,8 @@ TEST_P(AdjointScheme, MotorsTimedAtTheStartMatchDifferences) {
   int motors = 0, compared = 0;
   for (unsigned seed = 1; seed <= 20; ++seed) {
     Scene s = testing::random_machine(seed, 3 + static_cast<int>(seed % 3));
-    for (MotorDescription& m : s.motors) m.timing = MotorTiming::start, motors += m.control == MotorControl::position;
+    for (MotorDescription& m : s.motors)
+      m.timing = MotorTiming::start, motors += m.control == MotorControl::position;
     SCOPED_TRACE("seed " + std::to_string(seed));
     compared += check(s, GetParam(), seed, 1e-7);
   }
@@ -112,7 +120,8 @@ TEST_P(AdjointScheme, CompanyChangesNothing) {
     for (unsigned k = 0; k < 9; ++k) inputs.push_back(random_input(model, seed + 10 * k, kSteps));
     const StateLoss loss(model, kSteps, seed);
     for (int lane : {0, 5, 8}) {
-      const RunGradient alone = testing::adjoint_of_run(model, options, {inputs[std::size_t(lane)]}, loss, 0);
+      const RunGradient alone =
+          testing::adjoint_of_run(model, options, {inputs[std::size_t(lane)]}, loss, 0);
       const RunGradient among = testing::adjoint_of_run(model, options, inputs, loss, lane);
       EXPECT_EQ(alone.q, among.q) << "seed " << seed << " lane " << lane;
       EXPECT_EQ(alone.v, among.v);
@@ -123,7 +132,8 @@ TEST_P(AdjointScheme, CompanyChangesNothing) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, AdjointScheme,
-                         ::testing::Values(Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit));
+                         ::testing::Values(Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2,
+                                           Integrator::linear_implicit));
 
 }  // namespace
 }  // namespace tangere

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Same seed, same bits: any batch size, any lane, whatever the neighbours do, on every instruction set.
+// Same seed, same bits: any batch size, any lane, whatever the neighbours do, on every instruction
+// set.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -23,7 +24,8 @@ Scene varied() {
   s.randomizations.push_back({RandomTarget::joint_q, "ball_joint", "", 0, ContactField::kn, d, {}});
   s.randomizations.push_back({RandomTarget::joint_q, "ball_joint", "", 1, ContactField::kn, d, {}});
   d.a = 4, d.b = 6;
-  s.randomizations.push_back({RandomTarget::pair_contact, "pad", "ball", 0, ContactField::kn, d, {}});
+  s.randomizations.push_back(
+      {RandomTarget::pair_contact, "pad", "ball", 0, ContactField::kn, d, {}});
   d.a = 0.008, d.b = 0.012;
   s.randomizations.push_back({RandomTarget::tactile, "pad", "", 0, ContactField::kt, d, {}});
   return s;
@@ -72,12 +74,13 @@ TEST(Batch, AThousandNeighboursChangeNothing) {
   EXPECT_EQ(run(model, 1, 0, 999, 90), run(model, 1000, 999, 0, 90));
 }
 
-/// Trees of random joints, spheres and cuboids in contact, thrown about: an environment on its own against the same one
-/// in a group of eight and in a crowd.
+/// Trees of random joints, spheres and cuboids in contact, thrown about: an environment on its own
+/// against the same one in a group of eight and in a crowd.
 TEST(Batch, RandomScenesHaveTheSameBitsAloneAndInAGroup) {
   int touching = 0;
   for (unsigned seed = 1; seed <= 12; ++seed) {
-    const Model model(testing::random_contacts(seed, 2 + static_cast<int>(seed % 4), ContactLaw::clamped));
+    const Model model(
+        testing::random_contacts(seed, 2 + static_cast<int>(seed % 4), ContactLaw::clamped));
     const std::size_t nv = std::size_t(model.nv());
     const auto velocity = [&](int e) {
       testing::Random random(1000 * seed + static_cast<unsigned>(e));
@@ -130,7 +133,8 @@ TEST(Batch, BlocksAreResetFromManyThreadsAtOnce) {
   for (int t = 0; t < kThreads; ++t)
     threads.emplace_back([&, t] {
       for (int round = 0; round < kRounds; ++round)
-        for (int e = t * kernels::kBlock; e < (t + 1) * kernels::kBlock; ++e) batch.reset(e, e + 100 * (round % 7));
+        for (int e = t * kernels::kBlock; e < (t + 1) * kernels::kBlock; ++e)
+          batch.reset(e, e + 100 * (round % 7));
     });
   for (std::thread& thread : threads) thread.join();
   const int last = (kRounds - 1) % 7;
@@ -174,7 +178,8 @@ TEST(Batch, BadStatesAndControlsAreFrozenWithAReason) {
 
 TEST(Batch, RestartedRunContinuesBitForBit) {
   const Model model(varied());
-  for (Integrator scheme : {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
+  for (Integrator scheme :
+       {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
     Stepper stepper(model, testing::options(scheme, 5e-3, 1e-9));
     Batch through(model, 1, 3), resumed(model, 1, 3);
     std::vector<double> before_q, before_v;
@@ -210,14 +215,16 @@ TEST(Batch, InstructionSetsAgree) {
     if (names[i] == "avx2" && names[0] == "avx512") {
       EXPECT_EQ(records[i], records[0]);
     }
-    for (std::size_t k = 0; k < records[0].q.size(); ++k) EXPECT_NEAR(records[i].q[k], records[0].q[k], 1e-9) << names[i];
+    for (std::size_t k = 0; k < records[0].q.size(); ++k)
+      EXPECT_NEAR(records[i].q[k], records[0].q[k], 1e-9) << names[i];
   }
 }
 
 TEST(Batch, SecondSceneRunsInEveryScheme) {
   const Model model(testing::two_balls());
   Readout readout(model);
-  for (Integrator scheme : {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
+  for (Integrator scheme :
+       {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
     Stepper stepper(model, testing::options(scheme, 2e-3, 1e-10));
     Batch batch(model, 3);
     for (int k = 0; k < 300; ++k)

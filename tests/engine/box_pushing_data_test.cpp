@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Against the published simulator's box pushing: fields at its states, its states in our residual, its trajectory.
+// Against the published simulator's box pushing: fields at its states, its states in our residual,
+// its trajectory.
 //
-// A "switch" computes a point's force as published, in world axes and apart from the kernels' sums: the pad's velocity at
-// its own point x, the box's at x₂; the force on the pad acts at x; friction of the dynamics is bounded by
-// μ √(1 + |x × n|²) |N|.
+// A "switch" computes a point's force as published, in world axes and apart from the kernels' sums:
+// the pad's velocity at its own point x, the box's at x₂; the force on the pad acts at x; friction
+// of the dynamics is bounded by μ √(1 + |x × n|²) |N|.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -52,7 +53,8 @@ Pose pose_at(const std::vector<std::string>& cells, std::size_t first) {
   return {{x(0), x(1), x(2)}, {x(3), x(4), x(5), x(6)}};
 }
 
-/// Their scene from bodies.csv: masses and inertias as they are, but for the pad and the box, which have shapes.
+/// Their scene from bodies.csv: masses and inertias as they are, but for the pad and the box, which
+/// have shapes.
 Scene pushing() {
   const double length = double(0.003F), radius = double(0.018F);
   Scene s;
@@ -80,16 +82,20 @@ Scene pushing() {
     inert.mass = std::stod(c[18]);
     inert.inertia = {std::stod(c[19]), 0, 0, std::stod(c[20]), 0, std::stod(c[21])};
     l.body.shape = inert;
-    if (c[10] == "tactile_pad_left") l.body.shape = CylinderShape{length, radius, 8, 4}, l.body.density = 1;
-    if (c[10] == "box") l.body.shape = CuboidShape{{0.05, 0.05, 0.05}, {2, 2, 2}}, l.body.density = 600;
+    if (c[10] == "tactile_pad_left")
+      l.body.shape = CylinderShape{length, radius, 8, 4}, l.body.density = 1;
+    if (c[10] == "box")
+      l.body.shape = CuboidShape{{0.05, 0.05, 0.05}, {2, 2, 2}}, l.body.density = 600;
     names.push_back(c[0]);
     s.links.push_back(l);
   }
   s.motors.push_back({"gripper_base_translational", -1, 1, {}});
   s.motors.push_back({"gripper_base_rotational", -3, 3, {}});
   s.motors.push_back({"box_translational_joint", -0.2, 0.2, {}});
-  s.pair_contacts.push_back({"tactile_pad_left", "box", {100, 8, 1, 10}, ContactLaw::paper, 1e-5, {}});
-  s.ground_contacts.push_back({"box", {1e3, 1, double(0.8F), double(0.3F)}, ContactLaw::linear, 0, {}});
+  s.pair_contacts.push_back(
+      {"tactile_pad_left", "box", {100, 8, 1, 10}, ContactLaw::paper, 1e-5, {}});
+  s.ground_contacts.push_back(
+      {"box", {1e3, 1, double(0.8F), double(0.3F)}, ContactLaw::linear, 0, {}});
   TactileDescription t;
   t.name = "pad";
   t.body = "tactile_pad_left";
@@ -137,9 +143,9 @@ struct Pushing {
     return box_slide + cross(Vec3<double>{0, 0, box_rate}, x - box.p);
   }
   /// What a force on the pad at x, and its opposite on the box at x2, do on the seven dofs.
-  void add(std::vector<double>& forces, const Vec3<double>& f, const Vec3<double>& x, const Vec3<double>& x2,
-           double sign) const {
-    const double on[7] = {cross(x - base, f).z, dot(hand_x, f), dot(hand_y, f), -f.x, -f.y, -f.z,
+  void add(std::vector<double>& forces, const Vec3<double>& f, const Vec3<double>& x,
+           const Vec3<double>& x2, double sign) const {
+    const double on[7] = {cross(x - base, f).z,   dot(hand_x, f), dot(hand_y, f), -f.x, -f.y, -f.z,
                           -cross(x2 - box.p, f).z};
     for (std::size_t i = 0; i < 7; ++i) forces[i] += sign * on[i];
   }
@@ -197,7 +203,8 @@ TEST_F(BoxPushing, FieldsAtItsStates) {
     for (std::size_t p = 0; p < 130; ++p) {
       const Vec3<double> xi = {points[p][4], points[p][5], points[p][6]};
       const Vec3<double> f = transposed_times(at.pad.R, point_force(at, xi, true, false).force);
-      const double switched[3] = {-f.x, -f.y, -f.z};  // along axis0 = -x, axis1 = -y, and against their product z
+      const double switched[3] = {
+          -f.x, -f.y, -f.z};  // along axis0 = -x, axis1 = -y, and against their product z
       for (std::size_t c = 0; c < 3; ++c) {
         const double theirs = field[1 + 3 * p + c];
         worst = std::max(worst, std::abs(force[3 * p + c] - theirs));
@@ -227,7 +234,8 @@ TEST_F(BoxPushing, ItsStatesSolveOurResidual) {
       b.r[i] = 0;
       b.s[i] = -rate[t][i];
     }
-    const double tau[7] = {3 * u[t][2], u[t][0], u[t][1], 0.2 * u[t][3], 0.2 * u[t][4], 0.2 * u[t][5], 0};
+    const double tau[7] = {3 * u[t][2],   u[t][0],       u[t][1], 0.2 * u[t][3],
+                           0.2 * u[t][4], 0.2 * u[t][5], 0};
     std::copy(tau, tau + 7, b.tau.begin());
     b.residual(1 / h, 1 / h);
     for (double g : b.g) worst = std::max(worst, std::abs(g));
@@ -237,7 +245,8 @@ TEST_F(BoxPushing, ItsStatesSolveOurResidual) {
     bool slips = false;
     for (std::size_t k = 0; k < points.size(); k += 3) {
       const Vec3<double> xi = {points[k], points[k + 1], points[k + 2]};
-      const PointForce ours = point_force(at, xi, false, false), published = point_force(at, xi, true, true);
+      const PointForce ours = point_force(at, xi, false, false),
+                       published = point_force(at, xi, true, true);
       slips = slips || published.slips;
       at.add(theirs, ours.force, ours.x2, ours.x2, 1);
       at.add(theirs, published.force, published.x, published.x2, -1);
@@ -255,8 +264,9 @@ TEST_F(BoxPushing, ItsStatesSolveOurResidual) {
   EXPECT_GT(worst, 1e-4) << "then the switch would switch nothing";
 }
 
-/// The switch leaves 1e-8 N unexplained, so where the trajectories part it is by those two laws. They part by less than
-/// 0.4 of what our own positions move when h is halved, rates by less than 0.1: the difference is below the scheme's error.
+/// The switch leaves 1e-8 N unexplained, so where the trajectories part it is by those two laws.
+/// They part by less than 0.4 of what our own positions move when h is halved, rates by less than
+/// 0.1: the difference is below the scheme's error.
 TEST_F(BoxPushing, TrajectoriesDifferByLessThanTheStepSizeMatters) {
   const auto run = [&](int refine) {
     StepperOptions o;
@@ -278,16 +288,19 @@ TEST_F(BoxPushing, TrajectoriesDifferByLessThanTheStepSizeMatters) {
   const auto ours = run(1), fine = run(2);
   const auto apart = [](const Table& a, const Table& b, std::size_t i, std::size_t shift) {
     double most = 0;
-    for (std::size_t t = 0; t < 200; ++t) most = std::max(most, std::abs(a[t][i] - b[t + shift][i]));
+    for (std::size_t t = 0; t < 200; ++t)
+      most = std::max(most, std::abs(a[t][i] - b[t + shift][i]));
     return most;
   };
-  // Measured: 1.5e-6 rad, 2.2e-7 m, 2.7e-6 m; 2.2e-7 m, 2.5e-6 m, 2.1e-9 m, 4.8e-5 rad on ways of up to 0.12 m and
-  // 0.06 rad.
+  // Measured: 1.5e-6 rad, 2.2e-7 m, 2.7e-6 m; 2.2e-7 m, 2.5e-6 m, 2.1e-9 m, 4.8e-5 rad on ways of
+  // up to 0.12 m and 0.06 rad.
   const double limits[7] = {2e-6, 3e-7, 4e-6, 3e-7, 4e-6, 3e-9, 6e-5};
   for (std::size_t i = 0; i < 7; ++i) {
     EXPECT_LT(apart(ours.first, q, i, 1), limits[i]) << "coordinate " << i << " [rad, m]";
-    EXPECT_LT(apart(ours.first, q, i, 1), 0.4 * apart(ours.first, fine.first, i, 0)) << "coordinate " << i;
-    EXPECT_LT(apart(ours.second, rate, i, 1), 0.1 * apart(ours.second, fine.second, i, 0)) << "rate " << i;
+    EXPECT_LT(apart(ours.first, q, i, 1), 0.4 * apart(ours.first, fine.first, i, 0))
+        << "coordinate " << i;
+    EXPECT_LT(apart(ours.second, rate, i, 1), 0.1 * apart(ours.second, fine.second, i, 0))
+        << "rate " << i;
   }
 }
 

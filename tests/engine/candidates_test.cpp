@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Candidate lists decide speed, never results: any margin gives the same bits, and a lane that outruns its list is
-// noticed.
+// Candidate lists decide speed, never results: any margin gives the same bits, and a lane that
+// outruns its list is noticed.
 #include <gtest/gtest.h>
 
 #include "engine/detection.hpp"
@@ -18,7 +18,8 @@ struct Trajectory {
   int rows = 0;  // longest list seen
 };
 
-/// Eight balls under a pad at different places, stepped by hand so that the margin is ours to choose.
+/// Eight balls under a pad at different places, stepped by hand so that the margin is ours to
+/// choose.
 Trajectory run(double margin, const kernels::KernelTable& table) {
   const auto m = compile(testing::rolling_ball(false, 8));
   Workspace w(*m);
@@ -44,11 +45,13 @@ Trajectory run(double margin, const kernels::KernelTable& table) {
     std::vector<kernels::LaneRow> q0(w.q0, w.q0 + m->nq), v0(w.v0, w.v0 + m->nv);
     NewtonReport report;
     step.advance(table, w, alone, kAllLanes, history, report);
-    for (int l = 0; l < kGroup; ++l) EXPECT_FALSE(failed(report.status[l])) << "lane " << l << " step " << t;
+    for (int l = 0; l < kGroup; ++l)
+      EXPECT_FALSE(failed(report.status[l])) << "lane " << l << " step " << t;
     std::copy(q0.begin(), q0.end(), w.q_before);
     std::copy(v0.begin(), v0.end(), w.v_before);
     history = kAllLanes;
-    r.rows = std::max(r.rows, *std::max_element(w.lists[0].own_count, w.lists[0].own_count + kGroup));
+    r.rows =
+        std::max(r.rows, *std::max_element(w.lists[0].own_count, w.lists[0].own_count + kGroup));
   }
   for (int i = 0; i < m->nq; ++i)
     for (int l = 0; l < kGroup; ++l) r.states.push_back(w.q0[i][l]);
@@ -68,17 +71,23 @@ TEST(Candidates, AnyMarginGivesTheSameBits) {
   }
 }
 
-/// A bar of three blocks above a table, a cylinder and a ball, all fixed: nine pairs of shapes, one pair of links.
+/// A bar of three blocks above a table, a cylinder and a ball, all fixed: nine pairs of shapes, one
+/// pair of links.
 Scene bar_above_shapes() {
   Scene s;
   s.name = "bar";
   s.timestep = 2e-3;
-  s.links = {testing::link("middle", JointType::free, {0, 0, 0.03}, CuboidShape{{0.03, 0.03, 0.03}, {3, 3, 3}}, 500),
-             testing::link("left", JointType::fixed, {0, 0.03, 0}, CuboidShape{{0.03, 0.03, 0.03}, {3, 3, 3}}, 500),
-             testing::link("right", JointType::fixed, {0, -0.03, 0}, CuboidShape{{0.03, 0.03, 0.03}, {3, 3, 3}}, 500),
-             testing::link("table", JointType::fixed, {0, 0.05, 0}, CuboidShape{{0.1, 0.05, 0.02}, {2, 2, 2}}, 500),
-             testing::link("roll", JointType::fixed, {0, -0.04, 0}, CylinderShape{0.05, 0.012, 8, 2}, 500),
-             testing::link("ball", JointType::fixed, {0.01, 0, 0}, SphereShape{0.012}, 500)};
+  s.links = {
+      testing::link("middle", JointType::free, {0, 0, 0.03},
+                    CuboidShape{{0.03, 0.03, 0.03}, {3, 3, 3}}, 500),
+      testing::link("left", JointType::fixed, {0, 0.03, 0},
+                    CuboidShape{{0.03, 0.03, 0.03}, {3, 3, 3}}, 500),
+      testing::link("right", JointType::fixed, {0, -0.03, 0},
+                    CuboidShape{{0.03, 0.03, 0.03}, {3, 3, 3}}, 500),
+      testing::link("table", JointType::fixed, {0, 0.05, 0},
+                    CuboidShape{{0.1, 0.05, 0.02}, {2, 2, 2}}, 500),
+      testing::link("roll", JointType::fixed, {0, -0.04, 0}, CylinderShape{0.05, 0.012, 8, 2}, 500),
+      testing::link("ball", JointType::fixed, {0.01, 0, 0}, SphereShape{0.012}, 500)};
   s.links[1].parent = s.links[2].parent = 0;
   for (const char* block : {"middle", "left", "right"})
     for (const char* shape : {"table", "roll", "ball"})
@@ -104,7 +113,8 @@ Trajectory drop_bar(double margin, const kernels::KernelTable& table) {
   for (int t = 0; t < 60; ++t) {
     NewtonReport report;
     step.advance(table, w, alone, kAllLanes, kNoLane, report);
-    for (int l = 0; l < kGroup; ++l) EXPECT_FALSE(failed(report.status[l])) << "lane " << l << " step " << t;
+    for (int l = 0; l < kGroup; ++l)
+      EXPECT_FALSE(failed(report.status[l])) << "lane " << l << " step " << t;
     for (const auto& list : w.lists)
       for (int count : list.own_count) r.rows += count;
   }
@@ -116,7 +126,8 @@ Trajectory drop_bar(double margin, const kernels::KernelTable& table) {
 TEST(Candidates, BoundsThatSkipPairsOfShapesChangeNoBits) {
   for (const kernels::KernelTable* table : kernels::available_kernels()) {
     SCOPED_TRACE(table->name);
-    const Trajectory everything = drop_bar(1, *table), own = drop_bar(0, *table), tight = drop_bar(1e-6, *table);
+    const Trajectory everything = drop_bar(1, *table), own = drop_bar(0, *table),
+                     tight = drop_bar(1e-6, *table);
     EXPECT_EQ(everything.rows, 60 * kGroup * 9 * 26);
     EXPECT_GT(own.rows, 0);
     EXPECT_LT(own.rows, everything.rows / 4);

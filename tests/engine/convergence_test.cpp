@@ -15,7 +15,8 @@ using testing::link;
 /// A free body with its centre of mass off its frame, tumbling under gravity.
 Scene tumbling() {
   Scene s;
-  s.links = {link("body", JointType::free, {0, 0, 0}, CuboidShape{{0.1, 0.05, 0.02}, {2, 2, 2}}, 700)};
+  s.links = {
+      link("body", JointType::free, {0, 0, 0}, CuboidShape{{0.1, 0.05, 0.02}, {2, 2, 2}}, 700)};
   s.links[0].body.pose = {{0.03, -0.02, 0.01}, {0.8, 0.6, 0, 0}};
   s.initial.push_back({"body_joint", {}, {0.1, 0.2, -0.1, 4, 7, -3}, {}});
   return s;
@@ -41,7 +42,8 @@ Scene chain() {
 Scene ball_chain() {
   Scene s;
   s.links = {link("slide", JointType::prismatic, {0, 0, 0}, SphereShape{0.05}, 800),
-             link("arm", JointType::spherical, {0, 0, -0.05}, CuboidShape{{0.03, 0.05, 0.2}, {2, 2, 2}}, 900)};
+             link("arm", JointType::spherical, {0, 0, -0.05},
+                  CuboidShape{{0.03, 0.05, 0.2}, {2, 2, 2}}, 900)};
   s.links[0].joint.axis0 = {1, 0, 0};
   s.links[1].parent = 0;
   s.links[1].body.pose.position = {0, 0, -0.1};
@@ -99,21 +101,27 @@ TEST_P(Convergence, SchemesHaveTheirOrder) {
                   {Integrator::bdf2, 2, 0.15, 400},
                   {Integrator::sdirk2, 2, 0.15, 200}};
   for (const auto& s : kSchemes) {
-    const State coarse = run(model, s.scheme, c.duration, s.steps), fine = run(model, s.scheme, c.duration, 2 * s.steps);
+    const State coarse = run(model, s.scheme, c.duration, s.steps),
+                fine = run(model, s.scheme, c.duration, 2 * s.steps);
     const double q_order = std::log2(distance(coarse.q, exact.q) / distance(fine.q, exact.q));
     const double v_order = std::log2(distance(coarse.v, exact.v) / distance(fine.v, exact.v));
-    EXPECT_NEAR(q_order, s.order, s.slack) << to_string(s.scheme) << ", error " << distance(fine.q, exact.q);
-    EXPECT_NEAR(v_order, s.order, s.slack) << to_string(s.scheme) << ", error " << distance(fine.v, exact.v);
+    EXPECT_NEAR(q_order, s.order, s.slack)
+        << to_string(s.scheme) << ", error " << distance(fine.q, exact.q);
+    EXPECT_NEAR(v_order, s.order, s.slack)
+        << to_string(s.scheme) << ", error " << distance(fine.v, exact.v);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Convergence,
-                         ::testing::Values(Case{"tumbling", tumbling, 0.4}, Case{"chain", chain, 0.4},
-                                           Case{"ball_chain", ball_chain, 0.4}, Case{"resting", resting, 0.1}),
+                         ::testing::Values(Case{"tumbling", tumbling, 0.4},
+                                           Case{"chain", chain, 0.4},
+                                           Case{"ball_chain", ball_chain, 0.4},
+                                           Case{"resting", resting, 0.1}),
                          [](const auto& param) { return std::string(param.param.name); });
 
 TEST(Convergence, ASplitInsideBdf2KeepsOrderTwo) {
-  // Steps replaced by SDIRK2 half steps, as a split does: the history at the grid points stays valid.
+  // Steps replaced by SDIRK2 half steps, as a split does: the history at the grid points stays
+  // valid.
   const Model model(tumbling());
   const double duration = 0.4;
   const State exact = run(model, Integrator::sdirk2, duration, 6400);

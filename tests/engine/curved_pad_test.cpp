@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pads whose points have places, axes and coefficients of their own: kernels against one point at a time, readings
-// against each other.
+// Pads whose points have places, axes and coefficients of their own: kernels against one point at a
+// time, readings against each other.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,8 +20,8 @@
 namespace tangere {
 namespace {
 
-using kernels::kTactileTile;
 using kernels::KernelTable;
+using kernels::kTactileTile;
 using kernels::PadTiles;
 using kernels::Touch;
 using kernels::TouchShape;
@@ -36,16 +36,20 @@ std::vector<TactilePoint> wave(int count, bool own_factors) {
   Random random(3);
   std::vector<TactilePoint> points;
   for (int i = 0; i < count; ++i) {
-    const double x = random.uniform(-0.02, 0.02), y = random.uniform(-0.02, 0.02), turn = random.uniform(0, 6);
+    const double x = random.uniform(-0.02, 0.02), y = random.uniform(-0.02, 0.02),
+                 turn = random.uniform(0, 6);
     const double slope = 0.3 * std::cos(100 * x), length = std::sqrt(1 + slope * slope);
-    const Vec3<double> normal = (1 / length) * Vec3<double>{-slope, 0, 1}, along = (1 / length) * Vec3<double>{1, 0, slope};
+    const Vec3<double> normal = (1 / length) * Vec3<double>{-slope, 0, 1},
+                       along = (1 / length) * Vec3<double>{1, 0, slope};
     const Vec3<double> axis0 = std::cos(turn) * along + std::sin(turn) * cross(normal, along);
     TactilePoint p;
     p.position = {x, y, 0.003 * std::sin(100 * x)};
     p.normal = array_of(normal);
     p.axis0 = array_of(axis0);
     p.axis1 = array_of(cross(normal, axis0));
-    if (own_factors) p.factors = {random.uniform(0.5, 2), random.uniform(0.5, 2), random.uniform(0.5, 2), random.uniform(0.5, 2)};
+    if (own_factors)
+      p.factors = {random.uniform(0.5, 2), random.uniform(0.5, 2), random.uniform(0.5, 2),
+                   random.uniform(0.5, 2)};
     points.push_back(p);
   }
   return points;
@@ -56,14 +60,17 @@ Scene curved_ball(int count, bool own_factors = false) {
   scene.sensors[0].points = wave(count, own_factors);
   // Below the pad's body, looking down: the wave is turned over.
   for (TactilePoint& p : scene.sensors[0].points)
-    for (Vector3* a : {&p.position, &p.normal, &p.axis0, &p.axis1}) (*a)[1] = -(*a)[1], (*a)[2] = -(*a)[2];
+    for (Vector3* a : {&p.position, &p.normal, &p.axis0, &p.axis1})
+      (*a)[1] = -(*a)[1], (*a)[2] = -(*a)[2];
   for (TactilePoint& p : scene.sensors[0].points) p.position[2] -= 0.005;
   return scene;
 }
 
 TouchShape shape_of(PrimitiveShape shape) {
-  if (shape == PrimitiveShape::cylinder || shape == PrimitiveShape::capsule) return {shape, {0.012, 0.015, 0}};
-  return shape == PrimitiveShape::sphere ? TouchShape{shape, {0.02, 0, 0}} : TouchShape{shape, {0.02, 0.015, 0.01}};
+  if (shape == PrimitiveShape::cylinder || shape == PrimitiveShape::capsule)
+    return {shape, {0.012, 0.015, 0}};
+  return shape == PrimitiveShape::sphere ? TouchShape{shape, {0.02, 0, 0}}
+                                         : TouchShape{shape, {0.02, 0.015, 0.01}};
 }
 
 /// What touches the wave from below, by some of its extent.
@@ -78,35 +85,47 @@ Touch<double> random_touch(Random& random, const TouchShape& s) {
     t.c = {random.uniform(-0.01, 0.01), random.uniform(-0.01, 0.01), -0.005 - height};
     double least = 1;
     for (const TactilePoint& p : scene.sensors[0].points)
-      least = std::min(least, kernels::with_distance<double>(
-                                  s.shape, {s.size[0], s.size[1], s.size[2]}, [&](const auto& shape) {
-                                    return distance_at(shape, transposed_times(t.Q, vec(p.position) - t.c)).d;
-                                  }));
+      least = std::min(
+          least, kernels::with_distance<double>(
+                     s.shape, {s.size[0], s.size[1], s.size[2]}, [&](const auto& shape) {
+                       return distance_at(shape, transposed_times(t.Q, vec(p.position) - t.c)).d;
+                     }));
     if (least < -5e-4) return t;
   }
 }
 
-Vec3<double> reference(const TouchShape& s, const Touch<double>& t, ContactLaw law, const TactilePoint& p) {
-  const kernels::LawParameters<double> own = {t.kn * p.factors[0],      t.kt * p.factors[1], t.mu * p.factors[2],
-                                              t.damping * p.factors[3], law,                 0};
-  const Vec3<double> f =
-      kernels::with_distance<double>(s.shape, {s.size[0], s.size[1], s.size[2]}, [&](const auto& shape) {
+Vec3<double> reference(const TouchShape& s, const Touch<double>& t, ContactLaw law,
+                       const TactilePoint& p) {
+  const kernels::LawParameters<double> own = {t.kn * p.factors[0],
+                                              t.kt * p.factors[1],
+                                              t.mu * p.factors[2],
+                                              t.damping * p.factors[3],
+                                              law,
+                                              0};
+  const Vec3<double> f = kernels::with_distance<double>(
+      s.shape, {s.size[0], s.size[1], s.size[2]}, [&](const auto& shape) {
         return point_contact(shape, own, t.Q, t.c, t.omega, t.v, vec(p.position)).force;
       });
   return {dot(f, vec(p.axis0)), dot(f, vec(p.axis1)), -dot(f, vec(p.normal))};
 }
 
-int run(const KernelTable& table, const kernels::TactileArgs<double>& a) { return table.tactile(a); }
-int run(const KernelTable& table, const kernels::TactileArgs<float>& a) { return table.tactile_mixed(a); }
+int run(const KernelTable& table, const kernels::TactileArgs<double>& a) {
+  return table.tactile(a);
+}
+int run(const KernelTable& table, const kernels::TactileArgs<float>& a) {
+  return table.tactile_mixed(a);
+}
 
 /// (points, 3); tiles written go to `active`.
 template <class Real>
-std::vector<Real> field(const KernelTable& table, const PadTiles& pad, ContactLaw law, const TouchShape& shape,
-                        const Touch<double>& touch, std::vector<int>& active) {
+std::vector<Real> field(const KernelTable& table, const PadTiles& pad, ContactLaw law,
+                        const TouchShape& shape, const Touch<double>& touch,
+                        std::vector<int>& active) {
   std::vector<Real> dense(std::size_t(3 * pad.rows), Real(0));
   AlignedVector<Real> values(std::size_t(pad.tiles() * 3 * kTactileTile));
   active.resize(std::size_t(pad.tiles()));
-  const kernels::TactileArgs<Real> args{&pad, law, 1, &shape, &touch, active.data(), values.data(), dense.data()};
+  const kernels::TactileArgs<Real> args{&pad,          law,           1,           &shape, &touch,
+                                        active.data(), values.data(), dense.data()};
   active.resize(std::size_t(run(table, args)));
   return dense;
 }
@@ -177,7 +196,8 @@ INSTANTIATE_TEST_SUITE_P(Shapes, CurvedPad,
                                            Case{PrimitiveShape::sphere, ContactLaw::linear, true},
                                            Case{PrimitiveShape::cuboid, ContactLaw::clamped, true},
                                            Case{PrimitiveShape::plane, ContactLaw::clamped, true},
-                                           Case{PrimitiveShape::cylinder, ContactLaw::clamped, true},
+                                           Case{PrimitiveShape::cylinder, ContactLaw::clamped,
+                                                true},
                                            Case{PrimitiveShape::capsule, ContactLaw::paper, true}));
 
 /// The ball under the wave of environment e.
@@ -200,19 +220,22 @@ void check_readings(Precision precision) {
   for (int e = 0; e < 16; ++e) block.emplace_back(model, 0);
   int touched = 0;
   for (int moment = 0; moment < 4; ++moment) {
-    for (int e = 0; e < 19; ++e) press(batch, e, (e + moment) % 5 == 4 ? -5e-3 : 2e-3 + 5e-4 * (e % 5), e + 0.7 * moment);
+    for (int e = 0; e < 19; ++e)
+      press(batch, e, (e + moment) % 5 == 4 ? -5e-3 : 2e-3 + 5e-4 * (e % 5), e + 0.7 * moment);
     readout.read_block(batch, 0, std::span(block));
     for (int e = 0; e < 19; ++e) {
       std::vector<T> whole(900, T(-3)), expanded(900, T(-3));
       readout.tactile(batch, e, 0, whole);
       touched += std::any_of(whole.begin(), whole.end(), [](T x) { return x != 0; }) ? 1 : 0;
       readout.read(batch, e, dense);
-      EXPECT_TRUE(std::equal(whole.begin(), whole.end(), dense.values().begin())) << "environment " << e;
+      EXPECT_TRUE(std::equal(whole.begin(), whole.end(), dense.values().begin()))
+          << "environment " << e;
       readout.read(batch, e, compact);
       compact.expand(expanded);
       EXPECT_EQ(expanded, whole) << "environment " << e;
       if (e < 16) {
-        EXPECT_TRUE(std::equal(whole.begin(), whole.end(), block[std::size_t(e)].values().begin())) << "environment " << e;
+        EXPECT_TRUE(std::equal(whole.begin(), whole.end(), block[std::size_t(e)].values().begin()))
+            << "environment " << e;
       }
     }
   }
@@ -241,7 +264,8 @@ TEST(CurvedPad, OrderInTheListIsOrderInTheField) {
   for (const double x : f) peak = std::max(peak, std::abs(x));
   EXPECT_GT(peak, 0);
   for (std::size_t n = 0; n < 300; ++n)
-    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(f[3 * n + k], g[3 * (299 - n) + k], 1e-13 * peak);
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_NEAR(f[3 * n + k], g[3 * (299 - n) + k], 1e-13 * peak);
 }
 
 TEST(CurvedPad, AFlatListReadsWhatTheArrayReads) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A second derivation of the equations of motion, for tests: world axes, dense Jacobians of the centres of mass,
-// Newton and Euler summed over bodies, in any floating-point type. It shares no formula and no code with the kernels.
+// A second derivation of the equations of motion, for tests: world axes, dense Jacobians of the
+// centres of mass, Newton and Euler summed over bodies, in any floating-point type. It shares no
+// formula and no code with the kernels.
 //
-//   M = Σ m Jᵀ J + J_ωᵀ I J_ω,   M a + b = Q,   b = Σ Jᵀ m (a₀ - g) + J_ωᵀ (I α₀ + ω × I ω)      (a₀, α₀: with q̈ = 0)
+//   M = Σ m Jᵀ J + J_ωᵀ I J_ω,   M a + b = Q,   b = Σ Jᵀ m (a₀ - g) + J_ωᵀ (I α₀ + ω × I ω)
+//       (a₀, α₀: with q̈ = 0)
 //   Q: joint effects and motors. Joints of the scene are taken whole, not as chains.
 #pragma once
 
@@ -31,7 +33,8 @@ class DenseDynamics {
       nq += position_count(l.joint.type);
       nv += dof_count(l.joint.type);
     }
-    for (std::size_t i = 0; i < scene.links.size(); ++i) masses_.push_back(mass_of(scene.links[i].body));
+    for (std::size_t i = 0; i < scene.links.size(); ++i)
+      masses_.push_back(mass_of(scene.links[i].body));
   }
 
   int nq = 0, nv = 0;
@@ -59,7 +62,8 @@ class DenseDynamics {
     motor_forces(q, v, u, t.force);
     return t;
   }
-  [[nodiscard]] Vector acceleration(const Vector& q, const Vector& v, const std::vector<double>& u) const {
+  [[nodiscard]] Vector acceleration(const Vector& q, const Vector& v,
+                                    const std::vector<double>& u) const {
     const Terms t = terms(q, v, u);
     return t.mass.ldlt().solve(t.force - t.bias);
   }
@@ -73,8 +77,10 @@ class DenseDynamics {
       for (int k = 0; k < plain; ++k) out[q_[i] + k] = v[v_[i] + k];
       if (!ball(type)) continue;
       const int a = q_[i] + plain, w = v_[i] + plain;
-      const Quat turn = Quat(q[a], q[a + 1], q[a + 2], q[a + 3]) * Quat(S(0), v[w], v[w + 1], v[w + 2]);
-      out[a] = turn.w() / 2, out[a + 1] = turn.x() / 2, out[a + 2] = turn.y() / 2, out[a + 3] = turn.z() / 2;
+      const Quat turn =
+          Quat(q[a], q[a + 1], q[a + 2], q[a + 3]) * Quat(S(0), v[w], v[w + 1], v[w + 2]);
+      out[a] = turn.w() / 2, out[a + 1] = turn.x() / 2, out[a + 2] = turn.y() / 2,
+      out[a + 3] = turn.z() / 2;
     }
     return out;
   }
@@ -103,10 +109,12 @@ class DenseDynamics {
     int dof;
     V3 angular, linear, at;  ///< world axes; linear velocity of the material point at `at`
   };
-  /// A joint frame in world axes: pose, twist, acceleration with q̈ = 0, and how its motion depends on v.
+  /// A joint frame in world axes: pose, twist, acceleration with q̈ = 0, and how its motion depends
+  /// on v.
   struct Motion {
     M3 R = M3::Identity();
-    V3 p = V3::Zero(), omega = V3::Zero(), velocity = V3::Zero(), alpha = V3::Zero(), acceleration = V3::Zero();
+    V3 p = V3::Zero(), omega = V3::Zero(), velocity = V3::Zero(), alpha = V3::Zero(),
+       acceleration = V3::Zero();
     std::vector<Column> columns;
   };
 
@@ -122,16 +130,20 @@ class DenseDynamics {
       const S r = S(sphere->radius), m = density * 4 * std::acos(S(-1)) / 3 * r * r * r;
       return {m, M3::Identity() * (2 * m * r * r / 5)};
     }
-    const auto rod = [](S m, S axial, S across) { return Mass{m, M3(V3(across, across, axial).asDiagonal())}; };
+    const auto rod = [](S m, S axial, S across) {
+      return Mass{m, M3(V3(across, across, axial).asDiagonal())};
+    };
     if (const auto* c = std::get_if<CylinderShape>(&body.shape)) {
-      const S r2 = S(c->radius) * S(c->radius), l = S(c->length), m = density * std::acos(S(-1)) * r2 * l;
+      const S r2 = S(c->radius) * S(c->radius), l = S(c->length),
+              m = density * std::acos(S(-1)) * r2 * l;
       return rod(m, m * r2 / 2, m * (3 * r2 + l * l) / 12);
     }
     if (const auto* c = std::get_if<CapsuleShape>(&body.shape)) {
       const S r = S(c->radius), l = S(c->length), pi = std::acos(S(-1));
       const S tube = density * pi * r * r * l, ends = density * 4 * pi / 3 * r * r * r;
-      return rod(tube + ends, tube * r * r / 2 + 2 * ends * r * r / 5,
-                 tube * (3 * r * r + l * l) / 12 + ends * (2 * r * r / 5 + l * l / 4 + 3 * l * r / 8));
+      return rod(
+          tube + ends, tube * r * r / 2 + 2 * ends * r * r / 5,
+          tube * (3 * r * r + l * l) / 12 + ends * (2 * r * r / 5 + l * l / 4 + 3 * l * r / 8));
     }
     if (std::holds_alternative<PlaneShape>(body.shape)) return {0, M3::Zero()};
     const auto* box = std::get_if<CuboidShape>(&body.shape);
@@ -154,16 +166,20 @@ class DenseDynamics {
     m.velocity += axis * v;
     m.columns.push_back({dof, V3::Zero(), axis, m.p});
   }
-  static void turn_with(Motion& m, const V3& rate) {  // rate: R times a vector that is constant when q̈ = 0
+  static void turn_with(Motion& m,
+                        const V3& rate) {  // rate: R times a vector that is constant when q̈ = 0
     m.alpha += m.omega.cross(rate);
     m.omega += rate;
   }
 
-  static void move(const JointDescription& d, const Vector& q, const Vector& v, int iq, int iv, Motion& m) {
+  static void move(const JointDescription& d, const Vector& q, const Vector& v, int iq, int iv,
+                   Motion& m) {
     shift(m, m.R * vec(d.pose.position));
     m.R = (m.R * rotation(d.pose.orientation)).eval();
     const V3 a0 = vec(d.axis0), a1 = vec(d.axis1);
-    const auto slide = [&](int k, const V3& axis) { slide_along(m, m.R * axis, q[iq + k], v[iv + k], iv + k); };
+    const auto slide = [&](int k, const V3& axis) {
+      slide_along(m, m.R * axis, q[iq + k], v[iv + k], iv + k);
+    };
     const auto hinge = [&](int k, const V3& axis) {
       const V3 world = m.R * axis;
       m.R = (m.R * Eigen::AngleAxis<S>(q[iq + k], axis).toRotationMatrix()).eval();
@@ -171,17 +187,10 @@ class DenseDynamics {
       m.columns.push_back({iv + k, world, V3::Zero(), m.p});
     };
     switch (d.type) {
-      case JointType::fixed:
-        break;
-      case JointType::revolute:
-        hinge(0, a0);
-        break;
-      case JointType::prismatic:
-        slide(0, a0);
-        break;
-      case JointType::planar:
-        slide(0, a0), slide(1, a1);
-        break;
+      case JointType::fixed: break;
+      case JointType::revolute: hinge(0, a0); break;
+      case JointType::prismatic: slide(0, a0); break;
+      case JointType::planar: slide(0, a0), slide(1, a1); break;
       case JointType::translational:
       case JointType::free:
         for (int k = 0; k < 3; ++k) slide(k, V3::Unit(k));
@@ -189,8 +198,7 @@ class DenseDynamics {
       case JointType::free2d:
         slide(0, V3::UnitX()), slide(1, V3::UnitY()), hinge(2, V3::UnitZ());
         break;
-      case JointType::spherical:
-        break;
+      case JointType::spherical: break;
     }
     if (!ball(d.type)) return;
     const int a = iq + position_count(d.type) - 4, w = iv + dof_count(d.type) - 3;
@@ -199,8 +207,8 @@ class DenseDynamics {
     for (int k = 0; k < 3; ++k) m.columns.push_back({w + k, m.R.col(k), V3::Zero(), m.p});
   }
 
-  void add_body(const BodyDescription& d, const Mass& body, Motion m, const Vector& v, const V3& gravity,
-                Terms& t) const {
+  void add_body(const BodyDescription& d, const Mass& body, Motion m, const Vector& v,
+                const V3& gravity, Terms& t) const {
     if (body.mass == 0) return;
     shift(m, m.R * vec(d.pose.position));
     const M3 R = m.R * rotation(d.pose.orientation), I = R * body.inertia * R.transpose();
@@ -217,7 +225,8 @@ class DenseDynamics {
       throw std::logic_error("dense dynamics: the Jacobian does not give the velocity");
     t.momentum += body.mass * m.velocity;
     t.angular_momentum += spin + m.p.cross(body.mass * m.velocity);
-    t.energy += (body.mass * m.velocity.squaredNorm() + m.omega.dot(spin)) / 2 - body.mass * gravity.dot(m.p);
+    t.energy += (body.mass * m.velocity.squaredNorm() + m.omega.dot(spin)) / 2 -
+                body.mass * gravity.dot(m.p);
   }
 
   // --- joint effects ---
@@ -236,15 +245,19 @@ class DenseDynamics {
     const S a = x.norm();
     M3 X;
     X << 0, -x.z(), x.y(), x.z(), 0, -x.x(), -x.y(), x.x(), 0;
-    return M3::Identity() + X / 2 + X * X * (1 / (a * a) - (1 + std::cos(a)) / (2 * a * std::sin(a)));
+    return M3::Identity() + X / 2 +
+           X * X * (1 / (a * a) - (1 + std::cos(a)) / (2 * a * std::sin(a)));
   }
   static S beyond(const JointEffects& e, S q) {
     if (!e.limits) return S(0);
-    return q < S((*e.limits)[0]) ? S((*e.limits)[0]) - q : q > S((*e.limits)[1]) ? S((*e.limits)[1]) - q : S(0);
+    return q < S((*e.limits)[0])   ? S((*e.limits)[0]) - q
+           : q > S((*e.limits)[1]) ? S((*e.limits)[1]) - q
+                                   : S(0);
   }
   static Quat quat_at(const Vector& q, int i) { return Quat(q[i], q[i + 1], q[i + 2], q[i + 3]); }
 
-  static void joint_forces(const JointDescription& d, const Vector& q, const Vector& v, int iq, int iv, Terms& t) {
+  static void joint_forces(const JointDescription& d, const Vector& q, const Vector& v, int iq,
+                           int iv, Terms& t) {
     const int n = dof_count(d.type), plain = n - (ball(d.type) ? 3 : 0);
     for (int k = 0; k < n; ++k) {
       const JointEffects& e = d.turning && dof_turns(d.type, k) ? *d.turning : d;
@@ -252,7 +265,8 @@ class DenseDynamics {
       t.force[iv + k] -= S(e.damping) * v[iv + k];
       if (k >= plain) continue;
       const S rest = d.rest.empty() ? S(0) : S(d.rest[std::size_t(k)]);
-      t.force[iv + k] += S(e.stiffness) * (rest - q[iq + k]) + S(e.limit_stiffness) * beyond(e, q[iq + k]);
+      t.force[iv + k] +=
+          S(e.stiffness) * (rest - q[iq + k]) + S(e.limit_stiffness) * beyond(e, q[iq + k]);
     }
     if (!ball(d.type)) return;
     const JointEffects& e = d.turning ? *d.turning : d;
@@ -261,11 +275,14 @@ class DenseDynamics {
     for (int k = 0; k < 3 && !d.rest.empty(); ++k) rest[k] = S(d.rest[std::size_t(plain + k)]);
     t.force.template segment<3>(iv + plain) -= S(e.stiffness) * log(exp(rest).conjugate() * turn);
     const V3 phi = log(turn);
-    const V3 f = S(e.limit_stiffness) * V3(beyond(e, phi.x()), beyond(e, phi.y()), beyond(e, phi.z()));
-    if (f.norm() > 0) t.force.template segment<3>(iv + plain) += inverse_right_jacobian(phi).transpose() * f;
+    const V3 f =
+        S(e.limit_stiffness) * V3(beyond(e, phi.x()), beyond(e, phi.y()), beyond(e, phi.z()));
+    if (f.norm() > 0)
+      t.force.template segment<3>(iv + plain) += inverse_right_jacobian(phi).transpose() * f;
   }
 
-  void motor_forces(const Vector& q, const Vector& v, const std::vector<double>& u, Vector& force) const {
+  void motor_forces(const Vector& q, const Vector& v, const std::vector<double>& u,
+                    Vector& force) const {
     std::size_t at = 0;
     for (const MotorDescription& motor : scene_.motors)
       for (std::size_t i = 0; i < scene_.links.size(); ++i) {
@@ -277,19 +294,23 @@ class DenseDynamics {
         for (int k = 0; k < dof_count(type); ++k, ++at) {
           const S low = S(motor.low), high = S(motor.high), value = S(u[at]);
           if (motor.control == MotorControl::force) {
-            force[v_[i] + k] += low + (std::min(std::max(value, S(-1)), S(1)) + 1) * (high - low) / 2;
+            force[v_[i] + k] +=
+                low + (std::min(std::max(value, S(-1)), S(1)) + 1) * (high - low) / 2;
             continue;
           }
           const S error = type == JointType::spherical ? way[k] : value - q[q_[i] + k];
-          force[v_[i] + k] += std::min(std::max(S(motor.P) * error - S(motor.D) * v[v_[i] + k], low), high);
+          force[v_[i] + k] +=
+              std::min(std::max(S(motor.P) * error - S(motor.D) * v[v_[i] + k], low), high);
         }
       }
   }
 
-  void copy_initial(const std::vector<int>& first, std::vector<double> InitialState::*member, Vector& to) const {
+  void copy_initial(const std::vector<int>& first, std::vector<double> InitialState::*member,
+                    Vector& to) const {
     for (const InitialState& d : scene_.initial)
       for (std::size_t i = 0; i < scene_.links.size(); ++i)
-        for (std::size_t k = 0; scene_.links[i].joint.name == d.joint && k < (d.*member).size(); ++k)
+        for (std::size_t k = 0; scene_.links[i].joint.name == d.joint && k < (d.*member).size();
+             ++k)
           to[first[i] + int(k)] = S((d.*member)[k]);
   }
 

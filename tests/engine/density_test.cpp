@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Densities that vary by environment: each moves as in a scene of its own that has its density, and resets keep to their keys.
+// Densities that vary by environment: each moves as in a scene of its own that has its density, and
+// resets keep to their keys.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -57,7 +58,8 @@ TEST(Density, EachEnvironmentMovesAsInASceneOfItsOwn) {
     int steps;
   };
   // A block folded into a free bar; a box on two joints, the hand's own.
-  for (const Case& c : {Case{"stable_grasp", "block_8", 90}, Case{"box_pushing", "box", 120}, Case{"box_pushing", "hand", 120}}) {
+  for (const Case& c : {Case{"stable_grasp", "block_8", 90}, Case{"box_pushing", "box", 120},
+                        Case{"box_pushing", "hand", 120}}) {
     Scene varied = scene_named(c.scene);
     varied.randomizations.push_back(density_of(c.body, 200, 900));
     const Model model(varied);
@@ -73,7 +75,8 @@ TEST(Density, EachEnvironmentMovesAsInASceneOfItsOwn) {
       const auto expected = run(alone, one, c.steps)[0];
       double moved = 0;
       for (std::size_t i = 0; i < expected.size(); ++i) {
-        EXPECT_NEAR(q[std::size_t(e)][i], expected[i], 1e-7) << c.scene << " " << c.body << " coordinate " << i;
+        EXPECT_NEAR(q[std::size_t(e)][i], expected[i], 1e-7)
+            << c.scene << " " << c.body << " coordinate " << i;
         moved = std::max(moved, std::abs(q[0][i] - q[8][i]));
       }
       EXPECT_GT(moved, 1e-5) << "density matters";
@@ -129,12 +132,16 @@ TEST(Density, IsReadFromAScene) {
   const std::string path = TANGERE_SOURCE_DIR "/scenes/box_pushing.xml";
   std::string text = read_scene(path).scene.text;
   const std::size_t at = text.find("<randomize>") + 11;
-  const auto with = [&](const std::string& line) { return parse_scene(text.substr(0, at) + line + text.substr(at), path).scene; };
+  const auto with = [&](const std::string& line) {
+    return parse_scene(text.substr(0, at) + line + text.substr(at), path).scene;
+  };
   const Scene scene = with("<body name=\"box\" field=\"density\" uniform=\"400 800\"/>");
   EXPECT_EQ(scene.randomizations[0].target, RandomTarget::density);
   EXPECT_EQ(scene.randomizations[0].distribution.b, 800);
-  for (const char* wrong : {"<body name=\"bx\" field=\"density\" uniform=\"4 8\"/>", "<body name=\"box\" field=\"densty\" uniform=\"4 8\"/>",
-                            "<body name=\"box\" field=\"density\" uniform=\"0 8\"/>", "<body name=\"turntable\" field=\"density\" uniform=\"4 8\"/>"})
+  for (const char* wrong : {"<body name=\"bx\" field=\"density\" uniform=\"4 8\"/>",
+                            "<body name=\"box\" field=\"densty\" uniform=\"4 8\"/>",
+                            "<body name=\"box\" field=\"density\" uniform=\"0 8\"/>",
+                            "<body name=\"turntable\" field=\"density\" uniform=\"4 8\"/>"})
     EXPECT_THROW(with(wrong), InputError) << wrong;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mass matrix, bias, joint forces and accelerations against the dense derivation in world axes, on random trees.
+// Mass matrix, bias, joint forces and accelerations against the dense derivation in world axes, on
+// random trees.
 #include <gtest/gtest.h>
 
 #include "tests/engine/dense_dynamics.hpp"
@@ -15,26 +16,30 @@ using testing::StageBuffers;
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
-/// ID(q, v, a) less the joints' forces by the kernels: with x = 0, c₀/h = 0 and 1/h = 1 a stage's rates are r, its a is s.
+/// ID(q, v, a) less the joints' forces by the kernels: with x = 0, c₀/h = 0 and 1/h = 1 a stage's
+/// rates are r, its a is s.
 class Kernels {
  public:
   explicit Kernels(const CompiledModel& m) : m_(m), b_(m) {}
 
   void set(const Vector& q, const Vector& v, const Vector& target) {
     for (int i = 0; i < m_.nq; ++i) b_.centre[std::size_t(i)] = q[i];
-    for (int i = 0; i < m_.nv; ++i) b_.r[std::size_t(i)] = v[i], b_.target[std::size_t(i)] = target[i];
+    for (int i = 0; i < m_.nv; ++i)
+      b_.r[std::size_t(i)] = v[i], b_.target[std::size_t(i)] = target[i];
   }
   Vector residual(const Vector& a) {
     for (int i = 0; i < m_.nv; ++i) b_.s[std::size_t(i)] = a[i];
     b_.residual(0, 1);
     return Eigen::Map<const Vector>(b_.g.data(), m_.nv);
   }
-  /// At rest: the residual is linear in a, and large accelerations drown the rounding of what does not depend on a.
+  /// At rest: the residual is linear in a, and large accelerations drown the rounding of what does
+  /// not depend on a.
   Matrix mass() {
     b_.r.assign(b_.r.size(), 0);
     const Vector rest = residual(Vector::Zero(m_.nv));
     Matrix M(m_.nv, m_.nv);
-    for (int k = 0; k < m_.nv; ++k) M.col(k) = (residual(1e6 * Vector::Unit(m_.nv, k)) - rest) / 1e6;
+    for (int k = 0; k < m_.nv; ++k)
+      M.col(k) = (residual(1e6 * Vector::Unit(m_.nv, k)) - rest) / 1e6;
     return M;
   }
 
@@ -55,7 +60,8 @@ State random_state(const CompiledModel& m, Random& random) {
   return s;
 }
 
-/// Controls as motors take them: targets of position motors; force motors rest at the middle of their range.
+/// Controls as motors take them: targets of position motors; force motors rest at the middle of
+/// their range.
 std::vector<double> controls(const CompiledModel& m, const Vector& target, Vector& middle) {
   std::vector<double> u;
   middle = Vector::Zero(m.nv);
@@ -83,15 +89,17 @@ void compare(const Scene& scene, unsigned seed, bool solve) {
     kernels.set(s.q, s.v, s.target);
     for (int i = 0; i < m->nv; ++i)
       for (int j = 0; j < m->nv; ++j)
-        EXPECT_NEAR(M(i, j), t.mass(i, j), 1e-10 * std::sqrt(t.mass(i, i) * t.mass(j, j))) << i << ", " << j;
-    const Vector rest =
-        kernels.residual(Vector::Zero(m->nv)) - middle;  // motors known at the start stand in tau, not here
+        EXPECT_NEAR(M(i, j), t.mass(i, j), 1e-10 * std::sqrt(t.mass(i, i) * t.mass(j, j)))
+            << i << ", " << j;
+    const Vector rest = kernels.residual(Vector::Zero(m->nv)) -
+                        middle;  // motors known at the start stand in tau, not here
     const Vector expected = t.bias - t.force;
     const double scale = t.bias.norm() + t.force.norm();
     for (int i = 0; i < m->nv; ++i) EXPECT_NEAR(rest[i], expected[i], 1e-10 * scale) << "dof " << i;
     if (!solve) continue;
     const Vector a = dense.acceleration(s.q, s.v, controls(*m, s.target, middle));
-    const Vector left = kernels.residual(a) - middle;  // no residual at the independent accelerations, and back
+    const Vector left =
+        kernels.residual(a) - middle;  // no residual at the independent accelerations, and back
     EXPECT_LT(left.norm(), 1e-10 * (scale + (t.mass * a).norm()));
     const Vector ours = -M.ldlt().solve(rest);
     EXPECT_LT((ours - a).norm(), 1e-10 * a.norm());
@@ -108,15 +116,17 @@ TEST(Dynamics, TreesMatchTheDenseDerivation) {
 TEST(Dynamics, MachinesMatchTheDenseDerivation) {
   for (unsigned seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    // Two slides along one direction with nothing between them have a singular mass matrix: forces only.
+    // Two slides along one direction with nothing between them have a singular mass matrix: forces
+    // only.
     compare(testing::random_machine(seed, 2 + static_cast<int>(seed % 9)), seed, false);
   }
 }
 
 /// Deep trees of one joint type: errors would grow with depth.
 TEST(Dynamics, DeepChainsMatchTheDenseDerivation) {
-  for (JointType type : {JointType::revolute, JointType::prismatic, JointType::planar, JointType::translational,
-                         JointType::free2d, JointType::spherical, JointType::free}) {
+  for (JointType type :
+       {JointType::revolute, JointType::prismatic, JointType::planar, JointType::translational,
+        JointType::free2d, JointType::spherical, JointType::free}) {
     SCOPED_TRACE(to_string(type));
     Scene s = testing::random_tree(9, 12);
     for (std::size_t i = 0; i < s.links.size(); ++i) {
@@ -129,7 +139,8 @@ TEST(Dynamics, DeepChainsMatchTheDenseDerivation) {
 
 TEST(Dynamics, SeveralRootsAndBodiesFixedInTheWorld) {
   Scene s = testing::random_tree(21, 8);
-  for (std::size_t i = 0; i < s.links.size(); ++i) s.links[i].parent = i < 4 ? -1 : static_cast<int>(i) - 4;
+  for (std::size_t i = 0; i < s.links.size(); ++i)
+    s.links[i].parent = i < 4 ? -1 : static_cast<int>(i) - 4;
   s.links[1].joint.type = JointType::fixed;
   s.links[5].joint.type = JointType::revolute;  // hangs on the body fixed in the world
   compare(s, 6, true);

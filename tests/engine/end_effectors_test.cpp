@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions, velocities and Jacobians of end effectors against closed forms, differences and motion.
+// Positions, velocities and Jacobians of end effectors against closed forms, differences and
+// motion.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -43,8 +44,8 @@ Reading read(const Model& model, const std::vector<double>& q, const std::vector
   return read(readout, batch);
 }
 
-void expect_near(const std::vector<double>& found, const std::vector<double>& expected, double tolerance,
-                 const std::string& what) {
+void expect_near(const std::vector<double>& found, const std::vector<double>& expected,
+                 double tolerance, const std::string& what) {
   ASSERT_EQ(found.size(), expected.size()) << what;
   for (std::size_t k = 0; k < found.size(); ++k)
     EXPECT_NEAR(found[k], expected[k], tolerance) << what << "[" << k << "]";
@@ -60,19 +61,24 @@ TEST(EndEffectors, OfARevoluteChainAreThoseOfTheDrawing) {
   s.links[1].parent = 0;
   s.links[2].parent = 1;
   s.links[1].joint.pose.orientation = {std::sqrt(0.5), 0, 0, std::sqrt(0.5)};
-  s.variables = {effector("tip", "lower_joint", {0, -0.2, 0.05}), effector("middle", "bracket_joint", {0.1, 0, 0})};
+  s.variables = {effector("tip", "lower_joint", {0, -0.2, 0.05}),
+                 effector("middle", "bracket_joint", {0.1, 0, 0})};
   const double a = 0.7, b = -1.9, va = 1.3, vb = -0.4;
   const double c = std::cos(a), d = std::sin(a), e = std::cos(a + b), f = std::sin(a + b);
   const Reading r = read(Model(s), {a, b}, {va, vb});
-  // In the bracket's axes -y is x of the upper arm: 0.5 + 0.4 along it to the elbow, 0.2 along the lower arm.
-  expect_near(r.position, {0.1 + 0.9 * c + 0.2 * e, 0.2 + 0.9 * d + 0.2 * f, 0.35,  //
-                           0.1 + 0.5 * c - 0.1 * d, 0.2 + 0.5 * d + 0.1 * c, 0.3},
+  // In the bracket's axes -y is x of the upper arm: 0.5 + 0.4 along it to the elbow, 0.2 along the
+  // lower arm.
+  expect_near(r.position,
+              {0.1 + 0.9 * c + 0.2 * e, 0.2 + 0.9 * d + 0.2 * f, 0.35,  //
+               0.1 + 0.5 * c - 0.1 * d, 0.2 + 0.5 * d + 0.1 * c, 0.3},
               1e-15, "position");
-  expect_near(r.velocity, {-0.9 * d * va - 0.2 * f * (va + vb), 0.9 * c * va + 0.2 * e * (va + vb), 0,  //
-                           (-0.5 * d - 0.1 * c) * va, (0.5 * c - 0.1 * d) * va, 0},
+  expect_near(r.velocity,
+              {-0.9 * d * va - 0.2 * f * (va + vb), 0.9 * c * va + 0.2 * e * (va + vb), 0,  //
+               (-0.5 * d - 0.1 * c) * va, (0.5 * c - 0.1 * d) * va, 0},
               1e-15, "velocity");
-  expect_near(r.jacobian, {-0.9 * d - 0.2 * f, -0.2 * f, 0.9 * c + 0.2 * e, 0.2 * e, 0, 0,  //
-                           -0.5 * d - 0.1 * c, 0, 0.5 * c - 0.1 * d, 0, 0, 0},
+  expect_near(r.jacobian,
+              {-0.9 * d - 0.2 * f, -0.2 * f, 0.9 * c + 0.2 * e, 0.2 * e, 0, 0,  //
+               -0.5 * d - 0.1 * c, 0, 0.5 * c - 0.1 * d, 0, 0, 0},
               1e-15, "jacobian");
 }
 
@@ -80,18 +86,19 @@ TEST(EndEffectors, OfAFreeBodyTurnAndFlyWithIt) {
   Scene s;
   s.links = {link("ball", JointType::free, {1, 2, 3}, SphereShape{0.1}, 500),
              link("wall", JointType::fixed, {0, 5, 0}, SphereShape{0.1}, 500)};
-  s.variables = {effector("mark", "ball_joint", {0.1, 0.2, 0.3}), effector("nail", "wall_joint", {0, 0, 0.5})};
+  s.variables = {effector("mark", "ball_joint", {0.1, 0.2, 0.3}),
+                 effector("nail", "wall_joint", {0, 0, 0.5})};
   // A third of a turn about (1, 1, 1): x → y → z → x.
   const Reading r = read(Model(s), {0.5, 0.25, 0.125, 0.5, 0.5, 0.5, 0.5}, {1, -1, 2, 3, 0, 0});
-  expect_near(r.position, {1 + 0.5 + 0.3, 2 + 0.25 + 0.1, 3 + 0.125 + 0.2, 0, 5, 0.5}, 1e-15, "position");
+  expect_near(r.position, {1 + 0.5 + 0.3, 2 + 0.25 + 0.1, 3 + 0.125 + 0.2, 0, 5, 0.5}, 1e-15,
+              "position");
   // ω = 3 x in body axes: ω × p = 3 (0, -0.3, 0.2) there, (0.6, 0, -0.9) in the world.
   expect_near(r.velocity, {1 + 0.6, -1, 2 - 0.9, 0, 0, 0}, 1e-15, "velocity");
   // Columns of rotation: e × p in body axes, its components moved on by one.
-  expect_near(r.jacobian,
-              {1, 0, 0, 0.2, -0.1, 0,     //
-               0, 1, 0, 0, 0.3, -0.2,     //
-               0, 0, 1, -0.3, 0, 0.1,     //
-               0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0},
+  expect_near(r.jacobian, {1, 0, 0, 0.2,  -0.1, 0,     //
+                           0, 1, 0, 0,    0.3,  -0.2,  //
+                           0, 0, 1, -0.3, 0,    0.1,   //
+                           0, 0, 0, 0,    0,    0,    0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0},
               1e-15, "jacobian");
 }
 
@@ -100,7 +107,8 @@ Scene marked_tree(unsigned seed) {
   Scene s = testing::random_tree(seed, 9);
   Random random(seed + 77);
   for (const LinkDescription& l : s.links)
-    s.variables.push_back(effector("on_" + l.joint.name, l.joint.name, testing::array(random.vector(0.2))));
+    s.variables.push_back(
+        effector("on_" + l.joint.name, l.joint.name, testing::array(random.vector(0.2))));
   return s;
 }
 std::vector<double> random_numbers(Random& random, int count) {
@@ -132,7 +140,8 @@ TEST(EndEffectors, JacobianIsTheDifferenceOfPositionsAndGivesTheVelocity) {
     Random random(seed + 500);
     Batch batch(model, 1);
     batch.set_state(0, random_numbers(random, model.nq()), random_numbers(random, model.nv()));
-    const std::vector<double> q = testing::q_of(batch), v = testing::v_of(batch);  // quaternions normalised
+    const std::vector<double> q = testing::q_of(batch),
+                              v = testing::v_of(batch);  // quaternions normalised
     const Reading r = read(model, q, v);
     const auto nv = std::size_t(model.nv()), rows = r.position.size();
     std::vector<double> product(rows, 0.0);
@@ -170,7 +179,8 @@ TEST(EndEffectors, VelocityIsThatOfTheMotion) {
     const Reading after = read(readout, batch);
     double largest = 0, speed = 0;
     for (std::size_t i = 0; i < after.position.size(); ++i) {
-      largest = std::max(largest, std::abs((after.position[i] - before.position[i]) / (2 * h) - middle.velocity[i]));
+      largest = std::max(largest, std::abs((after.position[i] - before.position[i]) / (2 * h) -
+                                           middle.velocity[i]));
       speed = std::max(speed, std::abs(middle.velocity[i]));
     }
     EXPECT_GT(speed, 0.3);
@@ -193,7 +203,8 @@ TEST(EndEffectors, AreTheSameBitsInAnyBatch) {
   std::vector<std::vector<double>> all(kEnvironments, std::vector<double>(n));
   for (int block = 0; block < batch.blocks(); ++block) {
     std::vector<std::span<double>> spans;
-    for (int e = 16 * block; e < std::min(16 * block + 16, kEnvironments); ++e) spans.emplace_back(all[std::size_t(e)]);
+    for (int e = 16 * block; e < std::min(16 * block + 16, kEnvironments); ++e)
+      spans.emplace_back(all[std::size_t(e)]);
     readout.read_variables(batch, block, spans);
   }
   for (int e = 0; e < kEnvironments; ++e) {

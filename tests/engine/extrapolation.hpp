@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Explicit integration to rounding, for references: the modified midpoint rule, extrapolated (Gragg, Bulirsch and Stoer).
+// Explicit integration to rounding, for references: the modified midpoint rule, extrapolated
+// (Gragg, Bulirsch and Stoer).
 #pragma once
 
 #include <array>
@@ -7,7 +8,8 @@
 
 namespace tangere::testing {
 
-/// y(duration) of ẏ = f(y). Eight midpoint runs a step, 2 … 16 substeps, whose errors are series in h²: order 16.
+/// y(duration) of ẏ = f(y). Eight midpoint runs a step, 2 … 16 substeps, whose errors are series in
+/// h²: order 16.
 template <class Vector, class F, class S>
 Vector extrapolate(const F& f, Vector y, S duration, int steps) {
   constexpr int kRuns = 8;
@@ -29,7 +31,8 @@ Vector extrapolate(const F& f, Vector y, S duration, int steps) {
       for (int k = 1; k <= j; ++k) {
         const S ratio = S(count) / S(2 * (j + 1 - k));
         row.push_back(row[std::size_t(k - 1)] +
-                      (row[std::size_t(k - 1)] - above[std::size_t(k - 1)]) / (ratio * ratio - S(1)));
+                      (row[std::size_t(k - 1)] - above[std::size_t(k - 1)]) /
+                          (ratio * ratio - S(1)));
       }
     }
     y = row.back();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fields along a direction against dual numbers and against fields in reverse; every point's own numbers by three routes.
+// Fields along a direction against dual numbers and against fields in reverse; every point's own
+// numbers by three routes.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -36,13 +37,15 @@ struct Placed {
   BlockTape tape;
   CompactFrame<double> frame;
 
-  Placed(const Model& model, const PadState& s, int lane) : batch(model, kBlock), tape(model, Integrator::bdf1, 1), frame(model, 0) {
+  Placed(const Model& model, const PadState& s, int lane)
+      : batch(model, kBlock), tape(model, Integrator::bdf1, 1), frame(model, 0) {
     batch.set_state(lane, s.q, s.v);
     tape.start(batch, 0);
     Readout(model).read(batch, lane, frame);
   }
   /// How the whole field changes, in dual numbers.
-  std::vector<double> by_duals(int lane, const std::vector<double>& points_dot, const StateTangent& state) {
+  std::vector<double> by_duals(int lane, const std::vector<double>& points_dot,
+                               const StateTangent& state) {
     std::vector<double> change(frame.dense_size());
     Tangent(batch.model()).field(batch, 0, lane, tape, 0, 0, {}, points_dot, state, change);
     return change;
@@ -70,12 +73,14 @@ TEST_P(AlongADirection, MatchesDualNumbersAndTheReverse) {
       FieldTangent forward(model);
       forward.place(placed.batch, 0);
       forward.move(lane, d.q, d.v);
-      std::vector<double> change(placed.frame.values().size(), NAN), dense(placed.frame.dense_size());
+      std::vector<double> change(placed.frame.values().size(), NAN),
+          dense(placed.frame.dense_size());
       forward.field(0, placed.frame.tiles(), change);
       placed.frame.spread(change, dense);
       const std::vector<double> expected = placed.by_duals(lane, {}, d);
       const double size = std::sqrt(dot(expected, expected));
-      for (std::size_t i = 0; i < dense.size(); ++i) ASSERT_NEAR(dense[i], expected[i], 1e-12 * size) << table->name;
+      for (std::size_t i = 0; i < dense.size(); ++i)
+        ASSERT_NEAR(dense[i], expected[i], 1e-12 * size) << table->name;
       seen += size;
 
       const std::vector<double> weights = normals(random, dense.size());
@@ -88,8 +93,10 @@ TEST_P(AlongADirection, MatchesDualNumbersAndTheReverse) {
       pullback.finish(c);
       double back = 0;
       for (std::size_t i = 0; i < nv; ++i)
-        back += c.q[i * kBlock + std::size_t(lane)] * d.q[i] + c.v[i * kBlock + std::size_t(lane)] * d.v[i];
-      EXPECT_NEAR(dot(weights, dense), back, 1e-12 * size * std::sqrt(dot(weights, weights))) << table->name;
+        back += c.q[i * kBlock + std::size_t(lane)] * d.q[i] +
+                c.v[i * kBlock + std::size_t(lane)] * d.v[i];
+      EXPECT_NEAR(dot(weights, dense), back, 1e-12 * size * std::sqrt(dot(weights, weights)))
+          << table->name;
     }
   }
   kernels::use_kernels(before);
@@ -101,7 +108,8 @@ Scene moved_points(Scene s, std::size_t number, const std::vector<double>& direc
   TactileDescription& t = s.sensors[0];
   t.pressure_sign = 1;
   std::vector<double> change(direction.size() * kPointNumbers);
-  for (std::size_t i = 0; i < direction.size(); ++i) change[i * kPointNumbers + number] = e * direction[i];
+  for (std::size_t i = 0; i < direction.size(); ++i)
+    change[i * kPointNumbers + number] = e * direction[i];
   add_to_points(t, change);
   return s;
 }
@@ -140,12 +148,17 @@ TEST_P(AlongADirection, PointsHaveDerivativesByNumbersOfTheirOwn) {
     for (std::size_t number = 0; number < kPointNumbers; ++number) {
       const std::vector<double> direction = normals(random, points);
       std::vector<double> d(points * kPointNumbers), g(points);
-      for (std::size_t i = 0; i < points; ++i) d[i * kPointNumbers + number] = direction[i], g[i] = gradient[i * kPointNumbers + number];
+      for (std::size_t i = 0; i < points; ++i)
+        d[i * kPointNumbers + number] = direction[i], g[i] = gradient[i * kPointNumbers + number];
       const std::vector<double> change = placed.by_duals(lane, d, {zero, zero, {}, {}});
-      const double back = dot(gradient, d), size = std::sqrt(dot(weights, weights) * dot(change, change));
+      const double back = dot(gradient, d),
+                   size = std::sqrt(dot(weights, weights) * dot(change, change));
       EXPECT_NEAR(back, dot(weights, change), 1e-12 * size) << "number " << number;
-      const auto value = [&](double e) { return dot(weights, field_of(moved_points(scene, number, direction, e), s)); };
-      const double e = number < 3 ? 1e-8 : 1e-6, right = (value(e) - value(0)) / e, left = (value(0) - value(-e)) / e;
+      const auto value = [&](double e) {
+        return dot(weights, field_of(moved_points(scene, number, direction, e), s));
+      };
+      const double e = number < 3 ? 1e-8 : 1e-6, right = (value(e) - value(0)) / e,
+                   left = (value(0) - value(-e)) / e;
       if (std::abs(right - left) > 1e-3 * size) continue;  // points that touch come and go
       EXPECT_NEAR(back, 0.5 * (right + left), 1e-5 * size) << "number " << number;
       ++compared;
@@ -160,18 +173,22 @@ TEST_P(AlongADirection, AnArrayPointByPointHasTheSameField) {
   const Scene scene = testing::pad_scene(shape, law, pad);
   Random random(5);
   const PadState s = testing::random_pad_state(Model(scene), random);
-  const std::vector<double> a = field_of(scene, s), b = field_of(moved_points(scene, 0, std::vector<double>(a.size() / 3), 0), s);
+  const std::vector<double> a = field_of(scene, s),
+                            b = field_of(
+                                moved_points(scene, 0, std::vector<double>(a.size() / 3), 0), s);
   ASSERT_EQ(a.size(), b.size());
   const double size = std::sqrt(dot(a, a));
   EXPECT_GT(size, 0);
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 1e-12 * size);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, AlongADirection,
-                         ::testing::Combine(::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid, PrimitiveShape::plane,
-                                                              PrimitiveShape::cylinder, PrimitiveShape::capsule),
-                                            ::testing::Values(ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear),
-                                            ::testing::Values(Pad::flat, Pad::skewed, Pad::curved)));
+INSTANTIATE_TEST_SUITE_P(
+    All, AlongADirection,
+    ::testing::Combine(
+        ::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid, PrimitiveShape::plane,
+                          PrimitiveShape::cylinder, PrimitiveShape::capsule),
+        ::testing::Values(ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear),
+        ::testing::Values(Pad::flat, Pad::skewed, Pad::curved)));
 
 }  // namespace
 }  // namespace tangere

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a tactile field says about a contact: directions and patterns of shear, uniform pressure, zero after release, and
-// its balance with the wrench of the contact.
+// What a tactile field says about a contact: directions and patterns of shear, uniform pressure,
+// zero after release, and its balance with the wrench of the contact.
 //
-// The pad lies above its object and feels with its lower face. axis0 = x and axis1 = -y of the pad, their product points
-// down and out: the numbers are f_x, -f_y, f_z of the force on the pad, and pressure is positive.
+// The pad lies above its object and feels with its lower face. axis0 = x and axis1 = -y of the pad,
+// their product points down and out: the numbers are f_x, -f_y, f_z of the force on the pad, and
+// pressure is positive.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -21,14 +22,18 @@ using testing::link;
 
 constexpr int kSide = 21;
 constexpr double kEdge = 0.04, kThickness = 0.01, kRadius = 0.02;  // [m]
-constexpr double kDepth = 5e-4;                                    // [m] how far the pad is pressed in at q = 0
+constexpr double kDepth = 5e-4;  // [m] how far the pad is pressed in at q = 0
 
 TactileDescription skin() {
   TactileDescription t;
   t.name = t.body = "pad";
   t.coefficients = {10, 0.01, 1e3, 0};  // sticks
-  t.array = {{-kEdge / 2, kEdge / 2, -kThickness / 2}, {kEdge / 2, -kEdge / 2, -kThickness / 2},
-             {1, 0, 0}, {0, -1, 0}, kSide, kSide};
+  t.array = {{-kEdge / 2, kEdge / 2, -kThickness / 2},
+             {kEdge / 2, -kEdge / 2, -kThickness / 2},
+             {1, 0, 0},
+             {0, -1, 0},
+             kSide,
+             kSide};
   return t;
 }
 
@@ -86,7 +91,8 @@ Field read(const Model& model, const std::vector<double>& q, const std::vector<d
 
 TEST(Field, SlidingIsOpposedAtEveryPoint) {
   for (const bool flat : {false, true}) {
-    const Model model(flat ? on_block(JointType::translational) : on_ball(JointType::translational));
+    const Model model(flat ? on_block(JointType::translational)
+                           : on_ball(JointType::translational));
     EXPECT_EQ(model.sensors()[0].pressure_sign, 1);
     const Field still = read(model, {0, 0, 0}, {0, 0, 0});
     for (const auto& way : {Vec3<double>{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}}) {
@@ -162,12 +168,14 @@ TEST(Field, RollingWithoutSlipReadsNearlyNoShear) {
     for (std::size_t k = 0; k < f.numbers.size(); ++k) f.numbers[k] -= still.numbers[k];
     return f;
   };
-  const Field sliding = drag(0, 0), rolling = drag(v / 2, v / 2 / kRadius), backwards = drag(v / 2, -v / 2 / kRadius);
+  const Field sliding = drag(0, 0), rolling = drag(v / 2, v / 2 / kRadius),
+              backwards = drag(v / 2, -v / 2 / kRadius);
   // Points of the dent, up to a = √(2 r δ) from its middle, still creep by v a²/4r² < v δ/r.
   EXPECT_LT(rolling.largest_shear(), 2 * kDepth / kRadius * sliding.largest_shear());
   EXPECT_LT(std::abs(rolling.sum().x), kDepth / kRadius * std::abs(sliding.sum().x));
   EXPECT_GT(rolling.largest_shear(), 0);
-  EXPECT_NEAR(backwards.sum().x / sliding.sum().x, 1, 0.05) << "spun the wrong way, the ball's top slides as it did";
+  EXPECT_NEAR(backwards.sum().x / sliding.sum().x, 1, 0.05)
+      << "spun the wrong way, the ball's top slides as it did";
 }
 
 TEST(Field, AYawedPadReadsInItsOwnAxes) {
@@ -182,7 +190,8 @@ TEST(Field, AYawedPadReadsInItsOwnAxes) {
     EXPECT_NEAR(quarter.numbers[k], straight.numbers[k], 1e-14);
     EXPECT_NEAR(askew.numbers[k], straight.numbers[k], 1e-14);
   }
-  // Turned by 90° and dragged along the world's +x, which is -y of the pad: dragged back along +y of the pad.
+  // Turned by 90° and dragged along the world's +x, which is -y of the pad: dragged back along +y
+  // of the pad.
   const Field across = read(model, {0, 0, std::acos(-1.0) / 2}, {0.1, 0, 0});
   EXPECT_GT(across.sum().y, 0);
   EXPECT_NEAR(across.sum().x, 0, 1e-12 * across.sum().y);
@@ -191,7 +200,8 @@ TEST(Field, AYawedPadReadsInItsOwnAxes) {
 TEST(Field, FlatOnFlatIsUniformAndCarriesTheLoad) {
   Scene s = on_block(JointType::translational);
   s.gravity = {0, 0, -9.8};
-  s.pair_contacts.push_back({"pad", "object", s.sensors[0].coefficients, ContactLaw::clamped, 1e-5, {}});
+  s.pair_contacts.push_back(
+      {"pad", "object", s.sensors[0].coefficients, ContactLaw::clamped, 1e-5, {}});
   s.links[0].joint.damping = 2;
   const Model model(s);
   Stepper stepper(model, testing::options(Integrator::bdf2, 5e-3));
@@ -201,7 +211,8 @@ TEST(Field, FlatOnFlatIsUniformAndCarriesTheLoad) {
   const Field f = read(model, testing::q_of(batch), testing::v_of(batch));
   const double load = model.mass(0) * 9.8;
   EXPECT_NEAR(f.sum().z, load, 1e-9 * load);
-  for (int p = 0; p < f.points(); ++p) EXPECT_NEAR(f.force(p).z, load / f.points(), 1e-9 * load / f.points());
+  for (int p = 0; p < f.points(); ++p)
+    EXPECT_NEAR(f.force(p).z, load / f.points(), 1e-9 * load / f.points());
 }
 
 TEST(Field, PureTorsionIsARotation) {
@@ -243,15 +254,18 @@ TEST(Field, NothingIsLeftAfterRelease) {
   EXPECT_EQ(read_all(0.1), 0);
 }
 
-/// Where points and coefficients of sensor and contact are the same, forces and moments of the field are the wrench that
-/// the dynamics feels, taken from its residual: with the contact less without.
+/// Where points and coefficients of sensor and contact are the same, forces and moments of the
+/// field are the wrench that the dynamics feels, taken from its residual: with the contact less
+/// without.
 TEST(Field, SumAndMomentAreTheWrenchOfTheContact) {
   testing::Random random(5);
   for (const bool flat : {false, true}) {
-    Scene s = flat ? on_block(JointType::free, JointType::free) : on_ball(JointType::free, JointType::free);
+    Scene s = flat ? on_block(JointType::free, JointType::free)
+                   : on_ball(JointType::free, JointType::free);
     s.sensors[0].coefficients = {10, 0.3, 0.4, 2};  // some points stick, some slip
     const Model apart(s);
-    s.pair_contacts.push_back({"pad", "object", s.sensors[0].coefficients, ContactLaw::clamped, 1e-5, {}});
+    s.pair_contacts.push_back(
+        {"pad", "object", s.sensors[0].coefficients, ContactLaw::clamped, 1e-5, {}});
     const Model model(s);
     for (int trial = 0; trial < 20; ++trial) {
       // Both turned a little, the pad pressed in deeper; joint frames are at the bodies' middles.
@@ -276,7 +290,8 @@ TEST(Field, SumAndMomentAreTheWrenchOfTheContact) {
         return b.g;
       };
       const std::vector<double> with = residual(model), without = residual(apart);
-      std::vector<double> wrench(12);  // per body: force in world axes, torque about its middle in body axes
+      std::vector<double> wrench(
+          12);  // per body: force in world axes, torque about its middle in body axes
       for (std::size_t i = 0; i < 12; ++i) wrench[i] = without[i] - with[i];
 
       const auto rotation = [&](std::size_t at) {
@@ -297,11 +312,12 @@ TEST(Field, SumAndMomentAreTheWrenchOfTheContact) {
         moment2 += cross(x2 - p2, F);
       }
       const Vec3<double> on1 = transposed_times(R1, moment1), on2 = transposed_times(R2, moment2);
-      const double expected[12] = {force.x, force.y, force.z, on1.x, on1.y, on1.z,
+      const double expected[12] = {force.x,  force.y,  force.z,  on1.x,  on1.y,  on1.z,
                                    -force.x, -force.y, -force.z, -on2.x, -on2.y, -on2.z};
       const double scale = std::sqrt(dot(force, force));
       for (std::size_t i = 0; i < 12; ++i)
-        EXPECT_NEAR(wrench[i], expected[i], 1e-10 * scale) << (flat ? "block " : "ball ") << trial << " dof " << i;
+        EXPECT_NEAR(wrench[i], expected[i], 1e-10 * scale)
+            << (flat ? "block " : "ball ") << trial << " dof " << i;
     }
   }
 }

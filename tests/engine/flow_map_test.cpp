@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Flow maps: hand-computed numbers, one scale for all fields, zero without contact, no scale left in the result.
+// Flow maps: hand-computed numbers, one scale for all fields, zero without contact, no scale left
+// in the result.
 #include "engine/flow_map.hpp"
 
 #include <gmock/gmock.h>
@@ -54,7 +55,8 @@ using Types = ::testing::Types<float, double>;
 TYPED_TEST_SUITE(FlowMap, Types);
 
 TYPED_TEST(FlowMap, DividesShearByTheLongestOfAllFields) {
-  // Lengths 5, 0 on one pad, 10, 2.5 on the other; pressure is larger than all of them and does not count.
+  // Lengths 5, 0 on one pad, 10, 2.5 on the other; pressure is larger than all of them and does not
+  // count.
   const auto map = this->flow({{3, 4, 100, 0, 0, 50}, {-6, 8, -1000, 0, -2.5, 0}});
   EXPECT_EQ(this->longest, 10);
   using T = TypeParam;
@@ -92,15 +94,18 @@ TYPED_TEST(FlowMap, IsZeroUpToTheSmallestThatCounts) {
 
 TYPED_TEST(FlowMap, HasALongestArrowOfOneAndNoScale) {
   using T = TypeParam;
-  // A power of two changes no digit, another factor the last ones; nor do the ends of the range overflow or vanish.
+  // A power of two changes no digit, another factor the last ones; nor do the ends of the range
+  // overflow or vanish.
   constexpr int kFar = sizeof(T) == 4 ? 100 : 1000;
   const double tiny = std::ldexp(1.0, -kFar), huge = std::ldexp(1.0, kFar);
   const double rounding = 4 * double(std::numeric_limits<T>::epsilon());
   const auto one = this->flow({this->random_field(1, 20, 1), this->random_field(2, 30, 5)});
   EXPECT_NEAR(this->largest_length(one), 1, rounding);
-  EXPECT_LT(this->largest_length({one.begin(), one.begin() + 40}), 0.9) << "the first pad has a scale of its own";
+  EXPECT_LT(this->largest_length({one.begin(), one.begin() + 40}), 0.9)
+      << "the first pad has a scale of its own";
   for (const double scale : {1e-3, 7.0, 1e4, tiny, huge}) {
-    std::vector<std::vector<T>> fields = {this->random_field(1, 20, 1), this->random_field(2, 30, 5)};
+    std::vector<std::vector<T>> fields = {this->random_field(1, 20, 1),
+                                          this->random_field(2, 30, 5)};
     for (auto& f : fields)
       for (T& x : f) x = static_cast<T>(double(x) * scale);
     const auto map = this->flow(fields);
@@ -161,7 +166,9 @@ TEST(FlowMapOfARun, IsZeroBeforeContactAndThenTheShearWithoutItsScale) {
 /// Derivatives against differences, by every number of two fields, one of them less a field before.
 TEST(FlowMap, DerivativesMatchDifferences) {
   std::vector<double> first, second, before, weights;
-  for (int i = 0; i < 15; ++i) first.push_back(std::sin(3.0 * i)), second.push_back(std::cos(5.0 * i)), before.push_back(0.3 * std::sin(i));
+  for (int i = 0; i < 15; ++i)
+    first.push_back(std::sin(3.0 * i)), second.push_back(std::cos(5.0 * i)),
+        before.push_back(0.3 * std::sin(i));
   for (int i = 0; i < 20; ++i) weights.push_back(std::sin(7.0 * i + 1));
   const auto value = [&] {
     const ShearField<double> fields[] = {{first, {}}, {second, before}};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Short rollouts with a loss that is linear in every state: their gradients by the adjoint and by differences.
+// Short rollouts with a loss that is linear in every state: their gradients by the adjoint and by
+// differences.
 #pragma once
 
 #include <algorithm>
@@ -49,12 +50,14 @@ inline RunInput random_input(const Model& model, unsigned seed, int steps) {
 /// Σ_t weight(t)·(q_t, v_t) with random weights; quaternions enter with their four components.
 class StateLoss {
  public:
-  StateLoss(const Model& model, int steps, unsigned seed) : model_(model), nq_(model.nq()), nv_(model.nv()) {
+  StateLoss(const Model& model, int steps, unsigned seed)
+      : model_(model), nq_(model.nq()), nv_(model.nv()) {
     Random random(seed);
     weights_.resize(std::size_t((steps + 1) * (nq_ + nv_)));
     for (double& w : weights_) w = random.normal();
   }
-  [[nodiscard]] double value(int step, const std::vector<double>& q, const std::vector<double>& v) const {
+  [[nodiscard]] double value(int step, const std::vector<double>& q,
+                             const std::vector<double>& v) const {
     const double* w = at(step);
     double sum = 0;
     for (int i = 0; i < nq_; ++i) sum += w[i] * q[std::size_t(i)];
@@ -71,13 +74,16 @@ class StateLoss {
   }
 
  private:
-  [[nodiscard]] const double* at(int step) const { return &weights_[std::size_t(step * (nq_ + nv_))]; }
+  [[nodiscard]] const double* at(int step) const {
+    return &weights_[std::size_t(step * (nq_ + nv_))];
+  }
   Model model_;
   int nq_, nv_;
   std::vector<double> weights_;
 };
 
-inline double loss_of_run(const Model& model, const StepperOptions& options, const RunInput& in, const StateLoss& loss) {
+inline double loss_of_run(const Model& model, const StepperOptions& options, const RunInput& in,
+                          const StateLoss& loss) {
   Batch batch(model, 1);
   batch.set_state(0, in.q, in.v);
   Stepper stepper(model, options);
@@ -102,18 +108,21 @@ struct RunGradient {
 };
 
 /// Of environment `lane` among `inputs`, which run together.
-inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& options, const std::vector<RunInput>& inputs,
-                                  const StateLoss& loss, int lane) {
+inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& options,
+                                  const std::vector<RunInput>& inputs, const StateLoss& loss,
+                                  int lane) {
   const int count = static_cast<int>(inputs.size()), steps = static_cast<int>(inputs[0].u.size());
   Batch batch(model, count);
-  for (int e = 0; e < count; ++e) batch.set_state(e, inputs[std::size_t(e)].q, inputs[std::size_t(e)].v);
+  for (int e = 0; e < count; ++e)
+    batch.set_state(e, inputs[std::size_t(e)].q, inputs[std::size_t(e)].v);
   Stepper stepper(model, options);
   BlockTape tape(model, stepper.integrator(), steps);
   tape.start(batch, 0);
   std::vector<std::vector<double>> u;
   for (int t = 0; t < steps; ++t) {
     u.emplace_back();
-    for (const RunInput& in : inputs) u.back().insert(u.back().end(), in.u[std::size_t(t)].begin(), in.u[std::size_t(t)].end());
+    for (const RunInput& in : inputs)
+      u.back().insert(u.back().end(), in.u[std::size_t(t)].begin(), in.u[std::size_t(t)].end());
     stepper.step_block(batch, 0, u.back(), &tape);
   }
   Adjoint adjoint(model, options, {1, true});
@@ -130,7 +139,8 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
     if (t == 0) break;
     adjoint.reverse_step(batch, 0, tape, t - 1, u[std::size_t(t - 1)]);
     for (int k = 0; k < model.nu(); ++k)
-      g.u[std::size_t((t - 1) * model.nu() + k)] = adjoint.loss(0).u[std::size_t(k * kBlock + lane)];
+      g.u[std::size_t((t - 1) * model.nu() + k)] =
+          adjoint.loss(0).u[std::size_t(k * kBlock + lane)];
   }
   for (int i = 0; i < model.nv(); ++i) {
     g.q.push_back(adjoint.loss(0).q[std::size_t(i * kBlock + lane)]);
@@ -142,7 +152,8 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
   return g;
 }
 
-/// The central difference that changes least from one step size to the next; NaN where none settles (a kink).
+/// The central difference that changes least from one step size to the next; NaN where none settles
+/// (a kink).
 inline double best_difference(const std::function<double(double)>& f, double start) {
   double best = NAN, least = HUGE_VAL, before = NAN;
   for (double e = start; e > 1e-4 * start; e *= 0.25) {
@@ -155,8 +166,9 @@ inline double best_difference(const std::function<double(double)>& f, double sta
   return best;
 }
 
-inline RunGradient differences_of_run(const Model& model, const StepperOptions& options, const RunInput& in,
-                                      const StateLoss& loss, double start = 1e-3) {
+inline RunGradient differences_of_run(const Model& model, const StepperOptions& options,
+                                      const RunInput& in, const StateLoss& loss,
+                                      double start = 1e-3) {
   RunGradient g;
   const auto along = [&](const std::function<void(RunInput&, double)>& change) {
     return best_difference(

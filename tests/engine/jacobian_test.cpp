@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The analytic Jacobian of the residual: three routes on random trees with and without contact, every joint kind.
+// The analytic Jacobian of the residual: three routes on random trees with and without contact,
+// every joint kind.
 #include <gtest/gtest.h>
 
 #include "kernels/dual.hpp"
@@ -22,11 +23,13 @@ double norm_of(const CompiledModel& m, const StageBuffers<double>& b) {
   return worst;
 }
 
-/// Each row is measured by its own largest entry: rows of light and heavy bodies differ by many decades.
+/// Each row is measured by its own largest entry: rows of light and heavy bodies differ by many
+/// decades.
 std::vector<double> row_scales(const CompiledModel& m, const StageBuffers<double>& b) {
   std::vector<double> scale(std::size_t(m.nv), 0);
   for (int i = 0; i < m.nv; ++i)
-    for (int j = 0; j < m.nv; ++j) scale[std::size_t(i)] = std::max(scale[std::size_t(i)], std::abs(b.entry(b.A, i, j)));
+    for (int j = 0; j < m.nv; ++j)
+      scale[std::size_t(i)] = std::max(scale[std::size_t(i)], std::abs(b.entry(b.A, i, j)));
   return scale;
 }
 
@@ -54,7 +57,8 @@ void compare_with_dual_numbers(const CompiledModel& m, StageBuffers<double>& b, 
     dual.x[std::size_t(j)].epsilon = 0;
     for (int i = 0; i < m.nv; ++i) {
       EXPECT_DOUBLE_EQ(dual.g[std::size_t(i)].value, b.g[std::size_t(i)]);
-      EXPECT_NEAR(dual.g[std::size_t(i)].epsilon, b.entry(b.A, i, j), tolerance * scale[std::size_t(i)])
+      EXPECT_NEAR(dual.g[std::size_t(i)].epsilon, b.entry(b.A, i, j),
+                  tolerance * scale[std::size_t(i)])
           << "entry " << i << ", " << j;
     }
   }
@@ -103,7 +107,8 @@ TEST(Jacobian, ContactsWithFixedBodiesMatchDualNumbers) {
 }
 
 /// Returns how many entries were compared; those with a kink within ±e are left out.
-int compare_with_central_differences(const CompiledModel& m, StageBuffers<double>& b, double e, double tolerance) {
+int compare_with_central_differences(const CompiledModel& m, StageBuffers<double>& b, double e,
+                                     double tolerance) {
   b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
   const std::vector<double> scale = row_scales(m, b);
   StageBuffers<double> moved(m);
@@ -121,7 +126,8 @@ int compare_with_central_differences(const CompiledModel& m, StageBuffers<double
       const std::size_t k = std::size_t(i);
       const double right = (ahead[k] - b.g[k]) / e, left = (b.g[k] - behind[k]) / e;
       if (std::abs(right - left) > 1e-4 * scale[k]) continue;
-      EXPECT_NEAR((ahead[k] - behind[k]) / (2 * e), b.entry(b.A, i, j), tolerance * scale[k]) << "entry " << i << ", " << j;
+      EXPECT_NEAR((ahead[k] - behind[k]) / (2 * e), b.entry(b.A, i, j), tolerance * scale[k])
+          << "entry " << i << ", " << j;
       ++compared;
     }
   }
@@ -147,19 +153,23 @@ using TypeAndEffect = std::tuple<JointType, Effect>;
 
 class JointEffectJacobian : public ::testing::TestWithParam<TypeAndEffect> {};
 
-/// A joint with one effect between a free body and another: every derivative of it, and that it is there at all.
+/// A joint with one effect between a free body and another: every derivative of it, and that it is
+/// there at all.
 TEST_P(JointEffectJacobian, MatchesDualNumbersAndActs) {
   const auto [type, effect] = GetParam();
   const bool mixed = type == JointType::free || type == JointType::free2d;
-  if (mixed && effect >= Effect::position_motor) GTEST_SKIP() << "no motor on a joint that slides and turns";
+  if (mixed && effect >= Effect::position_motor)
+    GTEST_SKIP() << "no motor on a joint that slides and turns";
   Scene bare = testing::random_tree(3, 3);
-  for (std::size_t i = 0; i < 3; ++i) bare.links[i].parent = static_cast<int>(i) - 1, bare.links[i].joint.damping = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    bare.links[i].parent = static_cast<int>(i) - 1, bare.links[i].joint.damping = 0;
   bare.links[1].joint.type = type;
   Scene s = bare;
   JointDescription& joint = s.links[1].joint;
   if (effect == Effect::damping) joint.damping = 0.3;
   if (effect == Effect::armature) joint.armature = 0.2;
-  if (effect == Effect::spring) joint.stiffness = 30, joint.rest.assign(std::size_t(dof_count(type)), 0.2);
+  if (effect == Effect::spring)
+    joint.stiffness = 30, joint.rest.assign(std::size_t(dof_count(type)), 0.2);
   if (effect == Effect::limit) joint.limit_stiffness = 300, joint.limits = {-0.01, 0.02};
   if (effect >= Effect::position_motor) {
     MotorDescription motor{joint.name, -HUGE_VAL, HUGE_VAL, {}, MotorControl::position, 40, 0.2};
@@ -183,20 +193,22 @@ TEST_P(JointEffectJacobian, MatchesDualNumbersAndActs) {
   EXPECT_GT(felt, effect == Effect::limit || effect == Effect::clipped_motor ? 1 : 19);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, JointEffectJacobian,
-                         ::testing::Combine(::testing::Values(JointType::revolute, JointType::prismatic, JointType::planar,
-                                                              JointType::translational, JointType::free2d,
-                                                              JointType::spherical, JointType::free),
-                                            ::testing::Values(Effect::damping, Effect::armature, Effect::spring,
-                                                              Effect::limit, Effect::position_motor,
-                                                              Effect::clipped_motor)));
+INSTANTIATE_TEST_SUITE_P(
+    All, JointEffectJacobian,
+    ::testing::Combine(::testing::Values(JointType::revolute, JointType::prismatic,
+                                         JointType::planar, JointType::translational,
+                                         JointType::free2d, JointType::spherical, JointType::free),
+                       ::testing::Values(Effect::damping, Effect::armature, Effect::spring,
+                                         Effect::limit, Effect::position_motor,
+                                         Effect::clipped_motor)));
 
 class ContactJacobian : public ::testing::TestWithParam<ContactLaw> {};
 
 TEST_P(ContactJacobian, ContactsMatchDualNumbers) {
   int touched = 0;
   for (unsigned seed = 1; seed <= 200; ++seed) {
-    const auto m = compile(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), GetParam()));
+    const auto m =
+        compile(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), GetParam()));
     StageBuffers<double> b(*m);
     Random random(seed);
     for (int k = 0; k < 5; ++k) {
@@ -235,7 +247,8 @@ TEST_P(ContactJacobian, ContactsMatchCentralDifferences) {
           ++kinks;  // a contact or a slip began within ±e
           continue;
         }
-        EXPECT_NEAR(0.5 * (right + left), b.entry(b.A, i, j), 1e-5 * scale) << "seed " << seed << " entry " << i << ", " << j;
+        EXPECT_NEAR(0.5 * (right + left), b.entry(b.A, i, j), 1e-5 * scale)
+            << "seed " << seed << " entry " << i << ", " << j;
         ++compared;
       }
     }
@@ -244,7 +257,8 @@ TEST_P(ContactJacobian, ContactsMatchCentralDifferences) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, ContactJacobian,
-                         ::testing::Values(ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear));
+                         ::testing::Values(ContactLaw::clamped, ContactLaw::paper,
+                                           ContactLaw::linear));
 
 TEST(Jacobian, MassDiagonalIsTheKineticEnergyOfUnitVelocity) {
   // One free cuboid: ½ m and ½ I exactly.

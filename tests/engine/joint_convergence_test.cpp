@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Orders of convergence against solutions found another way: dense equations in world axes, extrapolated in long double.
+// Orders of convergence against solutions found another way: dense equations in world axes,
+// extrapolated in long double.
 #include <gtest/gtest.h>
 
 #include "tests/engine/dense_dynamics.hpp"
@@ -20,8 +21,8 @@ Scene bars(int count, double damping) {
   const Vector3 axes[] = {{0, 1, 0}, {0.6, 0.8, 0}, {0, 0.6, 0.8}};
   for (int i = 0; i < count; ++i) {
     const std::string name = "bar" + std::to_string(i);
-    s.links.push_back(
-        link(name, JointType::revolute, {i == 0 ? 0 : 0.2, 0, 0}, CuboidShape{{0.2, 0.04, 0.03}, {2, 2, 2}}, 900));
+    s.links.push_back(link(name, JointType::revolute, {i == 0 ? 0 : 0.2, 0, 0},
+                           CuboidShape{{0.2, 0.04, 0.03}, {2, 2, 2}}, 900));
     LinkDescription& l = s.links.back();
     l.parent = i - 1;
     l.joint.axis0 = axes[i % 3];
@@ -54,18 +55,21 @@ Scene balls() {
   s.links[0].joint.stiffness = 0.5;
   s.links[0].joint.rest = {0.2, -0.3, 0.4};
   s.links[1].joint.limit_stiffness = 0.02;
-  s.links[1].joint.limits = {-3, -2.5};  // no component ever gets there: a kink would cost the order
+  s.links[1].joint.limits = {-3,
+                             -2.5};  // no component ever gets there: a kink would cost the order
   s.initial.push_back({"bar0_joint", {}, {1, 2, -1}, {}});
   s.initial.push_back({"bar1_joint", {0.8, 0.36, 0.48, 0}, {0.5, 0.4, 0.3}, {}});
   s.motors.push_back({"bar2_joint", -HUGE_VAL, HUGE_VAL, {}, MotorControl::position, 0.1, 0.002});
   return s;
 }
 
-/// Two roots and branches: planar and free2d trunks, a slide, a massless cross slide, a fixed plate.
+/// Two roots and branches: planar and free2d trunks, a slide, a massless cross slide, a fixed
+/// plate.
 Scene branches() {
   Scene s;
   const CuboidShape box{{0.1, 0.06, 0.04}, {2, 2, 2}};
-  const auto add = [&](const char* name, int parent, JointType type, Vector3 at) -> LinkDescription& {
+  const auto add = [&](const char* name, int parent, JointType type,
+                       Vector3 at) -> LinkDescription& {
     s.links.push_back(link(name, type, at, box, 800));
     s.links.back().parent = parent;
     s.links.back().body.pose = {{0.04, 0.01, -0.02}, {0.8, 0, 0.6, 0}};
@@ -98,7 +102,8 @@ Scene branches() {
 Scene tumbling() {
   Scene s;
   s.gravity = {0, 0, 0};
-  s.links = {link("body", JointType::free, {0, 0, 0}, CuboidShape{{0.3, 0.2, 0.1}, {2, 2, 2}}, 500)};
+  s.links = {
+      link("body", JointType::free, {0, 0, 0}, CuboidShape{{0.3, 0.2, 0.1}, {2, 2, 2}}, 500)};
   s.links[0].body.pose = {{0.02, -0.01, 0.03}, {0.8, 0.6, 0, 0}};
   s.initial.push_back({"body_joint", {}, {0.1, 0.2, 0, 0.2, 1.5, 4.8}, {}});
   return s;
@@ -112,7 +117,8 @@ struct Case {
 };
 
 /// (q, v) of the dense equations after a time, quaternions of unit length.
-Dense::Vector reference(const Scene& scene, const std::vector<double>& u, double duration, int steps) {
+Dense::Vector reference(const Scene& scene, const std::vector<double>& u, double duration,
+                        int steps) {
   const Dense dense(scene);
   Dense::Vector y(dense.nq + dense.nv);
   y << dense.initial_q(), dense.initial_v();
@@ -130,8 +136,8 @@ struct Errors {
 };
 
 /// Distance to the reference in q and v; the sign of a quaternion means nothing.
-Errors errors(const Model& model, Integrator scheme, const std::vector<double>& u, double duration, int steps,
-              const Dense::Vector& exact) {
+Errors errors(const Model& model, Integrator scheme, const std::vector<double>& u, double duration,
+              int steps, const Dense::Vector& exact) {
   Stepper stepper(model, testing::options(scheme, duration / steps, 1e-13));
   Batch batch(model, 1);
   for (int k = 0; k < steps; ++k) stepper.step(batch, u);
@@ -139,7 +145,9 @@ Errors errors(const Model& model, Integrator scheme, const std::vector<double>& 
   const std::vector<double> q = testing::q_of(batch), v = testing::v_of(batch);
   Errors e{0, 0};
   std::size_t i = 0;
-  const auto add = [&](double sign) { e.q += std::pow(q[i] - sign * double(exact[int(i)]), 2), ++i; };
+  const auto add = [&](double sign) {
+    e.q += std::pow(q[i] - sign * double(exact[int(i)]), 2), ++i;
+  };
   for (const LinkDescription& l : model.scene().links) {
     const bool ball = l.joint.type == JointType::spherical || l.joint.type == JointType::free;
     for (int k = 0; k < position_count(l.joint.type) - (ball ? 4 : 0); ++k) add(1);
@@ -148,7 +156,8 @@ Errors errors(const Model& model, Integrator scheme, const std::vector<double>& 
     for (std::size_t k = 0; k < 4; ++k) match += q[i + k] * double(exact[int(i + k)]);
     for (int k = 0; k < 4; ++k) add(match < 0 ? -1 : 1);
   }
-  for (std::size_t k = 0; k < v.size(); ++k) e.v += std::pow(v[k] - double(exact[int(q.size() + k)]), 2);
+  for (std::size_t k = 0; k < v.size(); ++k)
+    e.v += std::pow(v[k] - double(exact[int(q.size() + k)]), 2);
   return {std::sqrt(e.q), std::sqrt(e.v)};
 }
 
@@ -172,16 +181,20 @@ TEST_P(JointConvergence, SchemesReachTheIndependentSolutionWithTheirOrder) {
   for (const auto& s : kSchemes) {
     const Errors coarse = errors(model, s.scheme, u, c.duration, s.steps, exact);
     const Errors fine = errors(model, s.scheme, u, c.duration, 2 * s.steps, exact);
-    EXPECT_NEAR(std::log2(coarse.q / fine.q), s.order, s.slack) << to_string(s.scheme) << ", error " << fine.q;
-    EXPECT_NEAR(std::log2(coarse.v / fine.v), s.order, s.slack) << to_string(s.scheme) << ", error " << fine.v;
+    EXPECT_NEAR(std::log2(coarse.q / fine.q), s.order, s.slack)
+        << to_string(s.scheme) << ", error " << fine.q;
+    EXPECT_NEAR(std::log2(coarse.v / fine.v), s.order, s.slack)
+        << to_string(s.scheme) << ", error " << fine.v;
     // Of the size of the errors of a finer step: the right solution, not just any.
     EXPECT_LT(fine.q, s.order == 1 ? 0.05 : 2e-3) << to_string(s.scheme);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, JointConvergence,
-                         ::testing::Values(Case{"pendulum", pendulum, 0.5, 1600}, Case{"arm", arm, 0.4, 1600},
-                                           Case{"balls", balls, 0.3, 1600}, Case{"branches", branches, 0.4, 4800},
+                         ::testing::Values(Case{"pendulum", pendulum, 0.5, 1600},
+                                           Case{"arm", arm, 0.4, 1600},
+                                           Case{"balls", balls, 0.3, 1600},
+                                           Case{"branches", branches, 0.4, 4800},
                                            Case{"tumbling", tumbling, 1.5, 3200}),
                          [](const auto& param) { return std::string(param.param.name); });
 
@@ -191,8 +204,8 @@ TEST(JointConvergence, TheMiddleAxisFlipsAndAngularMomentumStays) {
   const testing::DenseDynamics<double> dense(scene);
   const auto terms = [&](const Batch& b) {
     const std::vector<double> q = testing::q_of(b), v = testing::v_of(b);
-    return dense.terms(Eigen::Map<const Eigen::VectorXd>(q.data(), 7), Eigen::Map<const Eigen::VectorXd>(v.data(), 6),
-                       {});
+    return dense.terms(Eigen::Map<const Eigen::VectorXd>(q.data(), 7),
+                       Eigen::Map<const Eigen::VectorXd>(v.data(), 6), {});
   };
   const auto run = [&](int steps) {
     Stepper stepper(model, testing::options(Integrator::sdirk2, 8.0 / steps, 1e-12));
@@ -204,8 +217,10 @@ TEST(JointConvergence, TheMiddleAxisFlipsAndAngularMomentumStays) {
     for (int k = 0; k < steps; ++k) {
       stepper.step(batch, {});
       const auto now = terms(batch);
-      lost = std::max(lost, (now.angular_momentum - start.angular_momentum).norm() / start.angular_momentum.norm());
-      const double middle = testing::v_of(batch)[4] * 0.28 + testing::v_of(batch)[5] * 0.96;  // about the body's own y
+      lost = std::max(lost, (now.angular_momentum - start.angular_momentum).norm() /
+                                start.angular_momentum.norm());
+      const double middle = testing::v_of(batch)[4] * 0.28 +
+                            testing::v_of(batch)[5] * 0.96;  // about the body's own y
       if ((middle > 0) != forward) ++flips, forward = !forward;
     }
     EXPECT_NEAR(terms(batch).energy, start.energy, 0.02 * start.energy);

@@ -27,7 +27,8 @@ void run(const Model& model, Batch& batch, Integrator scheme, double timestep, i
 
 // --- fixed joints ---
 
-/// A box with a weightless ball under it; `parts`: in two halves on turned fixed joints, the ball on the second.
+/// A box with a weightless ball under it; `parts`: in two halves on turned fixed joints, the ball
+/// on the second.
 Scene thrown_box(bool parts) {
   Scene s;
   s.ground = GroundDescription{};
@@ -41,13 +42,15 @@ Scene thrown_box(bool parts) {
     s.links[0].body.pose.position = {-0.05, 0, 0};
     s.links[1].parent = 0;
     s.links[1].joint.pose.orientation = {0.8, 0.6, 0, 0};
-    // Back from the turned joint to the box's axes: the inverse of (0.03, 0.04, 0.1) and the rotation.
+    // Back from the turned joint to the box's axes: the inverse of (0.03, 0.04, 0.1) and the
+    // rotation.
     s.links[1].body.pose.orientation = {0.8, -0.6, 0, 0};
     const auto R = to_frame(s.links[1].joint.pose).R;
     const auto at = kernels::transposed_times(R, kernels::Vec3<double>{0.05 - 0.03, -0.04, -0.1});
     s.links[1].body.pose.position = {at.x, at.y, at.z};
     s.links[2].parent = 1;
-    const auto back = kernels::transposed_times(R, kernels::Vec3<double>{-0.03, -0.04, -0.1 - 0.05});
+    const auto back =
+        kernels::transposed_times(R, kernels::Vec3<double>{-0.03, -0.04, -0.1 - 0.05});
     s.links[2].joint.pose.position = {back.x, back.y, back.z};
   } else {
     s.links = {link("box", JointType::free, start, kBox, 700),
@@ -104,7 +107,8 @@ TEST(FixedJoints, MotorsFollow) {
   s.motors = {{"arm_joint", -2, 2, {}}};
   Scene direct = s;
   direct.links.erase(direct.links.begin());
-  const kernels::Frame<double> at = compose(to_frame(s.links[0].joint.pose), to_frame(s.links[1].joint.pose));
+  const kernels::Frame<double> at =
+      compose(to_frame(s.links[0].joint.pose), to_frame(s.links[1].joint.pose));
   const kernels::Quat<double> q = quaternion_of(at.R);
   direct.links[0].parent = -1;
   direct.links[0].joint.pose = {{at.p.x, at.p.y, at.p.z}, {q.w, q.x, q.y, q.z}};
@@ -118,7 +122,8 @@ TEST(FixedJoints, MotorsFollow) {
 }
 
 TEST(FixedJoints, BodiesOfTheWorldAreTouched) {
-  // A box stands on a fixed table by its corners; a ball hangs on one contact point of a fixed grid.
+  // A box stands on a fixed table by its corners; a ball hangs on one contact point of a fixed
+  // grid.
   Scene s;
   s.links = {link("table", JointType::fixed, {0, 0, 0}, CuboidShape{{1, 1, 0.1}, {3, 3, 2}}, 100),
              link("box", JointType::free, {0.2, 0.2, 0.08}, kBox, 700),
@@ -156,7 +161,8 @@ TEST(Limits, StopAFallWhereTheSpringCarriesIt) {
   EXPECT_NEAR(q_of(batch)[2], 0, 1e-12);
 }
 
-/// How deep a turning body goes beyond its limit follows from its energy; then it comes back as fast.
+/// How deep a turning body goes beyond its limit follows from its energy; then it comes back as
+/// fast.
 TEST(Limits, GiveTheEnergyBack) {
   for (JointType type : {JointType::revolute, JointType::spherical}) {
     Scene s;
@@ -166,7 +172,10 @@ TEST(Limits, GiveTheEnergyBack) {
     s.links[0].joint.limits = {-0.5, 0.4};
     s.links[0].joint.limit_stiffness = 20;
     s.initial.push_back(
-        {"ball_joint", {}, type == JointType::revolute ? std::vector<double>{3} : std::vector<double>{0, 0, 3}, {}});
+        {"ball_joint",
+         {},
+         type == JointType::revolute ? std::vector<double>{3} : std::vector<double>{0, 0, 3},
+         {}});
     const Model model(s);
     Batch batch(model, 1);
     Stepper stepper(model, testing::options(Integrator::sdirk2, 5e-4));
@@ -174,7 +183,8 @@ TEST(Limits, GiveTheEnergyBack) {
     for (int k = 0; k < 800; ++k) {
       stepper.step(batch, {});
       const std::vector<double> q = q_of(batch);
-      most = std::max(most, type == JointType::revolute ? q[0] : rotation_log({q[0], q[1], q[2], q[3]}).z);
+      most = std::max(
+          most, type == JointType::revolute ? q[0] : rotation_log({q[0], q[1], q[2], q[3]}).z);
     }
     const double inertia = 0.4 * model.mass(0) * 0.01;
     EXPECT_NEAR(most, 0.4 + 3 * std::sqrt(inertia / 20), 2e-4) << to_string(type);
@@ -196,12 +206,22 @@ TEST(Limits, MistakesInScenesBuiltInCodeAreErrors) {
     return std::string();
   };
   EXPECT_EQ(message([](Scene&) {}), "");
-  EXPECT_NE(message([](Scene& s) { s.links[0].joint.limits = {1, -1}; }).find("low, then high"), std::string::npos);
-  EXPECT_NE(message([](Scene& s) { s.links[0].joint.stiffness = -1; }).find("stiffness"), std::string::npos);
-  EXPECT_NE(message([](Scene& s) { s.links[0].joint.rest = {1, 2}; }).find("rest has 2"), std::string::npos);
-  EXPECT_NE(message([](Scene& s) { s.motors[0].high = HUGE_VAL; }).find("finite range"), std::string::npos);
-  EXPECT_NE(message([](Scene& s) { s.motors[0].low = 2; }).find("low, then high"), std::string::npos);
-  EXPECT_NE(message([](Scene& s) { s.links[0].body.density = 0; }).find("nothing that has mass"), std::string::npos);
+  EXPECT_NE(message([](Scene& s) {
+              s.links[0].joint.limits = {1, -1};
+            }).find("low, then high"),
+            std::string::npos);
+  EXPECT_NE(message([](Scene& s) { s.links[0].joint.stiffness = -1; }).find("stiffness"),
+            std::string::npos);
+  EXPECT_NE(message([](Scene& s) {
+              s.links[0].joint.rest = {1, 2};
+            }).find("rest has 2"),
+            std::string::npos);
+  EXPECT_NE(message([](Scene& s) { s.motors[0].high = HUGE_VAL; }).find("finite range"),
+            std::string::npos);
+  EXPECT_NE(message([](Scene& s) { s.motors[0].low = 2; }).find("low, then high"),
+            std::string::npos);
+  EXPECT_NE(message([](Scene& s) { s.links[0].body.density = 0; }).find("nothing that has mass"),
+            std::string::npos);
 }
 
 }  // namespace

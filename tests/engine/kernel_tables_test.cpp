@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every kernel table this machine can run, against the plain scalar run of the same templates, with poisoned
-// neighbour lanes; AVX2 and AVX-512 bit for bit.
+// Every kernel table this machine can run, against the plain scalar run of the same templates, with
+// poisoned neighbour lanes; AVX2 and AVX-512 bit for bit.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -40,7 +40,8 @@ void list_everything(const CompiledModel& m, BasicWorkspace<L>& w) {
 }
 
 template <int L>
-void fill_lane(BasicWorkspace<L>& w, const CompiledModel& m, const StageBuffers<double>& b, int lane) {
+void fill_lane(BasicWorkspace<L>& w, const CompiledModel& m, const StageBuffers<double>& b,
+               int lane) {
   for (int i = 0; i < m.nq; ++i) w.stage.centre[i][lane] = b.centre[std::size_t(i)];
   for (int i = 0; i < m.nv; ++i) {
     const std::size_t k = std::size_t(i);
@@ -63,7 +64,8 @@ struct Outputs {
 template <int L>
 Outputs outputs(const BasicWorkspace<L>& w, const CompiledModel& m, int lane) {
   Outputs o;
-  for (int i = 0; i < m.nv; ++i) o.g.push_back(w.stage.g[i][lane]), o.v.push_back(w.stage.v[i][lane]);
+  for (int i = 0; i < m.nv; ++i)
+    o.g.push_back(w.stage.g[i][lane]), o.v.push_back(w.stage.v[i][lane]);
   for (int e = 0; e < m.pattern.entries; ++e) o.A.push_back(w.stage.A[e][lane]);
   return o;
 }
@@ -98,7 +100,8 @@ void compare_tables(const Scene& scene, unsigned seed, double friction_tangent =
         Workspace w(*m);
         list_everything(*m, w);
         set_constants(w);
-        for (int l = 0; l < kGroup; ++l) w.stage.friction_tangent[l] = l == lane ? friction_tangent : 1 - friction_tangent;
+        for (int l = 0; l < kGroup; ++l)
+          w.stage.friction_tangent[l] = l == lane ? friction_tangent : 1 - friction_tangent;
         for (int l = 0; l < kGroup; ++l) fill_lane(w, *m, b, l);
         for (int l = 0; l < kGroup; ++l) {
           if (l == lane) continue;
@@ -109,7 +112,8 @@ void compare_tables(const Scene& scene, unsigned seed, double friction_tangent =
         table->group.evaluate(m->view, w.stage, -1);
         const Outputs o = outputs(w, *m, lane);
         if (first.g.empty()) first = o;
-        // The residual without its Jacobian, and a lane evaluated alone across points: the same bits.
+        // The residual without its Jacobian, and a lane evaluated alone across points: the same
+        // bits.
         table->group.kinematics(m->view, w.stage);
         table->group.residual(m->view, w.stage, -1);
         EXPECT_EQ(outputs(w, *m, lane).g, o.g);
@@ -152,12 +156,14 @@ void compare_tables(const Scene& scene, unsigned seed, double friction_tangent =
 
 TEST_P(KernelTables, EvaluateMatchesTheScalarReferenceWhateverTheNeighboursHold) {
   const unsigned seed = GetParam();
-  compare_tables(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed);
+  compare_tables(
+      testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed);
 }
 
 TEST_P(KernelTables, FrictionBySecantMatchesTheScalarReferenceWhateverTheNeighboursTake) {
   const unsigned seed = GetParam();
-  compare_tables(testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed, 0);
+  compare_tables(
+      testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed, 0);
 }
 
 TEST_P(KernelTables, JointEffectsMatchTheScalarReferenceWhateverTheNeighboursHold) {
@@ -167,7 +173,8 @@ TEST_P(KernelTables, JointEffectsMatchTheScalarReferenceWhateverTheNeighboursHol
 
 TEST_P(KernelTables, LuSolvesAndJudgesItself) {
   const unsigned seed = GetParam();
-  const auto m = compile(testing::random_contacts(seed, 2 + static_cast<int>(seed % 7), ContactLaw::clamped));
+  const auto m =
+      compile(testing::random_contacts(seed, 2 + static_cast<int>(seed % 7), ContactLaw::clamped));
   const int n = m->nv;
   Random random(seed);
   for (const kernels::KernelTable* table : kernels::available_kernels()) {
@@ -182,7 +189,8 @@ TEST_P(KernelTables, LuSolvesAndJudgesItself) {
         const int at = m->pattern.slot[std::size_t(i * n + j)];
         if (at < 0) continue;
         a(i, j) = random.normal() + (i == j ? 5.0 * n : 0.0);
-        for (int l = 0; l < kGroup; ++l) w.stage.A[at][l] = l == lane ? a(i, j) : std::numeric_limits<double>::quiet_NaN();
+        for (int l = 0; l < kGroup; ++l)
+          w.stage.A[at][l] = l == lane ? a(i, j) : std::numeric_limits<double>::quiet_NaN();
       }
       for (int l = 0; l < kGroup; ++l) w.stage.g[i][l] = rhs[i];
     }

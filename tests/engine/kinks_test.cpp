@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exactly at a kink a derivative is finite and that of one side, which a one-sided difference gives as well: of no contact at
-// the first touch, of sticking on the bound of friction, of the inside at a limit and at a clip.
+// Exactly at a kink a derivative is finite and that of one side, which a one-sided difference gives
+// as well: of no contact at the first touch, of sticking on the bound of friction, of the inside at
+// a limit and at a clip.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -38,13 +39,17 @@ struct Case {
   StateLoss loss;
 
   Case(const Scene& scene, Integrator scheme, int steps)
-      : model(scene), options(testing::options(scheme, scene.timestep, 1e-13)), loss(model, steps, 3) {
+      : model(scene),
+        options(testing::options(scheme, scene.timestep, 1e-13)),
+        loss(model, steps, 3) {
     const Batch batch(model, 1);
     in.q = testing::q_of(batch);
     in.v.assign(std::size_t(model.nv()), 0.0);
     in.u.assign(std::size_t(steps), std::vector<double>(std::size_t(model.nu())));
   }
-  [[nodiscard]] RunGradient adjoint() const { return testing::adjoint_of_run(model, options, {in}, loss, 0); }
+  [[nodiscard]] RunGradient adjoint() const {
+    return testing::adjoint_of_run(model, options, {in}, loss, 0);
+  }
 
   /// Derivative towards one side, of second order; `change`(input, e).
   template <class Change>
@@ -84,7 +89,8 @@ TEST_P(Kinks, AtALimitItIsThatOfTheInside) {
   s.name = "slider";
   s.timestep = kStep;
   s.gravity = {0, 0, 0};
-  s.links = {link("slider", JointType::prismatic, {0, 0, 0}, CuboidShape{{0.1, 0.1, 0.1}, {2, 2, 2}}, 1000)};
+  s.links = {link("slider", JointType::prismatic, {0, 0, 0},
+                  CuboidShape{{0.1, 0.1, 0.1}, {2, 2, 2}}, 1000)};
   s.links[0].joint.limits = {{0, 1}};
   s.links[0].joint.limit_stiffness = 1e4;
   s.motors.push_back({"slider_joint", -10, 10, {}});
@@ -115,7 +121,8 @@ TEST_P(Kinks, AtAClipItIsThatOfTheInside) {
   }
 }
 
-/// The push at which the ball begins to slip, to the last bit: the largest that it sticks at, and the next.
+/// The push at which the ball begins to slip, to the last bit: the largest that it sticks at, and
+/// the next.
 TEST_P(Kinks, BetweenStickAndSlipItIsThatOfEitherSide) {
   Scene s = ball_on_ground();
   s.gravity = {0, 0, -9.8};

@@ -18,7 +18,8 @@ using testing::v_of;
 
 const CuboidShape kBox{{0.2, 0.1, 0.06}, {2, 2, 2}};
 
-MotorDescription position_motor(const std::string& joint, double P, double D, double reach = HUGE_VAL) {
+MotorDescription position_motor(const std::string& joint, double P, double D,
+                                double reach = HUGE_VAL) {
   return {joint, -reach, reach, {}, MotorControl::position, P, D};
 }
 
@@ -40,7 +41,8 @@ TEST(PositionMotor, HoldsItsTargetAgainstGravity) {
   const Model model(s);
   EXPECT_EQ(model.u_units()[0], "rad");
   EXPECT_EQ(model.u_units()[1], "m");
-  for (Integrator scheme : {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
+  for (Integrator scheme :
+       {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
     Batch batch(model, 3);
     run(model, batch, scheme, 5e-3, 1500, {0.6, -0.1});
     const double m = model.mass(0), q = q_of(batch, 2)[0];
@@ -101,7 +103,8 @@ TEST(PositionMotor, OneStepIsItsFormulaAtEitherTiming) {
     // End: m (v - v0)/h = P (u - q0 - h v) - D v - m g, or the range where that is beyond it.
     const double free = (m * v0 / h + P * (u - 0.05) - m * g) / (m / h + P * h + D);
     const double wanted = P * (u - 0.05 - h * free) - D * free;
-    const double v = std::abs(wanted) > range ? v0 + h * (std::copysign(range, wanted) / m - g) : free;
+    const double v =
+        std::abs(wanted) > range ? v0 + h * (std::copysign(range, wanted) / m - g) : free;
     EXPECT_NEAR(v_of(a)[0], v, 1e-10);
     if (range > 100) {
       EXPECT_GT(std::abs(v_of(a)[0] - v_of(b)[0]), 1e-2);
@@ -119,13 +122,15 @@ TEST(PositionMotor, TimedAtTheStartTurnsABallJointByItsFormula) {
   const Model model(s);
   Batch batch(model, 1);
   run(model, batch, Integrator::bdf1, 1e-3, 1, {0.2, 0.9, -0.4});
-  const kernels::Vec3<double> way = rotation_log(kernels::Quat<double>{0.8, -0.6, 0, 0} *
-                                                 kernels::quaternion_exp(kernels::Vec3<double>{0.2, 0.9, -0.4}));
+  const kernels::Vec3<double> way =
+      rotation_log(kernels::Quat<double>{0.8, -0.6, 0, 0} *
+                   kernels::quaternion_exp(kernels::Vec3<double>{0.2, 0.9, -0.4}));
   const double error[3] = {way.x, way.y, way.z}, before[3] = {0.3, -0.2, 0.5};
   const double inertia = 0.4 * model.mass(0) * 0.01;
   for (std::size_t k = 0; k < 3; ++k) {
     const double torque = std::clamp(0.4 * error[k] - 0.02 * before[k], -0.3, 0.3);
-    EXPECT_NEAR(v_of(batch)[k], before[k] + 1e-3 * torque / inertia, 1e-10);  // a ball has no gyroscopic torque
+    EXPECT_NEAR(v_of(batch)[k], before[k] + 1e-3 * torque / inertia,
+                1e-10);  // a ball has no gyroscopic torque
   }
 }
 
@@ -154,7 +159,8 @@ TEST(PositionMotor, EveryEnvironmentHasItsOwnTarget) {
   std::vector<double> u;
   for (int e = 0; e < 19; ++e) u.push_back(0.01 * e);
   for (int k = 0; k < 1000; ++k) stepper.step(batch, u);
-  for (int e = 0; e < 19; ++e) EXPECT_NEAR(q_of(batch, e)[0], 0.01 * e - model.mass(0) * 9.8 / 500, 1e-9);
+  for (int e = 0; e < 19; ++e)
+    EXPECT_NEAR(q_of(batch, e)[0], 0.01 * e - model.mass(0) * 9.8 / 500, 1e-9);
 }
 
 TEST(VariedJoints, ADrawnNumberActsLikeAConstantOne) {
@@ -162,7 +168,8 @@ TEST(VariedJoints, ADrawnNumberActsLikeAConstantOne) {
   s.links = {link("arm", JointType::revolute, {0, 0, 0}, kBox, 500),
              link("ball", JointType::spherical, {1, 0, 0}, kBox, 500)};
   s.links[0].joint.axis0 = {0, 1, 0};
-  for (LinkDescription& l : s.links) l.body.pose.position = {0.1, 0, 0}, l.joint.limits = {-0.1, 0.05};
+  for (LinkDescription& l : s.links)
+    l.body.pose.position = {0.1, 0, 0}, l.joint.limits = {-0.1, 0.05};
   s.motors = {position_motor("arm_joint", 1, 0.1), position_motor("ball_joint", 1, 0.1, 0.5)};
   for (MotorTiming timing : {MotorTiming::end, MotorTiming::start})
     for (JointField field : {JointField::damping, JointField::armature, JointField::stiffness,
@@ -172,8 +179,14 @@ TEST(VariedJoints, ADrawnNumberActsLikeAConstantOne) {
       const Scene fixed = varied;
       const bool motor = field >= JointField::P;
       for (const LinkDescription& l : s.links) {
-        RandomizationDescription d{
-            motor ? RandomTarget::motor : RandomTarget::joint_effect, l.joint.name, "", 0, {}, {}, {}, field};
+        RandomizationDescription d{motor ? RandomTarget::motor : RandomTarget::joint_effect,
+                                   l.joint.name,
+                                   "",
+                                   0,
+                                   {},
+                                   {},
+                                   {},
+                                   field};
         d.distribution.a = 0.01, d.distribution.b = 0.4;
         varied.randomizations.push_back(d);
       }
@@ -204,8 +217,8 @@ TEST(VariedJoints, WhatIsNotThereCannotVary) {
   const auto fails = [](RandomTarget target, JointField field, JointType type) {
     Scene s = lift({"car_joint", -1, 1, {}});
     s.links.push_back(link("other", type, {1, 0, 0}, kBox, 500));
-    RandomizationDescription d{target, type == JointType::fixed ? "other_joint" : "car_joint", "", 0, {}, {}, {},
-                               field};
+    RandomizationDescription d{
+        target, type == JointType::fixed ? "other_joint" : "car_joint", "", 0, {}, {}, {}, field};
     s.randomizations = {d};
     EXPECT_THROW(Model{s}, InputError) << to_string(field);
   };

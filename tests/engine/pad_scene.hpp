@@ -23,10 +23,12 @@ inline Shape shape_of(PrimitiveShape s) {
 /// A pad on an arm of two joints, and a body that floats in it (a half-space stands still).
 inline Scene pad_scene(PrimitiveShape shape, ContactLaw law, Pad pad) {
   Scene s;
-  s.links = {link("arm", JointType::revolute, {0, 0, 0}, CuboidShape{{0.02, 0.02, 0.1}, {2, 2, 2}}, 500),
-             link("hand", JointType::free, {0.01, 0, 0.05}, CuboidShape{{0.06, 0.06, 0.02}, {2, 2, 2}}, 500),
-             link("thing", shape == PrimitiveShape::plane ? JointType::fixed : JointType::free, {0.013, -0.025, 0.057},
-                           shape_of(shape), 300)};
+  s.links = {
+      link("arm", JointType::revolute, {0, 0, 0}, CuboidShape{{0.02, 0.02, 0.1}, {2, 2, 2}}, 500),
+      link("hand", JointType::free, {0.01, 0, 0.05}, CuboidShape{{0.06, 0.06, 0.02}, {2, 2, 2}},
+           500),
+      link("thing", shape == PrimitiveShape::plane ? JointType::fixed : JointType::free,
+           {0.013, -0.025, 0.057}, shape_of(shape), 300)};
   s.links[1].parent = 0;
   s.links[0].joint.axis0 = {0, 1, 0};
   s.links[1].body.pose = {{0.003, -0.004, 0.01}, {0.6, 0.8, 0, 0}};
@@ -44,7 +46,8 @@ inline Scene pad_scene(PrimitiveShape shape, ContactLaw law, Pad pad) {
       p.position = {x, y, 0.004 * std::sin(100 * x)};
       p.normal = {R.m[0][2], R.m[1][2], R.m[2][2]}, p.axis0 = {R.m[0][0], R.m[1][0], R.m[2][0]};
       p.axis1 = {R.m[0][1], R.m[1][1], R.m[2][1]};
-      p.factors = {random.uniform(0.5, 2), random.uniform(0.5, 2), random.uniform(0.5, 2), random.uniform(0.5, 2)};
+      p.factors = {random.uniform(0.5, 2), random.uniform(0.5, 2), random.uniform(0.5, 2),
+                   random.uniform(0.5, 2)};
       t.points.push_back(p);
     }
     t.pressure_sign = 1;

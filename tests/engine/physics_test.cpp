@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Closed forms and invariants: free fall, tumbling, rest, rolling, signs of shear, uniform pressure, first touches.
+// Closed forms and invariants: free fall, tumbling, rest, rolling, signs of shear, uniform
+// pressure, first touches.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -36,18 +37,21 @@ TEST(Physics, FreeFallIsAParabola) {
 TEST(Physics, TumblingKeepsAngularMomentumToOrderTwo) {
   Scene s;
   s.gravity = {0, 0, 0};
-  s.links = {link("body", JointType::free, {0, 0, 0}, CuboidShape{{0.3, 0.2, 0.1}, {2, 2, 2}}, 500)};
+  s.links = {
+      link("body", JointType::free, {0, 0, 0}, CuboidShape{{0.3, 0.2, 0.1}, {2, 2, 2}}, 500)};
   s.initial.push_back({"body_joint", {}, {0, 0, 0, 0.05, 4, 0.05}, {}});  // about the middle axis
   const Model model(s);
   const double m = model.mass(0);
-  const double inertia[3] = {m / 12 * (0.04 + 0.01), m / 12 * (0.09 + 0.01), m / 12 * (0.09 + 0.04)};
+  const double inertia[3] = {m / 12 * (0.04 + 0.01), m / 12 * (0.09 + 0.01),
+                             m / 12 * (0.09 + 0.04)};
   const auto drift = [&](Integrator scheme, int steps) {
     Stepper stepper(model, testing::options(scheme, 2.0 / steps));
     Batch batch(model, 1);
     const auto momentum = [&] {
       const std::vector<double> q = q_of(batch), v = v_of(batch);
-      const kernels::Vec3<double> L = to_matrix(kernels::Quat<double>{q[3], q[4], q[5], q[6]}) *
-                                      kernels::Vec3<double>{inertia[0] * v[3], inertia[1] * v[4], inertia[2] * v[5]};
+      const kernels::Vec3<double> L =
+          to_matrix(kernels::Quat<double>{q[3], q[4], q[5], q[6]}) *
+          kernels::Vec3<double>{inertia[0] * v[3], inertia[1] * v[4], inertia[2] * v[5]};
       return L;
     };
     const kernels::Vec3<double> start = momentum();
@@ -75,7 +79,8 @@ TEST(Physics, SphereRestsWhereTheSpringCarriesIt) {
 }
 
 TEST(Physics, BallRollsWithoutSlippingUnderAMovingPad) {
-  // Viscous stick needs a little creep; with a heavy pad and a light ball the contact speeds match to the creep.
+  // Viscous stick needs a little creep; with a heavy pad and a light ball the contact speeds match
+  // to the creep.
   Scene s = testing::rolling_ball(false, 8);
   const Model model(s);
   Stepper stepper(model);
@@ -83,8 +88,8 @@ TEST(Physics, BallRollsWithoutSlippingUnderAMovingPad) {
   for (int k = 0; k < 140; ++k) stepper.step(batch, testing::rolling_ball_control(k));
   ASSERT_EQ(batch.failed_count(), 0);
   const std::vector<double> v = v_of(batch), q = q_of(batch);
-  const kernels::Vec3<double> omega =
-      to_matrix(kernels::Quat<double>{q[6], q[7], q[8], q[9]}) * kernels::Vec3<double>{v[6], v[7], v[8]};
+  const kernels::Vec3<double> omega = to_matrix(kernels::Quat<double>{q[6], q[7], q[8], q[9]}) *
+                                      kernels::Vec3<double>{v[6], v[7], v[8]};
   EXPECT_GT(v[0], 0.05);
   const double r = 0.02;
   EXPECT_NEAR(v[3] + omega.y * r, v[0], 0.02 * v[0]);  // top of the ball moves with the pad
@@ -95,7 +100,8 @@ TEST(Physics, BallRollsWithoutSlippingUnderAMovingPad) {
 TEST(Physics, ShearOpposesSliding) {
   Scene s;
   s.gravity = {0, 0, 0};
-  s.links = {link("pad", JointType::translational, {0, 0, 0.0245}, CuboidShape{{0.05, 0.05, 0.01}, {5, 5, 3}}, 1000),
+  s.links = {link("pad", JointType::translational, {0, 0, 0.0245},
+                  CuboidShape{{0.05, 0.05, 0.01}, {5, 5, 3}}, 1000),
              link("ball", JointType::fixed, {0, 0, 0}, SphereShape{0.02}, 1000)};
   TactileDescription t;
   t.name = "pad";
@@ -108,9 +114,7 @@ TEST(Physics, ShearOpposesSliding) {
   Readout readout(model);
   Batch batch(model, 1);
   std::vector<double> force(3 * 441);
-  const struct {
-    double vx, vy;
-  } kMotions[] = {{0.1, 0}, {-0.1, 0}, {0, 0.1}, {0, -0.1}};
+  const struct { double vx, vy; } kMotions[] = {{0.1, 0}, {-0.1, 0}, {0, 0.1}, {0, -0.1}};
   for (const auto& motion : kMotions) {
     batch.set_state(0, std::vector<double>{0, 0, 0}, std::vector<double>{motion.vx, motion.vy, 0});
     readout.tactile(batch, 0, 0, force);
@@ -128,8 +132,10 @@ TEST(Physics, ShearOpposesSliding) {
 
 TEST(Physics, FlatOnFlatIsUniform) {
   Scene s;
-  s.links = {link("pad", JointType::translational, {0, 0, 0.0295}, CuboidShape{{0.03, 0.03, 0.01}, {3, 3, 3}}, 1000),
-             link("block", JointType::fixed, {0, 0, 0}, CuboidShape{{0.1, 0.1, 0.05}, {3, 3, 3}}, 1000)};
+  s.links = {
+      link("pad", JointType::translational, {0, 0, 0.0295},
+           CuboidShape{{0.03, 0.03, 0.01}, {3, 3, 3}}, 1000),
+      link("block", JointType::fixed, {0, 0, 0}, CuboidShape{{0.1, 0.1, 0.05}, {3, 3, 3}}, 1000)};
   TactileDescription t;
   t.name = "pad";
   t.body = "pad";
@@ -167,7 +173,8 @@ TEST(Physics, FieldAndObjectMovingTogetherReadNoShear) {
   q[2] = -0.009;  // pressed
   const Vector3 rest[2] = {s.links[0].joint.pose.position, s.links[1].joint.pose.position};
   for (std::size_t b = 0; b < 2; ++b) {
-    const kernels::Vec3<double> at = {rest[b][0] + q[7 * b], rest[b][1] + q[7 * b + 1], rest[b][2] + q[7 * b + 2]};
+    const kernels::Vec3<double> at = {rest[b][0] + q[7 * b], rest[b][1] + q[7 * b + 1],
+                                      rest[b][2] + q[7 * b + 2]};
     const kernels::Vec3<double> linear = shift + cross(omega, at);
     const double values[6] = {linear.x, linear.y, linear.z, omega.x, omega.y, omega.z};
     for (std::size_t i = 0; i < 6; ++i) v[6 * b + i] = values[i];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Seeded random trees with joint effects, motors, massless bodies, and contacts with bodies fixed in the world.
+// Seeded random trees with joint effects, motors, massless bodies, and contacts with bodies fixed
+// in the world.
 #pragma once
 
 #include <cmath>
@@ -8,7 +9,8 @@
 
 namespace tangere::testing {
 
-/// Damping, armature, a spring and limits, each with probability `share`; coordinates of tests lie around the limits.
+/// Damping, armature, a spring and limits, each with probability `share`; coordinates of tests lie
+/// around the limits.
 inline JointEffects random_effects(Random& random, double share) {
   const auto maybe = [&](double low, double high) {
     const double x = random.uniform(low, high);
@@ -54,7 +56,8 @@ inline Scene random_machine(unsigned seed, int links) {
       motor.control = MotorControl::position;
       motor.P = random.uniform(1, 10);
       motor.D = random.uniform(0, 0.1);
-      motor.low = kind == 2 ? -HUGE_VAL : random.uniform(-2, -0.5);  // clipped about as often as not
+      motor.low =
+          kind == 2 ? -HUGE_VAL : random.uniform(-2, -0.5);  // clipped about as often as not
       motor.high = kind == 2 ? HUGE_VAL : random.uniform(0.5, 2);
     }
     s.motors.push_back(motor);
@@ -72,17 +75,22 @@ inline Scene random_machine_on_a_base(unsigned seed, int links) {
   s.links[0].body.shape = CuboidShape{{0.1, 0.08, 0.12}, {4, 3, 3}};
   s.links[1].joint.type = JointType::free;
   s.links[1].joint.rest.clear();
-  std::erase_if(s.motors, [&](const MotorDescription& m) { return m.joint == s.links[1].joint.name; });
+  std::erase_if(s.motors,
+                [&](const MotorDescription& m) { return m.joint == s.links[1].joint.name; });
   for (LinkDescription& l : s.links) l.body.density = std::max(l.body.density, 100.0);
   std::vector<char> stands = {1};  // moves with the world
   for (std::size_t i = 1; i < s.links.size(); ++i) {
     const LinkDescription& l = s.links[i];
-    stands.push_back(l.joint.type == JointType::fixed && (l.parent < 0 || stands[std::size_t(l.parent)] != 0));
+    stands.push_back(l.joint.type == JointType::fixed &&
+                     (l.parent < 0 || stands[std::size_t(l.parent)] != 0));
     if (stands[i] != 0) continue;
-    const ContactCoefficients c = {random.uniform(50, 500), random.uniform(0.1, 2), random.uniform(0.2, 1.2), 1};
-    s.pair_contacts.push_back({s.links[0].body.name, l.body.name, c, ContactLaw::clamped, 1e-5, {}});
+    const ContactCoefficients c = {random.uniform(50, 500), random.uniform(0.1, 2),
+                                   random.uniform(0.2, 1.2), 1};
+    s.pair_contacts.push_back(
+        {s.links[0].body.name, l.body.name, c, ContactLaw::clamped, 1e-5, {}});
     if (std::holds_alternative<CuboidShape>(l.body.shape))
-      s.pair_contacts.push_back({l.body.name, s.links[0].body.name, c, ContactLaw::clamped, 1e-5, {}});
+      s.pair_contacts.push_back(
+          {l.body.name, s.links[0].body.name, c, ContactLaw::clamped, 1e-5, {}});
   }
   return s;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes for tests, built in code: seeded random trees with every joint kind, touching bodies, ground.
+// Scenes for tests, built in code: seeded random trees with every joint kind, touching bodies,
+// ground.
 #pragma once
 
 #include "engine/scene.hpp"
@@ -21,14 +22,16 @@ inline Shape random_shape(Random& random) {
     case 2: return CapsuleShape{random.uniform(0.02, 0.08), random.uniform(0.02, 0.05), 3, 5};
     default: break;
   }
-  return CuboidShape{{random.uniform(0.04, 0.1), random.uniform(0.04, 0.1), random.uniform(0.04, 0.1)}, {3, 4, 3}};
+  return CuboidShape{
+      {random.uniform(0.04, 0.1), random.uniform(0.04, 0.1), random.uniform(0.04, 0.1)}, {3, 4, 3}};
 }
 
 /// A tree of `links` links: random joints, frames, shapes and densities, no contacts.
 inline Scene random_tree(unsigned seed, int links) {
   Random random(seed);
-  constexpr JointType kTypes[] = {JointType::fixed,         JointType::revolute, JointType::prismatic, JointType::planar,
-                                  JointType::translational, JointType::free2d,   JointType::spherical, JointType::free};
+  constexpr JointType kTypes[] = {
+      JointType::fixed,         JointType::revolute, JointType::prismatic, JointType::planar,
+      JointType::translational, JointType::free2d,   JointType::spherical, JointType::free};
   Scene s;
   s.name = "tree";
   s.gravity = array(random.vector(6));
@@ -52,8 +55,8 @@ inline Scene random_tree(unsigned seed, int links) {
   return s;
 }
 
-/// The same with every body that has contact points touching every other it can move against, and the ground in reach. A
-/// half-space is fixed in the world, or to the first link.
+/// The same with every body that has contact points touching every other it can move against, and
+/// the ground in reach. A half-space is fixed in the world, or to the first link.
 inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
   Scene s = random_tree(seed, links);
   Random random(seed + 1000);
@@ -64,8 +67,9 @@ inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
   wall.body.shape = PlaneShape{};
   s.ground = GroundDescription{array(random.vector(0.02)), array(random.direction())};
   const auto coefficients = [&] {
-    return ContactCoefficients{random.uniform(50, 500), random.uniform(0.1, 2), random.uniform(0.2, 1.2),
-                               law == ContactLaw::linear ? random.uniform(0, 0.1) : random.uniform(0, 10)};
+    return ContactCoefficients{
+        random.uniform(50, 500), random.uniform(0.1, 2), random.uniform(0.2, 1.2),
+        law == ContactLaw::linear ? random.uniform(0, 0.1) : random.uniform(0, 10)};
   };
   // The link that a body moves with, -1 the world: bodies on fixed joints follow what they hang on.
   std::vector<int> moves_with;
@@ -75,13 +79,15 @@ inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
                                                           : moves_with[std::size_t(l.parent)]);
   for (std::size_t a = 0; a < s.links.size(); ++a) {
     const BodyDescription& first = s.links[a].body;
-    if (moves_with[a] >= 0) s.ground_contacts.push_back({first.name, coefficients(), law, 1e-5, {}});
+    if (moves_with[a] >= 0)
+      s.ground_contacts.push_back({first.name, coefficients(), law, 1e-5, {}});
     if (std::holds_alternative<SphereShape>(first.shape)) continue;
     if (moves_with[a] != (wall.parent < 0 ? -1 : moves_with[std::size_t(wall.parent)]))
       s.pair_contacts.push_back({first.name, wall.body.name, coefficients(), law, 1e-5, {}});
     for (std::size_t b = 0; b < s.links.size(); ++b)
       if (moves_with[a] != moves_with[b])
-        s.pair_contacts.push_back({first.name, s.links[b].body.name, coefficients(), law, 1e-5, {}});
+        s.pair_contacts.push_back(
+            {first.name, s.links[b].body.name, coefficients(), law, 1e-5, {}});
   }
   s.links.push_back(wall);
   return s;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tactile fields and end effectors in reverse, against differences of what is read: every shape, law and kind of pad.
+// Tactile fields and end effectors in reverse, against differences of what is read: every shape,
+// law and kind of pad.
 #include <gtest/gtest.h>
 
 #include "engine/readout.hpp"
@@ -53,7 +54,8 @@ class Reading {
     for (auto* x : {&out.q, &out.v}) x->assign(std::size_t(model_.nv() * kBlock), 0.0);
     out.parameters.assign(std::size_t(parameter_rows(model_.compiled()) * kBlock), 0.0);
     pullback.field(lane, 0, frame.tiles(), cotangents, out.parameters);
-    for (int k = 0; k < 2; ++k) pullback.variable(lane, k, std::span(of_variables_).subspan(3 * std::size_t(k), 3));
+    for (int k = 0; k < 2; ++k)
+      pullback.variable(lane, k, std::span(of_variables_).subspan(3 * std::size_t(k), 3));
     pullback.finish(out);
     return frame.tiles().size();
   }
@@ -100,15 +102,20 @@ TEST_P(FieldPullback, MatchesDifferences) {
     double scale_q = 0, scale_v = 0;
     for (double x : c.q) scale_q = std::max(scale_q, std::abs(x));
     for (double x : c.v) scale_v = std::max(scale_v, std::abs(x));
-    const auto compare = [&](const std::function<double(double)>& f, double got, double scale, double start, const char* what) {
+    const auto compare = [&](const std::function<double(double)>& f, double got, double scale,
+                             double start, const char* what) {
       const double right = (f(start) - f(0)) / start, left = (f(0) - f(-start)) / start;
-      if (std::abs(right - left) > 1e-4 * scale) return;  // a kink, or strong bending: points that touch come and go
+      if (std::abs(right - left) > 1e-4 * scale)
+        return;  // a kink, or strong bending: points that touch come and go
       EXPECT_NEAR(0.5 * (right + left), got, 2e-6 * scale) << what;
       ++compared;
     };
     for (int i = 0; i < model.nv(); ++i) {
-      compare([&](double e) { return reading.value({testing::moved(model, s.q, i, e), s.v}); },
-              c.q[std::size_t(i * kBlock + lane)], scale_q, 1e-8, "q");
+      compare(
+          [&](double e) {
+            return reading.value({testing::moved(model, s.q, i, e), s.v});
+          },
+          c.q[std::size_t(i * kBlock + lane)], scale_q, 1e-8, "q");
       compare(
           [&](double e) {
             State other = s;
@@ -145,12 +152,13 @@ TEST_P(FieldPullback, MatchesDifferences) {
   EXPECT_TRUE(shape == PrimitiveShape::plane || sizes > 3) << sizes;
 }
 
-INSTANTIATE_TEST_SUITE_P(All, FieldPullback,
-                         ::testing::Combine(::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid,
-                                                              PrimitiveShape::plane, PrimitiveShape::cylinder,
-                                                              PrimitiveShape::capsule),
-                                            ::testing::Values(ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear),
-                                            ::testing::Values(Pad::flat, Pad::skewed, Pad::curved)));
+INSTANTIATE_TEST_SUITE_P(
+    All, FieldPullback,
+    ::testing::Combine(
+        ::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid, PrimitiveShape::plane,
+                          PrimitiveShape::cylinder, PrimitiveShape::capsule),
+        ::testing::Values(ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear),
+        ::testing::Values(Pad::flat, Pad::skewed, Pad::curved)));
 
 }  // namespace
 }  // namespace tangere

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Against the published simulator's rolling ball: fields at its states, its states in our residual, its trajectory.
+// Against the published simulator's rolling ball: fields at its states, its states in our residual,
+// its trajectory.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -39,13 +40,16 @@ class Reference : public ::testing::Test {
   Model model{testing::rolling_ball(true)};
   Table u = read("u.csv"), q = read("q_tight.csv"), rate = read("qdot_tight.csv");
 
-  /// Their coordinates in ours: rotation vector to quaternion, ṙ to the body's angular velocity ω = J_r(r) ṙ.
+  /// Their coordinates in ours: rotation vector to quaternion, ṙ to the body's angular velocity ω =
+  /// J_r(r) ṙ.
   void state(std::size_t row, std::vector<double>& our_q, std::vector<double>& our_v) const {
     our_q.assign(10, 0);
     our_v.assign(9, 0);
     for (std::size_t i = 0; i < 6; ++i) our_q[i] = q[row][i], our_v[i] = rate[row][i];
-    // Their rotation vector grows without bound; the quaternion exponential's series is for |r| ≤ 2π and exact there.
-    const Vec3<double> r = {q[row][6], q[row][7], q[row][8]}, w = {rate[row][6], rate[row][7], rate[row][8]};
+    // Their rotation vector grows without bound; the quaternion exponential's series is for |r| ≤
+    // 2π and exact there.
+    const Vec3<double> r = {q[row][6], q[row][7], q[row][8]},
+                       w = {rate[row][6], rate[row][7], rate[row][8]};
     ASSERT_LT(dot(r, r), 39.0);
     const Quat<double> turn = kernels::quaternion_exp(r);
     our_q[6] = turn.w, our_q[7] = turn.x, our_q[8] = turn.y, our_q[9] = turn.z;
@@ -59,7 +63,8 @@ class Reference : public ::testing::Test {
 };
 
 TEST_F(Reference, TactileFieldsAtItsStatesAgreeToRounding) {
-  const Table fields = read("tactile_tight.csv"), points = read("tactile_points.csv"), sums = read("tactile_sums_tight.csv");
+  const Table fields = read("tactile_tight.csv"), points = read("tactile_points.csv"),
+              sums = read("tactile_sums_tight.csv");
   ASSERT_EQ(fields.size(), 70U);
   ASSERT_EQ(points.size(), 400U);
   Batch batch(model, 1);
@@ -79,7 +84,8 @@ TEST_F(Reference, TactileFieldsAtItsStatesAgreeToRounding) {
       }
     double squares = 0, nonzero = 0;
     for (std::size_t p = 0; p < 40000; ++p) {
-      const double n = force[3 * p] * force[3 * p] + force[3 * p + 1] * force[3 * p + 1] + force[3 * p + 2] * force[3 * p + 2];
+      const double n = force[3 * p] * force[3 * p] + force[3 * p + 1] * force[3 * p + 1] +
+                       force[3 * p + 2] * force[3 * p + 2];
       squares += n;
       nonzero += n > 0;
     }
@@ -90,7 +96,8 @@ TEST_F(Reference, TactileFieldsAtItsStatesAgreeToRounding) {
   EXPECT_LT(worst, 1e-15 * 1e2 * peak);
 }
 
-/// Their row t + 1 in our BDF2 residual, rotation chart centred on row t. Planar rows only: there both charts coincide.
+/// Their row t + 1 in our BDF2 residual, rotation chart centred on row t. Planar rows only: there
+/// both charts coincide.
 TEST_F(Reference, ItsStatesSolveOurResidual) {
   const CompiledModel& m = model.compiled();
   testing::StageBuffers<double> b(m);
@@ -102,10 +109,13 @@ TEST_F(Reference, ItsStatesSolveOurResidual) {
     state(t - 1, before_q, before_v);
     state(t, now_q, now_v);
     state(t + 1, next_q, next_v);
-    const auto quat = [](const std::vector<double>& x) { return Quat<double>{x[6], x[7], x[8], x[9]}; };
+    const auto quat = [](const std::vector<double>& x) {
+      return Quat<double>{x[6], x[7], x[8], x[9]};
+    };
     const Vec3<double> turn = rotation_log(conjugate(quat(now_q)) * quat(next_q));
     const Vec3<double> history = rotation_log(conjugate(quat(now_q)) * quat(before_q));
-    const double turns[3] = {turn.x, turn.y, turn.z}, histories[3] = {history.x, history.y, history.z};
+    const double turns[3] = {turn.x, turn.y, turn.z},
+                 histories[3] = {history.x, history.y, history.z};
     for (std::size_t i = 0; i < 10; ++i) b.centre[i] = now_q[i];
     for (std::size_t i = 0; i < 9; ++i) {
       b.x[i] = i < 6 ? next_q[i] - now_q[i] : turns[i - 6];
@@ -118,26 +128,33 @@ TEST_F(Reference, ItsStatesSolveOurResidual) {
     const kernels::PairContact& pair = m.pairs[0];
     bool slips = false;
     const kernels::Mat3<double> turned = to_matrix(quat(next_q));
-    const kernels::Frame<double> pad = {kernels::diagonal(1.0), {next_q[0], next_q[1], 0.06 + next_q[2]}};
+    const kernels::Frame<double> pad = {kernels::diagonal(1.0),
+                                        {next_q[0], next_q[1], 0.06 + next_q[2]}};
     const Vec3<double> centre = Vec3<double>{next_q[3], next_q[4], 0.02 + next_q[5]} - pad.p;
     const Vec3<double> omega = turned * Vec3<double>{next_v[6], next_v[7], next_v[8]};
-    const Vec3<double> relative = Vec3<double>{next_v[3], next_v[4], next_v[5]} - Vec3<double>{next_v[0], next_v[1], next_v[2]};
+    const Vec3<double> relative = Vec3<double>{next_v[3], next_v[4], next_v[5]} -
+                                  Vec3<double>{next_v[0], next_v[1], next_v[2]};
     const kernels::LawParameters<double> law = {5, 1, 1, 1, ContactLaw::paper, 0};
     std::vector<double> theirs = b.g;
     for (int k = 0; k < pair.n_points; ++k) {
       const Vec3<double> xi = {pair.points[3 * k], pair.points[3 * k + 1], pair.points[3 * k + 2]};
-      const auto p = point_contact(kernels::SphereDistance<double>{pair.size.x}, law, kernels::diagonal(1.0), centre, omega,
-                                   relative - cross(omega, centre), xi);
+      const auto p =
+          point_contact(kernels::SphereDistance<double>{pair.size.x}, law, kernels::diagonal(1.0),
+                        centre, omega, relative - cross(omega, centre), xi);
       if (!(p.d < 0)) continue;
       slips = slips || p.tangential.slip > 0;
-      // Their bound takes the norm of the normal wrench at the pad's origin, torque and all. Nothing else differs here:
-      // the pad does not turn, so the points of velocity and of force make no difference to any dof.
+      // Their bound takes the norm of the normal wrench at the pad's origin, torque and all.
+      // Nothing else differs here: the pad does not turn, so the points of velocity and of force
+      // make no difference to any dof.
       const Vec3<double> arm = cross(xi, p.n);
-      const double speed = std::sqrt(dot(p.vt, p.vt)), bound = law.mu * std::sqrt(1 + dot(arm, arm)) * p.normal.bound;
+      const double speed = std::sqrt(dot(p.vt, p.vt)),
+                   bound = law.mu * std::sqrt(1 + dot(arm, arm)) * p.normal.bound;
       const double scale = law.kt * speed > bound ? bound / speed : law.kt;
-      const Vec3<double> more = (p.tangential.scale - scale) * p.vt;  // their force on the pad less ours
+      const Vec3<double> more =
+          (p.tangential.scale - scale) * p.vt;  // their force on the pad less ours
       const Vec3<double> torque = transposed_times(turned, cross(p.x2 - centre, more));
-      const double change[9] = {-more.x, -more.y, -more.z, more.x, more.y, more.z, torque.x, torque.y, torque.z};
+      const double change[9] = {-more.x, -more.y,  -more.z,  more.x,  more.y,
+                                more.z,  torque.x, torque.y, torque.z};
       for (std::size_t i = 0; i < 9; ++i) theirs[i] += change[i];
     }
     for (double g : theirs) worst_switched = std::max(worst_switched, std::abs(g));
@@ -170,9 +187,9 @@ TEST_F(Reference, FirstStepIsTheSameSdirkStep) {
 }
 
 TEST_F(Reference, PlanarTrajectoryAgreesWithinTheFrictionDifference) {
-  // The bounds differ by √(1 + |x × n|²) - 1 ≤ 3e-4 of a slipping point's friction (|x| ≤ 25 mm), at most a few of
-  // which slip at a time. 0.2 N acting through it for 0.6 s on 25 g with damping 1 N s/m moves the pad by under 1e-5 m;
-  // what is measured is far less because slip is rare.
+  // The bounds differ by √(1 + |x × n|²) - 1 ≤ 3e-4 of a slipping point's friction (|x| ≤ 25 mm),
+  // at most a few of which slip at a time. 0.2 N acting through it for 0.6 s on 25 g with damping 1
+  // N s/m moves the pad by under 1e-5 m; what is measured is far less because slip is rare.
   StepperOptions o;
   o.tolerance = 1e-12;
   Stepper stepper(model, o);
@@ -189,8 +206,8 @@ TEST_F(Reference, PlanarTrajectoryAgreesWithinTheFrictionDifference) {
 }
 
 TEST_F(Reference, LaterRowsDifferByNoMoreThanOurStepSize) {
-  // From row 200 on the charts differ, so the two discretisations do: bounded by how far our own answer moves when h is
-  // halved.
+  // From row 200 on the charts differ, so the two discretisations do: bounded by how far our own
+  // answer moves when h is halved.
   const auto run = [&](int refine) {
     StepperOptions o;
     o.tolerance = 1e-11;

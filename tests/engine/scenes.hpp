@@ -8,7 +8,8 @@
 
 namespace tangere::testing {
 
-inline LinkDescription link(const std::string& name, JointType type, Vector3 at, Shape shape, double density) {
+inline LinkDescription link(const std::string& name, JointType type, Vector3 at, Shape shape,
+                            double density) {
   LinkDescription l;
   l.name = name;
   l.joint.name = name + "_joint";
@@ -20,7 +21,8 @@ inline LinkDescription link(const std::string& name, JointType type, Vector3 at,
   return l;
 }
 
-/// A pad above a light ball on the ground. `published`: laws and single-precision numbers of the published simulator.
+/// A pad above a light ball on the ground. `published`: laws and single-precision numbers of the
+/// published simulator.
 inline Scene rolling_ball(bool published = false, int resolution = 200) {
   const auto number = [published](double x) { return published ? double(float(x)) : x; };
   Scene s;
@@ -28,7 +30,8 @@ inline Scene rolling_ball(bool published = false, int resolution = 200) {
   s.integrator = Integrator::bdf2;
   s.timestep = number(5e-3);
   s.ground = GroundDescription{};
-  s.links = {link("pad", JointType::translational, {0, 0, 0.06}, CuboidShape{{0.05, 0.05, 0.01}, {20, 20, 20}}, 1000),
+  s.links = {link("pad", JointType::translational, {0, 0, 0.06},
+                  CuboidShape{{0.05, 0.05, 0.01}, {20, 20, 20}}, 1000),
              link("ball", JointType::free, {0, 0, 0.02}, SphereShape{number(0.02)}, 1)};
   s.links[0].joint.damping = 1;
   s.motors.push_back({"pad_joint", -1, 1, {}});
@@ -41,7 +44,12 @@ inline Scene rolling_ball(bool published = false, int resolution = 200) {
   t.body = "pad";
   t.coefficients = {1, number(0.01), 2, number(0.003)};
   t.law = law;
-  t.array = {{-0.025, 0.025, -0.005}, {0.025, -0.025, -0.005}, {0, -1, 0}, {1, 0, 0}, resolution, resolution};
+  t.array = {{-0.025, 0.025, -0.005},
+             {0.025, -0.025, -0.005},
+             {0, -1, 0},
+             {1, 0, 0},
+             resolution,
+             resolution};
   s.sensors.push_back(t);
   return s;
 }
@@ -55,14 +63,16 @@ inline std::vector<double> rolling_ball_control(int step) {
   return {0, -0.2, 0.2};
 }
 
-/// Another scene: two balls of different radius under a yawed pad, other points, laws, step and scheme.
+/// Another scene: two balls of different radius under a yawed pad, other points, laws, step and
+/// scheme.
 inline Scene two_balls() {
   Scene s;
   s.name = "two_balls";
   s.integrator = Integrator::sdirk2;
   s.timestep = 2e-3;
   s.ground = GroundDescription{{0, 0, -0.01}, {0, 0, 1}};
-  s.links = {link("plate", JointType::translational, {0.01, 0, 0.06}, CuboidShape{{0.1, 0.06, 0.012}, {9, 7, 3}}, 400),
+  s.links = {link("plate", JointType::translational, {0.01, 0, 0.06},
+                  CuboidShape{{0.1, 0.06, 0.012}, {9, 7, 3}}, 400),
              link("large", JointType::free, {-0.02, 0.004, 0.02}, SphereShape{0.03}, 300),
              link("small", JointType::free, {0.035, -0.003, 0.0193}, SphereShape{0.0293}, 350)};
   s.links[0].joint.damping = 2;

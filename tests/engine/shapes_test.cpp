@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a body's shape comes to: mass by integration along its axis, where its contact points lie, how it rests.
+// What a body's shape comes to: mass by integration along its axis, where its contact points lie,
+// how it rests.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +29,10 @@ std::array<double, 3> integrate(double density, const std::vector<double>& piece
   for (std::size_t p = 0; p + 1 < pieces.size(); ++p)
     for (int k = 0; k <= 2 * kCells; ++k) {
       const double width = pieces[p + 1] - pieces[p], z = pieces[p] + width * k / (2 * kCells);
-      const double weight = width / (6 * kCells) * (k == 0 || k == 2 * kCells ? 1 : k % 2 == 1 ? 4 : 2);
+      const double weight = width / (6 * kCells) *
+                            (k == 0 || k == 2 * kCells ? 1
+                             : k % 2 == 1              ? 4
+                                                       : 2);
       const double area = M_PI * R(z) * R(z), disc = density * weight * area;
       sum[0] += disc;
       sum[1] += disc * (R(z) * R(z) / 4 + z * z);
@@ -48,14 +52,18 @@ void expect_mass(const Shape& shape, double density, const std::array<double, 3>
 }
 
 TEST(Shapes, MassAndInertiaAreTheIntegrals) {
-  const auto cap = [](double r, double beyond) { return std::sqrt(std::max(0.0, r * r - beyond * beyond)); };
-  expect_mass(CylinderShape{0.3, 0.07}, 800, integrate(800, {-0.15, 0.15}, [](double) { return 0.07; }));
+  const auto cap = [](double r, double beyond) {
+    return std::sqrt(std::max(0.0, r * r - beyond * beyond));
+  };
+  expect_mass(CylinderShape{0.3, 0.07}, 800,
+              integrate(800, {-0.15, 0.15}, [](double) { return 0.07; }));
   for (const double length : {0.3, 0.01})
-    expect_mass(CapsuleShape{length, 0.07}, 800,
-                integrate(800, {-length / 2 - 0.07, -length / 2, length / 2, length / 2 + 0.07}, [&](double z) {
-                  return cap(0.07, std::max(0.0, std::abs(z) - length / 2));
-                }));
-  expect_mass(SphereShape{0.07}, 800, integrate(800, {-0.07, 0.07}, [&](double z) { return cap(0.07, z); }));
+    expect_mass(
+        CapsuleShape{length, 0.07}, 800,
+        integrate(800, {-length / 2 - 0.07, -length / 2, length / 2, length / 2 + 0.07},
+                  [&](double z) { return cap(0.07, std::max(0.0, std::abs(z) - length / 2)); }));
+  expect_mass(SphereShape{0.07}, 800,
+              integrate(800, {-0.07, 0.07}, [&](double z) { return cap(0.07, z); }));
   EXPECT_EQ(mass_properties(PlaneShape{}, 800).mass, 0);
 }
 
@@ -64,7 +72,8 @@ void expect_on_surface(const Shape& shape, PrimitiveShape kind, const kernels::V
   const std::vector<double> p = contact_points(shape);
   for (std::size_t k = 0; k < p.size(); k += 3)
     kernels::with_distance<double>(kind, size, [&](const auto& s) {
-      EXPECT_NEAR(distance_at(s, kernels::Vec3<double>{p[k], p[k + 1], p[k + 2]}).d, 0, 1e-16) << "point " << k / 3;
+      EXPECT_NEAR(distance_at(s, kernels::Vec3<double>{p[k], p[k + 1], p[k + 2]}).d, 0, 1e-16)
+          << "point " << k / 3;
     });
 }
 
@@ -122,13 +131,15 @@ TEST(Shapes, ACylinderRestsOnAPlane) {
   for (const double v : v_of(batch)) EXPECT_NEAR(v, 0, 1e-8);
 }
 
-/// A plate on two parallel rods that cannot move: it sinks until their four lines of points carry it.
+/// A plate on two parallel rods that cannot move: it sinks until their four lines of points carry
+/// it.
 TEST(Shapes, APlateRestsOnRods) {
   for (const Shape& rod : {Shape(CylinderShape{0.4, 0.02}), Shape(CapsuleShape{0.4, 0.02})}) {
     Scene s;
     s.links = {link("left", JointType::fixed, {-0.05, 0, 0}, rod, 1),
                link("right", JointType::fixed, {0.05, 0, 0}, rod, 1),
-               link("plate", JointType::free, {0, 0, 0.0249}, CuboidShape{{0.1, 0.1, 0.01}, {3, 3, 2}}, 1000)};
+               link("plate", JointType::free, {0, 0, 0.0249},
+                    CuboidShape{{0.1, 0.1, 0.01}, {3, 3, 2}}, 1000)};
     for (LinkDescription& l : s.links)
       if (l.joint.type == JointType::fixed)
         l.body.pose.orientation = {std::sqrt(0.5), std::sqrt(0.5), 0, 0};  // along y
@@ -143,11 +154,13 @@ TEST(Shapes, APlateRestsOnRods) {
   }
 }
 
-/// A pad pressed on a rod reads the rod's shape: peak depth, no shear, symmetric; nothing where nothing touches.
+/// A pad pressed on a rod reads the rod's shape: peak depth, no shear, symmetric; nothing where
+/// nothing touches.
 TEST(Shapes, APadReadsTheRodsItLiesOn) {
   for (const Shape& rod : {Shape(CylinderShape{0.032, 0.02}), Shape(CapsuleShape{0.032, 0.02})}) {
     Scene s;
-    s.links = {link("pad", JointType::translational, {0, 0, 0.0245}, CuboidShape{{0.05, 0.05, 0.01}, {5, 5, 3}}, 1000),
+    s.links = {link("pad", JointType::translational, {0, 0, 0.0245},
+                    CuboidShape{{0.05, 0.05, 0.01}, {5, 5, 3}}, 1000),
                link("rod", JointType::fixed, {0, 0, 0}, rod, 1000)};
     s.links[1].body.pose.orientation = {std::sqrt(0.5), 0, std::sqrt(0.5), 0};  // along x
     TactileDescription t;
@@ -162,9 +175,11 @@ TEST(Shapes, APadReadsTheRodsItLiesOn) {
     readout.tactile(batch, 0, 0, force);
     for (std::size_t i = 0; i < 21; ++i)
       for (std::size_t j = 0; j < 21; ++j) {
-        const double y = 0.025 - 0.0025 * double(i), x = -0.025 + 0.0025 * double(j);  // columns run along the rod
+        const double y = 0.025 - 0.0025 * double(i),
+                     x = -0.025 + 0.0025 * double(j);  // columns run along the rod
         double d = std::hypot(y, 0.0195) - 0.02;
-        if (std::abs(x) > 0.016) d = rod.index() == 3 ? std::hypot(y, 0.0195, std::abs(x) - 0.016) - 0.02 : 1;
+        if (std::abs(x) > 0.016)
+          d = rod.index() == 3 ? std::hypot(y, 0.0195, std::abs(x) - 0.016) - 0.02 : 1;
         const double* f = &force[3 * (21 * i + j)];
         EXPECT_NEAR(std::hypot(f[0], f[1], f[2]), 100 * std::max(0.0, -d), 1e-12) << x << " " << y;
       }

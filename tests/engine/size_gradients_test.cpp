@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Derivatives by the sizes of bodies through contact alone: what is touched, what touches with points of its own, what lies
-// on the ground. The bodies weigh nothing, so that no size acts through mass; abstract ones at the same joints do.
+// Derivatives by the sizes of bodies through contact alone: what is touched, what touches with
+// points of its own, what lies on the ground. The bodies weigh nothing, so that no size acts
+// through mass; abstract ones at the same joints do.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -23,7 +24,8 @@ Shape one_ring() { return CapsuleShape{0.03, 0.018, 1, 6}; }
 Shape ball() { return SphereShape{0.025}; }
 
 /// A free body of 100 g, and with it a shape that weighs nothing.
-void add_carried(Scene& s, const std::string& name, const Vector3& at, const Shape& shape, Random& random) {
+void add_carried(Scene& s, const std::string& name, const Vector3& at, const Shape& shape,
+                 Random& random) {
   AbstractShape weight;
   weight.mass = 0.1;
   weight.inertia = {4e-5, 0, 0, 5e-5, 0, 6e-5};
@@ -34,7 +36,9 @@ void add_carried(Scene& s, const std::string& name, const Vector3& at, const Sha
   s.links.back().parent = static_cast<int>(s.links.size()) - 2;
 }
 
-ContactCoefficients coefficients(ContactLaw law) { return {300, 1.5, 0.5, law == ContactLaw::linear ? 0.1 : 5}; }
+ContactCoefficients coefficients(ContactLaw law) {
+  return {300, 1.5, 0.5, law == ContactLaw::linear ? 0.1 : 5};
+}
 
 RunInput input_of(const Model& model, Random& random) {
   const Batch batch(model, 1);
@@ -70,7 +74,8 @@ void compare(const Scene& scene, Random& random, std::map<std::string, int>& see
     scale = std::max(scale, std::abs(difference));
     seen[info.name] += adjoint.parameters[std::size_t(k)] != 0;
   }
-  for (std::size_t i = 0; i < both.size(); ++i) EXPECT_NEAR(both[i][0], both[i][1], 1e-6 * scale) << names[i];
+  for (std::size_t i = 0; i < both.size(); ++i)
+    EXPECT_NEAR(both[i][0], both[i][1], 1e-6 * scale) << names[i];
 }
 
 class Touching : public ::testing::TestWithParam<std::tuple<int, int, ContactLaw>> {};
@@ -97,7 +102,9 @@ TEST_P(Touching, SizesActThroughContactAlone) {
 
 INSTANTIATE_TEST_SUITE_P(All, Touching,
                          ::testing::Combine(::testing::Range(0, 4), ::testing::Range(0, 4),
-                                            ::testing::Values(ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear)));
+                                            ::testing::Values(ContactLaw::clamped,
+                                                              ContactLaw::paper,
+                                                              ContactLaw::linear)));
 
 class OnTheGround : public ::testing::TestWithParam<std::tuple<int, ContactLaw>> {};
 
@@ -123,7 +130,9 @@ TEST_P(OnTheGround, SizesActThroughContactAlone) {
 
 INSTANTIATE_TEST_SUITE_P(All, OnTheGround,
                          ::testing::Combine(::testing::Range(0, 5),
-                                            ::testing::Values(ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear)));
+                                            ::testing::Values(ContactLaw::clamped,
+                                                              ContactLaw::paper,
+                                                              ContactLaw::linear)));
 
 }  // namespace
 }  // namespace tangere

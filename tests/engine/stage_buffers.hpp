@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Everything one evaluation of a stage needs, for any number type: the plain scalar run of the kernels.
+// Everything one evaluation of a stage needs, for any number type: the plain scalar run of the
+// kernels.
 #pragma once
 
 #include <vector>
@@ -17,7 +18,8 @@ class StageBuffers {
   explicit StageBuffers(const CompiledModel& m) : model_(m) {
     const std::size_t nv = std::size_t(m.nv), entries = std::size_t(m.pattern.entries);
     centre.resize(std::size_t(m.nq));
-    for (auto* v : {&x, &r, &s, &tau, &target, &v_out, &g, &force_scale, &mass}) v->assign(nv, N(0.0));
+    for (auto* v : {&x, &r, &s, &tau, &target, &v_out, &g, &force_scale, &mass})
+      v->assign(nv, N(0.0));
     A.assign(entries, N(0.0));
     links_.resize(m.links.size());
     contacts_.resize(m.link_pairs.size() + m.grounded.size());
@@ -27,7 +29,8 @@ class StageBuffers {
       points_.emplace_back();
       for (int k = 0; k < 3 * p.n_points; ++k) points_.back().push_back(N(p.points[k]));
       references_.emplace_back(12, N(0.0));
-      lists_.push_back({points_.back().data(), p.n_points, references_.back().data(), 1e9, nullptr, 0, 0});
+      lists_.push_back(
+          {points_.back().data(), p.n_points, references_.back().data(), 1e9, nullptr, 0, 0});
     }
   }
 
@@ -96,7 +99,8 @@ void randomise(StageBuffers<N>& b, const CompiledModel& m, Random& random, doubl
       const double w[4] = {q.w, q.x, q.y, q.z};
       for (int k = 0; k < 4; ++k) b.centre[std::size_t(l.q + k)] = N(w[k]);
     } else {
-      for (int k = 0; k < kernels::dofs(l.kind); ++k) b.centre[std::size_t(l.q + k)] = N(0.05 * random.normal());
+      for (int k = 0; k < kernels::dofs(l.kind); ++k)
+        b.centre[std::size_t(l.q + k)] = N(0.05 * random.normal());
     }
   }
   for (int i = 0; i < m.nv; ++i) {

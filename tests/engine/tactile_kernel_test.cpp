@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tactile kernels of every instruction set, both precisions, across points and across environments, against one point
-// at a time. Padding, culling and what else is on the pad must not matter.
+// The tactile kernels of every instruction set, both precisions, across points and across
+// environments, against one point at a time. Padding, culling and what else is on the pad must not
+// matter.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,8 +20,8 @@
 namespace tangere {
 namespace {
 
-using kernels::kTactileTile;
 using kernels::KernelTable;
+using kernels::kTactileTile;
 using kernels::PadTiles;
 using kernels::Touch;
 using kernels::TouchShape;
@@ -67,8 +68,10 @@ struct PoisonedPad {
 };
 
 TouchShape shape_of(PrimitiveShape shape) {
-  if (shape == PrimitiveShape::cylinder || shape == PrimitiveShape::capsule) return {shape, {0.012, 0.015, 0}};
-  return shape == PrimitiveShape::sphere ? TouchShape{shape, {0.02, 0, 0}} : TouchShape{shape, {0.02, 0.015, 0.01}};
+  if (shape == PrimitiveShape::cylinder || shape == PrimitiveShape::capsule)
+    return {shape, {0.012, 0.015, 0}};
+  return shape == PrimitiveShape::sphere ? TouchShape{shape, {0.02, 0, 0}}
+                                         : TouchShape{shape, {0.02, 0.015, 0.01}};
 }
 Vec3<double> size_of(const TouchShape& s) { return {s.size[0], s.size[1], s.size[2]}; }
 
@@ -94,20 +97,23 @@ Touch<double> random_pose(Random& random) {
   return t;
 }
 
-/// A shape that is sunk in the pad somewhere, in any orientation, moving. Half-spaces leave a part of the pad free. Rods
-/// are sunk to half their radius: near the axis the normal turns with the last digit of the position, in any precision.
+/// A shape that is sunk in the pad somewhere, in any orientation, moving. Half-spaces leave a part
+/// of the pad free. Rods are sunk to half their radius: near the axis the normal turns with the
+/// last digit of the position, in any precision.
 Touch<double> random_touch(Random& random, const TouchShape& s) {
   const bool rod = s.shape == PrimitiveShape::cylinder || s.shape == PrimitiveShape::capsule;
   for (;;) {
     const Touch<double> t = random_pose(random);
     const double least = rod || s.shape == PrimitiveShape::plane ? deepest(s, t) : 0;
     if (rod && (least > -0.05 * s.size[0] || least < -0.5 * s.size[0])) continue;
-    if (s.shape == PrimitiveShape::plane && (least > -1e-3 || std::abs(t.Q.m[2][2]) > 0.9)) continue;
+    if (s.shape == PrimitiveShape::plane && (least > -1e-3 || std::abs(t.Q.m[2][2]) > 0.9))
+      continue;
     return t;
   }
 }
 
-Vec3<double> reference(const TouchShape& s, const Touch<double>& t, ContactLaw law, const Vec3<double>& xi) {
+Vec3<double> reference(const TouchShape& s, const Touch<double>& t, ContactLaw law,
+                       const Vec3<double>& xi) {
   const kernels::LawParameters<double> p = {t.kn, t.kt, t.mu, t.damping, law, 0};
   const auto at = kernels::with_distance<double>(s.shape, size_of(s), [&](const auto& shape) {
     return point_contact(shape, p, t.Q, t.c, t.omega, t.v, xi);
@@ -115,10 +121,18 @@ Vec3<double> reference(const TouchShape& s, const Touch<double>& t, ContactLaw l
   return {at.force.x, at.force.y, -at.force.z};
 }
 
-int run(const KernelTable& table, const kernels::TactileArgs<double>& a) { return table.tactile(a); }
-int run(const KernelTable& table, const kernels::TactileArgs<float>& a) { return table.tactile_mixed(a); }
-void run(const KernelTable& table, const kernels::TactileBlockArgs<double>& a) { table.tactile_block(a); }
-void run(const KernelTable& table, const kernels::TactileBlockArgs<float>& a) { table.tactile_block_mixed(a); }
+int run(const KernelTable& table, const kernels::TactileArgs<double>& a) {
+  return table.tactile(a);
+}
+int run(const KernelTable& table, const kernels::TactileArgs<float>& a) {
+  return table.tactile_mixed(a);
+}
+void run(const KernelTable& table, const kernels::TactileBlockArgs<double>& a) {
+  table.tactile_block(a);
+}
+void run(const KernelTable& table, const kernels::TactileBlockArgs<float>& a) {
+  table.tactile_block_mixed(a);
+}
 
 template <class Real>
 struct Result {
@@ -127,15 +141,16 @@ struct Result {
 };
 
 template <class Real>
-Result<Real> field(const KernelTable& table, const PadTiles& pad, ContactLaw law, const std::vector<TouchShape>& shapes,
+Result<Real> field(const KernelTable& table, const PadTiles& pad, ContactLaw law,
+                   const std::vector<TouchShape>& shapes,
                    const std::vector<Touch<double>>& touches) {
   Result<Real> r;
   AlignedVector<Real> values(std::size_t(pad.tiles() * 3 * kTactileTile), Real(-7));
   r.dense.assign(std::size_t(3 * pad.rows * pad.cols), Real(0));
   r.active.resize(std::size_t(pad.tiles()));
-  const int count = run(table, kernels::TactileArgs<Real>{&pad, law, static_cast<int>(shapes.size()), shapes.data(),
-                                                          touches.data(), r.active.data(), values.data(),
-                                                          r.dense.data()});
+  const int count = run(table, kernels::TactileArgs<Real>{
+                                   &pad, law, static_cast<int>(shapes.size()), shapes.data(),
+                                   touches.data(), r.active.data(), values.data(), r.dense.data()});
   r.active.resize(std::size_t(count));
   r.values.assign(values.begin(), values.begin() + std::ptrdiff_t{3} * kTactileTile * count);
   return r;
@@ -148,8 +163,8 @@ struct Case {
 class TactileKernel : public ::testing::TestWithParam<Case> {};
 
 template <class Real>
-void expect_reference(const PoisonedPad& pad, const Case& c, const Touch<double>& touch, const Result<Real>& got,
-                      double tolerance) {
+void expect_reference(const PoisonedPad& pad, const Case& c, const Touch<double>& touch,
+                      const Result<Real>& got, double tolerance) {
   const TouchShape shape = shape_of(c.shape);
   std::vector<Vec3<double>> expected;
   double peak = 0;
@@ -196,13 +211,15 @@ template <class Real>
 void check_sum(const Case& c) {
   Random random(5);
   const std::vector<TouchShape> shapes = {shape_of(c.shape), shape_of(PrimitiveShape::sphere)};
-  const std::vector<Touch<double>> touches = {random_touch(random, shapes[0]), random_touch(random, shapes[1])};
+  const std::vector<Touch<double>> touches = {random_touch(random, shapes[0]),
+                                              random_touch(random, shapes[1])};
   for (const KernelTable* table : kernels::available_kernels()) {
     const PoisonedPad pad;
     const auto first = field<Real>(*table, pad.tiles, c.law, {shapes[0]}, {touches[0]});
     const auto second = field<Real>(*table, pad.tiles, c.law, {shapes[1]}, {touches[1]});
     const auto both = field<Real>(*table, pad.tiles, c.law, shapes, touches);
-    for (std::size_t k = 0; k < both.dense.size(); ++k) EXPECT_EQ(both.dense[k], first.dense[k] + second.dense[k]);
+    for (std::size_t k = 0; k < both.dense.size(); ++k)
+      EXPECT_EQ(both.dense[k], first.dense[k] + second.dense[k]);
   }
 }
 TEST_P(TactileKernel, ShapesAdd) {
@@ -215,8 +232,8 @@ void check_tiles(const Case& c) {
   Random random(6);
   for (const KernelTable* table : kernels::available_kernels()) {
     const PoisonedPad pad;
-    const auto got =
-        field<Real>(*table, pad.tiles, c.law, {shape_of(c.shape)}, {random_touch(random, shape_of(c.shape))});
+    const auto got = field<Real>(*table, pad.tiles, c.law, {shape_of(c.shape)},
+                                 {random_touch(random, shape_of(c.shape))});
     ASSERT_GT(got.active.size(), 0u);
     ASSERT_LT(got.active.size(), std::size_t(pad.tiles.tiles()));
     EXPECT_TRUE(std::is_sorted(got.active.begin(), got.active.end()));
@@ -227,7 +244,8 @@ void check_tiles(const Case& c) {
       for (int i = 0; i < pad.tiles.rows_of(tile); ++i)
         for (int j = 0; j < pad.tiles.cols_of(tile); ++j)
           for (int k = 0; k < 3; ++k) {
-            const Real x = got.values[(3 * t + std::size_t(k)) * kTactileTile + std::size_t(8 * i + j)];
+            const Real x =
+                got.values[(3 * t + std::size_t(k)) * kTactileTile + std::size_t(8 * i + j)];
             rebuilt[std::size_t(3 * (pad.tiles.first_of(tile) + i * pad.tiles.cols + j) + k)] = x;
             touched |= x != 0;
           }
@@ -255,17 +273,20 @@ void check_block(const Case& c) {
     for (int l = 0; l < kLanes; ++l) {
       touches.push_back(random_touch(random, shape));
       if (l % 7 == 3) touches.back().c.z = 1;  // touches nothing
-      if (l == 5) touches.back().c.x = touches.back().v.y = std::numeric_limits<double>::quiet_NaN();
+      if (l == 5)
+        touches.back().c.x = touches.back().v.y = std::numeric_limits<double>::quiet_NaN();
       const auto* from = reinterpret_cast<const double*>(&touches.back());
       auto* to = reinterpret_cast<kernels::LaneRow*>(&rows[std::size_t(l / kernels::kGroup)]);
-      for (std::size_t k = 0; k < sizeof(Touch<double>) / sizeof(double); ++k) to[k].lane[l % kernels::kGroup] = from[k];
+      for (std::size_t k = 0; k < sizeof(Touch<double>) / sizeof(double); ++k)
+        to[k].lane[l % kernels::kGroup] = from[k];
     }
     const Touch<kernels::LaneRow>* of_shape[] = {rows.data()};
     std::vector<std::vector<Real>> dense(kLanes, std::vector<Real>(pad.numbers(), Real(0)));
     std::vector<Real*> arrays;
     for (auto& d : dense) arrays.push_back(d.data());
     arrays[5] = nullptr;
-    run(*table, kernels::TactileBlockArgs<Real>{&pad.tiles, c.law, 1, &shape, of_shape, arrays.data()});
+    run(*table,
+        kernels::TactileBlockArgs<Real>{&pad.tiles, c.law, 1, &shape, of_shape, arrays.data()});
     for (int l = 0; l < kLanes; ++l) {
       if (l == 5) continue;
       const auto alone = field<Real>(*table, pad.tiles, c.law, {shape}, {touches[std::size_t(l)]});
@@ -283,24 +304,27 @@ TEST_P(TactileKernel, AxesThatAreNotQuitePerpendicularGetTheirOwnComponents) {
   const std::vector<Touch<double>> touch = {random_touch(random, shape_of(GetParam().shape))};
   for (const KernelTable* table : kernels::available_kernels()) {
     PoisonedPad pad;
-    const auto plain = field<double>(*table, pad.tiles, GetParam().law, {shape_of(GetParam().shape)}, touch);
+    const auto plain =
+        field<double>(*table, pad.tiles, GetParam().law, {shape_of(GetParam().shape)}, touch);
     pad.tiles.skewed = true;
     const double axes[9] = {1, 2e-4, 0, -1e-4, 1, 0, 1e-5, 0, -1};
     std::copy(axes, axes + 9, pad.tiles.axes);
-    const auto skewed = field<double>(*table, pad.tiles, GetParam().law, {shape_of(GetParam().shape)}, touch);
+    const auto skewed =
+        field<double>(*table, pad.tiles, GetParam().law, {shape_of(GetParam().shape)}, touch);
     double peak = 0;
     for (const double x : plain.dense) peak = std::max(peak, std::abs(x));
     for (std::size_t n = 0; n < plain.dense.size(); n += 3) {
       const double f[3] = {plain.dense[n], plain.dense[n + 1], -plain.dense[n + 2]};
       for (std::size_t i = 0; i < 3; ++i)
-        EXPECT_NEAR(skewed.dense[n + i], axes[3 * i] * f[0] + axes[3 * i + 1] * f[1] + axes[3 * i + 2] * f[2],
+        EXPECT_NEAR(skewed.dense[n + i],
+                    axes[3 * i] * f[0] + axes[3 * i + 1] * f[1] + axes[3 * i + 2] * f[2],
                     1e-15 * peak);
     }
   }
 }
 
-/// The axis of a rod through a point of the pad, along and across it; a corner of the rim in the pad; a face in its
-/// plane: finite forces, the same as one point at a time in double precision.
+/// The axis of a rod through a point of the pad, along and across it; a corner of the rim in the
+/// pad; a face in its plane: finite forces, the same as one point at a time in double precision.
 TEST_P(TactileKernel, KinksHaveTheForceOfOnePoint) {
   const TouchShape shape = shape_of(GetParam().shape);
   const PoisonedPad pad;
@@ -310,10 +334,12 @@ TEST_P(TactileKernel, KinksHaveTheForceOfOnePoint) {
     for (const double lift : {0.0, shape.size[1], shape.size[0], -shape.size[0]}) {
       Touch<double> t = random_pose(random);
       t.Q = turn == 0 ? kernels::diagonal(1.0)
-                      : kernels::Mat3<double>{{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}};  // the axis lies in the pad
+                      : kernels::Mat3<double>{
+                            {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}}};  // the axis lies in the pad
       t.c = {on.x, on.y, lift};
       for (const KernelTable* table : kernels::available_kernels()) {
-        SCOPED_TRACE(std::string(table->name) + ", turn " + std::to_string(turn) + ", lift " + std::to_string(lift));
+        SCOPED_TRACE(std::string(table->name) + ", turn " + std::to_string(turn) + ", lift " +
+                     std::to_string(lift));
         const auto got = field<double>(*table, pad.tiles, GetParam().law, {shape}, {t});
         const Vec3<double> expected = reference(shape, t, GetParam().law, on);
         const std::size_t n = std::size_t(3 * (9 * pad.tiles.cols + 8));

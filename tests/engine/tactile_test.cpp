@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readings of tactile fields: every way of reading gives the same numbers, in either precision, wherever the environment is.
+// Readings of tactile fields: every way of reading gives the same numbers, in either precision,
+// wherever the environment is.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +20,8 @@ namespace {
 
 using kernels::Vec3;
 
-/// The ball under the pad of environment e, sunk by `depth` [m], turning and sliding; `far` [m] away from the origin.
+/// The ball under the pad of environment e, sunk by `depth` [m], turning and sliding; `far` [m]
+/// away from the origin.
 void press(Batch& batch, int e, double depth, double where, double far = 0) {
   std::vector<double> q = testing::q_of(batch, e), v = testing::v_of(batch, e);
   q[0] = far, q[1] = -far, q[2] = -0.015 - depth + far;
@@ -72,7 +74,8 @@ void check_frames(const Reading& c, int environments) {
     const Batch batch = pressed(model, environments, moment);
     for (int e = 0; e < environments; ++e) {
       readout.read(batch, e, alone);
-      EXPECT_EQ(values(alone), field<T>(readout, batch, e)) << "environment " << e << ", moment " << moment;
+      EXPECT_EQ(values(alone), field<T>(readout, batch, e))
+          << "environment " << e << ", moment " << moment;
     }
     for (int b = 0; b < batch.blocks(); ++b) {
       const std::size_t first = std::size_t(b * kernels::kBlock);
@@ -80,7 +83,8 @@ void check_frames(const Reading& c, int environments) {
       readout.read_block(batch, b, std::span(block).subspan(first, count));
     }
     for (int e = 0; e < environments; ++e)
-      EXPECT_EQ(values(block[std::size_t(e)]), field<T>(readout, batch, e)) << "environment " << e << " by block";
+      EXPECT_EQ(values(block[std::size_t(e)]), field<T>(readout, batch, e))
+          << "environment " << e << " by block";
     // One of a block read alone in between.
     readout.read(pressed(model, environments, moment + 3), 0, block[0]);
   }
@@ -100,7 +104,8 @@ void check_blocks(const Reading& c) {
   const Model model(testing::rolling_ball(false, c.resolution));
   Readout readout(model, c.precision);
   const Batch batch = pressed(model, 21);
-  std::vector<std::vector<T>> fields(16, std::vector<T>(std::size_t(3 * c.resolution * c.resolution), T(-3)));
+  std::vector<std::vector<T>> fields(
+      16, std::vector<T>(std::size_t(3 * c.resolution * c.resolution), T(-3)));
   const std::vector<T> untouched = fields[0];
   for (int b = 0; b < 2; ++b) {
     std::fill(fields.begin(), fields.end(), untouched);
@@ -108,7 +113,8 @@ void check_blocks(const Reading& c) {
     readout.read_block(batch, b, 0, spans);
     for (int l = 0; l < 16; ++l) {
       const int e = 16 * b + l;
-      EXPECT_EQ(fields[std::size_t(l)], e < 21 ? field<T>(readout, batch, e) : untouched) << "environment " << e;
+      EXPECT_EQ(fields[std::size_t(l)], e < 21 ? field<T>(readout, batch, e) : untouched)
+          << "environment " << e;
     }
   }
 }
@@ -143,8 +149,10 @@ TEST_P(TactileReading, NumbersAreThoseOfThePrecisionWhateverTheirType) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Pads, TactileReading,
-                         ::testing::Values(Reading{Precision::f64, 20}, Reading{Precision::mixed, 20},
-                                           Reading{Precision::f64, 27}, Reading{Precision::mixed, 27}));
+                         ::testing::Values(Reading{Precision::f64, 20},
+                                           Reading{Precision::mixed, 20},
+                                           Reading{Precision::f64, 27},
+                                           Reading{Precision::mixed, 27}));
 
 TEST(Tactile, MixedPrecisionKeepsAMillionthOfThePeak) {
   const Model model(testing::rolling_ball(false, 200));
@@ -155,7 +163,8 @@ TEST(Tactile, MixedPrecisionKeepsAMillionthOfThePeak) {
       double worst = 0, peak = 0;
       for (int where = 0; where < 10; ++where) {
         press(batch, 0, depth, where, far);
-        const std::vector<double> a = field<double>(exact, batch, 0), b = field<double>(mixed, batch, 0);
+        const std::vector<double> a = field<double>(exact, batch, 0),
+                                  b = field<double>(mixed, batch, 0);
         double largest = 0, error = 0;
         for (std::size_t k = 0; k < a.size(); ++k) {
           largest = std::max(largest, std::abs(a[k]));
@@ -166,8 +175,9 @@ TEST(Tactile, MixedPrecisionKeepsAMillionthOfThePeak) {
       }
       EXPECT_GT(peak, 0);
       EXPECT_LT(worst, 1e-6) << far << " m away, " << depth << " m deep";
-      RecordProperty("worst_at_" + std::to_string(int(1e6 * depth)) + "um_" + std::to_string(int(far)) + "m",
-                     std::to_string(1e9 * worst) + "e-9");
+      RecordProperty(
+          "worst_at_" + std::to_string(int(1e6 * depth)) + "um_" + std::to_string(int(far)) + "m",
+          std::to_string(1e9 * worst) + "e-9");
     }
 }
 
@@ -212,11 +222,13 @@ TEST(Tactile, BodiesReportTheirOwnFrames) {
   for (std::size_t i = 0; i < v.size(); ++i) v[i] = 0.3 - 0.1 * double(i % 5);
   const auto poses = [&](double t) {
     std::vector<double> at = q;
-    for (std::size_t i = 0; i < 3; ++i) at[i] += t * v[i], at[3 + i] += t * v[3 + i], at[10 + i] += t * v[9 + i];
+    for (std::size_t i = 0; i < 3; ++i)
+      at[i] += t * v[i], at[3 + i] += t * v[3 + i], at[10 + i] += t * v[9 + i];
     for (std::size_t ball = 0; ball < 2; ++ball) {
       const std::size_t p = 6 + 7 * ball, w = 6 + 6 * ball;
-      const auto turned = kernels::rotate_by(kernels::Quat<double>{q[p], q[p + 1], q[p + 2], q[p + 3]},
-                                             t * Vec3<double>{v[w], v[w + 1], v[w + 2]});
+      const auto turned =
+          kernels::rotate_by(kernels::Quat<double>{q[p], q[p + 1], q[p + 2], q[p + 3]},
+                             t * Vec3<double>{v[w], v[w + 1], v[w + 2]});
       at[p] = turned.w, at[p + 1] = turned.x, at[p + 2] = turned.y, at[p + 3] = turned.z;
     }
     batch.set_state(0, at, v);

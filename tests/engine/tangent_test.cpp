@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The second route: tangents in dual numbers through whole rollouts against the adjoint, for every scheme and every input,
-// fields included. λᵀ(J d) = (Jᵀλ)ᵀ d to rounding.
+// The second route: tangents in dual numbers through whole rollouts against the adjoint, for every
+// scheme and every input, fields included. λᵀ(J d) = (Jᵀλ)ᵀ d to rounding.
 #include <gtest/gtest.h>
 
 #include "engine/readout.hpp"
@@ -43,8 +43,10 @@ struct Products {
   int splits = 0;                  ///< steps that were split
 };
 
-/// Of a loss that is linear in states, and in the first sensor's fields every `every` steps (0: not at all).
-Products products(const Model& model, const StepperOptions& options, const RunInput& in, unsigned seed, int every) {
+/// Of a loss that is linear in states, and in the first sensor's fields every `every` steps (0: not
+/// at all).
+Products products(const Model& model, const StepperOptions& options, const RunInput& in,
+                  unsigned seed, int every) {
   const CompiledModel& m = model.compiled();
   const int steps = static_cast<int>(in.u.size());
   const StateLoss loss(model, steps, seed);
@@ -61,11 +63,14 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
   EXPECT_FALSE(failed(batch.status(0)));
 
   Random random(seed + 1);
-  Direction d{normals(random, std::size_t(m.nv)), normals(random, std::size_t(m.nv)),
-              std::vector<double>(std::size_t(parameter_rows(m))), {}};
+  Direction d{normals(random, std::size_t(m.nv)),
+              normals(random, std::size_t(m.nv)),
+              std::vector<double>(std::size_t(parameter_rows(m))),
+              {}};
   const Parameters parameters(model);
   std::vector<double> change;
-  for (const ParameterInfo& info : parameters.infos()) change.push_back(info.value * random.normal());
+  for (const ParameterInfo& info : parameters.infos())
+    change.push_back(info.value * random.normal());
   parameters.spread(change, batch, 0, d.numbers);
   for (int t = 0; t < steps; ++t) d.u.push_back(normals(random, std::size_t(m.nu)));
 
@@ -75,7 +80,8 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
 
   Products p{0, 0, 0, splits};
   Tangent tangent(model, options);
-  StateTangent s{d.q, d.v, std::vector<double>(std::size_t(m.nv)), std::vector<double>(std::size_t(m.nv))};
+  StateTangent s{d.q, d.v, std::vector<double>(std::size_t(m.nv)),
+                 std::vector<double>(std::size_t(m.nv))};
   double forward_square = 0, loss_square = 0;
   const auto state = [&](int t) {
     std::vector<double> q(std::size_t(m.nq));
@@ -123,7 +129,8 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
           if (row >= pad.rows_of(tile) || col >= pad.cols_of(tile)) continue;
           const auto point = std::size_t(pad.first_of(tile) + row * pad.cols + col);
           for (std::size_t c = 0; c < 3; ++c)
-            cotangents[192 * k + 64 * c + std::size_t(n)] = field_weights[std::size_t(t)][3 * point + c];
+            cotangents[192 * k + 64 * c + std::size_t(n)] =
+                field_weights[std::size_t(t)][3 * point + c];
         }
       pullback.place(batch, 0);
       pullback.clear();
@@ -137,7 +144,8 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
   }
   for (std::size_t i = 0; i < std::size_t(m.nv); ++i)
     p.backward += adjoint.loss(0).q[i * kBlock] * d.q[i] + adjoint.loss(0).v[i * kBlock] * d.v[i];
-  for (std::size_t i = 0; i < d.numbers.size(); ++i) p.backward += adjoint.loss(0).parameters[i * kBlock] * d.numbers[i];
+  for (std::size_t i = 0; i < d.numbers.size(); ++i)
+    p.backward += adjoint.loss(0).parameters[i * kBlock] * d.numbers[i];
   return p;
 }
 
@@ -149,29 +157,33 @@ TEST_P(TangentScheme, MachinesHaveTheSameProducts) {
     if (seed % 2 == 0)
       for (MotorDescription& m : s.motors) m.timing = MotorTiming::start;
     const Model model(s);
-    const Products p = products(model, testing::options(GetParam(), s.timestep, 1e-9), random_input(model, seed, 5), seed, 0);
+    const Products p = products(model, testing::options(GetParam(), s.timestep, 1e-9),
+                                random_input(model, seed, 5), seed, 0);
     EXPECT_NEAR(p.forward, p.backward, 1e-12 * p.size) << "seed " << seed;
   }
 }
 
 TEST_P(TangentScheme, ContactsHaveTheSameProducts) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
-    const Scene s = testing::random_contacts(seed, 2 + static_cast<int>(seed % 2), ContactLaw(seed % 3));
+    const Scene s =
+        testing::random_contacts(seed, 2 + static_cast<int>(seed % 2), ContactLaw(seed % 3));
     const Model model(s);
-    const Products p = products(model, testing::options(GetParam(), s.timestep, 1e-9), random_input(model, seed, 5), seed, 0);
+    const Products p = products(model, testing::options(GetParam(), s.timestep, 1e-9),
+                                random_input(model, seed, 5), seed, 0);
     EXPECT_NEAR(p.forward, p.backward, 1e-11 * p.size) << "seed " << seed;
   }
 }
 
-/// A search that may take one direction only: most steps are split, some of them again. No differences here: neighbouring
-/// runs may split elsewhere.
+/// A search that may take one direction only: most steps are split, some of them again. No
+/// differences here: neighbouring runs may split elsewhere.
 TEST_P(TangentScheme, SplitStepsHaveTheSameProducts) {
   int splits = 0;
   for (unsigned seed = 1; seed <= 12; ++seed) {
     Scene s = testing::random_contacts(seed, 2 + static_cast<int>(seed % 2), ContactLaw(seed % 3));
     s.solver.max_iterations = 1;
     const Model model(s);
-    const Products p = products(model, testing::options(GetParam(), s.timestep, 1e-9), random_input(model, seed, 5), seed, 0);
+    const Products p = products(model, testing::options(GetParam(), s.timestep, 1e-9),
+                                random_input(model, seed, 5), seed, 0);
     EXPECT_NEAR(p.forward, p.backward, 1e-11 * p.size) << "seed " << seed;
     splits += p.splits;
   }
@@ -207,7 +219,8 @@ TEST_P(TangentScheme, StepJacobiansTimesDirectionsAreTangents) {
     for (const auto& u : in.u) stepper.step_block(batch, 0, u, &tape);
     Random random(seed);
     const auto nv = std::size_t(model.nv()), nu = std::size_t(model.nu());
-    StateTangent s{normals(random, nv), normals(random, nv), normals(random, nv), normals(random, nv)};
+    StateTangent s{normals(random, nv), normals(random, nv), normals(random, nv),
+                   normals(random, nv)};
     const std::vector<double> u_dot = normals(random, nu);
     StepJacobians jacobians(model, options);
     jacobians.evaluate(batch, 0, tape, 2, in.u[2]);

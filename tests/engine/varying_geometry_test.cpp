@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sizes and places that vary by environment: each moves, and is felt, as in a scene of its own that has its numbers, whatever
-// its neighbours have, on every instruction set.
+// Sizes and places that vary by environment: each moves, and is felt, as in a scene of its own that
+// has its numbers, whatever its neighbours have, on every instruction set.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -43,8 +43,8 @@ RandomizationDescription varying(RandomTarget target, const std::string& name, i
   return d;
 }
 
-/// A pad driven onto a shape on springs, whose joint stands on an arm that turns: numbers of the shape, of where it is, of
-/// its density.
+/// A pad driven onto a shape on springs, whose joint stands on an arm that turns: numbers of the
+/// shape, of where it is, of its density.
 Scene pad_on(const Shape& shape, const std::vector<RandomizationDescription>& numbers) {
   Scene s;
   s.integrator = Integrator::bdf2;

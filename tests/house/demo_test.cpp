@@ -38,7 +38,8 @@ TEST(House, DemoTellsTheTruthAboutItsFile) {
   const std::map<std::string, h5::Dims> promised = promised_shapes();
   ASSERT_TRUE(promised.contains("data/demo_0/obs/q") && promised.contains("data/demo_0/obs/pad"));
 
-  static const std::regex command(R"(\n\$tangere (generate scenes/rolling_ball\.xml --episodes ([0-9]+) .*--steps 350.*) --output)");
+  static const std::regex command(
+      R"(\n\$tangere (generate scenes/rolling_ball\.xml --episodes ([0-9]+) .*--steps 350.*) --output)");
   std::smatch match;
   const std::string text = demo_text();
   ASSERT_TRUE(std::regex_search(text, match, command));
@@ -54,7 +55,8 @@ TEST(House, DemoTellsTheTruthAboutItsFile) {
     EXPECT_EQ(h5::dimensions(h5::open_dataset(opened, name)), shape) << name;
   const tangere::ShardContent content = tangere::check_shard(file.string());
   EXPECT_EQ(std::to_string(content.demos), match[2].str());
-  EXPECT_NE(text.find(match[2].str() + " episodes, data/demo_0 to data/demo_" + std::to_string(content.demos - 1)),
+  EXPECT_NE(text.find(match[2].str() + " episodes, data/demo_0 to data/demo_" +
+                      std::to_string(content.demos - 1)),
             std::string::npos);
   EXPECT_FALSE(fs::exists(folder / "shard-00001.h5")) << "the text names one shard";
   fs::remove_all(folder);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rules of the house that a program can check: which way includes point, what every folder and file must have.
+// The rules of the house that a program can check: which way includes point, what every folder and
+// file must have.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +12,8 @@
 
 namespace tangere::house {
 
-/// Path from the project's root ("engine/model.hpp") → contents. Tests plant violations in trees made by hand.
+/// Path from the project's root ("engine/model.hpp") → contents. Tests plant violations in trees
+/// made by hand.
 using Tree = std::map<std::string, std::string, std::less<>>;
 
 struct Violation {
@@ -21,19 +23,22 @@ struct Violation {
 };
 std::ostream& operator<<(std::ostream& out, const Violation& violation);
 
-/// Every source and text file below `root`, without hidden folders, build/ and out/. Throws std::runtime_error on a
-/// file that cannot be read.
+/// Every source and text file below `root`, without hidden folders, build/ and out/. Throws
+/// std::runtime_error on a file that cannot be read.
 Tree read_tree(const std::filesystem::path& root);
 
-/// kernels ← engine ← tasks, io ← apps, bench, tests: project includes point left, name a file that exists, and name it
-/// from the root (or beside the including file); libraries stay in the folders that own them.
+/// kernels ← engine ← tasks, io ← apps, bench, tests: project includes point left, name a file that
+/// exists, and name it from the root (or beside the including file); libraries stay in the folders
+/// that own them.
 std::vector<Violation> check_includes(const Tree& tree);
 
-/// What is compiled once per instruction set (kernels/*-inl.hpp and all it includes) uses no type whose functions the
-/// linker might merge across instruction sets: containers, strings, streams, functions.
+/// What is compiled once per instruction set (kernels/*-inl.hpp and all it includes) uses no type
+/// whose functions the linker might merge across instruction sets: containers, strings, streams,
+/// functions.
 std::vector<Violation> check_kernel_includes(const Tree& tree);
 
-/// Headers that cmake/install.cmake installs include each other and the standard library, nothing else.
+/// Headers that cmake/install.cmake installs include each other and the standard library, nothing
+/// else.
 std::vector<Violation> check_public_headers(const Tree& tree);
 
 /// SPDX line first, then a comment that says why the file exists; at most 600 lines.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shuffled, compressed, cut into tiles, left out: the numbers that HDF5 reads are those that were written.
+// Shuffled, compressed, cut into tiles, left out: the numbers that HDF5 reads are those that were
+// written.
 #include "io/chunk_codec.hpp"
 
 #include <gmock/gmock.h>
@@ -23,7 +24,8 @@ using ::tangere::testing::Folder;
 constexpr std::int64_t kRows = 37;
 
 /// Byte by byte, as the specification of the filter says it.
-std::vector<unsigned char> shuffled(const std::vector<unsigned char>& data, std::size_t used, std::size_t width) {
+std::vector<unsigned char> shuffled(const std::vector<unsigned char>& data, std::size_t used,
+                                    std::size_t width) {
   std::vector<unsigned char> out(data.size(), 0);
   const std::size_t numbers = data.size() / width;
   for (std::size_t k = 0; k < used / width; ++k)
@@ -74,12 +76,17 @@ class Piece {
     for (const auto& shape : l.observation_shapes()) {
       std::size_t width = 1;
       for (const std::uint64_t n : shape) width *= n;
-      std::vector<T>& all = values_.emplace_back(static_cast<std::size_t>(episodes * rows) * width, T{0});
+      std::vector<T>& all =
+          values_.emplace_back(static_cast<std::size_t>(episodes * rows) * width, T{0});
       for (int e = 0; e < episodes; ++e)
         for (int row = 0; row < rows; ++row)
           for (std::size_t k = 0; k < (noise ? width : 30); ++k) {
-            const std::size_t at = noise ? k : (static_cast<std::size_t>(first + e) * 131 + static_cast<std::size_t>(first_row + row) * 17 + k) % width;
-            const double value = noise ? static_cast<double>(random()) : static_cast<double>(first_row + row + 1);
+            const std::size_t at = noise ? k
+                                         : (static_cast<std::size_t>(first + e) * 131 +
+                                            static_cast<std::size_t>(first_row + row) * 17 + k) %
+                                               width;
+            const double value =
+                noise ? static_cast<double>(random()) : static_cast<double>(first_row + row + 1);
             all[static_cast<std::size_t>(e * rows + row) * width + at] = static_cast<T>(value);
           }
     }
@@ -96,7 +103,8 @@ class Piece {
 };
 
 template <class T>
-std::string write(const Folder& folder, const std::string& name, const DatasetLayout& l, bool pieces) {
+std::string write(const Folder& folder, const std::string& name, const DatasetLayout& l,
+                  bool pieces) {
   DatasetWriter writer({folder / name}, l);
   std::vector<std::int64_t> blocks;
   for (std::int64_t first = 0; first < l.episodes; first += 16) blocks.push_back(first);
@@ -126,9 +134,11 @@ void check_every_kind(bool single) {
       EXPECT_EQ(check_shard(whole).demos, 20) << name;
       EXPECT_EQ(sum_of(whole), sum_of(plain)) << name;
       if (sparse || l.compression != "none") {
-        EXPECT_LT(std::filesystem::file_size(whole), std::filesystem::file_size(plain) * 2 / 3) << name;
+        EXPECT_LT(std::filesystem::file_size(whole), std::filesystem::file_size(plain) * 2 / 3)
+            << name;
       }
-      EXPECT_TRUE(file_bytes(write<T>(folder, name + "2", l, true)) == file_bytes(whole)) << name << " depends on pieces";
+      EXPECT_TRUE(file_bytes(write<T>(folder, name + "2", l, true)) == file_bytes(whole))
+          << name << " depends on pieces";
     }
 }
 
@@ -146,7 +156,8 @@ TEST(ChunkCodec, TilesOfZerosAreNotThere) {
   ASSERT_EQ(H5Pget_chunk(properties.get(), 4, chunk.data()), 4);
   EXPECT_EQ(chunk[1], 16U);
   EXPECT_EQ(chunk[2], 16U);
-  const auto rows = (kRows + static_cast<std::int64_t>(chunk[0]) - 1) / static_cast<std::int64_t>(chunk[0]);
+  const auto rows =
+      (kRows + static_cast<std::int64_t>(chunk[0]) - 1) / static_cast<std::int64_t>(chunk[0]);
   hsize_t there = 0;
   const h5::Id space(H5Dget_space(image.get()));
   ASSERT_GE(H5Dget_num_chunks(image.get(), space.get(), &there), 0);
@@ -161,7 +172,8 @@ TEST(ChunkCodec, BlocksThatWaitTakeBoundedMemoryAndLoseNothing) {
   const auto all = static_cast<int>(l.rows()) + 1;
   DatasetWriter writer({folder / "set"}, l);
   for (const std::int64_t first : {96, 80, 64, 48, 32, 16, 0}) {
-    writer.write(Piece<float>(l, first, 0, all, true).rows());  // 20 MB each, none of which goes away
+    writer.write(
+        Piece<float>(l, first, 0, all, true).rows());  // 20 MB each, none of which goes away
     writer.finish(first, {});
   }
   EXPECT_EQ(check_shard(writer.shards().at(0)).demos, 112);
@@ -187,8 +199,10 @@ TEST(ChunkCodec, RowsThatWaitBesideChunksAreBoundedAsWell) {
   };
   double waiting = 0;
   for (const std::int64_t first : {96, 80, 64, 48, 32, 16, 0}) {
-    std::vector<double> gradient(16UL * static_cast<std::size_t>(l.rows()) * l.gradients[0].width());
-    for (std::size_t k = 0; k < gradient.size(); ++k) gradient[k] = static_cast<double>(first) + 1e-6 * static_cast<double>(k);
+    std::vector<double> gradient(16UL * static_cast<std::size_t>(l.rows()) *
+                                 l.gradients[0].width());
+    for (std::size_t k = 0; k < gradient.size(); ++k)
+      gradient[k] = static_cast<double>(first) + 1e-6 * static_cast<double>(k);
     const std::span<const double> all_of_it(gradient);
     // In two pieces, the derivatives with the last one.
     for (const int row : {0, 16}) {
@@ -207,9 +221,12 @@ TEST(ChunkCodec, RowsThatWaitBesideChunksAreBoundedAsWell) {
   const h5::Id file = h5::open_file(writer.shards().at(0));
   for (const int demo : {0, 20, 99}) {
     double number = 0;
-    h5::read_box(h5::open_dataset(file, "data/demo_" + std::to_string(demo) + "/grad_wide"), {2, 3, 5}, {1, 1, 1}, &number);
+    h5::read_box(h5::open_dataset(file, "data/demo_" + std::to_string(demo) + "/grad_wide"),
+                 {2, 3, 5}, {1, 1, 1}, &number);
     const int first = demo / 16 * 16;
-    EXPECT_EQ(number, first + 1e-6 * (((demo - first) * static_cast<double>(l.rows()) + 2) * 4096 + 3 * 64 + 5)) << demo;
+    EXPECT_EQ(number, first + 1e-6 * (((demo - first) * static_cast<double>(l.rows()) + 2) * 4096 +
+                                      3 * 64 + 5))
+        << demo;
   }
 }
 
@@ -230,7 +247,8 @@ TEST(ChunkCodec, DamagedLz4IsAnErrorOrChangesNothing) {
   for (int trial = 0; trial < 100; ++trial) {
     std::string damaged = whole;
     const std::size_t at = trial < 32 ? static_cast<std::size_t>(trial) / 2 : random() % size;
-    damaged[address + at] = static_cast<char>(trial % 2 == 0 ? 0xFF : damaged[address + at] + 1 + static_cast<int>(random() % 254));
+    damaged[address + at] = static_cast<char>(
+        trial % 2 == 0 ? 0xFF : damaged[address + at] + 1 + static_cast<int>(random() % 254));
     if (damaged == whole) continue;
     const std::string path = folder / "damaged.h5";
     std::ofstream(path, std::ios::binary) << damaged;

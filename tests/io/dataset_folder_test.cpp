@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The folder of a data set: one run at a time, no shard lost without being asked for, nothing half-written kept.
+// The folder of a data set: one run at a time, no shard lost without being asked for, nothing
+// half-written kept.
 #include "io/dataset_folder.hpp"
 
 #include <gmock/gmock.h>
@@ -89,7 +90,8 @@ TEST(DatasetFolder, RemovesWhatMergingMadeWithItsFolders) {
     fs::create_directories(data);
     for (const char* file : {"/main_data.hdf5", "/metadata.json"}) touch(data + file);
   }
-  for (const char* name : {"robomimic.hdf5", "shard-00000.h5", "notes.txt"}) touch(place / "set/" + name);
+  for (const char* name : {"robomimic.hdf5", "shard-00000.h5", "notes.txt"})
+    touch(place / "set/" + name);
   touch(place / "set/minari/tangere/two-v0/mine.txt");
   DatasetFolder folder(place / "set", ExistingShards::replace);
   folder.remove_old_shards(1);
@@ -143,13 +145,16 @@ TEST(DatasetFolder, IsSharedOnceTheOneThatMergesHasEnded) {
   ASSERT_TRUE(merging->take(FolderLock::Kind::alone));
   int pauses = 0;
   const auto share = [&](std::function<void()> between) {
-    const DatasetFolder folder(place / "set", ExistingShards::keep, true, {tries(3, std::move(between)), {}});
+    const DatasetFolder folder(place / "set", ExistingShards::keep, true,
+                               {tries(3, std::move(between)), {}});
   };
   try {
     share([&] { ++pauses; });
     FAIL() << "it is held";
   } catch (const IoError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("/set': another process is writing shards there and does not share the folder"));
+    EXPECT_THAT(
+        error.what(),
+        HasSubstr("/set': another process is writing shards there and does not share the folder"));
   }
   EXPECT_EQ(pauses, 2);
   EXPECT_NO_THROW(share([&] { merging.reset(); }));
@@ -160,7 +165,8 @@ TEST(DatasetFolder, IsHeldAloneOnceOthersHaveLetGo) {
   std::optional<DatasetFolder> other;
   int pauses = 0;
   DatasetFolder waits(place / "set", ExistingShards::keep, true, {{}, tries(4, [&] {
-                                                                    if (++pauses == 5) other->let_go();
+                                                                    if (++pauses == 5)
+                                                                      other->let_go();
                                                                   })});
   other.emplace(place / "set", ExistingShards::keep, true);
   EXPECT_FALSE(waits.hold_alone());
@@ -178,15 +184,17 @@ TEST(DatasetFolder, CleansWhatAKilledMergeLeft) {
     const Folder place;
     const std::string data = place / "set/minari/tangere/x-v0/data";
     fs::create_directories(data);
-    for (const std::string& part : {place / "set/robomimic.hdf5.part", data + "/main_data.hdf5.part", data + "/metadata.json.part",
-                                    place / "set/shard-00003.h5.part"})
+    for (const std::string& part :
+         {place / "set/robomimic.hdf5.part", data + "/main_data.hdf5.part",
+          data + "/metadata.json.part", place / "set/shard-00003.h5.part"})
       touch(part);
     touch(place / "set/robomimic.hdf5");
     { const DatasetFolder folder(place / "set", ExistingShards::keep, shared); }
     EXPECT_TRUE(fs::is_empty(data));
     EXPECT_TRUE(fs::exists(place / "set/robomimic.hdf5"));
     EXPECT_FALSE(fs::exists(place / "set/robomimic.hdf5.part"));
-    EXPECT_EQ(fs::exists(place / "set/shard-00003.h5.part"), shared) << "another process may be writing it";
+    EXPECT_EQ(fs::exists(place / "set/shard-00003.h5.part"), shared)
+        << "another process may be writing it";
     if (!shared) continue;
     const PartFile cleaned_by_another(place / "set/robomimic.hdf5", true);
     EXPECT_NO_THROW(DatasetFolder(place / "set", ExistingShards::keep, true));
@@ -197,8 +205,9 @@ TEST(DatasetFolder, CleansWhatAKilledMergeLeft) {
 TEST(DatasetFolder, SharedLosesWhatIsNoneOfItsShardsAndWhatShowsThemAsOne) {
   const Folder place;
   fs::create_directories(place / "set/minari/tangere/x-v0/data");
-  for (const char* name : {"shard-00000.h5", "shard-00002.h5", "shard-00003.h5", "shard-000001.h5", "shard-99999999999999999999.h5",
-                           "robomimic.hdf5", "minari/tangere/x-v0/data/main_data.hdf5", "notes.txt"})
+  for (const char* name : {"shard-00000.h5", "shard-00002.h5", "shard-00003.h5", "shard-000001.h5",
+                           "shard-99999999999999999999.h5", "robomimic.hdf5",
+                           "minari/tangere/x-v0/data/main_data.hdf5", "notes.txt"})
     touch(place / "set/" + name);
   DatasetFolder(place / "set", ExistingShards::keep, true).remove_old_shards(3);
   EXPECT_THAT(names(place / "set"), ::testing::SizeIs(8)) << "they are to be kept";

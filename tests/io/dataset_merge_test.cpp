@@ -19,14 +19,14 @@
 namespace tangere {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using ::tangere::testing::dataset_layout;
 using ::tangere::testing::failure;
 using ::tangere::testing::Folder;
 using ::tangere::testing::write_block;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 /// 40 episodes in three shards; all of the second shard failed, and some of the first.
 DatasetFiles write_with_gaps(const Folder& folder, bool single, const std::string& compression) {
@@ -47,7 +47,8 @@ std::vector<double> row(const h5::Id& file, const std::string& dataset, hsize_t 
   h5::Dims dims = h5::dimensions(opened), offset(dims.size(), 0);
   offset[0] = at;
   dims[0] = 1;
-  std::vector<double> numbers(std::accumulate(dims.begin(), dims.end(), hsize_t{1}, std::multiplies<>()));
+  std::vector<double> numbers(
+      std::accumulate(dims.begin(), dims.end(), hsize_t{1}, std::multiplies<>()));
   h5::read_box(opened, offset, dims, numbers.data());
   return numbers;
 }
@@ -65,12 +66,14 @@ TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
       const h5::Id merged = h5::open_file(result.file), data = h5::open_group(merged, "data");
       EXPECT_EQ(h5::link_count(data), 22U);
       EXPECT_FALSE(h5::has_link(data, "demo_7"));
-      EXPECT_EQ(h5::read_numbers<double>(h5::open_group(merged, "failed/episode_20"), "q").at(1), 20);
+      EXPECT_EQ(h5::read_numbers<double>(h5::open_group(merged, "failed/episode_20"), "q").at(1),
+                20);
       // Three rows: 1 and 2 of obs, then final_obs, which is row 3.
       for (hsize_t j = 0; j < 3; ++j)
         for (std::size_t k = 0; k < 2; ++k)
-          EXPECT_EQ(row(merged, "data/demo_33/next_obs/v", j)[k],
-                    tangere::testing::dataset_number<double>(33, 2, static_cast<std::int64_t>(j) + 1, k));
+          EXPECT_EQ(
+              row(merged, "data/demo_33/next_obs/v", j)[k],
+              tangere::testing::dataset_number<double>(33, 2, static_cast<std::int64_t>(j) + 1, k));
       const h5::Id view = h5::open_file(result.minari + "/data/main_data.hdf5");
       EXPECT_EQ(h5::link_count(view), 22U);
       std::vector<std::int64_t> demos;
@@ -79,7 +82,8 @@ TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
         EXPECT_EQ(h5::read_numbers<std::int64_t>(episode, "id").at(0), j);
         demos.push_back(h5::read_numbers<std::int64_t>(episode, "demo").at(0));
       }
-      EXPECT_THAT(demos, ElementsAre(1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 32, 33, 34, 35, 36, 37, 38, 39));
+      EXPECT_THAT(demos, ElementsAre(1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 32, 33, 34, 35,
+                                     36, 37, 38, 39));
     }
 }
 
@@ -103,7 +107,9 @@ TEST(DatasetMerge, ShowsSensorsWhosePercentSignsAreNoPattern) {
       EXPECT_THAT(examine_shard(result.file).problems, IsEmpty()) << sensor;
       {
         const h5::Id merged = h5::open_file(result.file);
-        EXPECT_EQ(row(merged, "data/demo_17/next_obs/" + sensor, 2), row(merged, "data/demo_17/final_obs/" + sensor, 0)) << sensor;
+        EXPECT_EQ(row(merged, "data/demo_17/next_obs/" + sensor, 2),
+                  row(merged, "data/demo_17/final_obs/" + sensor, 0))
+            << sensor;
       }
       const h5::Id view = h5::open_file(result.minari + "/data/main_data.hdf5");
       for (hsize_t j = 0; j < 4; ++j)
@@ -131,8 +137,11 @@ TEST(DatasetMerge, NamesTheShardAndTheMemberThatCannotBeOpened) {
   for (const bool copy : {false, true}) {
     const Folder folder;
     const DatasetFiles dataset = write_named(folder, "skin");
-    change(folder / "set/shard-00000.h5", [](hid_t file) { EXPECT_GE(H5Ldelete(file, "data/demo_9/final_obs/skin", H5P_DEFAULT), 0); });
-    EXPECT_THAT(complaint(dataset, copy), AllOf(HasSubstr("shard-00000.h5' is damaged: demo_9: "), HasSubstr("skin")));
+    change(folder / "set/shard-00000.h5", [](hid_t file) {
+      EXPECT_GE(H5Ldelete(file, "data/demo_9/final_obs/skin", H5P_DEFAULT), 0);
+    });
+    EXPECT_THAT(complaint(dataset, copy),
+                AllOf(HasSubstr("shard-00000.h5' is damaged: demo_9: "), HasSubstr("skin")));
     EXPECT_FALSE(std::filesystem::exists(folder / "set/robomimic.hdf5"));
   }
 }
@@ -140,11 +149,15 @@ TEST(DatasetMerge, NamesTheShardAndTheMemberThatCannotBeOpened) {
 TEST(DatasetMerge, NamesTheShardThatHasNotAllItsEpisodes) {
   const Folder folder;
   const DatasetFiles dataset = write_named(folder, "skin");
-  change(folder / "set/shard-00000.h5", [](hid_t file) { EXPECT_GE(H5Ldelete(file, "data/demo_9", H5P_DEFAULT), 0); });
-  EXPECT_THAT(complaint(dataset, false), HasSubstr("shard-00000.h5' is damaged: it has 15 demos and 0 failed episodes, expected 16"));
+  change(folder / "set/shard-00000.h5",
+         [](hid_t file) { EXPECT_GE(H5Ldelete(file, "data/demo_9", H5P_DEFAULT), 0); });
+  EXPECT_THAT(
+      complaint(dataset, false),
+      HasSubstr("shard-00000.h5' is damaged: it has 15 demos and 0 failed episodes, expected 16"));
 }
 
-/// Links show what is in the shards, and validate says what is wrong with it; a copy is not made of it.
+/// Links show what is in the shards, and validate says what is wrong with it; a copy is not made of
+/// it.
 TEST(DatasetMerge, CopiesNoNumbersThatAreNotThoseWritten) {
   const Folder folder;
   const DatasetFiles dataset = write_named(folder, "skin");
@@ -154,7 +167,8 @@ TEST(DatasetMerge, CopiesNoNumbersThatAreNotThoseWritten) {
     EXPECT_GE(H5Dwrite(actions, H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, others.data()), 0);
     H5Dclose(actions);
   });
-  EXPECT_THAT(complaint(dataset, true), HasSubstr("shard-00001.h5' is damaged: the checksum of its numbers is "));
+  EXPECT_THAT(complaint(dataset, true),
+              HasSubstr("shard-00001.h5' is damaged: the checksum of its numbers is "));
   EXPECT_FALSE(std::filesystem::exists(folder / "set/robomimic.hdf5"));
   EXPECT_FALSE(std::filesystem::exists(folder / "set/robomimic.hdf5.part"));
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several writers of one folder: the last of them says that it is complete, of one run, and none keeps another out.
+// Several writers of one folder: the last of them says that it is complete, of one run, and none
+// keeps another out.
 #include <gmock/gmock.h>
 
 #include "engine/error.hpp"
@@ -13,8 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::dataset_layout;
-using testing::Folder;
 using ::testing::ElementsAre;
+using testing::Folder;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::write_block;
@@ -27,11 +28,14 @@ DatasetLayout three_shards(std::uint64_t seed = 1) {
   return l;
 }
 
-DatasetOutput one(const Folder& folder, std::int64_t shard, ExistingShards existing = ExistingShards::refuse) {
+DatasetOutput one(const Folder& folder, std::int64_t shard,
+                  ExistingShards existing = ExistingShards::refuse) {
   return {folder / "set", existing, std::vector{shard}};
 }
 
-bool may_be_held_alone(const Folder& folder) { return FolderLock(folder / "set").take(FolderLock::Kind::alone); }
+bool may_be_held_alone(const Folder& folder) {
+  return FolderLock(folder / "set").take(FolderLock::Kind::alone);
+}
 
 TEST(DatasetShared, IsLetGoOfByWhoeverEndsAndHeldByWhoeverSeesAll) {
   const Folder folder;
@@ -65,8 +69,9 @@ TEST(DatasetShared, IsNotCompleteWithShardsOfAnotherRun) {
     DatasetWriter writer(one(folder, shard, ExistingShards::replace), l);
     write_block(writer, l, 16 * shard);
     EXPECT_FALSE(writer.complete());
-    EXPECT_THAT(writer.obstacle(), HasSubstr(shard == 0 ? "shard-00001.h5' is of another run: seed: 1 there, 2 here"
-                                                        : "shard-00002.h5' is of another run: seed: 1 there, 2 here"));
+    EXPECT_THAT(writer.obstacle(),
+                HasSubstr(shard == 0 ? "shard-00001.h5' is of another run: seed: 1 there, 2 here"
+                                     : "shard-00002.h5' is of another run: seed: 1 there, 2 here"));
     EXPECT_TRUE(may_be_held_alone(folder));
   }
   DatasetWriter last(one(folder, 2, ExistingShards::replace), l);
@@ -89,7 +94,8 @@ TEST(DatasetShared, IsNotCompleteWithAFileThatIsNoneOfItsShards) {
   const DatasetFiles files = find_dataset(folder / "set");
   EXPECT_THAT(files.missing, IsEmpty());
   EXPECT_THAT(files.surplus, ElementsAre(folder / "set/shard-00007.h5"));
-  EXPECT_THAT(examine_dataset(files).problems, ElementsAre(HasSubstr("shard-00007.h5: none of the shards that are counted")));
+  EXPECT_THAT(examine_dataset(files).problems,
+              ElementsAre(HasSubstr("shard-00007.h5: none of the shards that are counted")));
   try {
     check_complete(files);
     FAIL() << "one is too many";

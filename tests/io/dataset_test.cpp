@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shards hold what they were given where docs/datasets.md says, and the same bytes in whatever order it came.
+// Shards hold what they were given where docs/datasets.md says, and the same bytes in whatever
+// order it came.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
@@ -23,7 +24,6 @@ using testing::Folder;
 using ::testing::HasSubstr;
 using testing::write_block;
 using testing::write_piece;
-
 
 /// The only shard of a data set of 20 episodes, of which 2 and 17 failed.
 std::string one_shard(const Folder& folder, const DatasetLayout& l) {
@@ -202,7 +202,8 @@ TEST(Dataset, BytesDoNotDependOnTheOrderOfBlocksNorOnPieces) {
     writer.finish(48, {});
     write_block(writer, l, 16);
   }
-  EXPECT_TRUE(file_bytes(ascending / "set/shard-00000.h5") == file_bytes(mixed / "set/shard-00000.h5"));
+  EXPECT_TRUE(file_bytes(ascending / "set/shard-00000.h5") ==
+              file_bytes(mixed / "set/shard-00000.h5"));
 }
 
 TEST(Dataset, LongOnesAreSeveralShards) {
@@ -285,15 +286,15 @@ TEST(Dataset, NamesThatNoFileCanHoldAreRefused) {
   EXPECT_THAT(complaint("q", "c"), HasSubstr("another observation has this name"));
   EXPECT_THAT(complaint("c", "c"), HasSubstr("another observation has this name"));
   EXPECT_EQ(complaint(std::string(200, 'a'), std::string(254, 'b')), "nothing");
-  EXPECT_THAT(complaint(std::string(300, 'p'), "c"),
-              HasSubstr("'" + std::string(32, 'p') + "…': a name of 300 bytes; expected at most 255"));
+  EXPECT_THAT(
+      complaint(std::string(300, 'p'), "c"),
+      HasSubstr("'" + std::string(32, 'p') + "…': a name of 300 bytes; expected at most 255"));
   EXPECT_EQ(folder.entries(), 0U);
 }
 
 TEST(Dataset, MoreThanTheDiskHoldsIsRefusedBeforeAnythingIsWritten) {
   const Folder folder;
-  EXPECT_THROW(DatasetWriter({folder / "set"}, dataset_layout(std::int64_t{1} << 50)),
-               IoError);
+  EXPECT_THROW(DatasetWriter({folder / "set"}, dataset_layout(std::int64_t{1} << 50)), IoError);
   EXPECT_EQ(folder.entries(), 0U);
 }
 

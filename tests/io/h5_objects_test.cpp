@@ -115,8 +115,11 @@ TEST(H5Objects, ADatasetSharesTextsThatTheLibraryReadsAndCopies) {
     ASSERT_GE(H5Ocopy(opened.get(), "object", memory.get(), "copy", H5P_DEFAULT, H5P_DEFAULT), 0);
     EXPECT_EQ(h5::read_text(h5::open_dataset(memory, "copy"), "second"), second);
     h5::write_attribute(memory, "own", "the library's");
-    const h5::Id attribute(H5Aopen(object.get(), "first", H5P_DEFAULT)), own(H5Aopen(memory.get(), "own", H5P_DEFAULT));
-    EXPECT_GT(H5Tequal(h5::Id(H5Aget_type(attribute.get())).get(), h5::Id(H5Aget_type(own.get())).get()), 0);
+    const h5::Id attribute(H5Aopen(object.get(), "first", H5P_DEFAULT)),
+        own(H5Aopen(memory.get(), "own", H5P_DEFAULT));
+    EXPECT_GT(
+        H5Tequal(h5::Id(H5Aget_type(attribute.get())).get(), h5::Id(H5Aget_type(own.get())).get()),
+        0);
   }
 }
 
@@ -132,12 +135,10 @@ TEST(H5Objects, EveryTypeIsTheLibrarysOwn) {
   const std::int8_t no = 0, yes = 1;
   H5Tenum_insert(boolean.get(), "FALSE", &no);
   H5Tenum_insert(boolean.get(), "TRUE", &yes);
-  const std::vector<std::pair<h5::NumberType, hid_t>> types{{h5::NumberType::float32, H5T_IEEE_F32LE},
-                                                            {h5::NumberType::float64, H5T_IEEE_F64LE},
-                                                            {h5::NumberType::int8, H5T_STD_I8LE},
-                                                            {h5::NumberType::int64, H5T_STD_I64LE},
-                                                            {h5::NumberType::uint64, H5T_STD_U64LE},
-                                                            {h5::NumberType::boolean, boolean.get()}};
+  const std::vector<std::pair<h5::NumberType, hid_t>> types{
+      {h5::NumberType::float32, H5T_IEEE_F32LE}, {h5::NumberType::float64, H5T_IEEE_F64LE},
+      {h5::NumberType::int8, H5T_STD_I8LE},      {h5::NumberType::int64, H5T_STD_I64LE},
+      {h5::NumberType::uint64, H5T_STD_U64LE},   {h5::NumberType::boolean, boolean.get()}};
   for (std::size_t k = 0; k < types.size(); ++k) {
     Extended file(folder / ("file" + std::to_string(k) + ".h5"));
     h5::add_dataset(file.objects(), {types[k].first, {0}, {}, h5::kNowhere});
@@ -167,7 +168,8 @@ TEST(H5Objects, ChunksAreFoundThroughIndexesOfAnyDepth) {
     EXPECT_EQ(file.here() - before, h5::chunk_index_bytes(count, 2));
     const std::uint64_t dataset = file.here();
     // The last chunk has a row more than the dataset.
-    h5::add_dataset(file.objects(), {h5::NumberType::float32, {kRows * count - 1, 2}, {kRows, 2}, index});
+    h5::add_dataset(file.objects(),
+                    {h5::NumberType::float32, {kRows * count - 1, 2}, {kRows, 2}, index});
     const h5::Id opened = file.open(dataset), object = h5::open_dataset(opened, "object");
     numbers.resize(numbers.size() - 2);
     std::vector<float> read(numbers.size());
@@ -194,14 +196,18 @@ TEST(H5Objects, GroupsOfAnySizeListAndFindTheirMembers) {
       const std::array attributes{h5::FileAttribute{"k", h5::NumberType::int64, false, bytes}};
       h5::add_group(file.objects(), {}, attributes);
     }
-    const std::uint64_t address = h5::add_large_group(file.objects(), file.base(), "demo_", members);
+    const std::uint64_t address =
+        h5::add_large_group(file.objects(), file.base(), "demo_", members);
     const h5::Id opened = file.open(address), group = h5::open_group(opened, "object");
     std::sort(names.begin(), names.end());
     EXPECT_EQ(h5::link_names(group), names);
     EXPECT_EQ(h5::link_count(group), names.size());
     EXPECT_FALSE(h5::has_link(group, "demo_"));
     for (int k = 0; k < count; ++k)
-      ASSERT_EQ(h5::read_numbers<std::int64_t>(h5::open_group(group, "demo_" + std::to_string(k)), "k").at(0), k);
+      ASSERT_EQ(
+          h5::read_numbers<std::int64_t>(h5::open_group(group, "demo_" + std::to_string(k)), "k")
+              .at(0),
+          k);
   }
 }
 
@@ -232,9 +238,12 @@ void write_sources(const std::string& path, h5::Dims shape, bool single) {
   for (const hsize_t rows : {hsize_t{5}, hsize_t{1}}) {
     shape[0] = rows;
     std::vector<double> numbers;
-    for (hsize_t k = 0; k < std::accumulate(shape.begin(), shape.end(), hsize_t{1}, std::multiplies<>()); ++k) numbers.push_back(next++);
+    for (hsize_t k = 0;
+         k < std::accumulate(shape.begin(), shape.end(), hsize_t{1}, std::multiplies<>()); ++k)
+      numbers.push_back(next++);
     const char* const name = rows == 1 ? "one" : "many";
-    const h5::Id dataset = single ? h5::create_dataset<float>(file, name, shape) : h5::create_dataset<double>(file, name, shape);
+    const h5::Id dataset = single ? h5::create_dataset<float>(file, name, shape)
+                                  : h5::create_dataset<double>(file, name, shape);
     h5::write_box(dataset, h5::Dims(shape.size(), 0), shape, numbers.data());
   }
   h5::close_file(file, path);
@@ -260,7 +269,8 @@ Shown shown(const h5::Id& dataset) {
     H5Pget_virtual_filename(creation.get(), k, file.data(), file.size());
     H5Pget_virtual_dsetname(creation.get(), k, path.data(), path.size());
     said.sources.push_back(std::string(file.data()) + ":" + path.data());
-    for (const hid_t id : {H5Pget_virtual_srcspace(creation.get(), k), H5Pget_virtual_vspace(creation.get(), k)}) {
+    for (const hid_t id :
+         {H5Pget_virtual_srcspace(creation.get(), k), H5Pget_virtual_vspace(creation.get(), k)}) {
       const h5::Id space(id);
       std::vector<hsize_t> first(said.dims.size()), last(said.dims.size());
       if (H5Sget_select_type(id) == H5S_SEL_ALL) continue;
@@ -270,7 +280,8 @@ Shown shown(const h5::Id& dataset) {
     }
   }
   const h5::Id type(H5Dget_type(dataset.get()));
-  said.numbers.resize(std::accumulate(said.dims.begin(), said.dims.end(), hsize_t{1}, std::multiplies<>()));
+  said.numbers.resize(
+      std::accumulate(said.dims.begin(), said.dims.end(), hsize_t{1}, std::multiplies<>()));
   h5::read_box(dataset, h5::Dims(said.dims.size(), 0), said.dims, said.numbers.data());
   return said;
 }
@@ -284,11 +295,13 @@ TEST(H5Objects, AViewIsTheLibrarysOwn) {
         h5::Id library = h5::create_file(folder / "library.h5", 2048, true);
         {
           const h5::Id source = h5::open_file(folder / "source.h5");
-          h5::create_virtual(library, "object", h5::open_dataset(source, "many"), {"source.h5", "/many"}, {"source.h5", "/one"}, skipped);
+          h5::create_virtual(library, "object", h5::open_dataset(source, "many"),
+                             {"source.h5", "/many"}, {"source.h5", "/one"}, skipped);
         }
         h5::close_file(library, folder / "library.h5");
         Extended file(folder / "file.h5");
-        h5::FileDataset dataset{single ? h5::NumberType::float32 : h5::NumberType::float64, {shape.begin(), shape.end()}};
+        h5::FileDataset dataset{single ? h5::NumberType::float32 : h5::NumberType::float64,
+                                {shape.begin(), shape.end()}};
         dataset.dims[0] = 6 - skipped;
         std::vector<h5::ShownRows> parts;
         if (skipped < 5) parts.push_back({"source.h5", "/many", skipped, 5 - skipped, 5});
@@ -301,15 +314,20 @@ TEST(H5Objects, AViewIsTheLibrarysOwn) {
         h5::add_dataset(file.objects(), dataset);
         {
           const h5::Id opened = file.open(address), expected = h5::open_file(folder / "library.h5");
-          const h5::Id object = h5::open_dataset(opened, "object"), like = h5::open_dataset(expected, "object");
+          const h5::Id object = h5::open_dataset(opened, "object"),
+                       like = h5::open_dataset(expected, "object");
           const Shown said = shown(object);
           EXPECT_EQ(said, shown(like)) << "from row " << skipped;
-          EXPECT_EQ(said.numbers.front(), static_cast<double>(skipped * said.numbers.size() / (6 - skipped)));
-          EXPECT_GT(H5Tequal(h5::Id(H5Dget_type(object.get())).get(), h5::Id(H5Dget_type(like.get())).get()), 0);
+          EXPECT_EQ(said.numbers.front(),
+                    static_cast<double>(skipped * said.numbers.size() / (6 - skipped)));
+          EXPECT_GT(H5Tequal(h5::Id(H5Dget_type(object.get())).get(),
+                             h5::Id(H5Dget_type(like.get())).get()),
+                    0);
         }
         std::filesystem::remove(folder / "source.h5");
         const h5::Id opened = h5::open_file(folder / "file.h5");
-        EXPECT_TRUE(std::isnan(shown(h5::open_dataset(opened, "object")).numbers.front())) << "the source is missing";
+        EXPECT_TRUE(std::isnan(shown(h5::open_dataset(opened, "object")).numbers.front()))
+            << "the source is missing";
       }
 }
 
@@ -352,7 +370,8 @@ TEST(H5Objects, TheFirstGroupOfAFileMayBeALargeOne) {
   const h5::Id opened = h5::open_file(path);
   EXPECT_EQ(h5::link_count(opened), kMany);
   EXPECT_EQ(h5::read_numbers<std::int64_t>(opened, "total").at(0), kMany);
-  for (int k = 0; k < kMany; k += 7) EXPECT_TRUE(h5::has_link(opened, "episode_" + std::to_string(k)));
+  for (int k = 0; k < kMany; k += 7)
+    EXPECT_TRUE(h5::has_link(opened, "episode_" + std::to_string(k)));
   EXPECT_TRUE(h5::link_names(h5::open_group(opened, "/episode_49999")).empty());
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The picture of speed by threads: well-formed, every mark where its numbers say, whatever a name contains.
+// The picture of speed by threads: well-formed, every mark where its numbers say, whatever a name
+// contains.
 #include "io/scaling_plot.hpp"
 
 #include <gmock/gmock.h>

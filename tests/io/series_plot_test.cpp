@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of curves: well-formed, every mark where its numbers say, gaps left out, whatever a name contains.
+// Pictures of curves: well-formed, every mark where its numbers say, gaps left out, whatever a name
+// contains.
 #include "io/series_plot.hpp"
 
 #include <gmock/gmock.h>
@@ -41,16 +42,21 @@ TEST(SeriesPlot, DotsLieInProportion) {
 }
 
 TEST(SeriesPlot, DecadesAreEquallyFarAndZeroHasNoPlace) {
-  const auto at = dots(draw({"p", "x", "y", true, {{"", {0, 1, 2, 3}, {1e-6, 1e-3, 0, 1}, true, 0}}}));
+  const auto at =
+      dots(draw({"p", "x", "y", true, {{"", {0, 1, 2, 3}, {1e-6, 1e-3, 0, 1}, true, 0}}}));
   ASSERT_EQ(at.size(), 3U);
   EXPECT_NEAR(at[0].second - at[1].second, at[1].second - at[2].second, 0.2);
 }
 
 TEST(SeriesPlot, LinesHaveGapsAndNamesAreEscaped) {
-  const std::string svg = draw(
-      {"left & right", "time [s]", "force <N>", false, {{"k<n", {0, 1, 2, 3}, {1, 2, NAN, 1}, false, 1}}});
+  const std::string svg = draw({"left & right",
+                                "time [s]",
+                                "force <N>",
+                                false,
+                                {{"k<n", {0, 1, 2, 3}, {1, 2, NAN, 1}, false, 1}}});
   EXPECT_EQ(dots(svg).size(), 0U);
-  for (const char* part : {"a &amp; b", "noise &lt; 1 %", "left &amp; right", "time [s]", "force &lt;N&gt;", "k&lt;n"})
+  for (const char* part :
+       {"a &amp; b", "noise &lt; 1 %", "left &amp; right", "time [s]", "force &lt;N&gt;", "k&lt;n"})
     EXPECT_THAT(svg, HasSubstr(part));
   EXPECT_THAT(svg, testing::Not(HasSubstr("nan")));
 }

@@ -17,10 +17,11 @@
 namespace tangere {
 namespace {
 
-using ::testing::HasSubstr;
 using kernels::Vec3;
+using ::testing::HasSubstr;
 
-/// The box [0, 1] × [0, 2] × [0, 3]: quadrilaterals, comments, texture indices, an index counted from the end.
+/// The box [0, 1] × [0, 2] × [0, 3]: quadrilaterals, comments, texture indices, an index counted
+/// from the end.
 const std::string kBox = R"(# a box
 o box
 v 0 0 0
@@ -44,7 +45,8 @@ f 4 1 5 8
 
 class SurfaceFiles : public ::testing::Test {
  protected:
-  SurfaceFiles() : folder_(::testing::TempDir() + "tangere_surface_" + std::to_string(getpid()) + "/") {
+  SurfaceFiles()
+      : folder_(::testing::TempDir() + "tangere_surface_" + std::to_string(getpid()) + "/") {
     std::filesystem::create_directories(folder_);
   }
   ~SurfaceFiles() override { std::filesystem::remove_all(folder_); }
@@ -90,13 +92,15 @@ TEST_F(SurfaceFiles, ABoxHasTheMassOfTheCuboid) {
   const MeshShape mesh = read_obj(write("box.obj", kBox));
   EXPECT_EQ(mesh.vertices.size(), 24U);  // without the one that no face uses
   EXPECT_EQ(mesh.triangles.size(), 12U);
-  const MassProperties got = mass_properties(mesh, 700), box = mass_properties(CuboidShape{{1, 2, 3}, {2, 2, 2}}, 700);
+  const MassProperties got = mass_properties(mesh, 700),
+                       box = mass_properties(CuboidShape{{1, 2, 3}, {2, 2, 2}}, 700);
   EXPECT_NEAR(got.mass, box.mass, 1e-12 * box.mass);
   EXPECT_NEAR(got.centre.x, 0.5, 1e-15);
   EXPECT_NEAR(got.centre.y, 1, 1e-15);
   EXPECT_NEAR(got.centre.z, 1.5, 1e-15);
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) EXPECT_NEAR(got.inertia.m[i][j], box.inertia.m[i][j], 1e-12 * box.mass);
+    for (int j = 0; j < 3; ++j)
+      EXPECT_NEAR(got.inertia.m[i][j], box.inertia.m[i][j], 1e-12 * box.mass);
 }
 
 /// Any affine image A x + b of a solid has volume det A, centre A c + b and second moments A S Aᵀ.
@@ -123,18 +127,21 @@ TEST_F(SurfaceFiles, MovedAndShearedMeshesFollowTheirVertices) {
     EXPECT_NEAR(got.mass, 2 * 6 * det, 1e-9);
     const Vec3<double> centre = A * Vec3<double>{0.5, 1, 1.5} + b;
     EXPECT_NEAR(dot(got.centre - centre, got.centre - centre), 0, 1e-20);
-    const kernels::Mat3<double> S = A * (kernels::Mat3<double>{{{1, 0, 0}, {0, 4, 0}, {0, 0, 9}}}) * transpose(A);
+    const kernels::Mat3<double> S =
+        A * (kernels::Mat3<double>{{{1, 0, 0}, {0, 4, 0}, {0, 0, 9}}}) * transpose(A);
     const double trace = S.m[0][0] + S.m[1][1] + S.m[2][2];
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j)
-        EXPECT_NEAR(got.inertia.m[i][j], 2 * 6 * det / 12 * ((i == j ? trace : 0) - S.m[i][j]), 1e-8);
+        EXPECT_NEAR(got.inertia.m[i][j], 2 * 6 * det / 12 * ((i == j ? trace : 0) - S.m[i][j]),
+                    1e-8);
   }
 }
 
 TEST_F(SurfaceFiles, SeamsAreWelded) {
   // The top has its own copies of its four vertices.
   std::string text = kBox;
-  text.replace(text.find("f 5/1/1 6/2/1 7//1 -2"), 21, "v 0 0 3\nv 1 0 3\nv 1 2 3\nv -0 2 3\nf 10 11 12 13");
+  text.replace(text.find("f 5/1/1 6/2/1 7//1 -2"), 21,
+               "v 0 0 3\nv 1 0 3\nv 1 2 3\nv -0 2 3\nf 10 11 12 13");
   EXPECT_EQ(read_obj(write("box.obj", text)).vertices.size(), 24U);
 }
 
@@ -144,15 +151,19 @@ TEST_F(SurfaceFiles, WhatIsNoClosedSurfaceIsRefusedWithItsPlace) {
   EXPECT_THAT(box_error("f 4 1 5 8\n", "f 8 5 1 4\n"), HasSubstr("disagree on what is outside"));
   EXPECT_THAT(box_error("v 1 2 3", "v 1 2 nan"), HasSubstr("a.obj:9: 'nan'; expected a number"));
   EXPECT_THAT(box_error("v 1 2 3", "v 1 2 1e300"), HasSubstr("a.obj:9: '1e300'"));
-  EXPECT_THAT(box_error("v 1 2 3", "v 1 2"), HasSubstr("a.obj:9: a vertex of 2 numbers; expected x y z"));
-  EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1 5 18"), HasSubstr("a.obj:19: vertex 18; expected one of the 9"));
+  EXPECT_THAT(box_error("v 1 2 3", "v 1 2"),
+              HasSubstr("a.obj:9: a vertex of 2 numbers; expected x y z"));
+  EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1 5 18"),
+              HasSubstr("a.obj:19: vertex 18; expected one of the 9"));
   EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1 5 0"), HasSubstr("a.obj:19: vertex 0"));
   EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1 5 -10"), HasSubstr("a.obj:19: vertex -10"));
   EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1"), HasSubstr("a.obj:19: a face of 2 vertices"));
-  EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1 x"), HasSubstr("a.obj:19: 'x'; expected the number of a vertex"));
+  EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1 x"),
+              HasSubstr("a.obj:19: 'x'; expected the number of a vertex"));
   EXPECT_THAT(box_error("s off", "solid box"), HasSubstr("a.obj:13: 'solid'; expected v, f"));
   EXPECT_THAT(obj_error(""), HasSubstr("a.obj: no faces"));
-  EXPECT_THAT(obj_error("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n"), HasSubstr("encloses no volume"));
+  EXPECT_THAT(obj_error("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n"),
+              HasSubstr("encloses no volume"));
   EXPECT_THAT(obj_error("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n"),
               HasSubstr("the faces point inwards"));
   EXPECT_THROW(read_obj(folder_ + "none.obj"), IoError);
@@ -180,7 +191,9 @@ TEST_F(SurfaceFiles, ACompiledMeshIsTheCuboidInItsPlace) {
       R"(<body name="a" type="mesh" filename="box.obj" density="2" quat="1 0 1 0" pos="1 2 3" transform_type=)";
   const Scene placed = scene(mesh + "\"OBJ_TO_JOINT\" scale=\"2 1 1\"/>").scene;
   const Scene cuboid =
-      scene(R"(<body name="a" type="cuboid" size="2 2 3" density="2" quat="1 0 1 0" pos="2.5 3 2"/>)").scene;
+      scene(
+          R"(<body name="a" type="cuboid" size="2 2 3" density="2" quat="1 0 1 0" pos="2.5 3 2"/>)")
+          .scene;
   const auto a = compile(placed), b = compile(cuboid);
   const kernels::Link &x = a->links.back(), &y = b->links.back();
   EXPECT_NEAR(x.mass, y.mass, 1e-14);
@@ -202,8 +215,8 @@ TEST_F(SurfaceFiles, ACompiledMeshIsTheCuboidInItsPlace) {
 
 TEST_F(SurfaceFiles, AnAbstractBodyIsWhatItsNumbersSay) {
   write("p.txt", "3\n1 0 0\n0 2 0\n0 0 3\n");
-  const SceneFile file =
-      scene(R"(<body name="a" type="abstract" mass="5" inertia="2 0.1 0 3 0 4"><visual mesh="no.obj"/>
+  const SceneFile file = scene(
+      R"(<body name="a" type="abstract" mass="5" inertia="2 0.1 0 3 0 4"><visual mesh="no.obj"/>
 <collision contacts="p.txt" pos="0 0 1" quat="1 0 0 1"/></body>)");
   EXPECT_TRUE(file.warnings.empty());
   const auto& shape = std::get<AbstractShape>(file.scene.links[0].body.shape);
@@ -217,7 +230,8 @@ TEST_F(SurfaceFiles, AnAbstractBodyIsWhatItsNumbersSay) {
   EXPECT_NEAR(model->links.back().inertia.m[0][1], 0.1e-7, 1e-22);
 }
 
-/// The same points as a tactile hemisphere of that radius and count, in the scene's unit, where pos and quat put them.
+/// The same points as a tactile hemisphere of that radius and count, in the scene's unit, where pos
+/// and quat put them.
 TEST_F(SurfaceFiles, AnAbstractBodyMayTouchWithAHemisphere) {
   const std::string text = R"(<body name="a" type="abstract" mass="5" inertia="2 2 3">
 <collision radius="2" count="144" pos="0 0 -0.75" quat="1 0 0 1"/></body>)";
@@ -235,12 +249,18 @@ TEST_F(SurfaceFiles, AnAbstractBodyMayTouchWithAHemisphere) {
     std::string wrong = text;
     return scene_error(wrong.replace(wrong.find(from), from.size(), to));
   };
-  EXPECT_THAT(refusal(" radius=\"2\"", ""), HasSubstr("s.xml:4: <collision>: attribute 'radius' is missing"));
-  EXPECT_THAT(refusal(" count=\"144\"", ""), HasSubstr("s.xml:4: <collision>: attribute 'count' is missing"));
-  EXPECT_THAT(refusal("radius=\"2\" count=\"144\"", ""), HasSubstr("no contact points; expected 'contacts' (a file)"));
-  EXPECT_THAT(refusal("radius=\"2\"", "radius=\"2\" contacts=\"p.txt\""), HasSubstr("both 'contacts' and a hemisphere"));
-  EXPECT_THAT(refusal("radius=\"2\"", "radius=\"-2\""), HasSubstr("s.xml:4: <collision>: radius=\"-2\""));
-  EXPECT_THAT(refusal("count=\"144\"", "count=\"0\""), HasSubstr("s.xml:4: <collision>: count=\"0\""));
+  EXPECT_THAT(refusal(" radius=\"2\"", ""),
+              HasSubstr("s.xml:4: <collision>: attribute 'radius' is missing"));
+  EXPECT_THAT(refusal(" count=\"144\"", ""),
+              HasSubstr("s.xml:4: <collision>: attribute 'count' is missing"));
+  EXPECT_THAT(refusal("radius=\"2\" count=\"144\"", ""),
+              HasSubstr("no contact points; expected 'contacts' (a file)"));
+  EXPECT_THAT(refusal("radius=\"2\"", "radius=\"2\" contacts=\"p.txt\""),
+              HasSubstr("both 'contacts' and a hemisphere"));
+  EXPECT_THAT(refusal("radius=\"2\"", "radius=\"-2\""),
+              HasSubstr("s.xml:4: <collision>: radius=\"-2\""));
+  EXPECT_THAT(refusal("count=\"144\"", "count=\"0\""),
+              HasSubstr("s.xml:4: <collision>: count=\"0\""));
   EXPECT_THAT(refusal("count=\"144\"", "count=\"1.5\""), HasSubstr("count=\"1.5\""));
   EXPECT_THAT(refusal("radius=\"2\"", "radus=\"2\""), HasSubstr("did you mean 'radius'"));
 }
@@ -249,16 +269,22 @@ TEST_F(SurfaceFiles, ScenesSayWhatIsWrongWithTheirBodies) {
   write("box.obj", kBox);
   EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj"/>)"),
               HasSubstr("s.xml:3: <body>: attribute 'transform_type' is missing"));
-  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj" transform_type="BODY_TO_JOINT"/>)"),
-              HasSubstr("principal axes"));
-  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOIN"/>)"),
-              HasSubstr("did you mean 'OBJ_TO_JOINT'"));
+  EXPECT_THAT(
+      scene_error(
+          R"(<body name="a" type="mesh" filename="box.obj" transform_type="BODY_TO_JOINT"/>)"),
+      HasSubstr("principal axes"));
+  EXPECT_THAT(
+      scene_error(
+          R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOIN"/>)"),
+      HasSubstr("did you mean 'OBJ_TO_JOINT'"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" transform_type="OBJ_TO_JOINT"/>)"),
               HasSubstr("'filename' is missing"));
   EXPECT_THAT(
-      scene_error(R"(<body name="a" type="mesh" filename="box.obj" scale="1 0 1" transform_type="OBJ_TO_JOINT"/>)"),
+      scene_error(
+          R"(<body name="a" type="mesh" filename="box.obj" scale="1 0 1" transform_type="OBJ_TO_JOINT"/>)"),
       HasSubstr("scale has 0"));
-  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" inertia="1 1 1"/>)"), HasSubstr("'mass' is missing"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" inertia="1 1 1"/>)"),
+              HasSubstr("'mass' is missing"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1"/>)"),
               HasSubstr("inertia has 2 numbers; expected 3"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1 3"/>)"),
@@ -267,27 +293,34 @@ TEST_F(SurfaceFiles, ScenesSayWhatIsWrongWithTheirBodies) {
               HasSubstr("no solid body"));
 }
 
-/// Without a distance a body can touch but not be touched, in a file or in a scene built in code; no sensor feels it.
+/// Without a distance a body can touch but not be touched, in a file or in a scene built in code;
+/// no sensor feels it.
 TEST_F(SurfaceFiles, NothingTouchesAMesh) {
   write("box.obj", kBox);
-  const std::string cans = R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOINT"/></link>
+  const std::string cans =
+      R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOINT"/></link>
 <link name="b"><joint name="b" type="free3d"/><body name="b" type="cuboid" size="1 1 1"/>)";
   const auto with_contact = [&](const std::string& general, const std::string& primitive) {
-    return parse_scene(R"(<tangere><robot><link name="a"><joint name="a" type="free3d"/>
-)" + cans + R"(</link></robot><contact><general_primitive_contact general_body=")" + general + R"(" primitive_body=")" +
-                           primitive + R"("/></contact><sensor><tactile body="b" type="rect_array" rect_pos0="0 0 0.5"
+    return parse_scene(
+               R"(<tangere><robot><link name="a"><joint name="a" type="free3d"/>
+)" + cans + R"(</link></robot><contact><general_primitive_contact general_body=")" +
+                   general + R"(" primitive_body=")" + primitive +
+                   R"("/></contact><sensor><tactile body="b" type="rect_array" rect_pos0="0 0 0.5"
 rect_pos1="0.1 0.1 0.5" axis0="1 0 0" axis1="0 1 0" resolution="2 2"/></sensor></tangere>)",
-                       folder_ + "s.xml")
+               folder_ + "s.xml")
         .scene;
   };
-  EXPECT_THAT(error_of([&] { with_contact("b", "a"); }),
-              HasSubstr("primitive_body 'a' is a mesh body, which has no distance function; expected a sphere"));
+  EXPECT_THAT(
+      error_of([&] { with_contact("b", "a"); }),
+      HasSubstr(
+          "primitive_body 'a' is a mesh body, which has no distance function; expected a sphere"));
   Scene s = with_contact("a", "b");
   const auto model = compile(s);
   EXPECT_EQ(model->pairs[0].n_points, 8);
   EXPECT_TRUE(model->sensors[0].targets.empty());
   std::swap(s.pair_contacts[0].general_body, s.pair_contacts[0].primitive_body);
-  EXPECT_THAT(error_of([&] { compile(s); }), HasSubstr("primitive_body 'a' (mesh) has no distance"));
+  EXPECT_THAT(error_of([&] { compile(s); }),
+              HasSubstr("primitive_body 'a' (mesh) has no distance"));
 }
 
 }  // namespace

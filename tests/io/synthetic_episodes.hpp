@@ -37,7 +37,8 @@ inline DatasetLayout dataset_layout(std::int64_t episodes, bool single = true) {
   return l;
 }
 
-/// Number k of a row; name 0 is the actions, then q, v, end effectors if any, skin. Exact in float32.
+/// Number k of a row; name 0 is the actions, then q, v, end effectors if any, skin. Exact in
+/// float32.
 template <class T>
 T dataset_number(std::int64_t episode, std::size_t name, std::int64_t row, std::size_t k) {
   if (name == 0)

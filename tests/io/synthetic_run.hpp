@@ -28,7 +28,9 @@ class Folder {
   }
   Folder(const Folder&) = delete;
   Folder& operator=(const Folder&) = delete;
-  [[nodiscard]] std::string operator/(const std::string& name) const { return (path_ / name).string(); }
+  [[nodiscard]] std::string operator/(const std::string& name) const {
+    return (path_ / name).string();
+  }
   [[nodiscard]] std::size_t entries() const {
     return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_), {}));
   }
@@ -79,7 +81,9 @@ inline TrajectoryLayout layout(std::int64_t steps = 5) {
   return l;
 }
 
-inline double number(int kind, std::int64_t row, std::size_t k) { return 1000.0 * kind + 10.0 * double(row) + 0.001 * double(k); }
+inline double number(int kind, std::int64_t row, std::size_t k) {
+  return 1000.0 * kind + 10.0 * double(row) + 0.001 * double(k);
+}
 
 inline std::vector<double> numbers(int kind, std::int64_t row, std::size_t count) {
   std::vector<double> x(count);
@@ -100,7 +104,8 @@ inline std::vector<double> field(std::int64_t frame, double force) {
 
 inline void write_run(RowSink& sink, const TrajectoryLayout& l, double force = 1e-3) {
   for (std::int64_t t = 0; t <= l.steps; ++t) {
-    const auto q = numbers(1, t, 6), v = numbers(2, t, 6), pose = numbers(3, t, 14), twist = numbers(4, t, 12);
+    const auto q = numbers(1, t, 6), v = numbers(2, t, 6), pose = numbers(3, t, 14),
+               twist = numbers(4, t, 12);
     const auto variables = numbers(7, t, 2 * 3 * l.variable_names.size());
     sink.write(StateRow{t, double(t) * l.timestep, q, v, pose, twist, variables});
     if (t == l.steps) break;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of curved pads: evenly spread, in their order, with axes that turn the right way; files that say what is wrong.
+// Points of curved pads: evenly spread, in their order, with axes that turn the right way; files
+// that say what is wrong.
 #include "io/tactile_layouts.hpp"
 
 #include <gmock/gmock.h>
@@ -33,8 +34,9 @@ void expect_frame(const TactilePoint& p) {
 class TacFile {
  public:
   explicit TacFile(const std::string& text)
-      : path_(std::filesystem::path(::testing::TempDir()) / (std::string(::testing::UnitTest::GetInstance()
-                                                                             ->current_test_info()->name()) + ".txt")) {
+      : path_(std::filesystem::path(::testing::TempDir()) /
+              (std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()) +
+               ".txt")) {
     std::ofstream(path_) << text;
   }
   ~TacFile() { std::filesystem::remove(path_); }
@@ -133,7 +135,8 @@ TEST(TactileLayouts, AMeshIsCutAtThePitch) {
   MeshShape mesh;
   mesh.vertices = {0, 0, 0, 3, 0, 0, 0, 3, 0, 0, 0, 1};
   mesh.triangles = {{0, 1, 2}};
-  const std::vector<TactilePoint> points = mesh_points(mesh, 1.5, 100);  // the long edge is 4.24: three cuts
+  const std::vector<TactilePoint> points =
+      mesh_points(mesh, 1.5, 100);  // the long edge is 4.24: three cuts
   ASSERT_EQ(points.size(), 9U);
   Vector3 mean{};
   for (const TactilePoint& p : points) {
@@ -150,8 +153,9 @@ TEST(TactileLayouts, AMeshIsCutAtThePitch) {
 }
 
 TEST(TactileLayouts, AFileGivesPlacesAxesAndFactors) {
-  const TacFile file("# a finger\n2\n\"0.1 0.2 0.3\" \"4 5\" \"0 0 2\" \"1 0 0\" \"0 3 0\"\n"
-                     "\"+1 0 0\" \"-1 -1\" \"1 0 0\" \"0 1 0\" \"0 0 1\" \"2 1 0.5 0\"\n\n");
+  const TacFile file(
+      "# a finger\n2\n\"0.1 0.2 0.3\" \"4 5\" \"0 0 2\" \"1 0 0\" \"0 3 0\"\n"
+      "\"+1 0 0\" \"-1 -1\" \"1 0 0\" \"0 1 0\" \"0 0 1\" \"2 1 0.5 0\"\n\n");
   std::vector<TactilePoint> points = read_tactile_points(file.path());
   ASSERT_EQ(points.size(), 2U);
   EXPECT_EQ(points[0].position, (Vector3{0.1, 0.2, 0.3}));
@@ -172,16 +176,22 @@ TEST(TactileLayouts, FilesSayWhatIsWrongAndWhere) {
   EXPECT_THAT(complaint("0\n"), HasSubstr(":1: the first line is no count"));
   EXPECT_THAT(complaint("2\n" + good), HasSubstr("ends after 1 of 2"));
   EXPECT_THAT(complaint("1\n" + good + good), HasSubstr(":3: more than the 1 points"));
-  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0\" \"0 0 1\" \"1 0 0\"\n"), HasSubstr(":2: 11 numbers; expected"));
-  EXPECT_THAT(complaint("1\n\"0 0 nan\" \"0 0\" \"0 0 1\" \"1 0 0\" \"0 1 0\"\n"), HasSubstr(":2: 'nan'; expected a number of at most"));
-  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0.5\" \"0 0 1\" \"1 0 0\" \"0 1 0\"\n"), HasSubstr("'0.5'; expected a whole number"));
-  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0\" \"0 0 0\" \"1 0 0\" \"0 1 0\"\n"), HasSubstr("normal has no length"));
-  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0\" \"0 0 1\" \"1 0 0\" \"0 1 0\" \"1 1 1 -1\"\n"), HasSubstr("factor -1"));
+  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0\" \"0 0 1\" \"1 0 0\"\n"),
+              HasSubstr(":2: 11 numbers; expected"));
+  EXPECT_THAT(complaint("1\n\"0 0 nan\" \"0 0\" \"0 0 1\" \"1 0 0\" \"0 1 0\"\n"),
+              HasSubstr(":2: 'nan'; expected a number of at most"));
+  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0.5\" \"0 0 1\" \"1 0 0\" \"0 1 0\"\n"),
+              HasSubstr("'0.5'; expected a whole number"));
+  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0\" \"0 0 0\" \"1 0 0\" \"0 1 0\"\n"),
+              HasSubstr("normal has no length"));
+  EXPECT_THAT(complaint("1\n\"0 0 0\" \"0 0\" \"0 0 1\" \"1 0 0\" \"0 1 0\" \"1 1 1 -1\"\n"),
+              HasSubstr("factor -1"));
   EXPECT_THROW(read_tactile_points("/nowhere/points.txt"), IoError);
 }
 
 TEST(TactileLayouts, ScenesPutThemOnBodiesInTheirUnit) {
-  const std::string scene = R"(<redmax><option unit="cm-g"/><robot><link name="a"><joint name="a" type="free3d"/>
+  const std::string scene =
+      R"(<redmax><option unit="cm-g"/><robot><link name="a"><joint name="a" type="free3d"/>
 <body name="a" type="sphere" radius="2"/></link></robot><sensor>
 <tactile name="h" body="a" type="hemisphere" radius="2" count="100" resolution="10 12" pos="0 0 1"/>
 <tactile name="c" body="a" type="cylinder" radius="1" length="3" resolution="5 8" quat="0.7071067811865476 0 0.7071067811865476 0"/>
@@ -200,7 +210,10 @@ TEST(TactileLayouts, ScenesPutThemOnBodiesInTheirUnit) {
     parse_scene(few, "s.xml");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("s.xml:3: <tactile>: resolution=\"9 11\" has 99 pixels for 100 points; expected"));
+    EXPECT_THAT(
+        error.what(),
+        HasSubstr(
+            "s.xml:3: <tactile>: resolution=\"9 11\" has 99 pixels for 100 points; expected"));
   }
 }
 

@@ -11,10 +11,10 @@
 namespace tangere {
 namespace {
 
-using ::testing::HasSubstr;
-using ::testing::Not;
 using testing::Folder;
+using ::testing::HasSubstr;
 using testing::layout;
+using ::testing::Not;
 
 std::string picture(const Folder& folder, const PlotOptions& options, double force = 1e-3) {
   const TrajectoryLayout l = layout();
@@ -35,9 +35,10 @@ TEST(TactilePlot, AStripShowsEveryFrameWithUnitsAndScale) {
   const std::string svg = picture(folder, {});
   EXPECT_THAT(svg, HasSubstr("t = 0.020 s (step 2)"));
   EXPECT_THAT(svg, HasSubstr("t = 0.040 s (step 4)"));
-  EXPECT_THAT(svg, HasSubstr(">mN<"));            // 2 mN at most
-  EXPECT_THAT(svg, HasSubstr(">2<"));             // top of the colour bar
-  EXPECT_THAT(svg, HasSubstr("pressure 2 mN"));   // the sum, positive although it was written negative
+  EXPECT_THAT(svg, HasSubstr(">mN<"));  // 2 mN at most
+  EXPECT_THAT(svg, HasSubstr(">2<"));   // top of the colour bar
+  EXPECT_THAT(svg,
+              HasSubstr("pressure 2 mN"));  // the sum, positive although it was written negative
   EXPECT_THAT(svg, HasSubstr("sensor 'skin'"));
 }
 
@@ -46,7 +47,8 @@ TEST(TactilePlot, TheTouchedPointHasTheTopColourAtItsPlace) {
   PlotOptions one;
   one.frame = 1;
   const std::string svg = picture(folder, one);
-  // 3 × 4 points on 2 × 3 mm: panels are 240 wide, so cells are 60 wide; point (1, 2) starts at 64 + 120.
+  // 3 × 4 points on 2 × 3 mm: panels are 240 wide, so cells are 60 wide; point (1, 2) starts at 64
+  // + 120.
   EXPECT_THAT(svg, HasSubstr("<rect x=\"184.00\" y=\"137.33\""));
   EXPECT_THAT(svg, HasSubstr("fill=\"#faec82\""));
   EXPECT_THAT(svg, Not(HasSubstr("step 2)")));
@@ -94,7 +96,10 @@ TEST(TactilePlot, DrawsTheFirstRectangularArrayAndNamesThemAll) {
     return std::string();
   };
   EXPECT_THAT(message(""), HasSubstr("'second' has no frame"));
-  EXPECT_THAT(message("rod"), HasSubstr("'rod' is no rectangular array and has no image; those that can be drawn: second, skin"));
+  EXPECT_THAT(
+      message("rod"),
+      HasSubstr(
+          "'rod' is no rectangular array and has no image; those that can be drawn: second, skin"));
 }
 
 /// Points that go round: down is -z of the body, right is y, wherever their own axes point.
@@ -123,7 +128,8 @@ TEST(TactilePlot, AnImageHasItsPointsAtTheirPixelsAndShearAlongRowsAndColumns) {
 
   const Folder folder;
   TrajectoryLayout l = layout(0);
-  for (std::size_t k = 0; k < 4; ++k) s.list[k].pixel = {static_cast<int>(k / 2), static_cast<int>(k % 2)};
+  for (std::size_t k = 0; k < 4; ++k)
+    s.list[k].pixel = {static_cast<int>(k / 2), static_cast<int>(k % 2)};
   l.sensors = {s};
   TrajectoryFile file(folder / "run.h5", l, false);
   testing::write_run(file, l);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Trajectory files: every dataset and attribute, read back through the C library alone; nothing half-written remains.
+// Trajectory files: every dataset and attribute, read back through the C library alone; nothing
+// half-written remains.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hdf5.h>
@@ -71,12 +72,14 @@ TEST(TrajectoryFile, HoldsWhatItPromises) {
     for (std::size_t k = 0; k < 6; ++k) EXPECT_EQ(q[std::size_t(t) * 6 + k], number(1, t, k));
     for (std::size_t k = 0; k < 14; ++k) EXPECT_EQ(pose[std::size_t(t) * 14 + k], number(3, t, k));
   }
-  EXPECT_EQ(values<std::int64_t>(f, "/tactile/skin/step", H5T_NATIVE_INT64, 2), (std::vector<std::int64_t>{2, 4}));
+  EXPECT_EQ(values<std::int64_t>(f, "/tactile/skin/step", H5T_NATIVE_INT64, 2),
+            (std::vector<std::int64_t>{2, 4}));
   EXPECT_EQ(values<std::int8_t>(f, "/solver/status", H5T_NATIVE_INT8, 10)[1], -1);
   EXPECT_EQ(values<std::int32_t>(f, "/solver/iterations", H5T_NATIVE_INT32, 10)[4], 2);
   EXPECT_EQ(values<double>(f, "/time", H5T_NATIVE_DOUBLE, 6)[3], 0.03);
-  for (const char* name : {"scene_text", "command_line", "instruction_set", "tangere_version", "integrator", "timestep",
-                           "tolerance", "seed", "quaternion_order", "precision"})
+  for (const char* name :
+       {"scene_text", "command_line", "instruction_set", "tangere_version", "integrator",
+        "timestep", "tolerance", "seed", "quaternion_order", "precision"})
     EXPECT_GT(H5Aexists(f, name), 0) << name;
   for (const char* name : {"/q", "/v", "/u", "/bodies/pose", "/bodies/twist"}) {
     EXPECT_GT(H5Aexists_by_name(f, name, "names", H5P_DEFAULT), 0) << name;
@@ -103,7 +106,8 @@ TEST(TrajectoryFile, HoldsEndEffectorsWhereThereAreAny) {
   ASSERT_EQ(h5::dimensions(d), (h5::Dims{6, 2, 2, 3}));
   std::vector<double> x(72);
   h5::read_box(d, {0, 0, 0, 0}, {6, 2, 2, 3}, x.data());
-  for (std::size_t k = 0; k < 72; ++k) EXPECT_EQ(x[k], number(7, std::int64_t(k / 12), k % 12)) << k;
+  for (std::size_t k = 0; k < 72; ++k)
+    EXPECT_EQ(x[k], number(7, std::int64_t(k / 12), k % 12)) << k;
   EXPECT_EQ(h5::read_texts(d, "names"), l.variable_names);
   EXPECT_EQ(h5::read_text(d, "units"), "m");
   EXPECT_EQ(h5::read_text(d, "frame"), "world");
@@ -200,7 +204,8 @@ TEST(TrajectoryFile, AbsurdSizesAreRefusedBeforeAnythingIsWritten) {
 }
 
 TEST(TrajectoryFile, AFullDiskIsAnErrorAndLeavesNothing) {
-  // A limit on the size of files stands for a disk that fills up: writes fail in the middle of the run.
+  // A limit on the size of files stands for a disk that fills up: writes fail in the middle of the
+  // run.
   const Folder folder;
   std::signal(SIGXFSZ, SIG_IGN);
   rlimit before{};

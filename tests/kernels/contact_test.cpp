@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The law of one point: values against the formulas written out, derivatives against dual numbers and differences.
+// The law of one point: values against the formulas written out, derivatives against dual numbers
+// and differences.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -35,8 +36,10 @@ class PairDerivative : public ::testing::TestWithParam<Case> {};
 
 template <class N>
 N lift(double x, double e) {
-  if constexpr (std::is_same_v<N, double>) return x;
-  else return N(x, e);
+  if constexpr (std::is_same_v<N, double>)
+    return x;
+  else
+    return N(x, e);
 }
 template <class N>
 Vec3<N> lift(const Vec3<double>& x, const Vec3<double>& e) {
@@ -49,10 +52,13 @@ struct State {
   LawParameters<double> law;
 };
 
-/// A point of the shape's own frame that lies `depth` under its surface, on every kind of surface that it has.
+/// A point of the shape's own frame that lies `depth` under its surface, on every kind of surface
+/// that it has.
 Vec3<double> point_under(PrimitiveShape shape, Random& random, double depth) {
-  const double around = random.uniform(-3, 3), along = random.uniform(-0.012, 0.012), face = random.uniform(0, 1);
-  const Vec3<double> radial = {std::cos(around), std::sin(around), 0}, z = {0, 0, face < 0.25 ? -1.0 : 1.0};
+  const double around = random.uniform(-3, 3), along = random.uniform(-0.012, 0.012),
+               face = random.uniform(0, 1);
+  const Vec3<double> radial = {std::cos(around), std::sin(around), 0},
+                     z = {0, 0, face < 0.25 ? -1.0 : 1.0};
   switch (shape) {
     case PrimitiveShape::sphere: return (0.02 - depth) * random.direction();
     case PrimitiveShape::cuboid: return {0.025 - depth, along, random.uniform(-0.008, 0.008)};
@@ -77,14 +83,19 @@ State random_state(Random& random, const Case& test) {
   s.xi = s.c + s.Q * point_under(test.shape, random, depth);
   s.omega = random.vector(1);
   s.v = random.vector(random.uniform(0, 1) < 0.5 ? 1e-3 : 0.3);
-  s.law = {random.uniform(10, 1000), random.uniform(0.5, 5), random.uniform(0.1, 1.5), random.uniform(0, 20), test.law,
+  s.law = {random.uniform(10, 1000),
+           random.uniform(0.5, 5),
+           random.uniform(0.1, 1.5),
+           random.uniform(0, 20),
+           test.law,
            test.ramp};
   if (test.law == ContactLaw::linear) s.law.damping = random.uniform(0, 0.05);
   return s;
 }
 
 template <class N>
-PairSums<N> sums(const State& s, const Case& test, const Vec6<double>& epsilon, const Vec6<double>& rate) {
+PairSums<N> sums(const State& s, const Case& test, const Vec6<double>& epsilon,
+                 const Vec6<double>& rate) {
   PairSums<N> out = PairSums<N>::zero();
   // Body 2 displaced by ε in body 1's axes: Q ← Q + [θ]Q, c ← c + ρ + θ × c; W ← W + δW.
   const Mat3<double> turn = skew(epsilon.a) * s.Q;
@@ -92,7 +103,8 @@ PairSums<N> sums(const State& s, const Case& test, const Vec6<double>& epsilon, 
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) Q.m[i][j] = lift<N>(s.Q.m[i][j], turn.m[i][j]);
   const Vec3<N> c = lift<N>(s.c, epsilon.l + cross(epsilon.a, s.c));
-  const LawParameters<N> law = {N(s.law.kn), N(s.law.kt), N(s.law.mu), N(s.law.damping), s.law.law, s.law.ramp};
+  const LawParameters<N> law = {N(s.law.kn),      N(s.law.kt), N(s.law.mu),
+                                N(s.law.damping), s.law.law,   s.law.ramp};
   const Vec3<N> xi = lift<N>(s.xi, {0, 0, 0});
   const Vec3<N> omega = lift<N>(s.omega, rate.a), v = lift<N>(s.v, rate.l);
   constexpr bool kDerivatives = std::is_same_v<N, double>;
@@ -107,7 +119,8 @@ Vec6<double> apply(const Mat3<double> (&m)[2][2], const Vec6<double>& x) {
 }
 
 void expect_close(const Vec6<double>& a, const Vec6<double>& b, double scale, double tolerance) {
-  const double x[6] = {a.a.x, a.a.y, a.a.z, a.l.x, a.l.y, a.l.z}, y[6] = {b.a.x, b.a.y, b.a.z, b.l.x, b.l.y, b.l.z};
+  const double x[6] = {a.a.x, a.a.y, a.a.z, a.l.x, a.l.y, a.l.z},
+               y[6] = {b.a.x, b.a.y, b.a.z, b.l.x, b.l.y, b.l.z};
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(x[i], y[i], tolerance * scale) << "component " << i;
 }
 
@@ -119,10 +132,13 @@ TEST_P(PairDerivative, MatchesDualNumbers) {
     const Vec6<double> zero = zero6<double>(), e = random.motion(1);
     const PairSums<double> value = sums<double>(s, GetParam(), zero, zero);
     const Vec6<double> by_pose = apply(value.k, e), by_rate = apply(value.d, e);
-    const double pose_scale = 1e-30 + std::sqrt(dot(by_pose, by_pose)), rate_scale = 1e-30 + std::sqrt(dot(by_rate, by_rate));
-    const Vec6<D> pose = sums<D>(s, GetParam(), e, zero).wrench, rate = sums<D>(s, GetParam(), zero, e).wrench;
+    const double pose_scale = 1e-30 + std::sqrt(dot(by_pose, by_pose)),
+                 rate_scale = 1e-30 + std::sqrt(dot(by_rate, by_rate));
+    const Vec6<D> pose = sums<D>(s, GetParam(), e, zero).wrench,
+                  rate = sums<D>(s, GetParam(), zero, e).wrench;
     const auto epsilon = [](const Vec6<D>& w) {
-      return Vec6<double>{{w.a.x.epsilon, w.a.y.epsilon, w.a.z.epsilon}, {w.l.x.epsilon, w.l.y.epsilon, w.l.z.epsilon}};
+      return Vec6<double>{{w.a.x.epsilon, w.a.y.epsilon, w.a.z.epsilon},
+                          {w.l.x.epsilon, w.l.y.epsilon, w.l.z.epsilon}};
     };
     expect_close(by_pose, epsilon(pose), pose_scale, 1e-11);
     expect_close(by_rate, epsilon(rate), rate_scale, 1e-11);
@@ -153,8 +169,10 @@ TEST_P(PairDerivative, MatchesCentralDifferences) {
       return sums<double>(t, GetParam(), zero, zero).wrench;
     };
     const Vec6<double> ahead = moved(h), behind = moved(-h);
-    const Vec6<double> difference = {(0.5 / h) * (ahead.a - behind.a), (0.5 / h) * (ahead.l - behind.l)};
-    const Vec6<double> one_side = {(1 / h) * (ahead.a - moved(0).a), (1 / h) * (ahead.l - moved(0).l)};
+    const Vec6<double> difference = {(0.5 / h) * (ahead.a - behind.a),
+                                     (0.5 / h) * (ahead.l - behind.l)};
+    const Vec6<double> one_side = {(1 / h) * (ahead.a - moved(0).a),
+                                   (1 / h) * (ahead.l - moved(0).l)};
     const Vec6<double> bend = one_side - difference;
     const double scale = std::sqrt(dot(analytic, analytic));
     if (std::sqrt(dot(bend, bend)) > 1e-4 * scale) continue;  // a kink within ±h
@@ -168,20 +186,23 @@ TEST_P(PairDerivative, MatchesCentralDifferences) {
 std::vector<Case> laws_and_shapes(int shapes) {
   std::vector<Case> cases;
   for (int shape = 0; shape < shapes; ++shape)
-    for (const auto& [law, ramp] : {std::pair{ContactLaw::clamped, 0.0}, {ContactLaw::paper, 0.0},
-                                    {ContactLaw::linear, 1e-5}, {ContactLaw::linear, 0.0}})
+    for (const auto& [law, ramp] : {std::pair{ContactLaw::clamped, 0.0},
+                                    {ContactLaw::paper, 0.0},
+                                    {ContactLaw::linear, 1e-5},
+                                    {ContactLaw::linear, 0.0}})
       cases.push_back({law, ramp, static_cast<PrimitiveShape>(shape)});
   return cases;
 }
-INSTANTIATE_TEST_SUITE_P(LawsAndShapes, PairDerivative, ::testing::ValuesIn(laws_and_shapes(kPrimitiveShapes)));
+INSTANTIATE_TEST_SUITE_P(LawsAndShapes, PairDerivative,
+                         ::testing::ValuesIn(laws_and_shapes(kPrimitiveShapes)));
 
 TEST(ContactLaw, ValuesAreTheFormulas) {
   const auto force = [](ContactLaw law, double ramp, double d, double rate, double damping) {
     return normal_force(LawParameters<double>{100, 1, 0.5, damping, law, ramp}, d, rate).force;
   };
   EXPECT_DOUBLE_EQ(force(ContactLaw::clamped, 0, -1e-3, -0.1, 50), (-100 + 50 * -0.1) * -1e-3);
-  EXPECT_EQ(force(ContactLaw::clamped, 0, -1e-3, 3, 50), 0);                 // would pull
-  EXPECT_DOUBLE_EQ(force(ContactLaw::paper, 0, -1e-3, 3, 50), 50 * -1e-3);   // does
+  EXPECT_EQ(force(ContactLaw::clamped, 0, -1e-3, 3, 50), 0);                // would pull
+  EXPECT_DOUBLE_EQ(force(ContactLaw::paper, 0, -1e-3, 3, 50), 50 * -1e-3);  // does
   EXPECT_DOUBLE_EQ(force(ContactLaw::linear, 0, -1e-3, -0.1, 0.05), 0.1 + 0.005);
   EXPECT_DOUBLE_EQ(force(ContactLaw::linear, 1e-5, -1e-3, -0.1, 0.05), 0.1 + 0.005);
   EXPECT_DOUBLE_EQ(force(ContactLaw::linear, 1e-5, -5e-6, -0.1, 0.05), 5e-4 + 0.5 * 0.005);
@@ -194,8 +215,9 @@ TEST(ContactLaw, ValuesAreTheFormulas) {
 TEST(ContactLaw, FrictionNeverExceedsItsBoundAndNeverDividesByZero) {
   Random random(23);
   for (int k = 0; k < 2000; ++k) {
-    const LawParameters<double> law = {random.uniform(1, 1e6), random.uniform(0, 1e3), random.uniform(0, 3), 0,
-                                       ContactLaw::clamped, 0};
+    const LawParameters<double> law = {random.uniform(1, 1e6), random.uniform(0, 1e3),
+                                       random.uniform(0, 3),   0,
+                                       ContactLaw::clamped,    0};
     const NormalForce<double> normal = normal_force(law, -random.uniform(0, 1e-2), 0.0);
     for (double speed : {0.0, 1e-300, 1e-30, 1e-3, 10.0}) {
       const Vec3<double> vt = speed * random.direction();
@@ -214,20 +236,24 @@ TEST(ContactLaw, FrictionBySecantHasTheSameForceAndAConstantScale) {
   Random random(29);
   int slips = 0;
   for (int k = 0; k < 200; ++k) {
-    LawParameters<double> law = {random.uniform(100, 1e4), random.uniform(1, 100), random.uniform(0.1, 2), 10,
-                                 ContactLaw::clamped, 0};
+    LawParameters<double> law = {random.uniform(100, 1e4), random.uniform(1, 100),
+                                 random.uniform(0.1, 2),   10,
+                                 ContactLaw::clamped,      0};
     const Vec3<double> omega = random.vector(1), v = random.vector(1), xi = {0, 0, 0};
     const auto sums = [&](double tangent) {
       law.friction_tangent = tangent;
       PairSums<double> s = PairSums<double>::zero();
-      accumulate<true>(s, SphereDistance<double>{0.02}, law, diagonal(1.0), Vec3<double>{0, 0, 0.019}, omega, v, xi);
+      accumulate<true>(s, SphereDistance<double>{0.02}, law, diagonal(1.0),
+                       Vec3<double>{0, 0, 0.019}, omega, v, xi);
       return s;
     };
     const PairSums<double> exact = sums(1), secant = sums(0);
     for (int i = 0; i < 3; ++i) EXPECT_EQ((&exact.wrench.l.x)[i], (&secant.wrench.l.x)[i]);
-    // The normal is z: of a point that slips, what the force across it is by the velocity across it. In the derivative
-    // that is -s (I - t tᵀ), by the secant -s I.
-    const auto block = [](const PairSums<double>& s) { return std::array{s.d[1][1].m[0][0], s.d[1][1].m[0][1], s.d[1][1].m[1][1]}; };
+    // The normal is z: of a point that slips, what the force across it is by the velocity across
+    // it. In the derivative that is -s (I - t tᵀ), by the secant -s I.
+    const auto block = [](const PairSums<double>& s) {
+      return std::array{s.d[1][1].m[0][0], s.d[1][1].m[0][1], s.d[1][1].m[1][1]};
+    };
     const std::array<double, 3> e = block(exact), s = block(secant);
     EXPECT_NEAR(s[0], s[2], 1e-12 * std::abs(s[0]));
     EXPECT_NEAR(s[1], 0, 1e-12 * std::abs(s[0]));
@@ -245,8 +271,8 @@ TEST(ContactLaw, FrictionBySecantHasTheSameForceAndAConstantScale) {
 TEST(ContactLaw, NoContactIsExactlyZero) {
   const LawParameters<double> law = {10, 1, 1, 1, ContactLaw::clamped, 0};
   PairSums<double> s = PairSums<double>::zero();
-  accumulate<true>(s, SphereDistance<double>{0.02}, law, diagonal(1.0), Vec3<double>{0, 0, 0.03}, Vec3<double>{1, 2, 3},
-                   Vec3<double>{1, 1, 1}, Vec3<double>{0, 0, 0});
+  accumulate<true>(s, SphereDistance<double>{0.02}, law, diagonal(1.0), Vec3<double>{0, 0, 0.03},
+                   Vec3<double>{1, 2, 3}, Vec3<double>{1, 1, 1}, Vec3<double>{0, 0, 0});
   EXPECT_EQ(dot(s.wrench, s.wrench), 0);
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j)
@@ -263,7 +289,8 @@ TEST(GroundContact, DerivativesMatchDualNumbersForPointsAndSpheres) {
         const Vec3<double> normal = random.direction(), centre = random.vector(0.03);
         const double depth = 1e-3 * random.uniform(0.01, 1);
         const double height = radius - depth - dot(transposed_times(R, normal), centre);
-        const Vec6<double> V = {random.vector(2), random.vector(0.05)}, e = random.motion(1), w = random.motion(1);
+        const Vec6<double> V = {random.vector(2), random.vector(0.05)}, e = random.motion(1),
+                           w = random.motion(1);
         const auto evaluate = [&]<class N>(N, bool pose, bool rate) {
           const Mat3<double> turn = R * skew(e.a);
           Mat3<N> Rn;
@@ -275,15 +302,18 @@ TEST(GroundContact, DerivativesMatchDualNumbersForPointsAndSpheres) {
           const Vec6<N> Vn = {lift<N>(V.a, rate ? w.a : none), lift<N>(V.l, rate ? w.l : none)};
           const LawParameters<N> law = {N(200.0), N(2.0), N(0.8), N(0.3), which, 1e-5};
           PairSums<N> s = PairSums<N>::zero();
-          accumulate_ground<std::is_same_v<N, double>>(s, law, m, at, Vn, lift<N>(centre, none), N(radius));
+          accumulate_ground<std::is_same_v<N, double>>(s, law, m, at, Vn, lift<N>(centre, none),
+                                                       N(radius));
           return s;
         };
         const PairSums<double> s = evaluate(0.0, false, false);
         // ε = -δ₁, δW = -δV₁.
         const Vec6<double> by_pose = -apply(s.k, e), by_rate = -apply(s.d, w);
-        const Vec6<D> pose = evaluate(D(0.0), true, false).wrench, rate = evaluate(D(0.0), false, true).wrench;
+        const Vec6<D> pose = evaluate(D(0.0), true, false).wrench,
+                      rate = evaluate(D(0.0), false, true).wrench;
         const auto epsilon = [](const Vec6<D>& x) {
-          return Vec6<double>{{x.a.x.epsilon, x.a.y.epsilon, x.a.z.epsilon}, {x.l.x.epsilon, x.l.y.epsilon, x.l.z.epsilon}};
+          return Vec6<double>{{x.a.x.epsilon, x.a.y.epsilon, x.a.z.epsilon},
+                              {x.l.x.epsilon, x.l.y.epsilon, x.l.z.epsilon}};
         };
         expect_close(by_pose, epsilon(pose), 1e-30 + std::sqrt(dot(by_pose, by_pose)), 1e-11);
         expect_close(by_rate, epsilon(rate), 1e-30 + std::sqrt(dot(by_rate, by_rate)), 1e-11);
@@ -336,21 +366,25 @@ TEST_P(ProductSumsOf, PointsAreTheGeneralSums) {
   Random random(7);
   for (int trial = 0; trial < 200; ++trial) {
     const State s = random_state(random, test);
-    with_distance<double>(test.shape, size_of(test.shape), [&]<template <class> class Shape>(const Shape<double>& shape) {
-      PairSums<double> general = PairSums<double>::zero();
-      std::vector<Vec3<double>> xi;
-      for (int k = 0; k < 12; ++k) {
-        // Some of them outside, most inside; the state's own point first, then others under the surface.
-        const double depth = 1e-3 * random.uniform(-0.3, 1);
-        xi.push_back(k == 0 ? s.xi : s.c + s.Q * point_under(test.shape, random, depth));
-        accumulate<true>(general, shape, s.law, s.Q, s.c, s.omega, s.v, xi.back());
-      }
-      if constexpr (Shape<double>::kBending == Bending::ball) {
-        expect_same_sums(sphere_motion(s.c, {s.omega, s.v}, shape.radius), s, xi, general);
-      } else if constexpr (!std::is_same_v<Shape<double>, CapsuleDistance<double>>) {
-        expect_same_sums(FaceMotion<Shape, double>{{s.Q, s.c}, {s.omega, s.v}, shape}, s, xi, general);
-      }
-    });
+    with_distance<double>(
+        test.shape, size_of(test.shape),
+        [&]<template <class> class Shape>(const Shape<double>& shape) {
+          PairSums<double> general = PairSums<double>::zero();
+          std::vector<Vec3<double>> xi;
+          for (int k = 0; k < 12; ++k) {
+            // Some of them outside, most inside; the state's own point first, then others under the
+            // surface.
+            const double depth = 1e-3 * random.uniform(-0.3, 1);
+            xi.push_back(k == 0 ? s.xi : s.c + s.Q * point_under(test.shape, random, depth));
+            accumulate<true>(general, shape, s.law, s.Q, s.c, s.omega, s.v, xi.back());
+          }
+          if constexpr (Shape<double>::kBending == Bending::ball) {
+            expect_same_sums(sphere_motion(s.c, {s.omega, s.v}, shape.radius), s, xi, general);
+          } else if constexpr (!std::is_same_v<Shape<double>, CapsuleDistance<double>>) {
+            expect_same_sums(FaceMotion<Shape, double>{{s.Q, s.c}, {s.omega, s.v}, shape}, s, xi,
+                             general);
+          }
+        });
   }
 }
 

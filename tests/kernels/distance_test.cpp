@@ -15,9 +15,12 @@ using namespace kernels;
 using D = Dual<double>;
 using testing::Random;
 
-Vec3<D> seeded(const Vec3<double>& y, const Vec3<double>& e) { return {{y.x, e.x}, {y.y, e.y}, {y.z, e.z}}; }
+Vec3<D> seeded(const Vec3<double>& y, const Vec3<double>& e) {
+  return {{y.x, e.x}, {y.y, e.y}, {y.z, e.z}};
+}
 
-/// Distance to a box by brute force: nearest of many surface samples bounds it from above; exact outside by clamping.
+/// Distance to a box by brute force: nearest of many surface samples bounds it from above; exact
+/// outside by clamping.
 double box_distance(const Vec3<double>& y, const Vec3<double>& s) {
   const double q[3] = {std::abs(y.x) - s.x, std::abs(y.y) - s.y, std::abs(y.z) - s.z};
   double square = 0;
@@ -78,7 +81,8 @@ TEST(Distance, KinksHaveADefinedUnitNormal) {
   const Distance<double> middle = cube.evaluate({0, 0, 0}, k);
   EXPECT_EQ(middle.d, -1);
   EXPECT_EQ(middle.n.x, 1);  // ties go to x, and zero counts as positive
-  for (const Vec3<double>& y : {Vec3<double>{1, 1, 1}, Vec3<double>{1, 1, 0}, Vec3<double>{-1, 0, 0}}) {
+  for (const Vec3<double>& y :
+       {Vec3<double>{1, 1, 1}, Vec3<double>{1, 1, 0}, Vec3<double>{-1, 0, 0}}) {
     const Distance<double> at = cube.evaluate(y, k);
     EXPECT_EQ(at.d, 0);
     EXPECT_EQ(dot(at.n, at.n), 1);

@@ -20,7 +20,9 @@ bool fuses(const LaneProbe& p) { return std::strncmp(p.name, "avx", 3) == 0; }
 /// A number of every binade in turn, ends included.
 double positive(testing::Random& random, int n) {
   const int exponent = -1022 + n % 2046;
-  const double mantissa = n < 2046 ? 1.0 : n < 4092 ? std::nextafter(2.0, 1.0) : random.uniform(1, 2);
+  const double mantissa = n < 2046   ? 1.0
+                          : n < 4092 ? std::nextafter(2.0, 1.0)
+                                     : random.uniform(1, 2);
   return std::ldexp(mantissa, exponent);
 }
 
@@ -66,7 +68,8 @@ TEST(InverseSqrt, LanesDoNotMeet) {
     SCOPED_TRACE(probe->name);
     alignas(64) double x[8] = {1, 2, 3, 4, 5, 6, 7, 8}, clean[8], y[8];
     probe->inverse_sqrt(x, clean);
-    x[0] = std::numeric_limits<double>::quiet_NaN(), x[3] = 0, x[6] = -1, x[7] = std::numeric_limits<double>::infinity();
+    x[0] = std::numeric_limits<double>::quiet_NaN(), x[3] = 0, x[6] = -1,
+    x[7] = std::numeric_limits<double>::infinity();
     probe->inverse_sqrt(x, y);
     for (const int l : {1, 2, 4, 5}) EXPECT_EQ(y[l], clean[l]);
   }

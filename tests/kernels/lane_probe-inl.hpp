@@ -44,7 +44,9 @@ struct LaneProbeOf {
       for (int i = 0; i < kDistanceRows; ++i) out[8 * i + l] = row[i].x;
     }
   }
-  static constexpr LaneProbe make(const char* name) { return {name, inverse_sqrt, distance, distance_alone}; }
+  static constexpr LaneProbe make(const char* name) {
+    return {name, inverse_sqrt, distance, distance_alone};
+  }
 };
 
 }  // namespace tangere::testing

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Arithmetic of lanes as functions of plain arrays, one set per instruction set, so that tests can compare them.
+// Arithmetic of lanes as functions of plain arrays, one set per instruction set, so that tests can
+// compare them.
 #pragma once
 
 #include <span>
@@ -15,7 +16,7 @@ struct DistanceProbe {
 inline constexpr int kDistanceRows = 6;  ///< d, n, κ, and whether the point is nearer than 0.01
 
 struct LaneProbe {
-  const char* name;  ///< as in KernelTable
+  const char* name;                                  ///< as in KernelTable
   void (*inverse_sqrt)(const double* x, double* y);  ///< (8) each, 64-byte aligned
   /// At y (3, 8): out (kDistanceRows, 8), 64-byte aligned.
   void (*distance)(const DistanceProbe& shape, const double* y, double* out);

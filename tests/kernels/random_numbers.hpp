@@ -12,10 +12,14 @@ namespace tangere::testing {
 class Random {
  public:
   explicit Random(unsigned seed) : engine_(seed) {}
-  double uniform(double a, double b) { return std::uniform_real_distribution<double>(a, b)(engine_); }
+  double uniform(double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(engine_);
+  }
   double normal() { return std::normal_distribution<double>()(engine_); }
   int integer(int a, int b) { return std::uniform_int_distribution<int>(a, b)(engine_); }
-  kernels::Vec3<double> vector(double scale) { return {scale * normal(), scale * normal(), scale * normal()}; }
+  kernels::Vec3<double> vector(double scale) {
+    return {scale * normal(), scale * normal(), scale * normal()};
+  }
   kernels::Vec3<double> direction() {
     const auto v = vector(1);
     return (1 / std::sqrt(dot(v, v))) * v;

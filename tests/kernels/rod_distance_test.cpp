@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Distances of half-spaces, cylinders and capsules against a search along their outline in long double, against dual
-// numbers and differences, at places where they have kinks, in lanes of every instruction set.
+// Distances of half-spaces, cylinders and capsules against a search along their outline in long
+// double, against dual numbers and differences, at places where they have kinks, in lanes of every
+// instruction set.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,10 +25,12 @@ using testing::DistanceProbe;
 using testing::Random;
 
 constexpr double kRadius = 0.3, kHalf = 0.5;
-constexpr PrimitiveShape kShapes[] = {PrimitiveShape::plane, PrimitiveShape::cylinder, PrimitiveShape::capsule};
+constexpr PrimitiveShape kShapes[] = {PrimitiveShape::plane, PrimitiveShape::cylinder,
+                                      PrimitiveShape::capsule};
 const Vec3<double> kSize = {kRadius, kHalf, 0};
 
-/// The least of f on [a, b], where it may have several minima: sampled, then narrowed around the best.
+/// The least of f on [a, b], where it may have several minima: sampled, then narrowed around the
+/// best.
 template <class F>
 Real least(const F& f, Real a, Real b) {
   constexpr int kSamples = 100;
@@ -38,7 +41,8 @@ Real least(const F& f, Real a, Real b) {
        high = a + (b - a) * std::min(best + 1, kSamples) / kSamples;
   for (int k = 0; k < 160; ++k) {
     const Real third = (high - low) / 3;
-    (f(low + third) < f(high - third) ? high : low) += f(low + third) < f(high - third) ? -third : third;
+    (f(low + third) < f(high - third) ? high : low) +=
+        f(low + third) < f(high - third) ? -third : third;
   }
   return f((low + high) / 2);
 }
@@ -47,7 +51,9 @@ Real least(const F& f, Real a, Real b) {
 Real reference(PrimitiveShape shape, const Vec3<double>& y) {
   if (shape == PrimitiveShape::plane) return y.z;
   const Real rho = std::sqrt(Real(y.x) * y.x + Real(y.y) * y.y), z = y.z, r = kRadius, h = kHalf;
-  const auto to = [&](Real a, Real b) { return std::sqrt((rho - a) * (rho - a) + (z - b) * (z - b)); };
+  const auto to = [&](Real a, Real b) {
+    return std::sqrt((rho - a) * (rho - a) + (z - b) * (z - b));
+  };
   Real found = least([&](Real b) { return to(r, b); }, -h, h);
   bool inside = rho < r && std::abs(z) < h;
   const Real quarter = std::acos(Real(-1)) / 2;
@@ -56,8 +62,9 @@ Real reference(PrimitiveShape shape, const Vec3<double>& y) {
       found = std::min(found, least([&](Real a) { return to(a, end); }, 0, r));
     } else {
       const Real sign = end < 0 ? -1 : 1;
-      found =
-          std::min(found, least([&](Real t) { return to(r * std::cos(t), end + sign * r * std::sin(t)); }, 0, quarter));
+      found = std::min(
+          found, least([&](Real t) { return to(r * std::cos(t), end + sign * r * std::sin(t)); }, 0,
+                       quarter));
       inside = inside || to(0, end) < r;
     }
   }
@@ -71,12 +78,14 @@ double length(const Vec3<double>& a) { return std::sqrt(dot(a, a)); }
 
 class RodDistance : public ::testing::TestWithParam<PrimitiveShape> {};
 
-/// Random places, and all the places where two formulas meet: axis, ends, faces, rim, seams, origin; and very near.
+/// Random places, and all the places where two formulas meet: axis, ends, faces, rim, seams,
+/// origin; and very near.
 std::vector<Vec3<double>> special_places() {
   std::vector<Vec3<double>> places;
-  for (const double rho : {0.0, 1e-300, 1e-160, 1e-20, 0.1, kRadius, std::nextafter(kRadius, 1), kRadius + 1e-9, 0.6})
-    for (const double z :
-         {0.0, 1e-300, 0.2, kHalf - kRadius, kHalf, std::nextafter(kHalf, 1), kHalf + 1e-9, kHalf + kRadius, 2.0})
+  for (const double rho :
+       {0.0, 1e-300, 1e-160, 1e-20, 0.1, kRadius, std::nextafter(kRadius, 1), kRadius + 1e-9, 0.6})
+    for (const double z : {0.0, 1e-300, 0.2, kHalf - kRadius, kHalf, std::nextafter(kHalf, 1),
+                           kHalf + 1e-9, kHalf + kRadius, 2.0})
       for (const double sign : {-1.0, 1.0})
         for (const double angle : {0.0, 2.0})
           places.push_back({rho * std::cos(angle), rho * std::sin(angle), sign * z});
@@ -124,7 +133,8 @@ TEST_P(RodDistance, GradientAndHessianMatchDualNumbersAndDifferences) {
   for (int k = 0; k < 1000; ++k) {
     const Vec3<double> y = random.vector(0.35), e = random.direction();
     const Vec3<D> dual = {{y.x, e.x}, {y.y, e.y}, {y.z, e.z}};
-    const Distance<D> at = with_distance<D>(GetParam(), kSize, [&](const auto& s) { return distance_at(s, dual); });
+    const Distance<D> at =
+        with_distance<D>(GetParam(), kSize, [&](const auto& s) { return distance_at(s, dual); });
     const Vec3<double> n = {at.n.x.value, at.n.y.value, at.n.z.value};
     const Vec3<double> turn = {at.n.x.epsilon, at.n.y.epsilon, at.n.z.epsilon};
     EXPECT_NEAR(at.d.epsilon, dot(n, e), 1e-14);
@@ -138,9 +148,12 @@ TEST_P(RodDistance, GradientAndHessianMatchDualNumbersAndDifferences) {
     const double scale = 1 + length(hessian * e);
     EXPECT_LT(length(hessian * e - turn), 1e-12 * scale);
     const double h = 1e-7;
-    const Vec3<double> difference = (0.5 / h) * (evaluate(GetParam(), y + h * e).n - evaluate(GetParam(), y - h * e).n);
-    if (length(difference) > 1e4) ++kinks;  // across an edge of the medial axis
-    else EXPECT_LT(length(hessian * e - difference), 1e-5 * scale * scale * scale);
+    const Vec3<double> difference =
+        (0.5 / h) * (evaluate(GetParam(), y + h * e).n - evaluate(GetParam(), y - h * e).n);
+    if (length(difference) > 1e4)
+      ++kinks;  // across an edge of the medial axis
+    else
+      EXPECT_LT(length(hessian * e - difference), 1e-5 * scale * scale * scale);
   }
   EXPECT_LT(kinks, 10);
 }
@@ -177,9 +190,9 @@ TEST_P(RodDistance, KinksHaveTheirChosenNormal) {
   };
   switch (GetParam()) {
     case PrimitiveShape::cylinder:
-      is(normal({0, 0, 0}), 1, 0, 0);                           // the axis: the side, along x
-      is(normal({0, 0, -0.4}), 0, 0, -1);                       // on it, nearer to a cap
-      is(normal({0, kRadius, kHalf}), 0, 1, 0);                 // the rim: the side
+      is(normal({0, 0, 0}), 1, 0, 0);                            // the axis: the side, along x
+      is(normal({0, 0, -0.4}), 0, 0, -1);                        // on it, nearer to a cap
+      is(normal({0, kRadius, kHalf}), 0, 1, 0);                  // the rim: the side
       is(normal({0, kRadius - 0.125, kHalf - 0.125}), 0, 1, 0);  // as far from both: the side
       EXPECT_EQ(evaluate(PrimitiveShape::cylinder, {0, kRadius, kHalf}).d, 0);
       break;
@@ -190,12 +203,13 @@ TEST_P(RodDistance, KinksHaveTheirChosenNormal) {
       break;
     default:
       is(normal({0, 0, 0}), 0, 0, 1);
-      EXPECT_GT(evaluate(PrimitiveShape::plane, {1e6, 1e6, -1e6}).d, 0);  // filler points touch nothing
+      EXPECT_GT(evaluate(PrimitiveShape::plane, {1e6, 1e6, -1e6}).d,
+                0);  // filler points touch nothing
   }
 }
 
-/// Lanes of every instruction set, and lanes alone, against plain double; AVX2 and AVX-512 bit for bit; NaN stays in
-/// its lane.
+/// Lanes of every instruction set, and lanes alone, against plain double; AVX2 and AVX-512 bit for
+/// bit; NaN stays in its lane.
 TEST_P(RodDistance, LanesAgreeOnEveryInstructionSet) {
   Random random(35);
   std::vector<Vec3<double>> places = special_places();
@@ -222,10 +236,12 @@ TEST_P(RodDistance, LanesAgreeOnEveryInstructionSet) {
           ASSERT_LT(length(n - at.n), 1e-12);
         }
         ASSERT_TRUE(std::isfinite(got[32 + l]));
-        if (at.d < 0.01 || at.d > 0.015) {  // at a rim, the test without a root says so a little further out
+        if (at.d < 0.01 ||
+            at.d > 0.015) {  // at a rim, the test without a root says so a little further out
           ASSERT_EQ(got[40 + l], at.d < 0.01);
         }
-        for (int i = 0; i < testing::kDistanceRows; ++i) ASSERT_EQ(got[8 * i + l], alone[8 * i + l]) << "row " << i;
+        for (int i = 0; i < testing::kDistanceRows; ++i)
+          ASSERT_EQ(got[8 * i + l], alone[8 * i + l]) << "row " << i;
       }
       if (std::strncmp(lanes->name, "avx", 3) != 0) continue;
       for (int i = 0; have && i < testing::kDistanceRows; ++i)

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rotations: the series against closed forms in long double, identities, and derivatives by dual numbers.
+// Rotations: the series against closed forms in long double, identities, and derivatives by dual
+// numbers.
 #include <gtest/gtest.h>
 
 #include "engine/rotation_log.hpp"
@@ -29,7 +30,8 @@ Mat3<double> rodrigues(const Vec3<double>& axis, double angle) {
   const Mat3<double> X = skew(axis), X2 = X * X;
   Mat3<double> r;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) r.m[i][j] = double((i == j ? 1.0L : 0.0L) + s * X.m[i][j] + c * X2.m[i][j]);
+    for (int j = 0; j < 3; ++j)
+      r.m[i][j] = double((i == j ? 1.0L : 0.0L) + s * X.m[i][j] + c * X2.m[i][j]);
   return r;
 }
 
@@ -39,7 +41,9 @@ TEST(Rotation, ExponentialIsRodrigues) {
     for (int k = 0; k < 20; ++k) {
       const Vec3<double> axis = random.direction();
       const Vec3<double> x = length * axis;
-      EXPECT_LT(largest_difference(rotation_exp(x, rotation_series(x)), rodrigues(axis, length)), 2e-15) << length;
+      EXPECT_LT(largest_difference(rotation_exp(x, rotation_series(x)), rodrigues(axis, length)),
+                2e-15)
+          << length;
     }
 }
 
@@ -47,7 +51,9 @@ TEST(Rotation, QuaternionAndMatrixExponentialsAgree) {
   Random random(2);
   for (double length : kLengths) {
     const Vec3<double> x = length * random.direction();
-    EXPECT_LT(largest_difference(to_matrix(quaternion_exp(x)), rotation_exp(x, rotation_series(x))), 2e-15) << length;
+    EXPECT_LT(largest_difference(to_matrix(quaternion_exp(x)), rotation_exp(x, rotation_series(x))),
+              2e-15)
+        << length;
   }
 }
 
@@ -84,7 +90,8 @@ TEST(Rotation, RightJacobianDerivativeMatchesDualNumbers) {
   Random random(5);
   for (double length : kLengths)
     for (int k = 0; k < 20; ++k) {
-      const Vec3<double> x = length * random.direction(), w = random.vector(1), e = random.vector(1);
+      const Vec3<double> x = length * random.direction(), w = random.vector(1),
+                         e = random.vector(1);
       const Vec3<D> xd = {{x.x, e.x}, {x.y, e.y}, {x.z, e.z}};
       const Vec3<D> wd = {D(w.x), D(w.y), D(w.z)};
       const Vec3<D> dual = right_jacobian(xd, rotation_series(xd)) * wd;
@@ -106,7 +113,8 @@ TEST(Rotation, AnglesReduceToOneTurn) {
   for (double turns : {-1000.0, -3.0, 0.0, 1.0, 12345.0})
     for (double angle : {-3.1, -1.0, 0.0, 1e-9, 3.1}) {
       const double full = turns * 6.283185307179586 + angle;
-      EXPECT_NEAR(reduce_angle(full), std::remainder(full, 6.283185307179586), 1e-15 * (1 + std::abs(turns)));
+      EXPECT_NEAR(reduce_angle(full), std::remainder(full, 6.283185307179586),
+                  1e-15 * (1 + std::abs(turns)));
     }
   EXPECT_EQ(reduce_angle(D(100.0, 1.0)).epsilon, 1.0);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files in the published dialect: together they use its elements and oddities. They load, say what they leave out, and
-// run; what is not simulated yet is refused by name.
+// Files in the published dialect: together they use its elements and oddities. They load, say what
+// they leave out, and run; what is not simulated yet is refused by name.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -65,8 +65,8 @@ std::vector<double> pose_of(const Model& model, const std::vector<double>& q, in
 TEST(Dialect, HandLoadsAndSaysWhatItLeavesOut) {
   const SceneFile file = read_scene(kFolder + "dialect_hand.xml");
   const std::string warnings = warnings_of(file);
-  for (const char* part : {"max_ls", "design_params", "'lim' has no effect", "'axis' has no effect", "stray text",
-                           "pictures only"})
+  for (const char* part : {"max_ls", "design_params", "'lim' has no effect", "'axis' has no effect",
+                           "stray text", "pictures only"})
     EXPECT_THAT(warnings, HasSubstr(part));
   const Scene& s = file.scene;
   EXPECT_EQ(s.name, "hand");
@@ -91,9 +91,9 @@ TEST(Dialect, HandLoadsAndSaysWhatItLeavesOut) {
   EXPECT_EQ(model.sensors()[0].name, "tip") << "a sensor without a name has its body's";
   EXPECT_EQ(model.sensors()[0].pressure_sign, 1);
   EXPECT_EQ(model.sensors()[1].rows, 1);
-  EXPECT_EQ(model.contacts()[4].points, 3);   // tripod.txt
-  EXPECT_EQ(model.contacts()[5].points, 6);   // wedge.obj
-  EXPECT_EQ(model.contacts()[1].points, 4);   // tetrahedron.obj
+  EXPECT_EQ(model.contacts()[4].points, 3);  // tripod.txt
+  EXPECT_EQ(model.contacts()[5].points, 6);  // wedge.obj
+  EXPECT_EQ(model.contacts()[1].points, 4);  // tetrahedron.obj
 }
 
 TEST(Dialect, HandPressesTheBall) {
@@ -152,14 +152,19 @@ TEST(Dialect, WhatIsNotSimulatedIsRefusedByName) {
     }
     return std::string("accepted");
   };
-  EXPECT_THAT(refusal("OBJ_TO_JOINT", "BODY_TO_JOINT"), HasSubstr("supported: OBJ_TO_JOINT, OBJ_TO_WORLD"));
-  EXPECT_THAT(refusal("<virtual>", "<variable><endeffector joint=\"lowre\" pos=\"0 0 -1\"/></variable>\n<virtual>"),
-              HasSubstr("lower"));
+  EXPECT_THAT(refusal("OBJ_TO_JOINT", "BODY_TO_JOINT"),
+              HasSubstr("supported: OBJ_TO_JOINT, OBJ_TO_WORLD"));
+  EXPECT_THAT(
+      refusal("<virtual>",
+              "<variable><endeffector joint=\"lowre\" pos=\"0 0 -1\"/></variable>\n<virtual>"),
+      HasSubstr("lower"));
   EXPECT_THAT(refusal("<tactile body=\"tip\" type=\"rect_array\"",
                       "<tactile body=\"tip\" type=\"abstract\" spec=\"gone.txt\""),
               AllOf(HasSubstr("hand.xml:"), HasSubstr("<tactile>: "), HasSubstr("gone.txt")));
-  EXPECT_THAT(refusal("primitive_body=\"ball\"/>", "primitive_body=\"lower\"/>"), HasSubstr("no distance function"));
-  EXPECT_THAT(refusal("scale=\"1 1 1\"", "scale=\"1 1 -1\""), HasSubstr("expected positive factors"));  // a mirror
+  EXPECT_THAT(refusal("primitive_body=\"ball\"/>", "primitive_body=\"lower\"/>"),
+              HasSubstr("no distance function"));
+  EXPECT_THAT(refusal("scale=\"1 1 1\"", "scale=\"1 1 -1\""),
+              HasSubstr("expected positive factors"));  // a mirror
   EXPECT_THAT(refusal("meshes/tetrahedron.obj", "meshes/tetraeder.obj"),
               AllOf(HasSubstr("hand.xml:29: <body>: "), HasSubstr("meshes/tetraeder.obj")));
   EXPECT_THAT(refusal("./tripod.txt", "./tripot.txt"), HasSubstr("hand.xml:25: <collision>: "));

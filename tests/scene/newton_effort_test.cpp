@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What Newton's search needs in scenes with many stiff touches: passes and splits are counts, the same on every machine.
+// What Newton's search needs in scenes with many stiff touches: passes and splits are counts, the
+// same on every machine.
 #include <gtest/gtest.h>
 
 #include "engine/control.hpp"
@@ -25,7 +26,8 @@ Effort run(const std::string& name) {
   std::vector<double> u(kEnvironments * nu);
   Effort effort;
   for (std::int64_t k = 0; k < control.steps(); ++k) {
-    for (int e = 0; e < kEnvironments; ++e) control.evaluate(k, e, std::span(u).subspan(std::size_t(e) * nu, nu));
+    for (int e = 0; e < kEnvironments; ++e)
+      control.evaluate(k, e, std::span(u).subspan(std::size_t(e) * nu, nu));
     stepper.step(batch, u);
     for (int e = 0; e < kEnvironments; ++e) {
       effort.passes += batch.iterations(e);

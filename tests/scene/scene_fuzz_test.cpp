@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// 2 000 mutated scenes: each is read and compiled, or refused with a message. Nothing else may happen.
+// 2 000 mutated scenes: each is read and compiled, or refused with a message. Nothing else may
+// happen.
 #include <gtest/gtest.h>
 
 #include <iterator>
@@ -13,7 +14,6 @@
 namespace tangere {
 namespace {
 
-
 class Mutator {
  public:
   explicit Mutator(unsigned seed) : engine_(seed) {}
@@ -24,7 +24,9 @@ class Mutator {
   }
 
  private:
-  int at_most(std::size_t n) { return static_cast<int>(std::uniform_int_distribution<std::size_t>(0, n)(engine_)); }
+  int at_most(std::size_t n) {
+    return static_cast<int>(std::uniform_int_distribution<std::size_t>(0, n)(engine_));
+  }
 
   std::string once(std::string t) {
     const std::size_t at = std::size_t(at_most(t.size() - 1));
@@ -45,11 +47,13 @@ class Mutator {
   }
 
   void replace_number(std::string& t, std::size_t at) {
-    static const char* const kValues[] = {"nan", "inf", "-1", "0", "1e308", "1e-308", "-0", "99999999999", "2e9", "", "x", "1 2 3 4 5"};
+    static const char* const kValues[] = {"nan", "inf",         "-1",  "0", "1e308", "1e-308",
+                                          "-0",  "99999999999", "2e9", "",  "x",     "1 2 3 4 5"};
     const std::size_t begin = t.find_first_of("0123456789", at);
     if (begin == std::string::npos) return;
     const std::size_t end = t.find_first_not_of("0123456789.e-+", begin);
-    t.replace(begin, (end == std::string::npos ? t.size() : end) - begin, kValues[at_most(std::size(kValues) - 1)]);
+    t.replace(begin, (end == std::string::npos ? t.size() : end) - begin,
+              kValues[at_most(std::size(kValues) - 1)]);
   }
 
   std::mt19937_64 engine_;
@@ -59,12 +63,15 @@ TEST(SceneFuzz, TwoThousandMutantsAreReadOrRefused) {
   const std::string rods = testing::with(
       "type=\"sphere\" radius=\"0.02\"",
       "type=\"capsule\" length=\"0.03\" radius=\"0.02\" general_contact_resolution=\"3 5\"",
-      testing::with("type=\"cuboid\" size=\"0.05 0.05 0.01\"", "type=\"cylinder\" length=\"0.01\" radius=\"0.05\""));
-  const std::string sources[] = {testing::kScene, rods,
-                                 file_bytes(std::string(TANGERE_TEST_DATA) + "/scenes/two_balls.xml"),
-                                 file_bytes(std::string(TANGERE_TEST_DATA) + "/scenes/published_dialect_pad.xml"),
-                                 file_bytes(std::string(TANGERE_TEST_DATA) + "/scenes/every_joint.xml"),
-                                 file_bytes(std::string(TANGERE_SOURCE_DIR) + "/scenes/rolling_ball_small.xml")};
+      testing::with("type=\"cuboid\" size=\"0.05 0.05 0.01\"",
+                    "type=\"cylinder\" length=\"0.01\" radius=\"0.05\""));
+  const std::string sources[] = {
+      testing::kScene,
+      rods,
+      file_bytes(std::string(TANGERE_TEST_DATA) + "/scenes/two_balls.xml"),
+      file_bytes(std::string(TANGERE_TEST_DATA) + "/scenes/published_dialect_pad.xml"),
+      file_bytes(std::string(TANGERE_TEST_DATA) + "/scenes/every_joint.xml"),
+      file_bytes(std::string(TANGERE_SOURCE_DIR) + "/scenes/rolling_ball_small.xml")};
   int read = 0, refused = 0;
   for (unsigned seed = 0; seed < 2000; ++seed) {
     const std::string text = Mutator(seed)(sources[seed % std::size(sources)]);
@@ -74,7 +81,8 @@ TEST(SceneFuzz, TwoThousandMutantsAreReadOrRefused) {
       for (LinkDescription& l : file.scene.links) {
         if (auto* box = std::get_if<CuboidShape>(&l.body.shape))
           for (int& n : box->contact_resolution) n = std::min(n, 12);
-        if (auto* rod = std::get_if<CapsuleShape>(&l.body.shape)) rod->contact_rings = std::min(rod->contact_rings, 12);
+        if (auto* rod = std::get_if<CapsuleShape>(&l.body.shape))
+          rod->contact_rings = std::min(rod->contact_rings, 12);
         if (auto* rod = std::get_if<CylinderShape>(&l.body.shape))
           rod->contact_rings = std::min(rod->contact_rings, 12);
       }

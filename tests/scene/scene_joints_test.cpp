@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Joints, their effects and motors as scene files give them, in centimetres and grams; and that such a scene runs.
+// Joints, their effects and motors as scene files give them, in centimetres and grams; and that
+// such a scene runs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,13 +21,15 @@ TEST(SceneJoints, EveryJointEffectAndMotorComesThroughInSi) {
   const SceneFile file = read_scene(kFolder + "every_joint.xml");
   const Scene& s = file.scene;
   ASSERT_EQ(file.warnings.size(), 1U);
-  EXPECT_THAT(file.warnings[0], HasSubstr("every_joint.xml:10: <joint>: attribute 'lim' has no effect here"));
+  EXPECT_THAT(file.warnings[0],
+              HasSubstr("every_joint.xml:10: <joint>: attribute 'lim' has no effect here"));
   const auto joint = [&](const std::string& name) -> const JointDescription& {
     for (const LinkDescription& l : s.links)
       if (l.joint.name == name) return l.joint;
     throw std::logic_error(name);
   };
-  const JointDescription &shoulder = joint("shoulder"), &cross = joint("cross"), &puck = joint("puck");
+  const JointDescription &shoulder = joint("shoulder"), &cross = joint("cross"),
+                         &puck = joint("puck");
   EXPECT_DOUBLE_EQ(shoulder.damping, 10e-7);  // dyn cm s/rad
   EXPECT_DOUBLE_EQ(shoulder.armature, 500e-7);
   EXPECT_DOUBLE_EQ(shoulder.stiffness, 1e5 * 1e-7);
@@ -75,7 +78,8 @@ TEST(SceneJoints, ASceneOfEveryJointRuns) {
   EXPECT_EQ(model.mass(4), 0);  // the carriage
   EXPECT_EQ(model.u_units()[4], "m");
   EXPECT_EQ(model.u_names()[1], "wrist.wx");
-  for (Integrator scheme : {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
+  for (Integrator scheme :
+       {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
     StepperOptions options;
     options.integrator = scheme;
     Stepper stepper(model, options);
@@ -84,7 +88,8 @@ TEST(SceneJoints, ASceneOfEveryJointRuns) {
     std::vector<double> u(std::size_t(5 * model.nu()));
     for (int k = 0; k < 50; ++k) {
       for (int e = 0; e < 5; ++e)
-        control.evaluate(k, e, std::span(u).subspan(std::size_t(e * model.nu()), std::size_t(model.nu())));
+        control.evaluate(
+            k, e, std::span(u).subspan(std::size_t(e * model.nu()), std::size_t(model.nu())));
       stepper.step(batch, u);
     }
     EXPECT_EQ(batch.failed_count(), 0) << to_string(scheme);

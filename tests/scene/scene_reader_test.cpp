@@ -30,7 +30,8 @@ TEST(SceneReader, PublishedDialectLoadsUnmodified) {
   ASSERT_EQ(s.links.size(), 3U);
   EXPECT_EQ(s.links[2].joint.type, JointType::free);
   EXPECT_EQ(s.links[0].joint.pose.orientation[0], 1);
-  EXPECT_EQ(std::get<SphereShape>(s.links[2].body.shape).radius, 0.0199999996);  // double, not rounded through float
+  EXPECT_EQ(std::get<SphereShape>(s.links[2].body.shape).radius,
+            0.0199999996);  // double, not rounded through float
   EXPECT_EQ(s.ground_contacts[0].coefficients.mu, 0.800000012);
   EXPECT_EQ(s.ground_contacts[0].law, ContactLaw::linear);
   EXPECT_EQ(s.pair_contacts[0].law, ContactLaw::clamped);
@@ -40,8 +41,8 @@ TEST(SceneReader, PublishedDialectLoadsUnmodified) {
   EXPECT_EQ(s.variables[0].position[0], 0.001);
   std::string warnings;
   for (const std::string& w : file.warnings) warnings += w + "\n";
-  for (const char* part : {"max_ls", "design_params", "'axis' has no effect", "'lim' has no effect", "stray text",
-                           "pictures only", "'P' has no effect"})
+  for (const char* part : {"max_ls", "design_params", "'axis' has no effect", "'lim' has no effect",
+                           "stray text", "pictures only", "'P' has no effect"})
     EXPECT_THAT(warnings, HasSubstr(part));
   const Model model(s);
   EXPECT_EQ(model.nq(), 10);
@@ -90,9 +91,9 @@ TEST(SceneReader, DefaultsOfTheDialect) {
   const Scene s = parse_scene(text, "s.xml").scene;
   EXPECT_EQ(s.timestep, 0.02);
   EXPECT_EQ(s.integrator, Integrator::bdf1);
-  EXPECT_NEAR(s.gravity[2], -9.8, 1e-14);                                  // -980 cm/s²
-  EXPECT_EQ(std::get<SphereShape>(s.links[0].body.shape).radius, 0.01);    // 1 cm
-  EXPECT_EQ(s.links[0].body.density, 1000);                                // 1 g/cm³
+  EXPECT_NEAR(s.gravity[2], -9.8, 1e-14);                                // -980 cm/s²
+  EXPECT_EQ(std::get<SphereShape>(s.links[0].body.shape).radius, 0.01);  // 1 cm
+  EXPECT_EQ(s.links[0].body.density, 1000);                              // 1 g/cm³
   EXPECT_EQ(s.solver.tolerance, 1e-9);
 }
 
@@ -107,9 +108,12 @@ std::string in_centimetres() {
   change("pos=\"0 0 0.02\"", "pos=\"0 0 2\"");
   change("radius=\"0.02\" density=\"100\"", "radius=\"2\" density=\"0.1\"");
   change("ctrl_range=\"-1 1\"", "ctrl_range=\"-1e5 1e5\"");
-  change("kn=\"5e3\" kt=\"1\" mu=\"0.8\" damping=\"0.03\"", "kn=\"5e6\" kt=\"1000\" mu=\"0.8\" damping=\"30\"");
-  change("kn=\"5\" kt=\"1\" mu=\"1\" damping=\"1\"", "kn=\"5000\" kt=\"1000\" mu=\"1\" damping=\"10\"");
-  change("rect_pos0=\"-0.02 0.02 -0.005\" rect_pos1=\"0.02 -0.02 -0.005\"", "rect_pos0=\"-2 2 -0.5\" rect_pos1=\"2 -2 -0.5\"");
+  change("kn=\"5e3\" kt=\"1\" mu=\"0.8\" damping=\"0.03\"",
+         "kn=\"5e6\" kt=\"1000\" mu=\"0.8\" damping=\"30\"");
+  change("kn=\"5\" kt=\"1\" mu=\"1\" damping=\"1\"",
+         "kn=\"5000\" kt=\"1000\" mu=\"1\" damping=\"10\"");
+  change("rect_pos0=\"-0.02 0.02 -0.005\" rect_pos1=\"0.02 -0.02 -0.005\"",
+         "rect_pos0=\"-2 2 -0.5\" rect_pos1=\"2 -2 -0.5\"");
   change("damping=\"0.003\"", "damping=\"0.03\"");
   change("q=\"0.001 0 0 1 0 0 0\" v=\"0.1 0 0 0 2 0\"", "q=\"0.1 0 0 1 0 0 0\" v=\"10 0 0 0 2 0\"");
   change("uniform=\"-0.003 0.003\"", "uniform=\"-0.3 0.3\"");
@@ -118,7 +122,8 @@ std::string in_centimetres() {
 }
 
 TEST(SceneReader, CentimetresAndGramsGiveTheSameScene) {
-  const Scene a = parse_scene(kScene, "s.xml").scene, b = parse_scene(in_centimetres(), "s.xml").scene;
+  const Scene a = parse_scene(kScene, "s.xml").scene,
+              b = parse_scene(in_centimetres(), "s.xml").scene;
   const auto same = [](double x, double y) { EXPECT_NEAR(x, y, 1e-14 * std::abs(x)); };
   const auto all = [&](const Vector3& x, const Vector3& y) {
     for (int i = 0; i < 3; ++i) same(x[i], y[i]);
@@ -129,7 +134,8 @@ TEST(SceneReader, CentimetresAndGramsGiveTheSameScene) {
     same(a.links[i].joint.damping, b.links[i].joint.damping);
     same(a.links[i].body.density, b.links[i].body.density);
   }
-  all(std::get<CuboidShape>(a.links[0].body.shape).size, std::get<CuboidShape>(b.links[0].body.shape).size);
+  all(std::get<CuboidShape>(a.links[0].body.shape).size,
+      std::get<CuboidShape>(b.links[0].body.shape).size);
   same(a.motors[0].high, b.motors[0].high);
   const auto coefficients = [&](const ContactCoefficients& x, const ContactCoefficients& y) {
     same(x.kn, y.kn), same(x.kt, y.kt), same(x.mu, y.mu), same(x.damping, y.damping);
@@ -146,7 +152,8 @@ TEST(SceneReader, CentimetresAndGramsGiveTheSameScene) {
 
 TEST(SceneReader, RodsAndPlanesInEitherUnit) {
   const auto read = [](const char* unit, const std::string& bodies) {
-    return parse_scene("<redmax><option unit=\"" + std::string(unit) + "\"/><robot>" + bodies + "</robot></redmax>",
+    return parse_scene("<redmax><option unit=\"" + std::string(unit) + "\"/><robot>" + bodies +
+                           "</robot></redmax>",
                        "s.xml");
   };
   const std::string link = R"(<link name="$"><joint name="$" type="free3d"/><body name="$" type=)";
@@ -156,8 +163,9 @@ TEST(SceneReader, RodsAndPlanesInEitherUnit) {
     return text;
   };
   const SceneFile cm =
-      read("cm-g", body("a", R"("cylinder" length="4" radius="1.5" density="2")") +
-                       body("b", R"("capsule" length="6" radius="0.5" general_contact_resolution="3 7")"));
+      read("cm-g",
+           body("a", R"("cylinder" length="4" radius="1.5" density="2")") +
+               body("b", R"("capsule" length="6" radius="0.5" general_contact_resolution="3 7")"));
   EXPECT_TRUE(cm.warnings.empty());
   const auto& cylinder = std::get<CylinderShape>(cm.scene.links[0].body.shape);
   EXPECT_DOUBLE_EQ(cylinder.length, 0.04);
@@ -172,7 +180,8 @@ TEST(SceneReader, RodsAndPlanesInEitherUnit) {
 
   const std::string floor =
       R"(<link name="f"><joint name="f" type="fixed" quat="1 0 1 0"/><body name="f" type="plane" radius="3"/></link>)";
-  const std::string rings = R"( general_contact_angle_resolution="12" general_contact_radius_resolution="1")";
+  const std::string rings =
+      R"( general_contact_angle_resolution="12" general_contact_radius_resolution="1")";
   const std::string file = body("a", R"("cylinder" length="0.04" radius="0.015")" + rings) + floor;
   const SceneFile si = read("m-kg", file);
   ASSERT_EQ(si.warnings.size(), 1U);

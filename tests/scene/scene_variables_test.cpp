@@ -36,16 +36,17 @@ TEST(SceneVariables, KeepJointAndPlace) {
 }
 
 TEST(SceneVariables, AreConvertedFromCentimetresAndTakeDefaults) {
-  const Scene s = with_variables(R"(<default><endeffector radius="0.3" rgba="0 1 0 0.5"/></default><variable>
+  const Scene s =
+      with_variables(R"(<default><endeffector radius="0.3" rgba="0 1 0 0.5"/></default><variable>
     <endeffector joint="ball_joint" pos="1 -2 3"/>
     <endeffector joint="ball_joint" pos="0 0 0" radius="0.1"/></variable>)",
-                                 "cm-g");
+                     "cm-g");
   EXPECT_EQ(s.variables[0].position, (Vector3{0.01, -0.02, 0.03}));
   EXPECT_DOUBLE_EQ(s.variables[0].radius, 0.003);
   EXPECT_THAT(s.variables[0].rgba, ElementsAre(0, 1, 0, 0.5));
   EXPECT_DOUBLE_EQ(s.variables[1].radius, 0.001);
-  // The pad's joint stands at (0, 0, 0.06 cm), the ball's at (0, 0, 0.02 cm); the ball starts at x = 0.001 cm, at rest turned
-  // by nothing, so what is read is the sum, in metres.
+  // The pad's joint stands at (0, 0, 0.06 cm), the ball's at (0, 0, 0.02 cm); the ball starts at x
+  // = 0.001 cm, at rest turned by nothing, so what is read is the sum, in metres.
   Scene still = s;
   still.randomizations.clear();
   const Model model(still);

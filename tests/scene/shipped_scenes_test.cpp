@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every file in scenes/, run for its whole control with four environments: none fails, and it does what it says.
+// Every file in scenes/, run for its whole control with four environments: none fails, and it does
+// what it says.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -38,7 +39,8 @@ class SceneRun {
     std::vector<double> u(std::size_t(kEnvironments * model_.nu()));
     for (int k = 0; k < steps; ++k) {
       for (int e = 0; e < kEnvironments; ++e)
-        control.evaluate(k, e, std::span(u).subspan(std::size_t(e * model_.nu()), std::size_t(model_.nu())));
+        control.evaluate(
+            k, e, std::span(u).subspan(std::size_t(e * model_.nu()), std::size_t(model_.nu())));
       stepper.step(batch, u);
       for (int e = 0; e < kEnvironments; ++e) record(batch, readout, e);
     }
@@ -57,7 +59,8 @@ class SceneRun {
     const auto names = model_.body_names();
     const auto at = std::find(names.begin(), names.end(), name);
     if (at == names.end()) throw std::runtime_error("no body " + name);
-    return frames_[std::size_t(step * kEnvironments + e)].pose[std::size_t(7 * (at - names.begin()) + component)];
+    return frames_[std::size_t(step * kEnvironments + e)]
+        .pose[std::size_t(7 * (at - names.begin()) + component)];
   }
   [[nodiscard]] const Touch& touch(int step, int e, int sensor) const {
     return frames_[std::size_t(step * kEnvironments + e)].touch[std::size_t(sensor)];
@@ -87,7 +90,7 @@ class SceneRun {
       for (std::size_t p = 0; p < force.size(); p += 3) {
         t.points += force[p] != 0 || force[p + 1] != 0 || force[p + 2] != 0;
         t.pressure += info.pressure_sign * force[p + 2];
-          t.along += force[p];
+        t.along += force[p];
         t.shear = std::max(t.shear, std::hypot(force[p], force[p + 1]));
       }
       f.touch.push_back(t);
@@ -101,10 +104,12 @@ class SceneRun {
 
 TEST(ShippedScenes, AreAllRunHere) {
   std::set<std::string> found;
-  for (const auto& entry : std::filesystem::directory_iterator(std::string(TANGERE_SOURCE_DIR) + "/scenes"))
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(TANGERE_SOURCE_DIR) + "/scenes"))
     if (entry.path().extension() == ".xml") found.insert(entry.path().stem().string());
-  const std::set<std::string> run = {"box_pushing",  "cap_opening",        "identify_ball", "insertion",
-                                     "rolling_ball", "rolling_ball_small", "stable_grasp"};
+  const std::set<std::string> run = {"box_pushing", "cap_opening",  "identify_ball",
+                                     "insertion",   "rolling_ball", "rolling_ball_small",
+                                     "stable_grasp"};
   EXPECT_EQ(found, run) << "a scene without a test of what it does, or a test without a scene";
 }
 
@@ -114,8 +119,10 @@ TEST(ShippedScenes, RollingBallRolls) {
     EXPECT_EQ(r.steps, 350);
     EXPECT_EQ(r.failed, 0);
     for (int e = 0; e < kEnvironments; ++e) {
-      for (int k = 0; k < 60; ++k) EXPECT_EQ(r.touch(k, e, 0).points, 0) << "the pad is above the ball";
-      for (int k = 90; k < 310; ++k) EXPECT_GT(r.touch(k, e, 0).pressure, 1e-3) << name << " step " << k;
+      for (int k = 0; k < 60; ++k)
+        EXPECT_EQ(r.touch(k, e, 0).points, 0) << "the pad is above the ball";
+      for (int k = 90; k < 310; ++k)
+        EXPECT_GT(r.touch(k, e, 0).pressure, 1e-3) << name << " step " << k;
       EXPECT_GT(r.q(r.at(0.8), e, "ball_joint.x") - r.q(0, e, "ball_joint.x"), 2e-3);
     }
   }
@@ -126,12 +133,15 @@ TEST(ShippedScenes, BoxIsPushedAndLeftBehind) {
   EXPECT_EQ(r.steps, 500);
   EXPECT_EQ(r.failed, 0);
   for (int e = 0; e < kEnvironments; ++e) {
-    for (int k = 0; k <= r.at(0.1); ++k) ASSERT_EQ(r.touch(k, e, 0).points, 0) << "out of touch for 0.1 s";
-    for (int k = r.at(0.3); k < r.at(2.2); ++k) ASSERT_GT(r.touch(k, e, 0).pressure, 0.1) << "step " << k;
+    for (int k = 0; k <= r.at(0.1); ++k)
+      ASSERT_EQ(r.touch(k, e, 0).points, 0) << "out of touch for 0.1 s";
+    for (int k = r.at(0.3); k < r.at(2.2); ++k)
+      ASSERT_GT(r.touch(k, e, 0).pressure, 0.1) << "step " << k;
     EXPECT_GT(r.q(r.at(2.2), e, "box_slide.x"), 0.1);
     EXPECT_GT(std::abs(r.q(r.at(2.2), e, "box_turn.angle")), 0.01);
     for (int k = r.at(2.3); k < r.steps; ++k) ASSERT_EQ(r.touch(k, e, 0).points, 0) << "step " << k;
-    EXPECT_NEAR(r.q(r.steps - 1, e, "box_slide.x"), r.q(r.at(2.4), e, "box_slide.x"), 1e-4) << "it stays";
+    EXPECT_NEAR(r.q(r.steps - 1, e, "box_slide.x"), r.q(r.at(2.4), e, "box_slide.x"), 1e-4)
+        << "it stays";
   }
 }
 
@@ -152,7 +162,8 @@ TEST(ShippedScenes, BarIsLiftedAndPutDown) {
     const double start = r.body(0, e, "block_5", 2);
     EXPECT_GT(r.body(r.at(0.5), e, "block_5", 2) - start, 0.02);
     EXPECT_LT(std::abs(r.body(r.steps - 1, e, "block_5", 2) - start), 1e-3);
-    EXPECT_LT(std::abs(r.body(r.at(0.5), e, "block_5", 4)), 0.1) << "held near its centre of mass: nearly level";
+    EXPECT_LT(std::abs(r.body(r.at(0.5), e, "block_5", 4)), 0.1)
+        << "held near its centre of mass: nearly level";
   }
 }
 
@@ -166,9 +177,11 @@ TEST(ShippedScenes, InsertionHitsTheRim) {
     const double bottom = r.body(last, e, "box", 2) - 0.03;
     EXPECT_GT(bottom, 0.022) << "stopped by the rim, at 25 mm";
     EXPECT_LT(bottom, 0.0251);
-    // axis0 of the left pad is up, of the right pad down: a box that hangs pulls the pads down, the rim pushes them up.
+    // axis0 of the left pad is up, of the right pad down: a box that hangs pulls the pads down, the
+    // rim pushes them up.
     const int hanging = r.at(0.05);
-    EXPECT_LT(r.touch(hanging, e, 0).along - r.touch(hanging, e, 1).along, 0) << "before it touches";
+    EXPECT_LT(r.touch(hanging, e, 0).along - r.touch(hanging, e, 1).along, 0)
+        << "before it touches";
     EXPECT_GT(r.touch(last, e, 0).along - r.touch(last, e, 1).along, 0) << "pressed onto the rim";
   }
 }
@@ -183,9 +196,11 @@ TEST(ShippedScenes, CapIsTurnedByTwoStrokes) {
     EXPECT_GT(twice, once + 0.2);
     EXPECT_LT(twice, 2 * 1.3) << "a cap without damping rolls along, 1.3 rad a stroke";
     for (int s = 0; s < 3; ++s) {
-      for (int k = 0; k < r.at(0.1); ++k) ASSERT_EQ(r.touch(k, e, s).points, 0) << "before they close";
+      for (int k = 0; k < r.at(0.1); ++k)
+        ASSERT_EQ(r.touch(k, e, s).points, 0) << "before they close";
       for (double time : {0.6, 1.0, 1.4, 2.4, 2.8, 3.2}) {
-        EXPECT_NEAR(r.touch(r.at(time), e, s).pressure, 10, 1) << "finger " << s + 1 << " at " << time << " s";
+        EXPECT_NEAR(r.touch(r.at(time), e, s).pressure, 10, 1)
+            << "finger " << s + 1 << " at " << time << " s";
         EXPECT_GT(r.touch(r.at(time), e, s).points, 15);
         EXPECT_GT(r.touch(r.at(time), e, s).shear, 1e-4);
       }
@@ -200,15 +215,20 @@ TEST(ShippedScenes, BallToIdentifyIsPressedRolledAndSlidOver) {
   EXPECT_EQ(r.steps, 500);
   EXPECT_EQ(r.failed, 0);
   for (int e = 0; e < kEnvironments; ++e) {
-    for (int k = r.at(0.01); k < r.steps; ++k) ASSERT_GT(r.touch(k, e, 0).pressure, 0.1) << "step " << k;
+    for (int k = r.at(0.01); k < r.steps; ++k)
+      ASSERT_GT(r.touch(k, e, 0).pressure, 0.1) << "step " << k;
     EXPECT_NEAR(r.touch(r.at(0.24), e, 0).pressure, 0.6 + 0.245, 0.1) << "motor and weight";
-    // A ball rolls half the way of what it carries; sliding, the shear is at the limit of friction, 0.5.
+    // A ball rolls half the way of what it carries; sliding, the shear is at the limit of friction,
+    // 0.5.
     EXPECT_NEAR(r.q(r.at(0.4), e, "ball_joint.x"), 0.5 * r.q(r.at(0.4), e, "pad_joint.x"), 1e-3);
     EXPECT_GT(r.q(r.at(0.4), e, "ball_joint.x"), 4e-3);
     for (double time : {0.3, 0.4})
-      EXPECT_LT(std::abs(r.touch(r.at(time), e, 0).along), 0.2 * r.touch(r.at(time), e, 0).pressure);
+      EXPECT_LT(std::abs(r.touch(r.at(time), e, 0).along),
+                0.2 * r.touch(r.at(time), e, 0).pressure);
     for (double time : {0.735, 0.765})
-      EXPECT_GT(std::abs(r.touch(r.at(time), e, 0).along), 0.45 * r.touch(r.at(time), e, 0).pressure) << time << " s";
+      EXPECT_GT(std::abs(r.touch(r.at(time), e, 0).along),
+                0.45 * r.touch(r.at(time), e, 0).pressure)
+          << time << " s";
   }
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A machine written in metres and kilogrammes and the same in centimetres and grams move alike: every output is SI.
+// A machine written in metres and kilogrammes and the same in centimetres and grams move alike:
+// every output is SI.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +26,8 @@ Series run(const std::string& name) {
   Stepper stepper(model);
   Readout readout(model);
   const ControlProgram control(model, model.timestep(), 3);
-  const std::size_t nu = std::size_t(model.nu()), nq = std::size_t(model.nq()), nv = std::size_t(model.nv());
+  const std::size_t nu = std::size_t(model.nu()), nq = std::size_t(model.nq()),
+                    nv = std::size_t(model.nv());
   const std::size_t numbers = 3 * std::size_t(model.sensors()[0].points);
   std::vector<double> u(kEnvironments * nu);
   Series s;

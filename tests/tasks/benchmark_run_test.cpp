@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Episodes for the clock take the same steps and read the same fields, however they are spread over threads and batches.
+// Episodes for the clock take the same steps and read the same fields, however they are spread over
+// threads and batches.
 #include "tasks/benchmark_run.hpp"
 
 #include <gmock/gmock.h>
@@ -83,7 +84,8 @@ TEST(BenchmarkRun, CompactFramesHoldTheBitsOfDenseOnes) {
     EXPECT_THAT(compact.checksums, ElementsAreArray(dense.checksums)) << to_string(precision);
     EXPECT_EQ(compact.tactile_points, dense.tactile_points);
   }
-  EXPECT_NE(result_of(2, options(1, FrameKind::dense, Precision::mixed)).checksum(), result_of(2, options(1)).checksum());
+  EXPECT_NE(result_of(2, options(1, FrameKind::dense, Precision::mixed)).checksum(),
+            result_of(2, options(1)).checksum());
 }
 
 TEST(BenchmarkRun, AChainFeelsEveryBitAndTheOrder) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cap opening: what it draws, pays, shows and makes of an action. Derivatives and the script are tested with those of
-// all tasks.
+// Cap opening: what it draws, pays, shows and makes of an action. Derivatives and the script are
+// tested with those of all tasks.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -24,21 +24,30 @@ using testing::uniform_distance;
 TEST(CapOpening, StartsFollowTheirDistributionsOutsideTheCap) {
   const auto task = task_named("cap_opening");
   const auto all = starts(*task);
-  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.varying.at(0); }), 0.01, 0.7), kUnlikely);
-  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.varying.at(1); }), 0.02, 0.08), kUnlikely);
+  EXPECT_LT(
+      uniform_distance(column(all, [](const Start& s) { return s.varying.at(0); }), 0.01, 0.7),
+      kUnlikely);
+  EXPECT_LT(
+      uniform_distance(column(all, [](const Start& s) { return s.varying.at(1); }), 0.02, 0.08),
+      kUnlikely);
   for (const std::size_t axis : {2U, 3U})
-    EXPECT_LT(uniform_distance(column(all, [axis](const Start& s) { return s.varying.at(axis); }), -0.02, 0.02), kUnlikely);
+    EXPECT_LT(uniform_distance(column(all, [axis](const Start& s) { return s.varying.at(axis); }),
+                               -0.02, 0.02),
+              kUnlikely);
   EXPECT_EQ(all[0].varying.size(), 4U) << "damping, radius and place of the cap vary, nothing else";
   double mean = 0, square = 0;
   for (const Start& s : all) {
     ASSERT_EQ(s.q[0], 0) << "the cap";
-    for (const std::size_t swing : {1U, 4U, 7U}) mean += s.q[swing], square += s.q[swing] * s.q[swing];
-    // Every tip stands clear of the cap: hips are 97 mm from the middle, links are 120 mm, a tip is 12 mm.
+    for (const std::size_t swing : {1U, 4U, 7U})
+      mean += s.q[swing], square += s.q[swing] * s.q[swing];
+    // Every tip stands clear of the cap: hips are 97 mm from the middle, links are 120 mm, a tip is
+    // 12 mm.
     for (std::size_t f = 0; f < 3; ++f) {
       const double *q = &s.q[1 + 3 * f], turn = 2 * std::numbers::pi / 3 * double(f);
       const double out = 0.097 - 0.12 * std::sin(q[1]) - 0.12 * std::sin(q[1] + q[2]);
       const double left = 0.12 * (std::cos(q[1]) + std::cos(q[1] + q[2])) * std::sin(q[0]);
-      const double x = std::cos(turn) * out - std::sin(turn) * left, y = std::sin(turn) * out + std::cos(turn) * left;
+      const double x = std::cos(turn) * out - std::sin(turn) * left,
+                   y = std::sin(turn) * out + std::cos(turn) * left;
       ASSERT_GT(std::hypot(x - s.varying[2], y - s.varying[3]), s.varying[1] + 0.013 - 1e-12);
     }
   }
@@ -49,7 +58,8 @@ TEST(CapOpening, StartsFollowTheirDistributionsOutsideTheCap) {
   const std::size_t observed = task->spec().observation_size();
   for (int e = 0; e < 64; ++e) {
     const auto o = vector.observation(e);
-    EXPECT_THAT(std::vector<double>(o.begin() + 18, o.end()), ::testing::Each(0.0)) << "a tip touches at the start";
+    EXPECT_THAT(std::vector<double>(o.begin() + 18, o.end()), ::testing::Each(0.0))
+        << "a tip touches at the start";
     ASSERT_EQ(o.size(), observed);
   }
 }
@@ -87,7 +97,8 @@ TEST(CapOpening, TargetsFollowTheAnglesWithinTheirLimits) {
   for (std::size_t k = 0; k < u.size(); ++k) EXPECT_NEAR(u[k], expected[k], 1e-15) << k;
   const std::vector<MomentCotangent> to{{q, v, {}, {}}};
   task->controls_vjp(own.view(), 0, std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9}, {to, action});
-  EXPECT_THAT(q, ::testing::ElementsAre(0, 0, 2, 3, 4, 0, 6, 7, 8, 0)) << "a target at its limit stays there";
+  EXPECT_THAT(q, ::testing::ElementsAre(0, 0, 2, 3, 4, 0, 6, 7, 8, 0))
+      << "a target at its limit stays there";
   EXPECT_THAT(v, ::testing::Each(0.0));
 }
 
@@ -110,13 +121,18 @@ TEST(CapOpening, ShowsFieldsAsImages) {
     const auto& points = task->model().scene().sensors[f].points;
     for (std::size_t p = 0; p < points.size(); ++p)
       for (std::size_t c = 0; c < 3; ++c)
-        ASSERT_EQ(o[18 + ((f * 20 + std::size_t(points[p].pixel[0])) * 20 + std::size_t(points[p].pixel[1])) * 3 + c],
-                  double(3 * (302 * f + p) + c + 1));
+        ASSERT_EQ(
+            o[18 +
+              ((f * 20 + std::size_t(points[p].pixel[0])) * 20 + std::size_t(points[p].pixel[1])) *
+                  3 +
+              c],
+            double(3 * (302 * f + p) + c + 1));
     for (std::size_t k = 0; k < 1200; ++k) zeros += o[18 + 1200 * f + k] == 0;
   }
   EXPECT_EQ(zeros, 3 * 3 * (400 - 302U));
   Scene scene = read_scene(TANGERE_SOURCE_DIR "/scenes/cap_opening.xml").scene;
-  for (const std::array<int, 2> wrong : {std::array{-1, -1}, std::array{20, 0}, scene.sensors[1].points[7].pixel}) {
+  for (const std::array<int, 2> wrong :
+       {std::array{-1, -1}, std::array{20, 0}, scene.sensors[1].points[7].pixel}) {
     Scene other = scene;
     other.sensors[1].points[8].pixel = wrong;
     EXPECT_THROW(static_cast<void>(make_task("cap_opening", other)), InputError);
@@ -130,8 +146,10 @@ TEST(CapOpening, ObservesTouchOrNot) {
   EXPECT_EQ(blind->spec().observation_size(), 18U);
   EXPECT_EQ(task->spec().observation_size(), 18U + 3 * 20 * 20 * 3);
   VectorTask seeing(*task, 2), unseeing(*blind, 2);
-  for (std::size_t k = 0; k < 18; ++k) EXPECT_EQ(seeing.observation(1)[k], unseeing.observation(1)[k]);
-  // Every fingertip stands where its angles put it: so far from the axis, and a third of a turn from the next.
+  for (std::size_t k = 0; k < 18; ++k)
+    EXPECT_EQ(seeing.observation(1)[k], unseeing.observation(1)[k]);
+  // Every fingertip stands where its angles put it: so far from the axis, and a third of a turn
+  // from the next.
   for (std::size_t f = 0; f < 3; ++f) {
     const auto o = seeing.observation(1);
     const double *q = &o[3 * f], *tip = &o[9 + 3 * f];

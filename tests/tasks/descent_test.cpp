@@ -39,7 +39,8 @@ class ReachGoal : public RolloutLoss {
     if (at.step != at.steps) return sum;
     const double d = distance(at.q, at.environment);
     // No joint before the box has a quaternion, so dofs and coordinates have the same places.
-    for (std::size_t i = 0; i < 2; ++i) out.q[box_ + i] += at.q[box_ + i] - goals_[std::size_t(at.environment)][i];
+    for (std::size_t i = 0; i < 2; ++i)
+      out.q[box_ + i] += at.q[box_ + i] - goals_[std::size_t(at.environment)][i];
     return sum + 0.5 * d * d;
   }
 
@@ -98,7 +99,8 @@ double mean_distance(const Pushes& p, const ReachGoal& loss) {
   const std::size_t nu = std::size_t(p.model.nu());
   std::vector<double> u(nu * kEnvironments), q(std::size_t(p.model.nq()));
   for (int t = 0; t < kActions * kHeld; ++t) {
-    for (int e = 0; e < kEnvironments; ++e) p.controls(t, e, std::span(u).subspan(std::size_t(e) * nu, nu));
+    for (int e = 0; e < kEnvironments; ++e)
+      p.controls(t, e, std::span(u).subspan(std::size_t(e) * nu, nu));
     stepper.step(batch, u);
   }
   double sum = 0;
@@ -115,10 +117,12 @@ TEST(Descent, FiftyAdamStepsHalveTheDistanceOfAPushedBox) {
   // A little push that brings the pad to the box: out of touch no control has a gradient.
   for (std::size_t k = 0; k < p.actions.size(); k += kHandControls) p.actions[k] = 0.05;
   const auto names = p.model.q_names();
-  const auto box = std::size_t(std::find(names.begin(), names.end(), "box_slide.x") - names.begin());
+  const auto box =
+      std::size_t(std::find(names.begin(), names.end(), "box_slide.x") - names.begin());
   ASSERT_LT(box, names.size());
   std::array<Goal, kEnvironments> goals;  // 60 to 120 mm ahead, up to 20 mm aside
-  for (std::size_t e = 0; e < kEnvironments; ++e) goals[e] = {0.06 + 0.02 * double(e / 4), -0.02 + 0.04 / 3 * double(e % 4)};
+  for (std::size_t e = 0; e < kEnvironments; ++e)
+    goals[e] = {0.06 + 0.02 * double(e / 4), -0.02 + 0.04 / 3 * double(e % 4)};
   const ReachGoal loss(box, goals);
   const RolloutLoss* const losses[] = {&loss};
   GradientOptions options;
@@ -128,8 +132,8 @@ TEST(Descent, FiftyAdamStepsHalveTheDistanceOfAPushedBox) {
   Adam adam(p.actions.size(), 0.02);
   for (int k = 0; k < 50; ++k) {
     const GradientSummary g = rollout_gradients(
-        Batch(p.model, kEnvironments, 1), [&](std::int64_t t, int e, std::span<double> u) { p.controls(t, e, u); }, options,
-        losses);
+        Batch(p.model, kEnvironments, 1),
+        [&](std::int64_t t, int e, std::span<double> u) { p.controls(t, e, u); }, options, losses);
     ASSERT_TRUE(g.failures.empty());
     adam.step(p.actions, by_actions(p, g.losses[0].u));
   }
@@ -139,9 +143,11 @@ TEST(Descent, FiftyAdamStepsHalveTheDistanceOfAPushedBox) {
   EXPECT_LT(after, 0.5 * before) << "mean distances [m]";
 }
 
-/// The same of a task: what is climbed is its return, by the actions of 16 episodes that are pushed by others as well.
+/// The same of a task: what is climbed is its return, by the actions of 16 episodes that are pushed
+/// by others as well.
 TEST(Descent, AdamOnActionsRaisesTheReturnOfBoxPushing) {
-  const auto task = make_task("box_pushing_reduced", read_scene(TANGERE_SOURCE_DIR "/scenes/box_pushing.xml").scene);
+  const auto task = make_task("box_pushing_reduced",
+                              read_scene(TANGERE_SOURCE_DIR "/scenes/box_pushing.xml").scene);
   constexpr std::size_t kWidth = 3;
   std::vector<double> actions(kEnvironments * kActions * kWidth);
   for (std::size_t k = 0; k < actions.size(); k += kWidth) actions[k] = 0.05;
@@ -149,8 +155,10 @@ TEST(Descent, AdamOnActionsRaisesTheReturnOfBoxPushing) {
   options.episodes = kEnvironments;
   options.actions = kActions;
   options.seed = 1;
-  const TaskActions given = [&](const TaskView& view, std::span<const double>, std::span<double> action) {
-    std::copy_n(actions.begin() + (view.episode * kActions + view.actions) * std::int64_t(kWidth), kWidth, action.begin());
+  const TaskActions given = [&](const TaskView& view, std::span<const double>,
+                                std::span<double> action) {
+    std::copy_n(actions.begin() + (view.episode * kActions + view.actions) * std::int64_t(kWidth),
+                kWidth, action.begin());
   };
   Adam adam(actions.size(), 0.02);
   double before = 0, after = 0;
@@ -160,7 +168,8 @@ TEST(Descent, AdamOnActionsRaisesTheReturnOfBoxPushing) {
     after = std::accumulate(g.value.begin(), g.value.end(), 0.0) / kEnvironments;
     if (k == 0) before = after;
     std::vector<double> down(g.by_action.size());
-    std::transform(g.by_action.begin(), g.by_action.end(), down.begin(), [](double x) { return -x; });
+    std::transform(g.by_action.begin(), g.by_action.end(), down.begin(),
+                   [](double x) { return -x; });
     adam.step(actions, down);
   }
   RecordProperty("mean_return_before", std::to_string(before));

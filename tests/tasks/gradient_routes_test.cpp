@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Adjoint, tangents in dual numbers and differences of whole rollouts on every scene of a task, over 1 to 350 steps, under the
-// schemes that people ask for; and what published code gets wrong.
+// Adjoint, tangents in dual numbers and differences of whole rollouts on every scene of a task,
+// over 1 to 350 steps, under the schemes that people ask for; and what published code gets wrong.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,9 @@
 namespace tangere {
 namespace {
 
-Scene shipped(const std::string& name) { return read_scene(TANGERE_SOURCE_DIR "/scenes/" + name + ".xml").scene; }
+Scene shipped(const std::string& name) {
+  return read_scene(TANGERE_SOURCE_DIR "/scenes/" + name + ".xml").scene;
+}
 
 /// Of a shipped scene under a scheme.
 GradientCheck check(const Scene& scene, LossKind kind, std::int64_t steps, int entries) {
@@ -31,7 +33,8 @@ GradientCheck check(const Scene& scene, LossKind kind, std::int64_t steps, int e
   options.settled = 1e-6;
   options.stepper.tolerance = 1e-12;
   return check_gradient(
-      start, [&](std::int64_t step, int e, std::span<double> u) { program.evaluate(step, e, u); }, *loss, options);
+      start, [&](std::int64_t step, int e, std::span<double> u) { program.evaluate(step, e, u); },
+      *loss, options);
 }
 
 struct Routes {
@@ -39,11 +42,14 @@ struct Routes {
   Integrator scheme;
   LossKind loss;
 };
-void PrintTo(const Routes& r, std::ostream* out) { *out << r.scene << " " << to_string(r.scheme) << " " << to_string(r.loss); }
+void PrintTo(const Routes& r, std::ostream* out) {
+  *out << r.scene << " " << to_string(r.scheme) << " " << to_string(r.loss);
+}
 
 class EveryScene : public ::testing::TestWithParam<Routes> {};
 
-/// Half squares of speeds and of shear are much like those of states and of fields: short runs are enough.
+/// Half squares of speeds and of shear are much like those of states and of fields: short runs are
+/// enough.
 std::vector<std::int64_t> lengths(LossKind loss) {
   if (loss == LossKind::path || loss == LossKind::shear) return {1, 20};
   return {1, 20, 100, 350};
@@ -57,13 +63,16 @@ TEST_P(EveryScene, ThreeRoutesAgreeOverAnyLength) {
     const GradientCheck c = check(scene, GetParam().loss, steps, steps > 100 ? 1 : 3);
     const double tolerance = steps > 100 ? 1e-5 : 1e-6;
     for (const CheckedInput& i : c.inputs) {
-      EXPECT_LE(i.difference_error, tolerance) << i.name << " at " << i.worst << ", " << steps << " steps";
+      EXPECT_LE(i.difference_error, tolerance)
+          << i.name << " at " << i.worst << ", " << steps << " steps";
       EXPECT_LE(i.tangent_error, tolerance) << i.name << ", " << steps << " steps";
       EXPECT_TRUE(i.norm > 0 || steps < 100) << i.name << ", " << steps << " steps";
     }
     for (const CheckedInput& i : c.inputs)
-      if (i.influence && (i.name == "numbers" || i.name == "points")) compared[i.name] += i.compared;
-    // By the start of cap opening, whose motors have long since forgotten it, differences drown in the loss.
+      if (i.influence && (i.name == "numbers" || i.name == "points"))
+        compared[i.name] += i.compared;
+    // By the start of cap opening, whose motors have long since forgotten it, differences drown in
+    // the loss.
     EXPECT_TRUE(steps != 100 || c.entries() > 0) << c.kinks() << " kinks";
   }
   for (const auto& [input, count] : compared) EXPECT_GT(count, 0U) << input;
@@ -71,10 +80,13 @@ TEST_P(EveryScene, ThreeRoutesAgreeOverAnyLength) {
 
 std::vector<Routes> all_routes() {
   std::vector<Routes> all;
-  for (const char* scene : {"rolling_ball_small", "box_pushing", "stable_grasp", "cap_opening", "insertion"})
+  for (const char* scene :
+       {"rolling_ball_small", "box_pushing", "stable_grasp", "cap_opening", "insertion"})
     for (const Integrator scheme : {Integrator::bdf1, Integrator::bdf2})
-      for (const LossKind loss : {LossKind::final_state, LossKind::path, LossKind::tactile, LossKind::shear, LossKind::variables})
-        if (loss != LossKind::variables || Model(shipped(scene)).variables().size() > 0) all.push_back({scene, scheme, loss});
+      for (const LossKind loss : {LossKind::final_state, LossKind::path, LossKind::tactile,
+                                  LossKind::shear, LossKind::variables})
+        if (loss != LossKind::variables || Model(shipped(scene)).variables().size() > 0)
+          all.push_back({scene, scheme, loss});
   return all;
 }
 
@@ -106,7 +118,8 @@ TEST(PublishedFaults, RollingBallGradientIsRight) {
   }
 }
 
-/// The published code is 38 to 108 % off: the motor's force follows the state that the step solves for.
+/// The published code is 38 to 108 % off: the motor's force follows the state that the step solves
+/// for.
 TEST(PublishedFaults, PositionControlGradientIsRight) {
   for (const char* name : {"insertion", "cap_opening"})
     for (const MotorTiming timing : {MotorTiming::end, MotorTiming::start}) {
@@ -116,14 +129,16 @@ TEST(PublishedFaults, PositionControlGradientIsRight) {
         if (motor.control != MotorControl::position) continue;
         ++motors;
         motor.timing = timing;
-        if (timing == MotorTiming::start) motor.P *= 0.1, motor.D *= 0.1;  // explicit, they are not stable at full gain
+        if (timing == MotorTiming::start)
+          motor.P *= 0.1, motor.D *= 0.1;  // explicit, they are not stable at full gain
       }
       EXPECT_GT(motors, 0);
       expect_right(check(scene, LossKind::final_state, 30, 6), 1e-6);
     }
 }
 
-LossGradient gradient(const Model& model, std::int64_t steps, double tolerance, Precision precision) {
+LossGradient gradient(const Model& model, std::int64_t steps, double tolerance,
+                      Precision precision) {
   const ControlProgram program(model, model.timestep(), 3);
   const auto loss = make_loss(LossKind::shear, model, 5);
   const RolloutLoss* const losses[] = {loss.get()};
@@ -133,7 +148,9 @@ LossGradient gradient(const Model& model, std::int64_t steps, double tolerance, 
   options.precision = precision;
   options.parameters = true;
   return rollout_gradients(
-             Batch(model, 1, 3), [&](std::int64_t step, int e, std::span<double> u) { program.evaluate(step, e, u); }, options, losses)
+             Batch(model, 1, 3),
+             [&](std::int64_t step, int e, std::span<double> u) { program.evaluate(step, e, u); },
+             options, losses)
       .losses[0];
 }
 
@@ -141,7 +158,8 @@ LossGradient gradient(const Model& model, std::int64_t steps, double tolerance, 
 double distance(const Model& model, const LossGradient& a, const LossGradient& b) {
   const Parameters parameters(model);
   double worst = 0;
-  const auto part = [&](const std::vector<double>& x, const std::vector<double>& y, const auto& scale) {
+  const auto part = [&](const std::vector<double>& x, const std::vector<double>& y,
+                        const auto& scale) {
     double off = 0, norm = 0;
     for (std::size_t i = 0; i < x.size(); ++i) {
       off += std::pow(scale(i) * (x[i] - y[i]), 2);
@@ -158,12 +176,15 @@ double distance(const Model& model, const LossGradient& a, const LossGradient& b
   return worst;
 }
 
-/// What a solve leaves over is all that is wrong. With the factor that Newton's search left, the error would go with the root.
+/// What a solve leaves over is all that is wrong. With the factor that Newton's search left, the
+/// error would go with the root.
 TEST(Gradients, TheirErrorIsProportionalToTheTolerance) {
   for (const char* name : {"rolling_ball_small", "box_pushing", "stable_grasp"}) {
     const Model model(shipped(name));
     const LossGradient exact = gradient(model, 100, 1e-13, Precision::f64);
-    const auto error = [&](double tolerance) { return distance(model, gradient(model, 100, tolerance, Precision::f64), exact); };
+    const auto error = [&](double tolerance) {
+      return distance(model, gradient(model, 100, tolerance, Precision::f64), exact);
+    };
     const double coarse = error(1e-4), fine = error(1e-8), own = error(model.solver().tolerance);
     RecordProperty(std::string(name) + "_1e-4", std::to_string(coarse * 1e4));
     RecordProperty(std::string(name) + "_1e-8", std::to_string(fine * 1e8));
@@ -178,7 +199,8 @@ TEST(Gradients, TheirErrorIsProportionalToTheTolerance) {
 TEST(Gradients, FieldsInFloatKeepTheDotProduct) {
   for (const char* name : {"rolling_ball_small", "box_pushing", "stable_grasp", "insertion"}) {
     const Model model(shipped(name));
-    const double off = distance(model, gradient(model, 100, 1e-12, Precision::mixed), gradient(model, 100, 1e-12, Precision::f64));
+    const double off = distance(model, gradient(model, 100, 1e-12, Precision::mixed),
+                                gradient(model, 100, 1e-12, Precision::f64));
     EXPECT_GT(off, 0) << name << ": nothing was in float";
     EXPECT_LE(off, 1e-5) << name;
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of whole batches: the same bits however they are computed, and right on every scene that is shipped.
+// Gradients of whole batches: the same bits however they are computed, and right on every scene
+// that is shipped.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,24 +15,30 @@
 namespace tangere {
 namespace {
 
-Scene shipped(const std::string& name) { return read_scene(TANGERE_SOURCE_DIR "/scenes/" + name + ".xml").scene; }
-
-StepControls controls_of(const ControlProgram& program) {
-  return [&program](std::int64_t step, int environment, std::span<double> u) { program.evaluate(step, environment, u); };
+Scene shipped(const std::string& name) {
+  return read_scene(TANGERE_SOURCE_DIR "/scenes/" + name + ".xml").scene;
 }
 
-GradientSummary gradients(const Model& model, int environments, std::int64_t steps, int threads, double tape_bytes,
-                          int losses = 2) {
+StepControls controls_of(const ControlProgram& program) {
+  return [&program](std::int64_t step, int environment, std::span<double> u) {
+    program.evaluate(step, environment, u);
+  };
+}
+
+GradientSummary gradients(const Model& model, int environments, std::int64_t steps, int threads,
+                          double tape_bytes, int losses = 2) {
   const Batch start(model, environments, 5);
   const ControlProgram program(model, model.timestep(), 5);
-  const auto shear = make_loss(LossKind::shear, model, 5), final_state = make_loss(LossKind::final_state, model, 5);
+  const auto shear = make_loss(LossKind::shear, model, 5),
+             final_state = make_loss(LossKind::final_state, model, 5);
   const RolloutLoss* const both[] = {shear.get(), final_state.get()};
   GradientOptions options;
   options.steps = steps;
   options.threads = threads;
   options.parameters = options.points = true;
   options.tape_bytes = tape_bytes;
-  return rollout_gradients(start, controls_of(program), options, std::span(both).first(std::size_t(losses)));
+  return rollout_gradients(start, controls_of(program), options,
+                           std::span(both).first(std::size_t(losses)));
 }
 
 void expect_same(const GradientSummary& a, const GradientSummary& b, std::size_t losses = 2) {
@@ -55,7 +62,8 @@ TEST(Gradients, CheckpointsChangeNothing) {
     Scene scene = shipped("rolling_ball_small");
     scene.integrator = scheme;
     const Model model(scene);
-    const GradientSummary stored = gradients(model, 20, 110, 1, 1e9), again = gradients(model, 20, 110, 1, 1.5e5);
+    const GradientSummary stored = gradients(model, 20, 110, 1, 1e9),
+                          again = gradients(model, 20, 110, 1, 1.5e5);
     EXPECT_EQ(stored.recomputed_steps, 0);
     EXPECT_GE(again.recomputed_steps, 2 * 110);
     expect_same(stored, again);
@@ -64,7 +72,8 @@ TEST(Gradients, CheckpointsChangeNothing) {
 
 TEST(Gradients, AnotherLossBesideChangesNothing) {
   const Model model(shipped("box_pushing"));
-  const GradientSummary one = gradients(model, 3, 60, 1, 1e9, 1), two = gradients(model, 3, 60, 1, 1e9, 2);
+  const GradientSummary one = gradients(model, 3, 60, 1, 1e9, 1),
+                        two = gradients(model, 3, 60, 1, 1e9, 2);
   expect_same(one, two, 1);
   EXPECT_NE(two.losses[0].u, two.losses[1].u);
 }
@@ -86,7 +95,8 @@ TEST(Gradients, MemoryOfPointsIsCounted) {
   const double without = gradient_bytes(model, 40, options, 2);
   options.points = true;
   const double numbers = double(tactile_points(model)) * kPointNumbers;
-  EXPECT_DOUBLE_EQ(gradient_bytes(model, 40, options, 2) - without, 8 * numbers * 2 * (40 + 3 * 16));
+  EXPECT_DOUBLE_EQ(gradient_bytes(model, 40, options, 2) - without,
+                   8 * numbers * 2 * (40 + 3 * 16));
 }
 
 TEST(Gradients, RolloutsCanBeUsedAgain) {
@@ -101,7 +111,8 @@ TEST(Gradients, RolloutsCanBeUsedAgain) {
   const GradientSummary small = rollouts.run(Batch(model, 2, 5), controls_of(program));
   const auto per = small.losses[0].u.size() / 2;
   for (std::size_t i = 0; i < 2 * per; ++i) EXPECT_EQ(small.losses[0].u[i], large.losses[0].u[i]);
-  EXPECT_THROW(rollouts.run(Batch(Model(shipped("box_pushing")), 2), controls_of(program)), InputError);
+  EXPECT_THROW(rollouts.run(Batch(Model(shipped("box_pushing")), 2), controls_of(program)),
+               InputError);
 }
 
 /// An environment that fails is named, has finite derivatives and leaves its neighbours alone.
@@ -141,7 +152,8 @@ TEST(Gradients, ForwardBitsAreThoseOfAPlainRollout) {
   std::vector<double> u(18 * std::size_t(model.nu()));
   for (std::int64_t t = 0; t < 110; ++t) {
     const auto nu = std::size_t(model.nu());
-    for (std::size_t e = 0; e < 18; ++e) program.evaluate(t, std::int64_t(e), std::span(u).subspan(e * nu, nu));
+    for (std::size_t e = 0; e < 18; ++e)
+      program.evaluate(t, std::int64_t(e), std::span(u).subspan(e * nu, nu));
     stepper.step_block(plain, 0, u);
     stepper.step_block(taped, 0, u, &tape);
   }
@@ -158,11 +170,14 @@ struct Checked {
   LossKind loss;
   std::int64_t steps;
 };
-void PrintTo(const Checked& c, std::ostream* out) { *out << c.scene << " " << to_string(c.loss) << " " << c.steps; }
+void PrintTo(const Checked& c, std::ostream* out) {
+  *out << c.scene << " " << to_string(c.loss) << " " << c.steps;
+}
 
 class ShippedScene : public ::testing::TestWithParam<Checked> {};
 
-/// Fields under BDF2, a ball that rolls, motors that hold positions: where others' derivatives are zero or wrong.
+/// Fields under BDF2, a ball that rolls, motors that hold positions: where others' derivatives are
+/// zero or wrong.
 TEST_P(ShippedScene, GradientsAgreeByThreeRoutes) {
   const auto [name, kind, steps] = GetParam();
   const Model model(shipped(name));

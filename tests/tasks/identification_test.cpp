@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers put into a scene come out of its noisy recording, as well as the fit says; what cannot be fitted is refused.
+// Numbers put into a scene come out of its noisy recording, as well as the fit says; what cannot be
+// fitted is refused.
 #include "tasks/identification.hpp"
 
 #include <gmock/gmock.h>
@@ -17,14 +18,17 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const std::vector<std::string> kSought = {"tactile pad kn", "tactile pad kt", "tactile pad mu", "body ball density"};
+const std::vector<std::string> kSought = {"tactile pad kn", "tactile pad kt", "tactile pad mu",
+                                          "body ball density"};
 
 /// The shipped scene with a pad of 20 × 20 points, and what it records.
 class Recording {
  public:
   Recording()
-      : scene(read_scene(TANGERE_SOURCE_DIR "/scenes/identify_ball.xml").scene), program_(coarse(scene), scene.timestep, 0) {
-    run = {[this](std::int64_t t, int e, std::span<double> u) { program_.evaluate(t, e, u); }, program_.steps(), 5};
+      : scene(read_scene(TANGERE_SOURCE_DIR "/scenes/identify_ball.xml").scene),
+        program_(coarse(scene), scene.timestep, 0) {
+    run = {[this](std::int64_t t, int e, std::span<double> u) { program_.evaluate(t, e, u); },
+           program_.steps(), 5};
     clean = simulate_fields(scene, run);
     truth = numbers_of(scene, kSought);
     for (const auto& reading : clean.readings)
@@ -45,7 +49,8 @@ class Recording {
   ControlProgram program_;
 };
 
-Identification fit(const Recording& r, const FieldSequence& recorded, const std::vector<double>& factors) {
+Identification fit(const Recording& r, const FieldSequence& recorded,
+                   const std::vector<double>& factors) {
   std::vector<double> start = r.truth;
   for (std::size_t k = 0; k < start.size(); ++k) start[k] *= factors[k];
   IdentificationOptions options;
@@ -55,7 +60,8 @@ Identification fit(const Recording& r, const FieldSequence& recorded, const std:
 
 TEST(Identification, FindsSkinAndMassWithinOnePercent) {
   const Recording r;
-  const std::vector<std::vector<double>> factors = {{0.5, 2, 0.5, 2}, {2, 0.5, 2, 0.5}, {0.7, 0.6, 1.8, 1.5}};
+  const std::vector<std::vector<double>> factors = {
+      {0.5, 2, 0.5, 2}, {2, 0.5, 2, 0.5}, {0.7, 0.6, 1.8, 1.5}};
   for (std::size_t seed = 0; seed < factors.size(); ++seed) {
     FieldSequence recorded = r.clean;
     add_noise(recorded, 0.01 * r.peak, seed);
@@ -76,7 +82,8 @@ TEST(Identification, IsExactWithoutNoise) {
   const Recording r;
   const Identification found = fit(r, r.clean, {1.5, 0.8, 0.8, 1.3});
   EXPECT_TRUE(found.converged);
-  for (std::size_t k = 0; k < r.truth.size(); ++k) EXPECT_NEAR(found.values()[k] / r.truth[k], 1, 1e-6) << kSought[k];
+  for (std::size_t k = 0; k < r.truth.size(); ++k)
+    EXPECT_NEAR(found.values()[k] / r.truth[k], 1, 1e-6) << kSought[k];
   // Differences across points that begin to touch or to slip are not exact.
   EXPECT_LT(found.gradient_difference, 1e-4);
 }
@@ -96,13 +103,15 @@ TEST(Identification, MisfitIsHalfTheSquaresOfAllPoints) {
   const RolloutLoss* const losses[] = {&misfit};
   GradientOptions options;
   options.steps = r.run.steps;
-  const GradientSummary summary = rollout_gradients(Batch(model, 1), r.run.controls, options, losses);
+  const GradientSummary summary =
+      rollout_gradients(Batch(model, 1), r.run.controls, options, losses);
   EXPECT_NEAR(summary.losses[0].value[0], expected, 1e-12 * expected);
 }
 
 TEST(Identification, RefusesWhatCannotBeFitted) {
   const Recording r;
-  const auto message = [&](const Scene& scene, const FieldSequence& recorded, std::vector<std::string> numbers) {
+  const auto message = [&](const Scene& scene, const FieldSequence& recorded,
+                           std::vector<std::string> numbers) {
     IdentificationOptions options;
     options.numbers = std::move(numbers);
     try {
@@ -112,10 +121,13 @@ TEST(Identification, RefusesWhatCannotBeFitted) {
     }
     return std::string();
   };
-  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad stiffness"}), HasSubstr("no number 'tactile pad stiffness'"));
-  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball kn"}), testing::IsEmpty()) << "any number of the scene";
+  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad stiffness"}),
+              HasSubstr("no number 'tactile pad stiffness'"));
+  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball kn"}), testing::IsEmpty())
+      << "any number of the scene";
   // The ball never slips on the ground.
-  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball mu"}), HasSubstr("do not depend on 'ground ball mu'"));
+  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball mu"}),
+              HasSubstr("do not depend on 'ground ball mu'"));
   const Scene frictionless = with_numbers(r.scene, {{"tactile pad mu"}}, std::vector<double>{0});
   EXPECT_THAT(message(frictionless, r.clean, kSought), HasSubstr("'tactile pad mu' is 0"));
   FieldSequence short_one = r.clean;

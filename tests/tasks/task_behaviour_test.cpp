@@ -24,13 +24,18 @@ using testing::uniform_distance;
 
 TEST(BoxPushing, StartsFollowTheirDistributions) {
   const auto all = starts(*task_named("box_pushing"));
-  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.q[4]; }), -0.02, 0.02), kUnlikely);
-  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.memory[0]; }), 0.15, 0.25), kUnlikely);
-  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.memory[1]; }), -0.2, 0.2), kUnlikely);
-  const double spread = std::numbers::pi / 16;
-  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.memory[2] - std::numbers::pi * s.memory[1]; }),
-                             -spread, spread),
+  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.q[4]; }), -0.02, 0.02),
             kUnlikely);
+  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.memory[0]; }), 0.15, 0.25),
+            kUnlikely);
+  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.memory[1]; }), -0.2, 0.2),
+            kUnlikely);
+  const double spread = std::numbers::pi / 16;
+  EXPECT_LT(
+      uniform_distance(
+          column(all, [](const Start& s) { return s.memory[2] - std::numbers::pi * s.memory[1]; }),
+          -spread, spread),
+      kUnlikely);
   for (const Start& s : all) ASSERT_EQ(s.q[1], -0.001) << "the gripper, 1 mm back";
 }
 
@@ -58,8 +63,14 @@ TEST(BoxPushing, PaysWhatThePaperSays) {
   OwnView own(*task);
   own.memory = {0.2, 0.1, 0.3, 0, 0};
   own.action = {1, -2, 0.5};
-  own.q[0] = {0.1, 0, 0, 0.13, 0.12, 0, 0.3 + std::numbers::pi / 18};  // 0.05 + 0.13: 20 mm short, 20 mm left, 10 degrees
-  own.variables[0] = {0.1, 0.2, 0.03, 0.11, 0.22, 0.5};                // 10 mm and 20 mm apart
+  own.q[0] = {0.1,
+              0,
+              0,
+              0.13,
+              0.12,
+              0,
+              0.3 + std::numbers::pi / 18};  // 0.05 + 0.13: 20 mm short, 20 mm left, 10 degrees
+  own.variables[0] = {0.1, 0.2, 0.03, 0.11, 0.22, 0.5};  // 10 mm and 20 mm apart
   const Verdict verdict = task->judge(own.view());
   EXPECT_NEAR(verdict.reward, -0.01 * (4 + 4) - 0.1 * 4 - (0.25 + 1) - 0.1 * 5.25, 1e-12);
   EXPECT_FALSE(verdict.terminated || verdict.success);
@@ -76,13 +87,17 @@ TEST(BoxPushing, PaysWhatThePaperSays) {
 TEST(BallRolling, GoalsFollowTheirDistribution) {
   const auto all = starts(*task_named("ball_rolling_small"));
   for (std::size_t k = 0; k < 2; ++k)
-    EXPECT_LT(uniform_distance(column(all, [=](const Start& s) { return s.memory[k] - s.q[3 + k]; }), -0.01, 0.01),
-              kUnlikely);
+    EXPECT_LT(
+        uniform_distance(column(all, [=](const Start& s) { return s.memory[k] - s.q[3 + k]; }),
+                         -0.01, 0.01),
+        kUnlikely);
 }
 
 TEST(StableGrasp, BarsBalanceWhereTheyShallAndWeighWhatTheyShall) {
   const auto all = starts(*task_named("stable_grasp"));
-  const auto sum = [](const Start& s) { return std::accumulate(s.varying.begin(), s.varying.end(), 0.0); };
+  const auto sum = [](const Start& s) {
+    return std::accumulate(s.varying.begin(), s.varying.end(), 0.0);
+  };
   const auto centre = [&](const Start& s) {
     double moment = 0;
     for (std::size_t b = 0; b < s.varying.size(); ++b) moment += s.varying[b] * (double(b) + 0.5);
@@ -90,8 +105,10 @@ TEST(StableGrasp, BarsBalanceWhereTheyShallAndWeighWhatTheyShall) {
   };
   EXPECT_LT(uniform_distance(column(all, centre), 1, 10), kUnlikely);
   EXPECT_LT(uniform_distance(column(all, sum), 3000, 7000), kUnlikely);
-  EXPECT_LT(uniform_distance(column(all, [&](const Start& s) { return s.varying[std::size_t(centre(s))]; }), 600, 700),
-            kUnlikely);
+  EXPECT_LT(
+      uniform_distance(
+          column(all, [&](const Start& s) { return s.varying[std::size_t(centre(s))]; }), 600, 700),
+      kUnlikely);
   for (const Start& s : all) ASSERT_GT(*std::min_element(s.varying.begin(), s.varying.end()), 0);
 }
 
@@ -106,7 +123,8 @@ double offset_of(const Batch& batch, int e) {
   return moment / sum;
 }
 
-/// Of a field of shear (rows, cols), both pads: how much of it a common translation and rotation explain, and the latter.
+/// Of a field of shear (rows, cols), both pads: how much of it a common translation and rotation
+/// explain, and the latter.
 struct Vortex {
   double explained = 0, rotation = 0;
 };
@@ -116,14 +134,16 @@ Vortex vortex_of(std::span<const double> flow) {
   for (int pad = 0; pad < 2; ++pad)
     for (int p = 0; p < kPoints; ++p) {
       const double up = pad == 0 ? 1 : -1, z = up * (p / 10 - 6), y = 4.5 - p % 10;
-      const double a = up * flow[std::size_t(2 * pad * kPoints + p)], b = -flow[std::size_t((2 * pad + 1) * kPoints + p)];
+      const double a = up * flow[std::size_t(2 * pad * kPoints + p)],
+                   b = -flow[std::size_t((2 * pad + 1) * kPoints + p)];
       fz += a, fy += b, moment += y * a - z * b, square += y * y + z * z, all += a * a + b * b;
     }
   const double turning = moment * moment / square;
   return {((fy * fy + fz * fz) / (2 * kPoints) + turning) / all, moment / square};
 }
 
-/// The paper's Fig. 3: a bar that is not held at its centre of mass turns, the more the farther, and the pads read a vortex.
+/// The paper's Fig. 3: a bar that is not held at its centre of mass turns, the more the farther,
+/// and the pads read a vortex.
 TEST(StableGrasp, TiltGrowsWithTheOffsetAndShearIsARotation) {
   const auto task = task_named("stable_grasp");
   constexpr int kEnvironments = 64;
@@ -144,23 +164,27 @@ TEST(StableGrasp, TiltGrowsWithTheOffsetAndShearIsARotation) {
       EXPECT_LT(vortex.rotation * offset, 0) << "turned by its weight: the heavier side goes down";
     }
   }
-  vector.step(std::vector<double>(kEnvironments, 0.0));  // at the middle again: its reward tells the tilt
+  vector.step(
+      std::vector<double>(kEnvironments, 0.0));  // at the middle again: its reward tells the tilt
   std::vector<std::pair<double, double>> by_offset;
   for (int e = 0; e < kEnvironments; ++e) {
-    const double offset = std::abs(offset_of(vector.batch(), e)), reward = vector.rewards()[std::size_t(e)];
+    const double offset = std::abs(offset_of(vector.batch(), e)),
+                 reward = vector.rewards()[std::size_t(e)];
     by_offset.emplace_back(offset, reward > 0 ? 0 : -reward / 10);
   }
   std::sort(by_offset.begin(), by_offset.end());
   double before = -1;
   for (std::size_t part = 0; part < 4; ++part) {
     double mean = 0;
-    for (std::size_t i = 0; i < kEnvironments / 4; ++i) mean += by_offset[part * kEnvironments / 4 + i].second / (kEnvironments / 4);
+    for (std::size_t i = 0; i < kEnvironments / 4; ++i)
+      mean += by_offset[part * kEnvironments / 4 + i].second / (kEnvironments / 4);
     EXPECT_GT(mean, before) << "quarter " << part;
     before = mean;
   }
 }
 
-/// Fifty steps of 50 ms reach what 500 steps of 5 ms do: an implicit step of any length ends at rest.
+/// Fifty steps of 50 ms reach what 500 steps of 5 ms do: an implicit step of any length ends at
+/// rest.
 TEST(StableGrasp, SettlesInFewerStepsToTheSameRest) {
   const auto task = task_named("stable_grasp");
   const auto all = starts(*task);
@@ -172,7 +196,8 @@ TEST(StableGrasp, SettlesInFewerStepsToTheSameRest) {
       if (coarse) options.timestep = spec.settling_timestep;
       Stepper stepper(task->model(), options);
       Batch batch(task->model(), 1, 3, std::int64_t(episode));
-      for (int b = 0; b < 11; ++b) batch.set_randomized_value(0, b, all[episode].varying[std::size_t(b)]);
+      for (int b = 0; b < 11; ++b)
+        batch.set_randomized_value(0, b, all[episode].varying[std::size_t(b)]);
       batch.set_state(0, all[episode].q, all[episode].v);
       std::vector<double> u(6), action{0.0};
       task->controls({3, std::int64_t(episode), 0, all[episode].memory, action, {}}, 0, u);
@@ -180,23 +205,29 @@ TEST(StableGrasp, SettlesInFewerStepsToTheSameRest) {
       rest.emplace_back(std::size_t(task->model().nq()));
       batch.get_q(0, rest.back());
     }
-    for (std::size_t i = 0; i < rest[0].size(); ++i) EXPECT_NEAR(rest[0][i], rest[1][i], 2e-5) << "coordinate " << i;
+    for (std::size_t i = 0; i < rest[0].size(); ++i)
+      EXPECT_NEAR(rest[0][i], rest[1][i], 2e-5) << "coordinate " << i;
   }
 }
 
 TEST(Insertion, StartsFollowTheirDistributions) {
   const auto all = starts(*task_named("insertion"));
   const double degree = std::numbers::pi / 180;
-  const std::pair<double, double> memory[] = {{-6e-3, 6e-3}, {-6e-3, 6e-3}, {-10 * degree, 10 * degree}};
+  const std::pair<double, double> memory[] = {
+      {-6e-3, 6e-3}, {-6e-3, 6e-3}, {-10 * degree, 10 * degree}};
   for (std::size_t k = 0; k < 3; ++k)
-    EXPECT_LT(uniform_distance(column(all, [=](const Start& s) { return s.memory[3 + k]; }), memory[k].first,
-                               memory[k].second),
+    EXPECT_LT(uniform_distance(column(all, [=](const Start& s) { return s.memory[3 + k]; }),
+                               memory[k].first, memory[k].second),
               kUnlikely);
-  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.memory[6]; }), -0.01, 5e-3), kUnlikely);
-  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.memory[7]; }), 0.125, 0.8), kUnlikely);
-  const std::pair<double, double> skin[] = {{2e3, 14e3}, {20, 140}, {0.5, 2.5}, {50, 450}, {0.2, 2.3}, {0.5, 2.5}, {0, 100}};
+  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.memory[6]; }), -0.01, 5e-3),
+            kUnlikely);
+  EXPECT_LT(uniform_distance(column(all, [](const Start& s) { return s.memory[7]; }), 0.125, 0.8),
+            kUnlikely);
+  const std::pair<double, double> skin[] = {{2e3, 14e3}, {20, 140},  {0.5, 2.5}, {50, 450},
+                                            {0.2, 2.3},  {0.5, 2.5}, {0, 100}};
   for (std::size_t k = 0; k < 7; ++k) {
-    EXPECT_LT(uniform_distance(column(all, [=](const Start& s) { return s.varying[k]; }), skin[k].first, skin[k].second),
+    EXPECT_LT(uniform_distance(column(all, [=](const Start& s) { return s.varying[k]; }),
+                               skin[k].first, skin[k].second),
               kUnlikely)
         << k;
     ASSERT_EQ(all[5].varying[k], all[5].varying[7 + k]) << "both pads are of one skin";
@@ -217,7 +248,13 @@ TEST(Insertion, WhatGoesInFeelsNoRim) {
     const auto off = vector.view(e).memory.subspan(3, 2);
     const bool fits = std::abs(off[0]) < 2e-3 && std::abs(off[1]) < 2e-3;
     const Moment now = vector.view(e).now();
-    const bool inside = task->judge({0, 0, 1, vector.view(e).memory, vector.actions().subspan(2 * std::size_t(e), 2), {&now, 1}}).success;
+    const bool inside = task->judge({0,
+                                     0,
+                                     1,
+                                     vector.view(e).memory,
+                                     vector.actions().subspan(2 * std::size_t(e), 2),
+                                     {&now, 1}})
+                            .success;
     EXPECT_TRUE(inside || !fits) << off[0] << " " << off[1];
     if (std::abs(off[0]) > 3e-3 || std::abs(off[1]) > 3e-3) {
       EXPECT_FALSE(inside) << off[0] << " " << off[1];

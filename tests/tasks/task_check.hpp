@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tests of tasks share: a task by name, episodes of it, derivatives of its reward by differences.
+// What the tests of tasks share: a task by name, episodes of it, derivatives of its reward by
+// differences.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -55,10 +56,13 @@ struct Played {
   double mean_return = 0, mean_length = 0;
   [[nodiscard]] double rate() const { return double(successes) / episodes; }
   /// Half of the 95 % interval of the rate.
-  [[nodiscard]] double half_width() const { return 1.96 * std::sqrt(rate() * (1 - rate()) / episodes); }
+  [[nodiscard]] double half_width() const {
+    return 1.96 * std::sqrt(rate() * (1 - rate()) / episodes);
+  }
 };
 
-inline Played play_episodes(const Task& task, PolicyKind kind, int episodes, std::uint64_t seed = 0) {
+inline Played play_episodes(const Task& task, PolicyKind kind, int episodes,
+                            std::uint64_t seed = 0) {
   VectorOptions options;
   options.seed = seed;
   options.autoreset = false;
@@ -76,7 +80,8 @@ inline Played play_episodes(const Task& task, PolicyKind kind, int episodes, std
     p.failures += failed(vector.status(e));
     p.mean_return += vector.returns()[std::size_t(e)] / episodes;
     p.mean_length += double(vector.lengths()[std::size_t(e)]) / episodes;
-    EXPECT_EQ(vector.terminated()[std::size_t(e)] + vector.truncated()[std::size_t(e)], 1) << "episode " << e;
+    EXPECT_EQ(vector.terminated()[std::size_t(e)] + vector.truncated()[std::size_t(e)], 1)
+        << "episode " << e;
   }
   return p;
 }
@@ -99,7 +104,8 @@ struct OwnView {
   }
   [[nodiscard]] TaskView view() {
     moments.clear();
-    for (std::size_t m = 0; m < q.size(); ++m) moments.push_back({q[m], v[m], variables[m], tactile[m]});
+    for (std::size_t m = 0; m < q.size(); ++m)
+      moments.push_back({q[m], v[m], variables[m], tactile[m]});
     return {0, 0, actions, memory, action, moments};
   }
 };

@@ -48,7 +48,8 @@ class Differences {
 
  private:
   using Move = std::function<void(double)>;
-  void each(const char* what, double weight, std::vector<double>& x, const std::vector<double>& slope) {
+  void each(const char* what, double weight, std::vector<double>& x,
+            const std::vector<double>& slope) {
     for (std::size_t i = 0; i < std::min<std::size_t>(x.size(), 40); ++i) {
       const double at = x[i];
       compare(what, weight, slope[i], [&x, i, at](double d) { x[i] = at + d; });
@@ -94,7 +95,8 @@ TEST_P(EveryTask, TheRewardsDerivativesAreThoseOfDifferences) {
     std::size_t c = 0;
     for (const LinkDescription& link : task->model().scene().links) {
       const std::size_t count = std::size_t(position_count(link.joint.type));
-      const bool turns = link.joint.type == JointType::free || link.joint.type == JointType::spherical;
+      const bool turns =
+          link.joint.type == JointType::free || link.joint.type == JointType::spherical;
       for (auto& q : own.q) {
         if (!turns) continue;
         double square = 0;
@@ -117,11 +119,16 @@ void draw(OwnView& own, std::uint64_t seed) {
   for (double& x : own.q.back()) x = 0.1 * number();
 }
 
-/// What a function of a view hands back, against differences of weight · function by memory, action and q.
+/// What a function of a view hands back, against differences of weight · function by memory, action
+/// and q.
 class ViewDerivatives {
  public:
   ViewDerivatives(const Task& task, OwnView& own)
-      : action(own.action.size()), memory(own.memory.size()), own_(own), q_(std::size_t(task.model().nv())), v_(q_.size()) {}
+      : action(own.action.size()),
+        memory(own.memory.size()),
+        own_(own),
+        q_(std::size_t(task.model().nv())),
+        v_(q_.size()) {}
 
   std::vector<double> action, memory;
 
@@ -133,12 +140,13 @@ class ViewDerivatives {
   void check(const std::function<double()>& value, std::size_t by_q, const std::string& what) {
     each(own_.action, action, value, what + " by the action");
     each(own_.memory, memory, value, what + " by the memory");
-    each(own_.q.back(), std::vector<double>(q_.begin(), q_.begin() + std::ptrdiff_t(by_q)), value, what + " by q");
+    each(own_.q.back(), std::vector<double>(q_.begin(), q_.begin() + std::ptrdiff_t(by_q)), value,
+         what + " by q");
   }
 
  private:
-  static void each(std::vector<double>& x, const std::vector<double>& slope, const std::function<double()>& value,
-                   const std::string& what) {
+  static void each(std::vector<double>& x, const std::vector<double>& slope,
+                   const std::function<double()>& value, const std::string& what) {
     for (std::size_t k = 0; k < slope.size(); ++k) {
       const double at = x[k];
       x[k] = at + 1e-6;
@@ -169,7 +177,8 @@ TEST_P(EveryTask, TheControlsDerivativesAreThoseOfDifferences) {
   OwnView own(*task);
   draw(own, 6);
   std::vector<double> weight(std::size_t(task->model().nu()));
-  for (std::size_t k = 0; k < weight.size(); ++k) weight[k] = uniform({7, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
+  for (std::size_t k = 0; k < weight.size(); ++k)
+    weight[k] = uniform({7, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
   for (const int step : {0, task->spec().steps_per_action / 2}) {
     ViewDerivatives slopes(*task, own);
     task->controls_vjp(own.view(), step, weight, slopes.out());
@@ -188,7 +197,8 @@ TEST_P(EveryTask, WhatAnActionKeepsHasTheDerivativesOfDifferences) {
   OwnView own(*task);
   draw(own, 8);
   std::vector<double> weight(own.memory.size());
-  for (std::size_t k = 0; k < weight.size(); ++k) weight[k] = uniform({9, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
+  for (std::size_t k = 0; k < weight.size(); ++k)
+    weight[k] = uniform({9, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
   for (own.actions = 0; own.actions < 2; ++own.actions) {
     ViewDerivatives slopes(*task, own);
     std::vector<double> memory = weight;
@@ -199,7 +209,8 @@ TEST_P(EveryTask, WhatAnActionKeepsHasTheDerivativesOfDifferences) {
         [&] {
           const std::vector<double> found = own.memory;
           task->begin_action(own.view(), own.memory);  // in place, as a VectorTask does
-          const double value = std::inner_product(own.memory.begin(), own.memory.end(), weight.begin(), 0.0);
+          const double value =
+              std::inner_product(own.memory.begin(), own.memory.end(), weight.begin(), 0.0);
           own.memory = found;
           return value;
         },
@@ -213,8 +224,10 @@ TEST_P(EveryTask, RestartsHaveTheDerivativesOfDifferences) {
   draw(own, 10);
   const std::size_t nq = std::size_t(task->model().nq()), nv = std::size_t(task->model().nv());
   std::vector<double> by_q(nq), by_v(nv), along(nv), start(nq), speed(nv);
-  for (std::size_t k = 0; k < nq; ++k) by_q[k] = uniform({11, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
-  for (std::size_t k = 0; k < nv; ++k) by_v[k] = uniform({12, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
+  for (std::size_t k = 0; k < nq; ++k)
+    by_q[k] = uniform({11, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
+  for (std::size_t k = 0; k < nv; ++k)
+    by_v[k] = uniform({12, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
   ViewDerivatives slopes(*task, own);
   if (!task->spec().restarts) {
     EXPECT_THROW(task->place_vjp(own.view(), along, by_v, slopes.out()), InputError);
@@ -227,7 +240,8 @@ TEST_P(EveryTask, RestartsHaveTheDerivativesOfDifferences) {
       [&] {
         std::vector<double> q(nq), v(nv);
         task->place(own.view(), q, v);
-        return std::inner_product(q.begin(), q.end(), by_q.begin(), 0.0) + std::inner_product(v.begin(), v.end(), by_v.begin(), 0.0);
+        return std::inner_product(q.begin(), q.end(), by_q.begin(), 0.0) +
+               std::inner_product(v.begin(), v.end(), by_v.begin(), 0.0);
       },
       plain_coordinates(*task), "place");
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Distributions that are not plain: shares of what a bar weighs, angles of fingers that may be drawn again, noise of readings.
+// Distributions that are not plain: shares of what a bar weighs, angles of fingers that may be
+// drawn again, noise of readings.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -24,11 +25,13 @@ using testing::task_named;
 /// The probability that s/(s + t) < y, s and t of U(0.1, 1.1): s < kt, k = y/(1 - y).
 double share_below(double y) {
   const double k = y / (1 - y);
-  const double a = std::clamp(0.1 / k, 0.1, 1.1), b = std::clamp(1.1 / k, 0.1, 1.1);  // t where kt is 0.1, and 1.1
+  const double a = std::clamp(0.1 / k, 0.1, 1.1),
+               b = std::clamp(1.1 / k, 0.1, 1.1);  // t where kt is 0.1, and 1.1
   return k * (b * b - a * a) / 2 - 0.1 * (b - a) + (1.1 - b);
 }
 
-/// Of two blocks on the same side of the middle one: their shares are drawn alike, whatever the side weighs.
+/// Of two blocks on the same side of the middle one: their shares are drawn alike, whatever the
+/// side weighs.
 TEST(StableGrasp, BlocksOfASideShareItByChance) {
   std::vector<double> right, left;
   for (const Start& s : starts(*task_named("stable_grasp"))) {
@@ -49,8 +52,9 @@ TEST(StableGrasp, BlocksOfASideShareItByChance) {
   EXPECT_LT(distance_from(right, share_below), kUnlikely);
 }
 
-/// Fingers whose tips stand so far from the cap, 50 mm or four deviations, that a redraw is out of the question. The cap
-/// decides that, so their angles follow the distribution as it is. (The distances of 1.9 million of them are below 0.85.)
+/// Fingers whose tips stand so far from the cap, 50 mm or four deviations, that a redraw is out of
+/// the question. The cap decides that, so their angles follow the distribution as it is. (The
+/// distances of 1.9 million of them are below 0.85.)
 TEST(CapOpening, AnglesFollowTheirDistributions) {
   const double mean[] = {0, -0.5, 0.8};
   const double out = 0.097 - 0.12 * std::sin(mean[1]) - 0.12 * std::sin(mean[1] + mean[2]);
@@ -58,7 +62,8 @@ TEST(CapOpening, AnglesFollowTheirDistributions) {
   for (const Start& s : starts(*task_named("cap_opening")))
     for (std::size_t f = 0; f < 3; ++f) {
       const double turn = 2 * std::numbers::pi / 3 * double(f);
-      const double gap = std::hypot(std::cos(turn) * out - s.varying[2], std::sin(turn) * out - s.varying[3]);
+      const double gap =
+          std::hypot(std::cos(turn) * out - s.varying[2], std::sin(turn) * out - s.varying[3]);
       if (gap - s.varying[1] - 0.012 < 0.05) continue;
       for (std::size_t k = 0; k < 3; ++k) angles[k].push_back(s.q[1 + 3 * f + k]);
     }
@@ -68,7 +73,8 @@ TEST(CapOpening, AnglesFollowTheirDistributions) {
   }
 }
 
-/// Two readings are subtracted, each with noise of 1e-5 N. One point whose shear is 1 N makes the flow that of newtons.
+/// Two readings are subtracted, each with noise of 1e-5 N. One point whose shear is 1 N makes the
+/// flow that of newtons.
 TEST(Insertion, BothReadingsOfAFlowHaveNoise) {
   const auto task = task_named("insertion");
   OwnView own(*task);

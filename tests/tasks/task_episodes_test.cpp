@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Episodes of tasks on their way to a sink: in ascending order, the same bits on any number of threads, few at a time, ended by
-// errors and when asked to.
+// Episodes of tasks on their way to a sink: in ascending order, the same bits on any number of
+// threads, few at a time, ended by errors and when asked to.
 #include "tasks/task_episodes.hpp"
 
 #include <gmock/gmock.h>
@@ -27,7 +27,8 @@ class Keeper : public EpisodeSink {
     ++prepared;
     const std::int64_t ahead = piece.first_episode / 16 - written;
     std::int64_t most = most_ahead;
-    while (ahead > most && !most_ahead.compare_exchange_weak(most, ahead)) {}
+    while (ahead > most && !most_ahead.compare_exchange_weak(most, ahead)) {
+    }
   }
   void write(const EpisodeRows& piece) override {
     EXPECT_EQ(callers_++, 0) << "two threads in the sink";
@@ -40,14 +41,17 @@ class Keeper : public EpisodeSink {
       add(all, piece.actions, e, piece.action_rows, end.length);
       add(all, piece.rewards, e, piece.action_rows, end.length);
       for (const Observation& values : piece.observations)
-        std::visit([&](const auto& numbers) { add(all, numbers, e, piece.rows, end.length + 1); }, values);
+        std::visit([&](const auto& numbers) { add(all, numbers, e, piece.rows, end.length + 1); },
+                   values);
       all.append(reinterpret_cast<const char*>(&end.total), sizeof end.total);
     }
     if (slow) std::this_thread::sleep_for(std::chrono::milliseconds(20));
     ++written;
     --callers_;
   }
-  void finish(std::int64_t first, std::span<const FailedEpisode>) override { EXPECT_EQ(first, last_); }
+  void finish(std::int64_t first, std::span<const FailedEpisode>) override {
+    EXPECT_EQ(first, last_);
+  }
 
   std::vector<std::string> episodes;  // bytes of each
   std::int64_t fail_at = -1;
@@ -57,8 +61,10 @@ class Keeper : public EpisodeSink {
 
  private:
   template <class T>
-  void add(std::string& to, std::span<const T> all, int episode, std::int64_t rows, std::int64_t used) const {
-    const std::size_t each = all.size() / static_cast<std::size_t>(std::min<std::int64_t>(16, kEpisodes - last_));
+  void add(std::string& to, std::span<const T> all, int episode, std::int64_t rows,
+           std::int64_t used) const {
+    const std::size_t each =
+        all.size() / static_cast<std::size_t>(std::min<std::int64_t>(16, kEpisodes - last_));
     const std::size_t width = each / static_cast<std::size_t>(rows);
     to.append(reinterpret_cast<const char*>(all.data() + static_cast<std::size_t>(episode) * each),
               static_cast<std::size_t>(used) * width * sizeof(T));
@@ -67,8 +73,8 @@ class Keeper : public EpisodeSink {
   std::atomic<int> callers_{0};
 };
 
-TaskEpisodeSummary play(const Task& task, Keeper& keeper, int threads, const EpisodeProgress& progress = {},
-                        const StopRequest& stop = {}) {
+TaskEpisodeSummary play(const Task& task, Keeper& keeper, int threads,
+                        const EpisodeProgress& progress = {}, const StopRequest& stop = {}) {
   TaskEpisodeOptions options;
   options.episodes = kEpisodes;
   options.seed = 4;
@@ -135,7 +141,8 @@ TEST(TaskEpisodes, EndWhenAskedTo) {
   for (const int threads : {1, 4}) {
     Keeper keeper;
     std::atomic<int> asked = 0;
-    const TaskEpisodeSummary summary = play(*task, keeper, threads, {}, [&] { return ++asked > 100; });
+    const TaskEpisodeSummary summary =
+        play(*task, keeper, threads, {}, [&] { return ++asked > 100; });
     EXPECT_TRUE(summary.run.stopped);
     EXPECT_LE(asked, 100 + 2 * threads + 1);
     EXPECT_EQ(std::ssize(keeper.episodes), summary.run.episodes);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of returns: right for every task by three routes, the same bits however they are computed, and of the same episodes
-// that a VectorTask plays.
+// Gradients of returns: right for every task by three routes, the same bits however they are
+// computed, and of the same episodes that a VectorTask plays.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,7 +20,9 @@ namespace {
 using testing::task_named;
 
 TaskActions actions_of(const Policy& policy) {
-  return [&policy](const TaskView& view, std::span<const double> o, std::span<double> a) { policy.act(view, o, a); };
+  return [&policy](const TaskView& view, std::span<const double> o, std::span<double> a) {
+    policy.act(view, o, a);
+  };
 }
 
 struct Checked {
@@ -30,7 +32,9 @@ struct Checked {
   std::int64_t episode = 0;
   int entries = 6;
 };
-void PrintTo(const Checked& c, std::ostream* out) { *out << c.task << " " << to_string(c.policy) << " " << c.actions; }
+void PrintTo(const Checked& c, std::ostream* out) {
+  *out << c.task << " " << to_string(c.policy) << " " << c.actions;
+}
 
 class TaskReturn : public ::testing::TestWithParam<Checked> {};
 
@@ -56,7 +60,8 @@ TEST_P(TaskReturn, GradientsAgreeByThreeRoutes) {
   options.stepper.tolerance = 1e-12;
   const std::string own = name;
   const TaskGradientCheck check = check_task_gradient(
-      *task, [&](const Scene& scene) { return make_task(own, scene); }, actions_of(policy), options);
+      *task, [&](const Scene& scene) { return make_task(own, scene); }, actions_of(policy),
+      options);
   expect_agreement(check, 5e-6);
 }
 
@@ -64,7 +69,8 @@ INSTANTIATE_TEST_SUITE_P(Tasks, TaskReturn,
                          ::testing::Values(Checked{"dummy", PolicyKind::scripted, 40},
                                            Checked{"ball_rolling_small", PolicyKind::scripted, 30},
                                            Checked{"box_pushing", PolicyKind::scripted, 40},
-                                           Checked{"box_pushing_privileged", PolicyKind::random, 20},
+                                           Checked{"box_pushing_privileged", PolicyKind::random,
+                                                   20},
                                            Checked{"box_pushing_reduced", PolicyKind::scripted, 20},
                                            Checked{"cap_opening", PolicyKind::scripted, 20},
                                            Checked{"cap_opening_blind", PolicyKind::random, 20},
@@ -74,11 +80,15 @@ INSTANTIATE_TEST_SUITE_P(Tasks, TaskReturn,
                                            Checked{"insertion_rotation", PolicyKind::random, 2, 1}),
                          [](const auto& given) { return std::string(given.param.task); });
 
-/// Looks at everything that a task can look at, at two moments, and restarts from what it remembers of where it was.
+/// Looks at everything that a task can look at, at two moments, and restarts from what it remembers
+/// of where it was.
 class Everything : public Task {
  public:
   explicit Everything(const Scene& scene)
-      : Task(scene, declare()), pad_(coordinate("pad_joint")), pad_v_(dof("pad_joint")), ball_(coordinate("ball_joint")) {}
+      : Task(scene, declare()),
+        pad_(coordinate("pad_joint")),
+        pad_v_(dof("pad_joint")),
+        ball_(coordinate("ball_joint")) {}
 
   static TaskSpec declare() {
     TaskSpec spec = task_spec("ball_rolling_small");
@@ -97,7 +107,8 @@ class Everything : public Task {
     for (std::size_t k = 0; k < 3; ++k) m[k] = 0.5 * m[k] + 0.9 * view.now().q[pad_ + k];
     m[3] = 0.3 * m[3] + 0.1 * view.action[0];
   }
-  void begin_action_vjp(const TaskView&, std::span<double> m, const ViewCotangent& out) const override {
+  void begin_action_vjp(const TaskView&, std::span<double> m,
+                        const ViewCotangent& out) const override {
     for (std::size_t k = 0; k < 3; ++k) out.moments[0].q[pad_v_ + k] += 0.9 * m[k];
     for (std::size_t k = 0; k < 3; ++k) m[k] *= 0.5;
     out.action[0] += 0.1 * m[3];
@@ -107,7 +118,8 @@ class Everything : public Task {
     for (std::size_t k = 0; k < 2; ++k) q[pad_ + k] = 0.2 * q[pad_ + k] + 0.7 * view.memory[k];
     v[pad_v_] = 0.1 * v[pad_v_] + 0.02 * view.action[1] + 0.05 * view.memory[3];
   }
-  void place_vjp(const TaskView&, std::span<const double> q, std::span<const double> v, const ViewCotangent& out) const override {
+  void place_vjp(const TaskView&, std::span<const double> q, std::span<const double> v,
+                 const ViewCotangent& out) const override {
     for (std::size_t i = 0; i < q.size(); ++i) {
       const bool placed = i == pad_v_ || i == pad_v_ + 1;
       out.moments[0].q[i] += placed ? 0.2 * q[i] : q[i];
@@ -119,10 +131,11 @@ class Everything : public Task {
   }
   void controls(const TaskView& view, int step, std::span<double> u) const override {
     for (std::size_t k = 0; k < 3; ++k)
-      u[k] = view.action[k] * view.action[k] * (1 + 0.1 * step) + 0.2 * view.memory[k] - 0.3 * view.now().v[pad_v_ + k] -
-             view.now().q[pad_ + k];
+      u[k] = view.action[k] * view.action[k] * (1 + 0.1 * step) + 0.2 * view.memory[k] -
+             0.3 * view.now().v[pad_v_ + k] - view.now().q[pad_ + k];
   }
-  void controls_vjp(const TaskView& view, int step, std::span<const double> weight, const ViewCotangent& out) const override {
+  void controls_vjp(const TaskView& view, int step, std::span<const double> weight,
+                    const ViewCotangent& out) const override {
     for (std::size_t k = 0; k < 3; ++k) {
       out.action[k] += weight[k] * 2 * view.action[k] * (1 + 0.1 * step);
       out.memory[k] += 0.2 * weight[k];
@@ -130,7 +143,9 @@ class Everything : public Task {
       out.moments[0].q[pad_v_ + k] -= weight[k];
     }
   }
-  void observe(const TaskView&, std::span<double> o) const override { std::fill(o.begin(), o.end(), 0.0); }
+  void observe(const TaskView&, std::span<double> o) const override {
+    std::fill(o.begin(), o.end(), 0.0);
+  }
   Verdict judge(const TaskView& view) const override {
     double sum = view.memory[3] * view.action[2];
     for (const Moment& m : view.moments) {
@@ -146,7 +161,8 @@ class Everything : public Task {
     for (std::size_t m = 0; m < view.moments.size(); ++m) {
       for (std::size_t i = 0; i < view.moments[m].tactile.size(); ++i)
         out.moments[m].tactile[i] += weight * 100 * view.moments[m].tactile[i];
-      for (std::size_t i = 0; i < view.moments[m].v.size(); ++i) out.moments[m].v[i] += weight * 2 * view.moments[m].v[i];
+      for (std::size_t i = 0; i < view.moments[m].v.size(); ++i)
+        out.moments[m].v[i] += weight * 2 * view.moments[m].v[i];
       out.moments[m].q[dof("ball_joint")] += weight;
       out.moments[m].q[pad_v_ + 2] += 3 * weight;
     }
@@ -162,7 +178,9 @@ class Everything : public Task {
 };
 
 std::unique_ptr<Task> everything(const Scene& scene) { return std::make_unique<Everything>(scene); }
-Scene scene_of(const std::string& name) { return read_scene(TANGERE_SOURCE_DIR "/scenes/" + name + ".xml").scene; }
+Scene scene_of(const std::string& name) {
+  return read_scene(TANGERE_SOURCE_DIR "/scenes/" + name + ".xml").scene;
+}
 
 TEST(TaskGradients, WhateverATaskLooksAtHasItsShare) {
   const auto task = everything(scene_of("rolling_ball_small"));
@@ -170,12 +188,14 @@ TEST(TaskGradients, WhateverATaskLooksAtHasItsShare) {
   TaskCheckOptions options;
   options.entries = 8;
   options.stepper.tolerance = 1e-12;
-  const TaskGradientCheck check = check_task_gradient(*task, everything, actions_of(policy), options);
+  const TaskGradientCheck check =
+      check_task_gradient(*task, everything, actions_of(policy), options);
   expect_agreement(check, 1e-6);
   for (const CheckedInput& c : check.inputs) EXPECT_GT(c.norm, 0) << c.name;
 }
 
-TaskGradients gradients(const Task& task, std::int64_t episodes, int threads, double tape_bytes, std::int64_t actions = 0) {
+TaskGradients gradients(const Task& task, std::int64_t episodes, int threads, double tape_bytes,
+                        std::int64_t actions = 0) {
   const Policy policy(task, PolicyKind::scripted);
   TaskGradientOptions options;
   options.episodes = episodes;
@@ -199,16 +219,19 @@ void expect_same(const TaskGradients& a, const TaskGradients& b) {
 
 TEST(TaskGradients, ThreadsAndNeighboursChangeNothing) {
   const auto task = task_named("box_pushing");
-  const TaskGradients one = gradients(*task, 40, 1, 1e9, 30), three = gradients(*task, 40, 3, 1e9, 30);
+  const TaskGradients one = gradients(*task, 40, 1, 1e9, 30),
+                      three = gradients(*task, 40, 3, 1e9, 30);
   expect_same(one, three);
   const TaskGradients few = gradients(*task, 3, 1, 1e9, 30);
-  for (std::size_t i = 0; i < few.by_action.size(); ++i) EXPECT_EQ(few.by_action[i], one.by_action[i]);
+  for (std::size_t i = 0; i < few.by_action.size(); ++i)
+    EXPECT_EQ(few.by_action[i], one.by_action[i]);
   EXPECT_EQ(one.recomputed_steps, 0);
 }
 
 /// Restarts, ends at different times and a scheme of two steps among them.
 TEST(TaskGradients, CheckpointsChangeNothing) {
-  expect_same(gradients(*task_named("ball_rolling_small"), 18, 1, 1e9, 40), gradients(*task_named("ball_rolling_small"), 18, 1, 6e5, 40));
+  expect_same(gradients(*task_named("ball_rolling_small"), 18, 1, 1e9, 40),
+              gradients(*task_named("ball_rolling_small"), 18, 1, 6e5, 40));
   const auto task = everything(scene_of("rolling_ball_small"));
   const TaskGradients stored = gradients(*task, 18, 1, 1e9), again = gradients(*task, 18, 1, 2.2e5);
   EXPECT_EQ(stored.recomputed_steps, 0);
@@ -216,7 +239,8 @@ TEST(TaskGradients, CheckpointsChangeNothing) {
   expect_same(stored, again);
   const auto insertion = task_named("insertion");
   const TaskGradients ended = gradients(*insertion, 5, 1, 1e9, 6);
-  EXPECT_NE(*std::min_element(ended.length.begin(), ended.length.end()), *std::max_element(ended.length.begin(), ended.length.end()));
+  EXPECT_NE(*std::min_element(ended.length.begin(), ended.length.end()),
+            *std::max_element(ended.length.begin(), ended.length.end()));
   const TaskGradients ended_again = gradients(*insertion, 5, 1, 6e5, 6);
   EXPECT_GT(ended_again.recomputed_steps, 0);
   expect_same(ended, ended_again);
@@ -237,8 +261,10 @@ TEST(TaskGradients, TheEpisodesAreThoseOfAVectorTask) {
       policy.act(vector, chosen);
       vector.step(chosen);
     }
-    EXPECT_EQ(g.value, std::vector<double>(vector.returns().begin(), vector.returns().end())) << name;
-    EXPECT_EQ(g.length, std::vector<std::int64_t>(vector.lengths().begin(), vector.lengths().end())) << name;
+    EXPECT_EQ(g.value, std::vector<double>(vector.returns().begin(), vector.returns().end()))
+        << name;
+    EXPECT_EQ(g.length, std::vector<std::int64_t>(vector.lengths().begin(), vector.lengths().end()))
+        << name;
   }
 }
 
@@ -248,7 +274,11 @@ TEST(TaskGradients, AnActionBeyondItsBoundsHasNoDerivative) {
   options.episodes = 1;
   options.actions = 3;
   const auto g = task_gradients(
-      *task, [](const TaskView& view, std::span<const double>, std::span<double> a) { a[0] = view.actions == 1 ? 0.6 : 0.5; }, options);
+      *task,
+      [](const TaskView& view, std::span<const double>, std::span<double> a) {
+        a[0] = view.actions == 1 ? 0.6 : 0.5;
+      },
+      options);
   EXPECT_NE(g.by_action[0], 0) << "on the bound it is that of its inside";
   EXPECT_EQ(g.by_action[1], 0);
   EXPECT_NE(g.by_action[2], 0);
@@ -263,8 +293,11 @@ TEST(TaskGradients, RefusesWhatItCannotDo) {
   EXPECT_THROW(gradients(*task, 1, 1, 1e3), InputError);
   TaskGradientOptions options;
   options.episodes = 1;
-  EXPECT_THROW(task_gradients(*task, [](const TaskView&, std::span<const double>, std::span<double> a) { a[0] = NAN; }, options),
-               InputError);
+  EXPECT_THROW(
+      task_gradients(
+          *task, [](const TaskView&, std::span<const double>, std::span<double> a) { a[0] = NAN; },
+          options),
+      InputError);
 }
 
 /// The state of every lane after one more action, from where its own change has put it.
@@ -272,7 +305,8 @@ struct Lanes {
   std::vector<std::vector<double>> q, v;
 };
 
-/// What the states after action `last` are, with the state before it or the action itself moved lane by lane.
+/// What the states after action `last` are, with the state before it or the action itself moved
+/// lane by lane.
 template <class Change>
 Lanes after(const Task& task, std::int64_t last, const TaskActions& actions, const Change& change) {
   TaskRollout rollout(task, {{}, {}, 1e-12}, Precision::f64);
@@ -295,7 +329,8 @@ Lanes after(const Task& task, std::int64_t last, const TaskActions& actions, con
   return out;
 }
 
-/// Columns of a row's Jacobian against differences, in v and in the coordinates before the first quaternion.
+/// Columns of a row's Jacobian against differences, in v and in the coordinates before the first
+/// quaternion.
 void check_row(const Task& task, std::int64_t last) {
   const Policy policy(task, PolicyKind::random);
   const TaskActions actions = actions_of(policy);
@@ -314,7 +349,8 @@ void check_row(const Task& task, std::int64_t last) {
   const RowJacobian& j = jacobians.of(5);
   const std::size_t nv = std::size_t(task.model().nv()), width = task.spec().action.size();
   std::size_t plain = 0;
-  while (plain < nv && task.model().compiled().links[plain].kind != kernels::JointKind::spherical) ++plain;  // one link each there
+  while (plain < nv && task.model().compiled().links[plain].kind != kernels::JointKind::spherical)
+    ++plain;  // one link each there
   double norm = 0;
   for (const double x : j.state) norm = std::max(norm, std::abs(x));
   for (const double x : j.others) norm = std::max(norm, std::abs(x));
@@ -332,11 +368,16 @@ void check_row(const Task& task, std::int64_t last) {
       }
     });
     for (std::size_t i = 0; i < nv; ++i) {
-      const auto at = [&](std::size_t row) { return column < 2 * nv ? j.state[row * 2 * nv + column] : j.others[row * width + column - 2 * nv]; };
+      const auto at = [&](std::size_t row) {
+        return column < 2 * nv ? j.state[row * 2 * nv + column]
+                               : j.others[row * width + column - 2 * nv];
+      };
       if (i < plain) {
-        EXPECT_NEAR(at(i), (moved.q[0][i] - moved.q[1][i]) / (2 * kMove), 2e-5 * norm) << "q " << i << " by " << column;
+        EXPECT_NEAR(at(i), (moved.q[0][i] - moved.q[1][i]) / (2 * kMove), 2e-5 * norm)
+            << "q " << i << " by " << column;
       }
-      EXPECT_NEAR(at(nv + i), (moved.v[0][i] - moved.v[1][i]) / (2 * kMove), 2e-5 * norm) << "v " << i << " by " << column;
+      EXPECT_NEAR(at(nv + i), (moved.v[0][i] - moved.v[1][i]) / (2 * kMove), 2e-5 * norm)
+          << "v " << i << " by " << column;
     }
   }
 }

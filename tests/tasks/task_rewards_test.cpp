@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tasks pay, in numbers worked out by hand. Box pushing and cap opening have theirs in tests of their own.
+// What tasks pay, in numbers worked out by hand. Box pushing and cap opening have theirs in tests
+// of their own.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -36,11 +37,13 @@ TEST(Rewards, OfStableGrasp) {
   const std::size_t bar = place_of(*task, "bar");
   OwnView own(*task);
   own.memory[2] = 12 * kMillimetre;  // height at rest
-  const auto hang = [&](double lifted, double tilt) {  // turned about x: the slope of the bar, along y, is the sine of it
-    own.q[0][bar + 2] = (12 + lifted) * kMillimetre;
-    own.q[0][bar + 3] = std::cos(tilt / 2);
-    own.q[0][bar + 4] = std::sin(tilt / 2);
-  };
+  const auto hang =
+      [&](double lifted,
+          double tilt) {  // turned about x: the slope of the bar, along y, is the sine of it
+        own.q[0][bar + 2] = (12 + lifted) * kMillimetre;
+        own.q[0][bar + 3] = std::cos(tilt / 2);
+        own.q[0][bar + 4] = std::sin(tilt / 2);
+      };
   own.q[1][bar + 3] = 1;  // what is after the grasp, level and down, is of no account
   struct Case {
     double lifted, tilt;  // [mm], [rad]
@@ -48,11 +51,11 @@ TEST(Rewards, OfStableGrasp) {
     bool solved;
   };
   const Case cases[] = {
-      {30, 0.019, 100, true},     {30, -0.019, 100, true},   // below 0.02 rad to either side
-      {30, 0.021, -0.21, false},  {30, -0.021, -0.21, false},  // 10 * 0.021
-      {5.1, 0.01, 100, true},     {4.9, 0.01, -0.1, false},  // above 5 mm or not: 10 * 0.01
-      {4.9, 0.5, -5, false},      {30, -1.2, -12, false},    // 10 * 0.5, 10 * 1.2
-      {0, 0, 0, false},                                      // level, but not lifted
+      {30, 0.019, 100, true},    {30, -0.019, 100, true},     // below 0.02 rad to either side
+      {30, 0.021, -0.21, false}, {30, -0.021, -0.21, false},  // 10 * 0.021
+      {5.1, 0.01, 100, true},    {4.9, 0.01, -0.1, false},    // above 5 mm or not: 10 * 0.01
+      {4.9, 0.5, -5, false},     {30, -1.2, -12, false},      // 10 * 0.5, 10 * 1.2
+      {0, 0, 0, false},                                       // level, but not lifted
   };
   for (const Case& c : cases) {
     SCOPED_TRACE(c.tilt);
@@ -73,7 +76,8 @@ TEST(Rewards, OfInsertion) {
   own.action = {0.1, 0.05, 0.2};  // times 20 mm, 20 mm and 10 degrees: e = (1 + 2, -2 + 1, 3 + 2)
   // (3² + 1²)/6² + (5/10)² = 10/36 + 1/4 = 19/36
   const double outside = -19.0 / 36;
-  const auto stand = [&](double height, double tilt) {  // of the middle of its lower face, while it is level [mm]
+  const auto stand = [&](double height,
+                         double tilt) {  // of the middle of its lower face, while it is level [mm]
     for (auto& q : own.q) {
       q[box + 2] = height * kMillimetre + 0.03 - rest;
       q[box + 3] = std::cos(tilt / 2);

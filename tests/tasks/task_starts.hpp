@@ -13,8 +13,8 @@
 
 namespace tangere::testing {
 
-/// Largest distance between the distribution of `x` and the one that is below y with probability `below(y)`, times √n: below
-/// 1.63 with probability 0.99 (Kolmogorov, Smirnov).
+/// Largest distance between the distribution of `x` and the one that is below y with probability
+/// `below(y)`, times √n: below 1.63 with probability 0.99 (Kolmogorov, Smirnov).
 inline double distance_from(std::vector<double> x, const std::function<double(double)>& below) {
   std::sort(x.begin(), x.end());
   double most = 0;
@@ -31,7 +31,9 @@ inline double uniform_distance(std::vector<double> x, double low, double high) {
 }
 /// From the normal distribution.
 inline double normal_distance(std::vector<double> x, double mean, double deviation) {
-  return distance_from(std::move(x), [=](double y) { return 0.5 * std::erfc((mean - y) / (deviation * std::sqrt(2.0))); });
+  return distance_from(std::move(x), [=](double y) {
+    return 0.5 * std::erfc((mean - y) / (deviation * std::sqrt(2.0)));
+  });
 }
 inline constexpr double kUnlikely = 1.63;
 inline constexpr int kDraws = 10000;
@@ -58,7 +60,8 @@ inline std::vector<Start> starts(const Task& task) {
   }
   return all;
 }
-inline std::vector<double> column(const std::vector<Start>& all, const std::function<double(const Start&)>& of) {
+inline std::vector<double> column(const std::vector<Start>& all,
+                                  const std::function<double(const Start&)>& of) {
   std::vector<double> x;
   for (const Start& s : all) x.push_back(of(s));
   return x;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients where sizes and places vary by environment: each has those of its own numbers, by three routes.
+// Gradients where sizes and places vary by environment: each has those of its own numbers, by three
+// routes.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -14,7 +15,8 @@
 namespace tangere {
 namespace {
 
-/// A scene with more numbers that vary; they come last, so that the others are drawn as without them.
+/// A scene with more numbers that vary; they come last, so that the others are drawn as without
+/// them.
 Scene varied(const std::string& name, const std::string& lines) {
   const std::string path = TANGERE_SOURCE_DIR "/scenes/" + name + ".xml";
   const std::string text = read_scene(path).scene.text;
@@ -92,7 +94,8 @@ std::vector<double> part(const std::vector<double>& x, std::size_t i, std::size_
   return {x.begin() + std::ptrdiff_t(i * n), x.begin() + std::ptrdiff_t((i + 1) * n)};
 }
 
-/// The gradient of an environment among others, in either group of a block, is that of its numbers alone.
+/// The gradient of an environment among others, in either group of a block, is that of its numbers
+/// alone.
 TEST(VaryingGradients, OfABatchAreThoseOfScenesOfTheirOwn) {
   for (const auto& [name, lines, count] :
        {std::tuple{"rolling_ball_small", kBall, 1}, {"cap_opening", kCap, 4}}) {
@@ -127,7 +130,8 @@ TEST(VaryingGradients, OfABatchAreThoseOfScenesOfTheirOwn) {
       ASSERT_EQ(all.parameters.size(), 9 * own.parameters.size());
       const Parameters numbers(alone);
       for (std::size_t k = 0; k < own.parameters.size(); ++k)
-        EXPECT_NEAR(all.parameters[e * own.parameters.size() + k], own.parameters[k], 1e-13 * std::abs(own.parameters[k]))
+        EXPECT_NEAR(all.parameters[e * own.parameters.size() + k], own.parameters[k],
+                    1e-13 * std::abs(own.parameters[k]))
             << numbers.infos()[k].name;
     }
     EXPECT_NE(part(all.q, 0, nv), part(all.q, 8, nv));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many environments of a task: an episode is the same alone or among others, on any number of threads, and the order of
-// ends and starts is Gymnasium's.
+// Many environments of a task: an episode is the same alone or among others, on any number of
+// threads, and the order of ends and starts is Gymnasium's.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -23,7 +23,8 @@ TEST_P(EveryTask, DeclaresWhatItDoes) {
   const TaskSpec& spec = task->spec();
   EXPECT_EQ(spec.name, GetParam());
   EXPECT_FALSE(spec.summary.empty() || spec.success.empty() || spec.action.meaning.empty());
-  for (const TensorSpec& o : spec.observations) EXPECT_FALSE(o.unit.empty() || o.meaning.empty()) << o.name;
+  for (const TensorSpec& o : spec.observations)
+    EXPECT_FALSE(o.unit.empty() || o.meaning.empty()) << o.name;
   VectorTask vector(*task, 3);
   EXPECT_EQ(vector.observations().size(), 3 * spec.observation_size());
   EXPECT_THAT(vector.starting(), ::testing::Each(1));
@@ -31,8 +32,8 @@ TEST_P(EveryTask, DeclaresWhatItDoes) {
   EXPECT_THROW(vector.step(std::vector<double>(1)), InputError);
 }
 
-/// The first steps of 1000 environments, where they are cheap, else of 19, against some of them played alone with another
-/// number of threads.
+/// The first steps of 1000 environments, where they are cheap, else of 19, against some of them
+/// played alone with another number of threads.
 TEST_P(EveryTask, AnEpisodeIsTheSameAloneOrAmongOthers) {
   const auto task = task_named(GetParam());
   VectorOptions options;
@@ -47,14 +48,16 @@ TEST_P(EveryTask, AnEpisodeIsTheSameAloneOrAmongOthers) {
   options.threads = 1;
   for (const int e : {0, 7, environments - 1}) {
     options.first_episode = e;
-    EXPECT_EQ(play(*task, PolicyKind::random, 1, steps, options)[0], among[std::size_t(e)]) << "episode " << e;
+    EXPECT_EQ(play(*task, PolicyKind::random, 1, steps, options)[0], among[std::size_t(e)])
+        << "episode " << e;
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Tasks, EveryTask, ::testing::ValuesIn(task_names()),
                          [](const auto& given) { return given.param; });
 
-/// Resets of many environments by several threads at once: what an episode draws is its own on its way into its lane.
+/// Resets of many environments by several threads at once: what an episode draws is its own on its
+/// way into its lane.
 TEST(VectorTask, DrawsTheSameStartsOnAnyNumberOfThreads) {
   const auto task = task_named("dummy");
   constexpr int kEnvironments = 1000;
@@ -72,8 +75,10 @@ TEST(VectorTask, DrawsTheSameStartsOnAnyNumberOfThreads) {
   VectorTask vector(*task, kEnvironments, options);
   for (int round = 0; round < 30; ++round) {
     const std::vector<double> found = starts(vector);
-    const auto differ = std::mismatch(expected.begin(), expected.end(), found.begin()).first - expected.begin();
-    ASSERT_EQ(differ, std::ssize(expected)) << "round " << round << ", environment " << differ / task->model().nq();
+    const auto differ =
+        std::mismatch(expected.begin(), expected.end(), found.begin()).first - expected.begin();
+    ASSERT_EQ(differ, std::ssize(expected))
+        << "round " << round << ", environment " << differ / task->model().nq();
     vector.reset(0);
   }
 }
@@ -118,7 +123,8 @@ TEST(VectorTask, ALaterEpisodeIsWhatItIsAtTheStart) {
   options.first_episode = 5;
   const Shown second = play(*task, PolicyKind::random, 1, horizon - 1, options)[0];
   const std::size_t first = std::size_t(horizon + 1) * (task->spec().observation_size() + 1);
-  EXPECT_EQ(std::vector<double>(both.numbers.begin() + std::ptrdiff_t(first), both.numbers.end()), second.numbers);
+  EXPECT_EQ(std::vector<double>(both.numbers.begin() + std::ptrdiff_t(first), both.numbers.end()),
+            second.numbers);
   EXPECT_EQ(both.resets, 2);
   EXPECT_EQ(both.ends, 1);
 }
