@@ -11,8 +11,8 @@
 #include <map>
 #include <sstream>
 
-#include "engine/error.hpp"
-#include "io/nearest_name.hpp"
+#include "engine/base/error.hpp"
+#include "io/files/nearest_name.hpp"
 
 namespace tangere::apps {
 namespace {

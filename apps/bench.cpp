@@ -13,11 +13,11 @@
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
-#include "io/nearest_name.hpp"
-#include "io/part_file.hpp"
-#include "kernels/isa.hpp"
-#include "kernels/lanes.hpp"
-#include "tasks/task_episodes.hpp"
+#include "io/files/nearest_name.hpp"
+#include "io/files/part_file.hpp"
+#include "kernels/numbers/lanes.hpp"
+#include "kernels/table/isa.hpp"
+#include "tasks/run/task_episodes.hpp"
 
 namespace tangere::apps {
 namespace {

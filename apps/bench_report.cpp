@@ -6,7 +6,7 @@
 
 #include <filesystem>
 
-#include "io/scaling_plot.hpp"
+#include "io/picture/scaling_plot.hpp"
 
 namespace tangere::apps {
 namespace {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "apps/scene_run.hpp"
-#include "engine/model.hpp"
-#include "tasks/benchmark_run.hpp"
+#include "engine/model/model.hpp"
+#include "tasks/run/benchmark_run.hpp"
 
 namespace tangere::apps {
 

@@ -5,7 +5,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
-#include "io/dataset_export.hpp"
+#include "io/dataset/dataset_export.hpp"
 
 namespace tangere::apps {
 namespace {

@@ -18,11 +18,11 @@
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
 #include "apps/workers.hpp"
-#include "io/nearest_name.hpp"
-#include "kernels/isa.hpp"
-#include "tasks/episode_gradients.hpp"
-#include "tasks/losses.hpp"
-#include "tasks/task_episodes.hpp"
+#include "io/files/nearest_name.hpp"
+#include "kernels/table/isa.hpp"
+#include "tasks/gradients/episode_gradients.hpp"
+#include "tasks/gradients/losses.hpp"
+#include "tasks/run/task_episodes.hpp"
 
 namespace tangere::apps {
 namespace {

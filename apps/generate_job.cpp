@@ -9,9 +9,9 @@
 #include <filesystem>
 
 #include "apps/workers.hpp"
-#include "engine/error.hpp"
-#include "io/dataset_merge.hpp"
-#include "io/nearest_name.hpp"
+#include "engine/base/error.hpp"
+#include "io/dataset/dataset_merge.hpp"
+#include "io/files/nearest_name.hpp"
 
 namespace tangere::apps {
 namespace {

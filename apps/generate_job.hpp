@@ -10,9 +10,9 @@
 
 #include "apps/command.hpp"
 #include "apps/console.hpp"
-#include "io/dataset_writer.hpp"
-#include "tasks/episode_gradients.hpp"
-#include "tasks/episodes.hpp"
+#include "io/dataset/dataset_writer.hpp"
+#include "tasks/gradients/episode_gradients.hpp"
+#include "tasks/run/episodes.hpp"
 
 namespace tangere::apps {
 

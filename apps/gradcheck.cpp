@@ -12,10 +12,10 @@
 #include "apps/command.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/task_run.hpp"
-#include "tasks/gradient_check.hpp"
-#include "tasks/losses.hpp"
-#include "tasks/task_gradient_check.hpp"
-#include "tasks/task_list.hpp"
+#include "tasks/catalogue/task_list.hpp"
+#include "tasks/gradients/gradient_check.hpp"
+#include "tasks/gradients/losses.hpp"
+#include "tasks/gradients/task_gradient_check.hpp"
 
 namespace tangere::apps {
 namespace {

@@ -9,13 +9,13 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
-#include "engine/control.hpp"
-#include "engine/error.hpp"
-#include "engine/random.hpp"
-#include "io/part_file.hpp"
-#include "io/scene_reader.hpp"
-#include "io/series_plot.hpp"
-#include "tasks/identification.hpp"
+#include "engine/base/error.hpp"
+#include "engine/model/random.hpp"
+#include "engine/step/control.hpp"
+#include "io/files/part_file.hpp"
+#include "io/picture/series_plot.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "tasks/gradients/identification.hpp"
 
 namespace tangere::apps {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
-#include "io/dataset_files.hpp"
+#include "io/dataset/dataset_files.hpp"
 
 namespace tangere::apps {
 namespace {

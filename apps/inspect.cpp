@@ -9,10 +9,10 @@
 #include "apps/inspect_task.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/task_run.hpp"
-#include "engine/control.hpp"
-#include "engine/model.hpp"
-#include "io/trajectory_layout.hpp"
-#include "kernels/isa.hpp"
+#include "engine/model/model.hpp"
+#include "engine/step/control.hpp"
+#include "io/trajectory/trajectory_layout.hpp"
+#include "kernels/table/isa.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -102,7 +102,7 @@ Json as_json(const Model& model) {
           {"effects", effects},
           {"stages", stages},
           {"state_bytes_per_environment", model.state_bytes_per_environment()},
-          {"workspace_bytes", model.workspace_bytes()},
+          {"workspace_bytes", Stepper::workspace_bytes(model)},
           {"instruction_set", kernels::active_isa_name()}};
 }
 
@@ -168,7 +168,7 @@ std::string as_text(const Model& model) {
   return text + fmt::format(
                     "\nmemory: {} bytes per environment, {} bytes of workspace per thread\n"
                     "instruction set: {}",
-                    model.state_bytes_per_environment(), model.workspace_bytes(),
+                    model.state_bytes_per_environment(), Stepper::workspace_bytes(model),
                     kernels::active_isa_name());
 }
 

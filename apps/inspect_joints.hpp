@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "engine/model.hpp"
+#include "engine/model/model.hpp"
 
 namespace tangere::apps {
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "engine/task_spec.hpp"
+#include "engine/rows/task_spec.hpp"
 
 namespace tangere::apps {
 

@@ -11,8 +11,8 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
-#include "engine/error.hpp"
-#include "kernels/isa.hpp"
+#include "engine/base/error.hpp"
+#include "kernels/table/isa.hpp"
 
 namespace tangere::apps {
 namespace {

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <limits>
 
-#include "engine/error.hpp"
+#include "engine/base/error.hpp"
 
 namespace tangere::apps {
 namespace {

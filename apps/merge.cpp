@@ -7,9 +7,9 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
-#include "engine/error.hpp"
-#include "io/dataset_merge.hpp"
-#include "io/folder_lock.hpp"
+#include "engine/base/error.hpp"
+#include "io/dataset/dataset_merge.hpp"
+#include "io/files/folder_lock.hpp"
 
 namespace tangere::apps {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
-#include "io/part_file.hpp"
-#include "io/tactile_plot.hpp"
+#include "io/files/part_file.hpp"
+#include "io/picture/tactile_plot.hpp"
 
 namespace tangere::apps {
 namespace {

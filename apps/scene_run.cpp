@@ -6,9 +6,9 @@
 
 #include <csignal>
 
-#include "io/csv.hpp"
-#include "io/nearest_name.hpp"
-#include "io/scene_reader.hpp"
+#include "io/files/csv.hpp"
+#include "io/files/nearest_name.hpp"
+#include "io/scene/scene_reader.hpp"
 
 namespace tangere::apps {
 namespace {

@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "apps/console.hpp"
-#include "engine/control.hpp"
-#include "engine/precision.hpp"
-#include "engine/stepper.hpp"
-#include "tasks/losses.hpp"
-#include "tasks/rollout.hpp"
+#include "engine/base/precision.hpp"
+#include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
+#include "tasks/gradients/losses.hpp"
+#include "tasks/run/rollout.hpp"
 
 namespace tangere::apps {
 

@@ -15,14 +15,14 @@
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
-#include "engine/parameters.hpp"
-#include "io/nearest_name.hpp"
-#include "io/saved_state.hpp"
-#include "io/trajectory_file.hpp"
-#include "kernels/isa.hpp"
-#include "tasks/gradients.hpp"
-#include "tasks/losses.hpp"
-#include "tasks/task_pilot.hpp"
+#include "engine/derivative/parameters.hpp"
+#include "io/files/nearest_name.hpp"
+#include "io/trajectory/saved_state.hpp"
+#include "io/trajectory/trajectory_file.hpp"
+#include "kernels/table/isa.hpp"
+#include "tasks/gradients/gradients.hpp"
+#include "tasks/gradients/losses.hpp"
+#include "tasks/run/task_pilot.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -62,7 +62,7 @@ void check_arguments(const Options& options) {
 void check_size(const Model& model, int environments) {
   const double state = static_cast<double>(model.state_bytes_per_environment());
   check_memory(state * environments + rollout_bytes(model, environments) +
-                   static_cast<double>(model.workspace_bytes()),
+                   static_cast<double>(Stepper::workspace_bytes(model)),
                fmt::format("--envs {}", environments));
 }
 

@@ -6,10 +6,10 @@
 
 #include <filesystem>
 
-#include "io/csv.hpp"
-#include "io/nearest_name.hpp"
-#include "io/scene_reader.hpp"
-#include "tasks/task_list.hpp"
+#include "io/files/csv.hpp"
+#include "io/files/nearest_name.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "tasks/catalogue/task_list.hpp"
 
 namespace tangere::apps {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "apps/console.hpp"
-#include "tasks/policy.hpp"
+#include "tasks/run/policy.hpp"
 
 namespace tangere::apps {
 

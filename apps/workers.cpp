@@ -10,7 +10,7 @@
 #include <cstring>
 #include <optional>
 
-#include "engine/error.hpp"
+#include "engine/base/error.hpp"
 
 namespace tangere::apps {
 namespace {

@@ -10,11 +10,11 @@
 #include <random>
 #include <vector>
 
-#include "io/chunk_codec.hpp"
-#include "io/dataset_merge.hpp"
-#include "io/dataset_writer.hpp"
-#include "io/h5.hpp"
-#include "io/shard_check.hpp"
+#include "io/dataset/chunk_codec.hpp"
+#include "io/dataset/dataset_merge.hpp"
+#include "io/dataset/dataset_writer.hpp"
+#include "io/dataset/shard_check.hpp"
+#include "io/hdf5/h5.hpp"
 
 namespace tangere {
 namespace {

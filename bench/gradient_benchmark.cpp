@@ -8,18 +8,18 @@
 #include <optional>
 #include <vector>
 
-#include "engine/control.hpp"
-#include "engine/field_tangent.hpp"
-#include "engine/parameters.hpp"
-#include "engine/point_numbers.hpp"
-#include "engine/readout.hpp"
-#include "engine/readout_pullback.hpp"
-#include "engine/tape.hpp"
-#include "io/scene_reader.hpp"
-#include "kernels/isa.hpp"
-#include "tasks/benchmark_fields.hpp"
-#include "tasks/gradients.hpp"
-#include "tasks/losses.hpp"
+#include "engine/derivative/field_tangent.hpp"
+#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/point_numbers.hpp"
+#include "engine/derivative/readout_pullback.hpp"
+#include "engine/sense/readout.hpp"
+#include "engine/step/control.hpp"
+#include "engine/step/tape.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "kernels/table/isa.hpp"
+#include "tasks/gradients/gradients.hpp"
+#include "tasks/gradients/losses.hpp"
+#include "tasks/run/benchmark_fields.hpp"
 
 namespace tangere {
 namespace {

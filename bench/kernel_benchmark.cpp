@@ -6,13 +6,13 @@
 
 #include <vector>
 
-#include "engine/compiled_model.hpp"
-#include "engine/control.hpp"
-#include "engine/detection.hpp"
-#include "engine/group_step.hpp"
-#include "engine/stepper.hpp"
-#include "io/scene_reader.hpp"
-#include "kernels/isa.hpp"
+#include "engine/model/compiled_model.hpp"
+#include "engine/step/control.hpp"
+#include "engine/step/detection.hpp"
+#include "engine/step/group_step.hpp"
+#include "engine/step/stepper.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "kernels/table/isa.hpp"
 
 namespace tangere {
 namespace {

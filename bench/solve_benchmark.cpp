@@ -7,10 +7,10 @@
 
 #include <string>
 
-#include "engine/compiled_model.hpp"
-#include "engine/random.hpp"
-#include "engine/workspace.hpp"
-#include "kernels/isa.hpp"
+#include "engine/model/compiled_model.hpp"
+#include "engine/model/random.hpp"
+#include "engine/step/workspace.hpp"
+#include "kernels/table/isa.hpp"
 
 namespace tangere {
 namespace {

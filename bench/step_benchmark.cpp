@@ -7,13 +7,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/control.hpp"
-#include "engine/readout.hpp"
-#include "engine/stepper.hpp"
-#include "io/scene_reader.hpp"
-#include "kernels/isa.hpp"
-#include "tasks/benchmark_fields.hpp"
-#include "tasks/rollout.hpp"
+#include "engine/sense/readout.hpp"
+#include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "kernels/table/isa.hpp"
+#include "tasks/run/benchmark_fields.hpp"
+#include "tasks/run/rollout.hpp"
 
 namespace tangere {
 namespace {

@@ -14,11 +14,11 @@
 #include <immintrin.h>
 #endif
 
-#include "engine/compiled_model.hpp"
-#include "io/scene_reader.hpp"
-#include "kernels/isa.hpp"
-#include "kernels/kernel_table.hpp"
-#include "kernels/pair_contact.hpp"
+#include "engine/model/compiled_model.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "kernels/contact/pair_contact.hpp"
+#include "kernels/table/isa.hpp"
+#include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
 namespace {

@@ -9,12 +9,12 @@
 #include <span>
 #include <vector>
 
-#include "engine/readout.hpp"
-#include "io/scene_reader.hpp"
-#include "kernels/isa.hpp"
-#include "kernels/lanes.hpp"
-#include "tasks/policy.hpp"
-#include "tasks/task_list.hpp"
+#include "engine/sense/readout.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "kernels/numbers/lanes.hpp"
+#include "kernels/table/isa.hpp"
+#include "tasks/catalogue/task_list.hpp"
+#include "tasks/run/policy.hpp"
 
 namespace tangere {
 namespace {

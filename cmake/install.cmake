@@ -3,7 +3,7 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# Headers keep the names they have here, "engine/model.hpp", because they include each other by them. So the folder that
+# Headers keep the names they have here, "engine/model/model.hpp", because they include each other by them. So the folder that
 # users get on their include path is include/tangere.
 set(headers ${CMAKE_INSTALL_INCLUDEDIR}/tangere)
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/tangere)
@@ -23,17 +23,55 @@ set_target_properties(tangere_flags PROPERTIES EXPORT_NAME flags)  # carries a s
 install(TARGETS tangere_kernels tangere_engine tangere_tasks tangere_io tangere_umbrella tangere_flags
   EXPORT tangere ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS tangere RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-install(FILES kernels/contact_types.hpp DESTINATION ${headers}/kernels)
-install(FILES engine/adjoint.hpp engine/aligned.hpp engine/batch.hpp engine/control.hpp engine/episode_sink.hpp engine/error.hpp
-  engine/field_tangent.hpp engine/flow_map.hpp engine/loss.hpp engine/model.hpp engine/parameters.hpp engine/point_numbers.hpp engine/readout_pullback.hpp
-  engine/step_jacobian.hpp engine/tape.hpp
-  engine/precision.hpp engine/readout.hpp engine/row_sink.hpp engine/scene.hpp engine/stepper.hpp
-  engine/tactile_frame.hpp engine/task_spec.hpp DESTINATION ${headers}/engine)
-install(FILES tasks/benchmark_run.hpp tasks/episodes.hpp tasks/gradients.hpp tasks/identification.hpp tasks/losses.hpp tasks/policy.hpp tasks/rollout.hpp tasks/task.hpp
-  tasks/task_episodes.hpp tasks/task_list.hpp tasks/task_pilot.hpp tasks/vector_task.hpp DESTINATION ${headers}/tasks)
-install(FILES io/dataset_export.hpp io/dataset_files.hpp io/dataset_layout.hpp io/dataset_merge.hpp io/dataset_writer.hpp
-  io/scene_reader.hpp io/shard_check.hpp io/trajectory_file.hpp
-  io/trajectory_layout.hpp DESTINATION ${headers}/io)
+set(public_headers
+  engine/base/aligned.hpp
+  engine/base/error.hpp
+  engine/base/precision.hpp
+  engine/derivative/adjoint.hpp
+  engine/derivative/field_tangent.hpp
+  engine/derivative/loss.hpp
+  engine/derivative/parameters.hpp
+  engine/derivative/point_numbers.hpp
+  engine/derivative/readout_pullback.hpp
+  engine/derivative/step_jacobian.hpp
+  engine/model/model.hpp
+  engine/model/scene.hpp
+  engine/rows/episode_sink.hpp
+  engine/rows/row_sink.hpp
+  engine/rows/task_spec.hpp
+  engine/sense/flow_map.hpp
+  engine/sense/readout.hpp
+  engine/sense/tactile_frame.hpp
+  engine/step/batch.hpp
+  engine/step/control.hpp
+  engine/step/stepper.hpp
+  engine/step/tape.hpp
+  io/dataset/dataset_export.hpp
+  io/dataset/dataset_files.hpp
+  io/dataset/dataset_layout.hpp
+  io/dataset/dataset_merge.hpp
+  io/dataset/dataset_writer.hpp
+  io/dataset/shard_check.hpp
+  io/scene/scene_reader.hpp
+  io/trajectory/trajectory_file.hpp
+  io/trajectory/trajectory_layout.hpp
+  kernels/contact/contact_types.hpp
+  tasks/catalogue/task.hpp
+  tasks/catalogue/task_list.hpp
+  tasks/gradients/gradients.hpp
+  tasks/gradients/identification.hpp
+  tasks/gradients/losses.hpp
+  tasks/run/benchmark_run.hpp
+  tasks/run/episodes.hpp
+  tasks/run/policy.hpp
+  tasks/run/rollout.hpp
+  tasks/run/task_episodes.hpp
+  tasks/run/task_pilot.hpp
+  tasks/run/vector_task.hpp)
+foreach(header ${public_headers})
+  cmake_path(GET header PARENT_PATH folder)
+  install(FILES ${header} DESTINATION ${headers}/${folder})
+endforeach()
 install(DIRECTORY scenes/ DESTINATION ${CMAKE_INSTALL_DATADIR}/tangere/scenes)
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 

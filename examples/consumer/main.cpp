@@ -8,10 +8,10 @@
 #include <exception>
 #include <vector>
 
-#include "engine/control.hpp"
-#include "engine/readout.hpp"
-#include "engine/stepper.hpp"
-#include "io/scene_reader.hpp"
+#include "engine/sense/readout.hpp"
+#include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
+#include "io/scene/scene_reader.hpp"
 
 int main(int argc, char** argv) {
   if (argc != 2) {

@@ -12,7 +12,7 @@
 #include <numeric>
 #include <sstream>
 
-#include "io/h5_listing.hpp"
+#include "io/hdf5/h5_listing.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/sanitized.hpp"
 

@@ -7,16 +7,16 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "engine/control.hpp"
-#include "engine/step_jacobian.hpp"
-#include "io/h5.hpp"
-#include "io/h5_listing.hpp"
-#include "io/scene_reader.hpp"
-#include "io/shard_check.hpp"
-#include "tasks/losses.hpp"
-#include "tasks/policy.hpp"
-#include "tasks/task_gradients.hpp"
-#include "tasks/task_list.hpp"
+#include "engine/derivative/step_jacobian.hpp"
+#include "engine/step/control.hpp"
+#include "io/dataset/shard_check.hpp"
+#include "io/hdf5/h5.hpp"
+#include "io/hdf5/h5_listing.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "tasks/catalogue/task_list.hpp"
+#include "tasks/gradients/losses.hpp"
+#include "tasks/gradients/task_gradients.hpp"
+#include "tasks/run/policy.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
 

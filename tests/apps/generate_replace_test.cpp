@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/folder_lock.hpp"
+#include "io/files/folder_lock.hpp"
 #include "tests/apps/program.hpp"
 
 namespace tangere::apps {

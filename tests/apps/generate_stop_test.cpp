@@ -11,7 +11,7 @@
 #include <random>
 #include <thread>
 
-#include "io/shard_check.hpp"
+#include "io/dataset/shard_check.hpp"
 #include "tests/apps/program.hpp"
 
 namespace tangere::apps {

@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "io/h5.hpp"
-#include "io/shard_check.hpp"
+#include "io/dataset/shard_check.hpp"
+#include "io/hdf5/h5.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/sanitized.hpp"
 

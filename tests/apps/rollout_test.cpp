@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which rows a rollout gives, in which order, and what it says about failures and stops.
-#include "tasks/rollout.hpp"
+#include "tasks/run/rollout.hpp"
 
 #include <gmock/gmock.h>
 
@@ -8,8 +8,8 @@
 #include <limits>
 #include <string>
 
-#include "engine/readout.hpp"
-#include "io/scene_reader.hpp"
+#include "engine/sense/readout.hpp"
+#include "io/scene/scene_reader.hpp"
 
 namespace tangere {
 namespace {

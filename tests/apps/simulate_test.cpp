@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "io/h5.hpp"
+#include "io/hdf5/h5.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
 

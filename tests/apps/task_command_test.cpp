@@ -5,8 +5,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/h5.hpp"
-#include "io/shard_check.hpp"
+#include "io/dataset/shard_check.hpp"
+#include "io/hdf5/h5.hpp"
 #include "tests/apps/program.hpp"
 
 namespace tangere::apps {

@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "engine/scene.hpp"
+#include "engine/model/scene.hpp"
 
 namespace tangere::testing {
 

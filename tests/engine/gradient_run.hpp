@@ -8,9 +8,9 @@
 #include <functional>
 #include <vector>
 
-#include "engine/adjoint.hpp"
-#include "engine/displacement.hpp"
-#include "engine/parameters.hpp"
+#include "engine/derivative/adjoint.hpp"
+#include "engine/derivative/parameters.hpp"
+#include "engine/step/displacement.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/kernels/random_numbers.hpp"
 

@@ -3,7 +3,7 @@
 // ground.
 #pragma once
 
-#include "engine/scene.hpp"
+#include "engine/model/scene.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
 namespace tangere::testing {

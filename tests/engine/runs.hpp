@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "engine/readout.hpp"
-#include "engine/stepper.hpp"
+#include "engine/sense/readout.hpp"
+#include "engine/step/stepper.hpp"
 
 namespace tangere::testing {
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "engine/scene.hpp"
+#include "engine/model/scene.hpp"
 
 namespace tangere::testing {
 

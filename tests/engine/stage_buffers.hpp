@@ -5,8 +5,8 @@
 
 #include <vector>
 
-#include "engine/compiled_model.hpp"
-#include "kernels/jacobian-inl.hpp"
+#include "engine/model/compiled_model.hpp"
+#include "kernels/step/jacobian-inl.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
 namespace tangere::testing {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "io/h5.hpp"
-#include "io/shard_check.hpp"
+#include "io/dataset/shard_check.hpp"
+#include "io/hdf5/h5.hpp"
 #include "tests/files.hpp"
 
 namespace {

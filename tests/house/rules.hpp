@@ -12,7 +12,7 @@
 
 namespace tangere::house {
 
-/// Path from the project's root ("engine/model.hpp") → contents. Tests plant violations in trees
+/// Path from the project's root ("engine/model/model.hpp") → contents. Tests plant violations in trees
 /// made by hand.
 using Tree = std::map<std::string, std::string, std::less<>>;
 

@@ -27,7 +27,7 @@ const Tree& project() {
 
 TEST(House, IsSeenAsAWhole) {
   for (const char* path :
-       {"kernels/contact_types.hpp", "engine/model.hpp", "tasks/rollout.hpp",
+       {"kernels/contact/contact_types.hpp", "engine/model/model.hpp", "tasks/run/rollout.hpp",
         "tests/CMakeLists.txt", "cmake/install.cmake", "README.md", "run-demo", ".ci/run"})
     EXPECT_TRUE(project().contains(path)) << path;
   for (const auto& [path, text] : project()) {
@@ -48,40 +48,47 @@ TEST(House, FoldersAndLinksAreDocumented) { EXPECT_THAT(check_documents(project(
 
 TEST(HouseRules, SeeAnIncludeThatPointsTheWrongWay) {
   const Tree tree{
-      {"engine/model.hpp", "#include \"kernels/lanes.hpp\"\n"},
-      {"io/file.hpp", ""},
-      {"kernels/lanes.hpp", "#include <cmath>\n #  include \"engine/model.hpp\"\n"},
-      {"tasks/rollout.cpp", "#include \"io/file.hpp\"\n#include \"engine/model.hpp\"\n"},
-      {"apps/main.cpp", "#include \"io/file.hpp\"\n"}};
-  EXPECT_THAT(check_includes(tree),
-              ElementsAre(Says("kernels/lanes.hpp", 2, "kernels must not include engine"),
-                          Says("tasks/rollout.cpp", 1, "tasks must not include io")));
+      {"engine/model/model.hpp", "#include \"kernels/numbers/lanes.hpp\"\n"},
+      {"io/files/file.hpp", ""},
+      {"kernels/numbers/lanes.hpp", "#include <cmath>\n #  include \"engine/model/model.hpp\"\n"},
+      {"tasks/run/rollout.cpp",
+       "#include \"io/files/file.hpp\"\n#include \"engine/model/model.hpp\"\n"},
+      {"engine/step/batch.hpp", "#include \"engine/model/model.hpp\"\n"},
+      {"engine/model/compile.cpp", "#include \"engine/step/batch.hpp\"\n"},
+      {"apps/main.cpp", "#include \"io/files/file.hpp\"\n"}};
+  EXPECT_THAT(
+      check_includes(tree),
+      ElementsAre(
+          Says("engine/model/compile.cpp", 1, "engine/model must not include engine/step"),
+          Says("kernels/numbers/lanes.hpp", 2, "kernels/numbers must not include engine/model"),
+          Says("tasks/run/rollout.cpp", 1, "tasks/run must not include io/files")));
 }
 
 TEST(HouseRules, SeeANameFromOutsideTheRoot) {
-  const Tree tree{{"engine/deep/a.hpp", "#include \"b.hpp\"\n#include \"c.hpp\"\n"},
-                  {"engine/deep/b.hpp", ""}};
+  const Tree tree{{"engine/step/a.hpp", "#include \"b.hpp\"\n#include \"c.hpp\"\n"},
+                  {"engine/step/b.hpp", ""}};
   EXPECT_THAT(check_includes(tree),
-              ElementsAre(Says("engine/deep/a.hpp", 2, "no file of the project")));
+              ElementsAre(Says("engine/step/a.hpp", 2, "no file of the project")));
 }
 
 TEST(HouseRules, SeeALibraryInTheWrongFolder) {
   const Tree tree{
-      {"engine/a.cpp", "#include <vector>\n#include <hdf5.h>\n#include <CLI/CLI.hpp>\n"},
-      {"io/b.cpp", "#include <hdf5.h>\n"},
-      {"kernels/c.cpp", "#include <Eigen/Dense>\n"}};
-  EXPECT_THAT(check_includes(tree),
-              ElementsAre(Says("engine/a.cpp", 2, "<hdf5.h>"), Says("engine/a.cpp", 3, "<CLI/"),
-                          Says("kernels/c.cpp", 1, "<Eigen/Dense>")));
+      {"engine/model/a.cpp", "#include <vector>\n#include <hdf5.h>\n#include <CLI/CLI.hpp>\n"},
+      {"io/hdf5/b.cpp", "#include <hdf5.h>\n"},
+      {"kernels/step/c.cpp", "#include <Eigen/Dense>\n"}};
+  EXPECT_THAT(check_includes(tree), ElementsAre(Says("engine/model/a.cpp", 2, "<hdf5.h>"),
+                                                Says("engine/model/a.cpp", 3, "<CLI/"),
+                                                Says("kernels/step/c.cpp", 1, "<Eigen/Dense>")));
 }
 
 TEST(HouseRules, SeeAFolderNobodyTold) {
-  EXPECT_THAT(check_includes({{"misc/a.cpp", ""}}),
-              ElementsAre(Says("misc/a.cpp", 0, "does not know")));
+  EXPECT_THAT(check_includes({{"engine/a.cpp", ""}, {"misc/a.cpp", ""}}),
+              ElementsAre(Says("engine/a.cpp", 0, "does not know"),
+                          Says("misc/a.cpp", 0, "does not know")));
 }
 
 TEST(HouseRules, SeeAContainerBehindAKernel) {
-  const Tree tree{{"kernels/lu-inl.hpp", "#include \"kernels/view.hpp\"\n#include <cmath>\n"},
+  const Tree tree{{"kernels/step/lu-inl.hpp", "#include \"kernels/view.hpp\"\n#include <cmath>\n"},
                   {"kernels/view.hpp", "#include <vector>\n"},
                   {"kernels/table.cpp", "#include <string>\n"}};
   EXPECT_THAT(check_kernel_includes(tree), ElementsAre(Says("kernels/view.hpp", 1, "<vector>")));

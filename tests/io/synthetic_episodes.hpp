@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/episode_sink.hpp"
-#include "io/dataset_layout.hpp"
+#include "engine/rows/episode_sink.hpp"
+#include "io/dataset/dataset_layout.hpp"
 #include "tests/io/synthetic_run.hpp"
 
 namespace tangere::testing {

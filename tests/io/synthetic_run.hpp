@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "io/trajectory_file.hpp"
+#include "io/trajectory/trajectory_file.hpp"
 
 namespace tangere::testing {
 

@@ -2,7 +2,7 @@
 // Included once by each generated lane_probe.<isa>.cpp.
 #pragma once
 
-#include "kernels/one_lane.hpp"
+#include "kernels/numbers/one_lane.hpp"
 #include "tests/kernels/lane_probe.hpp"
 
 namespace tangere::testing {

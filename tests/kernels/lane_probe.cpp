@@ -5,7 +5,7 @@
 #include <cstring>
 #include <vector>
 
-#include "kernels/kernel_table.hpp"
+#include "kernels/table/kernel_table.hpp"
 
 namespace tangere::testing {
 

@@ -5,7 +5,7 @@
 
 #include <span>
 
-#include "kernels/distance.hpp"
+#include "kernels/contact/distance.hpp"
 
 namespace tangere::testing {
 

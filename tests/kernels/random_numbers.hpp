@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "kernels/so3.hpp"
+#include "kernels/numbers/so3.hpp"
 
 namespace tangere::testing {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/readout.hpp"
-#include "io/scene_reader.hpp"
+#include "engine/sense/readout.hpp"
+#include "io/scene/scene_reader.hpp"
 #include "tests/tasks/episode_recorder.hpp"
 
 namespace tangere::testing {

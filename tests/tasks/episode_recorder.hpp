@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "engine/episode_sink.hpp"
-#include "tasks/episodes.hpp"
+#include "engine/rows/episode_sink.hpp"
+#include "tasks/run/episodes.hpp"
 
 namespace tangere::testing {
 

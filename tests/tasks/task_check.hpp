@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "io/scene_reader.hpp"
-#include "tasks/policy.hpp"
-#include "tasks/task_list.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "tasks/catalogue/task_list.hpp"
+#include "tasks/run/policy.hpp"
 
 namespace tangere::testing {
 

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/batch.hpp"
-#include "tasks/task.hpp"
+#include "engine/step/batch.hpp"
+#include "tasks/catalogue/task.hpp"
 
 namespace tangere::testing {
 

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+// Between the tape and the group: gathers states and cotangents of eight lanes, reverses their
+// step, scatters.
+#include "engine/derivative/adjoint.hpp"
+
+#include <algorithm>
+
+#include "engine/derivative/group_adjoint.hpp"
+#include "engine/derivative/motor_pullback.hpp"
+#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/point_numbers.hpp"
+#include "engine/step/step_settings.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+using kernels::kGroup;
+using kernels::Row;
+
+namespace {
+
+/// Both sizes of lanes a step may have been taken in.
+template <int L>
+struct Lanes {
+  BasicWorkspace<L> work;
+  AdjointWorkspace<L> adjoint;
+  Lanes(const CompiledModel& m, const AdjointOptions& wanted)
+      : work(m), adjoint(m, wanted.losses, wanted.parameters) {}
+};
+
+/// A step of one group: environment `first` + l of the block in lane l of the batch.
+struct GroupStepInHand {
+  const BlockTape& tape;
+  std::int64_t step;
+  int first;
+  LaneBits live = 0;
+};
+
+}  // namespace
+
+struct Adjoint::Impl {
+  Model model;
+  StepSettings settings;
+  GroupAdjoint group;
+  Lanes<kGroup> eight;
+  Lanes<1> one;
+  std::vector<BlockCotangent> losses;
+  AlignedVector<double>
+      rows;  ///< a block as it was before the step: states from the tape, parameters from the batch
+
+  Impl(const Model& m, const StepSettings& s, const AdjointOptions& wanted)
+      : model(m),
+        settings(s),
+        group(model.compiled()),
+        eight(model.compiled(), wanted),
+        one(model.compiled(), wanted),
+        losses(std::size_t(wanted.losses)),
+        rows(std::size_t(model.compiled().layout.rows * kBlock)) {
+    const std::size_t nv = std::size_t(m.nv()) * kBlock, nu = std::size_t(m.nu()) * kBlock;
+    for (BlockCotangent& c : losses) {
+      for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v}) x->assign(nv, 0.0);
+      c.u.assign(nu, 0.0);
+      if (wanted.points)
+        c.points.assign(std::size_t(kBlock) * std::size_t(tactile_points(m) * kPointNumbers), 0.0);
+      if (wanted.parameters)
+        c.parameters.assign(std::size_t(parameter_rows(model.compiled()) * kBlock), 0.0);
+    }
+  }
+
+  /// The block's rows as they stood before `step`.
+  void restore(const Batch& batch, int block, const BlockTape& tape, std::int64_t step) {
+    const BlockLayout& layout = model.compiled().layout;
+    const double* now = batch.block(block);
+    std::copy(now + layout.parameters * kBlock, now + layout.rows * kBlock,
+              rows.data() + layout.parameters * kBlock);
+    const std::size_t count = std::size_t((model.nq() + model.nv()) * kBlock);
+    std::copy_n(tape.state(step), count, rows.data() + layout.q * kBlock);
+    std::copy_n(tape.state(step - 1), count, rows.data() + layout.previous_q * kBlock);
+  }
+
+  template <int L>
+  Lanes<L>& lanes() {
+    if constexpr (L == 1) {
+      return one;
+    } else {
+      return eight;
+    }
+  }
+
+  /// Rows of a block from lane `first` on.
+  template <int L>
+  static void gather(Row<L>* to, const double* from, int count, int first) {
+    for (int i = 0; i < count; ++i)
+      for (int l = 0; l < L; ++l) to[i][l] = from[i * kBlock + first + l];
+  }
+
+  template <int L>
+  void load(Lanes<L>& x, const GroupStepInHand& g) {
+    const CompiledModel& m = model.compiled();
+    BasicWorkspace<L>& w = x.work;
+    gather(w.q0, &rows[std::size_t(m.layout.q * kBlock)], m.nq, g.first);
+    gather(w.v0, &rows[std::size_t(m.layout.v * kBlock)], m.nv, g.first);
+    gather(w.q_before, &rows[std::size_t(m.layout.previous_q * kBlock)], m.nq, g.first);
+    gather(w.v_before, &rows[std::size_t(m.layout.previous_v * kBlock)], m.nv, g.first);
+    gather(w.q1, g.tape.state(g.step + 1), m.nq, g.first);
+    if (settings.integrator == Integrator::sdirk2)
+      gather(w.x_gamma, g.tape.x_gamma(g.step), m.nv, g.first);
+    w.stage.block = rows.data() + g.first;
+    w.stage.group = 0;
+    for (std::size_t k = 0; k < losses.size(); ++k) {
+      LossRows<L>& o = x.adjoint.losses[k];
+      gather(o.q, losses[k].q.data(), m.nv, g.first);
+      gather(o.v, losses[k].v.data(), m.nv, g.first);
+      for (Row<L>* p : {o.q_centre, o.v_centre, o.q_other, o.v_other, o.tau, o.target})
+        std::fill(p, p + m.nv, Row<L>{});
+      if (o.parameters != nullptr)
+        std::fill(o.parameters, o.parameters + kernels::parameter_numbers(m.view), Row<L>{});
+    }
+  }
+
+  /// The solves of one lane's special step, last first. What the step's result hands to its inner
+  /// states stays in the lane.
+  template <int L>
+  void reverse_special(Lanes<L>& x, const TapedStep& special, int lane, const GroupStepInHand& g) {
+    BasicWorkspace<L>& w = x.work;
+    const auto set = [lane](Row<L>* to, const std::vector<double>& from) {
+      for (std::size_t i = 0; i < from.size(); ++i) to[i][lane] = from[i];
+    };
+    for (std::size_t k = special.solves.size(); k-- > 0;) {
+      const TapedSolve& solve = special.solves[k];
+      set(w.q1, solve.q);
+      set(w.x_gamma, solve.x_gamma);
+      if (k > 0) {
+        set(w.q0, special.solves[k - 1].q);
+        set(w.v0, special.solves[k - 1].v);
+      } else {
+        const CompiledModel& m = model.compiled();
+        const double* start = rows.data() + g.first + lane;
+        for (int i = 0; i < m.nq; ++i) w.q0[i][lane] = start[(m.layout.q + i) * kBlock];
+        for (int i = 0; i < m.nv; ++i) w.v0[i][lane] = start[(m.layout.v + i) * kBlock];
+      }
+      group.reverse(solve.scheme, solve.h, kernels::active_kernels(), w, x.adjoint, 1U << lane);
+      if (k == 0) return;
+      for (LossRows<L>& o : x.adjoint.losses)
+        for (int i = 0; i < model.nv(); ++i) {
+          o.q[i][lane] = std::exchange(o.q_centre[i][lane], 0.0);
+          o.v[i][lane] = std::exchange(o.v_centre[i][lane], 0.0);
+        }
+    }
+  }
+
+  template <int L>
+  void reverse(const GroupStepInHand& g, std::span<const double> controls) {
+    const CompiledModel& m = model.compiled();
+    Lanes<L>& x = lanes<L>();
+    load(x, g);
+    LaneBits plain = 0;
+    for (int l = 0; l < L; ++l) {
+      if (!has(g.live, l)) continue;
+      set_motors(m, x.work, l, rows.data() + g.first + l,
+                 controls.subspan(std::size_t((g.first + l) * m.nu), std::size_t(m.nu)));
+      if (g.tape.special(g.step, g.first + l) == nullptr) plain |= 1U << l;
+    }
+    if (plain != 0)
+      group.reverse(settings.integrator, settings.timestep, kernels::active_kernels(), x.work,
+                    x.adjoint, plain);
+    for (int l = 0; l < L; ++l)
+      if (has(g.live & ~plain, l)) reverse_special(x, *g.tape.special(g.step, g.first + l), l, g);
+    for (std::size_t k = 0; k < losses.size(); ++k)
+      for (int l = 0; l < L; ++l)
+        if (has(g.live, l)) scatter(x.adjoint.losses[k], losses[k], l, g.first + l, controls);
+  }
+
+  /// One lane's results to its column; forces known at the start hang on the state there and on the
+  /// controls.
+  template <int L>
+  void scatter(LossRows<L>& o, BlockCotangent& c, int lane, int column,
+               std::span<const double> controls) {
+    const CompiledModel& m = model.compiled();
+    const std::span<const double> u =
+        controls.subspan(std::size_t(column * m.nu), std::size_t(m.nu));
+    MotorPullback<L> pullback{m, rows.data() + column, u, lane};
+    for (std::size_t k = 0; k < std::size_t(m.nu); ++k) c.u[k * kBlock + std::size_t(column)] = 0;
+    pullback.run(o, c.u.data() + column);
+    for (int i = 0; i < m.nv; ++i) {
+      const std::size_t at = std::size_t(i * kBlock + column);
+      c.q[at] = c.previous_q[at] + o.q_centre[i][lane];
+      c.v[at] = c.previous_v[at] + o.v_centre[i][lane];
+      c.previous_q[at] = o.q_other[i][lane];
+      c.previous_v[at] = o.v_other[i][lane];
+    }
+    if (o.parameters == nullptr) return;
+    for (int i = 0; i < kernels::parameter_numbers(m.view); ++i)
+      c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];
+  }
+
+  /// A step that was not taken: both states are the same.
+  void stand_still(int column) {
+    for (BlockCotangent& c : losses) {
+      for (int i = 0; i < model.nv(); ++i) {
+        const std::size_t at = std::size_t(i * kBlock + column);
+        c.q[at] += std::exchange(c.previous_q[at], 0.0);
+        c.v[at] += std::exchange(c.previous_v[at], 0.0);
+      }
+      for (int k = 0; k < model.nu(); ++k) c.u[std::size_t(k * kBlock + column)] = 0;
+    }
+  }
+};
+
+std::span<double> BlockCotangent::points_of(const Model& model, int sensor, int lane) {
+  if (points.empty()) return {};
+  const auto size = [](int n) { return std::size_t(n) * std::size_t(kPointNumbers); };
+  return std::span(points)
+      .subspan(points.size() / kBlock * std::size_t(lane))
+      .subspan(size(first_tactile_point(model, sensor)),
+               size(model.sensors()[std::size_t(sensor)].points));
+}
+
+Adjoint::Adjoint(const Model& model, const StepperOptions& options, const AdjointOptions& wanted)
+    : impl_(std::make_unique<Impl>(model, step_settings(model, options), wanted)) {}
+Adjoint::~Adjoint() = default;
+Adjoint::Adjoint(Adjoint&&) noexcept = default;
+Adjoint& Adjoint::operator=(Adjoint&&) noexcept = default;
+
+int Adjoint::losses() const { return static_cast<int>(impl_->losses.size()); }
+BlockCotangent& Adjoint::loss(int k) { return impl_->losses[std::size_t(k)]; }
+
+const BlockCotangent& Adjoint::loss(int k) const { return impl_->losses[std::size_t(k)]; }
+
+void Adjoint::clear() {
+  for (BlockCotangent& c : impl_->losses)
+    for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v, &c.u, &c.parameters, &c.points})
+      std::fill(x->begin(), x->end(), 0.0);
+}
+
+void Adjoint::reverse_step(const Batch& batch, int block, const BlockTape& tape, std::int64_t step,
+                           std::span<const double> controls) {
+  impl_->restore(batch, block, tape, step);
+  const std::size_t nu = std::size_t(batch.model().nu());
+  const std::span<const double> of_block = controls.subspan(std::size_t(block * kBlock) * nu);
+  for (int first = 0; first < kBlock; first += kGroup) {
+    GroupStepInHand g{tape, step, first};
+    for (int l = 0; l < kGroup; ++l) {
+      if (tape.took(step, first + l)) {
+        g.live |= 1U << l;
+      } else {
+        impl_->stand_still(first + l);
+      }
+    }
+    if (g.live == 0) continue;
+    if ((g.live & (g.live - 1)) ==
+        0) {  // as in the step: the same bits either way, a third of the time
+      g.first += __builtin_ctz(g.live);
+      g.live = 1;
+      impl_->reverse<1>(g, of_block);
+    } else {
+      impl_->reverse<kGroup>(g, of_block);
+    }
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,425 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kernels' templates over Dual<double>. Every number that a scene gives gets a row of its own:
+// value in lane 0, tangent in lane 1 (kernels/step/stage.hpp).
+#include "engine/derivative/dual_stage.hpp"
+
+#include <algorithm>
+
+#include "kernels/reverse/parameter_adjoint-inl.hpp"
+#include "kernels/step/jacobian-inl.hpp"
+#include "kernels/step/link_poses-inl.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+using kernels::Parameter;
+using D = DualNumber;
+
+struct DualStage::Impl {
+  const CompiledModel& m;
+  // The model with parameters in rows of `block`.
+  kernels::ModelView view;
+  std::vector<kernels::PairContact> pairs;
+  std::vector<kernels::GroundContact> grounds;
+  std::vector<kernels::DofEffects> effects;
+  std::vector<kernels::Link> bodies;  ///< links with the environment's masses
+  std::vector<Parameter> origin;      ///< of every row
+  std::vector<int> number;            ///< of every row: which number it is
+  std::vector<double> block;          ///< (rows, 16)
+  std::vector<double> inertia;        ///< tangents of masses, moments, inertias, (n_links, 10)
+  bool heavier = false;               ///< some of them are not zero
+  bool frozen = false;
+  std::vector<double> tangents;  ///< of the rows, while frozen
+  std::vector<double> stretch;   ///< tangents of the solids' sizes, (n_solids, 3)
+
+  std::vector<D> force_scale, mass_diagonal, A, excess;
+  std::vector<kernels::LinkScratch<D>> links;
+  std::vector<kernels::ContactScratch<D>> contacts;
+  std::vector<kernels::JointColumns<D>> columns;
+  std::vector<kernels::LinkAdjoint<D>> adjoint;
+  std::vector<std::vector<double>> ground_tangents;  ///< of the points in the ground
+  std::vector<std::vector<D>> points, references;
+  std::vector<kernels::CandidateList<D>> lists;
+
+  explicit Impl(const CompiledModel& model)
+      : m(model),
+        view(model.view),
+        pairs(model.pairs),
+        grounds(model.grounds),
+        effects(model.dof_effects),
+        bodies(model.links) {
+    const auto row = [this](Parameter& p, int which) {
+      origin.push_back(p);
+      number.push_back(which);
+      p.row = static_cast<int>(origin.size()) - 1;
+    };
+    int next = 0;
+    const auto contact = [&](kernels::ContactParameters& c) {
+      for (Parameter* p : {&c.kn, &c.kt, &c.mu, &c.damping}) row(*p, next++);
+    };
+    for (auto& p : pairs) contact(p.parameters);
+    for (auto& g : grounds) contact(g.parameters);
+    next += kernels::kInertiaNumbers * view.n_links;
+    for (auto& e : effects) {
+      for (Parameter* p : {&e.damping, &e.stiffness, &e.P, &e.D}) row(*p, next++);
+      row(e.armature, -1);
+      row(e.limit_stiffness, -1);
+    }
+    // `first`: row of the block that held the first of them, or -1: they are `values`.
+    const auto side_by_side = [this](int& first, int count, const double* values, int which) {
+      const int from = first;
+      first = static_cast<int>(origin.size());
+      for (int i = 0; i < count; ++i) {
+        origin.push_back(from < 0 ? Parameter{values[i], -1} : Parameter{0, from + i});
+        number.push_back(which < 0 ? -1 : which + i);
+      }
+    };
+    const auto size_of = [this](int body) {
+      return kernels::first_size_number(view) + kernels::kSizeNumbers * body;
+    };
+    for (auto& p : pairs) side_by_side(p.size_row, 3, &p.size.x, size_of(p.body2));
+    for (auto& g : grounds)
+      if (g.radius > 0) side_by_side(g.radius_row, 1, &g.radius, size_of(g.body));
+    for (auto& g : grounds)
+      g.point_tangents = ground_tangents.emplace_back(std::size_t(3 * g.n_points)).data();
+    for (kernels::Link& link : bodies) {
+      link.inertia_row = -1;
+      if (link.place_row >= 0) side_by_side(link.place_row, 3, nullptr, -1);
+    }
+    view.links = bodies.data();
+    view.pairs = pairs.data();
+    view.grounds = grounds.data();
+    view.effects = effects.data();
+    block.assign(origin.size() * kBlock, 0.0);
+    inertia.assign(std::size_t(kernels::kInertiaNumbers * view.n_links), 0.0);
+    stretch.assign(std::size_t(kernels::kSizeNumbers * view.n_solids), 0.0);
+    const std::size_t nv = std::size_t(m.nv);
+    force_scale.resize(nv), mass_diagonal.resize(nv), excess.resize(1);
+    A.resize(std::size_t(m.pattern.entries));
+    links.resize(m.links.size()), adjoint.resize(m.links.size()),
+        columns.resize(2 * m.links.size());
+    contacts.resize(std::size_t(view.n_link_pairs + view.n_grounded));
+    for (const kernels::PairContact& p : pairs) {
+      points.emplace_back(std::size_t(3 * p.n_points), D(0.0));
+      references.emplace_back(12, D(0.0));
+      lists.push_back({points.back().data(), 0, references.back().data(), 1e9, nullptr, 0, 0});
+    }
+  }
+
+  /// How a contact point of a body, link axes, moves with the body's size.
+  [[nodiscard]] kernels::Vec3<double> stretched(int body, const kernels::Vec3<double>& at) const {
+    const kernels::Solid& s = m.solids[std::size_t(body)];
+    if (!s.stretches) return kernels::zero3<double>();
+    const double* by = &stretch[std::size_t(kernels::kSizeNumbers * body)];
+    const kernels::Vec3<double> y = transposed_times(s.frame.R, at - s.frame.p);
+    if (s.shape == PrimitiveShape::cuboid)
+      return s.frame.R * kernels::Vec3<double>{y.x / s.size.x * by[0], y.y / s.size.y * by[1],
+                                               y.z / s.size.z * by[2]};
+    const double radius = s.size.x, half = s.size.y;
+    const bool pole = s.shape == PrimitiveShape::capsule && std::abs(y.z) > half * (1 + 1e-9);
+    const double up = pole ? std::copysign(1, y.z) * (by[0] + by[1]) : y.z / half * by[1];
+    return s.frame.R * kernels::Vec3<double>{y.x / radius * by[0], y.y / radius * by[0], up};
+  }
+
+  /// Tangents of the points in the ground.
+  void stretch_grounds() {
+    for (std::size_t g = 0; g < grounds.size(); ++g) {
+      const double* p = grounds[g].points;
+      std::vector<double>& t = ground_tangents[g];
+      for (std::size_t k = 0; k < t.size(); k += 3) {
+        const kernels::Vec3<double> moves =
+            frozen ? kernels::zero3<double>()
+                   : stretched(grounds[g].body, {p[k], p[k + 1], p[k + 2]});
+        t[k] = moves.x, t[k + 1] = moves.y, t[k + 2] = moves.z;
+      }
+    }
+  }
+
+  /// Lists of the points that touch at the poses of kinematics(); the others add nothing to values
+  /// or tangents. Points move with the sizes of their bodies.
+  void find_touching() {
+    stretch_grounds();
+    for (int k = 0; k < view.n_link_pairs; ++k) {
+      const kernels::LinkPair& link_pair = view.link_pairs[k];
+      for (int member = link_pair.first; member < link_pair.first + link_pair.count; ++member) {
+        const int at = view.pair_order[member];
+        const kernels::PairContact& pair = pairs[std::size_t(at)];
+        kernels::Frame<double> in_1;
+        const kernels::Frame<D>& dual = contacts[std::size_t(k)].link2_in_1;
+        for (int e = 0; e < 9; ++e) in_1.R.m[e / 3][e % 3] = dual.R.m[e / 3][e % 3].value;
+        in_1.p = {dual.p.x.value, dual.p.y.value, dual.p.z.value};
+        const kernels::Frame<double> shape = compose(in_1, pair.frame2);
+        const kernels::Vec3<double> size =
+            kernels::load_vector<double>(pair.size, pair.size_row, block.data(), 0);
+        std::vector<D>& list = points[std::size_t(at)];
+        int count = 0;
+        for (int i = 0; i < pair.n_points; ++i) {
+          const double* p = pair.points + 3 * i;
+          const kernels::Vec3<double> y =
+              transposed_times(shape.R, kernels::Vec3<double>{p[0], p[1], p[2]} - shape.p);
+          const double d = kernels::with_distance<double>(
+              pair.shape, size, [&](const auto& s) { return distance_at(s, y).d; });
+          if (!(d < 1e-9)) continue;  // [m] beyond rounding
+          const kernels::Vec3<double> moves =
+              frozen ? kernels::zero3<double>() : stretched(pair.body1, {p[0], p[1], p[2]});
+          list[std::size_t(3 * count)] = {p[0], moves.x};
+          list[std::size_t(3 * count + 1)] = {p[1], moves.y};
+          list[std::size_t(3 * count + 2)] = {p[2], moves.z};
+          ++count;
+        }
+        lists[std::size_t(at)].count = count;
+      }
+    }
+  }
+
+  /// g and A are linear in masses: what the tangents of masses weigh, without contacts, motors and
+  /// effects.
+  void weigh(const kernels::StageArgs<D>& a, std::vector<D>& g, D* entries) {
+    std::vector<kernels::Link> light = bodies;
+    for (std::size_t k = 0; k < light.size(); ++k) {
+      const double* n = &inertia[k * kernels::kInertiaNumbers];
+      light[k].massive = true;
+      light[k].effects = 0;
+      light[k].mass = n[0];
+      light[k].moment = {n[1], n[2], n[3]};
+      light[k].inertia = {{{n[4], n[5], n[6]}, {n[5], n[7], n[8]}, {n[6], n[8], n[9]}}};
+    }
+    kernels::ModelView weight = view;
+    weight.links = light.data();
+    weight.n_link_pairs = weight.n_grounded = weight.n_pairs = weight.n_grounds = 0;
+    std::vector<D> no_tau(g.size(), D(0.0));
+    kernels::StageArgs<D> b = a;
+    b.g = g.data();
+    b.tau = no_tau.data();
+    b.A = entries;
+    kernels::kinematics(weight, b);
+    if (entries == nullptr) {
+      kernels::residual<false>(weight, b);
+    } else {
+      kernels::residual<true>(weight, b);
+      kernels::jacobian(weight, b);
+    }
+  }
+
+  kernels::StageArgs<D> arguments(DualStage& s) {
+    kernels::StageArgs<D> a{};
+    a.centre = s.centre.data();
+    a.x = s.x.data();
+    a.r = s.r.data();
+    a.s = s.s.data();
+    a.tau = s.tau.data();
+    a.target = s.target.data();
+    a.c0_over_h = D(s.c0_over_h);
+    a.inverse_h = D(s.inverse_h);
+    a.block = block.data();
+    a.group = 0;
+    a.candidates = lists.data();
+    a.lone = -1;
+    a.links = links.data();
+    a.contacts = contacts.data();
+    a.columns = columns.data();
+    a.v = s.v.data();
+    a.g = s.g.data();
+    a.force_scale = force_scale.data();
+    a.mass_diagonal = mass_diagonal.data();
+    a.A = A.data();
+    a.excess = excess.data();
+    return a;
+  }
+};
+
+DualStage::DualStage(const CompiledModel& model) : impl_(std::make_unique<Impl>(model)) {
+  centre.resize(std::size_t(model.nq));
+  for (auto* p : {&x, &r, &s, &tau, &target, &v, &g}) p->assign(std::size_t(model.nv), D(0.0));
+}
+DualStage::~DualStage() = default;
+
+void DualStage::set_numbers(const double* column, std::span<const double> tangents) {
+  Impl& i = *impl_;
+  for (std::size_t k = 0; k < i.origin.size(); ++k) {
+    const Parameter& p = i.origin[k];
+    i.block[k * kBlock] = p.row < 0 ? p.value : column[p.row * kBlock];
+    i.block[k * kBlock + 1] =
+        tangents.empty() || i.number[k] < 0 ? 0 : tangents[std::size_t(i.number[k])];
+  }
+  for (std::size_t k = 0; k < i.bodies.size(); ++k) {
+    const int first = i.m.links[k].inertia_row;
+    if (first < 0) continue;
+    const auto row = [&](int n) { return column[(first + n) * kBlock]; };
+    kernels::Link& link = i.bodies[k];
+    link.mass = row(0);
+    link.moment = {row(1), row(2), row(3)};
+    link.inertia = {{{row(4), row(5), row(6)}, {row(5), row(7), row(8)}, {row(6), row(8), row(9)}}};
+  }
+  const auto first = std::size_t(kernels::first_inertia_number(i.view)),
+             sizes = std::size_t(kernels::first_size_number(i.view));
+  for (std::size_t k = 0; k < i.inertia.size(); ++k)
+    i.inertia[k] = tangents.empty() ? 0 : tangents[first + k];
+  for (std::size_t k = 0; k < i.stretch.size(); ++k)
+    i.stretch[k] = tangents.empty() ? 0 : tangents[sizes + k];
+  i.heavier = std::any_of(i.inertia.begin(), i.inertia.end(), [](double t) { return t != 0; });
+}
+
+void DualStage::rates() { kernels::kinematics(impl_->view, impl_->arguments(*this)); }
+
+void DualStage::freeze_numbers(bool frozen) {
+  Impl& i = *impl_;
+  if (frozen == i.frozen) return;
+  i.frozen = frozen;
+  i.tangents.resize(i.origin.size());
+  for (std::size_t k = 0; k < i.origin.size(); ++k) {
+    double& tangent = i.block[k * kBlock + 1];
+    if (frozen) i.tangents[k] = tangent;
+    tangent = frozen ? 0 : i.tangents[k];
+  }
+}
+
+void DualStage::residual() {
+  Impl& i = *impl_;
+  const auto a = i.arguments(*this);
+  kernels::kinematics(i.view, a);
+  i.find_touching();
+  kernels::residual<false>(i.view, a);
+  if (!i.heavier || i.frozen) return;
+  std::vector<D> of_mass(g.size());
+  i.weigh(a, of_mass, nullptr);
+  for (std::size_t k = 0; k < g.size(); ++k) g[k].epsilon += of_mass[k].value;
+}
+
+void DualStage::jacobian(std::vector<DualNumber>& A) {
+  Impl& i = *impl_;
+  const auto a = i.arguments(*this);
+  kernels::kinematics(i.view, a);
+  i.find_touching();
+  kernels::residual<true>(i.view, a);
+  kernels::jacobian(i.view, a);
+  const int n = i.m.nv;
+  A.assign(std::size_t(n * n), D(0.0));
+  for (int k = 0; k < n * n; ++k)
+    if (const int slot = i.m.view.pattern.slot[k]; slot >= 0)
+      A[std::size_t(k)] = i.A[std::size_t(slot)];
+  if (!i.heavier) return;
+  std::vector<D> of_mass(g.size()), of_A(i.A.size());
+  i.weigh(a, of_mass, of_A.data());
+  for (int k = 0; k < n * n; ++k)
+    if (const int slot = i.m.view.pattern.slot[k]; slot >= 0)
+      A[std::size_t(k)].epsilon += of_A[std::size_t(slot)].value;
+}
+
+void DualStage::products(std::span<const double> lambda, std::vector<DualNumber>& c_lambda,
+                         std::vector<DualNumber>& m_lambda, std::vector<DualNumber>& targets,
+                         std::vector<DualNumber>* numbers) {
+  Impl& i = *impl_;
+  const std::size_t n = g.size();
+  std::vector<D> along(n), zero(n, D(0.0)), nu(n), unused(4 * n, D(0.0));
+  for (std::size_t k = 0; k < n; ++k) along[k] = D(lambda[k]);
+  m_lambda.assign(n, D(0.0));
+  targets.assign(n, D(0.0));
+  const kernels::AdjointArgs<D> d = {
+      zero.data(),           zero.data(),           nullptr,     along.data(),    nu.data(),
+      m_lambda.data(),       targets.data(),        zero.data(), unused.data(),   unused.data() + n,
+      unused.data() + 2 * n, unused.data() + 3 * n, {0, 0, 0},   i.adjoint.data()};
+  const auto a = i.arguments(*this);
+  kernels::adjoint_products(i.view, a, d);
+  c_lambda.resize(n);
+  for (std::size_t k = 0; k < n; ++k) c_lambda[k] = -nu[k];  // v̄ = 0
+  if (numbers != nullptr) kernels::parameter_products(i.view, a, d, numbers->data());
+}
+
+namespace {
+
+/// A point of a pad in pad axes, and the rows that its field is stored by, acting on the force.
+struct PadPoint {
+  kernels::Vec3<double> at;
+  double rows[9];
+  double factors[4];
+  int index;  ///< of the field, -1: filler
+};
+PadPoint pad_point(const kernels::PadTiles& pad, int tile, int k) {
+  using kernels::kTactileTile;
+  PadPoint p{
+      {pad.x[tile], pad.y[tile], pad.z[tile]}, {1, 0, 0, 0, 1, 0, 0, 0, -1}, {1, 1, 1, 1}, -1};
+  const double* s = pad.offsets + (pad.curved() ? 3 : 2) * kTactileTile * pad.kind[tile] + k;
+  p.at.x += s[0], p.at.y += s[kTactileTile];
+  if (pad.curved()) {
+    p.at.z += s[2 * kTactileTile];
+    if (k < pad.points_of(tile)) p.index = pad.index[kTactileTile * tile + k];
+    for (int i = 0; i < 9; ++i) {  // rows act on (f·x, f·y, -f·z)
+      const double row = pad.frames[(9 * tile + i) * kTactileTile + k];
+      p.rows[i] = i % 3 == 2 ? -row : row;
+    }
+    for (int i = 0; i < 4 && pad.factors != nullptr; ++i)
+      p.factors[i] = pad.factors[(4 * tile + i) * kTactileTile + k];
+    return p;
+  }
+  if (pad.skewed) std::copy(pad.axes, pad.axes + 9, p.rows);
+  const int row = k / kernels::kTileSide, col = k % kernels::kTileSide;
+  if (row < pad.rows_of(tile) && col < pad.cols_of(tile))
+    p.index = pad.first_of(tile) + row * pad.cols + col;
+  return p;
+}
+
+}  // namespace
+
+void DualStage::field(int sensor, const double* column, std::span<const double> numbers,
+                      std::span<const double> points, std::span<double> field_dot) {
+  Impl& i = *impl_;
+  const CompiledSensor& felt = i.m.sensors[std::size_t(sensor)];
+  const kernels::PadTiles pad = felt.tiles();
+  kernels::kinematics(i.view, i.arguments(*this));
+  const auto pose = [&](int link) {
+    return link < 0 ? kernels::LinkPose<D>{{kernels::diagonal(D(1.0)), kernels::zero3<D>()},
+                                           kernels::zero6<D>()}
+                    : kernels::LinkPose<D>{i.links[std::size_t(link)].world,
+                                           i.links[std::size_t(link)].V};
+  };
+  const auto tangent = [&](int first, int k) {
+    return numbers.empty() ? 0.0 : numbers[std::size_t(first + k)];
+  };
+  const Parameter* const given[] = {&felt.parameters.kn, &felt.parameters.kt, &felt.parameters.mu,
+                                    &felt.parameters.damping};
+  const int first = kernels::parameter_numbers(i.m.view) + kernels::kContactNumbers * sensor;
+  D coefficients[4];
+  for (int k = 0; k < 4; ++k)
+    coefficients[k] =
+        D(given[k]->row < 0 ? given[k]->value : column[given[k]->row * kBlock], tangent(first, k));
+  const kernels::Mat3<double> turn =
+      transpose(felt.pad.R) * i.m.bodies[std::size_t(felt.body)].frame.R;
+  std::fill(field_dot.begin(), field_dot.end(), 0.0);
+  const kernels::LinkPose<D> hand = pose(felt.link);
+  for (const int number : felt.targets) {
+    const CompiledBody& body = i.m.bodies[std::size_t(number)];
+    const kernels::LinkPose<D> other = pose(body.link);
+    kernels::Touch<D> t;
+    kernels::pad_touch(&hand, felt.pad, &other, body.frame, t);
+    const int first_size = kernels::first_size_number(i.m.view) + kernels::kSizeNumbers * number;
+    const kernels::Vec3<double> has =
+        kernels::load_vector<double>(body.size, body.size_row, column, 0);
+    const kernels::Vec3<D> size = {{has.x, tangent(first_size, 0)},
+                                   {has.y, tangent(first_size, 1)},
+                                   {has.z, tangent(first_size, 2)}};
+    kernels::with_distance<D>(body.shape, size, [&](const auto& shape) {
+      for (int k = 0; k < pad.tiles() * kernels::kTactileTile; ++k) {
+        const PadPoint p = pad_point(pad, k / kernels::kTactileTile, k % kernels::kTactileTile);
+        if (p.index < 0) continue;
+        const auto own = [&](int n) {
+          return points.empty() ? 0.0 : points[std::size_t(p.index * kernels::kPointNumbers + n)];
+        };
+        const kernels::Vec3<double> moves = turn * kernels::Vec3<double>{own(0), own(1), own(2)};
+        const auto coefficient = [&](int n) {
+          return D(p.factors[n]) * coefficients[n] + D(0.0, own(3 + n));
+        };
+        const kernels::LawParameters<D> law = {coefficient(0), coefficient(1), coefficient(2),
+                                               coefficient(3), felt.law,       0.0};
+        const kernels::Vec3<D> xi = {{p.at.x, moves.x}, {p.at.y, moves.y}, {p.at.z, moves.z}};
+        const auto at = kernels::point_contact(shape, law, t.Q, t.c, t.omega, t.v, xi);
+        const double f[3] = {at.force.x.epsilon, at.force.y.epsilon, at.force.z.epsilon};
+        for (int c = 0; c < 3; ++c)
+          for (int e = 0; e < 3; ++e)
+            field_dot[std::size_t(3 * p.index + c)] += p.rows[3 * c + e] * f[e];
+      }
+    });
+  }
+}
+
+}  // namespace tangere

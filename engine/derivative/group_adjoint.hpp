@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// One step of a group in reverse: the stages of its scheme backwards, each assembled and factored
+// anew at its accepted state and solved transposed for every loss (docs/gradients.md).
+#pragma once
+
+#include <memory>
+
+#include "engine/derivative/dual_stage.hpp"
+#include "engine/step/group_step.hpp"
+
+namespace tangere {
+
+/// Cotangents of one loss in a group, rows (nv); positions by their right tangent.
+template <int L>
+struct LossRows {
+  using Rows = kernels::Row<L>*;
+  Rows q, v;                ///< in: of the state after the step
+  Rows q_centre, v_centre;  ///< out: of the state before it
+  Rows q_other, v_other;    ///< out: of the one before that
+  Rows tau, target;         ///< out: of forces known when the step begins, of motors' targets
+  Rows parameters;          ///< out: (parameter_numbers), or null
+};
+
+/// Scratch of one thread beside a workspace.
+template <int L>
+struct AdjointWorkspace {
+  using Row = kernels::Row<L>;
+  AdjointWorkspace(const CompiledModel& model, int losses, bool parameters);
+
+  AlignedVector<Row> memory;
+  std::vector<LossRows<L>> losses;
+  // One stage: the system, and what it hands on before lanes are picked.
+  Row *rhs, *lambda, *nu, *mass_lambda, *target, *other, *q_centre, *v_centre, *q_other, *v_other;
+  Row* numbers;  ///< (parameter_numbers), or null
+  // SDIRK2: cotangents of the inner stage, per loss (nv) after one another.
+  Row *q_gamma, *v_gamma;
+  Row sound;
+  std::unique_ptr<DualStage>
+      dual;  ///< the linearly implicit step's, made when it is first reversed
+};
+
+/// Reverses solves whose states stand in the workspace: q0, v0 where it began, q_before, v_before
+/// one step earlier, q1 its result, x_gamma SDIRK2's inner stage; tau, target and the block of
+/// parameters as in the step.
+class GroupAdjoint {
+ public:
+  explicit GroupAdjoint(const CompiledModel& model) : model_(model) {}
+
+  /// Adds to q_centre … target of every loss, in `lanes`.
+  template <int L>
+  void reverse(Integrator scheme, double h, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+               AdjointWorkspace<L>& a, LaneBits lanes) const;
+
+ private:
+  /// One stage: where a loss's cotangents come from and go to.
+  template <int L>
+  struct Route {
+    const kernels::Row<L>*q, *v;
+    kernels::Row<L>*q_centre, *v_centre, *q_other, *v_other;
+  };
+  template <int L>
+  struct StageInHand {
+    const kernels::KernelTable& table;
+    BasicWorkspace<L>& w;
+    AdjointWorkspace<L>& a;
+    LaneBits lanes;
+    [[nodiscard]] int lone() const {
+      return (lanes & (lanes - 1)) == 0 ? __builtin_ctz(lanes) : -1;
+    }
+  };
+  template <int L>
+  void assemble(const StageInHand<L>& s, double c0, double h) const;
+  template <int L>
+  void solve(const StageInHand<L>& s) const;
+  template <int L>
+  void hand_on(const StageInHand<L>& s, const kernels::StageHistory& history, const Route<L>& route,
+               const LossRows<L>& loss) const;
+  template <int L>
+  void reverse_sdirk2(const StageInHand<L>& s, double h) const;
+  template <int L>
+  void reverse_linear(const StageInHand<L>& in, double h) const;
+  template <int L>
+  void hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o, const std::vector<double>& x,
+                      double h, int lane) const;
+
+  const CompiledModel& model_;
+};
+
+}  // namespace tangere

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// Motors in reverse: cotangents of forces and targets to those of the controls and of the state
+// that a step begins with.
+//
+// Force motors: u ↦ low + (u + 1)/2 (high - low), constant beyond |u| = 1. Position motors timed at
+// the start:
+// clip(P ψ - D v), ψ = u - q or log(q⁻¹ exp u), with ∂ψ/∂q = -J_l⁻¹(ψ), ∂ψ/∂u = J_r⁻¹(ψ) J_r(u). At
+// a bound of a range the derivative is that of its inside.
+#pragma once
+
+#include "engine/derivative/group_adjoint.hpp"
+#include "engine/step/motor_force.hpp"
+#include "kernels/numbers/rotation_vector.hpp"
+
+namespace tangere {
+
+/// Of one lane.
+template <int L>
+struct MotorPullback {
+  const CompiledModel& m;
+  const double* state;        ///< its column of the block the step began with
+  std::span<const double> u;  ///< (nu)
+  int lane;
+
+  /// Adds to the cotangents of u, numbers kBlock apart, and of the state before the step.
+  void run(LossRows<L>& o, double* u_bar) const {
+    for (int k = 0; k < m.nu; ++k) {
+      const CompiledMotor& motor = m.motors[std::size_t(k)];
+      double& out = u_bar[k * kernels::kBlock];
+      if (motor.control == MotorControl::force) {
+        if (std::abs(u[std::size_t(k)]) <= 1)
+          out += 0.5 * (motor.high - motor.low) * o.tau[motor.dof][lane];
+      } else if (motor.timing == MotorTiming::end) {
+        out += o.target[motor.dof][lane];
+      } else {
+        at_start(motor, k, o, u_bar);
+      }
+    }
+  }
+
+ private:
+  [[nodiscard]] double row(int r) const { return state[r * kernels::kBlock]; }
+  [[nodiscard]] double number(const kernels::Parameter& p) const {
+    return p.row < 0 ? p.value : row(p.row);
+  }
+
+  void at_start(const CompiledMotor& motor, int k, LossRows<L>& o, double* u_bar) const {
+    const double force = unclipped(motor, k);
+    if (force < motor.low || force > motor.high) return;
+    const double lambda = o.tau[motor.dof][lane], P = number(motor.P);
+    o.v_centre[motor.dof][lane] -= number(motor.D) * lambda;
+    const kernels::Link& link = m.links[std::size_t(motor.link)];
+    if (o.parameters != nullptr) by_gains(motor, k, lambda, o);
+    if (link.kind != kernels::JointKind::spherical) {
+      o.q_centre[motor.dof][lane] -= P * lambda;
+      u_bar[k * kernels::kBlock] += P * lambda;
+      return;
+    }
+    const int first = k - motor.component;
+    const kernels::Vec3<double> goal = {u[std::size_t(first)], u[std::size_t(first) + 1],
+                                        u[std::size_t(first) + 2]};
+    const kernels::RotationVector<double> psi = way(link, goal);
+    kernels::Vec3<double> pull = {0, 0, 0};
+    (&pull.x)[motor.component] = P * lambda;
+    const kernels::Vec3<double> by_q = transposed_times(inverse_left_jacobian(psi), pull);
+    const kernels::Vec3<double> by_u =
+        transposed_times(right_jacobian(goal, kernels::rotation_series(goal)),
+                         transposed_times(inverse_right_jacobian(psi), pull));
+    const double to_q[3] = {by_q.x, by_q.y, by_q.z}, to_u[3] = {by_u.x, by_u.y, by_u.z};
+    for (int i = 0; i < 3; ++i) {
+      o.q_centre[link.v + i][lane] -= to_q[i];
+      u_bar[(first + i) * kernels::kBlock] += to_u[i];
+    }
+  }
+
+  void by_gains(const CompiledMotor& motor, int k, double lambda, LossRows<L>& o) const {
+    CompiledMotor unit = motor;  // P = 1, D = 0: the error alone
+    unit.P = {1, -1}, unit.D = {0, -1}, unit.low = -HUGE_VAL, unit.high = HUGE_VAL;
+    kernels::Row<L>* numbers =
+        o.parameters + kernels::first_dof_number(m.view) + kernels::kDofNumbers * motor.dof;
+    numbers[2][lane] += lambda * force_at_start(m, unit, state, u.data() + (k - motor.component));
+    numbers[3][lane] -= lambda * row(m.layout.v + motor.dof);
+  }
+
+  [[nodiscard]] kernels::RotationVector<double> way(const kernels::Link& link,
+                                                    const kernels::Vec3<double>& goal) const {
+    const int q = m.layout.q + link.q;
+    const kernels::Quat<double> here = {row(q), row(q + 1), row(q + 2), row(q + 3)};
+    return kernels::rotation_vector<false>(conjugate(here) * kernels::quaternion_exp(goal));
+  }
+  /// The motor's force before its range is applied.
+  [[nodiscard]] double unclipped(const CompiledMotor& motor, int k) const {
+    CompiledMotor free = motor;
+    free.low = -HUGE_VAL, free.high = HUGE_VAL;
+    return force_at_start(m, free, state, u.data() + (k - motor.component));
+  }
+};
+
+}  // namespace tangere

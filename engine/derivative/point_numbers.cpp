@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// Counts of tactile points, and an array of them one by one.
+#include "engine/derivative/point_numbers.hpp"
+
+#include "engine/model/compiled_model.hpp"
+
+namespace tangere {
+
+static_assert(kPointNumbers == kernels::kPointNumbers);
+
+int first_tactile_point(const Model& model, int sensor) {
+  int count = 0;
+  for (int k = 0; k < sensor; ++k) count += model.sensors()[std::size_t(k)].points;
+  return count;
+}
+
+int tactile_points(const Model& model) {
+  return first_tactile_point(model, static_cast<int>(model.sensors().size()));
+}
+
+std::vector<TactilePoint> list_points(const RectArray& a) {
+  using kernels::Vec3;
+  const auto vec = [](const Vector3& x) { return Vec3<double>{x[0], x[1], x[2]}; };
+  const Vec3<double> p0 = vec(a.corner0), axis0 = vec(a.axis0), axis1 = vec(a.axis1),
+                     diagonal = vec(a.corner1) - p0;
+  const Vec3<double> normal = cross(axis0, axis1);
+  const double step0 = a.rows > 1 ? dot(diagonal, axis0) / (a.rows - 1) : 0;
+  const double step1 = a.cols > 1 ? dot(diagonal, axis1) / (a.cols - 1) : 0;
+  std::vector<TactilePoint> points;
+  for (int i = 0; i < a.rows; ++i)
+    for (int j = 0; j < a.cols; ++j) {
+      const Vec3<double> at = p0 + (i * step0) * axis0 + (j * step1) * axis1;
+      TactilePoint point;
+      point.position = {at.x, at.y, at.z};
+      point.normal = {normal.x, normal.y, normal.z};
+      point.axis0 = a.axis0, point.axis1 = a.axis1;
+      point.pixel = {i, j};
+      points.push_back(point);
+    }
+  return points;
+}
+
+void add_to_points(TactileDescription& sensor, std::span<const double> change) {
+  if (sensor.points.empty()) sensor.points = list_points(sensor.array);
+  const std::size_t expected = sensor.points.size() * kPointNumbers;
+  if (change.size() != expected)
+    throw InputError(sensor.source.prefix() + "tactile sensor '" + sensor.name +
+                     "': " + std::to_string(change.size()) + " numbers for its points; expected " +
+                     std::to_string(expected));
+  const ContactCoefficients& c = sensor.coefficients;
+  const double of_sensor[] = {c.kn, c.kt, c.mu, c.damping};
+  const char* const names[] = {"kn", "kt", "mu", "damping"};
+  const double* own = change.data();
+  for (TactilePoint& p : sensor.points) {
+    for (std::size_t k = 0; k < 3; ++k) p.position[k] += own[k];
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (own[3 + k] == 0) continue;
+      if (of_sensor[k] == 0)
+        throw InputError(sensor.source.prefix() + "tactile sensor '" + sensor.name +
+                         "': points of their own " + names[k] + "; expected a sensor whose " +
+                         names[k] + " is not 0");
+      p.factors[k] += own[3 + k] / of_sensor[k];
+    }
+    own += kPointNumbers;
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+// Fields across points, then wrenches up the tree in lanes (docs/gradients.md).
+//
+// Of a shape in pad axes, W = Ad V₂ - V₁, δW = Ad δV₂ - δV₁ - Z × ε, ε = Ad δ₂ - δ₁, Z = Ad V₂:
+//   ε̄ += Z ×* W̄;  δ̄₂ = Adᵀ ε̄, δ̄₁ = -ε̄, V̄₂ = Adᵀ W̄, V̄₁ = -W̄
+#include "engine/derivative/readout_pullback.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/point_numbers.hpp"
+#include "engine/sense/dense_tiles.hpp"
+#include "engine/sense/pad_reader.hpp"
+
+namespace tangere {
+
+using kernels::Frame;
+using kernels::kBlock;
+using kernels::kGroup;
+using kernels::LaneRow;
+using kernels::LinkPose;
+using kernels::Vec3;
+using kernels::Vec6;
+
+namespace {
+
+constexpr int kGroups = kBlock / kGroup;
+
+void add_lane(Vec6<LaneRow>& to, const Vec6<double>& x, int lane, double sign) {
+  LaneRow* rows = &to.a.x;
+  const double* from = &x.a.x;
+  for (int i = 0; i < 6; ++i) rows[i][lane] += sign * from[i];
+}
+
+}  // namespace
+
+struct ReadoutPullback::Impl {
+  Model model;
+  PadReader reader;
+  const Batch* batch = nullptr;
+  int block = 0;
+  std::vector<int> met;  ///< (kGroups) sensor whose shapes the reader holds, -1
+  std::array<AlignedVector<kernels::MotionCotangent<LaneRow>>, kGroups> links;
+  std::array<bool, kGroups> used{};
+  AlignedVector<LaneRow> rows;  ///< q, v, zeros, rates, q̄, v̄ of one group
+  AlignedVector<std::byte> scratch;
+  std::vector<kernels::TouchCotangent<double>> touches;
+  std::vector<int> tiles;  ///< of a whole field: those that are not zero
+  std::vector<double> of_tiles;
+  AlignedVector<double> own;  ///< (tiles, kPointNumbers, 64)
+
+  explicit Impl(const Model& m) : model(m), reader(m), met(kGroups, -1) {
+    const CompiledModel& c = m.compiled();
+    for (auto& l : links) l.resize(c.links.size());
+    rows.resize(std::size_t(c.nq + 5 * c.nv));
+    std::size_t bytes = 0, targets = 0;
+    for (const kernels::KernelTable* t : kernels::available_kernels())
+      bytes = std::max(bytes, t->pullback_bytes(c.view));
+    for (const CompiledSensor& s : c.sensors) targets = std::max(targets, s.targets.size());
+    scratch.resize(bytes);
+    touches.resize(targets);
+  }
+
+  kernels::MotionCotangent<LaneRow>& link(int group, int link) {
+    return links[std::size_t(group)][std::size_t(link)];
+  }
+
+  /// Own numbers of the points of tiles, from pad axes to the body's.
+  void hand_on_points(const CompiledSensor& s, std::span<const int> touched,
+                      std::span<double> points) const {
+    const kernels::PadTiles pad = s.tiles();
+    const kernels::Mat3<double> turn =
+        transpose(model.compiled().bodies[std::size_t(s.body)].frame.R) * s.pad.R;
+    for (std::size_t i = 0; i < touched.size(); ++i)
+      for_points_of_tile(pad, touched[i], [&](int slot, int point) {
+        const double* from = &own[i * kPointNumbers * kernels::kTactileTile + std::size_t(slot)];
+        const auto number = [&](int k) { return from[k * kernels::kTactileTile]; };
+        const Vec3<double> place = turn * Vec3<double>{number(0), number(1), number(2)};
+        double* to = &points[std::size_t(point * kPointNumbers)];
+        to[0] += place.x, to[1] += place.y, to[2] += place.z;
+        for (int k = 3; k < kPointNumbers; ++k) to[k] += number(k);
+      });
+  }
+
+  /// One shape's sums, in pad axes, to its link and the sensor's.
+  void hand_on(const kernels::TouchCotangent<double>& c, const CompiledSensor& s,
+               const CompiledBody& body, int group, int lane) {
+    const LinkPose<double> one = reader.link(s.link, group, lane),
+                           two = reader.link(body.link, group, lane);
+    const Frame<double> second_in_first = relative(one.world, two.world);
+    const Vec6<double> Z = motion_to_child(s.pad, motion_to_parent(second_in_first, two.V));
+    const Vec6<double> pose = wrench_to_parent(s.pad, c.displacement + cross_wrench(Z, c.twist));
+    const Vec6<double> twist = wrench_to_parent(s.pad, c.twist);
+    if (s.link >= 0) {
+      add_lane(link(group, s.link).pose, pose, lane, -1);
+      add_lane(link(group, s.link).twist, twist, lane, -1);
+    }
+    if (body.link >= 0) {
+      add_lane(link(group, body.link).pose, wrench_to_child(second_in_first, pose), lane, 1);
+      add_lane(link(group, body.link).twist, wrench_to_child(second_in_first, twist), lane, 1);
+    }
+  }
+};
+
+ReadoutPullback::ReadoutPullback(const Model& model) : impl_(std::make_unique<Impl>(model)) {}
+ReadoutPullback::~ReadoutPullback() = default;
+ReadoutPullback::ReadoutPullback(ReadoutPullback&&) noexcept = default;
+ReadoutPullback& ReadoutPullback::operator=(ReadoutPullback&&) noexcept = default;
+
+void ReadoutPullback::place(const Batch& batch, int block) {
+  impl_->batch = &batch;
+  impl_->block = block;
+  for (int g = 0; g < kGroups; ++g) impl_->reader.move(batch, block, g);
+  std::fill(impl_->met.begin(), impl_->met.end(), -1);
+}
+
+void ReadoutPullback::clear() {
+  for (auto& group : impl_->links)
+    std::fill(group.begin(), group.end(), kernels::MotionCotangent<LaneRow>{});
+  impl_->used.fill(false);
+}
+
+void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
+                            std::span<const double> cotangents, std::span<double> parameters,
+                            std::span<double> points) {
+  if (tiles.empty()) return;
+  Impl& i = *impl_;
+  const int group = lane / kGroup, in_group = lane % kGroup;
+  if (i.met[std::size_t(group)] != sensor) {
+    i.reader.meet(*i.batch, i.block, group, sensor);
+    i.met[std::size_t(group)] = sensor;
+  }
+  const CompiledModel& m = i.model.compiled();
+  const CompiledSensor& s = m.sensors[std::size_t(sensor)];
+  const auto a = i.reader.arguments<double>(sensor, group, in_group);
+  if (!points.empty()) i.own.assign(tiles.size() * kPointNumbers * kernels::kTactileTile, 0.0);
+  kernels::active_kernels().pull_back_field(
+      {a.pad, a.law, a.n_touches, a.shapes, a.touches, static_cast<int>(tiles.size()), tiles.data(),
+       cotangents.data(), !parameters.empty(), points.empty() ? nullptr : i.own.data(),
+       i.touches.data()});
+  if (!points.empty()) i.hand_on_points(s, tiles, points);
+  i.used[std::size_t(group)] = true;
+  const int row = kernels::parameter_numbers(m.view) + kernels::kContactNumbers * sensor;
+  for (std::size_t k = 0; k < s.targets.size(); ++k) {
+    const kernels::TouchCotangent<double>& c = i.touches[k];
+    i.hand_on(c, s, m.bodies[std::size_t(s.targets[k])], group, in_group);
+    if (parameters.empty()) continue;
+    const auto add = [&](int first, std::initializer_list<double> numbers) {
+      for (const double x : numbers) parameters[std::size_t(first++ * kBlock + lane)] += x;
+    };
+    add(row, {c.law.kn, c.law.kt, c.law.mu, c.law.damping});
+    add(kernels::first_size_number(m.view) + kernels::kSizeNumbers * s.targets[k],
+        {c.size.x, c.size.y, c.size.z});
+  }
+}
+
+void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents,
+                                  std::span<double> parameters, std::span<double> points) {
+  const kernels::PadTiles pad = impl_->model.compiled().sensors[std::size_t(sensor)].tiles();
+  std::vector<int>& tiles = impl_->tiles;
+  std::vector<double>& values = impl_->of_tiles;
+  tiles.clear();
+  values.resize(std::size_t(pad.tiles()) * 3 * kernels::kTactileTile);
+  for (int tile = 0; tile < pad.tiles(); ++tile)
+    if (gather_tile(pad, tile, cotangents.data(),
+                    values.data() + 3 * kernels::kTactileTile * tiles.size()))
+      tiles.push_back(tile);
+  field(lane, sensor, tiles, std::span(values).first(3 * kernels::kTactileTile * tiles.size()),
+        parameters, points);
+}
+
+void ReadoutPullback::variable(int lane, int variable, std::span<const double> cotangent) {
+  Impl& i = *impl_;
+  const CompiledVariable& v = i.model.compiled().variables[std::size_t(variable)];
+  if (v.link < 0) return;
+  const int group = lane / kGroup;
+  const LinkPose<double> at = i.reader.link(v.link, group, lane % kGroup);
+  const Vec3<double> f =
+      transposed_times(at.world.R, Vec3<double>{cotangent[0], cotangent[1], cotangent[2]});
+  add_lane(i.link(group, v.link).pose, {cross(v.point, f), f}, lane % kGroup, 1);
+  i.used[std::size_t(group)] = true;
+}
+
+void ReadoutPullback::finish(BlockCotangent& out) {
+  Impl& i = *impl_;
+  const CompiledModel& m = i.model.compiled();
+  LaneRow *q = i.rows.data(), *v = q + m.nq, *zero = v + m.nv, *rates = zero + m.nv,
+          *q_bar = rates + m.nv, *v_bar = q_bar + m.nv;
+  for (int g = 0; g < kGroups; ++g) {
+    if (!i.used[std::size_t(g)]) continue;
+    const auto load = [&](LaneRow* to, int first, int count) {
+      for (int k = 0; k < count; ++k) {
+        const double* from = kernels::row_of(i.batch->block(i.block), first + k, g);
+        std::copy(from, from + kGroup, to[k].lane);
+      }
+    };
+    load(q, m.layout.q, m.nq);
+    load(v, m.layout.v, m.nv);
+    std::fill(q_bar, v_bar + m.nv, LaneRow{});
+    kernels::active_kernels().pull_back_links(
+        m.view, {q, v, zero, rates, i.batch->block(i.block), g}, i.scratch.data(),
+        i.links[std::size_t(g)].data(), q_bar, v_bar);
+    for (int k = 0; k < m.nv; ++k)
+      for (int l = 0; l < kGroup; ++l) {
+        out.q[std::size_t(k * kBlock + g * kGroup + l)] += q_bar[k][l];
+        out.v[std::size_t(k * kBlock + g * kGroup + l)] += v_bar[k][l];
+      }
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,352 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every solve of a step by the implicit function: A ẋ = -ġ, columns of A by dual numbers too.
+#include "engine/derivative/tangent.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+
+#include "engine/derivative/dual_stage.hpp"
+#include "engine/derivative/parameters.hpp"
+#include "engine/step/group_step.hpp"
+#include "engine/step/motor_force.hpp"
+#include "engine/step/rotation_log.hpp"
+#include "engine/step/step_settings.hpp"
+#include "kernels/numbers/rotation_vector.hpp"
+
+namespace tangere {
+
+using kernels::JointKind;
+using kernels::kBlock;
+using kernels::Link;
+using kernels::Quat;
+using kernels::Vec3;
+using D = DualNumber;
+using Duals = std::vector<D>;
+
+namespace {
+
+struct DualState {
+  Duals q, v;
+};
+
+Quat<D> quat_at(const Duals& q, int i) {
+  const auto k = std::size_t(i);
+  return {q[k], q[k + 1], q[k + 2], q[k + 3]};
+}
+Vec3<D> vec_at(const Duals& x, int i) {
+  const auto k = std::size_t(i);
+  return {x[k], x[k + 1], x[k + 2]};
+}
+void put(Duals& to, int i, const Vec3<D>& x) {
+  const auto k = std::size_t(i);
+  to[k] = x.x, to[k + 1] = x.y, to[k + 2] = x.z;
+}
+D scaled(double a, const D& x) { return {a * x.value, a * x.epsilon}; }
+
+/// q with its tangent along the dofs of v.
+Duals with_tangent(const CompiledModel& m, const double* q, int stride,
+                   const std::vector<double>& dot) {
+  Duals out(std::size_t(m.nq));
+  for (int i = 0; i < m.nq; ++i) out[std::size_t(i)] = D(q[i * stride]);
+  for (const Link& link : m.links) {
+    const auto v = std::size_t(link.v);
+    if (link.kind != JointKind::spherical) {
+      for (int k = 0; k < kernels::dofs(link.kind); ++k)
+        out[std::size_t(link.q + k)].epsilon = dot[v + std::size_t(k)];
+      continue;
+    }
+    const double* a = q + link.q * stride;  // q̇ = q ⊗ (0, θ)/2
+    const Quat<double> rate = Quat<double>{a[0], a[stride], a[2 * stride], a[3 * stride]} *
+                              Quat<double>{0, 0.5 * dot[v], 0.5 * dot[v + 1], 0.5 * dot[v + 2]};
+    const double e[4] = {rate.w, rate.x, rate.y, rate.z};
+    for (int k = 0; k < 4; ++k) out[std::size_t(link.q + k)].epsilon = e[k];
+  }
+  return out;
+}
+
+Duals with_tangent(const double* x, int stride, const std::vector<double>& dot) {
+  Duals out(dot.size());
+  for (std::size_t i = 0; i < dot.size(); ++i) out[i] = D(x[i * std::size_t(stride)], dot[i]);
+  return out;
+}
+
+/// Tangents of q along the dofs of v.
+std::vector<double> tangent_of(const CompiledModel& m, const Duals& q) {
+  std::vector<double> out(static_cast<std::size_t>(m.nv));
+  for (const Link& link : m.links) {
+    const auto v = std::size_t(link.v);
+    if (link.kind != JointKind::spherical) {
+      for (int k = 0; k < kernels::dofs(link.kind); ++k)
+        out[v + std::size_t(k)] = q[std::size_t(link.q + k)].epsilon;
+      continue;
+    }
+    const Quat<D> a = quat_at(q, link.q);  // θ = 2 q̄ ⊗ q̇
+    const Quat<double> turn = Quat<double>{a.w.value, -a.x.value, -a.y.value, -a.z.value} *
+                              Quat<double>{a.w.epsilon, a.x.epsilon, a.y.epsilon, a.z.epsilon};
+    out[v] = 2 * turn.x, out[v + 1] = 2 * turn.y, out[v + 2] = 2 * turn.z;
+  }
+  return out;
+}
+
+/// to ⊖ from.
+Duals difference(const CompiledModel& m, const Duals& to, const Duals& from) {
+  Duals out(std::size_t(m.nv));
+  for (const Link& link : m.links) {
+    if (link.kind == JointKind::spherical) {
+      put(out, link.v,
+          kernels::rotation_vector<false>(conjugate(quat_at(from, link.q)) * quat_at(to, link.q))
+              .phi);
+    } else {
+      for (int k = 0; k < kernels::dofs(link.kind); ++k)
+        out[std::size_t(link.v + k)] = to[std::size_t(link.q + k)] - from[std::size_t(link.q + k)];
+    }
+  }
+  return out;
+}
+
+/// from ⊕ x.
+Duals moved(const CompiledModel& m, const Duals& from, const Duals& x) {
+  Duals out(from.size());
+  for (const Link& link : m.links) {
+    const auto q = std::size_t(link.q);
+    if (link.kind == JointKind::spherical) {
+      const Quat<D> r = quat_at(from, link.q) * kernels::quaternion_exp(vec_at(x, link.v));
+      out[q] = r.w, out[q + 1] = r.x, out[q + 2] = r.y, out[q + 3] = r.z;
+    } else {
+      for (int k = 0; k < kernels::dofs(link.kind); ++k)
+        out[q + std::size_t(k)] = from[q + std::size_t(k)] + x[std::size_t(link.v + k)];
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+struct Tangent::Impl {
+  Model model;
+  StepSettings settings;
+  DualStage stage;
+
+  Impl(const Model& m, const StepSettings& s) : model(m), settings(s), stage(model.compiled()) {}
+  [[nodiscard]] const CompiledModel& m() const { return model.compiled(); }
+
+  /// The tangent of x with g(x) = 0 at the value of x; leaves v of it in the stage.
+  Duals solve(const std::vector<double>& x) {
+    const std::size_t n = x.size();
+    const auto size = static_cast<Eigen::Index>(n);
+    for (std::size_t i = 0; i < n; ++i) stage.x[i] = D(x[i]);
+    stage.residual();
+    Eigen::VectorXd rhs(size);
+    for (std::size_t i = 0; i < n; ++i) rhs[Eigen::Index(i)] = -stage.g[i].epsilon;
+    Eigen::MatrixXd A(size, size);
+    DualStage& s = stage;
+    const Duals centre = s.centre, r = s.r, acceleration = s.s, tau = s.tau, target = s.target;
+    for (Duals* inputs : {&s.centre, &s.r, &s.s, &s.tau, &s.target})
+      for (D& a : *inputs) a.epsilon = 0;
+    s.freeze_numbers(true);
+    for (std::size_t j = 0; j < n; ++j) {
+      s.x[j].epsilon = 1;
+      s.residual();
+      s.x[j].epsilon = 0;
+      for (std::size_t i = 0; i < n; ++i) A(Eigen::Index(i), Eigen::Index(j)) = s.g[i].epsilon;
+    }
+    s.freeze_numbers(false);
+    s.centre = centre, s.r = r, s.s = acceleration, s.tau = tau, s.target = target;
+    const Eigen::VectorXd dot = A.partialPivLu().solve(rhs);
+    for (std::size_t i = 0; i < n; ++i) s.x[i].epsilon = dot[Eigen::Index(i)];
+    s.rates();
+    return s.x;
+  }
+
+  std::vector<double> chart(const Duals& from, const double* q1, int stride) const {
+    std::vector<double> x(static_cast<std::size_t>(m().nv));
+    for (const Link& link : m().links) {
+      const auto v = std::size_t(link.v), q = std::size_t(link.q);
+      const double* to = q1 + link.q * stride;
+      if (link.kind == JointKind::spherical) {
+        const Quat<double> c = {from[q].value, from[q + 1].value, from[q + 2].value,
+                                from[q + 3].value};
+        const Vec3<double> turn = rotation_log(
+            conjugate(c) * Quat<double>{to[0], to[stride], to[2 * stride], to[3 * stride]});
+        x[v] = turn.x, x[v + 1] = turn.y, x[v + 2] = turn.z;
+      } else {
+        for (std::size_t k = 0; k < std::size_t(kernels::dofs(link.kind)); ++k)
+          x[v + k] = to[k * std::size_t(stride)] - from[q + k].value;
+      }
+    }
+    return x;
+  }
+
+  /// One solve of `scheme` from `at`; `before` for BDF2. q1: its result, x_gamma: SDIRK2's inner
+  /// stage, `stride` apart.
+  DualState solve_step(Integrator scheme, double h, const DualState& at, const DualState& before,
+                       const double* q1, const double* x_gamma, int stride) {
+    const std::size_t n = at.v.size();
+    stage.centre = at.q;
+    stage.inverse_h = 1 / h;
+    const auto history = [&](double c0, const auto& r, const auto& s) {
+      stage.c0_over_h = c0 / h;
+      for (std::size_t i = 0; i < n; ++i) stage.r[i] = r(i), stage.s[i] = s(i);
+    };
+    const std::vector<double> x1 = chart(at.q, q1, stride);
+    switch (scheme) {
+      case Integrator::bdf1:
+        history(
+            1, [](std::size_t) { return D(0.0); }, [&](std::size_t i) { return -at.v[i]; });
+        break;
+      case Integrator::bdf2: {
+        const Duals y = difference(m(), before.q, at.q);
+        history(
+            1.5, [&](std::size_t i) { return scaled(0.5, y[i]); },
+            [&](std::size_t i) { return scaled(0.5, before.v[i]) - scaled(2, at.v[i]); });
+        break;
+      }
+      case Integrator::sdirk2: {
+        history(
+            1 / kGamma, [](std::size_t) { return D(0.0); },
+            [&](std::size_t i) { return scaled(-1 / kGamma, at.v[i]); });
+        std::vector<double> inner(n);
+        for (std::size_t i = 0; i < n; ++i) inner[i] = x_gamma[i * std::size_t(stride)];
+        const Duals x = solve(inner), v = stage.v;
+        history(
+            1 / kGamma, [&](std::size_t i) { return scaled(-kKappa, x[i]); },
+            [&](std::size_t i) {
+              return scaled(-1 / kGamma, at.v[i] + scaled(kEta, v[i] - at.v[i]));
+            });
+        break;
+      }
+      case Integrator::linear_implicit: return linear(h, at);
+    }
+    const Duals x = solve(x1);
+    return {moved(m(), at.q, x), stage.v};
+  }
+
+  /// A ṡ = ġ - Ȧ s at the predictor.
+  DualState linear(double h, const DualState& at) {
+    const std::size_t n = at.v.size();
+    const auto index = [](std::size_t i) { return Eigen::Index(i); };
+    stage.c0_over_h = 1 / h;
+    for (std::size_t i = 0; i < n; ++i)
+      stage.r[i] = D(0.0), stage.s[i] = -at.v[i], stage.x[i] = scaled(h, at.v[i]);
+    const Duals predicted = stage.x;
+    stage.residual();
+    const Duals g = stage.g;
+    Duals entries;
+    stage.jacobian(entries);
+    Eigen::MatrixXd A(index(n), index(n)), A_dot(index(n), index(n));
+    Eigen::VectorXd value(index(n)), dot(index(n));
+    for (std::size_t i = 0; i < n; ++i) {
+      value[index(i)] = g[i].value, dot[index(i)] = g[i].epsilon;
+      for (std::size_t j = 0; j < n; ++j)
+        A(index(i), index(j)) = entries[i * n + j].value,
+                    A_dot(index(i), index(j)) = entries[i * n + j].epsilon;
+    }
+    const auto factor = A.partialPivLu();
+    const Eigen::VectorXd s = factor.solve(value), s_dot = factor.solve(dot - A_dot * s);
+    Duals x(n), v(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      x[i] = predicted[i] - D(s[index(i)], s_dot[index(i)]);
+      v[i] = scaled(1 / h, x[i]);
+    }
+    return {moved(m(), at.q, x), v};
+  }
+
+  /// Motors, as set_motors() does it.
+  void set_motors(const DualState& at, std::span<const double> u, std::span<const double> u_dot,
+                  std::span<const double> numbers_dot, const double* column) {
+    const int first_dof = kernels::first_dof_number(m().view);
+    for (std::size_t i = 0; i < stage.tau.size(); ++i) stage.tau[i] = stage.target[i] = D(0.0);
+    for (std::size_t k = 0; k < std::size_t(m().nu); ++k) {
+      const CompiledMotor& motor = m().motors[k];
+      const auto dof = std::size_t(motor.dof);
+      if (motor.control == MotorControl::force) {
+        const double half = 0.5 * (motor.high - motor.low);
+        stage.tau[dof] = D(motor.low + (std::clamp(u[k], -1.0, 1.0) + 1) * half,
+                           std::abs(u[k]) <= 1 ? half * u_dot[k] : 0);
+        continue;
+      }
+      if (motor.timing == MotorTiming::end) {
+        stage.target[dof] = D(u[k], u_dot[k]);
+        continue;
+      }
+      const auto gain = [&](const kernels::Parameter& p, int field) {
+        const double value = p.row < 0 ? p.value : column[p.row * kBlock];
+        const int row = first_dof + kernels::kDofNumbers * motor.dof + field;
+        return D(value, numbers_dot.empty() ? 0 : numbers_dot[std::size_t(row)]);
+      };
+      const D force =
+          gain(motor.P, 2) * error_of(motor, k, at, u, u_dot) - gain(motor.D, 3) * at.v[dof];
+      stage.tau[dof] = force.value < motor.low    ? D(motor.low)
+                       : force.value > motor.high ? D(motor.high)
+                                                  : force;
+    }
+  }
+
+  [[nodiscard]] D error_of(const CompiledMotor& motor, std::size_t k, const DualState& at,
+                           std::span<const double> u, std::span<const double> u_dot) const {
+    const Link& link = m().links[std::size_t(motor.link)];
+    if (link.kind != JointKind::spherical)
+      return D(u[k], u_dot[k]) - at.q[std::size_t(link.q + motor.component)];
+    const std::size_t f = k - std::size_t(motor.component);
+    const Vec3<D> goal = {D(u[f], u_dot[f]), D(u[f + 1], u_dot[f + 1]), D(u[f + 2], u_dot[f + 2])};
+    const Vec3<D> way = kernels::rotation_vector<false>(conjugate(quat_at(at.q, link.q)) *
+                                                        kernels::quaternion_exp(goal))
+                            .phi;
+    return motor.component == 0 ? way.x : motor.component == 1 ? way.y : way.z;
+  }
+};
+
+Tangent::Tangent(const Model& model, const StepperOptions& options)
+    : impl_(std::make_unique<Impl>(model, step_settings(model, options))) {}
+Tangent::~Tangent() = default;
+
+void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tape,
+                   std::int64_t step, std::span<const double> u, std::span<const double> u_dot,
+                   std::span<const double> numbers_dot, StateTangent& state) {
+  Impl& i = *impl_;
+  const CompiledModel& m = i.m();
+  const auto rows = [&](std::int64_t t) { return tape.state(t) + lane; };
+  const auto dual = [&](std::int64_t t, const std::vector<double>& q,
+                        const std::vector<double>& v) {
+    return DualState{with_tangent(m, rows(t), kBlock, q),
+                     with_tangent(rows(t) + m.nq * kBlock, kBlock, v)};
+  };
+  const DualState start = dual(step, state.q, state.v),
+                  before = dual(step - 1, state.previous_q, state.previous_v);
+  const double* column = batch.block(block) + lane;
+  i.stage.set_numbers(column, numbers_dot);
+  i.set_motors(start, u, u_dot, numbers_dot, column);
+  DualState end = start;
+  if (const TapedStep* special = tape.special(step, lane); special != nullptr) {
+    for (const TapedSolve& s : special->solves)
+      end = i.solve_step(s.scheme, s.h, end, before, s.q.data(), s.x_gamma.data(), 1);
+  } else {
+    const double* x_gamma =
+        i.settings.integrator == Integrator::sdirk2 ? tape.x_gamma(step) + lane : nullptr;
+    end = i.solve_step(i.settings.integrator, i.settings.timestep, start, before, rows(step + 1),
+                       x_gamma, kBlock);
+  }
+  state.previous_q = std::move(state.q);
+  state.previous_v = std::move(state.v);
+  state.q = tangent_of(m, end.q);
+  state.v.resize(end.v.size());
+  for (std::size_t k = 0; k < end.v.size(); ++k) state.v[k] = end.v[k].epsilon;
+}
+
+void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& tape,
+                    std::int64_t step, int sensor, std::span<const double> numbers_dot,
+                    std::span<const double> points_dot, const StateTangent& state,
+                    std::span<double> field_dot) {
+  Impl& i = *impl_;
+  const CompiledModel& m = i.m();
+  const double* row = tape.state(step) + lane;
+  i.stage.centre = with_tangent(m, row, kBlock, state.q);
+  const Duals v = with_tangent(row + m.nq * kBlock, kBlock, state.v);
+  for (std::size_t k = 0; k < v.size(); ++k)
+    i.stage.x[k] = i.stage.s[k] = D(0.0), i.stage.r[k] = v[k];
+  i.stage.c0_over_h = 0;
+  i.stage.inverse_h = 1;
+  i.stage.field(sensor, batch.block(block) + lane, numbers_dot, points_dot, field_dot);
+}
+
+}  // namespace tangere

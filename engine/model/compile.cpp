@@ -1,0 +1,360 @@
+// SPDX-License-Identifier: Apache-2.0
+// compile(scene): names become indices, fixed joints fold into what they hang on, joints become
+// elementary links.
+#include <algorithm>
+#include <cmath>
+
+#include "engine/model/compile_joints.hpp"
+#include "engine/model/compile_variations.hpp"
+
+namespace tangere {
+
+using kernels::Frame;
+using kernels::JointKind;
+using kernels::Link;
+using kernels::Mat3;
+using kernels::Vec3;
+
+namespace {
+
+Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
+
+class Compiler {
+ public:
+  explicit Compiler(const Scene& scene) { m_.scene = scene; }
+
+  CompiledModel run() {
+    for (int i = 0; i < static_cast<int>(m_.scene.links.size()); ++i) add_link(i);
+    if (m_.nv == 0)
+      throw InputError(where() + "nothing in the scene can move: every joint is fixed");
+    check_masses(m_);
+    compile_joint_effects(m_);
+    compile_motors(m_, joints_);
+    compile_initial_state(m_, joints_);
+    unknown_scales();
+    pair_contacts();
+    ground_contacts();
+    group_contacts(m_);
+    sensors();
+    variables();
+    randomizations();
+    symbolic();
+    return std::move(m_);
+  }
+
+ private:
+  [[nodiscard]] std::string where() const {
+    return m_.scene.path.empty() ? "" : m_.scene.path + ": ";
+  }
+
+  // --- tree ---
+
+  void add_link(int i) {
+    const LinkDescription& d = m_.scene.links[i];
+    links_.add("link", d.name, i, d.joint.source);
+    joints_.add("joint", d.joint.name, i, d.joint.source);
+    bodies_.add("body", d.body.name, i, d.body.source);
+    if (d.parent >= i || d.parent < -1)
+      throw InputError(d.joint.source.prefix() + "link '" + d.name + "': parents must come first");
+    const int parent = d.parent < 0 ? -1 : m_.joints[d.parent].link;
+    const Frame<double> base = d.parent < 0 ? kIdentityFrame : m_.joints[d.parent].frame;
+    m_.joints.push_back(add_joint(m_, d.joint, parent, compose(base, to_frame(d.joint.pose))));
+    add_body(d, m_.joints.back());
+  }
+
+  void add_body(const LinkDescription& d, const CompiledJoint& joint) {
+    CompiledBody body;
+    body.link = joint.link;
+    body.frame = compose(joint.frame, to_frame(d.body.pose));
+    place_shape(d.body.shape, body);
+    const MassProperties properties = mass_properties(d.body.shape, d.body.density);
+    body.mass = properties.mass;
+    body.centre = properties.centre;
+    if (!(body.mass >= 0) || !std::isfinite(body.mass))
+      throw InputError(d.body.source.prefix() + "body '" + d.body.name + "' has mass " +
+                       std::to_string(body.mass) + " kg; expected a finite one, zero or more");
+    if (body.link >= 0 && body.mass > 0) add_inertia(m_.links[body.link], body, properties);
+    m_.bodies.push_back(body);
+    m_.body_names.push_back(d.body.name);
+  }
+
+  // --- contacts ---
+
+  static kernels::ContactParameters constants(const ContactCoefficients& c) {
+    return {{c.kn, -1}, {c.kt, -1}, {c.mu, -1}, {c.damping, -1}};
+  }
+
+  const double* keep(std::vector<std::vector<double>>& storage, std::vector<double> values) {
+    storage.push_back(std::move(values));
+    return storage.back().data();  // moving a vector keeps its buffer
+  }
+
+  void pair_contacts() {
+    for (const PairContactDescription& d : m_.scene.pair_contacts) {
+      const int b1 = bodies_.find("body", d.general_body, d.source);
+      const int b2 = bodies_.find("body", d.primitive_body, d.source);
+      const CompiledBody &first = m_.bodies[b1], &second = m_.bodies[b2];
+      const Shape &general = m_.scene.links[b1].body.shape,
+                  &primitive = m_.scene.links[b2].body.shape;
+      if (!has_contact_points(general))
+        throw InputError(d.source.prefix() + "general_body '" + d.general_body + "' (" +
+                         shape_name(general) +
+                         ") has no contact points; expected a cuboid, cylinder or capsule (swap "
+                         "the two bodies)");
+      if (!has_distance(primitive))
+        throw InputError(
+            d.source.prefix() + "primitive_body '" + d.primitive_body + "' (" +
+            shape_name(primitive) +
+            ") has no distance; expected a sphere, cuboid, cylinder, capsule or plane");
+      if (b1 == b2 || first.link == second.link)
+        throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" +
+                         d.primitive_body + "' cannot move against each other");
+      std::vector<double> points = contact_points(general);
+      double reach = 0;
+      for (std::size_t k = 0; k < points.size(); k += 3) {
+        const Vec3<double> p =
+            first.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + first.frame.p;
+        points[k] = p.x, points[k + 1] = p.y, points[k + 2] = p.z;
+        reach = std::max(reach, std::sqrt(dot(p, p)));
+      }
+      std::vector<double> tiles = sort_into_tiles(points, kernels::kContactTile);
+      kernels::PairContact pair{};
+      pair.link1 = first.link;
+      pair.link2 = second.link;
+      pair.frame2 = second.frame;
+      pair.shape = second.shape;
+      pair.size = second.size;
+      pair.law = d.law;
+      pair.ramp = d.ramp;
+      pair.parameters = constants(d.coefficients);
+      pair.n_points = static_cast<int>(points.size() / 3);
+      pair.n_tiles = static_cast<int>(tiles.size() / 4);
+      pair.reach = reach;
+      pair.body1 = b1;
+      pair.body2 = b2;
+      pair.points = keep(m_.point_storage, std::move(points));
+      lay_out_tiles(pair, tiles);
+      m_.pairs.push_back(pair);
+      m_.contact_info.push_back(
+          {d.general_body, d.primitive_body, pair.n_points, to_string(d.law)});
+      touching_.emplace_back(pair.link1, pair.link2);
+    }
+  }
+
+  /// Points and bounds of the tiles as vectors read them, padded to whole tiles and whole vectors.
+  void lay_out_tiles(kernels::PairContact& pair, const std::vector<double>& tiles) {
+    constexpr int kTile = kernels::kContactTile, kLanes = kernels::kGroup;
+    AlignedVector<double> points(std::size_t(pair.n_tiles) * 3 * kTile, kernels::kFarAway);
+    for (int k = 0; k < pair.n_points; ++k)
+      for (int c = 0; c < 3; ++c)
+        points[std::size_t((k / kTile * 3 + c) * kTile + k % kTile)] = pair.points[3 * k + c];
+    const int groups = (pair.n_tiles + kLanes - 1) / kLanes;
+    AlignedVector<double> bounds(std::size_t(groups) * 4 * kLanes, kernels::kFarAway);
+    for (int t = 0; t < groups * kLanes; ++t)
+      for (int c = 0; c < 4; ++c)
+        bounds[std::size_t((t / kLanes * 4 + c) * kLanes + t % kLanes)] =
+            t < pair.n_tiles ? tiles[std::size_t(4 * t + c)]
+            : c < 3          ? kernels::kFarAway
+                             : 0;
+    m_.tile_storage.push_back(std::move(points));
+    pair.tile_points = m_.tile_storage.back().data();
+    m_.tile_storage.push_back(std::move(bounds));
+    pair.tile_bounds = m_.tile_storage.back().data();
+  }
+
+  void ground_contacts() {
+    for (const GroundContactDescription& d : m_.scene.ground_contacts) {
+      if (!m_.scene.ground)
+        throw InputError(d.source.prefix() + "ground_contact of '" + d.body +
+                         "', but the scene has no <ground>");
+      const int b = bodies_.find("body", d.body, d.source);
+      const CompiledBody& body = m_.bodies[b];
+      if (body.link < 0)
+        throw InputError(d.source.prefix() + "body '" + d.body + "' is fixed in the world");
+      kernels::GroundContact ground{};
+      const Shape& shape = m_.scene.links[b].body.shape;
+      std::vector<double> points = contact_points(shape);
+      if (std::holds_alternative<SphereShape>(shape)) {
+        points = {0, 0, 0};
+        ground.radius = body.size.x;
+      }
+      if (points.empty())
+        throw InputError(d.source.prefix() + "body '" + d.body + "' (" + shape_name(shape) +
+                         ") has no contact points");
+      for (std::size_t k = 0; k < points.size(); k += 3) {
+        const Vec3<double> p =
+            body.frame.R * Vec3<double>{points[k], points[k + 1], points[k + 2]} + body.frame.p;
+        points[k] = p.x, points[k + 1] = p.y, points[k + 2] = p.z;
+      }
+      ground.link = body.link;
+      ground.body = b;
+      ground.law = d.law;
+      ground.ramp = d.ramp;
+      ground.parameters = constants(d.coefficients);
+      ground.n_points = static_cast<int>(points.size() / 3);
+      ground.points = keep(m_.point_storage, std::move(points));
+      m_.grounds.push_back(ground);
+      m_.contact_info.push_back({d.body, "ground", ground.n_points, to_string(d.law)});
+    }
+  }
+
+  void sensors() {
+    for (std::size_t i = 0; i < m_.scene.sensors.size(); ++i) {
+      const TactileDescription& d = m_.scene.sensors[i];
+      sensors_.add("tactile sensor", d.name, static_cast<int>(i), d.source);
+      const int b = bodies_.find("body", d.body, d.source);
+      SensorInfo info;
+      CompiledSensor sensor = compile_sensor(d, m_.bodies[b], info);
+      sensor.body = b;
+      sensor.parameters = constants(d.coefficients);
+      for (int t = 0; t < static_cast<int>(m_.bodies.size()); ++t)
+        if (m_.bodies[t].link != sensor.link && m_.bodies[t].touchable) sensor.targets.push_back(t);
+      m_.sensors.push_back(std::move(sensor));
+      m_.sensor_info.push_back(std::move(info));
+    }
+  }
+
+  void variables() {
+    NameIndex names;
+    for (const VariableDescription& d : m_.scene.variables) {
+      names.add("endeffector", d.name, static_cast<int>(m_.variables.size()), d.source);
+      const CompiledJoint& joint = m_.joints[joints_.find("joint", d.joint, d.source)];
+      m_.variables.push_back({joint.link, joint.frame.R * vec(d.position) + joint.frame.p});
+      m_.variable_info.push_back({d.name, d.joint});
+    }
+  }
+
+  // --- state and what varies ---
+
+  /// Lengths are rounded against the farthest point of any body from the world's origin at rest.
+  void unknown_scales() {
+    std::vector<Frame<double>> world;
+    double extent = 0;
+    for (const Link& l : m_.links)
+      world.push_back(l.parent < 0 ? l.frame : compose(world[std::size_t(l.parent)], l.frame));
+    for (const CompiledBody& b : m_.bodies) {
+      const Frame<double> at = b.link < 0 ? b.frame : compose(world[std::size_t(b.link)], b.frame);
+      extent = std::max(extent, std::sqrt(dot(at.p, at.p)) + std::sqrt(dot(b.size, b.size)));
+    }
+    for (const Link& l : m_.links) {
+      const bool turns = l.kind == JointKind::revolute || l.kind == JointKind::spherical;
+      m_.unknown_scale.insert(m_.unknown_scale.end(), std::size_t(kernels::dofs(l.kind)),
+                              turns ? 1.0 : extent);
+    }
+  }
+
+  void randomizations() {
+    m_.layout = {0, m_.nq, m_.nq + m_.nv, 2 * m_.nq + m_.nv, 2 * (m_.nq + m_.nv), 0};
+    int next = m_.layout.parameters;
+    for (const RandomizationDescription& d : m_.scene.randomizations) {
+      if (d.target == RandomTarget::joint_q || d.target == RandomTarget::joint_v) {
+        m_.randomized_row.push_back(state_row(d));
+        continue;
+      }
+      if (d.target == RandomTarget::density) {
+        vary_density(m_, bodies_.find("body", d.name, d.source), d, next);
+        m_.randomized_row.push_back(next++);
+        continue;
+      }
+      if (d.target == RandomTarget::size) {
+        vary_size(m_, bodies_.find("body", d.name, d.source), d, next);
+        m_.randomized_row.push_back(next++);
+        continue;
+      }
+      if (d.target == RandomTarget::place) {
+        vary_place(m_, joints_.find("joint", d.name, d.source), d, next);
+        m_.randomized_row.push_back(next++);
+        continue;
+      }
+      if (d.target == RandomTarget::joint_effect || d.target == RandomTarget::motor) {
+        vary_joint(m_, joints_, d, next);
+        m_.randomized_row.push_back(next++);
+        continue;
+      }
+      const auto vary = [&](kernels::ContactParameters& p) {
+        kernels::Parameter* field[] = {&p.kn, &p.kt, &p.mu, &p.damping};
+        field[static_cast<int>(d.field)]->row = next;
+      };
+      parameters_of(d, vary);
+      m_.randomized_row.push_back(next++);
+    }
+    m_.layout.rows = add_derived_rows(m_, next);
+  }
+
+  int state_row(const RandomizationDescription& d) const {
+    const int i = joints_.find("joint", d.name, d.source);
+    const JointType type = m_.scene.links[i].joint.type;
+    const bool position = d.target == RandomTarget::joint_q;
+    const int count = position ? position_count(type) : dof_count(type);
+    if (d.index < 0 || d.index >= count)
+      throw InputError(d.source.prefix() + "joint '" + d.name + "' has " + std::to_string(count) +
+                       (position ? " coordinates" : " velocities") + "; index " +
+                       std::to_string(d.index) + " is not one of them");
+    return position ? m_.layout.q + m_.joints[i].q + d.index
+                    : m_.layout.v + m_.joints[i].v + d.index;
+  }
+
+  template <class Vary>
+  void parameters_of(const RandomizationDescription& d, const Vary& vary) {
+    bool found = false;
+    if (d.target == RandomTarget::tactile) {
+      vary(m_.sensors[sensors_.find("tactile sensor", d.name, d.source)].parameters);
+      return;
+    }
+    for (std::size_t k = 0; k < m_.pairs.size() && d.target == RandomTarget::pair_contact; ++k) {
+      const PairContactDescription& pair = m_.scene.pair_contacts[k];
+      if (pair.general_body == d.name && pair.primitive_body == d.second_name)
+        vary(m_.pairs[k].parameters), found = true;
+    }
+    for (std::size_t k = 0; k < m_.grounds.size() && d.target == RandomTarget::ground_contact; ++k)
+      if (m_.scene.ground_contacts[k].body == d.name) vary(m_.grounds[k].parameters), found = true;
+    if (!found)
+      throw InputError(d.source.prefix() + "no contact between '" + d.name + "' and '" +
+                       (d.second_name.empty() ? "ground" : d.second_name) + "' is declared");
+  }
+
+  void symbolic() { m_.pattern = analyse_pattern(m_.links, m_.nv, touching_); }
+
+  CompiledModel m_;
+  NameIndex links_, joints_, bodies_, sensors_;
+  std::vector<std::pair<int, int>> touching_;
+};
+
+}  // namespace
+
+/// Everything of a model, views included. The result must not be copied: its view points into its
+/// own vectors.
+std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
+  auto m = std::make_shared<CompiledModel>(Compiler(scene).run());
+  decide_effects(*m);
+  list_stages(*m);
+  const Vector3& g = m->scene.gravity;
+  kernels::ModelView& v = m->view;
+  v.n_links = static_cast<int>(m->links.size());
+  v.nq = m->nq;
+  v.nv = m->nv;
+  v.links = m->links.data();
+  v.gravity = vec(g);
+  const GroundDescription ground = m->scene.ground.value_or(GroundDescription{});
+  v.ground_point = vec(ground.position);
+  v.ground_normal = vec(ground.normal);
+  v.effects = m->dof_effects.data();
+  v.n_pairs = static_cast<int>(m->pairs.size());
+  v.n_grounds = static_cast<int>(m->grounds.size());
+  v.pairs = m->pairs.data();
+  v.grounds = m->grounds.data();
+  v.n_link_pairs = static_cast<int>(m->link_pairs.size());
+  v.n_grounded = static_cast<int>(m->grounded.size());
+  v.link_pairs = m->link_pairs.data();
+  v.grounded = m->grounded.data();
+  v.pair_order = m->pair_order.data();
+  v.ground_order = m->ground_order.data();
+  for (std::size_t k = 0; k < m->bodies.size(); ++k)
+    m->solids.push_back(solid_of(m->scene.links[k].body.shape, m->bodies[k]));
+  v.n_solids = static_cast<int>(m->solids.size());
+  v.solids = m->solids.data();
+  v.pattern = m->pattern.view();
+  return m;
+}
+
+}  // namespace tangere

@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: Apache-2.0
+// Joints become chains of elementary links, with coordinates, effects, motors and a starting state.
+#include "engine/model/compile_joints.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangere {
+
+using kernels::Frame;
+using kernels::JointKind;
+using kernels::Link;
+using kernels::Vec3;
+
+namespace {
+
+bool is_identity(const Frame<double>& f) {
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      if (f.R.m[i][j] != (i == j ? 1.0 : 0.0)) return false;
+  return f.p.x == 0 && f.p.y == 0 && f.p.z == 0;
+}
+
+Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
+
+void name_coordinates(CompiledModel& m, const JointDescription& d) {
+  struct Coordinate {
+    const char *name, *unit;
+  };
+  std::vector<Coordinate> q, v;
+  switch (d.type) {
+    case JointType::fixed: break;
+    case JointType::revolute: q = {{"angle", "rad"}}, v = {{"rate", "rad/s"}}; break;
+    case JointType::prismatic: q = {{"position", "m"}}, v = {{"rate", "m/s"}}; break;
+    case JointType::planar:
+      q = {{"axis0", "m"}, {"axis1", "m"}}, v = {{"v0", "m/s"}, {"v1", "m/s"}};
+      break;
+    case JointType::free2d:
+      q = {{"x", "m"}, {"y", "m"}, {"angle", "rad"}};
+      v = {{"vx", "m/s"}, {"vy", "m/s"}, {"rate", "rad/s"}};
+      break;
+    case JointType::translational:
+    case JointType::free:
+      q = {{"x", "m"}, {"y", "m"}, {"z", "m"}};
+      v = {{"vx", "m/s"}, {"vy", "m/s"}, {"vz", "m/s"}};
+      [[fallthrough]];
+    case JointType::spherical:
+      if (d.type == JointType::translational) break;
+      q.insert(q.end(), {{"qw", "1"}, {"qx", "1"}, {"qy", "1"}, {"qz", "1"}});
+      v.insert(v.end(), {{"wx", "rad/s"}, {"wy", "rad/s"}, {"wz", "rad/s"}});
+      break;
+  }
+  for (const Coordinate& c : q)
+    m.q_names.push_back(d.name + "." + c.name), m.q_units.emplace_back(c.unit);
+  for (const Coordinate& c : v)
+    m.v_names.push_back(d.name + "." + c.name), m.v_units.emplace_back(c.unit);
+}
+
+/// The numbers that hold for one dof of a joint.
+const JointEffects& effects_of(const JointDescription& d, int k) {
+  return d.turning && dof_turns(d.type, k) ? *d.turning : d;
+}
+
+void check_effects(const JointDescription& d, const JointEffects& e) {
+  const std::string of = d.source.prefix() + "joint '" + d.name + "': ";
+  const std::pair<const char*, double> numbers[] = {{"damping", e.damping},
+                                                    {"armature", e.armature},
+                                                    {"stiffness", e.stiffness},
+                                                    {"lim_stiffness", e.limit_stiffness}};
+  for (const auto& [name, value] : numbers)
+    if (!(value >= 0) || !std::isfinite(value))
+      throw InputError(of + name + " is " + std::to_string(value) +
+                       "; expected a finite number, zero or more");
+  if (e.limits && !((*e.limits)[0] <= (*e.limits)[1]))
+    throw InputError(of + "limits " + std::to_string((*e.limits)[0]) + " and " +
+                     std::to_string((*e.limits)[1]) + "; expected low, then high");
+}
+
+kernels::DofEffects dof_effects(const JointEffects& e, double rest) {
+  constexpr double kNone = HUGE_VAL;
+  kernels::DofEffects out{};
+  out.damping = {e.damping, -1};
+  out.armature = {e.armature, -1};
+  out.stiffness = {e.stiffness, -1};
+  out.limit_stiffness = {e.limit_stiffness, -1};
+  out.P = out.D = {0, -1};
+  out.rest = rest;
+  out.low = e.limits ? (*e.limits)[0] : -kNone;
+  out.high = e.limits ? (*e.limits)[1] : kNone;
+  out.force_low = -kNone;
+  out.force_high = kNone;
+  return out;
+}
+
+std::uint8_t flags_of(const JointEffects& e) {
+  int flags = 0;
+  if (e.damping != 0) flags |= kernels::kDamped;
+  if (e.armature != 0) flags |= kernels::kArmoured;
+  if (e.stiffness != 0) flags |= kernels::kSprung;
+  if (e.limits && e.limit_stiffness != 0) flags |= kernels::kLimited;
+  return static_cast<std::uint8_t>(flags);
+}
+
+/// The elementary link of one dof.
+int link_of_dof(const CompiledModel& m, int dof) {
+  for (int i = 0;; ++i)
+    if (dof < m.links[std::size_t(i)].v + kernels::dofs(m.links[std::size_t(i)].kind)) return i;
+}
+
+void check_motor(const MotorDescription& d) {
+  if (!(d.low <= d.high))
+    throw InputError(d.source.prefix() + "motor of joint '" + d.joint + "': range " +
+                     std::to_string(d.low) + " " + std::to_string(d.high) +
+                     "; expected low, then high");
+  const bool finite =
+      std::isfinite(d.low) && std::isfinite(d.high) && std::isfinite(d.P) && std::isfinite(d.D);
+  if (d.control == MotorControl::force ? !finite : !(d.P >= 0 && d.D >= 0))
+    throw InputError(d.source.prefix() + "motor of joint '" + d.joint +
+                     "': expected a finite range, or gains P and D of zero or more");
+}
+
+}  // namespace
+
+CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent,
+                        const Frame<double>& frame) {
+  CompiledJoint joint;
+  joint.q = m.nq;
+  joint.v = m.nv;
+  joint.first_link = static_cast<int>(m.links.size());
+  joint.frame = kIdentityFrame;
+  const Vec3<double> x = {1, 0, 0}, y = {0, 1, 0}, z = {0, 0, 1};
+  const Vec3<double> axis0 = vec(d.axis0), axis1 = vec(d.axis1);
+  // Appends an elementary link; only the first carries the joint's rest pose.
+  const auto add = [&](JointKind kind, const Vec3<double>& axis) {
+    const bool first = joint.link_count == 0;
+    const Frame<double>& at = first ? frame : kIdentityFrame;
+    const int up = first ? parent : joint.link;
+    const bool slides = kernels::slides(kind), steady = up < 0 || m.links[up].still;
+    const bool rotated = !is_identity({at.R, {0, 0, 0}}), turned = !slides || rotated;
+    const bool placed = slides || !is_identity({kIdentityFrame.R, at.p});
+    Link link{up,
+              kind,
+              m.nq,
+              m.nv,
+              axis,
+              at,
+              rotated,
+              turned,
+              placed,
+              steady,
+              steady && slides,
+              false,
+              0,
+              0,
+              {0, 0, 0},
+              kernels::zero33<double>()};
+    m.nq += kernels::coordinates(kind);
+    m.nv += kernels::dofs(kind);
+    joint.link = static_cast<int>(m.links.size());
+    m.links.push_back(link);
+    ++joint.link_count;
+  };
+  switch (d.type) {
+    case JointType::fixed:
+      joint.first_link = -1;
+      joint.link = parent;
+      joint.frame = frame;
+      break;
+    case JointType::revolute: add(JointKind::revolute, axis0); break;
+    case JointType::prismatic: add(JointKind::prismatic, axis0); break;
+    case JointType::planar:
+      add(JointKind::prismatic, axis0);
+      add(JointKind::prismatic, axis1);
+      break;
+    case JointType::translational: add(JointKind::translational, x); break;
+    case JointType::free2d:
+      add(JointKind::prismatic, x);
+      add(JointKind::prismatic, y);
+      add(JointKind::revolute, z);
+      break;
+    case JointType::spherical: add(JointKind::spherical, x); break;
+    case JointType::free:
+      add(JointKind::translational, x);
+      add(JointKind::spherical, x);
+      break;
+  }
+  name_coordinates(m, d);
+  return joint;
+}
+
+void compile_joint_effects(CompiledModel& m) {
+  m.dof_effects.resize(std::size_t(m.nv));
+  for (std::size_t i = 0; i < m.scene.links.size(); ++i) {
+    const JointDescription& d = m.scene.links[i].joint;
+    const int count = dof_count(d.type);
+    if (!d.rest.empty() && d.rest.size() != std::size_t(count))
+      throw InputError(d.source.prefix() + "joint '" + d.name + "': rest has " +
+                       std::to_string(d.rest.size()) + " values; expected " +
+                       std::to_string(count));
+    for (int k = 0; k < count; ++k) {
+      const int dof = m.joints[i].v + k;
+      const JointEffects& e = effects_of(d, k);
+      check_effects(d, e);
+      m.dof_effects[std::size_t(dof)] = dof_effects(e, d.rest.empty() ? 0 : d.rest[std::size_t(k)]);
+      m.links[std::size_t(link_of_dof(m, dof))].effects |= flags_of(e);
+    }
+  }
+}
+
+void compile_motors(CompiledModel& m, const NameIndex& joints) {
+  std::vector<char> driven(m.scene.links.size(), 0);
+  for (const MotorDescription& d : m.scene.motors) {
+    const auto i = std::size_t(joints.find("joint", d.joint, d.source));
+    const JointType type = m.scene.links[i].joint.type;
+    if (dof_count(type) == 0)
+      throw InputError(d.source.prefix() + "motor on the fixed joint '" + d.joint + "'");
+    if (driven[i] != 0)
+      throw InputError(d.source.prefix() + "joint '" + d.joint + "' has two motors");
+    driven[i] = 1;
+    check_motor(d);
+    for (int k = 0; k < dof_count(type); ++k) {
+      const int dof = m.joints[i].v + k, at = link_of_dof(m, dof);
+      Link& link = m.links[std::size_t(at)];
+      m.motors.push_back(
+          {dof, d.low, d.high, d.control, d.timing, at, dof - link.v, {d.P, -1}, {d.D, -1}});
+      m.u_names.push_back(m.v_names[std::size_t(dof)]);
+      const bool position = d.control == MotorControl::position;
+      m.u_units.emplace_back(!position ? "1" : dof_turns(type, k) ? "rad" : "m");
+      if (!position || d.timing == MotorTiming::start) continue;
+      link.effects |= kernels::kDriven;
+      kernels::DofEffects& e = m.dof_effects[std::size_t(dof)];
+      e.P = {d.P, -1};
+      e.D = {d.D, -1};
+      e.force_low = d.low;
+      e.force_high = d.high;
+    }
+  }
+  m.nu = static_cast<int>(m.motors.size());
+}
+
+void compile_initial_state(CompiledModel& m, const NameIndex& joints) {
+  m.initial_q.assign(m.nq, 0);
+  m.initial_v.assign(m.nv, 0);
+  for (const Link& link : m.links)
+    if (link.kind == JointKind::spherical) m.initial_q[link.q] = 1;
+  for (const InitialState& d : m.scene.initial) {
+    const int i = joints.find("joint", d.joint, d.source);
+    const JointType type = m.scene.links[i].joint.type;
+    const auto copy = [&](const char* what, const std::vector<double>& from, int count,
+                          double* to) {
+      if (from.empty()) return;
+      if (from.size() != std::size_t(count))
+        throw InputError(d.source.prefix() + "initial " + what + " of joint '" + d.joint +
+                         "' has " + std::to_string(from.size()) + " values; expected " +
+                         std::to_string(count));
+      std::copy(from.begin(), from.end(), to);
+    };
+    copy("q", d.q, position_count(type), m.initial_q.data() + m.joints[i].q);
+    copy("v", d.v, dof_count(type), m.initial_v.data() + m.joints[i].v);
+  }
+}
+
+void vary_joint(CompiledModel& m, const NameIndex& joints, const RandomizationDescription& d,
+                int row) {
+  const auto i = std::size_t(joints.find("joint", d.name, d.source));
+  const JointDescription& joint = m.scene.links[i].joint;
+  const auto fail = [&](const std::string& why) {
+    throw InputError(d.source.prefix() + to_string(d.joint_field) + " of joint '" + d.name +
+                     "' varies, but " + why);
+  };
+  bool found = false;
+  if (d.target == RandomTarget::motor) {
+    if (d.joint_field < JointField::P) fail("motors have P and D");
+    for (CompiledMotor& motor : m.motors) {
+      const int k = motor.dof - m.joints[i].v;
+      if (motor.control != MotorControl::position || k < 0 || k >= dof_count(joint.type)) continue;
+      kernels::DofEffects& e = m.dof_effects[std::size_t(motor.dof)];
+      (d.joint_field == JointField::P ? motor.P : motor.D).row = row;
+      (d.joint_field == JointField::P ? e.P : e.D).row = row;
+      found = true;
+    }
+    if (!found) fail("the joint has no position motor");
+    return;
+  }
+  if (d.joint_field >= JointField::P) fail("that is a number of a motor");
+  if (dof_count(joint.type) == 0) fail("the joint is fixed");
+  if (joint.turning) fail("its dofs do not share one number");
+  if (d.joint_field == JointField::lim_stiffness && !joint.limits) fail("the joint has no limits");
+  constexpr std::uint8_t kFlags[] = {kernels::kDamped, kernels::kArmoured, kernels::kSprung,
+                                     kernels::kLimited};
+  const auto field = static_cast<std::size_t>(d.joint_field);
+  for (int k = 0; k < dof_count(joint.type); ++k) {
+    const int dof = m.joints[i].v + k;
+    kernels::DofEffects& e = m.dof_effects[std::size_t(dof)];
+    kernels::Parameter* parameters[] = {&e.damping, &e.armature, &e.stiffness, &e.limit_stiffness};
+    parameters[field]->row = row;
+    m.links[std::size_t(link_of_dof(m, dof))].effects |= kFlags[field];
+  }
+}
+
+void check_masses(const CompiledModel& m) {
+  std::vector<char> carried(m.links.size(), 0);
+  for (std::size_t i = m.links.size(); i-- > 0;) {
+    if (m.links[i].massive) carried[i] = 1;
+    if (carried[i] != 0 && m.links[i].parent >= 0) carried[std::size_t(m.links[i].parent)] = 1;
+  }
+  for (std::size_t i = 0; i < m.joints.size(); ++i) {
+    const CompiledJoint& joint = m.joints[i];
+    if (joint.link_count == 0 || carried[std::size_t(joint.link)] != 0) continue;
+    const JointDescription& d = m.scene.links[i].joint;
+    throw InputError(d.source.prefix() + "joint '" + d.name +
+                     "' moves nothing that has mass; expected a body with mass on it " +
+                     "or on a joint that it carries");
+  }
+}
+
+}  // namespace tangere

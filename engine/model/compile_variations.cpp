@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// A body's size is what a scene gives it: the half lengths that kernels read, mass and inertia
+// follow. A joint's place moves the frame of its first link.
+#include "engine/model/compile_variations.hpp"
+
+#include <algorithm>
+
+#include "engine/model/compile_joints.hpp"
+
+namespace tangere {
+
+using kernels::Frame;
+using kernels::kBlock;
+using kernels::Link;
+using kernels::Vec3;
+
+namespace {
+
+/// The entry of a link, made when it is first asked for.
+VaryingInertia& varying_inertia(CompiledModel& m, int link) {
+  for (VaryingInertia& v : m.varying_inertia)
+    if (v.link == link) return v;
+  m.varying_inertia.push_back({link, 0, false, inertia_rows(m.links[std::size_t(link)]), {}});
+  return m.varying_inertia.back();
+}
+
+/// All bodies of a link, in the order in which compile() adds them.
+InertiaRows sum_anew(const CompiledModel& m, const VaryingInertia& varying, const double* column) {
+  Link link{};
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    if (m.bodies[b].link != varying.link) continue;
+    Shape shape = m.scene.links[b].body.shape;
+    double density = m.scene.links[b].body.density;
+    for (const VaryingSize& size : m.varying_sizes)
+      for (const VaryingNumber& n : size.numbers)
+        if (size.body == static_cast<int>(b)) *size_number(shape, n.which) = column[n.row * kBlock];
+    for (const VaryingInertia::Part& part : varying.parts)
+      if (part.body == static_cast<int>(b)) density = column[part.row * kBlock];
+    const MassProperties properties = mass_properties(shape, density);
+    CompiledBody body = m.bodies[b];
+    body.mass = properties.mass;
+    if (body.mass > 0) add_inertia(link, body, properties);
+  }
+  return inertia_rows(link);
+}
+
+}  // namespace
+
+void vary_density(CompiledModel& m, int body, const RandomizationDescription& d, int row) {
+  const BodyDescription& b = m.scene.links[std::size_t(body)].body;
+  const auto fail = [&](const std::string& why) {
+    throw InputError(d.source.prefix() + "density of body '" + d.name + "' varies, but " + why);
+  };
+  const int link = m.bodies[std::size_t(body)].link;
+  if (std::holds_alternative<AbstractShape>(b.shape))
+    fail("its mass is given; expected a body with volume");
+  if (link < 0) fail("it is fixed in the world");
+  if (!(b.density > 0)) fail("it is massless; expected a positive density");
+  VaryingInertia& varying = varying_inertia(m, link);
+  const InertiaRows of_density =
+      inertia_rows(m.bodies[std::size_t(body)], mass_properties(b.shape, 1));
+  for (std::size_t i = 0; i < of_density.size(); ++i)
+    varying.constant[i] -= b.density * of_density[i];
+  varying.parts.push_back({body, row, of_density});
+}
+
+void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, int row) {
+  BodyDescription& b = m.scene.links[std::size_t(body)].body;
+  CompiledBody& compiled = m.bodies[std::size_t(body)];
+  const std::string name = size_name(d.index);
+  const auto fail = [&](const std::string& why) {
+    throw InputError(d.source.prefix() + name + " of body '" + d.name + "' varies, but " + why);
+  };
+  if (size_number(b.shape, d.index) == nullptr)
+    fail(std::string("a ") + shape_name(b.shape) + " has none");
+  const Distribution& x = d.distribution;
+  const bool listed = x.kind == Distribution::Kind::list;
+  const double least = listed && !x.values.empty()
+                           ? *std::min_element(x.values.begin(), x.values.end())
+                       : listed ? 0
+                                : x.a;
+  if (x.kind == Distribution::Kind::normal || !(least > 0))
+    fail("not all that may be drawn is positive");
+  for (const PairContactDescription& c : m.scene.pair_contacts)
+    if (c.general_body == d.name)
+      fail(
+          "its contact points do not; expected a body that touches nothing with points of its own");
+  for (const TactileDescription& t : m.scene.sensors)
+    if (t.body == d.name)
+      fail("the points of its tactile sensor '" + t.name + "' do not; expected a body without one");
+  for (std::size_t k = 0; k < m.grounds.size(); ++k)
+    if (m.scene.ground_contacts[k].body == d.name && !std::holds_alternative<SphereShape>(b.shape))
+      fail("the points that touch the ground do not; expected a sphere there");
+  if (compiled.size_row < 0) {
+    compiled.size_row = static_cast<int>(m.varying_sizes.size());  // until add_derived_rows()
+    m.varying_sizes.push_back({body, 0, {}});
+    if (compiled.link >= 0 && compiled.mass > 0) varying_inertia(m, compiled.link).anew = true;
+  }
+  m.varying_sizes[std::size_t(compiled.size_row)].numbers.push_back({d.index, row});
+}
+
+void vary_place(CompiledModel& m, int joint, const RandomizationDescription& d, int row) {
+  const CompiledJoint& compiled = m.joints[std::size_t(joint)];
+  const auto fail = [&](const std::string& why) {
+    throw InputError(d.source.prefix() + "pos of joint '" + d.name + "' varies, but " + why);
+  };
+  if (d.index < 0 || d.index > 2) fail("index " + std::to_string(d.index) + " is none of 0, 1, 2");
+  if (compiled.link_count == 0) fail("the joint is fixed; expected one that moves");
+  for (VaryingPlace& place : m.varying_places)
+    if (place.joint == joint) {
+      place.numbers.push_back({d.index, row});
+      return;
+    }
+  const int parent = m.scene.links[std::size_t(joint)].parent;
+  m.varying_places.push_back({joint,
+                              0,
+                              parent < 0 ? kIdentityFrame : m.joints[std::size_t(parent)].frame,
+                              {{d.index, row}}});
+}
+
+int add_derived_rows(CompiledModel& m, int next) {
+  for (VaryingInertia& varying : m.varying_inertia) {
+    m.links[std::size_t(varying.link)].inertia_row = varying.row = next;
+    next += static_cast<int>(varying.constant.size());
+  }
+  for (VaryingSize& size : m.varying_sizes) {
+    const std::string& name = m.scene.links[std::size_t(size.body)].body.name;
+    m.bodies[std::size_t(size.body)].size_row = size.row = next;
+    for (std::size_t k = 0; k < m.pairs.size(); ++k)
+      if (m.scene.pair_contacts[k].primitive_body == name) m.pairs[k].size_row = next;
+    for (std::size_t k = 0; k < m.grounds.size(); ++k)
+      if (m.scene.ground_contacts[k].body == name)
+        m.grounds[k].radius_row = next, m.grounds[k].extent = 0;
+    for (CompiledSensor& sensor : m.sensors)
+      if (std::find(sensor.targets.begin(), sensor.targets.end(), size.body) !=
+          sensor.targets.end())
+        sensor.sizes_vary = true;
+    next += 3;
+  }
+  for (VaryingPlace& place : m.varying_places) {
+    Link& link = m.links[std::size_t(m.joints[std::size_t(place.joint)].first_link)];
+    link.place_row = place.row = next;
+    link.placed = true;
+    next += 3;
+  }
+  return next;
+}
+
+void update_derived_rows(const CompiledModel& m, double* column) {
+  const auto put = [&](int row, const Vec3<double>& x) {
+    column[row * kBlock] = x.x, column[(row + 1) * kBlock] = x.y, column[(row + 2) * kBlock] = x.z;
+  };
+  for (const VaryingInertia& varying : m.varying_inertia) {
+    InertiaRows sum = varying.constant;
+    if (varying.anew) sum = sum_anew(m, varying, column);
+    for (const VaryingInertia::Part& part : varying.parts)
+      for (std::size_t i = 0; i < sum.size() && !varying.anew; ++i)
+        sum[i] += column[part.row * kBlock] * part.of_density[i];
+    for (std::size_t i = 0; i < sum.size(); ++i)
+      column[(varying.row + static_cast<int>(i)) * kBlock] = sum[i];
+  }
+  for (const VaryingSize& size : m.varying_sizes) {
+    Shape shape = m.scene.links[std::size_t(size.body)].body.shape;
+    for (const VaryingNumber& n : size.numbers)
+      *size_number(shape, n.which) = column[n.row * kBlock];
+    CompiledBody body;
+    place_shape(shape, body);
+    put(size.row, body.size);
+  }
+  for (const VaryingPlace& place : m.varying_places) {
+    Pose pose = m.scene.links[std::size_t(place.joint)].joint.pose;
+    for (const VaryingNumber& n : place.numbers)
+      pose.position[std::size_t(n.which)] = column[n.row * kBlock];
+    put(place.row, compose(place.base, to_frame(pose)).p);
+  }
+}
+
+}  // namespace tangere

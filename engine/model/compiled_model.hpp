@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: Apache-2.0
+// The arrays behind a Model. Private to the engine: kernels see them through ModelView.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "engine/base/aligned.hpp"
+#include "engine/model/model.hpp"
+#include "kernels/numbers/so3.hpp"
+#include "kernels/step/model_view.hpp"
+#include "kernels/tactile/tactile_types.hpp"
+
+namespace tangere {
+
+/// A body after folding: where it sits on its link (-1: fixed in the world).
+struct CompiledBody {
+  int link = -1;
+  kernels::Frame<double> frame;  ///< body frame in the link (or the world)
+  bool touchable = true;  ///< has a distance; else `shape` says nothing and size.x is its extent
+  PrimitiveShape shape = PrimitiveShape::sphere;
+  kernels::Vec3<double> size{};    ///< as in kernels::PairContact
+  kernels::Vec3<double> centre{};  ///< of mass, body frame [m]
+  double mass = 0;                 ///< [kg]
+  int size_row = -1;               ///< ≥ 0: size stands in three rows of the block instead
+};
+
+/// A joint of the scene: its elementary links and its coordinates.
+struct CompiledJoint {
+  int first_link = -1, link_count = 0;  ///< none for a fixed joint
+  int q = 0, v = 0;                     ///< first coordinate, first dof
+  int link = -1;                        ///< what bodies of this joint move with
+  kernels::Frame<double> frame;         ///< joint frame in that link
+};
+
+/// Motor on one dof. Force motors: force = low + (clip(u) + 1)/2 (high - low). Position motors
+/// evaluated at the end of the step are effects of their joint (kernels/step/joint_effects-inl.hpp),
+/// which u is the target of.
+struct CompiledMotor {
+  int dof;
+  double low, high;
+  MotorControl control;
+  MotorTiming timing;
+  int link, component;  ///< elementary link, and which of its dofs
+  kernels::Parameter P, D;
+};
+
+/// Flat pads of at most so many points are read in all environments at once.
+inline constexpr int kSmallPad = 512;
+
+/// Points of one sensor in tiles of 8×8, in its pad's axes (kernels/tactile/tactile_types.hpp).
+struct CompiledSensor {
+  int body = -1, link = -1;
+  kernels::Frame<double>
+      pad;  ///< pad frame in the link: axis0, axis1, their product; the array's middle
+  int rows = 0, cols = 0, tile_rows = 0, tile_cols = 0;
+  AlignedVector<double> tile_x, tile_y, tile_z, tile_radius;  ///< (n_tiles, padded to 8)
+  std::vector<int> tile_kind;                                 ///< (n_tiles)
+  AlignedVector<double> offsets;  ///< (4, 2, 64) flat, (n_tiles, 3, 64) curved
+  AlignedVector<float> offsets_f;
+  std::vector<int> index;                 ///< (n_tiles, 64) curved, empty: flat
+  AlignedVector<double> frames, factors;  ///< (n_tiles, 9, 64), (n_tiles, 4, 64) or empty
+  AlignedVector<float> frames_f, factors_f;
+  bool skewed = false;
+  double axes[9] = {};  ///< rows axis0, axis1, -(axis0 × axis1), pad axes
+  kernels::ContactParameters parameters{};
+  ContactLaw law = ContactLaw::clamped;
+  std::vector<int> targets;  ///< bodies it can feel
+  bool sizes_vary = false;   ///< of some of them
+
+  [[nodiscard]] int points() const { return rows * cols; }
+  [[nodiscard]] int n_tiles() const { return tile_rows * tile_cols; }
+  [[nodiscard]] kernels::PadTiles tiles() const;
+};
+
+/// An end effector.
+struct CompiledVariable {
+  int link = -1;                  ///< -1: fixed in the world
+  kernels::Vec3<double> point{};  ///< link axes (or the world's) [m]
+};
+
+/// Symbolic analysis of the Jacobian: the storage behind kernels::Pattern.
+struct PatternStorage {
+  int n = 0, entries = 0, factor_entries = 0;
+  std::vector<int> slot, entry_begin, entry_column, permutation, scatter, diagonal;
+  std::vector<int> row_begin, factor_column, lower_begin, lower_slot, run_begin;
+  std::vector<kernels::EliminationRun> runs;
+  [[nodiscard]] kernels::Pattern view() const;
+};
+
+/// Rows of a block: q, v, the state one step before, then the numbers that vary.
+struct BlockLayout {
+  int q = 0, v = 0, previous_q = 0, previous_v = 0, parameters = 0, rows = 0;
+};
+
+/// Mass [kg], mass times centre of mass x y z [kg m], inertia xx xy xz yy yz zz about a link's
+/// origin [kg m²], link axes.
+using InertiaRows = std::array<double, 10>;
+
+/// A link some of whose bodies have densities that vary: rows `row` … of the block are constant + Σ
+/// density of_density.
+struct VaryingInertia {
+  struct Part {
+    int body;
+    int row;                 ///< of the block: the density [kg/m³]
+    InertiaRows of_density;  ///< for a density of 1
+  };
+  int link = -1;
+  int row = 0;
+  bool anew = false;  ///< sizes vary too: the sum over all bodies is made anew instead
+  InertiaRows constant{};
+  std::vector<Part> parts;
+};
+
+/// A number that a row of the block holds: which of a size (size_name), or which component.
+struct VaryingNumber {
+  int which, row;
+};
+/// Rows `row` … of the block: size as in CompiledBody.
+struct VaryingSize {
+  int body = -1;
+  int row = 0;
+  std::vector<VaryingNumber> numbers;
+};
+/// Rows `row` … of the block: where the first link of a joint is at rest, in its parent link.
+struct VaryingPlace {
+  int joint = -1;
+  int row = 0;
+  kernels::Frame<double> base;  ///< that the scene gives the joint's place in
+  std::vector<VaryingNumber> numbers;
+};
+
+struct CompiledModel {
+  Scene scene;
+  int nq = 0, nv = 0, nu = 0;
+  std::vector<kernels::Link> links;
+  std::vector<CompiledJoint> joints;  ///< parallel to scene.links
+  std::vector<CompiledBody> bodies;   ///< parallel to scene.links
+  std::vector<CompiledMotor> motors;  ///< one per control
+  std::vector<CompiledSensor> sensors;
+  std::vector<CompiledVariable> variables;
+  std::vector<kernels::PairContact> pairs;
+  std::vector<kernels::GroundContact> grounds;
+  std::vector<kernels::Solid> solids;  ///< parallel to bodies
+  std::vector<kernels::LinkPair> link_pairs;
+  std::vector<kernels::GroundedLink> grounded;
+  std::vector<int> pair_order, ground_order;  ///< members of link_pairs and grounded, side by side
+  std::vector<std::vector<double>> point_storage;  ///< what pairs and grounds point into
+  std::vector<AlignedVector<double>>
+      tile_storage;  ///< what pairs' tile_points and tile_bounds point into
+  std::vector<VaryingInertia> varying_inertia;
+  std::vector<VaryingSize> varying_sizes;
+  std::vector<VaryingPlace> varying_places;
+  std::vector<kernels::DofEffects> dof_effects;  ///< (nv)
+  std::vector<double>
+      unknown_scale;  ///< (nv) what an unknown is rounded against: extent of the scene [m], 1 [rad]
+  std::vector<double> initial_q, initial_v;
+  PatternStorage pattern;
+  BlockLayout layout;
+  std::vector<int> randomized_row;  ///< parallel to scene.randomizations: row of a block, or
+                                    ///< coordinate -1 - index
+  kernels::ModelView view{};
+
+  std::vector<SensorInfo> sensor_info;
+  std::vector<VariableInfo> variable_info;
+  std::vector<ContactInfo> contact_info;
+  std::vector<EffectInfo> effects;  ///< of the whole scene
+  std::vector<StageInfo> stages;
+  std::vector<std::string> q_names, v_names, u_names, q_units, v_units, u_units, body_names;
+};
+
+/// Of a body, in its own axes; inertia about its centre of mass.
+struct MassProperties {
+  double mass;                    ///< [kg]
+  kernels::Vec3<double> centre;   ///< of mass, body frame [m]
+  kernels::Mat3<double> inertia;  ///< [kg m²]
+};
+MassProperties mass_properties(const Shape& shape, double density);
+/// Its derivative by a number of the shape's size (size_name) that it has; the centre of mass
+/// stays.
+MassProperties mass_properties_by_size(const Shape& shape, double density, int which);
+/// What a body of these adds to its link.
+InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& properties);
+/// A link's own.
+InertiaRows inertia_rows(const kernels::Link& link);
+/// Adds a body to its link.
+void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProperties& properties);
+/// Shape and size of a body, and whether it can be touched.
+void place_shape(const Shape& shape, CompiledBody& body);
+
+/// Points of the body that meet other bodies, in its body frame, (n, 3): empty for spheres and
+/// planes.
+std::vector<double> contact_points(const Shape& shape);
+/// A body whose points these are.
+kernels::Solid solid_of(const Shape& shape, const CompiledBody& body);
+
+/// Reorders (n, 3) points so that every kContactTile consecutive ones are neighbours; returns their
+/// (tiles, 4) bounds.
+std::vector<double> sort_into_tiles(std::vector<double>& points, int tile);
+
+/// What a step runs: fills stages.
+void list_stages(CompiledModel& model);
+
+/// Which contacts share their links: fills link_pairs, grounded and the orders.
+void group_contacts(CompiledModel& model);
+
+/// Minimum-fill elimination of the structure of the tree and of every contact.
+PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
+                               const std::vector<std::pair<int, int>>& touching);
+
+/// Tiles, bounds, axes and pressure sign of a sensor. Throws InputError for degenerate arrays.
+CompiledSensor compile_sensor(const TactileDescription& description, const CompiledBody& body,
+                              SensorInfo& info);
+/// The same for a list of points.
+CompiledSensor compile_points(const TactileDescription& description, const CompiledBody& body,
+                              SensorInfo& info);
+/// Positive where a direction points out of a body near a place on its surface, body frame.
+double points_outward(const CompiledBody& body, const kernels::Vec3<double>& at,
+                      const kernels::Vec3<double>& direction);
+/// Where missing points and tiles are put [m]: beyond any shape, finite, so that nothing overflows.
+inline constexpr double kFarAway = 1e6;
+
+/// Names to indices, joints to elementary links. Throws InputError.
+std::shared_ptr<const CompiledModel> compile(const Scene& scene);
+
+kernels::Frame<double> to_frame(const Pose& pose);
+kernels::Quat<double> quaternion_of(const kernels::Mat3<double>& R);
+
+}  // namespace tangere

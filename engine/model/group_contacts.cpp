@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// Contacts of the same links, side by side: folding leaves many shapes on one link, which all move
+// alike.
+#include <algorithm>
+#include <cmath>
+
+#include "engine/model/compiled_model.hpp"
+
+namespace tangere {
+
+namespace {
+
+/// A ball around points (n, 3): the middle of their box, and the farthest of them from it.
+void bound(const double* points, int n, kernels::Vec3<double>& middle, double& extent) {
+  const kernels::Vec3<double> first = {points[0], points[1], points[2]};
+  kernels::Vec3<double> low = first, high = first;
+  for (int k = 0; k < n; ++k) {
+    const double* p = points + 3 * k;
+    low = {std::min(low.x, p[0]), std::min(low.y, p[1]), std::min(low.z, p[2])};
+    high = {std::max(high.x, p[0]), std::max(high.y, p[1]), std::max(high.z, p[2])};
+  }
+  middle = 0.5 * (low + high);
+  double square = 0;
+  for (int k = 0; k < n; ++k) {
+    const kernels::Vec3<double> arm =
+        kernels::Vec3<double>{points[3 * k], points[3 * k + 1], points[3 * k + 2]} - middle;
+    square = std::max(square, dot(arm, arm));
+  }
+  // Rounded up, by far more than poses are rounded: a bound that is short by one bit would be no
+  // bound.
+  extent = std::sqrt(square) * (1 + 1e-9) + 1e-9;
+}
+
+/// Indices of `items` group by group, in the order of first appearance; `same` tells which belong
+/// together. Returns where each group begins, and the end.
+template <class Item, class Same>
+std::vector<int> gather(const std::vector<Item>& items, const Same& same, std::vector<int>& order) {
+  std::vector<int> begins;
+  std::vector<char> taken(items.size(), 0);
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (taken[i] != 0) continue;
+    begins.push_back(static_cast<int>(order.size()));
+    for (std::size_t j = i; j < items.size(); ++j) {
+      if (taken[j] != 0 || !same(items[i], items[j])) continue;
+      taken[j] = 1;
+      order.push_back(static_cast<int>(j));
+    }
+  }
+  begins.push_back(static_cast<int>(order.size()));
+  return begins;
+}
+
+}  // namespace
+
+void group_contacts(CompiledModel& m) {
+  for (kernels::PairContact& p : m.pairs) bound(p.points, p.n_points, p.middle, p.extent);
+  for (kernels::GroundContact& g : m.grounds) {
+    bound(g.points, g.n_points, g.middle, g.extent);
+    g.extent += g.radius;
+  }
+  const std::vector<int> pairs = gather(
+      m.pairs,
+      [](const auto& a, const auto& b) { return a.link1 == b.link1 && a.link2 == b.link2; },
+      m.pair_order);
+  for (std::size_t g = 0; g + 1 < pairs.size(); ++g) {
+    const kernels::PairContact& first = m.pairs[std::size_t(m.pair_order[std::size_t(pairs[g])])];
+    kernels::LinkPair links = {first.link1, first.link2, pairs[g], pairs[g + 1] - pairs[g],
+                               0,           0,           false,    first.frame2.p};
+    links.ball = links.count == 1 && first.shape == PrimitiveShape::sphere;
+    double pitch = INFINITY;
+    for (int i = pairs[g]; i < pairs[g + 1]; ++i) {
+      const kernels::PairContact& pair = m.pairs[std::size_t(m.pair_order[std::size_t(i)])];
+      links.reach = std::max(links.reach, pair.reach);
+      pitch = std::min(pitch, pair.extent * std::sqrt(4 * M_PI / pair.n_points));
+    }
+    // What a lane may move before it is searched again. Where points are far apart a wide margin
+    // lists few more of them.
+    links.margin = std::max(links.reach / 200, pitch / 16);
+    m.link_pairs.push_back(links);
+  }
+  const std::vector<int> grounds = gather(
+      m.grounds, [](const auto& a, const auto& b) { return a.link == b.link; }, m.ground_order);
+  for (std::size_t g = 0; g + 1 < grounds.size(); ++g)
+    m.grounded.push_back({m.grounds[std::size_t(m.ground_order[std::size_t(grounds[g])])].link,
+                          grounds[g], grounds[g + 1] - grounds[g]});
+}
+
+}  // namespace tangere

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// The stages of a step that this scene calls for, and which variant of its kernel each one runs, as
+// `inspect` tells it.
+#include <algorithm>
+
+#include "engine/model/compiled_model.hpp"
+
+namespace tangere {
+
+namespace {
+
+using kernels::JointKind;
+using kernels::Link;
+
+const char* name_of(PrimitiveShape shape) {
+  constexpr const char* kNames[] = {"sphere", "cuboid", "plane", "cylinder", "capsule"};
+  static_assert(std::size(kNames) == kPrimitiveShapes);
+  return kNames[static_cast<int>(shape)];
+}
+
+/// How the points of a shape are added up (kernels/step/point_sums.hpp).
+const char* sums_of(PrimitiveShape shape) {
+  switch (shape) {
+    case PrimitiveShape::sphere: return "products about the centre";
+    case PrimitiveShape::capsule: return "point by point";
+    case PrimitiveShape::cylinder: return "products, one bent face";
+    case PrimitiveShape::cuboid:
+    case PrimitiveShape::plane: break;
+  }
+  return "products, flat faces";
+}
+
+std::string counted(std::size_t n, const std::string& one, const std::string& many) {
+  return std::to_string(n) + " " + (n == 1 ? one : many);
+}
+
+/// "cuboid: products, flat faces; …", each shape once, and what pairs of links leave out.
+std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links) {
+  std::vector<PrimitiveShape> shapes;
+  for (int i = links.first; i < links.first + links.count; ++i) {
+    const PrimitiveShape shape = m.pairs[std::size_t(m.pair_order[std::size_t(i)])].shape;
+    if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) shapes.push_back(shape);
+  }
+  std::string text;
+  for (const PrimitiveShape shape : shapes)
+    text += std::string(name_of(shape)) + ": " + sums_of(shape) + "; ";
+  if (links.link1 < 0 || links.link2 < 0) return text + "one body moves";
+  return text + "both bodies move";
+}
+
+/// The body of a link (-1: the world) that a contact declares, and how many more contacts share its
+/// links.
+std::string pair_name(const CompiledModel& m, const kernels::LinkPair& links) {
+  const ContactInfo& first = m.contact_info[std::size_t(m.pair_order[std::size_t(links.first)])];
+  std::string text = first.first + " on " + first.second;
+  if (links.count > 1)
+    text += " and " + std::to_string(links.count - 1) + " more of the same links";
+  return text;
+}
+
+const char* motion_variant(const std::vector<Link>& links) {
+  if (std::all_of(links.begin(), links.end(), [](const Link& l) { return l.still; }))
+    return "nothing turns";
+  if (std::any_of(links.begin(), links.end(), [](const Link& l) { return l.still; }))
+    return "some links never turn";
+  return "every link may turn";
+}
+
+std::string effects_variant(std::uint8_t effects) {
+  const std::pair<kernels::JointEffect, const char*> names[] = {
+      {kernels::kDamped, "damping"},
+      {kernels::kArmoured, "armature"},
+      {kernels::kSprung, "spring"},
+      {kernels::kLimited, "limits"},
+      {kernels::kDriven, "position motor"}};
+  std::string text;
+  for (const auto& [bit, name] : names)
+    if ((effects & bit) != 0) text += (text.empty() ? "" : ", ") + std::string(name);
+  return text;
+}
+
+std::string field_variant(const CompiledSensor& s) {
+  const std::string law = std::string("law ") + to_string(s.law);
+  if (!s.index.empty()) return "tiles of curved points, lanes are points; " + law;
+  return (s.points() <= kSmallPad ? "flat pad, lanes are environments; "
+                                  : "flat tiles, lanes are points; ") +
+         law;
+}
+
+}  // namespace
+
+void list_stages(CompiledModel& m) {
+  const auto add = [&](const char* name, std::string of, std::string variant) {
+    m.stages.push_back({name, std::move(of), std::move(variant)});
+  };
+  add("kinematics", counted(m.links.size(), "link", "links"), motion_variant(m.links));
+  if (!m.pairs.empty())
+    add("search", counted(m.pairs.size(), "pair of shapes", "pairs of shapes"),
+        "one sphere, tiles of 32, points");
+  for (const kernels::LinkPair& links : m.link_pairs)
+    add("pair contact", pair_name(m, links), pair_variant(m, links));
+  for (const kernels::GroundedLink& grounded : m.grounded) {
+    const int first = m.ground_order[std::size_t(grounded.first)];
+    add("ground contact", m.contact_info[m.pairs.size() + std::size_t(first)].first,
+        counted(std::size_t(grounded.count), "body", "bodies") +
+            (m.grounds[std::size_t(first)].radius > 0 ? ", sphere" : ", points"));
+  }
+  for (std::size_t j = 0; j < m.joints.size(); ++j) {
+    std::uint8_t effects = 0;
+    for (int i = 0; i < m.joints[j].link_count; ++i)
+      effects = static_cast<std::uint8_t>(effects |
+                                          m.links[std::size_t(m.joints[j].first_link + i)].effects);
+    if (effects != 0) add("joint effects", m.scene.links[j].joint.name, effects_variant(effects));
+  }
+  add("Jacobian", counted(std::size_t(m.pattern.entries), "entry", "entries"),
+      "composite inertia, one block per contact");
+  add("factor and solve", counted(std::size_t(m.pattern.factor_entries), "entry", "entries"),
+      m.pattern.factor_entries == m.pattern.entries
+          ? "no fill"
+          : std::to_string(m.pattern.factor_entries - m.pattern.entries) + " filled in");
+  for (std::size_t i = 0; i < m.sensors.size(); ++i)
+    add("field", m.sensor_info[i].name, field_variant(m.sensors[i]));
+}
+
+}  // namespace tangere

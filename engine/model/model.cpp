@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// The public face of a compiled scene.
+#include "engine/model/compiled_model.hpp"
+
+namespace tangere {
+
+Model::Model(const Scene& scene) : compiled_(compile(scene)) {}
+
+const Scene& Model::scene() const { return compiled_->scene; }
+int Model::nq() const { return compiled_->nq; }
+int Model::nv() const { return compiled_->nv; }
+int Model::nu() const { return compiled_->nu; }
+int Model::nb() const { return static_cast<int>(compiled_->bodies.size()); }
+double Model::mass(int body) const { return compiled_->bodies[std::size_t(body)].mass; }
+double Model::timestep() const { return compiled_->scene.timestep; }
+Integrator Model::integrator() const { return compiled_->scene.integrator; }
+const SolverOptions& Model::solver() const { return compiled_->scene.solver; }
+std::span<const SensorInfo> Model::sensors() const { return compiled_->sensor_info; }
+std::span<const VariableInfo> Model::variables() const { return compiled_->variable_info; }
+std::span<const ContactInfo> Model::contacts() const { return compiled_->contact_info; }
+std::span<const EffectInfo> Model::effects() const { return compiled_->effects; }
+std::span<const StageInfo> Model::stages() const { return compiled_->stages; }
+std::span<const std::string> Model::q_names() const { return compiled_->q_names; }
+std::span<const std::string> Model::v_names() const { return compiled_->v_names; }
+std::span<const std::string> Model::u_names() const { return compiled_->u_names; }
+std::span<const std::string> Model::q_units() const { return compiled_->q_units; }
+std::span<const std::string> Model::v_units() const { return compiled_->v_units; }
+std::span<const std::string> Model::u_units() const { return compiled_->u_units; }
+std::span<const std::string> Model::body_names() const { return compiled_->body_names; }
+
+std::size_t Model::state_bytes_per_environment() const {
+  // Rows of the block, then status, iterations, residual and the history flag.
+  return sizeof(double) * compiled_->layout.rows + sizeof(std::int8_t) + sizeof(std::int32_t) +
+         sizeof(double) + 1;
+}
+
+}  // namespace tangere

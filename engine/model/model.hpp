@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// A compiled scene: indices and constants, no strings on any hot path. Immutable; shared by every
+// batch and thread.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/model/scene.hpp"
+
+namespace tangere {
+
+struct CompiledModel;  // engine/model/compiled_model.hpp: the arrays kernels read; not part of the
+                       // installed interface
+
+/// A tactile sensor after compilation.
+struct SensorInfo {
+  std::string name;
+  std::string body;
+  int rows = 0, cols = 0;  ///< of a rectangular array; points = rows * cols, row-major
+  int points = 0;
+  int every = 0;          ///< as in the scene; 0: the caller decides
+  int pressure_sign = 1;  ///< +1: the third component is positive under pressure
+};
+
+/// An end effector after compilation.
+struct VariableInfo {
+  std::string name;
+  std::string joint;
+};
+
+/// One contact declared in the scene, after compilation.
+struct ContactInfo {
+  std::string first, second;  ///< bodies; second is "ground" for a ground contact
+  int points = 0;             ///< candidate points (1 for a sphere on the ground)
+  std::string law;
+};
+
+/// An effect that compile() decided on, and why: `inspect` prints it.
+struct EffectInfo {
+  std::string name;
+  bool on = false;
+  std::string reason;
+};
+
+/// A stage of the step that the scene calls for, what it works on and the variant of its kernel.
+struct StageInfo {
+  std::string name, of, variant;
+};
+
+class Model {
+ public:
+  /// Compiles a scene. Throws InputError (file:line) for references to nothing, massless leaves,
+  /// degenerate sensors, …
+  explicit Model(const Scene& scene);
+
+  [[nodiscard]] const Scene& scene() const;
+  [[nodiscard]] int nq() const;               ///< configuration coordinates (quaternions count 4)
+  [[nodiscard]] int nv() const;               ///< velocity dofs
+  [[nodiscard]] int nu() const;               ///< controls: motors in file order, each dof in turn
+  [[nodiscard]] int nb() const;               ///< bodies of the scene, folded or not, in file order
+  [[nodiscard]] double mass(int body) const;  ///< [kg]
+  [[nodiscard]] double timestep() const;      ///< [s]
+  [[nodiscard]] Integrator integrator() const;
+  [[nodiscard]] const SolverOptions& solver() const;
+  [[nodiscard]] std::span<const SensorInfo> sensors() const;
+  [[nodiscard]] std::span<const VariableInfo> variables() const;  ///< end effectors, in file order
+  [[nodiscard]] std::span<const ContactInfo> contacts() const;
+  [[nodiscard]] std::span<const EffectInfo> effects() const;
+  [[nodiscard]] std::span<const StageInfo> stages() const;     ///< in the order in which they run
+  [[nodiscard]] std::span<const std::string> q_names() const;  ///< "object_joint.qw" …
+  [[nodiscard]] std::span<const std::string> v_names() const;
+  [[nodiscard]] std::span<const std::string> u_names() const;
+  [[nodiscard]] std::span<const std::string> q_units() const;  ///< "m", "rad", "1"
+  [[nodiscard]] std::span<const std::string> v_units() const;
+  [[nodiscard]] std::span<const std::string> u_units()
+      const;  ///< "1": controls are dimensionless for force motors
+  [[nodiscard]] std::span<const std::string> body_names() const;
+  [[nodiscard]] std::size_t state_bytes_per_environment() const;  ///< of a Batch
+
+  [[nodiscard]] const CompiledModel& compiled() const { return *compiled_; }
+
+ private:
+  std::shared_ptr<const CompiledModel> compiled_;
+};
+
+}  // namespace tangere

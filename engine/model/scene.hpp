@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+// A scene as its author wrote it: names, SI units, defaults filled in. The only place that holds
+// strings. io/scene/scene_reader.hpp reads it from XML; compile() in engine/model/model.hpp turns it into index
+// arrays.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "engine/base/error.hpp"
+#include "kernels/contact/contact_types.hpp"
+
+namespace tangere {
+
+using Vector3 = std::array<double, 3>;     ///< x y z
+using Quaternion = std::array<double, 4>;  ///< w x y z, unit length
+
+enum class Integrator { bdf1, bdf2, sdirk2, linear_implicit };
+enum class JointType { fixed, revolute, prismatic, planar, translational, free2d, spherical, free };
+enum class MotorControl { force, position };
+/// end: implicit, stable for any gain. start: the published explicit law, unstable once h D/I
+/// exceeds 2.
+enum class MotorTiming { end, start };
+
+/// A frame given in another: x_outer = R(orientation) x_inner + position [m].
+struct Pose {
+  Vector3 position{0, 0, 0};
+  Quaternion orientation{1, 0, 0, 0};
+};
+
+/// Coefficients of one penalty contact or tactile point.
+struct ContactCoefficients {
+  double kn = 0;       ///< normal stiffness [N/m]
+  double kt = 0;       ///< tangential damping [N s/m]
+  double mu = 0;       ///< friction coefficient [-]
+  double damping = 0;  ///< k_d [N s/m²]; law linear: c [N s/m]
+};
+
+/// What acts on every dof of a joint, in SI by the dof's kind. Spherical joints have components of
+/// a rotation vector in place of q, torques and accelerations in body axes (docs/dynamics.md).
+struct JointEffects {
+  double damping = 0;          ///< force = -damping v [N s/m or N m s/rad]
+  double armature = 0;         ///< inertia that moves with the dof alone, a rotor's [kg or kg m²]
+  double stiffness = 0;        ///< force = -stiffness (q - rest) [N/m or N m/rad]
+  double limit_stiffness = 0;  ///< force = limit_stiffness times how far q is outside the limits
+  std::optional<std::array<double, 2>> limits;  ///< low, high [m or rad]
+};
+
+struct JointDescription : JointEffects {
+  std::string name;
+  JointType type = JointType::fixed;
+  Pose pose;  ///< joint frame in the parent joint's frame (frame="WORLD" is resolved by the reader)
+  Vector3 axis0{0, 0, 1};  ///< revolute, prismatic, planar: unit, in the joint frame
+  Vector3 axis1{0, 1, 0};  ///< planar only
+  std::vector<double>
+      rest;  ///< of the spring, one per dof; empty: zeros. free: x y z, then a rotation vector
+  std::optional<JointEffects>
+      turning;  ///< free2d, free: of the dofs that turn, where they differ from those that slide
+  Source source;
+};
+
+struct CuboidShape {
+  Vector3 size{0, 0, 0};  ///< full edge lengths [m]
+  std::array<int, 3> contact_resolution{6, 6,
+                                        6};  ///< surface nodes of this grid are the contact points
+};
+struct SphereShape {
+  double radius = 0;  ///< [m]
+};
+/// Closed cylinder along the body's z. Contact points: centres and rings of the two end faces.
+struct CylinderShape {
+  double length = 0, radius = 0;  ///< [m]
+  int contact_angles = 8;         ///< points on a ring
+  int contact_rings = 3;          ///< rings on a face, radii r k/rings
+};
+/// All points within `radius` of a segment of `length` along the body's z. Contact points: two
+/// poles, and rings around the straight part, ends included.
+struct CapsuleShape {
+  double length = 0, radius = 0;  ///< [m]; from pole to pole it is length + 2 radius
+  int contact_rings = 5;
+  int contact_angles = 4;  ///< points on a ring
+};
+/// The half-space z < 0 of the body frame: no mass, no contact points.
+struct PlaneShape {};
+/// A closed surface of triangles, corners anticlockwise seen from outside. Contact points: its
+/// vertices. Nothing touches its faces: it has no distance.
+struct MeshShape {
+  std::vector<double> vertices;  ///< (n, 3), body frame [m]
+  std::vector<std::array<int, 3>> triangles;
+};
+/// Known by its mass, inertia and contact points alone; no distance. Its centre of mass is the body
+/// frame's origin.
+struct AbstractShape {
+  double mass = 0;                     ///< [kg]; density has no effect
+  std::array<double, 6> inertia{};     ///< xx xy xz yy yz zz, body axes [kg m²]
+  std::vector<double> contact_points;  ///< (n, 3), body frame [m]
+};
+using Shape = std::variant<SphereShape, CuboidShape, CylinderShape, CapsuleShape, PlaneShape,
+                           MeshShape, AbstractShape>;
+
+struct BodyDescription {
+  std::string name;
+  Shape shape;
+  Pose pose;           ///< body frame in the joint's frame
+  double density = 1;  ///< [kg/m³]; 0: massless, so something with mass must move with it
+  std::array<double, 4> rgba{0.7, 0.7, 0.7, 1};
+  Source source;
+};
+
+/// A link: one joint to the parent link (or the world) and one body that moves with it.
+struct LinkDescription {
+  std::string name;
+  int parent = -1;  ///< index into Scene::links, -1 = world; parents come first
+  JointDescription joint;
+  BodyDescription body;
+};
+
+/// Force motor: u in [-1, 1] per dof of the joint is clipped and mapped linearly to [low, high].
+/// Position motor: u is the target of q (spherical: a rotation vector), force = clip(P (u - q) - D
+/// v) to [low, high].
+struct MotorDescription {
+  std::string joint;
+  double low = -1;  ///< force at u = -1 [N or N m]; position: smallest force, -infinity for none
+  double high = 1;  ///< force at u = +1; position: largest force, infinity for none
+  Source source;
+  MotorControl control = MotorControl::force;
+  double P = 0, D = 0;                    ///< position: gains [N/m, N s/m or N m/rad, N m s/rad]
+  MotorTiming timing = MotorTiming::end;  ///< position: which q and v the force is computed from
+};
+
+/// Rectangular array of tactile points: p(i, j) = corner0 + i Δ0 axis0 + j Δ1 axis1, in the body
+/// frame [m].
+struct RectArray {
+  Vector3 corner0{}, corner1{};
+  Vector3 axis0{}, axis1{};  ///< unit, orthogonal
+  int rows = 1, cols = 1;
+};
+
+/// A tactile point of its own, in the body frame.
+struct TactilePoint {
+  Vector3 position{};                         ///< [m]
+  Vector3 normal{}, axis0{}, axis1{};         ///< unit
+  std::array<int, 2> pixel{-1, -1};           ///< row and column in an image; -1: none
+  std::array<double, 4> factors{1, 1, 1, 1};  ///< times the sensor's kn, kt, mu, damping
+};
+
+struct TactileDescription {
+  std::string name;
+  std::string body;
+  ContactCoefficients coefficients;
+  ContactLaw law = ContactLaw::clamped;
+  RectArray array;
+  std::vector<TactilePoint> points;  ///< a curved pad, in the order of its field; empty: the array
+  int every = 0;                     ///< read every k-th step; 0: not given, left to the caller
+  std::optional<int> pressure_sign;  ///< +1 or -1; found from the geometry when not given
+  Source source;
+};
+
+/// An end effector: a point that moves with a joint, whose position in the world is an output.
+struct VariableDescription {
+  std::string name;
+  std::string joint;
+  Vector3 position{0, 0,
+                   0};   ///< in the joint's moving frame, the one that bodies are placed in [m]
+  double radius = 2e-3;  ///< [m]; for pictures only, as the colour
+  std::array<double, 4> rgba{1, 0, 0, 1};
+  Source source;
+};
+
+struct GroundDescription {
+  Vector3 position{0, 0, 0};
+  Vector3 normal{0, 0, 1};  ///< unit, pointing out of the half-space
+};
+
+struct GroundContactDescription {
+  std::string body;
+  ContactCoefficients coefficients;
+  ContactLaw law = ContactLaw::linear;
+  double ramp =
+      1e-5;  ///< depth over which the linear law's damper fades in [m]; 0: the published law
+  Source source;
+};
+
+/// Contact points of `general_body` against the signed distance of `primitive_body`.
+struct PairContactDescription {
+  std::string general_body, primitive_body;
+  ContactCoefficients coefficients;
+  ContactLaw law = ContactLaw::clamped;
+  double ramp = 1e-5;  ///< law linear only
+  Source source;
+};
+
+/// Starting state of one joint; empty vectors leave the default (q = 0 or the identity, v = 0).
+struct InitialState {
+  std::string joint;
+  std::vector<double> q;  ///< free: x y z qw qx qy qz; spherical: qw qx qy qz; else one per dof
+  std::vector<double>
+      v;  ///< tangent space: free: linear (joint frame axes), then angular (body axes)
+  Source source;
+};
+
+/// What drives an unattended rollout. Values are one per control, motors in file order, each dof in
+/// turn.
+struct ConstantControl {
+  std::vector<double> values;
+};
+struct PiecewiseControl {     ///< values[k] holds from times[k] until times[k+1]; times[0] = 0
+  std::vector<double> times;  ///< [s], ascending
+  std::vector<std::vector<double>> values;
+  double end = 0;  ///< [s] length of the run it describes; 0: open
+};
+struct CsvControl {
+  std::vector<std::vector<double>>
+      rows;  ///< one row per step; read by io; fewer rows than steps is an error
+  std::string path;
+};
+struct RandomControl {   ///< smooth noise: cosine-interpolated uniform knots, drawn per environment
+  double amplitude = 1;  ///< largest |u|
+  double period = 0.1;   ///< time between knots [s]
+};
+using ControlDescription =
+    std::variant<ConstantControl, PiecewiseControl, CsvControl, RandomControl>;
+
+/// A number that differs between environments, drawn from (seed, episode, purpose).
+struct Distribution {
+  enum class Kind { uniform, log_uniform, normal, list } kind = Kind::uniform;
+  double a = 0, b = 0;  ///< uniform, log_uniform: low, high; normal: mean, standard deviation
+  std::vector<double> values;  ///< list: equally likely
+};
+enum class RandomTarget {
+  joint_q,
+  joint_v,
+  ground_contact,
+  pair_contact,
+  tactile,
+  joint_effect,
+  motor,
+  density,
+  size,
+  place
+};
+enum class ContactField { kn, kt, mu, damping };
+enum class JointField {
+  damping,
+  armature,
+  stiffness,
+  lim_stiffness,
+  P,
+  D
+};  ///< the last two: position motors
+struct RandomizationDescription {
+  RandomTarget target = RandomTarget::joint_q;
+  std::string
+      name;  ///< joint (its motor), tactile, body (of a ground contact), or general body of a pair
+  std::string second_name;  ///< primitive body of a pair
+  int index =
+      0;  ///< joint_q, joint_v, place (of the joint in its parent's frame): which component; size:
+          ///< which number (size_name)
+  ContactField field = ContactField::kn;  ///< contacts and tactile
+  Distribution distribution;
+  Source source;
+  JointField joint_field =
+      JointField::damping;  ///< joint_effect and motor: of all dofs of the joint alike
+};
+
+struct SolverOptions {
+  double tolerance = 1e-9;  ///< on the scaled residual, dimensionless (docs/solver.md)
+  int max_iterations = 20;  ///< Newton passes before a step is split
+};
+
+struct Scene {
+  std::string name;
+  std::string path;  ///< file it was read from, "" if none
+  std::string text;  ///< the file as read, stored with every dataset
+  Vector3 gravity{0, 0, -9.8};
+  double timestep = 5e-3;  ///< [s]
+  Integrator integrator = Integrator::bdf1;
+  SolverOptions solver;
+  std::optional<GroundDescription> ground;
+  std::vector<LinkDescription> links;
+  std::vector<MotorDescription> motors;
+  std::vector<TactileDescription> sensors;
+  std::vector<VariableDescription> variables;
+  std::vector<GroundContactDescription> ground_contacts;
+  std::vector<PairContactDescription> pair_contacts;
+  std::vector<InitialState> initial;
+  std::optional<ControlDescription> control;
+  std::vector<RandomizationDescription> randomizations;
+};
+
+/// The name users write and read: "BDF1", "free", "clamped" …
+const char* to_string(Integrator value);
+const char* to_string(JointType value);
+const char* to_string(ContactLaw value);
+/// "sphere", "cuboid" …
+const char* shape_name(const Shape& shape);
+
+/// The numbers of a size: 0 radius, 1 length, 2 … 4 edges of a cuboid [m]. nullptr where a shape
+/// has no such number.
+double* size_number(Shape& shape, int which);
+const char* size_name(int which);  ///< "radius", "length", "size[0]" …
+inline constexpr int kSizeNames = 5;
+
+/// Whether contact points may touch it, and whether it has such points itself.
+bool has_distance(const Shape& shape);
+bool has_contact_points(const Shape& shape);
+/// Whether xx xy xz yy yz zz can be the inertia of a body with volume: principal moments positive,
+/// none as large as the other two together.
+bool is_inertia(const std::array<double, 6>& inertia);
+
+/// Number of configuration coordinates and of velocity dofs of a joint type: free is 7 and 6.
+int position_count(JointType type);
+int dof_count(JointType type);
+
+/// Dof `k` of a joint type turns; it slides otherwise.
+bool dof_turns(JointType type, int k);
+
+const char* to_string(JointField value);  ///< "damping", "P" …
+
+}  // namespace tangere

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// A rectangular array of tactile points, cut into 8×8 tiles and moved into its pad's axes;
+// tactile_points.cpp does lists.
+#include <algorithm>
+#include <cmath>
+
+#include "engine/model/compiled_model.hpp"
+#include "kernels/contact/distance.hpp"
+#include "kernels/table/kernel_table.hpp"
+
+namespace tangere {
+
+using kernels::Vec3;
+
+namespace {
+
+Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
+
+/// +1 when axis0 × axis1 points out of the body: then pressure, a force into the body, reads
+/// positive.
+int find_pressure_sign(const TactileDescription& d, const CompiledBody& body,
+                       const Vec3<double>& normal) {
+  if (d.pressure_sign) return *d.pressure_sign;
+  const RectArray& a = d.array;
+  return points_outward(body, 0.5 * (vec(a.corner0) + vec(a.corner1)), normal) >= 0 ? 1 : -1;
+}
+
+/// Spacing of the array's points in pad axes: from row to row, and from column to column [m].
+struct Lattice {
+  double row_x, row_y, col_x, col_y;
+};
+
+/// Points of a tile that starts at `first`, along one axis.
+int points_in(int first, int total) { return std::min(kernels::kTileSide, total - first); }
+
+void place_tiles(CompiledSensor& s, const Lattice& lattice) {
+  constexpr int kSide = kernels::kTileSide;
+  s.tile_rows = (s.rows + kSide - 1) / kSide;
+  s.tile_cols = (s.cols + kSide - 1) / kSide;
+  const std::size_t padded =
+      std::size_t(s.n_tiles() + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
+  s.tile_x.assign(padded, kFarAway);
+  s.tile_y.assign(padded, kFarAway);
+  s.tile_z.assign(padded, 0.0);
+  s.tile_radius.assign(padded, 0.0);
+  s.offsets.assign(std::size_t{4} * 2 * kernels::kTactileTile, kFarAway);
+  s.offsets_f.assign(s.offsets.size(), static_cast<float>(kFarAway));
+  for (int t = 0; t < s.n_tiles(); ++t) {
+    const int i0 = kSide * (t / s.tile_cols), j0 = kSide * (t % s.tile_cols);
+    const int rows = points_in(i0, s.rows), cols = points_in(j0, s.cols);
+    const double i = i0 + 0.5 * (rows - s.rows),
+                 j = j0 + 0.5 * (cols - s.cols);  // from the array's middle
+    s.tile_x[std::size_t(t)] = i * lattice.row_x + j * lattice.col_x;
+    s.tile_y[std::size_t(t)] = i * lattice.row_y + j * lattice.col_y;
+    const int kind = (cols < kSide ? 1 : 0) + (rows < kSide ? 2 : 0);
+    s.tile_kind.push_back(kind);
+    double square = 0;
+    for (int k = 0; k < kernels::kTactileTile; ++k) {
+      if (k / kSide >= rows || k % kSide >= cols) continue;
+      const double di = k / kSide - 0.5 * (rows - 1), dj = k % kSide - 0.5 * (cols - 1);
+      const double at[2] = {di * lattice.row_x + dj * lattice.col_x,
+                            di * lattice.row_y + dj * lattice.col_y};
+      for (int c = 0; c < 2; ++c) {
+        const auto index = std::size_t((2 * kind + c) * kernels::kTactileTile + k);
+        s.offsets[index] = at[c];
+        s.offsets_f[index] = static_cast<float>(at[c]);
+      }
+      square = std::max(square, at[0] * at[0] + at[1] * at[1]);
+    }
+    // What is left out must not touch in either precision: the margin is far above the rounding of
+    // both.
+    s.tile_radius[std::size_t(t)] = std::sqrt(square) * (1 + 1e-5) + 1e-12;
+  }
+}
+
+CompiledSensor compile_array(const TactileDescription& d, const CompiledBody& body,
+                             SensorInfo& info) {
+  CompiledSensor s;
+  const RectArray& a = d.array;
+  const Vec3<double> p0 = vec(a.corner0), axis0 = vec(a.axis0), axis1 = vec(a.axis1);
+  const Vec3<double> diagonal = vec(a.corner1) - p0;
+  const double step0 = a.rows > 1 ? dot(diagonal, axis0) / (a.rows - 1) : 0;
+  const double step1 = a.cols > 1 ? dot(diagonal, axis1) / (a.cols - 1) : 0;
+  const Vec3<double> normal = cross(axis0, axis1);
+  if (!(std::abs(dot(normal, normal) - 1) < 1e-6))
+    throw InputError(d.source.prefix() + "tactile sensor '" + d.name +
+                     "': axis0 and axis1 must be perpendicular");
+
+  s.link = body.link;
+  s.rows = a.rows;
+  s.cols = a.cols;
+  // Orthonormal to the last digit; what the scene's axes lack of that is made up for in the forces.
+  const Vec3<double> e0 = (1 / std::sqrt(dot(axis0, axis0))) * axis0;
+  const Vec3<double> e2 = (1 / std::sqrt(dot(normal, normal))) * normal;
+  const Vec3<double> e1 = cross(e2, e0);
+  const Vec3<double> middle =
+      p0 + (0.5 * (a.rows - 1) * step0) * axis0 + (0.5 * (a.cols - 1) * step1) * axis1;
+  s.pad =
+      compose(body.frame, {{{{e0.x, e1.x, e2.x}, {e0.y, e1.y, e2.y}, {e0.z, e1.z, e2.z}}}, middle});
+  place_tiles(s, {step0 * dot(axis0, e0), step0 * dot(axis0, e1), step1 * dot(axis1, e0),
+                  step1 * dot(axis1, e1)});
+  const Vec3<double> rows[3] = {axis0, axis1, -normal};
+  for (int r = 0; r < 3; ++r) {
+    const double row[3] = {dot(rows[r], e0), dot(rows[r], e1), dot(rows[r], e2)};
+    for (int c = 0; c < 3; ++c) {
+      s.axes[3 * r + c] = row[c];
+      s.skewed |= std::abs(row[c] - (r != c ? 0 : r == 2 ? -1 : 1)) > 1e-12;
+    }
+  }
+  info.rows = a.rows;
+  info.cols = a.cols;
+  info.pressure_sign = find_pressure_sign(d, body, normal);
+  return s;
+}
+
+}  // namespace
+
+double points_outward(const CompiledBody& body, const Vec3<double>& at,
+                      const Vec3<double>& direction) {
+  if (!body.touchable) return dot(direction, at - body.centre);
+  return dot(direction,
+             kernels::with_distance<double>(body.shape, body.size, [&](const auto& shape) {
+               return kernels::distance_at(shape, at).n;
+             }));
+}
+
+CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& body,
+                              SensorInfo& info) {
+  CompiledSensor s =
+      d.points.empty() ? compile_array(d, body, info) : compile_points(d, body, info);
+  s.law = d.law;
+  info.name = d.name;
+  info.body = d.body;
+  info.points = s.points();
+  info.every = d.every;
+  return s;
+}
+
+kernels::PadTiles CompiledSensor::tiles() const {
+  kernels::PadTiles p{};
+  p.rows = rows, p.cols = cols;
+  p.tile_rows = tile_rows, p.tile_cols = tile_cols;
+  p.x = tile_x.data(), p.y = tile_y.data(), p.z = tile_z.data(), p.radius = tile_radius.data();
+  p.kind = tile_kind.data();
+  p.offsets = offsets.data(), p.offsets_f = offsets_f.data();
+  if (!index.empty()) {
+    p.index = index.data();
+    p.frames = frames.data(), p.frames_f = frames_f.data();
+  }
+  if (!factors.empty()) p.factors = factors.data(), p.factors_f = factors_f.data();
+  p.skewed = skewed;
+  std::copy(axes, axes + 9, p.axes);
+  return p;
+}
+
+}  // namespace tangere

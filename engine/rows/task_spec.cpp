@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sizes of what a task declares, and what may not be declared.
+#include "engine/rows/task_spec.hpp"
+
+#include <fmt/format.h>
+
+#include <functional>
+#include <numeric>
+
+#include "engine/base/error.hpp"
+
+namespace tangere {
+
+std::size_t TensorSpec::size() const {
+  return std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
+}
+
+std::size_t TaskSpec::observation_size() const {
+  std::size_t size = 0;
+  for (const TensorSpec& tensor : observations) size += tensor.size();
+  return size;
+}
+
+void TaskSpec::check() const {
+  const auto fail = [&](const std::string& what) {
+    throw InputError(fmt::format("task '{}': {}", name, what));
+  };
+  if (name.empty() || scene.empty()) fail("expected a name and a scene");
+  if (steps_per_action < 1 || horizon < 1)
+    fail(fmt::format("{} steps per action, {} actions; expected at least 1", steps_per_action,
+                     horizon));
+  if (control_every < 0 || settling_steps < 0 || memory < 0) fail("a count is negative");
+  if (moments.empty() || moments.front() < 1 || moments.back() != steps_per_action)
+    fail(fmt::format("it must look after its last step, {}", steps_per_action));
+  for (std::size_t i = 1; i < moments.size(); ++i)
+    if (moments[i] <= moments[i - 1]) fail("the steps after which it looks must ascend");
+  if (action.size() == 0 || observation_size() == 0) fail("expected an action and an observation");
+  for (const TensorSpec& tensor : observations) {
+    if (tensor.name.empty() || tensor.name.find('/') != std::string::npos || tensor.name == "q" ||
+        tensor.name == "v")
+      fail(fmt::format("observation '{}'; expected another name than q and v, without '/'",
+                       tensor.name));
+    for (const TensorSpec& other : observations)
+      if (&other != &tensor && other.name == tensor.name)
+        fail("two observations are named " + tensor.name);
+  }
+}
+
+}  // namespace tangere

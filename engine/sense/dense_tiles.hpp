@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tiles of a (points, 3) array: zeroed, filled from (3, 64), or read into it.
+#pragma once
+
+#include <algorithm>
+#include <span>
+
+#include "kernels/tactile/tactile_types.hpp"
+
+namespace tangere {
+
+template <class T>
+void clear_tile(const kernels::PadTiles& pad, int tile, T* dense) {
+  if (pad.curved()) {
+    for (int k = 0; k < pad.points_of(tile); ++k)
+      std::fill_n(dense + 3 * pad.index[kernels::kTactileTile * tile + k], 3, T(0));
+    return;
+  }
+  const int rows = pad.rows_of(tile), numbers = 3 * pad.cols_of(tile);
+  T* row = dense + 3 * pad.first_of(tile);
+  for (int i = 0; i < rows; ++i, row += 3 * pad.cols) std::fill(row, row + numbers, T(0));
+}
+
+/// Zeroes every tile that is not in `tiles` (rising): rows of tiles with none of them in one piece.
+template <class T>
+void clear_tiles_between(const kernels::PadTiles& pad, std::span<const int> tiles, T* dense) {
+  std::size_t next = 0;
+  for (int first = 0; first < pad.tiles(); first += pad.tile_cols) {
+    const int end = first + pad.tile_cols;
+    if (!pad.curved() && (next == tiles.size() || tiles[next] >= end)) {
+      T* row = dense + 3 * pad.first_of(first);
+      std::fill(row, row + 3 * pad.rows_of(first) * pad.cols, T(0));
+      continue;
+    }
+    for (int tile = first; tile < end; ++tile) {
+      if (next < tiles.size() && tiles[next] == tile) {
+        ++next;
+      } else {
+        clear_tile(pad, tile, dense);
+      }
+    }
+  }
+}
+
+/// (3, 64) to the tile's rows, converted.
+template <class Real, class T>
+void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* dense) {
+  if (pad.curved()) {
+    const int* index = pad.index + kernels::kTactileTile * tile;
+    for (int k = 0; k < pad.points_of(tile); ++k)
+      for (int c = 0; c < 3; ++c)
+        dense[3 * index[k] + c] = static_cast<T>(from[c * kernels::kTactileTile + k]);
+    return;
+  }
+  const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
+  T* row = dense + 3 * pad.first_of(tile);
+  for (int i = 0; i < rows; ++i, row += 3 * pad.cols)
+    for (int j = 0; j < cols; ++j)
+      for (int c = 0; c < 3; ++c)
+        row[3 * j + c] =
+            static_cast<T>(from[c * kernels::kTactileTile + i * kernels::kTileSide + j]);
+}
+
+/// f(slot in the tile, point of the array) for all points of a tile.
+template <class F>
+void for_points_of_tile(const kernels::PadTiles& pad, int tile, const F& f) {
+  if (pad.curved()) {
+    for (int k = 0; k < pad.points_of(tile); ++k) f(k, pad.index[kernels::kTactileTile * tile + k]);
+    return;
+  }
+  const int rows = pad.rows_of(tile), cols = pad.cols_of(tile), first = pad.first_of(tile);
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < cols; ++j) f(i * kernels::kTileSide + j, first + i * pad.cols + j);
+}
+
+/// The other way, zeros where the tile has no point; false where all of it is zero.
+template <class T, class Real>
+bool gather_tile(const kernels::PadTiles& pad, int tile, const T* dense, Real* to) {
+  std::fill_n(to, 3 * kernels::kTactileTile, Real(0));
+  bool any = false;
+  const auto take = [&](int slot, const T* from) {
+    for (int c = 0; c < 3; ++c) {
+      to[c * kernels::kTactileTile + slot] = static_cast<Real>(from[c]);
+      any = any || from[c] != T(0);
+    }
+  };
+  for_points_of_tile(pad, tile, [&](int slot, int point) { take(slot, dense + 3 * point); });
+  return any;
+}
+
+}  // namespace tangere

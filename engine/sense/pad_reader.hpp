@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kinematics of eight environments at a time and the shapes that meet a pad, handed to the tactile
+// kernels.
+#pragma once
+
+#include <vector>
+
+#include "engine/base/aligned.hpp"
+#include "engine/model/compiled_model.hpp"
+#include "engine/step/batch.hpp"
+#include "kernels/table/kernel_table.hpp"
+
+namespace tangere {
+
+/// Scratch of one thread.
+class PadReader {
+ public:
+  explicit PadReader(const Model& model);
+
+  /// Poses and twists of all links in group `group` (0 or 1) of a block.
+  void move(const Batch& batch, int block, int group);
+  /// What lane `lane` of a group has: the world for link -1.
+  [[nodiscard]] kernels::LinkPose<double> link(int link, int group, int lane) const;
+
+  /// Every shape the sensor can feel, in its pad's axes, in the group moved last.
+  void meet(const Batch& batch, int block, int group, int sensor);
+  /// Arguments for one environment of a group that was met. No output is set but the list of tiles,
+  /// `active`.
+  template <class Real>
+  kernels::TactileArgs<Real> arguments(int sensor, int group, int lane);
+  /// Arguments for a group (double) or both (float).
+  template <class Real>
+  kernels::TactileBlockArgs<Real> block_arguments(int sensor, int group);
+
+  std::vector<int> active;
+
+ private:
+  using Rows = AlignedVector<kernels::LaneRow>;
+  static constexpr int kGroups = kernels::kBlock / kernels::kGroup;
+
+  /// The shapes that a sensor can feel, of the sizes that one lane has.
+  const kernels::TouchShape* shapes(int sensor, int group, int lane);
+
+  struct Pad {
+    kernels::PadTiles tiles;
+    std::vector<kernels::TouchShape> shapes;
+  };
+  Model model_;
+  Rows q_, v_, zero_, rates_;
+  AlignedVector<kernels::LinkPose<kernels::LaneRow>> links_;  // (kGroups, n_links)
+  std::vector<Pad> pads_;                                     // per sensor
+  AlignedVector<kernels::Touch<kernels::LaneRow>> touches_;   // (targets, kGroups)
+  std::vector<const kernels::Touch<kernels::LaneRow>*> touch_of_group_;
+  std::vector<kernels::Touch<double>> one_;      // (targets) one environment's
+  std::vector<kernels::TouchShape> one_shapes_;  // (targets)
+  AlignedVector<kernels::LaneRow> sizes_;        // (targets, kGroups, 3) of those that vary
+};
+
+}  // namespace tangere

@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kinematics in lanes, then the tactile kernel: per environment on large pads, per block on small
+// ones.
+#include "engine/sense/readout.hpp"
+
+#include <algorithm>
+#include <array>
+#include <type_traits>
+
+#include "engine/model/compiled_model.hpp"
+#include "engine/sense/dense_tiles.hpp"
+#include "engine/sense/pad_reader.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+using kernels::kGroup;
+using kernels::kTactileTile;
+
+/// Fewer environments of a block than this are read one by one: the same bits, less work.
+constexpr int kFewest = 6;
+
+static void write3(const kernels::Vec3<double>& a, double* to) {
+  to[0] = a.x, to[1] = a.y, to[2] = a.z;
+}
+
+struct Readout::Impl {
+  Model model;
+  Precision precision;
+  PadReader reader;
+  AlignedVector<double>
+      wide;  // fields computed in the other type than asked for: one, or those of a block
+  AlignedVector<float> single;
+
+  Impl(const Model& m, Precision p) : model(m), precision(p), reader(m) {
+    std::size_t room = 0;
+    for (const CompiledSensor& s : m.compiled().sensors)
+      room = std::max({room, std::size_t(s.n_tiles()) * 3 * kTactileTile,
+                       small(s) ? std::size_t(kBlock * 3 * s.points()) : std::size_t(0)});
+    (p == Precision::f64 ? wide.resize(room) : single.resize(room));
+  }
+
+  static bool small(const CompiledSensor& s) { return s.points() <= kSmallPad && s.index.empty(); }
+  [[nodiscard]] const CompiledSensor& sensor_of(int k) const {
+    return model.compiled().sensors[std::size_t(k)];
+  }
+  template <class Real>
+  Real* scratch() {
+    if constexpr (std::is_same_v<Real, double>) return wide.data();
+    if constexpr (std::is_same_v<Real, float>) return single.data();
+  }
+
+  static int run(const kernels::TactileArgs<double>& a) {
+    return kernels::active_kernels().tactile(a);
+  }
+  static int run(const kernels::TactileArgs<float>& a) {
+    return kernels::active_kernels().tactile_mixed(a);
+  }
+  static void run(const kernels::TactileBlockArgs<double>& a) {
+    kernels::active_kernels().tactile_block(a);
+  }
+  static void run(const kernels::TactileBlockArgs<float>& a) {
+    kernels::active_kernels().tactile_block_mixed(a);
+  }
+
+  /// Calls `body` with a zero of the type the readout computes in.
+  template <class Body>
+  auto in_precision(const Body& body) {
+    return precision == Precision::f64 ? body(double{}) : body(float{});
+  }
+
+  /// In the world, in the group moved last.
+  [[nodiscard]] kernels::Vec3<double> position_of(const CompiledVariable& v, int group,
+                                                  int lane) const {
+    const kernels::Frame<double> at = reader.link(v.link, group, lane).world;
+    return at.R * v.point + at.p;
+  }
+  void write_variables(int group, int lane, std::span<double> position) const {
+    double* to = position.data();
+    for (const CompiledVariable& v : model.compiled().variables)
+      write3(position_of(v, group, lane), to), to += 3;
+  }
+
+  void place(const Batch& batch, int environment, int sensor) {
+    const int block = environment / kBlock, group = environment % kBlock / kGroup;
+    reader.move(batch, block, group);
+    reader.meet(batch, block, group, sensor);
+  }
+
+  /// Writes the touched tiles of an environment that has been placed; returns how many, listed in
+  /// reader.active.
+  template <class T>
+  int write_touched(int environment, int sensor, T* dense) {
+    return in_precision([&](auto zero) {
+      using Real = decltype(zero);
+      auto a = reader.arguments<Real>(sensor, environment % kBlock / kGroup, environment % kGroup);
+      if constexpr (std::is_same_v<Real, T>) {
+        a.dense = dense;
+        return run(a);
+      } else {
+        a.values = scratch<Real>();
+        const int count = run(a);
+        for (int k = 0; k < count; ++k)
+          expand_tile(*a.pad, a.active[k], a.values + 3 * kTactileTile * k, dense);
+        return count;
+      }
+    });
+  }
+
+  template <class T>
+  void fill(int environment, int sensor, T* dense) {
+    const int count = write_touched(environment, sensor, dense);
+    clear_tiles_between<T>(sensor_of(sensor).tiles(), {reader.active.data(), std::size_t(count)},
+                           dense);
+  }
+
+  /// Writes what is touched now, zeroes what was and is no longer.
+  template <class T>
+  void refresh(int environment, DenseFrame<T>& frame) {
+    const kernels::PadTiles pad = sensor_of(frame.sensor_).tiles();
+    const int count = write_touched(environment, frame.sensor_, frame.values_.data());
+    for (int old = 0, now = 0; old < frame.count_; ++old) {
+      const int tile = frame.written_[std::size_t(old)];
+      while (now < count && reader.active[std::size_t(now)] < tile) ++now;
+      if (now == count || reader.active[std::size_t(now)] != tile)
+        clear_tile(pad, tile, frame.values_.data());
+    }
+    std::copy(reader.active.begin(), reader.active.begin() + count, frame.written_.begin());
+    frame.count_ = count;
+  }
+
+  /// Touched tiles of a small pad into the arrays of `environments` environments, zeros elsewhere.
+  template <class T>
+  void fill_block(int sensor, int environments, const std::array<T*, kBlock>& dense) {
+    const auto numbers = 3 * std::size_t(sensor_of(sensor).points());
+    in_precision([&](auto zero) {
+      using Real = decltype(zero);
+      std::array<Real*, kBlock> out{};
+      for (std::size_t e = 0; e < std::size_t(environments); ++e) {
+        if constexpr (std::is_same_v<Real, T>) {
+          out[e] = dense[e];
+        } else {
+          out[e] = scratch<Real>() + numbers * e;
+        }
+        std::fill(out[e], out[e] + numbers, Real(0));
+      }
+      constexpr int kLanes = std::is_same_v<Real, float> ? kBlock : kGroup;
+      for (int first = 0; first < environments; first += kLanes) {
+        auto a = reader.block_arguments<Real>(sensor, first / kGroup);
+        a.dense = out.data() + first;
+        run(a);
+      }
+      if constexpr (!std::is_same_v<Real, T>) {
+        for (std::size_t e = 0; e < std::size_t(environments); ++e)
+          std::transform(out[e], out[e] + numbers, dense[e],
+                         [](Real x) { return static_cast<T>(x); });
+      }
+    });
+  }
+
+  template <class T>
+  void compact(int environment, CompactFrame<T>& frame) {
+    frame.count_ = in_precision([&](auto zero) {
+      using Real = decltype(zero);
+      auto a = reader.arguments<Real>(frame.sensor_, environment % kBlock / kGroup,
+                                      environment % kGroup);
+      a.active = frame.tiles_.data();
+      if constexpr (std::is_same_v<Real, T>) {
+        a.values = frame.values_.get();
+        return run(a);
+      } else {
+        a.values = scratch<Real>();
+        const int count = run(a);
+        std::transform(a.values, a.values + std::ptrdiff_t{3} * kTactileTile * count,
+                       frame.values_.get(), [](Real x) { return static_cast<T>(x); });
+        return count;
+      }
+    });
+  }
+
+  /// Both groups of a block; the second even if empty: a vector of floats reads both.
+  void place_block(const Batch& batch, int number, int sensor) {
+    for (int g = 0; g < kBlock / kGroup; ++g) {
+      reader.move(batch, number, g);
+      reader.meet(batch, number, g, sensor);
+    }
+  }
+
+  /// Small pads are read in all environments of a block at once, unless most lanes would be idle or
+  /// feel shapes of sizes of their own.
+  [[nodiscard]] bool together(const Batch& batch, int number, int sensor) const {
+    return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary &&
+           environments_of(batch, number) >= kFewest;
+  }
+  static int environments_of(const Batch& batch, int number) {
+    return std::min(kBlock, batch.environments() - number * kBlock);
+  }
+
+  /// All environments at once, or `one` for each, its group placed.
+  template <class T, class One>
+  void block(const Batch& batch, int number, int sensor, const std::array<T*, kBlock>& dense,
+             const One& one) {
+    const int environments = environments_of(batch, number);
+    place_block(batch, number, sensor);
+    if (together(batch, number, sensor)) {
+      fill_block(sensor, environments, dense);
+    } else {
+      for (int e = 0; e < environments; ++e) one(e);
+    }
+  }
+
+  template <class T>
+  void block_spans(const Batch& batch, int number, int sensor,
+                   std::span<const std::span<T>> fields) {
+    std::array<T*, kBlock> dense{};
+    for (std::size_t e = 0; e < std::min(fields.size(), std::size_t(kBlock)); ++e)
+      dense[e] = fields[e].data();
+    block<T>(batch, number, sensor, dense, [&](int e) { fill(e, sensor, dense[std::size_t(e)]); });
+  }
+};
+
+Readout::Readout(const Model& model, Precision precision)
+    : impl_(std::make_unique<Impl>(model, precision)) {}
+Readout::~Readout() = default;
+Readout::Readout(Readout&&) noexcept = default;
+Readout& Readout::operator=(Readout&&) noexcept = default;
+Precision Readout::precision() const { return impl_->precision; }
+
+void Readout::bodies(const Batch& batch, int environment, std::span<double> pose,
+                     std::span<double> twist) {
+  const int group = environment % kBlock / kGroup, lane = environment % kGroup;
+  impl_->reader.move(batch, environment / kBlock, group);
+  const CompiledModel& m = impl_->model.compiled();
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    const CompiledBody& body = m.bodies[b];
+    const kernels::LinkPose<double> link = impl_->reader.link(body.link, group, lane);
+    const kernels::Frame<double> at = compose(link.world, body.frame);
+    const kernels::Quat<double> o = quaternion_of(at.R);
+    const double values[7] = {at.p.x, at.p.y, at.p.z, o.w, o.x, o.y, o.z};
+    std::copy(values, values + 7, &pose[7 * b]);
+    const kernels::Vec3<double> omega = link.world.R * link.V.a;
+    const kernels::Vec3<double> v = link.world.R * (link.V.l + cross(link.V.a, body.frame.p));
+    const double rates[6] = {omega.x, omega.y, omega.z, v.x, v.y, v.z};
+    std::copy(rates, rates + 6, &twist[6 * b]);
+  }
+}
+
+void Readout::variables(const Batch& batch, int environment, std::span<double> position,
+                        std::span<double> velocity) {
+  const int group = environment % kBlock / kGroup, lane = environment % kGroup;
+  impl_->reader.move(batch, environment / kBlock, group);
+  impl_->write_variables(group, lane, position);
+  const std::vector<CompiledVariable>& all = impl_->model.compiled().variables;
+  for (std::size_t k = 0; k < all.size() && !velocity.empty(); ++k) {
+    const kernels::LinkPose<double> link = impl_->reader.link(all[k].link, group, lane);
+    write3(link.world.R * (link.V.l + cross(link.V.a, all[k].point)), &velocity[3 * k]);
+  }
+}
+
+void Readout::read_variables(const Batch& batch, int block,
+                             std::span<const std::span<double>> positions) {
+  const int environments = Impl::environments_of(batch, block);
+  for (int e = 0; e < environments; ++e) {
+    if (e % kGroup == 0) impl_->reader.move(batch, block, e / kGroup);
+    impl_->write_variables(e / kGroup, e % kGroup, positions[std::size_t(e)]);
+  }
+}
+
+void Readout::variable_jacobian(const Batch& batch, int environment, std::span<double> jacobian) {
+  const int group = environment % kBlock / kGroup, lane = environment % kGroup;
+  impl_->reader.move(batch, environment / kBlock, group);
+  const CompiledModel& m = impl_->model.compiled();
+  const auto nv = std::size_t(m.nv);
+  std::fill(jacobian.begin(), jacobian.end(), 0.0);
+  for (std::size_t k = 0; k < m.variables.size(); ++k) {
+    const auto column = [&](int dof, const kernels::Vec3<double>& c) {
+      double* const at = &jacobian[3 * k * nv + std::size_t(dof)];
+      at[0] = c.x, at[nv] = c.y, at[2 * nv] = c.z;
+    };
+    const CompiledVariable& variable = m.variables[k];
+    const kernels::Vec3<double> x = impl_->position_of(variable, group, lane);
+    for (int i = variable.link; i >= 0; i = m.links[std::size_t(i)].parent) {
+      const kernels::Link& link = m.links[std::size_t(i)];
+      const kernels::Frame<double> at = impl_->reader.link(i, group, lane).world;
+      const auto along = [&](const kernels::Vec3<double>& axis) {
+        const kernels::Vec3<double> a = at.R * axis;
+        return kernels::slides(link.kind) ? a : cross(a, x - at.p);
+      };
+      if (kernels::dofs(link.kind) == 1) {
+        column(link.v, along(link.axis));
+      } else {
+        column(link.v, along({1, 0, 0}));
+        column(link.v + 1, along({0, 1, 0}));
+        column(link.v + 2, along({0, 0, 1}));
+      }
+    }
+  }
+}
+
+void Readout::tactile(const Batch& batch, int environment, int sensor, std::span<double> force) {
+  impl_->place(batch, environment, sensor);
+  impl_->fill(environment, sensor, force.data());
+}
+void Readout::tactile(const Batch& batch, int environment, int sensor, std::span<float> force) {
+  impl_->place(batch, environment, sensor);
+  impl_->fill(environment, sensor, force.data());
+}
+
+template <class T>
+void Readout::read(const Batch& batch, int environment, DenseFrame<T>& frame) {
+  impl_->place(batch, environment, frame.sensor_);
+  impl_->refresh(environment, frame);
+}
+
+template <class T>
+void Readout::read(const Batch& batch, int environment, CompactFrame<T>& frame) {
+  impl_->place(batch, environment, frame.sensor_);
+  impl_->compact(environment, frame);
+}
+
+void Readout::read_block(const Batch& batch, int block, int sensor,
+                         std::span<const std::span<double>> fields) {
+  impl_->block_spans(batch, block, sensor, fields);
+}
+void Readout::read_block(const Batch& batch, int block, int sensor,
+                         std::span<const std::span<float>> fields) {
+  impl_->block_spans(batch, block, sensor, fields);
+}
+
+template <class T>
+void Readout::read_block(const Batch& batch, int block, std::span<DenseFrame<T>> frames) {
+  if (frames.empty()) return;
+  std::array<T*, kBlock> dense{};
+  const bool whole = impl_->together(batch, block, frames[0].sensor_);
+  for (std::size_t e = 0; e < std::min(frames.size(), std::size_t(kBlock)); ++e) {
+    dense[e] = frames[e].values_.data();
+    if (whole)
+      frames[e].mark_all();  // whoever reads one of them alone afterwards must find all tiles in
+                             // its list
+  }
+  impl_->block<T>(batch, block, frames[0].sensor_, dense,
+                  [&](int e) { impl_->refresh(e, frames[std::size_t(e)]); });
+}
+
+template <class T>
+void Readout::read_block(const Batch& batch, int block, std::span<CompactFrame<T>> frames) {
+  if (frames.empty()) return;
+  impl_->place_block(batch, block, frames[0].sensor_);
+  const int environments = Impl::environments_of(batch, block);
+  for (int e = 0; e < environments; ++e) impl_->compact(e, frames[std::size_t(e)]);
+}
+
+template void Readout::read(const Batch&, int, DenseFrame<float>&);
+template void Readout::read(const Batch&, int, DenseFrame<double>&);
+template void Readout::read(const Batch&, int, CompactFrame<float>&);
+template void Readout::read(const Batch&, int, CompactFrame<double>&);
+template void Readout::read_block(const Batch&, int, std::span<DenseFrame<float>>);
+template void Readout::read_block(const Batch&, int, std::span<DenseFrame<double>>);
+template void Readout::read_block(const Batch&, int, std::span<CompactFrame<float>>);
+template void Readout::read_block(const Batch&, int, std::span<CompactFrame<double>>);
+
+}  // namespace tangere

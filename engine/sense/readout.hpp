@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a batch is measured by: poses and twists of bodies, end effectors, tactile fields. Reads the
+// state and changes nothing.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "engine/base/precision.hpp"
+#include "engine/sense/tactile_frame.hpp"
+#include "engine/step/batch.hpp"
+
+namespace tangere {
+
+/// Reads any batch of its model. Owns the scratch of one thread; allocates only when made.
+///
+/// Tactile fields are in [N]: f·axis0, f·axis1, -f·(axis0 × axis1), f the force on the sensor's
+/// body. Exactly zero where nothing touches. They feel every body that can move against the sensor.
+/// Every way of reading gives the same numbers: those of the readout's precision, converted where T
+/// is another type. T is float or double.
+class Readout {
+ public:
+  explicit Readout(const Model& model, Precision precision = Precision::f64);
+  ~Readout();
+  Readout(Readout&&) noexcept;
+  Readout& operator=(Readout&&) noexcept;
+
+  [[nodiscard]] Precision precision() const;
+
+  /// World poses (nb, 7: x y z qw qx qy qz of the body frame) and twists (nb, 6: angular, then
+  /// linear velocity of the body frame's origin, world axes) of one environment, every body of the
+  /// scene in file order.
+  void bodies(const Batch& batch, int environment, std::span<double> pose, std::span<double> twist);
+
+  /// World positions of the scene's end effectors (variables, 3) [m] of one environment, file
+  /// order; with `velocity`, theirs too (variables, 3) [m/s], world axes.
+  void variables(const Batch& batch, int environment, std::span<double> position,
+                 std::span<double> velocity = {});
+  /// Positions in the environments 16 block …, (variables, 3) each: the same bits, kinematics once
+  /// for eight of them. Environments beyond the last of the batch may be missing.
+  void read_variables(const Batch& batch, int block, std::span<const std::span<double>> positions);
+  /// (variables, 3, nv): derivative of each position by displacements of q along the dofs of v,
+  /// rotations on the right (docs/dynamics.md), so that velocity = jacobian v.
+  void variable_jacobian(const Batch& batch, int environment, std::span<double> jacobian);
+
+  /// Field of one sensor and environment into (points, 3), zeros included.
+  void tactile(const Batch& batch, int environment, int sensor, std::span<double> force);
+  void tactile(const Batch& batch, int environment, int sensor, std::span<float> force);
+
+  /// Field of the frame's sensor.
+  template <class T>
+  void read(const Batch& batch, int environment, DenseFrame<T>& frame);
+  template <class T>
+  void read(const Batch& batch, int environment, CompactFrame<T>& frame);
+
+  /// Fields of the environments 16 block …, (points, 3) each, one array per environment; those
+  /// beyond the last environment of the batch are left alone and may be missing. Flat pads of up to
+  /// kSmallPad points are read in all environments at once.
+  void read_block(const Batch& batch, int block, int sensor,
+                  std::span<const std::span<double>> fields);
+  void read_block(const Batch& batch, int block, int sensor,
+                  std::span<const std::span<float>> fields);
+  /// The same into one frame per environment, all of one sensor.
+  template <class T>
+  void read_block(const Batch& batch, int block, std::span<DenseFrame<T>> frames);
+  template <class T>
+  void read_block(const Batch& batch, int block, std::span<CompactFrame<T>> frames);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tangere

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Memory of frames; what is written into it is the business of the readout.
+#include "engine/sense/tactile_frame.hpp"
+
+#include <numeric>
+#include <string>
+
+#include "engine/base/error.hpp"
+#include "engine/model/compiled_model.hpp"
+#include "engine/sense/dense_tiles.hpp"
+
+namespace tangere {
+
+namespace {
+
+const CompiledSensor& checked(const Model& model, int sensor) {
+  const auto& sensors = model.compiled().sensors;
+  if (sensor < 0 || std::size_t(sensor) >= sensors.size())
+    throw InputError("no tactile sensor " + std::to_string(sensor) + ": the scene has " +
+                     std::to_string(sensors.size()));
+  return sensors[std::size_t(sensor)];
+}
+
+}  // namespace
+
+template <class T>
+DenseFrame<T>::DenseFrame(const Model& model, int sensor)
+    : model_(model),
+      sensor_(sensor),
+      values_(3 * std::size_t(checked(model, sensor).points())),
+      written_(std::size_t(checked(model, sensor).n_tiles())) {}
+
+template <class T>
+void DenseFrame<T>::mark_all() {
+  count_ = static_cast<int>(written_.size());
+  std::iota(written_.begin(), written_.end(), 0);
+}
+
+template <class T>
+CompactFrame<T>::CompactFrame(const Model& model, int sensor)
+    : model_(model),
+      sensor_(sensor),
+      tiles_(std::size_t(checked(model, sensor).n_tiles())),
+      values_(LaneAllocator<T>().allocate(tiles_.size() * 3 * kernels::kTactileTile)) {}
+
+template <class T>
+int CompactFrame<T>::tile_cols() const {
+  return model_.compiled().sensors[std::size_t(sensor_)].tile_cols;
+}
+
+template <class T>
+std::size_t CompactFrame<T>::dense_size() const {
+  return 3 * std::size_t(model_.compiled().sensors[std::size_t(sensor_)].points());
+}
+
+template <class T>
+void CompactFrame<T>::expand(std::span<T> dense) const {
+  spread(values(), dense);
+}
+
+template <class T>
+void CompactFrame<T>::spread(std::span<const T> of_tiles, std::span<T> dense) const {
+  const kernels::PadTiles pad = model_.compiled().sensors[std::size_t(sensor_)].tiles();
+  clear_tiles_between<T>(pad, tiles(), dense.data());
+  for (std::size_t k = 0; k < std::size_t(count_); ++k)
+    expand_tile(pad, tiles_[k], of_tiles.data() + 3 * kernels::kTactileTile * k, dense.data());
+}
+
+template class DenseFrame<float>;
+template class DenseFrame<double>;
+template class CompactFrame<float>;
+template class CompactFrame<double>;
+
+}  // namespace tangere

@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: Apache-2.0
+// States in lanes: allocation, the start of an episode, one environment in and out.
+#include "engine/step/batch.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+
+#include "engine/model/compile_variations.hpp"
+#include "engine/model/random.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+
+namespace {
+
+Purpose purpose_of(RandomTarget target) {
+  switch (target) {
+    case RandomTarget::joint_q:
+    case RandomTarget::joint_v: return Purpose::initial_state;
+    case RandomTarget::ground_contact:
+    case RandomTarget::pair_contact: return Purpose::contact;
+    case RandomTarget::joint_effect:
+    case RandomTarget::motor: return Purpose::joint;
+    case RandomTarget::size:
+    case RandomTarget::place:
+    case RandomTarget::density: return Purpose::body;
+    case RandomTarget::tactile: break;
+  }
+  return Purpose::tactile;
+}
+
+/// The constant that a varying number replaces: what padding lanes hold.
+double nominal(const CompiledModel& m, const RandomizationDescription& d) {
+  const auto field = [&](const ContactCoefficients& c) {
+    const double values[] = {c.kn, c.kt, c.mu, c.damping};
+    return values[static_cast<int>(d.field)];
+  };
+  for (const auto& s : m.scene.sensors)
+    if (d.target == RandomTarget::tactile && s.name == d.name) return field(s.coefficients);
+  for (const auto& c : m.scene.pair_contacts)
+    if (d.target == RandomTarget::pair_contact && c.general_body == d.name &&
+        c.primitive_body == d.second_name)
+      return field(c.coefficients);
+  for (const auto& c : m.scene.ground_contacts)
+    if (d.target == RandomTarget::ground_contact && c.body == d.name) return field(c.coefficients);
+  for (const auto& l : m.scene.links) {
+    const double values[] = {l.joint.damping, l.joint.armature, l.joint.stiffness,
+                             l.joint.limit_stiffness};
+    if (d.target == RandomTarget::joint_effect && l.joint.name == d.name)
+      return values[static_cast<int>(d.joint_field)];
+  }
+  for (const auto& l : m.scene.links)
+    if (d.target == RandomTarget::density && l.body.name == d.name) return l.body.density;
+  for (const auto& l : m.scene.links) {
+    Shape shape = l.body.shape;
+    if (d.target == RandomTarget::size && l.body.name == d.name)
+      return *size_number(shape, d.index);
+    if (d.target == RandomTarget::place && l.joint.name == d.name)
+      return l.joint.pose.position[std::size_t(d.index)];
+  }
+  for (const auto& motor : m.scene.motors)
+    if (d.target == RandomTarget::motor && motor.joint == d.name)
+      return d.joint_field == JointField::P ? motor.P : motor.D;
+  return 0;
+}
+
+}  // namespace
+
+const char* to_string(StepStatus value) {
+  switch (value) {
+    case StepStatus::converged: return "converged";
+    case StepStatus::split: return "converged after the step was split";
+    case StepStatus::not_converged: return "no solution found, step split down to h/64";
+    case StepStatus::non_finite: return "a control or state was not finite";
+    case StepStatus::rotation: return "a joint turned by pi or more in one step";
+    case StepStatus::singular: return "the Jacobian is singular";
+  }
+  return "unknown";
+}
+
+Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int64_t first_episode)
+    : model_(model), environments_(environments), blocks_(0), seed_(seed) {
+  if (environments < 1)
+    throw InputError("a batch of " + std::to_string(environments) +
+                     " environments; expected at least 1");
+  const CompiledModel& m = model.compiled();
+  blocks_ = environments / kBlock + (environments % kBlock != 0);
+  block_stride_ = std::size_t(m.layout.rows) * kBlock;
+  const std::size_t lanes = std::size_t(blocks_) * kBlock;
+  try {
+    data_.assign(block_stride_ * std::size_t(blocks_), 0.0);
+    status_.assign(lanes, StepStatus::converged);
+    iterations_.assign(lanes, 0);
+    residual_.assign(lanes, 0.0);
+    has_history_.assign(lanes, 0);
+    held_.assign(lanes, 0);
+    episode_.resize(lanes);
+  } catch (const std::exception&) {
+    throw InputError(
+        "no memory for " + std::to_string(environments) + " environments (" +
+        std::to_string(double(block_stride_) * double(blocks_) * sizeof(double) / 1e9) + " GB)");
+  }
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    episode_[lane] = first_episode + static_cast<std::int64_t>(lane);
+    draw_episode(lane);
+  }
+}
+
+double* Batch::column(std::size_t lane) {
+  return data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock;
+}
+
+/// Padding lanes keep the scene's own numbers.
+void Batch::draw_episode(std::size_t lane) {
+  const CompiledModel& m = model_.compiled();
+  const bool padding = lane >= std::size_t(environments_);
+  double* const own = column(lane);
+  for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = m.initial_q[std::size_t(i)];
+  for (int i = 0; i < m.nv; ++i) own[(m.layout.v + i) * kBlock] = m.initial_v[std::size_t(i)];
+  for (std::size_t k = 0; k < m.scene.randomizations.size(); ++k) {
+    const RandomizationDescription& d = m.scene.randomizations[k];
+    const int row = m.randomized_row[k];
+    if (!padding) {
+      own[row * kBlock] = draw(d.distribution, RandomKey{seed_, episode_[lane], 0,
+                                                         purpose_of(d.target), std::uint32_t(k)});
+    } else if (row >= m.layout.parameters) {
+      own[row * kBlock] = nominal(m, d);
+    }
+  }
+  update_derived_rows(m, own);
+  complete_state(lane);
+}
+
+void Batch::reset(int environment, std::int64_t episode) {
+  const std::size_t lane = std::size_t(environment);
+  episode_[lane] = episode;
+  draw_episode(lane);
+  status_[lane] = StepStatus::converged;
+  iterations_[lane] = 0;
+  residual_[lane] = 0;
+  has_history_[lane] = 0;
+  held_[lane] = 0;
+}
+
+void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<const double> v) {
+  const CompiledModel& m = model_.compiled();
+  double* const own = column(lane);
+  for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = q[std::size_t(i)];
+  for (int i = 0; i < m.nv; ++i) own[(m.layout.v + i) * kBlock] = v[std::size_t(i)];
+  complete_state(lane);
+}
+
+/// Quaternions of length one; the state before is the same.
+void Batch::complete_state(std::size_t lane) {
+  const CompiledModel& m = model_.compiled();
+  double* const own = column(lane);
+  const auto at = [&](int row) -> double& { return own[row * kBlock]; };
+  for (const kernels::Link& link : m.links) {
+    if (link.kind != kernels::JointKind::spherical) continue;
+    const int first = m.layout.q + link.q;
+    double square = 0;
+    for (int k = 0; k < 4; ++k) square += at(first + k) * at(first + k);
+    // Already unit to rounding: kept as it is, so that a stored state continues bit for bit.
+    if (std::abs(square - 1) < 1e-14) continue;
+    const double scale = 1 / std::sqrt(square);
+    for (int k = 0; k < 4; ++k) at(first + k) *= scale;
+  }
+  for (int i = 0; i < m.nq; ++i) at(m.layout.previous_q + i) = at(m.layout.q + i);
+  for (int i = 0; i < m.nv; ++i) at(m.layout.previous_v + i) = at(m.layout.v + i);
+}
+
+void Batch::get_q(int environment, std::span<double> q) const {
+  const double* column = block(environment / kBlock) + environment % kBlock;
+  const CompiledModel& m = model_.compiled();
+  for (int i = 0; i < m.nq; ++i) q[i] = column[std::size_t(m.layout.q + i) * kBlock];
+}
+
+void Batch::get_v(int environment, std::span<double> v) const {
+  const double* column = block(environment / kBlock) + environment % kBlock;
+  const CompiledModel& m = model_.compiled();
+  for (int i = 0; i < m.nv; ++i) v[i] = column[std::size_t(m.layout.v + i) * kBlock];
+}
+
+void Batch::set_state(int environment, std::span<const double> q, std::span<const double> v) {
+  const std::size_t lane = std::size_t(environment);
+  write_state(lane, q, v);
+  status_[lane] = StepStatus::converged;
+  has_history_[lane] = 0;
+}
+
+void Batch::set_state(int environment, std::span<const double> q, std::span<const double> v,
+                      std::span<const double> previous_q, std::span<const double> previous_v) {
+  const std::size_t lane = std::size_t(environment);
+  write_state(lane, previous_q, previous_v);
+  const CompiledModel& m = model_.compiled();
+  double* column = block(environment / kBlock) + environment % kBlock;
+  std::vector<double> before_q(m.nq), before_v(m.nv);
+  get_q(environment, before_q);
+  get_v(environment, before_v);
+  write_state(lane, q, v);
+  for (int i = 0; i < m.nq; ++i)
+    column[std::size_t(m.layout.previous_q + i) * kBlock] = before_q[i];
+  for (int i = 0; i < m.nv; ++i)
+    column[std::size_t(m.layout.previous_v + i) * kBlock] = before_v[i];
+  status_[lane] = StepStatus::converged;
+  has_history_[lane] = 1;
+}
+
+void Batch::set_failed(int environment, StepStatus status) {
+  if (!failed(status))
+    throw InputError(std::string("status '") + to_string(status) +
+                     "' is none of a failed environment");
+  status_[std::size_t(environment)] = status;
+}
+
+int Batch::failed_count() const {
+  const auto all = statuses();
+  return static_cast<int>(
+      std::count_if(all.begin(), all.end(), [](StepStatus s) { return failed(s); }));
+}
+
+BlockState Batch::save_block(int block) const {
+  const double* rows = this->block(block);
+  const auto lane = std::ptrdiff_t(block) * kBlock;
+  return {{rows, rows + block_stride_},
+          {status_.begin() + lane, status_.begin() + lane + kBlock},
+          {has_history_.begin() + lane, has_history_.begin() + lane + kBlock}};
+}
+
+void Batch::restore_block(int block, const BlockState& state) {
+  const auto lane = std::ptrdiff_t(block) * kBlock;
+  std::copy(state.rows.begin(), state.rows.end(), this->block(block));
+  std::copy(state.status.begin(), state.status.end(), status_.begin() + lane);
+  std::copy(state.has_history.begin(), state.has_history.end(), has_history_.begin() + lane);
+}
+
+bool Batch::is_parameter(int k) const {
+  const CompiledModel& m = model_.compiled();
+  return m.randomized_row[std::size_t(k)] >= m.layout.parameters;
+}
+
+double Batch::randomized_value(int environment, int k) const {
+  const CompiledModel& m = model_.compiled();
+  const RandomizationDescription& d = m.scene.randomizations[std::size_t(k)];
+  const int row = m.randomized_row[std::size_t(k)];
+  if (is_parameter(k))
+    return (block(environment / kBlock) + environment % kBlock)[std::size_t(row) * kBlock];
+  return draw(d.distribution,
+              RandomKey{seed_, episode(environment), 0, purpose_of(d.target), std::uint32_t(k)});
+}
+
+void Batch::set_randomized_value(int environment, int k, double value) {
+  const CompiledModel& m = model_.compiled();
+  const int row = m.randomized_row[std::size_t(k)];
+  if (!is_parameter(k))
+    throw InputError("randomised number " + std::to_string(k) +
+                     " is of the starting state; expected a parameter");
+  column(std::size_t(environment))[std::size_t(row) * kBlock] = value;
+  update_derived_rows(m, column(std::size_t(environment)));
+}
+
+}  // namespace tangere

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+// The state of many environments in blocks of 16 lanes, [block][row][lane]: what a checkpoint
+// stores, nothing else.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/base/aligned.hpp"
+#include "engine/model/model.hpp"
+
+namespace tangere {
+
+/// How the last step of an environment ended. Values are written to files: never renumber.
+enum class StepStatus : std::int8_t {
+  converged = 0,
+  split = 1,           ///< converged after the step was split
+  not_converged = -1,  ///< no root found down to h/64
+  non_finite = -2,     ///< a control or state was NaN or infinite
+  rotation = -3,       ///< a joint turned by π or more in one step
+  singular = -4,       ///< the Jacobian could not be factored, pivoting included
+};
+const char* to_string(StepStatus value);
+inline bool failed(StepStatus s) { return static_cast<std::int8_t>(s) < 0; }
+
+/// Everything of one block that a step may change.
+struct BlockState {
+  AlignedVector<double> rows;
+  std::vector<StepStatus> status;
+  std::vector<std::uint8_t> has_history;
+};
+
+/// Environments stepped together. A failed environment keeps its last good state and is not stepped
+/// again until reset.
+class Batch {
+ public:
+  /// `environments` states drawn from the scene's <initial> and <randomize>, keyed by (seed,
+  /// first_episode + e). Throws InputError when environments < 1 or the memory for it cannot be
+  /// had.
+  Batch(const Model& model, int environments, std::uint64_t seed = 0,
+        std::int64_t first_episode = 0);
+
+  [[nodiscard]] const Model& model() const { return model_; }
+  [[nodiscard]] int environments() const { return environments_; }
+  [[nodiscard]] int blocks() const { return blocks_; }
+  [[nodiscard]] std::uint64_t seed() const { return seed_; }
+  [[nodiscard]] std::int64_t episode(int environment) const {
+    return episode_[std::size_t(environment)];
+  }
+
+  /// Draws another episode into one environment, as a new batch would have it: the same bits
+  /// wherever it is drawn. Environments of different blocks may be reset from different threads.
+  void reset(int environment, std::int64_t episode);
+  /// A held environment is not stepped and keeps its state; reset() lets it go as well.
+  void hold(int environment, bool held = true) { held_[std::size_t(environment)] = held ? 1 : 0; }
+  [[nodiscard]] bool held(int environment) const { return held_[std::size_t(environment)] != 0; }
+
+  /// One environment's coordinates, copied out of or into its lane: (nq), (nv).
+  void get_q(int environment, std::span<double> q) const;
+  void get_v(int environment, std::span<double> v) const;
+  /// Sets a state and drops the integrator's history (the next step is a start). Quaternions are
+  /// normalised here.
+  void set_state(int environment, std::span<const double> q, std::span<const double> v);
+  /// The two newest states of a BDF2 run: (q, v) now and one step before; the next step continues
+  /// the run.
+  void set_state(int environment, std::span<const double> q, std::span<const double> v,
+                 std::span<const double> previous_q, std::span<const double> previous_v);
+
+  /// Freezes an environment as a failed step would. Throws InputError when `status` is none of
+  /// failure.
+  void set_failed(int environment, StepStatus status);
+
+  [[nodiscard]] StepStatus status(int environment) const {
+    return status_[std::size_t(environment)];
+  }
+  [[nodiscard]] std::int32_t iterations(int environment) const {
+    return iterations_[std::size_t(environment)];
+  }
+  [[nodiscard]] double residual(int environment) const {
+    return residual_[std::size_t(environment)];
+  }
+  [[nodiscard]] std::span<const StepStatus> statuses() const {
+    return {status_.data(), std::size_t(environments_)};
+  }
+  [[nodiscard]] std::span<const std::int32_t> iterations() const {
+    return {iterations_.data(), std::size_t(environments_)};
+  }
+  [[nodiscard]] std::span<const double> residuals() const {
+    return {residual_.data(), std::size_t(environments_)};
+  }
+  [[nodiscard]] int failed_count() const;
+
+  /// Whether the next step continues a run: the state one step before is known.
+  [[nodiscard]] bool has_history(int environment) const {
+    return has_history_[std::size_t(environment)] != 0;
+  }
+  /// A block as it is, and back to that.
+  [[nodiscard]] BlockState save_block(int block) const;
+  void restore_block(int block, const BlockState& state);
+
+  /// Value of randomised number k (in the order of Scene::randomizations) in an environment: what
+  /// was drawn for it, or set since if it is no number of the starting state.
+  [[nodiscard]] double randomized_value(int environment, int k) const;
+  /// Whether randomised number k is a parameter, not one of the starting state.
+  [[nodiscard]] bool is_parameter(int k) const;
+  /// Sets randomised number k of an environment until its next reset. Throws InputError for one of
+  /// the starting state.
+  void set_randomized_value(int environment, int k, double value);
+
+  /// First row of a block: row r, lane l at block(b)[r * 16 + l]. For the stepper and the tests.
+  double* block(int b) { return data_.data() + std::size_t(b) * block_stride_; }
+  [[nodiscard]] const double* block(int b) const {
+    return data_.data() + std::size_t(b) * block_stride_;
+  }
+
+ private:
+  friend class Stepper;
+  void write_state(std::size_t lane, std::span<const double> q, std::span<const double> v);
+  void complete_state(std::size_t lane);
+  void draw_episode(std::size_t lane);
+  [[nodiscard]] double* column(std::size_t lane);
+
+  Model model_;
+  int environments_, blocks_;
+  std::uint64_t seed_;
+  std::size_t block_stride_;  // doubles per block
+  AlignedVector<double> data_;
+  // Per lane, padding lanes included, so that a block can be handed to a thread whole.
+  std::vector<StepStatus> status_;
+  std::vector<std::int32_t> iterations_;
+  std::vector<double> residual_;
+  std::vector<std::uint8_t> has_history_;  // BDF2: the previous state is valid
+  std::vector<std::uint8_t> held_;
+  std::vector<std::int64_t> episode_;
+};
+
+}  // namespace tangere

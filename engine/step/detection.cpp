@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// One lane after the other through the search kernel.
+#include "engine/step/detection.hpp"
+
+namespace tangere {
+
+template <int L>
+void clear_candidates(BasicWorkspace<L>& w) {
+  w.in_rows = 0;
+  for (auto& list : w.lists) {
+    list.count = 0;
+    for (int& count : list.own_count) count = 0;
+  }
+}
+
+/// Size of a pair's shape in one lane.
+template <int L>
+kernels::Vec3<double> size_of(const kernels::PairContact& pair, const kernels::Stage<L>& stage,
+                              int lane) {
+  if (pair.size_row < 0) return pair.size;
+  const auto one = [&](int i) {
+    return kernels::row_of(stage.block, pair.size_row + i, stage.group)[lane];
+  };
+  return {one(0), one(1), one(2)};
+}
+
+template <int L>
+void find_candidates(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, LaneBits lanes) {
+  w.in_rows &= ~lanes;
+  table.stage<L>().near_pairs(model.view, w.stage, w.near);
+  for (std::size_t g = 0; g < model.link_pairs.size(); ++g) {
+    kernels::Row<L>* reference = w.references + 12 * g;
+    for (int i = 0; i < 12; ++i)
+      for (int l = 0; l < L; ++l)
+        if (has(lanes, l)) reference[i][l] = w.near.link_poses[12 * g + std::size_t(i)][l];
+  }
+  for (std::size_t k = 0; k < model.pairs.size(); ++k) {
+    auto& list = w.lists[k];
+    const kernels::Row<L>* row = w.near.shape_poses + 12 * k;
+    for (int l = 0; l < L; ++l) {
+      if (!has(lanes, l)) continue;
+      list.own_count[l] = 0;
+      if (!has(w.near.lanes[k], l)) continue;
+      double pose[12];
+      for (int i = 0; i < 12; ++i) pose[i] = row[i][l];
+      list.own_count[l] =
+          table.find_candidates({&model.pairs[k], size_of<L>(model.pairs[k], w.stage, l), pose,
+                                 list.margin, list.own + 3 * list.stride * l, list.stride});
+    }
+  }
+}
+
+void lists_to_rows(const kernels::KernelTable& table, Workspace& w, LaneBits lanes) {
+  if ((lanes & ~w.in_rows) == 0) return;
+  for (kernels::GroupStage::List& list : w.lists) table.transpose_list(list);
+  w.in_rows = kAllLanes;
+}
+
+template void clear_candidates(Workspace&);
+template void clear_candidates(SingleWorkspace&);
+template void find_candidates(const CompiledModel&, const kernels::KernelTable&, Workspace&,
+                              LaneBits);
+template void find_candidates(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
+                              LaneBits);
+
+}  // namespace tangere

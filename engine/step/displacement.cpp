@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// δq = q ⊗ (0, θ)/2 for quaternions; coordinates that are dofs for the rest.
+#include "engine/step/displacement.hpp"
+
+namespace tangere {
+
+void displace(const CompiledModel& m, std::span<double> q, int dof, double e) {
+  for (const kernels::Link& link : m.links) {
+    if (dof < link.v || dof >= link.v + kernels::dofs(link.kind)) continue;
+    if (link.kind != kernels::JointKind::spherical) {
+      q[std::size_t(link.q + dof - link.v)] += e;
+      return;
+    }
+    kernels::Vec3<double> turn = {0, 0, 0};
+    (dof == link.v ? turn.x : dof == link.v + 1 ? turn.y : turn.z) = e;
+    double* a = &q[std::size_t(link.q)];
+    const kernels::Quat<double> r = rotate_by(kernels::Quat<double>{a[0], a[1], a[2], a[3]}, turn);
+    a[0] = r.w, a[1] = r.x, a[2] = r.y, a[3] = r.z;
+    return;
+  }
+}
+
+void add_along_dofs(const CompiledModel& m, std::span<const double> q, std::span<const double> by_q,
+                    std::span<double> out) {
+  for (const kernels::Link& link : m.links) {
+    const double *a = &q[std::size_t(link.q)], *p = &by_q[std::size_t(link.q)];
+    double* to = &out[std::size_t(link.v)];
+    if (link.kind != kernels::JointKind::spherical) {
+      for (int k = 0; k < kernels::dofs(link.kind); ++k) to[k] += p[k];
+      continue;
+    }
+    to[0] += 0.5 * (-a[1] * p[0] + a[0] * p[1] + a[3] * p[2] - a[2] * p[3]);
+    to[1] += 0.5 * (-a[2] * p[0] - a[3] * p[1] + a[0] * p[2] + a[1] * p[3]);
+    to[2] += 0.5 * (-a[3] * p[0] + a[2] * p[1] - a[1] * p[2] + a[0] * p[3]);
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sets up the stages, commits their results, and splits the steps of lanes that found no root.
+#include "engine/step/group_step.hpp"
+
+#include <cmath>
+
+#include "engine/step/detection.hpp"
+#include "engine/step/state_difference.hpp"
+
+namespace tangere {
+
+using kernels::JointKind;
+using kernels::Quat;
+using kernels::Row;
+using kernels::Vec3;
+
+namespace {
+
+constexpr int kDeepestSplit = 6;  // h / 2^6
+// Inside a split the search may be long: a short leash there loses runs that a patient one
+// finishes.
+constexpr int kHalvings = 10, kSplitHalvings = 20, kSplitIterations = 40;
+constexpr int kPatience = 4, kSplitPatience = 40;
+
+template <int L>
+void fill(Row<L>& row, double value) {
+  for (double& x : row.lane) x = value;
+}
+
+}  // namespace
+
+template <int L>
+LaneBits GroupStep::solve_one_stage(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                                    LaneBits lanes, double c0, double h, bool inside_split,
+                                    NewtonReport& report) const {
+  fill(w.stage.c0_over_h, c0 / h);
+  fill(w.stage.inverse_h, 1 / h);
+  const NewtonLimits limits = {
+      settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
+      inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience};
+  return solve_stage(model_, table, w, lanes, limits, report);
+}
+
+template <int L>
+LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                        LaneBits lanes, double h, bool inside_split, NewtonReport& report) const {
+  const int n = model_.nv;
+  for (int i = 0; i < model_.nq; ++i) w.stage.centre[i] = w.q0[i];
+  const auto each = [&](auto&& f) {
+    for (int i = 0; i < n; ++i)
+      for (int l = 0; l < L; ++l) f(i, l);
+  };
+  kernels::Stage<L>& s = w.stage;
+  LaneBits resolved = 0;
+  switch (scheme) {
+    case Integrator::bdf1:
+    case Integrator::linear_implicit:
+      each([&](int i, int l) {
+        s.r[i][l] = 0, s.s[i][l] = -w.v0[i][l], s.x[i][l] = h * w.v0[i][l];
+      });
+      if (scheme == Integrator::bdf1) {
+        resolved = solve_one_stage(table, w, lanes, 1, h, inside_split, report);
+      } else {
+        fill(s.c0_over_h, 1 / h);
+        fill(s.inverse_h, 1 / h);
+        resolved = linear_step(model_, table, w, lanes, report);
+        each([&](int i, int l) { s.v[i][l] = s.x[i][l] / h; });
+      }
+      break;
+    case Integrator::bdf2:
+      state_difference(model_, w.q_before, w.q0, s.r);  // q₁ is the newest state, in q0
+      each([&](int i, int l) {
+        s.r[i][l] = 0.5 * s.r[i][l];
+        s.s[i][l] = 0.5 * w.v_before[i][l] - 2 * w.v0[i][l];
+        s.x[i][l] = h * (1.5 * w.v0[i][l] - 0.5 * w.v_before[i][l]);
+      });
+      resolved = solve_one_stage(table, w, lanes, 1.5, h, inside_split, report);
+      break;
+    case Integrator::sdirk2: {
+      each([&](int i, int l) {
+        s.r[i][l] = 0, s.s[i][l] = -w.v0[i][l] / kGamma, s.x[i][l] = kGamma * h * w.v0[i][l];
+      });
+      lanes = solve_one_stage(table, w, lanes, 1 / kGamma, h, inside_split, report);
+      each([&](int i, int l) {
+        w.x_gamma[i][l] = s.x[i][l], w.v_gamma[i][l] = s.v[i][l];
+        s.r[i][l] = -kKappa * s.x[i][l];
+        s.s[i][l] = -(w.v0[i][l] + kEta * (s.v[i][l] - w.v0[i][l])) / kGamma;
+        s.x[i][l] += (1 - kGamma) * h * s.v[i][l];
+      });
+      resolved = solve_one_stage(table, w, lanes, 1 / kGamma, h, inside_split, report);
+      break;
+    }
+  }
+  finish(w, resolved, h, resolved, report);
+  return resolved;
+}
+
+/// q1 = centre ⊕ x, v1 = v. A joint that turned by π or more is not resolved: its chart ends there.
+template <int L>
+void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits& resolved,
+                       NewtonReport& report) const {
+  for (int l = 0; l < L; ++l) {
+    if (!has(lanes, l)) continue;
+    for (int i = 0; i < model_.nv; ++i) w.v1[i][l] = w.stage.v[i][l];
+    for (const kernels::Link& link : model_.links) {
+      const Row<L>* x = w.stage.x + link.v;
+      if (link.kind != JointKind::spherical) {
+        for (int k = 0; k < kernels::dofs(link.kind); ++k)
+          w.q1[link.q + k][l] = w.stage.centre[link.q + k][l] + x[k][l];
+        continue;
+      }
+      const Vec3<double> turn = {x[0][l], x[1][l], x[2][l]};
+      const Row<L>* v = w.stage.v + link.v;
+      const Vec3<double> rate = {v[0][l], v[1][l], v[2][l]};
+      if (!(dot(turn, turn) < M_PI * M_PI) || !(dot(rate, rate) * h * h < M_PI * M_PI)) {
+        resolved &= ~(1U << l);
+        report.status[l] = StepStatus::rotation;
+      }
+      const Quat<double> q = rotate_by(quat_at(w.stage.centre + link.q, l), turn);
+      w.q1[link.q][l] = q.w, w.q1[link.q + 1][l] = q.x, w.q1[link.q + 2][l] = q.y,
+      w.q1[link.q + 3][l] = q.z;
+    }
+  }
+}
+
+/// Adds the solve that ended in q0, v0.
+template <int L>
+void GroupStep::note(const BasicWorkspace<L>& w, int lane, Integrator scheme, double h,
+                     std::vector<TapedSolve>* to) const {
+  if (to == nullptr) return;
+  const auto column = [&](const Row<L>* rows, int count) {
+    std::vector<double> x(static_cast<std::size_t>(count));
+    for (int i = 0; i < count; ++i) x[std::size_t(i)] = rows[i][lane];
+    return x;
+  };
+  to->push_back({scheme, h, column(w.q0, model_.nq), column(w.v0, model_.nv),
+                 column(w.x_gamma, scheme == Integrator::sdirk2 ? model_.nv : 0)});
+}
+
+/// Two half steps from q0, v0, split again where needed.
+bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
+                      NewtonReport& report, std::vector<TapedSolve>* solves) const {
+  if (depth > kDeepestSplit) return false;
+  // Order 2 must survive inside a BDF2 step, and so must its history: SDIRK2 there, not BDF1.
+  const bool second_order =
+      settings_.integrator == Integrator::bdf2 || settings_.integrator == Integrator::sdirk2;
+  const Integrator scheme = second_order ? Integrator::sdirk2 : Integrator::bdf1;
+  for (int half = 0; half < 2; ++half) {
+    if (run(scheme, table, w, 1U, 0.5 * h, true, report) != 0) {
+      for (int i = 0; i < model_.nq; ++i) w.q0[i] = w.q1[i];
+      for (int i = 0; i < model_.nv; ++i) w.v0[i] = w.v1[i];
+      note(w, 0, scheme, 0.5 * h, solves);
+    } else if (!split(table, w, 0.5 * h, depth + 1, report, solves)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Splits the step of one lane of a group; the others wait.
+template <int L>
+bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane,
+                           SingleWorkspace& alone, NewtonReport& report,
+                           std::vector<TapedSolve>* solves) const {
+  if constexpr (L == 1) {
+    if (&w == &alone) return split(table, w, settings_.timestep, 1, report, solves);
+  }
+  const auto to_one = [&](const Row<L>* from, Row<1>* to, int count) {
+    for (int i = 0; i < count; ++i) to[i][0] = from[i][lane];
+  };
+  const auto from_one = [&](const Row<1>* from, Row<L>* to, int count) {
+    for (int i = 0; i < count; ++i) to[i][lane] = from[i][0];
+  };
+  to_one(w.q0, alone.q0, model_.nq);
+  to_one(w.v0, alone.v0, model_.nv);
+  to_one(w.stage.tau, alone.stage.tau, model_.nv);
+  to_one(w.stage.target, alone.stage.target, model_.nv);
+  alone.stage.block =
+      w.stage.block == nullptr ? nullptr : w.stage.block + w.stage.group * kernels::kGroup + lane;
+  alone.stage.group = 0;
+  NewtonReport one;
+  one.status[0] = report.status[lane];
+  one.iterations[0] = report.iterations[lane];
+  one.residual[0] = report.residual[lane];
+  const bool done = split(table, alone, settings_.timestep, 1, one, solves);
+  from_one(alone.q0, w.q0, model_.nq);
+  from_one(alone.v0, w.v0, model_.nv);
+  report.status[lane] = one.status[0];
+  report.iterations[lane] = one.iterations[0];
+  report.residual[lane] = one.residual[0];
+  return done;
+}
+
+template <int L>
+void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                        SingleWorkspace& alone, LaneBits lanes, LaneBits history,
+                        NewtonReport& report, SolveLog* log) const {
+  const double h = settings_.timestep;
+  LaneBits resolved = 0;
+  const auto commit = [&](LaneBits done) {
+    for (int l = 0; l < L; ++l) {
+      if (!has(done, l)) continue;
+      for (int i = 0; i < model_.nq; ++i) w.q0[i][l] = w.q1[i][l];
+      for (int i = 0; i < model_.nv; ++i) w.v0[i][l] = w.v1[i][l];
+    }
+    resolved |= done;
+  };
+  clear_candidates(w);
+  if (settings_.integrator == Integrator::bdf2) {
+    if ((lanes & history) != 0)
+      commit(run(Integrator::bdf2, table, w, lanes & history, h, false, report));
+    if (const LaneBits starting = lanes & ~history; starting != 0) {
+      const LaneBits done = run(Integrator::sdirk2, table, w, starting, h, false, report);
+      commit(done);
+      for (int l = 0; l < L; ++l)
+        if (has(done, l))
+          note(w, l, Integrator::sdirk2, h,
+               log == nullptr ? nullptr : &log->special[std::size_t(l)]);
+    }
+  } else {
+    commit(run(settings_.integrator, table, w, lanes, h, false, report));
+    if (log != nullptr &&
+        settings_.integrator == Integrator::sdirk2)  // before a split of some lane overwrites them
+      for (int i = 0; i < model_.nv; ++i)
+        for (int l = 0; l < L; ++l)
+          if (has(resolved, l)) log->x_gamma[i * kernels::kBlock + l] = w.x_gamma[i][l];
+  }
+  for (int l = 0; l < L; ++l) {
+    if (!has(lanes & ~resolved, l)) continue;
+    const StepStatus first = report.status[l];
+    if (split_lane(table, w, l, alone, report,
+                   log == nullptr ? nullptr : &log->special[std::size_t(l)])) {
+      report.status[l] = StepStatus::split;
+    } else if (!failed(report.status[l])) {
+      report.status[l] = first;
+    }
+  }
+  // The next step's history is log(R₁ᵀR₀): a turn of π or more in this one would be read as its
+  // complement.
+  for (int l = 0; l < L; ++l) {
+    if (!has(lanes, l) || failed(report.status[l])) continue;
+    for (const kernels::Link& link : model_.links) {
+      if (link.kind != JointKind::spherical) continue;
+      const Row<L>* v = w.v0 + link.v;
+      const Vec3<double> rate = {v[0][l], v[1][l], v[2][l]};
+      if (!(dot(rate, rate) * h * h < M_PI * M_PI)) report.status[l] = StepStatus::rotation;
+    }
+  }
+}
+
+template void GroupStep::advance(const kernels::KernelTable&, Workspace&, SingleWorkspace&,
+                                 LaneBits, LaneBits, NewtonReport&, SolveLog*) const;
+template void GroupStep::advance(const kernels::KernelTable&, SingleWorkspace&, SingleWorkspace&,
+                                 LaneBits, LaneBits, NewtonReport&, SolveLog*) const;
+
+}  // namespace tangere

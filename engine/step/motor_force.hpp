@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Motor forces that are known when a step begins: force motors, and position motors timed at the
+// start.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "engine/model/compiled_model.hpp"
+#include "engine/step/rotation_log.hpp"
+#include "engine/step/workspace.hpp"
+
+namespace tangere {
+
+/// Force of a motor [N or N m]. `state`: one environment's column of its block; `u`: controls of
+/// the motor's joint from the first dof of its elementary link on.
+inline double force_at_start(const CompiledModel& m, const CompiledMotor& motor,
+                             const double* state, const double* u) {
+  if (motor.control == MotorControl::force)
+    return motor.low +
+           (std::clamp(u[motor.component], -1.0, 1.0) + 1) * (0.5 * (motor.high - motor.low));
+  const auto row = [&](int r) { return state[r * kernels::kBlock]; };
+  const auto number = [&](const kernels::Parameter& p) { return p.row < 0 ? p.value : row(p.row); };
+  const kernels::Link& link = m.links[std::size_t(motor.link)];
+  const int q = m.layout.q + link.q;
+  double error;
+  if (link.kind == kernels::JointKind::spherical) {  // from here to the target, in body axes
+    const kernels::Quat<double> here = {row(q), row(q + 1), row(q + 2), row(q + 3)};
+    const kernels::Quat<double> there =
+        kernels::quaternion_exp(kernels::Vec3<double>{u[0], u[1], u[2]});
+    const kernels::Vec3<double> way = rotation_log(conjugate(here) * there);
+    error = motor.component == 0 ? way.x : motor.component == 1 ? way.y : way.z;
+  } else {
+    error = u[motor.component] - row(q + motor.component);
+  }
+  return std::clamp(number(motor.P) * error - number(motor.D) * row(m.layout.v + motor.dof),
+                    motor.low, motor.high);
+}
+
+/// What the motors of one lane do: forces known at the start of the step, targets of the others.
+/// `state`: the lane's column of its block. Returns false when a control is not finite.
+template <int L>
+bool set_motors(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const double* state,
+                std::span<const double> u) {
+  for (int i = 0; i < m.nv; ++i) w.stage.tau[i][lane] = 0;
+  for (std::size_t k = 0; k < std::size_t(m.nu); ++k) {
+    if (!std::isfinite(u[k])) return false;
+    const CompiledMotor& motor = m.motors[k];
+    if (motor.control == MotorControl::position && motor.timing == MotorTiming::end) {
+      w.stage.target[motor.dof][lane] = u[k];
+    } else {
+      w.stage.tau[motor.dof][lane] =
+          force_at_start(m, motor, state, u.data() + (k - std::size_t(motor.component)));
+    }
+  }
+  return true;
+}
+
+}  // namespace tangere

@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: Apache-2.0
+// Newton in lanes. All searching lanes are evaluated together; each lane accepts or halves its own
+// step.
+//
+// Accepted when a trial x - αΔ passes the natural test ‖D^½ A⁻¹ g(x - αΔ)‖ ≤ (1 - α/4) ‖D^½ Δ‖ with
+// the factor at hand (D = diag M at the first point), when its scaled residual r
+// (kernels/step/norms-inl.hpp) is at most (1 - α/4) of the last point's, or when r is at most the
+// tolerance. One test alone stalls at first touches: the natural test where a factor from before
+// the touch says nothing of the forces after it, the residual where a long way must first be gone
+// uphill. The rounding floor in r comes from the last point that a direction was computed at.
+//
+// Where a direction brings no new lowest residual, the search goes back and forth between sticking
+// and slipping: the slope of one side leads far into the other. The next directions then take
+// friction by its secant, -s v_t with s as it is. That converges slowly from anywhere, so any
+// decrease will do, and a few such directions reach the side that the root is on. A lane that finds
+// no new lowest residual for `patience` directions gives up.
+//
+// The natural test has A⁻¹ g at the new point already: the next step if the factor at hand is used
+// again (a chord step). Such steps leave a fixed share ρ of the residual, about twice what the
+// Newton step before them left of its own, and they cost a third of a Newton step. They are taken
+// where three of them should meet the tolerance. A chord step that fails the natural test is taken
+// back for a Newton step.
+//
+// Whether an evaluation brings the Jacobian along is a guess about cost, never about results: g
+// alone where every lane should be done or take a chord step, and the Jacobian after it when one
+// was not. The Jacobian of one lane costs its contacts a third of a group's: where a single lane
+// needs one, it comes after g too.
+#include "engine/step/newton.hpp"
+
+#include <cmath>
+
+#include "engine/step/detection.hpp"
+
+namespace tangere {
+
+namespace {
+
+// Decrease that a trial must bring, per α: of Newton's directions and of those by the secant, of
+// which there are `kSecants` in a row.
+constexpr double kDecrease = 0.25, kSecantDecrease = 0.01;
+constexpr int kSecants = 3;
+
+template <int L>
+struct Search {
+  using LaneRow = kernels::Row<L>;
+  const CompiledModel& model;
+  const kernels::KernelTable& table;
+  BasicWorkspace<L>& w;
+  const NewtonLimits& limits;
+  NewtonReport& report;
+  double gravity;
+  LaneBits searching;
+  LaneBits on_trial = 0;     ///< lanes whose x is a trial along delta
+  LaneBits use_pivoted = 0;  ///< lanes whose factor at hand is the pivoted one
+  std::array<double, L> alpha{}, delta_norm{};
+  std::array<double, L> last{};    ///< scaled residual of the last accepted point
+  std::array<double, L> lowest{};  ///< of all accepted points
+  std::array<double, L>
+      expected{};             ///< what should be left once the next point has had its chord step
+  LaneBits chord = 0;         ///< lanes whose trial is a chord step
+  LaneBits no_chord = 0;      ///< lanes that had one fail
+  bool with_jacobian = true;  ///< the last evaluation
+  std::array<int, L> halvings{}, directions{};
+  std::array<int, L> idle{};     ///< directions since the lowest residual
+  std::array<int, L> secants{};  ///< directions left that take friction by its secant
+
+  [[nodiscard]] int n() const { return model.nv; }
+  [[nodiscard]] const kernels::StageKernels<L>& kernel() const { return table.stage<L>(); }
+
+  /// The only one of `lanes`, of which there are some, or -1.
+  static int lone(LaneBits lanes) { return (lanes & (lanes - 1)) == 0 ? __builtin_ctz(lanes) : -1; }
+
+  /// Poses at x; lists of lanes that have none yet or outran theirs.
+  void locate(bool first) {
+    kernel().kinematics(model.view, w.stage);
+    LaneBits stale = first ? searching : 0;
+    for (int l = 0; l < L; ++l)
+      if (has(searching, l) && w.stage.excess[0][l] > 0) stale |= 1U << l;
+    if (stale != 0) find_candidates(model, table, w, stale);
+    if constexpr (L > 1)
+      if (lone(searching) < 0) lists_to_rows(table, w, searching);
+  }
+
+  /// The pass that is due: g alone where all lanes but one should be done, else everything.
+  void evaluate(bool first) {
+    locate(first);
+    LaneBits open = 0;
+    for (int l = 0; l < L; ++l)
+      if (has(searching, l) && !(expected[l] <= limits.tolerance)) open |= 1U << l;
+    with_jacobian = first || (open != 0 && (lone(open) < 0 || open == searching));
+    (with_jacobian ? kernel().evaluate : kernel().residual)(model.view, w.stage, lone(searching));
+    if (first) {
+      kernel().set_weights(model.view, w.stage);
+      set_floor(searching);
+    }
+  }
+
+  void set_floor(LaneBits lanes) {
+    kernel().set_floor(model.view, w.stage, model.unknown_scale.data(), row_of(lanes));
+  }
+
+  static LaneRow row_of(LaneBits lanes) {
+    LaneRow row;
+    for (int l = 0; l < L; ++l) row[l] = has(lanes, l) ? 1 : 0;
+    return row;
+  }
+
+  void scaled_residuals(LaneRow& out) const {
+    kernel().scaled_residual(model.view, w.stage, gravity, out);
+  }
+  void weighted_norms(const LaneRow* a, LaneRow& out) const {
+    kernel().weighted_norm(model.view, w.stage, a, out);
+  }
+
+  void stop(int l, StepStatus status) {
+    report.status[l] = status;
+    searching &= ~(1U << l);
+    on_trial &= ~(1U << l);
+  }
+
+  /// Pivoted solve of one lane, for factors that plain elimination spoiled.
+  void pivoted_solve(int l, const LaneRow* b, LaneRow* out) {
+    for (int i = 0; i < n(); ++i) w.rhs[i] = b[i][l];
+    w.rhs = w.pivoted[l].solve(w.rhs).eval();
+    for (int i = 0; i < n(); ++i) out[i][l] = w.rhs[i];
+  }
+  void pivoted_factor(int l) {
+    Eigen::MatrixXd& a = w.dense[0];
+    const kernels::Pattern& p = model.view.pattern;
+    for (int i = 0; i < n(); ++i)
+      for (int j = 0; j < n(); ++j)
+        a(i, j) = p.slot[i * n() + j] < 0 ? 0 : w.stage.A[p.slot[i * n() + j]][l];
+    w.pivoted[l].compute(a);
+  }
+
+  /// Judges the trials at the present x. Returns the lanes that hold an accepted, unconverged
+  /// point.
+  LaneBits judge() {
+    LaneRow residual, test_norm{};
+    scaled_residuals(residual);
+    if (on_trial != 0) {
+      kernel().solve(model.view, w.stage, w.stage.g, w.test);
+      for (int l = 0; l < L; ++l)
+        if (has(on_trial & use_pivoted, l)) pivoted_solve(l, w.stage.g, w.test);
+      weighted_norms(w.test, test_norm);
+    }
+    LaneBits accepted = 0;
+    for (int l = 0; l < L; ++l) {
+      if (!has(searching, l)) continue;
+      ++report.iterations[l];
+      if (residual[l] <= limits.tolerance) {
+        report.residual[l] = residual[l];
+        stop(l, StepStatus::converged);
+      } else if (!has(on_trial, l)) {
+        if (std::isfinite(residual[l])) {
+          accepted |= 1U << l;
+          last[l] = lowest[l] = residual[l];
+        } else {
+          stop(l, StepStatus::non_finite);
+        }
+      } else if (descends(l, test_norm[l], residual[l])) {
+        report.residual[l] = residual[l];
+        const double ratio = residual[l] / last[l];
+        if (chord_suffices(l, residual[l], has(chord, l) ? ratio : 2 * ratio)) {
+          take_chord(l, test_norm[l]);
+        } else if (stalls(l, residual[l])) {
+          stop(l, StepStatus::not_converged);
+        } else {
+          accepted |= 1U << l;
+          const double next = ratio * ratio, share = 2 * next;  // a Newton step squares the ratio
+          expected[l] = residual[l] * next * share * share * share;
+        }
+        last[l] = residual[l];
+      } else if (has(chord, l)) {
+        take_back(l);
+      } else if (++halvings[l] > limits.max_halvings) {
+        stop(l, StepStatus::not_converged);
+      } else {
+        alpha[l] *= 0.5;
+        expected[l] = HUGE_VAL;
+        for (int i = 0; i < n(); ++i) w.stage.x[i][l] = w.base[i][l] - alpha[l] * w.delta[i][l];
+      }
+    }
+    return accepted;
+  }
+
+  /// Of a chord step only the natural test counts: what its factor leaves is what decides about the
+  /// next.
+  [[nodiscard]] bool descends(int l, double test_norm, double residual) const {
+    const double share = 1 - (secants[l] > 0 ? kSecantDecrease : kDecrease) * alpha[l];
+    return test_norm <= share * delta_norm[l] || (!has(chord, l) && residual <= share * last[l]);
+  }
+  /// Chooses how the next direction takes friction; whether there should be none.
+  [[nodiscard]] bool stalls(int l, double residual) {
+    if (residual < lowest[l]) {
+      lowest[l] = residual;
+      idle[l] = 0;
+      if (secants[l] > 0) use_secant(l, secants[l] - 1);
+      return false;
+    }
+    use_secant(l, kSecants);
+    return ++idle[l] > limits.patience;
+  }
+  void use_secant(int l, int directions_left) {
+    if ((secants[l] > 0) != (directions_left > 0))
+      with_jacobian = false;  // the one at hand is of the other kind
+    secants[l] = directions_left;
+    w.stage.friction_tangent[l] = directions_left > 0 ? 0 : 1;
+  }
+
+  [[nodiscard]] bool chord_suffices(int l, double residual, double share) const {
+    return alpha[l] == 1 && !has(no_chord, l) &&
+           residual * share * share * share <= limits.tolerance;
+  }
+  /// The natural test's vector as the next step.
+  void take_chord(int l, double norm) {
+    chord |= 1U << l;
+    expected[l] = 0;
+    delta_norm[l] = norm;
+    for (int i = 0; i < n(); ++i) {
+      w.base[i][l] = w.stage.x[i][l];
+      w.delta[i][l] = w.test[i][l];
+      w.stage.x[i][l] -= w.test[i][l];
+    }
+  }
+  /// Back to where the chord step began, for a Newton direction from there.
+  void take_back(int l) {
+    chord &= ~(1U << l);
+    no_chord |= 1U << l;
+    on_trial &= ~(1U << l);
+    expected[l] = HUGE_VAL;
+    for (int i = 0; i < n(); ++i) w.stage.x[i][l] = w.base[i][l];
+  }
+
+  /// New directions at the accepted points, and the full step along each as the next trial.
+  void new_directions(LaneBits accepted) {
+    if (!with_jacobian) kernel().evaluate(model.view, w.stage, lone(accepted));
+    set_floor(accepted);
+    const LaneRow accept = row_of(accepted);
+    kernel().factor(model.view, w.stage, (searching & ~accepted) == 0 ? nullptr : &accept);
+    kernel().solve_watched(model.view, w.stage, w.stage.g, w.test, &w.sound);
+    for (int l = 0; l < L; ++l) {
+      if (!has(accepted, l)) continue;
+      use_pivoted &= ~(1U << l);
+      if (w.sound[l] > 0) continue;
+      use_pivoted |= 1U << l;
+      pivoted_factor(l);
+      pivoted_solve(l, w.stage.g, w.test);
+    }
+    LaneRow norm;
+    weighted_norms(w.test, norm);
+    for (int l = 0; l < L; ++l) {
+      if (!has(accepted, l)) continue;
+      if (!std::isfinite(norm[l])) {
+        stop(l, StepStatus::singular);
+        continue;
+      }
+      if (++directions[l] > limits.max_iterations) {
+        stop(l, StepStatus::not_converged);
+        continue;
+      }
+      delta_norm[l] = norm[l];
+      alpha[l] = 1;
+      halvings[l] = 0;
+      on_trial |= 1U << l;
+      chord &= ~(1U << l);
+      for (int i = 0; i < n(); ++i) {
+        w.base[i][l] = w.stage.x[i][l];
+        w.delta[i][l] = w.test[i][l];
+        w.stage.x[i][l] -= w.test[i][l];
+      }
+    }
+  }
+};
+
+double magnitude(const kernels::Vec3<double>& a) { return std::sqrt(dot(a, a)); }
+
+}  // namespace
+
+template <int L>
+LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, LaneBits lanes, const NewtonLimits& limits,
+                     NewtonReport& report) {
+  Search<L> s{model, table, w, limits, report, magnitude(model.view.gravity), lanes};
+  bool first = true;
+  while (s.searching != 0) {
+    s.evaluate(first);
+    first = false;
+    const LaneBits accepted = s.judge();
+    if (accepted != 0) s.new_directions(accepted);
+  }
+  for (int l = 0; l < L; ++l) w.stage.friction_tangent[l] = 1;
+  LaneBits converged = 0;
+  for (int l = 0; l < L; ++l)
+    if (has(lanes, l) && report.status[l] == StepStatus::converged) converged |= 1U << l;
+  return converged;
+}
+
+template <int L>
+LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report) {
+  static constexpr NewtonLimits kOnce{0, 1, 0, 0};
+  Search<L> s{model, table, w, kOnce, report, magnitude(model.view.gravity), lanes};
+  s.evaluate(true);
+  kernels::Row<L> residual;
+  s.scaled_residuals(residual);
+  for (int l = 0; l < L; ++l) {
+    if (!has(lanes, l)) continue;
+    ++report.iterations[l];
+    report.residual[l] = residual[l];
+    if (!std::isfinite(residual[l])) s.stop(l, StepStatus::non_finite);
+  }
+  s.new_directions(s.searching);
+  for (int l = 0; l < L; ++l)
+    if (has(s.searching, l)) report.status[l] = StepStatus::converged;
+  return s.searching;
+}
+
+template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, Workspace&,
+                              LaneBits, const NewtonLimits&, NewtonReport&);
+template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
+                              LaneBits, const NewtonLimits&, NewtonReport&);
+template LaneBits linear_step(const CompiledModel&, const kernels::KernelTable&, Workspace&,
+                              LaneBits, NewtonReport&);
+template LaneBits linear_step(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
+                              LaneBits, NewtonReport&);
+
+}  // namespace tangere

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Masked Newton on one stage of a group of eight environments (docs/solver.md).
+#pragma once
+
+#include <array>
+
+#include "engine/step/batch.hpp"
+#include "engine/step/workspace.hpp"
+
+namespace tangere {
+
+struct NewtonLimits {
+  double tolerance;    ///< on the scaled residual
+  int max_iterations;  ///< Newton directions
+  int max_halvings;    ///< per direction
+  int patience;        ///< directions in a row without a new lowest residual
+};
+
+/// Per lane: how the solve went. Lanes that were not asked for keep what they had.
+struct NewtonReport {
+  std::array<StepStatus, kernels::kGroup> status{};
+  std::array<int, kernels::kGroup> iterations{};   ///< evaluations of the residual; added up
+  std::array<double, kernels::kGroup> residual{};  ///< scaled residual at the last accepted point
+};
+
+/// Solves g(x) = 0 for the lanes in `lanes`, from the x in the stage. On return the stage's x and v
+/// hold the solution of converged lanes. Returns the lanes that converged; the others have a
+/// failure in `report.status`.
+template <int L>
+LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, LaneBits lanes, const NewtonLimits& limits,
+                     NewtonReport& report);
+
+/// One direction from the x in the stage, without a test: the linearly implicit step. Returns the
+/// lanes where it is finite.
+template <int L>
+LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table,
+                     BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report);
+
+}  // namespace tangere

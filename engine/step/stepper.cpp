@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// Between the batch and the group: gathers eight lanes, steps them, scatters what succeeded.
+#include "engine/step/stepper.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/step/motor_force.hpp"
+#include "engine/step/step_settings.hpp"
+#include "engine/step/tape.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+using kernels::kGroup;
+
+StepSettings step_settings(const Model& model, const StepperOptions& o) {
+  const StepSettings s = {
+      o.integrator.value_or(model.integrator()), o.timestep.value_or(model.timestep()),
+      o.tolerance.value_or(model.solver().tolerance), model.solver().max_iterations};
+  if (!(s.timestep > 0) || !std::isfinite(s.timestep))
+    throw InputError("timestep " + std::to_string(s.timestep) + " s; expected a positive number");
+  if (!(s.tolerance > 0) || !std::isfinite(s.tolerance))
+    throw InputError("solver tolerance " + std::to_string(s.tolerance) +
+                     "; expected a positive number");
+  return s;
+}
+
+/// Lanes of one group of a block: environment `first` + l in lane l.
+struct GroupOfBlock {
+  double* rows;  ///< row r of the block's lane l: rows[r * kBlock + l]
+  int first;
+  LaneBits live = 0, history = 0;
+};
+
+struct Stepper::Impl {
+  Model model;
+  StepSettings settings;
+  GroupStep step;
+  Workspace work;
+  SingleWorkspace single;
+
+  Impl(const Model& m, const StepSettings& s)
+      : model(m),
+        settings(s),
+        step(model.compiled(), settings),
+        work(model.compiled()),
+        single(model.compiled()) {}
+
+  /// Steps the live lanes of a group; `lane`: which of them stands in lane 0 of a workspace of one.
+  template <int L>
+  void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane,
+                  BlockTape* tape) {
+    const CompiledModel& m = model.compiled();
+    const auto gather = [&](kernels::Row<L>* to, int row, int count) {
+      for (int i = 0; i < count; ++i)
+        for (int l = 0; l < L; ++l) to[i][l] = g.rows[(row + i) * kBlock + lane + l];
+    };
+    gather(w.q0, m.layout.q, m.nq);
+    gather(w.v0, m.layout.v, m.nv);
+    gather(w.q_before, m.layout.previous_q, m.nq);
+    gather(w.v_before, m.layout.previous_v, m.nv);
+    w.stage.block = g.rows + lane;
+    w.stage.group = 0;
+    const LaneBits live = g.live >> lane;
+    NewtonReport report;
+    SolveLog log;
+    const int of_block = g.first % kBlock + lane;
+    if (tape != nullptr && tape->next_x_gamma() != nullptr)
+      log.x_gamma = tape->next_x_gamma() + of_block;
+    step.advance(kernels::active_kernels(), w, single, live, g.history >> lane, report,
+                 tape == nullptr ? nullptr : &log);
+    for (int l = 0; l < L; ++l)
+      if (std::vector<TapedSolve>& solves = log.special[std::size_t(l)]; !solves.empty())
+        tape->add({tape->steps(), of_block + l, std::move(solves)});
+    for (int l = 0; l < L; ++l) {
+      if (!has(live, l)) continue;
+      const std::size_t e = std::size_t(g.first + lane + l);
+      batch.status_[e] = report.status[l];
+      batch.iterations_[e] = report.iterations[l];
+      batch.residual_[e] = report.residual[l];
+      if (failed(report.status[l])) continue;
+      batch.has_history_[e] = 1;
+      const auto shift = [&](int now, int before, const kernels::Row<L>* from, int count) {
+        for (int i = 0; i < count; ++i) {
+          double* row = g.rows + i * kBlock + lane + l;
+          row[before * kBlock] = row[now * kBlock];
+          row[now * kBlock] = from[i][l];
+        }
+      };
+      shift(m.layout.q, m.layout.previous_q, w.q0, m.nq);
+      shift(m.layout.v, m.layout.previous_v, w.v0, m.nv);
+    }
+  }
+};
+
+Stepper::Stepper(const Model& model, const StepperOptions& options)
+    : impl_(std::make_unique<Impl>(model, step_settings(model, options))) {}
+Stepper::~Stepper() = default;
+Stepper::Stepper(Stepper&&) noexcept = default;
+Stepper& Stepper::operator=(Stepper&&) noexcept = default;
+
+double Stepper::timestep() const { return impl_->settings.timestep; }
+Integrator Stepper::integrator() const { return impl_->settings.integrator; }
+double Stepper::tolerance() const { return impl_->settings.tolerance; }
+
+void Stepper::step(Batch& batch, std::span<const double> controls) {
+  for (int b = 0; b < batch.blocks(); ++b) step_block(batch, b, controls);
+}
+
+void Stepper::step_block(Batch& batch, int block, std::span<const double> controls,
+                         BlockTape* tape) {
+  const CompiledModel& model = impl_->model.compiled();
+  const std::size_t nu = std::size_t(model.nu);
+  for (int group = 0; group < kBlock / kGroup; ++group) {
+    GroupOfBlock g{batch.block(block) + group * kGroup, block * kBlock + group * kGroup};
+    for (int l = 0; l < kGroup; ++l) {
+      const std::size_t e = std::size_t(g.first + l);
+      if (g.first + l >= batch.environments() || failed(batch.status_[e]) || batch.held_[e] != 0)
+        continue;
+      g.live |= 1U << l;
+      if (batch.has_history_[e] != 0) g.history |= 1U << l;
+    }
+    // An environment on its own goes through kernels of one lane: the same bits, a third of the
+    // time.
+    const bool alone = g.live != 0 && (g.live & (g.live - 1)) == 0;
+    for (int l = 0; l < kGroup; ++l) {
+      if (!has(g.live, l)) continue;
+      const std::size_t e = std::size_t(g.first + l);
+      const std::span<const double> u = controls.subspan(e * nu, nu);
+      const double* state = g.rows + l;
+      if (alone ? set_motors(model, impl_->single, 0, state, u)
+                : set_motors(model, impl_->work, l, state, u))
+        continue;
+      batch.status_[e] = StepStatus::non_finite;
+      batch.iterations_[e] = 0;
+      g.live &= ~(1U << l);
+    }
+    if (g.live == 0) continue;
+    if (alone) {
+      impl_->step_lanes(batch, impl_->single, g, __builtin_ctz(g.live), tape);
+    } else {
+      impl_->step_lanes(batch, impl_->work, g, 0, tape);
+    }
+  }
+  if (tape != nullptr) tape->append(batch, block);
+}
+
+std::size_t Stepper::workspace_bytes(const Model& model) {
+  return Workspace::bytes(model.compiled());
+}
+
+}  // namespace tangere

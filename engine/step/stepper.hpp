@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// One implicit step of a batch: predict, detect, Newton in lanes, commit; lanes that fail are split
+// and solved alone.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "engine/step/batch.hpp"
+
+namespace tangere {
+
+class BlockTape;
+
+/// What a caller may change about the solve; defaults come from the scene.
+struct StepperOptions {
+  std::optional<Integrator> integrator;
+  std::optional<double> timestep;   ///< [s]
+  std::optional<double> tolerance;  ///< scaled residual, dimensionless
+};
+
+/// Owns the scratch of one thread. Steps any batch of its model; results do not depend on which
+/// Stepper ran.
+class Stepper {
+ public:
+  explicit Stepper(const Model& model, const StepperOptions& options = {});
+  ~Stepper();
+  Stepper(Stepper&&) noexcept;
+  Stepper& operator=(Stepper&&) noexcept;
+
+  [[nodiscard]] double timestep() const;        ///< the one in force [s]
+  [[nodiscard]] Integrator integrator() const;  ///< the one in force
+  [[nodiscard]] double tolerance() const;
+
+  /// Advances every environment that has not failed by one step. `controls`: (E, nu), clipped to
+  /// the motors' range.
+  void step(Batch& batch, std::span<const double> controls);
+
+  /// The same for one block of 16; `controls`: (E, nu) of the whole batch. The states after it are
+  /// added to `tape`.
+  void step_block(Batch& batch, int block, std::span<const double> controls,
+                  BlockTape* tape = nullptr);
+
+  /// Memory that a stepper of this model takes, [bytes].
+  static std::size_t workspace_bytes(const Model& model);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tangere

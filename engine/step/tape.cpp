@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// States in the layout of a block: [step][row][lane].
+#include "engine/step/tape.hpp"
+
+#include <algorithm>
+
+#include "engine/model/compiled_model.hpp"
+#include "engine/step/batch.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+
+int BlockTape::rows(const Model& model, Integrator integrator) {
+  return model.nq() + model.nv() * (integrator == Integrator::sdirk2 ? 2 : 1);
+}
+
+std::size_t BlockTape::bytes(const Model& model, Integrator integrator, std::int64_t steps) {
+  return std::size_t(steps + 2) * std::size_t(rows(model, integrator) * kBlock) * sizeof(double);
+}
+
+BlockTape::BlockTape(const Model& model, Integrator integrator, std::int64_t steps)
+    : model_(model),
+      nq_(model.nq()),
+      nv_(model.nv()),
+      row_count_(std::size_t(rows(model, integrator))),
+      states_(bytes(model, integrator, steps) / sizeof(double)),
+      taken_(kBlock, 0) {}
+
+void BlockTape::copy(const Batch& batch, int block, int first_row, double* to) const {
+  const double* from = batch.block(block) + first_row * kBlock;
+  std::copy(from, from + (nq_ + nv_) * kBlock, to);
+}
+
+void BlockTape::start(const Batch& batch, int block) {
+  const BlockLayout& layout = model_.compiled().layout;
+  steps_ = 0;
+  special_.clear();
+  std::fill(taken_.begin(), taken_.end(), 0);
+  copy(batch, block, layout.previous_q, slot(-1));
+  copy(batch, block, layout.q, slot(0));
+}
+
+void BlockTape::append(const Batch& batch, int block) {
+  copy(batch, block, model_.compiled().layout.q, slot(++steps_));
+  for (int l = 0; l < kBlock; ++l) {
+    const int e = block * kBlock + l;
+    if (e < batch.environments() && !failed(batch.status(e)) && !batch.held(e))
+      taken_[std::size_t(l)] = steps_;
+  }
+}
+
+void BlockTape::show(std::int64_t step, Batch& batch, int block) const {
+  std::copy_n(state(step), (nq_ + nv_) * kBlock,
+              batch.block(block) + model_.compiled().layout.q * kBlock);
+}
+
+double* BlockTape::next_x_gamma() {
+  if (row_count_ == std::size_t(nq_ + nv_)) return nullptr;
+  return slot(steps_ + 1) + std::size_t(nq_ + nv_) * kBlock;
+}
+
+const TapedStep* BlockTape::special(std::int64_t step, int lane) const {
+  const auto at =
+      std::lower_bound(special_.begin(), special_.end(), step,
+                       [](const TapedStep& s, std::int64_t value) { return s.step < value; });
+  for (auto s = at; s != special_.end() && s->step == step; ++s)
+    if (s->lane == lane) return &*s;
+  return nullptr;
+}
+
+}  // namespace tangere

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the reverse sweep needs of one block's rollout: its states, and of steps that were not plain
+// steps of the scheme how they came about.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/base/aligned.hpp"
+#include "engine/model/model.hpp"
+
+namespace tangere {
+
+class Batch;
+
+/// One solve of a step that had others than its scheme has: BDF2's start, the parts of a split
+/// step.
+struct TapedSolve {
+  Integrator scheme;
+  double h;                     ///< [s]
+  std::vector<double> q, v;     ///< its result: (nq), (nv)
+  std::vector<double> x_gamma;  ///< SDIRK2: its inner stage relative to where it began, (nv)
+};
+
+/// The solves of one environment's step, first to last.
+struct TapedStep {
+  std::int64_t step;
+  int lane;  ///< of the block
+  std::vector<TapedSolve> solves;
+};
+
+/// States of the 16 environments of a block after 0, 1, … steps, and one step before the first.
+class BlockTape {
+ public:
+  /// Room for `steps` steps; SDIRK2 keeps its inner stages as well.
+  BlockTape(const Model& model, Integrator integrator, std::int64_t steps);
+
+  /// Begins anew with the states of a block. Steps are counted from here on.
+  void start(const Batch& batch, int block);
+  /// Adds the states that a block has now. Lanes that have failed or are held keep theirs.
+  void append(const Batch& batch, int block);
+  /// Where the inner stages of the step that will be appended next go, rows (nv, 16); null when the
+  /// scheme has none.
+  [[nodiscard]] double* next_x_gamma();
+  void add(TapedStep step) { special_.push_back(std::move(step)); }
+
+  /// Puts the states after `step` steps into a block, where they are read; what it needs to go on
+  /// is not restored.
+  void show(std::int64_t step, Batch& batch, int block) const;
+
+  [[nodiscard]] std::int64_t steps() const { return steps_; }
+  /// Rows (nq + nv, 16) after `step` steps; -1: one step before the first.
+  [[nodiscard]] const double* state(std::int64_t step) const {
+    return states_.data() + std::size_t(step + 1) * row_count_ * 16;
+  }
+  /// Rows (nv, 16) of the inner stages of step `step`.
+  [[nodiscard]] const double* x_gamma(std::int64_t step) const {
+    return state(step + 1) + std::size_t(nq_ + nv_) * 16;
+  }
+  /// Of one environment's step, null for a plain one.
+  [[nodiscard]] const TapedStep* special(std::int64_t step, int lane) const;
+  /// Whether the environment took that step.
+  [[nodiscard]] bool took(std::int64_t step, int lane) const {
+    return step < taken_[std::size_t(lane)];
+  }
+  /// Memory of a block's tape for so many steps.
+  static std::size_t bytes(const Model& model, Integrator integrator, std::int64_t steps);
+
+ private:
+  static int rows(const Model& model, Integrator integrator);
+  double* slot(std::int64_t step) {
+    return states_.data() + std::size_t(step + 1) * row_count_ * 16;
+  }
+  void copy(const Batch& batch, int block, int first_row, double* to) const;
+
+  Model model_;
+  int nq_, nv_;
+  std::size_t row_count_;
+  std::int64_t steps_ = 0;
+  AlignedVector<double> states_;     // (steps + 2, rows, 16)
+  std::vector<TapedStep> special_;   // rising steps
+  std::vector<std::int64_t> taken_;  // (16)
+};
+
+}  // namespace tangere

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// One allocation for all rows of a group; sizes follow from the model.
+#include "engine/step/workspace.hpp"
+
+#include <algorithm>
+
+namespace tangere {
+
+using kernels::kGroup;
+using kernels::Row;
+
+namespace {
+
+/// Walks over all rows, counting them (base = nullptr) or handing them out.
+template <int L>
+std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) {
+  using LaneRow = Row<L>;
+  std::size_t used = 0;
+  const auto rows = [&](LaneRow*& p, int count) {
+    p = base == nullptr ? nullptr : base + used;
+    used += std::size_t(count);
+  };
+  kernels::Stage<L>& s = w.stage;
+  rows(s.centre, m.nq);
+  for (LaneRow** p : {&s.x, &s.r, &s.s, &s.tau, &s.target, &s.v, &s.g, &s.force_scale,
+                      &s.mass_diagonal, &s.weight, &s.inverse_weight})
+    rows(*p, m.nv);
+  rows(s.A, m.pattern.entries);
+  rows(s.LU, m.pattern.factor_entries);
+  rows(s.work, std::max(m.pattern.factor_entries, 5 * m.nv));
+  rows(s.excess, 1);
+  for (LaneRow** p : {&w.q0, &w.q_before, &w.q1}) rows(*p, m.nq);
+  for (LaneRow** p :
+       {&w.v0, &w.v_before, &w.v1, &w.x_gamma, &w.v_gamma, &w.delta, &w.base, &w.test})
+    rows(*p, m.nv);
+  const int link_pairs = static_cast<int>(m.link_pairs.size());
+  rows(w.references, 12 * link_pairs);
+  rows(w.near.link_poses, 12 * link_pairs);
+  rows(w.near.shape_poses, 12 * static_cast<int>(m.pairs.size()));
+  for (std::size_t k = 0; k < w.lists.size(); ++k) {
+    typename kernels::Stage<L>::List& list = w.lists[k];
+    list.stride = (m.pairs[k].n_points + kGroup - 1) / kGroup * kGroup + kGroup;
+    rows(list.points, 3 * list.stride);
+  }
+  return used;
+}
+
+}  // namespace
+
+template <int L>
+std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
+  BasicWorkspace w(m);
+  return w.memory.size() * sizeof(LaneRow) + w.own_points.size() * sizeof(double) +
+         w.scratch.size() + sizeof(double) * std::size_t(m.nv) * std::size_t(m.nv + 1) * (L + 1);
+}
+
+template <int L>
+BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m)
+    : lists(m.pairs.size()),
+      near_lanes(m.pairs.size()),
+      near{},
+      stage{},
+      pivoted(L, Eigen::PartialPivLU<Eigen::MatrixXd>(m.nv)),
+      dense(1, Eigen::MatrixXd(m.nv, m.nv)),
+      rhs(m.nv) {
+  memory.assign(lay_out<L>(m, *this, nullptr), LaneRow{});
+  lay_out<L>(m, *this, memory.data());
+  std::size_t own = 0;
+  for (const auto& list : lists) own += std::size_t(L * 3 * list.stride);
+  own_points.resize(own);
+  own = 0;
+  for (auto& list : lists) {
+    list.own = own_points.data() + own;
+    own += std::size_t(L * 3 * list.stride);
+  }
+  std::size_t bytes = 0;  // any instruction set may be chosen later
+  for (const kernels::KernelTable* table : kernels::available_kernels())
+    bytes = std::max(bytes, table->stage<L>().scratch_bytes(m.view));
+  scratch.resize(bytes);
+  // A lane that never lived holds unit quaternions, so that it computes with finite numbers.
+  for (const kernels::Link& link : m.links) {
+    if (link.kind != kernels::JointKind::spherical) continue;
+    for (LaneRow* q : {stage.centre, q0, q_before, q1})
+      for (double& w : q[link.q].lane) w = 1;
+  }
+  near.lanes = near_lanes.data();
+  for (std::size_t g = 0; g < m.link_pairs.size(); ++g) {
+    const kernels::LinkPair& links = m.link_pairs[g];
+    for (int i = 0; i < links.count; ++i) {
+      auto& list = lists[std::size_t(m.pair_order[std::size_t(links.first + i)])];
+      list.margin = links.margin;
+      list.reference = references + 12 * g;
+    }
+  }
+  stage.lists = lists.data();
+  stage.scratch = scratch.data();
+}
+
+template struct BasicWorkspace<kGroup>;
+template struct BasicWorkspace<1>;
+
+}  // namespace tangere

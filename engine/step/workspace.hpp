@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scratch of one thread: one group of eight lanes, or a single one, through one step. Nothing here
+// outlives a step.
+#pragma once
+
+#include <Eigen/LU>
+#include <cstdint>
+#include <vector>
+
+#include "engine/base/aligned.hpp"
+#include "engine/model/compiled_model.hpp"
+#include "kernels/table/kernel_table.hpp"
+
+namespace tangere {
+
+/// Bit l: lane l of the group.
+using LaneBits = unsigned;
+inline constexpr LaneBits kNoLane = 0;
+inline constexpr LaneBits kAllLanes = (1U << kernels::kGroup) - 1;
+inline bool has(LaneBits bits, int lane) { return ((bits >> lane) & 1U) != 0; }
+
+template <int L>
+struct BasicWorkspace {
+  using LaneRow = kernels::Row<L>;
+
+  explicit BasicWorkspace(const CompiledModel& model);
+  static std::size_t bytes(const CompiledModel& model);
+
+  using Rows = AlignedVector<LaneRow>;
+  Rows memory;  ///< every row below, in one allocation
+  AlignedVector<std::byte> scratch;
+  AlignedVector<double> own_points;  ///< the lists' points lane by lane
+  std::vector<typename kernels::Stage<L>::List> lists;
+  LaneBits in_rows = 0;  ///< lanes whose lists stand in the rows as well
+  LaneRow* references;   ///< (n_link_pairs, 12) what the lists' references point into
+  std::vector<unsigned> near_lanes;
+  kernels::NearPairs<L> near;
+  kernels::Stage<L> stage;
+
+  // The group's states: now, one step before, and the result of the solve in hand.
+  LaneRow *q0, *v0, *q_before, *v_before, *q1, *v1;
+  // SDIRK2's first stage, relative to q0.
+  LaneRow *x_gamma, *v_gamma;
+  // Newton: direction, point it starts from, natural test vector.
+  LaneRow *delta, *base, *test;
+  LaneRow sound;
+  std::vector<Eigen::PartialPivLU<Eigen::MatrixXd>>
+      pivoted;                         ///< (L) factor of lanes whose plain LU is useless
+  std::vector<Eigen::MatrixXd> dense;  ///< (1) the matrix being factored
+  Eigen::VectorXd rhs;
+};
+using Workspace = BasicWorkspace<kernels::kGroup>;
+using SingleWorkspace = BasicWorkspace<1>;
+
+}  // namespace tangere

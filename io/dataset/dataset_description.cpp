@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: Apache-2.0
+// Settings are compared as a file would hold them: what is written cannot be forgotten in the
+// comparison.
+#include "io/dataset/dataset_description.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <sstream>
+
+#include "io/hdf5/h5_listing.hpp"
+#include "io/trajectory/sensor_description.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr std::int64_t kFormatVersion = 2;
+constexpr const char* kGradients = "gradients";  // of /scene: the attribute and the group
+constexpr const char* kByRow = "one for each action";
+constexpr std::size_t kLongText = 60;  // bytes: beyond it a value is shown by the line that differs
+
+void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
+  if (!layout.task) {
+    h5::write_attribute(scene, "task", "none: a scene alone, whose every reward is 0");
+    return;
+  }
+  const TaskSpec& task = *layout.task;
+  h5::write_attribute(scene, "task", task.name);
+  h5::write_attribute(scene, "policy", layout.policy);
+  h5::write_attribute(scene, "success", task.success);
+  h5::write_attribute(scene, "action_unit", task.action.unit);
+  h5::write_attribute(scene, "action_meaning", task.action.meaning);
+  h5::write_scalar<double>(scene, "action_low", task.action.low);
+  h5::write_scalar<double>(scene, "action_high", task.action.high);
+  std::vector<std::string> units{"q_units", "v_units"}, meanings{"coordinates", "velocities"};
+  for (const TensorSpec& tensor : task.observations) {
+    units.push_back(tensor.unit);
+    meanings.push_back(tensor.meaning);
+  }
+  for (std::vector<std::string>* list : {&units, &meanings}) {
+    std::vector<std::string> stored;
+    for (const std::size_t k : layout.recorded()) stored.push_back((*list)[k]);
+    *list = std::move(stored);
+  }
+  h5::write_attribute(scene, "observation_units", std::span<const std::string>(units));
+  h5::write_attribute(scene, "observation_meanings", std::span<const std::string>(meanings));
+}
+
+void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
+  h5::write_attribute(scene, "name", layout.scene_name);
+  h5::write_attribute(scene, "text", layout.scene_text);
+  h5::write_attribute(scene, "tables", layout.tables);
+  h5::write_attribute(scene, "controls", layout.controls);
+  h5::write_scalar<std::uint64_t>(scene, "seed", layout.seed);
+  h5::write_scalar<std::int64_t>(scene, "steps", layout.steps);
+  h5::write_scalar<std::int64_t>(scene, "every", layout.every);
+  h5::write_scalar<double>(scene, "timestep", layout.timestep);
+  h5::write_attribute(scene, "timestep_unit", "s");
+  h5::write_attribute(scene, "integrator", layout.integrator);
+  h5::write_scalar<double>(scene, "tolerance", layout.tolerance);
+  h5::write_attribute(scene, "precision", layout.precision);
+  h5::write_attribute(scene, "compression", layout.compression);
+  h5::write_attribute(scene, "tactile", layout.sparse ? "sparse" : "dense");
+  h5::write_attribute(scene, "tangere_version", layout.version);
+  h5::write_attribute(scene, "instruction_set", layout.instruction_set);
+}
+
+void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
+  const auto texts = [&](const char* name, const std::vector<std::string>& list) {
+    h5::write_attribute(scene, name, std::span<const std::string>(list));
+  };
+  h5::write_attribute(scene, "quaternion_order", "w x y z");
+  h5::write_attribute(scene, "observation_type", layout.single ? "float32" : "float64");
+  texts("observations", layout.observation_names());
+  texts("q_names", layout.q_names);
+  texts("q_units", layout.q_units);
+  texts("v_names", layout.v_names);
+  texts("v_units", layout.v_units);
+  texts("action_names", layout.action_names());
+  if (!layout.randomized_names.empty()) {
+    texts("randomized_names", layout.randomized_names);
+    texts("randomized_units", layout.randomized_units);
+  }
+  describe_task(scene, layout);
+  if (!layout.task && !layout.variable_names.empty()) {
+    texts("variable_names", layout.variable_names);
+    h5::write_attribute(scene, "variable_units", "m");
+    h5::write_attribute(scene, "variable_frame", "world");
+  }
+  const h5::Id sensors = h5::create_group(scene, "sensors");
+  for (const SensorLayout& sensor : layout.sensors) {
+    const h5::Id group = h5::create_group(sensors, sensor.name);
+    describe_sensor(group, group, sensor);
+  }
+}
+
+void describe_gradients(const h5::Id& scene, const DatasetLayout& layout) {
+  if (layout.gradients.empty()) return;
+  h5::write_attribute(scene, "gradients", layout.gradients_of);
+  const h5::Id all = h5::create_group(scene, kGradients);
+  for (const GradientArray& array : layout.gradients) {
+    const h5::Id group = h5::create_group(all, array.name);
+    h5::write_attribute(group, "meaning", array.meaning);
+    h5::write_attribute(group, "rows", array.by_row ? kByRow : "one for the episode");
+    if (array.by_names.empty()) continue;
+    h5::write_attribute(group, "by_names", std::span<const std::string>(array.by_names));
+    h5::write_attribute(group, "by_units", std::span<const std::string>(array.by_units));
+  }
+}
+
+void add_attributes(const h5::Id& object, const std::string& prefix,
+                    std::vector<Setting>& settings) {
+  for (const std::string& name : h5::attribute_names(object))
+    settings.push_back({prefix + name, h5::attribute_text(object, name)});
+}
+
+/// The first line in which two texts differ, shortened.
+std::string line_of_difference(const std::string& there, const std::string& here) {
+  std::istringstream a(there), b(here);
+  for (int line = 1;; ++line) {
+    std::string of_a, of_b;
+    const bool more_a = static_cast<bool>(std::getline(a, of_a)),
+               more_b = static_cast<bool>(std::getline(b, of_b));
+    if (!more_a && !more_b) return "they differ in how they end";
+    if (more_a == more_b && of_a == of_b) continue;
+    return fmt::format("line {} is '{}' there, '{}' here", line, of_a.substr(0, kLongText),
+                       of_b.substr(0, kLongText));
+  }
+}
+
+}  // namespace
+
+std::string json_text(const std::string& text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\')
+      out += {'\\', c};
+    else if (static_cast<unsigned char>(c) < 0x20)
+      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    else
+      out += c;
+  }
+  return out + '"';
+}
+
+void describe_dataset(const h5::Id& file, const DatasetLayout& layout) {
+  h5::write_attribute(file, "format", "tangere dataset");
+  h5::write_scalar<std::int64_t>(file, "format_version", kFormatVersion);
+  h5::write_scalar<std::int64_t>(file, "dataset_episodes", layout.episodes);
+  h5::write_scalar<std::int64_t>(file, "dataset_shards", layout.shard_count());
+  h5::write_attribute(file, "command", layout.command);
+  const h5::Id scene = h5::create_group(file, "scene");
+  describe_run(scene, layout);
+  describe_numbers(scene, layout);
+  describe_gradients(scene, layout);
+}
+
+std::vector<Setting> settings_of(const DatasetLayout& layout) {
+  const h5::Id file = h5::create_memory_file();
+  describe_dataset(file, layout);
+  return read_settings(file);
+}
+
+std::vector<Setting> read_settings(const h5::Id& file) {
+  std::vector<Setting> settings;
+  for (const char* name : {"format", "format_version", "dataset_episodes", "dataset_shards"})
+    settings.push_back({name, h5::attribute_text(file, name)});
+  const h5::Id scene = h5::open_group(file, "scene"), sensors = h5::open_group(scene, "sensors");
+  add_attributes(scene, "", settings);
+  for (const std::string& sensor : h5::link_names(sensors))
+    add_attributes(h5::open_group(sensors, sensor), "sensors/" + sensor + "/", settings);
+  if (!h5::has_link(scene, kGradients)) return settings;
+  const h5::Id gradients = h5::open_group(scene, kGradients);
+  for (const std::string& name : h5::link_names(gradients))
+    add_attributes(h5::open_group(gradients, name), std::string(kGradients) + "/" + name + "/",
+                   settings);
+  return settings;
+}
+
+std::vector<std::string> differences(const std::vector<Setting>& there,
+                                     const std::vector<Setting>& here) {
+  const auto value_in = [](const std::vector<Setting>& list,
+                           const std::string& name) -> const std::string* {
+    const auto found =
+        std::find_if(list.begin(), list.end(), [&](const Setting& s) { return s.name == name; });
+    return found == list.end() ? nullptr : &found->value;
+  };
+  std::vector<std::string> lines;
+  for (const Setting& setting : here) {
+    const std::string* const other = value_in(there, setting.name);
+    if (other == nullptr) {
+      lines.push_back(fmt::format("{}: missing there", setting.name));
+    } else if (*other != setting.value) {
+      const bool is_long = std::max(other->size(), setting.value.size()) > kLongText;
+      lines.push_back(
+          is_long ? fmt::format("{}: {}", setting.name, line_of_difference(*other, setting.value))
+                  : fmt::format("{}: {} there, {} here", setting.name, *other, setting.value));
+    }
+  }
+  for (const Setting& setting : there)
+    if (value_in(here, setting.name) == nullptr)
+      lines.push_back(fmt::format("{}: missing here", setting.name));
+  return lines;
+}
+
+std::vector<GradientSaid> gradients_said(const h5::Id& scene) {
+  std::vector<GradientSaid> list;
+  if (!h5::has_link(scene, kGradients)) return list;
+  const h5::Id all = h5::open_group(scene, kGradients);
+  for (const std::string& name : h5::link_names(all)) {
+    const h5::Id one = h5::open_group(all, name);
+    list.push_back({name, h5::read_text(one, "meaning"), h5::read_text(one, "rows") == kByRow});
+  }
+  return list;
+}
+
+std::vector<std::int64_t> demo_numbers(const h5::Id& data) {
+  std::vector<std::int64_t> numbers;
+  for (const std::string& name : h5::link_names(data)) {
+    std::int64_t number = -1;
+    const char* const end = name.data() + name.size();
+    constexpr std::string_view kBegin = "demo_";
+    if (!name.starts_with(kBegin)) continue;
+    const auto [at, error] = std::from_chars(name.data() + kBegin.size(), end, number);
+    if (error == std::errc() && at == end) numbers.push_back(number);
+  }
+  std::sort(numbers.begin(), numbers.end());
+  return numbers;
+}
+
+}  // namespace tangere

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every shard of a data set says the same: its settings, written once and compared before
+// shards are put together.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/dataset/dataset_layout.hpp"
+#include "io/hdf5/h5.hpp"
+
+namespace tangere {
+
+/// Attributes of the root that belong to the whole data set, and the group /scene.
+void describe_dataset(const h5::Id& file, const DatasetLayout& layout);
+
+/// A JSON string, quotes included. Bytes from 0x80 on are UTF-8 already.
+std::string json_text(const std::string& text);
+
+/// All that decides which numbers a data set holds, in a fixed order: of a layout, of a file.
+std::vector<Setting> settings_of(const DatasetLayout& layout);
+std::vector<Setting> read_settings(const h5::Id& file);
+
+/// What differs, a line each: "seed: 9 there, 1 here". Of long texts the first lines that differ.
+/// Empty when nothing does.
+std::vector<std::string> differences(const std::vector<Setting>& there,
+                                     const std::vector<Setting>& here);
+
+/// What a file says of a derivative that each of its demos has.
+struct GradientSaid {
+  std::string name, meaning;
+  bool by_row = false;  ///< a row for each action
+};
+/// By name; none in most.
+std::vector<GradientSaid> gradients_said(const h5::Id& scene);
+
+/// Numbers of the demos in an open /data, ascending.
+std::vector<std::int64_t> demo_numbers(const h5::Id& data);
+
+}  // namespace tangere

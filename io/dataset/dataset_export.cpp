@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// Numbers are written in the fewest digits that give them back.
+#include "io/dataset/dataset_export.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
+
+#include "engine/base/error.hpp"
+#include "io/dataset/dataset_description.hpp"
+#include "io/files/part_file.hpp"
+#include "io/hdf5/h5_listing.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr std::size_t kWidest = 64;  // numbers of an observation in a table
+
+/// One dataset of a demo, read whole.
+struct Column {
+  std::size_t width = 1;
+  std::vector<double> values;  // (rows, width)
+  bool single = false;         // float32 on disk: shorter digits give it back
+};
+
+Column read_column(const h5::Id& group, const std::string& name) {
+  const h5::Id dataset = h5::open_dataset(group, name);
+  h5::Dims dims = h5::dimensions(dataset);
+  Column column;
+  for (std::size_t i = 1; i < dims.size(); ++i) column.width *= dims[i];
+  column.values.resize((dims.empty() ? 0 : dims[0]) * column.width);
+  const h5::Id type(H5Dget_type(dataset.get()));
+  column.single = H5Tget_class(type.get()) == H5T_FLOAT && H5Tget_size(type.get()) == sizeof(float);
+  if (!column.values.empty())
+    h5::read_box(dataset, h5::Dims(dims.size(), 0), dims, column.values.data());
+  return column;
+}
+
+std::size_t width_of(const h5::Id& group, const std::string& name) {
+  const h5::Dims dims = h5::dimensions(h5::open_dataset(group, name));
+  std::size_t width = 1;
+  for (std::size_t i = 1; i < dims.size(); ++i) width *= dims[i];
+  return width;
+}
+
+class CsvExport {
+ public:
+  CsvExport(const std::string& path, const ExportOptions& options)
+      : options_(options), part_(path, options.overwrite) {}
+
+  ExportResult run(const DatasetFiles& dataset) {
+    part_.write("# " + value_of(dataset.settings, "name") + ", seed " +
+                value_of(dataset.settings, "seed") + "\n");
+    for (const std::string& path : dataset.files) {
+      const h5::Id file = h5::open_file(path), data = h5::open_group(file, "data");
+      for (const std::int64_t demo : demo_numbers(data))
+        if (demo == options_.episode.value_or(demo))
+          add(h5::open_group(data, fmt::format("demo_{}", demo)), h5::open_group(file, "scene"),
+              demo);
+    }
+    if (options_.episode && result_.rows == 0)
+      throw IoError(fmt::format(
+          "'{}' has no episode {}, or it failed; 'tangere info' says how many there are",
+          dataset.folder.empty() ? dataset.files.front() : dataset.folder, *options_.episode));
+    part_.commit();
+    return result_;
+  }
+
+ private:
+  void write_header(const h5::Id& demo, const h5::Id& scene) {
+    std::string line = "episode,row";
+    const auto add_names = [&](const std::string& prefix, const std::vector<std::string>& names) {
+      for (const std::string& name : names) line += "," + prefix + name;
+    };
+    add_names("actions/", h5::read_texts(scene, "action_names"));
+    line += ",rewards,dones";
+    const h5::Id obs = h5::open_group(demo, "obs");
+    for (const std::string& name : h5::read_texts(scene, "observations")) {
+      const std::size_t width = width_of(obs, name);
+      if (width > kWidest) {
+        result_.left_out.push_back(name);
+        continue;
+      }
+      names_.push_back(name);
+      if (name == "q" || name == "v") {
+        add_names(name + "/", h5::read_texts(scene, name + "_names"));
+      } else {
+        for (std::size_t k = 0; k < width; ++k) line += fmt::format(",{}/{}", name, k);
+      }
+    }
+    result_.columns = std::count(line.begin(), line.end(), ',') + 1;
+    part_.write(line + "\n");
+  }
+
+  void add(const h5::Id& demo, const h5::Id& scene, std::int64_t number) {
+    if (result_.columns == 0) write_header(demo, scene);
+    std::vector<Column> columns;
+    for (const char* name : {"actions", "rewards", "dones"})
+      columns.push_back(read_column(demo, name));
+    const h5::Id obs = h5::open_group(demo, "obs");
+    for (const std::string& name : names_) columns.push_back(read_column(obs, name));
+    const auto rows =
+        static_cast<std::size_t>(h5::read_numbers<std::int64_t>(demo, "num_samples").at(0));
+    for (const Column& column : columns)
+      if (column.values.size() != rows * column.width)
+        throw IoError(fmt::format(
+            "demo_{}: its datasets differ in rows; 'tangere validate' says where", number));
+    fmt::memory_buffer text;
+    for (std::size_t row = 0; row < rows; ++row) {
+      fmt::format_to(std::back_inserter(text), "{},{}", number, row);
+      for (const Column& column : columns)
+        for (std::size_t k = 0; k < column.width; ++k) {
+          const double value = column.values[row * column.width + k];
+          if (column.single) {
+            fmt::format_to(std::back_inserter(text), ",{}", static_cast<float>(value));
+          } else {
+            fmt::format_to(std::back_inserter(text), ",{}", value);
+          }
+        }
+      text.push_back('\n');
+    }
+    part_.write({text.data(), text.size()});
+    result_.rows += static_cast<std::int64_t>(rows);
+  }
+
+  const ExportOptions& options_;
+  PartFile part_;
+  std::vector<std::string> names_;
+  ExportResult result_;
+};
+
+}  // namespace
+
+ExportResult export_csv(const DatasetFiles& dataset, const std::string& path,
+                        const ExportOptions& options) {
+  if (!dataset.folder.empty() && !options.episode) check_complete(dataset);
+  return CsvExport(path, options).run(dataset);
+}
+
+}  // namespace tangere

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rows of a data set as a table, for tools that read nothing else.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/dataset/dataset_files.hpp"
+
+namespace tangere {
+
+struct ExportOptions {
+  std::optional<std::int64_t> episode;  ///< that one alone; none: all
+  bool overwrite = false;
+};
+
+struct ExportResult {
+  std::int64_t rows = 0, columns = 0;
+  std::vector<std::string> left_out;  ///< observations too wide for a table, tactile fields mostly
+};
+
+/// One line per row: episode, row, actions, reward, done, then every observation of at most 64
+/// numbers. Throws IoError.
+ExportResult export_csv(const DatasetFiles& dataset, const std::string& path,
+                        const ExportOptions& options);
+
+}  // namespace tangere

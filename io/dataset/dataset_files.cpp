@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+// A shard that is not there is an error of whoever wants all, never a gap in silence.
+#include "io/dataset/dataset_files.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <string_view>
+
+#include "engine/base/error.hpp"
+#include "io/dataset/dataset_description.hpp"
+#include "io/dataset/shard_check.hpp"
+#include "io/hdf5/h5_listing.hpp"
+
+namespace tangere {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kMostShards =
+    100'000'000;  // a damaged count must not become a loop for ever
+
+/// "shard-00042.h5".
+bool is_shard(std::string_view name) {
+  constexpr std::string_view kBegin = "shard-", kEnd = ".h5";
+  if (!name.starts_with(kBegin) || !name.ends_with(kEnd) ||
+      name.size() <= kBegin.size() + kEnd.size())
+    return false;
+  const std::string_view number =
+      name.substr(kBegin.size(), name.size() - kBegin.size() - kEnd.size());
+  return number.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
+/// By number: names of more digits come later.
+bool before(const std::string& a, const std::string& b) {
+  return std::pair(a.size(), a) < std::pair(b.size(), b);
+}
+
+std::vector<std::string> shards_in(const std::string& folder) {
+  std::vector<std::string> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    if (is_shard(entry.path().filename().string())) files.push_back(entry.path().string());
+  std::sort(files.begin(), files.end(), before);
+  return files;
+}
+
+/// Compares the files with the shards that the settings count.
+void count_shards(DatasetFiles& dataset) {
+  const std::string text = value_of(dataset.settings, "dataset_shards");
+  std::int64_t count = 0;
+  std::from_chars(text.data(), text.data() + text.size(), count);
+  auto file = dataset.files.begin();
+  for (std::int64_t shard = 0; shard < std::min(count, kMostShards); ++shard) {
+    const std::string path =
+        (fs::path(dataset.folder) / fmt::format("shard-{:05}.h5", shard)).string();
+    for (; file != dataset.files.end() && before(*file, path); ++file)
+      dataset.surplus.push_back(*file);
+    if (file != dataset.files.end() && *file == path)
+      ++file;
+    else
+      dataset.missing.push_back(path);
+  }
+  dataset.surplus.insert(dataset.surplus.end(), file, dataset.files.end());
+}
+
+/// Settings of a file, and what differs from those of the data set; damage counts as a difference.
+std::vector<std::string> differences_of(const std::string& file,
+                                        const std::vector<Setting>& settings) {
+  try {
+    return differences(read_settings(h5::open_file(file)), settings);
+  } catch (const IoError& error) {
+    return {error.what()};
+  }
+}
+
+void add_shape(const h5::Id& group, const std::string& name, const std::string& prefix,
+               DatasetSummary& summary) {
+  const h5::Id dataset = h5::open_dataset(group, name);
+  const h5::Id type(H5Dget_type(dataset.get()));
+  const std::size_t bits = 8 * H5Tget_size(type.get());
+  const H5T_class_t kind = H5Tget_class(type.get());
+  const std::string word =
+      kind == H5T_ENUM ? "bool" : fmt::format("{}{}", kind == H5T_FLOAT ? "float" : "int", bits);
+  summary.shapes.emplace_back(
+      prefix + name, fmt::format("({}) {}", fmt::join(h5::dimensions(dataset), ", "), word));
+}
+
+void add_shapes(const h5::Id& group, const std::string& prefix, DatasetSummary& summary) {
+  for (const std::string& name : h5::link_names(group)) {
+    if (h5::is_dataset(group, name)) {
+      add_shape(group, name, prefix, summary);
+    } else {
+      add_shapes(h5::open_group(group, name), prefix + name + "/", summary);
+    }
+  }
+}
+
+void summarise_file(const std::string& path, DatasetSummary& summary) {
+  const h5::Id file = h5::open_file(path), data = h5::open_group(file, "data");
+  for (const std::int64_t demo : demo_numbers(data)) {
+    const h5::Id group = h5::open_group(data, fmt::format("demo_{}", demo));
+    summary.rows += h5::read_numbers<std::int64_t>(group, "num_samples").at(0);
+    if (summary.shapes.empty()) add_shapes(group, "", summary);
+    ++summary.demos;
+    const std::vector<std::string> names = h5::attribute_names(group);
+    if (!std::binary_search(names.begin(), names.end(), "success")) continue;
+    summary.has_success = true;
+    summary.successes += h5::read_numbers<std::int64_t>(group, "success").at(0) != 0 ? 1 : 0;
+  }
+  summary.failed +=
+      static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
+  summary.bytes += fs::file_size(path);
+}
+
+}  // namespace
+
+std::string value_of(const std::vector<Setting>& settings, const std::string& name) {
+  for (const Setting& setting : settings)
+    if (setting.name == name) return setting.value;
+  return {};
+}
+
+DatasetFiles find_dataset(const std::string& path) {
+  DatasetFiles dataset;
+  if (!fs::exists(path))
+    throw IoError(fmt::format("'{}' does not exist; expected a folder of shards or a file", path));
+  if (fs::is_directory(path)) {
+    dataset.folder = path;
+    dataset.files = shards_in(path);
+    if (dataset.files.empty())
+      throw IoError(fmt::format("'{}' has no shards; expected files like shard-00000.h5", path));
+  } else {
+    dataset.files = {path};
+  }
+  std::string reason;
+  for (const std::string& file : dataset.files) {
+    try {
+      dataset.settings = read_settings(h5::open_file(file));
+      break;
+    } catch (const IoError& error) {
+      if (reason.empty()) reason = error.what();
+    }
+  }
+  if (dataset.settings.empty()) throw IoError(fmt::format("'{}' is no data set: {}", path, reason));
+  if (!dataset.folder.empty()) count_shards(dataset);
+  return dataset;
+}
+
+void check_complete(const DatasetFiles& dataset) {
+  if (!dataset.missing.empty())
+    throw IoError(fmt::format(
+        "'{}' is missing{}; make it with 'tangere generate … --resume'", dataset.missing.front(),
+        dataset.missing.size() == 1
+            ? ""
+            : fmt::format(", and {} more shards are", dataset.missing.size() - 1)));
+  for (const std::string& file : dataset.files) {
+    const std::vector<std::string> lines = differences_of(file, dataset.settings);
+    if (!lines.empty())
+      throw IoError(fmt::format("'{}' is not of the same run as '{}': {}", file,
+                                dataset.files.front(), fmt::join(lines, "; ")));
+  }
+  if (!dataset.surplus.empty())
+    throw IoError(
+        fmt::format("'{}' is none of the {} shards that '{}' counts; expected no others, remove it",
+                    dataset.surplus.front(), value_of(dataset.settings, "dataset_shards"),
+                    dataset.files.front()));
+}
+
+DatasetReport examine_dataset(const DatasetFiles& dataset) {
+  DatasetReport report;
+  for (const std::string& file : dataset.missing) report.problems.push_back(file + ": missing");
+  for (const std::string& file : dataset.surplus)
+    report.problems.push_back(file + ": none of the shards that are counted");
+  for (const std::string& file : dataset.files) {
+    for (const std::string& line : differences_of(file, dataset.settings))
+      report.problems.push_back(fmt::format("{}: {}", file, line));
+    const ShardReport shard = examine_shard(file);
+    for (const std::string& problem : shard.problems)
+      report.problems.push_back(fmt::format("{}: {}", file, problem));
+    ++report.shards;
+    report.demos += shard.content.demos;
+    report.failed += shard.content.failed;
+    report.rows += shard.content.rows;
+    report.bytes += fs::file_size(file);
+  }
+  return report;
+}
+
+DatasetSummary summarise(const DatasetFiles& dataset) {
+  DatasetSummary summary;
+  for (const std::string& file : dataset.files) summarise_file(file, summary);
+  return summary;
+}
+
+}  // namespace tangere

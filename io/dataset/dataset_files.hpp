@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// A data set that is there: which files it has, which are missing, what they say of it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "io/dataset/dataset_layout.hpp"
+
+namespace tangere {
+
+struct DatasetFiles {
+  std::vector<std::string> files;    ///< shards in ascending order, or the one file that was named
+  std::vector<std::string> missing;  ///< paths of shards that should be there
+  std::vector<std::string>
+      surplus;  ///< paths of files that are called like shards and are none of this data set
+  std::vector<Setting> settings;  ///< of the first file that can be read
+  std::string folder;             ///< empty when a file was named
+};
+
+/// Of a setting, empty when there is none of this name.
+std::string value_of(const std::vector<Setting>& settings, const std::string& name);
+
+/// The shards of a folder, or a file. Throws IoError when there is none.
+DatasetFiles find_dataset(const std::string& path);
+
+/// Throws IoError that names the first missing shard and how many there are, what differs between
+/// shards, and a file that is none.
+void check_complete(const DatasetFiles& dataset);
+
+/// All that is wrong: shards missing, surplus, of other settings, damaged; each with its file.
+/// Reads everything.
+struct DatasetReport {
+  std::vector<std::string> problems;
+  std::int64_t shards = 0, demos = 0, failed = 0, rows = 0;
+  std::uint64_t bytes = 0;
+};
+DatasetReport examine_dataset(const DatasetFiles& dataset);
+
+/// What a file says of itself without its numbers being read.
+struct DatasetSummary {
+  std::int64_t demos = 0, failed = 0, rows = 0, successes = 0;
+  bool has_success = false;
+  std::uint64_t bytes = 0;
+  std::vector<std::pair<std::string, std::string>>
+      shapes;  ///< of the first demo: dataset, "(35, 3) float32"
+};
+DatasetSummary summarise(const DatasetFiles& dataset);
+
+}  // namespace tangere

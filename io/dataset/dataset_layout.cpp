@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// Names, shapes and sizes of a data set.
+#include "io/dataset/dataset_layout.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+#include <numeric>
+#include <set>
+
+#include "io/files/nearest_name.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr std::int64_t kBlockEpisodes = 16;
+// Short episodes: creating objects is what costs, and a shard that is lost should be cheap.
+constexpr std::int64_t kMostEpisodes = 4096;
+std::int64_t blocks_of(std::int64_t episodes) {
+  return (episodes + kBlockEpisodes - 1) / kBlockEpisodes;
+}
+
+constexpr const char* kVariables = "variables";
+
+/// What the format of a group in a file has room for.
+void check_lengths(const std::vector<std::string>& observations) {
+  constexpr std::size_t kLongest = 255, kShown = 32, kAll = 65000, kBesidesName = 16;
+  std::size_t bytes = 0;
+  for (const std::string& name : observations) {
+    if (name.size() > kLongest)
+      throw InputError(
+          fmt::format("observation '{}…': a name of {} bytes; expected at most {}, what a dataset "
+                      "may be called",
+                      name.substr(0, kShown), name.size(), kLongest));
+    bytes += name.size() + kBesidesName;
+  }
+  if (bytes > kAll)
+    throw InputError(fmt::format(
+        "{} observations whose names take {} bytes; expected at most {}, what a group has room for",
+        observations.size(), bytes, kAll));
+}
+
+template <class T>
+std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>& places) {
+  std::vector<T> some;
+  for (const std::size_t k : places) some.push_back(all[k]);
+  return some;
+}
+
+}  // namespace
+
+std::vector<std::string> DatasetLayout::action_names() const {
+  if (!task) return u_names;
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < task->action.size(); ++k)
+    names.push_back(fmt::format("{}[{}]", task->action.name, k));
+  return names;
+}
+
+std::vector<std::string> DatasetLayout::observation_names() const {
+  return chosen(all_observation_names(), recorded());
+}
+
+std::vector<std::size_t> DatasetLayout::recorded() const {
+  const std::vector<std::string> names = all_observation_names();
+  std::vector<std::size_t> places;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    if (record.empty() || std::find(record.begin(), record.end(), names[k]) != record.end())
+      places.push_back(k);
+  return places;
+}
+
+std::vector<std::string> DatasetLayout::all_observation_names() const {
+  std::vector<std::string> names{"q", "v"};
+  if (task) {
+    for (const TensorSpec& tensor : task->observations) names.push_back(tensor.name);
+    return names;
+  }
+  if (!variable_names.empty()) names.emplace_back(kVariables);
+  for (const SensorLayout& sensor : sensors) names.push_back(sensor.name);
+  return names;
+}
+
+std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() const {
+  std::vector<std::vector<std::uint64_t>> shapes{{q_names.size()}, {v_names.size()}};
+  if (task) {
+    for (const TensorSpec& tensor : task->observations)
+      shapes.emplace_back(tensor.shape.begin(), tensor.shape.end());
+    return chosen(shapes, recorded());
+  }
+  if (!variable_names.empty()) shapes.push_back({variable_names.size(), 3});
+  for (const SensorLayout& s : sensors) {
+    if (s.rectangular())
+      shapes.push_back({static_cast<std::uint64_t>(s.rows), static_cast<std::uint64_t>(s.cols), 3});
+    else
+      shapes.push_back({static_cast<std::uint64_t>(s.points), 3});
+  }
+  return chosen(shapes, recorded());
+}
+
+double DatasetLayout::episode_bytes() const {
+  double numbers = 0;
+  for (const std::vector<std::uint64_t>& shape : observation_shapes())
+    numbers += static_cast<double>(
+        std::accumulate(shape.begin(), shape.end(), std::uint64_t{1}, std::multiplies<>()));
+  const double r = static_cast<double>(rows());
+  const double of_actions = static_cast<double>(action_names().size()) * sizeof(float);
+  constexpr double kRewardAndDone = sizeof(float) + 1;
+  double of_gradients = 0;
+  for (const GradientArray& array : gradients)
+    of_gradients += sizeof(double) * static_cast<double>(array.width()) * (array.by_row ? r : 1);
+  return (r + 1) * numbers * (single ? sizeof(float) : sizeof(double)) +
+         r * (of_actions + kRewardAndDone) + of_gradients;
+}
+
+std::int64_t DatasetLayout::episodes_per_shard() const {
+  const double blocks = shard_bytes / (episode_bytes() * kBlockEpisodes);
+  constexpr double kMostBlocks = kMostEpisodes / kBlockEpisodes;
+  return static_cast<std::int64_t>(std::clamp(blocks, 1.0, kMostBlocks)) * kBlockEpisodes;
+}
+
+std::int64_t DatasetLayout::shard_count() const {
+  if (shards > 0) return shards;
+  const std::int64_t each = episodes_per_shard();
+  return (episodes + each - 1) / each;
+}
+
+EpisodeRange DatasetLayout::shard_episodes(std::int64_t shard) const {
+  const auto first = [&](std::int64_t s) {
+    if (shards == 0) return std::min(episodes, s * episodes_per_shard());
+    return std::min(episodes, s * blocks_of(episodes) / shards * kBlockEpisodes);
+  };
+  return {first(shard), first(shard + 1)};
+}
+
+std::int64_t DatasetLayout::shard_of(std::int64_t episode) const {
+  if (shards == 0) return episode / episodes_per_shard();
+  // The last shard whose first block, floor(s B / S), is not behind this one.
+  return ((episode / kBlockEpisodes + 1) * shards - 1) / blocks_of(episodes);
+}
+
+void DatasetLayout::check() const {
+  if (shards > blocks_of(episodes))
+    throw InputError(
+        fmt::format("{} shards of {} episodes; expected at most {}, one for each block of {}",
+                    shards, episodes, blocks_of(episodes), kBlockEpisodes));
+  const std::vector<std::string> all = all_observation_names();
+  for (const std::string& name : record)
+    if (std::find(all.begin(), all.end(), name) == all.end())
+      throw InputError(
+          fmt::format("--record: unknown observation '{}'{}", name, suggestion(name, all)));
+  check_lengths(all);
+  std::set<std::string> names{"q", "v"};
+  if (!variable_names.empty()) names.insert(kVariables);
+  for (const SensorLayout& sensor : sensors) {
+    const std::string& name = sensor.name;
+    if (name.empty() || name == "." || name.find('/') != std::string::npos)
+      throw InputError(fmt::format(
+          "sensor '{}': a dataset cannot have this name; expected one without '/'", name));
+    if (!task && !names.insert(name).second)
+      throw InputError(
+          fmt::format("sensor '{}': another observation has this name; expected none of q, v, "
+                      "variables (of end effectors) and the other sensors",
+                      name));
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// All that the shards of a data set say besides their numbers, and how episodes are dealt to
+// shards. Nothing in it depends on threads, folders or the time, so that the same request gives the
+// same bytes.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/rows/episode_sink.hpp"
+#include "engine/rows/task_spec.hpp"
+#include "io/trajectory/trajectory_layout.hpp"
+
+namespace tangere {
+
+/// What to do with shards that are there already.
+enum class ExistingShards { refuse, replace, keep };
+
+/// What a file says of its data set, as text.
+struct Setting {
+  std::string name, value;
+};
+
+struct DatasetLayout {
+  std::int64_t episodes = 0;  ///< N, of all shards
+  std::int64_t steps = 0;     ///< of an episode
+  int every = 1;              ///< K: row j is the state after j K steps
+  std::uint64_t seed = 0;
+  bool single = false;                        ///< observations are float32, else float64
+  std::vector<std::string> q_names, q_units;  ///< (nq)
+  std::vector<std::string> v_names, v_units;  ///< (nv)
+  std::vector<std::string> u_names;           ///< (nu)
+  std::vector<std::string> variable_names;    ///< (n) end effectors, empty when there are none
+  std::vector<SensorLayout> sensors;
+  std::vector<std::string> randomized_names, randomized_units;  ///< what varies between episodes
+  std::optional<TaskSpec>
+      task;            ///< whose actions, observations and rewards these are; none: a scene alone
+  std::string policy;  ///< of a task
+  std::string scene_name, scene_text;
+  std::string tables = "none";  ///< of files that the text refers to: their checksum
+  std::string integrator;
+  double timestep = 0;   ///< [s]
+  double tolerance = 0;  ///< of the scaled residual, dimensionless
+  std::string precision, version, instruction_set;
+  std::string controls = "of the scene";  ///< or which table, by its content
+  std::string
+      command;  ///< that makes this data set, without what does not change it (threads, folder …)
+  double shard_bytes = 1 << 30;  ///< a shard stays below it, unless 16 episodes are more
+  std::int64_t shards = 0;       ///< how many; 0: as shard_bytes says
+  std::string compression =
+      "none";           ///< or "deflate", "lz4": of observations whose rows are large enough
+  bool sparse = false;  ///< parts of large fields that are zero are left out
+  std::vector<std::string> record;  ///< observations to store; none: all there are
+  std::string gradients_of;         ///< what derivatives are of, in words; empty: there are none
+  std::vector<GradientArray> gradients;  ///< those stored with an episode
+
+  /// R: actions of an episode, of a task at most.
+  [[nodiscard]] std::int64_t rows() const { return steps / every; }
+  /// Names of the numbers of an action.
+  [[nodiscard]] std::vector<std::string> action_names() const;
+  /// All there are: q, v, then what a task observes, or "variables" if there are end effectors and
+  /// the sensors.
+  [[nodiscard]] std::vector<std::string> all_observation_names() const;
+  /// Places in that list, and in pieces of episodes, of those that are stored, ascending.
+  [[nodiscard]] std::vector<std::size_t> recorded() const;
+  /// Names below obs.
+  [[nodiscard]] std::vector<std::string> observation_names() const;
+  /// Shapes of one row of each of them: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
+  [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
+  /// Numbers of one episode on disk, without HDF5's own [bytes].
+  [[nodiscard]] double episode_bytes() const;
+  /// As many as stay below shard_bytes, a multiple of 16; depends on the data set alone.
+  [[nodiscard]] std::int64_t episodes_per_shard() const;
+  [[nodiscard]] std::int64_t shard_count() const;
+  /// Whole blocks of 16 episodes; where `shards` is given, as many in each as in any other, or one
+  /// more.
+  [[nodiscard]] EpisodeRange shard_episodes(std::int64_t shard) const;
+  [[nodiscard]] std::int64_t shard_of(std::int64_t episode) const;
+  /// Throws InputError when a sensor cannot be a name in a file, there are more shards than blocks,
+  /// or what is to be recorded is not there.
+  void check() const;
+};
+
+/// What the model does not know about a data set.
+struct DatasetDescription {
+  std::int64_t episodes = 0, steps = 0;
+  int every = 1;
+  std::uint64_t seed = 0;
+  bool single = false;  ///< observations are float32
+  std::string precision, version, instruction_set;
+  std::optional<TaskSpec> task;
+  std::string policy, controls, command;
+  std::int64_t shards = 0;
+  std::string compression = "none";
+  std::string gradients_of;
+  std::vector<GradientArray> gradients;
+  bool sparse = false;
+  std::vector<std::string> record = {};
+};
+
+DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
+                                  const DatasetDescription& run);
+
+}  // namespace tangere

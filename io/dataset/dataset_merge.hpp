@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// One file that shows a whole data set, and the view of it that Minari reads.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "io/dataset/dataset_files.hpp"
+
+namespace tangere {
+
+struct MergeOptions {
+  bool copy = false;       ///< numbers too, not links to the shards
+  bool overwrite = false;  ///< replace what an earlier merge made
+};
+
+struct MergeResult {
+  std::string file;       ///< FOLDER/robomimic.hdf5
+  std::string minari;     ///< FOLDER/minari/tangere/NAME-v0; FOLDER/minari is a root for Minari
+  std::string minari_id;  ///< tangere/NAME-v0
+  std::int64_t demos = 0, failed = 0, train = 0, valid = 0;
+  std::uint64_t bytes = 0;  ///< of the file
+};
+
+/// Merges a folder's shards. Opens every member that it links, reads all numbers that it copies.
+/// Throws IoError when a shard is missing, damaged or of other settings, when it finds its own
+/// output and `overwrite` is false, or cannot write. Each output appears whole or not at all.
+MergeResult merge_dataset(const DatasetFiles& dataset, const MergeOptions& options);
+
+}  // namespace tangere

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// The layout that robomimic's loader reads (docs/datasets.md).
+#include "io/dataset/demo_format.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <functional>
+#include <numeric>
+
+namespace tangere {
+namespace {
+
+template <class T>
+std::array<unsigned char, sizeof(T)> bytes_of_number(T value) {
+  return std::bit_cast<std::array<unsigned char, sizeof(T)>>(value);
+}
+
+std::size_t aligned(std::size_t bytes) { return (bytes + 7) / 8 * 8; }
+
+}  // namespace
+
+DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_number(facts.rows)) {
+  const EpisodeEnd end = facts.end.value_or(EpisodeEnd{});
+  total_ = bytes_of_number(end.total);
+  terminated_ = bytes_of_number<std::int8_t>(end.terminated ? 1 : 0);
+  success_ = bytes_of_number<std::int8_t>(end.success ? 1 : 0);
+  all_.push_back({"num_samples", h5::NumberType::int64, false, samples_});
+  if (facts.end) {
+    all_.push_back({"return", h5::NumberType::float64, false, total_});
+    all_.push_back({"terminated", h5::NumberType::int8, false, terminated_});
+    all_.push_back({"success", h5::NumberType::int8, false, success_});
+  }
+  const std::span randomized(reinterpret_cast<const unsigned char*>(facts.randomized.data()),
+                             facts.randomized.size() * sizeof(double));
+  if (!randomized.empty())
+    all_.push_back({"randomized", h5::NumberType::float64, true, randomized});
+}
+
+DemoFormat::DemoFormat(const DatasetLayout& layout)
+    : of_task_(layout.task.has_value()),
+      randomized_(layout.randomized_names.size()),
+      names_(layout.observation_names()),
+      sources_(layout.recorded()),
+      plans_(chunk_plans(layout)) {
+  using h5::NumberType;
+  const NumberType number = layout.single ? NumberType::float32 : NumberType::float64;
+  gradient_sources_.resize(layout.gradients.size());
+  std::iota(gradient_sources_.begin(), gradient_sources_.end(), std::size_t{0});
+  std::sort(gradient_sources_.begin(), gradient_sources_.end(), [&](std::size_t a, std::size_t b) {
+    return layout.gradients[a].name < layout.gradients[b].name;
+  });
+  for (const std::size_t k : gradient_sources_) gradients_.push_back(layout.gradients[k]);
+  shapes_ = {{layout.action_names().size()}, {}, {}};
+  types_ = {NumberType::float32, NumberType::float32, NumberType::boolean};
+  const std::vector<std::vector<std::uint64_t>> observed = layout.observation_shapes();
+  for (int twice = 0; twice < 2; ++twice) {
+    shapes_.insert(shapes_.end(), observed.begin(), observed.end());
+    types_.insert(types_.end(), observed.size(), number);
+  }
+  for (const GradientArray& array : gradients_) {
+    const auto from =
+        array.shape.begin() +
+        (array.by_row ? 0 : 1);  // one for the episode: its first dimension counts its rows
+    shapes_.emplace_back(from, array.shape.end());
+    types_.push_back(NumberType::float64);
+  }
+  for (std::size_t k = 0; k < shapes_.size(); ++k)
+    row_bytes_.push_back(std::accumulate(shapes_[k].begin(), shapes_[k].end(),
+                                         h5::bytes_of(types_[k]), std::multiplies<>()));
+  filters_ = file_filters(layout.compression, h5::bytes_of(number));
+  h5::Bytes of_one;
+  DemoFacts facts{1, std::nullopt, std::vector<double>(randomized_)};
+  if (of_task_) facts.end.emplace();
+  static_cast<void>(describe(of_one, 0, facts, std::vector<std::uint64_t>(datasets()), 0));
+  header_bytes_ = of_one.size();
+}
+
+std::int64_t DemoFormat::rows_of(std::size_t dataset, std::int64_t rows) const {
+  if (dataset < final_obs(0)) return rows;
+  if (dataset < gradient(0)) return 1;
+  const GradientArray& array = gradients_[dataset - gradient(0)];
+  return array.by_row ? rows : static_cast<std::int64_t>(array.shape.at(0));
+}
+
+std::int64_t DemoFormat::chunk_rows(std::size_t dataset, std::int64_t rows) const {
+  if (dataset < kFirst || dataset >= gradient(0)) return 0;
+  const ChunkPlan& cut = plan(dataset);
+  if (dataset >= final_obs(0)) return cut.rows > 0 && cut.last_row ? 1 : 0;
+  return std::min(cut.rows, rows);
+}
+
+std::size_t DemoFormat::data_bytes(std::int64_t rows) const {
+  std::size_t bytes = 0;
+  for (std::size_t k = 0; k < datasets(); ++k)
+    bytes += aligned(static_cast<std::size_t>(rows_of(k, rows)) * row_bytes_[k]);
+  return bytes;
+}
+
+h5::Bytes DemoFormat::texts() const {
+  std::vector<std::string_view> meanings;
+  for (const GradientArray& array : gradients_) meanings.emplace_back(array.meaning);
+  h5::Bytes out;
+  h5::add_texts(out, meanings);
+  return out;
+}
+
+void DemoFormat::describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows,
+                                  std::uint64_t address,
+                                  std::span<const h5::FileText> texts) const {
+  h5::FileDataset file;
+  file.type = types_[dataset];
+  file.dims = {static_cast<std::uint64_t>(rows_of(dataset, rows))};
+  file.dims.insert(file.dims.end(), shapes_[dataset].begin(), shapes_[dataset].end());
+  file.address = address;
+  if (const std::int64_t chunk = chunk_rows(dataset, rows); chunk > 0) {
+    const std::vector<std::uint64_t>& tile = plan(dataset).tile;
+    file.chunk = {static_cast<std::uint64_t>(chunk)};
+    file.chunk.insert(file.chunk.end(), tile.begin(), tile.end());
+    file.filters = filters_;
+  }
+  file.texts = texts;
+  h5::add_dataset(out, file);
+}
+
+std::uint64_t DemoFormat::describe_observations(h5::Bytes& out, std::uint64_t base,
+                                                std::int64_t rows, std::size_t first,
+                                                std::span<const std::uint64_t> addresses) const {
+  std::vector<h5::FileLink> links;
+  for (std::size_t name = 0; name < names_.size(); ++name) {
+    links.push_back({names_[name], base + out.size()});
+    describe_dataset(out, first + name, rows, addresses[first + name]);
+  }
+  const std::uint64_t group = base + out.size();
+  h5::add_group(out, links);
+  return group;
+}
+
+std::uint64_t DemoFormat::describe(h5::Bytes& out, std::uint64_t base, const DemoFacts& facts,
+                                   std::span<const std::uint64_t> addresses,
+                                   std::uint64_t texts) const {
+  std::vector<h5::FileLink> links;
+  for (const std::size_t dataset : {kActions, kRewards, kDones}) {
+    constexpr std::array<std::string_view, kFirst> kNames{"actions", "rewards", "dones"};
+    links.push_back({kNames[dataset], base + out.size()});
+    describe_dataset(out, dataset, facts.rows, addresses[dataset]);
+  }
+  links.push_back({"obs", describe_observations(out, base, facts.rows, obs(0), addresses)});
+  links.push_back(
+      {"final_obs", describe_observations(out, base, facts.rows, final_obs(0), addresses)});
+  for (std::size_t k = 0; k < gradients_.size(); ++k) {
+    const std::array meaning{
+        h5::FileText{"meaning", texts, static_cast<std::uint32_t>(k),
+                     static_cast<std::uint32_t>(gradients_[k].meaning.size())}};
+    links.push_back({gradients_[k].name, base + out.size()});
+    describe_dataset(out, gradient(k), facts.rows, addresses[gradient(k)], meaning);
+  }
+  const std::uint64_t group = base + out.size();
+  h5::add_group(out, links, DemoAttributes(facts).all());
+  return group;
+}
+
+}  // namespace tangere

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the datasets of a demo are, in the order of the file, and the bytes that describe them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/rows/episode_sink.hpp"
+#include "io/dataset/chunk_codec.hpp"
+#include "io/dataset/dataset_layout.hpp"
+#include "io/hdf5/h5_objects.hpp"
+
+namespace tangere {
+
+/// What a demo says of itself.
+struct DemoFacts {
+  std::int64_t rows = 0;           ///< R
+  std::optional<EpisodeEnd> end;   ///< of a task
+  std::vector<double> randomized;  ///< as many as the layout has names
+};
+
+/// They as the attributes of a demo's group. Refers to what it was made of, and to itself.
+class DemoAttributes {
+ public:
+  explicit DemoAttributes(const DemoFacts& facts);
+  DemoAttributes(const DemoAttributes&) = delete;
+  DemoAttributes& operator=(const DemoAttributes&) = delete;
+  [[nodiscard]] std::span<const h5::FileAttribute> all() const { return all_; }
+
+ private:
+  std::array<unsigned char, 8> samples_, total_;
+  std::array<unsigned char, 1> terminated_, success_;
+  std::vector<h5::FileAttribute> all_;
+};
+
+/// Datasets of a demo: actions, rewards, dones, obs/<name> …, final_obs/<name> …, then derivatives
+/// in the order of their names.
+class DemoFormat {
+ public:
+  static constexpr std::size_t kActions = 0, kRewards = 1, kDones = 2, kFirst = 3;
+
+  explicit DemoFormat(const DatasetLayout& layout);
+
+  [[nodiscard]] std::size_t datasets() const { return gradient(gradients_.size()); }
+  [[nodiscard]] std::size_t observations() const { return names_.size(); }
+  [[nodiscard]] std::size_t obs(std::size_t name) const { return kFirst + name; }
+  [[nodiscard]] std::size_t final_obs(std::size_t name) const {
+    return kFirst + names_.size() + name;
+  }
+  [[nodiscard]] std::size_t gradients() const { return gradients_.size(); }
+  [[nodiscard]] std::size_t gradient(std::size_t k) const { return kFirst + 2 * names_.size() + k; }
+  [[nodiscard]] std::size_t row_bytes(std::size_t dataset) const { return row_bytes_[dataset]; }
+  [[nodiscard]] std::size_t rank(std::size_t dataset) const { return shapes_[dataset].size() + 1; }
+  /// Rows of a dataset in a demo of `rows`.
+  [[nodiscard]] std::int64_t rows_of(std::size_t dataset, std::int64_t rows) const;
+  /// Rows of a chunk of a demo of `rows`, 0: contiguous.
+  [[nodiscard]] std::int64_t chunk_rows(std::size_t dataset, std::int64_t rows) const;
+  /// How it is cut, if it is.
+  [[nodiscard]] const ChunkPlan& plan(std::size_t dataset) const {
+    return plans_[(dataset - kFirst) % names_.size()];
+  }
+  /// Where pieces have it.
+  [[nodiscard]] std::size_t source(std::size_t name) const { return sources_[name]; }
+  [[nodiscard]] std::size_t source_of_gradient(std::size_t k) const { return gradient_sources_[k]; }
+  /// Of a row.
+  [[nodiscard]] const std::vector<std::uint64_t>& shape(std::size_t dataset) const {
+    return shapes_[dataset];
+  }
+  /// Bytes of all datasets of an uncompressed demo, each to a multiple of eight.
+  [[nodiscard]] std::size_t data_bytes(std::int64_t rows) const;
+  /// Bytes of a demo's description: the same for all.
+  [[nodiscard]] std::size_t header_bytes() const { return header_bytes_; }
+
+  /// What descriptions of demos refer to, once in a file; empty without derivatives.
+  [[nodiscard]] h5::Bytes texts() const;
+
+  /// Appends the description of a demo to what begins at `base` in the file. Returns the address of
+  /// its group. `addresses`: of the numbers of each dataset, or of the index of its chunks.
+  /// `texts`: of texts().
+  std::uint64_t describe(h5::Bytes& out, std::uint64_t base, const DemoFacts& facts,
+                         std::span<const std::uint64_t> addresses, std::uint64_t texts) const;
+
+ private:
+  std::uint64_t describe_observations(h5::Bytes& out, std::uint64_t base, std::int64_t rows,
+                                      std::size_t first,
+                                      std::span<const std::uint64_t> addresses) const;
+  void describe_dataset(h5::Bytes& out, std::size_t dataset, std::int64_t rows,
+                        std::uint64_t address, std::span<const h5::FileText> texts = {}) const;
+
+  bool of_task_;
+  std::size_t randomized_;
+  std::vector<std::string> names_;
+  std::vector<std::size_t> sources_, gradient_sources_;
+  std::vector<GradientArray> gradients_;            // by name
+  std::vector<ChunkPlan> plans_;                    // per observation
+  std::vector<std::vector<std::uint64_t>> shapes_;  // of a row, per dataset
+  std::vector<h5::NumberType> types_;
+  std::vector<std::size_t> row_bytes_;
+  std::vector<h5::FileFilter> filters_;
+  std::size_t header_bytes_ = 0;
+};
+
+}  // namespace tangere

@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+// Of a batch: what its virtual datasets show, then objects.
+#include "io/dataset/demo_links.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+#include "engine/base/error.hpp"
+#include "io/hdf5/h5_listing.hpp"
+#include "io/hdf5/h5_views.hpp"
+
+namespace tangere {
+namespace {
+
+using h5::Bytes;
+
+/// "/data/demo_3/obs/pad".
+std::string path_of(std::int64_t demo, std::string_view group, std::string_view name = {}) {
+  return name.empty() ? fmt::format("/data/demo_{}/{}", demo, group)
+                      : fmt::format("/data/demo_{}/{}/{}", demo, group, name);
+}
+
+std::vector<std::uint64_t> dims_of(std::uint64_t rows, const DemoArray& array) {
+  std::vector<std::uint64_t> dims{rows};
+  dims.insert(dims.end(), array.shape.begin(), array.shape.end());
+  return dims;
+}
+
+bool has_numbers(const DemoArray& array) {
+  return std::find(array.shape.begin(), array.shape.end(), 0) == array.shape.end();
+}
+
+/// Observations of a batch of demos one row later, or with one row more, as virtual datasets.
+class ShownObservations {
+ public:
+  /// `skipped`: rows of obs that are left out before final_obs follows. Appends what is shown.
+  ShownObservations(Bytes& out, std::uint64_t base, const DemoMembers& members,
+                    std::string_view file, std::span<const LinkedDemo> demos, std::uint64_t skipped)
+      : out_(out), base_(base), members_(members), skipped_(skipped) {
+    std::vector<std::string> texts;
+    for (const LinkedDemo& demo : demos)
+      for (const DemoArray& array : members.observations)
+        if (has_numbers(array)) texts.push_back(text(file, demo, array));
+    out.align();
+    texts_ = base + out.size();
+    h5::add_texts(out, std::vector<std::string_view>(texts.begin(), texts.end()));
+  }
+
+  /// Appends the group of the next demo's. Returns its address.
+  std::uint64_t add(const DemoFacts& facts) {
+    std::vector<h5::FileLink> links;
+    for (const DemoArray& array : members_.observations) {
+      links.push_back({array.name, base_ + out_.size()});
+      h5::FileDataset dataset{array.type, dims_of(rows(facts), array)};
+      if (has_numbers(array)) dataset.view = h5::FileView{texts_, next_++};
+      h5::add_dataset(out_, dataset);
+    }
+    const std::uint64_t group = base_ + out_.size();
+    h5::add_group(out_, links);
+    return group;
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t rows(const DemoFacts& facts) const {
+    return static_cast<std::uint64_t>(facts.rows) + 1 - skipped_;
+  }
+  [[nodiscard]] std::string text(std::string_view file, const LinkedDemo& demo,
+                                 const DemoArray& array) const {
+    const auto of = static_cast<std::uint64_t>(demo.facts.rows);
+    const std::string obs = path_of(demo.number, "obs", array.name),
+                      last = path_of(demo.number, "final_obs", array.name);
+    std::vector<h5::ShownRows> parts;
+    if (of > skipped_) parts.push_back({file, obs, skipped_, of - skipped_, of});
+    parts.push_back({file, last, 0, 1, 1});
+    return h5::shown_rows(parts, dims_of(rows(demo.facts), array));
+  }
+
+  Bytes& out_;
+  std::uint64_t base_, texts_ = 0;
+  const DemoMembers& members_;
+  std::uint64_t skipped_;
+  std::uint32_t next_ = 0;
+};
+
+h5::NumberType type_of(const h5::Id& dataset) {
+  const h5::Id type(H5Dget_type(dataset.get()));
+  return H5Tget_size(type.get()) == sizeof(float) ? h5::NumberType::float32
+                                                  : h5::NumberType::float64;
+}
+
+DemoArray array_of(const h5::Id& group, const std::string& name) {
+  const h5::Id dataset = h5::open_dataset(group, name);
+  const h5::Dims dims = h5::dimensions(dataset);
+  if (dims.empty()) throw IoError(fmt::format("{} is one number, expected rows", name));
+  return {name, type_of(dataset), {dims.begin() + 1, dims.end()}};
+}
+
+}  // namespace
+
+DemoMembers members_of(const h5::Id& demo) {
+  DemoMembers members;
+  members.names = h5::link_names(demo);
+  // Virtual datasets of their own are laid out anew.
+  members.names.erase(std::remove(members.names.begin(), members.names.end(), "next_obs"),
+                      members.names.end());
+  for (const std::string& name : members.names)
+    if (name.starts_with("grad_") || name == "loss") members.derivatives.push_back(name);
+  const h5::Id obs = h5::open_group(demo, "obs");
+  for (const std::string& name : h5::link_names(obs))
+    members.observations.push_back(array_of(obs, name));
+  members.actions = array_of(demo, "actions");
+  const std::vector<std::string> said = h5::attribute_names(demo);
+  members.of_task = std::binary_search(said.begin(), said.end(), "terminated");
+  members.varies = std::binary_search(said.begin(), said.end(), "randomized");
+  return members;
+}
+
+DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
+  const auto flag = [&](const char* name) {
+    return h5::read_numbers<std::int64_t>(demo, name).at(0) != 0;
+  };
+  DemoFacts facts;
+  facts.rows = h5::read_numbers<std::int64_t>(demo, "num_samples").at(0);
+  if (facts.rows < 1)
+    throw IoError(fmt::format("a demo has {} rows, expected at least 1", facts.rows));
+  if (members.of_task) {
+    const double total = h5::read_numbers<double>(demo, "return").at(0);
+    facts.end = EpisodeEnd{facts.rows, total, flag("terminated"), flag("success")};
+  }
+  if (members.varies) facts.randomized = h5::read_numbers<double>(demo, "randomized");
+  return facts;
+}
+
+void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFacts& facts) {
+  const auto check = [](const h5::Id& group, const DemoArray& array, std::int64_t rows) {
+    const h5::Id dataset = h5::open_dataset(group, array.name);
+    if (!std::ranges::equal(h5::dimensions(dataset),
+                            dims_of(static_cast<std::uint64_t>(rows), array)) ||
+        type_of(dataset) != array.type)
+      throw IoError(fmt::format("{} is not of {} rows, of the shape and type of the first demo",
+                                array.name, rows));
+  };
+  for (const std::string& name : members.names)
+    if (name != "obs" && name != "final_obs" && name != members.actions.name)
+      h5::open_dataset(demo, name);
+  check(demo, members.actions, facts.rows);
+  const h5::Id obs = h5::open_group(demo, "obs"), last = h5::open_group(demo, "final_obs");
+  for (const DemoArray& array : members.observations) {
+    check(obs, array, facts.rows);
+    check(last, array, 1);
+  }
+}
+
+std::vector<h5::FileMember> add_demo_links(Bytes& out, std::uint64_t base,
+                                           const DemoMembers& members, std::string_view file,
+                                           std::span<const LinkedDemo> demos) {
+  ShownObservations next(out, base, members, file, demos, 1);
+  std::vector<h5::FileMember> groups;
+  for (const LinkedDemo& demo : demos) {
+    std::vector<std::string> paths;
+    for (const std::string& name : members.names) paths.push_back(path_of(demo.number, name));
+    std::vector<h5::FileLink> links;
+    for (std::size_t k = 0; k < paths.size(); ++k)
+      links.push_back({members.names[k], h5::kNowhere, file, paths[k]});
+    links.push_back({"next_obs", next.add(demo.facts)});
+    groups.push_back({demo.number, base + out.size()});
+    h5::add_group(out, links, DemoAttributes(demo.facts).all());
+  }
+  return groups;
+}
+
+std::vector<h5::FileMember> add_minari_episodes(Bytes& out, std::uint64_t base,
+                                                const DemoMembers& members, std::string_view file,
+                                                std::span<const LinkedDemo> demos,
+                                                std::int64_t first, std::uint64_t seed) {
+  using Number = std::array<unsigned char, sizeof(std::int64_t)>;
+  ShownObservations observations(out, base, members, file, demos, 0);
+  std::vector<h5::FileMember> groups;
+  for (const LinkedDemo& demo : demos) {
+    const std::int64_t episode = first + static_cast<std::int64_t>(groups.size());
+    const std::string actions = path_of(demo.number, "actions"),
+                      rewards = path_of(demo.number, "rewards"),
+                      dones = path_of(demo.number, "dones");
+    const bool terminated = demo.facts.end && demo.facts.end->terminated;
+    const std::uint64_t all_false = base + out.size();
+    out.zeros(static_cast<std::size_t>(demo.facts.rows));
+    out.align();
+    const std::uint64_t never = base + out.size();
+    h5::add_dataset(
+        out,
+        {h5::NumberType::boolean, {static_cast<std::uint64_t>(demo.facts.rows)}, {}, all_false});
+    const std::uint64_t shown = observations.add(demo.facts);
+    std::vector<std::string> paths;
+    for (const std::string& name : members.derivatives) paths.push_back(path_of(demo.number, name));
+    std::vector<h5::FileLink> derivatives;
+    for (std::size_t k = 0; k < paths.size(); ++k)
+      derivatives.push_back({members.derivatives[k], h5::kNowhere, file, paths[k]});
+    const std::uint64_t infos = base + out.size();
+    h5::add_group(out,
+                  derivatives);  // empty where there are none: Minari prints no episode without it
+    const std::array links{
+        h5::FileLink{"actions", h5::kNowhere, file, actions},
+        h5::FileLink{"infos", infos},
+        h5::FileLink{"observations", shown},
+        h5::FileLink{"rewards", h5::kNowhere, file, rewards},
+        h5::FileLink{terminated ? "terminations" : "truncations", h5::kNowhere, file, dones},
+        h5::FileLink{terminated ? "truncations" : "terminations", never}};
+    const auto id = std::bit_cast<Number>(episode), rows = std::bit_cast<Number>(demo.facts.rows),
+               number = std::bit_cast<Number>(demo.number), drawn = std::bit_cast<Number>(seed);
+    const std::array attributes{
+        h5::FileAttribute{"id", h5::NumberType::int64, false, id},
+        h5::FileAttribute{"total_steps", h5::NumberType::int64, false, rows},
+        h5::FileAttribute{"seed", h5::NumberType::uint64, false, drawn},
+        h5::FileAttribute{"demo", h5::NumberType::int64, false, number}};
+    groups.push_back({episode, base + out.size()});
+    h5::add_group(out, links, attributes);
+  }
+  return groups;
+}
+
+}  // namespace tangere

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Demos of shards as members of another file: links and virtual datasets, as bytes, for robomimic
+// and for Minari.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/dataset/demo_format.hpp"
+#include "io/hdf5/h5.hpp"
+#include "io/hdf5/h5_trees.hpp"
+
+namespace tangere {
+
+/// A dataset of any demo.
+struct DemoArray {
+  std::string name;
+  h5::NumberType type = h5::NumberType::float32;
+  std::vector<std::uint64_t> shape;  ///< of a row
+};
+
+/// What all demos of a data set have alike.
+struct DemoMembers {
+  std::vector<std::string> names;       ///< of its links
+  std::vector<DemoArray> observations;  ///< below obs
+  DemoArray actions;
+  std::vector<std::string> derivatives;  ///< grad_… and the loss, among `names`
+  bool of_task = false, varies = false;
+};
+
+/// Throws IoError.
+DemoMembers members_of(const h5::Id& demo);
+/// Throws IoError.
+DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members);
+/// Opens every member, without its numbers. Throws IoError where one is missing, damaged, or of
+/// another shape or type.
+void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFacts& facts);
+
+struct LinkedDemo {
+  std::int64_t number = 0;
+  DemoFacts facts;
+};
+
+/// Appends groups demo_<i> to what begins at `base`: attributes and members of the demos of `file`,
+/// given relative to the folder of the file that is written, and next_obs: row j is row j + 1 of
+/// obs, the last one final_obs. Returns the groups.
+std::vector<h5::FileMember> add_demo_links(h5::Bytes& out, std::uint64_t base,
+                                           const DemoMembers& members, std::string_view file,
+                                           std::span<const LinkedDemo> demos);
+
+/// The same as groups episode_<j>, j from `first`, as Minari lays them out; derivatives below
+/// infos. `seed`: of the data set.
+std::vector<h5::FileMember> add_minari_episodes(h5::Bytes& out, std::uint64_t base,
+                                                const DemoMembers& members, std::string_view file,
+                                                std::span<const LinkedDemo> demos,
+                                                std::int64_t first, std::uint64_t seed);
+
+}  // namespace tangere

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// The library finds what was appended because it is told where the file ends.
+#include "io/dataset/grown_file.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr hsize_t kDescriptionBlock = hsize_t{1} << 16;
+
+std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 7) / 8 * 8; }
+
+}  // namespace
+
+GrownFile::GrownFile(const std::string& path, bool overwrite, bool views)
+    : part_(path, overwrite),
+      placed_(part_),
+      file_(h5::create_file(part_.path(), kDescriptionBlock, views)) {}
+
+GrownFile::~GrownFile() {
+  // On a full disk the library can only close its file once there is room again.
+  if (file_.get() >= 0) part_.empty();
+}
+
+void GrownFile::close() {
+  h5::close_file(file_, part_.path());
+  here_ = aligned(part_.size());
+}
+
+void GrownFile::append(const h5::Bytes& bytes) {
+  placed_.add(here_, bytes.all());
+  placed_.flush();
+  here_ = aligned(here_ + bytes.size());
+}
+
+std::uint64_t GrownFile::append_group(std::string_view prefix, std::vector<h5::FileMember> members,
+                                      bool root) {
+  h5::Bytes out;
+  const std::uint64_t group =
+      h5::add_large_group(out, here_, prefix, std::move(members), root,
+                          [this](const h5::Bytes& bytes) { append(bytes); });
+  placed_.add(here_, out.all().first(group - here_));
+  placed_.flush();
+  placed_.write_unchecked(group, out.from(group - here_));
+  here_ = aligned(here_ + out.size());
+  return group;
+}
+
+void GrownFile::open(std::uint64_t root) {
+  placed_.end_at(here_, root);
+  file_ = h5::change_file(part_.path());
+}
+
+std::uint64_t GrownFile::commit(const std::function<void(const std::string&)>& last) {
+  h5::close_file(file_, part_.path());
+  placed_.verify();
+  if (last) last(part_.path());
+  const std::uint64_t bytes = part_.size();
+  part_.commit();
+  return bytes;
+}
+
+}  // namespace tangere

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// A file that the library begins and ends, and whose thousands of members are laid out in between.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/dataset/placed_file.hpp"
+#include "io/files/part_file.hpp"
+#include "io/hdf5/h5.hpp"
+#include "io/hdf5/h5_trees.hpp"
+
+namespace tangere {
+
+/// In this order: file() → close() → append() … → open() → file() → commit(). Everything throws
+/// IoError.
+class GrownFile {
+ public:
+  /// Begins `<path>.part`; `views` as for h5::create_file.
+  GrownFile(const std::string& path, bool overwrite, bool views);
+  /// Leaves nothing unless it was committed.
+  ~GrownFile();
+  GrownFile(const GrownFile&) = delete;
+  GrownFile& operator=(const GrownFile&) = delete;
+
+  [[nodiscard]] const h5::Id& file() const { return file_; }
+  [[nodiscard]] const std::string& output() const { return part_.output(); }
+
+  void close();
+  /// Where the next bytes will be.
+  [[nodiscard]] std::uint64_t here() const { return here_; }
+  void append(const h5::Bytes& bytes);
+  /// A group to which the library may add; arguments as for h5::add_large_group. Returns its
+  /// address.
+  std::uint64_t append_group(std::string_view prefix, std::vector<h5::FileMember> members,
+                             bool root = false);
+  /// `root`: address of the group "/"; that of the beginning if it leads nowhere.
+  void open(std::uint64_t root = h5::kNowhere);
+
+  /// Reads back what was appended, calls `last` with the path of the .part, syncs, renames. Returns
+  /// the size in bytes.
+  std::uint64_t commit(const std::function<void(const std::string&)>& last = {});
+
+ private:
+  PartFile part_;
+  PlacedFile placed_;
+  h5::Id file_;
+  std::uint64_t here_ = 0;
+};
+
+}  // namespace tangere

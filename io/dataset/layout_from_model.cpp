@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+// From what the engine knows of a run to what its file says.
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "io/dataset/dataset_layout.hpp"
+#include "io/scene/scene_tables.hpp"
+#include "io/trajectory/trajectory_layout.hpp"
+
+namespace tangere {
+namespace {
+
+std::vector<std::string> copy(std::span<const std::string> texts) {
+  return {texts.begin(), texts.end()};
+}
+
+std::vector<std::string> variable_names(const Model& model) {
+  std::vector<std::string> names;
+  for (const VariableInfo& variable : model.variables()) names.push_back(variable.name);
+  return names;
+}
+
+SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& description,
+                           int interval) {
+  SensorLayout layout;
+  layout.name = info.name;
+  layout.body = info.body;
+  layout.rows = info.rows;
+  layout.cols = info.cols;
+  layout.points = info.points;
+  layout.every = interval;
+  layout.pressure_sign = info.pressure_sign;
+  layout.corner0 = description.array.corner0;
+  layout.corner1 = description.array.corner1;
+  layout.axis0 = description.array.axis0;
+  layout.axis1 = description.array.axis1;
+  layout.list = description.points;
+  return layout;
+}
+
+const char* field_name(ContactField field) {
+  switch (field) {
+    case ContactField::kn: return "kn";
+    case ContactField::kt: return "kt";
+    case ContactField::mu: return "mu";
+    case ContactField::damping: return "damping";
+  }
+  throw std::logic_error("a contact field without a name");
+}
+
+/// Stiffnesses and gains have the units of their law, joint and kind of sensor; all are SI.
+const char* randomized_unit(const RandomizationDescription& d) {
+  switch (d.target) {
+    case RandomTarget::joint_q: return "m, rad or 1, as in q_units";
+    case RandomTarget::joint_v: return "m/s or rad/s, as in v_units";
+    case RandomTarget::density: return "kg/m^3";
+    case RandomTarget::size:
+    case RandomTarget::place: return "m";
+    case RandomTarget::ground_contact:
+    case RandomTarget::pair_contact:
+    case RandomTarget::tactile: return d.field == ContactField::mu ? "1" : "SI";
+    case RandomTarget::joint_effect:
+    case RandomTarget::motor: return "SI";
+  }
+  throw std::logic_error("a randomised number without a unit");
+}
+
+}  // namespace
+
+std::string randomized_name(const RandomizationDescription& d) {
+  switch (d.target) {
+    case RandomTarget::joint_q: return fmt::format("{}.q[{}]", d.name, d.index);
+    case RandomTarget::joint_v: return fmt::format("{}.v[{}]", d.name, d.index);
+    case RandomTarget::ground_contact:
+      return fmt::format("ground/{}.{}", d.name, field_name(d.field));
+    case RandomTarget::pair_contact:
+      return fmt::format("{}/{}.{}", d.name, d.second_name, field_name(d.field));
+    case RandomTarget::tactile: return fmt::format("{}.{}", d.name, field_name(d.field));
+    case RandomTarget::density: return fmt::format("{}.density", d.name);
+    case RandomTarget::size: return fmt::format("{}.{}", d.name, size_name(d.index));
+    case RandomTarget::place: return fmt::format("{}.pos[{}]", d.name, d.index);
+    case RandomTarget::joint_effect: return fmt::format("{}.{}", d.name, to_string(d.joint_field));
+    case RandomTarget::motor: return fmt::format("motor/{}.{}", d.name, to_string(d.joint_field));
+  }
+  throw std::logic_error("a randomised number without a name");
+}
+
+TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
+                             const RunDescription& run) {
+  const Model& model = batch.model();
+  const Scene& scene = model.scene();
+  if (run.tactile_intervals.size() != model.sensors().size())
+    throw std::logic_error("one tactile interval per sensor is needed");
+  TrajectoryLayout layout;
+  layout.steps = run.steps;
+  layout.first_step = run.first_step;
+  layout.environments = batch.environments();
+  layout.q_names = copy(model.q_names());
+  layout.q_units = copy(model.q_units());
+  layout.v_names = copy(model.v_names());
+  layout.v_units = copy(model.v_units());
+  layout.u_names = copy(model.u_names());
+  layout.u_units = copy(model.u_units());
+  layout.body_names = copy(model.body_names());
+  layout.variable_names = variable_names(model);
+  for (std::size_t i = 0; i < model.sensors().size(); ++i)
+    layout.sensors.push_back(
+        sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));
+  for (const StepStatus status :
+       {StepStatus::converged, StepStatus::split, StepStatus::not_converged, StepStatus::non_finite,
+        StepStatus::rotation, StepStatus::singular})
+    layout.statuses.push_back({static_cast<std::int8_t>(status), to_string(status)});
+  for (const RandomizationDescription& description : scene.randomizations)
+    layout.randomized_names.push_back(randomized_name(description));
+  const int varied = static_cast<int>(layout.randomized_names.size());
+  for (int e = 0; e < batch.environments(); ++e)
+    for (int k = 0; k < varied; ++k)
+      layout.randomized_values.push_back(batch.randomized_value(e, k));
+  layout.scene_name = scene.name;
+  layout.scene_path = scene.path;
+  layout.scene_text = scene.text;
+  layout.integrator = to_string(stepper.integrator());
+  layout.timestep = stepper.timestep();
+  layout.tolerance = stepper.tolerance();
+  layout.every = run.every;
+  layout.seed = batch.seed();
+  layout.first_episode = batch.episode(0);
+  layout.precision = run.precision;
+  layout.command_line = run.command_line;
+  layout.task = run.task;
+  layout.policy = run.policy;
+  layout.version = run.version;
+  layout.instruction_set = run.instruction_set;
+  return layout;
+}
+
+DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
+                                  const DatasetDescription& run) {
+  const Scene& scene = model.scene();
+  DatasetLayout layout;
+  layout.episodes = run.episodes;
+  layout.steps = run.steps;
+  layout.every = run.every;
+  layout.seed = run.seed;
+  layout.single = run.single;
+  layout.q_names = copy(model.q_names());
+  layout.q_units = copy(model.q_units());
+  layout.v_names = copy(model.v_names());
+  layout.v_units = copy(model.v_units());
+  layout.u_names = copy(model.u_names());
+  layout.variable_names = variable_names(model);
+  for (std::size_t i = 0; i < model.sensors().size(); ++i)
+    layout.sensors.push_back(sensor_layout(model.sensors()[i], scene.sensors[i], run.every));
+  for (const RandomizationDescription& description : scene.randomizations) {
+    layout.randomized_names.push_back(randomized_name(description));
+    layout.randomized_units.emplace_back(randomized_unit(description));
+  }
+  layout.scene_name = scene.name;
+  layout.scene_text = scene.text;
+  layout.integrator = to_string(stepper.integrator());
+  layout.timestep = stepper.timestep();
+  layout.tolerance = stepper.tolerance();
+  layout.precision = run.precision;
+  layout.version = run.version;
+  layout.instruction_set = run.instruction_set;
+  layout.task = run.task;
+  layout.policy = run.policy;
+  layout.controls = run.controls;
+  layout.command = run.command;
+  layout.shards = run.shards;
+  layout.compression = run.compression;
+  layout.gradients_of = run.gradients_of;
+  layout.gradients = run.gradients;
+  layout.sparse = run.sparse;
+  layout.tables = tables_of(model.scene());
+  layout.record = run.record;
+  return layout;
+}
+
+}  // namespace tangere

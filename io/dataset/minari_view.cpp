@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// Minari wants episodes numbered without gaps, one more observation than actions, and both ends of
+// an episode apart.
+#include "io/dataset/minari_view.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "engine/base/error.hpp"
+#include "io/dataset/dataset_description.hpp"
+#include "io/files/part_file.hpp"
+#include "io/hdf5/h5_listing.hpp"
+
+namespace tangere {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kMinariVersion = "0.5.3";    // the layout that is written here
+constexpr const char* kToFolder = "../../../../";  // from …/minari/tangere/NAME-v0/data
+
+/// Letters, digits, - and _ are what Minari accepts.
+std::string dataset_name(std::string name) {
+  for (char& c : name) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       c == '-' || c == '_';
+    if (!plain) c = '-';
+  }
+  return name.empty() ? "dataset" : name;
+}
+
+/// A number in as many lists as a shape says: all bounds are the same.
+std::string nested(const std::vector<std::uint64_t>& shape, std::size_t from,
+                   const std::string& number) {
+  if (from == shape.size()) return number;
+  const std::string inner = nested(shape, from + 1, number);
+  std::string text = "[";
+  for (std::uint64_t i = 0; i < shape[from]; ++i) text += (i > 0 ? ", " : "") + inner;
+  return text + "]";
+}
+
+/// A Gymnasium Box as Minari writes it; infinite bounds are bare words there.
+std::string box(const DemoArray& array, const std::string& low, const std::string& high) {
+  return fmt::format(R"({{"type": "Box", "dtype": "{}", "shape": [{}], "low": {}, "high": {}}})",
+                     array.type == h5::NumberType::float32 ? "float32" : "float64",
+                     fmt::join(array.shape, ", "), nested(array.shape, 0, low),
+                     nested(array.shape, 0, high));
+}
+
+std::string bound(double value) {
+  if (std::isinf(value)) return value < 0 ? "-Infinity" : "Infinity";
+  return fmt::format("{}", value);
+}
+
+}  // namespace
+
+MinariView::MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members)
+    : members_(members) {
+  const h5::Id scene = h5::open_group(shard, "/scene");
+  command_ = h5::read_text(h5::open_group(shard, "/"), "command");
+  const std::string task = h5::read_text(scene, "task");
+  id_ = fmt::format("tangere/{}-v0",
+                    dataset_name(task.starts_with("none") ? h5::read_text(scene, "name") : task));
+  seed_ = h5::read_numbers<std::uint64_t>(scene, "seed").at(0);
+  if (members.of_task) {
+    low_ = bound(h5::read_numbers<double>(scene, "action_low").at(0));
+    high_ = bound(h5::read_numbers<double>(scene, "action_high").at(0));
+  }
+  folder_ = (fs::path(folder) / "minari" / id_ / "data").string();
+  std::error_code error;
+  fs::create_directories(folder_, error);
+  if (error)
+    throw IoError(fmt::format("cannot create the folder '{}': {}", folder_, error.message()));
+  file_.emplace((fs::path(folder_) / "main_data.hdf5").string(), true, true);
+  file_->close();
+}
+
+void MinariView::add(std::string_view file, std::span<const LinkedDemo> demos) {
+  h5::Bytes out;
+  for (const h5::FileMember& episode :
+       add_minari_episodes(out, file_->here(), members_, fmt::format("{}{}", kToFolder, file),
+                           demos, count_, seed_))
+    episodes_.push_back(episode);
+  file_->append(out);
+  count_ += std::ssize(demos);
+  for (const LinkedDemo& demo : demos) steps_ += demo.facts.rows;
+}
+
+void MinariView::commit() {
+  file_->open(file_->append_group("episode_", std::move(episodes_), true));
+  h5::write_scalar<std::int64_t>(file_->file(), "total_episodes", count_);
+  h5::write_scalar<std::int64_t>(file_->file(), "total_steps", steps_);
+  file_->commit();
+  write_text_atomically((fs::path(folder_) / "metadata.json").string(), metadata(), true);
+}
+
+std::string MinariView::metadata() const {
+  std::string subspaces;
+  for (const DemoArray& array : members_.observations)
+    subspaces += fmt::format("{}{}: {}", subspaces.empty() ? "" : ", ", json_text(array.name),
+                             box(array, "-Infinity", "Infinity"));
+  const std::string observation =
+      fmt::format(R"({{"type": "Dict", "subspaces": {{{}}}}})", subspaces);
+  return fmt::format(
+      "{{\"dataset_id\": {}, \"data_format\": \"hdf5\", \"minari_version\": \"{}\", "
+      "\"total_episodes\": {}, "
+      "\"total_steps\": {}, \"observation_space\": {}, \"action_space\": {}, \"algorithm_name\": "
+      "{}, "
+      "\"description\": {}}}\n",
+      json_text(id_), kMinariVersion, count_, steps_, json_text(observation),
+      json_text(box(members_.actions, low_, high_)), json_text("tangere"), json_text(command_));
+}
+
+}  // namespace tangere

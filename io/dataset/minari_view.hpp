@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// A data set as Minari lays it out: links and virtual datasets, no number twice.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "io/dataset/demo_links.hpp"
+#include "io/dataset/grown_file.hpp"
+
+namespace tangere {
+
+/// FOLDER/minari/tangere/NAME-v0/data. Everything throws IoError.
+class MinariView {
+ public:
+  /// Begins it, in place of one that is there; `shard`: anything in one of the folder's shards;
+  /// `members` must outlive it.
+  MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members);
+
+  /// Demos of a file of the data set's folder, given without its path, in ascending order.
+  void add(std::string_view file, std::span<const LinkedDemo> demos);
+  /// Writes what is left, and metadata.json.
+  void commit();
+  /// "tangere/NAME-v0".
+  [[nodiscard]] const std::string& id() const { return id_; }
+
+ private:
+  [[nodiscard]] std::string metadata() const;
+
+  const DemoMembers& members_;
+  std::string id_, folder_, command_, low_ = "-1.0", high_ = "1.0";
+  std::optional<GrownFile> file_;
+  std::vector<h5::FileMember> episodes_;
+  std::int64_t count_ = 0, steps_ = 0;
+  std::uint64_t seed_ = 0;
+};
+
+}  // namespace tangere

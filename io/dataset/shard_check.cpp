@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reads what was written through a fresh handle and compares with what the file says of itself.
+#include "io/dataset/shard_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "engine/base/error.hpp"
+#include "io/dataset/dataset_description.hpp"
+#include "io/hdf5/h5.hpp"
+#include "io/hdf5/h5_listing.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr std::size_t kReadBytes = std::size_t{4} << 20;
+
+std::uint64_t mix(std::uint64_t hash, std::uint64_t word) {
+  hash = (hash ^ word) * 0x9E3779B97F4A7C15ULL;  // odd: invertible, so no bit of a word is lost
+  return hash ^ (hash >> 32);
+}
+
+/// Four words side by side: a multiplication takes as long as four do one after the other.
+std::uint64_t row_hash(std::uint64_t key, const unsigned char* bytes, std::size_t count) {
+  std::array<std::uint64_t, 4> hash{}, words{};
+  hash[0] = mix(key, count);  // count: a row is not the same row with zeros behind it
+  for (std::size_t lane = 1; lane < hash.size(); ++lane) hash[lane] = mix(hash[lane - 1], lane);
+  for (; count >= sizeof words; bytes += sizeof words, count -= sizeof words) {
+    std::memcpy(words.data(), bytes, sizeof words);
+    for (std::size_t lane = 0; lane < hash.size(); ++lane)
+      hash[lane] = mix(hash[lane], words[lane]);
+  }
+  words = {};
+  std::memcpy(words.data(), bytes, count);
+  for (std::size_t lane = 0; lane < hash.size(); ++lane) hash[lane] = mix(hash[lane], words[lane]);
+  return mix(mix(mix(hash[0], hash[1]), hash[2]), hash[3]);
+}
+
+constexpr std::size_t kMostProblems = 100;  // of a shard: a thousand lines say no more
+
+class ShardChecker {
+ public:
+  ShardChecker(const std::string& path, bool finite)
+      : finite_(finite), file_(h5::open_file(path)), scene_(h5::open_group(file_, "scene")) {}
+
+  /// Of the first and the last episode everything but sums, of the others that they are counted.
+  ShardReport sample() {
+    const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
+    read_description();
+    for (const std::int64_t episode : {content_.first_episode, end_ - 1})
+      add_episode(data, failed, episode);
+    const auto demos = static_cast<std::int64_t>(h5::link_count(data));
+    const auto lost = static_cast<std::int64_t>(h5::link_count(failed));
+    if (demos + lost != end_ - content_.first_episode)
+      fail(fmt::format("it has {} demos and {} failed episodes, expected {} together", demos, lost,
+                       end_ - content_.first_episode));
+    return {content_, problems_};
+  }
+
+  ShardReport check() {
+    if (h5::read_text(file_, "format") != "tangere dataset") {
+      fail("it is no tangere data set");
+      return {content_, problems_};
+    }
+    if (const std::int64_t version = number(file_, "format_version"); version != 2) {
+      fail(fmt::format("its format_version is {}, expected 2", version));
+      return {content_, problems_};
+    }
+    read_description();
+    const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
+    for (std::int64_t episode = content_.first_episode; episode < end_; ++episode)
+      add_episode(data, failed, episode);
+    if (number(data, "total") != content_.rows)
+      fail(fmt::format("/data says {} rows, its demos have {}", number(data, "total"),
+                       content_.rows));
+    // Numbers that are known to be missing or wrong in count change the sum as well.
+    const std::uint64_t expected = h5::read_numbers<std::uint64_t>(file_, "content_sum").at(0);
+    if (problems_.empty() && sum_.value() != expected)
+      fail(fmt::format("the checksum of its numbers is {:016x}, expected {:016x}", sum_.value(),
+                       expected));
+    problems_.insert(problems_.end(), not_finite_.begin(), not_finite_.end());
+    return {content_, problems_};
+  }
+
+ private:
+  void read_description() {
+    content_.first_episode = number(file_, "first_episode");
+    end_ = content_.first_episode + number(file_, "episodes");
+    names_ = h5::read_texts(scene_, "observations");
+    single_ = h5::read_text(scene_, "observation_type") == "float32";
+    rows_ = number(scene_, "steps") / number(scene_, "every");
+    of_task_ = !h5::read_text(scene_, "task").starts_with("none");
+    gradients_ = gradients_said(scene_);
+  }
+  void add_episode(const h5::Id& data, const h5::Id& failed, std::int64_t episode) {
+    const std::string demo = fmt::format("demo_{}", episode);
+    const bool is_demo = h5::has_link(data, demo);
+    if (is_demo == h5::has_link(failed, fmt::format("episode_{}", episode)))
+      fail(fmt::format("episode {} is not in exactly one of /data and /failed", episode));
+    if (is_demo)
+      try_demo(data, demo, episode);
+    else
+      ++content_.failed;
+  }
+  void fail(const std::string& what) {
+    if (problems_.size() < kMostProblems) problems_.push_back(what);
+  }
+  void try_demo(const h5::Id& data, const std::string& demo, std::int64_t episode) {
+    try {
+      add_demo(h5::open_group(data, demo), episode);
+    } catch (const IoError& error) {
+      fail(fmt::format("{}: {}", demo, error.what()));
+    }
+  }
+  static std::int64_t number(const h5::Id& object, const std::string& name) {
+    return h5::read_numbers<std::int64_t>(object, name).at(0);
+  }
+
+  void add_demo(const h5::Id& demo, std::int64_t episode) {
+    const std::int64_t rows = number(demo, "num_samples");
+    if (of_task_ ? rows < 1 || rows > rows_ : rows != rows_)
+      return fail(fmt::format("demo_{} has {} rows, expected {}{}", episode, rows,
+                              of_task_ ? "1 to " : "", rows_));
+    // Known without a checksum: without a task nothing is rewarded, and only the last row ends the
+    // episode.
+    if (of_task_) {
+      add<float>(demo, "rewards", episode, names_.size() + 1, 0, rows);
+    } else {
+      check_list<float>(demo, "rewards", episode, rows, 0);
+    }
+    check_list<std::int8_t>(demo, "dones", episode, rows, 1);
+    add<float>(demo, "actions", episode, 0, 0, rows);
+    const h5::Id obs = h5::open_group(demo, "obs"), final_obs = h5::open_group(demo, "final_obs");
+    for (std::size_t k = 0; k < names_.size(); ++k) {
+      if (single_) {
+        add<float>(obs, names_[k], episode, k + 1, 0, rows);
+        add<float>(final_obs, names_[k], episode, k + 1, rows, 1);
+      } else {
+        add<double>(obs, names_[k], episode, k + 1, 0, rows);
+        add<double>(final_obs, names_[k], episode, k + 1, rows, 1);
+      }
+    }
+    for (std::size_t k = 0; k < gradients_.size(); ++k)
+      add_gradient(demo, gradients_[k], episode, names_.size() + 2 + k, rows);
+    if (h5::has_link(demo, "next_obs"))
+      for (const std::string& name : names_)
+        single_ ? check_next<float>(demo, name, episode, rows)
+                : check_next<double>(demo, name, episode, rows);
+    content_.rows += rows;
+    ++content_.demos;
+  }
+
+  void add_gradient(const h5::Id& demo, const GradientSaid& said, std::int64_t episode,
+                    std::size_t index, std::int64_t rows) {
+    const h5::Id dataset = h5::open_dataset(demo, said.name);
+    if (h5::read_text(dataset, "meaning") != said.meaning)
+      fail(fmt::format("demo_{}: {} says another meaning than /scene", episode, said.name));
+    const h5::Dims dims = h5::dimensions(dataset);
+    if (dims.empty())
+      return fail(fmt::format("demo_{}: {} is one number, expected a list", episode, said.name));
+    add<double>(demo, said.name, episode, index, 0,
+                said.by_row ? rows : static_cast<std::int64_t>(dims[0]));
+  }
+
+  /// A list of zeros whose last number is `last`.
+  template <class T>
+  void check_list(const h5::Id& demo, const std::string& name, std::int64_t episode,
+                  std::int64_t rows, T last) {
+    const h5::Id dataset = h5::open_dataset(demo, name);
+    if (!has_rows(dataset, fmt::format("demo_{}: {}", episode, name), rows)) return;
+    std::vector<T> list(static_cast<std::size_t>(rows)), expected(list.size(), T{0});
+    expected.back() = last;
+    h5::read_box(dataset, {0}, {list.size()}, list.data());
+    if (list != expected) fail(fmt::format("demo_{}: {} are not what was written", episode, name));
+  }
+
+  /// Of merged files: obs from its second row on, then final_obs.
+  template <class T>
+  void check_next(const h5::Id& demo, const std::string& name, std::int64_t episode,
+                  std::int64_t rows) {
+    const h5::Id next = h5::open_dataset(demo, "next_obs/" + name),
+                 obs = h5::open_dataset(demo, "obs/" + name),
+                 last = h5::open_dataset(demo, "final_obs/" + name);
+    const std::string full = fmt::format("demo_{}: next_obs/{}", episode, name);
+    if (!has_rows(next, full, rows)) return;
+    h5::Dims count = h5::dimensions(next);
+    count[0] = 1;
+    std::size_t width = 1;
+    for (std::size_t i = 1; i < count.size(); ++i) width *= count[i];
+    if (width == 0) return;
+    const auto step =
+        static_cast<std::int64_t>(std::max<std::size_t>(1, kReadBytes / (width * sizeof(T))));
+    std::vector<T> shown, there;
+    const auto read = [&](const h5::Id& dataset, std::int64_t first, std::int64_t taken,
+                          std::vector<T>& into) {
+      h5::Dims offset(count.size(), 0);
+      offset[0] = static_cast<hsize_t>(first);
+      count[0] = static_cast<hsize_t>(taken);
+      into.resize(count[0] * width);
+      h5::read_box(dataset, offset, count, into.data());
+    };
+    for (std::int64_t row = 0; row < rows;) {
+      const bool at_last = row + 1 == rows;
+      const std::int64_t taken = at_last ? 1 : std::min(step, rows - 1 - row);
+      read(next, row, taken, shown);
+      read(at_last ? last : obs, at_last ? 0 : row + 1, taken, there);
+      if (std::memcmp(shown.data(), there.data(), shown.size() * sizeof(T)) != 0)
+        return fail(fmt::format("{} is not obs one row later, in rows {} to {}", full, row,
+                                row + taken - 1));
+      row += taken;
+    }
+  }
+
+  bool has_rows(const h5::Id& dataset, const std::string& name, std::int64_t rows) {
+    const h5::Dims dims = h5::dimensions(dataset);
+    const bool right = !dims.empty() && dims[0] == static_cast<hsize_t>(rows);
+    if (!right) fail(fmt::format("{} has not {} rows", name, rows));
+    return right;
+  }
+
+  template <class T>
+  void check_finite(const std::vector<T>& numbers, const std::string& name, std::int64_t first,
+                    std::size_t width) {
+    const auto bad =
+        std::find_if(numbers.begin(), numbers.end(), [](T x) { return !std::isfinite(x); });
+    if (!finite_ || bad == numbers.end() || not_finite_.size() >= kMostProblems) return;
+    const auto at = static_cast<std::size_t>(bad - numbers.begin());
+    not_finite_.push_back(fmt::format("{}: row {} has a number that is {}, expected finite ones",
+                                      name, first + static_cast<std::int64_t>(at / width), *bad));
+  }
+
+  /// Adds a dataset whose row 0 is row `first` of the episode.
+  template <class T>
+  void add(const h5::Id& group, const std::string& name, std::int64_t episode, std::size_t index,
+           std::int64_t first, std::int64_t rows) {
+    const h5::Id dataset = h5::open_dataset(group, name);
+    const std::string full = fmt::format("demo_{}: {}", episode, name);
+    if (!has_rows(dataset, full, rows)) return;
+    h5::Dims count = h5::dimensions(dataset), offset(count.size(), 0);
+    std::size_t width = 1;
+    for (std::size_t i = 1; i < count.size(); ++i) width *= count[i];
+    if (width == 0) return;
+    const auto step =
+        static_cast<std::int64_t>(std::max<std::size_t>(1, kReadBytes / (width * sizeof(T))));
+    auto& buffer = std::get<std::vector<T>>(buffers_);
+    for (std::int64_t row = 0; row < rows; row += step) {
+      count[0] = static_cast<hsize_t>(std::min(step, rows - row));
+      offset[0] = static_cast<hsize_t>(row);
+      buffer.resize(count[0] * width);
+      h5::read_box(dataset, offset, count, buffer.data());
+      check_finite(buffer, full, first + row, width);
+      sum_.add(episode, index, first + row, static_cast<std::int64_t>(count[0]), width * sizeof(T),
+               buffer.data());
+    }
+  }
+
+  bool finite_;
+  std::vector<std::string> problems_, not_finite_;
+  h5::Id file_, scene_;
+  std::vector<std::string> names_;
+  std::vector<GradientSaid> gradients_;
+  bool single_ = false, of_task_ = false;
+  std::int64_t rows_ = 0, end_ = 0;
+  std::tuple<std::vector<float>, std::vector<double>> buffers_;
+  ContentSum sum_;
+  ShardContent content_;
+};
+
+}  // namespace
+
+void ContentSum::add(std::int64_t episode, std::size_t name, std::int64_t first_row,
+                     std::int64_t rows, std::size_t row_bytes, const void* data) {
+  const auto* bytes = static_cast<const unsigned char*>(data);
+  const std::uint64_t dataset = mix(mix(0, static_cast<std::uint64_t>(episode)), name);
+  if (row_bytes == 0) return;
+  for (std::int64_t row = 0; row < rows; ++row, bytes += row_bytes)
+    sum_ += row_hash(mix(dataset, static_cast<std::uint64_t>(first_row + row)), bytes, row_bytes);
+}
+
+ShardReport examine_shard(const std::string& path) {
+  try {
+    return ShardChecker(path, true).check();
+  } catch (const IoError& error) {
+    return {{}, {error.what()}};
+  }
+}
+
+void sample_shard(const std::string& path) {
+  const ShardReport report = ShardChecker(path, false).sample();
+  if (!report.problems.empty())
+    throw IoError(fmt::format("'{}' is damaged: {}", path, report.problems.front()));
+}
+
+ShardContent check_shard(const std::string& path) {
+  const ShardReport report = ShardChecker(path, false).check();
+  if (!report.problems.empty())
+    throw IoError(fmt::format("'{}' is damaged: {}", path, report.problems.front()));
+  return report.content;
+}
+
+}  // namespace tangere

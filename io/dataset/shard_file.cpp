@@ -1,0 +1,333 @@
+// SPDX-License-Identifier: Apache-2.0
+// A block: descriptions of its demos, indexes of chunks if any, then the numbers, demo after demo.
+#include "io/dataset/shard_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "io/dataset/dataset_description.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr std::int64_t kBlockEpisodes = 16;
+constexpr std::size_t kMostHeld = std::size_t{64} << 20;
+
+std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 7) / 8 * 8; }
+
+template <class T>
+std::span<const unsigned char> bytes_of(std::span<const T> numbers) {
+  return {reinterpret_cast<const unsigned char*>(numbers.data()), numbers.size_bytes()};
+}
+
+}  // namespace
+
+ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const DemoFormat& format,
+                     EpisodeRange range, bool overwrite, std::size_t& held_bytes)
+    : layout_(layout),
+      format_(format),
+      first_episode_(range.first),
+      end_(range.end),
+      unfinished_((range.end - range.first + kBlockEpisodes - 1) / kBlockEpisodes),
+      next_(range.first),
+      cut_(has_chunks(layout)),
+      held_bytes_(held_bytes),
+      part_(path, overwrite),
+      placed_(part_),
+      no_rewards_(static_cast<std::size_t>(layout.rows()), 0.0F),
+      dones_(no_rewards_.size(), 0) {
+  dones_.back() = 1;
+  try {
+    describe();
+  } catch (...) {
+    part_.empty();
+    throw;
+  }
+  texts_ = aligned(part_.size());
+  const h5::Bytes texts = format_.texts();
+  placed_.add(texts_, texts.all());
+  placed_.flush();
+  begin_ = free_ = texts_ + texts.size();
+}
+
+ShardFile::~ShardFile() {
+  // On a full disk the library can only close its file once there is room again.
+  if (file_.get() >= 0) part_.empty();
+}
+
+void ShardFile::describe() {
+  file_ = h5::create_file(part_.path());
+  describe_dataset(file_, layout_);
+  h5::write_scalar<std::int64_t>(file_, "first_episode", first_episode_);
+  h5::write_scalar<std::int64_t>(file_, "episodes", end_ - first_episode_);
+  h5::close_file(file_, part_.path());
+}
+
+ShardFile::Block& ShardFile::block_of(const EpisodeRows& rows) {
+  const auto [found, is_new] = blocks_.try_emplace(rows.first_episode);
+  Block& block = found->second;
+  if (!is_new) return block;
+  const std::size_t varied = layout_.randomized_names.size();
+  for (int e = 0; e < rows.episodes; ++e) {
+    Demo& demo = block.demos.emplace_back();
+    demo.facts.rows = rows_of_episode(layout_, rows, e);
+    const auto i = static_cast<std::size_t>(e);
+    if (!rows.ends.empty()) demo.facts.end = rows.ends[i];
+    // Pieces that no engine made may say nothing of what varied.
+    demo.facts.randomized.assign(varied, 0);
+    if (!rows.randomized.empty())
+      std::copy_n(rows.randomized.begin() + static_cast<std::ptrdiff_t>(i * varied), varied,
+                  demo.facts.randomized.begin());
+    demo.addresses.resize(format_.datasets(), h5::kNowhere);
+    demo.held.resize(format_.datasets());
+    demo.chunks.resize(format_.datasets());
+  }
+  if (!waits()) give_place(block, rows.first_episode);
+  return block;
+}
+
+/// Demos of a scene are of one size, so the place of a block follows from its number; those of a
+/// task come in ascending order.
+void ShardFile::give_place(Block& block, std::int64_t first_episode) {
+  const std::uint64_t of_demo = format_.header_bytes() + format_.data_bytes(layout_.rows());
+  const auto before = static_cast<std::uint64_t>(first_episode - first_episode_);
+  block.base = layout_.task ? free_ : begin_ + before * of_demo;
+  std::uint64_t at = block.base + block.demos.size() * format_.header_bytes();
+  for (Demo& demo : block.demos)
+    for (std::size_t k = 0; k < format_.datasets(); ++k) {
+      demo.addresses[k] = at;
+      at += aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) *
+                    format_.row_bytes(k));
+    }
+  free_ = std::max(free_, at);
+}
+
+void ShardFile::write(const EpisodeRows& rows, PreparedPiece prepared) {
+  Block& block = block_of(rows);
+  for (int e = 0; e < rows.episodes; ++e) {
+    const ContentSum& sum = prepared.sums[static_cast<std::size_t>(e)];
+    block.demos[static_cast<std::size_t>(e)].sum.add(sum);
+    if (!waits()) placed_.expect(sum);
+    write_slices(block, rows, e);
+  }
+  placed_.flush();
+  hold(block, prepared.chunks);
+}
+
+void ShardFile::write_slices(Block& block, const EpisodeRows& rows, int episode) {
+  Demo& demo = block.demos[static_cast<std::size_t>(episode)];
+  const std::vector<PieceSlice> slices = slices_of(format_, rows, episode, demo.facts.rows);
+  for (std::size_t k = 0; k < format_.datasets(); ++k) {
+    const PieceSlice& slice = slices[k];
+    if (!waits()) {
+      const std::span<const unsigned char> same = constant(k, demo.facts.rows);
+      if (same.empty())
+        placed_.add(
+            demo.addresses[k] + static_cast<std::uint64_t>(slice.first) * slice.rows.row_bytes,
+            slice.rows, slice.data);
+      else if (rows.first_row == 0)
+        placed_.add(demo.addresses[k], same);
+    } else if (format_.chunk_rows(k, demo.facts.rows) == 0 && slice.rows.rows > 0) {
+      hold(demo, k, slice);
+    }
+  }
+}
+
+/// Numbers that follow from R; none of the other datasets.
+std::span<const unsigned char> ShardFile::constant(std::size_t dataset, std::int64_t rows) const {
+  const auto count = static_cast<std::size_t>(rows);
+  if (dataset == DemoFormat::kDones) return bytes_of(std::span(dones_).last(count));
+  if (dataset == DemoFormat::kRewards && !layout_.task)
+    return bytes_of(std::span(no_rewards_).first(count));
+  return {};
+}
+
+void ShardFile::hold(Block& block, std::vector<PreparedChunk>& chunks) {
+  for (PreparedChunk& chunk : chunks) {
+    Chunk held{{chunk.first, 0, static_cast<std::uint32_t>(chunk.bytes.size())},
+               std::move(chunk.bytes)};
+    held_bytes_ += held.bytes.size();
+    if (held_bytes_ >
+        kMostHeld) {  // memory is bounded; where it lies then depends on the order of pieces
+      held_bytes_ -= held.bytes.size();
+      held.place.address = free_;
+      placed_.add(free_, held.bytes);
+      placed_.flush();
+      free_ = aligned(free_ + held.bytes.size());
+      held.bytes = {};
+    }
+    block.demos[static_cast<std::size_t>(chunk.episode)].chunks[chunk.dataset].push_back(
+        std::move(held));
+  }
+}
+
+/// The same for rows: where memory is full, all of the dataset gets its place.
+void ShardFile::hold(Demo& demo, std::size_t dataset, const PieceSlice& slice) {
+  HeldRows& held = demo.held[dataset];
+  const std::span<const unsigned char> bytes(
+      slice.data, static_cast<std::size_t>(slice.rows.rows) * slice.rows.row_bytes);
+  if (held.address == h5::kNowhere) {
+    if (held_bytes_ + bytes.size() <= kMostHeld) {
+      held.bytes.insert(held.bytes.end(), bytes.begin(), bytes.end());
+      held_bytes_ += bytes.size();
+      return;
+    }
+    held.address = free_;
+    const auto rows = static_cast<std::uint64_t>(format_.rows_of(dataset, demo.facts.rows));
+    free_ = aligned(free_ + rows * slice.rows.row_bytes);
+    placed_.add(held.address, held.bytes);
+    placed_.flush();
+    held_bytes_ -= held.bytes.size();
+    held.bytes = {};
+  }
+  placed_.add(held.address + static_cast<std::uint64_t>(slice.first) * slice.rows.row_bytes, bytes);
+  placed_.flush();
+}
+
+void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) {
+  Block& block = blocks_.at(first_episode);
+  for (const FailedEpisode& failure : failures) {
+    Demo& demo = block.demos[static_cast<std::size_t>(failure.episode - first_episode)];
+    demo.failed = true;
+    failures_.push_back(failure);
+    if (!layout_.randomized_names.empty())
+      randomized_of_failures_[failure.episode] = demo.facts.randomized;
+  }
+  block.finished = true;
+  --unfinished_;
+  if (!waits()) {
+    close_block(block, first_episode, {});
+    blocks_.erase(first_episode);
+    return;
+  }
+  for (auto next = blocks_.find(next_); next != blocks_.end() && next->second.finished;
+       next = blocks_.find(next_)) {
+    give_place_to_held(next->second);
+    blocks_.erase(next);
+    next_ += kBlockEpisodes;
+  }
+}
+
+/// Everything in the order of the file, in few large writes.
+void ShardFile::give_place_to_held(Block& block) {
+  block.base = free_;
+  std::size_t indexes = 0;
+  for (const Demo& demo : block.demos)
+    for (std::size_t k = 0; k < format_.datasets(); ++k)
+      indexes += h5::chunk_index_bytes(demo.chunks[k].size(), format_.rank(k));
+  const std::uint64_t first_index = block.base + block.demos.size() * format_.header_bytes();
+  std::uint64_t at = first_index + indexes;
+  h5::Bytes index;
+  for (Demo& demo : block.demos)
+    for (std::size_t k = 0; k < format_.datasets(); ++k) {
+      demo.addresses[k] = at;
+      const std::int64_t rows = format_.chunk_rows(k, demo.facts.rows);
+      if (demo.held[k].address != h5::kNowhere) {
+        demo.addresses[k] = demo.held[k].address;
+        continue;
+      }
+      if (rows == 0) {
+        at += aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) *
+                      format_.row_bytes(k));
+        continue;
+      }
+      std::vector<h5::FileChunk> places;
+      for (Chunk& chunk : demo.chunks[k]) {
+        if (!chunk.bytes.empty()) {
+          chunk.place.address = at;
+          at = aligned(at + chunk.bytes.size());
+        }
+        places.push_back(chunk.place);
+      }
+      demo.addresses[k] = h5::add_chunk_index(index, first_index, places, format_.rank(k),
+                                              static_cast<std::uint64_t>(rows));
+    }
+  free_ = at;
+  close_block(block, next_, index);
+}
+
+void ShardFile::write_held(Block& block) {
+  for (const Demo& demo : block.demos)
+    for (std::size_t k = 0; k < format_.datasets(); ++k) {
+      const std::span<const unsigned char> same = constant(k, demo.facts.rows);
+      if (format_.chunk_rows(k, demo.facts.rows) == 0)
+        placed_.add(demo.addresses[k],
+                    same.empty() ? std::span<const unsigned char>(demo.held[k].bytes) : same);
+      held_bytes_ -= demo.held[k].bytes.size();
+      for (const Chunk& chunk : demo.chunks[k]) {
+        held_bytes_ -= chunk.bytes.size();
+        placed_.add(chunk.place.address, chunk.bytes);
+      }
+    }
+}
+
+void ShardFile::close_block(Block& block, std::int64_t first_episode, const h5::Bytes& indexes) {
+  h5::Bytes descriptions;
+  for (std::size_t e = 0; e < block.demos.size(); ++e) {
+    const Demo& demo = block.demos[e];
+    const std::uint64_t group =
+        format_.describe(descriptions, block.base, demo.facts, demo.addresses, texts_);
+    if (demo.failed) continue;  // its bytes stay, nothing leads to them
+    members_.push_back({first_episode + static_cast<std::int64_t>(e), group});
+    rows_ += demo.facts.rows;
+    sum_.add(demo.sum);
+  }
+  descriptions.add(indexes.all());
+  placed_.add(block.base, descriptions.all());
+  if (waits()) write_held(block);
+  placed_.flush();
+}
+
+void ShardFile::record_failures() {
+  std::sort(failures_.begin(), failures_.end(),
+            [](const FailedEpisode& a, const FailedEpisode& b) { return a.episode < b.episode; });
+  const h5::Id failed = h5::create_group(file_, "failed");
+  for (const FailedEpisode& failure : failures_) {
+    const h5::Id group = h5::create_group(failed, fmt::format("episode_{}", failure.episode));
+    h5::write_scalar<std::int64_t>(group, "step", failure.step);
+    h5::write_scalar<std::int8_t>(group, "status", static_cast<std::int8_t>(failure.status));
+    h5::write_attribute(group, "reason", to_string(failure.status));
+    h5::write_list<double>(group, "q", failure.q);
+    h5::write_list<double>(group, "v", failure.v);
+    const std::vector<double>& randomized = randomized_of_failures_[failure.episode];
+    if (!randomized.empty()) h5::write_list<double>(group, "randomized", randomized);
+  }
+}
+
+/// `data`: the address of the group of demos.
+void ShardFile::complete_description(std::uint64_t data) {
+  file_ = h5::change_file(part_.path());
+  h5::link_object(file_, "data", data);
+  const h5::Id group = h5::open_group(file_, "data");
+  h5::write_attribute(group, "env_args",
+                      fmt::format(R"({{"env_name": {}, "type": 2, "env_kwargs": {{}}}})",
+                                  json_text(layout_.scene_name)));
+  h5::write_scalar<std::int64_t>(group, "total", rows_);
+  record_failures();
+  h5::write_scalar<std::uint64_t>(file_, "content_sum", sum_.value());
+}
+
+void ShardFile::commit() {
+  h5::Bytes out;
+  const std::uint64_t data = h5::add_large_group(out, free_, "demo_", std::move(members_));
+  const std::span<const unsigned char> members = out.all().first(data - free_),
+                                       group = out.all().subspan(data - free_);
+  placed_.add(free_, members);
+  placed_.flush();
+  placed_.write_unchecked(data, group);  // the library will add to it
+  placed_.end_at(free_ + out.size());
+  try {
+    complete_description(data);
+    h5::close_file(file_, part_.path());
+  } catch (...) {
+    part_.empty();
+    throw;
+  }
+  placed_.verify();
+  sample_shard(part_.path());
+  part_.commit();
+}
+
+}  // namespace tangere

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// One HDF5 file of a data set, whose bytes do not depend on the order in which blocks are finished.
+// The library writes what the file says of the data set; demos, thousands of them, are laid out
+// here.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "engine/rows/episode_sink.hpp"
+#include "io/dataset/dataset_layout.hpp"
+#include "io/dataset/demo_format.hpp"
+#include "io/dataset/placed_file.hpp"
+#include "io/dataset/prepared_piece.hpp"
+#include "io/files/part_file.hpp"
+#include "io/hdf5/h5.hpp"
+#include "io/hdf5/h5_trees.hpp"
+
+namespace tangere {
+
+class ShardFile {
+ public:
+  /// Creates `<path>.part`. Throws IoError, also when `path` exists and `overwrite` is false.
+  /// `layout`, `format` and `held_bytes`, what all shards of a data set together keep in memory,
+  /// must outlive it.
+  ShardFile(const std::string& path, const DatasetLayout& layout, const DemoFormat& format,
+            EpisodeRange range, bool overwrite, std::size_t& held_bytes);
+  ~ShardFile();
+  ShardFile(const ShardFile&) = delete;
+  ShardFile& operator=(const ShardFile&) = delete;
+
+  /// `prepared`: of the same piece.
+  void write(const EpisodeRows& rows, PreparedPiece prepared);
+  void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures);
+  /// Whether every block has finished.
+  [[nodiscard]] bool complete() const { return unfinished_ == 0; }
+  /// Names the demos that did not fail, reads everything back, syncs and renames.
+  void commit();
+
+ private:
+  /// In memory until its block has a place; or, where memory is full, on disk already.
+  struct Chunk {
+    h5::FileChunk place;
+    std::vector<unsigned char> bytes;
+  };
+  /// Numbers of a contiguous dataset, of a block without a place. The same: once they have an
+  /// address, they are there.
+  struct HeldRows {
+    std::vector<unsigned char> bytes;
+    std::uint64_t address = h5::kNowhere;
+  };
+  struct Demo {
+    DemoFacts facts;
+    bool failed = false;
+    ContentSum sum;
+    std::vector<std::uint64_t> addresses;    // per dataset, once known
+    std::vector<HeldRows> held;              // per dataset
+    std::vector<std::vector<Chunk>> chunks;  // per dataset
+  };
+  struct Block {
+    std::vector<Demo> demos;
+    std::uint64_t base = 0;
+    bool finished = false;
+  };
+
+  void describe();
+  void complete_description(std::uint64_t data);
+  [[nodiscard]] bool waits() const { return cut_; }  // sizes are known when a block has ended
+  Block& block_of(const EpisodeRows& rows);
+  void give_place(Block& block, std::int64_t first_episode);
+  void write_slices(Block& block, const EpisodeRows& rows, int episode);
+  [[nodiscard]] std::span<const unsigned char> constant(std::size_t dataset,
+                                                        std::int64_t rows) const;
+  void hold(Block& block, std::vector<PreparedChunk>& chunks);
+  void hold(Demo& demo, std::size_t dataset, const PieceSlice& slice);
+  void give_place_to_held(Block& block);
+  void write_held(Block& block);
+  void close_block(Block& block, std::int64_t first_episode, const h5::Bytes& indexes);
+  void record_failures();
+
+  const DatasetLayout& layout_;
+  const DemoFormat& format_;
+  std::int64_t first_episode_, end_, unfinished_,
+      next_;                 // blocks that are unfinished; the first one without a place
+  bool cut_;                 // into chunks
+  std::size_t& held_bytes_;  // of chunks and rows, of all shards
+  PartFile part_;
+  PlacedFile placed_;
+  h5::Id file_;
+  std::uint64_t texts_ = 0, begin_ = 0;   // of what demos refer to; of the blocks
+  std::uint64_t free_ = 0;                // behind the last byte that is taken
+  std::map<std::int64_t, Block> blocks_;  // by their first episode
+  std::vector<float> no_rewards_;
+  std::vector<std::int8_t> dones_;
+  std::vector<h5::FileMember> members_;
+  std::vector<FailedEpisode> failures_;
+  std::map<std::int64_t, std::vector<double>> randomized_of_failures_;  // by episode
+  std::int64_t rows_ = 0;  // of demos, failed ones left out
+  ContentSum sum_;
+};
+
+}  // namespace tangere

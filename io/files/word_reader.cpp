@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+// Numbers are read the same whatever the locale.
+#include "io/files/word_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+
+#include "engine/base/error.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr std::uintmax_t kLargestFile = 256U << 20;
+constexpr double kLargestPosition = 1e6;  // [file's unit]
+
+/// Not a number where the word is none.
+double parse(std::string_view word) {
+  double x = 0;
+  if (word.size() > 1 && word[0] == '+' && word[1] != '-')
+    word.remove_prefix(1);  // the library knows no plus sign
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), x);
+  return error == std::errc() && end == word.data() + word.size() ? x : NAN;
+}
+
+}  // namespace
+
+WordReader::WordReader(const std::string& path) : path_(path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error))
+    throw IoError(path + ": is a folder; expected a file");
+  file_.open(path, std::ios::binary);
+  if (!file_) throw IoError(path + ": cannot be opened for reading");
+  if (std::filesystem::file_size(path, error) > kLargestFile && !error)
+    throw InputError(path + ": larger than 256 MiB; expected a surface or a list of points");
+}
+
+bool WordReader::next() {
+  while (std::getline(file_, line_)) {
+    ++number_;
+    std::replace(line_.begin(), line_.end(), '"', ' ');
+    words.clear();
+    std::string_view rest = line_;
+    for (;;) {
+      const std::size_t begin = rest.find_first_not_of(" \t\r");
+      if (begin == std::string_view::npos || rest[begin] == '#') break;
+      const std::size_t end = std::min(rest.find_first_of(" \t\r", begin), rest.size());
+      words.push_back(rest.substr(begin, end - begin));
+      rest.remove_prefix(end);
+    }
+    if (!words.empty()) return true;
+  }
+  if (file_.bad()) throw IoError(path_ + ": reading failed");
+  return false;
+}
+
+void WordReader::fail(const std::string& message) const {
+  throw InputError(Source{path_, number_}.prefix() + message);
+}
+
+double WordReader::number(std::size_t k) const {
+  const double x = parse(words[k]);
+  if (!std::isfinite(x))
+    fail(fmt::format("'{}'; expected a finite number", words[k].substr(0, 40)));
+  return x;
+}
+
+double WordReader::position(std::size_t k) const {
+  const double x = parse(words[k]);
+  if (!(std::abs(x) <= kLargestPosition))
+    fail(fmt::format("'{}'; expected a number of at most {:g}", words[k].substr(0, 40),
+                     kLargestPosition));
+  return x;
+}
+
+long WordReader::integer(std::string_view word, const char* expected) const {
+  long n = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), n);
+  if (error != std::errc() || end != word.data() + word.size())
+    fail(fmt::format("'{}'; expected {}", word.substr(0, 40), expected));
+  return n;
+}
+
+}  // namespace tangere

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Views: objects of one file that show numbers of another.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "io/hdf5/h5.hpp"
+
+namespace tangere::h5 {
+
+/// `file`: relative to the folder of the file that the link is in. Opening the link fails where
+/// that is missing.
+void link_external(const Id& group, const std::string& name, const std::string& file,
+                   const std::string& path);
+
+/// Copies a group and all below it, from one file to another, under another name.
+void copy_group(const Id& from, const std::string& name, const Id& to, const std::string& as);
+
+/// A dataset of another file, all of it.
+struct Source {
+  std::string file;  ///< as for link_external; ".": the one with the virtual dataset
+  std::string path;
+};
+/// `first` without its first `skipped` rows and the one row of `last` behind it, as one dataset.
+/// `like`: the open dataset that `first` names. Reading it gives NaN where a file is missing.
+void create_virtual(const Id& group, const std::string& name, const Id& like, const Source& first,
+                    const Source& last, hsize_t skipped = 0);
+
+/// Names that are `prefix` and a number, as byte strings of equal length, padded with zeros: what
+/// NumPy calls S.
+void write_names(const Id& group, const std::string& name, const std::string& prefix,
+                 const std::vector<std::int64_t>& numbers);
+
+}  // namespace tangere::h5

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is in a file, for those who do not know it beforehand: names of links and attributes, values
+// as text.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/hdf5/h5.hpp"
+
+namespace tangere::h5 {
+
+/// Names of a group's links, sorted. Throws IoError.
+std::vector<std::string> link_names(const Id& group);
+std::size_t link_count(const Id& group);
+/// Names of an object's attributes, sorted. Throws IoError.
+std::vector<std::string> attribute_names(const Id& object);
+/// Elements separated by ", "; numbers in the fewest digits that give them back. Throws IoError.
+std::string attribute_text(const Id& object, const std::string& name);
+/// Whether a link leads to a dataset, not to a group.
+[[nodiscard]] bool is_dataset(const Id& parent, const std::string& name);
+
+}  // namespace tangere::h5

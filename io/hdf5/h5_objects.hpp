@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+// Objects of HDF5 files as bytes, made without the library and by any thread. The library makes
+// some ten thousand objects a second; a data set of short episodes has more. Formats: HDF5 File
+// Format Specification, version 3. Everything made here is read back through the library in tests,
+// and by `tangere validate`.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tangere::h5 {
+
+/// An address that leads nowhere.
+inline constexpr std::uint64_t kNowhere = ~std::uint64_t{0};
+
+/// Bytes to be, little-endian.
+class Bytes {
+ public:
+  template <class T>
+  void number(T value) {
+    for (std::size_t k = 0; k < sizeof(T); ++k)
+      bytes_.push_back(static_cast<unsigned char>(static_cast<std::uint64_t>(value) >> (8 * k)));
+  }
+  void add(std::span<const unsigned char> bytes) {
+    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+  }
+  void text(std::string_view text) { bytes_.insert(bytes_.end(), text.begin(), text.end()); }
+  void zeros(std::size_t count) { bytes_.resize(bytes_.size() + count, 0); }
+  /// To a multiple of eight.
+  void align() { zeros((8 - bytes_.size() % 8) % 8); }
+  void clear() { bytes_.clear(); }
+  [[nodiscard]] std::size_t size() const { return bytes_.size(); }
+  [[nodiscard]] std::span<const unsigned char> from(std::size_t first) const {
+    return std::span(bytes_).subspan(first);
+  }
+  [[nodiscard]] std::span<const unsigned char> all() const { return bytes_; }
+
+ private:
+  std::vector<unsigned char> bytes_;
+};
+
+/// The library's checksum of what describes objects: Jenkins' lookup3.
+std::uint32_t object_checksum(std::span<const unsigned char> bytes);
+
+/// LZ4's number among registered filters: readers need its plug-in, or allow_lz4() of
+/// io/hdf5/h5_lz4.hpp.
+inline constexpr std::uint16_t kLz4Filter = 32004;
+
+/// The head of a file that the library made for readers of HDF5 1.8.
+inline constexpr std::size_t kSuperblockBytes = 48;
+/// Where the file ends, for a file that was made longer; and, unless it leads nowhere, the address
+/// of its group "/".
+void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std::uint64_t end,
+                     std::uint64_t root = kNowhere);
+
+/// Types on disk, as the format has them.
+enum class NumberType { float32, float64, int8, int64, uint64, boolean };
+std::size_t bytes_of(NumberType type);
+
+struct FileFilter {
+  std::uint16_t id = 0;
+  std::string_view name = {};  ///< of ids from 256 on
+  std::vector<std::uint32_t> values = {};
+};
+
+/// Where a virtual dataset says whose rows it shows: a text of a list that add_texts made.
+struct FileView {
+  std::uint64_t texts = 0;   ///< address of the list
+  std::uint32_t number = 0;  ///< in the list
+};
+
+/// A text of a list that add_texts made. Objects may share it in files that are read only: who
+/// changes it through one of them takes it from the others.
+struct FileText {
+  std::string_view name;     ///< of the attribute
+  std::uint64_t texts = 0;   ///< address of the list
+  std::uint32_t number = 0;  ///< in the list
+  std::uint32_t bytes = 0;
+};
+
+/// A dataset. What its chunks leave out is zero; what a view does not find is NaN.
+struct FileDataset {
+  NumberType type = NumberType::float32;
+  std::vector<std::uint64_t> dims;
+  std::vector<std::uint64_t> chunk = {};  ///< empty: contiguous
+  std::uint64_t address = kNowhere;       ///< of its numbers, or of the index of its chunks
+  std::span<const FileFilter> filters = {};
+  std::span<const FileText> texts = {};  ///< attributes
+  std::optional<FileView> view = {};  ///< it has no numbers of its own; of floating-point numbers
+};
+
+struct FileLink {
+  std::string_view name;
+  std::uint64_t address = kNowhere;  ///< of the object, where it is in the same file
+  std::string_view file = {};        ///< of another file, relative to the folder of this one
+  std::string_view path = {};        ///< in that file
+};
+
+/// A number, or a list of them.
+struct FileAttribute {
+  std::string_view name;
+  NumberType type;
+  bool list;
+  std::span<const unsigned char> values;  ///< little-endian
+};
+
+/// Appends texts, or bytes of other kinds, for attributes and views to refer to; none of none.
+void add_texts(Bytes& out, std::span<const std::string_view> texts);
+/// Appends a dataset's description.
+void add_dataset(Bytes& out, const FileDataset& dataset);
+/// Appends a group that holds its links itself: for few of them.
+void add_group(Bytes& out, std::span<const FileLink> links,
+               std::span<const FileAttribute> attributes = {});
+
+}  // namespace tangere::h5

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Search trees of HDF5 files as bytes, built at once from sorted entries: where the chunks of a
+// dataset are, and the members of a group of thousands.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "io/hdf5/h5_objects.hpp"
+
+namespace tangere::h5 {
+
+/// A chunk on disk, all filters applied.
+struct FileChunk {
+  std::array<std::uint64_t, 3>
+      first{};  ///< of its numbers, in the first dimensions; 0 in the others
+  std::uint64_t address = 0;
+  std::uint32_t bytes = 0;
+};
+
+/// Appends the index of a dataset's chunks, ascending, to what begins at `base` in the file.
+/// Returns its address; that of no chunks leads nowhere. `rank`: of the dataset, whose chunks have
+/// `chunk_rows` rows each.
+std::uint64_t add_chunk_index(Bytes& out, std::uint64_t base, std::span<const FileChunk> chunks,
+                              std::size_t rank, std::uint64_t chunk_rows);
+/// Bytes that it takes.
+std::size_t chunk_index_bytes(std::size_t chunks, std::size_t rank);
+
+/// A group's member, called by what all members begin with and its number.
+struct FileMember {
+  std::int64_t number = 0;    ///< from 0 on
+  std::uint64_t address = 0;  ///< of the object
+};
+
+/// Takes bytes away that go behind those it took before.
+using Spill = std::function<void(const Bytes&)>;
+
+/// Appends a group of any number of members, in any order. Returns the address of the group, whose
+/// count of links to it is 0: link it. With `root` it is 1, for the group "/". With `spill`, bytes
+/// are taken away as they come, but for the last ones, among them the group itself: what is left in
+/// `out` follows them.
+std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::string_view prefix,
+                              std::vector<FileMember> members, bool root = false,
+                              const Spill& spill = {});
+
+}  // namespace tangere::h5

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures are written by hand: a library for so little would be more to know than this.
+#include "io/picture/svg.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace tangere::svg {
+
+std::string escape(const std::string& text) {
+  std::string out;
+  for (char c : text) {
+    switch (c) {
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '&': out += "&amp;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    }
+  }
+  return out;
+}
+
+std::string text(double x, double y, const std::string& content, const char* extra) {
+  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" {}>{}</text>\n", x, y, extra,
+                     escape(content));
+}
+
+double round_down(double x) {
+  const double base = std::pow(10, std::floor(std::log10(x)));
+  return x >= 5 * base ? 5 * base : x >= 2 * base ? 2 * base : base;
+}
+
+}  // namespace tangere::svg

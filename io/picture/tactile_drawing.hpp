@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a picture of a tactile field puts each point, and which way its shear points there.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "io/trajectory/trajectory_layout.hpp"
+
+namespace tangere {
+
+/// A rectangular array, or the image that a list of points has pixels in.
+struct TactileDrawing {
+  int rows = 0, cols = 0;
+  double height = 0, width = 0;  ///< [m]; of an image, of its points along its rows and columns
+  std::vector<std::array<int, 2>> cell;  ///< (points) row and column; -1: not drawn
+  std::vector<std::array<double, 4>>
+      turn;  ///< (points) force along axis0, axis1 to down, right; empty: by the signs below
+  double down = 1,
+         right = 1;  ///< arrays: whether rows go down along axis0, columns to the right along axis1
+
+  /// Down and right of a force along axis0 and axis1.
+  [[nodiscard]] std::array<double, 2> shear(std::size_t point, double f0, double f1) const;
+};
+
+/// Whether it can be drawn: an array, or a list some of whose points have pixels.
+bool drawable(const SensorLayout& sensor);
+TactileDrawing drawing_of(const SensorLayout& sensor);
+
+}  // namespace tangere

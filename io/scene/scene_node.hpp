@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// One XML element while a scene is read: attributes as checked values, errors with file and line.
+#pragma once
+
+#include <tinyxml2.h>
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/model/scene.hpp"
+#include "io/files/nearest_name.hpp"
+
+namespace tangere {
+
+/// What all elements of one file share.
+struct SceneContext {
+  std::string file;
+  bool allow_unknown = false;
+  std::vector<std::string> warnings;
+  /// A value from <default> and the line it stands in.
+  struct Default {
+    std::string value;
+    int line;
+  };
+  /// Attribute values for elements that leave them out: [element][attribute].
+  std::map<std::string, std::map<std::string, Default>> defaults;
+
+  // Factors to SI, by dimension.
+  double length = 1, stiffness = 1, damping_force = 1, damping_area = 1, density = 1, force = 1,
+         torque = 1, rotational = 1;
+  void use_centimetres_and_grams();
+};
+
+class SceneNode {
+ public:
+  SceneNode(const tinyxml2::XMLElement& element, SceneContext& context)
+      : element_(&element), context_(&context) {}
+
+  [[nodiscard]] std::string name() const { return element_->Name(); }
+  [[nodiscard]] Source source() const { return {context_->file, element_->GetLineNum()}; }
+  [[nodiscard]] SceneContext& context() const { return *context_; }
+  [[noreturn]] void fail(const std::string& message) const;
+  /// Because of an attribute's value: says so where it comes from <default>.
+  [[noreturn]] void fail_at(const char* attribute, const std::string& message) const;
+  void warn(const std::string& message) const;
+
+  /// Refuses attributes outside the three lists: `used` are read, `pictures` only matter to a
+  /// viewer and pass silently, `unused` belong to other types of this element and are listed as
+  /// warnings.
+  void check_attributes(const std::vector<std::string>& used,
+                        const std::vector<std::string>& pictures = {},
+                        const std::vector<std::string>& unused = {}) const;
+
+  /// Children in order. Names outside `known` fail; stray text is a warning.
+  [[nodiscard]] std::vector<SceneNode> children(const std::vector<std::string>& known) const;
+
+  [[nodiscard]] bool has(const char* attribute) const { return find(attribute) != nullptr; }
+  [[nodiscard]] std::string text(const char* attribute) const;  ///< required
+  [[nodiscard]] std::string text(const char* attribute, const std::string& fallback) const;
+  /// One of `words`, by position.
+  [[nodiscard]] int choice(const char* attribute, const std::vector<std::string>& words,
+                           std::optional<int> fallback = std::nullopt) const;
+  [[nodiscard]] double number(const char* attribute,
+                              std::optional<double> fallback = std::nullopt) const;
+  [[nodiscard]] double positive(const char* attribute,
+                                std::optional<double> fallback = std::nullopt) const;
+  [[nodiscard]] double not_negative(const char* attribute,
+                                    std::optional<double> fallback = std::nullopt) const;
+  [[nodiscard]] int integer(const char* attribute, int lowest, int highest,
+                            std::optional<int> fallback = std::nullopt) const;
+  /// As many integers as the fallback has, each from `lowest` to `highest`.
+  [[nodiscard]] std::vector<int> integers(const char* attribute, const std::vector<int>& fallback,
+                                          int lowest, int highest) const;
+  /// Any number of finite numbers; `count` > 0 asks for exactly so many.
+  [[nodiscard]] std::vector<double> numbers(const char* attribute, std::size_t count = 0) const;
+  [[nodiscard]] Vector3 vector(const char* attribute,
+                               std::optional<Vector3> fallback = std::nullopt) const;
+  [[nodiscard]] Vector3 direction(const char* attribute,
+                                  std::optional<Vector3> fallback = std::nullopt) const;
+  [[nodiscard]] Quaternion quaternion(const char* attribute) const;  ///< default: identity
+
+ private:
+  [[nodiscard]] const char* find(const char* attribute) const;
+  [[nodiscard]] const SceneContext::Default* find_default(const char* attribute) const;
+
+  const tinyxml2::XMLElement* element_;
+  SceneContext* context_;
+};
+
+}  // namespace tangere

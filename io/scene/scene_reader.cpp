@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+// The file as a whole: options, defaults, the tree of links. What hangs on the tree is read in
+// scene_sections.cpp.
+#include "io/scene/scene_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+
+#include "engine/model/compiled_model.hpp"
+#include "io/scene/scene_sections.hpp"
+
+namespace tangere {
+
+namespace {
+
+constexpr std::uintmax_t kLargestFile = 64U << 20;  // a scene is text written by people
+constexpr int kDeepestTree = 200;
+
+const std::vector<std::string> kJointTypes = {
+    "fixed",     "revolute",        "prismatic",     "planar", "free2d",       "translational",
+    "spherical", "spherical-euler", "spherical-exp", "free3d", "free3d-euler", "free3d-exp"};
+constexpr JointType kJointTypeOf[] = {
+    JointType::fixed,     JointType::revolute,      JointType::prismatic, JointType::planar,
+    JointType::free2d,    JointType::translational, JointType::spherical, JointType::spherical,
+    JointType::spherical, JointType::free,          JointType::free,      JointType::free};
+
+class TreeReader {
+ public:
+  explicit TreeReader(Scene& scene) : scene_(scene) {}
+
+  void read_robot(const SceneNode& robot) {
+    robot.check_attributes({"name"});
+    for (const SceneNode& link : robot.children({"link"})) read_link(link, -1, 0);
+  }
+
+ private:
+  void read_link(const SceneNode& node, int parent, int depth) {
+    if (depth > kDeepestTree) node.fail(fmt::format("links nested deeper than {}", kDeepestTree));
+    node.check_attributes({"name"}, {}, {"design_params"});
+    LinkDescription link;
+    link.name = node.text("name");
+    link.parent = parent;
+    unique("link", link.name, node);
+    std::vector<SceneNode> inner;
+    int joints = 0, bodies = 0;
+    bool in_world = false;  // whether the body's pose is given there
+    for (const SceneNode& child : node.children({"joint", "body", "link"})) {
+      if (child.name() == "joint") {
+        if (++joints > 1) child.fail("a second joint in link '" + link.name + "'; expected one");
+        link.joint = read_joint(child, parent);
+      } else if (child.name() == "body") {
+        if (++bodies > 1) child.fail("a second body in link '" + link.name + "'; expected one");
+        link.body = read_body(child);
+        unique("body", link.body.name, child);
+        in_world = placed_in_world(child, link.body);
+      } else {
+        inner.push_back(child);
+      }
+    }
+    if (joints == 0) node.fail("link '" + link.name + "' has no <joint>");
+    if (bodies == 0) node.fail("link '" + link.name + "' has no <body>");
+    const int index = static_cast<int>(scene_.links.size());
+    const kernels::Frame<double> at = to_frame(link.joint.pose);
+    world_.push_back(parent < 0 ? at : compose(world_[std::size_t(parent)], at));
+    if (in_world) link.body.pose = in_parent(link.body.pose, index);
+    scene_.links.push_back(std::move(link));
+    for (const SceneNode& child : inner) read_link(child, index, depth + 1);
+  }
+
+  void unique(const std::string& kind, const std::string& name, const SceneNode& node) {
+    const auto [first, is_new] = names_.try_emplace(kind + "/" + name, node.source().line);
+    if (!is_new)
+      node.fail(
+          fmt::format("{} name '{}' is used twice, first in line {}", kind, name, first->second));
+  }
+
+  JointDescription read_joint(const SceneNode& node, int parent) {
+    const double length = node.context().length;
+    JointDescription joint;
+    joint.source = node.source();
+    joint.name = node.text("name");
+    unique("joint", joint.name, node);
+    joint.type = kJointTypeOf[node.choice("type", kJointTypes)];
+    std::vector<std::string> used = {"name", "type", "pos", "quat", "frame", "damping"};
+    std::vector<std::string> idle = {"lim",      "lim_stiffness", "stiffness", "rest",
+                                     "armature", "axis",          "axis0",     "axis1"};
+    const auto take = [&](const char* attribute) {
+      used.emplace_back(attribute);
+      idle.erase(std::find(idle.begin(), idle.end(), attribute));
+    };
+    if (joint.type != JointType::fixed)
+      for (const char* effect : {"lim", "lim_stiffness", "stiffness", "rest", "armature"})
+        take(effect);
+    if (joint.type == JointType::revolute || joint.type == JointType::prismatic) {
+      take("axis");
+      joint.axis0 = node.direction("axis");
+    } else if (joint.type == JointType::planar) {
+      take("axis0");
+      take("axis1");
+      joint.axis0 = node.direction("axis0");
+      joint.axis1 = node.direction("axis1");
+    }
+    node.check_attributes(used, {}, idle);
+    joint.pose.position = scaled(node.vector("pos", Vector3{0, 0, 0}), length);
+    joint.pose.orientation = node.quaternion("quat");
+    if (node.choice("frame", {"LOCAL", "WORLD"}, 0) == 1 && parent >= 0)
+      joint.pose = in_parent(joint.pose, parent);
+    read_joint_effects(node, joint);
+    return joint;
+  }
+
+  /// A pose given in the world, in the frame of a parent joint at rest.
+  [[nodiscard]] Pose in_parent(const Pose& pose, int parent) const {
+    const kernels::Frame<double> local = relative(world_[std::size_t(parent)], to_frame(pose));
+    const kernels::Quat<double> q = quaternion_of(local.R);
+    return {{local.p.x, local.p.y, local.p.z}, {q.w, q.x, q.y, q.z}};
+  }
+
+  Scene& scene_;
+  std::map<std::string, int> names_;           // kind/name, line
+  std::vector<kernels::Frame<double>> world_;  // rest pose of each joint
+};
+
+void read_option(Scene& scene, const SceneNode& node) {
+  SceneContext& c = node.context();
+  node.check_attributes({"gravity", "timestep", "integrator", "unit"});
+  scene.gravity = scaled(node.vector("gravity", Vector3{0, 0, -9.8 / c.length}), c.length);
+  scene.timestep = node.positive("timestep", 0.02);
+  constexpr Integrator kBy[] = {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2,
+                                Integrator::linear_implicit};
+  scene.integrator =
+      kBy[node.choice("integrator", {"BDF1", "BDF2", "SDIRK2", "linear-implicit"}, 0)];
+}
+
+void read_solver(Scene& scene, const SceneNode& node) {
+  node.check_attributes({"tol", "max_iter"}, {}, {"max_ls"});
+  scene.solver.tolerance = node.positive("tol", scene.solver.tolerance);
+  scene.solver.max_iterations = node.integer("max_iter", 1, 100000, scene.solver.max_iterations);
+}
+
+void read_defaults(const SceneNode& node) {
+  const std::map<std::string, std::vector<std::string>> known = {
+      {"joint", {"damping", "lim_stiffness", "stiffness", "armature"}},
+      {"body", {"density", "scale", "rgba"}},
+      {"general_primitive_contact", {"kn", "kt", "mu", "damping", "render", "law", "ramp"}},
+      {"ground_contact", {"kn", "kt", "mu", "damping", "render", "law", "ramp"}},
+      {"tactile", {"kn", "kt", "mu", "damping", "render", "law", "every"}},
+      {"motor", {"P", "D", "ctrl_range", "timing"}},
+      {"endeffector", {"radius", "rgba"}}};
+  std::vector<std::string> names;
+  for (const auto& [name, attributes] : known) names.push_back(name);
+  for (const SceneNode& child : node.children(names)) {
+    const std::vector<std::string>& attributes = known.at(child.name());
+    child.check_attributes(attributes);
+    for (const std::string& a : attributes)
+      if (child.has(a.c_str()))
+        node.context().defaults[child.name()][a] = {child.text(a.c_str()), child.source().line};
+  }
+}
+
+void read_root(const SceneNode& root, Scene& scene) {
+  if (root.name() != "redmax" && root.name() != "tangere")
+    root.fail("not a scene; expected the root <redmax> or <tangere>");
+  root.check_attributes({"model", "name"});
+  scene.name = root.text("model", root.text("name", "scene"));
+  const std::vector<SceneNode> sections =
+      root.children({"option", "solver_option", "ground", "default", "robot", "actuator", "sensor",
+                     "contact", "variable", "virtual", "initial", "control", "randomize"});
+  const auto each = [&](const char* name, auto&& read) {
+    for (const SceneNode& s : sections)
+      if (s.name() == name) read(s);
+  };
+  const auto once = [&](const char* name, auto&& read) {
+    int count = 0;
+    each(name, [&](const SceneNode& s) {
+      if (++count > 1) s.fail("given twice; expected once");
+      read(s);
+    });
+    return count > 0;
+  };
+  // Units first: every other number depends on them. Then whatever later sections refer to.
+  SceneContext& c = root.context();
+  bool metres = false;
+  each("option", [&](const SceneNode& s) { metres = s.choice("unit", {"cm-g", "m-kg"}, 0) == 1; });
+  if (!metres) c.use_centimetres_and_grams();
+  scene.timestep = 0.02;
+  scene.integrator = Integrator::bdf1;
+  scene.gravity = {0, 0, -9.8};
+  once("option", [&](const SceneNode& s) { read_option(scene, s); });
+  once("solver_option", [&](const SceneNode& s) { read_solver(scene, s); });
+  each("default", [&](const SceneNode& s) { read_defaults(s); });
+  once("ground", [&](const SceneNode& s) {
+    s.check_attributes({"pos", "normal"}, {"size", "texture", "rgba"});
+    scene.ground = GroundDescription{scaled(s.vector("pos", Vector3{0, 0, 0}), c.length),
+                                     s.direction("normal", Vector3{0, 0, 1})};
+  });
+  TreeReader tree(scene);
+  each("robot", [&](const SceneNode& s) { tree.read_robot(s); });
+  if (scene.links.empty()) root.fail("no <link> in any <robot>: there is nothing to simulate");
+  each("actuator", [&](const SceneNode& s) { read_actuators(scene, s); });
+  each("contact", [&](const SceneNode& s) { read_contacts(scene, s); });
+  each("sensor", [&](const SceneNode& s) { read_sensors(scene, s); });
+  each("variable", [&](const SceneNode& s) { read_variables(scene, s); });
+  name_variables(scene);
+  each("virtual", [&](const SceneNode& s) { s.warn("shapes for pictures only; ignored"); });
+  each("initial", [&](const SceneNode& s) { read_initial(scene, s); });
+  once("control", [&](const SceneNode& s) { read_control(scene, s); });
+  once("randomize", [&](const SceneNode& s) { read_randomize(scene, s); });
+}
+
+/// What the parser stumbled over.
+const char* fault_of(tinyxml2::XMLError error) {
+  switch (error) {
+    case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT:
+      return "an element is closed by another's end tag, or never";
+    case tinyxml2::XML_ERROR_PARSING_ELEMENT: return "a tag that is no <name attribute=\"value\">";
+    case tinyxml2::XML_ERROR_PARSING_ATTRIBUTE: return "an attribute that is no name=\"value\"";
+    case tinyxml2::XML_ERROR_PARSING_COMMENT: return "a comment without its end -->";
+    case tinyxml2::XML_ERROR_PARSING_DECLARATION: return "a declaration without its end ?>";
+    case tinyxml2::XML_ERROR_EMPTY_DOCUMENT:
+      return "no element; expected the root <redmax> or <tangere>";
+    case tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED: return "elements nested too deep";
+    default: return tinyxml2::XMLDocument::ErrorIDToName(error);
+  }
+}
+
+}  // namespace
+
+SceneFile parse_scene(const std::string& text, const std::string& name,
+                      const SceneReadOptions& options) {
+  tinyxml2::XMLDocument document;
+  if (text.find('\0') != std::string::npos)
+    throw InputError(name + ": holds a zero byte; expected XML text");
+  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
+    const int line = document.ErrorLineNum();
+    throw InputError(fmt::format("{}:{}: not well-formed XML: {}", name, std::max(line, 1),
+                                 fault_of(document.ErrorID())));
+  }
+  const tinyxml2::XMLElement* root = document.RootElement();
+  if (root == nullptr)
+    throw InputError(name + ":1: no element; expected the root <redmax> or <tangere>");
+  SceneContext context;
+  context.file = name;
+  context.allow_unknown = options.allow_unknown;
+  for (const tinyxml2::XMLNode* node = document.FirstChild(); node != nullptr;
+       node = node->NextSibling()) {
+    if (node->ToText() != nullptr)
+      context.warnings.push_back(fmt::format("{}:{}: stray text outside <{}> is ignored", name,
+                                             node->GetLineNum(), root->Name()));
+    if (node->ToElement() != nullptr && node != root)
+      throw InputError(fmt::format("{}:{}: <{}> after the end of <{}>; expected one root", name,
+                                   node->GetLineNum(), node->ToElement()->Name(), root->Name()));
+  }
+  SceneFile out;
+  read_root(SceneNode(*root, context), out.scene);
+  out.scene.path = name;
+  out.scene.text = text;
+  out.warnings = std::move(context.warnings);
+  return out;
+}
+
+SceneFile read_scene(const std::filesystem::path& path, const SceneReadOptions& options) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error))
+    throw IoError(path.string() + ": is a folder; expected a scene file");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw IoError(path.string() + ": cannot be opened for reading");
+  if (std::filesystem::file_size(path, error) > kLargestFile && !error)
+    throw InputError(path.string() + ": larger than 64 MiB; expected a scene file");
+  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  if (file.bad()) throw IoError(path.string() + ": reading failed");
+  return parse_scene(text, path.string(), options);
+}
+
+}  // namespace tangere

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scene files: the dialect of the paper's published simulator (root <redmax>) and ours (root
+// <tangere>), same elements.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "engine/model/scene.hpp"
+
+namespace tangere {
+
+struct SceneReadOptions {
+  bool allow_unknown = false;  ///< unknown elements and attributes become warnings
+};
+
+struct SceneFile {
+  Scene scene;                        ///< SI units, defaults filled in, names resolved
+  std::vector<std::string> warnings;  ///< "file:line: …", in the order of the file
+};
+
+/// Reads and checks a scene. Throws IoError when the file cannot be read, InputError ("file:line:
+/// what; expected …") for anything in it that is unknown, missing, malformed or impossible.
+SceneFile read_scene(const std::filesystem::path& path, const SceneReadOptions& options = {});
+
+/// The same for text in memory; `name` stands for the file in messages, and csv files are sought
+/// beside it.
+SceneFile parse_scene(const std::string& text, const std::string& name,
+                      const SceneReadOptions& options = {});
+
+}  // namespace tangere

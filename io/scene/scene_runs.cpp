@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run of a scene starts from, is driven by, and varies: <initial>, <control>, <randomize>.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "io/files/csv.hpp"
+#include "io/scene/scene_sections.hpp"
+
+namespace tangere {
+
+namespace {
+
+std::vector<double> read_coordinates(const SceneNode& node, const char* attribute, JointType type,
+                                     int count) {
+  std::vector<double> x = node.numbers(attribute, std::size_t(count));
+  for (int i = 0; i < count; ++i) x[std::size_t(i)] *= coordinate_scale(type, i, node.context());
+  return x;
+}
+
+/// The attribute `value`: one per control, targets of position motors in the scene's lengths.
+std::vector<double> read_controls(const Scene& scene, const SceneNode& node) {
+  std::vector<double> values = node.numbers("value");
+  const std::vector<double> scales = control_scales(scene, node.context());
+  if (values.size() != scales.size())
+    node.fail(fmt::format("{} control values; the motors take {}", values.size(), scales.size()));
+  for (std::size_t k = 0; k < values.size(); ++k) values[k] *= scales[k];
+  return values;
+}
+
+PiecewiseControl read_piecewise(const Scene& scene, const SceneNode& node) {
+  PiecewiseControl control;
+  node.check_attributes({"end"});
+  control.end = node.has("end") ? node.positive("end") : 0;
+  for (const SceneNode& at : node.children({"at"})) {
+    at.check_attributes({"time", "value"});
+    const double time = at.not_negative("time");
+    if (control.times.empty() && time != 0)
+      at.fail(fmt::format("time=\"{}\"; the first must be 0", time));
+    if (!control.times.empty() && !(time > control.times.back()))
+      at.fail(fmt::format("time=\"{}\" does not come after {}", time, control.times.back()));
+    control.times.push_back(time);
+    control.values.push_back(read_controls(scene, at));
+  }
+  if (control.times.empty()) node.fail("no <at time value>; expected at least one");
+  if (control.end > 0 && !(control.end > control.times.back()))
+    node.fail(fmt::format("end=\"{}\" does not come after the last time {}", control.end,
+                          control.times.back()));
+  return control;
+}
+
+/// Exactly one of uniform, log_uniform, normal, list; numbers times `scale`.
+Distribution read_distribution(const SceneNode& node, double scale) {
+  Distribution d;
+  const char* const kinds[] = {"uniform", "log_uniform", "normal", "list"};
+  int found = 0;
+  for (int k = 0; k < 4; ++k) {
+    if (!node.has(kinds[k])) continue;
+    ++found;
+    d.kind = static_cast<Distribution::Kind>(k);
+    std::vector<double> x = node.numbers(kinds[k], k < 3 ? 2 : 0);
+    for (double& value : x) value *= scale;
+    if (k == 3) {
+      if (x.empty()) node.fail("list=\"\"; expected one value or more");
+      d.values = x;
+      continue;
+    }
+    d.a = x[0];
+    d.b = x[1];
+    if (k < 2 && !(d.a <= d.b)) node.fail(fmt::format("{}: expected low, then high", kinds[k]));
+    if (k == 1 && !(d.a > 0)) node.fail("log_uniform: expected positive bounds");
+    if (k == 2 && !(d.b >= 0))
+      node.fail("normal: expected mean, then a standard deviation of zero or more");
+  }
+  if (found != 1) node.fail("expected exactly one of uniform, log_uniform, normal, list");
+  return d;
+}
+
+/// A coefficient must stay zero or more whatever is drawn, so a normal distribution has no place
+/// there.
+void check_coefficient(const SceneNode& node, const Distribution& d) {
+  if (d.kind == Distribution::Kind::normal)
+    node.fail("normal can draw a negative coefficient; expected uniform, log_uniform or list");
+  bool negative = d.a < 0;
+  for (double x : d.values) negative = negative || x < 0;
+  if (negative) node.fail("a coefficient may not be negative");
+}
+
+/// damping, armature, stiffness, lim_stiffness of a joint, or P, D of its motor.
+void read_joint_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
+  const bool motor = node.name() == "motor";
+  const char* by = motor ? "joint" : "name";
+  const JointDescription& joint = scene.links[std::size_t(find_joint(scene, node, by))].joint;
+  node.check_attributes({by, "field", "uniform", "log_uniform", "normal", "list"});
+  d.target = motor ? RandomTarget::motor : RandomTarget::joint_effect;
+  d.name = joint.name;
+  if (motor) {
+    d.joint_field = node.choice("field", {"P", "D"}) == 0 ? JointField::P : JointField::D;
+    bool position = false;
+    for (const MotorDescription& m : scene.motors)
+      position = position || (m.joint == joint.name && m.control == MotorControl::position);
+    if (!position)
+      node.fail("joint '" + joint.name + "' has no position motor; force motors have no gains");
+  } else {
+    const std::vector<std::string> fields = {"damping", "armature", "stiffness", "lim_stiffness"};
+    d.joint_field = static_cast<JointField>(node.choice("field", fields));
+    if (joint.type == JointType::fixed)
+      node.fail("joint '" + joint.name + "' is fixed; nothing of it can vary");
+    if (d.joint_field == JointField::lim_stiffness && !joint.limits)
+      node.fail("joint '" + joint.name + "' has no 'lim'");
+    const bool mixed = joint.type == JointType::free || joint.type == JointType::free2d;
+    if (mixed && node.context().length != 1)
+      node.fail("joint '" + joint.name +
+                "' slides and turns: one number has two units; use unit=\"m-kg\"");
+  }
+  d.distribution = read_distribution(
+      node, joint_field_scale(d.joint_field, dof_turns(joint.type, 0), node.context()));
+  check_coefficient(node, d.distribution);
+}
+
+void read_state_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
+  node.check_attributes({"name", "q", "v", "pos", "uniform", "log_uniform", "normal", "list"});
+  const int joint = find_joint(scene, node, "name");
+  const JointType type = scene.links[std::size_t(joint)].joint.type;
+  if (int{node.has("q")} + int{node.has("v")} + int{node.has("pos")} != 1)
+    node.fail("expected exactly one of q, v, pos (the index of what varies) and field");
+  if (node.has("pos")) {
+    if (type == JointType::fixed)
+      node.fail("joint '" + node.text("name") + "' is fixed; expected one that moves");
+    d.target = RandomTarget::place;
+    d.name = node.text("name");
+    d.index = node.integer("pos", 0, 2);
+    d.distribution = read_distribution(node, node.context().length);
+    return;
+  }
+  const bool position = node.has("q");
+  const int count = position ? position_count(type) : dof_count(type);
+  if (count == 0) node.fail("joint '" + node.text("name") + "' is fixed; nothing of it can vary");
+  d.target = position ? RandomTarget::joint_q : RandomTarget::joint_v;
+  d.name = node.text("name");
+  d.index = node.integer(position ? "q" : "v", 0, count - 1);
+  d.distribution = read_distribution(node, coordinate_scale(type, d.index, node.context()));
+}
+
+/// Masses and sizes are positive whatever is drawn.
+void check_positive(const SceneNode& node, const Distribution& d, const std::string& what) {
+  if (d.kind == Distribution::Kind::normal)
+    node.fail("normal can draw a negative " + what + "; expected uniform, log_uniform or list");
+  double least = d.a;
+  if (d.kind == Distribution::Kind::list)
+    least = *std::min_element(d.values.begin(), d.values.end());
+  if (!(least > 0))
+    node.fail(
+        fmt::format("{} can be {:g}, in SI units; expected positive values only", what, least));
+}
+
+/// The density of a body, or a number of its size.
+void read_body_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
+  node.check_attributes({"name", "field", "size", "uniform", "log_uniform", "normal", "list"});
+  const BodyDescription& body = scene.links[std::size_t(find_body(scene, node, "name"))].body;
+  d.name = body.name;
+  if (node.has("field") == node.has("size"))
+    node.fail("expected exactly one of field and size (the index of an edge)");
+  if (node.has("size")) {
+    d.index = 2 + node.integer("size", 0, 2);
+  } else {
+    d.index = node.choice("field", {"radius", "length", "density"});
+  }
+  if (node.has("size") || d.index < 2) {
+    d.target = RandomTarget::size;
+    Shape shape = body.shape;
+    if (size_number(shape, d.index) == nullptr)
+      node.fail(fmt::format("body '{}' is {} {}, which has no {}; expected a body that has one",
+                            body.name, std::holds_alternative<AbstractShape>(shape) ? "an" : "a",
+                            shape_name(shape), size_name(d.index)));
+    d.distribution = read_distribution(node, node.context().length);
+    check_positive(node, d.distribution, size_name(d.index));
+    return;
+  }
+  d.index = 0;
+  if (std::holds_alternative<AbstractShape>(body.shape))
+    node.fail("body '" + body.name + "' is known by its mass; nothing of it can vary");
+  if (!(body.density > 0))
+    node.fail("body '" + body.name + "' is massless; expected a positive density");
+  d.target = RandomTarget::density;
+  d.distribution = read_distribution(node, node.context().density);
+  check_positive(node, d.distribution, "density");
+}
+
+/// The law decides the unit of `damping`.
+double field_scale(const SceneNode& node, ContactField field, ContactLaw law) {
+  const SceneContext& c = node.context();
+  switch (field) {
+    case ContactField::kn: return c.stiffness;
+    case ContactField::kt: return c.damping_force;
+    case ContactField::mu: return 1;
+    case ContactField::damping: break;
+  }
+  return law == ContactLaw::linear ? c.damping_force : c.damping_area;
+}
+
+void read_coefficient_variation(const Scene& scene, const SceneNode& node,
+                                RandomizationDescription& d) {
+  const bool ground = node.name() == "ground_contact",
+             pair = node.name() == "general_primitive_contact";
+  std::vector<std::string> attributes = {"field", "uniform", "log_uniform", "normal", "list"};
+  ContactLaw law = ContactLaw::clamped;
+  bool found = false;
+  if (pair) {
+    attributes.insert(attributes.end(), {"general_body", "primitive_body"});
+    d.target = RandomTarget::pair_contact;
+    find_body(scene, node, "general_body");
+    find_body(scene, node, "primitive_body");
+    d.name = node.text("general_body");
+    d.second_name = node.text("primitive_body");
+    for (const auto& c : scene.pair_contacts)
+      if (c.general_body == d.name && c.primitive_body == d.second_name) found = true, law = c.law;
+  } else if (ground) {
+    attributes.emplace_back("body");
+    d.target = RandomTarget::ground_contact;
+    find_body(scene, node, "body");
+    d.name = node.text("body");
+    for (const auto& c : scene.ground_contacts)
+      if (c.body == d.name) found = true, law = c.law;
+  } else {
+    attributes.emplace_back("name");
+    d.target = RandomTarget::tactile;
+    d.name = node.text("name");
+    std::vector<std::string> names;
+    for (const auto& s : scene.sensors) {
+      names.push_back(s.name);
+      if (s.name == d.name) found = true;
+    }
+    if (!found)
+      node.fail("no tactile sensor is named '" + d.name + "'" + suggestion(d.name, names));
+  }
+  if (!found) node.fail("no such contact is declared in <contact>");
+  node.check_attributes(attributes);
+  d.field = static_cast<ContactField>(node.choice("field", {"kn", "kt", "mu", "damping"}));
+  d.distribution = read_distribution(node, field_scale(node, d.field, law));
+  check_coefficient(node, d.distribution);
+}
+
+}  // namespace
+
+void read_initial(Scene& scene, const SceneNode& section) {
+  section.check_attributes({});
+  for (const SceneNode& node : section.children({"joint"})) {
+    node.check_attributes({"name", "q", "v"});
+    const int joint = find_joint(scene, node, "name");
+    const JointType type = scene.links[std::size_t(joint)].joint.type;
+    InitialState state;
+    state.source = node.source();
+    state.joint = node.text("name");
+    for (const InitialState& other : scene.initial)
+      if (other.joint == state.joint) node.fail("joint '" + state.joint + "' is given twice");
+    if (type == JointType::fixed)
+      node.fail("joint '" + state.joint + "' is fixed; it has no state");
+    if (node.has("q")) state.q = read_coordinates(node, "q", type, position_count(type));
+    if (node.has("v")) state.v = read_coordinates(node, "v", type, dof_count(type));
+    if (type == JointType::spherical || type == JointType::free) {
+      double square = 0;
+      for (std::size_t k = 0; k < 4 && !state.q.empty(); ++k)
+        square += std::pow(state.q[state.q.size() - 4 + k], 2);
+      if (!state.q.empty() && !(square > 1e-100))
+        node.fail("q ends in a quaternion of zero length");
+    }
+    scene.initial.push_back(std::move(state));
+  }
+}
+
+void read_control(Scene& scene, const SceneNode& section) {
+  section.check_attributes({});
+  const std::vector<SceneNode> kinds = section.children({"constant", "piecewise", "csv", "random"});
+  if (kinds.size() != 1)
+    section.fail(fmt::format("{} ways to drive the scene; expected one", kinds.size()));
+  const SceneNode& node = kinds.front();
+  if (node.name() == "constant") {
+    node.check_attributes({"value"});
+    scene.control = ConstantControl{read_controls(scene, node)};
+  } else if (node.name() == "piecewise") {
+    scene.control = read_piecewise(scene, node);
+  } else if (node.name() == "csv") {
+    node.check_attributes({"file"});
+    const std::filesystem::path beside = std::filesystem::path(node.context().file).parent_path();
+    CsvControl control;
+    control.path = (beside / node.text("file")).string();
+    if (!std::filesystem::exists(control.path))
+      node.fail(fmt::format("file=\"{}\": there is no {}", node.text("file"), control.path));
+    control.rows = read_csv(control.path, std::size_t(control_count(scene)));
+    scene.control = std::move(control);
+  } else {
+    node.check_attributes({"amplitude", "period"});
+    scene.control =
+        RandomControl{node.not_negative("amplitude", 1.0), node.positive("period", 0.1)};
+  }
+}
+
+void read_randomize(Scene& scene, const SceneNode& section) {
+  section.check_attributes({});
+  const std::vector<std::string> kinds = {
+      "joint", "motor", "ground_contact", "general_primitive_contact", "tactile", "body"};
+  for (const SceneNode& node : section.children(kinds)) {
+    RandomizationDescription d;
+    d.source = node.source();
+    if (node.name() == "motor" || (node.name() == "joint" && node.has("field"))) {
+      read_joint_variation(scene, node, d);
+    } else if (node.name() == "joint") {
+      read_state_variation(scene, node, d);
+    } else if (node.name() == "body") {
+      read_body_variation(scene, node, d);
+    } else {
+      read_coefficient_variation(scene, node, d);
+    }
+    for (const RandomizationDescription& other : scene.randomizations)
+      if (other.target == d.target && other.name == d.name && other.second_name == d.second_name &&
+          other.index == d.index && other.field == d.field && other.joint_field == d.joint_field)
+        node.fail("this number already varies");
+    scene.randomizations.push_back(std::move(d));
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sections of a scene beside its tree of links. Each appends to the scene; references are
+// checked where they stand.
+#pragma once
+
+#include <filesystem>
+
+#include "engine/base/error.hpp"
+#include "io/scene/scene_node.hpp"
+
+namespace tangere {
+
+/// A body in its joint's frame; files that it names are read.
+BodyDescription read_body(const SceneNode& node);
+/// Whether the pose of a mesh is given in the world instead.
+bool placed_in_world(const SceneNode& node, const BodyDescription& body);
+void read_actuators(Scene& scene, const SceneNode& section);
+void read_contacts(Scene& scene, const SceneNode& section);
+void read_sensors(Scene& scene, const SceneNode& section);
+void read_variables(Scene& scene, const SceneNode& section);
+/// Gives end effectors without a name theirs: "endeffector" and their place in the file, or the
+/// next number that is free.
+void name_variables(Scene& scene);
+void read_initial(Scene& scene, const SceneNode& section);
+void read_control(Scene& scene, const SceneNode& section);
+void read_randomize(Scene& scene, const SceneNode& section);
+
+/// What `read` makes of a file named by an attribute, beside the scene. Errors say who asked.
+template <class Read>
+auto read_beside(const SceneNode& node, const char* attribute, Read&& read) {
+  const std::filesystem::path path =
+      std::filesystem::path(node.context().file).parent_path() / node.text(attribute);
+  try {
+    return read(path.string());
+  } catch (const IoError& e) {
+    throw IoError(node.source().prefix() + "<" + node.name() + ">: " + e.what());
+  }
+}
+
+/// The closed surface of `filename`, scaled by `scale` and to metres.
+MeshShape read_mesh(const SceneNode& node, double length);
+
+/// k_n, k_t, μ and the damping that a law means, in SI; all 0 by default.
+ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law);
+
+inline Vector3 scaled(const Vector3& a, double s) { return {s * a[0], s * a[1], s * a[2]}; }
+
+/// Three or four numbers; alpha stays 1 if not given. Left alone where the attribute is missing.
+void read_colour(const SceneNode& node, std::array<double, 4>& rgba);
+
+/// Index of the named joint or body; fails at the attribute's element with the nearest name.
+int find_joint(const Scene& scene, const SceneNode& node, const char* attribute);
+int find_body(const Scene& scene, const SceneNode& node, const char* attribute);
+
+/// Factor to SI of coordinate `index` of a joint type, and of velocity `index`: both have lengths
+/// in the same places.
+double coordinate_scale(JointType type, int index, const SceneContext& context);
+
+/// Factor to SI of a number of a joint or motor whose dofs turn or slide.
+double joint_field_scale(JointField field, bool turns, const SceneContext& context);
+
+/// Number of controls the motors read so far take.
+int control_count(const Scene& scene);
+/// Factor to SI of each of them: targets of position motors are coordinates, force motors take
+/// numbers without a unit.
+std::vector<double> control_scales(const Scene& scene, const SceneContext& context);
+
+/// Damping, armature, spring and limits of a joint whose type is known.
+void read_joint_effects(const SceneNode& node, JointDescription& joint);
+
+}  // namespace tangere

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sensors of a scene file: what each layout is made of.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "io/scene/scene_sections.hpp"
+#include "io/scene/tactile_layouts.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kLargestArray = 4096;   // rows or columns of a tactile array
+constexpr int kMostPoints = 1 << 20;  // of a list
+const std::vector<std::string> kTypes = {"rect_array", "abstract", "hemisphere", "cylinder",
+                                         "mesh"};
+using Names = std::vector<std::string>;
+
+/// Attributes that only some layouts use, and which.
+Names attributes_of(int type) {
+  switch (type) {
+    case 0: return {"rect_pos0", "rect_pos1", "axis0", "axis1", "resolution"};
+    case 1: return {"spec", "pos", "quat"};
+    case 2: return {"radius", "count", "resolution", "pos", "quat"};
+    case 3: return {"radius", "length", "resolution", "pos", "quat"};
+    default: return {"filename", "pitch", "scale", "pos", "quat"};
+  }
+}
+
+void check_attributes(const SceneNode& node, int type) {
+  Names used = {"name", "body",    "type", "kn",    "kt",
+                "mu",   "damping", "law",  "every", "pressure_sign"},
+        idle;
+  const Names own = attributes_of(type);
+  used.insert(used.end(), own.begin(), own.end());
+  for (int other = 0; other < static_cast<int>(kTypes.size()); ++other)
+    for (const std::string& name : attributes_of(other))
+      if (std::find(used.begin(), used.end(), name) == used.end() &&
+          std::find(idle.begin(), idle.end(), name) == idle.end())
+        idle.push_back(name);
+  node.check_attributes(used, {"render"}, idle);
+}
+
+/// Rows and columns.
+std::array<int, 2> read_resolution(const SceneNode& node) {
+  const std::vector<double> n = node.numbers("resolution", 2);
+  for (double k : n)
+    if (k != std::floor(k) || k < 1 || k > kLargestArray)
+      node.fail(fmt::format("resolution has {}; expected integers from 1 to {}", k, kLargestArray));
+  return {static_cast<int>(n[0]), static_cast<int>(n[1])};
+}
+
+RectArray read_array(const SceneNode& node) {
+  const double length = node.context().length;
+  RectArray array;
+  array.corner0 = scaled(node.vector("rect_pos0"), length);
+  array.corner1 = scaled(node.vector("rect_pos1"), length);
+  array.axis0 = node.direction("axis0");
+  array.axis1 = node.direction("axis1");
+  double slant = 0;
+  for (int i = 0; i < 3; ++i) slant += array.axis0[i] * array.axis1[i];
+  if (std::abs(slant) > 1e-6) node.fail("axis0 and axis1 are not perpendicular");
+  const auto [rows, cols] = read_resolution(node);
+  array.rows = rows, array.cols = cols;
+  return array;
+}
+
+std::vector<TactilePoint> read_spec(const SceneNode& node, double length) {
+  std::vector<TactilePoint> points = read_beside(node, "spec", read_tactile_points);
+  for (TactilePoint& p : points) p.position = scaled(p.position, length);
+  return points;
+}
+
+std::vector<TactilePoint> read_surface(const SceneNode& node, double length) {
+  const MeshShape mesh = read_mesh(node, length);
+  const double pitch = node.positive("pitch") * length;
+  const std::vector<TactilePoint> points = mesh_points(mesh, pitch, kMostPoints);
+  if (points.empty())
+    node.fail(fmt::format("pitch of {} m: more than {} points; expected a larger one", pitch,
+                          kMostPoints));
+  return points;
+}
+
+/// With a resolution, every point has a pixel of its own.
+std::vector<TactilePoint> read_hemisphere(const SceneNode& node, double radius) {
+  std::vector<TactilePoint> points =
+      hemisphere_points(radius, node.integer("count", 1, kMostPoints));
+  if (!node.has("resolution")) return points;
+  const auto [rows, cols] = read_resolution(node);
+  if (static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols) < points.size())
+    node.fail(
+        fmt::format("resolution=\"{}\" has {} pixels for {} points; expected one for each at least",
+                    node.text("resolution"), rows * cols, points.size()));
+  draw_hemisphere(rows, cols, points);
+  return points;
+}
+
+std::vector<TactilePoint> read_points(const SceneNode& node, int type) {
+  const double length = node.context().length;
+  const auto points = [&] {
+    if (type == 1) return read_spec(node, length);
+    if (type == 4) return read_surface(node, length);
+    const double radius = node.positive("radius") * length;
+    if (type == 2) return read_hemisphere(node, radius);
+    const auto [along, around] = read_resolution(node);
+    return cylinder_points(radius, node.positive("length") * length, along, around);
+  };
+  std::vector<TactilePoint> all = points();
+  move_points({scaled(node.vector("pos", Vector3{0, 0, 0}), length), node.quaternion("quat")}, all);
+  return all;
+}
+
+}  // namespace
+
+void read_sensors(Scene& scene, const SceneNode& section) {
+  section.check_attributes({});
+  for (const SceneNode& node : section.children({"tactile"})) {
+    TactileDescription d;
+    d.source = node.source();
+    find_body(scene, node, "body");
+    d.body = node.text("body");
+    d.name = node.text("name", d.body);
+    if (d.name.find('/') != std::string::npos)
+      node.fail("name \"" + d.name + "\" holds '/', which files use as a separator");
+    for (const TactileDescription& other : scene.sensors)
+      if (other.name == d.name) node.fail("tactile name '" + d.name + "' is used twice");
+    const int type = node.choice("type", kTypes);
+    check_attributes(node, type);
+    constexpr ContactLaw kTactileLaws[] = {ContactLaw::clamped, ContactLaw::paper};
+    d.law = kTactileLaws[node.choice("law", {"clamped", "paper"}, 0)];
+    d.coefficients = read_coefficients(node, d.law);
+    d.every = node.integer("every", 1, 1000000000, 0);
+    if (node.has("pressure_sign")) {
+      const double sign = node.number("pressure_sign");
+      if (sign != 1 && sign != -1)
+        node.fail(fmt::format("pressure_sign=\"{}\"; expected 1 or -1", sign));
+      d.pressure_sign = static_cast<int>(sign);
+    }
+    if (type == 0) {
+      d.array = read_array(node);
+    } else {
+      d.points = read_points(node, type);
+    }
+    scene.sensors.push_back(std::move(d));
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// End effectors of a scene file.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "io/scene/scene_sections.hpp"
+
+namespace tangere {
+
+void read_colour(const SceneNode& node, std::array<double, 4>& rgba) {
+  if (!node.has("rgba")) return;
+  const std::vector<double> c = node.numbers("rgba");
+  if (c.size() != 3 && c.size() != 4)
+    node.fail(fmt::format("rgba has {} numbers; expected 3 or 4", c.size()));
+  std::copy(c.begin(), c.end(), rgba.begin());
+}
+
+void read_variables(Scene& scene, const SceneNode& section) {
+  section.check_attributes({});
+  for (const SceneNode& node : section.children({"endeffector"})) {
+    node.check_attributes({"name", "joint", "pos", "radius", "rgba"});
+    const double length = node.context().length;
+    VariableDescription d;
+    d.source = node.source();
+    find_joint(scene, node, "joint");
+    d.joint = node.text("joint");
+    d.name = node.text("name", "");
+    for (const VariableDescription& other : scene.variables)
+      if (!d.name.empty() && other.name == d.name)
+        node.fail("endeffector name '" + d.name + "' is used twice");
+    d.position = scaled(node.vector("pos"), length);
+    if (node.has("radius")) d.radius = node.positive("radius") * length;
+    read_colour(node, d.rgba);
+    scene.variables.push_back(std::move(d));
+  }
+}
+
+void name_variables(Scene& scene) {
+  const auto taken = [&](const std::string& name) {
+    return std::any_of(scene.variables.begin(), scene.variables.end(),
+                       [&](const auto& v) { return v.name == name; });
+  };
+  for (std::size_t i = 0; i < scene.variables.size(); ++i)
+    for (std::size_t k = i; scene.variables[i].name.empty(); ++k)
+      if (const std::string name = fmt::format("endeffector{}", k); !taken(name))
+        scene.variables[i].name = name;
+}
+
+}  // namespace tangere

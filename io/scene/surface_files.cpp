@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+// A surface is closed when every directed edge has as many partners the other way round: then its
+// volume is defined.
+#include "io/scene/surface_files.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string_view>
+
+#include "engine/base/error.hpp"
+#include "io/files/word_reader.hpp"
+
+namespace tangere {
+namespace {
+
+struct RawMesh {
+  std::vector<Vector3> positions;
+  std::vector<std::array<int, 3>> triangles;
+};
+
+/// Index of a face's corner "7", "7/1", "7//2" or "-1": from 1, or back from the latest vertex.
+int corner(const WordReader& file, std::string_view word, std::size_t vertices) {
+  const long n = file.integer(word.substr(0, word.find('/')), "the number of a vertex");
+  const long index = n > 0 ? n - 1 : static_cast<long>(vertices) + n;
+  if (n == 0 || index < 0 || index >= static_cast<long>(vertices))
+    file.fail(fmt::format("vertex {}; expected one of the {} before this line", n, vertices));
+  return static_cast<int>(index);
+}
+
+RawMesh parse_obj(WordReader& file) {
+  static const std::vector<std::string_view> kSkipped = {"vt", "vn",     "vp",     "o", "g",
+                                                         "s",  "usemtl", "mtllib", "l", "p"};
+  RawMesh mesh;
+  while (file.next()) {
+    const std::vector<std::string_view>& words = file.words;
+    if (words[0] == "v") {
+      if (words.size() < 4)
+        file.fail(fmt::format("a vertex of {} numbers; expected x y z", words.size() - 1));
+      mesh.positions.push_back({file.position(1), file.position(2), file.position(3)});
+    } else if (words[0] == "f") {
+      if (words.size() < 4)
+        file.fail(fmt::format("a face of {} vertices; expected three or more", words.size() - 1));
+      const auto at = [&](std::size_t k) { return corner(file, words[k], mesh.positions.size()); };
+      for (std::size_t k = 2; k + 1 < words.size(); ++k)
+        mesh.triangles.push_back({at(1), at(k), at(k + 1)});
+    } else if (std::find(kSkipped.begin(), kSkipped.end(), words[0]) == kSkipped.end()) {
+      file.fail(fmt::format("'{}'; expected v, f or another element of an OBJ file",
+                            words[0].substr(0, 40)));
+    }
+  }
+  return mesh;
+}
+
+/// One vertex per position that a face uses, in order of use; faces without area by equal corners
+/// are dropped.
+MeshShape weld(const RawMesh& raw) {
+  MeshShape mesh;
+  std::map<Vector3, int> index;
+  for (const std::array<int, 3>& t : raw.triangles) {
+    std::array<int, 3> welded{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      Vector3 at = raw.positions[std::size_t(t[k])];
+      for (double& x : at) x += 0.0;  // -0 and +0 are one place
+      const auto [found, fresh] = index.emplace(at, static_cast<int>(index.size()));
+      if (fresh) mesh.vertices.insert(mesh.vertices.end(), at.begin(), at.end());
+      welded[k] = found->second;
+    }
+    if (welded[0] != welded[1] && welded[1] != welded[2] && welded[2] != welded[0])
+      mesh.triangles.push_back(welded);
+  }
+  return mesh;
+}
+
+void check_closed(const MeshShape& mesh, const std::string& path) {
+  std::map<std::pair<int, int>, int> surplus;  // of an edge one way round over the other
+  for (const std::array<int, 3>& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int a = t[k], b = t[(k + 1) % 3];
+      surplus[std::minmax(a, b)] += a < b ? 1 : -1;
+    }
+  const auto place = [&](int v) {
+    const double* p = &mesh.vertices[3 * std::size_t(v)];
+    return fmt::format("({:g} {:g} {:g})", p[0], p[1], p[2]);
+  };
+  for (const auto& [edge, count] : surplus)
+    if (count != 0)
+      throw InputError(fmt::format(
+          "{}: the surface is open, or its faces disagree on what is outside, at the edge from {} "
+          "to {}; expected a closed surface",
+          path, place(edge.first), place(edge.second)));
+}
+
+/// Six times the volume, from tetrahedra on the first vertex.
+double six_volumes(const MeshShape& mesh) {
+  double sum = 0;
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    double e[3][3];
+    for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t c = 0; c < 3; ++c)
+        e[k][c] = mesh.vertices[3 * std::size_t(t[k]) + c] - mesh.vertices[c];
+    sum += e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) +
+           e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
+           e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
+  }
+  return sum;
+}
+
+}  // namespace
+
+MeshShape read_obj(const std::string& path) {
+  WordReader file(path);
+  MeshShape mesh = weld(parse_obj(file));
+  if (mesh.triangles.empty()) throw InputError(path + ": no faces; expected a closed surface");
+  check_closed(mesh, path);
+  const double volume = six_volumes(mesh) / 6;
+  if (volume < 0)
+    throw InputError(path +
+                     ": the faces point inwards; expected anticlockwise corners seen from outside");
+  if (!(volume > 0)) throw InputError(path + ": the surface encloses no volume");
+  return mesh;
+}
+
+std::vector<double> read_contact_points(const std::string& path) {
+  WordReader file(path);
+  if (!file.next())
+    throw InputError(path + ": empty; expected a count, then a line x y z per point");
+  if (file.words.size() != 1)
+    file.fail(fmt::format("{} words; expected the number of points alone", file.words.size()));
+  const long count = file.integer(file.words[0], "the number of points");
+  if (count < 1) file.fail(fmt::format("{} points; expected one or more", count));
+  std::vector<double> points;
+  while (file.next()) {
+    if (file.words.size() != 3)
+      file.fail(fmt::format("{} numbers; expected x y z", file.words.size()));
+    for (std::size_t k = 0; k < 3; ++k) points.push_back(file.position(k));
+  }
+  if (points.size() / 3 != std::size_t(count))
+    throw InputError(
+        fmt::format("{}: {} points follow the count of {}; expected as many as it says", path,
+                    points.size() / 3, count));
+  return points;
+}
+
+}  // namespace tangere

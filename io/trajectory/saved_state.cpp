@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// One row of each dataset, checked against the model before any of it is used.
+#include "io/trajectory/saved_state.hpp"
+
+#include <fmt/format.h>
+
+#include "engine/base/error.hpp"
+#include "io/hdf5/h5.hpp"
+
+namespace tangere {
+namespace {
+
+template <class T>
+T number(const h5::Id& object, const std::string& name, const std::string& path) {
+  const std::vector<T> values = h5::read_numbers<T>(object, name);
+  if (values.size() != 1) throw IoError(fmt::format("{}: attribute '{}' is damaged", path, name));
+  return values[0];
+}
+
+/// Row `row` of a (rows, E, width) dataset.
+std::vector<double> read_row(const h5::Id& dataset, std::int64_t row) {
+  const h5::Dims dims = h5::dimensions(dataset);
+  std::vector<double> values(dims[1] * dims[2]);
+  if (!values.empty())
+    h5::read_box<double>(dataset, {static_cast<hsize_t>(row), 0, 0}, {1, dims[1], dims[2]},
+                         values.data());
+  return values;
+}
+
+std::vector<StepStatus> read_status(const h5::Id& file, std::int64_t step,
+                                    std::size_t environments) {
+  std::vector<std::int8_t> values(environments);
+  h5::read_box<std::int8_t>(h5::open_dataset(h5::open_group(file, "solver"), "status"),
+                            {static_cast<hsize_t>(step), 0}, {1, environments}, values.data());
+  std::vector<StepStatus> status;
+  for (const std::int8_t value : values) status.push_back(static_cast<StepStatus>(value));
+  return status;
+}
+
+void check_names(const SavedState& from, const char* what, const std::vector<std::string>& names,
+                 std::span<const std::string> expected) {
+  if (names.size() != expected.size())
+    throw InputError(fmt::format("{}: {} numbers in {}; the scene has {}", from.path, names.size(),
+                                 what, expected.size()));
+  for (std::size_t i = 0; i < names.size(); ++i)
+    if (names[i] != expected[i])
+      throw InputError(fmt::format("{}: number {} of {} is '{}'; in the scene it is '{}'",
+                                   from.path, i, what, names[i], expected[i]));
+}
+
+}  // namespace
+
+SavedState read_state(const std::string& path, std::optional<std::int64_t> row) {
+  const h5::Id file = h5::open_file(path);
+  if (H5Aexists(file.get(), "format") <= 0 || h5::read_text(file, "format") != "tangere trajectory")
+    throw IoError(path + ": not a trajectory file of 'tangere simulate'");
+  SavedState state;
+  state.path = path;
+  const auto steps = number<std::int64_t>(file, "steps", path);
+  state.row = row.value_or(steps);
+  if (state.row < 0 || state.row > steps)
+    throw InputError(fmt::format("row {} of {}; expected 0 to {}", state.row, path, steps));
+  state.step = number<std::int64_t>(file, "first_step", path) + state.row;
+  state.environments = static_cast<int>(number<std::int64_t>(file, "environments", path));
+  state.seed = number<std::uint64_t>(file, "seed", path);
+  state.first_episode = number<std::int64_t>(file, "first_episode", path);
+  state.timestep = number<double>(file, "timestep", path);
+  state.integrator = h5::read_text(file, "integrator");
+  state.scene_text = h5::read_text(file, "scene_text");
+  const h5::Id q = h5::open_dataset(file, "q"), v = h5::open_dataset(file, "v");
+  state.q_names = h5::read_texts(q, "names");
+  state.v_names = h5::read_texts(v, "names");
+  const h5::Dims dims = h5::dimensions(q), rates = h5::dimensions(v);
+  const auto environments = static_cast<std::size_t>(state.environments);
+  if (dims != h5::Dims{static_cast<hsize_t>(steps) + 1, environments, state.q_names.size()} ||
+      rates != h5::Dims{static_cast<hsize_t>(steps) + 1, environments, state.v_names.size()})
+    throw IoError(path + ": the states are damaged");
+  state.q = read_row(q, state.row);
+  state.v = read_row(v, state.row);
+  state.status.assign(environments, StepStatus::converged);
+  if (state.row > 0) {
+    state.previous_q = read_row(q, state.row - 1);
+    state.previous_v = read_row(v, state.row - 1);
+    state.status = read_status(file, state.row - 1, environments);
+  }
+  return state;
+}
+
+void restore_state(const SavedState& from, bool continues, Batch& batch) {
+  const Model& model = batch.model();
+  check_names(from, "q", from.q_names, model.q_names());
+  check_names(from, "v", from.v_names, model.v_names());
+  if (batch.environments() > from.environments)
+    throw InputError(fmt::format("{} environments; {} has {}", batch.environments(), from.path,
+                                 from.environments));
+  const auto nq = static_cast<std::size_t>(model.nq()), nv = static_cast<std::size_t>(model.nv());
+  for (int e = 0; e < batch.environments(); ++e) {
+    const auto part = [e](const std::vector<double>& all, std::size_t width) {
+      return std::span(all).subspan(static_cast<std::size_t>(e) * width, width);
+    };
+    if (continues && from.row > 0) {
+      batch.set_state(e, part(from.q, nq), part(from.v, nv), part(from.previous_q, nq),
+                      part(from.previous_v, nv));
+    } else {
+      batch.set_state(e, part(from.q, nq), part(from.v, nv));
+    }
+    const StepStatus status = from.status[static_cast<std::size_t>(e)];
+    if (failed(status)) batch.set_failed(e, status);
+  }
+}
+
+}  // namespace tangere

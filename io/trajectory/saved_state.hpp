@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// A row of a trajectory file as the start of another run.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/step/batch.hpp"
+
+namespace tangere {
+
+/// Row K of a file: all that the steps after it depend on.
+struct SavedState {
+  std::string path;
+  std::int64_t row = 0;  ///< K
+  std::int64_t step =
+      0;  ///< steps since the very first run of a chain: K of a run that continued none
+  int environments = 0;  ///< E
+  std::uint64_t seed = 0;
+  std::int64_t first_episode = 0;
+  double timestep = 0;  ///< [s]
+  std::string integrator, scene_text;
+  std::vector<std::string> q_names;            ///< (nq)
+  std::vector<std::string> v_names;            ///< (nv)
+  std::vector<double> q, v;                    ///< (E, nq), (E, nv)
+  std::vector<double> previous_q, previous_v;  ///< of row K - 1; empty for row 0
+  std::vector<StepStatus> status;  ///< (E) of the step that led here; converged for row 0
+};
+
+/// `row`: the last one when not given. Throws IoError for a file that is missing, damaged or no
+/// trajectory, InputError naming the rows there are.
+SavedState read_state(const std::string& path, std::optional<std::int64_t> row);
+
+/// Puts environment e of a saved state into environment e of a batch: with the row before it where
+/// `continues` (the next step then takes up BDF2 where it was left). An environment that had failed
+/// stays failed. Throws InputError when the coordinates are not those of the model or the batch is
+/// larger than the file's.
+void restore_state(const SavedState& from, bool continues, Batch& batch);
+
+}  // namespace tangere

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points are in the order of the field: row k of one is row k of the other.
+#include "io/trajectory/sensor_description.hpp"
+
+#include <algorithm>
+
+namespace tangere {
+namespace {
+
+void write_vectors(const h5::Id& group, const char* name, const SensorLayout& sensor,
+                   Vector3 TactilePoint::*member, const char* units) {
+  std::vector<double> numbers;
+  for (const TactilePoint& p : sensor.list)
+    numbers.insert(numbers.end(), (p.*member).begin(), (p.*member).end());
+  const h5::Dims dims{sensor.list.size(), 3};
+  const h5::Id dataset = h5::create_dataset<double>(group, name, dims);
+  h5::write_attribute(dataset, "units", units);
+  h5::write_attribute(dataset, "frame", "body");
+  h5::write_box<double>(dataset, {0, 0}, dims, numbers.data());
+}
+
+void describe_array(const h5::Id& object, const SensorLayout& s) {
+  h5::write_attribute(object, "components",
+                      "f.axis0, f.axis1, -f.(axis0 x axis1); f is the force on the body");
+  h5::write_attribute(object, "frame", "axis0, axis1 of the sensor, in the body's axes");
+  const std::int64_t resolution[] = {s.rows, s.cols};
+  h5::write_list<std::int64_t>(object, "resolution", resolution);
+  h5::write_list<double>(object, "corner0", s.corner0);
+  h5::write_list<double>(object, "corner1", s.corner1);
+  h5::write_list<double>(object, "axis0", s.axis0);
+  h5::write_list<double>(object, "axis1", s.axis1);
+}
+
+void describe_list(const h5::Id& object, const h5::Id& group, const SensorLayout& s) {
+  h5::write_attribute(object, "components",
+                      "f.axis0, f.axis1, -f.normal; f is the force on the body");
+  h5::write_attribute(object, "frame", "axis0, axis1, normal of each point, in the body's axes");
+  write_vectors(group, "position", s, &TactilePoint::position, "m");
+  write_vectors(group, "normal", s, &TactilePoint::normal, "1");
+  write_vectors(group, "axis0", s, &TactilePoint::axis0, "1");
+  write_vectors(group, "axis1", s, &TactilePoint::axis1, "1");
+  if (std::all_of(s.list.begin(), s.list.end(),
+                  [](const TactilePoint& p) { return p.pixel[0] < 0; }))
+    return;
+  std::vector<std::int64_t> pixels;
+  for (const TactilePoint& p : s.list) pixels.insert(pixels.end(), {p.pixel[0], p.pixel[1]});
+  const h5::Dims dims{s.list.size(), 2};
+  const h5::Id dataset = h5::create_dataset<std::int64_t>(group, "pixel", dims);
+  h5::write_attribute(dataset, "meaning", "row and column of the point in an image; -1: none");
+  h5::write_box<std::int64_t>(dataset, {0, 0}, dims, pixels.data());
+}
+
+}  // namespace
+
+void describe_sensor(const h5::Id& object, const h5::Id& group, const SensorLayout& sensor) {
+  h5::write_attribute(object, "units", "N");
+  h5::write_attribute(object, "body", sensor.body);
+  h5::write_scalar<std::int64_t>(object, "pressure_sign", sensor.pressure_sign);
+  if (sensor.rectangular()) {
+    describe_array(object, sensor);
+  } else {
+    describe_list(object, group, sensor);
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,370 @@
+// SPDX-License-Identifier: Apache-2.0
+// Everything is created before the first step, so that a run cannot fail late for a reason known
+// early.
+#include "io/trajectory/trajectory_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "engine/derivative/point_numbers.hpp"
+#include "io/files/part_file.hpp"
+#include "io/hdf5/h5.hpp"
+#include "io/trajectory/sensor_description.hpp"
+
+namespace tangere {
+
+namespace {
+
+constexpr hsize_t kChunkBytes = 1U << 20;
+
+/// Whole rows, about a megabyte of them.
+h5::Storage rows_of(const h5::Dims& dims, std::size_t element) {
+  hsize_t row = element;
+  for (std::size_t i = 1; i < dims.size(); ++i) row *= dims[i];
+  if (dims[0] * row <= kChunkBytes) return {};  // small: one contiguous piece
+  h5::Dims chunk = dims;
+  chunk[0] = std::clamp<hsize_t>(kChunkBytes / row, 1, dims[0]);
+  // A row of very many environments is cut between environments.
+  if (row > kChunkBytes && dims.size() > 1) {
+    const hsize_t environment = row / dims[1];
+    chunk[1] = std::clamp<hsize_t>(kChunkBytes / environment, 1, dims[1]);
+  }
+  return {chunk, false};
+}
+
+/// One environment's field per chunk: mostly zeros, so compressed.
+h5::Storage field_storage(const h5::Dims& dims) {
+  h5::Dims chunk = dims;
+  chunk[0] = chunk[1] = 1;
+  return {chunk, true};
+}
+
+const char* const kPoseComponents[] = {"x", "y", "z", "qw", "qx", "qy", "qz"};
+const char* const kTwistComponents[] = {"wx", "wy", "wz", "vx", "vy", "vz"};
+
+}  // namespace
+
+struct TrajectoryFile::Impl {
+  TrajectoryLayout layout;
+  PartFile part;
+  h5::Id file, time, q, v, u, pose, twist, variables, iterations, status, residual;
+  struct Sensor {
+    h5::Id force, step;
+    h5::Dims frame;  // dimensions of one row of force
+    std::int64_t written = 0;
+  };
+  std::vector<Sensor> sensors;
+  struct Task {
+    h5::Id action, step, reward, terminated, truncated, success;
+  } task;
+  std::int64_t states = 0, steps = 0, actions = 0;
+
+  Impl(const std::string& output, const TrajectoryLayout& l, bool overwrite)
+      : layout((l.check(), l)), part(output, overwrite) {
+    const std::uint64_t needed = layout.bytes_without_tactile(), available = part.free_bytes();
+    if (needed > available)
+      throw IoError(fmt::format("{}: needs at least {} bytes and the disk has {} free", output,
+                                needed, available));
+    file = h5::create_file(part.path());
+    try {
+      describe_run();
+      create_trajectory();
+      for (const SensorLayout& s : layout.sensors) create_sensor(s);
+      create_randomized();
+      create_task();
+    } catch (...) {
+      part.empty();
+      throw;
+    }
+  }
+
+  template <class T>
+  h5::Id rows(const h5::Id& parent, const std::string& name, h5::Dims dims) {
+    return h5::create_dataset<T>(parent, name, dims, rows_of(dims, sizeof(T)));
+  }
+
+  /// A dataset for each sensor from (E, points of all, kPointNumbers).
+  void put_points(const h5::Id& gradients, std::span<const double> of_all) {
+    const h5::Id group = h5::create_group(gradients, "grad_points");
+    h5::write_attribute(group, "meaning",
+                        "derivative of the loss by each tactile point's place in its body's axes "
+                        "and its own coefficients");
+    h5::write_attribute(group, "names",
+                        std::vector<std::string>{"x", "y", "z", "kn", "kt", "mu", "damping"});
+    h5::write_attribute(
+        group, "units",
+        std::vector<std::string>{"m", "m", "m", "N/m", "N s/m", "1", "N s/m^2; law linear: N s/m"});
+    const hsize_t E = static_cast<hsize_t>(layout.environments);
+    const double* next = of_all.data();
+    for (const SensorLayout& s : layout.sensors) {
+      const hsize_t points = static_cast<hsize_t>(s.points);
+      const h5::Id dataset = rows<double>(group, s.name, {E, points, kPointNumbers});
+      for (hsize_t e = 0; e < E; ++e)
+        h5::write_box<double>(dataset, {e, 0, 0}, {1, points, kPointNumbers},
+                              next + e * (of_all.size() / E));
+      next += points * kPointNumbers;
+    }
+  }
+
+  void describe_run() {
+    h5::write_attribute(file, "format", "tangere trajectory");
+    h5::write_scalar<std::int64_t>(file, "format_version", 1);
+    h5::write_attribute(file, "tangere_version", layout.version);
+    h5::write_attribute(file, "instruction_set", layout.instruction_set);
+    h5::write_attribute(file, "precision", layout.precision);
+    h5::write_attribute(file, "command_line", layout.command_line);
+    h5::write_attribute(file, "scene_name", layout.scene_name);
+    h5::write_attribute(file, "scene_path", layout.scene_path);
+    h5::write_attribute(file, "scene_text", layout.scene_text);
+    h5::write_attribute(file, "integrator", layout.integrator);
+    h5::write_scalar<double>(file, "timestep", layout.timestep);
+    h5::write_attribute(file, "timestep_unit", "s");
+    h5::write_scalar<double>(file, "tolerance", layout.tolerance);
+    h5::write_scalar<std::int64_t>(file, "every", layout.every);
+    h5::write_scalar<std::uint64_t>(file, "seed", layout.seed);
+    h5::write_scalar<std::int64_t>(file, "first_episode", layout.first_episode);
+    h5::write_scalar<std::int64_t>(file, "steps", layout.steps);
+    h5::write_scalar<std::int64_t>(file, "first_step", layout.first_step);
+    h5::write_scalar<std::int64_t>(file, "environments", layout.environments);
+    h5::write_attribute(file, "quaternion_order", "w x y z");
+    h5::write_attribute(file, "world_axes", "right-handed, SI units");
+  }
+
+  void create_trajectory() {
+    const hsize_t T = static_cast<hsize_t>(layout.steps),
+                  E = static_cast<hsize_t>(layout.environments);
+    const auto named = [](const h5::Id& d, const std::vector<std::string>& names,
+                          const std::vector<std::string>& units) {
+      h5::write_attribute(d, "names", std::span<const std::string>(names));
+      h5::write_attribute(d, "units", std::span<const std::string>(units));
+    };
+    time = rows<double>(file, "time", {T + 1});
+    h5::write_attribute(time, "units", "s");
+    q = rows<double>(file, "q", {T + 1, E, layout.q_names.size()});
+    named(q, layout.q_names, layout.q_units);
+    h5::write_attribute(q, "frame",
+                        "each joint's fixed frame; quaternions turn the moving frame into it");
+    v = rows<double>(file, "v", {T + 1, E, layout.v_names.size()});
+    named(v, layout.v_names, layout.v_units);
+    h5::write_attribute(
+        v, "frame", "linear: axes of the joint's fixed frame; angular: axes of the moving frame");
+    if (!layout.u_names.empty()) {
+      u = rows<double>(file, "u", {T, E, layout.u_names.size()});
+      named(u, layout.u_names, layout.u_units);
+      h5::write_attribute(u, "meaning",
+                          "as given; clipped to [-1, 1], then mapped to the motor's range");
+    }
+    const h5::Id bodies = h5::create_group(file, "bodies");
+    h5::write_attribute(bodies, "names", std::span<const std::string>(layout.body_names));
+    const hsize_t nb = layout.body_names.size();
+    pose = rows<double>(bodies, "pose", {T + 1, E, nb, 7});
+    const std::vector<std::string> pose_names(std::begin(kPoseComponents),
+                                              std::end(kPoseComponents));
+    named(pose, pose_names, {"m", "m", "m", "1", "1", "1", "1"});
+    h5::write_attribute(pose, "frame", "body frame in the world");
+    twist = rows<double>(bodies, "twist", {T + 1, E, nb, 6});
+    const std::vector<std::string> twist_names(std::begin(kTwistComponents),
+                                               std::end(kTwistComponents));
+    named(twist, twist_names, {"rad/s", "rad/s", "rad/s", "m/s", "m/s", "m/s"});
+    h5::write_attribute(twist, "frame", "world axes; velocity of the body frame's origin");
+    for (const h5::Id* d : {&pose, &twist})
+      h5::write_attribute(*d, "bodies", std::span<const std::string>(layout.body_names));
+    if (!layout.variable_names.empty()) {
+      const h5::Id group = h5::create_group(file, "variables");
+      variables = rows<double>(group, "position", {T + 1, E, layout.variable_names.size(), 3});
+      h5::write_attribute(variables, "names", std::span<const std::string>(layout.variable_names));
+      h5::write_attribute(variables, "units", "m");
+      h5::write_attribute(variables, "frame", "world");
+    }
+
+    const h5::Id solver = h5::create_group(file, "solver");
+    iterations = rows<std::int32_t>(solver, "iterations", {T, E});
+    h5::write_attribute(iterations, "meaning", "evaluations of the residual, sub-steps included");
+    status = rows<std::int8_t>(solver, "status", {T, E});
+    std::vector<std::string> meanings;
+    std::vector<std::int8_t> values;
+    for (const StatusMeaning& s : layout.statuses)
+      values.push_back(s.value), meanings.push_back(s.meaning);
+    h5::write_list<std::int8_t>(status, "values", values);
+    h5::write_attribute(status, "meanings", std::span<const std::string>(meanings));
+    residual = rows<double>(solver, "residual", {T, E});
+    h5::write_attribute(residual, "meaning", "scaled residual at acceptance, dimensionless");
+  }
+
+  void create_sensor(const SensorLayout& s) {
+    const hsize_t E = static_cast<hsize_t>(layout.environments),
+                  F = static_cast<hsize_t>(s.frames(layout.steps, layout.first_step));
+    if (!h5::has_link(file, "tactile")) h5::create_group(file, "tactile");
+    const h5::Id group = h5::create_group(h5::open_group(file, "tactile"), s.name);
+    Sensor out;
+    out.frame = {E, static_cast<hsize_t>(s.points), 3};
+    if (s.rectangular())
+      out.frame = {E, static_cast<hsize_t>(s.rows), static_cast<hsize_t>(s.cols), 3};
+    h5::Dims dims = out.frame;
+    dims.insert(dims.begin(), F);
+    out.force = h5::create_dataset<double>(group, "force", dims,
+                                           F > 0 ? field_storage(dims) : h5::Storage{});
+    out.step = h5::create_dataset<std::int64_t>(group, "step", {F});
+    h5::write_attribute(out.step, "meaning", "row of /q that each field was read from");
+    h5::write_scalar<std::int64_t>(out.force, "every", s.every);
+    describe_sensor(out.force, group, s);
+    sensors.push_back(std::move(out));
+  }
+
+  void create_randomized() {
+    if (layout.randomized_names.empty()) return;
+    const hsize_t E = static_cast<hsize_t>(layout.environments), k = layout.randomized_names.size();
+    const h5::Id d = h5::create_dataset<double>(file, "randomized", {E, k});
+    h5::write_attribute(d, "names", std::span<const std::string>(layout.randomized_names));
+    h5::write_attribute(d, "units", "SI, as the scene gives each number");
+    h5::write_box<double>(d, {0, 0}, {E, k}, layout.randomized_values.data());
+  }
+
+  void create_task() {
+    if (!layout.task) {
+      h5::write_attribute(file, "task", "none: a scene alone, whose every reward is 0");
+      return;
+    }
+    const TaskSpec& spec = *layout.task;
+    h5::write_attribute(file, "task", spec.name);
+    h5::write_attribute(file, "policy", layout.policy);
+    const hsize_t E = static_cast<hsize_t>(layout.environments),
+                  A = static_cast<hsize_t>(spec.horizon);
+    const h5::Id group = h5::create_group(file, "task");
+    h5::write_attribute(group, "success", spec.success);
+    task.action = rows<double>(group, "action", {A, E, spec.action.size()});
+    h5::write_attribute(task.action, "unit", spec.action.unit);
+    h5::write_attribute(task.action, "meaning", spec.action.meaning);
+    task.step = h5::create_dataset<std::int64_t>(group, "step", {A});
+    h5::write_attribute(task.step, "meaning", "row of /q after each action");
+    task.reward = rows<double>(group, "reward", {A, E});
+    task.terminated = rows<std::int8_t>(group, "terminated", {A, E});
+    task.truncated = rows<std::int8_t>(group, "truncated", {A, E});
+    task.success = rows<std::int8_t>(group, "success", {A, E});
+  }
+
+  /// Row `at` of a dataset whose other dimensions are `row`.
+  template <class T>
+  static void put(const h5::Id& d, std::int64_t at, h5::Dims row, const T* data) {
+    h5::Dims offset(row.size() + 1, 0);
+    offset[0] = static_cast<hsize_t>(at);
+    row.insert(row.begin(), 1);
+    h5::write_box<T>(d, offset, row, data);
+  }
+};
+
+TrajectoryFile::TrajectoryFile(const std::string& output, const TrajectoryLayout& layout,
+                               bool overwrite)
+    : impl_(std::make_unique<Impl>(output, layout, overwrite)) {}
+TrajectoryFile::~TrajectoryFile() {
+  // On a full disk the library can only close its file once there is room again.
+  if (impl_ != nullptr && impl_->file.get() >= 0) impl_->part.empty();
+}
+
+void TrajectoryFile::write(const StateRow& row) {
+  Impl& f = *impl_;
+  const hsize_t E = static_cast<hsize_t>(f.layout.environments), nb = f.layout.body_names.size();
+  const std::int64_t t = row.step;
+  const hsize_t one = 1;
+  h5::write_box<double>(f.time, {static_cast<hsize_t>(t)}, {one}, &row.time);
+  Impl::put<double>(f.q, t, {E, f.layout.q_names.size()}, row.q.data());
+  Impl::put<double>(f.v, t, {E, f.layout.v_names.size()}, row.v.data());
+  Impl::put<double>(f.pose, t, {E, nb, 7}, row.body_pose.data());
+  Impl::put<double>(f.twist, t, {E, nb, 6}, row.body_twist.data());
+  if (const hsize_t n = f.layout.variable_names.size(); n > 0) {
+    if (row.variables.size() != E * n * 3)
+      throw IoError(fmt::format("{}: row {} has {} numbers for {} end effectors of {} environments",
+                                f.part.output(), t, row.variables.size(), n, E));
+    Impl::put<double>(f.variables, t, {E, n, 3}, row.variables.data());
+  }
+  ++f.states;
+}
+
+void TrajectoryFile::write(const StepRow& row) {
+  Impl& f = *impl_;
+  const hsize_t E = static_cast<hsize_t>(f.layout.environments);
+  if (!f.layout.u_names.empty())
+    Impl::put<double>(f.u, row.step, {E, f.layout.u_names.size()}, row.u.data());
+  Impl::put<std::int32_t>(f.iterations, row.step, {E}, row.iterations.data());
+  Impl::put<std::int8_t>(f.status, row.step, {E}, row.status.data());
+  Impl::put<double>(f.residual, row.step, {E}, row.residual.data());
+  ++f.steps;
+}
+
+void TrajectoryFile::write(const TactileRow& row) {
+  Impl::Sensor& s = impl_->sensors[std::size_t(row.sensor)];
+  Impl::put<double>(s.force, row.frame, s.frame, row.force.data());
+  h5::write_box<std::int64_t>(s.step, {static_cast<hsize_t>(row.frame)}, {1}, &row.step);
+  ++s.written;
+}
+
+void TrajectoryFile::write(const ActionRow& row) {
+  Impl& f = *impl_;
+  const hsize_t E = static_cast<hsize_t>(f.layout.environments);
+  Impl::put<double>(f.task.action, row.action, {E, f.layout.task->action.size()}, row.u.data());
+  h5::write_box<std::int64_t>(f.task.step, {static_cast<hsize_t>(row.action)}, {1}, &row.step);
+  Impl::put<double>(f.task.reward, row.action, {E}, row.reward.data());
+  const auto flags = [&](const h5::Id& dataset, std::span<const std::uint8_t> values) {
+    const std::vector<std::int8_t> flags_of(values.begin(), values.end());
+    Impl::put<std::int8_t>(dataset, row.action, {E}, flags_of.data());
+  };
+  flags(f.task.terminated, row.terminated);
+  flags(f.task.truncated, row.truncated);
+  flags(f.task.success, row.success);
+  ++f.actions;
+}
+
+void TrajectoryFile::write(const GradientArrays& g) {
+  const TrajectoryLayout& l = impl_->layout;
+  const hsize_t E = static_cast<hsize_t>(l.environments), T = static_cast<hsize_t>(l.steps),
+                nv = l.v_names.size(), nu = l.u_names.size();
+  const h5::Id group = h5::create_group(impl_->file, "gradients");
+  h5::write_attribute(group, "loss", g.loss);
+  h5::write_attribute(group, "meaning", g.meaning);
+  const auto put = [&](const std::string& name, const h5::Dims& dims,
+                       std::span<const double> values, const std::string& meaning,
+                       std::span<const std::string> names) {
+    const h5::Id d = h5::create_dataset<double>(group, name, dims, rows_of(dims, sizeof(double)));
+    h5::write_attribute(d, "meaning", meaning);
+    if (!names.empty()) h5::write_attribute(d, "names", names);
+    if (!values.empty()) h5::write_box<double>(d, h5::Dims(dims.size(), 0), dims, values.data());
+  };
+  put("loss", {E}, g.value, "the loss of each environment", {});
+  if (nu > 0)
+    put("grad_u", {E, T, nu}, g.u, "derivative of the loss by the controls of every step",
+        l.u_names);
+  put("grad_q", {E, nv}, g.q,
+      "by the initial positions, along the dofs of v; rotations on the right", l.v_names);
+  put("grad_v", {E, nv}, g.v, "by the initial velocities", l.v_names);
+  put("grad_numbers", {E, g.number_names.size()}, g.numbers,
+      "by the numbers of the scene, in the units given", g.number_names);
+  const h5::Id numbers = h5::open_dataset(group, "grad_numbers");
+  h5::write_attribute(numbers, "units", g.number_units);
+  if (!g.points.empty()) impl_->put_points(group, g.points);
+}
+
+void TrajectoryFile::commit() {
+  Impl& f = *impl_;
+  const auto expect = [&](const std::string& what, std::int64_t written, std::int64_t expected) {
+    if (written != expected)
+      throw IoError(fmt::format("{}: {} {} of {} were written; the file is incomplete",
+                                f.part.output(), written, what, expected));
+  };
+  expect("states", f.states, f.layout.steps + 1);
+  expect("steps", f.steps, f.layout.steps);
+  expect("actions", f.actions, f.layout.task ? f.layout.task->horizon : 0);
+  for (std::size_t i = 0; i < f.sensors.size(); ++i)
+    expect("fields of " + f.layout.sensors[i].name, f.sensors[i].written,
+           f.layout.sensors[i].frames(f.layout.steps, f.layout.first_step));
+  for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.variables, &f.iterations,
+                    &f.status, &f.residual})
+    d->reset();
+  f.sensors.clear();
+  f.task = {};
+  h5::close_file(f.file, f.part.path());
+  f.part.commit();
+}
+
+}  // namespace tangere

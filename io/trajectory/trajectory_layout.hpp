@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// All that a trajectory file says besides its numbers, known before the first step is taken.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/rows/task_spec.hpp"
+#include "engine/step/stepper.hpp"
+
+namespace tangere {
+
+/// A tactile sensor as files describe it.
+struct SensorLayout {
+  std::string name;
+  std::string body;
+  int rows = 0, cols = 0;  ///< of a rectangular array, points row-major; both 0: a list of points
+  int points = 0;          ///< rows * cols for a rectangular array
+  int every = 1;          ///< K: fields are read after steps K, 2K, … of the first run of a chain
+  int pressure_sign = 1;  ///< times the third force component: positive under pressure
+  /// Rectangular arrays: p(i, j) = corner0 + i pitch0 axis0 + j pitch1 axis1, body frame [m].
+  std::array<double, 3> corner0{}, corner1{};
+  std::array<double, 3> axis0{}, axis1{};  ///< unit, orthogonal
+
+  std::vector<TactilePoint> list;  ///< a list of points in the field's order; empty for arrays
+
+  [[nodiscard]] bool rectangular() const { return rows > 0; }
+  /// {pitch0, pitch1} [m]; negative when the corners run against an axis, 0 for a single row.
+  [[nodiscard]] std::array<double, 2> pitch() const;
+  /// Fields that `steps` steps give after `first_step` of an earlier run.
+  [[nodiscard]] std::int64_t frames(std::int64_t steps, std::int64_t first_step) const {
+    return (first_step + steps) / every - first_step / every;
+  }
+};
+
+/// A value of /solver/status and what it means.
+struct StatusMeaning {
+  std::int8_t value = 0;
+  std::string meaning;
+};
+
+struct TrajectoryLayout {
+  std::int64_t steps = 0;       ///< T
+  std::int64_t first_step = 0;  ///< steps before row 0, of the runs that this one continues
+  int environments = 1;         ///< E
+  std::vector<std::string> q_names, q_units;  ///< (nq)
+  std::vector<std::string> v_names, v_units;  ///< (nv)
+  std::vector<std::string> u_names, u_units;  ///< (nu)
+  std::vector<std::string> body_names;        ///< (nb)
+  std::vector<std::string> variable_names;    ///< (n) end effectors, empty when there are none
+  std::vector<SensorLayout> sensors;
+  std::vector<StatusMeaning> statuses;
+  std::vector<std::string> randomized_names;  ///< (k), empty when nothing varies
+  std::vector<double> randomized_values;      ///< (E, k)
+
+  std::string scene_name, scene_path, scene_text;
+  std::string integrator;
+  double timestep = 0;   ///< [s]
+  double tolerance = 0;  ///< of the scaled residual, dimensionless
+  int every = 0;         ///< the option as given; 0: each sensor's own
+  std::uint64_t seed = 0;
+  std::int64_t first_episode = 0;
+  std::string precision, command_line, version, instruction_set;
+  std::optional<TaskSpec> task;  ///< that a policy plays here; none: a scene alone
+  std::string policy;            ///< of a task
+
+  /// Throws InputError when counts contradict each other or a sensor cannot be a name in a file.
+  void check() const;
+  /// Size without compression, of all but the tactile fields and of everything [bytes].
+  /// Throws InputError when the size is beyond 2^63.
+  [[nodiscard]] std::uint64_t bytes_without_tactile() const;
+  [[nodiscard]] std::uint64_t bytes() const;
+};
+
+/// What the model and the batch do not know about a run.
+struct RunDescription {
+  std::int64_t steps = 0, first_step = 0;
+  int every = 0;                       ///< the option as given; 0: each sensor's own
+  std::vector<int> tactile_intervals;  ///< K in force, one per sensor
+  std::string precision, command_line, version, instruction_set;
+  std::optional<TaskSpec> task;
+  std::string policy;
+};
+
+/// The layout of a rollout of `batch` by `stepper`.
+TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper, const RunDescription& run);
+
+/// How a randomised number is called in files: "slider.q[0]", "pad/ball.kn", "ground/ball.mu".
+std::string randomized_name(const RandomizationDescription& description);
+
+}  // namespace tangere

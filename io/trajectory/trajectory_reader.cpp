@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+// The inverse of trajectory_file.cpp, attribute by attribute.
+#include "io/trajectory/trajectory_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "engine/base/error.hpp"
+#include "io/files/nearest_name.hpp"
+#include "io/hdf5/h5.hpp"
+
+namespace tangere {
+
+namespace {
+constexpr std::int64_t kLargestImage = std::int64_t{1} << 30;  // pixels along one side
+}
+
+struct TrajectoryReader::Impl {
+  std::string path, scene_name;
+  h5::Id file;
+  std::int64_t environments = 0;
+  double timestep = 0;
+  std::vector<SensorLayout> sensors;
+  std::vector<std::int64_t> frames;
+
+  explicit Impl(const std::string& p) : path(p), file(h5::open_file(p)) {
+    if (H5Aexists(file.get(), "format") <= 0 ||
+        h5::read_text(file, "format") != "tangere trajectory")
+      throw IoError(path + ": not a trajectory file of 'tangere simulate'");
+    scene_name = h5::read_text(file, "scene_name");
+    environments = one<std::int64_t>(file, "environments");
+    timestep = one<double>(file, "timestep");
+    if (!h5::has_link(file, "tactile")) return;
+    const h5::Id group = h5::open_group(file, "tactile");
+    H5G_info_t info;
+    H5Gget_info(group.get(), &info);
+    for (hsize_t i = 0; i < info.nlinks; ++i) {
+      char name[1024];
+      if (H5Lget_name_by_idx(group.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, name, sizeof name,
+                             H5P_DEFAULT) < 0)
+        throw IoError(path + ": the list of sensors is damaged");
+      add_sensor(h5::open_group(group, name), name);
+    }
+  }
+
+  template <class T>
+  T one(const h5::Id& object, const std::string& name) const {
+    const std::vector<T> values = h5::read_numbers<T>(object, name);
+    if (values.empty()) throw IoError(path + ": attribute '" + name + "' is empty");
+    return values[0];
+  }
+
+  /// What a picture of a list of points needs.
+  void read_image(const h5::Id& group, SensorLayout& s) const {
+    const auto n = static_cast<hsize_t>(s.points);
+    s.list.resize(n);
+    std::vector<std::int64_t> pixels(2 * n);
+    h5::read_box<std::int64_t>(h5::open_dataset(group, "pixel"), {0, 0}, {n, 2}, pixels.data());
+    for (std::size_t p = 0; p < n; ++p)
+      for (std::size_t k = 0; k < 2; ++k) {
+        const std::int64_t x = pixels[2 * p + k];
+        if (x < -1 || x >= kLargestImage)
+          throw IoError(fmt::format("{}: sensor '{}' has pixel {}", path, s.name, x));
+        s.list[p].pixel[k] = static_cast<int>(x);
+      }
+    const auto vectors = [&](const char* name, Vector3 TactilePoint::*to) {
+      std::vector<double> x(3 * n);
+      h5::read_box<double>(h5::open_dataset(group, name), {0, 0}, {n, 3}, x.data());
+      for (std::size_t p = 0; p < n; ++p) std::copy_n(&x[3 * p], 3, (s.list[p].*to).begin());
+    };
+    vectors("position", &TactilePoint::position);
+    vectors("axis0", &TactilePoint::axis0);
+    vectors("axis1", &TactilePoint::axis1);
+  }
+
+  void add_sensor(const h5::Id& group, const std::string& name) {
+    const h5::Id force = h5::open_dataset(group, "force");
+    SensorLayout s;
+    s.name = name;
+    s.body = h5::read_text(force, "body");
+    s.pressure_sign = static_cast<int>(one<std::int64_t>(force, "pressure_sign"));
+    s.every = static_cast<int>(one<std::int64_t>(force, "every"));
+    const auto copy = [&](const char* attribute, std::array<double, 3>& to) {
+      const std::vector<double> x = h5::read_numbers<double>(force, attribute);
+      if (x.size() != 3) throw IoError(path + ": attribute '" + attribute + "' is damaged");
+      std::copy(x.begin(), x.end(), to.begin());
+    };
+    const h5::Dims dims = h5::dimensions(force);
+    if (dims.size() == 5) {
+      s.rows = static_cast<int>(dims[2]);
+      s.cols = static_cast<int>(dims[3]);
+      s.points = s.rows * s.cols;
+      copy("corner0", s.corner0);
+      copy("corner1", s.corner1);
+      copy("axis0", s.axis0);
+      copy("axis1", s.axis1);
+    } else if (dims.size() == 4) {
+      s.points = static_cast<int>(dims[2]);
+      if (h5::has_link(group, "pixel")) read_image(group, s);
+    } else {
+      throw IoError(fmt::format("{}: sensor '{}' has {} dimensions; expected 4 or 5", path, name,
+                                dims.size()));
+    }
+    sensors.push_back(std::move(s));
+    frames.push_back(static_cast<std::int64_t>(dims[0]));
+  }
+
+  [[nodiscard]] h5::Id open(std::size_t sensor, const char* dataset) const {
+    return h5::open_dataset(h5::open_group(h5::open_group(file, "tactile"), sensors[sensor].name),
+                            dataset);
+  }
+};
+
+TrajectoryReader::TrajectoryReader(const std::string& path) : impl_(std::make_unique<Impl>(path)) {}
+TrajectoryReader::~TrajectoryReader() = default;
+TrajectoryReader::TrajectoryReader(TrajectoryReader&&) noexcept = default;
+
+const std::string& TrajectoryReader::path() const { return impl_->path; }
+const std::string& TrajectoryReader::scene_name() const { return impl_->scene_name; }
+std::int64_t TrajectoryReader::environments() const { return impl_->environments; }
+double TrajectoryReader::timestep() const { return impl_->timestep; }
+const std::vector<SensorLayout>& TrajectoryReader::sensors() const { return impl_->sensors; }
+
+std::size_t TrajectoryReader::find_sensor(const std::string& name) const {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < impl_->sensors.size(); ++i) {
+    names.push_back(impl_->sensors[i].name);
+    if (name.empty() || names.back() == name) return i;
+  }
+  if (names.empty()) throw InputError(impl_->path + ": the run had no tactile sensor");
+  throw InputError(impl_->path + ": no sensor is named '" + name + "'" + suggestion(name, names));
+}
+
+std::int64_t TrajectoryReader::frames(std::size_t sensor) const { return impl_->frames[sensor]; }
+
+std::int64_t TrajectoryReader::step(std::size_t sensor, std::int64_t frame) const {
+  std::int64_t value = 0;
+  h5::read_box<std::int64_t>(impl_->open(sensor, "step"), {static_cast<hsize_t>(frame)}, {1},
+                             &value);
+  return value;
+}
+
+std::vector<double> TrajectoryReader::force(std::size_t sensor, std::int64_t frame,
+                                            std::int64_t environment) const {
+  const SensorLayout& s = impl_->sensors[sensor];
+  std::vector<double> values(std::size_t(s.points) * 3);
+  h5::Dims offset = {static_cast<hsize_t>(frame), static_cast<hsize_t>(environment)},
+           count = {1, 1};
+  if (s.rectangular()) {
+    offset.insert(offset.end(), {0, 0, 0});
+    count.insert(count.end(), {static_cast<hsize_t>(s.rows), static_cast<hsize_t>(s.cols), 3});
+  } else {
+    offset.insert(offset.end(), {0, 0});
+    count.insert(count.end(), {static_cast<hsize_t>(s.points), 3});
+  }
+  h5::read_box<double>(impl_->open(sensor, "force"), offset, count, values.data());
+  return values;
+}
+
+}  // namespace tangere

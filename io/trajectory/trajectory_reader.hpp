@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reads trajectory files back: what a plot needs, one field at a time.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "io/trajectory/trajectory_layout.hpp"
+
+namespace tangere {
+
+class TrajectoryReader {
+ public:
+  /// Throws IoError for a file that is missing, damaged or not a trajectory.
+  explicit TrajectoryReader(const std::string& path);
+  ~TrajectoryReader();
+  TrajectoryReader(TrajectoryReader&&) noexcept;
+
+  [[nodiscard]] const std::string& path() const;
+  [[nodiscard]] const std::string& scene_name() const;
+  [[nodiscard]] std::int64_t environments() const;
+  [[nodiscard]] double timestep() const;  ///< [s]
+  [[nodiscard]] const std::vector<SensorLayout>& sensors() const;
+  /// Index of a sensor; "" is the first. Throws InputError naming those there are.
+  [[nodiscard]] std::size_t find_sensor(const std::string& name) const;
+  [[nodiscard]] std::int64_t frames(std::size_t sensor) const;
+  /// Row of /q that a frame was read from.
+  [[nodiscard]] std::int64_t step(std::size_t sensor, std::int64_t frame) const;
+  /// (points, 3) [N].
+  [[nodiscard]] std::vector<double> force(std::size_t sensor, std::int64_t frame,
+                                          std::int64_t environment) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tangere

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+// Force and derivative of one touching point, and their sums over a pair of bodies.
+//
+// Everything is in the axes of body 1, which carries the point ξ. G = (Q, c) is body 2's shape
+// frame there, W = (ω; v)
+// the twist of body 2 relative to body 1 at body 1's origin. d, n = distance and gradient at ξ; x₂
+// = ξ - d n is the nearest point on the touched surface, where velocities are compared and forces
+// act:
+//   u = -(v + ω × x₂)  velocity of body 1 relative to body 2 at x₂;  ḋ = n·u;  v_t = u - ḋ n;
+//       f on body 1.
+// Derivative with respect to ε = (θ; ρ), the displacement of body 2 relative to body 1, and to δW.
+// With ρ₂ = ρ + θ × x₂ the displacement of body 2's material at x₂, and H the Hessian of d:
+//   δd = -n·ρ₂,  δn = -H ρ₂ + (I - dH)(θ × n),  δx₂ = -δd n - d δn,  δu = -(δv + δω × x₂) - ω × δx₂
+//   δḋ = δn·u + n·δu,  δv_t = δu - δḋ n - ḋ δn,  δN = N_d δd + N_ḋ δḋ
+//   δf = δN n + N δn + δf_t,  δf_t = -s (δv_t - t (t·δv_t)) - μ t δB
+//       (t = 0 and no δB when sticking)
+// Wrench on body 1 about its origin: w₁ = Σ (x₂ × f; f),  δw₁ = K ε + D δW.
+#pragma once
+
+#include "kernels/contact/contact_law.hpp"
+#include "kernels/contact/distance.hpp"
+
+namespace tangere::kernels {
+
+/// What a point of body 1 meets on body 2, in body 1's axes.
+template <class N>
+struct PointContact {
+  N d, rate;  ///< d, ḋ
+  Vec3<N> n, x2, u, vt;
+  NormalForce<N> normal;
+  Friction<N> tangential;
+  Vec3<N> force;  ///< on body 1, acting at x2
+  N curvature;    ///< κ of H (Bending)
+  Vec3<N> axis;   ///< rods only: e z
+};
+
+/// Distance, velocities and force at ξ. `Q`, `c`: shape frame in body 1; `omega`, `v`: W.
+template <class Shape, class N>
+PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, const Mat3<N>& Q,
+                              const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
+                              const Vec3<N>& xi) {
+  PointContact<N> p;
+  const Vec3<N> arm = xi - c;
+  if constexpr (Shape::kBending == Bending::flat) {
+    const Distance<N> at = shape.evaluate(transposed_times(Q, arm), p.curvature);
+    p.d = at.d;
+    p.n = Q * at.n;
+  } else if constexpr (Shape::kBending == Bending::rod) {
+    N straight;
+    const Distance<N> at = shape.evaluate(transposed_times(Q, arm), p.curvature, straight);
+    p.d = at.d;
+    p.n = Q * at.n;
+    p.axis = straight * Vec3<N>{Q.m[0][2], Q.m[1][2], Q.m[2][2]};
+  } else {  // a sphere looks the same from every side
+    const Distance<N> at = shape.evaluate(arm, p.curvature);
+    p.d = at.d;
+    p.n = at.n;
+  }
+  p.x2 = xi - p.d * p.n;
+  p.u = -(v + cross(omega, p.x2));
+  p.rate = dot(p.n, p.u);
+  p.vt = p.u - p.rate * p.n;
+  p.normal = normal_force(law, p.d, p.rate);
+  p.tangential = friction(law, p.normal, p.vt);
+  const N touching = select(p.d < N(0.0), N(1.0), N(0.0));
+  p.force = touching * (p.normal.force * p.n - p.tangential.scale * p.vt);
+  return p;
+}
+
+/// Sums over the points of a pair, in body 1's axes about its origin: wrench, and 6×6 stiffness and
+/// damping in blocks {torque, force} × {angular, linear}.
+template <class N>
+struct PairSums {
+  Vec6<N> wrench;
+  Mat3<N> k[2][2];
+  Mat3<N> d[2][2];
+
+  static PairSums zero() {
+    PairSums s;
+    s.wrench = zero6<N>();
+    for (int i = 0; i < 2; ++i)
+      for (int j = 0; j < 2; ++j) s.k[i][j] = s.d[i][j] = zero33<N>();
+    return s;
+  }
+};
+
+/// Derivatives of the force: ∂f/∂u at fixed geometry, and ∂f, ∂x₂ by ρ₂ and θ.
+template <class N>
+struct PointDerivative {
+  Mat3<N> f_u, f_rho, f_theta, x_rho, x_theta;
+};
+
+template <class Shape, class N>
+PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact<N>& p,
+                                 const Vec3<N>& omega) {
+  PointDerivative<N> r;
+  const N one(1.0);
+  const Vec3<N>& n = p.n;
+  const Vec3<N>& t = p.tangential.direction;
+  const Mat3<N> nn = outer(n, n);
+  const Mat3<N> P = diagonal(one) - nn;
+  // δn = n_rho ρ₂ + n_theta θ; H = κ (P - e zzᵀ); n_theta = -(I - dH)[n], with P[n] = [n] and
+  // zzᵀ[n] = z (z × n)ᵀ.
+  constexpr bool kFlat = Shape::kBending == Bending::flat;
+  Mat3<N> n_rho = kFlat ? zero33<N>() : (-p.curvature) * P;
+  const N flatten = kFlat ? one : mul_sub_from(p.d, p.curvature, one);
+  Mat3<N> n_theta = skew(-(flatten * n));
+  if constexpr (Shape::kBending == Bending::rod) {
+    n_rho += outer(p.curvature * p.axis, p.axis);
+    n_theta = n_theta - outer((p.d * p.curvature) * p.axis, cross(p.axis, n));
+  }
+  // δx₂ = nnᵀ ρ₂ - d δn.
+  r.x_rho = kFlat ? nn : nn - p.d * n_rho;
+  r.x_theta = (-p.d) * n_theta;
+  // The force by δn and δu apart: δf = f_n δn + f_u δu + f_d δd.
+  //   δḋ = u·δn + n·δu;  δv_t = δu - n δḋ - ḋ δn
+  const N s = p.tangential.scale;
+  const Vec3<N> mt = (law.mu * p.tangential.slip) * t;
+  // ∂f/∂ḋ through N and B, and ∂f/∂v_t = -s (I - ttᵀ).
+  const Vec3<N> f_rate = p.normal.rate_slope * n - p.normal.bound_rate * mt;
+  const Vec3<N> f_depth = p.normal.d_slope * n - p.normal.bound_d * mt;
+  const Mat3<N> T = s * (diagonal(one) - outer(t, t));
+  const Vec3<N> g = f_rate + T * n;  // coefficient of δḋ
+  r.f_u = outer(g, n) - T;
+  const Mat3<N> f_n = diagonal(p.normal.force) + outer(g, p.u) + p.rate * T;
+  // δu = -ω × δx₂.
+  const Mat3<N> u_rho = cross_columns(-omega, r.x_rho);
+  const Mat3<N> u_theta = cross_columns(-omega, r.x_theta);
+  r.f_rho = r.f_u * u_rho - outer(f_depth, n);
+  if constexpr (!kFlat) r.f_rho += f_n * n_rho;
+  r.f_theta = r.f_u * u_theta + f_n * n_theta;
+  return r;
+}
+
+/// Adds one point. Points that do not touch (d ≥ 0) add exact zeros.
+template <bool Derivatives, class Shape, class N>
+void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& law,
+                const Mat3<N>& Q, const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
+                const Vec3<N>& xi) {
+  const PointContact<N> p = point_contact(shape, law, Q, c, omega, v, xi);
+  const auto touching = p.d < N(0.0);
+  if (!any(touching)) return;
+  sums.wrench.a += cross(p.x2, p.force);
+  sums.wrench.l += p.force;
+  if constexpr (Derivatives) {
+    PointDerivative<N> r = differentiate<Shape>(law, p, omega);
+    const N gate = select(touching, N(1.0), N(0.0));
+    r.f_u = gate * r.f_u;
+    r.f_rho = gate * r.f_rho;
+    r.f_theta = gate * r.f_theta;
+    // By ε = (θ; ρ): ρ₂ = ρ - [x₂]θ.  By δW = (δω; δv): δu = -(δv - [x₂]δω).
+    const Mat3<N> f_eps_a = r.f_theta - times_skew(r.f_rho, p.x2);
+    const Mat3<N> f_w_a = times_skew(r.f_u, p.x2);
+    const Mat3<N> x_eps_a = r.x_theta - times_skew(r.x_rho, p.x2);
+    sums.k[1][0] += f_eps_a;
+    sums.k[1][1] += r.f_rho;
+    // δ(x₂ × f) = x₂ × δf - f × δx₂.
+    sums.k[0][0] += cross_columns(p.x2, f_eps_a) - cross_columns(p.force, x_eps_a);
+    sums.k[0][1] += cross_columns(p.x2, r.f_rho) - cross_columns(p.force, r.x_rho);
+    sums.d[1][0] += f_w_a;
+    sums.d[1][1] = sums.d[1][1] - r.f_u;
+    sums.d[0][0] += cross_columns(p.x2, f_w_a);
+    sums.d[0][1] = sums.d[0][1] - cross_columns(p.x2, r.f_u);
+  }
+}
+
+/// The same sums for points or a sphere on the ground, with velocity and force at the body's own
+/// point ξ = ξ_c - r m (r = 0: a material point). m = Rᵀ n_ground, `height` = n·(p - ground point),
+/// V = body twist, all in body axes.
+///   δm = m × θ, δξ = -r m × θ, δd = m·(ρ + θ × ξ_c), u = v + ω × ξ, ḋ = m·u     (θ, ρ of the body
+///   itself)
+/// In the pair's convention body 2 is the ground: ε = -δ₁, δW = -δV₁, hence the signs of k and d.
+/// False where no lane touches.
+template <bool Derivatives, class N>
+bool accumulate_ground(PairSums<N>& sums, const LawParameters<N>& law, const Vec3<N>& m,
+                       const N& height, const Vec6<N>& V, const Vec3<N>& centre, const N& radius) {
+  const N d = dot(m, centre) + height - radius;
+  const auto touching = d < N(0.0);
+  if (!any(touching)) return false;
+  const Vec3<N> xi = centre - radius * m;
+  const Vec3<N> u = V.l + cross(V.a, xi);
+  const N rate = dot(m, u);
+  const Vec3<N> vt = u - rate * m;
+  const NormalForce<N> normal = normal_force(law, d, rate);
+  const Friction<N> tangential = friction(law, normal, vt);
+  const N gate = select(touching, N(1.0), N(0.0));
+  const Vec3<N> f = gate * (normal.force * m - tangential.scale * vt);
+  sums.wrench.a += cross(xi, f);
+  sums.wrench.l += f;
+  if constexpr (Derivatives) {
+    const Vec3<N>& t = tangential.direction;
+    const Vec3<N> mt = (law.mu * tangential.slip) * t;
+    const Vec3<N> f_rate = normal.rate_slope * m - normal.bound_rate * mt;
+    const Vec3<N> f_depth = normal.d_slope * m - normal.bound_d * mt;
+    const Mat3<N> T = tangential.scale * (diagonal(N(1.0)) - outer(t, t));
+    const Vec3<N> g = f_rate + T * m;
+    const Mat3<N> f_u = gate * (outer(g, m) - T);
+    const Mat3<N> f_m = gate * (diagonal(normal.force) + outer(g, u) + rate * T);
+    const Mat3<N> f_d = gate * outer(f_depth, m);  // by ρ; by θ: -f_d [ξ_c]
+    const Mat3<N> m_theta = skew(m);
+    const Mat3<N> xi_theta = (-radius) * m_theta;
+    const Mat3<N> u_theta = cross_columns(V.a, xi_theta);
+    const Mat3<N> f_theta = f_u * u_theta + f_m * m_theta - times_skew(f_d, centre);
+    const Mat3<N> f_omega = times_skew(f_u, xi);  // f_u δω × ξ = -f_u [ξ] δω
+    sums.k[1][0] = sums.k[1][0] - f_theta;
+    sums.k[1][1] = sums.k[1][1] - f_d;
+    sums.k[0][0] = sums.k[0][0] - (cross_columns(xi, f_theta) - cross_columns(f, xi_theta));
+    sums.k[0][1] = sums.k[0][1] - cross_columns(xi, f_d);
+    sums.d[1][0] += f_omega;
+    sums.d[1][1] = sums.d[1][1] - f_u;
+    sums.d[0][0] += cross_columns(xi, f_omega);
+    sums.d[0][1] = sums.d[0][1] - cross_columns(xi, f_u);
+  }
+  return true;
+}
+
+}  // namespace tangere::kernels

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// A few contact points on their way through the law and into the sums of their pair.
+//
+// A family of shapes brings a Motion (numbers only, the same for all points), its Point, Pass and
+// Sums, and
+//   find_distance(motion, ξ, point, pass)    distance and normal; returns where the point touches
+//   find_slide(motion, point, pass)          velocities
+//   find_force<Derivatives>(…)
+//       force and what its derivative needs; returns where the point slips
+//   add_chunk<Derivatives>(sums, chunk)      the chunk's points in order
+// Families: kernels/contact/sphere_contact.hpp, kernels/contact/face_contact.hpp.
+#pragma once
+
+#include <utility>
+
+#include "kernels/contact/contact_law.hpp"
+
+namespace tangere::kernels {
+
+template <class P>
+struct PointChunk {
+  using N = typename P::Number;
+  using Mask = decltype(std::declval<N>() < std::declval<N>());
+  static constexpr int kPoints =
+      sizeof(N) == sizeof(double) ? 8 : 4;  // of lanes, what the first-level cache holds
+  P point[kPoints];
+  Mask touch[kPoints], slip[kPoints];        ///< lane by lane, where some lane touches
+  int touching[kPoints], slipping[kPoints];  ///< which touch, and which of them slip, in some lane
+  int count = 0, slips = 0;
+};
+
+/// Takes `count` ≤ kPoints points through the law. Each pass waits for one root, so that roots of
+/// different points overlap.
+template <bool Derivatives, class Motion, class N>
+void fill_chunk(const Motion& z, const LawParameters<N>& law, const Vec3<N>* xi, int count,
+                PointChunk<typename Motion::Point>& chunk) {
+  typename Motion::Pass pass[PointChunk<typename Motion::Point>::kPoints];
+  chunk.count = chunk.slips = 0;
+  for (int i = 0; i < count; ++i) {
+    chunk.touch[i] = find_distance(z, xi[i], chunk.point[i], pass[i]);
+    if (any(chunk.touch[i])) chunk.touching[chunk.count++] = i;
+  }
+  for (int c = 0; c < chunk.count; ++c)
+    find_slide(z, chunk.point[chunk.touching[c]], pass[chunk.touching[c]]);
+  for (int c = 0; c < chunk.count; ++c) {
+    const int i = chunk.touching[c];
+    chunk.slip[i] = find_force<Derivatives>(z, law, pass[i], chunk.point[i]);
+    if (any(chunk.slip[i])) chunk.slipping[chunk.slips++] = i;
+  }
+}
+
+// The sums below live in registers, which GCC's own limits on inlining would make a matter of
+// chance.
+template <class N>
+[[gnu::always_inline]] inline void add_outer(Mat3<N>& sum, const Vec3<N>& a, const Vec3<N>& b) {
+  const N x[3] = {a.x, a.y, a.z}, y[3] = {b.x, b.y, b.z};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) sum.m[i][j] = mul_add(x[i], y[j], sum.m[i][j]);
+}
+
+/// A symmetric matrix: xx, xy, xz, yy, yz, zz.
+template <class N>
+struct UpperTriangle {
+  N m[6];
+};
+/// a bᵀ, known to be symmetric.
+template <class N>
+[[gnu::always_inline]] inline void add_upper(UpperTriangle<N>& sum, const Vec3<N>& a,
+                                             const Vec3<N>& b) {
+  sum.m[0] = mul_add(a.x, b.x, sum.m[0]);
+  sum.m[1] = mul_add(a.x, b.y, sum.m[1]);
+  sum.m[2] = mul_add(a.x, b.z, sum.m[2]);
+  sum.m[3] = mul_add(a.y, b.y, sum.m[3]);
+  sum.m[4] = mul_add(a.y, b.z, sum.m[4]);
+  sum.m[5] = mul_add(a.z, b.z, sum.m[5]);
+}
+template <class N>
+Mat3<N> full(const UpperTriangle<N>& s) {
+  return {{{s.m[0], s.m[1], s.m[2]}, {s.m[1], s.m[3], s.m[4]}, {s.m[2], s.m[4], s.m[5]}}};
+}
+
+/// Adds points one after the other to a few sums, which stay in registers: f(sum, point).
+template <class Sum, class P, class F>
+[[gnu::always_inline]] inline void add_each(Sum& sum, const P* point, const int* which, int count,
+                                            const F& f) {
+  Sum local = sum;
+  for (int i = 0; i < count; ++i) f(local, point[which[i]]);
+  sum = local;
+}
+
+}  // namespace tangere::kernels

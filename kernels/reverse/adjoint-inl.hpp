@@ -1,0 +1,275 @@
+// SPDX-License-Identifier: Apache-2.0
+// The reverse sweep through one solved stage, after residual<true>() and jacobian() at its accepted
+// x (docs/gradients.md).
+//
+//   Aᵀ λ = Jᵀ q̄ + V_xᵀ v̄;   ν = v̄ - Cᵀ λ,  C = G_v + (c₀/h) M;
+//       then the history takes (∂v/∂q_k)ᵀ ν and -(∂a/∂v_k)ᵀ M λ
+//
+// Products with Cᵀ and M need no matrix. φ = λᵀ g is the power of all wrenches along the twists Λ =
+// X Λ_p + S λ:
+//   φ = Σ Λᵀ (I A + V ×* I V) + Σ_pairs Yᵀ w₁ - λᵀ τ …,   Y = Ad Λ₂ - Λ₁
+// and one inward sweep of Ā = I Λ, V̄ = -Λ ×* I V - I (V × Λ) + contacts gives all its derivatives
+// by v at fixed q:
+//   V̄ += (S q̇) ×* Ā;   (M λ)_i = Sᵀ Ā;   (Cᵀ λ)_i = Sᵀ (V̄ - V ×* Ā) + (c₀/h) Sᵀ Ā;
+//       Ā_p += X* Ā, V̄_p += X* V̄
+#pragma once
+
+#include "kernels/step/arguments.hpp"
+#include "kernels/step/inertial_jacobian-inl.hpp"
+
+namespace tangere::kernels {
+
+/// What the sweeps pass on per link, in its axes.
+template <class N>
+struct LinkAdjoint {
+  Vec6<N> twist;  ///< Λ
+  Vec6<N> rate;   ///< S q̇
+  Vec6<N> by_v;   ///< V̄
+  Vec6<N> by_a;   ///< Ā
+};
+
+template <class N>
+struct AdjointArgs {
+  const N *q_bar, *v_bar;  ///< (nv) cotangents of the stage's result, q by its right tangent
+  N* rhs;                  ///< (nv) out: Jᵀ q̄ + V_xᵀ v̄
+  const N* lambda;         ///< (nv) the solution
+  N *nu, *mass_lambda;     ///< (nv) out: ν, M λ
+  N* target;  ///< (nv) out: cotangent of the targets of position motors, zero where there are none
+  const N* other;          ///< (nv) q_other ⊖ q_centre
+  N *q_centre, *v_centre;  ///< (nv) added to
+  N *q_other, *v_other;    ///< (nv) added to; not read where ρ and s_other are zero
+  StageHistory history;
+  LinkAdjoint<N>* links;  ///< (n_links) scratch
+};
+
+/// Jᵀ q̄ + V_xᵀ v̄.
+template <class N>
+void adjoint_rhs(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
+  for (int i = 0; i < model.n_links; ++i) {
+    const Link& link = model.links[i];
+    const LinkScratch<N>& o = a.links[i];
+    for (int k = link.v; k < link.v + dofs(link.kind); ++k) {
+      if (link.kind != JointKind::spherical) {
+        d.rhs[k] = mul_add(a.c0_over_h, d.v_bar[k], d.q_bar[k]);
+        continue;
+      }
+      N sum(0.0);
+      for (int j = 0; j < 3; ++j) {
+        sum = mul_add(o.chart.m[j][k - link.v], d.q_bar[link.v + j], sum);
+        sum = mul_add(o.chart_rate.m[j][k - link.v], d.v_bar[link.v + j], sum);
+      }
+      d.rhs[k] = sum;
+    }
+  }
+}
+
+/// S x for one joint.
+template <JointKind K, class N>
+Vec6<N> along_joint(const Link& link, const N* x) {
+  Vec3<N> sum = x[link.v] * joint_axis<K, N>(link, 0);
+  if constexpr (dofs(K) == 3) sum = {x[link.v], x[link.v + 1], x[link.v + 2]};
+  return slides(K) ? Vec6<N>{zero3<N>(), sum} : Vec6<N>{sum, zero3<N>()};
+}
+
+/// Λ, and what inertia gives to Ā and V̄.
+template <class N>
+void adjoint_outward(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
+  for (int i = 0; i < model.n_links; ++i) {
+    const Link& link = model.links[i];
+    const LinkScratch<N>& s = a.links[i];
+    LinkAdjoint<N>& o = d.links[i];
+    with_kind(link.kind, [&]<JointKind K>() {
+      o.twist = along_joint<K>(link, d.lambda);
+      o.rate = along_joint<K>(link, a.v);
+    });
+    if (link.parent >= 0) o.twist += motion_to_child(link, s.local, d.links[link.parent].twist);
+    o.by_v = o.by_a = zero6<N>();
+    if (!link.massive) continue;
+    const LinkInertia<N> own = load_inertia<N>(link, a.block, a.group);
+    if (link.still) {
+      o.by_a.l = own.mass * o.twist.l;
+      continue;
+    }
+    const auto times = [&](const Vec6<N>& x) {
+      return inertia_times(own.mass, own.moment, own.inertia, x);
+    };
+    o.by_a = times(o.twist);
+    o.by_v = -(cross_wrench(o.twist, times(s.V)) + times(cross_motion(s.V, o.twist)));
+  }
+}
+
+/// 𝐃ᵀ Y.
+template <class N>
+Vec6<N> transposed_damping(const PairSums<N>& s, const Vec6<N>& y) {
+  return {transposed_times(s.d[0][0], y.a) + transposed_times(s.d[1][0], y.l),
+          transposed_times(s.d[0][1], y.a) + transposed_times(s.d[1][1], y.l)};
+}
+
+/// Y of a pair of links: the rate at which body 2 moves against body 1 along λ, in body 1's axes at
+/// its origin.
+template <class N>
+Vec6<N> adjoint_slip(const LinkPair& pair, const ContactScratch<N>& o,
+                     const LinkAdjoint<N>* links) {
+  Vec6<N> y = pair.link2 < 0 ? zero6<N>() : motion_to_parent(o.link2_in_1, links[pair.link2].twist);
+  if (pair.link1 >= 0) y -= links[pair.link1].twist;
+  return y;
+}
+
+/// What contacts give to V̄: w₁ depends on W = Ad V₂ - V₁.
+template <class N>
+void adjoint_contacts(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
+  for (int k = 0; k < model.n_link_pairs; ++k) {
+    const LinkPair& pair = model.link_pairs[k];
+    const ContactScratch<N>& o = a.contacts[k];
+    if (!o.near) continue;
+    const Vec6<N> w = transposed_damping(o.sums, adjoint_slip(pair, o, d.links));
+    if (pair.link1 >= 0) d.links[pair.link1].by_v -= w;
+    if (pair.link2 >= 0) d.links[pair.link2].by_v += wrench_to_child(o.link2_in_1, w);
+  }
+  for (int k = 0; k < model.n_grounded; ++k) {
+    const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
+    if (!o.near) continue;
+    LinkAdjoint<N>& link = d.links[model.grounded[k].link];
+    link.by_v += transposed_damping(o.sums, link.twist);
+  }
+}
+
+/// Cotangents of the targets of one joint's motors: (∂force/∂u)ᵀ λ.
+template <JointKind K, class N>
+void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& link,
+                     const N* lambda, N* target) {
+  const DofEffects* e = model.effects + link.v;
+  const N *c = a.centre + link.q, *x = a.x + link.v, *u = a.target + link.v, *v = a.v + link.v;
+  N pull[3];
+  const auto pulled = [&](int k, const N& error) {
+    const N P = load_parameter(a, e[k].P);
+    N inside;
+    motor_force(e[k], P, load_parameter(a, e[k].D), error, v[k], inside);
+    pull[k] = inside * P * lambda[link.v + k];
+  };
+  if constexpr (K != JointKind::spherical) {
+    for (int k = 0; k < dofs(K); ++k) {
+      pulled(k, u[k] - (c[k] + x[k]));
+      target[link.v + k] = pull[k];
+    }
+  } else {  // ψ = log(q⁻¹ exp u): δψ = J_r⁻¹(ψ) J_r(u) δu
+    const Quat<N> q = Quat<N>{c[0], c[1], c[2], c[3]} * quaternion_exp(Vec3<N>{x[0], x[1], x[2]});
+    const Vec3<N> goal = {u[0], u[1], u[2]};
+    const RotationVector<N> error = rotation_vector<false>(conjugate(q) * quaternion_exp(goal));
+    pulled(0, error.phi.x), pulled(1, error.phi.y), pulled(2, error.phi.z);
+    const Vec3<N> by_psi =
+        transposed_times(inverse_right_jacobian(error), Vec3<N>{pull[0], pull[1], pull[2]});
+    const Vec3<N> by_u = transposed_times(right_jacobian(goal, rotation_series(goal)), by_psi);
+    target[link.v] = by_u.x, target[link.v + 1] = by_u.y, target[link.v + 2] = by_u.z;
+  }
+}
+
+/// What acts on the dofs of one joint, on top of the sweep's Cᵀ λ and M λ.
+template <JointKind K, class N>
+void adjoint_effects(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
+                     const Link& link, N* by_v) {
+  if (link.effects & kDamped)
+    for (int k = 0; k < dofs(K); ++k)
+      by_v[k] = mul_add(load_parameter(a, model.effects[link.v + k].damping), d.lambda[link.v + k],
+                        by_v[k]);
+  if (!(link.effects & kBeyondDamping)) return;
+  JointLoad<N> load;
+  joint_load<K, true>(model, a, link, load);
+  for (int k = 0; k < dofs(K); ++k) {
+    const N& lambda = d.lambda[link.v + k];
+    by_v[k] = mul_add(load.by_v[k], lambda, by_v[k]);
+    d.mass_lambda[link.v + k] = mul_add(load.armature[k], lambda, d.mass_lambda[link.v + k]);
+  }
+  if (link.effects & kDriven) adjoint_targets<K>(model, a, link, d.lambda, d.target);
+}
+
+/// M λ, ν and the targets, leaves first.
+template <class N>
+void adjoint_inward(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
+  for (int i = 0; i < model.nv; ++i) d.target[i] = N(0.0);
+  for (int i = model.n_links - 1; i >= 0; --i) {
+    const Link& link = model.links[i];
+    const LinkScratch<N>& s = a.links[i];
+    LinkAdjoint<N>& o = d.links[i];
+    Vec6<N> projected = o.by_v;
+    if (!link.still) {
+      o.by_v += cross_wrench(o.rate, o.by_a);
+      projected = o.by_v - cross_wrench(s.V, o.by_a);
+    }
+    with_kind(link.kind, [&]<JointKind K>() {
+      N by_v[3];
+      for (int k = 0; k < dofs(K); ++k) {
+        const N mass = project<K>(link, k, o.by_a);
+        d.mass_lambda[link.v + k] = mass;
+        by_v[k] = mul_add(a.c0_over_h, mass, project<K>(link, k, projected));
+      }
+      adjoint_effects<K>(model, a, d, link, by_v);
+      for (int k = 0; k < dofs(K); ++k) d.nu[link.v + k] = d.v_bar[link.v + k] - by_v[k];
+    });
+    if (link.parent < 0) continue;
+    LinkAdjoint<N>& parent = d.links[link.parent];
+    parent.by_v += wrench_to_parent(link, s.local, o.by_v);
+    parent.by_a += wrench_to_parent(link, s.local, o.by_a);
+  }
+}
+
+template <class N>
+void add3(N* to, const Vec3<N>& x) {
+  to[0] += x.x, to[1] += x.y, to[2] += x.z;
+}
+/// Rotation vector x, |x| < π, with what its inverse Jacobians need.
+template <class N>
+RotationVector<N> with_inverse_jacobians(const N* x) {
+  RotationVector<N> r = rotation_vector<false>(quaternion_exp(Vec3<N>{x[0], x[1], x[2]}));
+  r.phi = {x[0], x[1], x[2]};
+  return r;
+}
+
+/// ∂v/∂q_k at a fixed newest pose: by the centre -V_x J_l⁻¹(x) - (ρ/h) J_r(x) J_l⁻¹(y), by the
+/// other (ρ/h) J_r(x) J_r⁻¹(y), y = q_other ⊖ q_centre.
+template <class N>
+void adjoint_turning_history(const StageArgs<N>& a, const AdjointArgs<N>& d, const Link& link,
+                             const LinkScratch<N>& o, const N& rho_over_h) {
+  const int v = link.v;
+  const Vec3<N> nu = {d.nu[v], d.nu[v + 1], d.nu[v + 2]};
+  const RotationVector<N> x = with_inverse_jacobians(a.x + v);
+  add3(d.q_centre + v, -(inverse_right_jacobian(x) * transposed_times(o.chart_rate, nu)));
+  if (d.history.rho == 0) return;
+  const RotationVector<N> y = with_inverse_jacobians(d.other + v);
+  const Vec3<N> z = rho_over_h * transposed_times(o.chart, nu);
+  add3(d.q_centre + v, -(inverse_right_jacobian(y) * z));
+  add3(d.q_other + v, inverse_left_jacobian(y) * z);
+}
+
+/// Hands ν and M λ on to the states that the stage hangs on.
+template <class N>
+void adjoint_history(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
+  const StageHistory& h = d.history;
+  const N rho_over_h = N(h.rho) * a.inverse_h;
+  const N from_centre = -(a.c0_over_h + rho_over_h);
+  const N by_centre = N(-h.s_centre) * a.inverse_h, by_other = N(-h.s_other) * a.inverse_h;
+  for (int i = 0; i < model.n_links; ++i) {
+    const Link& link = model.links[i];
+    const bool turning = link.kind == JointKind::spherical;
+    if (turning) adjoint_turning_history(a, d, link, a.links[i], rho_over_h);
+    for (int k = link.v; k < link.v + dofs(link.kind); ++k) {
+      if (!turning) d.q_centre[k] = mul_add(from_centre, d.nu[k], d.q_centre[k]);
+      if (!turning && h.rho != 0) d.q_other[k] = mul_add(rho_over_h, d.nu[k], d.q_other[k]);
+      d.v_centre[k] = mul_add(by_centre, d.mass_lambda[k], d.v_centre[k]);
+      if (h.s_other != 0) d.v_other[k] = mul_add(by_other, d.mass_lambda[k], d.v_other[k]);
+    }
+  }
+}
+
+/// ν, M λ, the motors' targets, and the history, from λ.
+template <class N>
+void adjoint_products(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
+  adjoint_outward(model, a, d);
+  adjoint_contacts(model, a, d);
+  adjoint_inward(model, a, d);
+  without_negative_zeros(d.nu, model.nv);
+  without_negative_zeros(d.mass_lambda, model.nv);
+  adjoint_history(model, a, d);
+}
+
+}  // namespace tangere::kernels

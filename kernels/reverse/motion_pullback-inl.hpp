@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cotangents of link poses and twists to those of q and v (docs/gradients.md).
+//
+// A link's displacement δ (right, body axes) and twist V hang on joint i above it by ∂δ/∂q_i = X
+// S_i, ∂V/∂q_i = X Ψ̇_i,
+// ∂V/∂v_i = X S_i, Ψ̇ = V_p × S. So δ̄ and V̄ travel up the tree as wrenches, and
+//   q̄_i = Sᵀ δ̄ + Ψ̇ᵀ V̄ = Sᵀ (δ̄ - V_p ×* V̄);   v̄_i = Sᵀ V̄
+#pragma once
+
+#include "kernels/step/link_poses-inl.hpp"
+
+namespace tangere::kernels {
+
+/// What one link keeps between the sweeps.
+template <class N>
+struct LinkMotion {
+  Frame<N> local;
+  Vec6<N> Vp, V;
+};
+
+/// Adds to q̄ and v̄ (nv). `links` (n_links) is used up; `scratch` (n_links). The state is that of
+/// link_poses().
+template <class N>
+void pull_back_links(const ModelView& model, const StageArgs<N>& a, LinkMotion<N>* scratch,
+                     MotionCotangent<N>* links, N* q_bar, N* v_bar) {
+  for (int i = 0; i < model.n_links; ++i) {
+    const Link& link = model.links[i];
+    LinkScratch<N> one;
+    Vec6<N> rate, unused;
+    joint_motion(link, a, one, rate, unused);
+    LinkMotion<N>& o = scratch[i];
+    o.local = one.local;
+    o.Vp = link.parent < 0 ? zero6<N>() : motion_to_child(link, o.local, scratch[link.parent].V);
+    o.V = o.Vp + rate;
+  }
+  for (int i = model.n_links - 1; i >= 0; --i) {
+    const Link& link = model.links[i];
+    const LinkMotion<N>& o = scratch[i];
+    const MotionCotangent<N>& c = links[i];
+    const Vec6<N> by_q = c.pose - cross_wrench(o.Vp, c.twist);
+    with_kind(link.kind, [&]<JointKind K>() {
+      for (int k = 0; k < dofs(K); ++k) {
+        q_bar[link.v + k] += project<K>(link, k, by_q);
+        v_bar[link.v + k] += project<K>(link, k, c.twist);
+      }
+    });
+    if (link.parent < 0) continue;
+    links[link.parent].pose += wrench_to_parent(link, o.local, c.pose);
+    links[link.parent].twist += wrench_to_parent(link, o.local, c.twist);
+  }
+}
+
+}  // namespace tangere::kernels

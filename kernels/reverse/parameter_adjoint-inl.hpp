@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+// -(∂g/∂p)ᵀ λ for the numbers of a scene, after adjoint_products(): φ = λᵀ g is linear in masses,
+// dampings, stiffnesses and gains, and what a contact's coefficients do to its points' forces is
+// weighed by Y, the slip along λ:
+//   ∂φ/∂p = Σ (Y_l + Y_a × x₂)·∂f/∂p
+//       ∂φ/∂(m, c, J) of Λᵀ I X = Λ_a·(J α + c × a) + Λ_l·(m a - c × α), X = (α; a)
+// with X = A, and with X = V and -V × Λ in place of Λ. Sizes act through d and n where a body is
+// touched, and through the
+// places ξ of its own points, which move with its surface: with ξ̄, ρ̄ from f̄ = Y_l + Y_a × x₂ and
+// x̄ = f × Y_a (kernels/reverse/point_pullback.hpp), a size's share is that of ρ̄ (kernels/contact/distance.hpp)
+// and Σ ξ̄·∂ξ/∂size.
+#pragma once
+
+#include "kernels/reverse/adjoint-inl.hpp"
+#include "kernels/reverse/point_pullback.hpp"
+
+namespace tangere::kernels {
+
+template <class N>
+void subtract_law(const LawCotangent<N>& c, N* out) {
+  out[0] -= c.kn, out[1] -= c.kt, out[2] -= c.mu, out[3] -= c.damping;
+}
+
+/// Of one pair or ground contact: what its points add up to.
+template <class N>
+struct ContactCotangent {
+  LawCotangent<N> law;
+  Vec3<N> size, stretch;  ///< of the touched shape; of the body whose points touch
+};
+template <class N>
+ContactCotangent<N> zero_contact() {
+  return {{N(0.0), N(0.0), N(0.0), N(0.0)}, zero3<N>(), zero3<N>()};
+}
+
+/// Σ ξ̄·∂ξ/∂size for a point of a body at ξ, link axes: points keep their place on a cuboid's grid,
+/// a rod's rings and poles.
+template <class N>
+Vec3<N> stretch_share(const Solid& body, const Vec3<N>& xi, const Vec3<N>& xi_bar) {
+  if (!body.stretches) return zero3<N>();
+  const Mat3<N> R = broadcast<N>(body.frame.R);
+  const Vec3<N> y = transposed_times(R, xi - broadcast<N>(body.frame.p)),
+                bar = transposed_times(R, xi_bar);
+  const Vec3<double>& s = body.size;
+  if (body.shape == PrimitiveShape::cuboid)
+    return {bar.x * y.x * N(1 / s.x), bar.y * y.y * N(1 / s.y), bar.z * y.z * N(1 / s.z)};
+  const N on_axis = body.shape == PrimitiveShape::capsule ? max(min(y.z, N(s.y)), N(-s.y)) : y.z;
+  const N around = mul_add(bar.x, y.x, bar.y * y.y);
+  return {mul_add(bar.z, y.z - on_axis, around) * N(1 / s.x), bar.z * on_axis * N(1 / s.y), N(0.0)};
+}
+
+/// One point of a pair; `slip`: Y. Nothing where it does not touch.
+template <class Shape, class N>
+void add_point(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
+               const LawParameters<N>& law, const Solid& body, const Vec6<N>& slip,
+               const Vec3<N>& xi, ContactCotangent<N>& sum) {
+  const PointContact<N> p = point_contact(shape, law, at.R, at.p, W.a, W.l, xi);
+  const auto touching = p.d < N(0.0);
+  if (!any(touching)) return;
+  const N gate = select(touching, N(1.0), N(0.0));
+  const Vec3<N> f_bar = gate * (slip.l + cross(slip.a, p.x2));
+  pull_back_law(law, p, f_bar, sum.law);
+  TouchCotangent<N> unused;
+  unused.twist = unused.displacement = zero6<N>();
+  const PlaceCotangent<N> of_force = pull_back_motion<Shape>(law, p, W.a, f_bar, unused);
+  const PlaceCotangent<N> of_arm = pull_back_place<Shape>(p, cross(p.force, slip.a));
+  const Vec3<N> rho = of_force.rho + of_arm.rho;
+  sum.size += pull_back_size(shape, p, at.R, at.p, xi, rho);
+  sum.stretch += gate * stretch_share(body, xi, of_force.x + of_arm.x - rho);
+}
+
+template <class Shape, class N>
+void pair_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
+                  const LawParameters<N>& law, const Solid& body, const CandidateList<N>& list,
+                  int lone, const Vec6<N>& slip, ContactCotangent<N>& sum) {
+  const auto add = [&](const Vec3<N>& xi) { add_point(shape, at, W, law, body, slip, xi, sum); };
+  if (lone < 0) {
+    for (int k = 0; k < list.count; ++k)
+      add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
+  } else {
+    const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
+    for (int k = 0; k < list.own_count; ++k) add({N(x[k]), N(y[k]), N(z[k])});
+  }
+}
+
+/// Where contacts add what they find.
+template <class N>
+struct ContactRows {
+  N* law;   ///< (n_pairs + n_grounds, kContactNumbers)
+  N* size;  ///< (n_solids, kSizeNumbers)
+};
+template <class N>
+void subtract(const Vec3<N>& sum, N* out) {
+  out[0] -= sum.x, out[1] -= sum.y, out[2] -= sum.z;
+}
+
+/// Coefficients and sizes of every shape of two links.
+template <class N>
+void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const LinkPair& links,
+                          const ContactScratch<N>& o, const LinkAdjoint<N>* adjoint,
+                          const ContactRows<N>& out) {
+  const Vec6<N> slip = adjoint_slip(links, o, adjoint);
+  for (int m = links.first; m < links.first + links.count; ++m) {
+    const int k = model.pair_order[m];
+    const PairContact& pair = model.pairs[k];
+    const LawParameters<N> law =
+        load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
+    const Frame<N> at = compose(o.link2_in_1, broadcast<N>(pair.frame2));
+    ContactCotangent<N> sum = zero_contact<N>();
+    const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
+    with_distance<N>(pair.shape, size, [&]<class Shape>(const Shape& shape) {
+      pair_adjoint(shape, at, o.W, law, model.solids[pair.body1], a.candidates[k], a.lone, slip,
+                   sum);
+    });
+    subtract_law(sum.law, out.law + kContactNumbers * k);
+    subtract(sum.size, out.size + kSizeNumbers * pair.body2);
+    subtract(sum.stretch, out.size + kSizeNumbers * pair.body1);
+  }
+}
+
+/// Of one body against the ground: Y = -Λ. Forces act at ξ = ξ_c - r m itself, ξ_c a point of the
+/// body or a ball's centre.
+template <class N>
+ContactCotangent<N> ground_adjoint(const ModelView& model, const StageArgs<N>& a,
+                                   const GroundContact& ground, const Vec6<N>& twist) {
+  const LinkScratch<N>& link = a.links[ground.link];
+  const Vec3<N> normal = broadcast<N>(model.ground_normal);
+  const Vec3<N> m = transposed_times(link.world.R, normal);
+  const N height = dot(normal, link.world.p - broadcast<N>(model.ground_point));
+  const LawParameters<N> law =
+      load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
+  const N radius = ground_radius<N>(ground, a.block, a.group);
+  const bool ball = ground.radius > 0;
+  ContactCotangent<N> sum = zero_contact<N>();
+  for (int i = 0; i < ground.n_points; ++i) {
+    const Vec3<N> centre = ground_point<N>(ground, i), xi = centre - radius * m;
+    PointContact<N> p;
+    p.d = dot(m, centre) + height - radius;
+    const auto touching = p.d < N(0.0);
+    if (!any(touching)) continue;
+    const N gate = select(touching, N(1.0), N(0.0));
+    p.n = m;
+    p.u = link.V.l + cross(link.V.a, xi);
+    p.rate = dot(m, p.u);
+    p.vt = p.u - p.rate * m;
+    p.normal = normal_force(law, p.d, p.rate);
+    p.tangential = friction(law, p.normal, p.vt);
+    const Vec3<N> f_bar = (-gate) * (twist.l + cross(twist.a, xi));
+    pull_back_law(law, p, f_bar, sum.law);
+    const ForceCotangent<N> bar = pull_back_force(law, p, f_bar);
+    const Vec3<N> force = gate * (p.normal.force * m - p.tangential.scale * p.vt);
+    const Vec3<N> xi_bar = cross(bar.u, link.V.a) - cross(force, twist.a);
+    if (ball) {
+      sum.size.x -= dot(m, xi_bar) + bar.d;
+    } else {
+      sum.stretch += stretch_share(model.solids[ground.body], centre, xi_bar + bar.d * m);
+    }
+  }
+  return sum;
+}
+
+/// Of every pair and ground contact.
+template <class N>
+void contact_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
+                        const ContactRows<N>& out) {
+  for (int k = 0; k < model.n_link_pairs; ++k)
+    if (a.contacts[k].near)
+      link_pair_parameters(model, a, model.link_pairs[k], a.contacts[k], links, out);
+  for (int k = 0; k < model.n_grounded; ++k) {
+    const GroundedLink& grounded = model.grounded[k];
+    if (!a.contacts[model.n_link_pairs + k].near) continue;
+    for (int m = grounded.first; m < grounded.first + grounded.count; ++m) {
+      const int g = model.ground_order[m];
+      const ContactCotangent<N> sum =
+          ground_adjoint(model, a, model.grounds[g], links[grounded.link].twist);
+      subtract_law(sum.law, out.law + kContactNumbers * (model.n_pairs + g));
+      subtract(sum.size + sum.stretch, out.size + kSizeNumbers * model.grounds[g].body);
+    }
+  }
+}
+
+/// Adds ∂(Λᵀ I X) by (m, c, J), times -1; J as xx xy xz yy yz zz.
+template <class N>
+void subtract_inertia(const Vec6<N>& twist, const Vec6<N>& x, N* out) {
+  out[0] -= dot(twist.l, x.l);
+  const Vec3<N> c = cross(x.l, twist.a) - cross(x.a, twist.l);
+  out[1] -= c.x, out[2] -= c.y, out[3] -= c.z;
+  const Vec3<N>&t = twist.a, &w = x.a;
+  out[4] -= t.x * w.x;
+  out[5] -= mul_add(t.x, w.y, t.y * w.x);
+  out[6] -= mul_add(t.x, w.z, t.z * w.x);
+  out[7] -= t.y * w.y;
+  out[8] -= mul_add(t.y, w.z, t.z * w.y);
+  out[9] -= t.z * w.z;
+}
+
+/// Mass, moment and inertia of every link, ten each.
+template <class N>
+void inertia_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
+                        N* out) {
+  for (int i = 0; i < model.n_links; ++i, out += kInertiaNumbers) {
+    const LinkScratch<N>& s = a.links[i];
+    if (model.links[i].still) {
+      out[0] -= dot(links[i].twist.l, s.A.l);
+      continue;
+    }
+    subtract_inertia(links[i].twist, s.A, out);
+    subtract_inertia(-cross_motion(s.V, links[i].twist), s.V, out);
+  }
+}
+
+/// Damping, stiffness, P and D of a joint's dofs; a ball joint has one stiffness, that of its first
+/// dof.
+template <JointKind K, class N>
+void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link& link,
+                      const N* lambda, N* out) {
+  const DofEffects* e = model.effects + link.v;
+  const N *c = a.centre + link.q, *x = a.x + link.v, *u = a.target + link.v;
+  const auto motor = [&](int k, const N& error) {
+    N inside;
+    const N& v = a.v[link.v + k];
+    motor_force(e[k], load_parameter(a, e[k].P), load_parameter(a, e[k].D), error, v, inside);
+    out[kDofNumbers * k + 2] += inside * lambda[link.v + k] * error;
+    out[kDofNumbers * k + 3] -= inside * lambda[link.v + k] * v;
+  };
+  for (int k = 0; k < dofs(K); ++k) out[kDofNumbers * k] -= lambda[link.v + k] * a.v[link.v + k];
+  if constexpr (K != JointKind::spherical) {
+    for (int k = 0; k < dofs(K); ++k) {
+      const N q = c[k] + x[k];
+      if (link.effects & kSprung)
+        out[kDofNumbers * k + 1] += lambda[link.v + k] * (N(e[k].rest) - q);
+      if (link.effects & kDriven) motor(k, u[k] - q);
+    }
+  } else {
+    const Quat<N> q = Quat<N>{c[0], c[1], c[2], c[3]} * quaternion_exp(Vec3<N>{x[0], x[1], x[2]});
+    if (link.effects & kSprung) {
+      const Quat<N> rest = quaternion_exp(Vec3<N>{N(e[0].rest), N(e[1].rest), N(e[2].rest)});
+      const Vec3<N> phi = rotation_vector<false>(conjugate(rest) * q).phi;
+      out[1] -= dot(phi, Vec3<N>{lambda[link.v], lambda[link.v + 1], lambda[link.v + 2]});
+    }
+    if (link.effects & kDriven) {
+      const Vec3<N> psi =
+          rotation_vector<false>(conjugate(q) * quaternion_exp(Vec3<N>{u[0], u[1], u[2]})).phi;
+      motor(0, psi.x), motor(1, psi.y), motor(2, psi.z);
+    }
+  }
+}
+
+/// Adds to (parameter_numbers(model)).
+template <class N>
+void parameter_products(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
+                        N* out) {
+  contact_parameters<N>(model, a, d.links, {out, out + first_size_number(model)});
+  inertia_parameters(model, a, d.links, out + first_inertia_number(model));
+  out += first_dof_number(model);
+  for (int i = 0; i < model.n_links; ++i) {
+    const Link& link = model.links[i];
+    with_kind(link.kind, [&]<JointKind K>() {
+      joint_parameters<K>(model, a, link, d.lambda, out + kDofNumbers * link.v);
+    });
+  }
+}
+
+}  // namespace tangere::kernels

@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reverse mode through one touching point (kernels/contact/pair_contact.hpp): from a cotangent f̄ of its
+// force on body 1 to those of the displacement ε = (θ; ρ) and relative twist W of body 2, and of
+// the contact's coefficients. Some 150 operations, no
+// matrices. With m̄ = μ t (t = 0 when sticking), B the bound of friction over μ:
+//   d̄ = (N_d n - B_d m̄)·f̄,  r̄ = (N_ḋ n - B_ḋ m̄)·f̄,  n̄ = N f̄,  s̄ = -s (f̄ - t (t·f̄))
+//       through f = N n + f_t(v_t, B)
+//   r̄ -= n·s̄,  n̄ -= ḋ s̄
+//       through v_t = u - ḋ n
+//   n̄ += r̄ u,  ū = s̄ + r̄ n
+//       through ḋ = n·u
+//   W̄ = (x₂ × v̄; v̄), v̄ = -ū;  x̄ = ω × ū
+//       through u = -(v + ω × x₂)
+//   d̄ -= n·x̄,  n̄ -= d x̄
+//       through x₂ = ξ - d n
+//   ρ̄ = -d̄ n - H n̄,  θ̄ = x₂ × ρ̄ + n × (I - dH) n̄
+//       through d and n
+#pragma once
+
+#include "kernels/contact/pair_contact.hpp"
+#include "kernels/tactile/tactile_types.hpp"
+
+namespace tangere::kernels {
+
+/// From cotangents of N and of B to those of k_n and k_d. Zero where the normal force is clamped.
+template <class N>
+void pull_back_normal_force(const LawParameters<N>& p, const N& d, const N& rate,
+                            const NormalForce<N>& at, const N& force, const N& bound,
+                            LawCotangent<N>& out) {
+  const N zero(0.0), one(1.0);
+  const auto pulling = at.force < zero;  // law paper: B = -N
+  const N both = force + select(pulling, -bound, bound);
+  if (p.law == ContactLaw::linear) {
+    const N pushing = select(at.force > zero, one, zero);
+    const N ramp = p.ramp > 0 ? min(abs(d) * N(1.0 / (p.ramp > 0 ? p.ramp : 1)), one) : one;
+    if (p.ramp > 0) {
+      out.kn -= pushing * both * d;
+      out.damping -= pushing * both * ramp * rate;
+    } else {  // B = k_n |d|
+      out.kn -= (pushing * force + bound) * d;
+      out.damping -= pushing * force * rate;
+    }
+    return;
+  }
+  const N active = p.law == ContactLaw::paper ? one : select(at.force > zero, one, zero);
+  out.kn -= active * both * d;
+  out.damping = mul_add(active * both, d * rate, out.damping);
+}
+
+/// Cotangents of the law's coefficients; f̄ zero where nothing touches.
+template <class N>
+void pull_back_law(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& f_bar,
+                   LawCotangent<N>& out) {
+  const N along_t = dot(p.tangential.direction, f_bar);
+  const N slip = p.tangential.slip;
+  out.kt -= (N(1.0) - slip) * dot(p.vt, f_bar);
+  out.mu -= p.normal.bound * along_t;
+  pull_back_normal_force(law, p.d, p.rate, p.normal, dot(p.n, f_bar), -(law.mu * along_t), out);
+}
+
+/// Cotangents of what a point's force hangs on besides its coefficients, at fixed n.
+template <class N>
+struct ForceCotangent {
+  Vec3<N> slide, u;  ///< of v_t beside u; of u
+  N rate, d;
+};
+
+/// Through f = N n + f_t, v_t = u - ḋ n and ḋ = n·u.
+template <class N>
+ForceCotangent<N> pull_back_force(const LawParameters<N>& law, const PointContact<N>& p,
+                                  const Vec3<N>& f_bar) {
+  const Vec3<N>& t = p.tangential.direction;
+  const N along_n = dot(p.n, f_bar), along_t = dot(t, f_bar), bound = -(law.mu * along_t);
+  const Vec3<N> slide = (-p.tangential.scale) * mul_add(-along_t, t, f_bar);
+  const N rate =
+      mul_add(p.normal.rate_slope, along_n, p.normal.bound_rate * bound) - dot(p.n, slide);
+  return {slide, mul_add(rate, p.n, slide), rate,
+          mul_add(p.normal.d_slope, along_n, p.normal.bound_d * bound)};
+}
+
+/// H n̄ = κ (n̄ - n (n·n̄) - e z (z·n̄)).
+template <class Shape, class N>
+Vec3<N> bend(const PointContact<N>& p, const Vec3<N>& n_bar) {
+  Vec3<N> bent = mul_add(-dot(p.n, n_bar), p.n, n_bar);
+  if constexpr (Shape::kBending == Bending::rod) bent = mul_add(-dot(p.axis, n_bar), p.axis, bent);
+  return p.curvature * bent;
+}
+
+/// Cotangents of where a point and a shape are: of ρ₂, by which d and n hang on the shape's place,
+/// and of x₂ beside them. Moving the point instead of the shape, ξ̄ = x̄ - ρ̄.
+template <class N>
+struct PlaceCotangent {
+  Vec3<N> x, rho;
+};
+
+/// Adds the motion's share of one point; f̄ zero where nothing touches.
+template <class Shape, class N>
+PlaceCotangent<N> pull_back_motion(const LawParameters<N>& law, const PointContact<N>& p,
+                                   const Vec3<N>& omega, const Vec3<N>& f_bar,
+                                   TouchCotangent<N>& out) {
+  const ForceCotangent<N> bar = pull_back_force(law, p, f_bar);
+  out.twist.a += cross(bar.u, p.x2);
+  out.twist.l -= bar.u;
+  const Vec3<N> x_bar = cross(omega, bar.u);
+  const N minus_d_bar = dot(p.n, x_bar) - bar.d;
+  const Vec3<N> n_bar = mul_add(
+      p.normal.force, f_bar, mul_add(-p.rate, bar.slide, mul_add(bar.rate, p.u, (-p.d) * x_bar)));
+  Vec3<N> rho = minus_d_bar * p.n, turned = n_bar;
+  if constexpr (Shape::kBending != Bending::flat) {
+    const Vec3<N> bent = bend<Shape>(p, n_bar);
+    rho -= bent;
+    turned = mul_add(-p.d, bent, turned);
+  }
+  out.displacement.a += cross(p.x2, rho) + cross(p.n, turned);
+  out.displacement.l += rho;
+  return {x_bar, rho};
+}
+
+/// What a cotangent of x₂ = ξ - d n alone adds: x̄ and ρ̄ = n (n·x̄) + d H x̄.
+template <class Shape, class N>
+PlaceCotangent<N> pull_back_place(const PointContact<N>& p, const Vec3<N>& x_bar) {
+  Vec3<N> rho = dot(p.n, x_bar) * p.n;
+  if constexpr (Shape::kBending != Bending::flat) rho += p.d * bend<Shape>(p, x_bar);
+  return {x_bar, rho};
+}
+
+/// Cotangent of a shape's size from that of ρ₂; y: the point, in the shape's axes, whose columns Q
+/// are.
+template <class Shape, class N>
+Vec3<N> pull_back_size(const Shape& shape, const PointContact<N>& p, const Mat3<N>& Q,
+                       const Vec3<N>& c, const Vec3<N>& xi, const Vec3<N>& rho) {
+  if constexpr (Shape::kBending == Bending::ball) {
+    return {dot(p.n, rho), N(0.0), N(0.0)};
+  } else {
+    return shape.size_share(transposed_times(Q, xi - c), transposed_times(Q, p.n),
+                            transposed_times(Q, rho));
+  }
+}
+
+}  // namespace tangere::kernels

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which points of a body may touch a shape: all of them by one bounding sphere across environments,
+// then tiles by theirs and points, eight at a time.
+#pragma once
+
+#include "kernels/contact/distance.hpp"
+#include "kernels/numbers/one_lane.hpp"
+#include "kernels/step/arguments.hpp"
+#include "kernels/step/stage.hpp"
+
+namespace tangere::kernels {
+
+/// Which of eight places in body 1 are nearer to a shape posed there than m.
+template <class Shape, class N>
+unsigned near_shape(const Shape& shape, const Frame<N>& pose, const Vec3<N>& place, const N& m) {
+  const Vec3<N> arm = place - pose.p;
+  if constexpr (Shape::kBending == Bending::ball) {
+    return lane_bits(nearer_than(shape, arm, m));
+  } else {
+    return lane_bits(nearer_than(shape, transposed_times(pose.R, arm), m));
+  }
+}
+
+template <class N>
+void store_frame(const Frame<N>& x, N* rows) {
+  for (int i = 0; i < 9; ++i) rows[i] = x.R.m[i / 3][i % 3];
+  rows[9] = x.p.x, rows[10] = x.p.y, rows[11] = x.p.z;
+}
+
+/// Pairs whose points may be near: the ball that holds them against the shape.
+template <class N, int L>
+void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out) {
+  const auto view = [](Row<L>* p) { return reinterpret_cast<N*>(p); };
+  for (int g = 0; g < model.n_link_pairs; ++g) {
+    const LinkPair& links = model.link_pairs[g];
+    const Frame<N>& x = a.contacts[g].link2_in_1;
+    store_frame(x, view(out.link_poses + 12 * g));
+    for (int i = 0; i < links.count; ++i) {
+      const int k = model.pair_order[links.first + i];
+      const PairContact& pair = model.pairs[k];
+      const Vec3<N> in_2 = transposed_times(x.R, broadcast<N>(pair.middle) - x.p);
+      const Vec3<N> y =
+          transposed_times(broadcast<N>(pair.frame2.R), in_2 - broadcast<N>(pair.frame2.p));
+      const N reach(pair.extent + a.candidates[k].margin);
+      const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
+      out.lanes[k] = with_distance<N>(pair.shape, size, [&](const auto& shape) {
+        return lane_bits(nearer_than(shape, y, reach));
+      });
+      if (out.lanes[k] != 0)
+        store_frame(compose(x, broadcast<N>(pair.frame2)), view(out.shape_poses + 12 * k));
+    }
+  }
+}
+
+/// Appends the lanes in `which`; writes up to eight numbers, whatever their count.
+template <class A>
+void append(const Lanes<A>& a, unsigned which, double* out) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    _mm512_storeu_pd(out, _mm512_maskz_compress_pd(static_cast<__mmask8>(which), a.r[0]));
+    return;
+  }
+#endif
+  alignas(64) double lanes[kGroup];
+  store_lanes(a, lanes);
+  for (; which != 0; which &= which - 1) *out++ = lanes[__builtin_ctz(which)];
+}
+
+/// Shape and pose are its own copies: for all the compiler knows, storing to `points` could change
+/// them otherwise.
+template <class A, class Shape>
+int search_shape(const CandidateSearch& s, Shape shape) {
+  using N = Lanes<A>;
+  Frame<N> pose;
+  for (int i = 0; i < 9; ++i) pose.R.m[i / 3][i % 3] = N(s.pose[i]);
+  pose.p = {N(s.pose[9]), N(s.pose[10]), N(s.pose[11])};
+  const PairContact& pair = *s.pair;
+  const N margin(s.margin);
+  double *x = s.points, *y = x + s.stride, *z = y + s.stride;
+  int count = 0;
+  for (int group = 0; group * kGroup < pair.n_tiles; ++group) {
+    const double* b = pair.tile_bounds + 4 * kGroup * group;
+    const Vec3<N> centre = {load_lanes<A>(b), load_lanes<A>(b + kGroup),
+                            load_lanes<A>(b + 2 * kGroup)};
+    const N reach = load_lanes<A>(b + 3 * kGroup) + margin;
+    for (unsigned near = near_shape(shape, pose, centre, reach); near != 0; near &= near - 1) {
+      const int tile = group * kGroup + __builtin_ctz(near),
+                rest = pair.n_points - tile * kContactTile;
+      const double* p = pair.tile_points + 3 * kContactTile * tile;
+      for (int k = 0; k < kContactTile && k < rest; k += kGroup) {
+        const Vec3<N> place = {load_lanes<A>(p + k), load_lanes<A>(p + kContactTile + k),
+                               load_lanes<A>(p + 2 * kContactTile + k)};
+        const unsigned in = near_shape(shape, pose, place, margin);
+        if (in == 0) continue;
+        append(place.x, in, x + count);
+        append(place.y, in, y + count);
+        append(place.z, in, z + count);
+        count += __builtin_popcount(in);
+      }
+    }
+  }
+  for (int k = count; k % kGroup != 0; ++k) x[k] = y[k] = z[k] = kFarAway;
+  return count;
+}
+
+template <class A>
+int search_candidates(const CandidateSearch& s) {
+  return with_distance<Lanes<A>>(s.pair->shape, s.size, [&]<class Shape>(const Shape& shape) {
+    return search_shape<A, Shape>(s, shape);
+  });
+}
+
+/// Rows of eight lanes from the lanes' own lists; shorter ones end in far points.
+template <class A>
+void transpose_rows(GroupStage::List& list) {
+  list.count = 0;
+  for (int count : list.own_count) list.count = count > list.count ? count : list.count;
+  if (list.count == 0) return;
+  for (int l = 0; l < kGroup; ++l)
+    for (int c = 0; c < 3; ++c) {
+      const double* from = list.own + (l * 3 + c) * list.stride;
+      for (int k = 0; k < list.own_count[l]; ++k) list.points[3 * k + c][l] = from[k];
+      for (int k = list.own_count[l]; k < list.count; ++k) list.points[3 * k + c][l] = kFarAway;
+    }
+}
+
+}  // namespace tangere::kernels

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+// The inertial part of the Jacobian A = ∂g/∂x after residual<true>() has filled the scratch.
+// Wrenches by q and by v of a joint's columns are combined into wrenches by x before anything is
+// projected:
+//   A = G_q J + C V_x,  C = G_v + (c₀/h) M;
+//       J = 1, V_x = c₀/h but for spherical joints (kernels/step/stage.hpp)
+//
+// Inertial part, composites Iᶜ, Bᶜ, Fᶜ of subtrees (Fᶜ is the F of the inward sweep), for dof i and
+// ancestor-or-self j:
+//   ∂ID_j/∂q_i = S_jᵀ(Bᶜ Ψ̇_i + Iᶜ Ψ̈_i + [j ≠ i] Fᶜ ×̄* S_i)
+//       ∂ID_i/∂q_j = S_iᵀ(Bᶜ Ψ̇_j + Iᶜ Ψ̈_j)
+//   ∂ID_j/∂v_i = S_jᵀ(Bᶜ S_i + Iᶜ (Ψ̇_i + Ṡ_i))
+//       ∂ID_i/∂v_j = S_iᵀ(Bᶜ S_j + Iᶜ (Ψ̇_j + Ṡ_j))
+//   M_ji = S_jᵀ Iᶜ S_i
+// B of a rigid body acts on the angular part alone, (bias; -2 [momentum]), and stays so when moved
+// and summed.
+#pragma once
+
+#include "kernels/step/residual-inl.hpp"
+
+namespace tangere::kernels {
+
+template <class N>
+Vec6<N> bias_times(const LinkScratch<N>& o, const Vec6<N>& m) {
+  return {o.bias * m.a, N(-2.0) * cross(o.momentum, m.a)};
+}
+/// F ×̄* m = m ×* F.
+template <class N>
+Vec6<N> turned(const Vec6<N>& f, const Vec6<N>& m) {
+  return cross_wrench(m, f);
+}
+
+/// Own bias B = V×* I - I V× + (I V) ×̄*: upper left W J - J W - (U C + C U) - [h], W = [ω], U =
+/// [v], C = [moment].
+template <class N>
+void own_bias(LinkScratch<N>& o) {
+  const Vec6<N> h = inertia_times(o.mass, o.moment, o.inertia, o.V);
+  const Mat3<N> uc = cross_columns(o.V.l, skew(o.moment));
+  o.bias = cross_columns(o.V.a, o.inertia) - times_skew(o.inertia, o.V.a) - (uc + transpose(uc)) -
+           skew(h.a);
+  o.momentum = h.l;
+}
+
+/// Adds a link's composites to its parent's.
+template <class N>
+void add_composites(const Link& link, const LinkScratch<N>& o, LinkScratch<N>& p) {
+  p.mass += o.mass;
+  Vec3<N> moment = o.moment, momentum = o.momentum;
+  Mat3<N> inertia = o.inertia, bias = o.bias;
+  if (link.turned) {
+    const Mat3<N>& R = o.local.R;
+    const Mat3<N> Rt = transpose(R);
+    moment = R * moment;
+    momentum = R * momentum;
+    inertia = R * inertia * Rt;
+    bias = R * bias * Rt;
+  }
+  if (link.placed) {
+    const Vec3<N>& at = o.local.p;
+    const Mat3<N> pm = cross_columns(at, skew(moment));  // [p][moment]
+    inertia += -(pm + transpose(pm)) - o.mass * cross_columns(at, skew(at));
+    bias += N(-2.0) * cross_columns(at, skew(momentum));
+    p.moment += o.mass * at;
+  }
+  p.moment += moment;
+  p.momentum += momentum;
+  p.inertia += inertia;
+  p.bias += bias;
+}
+
+/// Own inertia and bias of each link, then sums over subtrees. Of a link that never turns only the
+/// mass is asked for.
+template <class N>
+void composite_sweep(const ModelView& model, const StageArgs<N>& a) {
+  for (int i = 0; i < model.n_links; ++i) {
+    const Link& link = model.links[i];
+    LinkScratch<N>& o = a.links[i];
+    const LinkInertia<N> own = load_inertia<N>(link, a.block, a.group);
+    o.mass = own.mass;
+    o.moment = own.moment;
+    o.momentum = zero3<N>();
+    if (link.still) continue;
+    o.inertia = own.inertia;
+    if (link.massive) {
+      own_bias(o);
+    } else {
+      o.bias = zero33<N>();
+    }
+  }
+  for (int i = model.n_links - 1; i >= 0; --i) {
+    const int parent = model.links[i].parent;
+    if (parent < 0) continue;
+    if (model.links[parent].still) {
+      a.links[parent].mass += a.links[i].mass;
+    } else {
+      add_composites(model.links[i], a.links[i], a.links[parent]);
+    }
+  }
+}
+
+/// Ψ̇, Ψ̈, Ṡ of a joint's dofs.
+template <JointKind K, class N>
+void joint_rates(const Link& link, LinkScratch<N>& o) {
+  for (int k = 0; k < dofs(K); ++k) {
+    Vec6<N>&pd = o.psi_dot[k], &pdd = o.psi_ddot[k], &sd = o.s_dot[k];
+    if constexpr (slides(K)) {
+      pd.a = pdd.a = sd.a = zero3<N>();
+      pd.l = cross_axis<K>(link, k, o.Vp.a);
+      pdd.l = cross_axis<K>(link, k, o.Ap.a) + cross(o.Vp.a, pd.l);
+      sd.l = cross_axis<K>(link, k, o.V.a);
+    } else {
+      sd = {cross_axis<K>(link, k, o.V.a), cross_axis<K>(link, k, o.V.l)};
+      pd.l = cross_axis<K>(link, k, o.Vp.l);
+      pdd.l = cross_axis<K>(link, k, o.Ap.l);
+      pd.a = pdd.a = zero3<N>();
+      if (link.steady) continue;
+      pd.a = cross_axis<K>(link, k, o.Vp.a);
+      pdd.a = cross_axis<K>(link, k, o.Ap.a) + cross(o.Vp.a, pd.a);
+      pdd.l += cross(o.Vp.l, pd.a) + cross(o.Vp.a, pd.l);
+    }
+  }
+}
+
+/// A joint's columns by x from its columns by q and v; T is a number or a wrench.
+template <JointKind K, class T, class N>
+void combine(const LinkScratch<N>& o, const N& c0_over_h, const T* by_q, const T* by_v, T* by_x) {
+  if constexpr (K != JointKind::spherical) {
+    for (int k = 0; k < dofs(K); ++k) by_x[k] = mul_add(c0_over_h, by_v[k], by_q[k]);
+  } else {
+    for (int k = 0; k < 3; ++k) {
+      T sum = o.chart.m[0][k] * by_q[0];
+      for (int j = 1; j < 3; ++j) sum = mul_add(o.chart.m[j][k], by_q[j], sum);
+      for (int j = 0; j < 3; ++j) sum = mul_add(o.chart_rate.m[j][k], by_v[j], sum);
+      by_x[k] = sum;
+    }
+  }
+}
+
+/// Wrenches of a joint's columns by x and by a, and of its rows: Bᶜᵀ S, which has no force.
+template <class N>
+struct JointWrenches {
+  Vec6<N> by_x[3], by_a[3];
+  Vec3<N> row[3];
+};
+
+/// I m of a motion without angular part.
+template <class N>
+Vec6<N> inertia_times_linear(const LinkScratch<N>& o, const Vec3<N>& l) {
+  return {cross(o.moment, l), o.mass * l};
+}
+
+template <JointKind K, class N>
+void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_h,
+                    JointWrenches<N>& w) {
+  if (slides(K) && link.still) {  // of everything only the force by a matters
+    for (int k = 0; k < dofs(K); ++k) {
+      w.by_a[k] = {zero3<N>(), o.mass * joint_axis<K, N>(link, k)};
+      w.by_x[k] = {zero3<N>(), (c0_over_h * c0_over_h) * w.by_a[k].l};
+      w.row[k] = zero3<N>();
+    }
+    return;
+  }
+  Vec6<N> by_q[3], by_v[3];
+  for (int k = 0; k < dofs(K); ++k) {
+    const Vec6<N> rate = o.psi_dot[k] + o.s_dot[k];
+    if constexpr (slides(K)) {
+      w.by_a[k] = {cross_axis<K>(link, k, o.moment), o.mass * joint_axis<K, N>(link, k)};
+      w.row[k] = N(2.0) * cross_axis<K>(link, k, o.momentum);
+      by_v[k] = inertia_times_linear(o, rate.l);
+      by_q[k] = inertia_times_linear(o, o.psi_ddot[k].l);
+    } else {
+      w.by_a[k] = {times_axis<K>(link, k, o.inertia), -cross_axis<K>(link, k, o.moment)};
+      w.row[k] = times_axis<K>(link, k, transpose(o.bias));
+      by_v[k] =
+          inertia_times(o.mass, o.moment, o.inertia, rate) +
+          Vec6<N>{times_axis<K>(link, k, o.bias), N(-2.0) * cross_axis<K>(link, k, o.momentum)};
+      if (link.steady) {
+        by_q[k] = inertia_times_linear(o, o.psi_ddot[k].l);
+      } else {
+        by_q[k] =
+            bias_times(o, o.psi_dot[k]) + inertia_times(o.mass, o.moment, o.inertia, o.psi_ddot[k]);
+      }
+    }
+    by_v[k] = mul_add(c0_over_h, w.by_a[k], by_v[k]);
+  }
+  combine<K>(o, c0_over_h, by_q, by_v, w.by_x);
+}
+
+/// Entries of dof d and the dofs of one ancestor's joint, everything in the ancestor's axes.
+template <JointKind K, class N>
+void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int d,
+                      const Vec6<N>& by_x, const Vec6<N>& by_a, const Vec3<N>& row) {
+  const int n = model.nv;
+  const Link& ancestor = model.links[up];
+  const LinkScratch<N>& p = a.links[up];
+  N q[3], v[3], x[3];
+  for (int j = 0; j < dofs(K); ++j) {
+    a.A[model.pattern.slot[(ancestor.v + j) * n + d]] = project<K>(ancestor, j, by_x);
+    v[j] = a.c0_over_h * project<K>(ancestor, j, by_a);
+    q[j] = N(0.0);
+    if (slides(K) && ancestor.still) continue;
+    if constexpr (!slides(K)) v[j] += along_axis<K>(ancestor, j, row);
+    v[j] += dot(by_a, p.psi_dot[j] + p.s_dot[j]);
+    q[j] = dot(row, p.psi_dot[j].a) + dot(by_a, p.psi_ddot[j]);
+  }
+  combine<K>(p, a.c0_over_h, q, v, x);
+  for (int j = 0; j < dofs(K); ++j) a.A[model.pattern.slot[d * n + ancestor.v + j]] = x[j];
+}
+
+/// Rows and columns of a joint's dofs in the ancestors of its link.
+template <class N>
+void walk_ancestors(const ModelView& model, const StageArgs<N>& a, int i, JointWrenches<N>& w) {
+  const int first = model.links[i].v, count = dofs(model.links[i].kind);
+  for (int up = model.links[i].parent; up >= 0; i = up, up = model.links[up].parent) {
+    const Link& link = model.links[i];
+    const Frame<N>& local = a.links[i].local;
+    for (int k = 0; k < count; ++k) {
+      if (!model.links[up].still) {
+        w.by_x[k] = wrench_to_parent(link, local, w.by_x[k]);
+        w.by_a[k] = wrench_to_parent(link, local, w.by_a[k]);
+        if (link.turned) w.row[k] = local.R * w.row[k];
+      } else if (link.turned) {  // nothing above turns: torques no longer matter
+        w.by_x[k].l = local.R * w.by_x[k].l;
+        w.by_a[k].l = local.R * w.by_a[k].l;
+      }
+    }
+    with_kind(model.links[up].kind, [&]<JointKind K>() {
+      for (int k = 0; k < count; ++k)
+        ancestor_entries<K>(model, a, up, first + k, w.by_x[k], w.by_a[k], w.row[k]);
+    });
+  }
+}
+
+/// Writes the inertial part and the effects of one joint's rows and columns of A, and its diagonal
+/// of M.
+template <JointKind K, class N>
+void joint_jacobian(const ModelView& model, const StageArgs<N>& a, int i) {
+  const Link& link = model.links[i];
+  LinkScratch<N>& o = a.links[i];
+  const int n = model.nv;
+  if (!link.still) joint_rates<K>(link, o);
+  JointWrenches<N> w;
+  joint_wrenches<K>(link, o, a.c0_over_h, w);
+  for (int j = 0; j < dofs(K); ++j) {
+    const int d = link.v + j;
+    a.mass_diagonal[d] = project<K>(link, j, w.by_a[j]);
+    for (int k = 0; k < dofs(K); ++k)
+      a.A[model.pattern.slot[d * n + link.v + k]] = project<K>(link, j, w.by_x[k]);
+  }
+  if (link.effects != 0) add_effect_entries<K>(model, a, link);
+  if (link.parent < 0) return;
+  // Moving the joint turns the subtree's wrench as well: S × F, by x.
+  for (int k = 0; k < dofs(K); ++k) {
+    if constexpr (slides(K)) {
+      if (!link.still) w.by_x[k].a -= cross_axis<K>(link, k, o.F.l);
+    } else {
+      const Vec3<N> s = K == JointKind::spherical
+                            ? Vec3<N>{o.chart.m[0][k], o.chart.m[1][k], o.chart.m[2][k]}
+                            : joint_axis<K, N>(link, k);
+      w.by_x[k] += Vec6<N>{cross(s, o.F.a), cross(s, o.F.l)};
+    }
+  }
+  walk_ancestors(model, a, i, w);
+}
+
+}  // namespace tangere::kernels

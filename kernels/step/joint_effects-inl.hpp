@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+// What acts on the dofs of a joint: damping, armature, springs, limits, position motors; and its
+// derivatives. Per dof
+//
+//   f = -c v - I_a a - k (q - rest) + k_l max(0, lo - q) - k_l max(0, q - hi) + clip(P (u - q) - D
+//       v, range)
+//
+// A spherical joint has rotation vectors in place of q, φ = log q, φ_s = log(rest⁻¹ q), ψ = log(q⁻¹
+// exp u). Torques, body axes: spring -k φ_s (the gradient of k|φ_s|²/2, as J_r⁻ᵀ(φ) φ = φ); limits
+// J_r⁻ᵀ(φ) f(φ), f per component; motor
+// clip(P ψ - D ω). By the right tangent θ: ∂φ/∂θ = J_r⁻¹(φ), ∂ψ/∂θ = -J_r⁻ᵀ(ψ).
+//
+// Flags of the link decide outside the lanes what is evaluated. At a bound of a limit the
+// derivative is that of its inside, at a bound of a motor's range that of the unclipped force.
+#pragma once
+
+#include "kernels/numbers/rotation_vector.hpp"
+#include "kernels/step/stage.hpp"
+
+namespace tangere::kernels {
+
+/// Forces on the dofs of one joint [N, N m], damping left out, and derivatives of -force as the
+/// Jacobian wants them.
+template <class N>
+struct JointLoad {
+  N force[3];
+  N magnitude[3];   ///< sum of the magnitudes of its parts, inertia left out
+  N by_q[3];        ///< joints that do not turn freely: diagonal
+  Mat3<N> by_turn;  ///< spherical: by the right tangent
+  N by_v[3];        ///< diagonal; c₀/h times the armature included
+  N armature[3];
+};
+
+template <class N>
+N load_parameter(const StageArgs<N>& a, const Parameter& p) {
+  return ParameterLoad<N>::load(p, a.block, a.group);
+}
+
+template <class N>
+void add_force(JointLoad<N>& out, int k, const N& force) {
+  out.force[k] += force;
+  out.magnitude[k] += abs(force);
+}
+
+/// Force of a limit at q; `slope`: derivative of -force.
+template <class N>
+N limit_force(const DofEffects& e, const N& stiffness, const N& q, N& slope) {
+  const N low(e.low), high(e.high), zero(0.0);
+  slope = select(q < low, stiffness, select(q > high, stiffness, zero));
+  return select(q < low, stiffness * (low - q), select(q > high, stiffness * (high - q), zero));
+}
+
+/// Force of a position motor at the distance `error` from its target; `inside`: 1 where it is not
+/// clipped.
+template <class N>
+N motor_force(const DofEffects& e, const N& P, const N& D, const N& error, const N& v, N& inside) {
+  const N low(e.force_low), high(e.force_high);
+  const N force = P * error - D * v;
+  inside = select(force < low, N(0.0), select(force > high, N(0.0), N(1.0)));
+  return select(force < low, low, select(force > high, high, force));
+}
+
+template <class N>
+void add_plain_effects(const StageArgs<N>& a, const Link& link, const DofEffects& e, int k,
+                       JointLoad<N>& out) {
+  const N q = a.centre[link.q + k] + a.x[link.v + k];
+  if (link.effects & kSprung) {
+    const N stiffness = load_parameter(a, e.stiffness);
+    add_force(out, k, stiffness * (N(e.rest) - q));
+    out.by_q[k] += stiffness;
+  }
+  if (link.effects & kLimited) {
+    N slope;
+    add_force(out, k, limit_force(e, load_parameter(a, e.limit_stiffness), q, slope));
+    out.by_q[k] += slope;
+  }
+  if (link.effects & kDriven) {
+    const N P = load_parameter(a, e.P), D = load_parameter(a, e.D);
+    N inside;
+    add_force(out, k, motor_force(e, P, D, a.target[link.v + k] - q, a.v[link.v + k], inside));
+    out.by_q[k] += inside * P;
+    out.by_v[k] += inside * D;
+  }
+}
+
+template <class N>
+void add_torque(JointLoad<N>& out, const Vec3<N>& torque) {
+  add_force(out, 0, torque.x);
+  add_force(out, 1, torque.y);
+  add_force(out, 2, torque.z);
+}
+
+template <bool Derivatives, class N>
+void add_turning_limits(const StageArgs<N>& a, const DofEffects* e, const Quat<N>& q,
+                        JointLoad<N>& out) {
+  const RotationVector<N> at = rotation_vector<Derivatives>(q);
+  const N phi[3] = {at.phi.x, at.phi.y, at.phi.z};
+  N f[3], slope[3];
+  for (int k = 0; k < 3; ++k)
+    f[k] = limit_force(e[k], load_parameter(a, e[k].limit_stiffness), phi[k], slope[k]);
+  const Vec3<N> force = {f[0], f[1], f[2]};
+  const Mat3<N> inverse = inverse_left_jacobian(at);
+  add_torque(out, inverse * force);
+  if constexpr (Derivatives) {
+    Mat3<N> by_phi = -inverse_left_jacobian_derivative(at, force);
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k)
+        by_phi.m[i][k] = mul_add(inverse.m[i][k], slope[k], by_phi.m[i][k]);
+    out.by_turn += by_phi * inverse_right_jacobian(at);
+  }
+}
+
+template <bool Derivatives, class N>
+void add_turning_motor(const StageArgs<N>& a, const Link& link, const DofEffects* e,
+                       const Quat<N>& q, JointLoad<N>& out) {
+  const N* u = a.target + link.v;
+  const RotationVector<N> error =
+      rotation_vector<false>(conjugate(q) * quaternion_exp(Vec3<N>{u[0], u[1], u[2]}));
+  const N psi[3] = {error.phi.x, error.phi.y, error.phi.z};
+  const Mat3<N> slope = inverse_left_jacobian(error);
+  for (int i = 0; i < 3; ++i) {
+    const N P = load_parameter(a, e[i].P), D = load_parameter(a, e[i].D);
+    N inside;
+    add_force(out, i, motor_force(e[i], P, D, psi[i], a.v[link.v + i], inside));
+    out.by_v[i] += inside * D;
+    if constexpr (Derivatives)
+      for (int k = 0; k < 3; ++k)
+        out.by_turn.m[i][k] = mul_add(inside * P, slope.m[i][k], out.by_turn.m[i][k]);
+  }
+}
+
+template <bool Derivatives, class N>
+void add_turning_effects(const StageArgs<N>& a, const Link& link, const DofEffects* e,
+                         JointLoad<N>& out) {
+  out.by_turn = zero33<N>();
+  const N *c = a.centre + link.q, *x = a.x + link.v;
+  const Quat<N> q = Quat<N>{c[0], c[1], c[2], c[3]} * quaternion_exp(Vec3<N>{x[0], x[1], x[2]});
+  if (link.effects & kSprung) {
+    const Quat<N> rest = quaternion_exp(Vec3<N>{N(e[0].rest), N(e[1].rest), N(e[2].rest)});
+    const RotationVector<N> turn = rotation_vector<false>(conjugate(rest) * q);
+    const N stiffness = load_parameter(a, e[0].stiffness);
+    add_torque(out, -(stiffness * turn.phi));
+    if constexpr (Derivatives) out.by_turn += stiffness * inverse_right_jacobian(turn);
+  }
+  if (link.effects & kLimited) add_turning_limits<Derivatives>(a, e, q, out);
+  if (link.effects & kDriven) add_turning_motor<Derivatives>(a, link, e, q, out);
+}
+
+/// Damping alone: most joints have nothing else.
+template <JointKind K, class N>
+void add_damping(const ModelView& model, const StageArgs<N>& a, const Link& link) {
+  for (int k = 0; k < dofs(K); ++k) {
+    const int d = link.v + k;
+    const N damping = load_parameter(a, model.effects[d].damping) * a.v[d];
+    a.g[d] += damping;
+    a.force_scale[d] += abs(damping);
+  }
+}
+
+/// All other effects of one joint at the stage's x; a.v of its dofs must be there.
+template <JointKind K, bool Derivatives, class N>
+void joint_load(const ModelView& model, const StageArgs<N>& a, const Link& link,
+                JointLoad<N>& out) {
+  const DofEffects* e = model.effects + link.v;
+  for (int k = 0; k < dofs(K); ++k) {
+    const int d = link.v + k;
+    out.force[k] = out.magnitude[k] = out.by_q[k] = out.by_v[k] = out.armature[k] = N(0.0);
+    if (link.effects & kArmoured) {
+      out.armature[k] = load_parameter(a, e[k].armature);
+      out.force[k] -= out.armature[k] * mul_add(a.c0_over_h, a.v[d], a.inverse_h * a.s[d]);
+      out.by_v[k] = a.c0_over_h * out.armature[k];
+    }
+    if constexpr (K != JointKind::spherical)
+      if (link.effects & kOfPosition) add_plain_effects(a, link, e[k], k, out);
+  }
+  if constexpr (K == JointKind::spherical)
+    if (link.effects & kOfPosition) add_turning_effects<Derivatives>(a, link, e, out);
+}
+
+// Kept out of line: inlined, its frame would cost joints that have no such effects.
+template <JointKind K, class N>
+[[gnu::noinline]] void add_joint_load(const ModelView& model, const StageArgs<N>& a,
+                                      const Link& link) {
+  JointLoad<N> load;
+  joint_load<K, false>(model, a, link, load);
+  for (int k = 0; k < dofs(K); ++k) {
+    a.g[link.v + k] -= load.force[k];
+    a.force_scale[link.v + k] += load.magnitude[k];
+  }
+}
+
+/// Adds a force's derivatives by v, diagonal, to the joint's block of A.
+template <JointKind K, class N>
+void add_by_v(const ModelView& model, const StageArgs<N>& a, const Link& link, int j,
+              const N& by_v) {
+  const int* slot = model.pattern.slot + (link.v + j) * model.nv + link.v;
+  if constexpr (K != JointKind::spherical) {
+    a.A[slot[j]] = mul_add(a.c0_over_h, by_v, a.A[slot[j]]);
+  } else {
+    const LinkScratch<N>& o = a.links[&link - model.links];
+    for (int k = 0; k < 3; ++k) a.A[slot[k]] = mul_add(o.chart_rate.m[j][k], by_v, a.A[slot[k]]);
+  }
+}
+
+template <JointKind K, class N>
+[[gnu::noinline]] void add_load_entries(const ModelView& model, const StageArgs<N>& a,
+                                        const Link& link) {
+  JointLoad<N> load;
+  joint_load<K, true>(model, a, link, load);
+  for (int j = 0; j < dofs(K); ++j) {
+    a.mass_diagonal[link.v + j] += load.armature[j];
+    add_by_v<K>(model, a, link, j, load.by_v[j]);
+    if (!(link.effects & kOfPosition)) continue;
+    const int* slot = model.pattern.slot + (link.v + j) * model.nv + link.v;
+    if constexpr (K != JointKind::spherical) {
+      a.A[slot[j]] += load.by_q[j];
+    } else {
+      const Mat3<N>& chart = a.links[&link - model.links].chart;
+      for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < 3; ++i)
+          a.A[slot[k]] = mul_add(load.by_turn.m[j][i], chart.m[i][k], a.A[slot[k]]);
+    }
+  }
+}
+
+/// Adds a joint's effects to its diagonal block of A and to the diagonal of M.
+template <JointKind K, class N>
+void add_effect_entries(const ModelView& model, const StageArgs<N>& a, const Link& link) {
+  if (link.effects & kDamped)
+    for (int j = 0; j < dofs(K); ++j)
+      add_by_v<K>(model, a, link, j, load_parameter(a, model.effects[link.v + j].damping));
+  if (link.effects & kBeyondDamping) add_load_entries<K>(model, a, link);
+}
+
+}  // namespace tangere::kernels

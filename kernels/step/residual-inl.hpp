@@ -1,0 +1,369 @@
+// SPDX-License-Identifier: Apache-2.0
+// The residual g of a step: kinematics outward, contacts, inverse dynamics inward (RNEA in body
+// axes).
+//
+//   V = V_p + S q̇,  A = A_p + S q̈ + V × (S q̇),  F = I A + V ×* I V - w_ext,  F_p += X* F
+//   g = Sᵀ F - τ - what acts on the dofs (kernels/step/joint_effects-inl.hpp)
+// The base accelerates at -gravity, so gravity needs no term of its own.
+#pragma once
+
+#include "kernels/step/joint_effects-inl.hpp"
+#include "kernels/step/point_sums.hpp"
+#include "kernels/step/stage.hpp"
+
+namespace tangere::kernels {
+
+/// Pose of a child link in its parent, and its joint's rates. q̇ and q̈ come back in `rate` and
+/// `acceleration`.
+template <class N>
+void joint_motion(const Link& link, const StageArgs<N>& a, LinkScratch<N>& out, Vec6<N>& rate,
+                  Vec6<N>& acceleration) {
+  const int i = link.v;
+  const auto slope = [&](int k) {
+    return mul_add(a.c0_over_h, a.x[i + k], a.inverse_h * a.r[i + k]);
+  };
+  const auto acceleration_of = [&](int k, const N& v) {
+    return mul_add(a.c0_over_h, v, a.inverse_h * a.s[i + k]);
+  };
+  rate = acceleration = zero6<N>();
+  Frame<N> moved = {diagonal(N(1.0)), zero3<N>()};
+  bool turns = false;
+  switch (link.kind) {
+    case JointKind::revolute:
+    case JointKind::prismatic: {
+      const Vec3<N> axis = broadcast<N>(link.axis);
+      const N v = slope(0), q = a.centre[link.q] + a.x[i], acc = acceleration_of(0, v);
+      a.v[i] = v;
+      if (link.kind == JointKind::prismatic) {
+        moved.p = q * axis;
+        rate.l = v * axis;
+        acceleration.l = acc * axis;
+      } else {
+        turns = true;
+        const Vec3<N> x = reduce_angle(q) * axis;
+        moved.R = rotation_exp(x, rotation_series(x));
+        rate.a = v * axis;
+        acceleration.a = acc * axis;
+      }
+      break;
+    }
+    case JointKind::translational: {
+      const Vec3<N> v = {slope(0), slope(1), slope(2)};
+      moved.p = {a.centre[link.q] + a.x[i], a.centre[link.q + 1] + a.x[i + 1],
+                 a.centre[link.q + 2] + a.x[i + 2]};
+      a.v[i] = v.x, a.v[i + 1] = v.y, a.v[i + 2] = v.z;
+      rate.l = v;
+      acceleration.l = {acceleration_of(0, v.x), acceleration_of(1, v.y), acceleration_of(2, v.z)};
+      break;
+    }
+    case JointKind::spherical: {
+      turns = true;
+      const Vec3<N> x = {a.x[i], a.x[i + 1], a.x[i + 2]};
+      const Vec3<N> x_rate = {slope(0), slope(1), slope(2)};
+      const RotationSeries<N> k = rotation_series(x);
+      const N* c = a.centre + link.q;
+      moved.R = to_matrix(Quat<N>{c[0], c[1], c[2], c[3]}) * rotation_exp(x, k);
+      out.chart = right_jacobian(x, k);
+      out.chart_rate = a.c0_over_h * out.chart + right_jacobian_derivative(x, k, x_rate);
+      const Vec3<N> v = out.chart * x_rate;
+      a.v[i] = v.x, a.v[i + 1] = v.y, a.v[i + 2] = v.z;
+      rate.a = v;
+      acceleration.a = {acceleration_of(0, v.x), acceleration_of(1, v.y), acceleration_of(2, v.z)};
+      break;
+    }
+  }
+  const Frame<N> base = {broadcast<N>(link.frame.R),
+                         load_vector<N>(link.frame.p, link.place_row, a.block, a.group)};
+  out.local.R = link.rotated ? (turns ? base.R * moved.R : base.R) : moved.R;
+  out.local.p = slides(link.kind) ? (link.rotated ? base.R * moved.p : moved.p) + base.p : base.p;
+}
+
+/// I m for a rigid body: (J ω + c × v; m v - c × ω), c = mass times centre of mass.
+template <class N>
+Vec6<N> inertia_times(const N& mass, const Vec3<N>& moment, const Mat3<N>& inertia,
+                      const Vec6<N>& m) {
+  return {inertia * m.a + cross(moment, m.l), mass * m.l - cross(moment, m.a)};
+}
+
+/// Poses, twists and accelerations of every link.
+template <class N>
+void outward_sweep(const ModelView& model, const StageArgs<N>& a) {
+  for (int i = 0; i < model.n_links; ++i) {
+    const Link& link = model.links[i];
+    LinkScratch<N>& o = a.links[i];
+    Vec6<N> rate, acceleration;
+    joint_motion(link, a, o, rate, acceleration);
+    if (link.parent < 0) {
+      o.world = o.local;
+      o.Vp = zero6<N>();
+      const Vec3<N> rising = -broadcast<N>(model.gravity);
+      o.Ap = {zero3<N>(), link.turned ? transposed_times(o.local.R, rising) : rising};
+    } else {
+      const LinkScratch<N>& p = a.links[link.parent];
+      o.world = compose(link, p.world, o.local);
+      o.Vp = motion_to_child(link, o.local, p.V);
+      o.Ap = motion_to_child(link, o.local, p.A);
+    }
+    o.V = o.Vp + rate;
+    o.A = o.Ap + acceleration;
+    if (!link.still) o.A += cross_motion(o.V, rate);
+  }
+}
+
+/// Inertial wrench of every link about its own origin.
+template <class N>
+void inertial_wrenches(const ModelView& model, const StageArgs<N>& a) {
+  for (int i = 0; i < model.n_links; ++i) {
+    const Link& link = model.links[i];
+    LinkScratch<N>& o = a.links[i];
+    o.F = zero6<N>();
+    if (!link.massive) continue;
+    const auto [mass, moment, inertia] = load_inertia<N>(link, a.block, a.group);
+    if (link.still) {  // its torque does no work
+      o.F.l = mass * o.A.l;
+      continue;
+    }
+    o.F = inertia_times(mass, moment, inertia, o.A) +
+          cross_wrench(o.V, inertia_times(mass, moment, inertia, o.V));
+  }
+}
+
+/// Relative pose and twist of two links. The world has its own frame and no twist.
+template <class N>
+void pair_motion(const LinkPair& pair, const StageArgs<N>& a, ContactScratch<N>& o) {
+  const Frame<N> origin = {diagonal(N(1.0)), zero3<N>()};
+  const Frame<N>& w1 = pair.link1 < 0 ? origin : a.links[pair.link1].world;
+  const Frame<N>& w2 = pair.link2 < 0 ? origin : a.links[pair.link2].world;
+  o.link2_in_1 = relative(w1, w2);
+  o.Z = pair.link2 < 0 ? zero6<N>() : motion_to_parent(o.link2_in_1, a.links[pair.link2].V);
+  o.W = pair.link1 < 0 ? o.Z : o.Z - a.links[pair.link1].V;
+}
+
+/// How far any point of body 1 may have come nearer to a shape since the lists were made, beyond
+/// the margin. With G = (R, p) of the links, a point ξ is at Rᵀ(ξ - p) in body 2 and so in every
+/// shape that is fixed there.
+template <class N>
+N list_excess(const LinkPair& pair, const CandidateList<N>& list, const Frame<N>& now) {
+  const N* ref = list.reference;
+  const Vec3<N> p0 = {ref[9], ref[10], ref[11]};
+  Mat3<N> R0;
+  for (int k = 0; k < 9; ++k) R0.m[k / 3][k % 3] = ref[k];
+  const Mat3<N> turn = now.R - R0;
+  N moved;
+  if (pair.ball) {
+    const Vec3<N> step = turn * broadcast<N>(pair.centre) + (now.p - p0);
+    moved = sqrt(dot(step, step));
+  } else {
+    N square(0.0);
+    for (int k = 0; k < 9; ++k)
+      square = mul_add(turn.m[k / 3][k % 3], turn.m[k / 3][k % 3], square);
+    const Vec3<N> step = transposed_times(now.R, now.p) - transposed_times(R0, p0);
+    moved = sqrt(square) * N(pair.reach) + sqrt(dot(step, step));
+  }
+  return moved - list.margin;
+}
+
+/// Adds the points of a capsule, whose ends bend in two directions, one candidate after the other.
+template <bool Derivatives, class Shape, class N>
+void add_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list,
+                    int lone, const Frame<N>& frame, const Vec6<N>& W, PairSums<N>& sums) {
+  const auto add = [&](const Vec3<N>& xi) {
+    accumulate<Derivatives>(sums, shape, law, frame.R, frame.p, W.a, W.l, xi);
+  };
+  if (lone < 0) {
+    for (int k = 0; k < list.count; ++k)
+      add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]});
+  } else {
+    const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
+    for (int k = 0; k < list.own_count; ++k) add({N(x[k]), N(y[k]), N(z[k])});
+  }
+}
+
+template <class N>
+bool has_candidates(const CandidateList<N>& list, int lone) {
+  return (lone < 0 ? list.count : list.own_count) > 0;
+}
+
+/// Adds the points around a sphere.
+template <bool Derivatives, class N>
+[[gnu::noinline]] void add_sphere(const SphereMotion<N>& motion, const LawParameters<N>& law,
+                                  const CandidateList<N>& list, int lone, const Vec6<N>& W,
+                                  PairSums<N>& sums) {
+  PointSums<Derivatives, SphereSums, N> sphere;
+  sphere.start(lone);
+  sphere.add(motion, law, list, lone);
+  add_finished<Derivatives>(motion, W, sphere.result(lone), sums);
+}
+
+/// Zeros; without derivatives, only those of the wrench.
+template <bool Derivatives, class N>
+void start(PairSums<N>& sums) {
+  if constexpr (Derivatives) {
+    sums = PairSums<N>::zero();
+  } else {
+    sums.wrench = zero6<N>();
+  }
+}
+
+/// Sums over all shapes of two links. Flat and bent faces share theirs, which are about body 1's
+/// origin.
+template <bool Derivatives, class N>
+void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArgs<N>& a,
+                   ContactScratch<N>& o) {
+  start<Derivatives>(o.sums);
+  PointSums<Derivatives, FaceSums, N> faces;
+  bool any_face = false;
+  for (int i = 0; i < links.count; ++i) {
+    const int k = model.pair_order[links.first + i];
+    const PairContact& pair = model.pairs[k];
+    const CandidateList<N>& list = a.candidates[k];
+    if (!has_candidates(list, a.lone)) continue;
+    LawParameters<N> law = load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
+    law.friction_tangent = a.friction_tangent;
+    const auto frame = [&] { return compose(o.link2_in_1, broadcast<N>(pair.frame2)); };
+    const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
+    with_distance<N>(pair.shape, size, [&]<template <class> class Shape>(const Shape<N>& shape) {
+      if constexpr (Shape<N>::kBending == Bending::ball) {
+        const Vec3<N> centre = o.link2_in_1.R * broadcast<N>(pair.frame2.p) + o.link2_in_1.p;
+        add_sphere<Derivatives>(sphere_motion(centre, o.W, shape.radius), law, list, a.lone, o.W,
+                                o.sums);
+      } else if constexpr (std::is_same_v<Shape<N>, CapsuleDistance<N>>) {
+        add_candidates<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
+      } else {
+        if (!any_face) faces.start(a.lone);
+        any_face = true;
+        faces.add(FaceMotion<Shape, N>{frame(), o.W, shape}, law, list, a.lone);
+      }
+    });
+  }
+  if (any_face) add_finished<Derivatives>(o.W, faces.result(a.lone), o.sums);
+}
+
+/// Points of one link in the ground; false where there are none in any lane.
+template <bool Derivatives, class N>
+bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const StageArgs<N>& a,
+                  PairSums<N>& sums) {
+  const LinkScratch<N>& link = a.links[grounded.link];
+  const Vec3<N> m = transposed_times(link.world.R, broadcast<N>(model.ground_normal));
+  const N height =
+      dot(broadcast<N>(model.ground_normal), link.world.p - broadcast<N>(model.ground_point));
+  bool near = false, started = false;
+  for (int i = 0; i < grounded.count; ++i) {
+    const GroundContact& ground = model.grounds[model.ground_order[grounded.first + i]];
+    const N radius = ground_radius<N>(ground, a.block, a.group);
+    const N extent = ground.radius_row < 0 ? N(ground.extent) : N(ground.extent) + radius;
+    if (!any(dot(m, broadcast<N>(ground.middle)) + height < extent)) continue;
+    if (!started) start<Derivatives>(sums);
+    started = true;
+    LawParameters<N> law =
+        load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
+    law.friction_tangent = a.friction_tangent;
+    for (int k = 0; k < ground.n_points; ++k)
+      near |= accumulate_ground<Derivatives>(sums, law, m, height, link.V,
+                                             ground_point<N>(ground, k), radius);
+  }
+  return near;
+}
+
+/// -0 to +0: a contact that is near in another lane only adds ±0, which must not show in this
+/// lane's bits.
+template <class N>
+void without_negative_zeros(N* x, int count) {
+  for (int i = 0; i < count; ++i) x[i] = x[i] + N(0.0);
+}
+
+template <class N>
+bool near(const ModelView& model, const LinkPair& links, const StageArgs<N>& a) {
+  for (int i = 0; i < links.count; ++i)
+    if (has_candidates(a.candidates[model.pair_order[links.first + i]], a.lone)) return true;
+  return false;
+}
+
+/// Contact sums of every pair of links and grounded link; their wrenches are taken from the links'
+/// F.
+template <bool Derivatives, class N>
+void contact_sweep(const ModelView& model, const StageArgs<N>& a) {
+  for (int k = 0; k < model.n_link_pairs; ++k) {
+    const LinkPair& pair = model.link_pairs[k];
+    ContactScratch<N>& o = a.contacts[k];
+    o.near = near(model, pair, a);
+    if (!o.near) continue;
+    sum_link_pair<Derivatives>(model, pair, a, o);
+    if (pair.link1 >= 0) a.links[pair.link1].F -= o.sums.wrench;
+    if (pair.link2 >= 0) a.links[pair.link2].F += wrench_to_child(o.link2_in_1, o.sums.wrench);
+  }
+  for (int k = 0; k < model.n_grounded; ++k) {
+    ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
+    o.near = sum_grounded<Derivatives>(model, model.grounded[k], a, o.sums);
+    if (o.near) a.links[model.grounded[k].link].F -= o.sums.wrench;
+  }
+}
+
+/// Joint forces from the wrenches, leaves first. Also |forces| for the stopping test.
+template <class N>
+void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
+  for (int i = model.n_links - 1; i >= 0; --i) {
+    const Link& link = model.links[i];
+    const LinkScratch<N>& o = a.links[i];
+    with_kind(link.kind, [&]<JointKind K>() {
+      for (int k = 0; k < dofs(K); ++k) {
+        const int d = link.v + k;
+        a.g[d] = project<K>(link, k, o.F) - a.tau[d];
+        a.force_scale[d] = abs(a.tau[d]);
+      }
+      if (link.effects & kDamped) add_damping<K>(model, a, link);
+      if (link.effects & kBeyondDamping) add_joint_load<K>(model, a, link);
+    });
+    if (link.parent >= 0) a.links[link.parent].F += wrench_to_parent(link, o.local, o.F);
+  }
+}
+
+/// Adds |generalised force| of one contact wrench on a link to the scale of every dof that carries
+/// it.
+template <class N>
+void add_force_scale(const ModelView& model, const StageArgs<N>& a, int link, Vec6<N> wrench) {
+  for (int i = link; i >= 0; i = model.links[i].parent) {
+    with_kind(model.links[i].kind, [&]<JointKind K>() {
+      for (int k = 0; k < dofs(K); ++k)
+        a.force_scale[model.links[i].v + k] += abs(project<K>(model.links[i], k, wrench));
+    });
+    if (model.links[i].parent >= 0)
+      wrench = wrench_to_parent(model.links[i], a.links[i].local, wrench);
+  }
+}
+
+/// Poses and motions at x, and how far each lane has outrun its candidate lists.
+template <class N>
+void kinematics(const ModelView& model, const StageArgs<N>& a) {
+  outward_sweep(model, a);
+  a.excess[0] = N(0.0);
+  for (int k = 0; k < model.n_link_pairs; ++k) {
+    const LinkPair& pair = model.link_pairs[k];
+    const CandidateList<N>& list = a.candidates[model.pair_order[pair.first]];
+    pair_motion(pair, a, a.contacts[k]);
+    a.excess[0] = max(a.excess[0], list_excess(pair, list, a.contacts[k].link2_in_1));
+  }
+}
+
+/// g at the x of kinematics(), with everything the Jacobian needs left in the scratch.
+template <bool Derivatives, class N>
+void residual(const ModelView& model, const StageArgs<N>& a) {
+  inertial_wrenches(model, a);
+  contact_sweep<Derivatives>(model, a);
+  inward_sweep(model, a);
+  for (int k = 0; k < model.n_link_pairs; ++k) {
+    const ContactScratch<N>& o = a.contacts[k];
+    if (!o.near) continue;
+    const LinkPair& pair = model.link_pairs[k];
+    add_force_scale(model, a, pair.link1, o.sums.wrench);
+    if (pair.link2 >= 0)
+      add_force_scale(model, a, pair.link2, wrench_to_child(o.link2_in_1, o.sums.wrench));
+  }
+  for (int k = 0; k < model.n_grounded; ++k) {
+    const ContactScratch<N>& o = a.contacts[model.n_link_pairs + k];
+    if (o.near) add_force_scale(model, a, model.grounded[k].link, o.sums.wrench);
+  }
+  without_negative_zeros(a.g, model.nv);
+}
+
+}  // namespace tangere::kernels

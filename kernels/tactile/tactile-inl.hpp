@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tactile field of one environment: brackets of eight tiles at a time, then the points of the tiles
+// within reach.
+#pragma once
+
+#include "kernels/tactile/tactile_rods.hpp"
+#include "kernels/tactile/vector_pair.hpp"
+
+namespace tangere::kernels {
+
+/// Brackets of eight tiles, one column each, and how near they are.
+template <class Real>
+struct TileChunk {
+  alignas(64) Real row[kBracketRows][kGroup];
+  alignas(64) double gap[kGroup];  ///< < 0: within reach
+};
+
+template <class Real, class D>
+void store_row(const D& x, Real* out) {
+  alignas(64) double wide[kGroup];
+  store_lanes(x, wide);
+  for (int l = 0; l < kGroup; ++l) out[l] = static_cast<Real>(wide[l]);
+}
+
+/// False where none of the eight tiles is within reach; then the rows are not written.
+template <class P, class Shape>
+bool chunk_brackets(const PadTiles& pad, int first, const TouchShape& shape,
+                    const Touch<Lanes<typename P::Architecture>>& at,
+                    TileChunk<typename P::Real>& out) {
+  using Arch = typename P::Architecture;
+  using D = Lanes<Arch>;
+  const Vec3<D> t = {load_lanes<Arch>(pad.x + first), load_lanes<Arch>(pad.y + first),
+                     load_lanes<Arch>(pad.z + first)};
+  D row[kBracketRows];
+  const D gap = Shape::bracket(shape, at, t, load_lanes<Arch>(pad.radius + first), row);
+  if (!any(gap < D(0.0))) return false;
+  store_lanes(gap, out.gap);
+  const Vec3<D> u = tile_velocity(at, t);
+  row[Shape::kRows - 3] = u.x, row[Shape::kRows - 2] = u.y, row[Shape::kRows - 1] = u.z;
+  for (int i = 0; i < Shape::kRows; ++i) store_row(row[i], out.row[i]);
+  return true;
+}
+
+template <class N>
+Touch<N> broadcast_touch(const Touch<double>& t) {
+  return {broadcast<N>(t.Q), broadcast<N>(t.c), broadcast<N>(t.omega), broadcast<N>(t.v), N(t.kn),
+          N(t.kt),           N(t.mu),           N(t.damping)};
+}
+template <class N>
+PointLaw<N> point_law(const Touch<double>& t) {
+  return {broadcast<N>(t.omega), N(-t.kn), N(t.kt), N(t.mu), N(t.damping)};
+}
+
+/// Points k … of a tile, `offsets` (2 or 3, 64).
+template <class P>
+typename P::Offset load_offset(const typename P::Real* offsets, int k) {
+  if constexpr (P::kCurved) {
+    return {P::load(offsets + k), P::load(offsets + kTactileTile + k),
+            P::load(offsets + 2 * kTactileTile + k)};
+  } else {
+    return {P::load(offsets + k), P::load(offsets + kTactileTile + k)};
+  }
+}
+
+/// The force on points k … of a tile in the axes in which it is stored; false where nothing
+/// touches.
+template <class P, ContactLaw Law, class Shape, class N = typename P::N>
+bool stored_force(const PadTiles& pad, int tile, int k, const Shape& shape, const PointLaw<N>& law,
+                  Vec3<N>& f) {
+  constexpr int kWidth = P::kCurved ? 3 : 2;
+  const typename P::Offset s =
+      load_offset<P>(P::offsets(pad) + kWidth * kTactileTile * pad.kind[tile], k);
+  if constexpr (P::kCurved) {
+    const bool own = pad.factors != nullptr;
+    const auto at = own ? scaled_law<P>(law, P::factors(pad) + 4 * kTactileTile * tile + k) : law;
+    if (!point_force<P, Law>(shape, at, s, f)) return false;
+    f = in_point_axes<P>(P::frames(pad) + 9 * kTactileTile * tile + k, f);
+  } else {
+    if (!point_force<P, Law>(shape, law, s, f)) return false;
+    if (pad.skewed) f = in_skewed_axes(pad.axes, f);
+  }
+  return true;
+}
+
+/// The points of one tile. `out` (3, 64): written whole when `fresh` and something touches, else
+/// added to.
+template <class P, ContactLaw Law, class Shape>
+bool tile_force(const PadTiles& pad, int tile, const Shape& shape,
+                const PointLaw<typename P::N>& law, bool fresh, typename P::Real* out) {
+  using N = typename P::N;
+  bool touched = false;
+  for (int k = 0; k < kTactileTile; k += P::kLanes) {
+    Vec3<N> f;
+    const bool here = stored_force<P, Law>(pad, tile, k, shape, law, f);
+    touched |= here;
+    if (!here) {
+      if (!fresh) continue;
+      f = zero3<N>();
+    }
+    const N* component = &f.x;
+    for (int c = 0; c < 3; ++c) {
+      auto* at = out + c * kTactileTile + k;
+      P::store(fresh ? component[c] : P::load(at) + component[c], at);
+    }
+  }
+  return touched;
+}
+
+/// Adds one shape to eight tiles from `first`; returns the bits of those touched, `written`
+/// included.
+template <class P, ContactLaw Law, class Shape>
+unsigned chunk_force(const TactileArgs<typename P::Real>& a, int touch, int first, unsigned written,
+                     typename P::Real* buffer) {
+  using N = typename P::N;
+  using D = Lanes<typename P::Architecture>;
+  const PadTiles& pad = *a.pad;
+  const Touch<double>& at = a.touches[touch];
+  TileChunk<typename P::Real> chunk;
+  if (!chunk_brackets<P, Shape>(pad, first, a.shapes[touch], broadcast_touch<D>(at), chunk))
+    return written;
+  Shape shape(a.shapes[touch], broadcast<N>(at.Q));
+  const PointLaw<N> law = point_law<N>(at);
+  const int count = pad.tiles() - first < kGroup ? pad.tiles() - first : kGroup;
+  for (int l = 0; l < count; ++l) {
+    if (!(chunk.gap[l] < 0)) continue;
+    N row[Shape::kRows];
+    for (int i = 0; i < Shape::kRows; ++i) row[i] = N(double(chunk.row[i][l]));
+    shape.set(row);
+    shape.u = {row[Shape::kRows - 3], row[Shape::kRows - 2], row[Shape::kRows - 1]};
+    const bool fresh = ((written >> l) & 1U) == 0;
+    if (tile_force<P, Law>(pad, first + l, shape, law, fresh, buffer + 3 * kTactileTile * l))
+      written |= 1U << l;
+  }
+  return written;
+}
+
+template <class Real>
+struct EightOf;
+template <>
+struct EightOf<double> {
+  typedef double Type __attribute__((vector_size(64)));
+};
+template <>
+struct EightOf<float> {
+  typedef float Type __attribute__((vector_size(32)));
+};
+
+/// x, y, z of eight points to (8, 3), in registers: two shuffles for each third of the result.
+template <class Arch, class Real>
+void interleave_row(const Real* from, Real* to) {
+  using Eight = typename EightOf<Real>::Type;
+  Eight x, y, z;
+  __builtin_memcpy(&x, from, sizeof x);
+  __builtin_memcpy(&y, from + kTactileTile, sizeof y);
+  __builtin_memcpy(&z, from + 2 * kTactileTile, sizeof z);
+  const Eight xy0 = __builtin_shufflevector(x, y, 0, 8, 0, 1, 9, 1, 2, 10),
+              xy1 = __builtin_shufflevector(x, y, 0, 3, 11, 3, 4, 12, 4, 5),
+              xy2 = __builtin_shufflevector(x, y, 13, 5, 6, 14, 6, 7, 15, 7);
+  const Eight first = __builtin_shufflevector(xy0, z, 0, 1, 8, 3, 4, 9, 6, 7),
+              second = __builtin_shufflevector(xy1, z, 10, 1, 2, 11, 4, 5, 12, 7),
+              third = __builtin_shufflevector(xy2, z, 0, 13, 2, 3, 14, 5, 6, 15);
+  __builtin_memcpy(to, &first, sizeof first);
+  __builtin_memcpy(to + 8, &second, sizeof second);
+  __builtin_memcpy(to + 16, &third, sizeof third);
+}
+
+/// (3, 64) to rows of (point, 3) in the array, or to places in a list.
+template <class Arch, class Real>
+void write_dense(const PadTiles& pad, int tile, const Real* from, Real* dense) {
+  if (pad.curved()) {
+    const int* index = pad.index + kTactileTile * tile;
+    for (int k = 0; k < pad.points_of(tile); ++k)
+      for (int c = 0; c < 3; ++c) dense[3 * index[k] + c] = from[c * kTactileTile + k];
+    return;
+  }
+  const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
+  Real* to = dense + 3 * pad.first_of(tile);
+  for (int i = 0; i < rows; ++i, from += kTileSide, to += 3 * pad.cols) {
+    if (cols == kTileSide) {
+      interleave_row<Arch>(from, to);
+      continue;
+    }
+    for (int j = 0; j < cols; ++j) {
+      to[3 * j] = from[j];
+      to[3 * j + 1] = from[kTactileTile + j];
+      to[3 * j + 2] = from[2 * kTactileTile + j];
+    }
+  }
+}
+
+/// f<Shape>() of every shape, in the order of PrimitiveShape: the choice is made once per tile or
+/// chunk of tiles.
+template <class P, class F>
+constexpr auto by_shape(const F& f) {
+  using Function = decltype(f.template operator()<SpherePad<P>>());
+  struct Table {
+    Function of[kPrimitiveShapes];
+    Function operator[](PrimitiveShape shape) const { return of[static_cast<int>(shape)]; }
+  };
+  return Table{{f.template operator()<SpherePad<P>>(), f.template operator()<CuboidPad<P>>(),
+                f.template operator()<PlanePad<P>>(), f.template operator()<CylinderPad<P>>(),
+                f.template operator()<CapsulePad<P>>()}};
+}
+
+template <class P, ContactLaw Law>
+int tactile_field(const TactileArgs<typename P::Real>& a) {
+  using Real = typename P::Real;
+  static constexpr auto kForce =
+      by_shape<P>([]<class Shape>() { return &chunk_force<P, Law, Shape>; });
+  alignas(64) Real buffer[kGroup * 3 * kTactileTile];
+  int count = 0;
+  for (int first = 0; first < a.pad->tiles(); first += kGroup) {
+    unsigned written = 0;
+    for (int k = 0; k < a.n_touches; ++k)
+      written = kForce[a.shapes[k].shape](a, k, first, written, buffer);
+    for (int l = 0; written != 0; ++l, written >>= 1) {
+      if ((written & 1U) == 0) continue;
+      const Real* tile = buffer + 3 * kTactileTile * l;
+      if (a.values != nullptr)
+        for (int i = 0; i < 3 * kTactileTile; ++i) a.values[3 * kTactileTile * count + i] = tile[i];
+      if (a.dense != nullptr)
+        write_dense<typename P::Architecture>(*a.pad, first + l, tile, a.dense);
+      a.active[count++] = first + l;
+    }
+  }
+  return count;
+}
+
+/// Returns the number of tiles that something touches.
+template <class P>
+int tactile_field_of(const TactileArgs<typename P::Real>& a) {
+  switch (a.law) {
+    case ContactLaw::paper: return tactile_field<P, ContactLaw::paper>(a);
+    case ContactLaw::linear: return tactile_field<P, ContactLaw::linear>(a);
+    case ContactLaw::clamped: break;
+  }
+  return tactile_field<P, ContactLaw::clamped>(a);
+}
+
+template <class P>
+int any_field(const TactileArgs<typename P::Real>& a) {
+  return a.pad->curved() ? tactile_field_of<OnCurvedPad<P>>(a)
+                         : tactile_field_of<AcrossPoints<P>>(a);
+}
+
+}  // namespace tangere::kernels

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tactile fields of many environments with a small, flat pad: one lane each, the points of a tile
+// one after the other.
+//
+// The same arithmetic as across points, lane by lane, so that an environment has the same bits
+// either way.
+#pragma once
+
+#include "kernels/tactile/tactile-inl.hpp"
+
+namespace tangere::kernels {
+
+/// Eight environments in double, or two groups of eight rounded to single precision.
+template <class P, class Pick>
+typename P::N lanes_of(const Touch<LaneRow>* touch, const Pick& pick) {
+  using Arch = typename P::Architecture;
+  if constexpr (P::kSingle) {
+    return narrow(load_lanes<Arch>(pick(touch[0]).lane), load_lanes<Arch>(pick(touch[1]).lane));
+  } else {
+    return load_lanes<Arch>(pick(touch[0]).lane);
+  }
+}
+
+template <class P>
+Vec3<typename P::N> lanes_of(const Touch<LaneRow>* touch, Vec3<LaneRow> Touch<LaneRow>::*v) {
+  return {lanes_of<P>(touch, [v](const auto& t) -> const LaneRow& { return (t.*v).x; }),
+          lanes_of<P>(touch, [v](const auto& t) -> const LaneRow& { return (t.*v).y; }),
+          lanes_of<P>(touch, [v](const auto& t) -> const LaneRow& { return (t.*v).z; })};
+}
+
+template <class P>
+PointLaw<typename P::N> point_law(const Touch<LaneRow>* touch) {
+  using N = typename P::N;
+  const auto one = [&](LaneRow Touch<LaneRow>::*m) {
+    return lanes_of<P>(touch, [m](const auto& t) -> const LaneRow& { return t.*m; });
+  };
+  return {lanes_of<P>(touch, &Touch<LaneRow>::omega), N(0.0) - one(&Touch<LaneRow>::kn),
+          one(&Touch<LaneRow>::kt), one(&Touch<LaneRow>::mu), one(&Touch<LaneRow>::damping)};
+}
+
+/// The brackets of one tile in every environment; false where it is out of reach of all.
+template <class P, class Shape>
+bool lane_brackets(const PadTiles& pad, int tile, const TouchShape& s, const Touch<LaneRow>* touch,
+                   Shape& shape) {
+  using Arch = typename P::Architecture;
+  using D = Lanes<Arch>;
+  constexpr int kGroups = P::kLanes / kGroup;
+  const Vec3<D> t = {D(pad.x[tile]), D(pad.y[tile]), D(pad.z[tile])};
+  const D reach(pad.radius[tile]);
+  D row[kGroups][kBracketRows];
+  bool near = false;
+  for (int g = 0; g < kGroups; ++g) {
+    const auto& at = reinterpret_cast<const Touch<D>&>(touch[g]);
+    near |= any(Shape::bracket(s, at, t, reach, row[g]) < D(0.0));
+    const Vec3<D> u = tile_velocity(at, t);
+    row[g][Shape::kRows - 3] = u.x, row[g][Shape::kRows - 2] = u.y, row[g][Shape::kRows - 1] = u.z;
+  }
+  if (!near) return false;
+  typename P::N narrowed[Shape::kRows];
+  for (int i = 0; i < Shape::kRows; ++i) {
+    if constexpr (P::kSingle) {
+      narrowed[i] = narrow(row[0][i], row[1][i]);
+    } else {
+      narrowed[i] = row[0][i];
+    }
+  }
+  shape.set(narrowed);
+  shape.u = {narrowed[Shape::kRows - 3], narrowed[Shape::kRows - 2], narrowed[Shape::kRows - 1]};
+  return true;
+}
+
+/// One shape on one tile: `out` (64, 3) lanes, written whole when `fresh` and something touches,
+/// else added to.
+template <class P, ContactLaw Law, class Shape>
+bool tile_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, int k, bool fresh,
+                typename P::N* out) {
+  using N = typename P::N;
+  const PadTiles& pad = *a.pad;
+  const Touch<LaneRow>* touch = a.touches[k];
+  Mat3<N> pose;
+  if constexpr (Shape::kTurns)
+    for (int i = 0; i < 9; ++i)
+      pose.m[i / 3][i % 3] =
+          lanes_of<P>(touch, [i](const auto& t) -> const LaneRow& { return t.Q.m[i / 3][i % 3]; });
+  Shape shape(a.shapes[k], pose);
+  if (!lane_brackets<P>(pad, tile, a.shapes[k], touch, shape)) return false;
+  const PointLaw<N> law = point_law<P>(touch);
+  const auto* offsets = P::offsets(pad) + 2 * kTactileTile * pad.kind[tile];
+  const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
+  bool touched = false;
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < cols; ++j) {
+      const int at = i * kTileSide + j;
+      Vec3<N> f;
+      const bool here = point_force<P, Law>(
+          shape, law, {N(double(offsets[at])), N(double(offsets[kTactileTile + at]))}, f);
+      touched |= here;
+      if (!here) {
+        if (!fresh) continue;
+        f = zero3<N>();
+      } else if (pad.skewed) {
+        f = in_skewed_axes(pad.axes, f);
+      }
+      N* to = out + 3 * at;
+      to[0] = fresh ? f.x : to[0] + f.x;
+      to[1] = fresh ? f.y : to[1] + f.y;
+      to[2] = fresh ? f.z : to[2] + f.z;
+    }
+  return touched;
+}
+
+/// (64, 3) lanes to rows of (point, 3) in the array of each lane.
+template <class P>
+void write_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, const typename P::N* from) {
+  const PadTiles& pad = *a.pad;
+  const int rows = pad.rows_of(tile), numbers = 3 * pad.cols_of(tile);
+  const auto* values = reinterpret_cast<const typename P::Real*>(from);
+  for (int l = 0; l < P::kLanes; ++l) {
+    if (a.dense[l] == nullptr) continue;
+    auto* to = a.dense[l] + 3 * pad.first_of(tile);
+    for (int i = 0; i < rows; ++i, to += 3 * pad.cols)
+      for (int j = 0; j < numbers; ++j) to[j] = values[(3 * kTileSide * i + j) * P::kLanes + l];
+  }
+}
+
+template <class P, ContactLaw Law>
+void tactile_block(const TactileBlockArgs<typename P::Real>& a) {
+  static constexpr auto kForce =
+      by_shape<P>([]<class Shape>() { return &tile_lanes<P, Law, Shape>; });
+  typename P::N buffer[3 * kTactileTile];
+  for (int tile = 0; tile < a.pad->tiles(); ++tile) {
+    bool written = false;
+    for (int k = 0; k < a.n_touches; ++k)
+      written |= kForce[a.shapes[k].shape](a, tile, k, !written, buffer);
+    if (written) write_lanes<P>(a, tile, buffer);
+  }
+}
+
+template <class P>
+void tactile_block(const TactileBlockArgs<typename P::Real>& a) {
+  switch (a.law) {
+    case ContactLaw::paper: return tactile_block<P, ContactLaw::paper>(a);
+    case ContactLaw::linear: return tactile_block<P, ContactLaw::linear>(a);
+    case ContactLaw::clamped: break;
+  }
+  return tactile_block<P, ContactLaw::clamped>(a);
+}
+
+}  // namespace tangere::kernels

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+// Box pushing: a finger pushes a box to a pose while somebody else pushes it too (Xu et al., third
+// experiment).
+//   reward = -0.01 |Δp/10 mm|² - 0.1 (Δθ/5°)² - |x_tip - x_face|²/(20 mm)² - 0.1 |u|²
+// Δp, Δθ: box to goal; x_tip, x_face: middle of the pad and of the face that it pushes, horizontal;
+// u: the action, whose tanh drives the motors.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "tasks/catalogue/box_pushing_script.hpp"
+#include "tasks/catalogue/task_list.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kActions = 100;
+constexpr int kPushActions = 10;  // a random push lasts so many actions, 0.25 s
+constexpr double kAngleUnit = std::numbers::pi / 36, kLengthUnit = 0.01, kGap = 0.02;
+constexpr double kPosition = 0.01, kAngle = 0.1, kEffort = 0.1;  // weights
+constexpr double kNear = 0.03, kAligned = 0.1;                   // of a success [m], [rad]
+// Memory: the goal's x, y, yaw; the push on the box, in units of its motors.
+constexpr std::size_t kGoal = 0, kPush = 3;
+constexpr std::size_t kTip = 0, kFace = 3;  // in Moment::variables
+
+Scene without_randomisation(Scene scene) {
+  scene.randomizations.clear();
+  return scene;
+}
+
+class BoxPushing : public Task {
+ public:
+  BoxPushing(const Scene& scene, PushObservation observation)
+      : Task(without_randomisation(scene), declare_box_pushing(observation)),
+        observation_(observation),
+        turn_(coordinate("hand_turn")),
+        slide_(coordinate("hand_slide")),
+        box_(coordinate("box_slide")),
+        box_turn_(coordinate("box_turn")),
+        script_(model().scene()) {
+    if (model().variables().size() != 2 || model().variables()[0].name != "tip" ||
+        model().variables()[1].name != "face")
+      throw InputError(model().scene().path + ": box pushing needs the end effectors tip and face");
+  }
+
+  void start(const TaskStart& s) const override {
+    const auto number = [&](std::uint32_t k, double low, double high) {
+      return task_uniform(s.seed, s.episode, 0, k, low, high);
+    };
+    s.q[box_ + 1] = number(0, -0.02, 0.02);
+    s.memory[kGoal] = number(1, 0.15, 0.25);
+    s.memory[kGoal + 1] = number(2, -0.2, 0.2);
+    const double yaw = std::numbers::pi * s.memory[kGoal + 1], spread = std::numbers::pi / 16;
+    s.memory[kGoal + 2] = number(3, yaw - spread, yaw + spread);
+  }
+
+  /// Every tenth action there is a new push, or none, each with probability ½.
+  void begin_action(const TaskView& view, std::span<double> memory) const override {
+    if (view.actions % kPushActions != 0) return;
+    const auto number = [&](std::uint32_t k) {
+      return task_uniform(view.seed, view.episode, 1 + view.actions, k, -1, 1);
+    };
+    const bool pushed = number(0) < 0;
+    for (std::uint32_t k = 0; k < 2; ++k) memory[kPush + k] = pushed ? number(1 + k) : 0;
+  }
+
+  void controls(const TaskView& view, int, std::span<double> u) const override {
+    for (std::size_t k = 0; k < 3; ++k) u[k] = std::tanh(view.action[k]);
+    u[3] = view.memory[kPush];
+    u[4] = view.memory[kPush + 1];
+    u[5] = 0;
+  }
+
+  void observe(const TaskView& view, std::span<double> o) const override {
+    const Moment& now = view.now();
+    in_hand(now, {view.memory[kGoal], view.memory[kGoal + 1], view.memory[kGoal + 2]}, o.first(3));
+    if (observation_ == PushObservation::privileged) in_hand(now, box_pose(now), o.subspan(3));
+    if (observation_ == PushObservation::tactile)
+      std::copy(now.tactile.begin(), now.tactile.end(), o.begin() + 3);
+  }
+
+  Verdict judge(const TaskView& view) const override {
+    const std::array<double, 3> off = to_goal(view);
+    const Moment& now = view.now();
+    double gap = 0, effort = 0;
+    for (std::size_t k = 0; k < 2; ++k)
+      gap += square(now.variables[kTip + k] - now.variables[kFace + k]);
+    for (const double u : view.action) effort += u * u;
+    const double distance = square(off[0]) + square(off[1]);
+    const double reward = -kPosition * distance / square(kLengthUnit) -
+                          kAngle * square(off[2] / kAngleUnit) - gap / square(kGap) -
+                          kEffort * effort;
+    const bool there = distance < square(kNear) && std::abs(off[2]) < kAligned;
+    return {reward, false, view.actions == kActions && there};
+  }
+
+  void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
+    const std::array<double, 3> off = to_goal(view);
+    const Moment& now = view.now();
+    const MomentCotangent& to = out.moments.back();
+    // Every joint here slides or turns about one axis: coordinates and dofs have the same places.
+    for (std::size_t k = 0; k < 2; ++k) {
+      const double by_place = weight * 2 * kPosition * off[k] / square(kLengthUnit);
+      to.q[box_ + k] -= by_place;
+      out.memory[kGoal + k] += by_place;
+      const double gap =
+          weight * 2 * (now.variables[kTip + k] - now.variables[kFace + k]) / square(kGap);
+      to.variables[kTip + k] -= gap;
+      to.variables[kFace + k] += gap;
+    }
+    const double by_yaw = weight * 2 * kAngle * off[2] / square(kAngleUnit);
+    to.q[box_turn_] -= by_yaw;
+    out.memory[kGoal + 2] += by_yaw;
+    for (std::size_t k = 0; k < 3; ++k) out.action[k] -= weight * 2 * kEffort * view.action[k];
+  }
+
+  void controls_vjp(const TaskView& view, int, std::span<const double> weight,
+                    const ViewCotangent& out) const override {
+    for (std::size_t k = 0; k < 3; ++k)
+      out.action[k] += weight[k] * (1 - square(std::tanh(view.action[k])));
+    for (std::size_t k = 0; k < 2; ++k) out.memory[kPush + k] += weight[3 + k];
+  }
+
+  void begin_action_vjp(const TaskView& view, std::span<double> memory,
+                        const ViewCotangent&) const override {
+    if (view.actions % kPushActions != 0) return;
+    memory[kPush] = memory[kPush + 1] = 0;  // drawn
+  }
+
+  /// Feedback of the state, whatever is observed.
+  void scripted(const TaskView& view, std::span<const double>,
+                std::span<double> action) const override {
+    const Moment& now = view.now();
+    const std::array<double, 3> box = box_pose(now);
+    const PushState state = {now.q[turn_],
+                             {now.q[slide_], now.q[slide_ + 1]},
+                             box,
+                             {view.memory[kGoal], view.memory[kGoal + 1], view.memory[kGoal + 2]}};
+    const std::array<double, 3> u = script_.controls(state);
+    for (std::size_t k = 0; k < 3; ++k) action[k] = std::atanh(std::clamp(u[k], -0.99, 0.99));
+  }
+
+ private:
+  static double square(double x) { return x * x; }
+
+  /// x, y [m] and yaw [rad] in the world.
+  [[nodiscard]] std::array<double, 3> box_pose(const Moment& now) const {
+    return {script_.box_rest()[0] + now.q[box_], script_.box_rest()[1] + now.q[box_ + 1],
+            now.q[box_turn_]};
+  }
+  /// The box from its goal.
+  [[nodiscard]] std::array<double, 3> to_goal(const TaskView& view) const {
+    std::array<double, 3> off = box_pose(view.now());
+    for (std::size_t k = 0; k < 3; ++k) off[k] -= view.memory[kGoal + k];
+    return off;
+  }
+  /// A pose as seen from the middle of the pad, x where it pushes.
+  void in_hand(const Moment& now, const std::array<double, 3>& pose, std::span<double> o) const {
+    const double c = std::cos(now.q[turn_]), s = std::sin(now.q[turn_]);
+    const double x = pose[0] - now.variables[kTip], y = pose[1] - now.variables[kTip + 1];
+    o[0] = c * x + s * y;
+    o[1] = c * y - s * x;
+    o[2] = pose[2] - now.q[turn_];
+  }
+
+  PushObservation observation_;
+  std::size_t turn_, slide_, box_, box_turn_;
+  PushScript script_;
+};
+
+}  // namespace
+
+TaskSpec declare_box_pushing(PushObservation observation) {
+  TaskSpec spec;
+  spec.name = "box_pushing";
+  spec.summary = "A finger pushes a box to a pose; the goal and the field of the pad are observed.";
+  spec.scene = "box_pushing.xml";
+  spec.success = "the box is within 30 mm and 0.1 rad of its goal after the last action";
+  spec.action = {"u", {3}, "1", "tanh(u) times 1 N, 1 N (the hand's x, y) and 3 N m (its turn)"};
+  spec.observations = {{"goal", {3}, "m m rad", "goal of the box: x, y, yaw as seen from the pad"}};
+  spec.steps_per_action = 5;
+  spec.moments = {5};
+  spec.horizon = kActions;
+  spec.memory = 5;
+  spec.looks_at_variables = true;
+  if (observation == PushObservation::tactile) {
+    spec.observations.push_back({"tactile", {13, 10, 3}, "N", "field of the pad"});
+    spec.looks_at_tactile = true;
+  } else if (observation == PushObservation::privileged) {
+    spec.name = "box_pushing_privileged";
+    spec.summary = "The same; the goal and the box's pose are observed.";
+    spec.observations.push_back({"box", {3}, "m m rad", "the box: x, y, yaw as seen from the pad"});
+  } else {
+    spec.name = "box_pushing_reduced";
+    spec.summary = "The same; the goal alone is observed.";
+  }
+  return spec;
+}
+
+std::unique_ptr<Task> make_box_pushing(const Scene& scene, PushObservation observation) {
+  return std::make_unique<BoxPushing>(scene, observation);
+}
+
+}  // namespace tangere

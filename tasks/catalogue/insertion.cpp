@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+// Insertion: a held box is lowered onto a hole that it misses, and moved by what the pads feel when
+// it hits the rim (Xu et al., fifth experiment). Every attempt starts anew above the hole, e = (x,
+// y, yaw) off it, with e changed by the action.
+//   reward = 10 and the end if the box is in the hole, else -|e_xy|²/(6 mm)² - (e_yaw/10°)²
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "engine/sense/flow_map.hpp"
+#include "tasks/catalogue/task_list.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kSteps = 45, kAttempts = 15;
+constexpr std::size_t kRows = 13, kCols = 10, kPads = 2, kPoints = kRows * kCols;
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr std::array<double, 3> kAct{0.02, 0.02, 10 * kDegree};  // of an action [m, m, rad]
+constexpr std::array<double, 3> kOff{6e-3, 6e-3, 10 * kDegree};  // at the start, at most
+constexpr double kInside = 0.0247;  // height of the box's lower corners [m]
+constexpr double kSuccess = 10, kNoise = 1e-5,
+                 kTooLittle = 1e-4;  // reward; noise of a reading, least shear [N]
+constexpr double kShift = 4.1e-3, kTurn = 5 * kDegree;  // of the script: amid what does not go in
+constexpr double kApartNoise = 0.01, kTurningNoise = 0.04;  // less is no sign
+constexpr int kPatience = 3;    // the script turns every so many attempts at least
+constexpr double kLift = 6e-3;  // targets begin so high and end so low [m]
+// Memory: e before the action in hand, e in it, height of the grip [m], share of 20 N that grips,
+// yaw that actions have added, which a script may know [rad].
+constexpr std::size_t kBefore = 0, kNow = 3, kHeight = 6, kGrip = 7, kTurned = 8;
+
+/// The scene with what nobody knows of the skin as what varies: of both pads alike.
+Scene with_skin(Scene scene) {
+  scene.randomizations.clear();
+  const auto vary = [&](RandomTarget target, const char* pad, ContactField field) {
+    RandomizationDescription d;
+    d.target = target;
+    d.name = pad;
+    d.field = field;
+    if (target == RandomTarget::pair_contact) d.second_name = "box";
+    d.distribution.kind = Distribution::Kind::list;
+    d.distribution.values = {1};  // replaced at the start of an episode
+    scene.randomizations.push_back(d);
+  };
+  for (const char* pad : {"left_pad", "right_pad"}) {
+    for (const ContactField field : {ContactField::kn, ContactField::kt, ContactField::mu})
+      vary(RandomTarget::pair_contact, pad, field);
+    for (const ContactField field :
+         {ContactField::kn, ContactField::kt, ContactField::mu, ContactField::damping})
+      vary(RandomTarget::tactile, pad, field);
+  }
+  return scene;
+}
+
+class Insertion : public Task {
+ public:
+  Insertion(const Scene& scene, InsertionMotion motion)
+      : Task(with_skin(scene), declare_insertion(motion)),
+        moved_(motion == InsertionMotion::rotation      ? std::vector<std::size_t>{2}
+               : motion == InsertionMotion::translation ? std::vector<std::size_t>{0, 1}
+                                                        : std::vector<std::size_t>{0, 1, 2}),
+        hand_(coordinate("hand_slide")),
+        turn_(coordinate("hand_turn")),
+        finger_(coordinate("left_finger")),
+        box_(coordinate("box")),
+        hand_v_(dof("hand_slide")),
+        turn_v_(dof("hand_turn")),
+        box_v_(dof("box")) {
+    for (const LinkDescription& link : model().scene().links)
+      if (link.joint.name == "box") rest_ = link.joint.pose.position;
+    if (model().sensors().size() != kPads ||
+        static_cast<std::size_t>(model().sensors()[0].points) != kPoints)
+      throw InputError(model().scene().path + ": insertion needs two pads of 13 × 10 points");
+  }
+
+  void start(const TaskStart& s) const override {
+    const auto number = [&](std::uint32_t k, double low, double high) {
+      return task_uniform(s.seed, s.episode, 0, k, low, high);
+    };
+    for (const std::size_t k : moved_)
+      s.memory[kBefore + k] = s.memory[kNow + k] =
+          number(static_cast<std::uint32_t>(k), -kOff[k], kOff[k]);
+    s.memory[kHeight] = number(3, -0.01, 5e-3);
+    s.memory[kGrip] = number(4, 0.125, 0.8);
+    const std::array<double, 7> skin{
+        number(5, 2e3, 14e3), number(6, 20, 140),   number(7, 0.5, 2.5), number(8, 50, 450),
+        number(9, 0.2, 2.3),  number(10, 0.5, 2.5), number(11, 0, 100)};
+    for (std::size_t k = 0; k < s.varying.size(); ++k) s.varying[k] = skin[k % skin.size()];
+    hold({0, 0, 0, s.memory, {}, {}}, s.q, s.v);
+  }
+
+  void begin_action(const TaskView& view, std::span<double> memory) const override {
+    for (std::size_t k = 0; k < 3; ++k) memory[kBefore + k] = memory[kNow + k];
+    const std::array<double, 3> e = off(view);
+    memory[kTurned] += e[2] - memory[kBefore + 2];
+    std::copy(e.begin(), e.end(), memory.begin() + kNow);
+  }
+
+  /// The box between open fingers, 3 mm above the rim.
+  void place(const TaskView& view, std::span<double> q, std::span<double> v) const override {
+    hold(view, q, v);
+  }
+
+  /// Hand x, y, z, turn; fingers. They close in five steps, then the hand goes down.
+  void controls(const TaskView& view, int step, std::span<double> u) const override {
+    const std::array<double, 3> e = off(view);
+    u[0] = e[0];
+    u[1] = e[1];
+    u[2] = view.memory[kHeight] + kLift - 2 * kLift * std::clamp((step - 4) / 18.0, 0.0, 1.0);
+    u[3] = e[2];
+    u[4] = u[5] = view.memory[kGrip];
+  }
+
+  void observe(const TaskView& view, std::span<double> o) const override {
+    const std::span<const double> before = view.moments[0].tactile, after = view.moments[1].tactile;
+    constexpr std::size_t kReading = 3 * kPads * kPoints;
+    std::array<double, kReading> read{}, first{};
+    const auto noise = [&](std::size_t i) {
+      return task_normal(view.seed, view.episode, 1 + view.actions, static_cast<std::uint32_t>(i),
+                         kNoise);
+    };
+    for (std::size_t i = 0; i < kReading; ++i) {
+      read[i] = after[i] + noise(i);
+      first[i] = before[i] + noise(kReading + i);
+    }
+    std::array<ShearField<double>, kPads> pads;
+    for (std::size_t pad = 0; pad < kPads; ++pad)
+      pads[pad] = {std::span<const double>(read).subspan(3 * kPoints * pad, 3 * kPoints),
+                   std::span<const double>(first).subspan(3 * kPoints * pad, 3 * kPoints)};
+    std::array<double, 2 * kPads * kPoints> flow{};
+    normalised_flow(pads, flow, kTooLittle);
+    for (std::size_t pad = 0; pad < kPads; ++pad)
+      for (std::size_t p = 0; p < kPoints; ++p)
+        for (std::size_t c = 0; c < 2; ++c)
+          o[(2 * pad + c) * kPoints + p] = flow[(pad * kPoints + p) * 2 + c];
+  }
+
+  Verdict judge(const TaskView& view) const override {
+    const std::array<double, 3> e = off(view);
+    const bool inside = highest_below(view.now()) < kInside;
+    double far = 0;
+    for (std::size_t k = 0; k < 3; ++k) far += e[k] / kOff[k] * e[k] / kOff[k];
+    return {inside ? kSuccess : -far, inside, inside};
+  }
+
+  void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
+    if (judge(view).success) return;
+    std::array<double, 3> by_off = off(view);
+    for (std::size_t k = 0; k < 3; ++k) by_off[k] *= -weight * 2 / (kOff[k] * kOff[k]);
+    off_vjp(by_off, out);
+  }
+
+  void controls_vjp(const TaskView&, int, std::span<const double> weight,
+                    const ViewCotangent& out) const override {
+    off_vjp({weight[0], weight[1], weight[3]}, out);
+    out.memory[kHeight] += weight[2];
+    out.memory[kGrip] += weight[4] + weight[5];
+  }
+
+  void begin_action_vjp(const TaskView&, std::span<double> memory,
+                        const ViewCotangent& out) const override {
+    for (std::size_t a = 0; a < moved_.size(); ++a) {
+      const std::size_t k = moved_[a];
+      out.action[a] += kAct[k] * (memory[kNow + k] + (k == 2 ? memory[kTurned] : 0));
+    }
+    for (std::size_t k = 0; k < 3; ++k) memory[kNow + k] += std::exchange(memory[kBefore + k], 0.0);
+  }
+
+  /// Of hold(): hand and box turn about the same axis.
+  void place_vjp(const TaskView&, std::span<const double> q, std::span<const double>,
+                 const ViewCotangent& out) const override {
+    for (std::size_t k = 0; k < 2; ++k) out.memory[kNow + k] += q[hand_v_ + k] + q[box_v_ + k];
+    out.memory[kNow + 2] += q[turn_v_] + q[box_v_ + 5];
+    out.memory[kHeight] += q[hand_v_ + 2];
+  }
+
+  void scripted(const TaskView& view, std::span<const double> o,
+                std::span<double> action) const override;
+
+ private:
+  static constexpr std::array<double, 3> kHalf{0.0175, 0.025, 0.03};  // edges of the box [m]
+  static constexpr double kApart = -0.0177;  // fingers: 0.2 mm from the box [m]
+
+  /// Of the corners of the box's lower face [m]: a box that tilts in its grip is not inside.
+  [[nodiscard]] double highest_below(const Moment& m) const {
+    const double* const r = &m.q[box_ + 3];
+    const double zx = 2 * (r[1] * r[3] - r[0] * r[2]), zy = 2 * (r[2] * r[3] + r[0] * r[1]);
+    const double zz = 1 - 2 * (r[1] * r[1] + r[2] * r[2]);
+    return rest_[2] + m.q[box_ + 2] + std::abs(zx) * kHalf[0] + std::abs(zy) * kHalf[1] -
+           zz * kHalf[2];
+  }
+  [[nodiscard]] bool slides() const { return moved_.front() == 0; }
+  [[nodiscard]] bool turns() const { return moved_.back() == 2; }
+  /// e in the action in hand: memory before it plus what it asks for.
+  [[nodiscard]] std::array<double, 3> off(const TaskView& view) const {
+    std::array<double, 3> e{view.memory[kBefore], view.memory[kBefore + 1],
+                            view.memory[kBefore + 2]};
+    for (std::size_t a = 0; a < moved_.size() && a < view.action.size(); ++a)
+      e[moved_[a]] += kAct[moved_[a]] * view.action[a];
+    return e;
+  }
+
+  void off_vjp(const std::array<double, 3>& by_off, const ViewCotangent& out) const {
+    for (std::size_t k = 0; k < 3; ++k) out.memory[kBefore + k] += by_off[k];
+    for (std::size_t a = 0; a < moved_.size(); ++a)
+      out.action[a] += kAct[moved_[a]] * by_off[moved_[a]];
+  }
+
+  void hold(const TaskView& view, std::span<double> q, std::span<double> v) const {
+    const std::span<const double> e = view.memory.subspan(kNow, 3);
+    std::fill(v.begin(), v.end(), 0.0);
+    q[hand_] = e[0];
+    q[hand_ + 1] = e[1];
+    q[hand_ + 2] = view.memory[kHeight];
+    q[turn_] = e[2];
+    q[finger_] = q[finger_ + 1] = kApart;
+    q[box_] = e[0] - rest_[0];
+    q[box_ + 1] = e[1] - rest_[1];
+    q[box_ + 2] = 0;
+    q[box_ + 3] = std::cos(e[2] / 2);
+    q[box_ + 4] = q[box_ + 5] = 0;
+    q[box_ + 6] = std::sin(e[2] / 2);
+  }
+
+  std::vector<std::size_t> moved_;          // which of e an action changes
+  std::size_t hand_, turn_, finger_, box_;  // coordinates
+  std::size_t hand_v_, turn_v_, box_v_;     // dofs
+  Vector3 rest_{};                          // of the box's joint
+};
+
+/// Where the rim pushes. Off in x, one finger is pushed up more than the other; off in y, the box
+/// turns about the grip: then it is moved the other way, by what is off on average where it does
+/// not go in. A turned box stands on two opposite corners, which feels the same to either side, so
+/// the script tries one side, then the other.
+void Insertion::scripted(const TaskView& view, std::span<const double> o,
+                         std::span<double> action) const {
+  std::array<double, kPads> up{};
+  double moment = 0, square = 0;
+  for (std::size_t pad = 0; pad < kPads; ++pad) {
+    const double sign =
+        pad == 0 ? 1
+                 : -1;  // rows of the left pad go up, those of the right pad down; columns to -y
+    for (std::size_t p = 0; p < kPoints; ++p) {
+      const double fz = sign * o[2 * pad * kPoints + p], fy = -o[(2 * pad + 1) * kPoints + p];
+      const double z = sign * (static_cast<double>(p / kCols) - 6),
+                   y = 4.5 - static_cast<double>(p % kCols);
+      up[pad] += fz;
+      moment += y * fz - z * fy;
+      square += y * y + z * z;
+    }
+  }
+  const double total = up[0] + up[1], apart = (up[1] - up[0]) / total,
+               turning = 10 * moment / square;
+  std::array<double, 3> move{};
+  const bool feels = total > 0;
+  if (feels && slides() && std::abs(apart) > kApartNoise) move[0] = -std::copysign(kShift, apart);
+  if (feels && slides() && std::abs(turning) > kTurningNoise)
+    move[1] = -std::copysign(kShift, turning);
+  const bool straight = move[0] == 0 && move[1] == 0;
+  if (feels && straight && !turns()) {
+    // Something is off all the same: what shows most.
+    const std::size_t k = std::abs(apart) / kApartNoise > std::abs(turning) / kTurningNoise ? 0 : 1;
+    move[k] = -std::copysign(kShift, k == 0 ? apart : turning);
+  }
+  if (turns() && (straight || view.actions % kPatience == kPatience - 1)) {
+    const double turned = view.memory[kTurned];
+    const double next = turned == 0 ? kTurn : turned > 0 ? -kTurn : slides() ? 0 : kTurn;
+    move[2] = next - turned;
+  }
+  for (std::size_t a = 0; a < moved_.size(); ++a)
+    action[a] = std::clamp(move[moved_[a]] / kAct[moved_[a]], -1.0, 1.0);
+}
+
+}  // namespace
+
+TaskSpec declare_insertion(InsertionMotion motion) {
+  const bool turns = motion != InsertionMotion::translation,
+             slides = motion != InsertionMotion::rotation;
+  TaskSpec spec;
+  spec.name = !slides ? "insertion_rotation" : !turns ? "insertion_translation" : "insertion";
+  spec.summary = !slides  ? "The same; only the yaw is off and is corrected."
+                 : !turns ? "The same; only the place is off and is corrected."
+                          : "A held box is moved and turned until it goes into a hole.";
+  spec.scene = "insertion.xml";
+  spec.success = "all corners of the box's lower face are below 24.7 mm at the end of an attempt";
+  spec.action = {"correction",
+                 {(turns ? 1U : 0U) + (slides ? 2U : 0U)},
+                 "1",
+                 !slides  ? "of the yaw, times 10 degrees"
+                 : !turns ? "of x and y, times 20 mm"
+                          : "of x and y, times 20 mm, and of the yaw, times 10 degrees",
+                 -1,
+                 1};
+  spec.observations = {{"flow",
+                        {4, 13, 10},
+                        "1",
+                        "normalised change of shear from step 6 to 44: left pad up and to -y, "
+                        "right pad down and to -y",
+                        -1,
+                        1}};
+  spec.steps_per_action = kSteps;
+  spec.control_every = 1;
+  spec.moments = {6, 44, kSteps};
+  spec.horizon = kAttempts - 1;
+  spec.opening = true;
+  spec.restarts = true;
+  spec.memory = 9;
+  spec.looks_at_tactile = true;
+  return spec;
+}
+
+std::unique_ptr<Task> make_insertion(const Scene& scene, InsertionMotion motion) {
+  return std::make_unique<Insertion>(scene, motion);
+}
+
+}  // namespace tangere

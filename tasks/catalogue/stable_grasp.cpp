@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: Apache-2.0
+// Stable grasp: find where a bar of unknown densities can be lifted without tilting (Xu et al.,
+// second experiment). A grasp is 180 targets of the hand: close, hold, lift, hold, down, hold,
+// open. Lifted, the bar hangs level where it is held at its centre of mass; elsewhere it turns
+// about the grip, and the pads read that turning as a vortex of shear.
+//   reward = 100 and the end where |tilt| < 0.02 rad and the bar is lifted by 5 mm after step 60,
+//       else -10 |tilt|
+// tilt = asin(e_z · R e_y), R the bar's orientation.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "engine/sense/flow_map.hpp"
+#include "tasks/catalogue/task_list.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kBlocks = 11, kRows = 13, kCols = 10, kPads = 2;
+constexpr int kSteps = 180, kLook = 60, kGrasps = 10;
+constexpr double kBlock = 0.025;                               // edge of a block [m]
+constexpr double kReach = 0.05, kFarthest = 0.11;              // of an action, of the hand [m]
+constexpr double kLevel = 0.02, kLifted = 5e-3;                // [rad], [m]
+constexpr double kSuccess = 100, kTilt = 10;                   // of the reward
+constexpr double kOpen = -0.025, kClosed = 0, kHeight = 0.03;  // targets of fingers and hand [m]
+constexpr double kTooLittle = 1e-6;                            // shear that counts as none [N]
+// Memory: where the hand grasps, where it grasped before [m], height of the bar at rest [m].
+constexpr std::size_t kPlace = 0, kBefore = 1, kRest = 2;
+
+/// 0 before step `from`, 1 after `length` more.
+double ramp(int step, int from, int length) {
+  return std::clamp(static_cast<double>(step + 1 - from) / length, 0.0, 1.0);
+}
+
+/// The scene with densities as what varies, block by block.
+Scene with_densities(Scene scene) {
+  scene.randomizations.clear();
+  for (int b = 0; b < kBlocks; ++b) {
+    RandomizationDescription d;
+    d.target = RandomTarget::density;
+    d.name = "block_" + std::to_string(b);
+    d.distribution.kind = Distribution::Kind::list;
+    d.distribution.values = {500};  // replaced at the start of an episode
+    scene.randomizations.push_back(d);
+  }
+  return scene;
+}
+
+class StableGrasp : public Task {
+ public:
+  explicit StableGrasp(const Scene& scene)
+      : Task(with_densities(scene), declare_stable_grasp()),
+        hand_(coordinate("hand_slide")),
+        bar_(coordinate("bar")),
+        bar_v_(dof("bar")) {
+    for (const SensorInfo& sensor : model().sensors())
+      if (model().sensors().size() != kPads || sensor.rows != kRows || sensor.cols != kCols)
+        throw InputError(model().scene().path + ": stable grasp needs two pads of 13 × 10 points");
+  }
+
+  /// Densities that balance at `centre`, in blocks from the bar's right end: the block there is
+  /// drawn, and so is the sum; what is left goes to both sides so that their moments about `centre`
+  /// are equal, shared among the blocks of a side by chance.
+  void start(const TaskStart& s) const override {
+    std::uint32_t next = 0;
+    const auto number = [&](double low, double high) {
+      return task_uniform(s.seed, s.episode, 0, next++, low, high);
+    };
+    const double centre = number(1, kBlocks - 1), density = number(600, 700),
+                 sum = number(3000, 7000);
+    const int middle = static_cast<int>(centre);
+    const double offset = centre - (middle + 0.5);
+    std::array<double, kBlocks> share{};
+    std::array<double, 2> total{}, arm{};  // right, left
+    for (int b = 0; b < kBlocks; ++b) {
+      share[static_cast<std::size_t>(b)] = b == middle ? 0 : number(0, 1) + 0.1;
+      total[b > middle] += share[static_cast<std::size_t>(b)];
+    }
+    for (int b = 0; b < kBlocks; ++b)
+      if (b != middle)
+        arm[b > middle] +=
+            share[static_cast<std::size_t>(b)] / total[b > middle] * std::abs(b + 0.5 - centre);
+    const double sides = sum - density;
+    const double right = (sides * arm[1] - density * offset) / (arm[0] + arm[1]);
+    for (int b = 0; b < kBlocks; ++b) {
+      const double side = b > middle ? sides - right : right;
+      s.varying[static_cast<std::size_t>(b)] =
+          b == middle ? density : side * share[static_cast<std::size_t>(b)] / total[b > middle];
+    }
+    s.q[hand_ + 1] = 0;  // the first grasp is at the middle
+  }
+
+  void begin_action(const TaskView& view, std::span<double> memory) const override {
+    if (view.actions == 0) memory[kRest] = view.now().q[bar_ + 2];
+    memory[kBefore] = memory[kPlace];
+    memory[kPlace] = place(view);
+  }
+
+  /// Hand x, y, z, turn; fingers. The hand is over its place before the fingers touch.
+  void controls(const TaskView& view, int step, std::span<double> u) const override {
+    const double moved = ramp(step, 0, 10), closed = ramp(step, 10, 10) - ramp(step, 160, 20);
+    u[0] = u[3] = 0;
+    u[1] = view.memory[kBefore] + moved * (place(view) - view.memory[kBefore]);
+    u[2] = kHeight * (ramp(step, 30, 50) - ramp(step, 100, 50));
+    u[4] = u[5] = kOpen + closed * (kClosed - kOpen);
+  }
+
+  void observe(const TaskView& view, std::span<double> o) const override {
+    const std::span<const double> field = view.moments.front().tactile;
+    const std::array<ShearField<double>, kPads> pads{
+        ShearField<double>{field.first(field.size() / 2)},
+        ShearField<double>{field.subspan(field.size() / 2)}};
+    std::array<double, std::size_t{kPads} * kRows * kCols * 2> flow{};
+    normalised_flow(pads, flow, kTooLittle);
+    constexpr std::size_t kPoints = std::size_t{kRows} * kCols;
+    for (std::size_t pad = 0; pad < kPads; ++pad)
+      for (std::size_t p = 0; p < kPoints; ++p)
+        for (std::size_t c = 0; c < 2; ++c)
+          o[(2 * pad + c) * kPoints + p] = flow[(pad * kPoints + p) * 2 + c];
+  }
+
+  Verdict judge(const TaskView& view) const override {
+    const double tilt = std::abs(std::asin(slope(lifted(view))));
+    const bool level = tilt < kLevel && lifted(view).q[bar_ + 2] - view.memory[kRest] > kLifted;
+    return {level ? kSuccess : -kTilt * tilt, level, level};
+  }
+
+  void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const override {
+    if (judge(view).success) return;
+    // δR = R [θ]: δ(e_z · R e_y) = R_zz θ_x - R_zx θ_z.
+    const double* const r = &lifted(view).q[bar_ + 3];
+    const double zx = 2 * (r[1] * r[3] - r[0] * r[2]), zz = 1 - 2 * (r[1] * r[1] + r[2] * r[2]);
+    const double at = slope(lifted(view));
+    const double by_slope = -weight * kTilt * (at < 0 ? -1 : 1) / std::sqrt(1 - at * at);
+    out.moments.front().q[bar_v_ + 3] += by_slope * zz;
+    out.moments.front().q[bar_v_ + 5] -= by_slope * zx;
+  }
+
+  void controls_vjp(const TaskView& view, int step, std::span<const double> weight,
+                    const ViewCotangent& out) const override {
+    const double moved = ramp(step, 0, 10);
+    const bool within = within_reach(view.memory[kBefore], view.action[0]);
+    out.memory[kBefore] += weight[1] * (within ? 1 : 1 - moved);
+    if (within) out.action[0] += weight[1] * moved * kReach;
+  }
+
+  void begin_action_vjp(const TaskView& view, std::span<double> memory,
+                        const ViewCotangent& out) const override {
+    if (view.actions == 0) out.moments.back().q[bar_v_ + 2] += std::exchange(memory[kRest], 0.0);
+    const double by_place = within_reach(view.memory[kPlace], view.action[0]) ? memory[kPlace] : 0;
+    out.action[0] += by_place * kReach;
+    memory[kPlace] = by_place + std::exchange(memory[kBefore], 0.0);
+  }
+
+  /// Towards the heavier side. The bar slides and turns in the grip at rates that its weight and
+  /// its moment drive, and shear is proportional to a point's velocity: with v downward and ω about
+  /// the grip, the centre of mass is ω/v Σ r²/n away, the mean over the points that hold the bar.
+  void scripted(const TaskView&, std::span<const double> o,
+                std::span<double> action) const override {
+    double weight = 0, moment = 0, square = 0;
+    for (std::size_t pad = 0; pad < kPads; ++pad) {
+      const double up =
+          pad == 0 ? 1
+                   : -1;  // rows of the left pad go up, those of the right pad down; columns to -y
+      for (std::size_t i = 0; i < kRows; ++i)
+        for (std::size_t j = 0; j < kCols; ++j) {
+          const std::size_t at = 2 * pad * kRows * kCols + i * kCols + j;
+          const double fz = up * o[at], fy = -o[at + std::size_t{kRows} * kCols];
+          const double z = up * (static_cast<double>(i) - 6) * kPitch,
+                       y = (4.5 - static_cast<double>(j)) * kPitch;
+          weight += fz;
+          moment += y * fz - z * fy;
+          square += y * y + z * z;
+        }
+    }
+    constexpr double kPoints = kPads * kRows * kCols;
+    const double away = moment / square / (weight / kPoints) * kMeanSquare;
+    action[0] = std::isfinite(away) ? std::clamp(kGain * away / kReach, -1.0, 1.0) : 0;
+  }
+
+ private:
+  static constexpr double kPitch = 1.5e-3;  // of the pads' points [m]
+  static constexpr double kMeanSquare =
+      0.4545 * 0.018 * 0.018;  // of a pad's 33 contact points [m²]
+  static constexpr double kGain = 1;
+
+  /// Where the action in hand grasps [m].
+  static double place(const TaskView& view) {
+    return std::clamp(view.memory[kBefore] + kReach * view.action[0], -kFarthest, kFarthest);
+  }
+  static bool within_reach(double before, double action) {
+    return std::abs(before + kReach * action) <= kFarthest;
+  }
+  static const Moment& lifted(const TaskView& view) { return view.moments.front(); }
+  /// e_z · R e_y.
+  [[nodiscard]] double slope(const Moment& m) const {
+    const double* const r = &m.q[bar_ + 3];
+    return std::clamp(2 * (r[2] * r[3] + r[0] * r[1]), -1.0, 1.0);
+  }
+
+  std::size_t hand_, bar_, bar_v_;
+};
+
+}  // namespace
+
+TaskSpec declare_stable_grasp() {
+  TaskSpec spec;
+  spec.name = "stable_grasp";
+  spec.summary =
+      "A gripper looks for the place where a bar of unknown densities can be lifted level.";
+  spec.scene = "stable_grasp.xml";
+  spec.success = "lifted by more than 5 mm with a tilt below 0.02 rad";
+  spec.action = {"shift", {1},
+                 "1",     "how far the next grasp is from this one along the bar, times 50 mm",
+                 -1,      1};
+  spec.observations = {
+      {"flow",
+       {4, 13, 10},
+       "1",
+       "normalised shear while lifting: left pad up and to -y, right pad down and to -y",
+       -1,
+       1}};
+  spec.steps_per_action = kSteps;
+  spec.control_every = 1;
+  spec.moments = {kLook, kSteps};
+  spec.horizon = kGrasps - 1;
+  spec.opening = true;
+  spec.settling_steps = 50;
+  spec.settling_timestep = 0.05;
+  spec.memory = 3;
+  spec.looks_at_tactile = true;
+  return spec;
+}
+
+std::unique_ptr<Task> make_stable_grasp(const Scene& scene) {
+  return std::make_unique<StableGrasp>(scene);
+}
+
+}  // namespace tangere

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// What all tasks share: the compiled scene, places of joints, random numbers.
+#include "tasks/catalogue/task.hpp"
+
+#include <fmt/format.h>
+
+#include "engine/model/random.hpp"
+
+namespace tangere {
+namespace {
+
+/// Of the first joint `name` or of the joints before it, summed.
+std::size_t place_of(const Scene& scene, const std::string& name, int (*count)(JointType)) {
+  int place = 0;
+  for (const LinkDescription& link : scene.links) {
+    if (link.joint.name == name) return static_cast<std::size_t>(place);
+    place += count(link.joint.type);
+  }
+  throw InputError(
+      fmt::format("{}: the scene has no joint '{}', which its task needs", scene.path, name));
+}
+
+}  // namespace
+
+Task::Task(const Scene& scene, TaskSpec spec)
+    : model_((spec.check(), scene)), spec_(std::move(spec)) {
+  if (spec_.control_every == 0) spec_.control_every = spec_.steps_per_action;
+}
+
+std::size_t Task::tactile_size() const {
+  std::size_t numbers = 0;
+  for (const SensorInfo& sensor : model_.sensors())
+    numbers += 3 * static_cast<std::size_t>(sensor.points);
+  return spec_.looks_at_tactile ? numbers : 0;
+}
+
+std::size_t Task::variables_size() const {
+  return spec_.looks_at_variables ? 3 * model_.variables().size() : 0;
+}
+
+void Task::start(const TaskStart&) const {}
+void Task::begin_action(const TaskView&, std::span<double>) const {}
+void Task::place(const TaskView&, std::span<double>, std::span<double>) const {}
+
+void Task::begin_action_vjp(const TaskView&, std::span<double>, const ViewCotangent&) const {}
+void Task::place_vjp(const TaskView&, std::span<const double>, std::span<const double>,
+                     const ViewCotangent&) const {
+  throw InputError(fmt::format(
+      "task {} restarts at every action and has no derivative of the states it restarts from; "
+      "expected Task::place_vjp",
+      spec_.name));
+}
+
+std::size_t Task::coordinate(const std::string& joint) const {
+  return place_of(model_.scene(), joint, position_count);
+}
+std::size_t Task::dof(const std::string& joint) const {
+  return place_of(model_.scene(), joint, dof_count);
+}
+
+double task_uniform(std::uint64_t seed, std::int64_t episode, std::int64_t step,
+                    std::uint32_t index, double low, double high) {
+  return uniform({seed, episode, step, Purpose::task, index}, low, high);
+}
+
+double task_normal(std::uint64_t seed, std::int64_t episode, std::int64_t step, std::uint32_t index,
+                   double deviation) {
+  return normal({seed, episode, step, Purpose::task, index}, 0, deviation);
+}
+
+}  // namespace tangere

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Names of tasks and how to make them.
+#include "tasks/catalogue/task_list.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+
+namespace tangere {
+namespace {
+
+struct Entry {
+  std::function<TaskSpec()> declare;
+  std::function<std::unique_ptr<Task>(const Scene&)> make;
+};
+
+/// A task with variants: `variant` goes to both functions.
+template <class Declare, class Make, class Variant>
+Entry entry(Declare declare, Make make, Variant variant) {
+  return {[=] { return declare(variant); },
+          [=](const Scene& scene) { return make(scene, variant); }};
+}
+
+const std::vector<Entry>& entries() {
+  using Push = PushObservation;
+  static const std::vector<Entry> all{
+      entry(declare_ball_rolling, make_ball_rolling, BallPad::large),
+      entry(declare_ball_rolling, make_ball_rolling, BallPad::small),
+      {declare_stable_grasp, make_stable_grasp},
+      entry(declare_box_pushing, make_box_pushing, Push::tactile),
+      entry(declare_box_pushing, make_box_pushing, Push::privileged),
+      entry(declare_box_pushing, make_box_pushing, Push::reduced),
+      entry(declare_cap_opening, make_cap_opening, CapObservation::tactile),
+      entry(declare_cap_opening, make_cap_opening, CapObservation::blind),
+      entry(declare_insertion, make_insertion, InsertionMotion::both),
+      entry(declare_insertion, make_insertion, InsertionMotion::translation),
+      entry(declare_insertion, make_insertion, InsertionMotion::rotation),
+      {declare_dummy, make_dummy},
+  };
+  return all;
+}
+
+const Entry& find(const std::string& name) {
+  for (const Entry& e : entries())
+    if (e.declare().name == name) return e;
+  throw InputError(fmt::format("no task is named '{}'; expected one of {}", name,
+                               fmt::join(task_names(), ", ")));
+}
+
+}  // namespace
+
+std::vector<std::string> task_names() {
+  std::vector<std::string> names;
+  for (const Entry& e : entries()) names.push_back(e.declare().name);
+  return names;
+}
+
+bool is_task(const std::string& name) {
+  const std::vector<std::string> names = task_names();
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+TaskSpec task_spec(const std::string& name) { return find(name).declare(); }
+std::unique_ptr<Task> make_task(const std::string& name, const Scene& scene) {
+  return find(name).make(scene);
+}
+
+}  // namespace tangere

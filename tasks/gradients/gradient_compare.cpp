@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which step size is right shows in its neighbours: they agree there, or there is a kink.
+#include "tasks/gradients/gradient_compare.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "engine/model/random.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr double kLargest = 1e-3;  // step size, times the input's scale
+constexpr double kNoInfluence =
+    1e-10;  // of the loss: an input whose derivatives are all smaller does not act on it
+
+double norm_of(std::span<const double> x) {
+  return std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0));
+}
+
+/// What is not finite is as wrong as can be.
+double finite_error(double error) { return std::isfinite(error) ? error : HUGE_VAL; }
+
+/// Which of `all` are compared: every one, or `wanted`, drawn.
+std::vector<std::size_t> chosen(std::vector<std::size_t> all, std::size_t wanted,
+                                std::uint64_t seed, std::uint32_t purpose) {
+  if (wanted == 0 || all.size() <= wanted) return all;
+  for (std::size_t i = 0; i < wanted; ++i) {
+    const RandomKey key{seed, 0, static_cast<std::int64_t>(i), Purpose::control, purpose};
+    std::swap(all[i], all[i + std::size_t(uniform(key, 0, double(all.size() - i) - 1e-9))]);
+  }
+  all.resize(wanted);
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+}  // namespace
+
+std::array<double, 2 * kSweepLevels> sweep(double scale) {
+  std::array<double, 2 * kSweepLevels> changes{};
+  double step = kLargest * scale;
+  for (std::size_t k = 0; k < kSweepLevels; ++k, step *= 0.25) {
+    changes[2 * k] = step;
+    changes[2 * k + 1] = -step;
+  }
+  return changes;
+}
+
+Difference best_difference(std::span<const double> values, double scale) {
+  std::array<double, kSweepLevels>
+      slopes{};  // the error of second order taken out; none at the first
+  double step = kLargest * scale, coarse = NAN;
+  for (std::size_t k = 0; k < kSweepLevels; ++k, step *= 0.25) {
+    const double central = (values[2 * k] - values[2 * k + 1]) / (2 * step);
+    slopes[k] = (16 * central - coarse) / 15;
+    coarse = central;
+  }
+  Difference best{NAN, HUGE_VAL};
+  for (std::size_t k = 2; k + 1 < kSweepLevels; ++k) {
+    const double doubt =
+        std::max(std::abs(slopes[k] - slopes[k - 1]), std::abs(slopes[k + 1] - slopes[k]));
+    if (doubt < best.doubt) best = {slopes[k], doubt};
+  }
+  return best;
+}
+
+CheckedInput compare(const Comparison& of, double loss, const CompareOptions& o,
+                     std::uint32_t purpose) {
+  CheckedInput c;
+  c.name = of.name;
+  c.entries = of.gradient.size();
+  c.norm = norm_of(of.gradient);
+  const std::vector<std::size_t> entries =
+      chosen(of.among, static_cast<std::size_t>(o.entries), o.seed, purpose);
+  std::vector<Difference> differences;
+  double square = 0;
+  for (const std::size_t i : entries) {
+    differences.push_back(of.difference(i));
+    if (std::isfinite(differences.back().value))
+      square += differences.back().value * differences.back().value;
+  }
+  c.scale = std::max(c.norm, std::sqrt(square));
+  if (!std::isfinite(c.norm)) c.difference_error = HUGE_VAL;
+  c.influence = !(c.scale <= kNoInfluence * std::abs(loss));
+  for (std::size_t k = 0; k < entries.size() && c.influence; ++k) {
+    if (!(differences[k].doubt <= o.settled * c.scale)) {
+      ++c.kinks;
+      continue;
+    }
+    ++c.compared;
+    const double error =
+        finite_error(std::abs(differences[k].value - of.gradient[entries[k]]) / c.scale);
+    if (error >= c.difference_error)
+      c.difference_error = error, c.worst = of.entry_name(entries[k]);
+  }
+  return c;
+}
+
+void compare_along(CheckedInput& c, std::span<const double> gradient,
+                   std::span<const double> direction, double along) {
+  if (!c.influence) return;
+  const double dot = std::inner_product(gradient.begin(), gradient.end(), direction.begin(), 0.0);
+  c.tangent_error = finite_error(std::abs(dot - along) / (c.scale * norm_of(direction)));
+}
+
+RelativeGradient::RelativeGradient(const Parameters& parameters, const Scene& scene,
+                                   std::span<const double> varying,
+                                   std::span<const double> absolute) {
+  for (std::size_t k = 0; k < absolute.size(); ++k) {
+    const int random = parameters.randomization(scene, static_cast<int>(k));
+    has.push_back(random < 0 ? parameters.infos()[k].value : varying[std::size_t(random)]);
+    gradient.push_back(absolute[k] * has[k]);
+    if (has[k] != 0) given.push_back(k);
+  }
+}
+
+std::vector<double> RelativeGradient::change(std::span<const double> relative) const {
+  std::vector<double> change(relative.size());
+  for (std::size_t k = 0; k < change.size(); ++k) change[k] = relative[k] * has[k];
+  return change;
+}
+
+std::vector<std::size_t> all_of(std::size_t count) {
+  std::vector<std::size_t> all(count);
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return all;
+}
+
+std::vector<double> random_direction(std::size_t n, std::uint64_t seed, std::uint32_t purpose) {
+  std::vector<double> d(n);
+  for (std::size_t i = 0; i < n; ++i)
+    d[i] = uniform({seed, 1, static_cast<std::int64_t>(i), Purpose::control, purpose}, -1, 1);
+  return d;
+}
+
+}  // namespace tangere

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// A gradient against central differences, over a sweep of step sizes, and against a derivative
+// along one direction.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/derivative/parameters.hpp"
+
+namespace tangere {
+
+/// One kind of input. Errors are relative to the norm of the gradient by it, (numbers of the scene:
+/// by their relative change).
+struct CheckedInput {
+  std::string name;          ///< "u" or "actions", "q", "v", "numbers", "points"
+  std::size_t entries = 0;   ///< the gradient has
+  std::size_t compared = 0;  ///< with differences
+  std::size_t kinks =
+      0;            ///< left out: differences that do not settle, or whose runs find no solution
+  double norm = 0;  ///< of the gradient
+  double scale =
+      0;  ///< what errors are measured by: that, or the norm of the differences if it is larger
+  bool influence = true;        ///< false: derivatives and differences are nothing beside the loss;
+                                ///< nothing is compared
+  double difference_error = 0;  ///< largest among those compared
+  std::string worst;            ///< where
+  double tangent_error = 0;     ///< |g·d - tangent|/(|g| |d|) along a random direction
+};
+
+/// Step sizes of a sweep, each a quarter of the one before, forward and back: a block of
+/// environments.
+inline constexpr int kSweepLevels = 8;
+/// Changes of an input whose entries are of size `scale`: +, -, of the largest step size first.
+std::array<double, 2 * kSweepLevels> sweep(double scale);
+
+/// The central difference at which three neighbouring step sizes agree best, and how well.
+struct Difference {
+  double value, doubt;
+};
+/// `values`: of the function after the changes of sweep(scale).
+Difference best_difference(std::span<const double> values, double scale);
+
+/// Changes of positions are as they are, times 1 m or rad; velocities and controls change more.
+inline constexpr double kVelocityScale = 10, kControlScale = 10;
+
+struct CompareOptions {
+  int entries =
+      24;  ///< of each input that differences are taken of, drawn if there are more; 0: all
+  std::uint64_t seed = 0;  ///< of that draw and of the directions
+  double settled = 3e-6;   ///< of the gradient's norm: neighbouring step sizes agree so far, or it
+                           ///< counts as a kink
+};
+
+/// What is compared of one input.
+struct Comparison {
+  std::string name;
+  std::span<const double> gradient;
+  std::vector<std::size_t> among;                     ///< entries that can be moved
+  std::function<Difference(std::size_t)> difference;  ///< by entry
+  std::function<std::string(std::size_t)> entry_name;
+};
+/// `loss`: what an influence is measured by; `purpose` keys the draw of entries.
+CheckedInput compare(const Comparison& c, double loss, const CompareOptions& options,
+                     std::uint32_t purpose);
+/// `along`: the derivative along `direction` by another way.
+void compare_along(CheckedInput& c, std::span<const double> gradient,
+                   std::span<const double> direction, double along);
+
+/// A gradient by numbers of a scene, by their relative change.
+struct RelativeGradient {
+  std::vector<double> has, gradient;  ///< what the environment has of them; times what it was
+  std::vector<std::size_t> given;     ///< not zero: there is something to change a little
+
+  /// `varying`: values of what the scene randomises, in its order.
+  RelativeGradient(const Parameters& parameters, const Scene& scene,
+                   std::span<const double> varying, std::span<const double> gradient);
+  [[nodiscard]] std::vector<double> change(std::span<const double> relative) const;
+};
+
+std::vector<std::size_t> all_of(std::size_t count);
+/// Numbers in [-1, 1].
+std::vector<double> random_direction(std::size_t n, std::uint64_t seed, std::uint32_t purpose);
+
+}  // namespace tangere

@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+// Residuals, their Jacobian, and the fit: minimise ½|r(exp x)|² by (F + λ diag F) δ = −g, F = JᵀJ.
+#include "tasks/gradients/identification.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/derivative/parameters.hpp"
+#include "engine/model/compiled_model.hpp"
+#include "engine/model/random.hpp"
+#include "engine/sense/readout.hpp"
+
+namespace tangere {
+namespace {
+
+using Vector = Eigen::VectorXd;
+using Matrix = Eigen::MatrixXd;
+
+constexpr double kDifference =
+    1e-6;  // of logarithms; small, so that few points begin to touch or to slip within it
+constexpr double kRounding = 1e-8;  // of logarithms
+constexpr double kLongest = 1.5;    // of logarithms in one step: the model is linear
+
+/// f(point of the sensor, its place 0 … 63 in the tile) for the points of a tile.
+template <class Function>
+void for_points(const kernels::PadTiles& pad, int tile, const Function& f) {
+  if (pad.curved()) {
+    for (int n = 0; n < pad.points_of(tile); ++n)
+      f(static_cast<std::size_t>(pad.index[kernels::kTactileTile * tile + n]),
+        static_cast<std::size_t>(n));
+    return;
+  }
+  for (int i = 0; i < pad.rows_of(tile); ++i)
+    for (int j = 0; j < pad.cols_of(tile); ++j)
+      f(static_cast<std::size_t>(pad.first_of(tile) + i * pad.cols + j),
+        static_cast<std::size_t>(kernels::kTileSide * i + j));
+}
+
+std::size_t numbers_of_fields(const Model& model) {
+  std::size_t n = 0;
+  for (const SensorInfo& s : model.sensors()) n += 3 * std::size_t(s.points);
+  return n;
+}
+
+void check_run(const RecordedRun& run) {
+  if (run.every < 1 || run.steps < run.every)
+    throw InputError(
+        fmt::format("a recording of {} steps read every {}; expected at least one reading",
+                    run.steps, run.every));
+}
+
+std::vector<int> places_of(const Parameters& parameters, const Scene& scene,
+                           std::span<const std::string> names) {
+  std::vector<int> out;
+  std::string known;
+  for (const ParameterInfo& info : parameters.infos())
+    known += (known.empty() ? "'" : ", '") + info.name + "'";
+  for (const std::string& name : names) {
+    const auto infos = parameters.infos();
+    const auto at = std::find_if(infos.begin(), infos.end(),
+                                 [&](const ParameterInfo& i) { return i.name == name; });
+    if (at == infos.end())
+      throw InputError(
+          fmt::format("{}: no number '{}'; expected one of {}", scene.path, name, known));
+    out.push_back(static_cast<int>(at - infos.begin()));
+  }
+  return out;
+}
+
+/// The sequence as a function of x, logarithms of the sought numbers.
+class Problem {
+ public:
+  Problem(const Scene& scene, const RecordedRun& run, const FieldSequence& recorded,
+          const std::vector<std::string>& names)
+      : scene_(scene),
+        run_(run),
+        recorded_(recorded),
+        names_(names),
+        places_(places_of(Parameters(Model(scene)), scene, names)) {}
+
+  [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(places_.size()); }
+  [[nodiscard]] Vector start() const {
+    const std::vector<double> values = numbers_of(scene_, names_);
+    Vector x(count());
+    for (Eigen::Index k = 0; k < count(); ++k) {
+      const double value = values[std::size_t(k)];
+      if (!(value > 0))
+        throw InputError(
+            fmt::format("{}: '{}' is {} at the start of a fit; expected a positive number",
+                        scene_.path, names_[std::size_t(k)], value));
+      x[k] = std::log(value);
+    }
+    return x;
+  }
+
+  struct Value {
+    double misfit;    // infinite: the rollout fails there
+    Vector gradient;  // by x
+  };
+  [[nodiscard]] Value evaluate(const Vector& x) const {
+    const Model model(at(x));
+    const FieldMisfit misfit(model, recorded_);
+    const RolloutLoss* const losses[] = {&misfit};
+    GradientOptions options;
+    options.steps = run_.steps;
+    options.parameters = true;
+    const GradientSummary summary =
+        rollout_gradients(Batch(model, 1), run_.controls, options, losses);
+    if (!summary.failures.empty())
+      return {std::numeric_limits<double>::infinity(), Vector::Zero(count())};
+    Value out{summary.losses[0].value[0], Vector(count())};
+    for (Eigen::Index k = 0; k < count(); ++k)  // ∂/∂ log p = p ∂/∂p
+      out.gradient[k] =
+          std::exp(x[k]) * summary.losses[0].parameters[std::size_t(places_[std::size_t(k)])];
+    return out;
+  }
+
+  /// ∂ fields / ∂x, (numbers of the whole sequence, count).
+  [[nodiscard]] Matrix jacobian(const Vector& x) const {
+    Matrix J(static_cast<Eigen::Index>(recorded_.readings.size() * recorded_.readings[0].size()),
+             count());
+    for (Eigen::Index k = 0; k < count(); ++k) {
+      const Vector step = kDifference * Vector::Unit(count(), k);
+      J.col(k) = (fields(x + step) - fields(x - step)) / (2 * kDifference);
+      if (J.col(k).isZero(0))
+        throw InputError(fmt::format(
+            "{}: the fields do not depend on '{}'; expected numbers that a recording can show",
+            scene_.path, names_[std::size_t(k)]));
+    }
+    return J;
+  }
+  [[nodiscard]] Vector residuals(const Vector& x) const { return fields(x) - flat(recorded_); }
+
+ private:
+  [[nodiscard]] Scene at(const Vector& x) const {
+    const Vector values = x.array().exp();
+    return with_numbers(scene_, names_, {values.data(), std::size_t(values.size())});
+  }
+  [[nodiscard]] Vector fields(const Vector& x) const { return flat(simulate_fields(at(x), run_)); }
+  static Vector flat(const FieldSequence& s) {
+    Vector out(static_cast<Eigen::Index>(s.readings.size() * s.readings[0].size()));
+    Eigen::Index row = 0;
+    for (const auto& reading : s.readings)
+      for (double f : reading) out[row++] = f;
+    return out;
+  }
+
+  const Scene& scene_;
+  const RecordedRun& run_;
+  const FieldSequence& recorded_;
+  const std::vector<std::string>& names_;
+  std::vector<int> places_;  // among Parameters::infos()
+};
+
+/// Whether a step that changed the misfit by `gain` is worth no more than `tolerance` standard
+/// deviations of the numbers, which are ½ tolerance² variances of a residual, or is a rounding.
+/// Creases (points that begin to touch or to slip) may hold a minimum where the gradient does not
+/// vanish: what is left to gain is what counts.
+bool is_end(double gain, double misfit, Eigen::Index residuals, double tolerance,
+            const Vector& step) {
+  const double variance = 2 * misfit / static_cast<double>(residuals);
+  return std::abs(gain) < 0.5 * tolerance * tolerance * variance ||
+         step.lpNorm<Eigen::Infinity>() < kRounding;
+}
+
+FitPoint fit_point(const Vector& x, const Problem::Value& value) {
+  FitPoint p;
+  for (Eigen::Index k = 0; k < x.size(); ++k) p.values.push_back(std::exp(x[k]));
+  p.misfit = value.misfit;
+  p.gradient = value.gradient.norm();
+  return p;
+}
+
+/// How well the numbers are known at the end of a fit.
+void judge(const Problem& problem, double misfit, const Matrix& J, Identification& out) {
+  const Eigen::Index n = problem.count();
+  out.noise = std::sqrt(2 * misfit / static_cast<double>(J.rows() - n));
+  // A perfect fit has no scale: the information is then that of unit noise.
+  const double scale = out.noise > 0 ? 1 / (out.noise * out.noise) : 1;
+  const Matrix F = scale * (J.transpose() * J);
+  const Eigen::SelfAdjointEigenSolver<Matrix> modes(F);
+  out.condition = modes.eigenvalues().maxCoeff() / modes.eigenvalues().minCoeff();
+  const Matrix covariance = F.inverse();
+  for (Eigen::Index k = 0; k < n; ++k) out.deviation.push_back(std::sqrt(covariance(k, k)));
+  out.information.assign(F.data(), F.data() + F.size());
+}
+
+}  // namespace
+
+std::vector<double> numbers_of(const Scene& scene, std::span<const std::string> names) {
+  const Parameters parameters{Model(scene)};
+  std::vector<double> out;
+  for (int k : places_of(parameters, scene, names))
+    out.push_back(parameters.infos()[std::size_t(k)].value);
+  return out;
+}
+
+Scene with_numbers(const Scene& scene, std::span<const std::string> names,
+                   std::span<const double> values) {
+  const Parameters parameters{Model(scene)};
+  Scene out = scene;
+  std::size_t n = 0;
+  for (int k : places_of(parameters, scene, names)) parameters.in(out, k) = values[n++];
+  return out;
+}
+
+FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run) {
+  check_run(run);
+  const Model model(scene);
+  Batch batch(model, 1);
+  Stepper stepper(model);
+  Readout readout(model);
+  std::vector<double> u(std::size_t(model.nu()));
+  FieldSequence out{run.every, {}};
+  for (std::int64_t t = 0; t < run.steps; ++t) {
+    run.controls(t, 0, u);
+    stepper.step(batch, u);
+    if (failed(batch.status(0)))
+      throw InputError(fmt::format("{}: step {} failed ({}); expected a rollout of {} steps",
+                                   scene.path, t, to_string(batch.status(0)), run.steps));
+    if ((t + 1) % run.every != 0) continue;
+    std::vector<double>& reading = out.readings.emplace_back(numbers_of_fields(model));
+    std::size_t first = 0;
+    for (std::size_t s = 0; s < model.sensors().size(); ++s) {
+      const std::size_t size = 3 * std::size_t(model.sensors()[s].points);
+      readout.tactile(batch, 0, static_cast<int>(s), std::span(reading).subspan(first, size));
+      first += size;
+    }
+  }
+  return out;
+}
+
+void add_noise(FieldSequence& sequence, double deviation, std::uint64_t seed) {
+  for (std::size_t k = 0; k < sequence.readings.size(); ++k)
+    for (std::size_t i = 0; i < sequence.readings[k].size(); ++i)
+      // Steps from 1 on: what <randomize> draws for sensors has step 0.
+      sequence.readings[k][i] += normal({seed, 0, static_cast<std::int64_t>(k) + 1,
+                                         Purpose::tactile, static_cast<std::uint32_t>(i)},
+                                        0, deviation);
+}
+
+FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded)
+    : model_(model), recorded_(recorded) {
+  for (const auto& reading : recorded.readings) {
+    if (reading.size() != numbers_of_fields(model))
+      throw InputError(
+          fmt::format("a recorded reading of {} numbers; expected {}, three for each tactile point "
+                      "of the scene",
+                      reading.size(), numbers_of_fields(model)));
+    std::vector<double>& squares = squares_.emplace_back();
+    const double* of_sensor = reading.data();
+    for (const CompiledSensor& sensor : model.compiled().sensors) {
+      const kernels::PadTiles pad = sensor.tiles();
+      for (int tile = 0; tile < pad.tiles(); ++tile) {
+        double& sum = squares.emplace_back(0);
+        for_points(pad, tile, [&](std::size_t point, std::size_t) {
+          for (std::size_t c = 0; c < 3; ++c)
+            sum += 0.5 * of_sensor[3 * point + c] * of_sensor[3 * point + c];
+        });
+      }
+      of_sensor += 3 * sensor.points();
+    }
+  }
+}
+
+/// Where nothing touches, T = 0 and the share of a tile is ½ T_recorded²: known beforehand, and
+/// constant.
+double FieldMisfit::evaluate(const LossPoint& at, const LossCotangent& out) const {
+  if (!reads_fields(at.step)) return 0;
+  const auto k = static_cast<std::size_t>(at.step / recorded_.every) - 1;
+  const double* reading = recorded_.readings[k].data();
+  const double* squares = squares_[k].data();
+  double sum = 0;
+  for (std::size_t s = 0; s < at.fields.size(); ++s) {
+    const CompiledSensor& sensor = model_.compiled().sensors[s];
+    const kernels::PadTiles pad = sensor.tiles();
+    const std::span<const int> touched = at.fields[s]->tiles();
+    std::size_t t = 0;
+    for (int tile = 0; tile < pad.tiles(); ++tile) {
+      if (t == touched.size() || touched[t] != tile) {
+        sum += squares[tile];
+        continue;
+      }
+      for_points(pad, tile, [&](std::size_t point, std::size_t n) {
+        for (std::size_t c = 0; c < 3; ++c) {
+          const std::size_t i = (3 * t + c) * kernels::kTactileTile + n;
+          const double residual = at.fields[s]->values()[i] - reading[3 * point + c];
+          sum += 0.5 * residual * residual;
+          out.fields[s][i] += residual;
+        }
+      });
+      ++t;
+    }
+    reading += 3 * sensor.points();
+    squares += pad.tiles();
+  }
+  return sum;
+}
+
+Identification identify(const Scene& scene, const RecordedRun& run, const FieldSequence& recorded,
+                        const IdentificationOptions& options) {
+  check_run(run);
+  if (recorded.every != run.every ||
+      static_cast<std::int64_t>(recorded.readings.size()) != run.steps / run.every)
+    throw InputError(
+        fmt::format("a recording of {} readings, one every {} steps; expected {}, one every {}",
+                    recorded.readings.size(), recorded.every, run.steps / run.every, run.every));
+  const Problem problem(scene, run, recorded, options.numbers);
+  Vector x = problem.start();
+  Problem::Value now = problem.evaluate(x);
+  if (!std::isfinite(now.misfit))
+    throw InputError(scene.path + ": the rollout fails at the start of the fit");
+  Matrix J = problem.jacobian(x);
+  Identification out;
+  out.points.push_back(fit_point(x, now));
+  const Vector by_differences = J.transpose() * problem.residuals(x);
+  out.gradient_difference = (now.gradient - by_differences).norm() / by_differences.norm();
+  double damping = 1e-2;
+  for (int iteration = 0; iteration < options.max_iterations && !out.converged; ++iteration) {
+    Matrix H = J.transpose() * J;
+    H.diagonal() *= 1 + damping;
+    Vector step = H.ldlt().solve(-now.gradient);
+    step *= std::min(1.0, kLongest / step.lpNorm<Eigen::Infinity>());
+    const Problem::Value next = problem.evaluate(x + step);
+    out.converged = is_end(now.misfit - next.misfit, now.misfit, J.rows(), options.tolerance, step);
+    if (!(next.misfit < now.misfit)) {
+      damping *= 8;
+      continue;
+    }
+    damping /= 8;
+    x += step;
+    now = next;
+    out.points.push_back(fit_point(x, now));
+    J = problem.jacobian(x);
+  }
+  judge(problem, now.misfit, J, out);
+  return out;
+}
+
+}  // namespace tangere

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// Half squares: their derivatives are the numbers themselves.
+#include "tasks/gradients/losses.hpp"
+
+#include <numeric>
+
+#include "engine/step/displacement.hpp"
+
+namespace tangere {
+namespace {
+
+class FinalState : public RolloutLoss {
+ public:
+  explicit FinalState(const Model& model) : model_(model) {}
+  double evaluate(const LossPoint& at, const LossCotangent& out) const override {
+    if (at.step != at.steps) return 0;
+    double sum = 0;
+    for (std::size_t i = 0; i < at.v.size(); ++i) {
+      sum += 0.5 * at.v[i] * at.v[i];
+      out.v[i] += at.v[i];
+    }
+    const CompiledModel& m = model_.compiled();
+    std::vector<double> off(at.q.begin(), at.q.end());
+    for (std::size_t i = 0; i < off.size(); ++i) {
+      off[i] -= m.initial_q[i];
+      sum += 0.5 * off[i] * off[i];
+    }
+    add_along_dofs(m, at.q, off, out.q);
+    return sum;
+  }
+
+ private:
+  Model model_;
+};
+
+class Path : public RolloutLoss {
+ public:
+  double evaluate(const LossPoint& at, const LossCotangent& out) const override {
+    double sum = 0;
+    for (std::size_t i = 0; i < at.v.size(); ++i) {
+      sum += 0.5 * at.v[i] * at.v[i];
+      out.v[i] += at.v[i];
+    }
+    return sum;
+  }
+};
+
+class Fields : public RolloutLoss {
+ public:
+  Fields(int every, std::size_t components) : every_(every), components_(components) {}
+  [[nodiscard]] bool reads_fields(std::int64_t step) const override {
+    return step > 0 && step % every_ == 0;
+  }
+  double evaluate(const LossPoint& at, const LossCotangent& out) const override {
+    constexpr std::size_t kLanes = 8, kTile = 64;
+    double squares[kLanes] = {};  // side by side: one sum would wait for itself at every number
+    for (std::size_t s = 0; s < at.fields.size(); ++s) {
+      const std::span<const double> values = at.fields[s]->values();  // (tiles, 3, 64)
+      for (std::size_t row = 0; row < values.size() / kTile; ++row) {
+        if (row % 3 >= components_) continue;
+        const double* from = &values[row * kTile];
+        double* to = &out.fields[s][row * kTile];
+        for (std::size_t i = 0; i < kTile; i += kLanes)
+          for (std::size_t k = 0; k < kLanes; ++k) {
+            squares[k] += from[i + k] * from[i + k];
+            to[i + k] += from[i + k];
+          }
+      }
+    }
+    return 0.5 * std::accumulate(squares, squares + kLanes, 0.0);
+  }
+
+ private:
+  int every_;
+  std::size_t components_;
+};
+
+class EndEffectors : public RolloutLoss {
+ public:
+  [[nodiscard]] bool reads_variables(std::int64_t /*step*/) const override { return true; }
+  double evaluate(const LossPoint& at, const LossCotangent& out) const override {
+    if (at.step != at.steps) return 0;
+    double sum = 0;
+    for (std::size_t i = 0; i < at.variables.size(); ++i) {
+      sum += 0.5 * at.variables[i] * at.variables[i];
+      out.variables[i] += at.variables[i];
+    }
+    return sum;
+  }
+};
+
+}  // namespace
+
+const char* to_string(LossKind value) {
+  switch (value) {
+    case LossKind::final_state: return "final";
+    case LossKind::path: return "path";
+    case LossKind::tactile: return "tactile";
+    case LossKind::shear: return "shear";
+    case LossKind::variables: return "variables";
+  }
+  return "unknown";
+}
+
+const char* loss_meaning(LossKind value) {
+  switch (value) {
+    case LossKind::final_state:
+      return "half the squares of the last state, positions from where the scene starts, number by "
+             "number";
+    case LossKind::path: return "half the squares of all velocities, summed over steps";
+    case LossKind::tactile: return "half the squares of all tactile forces, summed over fields";
+    case LossKind::shear: return "half the squares of all shear forces, summed over fields";
+    case LossKind::variables: return "half the squares of the end effectors' last positions";
+  }
+  return "";
+}
+
+const std::vector<LossKind>& loss_kinds() {
+  static const std::vector<LossKind> kinds = {LossKind::final_state, LossKind::path,
+                                              LossKind::tactile, LossKind::shear,
+                                              LossKind::variables};
+  return kinds;
+}
+
+std::unique_ptr<RolloutLoss> make_loss(LossKind kind, const Model& model, int every) {
+  const bool of_fields = kind == LossKind::tactile || kind == LossKind::shear;
+  if (of_fields && model.sensors().empty())
+    throw InputError(std::string("loss '") + to_string(kind) +
+                     "': the scene has no tactile sensor");
+  if (kind == LossKind::variables && model.variables().empty())
+    throw InputError("loss 'variables': the scene has no end effector");
+  switch (kind) {
+    case LossKind::final_state: return std::make_unique<FinalState>(model);
+    case LossKind::path: return std::make_unique<Path>();
+    case LossKind::tactile: return std::make_unique<Fields>(every, 3);
+    case LossKind::shear: return std::make_unique<Fields>(every, 2);
+    case LossKind::variables: break;
+  }
+  return std::make_unique<EndEffectors>();
+}
+
+}  // namespace tangere

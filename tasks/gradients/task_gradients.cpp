@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// A thread takes sixteen episodes forward and back; blocks share nothing but the task.
+#include "tasks/gradients/task_gradients.hpp"
+
+#include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+#include "tasks/gradients/task_gradient_block.hpp"
+#include "tasks/run/thread_order.hpp"
+
+namespace tangere {
+namespace {
+
+std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+TaskGradientOptions checked(const Task& task, TaskGradientOptions o) {
+  if (o.episodes < 1 || o.threads < 1)
+    throw InputError(fmt::format("gradients of {} episodes on {} threads; expected at least 1",
+                                 o.episodes, o.threads));
+  if (o.actions < 0 || o.actions > task.spec().horizon)
+    throw InputError(fmt::format(
+        "gradients of {} actions of task {}; expected 1 to {}, its horizon, or 0 for all",
+        o.actions, task.spec().name, task.spec().horizon));
+  if (o.actions == 0) o.actions = task.spec().horizon;
+  if (!(o.tape_bytes > 0))
+    throw InputError(fmt::format("tapes of {} bytes; expected a positive number", o.tape_bytes));
+  return o;
+}
+
+}  // namespace
+
+TaskGradients empty_task_gradients(const Task& task, const TaskGradientOptions& o) {
+  const std::size_t episodes = size(o.episodes),
+                    actions = size(o.actions) * task.spec().action.size();
+  TaskGradients out;
+  out.value.resize(episodes);
+  out.length.resize(episodes);
+  out.action.resize(episodes * actions);
+  out.by_action.resize(episodes * actions);
+  out.by_q.resize(episodes * size(task.model().nv()));
+  out.by_v.resize(out.by_q.size());
+  if (o.parameters) out.by_parameter.resize(episodes * size(Parameters(task.model()).count()));
+  return out;
+}
+
+TaskGradients task_gradients(const Task& task, const TaskActions& actions,
+                             const TaskGradientOptions& asked, const GradientGoOn& go_on) {
+  const TaskGradientOptions o = checked(task, asked);
+  const auto blocks = static_cast<int>((o.episodes + kernels::kBlock - 1) / kernels::kBlock);
+  TaskGradients out = empty_task_gradients(task, o);
+  std::vector<std::vector<LostEpisode>> lost(size(blocks));
+  std::vector<TaskGradientBlock> workers;  // by the thread's index in the arena
+  workers.reserve(size(o.threads));
+  for (int i = 0; i < o.threads; ++i) workers.emplace_back(task, o).begin(go_on);
+  const tbb::global_control cap(tbb::global_control::max_allowed_parallelism, size(o.threads));
+  tbb::task_arena arena(o.threads);
+  TaskOrder order;
+  const auto run = [&](const tbb::blocked_range<int>& range) {
+    TaskOrder::arrive();
+    TaskGradientBlock& worker = workers[size(tbb::this_task_arena::current_thread_index())];
+    const TaskOrder::Task task_of_thread(order, &worker);
+    for (int b = range.begin(); b != range.end(); ++b) {
+      const std::int64_t first = std::int64_t{b} * kernels::kBlock;
+      const auto count =
+          static_cast<int>(std::min<std::int64_t>(kernels::kBlock, o.episodes - first));
+      worker.run(o.first_episode + first, count, actions, first, out, lost[size(b)]);
+    }
+  };
+  order.begin();
+  arena.execute([&] {
+    tbb::parallel_for(tbb::blocked_range<int>(0, blocks, 1), ByReference<decltype(run)>{&run},
+                      tbb::simple_partitioner{});
+  });
+  order.end();
+  for (const auto& of_block : lost)
+    out.lost.insert(out.lost.end(), of_block.begin(), of_block.end());
+  std::sort(out.lost.begin(), out.lost.end(),
+            [](const auto& a, const auto& b) { return a.episode < b.episode; });
+  for (const TaskGradientBlock& worker : workers) {
+    out.recomputed_steps += worker.recomputed_steps();
+    out.stopped = out.stopped || worker.stopped();
+  }
+  return out;
+}
+
+double task_gradient_bytes(const Task& task, const TaskGradientOptions& asked) {
+  const TaskGradientOptions o = checked(task, asked);
+  const double numbers = o.parameters ? Parameters(task.model()).count() : 0;
+  const double results = 2.0 * double(o.actions) * double(task.spec().action.size()) +
+                         2.0 * task.model().nv() + numbers + 2;
+  return 8 * results * double(o.episodes) + o.threads * TaskGradientBlock::bytes(task, o);
+}
+
+}  // namespace tangere

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parts of a VectorTask's action, taken one by one, and again in reverse.
+#include "tasks/gradients/task_rollout.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/model/compiled_model.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+
+namespace {
+
+std::size_t size(int n) { return static_cast<std::size_t>(n); }
+
+template <class T>
+std::span<T> row(std::vector<T>& all, int lane, std::size_t width) {
+  return std::span(all).subspan(size(lane) * width, width);
+}
+template <class T>
+std::span<const T> row(const std::vector<T>& all, int lane, std::size_t width) {
+  return std::span(all).subspan(size(lane) * width, width);
+}
+
+}  // namespace
+
+ActionRecord::ActionRecord(const Task& task) {
+  const auto rows = [](std::size_t width) { return std::vector<double>(kBlock * width); };
+  q = rows(size(task.model().nq()));
+  v = rows(size(task.model().nv()));
+  found = memory = rows(size(task.spec().memory));
+  asked = action = rows(task.spec().action.size());
+}
+
+double ActionRecord::bytes(const Task& task) {
+  const std::size_t numbers = size(task.model().nq()) + size(task.model().nv()) +
+                              2 * size(task.spec().memory) + 2 * task.spec().action.size();
+  return static_cast<double>(numbers * kBlock * sizeof(double) + sizeof(ActionRecord));
+}
+
+TaskRollout::TaskRollout(const Task& task, const StepperOptions& options, Precision precision)
+    : task_(task),
+      worker_(task, precision),
+      stepper_(task.model(), options),
+      u_(kBlock * size(task.model().nu())),
+      q_(size(task.model().nq())),
+      v_(size(task.model().nv())) {}
+
+void TaskRollout::start(std::uint64_t seed, std::span<const std::int64_t> episodes) {
+  const auto count = static_cast<int>(episodes.size());
+  batch_.emplace(task_.model(), count, seed);
+  data_.emplace(task_, count);
+  std::copy(episodes.begin(), episodes.end(), data_->next_episode.begin());
+  counts_ = {};
+  std::fill(u_.begin(), u_.end(), 0.0);
+  worker_.begin(*batch_, *data_, 0, {});
+  if (task_.spec().opening) {
+    for (int k = 0; k < task_.spec().steps_per_action; ++k) {
+      worker_.ask_for_controls(*batch_, *data_, 0, k);
+      stepper_.step_block(*batch_, 0, data_->u);
+      worker_.look_after(*batch_, 0, k, counts_);
+    }
+  } else {
+    worker_.look_at_start(*batch_, 0);
+  }
+  worker_.conclude(*batch_, *data_, 0, counts_);
+}
+
+void TaskRollout::displace(int lane, std::span<const double> q, std::span<const double> v) {
+  const BlockLayout& layout = task_.model().compiled().layout;
+  double* const column = batch_->block(0) + lane;
+  for (std::size_t i = 0; i < q.size(); ++i) column[(size(layout.q) + i) * kBlock] = q[i];
+  for (std::size_t i = 0; i < v.size(); ++i) column[(size(layout.v) + i) * kBlock] = v[i];
+  std::copy(q.begin(), q.end(), row(data_->q, lane, q.size()).begin());
+  std::copy(v.begin(), v.end(), row(data_->v, lane, v.size()).begin());
+}
+
+bool TaskRollout::running() const {
+  return std::any_of(data_->state.begin(), data_->state.end(),
+                     [](EnvironmentState s) { return s == EnvironmentState::running; });
+}
+
+void TaskRollout::choose(const TaskActions& actions, ActionRecord& r) {
+  const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
+  for (int l = 0; l < lanes(); ++l) {
+    if (data_->state[size(l)] != EnvironmentState::running) continue;
+    const std::span<double> asked = row(r.asked, l, width);
+    actions(view_of(*batch_, *data_, l), row(data_->observation, l, seen), asked);
+    for (std::size_t k = 0; k < width; ++k)
+      if (!std::isfinite(asked[k]))
+        throw InputError(
+            fmt::format("number {} of action {} of episode {} is {}; expected a finite number", k,
+                        data_->length[size(l)], data_->episodes[size(l)], asked[k]));
+  }
+}
+
+void TaskRollout::begin(ActionRecord& r) {
+  for (int l = 0; l < lanes(); ++l)
+    r.taken[size(l)] = data_->state[size(l)] == EnvironmentState::running;
+  const auto keep = [&](const std::vector<double>& from, std::vector<double>& to) {
+    std::copy(from.begin(), from.end(), to.begin());
+  };
+  keep(data_->q, r.q);
+  keep(data_->v, r.v);
+  keep(data_->memory, r.found);
+  worker_.begin(*batch_, *data_, 0, std::span<const double>(r.asked).first(data_->action.size()));
+  keep(data_->memory, r.memory);
+  keep(data_->action, r.action);
+}
+
+void TaskRollout::take_steps(BlockTape* tape) {
+  if (tape != nullptr) tape->start(*batch_, 0);
+  for (int k = 0; k < task_.spec().steps_per_action; ++k) {
+    worker_.ask_for_controls(*batch_, *data_, 0, k);
+    stepper_.step_block(*batch_, 0, data_->u, tape);
+    worker_.look_after(*batch_, 0, k, counts_);
+  }
+}
+
+void TaskRollout::conclude() { worker_.conclude(*batch_, *data_, 0, counts_); }
+
+void TaskRollout::place_again(const ActionRecord& r, std::int64_t action) {
+  if (!task_.spec().restarts) return;
+  for (int l = 0; l < lanes(); ++l) {
+    if (!r.taken[size(l)]) continue;
+    const auto q = row(r.q, l, q_.size()), v = row(r.v, l, v_.size());
+    std::copy(q.begin(), q.end(), q_.begin());
+    std::copy(v.begin(), v.end(), v_.begin());
+    const Moment seen{q, v, {}, {}};
+    task_.place(view(r, action, l, row(r.memory, l, size(task_.spec().memory)), {&seen, 1}), q_,
+                v_);
+    batch_->set_state(l, q_, v_);
+  }
+}
+
+void TaskRollout::retake_steps(const ActionRecord& r, std::int64_t action, BlockTape& tape) {
+  for (int l = 0; l < lanes(); ++l) batch_->hold(l, !r.taken[size(l)]);
+  tape.start(*batch_, 0);
+  const int every = task_.spec().control_every;
+  for (int k = 0; k < task_.spec().steps_per_action; ++k) {
+    if (k % every == 0) ask_again(r, action, k, tape);
+    stepper_.step_block(*batch_, 0, u_, &tape);
+  }
+}
+
+void TaskRollout::ask_again(const ActionRecord& r, std::int64_t action, int step,
+                            const BlockTape& tape) {
+  const std::size_t memory = size(task_.spec().memory);
+  for (int l = 0; l < lanes(); ++l) {
+    if (!r.taken[size(l)]) continue;
+    const Moment first = first_moment(tape, l);
+    task_.controls(view(r, action, l, row(r.memory, l, memory), {&first, 1}), step,
+                   row(u_, l, size(task_.model().nu())));
+  }
+}
+
+void TaskRollout::look_again(const BlockTape& tape) {
+  for (const int moment : task_.spec().moments) {
+    tape.show(moment, *batch_, 0);
+    worker_.look_after(*batch_, 0, moment - 1, recounted_);
+  }
+}
+
+TaskView TaskRollout::view(const ActionRecord& r, std::int64_t action, int lane,
+                           std::span<const double> memory, std::span<const Moment> now) const {
+  return {batch_->seed(),
+          data_->episodes[size(lane)],
+          action,
+          memory,
+          row(r.action, lane, task_.spec().action.size()),
+          now};
+}
+
+Moment TaskRollout::first_moment(const BlockTape& tape, int lane) {
+  const double* const column = tape.state(0) + lane;
+  for (std::size_t i = 0; i < q_.size(); ++i) q_[i] = column[i * kBlock];
+  for (std::size_t i = 0; i < v_.size(); ++i) v_[i] = column[(q_.size() + i) * kBlock];
+  return {q_, v_, {}, {}};
+}
+
+}  // namespace tangere

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// How an episode's return changes along a direction, forward: a task's own derivatives row by row,
+// its steps in dual numbers. The second route that gradients of returns are checked by.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/derivative/tangent.hpp"
+#include "tasks/gradients/task_rollout.hpp"
+
+namespace tangere {
+
+/// Changes of an episode's inputs; empty: none.
+struct EpisodeDirection {
+  std::span<const double> actions;  ///< (A, action)
+  std::span<const double> q, v;     ///< (nv) of the state where the first action begins
+  std::span<const double> numbers;  ///< as rows of BlockCotangent::parameters
+};
+
+class TaskTangent {
+ public:
+  /// Plays lane 0 of `rollout`, which has just started, with `actions`: (A, action), within their
+  /// bounds.
+  TaskTangent(TaskRollout& rollout, std::span<const double> actions, const StepperOptions& options);
+
+  [[nodiscard]] double along(const EpisodeDirection& direction);
+
+ private:
+  /// A change of what a task looks at.
+  struct ViewTangent {
+    std::vector<std::vector<double>> q, v, variables, tactile;  // per moment
+    std::vector<double> memory, action;
+  };
+  struct OwnCotangent;
+  void begin(std::size_t action);
+  void take_steps(std::size_t action, const EpisodeDirection& d, ViewTangent& seen);
+  void look(std::size_t action, std::size_t moment, const EpisodeDirection& d, ViewTangent& seen);
+  [[nodiscard]] double reward(std::size_t action, const ViewTangent& seen);
+
+  TaskRollout& rollout_;
+  const Task& task_;
+  Tangent tangent_;
+  Readout readout_;
+  std::vector<ActionRecord> records_;
+  std::vector<BlockTape> tapes_;
+  StateTangent state_;
+  std::vector<double> memory_,
+      action_;  // how they change: what begin_action left, the action in hand
+};
+
+}  // namespace tangere

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+// An action of a block, in order: start or take actions, K steps with looks in between, then
+// rewards and observations.
+#include "tasks/run/block_worker.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "kernels/numbers/lanes.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+
+namespace {
+
+std::size_t size(int n) { return static_cast<std::size_t>(n); }
+
+template <class T>
+std::span<T> row(std::vector<T>& all, int environment, std::size_t width) {
+  return std::span(all).subspan(size(environment) * width, width);
+}
+template <class T>
+std::span<const T> row(const std::vector<T>& all, int environment, std::size_t width) {
+  return std::span(all).subspan(size(environment) * width, width);
+}
+
+}  // namespace
+
+EnvironmentData::EnvironmentData(const Task& task, int environments) {
+  const TaskSpec& spec = task.spec();
+  const Model& model = task.model();
+  const std::size_t e = size(environments);
+  memory.resize(e * size(spec.memory));
+  action.resize(e * spec.action.size());
+  observation.resize(e * spec.observation_size());
+  u.resize(e * size(model.nu()));
+  q.resize(e * size(model.nq()));
+  v.resize(e * size(model.nv()));
+  for (std::vector<double>* numbers : {&reward, &returns}) numbers->resize(e);
+  for (std::vector<std::uint8_t>* flags : {&terminated, &truncated, &success, &starting})
+    flags->resize(e);
+  length.resize(e);
+  episodes.resize(e);
+  next_episode.resize(e);
+  state.assign(e, EnvironmentState::to_start);
+  for (int i = 0; i < environments; ++i)
+    now.push_back({row(q, i, size(model.nq())), row(v, i, size(model.nv())), {}, {}});
+}
+
+double EnvironmentData::bytes(const Task& task) {
+  const TaskSpec& spec = task.spec();
+  const Model& model = task.model();
+  const std::size_t numbers = size(spec.memory) + spec.action.size() + spec.observation_size() +
+                              size(model.nu()) + size(model.nq()) + size(model.nv()) + 5;
+  return static_cast<double>(numbers * sizeof(double) + 5 + sizeof(Moment));
+}
+
+TaskView view_of(const Batch& batch, const EnvironmentData& data, int environment) {
+  const std::size_t e = size(environment), environments = data.reward.size();
+  const std::size_t memory = data.memory.size() / environments,
+                    action = data.action.size() / environments;
+  return {batch.seed(),
+          data.episodes[e],
+          data.length[e],
+          row(data.memory, environment, memory),
+          row(data.action, environment, action),
+          {&data.now[e], 1}};
+}
+
+BlockWorker::BlockWorker(const Task& task, Precision precision)
+    : task_(task),
+      stepper_(task.model()),
+      readout_(task.model(), precision),
+      varying_(task.model().scene().randomizations.size()) {
+  const TaskSpec& spec = task.spec();
+  const std::size_t moments = spec.moments.size();
+  q_.resize(moments * kBlock * size(task.model().nq()));
+  v_.resize(moments * kBlock * size(task.model().nv()));
+  variables_.resize(moments * kBlock * task.variables_size());
+  tactile_.resize(moments * kBlock * task.tactile_size());
+  for (int lane = 0; lane < kBlock; ++lane)
+    for (std::size_t m = 0; m < moments; ++m)
+      moments_.push_back({part(q_, m, lane), part(v_, m, lane), part(variables_, m, lane),
+                          part(tactile_, m, lane)});
+  if (spec.settling_steps == 0) return;
+  StepperOptions options;
+  options.timestep = spec.settling_timestep;
+  settling_stepper_.emplace(task.model(), options);
+}
+
+double BlockWorker::bytes(const Task& task) {
+  const std::size_t numbers = size(task.model().nq()) + size(task.model().nv()) +
+                              task.variables_size() + task.tactile_size();
+  return static_cast<double>(task.spec().moments.size() * kBlock * numbers * sizeof(double)) +
+         static_cast<double>(Stepper::workspace_bytes(task.model()));
+}
+
+std::span<double> BlockWorker::part(std::vector<double>& of_moments, std::size_t moment,
+                                    int lane) const {
+  const std::size_t width = of_moments.size() / (task_.spec().moments.size() * kBlock);
+  return std::span(of_moments).subspan((moment * kBlock + size(lane)) * width, width);
+}
+
+void BlockWorker::act(Batch& batch, EnvironmentData& data, int block,
+                      std::span<const double> actions, VectorCounts& counts) {
+  begin(batch, data, block, actions);
+  for (int k = 0; k < task_.spec().steps_per_action; ++k) {
+    ask_for_controls(batch, data, block, k);
+    stepper_.step_block(batch, block, data.u);
+    look_after(batch, block, k, counts);
+  }
+  conclude(batch, data, block, counts);
+}
+
+void BlockWorker::begin(Batch& batch, EnvironmentData& data, int block,
+                        std::span<const double> actions) {
+  const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
+  for (int e = first; e < last; ++e) {
+    data.starting[size(e)] = data.state[size(e)] == EnvironmentState::to_start ? 1 : 0;
+    if (data.starting[size(e)] != 0) {
+      start(batch, data, e);
+    } else if (data.state[size(e)] == EnvironmentState::running) {
+      take_action(batch, data, e, actions);
+    }
+  }
+}
+
+void BlockWorker::ask_for_controls(const Batch& batch, EnvironmentData& data, int block,
+                                   int step) const {
+  if (step % task_.spec().control_every != 0) return;
+  const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
+  for (int e = first; e < last; ++e)
+    if (!batch.held(e))
+      task_.controls(view_of(batch, data, e), step, row(data.u, e, size(task_.model().nu())));
+}
+
+void BlockWorker::look_after(const Batch& batch, int block, int step, VectorCounts& counts) {
+  const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
+  for (int e = first; e < last; ++e) {
+    if (batch.held(e) || failed(batch.status(e))) continue;
+    ++counts.simulation_steps;
+    counts.newton_iterations += batch.iterations(e);
+    counts.split_steps += batch.status(e) == StepStatus::split ? 1 : 0;
+  }
+  const std::vector<int>& moments = task_.spec().moments;
+  const auto moment = std::lower_bound(moments.begin(), moments.end(), step + 1);
+  if (*moment == step + 1) look(batch, block, size(static_cast<int>(moment - moments.begin())));
+}
+
+void BlockWorker::look_at_start(const Batch& batch, int block) {
+  look(batch, block, task_.spec().moments.size() - 1);
+}
+
+void BlockWorker::conclude(Batch& batch, EnvironmentData& data, int block, VectorCounts& counts) {
+  const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
+  for (int e = first; e < last; ++e) conclude_one(batch, data, e, counts);
+}
+
+std::span<const Moment> BlockWorker::moments(int lane) const {
+  const std::size_t count = task_.spec().moments.size();
+  return std::span(moments_).subspan(size(lane) * count, count);
+}
+
+void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
+  const TaskSpec& spec = task_.spec();
+  const std::size_t e = size(environment);
+  const std::span<double> q = row(data.q, environment, size(task_.model().nq()));
+  const std::span<double> v = row(data.v, environment, size(task_.model().nv()));
+  const std::span<double> memory = row(data.memory, environment, size(spec.memory));
+  data.episodes[e] = data.next_episode[e];
+  data.length[e] = 0;
+  data.returns[e] = 0;
+  batch.reset(environment, data.episodes[e]);
+  batch.get_q(environment, q);
+  batch.get_v(environment, v);
+  for (std::size_t k = 0; k < varying_.size(); ++k)
+    varying_[k] = batch.randomized_value(environment, static_cast<int>(k));
+  std::fill(memory.begin(), memory.end(), 0.0);
+  task_.start({batch.seed(), data.episodes[e], q, v, varying_, memory});
+  for (std::size_t k = 0; k < varying_.size(); ++k)
+    if (batch.is_parameter(static_cast<int>(k)))
+      batch.set_randomized_value(environment, static_cast<int>(k), varying_[k]);
+  const std::span<double> action = row(data.action, environment, spec.action.size());
+  std::fill(action.begin(), action.end(), 0.0);
+  if (spec.settling_steps > 0) settle(batch, data, environment);
+  batch.set_state(environment, q, v);
+  if (spec.opening) {
+    task_.begin_action(view_of(batch, data, environment), memory);
+  } else {
+    batch.hold(environment);
+  }
+}
+
+/// On its own, so that the steps of the others are not held up.
+void BlockWorker::settle(const Batch& batch, EnvironmentData& data, int environment) {
+  const Model& model = task_.model();
+  if (!settling_ || settling_->seed() != batch.seed()) settling_.emplace(model, 1, batch.seed());
+  const Moment& now = data.now[size(environment)];
+  settling_->reset(0, data.episodes[size(environment)]);
+  for (std::size_t k = 0; k < varying_.size(); ++k)
+    if (batch.is_parameter(static_cast<int>(k)))
+      settling_->set_randomized_value(0, static_cast<int>(k), varying_[k]);
+  settling_->set_state(0, now.q, now.v);
+  const std::span<double> u = row(data.u, environment, size(model.nu()));
+  task_.controls(view_of(batch, data, environment), 0, u);
+  for (int k = 0; k < task_.spec().settling_steps; ++k) settling_stepper_->step(*settling_, u);
+  settling_->get_q(0, row(data.q, environment, now.q.size()));
+  settling_->get_v(0, row(data.v, environment, now.v.size()));
+}
+
+void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environment,
+                              std::span<const double> actions) {
+  const TensorSpec& spec = task_.spec().action;
+  const std::span<double> action = row(data.action, environment, spec.size());
+  for (std::size_t k = 0; k < action.size(); ++k) {
+    const double asked = actions[size(environment) * spec.size() + k];
+    // clamp() lets NaN pass: the controls are NaN then, and the step says so.
+    action[k] = std::clamp(asked, spec.low, spec.high);
+  }
+  task_.begin_action(view_of(batch, data, environment),
+                     row(data.memory, environment, size(task_.spec().memory)));
+  if (!task_.spec().restarts) return;
+  const std::span<double> q = row(data.q, environment, size(task_.model().nq()));
+  const std::span<double> v = row(data.v, environment, size(task_.model().nv()));
+  task_.place(view_of(batch, data, environment), q, v);
+  batch.set_state(environment, q, v);
+}
+
+void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
+  const TaskSpec& spec = task_.spec();
+  const int first = block * kBlock, environments = std::min(kBlock, batch.environments() - first);
+  std::array<std::span<double>, kBlock> parts;
+  for (int lane = 0; lane < environments; ++lane) {
+    batch.get_q(first + lane, part(q_, moment, lane));
+    batch.get_v(first + lane, part(v_, moment, lane));
+  }
+  if (task_.variables_size() > 0) {
+    for (int lane = 0; lane < environments; ++lane)
+      parts[size(lane)] = part(variables_, moment, lane);
+    readout_.read_variables(batch, block, parts);
+  }
+  if (!spec.looks_at_tactile) return;
+  std::size_t offset = 0;
+  for (std::size_t s = 0; s < task_.model().sensors().size(); ++s) {
+    const std::size_t numbers = 3 * size(task_.model().sensors()[s].points);
+    for (int lane = 0; lane < environments; ++lane)
+      parts[size(lane)] = part(tactile_, moment, lane).subspan(offset, numbers);
+    readout_.read_block(batch, block, static_cast<int>(s),
+                        std::span<const std::span<double>>(parts));
+    offset += numbers;
+  }
+}
+
+void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environment,
+                               VectorCounts& counts) {
+  const TaskSpec& spec = task_.spec();
+  const std::size_t e = size(environment);
+  data.reward[e] = 0;
+  if (data.state[e] == EnvironmentState::over) return;
+  TaskView view = view_of(batch, data, environment);
+  const std::span<const Moment> moments = this->moments(environment % kBlock);
+  view.moments = moments;
+  const Moment& now = moments.back();
+  std::copy(now.q.begin(), now.q.end(), row(data.q, environment, now.q.size()).begin());
+  std::copy(now.v.begin(), now.v.end(), row(data.v, environment, now.v.size()).begin());
+  data.terminated[e] = data.truncated[e] = data.success[e] = 0;
+  if (data.starting[e] != 0) {
+    if (!spec.opening) {
+      batch.hold(environment, false);
+      view.moments = moments.last(1);
+    }
+    data.state[e] = EnvironmentState::running;
+  } else {
+    const bool lost = failed(batch.status(environment));
+    ++counts.environment_steps;
+    view.actions = ++data.length[e];
+    const Verdict verdict = task_.judge(view);
+    data.reward[e] = verdict.reward;
+    data.returns[e] += verdict.reward;
+    data.terminated[e] = verdict.terminated && !lost;
+    data.truncated[e] = lost || (!verdict.terminated && data.length[e] == spec.horizon);
+    data.success[e] = verdict.success && !lost;
+    if (data.terminated[e] != 0 || data.truncated[e] != 0) {
+      data.state[e] = EnvironmentState::over;
+      batch.hold(environment);
+    }
+  }
+  task_.observe(view, row(data.observation, environment, spec.observation_size()));
+}
+
+}  // namespace tangere

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// One thread's part of a VectorTask: takes a block of 16 environments through one action.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/sense/readout.hpp"
+#include "tasks/run/vector_task.hpp"
+
+namespace tangere {
+
+enum class EnvironmentState : std::uint8_t {
+  to_start,  ///< its next step starts episode `next_episode`
+  running,
+  over,
+};
+
+/// What a VectorTask knows of its environments besides their states, (E, width) each. A block's
+/// part is one thread's.
+struct EnvironmentData {
+  EnvironmentData(const Task& task, int environments);
+  static double bytes(const Task& task);  ///< of one environment
+
+  std::vector<double> memory, action, observation, u, q, v;
+  std::vector<double> reward, returns;
+  std::vector<std::uint8_t> terminated, truncated, success, starting;
+  std::vector<std::int64_t> length, episodes, next_episode;
+  std::vector<EnvironmentState> state;
+  std::vector<Moment> now;  ///< views of q and v
+};
+
+class BlockWorker {
+ public:
+  BlockWorker(const Task& task, Precision precision);
+
+  /// `actions`: (E, action), empty where every environment of the block starts.
+  void act(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions,
+           VectorCounts& counts);
+
+  // The parts of act(), for whoever steps the batch himself: begin, for every step k ask, step,
+  // look, then conclude.
+  void begin(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions);
+  /// Controls for the step k into data.u.
+  void ask_for_controls(const Batch& batch, EnvironmentData& data, int block, int step) const;
+  void look_after(const Batch& batch, int block, int step, VectorCounts& counts);
+  /// In place of steps and looks: where every environment starts and there is no opening.
+  void look_at_start(const Batch& batch, int block);
+  void conclude(Batch& batch, EnvironmentData& data, int block, VectorCounts& counts);
+  /// What was seen of a lane of the block looked at last, one of each of the task's moments.
+  [[nodiscard]] std::span<const Moment> moments(int lane) const;
+
+  static double bytes(const Task& task);
+
+ private:
+  void start(Batch& batch, EnvironmentData& data, int environment);
+  void settle(const Batch& batch, EnvironmentData& data, int environment);
+  void take_action(Batch& batch, EnvironmentData& data, int environment,
+                   std::span<const double> actions);
+  void look(const Batch& batch, int block, std::size_t moment);
+  void conclude_one(Batch& batch, EnvironmentData& data, int environment, VectorCounts& counts);
+  [[nodiscard]] std::span<double> part(std::vector<double>& of_moments, std::size_t moment,
+                                       int lane) const;
+
+  const Task& task_;
+  Stepper stepper_;
+  Readout readout_;
+  std::optional<Stepper> settling_stepper_;
+  std::optional<Batch> settling_;                    // one environment
+  std::vector<double> varying_;                      // of the environment that starts
+  std::vector<double> q_, v_, variables_, tactile_;  // (moments, 16, width)
+  std::vector<Moment> moments_;                      // (16, moments): views of them
+};
+
+/// What a task may look at of an environment between two actions.
+TaskView view_of(const Batch& batch, const EnvironmentData& data, int environment);
+
+}  // namespace tangere

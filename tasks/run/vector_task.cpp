@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: Apache-2.0
+// A thread takes a block of 16 environments through one action: start those whose episode is over,
+// step, look, judge.
+#include "tasks/run/vector_task.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "tasks/run/block_worker.hpp"
+#include "tasks/run/thread_order.hpp"
+
+namespace tangere {
+
+struct VectorTask::Impl {
+  Impl(const Task& t, int environments, const VectorOptions& o)
+      : task(t),
+        options(o),
+        data(t, environments),
+        batch(t.model(), environments, o.seed, o.first_episode),
+        arena(o.threads) {
+    workers.reserve(static_cast<std::size_t>(o.threads));
+    for (int i = 0; i < o.threads; ++i)
+      workers.push_back(std::make_unique<BlockWorker>(t, o.precision));
+    tallies.resize(static_cast<std::size_t>(batch.blocks()));
+  }
+
+  template <class Body>
+  void each_block(const Body& body) {
+    if (options.threads == 1) {
+      for (int b = 0; b < batch.blocks(); ++b) body(*workers[0], b);
+      return;
+    }
+    // The arena alone is not enough where more threads are asked for than there are cores.
+    const tbb::global_control cap(tbb::global_control::max_allowed_parallelism,
+                                  static_cast<std::size_t>(options.threads));
+    const auto run = [&](const tbb::blocked_range<int>& blocks) {
+      TaskOrder::arrive();
+      BlockWorker& worker =
+          *workers[static_cast<std::size_t>(tbb::this_task_arena::current_thread_index())];
+      const TaskOrder::Task task_of_thread(order, &worker);
+      for (int b = blocks.begin(); b != blocks.end(); ++b) body(worker, b);
+    };
+    order.begin();
+    arena.execute([&] {
+      tbb::parallel_for(tbb::blocked_range<int>(0, batch.blocks(), 1),
+                        ByReference<decltype(run)>{&run}, tbb::simple_partitioner{});
+    });
+    order.end();
+  }
+
+  void reset(std::uint64_t seed) {
+    options.seed = seed;
+    if (batch.seed() != seed)
+      batch = Batch(task.model(), batch.environments(), seed, options.first_episode);
+    for (int e = 0; e < batch.environments(); ++e)
+      data.next_episode[static_cast<std::size_t>(e)] = options.first_episode + e;
+    std::fill(data.state.begin(), data.state.end(), EnvironmentState::to_start);
+    std::fill(tallies.begin(), tallies.end(), VectorCounts{});
+    run({});
+  }
+
+  void run(std::span<const double> actions) {
+    each_block([&](BlockWorker& worker, int block) {
+      worker.act(batch, data, block, actions, tallies[static_cast<std::size_t>(block)]);
+    });
+    if (!options.autoreset) return;
+    for (int e = 0; e < batch.environments(); ++e) {
+      const auto i = static_cast<std::size_t>(e);
+      if (data.state[i] != EnvironmentState::over) continue;
+      data.state[i] = EnvironmentState::to_start;
+      data.next_episode[i] = data.episodes[i] + batch.environments();
+    }
+  }
+
+  const Task& task;
+  VectorOptions options;
+  EnvironmentData data;
+  Batch batch;
+  std::vector<std::unique_ptr<BlockWorker>> workers;  // by the thread's index in the arena
+  std::vector<VectorCounts> tallies;                  // per block
+  TaskOrder order;
+  tbb::task_arena arena;
+};
+
+VectorTask::VectorTask(const Task& task, int environments, const VectorOptions& options) {
+  if (options.threads < 1)
+    throw InputError(std::to_string(options.threads) + " threads; expected at least 1");
+  impl_ = std::make_unique<Impl>(task, environments, options);
+  impl_->reset(options.seed);
+}
+VectorTask::~VectorTask() = default;
+VectorTask::VectorTask(VectorTask&&) noexcept = default;
+VectorTask& VectorTask::operator=(VectorTask&&) noexcept = default;
+
+void VectorTask::reset(std::uint64_t seed) { impl_->reset(seed); }
+
+void VectorTask::step(std::span<const double> actions) {
+  const std::size_t expected = impl_->data.action.size();
+  if (actions.size() != expected)
+    throw InputError(std::to_string(actions.size()) + " numbers of actions; expected " +
+                     std::to_string(expected));
+  impl_->run(actions);
+}
+
+const Task& VectorTask::task() const { return impl_->task; }
+int VectorTask::environments() const { return impl_->batch.environments(); }
+std::span<const double> VectorTask::observations() const { return impl_->data.observation; }
+std::span<const double> VectorTask::observation(int environment) const {
+  const std::size_t width = impl_->task.spec().observation_size();
+  return observations().subspan(static_cast<std::size_t>(environment) * width, width);
+}
+std::span<const double> VectorTask::actions() const { return impl_->data.action; }
+std::span<const double> VectorTask::rewards() const { return impl_->data.reward; }
+std::span<const std::uint8_t> VectorTask::terminated() const { return impl_->data.terminated; }
+std::span<const std::uint8_t> VectorTask::truncated() const { return impl_->data.truncated; }
+std::span<const std::uint8_t> VectorTask::success() const { return impl_->data.success; }
+std::span<const std::uint8_t> VectorTask::starting() const { return impl_->data.starting; }
+std::span<const double> VectorTask::returns() const { return impl_->data.returns; }
+std::span<const std::int64_t> VectorTask::lengths() const { return impl_->data.length; }
+std::span<const std::int64_t> VectorTask::episodes() const { return impl_->data.episodes; }
+StepStatus VectorTask::status(int environment) const { return impl_->batch.status(environment); }
+TaskView VectorTask::view(int environment) const {
+  return view_of(impl_->batch, impl_->data, environment);
+}
+const Batch& VectorTask::batch() const { return impl_->batch; }
+
+VectorCounts VectorTask::counts() const {
+  VectorCounts sum;
+  for (const VectorCounts& tally : impl_->tallies) {
+    sum.environment_steps += tally.environment_steps;
+    sum.simulation_steps += tally.simulation_steps;
+    sum.newton_iterations += tally.newton_iterations;
+    sum.split_steps += tally.split_steps;
+  }
+  return sum;
+}
+
+double VectorTask::bytes(const Task& task, int environments, int threads) {
+  const double state = static_cast<double>(task.model().state_bytes_per_environment());
+  return environments * (state + EnvironmentData::bytes(task)) + threads * BlockWorker::bytes(task);
+}
+
+}  // namespace tangere

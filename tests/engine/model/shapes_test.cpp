@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a body's shape comes to: mass by integration along its axis, where its contact points lie,
+// how it rests.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "engine/model/compiled_model.hpp"
+#include "kernels/contact/distance.hpp"
+#include "tests/engine/runs.hpp"
+#include "tests/engine/scenes.hpp"
+
+namespace tangere {
+namespace {
+
+using testing::link;
+using testing::q_of;
+using testing::v_of;
+
+/// Discs of radius R(z), summed by Simpson's rule from piece to piece: mass, I_xx, I_zz.
+std::array<double, 3> integrate(double density, const std::vector<double>& pieces,
+                                const std::function<double(double)>& R) {
+  std::array<double, 3> sum{};
+  constexpr int kCells = 400;
+  for (std::size_t p = 0; p + 1 < pieces.size(); ++p)
+    for (int k = 0; k <= 2 * kCells; ++k) {
+      const double width = pieces[p + 1] - pieces[p], z = pieces[p] + width * k / (2 * kCells);
+      const double weight = width / (6 * kCells) *
+                            (k == 0 || k == 2 * kCells ? 1
+                             : k % 2 == 1              ? 4
+                                                       : 2);
+      const double area = M_PI * R(z) * R(z), disc = density * weight * area;
+      sum[0] += disc;
+      sum[1] += disc * (R(z) * R(z) / 4 + z * z);
+      sum[2] += disc * R(z) * R(z) / 2;
+    }
+  return sum;
+}
+
+void expect_mass(const Shape& shape, double density, const std::array<double, 3>& expected) {
+  const MassProperties p = mass_properties(shape, density);
+  EXPECT_NEAR(p.mass, expected[0], 1e-12 * expected[0]);
+  EXPECT_NEAR(p.inertia.m[0][0], expected[1], 1e-10 * expected[1]);
+  EXPECT_NEAR(p.inertia.m[1][1], expected[1], 1e-10 * expected[1]);
+  EXPECT_NEAR(p.inertia.m[2][2], expected[2], 1e-10 * expected[2]);
+  EXPECT_EQ(p.inertia.m[0][1], 0);
+  EXPECT_EQ(dot(p.centre, p.centre), 0);
+}
+
+TEST(Shapes, MassAndInertiaAreTheIntegrals) {
+  const auto cap = [](double r, double beyond) {
+    return std::sqrt(std::max(0.0, r * r - beyond * beyond));
+  };
+  expect_mass(CylinderShape{0.3, 0.07}, 800,
+              integrate(800, {-0.15, 0.15}, [](double) { return 0.07; }));
+  for (const double length : {0.3, 0.01})
+    expect_mass(
+        CapsuleShape{length, 0.07}, 800,
+        integrate(800, {-length / 2 - 0.07, -length / 2, length / 2, length / 2 + 0.07},
+                  [&](double z) { return cap(0.07, std::max(0.0, std::abs(z) - length / 2)); }));
+  expect_mass(SphereShape{0.07}, 800,
+              integrate(800, {-0.07, 0.07}, [&](double z) { return cap(0.07, z); }));
+  EXPECT_EQ(mass_properties(PlaneShape{}, 800).mass, 0);
+}
+
+/// Distance of every contact point from the surface of its own body: rounding.
+void expect_on_surface(const Shape& shape, PrimitiveShape kind, const kernels::Vec3<double>& size) {
+  const std::vector<double> p = contact_points(shape);
+  for (std::size_t k = 0; k < p.size(); k += 3)
+    kernels::with_distance<double>(kind, size, [&](const auto& s) {
+      EXPECT_NEAR(distance_at(s, kernels::Vec3<double>{p[k], p[k + 1], p[k + 2]}).d, 0, 1e-16)
+          << "point " << k / 3;
+    });
+}
+
+bool holds(const std::vector<double>& points, double x, double y, double z) {
+  for (std::size_t k = 0; k < points.size(); k += 3)
+    if (std::hypot(points[k] - x, points[k + 1] - y, points[k + 2] - z) < 1e-16) return true;
+  return false;
+}
+
+TEST(Shapes, CylinderPointsAreCentresAndRingsOfItsFaces) {
+  const CylinderShape shape{0.2, 0.06, 6, 3};
+  const std::vector<double> p = contact_points(shape);
+  ASSERT_EQ(p.size(), 3U * 2 * (1 + 6 * 3));
+  expect_on_surface(shape, PrimitiveShape::cylinder, {0.06, 0.1, 0});
+  for (const double z : {-0.1, 0.1}) {
+    EXPECT_TRUE(holds(p, 0, 0, z));
+    for (const double r : {0.02, 0.04, 0.06}) {
+      EXPECT_TRUE(holds(p, r, 0, z)) << r;  // angles start along x
+      EXPECT_TRUE(holds(p, -r, 0, z)) << r;
+      EXPECT_TRUE(holds(p, 0.5 * r, std::sqrt(0.75) * r, z)) << r;
+    }
+  }
+  EXPECT_EQ(contact_points(CylinderShape{1, 1}).size(), 3U * 2 * (1 + 8 * 3));
+}
+
+TEST(Shapes, CapsulePointsArePolesAndRings) {
+  const CapsuleShape shape{0.2, 0.06, 5, 4};
+  const std::vector<double> p = contact_points(shape);
+  ASSERT_EQ(p.size(), 3U * (2 + 5 * 4));
+  expect_on_surface(shape, PrimitiveShape::capsule, {0.06, 0.1, 0});
+  EXPECT_TRUE(holds(p, 0, 0, 0.16));
+  EXPECT_TRUE(holds(p, 0, 0, -0.16));
+  for (const double z : {-0.1, -0.05, 0.0, 0.05, 0.1}) {
+    EXPECT_TRUE(holds(p, 0.06, 0, z)) << z;
+    EXPECT_TRUE(holds(p, 0, -0.06, z)) << z;
+  }
+  EXPECT_EQ(contact_points(CapsuleShape{1, 1}).size(), 3U * (2 + 5 * 4));
+  EXPECT_TRUE(holds(contact_points(CapsuleShape{0.2, 0.06, 1, 4}), 0.06, 0, 0));
+  EXPECT_TRUE(contact_points(SphereShape{1}).empty());
+  EXPECT_TRUE(contact_points(PlaneShape{}).empty());
+}
+
+/// A cylinder on its face sinks into a half-space until the springs of that face carry it.
+TEST(Shapes, ACylinderRestsOnAPlane) {
+  Scene s;
+  s.links = {link("floor", JointType::fixed, {0, 0, 0.5}, PlaneShape{}, 1),
+             link("can", JointType::free, {0, 0, 0.5499}, CylinderShape{0.1, 0.03, 6, 2}, 1000)};
+  s.pair_contacts.push_back({"can", "floor", {500, 5, 0.5, 100}, ContactLaw::clamped, 1e-5, {}});
+  const Model model(s);
+  Stepper stepper(model, testing::options(Integrator::bdf1, 0.01));
+  Batch batch(model, 1);
+  for (int k = 0; k < 400; ++k) stepper.step(batch, {});
+  const double depth = model.mass(1) * 9.8 / (13 * 500);
+  EXPECT_NEAR(q_of(batch)[2], 0.05 - depth - 0.0499, 1e-9);  // q is relative to the joint's place
+  for (const double v : v_of(batch)) EXPECT_NEAR(v, 0, 1e-8);
+}
+
+/// A plate on two parallel rods that cannot move: it sinks until their four lines of points carry
+/// it.
+TEST(Shapes, APlateRestsOnRods) {
+  for (const Shape& rod : {Shape(CylinderShape{0.4, 0.02}), Shape(CapsuleShape{0.4, 0.02})}) {
+    Scene s;
+    s.links = {link("left", JointType::fixed, {-0.05, 0, 0}, rod, 1),
+               link("right", JointType::fixed, {0.05, 0, 0}, rod, 1),
+               link("plate", JointType::free, {0, 0, 0.0249},
+                    CuboidShape{{0.1, 0.1, 0.01}, {3, 3, 2}}, 1000)};
+    for (LinkDescription& l : s.links)
+      if (l.joint.type == JointType::fixed)
+        l.body.pose.orientation = {std::sqrt(0.5), std::sqrt(0.5), 0, 0};  // along y
+    for (const char* name : {"left", "right"})
+      s.pair_contacts.push_back({"plate", name, {300, 5, 0.5, 100}, ContactLaw::clamped, 1e-5, {}});
+    const Model model(s);
+    Stepper stepper(model, testing::options(Integrator::bdf1, 0.01));
+    Batch batch(model, 1);
+    for (int k = 0; k < 400; ++k) stepper.step(batch, {});
+    EXPECT_NEAR(q_of(batch)[2], 0.0001 - model.mass(2) * 9.8 / (6 * 300), 1e-9);
+    for (const double v : v_of(batch)) EXPECT_NEAR(v, 0, 1e-8);
+  }
+}
+
+/// A pad pressed on a rod reads the rod's shape: peak depth, no shear, symmetric; nothing where
+/// nothing touches.
+TEST(Shapes, APadReadsTheRodsItLiesOn) {
+  for (const Shape& rod : {Shape(CylinderShape{0.032, 0.02}), Shape(CapsuleShape{0.032, 0.02})}) {
+    Scene s;
+    s.links = {link("pad", JointType::translational, {0, 0, 0.0245},
+                    CuboidShape{{0.05, 0.05, 0.01}, {5, 5, 3}}, 1000),
+               link("rod", JointType::fixed, {0, 0, 0}, rod, 1000)};
+    s.links[1].body.pose.orientation = {std::sqrt(0.5), 0, std::sqrt(0.5), 0};  // along x
+    TactileDescription t;
+    t.name = t.body = "pad";
+    t.coefficients = {100, 0.01, 2, 0};
+    t.array = {{-0.025, 0.025, -0.005}, {0.025, -0.025, -0.005}, {0, -1, 0}, {1, 0, 0}, 21, 21};
+    s.sensors.push_back(t);
+    const Model model(s);
+    Readout readout(model);
+    const Batch batch(model, 1);
+    std::vector<double> force(3 * 441);
+    readout.tactile(batch, 0, 0, force);
+    for (std::size_t i = 0; i < 21; ++i)
+      for (std::size_t j = 0; j < 21; ++j) {
+        const double y = 0.025 - 0.0025 * double(i),
+                     x = -0.025 + 0.0025 * double(j);  // columns run along the rod
+        double d = std::hypot(y, 0.0195) - 0.02;
+        if (std::abs(x) > 0.016)
+          d = rod.index() == 3 ? std::hypot(y, 0.0195, std::abs(x) - 0.016) - 0.02 : 1;
+        const double* f = &force[3 * (21 * i + j)];
+        EXPECT_NEAR(std::hypot(f[0], f[1], f[2]), 100 * std::max(0.0, -d), 1e-12) << x << " " << y;
+      }
+  }
+}
+
+}  // namespace
+}  // namespace tangere

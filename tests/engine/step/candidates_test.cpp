@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// Candidate lists decide speed, never results: any margin gives the same bits, and a lane that
+// outruns its list is noticed.
+#include <gtest/gtest.h>
+
+#include "engine/step/detection.hpp"
+#include "engine/step/group_step.hpp"
+#include "engine/step/workspace.hpp"
+#include "tests/engine/scenes.hpp"
+
+namespace tangere {
+namespace {
+
+using kernels::kGroup;
+
+struct Trajectory {
+  std::vector<double> states;
+  int rows = 0;  // longest list seen
+};
+
+/// Eight balls under a pad at different places, stepped by hand so that the margin is ours to
+/// choose.
+Trajectory run(double margin, const kernels::KernelTable& table) {
+  const auto m = compile(testing::rolling_ball(false, 8));
+  Workspace w(*m);
+  SingleWorkspace alone(*m);
+  for (auto& list : w.lists) list.margin = margin;
+  const GroupStep step(*m, {Integrator::bdf2, 5e-3, 1e-9, 20});
+  for (int i = 0; i < m->nq; ++i)
+    for (int l = 0; l < kGroup; ++l) w.q0[i][l] = m->initial_q[std::size_t(i)];
+  for (int l = 0; l < kGroup; ++l) {
+    w.q0[2][l] = -0.0148;
+    w.v0[2][l] = -0.05 * l;  // the hardest comes in at 0.35 m/s: 1.75 mm a step
+    w.q0[3][l] = 1e-3 * l;
+  }
+  Trajectory r;
+  LaneBits history = 0;
+  for (int t = 0; t < 40; ++t) {
+    std::vector<double> q, v;
+    for (int l = 0; l < kGroup; ++l) {
+      const std::vector<double> u = testing::rolling_ball_control(100);
+      for (int i = 0; i < 3; ++i) w.stage.tau[i][l] = u[std::size_t(i)];
+    }
+    // What the stepper does around advance(): the state before becomes the history.
+    std::vector<kernels::LaneRow> q0(w.q0, w.q0 + m->nq), v0(w.v0, w.v0 + m->nv);
+    NewtonReport report;
+    step.advance(table, w, alone, kAllLanes, history, report);
+    for (int l = 0; l < kGroup; ++l)
+      EXPECT_FALSE(failed(report.status[l])) << "lane " << l << " step " << t;
+    std::copy(q0.begin(), q0.end(), w.q_before);
+    std::copy(v0.begin(), v0.end(), w.v_before);
+    history = kAllLanes;
+    r.rows =
+        std::max(r.rows, *std::max_element(w.lists[0].own_count, w.lists[0].own_count + kGroup));
+  }
+  for (int i = 0; i < m->nq; ++i)
+    for (int l = 0; l < kGroup; ++l) r.states.push_back(w.q0[i][l]);
+  return r;
+}
+
+TEST(Candidates, AnyMarginGivesTheSameBits) {
+  for (const kernels::KernelTable* table : kernels::available_kernels()) {
+    SCOPED_TRACE(table->name);
+    const Trajectory everything = run(1, *table);
+    EXPECT_EQ(everything.rows, 2168);  // a metre of margin: every point is listed
+    for (double margin : {1e-2, 1e-4, 1e-7}) {
+      const Trajectory r = run(margin, *table);
+      EXPECT_EQ(r.states, everything.states) << "margin " << margin;
+      EXPECT_LT(r.rows, 2168);
+    }
+  }
+}
+
+/// A bar of three blocks above a table, a cylinder and a ball, all fixed: nine pairs of shapes, one
+/// pair of links.
+Scene bar_above_shapes() {
+  Scene s;
+  s.name = "bar";
+  s.timestep = 2e-3;
+  s.links = {
+      testing::link("middle", JointType::free, {0, 0, 0.03},
+                    CuboidShape{{0.03, 0.03, 0.03}, {3, 3, 3}}, 500),
+      testing::link("left", JointType::fixed, {0, 0.03, 0},
+                    CuboidShape{{0.03, 0.03, 0.03}, {3, 3, 3}}, 500),
+      testing::link("right", JointType::fixed, {0, -0.03, 0},
+                    CuboidShape{{0.03, 0.03, 0.03}, {3, 3, 3}}, 500),
+      testing::link("table", JointType::fixed, {0, 0.05, 0},
+                    CuboidShape{{0.1, 0.05, 0.02}, {2, 2, 2}}, 500),
+      testing::link("roll", JointType::fixed, {0, -0.04, 0}, CylinderShape{0.05, 0.012, 8, 2}, 500),
+      testing::link("ball", JointType::fixed, {0.01, 0, 0}, SphereShape{0.012}, 500)};
+  s.links[1].parent = s.links[2].parent = 0;
+  for (const char* block : {"middle", "left", "right"})
+    for (const char* shape : {"table", "roll", "ball"})
+      s.pair_contacts.push_back({block, shape, {5e3, 5, 1, 20}, ContactLaw::clamped, 1e-5, {}});
+  return s;
+}
+
+/// States after some steps; `margin` 0: the model's own. Counts the candidates that were listed.
+Trajectory drop_bar(double margin, const kernels::KernelTable& table) {
+  const auto m = compile(bar_above_shapes());
+  EXPECT_EQ(m->link_pairs.size(), 1U);
+  Workspace w(*m);
+  SingleWorkspace alone(*m);
+  if (margin > 0)
+    for (auto& list : w.lists) list.margin = margin;
+  const GroupStep step(*m, {Integrator::bdf1, 2e-3, 1e-9, 20});
+  for (int l = 0; l < kGroup; ++l) {
+    for (int i = 0; i < m->nq; ++i) w.q0[i][l] = m->initial_q[std::size_t(i)];
+    w.v0[2][l] = -0.1 * l;
+    w.v0[4][l] = 0.5 * l;
+  }
+  Trajectory r;
+  for (int t = 0; t < 60; ++t) {
+    NewtonReport report;
+    step.advance(table, w, alone, kAllLanes, kNoLane, report);
+    for (int l = 0; l < kGroup; ++l)
+      EXPECT_FALSE(failed(report.status[l])) << "lane " << l << " step " << t;
+    for (const auto& list : w.lists)
+      for (int count : list.own_count) r.rows += count;
+  }
+  for (int i = 0; i < m->nq; ++i)
+    for (int l = 0; l < kGroup; ++l) r.states.push_back(w.q0[i][l]);
+  return r;
+}
+
+TEST(Candidates, BoundsThatSkipPairsOfShapesChangeNoBits) {
+  for (const kernels::KernelTable* table : kernels::available_kernels()) {
+    SCOPED_TRACE(table->name);
+    const Trajectory everything = drop_bar(1, *table), own = drop_bar(0, *table),
+                     tight = drop_bar(1e-6, *table);
+    EXPECT_EQ(everything.rows, 60 * kGroup * 9 * 26);
+    EXPECT_GT(own.rows, 0);
+    EXPECT_LT(own.rows, everything.rows / 4);
+    EXPECT_EQ(own.states, everything.states);
+    EXPECT_EQ(tight.states, everything.states);
+  }
+}
+
+TEST(Candidates, ALaneThatOutrunsItsListSaysSo) {
+  const auto m = compile(testing::rolling_ball(false, 8));
+  Workspace w(*m);
+  for (double& x : w.stage.c0_over_h.lane) x = 200;
+  for (double& x : w.stage.inverse_h.lane) x = 200;
+  for (int i = 0; i < m->nq; ++i)
+    for (double& x : w.stage.centre[i].lane) x = m->initial_q[std::size_t(i)];
+  const kernels::KernelTable& table = kernels::active_kernels();
+  table.group.kinematics(m->view, w.stage);
+  find_candidates(*m, table, w, kAllLanes);
+  table.group.kinematics(m->view, w.stage);
+  for (double x : w.stage.excess[0].lane) EXPECT_LE(x, 0);
+  w.stage.x[2][3] = -2 * w.lists[0].margin;
+  table.group.kinematics(m->view, w.stage);
+  for (int l = 0; l < kGroup; ++l) {
+    if (l == 3) {
+      EXPECT_GT(w.stage.excess[0][l], 0);
+    } else {
+      EXPECT_LE(w.stage.excess[0][l], 0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tangere

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every kernel table this machine can run, against the plain scalar run of the same templates, with
+// poisoned neighbour lanes; AVX2 and AVX-512 bit for bit.
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <limits>
+
+#include "engine/step/workspace.hpp"
+#include "tests/engine/random_machine.hpp"
+#include "tests/engine/stage_buffers.hpp"
+
+namespace tangere {
+namespace {
+
+using kernels::kGroup;
+using kernels::LaneRow;
+using testing::Random;
+using testing::StageBuffers;
+
+constexpr double kStep = 0.004, kC0 = 1.5;
+
+/// A workspace whose candidate lists hold every point, in all lanes.
+template <int L>
+void list_everything(const CompiledModel& m, BasicWorkspace<L>& w) {
+  for (std::size_t k = 0; k < m.pairs.size(); ++k) {
+    auto& list = w.lists[k];
+    list.count = m.pairs[k].n_points;
+    list.margin = 1e9;
+    for (int i = 0; i < 3 * m.pairs[k].n_points; ++i)
+      for (double& x : list.points[i].lane) x = m.pairs[k].points[i];
+    for (int l = 0; l < L; ++l) {
+      list.own_count[l] = m.pairs[k].n_points;
+      for (int i = 0; i < list.stride; ++i)
+        for (int c = 0; c < 3; ++c)
+          list.own[(l * 3 + c) * list.stride + i] =
+              i < m.pairs[k].n_points ? m.pairs[k].points[3 * i + c] : kernels::kFarAway;
+    }
+  }
+}
+
+template <int L>
+void fill_lane(BasicWorkspace<L>& w, const CompiledModel& m, const StageBuffers<double>& b,
+               int lane) {
+  for (int i = 0; i < m.nq; ++i) w.stage.centre[i][lane] = b.centre[std::size_t(i)];
+  for (int i = 0; i < m.nv; ++i) {
+    const std::size_t k = std::size_t(i);
+    w.stage.x[i][lane] = b.x[k], w.stage.r[i][lane] = b.r[k], w.stage.s[i][lane] = b.s[k];
+    w.stage.tau[i][lane] = b.tau[k], w.stage.target[i][lane] = b.target[k];
+  }
+}
+
+template <int L>
+void set_constants(BasicWorkspace<L>& w) {
+  for (double& x : w.stage.c0_over_h.lane) x = kC0 / kStep;
+  for (double& x : w.stage.inverse_h.lane) x = 1 / kStep;
+  w.stage.block = nullptr;
+  w.stage.group = 0;
+}
+
+struct Outputs {
+  std::vector<double> g, v, A;
+};
+template <int L>
+Outputs outputs(const BasicWorkspace<L>& w, const CompiledModel& m, int lane) {
+  Outputs o;
+  for (int i = 0; i < m.nv; ++i)
+    o.g.push_back(w.stage.g[i][lane]), o.v.push_back(w.stage.v[i][lane]);
+  for (int e = 0; e < m.pattern.entries; ++e) o.A.push_back(w.stage.A[e][lane]);
+  return o;
+}
+
+double largest(const std::vector<double>& a) {
+  double m = 0;
+  for (double x : a) m = std::max(m, std::abs(x));
+  return m;
+}
+void expect_close(const std::vector<double>& a, const std::vector<double>& b, double tolerance) {
+  ASSERT_EQ(a.size(), b.size());
+  const double scale = largest(b) + 1e-300;
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], tolerance * scale) << i;
+}
+
+class KernelTables : public ::testing::TestWithParam<unsigned> {};
+
+/// `friction_tangent`: of the lane that is looked at; its neighbours have the other.
+void compare_tables(const Scene& scene, unsigned seed, double friction_tangent = 1) {
+  const auto m = compile(scene);
+  StageBuffers<double> b(*m);
+  Random random(seed);
+  testing::randomise(b, *m, random, kStep);
+  b.friction_tangent = friction_tangent;
+  b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
+  Outputs fused;
+  for (const kernels::KernelTable* table : kernels::available_kernels()) {
+    SCOPED_TRACE(table->name);
+    Outputs first;
+    for (int lane = 0; lane < kGroup; ++lane)
+      for (const double poison : {0.5, std::numeric_limits<double>::quiet_NaN(), 1e300}) {
+        Workspace w(*m);
+        list_everything(*m, w);
+        set_constants(w);
+        for (int l = 0; l < kGroup; ++l)
+          w.stage.friction_tangent[l] = l == lane ? friction_tangent : 1 - friction_tangent;
+        for (int l = 0; l < kGroup; ++l) fill_lane(w, *m, b, l);
+        for (int l = 0; l < kGroup; ++l) {
+          if (l == lane) continue;
+          for (int i = 0; i < m->nv; ++i) w.stage.x[i][l] = poison;
+          for (int i = 0; i < m->nq; ++i) w.stage.centre[i][l] = poison;
+        }
+        table->group.kinematics(m->view, w.stage);
+        table->group.evaluate(m->view, w.stage, -1);
+        const Outputs o = outputs(w, *m, lane);
+        if (first.g.empty()) first = o;
+        // The residual without its Jacobian, and a lane evaluated alone across points: the same
+        // bits.
+        table->group.kinematics(m->view, w.stage);
+        table->group.residual(m->view, w.stage, -1);
+        EXPECT_EQ(outputs(w, *m, lane).g, o.g);
+        table->group.kinematics(m->view, w.stage);
+        table->group.evaluate(m->view, w.stage, lane);
+        const Outputs alone = outputs(w, *m, lane);
+        EXPECT_EQ(alone.g, o.g);
+        EXPECT_EQ(alone.A, o.A);
+        table->group.kinematics(m->view, w.stage);
+        table->group.residual(m->view, w.stage, lane);
+        EXPECT_EQ(outputs(w, *m, lane).g, o.g);
+        EXPECT_EQ(o.g, first.g);  // same bits in any lane, whatever the neighbours hold
+        EXPECT_EQ(o.A, first.A);
+      }
+    // The kernels of one lane: the same bits once more.
+    SingleWorkspace single(*m);
+    list_everything(*m, single);
+    set_constants(single);
+    single.stage.friction_tangent[0] = friction_tangent;
+    fill_lane(single, *m, b, 0);
+    table->single.kinematics(m->view, single.stage);
+    table->single.evaluate(m->view, single.stage, 0);
+    const Outputs own = outputs(single, *m, 0);
+    EXPECT_EQ(own.g, first.g);
+    EXPECT_EQ(own.v, first.v);
+    EXPECT_EQ(own.A, first.A);
+    table->single.residual(m->view, single.stage, 0);
+    EXPECT_EQ(outputs(single, *m, 0).g, first.g);
+    expect_close(first.g, b.g, 1e-12);
+    expect_close(first.v, b.v_out, 1e-13);
+    expect_close(first.A, b.A, 1e-12);
+    const std::string name = table->name;
+    if (name == "avx2" || name == "avx512") {
+      if (fused.g.empty()) fused = first;
+      EXPECT_EQ(fused.g, first.g) << "AVX2 and AVX-512 differ";
+      EXPECT_EQ(fused.A, first.A) << "AVX2 and AVX-512 differ";
+    }
+  }
+}
+
+TEST_P(KernelTables, EvaluateMatchesTheScalarReferenceWhateverTheNeighboursHold) {
+  const unsigned seed = GetParam();
+  compare_tables(
+      testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed);
+}
+
+TEST_P(KernelTables, FrictionBySecantMatchesTheScalarReferenceWhateverTheNeighboursTake) {
+  const unsigned seed = GetParam();
+  compare_tables(
+      testing::random_contacts(seed, 2 + static_cast<int>(seed % 5), ContactLaw::clamped), seed, 0);
+}
+
+TEST_P(KernelTables, JointEffectsMatchTheScalarReferenceWhateverTheNeighboursHold) {
+  const unsigned seed = GetParam();
+  compare_tables(testing::random_machine(seed, 2 + static_cast<int>(seed % 7)), seed);
+}
+
+TEST_P(KernelTables, LuSolvesAndJudgesItself) {
+  const unsigned seed = GetParam();
+  const auto m =
+      compile(testing::random_contacts(seed, 2 + static_cast<int>(seed % 7), ContactLaw::clamped));
+  const int n = m->nv;
+  Random random(seed);
+  for (const kernels::KernelTable* table : kernels::available_kernels()) {
+    SCOPED_TRACE(table->name);
+    Workspace w(*m);
+    Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd rhs(n);
+    const int lane = static_cast<int>(seed) % kGroup;
+    for (int i = 0; i < n; ++i) {
+      rhs[i] = random.normal();
+      for (int j = 0; j < n; ++j) {
+        const int at = m->pattern.slot[std::size_t(i * n + j)];
+        if (at < 0) continue;
+        a(i, j) = random.normal() + (i == j ? 5.0 * n : 0.0);
+        for (int l = 0; l < kGroup; ++l)
+          w.stage.A[at][l] = l == lane ? a(i, j) : std::numeric_limits<double>::quiet_NaN();
+      }
+      for (int l = 0; l < kGroup; ++l) w.stage.g[i][l] = rhs[i];
+    }
+    LaneRow accept;
+    for (double& x : accept.lane) x = 1;
+    table->group.factor(m->view, w.stage, &accept);
+    table->group.solve_watched(m->view, w.stage, w.stage.g, w.test, &w.sound);
+    table->group.solve(m->view, w.stage, w.stage.g, w.delta);
+    const Eigen::VectorXd expected = a.partialPivLu().solve(rhs);
+    EXPECT_EQ(w.sound[lane], 1);
+    for (int i = 0; i < n; ++i) {
+      EXPECT_NEAR(w.test[i][lane], expected[i], 1e-14 * expected.norm());
+      EXPECT_NEAR(w.delta[i][lane], expected[i], 1e-12 * expected.norm());
+    }
+    for (int l = 0; l < kGroup; ++l)
+      if (l != lane) {
+        EXPECT_EQ(w.sound[l], 0) << "a NaN matrix passed as sound";
+      }
+    // Lanes that are not accepted keep their factor.
+    const double kept = w.stage.LU[0][lane];
+    for (double& x : accept.lane) x = 0;
+    for (int e = 0; e < m->pattern.entries; ++e) w.stage.A[e][lane] *= 2;
+    table->group.factor(m->view, w.stage, &accept);
+    EXPECT_EQ(w.stage.LU[0][lane], kept);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, KernelTables, ::testing::Range(1U, 13U));
+
+TEST(KernelTable, AUselessFactorIsNotSound) {
+  // A leaf whose own block nearly vanishes while it is coupled: plain elimination loses all digits.
+  const auto m = compile(testing::random_contacts(5, 3, ContactLaw::clamped));
+  const int n = m->nv;
+  for (const kernels::KernelTable* table : kernels::available_kernels()) {
+    Workspace w(*m);
+    Random random(5);
+    for (int e = 0; e < m->pattern.entries; ++e)
+      for (double& x : w.stage.A[e].lane) x = random.normal();
+    const int first = m->pattern.permutation[0];
+    for (double& x : w.stage.A[m->pattern.slot[std::size_t(first * n + first)]].lane) x = 1e-25;
+    for (int i = 0; i < n; ++i)
+      for (double& x : w.stage.g[i].lane) x = random.normal();
+    LaneRow accept;
+    for (double& x : accept.lane) x = 1;
+    table->group.factor(m->view, w.stage, &accept);
+    table->group.solve_watched(m->view, w.stage, w.stage.g, w.test, &w.sound);
+    for (double s : w.sound.lane) EXPECT_EQ(s, 0) << table->name;
+  }
+}
+
+TEST(KernelTable, NamesAreKnownAndScalarIsAlwaysThere) {
+  const auto tables = kernels::available_kernels();
+  ASSERT_FALSE(tables.empty());
+  EXPECT_STREQ(tables.back()->name, "scalar");
+}
+
+}  // namespace
+}  // namespace tangere

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Several writers of one folder: the last of them says that it is complete, of one run, and none
+// keeps another out.
+#include <gmock/gmock.h>
+
+#include "engine/base/error.hpp"
+#include "io/dataset/dataset_files.hpp"
+#include "io/dataset/dataset_writer.hpp"
+#include "io/files/folder_lock.hpp"
+#include "tests/io/synthetic_episodes.hpp"
+
+namespace tangere {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::dataset_layout;
+using ::testing::ElementsAre;
+using testing::Folder;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::write_block;
+
+/// 48 episodes, a shard for each block of 16.
+DatasetLayout three_shards(std::uint64_t seed = 1) {
+  DatasetLayout l = dataset_layout(48);
+  l.shards = 3;
+  l.seed = seed;
+  return l;
+}
+
+DatasetOutput one(const Folder& folder, std::int64_t shard,
+                  ExistingShards existing = ExistingShards::refuse) {
+  return {folder / "set", existing, std::vector{shard}};
+}
+
+bool may_be_held_alone(const Folder& folder) {
+  return FolderLock(folder / "set").take(FolderLock::Kind::alone);
+}
+
+TEST(DatasetShared, IsLetGoOfByWhoeverEndsAndHeldByWhoeverSeesAll) {
+  const Folder folder;
+  const DatasetLayout l = three_shards();
+  DatasetWriter first(one(folder, 0), l);
+  write_block(first, l, 0);
+  EXPECT_FALSE(may_be_held_alone(folder));
+  EXPECT_FALSE(first.complete());
+  EXPECT_THAT(first.obstacle(), IsEmpty()) << "shards are missing: nothing is wrong";
+  EXPECT_TRUE(may_be_held_alone(folder)) << "the first one still lives, and keeps nobody out";
+  DatasetWriter second(one(folder, 1), l), third(one(folder, 2), l);
+  write_block(second, l, 16);
+  write_block(third, l, 32);
+  // Both have ended their shards: the second is not alone yet, the third is.
+  EXPECT_FALSE(second.complete());
+  EXPECT_THAT(second.obstacle(), HasSubstr("other processes hold '" + folder / "set'"));
+  EXPECT_TRUE(third.complete());
+  EXPECT_THAT(third.obstacle(), IsEmpty());
+  EXPECT_FALSE(may_be_held_alone(folder)) << "it merges";
+}
+
+TEST(DatasetShared, IsNotCompleteWithShardsOfAnotherRun) {
+  const Folder folder;
+  const DatasetLayout old = three_shards(1), l = three_shards(2);
+  {
+    DatasetWriter alone({folder / "set"}, old);
+    for (const std::int64_t episode : {0, 16, 32}) write_block(alone, old, episode);
+    EXPECT_TRUE(alone.complete());
+  }
+  for (const std::int64_t shard : {0, 1}) {
+    DatasetWriter writer(one(folder, shard, ExistingShards::replace), l);
+    write_block(writer, l, 16 * shard);
+    EXPECT_FALSE(writer.complete());
+    EXPECT_THAT(writer.obstacle(),
+                HasSubstr(shard == 0 ? "shard-00001.h5' is of another run: seed: 1 there, 2 here"
+                                     : "shard-00002.h5' is of another run: seed: 1 there, 2 here"));
+    EXPECT_TRUE(may_be_held_alone(folder));
+  }
+  DatasetWriter last(one(folder, 2, ExistingShards::replace), l);
+  write_block(last, l, 32);
+  EXPECT_TRUE(last.complete());
+}
+
+TEST(DatasetShared, IsNotCompleteWithAFileThatIsNoneOfItsShards) {
+  const Folder folder;
+  const DatasetLayout l = three_shards();
+  {
+    DatasetWriter alone({folder / "set"}, l);
+    for (const std::int64_t episode : {0, 16, 32}) write_block(alone, l, episode);
+  }
+  fs::copy_file(folder / "set/shard-00000.h5", folder / "set/shard-00007.h5");
+  DatasetWriter again({folder / "set", ExistingShards::keep}, l);
+  EXPECT_FALSE(again.complete());
+  EXPECT_THAT(again.obstacle(), HasSubstr("shard-00007.h5' is none of the 3 shards of this run"));
+  // Whoever reads or merges the folder says so as well.
+  const DatasetFiles files = find_dataset(folder / "set");
+  EXPECT_THAT(files.missing, IsEmpty());
+  EXPECT_THAT(files.surplus, ElementsAre(folder / "set/shard-00007.h5"));
+  EXPECT_THAT(examine_dataset(files).problems,
+              ElementsAre(HasSubstr("shard-00007.h5: none of the shards that are counted")));
+  try {
+    check_complete(files);
+    FAIL() << "one is too many";
+  } catch (const IoError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("shard-00007.h5' is none of the 3 shards that '"));
+  }
+}
+
+}  // namespace
+}  // namespace tangere

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every kind of damage to a shard is found and named.
+#include "io/dataset/shard_check.hpp"
+
+#include <gmock/gmock.h>
+#include <hdf5.h>
+
+#include <cstring>
+#include <fstream>
+#include <functional>
+
+#include "io/dataset/dataset_writer.hpp"
+#include "io/trajectory/trajectory_file.hpp"
+#include "tests/files.hpp"
+#include "tests/io/synthetic_episodes.hpp"
+
+namespace tangere {
+namespace {
+
+using testing::dataset_layout;
+using testing::dataset_number;
+using testing::Folder;
+using ::testing::HasSubstr;
+
+/// A whole shard of 20 episodes, of which 17 failed.
+class ShardCheck : public ::testing::Test {
+ protected:
+  ShardCheck() {
+    const DatasetLayout l = dataset_layout(20);
+    DatasetWriter writer({folder_ / "set"}, l);
+    testing::write_block(writer, l, 0);
+    testing::write_block(writer, l, 16, {testing::failure(17)});
+  }
+
+  /// What check_shard says; "" when it finds nothing.
+  [[nodiscard]] std::string complaint() const {
+    try {
+      static_cast<void>(check_shard(path_));
+    } catch (const IoError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  [[nodiscard]] std::string read() const { return file_bytes(path_); }
+  void write(const std::string& bytes) const {
+    std::ofstream(path_, std::ios::binary | std::ios::trunc) << bytes;
+  }
+
+  /// Opens the shard for writing, as no program of ours does.
+  void change(const std::function<void(hid_t)>& how) const {
+    const hid_t file = H5Fopen(path_.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    ASSERT_GE(file, 0);
+    how(file);
+    H5Fclose(file);
+  }
+  static void set(hid_t file, const char* object, const char* name, std::int64_t value) {
+    const hid_t owner = H5Oopen(file, object, H5P_DEFAULT),
+                attribute = H5Aopen(owner, name, H5P_DEFAULT);
+    EXPECT_GE(H5Awrite(attribute, H5T_NATIVE_INT64, &value), 0) << name;
+    H5Aclose(attribute);
+    H5Oclose(owner);
+  }
+
+  Folder folder_;
+  std::string path_ = folder_ / "set/shard-00000.h5";
+};
+
+std::string bytes_of_row(std::int64_t episode, std::size_t name, std::int64_t row,
+                         std::size_t width) {
+  std::vector<float> numbers;
+  for (std::size_t k = 0; k < width; ++k)
+    numbers.push_back(dataset_number<float>(episode, name, row, k));
+  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(float)};
+}
+
+TEST_F(ShardCheck, FindsNothingInAWholeOne) { EXPECT_EQ(complaint(), ""); }
+
+TEST_F(ShardCheck, FindsEveryFlippedBitOfARow) {
+  const std::string whole = read();
+  // A row of a field, of q in obs and of v in final_obs.
+  for (const auto& [name, row, width] : {std::tuple{3U, 1, 36U}, {1U, 2, 3U}, {2U, 3, 2U}}) {
+    const std::string part = bytes_of_row(5, name, row, width);
+    const std::size_t at = whole.find(part);
+    ASSERT_NE(at, std::string::npos) << name;
+    ASSERT_EQ(whole.find(part, at + 1), std::string::npos)
+        << "the numbers do not say where they belong";
+    for (std::size_t bit = 0; bit < 8 * part.size(); bit += width == 36 ? 29 : 1) {
+      std::string damaged = whole;
+      damaged[at + bit / 8] = static_cast<char>(damaged[at + bit / 8] ^ (1 << bit % 8));
+      write(damaged);
+      EXPECT_THAT(complaint(), HasSubstr("the checksum of its numbers is ")) << "bit " << bit;
+    }
+  }
+  write(whole);
+  EXPECT_EQ(complaint(), "");
+}
+
+TEST_F(ShardCheck, FindsAFlippedBitOfAnyDataset) {
+  for (const char* name : {"actions", "rewards", "dones", "obs/q", "obs/v", "obs/skin",
+                           "final_obs/q", "final_obs/v", "final_obs/skin"}) {
+    const std::string whole = read();
+    haddr_t at = 0;
+    {
+      const hid_t file = H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+      const hid_t dataset =
+          H5Dopen(file, (std::string("data/demo_19/") + name).c_str(), H5P_DEFAULT);
+      at = H5Dget_offset(dataset);
+      H5Dclose(dataset);
+      H5Fclose(file);
+    }
+    ASSERT_NE(at, HADDR_UNDEF) << name;
+    std::string damaged = whole;
+    damaged[at] = static_cast<char>(damaged[at] ^ 1);
+    write(damaged);
+    EXPECT_THAT(complaint(), HasSubstr("is damaged")) << name;
+    write(whole);
+  }
+}
+
+TEST_F(ShardCheck, FindsRowsThatChangedPlaces) {
+  const std::string whole = read();
+  const auto swapped = [&](const std::string& a, const std::string& b) {
+    std::string damaged = whole;
+    const std::size_t at_a = whole.find(a), at_b = whole.find(b);
+    damaged.replace(at_a, a.size(), b);
+    damaged.replace(at_b, b.size(), a);
+    return damaged;
+  };
+  write(swapped(bytes_of_row(5, 3, 0, 36), bytes_of_row(5, 3, 1, 36)));  // in an episode
+  EXPECT_THAT(complaint(), HasSubstr("checksum"));
+  write(swapped(bytes_of_row(5, 3, 1, 36), bytes_of_row(6, 3, 1, 36)));  // between episodes
+  EXPECT_THAT(complaint(), HasSubstr("checksum"));
+}
+
+TEST_F(ShardCheck, FindsEpisodesThatAreMissingOrThereTwice) {
+  const std::string whole = read();
+  change([](hid_t file) { H5Ldelete(file, "data/demo_3", H5P_DEFAULT); });
+  EXPECT_THAT(complaint(), HasSubstr("episode 3 is not in exactly one of /data and /failed"));
+  write(whole);
+  change([](hid_t file) { H5Ldelete(file, "failed/episode_17", H5P_DEFAULT); });
+  EXPECT_THAT(complaint(), HasSubstr("episode 17 is not in exactly one"));
+  write(whole);
+  change([](hid_t file) {
+    H5Gclose(H5Gcreate(file, "failed/episode_4", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  });
+  EXPECT_THAT(complaint(), HasSubstr("episode 4 is not in exactly one"));
+  write(whole);
+  change([](hid_t file) {
+    H5Lmove(file, "data/demo_3", file, "failed/episode_3", H5P_DEFAULT, H5P_DEFAULT);
+  });
+  EXPECT_THAT(complaint(), HasSubstr("/data says 57 rows, its demos have 54"));
+  // Two demos under each other's names.
+  write(whole);
+  change([](hid_t file) {
+    H5Lmove(file, "data/demo_3", file, "data/x", H5P_DEFAULT, H5P_DEFAULT);
+    H5Lmove(file, "data/demo_4", file, "data/demo_3", H5P_DEFAULT, H5P_DEFAULT);
+    H5Lmove(file, "data/x", file, "data/demo_4", H5P_DEFAULT, H5P_DEFAULT);
+  });
+  EXPECT_THAT(complaint(), HasSubstr("checksum"));
+}
+
+TEST_F(ShardCheck, FindsCountsThatAreWrong) {
+  const std::string whole = read();
+  const auto with = [&](const char* object, const char* name, std::int64_t value) {
+    write(whole);
+    change([&](hid_t file) { set(file, object, name, value); });
+    return complaint();
+  };
+  EXPECT_THAT(with("data", "total", 56), HasSubstr("/data says 56 rows, its demos have 57"));
+  EXPECT_THAT(with("data/demo_7", "num_samples", 2), HasSubstr("demo_7 has 2 rows, expected 3"));
+  EXPECT_THAT(with(".", "episodes", 21), HasSubstr("episode 20 is not in exactly one"));
+  EXPECT_THAT(with(".", "episodes", 16), HasSubstr("/data says 57 rows, its demos have 48"));
+  EXPECT_THAT(with(".", "first_episode", 1), HasSubstr("episode 20 is not in exactly one"));
+  EXPECT_THAT(with("scene", "steps", 8), HasSubstr("demo_0 has 3 rows, expected 4"));
+  EXPECT_THAT(with(".", "content_sum", 1), HasSubstr("expected 0000000000000001"));
+}
+
+TEST_F(ShardCheck, FindsDatasetsThatAreMissingOrShort) {
+  const std::string whole = read();
+  for (const char* name :
+       {"actions", "rewards", "dones", "obs", "obs/q", "obs/skin", "final_obs/v"}) {
+    write(whole);
+    const std::string path = std::string("data/demo_9/") + name;
+    change([&](hid_t file) { H5Ldelete(file, path.c_str(), H5P_DEFAULT); });
+    EXPECT_NE(complaint(), "") << name;
+    if (std::strcmp(name, "obs") == 0) continue;
+    change([&](hid_t file) {
+      const hsize_t dims[] = {2};
+      const hid_t space = H5Screate_simple(1, dims, nullptr);
+      H5Dclose(H5Dcreate(file, path.c_str(), H5T_IEEE_F32LE, space, H5P_DEFAULT, H5P_DEFAULT,
+                         H5P_DEFAULT));
+      H5Sclose(space);
+    });
+    EXPECT_THAT(complaint(), HasSubstr("has not ")) << name;
+  }
+}
+
+TEST_F(ShardCheck, FindsFilesThatAreCutOrSomethingElse) {
+  const std::string whole = read();
+  for (const double part : {0.0, 0.001, 0.3, 0.9, 0.9999}) {
+    write(whole.substr(0, static_cast<std::size_t>(part * static_cast<double>(whole.size()))));
+    EXPECT_NE(complaint(), "") << part;
+  }
+  write("no hdf5");
+  EXPECT_NE(complaint(), "");
+  std::filesystem::remove(path_);
+  EXPECT_NE(complaint(), "");
+  TrajectoryFile trajectory(path_, testing::layout(), false);
+  testing::write_run(trajectory, testing::layout());
+  trajectory.commit();
+  EXPECT_NE(complaint(), "");
+}
+
+TEST(ContentSum, DependsOnPlacesAndBytesButNotOnOrder) {
+  const std::uint8_t bytes[] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 0};
+  const auto sum = [&](std::int64_t episode, std::size_t name, std::int64_t row,
+                       std::size_t width) {
+    ContentSum s;
+    s.add(episode, name, row, 1, width, bytes);
+    return s.value();
+  };
+  const std::uint64_t plain = sum(1, 1, 1, 10);
+  EXPECT_NE(sum(2, 1, 1, 10), plain);
+  EXPECT_NE(sum(1, 2, 1, 10), plain);
+  EXPECT_NE(sum(1, 1, 2, 10), plain);
+  EXPECT_NE(sum(1, 1, 1, 9), plain);
+  ContentSum two, one_by_one, second;
+  two.add(1, 1, 4, 2, 5, bytes);
+  second.add(1, 1, 5, 1, 5, bytes + 5);
+  one_by_one.add(second);
+  one_by_one.add(1, 1, 4, 1, 5, bytes);
+  EXPECT_EQ(two.value(), one_by_one.value());
+}
+
+}  // namespace
+}  // namespace tangere

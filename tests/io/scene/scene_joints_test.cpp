@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// Joints, their effects and motors as scene files give them, in centimetres and grams; and that
+// such a scene runs.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
+#include "io/scene/scene_reader.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::string kFolder = std::string(TANGERE_TEST_DATA) + "/scenes/";
+
+TEST(SceneJoints, EveryJointEffectAndMotorComesThroughInSi) {
+  const SceneFile file = read_scene(kFolder + "every_joint.xml");
+  const Scene& s = file.scene;
+  ASSERT_EQ(file.warnings.size(), 1U);
+  EXPECT_THAT(file.warnings[0],
+              HasSubstr("every_joint.xml:10: <joint>: attribute 'lim' has no effect here"));
+  const auto joint = [&](const std::string& name) -> const JointDescription& {
+    for (const LinkDescription& l : s.links)
+      if (l.joint.name == name) return l.joint;
+    throw std::logic_error(name);
+  };
+  const JointDescription &shoulder = joint("shoulder"), &cross = joint("cross"),
+                         &puck = joint("puck");
+  EXPECT_DOUBLE_EQ(shoulder.damping, 10e-7);  // dyn cm s/rad
+  EXPECT_DOUBLE_EQ(shoulder.armature, 500e-7);
+  EXPECT_DOUBLE_EQ(shoulder.stiffness, 1e5 * 1e-7);
+  EXPECT_DOUBLE_EQ(shoulder.limit_stiffness, 0.2);
+  EXPECT_EQ(shoulder.limits, (std::array<double, 2>{-1.5, 1.5}));
+  EXPECT_EQ(shoulder.rest, std::vector<double>{0.25});
+  EXPECT_EQ(joint("elbow").rest, (std::vector<double>{0.1, 0.2, 0}));
+  EXPECT_EQ(joint("elbow").type, JointType::spherical);
+  EXPECT_DOUBLE_EQ((*joint("carriage").limits)[1], 0.05);
+  EXPECT_DOUBLE_EQ(joint("carriage").limit_stiffness, 2000);
+  EXPECT_DOUBLE_EQ(joint("carriage").damping, 2);
+  EXPECT_DOUBLE_EQ(cross.stiffness, 100);
+  EXPECT_DOUBLE_EQ(cross.rest[0], 0.02);
+  EXPECT_DOUBLE_EQ(cross.armature, 3e-3);
+  EXPECT_DOUBLE_EQ(puck.damping, 7e-3);
+  ASSERT_TRUE(puck.turning);
+  EXPECT_DOUBLE_EQ(puck.turning->damping, 7e-7);
+  for (const char* free : {"a", "b", "c"}) EXPECT_EQ(joint(free).type, JointType::free);
+  ASSERT_EQ(s.motors.size(), 4U);
+  EXPECT_DOUBLE_EQ(s.motors[0].P, 0.3);  // from <default>
+  EXPECT_DOUBLE_EQ(s.motors[0].D, 2e-3);
+  EXPECT_DOUBLE_EQ(s.motors[0].high, 1);
+  EXPECT_EQ(s.motors[0].timing, MotorTiming::end);
+  EXPECT_EQ(s.motors[1].high, HUGE_VAL);
+  EXPECT_DOUBLE_EQ(s.motors[2].P, 200);
+  EXPECT_DOUBLE_EQ(s.motors[2].D, 10);
+  EXPECT_DOUBLE_EQ(s.motors[2].low, -10);
+  EXPECT_EQ(s.motors[2].timing, MotorTiming::start);
+  EXPECT_DOUBLE_EQ(s.motors[3].high, 2);
+  const auto& control = std::get<PiecewiseControl>(*s.control);
+  EXPECT_DOUBLE_EQ(control.values[0][0], 0.3);    // rad
+  EXPECT_DOUBLE_EQ(control.values[0][4], 0.015);  // the carriage's target, from centimetres
+  EXPECT_DOUBLE_EQ(control.values[0][6], 0.5);    // a force motor's control has no unit
+  EXPECT_DOUBLE_EQ(s.randomizations[1].distribution.b, 1e-4);
+  EXPECT_DOUBLE_EQ(s.randomizations[2].distribution.b, 1000);
+  EXPECT_DOUBLE_EQ(s.randomizations[3].distribution.values[1], 2000);
+  EXPECT_DOUBLE_EQ(s.randomizations[4].distribution.b, 10e-3);
+  EXPECT_DOUBLE_EQ(s.randomizations[5].distribution.b, 0.3);
+  EXPECT_DOUBLE_EQ(s.randomizations[6].distribution.b, 10);
+}
+
+TEST(SceneJoints, ASceneOfEveryJointRuns) {
+  const Model model(read_scene(kFolder + "every_joint.xml").scene);
+  EXPECT_EQ(model.nv(), 1 + 3 + 3 + 1 + 1 + 2 + 3 + 3 + 3 * 6 + 3);
+  EXPECT_EQ(model.nu(), 1 + 3 + 1 + 2);
+  EXPECT_EQ(model.mass(4), 0);  // the carriage
+  EXPECT_EQ(model.u_units()[4], "m");
+  EXPECT_EQ(model.u_names()[1], "wrist.wx");
+  for (Integrator scheme :
+       {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
+    StepperOptions options;
+    options.integrator = scheme;
+    Stepper stepper(model, options);
+    Batch batch(model, 5, 2);
+    const ControlProgram control(model, stepper.timestep(), 2);
+    std::vector<double> u(std::size_t(5 * model.nu()));
+    for (int k = 0; k < 50; ++k) {
+      for (int e = 0; e < 5; ++e)
+        control.evaluate(
+            k, e, std::span(u).subspan(std::size_t(e * model.nu()), std::size_t(model.nu())));
+      stepper.step(batch, u);
+    }
+    EXPECT_EQ(batch.failed_count(), 0) << to_string(scheme);
+  }
+}
+
+}  // namespace
+}  // namespace tangere

@@ -1,0 +1,327 @@
+// SPDX-License-Identifier: Apache-2.0
+// Meshes and contact points from files: what they come to, and what is said of files that are none.
+#include "io/scene/surface_files.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "engine/model/compiled_model.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "io/scene/tactile_layouts.hpp"
+#include "tests/kernels/random_numbers.hpp"
+
+namespace tangere {
+namespace {
+
+using kernels::Vec3;
+using ::testing::HasSubstr;
+
+/// The box [0, 1] × [0, 2] × [0, 3]: quadrilaterals, comments, texture indices, an index counted
+/// from the end.
+const std::string kBox = R"(# a box
+o box
+v 0 0 0
+v 1 0 0
+v 1 2 0
+v 0 2 0
+v 0 0 3
+v 1 0 3
+v 1 2 3
+v 0 2 3
+v 9 9 9
+vn 0 0 1
+s off
+f 1 4 3 2
+f 5/1/1 6/2/1 7//1 -2   # the top; vertex 8
+f 1 2 6 5
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 8
+)";
+
+class SurfaceFiles : public ::testing::Test {
+ protected:
+  SurfaceFiles()
+      : folder_(::testing::TempDir() + "tangere_surface_" + std::to_string(getpid()) + "/") {
+    std::filesystem::create_directories(folder_);
+  }
+  ~SurfaceFiles() override { std::filesystem::remove_all(folder_); }
+
+  std::string write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ + name, std::ios::binary) << text;
+    return folder_ + name;
+  }
+  template <class F>
+  std::string error_of(const F& f) {
+    try {
+      f();
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "";
+  }
+  std::string obj_error(const std::string& text) {
+    return error_of([&] { read_obj(write("a.obj", text)); });
+  }
+  /// kBox with one piece replaced.
+  std::string box_error(const std::string& what, const std::string& by) {
+    std::string text = kBox;
+    return obj_error(text.replace(text.find(what), what.size(), by));
+  }
+  std::string points_error(const std::string& text) {
+    return error_of([&] { read_contact_points(write("p.txt", text)); });
+  }
+  SceneFile scene(const std::string& body) {
+    const std::string text = R"(<tangere><option unit="cm-g"/><ground/><robot><link name="a">
+<joint name="a" type="free3d" pos="1 0 0" quat="1 0 0 1"/>
+)" + body + "\n</link></robot></tangere>";
+    return parse_scene(text, folder_ + "s.xml");
+  }
+  std::string scene_error(const std::string& body) {
+    return error_of([&] { scene(body); });
+  }
+
+  std::string folder_;
+};
+
+TEST_F(SurfaceFiles, ABoxHasTheMassOfTheCuboid) {
+  const MeshShape mesh = read_obj(write("box.obj", kBox));
+  EXPECT_EQ(mesh.vertices.size(), 24U);  // without the one that no face uses
+  EXPECT_EQ(mesh.triangles.size(), 12U);
+  const MassProperties got = mass_properties(mesh, 700),
+                       box = mass_properties(CuboidShape{{1, 2, 3}, {2, 2, 2}}, 700);
+  EXPECT_NEAR(got.mass, box.mass, 1e-12 * box.mass);
+  EXPECT_NEAR(got.centre.x, 0.5, 1e-15);
+  EXPECT_NEAR(got.centre.y, 1, 1e-15);
+  EXPECT_NEAR(got.centre.z, 1.5, 1e-15);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      EXPECT_NEAR(got.inertia.m[i][j], box.inertia.m[i][j], 1e-12 * box.mass);
+}
+
+/// Any affine image A x + b of a solid has volume det A, centre A c + b and second moments A S Aᵀ.
+TEST_F(SurfaceFiles, MovedAndShearedMeshesFollowTheirVertices) {
+  testing::Random random(3);
+  const MeshShape box = read_obj(write("box.obj", kBox));
+  for (int trial = 0; trial < 20; ++trial) {
+    kernels::Mat3<double> A;
+    for (auto& row : A.m)
+      for (double& x : row) x = random.uniform(-1, 1);
+    const auto& m = A.m;
+    const double det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -
+                       m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+                       m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+    if (det < 0.05) continue;
+    const Vec3<double> b = random.vector(1000);
+    MeshShape moved = box;
+    for (std::size_t k = 0; k < moved.vertices.size(); k += 3) {
+      double* p = &moved.vertices[k];
+      const Vec3<double> at = A * Vec3<double>{p[0], p[1], p[2]} + b;
+      p[0] = at.x, p[1] = at.y, p[2] = at.z;
+    }
+    const MassProperties got = mass_properties(moved, 2);
+    EXPECT_NEAR(got.mass, 2 * 6 * det, 1e-9);
+    const Vec3<double> centre = A * Vec3<double>{0.5, 1, 1.5} + b;
+    EXPECT_NEAR(dot(got.centre - centre, got.centre - centre), 0, 1e-20);
+    const kernels::Mat3<double> S =
+        A * (kernels::Mat3<double>{{{1, 0, 0}, {0, 4, 0}, {0, 0, 9}}}) * transpose(A);
+    const double trace = S.m[0][0] + S.m[1][1] + S.m[2][2];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        EXPECT_NEAR(got.inertia.m[i][j], 2 * 6 * det / 12 * ((i == j ? trace : 0) - S.m[i][j]),
+                    1e-8);
+  }
+}
+
+TEST_F(SurfaceFiles, SeamsAreWelded) {
+  // The top has its own copies of its four vertices.
+  std::string text = kBox;
+  text.replace(text.find("f 5/1/1 6/2/1 7//1 -2"), 21,
+               "v 0 0 3\nv 1 0 3\nv 1 2 3\nv -0 2 3\nf 10 11 12 13");
+  EXPECT_EQ(read_obj(write("box.obj", text)).vertices.size(), 24U);
+}
+
+TEST_F(SurfaceFiles, WhatIsNoClosedSurfaceIsRefusedWithItsPlace) {
+  EXPECT_THAT(box_error("f 4 1 5 8\n", ""), HasSubstr("a.obj: the surface is open"));
+  EXPECT_THAT(box_error("f 4 1 5 8\n", ""), HasSubstr("edge from (0 0 0) to (0 2 0)"));
+  EXPECT_THAT(box_error("f 4 1 5 8\n", "f 8 5 1 4\n"), HasSubstr("disagree on what is outside"));
+  EXPECT_THAT(box_error("v 1 2 3", "v 1 2 nan"), HasSubstr("a.obj:9: 'nan'; expected a number"));
+  EXPECT_THAT(box_error("v 1 2 3", "v 1 2 1e300"), HasSubstr("a.obj:9: '1e300'"));
+  EXPECT_THAT(box_error("v 1 2 3", "v 1 2"),
+              HasSubstr("a.obj:9: a vertex of 2 numbers; expected x y z"));
+  EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1 5 18"),
+              HasSubstr("a.obj:19: vertex 18; expected one of the 9"));
+  EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1 5 0"), HasSubstr("a.obj:19: vertex 0"));
+  EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1 5 -10"), HasSubstr("a.obj:19: vertex -10"));
+  EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1"), HasSubstr("a.obj:19: a face of 2 vertices"));
+  EXPECT_THAT(box_error("f 4 1 5 8", "f 4 1 x"),
+              HasSubstr("a.obj:19: 'x'; expected the number of a vertex"));
+  EXPECT_THAT(box_error("s off", "solid box"), HasSubstr("a.obj:13: 'solid'; expected v, f"));
+  EXPECT_THAT(obj_error(""), HasSubstr("a.obj: no faces"));
+  EXPECT_THAT(obj_error("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n"),
+              HasSubstr("encloses no volume"));
+  EXPECT_THAT(obj_error("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n"),
+              HasSubstr("the faces point inwards"));
+  EXPECT_THROW(read_obj(folder_ + "none.obj"), IoError);
+  EXPECT_THROW(read_obj(folder_), IoError);
+}
+
+TEST_F(SurfaceFiles, ContactPointsFollowTheirCount) {
+  EXPECT_THAT(read_contact_points(write("p.txt", "2\n1 +2 3\n\n-1e-3 0 5\n")),
+              ::testing::ElementsAre(1, 2, 3, -1e-3, 0, 5));
+  EXPECT_THAT(points_error("2\n1 2 3\n"), HasSubstr("p.txt: 1 points follow the count of 2"));
+  EXPECT_THAT(points_error("1\n1 2 3\n4 5 6\n"), HasSubstr("2 points follow the count of 1"));
+  EXPECT_THAT(points_error("1\n1 2\n"), HasSubstr("p.txt:2: 2 numbers; expected x y z"));
+  EXPECT_THAT(points_error("1\n1 2 +-3\n"), HasSubstr("p.txt:2: '+-3'"));
+  EXPECT_THAT(points_error("1\n1 2 inf\n"), HasSubstr("p.txt:2: 'inf'"));
+  EXPECT_THAT(points_error("x\n"), HasSubstr("p.txt:1: 'x'; expected the number of points"));
+  EXPECT_THAT(points_error("0\n"), HasSubstr("p.txt:1: 0 points; expected one or more"));
+  EXPECT_THAT(points_error("1 2 3\n"), HasSubstr("p.txt:1: 3 words"));
+  EXPECT_THAT(points_error(""), HasSubstr("p.txt: empty"));
+}
+
+/// A mesh whose origin is a corner moves exactly as the cuboid placed where the mesh is.
+TEST_F(SurfaceFiles, ACompiledMeshIsTheCuboidInItsPlace) {
+  write("box.obj", kBox);
+  const std::string mesh =
+      R"(<body name="a" type="mesh" filename="box.obj" density="2" quat="1 0 1 0" pos="1 2 3" transform_type=)";
+  const Scene placed = scene(mesh + "\"OBJ_TO_JOINT\" scale=\"2 1 1\"/>").scene;
+  const Scene cuboid =
+      scene(
+          R"(<body name="a" type="cuboid" size="2 2 3" density="2" quat="1 0 1 0" pos="2.5 3 2"/>)")
+          .scene;
+  const auto a = compile(placed), b = compile(cuboid);
+  const kernels::Link &x = a->links.back(), &y = b->links.back();
+  EXPECT_NEAR(x.mass, y.mass, 1e-14);
+  EXPECT_NEAR(x.moment.x, y.moment.x, 1e-15);
+  EXPECT_NEAR(x.moment.y, y.moment.y, 1e-15);
+  EXPECT_NEAR(x.moment.z, y.moment.z, 1e-15);
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) EXPECT_NEAR(x.inertia.m[i][j], y.inertia.m[i][j], 1e-16);
+  // In the world: the joint stands at (1 0 0) cm, turned by 90° about z.
+  const Scene world =
+      scene(
+          R"(<body name="a" type="mesh" filename="box.obj" quat="1 0 0 1" pos="1 5 0" transform_type="OBJ_TO_WORLD"/>)")
+          .scene;
+  const Pose& pose = world.links[0].body.pose;
+  EXPECT_NEAR(pose.position[0], 0.05, 1e-16);
+  EXPECT_NEAR(pose.position[1], 0, 1e-16);
+  EXPECT_NEAR(pose.orientation[0], 1, 1e-15);
+}
+
+TEST_F(SurfaceFiles, AnAbstractBodyIsWhatItsNumbersSay) {
+  write("p.txt", "3\n1 0 0\n0 2 0\n0 0 3\n");
+  const SceneFile file = scene(
+      R"(<body name="a" type="abstract" mass="5" inertia="2 0.1 0 3 0 4"><visual mesh="no.obj"/>
+<collision contacts="p.txt" pos="0 0 1" quat="1 0 0 1"/></body>)");
+  EXPECT_TRUE(file.warnings.empty());
+  const auto& shape = std::get<AbstractShape>(file.scene.links[0].body.shape);
+  EXPECT_NEAR(shape.mass, 5e-3, 1e-18);
+  EXPECT_NEAR(shape.inertia[1], 0.1e-7, 1e-22);
+  EXPECT_NEAR(shape.inertia[5], 4e-7, 1e-21);
+  ASSERT_EQ(shape.contact_points.size(), 9U);
+  EXPECT_NEAR(shape.contact_points[1], 0.01, 1e-17);  // x turned onto y
+  EXPECT_NEAR(shape.contact_points[2], 0.01, 1e-17);
+  const auto model = compile(file.scene);
+  EXPECT_NEAR(model->links.back().inertia.m[0][1], 0.1e-7, 1e-22);
+}
+
+/// The same points as a tactile hemisphere of that radius and count, in the scene's unit, where pos
+/// and quat put them.
+TEST_F(SurfaceFiles, AnAbstractBodyMayTouchWithAHemisphere) {
+  const std::string text = R"(<body name="a" type="abstract" mass="5" inertia="2 2 3">
+<collision radius="2" count="144" pos="0 0 -0.75" quat="1 0 0 1"/></body>)";
+  const Scene s = scene(text).scene;
+  const auto& points = std::get<AbstractShape>(s.links[0].body.shape).contact_points;
+  const std::vector<TactilePoint> expected = hemisphere_points(0.02, 144);
+  ASSERT_EQ(points.size(), 3 * expected.size());
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    const Vector3& p = expected[k].position;
+    EXPECT_NEAR(points[3 * k], -p[1], 1e-16);  // a quarter turn about z
+    EXPECT_NEAR(points[3 * k + 1], p[0], 1e-16);
+    EXPECT_NEAR(points[3 * k + 2], p[2] - 0.0075, 1e-16);
+  }
+  const auto refusal = [&](const std::string& from, const std::string& to) {
+    std::string wrong = text;
+    return scene_error(wrong.replace(wrong.find(from), from.size(), to));
+  };
+  EXPECT_THAT(refusal(" radius=\"2\"", ""),
+              HasSubstr("s.xml:4: <collision>: attribute 'radius' is missing"));
+  EXPECT_THAT(refusal(" count=\"144\"", ""),
+              HasSubstr("s.xml:4: <collision>: attribute 'count' is missing"));
+  EXPECT_THAT(refusal("radius=\"2\" count=\"144\"", ""),
+              HasSubstr("no contact points; expected 'contacts' (a file)"));
+  EXPECT_THAT(refusal("radius=\"2\"", "radius=\"2\" contacts=\"p.txt\""),
+              HasSubstr("both 'contacts' and a hemisphere"));
+  EXPECT_THAT(refusal("radius=\"2\"", "radius=\"-2\""),
+              HasSubstr("s.xml:4: <collision>: radius=\"-2\""));
+  EXPECT_THAT(refusal("count=\"144\"", "count=\"0\""),
+              HasSubstr("s.xml:4: <collision>: count=\"0\""));
+  EXPECT_THAT(refusal("count=\"144\"", "count=\"1.5\""), HasSubstr("count=\"1.5\""));
+  EXPECT_THAT(refusal("radius=\"2\"", "radus=\"2\""), HasSubstr("did you mean 'radius'"));
+}
+
+TEST_F(SurfaceFiles, ScenesSayWhatIsWrongWithTheirBodies) {
+  write("box.obj", kBox);
+  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" filename="box.obj"/>)"),
+              HasSubstr("s.xml:3: <body>: attribute 'transform_type' is missing"));
+  EXPECT_THAT(
+      scene_error(
+          R"(<body name="a" type="mesh" filename="box.obj" transform_type="BODY_TO_JOINT"/>)"),
+      HasSubstr("principal axes"));
+  EXPECT_THAT(
+      scene_error(
+          R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOIN"/>)"),
+      HasSubstr("did you mean 'OBJ_TO_JOINT'"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="mesh" transform_type="OBJ_TO_JOINT"/>)"),
+              HasSubstr("'filename' is missing"));
+  EXPECT_THAT(
+      scene_error(
+          R"(<body name="a" type="mesh" filename="box.obj" scale="1 0 1" transform_type="OBJ_TO_JOINT"/>)"),
+      HasSubstr("scale has 0"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" inertia="1 1 1"/>)"),
+              HasSubstr("'mass' is missing"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1"/>)"),
+              HasSubstr("inertia has 2 numbers; expected 3"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1 3"/>)"),
+              HasSubstr("inertia=\"1 1 3\" is that of no solid body"));
+  EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 2 0 1 0 1"/>)"),
+              HasSubstr("no solid body"));
+}
+
+/// Without a distance a body can touch but not be touched, in a file or in a scene built in code;
+/// no sensor feels it.
+TEST_F(SurfaceFiles, NothingTouchesAMesh) {
+  write("box.obj", kBox);
+  const std::string cans =
+      R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOINT"/></link>
+<link name="b"><joint name="b" type="free3d"/><body name="b" type="cuboid" size="1 1 1"/>)";
+  const auto with_contact = [&](const std::string& general, const std::string& primitive) {
+    return parse_scene(
+               R"(<tangere><robot><link name="a"><joint name="a" type="free3d"/>
+)" + cans + R"(</link></robot><contact><general_primitive_contact general_body=")" +
+                   general + R"(" primitive_body=")" + primitive +
+                   R"("/></contact><sensor><tactile body="b" type="rect_array" rect_pos0="0 0 0.5"
+rect_pos1="0.1 0.1 0.5" axis0="1 0 0" axis1="0 1 0" resolution="2 2"/></sensor></tangere>)",
+               folder_ + "s.xml")
+        .scene;
+  };
+  EXPECT_THAT(
+      error_of([&] { with_contact("b", "a"); }),
+      HasSubstr(
+          "primitive_body 'a' is a mesh body, which has no distance function; expected a sphere"));
+  Scene s = with_contact("a", "b");
+  const auto model = compile(s);
+  EXPECT_EQ(model->pairs[0].n_points, 8);
+  EXPECT_TRUE(model->sensors[0].targets.empty());
+  std::swap(s.pair_contacts[0].general_body, s.pair_contacts[0].primitive_body);
+  EXPECT_THAT(error_of([&] { compile(s); }),
+              HasSubstr("primitive_body 'a' (mesh) has no distance"));
+}
+
+}  // namespace
+}  // namespace tangere

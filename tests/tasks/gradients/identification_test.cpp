@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// Numbers put into a scene come out of its noisy recording, as well as the fit says; what cannot be
+// fitted is refused.
+#include "tasks/gradients/identification.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "engine/base/error.hpp"
+#include "engine/model/random.hpp"
+#include "engine/step/control.hpp"
+#include "io/scene/scene_reader.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::vector<std::string> kSought = {"tactile pad kn", "tactile pad kt", "tactile pad mu",
+                                          "body ball density"};
+
+/// The shipped scene with a pad of 20 × 20 points, and what it records.
+class Recording {
+ public:
+  Recording()
+      : scene(read_scene(TANGERE_SOURCE_DIR "/scenes/identify_ball.xml").scene),
+        program_(coarse(scene), scene.timestep, 0) {
+    run = {[this](std::int64_t t, int e, std::span<double> u) { program_.evaluate(t, e, u); },
+           program_.steps(), 5};
+    clean = simulate_fields(scene, run);
+    truth = numbers_of(scene, kSought);
+    for (const auto& reading : clean.readings)
+      for (double f : reading) peak = std::max(peak, std::abs(f));
+  }
+
+  Scene scene;
+  RecordedRun run;
+  FieldSequence clean;
+  std::vector<double> truth;
+  double peak = 0;
+
+ private:
+  static Model coarse(Scene& s) {
+    s.sensors[0].array.rows = s.sensors[0].array.cols = 20;
+    return Model(s);
+  }
+  ControlProgram program_;
+};
+
+Identification fit(const Recording& r, const FieldSequence& recorded,
+                   const std::vector<double>& factors) {
+  std::vector<double> start = r.truth;
+  for (std::size_t k = 0; k < start.size(); ++k) start[k] *= factors[k];
+  IdentificationOptions options;
+  options.numbers = kSought;
+  return identify(with_numbers(r.scene, kSought, start), r.run, recorded, options);
+}
+
+TEST(Identification, FindsSkinAndMassWithinOnePercent) {
+  const Recording r;
+  const std::vector<std::vector<double>> factors = {
+      {0.5, 2, 0.5, 2}, {2, 0.5, 2, 0.5}, {0.7, 0.6, 1.8, 1.5}};
+  for (std::size_t seed = 0; seed < factors.size(); ++seed) {
+    FieldSequence recorded = r.clean;
+    add_noise(recorded, 0.01 * r.peak, seed);
+    const Identification found = fit(r, recorded, factors[seed]);
+    EXPECT_TRUE(found.converged);
+    EXPECT_NEAR(found.noise, 0.01 * r.peak, 2e-4 * r.peak);
+    EXPECT_LT(found.condition, 1000);
+    for (std::size_t k = 0; k < r.truth.size(); ++k) {
+      const double error = found.values()[k] / r.truth[k] - 1;
+      EXPECT_LT(std::abs(error), 0.01) << kSought[k] << ", seed " << seed;
+      EXPECT_LT(std::abs(error), 4.5 * found.deviation[k]) << kSought[k] << ", seed " << seed;
+    }
+  }
+}
+
+/// Without noise nothing is left but the tolerance of the steps.
+TEST(Identification, IsExactWithoutNoise) {
+  const Recording r;
+  const Identification found = fit(r, r.clean, {1.5, 0.8, 0.8, 1.3});
+  EXPECT_TRUE(found.converged);
+  for (std::size_t k = 0; k < r.truth.size(); ++k)
+    EXPECT_NEAR(found.values()[k] / r.truth[k], 1, 1e-6) << kSought[k];
+  // Differences across points that begin to touch or to slip are not exact.
+  EXPECT_LT(found.gradient_difference, 1e-4);
+}
+
+TEST(Identification, MisfitIsHalfTheSquaresOfAllPoints) {
+  const Recording r;
+  FieldSequence recorded = r.clean;
+  add_noise(recorded, 0.1 * r.peak, 3);
+  const Scene other = with_numbers(r.scene, kSought, std::vector<double>{5, 0.4, 0.6, 1600});
+  const FieldSequence fields = simulate_fields(other, r.run);
+  double expected = 0;
+  for (std::size_t k = 0; k < fields.readings.size(); ++k)
+    for (std::size_t i = 0; i < fields.readings[k].size(); ++i)
+      expected += 0.5 * std::pow(fields.readings[k][i] - recorded.readings[k][i], 2);
+  const Model model(other);
+  const FieldMisfit misfit(model, recorded);
+  const RolloutLoss* const losses[] = {&misfit};
+  GradientOptions options;
+  options.steps = r.run.steps;
+  const GradientSummary summary =
+      rollout_gradients(Batch(model, 1), r.run.controls, options, losses);
+  EXPECT_NEAR(summary.losses[0].value[0], expected, 1e-12 * expected);
+}
+
+TEST(Identification, RefusesWhatCannotBeFitted) {
+  const Recording r;
+  const auto message = [&](const Scene& scene, const FieldSequence& recorded,
+                           std::vector<std::string> numbers) {
+    IdentificationOptions options;
+    options.numbers = std::move(numbers);
+    try {
+      identify(scene, r.run, recorded, options);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad stiffness"}),
+              HasSubstr("no number 'tactile pad stiffness'"));
+  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball kn"}), testing::IsEmpty())
+      << "any number of the scene";
+  // The ball never slips on the ground.
+  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball mu"}),
+              HasSubstr("do not depend on 'ground ball mu'"));
+  const Scene frictionless = with_numbers(r.scene, {{"tactile pad mu"}}, std::vector<double>{0});
+  EXPECT_THAT(message(frictionless, r.clean, kSought), HasSubstr("'tactile pad mu' is 0"));
+  FieldSequence short_one = r.clean;
+  short_one.readings.pop_back();
+  EXPECT_THAT(message(r.scene, short_one, kSought), HasSubstr("99 readings"));
+  FieldSequence narrow = r.clean;
+  narrow.readings[0].pop_back();
+  EXPECT_THAT(message(r.scene, narrow, kSought), HasSubstr("1199 numbers; expected 1200"));
+}
+
+}  // namespace
+}  // namespace tangere

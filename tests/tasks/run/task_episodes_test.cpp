@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// Episodes of tasks on their way to a sink: in ascending order, the same bits on any number of
+// threads, few at a time, ended by errors and when asked to.
+#include "tasks/run/task_episodes.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "tests/sanitized.hpp"
+#include "tests/tasks/task_check.hpp"
+
+namespace tangere {
+namespace {
+
+using ::tangere::testing::task_named;
+
+constexpr std::int64_t kEpisodes = kSanitized ? 104 : 200;  // the last block is short
+
+/// Keeps what it is given, and complains about what is out of order.
+class Keeper : public EpisodeSink {
+ public:
+  void prepare(const EpisodeRows& piece) override {
+    ++prepared;
+    const std::int64_t ahead = piece.first_episode / 16 - written;
+    std::int64_t most = most_ahead;
+    while (ahead > most && !most_ahead.compare_exchange_weak(most, ahead)) {
+    }
+  }
+  void write(const EpisodeRows& piece) override {
+    EXPECT_EQ(callers_++, 0) << "two threads in the sink";
+    EXPECT_GT(piece.first_episode, last_);
+    last_ = piece.first_episode;
+    if (fail_at == last_) throw IoError("the disk is full");
+    for (int e = 0; e < piece.episodes; ++e) {
+      const EpisodeEnd& end = piece.ends[static_cast<std::size_t>(e)];
+      std::string& all = episodes.emplace_back();
+      add(all, piece.actions, e, piece.action_rows, end.length);
+      add(all, piece.rewards, e, piece.action_rows, end.length);
+      for (const Observation& values : piece.observations)
+        std::visit([&](const auto& numbers) { add(all, numbers, e, piece.rows, end.length + 1); },
+                   values);
+      all.append(reinterpret_cast<const char*>(&end.total), sizeof end.total);
+    }
+    if (slow) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    ++written;
+    --callers_;
+  }
+  void finish(std::int64_t first, std::span<const FailedEpisode>) override {
+    EXPECT_EQ(first, last_);
+  }
+
+  std::vector<std::string> episodes;  // bytes of each
+  std::int64_t fail_at = -1;
+  bool slow = false;
+  std::atomic<int> prepared{0}, written{0};
+  std::atomic<std::int64_t> most_ahead{0};
+
+ private:
+  template <class T>
+  void add(std::string& to, std::span<const T> all, int episode, std::int64_t rows,
+           std::int64_t used) const {
+    const std::size_t each =
+        all.size() / static_cast<std::size_t>(std::min<std::int64_t>(16, kEpisodes - last_));
+    const std::size_t width = each / static_cast<std::size_t>(rows);
+    to.append(reinterpret_cast<const char*>(all.data() + static_cast<std::size_t>(episode) * each),
+              static_cast<std::size_t>(used) * width * sizeof(T));
+  }
+  std::int64_t last_ = -1;
+  std::atomic<int> callers_{0};
+};
+
+TaskEpisodeSummary play(const Task& task, Keeper& keeper, int threads,
+                        const EpisodeProgress& progress = {}, const StopRequest& stop = {}) {
+  TaskEpisodeOptions options;
+  options.episodes = kEpisodes;
+  options.seed = 4;
+  options.threads = threads;
+  return run_task_episodes(task, Policy(task, PolicyKind::random), options, keeper, progress, stop);
+}
+
+TEST(TaskEpisodes, AreTheSameInTheSameOrderOnAnyNumberOfThreads) {
+  const auto task = task_named("dummy");
+  Keeper one;
+  const TaskEpisodeSummary alone = play(*task, one, 1);
+  ASSERT_EQ(std::ssize(one.episodes), kEpisodes);
+  EXPECT_NE(one.episodes[0], one.episodes[1]);
+  for (const int threads : {2, 3, 8}) {
+    Keeper many;
+    const TaskEpisodeSummary summary = play(*task, many, threads);
+    EXPECT_TRUE(many.episodes == one.episodes) << threads;
+    EXPECT_EQ(many.prepared, (kEpisodes + 15) / 16);
+    EXPECT_EQ(summary.mean_return, alone.mean_return) << "summed in another order";
+    EXPECT_EQ(summary.run.rows, alone.run.rows);
+    EXPECT_EQ(summary.run.environment_steps, kEpisodes * 40);
+    EXPECT_LE(summary.run.peak_blocks_in_flight, 2 * threads + 1);
+  }
+}
+
+TEST(TaskEpisodes, OfRangesAreThoseOfAllOfThem) {
+  const auto task = task_named("dummy");
+  Keeper all, some;
+  play(*task, all, 2);
+  TaskEpisodeOptions options;
+  options.episodes = kEpisodes;
+  options.ranges = {{16, 48}, {kEpisodes - 8, kEpisodes}};
+  options.seed = 4;
+  options.threads = 2;
+  const auto summary = run_task_episodes(*task, Policy(*task, PolicyKind::random), options, some);
+  EXPECT_EQ(summary.run.episodes, 40);
+  std::vector<std::string> expected(all.episodes.begin() + 16, all.episodes.begin() + 48);
+  expected.insert(expected.end(), all.episodes.end() - 8, all.episodes.end());
+  EXPECT_TRUE(some.episodes == expected);
+}
+
+TEST(TaskEpisodes, ASlowSinkHoldsThemUpInsteadOfMemory) {
+  const auto task = task_named("dummy");
+  Keeper keeper;
+  keeper.slow = true;
+  const TaskEpisodeSummary summary = play(*task, keeper, 2);
+  EXPECT_LE(keeper.most_ahead, 5);
+  EXPECT_LE(summary.run.peak_blocks_in_flight, 5);
+  EXPECT_GE(keeper.most_ahead, 1) << "nothing was played while the sink wrote";
+}
+
+TEST(TaskEpisodes, EndWithWhatTheSinkThrows) {
+  const auto task = task_named("dummy");
+  for (const int threads : {1, 4}) {
+    Keeper keeper;
+    keeper.fail_at = 32;
+    EXPECT_THROW(play(*task, keeper, threads), IoError);
+    EXPECT_EQ(keeper.written, 2) << "the sink was called again after it threw";
+  }
+}
+
+TEST(TaskEpisodes, EndWhenAskedTo) {
+  const auto task = task_named("dummy");
+  for (const int threads : {1, 4}) {
+    Keeper keeper;
+    std::atomic<int> asked = 0;
+    const TaskEpisodeSummary summary =
+        play(*task, keeper, threads, {}, [&] { return ++asked > 100; });
+    EXPECT_TRUE(summary.run.stopped);
+    EXPECT_LE(asked, 100 + 2 * threads + 1);
+    EXPECT_EQ(std::ssize(keeper.episodes), summary.run.episodes);
+    EXPECT_LT(summary.run.episodes, 48);
+  }
+}
+
+TEST(TaskEpisodes, ProgressCountsEveryAction) {
+  const auto task = task_named("dummy");
+  std::vector<std::int64_t> seen;
+  Keeper keeper;
+  play(*task, keeper, 4, [&](std::int64_t steps) { seen.push_back(steps); });
+  EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end()));
+  EXPECT_EQ(seen.back(), kEpisodes * 40);
+}
+
+}  // namespace
+}  // namespace tangere
