@@ -69,9 +69,9 @@ Json as_json(const Model& model) {
                        {"points", s.points},
                        {"every", s.every},
                        {"pressure_sign", s.pressure_sign}});
-  Json variables = Json::array();
-  for (const VariableInfo& v : model.variables())
-    variables.push_back({{"name", v.name}, {"joint", v.joint}});
+  Json end_effectors = Json::array();
+  for (const EndEffectorInfo& v : model.end_effectors())
+    end_effectors.push_back({{"name", v.name}, {"joint", v.joint}});
   for (const EffectInfo& e : model.effects())
     effects.push_back({{"name", e.name}, {"on", e.on}, {"reason", e.reason}});
   Json stages = Json::array();
@@ -95,7 +95,7 @@ Json as_json(const Model& model) {
           {"motors", motors_json(scene)},
           {"contacts", contacts},
           {"sensors", sensors},
-          {"variables", variables},
+          {"variables", end_effectors},
           {"control", control_name(scene)},
           {"steps", steps < 0 ? Json() : Json(steps)},
           {"randomized", randomized_names(scene)},
@@ -133,10 +133,10 @@ std::string sensors_text(const Model& model) {
   return text;
 }
 
-std::string variables_text(const Model& model) {
-  if (model.variables().empty()) return "";
-  std::string text = fmt::format("\nend effectors ({})\n", model.variables().size());
-  for (const VariableInfo& v : model.variables())
+std::string end_effectors_text(const Model& model) {
+  if (model.end_effectors().empty()) return "";
+  std::string text = fmt::format("\nend effectors ({})\n", model.end_effectors().size());
+  for (const EndEffectorInfo& v : model.end_effectors())
     text += fmt::format("  {} on joint {}\n", v.name, v.joint);
   return text;
 }
@@ -159,7 +159,7 @@ std::string as_text(const Model& model) {
   for (const ContactInfo& c : model.contacts())
     text += fmt::format("  {} on {}: {} point{}, law {}\n", c.first, c.second, c.points,
                         c.points == 1 ? "" : "s", c.law);
-  text += '\n' + sensors_text(model) + variables_text(model) + "\neffects\n";
+  text += '\n' + sensors_text(model) + end_effectors_text(model) + "\neffects\n";
   for (const EffectInfo& e : model.effects())
     text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);
   text += "\nstages\n";

@@ -108,7 +108,7 @@ void FieldTangent::field(int sensor, std::span<const int> tiles, std::span<doubl
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const int group = i.lane / kGroup;
   if (i.met_group != group || i.met_sensor != sensor)
-    i.reader.meet(*i.batch, i.block, group, sensor);
+    i.reader.find_touches(*i.batch, i.block, group, sensor);
   i.met_group = group, i.met_sensor = sensor;
   const auto a = i.reader.arguments<double>(sensor, group, i.lane % kGroup);
   for (std::size_t k = 0; k < s.targets.size(); ++k)

@@ -13,10 +13,10 @@ namespace tangere {
 /// One environment after `step` of `steps` steps.
 struct LossPoint {
   std::int64_t step, steps;
-  int environment;                    ///< of the batch
-  std::span<const double> q, v;       ///< (nq), (nv)
-  std::span<const double> u;          ///< (nu) of the step that follows; empty after the last
-  std::span<const double> variables;  ///< (n, 3) end effectors [m]; empty unless asked for
+  int environment;                        ///< of the batch
+  std::span<const double> q, v;           ///< (nq), (nv)
+  std::span<const double> u;              ///< (nu) of the step that follows; empty after the last
+  std::span<const double> end_effectors;  ///< (n, 3) end effectors [m]; empty unless asked for
   std::span<const CompactFrame<double>* const>
       fields;  ///< of every sensor [N]; empty unless asked for
 };
@@ -26,7 +26,7 @@ struct LossPoint {
 /// derivatives by, zeros to begin with.
 struct LossCotangent {
   std::span<double> q, v;  ///< (nv), (nv)
-  std::span<double> u, variables;
+  std::span<double> u, end_effectors;
   std::span<const std::span<double>> fields;  ///< as CompactFrame::values(), of the same tiles
 };
 
@@ -36,7 +36,7 @@ class RolloutLoss {
   virtual ~RolloutLoss() = default;
   /// Whether it looks at tactile fields or end effectors there.
   [[nodiscard]] virtual bool reads_fields(std::int64_t /*step*/) const { return false; }
-  [[nodiscard]] virtual bool reads_variables(std::int64_t /*step*/) const { return false; }
+  [[nodiscard]] virtual bool reads_end_effectors(std::int64_t /*step*/) const { return false; }
   /// Its share at a state. The loss of a rollout is the sum.
   virtual double evaluate(const LossPoint& at, const LossCotangent& out) const = 0;
 };

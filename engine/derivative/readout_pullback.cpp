@@ -128,7 +128,7 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
   Impl& i = *impl_;
   const int group = lane / kGroup, in_group = lane % kGroup;
   if (i.met[std::size_t(group)] != sensor) {
-    i.reader.meet(*i.batch, i.block, group, sensor);
+    i.reader.find_touches(*i.batch, i.block, group, sensor);
     i.met[std::size_t(group)] = sensor;
   }
   const CompiledModel& m = i.model.compiled();
@@ -170,9 +170,9 @@ void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> 
         parameters, points);
 }
 
-void ReadoutPullback::variable(int lane, int variable, std::span<const double> cotangent) {
+void ReadoutPullback::end_effector(int lane, int end_effector, std::span<const double> cotangent) {
   Impl& i = *impl_;
-  const CompiledVariable& v = i.model.compiled().variables[std::size_t(variable)];
+  const CompiledEndEffector& v = i.model.compiled().end_effectors[std::size_t(end_effector)];
   if (v.link < 0) return;
   const int group = lane / kGroup;
   const LinkPose<double> at = i.reader.link(v.link, group, lane % kGroup);

@@ -12,7 +12,7 @@
 namespace tangere {
 
 /// Owns the scratch of one thread; allocates when made, and for more tiles at once than ever
-/// before. For each state: place(), then for each loss clear(), any number of fields and variables,
+/// before. For each state: place(), then for each loss clear(), any number of fields and end effectors,
 /// and finish(). Fields are computed anew in double; nothing is kept of how they were read.
 class ReadoutPullback {
  public:
@@ -36,7 +36,7 @@ class ReadoutPullback {
   void dense_field(int lane, int sensor, std::span<const double> cotangents,
                    std::span<double> parameters = {}, std::span<double> points = {});
   /// Of the world position of an end effector, (3).
-  void variable(int lane, int variable, std::span<const double> cotangent);
+  void end_effector(int lane, int end_effector, std::span<const double> cotangent);
   /// Adds what was collected to q and v of `out`, all lanes.
   void finish(BlockCotangent& out);
 

@@ -36,7 +36,7 @@ class Compiler {
     ground_contacts();
     group_contacts(m_);
     sensors();
-    variables();
+    end_effectors();
     randomizations();
     symbolic();
     return std::move(m_);
@@ -214,13 +214,13 @@ class Compiler {
     }
   }
 
-  void variables() {
+  void end_effectors() {
     NameIndex names;
-    for (const VariableDescription& d : m_.scene.variables) {
-      names.add("endeffector", d.name, static_cast<int>(m_.variables.size()), d.source);
+    for (const EndEffectorDescription& d : m_.scene.end_effectors) {
+      names.add("endeffector", d.name, static_cast<int>(m_.end_effectors.size()), d.source);
       const CompiledJoint& joint = m_.joints[joints_.find("joint", d.joint, d.source)];
-      m_.variables.push_back({joint.link, joint.frame.R * vec(d.position) + joint.frame.p});
-      m_.variable_info.push_back({d.name, d.joint});
+      m_.end_effectors.push_back({joint.link, joint.frame.R * vec(d.position) + joint.frame.p});
+      m_.end_effector_info.push_back({d.name, d.joint});
     }
   }
 

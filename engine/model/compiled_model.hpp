@@ -74,7 +74,7 @@ struct CompiledSensor {
 };
 
 /// An end effector.
-struct CompiledVariable {
+struct CompiledEndEffector {
   int link = -1;                  ///< -1: fixed in the world
   kernels::Vec3<double> point{};  ///< link axes (or the world's) [m]
 };
@@ -138,7 +138,7 @@ struct CompiledModel {
   std::vector<CompiledBody> bodies;   ///< parallel to scene.links
   std::vector<CompiledMotor> motors;  ///< one per control
   std::vector<CompiledSensor> sensors;
-  std::vector<CompiledVariable> variables;
+  std::vector<CompiledEndEffector> end_effectors;
   std::vector<kernels::PairContact> pairs;
   std::vector<kernels::GroundContact> grounds;
   std::vector<kernels::Solid> solids;  ///< parallel to bodies
@@ -162,7 +162,7 @@ struct CompiledModel {
   kernels::ModelView view{};
 
   std::vector<SensorInfo> sensor_info;
-  std::vector<VariableInfo> variable_info;
+  std::vector<EndEffectorInfo> end_effector_info;
   std::vector<ContactInfo> contact_info;
   std::vector<EffectInfo> effects;  ///< of the whole scene
   std::vector<StageInfo> stages;

@@ -16,7 +16,9 @@ double Model::timestep() const { return compiled_->scene.timestep; }
 Integrator Model::integrator() const { return compiled_->scene.integrator; }
 const SolverOptions& Model::solver() const { return compiled_->scene.solver; }
 std::span<const SensorInfo> Model::sensors() const { return compiled_->sensor_info; }
-std::span<const VariableInfo> Model::variables() const { return compiled_->variable_info; }
+std::span<const EndEffectorInfo> Model::end_effectors() const {
+  return compiled_->end_effector_info;
+}
 std::span<const ContactInfo> Model::contacts() const { return compiled_->contact_info; }
 std::span<const EffectInfo> Model::effects() const { return compiled_->effects; }
 std::span<const StageInfo> Model::stages() const { return compiled_->stages; }

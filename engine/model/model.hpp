@@ -27,7 +27,7 @@ struct SensorInfo {
 };
 
 /// An end effector after compilation.
-struct VariableInfo {
+struct EndEffectorInfo {
   std::string name;
   std::string joint;
 };
@@ -67,7 +67,8 @@ class Model {
   [[nodiscard]] Integrator integrator() const;
   [[nodiscard]] const SolverOptions& solver() const;
   [[nodiscard]] std::span<const SensorInfo> sensors() const;
-  [[nodiscard]] std::span<const VariableInfo> variables() const;  ///< end effectors, in file order
+  [[nodiscard]] std::span<const EndEffectorInfo> end_effectors()
+      const;  ///< end effectors, in file order
   [[nodiscard]] std::span<const ContactInfo> contacts() const;
   [[nodiscard]] std::span<const EffectInfo> effects() const;
   [[nodiscard]] std::span<const StageInfo> stages() const;     ///< in the order in which they run

@@ -160,7 +160,7 @@ struct TactileDescription {
 };
 
 /// An end effector: a point that moves with a joint, whose position in the world is an output.
-struct VariableDescription {
+struct EndEffectorDescription {
   std::string name;
   std::string joint;
   Vector3 position{0, 0,
@@ -283,7 +283,7 @@ struct Scene {
   std::vector<LinkDescription> links;
   std::vector<MotorDescription> motors;
   std::vector<TactileDescription> sensors;
-  std::vector<VariableDescription> variables;
+  std::vector<EndEffectorDescription> end_effectors;
   std::vector<GroundContactDescription> ground_contacts;
   std::vector<PairContactDescription> pair_contacts;
   std::vector<InitialState> initial;

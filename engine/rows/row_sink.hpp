@@ -18,7 +18,7 @@ struct StateRow {
       body_pose;  ///< (E, nb, 7) x y z qw qx qy qz of each body frame in the world
   std::span<const double>
       body_twist;  ///< (E, nb, 6) angular, then linear velocity of its origin, world axes
-  std::span<const double> variables =
+  std::span<const double> end_effectors =
       {};  ///< (E, n, 3) world positions of the end effectors [m]; empty if n = 0
 };
 

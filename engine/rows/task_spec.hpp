@@ -42,7 +42,7 @@ struct TaskSpec {
   int settling_steps = 0;  ///< a reset ends with so many steps of `settling_timestep` [s]
   double settling_timestep = 0;
   int memory = 0;  ///< numbers of its own that an episode keeps: a goal, a force
-  bool looks_at_variables = false,
+  bool looks_at_end_effectors = false,
        looks_at_tactile = false;  ///< what its moments hold besides q and v
 
   [[nodiscard]] std::size_t observation_size() const;

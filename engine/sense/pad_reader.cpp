@@ -74,7 +74,7 @@ LinkPose<double> PadReader::link(int link, int group, int lane) const {
           {lane_of(p.V.a, lane), lane_of(p.V.l, lane)}};
 }
 
-void PadReader::meet(const Batch& batch, int block, int group, int sensor) {
+void PadReader::find_touches(const Batch& batch, int block, int group, int sensor) {
   const CompiledModel& m = model_.compiled();
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const LinkPose<LaneRow>* links = links_.data() + std::size_t(group) * m.links.size();

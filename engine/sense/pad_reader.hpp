@@ -23,7 +23,7 @@ class PadReader {
   [[nodiscard]] kernels::LinkPose<double> link(int link, int group, int lane) const;
 
   /// Every shape the sensor can feel, in its pad's axes, in the group moved last.
-  void meet(const Batch& batch, int block, int group, int sensor);
+  void find_touches(const Batch& batch, int block, int group, int sensor);
   /// Arguments for one environment of a group that was met. No output is set but the list of tiles,
   /// `active`.
   template <class Real>

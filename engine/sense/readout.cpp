@@ -70,21 +70,21 @@ struct Readout::Impl {
   }
 
   /// In the world, in the group moved last.
-  [[nodiscard]] kernels::Vec3<double> position_of(const CompiledVariable& v, int group,
+  [[nodiscard]] kernels::Vec3<double> position_of(const CompiledEndEffector& v, int group,
                                                   int lane) const {
     const kernels::Frame<double> at = reader.link(v.link, group, lane).world;
     return at.R * v.point + at.p;
   }
-  void write_variables(int group, int lane, std::span<double> position) const {
+  void write_end_effectors(int group, int lane, std::span<double> position) const {
     double* to = position.data();
-    for (const CompiledVariable& v : model.compiled().variables)
+    for (const CompiledEndEffector& v : model.compiled().end_effectors)
       write3(position_of(v, group, lane), to), to += 3;
   }
 
   void place(const Batch& batch, int environment, int sensor) {
     const int block = environment / kBlock, group = environment % kBlock / kGroup;
     reader.move(batch, block, group);
-    reader.meet(batch, block, group, sensor);
+    reader.find_touches(batch, block, group, sensor);
   }
 
   /// Writes the touched tiles of an environment that has been placed; returns how many, listed in
@@ -182,7 +182,7 @@ struct Readout::Impl {
   void place_block(const Batch& batch, int number, int sensor) {
     for (int g = 0; g < kBlock / kGroup; ++g) {
       reader.move(batch, number, g);
-      reader.meet(batch, number, g, sensor);
+      reader.find_touches(batch, number, g, sensor);
     }
   }
 
@@ -245,41 +245,42 @@ void Readout::bodies(const Batch& batch, int environment, std::span<double> pose
   }
 }
 
-void Readout::variables(const Batch& batch, int environment, std::span<double> position,
-                        std::span<double> velocity) {
+void Readout::end_effectors(const Batch& batch, int environment, std::span<double> position,
+                            std::span<double> velocity) {
   const int group = environment % kBlock / kGroup, lane = environment % kGroup;
   impl_->reader.move(batch, environment / kBlock, group);
-  impl_->write_variables(group, lane, position);
-  const std::vector<CompiledVariable>& all = impl_->model.compiled().variables;
+  impl_->write_end_effectors(group, lane, position);
+  const std::vector<CompiledEndEffector>& all = impl_->model.compiled().end_effectors;
   for (std::size_t k = 0; k < all.size() && !velocity.empty(); ++k) {
     const kernels::LinkPose<double> link = impl_->reader.link(all[k].link, group, lane);
     write3(link.world.R * (link.V.l + cross(link.V.a, all[k].point)), &velocity[3 * k]);
   }
 }
 
-void Readout::read_variables(const Batch& batch, int block,
-                             std::span<const std::span<double>> positions) {
+void Readout::read_end_effectors(const Batch& batch, int block,
+                                 std::span<const std::span<double>> positions) {
   const int environments = Impl::environments_of(batch, block);
   for (int e = 0; e < environments; ++e) {
     if (e % kGroup == 0) impl_->reader.move(batch, block, e / kGroup);
-    impl_->write_variables(e / kGroup, e % kGroup, positions[std::size_t(e)]);
+    impl_->write_end_effectors(e / kGroup, e % kGroup, positions[std::size_t(e)]);
   }
 }
 
-void Readout::variable_jacobian(const Batch& batch, int environment, std::span<double> jacobian) {
+void Readout::end_effector_jacobian(const Batch& batch, int environment,
+                                    std::span<double> jacobian) {
   const int group = environment % kBlock / kGroup, lane = environment % kGroup;
   impl_->reader.move(batch, environment / kBlock, group);
   const CompiledModel& m = impl_->model.compiled();
   const auto nv = std::size_t(m.nv);
   std::fill(jacobian.begin(), jacobian.end(), 0.0);
-  for (std::size_t k = 0; k < m.variables.size(); ++k) {
+  for (std::size_t k = 0; k < m.end_effectors.size(); ++k) {
     const auto column = [&](int dof, const kernels::Vec3<double>& c) {
       double* const at = &jacobian[3 * k * nv + std::size_t(dof)];
       at[0] = c.x, at[nv] = c.y, at[2 * nv] = c.z;
     };
-    const CompiledVariable& variable = m.variables[k];
-    const kernels::Vec3<double> x = impl_->position_of(variable, group, lane);
-    for (int i = variable.link; i >= 0; i = m.links[std::size_t(i)].parent) {
+    const CompiledEndEffector& end_effector = m.end_effectors[k];
+    const kernels::Vec3<double> x = impl_->position_of(end_effector, group, lane);
+    for (int i = end_effector.link; i >= 0; i = m.links[std::size_t(i)].parent) {
       const kernels::Link& link = m.links[std::size_t(i)];
       const kernels::Frame<double> at = impl_->reader.link(i, group, lane).world;
       const auto along = [&](const kernels::Vec3<double>& axis) {

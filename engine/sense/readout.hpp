@@ -32,16 +32,17 @@ class Readout {
   /// scene in file order.
   void bodies(const Batch& batch, int environment, std::span<double> pose, std::span<double> twist);
 
-  /// World positions of the scene's end effectors (variables, 3) [m] of one environment, file
-  /// order; with `velocity`, theirs too (variables, 3) [m/s], world axes.
-  void variables(const Batch& batch, int environment, std::span<double> position,
-                 std::span<double> velocity = {});
-  /// Positions in the environments 16 block …, (variables, 3) each: the same bits, kinematics once
+  /// World positions of the scene's end effectors (end effectors, 3) [m] of one environment, file
+  /// order; with `velocity`, theirs too (end effectors, 3) [m/s], world axes.
+  void end_effectors(const Batch& batch, int environment, std::span<double> position,
+                     std::span<double> velocity = {});
+  /// Positions in the environments 16 block …, (end effectors, 3) each: the same bits, kinematics once
   /// for eight of them. Environments beyond the last of the batch may be missing.
-  void read_variables(const Batch& batch, int block, std::span<const std::span<double>> positions);
-  /// (variables, 3, nv): derivative of each position by displacements of q along the dofs of v,
+  void read_end_effectors(const Batch& batch, int block,
+                          std::span<const std::span<double>> positions);
+  /// (end effectors, 3, nv): derivative of each position by displacements of q along the dofs of v,
   /// rotations on the right (docs/dynamics.md), so that velocity = jacobian v.
-  void variable_jacobian(const Batch& batch, int environment, std::span<double> jacobian);
+  void end_effector_jacobian(const Batch& batch, int environment, std::span<double> jacobian);
 
   /// Field of one sensor and environment into (points, 3), zeros included.
   void tactile(const Batch& batch, int environment, int sensor, std::span<double> force);

@@ -83,8 +83,8 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
     texts("randomized_units", layout.randomized_units);
   }
   describe_task(scene, layout);
-  if (!layout.task && !layout.variable_names.empty()) {
-    texts("variable_names", layout.variable_names);
+  if (!layout.task && !layout.end_effector_names.empty()) {
+    texts("variable_names", layout.end_effector_names);
     h5::write_attribute(scene, "variable_units", "m");
     h5::write_attribute(scene, "variable_frame", "world");
   }

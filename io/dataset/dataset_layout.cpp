@@ -21,7 +21,7 @@ std::int64_t blocks_of(std::int64_t episodes) {
   return (episodes + kBlockEpisodes - 1) / kBlockEpisodes;
 }
 
-constexpr const char* kVariables = "variables";
+constexpr const char* kEndEffectors = "variables";
 
 /// What the format of a group in a file has room for.
 void check_lengths(const std::vector<std::string>& observations) {
@@ -77,7 +77,7 @@ std::vector<std::string> DatasetLayout::all_observation_names() const {
     for (const TensorSpec& tensor : task->observations) names.push_back(tensor.name);
     return names;
   }
-  if (!variable_names.empty()) names.emplace_back(kVariables);
+  if (!end_effector_names.empty()) names.emplace_back(kEndEffectors);
   for (const SensorLayout& sensor : sensors) names.push_back(sensor.name);
   return names;
 }
@@ -89,7 +89,7 @@ std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() cons
       shapes.emplace_back(tensor.shape.begin(), tensor.shape.end());
     return chosen(shapes, recorded());
   }
-  if (!variable_names.empty()) shapes.push_back({variable_names.size(), 3});
+  if (!end_effector_names.empty()) shapes.push_back({end_effector_names.size(), 3});
   for (const SensorLayout& s : sensors) {
     if (s.rectangular())
       shapes.push_back({static_cast<std::uint64_t>(s.rows), static_cast<std::uint64_t>(s.cols), 3});
@@ -152,7 +152,7 @@ void DatasetLayout::check() const {
           fmt::format("--record: unknown observation '{}'{}", name, suggestion(name, all)));
   check_lengths(all);
   std::set<std::string> names{"q", "v"};
-  if (!variable_names.empty()) names.insert(kVariables);
+  if (!end_effector_names.empty()) names.insert(kEndEffectors);
   for (const SensorLayout& sensor : sensors) {
     const std::string& name = sensor.name;
     if (name.empty() || name == "." || name.find('/') != std::string::npos)

@@ -28,11 +28,11 @@ struct DatasetLayout {
   std::int64_t steps = 0;     ///< of an episode
   int every = 1;              ///< K: row j is the state after j K steps
   std::uint64_t seed = 0;
-  bool single = false;                        ///< observations are float32, else float64
-  std::vector<std::string> q_names, q_units;  ///< (nq)
-  std::vector<std::string> v_names, v_units;  ///< (nv)
-  std::vector<std::string> u_names;           ///< (nu)
-  std::vector<std::string> variable_names;    ///< (n) end effectors, empty when there are none
+  bool single = false;                          ///< observations are float32, else float64
+  std::vector<std::string> q_names, q_units;    ///< (nq)
+  std::vector<std::string> v_names, v_units;    ///< (nv)
+  std::vector<std::string> u_names;             ///< (nu)
+  std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
   std::vector<std::string> randomized_names, randomized_units;  ///< what varies between episodes
   std::optional<TaskSpec>

@@ -15,9 +15,10 @@ std::vector<std::string> copy(std::span<const std::string> texts) {
   return {texts.begin(), texts.end()};
 }
 
-std::vector<std::string> variable_names(const Model& model) {
+std::vector<std::string> end_effector_names(const Model& model) {
   std::vector<std::string> names;
-  for (const VariableInfo& variable : model.variables()) names.push_back(variable.name);
+  for (const EndEffectorInfo& end_effector : model.end_effectors())
+    names.push_back(end_effector.name);
   return names;
 }
 
@@ -103,7 +104,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.u_names = copy(model.u_names());
   layout.u_units = copy(model.u_units());
   layout.body_names = copy(model.body_names());
-  layout.variable_names = variable_names(model);
+  layout.end_effector_names = end_effector_names(model);
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));
@@ -149,7 +150,7 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.v_names = copy(model.v_names());
   layout.v_units = copy(model.v_units());
   layout.u_names = copy(model.u_names());
-  layout.variable_names = variable_names(model);
+  layout.end_effector_names = end_effector_names(model);
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(sensor_layout(model.sensors()[i], scene.sensors[i], run.every));
   for (const RandomizationDescription& description : scene.randomizations) {

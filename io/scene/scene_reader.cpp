@@ -204,8 +204,8 @@ void read_root(const SceneNode& root, Scene& scene) {
   each("actuator", [&](const SceneNode& s) { read_actuators(scene, s); });
   each("contact", [&](const SceneNode& s) { read_contacts(scene, s); });
   each("sensor", [&](const SceneNode& s) { read_sensors(scene, s); });
-  each("variable", [&](const SceneNode& s) { read_variables(scene, s); });
-  name_variables(scene);
+  each("variable", [&](const SceneNode& s) { read_end_effectors(scene, s); });
+  name_end_effectors(scene);
   each("virtual", [&](const SceneNode& s) { s.warn("shapes for pictures only; ignored"); });
   each("initial", [&](const SceneNode& s) { read_initial(scene, s); });
   once("control", [&](const SceneNode& s) { read_control(scene, s); });

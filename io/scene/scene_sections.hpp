@@ -17,10 +17,10 @@ bool placed_in_world(const SceneNode& node, const BodyDescription& body);
 void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
 void read_sensors(Scene& scene, const SceneNode& section);
-void read_variables(Scene& scene, const SceneNode& section);
+void read_end_effectors(Scene& scene, const SceneNode& section);
 /// Gives end effectors without a name theirs: "endeffector" and their place in the file, or the
 /// next number that is free.
-void name_variables(Scene& scene);
+void name_end_effectors(Scene& scene);
 void read_initial(Scene& scene, const SceneNode& section);
 void read_control(Scene& scene, const SceneNode& section);
 void read_randomize(Scene& scene, const SceneNode& section);

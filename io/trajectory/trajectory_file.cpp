@@ -49,7 +49,7 @@ const char* const kTwistComponents[] = {"wx", "wy", "wz", "vx", "vy", "vz"};
 struct TrajectoryFile::Impl {
   TrajectoryLayout layout;
   PartFile part;
-  h5::Id file, time, q, v, u, pose, twist, variables, iterations, status, residual;
+  h5::Id file, time, q, v, u, pose, twist, end_effectors, iterations, status, residual;
   struct Sensor {
     h5::Id force, step;
     h5::Dims frame;  // dimensions of one row of force
@@ -171,12 +171,14 @@ struct TrajectoryFile::Impl {
     h5::write_attribute(twist, "frame", "world axes; velocity of the body frame's origin");
     for (const h5::Id* d : {&pose, &twist})
       h5::write_attribute(*d, "bodies", std::span<const std::string>(layout.body_names));
-    if (!layout.variable_names.empty()) {
+    if (!layout.end_effector_names.empty()) {
       const h5::Id group = h5::create_group(file, "variables");
-      variables = rows<double>(group, "position", {T + 1, E, layout.variable_names.size(), 3});
-      h5::write_attribute(variables, "names", std::span<const std::string>(layout.variable_names));
-      h5::write_attribute(variables, "units", "m");
-      h5::write_attribute(variables, "frame", "world");
+      end_effectors =
+          rows<double>(group, "position", {T + 1, E, layout.end_effector_names.size(), 3});
+      h5::write_attribute(end_effectors, "names",
+                          std::span<const std::string>(layout.end_effector_names));
+      h5::write_attribute(end_effectors, "units", "m");
+      h5::write_attribute(end_effectors, "frame", "world");
     }
 
     const h5::Id solver = h5::create_group(file, "solver");
@@ -273,11 +275,11 @@ void TrajectoryFile::write(const StateRow& row) {
   Impl::put<double>(f.v, t, {E, f.layout.v_names.size()}, row.v.data());
   Impl::put<double>(f.pose, t, {E, nb, 7}, row.body_pose.data());
   Impl::put<double>(f.twist, t, {E, nb, 6}, row.body_twist.data());
-  if (const hsize_t n = f.layout.variable_names.size(); n > 0) {
-    if (row.variables.size() != E * n * 3)
+  if (const hsize_t n = f.layout.end_effector_names.size(); n > 0) {
+    if (row.end_effectors.size() != E * n * 3)
       throw IoError(fmt::format("{}: row {} has {} numbers for {} end effectors of {} environments",
-                                f.part.output(), t, row.variables.size(), n, E));
-    Impl::put<double>(f.variables, t, {E, n, 3}, row.variables.data());
+                                f.part.output(), t, row.end_effectors.size(), n, E));
+    Impl::put<double>(f.end_effectors, t, {E, n, 3}, row.end_effectors.data());
   }
   ++f.states;
 }
@@ -358,7 +360,7 @@ void TrajectoryFile::commit() {
   for (std::size_t i = 0; i < f.sensors.size(); ++i)
     expect("fields of " + f.layout.sensors[i].name, f.sensors[i].written,
            f.layout.sensors[i].frames(f.layout.steps, f.layout.first_step));
-  for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.variables, &f.iterations,
+  for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.end_effectors, &f.iterations,
                     &f.status, &f.residual})
     d->reset();
   f.sensors.clear();

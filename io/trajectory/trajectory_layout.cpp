@@ -40,7 +40,7 @@ void add_small(const TrajectoryLayout& layout, Bytes& bytes) {
   bytes.add({8});
   const std::int64_t row = count_of(layout.q_names) + count_of(layout.v_names) +
                            kPoseAndTwist * count_of(layout.body_names) +
-                           3 * count_of(layout.variable_names);
+                           3 * count_of(layout.end_effector_names);
   bytes.add({t, e, row, 8});
   bytes.add({e, row, 8});
   bytes.add({t, e, count_of(layout.u_names), 8});

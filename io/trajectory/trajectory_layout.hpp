@@ -47,11 +47,11 @@ struct TrajectoryLayout {
   std::int64_t steps = 0;       ///< T
   std::int64_t first_step = 0;  ///< steps before row 0, of the runs that this one continues
   int environments = 1;         ///< E
-  std::vector<std::string> q_names, q_units;  ///< (nq)
-  std::vector<std::string> v_names, v_units;  ///< (nv)
-  std::vector<std::string> u_names, u_units;  ///< (nu)
-  std::vector<std::string> body_names;        ///< (nb)
-  std::vector<std::string> variable_names;    ///< (n) end effectors, empty when there are none
+  std::vector<std::string> q_names, q_units;    ///< (nq)
+  std::vector<std::string> v_names, v_units;    ///< (nv)
+  std::vector<std::string> u_names, u_units;    ///< (nu)
+  std::vector<std::string> body_names;          ///< (nb)
+  std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
   std::vector<StatusMeaning> statuses;
   std::vector<std::string> randomized_names;  ///< (k), empty when nothing varies

@@ -22,7 +22,7 @@ constexpr double kPosition = 0.01, kAngle = 0.1, kEffort = 0.1;  // weights
 constexpr double kNear = 0.03, kAligned = 0.1;                   // of a success [m], [rad]
 // Memory: the goal's x, y, yaw; the push on the box, in units of its motors.
 constexpr std::size_t kGoal = 0, kPush = 3;
-constexpr std::size_t kTip = 0, kFace = 3;  // in Moment::variables
+constexpr std::size_t kTip = 0, kFace = 3;  // in Moment::end_effectors
 
 Scene without_randomisation(Scene scene) {
   scene.randomizations.clear();
@@ -39,8 +39,8 @@ class BoxPushing : public Task {
         box_(coordinate("box_slide")),
         box_turn_(coordinate("box_turn")),
         script_(model().scene()) {
-    if (model().variables().size() != 2 || model().variables()[0].name != "tip" ||
-        model().variables()[1].name != "face")
+    if (model().end_effectors().size() != 2 || model().end_effectors()[0].name != "tip" ||
+        model().end_effectors()[1].name != "face")
       throw InputError(model().scene().path + ": box pushing needs the end effectors tip and face");
   }
 
@@ -85,7 +85,7 @@ class BoxPushing : public Task {
     const Moment& now = view.now();
     double gap = 0, effort = 0;
     for (std::size_t k = 0; k < 2; ++k)
-      gap += square(now.variables[kTip + k] - now.variables[kFace + k]);
+      gap += square(now.end_effectors[kTip + k] - now.end_effectors[kFace + k]);
     for (const double u : view.action) effort += u * u;
     const double distance = square(off[0]) + square(off[1]);
     const double reward = -kPosition * distance / square(kLengthUnit) -
@@ -105,9 +105,9 @@ class BoxPushing : public Task {
       to.q[box_ + k] -= by_place;
       out.memory[kGoal + k] += by_place;
       const double gap =
-          weight * 2 * (now.variables[kTip + k] - now.variables[kFace + k]) / square(kGap);
-      to.variables[kTip + k] -= gap;
-      to.variables[kFace + k] += gap;
+          weight * 2 * (now.end_effectors[kTip + k] - now.end_effectors[kFace + k]) / square(kGap);
+      to.end_effectors[kTip + k] -= gap;
+      to.end_effectors[kFace + k] += gap;
     }
     const double by_yaw = weight * 2 * kAngle * off[2] / square(kAngleUnit);
     to.q[box_turn_] -= by_yaw;
@@ -158,7 +158,7 @@ class BoxPushing : public Task {
   /// A pose as seen from the middle of the pad, x where it pushes.
   void in_hand(const Moment& now, const std::array<double, 3>& pose, std::span<double> o) const {
     const double c = std::cos(now.q[turn_]), s = std::sin(now.q[turn_]);
-    const double x = pose[0] - now.variables[kTip], y = pose[1] - now.variables[kTip + 1];
+    const double x = pose[0] - now.end_effectors[kTip], y = pose[1] - now.end_effectors[kTip + 1];
     o[0] = c * x + s * y;
     o[1] = c * y - s * x;
     o[2] = pose[2] - now.q[turn_];
@@ -183,7 +183,7 @@ TaskSpec declare_box_pushing(PushObservation observation) {
   spec.moments = {5};
   spec.horizon = kActions;
   spec.memory = 5;
-  spec.looks_at_variables = true;
+  spec.looks_at_end_effectors = true;
   if (observation == PushObservation::tactile) {
     spec.observations.push_back({"tactile", {13, 10, 3}, "N", "field of the pad"});
     spec.looks_at_tactile = true;

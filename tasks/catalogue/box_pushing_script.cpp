@@ -45,7 +45,7 @@ PushScript::PushScript(const Scene& scene) {
     if (link.joint.name == "hand_turn") base_ = {p[0], p[1]};
     if (link.joint.name == "box_slide") box_rest_ = {p[0], p[1]};
   }
-  for (const VariableDescription& v : scene.variables) {
+  for (const EndEffectorDescription& v : scene.end_effectors) {
     if (v.name == "tip") tip_ = {v.position[0], v.position[1]};
     if (v.name == "face") face_ = {v.position[0], v.position[1]};
   }

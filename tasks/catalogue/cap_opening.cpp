@@ -60,7 +60,7 @@ class CapOpening : public Task {
         finger_(coordinate("swing_1")),
         script_(model().scene()) {
     const Scene& s = model().scene();
-    if (model().variables().size() != kFingers || s.sensors.size() != kFingers ||
+    if (model().end_effectors().size() != kFingers || s.sensors.size() != kFingers ||
         s.motors.size() != kAngles)
       throw InputError(
           s.path +
@@ -107,7 +107,7 @@ class CapOpening : public Task {
   void observe(const TaskView& view, std::span<double> o) const override {
     const Moment& now = view.now();
     for (std::size_t k = 0; k < kAngles; ++k) o[k] = now.q[finger_ + k];
-    std::copy(now.variables.begin(), now.variables.end(), o.begin() + kAngles);
+    std::copy(now.end_effectors.begin(), now.end_effectors.end(), o.begin() + kAngles);
     if (observation_ == CapObservation::blind) return;
     const std::span<double> images = o.subspan(2 * kAngles);
     std::fill(images.begin(), images.end(), 0.0);
@@ -193,7 +193,7 @@ class CapOpening : public Task {
   }
   static bool left(const Moment& m) {
     for (std::size_t f = 0; f < kFingers; ++f)
-      if (m.variables[3 * f + 2] > kHighest) return true;
+      if (m.end_effectors[3 * f + 2] > kHighest) return true;
     return false;
   }
 
@@ -226,7 +226,7 @@ TaskSpec declare_cap_opening(CapObservation observation) {
   spec.moments = {5};
   spec.horizon = kActions;
   spec.memory = kFingers + 3;
-  spec.looks_at_variables = true;
+  spec.looks_at_end_effectors = true;
   spec.looks_at_tactile = true;  // the reward asks which fingers touch
   if (observation == CapObservation::tactile) {
     spec.observations.push_back(

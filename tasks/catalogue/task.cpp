@@ -34,8 +34,8 @@ std::size_t Task::tactile_size() const {
   return spec_.looks_at_tactile ? numbers : 0;
 }
 
-std::size_t Task::variables_size() const {
-  return spec_.looks_at_variables ? 3 * model_.variables().size() : 0;
+std::size_t Task::end_effectors_size() const {
+  return spec_.looks_at_end_effectors ? 3 * model_.end_effectors().size() : 0;
 }
 
 void Task::start(const TaskStart&) const {}

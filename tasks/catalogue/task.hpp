@@ -15,8 +15,8 @@ namespace tangere {
 
 /// An environment at one time.
 struct Moment {
-  std::span<const double> q, v;       ///< (nq), (nv)
-  std::span<const double> variables;  ///< (n, 3) end effectors [m], if the task looks at them
+  std::span<const double> q, v;           ///< (nq), (nv)
+  std::span<const double> end_effectors;  ///< (n, 3) end effectors [m], if the task looks at them
   std::span<const double>
       tactile;  ///< every sensor's (points, 3) [N] one behind the other, if the task looks at them
 };
@@ -55,9 +55,9 @@ struct Verdict {
 /// the right (docs/dynamics.md), the others component by component. What the task does not look at
 /// is empty.
 struct MomentCotangent {
-  std::span<double> q, v;       ///< (nv), (nv)
-  std::span<double> variables;  ///< (n, 3)
-  std::span<double> tactile;    ///< as in Moment
+  std::span<double> q, v;           ///< (nv), (nv)
+  std::span<double> end_effectors;  ///< (n, 3)
+  std::span<double> tactile;        ///< as in Moment
 };
 struct ViewCotangent {
   std::span<const MomentCotangent> moments;  ///< parallel to TaskView::moments
@@ -76,7 +76,7 @@ class Task {
   [[nodiscard]] const TaskSpec& spec() const { return spec_; }
   [[nodiscard]] const Model& model() const { return model_; }
   [[nodiscard]] std::size_t tactile_size() const;  ///< numbers of Moment::tactile
-  [[nodiscard]] std::size_t variables_size() const;
+  [[nodiscard]] std::size_t end_effectors_size() const;
 
   /// Starts an episode: as drawn, unless a task says more.
   virtual void start(const TaskStart& start) const;

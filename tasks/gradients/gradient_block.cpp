@@ -161,14 +161,14 @@ void GradientBlock::look(const InHand& h, std::int64_t step) {
   bool placed = false;
   for (std::size_t k = 0; k < losses_.size(); ++k) {
     const bool fields = losses_[k]->reads_fields(step),
-               variables = losses_[k]->reads_variables(step);
-    if ((fields || variables) && !placed) {
+               end_effectors = losses_[k]->reads_end_effectors(step);
+    if ((fields || end_effectors) && !placed) {
       pullback_.place(h.batch, h.block);
       placed = true;
     }
-    if (fields || variables) pullback_.clear();
+    if (fields || end_effectors) pullback_.clear();
     for (int e = h.first; e < h.last; ++e) judge(h, step, k, e);
-    if (fields || variables) pullback_.finish(adjoint_.loss(static_cast<int>(k)));
+    if (fields || end_effectors) pullback_.finish(adjoint_.loss(static_cast<int>(k)));
   }
 }
 
@@ -198,8 +198,9 @@ void GradientBlock::judge(const InHand& h, std::int64_t step, std::size_t loss, 
     pullback_.field(lane, static_cast<int>(s), frames_[s][count(lane)].tiles(),
                     reading_.field_bar(s), c.parameters,
                     c.points_of(model_, static_cast<int>(s), lane));
-  for (std::size_t k = 0; k < model_.variables().size() && l.reads_variables(step); ++k)
-    pullback_.variable(lane, static_cast<int>(k), reading_.variables_bar().subspan(3 * k, 3));
+  for (std::size_t k = 0; k < model_.end_effectors().size() && l.reads_end_effectors(step); ++k)
+    pullback_.end_effector(lane, static_cast<int>(k),
+                           reading_.end_effectors_bar().subspan(3 * k, 3));
 }
 
 /// Gradients by the initial state and by the scene's numbers.

@@ -22,19 +22,19 @@ class LossReading {
   double evaluate(const RolloutLoss& loss, const Batch& batch, Readout& readout, int environment,
                   std::int64_t step, std::int64_t steps, std::span<const double> u);
 
-  // Derivatives of the loss evaluated last; of variables and fields if it reads them.
+  // Derivatives of the loss evaluated last; of end effectors and fields if it reads them.
   [[nodiscard]] std::span<const double> q_bar() const { return q_bar_; }
   [[nodiscard]] std::span<const double> v_bar() const { return v_bar_; }
   [[nodiscard]] std::span<const double> u_bar() const {
     return u_bar_;
   }  ///< zeros after the last step
-  [[nodiscard]] std::span<const double> variables_bar() const { return variables_bar_; }
+  [[nodiscard]] std::span<const double> end_effectors_bar() const { return end_effectors_bar_; }
   [[nodiscard]] std::span<const double> field_bar(std::size_t sensor) const {
     return field_bars_[sensor];
   }
 
  private:
-  std::vector<double> q_, v_, variables_, q_bar_, v_bar_, u_bar_, variables_bar_;
+  std::vector<double> q_, v_, end_effectors_, q_bar_, v_bar_, u_bar_, end_effectors_bar_;
   std::vector<const CompactFrame<double>*> fields_;  // (sensors)
   std::vector<std::vector<double>> field_bars_;      // (sensors)
   std::vector<std::span<double>> field_spans_;

@@ -77,13 +77,13 @@ class Fields : public RolloutLoss {
 
 class EndEffectors : public RolloutLoss {
  public:
-  [[nodiscard]] bool reads_variables(std::int64_t /*step*/) const override { return true; }
+  [[nodiscard]] bool reads_end_effectors(std::int64_t /*step*/) const override { return true; }
   double evaluate(const LossPoint& at, const LossCotangent& out) const override {
     if (at.step != at.steps) return 0;
     double sum = 0;
-    for (std::size_t i = 0; i < at.variables.size(); ++i) {
-      sum += 0.5 * at.variables[i] * at.variables[i];
-      out.variables[i] += at.variables[i];
+    for (std::size_t i = 0; i < at.end_effectors.size(); ++i) {
+      sum += 0.5 * at.end_effectors[i] * at.end_effectors[i];
+      out.end_effectors[i] += at.end_effectors[i];
     }
     return sum;
   }
@@ -97,7 +97,7 @@ const char* to_string(LossKind value) {
     case LossKind::path: return "path";
     case LossKind::tactile: return "tactile";
     case LossKind::shear: return "shear";
-    case LossKind::variables: return "variables";
+    case LossKind::end_effectors: return "variables";
   }
   return "unknown";
 }
@@ -110,7 +110,7 @@ const char* loss_meaning(LossKind value) {
     case LossKind::path: return "half the squares of all velocities, summed over steps";
     case LossKind::tactile: return "half the squares of all tactile forces, summed over fields";
     case LossKind::shear: return "half the squares of all shear forces, summed over fields";
-    case LossKind::variables: return "half the squares of the end effectors' last positions";
+    case LossKind::end_effectors: return "half the squares of the end effectors' last positions";
   }
   return "";
 }
@@ -118,7 +118,7 @@ const char* loss_meaning(LossKind value) {
 const std::vector<LossKind>& loss_kinds() {
   static const std::vector<LossKind> kinds = {LossKind::final_state, LossKind::path,
                                               LossKind::tactile, LossKind::shear,
-                                              LossKind::variables};
+                                              LossKind::end_effectors};
   return kinds;
 }
 
@@ -127,14 +127,14 @@ std::unique_ptr<RolloutLoss> make_loss(LossKind kind, const Model& model, int ev
   if (of_fields && model.sensors().empty())
     throw InputError(std::string("loss '") + to_string(kind) +
                      "': the scene has no tactile sensor");
-  if (kind == LossKind::variables && model.variables().empty())
+  if (kind == LossKind::end_effectors && model.end_effectors().empty())
     throw InputError("loss 'variables': the scene has no end effector");
   switch (kind) {
     case LossKind::final_state: return std::make_unique<FinalState>(model);
     case LossKind::path: return std::make_unique<Path>();
     case LossKind::tactile: return std::make_unique<Fields>(every, 3);
     case LossKind::shear: return std::make_unique<Fields>(every, 2);
-    case LossKind::variables: break;
+    case LossKind::end_effectors: break;
   }
   return std::make_unique<EndEffectors>();
 }

@@ -11,11 +11,11 @@
 namespace tangere {
 
 enum class LossKind {
-  final_state,  ///< ½ |q_T - q(rest)|² + ½ |v_T|², number by number, after the last step
-  path,         ///< ½ Σ_t |v_t|²
-  tactile,      ///< ½ Σ |T|² of all sensors, every k-th step
-  shear,        ///< the same of the first two components
-  variables,    ///< ½ |x|² of all end effectors after the last step
+  final_state,    ///< ½ |q_T - q(rest)|² + ½ |v_T|², number by number, after the last step
+  path,           ///< ½ Σ_t |v_t|²
+  tactile,        ///< ½ Σ |T|² of all sensors, every k-th step
+  shear,          ///< the same of the first two components
+  end_effectors,  ///< ½ |x|² of all end effectors after the last step
 };
 const char* to_string(LossKind value);
 /// In words, for files.

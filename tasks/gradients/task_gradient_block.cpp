@@ -70,7 +70,7 @@ TaskGradientBlock::TaskGradientBlock(const Task& task, const TaskGradientOptions
   by_action_.assign(size(options.actions), std::vector<double>(kBlock * task.spec().action.size()));
   for (MomentRows& m : moments_) {
     m.q = m.v = start_q_;
-    m.variables.resize(kBlock * task.variables_size());
+    m.end_effectors.resize(kBlock * task.end_effectors_size());
     m.tactile.resize(kBlock * task.tactile_size());
   }
 }
@@ -171,7 +171,7 @@ void TaskGradientBlock::reverse(std::int64_t action, const BlockTape& tape) {
 
 void TaskGradientBlock::reverse_rewards(const ActionRecord& r, std::int64_t action) {
   for (MomentRows& m : moments_)
-    for (std::vector<double>* x : {&m.q, &m.v, &m.variables, &m.tactile})
+    for (std::vector<double>* x : {&m.q, &m.v, &m.end_effectors, &m.tactile})
       std::fill(x->begin(), x->end(), 0.0);
   std::vector<MomentCotangent> to(moments_.size());
   for (int l = 0; l < rollout_.lanes(); ++l) {
@@ -193,7 +193,7 @@ void TaskGradientBlock::add_moment(std::size_t moment, const BlockTape& tape) {
       c.v[i * kBlock + size(l)] += v[i];
     }
   }
-  if (m.variables.empty() && m.tactile.empty()) return;
+  if (m.end_effectors.empty() && m.tactile.empty()) return;
   tape.show(task_.spec().moments[moment], rollout_.batch(), 0);
   pullback_.place(rollout_.batch(), 0);
   pullback_.clear();
@@ -202,10 +202,10 @@ void TaskGradientBlock::add_moment(std::size_t moment, const BlockTape& tape) {
 }
 
 void TaskGradientBlock::add_fields(std::size_t moment, int lane) {
-  const std::span<const double> variables = part(moments_[moment].variables, lane);
+  const std::span<const double> end_effectors = part(moments_[moment].end_effectors, lane);
   std::span<const double> fields = part(moments_[moment].tactile, lane);
-  for (std::size_t k = 0; 3 * k < variables.size(); ++k)
-    pullback_.variable(lane, static_cast<int>(k), variables.subspan(3 * k, 3));
+  for (std::size_t k = 0; 3 * k < end_effectors.size(); ++k)
+    pullback_.end_effector(lane, static_cast<int>(k), end_effectors.subspan(3 * k, 3));
   const auto sensors = task_.model().sensors();
   for (std::size_t s = 0; s < sensors.size() && !fields.empty(); ++s) {
     const std::size_t numbers = 3 * size(sensors[s].points);
@@ -300,7 +300,7 @@ std::span<const double> TaskGradientBlock::part(const std::vector<double>& all, 
 
 MomentCotangent TaskGradientBlock::cotangent(std::size_t moment, int lane) {
   MomentRows& m = moments_[moment];
-  return {part(m.q, lane), part(m.v, lane), part(m.variables, lane), part(m.tactile, lane)};
+  return {part(m.q, lane), part(m.v, lane), part(m.end_effectors, lane), part(m.tactile, lane)};
 }
 
 }  // namespace tangere

@@ -57,7 +57,7 @@ class TaskGradientBlock {
   std::vector<BlockState> checkpoints_;
   std::vector<ActionRecord> records_;  // (actions)
   struct MomentRows {
-    std::vector<double> q, v, variables, tactile;  // (16, width)
+    std::vector<double> q, v, end_effectors, tactile;  // (16, width)
   };
   std::vector<MomentRows> moments_;             // cotangents of an action's moments
   std::vector<double> start_q_, start_v_;       // (16, nv) of its first state

@@ -24,7 +24,7 @@ std::span<const double> of_lane(const std::vector<double>& all) {
 
 /// Room for what a task's reverse functions add to.
 struct TaskTangent::OwnCotangent {
-  std::vector<std::vector<double>> q, v, variables, tactile;
+  std::vector<std::vector<double>> q, v, end_effectors, tactile;
   std::vector<double> memory, action;
   std::vector<MomentCotangent> moments;
 
@@ -34,11 +34,11 @@ struct TaskTangent::OwnCotangent {
     for (std::size_t m = 0; m < count; ++m) {
       q.push_back(dofs);
       v.push_back(dofs);
-      variables.emplace_back(task.variables_size());
+      end_effectors.emplace_back(task.end_effectors_size());
       tactile.emplace_back(task.tactile_size());
     }
     for (std::size_t m = 0; m < count; ++m)
-      moments.push_back({q[m], v[m], variables[m], tactile[m]});
+      moments.push_back({q[m], v[m], end_effectors[m], tactile[m]});
   }
   [[nodiscard]] ViewCotangent out() { return {moments, action, memory}; }
   /// Times the changes of an action's start.
@@ -84,7 +84,7 @@ double TaskTangent::along(const EpisodeDirection& d) {
     ViewTangent seen;
     seen.memory = memory_;
     seen.action = action_;
-    for (auto* x : {&seen.q, &seen.v, &seen.variables, &seen.tactile}) x->resize(moments);
+    for (auto* x : {&seen.q, &seen.v, &seen.end_effectors, &seen.tactile}) x->resize(moments);
     take_steps(a, d, seen);
     sum += reward(a, seen);
   }
@@ -156,11 +156,11 @@ void TaskTangent::look(std::size_t action, std::size_t moment, const EpisodeDire
   seen.v[moment] = state_.v;
   tape.show(step, rollout_.batch(), 0);
   const std::size_t nv = state_.q.size();
-  if (task_.variables_size() > 0) {
-    std::vector<double> jacobian(task_.variables_size() * nv);
-    readout_.variable_jacobian(rollout_.batch(), 0, jacobian);
-    for (std::size_t i = 0; i < task_.variables_size(); ++i)
-      seen.variables[moment].push_back(dot(std::span(jacobian).subspan(i * nv, nv), state_.q));
+  if (task_.end_effectors_size() > 0) {
+    std::vector<double> jacobian(task_.end_effectors_size() * nv);
+    readout_.end_effector_jacobian(rollout_.batch(), 0, jacobian);
+    for (std::size_t i = 0; i < task_.end_effectors_size(); ++i)
+      seen.end_effectors[moment].push_back(dot(std::span(jacobian).subspan(i * nv, nv), state_.q));
   }
   if (task_.tactile_size() == 0) return;
   const auto sensors = task_.model().sensors();
@@ -181,7 +181,7 @@ double TaskTangent::reward(std::size_t action, const ViewTangent& seen) {
   double sum = dot(bar.memory, seen.memory) + dot(bar.action, seen.action);
   for (std::size_t m = 0; m < seen.q.size(); ++m)
     sum += dot(bar.q[m], seen.q[m]) + dot(bar.v[m], seen.v[m]) +
-           dot(bar.variables[m], seen.variables[m]) + dot(bar.tactile[m], seen.tactile[m]);
+           dot(bar.end_effectors[m], seen.end_effectors[m]) + dot(bar.tactile[m], seen.tactile[m]);
   return sum;
 }
 

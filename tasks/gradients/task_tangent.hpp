@@ -29,7 +29,7 @@ class TaskTangent {
  private:
   /// A change of what a task looks at.
   struct ViewTangent {
-    std::vector<std::vector<double>> q, v, variables, tactile;  // per moment
+    std::vector<std::vector<double>> q, v, end_effectors, tactile;  // per moment
     std::vector<double> memory, action;
   };
   struct OwnCotangent;

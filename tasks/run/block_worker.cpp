@@ -78,11 +78,11 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
   const std::size_t moments = spec.moments.size();
   q_.resize(moments * kBlock * size(task.model().nq()));
   v_.resize(moments * kBlock * size(task.model().nv()));
-  variables_.resize(moments * kBlock * task.variables_size());
+  end_effectors_.resize(moments * kBlock * task.end_effectors_size());
   tactile_.resize(moments * kBlock * task.tactile_size());
   for (int lane = 0; lane < kBlock; ++lane)
     for (std::size_t m = 0; m < moments; ++m)
-      moments_.push_back({part(q_, m, lane), part(v_, m, lane), part(variables_, m, lane),
+      moments_.push_back({part(q_, m, lane), part(v_, m, lane), part(end_effectors_, m, lane),
                           part(tactile_, m, lane)});
   if (spec.settling_steps == 0) return;
   StepperOptions options;
@@ -92,7 +92,7 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
 
 double BlockWorker::bytes(const Task& task) {
   const std::size_t numbers = size(task.model().nq()) + size(task.model().nv()) +
-                              task.variables_size() + task.tactile_size();
+                              task.end_effectors_size() + task.tactile_size();
   return static_cast<double>(task.spec().moments.size() * kBlock * numbers * sizeof(double)) +
          static_cast<double>(Stepper::workspace_bytes(task.model()));
 }
@@ -236,10 +236,10 @@ void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
     batch.get_q(first + lane, part(q_, moment, lane));
     batch.get_v(first + lane, part(v_, moment, lane));
   }
-  if (task_.variables_size() > 0) {
+  if (task_.end_effectors_size() > 0) {
     for (int lane = 0; lane < environments; ++lane)
-      parts[size(lane)] = part(variables_, moment, lane);
-    readout_.read_variables(batch, block, parts);
+      parts[size(lane)] = part(end_effectors_, moment, lane);
+    readout_.read_end_effectors(batch, block, parts);
   }
   if (!spec.looks_at_tactile) return;
   std::size_t offset = 0;

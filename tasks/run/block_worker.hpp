@@ -68,10 +68,10 @@ class BlockWorker {
   Stepper stepper_;
   Readout readout_;
   std::optional<Stepper> settling_stepper_;
-  std::optional<Batch> settling_;                    // one environment
-  std::vector<double> varying_;                      // of the environment that starts
-  std::vector<double> q_, v_, variables_, tactile_;  // (moments, 16, width)
-  std::vector<Moment> moments_;                      // (16, moments): views of them
+  std::optional<Batch> settling_;                        // one environment
+  std::vector<double> varying_;                          // of the environment that starts
+  std::vector<double> q_, v_, end_effectors_, tactile_;  // (moments, 16, width)
+  std::vector<Moment> moments_;                          // (16, moments): views of them
 };
 
 /// What a task may look at of an environment between two actions.

@@ -15,8 +15,8 @@ constexpr int kForceWidth = 3, kPositionWidth = 3;
 std::size_t size(int n) { return static_cast<std::size_t>(n); }
 
 constexpr std::size_t kQ = 0, kV = 1,
-                      kVariables =
-                          2;  // names of observations; without variables a sensor is the third
+                      kEndEffectors =
+                          2;  // names of observations; without end effectors a sensor is the third
 
 /// Bytes of one row of one episode in a slot's buffers: what is no field is kept in double first.
 double row_bytes(const EpisodeShape& shape, const EpisodeOptions& options) {
@@ -46,7 +46,8 @@ int whole_rows(int most) {
 EpisodeShape::EpisodeShape(const Model& model, const EpisodeOptions& options)
     : rows(::tangere::action_rows(options)), nu(size(model.nu())) {
   widths = {size(model.nq()), size(model.nv())};
-  if (!model.variables().empty()) widths.push_back(kPositionWidth * model.variables().size());
+  if (!model.end_effectors().empty())
+    widths.push_back(kPositionWidth * model.end_effectors().size());
   first_sensor = widths.size();
   for (const SensorInfo& sensor : model.sensors())
     widths.push_back(kForceWidth * size(sensor.points));
@@ -128,11 +129,11 @@ void EpisodeSlot::observe(int row) {
     batch_->get_q(e, numbers<double>(kQ, e, row));
     batch_->get_v(e, numbers<double>(kV, e, row));
   }
-  if (shape_.first_sensor > kVariables) {
+  if (shape_.first_sensor > kEndEffectors) {
     std::array<std::span<double>, kBlockEpisodes> positions;
     for (int e = 0; e < batch_->environments(); ++e)
-      positions[size(e)] = numbers<double>(kVariables, e, row);
-    readout_.read_variables(*batch_, 0, positions);
+      positions[size(e)] = numbers<double>(kEndEffectors, e, row);
+    readout_.read_end_effectors(*batch_, 0, positions);
   }
   for (std::size_t name = shape_.first_sensor; name < shape_.widths.size(); ++name) {
     const auto sensor = static_cast<int>(name - shape_.first_sensor);

@@ -37,7 +37,7 @@ class Recorder {
     v_.resize(e * static_cast<std::size_t>(model.nv()));
     pose_.resize(e * static_cast<std::size_t>(model.nb()) * kPoseWidth);
     twist_.resize(e * static_cast<std::size_t>(model.nb()) * kTwistWidth);
-    variables_.resize(e * model.variables().size() * kPositionWidth);
+    end_effectors_.resize(e * model.end_effectors().size() * kPositionWidth);
     force_.resize(e * largest_field(model));
     iterations_.resize(e);
     status_.resize(e);
@@ -49,11 +49,11 @@ class Recorder {
       batch_.get_v(e, part(v_, e));
       readout_.bodies(batch_, e, part(pose_, e), part(twist_, e));
     }
-    if (!variables_.empty())
-      each_block(variables_, [&](int block, auto positions) {
-        readout_.read_variables(batch_, block, positions);
+    if (!end_effectors_.empty())
+      each_block(end_effectors_, [&](int block, auto positions) {
+        readout_.read_end_effectors(batch_, block, positions);
       });
-    sink_.write(StateRow{step, time, q_, v_, pose_, twist_, variables_});
+    sink_.write(StateRow{step, time, q_, v_, pose_, twist_, end_effectors_});
   }
 
   /// `stepping`: the environments that took the step.
@@ -98,8 +98,8 @@ class Recorder {
   RowSink& sink_;
   Readout readout_;
   int environments_;
-  std::vector<double> q_, v_, pose_, twist_, variables_;  // as in StateRow
-  std::vector<double> force_;                             // shared by the sensors
+  std::vector<double> q_, v_, pose_, twist_, end_effectors_;  // as in StateRow
+  std::vector<double> force_;                                 // shared by the sensors
   std::vector<std::int32_t> iterations_;
   std::vector<std::int8_t> status_;
 };
@@ -165,7 +165,7 @@ std::int64_t tactile_frames(const SensorInfo& sensor, const RolloutOptions& opti
 double rollout_bytes(const Model& model, int environments) {
   const double numbers =
       model.nq() + model.nv() + model.nu() + double{kPoseWidth + kTwistWidth} * model.nb() +
-      static_cast<double>(model.variables().size() * kPositionWidth + largest_field(model));
+      static_cast<double>(model.end_effectors().size() * kPositionWidth + largest_field(model));
   constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
   return environments * (numbers * sizeof(double) + kFlags);
 }

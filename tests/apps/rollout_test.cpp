@@ -51,7 +51,7 @@ Model pad_on_ball() {
 struct StoredState {
   std::int64_t step;
   double time;
-  std::vector<double> q, v, pose, twist, variables;
+  std::vector<double> q, v, pose, twist, end_effectors;
 };
 struct StoredStep {
   std::int64_t step;
@@ -77,7 +77,7 @@ class Memory : public RowSink {
   void write(const StateRow& row) override {
     order += "q" + std::to_string(row.step) + " ";
     states.push_back({row.step, row.time, copy(row.q), copy(row.v), copy(row.body_pose),
-                      copy(row.body_twist), copy(row.variables)});
+                      copy(row.body_twist), copy(row.end_effectors)});
   }
   void write(const StepRow& row) override {
     order += "u" + std::to_string(row.step) + " ";
@@ -143,7 +143,7 @@ TEST_F(Rollout, RowsAreTheBatchStepByStep) {
   Batch again(model_, kEnvironments);
   Stepper stepper(model_);
   Readout readout(model_);
-  std::vector<double> pose(14), twist(12), q(1), v(1), force(49 * 3), variables(6);
+  std::vector<double> pose(14), twist(12), q(1), v(1), force(49 * 3), end_effectors(6);
   for (std::size_t t = 0;; ++t) {
     const StoredState& row = memory_.states[t];
     EXPECT_EQ(row.step, static_cast<std::int64_t>(t));
@@ -157,10 +157,11 @@ TEST_F(Rollout, RowsAreTheBatchStepByStep) {
       readout.bodies(again, e, pose, twist);
       for (std::size_t i = 0; i < 14; ++i) EXPECT_EQ(row.pose[at * 14 + i], pose[i]);
       for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(row.twist[at * 12 + i], twist[i]);
-      readout.variables(again, e, variables);
-      ASSERT_EQ(row.variables.size(), 6U * kEnvironments);
-      for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(row.variables[at * 6 + i], variables[i]);
-      EXPECT_NEAR(variables[2], 0.0249 + q[0], 1e-15);
+      readout.end_effectors(again, e, end_effectors);
+      ASSERT_EQ(row.end_effectors.size(), 6U * kEnvironments);
+      for (std::size_t i = 0; i < 6; ++i)
+        EXPECT_EQ(row.end_effectors[at * 6 + i], end_effectors[i]);
+      EXPECT_NEAR(end_effectors[2], 0.0249 + q[0], 1e-15);
       if (t == 0) continue;
       readout.tactile(again, e, 1, force);
       const StoredField& field = memory_.fields[2 * t - 1];

@@ -56,7 +56,7 @@ class SyntheticPiece {
     const auto episodes = static_cast<int>(std::min<std::int64_t>(16, l.episodes - first_episode));
     const auto with_action = static_cast<int>(std::min<std::int64_t>(rows, l.rows() - first_row));
     std::vector<std::size_t> widths = {l.u_names.size(), l.q_names.size(), l.v_names.size()};
-    if (!l.variable_names.empty()) widths.push_back(3 * l.variable_names.size());
+    if (!l.end_effector_names.empty()) widths.push_back(3 * l.end_effector_names.size());
     widths.push_back(3 * static_cast<std::size_t>(l.sensors[0].points));
     values_.resize(widths.size() - 1);
     for (std::int64_t e = first_episode; e < first_episode + episodes; ++e) {

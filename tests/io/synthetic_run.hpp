@@ -106,8 +106,8 @@ inline void write_run(RowSink& sink, const TrajectoryLayout& l, double force = 1
   for (std::int64_t t = 0; t <= l.steps; ++t) {
     const auto q = numbers(1, t, 6), v = numbers(2, t, 6), pose = numbers(3, t, 14),
                twist = numbers(4, t, 12);
-    const auto variables = numbers(7, t, 2 * 3 * l.variable_names.size());
-    sink.write(StateRow{t, double(t) * l.timestep, q, v, pose, twist, variables});
+    const auto end_effectors = numbers(7, t, 2 * 3 * l.end_effector_names.size());
+    sink.write(StateRow{t, double(t) * l.timestep, q, v, pose, twist, end_effectors});
     if (t == l.steps) break;
     const auto u = numbers(5, t, 2), residual = numbers(6, t, 2);
     const std::vector<std::int32_t> iterations = {static_cast<std::int32_t>(t), 7};

@@ -72,7 +72,9 @@ struct ByHand {
   }
 
  private:
-  static std::size_t first_sensor(const Model& model) { return model.variables().empty() ? 2 : 3; }
+  static std::size_t first_sensor(const Model& model) {
+    return model.end_effectors().empty() ? 2 : 3;
+  }
   void step(Stepper& stepper, const std::vector<double>& u, std::int64_t t) {
     std::vector<double> q(std::size_t(batch_.model().nq())), v(std::size_t(batch_.model().nv()));
     batch_.get_q(0, q);
@@ -87,9 +89,9 @@ struct ByHand {
     batch_.get_v(0, v);
     keep(0, std::vector<T>(q.begin(), q.end()));
     keep(1, std::vector<T>(v.begin(), v.end()));
-    if (!model.variables().empty()) {
-      std::vector<double> positions(3 * model.variables().size());
-      readout_.variables(batch_, 0, positions);
+    if (!model.end_effectors().empty()) {
+      std::vector<double> positions(3 * model.end_effectors().size());
+      readout_.end_effectors(batch_, 0, positions);
       keep(2, std::vector<T>(positions.begin(), positions.end()));
     }
     for (std::size_t s = 0; s < model.sensors().size(); ++s) {

@@ -89,7 +89,7 @@ inline Played play_episodes(const Task& task, PolicyKind kind, int episodes,
 /// Numbers of one environment that a view can look at, owned.
 struct OwnView {
   std::vector<double> memory, action;
-  std::vector<std::vector<double>> q, v, variables, tactile;  // per moment
+  std::vector<std::vector<double>> q, v, end_effectors, tactile;  // per moment
   std::vector<Moment> moments;
   std::int64_t actions = 0;
 
@@ -98,14 +98,14 @@ struct OwnView {
     for (std::size_t m = 0; m < task.spec().moments.size(); ++m) {
       q.emplace_back(std::size_t(task.model().nq()));
       v.emplace_back(std::size_t(task.model().nv()));
-      variables.emplace_back(task.variables_size());
+      end_effectors.emplace_back(task.end_effectors_size());
       tactile.emplace_back(task.tactile_size());
     }
   }
   [[nodiscard]] TaskView view() {
     moments.clear();
     for (std::size_t m = 0; m < q.size(); ++m)
-      moments.push_back({q[m], v[m], variables[m], tactile[m]});
+      moments.push_back({q[m], v[m], end_effectors[m], tactile[m]});
     return {0, 0, actions, memory, action, moments};
   }
 };

@@ -23,7 +23,7 @@ class Reading {
     Random random(seed);
     weights_.resize(std::size_t(3 * model.sensors()[0].points));
     for (double& w : weights_) w = random.normal();
-    for (double& w : of_variables_) w = 10 * random.normal();
+    for (double& w : of_end_effectors_) w = 10 * random.normal();
   }
   [[nodiscard]] double value(const State& s, const Model* other = nullptr) const {
     const Model& model = other == nullptr ? model_ : *other;
@@ -35,8 +35,8 @@ class Reading {
     double sum = 0;
     for (std::size_t i = 0; i < field.size(); ++i) sum += weights_[i] * field[i];
     double position[6];
-    readout.variables(batch, 0, position);
-    for (std::size_t i = 0; i < 6; ++i) sum += of_variables_[i] * position[i];
+    readout.end_effectors(batch, 0, position);
+    for (std::size_t i = 0; i < 6; ++i) sum += of_end_effectors_[i] * position[i];
     return sum;
   }
   /// In lane `lane` of a block, the others in other states. Returns how many tiles were touched.
@@ -55,7 +55,7 @@ class Reading {
     out.parameters.assign(std::size_t(parameter_rows(model_.compiled()) * kBlock), 0.0);
     pullback.field(lane, 0, frame.tiles(), cotangents, out.parameters);
     for (int k = 0; k < 2; ++k)
-      pullback.variable(lane, k, std::span(of_variables_).subspan(3 * std::size_t(k), 3));
+      pullback.end_effector(lane, k, std::span(of_end_effectors_).subspan(3 * std::size_t(k), 3));
     pullback.finish(out);
     return frame.tiles().size();
   }
@@ -81,7 +81,7 @@ class Reading {
 
   Model model_;
   std::vector<double> weights_;
-  double of_variables_[6] = {};
+  double of_end_effectors_[6] = {};
 };
 
 using Case = std::tuple<PrimitiveShape, ContactLaw, Pad>;

@@ -18,8 +18,8 @@ using kernels::Vec3;
 using testing::link;
 using testing::Random;
 
-VariableDescription effector(const std::string& name, const std::string& joint, Vector3 at) {
-  VariableDescription d;
+EndEffectorDescription effector(const std::string& name, const std::string& joint, Vector3 at) {
+  EndEffectorDescription d;
   d.name = name;
   d.joint = joint;
   d.position = at;
@@ -30,11 +30,11 @@ struct Reading {
   std::vector<double> position, velocity, jacobian;  // (n, 3), (n, 3), (n, 3, nv)
 };
 Reading read(Readout& readout, const Batch& batch, int environment = 0) {
-  const std::size_t n = 3 * batch.model().variables().size();
+  const std::size_t n = 3 * batch.model().end_effectors().size();
   Reading r{std::vector<double>(n), std::vector<double>(n),
             std::vector<double>(n * std::size_t(batch.model().nv()), std::nan(""))};
-  readout.variables(batch, environment, r.position, r.velocity);
-  readout.variable_jacobian(batch, environment, r.jacobian);
+  readout.end_effectors(batch, environment, r.position, r.velocity);
+  readout.end_effector_jacobian(batch, environment, r.jacobian);
   return r;
 }
 Reading read(const Model& model, const std::vector<double>& q, const std::vector<double>& v) {
@@ -61,8 +61,8 @@ TEST(EndEffectors, OfARevoluteChainAreThoseOfTheDrawing) {
   s.links[1].parent = 0;
   s.links[2].parent = 1;
   s.links[1].joint.pose.orientation = {std::sqrt(0.5), 0, 0, std::sqrt(0.5)};
-  s.variables = {effector("tip", "lower_joint", {0, -0.2, 0.05}),
-                 effector("middle", "bracket_joint", {0.1, 0, 0})};
+  s.end_effectors = {effector("tip", "lower_joint", {0, -0.2, 0.05}),
+                     effector("middle", "bracket_joint", {0.1, 0, 0})};
   const double a = 0.7, b = -1.9, va = 1.3, vb = -0.4;
   const double c = std::cos(a), d = std::sin(a), e = std::cos(a + b), f = std::sin(a + b);
   const Reading r = read(Model(s), {a, b}, {va, vb});
@@ -86,8 +86,8 @@ TEST(EndEffectors, OfAFreeBodyTurnAndFlyWithIt) {
   Scene s;
   s.links = {link("ball", JointType::free, {1, 2, 3}, SphereShape{0.1}, 500),
              link("wall", JointType::fixed, {0, 5, 0}, SphereShape{0.1}, 500)};
-  s.variables = {effector("mark", "ball_joint", {0.1, 0.2, 0.3}),
-                 effector("nail", "wall_joint", {0, 0, 0.5})};
+  s.end_effectors = {effector("mark", "ball_joint", {0.1, 0.2, 0.3}),
+                     effector("nail", "wall_joint", {0, 0, 0.5})};
   // A third of a turn about (1, 1, 1): x → y → z → x.
   const Reading r = read(Model(s), {0.5, 0.25, 0.125, 0.5, 0.5, 0.5, 0.5}, {1, -1, 2, 3, 0, 0});
   expect_near(r.position, {1 + 0.5 + 0.3, 2 + 0.25 + 0.1, 3 + 0.125 + 0.2, 0, 5, 0.5}, 1e-15,
@@ -107,7 +107,7 @@ Scene marked_tree(unsigned seed) {
   Scene s = testing::random_tree(seed, 9);
   Random random(seed + 77);
   for (const LinkDescription& l : s.links)
-    s.variables.push_back(
+    s.end_effectors.push_back(
         effector("on_" + l.joint.name, l.joint.name, testing::array(random.vector(0.2))));
   return s;
 }
@@ -199,13 +199,13 @@ TEST(EndEffectors, AreTheSameBitsInAnyBatch) {
   for (int e = 0; e < kEnvironments; ++e)
     batch.set_state(e, random_numbers(random, model.nq()), random_numbers(random, model.nv()));
   Readout readout(model);
-  const std::size_t n = 3 * model.variables().size();
+  const std::size_t n = 3 * model.end_effectors().size();
   std::vector<std::vector<double>> all(kEnvironments, std::vector<double>(n));
   for (int block = 0; block < batch.blocks(); ++block) {
     std::vector<std::span<double>> spans;
     for (int e = 16 * block; e < std::min(16 * block + 16, kEnvironments); ++e)
       spans.emplace_back(all[std::size_t(e)]);
-    readout.read_variables(batch, block, spans);
+    readout.read_end_effectors(batch, block, spans);
   }
   for (int e = 0; e < kEnvironments; ++e) {
     const Reading here = read(readout, batch, e);
@@ -220,12 +220,12 @@ TEST(EndEffectors, AreTheSameBitsInAnyBatch) {
 
 TEST(EndEffectors, AreListedAndMistakesAreRefused) {
   Scene s = testing::rolling_ball();
-  EXPECT_TRUE(Model(s).variables().empty());
-  s.variables = {effector("a", "pad_joint", {}), effector("b", "ball_joint", {})};
+  EXPECT_TRUE(Model(s).end_effectors().empty());
+  s.end_effectors = {effector("a", "pad_joint", {}), effector("b", "ball_joint", {})};
   const Model model(s);
-  ASSERT_EQ(model.variables().size(), 2U);
-  EXPECT_EQ(model.variables()[1].name, "b");
-  EXPECT_EQ(model.variables()[1].joint, "ball_joint");
+  ASSERT_EQ(model.end_effectors().size(), 2U);
+  EXPECT_EQ(model.end_effectors()[1].name, "b");
+  EXPECT_EQ(model.end_effectors()[1].joint, "ball_joint");
   const auto error = [&] {
     try {
       const Model refused(s);
@@ -234,9 +234,9 @@ TEST(EndEffectors, AreListedAndMistakesAreRefused) {
     }
     return std::string();
   };
-  s.variables[1].joint = "bal_joint";
+  s.end_effectors[1].joint = "bal_joint";
   EXPECT_THAT(error(), ::testing::HasSubstr("no joint is named 'bal_joint'"));
-  s.variables[1] = s.variables[0];
+  s.end_effectors[1] = s.end_effectors[0];
   EXPECT_THAT(error(), ::testing::HasSubstr("endeffector name 'a' is used twice"));
 }
 

@@ -102,7 +102,7 @@ TEST(Dataset, HoldsEndEffectorsAsAnObservation) {
   const Folder folder;
   DatasetLayout l = dataset_layout(20);
   const double bytes = l.episode_bytes();
-  l.variable_names = {"tip", "heel"};
+  l.end_effector_names = {"tip", "heel"};
   EXPECT_EQ(l.episode_bytes() - bytes, 4 * 6 * sizeof(float));
   const std::string path = one_shard(folder, l);
   EXPECT_EQ(check_shard(path).demos, 18);
@@ -121,7 +121,7 @@ TEST(Dataset, TakesTheNameOfEndEffectorsOnlyWhereThereAreAny) {
   DatasetLayout l = dataset_layout(20);
   l.sensors[0].name = "variables";
   EXPECT_NO_THROW(l.check());
-  l.variable_names = {"tip"};
+  l.end_effector_names = {"tip"};
   EXPECT_THROW(l.check(), InputError);
 }
 

@@ -36,9 +36,9 @@ TEST(SceneReader, PublishedDialectLoadsUnmodified) {
   EXPECT_EQ(s.ground_contacts[0].law, ContactLaw::linear);
   EXPECT_EQ(s.pair_contacts[0].law, ContactLaw::clamped);
   EXPECT_EQ(s.sensors[0].coefficients.kt, 0.01);
-  ASSERT_EQ(s.variables.size(), 1U);
-  EXPECT_EQ(s.variables[0].name, "endeffector0");
-  EXPECT_EQ(s.variables[0].position[0], 0.001);
+  ASSERT_EQ(s.end_effectors.size(), 1U);
+  EXPECT_EQ(s.end_effectors[0].name, "endeffector0");
+  EXPECT_EQ(s.end_effectors[0].position[0], 0.001);
   std::string warnings;
   for (const std::string& w : file.warnings) warnings += w + "\n";
   for (const char* part : {"max_ls", "design_params", "'axis' has no effect", "'lim' has no effect",

@@ -99,7 +99,7 @@ TEST(TrajectoryFile, HoldsEndEffectorsWhereThereAreAny) {
   const Folder other;
   TrajectoryLayout l = layout();
   const std::uint64_t bytes = l.bytes();
-  l.variable_names = {"tip", "heel"};
+  l.end_effector_names = {"tip", "heel"};
   EXPECT_EQ(l.bytes() - bytes, 6U * 2 * 2 * 3 * 8);
   const h5::Id f = h5::open_file(write_file(other, l));
   const h5::Id d = h5::open_dataset(f, "variables/position");
@@ -108,7 +108,7 @@ TEST(TrajectoryFile, HoldsEndEffectorsWhereThereAreAny) {
   h5::read_box(d, {0, 0, 0, 0}, {6, 2, 2, 3}, x.data());
   for (std::size_t k = 0; k < 72; ++k)
     EXPECT_EQ(x[k], number(7, std::int64_t(k / 12), k % 12)) << k;
-  EXPECT_EQ(h5::read_texts(d, "names"), l.variable_names);
+  EXPECT_EQ(h5::read_texts(d, "names"), l.end_effector_names);
   EXPECT_EQ(h5::read_text(d, "units"), "m");
   EXPECT_EQ(h5::read_text(d, "frame"), "world");
 }
@@ -116,7 +116,7 @@ TEST(TrajectoryFile, HoldsEndEffectorsWhereThereAreAny) {
 TEST(TrajectoryFile, RefusesARowWithoutTheEndEffectorsItsLayoutHas) {
   const Folder folder;
   TrajectoryLayout l = layout();
-  l.variable_names = {"tip"};
+  l.end_effector_names = {"tip"};
   TrajectoryFile file(folder / "run.h5", l, false);
   EXPECT_THROW(testing::write_run(file, layout()), IoError);
 }

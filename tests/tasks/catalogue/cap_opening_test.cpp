@@ -74,12 +74,12 @@ TEST(CapOpening, PaysWhatThePaperSays) {
   Verdict verdict = task->judge(own.view());
   EXPECT_NEAR(verdict.reward, plain, 1e-12);
   EXPECT_FALSE(verdict.terminated || verdict.success);
-  own.variables[0][8] = 0.051;  // the third fingertip is too high
+  own.end_effectors[0][8] = 0.051;  // the third fingertip is too high
   verdict = task->judge(own.view());
   EXPECT_NEAR(verdict.reward, plain - 50, 1e-12);
   EXPECT_TRUE(verdict.terminated);
   EXPECT_FALSE(verdict.success);
-  own.variables[0][8] = 0.049;
+  own.end_effectors[0][8] = 0.049;
   own.q[0][0] = std::numbers::pi / 4 + 0.2;
   verdict = task->judge(own.view());
   EXPECT_NEAR(verdict.reward, plain + 0.04 + 50, 1e-12);

@@ -70,7 +70,7 @@ TEST(BoxPushing, PaysWhatThePaperSays) {
               0.12,
               0,
               0.3 + std::numbers::pi / 18};  // 0.05 + 0.13: 20 mm short, 20 mm left, 10 degrees
-  own.variables[0] = {0.1, 0.2, 0.03, 0.11, 0.22, 0.5};  // 10 mm and 20 mm apart
+  own.end_effectors[0] = {0.1, 0.2, 0.03, 0.11, 0.22, 0.5};  // 10 mm and 20 mm apart
   const Verdict verdict = task->judge(own.view());
   EXPECT_NEAR(verdict.reward, -0.01 * (4 + 4) - 0.1 * 4 - (0.25 + 1) - 0.1 * 5.25, 1e-12);
   EXPECT_FALSE(verdict.terminated || verdict.success);

@@ -25,21 +25,22 @@ class Differences {
   /// Compares the derivative by every number with central differences.
   void check() {
     const std::size_t moments = own_.q.size();
-    std::vector<std::vector<double>> q, v, variables, tactile;
+    std::vector<std::vector<double>> q, v, end_effectors, tactile;
     std::vector<MomentCotangent> to;
     for (std::size_t m = 0; m < moments; ++m) {
       q.emplace_back(v.emplace_back(std::size_t(task_.model().nv())));
-      variables.emplace_back(task_.variables_size());
+      end_effectors.emplace_back(task_.end_effectors_size());
       tactile.emplace_back(task_.tactile_size());
     }
-    for (std::size_t m = 0; m < moments; ++m) to.push_back({q[m], v[m], variables[m], tactile[m]});
+    for (std::size_t m = 0; m < moments; ++m)
+      to.push_back({q[m], v[m], end_effectors[m], tactile[m]});
     std::vector<double> action(own_.action.size()), memory(own_.memory.size());
     constexpr double kWeight = 1.7;
     task_.reward_vjp(own_.view(), kWeight, {to, action, memory});
     for (std::size_t m = 0; m < moments; ++m) {
       for (std::size_t i = 0; i < q[m].size(); ++i) compare("q", kWeight, q[m][i], displaced(m, i));
       each("v", kWeight, own_.v[m], v[m]);
-      each("variables", kWeight, own_.variables[m], variables[m]);
+      each("variables", kWeight, own_.end_effectors[m], end_effectors[m]);
       each("tactile", kWeight, own_.tactile[m], tactile[m]);
     }
     each("action", kWeight, own_.action, action);
@@ -88,7 +89,7 @@ TEST_P(EveryTask, TheRewardsDerivativesAreThoseOfDifferences) {
     OwnView own(*task);
     for (auto* part : {&own.memory, &own.action})
       for (double& x : *part) x = number();
-    for (auto* parts : {&own.q, &own.v, &own.variables, &own.tactile})
+    for (auto* parts : {&own.q, &own.v, &own.end_effectors, &own.tactile})
       for (auto& part : *parts)
         for (double& x : part) x = 0.1 * number();
     // Quaternions of unit length.

@@ -84,8 +84,8 @@ std::vector<Routes> all_routes() {
        {"rolling_ball_small", "box_pushing", "stable_grasp", "cap_opening", "insertion"})
     for (const Integrator scheme : {Integrator::bdf1, Integrator::bdf2})
       for (const LossKind loss : {LossKind::final_state, LossKind::path, LossKind::tactile,
-                                  LossKind::shear, LossKind::variables})
-        if (loss != LossKind::variables || Model(shipped(scene)).variables().size() > 0)
+                                  LossKind::shear, LossKind::end_effectors})
+        if (loss != LossKind::end_effectors || Model(shipped(scene)).end_effectors().size() > 0)
           all.push_back({scene, scheme, loss});
   return all;
 }

@@ -114,7 +114,7 @@ TEST(Episodes, OfPadsThatAreReadSixteenAtATimeAreTheSame) {
 TEST(Episodes, WithEndEffectorsHaveThemBeforeTheSensors) {
   Scene scene = small_scene();
   for (const char* joint : {"ball_joint", "pad_joint"}) {
-    VariableDescription& v = scene.variables.emplace_back();
+    EndEffectorDescription& v = scene.end_effectors.emplace_back();
     v.name = v.joint = joint;
     v.position = {0.01, 0.02, 0.03};
   }

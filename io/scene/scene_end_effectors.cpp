@@ -16,35 +16,35 @@ void read_colour(const SceneNode& node, std::array<double, 4>& rgba) {
   std::copy(c.begin(), c.end(), rgba.begin());
 }
 
-void read_variables(Scene& scene, const SceneNode& section) {
+void read_end_effectors(Scene& scene, const SceneNode& section) {
   section.check_attributes({});
   for (const SceneNode& node : section.children({"endeffector"})) {
     node.check_attributes({"name", "joint", "pos", "radius", "rgba"});
     const double length = node.context().length;
-    VariableDescription d;
+    EndEffectorDescription d;
     d.source = node.source();
     find_joint(scene, node, "joint");
     d.joint = node.text("joint");
     d.name = node.text("name", "");
-    for (const VariableDescription& other : scene.variables)
+    for (const EndEffectorDescription& other : scene.end_effectors)
       if (!d.name.empty() && other.name == d.name)
         node.fail("endeffector name '" + d.name + "' is used twice");
     d.position = scaled(node.vector("pos"), length);
     if (node.has("radius")) d.radius = node.positive("radius") * length;
     read_colour(node, d.rgba);
-    scene.variables.push_back(std::move(d));
+    scene.end_effectors.push_back(std::move(d));
   }
 }
 
-void name_variables(Scene& scene) {
+void name_end_effectors(Scene& scene) {
   const auto taken = [&](const std::string& name) {
-    return std::any_of(scene.variables.begin(), scene.variables.end(),
+    return std::any_of(scene.end_effectors.begin(), scene.end_effectors.end(),
                        [&](const auto& v) { return v.name == name; });
   };
-  for (std::size_t i = 0; i < scene.variables.size(); ++i)
-    for (std::size_t k = i; scene.variables[i].name.empty(); ++k)
+  for (std::size_t i = 0; i < scene.end_effectors.size(); ++i)
+    for (std::size_t k = i; scene.end_effectors[i].name.empty(); ++k)
       if (const std::string name = fmt::format("endeffector{}", k); !taken(name))
-        scene.variables[i].name = name;
+        scene.end_effectors[i].name = name;
 }
 
 }  // namespace tangere
