@@ -37,14 +37,16 @@ struct Options {
   bool point_gradients = false, overwrite = false, allow_unknown = false;
 };
 
-Integrator integrator_named(const std::string& name) {
+std::vector<std::string> integrator_names() {
   std::vector<std::string> names;
-  for (const Integrator value :
-       {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
-    names.emplace_back(to_string(value));
-    if (names.back() == name) return value;
-  }
-  throw InputError("unknown integrator '" + name + "'" + suggestion(name, names));
+  for (const Integrator known : integrators()) names.emplace_back(to_string(known));
+  return names;
+}
+
+Integrator integrator_named(const std::string& name) {
+  for (const Integrator known : integrators())
+    if (to_string(known) == name) return known;
+  throw InputError("unknown integrator '" + name + "'" + suggestion(name, integrator_names()));
 }
 
 void check_arguments(const Options& options) {
@@ -400,7 +402,7 @@ Command add_simulate(CLI::App& program) {
                                  "Row of --state-from [default: the last]");
   add_positive_number(*app, "--timestep", o.timestep, "Step size in s [default: the scene's]");
   add_text(*app, "--integrator", o.integrator, "NAME",
-           "BDF1, BDF2, SDIRK2 or linear-implicit [default: the scene's]");
+           fmt::format("{} [default: the scene's]", fmt::join(integrator_names(), ", ")));
   add_positive_number(*app, "--tol", o.tolerance,
                       "Largest scaled residual of a step [default: the scene's]");
   add_text(*app, "--gradients", o.gradients, "LOSS",

@@ -36,6 +36,7 @@ set(public_headers
   engine/derivative/step_jacobian.hpp
   engine/model/model.hpp
   engine/model/scene.hpp
+  engine/model/scheme.hpp
   engine/rows/episode_sink.hpp
   engine/rows/row_sink.hpp
   engine/rows/task_spec.hpp

@@ -24,8 +24,8 @@ template <int L>
 struct Lanes {
   BasicWorkspace<L> work;
   AdjointWorkspace<L> adjoint;
-  Lanes(const CompiledModel& m, const AdjointOptions& wanted)
-      : work(m), adjoint(m, wanted.losses, wanted.parameters) {}
+  Lanes(const CompiledModel& m, const AdjointOptions& wanted, int inner_stages)
+      : work(m, inner_stages), adjoint(m, wanted.losses, wanted.parameters, inner_stages) {}
 };
 
 /// A step of one group: environment `first` + l of the block in lane l of the batch.
@@ -52,8 +52,8 @@ struct Adjoint::Impl {
       : model(m),
         settings(s),
         group(model.compiled()),
-        eight(model.compiled(), wanted),
-        one(model.compiled(), wanted),
+        eight(model.compiled(), wanted, s.integrator.scheme().most_inner_stages()),
+        one(model.compiled(), wanted, s.integrator.scheme().most_inner_stages()),
         losses(std::size_t(wanted.losses)),
         rows(std::size_t(model.compiled().layout.rows * kBlock)) {
     const std::size_t nv = std::size_t(m.nv()) * kBlock, nu = std::size_t(m.nu()) * kBlock;
@@ -103,15 +103,15 @@ struct Adjoint::Impl {
     gather(w.q_before, &rows[std::size_t(m.layout.previous_q * kBlock)], m.nq, g.first);
     gather(w.v_before, &rows[std::size_t(m.layout.previous_v * kBlock)], m.nv, g.first);
     gather(w.q1, g.tape.state(g.step + 1), m.nq, g.first);
-    if (settings.integrator == Integrator::sdirk2)
-      gather(w.x_gamma, g.tape.x_gamma(g.step), m.nv, g.first);
+    gather(w.x_inner, g.tape.inner(g.step), settings.integrator.scheme().inner_stages() * m.nv,
+           g.first);
     w.stage.block = rows.data() + g.first;
     w.stage.group = 0;
     for (std::size_t k = 0; k < losses.size(); ++k) {
       LossRows<L>& o = x.adjoint.losses[k];
       gather(o.q, losses[k].q.data(), m.nv, g.first);
       gather(o.v, losses[k].v.data(), m.nv, g.first);
-      for (Row<L>* p : {o.q_centre, o.v_centre, o.q_other, o.v_other, o.tau, o.target})
+      for (Row<L>* p : {o.q_centre, o.v_centre, o.q_before, o.v_before, o.tau, o.target})
         std::fill(p, p + m.nv, Row<L>{});
       if (o.parameters != nullptr)
         std::fill(o.parameters, o.parameters + kernels::parameter_numbers(m.view), Row<L>{});
@@ -129,7 +129,7 @@ struct Adjoint::Impl {
     for (std::size_t k = special.solves.size(); k-- > 0;) {
       const TapedSolve& solve = special.solves[k];
       set(w.q1, solve.q);
-      set(w.x_gamma, solve.x_gamma);
+      set(w.x_inner, solve.inner);
       if (k > 0) {
         set(w.q0, special.solves[k - 1].q);
         set(w.v0, special.solves[k - 1].v);
@@ -139,7 +139,8 @@ struct Adjoint::Impl {
         for (int i = 0; i < m.nq; ++i) w.q0[i][lane] = start[(m.layout.q + i) * kBlock];
         for (int i = 0; i < m.nv; ++i) w.v0[i][lane] = start[(m.layout.v + i) * kBlock];
       }
-      group.reverse(solve.scheme, solve.h, kernels::active_kernels(), w, x.adjoint, 1U << lane);
+      group.reverse(solve.integrator.scheme(), solve.h, kernels::active_kernels(), w, x.adjoint,
+                    1U << lane);
       if (k == 0) return;
       for (LossRows<L>& o : x.adjoint.losses)
         for (int i = 0; i < model.nv(); ++i) {
@@ -162,8 +163,8 @@ struct Adjoint::Impl {
       if (g.tape.special(g.step, g.first + l) == nullptr) plain |= 1U << l;
     }
     if (plain != 0)
-      group.reverse(settings.integrator, settings.timestep, kernels::active_kernels(), x.work,
-                    x.adjoint, plain);
+      group.reverse(settings.integrator.scheme(), settings.timestep, kernels::active_kernels(),
+                    x.work, x.adjoint, plain);
     for (int l = 0; l < L; ++l)
       if (has(g.live & ~plain, l)) reverse_special(x, *g.tape.special(g.step, g.first + l), l, g);
     for (std::size_t k = 0; k < losses.size(); ++k)
@@ -186,8 +187,8 @@ struct Adjoint::Impl {
       const std::size_t at = std::size_t(i * kBlock + column);
       c.q[at] = c.previous_q[at] + o.q_centre[i][lane];
       c.v[at] = c.previous_v[at] + o.v_centre[i][lane];
-      c.previous_q[at] = o.q_other[i][lane];
-      c.previous_v[at] = o.v_other[i][lane];
+      c.previous_q[at] = o.q_before[i][lane];
+      c.previous_v[at] = o.v_before[i][lane];
     }
     if (o.parameters == nullptr) return;
     for (int i = 0; i < kernels::parameter_numbers(m.view); ++i)

@@ -311,14 +311,14 @@ void DualStage::products(std::span<const double> lambda, std::vector<DualNumber>
                          std::vector<DualNumber>* numbers) {
   Impl& i = *impl_;
   const std::size_t n = g.size();
-  std::vector<D> along(n), zero(n, D(0.0)), nu(n), unused(4 * n, D(0.0));
+  std::vector<D> along(n), zero(n, D(0.0)), nu(n), unused(2 * n, D(0.0));
   for (std::size_t k = 0; k < n; ++k) along[k] = D(lambda[k]);
   m_lambda.assign(n, D(0.0));
   targets.assign(n, D(0.0));
-  const kernels::AdjointArgs<D> d = {
-      zero.data(),           zero.data(),           nullptr,     along.data(),    nu.data(),
-      m_lambda.data(),       targets.data(),        zero.data(), unused.data(),   unused.data() + n,
-      unused.data() + 2 * n, unused.data() + 3 * n, {0, 0, 0},   i.adjoint.data()};
+  const kernels::AdjointArgs<D> d = {zero.data(),    zero.data(),     nullptr,
+                                     along.data(),   nu.data(),       m_lambda.data(),
+                                     targets.data(), unused.data(),   unused.data() + n,
+                                     {0, 0, {}},     i.adjoint.data()};
   const auto a = i.arguments(*this);
   kernels::adjoint_products(i.view, a, d);
   c_lambda.resize(n);

@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// The schemes of engine/step/group_step.hpp backwards. Lanes outside the mask compute with what stands
-// there and change nothing.
+// The stages of a scheme backwards (engine/model/scheme.hpp). Lanes outside the mask compute with what
+// stands there and change nothing.
 #include "engine/derivative/group_adjoint.hpp"
 
 #include <algorithm>
 
 #include "engine/step/detection.hpp"
-#include "engine/step/state_difference.hpp"
+#include "engine/step/scheme_stage.hpp"
 
 namespace tangere {
 
 using kernels::Row;
-using kernels::StageHistory;
 
 template <int L>
-AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count, bool parameters)
+AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count, bool parameters,
+                                      int inner_stages)
     : losses(std::size_t(loss_count)) {
-  const std::size_t nv = std::size_t(model.nv), per_loss = 10, shared = 10;
+  const std::size_t nv = std::size_t(model.nv), inner = std::size_t(inner_stages),
+                    per_loss = 8 + 2 * inner, shared = 8 + 2 * (1 + inner);
   const std::size_t count = parameters ? std::size_t(kernels::parameter_numbers(model.view)) : 0;
   memory.assign(nv * (per_loss * losses.size() + shared) + count * (losses.size() + 1), Row{});
   Row* at = memory.data();
@@ -24,15 +25,15 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
     p = at;
     at += rows;
   };
-  for (LossRows<L>& l : losses)
+  for (LossRows<L>& l : losses) {
     for (Row** p :
-         {&l.q, &l.v, &l.q_centre, &l.v_centre, &l.q_other, &l.v_other, &l.tau, &l.target})
+         {&l.q, &l.v, &l.q_centre, &l.v_centre, &l.q_before, &l.v_before, &l.tau, &l.target})
       take(*p, nv);
-  take(q_gamma, nv * losses.size());
-  take(v_gamma, nv * losses.size());
-  for (Row** p : {&rhs, &lambda, &nu, &mass_lambda, &target, &other, &q_centre, &v_centre, &q_other,
-                  &v_other})
+    for (Row** p : {&l.q_inner, &l.v_inner}) take(*p, inner * nv);
+  }
+  for (Row** p : {&rhs, &lambda, &nu, &mass_lambda, &target, &difference, &q_centre, &v_centre})
     take(*p, nv);
+  for (Row** p : {&q_older, &v_older}) take(*p, (1 + inner) * nv);
   numbers = nullptr;
   for (LossRows<L>& l : losses) l.parameters = nullptr;
   if (!parameters) return;
@@ -42,10 +43,6 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
 
 namespace {
 
-template <int L>
-void fill(Row<L>& row, double value) {
-  for (double& x : row.lane) x = value;
-}
 template <int L>
 void clear(Row<L>* rows, int count) {
   for (int i = 0; i < count; ++i) rows[i] = Row<L>{};
@@ -59,14 +56,11 @@ void add_lanes(Row<L>* to, const Row<L>* from, int count, LaneBits lanes) {
 
 }  // namespace
 
-/// A and its factor at the stage's x; centre, x, r, s are set.
+/// A and its factor at the stage's x; everything else of the stage is set.
 template <int L>
-void GroupAdjoint::assemble(const StageInHand<L>& s, double c0, double h) const {
+void GroupAdjoint::assemble(const StageInHand<L>& s) const {
   BasicWorkspace<L>& w = s.w;
   const kernels::StageKernels<L>& kernel = s.table.template stage<L>();
-  fill(w.stage.c0_over_h, c0 / h);
-  fill(w.stage.inverse_h, 1 / h);
-  for (int i = 0; i < model_.nq; ++i) w.stage.centre[i] = w.q0[i];
   kernel.kinematics(model_.view, w.stage);
   clear_candidates(w);
   find_candidates(model_, s.table, w, s.lanes);
@@ -97,24 +91,60 @@ void GroupAdjoint::solve(const StageInHand<L>& s) const {
   }
 }
 
+/// What a stage hangs on beside its centre: the state one step before, then the earlier stages.
+template <int L>
+kernels::StageHistory<Row<L>> GroupAdjoint::history_of(const StageInHand<L>& s,
+                                                       const Scheme& scheme, int stage) const {
+  AdjointWorkspace<L>& a = s.a;
+  const SchemeStage& row = scheme.stages[std::size_t(stage)];
+  kernels::StageHistory<Row<L>> history{row.s_centre, 0, {}};
+  const auto add = [&](double r, double s_v, const Row<L>* difference) {
+    const int at = history.count++ * model_.nv;
+    history.older[at / model_.nv] = {r, s_v / row.s_divisor, difference, a.q_older + at,
+                                     a.v_older + at};
+  };
+  if (row.r_before != 0) add(row.r_before, row.s_before, a.difference);
+  for (int j = 0; j < stage; ++j) {
+    const InnerWeight& inner = row.inner[std::size_t(j)];
+    history.s_centre -= inner.s;
+    add(inner.r, inner.s, s.w.x_inner + j * model_.nv);
+  }
+  history.s_centre /= row.s_divisor;
+  return history;
+}
+
 /// One loss through the stage in hand.
 template <int L>
-void GroupAdjoint::hand_on(const StageInHand<L>& s, const StageHistory& history,
-                           const Route<L>& route, const LossRows<L>& loss) const {
+void GroupAdjoint::hand_on(const StageInHand<L>& s, const Scheme& scheme, int stage,
+                           const LossRows<L>& loss) const {
   AdjointWorkspace<L>& a = s.a;
   const int n = model_.nv;
   const kernels::StageKernels<L>& kernel = s.table.template stage<L>();
-  const kernels::StageAdjoint<L> d = {route.q,       route.v,   a.rhs,   a.lambda,   a.nu,
-                                      a.mass_lambda, a.target,  a.other, a.q_centre, a.v_centre,
-                                      a.q_other,     a.v_other, history};
+  const bool last = stage == scheme.inner_stages();
+  const kernels::StageAdjoint<L> d = {last ? loss.q : loss.q_inner + stage * n,
+                                      last ? loss.v : loss.v_inner + stage * n,
+                                      a.rhs,
+                                      a.lambda,
+                                      a.nu,
+                                      a.mass_lambda,
+                                      a.target,
+                                      a.q_centre,
+                                      a.v_centre,
+                                      history_of(s, scheme, stage)};
   kernel.adjoint_rhs(model_.view, s.w.stage, d);
   solve(s);
-  for (Row<L>* rows : {a.q_centre, a.v_centre, a.q_other, a.v_other}) clear(rows, n);
+  clear(a.q_centre, n);
+  clear(a.v_centre, n);
+  clear(a.q_older, d.history.count * n);
+  clear(a.v_older, d.history.count * n);
   kernel.adjoint_products(model_.view, s.w.stage, d);
-  add_lanes(route.q_centre, a.q_centre, n, s.lanes);
-  add_lanes(route.v_centre, a.v_centre, n, s.lanes);
-  add_lanes(route.q_other, a.q_other, n, s.lanes);
-  add_lanes(route.v_other, a.v_other, n, s.lanes);
+  add_lanes(loss.q_centre, a.q_centre, n, s.lanes);
+  add_lanes(loss.v_centre, a.v_centre, n, s.lanes);
+  const int before = d.history.count - stage;  // 1: of a scheme with history
+  add_lanes(loss.q_before, a.q_older, before * n, s.lanes);
+  add_lanes(loss.v_before, a.v_older, before * n, s.lanes);
+  add_lanes(loss.q_inner, a.q_older + before * n, stage * n, s.lanes);
+  add_lanes(loss.v_inner, a.v_older + before * n, stage * n, s.lanes);
   add_lanes(loss.tau, a.lambda, n, s.lanes);
   add_lanes(loss.target, a.target, n, s.lanes);
   if (loss.parameters == nullptr) return;
@@ -124,85 +154,56 @@ void GroupAdjoint::hand_on(const StageInHand<L>& s, const StageHistory& history,
   add_lanes(loss.parameters, a.numbers, count, s.lanes);
 }
 
-/// Stage 1 hangs on stage γ and on the start, stage γ on the start alone.
+/// v_inner from x_inner, by the stages' kinematics.
 template <int L>
-void GroupAdjoint::reverse_sdirk2(const StageInHand<L>& s, double h) const {
+void GroupAdjoint::find_inner_velocities(const StageInHand<L>& s, const Scheme& scheme,
+                                         double h) const {
   BasicWorkspace<L>& w = s.w;
-  AdjointWorkspace<L>& a = s.a;
-  const int n = model_.nv;
-  clear(a.q_gamma, n * static_cast<int>(a.losses.size()));
-  clear(a.v_gamma, n * static_cast<int>(a.losses.size()));
-  // v_γ = J(x_γ) x_γ/(γ h) and stage γ's own s = -v₀/γ: by its kinematics.
-  for (int i = 0; i < n; ++i) {
-    w.stage.x[i] = w.x_gamma[i];
-    w.stage.r[i] = Row<L>{};
-    for (int l = 0; l < L; ++l) w.stage.s[i][l] = -w.v0[i][l] / kGamma;
-  }
-  fill(w.stage.c0_over_h, 1 / (kGamma * h));
-  fill(w.stage.inverse_h, 1 / h);
-  for (int i = 0; i < model_.nq; ++i) w.stage.centre[i] = w.q0[i];
-  s.table.template stage<L>().kinematics(model_.view, w.stage);
-  for (int i = 0; i < n; ++i) w.v_gamma[i] = w.stage.v[i];
-
-  state_difference(model_, w.q1, w.q0, w.stage.x);
-  for (int i = 0; i < n; ++i) {
-    a.other[i] = w.x_gamma[i];
-    for (int l = 0; l < L; ++l) {
-      w.stage.r[i][l] = -kKappa * w.x_gamma[i][l];
-      w.stage.s[i][l] = -(w.v0[i][l] + kEta * (w.v_gamma[i][l] - w.v0[i][l])) / kGamma;
-    }
-  }
-  assemble(s, 1 / kGamma, h);
-  const StageHistory last = {-kKappa, -(1 - kEta) / kGamma, -kEta / kGamma};
-  for (std::size_t k = 0; k < a.losses.size(); ++k) {
-    const LossRows<L>& o = a.losses[k];
-    Row<L>*q_gamma = a.q_gamma + k * std::size_t(n), *v_gamma = a.v_gamma + k * std::size_t(n);
-    hand_on(s, last, {o.q, o.v, o.q_centre, o.v_centre, q_gamma, v_gamma}, o);
-  }
-  for (int i = 0; i < n; ++i) {
-    w.stage.x[i] = w.x_gamma[i];
-    w.stage.r[i] = Row<L>{};
-    for (int l = 0; l < L; ++l) w.stage.s[i][l] = -w.v0[i][l] / kGamma;
-  }
-  assemble(s, 1 / kGamma, h);
-  const StageHistory first = {0, -1 / kGamma, 0};
-  for (std::size_t k = 0; k < a.losses.size(); ++k) {
-    const LossRows<L>& o = a.losses[k];
-    const Row<L>*q_gamma = a.q_gamma + k * std::size_t(n),
-          *v_gamma = a.v_gamma + k * std::size_t(n);
-    hand_on(s, first, {q_gamma, v_gamma, o.q_centre, o.v_centre, o.q_other, o.v_other}, o);
+  for (int k = 0; k < scheme.inner_stages(); ++k) {
+    set_stage(model_, scheme, k, h, w);
+    // c₀/h once more: by the product a_kk h, which the last bits of gradients hang on.
+    fill(w.stage.c0_over_h, 1 / (scheme.stages[std::size_t(k)].s_divisor * h));
+    std::copy_n(w.x_inner + k * model_.nv, model_.nv, w.stage.x);
+    s.table.template stage<L>().kinematics(model_.view, w.stage);
+    std::copy_n(w.stage.v, model_.nv, w.v_inner + k * model_.nv);
   }
 }
 
 template <int L>
-void GroupAdjoint::reverse(Integrator scheme, double h, const kernels::KernelTable& table,
+void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme, double h) const {
+  BasicWorkspace<L>& w = s.w;
+  const int last = scheme.inner_stages();
+  for (const LossRows<L>& o : s.a.losses)
+    for (Row<L>* rows : {o.q_inner, o.v_inner}) clear(rows, last * model_.nv);
+  find_inner_velocities(s, scheme, h);
+  for (int k = last; k >= 0; --k) {
+    set_stage(model_, scheme, k, h, w);
+    if (scheme.needs_history()) state_difference(model_, w.q_before, w.q0, s.a.difference);
+    if (k == last) {
+      state_difference(model_, w.q1, w.q0, w.stage.x);
+    } else {
+      std::copy_n(w.x_inner + k * model_.nv, model_.nv, w.stage.x);
+    }
+    assemble(s);
+    for (const LossRows<L>& o : s.a.losses) hand_on(s, scheme, k, o);
+  }
+}
+
+template <int L>
+void GroupAdjoint::reverse(const Scheme& scheme, double h, const kernels::KernelTable& table,
                            BasicWorkspace<L>& w, AdjointWorkspace<L>& a, LaneBits lanes) const {
   const StageInHand<L> s = {table, w, a, lanes};
-  if (scheme == Integrator::sdirk2) return reverse_sdirk2(s, h);
-  if (scheme == Integrator::linear_implicit) return reverse_linear(s, h);
-  const int n = model_.nv;
-  StageHistory history = {0, -1, 0};
-  state_difference(model_, w.q1, w.q0, w.stage.x);
-  if (scheme == Integrator::bdf2) {
-    history = {0.5, -2, 0.5};
-    state_difference(model_, w.q_before, w.q0, a.other);
+  switch (scheme.solve) {
+    case StageSolve::newton: return reverse_stages(s, scheme, h);
+    case StageSolve::one_direction: return reverse_linear(s, scheme, h);
   }
-  for (int i = 0; i < n; ++i)
-    for (int l = 0; l < L; ++l) {
-      w.stage.r[i][l] = history.rho == 0 ? 0 : history.rho * a.other[i][l];
-      w.stage.s[i][l] = history.s_centre * w.v0[i][l];
-      if (history.s_other != 0) w.stage.s[i][l] += history.s_other * w.v_before[i][l];
-    }
-  assemble(s, scheme == Integrator::bdf2 ? 1.5 : 1, h);
-  for (const LossRows<L>& o : a.losses)
-    hand_on(s, history, {o.q, o.v, o.q_centre, o.v_centre, o.q_other, o.v_other}, o);
 }
 
 template struct AdjointWorkspace<kernels::kGroup>;
 template struct AdjointWorkspace<1>;
-template void GroupAdjoint::reverse(Integrator, double, const kernels::KernelTable&, Workspace&,
+template void GroupAdjoint::reverse(const Scheme&, double, const kernels::KernelTable&, Workspace&,
                                     AdjointWorkspace<kernels::kGroup>&, LaneBits) const;
-template void GroupAdjoint::reverse(Integrator, double, const kernels::KernelTable&,
+template void GroupAdjoint::reverse(const Scheme&, double, const kernels::KernelTable&,
                                     SingleWorkspace&, AdjointWorkspace<1>&, LaneBits) const;
 
 }  // namespace tangere

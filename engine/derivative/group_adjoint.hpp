@@ -16,7 +16,8 @@ struct LossRows {
   using Rows = kernels::Row<L>*;
   Rows q, v;                ///< in: of the state after the step
   Rows q_centre, v_centre;  ///< out: of the state before it
-  Rows q_other, v_other;    ///< out: of the one before that
+  Rows q_before, v_before;  ///< out: of the one before that
+  Rows q_inner, v_inner;    ///< of inner stages, (nv) after one another
   Rows tau, target;         ///< out: of forces known when the step begins, of motors' targets
   Rows parameters;          ///< out: (parameter_numbers), or null
 };
@@ -25,22 +26,21 @@ struct LossRows {
 template <int L>
 struct AdjointWorkspace {
   using Row = kernels::Row<L>;
-  AdjointWorkspace(const CompiledModel& model, int losses, bool parameters);
+  AdjointWorkspace(const CompiledModel& model, int losses, bool parameters, int inner_stages);
 
   AlignedVector<Row> memory;
   std::vector<LossRows<L>> losses;
   // One stage: the system, and what it hands on before lanes are picked.
-  Row *rhs, *lambda, *nu, *mass_lambda, *target, *other, *q_centre, *v_centre, *q_other, *v_other;
-  Row* numbers;  ///< (parameter_numbers), or null
-  // SDIRK2: cotangents of the inner stage, per loss (nv) after one another.
-  Row *q_gamma, *v_gamma;
+  Row *rhs, *lambda, *nu, *mass_lambda, *target, *difference, *q_centre, *v_centre;
+  Row *q_older, *v_older;  ///< (nv) of each state that a stage may hang on after one another
+  Row* numbers;            ///< (parameter_numbers), or null
   Row sound;
   std::unique_ptr<DualStage>
       dual;  ///< the linearly implicit step's, made when it is first reversed
 };
 
 /// Reverses solves whose states stand in the workspace: q0, v0 where it began, q_before, v_before
-/// one step earlier, q1 its result, x_gamma SDIRK2's inner stage; tau, target and the block of
+/// one step earlier, q1 its result, x_inner its inner stages; tau, target and the block of
 /// parameters as in the step.
 class GroupAdjoint {
  public:
@@ -48,16 +48,10 @@ class GroupAdjoint {
 
   /// Adds to q_centre … target of every loss, in `lanes`.
   template <int L>
-  void reverse(Integrator scheme, double h, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-               AdjointWorkspace<L>& a, LaneBits lanes) const;
+  void reverse(const Scheme& scheme, double h, const kernels::KernelTable& table,
+               BasicWorkspace<L>& w, AdjointWorkspace<L>& a, LaneBits lanes) const;
 
  private:
-  /// One stage: where a loss's cotangents come from and go to.
-  template <int L>
-  struct Route {
-    const kernels::Row<L>*q, *v;
-    kernels::Row<L>*q_centre, *v_centre, *q_other, *v_other;
-  };
   template <int L>
   struct StageInHand {
     const kernels::KernelTable& table;
@@ -69,16 +63,21 @@ class GroupAdjoint {
     }
   };
   template <int L>
-  void assemble(const StageInHand<L>& s, double c0, double h) const;
+  void assemble(const StageInHand<L>& s) const;
   template <int L>
   void solve(const StageInHand<L>& s) const;
   template <int L>
-  void hand_on(const StageInHand<L>& s, const kernels::StageHistory& history, const Route<L>& route,
+  kernels::StageHistory<kernels::Row<L>> history_of(const StageInHand<L>& s, const Scheme& scheme,
+                                                    int stage) const;
+  template <int L>
+  void hand_on(const StageInHand<L>& s, const Scheme& scheme, int stage,
                const LossRows<L>& loss) const;
   template <int L>
-  void reverse_sdirk2(const StageInHand<L>& s, double h) const;
+  void find_inner_velocities(const StageInHand<L>& s, const Scheme& scheme, double h) const;
   template <int L>
-  void reverse_linear(const StageInHand<L>& in, double h) const;
+  void reverse_stages(const StageInHand<L>& s, const Scheme& scheme, double h) const;
+  template <int L>
+  void reverse_linear(const StageInHand<L>& in, const Scheme& scheme, double h) const;
   template <int L>
   void hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o, const std::vector<double>& x,
                       double h, int lane) const;

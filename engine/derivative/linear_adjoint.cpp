@@ -8,7 +8,7 @@
 // One environment after the other, in dual numbers.
 #include "engine/derivative/dual_stage.hpp"
 #include "engine/derivative/group_adjoint.hpp"
-#include "engine/step/state_difference.hpp"
+#include "engine/step/scheme_stage.hpp"
 #include "kernels/numbers/rotation_vector.hpp"
 
 namespace tangere {
@@ -102,19 +102,15 @@ void GroupAdjoint::hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o
 }
 
 template <int L>
-void GroupAdjoint::reverse_linear(const StageInHand<L>& in, double h) const {
+void GroupAdjoint::reverse_linear(const StageInHand<L>& in, const Scheme& scheme, double h) const {
   BasicWorkspace<L>& w = in.w;
   AdjointWorkspace<L>& a = in.a;
   const int n = model_.nv;
   if (a.dual == nullptr) a.dual = std::make_unique<DualStage>(model_);
-  state_difference(model_, w.q1, w.q0, a.other);
-  for (int i = 0; i < n; ++i)
-    for (int l = 0; l < L; ++l) {
-      w.stage.r[i][l] = 0;
-      w.stage.s[i][l] = -w.v0[i][l];
-      w.stage.x[i][l] = h * w.v0[i][l];
-    }
-  assemble(in, 1, h);
+  state_difference(model_, w.q1, w.q0, a.difference);
+  set_stage(model_, scheme, 0, h, w);
+  guess_stage(model_, scheme, 0, h, w);
+  assemble(in);
   for (const LossRows<L>& o : a.losses) {
     for (const kernels::Link& link : model_.links) {
       for (int l = 0; l < L; ++l) {
@@ -123,8 +119,8 @@ void GroupAdjoint::reverse_linear(const StageInHand<L>& in, double h) const {
             a.rhs[i][l] = o.q[i][l] + o.v[i][l] / h;
           continue;
         }
-        const Vec3<double> turn = {a.other[link.v][l], a.other[link.v + 1][l],
-                                   a.other[link.v + 2][l]};
+        const Vec3<double> turn = {a.difference[link.v][l], a.difference[link.v + 1][l],
+                                   a.difference[link.v + 2][l]};
         const Vec3<double> q =
             transposed_times(kernels::right_jacobian(turn, kernels::rotation_series(turn)),
                              Vec3<double>{o.q[link.v][l], o.q[link.v + 1][l], o.q[link.v + 2][l]});
@@ -136,13 +132,14 @@ void GroupAdjoint::reverse_linear(const StageInHand<L>& in, double h) const {
     std::vector<double> x(static_cast<std::size_t>(n));
     for (int l = 0; l < L; ++l) {
       if (!has(in.lanes, l)) continue;
-      for (int i = 0; i < n; ++i) x[std::size_t(i)] = a.other[i][l];
+      for (int i = 0; i < n; ++i) x[std::size_t(i)] = a.difference[i][l];
       hand_on_linear(in, o, x, h, l);
     }
   }
 }
 
-template void GroupAdjoint::reverse_linear(const StageInHand<kernels::kGroup>&, double) const;
-template void GroupAdjoint::reverse_linear(const StageInHand<1>&, double) const;
+template void GroupAdjoint::reverse_linear(const StageInHand<kernels::kGroup>&, const Scheme&,
+                                           double) const;
+template void GroupAdjoint::reverse_linear(const StageInHand<1>&, const Scheme&, double) const;
 
 }  // namespace tangere

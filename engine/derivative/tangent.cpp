@@ -177,48 +177,45 @@ struct Tangent::Impl {
     return x;
   }
 
-  /// One solve of `scheme` from `at`; `before` for BDF2. q1: its result, x_gamma: SDIRK2's inner
-  /// stage, `stride` apart.
-  DualState solve_step(Integrator scheme, double h, const DualState& at, const DualState& before,
-                       const double* q1, const double* x_gamma, int stride) {
-    const std::size_t n = at.v.size();
+  /// r and s of a stage, by the states and the earlier stages that it hangs on.
+  void set_history(const SchemeStage& row, const DualState& at, const DualState& before,
+                   const std::vector<DualState>& inner) {
+    const Duals way = row.r_before == 0 ? Duals() : difference(m(), before.q, at.q);
+    for (std::size_t i = 0; i < at.v.size(); ++i) {
+      D by_x = way.empty() ? D(0.0) : scaled(row.r_before, way[i]);
+      D by_v = scaled(row.s_centre, at.v[i]);
+      if (row.s_before != 0) by_v += scaled(row.s_before, before.v[i]);
+      for (std::size_t j = 0; j < inner.size(); ++j) {
+        by_x += scaled(row.inner[j].r, inner[j].q[i]);
+        by_v += scaled(row.inner[j].s, inner[j].v[i] - at.v[i]);
+      }
+      stage.r[i] = by_x;
+      stage.s[i] = scaled(1 / row.s_divisor, by_v);
+    }
+  }
+
+  /// One solve of `scheme` from `at`; `before`: the state one step earlier. q1: its result, x_inner:
+  /// its inner stages, `stride` apart.
+  DualState solve_step(const Scheme& scheme, double h, const DualState& at, const DualState& before,
+                       const double* q1, const double* x_inner, int stride) {
     stage.centre = at.q;
     stage.inverse_h = 1 / h;
-    const auto history = [&](double c0, const auto& r, const auto& s) {
-      stage.c0_over_h = c0 / h;
-      for (std::size_t i = 0; i < n; ++i) stage.r[i] = r(i), stage.s[i] = s(i);
-    };
-    const std::vector<double> x1 = chart(at.q, q1, stride);
-    switch (scheme) {
-      case Integrator::bdf1:
-        history(
-            1, [](std::size_t) { return D(0.0); }, [&](std::size_t i) { return -at.v[i]; });
-        break;
-      case Integrator::bdf2: {
-        const Duals y = difference(m(), before.q, at.q);
-        history(
-            1.5, [&](std::size_t i) { return scaled(0.5, y[i]); },
-            [&](std::size_t i) { return scaled(0.5, before.v[i]) - scaled(2, at.v[i]); });
-        break;
-      }
-      case Integrator::sdirk2: {
-        history(
-            1 / kGamma, [](std::size_t) { return D(0.0); },
-            [&](std::size_t i) { return scaled(-1 / kGamma, at.v[i]); });
-        std::vector<double> inner(n);
-        for (std::size_t i = 0; i < n; ++i) inner[i] = x_gamma[i * std::size_t(stride)];
-        const Duals x = solve(inner), v = stage.v;
-        history(
-            1 / kGamma, [&](std::size_t i) { return scaled(-kKappa, x[i]); },
-            [&](std::size_t i) {
-              return scaled(-1 / kGamma, at.v[i] + scaled(kEta, v[i] - at.v[i]));
-            });
-        break;
-      }
-      case Integrator::linear_implicit: return linear(h, at);
+    switch (scheme.solve) {
+      case StageSolve::newton: break;
+      case StageSolve::one_direction: return linear(h, at);
     }
-    const Duals x = solve(x1);
-    return {moved(m(), at.q, x), stage.v};
+    std::vector<DualState> found;  // (x, v) of the stages so far
+    for (const SchemeStage& row : scheme.stages) {
+      stage.c0_over_h = row.c0 / h;
+      set_history(row, at, before, found);
+      const bool last = found.size() + 1 == scheme.stages.size();
+      std::vector<double> x = last ? chart(at.q, q1, stride) : std::vector<double>(at.v.size());
+      if (!last)
+        for (double& component : x) component = *x_inner, x_inner += stride;
+      Duals changing = solve(x);
+      found.push_back({std::move(changing), stage.v});
+    }
+    return {moved(m(), at.q, found.back().q), found.back().v};
   }
 
   /// A ṡ = ġ - Ȧ s at the predictor.
@@ -319,12 +316,10 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
   DualState end = start;
   if (const TapedStep* special = tape.special(step, lane); special != nullptr) {
     for (const TapedSolve& s : special->solves)
-      end = i.solve_step(s.scheme, s.h, end, before, s.q.data(), s.x_gamma.data(), 1);
+      end = i.solve_step(s.integrator.scheme(), s.h, end, before, s.q.data(), s.inner.data(), 1);
   } else {
-    const double* x_gamma =
-        i.settings.integrator == Integrator::sdirk2 ? tape.x_gamma(step) + lane : nullptr;
-    end = i.solve_step(i.settings.integrator, i.settings.timestep, start, before, rows(step + 1),
-                       x_gamma, kBlock);
+    end = i.solve_step(i.settings.integrator.scheme(), i.settings.timestep, start, before,
+                       rows(step + 1), tape.inner(step) + lane, kBlock);
   }
   state.previous_q = std::move(state.q);
   state.previous_v = std::move(state.v);

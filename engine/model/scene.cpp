@@ -6,16 +6,6 @@
 
 namespace tangere {
 
-const char* to_string(Integrator value) {
-  switch (value) {
-    case Integrator::bdf1: return "BDF1";
-    case Integrator::bdf2: return "BDF2";
-    case Integrator::sdirk2: return "SDIRK2";
-    case Integrator::linear_implicit: return "linear-implicit";
-  }
-  return "unknown";
-}
-
 const char* to_string(JointType value) {
   switch (value) {
     case JointType::fixed: return "fixed";

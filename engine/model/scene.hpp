@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/base/error.hpp"
+#include "engine/model/scheme.hpp"
 #include "kernels/contact/contact_types.hpp"
 
 namespace tangere {
@@ -18,7 +19,6 @@ namespace tangere {
 using Vector3 = std::array<double, 3>;     ///< x y z
 using Quaternion = std::array<double, 4>;  ///< w x y z, unit length
 
-enum class Integrator { bdf1, bdf2, sdirk2, linear_implicit };
 enum class JointType { fixed, revolute, prismatic, planar, translational, free2d, spherical, free };
 enum class MotorControl { force, position };
 /// end: implicit, stable for any gain. start: the published explicit law, unstable once h D/I
@@ -291,8 +291,7 @@ struct Scene {
   std::vector<RandomizationDescription> randomizations;
 };
 
-/// The name users write and read: "BDF1", "free", "clamped" …
-const char* to_string(Integrator value);
+/// The name users write and read: "free", "clamped" …
 const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
 /// "sphere", "cuboid" …

@@ -2,10 +2,11 @@
 // Sets up the stages, commits their results, and splits the steps of lanes that found no root.
 #include "engine/step/group_step.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "engine/step/detection.hpp"
-#include "engine/step/state_difference.hpp"
+#include "engine/step/scheme_stage.hpp"
 
 namespace tangere {
 
@@ -22,76 +23,46 @@ constexpr int kDeepestSplit = 6;  // h / 2^6
 constexpr int kHalvings = 10, kSplitHalvings = 20, kSplitIterations = 40;
 constexpr int kPatience = 4, kSplitPatience = 40;
 
-template <int L>
-void fill(Row<L>& row, double value) {
-  for (double& x : row.lane) x = value;
-}
-
 }  // namespace
 
+/// From the first guess in the stage.
 template <int L>
-LaneBits GroupStep::solve_one_stage(const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                                    LaneBits lanes, double c0, double h, bool inside_split,
-                                    NewtonReport& report) const {
-  fill(w.stage.c0_over_h, c0 / h);
-  fill(w.stage.inverse_h, 1 / h);
-  const NewtonLimits limits = {
-      settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
-      inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience};
-  return solve_stage(model_, table, w, lanes, limits, report);
-}
-
-template <int L>
-LaneBits GroupStep::run(Integrator scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                        LaneBits lanes, double h, bool inside_split, NewtonReport& report) const {
-  const int n = model_.nv;
-  for (int i = 0; i < model_.nq; ++i) w.stage.centre[i] = w.q0[i];
-  const auto each = [&](auto&& f) {
-    for (int i = 0; i < n; ++i)
-      for (int l = 0; l < L; ++l) f(i, l);
-  };
-  kernels::Stage<L>& s = w.stage;
-  LaneBits resolved = 0;
-  switch (scheme) {
-    case Integrator::bdf1:
-    case Integrator::linear_implicit:
-      each([&](int i, int l) {
-        s.r[i][l] = 0, s.s[i][l] = -w.v0[i][l], s.x[i][l] = h * w.v0[i][l];
-      });
-      if (scheme == Integrator::bdf1) {
-        resolved = solve_one_stage(table, w, lanes, 1, h, inside_split, report);
-      } else {
-        fill(s.c0_over_h, 1 / h);
-        fill(s.inverse_h, 1 / h);
-        resolved = linear_step(model_, table, w, lanes, report);
-        each([&](int i, int l) { s.v[i][l] = s.x[i][l] / h; });
-      }
-      break;
-    case Integrator::bdf2:
-      state_difference(model_, w.q_before, w.q0, s.r);  // q₁ is the newest state, in q0
-      each([&](int i, int l) {
-        s.r[i][l] = 0.5 * s.r[i][l];
-        s.s[i][l] = 0.5 * w.v_before[i][l] - 2 * w.v0[i][l];
-        s.x[i][l] = h * (1.5 * w.v0[i][l] - 0.5 * w.v_before[i][l]);
-      });
-      resolved = solve_one_stage(table, w, lanes, 1.5, h, inside_split, report);
-      break;
-    case Integrator::sdirk2: {
-      each([&](int i, int l) {
-        s.r[i][l] = 0, s.s[i][l] = -w.v0[i][l] / kGamma, s.x[i][l] = kGamma * h * w.v0[i][l];
-      });
-      lanes = solve_one_stage(table, w, lanes, 1 / kGamma, h, inside_split, report);
-      each([&](int i, int l) {
-        w.x_gamma[i][l] = s.x[i][l], w.v_gamma[i][l] = s.v[i][l];
-        s.r[i][l] = -kKappa * s.x[i][l];
-        s.s[i][l] = -(w.v0[i][l] + kEta * (s.v[i][l] - w.v0[i][l])) / kGamma;
-        s.x[i][l] += (1 - kGamma) * h * s.v[i][l];
-      });
-      resolved = solve_one_stage(table, w, lanes, 1 / kGamma, h, inside_split, report);
-      break;
+LaneBits GroupStep::solve_one_stage(StageSolve how, const kernels::KernelTable& table,
+                                    BasicWorkspace<L>& w, LaneBits lanes, double h,
+                                    bool inside_split, NewtonReport& report) const {
+  switch (how) {
+    case StageSolve::newton: {
+      const NewtonLimits limits = {
+          settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
+          inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience};
+      return solve_stage(model_, table, w, lanes, limits, report);
+    }
+    case StageSolve::one_direction: {
+      const LaneBits finite = linear_step(model_, table, w, lanes, report);
+      for (int i = 0; i < model_.nv; ++i)
+        for (int l = 0; l < L; ++l) w.stage.v[i][l] = w.stage.x[i][l] / h;
+      return finite;
     }
   }
-  finish(w, resolved, h, resolved, report);
+  return kNoLane;
+}
+
+/// The stages of a step, each for the lanes that found the one before.
+template <int L>
+LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
+                        NewtonReport& report) const {
+  const int n = model_.nv;
+  for (int k = 0; k <= scheme.inner_stages(); ++k) {
+    set_stage(model_, scheme, k, h, w);
+    guess_stage(model_, scheme, k, h, w);
+    lanes = solve_one_stage(scheme.solve, table, w, lanes, h, inside_split, report);
+    if (k == scheme.inner_stages()) break;
+    std::copy_n(w.stage.x, n, w.x_inner + k * n);
+    std::copy_n(w.stage.v, n, w.v_inner + k * n);
+  }
+  LaneBits resolved = lanes;
+  finish(w, lanes, h, resolved, report);
   return resolved;
 }
 
@@ -125,7 +96,7 @@ void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits&
 
 /// Adds the solve that ended in q0, v0.
 template <int L>
-void GroupStep::note(const BasicWorkspace<L>& w, int lane, Integrator scheme, double h,
+void GroupStep::note(const BasicWorkspace<L>& w, int lane, const Scheme& scheme, double h,
                      std::vector<TapedSolve>* to) const {
   if (to == nullptr) return;
   const auto column = [&](const Row<L>* rows, int count) {
@@ -133,18 +104,15 @@ void GroupStep::note(const BasicWorkspace<L>& w, int lane, Integrator scheme, do
     for (int i = 0; i < count; ++i) x[std::size_t(i)] = rows[i][lane];
     return x;
   };
-  to->push_back({scheme, h, column(w.q0, model_.nq), column(w.v0, model_.nv),
-                 column(w.x_gamma, scheme == Integrator::sdirk2 ? model_.nv : 0)});
+  to->push_back({Integrator(scheme), h, column(w.q0, model_.nq), column(w.v0, model_.nv),
+                 column(w.x_inner, scheme.inner_stages() * model_.nv)});
 }
 
 /// Two half steps from q0, v0, split again where needed.
 bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
                       NewtonReport& report, std::vector<TapedSolve>* solves) const {
   if (depth > kDeepestSplit) return false;
-  // Order 2 must survive inside a BDF2 step, and so must its history: SDIRK2 there, not BDF1.
-  const bool second_order =
-      settings_.integrator == Integrator::bdf2 || settings_.integrator == Integrator::sdirk2;
-  const Integrator scheme = second_order ? Integrator::sdirk2 : Integrator::bdf1;
+  const Scheme& scheme = settings_.integrator.scheme().of_parts();
   for (int half = 0; half < 2; ++half) {
     if (run(scheme, table, w, 1U, 0.5 * h, true, report) != 0) {
       for (int i = 0; i < model_.nq; ++i) w.q0[i] = w.q1[i];
@@ -196,6 +164,11 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                         SingleWorkspace& alone, LaneBits lanes, LaneBits history,
                         NewtonReport& report, SolveLog* log) const {
   const double h = settings_.timestep;
+  const Scheme& scheme = settings_.integrator.scheme();
+  const LaneBits starting = scheme.needs_history() ? lanes & ~history : kNoLane;
+  const auto solves_of = [log](int l) {
+    return log == nullptr ? nullptr : &log->special[std::size_t(l)];
+  };
   LaneBits resolved = 0;
   const auto commit = [&](LaneBits done) {
     for (int l = 0; l < L; ++l) {
@@ -206,30 +179,23 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
     resolved |= done;
   };
   clear_candidates(w);
-  if (settings_.integrator == Integrator::bdf2) {
-    if ((lanes & history) != 0)
-      commit(run(Integrator::bdf2, table, w, lanes & history, h, false, report));
-    if (const LaneBits starting = lanes & ~history; starting != 0) {
-      const LaneBits done = run(Integrator::sdirk2, table, w, starting, h, false, report);
-      commit(done);
-      for (int l = 0; l < L; ++l)
-        if (has(done, l))
-          note(w, l, Integrator::sdirk2, h,
-               log == nullptr ? nullptr : &log->special[std::size_t(l)]);
-    }
-  } else {
-    commit(run(settings_.integrator, table, w, lanes, h, false, report));
-    if (log != nullptr &&
-        settings_.integrator == Integrator::sdirk2)  // before a split of some lane overwrites them
-      for (int i = 0; i < model_.nv; ++i)
+  if ((lanes & ~starting) != 0) {
+    commit(run(scheme, table, w, lanes & ~starting, h, false, report));
+    if (log != nullptr)  // before a start or a split of some lane overwrites them
+      for (int i = 0; i < scheme.inner_stages() * model_.nv; ++i)
         for (int l = 0; l < L; ++l)
-          if (has(resolved, l)) log->x_gamma[i * kernels::kBlock + l] = w.x_gamma[i][l];
+          if (has(resolved, l)) log->inner[i * kernels::kBlock + l] = w.x_inner[i][l];
+  }
+  if (starting != 0) {
+    const LaneBits done = run(*scheme.start, table, w, starting, h, false, report);
+    commit(done);
+    for (int l = 0; l < L; ++l)
+      if (has(done, l)) note(w, l, *scheme.start, h, solves_of(l));
   }
   for (int l = 0; l < L; ++l) {
     if (!has(lanes & ~resolved, l)) continue;
     const StepStatus first = report.status[l];
-    if (split_lane(table, w, l, alone, report,
-                   log == nullptr ? nullptr : &log->special[std::size_t(l)])) {
+    if (split_lane(table, w, l, alone, report, solves_of(l))) {
       report.status[l] = StepStatus::split;
     } else if (!failed(report.status[l])) {
       report.status[l] = first;

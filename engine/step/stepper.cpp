@@ -44,8 +44,8 @@ struct Stepper::Impl {
       : model(m),
         settings(s),
         step(model.compiled(), settings),
-        work(model.compiled()),
-        single(model.compiled()) {}
+        work(model.compiled(), s.integrator.scheme().most_inner_stages()),
+        single(model.compiled(), s.integrator.scheme().most_inner_stages()) {}
 
   /// Steps the live lanes of a group; `lane`: which of them stands in lane 0 of a workspace of one.
   template <int L>
@@ -66,8 +66,7 @@ struct Stepper::Impl {
     NewtonReport report;
     SolveLog log;
     const int of_block = g.first % kBlock + lane;
-    if (tape != nullptr && tape->next_x_gamma() != nullptr)
-      log.x_gamma = tape->next_x_gamma() + of_block;
+    if (tape != nullptr && tape->next_inner() != nullptr) log.inner = tape->next_inner() + of_block;
     step.advance(kernels::active_kernels(), w, single, live, g.history >> lane, report,
                  tape == nullptr ? nullptr : &log);
     for (int l = 0; l < L; ++l)

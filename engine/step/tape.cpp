@@ -12,7 +12,7 @@ namespace tangere {
 using kernels::kBlock;
 
 int BlockTape::rows(const Model& model, Integrator integrator) {
-  return model.nq() + model.nv() * (integrator == Integrator::sdirk2 ? 2 : 1);
+  return model.nq() + model.nv() * (1 + integrator.scheme().inner_stages());
 }
 
 std::size_t BlockTape::bytes(const Model& model, Integrator integrator, std::int64_t steps) {
@@ -55,7 +55,7 @@ void BlockTape::show(std::int64_t step, Batch& batch, int block) const {
               batch.block(block) + model_.compiled().layout.q * kBlock);
 }
 
-double* BlockTape::next_x_gamma() {
+double* BlockTape::next_inner() {
   if (row_count_ == std::size_t(nq_ + nv_)) return nullptr;
   return slot(steps_ + 1) + std::size_t(nq_ + nv_) * kBlock;
 }

@@ -14,13 +14,12 @@ namespace tangere {
 
 class Batch;
 
-/// One solve of a step that had others than its scheme has: BDF2's start, the parts of a split
-/// step.
+/// One solve of a step that had others than its scheme has: a start, the parts of a split step.
 struct TapedSolve {
-  Integrator scheme;
-  double h;                     ///< [s]
-  std::vector<double> q, v;     ///< its result: (nq), (nv)
-  std::vector<double> x_gamma;  ///< SDIRK2: its inner stage relative to where it began, (nv)
+  Integrator integrator;
+  double h;                   ///< [s]
+  std::vector<double> q, v;   ///< its result: (nq), (nv)
+  std::vector<double> inner;  ///< inner stages relative to where it began, (inner_stages, nv)
 };
 
 /// The solves of one environment's step, first to last.
@@ -33,16 +32,16 @@ struct TapedStep {
 /// States of the 16 environments of a block after 0, 1, … steps, and one step before the first.
 class BlockTape {
  public:
-  /// Room for `steps` steps; SDIRK2 keeps its inner stages as well.
+  /// Room for `steps` steps, with the inner stages of schemes that have some.
   BlockTape(const Model& model, Integrator integrator, std::int64_t steps);
 
   /// Begins anew with the states of a block. Steps are counted from here on.
   void start(const Batch& batch, int block);
   /// Adds the states that a block has now. Lanes that have failed or are held keep theirs.
   void append(const Batch& batch, int block);
-  /// Where the inner stages of the step that will be appended next go, rows (nv, 16); null when the
-  /// scheme has none.
-  [[nodiscard]] double* next_x_gamma();
+  /// Where the inner stages of the step that will be appended next go, rows (inner_stages, nv, 16);
+  /// null when the scheme has none.
+  [[nodiscard]] double* next_inner();
   void add(TapedStep step) { special_.push_back(std::move(step)); }
 
   /// Puts the states after `step` steps into a block, where they are read; what it needs to go on
@@ -54,8 +53,8 @@ class BlockTape {
   [[nodiscard]] const double* state(std::int64_t step) const {
     return states_.data() + std::size_t(step + 1) * row_count_ * 16;
   }
-  /// Rows (nv, 16) of the inner stages of step `step`.
-  [[nodiscard]] const double* x_gamma(std::int64_t step) const {
+  /// Rows (inner_stages, nv, 16) of step `step`, each relative to where it began.
+  [[nodiscard]] const double* inner(std::int64_t step) const {
     return state(step + 1) + std::size_t(nq_ + nv_) * 16;
   }
   /// Of one environment's step, null for a plain one.

@@ -30,9 +30,8 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   rows(s.work, std::max(m.pattern.factor_entries, 5 * m.nv));
   rows(s.excess, 1);
   for (LaneRow** p : {&w.q0, &w.q_before, &w.q1}) rows(*p, m.nq);
-  for (LaneRow** p :
-       {&w.v0, &w.v_before, &w.v1, &w.x_gamma, &w.v_gamma, &w.delta, &w.base, &w.test})
-    rows(*p, m.nv);
+  for (LaneRow** p : {&w.v0, &w.v_before, &w.v1, &w.delta, &w.base, &w.test}) rows(*p, m.nv);
+  for (LaneRow** p : {&w.x_inner, &w.v_inner}) rows(*p, w.inner_stages * m.nv);
   const int link_pairs = static_cast<int>(m.link_pairs.size());
   rows(w.references, 12 * link_pairs);
   rows(w.near.link_poses, 12 * link_pairs);
@@ -55,11 +54,12 @@ std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
 }
 
 template <int L>
-BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m)
+BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
     : lists(m.pairs.size()),
       near_lanes(m.pairs.size()),
       near{},
       stage{},
+      inner_stages(inner),
       pivoted(L, Eigen::PartialPivLU<Eigen::MatrixXd>(m.nv)),
       dense(1, Eigen::MatrixXd(m.nv, m.nv)),
       rhs(m.nv) {

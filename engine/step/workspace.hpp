@@ -19,11 +19,15 @@ inline constexpr LaneBits kNoLane = 0;
 inline constexpr LaneBits kAllLanes = (1U << kernels::kGroup) - 1;
 inline bool has(LaneBits bits, int lane) { return ((bits >> lane) & 1U) != 0; }
 
+/// The most inner stages of a scheme in the table.
+inline constexpr int kInnerStages = 1;
+
 template <int L>
 struct BasicWorkspace {
   using LaneRow = kernels::Row<L>;
 
-  explicit BasicWorkspace(const CompiledModel& model);
+  /// `inner_stages`: of the schemes that it will be used for.
+  explicit BasicWorkspace(const CompiledModel& model, int inner_stages = kInnerStages);
   static std::size_t bytes(const CompiledModel& model);
 
   using Rows = AlignedVector<LaneRow>;
@@ -39,8 +43,9 @@ struct BasicWorkspace {
 
   // The group's states: now, one step before, and the result of the solve in hand.
   LaneRow *q0, *v0, *q_before, *v_before, *q1, *v1;
-  // SDIRK2's first stage, relative to q0.
-  LaneRow *x_gamma, *v_gamma;
+  // Inner stages, x relative to q0: (nv) of each after one another.
+  int inner_stages;
+  LaneRow *x_inner, *v_inner;
   // Newton: direction, point it starts from, natural test vector.
   LaneRow *delta, *base, *test;
   LaneRow sound;

@@ -130,10 +130,9 @@ void read_option(Scene& scene, const SceneNode& node) {
   node.check_attributes({"gravity", "timestep", "integrator", "unit"});
   scene.gravity = scaled(node.vector("gravity", Vector3{0, 0, -9.8 / c.length}), c.length);
   scene.timestep = node.positive("timestep", 0.02);
-  constexpr Integrator kBy[] = {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2,
-                                Integrator::linear_implicit};
-  scene.integrator =
-      kBy[node.choice("integrator", {"BDF1", "BDF2", "SDIRK2", "linear-implicit"}, 0)];
+  std::vector<std::string> names;
+  for (const Integrator known : integrators()) names.emplace_back(to_string(known));
+  scene.integrator = integrators()[std::size_t(node.choice("integrator", names, 0))];
 }
 
 void read_solver(Scene& scene, const SceneNode& node) {

@@ -12,11 +12,9 @@
 #include <type_traits>
 #include <xsimd/xsimd.hpp>
 
-namespace tangere::kernels {
+#include "kernels/numbers/block.hpp"
 
-inline constexpr int kGroup = 8;  ///< lanes that iterate together
-inline constexpr int kBlock =
-    16;  ///< environments in a block: two groups of double, one vector of float
+namespace tangere::kernels {
 
 /// One number of a group of L environments in memory. Engine code indexes it; kernels read it as
 /// Lanes, or as OneLane.

@@ -35,10 +35,8 @@ struct AdjointArgs {
   const N* lambda;         ///< (nv) the solution
   N *nu, *mass_lambda;     ///< (nv) out: ν, M λ
   N* target;  ///< (nv) out: cotangent of the targets of position motors, zero where there are none
-  const N* other;          ///< (nv) q_other ⊖ q_centre
   N *q_centre, *v_centre;  ///< (nv) added to
-  N *q_other, *v_other;    ///< (nv) added to; not read where ρ and s_other are zero
-  StageHistory history;
+  StageHistory<N> history;
   LinkAdjoint<N>* links;  ///< (n_links) scratch
 };
 
@@ -225,38 +223,45 @@ RotationVector<N> with_inverse_jacobians(const N* x) {
   return r;
 }
 
-/// ∂v/∂q_k at a fixed newest pose: by the centre -V_x J_l⁻¹(x) - (ρ/h) J_r(x) J_l⁻¹(y), by the
-/// other (ρ/h) J_r(x) J_r⁻¹(y), y = q_other ⊖ q_centre.
+/// ∂v/∂q_k at a fixed newest pose: by the centre -V_x J_l⁻¹(x) - Σ (ρ/h) J_r(x) J_l⁻¹(y), by an
+/// older state (ρ/h) J_r(x) J_r⁻¹(y), y = q ⊖ q_centre.
 template <class N>
 void adjoint_turning_history(const StageArgs<N>& a, const AdjointArgs<N>& d, const Link& link,
-                             const LinkScratch<N>& o, const N& rho_over_h) {
+                             const LinkScratch<N>& o) {
   const int v = link.v;
   const Vec3<N> nu = {d.nu[v], d.nu[v + 1], d.nu[v + 2]};
   const RotationVector<N> x = with_inverse_jacobians(a.x + v);
   add3(d.q_centre + v, -(inverse_right_jacobian(x) * transposed_times(o.chart_rate, nu)));
-  if (d.history.rho == 0) return;
-  const RotationVector<N> y = with_inverse_jacobians(d.other + v);
-  const Vec3<N> z = rho_over_h * transposed_times(o.chart, nu);
-  add3(d.q_centre + v, -(inverse_right_jacobian(y) * z));
-  add3(d.q_other + v, inverse_left_jacobian(y) * z);
+  for (int k = 0; k < d.history.count; ++k) {
+    const OlderState<N>& older = d.history.older[k];
+    if (older.rho == 0) continue;
+    const RotationVector<N> y = with_inverse_jacobians(older.difference + v);
+    const Vec3<N> z = N(older.rho) * a.inverse_h * transposed_times(o.chart, nu);
+    add3(d.q_centre + v, -(inverse_right_jacobian(y) * z));
+    add3(older.q + v, inverse_left_jacobian(y) * z);
+  }
 }
 
 /// Hands ν and M λ on to the states that the stage hangs on.
 template <class N>
 void adjoint_history(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
-  const StageHistory& h = d.history;
-  const N rho_over_h = N(h.rho) * a.inverse_h;
-  const N from_centre = -(a.c0_over_h + rho_over_h);
-  const N by_centre = N(-h.s_centre) * a.inverse_h, by_other = N(-h.s_other) * a.inverse_h;
+  const StageHistory<N>& h = d.history;
+  N from_centre = a.c0_over_h;
+  for (int i = 0; i < h.count; ++i) from_centre = from_centre + N(h.older[i].rho) * a.inverse_h;
+  from_centre = -from_centre;
+  const N by_centre = N(-h.s_centre) * a.inverse_h;
   for (int i = 0; i < model.n_links; ++i) {
     const Link& link = model.links[i];
     const bool turning = link.kind == JointKind::spherical;
-    if (turning) adjoint_turning_history(a, d, link, a.links[i], rho_over_h);
+    if (turning) adjoint_turning_history(a, d, link, a.links[i]);
     for (int k = link.v; k < link.v + dofs(link.kind); ++k) {
       if (!turning) d.q_centre[k] = mul_add(from_centre, d.nu[k], d.q_centre[k]);
-      if (!turning && h.rho != 0) d.q_other[k] = mul_add(rho_over_h, d.nu[k], d.q_other[k]);
       d.v_centre[k] = mul_add(by_centre, d.mass_lambda[k], d.v_centre[k]);
-      if (h.s_other != 0) d.v_other[k] = mul_add(by_other, d.mass_lambda[k], d.v_other[k]);
+      for (int j = 0; j < h.count; ++j) {
+        const OlderState<N>& o = h.older[j];
+        if (!turning && o.rho != 0) o.q[k] = mul_add(N(o.rho) * a.inverse_h, d.nu[k], o.q[k]);
+        if (o.s != 0) o.v[k] = mul_add(N(-o.s) * a.inverse_h, d.mass_lambda[k], o.v[k]);
+      }
     }
   }
 }

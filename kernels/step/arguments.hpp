@@ -41,10 +41,20 @@ struct Stage {
 };
 using GroupStage = Stage<kGroup>;
 
-/// How a stage's rates hang on two older states: r = ρ (q_other ⊖ q_centre), s = s_centre v_centre
-/// + s_other v_other.
+/// A state that a stage hangs on beside its centre; rows (nv), R a row of lanes or a number.
+template <class R>
+struct OlderState {
+  double rho, s;        ///< r has ρ (q ⊖ q_centre), s has s v
+  const R* difference;  ///< q ⊖ q_centre
+  R *q, *v;             ///< cotangents, added to: q unless ρ is zero, v unless s is zero
+};
+/// How a stage's rates hang on what came before: r = Σ ρ (q ⊖ q_centre), s = s_centre v_centre + Σ s v.
+template <class R>
 struct StageHistory {
-  double rho, s_centre, s_other;
+  static constexpr int kMost = 4;
+  double s_centre;
+  int count;
+  OlderState<R> older[kMost];
 };
 
 /// Numbers of a scene with a derivative, as parameter_products() lays them out: of each pair and
@@ -72,10 +82,8 @@ struct StageAdjoint {
   Row<L>*rhs, *lambda;
   Row<L>*nu, *mass_lambda;  ///< out: v̄ - Cᵀ λ, M λ
   Row<L>* target;           ///< out: of the targets of position motors, zero where there are none
-  const Row<L>* other;      ///< q_other ⊖ q_centre
   Row<L>*q_centre, *v_centre;  ///< added to
-  Row<L>*q_other, *v_other;    ///< added to
-  StageHistory history;
+  StageHistory<Row<L>> history;
 };
 
 /// Which pairs are near enough to search, and the poses that the search needs.

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The name of the instruction set in use, for people and files.
+// The instruction set in use, for people and files.
 #pragma once
-
-#include "kernels/table/kernel_table.hpp"
 
 namespace tangere::kernels {
 
-/// "avx512", "avx2", "sse2" or "scalar".
-inline const char* active_isa_name() { return active_kernels().name; }
+/// "avx512", "avx2", "sse2" or "scalar": the best one that the machine runs, or the one named by the
+/// environment variable TANGERE_ISA when the program started.
+const char* active_isa_name();
+
+/// "" or why TANGERE_ISA cannot be honoured, with the names that can. Programs check it at start.
+const char* forced_isa_error();
 
 }  // namespace tangere::kernels

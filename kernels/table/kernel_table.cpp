@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "kernels/table/isa.hpp"
+
 namespace tangere::kernels {
 
 extern const KernelTable kTable_scalar;
@@ -61,6 +63,7 @@ std::span<const KernelTable* const> available_kernels() {
   return {registry().tables.data(), registry().count};
 }
 const KernelTable& active_kernels() { return *registry().active; }
+const char* active_isa_name() { return active_kernels().name; }
 const char* forced_isa_error() { return registry().error; }
 void use_kernels(const KernelTable& table) { registry().active = &table; }
 

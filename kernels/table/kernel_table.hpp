@@ -96,11 +96,8 @@ std::span<const KernelTable* const> available_kernels();
 
 /// The table in use: the best one, or the one named by the environment variable TANGERE_ISA when
 /// the program started. Throws nothing; an unknown or unsupported name is reported by
-/// forced_isa_error().
+/// forced_isa_error() (isa.hpp).
 const KernelTable& active_kernels();
-
-/// "" or why TANGERE_ISA cannot be honoured, with the names that can. Programs check it at start.
-const char* forced_isa_error();
 
 /// Runs on `table` from now on (tests visit every one).
 void use_kernels(const KernelTable& table);

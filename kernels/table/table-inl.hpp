@@ -136,13 +136,22 @@ struct StageTable {
                         view(s.work));
   }
   static AdjointArgs<N> adjoint_arguments(const StageAdjoint<L>& d, LinkAdjoint<N>* links) {
-    return {view(d.q_bar),    view(d.v_bar),
-            view(d.rhs),      view(d.lambda),
-            view(d.nu),       view(d.mass_lambda),
-            view(d.target),   view(d.other),
-            view(d.q_centre), view(d.v_centre),
-            view(d.q_other),  view(d.v_other),
-            d.history,        links};
+    AdjointArgs<N> a{view(d.q_bar),
+                     view(d.v_bar),
+                     view(d.rhs),
+                     view(d.lambda),
+                     view(d.nu),
+                     view(d.mass_lambda),
+                     view(d.target),
+                     view(d.q_centre),
+                     view(d.v_centre),
+                     {d.history.s_centre, d.history.count, {}},
+                     links};
+    for (int k = 0; k < d.history.count; ++k) {
+      const OlderState<RowOf>& o = d.history.older[k];
+      a.history.older[k] = {o.rho, o.s, view(o.difference), view(o.q), view(o.v)};
+    }
+    return a;
   }
   static void adjoint_rhs_lanes(const ModelView& m, const StageOf& s, const StageAdjoint<L>& d) {
     adjoint_rhs(m, arguments(m, s, -1), adjoint_arguments(d, nullptr));

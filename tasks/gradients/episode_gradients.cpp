@@ -98,9 +98,10 @@ std::vector<GradientArray> arrays_of_jacobians(const Model& model, const Named& 
       "derivative of the next row's state (displacement along the dofs, then velocity)";
   std::vector<GradientArray> all;
   all.push_back(array("grad_state_by_state", {n, n}, true, of + " by the row's state", state));
-  if (model.integrator() == Integrator::bdf2)
+  if (model.integrator().scheme().needs_history())
     all.push_back(array("grad_state_by_previous", {n, n}, true,
-                        of + " by the state one step before the row's, which BDF2 goes on from",
+                        of + " by the state one step before the row's, which " +
+                            to_string(model.integrator()) + " goes on from",
                         state));
   all.push_back(array("grad_state_by_action", {n, actions.names.size()}, true,
                       of + " by the row's action", actions));

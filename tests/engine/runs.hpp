@@ -2,12 +2,31 @@
 // Short runs for tests.
 #pragma once
 
+#include <ostream>
 #include <vector>
 
 #include "engine/sense/readout.hpp"
 #include "engine/step/stepper.hpp"
 
-namespace tangere::testing {
+namespace tangere {
+
+inline void PrintTo(Integrator integrator, std::ostream* out) { *out << to_string(integrator); }
+
+namespace testing {
+
+/// A scheme that no table has: Alexander's of order 3, three implicit stages, the last its result.
+inline Integrator sdirk3() {
+  constexpr double kG = 0.43586652150845899942, kB = -1.5 * kG * kG + 4 * kG - 0.25;
+  static const Scheme kScheme =
+      runge_kutta("SDIRK3", 3, {{kG}, {0.5 * (1 - kG), kG}, {kB, 1 - kB - kG, kG}});
+  return Integrator(kScheme);
+}
+/// Those of the table and that one.
+inline std::vector<Integrator> all_integrators() {
+  std::vector<Integrator> all(integrators().begin(), integrators().end());
+  all.push_back(sdirk3());
+  return all;
+}
 
 inline StepperOptions options(Integrator scheme, double timestep, double tolerance = 1e-12) {
   StepperOptions o;
@@ -35,4 +54,5 @@ inline void step_all(Stepper& stepper, Batch& batch, const std::vector<double>& 
   stepper.step(batch, all);
 }
 
-}  // namespace tangere::testing
+}  // namespace testing
+}  // namespace tangere

@@ -131,9 +131,7 @@ TEST_P(AdjointScheme, CompanyChangesNothing) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, AdjointScheme,
-                         ::testing::Values(Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2,
-                                           Integrator::linear_implicit));
+INSTANTIATE_TEST_SUITE_P(All, AdjointScheme, ::testing::ValuesIn(testing::all_integrators()));
 
 }  // namespace
 }  // namespace tangere

@@ -178,14 +178,13 @@ TEST(Batch, BadStatesAndControlsAreFrozenWithAReason) {
 
 TEST(Batch, RestartedRunContinuesBitForBit) {
   const Model model(varied());
-  for (Integrator scheme :
-       {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
+  for (Integrator scheme : testing::all_integrators()) {
     Stepper stepper(model, testing::options(scheme, 5e-3, 1e-9));
     Batch through(model, 1, 3), resumed(model, 1, 3);
     std::vector<double> before_q, before_v;
     for (int k = 0; k < 100; ++k) {
       if (k == 80) {
-        if (scheme == Integrator::bdf2) {
+        if (scheme.scheme().needs_history()) {
           resumed.set_state(0, q_of(through), v_of(through), before_q, before_v);
         } else {
           resumed.set_state(0, q_of(through), v_of(through));
@@ -223,8 +222,7 @@ TEST(Batch, InstructionSetsAgree) {
 TEST(Batch, SecondSceneRunsInEveryScheme) {
   const Model model(testing::two_balls());
   Readout readout(model);
-  for (Integrator scheme :
-       {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
+  for (Integrator scheme : testing::all_integrators()) {
     Stepper stepper(model, testing::options(scheme, 2e-3, 1e-10));
     Batch batch(model, 3);
     for (int k = 0; k < 300; ++k)

@@ -41,8 +41,7 @@ TEST(PositionMotor, HoldsItsTargetAgainstGravity) {
   const Model model(s);
   EXPECT_EQ(model.u_units()[0], "rad");
   EXPECT_EQ(model.u_units()[1], "m");
-  for (Integrator scheme :
-       {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
+  for (Integrator scheme : testing::all_integrators()) {
     Batch batch(model, 3);
     run(model, batch, scheme, 5e-3, 1500, {0.6, -0.1});
     const double m = model.mass(0), q = q_of(batch, 2)[0];

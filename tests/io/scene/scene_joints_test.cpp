@@ -78,8 +78,7 @@ TEST(SceneJoints, ASceneOfEveryJointRuns) {
   EXPECT_EQ(model.mass(4), 0);  // the carriage
   EXPECT_EQ(model.u_units()[4], "m");
   EXPECT_EQ(model.u_names()[1], "wrist.wx");
-  for (Integrator scheme :
-       {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::linear_implicit}) {
+  for (Integrator scheme : integrators()) {
     StepperOptions options;
     options.integrator = scheme;
     Stepper stepper(model, options);

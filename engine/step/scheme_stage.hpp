@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a stage of a scheme begins with, in a workspace's rows: the equations at the head of
+// engine/model/scheme.hpp.
+#pragma once
+
+#include "engine/model/scheme.hpp"
+#include "engine/step/state_difference.hpp"
+#include "engine/step/workspace.hpp"
+
+namespace tangere {
+
+/// The same in all lanes.
+template <int L>
+void fill(kernels::Row<L>& row, double value) {
+  for (double& x : row.lane) x = value;
+}
+
+/// Centre, c₀/h, r and s of stage `k`, from the states and the earlier stages in the workspace.
+template <int L>
+void set_stage(const CompiledModel& m, const Scheme& scheme, int k, double h,
+               BasicWorkspace<L>& w) {
+  const SchemeStage& row = scheme.stages[std::size_t(k)];
+  kernels::Stage<L>& s = w.stage;
+  fill(s.c0_over_h, row.c0 / h);
+  fill(s.inverse_h, 1 / h);
+  for (int i = 0; i < m.nq; ++i) s.centre[i] = w.q0[i];
+  if (row.r_before != 0) state_difference(m, w.q_before, w.q0, s.r);
+  for (int i = 0; i < m.nv; ++i)
+    for (int l = 0; l < L; ++l) {
+      double by_x = row.r_before == 0 ? 0 : row.r_before * s.r[i][l];
+      double by_v = row.s_centre * w.v0[i][l];
+      if (row.s_before != 0) by_v += row.s_before * w.v_before[i][l];
+      for (int j = 0; j < k; ++j) {
+        const InnerWeight& inner = row.inner[std::size_t(j)];
+        by_x += inner.r * w.x_inner[j * m.nv + i][l];
+        by_v += inner.s * (w.v_inner[j * m.nv + i][l] - w.v0[i][l]);
+      }
+      s.r[i][l] = by_x;
+      s.s[i][l] = by_v / row.s_divisor;
+    }
+}
+
+/// The first guess of x: from the stage before with its velocity, the first from the start.
+template <int L>
+void guess_stage(const CompiledModel& m, const Scheme& scheme, int k, double h,
+                 BasicWorkspace<L>& w) {
+  kernels::Stage<L>& s = w.stage;
+  const double end = scheme.stages[std::size_t(k)].end, more = scheme.extrapolation;
+  const double way = k == 0 ? end * h : (end - scheme.stages[std::size_t(k) - 1].end) * h;
+  for (int i = 0; i < m.nv; ++i)
+    for (int l = 0; l < L; ++l) {
+      if (k > 0) {
+        s.x[i][l] += way * s.v[i][l];
+      } else if (more == 0) {
+        s.x[i][l] = way * w.v0[i][l];
+      } else {
+        s.x[i][l] = way * ((1 + more) * w.v0[i][l] - more * w.v_before[i][l]);
+      }
+    }
+}
+
+}  // namespace tangere
