@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "engine/derivative/linear_adjoint.hpp"
 #include "engine/step/detection.hpp"
 #include "engine/step/scheme_stage.hpp"
 
@@ -186,6 +187,20 @@ void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme,
     }
     assemble(s);
     for (const LossRows<L>& o : s.a.losses) hand_on(s, scheme, k, o);
+  }
+}
+
+template <int L>
+void GroupAdjoint::reverse_linear(const StageInHand<L>& s, const Scheme& scheme, double h) const {
+  state_difference(model_, s.w.q1, s.w.q0, s.a.difference);
+  set_stage(model_, scheme, 0, h, s.w);
+  guess_stage(model_, scheme, 0, h, s.w);
+  assemble(s);
+  for (const LossRows<L>& o : s.a.losses) {
+    linear_rhs(model_, o, h, s.a);
+    solve(s);
+    for (int l = 0; l < L; ++l)
+      if (has(s.lanes, l)) hand_on_linear(model_, o, h, l, s.w, s.a);
   }
 }
 

@@ -47,7 +47,7 @@ struct Products {
 /// at all).
 Products products(const Model& model, const StepperOptions& options, const RunInput& in,
                   unsigned seed, int every) {
-  const CompiledModel& m = model.compiled();
+  const CompiledModel& m = compiled(model);
   const int steps = static_cast<int>(in.u.size());
   const StateLoss loss(model, steps, seed);
   Batch batch(model, 1);
@@ -65,7 +65,7 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
   Random random(seed + 1);
   Direction d{normals(random, std::size_t(m.nv)),
               normals(random, std::size_t(m.nv)),
-              std::vector<double>(std::size_t(parameter_rows(m))),
+              std::vector<double>(std::size_t(parameter_rows(model))),
               {}};
   const Parameters parameters(model);
   std::vector<double> change;
