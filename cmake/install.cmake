@@ -40,6 +40,7 @@ set(public_headers
   engine/model/random.hpp
   engine/model/scene.hpp
   engine/model/scheme.hpp
+  engine/model/shapes.hpp
   engine/rows/episode_sink.hpp
   engine/rows/row_sink.hpp
   engine/rows/task_spec.hpp

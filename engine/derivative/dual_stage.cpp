@@ -112,13 +112,15 @@ struct DualStage::Impl {
     if (!s.stretches) return kernels::zero3<double>();
     const double* by = &stretch[std::size_t(kernels::kSizeNumbers * body)];
     const kernels::Vec3<double> y = transposed_times(s.frame.R, at - s.frame.p);
-    if (s.shape == PrimitiveShape::cuboid)
-      return s.frame.R * kernels::Vec3<double>{y.x / s.size.x * by[0], y.y / s.size.y * by[1],
-                                               y.z / s.size.z * by[2]};
-    const double radius = s.size.x, half = s.size.y;
-    const bool pole = s.shape == PrimitiveShape::capsule && std::abs(y.z) > half * (1 + 1e-9);
-    const double up = pole ? std::copysign(1, y.z) * (by[0] + by[1]) : y.z / half * by[1];
-    return s.frame.R * kernels::Vec3<double>{y.x / radius * by[0], y.y / radius * by[0], up};
+    const kernels::Vec3<D> size = {{s.size.x, by[0]}, {s.size.y, by[1]}, {s.size.z, by[2]}};
+    return s.frame.R * kernels::with_distance<D>(s.shape, size, [&]<class Shape>(const Shape&) {
+             if constexpr (requires { Shape::stretched(size, s.size, y); }) {
+               const kernels::Vec3<D> moved = Shape::stretched(size, s.size, y);
+               return kernels::Vec3<double>{moved.x.epsilon, moved.y.epsilon, moved.z.epsilon};
+             } else {
+               return kernels::zero3<double>();
+             }
+           });
   }
 
   /// Tangents of the points in the ground.

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <optional>
 
-#include "engine/model/compiled_model.hpp"
+#include "engine/model/shapes.hpp"
 #include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
@@ -110,12 +110,11 @@ void Parameters::add_bodies() {
       add("body " + d.name + " mass", "kg", with_masses({Place::mass, b, 0, {}}));
     if (massive && !given)
       add("body " + d.name + " density", "kg/m^3", with_masses({Place::density, b, 0, {}}));
-    Shape shape = d.shape;
     for (int which = 0; which < kSizeNames && size_matters(m, b); ++which) {
-      if (size_number(shape, which) == nullptr) continue;
-      const Term of_contacts = {
-          first_size + kernels::kSizeNumbers * b + (which < 2 ? which : which - 2),
-          which == 0 ? 1.0 : 0.5};
+      const SizeNumber* const number = row_of(d.shape).size(which);
+      if (number == nullptr) continue;
+      const Term of_contacts = {first_size + kernels::kSizeNumbers * b + number->component,
+                                number->scale};
       add("body " + d.name + " " + size_name(which), "m",
           with_masses({Place::size, b, which, {of_contacts}}));
     }

@@ -4,9 +4,12 @@
 #include "engine/model/compile_variations.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "engine/model/compile_joints.hpp"
 #include "engine/model/frames.hpp"
+#include "engine/model/shapes.hpp"
 
 namespace tangere {
 
@@ -45,6 +48,26 @@ InertiaRows sum_anew(const CompiledModel& m, const VaryingInertia& varying, cons
   return inertia_rows(link);
 }
 
+/// The least and the most that a distribution of positive numbers may draw.
+std::array<double, 2> bounds(const Distribution& d) {
+  if (d.kind != Distribution::Kind::list) return {d.a, d.b};
+  const auto [low, high] = std::minmax_element(d.values.begin(), d.values.end());
+  return {*low, *high};
+}
+
+/// What is wrong with a size some of whose numbers are drawn.
+std::string drawn_slenderness_fault(const Scene& scene, BodyDescription& body) {
+  double least = INFINITY, most = 0;
+  for (const SizeNumber& s : row_of(body.shape).sizes) {
+    std::array<double, 2> of = {*s.at(body.shape), *s.at(body.shape)};
+    for (const RandomizationDescription& r : scene.randomizations)  // the last one holds
+      if (r.target == RandomTarget::size && r.name == body.name && r.index == s.which)
+        of = bounds(r.distribution);
+    least = std::min(least, of[0]), most = std::max(most, of[1]);
+  }
+  return slenderness_fault(row_of(body.shape), least, most);
+}
+
 }  // namespace
 
 void vary_density(CompiledModel& m, int body, const RandomizationDescription& d, int row) {
@@ -73,7 +96,7 @@ void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, in
     throw InputError(d.source.prefix() + name + " of body '" + d.name + "' varies, but " + why);
   };
   if (size_number(b.shape, d.index) == nullptr)
-    fail(std::string("a ") + shape_name(b.shape) + " has none");
+    fail(with_article(shape_name(b.shape)) + " has none");
   const Distribution& x = d.distribution;
   const bool listed = x.kind == Distribution::Kind::list;
   const double least = listed && !x.values.empty()
@@ -82,6 +105,8 @@ void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, in
                                 : x.a;
   if (x.kind == Distribution::Kind::normal || !(least > 0))
     fail("not all that may be drawn is positive");
+  if (const std::string fault = drawn_slenderness_fault(m.scene, b); !fault.empty())
+    fail("that allows " + fault);
   for (const PairContactDescription& c : m.scene.pair_contacts)
     if (c.general_body == d.name)
       fail(
@@ -90,7 +115,7 @@ void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, in
     if (t.body == d.name)
       fail("the points of its tactile sensor '" + t.name + "' do not; expected a body without one");
   for (std::size_t k = 0; k < m.grounds.size(); ++k)
-    if (m.scene.ground_contacts[k].body == d.name && !std::holds_alternative<SphereShape>(b.shape))
+    if (m.scene.ground_contacts[k].body == d.name && !is_ball(b.shape))
       fail("the points that touch the ground do not; expected a sphere there");
   if (compiled.size_row < 0) {
     compiled.size_row = static_cast<int>(m.varying_sizes.size());  // until add_derived_rows()

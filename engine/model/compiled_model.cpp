@@ -11,6 +11,7 @@
 #include "engine/model/effects_and_stages.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/model/group_contacts.hpp"
+#include "engine/model/shapes.hpp"
 
 namespace tangere {
 
@@ -69,6 +70,8 @@ class Compiler {
     CompiledBody body;
     body.link = joint.link;
     body.frame = compose(joint.frame, to_frame(d.body.pose));
+    if (const std::string fault = slenderness_fault(d.body.shape); !fault.empty())
+      throw InputError(d.body.source.prefix() + "body '" + d.body.name + "' is " + fault);
     place_shape(d.body.shape, body);
     const MassProperties properties = mass_properties(d.body.shape, d.body.density);
     body.mass = properties.mass;
@@ -101,14 +104,13 @@ class Compiler {
                   &primitive = m_.scene.links[b2].body.shape;
       if (!has_contact_points(general))
         throw InputError(d.source.prefix() + "general_body '" + d.general_body + "' (" +
-                         shape_name(general) +
-                         ") has no contact points; expected a cuboid, cylinder or capsule (swap "
-                         "the two bodies)");
+                         shape_name(general) + ") has no contact points; expected " +
+                         shapes_with([](const ShapeRow& row) { return row.stretches(); }) +
+                         " (swap the two bodies)");
       if (!has_distance(primitive))
-        throw InputError(
-            d.source.prefix() + "primitive_body '" + d.primitive_body + "' (" +
-            shape_name(primitive) +
-            ") has no distance; expected a sphere, cuboid, cylinder, capsule or plane");
+        throw InputError(d.source.prefix() + "primitive_body '" + d.primitive_body + "' (" +
+                         shape_name(primitive) + ") has no distance; expected " +
+                         shapes_with([](const ShapeRow& row) { return row.distance.has_value(); }));
       if (b1 == b2 || first.link == second.link)
         throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" +
                          d.primitive_body + "' cannot move against each other");
@@ -177,7 +179,7 @@ class Compiler {
       kernels::GroundContact ground{};
       const Shape& shape = m_.scene.links[b].body.shape;
       std::vector<double> points = contact_points(shape);
-      if (std::holds_alternative<SphereShape>(shape)) {
+      if (is_ball(shape)) {
         points = {0, 0, 0};
         ground.radius = body.size.x;
       }

@@ -169,6 +169,7 @@ struct MassProperties {
   kernels::Mat3<double> inertia;  ///< [kg m²]
 };
 MassProperties mass_properties(const Shape& shape, double density);
+MassProperties mesh_mass(const MeshShape& mesh, double density);
 /// Its derivative by a number of the shape's size (size_name) that it has; the centre of mass
 /// stays.
 MassProperties mass_properties_by_size(const Shape& shape, double density, int which);
@@ -181,8 +182,7 @@ void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProper
 /// Shape and size of a body, and whether it can be touched.
 void place_shape(const Shape& shape, CompiledBody& body);
 
-/// Points of the body that meet other bodies, in its body frame, (n, 3): empty for spheres and
-/// planes.
+/// Points of the body that meet other bodies, in its body frame, (n, 3): perhaps none.
 std::vector<double> contact_points(const Shape& shape);
 /// A body whose points these are.
 kernels::Solid solid_of(const Shape& shape, const CompiledBody& body);

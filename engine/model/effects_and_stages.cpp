@@ -4,6 +4,9 @@
 
 #include <algorithm>
 
+#include "engine/model/shapes.hpp"
+#include "kernels/contact/distance.hpp"
+
 namespace tangere {
 
 namespace {
@@ -11,22 +14,16 @@ namespace {
 using kernels::JointKind;
 using kernels::Link;
 
-const char* name_of(PrimitiveShape shape) {
-  constexpr const char* kNames[] = {"sphere", "cuboid", "plane", "cylinder", "capsule"};
-  static_assert(std::size(kNames) == kPrimitiveShapes);
-  return kNames[static_cast<int>(shape)];
-}
-
 /// How the points of a shape are added up (kernels/step/point_sums.hpp).
 const char* sums_of(PrimitiveShape shape) {
-  switch (shape) {
-    case PrimitiveShape::sphere: return "products about the centre";
-    case PrimitiveShape::capsule: return "point by point";
-    case PrimitiveShape::cylinder: return "products, one bent face";
-    case PrimitiveShape::cuboid:
-    case PrimitiveShape::plane: break;
-  }
-  return "products, flat faces";
+  using kernels::Bending;
+  using kernels::PointSumForm;
+  return kernels::with_distance<double>(
+      shape, kernels::Vec3<double>{1, 1, 1}, []<class S>(const S&) {
+        if (S::kSums == PointSumForm::about_centre) return "products about the centre";
+        if (S::kSums == PointSumForm::points) return "point by point";
+        return S::kBending == Bending::flat ? "products, flat faces" : "products, one bent face";
+      });
 }
 
 std::string counted(std::size_t n, const std::string& one, const std::string& many) {
@@ -42,7 +39,7 @@ std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links)
   }
   std::string text;
   for (const PrimitiveShape shape : shapes)
-    text += std::string(name_of(shape)) + ": " + sums_of(shape) + "; ";
+    text += std::string(row_of(shape).name) + ": " + sums_of(shape) + "; ";
   if (links.link1 < 0 || links.link2 < 0) return text + "one body moves";
   return text + "both bodies move";
 }

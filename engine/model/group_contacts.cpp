@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/model/compiled_model.hpp"
+#include "kernels/contact/distance.hpp"
+
 namespace tangere {
 
 namespace {
@@ -65,7 +68,7 @@ void group_contacts(CompiledModel& m) {
     const kernels::PairContact& first = m.pairs[std::size_t(m.pair_order[std::size_t(pairs[g])])];
     kernels::LinkPair links = {first.link1, first.link2, pairs[g], pairs[g + 1] - pairs[g],
                                0,           0,           false,    first.frame2.p};
-    links.ball = links.count == 1 && first.shape == PrimitiveShape::sphere;
+    links.ball = links.count == 1 && kernels::is_ball(first.shape);
     double pitch = INFINITY;
     for (int i = pairs[g]; i < pairs[g + 1]; ++i) {
       const kernels::PairContact& pair = m.pairs[std::size_t(m.pair_order[std::size_t(i)])];

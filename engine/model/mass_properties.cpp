@@ -1,73 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mass and inertia of bodies of uniform density: closed forms, and volume integrals of meshes; what
-// kernels call their size.
-#include <algorithm>
-#include <cmath>
-
+// Mass and inertia of a body on its link, and of meshes by volume integrals; other shapes have closed
+// forms in shapes.cpp.
 #include "engine/model/compiled_model.hpp"
-#include "kernels/numbers/dual.hpp"
 
 namespace tangere {
-
-namespace {
-
-/// Mass and principal inertia, over any number type.
-template <class T>
-struct Principal {
-  T mass, xx, yy, zz;
-};
-
-template <class T>
-Principal<T> of_ball(double density, const T& r) {
-  const T mass = density * 4.0 / 3.0 * M_PI * r * r * r, inertia = 0.4 * mass * r * r;
-  return {mass, inertia, inertia, inertia};
-}
-
-template <class T>
-Principal<T> of_cuboid(double density, const T& x, const T& y, const T& z) {
-  const T mass = density * x * y * z;
-  return {mass, mass / 12 * (y * y + z * z), mass / 12 * (x * x + z * z),
-          mass / 12 * (x * x + y * y)};
-}
-
-template <class T>
-Principal<T> of_cylinder(double density, const T& r, const T& l) {
-  const T square = r * r, mass = density * M_PI * square * l;
-  const T across = mass / 12 * (3 * square + l * l);
-  return {mass, across, across, mass / 2 * square};
-}
-
-/// A cylinder and two half balls, each with its centre of mass 3 r/8 beyond the cylinder's end.
-template <class T>
-Principal<T> of_capsule(double density, const T& r, const T& l) {
-  const T tube = density * M_PI * r * r * l, ball = density * 4.0 / 3.0 * M_PI * r * r * r;
-  const T across =
-      tube * (l * l / 12 + r * r / 4) + ball * (0.4 * r * r + l * l / 4 + 0.375 * l * r);
-  return {tube + ball, across, across, tube * r * r / 2 + 0.4 * ball * r * r};
-}
-
-MassProperties centred(const Principal<double>& p) {
-  return {p.mass, {0, 0, 0}, {{{p.xx, 0, 0}, {0, p.yy, 0}, {0, 0, p.zz}}}};
-}
-
-MassProperties of(const SphereShape& s, double density) {
-  return centred(of_ball(density, s.radius));
-}
-MassProperties of(const CuboidShape& c, double density) {
-  return centred(of_cuboid(density, c.size[0], c.size[1], c.size[2]));
-}
-MassProperties of(const CylinderShape& c, double density) {
-  return centred(of_cylinder(density, c.radius, c.length));
-}
-MassProperties of(const CapsuleShape& c, double density) {
-  return centred(of_capsule(density, c.radius, c.length));
-}
-MassProperties of(const PlaneShape&, double) { return centred({0, 0, 0, 0}); }
 
 /// Tetrahedra from the first vertex to every triangle, about that vertex: far from its frame's
 /// origin a body loses nothing. With corners a, b, c: volume = a·(b × c)/6, ∫x = volume (a + b +
 /// c)/4, ∫x xᵀ = volume (aaᵀ + bbᵀ + ccᵀ + ssᵀ)/20, s = a + b + c.
-MassProperties of(const MeshShape& mesh, double density) {
+MassProperties mesh_mass(const MeshShape& mesh, double density) {
   using kernels::Vec3;
   const auto vertex = [&](int k) {
     const double* p = &mesh.vertices[3 * std::size_t(k)];
@@ -91,34 +32,6 @@ MassProperties of(const MeshShape& mesh, double density) {
   return {density * volume, origin + centre, kernels::diagonal(trace) - second};
 }
 
-MassProperties of(const AbstractShape& a, double) {
-  const std::array<double, 6>& i = a.inertia;
-  return {a.mass, {0, 0, 0}, {{{i[0], i[1], i[2]}, {i[1], i[3], i[4]}, {i[2], i[4], i[5]}}}};
-}
-
-}  // namespace
-
-MassProperties mass_properties(const Shape& shape, double density) {
-  return std::visit([&](const auto& s) { return of(s, density); }, shape);
-}
-
-MassProperties mass_properties_by_size(const Shape& shape, double density, int which) {
-  using D = kernels::Dual<double>;
-  const auto number = [which](double x, int k) { return D(x, k == which ? 1 : 0); };
-  const auto slope = [](const Principal<D>& p) {
-    return centred({p.mass.epsilon, p.xx.epsilon, p.yy.epsilon, p.zz.epsilon});
-  };
-  if (const auto* s = std::get_if<SphereShape>(&shape))
-    return slope(of_ball(density, number(s->radius, 0)));
-  if (const auto* c = std::get_if<CuboidShape>(&shape))
-    return slope(
-        of_cuboid(density, number(c->size[0], 2), number(c->size[1], 3), number(c->size[2], 4)));
-  if (const auto* c = std::get_if<CylinderShape>(&shape))
-    return slope(of_cylinder(density, number(c->radius, 0), number(c->length, 1)));
-  const auto& c = std::get<CapsuleShape>(shape);
-  return slope(of_capsule(density, number(c.radius, 0), number(c.length, 1)));
-}
-
 InertiaRows inertia_rows(const kernels::Link& link) {
   const auto& I = link.inertia.m;
   return {link.mass, link.moment.x, link.moment.y, link.moment.z, I[0][0],
@@ -130,29 +43,6 @@ InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& propert
   of_these.mass = properties.mass;
   add_inertia(link, of_these, properties);
   return inertia_rows(link);
-}
-
-void place_shape(const Shape& shape, CompiledBody& body) {
-  if (const auto* sphere = std::get_if<SphereShape>(&shape)) {
-    body.shape = PrimitiveShape::sphere;
-    body.size = {sphere->radius, 0, 0};
-  } else if (const auto* cuboid = std::get_if<CuboidShape>(&shape)) {
-    body.shape = PrimitiveShape::cuboid;
-    body.size = {0.5 * cuboid->size[0], 0.5 * cuboid->size[1], 0.5 * cuboid->size[2]};
-  } else if (const auto* cylinder = std::get_if<CylinderShape>(&shape)) {
-    body.shape = PrimitiveShape::cylinder;
-    body.size = {cylinder->radius, 0.5 * cylinder->length, 0};
-  } else if (const auto* capsule = std::get_if<CapsuleShape>(&shape)) {
-    body.shape = PrimitiveShape::capsule;
-    body.size = {capsule->radius, 0.5 * capsule->length, 0};
-  } else if (std::holds_alternative<PlaneShape>(shape)) {
-    body.shape = PrimitiveShape::plane;
-  } else {
-    body.touchable = false;
-    const std::vector<double> p = contact_points(shape);
-    for (std::size_t k = 0; k < p.size(); k += 3)
-      body.size.x = std::max(body.size.x, std::hypot(p[k], p[k + 1], p[k + 2]));
-  }
 }
 
 void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProperties& properties) {

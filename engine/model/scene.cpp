@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names and sizes of a scene's enumerations, and its poses.
+// Names and sizes of a scene's enumerations, and its poses; those of shapes are in shapes.cpp.
 #include "engine/model/scene.hpp"
 
 #include <iterator>
@@ -50,24 +50,6 @@ const char* to_string(ContactLaw value) {
   return "unknown";
 }
 
-const char* shape_name(const Shape& shape) {
-  constexpr const char* kNames[] = {"sphere", "cuboid", "cylinder", "capsule",
-                                    "plane",  "mesh",   "abstract"};
-  static_assert(std::size(kNames) == std::variant_size_v<Shape>);
-  return kNames[shape.index()];
-}
-
-bool has_distance(const Shape& shape) {
-  return !std::holds_alternative<MeshShape>(shape) && !std::holds_alternative<AbstractShape>(shape);
-}
-
-bool has_contact_points(const Shape& shape) {
-  if (const auto* mesh = std::get_if<MeshShape>(&shape)) return !mesh->vertices.empty();
-  if (const auto* abstract = std::get_if<AbstractShape>(&shape))
-    return !abstract->contact_points.empty();
-  return !std::holds_alternative<SphereShape>(shape) && !std::holds_alternative<PlaneShape>(shape);
-}
-
 bool is_inertia(const std::array<double, 6>& inertia) {
   const auto& [xx, xy, xz, yy, yz, zz] = inertia;
   // ∫ρ x xᵀ = ½ tr(I) 1 - I must be positive definite: leading minors.
@@ -109,24 +91,6 @@ const char* to_string(JointField value) {
     case JointField::D: return "D";
   }
   return "unknown";
-}
-
-double* size_number(Shape& shape, int which) {
-  if (auto* cuboid = std::get_if<CuboidShape>(&shape))
-    return which >= 2 && which <= 4 ? &cuboid->size[std::size_t(which - 2)] : nullptr;
-  if (auto* sphere = std::get_if<SphereShape>(&shape))
-    return which == 0 ? &sphere->radius : nullptr;
-  const auto of_rod = [&](auto* rod) {
-    return which == 0 ? &rod->radius : which == 1 ? &rod->length : nullptr;
-  };
-  if (auto* cylinder = std::get_if<CylinderShape>(&shape)) return of_rod(cylinder);
-  if (auto* capsule = std::get_if<CapsuleShape>(&shape)) return of_rod(capsule);
-  return nullptr;
-}
-
-const char* size_name(int which) {
-  constexpr const char* kNames[kSizeNames] = {"radius", "length", "size[0]", "size[1]", "size[2]"};
-  return which >= 0 && which < kSizeNames ? kNames[which] : "unknown";
 }
 
 bool dof_turns(JointType type, int k) {

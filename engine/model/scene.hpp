@@ -313,6 +313,8 @@ inline constexpr int kSizeNames = 5;
 /// Whether contact points may touch it, and whether it has such points itself.
 bool has_distance(const Shape& shape);
 bool has_contact_points(const Shape& shape);
+/// Whether it looks the same from every side: then the ground touches its lowest point.
+bool is_ball(const Shape& shape);
 /// Whether xx xy xz yy yz zz can be the inertia of a body with volume: principal moments positive,
 /// none as large as the other two together.
 bool is_inertia(const std::array<double, 6>& inertia);

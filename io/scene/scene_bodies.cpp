@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "engine/model/shapes.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/surface_files.hpp"
 #include "io/scene/tactile_layouts.hpp"
@@ -44,33 +45,35 @@ class Attributes {
                 "inertia"};
 };
 
-CuboidShape read_cuboid(const SceneNode& node, double length) {
-  CuboidShape shape;
-  shape.size = scaled(node.vector("size"), length);
-  for (double s : shape.size)
-    if (!(s > 0)) node.fail(fmt::format("size has the edge {} m; expected positive lengths", s));
-  const std::array<int, 3>& fallback = shape.contact_resolution;
-  const std::vector<int> n = node.integers(
-      "general_contact_resolution", {fallback.begin(), fallback.end()}, 2, kLargestResolution);
-  std::copy(n.begin(), n.end(), shape.contact_resolution.begin());
-  return shape;
-}
-
-CylinderShape read_cylinder(const SceneNode& node, double length) {
-  CylinderShape shape{node.positive("length") * length, node.positive("radius") * length};
-  int &angles = shape.contact_angles, &rings = shape.contact_rings;
-  angles = node.integer("general_contact_angle_resolution", 3, kLargestResolution, angles);
-  rings = node.integer("general_contact_radius_resolution", 1, kLargestResolution, rings);
-  return shape;
-}
-
-CapsuleShape read_capsule(const SceneNode& node, double length) {
-  CapsuleShape shape{node.positive("length") * length, node.positive("radius") * length};
-  const std::vector<int> n =
-      node.integers("general_contact_resolution", {shape.contact_rings, shape.contact_angles}, 2,
-                    kLargestResolution);
-  shape.contact_rings = n[0], shape.contact_angles = n[1];
-  return shape;
+/// A shape that its size and the counts of its contact points say all about.
+void read_sized(const SceneNode& node, const ShapeRow& row, Shape& shape, Attributes& attributes) {
+  const double length = node.context().length;
+  for (const SizeNumber& n : row.sizes) {
+    if (n.which < 2) {  // radius, length
+      const char* const name = size_name(n.which);
+      attributes.use({name});
+      *n.at(shape) = node.positive(name) * length;
+      continue;
+    }
+    if (n.which == 2) attributes.use({"size"});
+    const double edge = scaled(node.vector("size"), length)[std::size_t(n.which - 2)];
+    if (!(edge > 0))
+      node.fail(fmt::format("size has the edge {} m; expected positive lengths", edge));
+    *n.at(shape) = edge;
+  }
+  for (const PointCounts& c : row.counts) {
+    attributes.use({c.attribute});
+    std::vector<int> n;
+    for (const auto& at : c.at) n.push_back(*at(shape));
+    if (n.size() == 1) {
+      n[0] = node.integer(c.attribute, c.least, kLargestResolution, n[0]);
+    } else {
+      n = node.integers(c.attribute, n, c.least, kLargestResolution);
+    }
+    for (std::size_t k = 0; k < n.size(); ++k) *c.at[k](shape) = n[k];
+  }
+  if (row.mass == nullptr) attributes.leave("density");
+  if (const std::string fault = slenderness_fault(shape); !fault.empty()) node.fail(fault);
 }
 
 /// Contact points of an abstract body, in the scene's unit: those of a file, or of a hemisphere.
@@ -127,26 +130,21 @@ AbstractShape read_abstract(const SceneNode& node, double length) {
 
 Shape read_shape(const SceneNode& node, Attributes& attributes) {
   const double length = node.context().length;
-  switch (node.choice("type",
-                      {"sphere", "cuboid", "cylinder", "capsule", "plane", "mesh", "abstract"})) {
-    case 0: attributes.use({"radius"}); return SphereShape{node.positive("radius") * length};
-    case 1:
-      attributes.use({"size", "general_contact_resolution"});
-      return read_cuboid(node, length);
-    case 2:
-      attributes.use({"length", "radius", "general_contact_angle_resolution",
-                      "general_contact_radius_resolution"});
-      return read_cylinder(node, length);
-    case 3:
-      attributes.use({"length", "radius", "general_contact_resolution"});
-      return read_capsule(node, length);
-    case 4: attributes.leave("density"); return PlaneShape{};
-    case 5: attributes.use({"filename", "scale", "transform_type"}); return read_mesh(node, length);
-    default: break;
+  Names names;
+  for (const ShapeRow& row : shape_rows()) names.emplace_back(row.name);
+  const ShapeRow& row = shape_rows()[std::size_t(node.choice("type", names))];
+  Shape shape = row.make();
+  if (std::holds_alternative<MeshShape>(shape)) {
+    attributes.use({"filename", "scale", "transform_type"});
+    return read_mesh(node, length);
   }
-  attributes.use({"inertia"});
-  attributes.leave("density");
-  return read_abstract(node, length);
+  if (std::holds_alternative<AbstractShape>(shape)) {
+    attributes.use({"inertia"});
+    attributes.leave("density");
+    return read_abstract(node, length);
+  }
+  read_sized(node, row, shape, attributes);
+  return shape;
 }
 
 }  // namespace

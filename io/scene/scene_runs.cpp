@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "engine/model/shapes.hpp"
 #include "io/files/csv.hpp"
 #include "io/scene/scene_sections.hpp"
 
@@ -172,9 +173,8 @@ void read_body_variation(const Scene& scene, const SceneNode& node, Randomizatio
     d.target = RandomTarget::size;
     Shape shape = body.shape;
     if (size_number(shape, d.index) == nullptr)
-      node.fail(fmt::format("body '{}' is {} {}, which has no {}; expected a body that has one",
-                            body.name, std::holds_alternative<AbstractShape>(shape) ? "an" : "a",
-                            shape_name(shape), size_name(d.index)));
+      node.fail(fmt::format("body '{}' is {}, which has no {}; expected a body that has one",
+                            body.name, with_article(shape_name(shape)), size_name(d.index)));
     d.distribution = read_distribution(node, node.context().length);
     check_positive(node, d.distribution, size_name(d.index));
     return;

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/model/shapes.hpp"
+
 namespace tangere {
 
 namespace {
@@ -25,10 +27,6 @@ int find_named(const Scene& scene, const SceneNode& node, const char* attribute,
   }
   node.fail(fmt::format("{}=\"{}\": no {} has this name{}", attribute, wanted, kind,
                         suggestion(wanted, names)));
-}
-
-std::string with_article(const std::string& shape) {
-  return (shape == "abstract" ? "an " : "a ") + shape + " body";
 }
 
 double read_ramp(const SceneNode& node) {
@@ -66,8 +64,8 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       const int body = find_body(scene, node, "body");
       d.body = node.text("body");
       const Shape& shape = scene.links[std::size_t(body)].body.shape;
-      if (!has_contact_points(shape) && !std::holds_alternative<SphereShape>(shape))
-        node.fail("body '" + d.body + "' is " + with_article(shape_name(shape)) +
+      if (!has_contact_points(shape) && !is_ball(shape))
+        node.fail("body '" + d.body + "' is " + with_article(shape_name(shape)) + " body" +
                   ", which has no contact points");
       d.law = kLawOf[node.choice("law", kLaws, 2)];
       d.ramp = read_ramp(node);
@@ -88,15 +86,15 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       const Shape& points = scene.links[std::size_t(general)].body.shape;
       if (!has_contact_points(points))
         node.fail(fmt::format(
-            "general_body '{}' is {}, which has no contact points; {}", d.general_body,
+            "general_body '{}' is {} body, which has no contact points; {}", d.general_body,
             with_article(shape_name(points)),
             has_distance(points) ? "swap the two bodies" : "give it a <collision contacts>"));
       const Shape& touched = scene.links[std::size_t(primitive)].body.shape;
       if (!has_distance(touched))
         node.fail(fmt::format(
-            "primitive_body '{}' is {}, which has no distance function; expected a sphere, cuboid, "
-            "cylinder, capsule or plane",
-            d.primitive_body, with_article(shape_name(touched))));
+            "primitive_body '{}' is {} body, which has no distance function; expected {}",
+            d.primitive_body, with_article(shape_name(touched)),
+            shapes_with([](const ShapeRow& row) { return row.distance.has_value(); })));
       d.law = kLawOf[node.choice("law", kLaws, 0)];
       d.ramp = read_ramp(node);
       d.coefficients = read_coefficients(node, d.law);

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The penalty law of one point, over any number type (docs/contact.md).
+// The penalty law of one point, over any number type (docs/contact.md): contacts, the ground, tactile
+// points and their reverse all take it from here.
 //
 //   N(d, ḋ) the normal force, d < 0 the penetration;  f = N n + f_t
+//   R = (-k_n + k_d ḋ) d, law linear: -k_n d - c ḋ, c fading below the ramp;  N = max(0, R), paper: R
 //   f_t = -k_t v_t            if k_t |v_t| ≤ μ |N|    (stick; also at v_t = 0 and on the kink)
 //       = -μ |N| v_t / |v_t|  else                    (slip)
 //   law linear with ramp 0 takes μ k_n |d| as its friction bound, as published.
@@ -23,6 +25,57 @@ struct LawParameters {
   N friction_tangent = N(1.0);
 };
 
+/// How a b + c is rounded: contacts of bodies twice, tactile points once where lanes fuse.
+struct Rounded {
+  template <class N>
+  static N add(const N& a, const N& b, const N& c) {
+    return a * b + c;
+  }
+  template <class N>
+  static N subtract(const N& a, const N& b, const N& c) {
+    return c - a * b;
+  }
+};
+struct Fused {
+  template <class N>
+  static N add(const N& a, const N& b, const N& c) {
+    return mul_add(a, b, c);
+  }
+  template <class N>
+  static N subtract(const N& a, const N& b, const N& c) {
+    return mul_sub_from(a, b, c);
+  }
+};
+
+/// R, wherever the point is; `damping` of the linear law with its ramp.
+template <class Rounding, class N>
+[[gnu::always_inline]] inline N raw_force(ContactLaw law, const N& minus_kn, const N& damping,
+                                          const N& d, const N& rate) {
+  if (law == ContactLaw::linear) return Rounding::subtract(damping, rate, minus_kn * d);
+  return Rounding::add(damping, rate, minus_kn) * d;
+}
+
+/// N and the friction bound over μ of a tactile point, whose linear law is the published one. d = 0
+/// gives zeros.
+template <ContactLaw Law, class N, class M>
+void normal_force_alone(const N& minus_kn, const N& damping, const N& d, const N& rate,
+                        const M& touching, N& force, N& bound) {
+  const N zero(0.0), raw = raw_force<Fused>(Law, minus_kn, damping, d, rate);
+  force = Law == ContactLaw::paper ? raw : max(raw, zero);
+  if constexpr (Law == ContactLaw::linear) {
+    force = select(touching, force, zero);
+    bound = minus_kn * d;
+  } else {
+    bound = Law == ContactLaw::clamped ? force : max(force, zero - force);
+  }
+}
+
+/// f_t = -scale v_t: the smaller of k_t and μ B/|v_t|. `square` = |v_t|², above zero.
+template <class N>
+N friction_scale(const N& kt, const N& mu, const N& bound, const N& square) {
+  return min(kt, mu * bound * inverse_sqrt(square));
+}
+
 /// N and the friction bound over μ, with their slopes.
 template <class N>
 struct NormalForce {
@@ -37,18 +90,16 @@ NormalForce<N> normal_force(const LawParameters<N>& p, const N& d, const N& rate
   NormalForce<N> r;
   auto active = d < zero;
   if (p.law == ContactLaw::linear) {
+    N damping = p.damping;
+    r.d_slope = -p.kn;
     if (p.ramp > 0) {
       const N inverse(1.0 / p.ramp);
       const auto fading = abs(d) < N(p.ramp);
-      const N ramp = select(fading, abs(d) * inverse, N(1.0));
-      r.force = -(p.kn * d) - p.damping * ramp * rate;
+      damping = p.damping * select(fading, abs(d) * inverse, N(1.0));
       r.d_slope = select(fading, p.damping * inverse * rate - p.kn, -p.kn);
-      r.rate_slope = -(p.damping * ramp);
-    } else {
-      r.force = -(p.kn * d) - p.damping * rate;
-      r.d_slope = -p.kn;
-      r.rate_slope = -p.damping;
     }
+    r.force = raw_force<Rounded>(p.law, -p.kn, damping, d, rate);
+    r.rate_slope = -damping;
     const auto pushing = active & (r.force > zero);
     const auto bounded = active;
     r.force = select(pushing, r.force, zero);
@@ -61,8 +112,8 @@ NormalForce<N> normal_force(const LawParameters<N>& p, const N& d, const N& rate
       return r;
     }
   } else {
-    const N stiffness = p.damping * rate - p.kn;
-    r.force = stiffness * d;
+    const N stiffness = Rounded::add(p.damping, rate, -p.kn);
+    r.force = raw_force<Rounded>(p.law, -p.kn, p.damping, d, rate);
     if (p.law == ContactLaw::clamped) active = active & (r.force > zero);
     r.force = select(active, r.force, zero);
     r.d_slope = select(active, stiffness, zero);
@@ -73,6 +124,32 @@ NormalForce<N> normal_force(const LawParameters<N>& p, const N& d, const N& rate
   r.bound_d = select(pulling, -r.d_slope, r.d_slope);
   r.bound_rate = select(pulling, -r.rate_slope, r.rate_slope);
   return r;
+}
+
+/// From cotangents of N and of B to those of k_n and k_d (out.kn, out.damping). Zero where the normal
+/// force is clamped.
+template <class N, class Cotangent>
+void pull_back_normal_force(const LawParameters<N>& p, const N& d, const N& rate,
+                            const NormalForce<N>& at, const N& force, const N& bound,
+                            Cotangent& out) {
+  const N zero(0.0), one(1.0);
+  const auto pulling = at.force < zero;  // law paper: B = -N
+  const N both = force + select(pulling, -bound, bound);
+  if (p.law == ContactLaw::linear) {
+    const N pushing = select(at.force > zero, one, zero);
+    const N ramp = p.ramp > 0 ? min(abs(d) * N(1.0 / (p.ramp > 0 ? p.ramp : 1)), one) : one;
+    if (p.ramp > 0) {
+      out.kn -= pushing * both * d;
+      out.damping -= pushing * both * ramp * rate;
+    } else {  // B = k_n |d|
+      out.kn -= (pushing * force + bound) * d;
+      out.damping -= pushing * force * rate;
+    }
+    return;
+  }
+  const N active = p.law == ContactLaw::paper ? one : select(at.force > zero, one, zero);
+  out.kn -= active * both * d;
+  out.damping = mul_add(active * both, d * rate, out.damping);
 }
 
 /// f_t = -scale v_t, and what its derivative needs.

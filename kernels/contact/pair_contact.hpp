@@ -29,9 +29,10 @@ struct PointContact {
   Vec3<N> n, x2, u, vt;
   NormalForce<N> normal;
   Friction<N> tangential;
-  Vec3<N> force;  ///< on body 1, acting at x2
-  N curvature;    ///< κ of H (Bending)
-  Vec3<N> axis;   ///< rods only: e z
+  Vec3<N> force;    ///< on body 1, acting at x2
+  N curvature;      ///< κ of H (Bending)
+  Vec3<N> axis;     ///< rods only: e z
+  Mat3<N> hessian;  ///< Bending::general only: H
 };
 
 /// Distance, velocities and force at ξ. `Q`, `c`: shape frame in body 1; `omega`, `v`: W.
@@ -51,6 +52,11 @@ PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, c
     p.d = at.d;
     p.n = Q * at.n;
     p.axis = straight * Vec3<N>{Q.m[0][2], Q.m[1][2], Q.m[2][2]};
+  } else if constexpr (Shape::kBending == Bending::general) {
+    const Distance<N> at = shape.evaluate(transposed_times(Q, arm));
+    p.d = at.d;
+    p.n = Q * at.n;
+    p.hessian = Q * shape.hessian(at) * transpose(Q);
   } else {  // a sphere looks the same from every side
     const Distance<N> at = shape.evaluate(arm, p.curvature);
     p.d = at.d;
@@ -90,45 +96,60 @@ struct PointDerivative {
   Mat3<N> f_u, f_rho, f_theta, x_rho, x_theta;
 };
 
+/// ∂f by n, u and d at a point.
+template <class N>
+struct ForceDerivative {
+  Mat3<N> by_n, by_u;
+  Vec3<N> by_d;
+};
+///   δḋ = u·δn + n·δu;  δv_t = δu - n δḋ - ḋ δn
+template <class N>
+ForceDerivative<N> differentiate_force(const LawParameters<N>& law, const PointContact<N>& p) {
+  const Vec3<N>&n = p.n, &t = p.tangential.direction;
+  const Vec3<N> mt = (law.mu * p.tangential.slip) * t;
+  // ∂f/∂ḋ through N and B, and ∂f/∂v_t = -s (I - ttᵀ).
+  const Vec3<N> f_rate = p.normal.rate_slope * n - p.normal.bound_rate * mt;
+  const Vec3<N> f_depth = p.normal.d_slope * n - p.normal.bound_d * mt;
+  const Mat3<N> T = p.tangential.scale * (diagonal(N(1.0)) - outer(t, t));
+  const Vec3<N> g = f_rate + T * n;  // coefficient of δḋ
+  return {diagonal(p.normal.force) + outer(g, p.u) + p.rate * T, outer(g, n) - T, f_depth};
+}
+
 template <class Shape, class N>
 PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact<N>& p,
                                  const Vec3<N>& omega) {
   PointDerivative<N> r;
   const N one(1.0);
   const Vec3<N>& n = p.n;
-  const Vec3<N>& t = p.tangential.direction;
   const Mat3<N> nn = outer(n, n);
   const Mat3<N> P = diagonal(one) - nn;
   // δn = n_rho ρ₂ + n_theta θ; H = κ (P - e zzᵀ); n_theta = -(I - dH)[n], with P[n] = [n] and
   // zzᵀ[n] = z (z × n)ᵀ.
   constexpr bool kFlat = Shape::kBending == Bending::flat;
-  Mat3<N> n_rho = kFlat ? zero33<N>() : (-p.curvature) * P;
-  const N flatten = kFlat ? one : mul_sub_from(p.d, p.curvature, one);
-  Mat3<N> n_theta = skew(-(flatten * n));
-  if constexpr (Shape::kBending == Bending::rod) {
-    n_rho += outer(p.curvature * p.axis, p.axis);
-    n_theta = n_theta - outer((p.d * p.curvature) * p.axis, cross(p.axis, n));
+  Mat3<N> n_rho, n_theta;
+  if constexpr (Shape::kBending == Bending::general) {
+    n_rho = -p.hessian;
+    n_theta = p.d * times_skew(p.hessian, n) - skew(n);
+  } else {
+    n_rho = kFlat ? zero33<N>() : (-p.curvature) * P;
+    const N flatten = kFlat ? one : mul_sub_from(p.d, p.curvature, one);
+    n_theta = skew(-(flatten * n));
+    if constexpr (Shape::kBending == Bending::rod) {
+      n_rho += outer(p.curvature * p.axis, p.axis);
+      n_theta = n_theta - outer((p.d * p.curvature) * p.axis, cross(p.axis, n));
+    }
   }
   // δx₂ = nnᵀ ρ₂ - d δn.
   r.x_rho = kFlat ? nn : nn - p.d * n_rho;
   r.x_theta = (-p.d) * n_theta;
-  // The force by δn and δu apart: δf = f_n δn + f_u δu + f_d δd.
-  //   δḋ = u·δn + n·δu;  δv_t = δu - n δḋ - ḋ δn
-  const N s = p.tangential.scale;
-  const Vec3<N> mt = (law.mu * p.tangential.slip) * t;
-  // ∂f/∂ḋ through N and B, and ∂f/∂v_t = -s (I - ttᵀ).
-  const Vec3<N> f_rate = p.normal.rate_slope * n - p.normal.bound_rate * mt;
-  const Vec3<N> f_depth = p.normal.d_slope * n - p.normal.bound_d * mt;
-  const Mat3<N> T = s * (diagonal(one) - outer(t, t));
-  const Vec3<N> g = f_rate + T * n;  // coefficient of δḋ
-  r.f_u = outer(g, n) - T;
-  const Mat3<N> f_n = diagonal(p.normal.force) + outer(g, p.u) + p.rate * T;
+  const ForceDerivative<N> f = differentiate_force(law, p);
+  r.f_u = f.by_u;
   // δu = -ω × δx₂.
   const Mat3<N> u_rho = cross_columns(-omega, r.x_rho);
   const Mat3<N> u_theta = cross_columns(-omega, r.x_theta);
-  r.f_rho = r.f_u * u_rho - outer(f_depth, n);
-  if constexpr (!kFlat) r.f_rho += f_n * n_rho;
-  r.f_theta = r.f_u * u_theta + f_n * n_theta;
+  r.f_rho = r.f_u * u_rho - outer(f.by_d, n);
+  if constexpr (!kFlat) r.f_rho += f.by_n * n_rho;
+  r.f_theta = r.f_u * u_theta + f.by_n * n_theta;
   return r;
 }
 
@@ -164,9 +185,28 @@ void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& l
   }
 }
 
-/// The same sums for points or a sphere on the ground, with velocity and force at the body's own
-/// point ξ = ξ_c - r m (r = 0: a material point). m = Rᵀ n_ground, `height` = n·(p - ground point),
-/// V = body twist, all in body axes.
+/// A point or a sphere on the ground, with velocity and force at the body's own point ξ = ξ_c - r m
+/// (r = 0: a material point), p.x2. m = Rᵀ n_ground, `height` = n·(p - ground point), V = body twist,
+/// all in body axes. False where no lane touches; then `p` holds d alone.
+template <class N>
+bool ground_contact(const LawParameters<N>& law, const Vec3<N>& m, const N& height,
+                    const Vec6<N>& V, const Vec3<N>& centre, const N& radius, PointContact<N>& p) {
+  p.d = dot(m, centre) + height - radius;
+  const auto touching = p.d < N(0.0);
+  if (!any(touching)) return false;
+  p.n = m;
+  p.x2 = centre - radius * m;
+  p.u = V.l + cross(V.a, p.x2);
+  p.rate = dot(m, p.u);
+  p.vt = p.u - p.rate * m;
+  p.normal = normal_force(law, p.d, p.rate);
+  p.tangential = friction(law, p.normal, p.vt);
+  const N gate = select(touching, N(1.0), N(0.0));
+  p.force = gate * (p.normal.force * m - p.tangential.scale * p.vt);
+  return true;
+}
+
+/// Its sums.
 ///   δm = m × θ, δξ = -r m × θ, δd = m·(ρ + θ × ξ_c), u = v + ω × ξ, ḋ = m·u     (θ, ρ of the body
 ///   itself)
 /// In the pair's convention body 2 is the ground: ε = -δ₁, δW = -δV₁, hence the signs of k and d.
@@ -174,29 +214,16 @@ void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& l
 template <bool Derivatives, class N>
 bool accumulate_ground(PairSums<N>& sums, const LawParameters<N>& law, const Vec3<N>& m,
                        const N& height, const Vec6<N>& V, const Vec3<N>& centre, const N& radius) {
-  const N d = dot(m, centre) + height - radius;
-  const auto touching = d < N(0.0);
-  if (!any(touching)) return false;
-  const Vec3<N> xi = centre - radius * m;
-  const Vec3<N> u = V.l + cross(V.a, xi);
-  const N rate = dot(m, u);
-  const Vec3<N> vt = u - rate * m;
-  const NormalForce<N> normal = normal_force(law, d, rate);
-  const Friction<N> tangential = friction(law, normal, vt);
-  const N gate = select(touching, N(1.0), N(0.0));
-  const Vec3<N> f = gate * (normal.force * m - tangential.scale * vt);
+  PointContact<N> p;
+  if (!ground_contact(law, m, height, V, centre, radius, p)) return false;
+  const Vec3<N>&xi = p.x2, &f = p.force;
   sums.wrench.a += cross(xi, f);
   sums.wrench.l += f;
   if constexpr (Derivatives) {
-    const Vec3<N>& t = tangential.direction;
-    const Vec3<N> mt = (law.mu * tangential.slip) * t;
-    const Vec3<N> f_rate = normal.rate_slope * m - normal.bound_rate * mt;
-    const Vec3<N> f_depth = normal.d_slope * m - normal.bound_d * mt;
-    const Mat3<N> T = tangential.scale * (diagonal(N(1.0)) - outer(t, t));
-    const Vec3<N> g = f_rate + T * m;
-    const Mat3<N> f_u = gate * (outer(g, m) - T);
-    const Mat3<N> f_m = gate * (diagonal(normal.force) + outer(g, u) + rate * T);
-    const Mat3<N> f_d = gate * outer(f_depth, m);  // by ρ; by θ: -f_d [ξ_c]
+    const N gate = select(p.d < N(0.0), N(1.0), N(0.0));
+    const ForceDerivative<N> by = differentiate_force(law, p);
+    const Mat3<N> f_u = gate * by.by_u, f_m = gate * by.by_n;
+    const Mat3<N> f_d = gate * outer(by.by_d, m);  // by ρ; by θ: -f_d [ξ_c]
     const Mat3<N> m_theta = skew(m);
     const Mat3<N> xi_theta = (-radius) * m_theta;
     const Mat3<N> u_theta = cross_columns(V.a, xi_theta);

@@ -32,20 +32,20 @@ ContactCotangent<N> zero_contact() {
   return {{N(0.0), N(0.0), N(0.0), N(0.0)}, zero3<N>(), zero3<N>()};
 }
 
-/// Σ ξ̄·∂ξ/∂size for a point of a body at ξ, link axes: points keep their place on a cuboid's grid,
-/// a rod's rings and poles.
+/// Σ ξ̄·∂ξ/∂size for a point of a body at ξ, link axes.
 template <class N>
 Vec3<N> stretch_share(const Solid& body, const Vec3<N>& xi, const Vec3<N>& xi_bar) {
   if (!body.stretches) return zero3<N>();
   const Mat3<N> R = broadcast<N>(body.frame.R);
   const Vec3<N> y = transposed_times(R, xi - broadcast<N>(body.frame.p)),
                 bar = transposed_times(R, xi_bar);
-  const Vec3<double>& s = body.size;
-  if (body.shape == PrimitiveShape::cuboid)
-    return {bar.x * y.x * N(1 / s.x), bar.y * y.y * N(1 / s.y), bar.z * y.z * N(1 / s.z)};
-  const N on_axis = body.shape == PrimitiveShape::capsule ? max(min(y.z, N(s.y)), N(-s.y)) : y.z;
-  const N around = mul_add(bar.x, y.x, bar.y * y.y);
-  return {mul_add(bar.z, y.z - on_axis, around) * N(1 / s.x), bar.z * on_axis * N(1 / s.y), N(0.0)};
+  return with_distance<N>(body.shape, body.size, [&]<class Shape>(const Shape&) {
+    if constexpr (requires { Shape::stretch_share(body.size, y, bar); }) {
+      return Shape::stretch_share(body.size, y, bar);
+    } else {
+      return zero3<N>();
+    }
+  });
 }
 
 /// One point of a pair; `slip`: Y. Nothing where it does not touch.
@@ -132,23 +132,14 @@ ContactCotangent<N> ground_adjoint(const ModelView& model, const StageArgs<N>& a
   const bool ball = ground.radius > 0;
   ContactCotangent<N> sum = zero_contact<N>();
   for (int i = 0; i < ground.n_points; ++i) {
-    const Vec3<N> centre = ground_point<N>(ground, i), xi = centre - radius * m;
+    const Vec3<N> centre = ground_point<N>(ground, i);
     PointContact<N> p;
-    p.d = dot(m, centre) + height - radius;
-    const auto touching = p.d < N(0.0);
-    if (!any(touching)) continue;
-    const N gate = select(touching, N(1.0), N(0.0));
-    p.n = m;
-    p.u = link.V.l + cross(link.V.a, xi);
-    p.rate = dot(m, p.u);
-    p.vt = p.u - p.rate * m;
-    p.normal = normal_force(law, p.d, p.rate);
-    p.tangential = friction(law, p.normal, p.vt);
-    const Vec3<N> f_bar = (-gate) * (twist.l + cross(twist.a, xi));
+    if (!ground_contact(law, m, height, link.V, centre, radius, p)) continue;
+    const N gate = select(p.d < N(0.0), N(1.0), N(0.0));
+    const Vec3<N> f_bar = (-gate) * (twist.l + cross(twist.a, p.x2));
     pull_back_law(law, p, f_bar, sum.law);
     const ForceCotangent<N> bar = pull_back_force(law, p, f_bar);
-    const Vec3<N> force = gate * (p.normal.force * m - p.tangential.scale * p.vt);
-    const Vec3<N> xi_bar = cross(bar.u, link.V.a) - cross(force, twist.a);
+    const Vec3<N> xi_bar = cross(bar.u, link.V.a) - cross(p.force, twist.a);
     if (ball) {
       sum.size.x -= dot(m, xi_bar) + bar.d;
     } else {

@@ -22,31 +22,6 @@
 
 namespace tangere::kernels {
 
-/// From cotangents of N and of B to those of k_n and k_d. Zero where the normal force is clamped.
-template <class N>
-void pull_back_normal_force(const LawParameters<N>& p, const N& d, const N& rate,
-                            const NormalForce<N>& at, const N& force, const N& bound,
-                            LawCotangent<N>& out) {
-  const N zero(0.0), one(1.0);
-  const auto pulling = at.force < zero;  // law paper: B = -N
-  const N both = force + select(pulling, -bound, bound);
-  if (p.law == ContactLaw::linear) {
-    const N pushing = select(at.force > zero, one, zero);
-    const N ramp = p.ramp > 0 ? min(abs(d) * N(1.0 / (p.ramp > 0 ? p.ramp : 1)), one) : one;
-    if (p.ramp > 0) {
-      out.kn -= pushing * both * d;
-      out.damping -= pushing * both * ramp * rate;
-    } else {  // B = k_n |d|
-      out.kn -= (pushing * force + bound) * d;
-      out.damping -= pushing * force * rate;
-    }
-    return;
-  }
-  const N active = p.law == ContactLaw::paper ? one : select(at.force > zero, one, zero);
-  out.kn -= active * both * d;
-  out.damping = mul_add(active * both, d * rate, out.damping);
-}
-
 /// Cotangents of the law's coefficients; f̄ zero where nothing touches.
 template <class N>
 void pull_back_law(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& f_bar,
@@ -78,9 +53,10 @@ ForceCotangent<N> pull_back_force(const LawParameters<N>& law, const PointContac
           mul_add(p.normal.d_slope, along_n, p.normal.bound_d * bound)};
 }
 
-/// H n̄ = κ (n̄ - n (n·n̄) - e z (z·n̄)).
+/// H n̄; H = κ (I - n nᵀ - e z zᵀ) of balls and rods.
 template <class Shape, class N>
 Vec3<N> bend(const PointContact<N>& p, const Vec3<N>& n_bar) {
+  if constexpr (Shape::kBending == Bending::general) return p.hessian * n_bar;
   Vec3<N> bent = mul_add(-dot(p.n, n_bar), p.n, n_bar);
   if constexpr (Shape::kBending == Bending::rod) bent = mul_add(-dot(p.axis, n_bar), p.axis, bent);
   return p.curvature * bent;
@@ -129,8 +105,8 @@ PlaceCotangent<N> pull_back_place(const PointContact<N>& p, const Vec3<N>& x_bar
 template <class Shape, class N>
 Vec3<N> pull_back_size(const Shape& shape, const PointContact<N>& p, const Mat3<N>& Q,
                        const Vec3<N>& c, const Vec3<N>& xi, const Vec3<N>& rho) {
-  if constexpr (Shape::kBending == Bending::ball) {
-    return {dot(p.n, rho), N(0.0), N(0.0)};
+  if constexpr (Shape::kBending == Bending::ball) {  // the same in any axes
+    return shape.size_share(xi, p.n, rho);
   } else {
     return shape.size_share(transposed_times(Q, xi - c), transposed_times(Q, p.n),
                             transposed_times(Q, rho));

@@ -223,11 +223,11 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
     const auto frame = [&] { return compose(o.link2_in_1, broadcast<N>(pair.frame2)); };
     const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
     with_distance<N>(pair.shape, size, [&]<template <class> class Shape>(const Shape<N>& shape) {
-      if constexpr (Shape<N>::kBending == Bending::ball) {
+      if constexpr (Shape<N>::kSums == PointSumForm::about_centre) {
         const Vec3<N> centre = o.link2_in_1.R * broadcast<N>(pair.frame2.p) + o.link2_in_1.p;
         add_sphere<Derivatives>(sphere_motion(centre, o.W, shape.radius), law, list, a.lone, o.W,
                                 o.sums);
-      } else if constexpr (std::is_same_v<Shape<N>, CapsuleDistance<N>>) {
+      } else if constexpr (Shape<N>::kSums == PointSumForm::points) {
         add_candidates<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
       } else {
         if (!any_face) faces.start(a.lone);

@@ -3,7 +3,8 @@
 // within reach.
 #pragma once
 
-#include "kernels/tactile/tactile_rods.hpp"
+#include "kernels/contact/distance.hpp"
+#include "kernels/tactile/tactile_point.hpp"
 #include "kernels/tactile/vector_pair.hpp"
 
 namespace tangere::kernels {
@@ -188,18 +189,10 @@ void write_dense(const PadTiles& pad, int tile, const Real* from, Real* dense) {
   }
 }
 
-/// f<Shape>() of every shape, in the order of PrimitiveShape: the choice is made once per tile or
-/// chunk of tiles.
+/// f<Shape>() of every shape: the choice is made once per tile or chunk of tiles.
 template <class P, class F>
 constexpr auto by_shape(const F& f) {
-  using Function = decltype(f.template operator()<SpherePad<P>>());
-  struct Table {
-    Function of[kPrimitiveShapes];
-    Function operator[](PrimitiveShape shape) const { return of[static_cast<int>(shape)]; }
-  };
-  return Table{{f.template operator()<SpherePad<P>>(), f.template operator()<CuboidPad<P>>(),
-                f.template operator()<PlanePad<P>>(), f.template operator()<CylinderPad<P>>(),
-                f.template operator()<CapsulePad<P>>()}};
+  return by_pad<P>(f, Shapes{});
 }
 
 template <class P, ContactLaw Law>
@@ -212,7 +205,7 @@ int tactile_field(const TactileArgs<typename P::Real>& a) {
   for (int first = 0; first < a.pad->tiles(); first += kGroup) {
     unsigned written = 0;
     for (int k = 0; k < a.n_touches; ++k)
-      written = kForce[a.shapes[k].shape](a, k, first, written, buffer);
+      written = kForce[std::size_t(a.shapes[k].shape)](a, k, first, written, buffer);
     for (int l = 0; written != 0; ++l, written >>= 1) {
       if ((written & 1U) == 0) continue;
       const Real* tile = buffer + 3 * kTactileTile * l;

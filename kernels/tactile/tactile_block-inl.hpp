@@ -131,7 +131,7 @@ void tactile_block(const TactileBlockArgs<typename P::Real>& a) {
   for (int tile = 0; tile < a.pad->tiles(); ++tile) {
     bool written = false;
     for (int k = 0; k < a.n_touches; ++k)
-      written |= kForce[a.shapes[k].shape](a, tile, k, !written, buffer);
+      written |= kForce[std::size_t(a.shapes[k].shape)](a, tile, k, !written, buffer);
     if (written) write_lanes<P>(a, tile, buffer);
   }
 }

@@ -6,8 +6,7 @@
 // directions, its own axes, perhaps its own ξ.
 #pragma once
 
-#include "kernels/contact/contact_types.hpp"
-#include "kernels/numbers/linalg.hpp"
+#include "kernels/contact/shapes/tile.hpp"
 
 namespace tangere::kernels {
 
@@ -55,21 +54,6 @@ struct PadTiles {
 
  private:
   static int shorter(int n) { return n < kTileSide ? n : kTileSide; }
-};
-
-/// A shape in pad axes: pose, twist relative to the pad at the pad's origin, contact parameters of
-/// the sensor.
-template <class N>
-struct Touch {
-  Mat3<N> Q;
-  Vec3<N> c;
-  Vec3<N> omega, v;
-  N kn, kt, mu, damping;
-};
-
-struct TouchShape {
-  PrimitiveShape shape;
-  double size[3];  ///< as in PairContact [m]
 };
 
 /// One environment's field, Real = double or float. The tiles that something touches are returned,

@@ -9,7 +9,7 @@
 #include <functional>
 #include <vector>
 
-#include "engine/model/compiled_model.hpp"
+#include "engine/model/shapes.hpp"
 #include "kernels/contact/distance.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"
@@ -20,6 +20,20 @@ namespace {
 using testing::link;
 using testing::q_of;
 using testing::v_of;
+
+TEST(Shapes, TheTableIsInOrder) {
+  ASSERT_EQ(shape_rows().size(), std::variant_size_v<Shape>);
+  for (std::size_t k = 0; k < shape_rows().size(); ++k) {
+    const ShapeRow& row = shape_rows()[k];
+    const Shape shape = row.make();
+    EXPECT_EQ(shape.index(), k) << row.name;
+    EXPECT_EQ(&row_of(shape), &row);
+    if (row.distance) {
+      EXPECT_EQ(&row_of(*row.distance), &row);
+    }
+    EXPECT_EQ(row.mass_by_size != nullptr, !row.sizes.empty()) << row.name;
+  }
+}
 
 /// Discs of radius R(z), summed by Simpson's rule from piece to piece: mass, I_xx, I_zz.
 std::array<double, 3> integrate(double density, const std::vector<double>& pieces,

@@ -378,9 +378,9 @@ TEST_P(ProductSumsOf, PointsAreTheGeneralSums) {
             xi.push_back(k == 0 ? s.xi : s.c + s.Q * point_under(test.shape, random, depth));
             accumulate<true>(general, shape, s.law, s.Q, s.c, s.omega, s.v, xi.back());
           }
-          if constexpr (Shape<double>::kBending == Bending::ball) {
+          if constexpr (Shape<double>::kSums == PointSumForm::about_centre) {
             expect_same_sums(sphere_motion(s.c, {s.omega, s.v}, shape.radius), s, xi, general);
-          } else if constexpr (!std::is_same_v<Shape<double>, CapsuleDistance<double>>) {
+          } else if constexpr (Shape<double>::kSums == PointSumForm::faces) {
             expect_same_sums(FaceMotion<Shape, double>{{s.Q, s.c}, {s.omega, s.v}, shape}, s, xi,
                              general);
           }

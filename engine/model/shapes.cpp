@@ -1,0 +1,338 @@
+// SPDX-License-Identifier: Apache-2.0
+// One row for each shape: its name and size in files, mass and inertia for uniform density, contact
+// points.
+#include "engine/model/shapes.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/model/compiled_model.hpp"
+#include "kernels/contact/distance.hpp"
+#include "kernels/numbers/dual.hpp"
+
+namespace tangere {
+
+namespace {
+
+// --- masses: the numbers of a size in the order of SizeNumber::component, over any number type ---
+
+/// Mass and principal inertia, over any number type.
+template <class T>
+struct Principal {
+  T mass, xx, yy, zz;
+};
+
+struct BallMass {
+  template <class T>
+  static Principal<T> of(double density, const T* n) {
+    const T& r = n[0];
+    const T mass = density * 4.0 / 3.0 * M_PI * r * r * r, inertia = 0.4 * mass * r * r;
+    return {mass, inertia, inertia, inertia};
+  }
+};
+
+struct CuboidMass {
+  template <class T>
+  static Principal<T> of(double density, const T* n) {
+    const T &x = n[0], &y = n[1], &z = n[2];
+    const T mass = density * x * y * z;
+    return {mass, mass / 12 * (y * y + z * z), mass / 12 * (x * x + z * z),
+            mass / 12 * (x * x + y * y)};
+  }
+};
+
+struct CylinderMass {
+  template <class T>
+  static Principal<T> of(double density, const T* n) {
+    const T &r = n[0], &l = n[1];
+    const T square = r * r, mass = density * M_PI * square * l;
+    const T across = mass / 12 * (3 * square + l * l);
+    return {mass, across, across, mass / 2 * square};
+  }
+};
+
+/// A cylinder and two half balls, each with its centre of mass 3 r/8 beyond the cylinder's end.
+struct CapsuleMass {
+  template <class T>
+  static Principal<T> of(double density, const T* n) {
+    const T &r = n[0], &l = n[1];
+    const T tube = density * M_PI * r * r * l, ball = density * 4.0 / 3.0 * M_PI * r * r * r;
+    const T across =
+        tube * (l * l / 12 + r * r / 4) + ball * (0.4 * r * r + l * l / 4 + 0.375 * l * r);
+    return {tube + ball, across, across, tube * r * r / 2 + 0.4 * ball * r * r};
+  }
+};
+
+MassProperties centred(const Principal<double>& p) {
+  return {p.mass, {0, 0, 0}, {{{p.xx, 0, 0}, {0, p.yy, 0}, {0, 0, p.zz}}}};
+}
+template <class Form>
+MassProperties mass_of(const Shape& shape, double density) {
+  double n[3] = {0, 0, 0};
+  Shape copy = shape;
+  for (const SizeNumber& s : row_of(shape).sizes) n[s.component] = *s.at(copy);
+  return centred(Form::of(density, n));
+}
+template <class Form>
+MassProperties mass_slope(const Shape& shape, double density, int which) {
+  using D = kernels::Dual<double>;
+  D n[3] = {0, 0, 0};
+  Shape copy = shape;
+  for (const SizeNumber& s : row_of(shape).sizes)
+    n[s.component] = D(*s.at(copy), s.which == which ? 1 : 0);
+  const Principal<D> p = Form::of(density, n);
+  return centred({p.mass.epsilon, p.xx.epsilon, p.yy.epsilon, p.zz.epsilon});
+}
+
+// --- contact points ---
+
+/// Surface nodes of the grid.
+std::vector<double> points_of(const CuboidShape& shape) {
+  const std::array<int, 3>& n = shape.contact_resolution;
+  std::vector<double> points;
+  const auto coordinate = [&](int axis, int i) {
+    return -0.5 * shape.size[axis] + i * (shape.size[axis] / (n[axis] - 1));
+  };
+  const auto on_face = [&](int axis, int i) { return i == 0 || i == n[axis] - 1; };
+  for (int i = 0; i < n[0]; ++i)
+    for (int j = 0; j < n[1]; ++j)
+      for (int k = 0; k < n[2]; ++k) {
+        if (!on_face(0, i) && !on_face(1, j) && !on_face(2, k)) continue;
+        points.insert(points.end(), {coordinate(0, i), coordinate(1, j), coordinate(2, k)});
+      }
+  return points;
+}
+
+/// `count` points around z, the first along x.
+void add_ring(std::vector<double>& points, int count, double radius, double z) {
+  for (int j = 0; j < count; ++j) {
+    const double angle = 2 * M_PI * j / count;
+    points.insert(points.end(), {radius * std::cos(angle), radius * std::sin(angle), z});
+  }
+}
+
+std::vector<double> points_of(const CylinderShape& shape) {
+  std::vector<double> points;
+  for (const double z : {-0.5 * shape.length, 0.5 * shape.length}) {
+    points.insert(points.end(), {0, 0, z});
+    for (int k = 1; k <= shape.contact_rings; ++k)
+      add_ring(points, shape.contact_angles, shape.radius * k / shape.contact_rings, z);
+  }
+  return points;
+}
+
+std::vector<double> points_of(const CapsuleShape& shape) {
+  const double pole = 0.5 * shape.length + shape.radius;
+  std::vector<double> points = {0, 0, pole, 0, 0, -pole};
+  const int rings = shape.contact_rings;
+  for (int k = 0; k < rings; ++k) {
+    const double along =
+        rings > 1 ? double(k) / (rings - 1) : 0.5;  // a single ring goes around the middle
+    add_ring(points, shape.contact_angles, shape.radius, shape.length * (along - 0.5));
+  }
+  return points;
+}
+
+template <class S>
+std::vector<double> points_on(const Shape& shape) {
+  return points_of(std::get<S>(shape));
+}
+
+// --- the table ---
+
+template <class S>
+Shape make() {
+  return S{};
+}
+template <class S>
+double* radius(Shape& shape) {
+  return &std::get<S>(shape).radius;
+}
+template <class S>
+double* length(Shape& shape) {
+  return &std::get<S>(shape).length;
+}
+template <class S, int Axis>
+double* edge(Shape& shape) {
+  return &std::get<S>(shape).size[Axis];
+}
+template <class S, auto Member>
+int* count(Shape& shape) {
+  return &(std::get<S>(shape).*Member);
+}
+template <int Axis>
+int* cuboid_nodes(Shape& shape) {
+  return &std::get<CuboidShape>(shape).contact_resolution[Axis];
+}
+
+/// A size in three lengths along the body's axes.
+template <class S>
+std::vector<SizeNumber> edges() {
+  return {{2, 0, 0.5, edge<S, 0>}, {3, 1, 0.5, edge<S, 1>}, {4, 2, 0.5, edge<S, 2>}};
+}
+template <class S>
+std::vector<SizeNumber> rod() {
+  return {{1, 1, 0.5, length<S>}, {0, 0, 1, radius<S>}};
+}
+
+const std::vector<ShapeRow>& table() {
+  static const std::vector<ShapeRow> rows = {
+      {.name = "sphere",
+       .make = make<SphereShape>,
+       .distance = PrimitiveShape::sphere,
+       .sizes = {{0, 0, 1, radius<SphereShape>}},
+       .mass = mass_of<BallMass>,
+       .mass_by_size = mass_slope<BallMass>},
+      {.name = "cuboid",
+       .make = make<CuboidShape>,
+       .distance = PrimitiveShape::cuboid,
+       .sizes = edges<CuboidShape>(),
+       .counts = {{"general_contact_resolution",
+                   2,
+                   {cuboid_nodes<0>, cuboid_nodes<1>, cuboid_nodes<2>}}},
+       .mass = mass_of<CuboidMass>,
+       .mass_by_size = mass_slope<CuboidMass>,
+       .points = points_on<CuboidShape>},
+      {.name = "cylinder",
+       .make = make<CylinderShape>,
+       .distance = PrimitiveShape::cylinder,
+       .sizes = rod<CylinderShape>(),
+       .counts = {{"general_contact_angle_resolution",
+                   3,
+                   {count<CylinderShape, &CylinderShape::contact_angles>}},
+                  {"general_contact_radius_resolution",
+                   1,
+                   {count<CylinderShape, &CylinderShape::contact_rings>}}},
+       .mass = mass_of<CylinderMass>,
+       .mass_by_size = mass_slope<CylinderMass>,
+       .points = points_on<CylinderShape>},
+      {.name = "capsule",
+       .make = make<CapsuleShape>,
+       .distance = PrimitiveShape::capsule,
+       .sizes = rod<CapsuleShape>(),
+       .counts = {{"general_contact_resolution",
+                   2,
+                   {count<CapsuleShape, &CapsuleShape::contact_rings>,
+                    count<CapsuleShape, &CapsuleShape::contact_angles>}}},
+       .mass = mass_of<CapsuleMass>,
+       .mass_by_size = mass_slope<CapsuleMass>,
+       .points = points_on<CapsuleShape>},
+      {.name = "plane", .make = make<PlaneShape>, .distance = PrimitiveShape::plane},
+      {.name = "mesh",
+       .make = make<MeshShape>,
+       .mass = [](const Shape& s,
+                  double density) { return mesh_mass(std::get<MeshShape>(s), density); },
+       .points = [](const Shape& s) { return std::get<MeshShape>(s).vertices; }},
+      {.name = "abstract",
+       .make = make<AbstractShape>,
+       .mass =
+           [](const Shape& s, double) {
+             const auto& a = std::get<AbstractShape>(s);
+             const std::array<double, 6>& i = a.inertia;
+             return MassProperties{
+                 a.mass, {0, 0, 0}, {{{i[0], i[1], i[2]}, {i[1], i[3], i[4]}, {i[2], i[4], i[5]}}}};
+           },
+       .points = [](const Shape& s) { return std::get<AbstractShape>(s).contact_points; }}};
+  return rows;
+}
+
+}  // namespace
+
+const SizeNumber* ShapeRow::size(int which) const {
+  for (const SizeNumber& s : sizes)
+    if (s.which == which) return &s;
+  return nullptr;
+}
+
+std::span<const ShapeRow> shape_rows() { return table(); }
+const ShapeRow& row_of(const Shape& shape) {
+  return table()[shape.index()];  // in the order of its alternatives: Shapes.TheTableIsInOrder
+}
+const ShapeRow& row_of(PrimitiveShape shape) {
+  return *std::find_if(table().begin(), table().end(),
+                       [shape](const ShapeRow& row) { return row.distance == shape; });
+}
+
+std::string with_article(const char* name) {
+  return (std::string("aeiou").find(name[0]) != std::string::npos ? "an " : "a ") +
+         std::string(name);
+}
+std::string shapes_with(const std::function<bool(const ShapeRow&)>& has) {
+  std::vector<const char*> names;
+  for (const ShapeRow& row : shape_rows())
+    if (has(row)) names.push_back(row.name);
+  std::string text = with_article(names[0]);
+  for (std::size_t k = 1; k < names.size(); ++k)
+    text += (k + 1 < names.size() ? ", " : " or ") + std::string(names[k]);
+  return text;
+}
+
+std::string slenderness_fault(const ShapeRow& row, double least, double most) {
+  if (row.slenderness == 0 || most <= row.slenderness * least) return "";
+  return with_article(row.name) + " with a longest number of its size " +
+         std::to_string(most / least) + " times the shortest; expected at most " +
+         std::to_string(static_cast<int>(row.slenderness)) + " times";
+}
+std::string slenderness_fault(const Shape& shape) {
+  const ShapeRow& row = row_of(shape);
+  if (row.slenderness == 0) return "";
+  Shape copy = shape;
+  double least = INFINITY, most = 0;
+  for (const SizeNumber& s : row.sizes)
+    least = std::min(least, *s.at(copy)), most = std::max(most, *s.at(copy));
+  return slenderness_fault(row, least, most);
+}
+
+// --- what the rest of the engine asks of a shape ---
+
+const char* shape_name(const Shape& shape) { return row_of(shape).name; }
+bool has_distance(const Shape& shape) { return row_of(shape).distance.has_value(); }
+bool is_ball(const Shape& shape) {
+  return has_distance(shape) && kernels::is_ball(*row_of(shape).distance);
+}
+bool has_contact_points(const Shape& shape) {
+  const ShapeRow& row = row_of(shape);
+  return row.stretches() || !contact_points(shape).empty();
+}
+
+double* size_number(Shape& shape, int which) {
+  const SizeNumber* s = row_of(shape).size(which);
+  return s == nullptr ? nullptr : s->at(shape);
+}
+const char* size_name(int which) {
+  constexpr const char* kNames[kSizeNames] = {"radius", "length", "size[0]", "size[1]", "size[2]"};
+  return which >= 0 && which < kSizeNames ? kNames[which] : "unknown";
+}
+
+MassProperties mass_properties(const Shape& shape, double density) {
+  const ShapeRow& row = row_of(shape);
+  return row.mass != nullptr ? row.mass(shape, density) : centred({0, 0, 0, 0});
+}
+MassProperties mass_properties_by_size(const Shape& shape, double density, int which) {
+  return row_of(shape).mass_by_size(shape, density, which);
+}
+
+std::vector<double> contact_points(const Shape& shape) {
+  const ShapeRow& row = row_of(shape);
+  return row.points != nullptr ? row.points(shape) : std::vector<double>{};
+}
+
+void place_shape(const Shape& shape, CompiledBody& body) {
+  const ShapeRow& row = row_of(shape);
+  body.touchable = row.distance.has_value();
+  if (body.touchable) {
+    body.shape = *row.distance;
+    Shape copy = shape;
+    for (const SizeNumber& s : row.sizes) (&body.size.x)[s.component] = s.scale * *s.at(copy);
+    return;
+  }
+  const std::vector<double> p = contact_points(shape);
+  for (std::size_t k = 0; k < p.size(); k += 3)
+    body.size.x = std::max(body.size.x, std::hypot(p[k], p[k + 1], p[k + 2]));
+}
+
+kernels::Solid solid_of(const Shape& shape, const CompiledBody& body) {
+  return {body.frame, row_of(shape).stretches(), body.shape, body.size};
+}
+
+}  // namespace tangere

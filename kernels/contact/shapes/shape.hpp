@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a shape is to contacts and pads. Each file beside this one is one shape, over any number
+// type: its signed distance d (< 0 inside) with unit gradient n = ∇d everywhere, also where the
+// distance has a kink (centre, axis, edge, corner).
+//
+// A shape is a template S<N> with
+//   kShape, kBending, kSums      what it is, what its Hessian looks like, how its points are summed
+//   Pad<P>                       its distance under a pad, relative to a tile
+//   of(size)                     the shape of a size as in PairContact
+//   evaluate(y, …)               d and n; ball, flat: and κ; rod: and κ, e
+//   size_share(y, n, ρ̄)          cotangent of the size from that of the shape's place, inside
+//   nearer_than(shape, y, m)     whether d < m, m > 0; true by mistake at worst
+// and, where bodies of it have contact points of their own that follow their size,
+//   stretched(to, from, y)       where the contact point y of a shape `from` is on a shape `to`
+//   stretch_share(size, y, ȳ)    the same in reverse: Σ ȳ·∂y/∂size
+// and for faces, inside(y, κ): as evaluate() where d < 0, elsewhere some d ≥ 0.
+// What a shape does not specialise has a general form: Bending::general with hessian(d, n), sums
+// point by point, GeneralPad.
+#pragma once
+
+#include "kernels/contact/contact_types.hpp"
+#include "kernels/contact/shapes/tile.hpp"
+#include "kernels/numbers/inverse_sqrt.hpp"
+#include "kernels/numbers/linalg.hpp"
+
+namespace tangere::kernels {
+
+/// Value and gradient. Curvature comes apart.
+template <class N>
+struct Distance {
+  N d;
+  Vec3<N> n;
+};
+
+/// What the Hessian is inside a shape, the only place where contact looks.
+enum class Bending {
+  flat,  ///< H = 0
+  ball,  ///< H = κ (I - n nᵀ), and the shape looks the same from every side: it needs no
+         ///< orientation
+  rod,  ///< H = κ (I - n nᵀ - e z zᵀ), z the shape's axis; e = 1 where the surface is straight
+        ///< along z, else 0
+  general,  ///< any symmetric H with H n = 0
+};
+
+/// How the forces of many points on a shape are added up, with their derivatives.
+enum class PointSumForm {
+  about_centre,  ///< products about a ball's centre (sphere_contact.hpp)
+  faces,         ///< products, faces that bend in one direction at most (face_contact.hpp)
+  points,        ///< one point after the other (pair_contact.hpp)
+};
+
+/// Where a contact point keeps its place relative to a shape's lengths along its axes.
+template <class N>
+Vec3<N> stretched_along_axes(const Vec3<N>& to, const Vec3<double>& from, const Vec3<double>& y) {
+  return {N(y.x / from.x) * to.x, N(y.y / from.y) * to.y, N(y.z / from.z) * to.z};
+}
+template <class N>
+Vec3<N> axes_stretch_share(const Vec3<double>& size, const Vec3<N>& y, const Vec3<N>& bar) {
+  return {bar.x * y.x * N(1 / size.x), bar.y * y.y * N(1 / size.y), bar.z * y.z * N(1 / size.z)};
+}
+
+}  // namespace tangere::kernels

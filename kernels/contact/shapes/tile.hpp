@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// A shape against the points of one tile of a pad: what a shape's file needs to take its brackets.
+#pragma once
+
+#include "kernels/contact/contact_types.hpp"
+#include "kernels/numbers/linalg.hpp"
+
+namespace tangere::kernels {
+
+/// A shape in pad axes: pose, twist relative to the pad at the pad's origin, contact parameters of
+/// the sensor.
+template <class N>
+struct Touch {
+  Mat3<N> Q;
+  Vec3<N> c;
+  Vec3<N> omega, v;
+  N kn, kt, mu, damping;
+};
+
+struct TouchShape {
+  PrimitiveShape shape;
+  double size[3];  ///< as in PairContact [m]
+};
+
+/// A point from its tile's centre, pad axes [m].
+template <class N, bool Curved>
+struct PointOffset {
+  N x, y;  ///< z = 0
+};
+template <class N>
+struct PointOffset<N, true> {
+  N x, y, z;
+};
+/// A row of a matrix times it: a x + b y + c z.
+template <class N>
+N along(const N& a, const N& b, const N&, const PointOffset<N, false>& s) {
+  return mul_add(a, s.x, b * s.y);
+}
+template <class N>
+N along(const N& a, const N& b, const N& c, const PointOffset<N, true>& s) {
+  return mul_add(a, s.x, mul_add(b, s.y, c * s.z));
+}
+
+inline constexpr int kBracketRows = 10;  ///< the most that a shape has
+
+}  // namespace tangere::kernels
