@@ -17,7 +17,7 @@
 #include "io/files/part_file.hpp"
 #include "kernels/numbers/block.hpp"
 #include "kernels/table/isa.hpp"
-#include "tasks/run/task_episodes.hpp"
+#include "tasks/run/benchmark_run.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -53,13 +53,10 @@ void check_arguments(const Options& options) {
     throw InputError(fmt::format("--svg and --csv are both '{}'; expected two files", options.svg));
 }
 
-void check_size(const Model& model, const BenchSetting& setting, int most_threads) {
-  BenchmarkOptions options = setting.options;
-  options.threads = most_threads;
-  const double start =
-      static_cast<double>(model.state_bytes_per_environment()) * setting.environments;
-  check_memory(start + benchmark_bytes(model, setting.environments, options),
-               fmt::format("--envs {}", setting.environments));
+/// `of_benchmark`: memory that it takes besides the batch it starts from [bytes].
+void check_size(const Model& model, int environments, double of_benchmark) {
+  const double start = static_cast<double>(model.state_bytes_per_environment()) * environments;
+  check_memory(start + of_benchmark, fmt::format("--envs {}", environments));
 }
 
 void note_idle_threads(const Console& console, int environments, int most_threads) {
@@ -187,20 +184,17 @@ int bench_task(const Options& options, const Console& console, const Task& task)
   const std::vector<int> threads = thread_counts(options);
   const int most_threads = *std::max_element(threads.begin(), threads.end());
   note_idle_threads(console, setting.environments, most_threads);
-  check_memory(VectorTask::bytes(task, setting.environments, most_threads),
-               fmt::format("--envs {}", setting.environments));
-  VectorOptions vector;
-  vector.seed = options.seed.value_or(0);
-  vector.precision = setting.options.precision;
+  setting.options.threads = most_threads;
+  check_size(task.model(), setting.environments,
+             benchmark_bytes(task, setting.environments, setting.options));
+  const Batch start(task.model(), setting.environments, options.seed.value_or(0));
   const Json of_task{{"task", task.spec().name},
                      {"policy", to_string(kind)},
                      {"steps_per_action", task.spec().steps_per_action}};
-  return measure(
-      options, console, setting, threads, task.model(), of_task, [&](const BenchmarkGoOn& go_on) {
-        vector.threads = setting.options.threads;
-        return run_task_benchmark(task, policy, setting.environments, setting.options.rollout.steps,
-                                  setting.options.repeat, vector, go_on);
-      });
+  return measure(options, console, setting, threads, task.model(), of_task,
+                 [&](const BenchmarkGoOn& go_on) {
+                   return run_benchmark(start, task, policy, setting.options, go_on);
+                 });
 }
 
 int bench(const Options& options, const Console& console) {
@@ -222,7 +216,9 @@ int bench(const Options& options, const Console& console) {
   if (setting.options.frames != FrameKind::none)
     note_empty_sensors(console, model, setting.options.rollout);
   note_idle_threads(console, setting.environments, most_threads);
-  check_size(model, setting, most_threads);
+  setting.options.threads = most_threads;
+  check_size(model, setting.environments,
+             benchmark_bytes(model, setting.environments, setting.options));
   const Batch start(model, setting.environments, seed);
 
   return measure(options, console, setting, threads, model, {{"task", nullptr}},

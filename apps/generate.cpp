@@ -22,7 +22,7 @@
 #include "kernels/table/isa.hpp"
 #include "tasks/gradients/episode_gradients.hpp"
 #include "tasks/gradients/losses.hpp"
-#include "tasks/run/task_episodes.hpp"
+#include "tasks/run/episodes.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -128,8 +128,8 @@ std::vector<Failure> failures_of(const EpisodeSummary& summary) {
   return failures;
 }
 
-TaskReport report_of(const Task& task, PolicyKind policy, const TaskEpisodeSummary& summary) {
-  const auto played = summary.run.episodes - static_cast<std::int64_t>(summary.run.failures.size());
+TaskReport report_of(const Task& task, PolicyKind policy, const EpisodeSummary& summary) {
+  const auto played = summary.episodes - static_cast<std::int64_t>(summary.failures.size());
   TaskReport report;
   report.keys = {{"task", task.spec().name},
                  {"policy", to_string(policy)},
@@ -291,9 +291,8 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   job.run.seed = options.seed.value_or(0);
   job.run.precision = precision_named(options.precision);
   job.run.threads = options.threads.value_or(available_threads());
-  const auto of_task = [](const EpisodeOptions& run) {
-    return TaskEpisodeOptions{run.episodes, run.ranges, run.seed, run.precision, run.threads};
-  };
+  // Those that wait for an earlier one to be written included: episodes differ in length.
+  job.run.blocks_in_flight = 2 * job.run.threads + 1;
   const GradientKind gradients = gradients_wanted(options, true);
   const TaskActions actions = [&](const TaskView& view, std::span<const double> observation,
                                   std::span<double> action) {
@@ -303,7 +302,7 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
     return task_episode_gradients(task, actions, run, gradients, tape_bytes(options, run.threads));
   };
   const GradientPlan plan = checked(plan_of(job.run));
-  job.memory_bytes = task_episode_bytes(task, of_task(job.run)) + job.run.threads * plan.bytes;
+  job.memory_bytes = episode_bytes(task, job.run) + job.run.threads * plan.bytes;
   check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
   job.unit = "action";
   job.effects = effects_of(task.model());
@@ -311,10 +310,10 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
                            to_string(kind));
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
-    const TaskEpisodeSummary summary = with_gradients(plan_of(run), sink, [&](EpisodeSink& to) {
-      return run_task_episodes(task, policy, of_task(run), to, progress, stop);
+    const EpisodeSummary summary = with_gradients(plan_of(run), sink, [&](EpisodeSink& to) {
+      return run_episodes(task, policy, run, to, progress, stop);
     });
-    return {summary.run, report_of(task, kind, summary)};
+    return {summary, report_of(task, kind, summary)};
   };
   return make(options, console, job);
 }

@@ -22,7 +22,7 @@
 #include "kernels/table/isa.hpp"
 #include "tasks/gradients/gradients.hpp"
 #include "tasks/gradients/losses.hpp"
-#include "tasks/run/task_pilot.hpp"
+#include "tasks/run/rollout.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -302,12 +302,15 @@ int simulate_task(const Options& options, const Console& console, const ProgramI
   const Policy policy = make_policy(task, kind, options.controls);
   const Model& model = task.model();
   Stepper stepper(model);
-  const RolloutOptions rollout{TaskPilot::steps(task.spec()), options.every.value_or(0), precision,
-                               0};
+  const RolloutOptions rollout{TaskProgram::steps(task.spec()), options.every.value_or(0),
+                               precision, 0};
   note_empty_sensors(console, model, rollout);
   check_size(model, options.environments.value_or(1));
   Batch batch(model, options.environments.value_or(1), options.seed.value_or(0));
-  TaskPilot pilot(task, policy, batch, precision);
+  const auto data = std::make_shared<EnvironmentData>(task, batch.environments());
+  data->restart(batch);
+  TaskProgram program(task, policy, data, precision, batch.blocks());
+  for (int b = 0; b < batch.blocks(); ++b) program.start(batch, b);
 
   const StopSignals signals;
   TrajectoryFile output(options.output,
@@ -316,19 +319,20 @@ int simulate_task(const Options& options, const Console& console, const ProgramI
   return write_run(
       options, console, batch, stepper, rollout, output, signals,
       [&](const RolloutProgress& progress) {
-        return run_rollout(batch, stepper, pilot, rollout, output, progress);
+        return run_rollout(batch, stepper, program, rollout, output, progress);
       },
       [&] {
-        const double rate = static_cast<double>(pilot.successes()) / batch.environments();
+        const auto solved = std::count(data->success.begin(), data->success.end(), 1);
+        const double mean =
+            std::accumulate(data->returns.begin(), data->returns.end(), 0.0) / batch.environments();
         return TaskReport{
             {{"task", task.spec().name},
              {"policy", to_string(kind)},
-             {"successes", pilot.successes()},
-             {"success_rate", rate},
-             {"mean_return", pilot.mean_return()}},
+             {"successes", solved},
+             {"success_rate", static_cast<double>(solved) / batch.environments()},
+             {"mean_return", mean}},
             fmt::format("task {}, policy {}: {} of {} episodes solved, mean return {:.4g}",
-                        task.spec().name, to_string(kind), pilot.successes(), batch.environments(),
-                        pilot.mean_return())};
+                        task.spec().name, to_string(kind), solved, batch.environments(), mean)};
       });
 }
 

@@ -15,7 +15,7 @@ namespace {
 using kernels::kBlock;
 
 /// Of a task: one that a thread plays and those that wait for an earlier one to be written
-/// (tasks/run/task_episodes.cpp).
+/// (EpisodeOptions::blocks_in_flight).
 constexpr double kBlocksOfThread = 3;
 
 std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }

@@ -83,24 +83,15 @@ void GradientBlock::step(const InHand& h, std::int64_t t, BlockTape* tape) {
 void GradientBlock::forward(const InHand& h, std::vector<FailedEnvironment>& failures) {
   const bool whole = segment_ == options_.steps;
   checkpoints_.clear();
-  std::array<bool, kBlock> live{};
-  for (int e = h.first; e < h.last; ++e) {
-    live[count(e - h.first)] = !failed(h.batch.status(e));
-    if (failed(h.batch.status(e))) failures.push_back({e, -1, h.batch.status(e)});
-  }
+  StepTally tally(h.batch, h.first, h.last - h.first);
   if (whole) tape_.start(h.batch, h.block);
   for (std::int64_t t = 0; t < options_.steps && may_go_on(); ++t) {
     if (!whole && t % segment_ == 0) checkpoints_.push_back(h.batch.save_block(h.block));
     step(h, t, whole ? &tape_ : nullptr);
-    for (int e = h.first; e < h.last; ++e) {
-      bool& alive = live[count(e - h.first)];
-      if (!alive) continue;
-      newton_iterations_ += h.batch.iterations(e);
-      if (!failed(h.batch.status(e))) continue;
-      failures.push_back({e, t, h.batch.status(e)});
-      alive = false;
-    }
+    tally.count(h.batch, t);
   }
+  newton_iterations_ += tally.newton_iterations;
+  failures.insert(failures.end(), tally.failures.begin(), tally.failures.end());
 }
 
 void GradientBlock::backward(const InHand& h) {

@@ -2,18 +2,13 @@
 // A thread takes a block forward and back; blocks share nothing but the model.
 #include "tasks/gradients/gradients.hpp"
 
-#include <tbb/blocked_range.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <string>
 
 #include "engine/derivative/point_numbers.hpp"
 #include "kernels/numbers/block.hpp"
 #include "tasks/gradients/gradient_block.hpp"
-#include "tasks/run/thread_order.hpp"
+#include "tasks/run/block_threads.hpp"
 
 namespace tangere {
 namespace {
@@ -56,16 +51,10 @@ struct GradientRollouts::Impl {
   GradientOptions options;
   std::vector<GradientBlock> workers;  // by the thread's index in the arena
   std::size_t losses;
-  TaskOrder order;
-  tbb::global_control cap;
-  tbb::task_arena arena;
+  BlockThreads threads;
 
   Impl(const Model& m, const GradientOptions& o, std::span<const RolloutLoss* const> l)
-      : model(m),
-        options(o),
-        losses(l.size()),
-        cap(tbb::global_control::max_allowed_parallelism, std::size_t(o.threads)),
-        arena(o.threads) {
+      : model(m), options(o), losses(l.size()), threads(o.threads) {
     workers.reserve(std::size_t(o.threads));
     for (int i = 0; i < o.threads; ++i) workers.emplace_back(model, o, l);
   }
@@ -92,19 +81,9 @@ GradientSummary GradientRollouts::run(const Batch& start, const StepControls& co
   std::vector<double> u(std::size_t(start.environments()) * std::size_t(i.model.nu()));
   std::vector<std::vector<FailedEnvironment>> failures(std::size_t(start.blocks()));
   for (GradientBlock& worker : i.workers) worker.begin(go_on);
-  const auto run_blocks = [&](const tbb::blocked_range<int>& blocks) {
-    TaskOrder::arrive();
-    GradientBlock& worker = i.workers[std::size_t(tbb::this_task_arena::current_thread_index())];
-    const TaskOrder::Task task(i.order, &worker);
-    for (int b = blocks.begin(); b != blocks.end(); ++b)
-      worker.run(batch, b, controls, u, out, failures[std::size_t(b)]);
-  };
-  i.order.begin();
-  i.arena.execute([&] {
-    tbb::parallel_for(tbb::blocked_range<int>(0, batch.blocks(), 1),
-                      ByReference<decltype(run_blocks)>{&run_blocks}, tbb::simple_partitioner{});
+  i.threads.for_each(batch.blocks(), i.workers, [&](GradientBlock& worker, int b) {
+    worker.run(batch, b, controls, u, out, failures[std::size_t(b)]);
   });
-  i.order.end();
   for (const auto& of_block : failures)
     out.failures.insert(out.failures.end(), of_block.begin(), of_block.end());
   std::sort(out.failures.begin(), out.failures.end(),

@@ -13,7 +13,7 @@
 #include "engine/derivative/loss.hpp"
 #include "engine/step/batch.hpp"
 #include "engine/step/stepper.hpp"
-#include "tasks/run/rollout.hpp"
+#include "tasks/run/step_tally.hpp"
 
 namespace tangere {
 

@@ -3,15 +3,11 @@
 #include "tasks/gradients/task_gradients.hpp"
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 
 #include "tasks/gradients/task_gradient_block.hpp"
-#include "tasks/run/thread_order.hpp"
+#include "tasks/run/block_threads.hpp"
 
 namespace tangere {
 namespace {
@@ -57,26 +53,12 @@ TaskGradients task_gradients(const Task& task, const TaskActions& actions,
   std::vector<TaskGradientBlock> workers;  // by the thread's index in the arena
   workers.reserve(size(o.threads));
   for (int i = 0; i < o.threads; ++i) workers.emplace_back(task, o).begin(go_on);
-  const tbb::global_control cap(tbb::global_control::max_allowed_parallelism, size(o.threads));
-  tbb::task_arena arena(o.threads);
-  TaskOrder order;
-  const auto run = [&](const tbb::blocked_range<int>& range) {
-    TaskOrder::arrive();
-    TaskGradientBlock& worker = workers[size(tbb::this_task_arena::current_thread_index())];
-    const TaskOrder::Task task_of_thread(order, &worker);
-    for (int b = range.begin(); b != range.end(); ++b) {
-      const std::int64_t first = std::int64_t{b} * kernels::kBlock;
-      const auto count =
-          static_cast<int>(std::min<std::int64_t>(kernels::kBlock, o.episodes - first));
-      worker.run(o.first_episode + first, count, actions, first, out, lost[size(b)]);
-    }
-  };
-  order.begin();
-  arena.execute([&] {
-    tbb::parallel_for(tbb::blocked_range<int>(0, blocks, 1), ByReference<decltype(run)>{&run},
-                      tbb::simple_partitioner{});
+  BlockThreads(o.threads).for_each(blocks, workers, [&](TaskGradientBlock& worker, int b) {
+    const std::int64_t first = std::int64_t{b} * kernels::kBlock;
+    const auto count =
+        static_cast<int>(std::min<std::int64_t>(kernels::kBlock, o.episodes - first));
+    worker.run(o.first_episode + first, count, actions, first, out, lost[size(b)]);
   });
-  order.end();
   for (const auto& of_block : lost)
     out.lost.insert(out.lost.end(), of_block.begin(), of_block.end());
   std::sort(out.lost.begin(), out.lost.end(),

@@ -3,11 +3,6 @@
 // cache, and no thread waits for another between steps.
 #include "tasks/run/benchmark_run.hpp"
 
-#include <tbb/blocked_range.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -19,25 +14,12 @@
 #include "engine/step/stepper.hpp"
 #include "kernels/numbers/block.hpp"
 #include "tasks/run/benchmark_fields.hpp"
-#include "tasks/run/thread_order.hpp"
+#include "tasks/run/block_threads.hpp"
 
 namespace tangere {
 namespace {
 
 using kernels::kBlock;
-
-/// Scratch of one thread.
-struct Worker {
-  Worker(const Model& model, Precision precision) : stepper(model), readout(model, precision) {}
-  Stepper stepper;
-  Readout readout;
-};
-
-/// What one block did in one pass.
-struct BlockTally {
-  std::int64_t environment_steps = 0, newton_iterations = 0, tactile_points = 0;
-  std::vector<FailedEnvironment> failures;
-};
 
 std::uint64_t mix(std::uint64_t hash, std::uint64_t bits) {
   return std::rotl(hash ^ bits, 29) * 0x9e3779b97f4a7c15U + 0x632be59bd9b4e019U;
@@ -59,155 +41,199 @@ double cpu_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// An episode that can be run again and again, and all memory for it.
-class Episode {
+std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
+
+/// Scratch of one thread.
+struct Worker {
+  Stepper stepper;
+  Readout readout;
+  std::unique_ptr<EpisodeProgram> program;
+};
+
+/// What one block did in one pass.
+struct BlockTally {
+  std::int64_t environment_steps = 0, newton_iterations = 0, tactile_points = 0;
+  std::vector<FailedEnvironment> failures;
+};
+
+/// Episodes that can be run again and again, and all memory for them.
+class Benchmark {
  public:
-  Episode(const Batch& start, const ControlProgram& controls, const BenchmarkOptions& options,
-          const BenchmarkGoOn& go_on)
+  using MakeProgram = std::function<std::unique_ptr<EpisodeProgram>()>;
+
+  /// `task_data`: what programs of a task share, null for a scene.
+  Benchmark(const Batch& start, const BenchmarkOptions& options, const BenchmarkGoOn& go_on,
+            std::shared_ptr<EnvironmentData> task_data, const MakeProgram& make_program)
       : start_(start),
         batch_(start),
-        controls_(controls),
         options_(options),
         go_on_(go_on),
-        u_(lanes(start.environments()) * lanes(start.model().nu())),
-        fields_(start.model(), start.environments(), options.frames, options.precision),
-        tallies_(lanes(start.blocks())),
-        checksums_(lanes(start.environments())),
-        cap_(tbb::global_control::max_allowed_parallelism, lanes(options.threads)),
-        arena_(options.threads) {
-    workers_.reserve(lanes(options.threads));
+        data_(std::move(task_data)),
+        frames_(data_ == nullptr ? options.frames : FrameKind::none),
+        u_(size(start.environments()) * size(start.model().nu())),
+        fields_(start.model(), start.environments(), frames_, options.precision),
+        tallies_(size(start.blocks())),
+        checksums_(size(start.environments())),
+        threads_(options.threads) {
     for (int i = 0; i < options.threads; ++i)
-      workers_.emplace_back(start.model(), options.precision);
-    if (workers_[0].stepper.timestep() != controls.timestep())
-      throw InputError("controls laid out for a timestep of " +
-                       std::to_string(controls.timestep()) + " s; the scene's is " +
-                       std::to_string(workers_[0].stepper.timestep()) + " s");
+      workers_.push_back(
+          {Stepper(start.model()), Readout(start.model(), options.precision), make_program()});
   }
 
+  BenchmarkResult run() {
+    BenchmarkResult result;
+    pass(true);
+    report(result);
+    while (!stopped_ && std::ssize(result.times) < options_.repeat) {
+      const BenchmarkTime time = pass(false);
+      if (!stopped_) result.times.push_back(time);
+    }
+    result.stopped = stopped_;
+    return result;
+  }
+
+ private:
   /// One pass from the start; with `checked`, checksums are made, which takes time.
   BenchmarkTime pass(bool checked) {
     batch_ = start_;
+    for (Worker& worker : workers_)
+      if (TaskProgram* const task = worker.program->judged()) task->clear_counts();
+    if (data_ != nullptr) {
+      data_->restart(batch_);
+      threads_.for_each(batch_.blocks(), workers_, [&](Worker& w, int b) { start_block(b, w); });
+    }
     const double cpu = cpu_seconds();
     const auto begin = std::chrono::steady_clock::now();
-    const auto run_blocks = [&](const tbb::blocked_range<int>& blocks) {
-      TaskOrder::arrive();
-      Worker& worker = workers_[lanes(tbb::this_task_arena::current_thread_index())];
-      const TaskOrder::Task task(order_, &worker);
-      for (int b = blocks.begin(); b != blocks.end(); ++b) run_block(b, worker, checked);
-    };
-    order_.begin();
-    arena_.execute([&] {
-      // One block at a time to whoever is free: some blocks need more iterations than others, and
-      // the machine may have other work on some cores.
-      tbb::parallel_for(tbb::blocked_range<int>(0, batch_.blocks(), 1),
-                        ByReference<decltype(run_blocks)>{&run_blocks}, tbb::simple_partitioner{});
-    });
-    order_.end();
+    threads_.for_each(batch_.blocks(), workers_,
+                      [&](Worker& w, int b) { run_block(b, w, checked); });
     const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - begin;
     return {wall.count(), cpu_seconds() - cpu};
   }
-
-  [[nodiscard]] bool stopped() const { return stopped_; }
 
   /// Of the pass before.
   void report(BenchmarkResult& result) const {
     for (const BlockTally& tally : tallies_) {
       result.environment_steps += tally.environment_steps;
-      result.simulation_steps += tally.environment_steps;
       result.newton_iterations += tally.newton_iterations;
       result.tactile_points += tally.tactile_points;
       result.failures.insert(result.failures.end(), tally.failures.begin(), tally.failures.end());
     }
+    result.simulation_steps = result.environment_steps;
+    for (const Worker& worker : workers_)
+      if (const TaskProgram* const task = worker.program->judged()) {
+        result.environment_steps += task->counts().environment_steps;
+        result.simulation_steps += task->counts().simulation_steps;
+        result.newton_iterations += task->counts().newton_iterations;
+      }
     std::stable_sort(result.failures.begin(), result.failures.end(),
                      [](const auto& a, const auto& b) { return a.step < b.step; });
     result.checksums = checksums_;
   }
 
- private:
-  static std::size_t lanes(int n) { return static_cast<std::size_t>(n); }
-
-  void run_block(int block, Worker& worker, bool checked) {
-    const int first = block * kBlock, last = std::min(first + kBlock, batch_.environments());
-    const std::size_t nu = lanes(batch_.model().nu());
-    BlockTally tally;
-    if (checked)
-      for (int e = first; e < last; ++e)
-        checksums_[lanes(e)] = static_cast<std::uint64_t>(batch_.episode(e));
-    std::array<bool, kBlock> live{};
-    for (int e = first; e < last; ++e) live[lanes(e - first)] = !failed(batch_.status(e));
-    for (std::int64_t t = 0; t < options_.rollout.steps; ++t) {
-      if (go_on_ && !go_on_()) {
-        stopped_ = true;
-        return;
-      }
-      for (int e = first; e < last; ++e)
-        controls_.evaluate(t, batch_.episode(e), std::span(u_).subspan(lanes(e) * nu, nu));
-      worker.stepper.step_block(batch_, block, u_);
-      count(first, last, t, live, tally);
-      if (options_.frames != FrameKind::none)
-        read_fields(first, last, t + 1, live, worker, checked, tally);
-    }
-    if (checked) chain_states(first, last);
-    tallies_[lanes(block)] = std::move(tally);
+  void start_block(int block, Worker& worker) {
+    EpisodeProgram& program = *worker.program;
+    program.start(batch_, block);
+    if (program.opening_steps() == 0) return;
+    for (int t = 0; t < program.opening_steps(); ++t) take_step(t, block, worker);
+    program.judge(batch_, block);
   }
 
-  /// Environments that failed in this step leave `live`.
-  void count(int first, int last, std::int64_t step, std::array<bool, kBlock>& live,
-             BlockTally& tally) const {
-    for (int e = first; e < last; ++e) {
-      bool& alive = live[lanes(e - first)];
-      if (!alive) continue;
-      ++tally.environment_steps;
-      tally.newton_iterations += batch_.iterations(e);
-      if (!failed(batch_.status(e))) continue;
-      tally.failures.push_back({e, step, batch_.status(e)});
-      alive = false;
+  void take_step(std::int64_t t, int block, Worker& worker) {
+    worker.program->controls(t, batch_, block, u_);
+    worker.stepper.step_block(batch_, block, u_);
+    worker.program->look(t, batch_, block);
+  }
+
+  void run_block(int block, Worker& worker, bool checked) {
+    EpisodeProgram& program = *worker.program;
+    const int first = block * kBlock, last = first + lanes_of(batch_, block);
+    BlockTally tally;
+    StepTally steps(batch_, first, last - first);
+    if (checked)
+      for (int e = first; e < last; ++e)
+        checksums_[size(e)] = static_cast<std::uint64_t>(start_.episode(e));
+    for (std::int64_t row = 0; row < options_.rollout.steps; ++row) {
+      for (int k = 0; k < program.steps_per_row(); ++k) {
+        if (go_on_ && !go_on_()) {
+          stopped_ = true;
+          return;
+        }
+        const std::int64_t t = row * program.steps_per_row() + k;
+        take_step(program.opening_steps() + t, block, worker);
+        if (data_ != nullptr) continue;
+        steps.count(batch_, t);
+        if (frames_ != FrameKind::none)
+          read_fields(first, last, t + 1, steps, worker, checked, tally);
+      }
+      if (data_ == nullptr) continue;
+      program.judge(batch_, block);
+      if (checked) chain_action(first, last, row, tally);
     }
+    if (data_ == nullptr) {
+      tally.environment_steps = steps.environment_steps;
+      tally.newton_iterations = steps.newton_iterations;
+      tally.failures = std::move(steps.failures);
+      if (checked) chain_states(first, last);
+    }
+    tallies_[size(block)] = std::move(tally);
   }
 
   /// The fields due after `done` steps.
-  void read_fields(int first, int last, std::int64_t done, const std::array<bool, kBlock>& live,
-                   Worker& worker, bool checked, BlockTally& tally) {
+  void read_fields(int first, int last, std::int64_t done, const StepTally& steps, Worker& worker,
+                   bool checked, BlockTally& tally) {
     const std::span<const SensorInfo> sensors = batch_.model().sensors();
     for (std::size_t s = 0; s < sensors.size(); ++s) {
       const int sensor = static_cast<int>(s);
       if (done % tactile_interval(sensors[s], options_.rollout) != 0) continue;
       fields_.read(worker.readout, batch_, first / kBlock, sensor);
       for (int e = first; e < last; ++e) {
-        if (!live[lanes(e - first)]) continue;
+        if (!steps.live(e)) continue;
         tally.tactile_points += sensors[s].points;
-        if (checked) checksums_[lanes(e)] = fields_.chain(checksums_[lanes(e)], e, sensor);
+        if (checked) checksums_[size(e)] = fields_.chain(checksums_[size(e)], e, sensor);
       }
     }
   }
 
   void chain_states(int first, int last) {
-    std::vector<double> q(lanes(batch_.model().nq())), v(lanes(batch_.model().nv()));
+    std::vector<double> q(size(batch_.model().nq())), v(size(batch_.model().nv()));
     for (int e = first; e < last; ++e) {
       batch_.get_q(e, q);
       batch_.get_v(e, v);
-      checksums_[lanes(e)] = chain_bits(chain_bits(checksums_[lanes(e)], q), v);
+      checksums_[size(e)] = chain_bits(chain_bits(checksums_[size(e)], q), v);
+    }
+  }
+
+  void chain_action(int first, int last, std::int64_t action, BlockTally& tally) {
+    const EnvironmentData& d = *data_;
+    const std::size_t seen = d.observation.size() / d.reward.size();
+    for (int e = first; e < last; ++e) {
+      const std::size_t i = size(e);
+      const std::array<double, 4> rest{d.reward[i], double(d.terminated[i]), double(d.truncated[i]),
+                                       double(d.success[i])};
+      checksums_[i] =
+          chain_bits(chain_bits(checksums_[i], std::span(d.observation).subspan(i * seen, seen)),
+                     std::span<const double>(rest));
+      if (failed(batch_.status(e)) && d.truncated[i] != 0)
+        tally.failures.push_back({e, action, batch_.status(e)});
     }
   }
 
   const Batch& start_;
   Batch batch_;
-  const ControlProgram& controls_;
   const BenchmarkOptions& options_;
   const BenchmarkGoOn& go_on_;
+  std::shared_ptr<EnvironmentData> data_;
+  FrameKind frames_;
   std::vector<double> u_;  // (E, nu)
   BenchmarkFields fields_;
   std::vector<BlockTally> tallies_;
   std::vector<std::uint64_t> checksums_;
   std::vector<Worker> workers_;  // by the thread's index in the arena
   std::atomic<bool> stopped_{false};
-  TaskOrder order_;
-  // The arena alone is not enough where more threads are asked for than there are cores.
-  tbb::global_control cap_;
-  tbb::task_arena arena_;
+  BlockThreads threads_;
 };
 
-void check(const ControlProgram& controls, const BenchmarkOptions& options) {
+void check(const BenchmarkOptions& options) {
   const auto at_least_one = [](const char* what, std::int64_t value) {
     if (value < 1)
       throw InputError("a benchmark with " + std::to_string(value) + " " + what +
@@ -219,7 +245,6 @@ void check(const ControlProgram& controls, const BenchmarkOptions& options) {
   if (options.rollout.every < 0)
     throw InputError("tactile every " + std::to_string(options.rollout.every) +
                      " steps; expected 1 or more, or 0 for the scene's own");
-  controls.check_covers(options.rollout.steps);
 }
 
 double median_of(std::vector<double> values) {
@@ -267,16 +292,29 @@ BenchmarkTime BenchmarkResult::median() const {
 
 BenchmarkResult run_benchmark(const Batch& start, const ControlProgram& controls,
                               const BenchmarkOptions& options, const BenchmarkGoOn& go_on) {
-  check(controls, options);
-  Episode episode(start, controls, options, go_on);
-  BenchmarkResult result;
-  episode.pass(true);
-  episode.report(result);
-  while (!episode.stopped() && result.times.size() < static_cast<std::size_t>(options.repeat)) {
-    const BenchmarkTime time = episode.pass(false);
-    if (!episode.stopped()) result.times.push_back(time);
-  }
-  result.stopped = episode.stopped();
+  check(options);
+  controls.check_covers(options.rollout.steps);
+  const double timestep = Stepper(start.model()).timestep();
+  if (timestep != controls.timestep())
+    throw InputError("controls laid out for a timestep of " + std::to_string(controls.timestep()) +
+                     " s; the scene's is " + std::to_string(timestep) + " s");
+  return Benchmark(start, options, go_on, nullptr,
+                   [&] { return std::make_unique<SceneProgram>(controls); })
+      .run();
+}
+
+BenchmarkResult run_benchmark(const Batch& start, const Task& task, const Policy& policy,
+                              const BenchmarkOptions& options, const BenchmarkGoOn& go_on) {
+  check(options);
+  const auto data = std::make_shared<EnvironmentData>(task, start.environments());
+  BenchmarkResult result =
+      Benchmark(start, options, go_on, data, [&] {
+        return std::make_unique<TaskProgram>(task, policy, data, options.precision, 1,
+                                             TaskProgram::AtEnd::again);
+      }).run();
+  result.tactile_points = static_cast<std::int64_t>(task.tactile_size() / 3) *
+                          std::ssize(task.spec().moments) * start.environments() *
+                          options.rollout.steps;
   return result;
 }
 
@@ -287,6 +325,13 @@ double benchmark_bytes(const Model& model, int environments, const BenchmarkOpti
                                  sizeof(std::uint64_t);
   const double per_thread = static_cast<double>(Stepper::workspace_bytes(model));
   return environments * per_environment + options.threads * per_thread;
+}
+
+double benchmark_bytes(const Task& task, int environments, const BenchmarkOptions& options) {
+  BenchmarkOptions no_fields = options;
+  no_fields.frames = FrameKind::none;
+  return benchmark_bytes(task.model(), environments, no_fields) +
+         environments * EnvironmentData::bytes(task) + options.threads * BlockWorker::bytes(task);
 }
 
 }  // namespace tangere

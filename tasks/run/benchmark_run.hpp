@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whole episodes for the clock: scene's controls in, every tactile field read, nothing written.
-// Blocks of environments are spread over threads and never wait for each other.
+// Whole episodes for the clock: a scene's controls in and every tactile field read, or a task's
+// policy in and every action judged; nothing written. Blocks of environments are spread over
+// threads and never wait for each other.
 #pragma once
 
 #include <cstdint>
@@ -24,9 +25,9 @@ enum class FrameKind {
 const char* to_string(FrameKind value);
 
 struct BenchmarkOptions {
-  RolloutOptions rollout;  ///< steps, and the interval of fields
-  FrameKind frames = FrameKind::dense;
-  Precision precision = Precision::f64;  ///< of the fields: mixed ones are kept in float
+  RolloutOptions rollout;  ///< steps (of a task: actions), and of a scene the interval of fields
+  FrameKind frames = FrameKind::dense;   ///< of a scene
+  Precision precision = Precision::f64;  ///< of the fields: a scene's mixed ones are kept in float
   int threads = 1;
   int repeat = 3;  ///< timed passes over the whole episode
 };
@@ -38,15 +39,16 @@ struct BenchmarkTime {
 };
 
 struct BenchmarkResult {
-  std::vector<BenchmarkTime> times;    ///< one per timed pass, in their order
-  std::int64_t environment_steps = 0;  ///< tried in one pass, failing ones included
+  std::vector<BenchmarkTime> times;  ///< one per timed pass, in their order
+  std::int64_t environment_steps =
+      0;  ///< tried in one pass, failing ones included; a task's: actions
   std::int64_t simulation_steps =
       0;  ///< the same of a scene; of a task those of its actions, resets included
   std::int64_t newton_iterations = 0;       ///< of one pass, over simulation_steps
   std::int64_t tactile_points = 0;          ///< read in one pass
   std::vector<FailedEnvironment> failures;  ///< in the order of their steps
   /// One per environment: chains the bits of every field in the order of time, then of the final
-  /// state. Depends on the environment's episode, not on threads, blocks or the size of the batch.
+  /// state; of a task those of observations, rewards and flags. Depends on the environment's episode, not on threads, blocks or the size of the batch.
   std::vector<std::uint64_t> checksums;
   bool stopped = false;  ///< `go_on` returned false; the times are of complete passes only
 
@@ -74,7 +76,13 @@ using BenchmarkGoOn = std::function<bool()>;
 BenchmarkResult run_benchmark(const Batch& start, const ControlProgram& controls,
                               const BenchmarkOptions& options, const BenchmarkGoOn& go_on = {});
 
+/// The same of a task's episodes, played by a policy from a batch that nothing has been done to:
+/// environments start anew as their episodes end, as those of a VectorTask do.
+BenchmarkResult run_benchmark(const Batch& start, const Task& task, const Policy& policy,
+                              const BenchmarkOptions& options, const BenchmarkGoOn& go_on = {});
+
 /// Memory that run_benchmark takes besides `start` [bytes].
 double benchmark_bytes(const Model& model, int environments, const BenchmarkOptions& options);
+double benchmark_bytes(const Task& task, int environments, const BenchmarkOptions& options);
 
 }  // namespace tangere

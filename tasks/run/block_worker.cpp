@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "kernels/numbers/block.hpp"
+#include "tasks/run/block_reader.hpp"
 
 namespace tangere {
 
@@ -57,6 +58,20 @@ double EnvironmentData::bytes(const Task& task) {
   return static_cast<double>(numbers * sizeof(double) + 5 + sizeof(Moment));
 }
 
+void EnvironmentData::restart(const Batch& batch) {
+  for (std::size_t e = 0; e < state.size(); ++e)
+    next_episode[e] = batch.episode(static_cast<int>(e));
+  std::fill(state.begin(), state.end(), EnvironmentState::to_start);
+}
+
+void EnvironmentData::start_next(int first, int environments) {
+  for (std::size_t e = size(first); e < size(first + environments); ++e) {
+    if (state[e] != EnvironmentState::over) continue;
+    state[e] = EnvironmentState::to_start;
+    next_episode[e] = episodes[e] + std::ssize(state);
+  }
+}
+
 TaskView view_of(const Batch& batch, const EnvironmentData& data, int environment) {
   const std::size_t e = size(environment), environments = data.reward.size();
   const std::size_t memory = data.memory.size() / environments,
@@ -71,7 +86,6 @@ TaskView view_of(const Batch& batch, const EnvironmentData& data, int environmen
 
 BlockWorker::BlockWorker(const Task& task, Precision precision)
     : task_(task),
-      stepper_(task.model()),
       readout_(task.model(), precision),
       varying_(task.model().scene().randomizations.size()) {
   const TaskSpec& spec = task.spec();
@@ -93,8 +107,7 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
 double BlockWorker::bytes(const Task& task) {
   const std::size_t numbers = size(task.model().nq()) + size(task.model().nv()) +
                               task.end_effectors_size() + task.tactile_size();
-  return static_cast<double>(task.spec().moments.size() * kBlock * numbers * sizeof(double)) +
-         static_cast<double>(Stepper::workspace_bytes(task.model()));
+  return static_cast<double>(task.spec().moments.size() * kBlock * numbers * sizeof(double));
 }
 
 std::span<double> BlockWorker::part(std::vector<double>& of_moments, std::size_t moment,
@@ -103,12 +116,12 @@ std::span<double> BlockWorker::part(std::vector<double>& of_moments, std::size_t
   return std::span(of_moments).subspan((moment * kBlock + size(lane)) * width, width);
 }
 
-void BlockWorker::act(Batch& batch, EnvironmentData& data, int block,
+void BlockWorker::act(Batch& batch, Stepper& stepper, EnvironmentData& data, int block,
                       std::span<const double> actions, VectorCounts& counts) {
   begin(batch, data, block, actions);
   for (int k = 0; k < task_.spec().steps_per_action; ++k) {
     ask_for_controls(batch, data, block, k);
-    stepper_.step_block(batch, block, data.u);
+    stepper.step_block(batch, block, data.u);
     look_after(batch, block, k, counts);
   }
   conclude(batch, data, block, counts);
@@ -229,26 +242,21 @@ void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environme
 }
 
 void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
-  const TaskSpec& spec = task_.spec();
-  const int first = block * kBlock, environments = std::min(kBlock, batch.environments() - first);
-  std::array<std::span<double>, kBlock> parts;
-  for (int lane = 0; lane < environments; ++lane) {
-    batch.get_q(first + lane, part(q_, moment, lane));
-    batch.get_v(first + lane, part(v_, moment, lane));
-  }
-  if (task_.end_effectors_size() > 0) {
-    for (int lane = 0; lane < environments; ++lane)
-      parts[size(lane)] = part(end_effectors_, moment, lane);
-    readout_.read_end_effectors(batch, block, parts);
-  }
-  if (!spec.looks_at_tactile) return;
+  const int first = block * kBlock;
+  const auto place = [&](std::vector<double>& of_moments) {
+    return
+        [this, &of_moments, moment, first](int e) { return part(of_moments, moment, e - first); };
+  };
+  read_states(batch, block, place(q_), place(v_));
+  if (task_.end_effectors_size() > 0)
+    read_end_effectors(readout_, batch, block, place(end_effectors_));
+  if (!task_.spec().looks_at_tactile) return;
   std::size_t offset = 0;
   for (std::size_t s = 0; s < task_.model().sensors().size(); ++s) {
     const std::size_t numbers = 3 * size(task_.model().sensors()[s].points);
-    for (int lane = 0; lane < environments; ++lane)
-      parts[size(lane)] = part(tactile_, moment, lane).subspan(offset, numbers);
-    readout_.read_block(batch, block, static_cast<int>(s),
-                        std::span<const std::span<double>>(parts));
+    read_field<double>(readout_, batch, block, static_cast<int>(s), [&](int e) {
+      return part(tactile_, moment, e - first).subspan(offset, numbers);
+    });
     offset += numbers;
   }
 }

@@ -24,6 +24,12 @@ struct EnvironmentData {
   EnvironmentData(const Task& task, int environments);
   static double bytes(const Task& task);  ///< of one environment
 
+  /// All of them start the episodes that the batch has drawn.
+  void restart(const Batch& batch);
+  /// Those from `first` on whose episode is over start another one at their next action: environment
+  /// e plays e, e + E, e + 2 E … of the first ones.
+  void start_next(int first, int environments);
+
   std::vector<double> memory, action, observation, u, q, v;
   std::vector<double> reward, returns;
   std::vector<std::uint8_t> terminated, truncated, success, starting;
@@ -37,8 +43,8 @@ class BlockWorker {
   BlockWorker(const Task& task, Precision precision);
 
   /// `actions`: (E, action), empty where every environment of the block starts.
-  void act(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions,
-           VectorCounts& counts);
+  void act(Batch& batch, Stepper& stepper, EnvironmentData& data, int block,
+           std::span<const double> actions, VectorCounts& counts);
 
   // The parts of act(), for whoever steps the batch himself: begin, for every step k ask, step,
   // look, then conclude.
@@ -65,7 +71,6 @@ class BlockWorker {
                                        int lane) const;
 
   const Task& task_;
-  Stepper stepper_;
   Readout readout_;
   std::optional<Stepper> settling_stepper_;
   std::optional<Batch> settling_;                        // one environment

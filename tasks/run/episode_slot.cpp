@@ -1,33 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-// Row j: observe the state after j K steps, then hold the action of step j K for K steps. The row
+// Row j: what is observed before action j, then the action, held or followed for K steps. The row
 // after the last action is observed only.
 #include "tasks/run/episode_slot.hpp"
 
 #include <algorithm>
-#include <array>
-#include <type_traits>
+
+#include "tasks/run/block_reader.hpp"
 
 namespace tangere {
 namespace {
 
-constexpr int kForceWidth = 3, kPositionWidth = 3;
+std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
-std::size_t size(int n) { return static_cast<std::size_t>(n); }
+constexpr std::size_t kQ = 0, kV = 1, kThird = 2;  // names of observations
 
-constexpr std::size_t kQ = 0, kV = 1,
-                      kEndEffectors =
-                          2;  // names of observations; without end effectors a sensor is the third
+std::size_t number_bytes(const EpisodeOptions& options) {
+  return options.precision == Precision::mixed ? sizeof(float) : sizeof(double);
+}
 
-/// Bytes of one row of one episode in a slot's buffers: what is no field is kept in double first.
-double row_bytes(const EpisodeShape& shape, const EpisodeOptions& options) {
-  const bool single = options.precision == Precision::mixed;
-  double bytes = static_cast<double>(shape.nu) * sizeof(float);
-  for (std::size_t name = 0; name < shape.widths.size(); ++name) {
-    const std::size_t number = !single                     ? sizeof(double)
-                               : name < shape.first_sensor ? sizeof(double) + sizeof(float)
-                                                           : sizeof(float);
-    bytes += static_cast<double>(shape.widths[name] * number);
-  }
+/// Of one row of one episode in a slot's buffers.
+double row_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
+  double bytes = static_cast<double>(source.action + (source.whole ? 1 : 0)) * sizeof(float);
+  for (const std::size_t width : source.widths)
+    bytes += static_cast<double>(width * number_bytes(options));
   return bytes;
 }
 
@@ -43,177 +38,259 @@ int whole_rows(int most) {
 
 }  // namespace
 
-EpisodeShape::EpisodeShape(const Model& model, const EpisodeOptions& options)
-    : rows(::tangere::action_rows(options)), nu(size(model.nu())) {
-  widths = {size(model.nq()), size(model.nv())};
-  if (!model.end_effectors().empty())
-    widths.push_back(kPositionWidth * model.end_effectors().size());
-  first_sensor = widths.size();
-  for (const SensorInfo& sensor : model.sensors())
-    widths.push_back(kForceWidth * size(sensor.points));
+int piece_rows(const EpisodeSource& source, const EpisodeOptions& options) {
+  if (source.whole) return static_cast<int>(source.rows) + 1;
   const double fitting =
-      static_cast<double>(options.piece_bytes) / (kBlockEpisodes * row_bytes(*this, options));
+      static_cast<double>(options.piece_bytes) / (kBlockEpisodes * row_bytes(source, options));
   constexpr std::int64_t kMostRows = 1 << 20;  // rows without numbers still are counted by an int
-  piece_rows = static_cast<int>(
-      std::clamp(fitting, 1.0, static_cast<double>(std::min(rows + 1, kMostRows))));
-  if (piece_rows <= rows) piece_rows = whole_rows(piece_rows);
+  const auto rows = static_cast<int>(
+      std::clamp(fitting, 1.0, static_cast<double>(std::min(source.rows + 1, kMostRows))));
+  return rows <= source.rows ? whole_rows(rows) : rows;
 }
 
-double EpisodeShape::piece_bytes(const EpisodeOptions& options) const {
-  return row_bytes(*this, options) * kBlockEpisodes * piece_rows;
+double piece_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
+  return row_bytes(source, options) * kBlockEpisodes * piece_rows(source, options);
 }
 
-EpisodeSlot::EpisodeSlot(const Model& model, const StepperOptions& solver,
-                         const ControlProgram& controls, const EpisodeOptions& options,
-                         const EpisodeShape& shape)
-    : model_(model),
-      controls_(controls),
+template <class T>
+EpisodeSlot<T>::EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& options)
+    : source_(source),
       options_(options),
-      shape_(shape),
-      stepper_(model, solver),
-      readout_(model, options.precision),
-      u_(kBlockEpisodes * shape.nu),
-      values_(shape.widths.size()),
-      singles_(shape.widths.size()),
-      actions_(kBlockEpisodes * size(shape.piece_rows) * shape.nu),
-      observations_(shape.widths.size()),
-      live_(kBlockEpisodes) {
+      piece_rows_(piece_rows(source, options)),
+      stepper_(*source.model, source.solver),
+      readout_(*source.model, options.precision),
+      u_(kBlockEpisodes * size(source.model->nu())),
+      values_(source.widths.size()),
+      actions_(kBlockEpisodes * size(piece_rows_) * source.action),
+      rewards_(source.whole ? kBlockEpisodes * size(piece_rows_) : 0),
+      observations_(source.widths.size()) {
   for (std::size_t name = 0; name < values_.size(); ++name) {
-    const std::size_t numbers = kBlockEpisodes * size(shape.piece_rows) * shape.widths[name];
-    const bool single = options.precision == Precision::mixed;
-    if (!single || name < shape.first_sensor) values_[name].resize(numbers);
-    if (single) singles_[name].resize(numbers);
+    values_[name].resize(kBlockEpisodes * size(piece_rows_) * source.widths[name]);
+    small_.resize(std::max(small_.size(), name < source.first_sensor ? source.widths[name] : 0));
   }
 }
 
-void EpisodeSlot::begin(std::int64_t block) {
-  const std::int64_t first = block * kBlockEpisodes;
-  const auto episodes =
-      static_cast<int>(std::min<std::int64_t>(kBlockEpisodes, options_.episodes - first));
-  batch_.emplace(model_, episodes, options_.seed, first);
+template <class T>
+void EpisodeSlot<T>::begin(EpisodeRange range) {
+  const auto episodes = static_cast<int>(range.end - range.first);
+  batch_.emplace(*source_.model, episodes, options_.seed, range.first);
+  program_ = source_.program(*batch_);
+  program_->start(*batch_, 0);
+  tally_.emplace(*batch_, 0, episodes);
   next_row_ = 0;
+  if (program_->opening_steps() > 0) {
+    static_cast<void>(take_steps(0, program_->opening_steps(), {}));
+    program_->judge(*batch_, 0);
+  }
   randomized_.clear();
   for (int e = 0; e < episodes; ++e)
-    for (int k = 0; k < static_cast<int>(model_.scene().randomizations.size()); ++k)
+    for (int k = 0; k < std::ssize(source_.model->scene().randomizations); ++k)
       randomized_.push_back(batch_->randomized_value(e, k));
+  playing_.assign(size(episodes), true);
+  ends_.clear();
   failures_.clear();
-  live_.assign(size(episodes), true);
 }
 
-bool EpisodeSlot::simulate(const StopRequest& stop) {
+template <class T>
+bool EpisodeSlot<T>::simulate(const StopRequest& stop,
+                              const std::function<void(std::int64_t)>& told) {
   first_row_ = next_row_;
-  rows_ = static_cast<int>(std::min<std::int64_t>(shape_.piece_rows, shape_.rows + 1 - first_row_));
-  action_rows_ = static_cast<int>(std::min<std::int64_t>(rows_, shape_.rows - first_row_));
-  counts_ = {};
+  rows_ = static_cast<int>(std::min<std::int64_t>(piece_rows_, source_.rows + 1 - first_row_));
+  action_rows_ = static_cast<int>(std::min<std::int64_t>(rows_, source_.rows - first_row_));
   for (int row = 0; row < rows_; ++row) {
     observe(row);
-    if (row < action_rows_ && !act(row, stop)) return false;
+    if (row == action_rows_ || std::count(playing_.begin(), playing_.end(), true) == 0) break;
+    const std::int64_t before = environment_steps();
+    if (!act(row, stop)) return false;
+    told(environment_steps() - before);
   }
   next_row_ += rows_;
+  if (last()) collect();
+  for (std::size_t name = 0; name < values_.size(); ++name)
+    observations_[name] =
+        std::span<const T>(values_[name])
+            .first(size(batch_->environments()) * size(rows_) * source_.widths[name]);
   return true;
 }
 
 template <class T>
-std::span<T> EpisodeSlot::numbers(std::size_t name, int episode, int row) {
-  const std::size_t width = shape_.widths[name];
-  const std::size_t first = (size(episode) * size(rows_) + size(row)) * width;
-  if constexpr (std::is_same_v<T, float>) {
-    return std::span(singles_[name]).subspan(first, width);
+std::span<T> EpisodeSlot<T>::numbers(std::size_t name, int episode, int row) {
+  const std::size_t width = source_.widths[name];
+  return std::span(values_[name]).subspan((size(episode) * size(rows_) + size(row)) * width, width);
+}
+
+template <class T>
+void EpisodeSlot<T>::put(std::size_t name, int episode, int row, std::span<const double> from) {
+  std::transform(from.begin(), from.end(), numbers(name, episode, row).begin(),
+                 [](double x) { return static_cast<T>(x); });
+}
+
+template <class T>
+std::int64_t EpisodeSlot<T>::environment_steps() const {
+  const TaskProgram* const task = program_->judged();
+  return task != nullptr ? task->counts().environment_steps : tally_->environment_steps;
+}
+
+/// Of episodes that are over: no more.
+template <class T>
+void EpisodeSlot<T>::observe(int row) {
+  for (int e = 0; e < batch_->environments(); ++e) {
+    if (!playing_[size(e)]) continue;
+    const std::span<double> q = std::span(small_).first(source_.widths[kQ]),
+                            v = std::span(small_).first(source_.widths[kV]);
+    batch_->get_q(e, q);
+    put(kQ, e, row, q);
+    batch_->get_v(e, v);
+    put(kV, e, row, v);
+  }
+  if (const TaskProgram* const task = program_->judged()) {
+    observe_task(*task, row);
   } else {
-    return std::span(values_[name]).subspan(first, width);
+    observe_scene(row);
   }
 }
 
-void EpisodeSlot::observe(int row) {
+template <class T>
+void EpisodeSlot<T>::observe_task(const TaskProgram& task, int row) {
+  const EnvironmentData& data = task.data();
+  const std::size_t width = task.task().spec().observation_size();
   for (int e = 0; e < batch_->environments(); ++e) {
-    batch_->get_q(e, numbers<double>(kQ, e, row));
-    batch_->get_v(e, numbers<double>(kV, e, row));
+    if (!playing_[size(e)]) continue;
+    std::span<const double> rest = std::span(data.observation).subspan(size(e) * width, width);
+    for (std::size_t name = kThird; name < source_.widths.size(); ++name) {
+      put(name, e, row, rest.first(source_.widths[name]));
+      rest = rest.subspan(source_.widths[name]);
+    }
+    playing_[size(e)] = data.state[size(e)] == EnvironmentState::running;
   }
-  if (shape_.first_sensor > kEndEffectors) {
-    std::array<std::span<double>, kBlockEpisodes> positions;
+}
+
+template <class T>
+void EpisodeSlot<T>::observe_scene(int row) {
+  if (source_.first_sensor > kThird) {
+    std::vector<double> positions(size(batch_->environments()) * source_.widths[kThird]);
+    const auto place = [&](int e) {
+      return std::span(positions).subspan(size(e) * source_.widths[kThird], source_.widths[kThird]);
+    };
+    read_end_effectors(readout_, *batch_, 0, place);
+    for (int e = 0; e < batch_->environments(); ++e) put(kThird, e, row, place(e));
+  }
+  for (std::size_t name = source_.first_sensor; name < source_.widths.size(); ++name)
+    read_field<T>(readout_, *batch_, 0, static_cast<int>(name - source_.first_sensor),
+                  [&](int e) { return numbers(name, e, row); });
+}
+
+template <class T>
+bool EpisodeSlot<T>::act(int row, const StopRequest& stop) {
+  const int steps = program_->steps_per_row();
+  const std::int64_t first = program_->opening_steps() + (first_row_ + row) * steps;
+  program_->controls(first, *batch_, 0, u_);
+  keep_action(row);
+  if (!take_steps(first, steps, stop)) return false;
+  program_->judge(*batch_, 0);
+  if (const TaskProgram* const task = program_->judged())
     for (int e = 0; e < batch_->environments(); ++e)
-      positions[size(e)] = numbers<double>(kEndEffectors, e, row);
-    readout_.read_end_effectors(*batch_, 0, positions);
+      if (playing_[size(e)])
+        rewards_[size(e) * size(action_rows_) + size(row)] =
+            static_cast<float>(task->data().reward[size(e)]);
+  return true;
+}
+
+/// The controls of step `from` are in place if it begins a row.
+template <class T>
+bool EpisodeSlot<T>::take_steps(std::int64_t from, std::int64_t count, const StopRequest& stop) {
+  const bool asked = from >= program_->opening_steps();
+  for (std::int64_t t = from; t < from + count; ++t) {
+    if (stop && stop()) return false;
+    if (t > from || !asked) program_->controls(t, *batch_, 0, u_);
+    stepper_.step(*batch_, u_);
+    tally_->count(*batch_, t);
+    program_->look(t, *batch_, 0);
   }
-  for (std::size_t name = shape_.first_sensor; name < shape_.widths.size(); ++name) {
-    const auto sensor = static_cast<int>(name - shape_.first_sensor);
-    if (options_.precision == Precision::mixed) {
-      read_field<float>(sensor, row);
-    } else {
-      read_field<double>(sensor, row);
+  return true;
+}
+
+/// As it was taken: within its bounds.
+template <class T>
+void EpisodeSlot<T>::keep_action(int row) {
+  const TaskProgram* const task = program_->judged();
+  const std::size_t width = source_.action;
+  for (int e = 0; e < batch_->environments(); ++e) {
+    if (!playing_[size(e)]) continue;
+    const std::vector<double>& from = task != nullptr ? task->data().action : u_;
+    float* const to = actions_.data() + (size(e) * size(action_rows_) + size(row)) * width;
+    for (std::size_t k = 0; k < width; ++k) {
+      const double x = from[size(e) * width + k];
+      to[k] = static_cast<float>(task != nullptr ? x : std::clamp(x, -1.0, 1.0));
     }
   }
 }
 
+/// How the block's episodes ended.
 template <class T>
-void EpisodeSlot::read_field(int sensor, int row) {
-  std::array<std::span<T>, kBlockEpisodes> fields;
-  for (int e = 0; e < batch_->environments(); ++e)
-    fields[size(e)] = numbers<T>(shape_.first_sensor + size(sensor), e, row);
-  readout_.read_block(*batch_, 0, sensor, fields);
-}
-
-bool EpisodeSlot::act(int row, const StopRequest& stop) {
-  const std::int64_t begin = (first_row_ + row) * options_.every;
-  const std::size_t nu = shape_.nu;
-  for (int e = 0; e < batch_->environments(); ++e) {
-    const std::span<double> u = std::span(u_).subspan(size(e) * nu, nu);
-    controls_.evaluate(begin, batch_->episode(e), u);
-    float* const action = actions_.data() + (size(e) * size(action_rows_) + size(row)) * nu;
-    for (std::size_t k = 0; k < nu; ++k)
-      action[k] = static_cast<float>(std::clamp(u[k], -1.0, 1.0));
+void EpisodeSlot<T>::collect() {
+  if (const TaskProgram* const task = program_->judged()) {
+    const EnvironmentData& d = task->data();
+    for (std::size_t e = 0; e < d.length.size(); ++e)
+      ends_.push_back({d.length[e], d.returns[e], d.terminated[e] != 0, d.success[e] != 0});
   }
-  for (int k = 0; k < options_.every; ++k) {
-    if (stop && stop()) return false;
-    stepper_.step(*batch_, u_);
-    count(begin + k);
-  }
-  return true;
-}
-
-void EpisodeSlot::count(std::int64_t step) {
   for (int e = 0; e < batch_->environments(); ++e) {
-    if (!live_[size(e)]) continue;
-    const StepStatus status = batch_->status(e);
-    ++counts_.environment_steps;
-    counts_.newton_iterations += batch_->iterations(e);
-    counts_.split_steps += status == StepStatus::split ? 1 : 0;
-    if (!failed(status)) continue;
-    live_[size(e)] = false;
+    if (!failed(batch_->status(e))) continue;
     FailedEpisode& failure = failures_.emplace_back();
-    failure = {batch_->episode(e), step, status, std::vector<double>(size(model_.nq())),
-               std::vector<double>(size(model_.nv()))};
+    failure = {batch_->episode(e), step_of_failure(e), batch_->status(e),
+               std::vector<double>(source_.widths[kQ]), std::vector<double>(source_.widths[kV])};
     batch_->get_q(e, failure.q);
     batch_->get_v(e, failure.v);
   }
 }
 
-void EpisodeSlot::encode() {
-  for (std::size_t name = 0; name < values_.size(); ++name) {
-    const std::size_t numbers = size(batch_->environments()) * size(rows_) * shape_.widths[name];
-    if (options_.precision == Precision::f64) {
-      observations_[name] = std::span<const double>(values_[name]).first(numbers);
-      continue;
-    }
-    const std::span<float> singles = std::span(singles_[name]).first(numbers);
-    if (name < shape_.first_sensor)
-      std::transform(values_[name].begin(),
-                     values_[name].begin() + static_cast<std::ptrdiff_t>(numbers), singles.begin(),
-                     [](double x) { return static_cast<float>(x); });
-    observations_[name] = std::span<const float>(singles);
-  }
-  std::sort(failures_.begin(), failures_.end(),
-            [](const FailedEpisode& a, const FailedEpisode& b) { return a.episode < b.episode; });
+/// Of a task: the first step of the action that could not be carried through.
+template <class T>
+std::int64_t EpisodeSlot<T>::step_of_failure(int episode) const {
+  if (!ends_.empty())
+    return std::max<std::int64_t>(0, ends_[size(episode)].length - 1) * program_->steps_per_row();
+  return std::find_if(tally_->failures.begin(), tally_->failures.end(),
+                      [episode](const auto& f) { return f.environment == episode; })
+      ->step;
 }
 
-EpisodeRows EpisodeSlot::piece() const {
-  const std::size_t actions = size(batch_->environments()) * size(action_rows_) * shape_.nu;
+template <class T>
+void EpisodeSlot<T>::add_to(EpisodeSummary& run) const {
+  const TaskProgram* const task = program_->judged();
+  run.episodes += batch_->environments();
+  run.environment_steps += environment_steps();
+  run.simulation_steps += task != nullptr ? task->counts().simulation_steps : environment_steps();
+  run.newton_iterations +=
+      task != nullptr ? task->counts().newton_iterations : tally_->newton_iterations;
+  run.split_steps += task != nullptr ? task->counts().split_steps : tally_->split_steps;
+  run.failures.insert(run.failures.end(), failures_.begin(), failures_.end());
+  auto failure = failures_.begin();
+  for (int e = 0; e < batch_->environments(); ++e) {
+    if (failure != failures_.end() && failure->episode == batch_->episode(e)) {
+      ++failure;
+      continue;
+    }
+    run.rows += task != nullptr ? ends_[size(e)].length : source_.rows;
+    if (task == nullptr) continue;
+    run.successes += ends_[size(e)].success ? 1 : 0;
+    run.mean_return += ends_[size(e)].total;
+  }
+}
+
+template <class T>
+EpisodeRows EpisodeSlot<T>::piece() const {
+  const std::size_t actions = size(batch_->environments()) * size(action_rows_);
   EpisodeRows piece{batch_->episode(0), batch_->environments(),
                     first_row_,         rows_,
-                    action_rows_,       std::span(actions_).first(actions),
+                    action_rows_,       std::span(actions_).first(actions * source_.action),
                     observations_};
   piece.randomized = randomized_;
+  if (source_.whole) piece.rewards = std::span(rewards_).first(actions);
+  piece.ends = ends_;
   return piece;
 }
+
+template class EpisodeSlot<double>;
+template class EpisodeSlot<float>;
 
 }  // namespace tangere

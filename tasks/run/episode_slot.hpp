@@ -8,77 +8,72 @@
 #include <vector>
 
 #include "engine/sense/readout.hpp"
-#include "tasks/run/episodes.hpp"
+#include "tasks/run/episode_source.hpp"
+#include "tasks/run/step_tally.hpp"
 
 namespace tangere {
 
 inline constexpr int kBlockEpisodes = 16;  // lanes of a block of a Batch: one stepper's work
 
-/// Sizes that all blocks of a run share.
-struct EpisodeShape {
-  std::int64_t rows = 0;  ///< R, actions of an episode
-  int piece_rows = 0;     ///< rows of a piece, fewer at the end
-  std::size_t nu = 0;     ///< numbers of an action
-  std::vector<std::size_t>
-      widths;  ///< numbers per row of q, v, the end effectors if there are any, and each sensor
-  std::size_t first_sensor = 0;  ///< its place in widths
+/// Rows of a piece, fewer at the end: as many as fit, at least one; all of them where blocks come
+/// whole.
+int piece_rows(const EpisodeSource& source, const EpisodeOptions& options);
+/// Buffers of one slot [bytes].
+double piece_bytes(const EpisodeSource& source, const EpisodeOptions& options);
 
-  EpisodeShape(const Model& model, const EpisodeOptions& options);
-  /// Buffers of one slot [bytes].
-  [[nodiscard]] double piece_bytes(const EpisodeOptions& options) const;
-};
-
-/// What a piece took.
-struct PieceCounts {
-  std::int64_t environment_steps = 0, newton_iterations = 0, split_steps = 0;
-};
-
+/// T: what numbers leave as, double or float.
+template <class T>
 class EpisodeSlot {
  public:
-  EpisodeSlot(const Model& model, const StepperOptions& solver, const ControlProgram& controls,
-              const EpisodeOptions& options, const EpisodeShape& shape);
+  EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& options);
 
-  /// Starts block b: episodes 16 b … of the run.
-  void begin(std::int64_t block);
-  /// Steps through the rows of the next piece. False: `stop` wanted it to end, the piece is void.
-  [[nodiscard]] bool simulate(const StopRequest& stop);
-  /// Turns the piece into the numbers that are stored.
-  void encode();
+  /// Starts a block: the episodes of `range`, 16 at most.
+  void begin(EpisodeRange range);
+  /// Steps through the rows of the next piece; `told` gets the environment steps of each. False:
+  /// `stop` wanted it to end, the piece is void.
+  [[nodiscard]] bool simulate(const StopRequest& stop,
+                              const std::function<void(std::int64_t)>& told);
 
   [[nodiscard]] EpisodeRows piece() const;  ///< valid until the next simulate()
-  [[nodiscard]] bool last() const { return next_row_ > shape_.rows; }  ///< of the block's pieces
-  [[nodiscard]] const PieceCounts& counts() const { return counts_; }
-  /// Of the whole block, ascending.
+  [[nodiscard]] bool last() const { return next_row_ > source_.rows; }  ///< of the block's pieces
+  /// Of the whole block, after its last piece: what it adds to a run, returns as their sum.
+  void add_to(EpisodeSummary& summary) const;
+  /// Ascending.
   [[nodiscard]] const std::vector<FailedEpisode>& failures() const { return failures_; }
 
  private:
-  template <class T>
   [[nodiscard]] std::span<T> numbers(std::size_t name, int episode, int row);
+  [[nodiscard]] std::int64_t environment_steps() const;
+  void put(std::size_t name, int episode, int row, std::span<const double> from);
   void observe(int row);
-  template <class T>
-  void read_field(int sensor, int row);
+  void observe_scene(int row);
+  void observe_task(const TaskProgram& task, int row);
   [[nodiscard]] bool act(int row, const StopRequest& stop);
-  void count(std::int64_t step);
+  [[nodiscard]] bool take_steps(std::int64_t from, std::int64_t count, const StopRequest& stop);
+  void keep_action(int row);
+  void collect();
+  [[nodiscard]] std::int64_t step_of_failure(int episode) const;
 
-  const Model& model_;
-  const ControlProgram& controls_;
+  const EpisodeSource& source_;
   const EpisodeOptions& options_;
-  const EpisodeShape& shape_;
+  int piece_rows_;
   Stepper stepper_;
   Readout readout_;
   std::optional<Batch> batch_;
+  std::unique_ptr<EpisodeProgram> program_;
+  std::optional<StepTally> tally_;
   std::int64_t first_row_ = 0, next_row_ = 0;
-  int rows_ = 0, action_rows_ = 0;  // of the piece
-  std::vector<double> randomized_;  // (episodes, what varies)
-  std::vector<double> u_;           // (episodes, nu)
-  std::vector<std::vector<double>>
-      values_;  // per name: (episodes, rows, width); fields only where float64 is stored
-  std::vector<std::vector<float>> singles_;  // the same, where float32 is stored
-  std::vector<float> actions_;               // (episodes, action rows, nu)
+  int rows_ = 0, action_rows_ = 0;      // of the piece
+  std::vector<double> randomized_;      // (episodes, what varies)
+  std::vector<double> u_;               // (episodes, nu)
+  std::vector<double> small_;           // of one episode, before it is converted
+  std::vector<std::vector<T>> values_;  // per name: (episodes, rows, width)
+  std::vector<float> actions_;          // (episodes, action rows, action)
+  std::vector<float> rewards_;          // of a task: (episodes, action rows)
   std::vector<Observation> observations_;
-  std::vector<bool> live_;
+  std::vector<bool> playing_;
+  std::vector<EpisodeEnd> ends_;
   std::vector<FailedEpisode> failures_;
-  PieceCounts counts_;
 };
 
 }  // namespace tangere

@@ -3,12 +3,11 @@
 #include "tasks/run/rollout.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <string>
 
-#include "engine/sense/readout.hpp"
 #include "kernels/numbers/block.hpp"
+#include "tasks/run/block_reader.hpp"
 
 namespace tangere {
 namespace {
@@ -25,6 +24,15 @@ std::size_t largest_field(const Model& model) {
 
 /// Copies a batch row by row into dense arrays and hands them on.
 class Recorder {
+ private:
+  [[nodiscard]] std::span<double> part(std::span<double> all, int environment) const {
+    const std::size_t width = all.size() / static_cast<std::size_t>(environments_);
+    return all.subspan(static_cast<std::size_t>(environment) * width, width);
+  }
+  [[nodiscard]] auto place(std::span<double> all) const {
+    return [this, all](int environment) { return part(all, environment); };
+  }
+
  public:
   Recorder(const Batch& batch, Precision precision, RowSink& sink)
       : batch_(batch),
@@ -44,23 +52,20 @@ class Recorder {
   }
 
   void write_state(std::int64_t step, double time) {
-    for (int e = 0; e < environments_; ++e) {
-      batch_.get_q(e, part(q_, e));
-      batch_.get_v(e, part(v_, e));
-      readout_.bodies(batch_, e, part(pose_, e), part(twist_, e));
+    for (int block = 0; block < batch_.blocks(); ++block) {
+      read_states(batch_, block, place(q_), place(v_));
+      read_end_effectors(readout_, batch_, block, place(end_effectors_));
     }
-    if (!end_effectors_.empty())
-      each_block(end_effectors_, [&](int block, auto positions) {
-        readout_.read_end_effectors(batch_, block, positions);
-      });
+    for (int e = 0; e < environments_; ++e)
+      readout_.bodies(batch_, e, part(pose_, e), part(twist_, e));
     sink_.write(StateRow{step, time, q_, v_, pose_, twist_, end_effectors_});
   }
 
-  /// `stepping`: the environments that took the step.
-  void write_step(std::int64_t step, std::span<const double> u, const std::vector<bool>& stepping) {
+  /// Step `step` has been taken and not been counted yet.
+  void write_step(std::int64_t step, std::span<const double> u, const StepTally& tally) {
     for (int e = 0; e < environments_; ++e) {
       const auto i = static_cast<std::size_t>(e);
-      iterations_[i] = stepping[i] ? batch_.iterations(e) : 0;
+      iterations_[i] = tally.steps(batch_, e) ? batch_.iterations(e) : 0;
       status_[i] = static_cast<std::int8_t>(batch_.status(e));
     }
     sink_.write(StepRow{step, u, iterations_, status_, batch_.residuals()});
@@ -71,29 +76,12 @@ class Recorder {
         static_cast<std::size_t>(batch_.model().sensors()[static_cast<std::size_t>(sensor)].points);
     const std::span<double> field =
         std::span(force_).first(static_cast<std::size_t>(environments_) * points * kForceWidth);
-    each_block(field,
-               [&](int block, auto fields) { readout_.read_block(batch_, block, sensor, fields); });
+    for (int block = 0; block < batch_.blocks(); ++block)
+      read_field<double>(readout_, batch_, block, sensor, place(field));
     sink_.write(TactileRow{sensor, frame, step, field});
   }
 
  private:
-  /// Calls `read` with every block and where its environments' numbers go.
-  template <class Read>
-  void each_block(std::span<double> all, const Read& read) const {
-    std::array<std::span<double>, kernels::kBlock> parts;
-    for (int block = 0; block < batch_.blocks(); ++block) {
-      const int first = block * kernels::kBlock,
-                last = std::min(first + kernels::kBlock, environments_);
-      for (int e = first; e < last; ++e) parts[static_cast<std::size_t>(e - first)] = part(all, e);
-      read(block, std::span<const std::span<double>>(parts));
-    }
-  }
-
-  [[nodiscard]] std::span<double> part(std::span<double> all, int environment) const {
-    const std::size_t width = all.size() / static_cast<std::size_t>(environments_);
-    return all.subspan(static_cast<std::size_t>(environment) * width, width);
-  }
-
   const Batch& batch_;
   RowSink& sink_;
   Readout readout_;
@@ -116,38 +104,13 @@ void check(const RolloutOptions& options) {
                      "; expected 0 or more");
 }
 
-/// Every environment's controls from its episode.
-class ProgramDriver : public RolloutDriver {
- public:
-  ProgramDriver(const ControlProgram& controls, std::int64_t first_step)
-      : controls_(controls), first_step_(first_step) {}
-
-  void drive(std::int64_t step, Batch& batch, std::span<double> u) override {
-    const auto nu = static_cast<std::size_t>(batch.model().nu());
-    for (int e = 0; e < batch.environments(); ++e)
-      controls_.evaluate(first_step_ + step, batch.episode(e),
-                         u.subspan(static_cast<std::size_t>(e) * nu, nu));
-  }
-  void done(std::int64_t, Batch&, RowSink&) override {}
-
- private:
-  const ControlProgram& controls_;
-  std::int64_t first_step_;
-};
-
-/// Counts one step's outcome into the summary; environments that failed in it leave `live`.
-void count(const Batch& batch, std::int64_t step, const std::vector<bool>& stepping,
-           std::vector<bool>& live, RolloutSummary& summary) {
-  for (int e = 0; e < batch.environments(); ++e) {
-    if (!stepping[static_cast<std::size_t>(e)]) continue;
-    const StepStatus status = batch.status(e);
-    ++summary.environment_steps;
-    summary.newton_iterations += batch.iterations(e);
-    summary.split_steps += status == StepStatus::split ? 1 : 0;
-    if (!failed(status)) continue;
-    summary.failures.push_back({e, step, status});
-    live[static_cast<std::size_t>(e)] = false;
-  }
+/// What the action came to that ends with step `step`, if it is none of an opening.
+void write_action(EpisodeProgram& program, std::int64_t step, RowSink& sink) {
+  const TaskProgram* const task = program.judged();
+  if (task == nullptr || step < task->opening_steps()) return;
+  const EnvironmentData& d = task->data();
+  sink.write(ActionRow{(step - task->opening_steps()) / task->steps_per_row(), step + 1, d.action,
+                       d.reward, d.terminated, d.truncated, d.success});
 }
 
 }  // namespace
@@ -178,26 +141,24 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram&
     throw InputError("controls laid out for a timestep of " + std::to_string(controls.timestep()) +
                      " s; the stepper's is " + std::to_string(stepper.timestep()) + " s");
   controls.check_covers(options.first_step + options.steps);
-  ProgramDriver driver(controls, options.first_step);
-  return run_rollout(batch, stepper, driver, options, sink, progress);
+  SceneProgram program(controls, 1, options.first_step);
+  return run_rollout(batch, stepper, program, options, sink, progress);
 }
 
-RolloutSummary run_rollout(Batch& batch, Stepper& stepper, RolloutDriver& driver,
+RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress) {
   check(options);
   const auto start = std::chrono::steady_clock::now();
   const auto sensors = batch.model().sensors();
-  const auto environments = static_cast<std::size_t>(batch.environments());
-  const auto nu = static_cast<std::size_t>(batch.model().nu());
   Recorder recorder(batch, options.precision, sink);
   RolloutSummary summary;
-  std::vector<double> u(environments * nu);
-  std::vector<bool> live(environments), stepping(environments);
-  for (std::size_t e = 0; e < environments; ++e) {
-    live[e] = !failed(batch.statuses()[e]);
-    if (!live[e]) summary.failures.push_back({static_cast<int>(e), -1, batch.statuses()[e]});
-  }
+  StepTally tally(batch, 0, batch.environments());
+  std::vector<double> u(static_cast<std::size_t>(batch.environments()) *
+                        static_cast<std::size_t>(batch.model().nu()));
+  const auto each_block = [&](const auto& body) {
+    for (int b = 0; b < batch.blocks(); ++b) body(b);
+  };
 
   // Times come from the counter, so that they do not drift.
   const auto time = [&](std::int64_t row) {
@@ -205,13 +166,15 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, RolloutDriver& driver
   };
   recorder.write_state(0, time(0));
   for (std::int64_t t = 0; t < options.steps; ++t) {
-    driver.drive(t, batch, u);
-    for (std::size_t e = 0; e < environments; ++e)
-      stepping[e] = live[e] && !batch.held(static_cast<int>(e));
+    each_block([&](int b) { program.controls(t, batch, b, u); });
     stepper.step(batch, u);
-    recorder.write_step(t, u, stepping);
-    count(batch, t, stepping, live, summary);
-    driver.done(t, batch, sink);
+    recorder.write_step(t, u, tally);
+    tally.count(batch, t);
+    each_block([&](int b) { program.look(t, batch, b); });
+    if ((t + 1) % program.steps_per_row() == 0) {
+      each_block([&](int b) { program.judge(batch, b); });
+      write_action(program, t, sink);
+    }
     recorder.write_state(t + 1, time(t + 1));
     for (std::size_t s = 0; s < sensors.size(); ++s) {
       const std::int64_t every = tactile_interval(sensors[s], options),
@@ -224,6 +187,10 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, RolloutDriver& driver
     summary.stopped = progress && !progress(t + 1);
     if (summary.stopped) break;
   }
+  summary.environment_steps = tally.environment_steps;
+  summary.newton_iterations = tally.newton_iterations;
+  summary.split_steps = tally.split_steps;
+  summary.failures = std::move(tally.failures);
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
 }

@@ -10,8 +10,9 @@
 #include "engine/base/precision.hpp"
 #include "engine/rows/row_sink.hpp"
 #include "engine/step/batch.hpp"
-#include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
+#include "tasks/run/episode_program.hpp"
+#include "tasks/run/step_tally.hpp"
 
 namespace tangere {
 
@@ -22,13 +23,6 @@ struct RolloutOptions {
   /// Steps taken before row 0, by a run that this one continues: counted in times, controls and the
   /// rhythm of fields.
   std::int64_t first_step = 0;
-};
-
-/// An environment that no solution was found for. It keeps the state before that step.
-struct FailedEnvironment {
-  int environment;
-  std::int64_t step;  ///< the first that failed, -1: before this run
-  StepStatus status;  ///< why
 };
 
 struct RolloutSummary {
@@ -45,25 +39,17 @@ struct RolloutSummary {
 using RolloutProgress = std::function<bool(std::int64_t done)>;
 
 /// Steps the batch and hands every row to the sink: row 0 of the state, then for each step its
-/// StepRow, the StateRow after it and the tactile rows due. Rows of a tactile sensor are read after
-/// steps K, 2K, …: field k comes from row (k + 1) K of q. In a StepRow, an environment that failed
-/// earlier has 0 iterations and its last status and residual. Throws InputError when steps < 1,
-/// every < 0, first_step < 0, a table of controls is too short or was laid out for another
-/// timestep, and passes on what the sink throws.
-RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram& controls,
+/// StepRow, of a task the ActionRow that it ends, the StateRow after it and the tactile rows due.
+/// Rows of a tactile sensor are read after steps K, 2K, …: field k comes from row (k + 1) K of q. In
+/// a StepRow, an environment that failed earlier has 0 iterations and its last status and residual.
+/// `program` has started every block and takes all of them through a step in turn. Throws
+/// InputError when steps < 1, every < 0, first_step < 0, and passes on what the sink throws.
+RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});
-
-/// Drives a rollout in place of a ControlProgram.
-class RolloutDriver {
- public:
-  virtual ~RolloutDriver() = default;
-  /// Controls (E, nu) of step t, which is about to be taken.
-  virtual void drive(std::int64_t step, Batch& batch, std::span<double> u) = 0;
-  /// Step t has been taken; rows may be handed to the sink.
-  virtual void done(std::int64_t step, Batch& batch, RowSink& sink) = 0;
-};
-RolloutSummary run_rollout(Batch& batch, Stepper& stepper, RolloutDriver& driver,
+/// Of a scene. Throws InputError as well when a table of controls is too short or was laid out for
+/// another timestep.
+RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram& controls,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});
 

@@ -3,55 +3,32 @@
 // step, look, judge.
 #include "tasks/run/vector_task.hpp"
 
-#include <tbb/blocked_range.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "tasks/run/block_threads.hpp"
 #include "tasks/run/block_worker.hpp"
-#include "tasks/run/thread_order.hpp"
 
 namespace tangere {
 
 struct VectorTask::Impl {
+  /// Scratch of one thread.
+  struct Worker {
+    BlockWorker block;
+    Stepper stepper;
+  };
+
   Impl(const Task& t, int environments, const VectorOptions& o)
       : task(t),
         options(o),
         data(t, environments),
         batch(t.model(), environments, o.seed, o.first_episode),
-        arena(o.threads) {
+        threads(o.threads) {
     workers.reserve(static_cast<std::size_t>(o.threads));
     for (int i = 0; i < o.threads; ++i)
-      workers.push_back(std::make_unique<BlockWorker>(t, o.precision));
+      workers.push_back({BlockWorker(t, o.precision), Stepper(t.model())});
     tallies.resize(static_cast<std::size_t>(batch.blocks()));
-  }
-
-  template <class Body>
-  void each_block(const Body& body) {
-    if (options.threads == 1) {
-      for (int b = 0; b < batch.blocks(); ++b) body(*workers[0], b);
-      return;
-    }
-    // The arena alone is not enough where more threads are asked for than there are cores.
-    const tbb::global_control cap(tbb::global_control::max_allowed_parallelism,
-                                  static_cast<std::size_t>(options.threads));
-    const auto run = [&](const tbb::blocked_range<int>& blocks) {
-      TaskOrder::arrive();
-      BlockWorker& worker =
-          *workers[static_cast<std::size_t>(tbb::this_task_arena::current_thread_index())];
-      const TaskOrder::Task task_of_thread(order, &worker);
-      for (int b = blocks.begin(); b != blocks.end(); ++b) body(worker, b);
-    };
-    order.begin();
-    arena.execute([&] {
-      tbb::parallel_for(tbb::blocked_range<int>(0, batch.blocks(), 1),
-                        ByReference<decltype(run)>{&run}, tbb::simple_partitioner{});
-    });
-    order.end();
   }
 
   void reset(std::uint64_t seed) {
@@ -66,26 +43,20 @@ struct VectorTask::Impl {
   }
 
   void run(std::span<const double> actions) {
-    each_block([&](BlockWorker& worker, int block) {
-      worker.act(batch, data, block, actions, tallies[static_cast<std::size_t>(block)]);
+    threads.for_each(batch.blocks(), workers, [&](Worker& worker, int block) {
+      worker.block.act(batch, worker.stepper, data, block, actions,
+                       tallies[static_cast<std::size_t>(block)]);
     });
-    if (!options.autoreset) return;
-    for (int e = 0; e < batch.environments(); ++e) {
-      const auto i = static_cast<std::size_t>(e);
-      if (data.state[i] != EnvironmentState::over) continue;
-      data.state[i] = EnvironmentState::to_start;
-      data.next_episode[i] = data.episodes[i] + batch.environments();
-    }
+    if (options.autoreset) data.start_next(0, batch.environments());
   }
 
   const Task& task;
   VectorOptions options;
   EnvironmentData data;
   Batch batch;
-  std::vector<std::unique_ptr<BlockWorker>> workers;  // by the thread's index in the arena
-  std::vector<VectorCounts> tallies;                  // per block
-  TaskOrder order;
-  tbb::task_arena arena;
+  std::vector<Worker> workers;        // by the thread's index in the arena
+  std::vector<VectorCounts> tallies;  // per block
+  BlockThreads threads;
 };
 
 VectorTask::VectorTask(const Task& task, int environments, const VectorOptions& options) {
@@ -143,7 +114,9 @@ VectorCounts VectorTask::counts() const {
 
 double VectorTask::bytes(const Task& task, int environments, int threads) {
   const double state = static_cast<double>(task.model().state_bytes_per_environment());
-  return environments * (state + EnvironmentData::bytes(task)) + threads * BlockWorker::bytes(task);
+  return environments * (state + EnvironmentData::bytes(task)) +
+         threads * (BlockWorker::bytes(task) +
+                    static_cast<double>(Stepper::workspace_bytes(task.model())));
 }
 
 }  // namespace tangere

@@ -127,7 +127,7 @@ TEST(EpisodeLimits, ProgressCountsEveryStep) {
   Recorder recorder(kRows);
   run_episodes(small_ball(), {}, ControlProgram(small_ball(), 5e-3, kSeed), o, recorder,
                [&](std::int64_t steps) { seen.push_back(steps); });
-  ASSERT_EQ(std::ssize(seen), recorder.pieces);
+  ASSERT_EQ(std::ssize(seen), 5 * kRows) << "blocks times rows";
   EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end()));
   EXPECT_EQ(seen.back(), kEpisodes * kSteps);
 }

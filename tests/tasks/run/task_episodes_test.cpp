@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Episodes of tasks on their way to a sink: in ascending order, the same bits on any number of
 // threads, few at a time, ended by errors and when asked to.
-#include "tasks/run/task_episodes.hpp"
-
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include <chrono>
 #include <thread>
 
+#include "tasks/run/episodes.hpp"
 #include "tests/sanitized.hpp"
 #include "tests/tasks/task_check.hpp"
 
@@ -73,30 +72,37 @@ class Keeper : public EpisodeSink {
   std::atomic<int> callers_{0};
 };
 
-TaskEpisodeSummary play(const Task& task, Keeper& keeper, int threads,
-                        const EpisodeProgress& progress = {}, const StopRequest& stop = {}) {
-  TaskEpisodeOptions options;
+EpisodeOptions options_on(int threads) {
+  EpisodeOptions options;
   options.episodes = kEpisodes;
   options.seed = 4;
+  options.precision = Precision::mixed;
   options.threads = threads;
-  return run_task_episodes(task, Policy(task, PolicyKind::random), options, keeper, progress, stop);
+  options.blocks_in_flight = 2 * threads + 1;
+  return options;
+}
+
+EpisodeSummary play(const Task& task, Keeper& keeper, int threads,
+                    const EpisodeProgress& progress = {}, const StopRequest& stop = {}) {
+  return run_episodes(task, Policy(task, PolicyKind::random), options_on(threads), keeper, progress,
+                      stop);
 }
 
 TEST(TaskEpisodes, AreTheSameInTheSameOrderOnAnyNumberOfThreads) {
   const auto task = task_named("dummy");
   Keeper one;
-  const TaskEpisodeSummary alone = play(*task, one, 1);
+  const EpisodeSummary alone = play(*task, one, 1);
   ASSERT_EQ(std::ssize(one.episodes), kEpisodes);
   EXPECT_NE(one.episodes[0], one.episodes[1]);
   for (const int threads : {2, 3, 8}) {
     Keeper many;
-    const TaskEpisodeSummary summary = play(*task, many, threads);
+    const EpisodeSummary summary = play(*task, many, threads);
     EXPECT_TRUE(many.episodes == one.episodes) << threads;
     EXPECT_EQ(many.prepared, (kEpisodes + 15) / 16);
     EXPECT_EQ(summary.mean_return, alone.mean_return) << "summed in another order";
-    EXPECT_EQ(summary.run.rows, alone.run.rows);
-    EXPECT_EQ(summary.run.environment_steps, kEpisodes * 40);
-    EXPECT_LE(summary.run.peak_blocks_in_flight, 2 * threads + 1);
+    EXPECT_EQ(summary.rows, alone.rows);
+    EXPECT_EQ(summary.environment_steps, kEpisodes * 40);
+    EXPECT_LE(summary.peak_blocks_in_flight, 2 * threads + 1);
   }
 }
 
@@ -104,13 +110,10 @@ TEST(TaskEpisodes, OfRangesAreThoseOfAllOfThem) {
   const auto task = task_named("dummy");
   Keeper all, some;
   play(*task, all, 2);
-  TaskEpisodeOptions options;
-  options.episodes = kEpisodes;
+  EpisodeOptions options = options_on(2);
   options.ranges = {{16, 48}, {kEpisodes - 8, kEpisodes}};
-  options.seed = 4;
-  options.threads = 2;
-  const auto summary = run_task_episodes(*task, Policy(*task, PolicyKind::random), options, some);
-  EXPECT_EQ(summary.run.episodes, 40);
+  const auto summary = run_episodes(*task, Policy(*task, PolicyKind::random), options, some);
+  EXPECT_EQ(summary.episodes, 40);
   std::vector<std::string> expected(all.episodes.begin() + 16, all.episodes.begin() + 48);
   expected.insert(expected.end(), all.episodes.end() - 8, all.episodes.end());
   EXPECT_TRUE(some.episodes == expected);
@@ -120,9 +123,9 @@ TEST(TaskEpisodes, ASlowSinkHoldsThemUpInsteadOfMemory) {
   const auto task = task_named("dummy");
   Keeper keeper;
   keeper.slow = true;
-  const TaskEpisodeSummary summary = play(*task, keeper, 2);
+  const EpisodeSummary summary = play(*task, keeper, 2);
   EXPECT_LE(keeper.most_ahead, 5);
-  EXPECT_LE(summary.run.peak_blocks_in_flight, 5);
+  EXPECT_LE(summary.peak_blocks_in_flight, 5);
   EXPECT_GE(keeper.most_ahead, 1) << "nothing was played while the sink wrote";
 }
 
@@ -141,12 +144,11 @@ TEST(TaskEpisodes, EndWhenAskedTo) {
   for (const int threads : {1, 4}) {
     Keeper keeper;
     std::atomic<int> asked = 0;
-    const TaskEpisodeSummary summary =
-        play(*task, keeper, threads, {}, [&] { return ++asked > 100; });
-    EXPECT_TRUE(summary.run.stopped);
+    const EpisodeSummary summary = play(*task, keeper, threads, {}, [&] { return ++asked > 100; });
+    EXPECT_TRUE(summary.stopped);
     EXPECT_LE(asked, 100 + 2 * threads + 1);
-    EXPECT_EQ(std::ssize(keeper.episodes), summary.run.episodes);
-    EXPECT_LT(summary.run.episodes, 48);
+    EXPECT_EQ(std::ssize(keeper.episodes), summary.episodes);
+    EXPECT_LT(summary.episodes, 48);
   }
 }
 

@@ -25,15 +25,15 @@ struct ByReference {
 template <class Function>
 ByReference(const Function*) -> ByReference<Function>;
 
-/// What this thread did until now comes before what others do after ordered_after() of the same
+/// What this thread did until now comes before what others do after tsan_acquire() of the same
 /// address.
-inline void ordered_before([[maybe_unused]] const void* address) {
+inline void tsan_release([[maybe_unused]] const void* address) {
 #if defined(__SANITIZE_THREAD__)
   __tsan_release(const_cast<void*>(address));
 #endif
 }
 
-inline void ordered_after([[maybe_unused]] const void* address) {
+inline void tsan_acquire([[maybe_unused]] const void* address) {
 #if defined(__SANITIZE_THREAD__)
   __tsan_acquire(const_cast<void*>(address));
 #endif
@@ -43,7 +43,7 @@ inline void ordered_after([[maybe_unused]] const void* address) {
 /// bodies, is over. Its tasks count themselves off in the header, so touching the counter here is
 /// enough.
 template <class Graph>
-void ordered_after_tasks_of([[maybe_unused]] Graph& graph) {
+void tsan_acquire_tasks_of([[maybe_unused]] Graph& graph) {
 #if defined(__SANITIZE_THREAD__)
   graph.reserve_wait();
   graph.release_wait();
@@ -51,31 +51,31 @@ void ordered_after_tasks_of([[maybe_unused]] Graph& graph) {
 }
 
 /// The tasks of one wait: each starts after begin(), and end() comes after all of them.
-class TaskOrder {
+class TsanOrder {
  public:
-  void begin() const { ordered_before(&begin_); }
+  void begin() const { tsan_release(&begin_); }
   /// First thing in a task whose function itself, with what it captured, lives where begin() was
   /// called.
-  static void arrive() { ordered_after(&begin_); }
-  void end() const { ordered_after(&end_); }
+  static void arrive() { tsan_acquire(&begin_); }
+  void end() const { tsan_acquire(&end_); }
 
   /// While a task runs. `mine`: what tasks hand from one to the next and none uses at the same time
   /// as another.
   class Task {
    public:
-    Task(const TaskOrder& order, const void* mine) : order_(order), mine_(mine) {
+    Task(const TsanOrder& order, const void* mine) : order_(order), mine_(mine) {
       arrive();
-      ordered_after(mine_);
+      tsan_acquire(mine_);
     }
     ~Task() {
-      ordered_before(mine_);
-      ordered_before(&order_.end_);
+      tsan_release(mine_);
+      tsan_release(&order_.end_);
     }
     Task(const Task&) = delete;
     Task& operator=(const Task&) = delete;
 
    private:
-    const TaskOrder& order_;
+    const TsanOrder& order_;
     const void* mine_;
   };
 

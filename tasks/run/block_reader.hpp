@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where states, end effectors and tactile fields of a block are read: by the rollout, the player of
+// episodes and tasks, each into rows of its own.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "engine/sense/readout.hpp"
+#include "tasks/run/step_tally.hpp"
+
+namespace tangere {
+
+// `place(environment)`: where the numbers of an environment of the batch go.
+
+/// Coordinates (nq) and velocities (nv).
+template <class PlaceQ, class PlaceV>
+void read_states(const Batch& batch, int block, const PlaceQ& q, const PlaceV& v) {
+  const int first = block * kernels::kBlock;
+  for (int e = first; e < first + lanes_of(batch, block); ++e) {
+    batch.get_q(e, q(e));
+    batch.get_v(e, v(e));
+  }
+}
+
+/// What place(environment) says for each lane.
+template <class T, class Place>
+std::array<std::span<T>, kernels::kBlock> places_of(const Batch& batch, int block,
+                                                    const Place& place) {
+  std::array<std::span<T>, kernels::kBlock> places;
+  for (int lane = 0; lane < lanes_of(batch, block); ++lane)
+    places[static_cast<std::size_t>(lane)] = place(block * kernels::kBlock + lane);
+  return places;
+}
+
+/// World positions (end effectors, 3) [m]; nothing where the scene has none.
+template <class Place>
+void read_end_effectors(Readout& readout, const Batch& batch, int block, const Place& place) {
+  if (!batch.model().end_effectors().empty())
+    readout.read_end_effectors(batch, block, places_of<double>(batch, block, place));
+}
+
+/// The field of one sensor, (points, 3) [N]; T: double or float.
+template <class T, class Place>
+void read_field(Readout& readout, const Batch& batch, int block, int sensor, const Place& place) {
+  const auto places = places_of<T>(batch, block, place);
+  readout.read_block(batch, block, sensor, std::span<const std::span<T>>(places));
+}
+
+}  // namespace tangere

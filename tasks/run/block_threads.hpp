@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// Blocks of environments spread over threads: what everything that shares nothing but the model
+// between blocks runs on.
+#pragma once
+
+#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <cstddef>
+
+#include "tasks/run/tsan_order.hpp"
+
+namespace tangere {
+
+/// So many threads, one of them the caller's.
+class BlockThreads {
+ public:
+  explicit BlockThreads(int threads) : threads_(threads), arena_(threads) {}
+
+  /// Calls body(workers[k], block) for every block: one block at a time to whoever is free, because
+  /// some take longer than others and other programs may be on some cores. No worker is used by two
+  /// threads at once. Passes on what body throws.
+  template <class Workers, class Body>
+  void for_each(int blocks, Workers& workers, const Body& body) {
+    if (threads_ == 1) {
+      for (int b = 0; b < blocks; ++b) body(workers[0], b);
+      return;
+    }
+    // The arena alone is not enough where more threads are asked for than there are cores.
+    const tbb::global_control cap(tbb::global_control::max_allowed_parallelism,
+                                  static_cast<std::size_t>(threads_));
+    const auto run = [&](const tbb::blocked_range<int>& range) {
+      TsanOrder::arrive();
+      auto& worker =
+          workers[static_cast<std::size_t>(tbb::this_task_arena::current_thread_index())];
+      const TsanOrder::Task task(order_, &worker);
+      for (int b = range.begin(); b != range.end(); ++b) body(worker, b);
+    };
+    order_.begin();
+    arena_.execute([&] {
+      tbb::parallel_for(tbb::blocked_range<int>(0, blocks, 1), ByReference<decltype(run)>{&run},
+                        tbb::simple_partitioner{});
+    });
+    order_.end();
+  }
+
+ private:
+  int threads_;
+  TsanOrder order_;
+  tbb::task_arena arena_;
+};
+
+}  // namespace tangere

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// A scene asks its controls; a task takes the parts of an action one after the other.
+#include "tasks/run/episode_program.hpp"
+
+#include <algorithm>
+
+#include "tasks/run/step_tally.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+
+void SceneProgram::controls(std::int64_t step, Batch& batch, int block, std::span<double> u) {
+  if (step % steps_per_row_ != 0) return;
+  const auto nu = static_cast<std::size_t>(batch.model().nu());
+  const int first = block * kBlock;
+  for (int e = first; e < first + lanes_of(batch, block); ++e)
+    controls_.evaluate(first_step_ + step, batch.episode(e),
+                       u.subspan(static_cast<std::size_t>(e) * nu, nu));
+}
+
+TaskProgram::TaskProgram(const Task& task, const Policy& policy,
+                         std::shared_ptr<EnvironmentData> data, Precision precision, int in_turn,
+                         AtEnd at_end)
+    : task_(task),
+      policy_(policy),
+      data_(std::move(data)),
+      actions_(data_->action.size()),
+      at_end_(at_end) {
+  workers_.reserve(static_cast<std::size_t>(in_turn));
+  for (int b = 0; b < in_turn; ++b) workers_.emplace_back(task, precision);
+}
+
+void TaskProgram::start(Batch& batch, int block) {
+  worker(block).begin(batch, *data_, block, {});
+  if (task_.spec().opening) return;
+  worker(block).look_at_start(batch, block);
+  worker(block).conclude(batch, *data_, block, counts_);
+}
+
+void TaskProgram::choose(const Batch& batch, int block) {
+  const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
+  const auto first = static_cast<std::size_t>(block) * kBlock,
+             last = first + static_cast<std::size_t>(lanes_of(batch, block));
+  for (std::size_t e = first; e < last; ++e)
+    policy_.act(view_of(batch, *data_, static_cast<int>(e)),
+                std::span(data_->observation).subspan(e * seen, seen),
+                std::span(actions_).subspan(e * width, width));
+}
+
+void TaskProgram::controls(std::int64_t step, Batch& batch, int block, std::span<double> u) {
+  const auto k = static_cast<int>(step % steps_per_row());
+  if (k == 0 && step >= opening_steps()) {
+    choose(batch, block);
+    worker(block).begin(batch, *data_, block, actions_);
+  }
+  worker(block).ask_for_controls(batch, *data_, block, k);
+  const auto nu = static_cast<std::size_t>(batch.model().nu());
+  const std::size_t first = static_cast<std::size_t>(block) * kBlock * nu,
+                    count = static_cast<std::size_t>(lanes_of(batch, block)) * nu;
+  std::copy_n(data_->u.begin() + static_cast<std::ptrdiff_t>(first), count,
+              u.begin() + static_cast<std::ptrdiff_t>(first));
+}
+
+void TaskProgram::look(std::int64_t step, const Batch& batch, int block) {
+  worker(block).look_after(batch, block, static_cast<int>(step % steps_per_row()), counts_);
+}
+
+void TaskProgram::judge(Batch& batch, int block) {
+  worker(block).conclude(batch, *data_, block, counts_);
+  if (at_end_ == AtEnd::again) data_->start_next(block * kBlock, lanes_of(batch, block));
+}
+
+std::int64_t TaskProgram::steps(const TaskSpec& spec) {
+  return (spec.horizon + (spec.opening ? 1 : 0)) * static_cast<std::int64_t>(spec.steps_per_action);
+}
+
+}  // namespace tangere

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// What steps took and which environments failed in them, counted in one way for rollouts, episodes,
+// benchmarks and gradients.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "engine/step/batch.hpp"
+#include "kernels/numbers/lanes.hpp"
+
+namespace tangere {
+
+/// An environment that no solution was found for. It keeps the state before that step.
+struct FailedEnvironment {
+  int environment;
+  std::int64_t step;  ///< the first that failed, -1: before this run
+  StepStatus status;  ///< why
+};
+
+/// Environments of a block.
+inline int lanes_of(const Batch& batch, int block) {
+  return std::min(kernels::kBlock, batch.environments() - block * kernels::kBlock);
+}
+
+struct StepTally {
+  std::int64_t environment_steps = 0;  ///< tried, failing ones included
+  std::int64_t newton_iterations = 0;
+  std::int64_t split_steps = 0;
+  std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
+
+  /// Of `environments` from number `first` on, before the first step.
+  StepTally(const Batch& batch, int first, int environments)
+      : first_(first), live_(static_cast<std::size_t>(environments)) {
+    for (int e = first; e < first + environments; ++e) {
+      live_[lane(e)] = !failed(batch.status(e));
+      if (!live_[lane(e)]) failures.push_back({e, -1, batch.status(e)});
+    }
+  }
+
+  /// Whether an environment takes, or has just taken and not yet counted, a step.
+  [[nodiscard]] bool steps(const Batch& batch, int environment) const {
+    return live_[lane(environment)] && !batch.held(environment);
+  }
+  [[nodiscard]] bool live(int environment) const { return live_[lane(environment)]; }
+
+  /// After step `step`.
+  void count(const Batch& batch, std::int64_t step) {
+    for (int e = first_; e < first_ + static_cast<int>(live_.size()); ++e) {
+      if (!steps(batch, e)) continue;
+      const StepStatus status = batch.status(e);
+      ++environment_steps;
+      newton_iterations += batch.iterations(e);
+      split_steps += status == StepStatus::split ? 1 : 0;
+      if (!failed(status)) continue;
+      failures.push_back({e, step, status});
+      live_[lane(e)] = false;
+    }
+  }
+
+ private:
+  [[nodiscard]] std::size_t lane(int environment) const {
+    return static_cast<std::size_t>(environment - first_);
+  }
+  int first_;
+  std::vector<bool> live_;
+};
+
+}  // namespace tangere
