@@ -80,10 +80,10 @@ struct DatasetWriter::Impl {
     for (const std::string& file : files) {
       const std::vector<std::string> lines = differences(read_settings(h5::open_file(file)), here);
       if (lines.empty()) continue;
-      throw InputError(fmt::format(
-          "'{}' is of another run, so this one cannot continue it: {}; expected the same "
-          "settings, another folder, or --overwrite",
-          file, fmt::join(lines, "; ")));
+      throw InputError(
+          fmt::format("'{}' belongs to another run, so this one cannot continue it: {}; use the "
+                      "same settings, another folder, or --overwrite",
+                      file, fmt::join(lines, "; ")));
     }
   }
 
@@ -106,7 +106,7 @@ struct DatasetWriter::Impl {
     const EpisodeRange there{number(file, "first_episode"),
                              number(file, "first_episode") + number(file, "episodes")};
     if (there.first != range.first || there.end != range.end)
-      throw InputError(fmt::format("'{}' holds episodes {} to {}, expected {} to {}", path,
+      throw InputError(fmt::format("'{}' holds episodes {} to {}; expected {} to {}", path,
                                    there.first, there.end - 1, range.first, range.end - 1));
     ++kept;
     kept_failed += static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
@@ -133,7 +133,7 @@ struct DatasetWriter::Impl {
         const std::vector<std::string> lines =
             differences(read_settings(h5::open_file(file)), here);
         if (!lines.empty())
-          return fmt::format("'{}' is of another run: {}", file, fmt::join(lines, "; "));
+          return fmt::format("'{}' belongs to another run: {}", file, fmt::join(lines, "; "));
       } catch (const IoError& error) {
         return error.what();
       }
@@ -141,7 +141,7 @@ struct DatasetWriter::Impl {
     if (std::ssize(files) == layout.shard_count()) return {};
     for (std::int64_t shard = 0; shard < layout.shard_count(); ++shard)
       std::erase(files, folder.shard_path(shard));
-    return fmt::format("'{}' is none of the {} shards of this run", files.front(),
+    return fmt::format("'{}' is not one of the {} shards of this run", files.front(),
                        layout.shard_count());
   }
 

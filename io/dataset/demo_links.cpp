@@ -94,7 +94,7 @@ h5::NumberType type_of(const h5::Id& dataset) {
 DemoArray array_of(const h5::Id& group, const std::string& name) {
   const h5::Id dataset = h5::open_dataset(group, name);
   const h5::Dims dims = h5::dimensions(dataset);
-  if (dims.empty()) throw IoError(fmt::format("{} is one number, expected rows", name));
+  if (dims.empty()) throw IoError(fmt::format("{} is one number; expected rows", name));
   return {name, type_of(dataset), {dims.begin() + 1, dims.end()}};
 }
 
@@ -125,7 +125,7 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
   DemoFacts facts;
   facts.rows = h5::read_numbers<std::int64_t>(demo, "num_samples").at(0);
   if (facts.rows < 1)
-    throw IoError(fmt::format("a demo has {} rows, expected at least 1", facts.rows));
+    throw IoError(fmt::format("a demo has {} rows; expected at least 1", facts.rows));
   if (members.of_task) {
     const double total = h5::read_numbers<double>(demo, "return").at(0);
     facts.end = EpisodeEnd{facts.rows, total, flag("terminated"), flag("success")};
@@ -140,7 +140,7 @@ void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFac
     if (!std::ranges::equal(h5::dimensions(dataset),
                             dims_of(static_cast<std::uint64_t>(rows), array)) ||
         type_of(dataset) != array.type)
-      throw IoError(fmt::format("{} is not of {} rows, of the shape and type of the first demo",
+      throw IoError(fmt::format("{} does not have {} rows, or the shape and type of the first demo",
                                 array.name, rows));
   };
   for (const std::string& name : members.names)
