@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A shard that is not there is an error of whoever wants all, never a gap in silence.
+// A missing shard is an error for every reader that needs all of them, never a silent gap.
 #include "io/dataset/dataset_files.hpp"
 
 #include <fmt/format.h>

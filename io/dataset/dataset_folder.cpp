@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is removed is removed under the lock: what shows shards as one before the shards.
+// Everything is removed under the lock, merged files before shards.
 #include "io/dataset/dataset_folder.hpp"
 
 #include <fmt/format.h>

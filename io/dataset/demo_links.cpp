@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Of a batch: what its virtual datasets show, then objects.
+// For each batch of demos the file has what its virtual datasets show, then the objects.
 #include "io/dataset/demo_links.hpp"
 
 #include <fmt/format.h>
@@ -36,7 +36,8 @@ bool has_numbers(const DemoArray& array) {
 /// Observations of a batch of demos one row later, or with one row more, as virtual datasets.
 class ShownObservations {
  public:
-  /// `skipped`: rows of obs that are left out before final_obs follows. Appends what is shown.
+  /// `skipped` is how many rows of obs are left out before final_obs follows. Appends what is
+  /// shown.
   ShownObservations(Bytes& out, std::uint64_t base, const DemoMembers& members,
                     std::string_view file, std::span<const LinkedDemo> demos, std::uint64_t skipped)
       : out_(out), base_(base), members_(members), skipped_(skipped) {

@@ -48,7 +48,7 @@ class ShardChecker {
   ShardChecker(const std::string& path, bool finite)
       : finite_(finite), file_(h5::open_file(path)), scene_(h5::open_group(file_, "scene")) {}
 
-  /// Of the first and the last episode everything but sums, of the others that they are counted.
+  /// Checks everything but sums of the first and the last episode. Only counts the others.
   ShardReport sample() {
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
     read_description();
@@ -126,8 +126,8 @@ class ShardChecker {
     if (of_task_ ? rows < 1 || rows > rows_ : rows != rows_)
       return fail(fmt::format("demo_{} has {} rows, expected {}{}", episode, rows,
                               of_task_ ? "1 to " : "", rows_));
-    // Known without a checksum: without a task nothing is rewarded, and only the last row ends the
-    // episode.
+    // These are known without a checksum: without a task every reward is 0, and only the last row
+    // ends the episode.
     if (of_task_) {
       add<float>(demo, "rewards", episode, names_.size() + 1, 0, rows);
     } else {
