@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Chunks as HDF5's filters shuffle, deflate and LZ4 would make them, but by any thread: the library
-// itself has one lock for all.
+// Makes chunks as HDF5's filters shuffle, deflate and LZ4 would, but on any thread. The library has
+// one lock for all threads.
 #pragma once
 
 #include <cstddef>
@@ -25,16 +25,15 @@ struct ChunkPlan {
   bool last_row = false;            ///< the one row of final_obs is cut as well
 };
 
-/// Of each observation: contiguous where there is neither compression nor sparseness, or a row is
-/// too small for it.
+/// One plan for each observation. It is contiguous without compression and sparseness, and where a
+/// row is too small for them.
 std::vector<ChunkPlan> chunk_plans(const DatasetLayout& layout);
-/// Whether any is cut: then nobody knows the size of an episode beforehand.
+/// Whether any observation is cut. Then the size of an episode is not known beforehand.
 bool has_chunks(const DatasetLayout& layout);
 
-/// What a file says of its chunks, numbers of `number_bytes` each.
+/// The filters that a file declares for chunks of numbers of `number_bytes` each.
 std::vector<h5::FileFilter> file_filters(const std::string& compression, std::size_t number_bytes);
-/// What lies on disk for `used` bytes of data in a chunk of `bytes`, the rest of it zeros.
-/// Thread-safe.
+/// Returns the bytes on disk of a chunk of `bytes`: `used` bytes of data, then zeros. Thread-safe.
 std::vector<unsigned char> compressed(const DatasetLayout& layout, const unsigned char* data,
                                       std::size_t used, std::size_t bytes);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every shard of a data set says the same: its settings, written once and compared before
-// shards are put together.
+// The settings that all shards of a data set share. They are written into each shard and compared
+// before shards are put together.
 #pragma once
 
 #include <string>
@@ -17,16 +17,17 @@ void describe_dataset(const h5::Id& file, const DatasetLayout& layout);
 /// A JSON string, quotes included. Bytes from 0x80 on are UTF-8 already.
 std::string json_text(const std::string& text);
 
-/// All that decides which numbers a data set holds, in a fixed order: of a layout, of a file.
+/// All settings that decide which numbers a data set holds, in a fixed order: from a layout, from a
+/// file.
 std::vector<Setting> settings_of(const DatasetLayout& layout);
 std::vector<Setting> read_settings(const h5::Id& file);
 
-/// What differs, a line each: "seed: 9 there, 1 here". Of long texts the first lines that differ.
-/// Empty when nothing does.
+/// One line for each difference: "seed: 9 there, 1 here". For long texts, the first lines that
+/// differ. Empty when nothing differs.
 std::vector<std::string> differences(const std::vector<Setting>& there,
                                      const std::vector<Setting>& here);
 
-/// What a file says of a derivative that each of its demos has.
+/// How a file describes a derivative that each of its demos has.
 struct GradientSaid {
   std::string name, meaning;
   bool by_row = false;  ///< a row for each action

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers are written in the fewest digits that give them back.
+// Writes each number with the fewest digits that read back as the same number.
 #include "io/dataset/dataset_export.hpp"
 
 #include <fmt/format.h>

@@ -12,7 +12,7 @@
 namespace tangere {
 
 struct ExportOptions {
-  std::optional<std::int64_t> episode;  ///< that one alone; none: all
+  std::optional<std::int64_t> episode;  ///< only this one; none: all
   bool overwrite = false;
 };
 

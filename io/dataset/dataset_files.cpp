@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A shard that is not there is an error of whoever wants all, never a gap in silence.
+// A missing shard is an error for every reader that needs all of them, never a silent gap.
 #include "io/dataset/dataset_files.hpp"
 
 #include <fmt/format.h>
@@ -144,7 +144,8 @@ DatasetFiles find_dataset(const std::string& path) {
       if (reason.empty()) reason = error.what();
     }
   }
-  if (dataset.settings.empty()) throw IoError(fmt::format("'{}' is no data set: {}", path, reason));
+  if (dataset.settings.empty())
+    throw IoError(fmt::format("'{}' is not a data set: {}", path, reason));
   if (!dataset.folder.empty()) count_shards(dataset);
   return dataset;
 }
@@ -159,21 +160,20 @@ void check_complete(const DatasetFiles& dataset) {
   for (const std::string& file : dataset.files) {
     const std::vector<std::string> lines = differences_of(file, dataset.settings);
     if (!lines.empty())
-      throw IoError(fmt::format("'{}' is not of the same run as '{}': {}", file,
+      throw IoError(fmt::format("'{}' does not belong to the same run as '{}': {}", file,
                                 dataset.files.front(), fmt::join(lines, "; ")));
   }
   if (!dataset.surplus.empty())
-    throw IoError(
-        fmt::format("'{}' is none of the {} shards that '{}' counts; expected no others, remove it",
-                    dataset.surplus.front(), value_of(dataset.settings, "dataset_shards"),
-                    dataset.files.front()));
+    throw IoError(fmt::format("'{}' is not one of the {} shards that '{}' counts; remove it",
+                              dataset.surplus.front(), value_of(dataset.settings, "dataset_shards"),
+                              dataset.files.front()));
 }
 
 DatasetReport examine_dataset(const DatasetFiles& dataset) {
   DatasetReport report;
   for (const std::string& file : dataset.missing) report.problems.push_back(file + ": missing");
   for (const std::string& file : dataset.surplus)
-    report.problems.push_back(file + ": none of the shards that are counted");
+    report.problems.push_back(file + ": not one of the shards that are counted");
   for (const std::string& file : dataset.files) {
     for (const std::string& line : differences_of(file, dataset.settings))
       report.problems.push_back(fmt::format("{}: {}", file, line));

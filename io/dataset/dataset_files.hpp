@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A data set that is there: which files it has, which are missing, what they say of it.
+// An existing data set: its files, the shards that are missing, and its settings.
 #pragma once
 
 #include <cstdint>
@@ -15,19 +15,19 @@ struct DatasetFiles {
   std::vector<std::string> files;    ///< shards in ascending order, or the one file that was named
   std::vector<std::string> missing;  ///< paths of shards that should be there
   std::vector<std::string>
-      surplus;  ///< paths of files that are called like shards and are none of this data set
+      surplus;  ///< paths of files that are named like shards but do not belong to the data set
   std::vector<Setting> settings;  ///< of the first file that can be read
   std::string folder;             ///< empty when a file was named
 };
 
-/// Of a setting, empty when there is none of this name.
+/// The value of a setting; empty when there is none of this name.
 std::string value_of(const std::vector<Setting>& settings, const std::string& name);
 
 /// The shards of a folder, or a file. Throws IoError when there is none.
 DatasetFiles find_dataset(const std::string& path);
 
-/// Throws IoError that names the first missing shard and how many there are, what differs between
-/// shards, and a file that is none.
+/// Throws IoError when shards are missing, when shards differ in their settings, or when a file is
+/// named like a shard and is none. The message names the first such file.
 void check_complete(const DatasetFiles& dataset);
 
 /// All that is wrong: shards missing, surplus, of other settings, damaged; each with its file.
@@ -39,7 +39,7 @@ struct DatasetReport {
 };
 DatasetReport examine_dataset(const DatasetFiles& dataset);
 
-/// What a file says of itself without its numbers being read.
+/// What a file says of itself, without reading its numbers.
 struct DatasetSummary {
   std::int64_t demos = 0, failed = 0, rows = 0, successes = 0;
   bool has_success = false;

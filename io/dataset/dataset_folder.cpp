@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is removed is removed under the lock: what shows shards as one before the shards.
+// Everything is removed under the lock, merged files before shards.
 #include "io/dataset/dataset_folder.hpp"
 
 #include <fmt/format.h>
@@ -46,7 +46,8 @@ DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool sha
   if (error && error != std::errc::file_exists)
     throw IoError(fmt::format("cannot create the folder '{}': {}", path_, error.message()));
   if (!fs::is_directory(path_))
-    throw IoError(fmt::format("'{}' exists and is no folder; expected a folder for shards", path_));
+    throw IoError(
+        fmt::format("'{}' exists and is not a folder; expected a folder for shards", path_));
   if (access(path_.c_str(), W_OK | X_OK) != 0) fail("write into", path_, errno);
   hold();
   if (!shared_ && existing == ExistingShards::refuse && !shards().empty())

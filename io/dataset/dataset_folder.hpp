@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The folder of a data set: one process at a time, shards of one run only.
+// The folder of a data set. One process holds it, or several share it, and its shards belong to one
+// run.
 #pragma once
 
 #include <cstdint>
@@ -12,37 +13,38 @@
 
 namespace tangere {
 
-/// For those who share a folder: until the one that merges has ended, until nobody who looks at it
-/// is in the way of merging.
+/// How long a process that shares a folder waits: to share it while another process merges, and to
+/// be alone while others look at it.
 struct FolderPatience {
   LockPatience to_share = LockPatience::seconds(10), to_be_alone = LockPatience::seconds(1);
 };
 
 class DatasetFolder {
  public:
-  /// Creates the folder when it is missing, and holds it against other processes; `shared`: against
-  /// those alone that want it for themselves. Removes what a killed run or merge left unfinished,
-  /// shards of others that share it excepted. Throws IoError when it is something else, cannot be
-  /// written, is held by another process, or is not shared and has shards that it should not have.
+  /// Creates the folder when it is missing, and locks out other processes. With `shared` it locks
+  /// out only those that want the folder alone. Removes what a killed run or merge left unfinished,
+  /// except shards of others that share the folder. Throws IoError when it is something else,
+  /// cannot be written, is held by another process, or is not shared and has shards that it should
+  /// not have.
   DatasetFolder(std::string path, ExistingShards existing, bool shared = false,
                 FolderPatience patience = {});
-  /// Removes the folder if it was created here and nothing came into it.
+  /// Removes the folder if it was created here and is empty.
   ~DatasetFolder();
   DatasetFolder(const DatasetFolder&) = delete;
   DatasetFolder& operator=(const DatasetFolder&) = delete;
 
-  /// Lets go of a shared folder, for good; others may go on writing.
+  /// Lets go of a shared folder for good. Others may go on writing.
   void let_go();
   /// Whether this process holds the folder alone, or could from now on.
   [[nodiscard]] bool hold_alone();
   [[nodiscard]] std::string shard_path(std::int64_t shard) const;
-  /// Paths of all that is called like a shard, sorted.
+  /// Sorted paths of all files that are named like shards.
   [[nodiscard]] std::vector<std::string> shards() const { return files_ending(".h5"); }
-  /// Space on the disk that shards may fill, those to be removed included [bytes].
+  /// Space on the disk that shards may fill [bytes], including the space of shards to be removed.
   [[nodiscard]] double free_bytes() const;
-  /// Where an earlier run is to be replaced, removes what shows its shards as one, then the shards,
-  /// last one first, so that what is left begins with 0. In a shared folder, where each shard is
-  /// replaced by its own, only those that are none of `count` shards.
+  /// If an earlier run is to be replaced, removes its merged files, then its shards, the last one
+  /// first, so that what is left begins with 0. In a shared folder each process replaces its own
+  /// shards, so only those are removed that do not belong to `count` shards.
   void remove_old_shards(std::int64_t count);
 
  private:

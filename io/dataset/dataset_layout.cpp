@@ -29,16 +29,15 @@ void check_lengths(const std::vector<std::string>& observations) {
   std::size_t bytes = 0;
   for (const std::string& name : observations) {
     if (name.size() > kLongest)
-      throw InputError(
-          fmt::format("observation '{}…': a name of {} bytes; expected at most {}, what a dataset "
-                      "may be called",
-                      name.substr(0, kShown), name.size(), kLongest));
+      throw InputError(fmt::format(
+          "observation '{}…': the name has {} bytes; the name of a dataset has at most {}",
+          name.substr(0, kShown), name.size(), kLongest));
     bytes += name.size() + kBesidesName;
   }
   if (bytes > kAll)
-    throw InputError(fmt::format(
-        "{} observations whose names take {} bytes; expected at most {}, what a group has room for",
-        observations.size(), bytes, kAll));
+    throw InputError(
+        fmt::format("the names of {} observations take {} bytes; a group has room for {}",
+                    observations.size(), bytes, kAll));
 }
 
 template <class T>
@@ -160,8 +159,8 @@ void DatasetLayout::check() const {
           "sensor '{}': a dataset cannot have this name; expected one without '/'", name));
     if (!task && !names.insert(name).second)
       throw InputError(
-          fmt::format("sensor '{}': another observation has this name; expected none of q, v, "
-                      "variables (of end effectors) and the other sensors",
+          fmt::format("sensor '{}': another observation has this name; expected a name other than "
+                      "q, v, variables (of end effectors) and those of other sensors",
                       name));
   }
 }

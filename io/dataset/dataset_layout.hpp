@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All that the shards of a data set say besides their numbers, and how episodes are dealt to
-// shards. Nothing in it depends on threads, folders or the time, so that the same request gives the
+// All that the shards of a data set say besides their numbers, and which episodes go into which
+// shard. Nothing in it depends on threads, folders or the time, so that the same request gives the
 // same bytes.
 #pragma once
 
@@ -15,7 +15,7 @@
 
 namespace tangere {
 
-/// What to do with shards that are there already.
+/// What to do with shards that exist already.
 enum class ExistingShards { refuse, replace, keep };
 
 /// What a file says of its data set, as text.
@@ -60,8 +60,8 @@ struct DatasetLayout {
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
   /// Names of the numbers of an action.
   [[nodiscard]] std::vector<std::string> action_names() const;
-  /// All there are: q, v, then what a task observes, or "variables" if there are end effectors and
-  /// the sensors.
+  /// All observations: q, v, then what a task observes, or "variables" if there are end effectors
+  /// and the sensors.
   [[nodiscard]] std::vector<std::string> all_observation_names() const;
   /// Places in that list, and in pieces of episodes, of those that are stored, ascending.
   [[nodiscard]] std::vector<std::size_t> recorded() const;

@@ -58,7 +58,8 @@ class Merger {
     }
     complete();
     copied_.reset();
-    // The view first: it is replaced without being asked for as long as the file is not there.
+    // The view comes first: as long as the merged file is missing, a view is replaced without
+    // --overwrite.
     result_.bytes = file_.commit([this](const std::string& part) {
       if (options_.copy) check_copy(part);
       if (view_) view_->commit();
@@ -89,7 +90,8 @@ class Merger {
     h5::copy_group(from, "scene", file_.file(), "scene");
   }
 
-  /// Reads the copy whole. Where it is damaged, a shard most likely was: then that is named.
+  /// Reads the copy whole. If it is damaged, a shard most likely was damaged, and the error names
+  /// that shard.
   void check_copy(const std::string& part) const {
     try {
       check_shard(part);

@@ -51,7 +51,8 @@ struct DatasetWriter::Impl {
         folder(o.folder, o.existing, o.only.has_value()),
         format(layout) {
     if (output.existing != ExistingShards::replace) check_settings();
-    // Before shards are counted one by one: a slip of the keyboard may ask for billions.
+    // This comes before shards are counted one by one, because a typing mistake may ask for
+    // billions.
     if (makes_all()) check_space(static_cast<double>(layout.episodes));
     for (const std::int64_t shard : to_make()) look_at(shard);
     double episodes = 0;
@@ -72,7 +73,7 @@ struct DatasetWriter::Impl {
     return all;
   }
 
-  /// Of every shard that is there, whoever made it: a data set is of one run.
+  /// Compares every existing shard, whichever process made it. A data set belongs to one run.
   void check_settings() const {
     const std::vector<std::string> files = folder.shards();
     if (files.empty()) return;
@@ -80,14 +81,14 @@ struct DatasetWriter::Impl {
     for (const std::string& file : files) {
       const std::vector<std::string> lines = differences(read_settings(h5::open_file(file)), here);
       if (lines.empty()) continue;
-      throw InputError(fmt::format(
-          "'{}' is of another run, so this one cannot continue it: {}; expected the same "
-          "settings, another folder, or --overwrite",
-          file, fmt::join(lines, "; ")));
+      throw InputError(
+          fmt::format("'{}' belongs to another run, so this one cannot continue it: {}; use the "
+                      "same settings, another folder, or --overwrite",
+                      file, fmt::join(lines, "; ")));
     }
   }
 
-  /// A shard that is there is complete: only complete ones have the name.
+  /// An existing shard is complete, because only complete ones get the name.
   void look_at(std::int64_t shard) {
     const EpisodeRange range = layout.shard_episodes(shard);
     const std::string path = folder.shard_path(shard);
@@ -106,7 +107,7 @@ struct DatasetWriter::Impl {
     const EpisodeRange there{number(file, "first_episode"),
                              number(file, "first_episode") + number(file, "episodes")};
     if (there.first != range.first || there.end != range.end)
-      throw InputError(fmt::format("'{}' holds episodes {} to {}, expected {} to {}", path,
+      throw InputError(fmt::format("'{}' holds episodes {} to {}; expected {} to {}", path,
                                    there.first, there.end - 1, range.first, range.end - 1));
     ++kept;
     kept_failed += static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
@@ -123,8 +124,8 @@ struct DatasetWriter::Impl {
     return true;
   }
 
-  /// What is wrong with the first shard that is not of this one, which others may be about to
-  /// replace; empty if there is none.
+  /// What is wrong with the first shard that does not belong to this data set; empty if there is
+  /// none. Other processes may be about to replace it.
   [[nodiscard]] std::string of_another_run() const {
     const std::vector<Setting> here = settings_of(layout);
     std::vector<std::string> files = folder.shards();
@@ -133,7 +134,7 @@ struct DatasetWriter::Impl {
         const std::vector<std::string> lines =
             differences(read_settings(h5::open_file(file)), here);
         if (!lines.empty())
-          return fmt::format("'{}' is of another run: {}", file, fmt::join(lines, "; "));
+          return fmt::format("'{}' belongs to another run: {}", file, fmt::join(lines, "; "));
       } catch (const IoError& error) {
         return error.what();
       }
@@ -141,7 +142,7 @@ struct DatasetWriter::Impl {
     if (std::ssize(files) == layout.shard_count()) return {};
     for (std::int64_t shard = 0; shard < layout.shard_count(); ++shard)
       std::erase(files, folder.shard_path(shard));
-    return fmt::format("'{}' is none of the {} shards of this run", files.front(),
+    return fmt::format("'{}' is not one of the {} shards of this run", files.front(),
                        layout.shard_count());
   }
 
@@ -204,8 +205,8 @@ void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpi
 
 bool DatasetWriter::complete() {
   impl_->folder.let_go();
-  // Let go of first: whoever looks last sees the shards of all, and none of those who looked before
-  // is in its way.
+  // Every process lets go first. So the last one to look sees all shards, and no earlier one is in
+  // its way.
   if (!impl_->all_there()) return false;
   if (!impl_->folder.hold_alone()) {
     impl_->obstacle = fmt::format(

@@ -15,8 +15,8 @@ namespace tangere {
 struct DatasetOutput {
   std::string folder;
   ExistingShards existing = ExistingShards::refuse;
-  /// Shards to make, ascending; others may be made by other processes at the same time. None: all,
-  /// alone.
+  /// Shards to make, ascending; other processes may make others at the same time. None: this
+  /// process makes all of them alone.
   std::optional<std::vector<std::int64_t>> only = {};
 };
 
@@ -24,10 +24,10 @@ struct DatasetOutput {
 /// read back; destroyed before that, it leaves nothing behind.
 class DatasetWriter : public EpisodeSink {
  public:
-  /// Creates the folder; touches no shard. Throws InputError for names no file can hold and for
-  /// shards to keep that other settings made, naming what differs; IoError when the folder cannot
-  /// be written, is being written by another process, has shards that are neither to be kept nor
-  /// replaced, or the disk has no room for the data set.
+  /// Creates the folder and touches no shard. Throws InputError for names that no file can hold,
+  /// and for shards to keep that have other settings, naming what differs. Throws IoError when the
+  /// folder cannot be written, is being written by another process, has shards that are neither to
+  /// be kept nor replaced, or the disk has no room for the data set.
   DatasetWriter(const DatasetOutput& output, const DatasetLayout& layout);
   ~DatasetWriter() override;
 
@@ -37,19 +37,19 @@ class DatasetWriter : public EpisodeSink {
   [[nodiscard]] std::int64_t kept() const;
   [[nodiscard]] std::int64_t kept_failed() const;
 
-  /// Compresses, where the layout says so.
+  /// Compresses the piece if the layout says so.
   void prepare(const EpisodeRows& rows) override;
-  /// The first piece of a run removes the shards of an earlier one, where those are to be replaced.
+  /// The first piece of a run removes the shards of an earlier run, if those are to be replaced.
   void write(const EpisodeRows& rows) override;
   void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) override;
 
   /// Paths of the complete shards, kept ones among them, in ascending order.
   [[nodiscard]] std::vector<std::string> shards() const;
-  /// Whether the data set is complete and no other process writes into its folder, nor can from now
-  /// on: of several that end at the same time, at least one is told so. Nothing may be written
-  /// afterwards; where it is not complete, others may.
+  /// Whether the data set is complete and no other process writes into its folder or can do so from
+  /// now on. Of several processes that end at the same time, at least one gets true. This writer
+  /// must not write afterwards; if the data set is not complete, other processes may.
   [[nodiscard]] bool complete();
-  /// Why complete() said no although as many shards as are wanted are there; else empty.
+  /// Why complete() returned false although all shards exist; else empty.
   [[nodiscard]] const std::string& obstacle() const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the datasets of a demo are, in the order of the file, and the bytes that describe them.
+// The datasets of a demo in the order of the file, and the bytes that describe them.
 #pragma once
 
 #include <array>
@@ -16,14 +16,14 @@
 
 namespace tangere {
 
-/// What a demo says of itself.
+/// What the attributes of a demo's group say.
 struct DemoFacts {
   std::int64_t rows = 0;           ///< R
   std::optional<EpisodeEnd> end;   ///< of a task
   std::vector<double> randomized;  ///< as many as the layout has names
 };
 
-/// They as the attributes of a demo's group. Refers to what it was made of, and to itself.
+/// The same facts as attributes of the group. all() refers to the facts given and to this object.
 class DemoAttributes {
  public:
   explicit DemoAttributes(const DemoFacts& facts);
@@ -57,30 +57,31 @@ class DemoFormat {
   [[nodiscard]] std::size_t rank(std::size_t dataset) const { return shapes_[dataset].size() + 1; }
   /// Rows of a dataset in a demo of `rows`.
   [[nodiscard]] std::int64_t rows_of(std::size_t dataset, std::int64_t rows) const;
-  /// Rows of a chunk of a demo of `rows`, 0: contiguous.
+  /// Rows of a chunk in a demo of `rows`; 0: contiguous.
   [[nodiscard]] std::int64_t chunk_rows(std::size_t dataset, std::int64_t rows) const;
-  /// How it is cut, if it is.
+  /// How an observation is cut into chunks.
   [[nodiscard]] const ChunkPlan& plan(std::size_t dataset) const {
     return plans_[(dataset - kFirst) % names_.size()];
   }
-  /// Where pieces have it.
+  /// The place of an observation in pieces of episodes.
   [[nodiscard]] std::size_t source(std::size_t name) const { return sources_[name]; }
   [[nodiscard]] std::size_t source_of_gradient(std::size_t k) const { return gradient_sources_[k]; }
-  /// Of a row.
+  /// The shape of one row.
   [[nodiscard]] const std::vector<std::uint64_t>& shape(std::size_t dataset) const {
     return shapes_[dataset];
   }
-  /// Bytes of all datasets of an uncompressed demo, each to a multiple of eight.
+  /// Bytes of all datasets of an uncompressed demo, each rounded up to a multiple of eight.
   [[nodiscard]] std::size_t data_bytes(std::int64_t rows) const;
-  /// Bytes of a demo's description: the same for all.
+  /// Bytes of a demo's description; all demos have the same.
   [[nodiscard]] std::size_t header_bytes() const { return header_bytes_; }
 
-  /// What descriptions of demos refer to, once in a file; empty without derivatives.
+  /// The texts that descriptions of demos refer to. A file has them once; empty without
+  /// derivatives.
   [[nodiscard]] h5::Bytes texts() const;
 
   /// Appends the description of a demo to what begins at `base` in the file. Returns the address of
-  /// its group. `addresses`: of the numbers of each dataset, or of the index of its chunks.
-  /// `texts`: of texts().
+  /// its group. `addresses` are those of the numbers of each dataset, or of the index of its
+  /// chunks. `texts` is the address of texts().
   std::uint64_t describe(h5::Bytes& out, std::uint64_t base, const DemoFacts& facts,
                          std::span<const std::uint64_t> addresses, std::uint64_t texts) const;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Of a batch: what its virtual datasets show, then objects.
+// For each batch of demos the file has what its virtual datasets show, then the objects.
 #include "io/dataset/demo_links.hpp"
 
 #include <fmt/format.h>
@@ -36,7 +36,8 @@ bool has_numbers(const DemoArray& array) {
 /// Observations of a batch of demos one row later, or with one row more, as virtual datasets.
 class ShownObservations {
  public:
-  /// `skipped`: rows of obs that are left out before final_obs follows. Appends what is shown.
+  /// `skipped` is how many rows of obs are left out before final_obs follows. Appends what is
+  /// shown.
   ShownObservations(Bytes& out, std::uint64_t base, const DemoMembers& members,
                     std::string_view file, std::span<const LinkedDemo> demos, std::uint64_t skipped)
       : out_(out), base_(base), members_(members), skipped_(skipped) {
@@ -94,7 +95,7 @@ h5::NumberType type_of(const h5::Id& dataset) {
 DemoArray array_of(const h5::Id& group, const std::string& name) {
   const h5::Id dataset = h5::open_dataset(group, name);
   const h5::Dims dims = h5::dimensions(dataset);
-  if (dims.empty()) throw IoError(fmt::format("{} is one number, expected rows", name));
+  if (dims.empty()) throw IoError(fmt::format("{} is one number; expected rows", name));
   return {name, type_of(dataset), {dims.begin() + 1, dims.end()}};
 }
 
@@ -125,7 +126,7 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
   DemoFacts facts;
   facts.rows = h5::read_numbers<std::int64_t>(demo, "num_samples").at(0);
   if (facts.rows < 1)
-    throw IoError(fmt::format("a demo has {} rows, expected at least 1", facts.rows));
+    throw IoError(fmt::format("a demo has {} rows; expected at least 1", facts.rows));
   if (members.of_task) {
     const double total = h5::read_numbers<double>(demo, "return").at(0);
     facts.end = EpisodeEnd{facts.rows, total, flag("terminated"), flag("success")};
@@ -140,7 +141,7 @@ void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFac
     if (!std::ranges::equal(h5::dimensions(dataset),
                             dims_of(static_cast<std::uint64_t>(rows), array)) ||
         type_of(dataset) != array.type)
-      throw IoError(fmt::format("{} is not of {} rows, of the shape and type of the first demo",
+      throw IoError(fmt::format("{} does not have {} rows, or the shape and type of the first demo",
                                 array.name, rows));
   };
   for (const std::string& name : members.names)

@@ -22,7 +22,7 @@ struct DemoArray {
   std::vector<std::uint64_t> shape;  ///< of a row
 };
 
-/// What all demos of a data set have alike.
+/// What all demos of a data set have in common.
 struct DemoMembers {
   std::vector<std::string> names;       ///< of its links
   std::vector<DemoArray> observations;  ///< below obs
@@ -45,8 +45,8 @@ struct LinkedDemo {
 };
 
 /// Appends groups demo_<i> to what begins at `base`: attributes and members of the demos of `file`,
-/// given relative to the folder of the file that is written, and next_obs: row j is row j + 1 of
-/// obs, the last one final_obs. Returns the groups.
+/// given relative to the folder of the file that is written, and next_obs, whose row j is row j + 1
+/// of obs and whose last row is final_obs. Returns the groups.
 std::vector<h5::FileMember> add_demo_links(h5::Bytes& out, std::uint64_t base,
                                            const DemoMembers& members, std::string_view file,
                                            std::span<const LinkedDemo> demos);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file that the library begins and ends, and whose thousands of members are laid out in between.
+// A file that the HDF5 library begins and ends. Its thousands of members are laid out in between.
 #pragma once
 
 #include <cstdint>
@@ -15,13 +15,13 @@
 
 namespace tangere {
 
-/// In this order: file() → close() → append() … → open() → file() → commit(). Everything throws
-/// IoError.
+/// Call in this order: file() → close() → append() … → open() → file() → commit(). Everything
+/// throws IoError.
 class GrownFile {
  public:
   /// Begins `<path>.part`; `views` as for h5::create_file.
   GrownFile(const std::string& path, bool overwrite, bool views);
-  /// Leaves nothing unless it was committed.
+  /// Leaves nothing behind unless it was committed.
   ~GrownFile();
   GrownFile(const GrownFile&) = delete;
   GrownFile& operator=(const GrownFile&) = delete;
@@ -33,11 +33,11 @@ class GrownFile {
   /// Where the next bytes will be.
   [[nodiscard]] std::uint64_t here() const { return here_; }
   void append(const h5::Bytes& bytes);
-  /// A group to which the library may add; arguments as for h5::add_large_group. Returns its
-  /// address.
+  /// Appends a group to which the library may add. The arguments are those of h5::add_large_group.
+  /// Returns its address.
   std::uint64_t append_group(std::string_view prefix, std::vector<h5::FileMember> members,
                              bool root = false);
-  /// `root`: address of the group "/"; that of the beginning if it leads nowhere.
+  /// `root`: address of the group "/"; if it leads nowhere, the group stays where it was.
   void open(std::uint64_t root = h5::kNowhere);
 
   /// Reads back what was appended, calls `last` with the path of the .part, syncs, renames. Returns

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From what the engine knows of a run to what its file says.
+// Turns what the engine knows of a run into what its file says.
 #include <fmt/format.h>
 
 #include <stdexcept>

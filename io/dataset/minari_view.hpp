@@ -17,11 +17,12 @@ namespace tangere {
 /// FOLDER/minari/tangere/NAME-v0/data. Everything throws IoError.
 class MinariView {
  public:
-  /// Begins it, in place of one that is there; `shard`: anything in one of the folder's shards;
-  /// `members` must outlive it.
+  /// Begins the view and replaces an existing one. `shard` is any object in one of the folder's
+  /// shards. `members` must outlive the view.
   MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members);
 
-  /// Demos of a file of the data set's folder, given without its path, in ascending order.
+  /// Adds demos of a file in the data set's folder, in ascending order. The file is given without
+  /// its path.
   void add(std::string_view file, std::span<const LinkedDemo> demos);
   /// Writes what is left, and metadata.json.
   void commit();

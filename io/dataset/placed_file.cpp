@@ -87,9 +87,10 @@ void PlacedFile::verify() const {
     }
   }
   if (sum.value() != expected_.value())
-    throw IoError(fmt::format(
-        "'{}' is damaged: read back, the checksum of what was written is {:016x}, expected {:016x}",
-        part_.path(), sum.value(), expected_.value()));
+    throw IoError(
+        fmt::format("'{}' is damaged: the checksum of what was written is {:016x} when read back; "
+                    "expected {:016x}",
+                    part_.path(), sum.value(), expected_.value()));
 }
 
 }  // namespace tangere

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file that is written in places, in any order, and read back afterwards: whether the disk has
-// what it was given.
+// A file that is written in places, in any order, and read back afterwards to compare the disk with
+// what was written.
 #pragma once
 
 #include <sys/uio.h>
@@ -15,7 +15,7 @@
 
 namespace tangere {
 
-/// Rows as ContentSum adds them.
+/// Rows in the terms of ContentSum.
 struct PlacedRows {
   std::int64_t episode = 0;
   std::size_t name = 0;
@@ -27,23 +27,23 @@ class PlacedFile {
  public:
   explicit PlacedFile(PartFile& part) : part_(part) {}
 
-  /// Rows whose sum somebody else knows: expect() it. `data` must stay until flush(), as below.
-  /// Places ascend until then.
+  /// Adds rows; the caller gives their checksum to expect(). `data` must stay valid until flush().
+  /// Addresses ascend between two calls of flush().
   void add(std::uint64_t address, const PlacedRows& rows, const void* data);
   void expect(const ContentSum& sum) { expected_.add(sum); }
-  /// Bytes of which nothing is known.
+  /// Adds bytes without a checksum of their own. They must stay valid until flush() as well.
   void add(std::uint64_t address, std::span<const unsigned char> bytes);
   /// Writes what was added; gaps of less than eight bytes become zeros.
   void flush();
 
-  /// At once; verify() does not look at it.
+  /// Writes at once. verify() does not look at these bytes.
   void write_unchecked(std::uint64_t address, std::span<const unsigned char> bytes);
 
-  /// Tells the library where the file ends, and where its group "/" is unless that leads nowhere;
-  /// verify() does not look at it.
+  /// Tells the library where the file ends and, unless `root` leads nowhere, where its group "/"
+  /// is. verify() does not look at this.
   void end_at(std::uint64_t end, std::uint64_t root = h5::kNowhere);
 
-  /// Reads all that was written. Throws IoError when it is not the same.
+  /// Reads back all that was added. Throws IoError when it differs from what was written.
   void verify() const;
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can be done to a piece of episodes before the one thread that writes has it: sums and
-// compressed chunks.
+// The work on a piece of episodes that any thread can do before the one writing thread gets it:
+// checksums and compressed chunks.
 #pragma once
 
 #include <array>
@@ -20,8 +20,8 @@ struct PieceSlice {
   const unsigned char* data = nullptr;
 };
 
-/// R of an episode of the piece. One that failed in its first action has no row; it gets one, which
-/// nobody will see.
+/// R of an episode of the piece. An episode that failed in its first action has no row. It gets
+/// one, which no reader will see.
 std::int64_t rows_of_episode(const DatasetLayout& layout, const EpisodeRows& piece, int episode);
 
 /// Of an episode of the piece, per dataset. Rewards only of tasks, dones never: those follow from

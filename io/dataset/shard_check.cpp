@@ -48,7 +48,7 @@ class ShardChecker {
   ShardChecker(const std::string& path, bool finite)
       : finite_(finite), file_(h5::open_file(path)), scene_(h5::open_group(file_, "scene")) {}
 
-  /// Of the first and the last episode everything but sums, of the others that they are counted.
+  /// Checks everything but sums of the first and the last episode. Only counts the others.
   ShardReport sample() {
     const h5::Id data = h5::open_group(file_, "data"), failed = h5::open_group(file_, "failed");
     read_description();
@@ -57,18 +57,18 @@ class ShardChecker {
     const auto demos = static_cast<std::int64_t>(h5::link_count(data));
     const auto lost = static_cast<std::int64_t>(h5::link_count(failed));
     if (demos + lost != end_ - content_.first_episode)
-      fail(fmt::format("it has {} demos and {} failed episodes, expected {} together", demos, lost,
+      fail(fmt::format("it has {} demos and {} failed episodes; expected {} together", demos, lost,
                        end_ - content_.first_episode));
     return {content_, problems_};
   }
 
   ShardReport check() {
     if (h5::read_text(file_, "format") != "tangere dataset") {
-      fail("it is no tangere data set");
+      fail("it is not a tangere data set");
       return {content_, problems_};
     }
     if (const std::int64_t version = number(file_, "format_version"); version != 2) {
-      fail(fmt::format("its format_version is {}, expected 2", version));
+      fail(fmt::format("its format_version is {}; expected 2", version));
       return {content_, problems_};
     }
     read_description();
@@ -76,12 +76,12 @@ class ShardChecker {
     for (std::int64_t episode = content_.first_episode; episode < end_; ++episode)
       add_episode(data, failed, episode);
     if (number(data, "total") != content_.rows)
-      fail(fmt::format("/data says {} rows, its demos have {}", number(data, "total"),
+      fail(fmt::format("/data counts {} rows; its demos have {}", number(data, "total"),
                        content_.rows));
     // Numbers that are known to be missing or wrong in count change the sum as well.
     const std::uint64_t expected = h5::read_numbers<std::uint64_t>(file_, "content_sum").at(0);
     if (problems_.empty() && sum_.value() != expected)
-      fail(fmt::format("the checksum of its numbers is {:016x}, expected {:016x}", sum_.value(),
+      fail(fmt::format("the checksum of its numbers is {:016x}; expected {:016x}", sum_.value(),
                        expected));
     problems_.insert(problems_.end(), not_finite_.begin(), not_finite_.end());
     return {content_, problems_};
@@ -126,8 +126,8 @@ class ShardChecker {
     if (of_task_ ? rows < 1 || rows > rows_ : rows != rows_)
       return fail(fmt::format("demo_{} has {} rows, expected {}{}", episode, rows,
                               of_task_ ? "1 to " : "", rows_));
-    // Known without a checksum: without a task nothing is rewarded, and only the last row ends the
-    // episode.
+    // These are known without a checksum: without a task every reward is 0, and only the last row
+    // ends the episode.
     if (of_task_) {
       add<float>(demo, "rewards", episode, names_.size() + 1, 0, rows);
     } else {
@@ -159,10 +159,11 @@ class ShardChecker {
                     std::size_t index, std::int64_t rows) {
     const h5::Id dataset = h5::open_dataset(demo, said.name);
     if (h5::read_text(dataset, "meaning") != said.meaning)
-      fail(fmt::format("demo_{}: {} says another meaning than /scene", episode, said.name));
+      fail(fmt::format("demo_{}: the meaning of {} differs from that in /scene", episode,
+                       said.name));
     const h5::Dims dims = h5::dimensions(dataset);
     if (dims.empty())
-      return fail(fmt::format("demo_{}: {} is one number, expected a list", episode, said.name));
+      return fail(fmt::format("demo_{}: {} is one number; expected a list", episode, said.name));
     add<double>(demo, said.name, episode, index, 0,
                 said.by_row ? rows : static_cast<std::int64_t>(dims[0]));
   }
@@ -219,7 +220,7 @@ class ShardChecker {
   bool has_rows(const h5::Id& dataset, const std::string& name, std::int64_t rows) {
     const h5::Dims dims = h5::dimensions(dataset);
     const bool right = !dims.empty() && dims[0] == static_cast<hsize_t>(rows);
-    if (!right) fail(fmt::format("{} has not {} rows", name, rows));
+    if (!right) fail(fmt::format("{} does not have {} rows", name, rows));
     return right;
   }
 
@@ -230,7 +231,7 @@ class ShardChecker {
         std::find_if(numbers.begin(), numbers.end(), [](T x) { return !std::isfinite(x); });
     if (!finite_ || bad == numbers.end() || not_finite_.size() >= kMostProblems) return;
     const auto at = static_cast<std::size_t>(bad - numbers.begin());
-    not_finite_.push_back(fmt::format("{}: row {} has a number that is {}, expected finite ones",
+    not_finite_.push_back(fmt::format("{}: row {} has a number that is {}; expected finite numbers",
                                       name, first + static_cast<std::int64_t>(at / width), *bad));
   }
 

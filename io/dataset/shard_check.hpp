@@ -34,15 +34,15 @@ struct ShardReport {
   std::vector<std::string> problems;  ///< each with the dataset it is about; a hundred at most
 };
 
-/// Reads a shard whole and tells all that is wrong with it, numbers that are not finite among it.
-/// Throws nothing for a file that cannot be read: that is a problem like others.
+/// Reads a shard whole and reports all that is wrong with it, including numbers that are not
+/// finite. A file that cannot be read is a problem in the report, not an exception.
 ShardReport examine_shard(const std::string& path);
 
 /// Reads a shard whole. Throws IoError naming the file and what is missing or differs.
 ShardContent check_shard(const std::string& path);
 
-/// Counts all episodes and reads the first and the last one: of a shard whose bytes are known,
-/// whether they are a data set. Throws IoError as check_shard().
+/// Counts all episodes and reads the first and the last one. For a shard whose bytes have been
+/// compared already, this checks that they form a data set. Throws IoError as check_shard().
 void sample_shard(const std::string& path);
 
 }  // namespace tangere

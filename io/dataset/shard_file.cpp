@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A block: descriptions of its demos, indexes of chunks if any, then the numbers, demo after demo.
+// A block has the descriptions of its demos, indexes of chunks if any, then the numbers, demo after
+// demo.
 #include "io/dataset/shard_file.hpp"
 
 #include <fmt/format.h>

@@ -23,15 +23,15 @@ namespace tangere {
 class ShardFile {
  public:
   /// Creates `<path>.part`. Throws IoError, also when `path` exists and `overwrite` is false.
-  /// `layout`, `format` and `held_bytes`, what all shards of a data set together keep in memory,
-  /// must outlive it.
+  /// `layout`, `format` and `held_bytes` must outlive this object. `held_bytes` counts what all
+  /// shards of a data set together keep in memory.
   ShardFile(const std::string& path, const DatasetLayout& layout, const DemoFormat& format,
             EpisodeRange range, bool overwrite, std::size_t& held_bytes);
   ~ShardFile();
   ShardFile(const ShardFile&) = delete;
   ShardFile& operator=(const ShardFile&) = delete;
 
-  /// `prepared`: of the same piece.
+  /// `prepared` belongs to the same piece.
   void write(const EpisodeRows& rows, PreparedPiece prepared);
   void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures);
   /// Whether every block has finished.
@@ -40,13 +40,12 @@ class ShardFile {
   void commit();
 
  private:
-  /// In memory until its block has a place; or, where memory is full, on disk already.
+  /// A chunk is in memory until its block has a place. If memory is full, it is on disk already.
   struct Chunk {
     h5::FileChunk place;
     std::vector<unsigned char> bytes;
   };
-  /// Numbers of a contiguous dataset, of a block without a place. The same: once they have an
-  /// address, they are there.
+  /// Numbers of a contiguous dataset in a block without a place. With an address they are on disk.
   struct HeldRows {
     std::vector<unsigned char> bytes;
     std::uint64_t address = h5::kNowhere;

@@ -50,7 +50,7 @@ void check_output(const std::string& output, bool overwrite) {
     fail("write", output, errno);
   }
   if (S_ISDIR(info.st_mode))
-    throw IoError(fmt::format("cannot write '{}': it is a folder, expected a file name", output));
+    throw IoError(fmt::format("cannot write '{}': it is a folder; expected a file name", output));
   if (!S_ISREG(info.st_mode) && !S_ISLNK(info.st_mode))
     throw IoError(fmt::format("cannot write '{}': it is not a regular file", output));
   if (!overwrite)
@@ -195,7 +195,7 @@ void PartFile::read_at(std::uint64_t offset, std::span<unsigned char> bytes) con
     if (result < 0 && errno == EINTR) continue;
     if (result < 0) fail("read", path_, errno);
     if (result == 0)
-      throw IoError(fmt::format("'{}' ends at byte {}, expected more of it", path_, offset));
+      throw IoError(fmt::format("'{}' ends at byte {}; expected more bytes", path_, offset));
     offset += static_cast<std::uint64_t>(result);
     bytes = bytes.subspan(static_cast<std::size_t>(result));
   }

@@ -394,7 +394,7 @@ std::string read_text(const Id& object, const std::string& name) {
   std::vector<std::string> texts = read_texts(object, name);
   if (texts.size() != 1) {
     const Quiet quiet;
-    fail("read attribute", object, name, fmt::format("expected one text, found {}", texts.size()));
+    fail("read attribute", object, name, fmt::format("expected one text; found {}", texts.size()));
   }
   return std::move(texts.front());
 }

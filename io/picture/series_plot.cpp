@@ -42,7 +42,7 @@ class Panel {
   Panel(const CurvePanel& panel, double top) : panel_(panel), top_(top) {
     for (const Curve& c : panel.curves) {
       if (c.x.size() != c.y.size())
-        throw InputError(fmt::format("curve '{}' has {} x and {} y; expected as many", c.name,
+        throw InputError(fmt::format("curve '{}' has {} x and {} y; expected equal numbers", c.name,
                                      c.x.size(), c.y.size()));
       for (std::size_t k = 0; k < c.x.size(); ++k)
         if (drawn(c, k)) x_.take(c.x[k]), y_.take(scaled(c.y[k]));

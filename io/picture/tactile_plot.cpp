@@ -317,7 +317,7 @@ std::string render_tactile_svg(const TrajectoryReader& file, const PlotOptions& 
   const SensorLayout& s = file.sensors()[sensor];
   if (!drawable(s))
     throw InputError(fmt::format(
-        "sensor '{}' is no rectangular array and has no image; {}", s.name,
+        "sensor '{}' is not a rectangular array and has no image; {}", s.name,
         names.empty() ? "only those can be drawn, and the file has none"
                       : fmt::format("those that can be drawn: {}", fmt::join(names, ", "))));
   if (o.environment < 0 || o.environment >= file.environments())

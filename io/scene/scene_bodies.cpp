@@ -105,9 +105,8 @@ AbstractShape read_abstract(const SceneNode& node, double length) {
       std::all_of(shape.inertia.begin(), shape.inertia.end(), [](double x) { return x == 0; });
   if (shape.mass == 0 ? !weightless : !is_inertia(shape.inertia))
     node.fail(
-        fmt::format("inertia=\"{}\" is that of no solid body of mass {}; expected positive "
-                    "moments, none more than the sum of "
-                    "the other two, or zeros with mass 0",
+        fmt::format("no solid body of mass {1} has inertia=\"{0}\"; expected positive moments, "
+                    "each at most the sum of the other two, or zeros with mass 0",
                     node.text("inertia"), node.text("mass")));
   for (const SceneNode& child : node.children({"visual", "collision"})) {
     if (child.name() == "visual") {

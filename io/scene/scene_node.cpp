@@ -202,7 +202,7 @@ Quaternion SceneNode::quaternion(const char* attribute) const {
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!(length > 1e-100) || !std::isfinite(length))
     fail_at(attribute,
-            fmt::format("{}=\"{} {} {} {}\" is no rotation; expected w x y z, not all zero",
+            fmt::format("{}=\"{} {} {} {}\" is not a rotation; expected w x y z, not all zero",
                         attribute, q[0], q[1], q[2], q[3]));
   return {q[0] / length, q[1] / length, q[2] / length, q[3] / length};
 }

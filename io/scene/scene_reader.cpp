@@ -214,8 +214,10 @@ const char* fault_of(tinyxml2::XMLError error) {
   switch (error) {
     case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT:
       return "an element is closed by another's end tag, or never";
-    case tinyxml2::XML_ERROR_PARSING_ELEMENT: return "a tag that is no <name attribute=\"value\">";
-    case tinyxml2::XML_ERROR_PARSING_ATTRIBUTE: return "an attribute that is no name=\"value\"";
+    case tinyxml2::XML_ERROR_PARSING_ELEMENT:
+      return "a tag that is not of the form <name attribute=\"value\">";
+    case tinyxml2::XML_ERROR_PARSING_ATTRIBUTE:
+      return "an attribute that is not of the form name=\"value\"";
     case tinyxml2::XML_ERROR_PARSING_COMMENT: return "a comment without its end -->";
     case tinyxml2::XML_ERROR_PARSING_DECLARATION: return "a declaration without its end ?>";
     case tinyxml2::XML_ERROR_EMPTY_DOCUMENT:

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/step/batch.hpp"
-#include "kernels/numbers/lanes.hpp"
+#include "kernels/numbers/block.hpp"
 
 namespace tangere {
 

@@ -47,11 +47,11 @@ TEST_F(GenerateReplace, WhatShowsShardsAsOneGoesWithTheFirstThatIsReplaced) {
   const json first = make("2", {"--shard", "0/3", "--overwrite"});
   EXPECT_TRUE(first.at("merged").is_null());
   EXPECT_THAT(first.at("not_merged").get<std::string>(),
-              HasSubstr("'set/shard-00001.h5' is of another run: seed: 1 there, 2 here"));
+              HasSubstr("'set/shard-00001.h5' belongs to another run: seed: 1 there, 2 here"));
   EXPECT_FALSE(merged()) << "it would show the shard of seed 2 with those of seed 1";
   const Outcome second = run(folder_, generate("2", {"--shard", "1/3", "--overwrite"}));
   EXPECT_EQ(second.exit_code, 0) << second.err;
-  EXPECT_THAT(second.out, HasSubstr("not merged: 'set/shard-00002.h5' is of another run"));
+  EXPECT_THAT(second.out, HasSubstr("not merged: 'set/shard-00002.h5' belongs to another run"));
   EXPECT_EQ(make("2", {"--shard", "2/3", "--overwrite"}).at("merged"), "set/robomimic.hdf5");
   EXPECT_TRUE(merged());
   EXPECT_EQ(run(folder_, {"validate", "set/robomimic.hdf5"}).exit_code, 0);

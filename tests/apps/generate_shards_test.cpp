@@ -169,7 +169,7 @@ TEST(GenerateShards, ResumeNamesEverySettingThatDiffers) {
     const Outcome outcome = run(folder, words, environment);
     EXPECT_EQ(outcome.exit_code, 2) << option;
     EXPECT_TRUE(bytes(folder, "set") == before) << option;
-    EXPECT_THAT(outcome.err, HasSubstr("'set/shard-00000.h5' is of another run"));
+    EXPECT_THAT(outcome.err, HasSubstr("'set/shard-00000.h5' belongs to another run"));
     return outcome.err;
   };
   EXPECT_THAT(refusal("--seed", "4"), HasSubstr("seed: 3 there, 4 here"));

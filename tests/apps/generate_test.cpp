@@ -288,7 +288,7 @@ TEST(Generate, PlacesThatAreNoFoldersAreNamed) {
     EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
     return outcome.err;
   };
-  EXPECT_THAT(complaint("file"), HasSubstr("'file' exists and is no folder"));
+  EXPECT_THAT(complaint("file"), HasSubstr("'file' exists and is not a folder"));
   EXPECT_THAT(complaint("no/set"), HasSubstr("cannot create the folder 'no/set'"));
   EXPECT_THAT(complaint("/proc/set"), HasSubstr("/proc/set"));
   EXPECT_THAT(folder.files(), ElementsAre("file"));

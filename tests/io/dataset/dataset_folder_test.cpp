@@ -218,7 +218,7 @@ TEST(DatasetFolder, SharedLosesWhatIsNoneOfItsShardsAndWhatShowsThemAsOne) {
 TEST(DatasetFolder, ThatIsNoneIsNamed) {
   const Folder place;
   touch(place / "file");
-  EXPECT_THAT(complaint(place / "file"), HasSubstr("exists and is no folder"));
+  EXPECT_THAT(complaint(place / "file"), HasSubstr("exists and is not a folder"));
   EXPECT_THAT(complaint(place / "no/set"), HasSubstr("cannot create the folder"));
   EXPECT_THAT(complaint(""), HasSubstr("folder"));
   EXPECT_THAT(names(place / ""), ElementsAre("file"));

@@ -69,9 +69,10 @@ TEST(DatasetShared, IsNotCompleteWithShardsOfAnotherRun) {
     DatasetWriter writer(one(folder, shard, ExistingShards::replace), l);
     write_block(writer, l, 16 * shard);
     EXPECT_FALSE(writer.complete());
-    EXPECT_THAT(writer.obstacle(),
-                HasSubstr(shard == 0 ? "shard-00001.h5' is of another run: seed: 1 there, 2 here"
-                                     : "shard-00002.h5' is of another run: seed: 1 there, 2 here"));
+    EXPECT_THAT(
+        writer.obstacle(),
+        HasSubstr(shard == 0 ? "shard-00001.h5' belongs to another run: seed: 1 there, 2 here"
+                             : "shard-00002.h5' belongs to another run: seed: 1 there, 2 here"));
     EXPECT_TRUE(may_be_held_alone(folder));
   }
   DatasetWriter last(one(folder, 2, ExistingShards::replace), l);
@@ -89,18 +90,19 @@ TEST(DatasetShared, IsNotCompleteWithAFileThatIsNoneOfItsShards) {
   fs::copy_file(folder / "set/shard-00000.h5", folder / "set/shard-00007.h5");
   DatasetWriter again({folder / "set", ExistingShards::keep}, l);
   EXPECT_FALSE(again.complete());
-  EXPECT_THAT(again.obstacle(), HasSubstr("shard-00007.h5' is none of the 3 shards of this run"));
+  EXPECT_THAT(again.obstacle(),
+              HasSubstr("shard-00007.h5' is not one of the 3 shards of this run"));
   // Whoever reads or merges the folder says so as well.
   const DatasetFiles files = find_dataset(folder / "set");
   EXPECT_THAT(files.missing, IsEmpty());
   EXPECT_THAT(files.surplus, ElementsAre(folder / "set/shard-00007.h5"));
   EXPECT_THAT(examine_dataset(files).problems,
-              ElementsAre(HasSubstr("shard-00007.h5: none of the shards that are counted")));
+              ElementsAre(HasSubstr("shard-00007.h5: not one of the shards that are counted")));
   try {
     check_complete(files);
     FAIL() << "one is too many";
   } catch (const IoError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("shard-00007.h5' is none of the 3 shards that '"));
+    EXPECT_THAT(error.what(), HasSubstr("shard-00007.h5' is not one of the 3 shards that '"));
   }
 }
 

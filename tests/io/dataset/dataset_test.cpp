@@ -286,9 +286,9 @@ TEST(Dataset, NamesThatNoFileCanHoldAreRefused) {
   EXPECT_THAT(complaint("q", "c"), HasSubstr("another observation has this name"));
   EXPECT_THAT(complaint("c", "c"), HasSubstr("another observation has this name"));
   EXPECT_EQ(complaint(std::string(200, 'a'), std::string(254, 'b')), "nothing");
-  EXPECT_THAT(
-      complaint(std::string(300, 'p'), "c"),
-      HasSubstr("'" + std::string(32, 'p') + "…': a name of 300 bytes; expected at most 255"));
+  EXPECT_THAT(complaint(std::string(300, 'p'), "c"),
+              HasSubstr("'" + std::string(32, 'p') +
+                        "…': the name has 300 bytes; the name of a dataset has at most 255"));
   EXPECT_EQ(folder.entries(), 0U);
 }
 

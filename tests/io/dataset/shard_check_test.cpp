@@ -149,7 +149,7 @@ TEST_F(ShardCheck, FindsEpisodesThatAreMissingOrThereTwice) {
   change([](hid_t file) {
     H5Lmove(file, "data/demo_3", file, "failed/episode_3", H5P_DEFAULT, H5P_DEFAULT);
   });
-  EXPECT_THAT(complaint(), HasSubstr("/data says 57 rows, its demos have 54"));
+  EXPECT_THAT(complaint(), HasSubstr("/data counts 57 rows; its demos have 54"));
   // Two demos under each other's names.
   write(whole);
   change([](hid_t file) {
@@ -167,10 +167,10 @@ TEST_F(ShardCheck, FindsCountsThatAreWrong) {
     change([&](hid_t file) { set(file, object, name, value); });
     return complaint();
   };
-  EXPECT_THAT(with("data", "total", 56), HasSubstr("/data says 56 rows, its demos have 57"));
+  EXPECT_THAT(with("data", "total", 56), HasSubstr("/data counts 56 rows; its demos have 57"));
   EXPECT_THAT(with("data/demo_7", "num_samples", 2), HasSubstr("demo_7 has 2 rows, expected 3"));
   EXPECT_THAT(with(".", "episodes", 21), HasSubstr("episode 20 is not in exactly one"));
-  EXPECT_THAT(with(".", "episodes", 16), HasSubstr("/data says 57 rows, its demos have 48"));
+  EXPECT_THAT(with(".", "episodes", 16), HasSubstr("/data counts 57 rows; its demos have 48"));
   EXPECT_THAT(with(".", "first_episode", 1), HasSubstr("episode 20 is not in exactly one"));
   EXPECT_THAT(with("scene", "steps", 8), HasSubstr("demo_0 has 3 rows, expected 4"));
   EXPECT_THAT(with(".", "content_sum", 1), HasSubstr("expected 0000000000000001"));
@@ -192,7 +192,7 @@ TEST_F(ShardCheck, FindsDatasetsThatAreMissingOrShort) {
                          H5P_DEFAULT));
       H5Sclose(space);
     });
-    EXPECT_THAT(complaint(), HasSubstr("has not ")) << name;
+    EXPECT_THAT(complaint(), HasSubstr("does not have ")) << name;
   }
 }
 

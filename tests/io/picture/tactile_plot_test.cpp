@@ -96,10 +96,8 @@ TEST(TactilePlot, DrawsTheFirstRectangularArrayAndNamesThemAll) {
     return std::string();
   };
   EXPECT_THAT(message(""), HasSubstr("'second' has no frame"));
-  EXPECT_THAT(
-      message("rod"),
-      HasSubstr(
-          "'rod' is no rectangular array and has no image; those that can be drawn: second, skin"));
+  EXPECT_THAT(message("rod"), HasSubstr("'rod' is not a rectangular array and has no image; those "
+                                        "that can be drawn: second, skin"));
 }
 
 /// Points that go round: down is -z of the body, right is y, wherever their own axes point.

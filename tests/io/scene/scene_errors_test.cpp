@@ -105,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(
             ":12: ",
             {"rest turns by 3.16", "pi"}},
         Bad{"type=\"translational\" pos", "type=\"revolute\" pos", ":8: ", {"'axis' is missing"}},
-        Bad{"pos=\"0 0 0.06\"", "pos=\"0 0 0.06\" quat=\"0 0 0 0\"", ":8: ", {"no rotation"}},
+        Bad{"pos=\"0 0 0.06\"", "pos=\"0 0 0.06\" quat=\"0 0 0 0\"", ":8: ", {"not a rotation"}},
         Bad{"pos=\"0 0 0.06\"",
             "pos=\"0 0 0.06\" frame=\"WOLRD\"",
             ":8: ",

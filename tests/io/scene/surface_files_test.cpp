@@ -288,7 +288,7 @@ TEST_F(SurfaceFiles, ScenesSayWhatIsWrongWithTheirBodies) {
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1"/>)"),
               HasSubstr("inertia has 2 numbers; expected 3"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 1 3"/>)"),
-              HasSubstr("inertia=\"1 1 3\" is that of no solid body"));
+              HasSubstr("has inertia=\"1 1 3\"; expected positive moments"));
   EXPECT_THAT(scene_error(R"(<body name="a" type="abstract" mass="1" inertia="1 2 0 1 0 1"/>)"),
               HasSubstr("no solid body"));
 }
