@@ -9,6 +9,7 @@
 #include <functional>
 #include <vector>
 
+#include "engine/model/compiled_model.hpp"
 #include "engine/model/shapes.hpp"
 #include "kernels/contact/distance.hpp"
 #include "tests/engine/runs.hpp"
