@@ -30,12 +30,13 @@ set(public_headers
   engine/derivative/adjoint.hpp
   engine/derivative/field_tangent.hpp
   engine/derivative/loss.hpp
-  engine/derivative/parameters.hpp
+  engine/derivative/number_gradients.hpp
   engine/derivative/point_numbers.hpp
   engine/derivative/readout_pullback.hpp
   engine/derivative/step_jacobian.hpp
   engine/model/model.hpp
   engine/model/scene.hpp
+  engine/model/scene_number.hpp
   engine/rows/episode_sink.hpp
   engine/rows/row_sink.hpp
   engine/rows/task_spec.hpp

@@ -88,18 +88,6 @@ int dof_count(JointType type) {
   }
 }
 
-const char* to_string(JointField value) {
-  switch (value) {
-    case JointField::damping: return "damping";
-    case JointField::armature: return "armature";
-    case JointField::stiffness: return "stiffness";
-    case JointField::lim_stiffness: return "lim_stiffness";
-    case JointField::P: return "P";
-    case JointField::D: return "D";
-  }
-  return "unknown";
-}
-
 double* size_number(Shape& shape, int which) {
   if (auto* cuboid = std::get_if<CuboidShape>(&shape))
     return which >= 2 && which <= 4 ? &cuboid->size[std::size_t(which - 2)] : nullptr;
@@ -113,11 +101,6 @@ double* size_number(Shape& shape, int which) {
   return nullptr;
 }
 
-const char* size_name(int which) {
-  constexpr const char* kNames[kSizeNames] = {"radius", "length", "size[0]", "size[1]", "size[2]"};
-  return which >= 0 && which < kSizeNames ? kNames[which] : "unknown";
-}
-
 bool dof_turns(JointType type, int k) {
   switch (type) {
     case JointType::revolute:
@@ -126,6 +109,11 @@ bool dof_turns(JointType type, int k) {
     case JointType::free: return k >= 3;
     default: return false;
   }
+}
+
+const char* coordinate_unit(JointType type, int k) {
+  if (type == JointType::spherical || (type == JointType::free && k > 2)) return "1";
+  return dof_turns(type, k) ? "rad" : "m";
 }
 
 }  // namespace tangere

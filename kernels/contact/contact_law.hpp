@@ -14,8 +14,7 @@
 namespace tangere::kernels {
 
 template <class N>
-struct LawParameters {
-  N kn, kt, mu, damping;
+struct LawParameters : Coefficients<N> {
   ContactLaw law;
   double ramp;
   /// Whether slipping points bring the derivative of -scale v_t (1) or, by its secant, -scale alone

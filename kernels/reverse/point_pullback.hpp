@@ -26,7 +26,7 @@ namespace tangere::kernels {
 template <class N>
 void pull_back_normal_force(const LawParameters<N>& p, const N& d, const N& rate,
                             const NormalForce<N>& at, const N& force, const N& bound,
-                            LawCotangent<N>& out) {
+                            Coefficients<N>& out) {
   const N zero(0.0), one(1.0);
   const auto pulling = at.force < zero;  // law paper: B = -N
   const N both = force + select(pulling, -bound, bound);
@@ -50,7 +50,7 @@ void pull_back_normal_force(const LawParameters<N>& p, const N& d, const N& rate
 /// Cotangents of the law's coefficients; f̄ zero where nothing touches.
 template <class N>
 void pull_back_law(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& f_bar,
-                   LawCotangent<N>& out) {
+                   Coefficients<N>& out) {
   const N along_t = dot(p.tangential.direction, f_bar);
   const N slip = p.tangential.slip;
   out.kt -= (N(1.0) - slip) * dot(p.vt, f_bar);
