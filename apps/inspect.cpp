@@ -35,9 +35,15 @@ const char* control_name(const Scene& scene) {
 
 std::vector<std::string> randomized_names(const Scene& scene) {
   std::vector<std::string> names;
-  for (const RandomizationDescription& d : scene.randomizations)
-    names.push_back(randomized_name(d));
+  for (const RandomizationDescription& d : scene.randomizations) names.push_back(name_of(d.number));
   return names;
+}
+
+std::vector<std::string> randomized_units(const Scene& scene) {
+  std::vector<std::string> units;
+  for (const RandomizationDescription& d : scene.randomizations)
+    units.push_back(unit_of(scene, d.number));
+  return units;
 }
 
 /// Steps of an unattended run, -1 when the scene does not say.
@@ -99,6 +105,7 @@ Json as_json(const Model& model) {
           {"control", control_name(scene)},
           {"steps", steps < 0 ? Json() : Json(steps)},
           {"randomized", randomized_names(scene)},
+          {"randomized_units", randomized_units(scene)},
           {"effects", effects},
           {"stages", stages},
           {"state_bytes_per_environment", model.state_bytes_per_environment()},

@@ -15,7 +15,7 @@
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/trajectory/saved_state.hpp"
 #include "io/trajectory/trajectory_file.hpp"
@@ -248,8 +248,8 @@ struct Gradients {
     if (summary.stopped) return false;
     const LossGradient& g = summary.losses[0];
     std::vector<std::string> names, units;
-    const Parameters parameters(start->model());
-    for (const ParameterInfo& info : parameters.infos())
+    const NumberGradients parameters(start->model());
+    for (const NumberInfo& info : parameters.infos())
       names.push_back(info.name), units.push_back(info.unit);
     output.write({name, loss_meaning(loss_named(name)), g.value, g.u, g.q, g.v, g.parameters, names,
                   units, g.points});

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "engine/derivative/field_tangent.hpp"
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/point_numbers.hpp"
 #include "engine/derivative/readout_pullback.hpp"
 #include "engine/sense/readout.hpp"

@@ -47,7 +47,7 @@ struct Press {
     touch.c = {0.001, -0.002, radius - depth};
     touch.omega = {0.3, -0.2, 0.1};
     touch.v = {0.01, 0.02, -0.005};
-    touch.kn = 1, touch.kt = 0.01, touch.mu = 2, touch.damping = 0.003;
+    touch.law = {1, 0.01, 2, 0.003};
   }
 };
 /// Every point of the pad is inside.
@@ -133,7 +133,7 @@ void BM_OnePointAtATime(benchmark::State& state) {
   const Press& press = kEverywhere;
   const Touch<double>& t = press.touch;
   std::vector<double> array(std::size_t(pad.rows * pad.cols) * 3);
-  const kernels::LawParameters<double> law = {t.kn, t.kt, t.mu, t.damping, ContactLaw::clamped, 0};
+  const kernels::LawParameters<double> law = {t.law, ContactLaw::clamped, 0};
   const double step = 0.05 / 199;
   for (auto _ : state) {
     double* to = array.data();

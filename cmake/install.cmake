@@ -31,7 +31,7 @@ set(public_headers
   engine/derivative/adjoint.hpp
   engine/derivative/field_tangent.hpp
   engine/derivative/loss.hpp
-  engine/derivative/parameters.hpp
+  engine/derivative/number_gradients.hpp
   engine/derivative/point_numbers.hpp
   engine/derivative/readout_pullback.hpp
   engine/derivative/step_jacobian.hpp
@@ -39,6 +39,7 @@ set(public_headers
   engine/model/model.hpp
   engine/model/random.hpp
   engine/model/scene.hpp
+  engine/model/scene_number.hpp
   engine/model/scheme.hpp
   engine/model/shapes.hpp
   engine/rows/episode_sink.hpp

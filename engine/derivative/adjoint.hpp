@@ -18,7 +18,7 @@ struct BlockCotangent {
   AlignedVector<double> previous_q, previous_v;  ///< (nv, 16) of the state one step before it
   AlignedVector<double> u;  ///< (nu, 16) of the controls of the step reversed last
   AlignedVector<double>
-      parameters;  ///< (parameter_rows, 16), summed over steps (engine/derivative/parameters.hpp); or empty
+      parameters;  ///< (parameter_rows, 16), summed over steps (engine/derivative/number_gradients.hpp); or empty
   AlignedVector<double>
       points;  ///< (16, tactile points, kPointNumbers), the same (engine/derivative/point_numbers.hpp)
 

@@ -55,7 +55,7 @@ struct DualStage::Impl {
     };
     int next = 0;
     const auto contact = [&](kernels::ContactParameters& c) {
-      for (Parameter* p : {&c.kn, &c.kt, &c.mu, &c.damping}) row(*p, next++);
+      for (std::size_t k = 0; k < kCoefficients; ++k) row(c[k], next++);
     };
     for (auto& p : pairs) contact(p.parameters);
     for (auto& g : grounds) contact(g.parameters);
@@ -378,13 +378,11 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
   const auto tangent = [&](int first, int k) {
     return numbers.empty() ? 0.0 : numbers[std::size_t(first + k)];
   };
-  const Parameter* const given[] = {&felt.parameters.kn, &felt.parameters.kt, &felt.parameters.mu,
-                                    &felt.parameters.damping};
-  const int first = kernels::parameter_numbers(i.m.view) + kernels::kContactNumbers * sensor;
-  D coefficients[4];
-  for (int k = 0; k < 4; ++k)
-    coefficients[k] =
-        D(given[k]->row < 0 ? given[k]->value : column[given[k]->row * kBlock], tangent(first, k));
+  const int first = kernels::parameter_numbers(i.m.view) + kCoefficients * sensor;
+  int next = 0;
+  const Coefficients<D> coefficients = transformed(felt.parameters, [&](const Parameter& p) {
+    return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent(first, next++));
+  });
   const kernels::Mat3<double> turn =
       transpose(felt.pad.R) * i.m.bodies[std::size_t(felt.body)].frame.R;
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
@@ -408,11 +406,13 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
           return points.empty() ? 0.0 : points[std::size_t(p.index * kernels::kPointNumbers + n)];
         };
         const kernels::Vec3<double> moves = turn * kernels::Vec3<double>{own(0), own(1), own(2)};
-        const auto coefficient = [&](int n) {
-          return D(p.factors[n]) * coefficients[n] + D(0.0, own(3 + n));
+        int n = 0;
+        const auto of_point = [&](const D& of_sensor) {
+          const D scaled = D(p.factors[n]) * of_sensor + D(0.0, own(3 + n));
+          ++n;
+          return scaled;
         };
-        const kernels::LawParameters<D> law = {coefficient(0), coefficient(1), coefficient(2),
-                                               coefficient(3), felt.law,       0.0};
+        const kernels::LawParameters<D> law = {transformed(coefficients, of_point), felt.law, 0.0};
         const kernels::Vec3<D> xi = {{p.at.x, moves.x}, {p.at.y, moves.y}, {p.at.z, moves.z}};
         const auto at = kernels::point_contact(shape, law, t.Q, t.c, t.omega, t.v, xi);
         const double f[3] = {at.force.x.epsilon, at.force.y.epsilon, at.force.z.epsilon};

@@ -8,7 +8,18 @@
 
 namespace tangere {
 
-static_assert(kPointNumbers == kernels::kPointNumbers);
+static_assert(kPointNumbers == kernels::kPointNumbers && kPointNumbers == 3 + kCoefficients);
+
+const char* point_number_name(int k) {
+  constexpr const char* kPlace[] = {"x", "y", "z"};
+  return k < 3 ? kPlace[k] : number_kind(NumberOwner::tactile, coefficient_field(k - 3)).name;
+}
+
+const char* point_number_unit(int k, ContactLaw law) {
+  return k < 3 ? "m"
+               : number_kind(NumberOwner::tactile, coefficient_field(k - 3))
+                     .unit_of(law == ContactLaw::linear);
+}
 
 int first_tactile_point(const Model& model, int sensor) {
   int count = 0;
@@ -20,14 +31,14 @@ int tactile_points(const Model& model) {
   return first_tactile_point(model, static_cast<int>(model.sensors().size()));
 }
 
-std::array<double, 4> sensor_coefficients(const Batch& batch, int environment, int sensor) {
+ContactCoefficients sensor_coefficients(const Batch& batch, int environment, int sensor) {
   const kernels::ContactParameters& c =
       compiled(batch.model()).sensors[std::size_t(sensor)].parameters;
   const double* column = batch.block(environment / kernels::kBlock) + environment % kernels::kBlock;
   const auto in_force = [column](const kernels::Parameter& p) {
     return p.row < 0 ? p.value : column[p.row * kernels::kBlock];
   };
-  return {in_force(c.kn), in_force(c.kt), in_force(c.mu), in_force(c.damping)};
+  return transformed(c, in_force);
 }
 
 std::vector<TactilePoint> list_points(const RectArray& a) {
@@ -59,18 +70,17 @@ void add_to_points(TactileDescription& sensor, std::span<const double> change) {
                      "': " + std::to_string(change.size()) + " numbers for its points; expected " +
                      std::to_string(expected));
   const ContactCoefficients& c = sensor.coefficients;
-  const double of_sensor[] = {c.kn, c.kt, c.mu, c.damping};
-  const char* const names[] = {"kn", "kt", "mu", "damping"};
   const double* own = change.data();
   for (TactilePoint& p : sensor.points) {
     for (std::size_t k = 0; k < 3; ++k) p.position[k] += own[k];
-    for (std::size_t k = 0; k < 4; ++k) {
+    for (std::size_t k = 0; k < kCoefficients; ++k) {
       if (own[3 + k] == 0) continue;
-      if (of_sensor[k] == 0)
-        throw InputError(sensor.source.prefix() + "tactile sensor '" + sensor.name +
-                         "': points of their own " + names[k] + "; expected a sensor whose " +
-                         names[k] + " is not 0");
-      p.factors[k] += own[3 + k] / of_sensor[k];
+      if (c[k] == 0)
+        throw InputError(
+            sensor.source.prefix() + "points with '" +
+            name_of({NumberOwner::tactile, coefficient_field(static_cast<int>(k)), sensor.name}) +
+            "' of their own; expected a sensor whose own is not 0");
+      p.factors[k] += own[3 + k] / c[k];
     }
     own += kPointNumbers;
   }

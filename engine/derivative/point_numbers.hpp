@@ -13,9 +13,13 @@ namespace tangere {
 
 class Batch;
 
-/// Of a point: its place x y z in its body's frame [m], its axes left as they are; then its own kn,
-/// kt, mu, kd or c (the sensor's times its factors).
+/// Of a point: its place x y z in its body's frame, its axes left as they are; then its own
+/// coefficients (the sensor's times its factors).
 inline constexpr int kPointNumbers = 7;
+
+/// "x", "y", "z", "kn" …, and their units where a sensor has this law.
+const char* point_number_name(int k);
+const char* point_number_unit(int k, ContactLaw law);
 
 /// All points of all sensors, one sensor after the other, each in the order of its field.
 int tactile_points(const Model& model);
@@ -23,7 +27,7 @@ int tactile_points(const Model& model);
 int first_tactile_point(const Model& model, int sensor);
 
 /// kn, kt, mu and damping that a sensor has in an environment.
-std::array<double, 4> sensor_coefficients(const Batch& batch, int environment, int sensor);
+ContactCoefficients sensor_coefficients(const Batch& batch, int environment, int sensor);
 
 /// The points of an array, row by row, with its axes: given one by one they have the same field.
 std::vector<TactilePoint> list_points(const RectArray& array);

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <array>
 
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/point_numbers.hpp"
 #include "engine/sense/dense_tiles.hpp"
 #include "engine/sense/pad_reader.hpp"
@@ -141,17 +141,15 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
        i.touches.data()});
   if (!points.empty()) i.hand_on_points(s, tiles, points);
   i.used[std::size_t(group)] = true;
-  const int row = kernels::parameter_numbers(m.view) + kernels::kContactNumbers * sensor;
+  const int row = kernels::parameter_numbers(m.view) + kCoefficients * sensor;
   for (std::size_t k = 0; k < s.targets.size(); ++k) {
     const kernels::TouchCotangent<double>& c = i.touches[k];
     i.hand_on(c, s, m.bodies[std::size_t(s.targets[k])], group, in_group);
     if (parameters.empty()) continue;
-    const auto add = [&](int first, std::initializer_list<double> numbers) {
-      for (const double x : numbers) parameters[std::size_t(first++ * kBlock + lane)] += x;
-    };
-    add(row, {c.law.kn, c.law.kt, c.law.mu, c.law.damping});
-    add(kernels::first_size_number(m.view) + kernels::kSizeNumbers * s.targets[k],
-        {c.size.x, c.size.y, c.size.z});
+    const auto add = [&](int at, double x) { parameters[std::size_t(at * kBlock + lane)] += x; };
+    for (int n = 0; n < kCoefficients; ++n) add(row + n, c.law[std::size_t(n)]);
+    const int size = kernels::first_size_number(m.view) + kernels::kSizeNumbers * s.targets[k];
+    add(size, c.size.x), add(size + 1, c.size.y), add(size + 2, c.size.z);
   }
 }
 

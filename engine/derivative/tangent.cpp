@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "engine/derivative/dual_stage.hpp"
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "engine/step/group_step.hpp"
 #include "engine/step/motor_force.hpp"
 #include "engine/step/rotation_log.hpp"

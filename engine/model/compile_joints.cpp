@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+
+#include "engine/model/compile_variations.hpp"
 
 namespace tangere {
 
@@ -23,36 +26,30 @@ bool is_identity(const Frame<double>& f) {
 }
 
 void name_coordinates(CompiledModel& m, const JointDescription& d) {
-  struct Coordinate {
-    const char *name, *unit;
-  };
-  std::vector<Coordinate> q, v;
+  std::vector<const char*> q, v;
   switch (d.type) {
     case JointType::fixed: break;
-    case JointType::revolute: q = {{"angle", "rad"}}, v = {{"rate", "rad/s"}}; break;
-    case JointType::prismatic: q = {{"position", "m"}}, v = {{"rate", "m/s"}}; break;
-    case JointType::planar:
-      q = {{"axis0", "m"}, {"axis1", "m"}}, v = {{"v0", "m/s"}, {"v1", "m/s"}};
-      break;
-    case JointType::free2d:
-      q = {{"x", "m"}, {"y", "m"}, {"angle", "rad"}};
-      v = {{"vx", "m/s"}, {"vy", "m/s"}, {"rate", "rad/s"}};
-      break;
+    case JointType::revolute: q = {"angle"}, v = {"rate"}; break;
+    case JointType::prismatic: q = {"position"}, v = {"rate"}; break;
+    case JointType::planar: q = {"axis0", "axis1"}, v = {"v0", "v1"}; break;
+    case JointType::free2d: q = {"x", "y", "angle"}, v = {"vx", "vy", "rate"}; break;
     case JointType::translational:
-    case JointType::free:
-      q = {{"x", "m"}, {"y", "m"}, {"z", "m"}};
-      v = {{"vx", "m/s"}, {"vy", "m/s"}, {"vz", "m/s"}};
-      [[fallthrough]];
+    case JointType::free: q = {"x", "y", "z"}, v = {"vx", "vy", "vz"}; [[fallthrough]];
     case JointType::spherical:
       if (d.type == JointType::translational) break;
-      q.insert(q.end(), {{"qw", "1"}, {"qx", "1"}, {"qy", "1"}, {"qz", "1"}});
-      v.insert(v.end(), {{"wx", "rad/s"}, {"wy", "rad/s"}, {"wz", "rad/s"}});
+      q.insert(q.end(), {"qw", "qx", "qy", "qz"});
+      v.insert(v.end(), {"wx", "wy", "wz"});
       break;
   }
-  for (const Coordinate& c : q)
-    m.q_names.push_back(d.name + "." + c.name), m.q_units.emplace_back(c.unit);
-  for (const Coordinate& c : v)
-    m.v_names.push_back(d.name + "." + c.name), m.v_units.emplace_back(c.unit);
+  const NumberKind& rate = number_kind(NumberOwner::joint, NumberField::v);
+  for (std::size_t k = 0; k < q.size(); ++k) {
+    m.q_names.push_back(d.name + "." + q[k]);
+    m.q_units.emplace_back(coordinate_unit(d.type, static_cast<int>(k)));
+  }
+  for (std::size_t k = 0; k < v.size(); ++k) {
+    m.v_names.push_back(d.name + "." + v[k]);
+    m.v_units.emplace_back(rate.unit_of(dof_turns(d.type, static_cast<int>(k))));
+  }
 }
 
 /// The numbers that hold for one dof of a joint.
@@ -259,41 +256,41 @@ void compile_initial_state(CompiledModel& m, const NameIndex& joints) {
   }
 }
 
-void vary_joint(CompiledModel& m, const NameIndex& joints, const RandomizationDescription& d,
-                int row) {
-  const auto i = std::size_t(joints.find("joint", d.name, d.source));
-  const JointDescription& joint = m.scene.links[i].joint;
+void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, int row) {
+  const NumberField field = d.number.field;
+  if (field == NumberField::pos) return vary_place(m, joint, d, row);
+  const CompiledJoint& compiled = m.joints[std::size_t(joint)];
+  const JointDescription& of = m.scene.links[std::size_t(joint)].joint;
   const auto fail = [&](const std::string& why) {
-    throw InputError(d.source.prefix() + to_string(d.joint_field) + " of joint '" + d.name +
-                     "' varies, but " + why);
+    throw InputError(d.source.prefix() + "'" + name_of(d.number) + "' varies, but " + why);
   };
   bool found = false;
-  if (d.target == RandomTarget::motor) {
-    if (d.joint_field < JointField::P) fail("motors have P and D");
+  if (d.number.owner == NumberOwner::motor) {
+    const bool P = field == NumberField::P;
     for (CompiledMotor& motor : m.motors) {
-      const int k = motor.dof - m.joints[i].v;
-      if (motor.control != MotorControl::position || k < 0 || k >= dof_count(joint.type)) continue;
+      const int k = motor.dof - compiled.v;
+      if (motor.control != MotorControl::position || k < 0 || k >= dof_count(of.type)) continue;
       kernels::DofEffects& e = m.dof_effects[std::size_t(motor.dof)];
-      (d.joint_field == JointField::P ? motor.P : motor.D).row = row;
-      (d.joint_field == JointField::P ? e.P : e.D).row = row;
+      (P ? motor.P : motor.D).row = row;
+      (P ? e.P : e.D).row = row;
       found = true;
     }
     if (!found) fail("the joint has no position motor");
     return;
   }
-  if (d.joint_field >= JointField::P) fail("that is a number of a motor");
-  if (dof_count(joint.type) == 0) fail("the joint is fixed");
-  if (joint.turning) fail("its dofs do not share one number");
-  if (d.joint_field == JointField::lim_stiffness && !joint.limits) fail("the joint has no limits");
+  if (dof_count(of.type) == 0) fail("the joint is fixed");
+  if (of.turning) fail("its dofs do not share one number");
+  if (field == NumberField::lim_stiffness && !of.limits) fail("the joint has no limits");
   constexpr std::uint8_t kFlags[] = {kernels::kDamped, kernels::kArmoured, kernels::kSprung,
                                      kernels::kLimited};
-  const auto field = static_cast<std::size_t>(d.joint_field);
-  for (int k = 0; k < dof_count(joint.type); ++k) {
-    const int dof = m.joints[i].v + k;
+  const auto effect = static_cast<std::size_t>(from(NumberField::damping, field));
+  if (effect >= std::size(kFlags)) fail("no dof of the joint turns by a number of its own");
+  for (int k = 0; k < dof_count(of.type); ++k) {
+    const int dof = compiled.v + k;
     kernels::DofEffects& e = m.dof_effects[std::size_t(dof)];
     kernels::Parameter* parameters[] = {&e.damping, &e.armature, &e.stiffness, &e.limit_stiffness};
-    parameters[field]->row = row;
-    m.links[std::size_t(link_of_dof(m, dof))].effects |= kFlags[field];
+    parameters[effect]->row = row;
+    m.links[std::size_t(link_of_dof(m, dof))].effects |= kFlags[effect];
   }
 }
 

@@ -21,9 +21,9 @@ void compile_motors(CompiledModel& m, const NameIndex& joints);
 
 void compile_initial_state(CompiledModel& m, const NameIndex& joints);
 
-/// Lets a number of a joint or of its motor come from a row of the block.
-void vary_joint(CompiledModel& m, const NameIndex& joints, const RandomizationDescription& d,
-                int row);
+/// Lets a number of a joint or of its motor come from row `row` of the block. Throws InputError
+/// where it cannot.
+void vary_joint(CompiledModel& m, int joint, const RandomizationDescription& d, int row);
 
 /// Throws where nothing with mass moves with a joint: its mass matrix would be singular.
 void check_masses(const CompiledModel& m);

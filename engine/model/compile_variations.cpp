@@ -61,25 +61,25 @@ std::string drawn_slenderness_fault(const Scene& scene, BodyDescription& body) {
   for (const SizeNumber& s : row_of(body.shape).sizes) {
     std::array<double, 2> of = {*s.at(body.shape), *s.at(body.shape)};
     for (const RandomizationDescription& r : scene.randomizations)  // the last one holds
-      if (r.target == RandomTarget::size && r.name == body.name && r.index == s.which)
+      if (r.number.owner == NumberOwner::body && r.number.field != NumberField::density &&
+          r.number.name == body.name && size_index(r.number) == s.which)
         of = bounds(r.distribution);
     least = std::min(least, of[0]), most = std::max(most, of[1]);
   }
   return slenderness_fault(row_of(body.shape), least, most);
 }
 
-}  // namespace
+[[noreturn]] void fail(const RandomizationDescription& d, const std::string& why) {
+  throw InputError(d.source.prefix() + "'" + name_of(d.number) + "' varies, but " + why);
+}
 
 void vary_density(CompiledModel& m, int body, const RandomizationDescription& d, int row) {
   const BodyDescription& b = m.scene.links[std::size_t(body)].body;
-  const auto fail = [&](const std::string& why) {
-    throw InputError(d.source.prefix() + "density of body '" + d.name + "' varies, but " + why);
-  };
   const int link = m.bodies[std::size_t(body)].link;
   if (std::holds_alternative<AbstractShape>(b.shape))
-    fail("its mass is given; expected a body with volume");
-  if (link < 0) fail("it is fixed in the world");
-  if (!(b.density > 0)) fail("it is massless; expected a positive density");
+    fail(d, "its mass is given; expected a body with volume");
+  if (link < 0) fail(d, "it is fixed in the world");
+  if (!(b.density > 0)) fail(d, "it is massless; expected a positive density");
   VaryingInertia& varying = varying_inertia(m, link);
   const InertiaRows of_density =
       inertia_rows(m.bodies[std::size_t(body)], mass_properties(b.shape, 1));
@@ -91,12 +91,9 @@ void vary_density(CompiledModel& m, int body, const RandomizationDescription& d,
 void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, int row) {
   BodyDescription& b = m.scene.links[std::size_t(body)].body;
   CompiledBody& compiled = m.bodies[std::size_t(body)];
-  const std::string name = size_name(d.index);
-  const auto fail = [&](const std::string& why) {
-    throw InputError(d.source.prefix() + name + " of body '" + d.name + "' varies, but " + why);
-  };
-  if (size_number(b.shape, d.index) == nullptr)
-    fail(with_article(shape_name(b.shape)) + " has none");
+  const int which = size_index(d.number);
+  if (size_number(b.shape, which) == nullptr)
+    fail(d, with_article(shape_name(b.shape)) + " has none");
   const Distribution& x = d.distribution;
   const bool listed = x.kind == Distribution::Kind::list;
   const double least = listed && !x.values.empty()
@@ -104,44 +101,52 @@ void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, in
                        : listed ? 0
                                 : x.a;
   if (x.kind == Distribution::Kind::normal || !(least > 0))
-    fail("not all that may be drawn is positive");
+    fail(d, "not all that may be drawn is positive");
   if (const std::string fault = drawn_slenderness_fault(m.scene, b); !fault.empty())
-    fail("that allows " + fault);
+    fail(d, "that allows " + fault);
   for (const PairContactDescription& c : m.scene.pair_contacts)
-    if (c.general_body == d.name)
+    if (c.general_body == d.number.name)
       fail(
+          d,
           "its contact points do not; expected a body that touches nothing with points of its own");
   for (const TactileDescription& t : m.scene.sensors)
-    if (t.body == d.name)
-      fail("the points of its tactile sensor '" + t.name + "' do not; expected a body without one");
+    if (t.body == d.number.name)
+      fail(d,
+           "the points of its tactile sensor '" + t.name + "' do not; expected a body without one");
   for (std::size_t k = 0; k < m.grounds.size(); ++k)
-    if (m.scene.ground_contacts[k].body == d.name && !is_ball(b.shape))
-      fail("the points that touch the ground do not; expected a sphere there");
+    if (m.scene.ground_contacts[k].body == d.number.name && !is_ball(b.shape))
+      fail(d, "the points that touch the ground do not; expected a sphere there");
   if (compiled.size_row < 0) {
     compiled.size_row = static_cast<int>(m.varying_sizes.size());  // until add_derived_rows()
     m.varying_sizes.push_back({body, 0, {}});
     if (compiled.link >= 0 && compiled.mass > 0) varying_inertia(m, compiled.link).anew = true;
   }
-  m.varying_sizes[std::size_t(compiled.size_row)].numbers.push_back({d.index, row});
+  m.varying_sizes[std::size_t(compiled.size_row)].numbers.push_back({which, row});
+}
+
+}  // namespace
+
+void vary_body(CompiledModel& m, int body, const RandomizationDescription& d, int row) {
+  if (d.number.field == NumberField::density) {
+    vary_density(m, body, d, row);
+  } else {
+    vary_size(m, body, d, row);
+  }
 }
 
 void vary_place(CompiledModel& m, int joint, const RandomizationDescription& d, int row) {
   const CompiledJoint& compiled = m.joints[std::size_t(joint)];
-  const auto fail = [&](const std::string& why) {
-    throw InputError(d.source.prefix() + "pos of joint '" + d.name + "' varies, but " + why);
-  };
-  if (d.index < 0 || d.index > 2) fail("index " + std::to_string(d.index) + " is none of 0, 1, 2");
-  if (compiled.link_count == 0) fail("the joint is fixed; expected one that moves");
+  const int axis = d.number.component;
+  if (axis < 0 || axis > 2) fail(d, "index " + std::to_string(axis) + " is none of 0, 1, 2");
+  if (compiled.link_count == 0) fail(d, "the joint is fixed; expected one that moves");
   for (VaryingPlace& place : m.varying_places)
     if (place.joint == joint) {
-      place.numbers.push_back({d.index, row});
+      place.numbers.push_back({axis, row});
       return;
     }
   const int parent = m.scene.links[std::size_t(joint)].parent;
-  m.varying_places.push_back({joint,
-                              0,
-                              parent < 0 ? kIdentityFrame : m.joints[std::size_t(parent)].frame,
-                              {{d.index, row}}});
+  m.varying_places.push_back(
+      {joint, 0, parent < 0 ? kIdentityFrame : m.joints[std::size_t(parent)].frame, {{axis, row}}});
 }
 
 int add_derived_rows(CompiledModel& m, int next) {

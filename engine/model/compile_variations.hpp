@@ -9,8 +9,7 @@ namespace tangere {
 
 /// Lets a number of a body, or of where a joint stands, come from row `row` of the block. Throws
 /// InputError where it cannot.
-void vary_density(CompiledModel& m, int body, const RandomizationDescription& d, int row);
-void vary_size(CompiledModel& m, int body, const RandomizationDescription& d, int row);
+void vary_body(CompiledModel& m, int body, const RandomizationDescription& d, int row);
 void vary_place(CompiledModel& m, int joint, const RandomizationDescription& d, int row);
 
 /// Once all varying numbers are known: rows, from `next`, for what kernels read instead of them.

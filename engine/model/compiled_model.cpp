@@ -87,7 +87,7 @@ class Compiler {
   // --- contacts ---
 
   static kernels::ContactParameters constants(const ContactCoefficients& c) {
-    return {{c.kn, -1}, {c.kt, -1}, {c.mu, -1}, {c.damping, -1}};
+    return transformed(c, [](double value) { return kernels::Parameter{value, -1}; });
   }
 
   const double* keep(std::vector<std::vector<double>>& storage, std::vector<double> values) {
@@ -139,6 +139,8 @@ class Compiler {
       pair.body2 = b2;
       pair.points = keep(m_.point_storage, std::move(points));
       lay_out_tiles(pair, tiles);
+      contacts_.add("contact", d.general_body + " " + d.primitive_body,
+                    static_cast<int>(m_.pairs.size()), d.source);
       m_.pairs.push_back(pair);
       m_.contact_info.push_back(
           {d.general_body, d.primitive_body, pair.n_points, to_string(d.law)});
@@ -198,6 +200,7 @@ class Compiler {
       ground.parameters = constants(d.coefficients);
       ground.n_points = static_cast<int>(points.size() / 3);
       ground.points = keep(m_.point_storage, std::move(points));
+      grounds_.add("ground contact", d.body, static_cast<int>(m_.grounds.size()), d.source);
       m_.grounds.push_back(ground);
       m_.contact_info.push_back({d.body, "ground", ground.n_points, to_string(d.law)});
     }
@@ -252,76 +255,54 @@ class Compiler {
     m_.layout = {0, m_.nq, m_.nq + m_.nv, 2 * m_.nq + m_.nv, 2 * (m_.nq + m_.nv), 0};
     int next = m_.layout.parameters;
     for (const RandomizationDescription& d : m_.scene.randomizations) {
-      if (d.target == RandomTarget::joint_q || d.target == RandomTarget::joint_v) {
-        m_.randomized_row.push_back(state_row(d));
-        continue;
-      }
-      if (d.target == RandomTarget::density) {
-        vary_density(m_, bodies_.find("body", d.name, d.source), d, next);
-        m_.randomized_row.push_back(next++);
-        continue;
-      }
-      if (d.target == RandomTarget::size) {
-        vary_size(m_, bodies_.find("body", d.name, d.source), d, next);
-        m_.randomized_row.push_back(next++);
-        continue;
-      }
-      if (d.target == RandomTarget::place) {
-        vary_place(m_, joints_.find("joint", d.name, d.source), d, next);
-        m_.randomized_row.push_back(next++);
-        continue;
-      }
-      if (d.target == RandomTarget::joint_effect || d.target == RandomTarget::motor) {
-        vary_joint(m_, joints_, d, next);
-        m_.randomized_row.push_back(next++);
-        continue;
-      }
-      const auto vary = [&](kernels::ContactParameters& p) {
-        kernels::Parameter* field[] = {&p.kn, &p.kt, &p.mu, &p.damping};
-        field[static_cast<int>(d.field)]->row = next;
-      };
-      parameters_of(d, vary);
-      m_.randomized_row.push_back(next++);
+      name_of(d.number);  // or throws
+      if (!is_of_start(d.number)) vary(d, next);
+      m_.randomized_row.push_back(is_of_start(d.number) ? state_row(d) : next++);
     }
     m_.layout.rows = add_derived_rows(m_, next);
   }
 
   int state_row(const RandomizationDescription& d) const {
-    const int i = joints_.find("joint", d.name, d.source);
+    const int i = joints_.find("joint", d.number.name, d.source), k = d.number.component;
     const JointType type = m_.scene.links[i].joint.type;
-    const bool position = d.target == RandomTarget::joint_q;
+    const bool position = d.number.field == NumberField::q;
     const int count = position ? position_count(type) : dof_count(type);
-    if (d.index < 0 || d.index >= count)
-      throw InputError(d.source.prefix() + "joint '" + d.name + "' has " + std::to_string(count) +
-                       (position ? " coordinates" : " velocities") + "; index " +
-                       std::to_string(d.index) + " is not one of them");
-    return position ? m_.layout.q + m_.joints[i].q + d.index
-                    : m_.layout.v + m_.joints[i].v + d.index;
+    if (k < 0 || k >= count)
+      throw InputError(d.source.prefix() + "joint '" + d.number.name + "' has " +
+                       std::to_string(count) + (position ? " coordinates" : " velocities") +
+                       "; index " + std::to_string(k) + " is not one of them");
+    return position ? m_.layout.q + m_.joints[i].q + k : m_.layout.v + m_.joints[i].v + k;
   }
 
-  template <class Vary>
-  void parameters_of(const RandomizationDescription& d, const Vary& vary) {
-    bool found = false;
-    if (d.target == RandomTarget::tactile) {
-      vary(m_.sensors[sensors_.find("tactile sensor", d.name, d.source)].parameters);
-      return;
+  /// Lets a number come from a row of the block.
+  void vary(const RandomizationDescription& d, int row) {
+    const SceneNumber& n = d.number;
+    const auto coefficient = [&](kernels::ContactParameters& of) {
+      of[std::size_t(from(NumberField::kn, n.field))].row = row;
+    };
+    const auto at = [&](const NameIndex& names, const char* kind, const std::string& name) {
+      return std::size_t(names.find(kind, name, d.source));
+    };
+    switch (n.owner) {
+      case NumberOwner::contact:
+        coefficient(m_.pairs[at(contacts_, "contact", n.name + " " + n.second_name)].parameters);
+        break;
+      case NumberOwner::ground:
+        coefficient(m_.grounds[at(grounds_, "ground contact", n.name)].parameters);
+        break;
+      case NumberOwner::tactile:
+        coefficient(m_.sensors[at(sensors_, "tactile sensor", n.name)].parameters);
+        break;
+      case NumberOwner::body: vary_body(m_, int(at(bodies_, "body", n.name)), d, row); break;
+      case NumberOwner::joint:
+      case NumberOwner::motor: vary_joint(m_, int(at(joints_, "joint", n.name)), d, row); break;
     }
-    for (std::size_t k = 0; k < m_.pairs.size() && d.target == RandomTarget::pair_contact; ++k) {
-      const PairContactDescription& pair = m_.scene.pair_contacts[k];
-      if (pair.general_body == d.name && pair.primitive_body == d.second_name)
-        vary(m_.pairs[k].parameters), found = true;
-    }
-    for (std::size_t k = 0; k < m_.grounds.size() && d.target == RandomTarget::ground_contact; ++k)
-      if (m_.scene.ground_contacts[k].body == d.name) vary(m_.grounds[k].parameters), found = true;
-    if (!found)
-      throw InputError(d.source.prefix() + "no contact between '" + d.name + "' and '" +
-                       (d.second_name.empty() ? "ground" : d.second_name) + "' is declared");
   }
 
   void symbolic() { m_.pattern = analyse_pattern(m_.links, m_.nv, touching_); }
 
   CompiledModel m_;
-  NameIndex links_, joints_, bodies_, sensors_;
+  NameIndex links_, joints_, bodies_, sensors_, contacts_, grounds_;
   std::vector<std::pair<int, int>> touching_;
 };
 

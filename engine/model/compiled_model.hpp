@@ -105,7 +105,7 @@ struct VaryingInertia {
   std::vector<Part> parts;
 };
 
-/// A number that a row of the block holds: which of a size (size_name), or which component.
+/// A number that a row of the block holds: which of a size (size_number), or which component.
 struct VaryingNumber {
   int which, row;
 };
@@ -150,8 +150,7 @@ struct CompiledModel {
   std::vector<double> initial_q, initial_v;
   PatternStorage pattern;
   BlockLayout layout;
-  std::vector<int> randomized_row;  ///< parallel to scene.randomizations: row of a block, or
-                                    ///< coordinate -1 - index
+  std::vector<int> randomized_row;  ///< parallel to scene.randomizations: row of a block
   kernels::ModelView view{};
 
   std::vector<SensorInfo> sensor_info;
@@ -170,7 +169,7 @@ struct MassProperties {
 };
 MassProperties mass_properties(const Shape& shape, double density);
 MassProperties mesh_mass(const MeshShape& mesh, double density);
-/// Its derivative by a number of the shape's size (size_name) that it has; the centre of mass
+/// Its derivative by a number of the shape's size (size_number) that it has; the centre of mass
 /// stays.
 MassProperties mass_properties_by_size(const Shape& shape, double density, int which);
 /// What a body of these adds to its link.

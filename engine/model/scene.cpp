@@ -81,16 +81,6 @@ int dof_count(JointType type) {
   }
 }
 
-const char* to_string(JointField value) {
-  switch (value) {
-    case JointField::damping: return "damping";
-    case JointField::armature: return "armature";
-    case JointField::stiffness: return "stiffness";
-    case JointField::lim_stiffness: return "lim_stiffness";
-    case JointField::P: return "P";
-    case JointField::D: return "D";
-  }
-  return "unknown";
 }
 
 bool dof_turns(JointType type, int k) {
@@ -101,6 +91,11 @@ bool dof_turns(JointType type, int k) {
     case JointType::free: return k >= 3;
     default: return false;
   }
+}
+
+const char* coordinate_unit(JointType type, int k) {
+  if (type == JointType::spherical || (type == JointType::free && k > 2)) return "1";
+  return dof_turns(type, k) ? "rad" : "m";
 }
 
 }  // namespace tangere

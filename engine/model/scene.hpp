@@ -13,6 +13,7 @@
 
 #include "engine/base/error.hpp"
 #include "engine/base/vector3.hpp"
+#include "engine/model/scene_number.hpp"
 #include "engine/model/scheme.hpp"
 #include "kernels/contact/contact_types.hpp"
 
@@ -38,13 +39,8 @@ Vector3 outer_direction(const Pose& pose, const Vector3& direction);
 /// where the first one is.
 Pose pose_at_end(std::span<const Pose> way, const Pose& pose);
 
-/// Coefficients of one penalty contact or tactile point.
-struct ContactCoefficients {
-  double kn = 0;       ///< normal stiffness [N/m]
-  double kt = 0;       ///< tangential damping [N s/m]
-  double mu = 0;       ///< friction coefficient [-]
-  double damping = 0;  ///< k_d [N s/m²]; law linear: c [N s/m]
-};
+/// Of one penalty contact or tactile point.
+using ContactCoefficients = Coefficients<double>;
 
 /// What acts on every dof of a joint, in SI by the dof's kind. Spherical joints have components of
 /// a rotation vector in place of q, torques and accelerations in body axes (docs/dynamics.md).
@@ -157,7 +153,7 @@ struct TactilePoint {
 struct TactileDescription {
   std::string name;
   std::string body;
-  ContactCoefficients coefficients;
+  ContactCoefficients coefficients{};
   ContactLaw law = ContactLaw::clamped;
   RectArray array;
   std::vector<TactilePoint> points;  ///< a curved pad, in the order of its field; empty: the array
@@ -184,7 +180,7 @@ struct GroundDescription {
 
 struct GroundContactDescription {
   std::string body;
-  ContactCoefficients coefficients;
+  ContactCoefficients coefficients{};
   ContactLaw law = ContactLaw::linear;
   double ramp =
       1e-5;  ///< depth over which the linear law's damper fades in [m]; 0: the published law
@@ -194,7 +190,7 @@ struct GroundContactDescription {
 /// Contact points of `general_body` against the signed distance of `primitive_body`.
 struct PairContactDescription {
   std::string general_body, primitive_body;
-  ContactCoefficients coefficients;
+  ContactCoefficients coefficients{};
   ContactLaw law = ContactLaw::clamped;
   double ramp = 1e-5;  ///< law linear only
   Source source;
@@ -237,40 +233,10 @@ struct Distribution {
   double a = 0, b = 0;  ///< uniform, log_uniform: low, high; normal: mean, standard deviation
   std::vector<double> values;  ///< list: equally likely
 };
-enum class RandomTarget {
-  joint_q,
-  joint_v,
-  ground_contact,
-  pair_contact,
-  tactile,
-  joint_effect,
-  motor,
-  density,
-  size,
-  place
-};
-enum class ContactField { kn, kt, mu, damping };
-enum class JointField {
-  damping,
-  armature,
-  stiffness,
-  lim_stiffness,
-  P,
-  D
-};  ///< the last two: position motors
 struct RandomizationDescription {
-  RandomTarget target = RandomTarget::joint_q;
-  std::string
-      name;  ///< joint (its motor), tactile, body (of a ground contact), or general body of a pair
-  std::string second_name;  ///< primitive body of a pair
-  int index =
-      0;  ///< joint_q, joint_v, place (of the joint in its parent's frame): which component; size:
-          ///< which number (size_name)
-  ContactField field = ContactField::kn;  ///< contacts and tactile
+  SceneNumber number;
   Distribution distribution;
   Source source;
-  JointField joint_field =
-      JointField::damping;  ///< joint_effect and motor: of all dofs of the joint alike
 };
 
 struct SolverOptions {
@@ -304,11 +270,10 @@ const char* to_string(ContactLaw value);
 /// "sphere", "cuboid" …
 const char* shape_name(const Shape& shape);
 
-/// The numbers of a size: 0 radius, 1 length, 2 … 4 edges of a cuboid [m]. nullptr where a shape
-/// has no such number.
+/// Numbers of a size: 0 radius, 1 length, 2 … 4 edges of a cuboid [m]. nullptr where a shape has no
+/// such number.
 double* size_number(Shape& shape, int which);
-const char* size_name(int which);  ///< "radius", "length", "size[0]" …
-inline constexpr int kSizeNames = 5;
+inline constexpr int kSizeIndices = 5;
 
 /// Whether contact points may touch it, and whether it has such points itself.
 bool has_distance(const Shape& shape);
@@ -326,6 +291,7 @@ int dof_count(JointType type);
 /// Dof `k` of a joint type turns; it slides otherwise.
 bool dof_turns(JointType type, int k);
 
-const char* to_string(JointField value);  ///< "damping", "P" …
+/// Unit of coordinate `k` of a joint type: "m", "rad", or "1" in a quaternion.
+const char* coordinate_unit(JointType type, int k);
 
 }  // namespace tangere

@@ -299,10 +299,6 @@ double* size_number(Shape& shape, int which) {
   const SizeNumber* s = row_of(shape).size(which);
   return s == nullptr ? nullptr : s->at(shape);
 }
-const char* size_name(int which) {
-  constexpr const char* kNames[kSizeNames] = {"radius", "length", "size[0]", "size[1]", "size[2]"};
-  return which >= 0 && which < kSizeNames ? kNames[which] : "unknown";
-}
 
 MassProperties mass_properties(const Shape& shape, double density) {
   const ShapeRow& row = row_of(shape);

@@ -15,7 +15,7 @@ namespace tangere {
 
 struct MassProperties;  // engine/model/compiled_model.hpp
 
-/// A number of a shape's size: which of size_name(), which of three numbers kernels keep for it
+/// A number of a shape's size: which of size_number(), which of three numbers kernels keep for it
 /// (kernels::PairContact), and by what factor.
 struct SizeNumber {
   int which, component;

@@ -91,10 +91,7 @@ void PadReader::find_touches(const Batch& batch, int block, int group, int senso
     const CompiledBody& body = m.bodies[std::size_t(s.targets[k])];
     Touch<LaneRow>& touch = touches_[kGroups * k + std::size_t(group)];
     kernels::active_kernels().pad_touch(pose(s.link), s.pad, pose(body.link), body.frame, &touch);
-    parameter(s.parameters.kn, touch.kn);
-    parameter(s.parameters.kt, touch.kt);
-    parameter(s.parameters.mu, touch.mu);
-    parameter(s.parameters.damping, touch.damping);
+    for (std::size_t i = 0; i < kCoefficients; ++i) parameter(s.parameters[i], touch.law[i]);
     for (int i = 0; i < 3 && body.size_row >= 0; ++i)
       parameter({0, body.size_row + i},
                 sizes_[3 * (kGroups * k + std::size_t(group)) + std::size_t(i)]);
@@ -121,9 +118,8 @@ kernels::TactileArgs<Real> PadReader::arguments(int sensor, int group, int lane)
   const Pad& pad = pads_[std::size_t(sensor)];
   for (std::size_t k = 0; k < s.targets.size(); ++k) {
     const Touch<LaneRow>& t = touches_[kGroups * k + std::size_t(group)];
-    one_[k] = {lane_of(t.Q, lane), lane_of(t.c, lane), lane_of(t.omega, lane),
-               lane_of(t.v, lane), t.kn[lane],         t.kt[lane],
-               t.mu[lane],         t.damping[lane]};
+    one_[k] = {lane_of(t.Q, lane), lane_of(t.c, lane), lane_of(t.omega, lane), lane_of(t.v, lane),
+               transformed(t.law, [lane](const LaneRow& a) { return a[lane]; })};
   }
   return {&pad.tiles,
           s.law,

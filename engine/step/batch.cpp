@@ -15,55 +15,18 @@ using kernels::kBlock;
 
 namespace {
 
-Purpose purpose_of(RandomTarget target) {
-  switch (target) {
-    case RandomTarget::joint_q:
-    case RandomTarget::joint_v: return Purpose::initial_state;
-    case RandomTarget::ground_contact:
-    case RandomTarget::pair_contact: return Purpose::contact;
-    case RandomTarget::joint_effect:
-    case RandomTarget::motor: return Purpose::joint;
-    case RandomTarget::size:
-    case RandomTarget::place:
-    case RandomTarget::density: return Purpose::body;
-    case RandomTarget::tactile: break;
+Purpose purpose_of(const SceneNumber& number) {
+  if (is_of_start(number)) return Purpose::initial_state;
+  switch (number.owner) {
+    case NumberOwner::contact:
+    case NumberOwner::ground: return Purpose::contact;
+    case NumberOwner::joint:
+      return number.field == NumberField::pos ? Purpose::body : Purpose::joint;
+    case NumberOwner::motor: return Purpose::joint;
+    case NumberOwner::body: return Purpose::body;
+    case NumberOwner::tactile: break;
   }
   return Purpose::tactile;
-}
-
-/// The constant that a varying number replaces: what padding lanes hold.
-double nominal(const CompiledModel& m, const RandomizationDescription& d) {
-  const auto field = [&](const ContactCoefficients& c) {
-    const double values[] = {c.kn, c.kt, c.mu, c.damping};
-    return values[static_cast<int>(d.field)];
-  };
-  for (const auto& s : m.scene.sensors)
-    if (d.target == RandomTarget::tactile && s.name == d.name) return field(s.coefficients);
-  for (const auto& c : m.scene.pair_contacts)
-    if (d.target == RandomTarget::pair_contact && c.general_body == d.name &&
-        c.primitive_body == d.second_name)
-      return field(c.coefficients);
-  for (const auto& c : m.scene.ground_contacts)
-    if (d.target == RandomTarget::ground_contact && c.body == d.name) return field(c.coefficients);
-  for (const auto& l : m.scene.links) {
-    const double values[] = {l.joint.damping, l.joint.armature, l.joint.stiffness,
-                             l.joint.limit_stiffness};
-    if (d.target == RandomTarget::joint_effect && l.joint.name == d.name)
-      return values[static_cast<int>(d.joint_field)];
-  }
-  for (const auto& l : m.scene.links)
-    if (d.target == RandomTarget::density && l.body.name == d.name) return l.body.density;
-  for (const auto& l : m.scene.links) {
-    Shape shape = l.body.shape;
-    if (d.target == RandomTarget::size && l.body.name == d.name)
-      return *size_number(shape, d.index);
-    if (d.target == RandomTarget::place && l.joint.name == d.name)
-      return l.joint.pose.position[std::size_t(d.index)];
-  }
-  for (const auto& motor : m.scene.motors)
-    if (d.target == RandomTarget::motor && motor.joint == d.name)
-      return d.joint_field == JointField::P ? motor.P : motor.D;
-  return 0;
 }
 
 }  // namespace
@@ -124,9 +87,9 @@ void Batch::draw_episode(std::size_t lane) {
     const int row = m.randomized_row[k];
     if (!padding) {
       own[row * kBlock] = draw(d.distribution, RandomKey{seed_, episode_[lane], 0,
-                                                         purpose_of(d.target), std::uint32_t(k)});
+                                                         purpose_of(d.number), std::uint32_t(k)});
     } else if (row >= m.layout.parameters) {
-      own[row * kBlock] = nominal(m, d);
+      own[row * kBlock] = number_in(m.scene, d.number);
     }
   }
   update_derived_rows(m, own);
@@ -252,15 +215,15 @@ double Batch::randomized_value(int environment, int k) const {
   if (is_parameter(k))
     return (block(environment / kBlock) + environment % kBlock)[std::size_t(row) * kBlock];
   return draw(d.distribution,
-              RandomKey{seed_, episode(environment), 0, purpose_of(d.target), std::uint32_t(k)});
+              RandomKey{seed_, episode(environment), 0, purpose_of(d.number), std::uint32_t(k)});
 }
 
 void Batch::set_randomized_value(int environment, int k, double value) {
   const CompiledModel& m = compiled(model_);
   const int row = m.randomized_row[std::size_t(k)];
   if (!is_parameter(k))
-    throw InputError("randomised number " + std::to_string(k) +
-                     " is of the starting state; expected a parameter");
+    throw InputError("'" + name_of(m.scene.randomizations[std::size_t(k)].number) +
+                     "' is of the starting state; expected a parameter");
   column(std::size_t(environment))[std::size_t(row) * kBlock] = value;
   update_derived_rows(m, column(std::size_t(environment)));
 }

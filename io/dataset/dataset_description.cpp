@@ -15,7 +15,6 @@
 namespace tangere {
 namespace {
 
-constexpr std::int64_t kFormatVersion = 2;
 constexpr const char* kGradients = "gradients";  // of /scene: the attribute and the group
 constexpr const char* kByRow = "one for each action";
 constexpr std::size_t kLongText = 60;  // bytes: beyond it a value is shown by the line that differs
@@ -146,7 +145,7 @@ std::string json_text(const std::string& text) {
 
 void describe_dataset(const h5::Id& file, const DatasetLayout& layout) {
   h5::write_attribute(file, "format", "tangere dataset");
-  h5::write_scalar<std::int64_t>(file, "format_version", kFormatVersion);
+  h5::write_scalar<std::int64_t>(file, "format_version", kDatasetFormat);
   h5::write_scalar<std::int64_t>(file, "dataset_episodes", layout.episodes);
   h5::write_scalar<std::int64_t>(file, "dataset_shards", layout.shard_count());
   h5::write_attribute(file, "command", layout.command);

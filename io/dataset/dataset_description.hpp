@@ -3,6 +3,7 @@
 // before shards are put together.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,9 @@
 #include "io/hdf5/h5.hpp"
 
 namespace tangere {
+
+/// `format_version` of the shards that are written, and of those that are checked and merged.
+inline constexpr std::int64_t kDatasetFormat = 3;
 
 /// Attributes of the root that belong to the whole data set, and the group /scene.
 void describe_dataset(const h5::Id& file, const DatasetLayout& layout);

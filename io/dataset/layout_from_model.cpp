@@ -32,6 +32,7 @@ SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& des
   layout.points = info.points;
   layout.every = interval;
   layout.pressure_sign = info.pressure_sign;
+  layout.law = description.law;
   layout.corner0 = description.array.corner0;
   layout.corner1 = description.array.corner1;
   layout.axis0 = description.array.axis0;
@@ -40,52 +41,16 @@ SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& des
   return layout;
 }
 
-const char* field_name(ContactField field) {
-  switch (field) {
-    case ContactField::kn: return "kn";
-    case ContactField::kt: return "kt";
-    case ContactField::mu: return "mu";
-    case ContactField::damping: return "damping";
+/// Names and units of what varies.
+template <class Layout>
+void describe_randomized(const Scene& scene, Layout& layout) {
+  for (const RandomizationDescription& d : scene.randomizations) {
+    layout.randomized_names.push_back(name_of(d.number));
+    layout.randomized_units.push_back(unit_of(scene, d.number));
   }
-  throw std::logic_error("a contact field without a name");
-}
-
-/// Stiffnesses and gains have the units of their law, joint and kind of sensor; all are SI.
-const char* randomized_unit(const RandomizationDescription& d) {
-  switch (d.target) {
-    case RandomTarget::joint_q: return "m, rad or 1, as in q_units";
-    case RandomTarget::joint_v: return "m/s or rad/s, as in v_units";
-    case RandomTarget::density: return "kg/m^3";
-    case RandomTarget::size:
-    case RandomTarget::place: return "m";
-    case RandomTarget::ground_contact:
-    case RandomTarget::pair_contact:
-    case RandomTarget::tactile: return d.field == ContactField::mu ? "1" : "SI";
-    case RandomTarget::joint_effect:
-    case RandomTarget::motor: return "SI";
-  }
-  throw std::logic_error("a randomised number without a unit");
 }
 
 }  // namespace
-
-std::string randomized_name(const RandomizationDescription& d) {
-  switch (d.target) {
-    case RandomTarget::joint_q: return fmt::format("{}.q[{}]", d.name, d.index);
-    case RandomTarget::joint_v: return fmt::format("{}.v[{}]", d.name, d.index);
-    case RandomTarget::ground_contact:
-      return fmt::format("ground/{}.{}", d.name, field_name(d.field));
-    case RandomTarget::pair_contact:
-      return fmt::format("{}/{}.{}", d.name, d.second_name, field_name(d.field));
-    case RandomTarget::tactile: return fmt::format("{}.{}", d.name, field_name(d.field));
-    case RandomTarget::density: return fmt::format("{}.density", d.name);
-    case RandomTarget::size: return fmt::format("{}.{}", d.name, size_name(d.index));
-    case RandomTarget::place: return fmt::format("{}.pos[{}]", d.name, d.index);
-    case RandomTarget::joint_effect: return fmt::format("{}.{}", d.name, to_string(d.joint_field));
-    case RandomTarget::motor: return fmt::format("motor/{}.{}", d.name, to_string(d.joint_field));
-  }
-  throw std::logic_error("a randomised number without a name");
-}
 
 TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
                              const RunDescription& run) {
@@ -112,8 +77,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
        {StepStatus::converged, StepStatus::split, StepStatus::not_converged, StepStatus::non_finite,
         StepStatus::rotation, StepStatus::singular})
     layout.statuses.push_back({static_cast<std::int8_t>(status), to_string(status)});
-  for (const RandomizationDescription& description : scene.randomizations)
-    layout.randomized_names.push_back(randomized_name(description));
+  describe_randomized(scene, layout);
   const int varied = static_cast<int>(layout.randomized_names.size());
   for (int e = 0; e < batch.environments(); ++e)
     for (int k = 0; k < varied; ++k)
@@ -153,10 +117,7 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.end_effector_names = end_effector_names(model);
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(sensor_layout(model.sensors()[i], scene.sensors[i], run.every));
-  for (const RandomizationDescription& description : scene.randomizations) {
-    layout.randomized_names.push_back(randomized_name(description));
-    layout.randomized_units.emplace_back(randomized_unit(description));
-  }
+  describe_randomized(scene, layout);
   layout.scene_name = scene.name;
   layout.scene_text = scene.text;
   layout.integrator = to_string(stepper.integrator());

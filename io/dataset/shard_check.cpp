@@ -67,8 +67,9 @@ class ShardChecker {
       fail("it is not a tangere data set");
       return {content_, problems_};
     }
-    if (const std::int64_t version = number(file_, "format_version"); version != 2) {
-      fail(fmt::format("its format_version is {}; expected 2", version));
+    if (const std::int64_t version = number(file_, "format_version"); version != kDatasetFormat) {
+      fail(fmt::format("its format_version is {}; expected {}; generate the data set again",
+                       version, kDatasetFormat));
       return {content_, problems_};
     }
     read_description();

@@ -50,7 +50,7 @@ void read_sized(const SceneNode& node, const ShapeRow& row, Shape& shape, Attrib
   const double length = node.context().length;
   for (const SizeNumber& n : row.sizes) {
     if (n.which < 2) {  // radius, length
-      const char* const name = size_name(n.which);
+      const char* const name = number_kind(NumberOwner::body, size_of_body("", n.which).field).name;
       attributes.use({name});
       *n.at(shape) = node.positive(name) * length;
       continue;

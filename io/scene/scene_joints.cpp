@@ -14,14 +14,15 @@ namespace {
 /// The effects of the dofs that turn, or of those that slide.
 JointEffects effects_in_si(const SceneNode& node, bool turns) {
   const SceneContext& c = node.context();
-  const auto number = [&](const char* name, JointField field) {
-    return node.not_negative(name, 0.0) * joint_field_scale(field, turns, c);
+  const auto number = [&](NumberField field) {
+    const NumberKind& kind = number_kind(NumberOwner::joint, field);
+    return node.not_negative(kind.name, 0.0) * c.factor(kind.unit_of(turns));
   };
   JointEffects e;
-  e.damping = number("damping", JointField::damping);
-  e.armature = number("armature", JointField::armature);
-  e.stiffness = number("stiffness", JointField::stiffness);
-  e.limit_stiffness = number("lim_stiffness", JointField::lim_stiffness);
+  e.damping = number(NumberField::damping);
+  e.armature = number(NumberField::armature);
+  e.stiffness = number(NumberField::stiffness);
+  e.limit_stiffness = number(NumberField::lim_stiffness);
   if (node.has("lim")) {
     const std::vector<double> x = node.numbers("lim", 2);
     if (!(x[0] <= x[1]))
@@ -66,8 +67,11 @@ void read_motor(const SceneNode& node, bool turns, MotorDescription& motor) {
   for (const char* name : {"P", "D", "timing"}) (position ? used : idle).emplace_back(name);
   node.check_attributes(used, {}, idle);
   if (position) {
-    motor.P = node.not_negative("P") * joint_field_scale(JointField::P, turns, c);
-    motor.D = node.not_negative("D", 0.0) * joint_field_scale(JointField::D, turns, c);
+    const auto factor = [&](NumberField field) {
+      return c.factor(number_kind(NumberOwner::motor, field).unit_of(turns));
+    };
+    motor.P = node.not_negative("P") * factor(NumberField::P);
+    motor.D = node.not_negative("D", 0.0) * factor(NumberField::D);
     motor.timing =
         node.choice("timing", {"end", "start"}, 0) == 1 ? MotorTiming::start : MotorTiming::end;
     motor.high = std::numeric_limits<double>::infinity();
@@ -84,32 +88,7 @@ void read_motor(const SceneNode& node, bool turns, MotorDescription& motor) {
 }  // namespace
 
 double coordinate_scale(JointType type, int index, const SceneContext& c) {
-  switch (type) {
-    case JointType::fixed:
-    case JointType::revolute:
-    case JointType::spherical: return 1;
-    case JointType::prismatic:
-    case JointType::planar:
-    case JointType::translational: return c.length;
-    case JointType::free2d: return index < 2 ? c.length : 1;
-    case JointType::free: break;
-  }
-  return index < 3 ? c.length : 1;
-}
-
-double joint_field_scale(JointField field, bool turns, const SceneContext& c) {
-  if (turns)
-    return c
-        .rotational;  // torque per angle, its rate or its acceleration: a mass times a length twice
-  switch (field) {
-    case JointField::damping:
-    case JointField::D: return c.damping_force;
-    case JointField::armature: return c.density * c.length * c.length * c.length;
-    case JointField::stiffness:
-    case JointField::lim_stiffness:
-    case JointField::P: break;
-  }
-  return c.stiffness;
+  return c.factor(coordinate_unit(type, index));
 }
 
 void read_joint_effects(const SceneNode& node, JointDescription& joint) {

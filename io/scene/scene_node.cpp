@@ -22,6 +22,18 @@ void SceneContext::use_centimetres_and_grams() {
   rotational = 1e-7;
 }
 
+double SceneContext::factor(std::string_view unit) const {
+  if (unit == "m" || unit == "m/s") return length;
+  if (unit == "N/m") return stiffness;
+  if (unit == "N s/m") return damping_force;
+  if (unit == "N s/m^2") return damping_area;
+  if (unit == "kg/m^3") return density;
+  if (unit == "kg") return density * length * length * length;
+  // Torque per angle, its rate or its acceleration: a mass times a length twice.
+  if (unit == "N m/rad" || unit == "N m s/rad" || unit == "kg m^2") return rotational;
+  return 1;
+}
+
 void SceneNode::fail(const std::string& message) const {
   throw InputError(source().prefix() + "<" + name() + ">: " + message);
 }

@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/model/scene.hpp"
@@ -32,6 +33,8 @@ struct SceneContext {
   double length = 1, stiffness = 1, damping_force = 1, damping_area = 1, density = 1, force = 1,
          torque = 1, rotational = 1;
   void use_centimetres_and_grams();
+  /// From the scene's units to a unit of the table in engine/model/scene_number.cpp.
+  [[nodiscard]] double factor(std::string_view unit) const;
 };
 
 class SceneNode {

@@ -89,157 +89,154 @@ void check_coefficient(const SceneNode& node, const Distribution& d) {
   if (negative) node.fail("a coefficient may not be negative");
 }
 
+/// The attribute `field`: one of those that an owner has, from `first` to `last`.
+NumberField read_field(const SceneNode& node, NumberOwner owner, NumberField first,
+                       NumberField last) {
+  std::vector<std::string> names;
+  for (int k = 0; k <= from(first, last); ++k)
+    names.emplace_back(number_kind(owner, NumberField(int(first) + k)).name);
+  return static_cast<NumberField>(static_cast<int>(first) + int(node.choice("field", names)));
+}
+
+/// Draws in the unit of a number.
+Distribution read_distribution(const Scene& scene, const SceneNode& node, const SceneNumber& n) {
+  return read_distribution(node, node.context().factor(unit_of(scene, n)));
+}
+
 /// damping, armature, stiffness, lim_stiffness of a joint, or P, D of its motor.
 void read_joint_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
   const bool motor = node.name() == "motor";
   const char* by = motor ? "joint" : "name";
   const JointDescription& joint = scene.links[std::size_t(find_joint(scene, node, by))].joint;
   node.check_attributes({by, "field", "uniform", "log_uniform", "normal", "list"});
-  d.target = motor ? RandomTarget::motor : RandomTarget::joint_effect;
-  d.name = joint.name;
+  d.number.name = joint.name;
   if (motor) {
-    d.joint_field = node.choice("field", {"P", "D"}) == 0 ? JointField::P : JointField::D;
+    d.number.owner = NumberOwner::motor;
+    d.number.field = read_field(node, NumberOwner::motor, NumberField::P, NumberField::D);
     bool position = false;
     for (const MotorDescription& m : scene.motors)
       position = position || (m.joint == joint.name && m.control == MotorControl::position);
     if (!position)
       node.fail("joint '" + joint.name + "' has no position motor; force motors have no gains");
   } else {
-    const std::vector<std::string> fields = {"damping", "armature", "stiffness", "lim_stiffness"};
-    d.joint_field = static_cast<JointField>(node.choice("field", fields));
+    d.number.field =
+        read_field(node, NumberOwner::joint, NumberField::damping, NumberField::lim_stiffness);
     if (joint.type == JointType::fixed)
       node.fail("joint '" + joint.name + "' is fixed; nothing of it can vary");
-    if (d.joint_field == JointField::lim_stiffness && !joint.limits)
+    if (d.number.field == NumberField::lim_stiffness && !joint.limits)
       node.fail("joint '" + joint.name + "' has no 'lim'");
     const bool mixed = joint.type == JointType::free || joint.type == JointType::free2d;
     if (mixed && node.context().length != 1)
       node.fail("joint '" + joint.name +
                 "' slides and turns: one number has two units; use unit=\"m-kg\"");
   }
-  d.distribution = read_distribution(
-      node, joint_field_scale(d.joint_field, dof_turns(joint.type, 0), node.context()));
+  d.distribution = read_distribution(scene, node, d.number);
   check_coefficient(node, d.distribution);
 }
 
+/// A coordinate or a velocity at the start, or where the joint stands.
 void read_state_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
   node.check_attributes({"name", "q", "v", "pos", "uniform", "log_uniform", "normal", "list"});
   const int joint = find_joint(scene, node, "name");
   const JointType type = scene.links[std::size_t(joint)].joint.type;
   if (int{node.has("q")} + int{node.has("v")} + int{node.has("pos")} != 1)
     node.fail("expected exactly one of q, v, pos (the index of what varies) and field");
+  d.number.name = node.text("name");
   if (node.has("pos")) {
     if (type == JointType::fixed)
-      node.fail("joint '" + node.text("name") + "' is fixed; expected one that moves");
-    d.target = RandomTarget::place;
-    d.name = node.text("name");
-    d.index = node.integer("pos", 0, 2);
-    d.distribution = read_distribution(node, node.context().length);
-    return;
+      node.fail("joint '" + d.number.name + "' is fixed; expected one that moves");
+    d.number.field = NumberField::pos;
+    d.number.component = node.integer("pos", 0, 2);
+  } else {
+    const bool position = node.has("q");
+    const int count = position ? position_count(type) : dof_count(type);
+    if (count == 0) node.fail("joint '" + d.number.name + "' is fixed; nothing of it can vary");
+    d.number.field = position ? NumberField::q : NumberField::v;
+    d.number.component = node.integer(position ? "q" : "v", 0, count - 1);
   }
-  const bool position = node.has("q");
-  const int count = position ? position_count(type) : dof_count(type);
-  if (count == 0) node.fail("joint '" + node.text("name") + "' is fixed; nothing of it can vary");
-  d.target = position ? RandomTarget::joint_q : RandomTarget::joint_v;
-  d.name = node.text("name");
-  d.index = node.integer(position ? "q" : "v", 0, count - 1);
-  d.distribution = read_distribution(node, coordinate_scale(type, d.index, node.context()));
+  d.distribution = read_distribution(scene, node, d.number);
 }
 
 /// Masses and sizes are positive whatever is drawn.
-void check_positive(const SceneNode& node, const Distribution& d, const std::string& what) {
+void check_positive(const SceneNode& node, const RandomizationDescription& of) {
+  const Distribution& d = of.distribution;
   if (d.kind == Distribution::Kind::normal)
-    node.fail("normal can draw a negative " + what + "; expected uniform, log_uniform or list");
+    node.fail("normal can draw a negative '" + name_of(of.number) +
+              "'; expected uniform, log_uniform or list");
   double least = d.a;
   if (d.kind == Distribution::Kind::list)
     least = *std::min_element(d.values.begin(), d.values.end());
   if (!(least > 0))
-    node.fail(
-        fmt::format("{} can be {:g}, in SI units; expected positive values only", what, least));
+    node.fail(fmt::format("'{}' can be {:g}, in SI units; expected positive values only",
+                          name_of(of.number), least));
 }
 
 /// The density of a body, or a number of its size.
 void read_body_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
   node.check_attributes({"name", "field", "size", "uniform", "log_uniform", "normal", "list"});
   const BodyDescription& body = scene.links[std::size_t(find_body(scene, node, "name"))].body;
-  d.name = body.name;
   if (node.has("field") == node.has("size"))
     node.fail("expected exactly one of field and size (the index of an edge)");
+  constexpr NumberField kFields[] = {NumberField::radius, NumberField::length,
+                                     NumberField::density};
+  d.number = {NumberOwner::body, NumberField::size, body.name};
   if (node.has("size")) {
-    d.index = 2 + node.integer("size", 0, 2);
+    d.number.component = node.integer("size", 0, 2);
   } else {
-    d.index = node.choice("field", {"radius", "length", "density"});
+    d.number.field = kFields[node.choice("field", {"radius", "length", "density"})];
   }
-  if (node.has("size") || d.index < 2) {
-    d.target = RandomTarget::size;
+  if (d.number.field != NumberField::density) {
     Shape shape = body.shape;
-    if (size_number(shape, d.index) == nullptr)
-      node.fail(fmt::format("body '{}' is {}, which has no {}; expected a body that has one",
-                            body.name, with_article(shape_name(shape)), size_name(d.index)));
-    d.distribution = read_distribution(node, node.context().length);
-    check_positive(node, d.distribution, size_name(d.index));
-    return;
+    if (size_number(shape, size_index(d.number)) == nullptr)
+      node.fail(fmt::format("there is no '{}': body '{}' is {}; expected a body that has one",
+                            name_of(d.number), body.name, with_article(shape_name(shape))));
+  } else {
+    if (std::holds_alternative<AbstractShape>(body.shape))
+      node.fail("body '" + body.name + "' is known by its mass; nothing of it can vary");
+    if (!(body.density > 0))
+      node.fail("body '" + body.name + "' is massless; expected a positive density");
   }
-  d.index = 0;
-  if (std::holds_alternative<AbstractShape>(body.shape))
-    node.fail("body '" + body.name + "' is known by its mass; nothing of it can vary");
-  if (!(body.density > 0))
-    node.fail("body '" + body.name + "' is massless; expected a positive density");
-  d.target = RandomTarget::density;
-  d.distribution = read_distribution(node, node.context().density);
-  check_positive(node, d.distribution, "density");
-}
-
-/// The law decides the unit of `damping`.
-double field_scale(const SceneNode& node, ContactField field, ContactLaw law) {
-  const SceneContext& c = node.context();
-  switch (field) {
-    case ContactField::kn: return c.stiffness;
-    case ContactField::kt: return c.damping_force;
-    case ContactField::mu: return 1;
-    case ContactField::damping: break;
-  }
-  return law == ContactLaw::linear ? c.damping_force : c.damping_area;
+  d.distribution = read_distribution(scene, node, d.number);
+  check_positive(node, d);
 }
 
 void read_coefficient_variation(const Scene& scene, const SceneNode& node,
                                 RandomizationDescription& d) {
-  const bool ground = node.name() == "ground_contact",
-             pair = node.name() == "general_primitive_contact";
   std::vector<std::string> attributes = {"field", "uniform", "log_uniform", "normal", "list"};
-  ContactLaw law = ContactLaw::clamped;
-  bool found = false;
-  if (pair) {
+  const auto declared = [&](const auto& list, const auto& matches) {
+    if (std::none_of(list.begin(), list.end(), matches))
+      node.fail("no such contact is declared in <contact>");
+  };
+  SceneNumber& n = d.number;
+  if (node.name() == "general_primitive_contact") {
     attributes.insert(attributes.end(), {"general_body", "primitive_body"});
-    d.target = RandomTarget::pair_contact;
     find_body(scene, node, "general_body");
     find_body(scene, node, "primitive_body");
-    d.name = node.text("general_body");
-    d.second_name = node.text("primitive_body");
-    for (const auto& c : scene.pair_contacts)
-      if (c.general_body == d.name && c.primitive_body == d.second_name) found = true, law = c.law;
-  } else if (ground) {
+    n.owner = NumberOwner::contact;
+    n.name = node.text("general_body");
+    n.second_name = node.text("primitive_body");
+    declared(scene.pair_contacts, [&](const PairContactDescription& c) {
+      return c.general_body == n.name && c.primitive_body == n.second_name;
+    });
+  } else if (node.name() == "ground_contact") {
     attributes.emplace_back("body");
-    d.target = RandomTarget::ground_contact;
     find_body(scene, node, "body");
-    d.name = node.text("body");
-    for (const auto& c : scene.ground_contacts)
-      if (c.body == d.name) found = true, law = c.law;
+    n.owner = NumberOwner::ground;
+    n.name = node.text("body");
+    declared(scene.ground_contacts,
+             [&](const GroundContactDescription& c) { return c.body == n.name; });
   } else {
     attributes.emplace_back("name");
-    d.target = RandomTarget::tactile;
-    d.name = node.text("name");
+    n.owner = NumberOwner::tactile;
+    n.name = node.text("name");
     std::vector<std::string> names;
-    for (const auto& s : scene.sensors) {
-      names.push_back(s.name);
-      if (s.name == d.name) found = true;
-    }
-    if (!found)
-      node.fail("no tactile sensor is named '" + d.name + "'" + suggestion(d.name, names));
+    for (const auto& s : scene.sensors) names.push_back(s.name);
+    if (std::find(names.begin(), names.end(), n.name) == names.end())
+      node.fail("no tactile sensor is named '" + n.name + "'" + suggestion(n.name, names));
   }
-  if (!found) node.fail("no such contact is declared in <contact>");
   node.check_attributes(attributes);
-  d.field = static_cast<ContactField>(node.choice("field", {"kn", "kt", "mu", "damping"}));
-  d.distribution = read_distribution(node, field_scale(node, d.field, law));
+  n.field = read_field(node, n.owner, NumberField::kn, NumberField::damping);
+  d.distribution = read_distribution(scene, node, n);
   check_coefficient(node, d.distribution);
 }
 
@@ -315,9 +312,7 @@ void read_randomize(Scene& scene, const SceneNode& section) {
       read_coefficient_variation(scene, node, d);
     }
     for (const RandomizationDescription& other : scene.randomizations)
-      if (other.target == d.target && other.name == d.name && other.second_name == d.second_name &&
-          other.index == d.index && other.field == d.field && other.joint_field == d.joint_field)
-        node.fail("this number already varies");
+      if (other.number == d.number) node.fail("'" + name_of(d.number) + "' already varies");
     scene.randomizations.push_back(std::move(d));
   }
 }

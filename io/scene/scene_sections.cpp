@@ -36,11 +36,13 @@ double read_ramp(const SceneNode& node) {
 }  // namespace
 
 ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law) {
-  const SceneContext& c = node.context();
-  const double damping = law == ContactLaw::linear ? c.damping_force : c.damping_area;
-  return {node.not_negative("kn", 0.0) * c.stiffness,
-          node.not_negative("kt", 0.0) * c.damping_force, node.not_negative("mu", 0.0),
-          node.not_negative("damping", 0.0) * damping};
+  ContactCoefficients c{};
+  for (int k = 0; k < kCoefficients; ++k) {
+    const NumberKind& kind = number_kind(NumberOwner::contact, coefficient_field(k));
+    c[std::size_t(k)] = node.not_negative(kind.name, 0.0) *
+                        node.context().factor(kind.unit_of(law == ContactLaw::linear));
+  }
+  return c;
 }
 
 int find_joint(const Scene& scene, const SceneNode& node, const char* attribute) {

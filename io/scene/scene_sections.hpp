@@ -56,9 +56,6 @@ int find_body(const Scene& scene, const SceneNode& node, const char* attribute);
 /// in the same places.
 double coordinate_scale(JointType type, int index, const SceneContext& context);
 
-/// Factor to SI of a number of a joint or motor whose dofs turn or slide.
-double joint_field_scale(JointField field, bool turns, const SceneContext& context);
-
 /// Number of controls the motors read so far take.
 int control_count(const Scene& scene);
 /// Factor to SI of each of them: targets of position motors are coordinates, force motors take

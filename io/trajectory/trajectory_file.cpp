@@ -17,6 +17,7 @@ namespace tangere {
 
 namespace {
 
+constexpr std::int64_t kFormatVersion = 2;
 constexpr hsize_t kChunkBytes = 1U << 20;
 
 /// Whole rows, about a megabyte of them.
@@ -91,16 +92,18 @@ struct TrajectoryFile::Impl {
     h5::write_attribute(group, "meaning",
                         "derivative of the loss by each tactile point's place in its body's axes "
                         "and its own coefficients");
-    h5::write_attribute(group, "names",
-                        std::vector<std::string>{"x", "y", "z", "kn", "kt", "mu", "damping"});
-    h5::write_attribute(
-        group, "units",
-        std::vector<std::string>{"m", "m", "m", "N/m", "N s/m", "1", "N s/m^2; law linear: N s/m"});
     const hsize_t E = static_cast<hsize_t>(layout.environments);
     const double* next = of_all.data();
     for (const SensorLayout& s : layout.sensors) {
       const hsize_t points = static_cast<hsize_t>(s.points);
       const h5::Id dataset = rows<double>(group, s.name, {E, points, kPointNumbers});
+      std::vector<std::string> names, units;
+      for (int k = 0; k < kPointNumbers; ++k) {
+        names.emplace_back(point_number_name(k));
+        units.emplace_back(point_number_unit(k, s.law));
+      }
+      h5::write_attribute(dataset, "names", std::span<const std::string>(names));
+      h5::write_attribute(dataset, "units", std::span<const std::string>(units));
       for (hsize_t e = 0; e < E; ++e)
         h5::write_box<double>(dataset, {e, 0, 0}, {1, points, kPointNumbers},
                               next + e * (of_all.size() / E));
@@ -110,7 +113,7 @@ struct TrajectoryFile::Impl {
 
   void describe_run() {
     h5::write_attribute(file, "format", "tangere trajectory");
-    h5::write_scalar<std::int64_t>(file, "format_version", 1);
+    h5::write_scalar<std::int64_t>(file, "format_version", kFormatVersion);
     h5::write_attribute(file, "tangere_version", layout.version);
     h5::write_attribute(file, "instruction_set", layout.instruction_set);
     h5::write_attribute(file, "precision", layout.precision);
@@ -220,7 +223,7 @@ struct TrajectoryFile::Impl {
     const hsize_t E = static_cast<hsize_t>(layout.environments), k = layout.randomized_names.size();
     const h5::Id d = h5::create_dataset<double>(file, "randomized", {E, k});
     h5::write_attribute(d, "names", std::span<const std::string>(layout.randomized_names));
-    h5::write_attribute(d, "units", "SI, as the scene gives each number");
+    h5::write_attribute(d, "units", std::span<const std::string>(layout.randomized_units));
     h5::write_box<double>(d, {0, 0}, {E, k}, layout.randomized_values.data());
   }
 

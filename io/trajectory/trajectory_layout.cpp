@@ -93,6 +93,7 @@ void TrajectoryLayout::check() const {
   same("q", q_names.size(), q_units.size());
   same("v", v_names.size(), v_units.size());
   same("u", u_names.size(), u_units.size());
+  same("what varies", randomized_names.size(), randomized_units.size());
   if (randomized_values.size() != randomized_names.size() * std::size_t(environments))
     throw InputError(fmt::format("{} randomised values, expected {} for each of {} environments",
                                  randomized_values.size(), randomized_names.size(), environments));

@@ -20,7 +20,8 @@ struct SensorLayout {
   std::string body;
   int rows = 0, cols = 0;  ///< of a rectangular array, points row-major; both 0: a list of points
   int points = 0;          ///< rows * cols for a rectangular array
-  int every = 1;          ///< K: fields are read after steps K, 2K, … of the first run of a chain
+  int every = 1;  ///< K: fields are read after steps K, 2K, … of the first run of a chain
+  ContactLaw law = ContactLaw::clamped;  ///< decides the unit of its damping
   int pressure_sign = 1;  ///< times the third force component: positive under pressure
   /// Rectangular arrays: p(i, j) = corner0 + i pitch0 axis0 + j pitch1 axis1, body frame [m].
   std::array<double, 3> corner0{}, corner1{};
@@ -54,8 +55,8 @@ struct TrajectoryLayout {
   std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
   std::vector<StatusMeaning> statuses;
-  std::vector<std::string> randomized_names;  ///< (k), empty when nothing varies
-  std::vector<double> randomized_values;      ///< (E, k)
+  std::vector<std::string> randomized_names, randomized_units;  ///< (k), empty when nothing varies
+  std::vector<double> randomized_values;                        ///< (E, k)
 
   std::string scene_name, scene_path, scene_text;
   std::string integrator;
@@ -88,8 +89,5 @@ struct RunDescription {
 
 /// The layout of a rollout of `batch` by `stepper`.
 TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper, const RunDescription& run);
-
-/// How a randomised number is called in files: "slider.q[0]", "pad/ball.kn", "ground/ball.mu".
-std::string randomized_name(const RandomizationDescription& description);
 
 }  // namespace tangere

@@ -16,8 +16,7 @@
 namespace tangere::kernels {
 
 template <class N>
-struct LawParameters {
-  N kn, kt, mu, damping;
+struct LawParameters : Coefficients<N> {
   ContactLaw law;
   double ramp;
   /// Whether slipping points bring the derivative of -scale v_t (1) or, by its secant, -scale alone
@@ -126,12 +125,12 @@ NormalForce<N> normal_force(const LawParameters<N>& p, const N& d, const N& rate
   return r;
 }
 
-/// From cotangents of N and of B to those of k_n and k_d (out.kn, out.damping). Zero where the normal
+/// From cotangents of N and of B to those of k_n and k_d. Zero where the normal
 /// force is clamped.
-template <class N, class Cotangent>
+template <class N>
 void pull_back_normal_force(const LawParameters<N>& p, const N& d, const N& rate,
                             const NormalForce<N>& at, const N& force, const N& bound,
-                            Cotangent& out) {
+                            Coefficients<N>& out) {
   const N zero(0.0), one(1.0);
   const auto pulling = at.force < zero;  // law paper: B = -N
   const N both = force + select(pulling, -bound, bound);

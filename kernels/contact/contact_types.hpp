@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The enumerations that a scene and a kernel share: which law a contact follows, which shape is
+// What a scene and a kernel share: which law a contact follows, its coefficients, which shape is
 // touched.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace tangere {
@@ -13,6 +14,33 @@ enum class ContactLaw : std::uint8_t {
   paper,    ///< (-kn + kd ḋ) d, eq. 1 to the letter: pulls when ḋ > kn/kd
   linear,   ///< max(0, -kn d - c min(1, |d|/ramp) ḋ); ramp = 0 is the published ground law
 };
+
+/// Coefficients of a contact or a tactile sensor, and what there is one of for each of them, in the
+/// one order that they have everywhere.
+template <class N>
+struct Coefficients {
+  N kn;       ///< normal stiffness [N/m]
+  N kt;       ///< tangential damping [N s/m]
+  N mu;       ///< friction coefficient [-]
+  N damping;  ///< k_d [N s/m²]; law linear: c [N s/m]
+
+  [[gnu::always_inline]] constexpr N& operator[](std::size_t k) { return this->*kOrder[k]; }
+  [[gnu::always_inline]] constexpr const N& operator[](std::size_t k) const {
+    return this->*kOrder[k];
+  }
+
+ private:
+  static constexpr N Coefficients::*kOrder[] = {&Coefficients::kn, &Coefficients::kt,
+                                                &Coefficients::mu, &Coefficients::damping};
+};
+inline constexpr int kCoefficients = 4;
+
+/// f of each of them, in order.
+template <class N, class F>
+[[gnu::always_inline]] inline auto transformed(const Coefficients<N>& c, const F& f)
+    -> Coefficients<decltype(f(c.kn))> {
+  return {f(c.kn), f(c.kt), f(c.mu), f(c.damping)};
+}
 
 /// Shapes with a signed distance that a contact or tactile point may touch.
 enum class PrimitiveShape : std::uint8_t { sphere, cuboid, plane, cylinder, capsule };

@@ -17,14 +17,14 @@
 namespace tangere::kernels {
 
 template <class N>
-void subtract_law(const LawCotangent<N>& c, N* out) {
-  out[0] -= c.kn, out[1] -= c.kt, out[2] -= c.mu, out[3] -= c.damping;
+void subtract_law(const Coefficients<N>& c, N* out) {
+  for (std::size_t k = 0; k < kCoefficients; ++k) out[k] -= c[k];
 }
 
 /// Of one pair or ground contact: what its points add up to.
 template <class N>
 struct ContactCotangent {
-  LawCotangent<N> law;
+  Coefficients<N> law;
   Vec3<N> size, stretch;  ///< of the touched shape; of the body whose points touch
 };
 template <class N>
@@ -85,7 +85,7 @@ void pair_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
 /// Where contacts add what they find.
 template <class N>
 struct ContactRows {
-  N* law;   ///< (n_pairs + n_grounds, kContactNumbers)
+  N* law;   ///< (n_pairs + n_grounds, kCoefficients)
   N* size;  ///< (n_solids, kSizeNumbers)
 };
 template <class N>
@@ -111,7 +111,7 @@ void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const L
       pair_adjoint(shape, at, o.W, law, model.solids[pair.body1], a.candidates[k], a.lone, slip,
                    sum);
     });
-    subtract_law(sum.law, out.law + kContactNumbers * k);
+    subtract_law(sum.law, out.law + kCoefficients * k);
     subtract(sum.size, out.size + kSizeNumbers * pair.body2);
     subtract(sum.stretch, out.size + kSizeNumbers * pair.body1);
   }
@@ -163,7 +163,7 @@ void contact_parameters(const ModelView& model, const StageArgs<N>& a, const Lin
       const int g = model.ground_order[m];
       const ContactCotangent<N> sum =
           ground_adjoint(model, a, model.grounds[g], links[grounded.link].twist);
-      subtract_law(sum.law, out.law + kContactNumbers * (model.n_pairs + g));
+      subtract_law(sum.law, out.law + kCoefficients * (model.n_pairs + g));
       subtract(sum.size + sum.stretch, out.size + kSizeNumbers * model.grounds[g].body);
     }
   }

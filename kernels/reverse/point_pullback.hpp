@@ -25,7 +25,7 @@ namespace tangere::kernels {
 /// Cotangents of the law's coefficients; f̄ zero where nothing touches.
 template <class N>
 void pull_back_law(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& f_bar,
-                   LawCotangent<N>& out) {
+                   Coefficients<N>& out) {
   const N along_t = dot(p.tangential.direction, f_bar);
   const N slip = p.tangential.slip;
   out.kt -= (N(1.0) - slip) * dot(p.vt, f_bar);

@@ -23,7 +23,7 @@ PadMotion<N> pad_motion(const Touch<double>& t, ContactLaw law) {
           broadcast<N>(t.c),
           broadcast<N>(t.omega),
           broadcast<N>(t.v),
-          {N(t.kn), N(t.kt), N(t.mu), N(t.damping), law, 0.0}};
+          {transformed(t.law, [](double a) { return N(a); }), law, 0.0}};
 }
 
 /// Eight numbers from anywhere: what callers hand in need not be aligned.
@@ -83,8 +83,7 @@ LawParameters<Lanes<A>> law_of_points(const PadTiles& pad, int tile, int k,
   const auto factor = [&](int i) {
     return load_lanes<A>(pad.factors + (4 * tile + i) * kTactileTile + k);
   };
-  law.kn = law.kn * factor(0), law.kt = law.kt * factor(1);
-  law.mu = law.mu * factor(2), law.damping = law.damping * factor(3);
+  for (int c = 0; c < kCoefficients; ++c) law[std::size_t(c)] = law[std::size_t(c)] * factor(c);
   return law;
 }
 
@@ -97,10 +96,10 @@ bool reaches(const Shape& shape, const PadMotion<N>& m, const PadTiles& pad, int
 
 /// Adds to eight points' own numbers; `to`: (kPointNumbers, 64) at the first of them.
 template <class A>
-void add_to_points(const PlaceCotangent<Lanes<A>>& place, const LawCotangent<Lanes<A>>& law,
+void add_to_points(const PlaceCotangent<Lanes<A>>& place, const Coefficients<Lanes<A>>& law,
                    double* to) {
   const Vec3<Lanes<A>> xi = place.x - place.rho;
-  const Lanes<A> numbers[kPointNumbers] = {xi.x, xi.y, xi.z, law.kn, law.kt, law.mu, law.damping};
+  const Lanes<A> numbers[kPointNumbers] = {xi.x, xi.y, xi.z, law[0], law[1], law[2], law[3]};
   for (int i = 0; i < kPointNumbers; ++i)
     store_lanes(load_lanes<A>(to + i * kTactileTile) + numbers[i], to + i * kTactileTile);
 }
@@ -119,17 +118,15 @@ void pull_back_points(const PadTiles& pad, int tile, int k, const double* field,
   const PlaceCotangent<N> place = pull_back_motion<Shape>(law, p, m.omega, f_bar, sums);
   if constexpr (!OfLaw) return;
   sums.size += pull_back_size(shape, p, m.Q, m.c, xi, place.rho);
-  LawCotangent<N> of_law = {N(0.0), N(0.0), N(0.0), N(0.0)};
+  Coefficients<N> of_law = {N(0.0), N(0.0), N(0.0), N(0.0)};
   pull_back_law(law, p, f_bar, of_law);
   if (own != nullptr) add_to_points<A>(place, of_law, own + k);
   const auto factor = [&](int i) {
     return pad.factors == nullptr ? N(1.0)
                                   : load_lanes<A>(pad.factors + (4 * tile + i) * kTactileTile + k);
   };
-  sums.law.kn = mul_add(factor(0), of_law.kn, sums.law.kn);
-  sums.law.kt = mul_add(factor(1), of_law.kt, sums.law.kt);
-  sums.law.mu = mul_add(factor(2), of_law.mu, sums.law.mu);
-  sums.law.damping = mul_add(factor(3), of_law.damping, sums.law.damping);
+  for (std::size_t c = 0; c < kCoefficients; ++c)
+    sums.law[c] = mul_add(factor(static_cast<int>(c)), of_law[c], sums.law[c]);
 }
 
 /// Sum over the lanes, in order.

@@ -58,11 +58,11 @@ struct StageHistory {
 };
 
 /// Numbers of a scene with a derivative, as parameter_products() lays them out: of each pair and
-/// ground contact kn, kt, mu, damping; of each link mass, moment, inertia (xx xy xz yy yz zz); of
+/// ground contact its coefficients; of each link mass, moment, inertia (xx xy xz yy yz zz); of
 /// each dof damping, stiffness, P, D; of each solid its size as contacts see it, masses left alone.
-inline constexpr int kContactNumbers = 4, kInertiaNumbers = 10, kDofNumbers = 4, kSizeNumbers = 3;
+inline constexpr int kInertiaNumbers = 10, kDofNumbers = 4, kSizeNumbers = 3;
 inline int first_inertia_number(const ModelView& m) {
-  return kContactNumbers * (m.n_pairs + m.n_grounds);
+  return kCoefficients * (m.n_pairs + m.n_grounds);
 }
 inline int first_dof_number(const ModelView& m) {
   return first_inertia_number(m) + kInertiaNumbers * m.n_links;

@@ -70,9 +70,7 @@ struct DofEffects {
   double force_low, force_high;  ///< its range; infinite: none
 };
 
-struct ContactParameters {
-  Parameter kn, kt, mu, damping;
-};
+using ContactParameters = Coefficients<Parameter>;
 
 /// Points of body 1 against the distance function of body 2.
 struct PairContact {

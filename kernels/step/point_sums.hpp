@@ -107,13 +107,9 @@ struct PointSums<Derivatives, Sums, OneLane<A>> {
   void add(const Motion& motion, const LawParameters<OneLane<A>>& law,
            const CandidateList<OneLane<A>>& list, int) {
     using N = Lanes<A>;
-    const LawParameters<N> all = {N(law.kn.x),
-                                  N(law.kt.x),
-                                  N(law.mu.x),
-                                  N(law.damping.x),
-                                  law.law,
-                                  law.ramp,
-                                  N(law.friction_tangent.x)};
+    const auto spread = [](const OneLane<A>& a) { return N(a.x); };
+    const LawParameters<N> all = {transformed(law, spread), law.law, law.ramp,
+                                  spread(law.friction_tangent)};
     add_own_points<Derivatives>(in_all_lanes<A>(motion, 0), all, list, own);
   }
   Sums<OneLane<A>> result(int) { return unpacked<Derivatives>(own); }
@@ -141,12 +137,7 @@ struct PointSums<Derivatives, Sums, Lanes<A>> {
       return;
     }
     const auto spread = [lone](const N& a) { return N(reinterpret_cast<const double*>(&a)[lone]); };
-    const LawParameters<N> all = {spread(law.kn),
-                                  spread(law.kt),
-                                  spread(law.mu),
-                                  spread(law.damping),
-                                  law.law,
-                                  law.ramp,
+    const LawParameters<N> all = {transformed(law, spread), law.law, law.ramp,
                                   spread(law.friction_tangent)};
     add_own_points<Derivatives>(in_all_lanes<A>(motion, lone), all, list, own);
   }

@@ -225,7 +225,7 @@ template <class N>
 LawParameters<N> load_law(const ContactParameters& p, ContactLaw law, double ramp,
                           const double* block, int group) {
   const auto one = [&](const Parameter& x) { return ParameterLoad<N>::load(x, block, group); };
-  return {one(p.kn), one(p.kt), one(p.mu), one(p.damping), law, ramp};
+  return {transformed(p, one), law, ramp};
 }
 
 }  // namespace tangere::kernels

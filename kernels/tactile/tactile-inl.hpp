@@ -44,12 +44,12 @@ bool chunk_brackets(const PadTiles& pad, int first, const TouchShape& shape,
 
 template <class N>
 Touch<N> broadcast_touch(const Touch<double>& t) {
-  return {broadcast<N>(t.Q), broadcast<N>(t.c), broadcast<N>(t.omega), broadcast<N>(t.v), N(t.kn),
-          N(t.kt),           N(t.mu),           N(t.damping)};
+  return {broadcast<N>(t.Q), broadcast<N>(t.c), broadcast<N>(t.omega), broadcast<N>(t.v),
+          transformed(t.law, [](double a) { return N(a); })};
 }
 template <class N>
 PointLaw<N> point_law(const Touch<double>& t) {
-  return {broadcast<N>(t.omega), N(-t.kn), N(t.kt), N(t.mu), N(t.damping)};
+  return {broadcast<N>(t.omega), N(-t.law.kn), N(t.law.kt), N(t.law.mu), N(t.law.damping)};
 }
 
 /// Points k … of a tile, `offsets` (2 or 3, 64).

@@ -31,11 +31,10 @@ Vec3<typename P::N> lanes_of(const Touch<LaneRow>* touch, Vec3<LaneRow> Touch<La
 template <class P>
 PointLaw<typename P::N> point_law(const Touch<LaneRow>* touch) {
   using N = typename P::N;
-  const auto one = [&](LaneRow Touch<LaneRow>::*m) {
-    return lanes_of<P>(touch, [m](const auto& t) -> const LaneRow& { return t.*m; });
+  const auto one = [&](std::size_t k) {
+    return lanes_of<P>(touch, [k](const auto& t) -> const LaneRow& { return t.law[k]; });
   };
-  return {lanes_of<P>(touch, &Touch<LaneRow>::omega), N(0.0) - one(&Touch<LaneRow>::kn),
-          one(&Touch<LaneRow>::kt), one(&Touch<LaneRow>::mu), one(&Touch<LaneRow>::damping)};
+  return {lanes_of<P>(touch, &Touch<LaneRow>::omega), N(0.0) - one(0), one(1), one(2), one(3)};
 }
 
 /// The brackets of one tile in every environment; false where it is out of reach of all.

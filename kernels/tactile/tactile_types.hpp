@@ -28,7 +28,7 @@ struct PadTiles {
   const double* frames;    ///< curved: (n_tiles, 9, 64) rows axis0, axis1, -normal of (f·x, f·y,
                            ///< -f·z), pad axes
   const float* frames_f;
-  const double* factors;  ///< (n_tiles, 4, 64) of kn, kt, mu, damping; nullptr: all 1
+  const double* factors;  ///< (n_tiles, 4, 64) of the coefficients; nullptr: all 1
   const float* factors_f;
   bool skewed;     ///< axis0 and axis1 are not quite unit and perpendicular: forces need `axes`
   double axes[9];  ///< rows: axis0, axis1, -(axis0 × axis1), pad axes
@@ -82,23 +82,17 @@ struct TactileBlockArgs {
                        ///< tiles that nothing touches in any lane are not written
 };
 
-/// Cotangents of the coefficients of a contact.
-template <class N>
-struct LawCotangent {
-  N kn, kt, mu, damping;
-};
-
 /// Of a pad's shape, or of a pair: what all its points add up to.
 template <class N>
 struct TouchCotangent {
   Vec6<N> displacement;  ///< (θ̄; ρ̄) of body 2 relative to body 1, body 1's axes and origin
   Vec6<N> twist;         ///< W̄
-  LawCotangent<N> law;
+  Coefficients<N> law;
   Vec3<N> size;  ///< of body 2, as in PairContact
 };
 
-/// Numbers of a tactile point with a derivative: its place x y z, then its own kn, kt, mu, damping.
-inline constexpr int kPointNumbers = 7;
+/// Numbers of a tactile point with a derivative: its place x y z, then its own coefficients.
+inline constexpr int kPointNumbers = 3 + kCoefficients;
 
 /// One environment's field on its way back: cotangents of its touched tiles to those of each
 /// shape's motion.

@@ -35,19 +35,19 @@ constexpr double kLeast = 1e-3;  // a tip starts so far from the cap, or farther
 /// starts is up to the task.
 Scene with_cap_varying(Scene scene) {
   std::erase_if(scene.randomizations, [](const RandomizationDescription& d) {
-    return d.target != RandomTarget::joint_effect;
+    const bool starts_or_stands = is_of_start(d.number) || d.number.field == NumberField::pos;
+    return d.number.owner != NumberOwner::joint || starts_or_stands;
   });
-  const auto vary = [&](RandomTarget target, int index, double low, double high) {
+  const auto vary = [&](const SceneNumber& number, double low, double high) {
     RandomizationDescription d;
-    d.target = target;
-    d.name = "cap";
-    d.index = index;
+    d.number = number;
     d.distribution.a = low;
     d.distribution.b = high;
     scene.randomizations.push_back(d);
   };
-  vary(RandomTarget::size, 0, kSmallest, kLargest);
-  for (const int axis : {0, 1}) vary(RandomTarget::place, axis, -kOffset, kOffset);
+  vary({NumberOwner::body, NumberField::radius, "cap"}, kSmallest, kLargest);
+  for (const int axis : {0, 1})
+    vary({NumberOwner::joint, NumberField::pos, "cap", axis}, -kOffset, kOffset);
   return scene;
 }
 

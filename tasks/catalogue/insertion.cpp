@@ -34,22 +34,17 @@ constexpr std::size_t kBefore = 0, kNow = 3, kHeight = 6, kGrip = 7, kTurned = 8
 /// The scene with what nobody knows of the skin as what varies: of both pads alike.
 Scene with_skin(Scene scene) {
   scene.randomizations.clear();
-  const auto vary = [&](RandomTarget target, const char* pad, ContactField field) {
+  const auto vary = [&](const SceneNumber& number) {
     RandomizationDescription d;
-    d.target = target;
-    d.name = pad;
-    d.field = field;
-    if (target == RandomTarget::pair_contact) d.second_name = "box";
+    d.number = number;
     d.distribution.kind = Distribution::Kind::list;
     d.distribution.values = {1};  // replaced at the start of an episode
     scene.randomizations.push_back(d);
   };
   for (const char* pad : {"left_pad", "right_pad"}) {
-    for (const ContactField field : {ContactField::kn, ContactField::kt, ContactField::mu})
-      vary(RandomTarget::pair_contact, pad, field);
-    for (const ContactField field :
-         {ContactField::kn, ContactField::kt, ContactField::mu, ContactField::damping})
-      vary(RandomTarget::tactile, pad, field);
+    for (const NumberField field : {NumberField::kn, NumberField::kt, NumberField::mu})
+      vary({NumberOwner::contact, field, pad, 0, "box"});
+    for (int k = 0; k < kCoefficients; ++k) vary({NumberOwner::tactile, coefficient_field(k), pad});
   }
   return scene;
 }

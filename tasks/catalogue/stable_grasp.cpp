@@ -38,8 +38,7 @@ Scene with_densities(Scene scene) {
   scene.randomizations.clear();
   for (int b = 0; b < kBlocks; ++b) {
     RandomizationDescription d;
-    d.target = RandomTarget::density;
-    d.name = "block_" + std::to_string(b);
+    d.number = {NumberOwner::body, NumberField::density, "block_" + std::to_string(b)};
     d.distribution.kind = Distribution::Kind::list;
     d.distribution.values = {500};  // replaced at the start of an episode
     scene.randomizations.push_back(d);

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "tasks/gradients/gradient_block.hpp"
 #include "tasks/gradients/row_jacobians.hpp"
 #include "tasks/gradients/task_gradient_block.hpp"
@@ -69,8 +69,8 @@ std::vector<GradientArray> arrays_of_return(const Model& model, const Named& act
                                             const std::string& of) {
   const std::uint64_t nv = size(model.nv());
   Named numbers;
-  const Parameters parameters(model);
-  for (const ParameterInfo& info : parameters.infos()) {
+  const NumberGradients parameters(model);
+  for (const NumberInfo& info : parameters.infos()) {
     numbers.names.push_back(info.name);
     numbers.units.push_back(info.unit);
   }

@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/readout_pullback.hpp"
 #include "engine/sense/readout.hpp"
 #include "tasks/gradients/gradients.hpp"
@@ -65,7 +65,7 @@ class GradientBlock {
   std::vector<BlockState> checkpoints_;
   std::vector<std::vector<CompactFrame<double>>> frames_;  // (sensors, 16)
   LossReading reading_;
-  Parameters parameters_;
+  NumberGradients parameters_;
   const GradientGoOn* go_on_ = nullptr;
   bool stopped_ = false;
   std::int64_t newton_iterations_ = 0, recomputed_steps_ = 0;

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <optional>
 
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/point_numbers.hpp"
 #include "engine/derivative/tangent.hpp"
 #include "engine/sense/readout.hpp"
@@ -106,13 +106,14 @@ Difference difference_of(const Setting& s, double scale, const Change& change) {
 }
 
 /// Of number k of the scene, by its relative change.
-Difference difference_of_number(const Setting& s, const Parameters& parameters, int k) {
+Difference difference_of_number(const Setting& s, const NumberGradients& parameters, int k) {
   std::vector<double> losses;
   for (const double e : sweep(1)) {
     Scene scene = s.start.model().scene();
     std::vector<double> varying = s.varying;
-    const int random = parameters.randomization(scene, k);
-    (random < 0 ? parameters.in(scene, k) : varying[std::size_t(random)]) *= 1 + e;
+    const SceneNumber& number = parameters.infos()[std::size_t(k)].number;
+    const int random = randomization_of(scene, number);
+    (random < 0 ? number_in(scene, number) : varying[std::size_t(random)]) *= 1 + e;
     losses.push_back(losses_of(s, Model(scene), {s.at}, varying)[0]);
   }
   return best_difference(losses, 1);
@@ -176,7 +177,7 @@ Difference difference_of_points(const Setting& s, const PointChange& change,
 /// Tangents along one direction per input.
 class Directions {
  public:
-  Directions(const Setting& s, const Parameters& parameters) : s_(s), parameters_(parameters) {
+  Directions(const Setting& s, const NumberGradients& parameters) : s_(s), parameters_(parameters) {
     const Model& model = s.start.model();
     Batch batch = s.start;
     Stepper stepper(model, s.options.stepper);
@@ -261,7 +262,7 @@ class Directions {
   }
 
   const Setting& s_;
-  const Parameters& parameters_;
+  const NumberGradients& parameters_;
   std::optional<BlockTape> tape_;
 };
 
@@ -361,8 +362,8 @@ class Check {
     const Model& model = s_.start.model();
     std::vector<double> coefficients;  // this environment's
     for (std::size_t s = 0; s < model.sensors().size(); ++s)
-      for (const double c : sensor_coefficients(s_.start, 0, static_cast<int>(s)))
-        coefficients.push_back(c);
+      for (std::size_t k = 0; k < kCoefficients; ++k)
+        coefficients.push_back(sensor_coefficients(s_.start, 0, static_cast<int>(s))[k]);
     const std::vector<PointChange> changes = point_changes(model, coefficients, s_.options.seed);
     const std::span<const double> all =
         std::span(g_.points).first(std::size_t(tactile_points(model) * kPointNumbers));
@@ -371,12 +372,11 @@ class Check {
       gradient.push_back(std::inner_product(
           c.own.begin(), c.own.end(),
           all.begin() + first_tactile_point(model, c.sensor) * kPointNumbers, 0.0));
-    constexpr const char* kNames[kPointNumbers] = {"x", "y", "z", "kn", "kt", "mu", "damping"};
     add({"points", gradient, all_of(gradient.size()),
          [&](std::size_t k) { return difference_of_points(s_, changes[k], coefficients); },
          [&](std::size_t k) {
            return model.sensors()[std::size_t(changes[k].sensor)].name + " " +
-                  kNames[changes[k].number];
+                  point_number_name(changes[k].number);
          }},
         4, [&](const std::vector<double>& d) {
           return tangents_.along({}, {}, {}, {}, together(model, changes, d));
@@ -409,7 +409,7 @@ class Check {
 
   const Setting& s_;
   const LossGradient& g_;
-  Parameters parameters_;
+  NumberGradients parameters_;
   Directions tangents_;
 };
 

@@ -104,11 +104,11 @@ void compare_along(CheckedInput& c, std::span<const double> gradient,
   c.tangent_error = finite_error(std::abs(dot - along) / (c.scale * norm_of(direction)));
 }
 
-RelativeGradient::RelativeGradient(const Parameters& parameters, const Scene& scene,
+RelativeGradient::RelativeGradient(const NumberGradients& parameters, const Scene& scene,
                                    std::span<const double> varying,
                                    std::span<const double> absolute) {
   for (std::size_t k = 0; k < absolute.size(); ++k) {
-    const int random = parameters.randomization(scene, static_cast<int>(k));
+    const int random = randomization_of(scene, parameters.infos()[k].number);
     has.push_back(random < 0 ? parameters.infos()[k].value : varying[std::size_t(random)]);
     gradient.push_back(absolute[k] * has[k]);
     if (has[k] != 0) given.push_back(k);

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 
 namespace tangere {
 
@@ -76,7 +76,7 @@ struct RelativeGradient {
   std::vector<std::size_t> given;     ///< not zero: there is something to change a little
 
   /// `varying`: values of what the scene randomises, in its order.
-  RelativeGradient(const Parameters& parameters, const Scene& scene,
+  RelativeGradient(const NumberGradients& parameters, const Scene& scene,
                    std::span<const double> varying, std::span<const double> gradient);
   [[nodiscard]] std::vector<double> change(std::span<const double> relative) const;
 };

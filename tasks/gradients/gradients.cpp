@@ -37,7 +37,7 @@ GradientSummary empty_gradients(const Model& model, int environments, const Grad
     return std::size_t(environments) * std::size_t(each);
   };
   GradientSummary out;
-  const int numbers = o.parameters ? Parameters(model).count() : 0;
+  const int numbers = o.parameters ? NumberGradients(model).count() : 0;
   out.losses.assign(
       losses,
       {std::vector<double>(size(1)), std::vector<double>(size(o.steps * model.nu())),
@@ -97,7 +97,7 @@ GradientSummary GradientRollouts::run(const Batch& start, const StepControls& co
 }
 
 double gradient_bytes(const Model& model, int environments, const GradientOptions& o, int losses) {
-  const double numbers = o.parameters ? Parameters(model).count() : 0;
+  const double numbers = o.parameters ? NumberGradients(model).count() : 0;
   const double results =
       double(o.steps) * model.nu() + 2.0 * model.nv() + numbers + double(point_count(model, o)) + 1;
   const Integrator scheme = o.stepper.integrator.value_or(model.integrator());

@@ -29,7 +29,7 @@ struct GradientOptions {
   StepperOptions stepper;
   Precision precision =
       Precision::f64;  ///< of the tactile fields that losses see; derivatives are taken in double
-  bool parameters = false;  ///< by the scene's numbers too (engine/derivative/parameters.hpp)
+  bool parameters = false;  ///< by the scene's numbers too (engine/derivative/number_gradients.hpp)
   bool points =
       false;  ///< by every tactile point's own numbers too (engine/derivative/point_numbers.hpp)
   /// The states on a thread's tape may take so much [bytes]; a longer rollout is run again from
@@ -43,7 +43,7 @@ struct LossGradient {
   std::vector<double> value;       ///< (E)
   std::vector<double> u;           ///< (E, steps, nu)
   std::vector<double> q, v;        ///< (E, nv) by the initial state; q along the dofs of v
-  std::vector<double> parameters;  ///< (E, Parameters::count()) or empty
+  std::vector<double> parameters;  ///< (E, NumberGradients::count()) or empty
   std::vector<double> points;      ///< (E, tactile_points(model), kPointNumbers) or empty
 };
 

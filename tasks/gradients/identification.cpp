@@ -9,7 +9,7 @@
 #include <cmath>
 #include <limits>
 
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "engine/model/random.hpp"
 #include "engine/sense/readout.hpp"
 
@@ -37,16 +37,16 @@ void check_run(const RecordedRun& run) {
                     run.steps, run.every));
 }
 
-std::vector<int> places_of(const Parameters& parameters, const Scene& scene,
+std::vector<int> places_of(const NumberGradients& parameters, const Scene& scene,
                            std::span<const std::string> names) {
   std::vector<int> out;
   std::string known;
-  for (const ParameterInfo& info : parameters.infos())
+  for (const NumberInfo& info : parameters.infos())
     known += (known.empty() ? "'" : ", '") + info.name + "'";
   for (const std::string& name : names) {
     const auto infos = parameters.infos();
     const auto at = std::find_if(infos.begin(), infos.end(),
-                                 [&](const ParameterInfo& i) { return i.name == name; });
+                                 [&](const NumberInfo& i) { return i.name == name; });
     if (at == infos.end())
       throw InputError(
           fmt::format("{}: no number '{}'; expected one of {}", scene.path, name, known));
@@ -64,7 +64,7 @@ class Problem {
         run_(run),
         recorded_(recorded),
         names_(names),
-        places_(places_of(Parameters(Model(scene)), scene, names)) {}
+        places_(places_of(NumberGradients(Model(scene)), scene, names)) {}
 
   [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(places_.size()); }
   [[nodiscard]] Vector start() const {
@@ -137,7 +137,7 @@ class Problem {
   const RecordedRun& run_;
   const FieldSequence& recorded_;
   const std::vector<std::string>& names_;
-  std::vector<int> places_;  // among Parameters::infos()
+  std::vector<int> places_;  // among NumberGradients::infos()
 };
 
 /// Whether a step that changed the misfit by `gain` is worth no more than `tolerance` standard
@@ -176,7 +176,7 @@ void judge(const Problem& problem, double misfit, const Matrix& J, Identificatio
 }  // namespace
 
 std::vector<double> numbers_of(const Scene& scene, std::span<const std::string> names) {
-  const Parameters parameters{Model(scene)};
+  const NumberGradients parameters{Model(scene)};
   std::vector<double> out;
   for (int k : places_of(parameters, scene, names))
     out.push_back(parameters.infos()[std::size_t(k)].value);
@@ -185,10 +185,11 @@ std::vector<double> numbers_of(const Scene& scene, std::span<const std::string> 
 
 Scene with_numbers(const Scene& scene, std::span<const std::string> names,
                    std::span<const double> values) {
-  const Parameters parameters{Model(scene)};
+  const NumberGradients parameters{Model(scene)};
   Scene out = scene;
   std::size_t n = 0;
-  for (int k : places_of(parameters, scene, names)) parameters.in(out, k) = values[n++];
+  for (int k : places_of(parameters, scene, names))
+    number_in(out, parameters.infos()[std::size_t(k)].number) = values[n++];
   return out;
 }
 

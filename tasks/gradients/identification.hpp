@@ -20,7 +20,7 @@ struct FieldSequence {
   std::vector<std::vector<double>> readings;
 };
 
-/// Values of a scene's numbers by Parameters' names ("tactile pad kn"); the scene with others. Both
+/// Values of a scene's numbers by their names ("tactile pad kn"); the scene with others. Both
 /// throw InputError for a name that the scene does not have.
 std::vector<double> numbers_of(const Scene& scene, std::span<const std::string> names);
 Scene with_numbers(const Scene& scene, std::span<const std::string> names,
@@ -59,7 +59,7 @@ class FieldMisfit : public RolloutLoss {
 
 struct IdentificationOptions {
   std::vector<std::string>
-      numbers;  ///< what is sought, by Parameters' names; positive, fitted as logarithms
+      numbers;              ///< what is sought, by name_of(); positive, fitted as logarithms
   int max_iterations = 60;  ///< rollouts with gradients, those of rejected steps included
   double tolerance = 1e-2;  ///< ends at a step that is worth so many standard deviations
 };

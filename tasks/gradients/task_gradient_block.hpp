@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/readout_pullback.hpp"
 #include "tasks/gradients/task_gradients.hpp"
 
@@ -50,7 +50,7 @@ class TaskGradientBlock {
   TaskRollout rollout_;
   Adjoint adjoint_;
   ReadoutPullback pullback_;
-  Parameters parameters_;
+  NumberGradients parameters_;
   std::int64_t segment_;          // actions on tapes at a time
   std::int64_t taken_ = 0;        // actions of the episode that is longest
   std::vector<BlockTape> tapes_;  // (segment)

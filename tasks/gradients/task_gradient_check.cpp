@@ -160,8 +160,9 @@ class Check {
     for (const double e : sweep(1)) {
       Scene scene = task_.model().scene();
       std::vector<double> varying = varying_;
-      const int random = parameters_.randomization(scene, k);
-      (random < 0 ? parameters_.in(scene, k) : varying[size(random)]) *= 1 + e;
+      const SceneNumber& number = parameters_.infos()[size(k)].number;
+      const int random = randomization_of(scene, number);
+      (random < 0 ? number_in(scene, number) : varying[size(random)]) *= 1 + e;
       values.push_back(returns(*make_(scene), {at_}, varying)[0]);
     }
     return best_difference(values, 1);
@@ -180,7 +181,7 @@ class Check {
   const Task& task_;
   const TaskMaker& make_;
   const TaskCheckOptions& options_;
-  Parameters parameters_;
+  NumberGradients parameters_;
   TaskGradients gradient_;
   std::optional<TaskRollout> rollout_;
   std::optional<TaskTangent> tangent_;

@@ -40,7 +40,7 @@ TaskGradients empty_task_gradients(const Task& task, const TaskGradientOptions& 
   out.by_action.resize(episodes * actions);
   out.by_q.resize(episodes * size(task.model().nv()));
   out.by_v.resize(out.by_q.size());
-  if (o.parameters) out.by_parameter.resize(episodes * size(Parameters(task.model()).count()));
+  if (o.parameters) out.by_parameter.resize(episodes * size(NumberGradients(task.model()).count()));
   return out;
 }
 
@@ -72,7 +72,7 @@ TaskGradients task_gradients(const Task& task, const TaskActions& actions,
 
 double task_gradient_bytes(const Task& task, const TaskGradientOptions& asked) {
   const TaskGradientOptions o = checked(task, asked);
-  const double numbers = o.parameters ? Parameters(task.model()).count() : 0;
+  const double numbers = o.parameters ? NumberGradients(task.model()).count() : 0;
   const double results = 2.0 * double(o.actions) * double(task.spec().action.size()) +
                          2.0 * task.model().nv() + numbers + 2;
   return 8 * results * double(o.episodes) + o.threads * TaskGradientBlock::bytes(task, o);

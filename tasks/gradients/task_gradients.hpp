@@ -20,7 +20,7 @@ struct TaskGradientOptions {
   StepperOptions stepper;
   Precision precision = Precision::
       mixed;  ///< of what moments hold of tactile fields; derivatives are taken in double
-  bool parameters = false;  ///< by the scene's numbers too (engine/derivative/parameters.hpp)
+  bool parameters = false;  ///< by the scene's numbers too (engine/derivative/number_gradients.hpp)
   /// The states on a thread's tapes may take so much [bytes]; longer episodes are run again from
   /// checkpoints, with the same bits.
   double tape_bytes = 1e9;
@@ -41,7 +41,7 @@ struct TaskGradients {
   std::vector<double> by_action;     ///< (E, A, action); 0 for one beyond its bounds
   std::vector<double> by_q,
       by_v;  ///< (E, nv) by the state where the first action begins, positions along the dofs of v
-  std::vector<double> by_parameter;   ///< (E, Parameters::count()) or empty
+  std::vector<double> by_parameter;   ///< (E, NumberGradients::count()) or empty
   std::vector<LostEpisode> lost;      ///< ascending; their derivatives are those until then
   std::int64_t recomputed_steps = 0;  ///< of blocks, from checkpoints
   bool stopped = false;               ///< on the way: nothing is complete

@@ -286,7 +286,8 @@ TEST(GenerateShards, SayWhatVariedInEachEpisode) {
   std::vector<double> expected(dims.at(0) * dims.at(1));
   h5::read_box(all, {0, 0}, dims, expected.data());
   EXPECT_EQ(h5::read_texts(scene_group, "randomized_names"), h5::read_texts(all, "names"));
-  EXPECT_EQ(h5::read_texts(scene_group, "randomized_units").size(), dims[1]);
+  EXPECT_EQ(h5::read_texts(scene_group, "randomized_units"), h5::read_texts(all, "units"));
+  EXPECT_EQ(h5::read_texts(all, "units").size(), dims[1]);
   for (const int episode : {16, 31}) {
     const h5::Id demo = h5::open_group(shard, "data/demo_" + std::to_string(episode));
     const auto at = expected.begin() + static_cast<std::ptrdiff_t>(dims[1]) * episode;

@@ -115,7 +115,10 @@ TEST(Simulate, WritesGradientsOfTactilePoints) {
               numbers = read_array(folder, "/gradients/grad_numbers");
   const h5::Id file = h5::open_file(folder.path("out.h5"));
   const auto names = h5::read_texts(h5::open_dataset(file, "/gradients/grad_numbers"), "names");
-  const auto own = h5::read_texts(h5::open_group(file, "/gradients/grad_points"), "names");
+  const h5::Id of_pad = h5::open_dataset(file, "/gradients/grad_points/pad");
+  const auto own = h5::read_texts(of_pad, "names"), units = h5::read_texts(of_pad, "units");
+  EXPECT_EQ(own, (std::vector<std::string>{"x", "y", "z", "kn", "kt", "mu", "damping"}));
+  EXPECT_EQ(units, (std::vector<std::string>{"m", "m", "m", "N/m", "N s/m", "1", "N s/m^2"}));
   ASSERT_EQ(points.dims.size(), 3U);
   EXPECT_EQ(points.dims[0], 2U);
   EXPECT_EQ(points.dims[2], own.size());

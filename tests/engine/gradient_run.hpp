@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "engine/derivative/adjoint.hpp"
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "engine/step/displacement.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/kernels/random_numbers.hpp"
@@ -146,7 +146,7 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
     g.q.push_back(adjoint.loss(0).q[std::size_t(i * kBlock + lane)]);
     g.v.push_back(adjoint.loss(0).v[std::size_t(i * kBlock + lane)]);
   }
-  const Parameters parameters(model);
+  const NumberGradients parameters(model);
   g.parameters.resize(std::size_t(parameters.count()));
   parameters.gradient(adjoint.loss(0), batch, lane, g.parameters);
   return g;
@@ -186,7 +186,7 @@ inline RunGradient differences_of_run(const Model& model, const StepperOptions& 
   for (std::size_t t = 0; t < in.u.size(); ++t)
     for (int k = 0; k < model.nu(); ++k)
       g.u.push_back(along([&](RunInput& x, double e) { x.u[t][std::size_t(k)] += 10 * e; }) / 10);
-  const Parameters parameters(model);
+  const NumberGradients parameters(model);
   for (int k = 0; k < parameters.count(); ++k) {
     const double size = parameters.infos()[std::size_t(k)].value;
     if (size == 0) {  // at a bound of what a scene may say: one-sided
@@ -196,7 +196,8 @@ inline RunGradient differences_of_run(const Model& model, const StepperOptions& 
     g.parameters.push_back(best_difference(
                                [&](double e) {
                                  Scene scene = model.scene();
-                                 parameters.in(scene, k) += e * size;
+                                 number_in(scene, parameters.infos()[std::size_t(k)].number) +=
+                                     e * size;
                                  return loss_of_run(Model(scene), options, in, loss);
                                },
                                start) /

@@ -14,7 +14,7 @@ struct Touch {
   Mat3<N> Q;
   Vec3<N> c;
   Vec3<N> omega, v;
-  N kn, kt, mu, damping;
+  Coefficients<N> law;
 };
 
 struct TouchShape {

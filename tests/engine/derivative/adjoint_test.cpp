@@ -47,7 +47,7 @@ int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance
   int compared = compare(adjoint.q, difference.q, norm(difference.q), tolerance, "q");
   compared += compare(adjoint.v, difference.v, norm(difference.v), tolerance, "v");
   compared += compare(adjoint.u, difference.u, norm(difference.u), tolerance, "u");
-  const Parameters parameters(model);
+  const NumberGradients parameters(model);
   std::vector<double> a = adjoint.parameters,
                       b = difference.parameters;  // by their relative changes: units differ
   for (std::size_t k = 0; k < a.size(); ++k) {

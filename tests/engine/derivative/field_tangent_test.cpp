@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "engine/derivative/field_tangent.hpp"
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/point_numbers.hpp"
 #include "engine/derivative/readout_pullback.hpp"
 #include "engine/derivative/tangent.hpp"

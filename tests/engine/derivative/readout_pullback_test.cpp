@@ -124,11 +124,11 @@ TEST_P(FieldPullback, MatchesDifferences) {
           },
           c.v[std::size_t(i * kBlock + lane)], scale_v, 1e-6, "v");
     }
-    const Parameters parameters(model);
+    const NumberGradients parameters(model);
     std::vector<double> gradient(std::size_t(parameters.count()));
     parameters.gradient(c, Batch(model, kBlock), lane, gradient);
     for (int k = 0; k < parameters.count(); ++k) {
-      const ParameterInfo& info = parameters.infos()[std::size_t(k)];
+      const NumberInfo& info = parameters.infos()[std::size_t(k)];
       const bool of_size = info.name.rfind("body thing", 0) == 0 && info.unit == "m";
       if (info.name.rfind("tactile", 0) != 0 && !of_size) continue;
       sizes += of_size && gradient[std::size_t(k)] != 0;
@@ -136,7 +136,7 @@ TEST_P(FieldPullback, MatchesDifferences) {
       compare(
           [&](double e) {
             Scene scene = model.scene();
-            parameters.in(scene, k) += e * size;
+            number_in(scene, info.number) += e * size;
             const Model other(scene);
             return reading.value(s, &other);
           },

@@ -55,17 +55,17 @@ void compare(const Scene& scene, Random& random, std::map<std::string, int>& see
   const testing::StateLoss loss(model, kSteps, 3);
   if (!std::isfinite(testing::loss_of_run(model, options, in, loss))) return;
   const testing::RunGradient adjoint = testing::adjoint_of_run(model, options, {in}, loss, 0);
-  const Parameters parameters(model);
+  const NumberGradients parameters(model);
   double scale = 1e-4;  // of the loss, about 1: below, differences are noise
   std::vector<std::array<double, 2>> both;
   std::vector<std::string> names;
   for (int k = 0; k < parameters.count(); ++k) {
-    const ParameterInfo& info = parameters.infos()[std::size_t(k)];
+    const NumberInfo& info = parameters.infos()[std::size_t(k)];
     if (info.unit != "m") continue;
     const double difference = testing::best_difference(
         [&](double e) {
           Scene other = scene;
-          parameters.in(other, k) += e * info.value;
+          number_in(other, info.number) += e * info.value;
           return testing::loss_of_run(Model(other), options, in, loss);
         },
         1e-3);

@@ -67,10 +67,9 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
               normals(random, std::size_t(m.nv)),
               std::vector<double>(std::size_t(parameter_rows(model))),
               {}};
-  const Parameters parameters(model);
+  const NumberGradients parameters(model);
   std::vector<double> change;
-  for (const ParameterInfo& info : parameters.infos())
-    change.push_back(info.value * random.normal());
+  for (const NumberInfo& info : parameters.infos()) change.push_back(info.value * random.normal());
   parameters.spread(change, batch, 0, d.numbers);
   for (int t = 0; t < steps; ++t) d.u.push_back(normals(random, std::size_t(m.nu)));
 

@@ -26,8 +26,7 @@ BodyDescription& body_of(Scene& scene, const std::string& name) {
 
 RandomizationDescription density_of(const std::string& body, double low, double high) {
   RandomizationDescription d;
-  d.target = RandomTarget::density;
-  d.name = body;
+  d.number = {NumberOwner::body, NumberField::density, body};
   d.distribution.a = low;
   d.distribution.b = high;
   return d;
@@ -136,7 +135,7 @@ TEST(Density, IsReadFromAScene) {
     return parse_scene(text.substr(0, at) + line + text.substr(at), path).scene;
   };
   const Scene scene = with("<body name=\"box\" field=\"density\" uniform=\"400 800\"/>");
-  EXPECT_EQ(scene.randomizations[0].target, RandomTarget::density);
+  EXPECT_EQ(name_of(scene.randomizations[0].number), "body box density");
   EXPECT_EQ(scene.randomizations[0].distribution.b, 800);
   for (const char* wrong : {"<body name=\"bx\" field=\"density\" uniform=\"4 8\"/>",
                             "<body name=\"box\" field=\"densty\" uniform=\"4 8\"/>",

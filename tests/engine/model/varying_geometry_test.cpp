@@ -32,15 +32,20 @@ LinkDescription& link_of(Scene& scene, const std::string& name) {
   throw std::runtime_error("no link " + name);
 }
 
-RandomizationDescription varying(RandomTarget target, const std::string& name, int index,
-                                 double low, double high) {
+RandomizationDescription varying(const SceneNumber& number, double low, double high) {
   RandomizationDescription d;
-  d.target = target;
-  d.name = name;
-  d.index = index;
+  d.number = number;
   d.distribution.a = low;
   d.distribution.b = high;
   return d;
+}
+
+SceneNumber size(const std::string& body, int which) { return size_of_body(body, which); }
+SceneNumber place(const std::string& joint, int axis) {
+  return {NumberOwner::joint, NumberField::pos, joint, axis};
+}
+SceneNumber density(const std::string& body) {
+  return {NumberOwner::body, NumberField::density, body};
 }
 
 /// A pad driven onto a shape on springs, whose joint stands on an arm that turns: numbers of the
@@ -81,12 +86,7 @@ Scene written(const Scene& scene, const Batch& batch, int environment) {
   own.randomizations.clear();
   for (std::size_t k = 0; k < scene.randomizations.size(); ++k) {
     const RandomizationDescription& d = scene.randomizations[k];
-    const double value = batch.randomized_value(environment, static_cast<int>(k));
-    LinkDescription& l = link_of(own, d.name);
-    if (d.target == RandomTarget::size) *size_number(l.body.shape, d.index) = value;
-    if (d.target == RandomTarget::place) l.joint.pose.position[std::size_t(d.index)] = value;
-    if (d.target == RandomTarget::density) l.body.density = value;
-    if (d.target == RandomTarget::joint_effect) l.joint.damping = value;
+    number_in(own, d.number) = batch.randomized_value(environment, static_cast<int>(k));
   }
   return own;
 }
@@ -158,39 +158,35 @@ struct Case {
 };
 
 std::vector<Case> cases() {
-  using enum RandomTarget;
   Scene cap = scene_named("cap_opening");
-  cap.randomizations = {
-      varying(size, "cap", 0, 0.03, 0.045),       varying(place, "cap", 0, -0.004, 0.004),
-      varying(place, "cap", 1, -0.004, 0.004),    varying(density, "cap", 0, 300, 900),
-      varying(joint_effect, "cap", 0, 0.01, 0.7), varying(size, "cap", 1, 0.02, 0.03)};
+  cap.randomizations = {varying(size("cap", 0), 0.03, 0.045),
+                        varying(place("cap", 0), -0.004, 0.004),
+                        varying(place("cap", 1), -0.004, 0.004),
+                        varying(density("cap"), 300, 900),
+                        varying({NumberOwner::joint, NumberField::damping, "cap"}, 0.01, 0.7),
+                        varying(size("cap", 1), 0.02, 0.03)};
   Scene ball = scene_named("rolling_ball_small");
-  ball.randomizations = {varying(size, "ball", 0, 0.018, 0.0205)};
-  const auto anvil = [](RandomizationDescription d) {
-    d.name = d.target == place ? "anvil_joint" : "anvil";
-    return d;
-  };
+  ball.randomizations = {varying(size("ball", 0), 0.018, 0.0205)};
   const auto on = [&](const Shape& shape, std::vector<RandomizationDescription> numbers) {
-    numbers.push_back(varying(place, "", 0, -0.051, -0.05));
-    numbers.push_back(varying(place, "", 2, 0.01, 0.014));
-    numbers.push_back(varying(density, "", 0, 500, 900));
-    for (RandomizationDescription& d : numbers) d = anvil(d);
+    numbers.push_back(varying(place("anvil_joint", 0), -0.051, -0.05));
+    numbers.push_back(varying(place("anvil_joint", 2), 0.01, 0.014));
+    numbers.push_back(varying(density("anvil"), 500, 900));
     return pad_on(shape, numbers);
   };
   return {{"cap_opening", cap, 160},
           {"rolling_ball_small", ball, 160},
-          {"sphere", on(SphereShape{0.03}, {varying(size, "", 0, 0.028, 0.032)}), 60},
+          {"sphere", on(SphereShape{0.03}, {varying(size("", 0), 0.028, 0.032)}), 60},
           {"cuboid",
            on(CuboidShape{{0.06, 0.05, 0.06}, {}},
-              {varying(size, "", 2, 0.055, 0.06), varying(size, "", 4, 0.05, 0.06)}),
+              {varying(size("", 2), 0.055, 0.06), varying(size("", 4), 0.05, 0.06)}),
            60},
           {"cylinder",
            on(CylinderShape{0.06, 0.03, 8, 3},
-              {varying(size, "", 0, 0.028, 0.032), varying(size, "", 1, 0.05, 0.06)}),
+              {varying(size("", 0), 0.028, 0.032), varying(size("", 1), 0.05, 0.06)}),
            60},
           {"capsule",
            on(CapsuleShape{0.03, 0.03, 5, 4},
-              {varying(size, "", 0, 0.028, 0.032), varying(size, "", 1, 0.02, 0.03)}),
+              {varying(size("", 0), 0.028, 0.032), varying(size("", 1), 0.02, 0.03)}),
            60}};
 }
 
@@ -262,12 +258,7 @@ TEST(VaryingGeometry, AScenesOwnNumbersAsWhatVariesChangeNothing) {
   for (Case c : cases()) {
     SCOPED_TRACE(c.name);
     for (RandomizationDescription& d : c.scene.randomizations) {
-      LinkDescription& l = link_of(c.scene, d.name);
-      double value = l.joint.damping;
-      if (d.target == RandomTarget::size) value = *size_number(l.body.shape, d.index);
-      if (d.target == RandomTarget::place) value = l.joint.pose.position[std::size_t(d.index)];
-      if (d.target == RandomTarget::density) value = l.body.density;
-      d.distribution.a = d.distribution.b = value;
+      d.distribution.a = d.distribution.b = number_in(c.scene, d.number);
     }
     Scene plain = c.scene;
     plain.randomizations.clear();
@@ -288,13 +279,11 @@ TEST(VaryingGeometry, IsReadFromAScene) {
   };
   const RandomizationDescription edge =
       with("<body name=\"box\" size=\"2\" uniform=\"0.04 0.05\"/>");
-  EXPECT_EQ(edge.target, RandomTarget::size);
-  EXPECT_EQ(edge.index, 4);
+  EXPECT_EQ(name_of(edge.number), "body box size[2]");
   EXPECT_EQ(edge.distribution.b, 0.05);
   const RandomizationDescription y =
       with("<joint name=\"box_slide\" pos=\"1\" normal=\"-0.1 0.2\"/>");
-  EXPECT_EQ(y.target, RandomTarget::place);
-  EXPECT_EQ(y.index, 1);
+  EXPECT_EQ(name_of(y.number), "joint box_slide pos[1]");
   EXPECT_EQ(y.distribution.a, -0.1);
   const auto error = [&](const std::string& line) {
     try {
@@ -305,14 +294,14 @@ TEST(VaryingGeometry, IsReadFromAScene) {
     return std::string("accepted");
   };
   EXPECT_THAT(error("<body name=\"box\" field=\"radius\" uniform=\"1 2\"/>"),
-              HasSubstr("'box' is a cuboid, which has no radius"));
+              HasSubstr("there is no 'body box radius': body 'box' is a cuboid"));
   EXPECT_THAT(error("<body name=\"box\" field=\"raduis\" uniform=\"1 2\"/>"),
               HasSubstr("did you mean 'radius'"));
   EXPECT_THAT(error("<body name=\"box\" size=\"3\" uniform=\"1 2\"/>"), HasSubstr("size=\"3\""));
   EXPECT_THAT(error("<body name=\"box\" size=\"0\" uniform=\"0 2\"/>"),
-              HasSubstr("size[0] can be 0, in SI units; expected positive values only"));
+              HasSubstr("'body box size[0]' can be 0, in SI units; expected positive values only"));
   EXPECT_THAT(error("<body name=\"box\" size=\"0\" normal=\"1 2\"/>"),
-              HasSubstr("normal can draw a negative size[0]"));
+              HasSubstr("normal can draw a negative 'body box size[0]'"));
   EXPECT_THAT(error("<body name=\"box\" size=\"0\" field=\"density\" uniform=\"1 2\"/>"),
               HasSubstr("exactly one of field and size"));
   EXPECT_THAT(error("<joint name=\"box_slide\" pos=\"3\" uniform=\"1 2\"/>"),
@@ -332,25 +321,24 @@ std::string refusal(Scene scene, const RandomizationDescription& d) {
 }
 
 TEST(VaryingGeometry, WhatCannotVaryIsAnError) {
-  using enum RandomTarget;
   const Scene cap = scene_named("cap_opening"), box = scene_named("box_pushing");
-  EXPECT_THAT(refusal(box, varying(size, "box", 2, 0.1, 0.2)),
+  EXPECT_THAT(refusal(box, varying(size("box", 2), 0.1, 0.2)),
               HasSubstr("the points that touch the ground do not"));
-  EXPECT_THAT(refusal(cap, varying(size, "tip_1", 0, 0.1, 0.2)),
-              HasSubstr("radius of body 'tip_1' varies, but a"));
-  EXPECT_THAT(refusal(cap, varying(size, "cap", 3, 0.1, 0.2)),
-              HasSubstr("size[1] of body 'cap' varies, but a cylinder has none"));
-  EXPECT_THAT(refusal(cap, varying(size, "cap", 0, 0, 0.2)),
+  EXPECT_THAT(refusal(cap, varying(size("tip_1", 0), 0.1, 0.2)),
+              HasSubstr("'body tip_1 radius' varies, but a"));
+  EXPECT_THAT(refusal(cap, varying(size("cap", 3), 0.1, 0.2)),
+              HasSubstr("'body cap size[1]' varies, but a cylinder has none"));
+  EXPECT_THAT(refusal(cap, varying(size("cap", 0), 0, 0.2)),
               HasSubstr("not all that may be drawn is positive"));
-  EXPECT_THAT(refusal(pad_on(SphereShape{0.03}, {}), varying(size, "pad", 2, 0.1, 0.2)),
+  EXPECT_THAT(refusal(pad_on(SphereShape{0.03}, {}), varying(size("pad", 2), 0.1, 0.2)),
               HasSubstr("its contact points do not"));
-  EXPECT_THAT(refusal(cap, varying(place, "bottle", 0, 0, 0.2)),
-              HasSubstr("pos of joint 'bottle' varies, but the joint is fixed"));
-  EXPECT_THAT(refusal(cap, varying(place, "cap", 3, 0, 0.2)), HasSubstr("index 3"));
-  EXPECT_THAT(refusal(cap, varying(size, "cop", 0, 0.1, 0.2)), HasSubstr("no body is named 'cop'"));
+  EXPECT_THAT(refusal(cap, varying(place("bottle", 0), 0, 0.2)),
+              HasSubstr("'joint bottle pos[0]' varies, but the joint is fixed"));
+  EXPECT_THAT(refusal(cap, varying(place("cap", 3), 0, 0.2)), HasSubstr("index 3"));
+  EXPECT_THAT(refusal(cap, varying(size("cop", 0), 0.1, 0.2)), HasSubstr("no body is named 'cop'"));
   Scene felt = pad_on(SphereShape{0.03}, {});
   felt.pair_contacts.clear();
-  EXPECT_THAT(refusal(felt, varying(size, "pad", 2, 0.1, 0.2)), HasSubstr("tactile sensor 'pad'"));
+  EXPECT_THAT(refusal(felt, varying(size("pad", 2), 0.1, 0.2)), HasSubstr("tactile sensor 'pad'"));
 }
 
 }  // namespace

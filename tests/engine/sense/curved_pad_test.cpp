@@ -80,7 +80,7 @@ Touch<double> random_touch(Random& random, const TouchShape& s) {
   t.Q = random.rotation();
   t.omega = random.vector(2);
   t.v = random.vector(0.1);
-  t.kn = 30, t.kt = 0.5, t.mu = 0.8, t.damping = 4;
+  t.law = {30, 0.5, 0.8, 4};
   for (double height = 0.04;; height -= 1e-3) {
     t.c = {random.uniform(-0.01, 0.01), random.uniform(-0.01, 0.01), -0.005 - height};
     double least = 1;
@@ -96,10 +96,10 @@ Touch<double> random_touch(Random& random, const TouchShape& s) {
 
 Vec3<double> reference(const TouchShape& s, const Touch<double>& t, ContactLaw law,
                        const TactilePoint& p) {
-  const kernels::LawParameters<double> own = {t.kn * p.factors[0],
-                                              t.kt * p.factors[1],
-                                              t.mu * p.factors[2],
-                                              t.damping * p.factors[3],
+  const kernels::LawParameters<double> own = {t.law.kn * p.factors[0],
+                                              t.law.kt * p.factors[1],
+                                              t.law.mu * p.factors[2],
+                                              t.law.damping * p.factors[3],
                                               law,
                                               0};
   const Vec3<double> f = kernels::with_distance<double>(

@@ -93,7 +93,7 @@ Touch<double> random_pose(Random& random) {
   t.c = {random.uniform(-0.02, 0.02), random.uniform(-0.02, 0.02), random.uniform(-0.012, 0.012)};
   t.omega = random.vector(2);
   t.v = random.vector(0.1);
-  t.kn = 30, t.kt = 0.5, t.mu = 0.8, t.damping = 4;
+  t.law = {30, 0.5, 0.8, 4};
   return t;
 }
 
@@ -114,7 +114,7 @@ Touch<double> random_touch(Random& random, const TouchShape& s) {
 
 Vec3<double> reference(const TouchShape& s, const Touch<double>& t, ContactLaw law,
                        const Vec3<double>& xi) {
-  const kernels::LawParameters<double> p = {t.kn, t.kt, t.mu, t.damping, law, 0};
+  const kernels::LawParameters<double> p = {t.law, law, 0};
   const auto at = kernels::with_distance<double>(s.shape, size_of(s), [&](const auto& shape) {
     return point_contact(shape, p, t.Q, t.c, t.omega, t.v, xi);
   });

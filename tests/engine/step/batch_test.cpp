@@ -21,13 +21,12 @@ Scene varied() {
   Scene s = testing::rolling_ball(false, 24);
   Distribution d;
   d.a = -3e-3, d.b = 3e-3;
-  s.randomizations.push_back({RandomTarget::joint_q, "ball_joint", "", 0, ContactField::kn, d, {}});
-  s.randomizations.push_back({RandomTarget::joint_q, "ball_joint", "", 1, ContactField::kn, d, {}});
+  s.randomizations.push_back({{NumberOwner::joint, NumberField::q, "ball_joint", 0}, d, {}});
+  s.randomizations.push_back({{NumberOwner::joint, NumberField::q, "ball_joint", 1}, d, {}});
   d.a = 4, d.b = 6;
-  s.randomizations.push_back(
-      {RandomTarget::pair_contact, "pad", "ball", 0, ContactField::kn, d, {}});
+  s.randomizations.push_back({{NumberOwner::contact, NumberField::kn, "pad", 0, "ball"}, d, {}});
   d.a = 0.008, d.b = 0.012;
-  s.randomizations.push_back({RandomTarget::tactile, "pad", "", 0, ContactField::kt, d, {}});
+  s.randomizations.push_back({{NumberOwner::tactile, NumberField::kt, "pad"}, d, {}});
   return s;
 }
 

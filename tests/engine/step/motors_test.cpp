@@ -171,21 +171,17 @@ TEST(VariedJoints, ADrawnNumberActsLikeAConstantOne) {
     l.body.pose.position = {0.1, 0, 0}, l.joint.limits = {-0.1, 0.05};
   s.motors = {position_motor("arm_joint", 1, 0.1), position_motor("ball_joint", 1, 0.1, 0.5)};
   for (MotorTiming timing : {MotorTiming::end, MotorTiming::start})
-    for (JointField field : {JointField::damping, JointField::armature, JointField::stiffness,
-                             JointField::lim_stiffness, JointField::P, JointField::D}) {
+    for (NumberField field : {NumberField::damping, NumberField::armature, NumberField::stiffness,
+                              NumberField::lim_stiffness, NumberField::P, NumberField::D}) {
       Scene varied = s;
       for (MotorDescription& motor : varied.motors) motor.timing = timing;
       const Scene fixed = varied;
-      const bool motor = field >= JointField::P;
+      const NumberOwner owner = field == NumberField::P || field == NumberField::D
+                                    ? NumberOwner::motor
+                                    : NumberOwner::joint;
       for (const LinkDescription& l : s.links) {
-        RandomizationDescription d{motor ? RandomTarget::motor : RandomTarget::joint_effect,
-                                   l.joint.name,
-                                   "",
-                                   0,
-                                   {},
-                                   {},
-                                   {},
-                                   field};
+        RandomizationDescription d;
+        d.number = {owner, field, l.joint.name};
         d.distribution.a = 0.01, d.distribution.b = 0.4;
         varied.randomizations.push_back(d);
       }
@@ -197,35 +193,32 @@ TEST(VariedJoints, ADrawnNumberActsLikeAConstantOne) {
         for (std::size_t k = 0; k < 2; ++k) {
           const double x = batch.randomized_value(e, static_cast<int>(k));
           ASSERT_GT(x, 0.01);
-          JointDescription& joint = own.links[k].joint;
-          double* const numbers[] = {&joint.damping,         &joint.armature,  &joint.stiffness,
-                                     &joint.limit_stiffness, &own.motors[k].P, &own.motors[k].D};
-          *numbers[static_cast<int>(field)] = x;
+          number_in(own, {owner, field, own.links[k].joint.name}) = x;
         }
         const Model constant(own);
         Batch alone(constant, 1);
         run(constant, alone, Integrator::bdf2, 2e-3, 50, {0.3, 0.1, 0.2, 0.3});
-        EXPECT_EQ(q_of(batch, e), q_of(alone)) << to_string(field);
-        EXPECT_EQ(v_of(batch, e), v_of(alone)) << to_string(field);
+        EXPECT_EQ(q_of(batch, e), q_of(alone)) << number_kind(owner, field).name;
+        EXPECT_EQ(v_of(batch, e), v_of(alone)) << number_kind(owner, field).name;
       }
-      EXPECT_NE(q_of(batch, 0), q_of(batch, 4)) << to_string(field);
+      EXPECT_NE(q_of(batch, 0), q_of(batch, 4)) << number_kind(owner, field).name;
     }
 }
 
 TEST(VariedJoints, WhatIsNotThereCannotVary) {
-  const auto fails = [](RandomTarget target, JointField field, JointType type) {
+  const auto fails = [](NumberOwner owner, NumberField field, JointType type) {
     Scene s = lift({"car_joint", -1, 1, {}});
     s.links.push_back(link("other", type, {1, 0, 0}, kBox, 500));
-    RandomizationDescription d{
-        target, type == JointType::fixed ? "other_joint" : "car_joint", "", 0, {}, {}, {}, field};
+    RandomizationDescription d;
+    d.number = {owner, field, type == JointType::fixed ? "other_joint" : "car_joint"};
     s.randomizations = {d};
-    EXPECT_THROW(Model{s}, InputError) << to_string(field);
+    EXPECT_THROW(Model{s}, InputError) << static_cast<int>(field);
   };
-  fails(RandomTarget::motor, JointField::P, JointType::free);  // a force motor
-  fails(RandomTarget::motor, JointField::damping, JointType::free);
-  fails(RandomTarget::joint_effect, JointField::P, JointType::free);
-  fails(RandomTarget::joint_effect, JointField::lim_stiffness, JointType::free);  // no limits
-  fails(RandomTarget::joint_effect, JointField::damping, JointType::fixed);
+  fails(NumberOwner::motor, NumberField::P, JointType::free);  // a force motor
+  fails(NumberOwner::motor, NumberField::damping, JointType::free);
+  fails(NumberOwner::joint, NumberField::P, JointType::free);
+  fails(NumberOwner::joint, NumberField::lim_stiffness, JointType::free);  // no limits
+  fails(NumberOwner::joint, NumberField::damping, JointType::fixed);
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ TEST(SceneReader, ExtensionsComeThrough) {
   EXPECT_EQ(control.times[1], 0.5);
   EXPECT_EQ(control.values[1][0], 0.1);
   ASSERT_EQ(s.randomizations.size(), 2U);
-  EXPECT_EQ(s.randomizations[0].target, RandomTarget::joint_q);
+  EXPECT_EQ(s.randomizations[0].number.field, NumberField::q);
   EXPECT_EQ(s.randomizations[1].distribution.kind, Distribution::Kind::log_uniform);
   EXPECT_EQ(s.text, kScene);
 }

@@ -8,7 +8,7 @@
 #include <map>
 #include <string>
 
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "engine/step/control.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tasks/gradients/gradient_check.hpp"
@@ -156,7 +156,7 @@ LossGradient gradient(const Model& model, std::int64_t steps, double tolerance,
 
 /// |a - b| / |b| over controls, start and numbers (by their relative change).
 double distance(const Model& model, const LossGradient& a, const LossGradient& b) {
-  const Parameters parameters(model);
+  const NumberGradients parameters(model);
   double worst = 0;
   const auto part = [&](const std::vector<double>& x, const std::vector<double>& y,
                         const auto& scale) {

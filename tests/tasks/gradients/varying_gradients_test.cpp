@@ -6,7 +6,7 @@
 #include <optional>
 #include <tuple>
 
-#include "engine/derivative/parameters.hpp"
+#include "engine/derivative/number_gradients.hpp"
 #include "engine/step/control.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tasks/gradients/gradient_check.hpp"
@@ -79,13 +79,7 @@ Scene written(Scene scene, const Batch& batch, int environment, std::size_t coun
     scene.randomizations.pop_back();
     const double value =
         batch.randomized_value(environment, static_cast<int>(scene.randomizations.size()));
-    for (LinkDescription& link : scene.links) {
-      if (d.target == RandomTarget::place && link.joint.name == d.name)
-        link.joint.pose.position[std::size_t(d.index)] = value;
-      if (d.target == RandomTarget::size && link.body.name == d.name)
-        *size_number(link.body.shape, d.index) = value;
-      if (d.target == RandomTarget::density && link.body.name == d.name) link.body.density = value;
-    }
+    number_in(scene, d.number) = value;
   }
   return scene;
 }
@@ -128,7 +122,7 @@ TEST(VaryingGradients, OfABatchAreThoseOfScenesOfTheirOwn) {
       EXPECT_EQ(part(all.v, e, nv), own.v) << e;
       EXPECT_EQ(part(all.points, e, own.points.size()), own.points) << e;
       ASSERT_EQ(all.parameters.size(), 9 * own.parameters.size());
-      const Parameters numbers(alone);
+      const NumberGradients numbers(alone);
       for (std::size_t k = 0; k < own.parameters.size(); ++k)
         EXPECT_NEAR(all.parameters[e * own.parameters.size() + k], own.parameters[k],
                     1e-13 * std::abs(own.parameters[k]))

@@ -34,9 +34,7 @@ Model with_failing_spinner() {
   scene.motors.push_back(motor);
   scene.control = ConstantControl{{0, 0, 0.2, 0, 0, 0, 1, 0, 0}};
   RandomizationDescription spin;
-  spin.target = RandomTarget::joint_v;
-  spin.name = "spinner_joint";
-  spin.index = 3;
+  spin.number = {NumberOwner::joint, NumberField::v, "spinner_joint", 3};
   spin.distribution.kind = Distribution::Kind::list;
   spin.distribution.values = {-600, -600, -600, 300};
   scene.randomizations.push_back(spin);

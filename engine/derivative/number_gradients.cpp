@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which numbers there are, and how each enters what the kernels differentiate by.
+#include "engine/derivative/number_gradients.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "engine/model/compiled_model.hpp"
+#include "engine/model/shapes.hpp"
+#include "kernels/table/kernel_table.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+using Field = NumberField;
+using Owner = NumberOwner;
+
+int parameter_rows(const Model& model) {
+  const CompiledModel& m = compiled(model);
+  return kernels::parameter_numbers(m.view) + kCoefficients * static_cast<int>(m.sensors.size());
+}
+
+NumberGradients::NumberGradients(const Model& model) : model_(model) {
+  add_contacts();
+  add_bodies();
+  add_joints();
+  add_motors();
+}
+
+void NumberGradients::add(const SceneNumber& number, Terms terms, int body) {
+  const Scene& scene = model_.scene();
+  infos_.push_back({number, name_of(number), unit_of(scene, number), number_in(scene, number)});
+  entries_.push_back({std::move(terms), body});
+}
+
+void NumberGradients::add_coefficients(SceneNumber of, int row) {
+  for (int k = 0; k < kCoefficients; ++k) {
+    of.field = coefficient_field(k);
+    add(of, {{row + k, 1}});
+  }
+}
+
+void NumberGradients::add_contacts() {
+  const CompiledModel& m = compiled(model_);
+  int row = 0;
+  for (const PairContactDescription& c : m.scene.pair_contacts) {
+    add_coefficients({Owner::contact, Field::kn, c.general_body, 0, c.primitive_body}, row);
+    row += kCoefficients;
+  }
+  for (const GroundContactDescription& c : m.scene.ground_contacts) {
+    add_coefficients({Owner::ground, Field::kn, c.body}, row);
+    row += kCoefficients;
+  }
+  row = kernels::parameter_numbers(m.view);
+  for (const TactileDescription& t : m.scene.sensors) {
+    add_coefficients({Owner::tactile, Field::kn, t.name}, row);
+    row += kCoefficients;
+  }
+}
+
+namespace {
+
+/// Whether anything in the scene looks at a body's size.
+bool size_matters(const CompiledModel& m, int body) {
+  const CompiledBody& b = m.bodies[std::size_t(body)];
+  const auto touches = [body](const kernels::PairContact& p) {
+    return p.body1 == body || p.body2 == body;
+  };
+  const auto feels = [body](const CompiledSensor& s) {
+    return std::find(s.targets.begin(), s.targets.end(), body) != s.targets.end();
+  };
+  return (b.link >= 0 && b.mass > 0) || std::any_of(m.pairs.begin(), m.pairs.end(), touches) ||
+         std::any_of(m.grounds.begin(), m.grounds.end(),
+                     [body](const auto& g) { return g.body == body; }) ||
+         std::any_of(m.sensors.begin(), m.sensors.end(), feels);
+}
+
+bool varies(const Scene& scene, const std::string& body) {
+  return std::any_of(scene.randomizations.begin(), scene.randomizations.end(),
+                     [&](const RandomizationDescription& r) {
+                       return r.number.owner == Owner::body && r.number.name == body;
+                     });
+}
+
+}  // namespace
+
+/// Density, or the mass of an abstract body, and every number of a size.
+void NumberGradients::add_bodies() {
+  const CompiledModel& m = compiled(model_);
+  for (int b = 0; b < static_cast<int>(m.bodies.size()); ++b) {
+    const BodyDescription& d = m.scene.links[std::size_t(b)].body;
+    const bool massive = m.bodies[std::size_t(b)].link >= 0 && m.bodies[std::size_t(b)].mass > 0,
+               own = varies(m.scene, d.name);
+    const auto add_with_masses = [&](const SceneNumber& number, Terms terms) {
+      if (massive && !own) {
+        const Masses masses = masses_by(number, b, d.shape, d.density);
+        for (std::size_t k = 0; k < masses.size(); ++k)
+          terms.push_back({mass_row(b) + static_cast<int>(k), masses[k]});
+      }
+      add(number, std::move(terms), massive && own ? b : -1);
+    };
+    const bool given =
+        std::holds_alternative<AbstractShape>(d.shape);  // its inertia stays as given
+    if (massive) add_with_masses({Owner::body, given ? Field::mass : Field::density, d.name}, {});
+    for (int which = 0; which < kSizeIndices && size_matters(m, b); ++which) {
+      const SizeNumber* const size = row_of(d.shape).size(which);
+      if (size == nullptr) continue;
+      const Term of_contacts = {
+          kernels::first_size_number(m.view) + kernels::kSizeNumbers * b + size->component,
+          size->scale};
+      add_with_masses(size_of_body(d.name, which), {of_contacts});
+    }
+  }
+}
+
+int NumberGradients::mass_row(int body) const {
+  const CompiledModel& m = compiled(model_);
+  return kernels::first_inertia_number(m.view) +
+         kernels::kInertiaNumbers * m.bodies[std::size_t(body)].link;
+}
+
+NumberGradients::Masses NumberGradients::masses_by(const SceneNumber& number, int body,
+                                                   const Shape& shape, double density) const {
+  const CompiledBody& at = compiled(model_).bodies[std::size_t(body)];
+  if (number.field == Field::mass)
+    return inertia_rows(at, {1, at.centre, kernels::zero33<double>()});
+  return inertia_rows(at, number.field == Field::density
+                              ? mass_properties(shape, 1)
+                              : mass_properties_by_size(shape, density, size_index(number)));
+}
+
+NumberGradients::Masses NumberGradients::masses_by(std::size_t k, const Batch& batch,
+                                                   int environment) const {
+  const Scene& scene = model_.scene();
+  const int body = entries_[k].body;
+  const BodyDescription& d = scene.links[std::size_t(body)].body;
+  std::optional<Shape> sized;  // a mesh, whose size cannot vary, is not copied
+  double density = d.density;
+  for (std::size_t r = 0; r < scene.randomizations.size(); ++r) {  // the last one holds
+    const SceneNumber& varied = scene.randomizations[r].number;
+    if (varied.owner != Owner::body || varied.name != d.name) continue;
+    const double value = batch.randomized_value(environment, static_cast<int>(r));
+    if (varied.field == Field::density) {
+      density = value;
+      continue;
+    }
+    if (!sized) sized = d.shape;
+    *size_number(*sized, size_index(varied)) = value;
+  }
+  return masses_by(infos_[k].number, body, sized ? *sized : d.shape, density);
+}
+
+NumberGradients::Terms NumberGradients::of_dofs(std::size_t joint, int which, int first,
+                                                int end) const {
+  const CompiledModel& m = compiled(model_);
+  Terms terms;
+  for (int k = first; k < end; ++k)
+    terms.push_back(
+        {kernels::first_dof_number(m.view) + kernels::kDofNumbers * (m.joints[joint].v + k) + which,
+         1});
+  return terms;
+}
+
+/// Dofs have damping, stiffness, P, D (kernels/step/arguments.hpp).
+void NumberGradients::add_joints() {
+  for (std::size_t i = 0; i < model_.scene().links.size(); ++i) {
+    const JointDescription& d = model_.scene().links[i].joint;
+    const int n = dof_count(d.type),
+              slides = d.turning ? n - (d.type == JointType::free ? 3 : 1) : n;
+    if (n == 0) continue;
+    add({Owner::joint, Field::damping, d.name}, of_dofs(i, 0, 0, slides));
+    if (d.stiffness > 0) add({Owner::joint, Field::stiffness, d.name}, of_dofs(i, 1, 0, slides));
+    if (!d.turning) continue;
+    add({Owner::joint, Field::turning_damping, d.name}, of_dofs(i, 0, slides, n));
+    if (d.turning->stiffness > 0)
+      add({Owner::joint, Field::turning_stiffness, d.name}, of_dofs(i, 1, slides, n));
+  }
+}
+
+void NumberGradients::add_motors() {
+  const Scene& scene = model_.scene();
+  for (const MotorDescription& d : scene.motors) {
+    if (d.control != MotorControl::position) continue;
+    std::size_t joint = 0;
+    while (scene.links[joint].joint.name != d.joint) ++joint;
+    const int n = dof_count(scene.links[joint].joint.type);
+    add({Owner::motor, Field::P, d.joint}, of_dofs(joint, 2, 0, n));
+    add({Owner::motor, Field::D, d.joint}, of_dofs(joint, 3, 0, n));
+  }
+}
+
+void NumberGradients::gradient(const BlockCotangent& cotangent, const Batch& batch, int environment,
+                               std::span<double> out) const {
+  const auto row = [&](int r) {
+    return cotangent.parameters[std::size_t(r * kBlock + environment % kBlock)];
+  };
+  for (std::size_t k = 0; k < entries_.size(); ++k) {
+    double sum = 0;
+    for (const Term& t : entries_[k].terms) sum += t.coefficient * row(t.row);
+    if (entries_[k].body >= 0) {
+      const Masses masses = masses_by(k, batch, environment);
+      for (std::size_t i = 0; i < masses.size(); ++i)
+        sum += masses[i] * row(mass_row(entries_[k].body) + static_cast<int>(i));
+    }
+    out[k] = sum;
+  }
+}
+
+void NumberGradients::spread(std::span<const double> change, const Batch& batch, int environment,
+                             std::span<double> rows) const {
+  std::fill(rows.begin(), rows.end(), 0.0);
+  for (std::size_t k = 0; k < entries_.size(); ++k) {
+    for (const Term& t : entries_[k].terms) rows[std::size_t(t.row)] += t.coefficient * change[k];
+    if (entries_[k].body < 0) continue;
+    const Masses masses = masses_by(k, batch, environment);
+    for (std::size_t i = 0; i < masses.size(); ++i)
+      rows[std::size_t(mass_row(entries_[k].body)) + i] += masses[i] * change[k];
+  }
+}
+
+}  // namespace tangere

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// The numbers of a scene that gradients are taken by, and how each enters the rows of derivatives
+// that the kernels give.
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/derivative/adjoint.hpp"
+
+namespace tangere {
+
+struct NumberInfo {
+  SceneNumber number;
+  std::string name, unit;  ///< name_of(), unit_of()
+  double value;            ///< in the scene; environments may differ where <randomize> says so
+};
+
+/// Coefficients of contacts and sensors, densities (or masses) and sizes of bodies, damping and
+/// stiffness of joints, gains of position motors, once each: a number that a scene gives for a
+/// whole joint has one derivative. Their order is that of every gradient by them.
+class NumberGradients {
+ public:
+  explicit NumberGradients(const Model& model);
+
+  [[nodiscard]] std::span<const NumberInfo> infos() const { return infos_; }
+  [[nodiscard]] int count() const { return static_cast<int>(infos_.size()); }
+  /// Derivatives of a loss by all of them, (count), for an environment of the batch that an Adjoint
+  /// made with parameters has reversed.
+  void gradient(const BlockCotangent& cotangent, const Batch& batch, int environment,
+                std::span<double> out) const;
+  /// The other way: how the rows of BlockCotangent::parameters change when these numbers of an
+  /// environment, (count), do.
+  void spread(std::span<const double> change, const Batch& batch, int environment,
+              std::span<double> rows) const;
+
+ private:
+  struct Term {
+    int row;  ///< of BlockCotangent::parameters
+    double coefficient;
+  };
+  using Terms = std::vector<Term>;
+  using Masses = std::array<double, 10>;  ///< rows of a link's mass, moment and inertia
+  struct Entry {
+    Terms terms;
+    int body = -1;  ///< whose masses follow as each environment has them, and not by terms
+  };
+  void add(const SceneNumber& number, Terms terms, int body = -1);
+  void add_coefficients(SceneNumber of, int row);
+  void add_contacts();
+  void add_bodies();
+  void add_joints();
+  void add_motors();
+  /// Of number `which` of every dof from `first` on of a joint.
+  [[nodiscard]] Terms of_dofs(std::size_t joint, int which, int first, int end) const;
+  /// How the masses of its link change with a number of a body that is so.
+  [[nodiscard]] Masses masses_by(const SceneNumber& number, int body, const Shape& shape,
+                                 double density) const;
+  /// The same in an environment of its own density and size.
+  [[nodiscard]] Masses masses_by(std::size_t k, const Batch& batch, int environment) const;
+  [[nodiscard]] int mass_row(int body) const;
+
+  Model model_;
+  std::vector<NumberInfo> infos_;
+  std::vector<Entry> entries_;  // parallel to infos_
+};
+
+/// Rows of BlockCotangent::parameters: those of the kernels, then the coefficients of every sensor.
+int parameter_rows(const Model& model);
+
+}  // namespace tangere

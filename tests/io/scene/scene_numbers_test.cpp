@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: Apache-2.0
+// One identity of every number: what <randomize> calls it, its name and unit, its place in the
+// scene, its row in a block and in a gradient, and what files say of it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "engine/derivative/number_gradients.hpp"
+#include "engine/model/compiled_model.hpp"
+#include "io/dataset/dataset_layout.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "io/trajectory/trajectory_layout.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+/// One name for all that can have one: a sensor, a joint, a motor and a body called "skin".
+std::string scene_with(const std::string& lines) {
+  return R"(<tangere model="numbers">
+<option unit="m-kg" gravity="0 0 -9.8" timestep="5e-3" integrator="BDF2"/>
+<ground pos="0 0 0" normal="0 0 1"/>
+<robot>
+<link name="skin">
+<joint name="skin" type="revolute" axis="0 0 1" damping="0.2" armature="0.1" stiffness="3" lim="-1 1" lim_stiffness="5"/>
+<body name="skin" type="cuboid" size="0.05 0.05 0.01" density="1000" general_contact_resolution="4 4 2"/>
+</link>
+<link name="slide">
+<joint name="slide" type="prismatic" axis="1 0 0" pos="0 0 0.1" damping="0.3" stiffness="4" lim="-1 1" lim_stiffness="6"/>
+<body name="can" type="cylinder" length="0.04" radius="0.02" density="400"/>
+</link>
+<link name="ball">
+<joint name="ball" type="free3d" pos="0 0 0.02"/>
+<body name="ball" type="sphere" radius="0.02" density="100"/>
+</link>
+<link name="puck">
+<joint name="puck" type="free2d" pos="0.3 0 0.2" damping="0.4" stiffness="0.5"/>
+<body name="puck" type="abstract" mass="0.2" inertia="1e-4 1e-4 1e-4"/>
+</link>
+<link name="brick">
+<joint name="brick" type="translational" pos="0.6 0 0.2"/>
+<body name="brick" type="cuboid" size="0.03 0.04 0.05" density="700"/>
+</link>
+</robot>
+<actuator><motor joint="skin" ctrl="position" P="7" D="0.8"/><motor joint="slide" ctrl="position" P="9" D="0.6"/></actuator>
+<contact>
+<ground_contact body="ball" kn="5e3" kt="1" mu="0.8" damping="0.03"/>
+<general_primitive_contact general_body="skin" primitive_body="ball" kn="5" kt="2" mu="0.7" damping="1"/>
+</contact>
+<sensor>
+<tactile name="skin" body="skin" type="rect_array" rect_pos0="-0.02 0.02 -0.005" rect_pos1="0.02 -0.02 -0.005" axis0="0 -1 0" axis1="1 0 0" resolution="5 7" kn="11" kt="0.01" mu="2" damping="0.003"/>
+</sensor>
+<randomize>
+)" + lines +
+         "\n</randomize>\n</tangere>\n";
+}
+
+/// A row of the table as a scene writes it; `xml` empty: <randomize> does not take it.
+struct Row {
+  const char* xml;
+  const char *name, *unit;
+  bool has_gradient;
+  double value;  ///< in the scene; NAN: the start is not given there
+};
+const Row kRows[] = {
+    {R"(general_primitive_contact general_body="skin" primitive_body="ball" field="kn")",
+     "contact skin ball kn", "N/m", true, 5},
+    {R"(general_primitive_contact general_body="skin" primitive_body="ball" field="kt")",
+     "contact skin ball kt", "N s/m", true, 2},
+    {R"(general_primitive_contact general_body="skin" primitive_body="ball" field="mu")",
+     "contact skin ball mu", "1", true, 0.7},
+    {R"(general_primitive_contact general_body="skin" primitive_body="ball" field="damping")",
+     "contact skin ball damping", "N s/m^2", true, 1},
+    {R"(ground_contact body="ball" field="kn")", "ground ball kn", "N/m", true, 5e3},
+    {R"(ground_contact body="ball" field="kt")", "ground ball kt", "N s/m", true, 1},
+    {R"(ground_contact body="ball" field="mu")", "ground ball mu", "1", true, 0.8},
+    {R"(ground_contact body="ball" field="damping")", "ground ball damping", "N s/m", true, 0.03},
+    {R"(tactile name="skin" field="kn")", "tactile skin kn", "N/m", true, 11},
+    {R"(tactile name="skin" field="kt")", "tactile skin kt", "N s/m", true, 0.01},
+    {R"(tactile name="skin" field="mu")", "tactile skin mu", "1", true, 2},
+    {R"(tactile name="skin" field="damping")", "tactile skin damping", "N s/m^2", true, 0.003},
+    {R"(body name="can" field="density")", "body can density", "kg/m^3", true, 400},
+    {"", "body puck mass", "kg", true, 0.2},
+    {R"(body name="can" field="radius")", "body can radius", "m", true, 0.02},
+    {R"(body name="can" field="length")", "body can length", "m", true, 0.04},
+    {R"(body name="brick" size="2")", "body brick size[2]", "m", true, 0.05},
+    {R"(joint name="skin" q="0")", "joint skin q[0]", "rad", false, NAN},
+    {R"(joint name="slide" q="0")", "joint slide q[0]", "m", false, NAN},
+    {R"(joint name="ball" q="3")", "joint ball q[3]", "1", false, NAN},
+    {R"(joint name="ball" v="2")", "joint ball v[2]", "m/s", false, NAN},
+    {R"(joint name="ball" v="3")", "joint ball v[3]", "rad/s", false, NAN},
+    {R"(joint name="slide" pos="2")", "joint slide pos[2]", "m", false, 0.1},
+    {R"(joint name="skin" field="damping")", "joint skin damping", "N m s/rad", true, 0.2},
+    {R"(joint name="slide" field="damping")", "joint slide damping", "N s/m", true, 0.3},
+    {R"(joint name="skin" field="armature")", "joint skin armature", "kg m^2", false, 0.1},
+    {R"(joint name="skin" field="stiffness")", "joint skin stiffness", "N m/rad", true, 3},
+    {R"(joint name="slide" field="lim_stiffness")", "joint slide lim_stiffness", "N/m", false, 6},
+    {"", "joint puck damping", "N s/m", true, 0.4},
+    {"", "joint puck turning damping", "N m s/rad", true, 0.4},
+    {"", "joint puck turning stiffness", "N m/rad", true, 0.5},
+    {R"(motor joint="skin" field="P")", "motor skin P", "N m/rad", true, 7},
+    {R"(motor joint="slide" field="D")", "motor slide D", "N s/m", true, 0.6},
+};
+
+Scene read(const std::string& lines) { return parse_scene(scene_with(lines), "s.xml").scene; }
+
+const NumberInfo* find(const NumberGradients& gradients, const std::string& name) {
+  for (const NumberInfo& info : gradients.infos())
+    if (info.name == name) return &info;
+  return nullptr;
+}
+
+/// Every row that <randomize> takes: from its element to the same address everywhere.
+TEST(SceneNumbers, HaveOneNameAndUnitFromTheSceneToTheFile) {
+  for (const Row& row : kRows) {
+    if (*row.xml == '\0') continue;
+    SCOPED_TRACE(row.xml);
+    const Scene scene = read("<" + std::string(row.xml) + " uniform=\"0.125 0.25\"/>");
+    ASSERT_THAT(scene.randomizations, SizeIs(1));
+    const SceneNumber& number = scene.randomizations[0].number;
+    EXPECT_EQ(name_of(number), row.name);
+    EXPECT_EQ(unit_of(scene, number), row.unit);
+    EXPECT_EQ(scene.randomizations[0].distribution.b, 0.25) << "SI as it stands";
+    EXPECT_EQ(randomization_of(scene, number), 0);
+    if (!std::isnan(row.value)) {
+      EXPECT_EQ(number_in(scene, number), row.value);
+      Scene other = scene;
+      number_in(other, number) = 99;
+      EXPECT_EQ(number_in(other, number), 99);
+    }
+    const Model model(scene);
+    Batch batch(model, 3, 7);
+    const int block_row = model.compiled().randomized_row[0];
+    EXPECT_EQ(batch.block(0)[block_row * kernels::kBlock + 1], batch.randomized_value(1, 0));
+    EXPECT_EQ(batch.is_parameter(0), !is_of_start(number));
+    if (batch.is_parameter(0)) {
+      batch.set_randomized_value(1, 0, 0.2);
+      EXPECT_EQ(batch.block(0)[block_row * kernels::kBlock + 1], 0.2);
+    }
+    const NumberGradients gradients(model);
+    const NumberInfo* const info = find(gradients, row.name);
+    ASSERT_EQ(info != nullptr, row.has_gradient);
+    if (info != nullptr) {
+      EXPECT_EQ(info->number, number);
+      EXPECT_EQ(info->unit, row.unit);
+      EXPECT_EQ(info->value, row.value);
+    }
+    const Stepper stepper(model);
+    RunDescription run;
+    run.tactile_intervals = {1};
+    const TrajectoryLayout trajectory = layout_from(batch, stepper, run);
+    const DatasetLayout dataset = dataset_layout_from(model, stepper, {});
+    const std::vector<std::string> name = {row.name}, unit = {row.unit};
+    EXPECT_EQ(trajectory.randomized_names, name);
+    EXPECT_EQ(trajectory.randomized_units, unit);
+    EXPECT_EQ(dataset.randomized_names, name);
+    EXPECT_EQ(dataset.randomized_units, unit);
+  }
+}
+
+/// Every row of the table has a case here, and what <randomize> leaves out has its gradient.
+TEST(SceneNumbers, NoKindIsForgotten) {
+  const Scene scene = read("");
+  const Model model(scene);
+  const NumberGradients gradients(model);
+  for (const Row& row : kRows) {
+    const NumberInfo* const info = find(gradients, row.name);
+    ASSERT_EQ(info != nullptr, row.has_gradient) << row.name;
+    if (info == nullptr) continue;
+    EXPECT_EQ(info->unit, row.unit) << row.name;
+    EXPECT_EQ(info->value, row.value) << row.name;
+    EXPECT_EQ(unit_of(scene, info->number), row.unit);
+  }
+  for (const NumberKind& kind : number_kinds()) {
+    const auto is_of = [&](const Row& row) {
+      const std::string name = row.name, field = std::string(" ") + kind.name;
+      const std::string owner = owner_of({kind.owner, kind.field, ""});
+      const std::string end = kind.indexed ? field + "[" : field;
+      const std::size_t at = name.rfind(end);
+      return name.starts_with(owner.substr(0, owner.find(' ') + 1)) && at != std::string::npos &&
+             (kind.indexed || at + end.size() == name.size());
+    };
+    EXPECT_TRUE(std::any_of(std::begin(kRows), std::end(kRows), is_of)) << kind.name;
+  }
+}
+
+/// A sensor, a joint, a motor and a body may be called alike; no two numbers are.
+TEST(SceneNumbers, NoTwoHaveOneName) {
+  std::string lines;
+  std::size_t count = 0;
+  for (const Row& row : kRows)
+    if (*row.xml != '\0') lines += "<" + std::string(row.xml) + " uniform=\"0.1 0.2\"/>\n", ++count;
+  const Scene scene = read(lines);
+  ASSERT_THAT(scene.randomizations, SizeIs(count));
+  std::vector<std::string> names;
+  for (const RandomizationDescription& d : scene.randomizations) names.push_back(name_of(d.number));
+  std::sort(names.begin(), names.end());
+  EXPECT_EQ(std::adjacent_find(names.begin(), names.end()), names.end());
+  EXPECT_TRUE(std::binary_search(names.begin(), names.end(), "tactile skin damping"));
+  EXPECT_TRUE(std::binary_search(names.begin(), names.end(), "joint skin damping"));
+  std::vector<std::string> of_gradients;
+  const Model model(read(""));
+  const NumberGradients gradients(model);
+  for (const NumberInfo& info : gradients.infos()) of_gradients.push_back(info.name);
+  std::sort(of_gradients.begin(), of_gradients.end());
+  EXPECT_EQ(std::adjacent_find(of_gradients.begin(), of_gradients.end()), of_gradients.end());
+}
+
+std::string refusal(const Scene& scene) {
+  try {
+    const Model model(scene);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(SceneNumbers, ContactsOfTheSameBodiesAreAnError) {
+  Scene pairs = read(""), grounds = pairs;
+  pairs.pair_contacts.push_back(pairs.pair_contacts[0]);
+  EXPECT_THAT(refusal(pairs), HasSubstr("contact name 'skin ball' is used twice"));
+  grounds.ground_contacts.push_back(grounds.ground_contacts[0]);
+  EXPECT_THAT(refusal(grounds), HasSubstr("ground contact name 'ball' is used twice"));
+}
+
+TEST(SceneNumbers, WhatIsNotThereIsAnError) {
+  Scene scene = read("");
+  const auto message = [&](const SceneNumber& number) {
+    try {
+      number_in(scene, number) = 1;
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("found");
+  };
+  using enum NumberOwner;
+  EXPECT_EQ(message({tactile, NumberField::kn, "skin"}), "found");
+  for (const SceneNumber& number :
+       std::vector<SceneNumber>{{tactile, NumberField::kn, "ball"},
+                                {contact, NumberField::kn, "ball", 0, "skin"},
+                                {body, NumberField::radius, "brick"},
+                                {body, NumberField::size, "brick", 3},
+                                {body, NumberField::mass, "brick"},
+                                {joint, NumberField::pos, "skin", 3},
+                                {joint, NumberField::q, "skin"},
+                                {joint, NumberField::turning_damping, "skin"},
+                                {motor, NumberField::P, "ball"}})
+    EXPECT_THAT(message(number), HasSubstr("the scene has no number '" + name_of(number) + "'"));
+  EXPECT_THAT(message({joint, NumberField::P, "skin"}), HasSubstr("a joint has no 'P'; a motor"));
+  EXPECT_THAT(refusal([&] {
+                Scene twice = scene;
+                RandomizationDescription d;
+                d.number = {motor, NumberField::damping, "skin"};
+                twice.randomizations = {d};
+                return twice;
+              }()),
+              HasSubstr("a motor has no 'damping'"));
+  const auto reading = [](const std::string& lines) {
+    try {
+      read(lines);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  const std::string line = R"(<tactile name="skin" field="mu" uniform="1 2"/>)";
+  EXPECT_THAT(reading(line + "\n" + line), HasSubstr("'tactile skin mu' already varies"));
+}
+
+}  // namespace
+}  // namespace tangere
