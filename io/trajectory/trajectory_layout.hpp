@@ -89,7 +89,7 @@ struct RunDescription {
 /// The layout of a rollout of `batch` by `stepper`.
 TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper, const RunDescription& run);
 
-/// How a randomised number is called in files: "slider.q[0]", "pad/ball.kn", "ground/ball.mu".
+/// The name of a randomised number in files: "slider.q[0]", "pad/ball.kn", "ground/ball.mu".
 std::string randomized_name(const RandomizationDescription& description);
 
 }  // namespace tangere
