@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `tangere bench` measured, as a table for people, an object for programs, a CSV table and a
-// picture.
+// Reports what `tangere bench` measured: a table for people, an object for programs, a CSV table
+// and a picture.
 #pragma once
 
 #include <string>
@@ -32,11 +32,11 @@ std::vector<Failure> failures_of(const BenchRun& run);
 /// Steps between fields when all sensors agree, else 0.
 int common_interval(const Model& model, const RolloutOptions& rollout);
 
-/// Lines above the table, and the two that head it.
+/// The lines above the table and the two lines of its head.
 std::string bench_heading(const BenchSetting& setting);
-/// One line of the table; `first`: the run that the speed-up refers to.
+/// One line of the table. The speed-up refers to the run `first`.
 std::string bench_row(const BenchRun& run, const BenchRun& first);
-/// The line below the table: what does not depend on threads.
+/// The line below the table, with what does not depend on threads.
 std::string bench_footing(const BenchRun& run);
 
 /// One entry of "runs".

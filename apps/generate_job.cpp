@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is known of a data set before its first step.
+// Works out what is known of a data set before its first step.
 #include "apps/generate_job.hpp"
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Takes episodes and forgets them.
+/// A sink that takes episodes and forgets them.
 class NoSink : public EpisodeSink {
  public:
   void write(const EpisodeRows&) override {}
@@ -30,7 +30,7 @@ struct Extent {
   std::int64_t episodes = 0, kept = 0;
 };
 
-/// What this process would make; nothing is opened or created.
+/// What this process would make. Opens and creates nothing.
 Extent extent_of(const GenerateOptions& options, const DatasetLayout& layout,
                  const DatasetOutput& output) {
   Extent extent;
@@ -50,8 +50,7 @@ Extent extent_of(const GenerateOptions& options, const DatasetLayout& layout,
   return extent;
 }
 
-/// Environment steps per second of a first block for each thread, over as many steps as take about
-/// a second.
+/// Environment steps per second. Simulates a first block for each thread, for about a second.
 double measured_rate(const Job& job) {
   EpisodeOptions some = job.run;
   some.ranges.clear();
@@ -67,7 +66,7 @@ double measured_rate(const Job& job) {
   }
 }
 
-/// Of the nearest folder that exists.
+/// Free bytes at the nearest folder that exists.
 double free_bytes_at(const std::string& path) {
   fs::path folder = fs::absolute(path);
   while (!fs::exists(folder) && folder.has_parent_path() && folder != folder.parent_path())
@@ -150,7 +149,7 @@ int dry_run(const GenerateOptions& options, const Console& console, const Job& j
   const double of_one = job.layout.episode_bytes(),
                bytes = of_one * static_cast<double>(extent.episodes);
   const double free = free_bytes_at(options.output), rate = measured_rate(job);
-  // Of a task: actions, if every episode lasts as long as it may.
+  // For a task these are actions, if every episode lasts as long as it can.
   const double steps = static_cast<double>(extent.episodes) *
                        static_cast<double>(job.layout.task ? job.layout.rows() : job.layout.steps);
   const double seconds = steps / rate;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Linux's own account: /proc/cpuinfo, and the processors this process is bound to.
+// Reads /proc/cpuinfo and the processors that this process is bound to.
 #include "apps/machine.hpp"
 
 #include <algorithm>

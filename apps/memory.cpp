@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Linux's own account: /proc/meminfo, and the files of control groups, version 2.
+// Reads /proc/meminfo and the files of control groups, version 2.
 #include "apps/memory.hpp"
 
 #include <fmt/format.h>

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// A clear refusal beats a visit of the kernel's out-of-memory killer in the middle of a run.
+// Refuses requests that need too much memory, before the kernel kills the program in the middle of
+// a run.
 #pragma once
 
 #include <string>
 
 namespace tangere::apps {
 
-/// Memory that this process may still take without pushing others out [bytes]: of the machine, or
-/// of the container (control group) where that is less. Infinite when the system does not say.
+/// Memory that this process can still take without pushing others out [bytes]. It is that of the
+/// machine or of the container (control group), whichever is less. Infinite when the system does
+/// not say.
 double available_memory();
 
 /// Throws InputError naming both numbers when a request needs more bytes than there are.

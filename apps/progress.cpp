@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Terminals understand carriage return and "erase to the end of the line"; nothing else is used.
+// Uses only carriage return and "erase to the end of the line", which every terminal understands.
 #include "apps/progress.hpp"
 
 #include <fmt/format.h>

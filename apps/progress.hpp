@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far a run is, for people who wait.
+// Shows how far a run is to people who wait.
 #pragma once
 
 #include <chrono>
@@ -10,11 +10,11 @@
 
 namespace tangere::apps {
 
-/// One line that rewrites itself, at most ten times a second, where stderr is a terminal; elsewhere
-/// nothing, or a line every ten seconds when verbose; never when quiet.
+/// On a terminal this is one line that rewrites itself at most ten times a second. Elsewhere it is
+/// nothing, or a line every ten seconds when verbose. When quiet it is nothing.
 class Progress {
  public:
-  /// `unit`: what is counted to `steps`, each of them a step of `environments`.
+  /// `unit` names what is counted up to `steps`. Each of them is a step of `environments`.
   Progress(const Console& console, std::string unit, std::int64_t steps, int environments);
   ~Progress();
   Progress(const Progress&) = delete;

@@ -7,8 +7,8 @@
 
 namespace tangere::apps {
 
-/// While one lives, SIGINT and SIGTERM are remembered instead of ending the program (unless the
-/// parent had them ignored), and a file-size limit is an error of the write instead of SIGXFSZ.
+/// While an object lives, SIGINT and SIGTERM are remembered instead of ending the program (unless
+/// the parent had them ignored), and a file-size limit is an error of the write instead of SIGXFSZ.
 class StopSignals {
  public:
   StopSignals();
@@ -16,7 +16,7 @@ class StopSignals {
   StopSignals(const StopSignals&) = delete;
   StopSignals& operator=(const StopSignals&) = delete;
 
-  /// The first of SIGINT, SIGTERM that came, 0 while none did.
+  /// The first SIGINT or SIGTERM that came; 0 if none came.
   [[nodiscard]] int received() const;
 
  private:

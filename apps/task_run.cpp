@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A task carries its scene with it: the program needs no folder of scenes to run one.
+// The program contains the scenes of tasks, so it needs no folder of scenes to run a task.
 #include "apps/task_run.hpp"
 
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every command that accepts a task does the same way: telling tasks from scene files, making
-// one, its policy, what to say of it.
+// What all commands that accept a task have in common: telling tasks from scene files, making the
+// task and its policy, and reporting on it.
 #pragma once
 
 #include <memory>
@@ -17,22 +17,22 @@ namespace tangere::apps {
 /// the nearest task, for a plain word that is neither.
 std::unique_ptr<Task> find_task(const std::string& word, const Console& console);
 
-/// `name`: as given, `fallback` where it is empty; a table makes it csv. Throws InputError for
-/// another name, and for csv without a table or a table with another policy.
+/// The policy called `name`, or `fallback` if that is empty. With a table it is csv. Throws
+/// InputError for another name, for csv without a table, and for a table with another policy.
 PolicyKind policy_named(const std::string& name, const std::string& table, PolicyKind fallback);
 Policy make_policy(const Task& task, PolicyKind kind, const std::string& table);
 
-/// Options that have no meaning with a task, and whether they were given. Throws InputError for one
-/// that was.
+/// Takes options that have no meaning with a task, and whether they were given. Throws InputError
+/// for an option that was given.
 struct GivenOption {
   const char* name;
   bool given;
 };
 void refuse_with_task(const Task& task, const std::vector<GivenOption>& options);
-/// The same for those that a scene alone does not have.
+/// The same for options that a scene alone does not have.
 void refuse_with_scene(const std::string& scene, const std::vector<GivenOption>& options);
 
-/// Text of a scene that comes with the program, null for others.
+/// The text of a scene that comes with the program, null for other names.
 const char* task_scene(const std::string& file);
 
 }  // namespace tangere::apps

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The variables are those of Open MPI, of MPICH and its relatives (PMI), and of Slurm. No library
-// of theirs is needed.
+// Reads the variables of Open MPI, of MPICH and its relatives (PMI), and of Slurm. Needs none of
+// their libraries.
 #include "apps/workers.hpp"
 
 #include <fmt/format.h>
@@ -20,9 +20,9 @@ struct Variables {
   const char* count;
 };
 
-// mpirun within a Slurm job: Slurm's own numbers then are those of the nodes' daemons, so they come
-// last. SLURM_STEP_NUM_TASKS, not SLURM_NTASKS: the latter also is in a batch script, whose plain
-// commands run once.
+// Slurm's own numbers come last, because for mpirun within a Slurm job they are those of the nodes'
+// daemons. SLURM_NTASKS will not do in place of SLURM_STEP_NUM_TASKS: it is also set in a batch
+// script, whose plain commands run once.
 constexpr Variables kProcess[] = {{"OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"},
                                   {"PMI_RANK", "PMI_SIZE"},
                                   {"SLURM_PROCID", "SLURM_STEP_NUM_TASKS"}};

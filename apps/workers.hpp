@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which share of a data set is this process's, when a scheduler started several. They share nothing
-// but a folder.
+// Which share of a data set this process makes when a scheduler started several. The processes
+// share nothing but a folder.
 #pragma once
 
 #include <cstdint>
@@ -14,12 +14,12 @@ struct Worker {
   std::string source;  ///< variables that said so, empty when none did
 };
 
-/// From the environment that mpirun, srun or a Slurm array gives a process; an array of tasks that
-/// start several processes each counts all of them. Alone when none is set. Throws InputError,
-/// naming the variable, for values that are no index below a count.
+/// Reads the environment that mpirun, srun or a Slurm array gives a process. If each task of an
+/// array starts several processes, all of them count. The process is alone when nothing is set.
+/// Throws InputError, naming the variable, for values that are no index below a count.
 Worker worker_from_environment();
 
-/// "k/S". Throws InputError for anything else than 0 <= k < S.
+/// Reads "k/S". Throws InputError for anything other than 0 <= k < S.
 Worker worker_named(const std::string& words);
 
 /// index, index + count, … below `shards`.

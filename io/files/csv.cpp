@@ -18,8 +18,8 @@
 namespace tangere {
 namespace {
 
-// Longer lines are not tables of controls; a device that never ends a line must not fill the
-// memory.
+// Longer lines do not belong to tables of controls, and a device that never ends a line must not
+// fill the memory.
 constexpr std::streamsize kLongestLine = 1 << 20;
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // spreadsheets begin a file with it
 
@@ -41,7 +41,8 @@ std::vector<std::string_view> split(std::string_view line) {
   return fields;
 }
 
-/// Words begin with a letter, an underscore or a quote, and are no numbers ("nan" and "inf" are).
+/// A word begins with a letter, an underscore or a quote and is not a number ("nan" and "inf" are
+/// numbers).
 bool is_word(std::string_view field) {
   double number = 0;
   if (field.empty() ||
@@ -54,7 +55,7 @@ bool is_word(std::string_view field) {
 double parse_number(std::string_view field, const std::string& place) {
   if (field.empty()) throw InputError(place + " is empty; expected a number");
   std::string_view digits = field;
-  // The library's parser knows no plus sign.
+  // The library's parser does not accept a plus sign.
   if (digits.front() == '+' && !digits.starts_with("+-")) digits.remove_prefix(1);
   double number = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// flock on the folder itself. It is let go of before another kind is asked for: some file systems
-// would keep it otherwise.
+// Uses flock on the folder itself. A lock is released before another kind is requested, because
+// some file systems would keep the old one otherwise.
 #include "io/files/folder_lock.hpp"
 
 #include <fcntl.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who may write into a folder: one process alone, or several that share it. Nothing is left behind,
-// and a killed process loses it.
+// Decides who may write into a folder: one process alone, or several that share it. The lock leaves
+// no file behind, and a killed process loses it.
 #pragma once
 
 #include <functional>
@@ -8,12 +8,12 @@
 
 namespace tangere {
 
-/// How often a lock that others hold is asked for, and what is done in between.
+/// How often to request a lock that others hold, and what to do in between.
 struct LockPatience {
   int tries = 1;
   std::function<void()> pause = {};
 
-  /// Asks twenty times a second.
+  /// Tries twenty times a second.
   static LockPatience seconds(int seconds);
 };
 
@@ -21,15 +21,15 @@ class FolderLock {
  public:
   enum class Kind { shared, alone };
 
-  /// Takes nothing yet. Throws IoError when the folder cannot be opened.
+  /// Does not take the lock yet. Throws IoError when the folder cannot be opened.
   explicit FolderLock(const std::string& folder);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;
   FolderLock& operator=(const FolderLock&) = delete;
 
-  /// Whether it is held now; where others hold it, none is, not even the one of before. True on
-  /// file systems without locks: there the .part of each file keeps writers apart where that is
-  /// possible.
+  /// Returns whether the lock is held now. If others hold it, this object holds none, not even its
+  /// former one. Returns true on file systems without locks; there the .part of each file keeps
+  /// writers apart where that is possible.
   [[nodiscard]] bool take(Kind kind, const LockPatience& patience = {});
   void let_go();
 

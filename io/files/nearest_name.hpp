@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The valid name a mistyped one most resembles, for error messages.
+// Finds the valid name that a mistyped name most resembles, for error messages.
 #pragma once
 
 #include <span>

@@ -42,7 +42,7 @@ void check_folder(const std::string& output) {
     throw IoError(fmt::format("cannot write '{}': '{}' is not a folder", output, folder));
 }
 
-/// Links are not followed: a rename replaces the link itself.
+/// Does not follow links, because a rename replaces the link itself.
 void check_output(const std::string& output, bool overwrite) {
   struct stat info {};
   if (lstat(output.c_str(), &info) != 0) {
@@ -57,7 +57,7 @@ void check_output(const std::string& output, bool overwrite) {
     throw IoError(fmt::format("'{}' exists already; give --overwrite to replace it", output));
 }
 
-/// Whether the open file still is the one at `path`: its owner may have renamed it meanwhile.
+/// Whether the open file is still the one at `path`. Its owner may have renamed it meanwhile.
 bool is_at(int descriptor, const std::string& path) {
   struct stat ours {
   }, there{};

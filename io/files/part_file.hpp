@@ -26,13 +26,13 @@ class PartFile {
 
   [[nodiscard]] const std::string& output() const { return output_; }
   [[nodiscard]] const std::string& path() const { return path_; }  ///< of the .part
-  /// Space that this user may still fill on the disk of the output [bytes].
+  /// Space that this user can still fill on the disk of the output [bytes].
   [[nodiscard]] std::uint64_t free_bytes() const;
 
   void write(std::string_view bytes);
-  /// At a place of the file, one piece after the other. Leaves `pieces` as it likes.
+  /// Writes the pieces one after the other at a place of the file. Changes `pieces`.
   void write_at(std::uint64_t offset, std::span<iovec> pieces);
-  /// Throws IoError where the file ends before.
+  /// Throws IoError if the file ends before.
   void read_at(std::uint64_t offset, std::span<unsigned char> bytes) const;
   [[nodiscard]] std::uint64_t size() const;
   /// Gives the space back at once, so that a library can close its file on a disk that is full.

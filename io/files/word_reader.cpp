@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers are read the same whatever the locale.
+// Reads numbers in the same way in every locale.
 #include "io/files/word_reader.hpp"
 
 #include <fmt/format.h>
@@ -17,7 +17,7 @@ namespace {
 constexpr std::uintmax_t kLargestFile = 256U << 20;
 constexpr double kLargestPosition = 1e6;  // [file's unit]
 
-/// Not a number where the word is none.
+/// Returns NaN if the word is not a number.
 double parse(std::string_view word) {
   double x = 0;
   if (word.size() > 1 && word[0] == '+' && word[1] != '-')

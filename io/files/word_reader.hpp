@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Text files of numbers beside a scene: lines of words, errors with the line.
+// Reads text files of numbers beside a scene: lines of words, with errors that name the line.
 #pragma once
 
 #include <fstream>
@@ -12,7 +12,7 @@ namespace tangere {
 /// Lines of a text file, cut into words at spaces and quotes.
 class WordReader {
  public:
-  /// Throws IoError where the file cannot be opened, InputError where it is larger than 256 MiB.
+  /// Throws IoError if the file cannot be opened, InputError if it is larger than 256 MiB.
   explicit WordReader(const std::string& path);
 
   /// The next line that has words; false at the end. A word that starts with # ends its line.
@@ -20,8 +20,8 @@ class WordReader {
   /// Throws InputError with file and line.
   [[noreturn]] void fail(const std::string& message) const;
 
-  /// Word k of the line as a finite number; as one of at most a million, beyond which nothing is
-  /// simulated to any accuracy; as a whole number, where `expected` says what is wanted. Fail
+  /// Word k of the line as a finite number; as a number of at most a million, beyond which no
+  /// simulation is accurate; as a whole number, where `expected` says what is wanted. They fail
   /// otherwise.
   [[nodiscard]] double number(std::size_t k) const;
   [[nodiscard]] double position(std::size_t k) const;

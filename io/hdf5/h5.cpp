@@ -47,7 +47,7 @@ std::string file_of(hid_t object) {
   return name;
 }
 
-/// `reason`: ours where the library has none to give.
+/// `reason` is our own text for failures that the library does not explain.
 [[noreturn]] void fail(std::string_view operation, const Id& object, std::string_view child = {},
                        std::string reason = {}) {
   if (reason.empty()) reason = last_reason();  // before any other call of the library clears it
@@ -147,7 +147,7 @@ struct OpenAttribute {
     space = Id(H5Aget_space(attribute.get()));
     type = Id(H5Aget_type(attribute.get()));
     const hssize_t count = H5Sget_simple_extent_npoints(space.get());
-    // Larger ones are not ours, and a damaged count must not become an allocation.
+    // We write no larger ones, and a damaged count must not become an allocation.
     if (count < 0 || count > (hssize_t{1} << 26))
       fail("read attribute", object, name, fmt::format("it claims {} elements", count));
     elements = static_cast<std::size_t>(count);
@@ -157,8 +157,9 @@ struct OpenAttribute {
 }  // namespace
 
 Quiet::Quiet() {
-  // A file that a full disk kept from being closed would otherwise be tried again, and complained
-  // about, while the program ends. Refused, harmlessly, when the library is already in use.
+  // Otherwise the library would try again, and complain, at the end of the program about a file
+  // that a full disk kept it from closing. The call is refused without harm when the library is
+  // already in use.
   static const herr_t no_exit_handler = H5dont_atexit();
   static_cast<void>(no_exit_handler);
   H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
@@ -273,7 +274,7 @@ Id create_dataset(const Id& parent, const std::string& name, const Dims& dims,
     if (H5Pset_chunk(creation.get(), static_cast<int>(storage.chunk.size()), storage.chunk.data()) <
         0)
       fail("lay out the chunks of", parent, name);
-    // Whole chunks are written: a cache would only put errors off to the moment of closing.
+    // Only whole chunks are written, so a cache would only delay errors until the file is closed.
     H5Pset_chunk_cache(access.get(), 0, 0, 1);
     if (storage.compress &&
         (H5Pset_shuffle(creation.get()) < 0 || H5Pset_deflate(creation.get(), 1) < 0))

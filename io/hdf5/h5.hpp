@@ -15,7 +15,8 @@
 
 namespace tangere::h5 {
 
-/// An identifier of the library (file, group, dataset, attribute, type …), closed when it goes.
+/// An identifier of the library (file, group, dataset, attribute, type …). The destructor closes
+/// it.
 class Id {
  public:
   Id() = default;
@@ -32,16 +33,16 @@ class Id {
   ~Id() { reset(); }
 
   [[nodiscard]] hid_t get() const { return id_; }
-  /// Closes; failures are dropped, because only cleaning up calls it. To keep data, use close_file.
+  /// Closes and ignores failures, because only cleaning up calls it. To keep data, use close_file.
   void reset() noexcept;
-  /// Forgets an identifier that was closed otherwise.
+  /// Forgets an identifier that was closed elsewhere.
   void release() noexcept { id_ = -1; }
 
  private:
   hid_t id_ = -1;
 };
 
-/// While it lives, the library keeps its errors to itself.
+/// While this object lives, the library does not print its errors.
 class Quiet {
  public:
   Quiet();
@@ -58,17 +59,17 @@ using Dims = std::vector<hsize_t>;
 
 /// Creates a file, replacing what is at `path`. Readable by HDF5 1.8 and later; two runs that write
 /// the same numbers write the same bytes. Descriptions of objects are put together in blocks of
-/// `description_block` bytes: large ones suit files of many objects. With `views` HDF5 1.10 is
-/// needed to read it, as virtual datasets are.
+/// `description_block` bytes: large ones suit files of many objects. With `views` the file may have
+/// virtual datasets, and reading it needs HDF5 1.10.
 Id create_file(const std::string& path, hsize_t description_block = 2048, bool views = false);
 /// A file that is never on disk.
 Id create_memory_file();
-/// Opens a file for reading. `forget`: descriptions of objects that were closed are not kept; among
-/// tens of thousands of them that is slow.
+/// Opens a file for reading. With `forget` the library does not keep descriptions of closed
+/// objects, because searching tens of thousands of them is slow.
 Id open_file(const std::string& path, bool forget = false);
 /// Opens a file for reading and writing, as create_file left it.
 Id change_file(const std::string& path);
-/// Gives an object that is at an address of the file its name.
+/// Gives a name to the object at an address of the file.
 void link_object(const Id& parent, const std::string& name, std::uint64_t address);
 /// Flushes and closes a file; unlike Id::reset, it reports what could not be written.
 void close_file(Id& file, const std::string& path);

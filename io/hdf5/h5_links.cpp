@@ -18,8 +18,8 @@ void check(bool done, const char* operation, const std::string& name) {
   if (!done) throw IoError(fmt::format("cannot {} '{}': HDF5 refuses it", operation, name));
 }
 
-/// One by one: H5Ocopy of HDF5 1.10.8 ends in a segmentation fault where an object has many
-/// attributes with text.
+/// Copies attributes one by one: H5Ocopy of HDF5 1.10.8 ends in a segmentation fault if an object
+/// has many attributes with text.
 void copy_attributes(const Id& from, const Id& to) {
   for (const std::string& name : attribute_names(from)) {
     const Quiet quiet;
@@ -33,7 +33,7 @@ void copy_attributes(const Id& from, const Id& to) {
     const bool any = !bytes.empty();
     const bool read = !any || H5Aread(attribute.get(), type.get(), bytes.data()) >= 0;
     const bool written = read && (!any || H5Awrite(made.get(), type.get(), bytes.data()) >= 0);
-    // Frees texts that the library allocated; nothing where there are none.
+    // Frees texts that the library allocated, if there are any.
     if (read && any) H5Dvlen_reclaim(type.get(), space.get(), H5P_DEFAULT, bytes.data());
     check(written, "copy attribute", name);
   }

@@ -10,26 +10,27 @@
 
 namespace tangere::h5 {
 
-/// `file`: relative to the folder of the file that the link is in. Opening the link fails where
-/// that is missing.
+/// `file`: relative to the folder of the file that the link is in. Opening the link fails if that
+/// file is missing.
 void link_external(const Id& group, const std::string& name, const std::string& file,
                    const std::string& path);
 
 /// Copies a group and all below it, from one file to another, under another name.
 void copy_group(const Id& from, const std::string& name, const Id& to, const std::string& as);
 
-/// A dataset of another file, all of it.
+/// A whole dataset of another file.
 struct Source {
   std::string file;  ///< as for link_external; ".": the one with the virtual dataset
   std::string path;
 };
-/// `first` without its first `skipped` rows and the one row of `last` behind it, as one dataset.
-/// `like`: the open dataset that `first` names. Reading it gives NaN where a file is missing.
+/// Shows `first` without its first `skipped` rows, followed by the one row of `last`, as one
+/// dataset. `like` is the open dataset that `first` names. Reading gives NaN where a file is
+/// missing.
 void create_virtual(const Id& group, const std::string& name, const Id& like, const Source& first,
                     const Source& last, hsize_t skipped = 0);
 
-/// Names that are `prefix` and a number, as byte strings of equal length, padded with zeros: what
-/// NumPy calls S.
+/// Writes names that consist of `prefix` and a number, as byte strings of equal length, padded with
+/// zeros. NumPy calls this type S.
 void write_names(const Id& group, const std::string& name, const std::string& prefix,
                  const std::vector<std::int64_t>& numbers);
 

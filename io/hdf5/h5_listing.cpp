@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Iteration by name, so that two files of the same content are listed alike.
+// Iterates by name, so that two files of the same content are listed alike.
 #include "io/hdf5/h5_listing.hpp"
 
 #include <fmt/format.h>

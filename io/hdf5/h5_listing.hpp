@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is in a file, for those who do not know it beforehand: names of links and attributes, values
-// as text.
+// Lists what is in a file that is not known beforehand: names of links and attributes, values as
+// text.
 #pragma once
 
 #include <string>

@@ -25,7 +25,7 @@ std::uint64_t big_endian(const unsigned char* from, std::size_t bytes) {
   return value;
 }
 
-/// Decompresses `in` into `out`; false where it is damaged.
+/// Decompresses `in` into `out`. Returns false if it is damaged.
 bool decompress(const unsigned char* in, std::size_t size, unsigned char* out, std::uint64_t total,
                 std::uint64_t block) {
   constexpr std::size_t kLength = 4;
@@ -49,7 +49,7 @@ bool decompress(const unsigned char* in, std::size_t size, unsigned char* out, s
   return true;
 }
 
-/// As H5Z calls it: 0 is failure. Only reading is needed; chunks are written by our own threads.
+/// The function that H5Z calls; 0 is failure. It only reads, because our own threads write chunks.
 std::size_t filter(unsigned flags, std::size_t, const unsigned*, std::size_t size,
                    std::size_t* room, void** buffer) {
   constexpr std::size_t kHead = 12, kTotal = 8;

@@ -28,7 +28,7 @@ enum Message : std::uint8_t {
   kAttributeInfo = 0x15,
 };
 
-/// Writes the header around messages that are added while it lives.
+/// Writes the header around the messages that are added while this object lives.
 class Header {
  public:
   explicit Header(Bytes& out) : out_(out), begin_(out.size()) {}
@@ -153,7 +153,7 @@ void add_layout(Bytes& out, const FileDataset& dataset) {
   out.number(static_cast<std::uint32_t>(bytes_of(dataset.type)));
 }
 
-/// What is where nothing was stored.
+/// The value of elements that were not stored.
 void add_fill(Bytes& out, const FileDataset& dataset) {
   constexpr std::uint8_t kVersion = 3, kEarly = 1, kLate = 2, kIncremental = 3,
                          kNeverFilled = 1 << 2, kFilledIfSet = 2 << 2;
@@ -214,7 +214,7 @@ void add_link(Bytes& out, const FileLink& link) {
   }
 }
 
-/// Text of any length in UTF-8: where it is stands in its place.
+/// A text of any length in UTF-8 is stored elsewhere; its place holds the address.
 void add_text_type(Bytes& out) {
   constexpr std::uint8_t kClass = 0x19, kText = 1, kUtf8 = 1;
   out.number(kClass);
@@ -260,7 +260,7 @@ void add_attribute(Bytes& out, const FileText& text) {
   add_attribute(out, text.name, type, space, place.all());
 }
 
-/// Without it the library finds attributes by name and counts none.
+/// Without this message the library finds attributes by name but counts none.
 void add_attribute_info(Header& header) {
   header.message(kAttributeInfo, [](Bytes& to) {
     to.number<std::uint16_t>(0);  // version, flags

@@ -8,7 +8,7 @@
 namespace tangere::h5 {
 namespace {
 
-// What the library takes where a file says nothing else: half of the children of a node.
+// Half of the children of a node, as the library assumes if a file says nothing else.
 constexpr std::size_t kGroupNodeHalf = 16, kChunkNodeHalf = 32, kLeafHalf = 4;
 constexpr std::size_t kNodeHead = 24, kAddress = 8;
 
@@ -75,14 +75,14 @@ std::size_t tree_bytes(const TreeKind& kind, std::size_t children) {
   }
 }
 
-/// Bytes of a group, taken away now and then.
+/// Bytes of a group. They are handed on in portions.
 class GroupBytes {
  public:
   GroupBytes(Bytes& bytes, std::uint64_t base, const Spill& spill)
       : out(bytes), base_(base), spill_(spill) {}
   /// The address of what is appended next.
   [[nodiscard]] std::uint64_t here() const { return base_ + out.size(); }
-  /// Of the first byte that is still there.
+  /// The address of the first byte that is still here.
   [[nodiscard]] std::uint64_t base() const { return base_; }
   void breathe() {
     constexpr std::size_t kMost = std::size_t{1} << 20;

@@ -27,22 +27,22 @@ struct FileChunk {
 /// `chunk_rows` rows each.
 std::uint64_t add_chunk_index(Bytes& out, std::uint64_t base, std::span<const FileChunk> chunks,
                               std::size_t rank, std::uint64_t chunk_rows);
-/// Bytes that it takes.
+/// Bytes that the index takes.
 std::size_t chunk_index_bytes(std::size_t chunks, std::size_t rank);
 
-/// A group's member, called by what all members begin with and its number.
+/// A member of a group. Its name is the prefix of all members and its number.
 struct FileMember {
   std::int64_t number = 0;    ///< from 0 on
   std::uint64_t address = 0;  ///< of the object
 };
 
-/// Takes bytes away that go behind those it took before.
+/// Receives bytes that follow those it received before.
 using Spill = std::function<void(const Bytes&)>;
 
-/// Appends a group of any number of members, in any order. Returns the address of the group, whose
-/// count of links to it is 0: link it. With `root` it is 1, for the group "/". With `spill`, bytes
-/// are taken away as they come, but for the last ones, among them the group itself: what is left in
-/// `out` follows them.
+/// Appends a group of any number of members, in any order. Returns the address of the group. Its
+/// count of links is 0, so link it; with `root` it is 1, for the group "/". With `spill`, bytes are
+/// handed on as they are made, except the last ones, which include the group itself. What is left
+/// in `out` follows the bytes handed on.
 std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::string_view prefix,
                               std::vector<FileMember> members, bool root = false,
                               const Spill& spill = {});

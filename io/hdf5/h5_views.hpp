@@ -10,8 +10,8 @@
 
 namespace tangere::h5 {
 
-/// Rows [first, first + rows) of a dataset of another file; of a shape like the one that shows
-/// them.
+/// Rows [first, first + rows) of a dataset of another file. Its shape is like that of the dataset
+/// that shows them.
 struct ShownRows {
   std::string_view file;  ///< relative to the folder of the file with the virtual dataset
   std::string_view path;  ///< in that file

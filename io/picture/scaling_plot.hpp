@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A picture of speed against threads, beside the straight line that it would be at best. SVG, no
+// A picture of speed against threads, with the ideal straight line. It writes SVG and opens no
 // window.
 #pragma once
 

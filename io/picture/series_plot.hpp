@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of curves, one panel below the other: what a fit or a run did. SVG, no window.
+// Pictures of curves, one panel below the other, of a fit or a run. It writes SVG and opens no
+// window.
 #pragma once
 
 #include <span>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures are written by hand: a library for so little would be more to know than this.
+// SVG is written by hand, because a library would take more to learn than these functions.
 #include "io/picture/svg.hpp"
 
 #include <fmt/format.h>

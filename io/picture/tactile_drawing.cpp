@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Of an image, down is the way in which points lie farther along the body the higher their row: the
-// sum of their places, each times its row; likewise to the right.
+// In an image, down is the direction in which the rows of points increase along the body: the sum
+// of their places, each times its row. Right is found in the same way from columns.
 #include "io/picture/tactile_drawing.hpp"
 
 #include <algorithm>

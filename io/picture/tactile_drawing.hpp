@@ -23,7 +23,8 @@ struct TactileDrawing {
   [[nodiscard]] std::array<double, 2> shear(std::size_t point, double f0, double f1) const;
 };
 
-/// Whether it can be drawn: an array, or a list some of whose points have pixels.
+/// Whether a sensor can be drawn. It must be an array, or a list with pixels for some of its
+/// points.
 bool drawable(const SensorLayout& sensor);
 TactileDrawing drawing_of(const SensorLayout& sensor);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A picture of tactile fields: pressure as a map with a colour bar, shear as arrows. SVG, no
-// window.
+// A picture of tactile fields: pressure as a map with a colour bar, shear as arrows. It writes SVG
+// and opens no window.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bodies of a scene file: what each type is made of.
+// Reads bodies of a scene file, by type.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ constexpr int kMostPoints = 1 << 20;      // of a hemisphere
 
 using Names = std::vector<std::string>;
 
-/// Which attributes this element's type uses; the rest of what bodies may have is without effect.
+/// Which attributes this element's type uses. The other attributes of bodies have no effect.
 class Attributes {
  public:
   void use(std::initializer_list<const char*> names) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// End effectors of a scene file.
+// Reads end effectors of a scene file.
 #include <fmt/format.h>
 
 #include <algorithm>

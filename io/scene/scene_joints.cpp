@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What acts on the joints of a scene file: damping, springs, limits, motors.
+// Reads what acts on the joints of a scene file: damping, springs, limits, motors.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -59,7 +59,7 @@ bool has_effect(const JointEffects& e) {
   return e.damping != 0 || e.armature != 0 || e.stiffness != 0 || e.limit_stiffness != 0;
 }
 
-/// Range and gains of a motor, by the dofs it drives: they all slide or all turn.
+/// Range and gains of a motor. The dofs it drives all slide or all turn.
 void read_motor(const SceneNode& node, bool turns, MotorDescription& motor) {
   const SceneContext& c = node.context();
   const bool position = motor.control == MotorControl::position;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Attribute parsing: whole values only, in double precision, finite.
+// Parses attributes. Values must be complete and finite; they are read in double precision.
 #include "io/scene/scene_node.hpp"
 
 #include <fmt/format.h>

@@ -46,24 +46,23 @@ class SceneNode {
   [[nodiscard]] Source source() const { return {context_->file, element_->GetLineNum()}; }
   [[nodiscard]] SceneContext& context() const { return *context_; }
   [[noreturn]] void fail(const std::string& message) const;
-  /// Because of an attribute's value: says so where it comes from <default>.
+  /// Fails because of an attribute's value. The message says if the value comes from <default>.
   [[noreturn]] void fail_at(const char* attribute, const std::string& message) const;
   void warn(const std::string& message) const;
 
-  /// Refuses attributes outside the three lists: `used` are read, `pictures` only matter to a
-  /// viewer and pass silently, `unused` belong to other types of this element and are listed as
-  /// warnings.
+  /// Refuses attributes outside the three lists. `used` are read. `pictures` matter to viewers only
+  /// and pass silently. `unused` belong to other types of this element and give warnings.
   void check_attributes(const std::vector<std::string>& used,
                         const std::vector<std::string>& pictures = {},
                         const std::vector<std::string>& unused = {}) const;
 
-  /// Children in order. Names outside `known` fail; stray text is a warning.
+  /// Children in order. Names outside `known` are errors; stray text is a warning.
   [[nodiscard]] std::vector<SceneNode> children(const std::vector<std::string>& known) const;
 
   [[nodiscard]] bool has(const char* attribute) const { return find(attribute) != nullptr; }
   [[nodiscard]] std::string text(const char* attribute) const;  ///< required
   [[nodiscard]] std::string text(const char* attribute, const std::string& fallback) const;
-  /// One of `words`, by position.
+  /// The position of the value among `words`.
   [[nodiscard]] int choice(const char* attribute, const std::vector<std::string>& words,
                            std::optional<int> fallback = std::nullopt) const;
   [[nodiscard]] double number(const char* attribute,
@@ -77,7 +76,7 @@ class SceneNode {
   /// As many integers as the fallback has, each from `lowest` to `highest`.
   [[nodiscard]] std::vector<int> integers(const char* attribute, const std::vector<int>& fallback,
                                           int lowest, int highest) const;
-  /// Any number of finite numbers; `count` > 0 asks for exactly so many.
+  /// Any number of finite numbers, or exactly `count` if it is positive.
   [[nodiscard]] std::vector<double> numbers(const char* attribute, std::size_t count = 0) const;
   [[nodiscard]] Vector3 vector(const char* attribute,
                                std::optional<Vector3> fallback = std::nullopt) const;

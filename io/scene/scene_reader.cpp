@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The file as a whole: options, defaults, the tree of links. What hangs on the tree is read in
-// scene_sections.cpp.
+// Reads the file as a whole: options, defaults, the tree of links. scene_sections.cpp reads what
+// hangs on the tree.
 #include "io/scene/scene_reader.hpp"
 
 #include <fmt/format.h>
@@ -111,7 +111,7 @@ class TreeReader {
     return joint;
   }
 
-  /// A pose given in the world, in the frame of a parent joint at rest.
+  /// Converts a pose given in the world into the frame of a parent joint at rest.
   [[nodiscard]] Pose in_parent(const Pose& pose, int parent) const {
     std::vector<Pose> way;
     for (int i = parent; i >= 0; i = scene_.links[std::size_t(i)].parent)
@@ -179,7 +179,8 @@ void read_root(const SceneNode& root, Scene& scene) {
     });
     return count > 0;
   };
-  // Units first: every other number depends on them. Then whatever later sections refer to.
+  // Units come first because every other number depends on them. Sections that others refer to
+  // follow.
   SceneContext& c = root.context();
   bool metres = false;
   each("option", [&](const SceneNode& s) { metres = s.choice("unit", {"cm-g", "m-kg"}, 0) == 1; });
@@ -209,7 +210,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   once("randomize", [&](const SceneNode& s) { read_randomize(scene, s); });
 }
 
-/// What the parser stumbled over.
+/// Describes the error of the parser.
 const char* fault_of(tinyxml2::XMLError error) {
   switch (error) {
     case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scene files: the dialect of the paper's published simulator (root <redmax>) and ours (root
-// <tangere>), same elements.
+// Reads scene files: the dialect of the paper's published simulator (root <redmax>) and ours (root
+// <tangere>). Both have the same elements.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run of a scene starts from, is driven by, and varies: <initial>, <control>, <randomize>.
+// Reads the start of a run, its controls and its variation: <initial>, <control>, <randomize>.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -79,8 +79,7 @@ Distribution read_distribution(const SceneNode& node, double scale) {
   return d;
 }
 
-/// A coefficient must stay zero or more whatever is drawn, so a normal distribution has no place
-/// there.
+/// A coefficient must stay zero or more whatever is drawn, so a normal distribution is refused.
 void check_coefficient(const SceneNode& node, const Distribution& d) {
   if (d.kind == Distribution::Kind::normal)
     node.fail("normal can draw a negative coefficient; expected uniform, log_uniform or list");

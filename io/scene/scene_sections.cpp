@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Actuators and contacts of a scene file.
+// Reads actuators and contacts of a scene file.
 #include "io/scene/scene_sections.hpp"
 
 #include <fmt/format.h>

@@ -12,20 +12,20 @@ namespace tangere {
 
 /// A body in its joint's frame; files that it names are read.
 BodyDescription read_body(const SceneNode& node);
-/// Whether the pose of a mesh is given in the world instead.
+/// Whether the pose of a mesh is given in the world, not in the joint's frame.
 bool placed_in_world(const SceneNode& node, const BodyDescription& body);
 void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
 void read_sensors(Scene& scene, const SceneNode& section);
 void read_end_effectors(Scene& scene, const SceneNode& section);
-/// Gives end effectors without a name theirs: "endeffector" and their place in the file, or the
-/// next number that is free.
+/// Names end effectors that have no name: "endeffector" and their place in the file, or the next
+/// free number.
 void name_end_effectors(Scene& scene);
 void read_initial(Scene& scene, const SceneNode& section);
 void read_control(Scene& scene, const SceneNode& section);
 void read_randomize(Scene& scene, const SceneNode& section);
 
-/// What `read` makes of a file named by an attribute, beside the scene. Errors say who asked.
+/// Calls `read` with the file beside the scene that an attribute names. Errors name the element.
 template <class Read>
 auto read_beside(const SceneNode& node, const char* attribute, Read&& read) {
   const std::filesystem::path path =
@@ -45,10 +45,12 @@ ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law);
 
 inline Vector3 scaled(const Vector3& a, double s) { return {s * a[0], s * a[1], s * a[2]}; }
 
-/// Three or four numbers; alpha stays 1 if not given. Left alone where the attribute is missing.
+/// Reads three or four numbers; alpha stays 1 if not given. Changes nothing if the attribute is
+/// missing.
 void read_colour(const SceneNode& node, std::array<double, 4>& rgba);
 
-/// Index of the named joint or body; fails at the attribute's element with the nearest name.
+/// Index of the named joint or body. If there is none, fails at the attribute's element with the
+/// nearest name.
 int find_joint(const Scene& scene, const SceneNode& node, const char* attribute);
 int find_body(const Scene& scene, const SceneNode& node, const char* attribute);
 
@@ -56,10 +58,10 @@ int find_body(const Scene& scene, const SceneNode& node, const char* attribute);
 /// in the same places.
 double coordinate_scale(JointType type, int index, const SceneContext& context);
 
-/// Number of controls the motors read so far take.
+/// Number of controls of the motors read so far.
 int control_count(const Scene& scene);
-/// Factor to SI of each of them: targets of position motors are coordinates, force motors take
-/// numbers without a unit.
+/// Factor to SI of each control. Targets of position motors are coordinates; controls of force
+/// motors have no unit.
 std::vector<double> control_scales(const Scene& scene, const SceneContext& context);
 
 /// Damping, armature, spring and limits of a joint whose type is known.

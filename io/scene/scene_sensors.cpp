@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sensors of a scene file: what each layout is made of.
+// Reads sensors of a scene file, by layout.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ const std::vector<std::string> kTypes = {"rect_array", "abstract", "hemisphere",
                                          "mesh"};
 using Names = std::vector<std::string>;
 
-/// Attributes that only some layouts use, and which.
+/// Attributes that only some layouts use, with these layouts.
 Names attributes_of(int type) {
   switch (type) {
     case 0: return {"rect_pos0", "rect_pos1", "axis0", "axis1", "resolution"};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// FNV-1a over the bytes of numbers, lengths between them.
+// Computes FNV-1a over the bytes of numbers, with lengths between them.
 #include "io/scene/scene_tables.hpp"
 
 #include <fmt/format.h>
@@ -14,7 +14,8 @@ namespace {
 
 class Checksum {
  public:
-  /// Numbers of one kind; none count as well, but alone make no table.
+  /// Adds numbers of one kind. An empty list changes the sum as well, but does not make a table
+  /// alone.
   template <class T>
   void add(std::span<const T> numbers) {
     const std::uint64_t count = numbers.size();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a scene has from files of its own (meshes, lists of points, tables), told apart by content:
-// names may stay while the files change.
+// A checksum of what a scene takes from other files (meshes, lists of points, tables). It depends
+// on their content, because names can stay while files change.
 #pragma once
 
 #include <string>

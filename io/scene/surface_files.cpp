@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A surface is closed when every directed edge has as many partners the other way round: then its
-// volume is defined.
+// A surface is closed, and its volume defined, when every directed edge has as many partners in the
+// opposite direction.
 #include "io/scene/surface_files.hpp"
 
 #include <fmt/format.h>

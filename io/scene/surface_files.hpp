@@ -8,13 +8,15 @@
 
 namespace tangere {
 
-/// Positions and faces of an OBJ file, in its own unit; faces become fans of triangles, equal
-/// positions one vertex, what no face uses is left out. Texture, normals, groups and materials are
-/// skipped. Throws IoError where the file cannot be read, InputError with file:line where it is no
-/// OBJ, and without a line where the surface is open, encloses no volume, or faces inwards.
+/// Positions and faces of an OBJ file, in its own unit. Faces become fans of triangles, and equal
+/// positions one vertex. Vertices that no face uses are left out. Texture, normals, groups and
+/// materials are skipped. Throws IoError if the file cannot be read, InputError with file:line if
+/// it is not an OBJ file, and InputError without a line if the surface is open, encloses no volume,
+/// or faces inwards.
 MeshShape read_obj(const std::string& path);
 
-/// A count, then so many lines x y z: (n, 3) numbers in the file's own unit. Throws as read_obj.
+/// Reads a count, then as many lines x y z: (n, 3) numbers in the file's own unit. Throws as
+/// read_obj.
 std::vector<double> read_contact_points(const std::string& path);
 
 }  // namespace tangere

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each layout in its own frame; scene_sensors.cpp puts it on its body.
+// Makes each layout in its own frame. scene_sensors.cpp puts it on its body.
 #include "io/scene/tactile_layouts.hpp"
 
 #include <fmt/format.h>
@@ -59,8 +59,9 @@ TactilePoint parse_point(const WordReader& file) {
   return p;
 }
 
-/// Of a direction on the half z ≥ 0: its place in the square [-1, 1]². Rings about the pole become
-/// square rings that hold the same share of the area, and an eighth of a ring one half of an edge.
+/// Maps a direction on the half z ≥ 0 to its place in the square [-1, 1]². Rings about the pole
+/// become square rings that hold the same share of the area, and an eighth of a ring one half of an
+/// edge.
 std::array<double, 2> square_place(const Vector3& n) {
   const double ring = std::sqrt(std::max(0.0, 1 - n.z)), x = std::abs(n.x), y = std::abs(n.y);
   const double along = ring * std::atan2(std::min(x, y), std::max(x, y)) * 4 / M_PI;

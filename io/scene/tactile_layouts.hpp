@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the points of curved tactile pads are: on a hemisphere, a cylinder, a mesh, or as a file
-// says.
+// Places the points of curved tactile pads: on a hemisphere, a cylinder, a mesh, or as a file says.
 #pragma once
 
 #include <string>
@@ -26,14 +25,14 @@ void draw_hemisphere(int rows, int cols, std::vector<TactilePoint>& points);
 std::vector<TactilePoint> cylinder_points(double radius, double length, int along, int around);
 
 /// Every triangle is cut into equal small ones with edges of at most `pitch` [m]; their middles are
-/// the points. axis0 lies along the triangle's first edge. None where there would be more than
+/// the points. axis0 lies along the triangle's first edge. Returns none if there would be more than
 /// `most`.
 std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::size_t most);
 
-/// A count, then a line for each point: "position" "row col" "normal" "axis0" "axis1", and perhaps
-/// "kn kt mu damping", factors of the sensor's. Directions are made unit. Positions in the file's
-/// unit. Throws IoError where the file cannot be read, InputError with file:line and what was
-/// expected.
+/// Reads a count, then a line for each point: "position" "row col" "normal" "axis0" "axis1", and
+/// perhaps "kn kt mu damping", factors of the sensor's. Directions are normalised. Positions are in
+/// the file's unit. Throws IoError if the file cannot be read, InputError with file:line and what
+/// was expected.
 std::vector<TactilePoint> read_tactile_points(const std::string& path);
 
 /// The points moved by a pose: directions turn, positions turn and shift.

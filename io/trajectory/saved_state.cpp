@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One row of each dataset, checked against the model before any of it is used.
+// Reads one row of each dataset and checks it against the model before any of it is used.
 #include "io/trajectory/saved_state.hpp"
 
 #include <fmt/format.h>

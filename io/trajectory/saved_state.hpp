@@ -29,14 +29,14 @@ struct SavedState {
   std::vector<StepStatus> status;  ///< (E) of the step that led here; converged for row 0
 };
 
-/// `row`: the last one when not given. Throws IoError for a file that is missing, damaged or no
-/// trajectory, InputError naming the rows there are.
+/// `row` is the last one if not given. Throws IoError for a file that is missing, damaged or not a
+/// trajectory. Throws InputError for a row that does not exist, naming those that do.
 SavedState read_state(const std::string& path, std::optional<std::int64_t> row);
 
-/// Puts environment e of a saved state into environment e of a batch: with the row before it where
-/// `continues` (the next step then takes up BDF2 where it was left). An environment that had failed
-/// stays failed. Throws InputError when the coordinates are not those of the model or the batch is
-/// larger than the file's.
+/// Puts environment e of a saved state into environment e of a batch. With `continues` it also sets
+/// the row before, so that the next step continues BDF2. An environment that had failed stays
+/// failed. Throws InputError when the coordinates are not those of the model or the batch is larger
+/// than the file's.
 void restore_state(const SavedState& from, bool continues, Batch& batch);
 
 }  // namespace tangere

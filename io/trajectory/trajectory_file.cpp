@@ -20,7 +20,7 @@ namespace {
 constexpr std::int64_t kFormatVersion = 2;
 constexpr hsize_t kChunkBytes = 1U << 20;
 
-/// Whole rows, about a megabyte of them.
+/// A chunk has whole rows, about a megabyte.
 h5::Storage rows_of(const h5::Dims& dims, std::size_t element) {
   hsize_t row = element;
   for (std::size_t i = 1; i < dims.size(); ++i) row *= dims[i];
@@ -35,7 +35,7 @@ h5::Storage rows_of(const h5::Dims& dims, std::size_t element) {
   return {chunk, false};
 }
 
-/// One environment's field per chunk: mostly zeros, so compressed.
+/// A chunk has one environment's field. It is compressed because it is mostly zeros.
 h5::Storage field_storage(const h5::Dims& dims) {
   h5::Dims chunk = dims;
   chunk[0] = chunk[1] = 1;

@@ -36,7 +36,7 @@ class TrajectoryFile : public RowSink {
   void write(const StepRow& row) override;
   void write(const TactileRow& row) override;
   void write(const ActionRow& row) override;
-  /// Once, at most. Sizes are those of the layout.
+  /// Called at most once. Sizes are those of the layout.
   void write(const GradientArrays& gradients);
 
   /// Checks that every row came, closes, syncs and renames. Throws IoError.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks and sizes of a layout; free of the engine, so that readers and tests can do without it.
+// Checks and sizes of a layout. This file does not need the engine, so readers and tests do not
+// either.
 #include "io/trajectory/trajectory_layout.hpp"
 
 #include <fmt/format.h>

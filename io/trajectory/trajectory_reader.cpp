@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The inverse of trajectory_file.cpp, attribute by attribute.
+// Reads what trajectory_file.cpp writes, attribute by attribute.
 #include "io/trajectory/trajectory_reader.hpp"
 
 #include <fmt/format.h>

@@ -23,7 +23,7 @@ class TrajectoryReader {
   [[nodiscard]] std::int64_t environments() const;
   [[nodiscard]] double timestep() const;  ///< [s]
   [[nodiscard]] const std::vector<SensorLayout>& sensors() const;
-  /// Index of a sensor; "" is the first. Throws InputError naming those there are.
+  /// Index of a sensor; "" is the first. Throws InputError that names the sensors of the file.
   [[nodiscard]] std::size_t find_sensor(const std::string& name) const;
   [[nodiscard]] std::int64_t frames(std::size_t sensor) const;
   /// Row of /q that a frame was read from.
