@@ -3,11 +3,12 @@
 #include "tasks/gradients/episode_gradients.hpp"
 
 #include <algorithm>
+#include <memory>
 
 #include "engine/derivative/number_gradients.hpp"
-#include "tasks/gradients/gradient_block.hpp"
+#include "tasks/gradients/loss_block.hpp"
+#include "tasks/gradients/return_block.hpp"
 #include "tasks/gradients/row_jacobians.hpp"
-#include "tasks/gradients/task_gradient_block.hpp"
 
 namespace tangere {
 namespace {
@@ -135,175 +136,127 @@ void put_row(const RowJacobian& j, bool with_previous, std::size_t row,
   put(j.others, out.back());
 }
 
-class SceneReturns : public EpisodeGradients {
- public:
-  SceneReturns(const Model& model, const ControlProgram& controls, const EpisodeOptions& run,
-               const GradientOptions& options, const RolloutLoss* loss,
-               const std::vector<GradientArray>& arrays)
-      : model_(model),
-        controls_(controls),
-        run_(run),
-        options_(options),
-        arrays_(arrays),
-        block_(model, options, {&loss, 1}) {}
-
-  void compute(std::int64_t first, int episodes, std::vector<std::vector<double>>& out) override {
-    Batch batch(model_, episodes, run_.seed, first);
-    std::vector<double> u(size(episodes) * size(model_.nu()));
-    GradientSummary summary = empty_gradients(model_, episodes, options_, 1);
+EpisodeGradients scene_returns(const Model& model, const ControlProgram& controls,
+                               const EpisodeOptions& run, const GradientOptions& options,
+                               const RolloutLoss* loss) {
+  const auto block = std::make_shared<LossBlock>(model, options, std::span(&loss, 1));
+  return [&model, &controls, &run, options, block](std::int64_t first, int episodes, auto& out) {
+    Batch batch(model, episodes, run.seed, first);
+    const std::size_t nu = size(model.nu());
+    std::vector<double> u(size(episodes) * nu);
+    GradientSummary summary = empty_gradients(model, episodes, options, 1);
     std::vector<FailedEnvironment> failures;
-    block_.run(
+    block->run(
         batch, 0,
         [&](std::int64_t step, int e, std::span<double> to) {
-          controls_.evaluate(step / run_.every * run_.every, first + e, to);
+          controls.evaluate(step / run.every * run.every, first + e, to);
         },
         u, summary, failures);
     LossGradient& g = summary.losses[0];
-    make_room(arrays_, episodes, run_.steps / run_.every, out);
-    const std::size_t nu = size(model_.nu());
-    for (std::size_t i = 0; i < g.u.size(); ++i) {  // an action is held for K steps
-      const std::size_t step = i / nu;
-      out[0][step / size(run_.every) * nu + i % nu] += g.u[i];
-    }
+    for (std::size_t i = 0; i < g.u.size(); ++i)  // an action is held for K steps
+      out[0][i / nu / size(run.every) * nu + i % nu] += g.u[i];
     out[1] = std::move(g.q);
     out[2] = std::move(g.v);
     if (!g.parameters.empty()) out[3] = std::move(g.parameters);
     out.back() = std::move(g.value);
-  }
+  };
+}
 
- private:
-  const Model& model_;
-  const ControlProgram& controls_;
-  const EpisodeOptions& run_;
-  GradientOptions options_;
-  std::vector<GradientArray> arrays_;
-  GradientBlock block_;
-};
+EpisodeGradients task_returns(const Task& task, const TaskActions& actions,
+                              TaskGradientOptions options) {
+  const auto block = std::make_shared<ReturnBlock>(task, options);
+  return [&task, &actions, options, block](std::int64_t first, int episodes, auto& out) {
+    TaskGradientOptions some = options;
+    some.episodes = episodes;
+    TaskGradients g = empty_task_gradients(task, some);
+    std::vector<FailedEnvironment> failures;
+    block->run(first, episodes, actions, 0, g, failures);
+    out[0] = std::move(g.by_action);
+    out[1] = std::move(g.by_q);
+    out[2] = std::move(g.by_v);
+    if (out.size() > 3) out[3] = std::move(g.by_parameter);
+  };
+}
 
-class SceneJacobians : public EpisodeGradients {
- public:
-  SceneJacobians(const Model& model, const ControlProgram& controls, const EpisodeOptions& run,
-                 const std::vector<GradientArray>& arrays)
-      : model_(model),
-        controls_(controls),
-        run_(run),
-        arrays_(arrays),
-        stepper_(model),
-        jacobians_(model),
-        tape_(model, stepper_.integrator(), run.every),
-        chains_(kBlock, RowChain(model.nv(), size(model.nu()))),
-        held_(size(model.nu()) * (2 * size(model.nv()) + size(model.nu()))) {
-    const std::size_t nu = size(model.nu()), nv = size(model.nv());
-    for (std::size_t k = 0; k < nu; ++k) held_[k * (2 * nv + nu) + 2 * nv + k] = 1;
-  }
-
-  void compute(std::int64_t first, int episodes, std::vector<std::vector<double>>& out) override {
-    const std::int64_t rows = run_.steps / run_.every;
-    const std::size_t nu = size(model_.nu());
-    Batch batch(model_, episodes, run_.seed, first);
-    make_room(arrays_, episodes, rows, out);
+EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& controls,
+                                 const EpisodeOptions& run) {
+  struct Scratch {
+    Stepper stepper;
+    StepJacobians jacobians;
+    BlockTape tape;
+    std::vector<RowChain> chains;
+  };
+  const std::size_t nu = size(model.nu()), nv = size(model.nv());
+  const auto s = std::make_shared<Scratch>(
+      Scratch{Stepper(model), StepJacobians(model), BlockTape(model, model.integrator(), run.every),
+              std::vector<RowChain>(kBlock, RowChain(model.nv(), nu))});
+  std::vector<double> held(nu * (2 * nv + nu));  // (nu, 2 nv + nu): controls are the action
+  for (std::size_t k = 0; k < nu; ++k) held[k * (2 * nv + nu) + 2 * nv + k] = 1;
+  return [&model, &controls, &run, nu, s, held](std::int64_t first, int episodes, auto& out) {
+    const std::int64_t rows = run.steps / run.every;
+    Batch batch(model, episodes, run.seed, first);
     std::vector<double> u(size(episodes) * nu);
     StepJacobian step;
     RowJacobian row;
     for (std::int64_t j = 0; j < rows; ++j) {
       for (int e = 0; e < episodes; ++e)
-        controls_.evaluate(j * run_.every, first + e, std::span(u).subspan(size(e) * nu, nu));
-      tape_.start(batch, 0);
-      for (int k = 0; k < run_.every; ++k) stepper_.step_block(batch, 0, u, &tape_);
-      for (int e = 0; e < episodes; ++e) chains_[size(e)].begin();
-      for (int k = 0; k < run_.every; ++k) {
-        jacobians_.evaluate(batch, 0, tape_, k, u);
+        controls.evaluate(j * run.every, first + e, std::span(u).subspan(size(e) * nu, nu));
+      s->tape.start(batch, 0);
+      for (int k = 0; k < run.every; ++k) s->stepper.step_block(batch, 0, u, &s->tape);
+      for (RowChain& chain : s->chains) chain.begin();
+      for (int k = 0; k < run.every; ++k) {
+        s->jacobians.evaluate(batch, 0, s->tape, k, u);
         for (int e = 0; e < episodes; ++e) {
-          jacobians_.get(e, step);
-          chains_[size(e)].add(step, held_);
+          s->jacobians.get(e, step);
+          s->chains[size(e)].add(step, held);
         }
       }
       for (int e = 0; e < episodes; ++e) {
-        chains_[size(e)].get(row);
+        s->chains[size(e)].get(row);
         put_row(row, out.size() == 3, size(e) * size(rows) + size(j), out);
       }
     }
-  }
+  };
+}
 
- private:
-  const Model& model_;
-  const ControlProgram& controls_;
-  const EpisodeOptions& run_;
-  std::vector<GradientArray> arrays_;
-  Stepper stepper_;
-  StepJacobians jacobians_;
-  BlockTape tape_;
-  std::vector<RowChain> chains_;
-  std::vector<double> held_;  // (nu, 2 nv + nu): controls are the action
-};
-
-class TaskReturns : public EpisodeGradients {
- public:
-  TaskReturns(const Task& task, const TaskActions& actions, const TaskGradientOptions& options,
-              const std::vector<GradientArray>& arrays)
-      : task_(task), actions_(actions), options_(options), arrays_(arrays), block_(task, options) {}
-
-  void compute(std::int64_t first, int episodes, std::vector<std::vector<double>>& out) override {
-    options_.episodes = episodes;
-    TaskGradients g = empty_task_gradients(task_, options_);
-    std::vector<LostEpisode> lost;
-    block_.run(first, episodes, actions_, 0, g, lost);
-    make_room(arrays_, episodes, options_.actions, out);
-    out[0] = std::move(g.by_action);
-    out[1] = std::move(g.by_q);
-    out[2] = std::move(g.by_v);
-    if (out.size() > 3) out[3] = std::move(g.by_parameter);
-  }
-
- private:
-  const Task& task_;
-  const TaskActions& actions_;
-  TaskGradientOptions options_;
-  std::vector<GradientArray> arrays_;
-  TaskGradientBlock block_;
-};
-
-class TaskJacobians : public EpisodeGradients {
- public:
-  TaskJacobians(const Task& task, const TaskActions& actions, const EpisodeOptions& run,
-                const std::vector<GradientArray>& arrays)
-      : task_(task),
-        actions_(actions),
-        run_(run),
-        arrays_(arrays),
-        rollout_(task, {}, run.precision),
-        jacobians_(task, {}),
-        tape_(task.model(), rollout_.integrator(), task.spec().steps_per_action),
-        record_(task) {}
-
-  void compute(std::int64_t first, int episodes, std::vector<std::vector<double>>& out) override {
-    const std::int64_t rows = task_.spec().horizon;
-    make_room(arrays_, episodes, rows, out);
+EpisodeGradients task_jacobians(const Task& task, const TaskActions& actions,
+                                const EpisodeOptions& run) {
+  struct Scratch {
+    TaskRollout rollout;
+    ActionJacobians jacobians;
+    BlockTape tape;
+    ActionRecord record;
+  };
+  const auto s = std::make_shared<Scratch>(
+      Scratch{TaskRollout(task, {}, run.precision), ActionJacobians(task, {}),
+              BlockTape(task.model(), task.model().integrator(), task.spec().steps_per_action),
+              ActionRecord(task)});
+  return [&task, &actions, &run, s](std::int64_t first, int episodes, auto& out) {
+    const std::int64_t rows = task.spec().horizon;
     std::vector<std::int64_t> numbers;
     for (int e = 0; e < episodes; ++e) numbers.push_back(first + e);
-    rollout_.start(run_.seed, numbers);
-    for (std::int64_t a = 0; a < rows && rollout_.running(); ++a) {
-      rollout_.choose(actions_, record_);
-      rollout_.begin(record_);
-      rollout_.take_steps(&tape_);
-      jacobians_.evaluate(rollout_, record_, a, tape_);
+    s->rollout.start(run.seed, numbers);
+    for (std::int64_t a = 0; a < rows && s->rollout.running(); ++a) {
+      s->rollout.choose(actions, s->record);
+      s->rollout.begin(s->record);
+      s->rollout.take_steps(&s->tape);
+      s->jacobians.evaluate(s->rollout, s->record, a, s->tape);
       for (int e = 0; e < episodes; ++e)
-        if (record_.taken[size(e)])
-          put_row(jacobians_.of(e), out.size() == 3, size(e) * size(rows) + size(a), out);
-      rollout_.conclude();
+        if (s->record.taken[size(e)])
+          put_row(s->jacobians.of(e), out.size() == 3, size(e) * size(rows) + size(a), out);
+      s->rollout.conclude();
     }
-  }
+  };
+}
 
- private:
-  const Task& task_;
-  const TaskActions& actions_;
-  const EpisodeOptions& run_;
-  std::vector<GradientArray> arrays_;
-  TaskRollout rollout_;
-  ActionJacobians jacobians_;
-  BlockTape tape_;
-  ActionRecord record_;
-};
+/// Of Jacobians: one thread's scratch and `blocks` results.
+GradientPlan plan_of_jacobians(const Model& model, const Named& actions, std::int64_t rows,
+                               double blocks, std::function<EpisodeGradients()> make) {
+  GradientPlan plan{arrays_of_jacobians(model, actions), rows, std::move(make), 0};
+  plan.bytes = blocks * bytes_of(plan.arrays, rows) +
+               double(Stepper::workspace_bytes(model)) * (2 + 2 * model.nv());
+  return plan;
+}
 
 }  // namespace
 
@@ -319,84 +272,64 @@ const char* to_string(GradientKind kind) {
 GradientPlan scene_gradients(const Model& model, const ControlProgram& controls,
                              const EpisodeOptions& run, GradientKind kind, const RolloutLoss* loss,
                              const std::string& loss_meaning, double tape_bytes) {
-  GradientPlan plan;
-  if (kind == GradientKind::none) return plan;
+  if (kind == GradientKind::none) return {};
   const std::int64_t rows = run.steps / run.every;
-  const Named actions = actions_of(model);
-  if (kind == GradientKind::jacobians) {
-    plan.arrays = arrays_of_jacobians(model, actions);
-    plan.bytes = bytes_of(plan.arrays, rows) +
-                 double(Stepper::workspace_bytes(model)) * (2 + 2 * model.nv());
-    plan.make = [&model, &controls, &run,
-                 arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
-      return std::make_unique<SceneJacobians>(model, controls, run, arrays);
-    };
-    return plan;
-  }
-  plan.arrays = arrays_of_return(model, actions, "the loss");
-  plan.arrays.push_back(array("loss", {1}, false, loss_meaning, {}));
+  if (kind == GradientKind::jacobians)
+    return plan_of_jacobians(model, actions_of(model), rows, 1,
+                             [&] { return scene_jacobians(model, controls, run); });
   GradientOptions options;
   options.steps = run.steps;
   options.precision = run.precision;
   options.parameters = true;
   options.tape_bytes = tape_bytes;
+  GradientPlan plan{arrays_of_return(model, actions_of(model), "the loss"), rows,
+                    [&model, &controls, &run, options, loss] {
+                      return scene_returns(model, controls, run, options, loss);
+                    }};
+  plan.arrays.push_back(array("loss", {1}, false, loss_meaning, {}));
   plan.bytes = bytes_of(plan.arrays, rows) + gradient_bytes(model, kBlock, options, 1);
-  plan.make = [&model, &controls, &run, options, loss,
-               arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
-    return std::make_unique<SceneReturns>(model, controls, run, options, loss, arrays);
-  };
   return plan;
 }
 
 GradientPlan task_episode_gradients(const Task& task, const TaskActions& actions,
                                     const EpisodeOptions& run, GradientKind kind,
                                     double tape_bytes) {
-  GradientPlan plan;
-  if (kind == GradientKind::none) return plan;
+  if (kind == GradientKind::none) return {};
   const Model& model = task.model();
-  if (kind == GradientKind::jacobians) {
-    plan.arrays = arrays_of_jacobians(model, actions_of(task));
-    plan.bytes = kBlocksOfThread * bytes_of(plan.arrays, task.spec().horizon) +
-                 double(Stepper::workspace_bytes(model)) * (2 + 2 * model.nv());
-    plan.make = [&task, &actions, &run,
-                 arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
-      return std::make_unique<TaskJacobians>(task, actions, run, arrays);
-    };
-    return plan;
-  }
-  plan.arrays = arrays_of_return(model, actions_of(task), "the return");
+  const std::int64_t rows = task.spec().horizon;
+  if (kind == GradientKind::jacobians)
+    return plan_of_jacobians(model, actions_of(task), rows, kBlocksOfThread,
+                             [&] { return task_jacobians(task, actions, run); });
   TaskGradientOptions options;
   options.episodes = kBlock;
   options.seed = run.seed;
-  options.actions = task.spec().horizon;
+  options.actions = rows;
   options.precision = run.precision;
   options.parameters = true;
   options.tape_bytes = tape_bytes;
-  plan.bytes = kBlocksOfThread * bytes_of(plan.arrays, task.spec().horizon) +
-               task_gradient_bytes(task, options);
-  plan.make = [&task, &actions, options,
-               arrays = plan.arrays]() -> std::unique_ptr<EpisodeGradients> {
-    return std::make_unique<TaskReturns>(task, actions, options, arrays);
-  };
+  GradientPlan plan{arrays_of_return(model, actions_of(task), "the return"), rows,
+                    [&task, &actions, options] { return task_returns(task, actions, options); }};
+  plan.bytes = kBlocksOfThread * bytes_of(plan.arrays, rows) + task_gradient_bytes(task, options);
   return plan;
 }
 
 void GradientSink::prepare(const EpisodeRows& rows) {
   if (rows.rows > rows.action_rows) {  // the last piece: the block is complete
-    std::unique_ptr<EpisodeGradients> worker;
+    EpisodeGradients compute;
     {
       const std::lock_guard lock(mutex_);
       if (!idle_.empty()) {
-        worker = std::move(idle_.back());
+        compute = std::move(idle_.back());
         idle_.pop_back();
       }
     }
-    if (!worker) worker = plan_.make();
+    if (!compute) compute = plan_.make();
     Block block;
-    worker->compute(rows.first_episode, rows.episodes, block.numbers);
+    make_room(plan_.arrays, rows.episodes, plan_.rows, block.numbers);
+    compute(rows.first_episode, rows.episodes, block.numbers);
     block.spans.assign(block.numbers.begin(), block.numbers.end());
     const std::lock_guard lock(mutex_);
-    idle_.push_back(std::move(worker));
+    idle_.push_back(std::move(compute));
     blocks_[rows.first_episode] = std::move(block);
   }
   next_.prepare(with_gradients(rows));

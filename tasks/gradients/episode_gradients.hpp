@@ -5,7 +5,6 @@
 
 #include <functional>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <vector>
 
@@ -21,19 +20,16 @@ namespace tangere {
 enum class GradientKind { none, returns, jacobians };
 const char* to_string(GradientKind kind);
 
-/// Derivatives of up to 16 episodes, which it plays again. Scratch of one thread.
-class EpisodeGradients {
- public:
-  virtual ~EpisodeGradients() = default;
-  /// Into one list of numbers per array, as EpisodeRows::gradients has them, all rows.
-  virtual void compute(std::int64_t first_episode, int episodes,
-                       std::vector<std::vector<double>>& out) = 0;
-};
+/// Fills in derivatives of up to 16 episodes, which it plays again: one list of numbers per array, as
+/// EpisodeRows::gradients has them, all rows, zeros to begin with. Holds the scratch of one thread.
+using EpisodeGradients = std::function<void(std::int64_t first_episode, int episodes,
+                                            std::vector<std::vector<double>>& out)>;
 
 /// What is stored and who computes it: `make` is called once for each thread.
 struct GradientPlan {
   std::vector<GradientArray> arrays;
-  std::function<std::unique_ptr<EpisodeGradients>()> make;
+  std::int64_t rows = 0;  ///< of an episode, at most
+  std::function<EpisodeGradients()> make;
   double bytes = 0;  ///< memory of one thread's scratch and of its blocks' results
 };
 
@@ -68,7 +64,7 @@ class GradientSink : public EpisodeSink {
   const GradientPlan& plan_;
   EpisodeSink& next_;
   std::mutex mutex_;
-  std::vector<std::unique_ptr<EpisodeGradients>> idle_;
+  std::vector<EpisodeGradients> idle_;
   std::map<std::int64_t, Block> blocks_;  // by their first episode
 };
 

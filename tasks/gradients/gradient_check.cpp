@@ -12,25 +12,18 @@
 #include "engine/derivative/point_numbers.hpp"
 #include "engine/derivative/tangent.hpp"
 #include "engine/sense/readout.hpp"
-#include "engine/step/displacement.hpp"
 #include "tasks/gradients/loss_reading.hpp"
 
 namespace tangere {
 namespace {
 
-/// The inputs of one rollout.
-struct Inputs {
-  std::vector<double> q, v, u;  ///< (nq), (nv), (steps, nu)
-};
-
 struct Setting {
   const Batch& start;
   const RolloutLoss& loss;
   const CheckOptions& options;
-  Inputs at;
-  std::vector<double> varying;  ///< what the scene randomises, in its order
+  CheckInputs at;
 
-  [[nodiscard]] std::span<const double> u(const Inputs& of, std::int64_t step) const {
+  [[nodiscard]] std::span<const double> u(const CheckInputs& of, std::int64_t step) const {
     const auto nu = std::size_t(start.model().nu());
     if (step == options.steps) return {};
     return std::span(of.u).subspan(std::size_t(step) * nu, nu);
@@ -68,7 +61,7 @@ class Look {
 
 /// Loss of each of `inputs`, as environments of one batch; NaN where a step finds no solution.
 std::vector<double> losses_of(const Setting& s, const Model& model,
-                              const std::vector<Inputs>& inputs,
+                              const std::vector<CheckInputs>& inputs,
                               const std::vector<double>& varying) {
   const auto nu = std::size_t(model.nu());
   Batch batch(model, static_cast<int>(inputs.size()), s.start.seed(), s.start.episode(0));
@@ -92,31 +85,6 @@ std::vector<double> losses_of(const Setting& s, const Model& model,
   for (std::size_t e = 0; e < inputs.size(); ++e)
     if (failed(batch.status(static_cast<int>(e)))) sums[e] = NAN;
   return sums;
-}
-
-/// change(inputs, e): one entry of the inputs moved by e.
-template <class Change>
-Difference difference_of(const Setting& s, double scale, const Change& change) {
-  std::vector<Inputs> all;
-  for (const double e : sweep(scale)) {
-    all.push_back(s.at);
-    change(all.back(), e);
-  }
-  return best_difference(losses_of(s, s.start.model(), all, s.varying), scale);
-}
-
-/// Of number k of the scene, by its relative change.
-Difference difference_of_number(const Setting& s, const NumberGradients& parameters, int k) {
-  std::vector<double> losses;
-  for (const double e : sweep(1)) {
-    Scene scene = s.start.model().scene();
-    std::vector<double> varying = s.varying;
-    const SceneNumber& number = parameters.infos()[std::size_t(k)].number;
-    const int random = randomization_of(scene, number);
-    (random < 0 ? number_in(scene, number) : varying[std::size_t(random)]) *= 1 + e;
-    losses.push_back(losses_of(s, Model(scene), {s.at}, varying)[0]);
-  }
-  return best_difference(losses, 1);
 }
 
 /// Changes of all points of a sensor at once, by one of their numbers: random from point to point,
@@ -157,27 +125,10 @@ std::vector<PointChange> point_changes(const Model& model, std::span<const doubl
   return changes;
 }
 
-/// `coefficients`: what this environment's sensors have, (sensors, 4); points have parts of them.
-Difference difference_of_points(const Setting& s, const PointChange& change,
-                                std::span<const double> coefficients) {
-  std::vector<double> losses;
-  for (const double e : sweep(1)) {
-    Scene scene = s.start.model().scene();
-    std::vector<double> moved = change.own;
-    for (double& x : moved) x *= e;
-    TactileDescription& sensor = scene.sensors[std::size_t(change.sensor)];
-    const double* has = &coefficients[std::size_t(4 * change.sensor)];
-    sensor.coefficients = {has[0], has[1], has[2], has[3]};
-    add_to_points(sensor, moved);
-    losses.push_back(losses_of(s, Model(scene), {s.at}, s.varying)[0]);
-  }
-  return best_difference(losses, 1);
-}
-
 /// Tangents along one direction per input.
 class Directions {
  public:
-  Directions(const Setting& s, const NumberGradients& parameters) : s_(s), parameters_(parameters) {
+  explicit Directions(const Setting& s) : s_(s) {
     const Model& model = s.start.model();
     Batch batch = s.start;
     Stepper stepper(model, s.options.stepper);
@@ -196,31 +147,27 @@ class Directions {
     }
   }
 
-  /// dL along (q, v, u, numbers), each empty for zeros, and the points' own numbers, by sensor.
-  double along(const std::vector<double>& q, const std::vector<double>& v,
-               const std::vector<double>& u, const std::vector<double>& change,
-               const std::vector<std::vector<double>>& points = {}) {
+  /// dL; `points`: changes of their own numbers, by sensor.
+  double along(const InputDirection& d, const std::vector<std::vector<double>>& points = {}) {
     const Model& model = s_.start.model();
     const auto nu = std::size_t(model.nu());
     const std::vector<double> zero = numbers(model.nv()), no_u(nu);
-    StateTangent state{q.empty() ? zero : q, v.empty() ? zero : v, zero, zero};
-    std::vector<double> rows;
-    if (!change.empty()) {
-      rows.resize(std::size_t(parameter_rows(model)));
-      parameters_.spread(change, s_.start, 0, rows);
-    }
+    const auto given = [&](std::span<const double> x) {
+      return x.empty() ? zero : std::vector<double>(x.begin(), x.end());
+    };
+    StateTangent state{given(d.q), given(d.v), zero, zero};
     Tangent tangent(model, s_.options.stepper);
     Batch batch = s_.start;
     Look look(model);
     double sum = 0;
     for (std::int64_t t = 0; t <= s_.options.steps; ++t) {
-      const std::span<const double> u_dot = u.empty() || t == s_.options.steps
+      const std::span<const double> u_dot = d.u.empty() || t == s_.options.steps
                                                 ? std::span<const double>(no_u)
-                                                : std::span(u).subspan(std::size_t(t) * nu, nu);
+                                                : d.u.subspan(std::size_t(t) * nu, nu);
       tape_->show(t, batch, 0);
-      sum += change_at(batch, look, tangent, t, state, u_dot, rows, points);
+      sum += change_at(batch, look, tangent, t, state, u_dot, d.numbers, points);
       if (t == s_.options.steps) break;
-      tangent.step(batch, 0, 0, *tape_, t, s_.u(s_.at, t), u_dot, rows, state);
+      tangent.step(batch, 0, 0, *tape_, t, s_.u(s_.at, t), u_dot, d.numbers, state);
     }
     return sum;
   }
@@ -262,7 +209,6 @@ class Directions {
   }
 
   const Setting& s_;
-  const NumberGradients& parameters_;
   std::optional<BlockTape> tape_;
 };
 
@@ -278,10 +224,7 @@ Setting setting_of(const Batch& start, const StepControls& controls, const Rollo
             loss,
             options,
             {numbers(model.nq()), numbers(model.nv()),
-             std::vector<double>(std::size_t(options.steps) * nu)},
-            {}};
-  for (std::size_t k = 0; k < model.scene().randomizations.size(); ++k)
-    s.varying.push_back(start.randomized_value(0, static_cast<int>(k)));
+             std::vector<double>(std::size_t(options.steps) * nu)}};
   start.get_q(0, s.at.q);
   start.get_v(0, s.at.v);
   for (std::int64_t t = 0; t < options.steps; ++t)
@@ -306,86 +249,73 @@ LossGradient gradient_of(const Batch& start, const StepControls& controls, const
   return rollout_gradients(start, controls, wanted, losses).losses[0];
 }
 
-/// The inputs, one after the other.
-class Check {
+class LossChecker : public GradientChecker {
  public:
-  Check(const Setting& s, const LossGradient& g)
-      : s_(s), g_(g), parameters_(s.start.model()), tangents_(s, parameters_) {
-    out.loss = g.value[0];
-  }
-
-  void controls() {
-    const Model& model = s_.start.model();
-    const auto nu = std::size_t(model.nu());
-    const std::span<const double> u = std::span(g_.u).first(std::size_t(s_.options.steps) * nu);
-    add({"u", u, all_of(u.size()),
-         [&](std::size_t i) {
-           return difference_of(s_, kControlScale, [i](Inputs& x, double e) { x.u[i] += e; });
-         },
-         [&](std::size_t i) {
-           return "step " + std::to_string(i / nu) + " " + std::string(model.u_names()[i % nu]);
-         }},
-        0, [&](const std::vector<double>& d) { return tangents_.along({}, {}, d, {}); });
-  }
-  void positions() {
-    const Model& m = s_.start.model();
-    const std::span<const double> q = std::span(g_.q).first(std::size_t(m.nv()));
-    const auto move = [&m](std::size_t i) {
-      return [&m, i](Inputs& x, double e) { displace(m, x.q, static_cast<int>(i), e); };
+  LossChecker(const Setting& s, const LossGradient& g)
+      : GradientChecker(s.start.model(), s.options), s_(s), g_(g), tangents_(s) {
+    const auto first = [](const std::vector<double>& all, std::size_t n) {
+      return std::vector<double>(all.begin(), all.begin() + std::ptrdiff_t(n));
     };
-    add({"q", q, all_of(q.size()), [&](std::size_t i) { return difference_of(s_, 1, move(i)); },
-         dof_name()},
-        1, [&](const std::vector<double>& d) { return tangents_.along(d, {}, {}, {}); });
-  }
-  void velocities() {
-    const std::span<const double> v = std::span(g_.v).first(std::size_t(s_.start.model().nv()));
-    add({"v", v, all_of(v.size()),
-         [&](std::size_t i) {
-           return difference_of(s_, kVelocityScale, [i](Inputs& x, double e) { x.v[i] += e; });
-         },
-         dof_name()},
-        2, [&](const std::vector<double>& d) { return tangents_.along({}, d, {}, {}); });
-  }
-  /// By relative changes of what this environment has: units differ.
-  void numbers_of_scene() {
-    const Model& model = s_.start.model();
-    const RelativeGradient r(parameters_, model.scene(), s_.varying,
-                             std::span(g_.parameters).first(std::size_t(parameters_.count())));
-    add({"numbers", r.gradient, r.given,
-         [&](std::size_t k) { return difference_of_number(s_, parameters_, static_cast<int>(k)); },
-         [&](std::size_t k) { return parameters_.infos()[k].name; }},
-        3, [&](const std::vector<double>& d) { return tangents_.along({}, {}, {}, r.change(d)); });
+    for (std::size_t k = 0; k < model_.scene().randomizations.size(); ++k)
+      varying_.push_back(s.start.randomized_value(0, static_cast<int>(k)));
+    at_ = s.at;
+    by_u_ = first(g.u, s.at.u.size());
+    by_q_ = first(g.q, s.at.v.size());
+    by_v_ = first(g.v, s.at.v.size());
+    by_numbers_ = first(g.parameters, std::size_t(parameters_.count()));
+    out_.loss = g.value[0];
   }
 
   /// By places and coefficients of all points of a sensor at once.
   void points() {
-    const Model& model = s_.start.model();
     std::vector<double> coefficients;  // this environment's
-    for (std::size_t s = 0; s < model.sensors().size(); ++s)
+    for (std::size_t s = 0; s < model_.sensors().size(); ++s)
       for (std::size_t k = 0; k < kCoefficients; ++k)
         coefficients.push_back(sensor_coefficients(s_.start, 0, static_cast<int>(s))[k]);
-    const std::vector<PointChange> changes = point_changes(model, coefficients, s_.options.seed);
+    const std::vector<PointChange> changes = point_changes(model_, coefficients, s_.options.seed);
     const std::span<const double> all =
-        std::span(g_.points).first(std::size_t(tactile_points(model) * kPointNumbers));
+        std::span(g_.points).first(std::size_t(tactile_points(model_) * kPointNumbers));
     std::vector<double> gradient;
     for (const PointChange& c : changes)
       gradient.push_back(std::inner_product(
           c.own.begin(), c.own.end(),
-          all.begin() + first_tactile_point(model, c.sensor) * kPointNumbers, 0.0));
+          all.begin() + first_tactile_point(model_, c.sensor) * kPointNumbers, 0.0));
     add({"points", gradient, all_of(gradient.size()),
-         [&](std::size_t k) { return difference_of_points(s_, changes[k], coefficients); },
+         [&](std::size_t k) { return difference_of_points(changes[k], coefficients); },
          [&](std::size_t k) {
-           return model.sensors()[std::size_t(changes[k].sensor)].name + " " +
+           return model_.sensors()[std::size_t(changes[k].sensor)].name + " " +
                   point_number_name(changes[k].number);
          }},
         4, [&](const std::vector<double>& d) {
-          return tangents_.along({}, {}, {}, {}, together(model, changes, d));
+          return tangents_.along({}, together(model_, changes, d));
         });
   }
 
-  GradientCheck out;
-
  private:
+  [[nodiscard]] std::vector<double> values(const Scene* other,
+                                           const std::vector<CheckInputs>& inputs,
+                                           const std::vector<double>& varying) const override {
+    return losses_of(s_, other != nullptr ? Model(*other) : s_.start.model(), inputs, varying);
+  }
+  [[nodiscard]] double along(const InputDirection& d) override { return tangents_.along(d); }
+  [[nodiscard]] const Batch& batch() const override { return s_.start; }
+  [[nodiscard]] std::string control_name(std::size_t i) const override {
+    const auto nu = std::size_t(model_.nu());
+    return "step " + std::to_string(i / nu) + " " + std::string(model_.u_names()[i % nu]);
+  }
+
+  /// `coefficients`: what this environment's sensors have, (sensors, 4); points have parts of them.
+  [[nodiscard]] Difference difference_of_points(const PointChange& change,
+                                                std::span<const double> coefficients) const {
+    return difference_of_scene([&](Scene& scene, std::vector<double>&, double e) {
+      std::vector<double> moved = change.own;
+      for (double& x : moved) x *= e;
+      TactileDescription& sensor = scene.sensors[std::size_t(change.sensor)];
+      const double* has = &coefficients[std::size_t(4 * change.sensor)];
+      sensor.coefficients = {has[0], has[1], has[2], has[3]};
+      add_to_points(sensor, moved);
+    });
+  }
   static std::vector<std::vector<double>> together(const Model& model,
                                                    const std::vector<PointChange>& changes,
                                                    const std::vector<double>& d) {
@@ -397,50 +327,21 @@ class Check {
         sum[std::size_t(changes[k].sensor)][i] += d[k] * changes[k].own[i];
     return sum;
   }
-  void add(const Comparison& c, std::uint32_t purpose,
-           const std::function<double(const std::vector<double>&)>& along) {
-    out.inputs.push_back(compare(c, out.loss, s_.options, purpose));
-    const std::vector<double> d = random_direction(c.gradient.size(), s_.options.seed, purpose);
-    compare_along(out.inputs.back(), c.gradient, d, along(d));
-  }
-  [[nodiscard]] std::function<std::string(std::size_t)> dof_name() const {
-    return [this](std::size_t i) { return std::string(s_.start.model().v_names()[i]); };
-  }
-
   const Setting& s_;
   const LossGradient& g_;
-  NumberGradients parameters_;
   Directions tangents_;
 };
 
 }  // namespace
 
-double GradientCheck::max_relative_error() const {
-  double worst = 0;
-  for (const CheckedInput& c : inputs)
-    worst = std::max({worst, c.difference_error, c.tangent_error});
-  return worst;
-}
-std::size_t GradientCheck::entries() const {
-  return std::accumulate(inputs.begin(), inputs.end(), std::size_t{0},
-                         [](std::size_t n, const auto& c) { return n + c.compared; });
-}
-std::size_t GradientCheck::kinks() const {
-  return std::accumulate(inputs.begin(), inputs.end(), std::size_t{0},
-                         [](std::size_t n, const auto& c) { return n + c.kinks; });
-}
-
 GradientCheck check_gradient(const Batch& start, const StepControls& controls,
                              const RolloutLoss& loss, const CheckOptions& options) {
   const Setting s = setting_of(start, controls, loss, options);
   const LossGradient g = gradient_of(start, controls, loss, options);
-  Check check(s, g);
-  if (start.model().nu() > 0) check.controls();
-  check.positions();
-  check.velocities();
-  check.numbers_of_scene();
-  if (reads_fields(loss, options)) check.points();
-  return check.out;
+  LossChecker checker(s, g);
+  checker.check();
+  if (reads_fields(loss, options)) checker.points();
+  return checker.result();
 }
 
 }  // namespace tangere

@@ -16,14 +16,6 @@ struct CheckOptions : CompareOptions {
   StepperOptions stepper;
 };
 
-struct GradientCheck {
-  double loss = 0;
-  std::vector<CheckedInput> inputs;
-  [[nodiscard]] double max_relative_error() const;
-  [[nodiscard]] std::size_t entries() const;  ///< compared
-  [[nodiscard]] std::size_t kinks() const;
-};
-
 /// Of environment 0 of `start`. Throws InputError when a step of its rollout finds no solution, and
 /// when it continues a run of a scheme of two steps.
 GradientCheck check_gradient(const Batch& start, const StepControls& controls,

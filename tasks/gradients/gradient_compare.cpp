@@ -6,7 +6,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "engine/derivative/tangent.hpp"
 #include "engine/model/random.hpp"
+#include "engine/step/displacement.hpp"
 
 namespace tangere {
 namespace {
@@ -132,6 +134,109 @@ std::vector<double> random_direction(std::size_t n, std::uint64_t seed, std::uin
   for (std::size_t i = 0; i < n; ++i)
     d[i] = uniform({seed, 1, static_cast<std::int64_t>(i), Purpose::control, purpose}, -1, 1);
   return d;
+}
+
+double GradientCheck::max_relative_error() const {
+  double worst = 0;
+  for (const CheckedInput& c : inputs)
+    worst = std::max({worst, c.difference_error, c.tangent_error});
+  return worst;
+}
+std::size_t GradientCheck::entries() const {
+  return std::accumulate(inputs.begin(), inputs.end(), std::size_t{0},
+                         [](std::size_t n, const auto& c) { return n + c.compared; });
+}
+std::size_t GradientCheck::kinks() const {
+  return std::accumulate(inputs.begin(), inputs.end(), std::size_t{0},
+                         [](std::size_t n, const auto& c) { return n + c.kinks; });
+}
+
+void GradientChecker::check() {
+  if (!at_.u.empty()) check_controls();
+  check_positions();
+  check_velocities();
+  check_numbers();
+}
+
+void GradientChecker::add(const Comparison& c, std::uint32_t purpose,
+                          const std::function<double(const std::vector<double>&)>& along) {
+  out_.inputs.push_back(compare(c, out_.loss, options_, purpose));
+  const std::vector<double> d = random_direction(c.gradient.size(), options_.seed, purpose);
+  compare_along(out_.inputs.back(), c.gradient, d, along(d));
+}
+
+void GradientChecker::check_controls() {
+  add({u_name_, by_u_, all_of(by_u_.size()),
+       [&](std::size_t i) {
+         return difference(kControlScale, [i](CheckInputs& x, double e) { x.u[i] += e; });
+       },
+       [&](std::size_t i) { return control_name(i); }},
+      0, [&](const std::vector<double>& d) {
+        return along({d, {}, {}, {}});
+      });
+}
+
+void GradientChecker::check_positions() {
+  const auto move = [this](std::size_t i) {
+    return [this, i](CheckInputs& x, double e) { displace(model_, x.q, static_cast<int>(i), e); };
+  };
+  add({"q", by_q_, all_of(by_q_.size()), [&](std::size_t i) { return difference(1, move(i)); },
+       [&](std::size_t i) { return std::string(model_.v_names()[i]); }},
+      1, [&](const std::vector<double>& d) {
+        return along({{}, d, {}, {}});
+      });
+}
+
+void GradientChecker::check_velocities() {
+  add({"v", by_v_, all_of(by_v_.size()),
+       [&](std::size_t i) {
+         return difference(kVelocityScale, [i](CheckInputs& x, double e) { x.v[i] += e; });
+       },
+       [&](std::size_t i) { return std::string(model_.v_names()[i]); }},
+      2, [&](const std::vector<double>& d) {
+        return along({{}, {}, d, {}});
+      });
+}
+
+/// By relative changes of what this environment has: units differ.
+void GradientChecker::check_numbers() {
+  const RelativeGradient r(parameters_, model_.scene(), varying_, by_numbers_);
+  const auto of_number = [&](std::size_t k) {
+    return difference_of_scene([&, k](Scene& scene, std::vector<double>& varying, double e) {
+      const SceneNumber& number = parameters_.infos()[k].number;
+      const int random = randomization_of(scene, number);
+      (random < 0 ? number_in(scene, number) : varying[std::size_t(random)]) *= 1 + e;
+    });
+  };
+  add({"numbers", r.gradient, r.given, of_number,
+       [&](std::size_t k) { return parameters_.infos()[k].name; }},
+      3, [&](const std::vector<double>& d) {
+        std::vector<double> rows(std::size_t(parameter_rows(model_)));
+        parameters_.spread(r.change(d), batch(), 0, rows);
+        return along({{}, {}, {}, rows});
+      });
+}
+
+Difference GradientChecker::difference(
+    double scale, const std::function<void(CheckInputs&, double)>& change) const {
+  std::vector<CheckInputs> all;
+  for (const double e : sweep(scale)) {
+    all.push_back(at_);
+    change(all.back(), e);
+  }
+  return best_difference(values(nullptr, all, varying_), scale);
+}
+
+Difference GradientChecker::difference_of_scene(
+    const std::function<void(Scene&, std::vector<double>&, double)>& change) const {
+  std::vector<double> found;
+  for (const double e : sweep(1)) {
+    Scene scene = model_.scene();
+    std::vector<double> varying = varying_;
+    change(scene, varying, e);
+    found.push_back(values(&scene, {at_}, varying)[0]);
+  }
+  return best_difference(found, 1);
 }
 
 }  // namespace tangere

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A gradient against central differences, over a sweep of step sizes, and against a derivative
-// along one direction.
+// along one direction: input by input, of whatever a rollout or an episode comes to.
 #pragma once
 
 #include <array>
@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/derivative/number_gradients.hpp"
+#include "engine/step/batch.hpp"
 
 namespace tangere {
 
@@ -79,6 +80,76 @@ struct RelativeGradient {
   RelativeGradient(const NumberGradients& parameters, const Scene& scene,
                    std::span<const double> varying, std::span<const double> gradient);
   [[nodiscard]] std::vector<double> change(std::span<const double> relative) const;
+};
+
+struct GradientCheck {
+  double loss = 0;
+  std::vector<CheckedInput> inputs;
+  [[nodiscard]] double max_relative_error() const;
+  [[nodiscard]] std::size_t entries() const;  ///< compared
+  [[nodiscard]] std::size_t kinks() const;
+};
+
+/// The inputs of a rollout or an episode.
+struct CheckInputs {
+  std::vector<double> q, v;  ///< (nq), (nv) where it begins
+  std::vector<double> u;     ///< (steps, nu) controls, or (A, action) of a task
+};
+
+/// Changes of them; empty: none.
+struct InputDirection {
+  std::span<const double> u, q, v;  ///< as in CheckInputs, q along the dofs: (nv)
+  std::span<const double> numbers;  ///< as rows of BlockCotangent::parameters
+};
+
+/// Checks a gradient by all its inputs, one after the other. Of what, a scene's loss or a task's
+/// return, says a class derived from it.
+class GradientChecker {
+ public:
+  virtual ~GradientChecker() = default;
+  GradientChecker(const GradientChecker&) = delete;
+  GradientChecker& operator=(const GradientChecker&) = delete;
+
+  /// By controls or actions, if there are any, first state and the scene's numbers.
+  void check();
+  [[nodiscard]] const GradientCheck& result() const { return out_; }
+
+ protected:
+  GradientChecker(const Model& model, const CompareOptions& options)
+      : model_(model), options_(options), parameters_(model) {}
+
+  /// What each of `inputs` comes to, side by side, NaN where a step finds no solution; in `other`,
+  /// or in the scene as it is when that is null. `varying`: what the scene randomises, in its order.
+  [[nodiscard]] virtual std::vector<double> values(const Scene* other,
+                                                   const std::vector<CheckInputs>& inputs,
+                                                   const std::vector<double>& varying) const = 0;
+  [[nodiscard]] virtual double along(const InputDirection& direction) = 0;
+  /// Whose environment 0 has the numbers of the scene that are changed.
+  [[nodiscard]] virtual const Batch& batch() const = 0;
+  [[nodiscard]] virtual std::string control_name(std::size_t entry) const = 0;
+
+  /// `along`: the derivative along a direction by another way.
+  void add(const Comparison& c, std::uint32_t purpose,
+           const std::function<double(const std::vector<double>&)>& along);
+  void check_controls();
+  void check_positions();
+  void check_velocities();
+  void check_numbers();
+  /// change(inputs, e): one entry of the inputs moved by e.
+  [[nodiscard]] Difference difference(
+      double scale, const std::function<void(CheckInputs&, double)>& change) const;
+  /// change(scene, varying, e): numbers of the scene, by their relative change.
+  [[nodiscard]] Difference difference_of_scene(
+      const std::function<void(Scene&, std::vector<double>&, double)>& change) const;
+
+  const Model model_;
+  const CompareOptions options_;
+  NumberGradients parameters_;
+  CheckInputs at_;
+  std::vector<double> varying_;
+  std::vector<double> by_u_, by_q_, by_v_, by_numbers_;  // the gradient
+  const char* u_name_ = "u";
+  GradientCheck out_;
 };
 
 std::vector<std::size_t> all_of(std::size_t count);

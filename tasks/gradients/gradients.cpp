@@ -7,8 +7,7 @@
 
 #include "engine/derivative/point_numbers.hpp"
 #include "kernels/numbers/block.hpp"
-#include "tasks/gradients/gradient_block.hpp"
-#include "tasks/run/block_threads.hpp"
+#include "tasks/gradients/loss_block.hpp"
 
 namespace tangere {
 namespace {
@@ -49,7 +48,7 @@ GradientSummary empty_gradients(const Model& model, int environments, const Grad
 struct GradientRollouts::Impl {
   Model model;
   GradientOptions options;
-  std::vector<GradientBlock> workers;  // by the thread's index in the arena
+  std::vector<LossBlock> workers;  // by the thread's index in the arena
   std::size_t losses;
   BlockThreads threads;
 
@@ -79,20 +78,10 @@ GradientSummary GradientRollouts::run(const Batch& start, const StepControls& co
   GradientSummary out = empty_gradients(i.model, start.environments(), i.options, i.losses);
   Batch batch = start;
   std::vector<double> u(std::size_t(start.environments()) * std::size_t(i.model.nu()));
-  std::vector<std::vector<FailedEnvironment>> failures(std::size_t(start.blocks()));
-  for (GradientBlock& worker : i.workers) worker.begin(go_on);
-  i.threads.for_each(batch.blocks(), i.workers, [&](GradientBlock& worker, int b) {
-    worker.run(batch, b, controls, u, out, failures[std::size_t(b)]);
-  });
-  for (const auto& of_block : failures)
-    out.failures.insert(out.failures.end(), of_block.begin(), of_block.end());
-  std::sort(out.failures.begin(), out.failures.end(),
-            [](const auto& a, const auto& b) { return a.environment < b.environment; });
-  for (const GradientBlock& worker : i.workers) {
-    out.newton_iterations += worker.newton_iterations();
-    out.recomputed_steps += worker.recomputed_steps();
-    out.stopped = out.stopped || worker.stopped();
-  }
+  run_gradients(i.threads, i.workers, batch.blocks(), go_on, out,
+                [&](LossBlock& worker, int b, std::vector<FailedEnvironment>& failures) {
+                  worker.run(batch, b, controls, u, out, failures);
+                });
   return out;
 }
 

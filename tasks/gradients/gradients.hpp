@@ -47,12 +47,18 @@ struct LossGradient {
   std::vector<double> points;      ///< (E, tactile_points(model), kPointNumbers) or empty
 };
 
-struct GradientSummary {
-  std::vector<LossGradient> losses;
-  std::vector<FailedEnvironment> failures;  ///< in the order of environments
+/// How the rollouts or episodes of gradients went.
+struct GradientCounts {
+  /// In the order of environments. Of a task: those of its episodes in their order, steps are
+  /// actions, -1 the reset.
+  std::vector<FailedEnvironment> failures;
   std::int64_t newton_iterations = 0;
   std::int64_t recomputed_steps = 0;  ///< of blocks, from checkpoints
   bool stopped = false;               ///< on the way: gradients are not complete
+};
+
+struct GradientSummary : GradientCounts {
+  std::vector<LossGradient> losses;
 };
 
 /// Owns the threads and their scratch: for many rollouts of one model, as in a descent.

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/step/displacement.hpp"
 #include "tasks/gradients/task_tangent.hpp"
 
 namespace tangere {
@@ -18,82 +17,36 @@ constexpr double kMargin =
 
 std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
-/// The inputs of one episode.
-struct Inputs {
-  std::vector<double> q, v, actions;  ///< (nq), (nv) where the first action begins; (A, action)
-};
-
-class Check {
+class ReturnChecker : public GradientChecker {
  public:
-  Check(const Task& task, const TaskMaker& make, const TaskActions& actions,
-        const TaskCheckOptions& o)
-      : task_(task), make_(make), options_(o), parameters_(task.model()) {
-    gradient_ = task_gradients(task, within_bounds(actions), wanted());
-    if (!gradient_.lost.empty())
+  ReturnChecker(const Task& task, const TaskMaker& make, const TaskActions& actions,
+                const TaskCheckOptions& o)
+      : GradientChecker(task.model(), o), task_(task), make_(make), task_options_(o) {
+    TaskGradients gradient = task_gradients(task, within_bounds(actions), wanted());
+    if (!gradient.failures.empty())
       throw InputError(fmt::format("action {} of episode {} of task {} finds no solution: {}",
-                                   gradient_.lost[0].action, o.episode, task.spec().name,
-                                   to_string(gradient_.lost[0].status)));
-    out.loss = gradient_.value[0];
-    out.actions = gradient_.length[0];
-    gradient_.action.resize(size(out.actions) * task.spec().action.size());
-    gradient_.by_action.resize(gradient_.action.size());
+                                   gradient.failures[0].step, o.episode, task.spec().name,
+                                   to_string(gradient.failures[0].status)));
+    out_.loss = gradient.value[0];
+    length_ = gradient.length[0];
+    const std::size_t numbers = size(length_) * task.spec().action.size();
+    gradient.action.resize(numbers);
+    gradient.by_action.resize(numbers);
+    u_name_ = "actions";
+    by_u_ = std::move(gradient.by_action);
+    by_q_ = std::move(gradient.by_q);
+    by_v_ = std::move(gradient.by_v);
+    by_numbers_ = std::move(gradient.by_parameter);
     rollout_.emplace(task, o.stepper, Precision::f64);
     rollout_->start(o.seed, {&o.episode, 1});
     const Moment first = view_of(rollout_->batch(), rollout_->data(), 0).now();
-    at_ = {{first.q.begin(), first.q.end()}, {first.v.begin(), first.v.end()}, gradient_.action};
-    for (std::size_t k = 0; k < task.model().scene().randomizations.size(); ++k)
+    at_ = {{first.q.begin(), first.q.end()}, {first.v.begin(), first.v.end()}, gradient.action};
+    for (std::size_t k = 0; k < model_.scene().randomizations.size(); ++k)
       varying_.push_back(rollout_->batch().randomized_value(0, static_cast<int>(k)));
-    tangent_.emplace(*rollout_, at_.actions, o.stepper);
+    tangent_.emplace(*rollout_, at_.u, o.stepper);
   }
 
-  void actions() {
-    const std::size_t width = task_.spec().action.size();
-    add({"actions", gradient_.by_action, all_of(gradient_.by_action.size()),
-         [&](std::size_t i) {
-           return difference(kControlScale, [i](Inputs& x, double e) { x.actions[i] += e; });
-         },
-         [&, width](std::size_t i) {
-           return fmt::format("action {} {}[{}]", i / width, task_.spec().action.name, i % width);
-         }},
-        0, [](std::span<const double> d) {
-          return EpisodeDirection{d, {}, {}, {}};
-        });
-  }
-  void positions() {
-    const auto move = [this](std::size_t i) {
-      return
-          [this, i](Inputs& x, double e) { displace(task_.model(), x.q, static_cast<int>(i), e); };
-    };
-    add({"q", gradient_.by_q, all_of(gradient_.by_q.size()),
-         [&](std::size_t i) { return difference(1, move(i)); }, dof_name()},
-        1, [](std::span<const double> d) {
-          return EpisodeDirection{{}, d, {}, {}};
-        });
-  }
-  void velocities() {
-    add({"v", gradient_.by_v, all_of(gradient_.by_v.size()),
-         [&](std::size_t i) {
-           return difference(kVelocityScale, [i](Inputs& x, double e) { x.v[i] += e; });
-         },
-         dof_name()},
-        2, [](std::span<const double> d) {
-          return EpisodeDirection{{}, {}, d, {}};
-        });
-  }
-  /// By relative changes of what this episode has: units differ.
-  void numbers() {
-    const RelativeGradient r(parameters_, task_.model().scene(), varying_, gradient_.by_parameter);
-    std::vector<double> rows(size(parameter_rows(task_.model())));
-    add({"numbers", r.gradient, r.given,
-         [&](std::size_t k) { return difference_of_number(static_cast<int>(k)); },
-         [&](std::size_t k) { return parameters_.infos()[k].name; }},
-        3, [&](std::span<const double> d) {
-          parameters_.spread(r.change(d), rollout_->batch(), 0, rows);
-          return EpisodeDirection{{}, {}, {}, rows};
-        });
-  }
-
-  TaskGradientCheck out;
+  [[nodiscard]] std::int64_t length() const { return length_; }
 
  private:
   TaskActions within_bounds(const TaskActions& actions) const {
@@ -107,20 +60,22 @@ class Check {
   [[nodiscard]] TaskGradientOptions wanted() const {
     TaskGradientOptions wanted;
     wanted.episodes = 1;
-    wanted.first_episode = options_.episode;
+    wanted.first_episode = task_options_.episode;
     wanted.seed = options_.seed;
-    wanted.actions = options_.actions;
-    wanted.stepper = options_.stepper;
+    wanted.actions = task_options_.actions;
+    wanted.stepper = task_options_.stepper;
     wanted.precision = Precision::f64;
     wanted.parameters = true;
     return wanted;
   }
 
-  /// The return of each of `inputs`, lanes of one block; NaN where a step finds no solution.
-  [[nodiscard]] std::vector<double> returns(const Task& task, const std::vector<Inputs>& inputs,
-                                            const std::vector<double>& varying) const {
-    TaskRollout rollout(task, options_.stepper, Precision::f64);
-    rollout.start(options_.seed, std::vector<std::int64_t>(inputs.size(), options_.episode));
+  [[nodiscard]] std::vector<double> values(const Scene* other,
+                                           const std::vector<CheckInputs>& inputs,
+                                           const std::vector<double>& varying) const override {
+    const std::unique_ptr<Task> made = other != nullptr ? make_(*other) : nullptr;
+    const Task& task = made ? *made : task_;
+    TaskRollout rollout(task, task_options_.stepper, Precision::f64);
+    rollout.start(options_.seed, std::vector<std::int64_t>(inputs.size(), task_options_.episode));
     for (int l = 0; l < rollout.lanes(); ++l) {
       for (std::size_t k = 0; k < varying.size(); ++k)
         if (rollout.batch().is_parameter(static_cast<int>(k)))
@@ -129,9 +84,9 @@ class Check {
     }
     const std::size_t width = task.spec().action.size();
     ActionRecord record(task);
-    for (std::int64_t a = 0; a < out.actions; ++a) {
+    for (std::int64_t a = 0; a < length_; ++a) {
       for (std::size_t l = 0; l < inputs.size(); ++l)
-        std::copy_n(inputs[l].actions.begin() + a * std::int64_t(width), width,
+        std::copy_n(inputs[l].u.begin() + a * std::int64_t(width), width,
                     record.asked.begin() + std::ptrdiff_t(l * width));
       rollout.begin(record);
       rollout.take_steps(nullptr);
@@ -143,62 +98,28 @@ class Check {
     return sums;
   }
 
-  /// change(inputs, e): one entry of the inputs moved by e.
-  [[nodiscard]] Difference difference(double scale,
-                                      const std::function<void(Inputs&, double)>& change) const {
-    std::vector<Inputs> all;
-    for (const double e : sweep(scale)) {
-      all.push_back(at_);
-      change(all.back(), e);
-    }
-    return best_difference(returns(task_, all, varying_), scale);
-  }
-
-  /// Of number k of the scene, by its relative change.
-  [[nodiscard]] Difference difference_of_number(int k) const {
-    std::vector<double> values;
-    for (const double e : sweep(1)) {
-      Scene scene = task_.model().scene();
-      std::vector<double> varying = varying_;
-      const SceneNumber& number = parameters_.infos()[size(k)].number;
-      const int random = randomization_of(scene, number);
-      (random < 0 ? number_in(scene, number) : varying[size(random)]) *= 1 + e;
-      values.push_back(returns(*make_(scene), {at_}, varying)[0]);
-    }
-    return best_difference(values, 1);
-  }
-
-  void add(const Comparison& c, std::uint32_t purpose,
-           const std::function<EpisodeDirection(std::span<const double>)>& along) {
-    out.inputs.push_back(compare(c, out.loss, options_, purpose));
-    const std::vector<double> d = random_direction(c.gradient.size(), options_.seed, purpose);
-    compare_along(out.inputs.back(), c.gradient, d, tangent_->along(along(d)));
-  }
-  [[nodiscard]] std::function<std::string(std::size_t)> dof_name() const {
-    return [this](std::size_t i) { return std::string(task_.model().v_names()[i]); };
+  [[nodiscard]] double along(const InputDirection& d) override { return tangent_->along(d); }
+  [[nodiscard]] const Batch& batch() const override { return rollout_->batch(); }
+  [[nodiscard]] std::string control_name(std::size_t i) const override {
+    const TensorSpec& action = task_.spec().action;
+    return fmt::format("action {} {}[{}]", i / action.size(), action.name, i % action.size());
   }
 
   const Task& task_;
   const TaskMaker& make_;
-  const TaskCheckOptions& options_;
-  NumberGradients parameters_;
-  TaskGradients gradient_;
+  const TaskCheckOptions& task_options_;
+  std::int64_t length_ = 0;  // actions until the end
   std::optional<TaskRollout> rollout_;
   std::optional<TaskTangent> tangent_;
-  Inputs at_;
-  std::vector<double> varying_;  // what the scene randomises, in its order
 };
 
 }  // namespace
 
 TaskGradientCheck check_task_gradient(const Task& task, const TaskMaker& make,
                                       const TaskActions& actions, const TaskCheckOptions& options) {
-  Check check(task, make, actions, options);
-  check.actions();
-  check.positions();
-  check.velocities();
-  check.numbers();
-  return check.out;
+  ReturnChecker checker(task, make, actions, options);
+  checker.check();
+  return {checker.result(), checker.length()};
 }
 
 }  // namespace tangere

@@ -6,8 +6,7 @@
 
 #include <algorithm>
 
-#include "tasks/gradients/task_gradient_block.hpp"
-#include "tasks/run/block_threads.hpp"
+#include "tasks/gradients/return_block.hpp"
 
 namespace tangere {
 namespace {
@@ -49,24 +48,17 @@ TaskGradients task_gradients(const Task& task, const TaskActions& actions,
   const TaskGradientOptions o = checked(task, asked);
   const auto blocks = static_cast<int>((o.episodes + kernels::kBlock - 1) / kernels::kBlock);
   TaskGradients out = empty_task_gradients(task, o);
-  std::vector<std::vector<LostEpisode>> lost(size(blocks));
-  std::vector<TaskGradientBlock> workers;  // by the thread's index in the arena
+  std::vector<ReturnBlock> workers;  // by the thread's index in the arena
   workers.reserve(size(o.threads));
-  for (int i = 0; i < o.threads; ++i) workers.emplace_back(task, o).begin(go_on);
-  BlockThreads(o.threads).for_each(blocks, workers, [&](TaskGradientBlock& worker, int b) {
-    const std::int64_t first = std::int64_t{b} * kernels::kBlock;
-    const auto count =
-        static_cast<int>(std::min<std::int64_t>(kernels::kBlock, o.episodes - first));
-    worker.run(o.first_episode + first, count, actions, first, out, lost[size(b)]);
-  });
-  for (const auto& of_block : lost)
-    out.lost.insert(out.lost.end(), of_block.begin(), of_block.end());
-  std::sort(out.lost.begin(), out.lost.end(),
-            [](const auto& a, const auto& b) { return a.episode < b.episode; });
-  for (const TaskGradientBlock& worker : workers) {
-    out.recomputed_steps += worker.recomputed_steps();
-    out.stopped = out.stopped || worker.stopped();
-  }
+  for (int i = 0; i < o.threads; ++i) workers.emplace_back(task, o);
+  BlockThreads threads(o.threads);
+  run_gradients(threads, workers, blocks, go_on, out,
+                [&](ReturnBlock& worker, int b, std::vector<FailedEnvironment>& failures) {
+                  const std::int64_t first = std::int64_t{b} * kernels::kBlock;
+                  const auto count =
+                      static_cast<int>(std::min<std::int64_t>(kernels::kBlock, o.episodes - first));
+                  worker.run(o.first_episode + first, count, actions, first, out, failures);
+                });
   return out;
 }
 
@@ -75,7 +67,7 @@ double task_gradient_bytes(const Task& task, const TaskGradientOptions& asked) {
   const double numbers = o.parameters ? NumberGradients(task.model()).count() : 0;
   const double results = 2.0 * double(o.actions) * double(task.spec().action.size()) +
                          2.0 * task.model().nv() + numbers + 2;
-  return 8 * results * double(o.episodes) + o.threads * TaskGradientBlock::bytes(task, o);
+  return 8 * results * double(o.episodes) + o.threads * ReturnBlock::bytes(task, o);
 }
 
 }  // namespace tangere

@@ -26,25 +26,16 @@ struct TaskGradientOptions {
   double tape_bytes = 1e9;
 };
 
-/// An episode that found no solution, which ends it.
-struct LostEpisode {
-  std::int64_t episode, action;
-  StepStatus status;
-};
-
 /// Of every episode, A = actions. What belongs to the reset (settling, an opening) is taken as
 /// given, and so is what is drawn.
-struct TaskGradients {
+struct TaskGradients : GradientCounts {
   std::vector<double> value;         ///< (E) sum of rewards until the end
   std::vector<std::int64_t> length;  ///< (E) actions until the end
   std::vector<double> action;        ///< (E, A, action) as chosen; zeros after the end
   std::vector<double> by_action;     ///< (E, A, action); 0 for one beyond its bounds
   std::vector<double> by_q,
       by_v;  ///< (E, nv) by the state where the first action begins, positions along the dofs of v
-  std::vector<double> by_parameter;   ///< (E, NumberGradients::count()) or empty
-  std::vector<LostEpisode> lost;      ///< ascending; their derivatives are those until then
-  std::int64_t recomputed_steps = 0;  ///< of blocks, from checkpoints
-  bool stopped = false;               ///< on the way: nothing is complete
+  std::vector<double> by_parameter;  ///< (E, NumberGradients::count()) or empty
 };
 
 /// Episodes of `task` in blocks of 16 on all threads. `actions` chooses every action, looking at

@@ -67,7 +67,7 @@ TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
   }
 }
 
-double TaskTangent::along(const EpisodeDirection& d) {
+double TaskTangent::along(const InputDirection& d) {
   const auto given = [](std::span<const double> x, std::size_t n) {
     return x.empty() ? std::vector<double>(n) : std::vector<double>(x.begin(), x.end());
   };
@@ -77,8 +77,7 @@ double TaskTangent::along(const EpisodeDirection& d) {
   double sum = 0;
   for (std::size_t a = 0; a < records_.size(); ++a) {
     action_ =
-        given(d.actions.empty() ? d.actions : d.actions.subspan(a * action_.size(), action_.size()),
-              action_.size());
+        given(d.u.empty() ? d.u : d.u.subspan(a * action_.size(), action_.size()), action_.size());
     rollout_.look_again(tapes_[a]);
     begin(a);
     ViewTangent seen;
@@ -119,7 +118,7 @@ void TaskTangent::begin(std::size_t action) {
   state_ = placed;
 }
 
-void TaskTangent::take_steps(std::size_t action, const EpisodeDirection& d, ViewTangent& seen) {
+void TaskTangent::take_steps(std::size_t action, const InputDirection& d, ViewTangent& seen) {
   const ActionRecord& r = records_[action];
   const BlockTape& tape = tapes_[action];
   const TaskSpec& spec = task_.spec();
@@ -148,7 +147,7 @@ void TaskTangent::take_steps(std::size_t action, const EpisodeDirection& d, View
   }
 }
 
-void TaskTangent::look(std::size_t action, std::size_t moment, const EpisodeDirection& d,
+void TaskTangent::look(std::size_t action, std::size_t moment, const InputDirection& d,
                        ViewTangent& seen) {
   const BlockTape& tape = tapes_[action];
   const int step = task_.spec().moments[moment];

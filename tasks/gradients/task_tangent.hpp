@@ -7,16 +7,10 @@
 #include <vector>
 
 #include "engine/derivative/tangent.hpp"
+#include "tasks/gradients/gradient_compare.hpp"
 #include "tasks/gradients/task_rollout.hpp"
 
 namespace tangere {
-
-/// Changes of an episode's inputs; empty: none.
-struct EpisodeDirection {
-  std::span<const double> actions;  ///< (A, action)
-  std::span<const double> q, v;     ///< (nv) of the state where the first action begins
-  std::span<const double> numbers;  ///< as rows of BlockCotangent::parameters
-};
 
 class TaskTangent {
  public:
@@ -24,7 +18,7 @@ class TaskTangent {
   /// bounds.
   TaskTangent(TaskRollout& rollout, std::span<const double> actions, const StepperOptions& options);
 
-  [[nodiscard]] double along(const EpisodeDirection& direction);
+  [[nodiscard]] double along(const InputDirection& direction);
 
  private:
   /// A change of what a task looks at.
@@ -34,8 +28,8 @@ class TaskTangent {
   };
   struct OwnCotangent;
   void begin(std::size_t action);
-  void take_steps(std::size_t action, const EpisodeDirection& d, ViewTangent& seen);
-  void look(std::size_t action, std::size_t moment, const EpisodeDirection& d, ViewTangent& seen);
+  void take_steps(std::size_t action, const InputDirection& d, ViewTangent& seen);
+  void look(std::size_t action, std::size_t moment, const InputDirection& d, ViewTangent& seen);
   [[nodiscard]] double reward(std::size_t action, const ViewTangent& seen);
 
   TaskRollout& rollout_;

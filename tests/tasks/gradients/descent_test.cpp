@@ -164,7 +164,7 @@ TEST(Descent, AdamOnActionsRaisesTheReturnOfBoxPushing) {
   double before = 0, after = 0;
   for (int k = 0; k <= 50; ++k) {
     const TaskGradients g = task_gradients(*task, given, options);
-    ASSERT_TRUE(g.lost.empty());
+    ASSERT_TRUE(g.failures.empty());
     after = std::accumulate(g.value.begin(), g.value.end(), 0.0) / kEnvironments;
     if (k == 0) before = after;
     std::vector<double> down(g.by_action.size());

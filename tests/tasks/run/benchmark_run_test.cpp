@@ -10,14 +10,15 @@
 #include <string>
 
 #include "io/scene/scene_reader.hpp"
+#include "tests/tasks/task_check.hpp"
 
 namespace tangere {
 namespace {
 
-using testing::ElementsAreArray;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::SizeIs;
+using ::testing::ElementsAreArray;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
 
 constexpr std::uint64_t kSeed = 5;
 constexpr int kSteps = 120;  // the pad is on the ball from step 40 or so
@@ -197,6 +198,42 @@ TEST(BenchmarkRun, StopsBetweenSteps) {
   EXPECT_TRUE(result.stopped);
   EXPECT_THAT(result.times, IsEmpty());
   EXPECT_LE(asked, 50 + 3) << "a stopped block was stepped on";
+}
+
+/// Episodes that end and start anew included, on any number of threads.
+TEST(BenchmarkRun, ATaskIsPlayedAsAVectorTaskPlaysIt) {
+  constexpr int kEnvironments = 20;
+  for (const char* name : {"dummy", "insertion_translation"}) {
+    const auto task = ::tangere::testing::task_named(name);
+    const std::int64_t actions = task->spec().horizon + 2;
+    const Policy policy(*task, PolicyKind::random);
+    VectorOptions of_vector;
+    of_vector.seed = kSeed;
+    VectorTask vector(*task, kEnvironments, of_vector);
+    std::vector<std::uint64_t> expected(vector.episodes().begin(), vector.episodes().end());
+    std::vector<double> chosen(kEnvironments * task->spec().action.size());
+    for (std::int64_t t = 0; t < actions; ++t) {
+      policy.act(vector, chosen);
+      vector.step(chosen);
+      for (int e = 0; e < kEnvironments; ++e) {
+        const auto i = std::size_t(e);
+        const std::vector<double> rest{vector.rewards()[i], double(vector.terminated()[i]),
+                                       double(vector.truncated()[i]), double(vector.success()[i])};
+        expected[i] = chain_bits(chain_bits(expected[i], vector.observation(e)),
+                                 std::span<const double>(rest));
+      }
+    }
+    for (const int threads : {1, 2}) {
+      BenchmarkOptions o = options(threads, FrameKind::dense, Precision::mixed);
+      o.rollout = {actions};
+      const BenchmarkResult result =
+          run_benchmark(Batch(task->model(), kEnvironments, kSeed), *task, policy, o);
+      EXPECT_THAT(result.checksums, ElementsAreArray(expected)) << name;
+      EXPECT_EQ(result.environment_steps, vector.counts().environment_steps);
+      EXPECT_EQ(result.simulation_steps, vector.counts().simulation_steps);
+      EXPECT_EQ(result.newton_iterations, vector.counts().newton_iterations);
+    }
+  }
 }
 
 TEST(BenchmarkRun, RefusesWhatMakesNoSense) {

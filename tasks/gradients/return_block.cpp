@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forward with a tape for each action, or a checkpoint every so many; then action by action back.
+// A stretch is an action, with a tape of its own.
 // Of an action that begins at x, with memory m found and m⁺ left, K steps and looks in between:
 //   r = judge(moments, m⁺, a);  x_(k+1) = step(x_k, controls(x_0, m⁺, a));
 //       x_0 = place(x, m⁺, a);  m⁺ = begin_action(x, m, a)
-#include "tasks/gradients/task_gradient_block.hpp"
+#include "tasks/gradients/return_block.hpp"
 
 #include <fmt/format.h>
 
@@ -17,10 +17,6 @@ using kernels::kBlock;
 namespace {
 
 std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
-
-double checkpoint_bytes(const Model& model) {
-  return double(model.state_bytes_per_environment()) * kBlock;
-}
 
 double tape_bytes(const Task& task, const TaskGradientOptions& o) {
   const Integrator scheme = o.stepper.integrator.value_or(task.model().integrator());
@@ -36,36 +32,26 @@ double bytes_with(const Task& task, const TaskGradientOptions& o, std::int64_t s
   return records + double(segment) * tape_bytes(task, o) + checkpoints;
 }
 
-/// Actions on tapes at a time: all, or as many as make tapes and checkpoints together smallest, if
-/// that fits.
-std::int64_t segment_length(const Task& task, const TaskGradientOptions& o) {
-  if (bytes_with(task, o, o.actions) <= o.tape_bytes) return o.actions;
-  const double ratio = double(o.actions) * checkpoint_bytes(task.model()) / tape_bytes(task, o);
-  const auto best = std::clamp<std::int64_t>(std::llround(std::sqrt(ratio)), 1, o.actions);
-  const double needed = bytes_with(task, o, best);
-  if (needed > o.tape_bytes)
-    throw InputError(fmt::format("tapes of {:.0f} bytes for {} actions; expected at least {:.0f}",
-                                 o.tape_bytes, o.actions, needed));
-  return best;
+TapePlan plan_of(const Task& task, const TaskGradientOptions& o) {
+  return {o.actions, task.spec().steps_per_action,
+          units_on_tape(
+              task.model(), o.actions, tape_bytes(task, o), o.tape_bytes,
+              [&](std::int64_t segment) { return bytes_with(task, o, segment); }, "actions")};
 }
 
 }  // namespace
 
-TaskGradientBlock::TaskGradientBlock(const Task& task, const TaskGradientOptions& options)
-    : task_(task),
+ReturnBlock::ReturnBlock(const Task& task, const TaskGradientOptions& options)
+    : GradientBlock(task.model(), options.stepper, {1, options.parameters}, plan_of(task, options)),
+      task_(task),
       options_(options),
       rollout_(task, options.stepper, options.precision),
-      adjoint_(task.model(), options.stepper, {1, options.parameters}),
-      pullback_(task.model()),
-      parameters_(task.model()),
-      segment_(segment_length(task, options)),
       moments_(task.spec().moments.size()),
       start_q_(kBlock * size(task.model().nv())),
       start_v_(start_q_.size()),
       by_u_(kBlock * size(task.model().nu())),
-      by_memory_(kBlock * size(task.spec().memory)) {
-  for (std::int64_t k = 0; k < segment_; ++k)
-    tapes_.emplace_back(task.model(), rollout_.integrator(), task.spec().steps_per_action);
+      by_memory_(kBlock * size(task.spec().memory)),
+      sound_(kBlock) {
   records_.assign(size(options.actions), ActionRecord(task));
   by_action_.assign(size(options.actions), std::vector<double>(kBlock * task.spec().action.size()));
   for (MomentRows& m : moments_) {
@@ -75,77 +61,57 @@ TaskGradientBlock::TaskGradientBlock(const Task& task, const TaskGradientOptions
   }
 }
 
-void TaskGradientBlock::begin(const GradientGoOn& go_on) {
-  go_on_ = &go_on;
-  recomputed_steps_ = 0;
-  stopped_ = false;
-}
-
-double TaskGradientBlock::bytes(const Task& task, const TaskGradientOptions& options) {
+double ReturnBlock::bytes(const Task& task, const TaskGradientOptions& options) {
   return std::min(bytes_with(task, options, options.actions), options.tape_bytes) +
          BlockWorker::bytes(task) + 2 * double(Stepper::workspace_bytes(task.model()));
 }
 
-bool TaskGradientBlock::may_go_on() {
-  if (go_on_ != nullptr && *go_on_ && !(*go_on_)()) stopped_ = true;
-  return !stopped_;
-}
-
-void TaskGradientBlock::run(std::int64_t first, int count, const TaskActions& actions,
-                            std::int64_t to, TaskGradients& out, std::vector<LostEpisode>& lost) {
+void ReturnBlock::run(std::int64_t first, int count, const TaskActions& actions, std::int64_t to,
+                      TaskGradients& out, std::vector<FailedEnvironment>& failures) {
   std::vector<std::int64_t> episodes;
   for (int e = 0; e < count; ++e) episodes.push_back(first + e);
   rollout_.start(options_.seed, episodes);
-  forward(actions, lost);
-  if (!stopped_) backward();
-  if (!stopped_) finish(to, out);
-}
-
-void TaskGradientBlock::forward(const TaskActions& actions, std::vector<LostEpisode>& lost) {
-  const bool whole = segment_ == options_.actions;
-  checkpoints_.clear();
-  std::vector<bool> sound(size(rollout_.lanes()));
-  const auto note = [&](std::int64_t action) {
-    for (int l = 0; l < rollout_.lanes(); ++l) {
-      const bool now = !failed(rollout_.batch().status(l));
-      if (!now && (action < 0 || sound[size(l)]))
-        lost.push_back({rollout_.data().episodes[size(l)], action, rollout_.batch().status(l)});
-      sound[size(l)] = now;
-    }
-  };
+  choose_ = &actions;
+  lost_.clear();
   note(-1);
-  for (taken_ = 0; taken_ < options_.actions && rollout_.running() && may_go_on(); ++taken_) {
-    rollout_.choose(actions, records_[size(taken_)]);
-    rollout_.begin(records_[size(taken_)]);
-    if (!whole && taken_ % segment_ == 0) checkpoints_.push_back(rollout_.batch().save_block(0));
-    rollout_.take_steps(whole ? &tapes_[size(taken_)] : nullptr);
-    rollout_.conclude();
-    note(taken_);
+  std::fill(by_memory_.begin(), by_memory_.end(), 0.0);
+  GradientBlock::run(rollout_.batch(), 0);
+  for (const FailedEnvironment& f : lost_)
+    failures.push_back({static_cast<int>(to) + f.environment, f.step, f.status});
+  if (!stopped()) finish(to, out);
+}
+
+/// Who has failed in an action.
+void ReturnBlock::note(std::int64_t action) {
+  for (int l = 0; l < rollout_.lanes(); ++l) {
+    const bool now = !failed(rollout_.batch().status(l));
+    if (!now && (action < 0 || sound_[size(l)]))
+      lost_.push_back({l, action, rollout_.batch().status(l)});
+    sound_[size(l)] = now;
   }
 }
 
-void TaskGradientBlock::backward() {
-  adjoint_.clear();
-  std::fill(by_memory_.begin(), by_memory_.end(), 0.0);
-  if (segment_ == options_.actions) {
-    for (std::int64_t a = taken_; a-- > 0 && may_go_on();) reverse(a, tapes_[size(a)]);
-    return;
-  }
-  for (std::size_t k = checkpoints_.size(); k-- > 0;) {
-    const std::int64_t first = std::int64_t(k) * segment_, end = std::min(first + segment_, taken_);
-    rollout_.batch().restore_block(0, checkpoints_[k]);
-    for (std::int64_t a = first; a < end; ++a) {
-      if (a > first) rollout_.place_again(records_[size(a)], a);
-      rollout_.retake_steps(records_[size(a)], a, tapes_[size(a - first)]);
-    }
-    recomputed_steps_ += (end - first) * task_.spec().steps_per_action;
-    for (std::int64_t a = end; a-- > first && may_go_on();) reverse(a, tapes_[size(a - first)]);
-  }
+bool ReturnBlock::begin_stretch(std::int64_t action) {
+  if (!rollout_.running()) return false;
+  rollout_.choose(*choose_, records_[size(action)]);
+  rollout_.begin(records_[size(action)]);
+  return true;
+}
+
+void ReturnBlock::take_steps(std::int64_t action, BlockTape* tape) {
+  rollout_.take_steps(tape);
+  rollout_.conclude();
+  note(action);
+}
+
+void ReturnBlock::retake_steps(std::int64_t action, bool from_checkpoint, BlockTape& tape) {
+  if (!from_checkpoint) rollout_.place_again(records_[size(action)], action);
+  rollout_.retake_steps(records_[size(action)], action, tape);
 }
 
 /// From the state after an action, whose cotangents stand in the adjoint, to that in which it was
 /// chosen.
-void TaskGradientBlock::reverse(std::int64_t action, const BlockTape& tape) {
+void ReturnBlock::reverse(std::int64_t action, const BlockTape& tape) {
   const ActionRecord& r = records_[size(action)];
   const std::vector<int>& looks = task_.spec().moments;
   const int every = task_.spec().control_every;
@@ -169,7 +135,7 @@ void TaskGradientBlock::reverse(std::int64_t action, const BlockTape& tape) {
   reverse_start(r, action);
 }
 
-void TaskGradientBlock::reverse_rewards(const ActionRecord& r, std::int64_t action) {
+void ReturnBlock::reverse_rewards(const ActionRecord& r, std::int64_t action) {
   for (MomentRows& m : moments_)
     for (std::vector<double>* x : {&m.q, &m.v, &m.end_effectors, &m.tactile})
       std::fill(x->begin(), x->end(), 0.0);
@@ -183,7 +149,7 @@ void TaskGradientBlock::reverse_rewards(const ActionRecord& r, std::int64_t acti
 }
 
 /// Of the state after one of an action's steps.
-void TaskGradientBlock::add_moment(std::size_t moment, const BlockTape& tape) {
+void ReturnBlock::add_moment(std::size_t moment, const BlockTape& tape) {
   const MomentRows& m = moments_[moment];
   BlockCotangent& c = adjoint_.loss(0);
   for (int l = 0; l < rollout_.lanes(); ++l) {
@@ -201,7 +167,7 @@ void TaskGradientBlock::add_moment(std::size_t moment, const BlockTape& tape) {
   pullback_.finish(c);
 }
 
-void TaskGradientBlock::add_fields(std::size_t moment, int lane) {
+void ReturnBlock::add_fields(std::size_t moment, int lane) {
   const std::span<const double> end_effectors = part(moments_[moment].end_effectors, lane);
   std::span<const double> fields = part(moments_[moment].tactile, lane);
   for (std::size_t k = 0; 3 * k < end_effectors.size(); ++k)
@@ -216,8 +182,8 @@ void TaskGradientBlock::add_fields(std::size_t moment, int lane) {
 }
 
 /// Of the controls that hold from `step` on.
-void TaskGradientBlock::reverse_controls(const ActionRecord& r, std::int64_t action, int step,
-                                         const BlockTape& tape) {
+void ReturnBlock::reverse_controls(const ActionRecord& r, std::int64_t action, int step,
+                                   const BlockTape& tape) {
   for (int l = 0; l < rollout_.lanes(); ++l) {
     if (!r.taken[size(l)]) continue;
     const Moment first = rollout_.first_moment(tape, l);
@@ -230,7 +196,7 @@ void TaskGradientBlock::reverse_controls(const ActionRecord& r, std::int64_t act
 }
 
 /// Where the action was chosen: back through a restart, and through what the task keeps of it.
-void TaskGradientBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
+void ReturnBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
   BlockCotangent& c = adjoint_.loss(0);
   const std::size_t nv = size(task_.model().nv());
   for (int l = 0; l < rollout_.lanes(); ++l) {
@@ -263,10 +229,10 @@ void TaskGradientBlock::reverse_start(const ActionRecord& r, std::int64_t action
   }
 }
 
-void TaskGradientBlock::finish(std::int64_t to, TaskGradients& out) {
+void ReturnBlock::finish(std::int64_t to, TaskGradients& out) {
   const TensorSpec& spec = task_.spec().action;
   const std::size_t width = spec.size(), nv = size(task_.model().nv()),
-                    numbers = size(parameters_.count());
+                    numbers = options_.parameters ? size(parameters_.count()) : 0;
   for (int l = 0; l < rollout_.lanes(); ++l) {
     const std::size_t e = size(to + l);
     out.value[e] = rollout_.data().returns[size(l)];
@@ -278,27 +244,22 @@ void TaskGradientBlock::finish(std::int64_t to, TaskGradients& out) {
         out.action[at] = asked;
         out.by_action[at] = asked < spec.low || asked > spec.high ? 0 : part(by_action_[a], l)[k];
       }
-    const BlockCotangent& c = adjoint_.loss(0);
-    for (std::size_t i = 0; i < nv; ++i) {
-      out.by_q[e * nv + i] = c.q[i * kBlock + size(l)];
-      out.by_v[e * nv + i] = c.v[i * kBlock + size(l)];
-    }
-    if (options_.parameters)
-      parameters_.gradient(c, rollout_.batch(), l,
-                           std::span(out.by_parameter).subspan(e * numbers, numbers));
+    get_start(0, rollout_.batch(), l, std::span(out.by_q).subspan(e * nv, nv),
+              std::span(out.by_v).subspan(e * nv, nv),
+              std::span(out.by_parameter).subspan(e * numbers, numbers), {});
   }
 }
 
-std::span<double> TaskGradientBlock::part(std::vector<double>& all, int lane) const {
+std::span<double> ReturnBlock::part(std::vector<double>& all, int lane) const {
   const std::size_t width = all.size() / kBlock;
   return std::span(all).subspan(size(lane) * width, width);
 }
-std::span<const double> TaskGradientBlock::part(const std::vector<double>& all, int lane) const {
+std::span<const double> ReturnBlock::part(const std::vector<double>& all, int lane) const {
   const std::size_t width = all.size() / kBlock;
   return std::span(all).subspan(size(lane) * width, width);
 }
 
-MomentCotangent TaskGradientBlock::cotangent(std::size_t moment, int lane) {
+MomentCotangent ReturnBlock::cotangent(std::size_t moment, int lane) {
   MomentRows& m = moments_[moment];
   return {part(m.q, lane), part(m.v, lane), part(m.end_effectors, lane), part(m.tactile, lane)};
 }
