@@ -76,6 +76,15 @@ std::string bytes_of_row(std::int64_t episode, std::size_t name, std::int64_t ro
 
 TEST_F(ShardCheck, FindsNothingInAWholeOne) { EXPECT_EQ(complaint(), ""); }
 
+/// Earlier formats have other names and units of the scene's numbers, or another checksum.
+TEST_F(ShardCheck, RefusesEarlierFormats) {
+  for (const std::int64_t version : {1, 2}) {
+    change([&](hid_t file) { set(file, "/", "format_version", version); });
+    EXPECT_THAT(complaint(), HasSubstr("its format_version is " + std::to_string(version) +
+                                       ", expected 3; generate the data set again"));
+  }
+}
+
 TEST_F(ShardCheck, FindsEveryFlippedBitOfARow) {
   const std::string whole = read();
   // A row of a field, of q in obs and of v in final_obs.
