@@ -99,6 +99,7 @@ kernels::StageHistory<Row<L>> GroupAdjoint::history_of(const StageInHand<L>& s,
   AdjointWorkspace<L>& a = s.a;
   const SchemeStage& row = scheme.stages[std::size_t(stage)];
   kernels::StageHistory<Row<L>> history{row.s_centre, 0, {}};
+  static_assert(decltype(history)::kMost >= kMostStages);
   const auto add = [&](double r, double s_v, const Row<L>* difference) {
     const int at = history.count++ * model_.nv;
     history.older[at / model_.nv] = {r, s_v / row.s_divisor, difference, a.q_older + at,

@@ -63,9 +63,9 @@ TactilePoint parse_point(const WordReader& file) {
 /// become square rings that hold the same share of the area, and an eighth of a ring one half of an
 /// edge.
 std::array<double, 2> square_place(const Vector3& n) {
-  const double ring = std::sqrt(std::max(0.0, 1 - n.z)), x = std::abs(n.x), y = std::abs(n.y);
+  const double ring = std::sqrt(std::max(0.0, 1 - n[2])), x = std::abs(n[0]), y = std::abs(n[1]);
   const double along = ring * std::atan2(std::min(x, y), std::max(x, y)) * 4 / M_PI;
-  return {std::copysign(x >= y ? ring : along, n.x), std::copysign(x >= y ? along : ring, n.y)};
+  return {std::copysign(x >= y ? ring : along, n[0]), std::copysign(x >= y ? along : ring, n[1])};
 }
 
 }  // namespace
@@ -88,7 +88,7 @@ void draw_hemisphere(int rows, int cols, std::vector<TactilePoint>& points) {
     return static_cast<std::size_t>(i) * static_cast<std::size_t>(cols) + j;
   };
   for (TactilePoint& p : points) {
-    const auto [x, y] = square_place(vec(p.normal));
+    const auto [x, y] = square_place(p.normal);
     const double row = rows * (1 + x) / 2, col = cols * (1 + y) / 2;
     const int i0 = static_cast<int>(row), j0 = static_cast<int>(col);
     double nearest = INFINITY;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/derivative/readout_pullback.hpp"
+#include "engine/model/compiled_model.hpp"
 #include "engine/sense/readout.hpp"
 #include "tests/engine/pad_scene.hpp"
 
