@@ -15,7 +15,7 @@
 #include "apps/task_run.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/files/part_file.hpp"
-#include "kernels/numbers/lanes.hpp"
+#include "kernels/numbers/block.hpp"
 #include "kernels/table/isa.hpp"
 #include "tasks/run/task_episodes.hpp"
 

@@ -188,7 +188,7 @@ void BM_FieldDerivatives(benchmark::State& state) {
   const std::vector<double> direction(std::size_t(model.nv()), 0.1),
       cotangents(frame.values().size(), 1.0);
   std::vector<double> change(frame.values().size());
-  AlignedVector<double> rows(16 * std::size_t(parameter_rows(model.compiled())));
+  AlignedVector<double> rows(16 * std::size_t(parameter_rows(model)));
   std::vector<double> points(std::size_t(tactile_points(model) * kPointNumbers));
   FieldTangent tangent(model);
   tangent.place(batch, 0);

@@ -74,7 +74,7 @@ void count(benchmark::State& state, double points, double operations = 0) {
 template <class Real>
 void field(benchmark::State& state, const Press& press, int resolution, bool dense) {
   const Model model = pad_model(resolution);
-  const CompiledSensor& sensor = model.compiled().sensors[0];
+  const CompiledSensor& sensor = compiled(model).sensors[0];
   const kernels::PadTiles pad = sensor.tiles();
   AlignedVector<Real> values(std::size_t(pad.tiles()) * 3 * kTactileTile),
       array(std::size_t(sensor.points()) * 3);
@@ -103,7 +103,7 @@ template <class Real>
 void block(benchmark::State& state, int resolution) {
   constexpr std::size_t kLanes = sizeof(Real) == 4 ? 16 : 8;
   const Model model = pad_model(resolution);
-  const CompiledSensor& sensor = model.compiled().sensors[0];
+  const CompiledSensor& sensor = compiled(model).sensors[0];
   const kernels::PadTiles pad = sensor.tiles();
   AlignedVector<Touch<kernels::LaneRow>> touches(2);
   const auto* from = reinterpret_cast<const double*>(&kMiddle.touch);
@@ -129,7 +129,7 @@ void block(benchmark::State& state, int resolution) {
 /// The same field point by point, as a textbook would: what the kernels are compared with.
 void BM_OnePointAtATime(benchmark::State& state) {
   const Model model = pad_model(200);
-  const kernels::PadTiles pad = model.compiled().sensors[0].tiles();
+  const kernels::PadTiles pad = compiled(model).sensors[0].tiles();
   const Press& press = kEverywhere;
   const Touch<double>& t = press.touch;
   std::vector<double> array(std::size_t(pad.rows * pad.cols) * 3);
@@ -205,7 +205,7 @@ Model list_model() {
 template <class Real>
 void curved(benchmark::State& state) {
   const Model model = list_model();
-  const kernels::PadTiles pad = model.compiled().sensors[0].tiles();
+  const kernels::PadTiles pad = compiled(model).sensors[0].tiles();
   Press press(0.5, 2e-3);
   press.touch.c.z = -0.005 - press.touch.c.z;
   AlignedVector<Real> values(std::size_t(pad.tiles()) * 3 * kTactileTile);

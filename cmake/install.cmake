@@ -27,6 +27,7 @@ set(public_headers
   engine/base/aligned.hpp
   engine/base/error.hpp
   engine/base/precision.hpp
+  engine/base/vector3.hpp
   engine/derivative/adjoint.hpp
   engine/derivative/field_tangent.hpp
   engine/derivative/loss.hpp
@@ -34,7 +35,9 @@ set(public_headers
   engine/derivative/point_numbers.hpp
   engine/derivative/readout_pullback.hpp
   engine/derivative/step_jacobian.hpp
+  engine/derivative/tangent.hpp
   engine/model/model.hpp
+  engine/model/random.hpp
   engine/model/scene.hpp
   engine/model/scheme.hpp
   engine/rows/episode_sink.hpp
@@ -45,6 +48,7 @@ set(public_headers
   engine/sense/tactile_frame.hpp
   engine/step/batch.hpp
   engine/step/control.hpp
+  engine/step/displacement.hpp
   engine/step/stepper.hpp
   engine/step/tape.hpp
   io/dataset/dataset_export.hpp
@@ -57,6 +61,8 @@ set(public_headers
   io/trajectory/trajectory_file.hpp
   io/trajectory/trajectory_layout.hpp
   kernels/contact/contact_types.hpp
+  kernels/numbers/block.hpp
+  kernels/table/isa.hpp
   tasks/catalogue/task.hpp
   tasks/catalogue/task_list.hpp
   tasks/gradients/gradients.hpp

@@ -51,25 +51,24 @@ struct Adjoint::Impl {
   Impl(const Model& m, const StepSettings& s, const AdjointOptions& wanted)
       : model(m),
         settings(s),
-        group(model.compiled()),
-        eight(model.compiled(), wanted, s.integrator.scheme().most_inner_stages()),
-        one(model.compiled(), wanted, s.integrator.scheme().most_inner_stages()),
+        group(compiled(model)),
+        eight(compiled(model), wanted, s.integrator.scheme().most_inner_stages()),
+        one(compiled(model), wanted, s.integrator.scheme().most_inner_stages()),
         losses(std::size_t(wanted.losses)),
-        rows(std::size_t(model.compiled().layout.rows * kBlock)) {
+        rows(std::size_t(compiled(model).layout.rows * kBlock)) {
     const std::size_t nv = std::size_t(m.nv()) * kBlock, nu = std::size_t(m.nu()) * kBlock;
     for (BlockCotangent& c : losses) {
       for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v}) x->assign(nv, 0.0);
       c.u.assign(nu, 0.0);
       if (wanted.points)
         c.points.assign(std::size_t(kBlock) * std::size_t(tactile_points(m) * kPointNumbers), 0.0);
-      if (wanted.parameters)
-        c.parameters.assign(std::size_t(parameter_rows(model.compiled()) * kBlock), 0.0);
+      if (wanted.parameters) c.parameters.assign(std::size_t(parameter_rows(model) * kBlock), 0.0);
     }
   }
 
   /// The block's rows as they stood before `step`.
   void restore(const Batch& batch, int block, const BlockTape& tape, std::int64_t step) {
-    const BlockLayout& layout = model.compiled().layout;
+    const BlockLayout& layout = compiled(model).layout;
     const double* now = batch.block(block);
     std::copy(now + layout.parameters * kBlock, now + layout.rows * kBlock,
               rows.data() + layout.parameters * kBlock);
@@ -96,7 +95,7 @@ struct Adjoint::Impl {
 
   template <int L>
   void load(Lanes<L>& x, const GroupStepInHand& g) {
-    const CompiledModel& m = model.compiled();
+    const CompiledModel& m = compiled(model);
     BasicWorkspace<L>& w = x.work;
     gather(w.q0, &rows[std::size_t(m.layout.q * kBlock)], m.nq, g.first);
     gather(w.v0, &rows[std::size_t(m.layout.v * kBlock)], m.nv, g.first);
@@ -134,7 +133,7 @@ struct Adjoint::Impl {
         set(w.q0, special.solves[k - 1].q);
         set(w.v0, special.solves[k - 1].v);
       } else {
-        const CompiledModel& m = model.compiled();
+        const CompiledModel& m = compiled(model);
         const double* start = rows.data() + g.first + lane;
         for (int i = 0; i < m.nq; ++i) w.q0[i][lane] = start[(m.layout.q + i) * kBlock];
         for (int i = 0; i < m.nv; ++i) w.v0[i][lane] = start[(m.layout.v + i) * kBlock];
@@ -152,7 +151,7 @@ struct Adjoint::Impl {
 
   template <int L>
   void reverse(const GroupStepInHand& g, std::span<const double> controls) {
-    const CompiledModel& m = model.compiled();
+    const CompiledModel& m = compiled(model);
     Lanes<L>& x = lanes<L>();
     load(x, g);
     LaneBits plain = 0;
@@ -177,7 +176,7 @@ struct Adjoint::Impl {
   template <int L>
   void scatter(LossRows<L>& o, BlockCotangent& c, int lane, int column,
                std::span<const double> controls) {
-    const CompiledModel& m = model.compiled();
+    const CompiledModel& m = compiled(model);
     const std::span<const double> u =
         controls.subspan(std::size_t(column * m.nu), std::size_t(m.nu));
     MotorPullback<L> pullback{m, rows.data() + column, u, lane};

@@ -44,9 +44,9 @@ struct FieldTangent::Impl {
   std::vector<LinkTangent> links;
   std::vector<kernels::TouchTangent> touches;
 
-  explicit Impl(const Model& m) : model(m), reader(m), links(m.compiled().links.size()) {
+  explicit Impl(const Model& m) : model(m), reader(m), links(compiled(m).links.size()) {
     std::size_t targets = 0;
-    for (const CompiledSensor& s : m.compiled().sensors)
+    for (const CompiledSensor& s : compiled(m).sensors)
       targets = std::max(targets, s.targets.size());
     touches.resize(targets);
   }
@@ -89,7 +89,7 @@ void FieldTangent::place(const Batch& batch, int block) {
 void FieldTangent::move(int lane, std::span<const double> q, std::span<const double> v) {
   Impl& i = *impl_;
   i.lane = lane;
-  const CompiledModel& m = i.model.compiled();
+  const CompiledModel& m = compiled(i.model);
   for (std::size_t k = 0; k < m.links.size(); ++k) {
     const Link& link = m.links[k];
     const LinkPose<double> own = i.pose(static_cast<int>(k)), parent = i.pose(link.parent);
@@ -104,7 +104,7 @@ void FieldTangent::move(int lane, std::span<const double> q, std::span<const dou
 
 void FieldTangent::field(int sensor, std::span<const int> tiles, std::span<double> change) {
   Impl& i = *impl_;
-  const CompiledModel& m = i.model.compiled();
+  const CompiledModel& m = compiled(i.model);
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const int group = i.lane / kGroup;
   if (i.met_group != group || i.met_sensor != sensor)

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "engine/derivative/linear_adjoint.hpp"
 #include "engine/step/detection.hpp"
 #include "engine/step/scheme_stage.hpp"
 
@@ -98,6 +99,7 @@ kernels::StageHistory<Row<L>> GroupAdjoint::history_of(const StageInHand<L>& s,
   AdjointWorkspace<L>& a = s.a;
   const SchemeStage& row = scheme.stages[std::size_t(stage)];
   kernels::StageHistory<Row<L>> history{row.s_centre, 0, {}};
+  static_assert(decltype(history)::kMost >= kMostStages);
   const auto add = [&](double r, double s_v, const Row<L>* difference) {
     const int at = history.count++ * model_.nv;
     history.older[at / model_.nv] = {r, s_v / row.s_divisor, difference, a.q_older + at,
@@ -186,6 +188,20 @@ void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme,
     }
     assemble(s);
     for (const LossRows<L>& o : s.a.losses) hand_on(s, scheme, k, o);
+  }
+}
+
+template <int L>
+void GroupAdjoint::reverse_linear(const StageInHand<L>& s, const Scheme& scheme, double h) const {
+  state_difference(model_, s.w.q1, s.w.q0, s.a.difference);
+  set_stage(model_, scheme, 0, h, s.w);
+  guess_stage(model_, scheme, 0, h, s.w);
+  assemble(s);
+  for (const LossRows<L>& o : s.a.losses) {
+    linear_rhs(model_, o, h, s.a);
+    solve(s);
+    for (int l = 0; l < L; ++l)
+      if (has(s.lanes, l)) hand_on_linear(model_, o, h, l, s.w, s.a);
   }
 }
 

@@ -77,10 +77,7 @@ class GroupAdjoint {
   template <int L>
   void reverse_stages(const StageInHand<L>& s, const Scheme& scheme, double h) const;
   template <int L>
-  void reverse_linear(const StageInHand<L>& in, const Scheme& scheme, double h) const;
-  template <int L>
-  void hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o, const std::vector<double>& x,
-                      double h, int lane) const;
+  void reverse_linear(const StageInHand<L>& s, const Scheme& scheme, double h) const;
 
   const CompiledModel& model_;
 };

@@ -1,14 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The linearly implicit step in reverse. x = x_p - s, s = A(x_p)⁻¹ g(x_p): A itself hangs on what
-// the step begins with, so every derivative G_z of g enters as Ĝ_z = G_z - (dG_z/dx) s, the value
-// less the tangent at x_p + ε s:
-//   x̄ = Jᵀ(x) q̄ + v̄/h,  Aᵀ λ = x̄,  x̄_p = x̄ - Ĝ_xᵀ λ
-//   v̄₀ += h x̄_p - Ĝ_v₀ᵀ λ,  q̄₀ += exp(x) q̄ - Ĝ_q₀ᵀ λ,  ū -= Ĝ_uᵀ λ,  p̄ -= Ĝ_pᵀ λ
-//       (x_p = h v₀, v = x/h)
 // One environment after the other, in dual numbers.
+#include "engine/derivative/linear_adjoint.hpp"
+
 #include "engine/derivative/dual_stage.hpp"
-#include "engine/derivative/group_adjoint.hpp"
-#include "engine/step/scheme_stage.hpp"
 #include "kernels/numbers/rotation_vector.hpp"
 
 namespace tangere {
@@ -45,24 +39,44 @@ Vec3<D> by_turned_centre(const Vec3<D>& x, double h, const Vec3<D>& a_lambda,
 
 }  // namespace
 
-/// Cotangents of the predictor's neighbours for one lane; λ stands in a.lambda.
 template <int L>
-void GroupAdjoint::hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o,
-                                  const std::vector<double>& x, double h, int lane) const {
-  AdjointWorkspace<L>& a = in.a;
-  BasicWorkspace<L>& w = in.w;
+void linear_rhs(const CompiledModel& m, const LossRows<L>& o, double h, AdjointWorkspace<L>& a) {
+  for (const kernels::Link& link : m.links) {
+    for (int l = 0; l < L; ++l) {
+      if (link.kind != kernels::JointKind::spherical) {
+        for (int i = link.v; i < link.v + kernels::dofs(link.kind); ++i)
+          a.rhs[i][l] = o.q[i][l] + o.v[i][l] / h;
+        continue;
+      }
+      const Vec3<double> turn = {a.difference[link.v][l], a.difference[link.v + 1][l],
+                                 a.difference[link.v + 2][l]};
+      const Vec3<double> q =
+          transposed_times(kernels::right_jacobian(turn, kernels::rotation_series(turn)),
+                           Vec3<double>{o.q[link.v][l], o.q[link.v + 1][l], o.q[link.v + 2][l]});
+      const double by_q[3] = {q.x, q.y, q.z};
+      for (int i = 0; i < 3; ++i) a.rhs[link.v + i][l] = by_q[i] + o.v[link.v + i][l] / h;
+    }
+  }
+}
+
+template <int L>
+void hand_on_linear(const CompiledModel& m, const LossRows<L>& o, double h, int lane,
+                    const BasicWorkspace<L>& w, AdjointWorkspace<L>& a) {
+  if (a.dual == nullptr) a.dual = std::make_unique<DualStage>(m);
   DualStage& dual = *a.dual;
-  const int n = model_.nv;
-  std::vector<double> lambda(static_cast<std::size_t>(n)), x_bar(static_cast<std::size_t>(n));
+  const int n = m.nv;
+  std::vector<double> lambda(static_cast<std::size_t>(n)), x_bar(static_cast<std::size_t>(n)),
+      x(static_cast<std::size_t>(n));
   for (int i = 0; i < n; ++i) {
     const auto k = std::size_t(i);
+    x[k] = a.difference[i][lane];
     lambda[k] = a.lambda[i][lane], x_bar[k] = a.rhs[i][lane];
     const double predicted = h * w.v0[i][lane];
     dual.x[k] = D(predicted, predicted - x[k]);
     dual.r[k] = D(0.0), dual.s[k] = D(-w.v0[i][lane]);
     dual.tau[k] = D(w.stage.tau[i][lane]), dual.target[k] = D(w.stage.target[i][lane]);
   }
-  for (int i = 0; i < model_.nq; ++i) dual.centre[std::size_t(i)] = D(w.q0[i][lane]);
+  for (int i = 0; i < m.nq; ++i) dual.centre[std::size_t(i)] = D(w.q0[i][lane]);
   dual.c0_over_h = dual.inverse_h = 1 / h;
   dual.set_numbers(w.stage.block + lane);
   std::vector<D> A, c_lambda, m_lambda, targets, a_lambda(static_cast<std::size_t>(n), D(0.0));
@@ -72,7 +86,7 @@ void GroupAdjoint::hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o
       a_lambda[std::size_t(j)] += A[std::size_t(i * n + j)] * D(lambda[std::size_t(i)]);
   std::vector<D> numbers;
   if (o.parameters != nullptr)
-    numbers.assign(std::size_t(kernels::parameter_numbers(model_.view)), D(0.0));
+    numbers.assign(std::size_t(kernels::parameter_numbers(m.view)), D(0.0));
   dual.products(lambda, c_lambda, m_lambda, targets, o.parameters == nullptr ? nullptr : &numbers);
   for (int i = 0; i < n; ++i) {
     const auto k = std::size_t(i);
@@ -80,7 +94,7 @@ void GroupAdjoint::hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o
     o.tau[i][lane] += lambda[k];
     o.target[i][lane] += hatted(targets[k]);
   }
-  for (const kernels::Link& link : model_.links) {
+  for (const kernels::Link& link : m.links) {
     if (link.kind != kernels::JointKind::spherical) {
       for (int i = link.v; i < link.v + kernels::dofs(link.kind); ++i) {
         const auto k = std::size_t(i);
@@ -101,45 +115,12 @@ void GroupAdjoint::hand_on_linear(const StageInHand<L>& in, const LossRows<L>& o
   for (std::size_t k = 0; k < numbers.size(); ++k) o.parameters[k][lane] += hatted(numbers[k]);
 }
 
-template <int L>
-void GroupAdjoint::reverse_linear(const StageInHand<L>& in, const Scheme& scheme, double h) const {
-  BasicWorkspace<L>& w = in.w;
-  AdjointWorkspace<L>& a = in.a;
-  const int n = model_.nv;
-  if (a.dual == nullptr) a.dual = std::make_unique<DualStage>(model_);
-  state_difference(model_, w.q1, w.q0, a.difference);
-  set_stage(model_, scheme, 0, h, w);
-  guess_stage(model_, scheme, 0, h, w);
-  assemble(in);
-  for (const LossRows<L>& o : a.losses) {
-    for (const kernels::Link& link : model_.links) {
-      for (int l = 0; l < L; ++l) {
-        if (link.kind != kernels::JointKind::spherical) {
-          for (int i = link.v; i < link.v + kernels::dofs(link.kind); ++i)
-            a.rhs[i][l] = o.q[i][l] + o.v[i][l] / h;
-          continue;
-        }
-        const Vec3<double> turn = {a.difference[link.v][l], a.difference[link.v + 1][l],
-                                   a.difference[link.v + 2][l]};
-        const Vec3<double> q =
-            transposed_times(kernels::right_jacobian(turn, kernels::rotation_series(turn)),
-                             Vec3<double>{o.q[link.v][l], o.q[link.v + 1][l], o.q[link.v + 2][l]});
-        const double by_q[3] = {q.x, q.y, q.z};
-        for (int i = 0; i < 3; ++i) a.rhs[link.v + i][l] = by_q[i] + o.v[link.v + i][l] / h;
-      }
-    }
-    solve(in);
-    std::vector<double> x(static_cast<std::size_t>(n));
-    for (int l = 0; l < L; ++l) {
-      if (!has(in.lanes, l)) continue;
-      for (int i = 0; i < n; ++i) x[std::size_t(i)] = a.difference[i][l];
-      hand_on_linear(in, o, x, h, l);
-    }
-  }
-}
-
-template void GroupAdjoint::reverse_linear(const StageInHand<kernels::kGroup>&, const Scheme&,
-                                           double) const;
-template void GroupAdjoint::reverse_linear(const StageInHand<1>&, const Scheme&, double) const;
+template void linear_rhs(const CompiledModel&, const LossRows<kernels::kGroup>&, double,
+                         AdjointWorkspace<kernels::kGroup>&);
+template void linear_rhs(const CompiledModel&, const LossRows<1>&, double, AdjointWorkspace<1>&);
+template void hand_on_linear(const CompiledModel&, const LossRows<kernels::kGroup>&, double, int,
+                             const Workspace&, AdjointWorkspace<kernels::kGroup>&);
+template void hand_on_linear(const CompiledModel&, const LossRows<1>&, double, int,
+                             const SingleWorkspace&, AdjointWorkspace<1>&);
 
 }  // namespace tangere

@@ -12,7 +12,8 @@ namespace tangere {
 
 using kernels::kBlock;
 
-int parameter_rows(const CompiledModel& m) {
+int parameter_rows(const Model& model) {
+  const CompiledModel& m = compiled(model);
   return kernels::parameter_numbers(m.view) +
          kernels::kContactNumbers * static_cast<int>(m.sensors.size());
 }
@@ -39,7 +40,7 @@ void Parameters::add_coefficients(const std::string& of, bool linear, Place plac
 }
 
 void Parameters::add_contacts() {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   int row = 0;
   for (std::size_t k = 0; k < m.pairs.size(); ++k, row += kernels::kContactNumbers) {
     const PairContactDescription& c = m.scene.pair_contacts[k];
@@ -89,7 +90,7 @@ bool varies(const Scene& scene, const std::string& body) {
 
 /// Density, or the mass of an abstract body, and every number of a size.
 void Parameters::add_bodies() {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   const int first_size = kernels::first_size_number(m.view);
   for (int b = 0; b < static_cast<int>(m.bodies.size()); ++b) {
     const BodyDescription& d = m.scene.links[std::size_t(b)].body;
@@ -122,14 +123,14 @@ void Parameters::add_bodies() {
 }
 
 int Parameters::mass_row(const Entry& entry) const {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   return kernels::first_inertia_number(m.view) +
          kernels::kInertiaNumbers * m.bodies[std::size_t(entry.index)].link;
 }
 
 Parameters::Masses Parameters::masses_by(const Entry& entry, const Shape& shape,
                                          double density) const {
-  const CompiledBody& body = model_.compiled().bodies[std::size_t(entry.index)];
+  const CompiledBody& body = compiled(model_).bodies[std::size_t(entry.index)];
   if (entry.place == Place::mass)
     return inertia_rows(body, {1, body.centre, kernels::zero33<double>()});
   return inertia_rows(body, entry.place == Place::density
@@ -156,7 +157,7 @@ Parameters::Masses Parameters::masses_by(const Entry& entry, const Batch& batch,
 }
 
 Parameters::Entry Parameters::of_dofs(Place place, int joint, int field, int first, int end) const {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   Entry entry{place, joint, field, {}};
   for (int k = first; k < end; ++k)
     entry.terms.push_back({kernels::first_dof_number(m.view) +
@@ -166,7 +167,7 @@ Parameters::Entry Parameters::of_dofs(Place place, int joint, int field, int fir
 }
 
 void Parameters::add_joints() {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   for (int i = 0; i < static_cast<int>(m.joints.size()); ++i) {
     const JointDescription& d = m.scene.links[std::size_t(i)].joint;
     const int n = dof_count(d.type),
@@ -191,7 +192,7 @@ void Parameters::add_joints() {
 }
 
 void Parameters::add_motors() {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   for (std::size_t k = 0; k < m.scene.motors.size(); ++k) {
     const MotorDescription& d = m.scene.motors[k];
     if (d.control != MotorControl::position) continue;

@@ -76,6 +76,6 @@ class Parameters {
 
 /// Rows of BlockCotangent::parameters: those of the kernels, then kn, kt, mu, damping of every
 /// sensor.
-int parameter_rows(const CompiledModel& model);
+int parameter_rows(const Model& model);
 
 }  // namespace tangere

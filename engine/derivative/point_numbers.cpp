@@ -3,6 +3,8 @@
 #include "engine/derivative/point_numbers.hpp"
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/frames.hpp"
+#include "engine/step/batch.hpp"
 
 namespace tangere {
 
@@ -18,11 +20,20 @@ int tactile_points(const Model& model) {
   return first_tactile_point(model, static_cast<int>(model.sensors().size()));
 }
 
+std::array<double, 4> sensor_coefficients(const Batch& batch, int environment, int sensor) {
+  const kernels::ContactParameters& c =
+      compiled(batch.model()).sensors[std::size_t(sensor)].parameters;
+  const double* column = batch.block(environment / kernels::kBlock) + environment % kernels::kBlock;
+  const auto in_force = [column](const kernels::Parameter& p) {
+    return p.row < 0 ? p.value : column[p.row * kernels::kBlock];
+  };
+  return {in_force(c.kn), in_force(c.kt), in_force(c.mu), in_force(c.damping)};
+}
+
 std::vector<TactilePoint> list_points(const RectArray& a) {
   using kernels::Vec3;
-  const auto vec = [](const Vector3& x) { return Vec3<double>{x[0], x[1], x[2]}; };
-  const Vec3<double> p0 = vec(a.corner0), axis0 = vec(a.axis0), axis1 = vec(a.axis1),
-                     diagonal = vec(a.corner1) - p0;
+  const Vec3<double> p0 = vec3_of(a.corner0), axis0 = vec3_of(a.axis0), axis1 = vec3_of(a.axis1),
+                     diagonal = vec3_of(a.corner1) - p0;
   const Vec3<double> normal = cross(axis0, axis1);
   const double step0 = a.rows > 1 ? dot(diagonal, axis0) / (a.rows - 1) : 0;
   const double step1 = a.cols > 1 ? dot(diagonal, axis1) / (a.cols - 1) : 0;

@@ -3,12 +3,15 @@
 // by them say where sensing pays, and fit a skin that is not the same everywhere.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
 #include "engine/model/model.hpp"
 
 namespace tangere {
+
+class Batch;
 
 /// Of a point: its place x y z in its body's frame [m], its axes left as they are; then its own kn,
 /// kt, mu, kd or c (the sensor's times its factors).
@@ -18,6 +21,9 @@ inline constexpr int kPointNumbers = 7;
 int tactile_points(const Model& model);
 /// Of which these come before those of a sensor.
 int first_tactile_point(const Model& model, int sensor);
+
+/// kn, kt, mu and damping that a sensor has in an environment.
+std::array<double, 4> sensor_coefficients(const Batch& batch, int environment, int sensor);
 
 /// The points of an array, row by row, with its axes: given one by one they have the same field.
 std::vector<TactilePoint> list_points(const RectArray& array);

@@ -51,7 +51,7 @@ struct ReadoutPullback::Impl {
   AlignedVector<double> own;  ///< (tiles, kPointNumbers, 64)
 
   explicit Impl(const Model& m) : model(m), reader(m), met(kGroups, -1) {
-    const CompiledModel& c = m.compiled();
+    const CompiledModel& c = compiled(m);
     for (auto& l : links) l.resize(c.links.size());
     rows.resize(std::size_t(c.nq + 5 * c.nv));
     std::size_t bytes = 0, targets = 0;
@@ -71,7 +71,7 @@ struct ReadoutPullback::Impl {
                       std::span<double> points) const {
     const kernels::PadTiles pad = s.tiles();
     const kernels::Mat3<double> turn =
-        transpose(model.compiled().bodies[std::size_t(s.body)].frame.R) * s.pad.R;
+        transpose(compiled(model).bodies[std::size_t(s.body)].frame.R) * s.pad.R;
     for (std::size_t i = 0; i < touched.size(); ++i)
       for_points_of_tile(pad, touched[i], [&](int slot, int point) {
         const double* from = &own[i * kPointNumbers * kernels::kTactileTile + std::size_t(slot)];
@@ -131,7 +131,7 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
     i.reader.find_touches(*i.batch, i.block, group, sensor);
     i.met[std::size_t(group)] = sensor;
   }
-  const CompiledModel& m = i.model.compiled();
+  const CompiledModel& m = compiled(i.model);
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const auto a = i.reader.arguments<double>(sensor, group, in_group);
   if (!points.empty()) i.own.assign(tiles.size() * kPointNumbers * kernels::kTactileTile, 0.0);
@@ -157,7 +157,7 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
 
 void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents,
                                   std::span<double> parameters, std::span<double> points) {
-  const kernels::PadTiles pad = impl_->model.compiled().sensors[std::size_t(sensor)].tiles();
+  const kernels::PadTiles pad = compiled(impl_->model).sensors[std::size_t(sensor)].tiles();
   std::vector<int>& tiles = impl_->tiles;
   std::vector<double>& values = impl_->of_tiles;
   tiles.clear();
@@ -172,7 +172,7 @@ void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> 
 
 void ReadoutPullback::end_effector(int lane, int end_effector, std::span<const double> cotangent) {
   Impl& i = *impl_;
-  const CompiledEndEffector& v = i.model.compiled().end_effectors[std::size_t(end_effector)];
+  const CompiledEndEffector& v = compiled(i.model).end_effectors[std::size_t(end_effector)];
   if (v.link < 0) return;
   const int group = lane / kGroup;
   const LinkPose<double> at = i.reader.link(v.link, group, lane % kGroup);
@@ -184,7 +184,7 @@ void ReadoutPullback::end_effector(int lane, int end_effector, std::span<const d
 
 void ReadoutPullback::finish(BlockCotangent& out) {
   Impl& i = *impl_;
-  const CompiledModel& m = i.model.compiled();
+  const CompiledModel& m = compiled(i.model);
   LaneRow *q = i.rows.data(), *v = q + m.nq, *zero = v + m.nv, *rates = zero + m.nv,
           *q_bar = rates + m.nv, *v_bar = q_bar + m.nv;
   for (int g = 0; g < kGroups; ++g) {

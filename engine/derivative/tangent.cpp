@@ -127,8 +127,8 @@ struct Tangent::Impl {
   StepSettings settings;
   DualStage stage;
 
-  Impl(const Model& m, const StepSettings& s) : model(m), settings(s), stage(model.compiled()) {}
-  [[nodiscard]] const CompiledModel& m() const { return model.compiled(); }
+  Impl(const Model& m, const StepSettings& s) : model(m), settings(s), stage(compiled(model)) {}
+  [[nodiscard]] const CompiledModel& m() const { return compiled(model); }
 
   /// The tangent of x with g(x) = 0 at the value of x; leaves v of it in the stage.
   Duals solve(const std::vector<double>& x) {

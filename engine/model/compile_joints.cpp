@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Joints become chains of elementary links, with coordinates, effects, motors and a starting state.
 #include "engine/model/compile_joints.hpp"
+#include "engine/model/frames.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -20,8 +21,6 @@ bool is_identity(const Frame<double>& f) {
       if (f.R.m[i][j] != (i == j ? 1.0 : 0.0)) return false;
   return f.p.x == 0 && f.p.y == 0 && f.p.z == 0;
 }
-
-Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
 
 void name_coordinates(CompiledModel& m, const JointDescription& d) {
   struct Coordinate {
@@ -129,7 +128,7 @@ CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent,
   joint.first_link = static_cast<int>(m.links.size());
   joint.frame = kIdentityFrame;
   const Vec3<double> x = {1, 0, 0}, y = {0, 1, 0}, z = {0, 0, 1};
-  const Vec3<double> axis0 = vec(d.axis0), axis1 = vec(d.axis1);
+  const Vec3<double> axis0 = vec3_of(d.axis0), axis1 = vec3_of(d.axis1);
   // Appends an elementary link; only the first carries the joint's rest pose.
   const auto add = [&](JointKind kind, const Vec3<double>& axis) {
     const bool first = joint.link_count == 0;

@@ -8,8 +8,6 @@
 
 namespace tangere {
 
-inline const kernels::Frame<double> kIdentityFrame = {kernels::diagonal(1.0), {0, 0, 0}};
-
 /// Appends a joint's elementary links. `parent`: the link it hangs on, -1 the world; `frame`: its
 /// rest pose there.
 CompiledJoint add_joint(CompiledModel& m, const JointDescription& d, int parent,
@@ -29,8 +27,5 @@ void vary_joint(CompiledModel& m, const NameIndex& joints, const RandomizationDe
 
 /// Throws where nothing with mass moves with a joint: its mass matrix would be singular.
 void check_masses(const CompiledModel& m);
-
-/// What the scene calls for, and why: decided here once, printed by `inspect`.
-void decide_effects(CompiledModel& m);
 
 }  // namespace tangere

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "engine/model/compile_joints.hpp"
+#include "engine/model/frames.hpp"
 
 namespace tangere {
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The arrays behind a Model. Private to the engine: kernels see them through ModelView.
+// The arrays behind a Model. Private to the engine: kernels see them through ModelView, and nobody
+// else gets at them.
 #pragma once
 
 #include <array>
@@ -7,6 +8,7 @@
 
 #include "engine/base/aligned.hpp"
 #include "engine/model/model.hpp"
+#include "engine/model/pattern.hpp"
 #include "kernels/numbers/so3.hpp"
 #include "kernels/step/model_view.hpp"
 #include "kernels/tactile/tactile_types.hpp"
@@ -77,15 +79,6 @@ struct CompiledSensor {
 struct CompiledEndEffector {
   int link = -1;                  ///< -1: fixed in the world
   kernels::Vec3<double> point{};  ///< link axes (or the world's) [m]
-};
-
-/// Symbolic analysis of the Jacobian: the storage behind kernels::Pattern.
-struct PatternStorage {
-  int n = 0, entries = 0, factor_entries = 0;
-  std::vector<int> slot, entry_begin, entry_column, permutation, scatter, diagonal;
-  std::vector<int> row_begin, factor_column, lower_begin, lower_slot, run_begin;
-  std::vector<kernels::EliminationRun> runs;
-  [[nodiscard]] kernels::Pattern view() const;
 };
 
 /// Rows of a block: q, v, the state one step before, then the numbers that vary.
@@ -198,16 +191,6 @@ kernels::Solid solid_of(const Shape& shape, const CompiledBody& body);
 /// (tiles, 4) bounds.
 std::vector<double> sort_into_tiles(std::vector<double>& points, int tile);
 
-/// What a step runs: fills stages.
-void list_stages(CompiledModel& model);
-
-/// Which contacts share their links: fills link_pairs, grounded and the orders.
-void group_contacts(CompiledModel& model);
-
-/// Minimum-fill elimination of the structure of the tree and of every contact.
-PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
-                               const std::vector<std::pair<int, int>>& touching);
-
 /// Tiles, bounds, axes and pressure sign of a sensor. Throws InputError for degenerate arrays.
 CompiledSensor compile_sensor(const TactileDescription& description, const CompiledBody& body,
                               SensorInfo& info);
@@ -223,7 +206,7 @@ inline constexpr double kFarAway = 1e6;
 /// Names to indices, joints to elementary links. Throws InputError.
 std::shared_ptr<const CompiledModel> compile(const Scene& scene);
 
-kernels::Frame<double> to_frame(const Pose& pose);
-kernels::Quat<double> quaternion_of(const kernels::Mat3<double>& R);
+/// What a model was compiled to.
+const CompiledModel& compiled(const Model& model);
 
 }  // namespace tangere

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Poses of the scene as frames, and back to quaternions.
-#include <cmath>
+// Rotations of unit quaternions and back.
+#include "engine/model/frames.hpp"
 
-#include "engine/model/compiled_model.hpp"
+#include <cmath>
 
 namespace tangere {
 

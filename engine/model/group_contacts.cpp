@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contacts of the same links, side by side: folding leaves many shapes on one link, which all move
-// alike.
+// Balls around the points of a contact, then contacts sorted by their links.
+#include "engine/model/group_contacts.hpp"
+
 #include <algorithm>
 #include <cmath>
-
-#include "engine/model/compiled_model.hpp"
 
 namespace tangere {
 

@@ -4,6 +4,8 @@
 
 namespace tangere {
 
+const CompiledModel& compiled(const Model& model) { return *model.compiled_; }
+
 Model::Model(const Scene& scene) : compiled_(compile(scene)) {}
 
 const Scene& Model::scene() const { return compiled_->scene; }
@@ -15,6 +17,7 @@ double Model::mass(int body) const { return compiled_->bodies[std::size_t(body)]
 double Model::timestep() const { return compiled_->scene.timestep; }
 Integrator Model::integrator() const { return compiled_->scene.integrator; }
 const SolverOptions& Model::solver() const { return compiled_->scene.solver; }
+std::span<const double> Model::initial_q() const { return compiled_->initial_q; }
 std::span<const SensorInfo> Model::sensors() const { return compiled_->sensor_info; }
 std::span<const EndEffectorInfo> Model::end_effectors() const {
   return compiled_->end_effector_info;

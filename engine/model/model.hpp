@@ -13,8 +13,7 @@
 
 namespace tangere {
 
-struct CompiledModel;  // engine/model/compiled_model.hpp: the arrays kernels read; not part of the
-                       // installed interface
+struct CompiledModel;  // private to the engine
 
 /// A tactile sensor after compilation.
 struct SensorInfo {
@@ -66,6 +65,7 @@ class Model {
   [[nodiscard]] double timestep() const;      ///< [s]
   [[nodiscard]] Integrator integrator() const;
   [[nodiscard]] const SolverOptions& solver() const;
+  [[nodiscard]] std::span<const double> initial_q() const;  ///< (nq) where the scene begins
   [[nodiscard]] std::span<const SensorInfo> sensors() const;
   [[nodiscard]] std::span<const EndEffectorInfo> end_effectors()
       const;  ///< end effectors, in file order
@@ -82,9 +82,11 @@ class Model {
   [[nodiscard]] std::span<const std::string> body_names() const;
   [[nodiscard]] std::size_t state_bytes_per_environment() const;  ///< of a Batch
 
-  [[nodiscard]] const CompiledModel& compiled() const { return *compiled_; }
+  /// Whether both are the same compiled scene, not only equal ones.
+  friend bool operator==(const Model& a, const Model& b) { return a.compiled_ == b.compiled_; }
 
  private:
+  friend const CompiledModel& compiled(const Model& model);
   std::shared_ptr<const CompiledModel> compiled_;
 };
 

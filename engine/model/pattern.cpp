@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Symbolic analysis, once per scene: which entries of the Jacobian exist, in which order to
-// eliminate, what fills in.
-#include <algorithm>
-#include <utility>
+// Greedy elimination, then runs of factor entries that one loop can take.
+#include "engine/model/pattern.hpp"
 
-#include "engine/model/compiled_model.hpp"
+#include <algorithm>
 
 namespace tangere {
 

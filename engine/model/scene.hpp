@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // A scene as its author wrote it: names, SI units, defaults filled in. The only place that holds
-// strings. io/scene/scene_reader.hpp reads it from XML; compile() in engine/model/model.hpp turns it into index
+// strings. io/scene/scene_reader.hpp reads it from XML; Model turns it into index
 // arrays.
 #pragma once
 
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "engine/base/error.hpp"
+#include "engine/base/vector3.hpp"
 #include "engine/model/scheme.hpp"
 #include "kernels/contact/contact_types.hpp"
 
 namespace tangere {
 
-using Vector3 = std::array<double, 3>;     ///< x y z
 using Quaternion = std::array<double, 4>;  ///< w x y z, unit length
 
 enum class JointType { fixed, revolute, prismatic, planar, translational, free2d, spherical, free };
@@ -30,6 +31,12 @@ struct Pose {
   Vector3 position{0, 0, 0};
   Quaternion orientation{1, 0, 0, 0};
 };
+/// A point and a direction of the inner frame, in the outer.
+Vector3 outer_point(const Pose& pose, const Vector3& point);
+Vector3 outer_direction(const Pose& pose, const Vector3& direction);
+/// A pose in the last frame of `way`, each of which is given in the one before; `pose` is given
+/// where the first one is.
+Pose pose_at_end(std::span<const Pose> way, const Pose& pose);
 
 /// Coefficients of one penalty contact or tactile point.
 struct ContactCoefficients {

@@ -20,6 +20,9 @@ int Scheme::most_inner_stages() const {
 
 Scheme runge_kutta(const char* name, int order, std::initializer_list<std::vector<double>> matrix) {
   const std::vector<std::vector<double>> a(matrix);
+  if (a.empty() || a.size() > kMostStages)
+    throw InputError(std::string(name) + ": " + std::to_string(a.size()) +
+                     " stages; expected 1 to " + std::to_string(kMostStages));
   Scheme scheme{name, order, StageSolve::newton, {}, 0, nullptr, nullptr};
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (a[i].size() != i + 1 || !(a[i][i] > 0))
@@ -40,7 +43,6 @@ Scheme runge_kutta(const char* name, int order, std::initializer_list<std::vecto
       throw InputError(std::string(name) + ": the last stage ends at " + std::to_string(end) +
                        " steps; expected 1");
   }
-  if (a.empty()) throw InputError(std::string(name) + ": expected at least one stage");
   return scheme;
 }
 

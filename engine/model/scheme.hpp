@@ -16,6 +16,8 @@
 
 namespace tangere {
 
+inline constexpr int kMostStages = 4;
+
 /// What an earlier stage of a step gives to a later one.
 struct InnerWeight {
   double r, s;
@@ -55,7 +57,8 @@ struct Scheme {
 };
 
 /// The scheme of a Runge-Kutta method whose last stage is its result: `matrix` has its coefficients,
-/// lower-triangular, row by row, with nothing but implicit stages. Throws InputError for any other.
+/// lower-triangular, row by row, with nothing but implicit stages, at most kMostStages. Throws
+/// InputError for any other.
 Scheme runge_kutta(const char* name, int order, std::initializer_list<std::vector<double>> matrix);
 
 /// Which scheme: those of the table by name, or any other that lives longer.

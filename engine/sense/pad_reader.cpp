@@ -30,12 +30,12 @@ PadReader::PadReader(const Model& model)
       v_(std::size_t(model.nv())),
       zero_(std::size_t(model.nv())),
       rates_(std::size_t(model.nv())),
-      links_(kGroups * model.compiled().links.size()) {
+      links_(kGroups * compiled(model).links.size()) {
   std::size_t tiles = 0, targets = 0;
-  for (const CompiledSensor& s : model.compiled().sensors) {
+  for (const CompiledSensor& s : compiled(model).sensors) {
     Pad pad{s.tiles(), {}};
     for (const int body : s.targets) {
-      const CompiledBody& b = model.compiled().bodies[std::size_t(body)];
+      const CompiledBody& b = compiled(model).bodies[std::size_t(body)];
       pad.shapes.push_back({b.shape, {b.size.x, b.size.y, b.size.z}});
     }
     tiles = std::max(tiles, std::size_t(s.n_tiles()));
@@ -51,7 +51,7 @@ PadReader::PadReader(const Model& model)
 }
 
 void PadReader::move(const Batch& batch, int block, int group) {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   const double* rows = batch.block(block);
   const auto load = [&](LaneRow* to, int first, int count) {
     for (int i = 0; i < count; ++i) {
@@ -69,13 +69,13 @@ void PadReader::move(const Batch& batch, int block, int group) {
 LinkPose<double> PadReader::link(int link, int group, int lane) const {
   if (link < 0) return {{kernels::diagonal(1.0), {0, 0, 0}}, kernels::zero6<double>()};
   const LinkPose<LaneRow>& p =
-      links_[std::size_t(group) * model_.compiled().links.size() + std::size_t(link)];
+      links_[std::size_t(group) * compiled(model_).links.size() + std::size_t(link)];
   return {{lane_of(p.world.R, lane), lane_of(p.world.p, lane)},
           {lane_of(p.V.a, lane), lane_of(p.V.l, lane)}};
 }
 
 void PadReader::find_touches(const Batch& batch, int block, int group, int sensor) {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const LinkPose<LaneRow>* links = links_.data() + std::size_t(group) * m.links.size();
   const auto pose = [&](int link) { return link < 0 ? nullptr : links + link; };
@@ -102,7 +102,7 @@ void PadReader::find_touches(const Batch& batch, int block, int group, int senso
 }
 
 const kernels::TouchShape* PadReader::shapes(int sensor, int group, int lane) {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const std::vector<kernels::TouchShape>& constant = pads_[std::size_t(sensor)].shapes;
   if (!s.sizes_vary) return constant.data();
@@ -117,7 +117,7 @@ const kernels::TouchShape* PadReader::shapes(int sensor, int group, int lane) {
 
 template <class Real>
 kernels::TactileArgs<Real> PadReader::arguments(int sensor, int group, int lane) {
-  const CompiledSensor& s = model_.compiled().sensors[std::size_t(sensor)];
+  const CompiledSensor& s = compiled(model_).sensors[std::size_t(sensor)];
   const Pad& pad = pads_[std::size_t(sensor)];
   for (std::size_t k = 0; k < s.targets.size(); ++k) {
     const Touch<LaneRow>& t = touches_[kGroups * k + std::size_t(group)];
@@ -137,7 +137,7 @@ kernels::TactileArgs<Real> PadReader::arguments(int sensor, int group, int lane)
 
 template <class Real>
 kernels::TactileBlockArgs<Real> PadReader::block_arguments(int sensor, int group) {
-  const CompiledSensor& s = model_.compiled().sensors[std::size_t(sensor)];
+  const CompiledSensor& s = compiled(model_).sensors[std::size_t(sensor)];
   const Pad& pad = pads_[std::size_t(sensor)];
   for (std::size_t k = 0; k < s.targets.size(); ++k)
     touch_of_group_[k] = &touches_[kGroups * k + std::size_t(group)];

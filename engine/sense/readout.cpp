@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/frames.hpp"
 #include "engine/sense/dense_tiles.hpp"
 #include "engine/sense/pad_reader.hpp"
 
@@ -34,7 +35,7 @@ struct Readout::Impl {
 
   Impl(const Model& m, Precision p) : model(m), precision(p), reader(m) {
     std::size_t room = 0;
-    for (const CompiledSensor& s : m.compiled().sensors)
+    for (const CompiledSensor& s : compiled(m).sensors)
       room = std::max({room, std::size_t(s.n_tiles()) * 3 * kTactileTile,
                        small(s) ? std::size_t(kBlock * 3 * s.points()) : std::size_t(0)});
     (p == Precision::f64 ? wide.resize(room) : single.resize(room));
@@ -42,7 +43,7 @@ struct Readout::Impl {
 
   static bool small(const CompiledSensor& s) { return s.points() <= kSmallPad && s.index.empty(); }
   [[nodiscard]] const CompiledSensor& sensor_of(int k) const {
-    return model.compiled().sensors[std::size_t(k)];
+    return compiled(model).sensors[std::size_t(k)];
   }
   template <class Real>
   Real* scratch() {
@@ -77,7 +78,7 @@ struct Readout::Impl {
   }
   void write_end_effectors(int group, int lane, std::span<double> position) const {
     double* to = position.data();
-    for (const CompiledEndEffector& v : model.compiled().end_effectors)
+    for (const CompiledEndEffector& v : compiled(model).end_effectors)
       write3(position_of(v, group, lane), to), to += 3;
   }
 
@@ -230,7 +231,7 @@ void Readout::bodies(const Batch& batch, int environment, std::span<double> pose
                      std::span<double> twist) {
   const int group = environment % kBlock / kGroup, lane = environment % kGroup;
   impl_->reader.move(batch, environment / kBlock, group);
-  const CompiledModel& m = impl_->model.compiled();
+  const CompiledModel& m = compiled(impl_->model);
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
     const CompiledBody& body = m.bodies[b];
     const kernels::LinkPose<double> link = impl_->reader.link(body.link, group, lane);
@@ -250,7 +251,7 @@ void Readout::end_effectors(const Batch& batch, int environment, std::span<doubl
   const int group = environment % kBlock / kGroup, lane = environment % kGroup;
   impl_->reader.move(batch, environment / kBlock, group);
   impl_->write_end_effectors(group, lane, position);
-  const std::vector<CompiledEndEffector>& all = impl_->model.compiled().end_effectors;
+  const std::vector<CompiledEndEffector>& all = compiled(impl_->model).end_effectors;
   for (std::size_t k = 0; k < all.size() && !velocity.empty(); ++k) {
     const kernels::LinkPose<double> link = impl_->reader.link(all[k].link, group, lane);
     write3(link.world.R * (link.V.l + cross(link.V.a, all[k].point)), &velocity[3 * k]);
@@ -270,7 +271,7 @@ void Readout::end_effector_jacobian(const Batch& batch, int environment,
                                     std::span<double> jacobian) {
   const int group = environment % kBlock / kGroup, lane = environment % kGroup;
   impl_->reader.move(batch, environment / kBlock, group);
-  const CompiledModel& m = impl_->model.compiled();
+  const CompiledModel& m = compiled(impl_->model);
   const auto nv = std::size_t(m.nv);
   std::fill(jacobian.begin(), jacobian.end(), 0.0);
   for (std::size_t k = 0; k < m.end_effectors.size(); ++k) {

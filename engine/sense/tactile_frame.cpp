@@ -14,7 +14,7 @@ namespace tangere {
 namespace {
 
 const CompiledSensor& checked(const Model& model, int sensor) {
-  const auto& sensors = model.compiled().sensors;
+  const auto& sensors = compiled(model).sensors;
   if (sensor < 0 || std::size_t(sensor) >= sensors.size())
     throw InputError("no tactile sensor " + std::to_string(sensor) + ": the scene has " +
                      std::to_string(sensors.size()));
@@ -45,12 +45,12 @@ CompactFrame<T>::CompactFrame(const Model& model, int sensor)
 
 template <class T>
 int CompactFrame<T>::tile_cols() const {
-  return model_.compiled().sensors[std::size_t(sensor_)].tile_cols;
+  return compiled(model_).sensors[std::size_t(sensor_)].tile_cols;
 }
 
 template <class T>
 std::size_t CompactFrame<T>::dense_size() const {
-  return 3 * std::size_t(model_.compiled().sensors[std::size_t(sensor_)].points());
+  return 3 * std::size_t(compiled(model_).sensors[std::size_t(sensor_)].points());
 }
 
 template <class T>
@@ -60,10 +60,22 @@ void CompactFrame<T>::expand(std::span<T> dense) const {
 
 template <class T>
 void CompactFrame<T>::spread(std::span<const T> of_tiles, std::span<T> dense) const {
-  const kernels::PadTiles pad = model_.compiled().sensors[std::size_t(sensor_)].tiles();
+  const kernels::PadTiles pad = compiled(model_).sensors[std::size_t(sensor_)].tiles();
   clear_tiles_between<T>(pad, tiles(), dense.data());
   for (std::size_t k = 0; k < std::size_t(count_); ++k)
     expand_tile(pad, tiles_[k], of_tiles.data() + 3 * kernels::kTactileTile * k, dense.data());
+}
+
+static_assert(kTilePoints == kernels::kTactileTile);
+
+std::vector<std::vector<TilePoint>> points_by_tile(const Model& model, int sensor) {
+  const kernels::PadTiles pad = checked(model, sensor).tiles();
+  std::vector<std::vector<TilePoint>> all(std::size_t(pad.tiles()));
+  for (int tile = 0; tile < pad.tiles(); ++tile)
+    for_points_of_tile(pad, tile, [&](int place, int point) {
+      all[std::size_t(tile)].push_back({point, place});
+    });
+  return all;
 }
 
 template class DenseFrame<float>;

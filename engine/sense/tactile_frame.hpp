@@ -69,6 +69,14 @@ class CompactFrame {
   int count_ = 0;
 };
 
+inline constexpr int kTilePoints = 64;  ///< places of a tile, rows of 8
+/// A point of a sensor's field, and its place in a tile.
+struct TilePoint {
+  int point, place;
+};
+/// Of every tile of a sensor, (tiles).
+std::vector<std::vector<TilePoint>> points_by_tile(const Model& model, int sensor);
+
 extern template class DenseFrame<float>;
 extern template class DenseFrame<double>;
 extern template class CompactFrame<float>;

@@ -85,7 +85,7 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
   if (environments < 1)
     throw InputError("a batch of " + std::to_string(environments) +
                      " environments; expected at least 1");
-  const CompiledModel& m = model.compiled();
+  const CompiledModel& m = compiled(model);
   blocks_ = environments / kBlock + (environments % kBlock != 0);
   block_stride_ = std::size_t(m.layout.rows) * kBlock;
   const std::size_t lanes = std::size_t(blocks_) * kBlock;
@@ -114,7 +114,7 @@ double* Batch::column(std::size_t lane) {
 
 /// Padding lanes keep the scene's own numbers.
 void Batch::draw_episode(std::size_t lane) {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   const bool padding = lane >= std::size_t(environments_);
   double* const own = column(lane);
   for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = m.initial_q[std::size_t(i)];
@@ -144,17 +144,21 @@ void Batch::reset(int environment, std::int64_t episode) {
   held_[lane] = 0;
 }
 
-void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<const double> v) {
-  const CompiledModel& m = model_.compiled();
-  double* const own = column(lane);
+void Batch::displace_state(int environment, std::span<const double> q, std::span<const double> v) {
+  const CompiledModel& m = compiled(model_);
+  double* const own = column(std::size_t(environment));
   for (int i = 0; i < m.nq; ++i) own[(m.layout.q + i) * kBlock] = q[std::size_t(i)];
   for (int i = 0; i < m.nv; ++i) own[(m.layout.v + i) * kBlock] = v[std::size_t(i)];
+}
+
+void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<const double> v) {
+  displace_state(static_cast<int>(lane), q, v);
   complete_state(lane);
 }
 
 /// Quaternions of length one; the state before is the same.
 void Batch::complete_state(std::size_t lane) {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   double* const own = column(lane);
   const auto at = [&](int row) -> double& { return own[row * kBlock]; };
   for (const kernels::Link& link : m.links) {
@@ -173,13 +177,13 @@ void Batch::complete_state(std::size_t lane) {
 
 void Batch::get_q(int environment, std::span<double> q) const {
   const double* column = block(environment / kBlock) + environment % kBlock;
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   for (int i = 0; i < m.nq; ++i) q[i] = column[std::size_t(m.layout.q + i) * kBlock];
 }
 
 void Batch::get_v(int environment, std::span<double> v) const {
   const double* column = block(environment / kBlock) + environment % kBlock;
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   for (int i = 0; i < m.nv; ++i) v[i] = column[std::size_t(m.layout.v + i) * kBlock];
 }
 
@@ -194,7 +198,7 @@ void Batch::set_state(int environment, std::span<const double> q, std::span<cons
                       std::span<const double> previous_q, std::span<const double> previous_v) {
   const std::size_t lane = std::size_t(environment);
   write_state(lane, previous_q, previous_v);
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   double* column = block(environment / kBlock) + environment % kBlock;
   std::vector<double> before_q(m.nq), before_v(m.nv);
   get_q(environment, before_q);
@@ -237,12 +241,12 @@ void Batch::restore_block(int block, const BlockState& state) {
 }
 
 bool Batch::is_parameter(int k) const {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   return m.randomized_row[std::size_t(k)] >= m.layout.parameters;
 }
 
 double Batch::randomized_value(int environment, int k) const {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   const RandomizationDescription& d = m.scene.randomizations[std::size_t(k)];
   const int row = m.randomized_row[std::size_t(k)];
   if (is_parameter(k))
@@ -252,7 +256,7 @@ double Batch::randomized_value(int environment, int k) const {
 }
 
 void Batch::set_randomized_value(int environment, int k, double value) {
-  const CompiledModel& m = model_.compiled();
+  const CompiledModel& m = compiled(model_);
   const int row = m.randomized_row[std::size_t(k)];
   if (!is_parameter(k))
     throw InputError("randomised number " + std::to_string(k) +

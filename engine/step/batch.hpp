@@ -67,6 +67,9 @@ class Batch {
   void set_state(int environment, std::span<const double> q, std::span<const double> v,
                  std::span<const double> previous_q, std::span<const double> previous_v);
 
+  /// The newest state alone, for differences: quaternions as they are, history and status kept.
+  void displace_state(int environment, std::span<const double> q, std::span<const double> v);
+
   /// Freezes an environment as a failed step would. Throws InputError when `status` is none of
   /// failure.
   void set_failed(int environment, StepStatus status);

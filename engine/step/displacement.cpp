@@ -2,10 +2,12 @@
 // δq = q ⊗ (0, θ)/2 for quaternions; coordinates that are dofs for the rest.
 #include "engine/step/displacement.hpp"
 
+#include "engine/model/compiled_model.hpp"
+
 namespace tangere {
 
-void displace(const CompiledModel& m, std::span<double> q, int dof, double e) {
-  for (const kernels::Link& link : m.links) {
+void displace(const Model& model, std::span<double> q, int dof, double e) {
+  for (const kernels::Link& link : compiled(model).links) {
     if (dof < link.v || dof >= link.v + kernels::dofs(link.kind)) continue;
     if (link.kind != kernels::JointKind::spherical) {
       q[std::size_t(link.q + dof - link.v)] += e;
@@ -20,9 +22,9 @@ void displace(const CompiledModel& m, std::span<double> q, int dof, double e) {
   }
 }
 
-void add_along_dofs(const CompiledModel& m, std::span<const double> q, std::span<const double> by_q,
+void add_along_dofs(const Model& model, std::span<const double> q, std::span<const double> by_q,
                     std::span<double> out) {
-  for (const kernels::Link& link : m.links) {
+  for (const kernels::Link& link : compiled(model).links) {
     const double *a = &q[std::size_t(link.q)], *p = &by_q[std::size_t(link.q)];
     double* to = &out[std::size_t(link.v)];
     if (link.kind != kernels::JointKind::spherical) {

@@ -43,15 +43,15 @@ struct Stepper::Impl {
   Impl(const Model& m, const StepSettings& s)
       : model(m),
         settings(s),
-        step(model.compiled(), settings),
-        work(model.compiled(), s.integrator.scheme().most_inner_stages()),
-        single(model.compiled(), s.integrator.scheme().most_inner_stages()) {}
+        step(compiled(model), settings),
+        work(compiled(model), s.integrator.scheme().most_inner_stages()),
+        single(compiled(model), s.integrator.scheme().most_inner_stages()) {}
 
   /// Steps the live lanes of a group; `lane`: which of them stands in lane 0 of a workspace of one.
   template <int L>
   void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane,
                   BlockTape* tape) {
-    const CompiledModel& m = model.compiled();
+    const CompiledModel& m = compiled(model);
     const auto gather = [&](kernels::Row<L>* to, int row, int count) {
       for (int i = 0; i < count; ++i)
         for (int l = 0; l < L; ++l) to[i][l] = g.rows[(row + i) * kBlock + lane + l];
@@ -109,7 +109,7 @@ void Stepper::step(Batch& batch, std::span<const double> controls) {
 
 void Stepper::step_block(Batch& batch, int block, std::span<const double> controls,
                          BlockTape* tape) {
-  const CompiledModel& model = impl_->model.compiled();
+  const CompiledModel& model = compiled(impl_->model);
   const std::size_t nu = std::size_t(model.nu);
   for (int group = 0; group < kBlock / kGroup; ++group) {
     GroupOfBlock g{batch.block(block) + group * kGroup, block * kBlock + group * kGroup};
@@ -146,7 +146,7 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
 }
 
 std::size_t Stepper::workspace_bytes(const Model& model) {
-  return Workspace::bytes(model.compiled());
+  return Workspace::bytes(compiled(model));
 }
 
 }  // namespace tangere

@@ -33,7 +33,7 @@ void BlockTape::copy(const Batch& batch, int block, int first_row, double* to) c
 }
 
 void BlockTape::start(const Batch& batch, int block) {
-  const BlockLayout& layout = model_.compiled().layout;
+  const BlockLayout& layout = compiled(model_).layout;
   steps_ = 0;
   special_.clear();
   std::fill(taken_.begin(), taken_.end(), 0);
@@ -42,7 +42,7 @@ void BlockTape::start(const Batch& batch, int block) {
 }
 
 void BlockTape::append(const Batch& batch, int block) {
-  copy(batch, block, model_.compiled().layout.q, slot(++steps_));
+  copy(batch, block, compiled(model_).layout.q, slot(++steps_));
   for (int l = 0; l < kBlock; ++l) {
     const int e = block * kBlock + l;
     if (e < batch.environments() && !failed(batch.status(e)) && !batch.held(e))
@@ -52,7 +52,7 @@ void BlockTape::append(const Batch& batch, int block) {
 
 void BlockTape::show(std::int64_t step, Batch& batch, int block) const {
   std::copy_n(state(step), (nq_ + nv_) * kBlock,
-              batch.block(block) + model_.compiled().layout.q * kBlock);
+              batch.block(block) + compiled(model_).layout.q * kBlock);
 }
 
 double* BlockTape::next_inner() {

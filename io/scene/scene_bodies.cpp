@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "engine/model/compiled_model.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/surface_files.hpp"
 #include "io/scene/tactile_layouts.hpp"
@@ -114,15 +113,13 @@ AbstractShape read_abstract(const SceneNode& node, double length) {
     }
     child.check_attributes({"contacts", "radius", "count", "pos", "quat"});
     if (!shape.contact_points.empty()) child.fail("given twice; expected once");
-    const kernels::Frame<double> at =
-        to_frame({scaled(child.vector("pos", Vector3{0, 0, 0}), length), child.quaternion("quat")});
+    const Pose at = {scaled(child.vector("pos", Vector3{0, 0, 0}), length),
+                     child.quaternion("quat")};
     const std::vector<double> points = read_collision(child);
     for (std::size_t k = 0; k < points.size(); k += 3) {
-      const kernels::Vec3<double> p =
-          at.R * kernels::Vec3<double>{length * points[k], length * points[k + 1],
-                                       length * points[k + 2]} +
-          at.p;
-      shape.contact_points.insert(shape.contact_points.end(), {p.x, p.y, p.z});
+      const Vector3 p =
+          outer_point(at, {length * points[k], length * points[k + 1], length * points[k + 2]});
+      shape.contact_points.insert(shape.contact_points.end(), p.begin(), p.end());
     }
   }
   return shape;

@@ -10,7 +10,6 @@
 #include <fstream>
 #include <map>
 
-#include "engine/model/compiled_model.hpp"
 #include "io/scene/scene_sections.hpp"
 
 namespace tangere {
@@ -64,10 +63,9 @@ class TreeReader {
     if (joints == 0) node.fail("link '" + link.name + "' has no <joint>");
     if (bodies == 0) node.fail("link '" + link.name + "' has no <body>");
     const int index = static_cast<int>(scene_.links.size());
-    const kernels::Frame<double> at = to_frame(link.joint.pose);
-    world_.push_back(parent < 0 ? at : compose(world_[std::size_t(parent)], at));
-    if (in_world) link.body.pose = in_parent(link.body.pose, index);
     scene_.links.push_back(std::move(link));
+    Pose& of_body = scene_.links.back().body.pose;
+    if (in_world) of_body = in_parent(of_body, index);
     for (const SceneNode& child : inner) read_link(child, index, depth + 1);
   }
 
@@ -115,14 +113,14 @@ class TreeReader {
 
   /// A pose given in the world, in the frame of a parent joint at rest.
   [[nodiscard]] Pose in_parent(const Pose& pose, int parent) const {
-    const kernels::Frame<double> local = relative(world_[std::size_t(parent)], to_frame(pose));
-    const kernels::Quat<double> q = quaternion_of(local.R);
-    return {{local.p.x, local.p.y, local.p.z}, {q.w, q.x, q.y, q.z}};
+    std::vector<Pose> way;
+    for (int i = parent; i >= 0; i = scene_.links[std::size_t(i)].parent)
+      way.insert(way.begin(), scene_.links[std::size_t(i)].joint.pose);
+    return pose_at_end(way, pose);
   }
 
   Scene& scene_;
-  std::map<std::string, int> names_;           // kind/name, line
-  std::vector<kernels::Frame<double>> world_;  // rest pose of each joint
+  std::map<std::string, int> names_;  // kind/name, line
 };
 
 void read_option(Scene& scene, const SceneNode& node) {

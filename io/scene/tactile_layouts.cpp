@@ -8,35 +8,27 @@
 #include <cmath>
 
 #include "engine/base/error.hpp"
-#include "engine/model/compiled_model.hpp"
 #include "io/files/word_reader.hpp"
 
 namespace tangere {
 namespace {
 
-using kernels::Vec3;
-
 constexpr int kMostPoints = 1 << 24;
 
-Vector3 array_of(const Vec3<double>& a) { return {a.x, a.y, a.z}; }
-Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
-Vec3<double> unit(const Vec3<double>& a) { return (1 / std::sqrt(dot(a, a))) * a; }
-
-TactilePoint point_at(const Vec3<double>& position, const Vec3<double>& normal,
-                      const Vec3<double>& axis0) {
+TactilePoint point_at(const Vector3& position, const Vector3& normal, const Vector3& axis0) {
   TactilePoint p;
-  p.position = array_of(position);
-  p.normal = array_of(normal);
-  p.axis0 = array_of(axis0);
-  p.axis1 = array_of(cross(normal, axis0));
+  p.position = position;
+  p.normal = normal;
+  p.axis0 = axis0;
+  p.axis1 = cross(normal, axis0);
   return p;
 }
 
 /// Three numbers from the k-th, of unit length.
 Vector3 direction(const WordReader& file, std::size_t k, const char* what) {
-  const Vec3<double> a = {file.number(k), file.number(k + 1), file.number(k + 2)};
+  const Vector3 a = {file.number(k), file.number(k + 1), file.number(k + 2)};
   if (!(dot(a, a) > 0)) file.fail(fmt::format("{} has no length; expected a direction", what));
-  return array_of(unit(a));
+  return unit(a);
 }
 
 TactilePoint parse_point(const WordReader& file) {
@@ -69,10 +61,10 @@ TactilePoint parse_point(const WordReader& file) {
 
 /// Of a direction on the half z ≥ 0: its place in the square [-1, 1]². Rings about the pole become
 /// square rings that hold the same share of the area, and an eighth of a ring one half of an edge.
-std::array<double, 2> square_place(const Vec3<double>& n) {
-  const double ring = std::sqrt(std::max(0.0, 1 - n.z)), x = std::abs(n.x), y = std::abs(n.y);
+std::array<double, 2> square_place(const Vector3& n) {
+  const double ring = std::sqrt(std::max(0.0, 1 - n[2])), x = std::abs(n[0]), y = std::abs(n[1]);
   const double along = ring * std::atan2(std::min(x, y), std::max(x, y)) * 4 / M_PI;
-  return {std::copysign(x >= y ? ring : along, n.x), std::copysign(x >= y ? along : ring, n.y)};
+  return {std::copysign(x >= y ? ring : along, n[0]), std::copysign(x >= y ? along : ring, n[1])};
 }
 
 }  // namespace
@@ -83,7 +75,7 @@ std::vector<TactilePoint> hemisphere_points(double radius, int count) {
   for (int i = 0; i < count; ++i) {
     const double z = 1 - (i + 0.5) / count, across = std::sqrt(1 - z * z), turn = golden * i;
     const double c = std::cos(turn), s = std::sin(turn);
-    const Vec3<double> normal = {across * c, across * s, z};
+    const Vector3 normal = {across * c, across * s, z};
     points.push_back(point_at(radius * normal, normal, {z * c, z * s, -across}));
   }
   return points;
@@ -95,7 +87,7 @@ void draw_hemisphere(int rows, int cols, std::vector<TactilePoint>& points) {
     return static_cast<std::size_t>(i) * static_cast<std::size_t>(cols) + j;
   };
   for (TactilePoint& p : points) {
-    const auto [x, y] = square_place(vec(p.normal));
+    const auto [x, y] = square_place(p.normal);
     const double row = rows * (1 + x) / 2, col = cols * (1 + y) / 2;
     const int i0 = static_cast<int>(row), j0 = static_cast<int>(col);
     double nearest = INFINITY;
@@ -128,11 +120,11 @@ std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::
   std::vector<TactilePoint> points;
   const auto vertex = [&](int k) {
     const double* p = &mesh.vertices[3 * std::size_t(k)];
-    return Vec3<double>{p[0], p[1], p[2]};
+    return Vector3{p[0], p[1], p[2]};
   };
   for (const std::array<int, 3>& t : mesh.triangles) {
-    const Vec3<double> a = vertex(t[0]), ab = vertex(t[1]) - a, ac = vertex(t[2]) - a, bc = ac - ab;
-    const Vec3<double> area = cross(ab, ac);
+    const Vector3 a = vertex(t[0]), ab = vertex(t[1]) - a, ac = vertex(t[2]) - a, bc = ac - ab;
+    const Vector3 area = cross(ab, ac);
     if (!(dot(area, area) > 0)) continue;  // nothing to feel on
     const double longest = std::sqrt(std::max({dot(ab, ab), dot(ac, ac), dot(bc, bc)})),
                  cuts = std::ceil(longest / pitch);
@@ -167,10 +159,9 @@ std::vector<TactilePoint> read_tactile_points(const std::string& path) {
 }
 
 void move_points(const Pose& pose, std::vector<TactilePoint>& points) {
-  const kernels::Frame<double> at = to_frame(pose);
   for (TactilePoint& p : points) {
-    p.position = array_of(at.R * vec(p.position) + at.p);
-    for (Vector3* a : {&p.normal, &p.axis0, &p.axis1}) *a = array_of(at.R * vec(*a));
+    p.position = outer_point(pose, p.position);
+    for (Vector3* a : {&p.normal, &p.axis0, &p.axis1}) *a = outer_direction(pose, *a);
   }
 }
 

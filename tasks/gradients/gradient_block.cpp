@@ -9,7 +9,7 @@
 #include <cmath>
 #include <string>
 
-#include "kernels/numbers/lanes.hpp"
+#include "kernels/numbers/block.hpp"
 
 namespace tangere {
 

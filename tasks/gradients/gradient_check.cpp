@@ -205,7 +205,7 @@ class Directions {
     StateTangent state{q.empty() ? zero : q, v.empty() ? zero : v, zero, zero};
     std::vector<double> rows;
     if (!change.empty()) {
-      rows.resize(std::size_t(parameter_rows(model.compiled())));
+      rows.resize(std::size_t(parameter_rows(model)));
       parameters_.spread(change, s_.start, 0, rows);
     }
     Tangent tangent(model, s_.options.stepper);
@@ -327,8 +327,8 @@ class Check {
         0, [&](const std::vector<double>& d) { return tangents_.along({}, {}, d, {}); });
   }
   void positions() {
-    const CompiledModel& m = s_.start.model().compiled();
-    const std::span<const double> q = std::span(g_.q).first(std::size_t(m.nv));
+    const Model& m = s_.start.model();
+    const std::span<const double> q = std::span(g_.q).first(std::size_t(m.nv()));
     const auto move = [&m](std::size_t i) {
       return [&m, i](Inputs& x, double e) { displace(m, x.q, static_cast<int>(i), e); };
     };
@@ -360,10 +360,9 @@ class Check {
   void points() {
     const Model& model = s_.start.model();
     std::vector<double> coefficients;  // this environment's
-    for (const CompiledSensor& s : model.compiled().sensors)
-      for (const kernels::Parameter& p :
-           {s.parameters.kn, s.parameters.kt, s.parameters.mu, s.parameters.damping})
-        coefficients.push_back(p.row < 0 ? p.value : s_.start.block(0)[p.row * kernels::kBlock]);
+    for (std::size_t s = 0; s < model.sensors().size(); ++s)
+      for (const double c : sensor_coefficients(s_.start, 0, static_cast<int>(s)))
+        coefficients.push_back(c);
     const std::vector<PointChange> changes = point_changes(model, coefficients, s_.options.seed);
     const std::span<const double> all =
         std::span(g_.points).first(std::size_t(tactile_points(model) * kPointNumbers));

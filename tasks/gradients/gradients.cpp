@@ -11,7 +11,7 @@
 #include <string>
 
 #include "engine/derivative/point_numbers.hpp"
-#include "kernels/numbers/lanes.hpp"
+#include "kernels/numbers/block.hpp"
 #include "tasks/gradients/gradient_block.hpp"
 #include "tasks/run/thread_order.hpp"
 
@@ -83,7 +83,7 @@ GradientRollouts& GradientRollouts::operator=(GradientRollouts&&) noexcept = def
 GradientSummary GradientRollouts::run(const Batch& start, const StepControls& controls,
                                       const GradientGoOn& go_on) {
   Impl& i = *impl_;
-  if (&start.model().compiled() != &i.model.compiled())
+  if (start.model() != i.model)
     throw InputError("a batch of scene '" + start.model().scene().name +
                      "' for gradients of a model of scene '" + i.model.scene().name +
                      "'; expected the same Model");

@@ -10,7 +10,6 @@
 #include <limits>
 
 #include "engine/derivative/parameters.hpp"
-#include "engine/model/compiled_model.hpp"
 #include "engine/model/random.hpp"
 #include "engine/sense/readout.hpp"
 
@@ -24,21 +23,6 @@ constexpr double kDifference =
     1e-6;  // of logarithms; small, so that few points begin to touch or to slip within it
 constexpr double kRounding = 1e-8;  // of logarithms
 constexpr double kLongest = 1.5;    // of logarithms in one step: the model is linear
-
-/// f(point of the sensor, its place 0 … 63 in the tile) for the points of a tile.
-template <class Function>
-void for_points(const kernels::PadTiles& pad, int tile, const Function& f) {
-  if (pad.curved()) {
-    for (int n = 0; n < pad.points_of(tile); ++n)
-      f(static_cast<std::size_t>(pad.index[kernels::kTactileTile * tile + n]),
-        static_cast<std::size_t>(n));
-    return;
-  }
-  for (int i = 0; i < pad.rows_of(tile); ++i)
-    for (int j = 0; j < pad.cols_of(tile); ++j)
-      f(static_cast<std::size_t>(pad.first_of(tile) + i * pad.cols + j),
-        static_cast<std::size_t>(kernels::kTileSide * i + j));
-}
 
 std::size_t numbers_of_fields(const Model& model) {
   std::size_t n = 0;
@@ -245,6 +229,8 @@ void add_noise(FieldSequence& sequence, double deviation, std::uint64_t seed) {
 
 FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded)
     : model_(model), recorded_(recorded) {
+  for (std::size_t s = 0; s < model.sensors().size(); ++s)
+    tiles_.push_back(points_by_tile(model, static_cast<int>(s)));
   for (const auto& reading : recorded.readings) {
     if (reading.size() != numbers_of_fields(model))
       throw InputError(
@@ -253,16 +239,14 @@ FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded)
                       reading.size(), numbers_of_fields(model)));
     std::vector<double>& squares = squares_.emplace_back();
     const double* of_sensor = reading.data();
-    for (const CompiledSensor& sensor : model.compiled().sensors) {
-      const kernels::PadTiles pad = sensor.tiles();
-      for (int tile = 0; tile < pad.tiles(); ++tile) {
+    for (std::size_t s = 0; s < tiles_.size(); ++s) {
+      for (const std::vector<TilePoint>& points : tiles_[s]) {
         double& sum = squares.emplace_back(0);
-        for_points(pad, tile, [&](std::size_t point, std::size_t) {
-          for (std::size_t c = 0; c < 3; ++c)
-            sum += 0.5 * of_sensor[3 * point + c] * of_sensor[3 * point + c];
-        });
+        for (const TilePoint& p : points)
+          for (int c = 0; c < 3; ++c)
+            sum += 0.5 * of_sensor[3 * p.point + c] * of_sensor[3 * p.point + c];
       }
-      of_sensor += 3 * sensor.points();
+      of_sensor += 3 * model.sensors()[s].points;
     }
   }
 }
@@ -276,27 +260,24 @@ double FieldMisfit::evaluate(const LossPoint& at, const LossCotangent& out) cons
   const double* squares = squares_[k].data();
   double sum = 0;
   for (std::size_t s = 0; s < at.fields.size(); ++s) {
-    const CompiledSensor& sensor = model_.compiled().sensors[s];
-    const kernels::PadTiles pad = sensor.tiles();
     const std::span<const int> touched = at.fields[s]->tiles();
     std::size_t t = 0;
-    for (int tile = 0; tile < pad.tiles(); ++tile) {
-      if (t == touched.size() || touched[t] != tile) {
+    for (std::size_t tile = 0; tile < tiles_[s].size(); ++tile) {
+      if (t == touched.size() || touched[t] != static_cast<int>(tile)) {
         sum += squares[tile];
         continue;
       }
-      for_points(pad, tile, [&](std::size_t point, std::size_t n) {
+      for (const TilePoint& p : tiles_[s][tile])
         for (std::size_t c = 0; c < 3; ++c) {
-          const std::size_t i = (3 * t + c) * kernels::kTactileTile + n;
-          const double residual = at.fields[s]->values()[i] - reading[3 * point + c];
+          const std::size_t i = (3 * t + c) * kTilePoints + std::size_t(p.place);
+          const double residual = at.fields[s]->values()[i] - reading[3 * std::size_t(p.point) + c];
           sum += 0.5 * residual * residual;
           out.fields[s][i] += residual;
         }
-      });
       ++t;
     }
-    reading += 3 * sensor.points();
-    squares += pad.tiles();
+    reading += 3 * model_.sensors()[s].points;
+    squares += tiles_[s].size();
   }
   return sum;
 }

@@ -51,7 +51,8 @@ class FieldMisfit : public RolloutLoss {
 
  private:
   Model model_;
-  const FieldSequence& recorded_;  // outlives this
+  const FieldSequence& recorded_;                           // outlives this
+  std::vector<std::vector<std::vector<TilePoint>>> tiles_;  // of every sensor
   std::vector<std::vector<double>>
       squares_;  // ½ |T_recorded|² of every sensor's tiles in each reading
 };

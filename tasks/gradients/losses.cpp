@@ -19,13 +19,12 @@ class FinalState : public RolloutLoss {
       sum += 0.5 * at.v[i] * at.v[i];
       out.v[i] += at.v[i];
     }
-    const CompiledModel& m = model_.compiled();
     std::vector<double> off(at.q.begin(), at.q.end());
     for (std::size_t i = 0; i < off.size(); ++i) {
-      off[i] -= m.initial_q[i];
+      off[i] -= model_.initial_q()[i];
       sum += 0.5 * off[i] * off[i];
     }
-    add_along_dofs(m, at.q, off, out.q);
+    add_along_dofs(model_, at.q, off, out.q);
     return sum;
   }
 

@@ -61,9 +61,8 @@ class Check {
   }
   void positions() {
     const auto move = [this](std::size_t i) {
-      return [this, i](Inputs& x, double e) {
-        displace(task_.model().compiled(), x.q, static_cast<int>(i), e);
-      };
+      return
+          [this, i](Inputs& x, double e) { displace(task_.model(), x.q, static_cast<int>(i), e); };
     };
     add({"q", gradient_.by_q, all_of(gradient_.by_q.size()),
          [&](std::size_t i) { return difference(1, move(i)); }, dof_name()},
@@ -84,7 +83,7 @@ class Check {
   /// By relative changes of what this episode has: units differ.
   void numbers() {
     const RelativeGradient r(parameters_, task_.model().scene(), varying_, gradient_.by_parameter);
-    std::vector<double> rows(size(parameter_rows(task_.model().compiled())));
+    std::vector<double> rows(size(parameter_rows(task_.model())));
     add({"numbers", r.gradient, r.given,
          [&](std::size_t k) { return difference_of_number(static_cast<int>(k)); },
          [&](std::size_t k) { return parameters_.infos()[k].name; }},

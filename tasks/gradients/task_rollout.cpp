@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "engine/model/compiled_model.hpp"
-
 namespace tangere {
 
 using kernels::kBlock;
@@ -71,10 +69,7 @@ void TaskRollout::start(std::uint64_t seed, std::span<const std::int64_t> episod
 }
 
 void TaskRollout::displace(int lane, std::span<const double> q, std::span<const double> v) {
-  const BlockLayout& layout = task_.model().compiled().layout;
-  double* const column = batch_->block(0) + lane;
-  for (std::size_t i = 0; i < q.size(); ++i) column[(size(layout.q) + i) * kBlock] = q[i];
-  for (std::size_t i = 0; i < v.size(); ++i) column[(size(layout.v) + i) * kBlock] = v[i];
+  batch_->displace_state(lane, q, v);
   std::copy(q.begin(), q.end(), row(data_->q, lane, q.size()).begin());
   std::copy(v.begin(), v.end(), row(data_->v, lane, v.size()).begin());
 }

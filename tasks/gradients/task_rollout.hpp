@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "engine/step/tape.hpp"
-#include "kernels/numbers/lanes.hpp"
+#include "kernels/numbers/block.hpp"
 #include "tasks/run/block_worker.hpp"
 
 namespace tangere {

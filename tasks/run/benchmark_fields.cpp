@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <type_traits>
 
-#include "kernels/numbers/lanes.hpp"
+#include "kernels/numbers/block.hpp"
 
 namespace tangere {
 namespace {

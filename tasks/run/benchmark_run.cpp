@@ -17,7 +17,7 @@
 #include <string>
 
 #include "engine/step/stepper.hpp"
-#include "kernels/numbers/lanes.hpp"
+#include "kernels/numbers/block.hpp"
 #include "tasks/run/benchmark_fields.hpp"
 #include "tasks/run/thread_order.hpp"
 

@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-#include "kernels/numbers/lanes.hpp"
+#include "kernels/numbers/block.hpp"
 
 namespace tangere {
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "engine/sense/readout.hpp"
-#include "kernels/numbers/lanes.hpp"
+#include "kernels/numbers/block.hpp"
 
 namespace tangere {
 namespace {

@@ -20,7 +20,7 @@ using kernels::kBlock;
 
 /// q ⊕ e along dof i.
 inline std::vector<double> moved(const Model& model, std::vector<double> q, int dof, double e) {
-  displace(model.compiled(), q, dof, e);
+  displace(model, q, dof, e);
   return q;
 }
 
@@ -69,7 +69,7 @@ class StateLoss {
     const double* w = at(step);
     for (int i = 0; i < nv_; ++i) c.v[std::size_t(i * kBlock + lane)] += w[nq_ + i];
     std::vector<double> along(static_cast<std::size_t>(nv_));
-    add_along_dofs(model_.compiled(), q, {w, static_cast<std::size_t>(nq_)}, along);
+    add_along_dofs(model_, q, {w, static_cast<std::size_t>(nq_)}, along);
     for (int i = 0; i < nv_; ++i) c.q[std::size_t(i * kBlock + lane)] += along[std::size_t(i)];
   }
 

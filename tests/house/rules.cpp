@@ -117,6 +117,20 @@ std::string resolve(const Tree& tree, const std::string& from, const std::string
   return tree.contains(beside) ? beside : "";
 }
 
+constexpr const char* kInstallList = "cmake/install.cmake";
+
+/// Headers that the list names.
+Names installed_headers(const Tree& tree) {
+  static const std::regex header(R"([a-z_]+/[a-z0-9_/-]+\.hpp)");
+  Names installed;
+  const auto list = tree.find(kInstallList);
+  if (list == tree.end()) return installed;
+  for (std::sregex_iterator match(list->second.begin(), list->second.end(), header), end;
+       match != end; ++match)
+    installed.insert(match->str());
+  return installed;
+}
+
 void check_quoted(const Tree& tree, const std::string& path, const Include& include,
                   std::vector<Violation>& found) {
   const std::string target = resolve(tree, path, include.name);
@@ -213,14 +227,9 @@ std::vector<Violation> check_kernel_includes(const Tree& tree) {
 }
 
 std::vector<Violation> check_public_headers(const Tree& tree) {
-  static const std::string list = "cmake/install.cmake";
-  const auto install = tree.find(list);
-  if (install == tree.end()) return {{list, 0, "is missing"}};
-  Names installed;
-  static const std::regex header(R"([a-z_]+/[a-z0-9_/-]+\.hpp)");
-  for (std::sregex_iterator match(install->second.begin(), install->second.end(), header), end;
-       match != end; ++match)
-    installed.insert(match->str());
+  const std::string list = kInstallList;
+  if (!tree.contains(list)) return {{list, 0, "is missing"}};
+  const Names installed = installed_headers(tree);
   std::vector<Violation> found;
   for (const std::string& path : installed) {
     const auto file = tree.find(path);
@@ -237,6 +246,26 @@ std::vector<Violation> check_public_headers(const Tree& tree) {
     }
   }
   if (installed.empty()) found.push_back({list, 0, "installs no header"});
+  return found;
+}
+
+std::vector<Violation> check_private_headers(const Tree& tree) {
+  const Names installed = installed_headers(tree);
+  std::vector<Violation> found;
+  for (const auto& [path, text] : tree) {
+    const std::string from = top_of(path);
+    if (!is_cpp(path) || from == "engine" || from == "kernels" || from == "tests" ||
+        from == "bench")
+      continue;
+    for (const Include& include : includes_of(text)) {
+      const std::string target = include.quoted ? resolve(tree, path, include.name) : "";
+      const std::string to = top_of(target);
+      if ((to == "engine" || to == "kernels") && !installed.contains(target))
+        found.push_back({path, include.line,
+                         "includes \"" + target + "\", which is private to " + to + ": " +
+                             kInstallList + " does not list it"});
+    }
+  }
   return found;
 }
 

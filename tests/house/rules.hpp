@@ -41,6 +41,10 @@ std::vector<Violation> check_kernel_includes(const Tree& tree);
 /// else.
 std::vector<Violation> check_public_headers(const Tree& tree);
 
+/// Nobody outside includes a private header: of engine and kernels, io, tasks, apps and examples see
+/// what cmake/install.cmake installs. Tests and benchmarks may look inside.
+std::vector<Violation> check_private_headers(const Tree& tree);
+
 /// SPDX line first, then a comment that says why the file exists; at most 600 lines.
 std::vector<Violation> check_sources(const Tree& tree);
 

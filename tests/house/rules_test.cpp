@@ -43,6 +43,7 @@ TEST(House, KernelsShareNothingAcrossInstructionSets) {
   EXPECT_THAT(check_kernel_includes(project()), IsEmpty());
 }
 TEST(House, PublicHeadersStandAlone) { EXPECT_THAT(check_public_headers(project()), IsEmpty()); }
+TEST(House, PrivateHeadersStayInside) { EXPECT_THAT(check_private_headers(project()), IsEmpty()); }
 TEST(House, SourcesAreShortAndSayWhy) { EXPECT_THAT(check_sources(project()), IsEmpty()); }
 TEST(House, FoldersAndLinksAreDocumented) { EXPECT_THAT(check_documents(project()), IsEmpty()); }
 
@@ -106,6 +107,23 @@ TEST(HouseRules, SeeAPublicHeaderThatLeansOnAPrivateOne) {
       ElementsAre(Says("engine/a.hpp", 3, "engine/hidden.hpp"), Says("engine/b.hpp", 1, "Eigen/LU"),
                   Says("cmake/install.cmake", 0, "engine/gone.hpp")));
   EXPECT_THAT(check_public_headers({}), Contains(Says("cmake/install.cmake", 0, "missing")));
+}
+
+TEST(HouseRules, SeeAPrivateHeaderOutside) {
+  const std::string both = "#include \"engine/open.hpp\"\n#include \"engine/shut.hpp\"\n";
+  const Tree tree{{"cmake/install.cmake", "install(FILES engine/open.hpp)\n"},
+                  {"apps/a.cpp", both},
+                  {"bench/a.cpp", both},
+                  {"engine/a.cpp", both},
+                  {"engine/open.hpp", ""},
+                  {"engine/shut.hpp", ""},
+                  {"examples/a.cpp", "#include \"kernels/lane.hpp\"\n#include \"io/b.hpp\"\n"},
+                  {"io/b.hpp", "#include <engine/shut.hpp>\n"},
+                  {"kernels/lane.hpp", ""},
+                  {"tests/a.cpp", both}};
+  EXPECT_THAT(check_private_headers(tree),
+              ElementsAre(Says("apps/a.cpp", 2, "engine/shut.hpp"),
+                          Says("examples/a.cpp", 1, "kernels/lane.hpp")));
 }
 
 TEST(HouseRules, SeeAHeadlessOrOverlongSource) {

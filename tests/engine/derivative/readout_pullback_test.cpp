@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/derivative/readout_pullback.hpp"
+#include "engine/model/compiled_model.hpp"
 #include "engine/sense/readout.hpp"
 #include "tests/engine/pad_scene.hpp"
 
@@ -52,7 +53,7 @@ class Reading {
     pullback.place(batch, 0);
     pullback.clear();
     for (auto* x : {&out.q, &out.v}) x->assign(std::size_t(model_.nv() * kBlock), 0.0);
-    out.parameters.assign(std::size_t(parameter_rows(model_.compiled()) * kBlock), 0.0);
+    out.parameters.assign(std::size_t(parameter_rows(model_) * kBlock), 0.0);
     pullback.field(lane, 0, frame.tiles(), cotangents, out.parameters);
     for (int k = 0; k < 2; ++k)
       pullback.end_effector(lane, k, std::span(of_end_effectors_).subspan(3 * std::size_t(k), 3));
@@ -63,7 +64,7 @@ class Reading {
  private:
   /// The weights in the layout of the tiles.
   void tile_weights(const CompactFrame<double>& frame, std::vector<double>& out) const {
-    const kernels::PadTiles pad = model_.compiled().sensors[0].tiles();
+    const kernels::PadTiles pad = compiled(model_).sensors[0].tiles();
     for (std::size_t k = 0; k < frame.tiles().size(); ++k) {
       const int tile = frame.tiles()[k];
       for (int p = 0; p < 64; ++p) {

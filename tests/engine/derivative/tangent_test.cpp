@@ -6,6 +6,7 @@
 #include "engine/derivative/readout_pullback.hpp"
 #include "engine/derivative/step_jacobian.hpp"
 #include "engine/derivative/tangent.hpp"
+#include "engine/model/compiled_model.hpp"
 #include "engine/sense/readout.hpp"
 #include "tests/engine/gradient_run.hpp"
 #include "tests/engine/random_machine.hpp"
@@ -47,7 +48,7 @@ struct Products {
 /// at all).
 Products products(const Model& model, const StepperOptions& options, const RunInput& in,
                   unsigned seed, int every) {
-  const CompiledModel& m = model.compiled();
+  const CompiledModel& m = compiled(model);
   const int steps = static_cast<int>(in.u.size());
   const StateLoss loss(model, steps, seed);
   Batch batch(model, 1);
@@ -65,7 +66,7 @@ Products products(const Model& model, const StepperOptions& options, const RunIn
   Random random(seed + 1);
   Direction d{normals(random, std::size_t(m.nv)),
               normals(random, std::size_t(m.nv)),
-              std::vector<double>(std::size_t(parameter_rows(m))),
+              std::vector<double>(std::size_t(parameter_rows(model))),
               {}};
   const Parameters parameters(model);
   std::vector<double> change;

@@ -44,6 +44,8 @@ TEST(Schemes, RefuseWhatNoStageSolves) {
   EXPECT_THROW((runge_kutta("none", 1, {})), InputError);
   EXPECT_THROW((runge_kutta("explicit", 2, {{0}, {0.5, 0.5}})), InputError);
   EXPECT_THROW((runge_kutta("full", 2, {{0.5, -0.1}, {0.5, 0.5}})), InputError);
+  EXPECT_THROW((runge_kutta("long", 1, {{1}, {0, 1}, {0, 0, 1}, {0, 0, 0, 1}, {0, 0, 0, 0, 1}})),
+               InputError);
   EXPECT_THROW((runge_kutta("short", 1, {{0.5}})), InputError);
 }
 

@@ -247,10 +247,10 @@ TEST(VaryingGeometry, NumbersCanBeSetAndAResetDrawsThemAgain) {
   const Model model(c.scene);
   Batch batch(model, 2, 7);
   const std::vector<double> before(batch.block(0),
-                                   batch.block(0) + model.compiled().layout.rows * kernels::kBlock);
+                                   batch.block(0) + compiled(model).layout.rows * kernels::kBlock);
   for (int k = 0; k < 3; ++k) batch.set_randomized_value(1, k, 0.035 - k);
   EXPECT_EQ(batch.randomized_value(1, 0), 0.035);
-  const int size_row = model.compiled().pairs[0].size_row;
+  const int size_row = compiled(model).pairs[0].size_row;
   ASSERT_GE(size_row, 0);
   EXPECT_EQ(batch.block(0)[size_row * kernels::kBlock + 1], 0.035);
   batch.reset(1, 1);

@@ -141,18 +141,18 @@ template <class Real>
 void check(const Case& c, double tolerance) {
   const Model model(curved_ball(300, c.own_factors));
   const std::vector<TactilePoint>& points = model.scene().sensors[0].points;
-  PadTiles pad = model.compiled().sensors[0].tiles();
+  PadTiles pad = compiled(model).sensors[0].tiles();
   ASSERT_EQ(pad.tiles(), 5);
   // What fills the last tile up holds NaN: it must reach no real point.
-  AlignedVector<double> offsets = model.compiled().sensors[0].offsets;
-  AlignedVector<float> offsets_f = model.compiled().sensors[0].offsets_f;
+  AlignedVector<double> offsets = compiled(model).sensors[0].offsets;
+  AlignedVector<float> offsets_f = compiled(model).sensors[0].offsets_f;
   for (std::size_t k = 0; k < offsets.size(); ++k)
     if (std::abs(offsets[k]) > 1) {
       offsets[k] = std::numeric_limits<double>::quiet_NaN();
       offsets_f[k] = std::numeric_limits<float>::quiet_NaN();
     }
   pad.offsets = offsets.data(), pad.offsets_f = offsets_f.data();
-  const AlignedVector<double> far_reach(model.compiled().sensors[0].tile_radius.size(), 1e9);
+  const AlignedVector<double> far_reach(compiled(model).sensors[0].tile_radius.size(), 1e9);
   PadTiles unculled = pad;
   unculled.radius = far_reach.data();
   for (unsigned seed = 1; seed <= 8; ++seed) {

@@ -118,7 +118,7 @@ std::vector<double> random_numbers(Random& random, int count) {
 }
 /// q moved by `by` along a dof, rotations on the right.
 std::vector<double> moved(const Model& model, std::vector<double> q, int dof, double by) {
-  for (const kernels::Link& l : model.compiled().links) {
+  for (const kernels::Link& l : compiled(model).links) {
     const int k = dof - l.v;
     if (k < 0 || k >= kernels::dofs(l.kind)) continue;
     double* const at = &q[std::size_t(l.q)];

@@ -283,7 +283,7 @@ TEST(Field, SumAndMomentAreTheWrenchOfTheContact) {
       ASSERT_GT(f.sum().z, 0);
 
       const auto residual = [&](const Model& m) {
-        testing::StageBuffers<double> b(m.compiled());
+        testing::StageBuffers<double> b(compiled(m));
         std::copy(q.begin(), q.end(), b.centre.begin());
         std::copy(v.begin(), v.end(), b.r.begin());  // rates are c₀/h x + r/h, with x = 0 and h = 1
         b.residual(1, 1);

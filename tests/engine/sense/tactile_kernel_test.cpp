@@ -36,7 +36,7 @@ const CompiledSensor& pad_sensor() {
     scene.sensors[0].array.cols = 19;
     return scene;
   }());
-  return model.compiled().sensors[0];
+  return compiled(model).sensors[0];
 }
 
 /// The pad with NaN where an edge tile has no point: none may reach a real one.

@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/frames.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/stepper.hpp"
 #include "kernels/contact/pair_contact.hpp"
@@ -190,7 +191,7 @@ TEST_F(BoxPushing, FieldsAtItsStates) {
   const Table fields = read("tactile_tight.csv"), points = read("tactile_points.csv");
   ASSERT_EQ(fields.size(), 40U);
   ASSERT_EQ(points.size(), 130U);
-  const CompiledModel& m = model.compiled();
+  const CompiledModel& m = compiled(model);
   Batch batch(model, 1);
   Readout readout(model);
   std::vector<double> force(3 * 130);
@@ -219,7 +220,7 @@ TEST_F(BoxPushing, FieldsAtItsStates) {
 }
 
 TEST_F(BoxPushing, ItsStatesSolveOurResidual) {
-  const CompiledModel& m = model.compiled();
+  const CompiledModel& m = compiled(model);
   ASSERT_EQ(m.nv, 7);
   testing::StageBuffers<double> b(m);
   const double h = m.scene.timestep;

@@ -95,7 +95,7 @@ TEST_P(Convergence, SchemesHaveTheirOrder) {
   const struct {
     double slack;
     int steps;
-  } kByOrder[] = {{0.1, 400}, {0.15, 200}, {0.2, 100}};
+  } kByOrder[] = {{0.1, 400}, {0.15, 400}, {0.25, 400}};
   for (const Integrator integrator : testing::all_integrators()) {
     const int order = integrator.scheme().order;
     const auto& s = kByOrder[order - 1];

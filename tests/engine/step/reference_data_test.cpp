@@ -99,7 +99,7 @@ TEST_F(Reference, TactileFieldsAtItsStatesAgreeToRounding) {
 /// Their row t + 1 in our BDF2 residual, rotation chart centred on row t. Planar rows only: there
 /// both charts coincide.
 TEST_F(Reference, ItsStatesSolveOurResidual) {
-  const CompiledModel& m = model.compiled();
+  const CompiledModel& m = compiled(model);
   testing::StageBuffers<double> b(m);
   const double h = m.scene.timestep;
   std::vector<double> before_q, before_v, now_q, now_v, next_q, next_v;

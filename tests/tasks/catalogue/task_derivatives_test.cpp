@@ -71,7 +71,7 @@ class Differences {
     std::vector<double>& q = own_.q[m];
     return [this, &q, at = q, dof](double x) {
       q = at;
-      displace(task_.model().compiled(), q, static_cast<int>(dof), x);
+      displace(task_.model(), q, static_cast<int>(dof), x);
     };
   }
 
@@ -235,7 +235,7 @@ TEST_P(EveryTask, RestartsHaveTheDerivativesOfDifferences) {
     return;
   }
   task->place(own.view(), start, speed);
-  add_along_dofs(task->model().compiled(), start, by_q, along);
+  add_along_dofs(task->model(), start, by_q, along);
   task->place_vjp(own.view(), along, by_v, slopes.out());
   slopes.check(
       [&] {

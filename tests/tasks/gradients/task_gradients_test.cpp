@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/model/compiled_model.hpp"
 #include "engine/step/displacement.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tasks/catalogue/task_list.hpp"
@@ -349,7 +350,7 @@ void check_row(const Task& task, std::int64_t last) {
   const RowJacobian& j = jacobians.of(5);
   const std::size_t nv = std::size_t(task.model().nv()), width = task.spec().action.size();
   std::size_t plain = 0;
-  while (plain < nv && task.model().compiled().links[plain].kind != kernels::JointKind::spherical)
+  while (plain < nv && compiled(task.model()).links[plain].kind != kernels::JointKind::spherical)
     ++plain;  // one link each there
   double norm = 0;
   for (const double x : j.state) norm = std::max(norm, std::abs(x));
@@ -361,7 +362,7 @@ void check_row(const Task& task, std::int64_t last) {
         const double e = l == 0 ? kMove : -kMove;
         const Moment now = view_of(r.batch(), r.data(), l).now();
         std::vector<double> q(now.q.begin(), now.q.end()), v(now.v.begin(), now.v.end());
-        if (column < nv) displace(task.model().compiled(), q, static_cast<int>(column), e);
+        if (column < nv) displace(task.model(), q, static_cast<int>(column), e);
         if (column >= nv && column < 2 * nv) v[column - nv] += e;
         if (column >= 2 * nv) asked.asked[std::size_t(l) * width + column - 2 * nv] += e;
         r.displace(l, q, v);

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // compile(scene): names become indices, fixed joints fold into what they hang on, joints become
 // elementary links.
+#include "engine/model/compiled_model.hpp"
+
 #include <algorithm>
 #include <cmath>
 
 #include "engine/model/compile_joints.hpp"
 #include "engine/model/compile_variations.hpp"
+#include "engine/model/effects_and_stages.hpp"
+#include "engine/model/frames.hpp"
+#include "engine/model/group_contacts.hpp"
 
 namespace tangere {
 
@@ -16,8 +21,6 @@ using kernels::Mat3;
 using kernels::Vec3;
 
 namespace {
-
-Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
 
 class Compiler {
  public:
@@ -219,7 +222,7 @@ class Compiler {
     for (const EndEffectorDescription& d : m_.scene.end_effectors) {
       names.add("endeffector", d.name, static_cast<int>(m_.end_effectors.size()), d.source);
       const CompiledJoint& joint = m_.joints[joints_.find("joint", d.joint, d.source)];
-      m_.end_effectors.push_back({joint.link, joint.frame.R * vec(d.position) + joint.frame.p});
+      m_.end_effectors.push_back({joint.link, joint.frame.R * vec3_of(d.position) + joint.frame.p});
       m_.end_effector_info.push_back({d.name, d.joint});
     }
   }
@@ -334,10 +337,10 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   v.nq = m->nq;
   v.nv = m->nv;
   v.links = m->links.data();
-  v.gravity = vec(g);
+  v.gravity = vec3_of(g);
   const GroundDescription ground = m->scene.ground.value_or(GroundDescription{});
-  v.ground_point = vec(ground.position);
-  v.ground_normal = vec(ground.normal);
+  v.ground_point = vec3_of(ground.position);
+  v.ground_normal = vec3_of(ground.normal);
   v.effects = m->dof_effects.data();
   v.n_pairs = static_cast<int>(m->pairs.size());
   v.n_grounds = static_cast<int>(m->grounds.size());

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Symbolic analysis of the Jacobian, once per scene: which entries exist, in which order to eliminate,
+// what fills in.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "kernels/step/model_view.hpp"
+
+namespace tangere {
+
+/// The storage behind kernels::Pattern.
+struct PatternStorage {
+  int n = 0, entries = 0, factor_entries = 0;
+  std::vector<int> slot, entry_begin, entry_column, permutation, scatter, diagonal;
+  std::vector<int> row_begin, factor_column, lower_begin, lower_slot, run_begin;
+  std::vector<kernels::EliminationRun> runs;
+  [[nodiscard]] kernels::Pattern view() const;
+};
+
+/// Minimum-fill elimination of the structure of the tree and of every contact.
+PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
+                               const std::vector<std::pair<int, int>>& touching);
+
+}  // namespace tangere
