@@ -13,7 +13,7 @@
 #include "engine/derivative/tangent.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/sense/readout.hpp"
-#include "tasks/gradients/loss_reading.hpp"
+#include "tasks/gradients/loss_block.hpp"
 
 namespace tangere {
 namespace {
