@@ -15,7 +15,7 @@
 #include "tasks/catalogue/task_list.hpp"
 #include "tasks/gradients/gradient_check.hpp"
 #include "tasks/gradients/losses.hpp"
-#include "tasks/gradients/task_gradient_check.hpp"
+#include "tasks/gradients/gradient_check.hpp"
 
 namespace tangere::apps {
 namespace {

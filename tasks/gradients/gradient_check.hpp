@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of one environment's rollout, checked on the spot: the adjoint against central
-// differences of whole rollouts and against tangents in dual numbers.
+// Gradients of one environment's rollout and of one episode's return, checked on the spot: the adjoint
+// against central differences of the whole and against tangents in dual numbers.
 #pragma once
 
-#include <string>
-#include <vector>
+#include <functional>
+#include <memory>
 
 #include "tasks/gradients/gradient_compare.hpp"
 #include "tasks/gradients/gradients.hpp"
+#include "tasks/gradients/task_gradients.hpp"
 
 namespace tangere {
 
@@ -20,5 +21,25 @@ struct CheckOptions : CompareOptions {
 /// when it continues a run of a scheme of two steps.
 GradientCheck check_gradient(const Batch& start, const StepControls& controls,
                              const RolloutLoss& loss, const CheckOptions& options);
+
+/// The seed is the episode's as well.
+struct TaskCheckOptions : CompareOptions {
+  std::int64_t episode = 0, actions = 0;  ///< actions: at most so many, 0: the task's horizon
+  StepperOptions stepper;
+};
+
+/// The task on a scene that differs from its own in some numbers.
+using TaskMaker = std::function<std::unique_ptr<Task>(const Scene& scene)>;
+
+struct TaskGradientCheck : GradientCheck {
+  std::int64_t actions = 0;  ///< until the end
+};
+
+/// Differences move the actions that `actions` has chosen, drawn in a little where they reach their
+/// bounds, the state of the first one and the scene's numbers; everything drawn stays. The tangent
+/// takes the task's own derivatives forward, those of the steps in dual numbers. Throws InputError
+/// when the episode finds no solution.
+TaskGradientCheck check_task_gradient(const Task& task, const TaskMaker& make,
+                                      const TaskActions& actions, const TaskCheckOptions& options);
 
 }  // namespace tangere

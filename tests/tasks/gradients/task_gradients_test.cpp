@@ -11,7 +11,7 @@
 #include "io/scene/scene_reader.hpp"
 #include "tasks/catalogue/task_list.hpp"
 #include "tasks/gradients/row_jacobians.hpp"
-#include "tasks/gradients/task_gradient_check.hpp"
+#include "tasks/gradients/gradient_check.hpp"
 #include "tasks/run/policy.hpp"
 #include "tests/tasks/task_check.hpp"
 

@@ -1,13 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// A row of a task's derivative is what its reverse gives for one number; a tangent is all rows
-// times the change.
-#include "tasks/gradients/task_tangent.hpp"
+// Differences sixteen episodes at a time: all step sizes of one entry are lanes of one block. And how
+// a return changes along a direction, forward: a row of a task's derivative is what its reverse gives
+// for one number, a tangent is all rows times the change; its steps in dual numbers.
+#include "tasks/gradients/gradient_check.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <optional>
+
+#include "engine/derivative/tangent.hpp"
+#include "engine/sense/readout.hpp"
 
 namespace tangere {
 namespace {
+
+constexpr double kMargin =
+    2e-2;  // actions stay so far within their bounds: more than differences move them
 
 std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
@@ -20,7 +31,36 @@ std::span<const double> of_lane(const std::vector<double>& all) {
   return std::span(all).first(all.size() / kernels::kBlock);
 }
 
-}  // namespace
+class TaskTangent {
+ public:
+  /// Plays lane 0 of `rollout`, which has just started, with `actions`: (A, action), within their
+  /// bounds.
+  TaskTangent(TaskRollout& rollout, std::span<const double> actions, const StepperOptions& options);
+
+  [[nodiscard]] double along(const InputDirection& direction);
+
+ private:
+  /// A change of what a task looks at.
+  struct ViewTangent {
+    std::vector<std::vector<double>> q, v, end_effectors, tactile;  // per moment
+    std::vector<double> memory, action;
+  };
+  struct OwnCotangent;
+  void begin(std::size_t action);
+  void take_steps(std::size_t action, const InputDirection& d, ViewTangent& seen);
+  void look(std::size_t action, std::size_t moment, const InputDirection& d, ViewTangent& seen);
+  [[nodiscard]] double reward(std::size_t action, const ViewTangent& seen);
+
+  TaskRollout& rollout_;
+  const Task& task_;
+  Tangent tangent_;
+  Readout readout_;
+  std::vector<ActionRecord> records_;
+  std::vector<BlockTape> tapes_;
+  StateTangent state_;
+  std::vector<double> memory_,
+      action_;  // how they change: what begin_action left, the action in hand
+};
 
 /// Room for what a task's reverse functions add to.
 struct TaskTangent::OwnCotangent {
@@ -182,6 +222,111 @@ double TaskTangent::reward(std::size_t action, const ViewTangent& seen) {
     sum += dot(bar.q[m], seen.q[m]) + dot(bar.v[m], seen.v[m]) +
            dot(bar.end_effectors[m], seen.end_effectors[m]) + dot(bar.tactile[m], seen.tactile[m]);
   return sum;
+}
+
+class ReturnChecker : public GradientChecker {
+ public:
+  ReturnChecker(const Task& task, const TaskMaker& make, const TaskActions& actions,
+                const TaskCheckOptions& o)
+      : GradientChecker(task.model(), o), task_(task), make_(make), task_options_(o) {
+    TaskGradients gradient = task_gradients(task, within_bounds(actions), wanted());
+    if (!gradient.failures.empty())
+      throw InputError(fmt::format("action {} of episode {} of task {} finds no solution: {}",
+                                   gradient.failures[0].step, o.episode, task.spec().name,
+                                   to_string(gradient.failures[0].status)));
+    out_.loss = gradient.value[0];
+    length_ = gradient.length[0];
+    const std::size_t numbers = size(length_) * task.spec().action.size();
+    gradient.action.resize(numbers);
+    gradient.by_action.resize(numbers);
+    u_name_ = "actions";
+    by_u_ = std::move(gradient.by_action);
+    by_q_ = std::move(gradient.by_q);
+    by_v_ = std::move(gradient.by_v);
+    by_numbers_ = std::move(gradient.by_parameter);
+    rollout_.emplace(task, o.stepper, Precision::f64);
+    rollout_->start(o.seed, {&o.episode, 1});
+    const Moment first = view_of(rollout_->batch(), rollout_->data(), 0).now();
+    at_ = {{first.q.begin(), first.q.end()}, {first.v.begin(), first.v.end()}, gradient.action};
+    for (std::size_t k = 0; k < model_.scene().randomizations.size(); ++k)
+      varying_.push_back(rollout_->batch().randomized_value(0, static_cast<int>(k)));
+    tangent_.emplace(*rollout_, at_.u, o.stepper);
+  }
+
+  [[nodiscard]] std::int64_t length() const { return length_; }
+
+ private:
+  TaskActions within_bounds(const TaskActions& actions) const {
+    const double low = task_.spec().action.low + kMargin, high = task_.spec().action.high - kMargin;
+    return [&actions, low, high](const TaskView& view, std::span<const double> observation,
+                                 std::span<double> action) {
+      actions(view, observation, action);
+      for (double& a : action) a = std::clamp(a, low, high);
+    };
+  }
+  [[nodiscard]] TaskGradientOptions wanted() const {
+    TaskGradientOptions wanted;
+    wanted.episodes = 1;
+    wanted.first_episode = task_options_.episode;
+    wanted.seed = options_.seed;
+    wanted.actions = task_options_.actions;
+    wanted.stepper = task_options_.stepper;
+    wanted.precision = Precision::f64;
+    wanted.parameters = true;
+    return wanted;
+  }
+
+  [[nodiscard]] std::vector<double> values(const Scene* other,
+                                           const std::vector<CheckInputs>& inputs,
+                                           const std::vector<double>& varying) const override {
+    const std::unique_ptr<Task> made = other != nullptr ? make_(*other) : nullptr;
+    const Task& task = made ? *made : task_;
+    TaskRollout rollout(task, task_options_.stepper, Precision::f64);
+    rollout.start(options_.seed, std::vector<std::int64_t>(inputs.size(), task_options_.episode));
+    for (int l = 0; l < rollout.lanes(); ++l) {
+      for (std::size_t k = 0; k < varying.size(); ++k)
+        if (rollout.batch().is_parameter(static_cast<int>(k)))
+          rollout.batch().set_randomized_value(l, static_cast<int>(k), varying[k]);
+      rollout.displace(l, inputs[size(l)].q, inputs[size(l)].v);
+    }
+    const std::size_t width = task.spec().action.size();
+    ActionRecord record(task);
+    for (std::int64_t a = 0; a < length_; ++a) {
+      for (std::size_t l = 0; l < inputs.size(); ++l)
+        std::copy_n(inputs[l].u.begin() + a * std::int64_t(width), width,
+                    record.asked.begin() + std::ptrdiff_t(l * width));
+      rollout.begin(record);
+      rollout.take_steps(nullptr);
+      rollout.conclude();
+    }
+    std::vector<double> sums = rollout.data().returns;
+    for (int l = 0; l < rollout.lanes(); ++l)
+      if (failed(rollout.batch().status(l))) sums[size(l)] = NAN;
+    return sums;
+  }
+
+  [[nodiscard]] double along(const InputDirection& d) override { return tangent_->along(d); }
+  [[nodiscard]] const Batch& batch() const override { return rollout_->batch(); }
+  [[nodiscard]] std::string control_name(std::size_t i) const override {
+    const TensorSpec& action = task_.spec().action;
+    return fmt::format("action {} {}[{}]", i / action.size(), action.name, i % action.size());
+  }
+
+  const Task& task_;
+  const TaskMaker& make_;
+  const TaskCheckOptions& task_options_;
+  std::int64_t length_ = 0;  // actions until the end
+  std::optional<TaskRollout> rollout_;
+  std::optional<TaskTangent> tangent_;
+};
+
+}  // namespace
+
+TaskGradientCheck check_task_gradient(const Task& task, const TaskMaker& make,
+                                      const TaskActions& actions, const TaskCheckOptions& options) {
+  ReturnChecker checker(task, make, actions, options);
+  checker.check();
+  return {checker.result(), checker.length()};
 }
 
 }  // namespace tangere

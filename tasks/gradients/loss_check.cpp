@@ -12,7 +12,7 @@
 #include "engine/derivative/point_numbers.hpp"
 #include "engine/derivative/tangent.hpp"
 #include "engine/sense/readout.hpp"
-#include "tasks/gradients/loss_reading.hpp"
+#include "tasks/gradients/loss_block.hpp"
 
 namespace tangere {
 namespace {
