@@ -15,7 +15,7 @@ enum class ContactLaw : std::uint8_t {
 };
 
 /// Shapes with a signed distance that a contact or tactile point may touch.
-enum class PrimitiveShape : std::uint8_t { sphere, cuboid, plane, cylinder, capsule };
-inline constexpr int kPrimitiveShapes = 5;
+enum class PrimitiveShape : std::uint8_t { sphere, cuboid, plane, cylinder, capsule, ellipsoid };
+inline constexpr int kPrimitiveShapes = 6;
 
 }  // namespace tangere
