@@ -63,6 +63,16 @@ struct CapsuleMass {
   }
 };
 
+struct EllipsoidMass {
+  template <class T>
+  static Principal<T> of(double density, const T* n) {
+    const T &x = n[0], &y = n[1], &z = n[2];
+    const T mass = density * M_PI / 6.0 * x * y * z;
+    return {mass, mass / 20 * (y * y + z * z), mass / 20 * (x * x + z * z),
+            mass / 20 * (x * x + y * y)};
+  }
+};
+
 MassProperties centred(const Principal<double>& p) {
   return {p.mass, {0, 0, 0}, {{{p.xx, 0, 0}, {0, p.yy, 0}, {0, 0, p.zz}}}};
 }
@@ -129,6 +139,20 @@ std::vector<double> points_of(const CapsuleShape& shape) {
     const double along =
         rings > 1 ? double(k) / (rings - 1) : 0.5;  // a single ring goes around the middle
     add_ring(points, shape.contact_angles, shape.radius, shape.length * (along - 0.5));
+  }
+  return points;
+}
+
+/// Each has the same area of the ball.
+std::vector<double> points_of(const EllipsoidShape& shape) {
+  std::vector<double> points;
+  const int count = shape.contact_count;
+  for (int i = 0; i < count; ++i) {
+    const double z = 1 - (2 * i + 1.0) / count, across = std::sqrt(1 - z * z);
+    const double turn = M_PI * (3 - std::sqrt(5.0)) * i;  // the golden angle
+    points.insert(points.end(),
+                  {0.5 * shape.size[0] * across * std::cos(turn),
+                   0.5 * shape.size[1] * across * std::sin(turn), 0.5 * shape.size[2] * z});
   }
   return points;
 }
@@ -217,6 +241,17 @@ const std::vector<ShapeRow>& table() {
        .mass = mass_of<CapsuleMass>,
        .mass_by_size = mass_slope<CapsuleMass>,
        .points = points_on<CapsuleShape>},
+      {.name = "ellipsoid",
+       .make = make<EllipsoidShape>,
+       .distance = PrimitiveShape::ellipsoid,
+       .sizes = edges<EllipsoidShape>(),
+       .counts = {{"general_contact_resolution",
+                   4,
+                   {count<EllipsoidShape, &EllipsoidShape::contact_count>}}},
+       .mass = mass_of<EllipsoidMass>,
+       .mass_by_size = mass_slope<EllipsoidMass>,
+       .points = points_on<EllipsoidShape>,
+       .slenderness = 100},
       {.name = "plane", .make = make<PlaneShape>, .distance = PrimitiveShape::plane},
       {.name = "mesh",
        .make = make<MeshShape>,

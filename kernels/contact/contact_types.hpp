@@ -43,7 +43,7 @@ template <class N, class F>
 }
 
 /// Shapes with a signed distance that a contact or tactile point may touch.
-enum class PrimitiveShape : std::uint8_t { sphere, cuboid, plane, cylinder, capsule };
-inline constexpr int kPrimitiveShapes = 5;
+enum class PrimitiveShape : std::uint8_t { sphere, cuboid, plane, cylinder, capsule, ellipsoid };
+inline constexpr int kPrimitiveShapes = 6;
 
 }  // namespace tangere

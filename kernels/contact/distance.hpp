@@ -8,7 +8,7 @@
 #include "kernels/contact/shapes/capsule.hpp"
 #include "kernels/contact/shapes/cuboid.hpp"
 #include "kernels/contact/shapes/cylinder.hpp"
-#include "kernels/contact/shapes/general_pad.hpp"
+#include "kernels/contact/shapes/ellipsoid.hpp"
 #include "kernels/contact/shapes/plane.hpp"
 #include "kernels/contact/shapes/sphere.hpp"
 
@@ -17,8 +17,8 @@ namespace tangere::kernels {
 template <template <class> class... S>
 struct ShapeList {};
 /// In the order of PrimitiveShape.
-using Shapes =
-    ShapeList<SphereDistance, CuboidDistance, PlaneDistance, CylinderDistance, CapsuleDistance>;
+using Shapes = ShapeList<SphereDistance, CuboidDistance, PlaneDistance, CylinderDistance,
+                         CapsuleDistance, EllipsoidDistance>;
 
 template <template <class> class... S>
 constexpr bool in_order(ShapeList<S...>) {

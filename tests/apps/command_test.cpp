@@ -55,7 +55,8 @@ TEST(Command, EveryBodyTypeIsInspectedSimulatedAndDrawn) {
   const std::string shapes = TANGERE_SOURCE_DIR "/tests/data/scenes/shapes.xml";
   const Outcome inspected = run(folder, {"inspect", shapes});
   EXPECT_EQ(inspected.exit_code, 0) << inspected.err;
-  for (const char* name : {"cuboid", "cylinder", "capsule", "plane", "mesh", "abstract"})
+  for (const char* name :
+       {"cuboid", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "abstract"})
     EXPECT_THAT(inspected.out, HasSubstr(name));
   const Outcome simulated = run(folder, {"simulate", shapes, "-o", "s.h5", "--json"});
   EXPECT_EQ(simulated.exit_code, 0) << simulated.err;

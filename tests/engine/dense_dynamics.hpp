@@ -146,6 +146,11 @@ class DenseDynamics {
           tube * (3 * r * r + l * l) / 12 + ends * (2 * r * r / 5 + l * l / 4 + 3 * l * r / 8));
     }
     if (std::holds_alternative<PlaneShape>(body.shape)) return {0, M3::Zero()};
+    if (const auto* c = std::get_if<EllipsoidShape>(&body.shape)) {
+      const V3 a = vec(c->size) / 2, a2 = a.cwiseProduct(a);
+      const S m = density * 4 * std::acos(S(-1)) / 3 * a.prod();
+      return {m, M3(V3(a2.y() + a2.z(), a2.x() + a2.z(), a2.x() + a2.y()).asDiagonal()) * (m / 5)};
+    }
     const auto* box = std::get_if<CuboidShape>(&body.shape);
     if (box == nullptr) throw std::logic_error("dense dynamics: a shape without a formula here");
     const V3 s = vec(box->size), s2 = s.cwiseProduct(s);

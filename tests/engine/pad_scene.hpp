@@ -15,6 +15,7 @@ inline Shape shape_of(PrimitiveShape s) {
     case PrimitiveShape::cuboid: return CuboidShape{{0.05, 0.04, 0.03}, {3, 3, 3}};
     case PrimitiveShape::plane: return PlaneShape{};
     case PrimitiveShape::cylinder: return CylinderShape{0.05, 0.02, 8, 2};
+    case PrimitiveShape::ellipsoid: return EllipsoidShape{{0.07, 0.05, 0.04}, 12};
     case PrimitiveShape::capsule: break;
   }
   return CapsuleShape{0.04, 0.02, 3, 4};

@@ -16,10 +16,13 @@ inline Pose random_pose(Random& random, double reach) {
 }
 
 inline Shape random_shape(Random& random) {
-  switch (random.integer(0, 3)) {
+  switch (random.integer(0, 4)) {
     case 0: return SphereShape{random.uniform(0.02, 0.06)};
     case 1: return CylinderShape{random.uniform(0.04, 0.1), random.uniform(0.02, 0.05), 5, 2};
     case 2: return CapsuleShape{random.uniform(0.02, 0.08), random.uniform(0.02, 0.05), 3, 5};
+    case 3:
+      return EllipsoidShape{
+          {random.uniform(0.04, 0.1), random.uniform(0.04, 0.1), random.uniform(0.04, 0.1)}, 25};
     default: break;
   }
   return CuboidShape{

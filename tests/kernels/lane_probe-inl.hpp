@@ -22,7 +22,11 @@ struct LaneProbeOf {
     kernels::with_distance<Number>(probe.shape, probe.size, [&]<class Shape>(const Shape& shape) {
       kernels::Distance<Number> at;
       Number straight;
-      if constexpr (Shape::kBending == kernels::Bending::rod) {
+      if constexpr (Shape::kBending == kernels::Bending::general) {
+        at = shape.evaluate(y);
+        const kernels::Mat3<Number> H = shape.hessian(at);
+        row[4] = H.m[0][0] + H.m[1][1] + H.m[2][2];
+      } else if constexpr (Shape::kBending == kernels::Bending::rod) {
         at = shape.evaluate(y, row[4], straight);
       } else {
         at = shape.evaluate(y, row[4]);

@@ -13,7 +13,8 @@ struct DistanceProbe {
   PrimitiveShape shape;
   kernels::Vec3<double> size;
 };
-inline constexpr int kDistanceRows = 6;  ///< d, n, κ, and whether the point is nearer than 0.01
+inline constexpr int kDistanceRows =
+    6;  ///< d, n, κ or the trace of H, and whether the point is nearer than 0.01
 
 struct LaneProbe {
   const char* name;                                  ///< as in KernelTable

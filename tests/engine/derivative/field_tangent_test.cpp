@@ -184,11 +184,12 @@ TEST_P(AlongADirection, AnArrayPointByPointHasTheSameField) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, AlongADirection,
-    ::testing::Combine(
-        ::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid, PrimitiveShape::plane,
-                          PrimitiveShape::cylinder, PrimitiveShape::capsule),
-        ::testing::Values(ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear),
-        ::testing::Values(Pad::flat, Pad::skewed, Pad::curved)));
+    ::testing::Combine(::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid,
+                                         PrimitiveShape::plane, PrimitiveShape::cylinder,
+                                         PrimitiveShape::capsule, PrimitiveShape::ellipsoid),
+                       ::testing::Values(ContactLaw::clamped, ContactLaw::paper,
+                                         ContactLaw::linear),
+                       ::testing::Values(Pad::flat, Pad::skewed, Pad::curved)));
 
 }  // namespace
 }  // namespace tangere

@@ -155,11 +155,12 @@ TEST_P(FieldPullback, MatchesDifferences) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, FieldPullback,
-    ::testing::Combine(
-        ::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid, PrimitiveShape::plane,
-                          PrimitiveShape::cylinder, PrimitiveShape::capsule),
-        ::testing::Values(ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear),
-        ::testing::Values(Pad::flat, Pad::skewed, Pad::curved)));
+    ::testing::Combine(::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid,
+                                         PrimitiveShape::plane, PrimitiveShape::cylinder,
+                                         PrimitiveShape::capsule, PrimitiveShape::ellipsoid),
+                       ::testing::Values(ContactLaw::clamped, ContactLaw::paper,
+                                         ContactLaw::linear),
+                       ::testing::Values(Pad::flat, Pad::skewed, Pad::curved)));
 
 }  // namespace
 }  // namespace tangere

@@ -21,6 +21,7 @@ Shape cuboid() { return CuboidShape{{0.05, 0.04, 0.03}, {4, 3, 3}}; }
 Shape cylinder() { return CylinderShape{0.05, 0.02, 7, 2}; }
 Shape capsule() { return CapsuleShape{0.04, 0.015, 3, 5}; }
 Shape one_ring() { return CapsuleShape{0.03, 0.018, 1, 6}; }
+Shape ellipsoid() { return EllipsoidShape{{0.06, 0.05, 0.036}, 30}; }
 Shape ball() { return SphereShape{0.025}; }
 
 /// A free body of 100 g, and with it a shape that weighs nothing.
@@ -82,8 +83,8 @@ class Touching : public ::testing::TestWithParam<std::tuple<int, int, ContactLaw
 
 TEST_P(Touching, SizesActThroughContactAlone) {
   const auto [general, primitive, law] = GetParam();
-  const Shape generals[] = {cuboid(), cylinder(), capsule(), one_ring()};
-  const Shape primitives[] = {ball(), cuboid(), cylinder(), capsule()};
+  const Shape generals[] = {cuboid(), cylinder(), capsule(), one_ring(), ellipsoid()};
+  const Shape primitives[] = {ball(), cuboid(), cylinder(), capsule(), ellipsoid()};
   std::map<std::string, int> seen;
   for (int trial = 0; trial < kTrials; ++trial) {
     SCOPED_TRACE("trial " + std::to_string(trial));
@@ -101,7 +102,7 @@ TEST_P(Touching, SizesActThroughContactAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Touching,
-                         ::testing::Combine(::testing::Range(0, 4), ::testing::Range(0, 4),
+                         ::testing::Combine(::testing::Range(0, 5), ::testing::Range(0, 5),
                                             ::testing::Values(ContactLaw::clamped,
                                                               ContactLaw::paper,
                                                               ContactLaw::linear)));
@@ -110,7 +111,7 @@ class OnTheGround : public ::testing::TestWithParam<std::tuple<int, ContactLaw>>
 
 TEST_P(OnTheGround, SizesActThroughContactAlone) {
   const auto [which, law] = GetParam();
-  const Shape shapes[] = {ball(), cuboid(), cylinder(), capsule(), one_ring()};
+  const Shape shapes[] = {ball(), cuboid(), cylinder(), capsule(), one_ring(), ellipsoid()};
   std::map<std::string, int> seen;
   for (int trial = 0; trial < kTrials; ++trial) {
     SCOPED_TRACE("trial " + std::to_string(trial));
@@ -129,7 +130,7 @@ TEST_P(OnTheGround, SizesActThroughContactAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, OnTheGround,
-                         ::testing::Combine(::testing::Range(0, 5),
+                         ::testing::Combine(::testing::Range(0, 6),
                                             ::testing::Values(ContactLaw::clamped,
                                                               ContactLaw::paper,
                                                               ContactLaw::linear)));

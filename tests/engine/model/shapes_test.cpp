@@ -82,6 +82,43 @@ TEST(Shapes, MassAndInertiaAreTheIntegrals) {
   EXPECT_EQ(mass_properties(PlaneShape{}, 800).mass, 0);
 }
 
+TEST(Shapes, AnEllipsoidsMassIsTheIntegral) {
+  const double size[3] = {0.3, 0.2, 0.07}, c = size[2] / 2, density = 800;
+  std::array<double, 4> sum{};
+  constexpr int kCells = 400;  // elliptic discs, by Simpson's rule
+  for (int k = 0; k <= 2 * kCells; ++k) {
+    const double z = c * (double(k) / kCells - 1), shrink = 1 - z * z / (c * c);
+    const double a2 = size[0] * size[0] / 4 * shrink, b2 = size[1] * size[1] / 4 * shrink;
+    const double weight = c / (3 * kCells) * (k == 0 || k == 2 * kCells ? 1 : k % 2 == 1 ? 4 : 2);
+    const double disc = density * weight * M_PI * size[0] * size[1] / 4 * shrink;
+    sum[0] += disc;
+    sum[1] += disc * (b2 / 4 + z * z);
+    sum[2] += disc * (a2 / 4 + z * z);
+    sum[3] += disc * (a2 + b2) / 4;
+  }
+  const MassProperties p = mass_properties(EllipsoidShape{{size[0], size[1], size[2]}}, density);
+  EXPECT_NEAR(p.mass, sum[0], 1e-12 * sum[0]);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(p.inertia.m[i][i], sum[i + 1], 1e-9 * sum[i + 1]);
+}
+
+TEST(Shapes, MassesFollowSizes) {
+  for (const Shape& shape : {Shape(SphereShape{0.07}), Shape(CuboidShape{{0.3, 0.2, 0.1}}),
+                             Shape(CylinderShape{0.3, 0.07}), Shape(CapsuleShape{0.3, 0.07}),
+                             Shape(EllipsoidShape{{0.3, 0.2, 0.1}})})
+    for (int which = 0; which < kSizeNames; ++which) {
+      Shape more = shape, less = shape;
+      if (size_number(more, which) == nullptr) continue;
+      *size_number(more, which) += 1e-6, *size_number(less, which) -= 1e-6;
+      const MassProperties slope = mass_properties_by_size(shape, 800, which),
+                           up = mass_properties(more, 800), down = mass_properties(less, 800);
+      EXPECT_NEAR(slope.mass, (up.mass - down.mass) / 2e-6, 1e-6 * std::abs(slope.mass));
+      for (int i = 0; i < 3; ++i)
+        EXPECT_NEAR(slope.inertia.m[i][i], (up.inertia.m[i][i] - down.inertia.m[i][i]) / 2e-6,
+                    1e-7 * up.mass)
+            << shape_name(shape) << ' ' << size_name(which);
+    }
+}
+
 /// Distance of every contact point from the surface of its own body: rounding.
 void expect_on_surface(const Shape& shape, PrimitiveShape kind, const kernels::Vec3<double>& size) {
   const std::vector<double> p = contact_points(shape);
@@ -129,6 +166,23 @@ TEST(Shapes, CapsulePointsArePolesAndRings) {
   EXPECT_TRUE(holds(contact_points(CapsuleShape{0.2, 0.06, 1, 4}), 0.06, 0, 0));
   EXPECT_TRUE(contact_points(SphereShape{1}).empty());
   EXPECT_TRUE(contact_points(PlaneShape{}).empty());
+}
+
+TEST(Shapes, EllipsoidPointsAreSpreadOverIt) {
+  const EllipsoidShape shape{{0.2, 0.12, 0.06}, 400};
+  const std::vector<double> p = contact_points(shape);
+  ASSERT_EQ(p.size(), 3U * 400);
+  expect_on_surface(shape, PrimitiveShape::ellipsoid, {0.1, 0.06, 0.03});
+  // On the ball that they are stretched from, no cap of a fiftieth of its area is without a point.
+  for (int k = 0; k < 500; ++k) {
+    const double z = 1 - (k + 0.5) / 250, turn = 2.1 * k, across = std::sqrt(1 - z * z);
+    double nearest = -1;
+    for (std::size_t i = 0; i < p.size(); i += 3)
+      nearest = std::max(nearest, (p[i] / 0.1) * across * std::cos(turn) +
+                                      (p[i + 1] / 0.06) * across * std::sin(turn) +
+                                      (p[i + 2] / 0.03) * z);
+    EXPECT_GT(nearest, 1 - 2.0 / 50);
+  }
 }
 
 /// A cylinder on its face sinks into a half-space until the springs of that face carry it.

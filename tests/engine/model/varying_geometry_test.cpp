@@ -187,6 +187,10 @@ std::vector<Case> cases() {
           {"capsule",
            on(CapsuleShape{0.03, 0.03, 5, 4},
               {varying(size("", 0), 0.028, 0.032), varying(size("", 1), 0.02, 0.03)}),
+           60},
+          {"ellipsoid",
+           on(EllipsoidShape{{0.06, 0.05, 0.06}, 40},
+              {varying(size("", 2), 0.055, 0.07), varying(size("", 4), 0.055, 0.06)}),
            60}};
 }
 
@@ -330,6 +334,9 @@ TEST(VaryingGeometry, WhatCannotVaryIsAnError) {
               HasSubstr("'body cap size[1]' varies, but a cylinder has none"));
   EXPECT_THAT(refusal(cap, varying(size("cap", 0), 0, 0.2)),
               HasSubstr("not all that may be drawn is positive"));
+  EXPECT_THAT(
+      refusal(pad_on(EllipsoidShape{{0.06, 0.05, 0.06}}, {}), varying(size("anvil", 3), 0.01, 6.1)),
+      HasSubstr("'body anvil size[1]' varies, but that allows an ellipsoid with a longest"));
   EXPECT_THAT(refusal(pad_on(SphereShape{0.03}, {}), varying(size("pad", 2), 0.1, 0.2)),
               HasSubstr("its contact points do not"));
   EXPECT_THAT(refusal(cap, varying(place("bottle", 0), 0, 0.2)),

@@ -190,15 +190,16 @@ TEST_P(CurvedPad, DoubleMatchesOnePointAtATime) { check<double>(GetParam(), 1e-1
 // Tiles of a centimetre, not of two millimetres: the rounding of offsets weighs more.
 TEST_P(CurvedPad, MixedIsAFewMillionthsOfThePeakAway) { check<float>(GetParam(), 5e-6); }
 
-INSTANTIATE_TEST_SUITE_P(Shapes, CurvedPad,
-                         ::testing::Values(Case{PrimitiveShape::sphere, ContactLaw::clamped, false},
-                                           Case{PrimitiveShape::sphere, ContactLaw::paper, true},
-                                           Case{PrimitiveShape::sphere, ContactLaw::linear, true},
-                                           Case{PrimitiveShape::cuboid, ContactLaw::clamped, true},
-                                           Case{PrimitiveShape::plane, ContactLaw::clamped, true},
-                                           Case{PrimitiveShape::cylinder, ContactLaw::clamped,
-                                                true},
-                                           Case{PrimitiveShape::capsule, ContactLaw::paper, true}));
+INSTANTIATE_TEST_SUITE_P(
+    Shapes, CurvedPad,
+    ::testing::Values(Case{PrimitiveShape::sphere, ContactLaw::clamped, false},
+                      Case{PrimitiveShape::sphere, ContactLaw::paper, true},
+                      Case{PrimitiveShape::sphere, ContactLaw::linear, true},
+                      Case{PrimitiveShape::cuboid, ContactLaw::clamped, true},
+                      Case{PrimitiveShape::plane, ContactLaw::clamped, true},
+                      Case{PrimitiveShape::cylinder, ContactLaw::clamped, true},
+                      Case{PrimitiveShape::ellipsoid, ContactLaw::clamped, true},
+                      Case{PrimitiveShape::capsule, ContactLaw::paper, true}));
 
 /// The ball under the wave of environment e.
 void press(Batch& batch, int e, double depth, double where) {

@@ -98,14 +98,16 @@ Touch<double> random_pose(Random& random) {
 }
 
 /// A shape that is sunk in the pad somewhere, in any orientation, moving. Half-spaces leave a part
-/// of the pad free. Rods are sunk to half their radius: near the axis the normal turns with the
+/// of the pad free. Rods and ellipsoids are sunk to half their radius: near the axis the normal turns with the
 /// last digit of the position, in any precision.
 Touch<double> random_touch(Random& random, const TouchShape& s) {
-  const bool rod = s.shape == PrimitiveShape::cylinder || s.shape == PrimitiveShape::capsule;
+  const bool rod = s.shape == PrimitiveShape::cylinder || s.shape == PrimitiveShape::capsule ||
+                   s.shape == PrimitiveShape::ellipsoid;
+  const double thickness = s.shape == PrimitiveShape::ellipsoid ? s.size[2] : s.size[0];
   for (;;) {
     const Touch<double> t = random_pose(random);
     const double least = rod || s.shape == PrimitiveShape::plane ? deepest(s, t) : 0;
-    if (rod && (least > -0.05 * s.size[0] || least < -0.5 * s.size[0])) continue;
+    if (rod && (least > -0.05 * thickness || least < -0.5 * thickness)) continue;
     if (s.shape == PrimitiveShape::plane && (least > -1e-3 || std::abs(t.Q.m[2][2]) > 0.9))
       continue;
     return t;

@@ -67,7 +67,8 @@ TEST(SceneReader, EveryShippedSceneCompiles) {
   EXPECT_EQ(shapes.contacts()[1].points, 2 + 4 * 24);
   EXPECT_EQ(shapes.contacts()[2].points, 6);
   EXPECT_EQ(shapes.contacts()[3].points, 3);
-  EXPECT_NEAR(shapes.mass(4), 600 * 0.5 * 0.04 * 0.06 * 0.02, 1e-15);
+  EXPECT_EQ(shapes.contacts()[4].points, 60);
+  EXPECT_NEAR(shapes.mass(5), 600 * 0.5 * 0.04 * 0.06 * 0.02, 1e-15);
 }
 
 TEST(SceneReader, ExtensionsComeThrough) {
@@ -190,6 +191,35 @@ TEST(SceneReader, RodsAndPlanesInEitherUnit) {
   EXPECT_EQ(std::get<CylinderShape>(si.scene.links[0].body.shape).contact_rings, 1);
   EXPECT_STREQ(shape_name(si.scene.links[1].body.shape), "plane");
   EXPECT_EQ(Model(si.scene).mass(1), 0);
+}
+
+TEST(SceneReader, AnEllipsoidHasASizeLikeACuboids) {
+  const auto read = [](const std::string& rest) {
+    return parse_scene(R"(<redmax><option unit="cm-g"/><robot><link name="e"><joint name="e" )"
+                       R"(type="free3d"/><body name="e" type="ellipsoid" )" +
+                           rest + "/></link></robot></redmax>",
+                       "s.xml");
+  };
+  const SceneFile file = read(R"(size="4 3 2" density="2")");
+  EXPECT_TRUE(file.warnings.empty());
+  const auto& egg = std::get<EllipsoidShape>(file.scene.links[0].body.shape);
+  EXPECT_DOUBLE_EQ(egg.size[0], 0.04);
+  EXPECT_DOUBLE_EQ(egg.size[2], 0.02);
+  EXPECT_EQ(egg.contact_count, 100);
+  EXPECT_NEAR(Model(file.scene).mass(0), 2000 * M_PI / 6 * 0.04 * 0.03 * 0.02, 1e-15);
+  const SceneFile counted = read(R"(size="4 3 2" general_contact_resolution="30")");
+  EXPECT_EQ(std::get<EllipsoidShape>(counted.scene.links[0].body.shape).contact_count, 30);
+  const auto refusal = [&](const std::string& rest) -> std::string {
+    try {
+      read(rest);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(refusal(R"(size="4 3 0.03")"), HasSubstr("expected at most 100 times"));
+  EXPECT_THAT(refusal(R"(size="4 -3 2")"), HasSubstr("expected positive lengths"));
+  EXPECT_THAT(refusal(R"(sice="4 3 2")"), HasSubstr("'size'"));
 }
 
 TEST(SceneReader, APlaneAloneCannotMove) {

@@ -29,6 +29,7 @@ struct Case {
 Vec3<double> size_of(PrimitiveShape shape) {
   if (shape == PrimitiveShape::sphere) return {0.02, 0, 0};
   if (shape == PrimitiveShape::cuboid) return {0.025, 0.02, 0.01};
+  if (shape == PrimitiveShape::ellipsoid) return {0.03, 0.02, 0.012};
   return {0.02, 0.015, 0};
 }
 
@@ -66,6 +67,11 @@ Vec3<double> point_under(PrimitiveShape shape, Random& random, double depth) {
     case PrimitiveShape::cylinder:
       return face < 0.5 ? (0.015 - depth) * z + (1 + along) * 0.01 * radial
                         : (0.02 - depth) * radial + along * Vec3<double>{0, 0, 1};
+    case PrimitiveShape::ellipsoid: {
+      const Vec3<double> n = random.direction();
+      const double h = std::sqrt(9e-4 * n.x * n.x + 4e-4 * n.y * n.y + 1.44e-4 * n.z * n.z);
+      return Vec3<double>{9e-4 * n.x / h, 4e-4 * n.y / h, 1.44e-4 * n.z / h} - depth * n;
+    }
     case PrimitiveShape::capsule: break;
   }
   Vec3<double> end = random.direction();
