@@ -51,18 +51,12 @@ template <int L>
 std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   BasicWorkspace w(m);
   return w.memory.size() * sizeof(LaneRow) + w.own_points.size() * sizeof(double) +
-         w.scratch.size() + sizeof(double) * std::size_t(m.nv) * std::size_t(m.nv + 1) * (L + 1);
+         w.scratch.size() + PivotedFactors::bytes(L, m.nv);
 }
 
 template <int L>
 BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m)
-    : lists(m.pairs.size()),
-      near_lanes(m.pairs.size()),
-      near{},
-      stage{},
-      pivoted(L, Eigen::PartialPivLU<Eigen::MatrixXd>(m.nv)),
-      dense(1, Eigen::MatrixXd(m.nv, m.nv)),
-      rhs(m.nv) {
+    : lists(m.pairs.size()), near_lanes(m.pairs.size()), near{}, stage{}, pivoted(L, m.nv) {
   memory.assign(lay_out<L>(m, *this, nullptr), LaneRow{});
   lay_out<L>(m, *this, memory.data());
   std::size_t own = 0;
