@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -35,96 +36,8 @@ std::vector<std::string> option_names(const CLI::App& command) {
   return names;
 }
 
-}  // namespace
-
-template <class T>
-CLI::Option* add_whole_number(CLI::App& command, const std::string& flags, std::optional<T>& value,
-                              T low, T high, const std::string& description) {
-  const auto read = [&value, low, high, name = long_name(flags)](const std::string& text) {
-    T number{};
-    if (!parse(text, number) || number < low || number > high)
-      throw InputError(
-          fmt::format("{} {}: expected a whole number from {} to {}", name, text, low, high));
-    value = number;
-  };
-  return command.add_option_function<std::string>(flags, read, description)->type_name("N");
-}
-
-template CLI::Option* add_whole_number(CLI::App&, const std::string&, std::optional<int>&, int, int,
-                                       const std::string&);
-template CLI::Option* add_whole_number(CLI::App&, const std::string&, std::optional<std::int64_t>&,
-                                       std::int64_t, std::int64_t, const std::string&);
-template CLI::Option* add_whole_number(CLI::App&, const std::string&, std::optional<std::uint64_t>&,
-                                       std::uint64_t, std::uint64_t, const std::string&);
-
-CLI::Option* add_whole_numbers(CLI::App& command, const std::string& flags,
-                               std::vector<int>& values, int low, int high,
-                               const std::string& description) {
-  const auto read = [&values, low, high, name = long_name(flags)](const std::string& text) {
-    std::istringstream words(text + ',');  // a comma ends a word: "1," has an empty second one
-    for (std::string word; std::getline(words, word, ',');) {
-      int number = 0;
-      if (!parse(word, number) || number < low || number > high)
-        throw InputError(
-            fmt::format("{} {}: '{}'; expected whole numbers from {} to {} separated by commas",
-                        name, text, word, low, high));
-      if (std::find(values.begin(), values.end(), number) != values.end())
-        throw InputError(fmt::format("{} {}: {} stands there twice", name, text, number));
-      values.push_back(number);
-    }
-  };
-  return command.add_option_function<std::string>(flags, read, description)->type_name("N,N,...");
-}
-
-CLI::Option* add_positive_number(CLI::App& command, const std::string& flags,
-                                 std::optional<double>& value, const std::string& description) {
-  const auto read = [&value, name = long_name(flags)](const std::string& text) {
-    double number = 0;
-    if (!parse(text, number) || !(number > 0) || !std::isfinite(number))
-      throw InputError(fmt::format("{} {}: expected a positive number", name, text));
-    value = number;
-  };
-  return command.add_option_function<std::string>(flags, read, description)->type_name("X");
-}
-
-CLI::Option* add_memory_size(CLI::App& command, const std::string& flags,
-                             std::optional<double>& bytes, const std::string& description) {
-  static const std::map<std::string, double> units{
-      {"B", 1},        {"kB", 1e3},     {"MB", 1e6},     {"GB", 1e9},    {"TB", 1e12},
-      {"KiB", 0x1p10}, {"MiB", 0x1p20}, {"GiB", 0x1p30}, {"TiB", 0x1p40}};
-  const auto read = [&bytes, name = long_name(flags)](const std::string& text) {
-    const std::size_t end = std::min(text.find_first_not_of("0123456789."), text.size());
-    const auto unit = units.find(text.substr(end));
-    double number = 0;
-    if (unit == units.end() || !parse(text.substr(0, end), number) || !(number > 0))
-      throw InputError(
-          fmt::format("{} {}: expected a positive number and its unit, B, kB, MB, GB, TB, KiB, "
-                      "MiB, GiB or TiB, "
-                      "as in 2GiB",
-                      name, text));
-    bytes = number * unit->second;
-  };
-  return command.add_option_function<std::string>(flags, read, description)->type_name("SIZE");
-}
-
-CLI::Option* add_text(CLI::App& command, const std::string& flags, std::string& value,
-                      const std::string& type, const std::string& description) {
-  const auto not_empty = [](const std::string& text) {
-    return text.empty() ? std::string("expected text, found none") : std::string();
-  };
-  return command.add_option(flags, value, description)->check(not_empty)->type_name(type);
-}
-
-void add_console_options(CLI::App& command, Console& console) {
-  command.add_flag("--json", console.json,
-                   "Print one JSON object on stdout; text for people goes to stderr");
-  CLI::Option* quiet = command.add_flag("-q,--quiet", console.quiet, "Print errors only");
-  command
-      .add_flag("-v,--verbose", console.verbose,
-                "Print details, and progress even where stderr is no terminal")
-      ->excludes(quiet);
-}
-
+/// Throws InputError, with the nearest name, when the parser could not place a word; `command` is
+/// the chosen subcommand, null when none was recognised.
 void check_no_extras(const CLI::App& program, const CLI::App* command) {
   std::vector<std::string> extras = program.remaining();
   const CLI::App* owner = &program;
@@ -143,6 +56,158 @@ void check_no_extras(const CLI::App& program, const CLI::App* command) {
   std::vector<std::string> commands;
   for (const CLI::App* sub : program.get_subcommands({})) commands.push_back(sub->get_name());
   throw InputError("unknown subcommand '" + word + "'" + suggestion(word, commands));
+}
+
+}  // namespace
+
+Parser::Parser(const std::string& description, const std::string& name, const std::string& footer)
+    : root_(std::make_unique<CLI::App>(description, name)) {
+  root_->footer(footer);
+}
+
+Parser::~Parser() = default;
+
+void Parser::add_version(const std::function<std::string()>& text, const std::string& description) {
+  root_->set_version_flag("--version", text, description);
+}
+
+bool Parser::parse(int argc, char** argv) {
+  try {
+    root_->parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) {  // --help, --version
+      root_->exit(error);
+      return false;
+    }
+    check_words();
+    const std::string space = chosen() == nullptr ? "" : " ";
+    throw InputError(fmt::format("{}; see '{}{}{} --help'", error.what(), root_->get_name(), space,
+                                 chosen_name()));
+  }
+  check_words();
+  return true;
+}
+
+const CLI::App* Parser::chosen() const {
+  for (const CLI::App* command : root_->get_subcommands({}))
+    if (command->parsed()) return command;
+  return nullptr;
+}
+
+std::string Parser::chosen_name() const {
+  const CLI::App* command = chosen();
+  return command == nullptr ? "" : command->get_name();
+}
+
+/// A word out of place says more than what is missing because of it.
+void Parser::check_words() const {
+  if (!root_->get_subcommands({}).empty()) check_no_extras(*root_, chosen());
+}
+
+CLI::App& add_command(CLI::App& program, const std::string& name, const std::string& description,
+                      const std::string& example) {
+  // What the parser cannot place is reported by us, with the nearest name; subcommands inherit that.
+  program.require_subcommand(0, 1);
+  program.allow_extras();
+  CLI::App* command = program.add_subcommand(name, description);
+  command->footer("Example:\n  " + example);
+  return *command;
+}
+
+void AddedOption::required() const { option_->required(); }
+void AddedOption::excludes(const AddedOption& other) const { option_->excludes(other.option_); }
+
+template <class T>
+AddedOption add_whole_number(CLI::App& command, const std::string& flags, std::optional<T>& value,
+                             T low, T high, const std::string& description) {
+  const auto read = [&value, low, high, name = long_name(flags)](const std::string& text) {
+    T number{};
+    if (!parse(text, number) || number < low || number > high)
+      throw InputError(
+          fmt::format("{} {}: expected a whole number from {} to {}", name, text, low, high));
+    value = number;
+  };
+  return AddedOption(
+      *command.add_option_function<std::string>(flags, read, description)->type_name("N"));
+}
+
+template AddedOption add_whole_number(CLI::App&, const std::string&, std::optional<int>&, int, int,
+                                      const std::string&);
+template AddedOption add_whole_number(CLI::App&, const std::string&, std::optional<std::int64_t>&,
+                                      std::int64_t, std::int64_t, const std::string&);
+template AddedOption add_whole_number(CLI::App&, const std::string&, std::optional<std::uint64_t>&,
+                                      std::uint64_t, std::uint64_t, const std::string&);
+
+void add_whole_numbers(CLI::App& command, const std::string& flags, std::vector<int>& values,
+                       int low, int high, const std::string& description) {
+  const auto read = [&values, low, high, name = long_name(flags)](const std::string& text) {
+    std::istringstream words(text + ',');  // a comma ends a word: "1," has an empty second one
+    for (std::string word; std::getline(words, word, ',');) {
+      int number = 0;
+      if (!parse(word, number) || number < low || number > high)
+        throw InputError(
+            fmt::format("{} {}: '{}'; expected whole numbers from {} to {} separated by commas",
+                        name, text, word, low, high));
+      if (std::find(values.begin(), values.end(), number) != values.end())
+        throw InputError(fmt::format("{} {}: {} stands there twice", name, text, number));
+      values.push_back(number);
+    }
+  };
+  command.add_option_function<std::string>(flags, read, description)->type_name("N,N,...");
+}
+
+void add_positive_number(CLI::App& command, const std::string& flags, std::optional<double>& value,
+                         const std::string& description) {
+  const auto read = [&value, name = long_name(flags)](const std::string& text) {
+    double number = 0;
+    if (!parse(text, number) || !(number > 0) || !std::isfinite(number))
+      throw InputError(fmt::format("{} {}: expected a positive number", name, text));
+    value = number;
+  };
+  command.add_option_function<std::string>(flags, read, description)->type_name("X");
+}
+
+void add_memory_size(CLI::App& command, const std::string& flags, std::optional<double>& bytes,
+                     const std::string& description) {
+  static const std::map<std::string, double> units{
+      {"B", 1},        {"kB", 1e3},     {"MB", 1e6},     {"GB", 1e9},    {"TB", 1e12},
+      {"KiB", 0x1p10}, {"MiB", 0x1p20}, {"GiB", 0x1p30}, {"TiB", 0x1p40}};
+  const auto read = [&bytes, name = long_name(flags)](const std::string& text) {
+    const std::size_t end = std::min(text.find_first_not_of("0123456789."), text.size());
+    const auto unit = units.find(text.substr(end));
+    double number = 0;
+    if (unit == units.end() || !parse(text.substr(0, end), number) || !(number > 0))
+      throw InputError(
+          fmt::format("{} {}: expected a positive number and its unit, B, kB, MB, GB, TB, KiB, "
+                      "MiB, GiB or TiB, "
+                      "as in 2GiB",
+                      name, text));
+    bytes = number * unit->second;
+  };
+  command.add_option_function<std::string>(flags, read, description)->type_name("SIZE");
+}
+
+AddedOption add_text(CLI::App& command, const std::string& flags, std::string& value,
+                     const std::string& type, const std::string& description) {
+  const auto not_empty = [](const std::string& text) {
+    return text.empty() ? std::string("expected text, found none") : std::string();
+  };
+  return AddedOption(
+      *command.add_option(flags, value, description)->check(not_empty)->type_name(type));
+}
+
+AddedOption add_flag(CLI::App& command, const std::string& flags, bool& value,
+                     const std::string& description) {
+  return AddedOption(*command.add_flag(flags, value, description));
+}
+
+void add_console_options(CLI::App& command, Console& console) {
+  add_flag(command, "--json", console.json,
+           "Print one JSON object on stdout; text for people goes to stderr");
+  const AddedOption quiet = add_flag(command, "-q,--quiet", console.quiet, "Print errors only");
+  add_flag(command, "-v,--verbose", console.verbose,
+           "Print details, and progress even where stderr is no terminal")
+      .excludes(quiet);
 }
 
 void check_not_same_file(const std::string& output, const std::string& input) {

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "apps/arguments.hpp"
 #include "apps/bench_report.hpp"
@@ -233,39 +234,37 @@ Command add_bench(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
   Options& o = *options;
-  CLI::App* app =
-      program.add_subcommand("bench", "Measure how fast a scene or a task runs, by threads");
-  add_text(*app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task")->required();
-  add_whole_number<int>(*app, "--envs", o.environments, 1, kMostEnvironments,
+  CLI::App& app =
+      add_command(program, "bench", "Measure how fast a scene or a task runs, by threads",
+                  "tangere bench scenes/rolling_ball_small.xml --envs 32 --steps 50 --threads 1,2 "
+                  "--svg speed.svg");
+  add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
+  add_whole_number<int>(app, "--envs", o.environments, 1, kMostEnvironments,
                         "Environments, in blocks of 16 [default: 256]");
   add_whole_number<std::int64_t>(
-      *app, "--steps", o.steps, 1, kMostSteps,
+      app, "--steps", o.steps, 1, kMostSteps,
       "Steps of the episode; of a task, actions [default: as many as the controls last]");
-  add_text(*app, "--policy", o.policy, "NAME",
+  add_text(app, "--policy", o.policy, "NAME",
            "Of a task: random, hold or scripted [default: random]");
-  add_whole_numbers(*app, "--threads", o.threads, 1, kMostThreads,
+  add_whole_numbers(app, "--threads", o.threads, 1, kMostThreads,
                     "Thread counts to measure [default: 1,2,4,... up to the processors here]");
-  add_text(*app, "--precision", o.precision, "NAME",
+  add_text(app, "--precision", o.precision, "NAME",
            "Of tactile fields: double, or mixed, points in float [default: mixed]");
-  add_whole_number<int>(*app, "--every", o.every, 1, kMostEnvironments,
+  add_whole_number<int>(app, "--every", o.every, 1, kMostEnvironments,
                         "Tactile fields every N-th step [default: the scene's, or 1]");
-  add_text(*app, "--frames", o.frames, "NAME",
+  add_text(app, "--frames", o.frames, "NAME",
            "Of tactile fields: dense, every point; compact, touched tiles; none [default: dense]");
-  add_whole_number<int>(*app, "--repeat", o.repeat, 1, kMostPasses,
+  add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,
                         "Timed passes over the episode; the best counts [default: 3]");
-  add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
+  add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between environments [default: 0]");
-  add_text(*app, "--svg", o.svg, "F.svg", "Picture of speed against threads to write");
-  add_text(*app, "--csv", o.csv, "F.csv", "Table of all figures to write");
-  app->add_flag("--overwrite", o.overwrite, "Replace the outputs if they exist");
-  app->add_flag("--allow-unknown", o.allow_unknown,
-                "Unknown elements and attributes of the scene are warnings, not errors");
-  add_console_options(*app, *console);
-  app->footer(
-      "Example:\n"
-      "  tangere bench scenes/rolling_ball_small.xml --envs 32 --steps 50 --threads 1,2 --svg "
-      "speed.svg");
-  return {app, [=](const ProgramInfo&) { return bench(*options, *console); }};
+  add_text(app, "--svg", o.svg, "F.svg", "Picture of speed against threads to write");
+  add_text(app, "--csv", o.csv, "F.csv", "Table of all figures to write");
+  add_flag(app, "--overwrite", o.overwrite, "Replace the outputs if they exist");
+  add_flag(app, "--allow-unknown", o.allow_unknown,
+           "Unknown elements and attributes of the scene are warnings, not errors");
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo&) { return bench(*options, *console); }};
 }
 
 }  // namespace tangere::apps

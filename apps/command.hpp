@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a subcommand is: a parser's corner and a function. One file for each.
+// What a subcommand is: a corner of the parser and a function. One file for each.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
+
+namespace CLI {
+class App;
+}
 
 namespace tangere::apps {
 
@@ -15,7 +18,7 @@ struct ProgramInfo {
 };
 
 struct Command {
-  CLI::App* app = nullptr;
+  const CLI::App* app = nullptr;
   std::function<int(const ProgramInfo&)> run;  ///< returns an ExitCode; throws InputError, IoError
 };
 

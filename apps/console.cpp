@@ -3,6 +3,7 @@
 #include "apps/console.hpp"
 
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 namespace tangere::apps {
 namespace {

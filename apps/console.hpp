@@ -3,7 +3,7 @@
 // stream.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 namespace tangere::apps {

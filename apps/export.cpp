@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <nlohmann/json.hpp>
+
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "io/dataset/dataset_export.hpp"
@@ -39,15 +41,15 @@ Command add_export(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
   Options& o = *options;
-  CLI::App* app = program.add_subcommand("export", "Write rows of a data set as a table");
-  add_text(*app, "DIR", o.input, "", "Folder of shards, or one file of a data set")->required();
-  add_text(*app, "--csv", o.output, "F.csv", "Table to write")->required();
-  add_whole_number<std::int64_t>(*app, "--episode", o.what.episode, 0, 1'000'000'000,
+  CLI::App& app = add_command(program, "export", "Write rows of a data set as a table",
+                              "tangere export balls --csv balls.csv --episode 3");
+  add_text(app, "DIR", o.input, "", "Folder of shards, or one file of a data set").required();
+  add_text(app, "--csv", o.output, "F.csv", "Table to write").required();
+  add_whole_number<std::int64_t>(app, "--episode", o.what.episode, 0, 1'000'000'000,
                                  "That episode alone");
-  app->add_flag("--overwrite", o.what.overwrite, "Replace the output if it exists");
-  add_console_options(*app, *console);
-  app->footer("Example:\n  tangere export balls --csv balls.csv --episode 3");
-  return {app, [=](const ProgramInfo&) { return export_table(*options, *console); }};
+  add_flag(app, "--overwrite", o.what.overwrite, "Replace the output if it exists");
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo&) { return export_table(*options, *console); }};
 }
 
 }  // namespace tangere::apps

@@ -382,59 +382,57 @@ Command add_generate(CLI::App& program) {
   const auto options = std::make_shared<GenerateOptions>();
   const auto console = std::make_shared<Console>();
   GenerateOptions& o = *options;
-  CLI::App* app = program.add_subcommand(
-      "generate", "Run many episodes of a scene or a task and write a data set");
-  add_text(*app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task")->required();
-  add_text(*app, "-o,--output", o.output, "DIR", "Folder to write shards into")->required();
-  add_whole_number<std::int64_t>(*app, "--episodes", o.episodes, 1, kMostEpisodes,
+  CLI::App& app = add_command(
+      program, "generate", "Run many episodes of a scene or a task and write a data set",
+      "tangere generate scenes/rolling_ball_small.xml --output balls --episodes 32 --seed 1");
+  add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
+  add_text(app, "-o,--output", o.output, "DIR", "Folder to write shards into").required();
+  add_whole_number<std::int64_t>(app, "--episodes", o.episodes, 1, kMostEpisodes,
                                  "Episodes to simulate")
-      ->required();
+      .required();
   add_text(
-      *app, "--controls", o.controls, "U.csv",
+      app, "--controls", o.controls, "U.csv",
       "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
-  add_text(*app, "--policy", o.policy, "NAME",
+  add_text(app, "--policy", o.policy, "NAME",
            "Of a task: random, hold, csv (with --controls) or scripted [default: scripted]");
-  add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
+  add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
                                  "Steps of an episode [default: as many as the controls last]");
-  add_whole_number<int>(*app, "--every", o.every, 1, kMostInterval,
+  add_whole_number<int>(app, "--every", o.every, 1, kMostInterval,
                         "A row every N-th step, its action held [default: the sensors', or 1]");
-  add_whole_number<int>(*app, "--threads", o.threads, 1, kMostThreads,
+  add_whole_number<int>(app, "--threads", o.threads, 1, kMostThreads,
                         "Threads to run on [default: one per core]");
-  add_text(*app, "--precision", o.precision, "NAME",
+  add_text(app, "--precision", o.precision, "NAME",
            "Of tactile fields: double, or mixed, stored as float32 [default: mixed]");
-  add_whole_number<std::uint64_t>(*app, "--seed", o.seed, 0, UINT64_MAX,
+  add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between episodes [default: 0]");
-  add_text(*app, "--compress", o.compress, "NAME",
+  add_text(app, "--compress", o.compress, "NAME",
            "Of tactile fields on disk: none, deflate or lz4, which needs a plug-in to read "
            "[default: none]");
-  add_text(*app, "--tactile", o.tactile, "KIND",
+  add_text(app, "--tactile", o.tactile, "KIND",
            "Of large fields on disk: dense, or sparse: tiles of zeros left out [default: dense]");
-  add_text(*app, "--record", o.record, "LIST",
+  add_text(app, "--record", o.record, "LIST",
            "Observations to store, separated by commas [default: all]");
-  add_text(*app, "--gradients", o.gradients, "KIND",
+  add_text(app, "--gradients", o.gradients, "KIND",
            "Derivatives as well: none, return (of a scene: with --loss), or jacobians, row by row "
            "[default: none]");
-  add_text(*app, "--loss", o.loss, "NAME",
+  add_text(app, "--loss", o.loss, "NAME",
            "Of a scene, with --gradients return: final, path, tactile, shear or variables");
   add_memory_size(
-      *app, "--tape-memory", o.tape_memory,
+      app, "--tape-memory", o.tape_memory,
       "With --gradients return: states kept for them by all threads [default: 1GB each]");
-  add_whole_number<std::int64_t>(*app, "--shards", o.shards, 1, kMostEpisodes,
+  add_whole_number<std::int64_t>(app, "--shards", o.shards, 1, kMostEpisodes,
                                  "Files to cut the data set into [default: below a gigabyte each]");
-  add_text(*app, "--shard", o.shard, "k/S",
+  add_text(app, "--shard", o.shard, "k/S",
            "Make shard k of S alone, k from 0; others may run beside it");
-  app->add_flag("--resume", o.resume,
-                "Keep the shards in the folder, of the same settings, and make the rest");
-  app->add_flag("--no-merge", o.no_merge, "Shards alone: do not merge them when all are there");
-  app->add_flag("--dry-run", o.dry_run, "Say what would be made, and how long it may take");
-  app->add_flag("--overwrite", o.overwrite, "Replace the shards in the folder");
-  app->add_flag("--allow-unknown", o.allow_unknown,
-                "Unknown elements and attributes of the scene are warnings, not errors");
-  add_console_options(*app, *console);
-  app->footer(
-      "Example:\n"
-      "  tangere generate scenes/rolling_ball_small.xml --output balls --episodes 32 --seed 1");
-  return {app, [=](const ProgramInfo& info) { return generate(*options, *console, info); }};
+  add_flag(app, "--resume", o.resume,
+           "Keep the shards in the folder, of the same settings, and make the rest");
+  add_flag(app, "--no-merge", o.no_merge, "Shards alone: do not merge them when all are there");
+  add_flag(app, "--dry-run", o.dry_run, "Say what would be made, and how long it may take");
+  add_flag(app, "--overwrite", o.overwrite, "Replace the shards in the folder");
+  add_flag(app, "--allow-unknown", o.allow_unknown,
+           "Unknown elements and attributes of the scene are warnings, not errors");
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo& info) { return generate(*options, *console, info); }};
 }
 
 }  // namespace tangere::apps

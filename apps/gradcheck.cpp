@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "apps/arguments.hpp"
@@ -15,7 +16,6 @@
 #include "tasks/catalogue/task_list.hpp"
 #include "tasks/gradients/gradient_check.hpp"
 #include "tasks/gradients/losses.hpp"
-#include "tasks/gradients/gradient_check.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -211,40 +211,38 @@ Command add_gradcheck(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
   Options& o = *options;
-  CLI::App* app = program.add_subcommand(
-      "gradcheck", "Check gradients of a scene or a task against differences and tangents");
-  add_text(*app, "SCENE", o.scene, "",
-           "Scene file (XML), or the name of a task: then of its return")
-      ->required();
-  add_text(*app, "--loss", o.loss, "NAME",
+  CLI::App& app = add_command(
+      program, "gradcheck", "Check gradients of a scene or a task against differences and tangents",
+      "tangere gradcheck scenes/rolling_ball_small.xml --loss shear --steps 100");
+  add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task: then of its return")
+      .required();
+  add_text(app, "--loss", o.loss, "NAME",
            "final: last state; path: speeds; tactile, shear: fields; variables: end effectors "
            "[default: tactile, or final "
            "where there is no sensor]");
   add_whole_number<std::int64_t>(
-      *app, "--steps", o.steps, 1, kMostSteps,
+      app, "--steps", o.steps, 1, kMostSteps,
       "Steps of the rollout [default: as many as the controls last, 100 at most]");
   add_whole_number<std::int64_t>(
-      *app, "--actions", o.actions, 1, kMostSteps,
+      app, "--actions", o.actions, 1, kMostSteps,
       "Of a task: actions of the episode at most [default: as many as take a hundred steps]");
-  add_text(*app, "--policy", o.policy, "NAME",
+  add_text(app, "--policy", o.policy, "NAME",
            "Of a task: random, hold, csv (with --controls) or scripted [default: scripted]");
-  add_whole_number<int>(*app, "--every", o.every, 1, std::numeric_limits<int>::max(),
+  add_whole_number<int>(app, "--every", o.every, 1, std::numeric_limits<int>::max(),
                         "Tactile fields every N-th step [default: the scene's, or 1]");
   add_whole_number<int>(
-      *app, "--entries", o.entries, 0, std::numeric_limits<int>::max(),
+      app, "--entries", o.entries, 0, std::numeric_limits<int>::max(),
       "Derivatives of each input compared with differences, drawn; 0: all [default: 24]");
   add_text(
-      *app, "--controls", o.controls, "F.csv",
+      app, "--controls", o.controls, "F.csv",
       "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
   add_whole_number<std::uint64_t>(
-      *app, "--seed", o.seed, 0, std::numeric_limits<std::uint64_t>::max(),
+      app, "--seed", o.seed, 0, std::numeric_limits<std::uint64_t>::max(),
       "Seed of the environment or episode, of the draw and of the directions [default: 0]");
-  app->add_flag("--allow-unknown", o.allow_unknown,
-                "Unknown elements and attributes of the scene are warnings, not errors");
-  add_console_options(*app, *console);
-  app->footer(
-      "Example:\n  tangere gradcheck scenes/rolling_ball_small.xml --loss shear --steps 100");
-  return {app, [=](const ProgramInfo&) { return run(*options, *console); }};
+  add_flag(app, "--allow-unknown", o.allow_unknown,
+           "Unknown elements and attributes of the scene are warnings, not errors");
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo&) { return run(*options, *console); }};
 }
 
 }  // namespace tangere::apps

@@ -3,7 +3,6 @@
 // noisy recording.
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <numbers>
 
@@ -160,26 +159,21 @@ int identify_ball(const Options& o) {
 
 int guarded(int argc, char** argv) {
   Options o;
-  CLI::App parser{
+  Parser parser(
       "Finds k_n, k_t and mu of a tactile skin and the mass of a ball from a noisy recording.",
-      "identify_ball"};
-  add_text(parser, "SCENE", o.scene, "",
-           "Scene with a pad 'pad' and a ball 'ball' [default: scenes/identify_ball.xml]");
-  add_positive_number(parser, "--noise", o.noise,
-                      "Standard deviation over the fields' largest number [default: 0.01]");
-  add_whole_number<std::uint64_t>(parser, "--seed", o.seed, 0, 1000000,
-                                  "Of the noise and of the wrong start [default: 1]");
-  add_text(parser, "--svg", o.svg, "FILE", "Picture of the fit to write");
-  parser.add_flag("--overwrite", o.overwrite, "Replace the picture if it exists");
-  parser.footer(
+      "identify_ball",
       "Example:\n  identify_ball scenes/identify_ball.xml --noise 0.02 --seed 3 --svg fit.svg");
+  CLI::App& app = parser.root();
+  add_text(app, "SCENE", o.scene, "",
+           "Scene with a pad 'pad' and a ball 'ball' [default: scenes/identify_ball.xml]");
+  add_positive_number(app, "--noise", o.noise,
+                      "Standard deviation over the fields' largest number [default: 0.01]");
+  add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, 1000000,
+                                  "Of the noise and of the wrong start [default: 1]");
+  add_text(app, "--svg", o.svg, "FILE", "Picture of the fit to write");
+  add_flag(app, "--overwrite", o.overwrite, "Replace the picture if it exists");
   try {
-    parser.parse(argc, argv);
-    return identify_ball(o);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return parser.exit(error);
-    fmt::print(stderr, "identify_ball: {}; see 'identify_ball --help'\n", error.what());
-    return kUsage;
+    return parser.parse(argc, argv) ? identify_ball(o) : kDone;
   } catch (const InputError& error) {
     fmt::print(stderr, "identify_ball: {}\n", error.what());
     return kUsage;

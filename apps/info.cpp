@@ -2,6 +2,8 @@
 // tangere info: what a data set is, without reading its numbers.
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "io/dataset/dataset_files.hpp"
@@ -52,12 +54,11 @@ int info(const std::string& path, const Console& console) {
 Command add_info(CLI::App& program) {
   const auto input = std::make_shared<std::string>();
   const auto console = std::make_shared<Console>();
-  CLI::App* app =
-      program.add_subcommand("info", "Say what a data set is: settings, shapes, counts");
-  add_text(*app, "DIR", *input, "", "Folder of shards, or one file of a data set")->required();
-  add_console_options(*app, *console);
-  app->footer("Example:\n  tangere info balls");
-  return {app, [=](const ProgramInfo&) { return info(*input, *console); }};
+  CLI::App& app = add_command(program, "info", "Say what a data set is: settings, shapes, counts",
+                              "tangere info balls");
+  add_text(app, "DIR", *input, "", "Folder of shards, or one file of a data set").required();
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo&) { return info(*input, *console); }};
 }
 
 }  // namespace tangere::apps

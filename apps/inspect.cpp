@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <nlohmann/json.hpp>
+
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "apps/inspect_joints.hpp"
@@ -203,15 +205,14 @@ int inspect(const Options& options, const Console& console) {
 Command add_inspect(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
-  CLI::App* app =
-      program.add_subcommand("inspect", "Show what a scene compiles to, and what a task declares");
-  add_text(*app, "SCENE", options->scene, "", "Scene file (XML), or the name of a task")
-      ->required();
-  app->add_flag("--allow-unknown", options->allow_unknown,
-                "Unknown elements and attributes are warnings, not errors");
-  add_console_options(*app, *console);
-  app->footer("Example:\n  tangere inspect scenes/rolling_ball.xml --json");
-  return {app, [=](const ProgramInfo&) { return inspect(*options, *console); }};
+  CLI::App& app =
+      add_command(program, "inspect", "Show what a scene compiles to, and what a task declares",
+                  "tangere inspect scenes/rolling_ball.xml --json");
+  add_text(app, "SCENE", options->scene, "", "Scene file (XML), or the name of a task").required();
+  add_flag(app, "--allow-unknown", options->allow_unknown,
+           "Unknown elements and attributes are warnings, not errors");
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo&) { return inspect(*options, *console); }};
 }
 
 }  // namespace tangere::apps

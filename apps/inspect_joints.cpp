@@ -6,11 +6,10 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 namespace tangere::apps {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 struct Named {
   std::string joint;

@@ -7,6 +7,7 @@
 #include <exception>
 #include <filesystem>
 #include <new>
+#include <nlohmann/json.hpp>
 #include <vector>
 
 #include "apps/arguments.hpp"
@@ -29,59 +30,31 @@ constexpr const char* kFooter =
     "Example:\n"
     "  tangere simulate scenes/rolling_ball.xml --output ball.h5 --envs 4";
 
-/// The program's parser and its subcommands. Made once; the callbacks point into it.
+/// The program's command line and its subcommands. Made once; the callbacks point into it.
 struct Program {
-  CLI::App parser{"Batched, differentiable tactile simulation on CPUs.", "tangere"};
+  Parser parser{"Batched, differentiable tactile simulation on CPUs.", "tangere", kFooter};
   std::vector<Command> commands;
 
   Program() {
-    parser.set_version_flag(
-        "--version",
+    parser.add_version(
         [] {
           return fmt::format("tangere {} ({}, {})", TANGERE_VERSION, kernels::active_isa_name(),
                              kCompiler);
         },
         "Print version, instruction set and compiler");
-    parser.footer(kFooter);
-    // What the parser cannot place is reported by us, with the nearest name.
-    parser.require_subcommand(0, 1);
-    parser.allow_extras();
-    commands = {add_inspect(parser),  add_simulate(parser), add_generate(parser),
-                add_validate(parser), add_info(parser),     add_merge(parser),
-                add_export(parser),   add_plot(parser),     add_bench(parser),
-                add_gradcheck(parser)};
-  }
-
-  [[nodiscard]] const Command* chosen() const {
-    for (const Command& command : commands)
-      if (command.app->parsed()) return &command;
-    return nullptr;
-  }
-
-  /// "tangere" or "tangere simulate".
-  [[nodiscard]] std::string name() const {
-    const Command* command = chosen();
-    return command == nullptr ? "tangere" : "tangere " + command->app->get_name();
-  }
-
-  /// A word out of place says more than what is missing because of it.
-  void check_words() const {
-    const Command* command = chosen();
-    check_no_extras(parser, command == nullptr ? nullptr : command->app);
+    for (const auto add : {add_inspect, add_simulate, add_generate, add_validate, add_info,
+                           add_merge, add_export, add_plot, add_bench, add_gradcheck})
+      commands.push_back(add(parser.root()));
   }
 };
 
 int run(Program& program, int argc, char** argv) {
-  try {
-    program.parser.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return program.parser.exit(error);  // --help, --version
-    program.check_words();
-    throw InputError(std::string(error.what()) + "; see '" + program.name() + " --help'");
-  }
-  program.check_words();
-  const Command* command = program.chosen();
-  if (command == nullptr) throw InputError("no subcommand given; see 'tangere --help'");
+  if (!program.parser.parse(argc, argv)) return kDone;
+  const auto command =
+      std::find_if(program.commands.begin(), program.commands.end(),
+                   [&](const Command& c) { return c.app == program.parser.chosen(); });
+  if (command == program.commands.end())
+    throw InputError("no subcommand given; see 'tangere --help'");
   if (*kernels::forced_isa_error() != '\0') throw InputError(kernels::forced_isa_error());
   ProgramInfo info{TANGERE_VERSION, {}};
   for (int i = 0; i < argc; ++i) info.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
@@ -94,8 +67,8 @@ int report(const Program& program, int argc, char** argv, ExitCode code, const s
   Console console;
   console.json = std::any_of(argv, argv + argc, [](const std::string& a) { return a == "--json"; });
   console.fail("tangere: " + what);
-  const Command* command = program.chosen();
-  console.result({{"command", command == nullptr ? Json() : Json(command->app->get_name())},
+  const std::string command = program.parser.chosen_name();
+  console.result({{"command", command.empty() ? Json() : Json(command)},
                   {"exit_code", static_cast<int>(code)},
                   {"error", what}});
   return code;

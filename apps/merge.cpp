@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "apps/arguments.hpp"
@@ -52,15 +53,15 @@ Command add_merge(CLI::App& program) {
   const auto input = std::make_shared<std::string>();
   const auto options = std::make_shared<MergeOptions>();
   const auto console = std::make_shared<Console>();
-  CLI::App* app =
-      program.add_subcommand("merge", "Show a folder of shards as one file, and to Minari");
-  add_text(*app, "DIR", *input, "", "Folder of shards, all of them there")->required();
-  app->add_flag("--copy", options->copy,
-                "Copy all numbers, for a file that needs no shards beside it");
-  app->add_flag("--overwrite", options->overwrite, "Replace what an earlier merge wrote");
-  add_console_options(*app, *console);
-  app->footer("Example:\n  tangere merge balls --overwrite");
-  return {app, [=](const ProgramInfo&) { return merge(*input, *options, *console); }};
+  CLI::App& app =
+      add_command(program, "merge", "Show a folder of shards as one file, and to Minari",
+                  "tangere merge balls --overwrite");
+  add_text(app, "DIR", *input, "", "Folder of shards, all of them there").required();
+  add_flag(app, "--copy", options->copy,
+           "Copy all numbers, for a file that needs no shards beside it");
+  add_flag(app, "--overwrite", options->overwrite, "Replace what an earlier merge wrote");
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo&) { return merge(*input, *options, *console); }};
 }
 
 }  // namespace tangere::apps

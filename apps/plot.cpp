@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
@@ -57,22 +58,22 @@ Command add_plot(CLI::App& program) {
   const auto console = std::make_shared<Console>();
   Options& o = *options;
   constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
-  CLI::App* app = program.add_subcommand("plot", "Draw tactile fields of a trajectory as SVG");
-  add_text(*app, "FILE", o.input, "", "HDF5 file written by 'tangere simulate'")->required();
-  add_text(*app, "-o,--output", o.output, "F.svg", "SVG file to write")->required();
-  add_text(*app, "--sensor", o.sensor, "NAME",
+  CLI::App& app = add_command(program, "plot", "Draw tactile fields of a trajectory as SVG",
+                              "tangere plot ball.h5 -o ball.svg --sensor pad --env 2 --strip 4");
+  add_text(app, "FILE", o.input, "", "HDF5 file written by 'tangere simulate'").required();
+  add_text(app, "-o,--output", o.output, "F.svg", "SVG file to write").required();
+  add_text(app, "--sensor", o.sensor, "NAME",
            "Tactile sensor, a rectangular array or one with an image [default: the first by name]");
-  add_whole_number<std::int64_t>(*app, "--env", o.environment, 0, kMost,
+  add_whole_number<std::int64_t>(app, "--env", o.environment, 0, kMost,
                                  "Environment, counted from 0 [default: 0]");
-  CLI::Option* frame = add_whole_number<std::int64_t>(*app, "--frame", o.frame, 0, kMost,
-                                                      "One frame, counted from 0");
-  add_whole_number<int>(*app, "--strip", o.strip, 1, kMostFrames,
+  const AddedOption frame = add_whole_number<std::int64_t>(app, "--frame", o.frame, 0, kMost,
+                                                           "One frame, counted from 0");
+  add_whole_number<int>(app, "--strip", o.strip, 1, kMostFrames,
                         "Most frames in a row, spread over those with contact [default: 6]")
-      ->excludes(frame);
-  app->add_flag("--overwrite", o.overwrite, "Replace the output if it exists");
-  add_console_options(*app, *console);
-  app->footer("Example:\n  tangere plot ball.h5 -o ball.svg --sensor pad --env 2 --strip 4");
-  return {app, [=](const ProgramInfo&) { return plot(*options, *console); }};
+      .excludes(frame);
+  add_flag(app, "--overwrite", o.overwrite, "Replace the output if it exists");
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo&) { return plot(*options, *console); }};
 }
 
 }  // namespace tangere::apps

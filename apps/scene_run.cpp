@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <csignal>
+#include <nlohmann/json.hpp>
 
 #include "io/files/csv.hpp"
 #include "io/files/nearest_name.hpp"
@@ -80,6 +81,11 @@ int report_stop(const Console& console, const std::string& command, int signal,
   object.update(result);
   console.result(object);
   return code;
+}
+
+int report_stop(const Console& console, const std::string& command, int signal,
+                const std::string& when) {
+  return report_stop(console, command, signal, when, "nothing was written", Json::object());
 }
 
 void list_failures(const Console& console, const std::string& what,

@@ -43,8 +43,10 @@ void note_empty_sensors(const Console& console, const Model& model, const Rollou
 /// Says that a signal ended the run, when ("after 3 of 9 steps") and what is left of it; returns
 /// its exit code. `result` comes along in the JSON object.
 int report_stop(const Console& console, const std::string& command, int signal,
-                const std::string& when, const std::string& left = "nothing was written",
-                const Json& result = Json::object());
+                const std::string& when, const std::string& left, const Json& result);
+/// Where nothing is left.
+int report_stop(const Console& console, const std::string& command, int signal,
+                const std::string& when);
 
 /// What no solution was found for: an environment, an episode.
 struct Failure {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "apps/arguments.hpp"
@@ -385,51 +386,49 @@ Command add_simulate(CLI::App& program) {
   const auto options = std::make_shared<Options>();
   const auto console = std::make_shared<Console>();
   Options& o = *options;
-  CLI::App* app =
-      program.add_subcommand("simulate", "Run a scene or a task and write its trajectory");
-  add_text(*app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task")->required();
-  add_text(*app, "-o,--output", o.output, "F.h5", "HDF5 file to write")->required();
+  CLI::App& app = add_command(
+      program, "simulate", "Run a scene or a task and write its trajectory",
+      "tangere simulate scenes/rolling_ball.xml --output ball.h5 --envs 4 --every 5 --seed 1");
+  add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
+  add_text(app, "-o,--output", o.output, "F.h5", "HDF5 file to write").required();
   add_text(
-      *app, "--controls", o.controls, "U.csv",
+      app, "--controls", o.controls, "U.csv",
       "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
-  add_text(*app, "--policy", o.policy, "NAME",
+  add_text(app, "--policy", o.policy, "NAME",
            "Of a task: random, hold, csv (with --controls) or scripted [default: scripted]");
-  add_whole_number<std::int64_t>(*app, "--steps", o.steps, 1, kMostSteps,
+  add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
                                  "Steps to take [default: as many as the controls last]");
-  add_whole_number<int>(*app, "--envs", o.environments, 1, kMostEnvironments,
+  add_whole_number<int>(app, "--envs", o.environments, 1, kMostEnvironments,
                         "Environments stepped together [default: 1, or those of --state-from]");
-  add_whole_number<int>(*app, "--every", o.every, 1, kMostEnvironments,
+  add_whole_number<int>(app, "--every", o.every, 1, kMostEnvironments,
                         "Tactile fields every N-th step [default: the scene's, or 1]");
-  add_text(*app, "--state-from", o.state_from, "F.h5",
+  add_text(app, "--state-from", o.state_from, "F.h5",
            "Start from a row of another run, environment e from its e");
-  add_whole_number<std::int64_t>(*app, "--row", o.row, 0, kMostSteps,
+  add_whole_number<std::int64_t>(app, "--row", o.row, 0, kMostSteps,
                                  "Row of --state-from [default: the last]");
-  add_positive_number(*app, "--timestep", o.timestep, "Step size in s [default: the scene's]");
-  add_text(*app, "--integrator", o.integrator, "NAME",
+  add_positive_number(app, "--timestep", o.timestep, "Step size in s [default: the scene's]");
+  add_text(app, "--integrator", o.integrator, "NAME",
            fmt::format("{} [default: the scene's]", fmt::join(integrator_names(), ", ")));
-  add_positive_number(*app, "--tol", o.tolerance,
+  add_positive_number(app, "--tol", o.tolerance,
                       "Largest scaled residual of a step [default: the scene's]");
-  add_text(*app, "--gradients", o.gradients, "LOSS",
+  add_text(app, "--gradients", o.gradients, "LOSS",
            "Derivatives of a loss by controls, start and the scene's numbers as well: final, path, "
            "tactile, shear or variables");
-  app->add_flag("--point-gradients", o.point_gradients,
-                "With --gradients: by place and coefficients of every tactile point, too");
-  add_memory_size(*app, "--tape-memory", o.tape_memory,
+  add_flag(app, "--point-gradients", o.point_gradients,
+           "With --gradients: by place and coefficients of every tactile point, too");
+  add_memory_size(app, "--tape-memory", o.tape_memory,
                   "With --gradients: states kept for them; a longer run is taken again from "
                   "checkpoints [default: 1GB]");
-  add_text(*app, "--precision", o.precision, "NAME",
+  add_text(app, "--precision", o.precision, "NAME",
            "Of tactile fields: double, or mixed, points in float [default: double]");
   add_whole_number<std::uint64_t>(
-      *app, "--seed", o.seed, 0, UINT64_MAX,
+      app, "--seed", o.seed, 0, UINT64_MAX,
       "Seed of all that varies between environments [default: 0, or that of --state-from]");
-  app->add_flag("--overwrite", o.overwrite, "Replace the output if it exists");
-  app->add_flag("--allow-unknown", o.allow_unknown,
-                "Unknown elements and attributes of the scene are warnings, not errors");
-  add_console_options(*app, *console);
-  app->footer(
-      "Example:\n"
-      "  tangere simulate scenes/rolling_ball.xml --output ball.h5 --envs 4 --every 5 --seed 1");
-  return {app, [=](const ProgramInfo& info) { return simulate(*options, *console, info); }};
+  add_flag(app, "--overwrite", o.overwrite, "Replace the output if it exists");
+  add_flag(app, "--allow-unknown", o.allow_unknown,
+           "Unknown elements and attributes of the scene are warnings, not errors");
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo& info) { return simulate(*options, *console, info); }};
 }
 
 }  // namespace tangere::apps

@@ -2,6 +2,8 @@
 // tangere validate: everything that is wrong with a data set.
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
 #include "io/dataset/dataset_files.hpp"
@@ -36,12 +38,12 @@ int validate(const std::string& path, const Console& console) {
 Command add_validate(CLI::App& program) {
   const auto input = std::make_shared<std::string>();
   const auto console = std::make_shared<Console>();
-  CLI::App* app = program.add_subcommand(
-      "validate", "Read a data set whole and name all that is wrong with it");
-  add_text(*app, "DIR", *input, "", "Folder of shards, or one file of a data set")->required();
-  add_console_options(*app, *console);
-  app->footer("Example:\n  tangere validate balls");
-  return {app, [=](const ProgramInfo&) { return validate(*input, *console); }};
+  CLI::App& app =
+      add_command(program, "validate", "Read a data set whole and name all that is wrong with it",
+                  "tangere validate balls");
+  add_text(app, "DIR", *input, "", "Folder of shards, or one file of a data set").required();
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo&) { return validate(*input, *console); }};
 }
 
 }  // namespace tangere::apps

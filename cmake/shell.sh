@@ -52,6 +52,30 @@ install_packages() {
   [ -z "$missing" ] || fail "apt-get reported success, but these are still not installed: $missing" "By hand: $by_hand"
 }
 
+# Every C++ file, for xargs -0.
+sources() { find kernels engine tasks io apps bench tests examples cmake -name '*.[ch]pp' -print0; }
+
+# Prints the clang-format of the release in cmake/python.txt, fails when there is none.
+clang_format_version=$(sed -n 's/^clang-format==//p' cmake/python.txt)
+clang_format() {
+  local program
+  for program in build/tools/bin/clang-format clang-format-"${clang_format_version%%.*}" clang-format; do
+    command -v "$program" >/dev/null || continue
+    # "Debian clang-format version 14.0.6", "clang-format version 14.0.6"
+    if "$program" --version | grep -q "version ${clang_format_version//./\\.}"; then
+      command -v "$program"
+      return
+    fi
+  done
+  return 1
+}
+# Nothing is built with it, so that a machine without Python or PyPI goes on.
+install_tools() {
+  if clang_format >/dev/null; then return; fi
+  { python3 -m venv build/tools && build/tools/bin/pip install -q -r cmake/python.txt; } </dev/null >/dev/null 2>&1 ||
+    say "There is no clang-format $clang_format_version here and PyPI is out of reach: formatting is not checked."
+}
+
 check_cmake() {
   local version
   version=$(cmake --version | sed -n 's/^cmake version \([0-9]*\.[0-9]*\).*/\1/p')
@@ -68,12 +92,12 @@ jobs() {
   if [ "$cores" -lt "$memory" ]; then echo "$cores"; else echo "$memory"; fi
 }
 
-# build PRESET [TARGET…]: configures and builds into build/PRESET.
+# build PRESET ISAS [TARGET…]: configures and builds into build/PRESET. ISAS: of the option TANGERE_ISAS.
 build() {
-  local preset=$1
-  shift
+  local preset=$1 isas=$2
+  shift 2
   check_cmake
-  cmake --preset "$preset" </dev/null || fail "cmake could not configure the build (its reason is above)." \
+  cmake --preset "$preset" "-DTANGERE_ISAS=$isas" </dev/null || fail "cmake could not configure the build (its reason is above)." \
     "If build/$preset is left from another place or compiler, remove it: rm -r build/$preset"
   cmake --build "build/$preset" --parallel "$(jobs)" ${1:+--target "$@"} </dev/null ||
     fail "the build of build/$preset failed (the compiler's reason is above)." \

@@ -79,16 +79,8 @@ void GroupAdjoint::solve(const StageInHand<L>& s) const {
   s.table.template stage<L>().solve_transposed(model_.view, w.stage, a.rhs, a.lambda, &a.sound);
   for (int l = 0; l < L; ++l) {
     if (!has(s.lanes, l) || a.sound[l] > 0) continue;
-    Eigen::MatrixXd& dense = w.dense[0];
-    const kernels::Pattern& p = model_.view.pattern;
-    for (int i = 0; i < model_.nv; ++i) {
-      w.rhs[i] = a.rhs[i][l];
-      for (int j = 0; j < model_.nv; ++j)
-        dense(j, i) = p.slot[i * model_.nv + j] < 0 ? 0 : w.stage.A[p.slot[i * model_.nv + j]][l];
-    }
-    w.pivoted[std::size_t(l)].compute(dense);
-    w.rhs = w.pivoted[std::size_t(l)].solve(w.rhs).eval();
-    for (int i = 0; i < model_.nv; ++i) a.lambda[i][l] = w.rhs[i];
+    w.pivoted.factor(model_.view.pattern, w.stage.A, l, true);
+    w.pivoted.solve(l, a.rhs, a.lambda);
   }
 }
 
@@ -221,5 +213,9 @@ template void GroupAdjoint::reverse(const Scheme&, double, const kernels::Kernel
                                     AdjointWorkspace<kernels::kGroup>&, LaneBits) const;
 template void GroupAdjoint::reverse(const Scheme&, double, const kernels::KernelTable&,
                                     SingleWorkspace&, AdjointWorkspace<1>&, LaneBits) const;
+
+// linear_adjoint.cpp calls it.
+template void GroupAdjoint::solve(const StageInHand<kernels::kGroup>&) const;
+template void GroupAdjoint::solve(const StageInHand<1>&) const;
 
 }  // namespace tangere

@@ -118,21 +118,6 @@ struct Search {
     on_trial &= ~(1U << l);
   }
 
-  /// Pivoted solve of one lane, for factors that plain elimination spoiled.
-  void pivoted_solve(int l, const LaneRow* b, LaneRow* out) {
-    for (int i = 0; i < n(); ++i) w.rhs[i] = b[i][l];
-    w.rhs = w.pivoted[l].solve(w.rhs).eval();
-    for (int i = 0; i < n(); ++i) out[i][l] = w.rhs[i];
-  }
-  void pivoted_factor(int l) {
-    Eigen::MatrixXd& a = w.dense[0];
-    const kernels::Pattern& p = model.view.pattern;
-    for (int i = 0; i < n(); ++i)
-      for (int j = 0; j < n(); ++j)
-        a(i, j) = p.slot[i * n() + j] < 0 ? 0 : w.stage.A[p.slot[i * n() + j]][l];
-    w.pivoted[l].compute(a);
-  }
-
   /// Judges the trials at the present x. Returns the lanes that hold an accepted, unconverged
   /// point.
   LaneBits judge() {
@@ -141,7 +126,7 @@ struct Search {
     if (on_trial != 0) {
       kernel().solve(model.view, w.stage, w.stage.g, w.test);
       for (int l = 0; l < L; ++l)
-        if (has(on_trial & use_pivoted, l)) pivoted_solve(l, w.stage.g, w.test);
+        if (has(on_trial & use_pivoted, l)) w.pivoted.solve(l, w.stage.g, w.test);
       weighted_norms(w.test, test_norm);
     }
     LaneBits accepted = 0;
@@ -244,8 +229,8 @@ struct Search {
       use_pivoted &= ~(1U << l);
       if (w.sound[l] > 0) continue;
       use_pivoted |= 1U << l;
-      pivoted_factor(l);
-      pivoted_solve(l, w.stage.g, w.test);
+      w.pivoted.factor(model.view.pattern, w.stage.A, l, false);
+      w.pivoted.solve(l, w.stage.g, w.test);
     }
     LaneRow norm;
     weighted_norms(w.test, norm);

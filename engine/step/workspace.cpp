@@ -50,7 +50,7 @@ template <int L>
 std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   BasicWorkspace w(m);
   return w.memory.size() * sizeof(LaneRow) + w.own_points.size() * sizeof(double) +
-         w.scratch.size() + sizeof(double) * std::size_t(m.nv) * std::size_t(m.nv + 1) * (L + 1);
+         w.scratch.size() + PivotedFactors::bytes(L, m.nv);
 }
 
 template <int L>
@@ -60,9 +60,7 @@ BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
       near{},
       stage{},
       inner_stages(inner),
-      pivoted(L, Eigen::PartialPivLU<Eigen::MatrixXd>(m.nv)),
-      dense(1, Eigen::MatrixXd(m.nv, m.nv)),
-      rhs(m.nv) {
+      pivoted(L, m.nv) {
   memory.assign(lay_out<L>(m, *this, nullptr), LaneRow{});
   lay_out<L>(m, *this, memory.data());
   std::size_t own = 0;

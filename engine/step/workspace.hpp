@@ -3,12 +3,12 @@
 // outlives a step.
 #pragma once
 
-#include <Eigen/LU>
 #include <cstdint>
 #include <vector>
 
 #include "engine/base/aligned.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "engine/step/pivoted_factors.hpp"
 #include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
@@ -49,10 +49,7 @@ struct BasicWorkspace {
   // Newton: direction, point it starts from, natural test vector.
   LaneRow *delta, *base, *test;
   LaneRow sound;
-  std::vector<Eigen::PartialPivLU<Eigen::MatrixXd>>
-      pivoted;                         ///< (L) factor of lanes whose plain LU is useless
-  std::vector<Eigen::MatrixXd> dense;  ///< (1) the matrix being factored
-  Eigen::VectorXd rhs;
+  PivotedFactors pivoted;  ///< of lanes whose plain LU is useless
 };
 using Workspace = BasicWorkspace<kernels::kGroup>;
 using SingleWorkspace = BasicWorkspace<1>;

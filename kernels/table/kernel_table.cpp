@@ -1,42 +1,104 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which tables the processor can run. Asked of the compiler's own detection, which also checks the
-// operating system.
+// Which tables there are and which of them the processor can run. Asked of the compiler's own
+// detection, which also checks the operating system.
 #include "kernels/table/kernel_table.hpp"
 
 #include <array>
 #include <cstdlib>
 #include <cstring>
+#include <string>
+
+#include "kernels/numbers/one_lane.hpp"
+#include "kernels/table/parts.hpp"
 
 #include "kernels/table/isa.hpp"
 
 namespace tangere::kernels {
-
-extern const KernelTable kTable_scalar;
-#if TANGERE_X86
-extern const KernelTable kTable_sse2;
-extern const KernelTable kTable_avx2;
-extern const KernelTable kTable_avx512;
-#endif
-
 namespace {
 
+template <class N, int L>
+constexpr StageKernels<L> stage_kernels() {
+  using Step = StepPart<N, L>;
+  using Adjoint = AdjointPart<N, L>;
+  return {Adjoint::scratch_bytes,
+          Step::kinematics,
+          Step::near_pairs,
+          Step::residual,
+          Step::evaluate,
+          Step::set_weights,
+          Step::set_floor,
+          Step::scaled_residual,
+          Step::weighted_norm,
+          Step::factor,
+          Step::solve,
+          Step::solve_watched,
+          Step::solve_transposed,
+          Adjoint::adjoint_rhs,
+          Adjoint::adjoint_products,
+          Adjoint::parameter_products};
+}
+
+/// Its functions are compiled elsewhere, with the flags of Arch (kernels/CMakeLists.txt).
+template <class Arch>
+constexpr KernelTable table_of(const char* name) {
+  using Group = GroupPart<Arch>;
+  using Tactile = TactilePart<Arch>;
+  using Pullback = ReadingPullbackPart<Arch>;
+  return {name,
+          stage_kernels<Lanes<Arch>, kGroup>(),
+          stage_kernels<OneLane<Arch>, 1>(),
+          Group::find_candidates,
+          Group::transpose_list,
+          Group::link_poses,
+          Group::pad_touch,
+          Tactile::tactile,
+          Tactile::tactile_mixed,
+          Tactile::tactile_block,
+          Tactile::tactile_block_mixed,
+          Pullback::pull_back_links,
+          Pullback::pullback_bytes,
+          Pullback::pull_back_field,
+          Pullback::field_tangent};
+}
+
+/// What was built, and whether this machine runs it. Best first.
+struct Built {
+  KernelTable table;
+  bool (*runs)();
+};
+constexpr Built kBuilt[] = {
+#if TANGERE_AVX512
+    {table_of<xsimd::avx512bw>("avx512"),
+     [] {
+       return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd") &&
+              __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw");
+     }},
+#endif
+#if TANGERE_AVX2
+    {table_of<xsimd::avx2>("avx2"),
+     [] { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }},
+#endif
+#if TANGERE_SSE2
+    {table_of<xsimd::sse2>("sse2"), [] { return true; }},
+#endif
+    {table_of<ScalarArch>("scalar"), [] { return true; }}};
+
 struct Registry {
-  std::array<const KernelTable*, 4> tables{};
+  std::array<const KernelTable*, std::size(kBuilt)> tables{};
   std::size_t count = 0;
   const KernelTable* active = nullptr;
-  const char* error = "";
+  std::string error;
 
   Registry() {
-    const auto add = [this](const KernelTable& t) { tables[count++] = &t; };
-#if TANGERE_X86
+#if TANGERE_AVX2 || TANGERE_AVX512
     __builtin_cpu_init();
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd") &&
-        __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw"))
-      add(kTable_avx512);
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) add(kTable_avx2);
-    add(kTable_sse2);
 #endif
-    add(kTable_scalar);
+    std::string names;
+    for (const Built& built : kBuilt) {
+      if (!built.runs()) continue;
+      tables[count++] = &built.table;
+      names += (names.empty() ? "" : ", ") + std::string(built.table.name);
+    }
     active = tables[0];
     const char* wanted = std::getenv("TANGERE_ISA");
     if (wanted == nullptr || *wanted == '\0') return;
@@ -47,8 +109,10 @@ struct Registry {
       }
     }
     error =
-        "TANGERE_ISA names an instruction set this machine does not run; known names are avx512, "
-        "avx2, sse2, scalar";
+        "TANGERE_ISA=" + std::string(wanted) +
+        ": an instruction set that this machine does not run or this program was built without; "
+        "expected one of " +
+        names;
   }
 };
 
@@ -64,7 +128,7 @@ std::span<const KernelTable* const> available_kernels() {
 }
 const KernelTable& active_kernels() { return *registry().active; }
 const char* active_isa_name() { return active_kernels().name; }
-const char* forced_isa_error() { return registry().error; }
+const char* forced_isa_error() { return registry().error.c_str(); }
 void use_kernels(const KernelTable& table) { registry().active = &table; }
 
 }  // namespace tangere::kernels

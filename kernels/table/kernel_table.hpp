@@ -91,7 +91,7 @@ struct KernelTable {
   }
 };
 
-/// Tables this machine can run, best first; never empty.
+/// Tables that were built and this machine can run, best first; never empty.
 std::span<const KernelTable* const> available_kernels();
 
 /// The table in use: the best one, or the one named by the environment variable TANGERE_ISA when

@@ -107,7 +107,8 @@ bool is_cpp(std::string_view path) { return ends_with_any(path, {".cpp", ".hpp",
 bool is_script(std::string_view path) {
   const std::string_view name = path.substr(path.rfind('/') + 1);
   return ends_with_any(path, {".cmake", ".cmake.in", ".sh", ".py", ".js"}) ||
-         name == "CMakeLists.txt" || name == "run-demo" || name == "run-tests" || path == ".ci/run";
+         name == "CMakeLists.txt" || name == "run-demo" || name == "run-tests" || name == "dev" ||
+         path == ".ci/run";
 }
 
 /// The file that a quoted include names, "" when there is none.
@@ -129,6 +130,27 @@ Names installed_headers(const Tree& tree) {
        match != end; ++match)
     installed.insert(match->str());
   return installed;
+}
+
+/// Everything between < and > in a file and in all project files that it includes.
+Names libraries_behind(const Tree& tree, const std::string& path) {
+  std::vector<std::string> waiting{path};
+  Names seen{path}, libraries;
+  while (!waiting.empty()) {
+    const std::string at = waiting.back();
+    waiting.pop_back();
+    for (const Include& include : includes_of(tree.find(at)->second)) {
+      const std::string target = include.quoted ? resolve(tree, at, include.name) : "";
+      if (!include.quoted) libraries.insert(include.name);
+      if (!target.empty() && seen.insert(target).second) waiting.push_back(target);
+    }
+  }
+  return libraries;
+}
+
+bool is_tested_source(std::string_view path) {
+  return path.ends_with(".cpp") &&
+         Names{"kernels", "engine", "tasks", "io", "apps"}.contains(top_of(path));
 }
 
 void check_quoted(const Tree& tree, const std::string& path, const Include& include,
@@ -265,6 +287,82 @@ std::vector<Violation> check_private_headers(const Tree& tree) {
                          "includes \"" + target + "\", which is private to " + to + ": " +
                              kInstallList + " does not list it"});
     }
+  }
+  return found;
+}
+
+std::vector<Violation> check_heavy_headers(const Tree& tree) {
+  // Half a second to four seconds of a compiler each. Sources of a folder that may reach them.
+  static const std::map<std::string, std::map<std::string, int>> allowed{
+      {"CLI/", {{"apps", 1}}},
+      {"Eigen/", {{"engine/derivative", 1}, {"engine/step", 1}, {"tasks/gradients", 1}}},
+      {"hdf5.h", {{"io/hdf5", 4}, {"io/dataset", 10}, {"io/trajectory", 4}}},
+      {"nlohmann/json.hpp", {{"apps", 17}}},
+      {"tbb/flow_graph.h", {{"tasks/run", 1}}},
+      {"regex", {}},
+      {"iostream", {}}};
+  std::map<std::pair<std::string, std::string>, int> count;  // header, folder
+  std::vector<Violation> found;
+  for (const auto& [path, text] : tree) {
+    if (!is_tested_source(path)) continue;
+    const std::string folder = folder_of(path);
+    const Names libraries = libraries_behind(tree, path);
+    for (const auto& [header, folders] : allowed) {
+      const auto reached = libraries.lower_bound(header);
+      if (reached == libraries.end() || !reached->starts_with(header)) continue;
+      const auto most = folders.find(folder);
+      const int sources = ++count[{header, folder}],
+                limit = most == folders.end() ? 0 : most->second;
+      if (sources == limit + 1)
+        found.push_back({path, 0,
+                         "one source too many of " + folder + " to reach <" + *reached +
+                             ">, which takes long to compile; allowed: " + std::to_string(limit)});
+    }
+  }
+  return found;
+}
+
+std::vector<Violation> check_own_headers(const Tree& tree) {
+  static const std::map<std::string, std::string> shared{
+      {"apps/bench.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/export.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/generate.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/gradcheck.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/identify_ball.cpp", "a program"},
+      {"apps/info.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/inspect.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/main.cpp", "a program"},
+      {"apps/merge.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/plot.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/simulate.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/validate.cpp", "a subcommand: apps/command.hpp"},
+      {"engine/model/contact_tiles.cpp", "a part of compiled_model.hpp"},
+      {"engine/model/mass_properties.cpp", "a part of compiled_model.hpp"},
+      {"engine/model/sensor.cpp", "a part of compiled_model.hpp"},
+      {"engine/model/tactile_points.cpp", "a part of compiled_model.hpp"},
+      {"io/dataset/layout_from_model.cpp", "a part of dataset_layout.hpp"},
+      {"io/scene/scene_bodies.cpp", "a part of scene_sections.hpp"},
+      {"io/scene/scene_end_effectors.cpp", "a part of scene_sections.hpp"},
+      {"io/scene/scene_joints.cpp", "a part of scene_sections.hpp"},
+      {"io/scene/scene_runs.cpp", "a part of scene_sections.hpp"},
+      {"io/scene/scene_sensors.cpp", "a part of scene_sections.hpp"},
+      {"tasks/catalogue/ball_rolling.cpp", "a task: task_list.cpp"},
+      {"tasks/catalogue/box_pushing.cpp", "a task: task_list.cpp"},
+      {"tasks/catalogue/cap_opening.cpp", "a task: task_list.cpp"},
+      {"tasks/catalogue/dummy_task.cpp", "a task: task_list.cpp"},
+      {"tasks/catalogue/insertion.cpp", "a task: task_list.cpp"},
+      {"tasks/catalogue/stable_grasp.cpp", "a task: task_list.cpp"},
+      {"tasks/gradients/loss_check.cpp", "a part of gradient_check.hpp"},
+      {"tasks/gradients/return_check.cpp", "a part of gradient_check.hpp"},
+      {"tasks/run/task_benchmark.cpp", "a part of task_episodes.hpp"}};
+  std::vector<Violation> found;
+  for (const auto& [path, text] : tree) {
+    if (!is_tested_source(path) || shared.contains(path)) continue;
+    const std::string header = path.substr(0, path.size() - 3) + "hpp";
+    if (!tree.contains(header))
+      found.push_back(
+          {path, 0,
+           "has no header " + header + "; expected one, or a reason in tests/house/rules.cpp"});
   }
   return found;
 }

@@ -44,6 +44,12 @@ std::vector<Violation> check_public_headers(const Tree& tree);
 /// Nobody outside includes a private header: of engine and kernels, io, tasks, apps and examples see
 /// what cmake/install.cmake installs. Tests and benchmarks may look inside.
 std::vector<Violation> check_private_headers(const Tree& tree);
+/// No more sources of a folder reach a header that takes long to compile than the table in rules.cpp
+/// allows; tests and benchmarks are free.
+std::vector<Violation> check_heavy_headers(const Tree& tree);
+
+/// A source of the libraries and the command has a header of its own name, or a reason not to.
+std::vector<Violation> check_own_headers(const Tree& tree);
 
 /// SPDX line first, then a comment that says why the file exists; at most 600 lines.
 std::vector<Violation> check_sources(const Tree& tree);

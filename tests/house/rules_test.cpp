@@ -44,6 +44,10 @@ TEST(House, KernelsShareNothingAcrossInstructionSets) {
 }
 TEST(House, PublicHeadersStandAlone) { EXPECT_THAT(check_public_headers(project()), IsEmpty()); }
 TEST(House, PrivateHeadersStayInside) { EXPECT_THAT(check_private_headers(project()), IsEmpty()); }
+TEST(House, HeavyHeadersStayWhereTheyAre) {
+  EXPECT_THAT(check_heavy_headers(project()), IsEmpty());
+}
+TEST(House, SourcesHaveTheirHeaders) { EXPECT_THAT(check_own_headers(project()), IsEmpty()); }
 TEST(House, SourcesAreShortAndSayWhy) { EXPECT_THAT(check_sources(project()), IsEmpty()); }
 TEST(House, FoldersAndLinksAreDocumented) { EXPECT_THAT(check_documents(project()), IsEmpty()); }
 
@@ -124,6 +128,26 @@ TEST(HouseRules, SeeAPrivateHeaderOutside) {
   EXPECT_THAT(check_private_headers(tree),
               ElementsAre(Says("apps/a.cpp", 2, "engine/shut.hpp"),
                           Says("examples/a.cpp", 1, "kernels/lane.hpp")));
+}
+
+TEST(HouseRules, SeeAHeavyHeaderBehindAnother) {
+  const Tree tree{{"apps/arguments.cpp", "#include <CLI/CLI.hpp>\n"},
+                  {"apps/one.cpp", "#include \"apps/one.hpp\"\n"},
+                  {"apps/one.hpp", "#include <CLI/App.hpp>\n"},
+                  {"io/files/a.cpp", "#include <regex>\n"},
+                  {"tests/io/a_test.cpp", "#include <regex>\n"}};
+  EXPECT_THAT(check_heavy_headers(tree), ElementsAre(Says("apps/one.cpp", 0, "<CLI/App.hpp>"),
+                                                     Says("io/files/a.cpp", 0, "<regex>")));
+}
+
+TEST(HouseRules, SeeASourceWithoutItsHeader) {
+  const Tree tree{{"apps/main.cpp", ""},
+                  {"engine/step/a.cpp", ""},
+                  {"engine/step/b.cpp", ""},
+                  {"engine/step/b.hpp", ""},
+                  {"tests/io/a_test.cpp", ""}};
+  EXPECT_THAT(check_own_headers(tree),
+              ElementsAre(Says("engine/step/a.cpp", 0, "engine/step/a.hpp")));
 }
 
 TEST(HouseRules, SeeAHeadlessOrOverlongSource) {

@@ -18,7 +18,7 @@ machine() {
   mkdir -p "$bin" "$home/project/cmake"
   : >"$log"
   cp "$project"/run-demo "$project"/run-tests "$project"/CMakePresets.json "$home/project"
-  cp "$project"/cmake/shell.sh "$project"/cmake/packages.txt "$home/project/cmake"
+  cp "$project"/cmake/shell.sh "$project"/cmake/packages.txt "$project"/cmake/python.txt "$home/project/cmake"
   local tool
   for tool in bash sed grep tr sort head awk env nproc dirname readlink cat mkdir rm ls ctest sleep; do
     ln -s "$(type -P "$tool")" "$bin/$tool"
@@ -82,6 +82,10 @@ expect "says that nothing is missing" prints "All packages"
 expect "installs nothing" not_called "apt-get"
 expect "runs the main job" called "tangere generate scenes/rolling_ball.xml"
 expect "draws" called "tangere plot out/rolling_ball.h5"
+expect "builds for this machine" called "cmake --preset release -DTANGERE_ISAS=host"
+echo TANGERE_ISAS:STRING=all >"$home/project/build/release/CMakeCache.txt"
+run run-demo
+expect "keeps the instruction sets of a full build" called "cmake --preset release -DTANGERE_ISAS=all"
 run FAKE_PROGRAM=2 run-demo
 expect "fails with the program" fails
 expect "says what failed" prints "generating the data set failed"
@@ -165,6 +169,14 @@ expect "fails with a test" fails
 expect "shows it" prints "0% tests passed, 1 tests failed out of 1"
 expect "names it at the end" ends_with "release: one"
 expect "names no older one" not_prints "asan: one"
+fake failing_program 'printf "[ RUN      ] A.Good\n[       OK ] A.Good (0 ms)\n[ RUN      ] A.Bad/1\n"
+  echo "[  FAILED  ] A.Bad/1, where GetParam() = 3 (2 ms)"; exit 1'
+test_in release "$bin/failing_program"
+run run-tests
+expect "names the case that failed" ends_with "release: one: A.Bad/1"
+fake failing_program 'echo "[ RUN      ] A.Crash"; exit 1'
+run run-tests
+expect "names the case that crashed" ends_with "release: one: A.Crash (did not end)"
 : >"$home/project/build/release/CTestTestfile.cmake"
 run run-tests
 expect "fails when no test ran" fails

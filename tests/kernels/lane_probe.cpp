@@ -9,19 +9,19 @@
 
 namespace tangere::testing {
 
-extern const LaneProbe kProbe_scalar;
-#if TANGERE_X86
-extern const LaneProbe kProbe_sse2, kProbe_avx2, kProbe_avx512;
-#endif
+// TANGERE_PROBES: PROBE(scalar) PROBE(avx2) and so on, of the instruction sets that were built.
+#define PROBE(isa) extern const LaneProbe kProbe_##isa;
+TANGERE_PROBES
+#undef PROBE
 
 std::span<const LaneProbe* const> lane_probes() {
   static const std::vector<const LaneProbe*> probes = [] {
-    std::vector<const LaneProbe*> built = {&kProbe_scalar};
-#if TANGERE_X86
-    for (const LaneProbe* p : {&kProbe_sse2, &kProbe_avx2, &kProbe_avx512})
+    std::vector<const LaneProbe*> built;
+#define PROBE(isa) &kProbe_##isa,
+    for (const LaneProbe* p : {TANGERE_PROBES})
+#undef PROBE
       for (const kernels::KernelTable* table : kernels::available_kernels())
         if (std::strcmp(p->name, table->name) == 0) built.push_back(p);
-#endif
     return built;
   }();
   return probes;

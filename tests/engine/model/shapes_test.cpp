@@ -115,7 +115,7 @@ TEST(Shapes, MassesFollowSizes) {
       for (int i = 0; i < 3; ++i)
         EXPECT_NEAR(slope.inertia.m[i][i], (up.inertia.m[i][i] - down.inertia.m[i][i]) / 2e-6,
                     1e-7 * up.mass)
-            << shape_name(shape) << ' ' << size_name(which);
+            << shape_name(shape) << " number " << which;
     }
 }
 

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// The functions of one instruction set's table, in parts that are compiled on their own: a change in
+// a kernel recompiles the parts that use it. Arch: xsimd's tag of the instruction set, or ScalarArch.
+#pragma once
+
+#include "kernels/step/arguments.hpp"
+#include "kernels/tactile/tactile_types.hpp"
+
+namespace tangere::kernels {
+
+/// A stage forward, in numbers N of L lanes: what StageKernels says of each.
+template <class N, int L>
+struct StepPart {
+  static void kinematics(const ModelView&, const Stage<L>&);
+  static void near_pairs(const ModelView&, const Stage<L>&, NearPairs<L>& out);
+  static void residual(const ModelView&, const Stage<L>&, int lone);
+  static void evaluate(const ModelView&, const Stage<L>&, int lone);
+  static void set_weights(const ModelView&, Stage<L>&);
+  static void set_floor(const ModelView&, Stage<L>&, const double* unknown_scale,
+                        const Row<L>& accept);
+  static void scaled_residual(const ModelView&, const Stage<L>&, double gravity, Row<L>& out);
+  static void weighted_norm(const ModelView&, const Stage<L>&, const Row<L>* a, Row<L>& out);
+  static void factor(const ModelView&, const Stage<L>&, const Row<L>* accept);
+  static void solve(const ModelView&, const Stage<L>&, const Row<L>* b, Row<L>* out);
+  static void solve_watched(const ModelView&, const Stage<L>&, const Row<L>* b, Row<L>* out,
+                            Row<L>* sound);
+  static void solve_transposed(const ModelView&, const Stage<L>&, const Row<L>* b, Row<L>* out,
+                               Row<L>* sound);
+};
+
+/// A stage in reverse; it knows all of a stage's scratch.
+template <class N, int L>
+struct AdjointPart {
+  static std::size_t scratch_bytes(const ModelView&);
+  static void adjoint_rhs(const ModelView&, const Stage<L>&, const StageAdjoint<L>&);
+  static void adjoint_products(const ModelView&, const Stage<L>&, const StageAdjoint<L>&);
+  static void parameter_products(const ModelView&, const Stage<L>&, const StageAdjoint<L>&,
+                                 int lone, Row<L>* out);
+};
+
+/// What a group needs beside its stages: what KernelTable says of each, here and below.
+template <class Arch>
+struct GroupPart {
+  static int find_candidates(const CandidateSearch&);
+  static void transpose_list(GroupStage::List&);
+  static void link_poses(const ModelView&, const GroupState&, LinkPose<LaneRow>* out);
+  static void pad_touch(const LinkPose<LaneRow>* sensor, const Frame<double>& pad,
+                        const LinkPose<LaneRow>* body, const Frame<double>& shape,
+                        Touch<LaneRow>* out);
+};
+
+/// Fields.
+template <class Arch>
+struct TactilePart {
+  static int tactile(const TactileArgs<double>&);
+  static int tactile_mixed(const TactileArgs<float>&);
+  static void tactile_block(const TactileBlockArgs<double>&);
+  static void tactile_block_mixed(const TactileBlockArgs<float>&);
+};
+
+/// Readings in reverse, and along a change.
+template <class Arch>
+struct ReadingPullbackPart {
+  static void pull_back_links(const ModelView&, const GroupState&, std::byte* scratch,
+                              MotionCotangent<LaneRow>* links, LaneRow* q_bar, LaneRow* v_bar);
+  static std::size_t pullback_bytes(const ModelView&);
+  static void pull_back_field(const TactilePullback&);
+  static void field_tangent(const TactileTangent&);
+};
+
+}  // namespace tangere::kernels

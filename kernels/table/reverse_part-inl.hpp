@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// The functions in reverse of an instruction set's table: of stages and of readings.
+#pragma once
+
+#include "kernels/reverse/motion_pullback-inl.hpp"
+#include "kernels/reverse/parameter_adjoint-inl.hpp"
+#include "kernels/reverse/tactile_pullback-inl.hpp"
+#include "kernels/reverse/tactile_tangent-inl.hpp"
+#include "kernels/table/parts.hpp"
+#include "kernels/table/stage_view-inl.hpp"
+
+namespace tangere::kernels {
+
+template <class N, int L>
+AdjointArgs<N> adjoint_arguments(const StageAdjoint<L>& d, LinkAdjoint<N>* links) {
+  const auto view = [](auto* p) { return StageView<N, L>::view(p); };
+  AdjointArgs<N> a{view(d.q_bar),
+                   view(d.v_bar),
+                   view(d.rhs),
+                   view(d.lambda),
+                   view(d.nu),
+                   view(d.mass_lambda),
+                   view(d.target),
+                   view(d.q_centre),
+                   view(d.v_centre),
+                   {d.history.s_centre, d.history.count, {}},
+                   links};
+  for (int k = 0; k < d.history.count; ++k) {
+    const auto& o = d.history.older[k];
+    a.history.older[k] = {o.rho, o.s, view(o.difference), view(o.q), view(o.v)};
+  }
+  return a;
+}
+
+template <class N, int L>
+std::size_t AdjointPart<N, L>::scratch_bytes(const ModelView& m) {
+  return sizeof(LinkScratch<N>) * m.n_links +
+         sizeof(ContactScratch<N>) * (m.n_link_pairs + m.n_grounded) +
+         sizeof(CandidateList<N>) * m.n_pairs + sizeof(JointColumns<N>) * 2 * m.n_links +
+         sizeof(LinkAdjoint<N>) * m.n_links + 5 * alignof(N);
+}
+
+template <class N, int L>
+void AdjointPart<N, L>::adjoint_rhs(const ModelView& m, const Stage<L>& s,
+                                    const StageAdjoint<L>& d) {
+  kernels::adjoint_rhs(m, StageView<N, L>::arguments(m, s, -1), adjoint_arguments<N>(d, nullptr));
+}
+
+template <class N, int L>
+void AdjointPart<N, L>::adjoint_products(const ModelView& m, const Stage<L>& s,
+                                         const StageAdjoint<L>& d) {
+  using View = StageView<N, L>;
+  typename View::Scratch scratch{s.scratch};
+  const StageArgs<N> a = View::arguments(m, s, -1, scratch);
+  kernels::adjoint_products(
+      m, a, adjoint_arguments<N>(d, scratch.template take<LinkAdjoint<N>>(m.n_links)));
+}
+
+template <class N, int L>
+void AdjointPart<N, L>::parameter_products(const ModelView& m, const Stage<L>& s,
+                                           const StageAdjoint<L>& d, int lone, Row<L>* out) {
+  using View = StageView<N, L>;
+  typename View::Scratch scratch{s.scratch};
+  const StageArgs<N> a = View::arguments(m, s, lone, scratch);
+  kernels::parameter_products(
+      m, a, adjoint_arguments<N>(d, scratch.template take<LinkAdjoint<N>>(m.n_links)),
+      View::view(out));
+}
+
+template <class Arch>
+void ReadingPullbackPart<Arch>::pull_back_links(const ModelView& m, const GroupState& s,
+                                                std::byte* scratch, MotionCotangent<LaneRow>* links,
+                                                LaneRow* q_bar, LaneRow* v_bar) {
+  using N = Lanes<Arch>;
+  using View = StageView<N, kGroup>;
+  kernels::pull_back_links(m, at_state<N>(s), reinterpret_cast<LinkMotion<N>*>(scratch),
+                           reinterpret_cast<MotionCotangent<N>*>(links), View::view(q_bar),
+                           View::view(v_bar));
+}
+
+template <class Arch>
+std::size_t ReadingPullbackPart<Arch>::pullback_bytes(const ModelView& m) {
+  return sizeof(LinkMotion<Lanes<Arch>>) * std::size_t(m.n_links);
+}
+
+template <class Arch>
+void ReadingPullbackPart<Arch>::pull_back_field(const TactilePullback& a) {
+  kernels::pull_back_field<Arch>(a);
+}
+
+template <class Arch>
+void ReadingPullbackPart<Arch>::field_tangent(const TactileTangent& a) {
+  kernels::field_tangent<Arch>(a);
+}
+
+}  // namespace tangere::kernels

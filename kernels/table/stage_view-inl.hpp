@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the engine hands over as rows of doubles, read as a kernel's numbers.
+#pragma once
+
+#include "kernels/step/arguments.hpp"
+#include "kernels/step/stage.hpp"
+
+namespace tangere::kernels {
+
+// A row of L doubles and the number type N of L lanes have the same layout; vector types may alias
+// anything, and OneLane is a double.
+template <class N, int L>
+struct StageView {
+  static_assert(sizeof(N) == sizeof(Row<L>));
+  using StageOf = Stage<L>;
+  using RowOf = Row<L>;
+
+  static N* view(RowOf* p) { return reinterpret_cast<N*>(p); }
+  static const N* view(const RowOf* p) { return reinterpret_cast<const N*>(p); }
+
+  /// Hands out arrays from a stage's scratch, one after the other.
+  struct Scratch {
+    std::byte* at;
+    template <class T>
+    T* take(int count) {
+      T* p = reinterpret_cast<T*>(at);
+      at += (sizeof(T) * count + sizeof(N) - 1) / sizeof(N) * sizeof(N);
+      return p;
+    }
+  };
+  static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone) {
+    Scratch scratch{s.scratch};
+    return arguments(m, s, lone, scratch);
+  }
+
+  static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone, Scratch& scratch) {
+    StageArgs<N> a;
+    a.links = scratch.template take<LinkScratch<N>>(m.n_links);
+    a.contacts = scratch.template take<ContactScratch<N>>(m.n_link_pairs + m.n_grounded);
+    a.columns = scratch.template take<JointColumns<N>>(2 * m.n_links);
+    auto* lists = scratch.template take<CandidateList<N>>(m.n_pairs);
+    for (int k = 0; k < m.n_pairs; ++k) {
+      const typename StageOf::List& l = s.lists[k];
+      const int lane = lone < 0 ? 0 : lone;
+      lists[k] = {
+          view(l.points),    l.count, view(l.reference), l.margin, l.own + 3 * l.stride * lane,
+          l.own_count[lane], l.stride};
+    }
+    a.candidates = lists;
+    a.lone = lone;
+    a.centre = view(s.centre);
+    a.x = view(s.x);
+    a.r = view(s.r);
+    a.s = view(s.s);
+    a.tau = view(s.tau);
+    a.target = view(s.target);
+    a.c0_over_h = *view(&s.c0_over_h);
+    a.inverse_h = *view(&s.inverse_h);
+    a.friction_tangent = *view(&s.friction_tangent);
+    a.block = s.block;
+    a.group = s.group;
+    a.v = view(s.v);
+    a.g = view(s.g);
+    a.force_scale = view(s.force_scale);
+    a.mass_diagonal = view(s.mass_diagonal);
+    a.A = view(s.A);
+    a.excess = view(s.excess);
+    return a;
+  }
+};
+
+/// A state as a stage at x = 0 whose rates are v.
+template <class N>
+StageArgs<N> at_state(const GroupState& s) {
+  using View = StageView<N, kGroup>;
+  StageArgs<N> a{};
+  a.centre = View::view(s.q);
+  a.x = a.s = View::view(s.zero);
+  a.r = View::view(s.v);
+  a.c0_over_h = N(0.0);
+  a.inverse_h = N(1.0);
+  a.v = View::view(s.rates);
+  a.block = s.block;
+  a.group = s.group;
+  return a;
+}
+
+}  // namespace tangere::kernels
