@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parser of the library accepts 0x10, 010 and nan; a number here is what it looks like.
+// Parses numbers itself, because the library's parser accepts 0x10, 010 and nan.
 #include "apps/arguments.hpp"
 
 #include <fmt/format.h>
@@ -28,7 +28,7 @@ bool parse(const std::string& text, T& number) {
 /// "--output" of "-o,--output".
 std::string long_name(const std::string& flags) { return flags.substr(flags.find("--")); }
 
-/// Long names only: every letter resembles every other.
+/// Uses long names only, because every single letter resembles every other.
 std::vector<std::string> option_names(const CLI::App& command) {
   std::vector<std::string> names;
   for (const CLI::Option* option : command.get_options())
@@ -149,7 +149,7 @@ void add_whole_numbers(CLI::App& command, const std::string& flags, std::vector<
             fmt::format("{} {}: '{}'; expected whole numbers from {} to {} separated by commas",
                         name, text, word, low, high));
       if (std::find(values.begin(), values.end(), number) != values.end())
-        throw InputError(fmt::format("{} {}: {} stands there twice", name, text, number));
+        throw InputError(fmt::format("{} {}: {} is given twice", name, text, number));
       values.push_back(number);
     }
   };

@@ -73,17 +73,17 @@ AddedOption add_whole_number(CLI::App& command, const std::string& flags, std::o
 void add_whole_numbers(CLI::App& command, const std::string& flags, std::vector<int>& values,
                        int low, int high, const std::string& description);
 
-/// One positive finite number.
+/// The same for one positive finite number.
 void add_positive_number(CLI::App& command, const std::string& flags, std::optional<double>& value,
                          const std::string& description);
 
-/// An amount of memory in bytes: a positive number and B, kB, MB, GB, TB (powers of 1000) or KiB,
-/// MiB, GiB, TiB (of 1024).
+/// The same for an amount of memory in bytes: a positive number and B, kB, MB, GB, TB (powers of
+/// 1000) or KiB, MiB, GiB, TiB (of 1024).
 void add_memory_size(CLI::App& command, const std::string& flags, std::optional<double>& bytes,
                      const std::string& description);
 
-/// An argument (`flags` without dashes) or option that takes text; empty text is an error, because
-/// it mostly is a shell variable that was not set.
+/// Adds an argument (`flags` without dashes) or option that takes text. Empty text is an error,
+/// because it is mostly a shell variable that was not set.
 AddedOption add_text(CLI::App& command, const std::string& flags, std::string& value,
                      const std::string& type, const std::string& description);
 
@@ -91,7 +91,7 @@ AddedOption add_text(CLI::App& command, const std::string& flags, std::string& v
 AddedOption add_flag(CLI::App& command, const std::string& flags, bool& value,
                      const std::string& description);
 
-/// --json, -q, -v: the same for every subcommand.
+/// Adds --json, -q and -v, which all subcommands share.
 void add_console_options(CLI::App& command, Console& console);
 
 /// Throws InputError when writing `output` would replace `input`, --overwrite or not.

@@ -200,7 +200,7 @@ int bench_task(const Options& options, const Console& console, const Task& task)
 
 int bench(const Options& options, const Console& console) {
   check_arguments(options);
-  // A wrong word is said before a scene is read.
+  // A wrong word is reported before a scene is read.
   frames_named(options.frames);
   precision_named(options.precision);
   if (const std::unique_ptr<Task> task = find_task(options.scene, console))
@@ -243,23 +243,23 @@ Command add_bench(CLI::App& program) {
                         "Environments, in blocks of 16 [default: 256]");
   add_whole_number<std::int64_t>(
       app, "--steps", o.steps, 1, kMostSteps,
-      "Steps of the episode; of a task, actions [default: as many as the controls last]");
+      "Steps of the episode; for a task, actions [default: as many as the controls last]");
   add_text(app, "--policy", o.policy, "NAME",
-           "Of a task: random, hold or scripted [default: random]");
+           "Policy of a task: random, hold or scripted [default: random]");
   add_whole_numbers(app, "--threads", o.threads, 1, kMostThreads,
                     "Thread counts to measure [default: 1,2,4,... up to the processors here]");
   add_text(app, "--precision", o.precision, "NAME",
-           "Of tactile fields: double, or mixed, points in float [default: mixed]");
+           "Precision of tactile fields: double, or mixed with points in float [default: mixed]");
   add_whole_number<int>(app, "--every", o.every, 1, kMostEnvironments,
-                        "Tactile fields every N-th step [default: the scene's, or 1]");
+                        "Read tactile fields every N steps [default: the scene's, or 1]");
   add_text(app, "--frames", o.frames, "NAME",
-           "Of tactile fields: dense, every point; compact, touched tiles; none [default: dense]");
+           "Fields to read: dense (every point), compact (touched tiles) or none [default: dense]");
   add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,
                         "Timed passes over the episode; the best counts [default: 3]");
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between environments [default: 0]");
-  add_text(app, "--svg", o.svg, "F.svg", "Picture of speed against threads to write");
-  add_text(app, "--csv", o.csv, "F.csv", "Table of all figures to write");
+  add_text(app, "--svg", o.svg, "F.svg", "Write a picture of speed against threads");
+  add_text(app, "--csv", o.csv, "F.csv", "Write a table of all figures");
   add_flag(app, "--overwrite", o.overwrite, "Replace the outputs if they exist");
   add_flag(app, "--allow-unknown", o.allow_unknown,
            "Unknown elements and attributes of the scene are warnings, not errors");

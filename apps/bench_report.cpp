@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rates are made here, from counts and times: nothing else divides.
+// Computes all rates, from counts and times.
 #include "apps/bench_report.hpp"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines to streams. A stream that cannot be written is noticed once, when main flushes stdout.
+// Writes lines to streams. main notices a stream that cannot be written when it flushes stdout.
 #include "apps/console.hpp"
 
 #include <cstdio>
@@ -29,7 +29,7 @@ void Console::print(const std::string& text) const {
 }
 
 void Console::result(const Json& object) const {
-  // Names from files may be no UTF-8; the object must be JSON all the same.
+  // Names from files may not be UTF-8, but the object must be JSON.
   if (json) write_line(stdout, object.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who reads what: people read text, programs read one JSON object, and the two never share a
-// stream.
+// Sends text to people and one JSON object to programs. The two never share a stream.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -24,16 +23,16 @@ using Json = nlohmann::ordered_json;
 struct Console {
   bool json = false, quiet = false, verbose = false;
 
-  /// Errors and failures, on stderr, always.
+  /// Prints errors and failures on stderr, always.
   void fail(const std::string& text) const;
-  /// Warnings and remarks, on stderr; not when quiet.
+  /// Prints warnings and remarks on stderr, unless quiet.
   void note(const std::string& text) const;
-  /// Details, on stderr; only when verbose.
+  /// Prints details on stderr, only when verbose.
   void detail(const std::string& text) const;
-  /// What was asked for, on stdout, or on stderr when that belongs to the JSON object; not when
-  /// quiet.
+  /// Prints the result for people, unless quiet: on stdout, or on stderr when stdout belongs to the
+  /// JSON object.
   void print(const std::string& text) const;
-  /// The one JSON object, on stdout, when asked for.
+  /// Prints the one JSON object on stdout, if --json was given.
   void result(const Json& object) const;
 };
 

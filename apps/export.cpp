@@ -46,7 +46,7 @@ Command add_export(CLI::App& program) {
   add_text(app, "DIR", o.input, "", "Folder of shards, or one file of a data set").required();
   add_text(app, "--csv", o.output, "F.csv", "Table to write").required();
   add_whole_number<std::int64_t>(app, "--episode", o.what.episode, 0, 1'000'000'000,
-                                 "That episode alone");
+                                 "Write only this episode");
   add_flag(app, "--overwrite", o.what.overwrite, "Replace the output if it exists");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return export_table(*options, *console); }};

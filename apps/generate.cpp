@@ -40,13 +40,13 @@ EpisodeOptions episode_options(const GenerateOptions& options, const Model& mode
   run.seed = options.seed.value_or(0);
   run.precision = precision_named(options.precision);
   run.threads = options.threads.value_or(available_threads());
-  // One more than can be simulated: a thread need not wait for the one that writes.
+  // One more than can be simulated, so no thread waits for the one that writes.
   run.blocks_in_flight = run.threads + 1;
   static_cast<void>(action_rows(run));
   return run;
 }
 
-/// A table by what it says, not by its name: a path may lead elsewhere on the next machine.
+/// Names a table by its content, because a path may lead elsewhere on another machine.
 std::string controls_named(const std::string& path) {
   if (path.empty()) return "of the scene";
   std::ifstream file(path, std::ios::binary);
@@ -69,7 +69,7 @@ std::vector<std::string> words_of(const std::string& list) {
   return words;
 }
 
-/// What makes the same data set again, wherever and on however many threads.
+/// The command that makes the same data set again, in any folder and on any number of threads.
 std::string command_of(const GenerateOptions& options, const EpisodeOptions& run,
                        const std::string& policy) {
   std::string command = fmt::format("tangere generate {} --episodes {} --seed {} --precision {}",
@@ -238,13 +238,13 @@ int stopped(const GenerateOptions& options, const Console& console, int signal,
       {{"shards", output.shards()}});
 }
 
-/// Says before anything is made what cannot be done: tapes that are too small.
+/// Throws before anything is made if the tapes are too small.
 GradientPlan checked(GradientPlan plan) {
   if (plan.make) static_cast<void>(plan.make());
   return plan;
 }
 
-/// Runs with what adds derivatives in between, if any are asked for.
+/// Runs the job, and adds derivatives in between if they were requested.
 template <class Run>
 auto with_gradients(const GradientPlan& plan, EpisodeSink& sink, const Run& run) {
   if (plan.arrays.empty()) return run(sink);
@@ -252,7 +252,7 @@ auto with_gradients(const GradientPlan& plan, EpisodeSink& sink, const Run& run)
   return run(adding);
 }
 
-/// Makes what is missing.
+/// Makes the missing shards.
 int make(const GenerateOptions& options, const Console& console, const Job& job) {
   if (options.dry_run) return dry_run(options, console, job);
   // Before the folder is made and until it is gone or complete: nothing half-written stays.
@@ -390,43 +390,48 @@ Command add_generate(CLI::App& program) {
   add_whole_number<std::int64_t>(app, "--episodes", o.episodes, 1, kMostEpisodes,
                                  "Episodes to simulate")
       .required();
+  add_text(app, "--controls", o.controls, "U.csv",
+           "Table of controls, one row per step, in place of the scene's <control>; for a task, of "
+           "actions");
   add_text(
-      app, "--controls", o.controls, "U.csv",
-      "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
-  add_text(app, "--policy", o.policy, "NAME",
-           "Of a task: random, hold, csv (with --controls) or scripted [default: scripted]");
+      app, "--policy", o.policy, "NAME",
+      "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
   add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
                                  "Steps of an episode [default: as many as the controls last]");
-  add_whole_number<int>(app, "--every", o.every, 1, kMostInterval,
-                        "A row every N-th step, its action held [default: the sensors', or 1]");
+  add_whole_number<int>(
+      app, "--every", o.every, 1, kMostInterval,
+      "Store a row every N steps and hold its action [default: the sensors', or 1]");
   add_whole_number<int>(app, "--threads", o.threads, 1, kMostThreads,
                         "Threads to run on [default: one per core]");
   add_text(app, "--precision", o.precision, "NAME",
-           "Of tactile fields: double, or mixed, stored as float32 [default: mixed]");
+           "Precision of tactile fields: double, or mixed, which stores float32 [default: mixed]");
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between episodes [default: 0]");
-  add_text(app, "--compress", o.compress, "NAME",
-           "Of tactile fields on disk: none, deflate or lz4, which needs a plug-in to read "
-           "[default: none]");
+  add_text(
+      app, "--compress", o.compress, "NAME",
+      "Compression of large observations: none, deflate, or lz4, which needs a plug-in to read "
+      "[default: none]");
   add_text(app, "--tactile", o.tactile, "KIND",
-           "Of large fields on disk: dense, or sparse: tiles of zeros left out [default: dense]");
+           "Storage of large fields: dense, or sparse, which leaves out tiles of zeros [default: "
+           "dense]");
   add_text(app, "--record", o.record, "LIST",
            "Observations to store, separated by commas [default: all]");
   add_text(app, "--gradients", o.gradients, "KIND",
-           "Derivatives as well: none, return (of a scene: with --loss), or jacobians, row by row "
+           "Derivatives to store: none, return (for a scene with --loss), or jacobians of each row "
            "[default: none]");
   add_text(app, "--loss", o.loss, "NAME",
-           "Of a scene, with --gradients return: final, path, tactile, shear or variables");
+           "Loss of a scene, with --gradients return: final, path, tactile, shear or variables");
   add_memory_size(
       app, "--tape-memory", o.tape_memory,
-      "With --gradients return: states kept for them by all threads [default: 1GB each]");
-  add_whole_number<std::int64_t>(app, "--shards", o.shards, 1, kMostEpisodes,
-                                 "Files to cut the data set into [default: below a gigabyte each]");
+      "With --gradients return: memory for the states that all threads keep [default: 1GB each]");
+  add_whole_number<std::int64_t>(
+      app, "--shards", o.shards, 1, kMostEpisodes,
+      "Number of shards [default: as many as keep each below a gigabyte]");
   add_text(app, "--shard", o.shard, "k/S",
-           "Make shard k of S alone, k from 0; others may run beside it");
+           "Make only shard k of S, k from 0; other processes may make others");
   add_flag(app, "--resume", o.resume,
-           "Keep the shards in the folder, of the same settings, and make the rest");
-  add_flag(app, "--no-merge", o.no_merge, "Shards alone: do not merge them when all are there");
+           "Keep the shards in the folder if their settings are the same, and make the rest");
+  add_flag(app, "--no-merge", o.no_merge, "Do not merge the shards when all are there");
   add_flag(app, "--dry-run", o.dry_run, "Say what would be made, and how long it may take");
   add_flag(app, "--overwrite", o.overwrite, "Replace the shards in the folder");
   add_flag(app, "--allow-unknown", o.allow_unknown,

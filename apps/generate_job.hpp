@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A data set that was asked for, checked and ready to be made: what scenes and tasks do differently
-// is behind one call.
+// A data set that was requested, checked and is ready to be made. One call hides what scenes and
+// tasks do differently.
 #pragma once
 
 #include <functional>
@@ -50,26 +50,26 @@ struct Job {
       simulate;
 };
 
-/// What --gradients and its companions ask for, of a scene or a task. Throws InputError for what
-/// does not go together.
+/// What --gradients and its companions ask for. Throws InputError for options that do not go
+/// together.
 GradientKind gradients_wanted(const GenerateOptions& options, bool of_task);
-/// Of one thread's tapes.
+/// Memory for the tapes of one thread [bytes].
 double tape_bytes(const GenerateOptions& options, int threads);
 
-/// Shards that this process is to make, and what becomes of those that are there. Says so where it
+/// Which shards this process makes, and what happens to existing ones. Prints a note if the process
 /// is not alone.
 DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& layout,
                          const Console& console);
 
-/// What a complete data set is shown as: paths for the JSON object, null where it is not complete
-/// or not wanted; and why not, where all shards seem to be there.
+/// The merged files of a complete data set: paths for the JSON object, null if the set is not
+/// complete or merging is not wanted, and the reason if all shards seem to exist.
 struct Merged {
   Json keys{{"merged", nullptr}, {"minari_id", nullptr}, {"not_merged", nullptr}};
   std::string line;
 };
 Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output);
 
-/// Says what would be made, and how long that may take: some episodes are simulated for it. Writes
+/// Prints what would be made and how long it may take. Simulates some episodes for this, and writes
 /// nothing.
 int dry_run(const GenerateOptions& options, const Console& console, const Job& job);
 

@@ -33,13 +33,13 @@ struct Options {
   bool allow_unknown = false;
 };
 
-/// As given; tactile where there is a sensor, else the final state.
+/// The loss as given; by default tactile if there is a sensor, else the final state.
 LossKind loss_of(const std::string& name, const Model& model) {
   if (!name.empty()) return loss_named(name);
   return model.sensors().empty() ? LossKind::final_state : LossKind::tactile;
 }
 
-/// A run of the scene's own length, or of a hundred steps where that is longer or has no end.
+/// As many steps as the scene's own run, but a hundred if that is longer or has no end.
 std::int64_t steps_of(const Options& o, const ControlProgram& controls) {
   if (o.steps) {
     controls.check_covers(*o.steps);
@@ -49,7 +49,7 @@ std::int64_t steps_of(const Options& o, const ControlProgram& controls) {
   return own < 0 ? kDefaultSteps : std::min(own, kDefaultSteps);
 }
 
-/// A check that compares nothing shows nothing.
+/// A check that compares nothing has failed.
 ExitCode exit_code(const GradientCheck& check) {
   return check.entries() == 0 ? kSomeFailed : kDone;
 }
@@ -61,13 +61,13 @@ std::string nothing_compared(const GradientCheck& check, const char* what,
                                      [](const CheckedInput& c) { return !c.influence; });
   std::string why;
   if (check.kinks() == 0)
-    why = fmt::format("no input acts on the {} here, its gradient is zero", what);
+    why = fmt::format("no input acts on the {}; its gradient is zero", what);
   else if (without == 0)
-    why = fmt::format("all {} derivatives looked at lie at kinks of the {}", check.kinks(), what);
+    why = fmt::format("all {} derivatives that were compared lie at kinks of the {}", check.kinks(),
+                      what);
   else
-    why =
-        fmt::format("{} derivatives lie at kinks of the {}, and other inputs do not act on it here",
-                    check.kinks(), what);
+    why = fmt::format("{} derivatives lie at kinks of the {}; the other inputs do not act on it",
+                      check.kinks(), what);
   return fmt::format("nothing could be compared with differences: {}; try {}", why, try_instead);
 }
 
@@ -83,7 +83,7 @@ void print(const Console& console, const GradientCheck& check, const char* what,
                               c.tangent_error, c.worst));
   for (const CheckedInput& c : check.inputs)
     if (!c.influence)
-      console.note(fmt::format("{} do not act on this loss here: nothing to compare", c.name));
+      console.note(fmt::format("{} do not act on this loss; nothing is compared", c.name));
   if (check.entries() == 0) {
     console.fail(nothing_compared(check, what, try_instead));
     return;
@@ -214,10 +214,12 @@ Command add_gradcheck(CLI::App& program) {
   CLI::App& app = add_command(
       program, "gradcheck", "Check gradients of a scene or a task against differences and tangents",
       "tangere gradcheck scenes/rolling_ball_small.xml --loss shear --steps 100");
-  add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task: then of its return")
+  add_text(app, "SCENE", o.scene, "",
+           "Scene file (XML), or the name of a task, whose return is then the loss")
       .required();
   add_text(app, "--loss", o.loss, "NAME",
-           "final: last state; path: speeds; tactile, shear: fields; variables: end effectors "
+           "Loss of a scene: final (last state), path (speeds), tactile or shear (fields), "
+           "variables (end effectors) "
            "[default: tactile, or final "
            "where there is no sensor]");
   add_whole_number<std::int64_t>(
@@ -225,17 +227,18 @@ Command add_gradcheck(CLI::App& program) {
       "Steps of the rollout [default: as many as the controls last, 100 at most]");
   add_whole_number<std::int64_t>(
       app, "--actions", o.actions, 1, kMostSteps,
-      "Of a task: actions of the episode at most [default: as many as take a hundred steps]");
-  add_text(app, "--policy", o.policy, "NAME",
-           "Of a task: random, hold, csv (with --controls) or scripted [default: scripted]");
+      "For a task: most actions of the episode [default: as many as take 100 steps]");
+  add_text(
+      app, "--policy", o.policy, "NAME",
+      "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
   add_whole_number<int>(app, "--every", o.every, 1, std::numeric_limits<int>::max(),
-                        "Tactile fields every N-th step [default: the scene's, or 1]");
+                        "Read tactile fields every N steps [default: the scene's, or 1]");
   add_whole_number<int>(
       app, "--entries", o.entries, 0, std::numeric_limits<int>::max(),
-      "Derivatives of each input compared with differences, drawn; 0: all [default: 24]");
-  add_text(
-      app, "--controls", o.controls, "F.csv",
-      "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
+      "Derivatives of each input to compare with differences; 0: all [default: 24]");
+  add_text(app, "--controls", o.controls, "F.csv",
+           "Table of controls, one row per step, in place of the scene's <control>; for a task, of "
+           "actions");
   add_whole_number<std::uint64_t>(
       app, "--seed", o.seed, 0, std::numeric_limits<std::uint64_t>::max(),
       "Seed of the environment or episode, of the draw and of the directions [default: 0]");

@@ -169,8 +169,8 @@ int guarded(int argc, char** argv) {
   add_positive_number(app, "--noise", o.noise,
                       "Standard deviation over the fields' largest number [default: 0.01]");
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, 1000000,
-                                  "Of the noise and of the wrong start [default: 1]");
-  add_text(app, "--svg", o.svg, "FILE", "Picture of the fit to write");
+                                  "Seed of the noise and of the wrong start [default: 1]");
+  add_text(app, "--svg", o.svg, "FILE", "Write a picture of the fit");
   add_flag(app, "--overwrite", o.overwrite, "Replace the picture if it exists");
   try {
     return parser.parse(argc, argv) ? identify_ball(o) : kDone;

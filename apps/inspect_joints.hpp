@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `tangere inspect` says about joints and motors.
+// Reports joints and motors for `tangere inspect`.
 #pragma once
 
 #include <string>
@@ -9,12 +9,11 @@
 
 namespace tangere::apps {
 
-/// What acts on the dofs of every joint that has such effects; SI, limits and rest null where there
-/// are none.
+/// The effects of every joint that has some, in SI. Limits and rest are null where there are none.
 Json joint_effects_json(const Scene& scene);
 std::string joint_effects_text(const Scene& scene);
 
-/// Motors in file order; a bound of a range that is not there is null.
+/// Motors in file order. A missing bound of a range is null.
 Json motors_json(const Scene& scene);
 std::string motors_text(const Scene& scene);
 

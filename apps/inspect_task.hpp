@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `tangere inspect` says about a task.
+// Reports a task for `tangere inspect`.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace tangere::apps {
 
-/// What a task declares; a bound that is not there is null.
+/// What a task declares. A missing bound is null.
 Json task_json(const TaskSpec& spec);
 std::string task_text(const TaskSpec& spec);
 

@@ -56,9 +56,9 @@ Command add_merge(CLI::App& program) {
   CLI::App& app =
       add_command(program, "merge", "Show a folder of shards as one file, and to Minari",
                   "tangere merge balls --overwrite");
-  add_text(app, "DIR", *input, "", "Folder of shards, all of them there").required();
+  add_text(app, "DIR", *input, "", "Folder with all shards of a data set").required();
   add_flag(app, "--copy", options->copy,
-           "Copy all numbers, for a file that needs no shards beside it");
+           "Copy all numbers, so that the file needs no shards beside it");
   add_flag(app, "--overwrite", options->overwrite, "Replace what an earlier merge wrote");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return merge(*input, *options, *console); }};

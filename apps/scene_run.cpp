@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The same words for the same thing, whichever subcommand met it.
+// All subcommands use the same words for the same thing.
 #include "apps/scene_run.hpp"
 
 #include <fmt/format.h>

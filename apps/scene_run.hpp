@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every command that runs a scene does the same way: reading it, its controls, how long it
-// lasts, and telling what failed.
+// What all commands that run a scene have in common: reading it and its controls, its length, and
+// reporting what failed.
 #pragma once
 
 #include <cstdint>
@@ -21,42 +21,42 @@ namespace tangere::apps {
 constexpr int kMostEnvironments = 1'000'000'000;
 constexpr std::int64_t kMostSteps = 1'000'000'000'000;
 
-/// Throws InputError for a --precision that there is not.
+/// Throws InputError for an unknown --precision.
 Precision precision_named(const std::string& name);
 
-/// Throws InputError for a loss that there is not.
+/// Throws InputError for an unknown loss.
 LossKind loss_named(const std::string& name);
 
 /// Reads a scene; its warnings go to the console.
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console);
 
-/// The controls of the table at `path`, or the scene's own where that is empty.
+/// The controls of the table at `path`, or the scene's own if `path` is empty.
 ControlProgram make_controls(const std::string& path, std::uint64_t seed, const Model& model,
                              const Stepper& stepper, const Console& console);
 
 /// --steps, or as many as the controls last. Throws InputError when neither says.
 std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlProgram& controls);
 
-/// Remarks on sensors that are read less often than there are steps.
+/// Prints notes on sensors that are not read after every step.
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout);
 
-/// Says that a signal ended the run, when ("after 3 of 9 steps") and what is left of it; returns
-/// its exit code. `result` comes along in the JSON object.
+/// Reports that a signal ended the run, when ("after 3 of 9 steps") and what is left. Returns the
+/// exit code. The JSON object includes `result`.
 int report_stop(const Console& console, const std::string& command, int signal,
                 const std::string& when, const std::string& left, const Json& result);
 /// Where nothing is left.
 int report_stop(const Console& console, const std::string& command, int signal,
                 const std::string& when);
 
-/// What no solution was found for: an environment, an episode.
+/// An environment or episode for which no solution was found.
 struct Failure {
   std::int64_t number = 0;
   std::int64_t step = 0;
   StepStatus status = StepStatus::not_converged;
 };
 
-/// A line for each of the first failures, and how many more there are; `what`: "environment",
-/// "episode"; `where`: what names all.
+/// Prints a line for each of the first failures, and how many more there are. `what` is
+/// "environment" or "episode"; `where` says what names all of them.
 void list_failures(const Console& console, const std::string& what,
                    const std::vector<Failure>& failures, const std::string& where);
 /// All of them; `what` is the key of the number.

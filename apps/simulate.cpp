@@ -391,17 +391,18 @@ Command add_simulate(CLI::App& program) {
       "tangere simulate scenes/rolling_ball.xml --output ball.h5 --envs 4 --every 5 --seed 1");
   add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
   add_text(app, "-o,--output", o.output, "F.h5", "HDF5 file to write").required();
+  add_text(app, "--controls", o.controls, "U.csv",
+           "Table of controls, one row per step, in place of the scene's <control>; for a task, of "
+           "actions");
   add_text(
-      app, "--controls", o.controls, "U.csv",
-      "Table of controls, a row per step, instead of the scene's <control>; of a task, of actions");
-  add_text(app, "--policy", o.policy, "NAME",
-           "Of a task: random, hold, csv (with --controls) or scripted [default: scripted]");
+      app, "--policy", o.policy, "NAME",
+      "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
   add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
                                  "Steps to take [default: as many as the controls last]");
   add_whole_number<int>(app, "--envs", o.environments, 1, kMostEnvironments,
                         "Environments stepped together [default: 1, or those of --state-from]");
   add_whole_number<int>(app, "--every", o.every, 1, kMostEnvironments,
-                        "Tactile fields every N-th step [default: the scene's, or 1]");
+                        "Read tactile fields every N steps [default: the scene's, or 1]");
   add_text(app, "--state-from", o.state_from, "F.h5",
            "Start from a row of another run, environment e from its e");
   add_whole_number<std::int64_t>(app, "--row", o.row, 0, kMostSteps,
@@ -411,16 +412,17 @@ Command add_simulate(CLI::App& program) {
            fmt::format("{} [default: the scene's]", fmt::join(integrator_names(), ", ")));
   add_positive_number(app, "--tol", o.tolerance,
                       "Largest scaled residual of a step [default: the scene's]");
-  add_text(app, "--gradients", o.gradients, "LOSS",
-           "Derivatives of a loss by controls, start and the scene's numbers as well: final, path, "
-           "tactile, shear or variables");
+  add_text(
+      app, "--gradients", o.gradients, "LOSS",
+      "Also write derivatives of a loss by controls, start and the scene's numbers: final, path, "
+      "tactile, shear or variables");
   add_flag(app, "--point-gradients", o.point_gradients,
-           "With --gradients: by place and coefficients of every tactile point, too");
+           "With --gradients: also by place and coefficients of every tactile point");
   add_memory_size(app, "--tape-memory", o.tape_memory,
-                  "With --gradients: states kept for them; a longer run is taken again from "
+                  "With --gradients: memory for the states kept; a longer run repeats steps from "
                   "checkpoints [default: 1GB]");
   add_text(app, "--precision", o.precision, "NAME",
-           "Of tactile fields: double, or mixed, points in float [default: double]");
+           "Precision of tactile fields: double, or mixed with points in float [default: double]");
   add_whole_number<std::uint64_t>(
       app, "--seed", o.seed, 0, UINT64_MAX,
       "Seed of all that varies between environments [default: 0, or that of --state-from]");

@@ -204,7 +204,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"threads_junk", {"--threads", "1,2x"}, 2, "'2x'; expected whole numbers"},
         Refusal{"threads_empty", {"--threads", "1,,2"}, 2, "''; expected whole numbers"},
         Refusal{"threads_end", {"--threads", "1,"}, 2, "''; expected whole numbers"},
-        Refusal{"threads_twice", {"--threads", "2,1,2"}, 2, "2 stands there twice"},
+        Refusal{"threads_twice", {"--threads", "2,1,2"}, 2, "2 is given twice"},
         Refusal{"frames",
                 {"--frames", "foo"},
                 2,

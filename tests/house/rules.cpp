@@ -353,8 +353,7 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"tasks/catalogue/insertion.cpp", "a task: task_list.cpp"},
       {"tasks/catalogue/stable_grasp.cpp", "a task: task_list.cpp"},
       {"tasks/gradients/loss_check.cpp", "a part of gradient_check.hpp"},
-      {"tasks/gradients/return_check.cpp", "a part of gradient_check.hpp"},
-      {"tasks/run/task_benchmark.cpp", "a part of task_episodes.hpp"}};
+      {"tasks/gradients/return_check.cpp", "a part of gradient_check.hpp"}};
   std::vector<Violation> found;
   for (const auto& [path, text] : tree) {
     if (!is_tested_source(path) || shared.contains(path)) continue;
