@@ -26,12 +26,6 @@ Scene scene_named(const std::string& name) {
   return scene;
 }
 
-LinkDescription& link_of(Scene& scene, const std::string& name) {
-  for (LinkDescription& l : scene.links)
-    if (l.body.name == name || l.joint.name == name) return l;
-  throw std::runtime_error("no link " + name);
-}
-
 RandomizationDescription varying(const SceneNumber& number, double low, double high) {
   RandomizationDescription d;
   d.number = number;
