@@ -133,7 +133,7 @@ TEST(SceneNumbers, HaveOneNameAndUnitFromTheSceneToTheFile) {
     }
     const Model model(scene);
     Batch batch(model, 3, 7);
-    const int block_row = model.compiled().randomized_row[0];
+    const int block_row = compiled(model).randomized_row[0];
     const bool of_quaternion = number.field == NumberField::q && std::string(row.unit) == "1";
     if (!of_quaternion)  // made of length 1 after the draw
       EXPECT_EQ(batch.block(0)[block_row * kernels::kBlock + 1], batch.randomized_value(1, 0));
