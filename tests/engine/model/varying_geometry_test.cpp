@@ -169,22 +169,22 @@ std::vector<Case> cases() {
   };
   return {{"cap_opening", cap, 160},
           {"rolling_ball_small", ball, 160},
-          {"sphere", on(SphereShape{0.03}, {varying(size("", 0), 0.028, 0.032)}), 60},
+          {"sphere", on(SphereShape{0.03}, {varying(size("anvil", 0), 0.028, 0.032)}), 60},
           {"cuboid",
            on(CuboidShape{{0.06, 0.05, 0.06}, {}},
-              {varying(size("", 2), 0.055, 0.06), varying(size("", 4), 0.05, 0.06)}),
+              {varying(size("anvil", 2), 0.055, 0.06), varying(size("anvil", 4), 0.05, 0.06)}),
            60},
           {"cylinder",
            on(CylinderShape{0.06, 0.03, 8, 3},
-              {varying(size("", 0), 0.028, 0.032), varying(size("", 1), 0.05, 0.06)}),
+              {varying(size("anvil", 0), 0.028, 0.032), varying(size("anvil", 1), 0.05, 0.06)}),
            60},
           {"capsule",
            on(CapsuleShape{0.03, 0.03, 5, 4},
-              {varying(size("", 0), 0.028, 0.032), varying(size("", 1), 0.02, 0.03)}),
+              {varying(size("anvil", 0), 0.028, 0.032), varying(size("anvil", 1), 0.02, 0.03)}),
            60},
           {"ellipsoid",
            on(EllipsoidShape{{0.06, 0.05, 0.06}, 40},
-              {varying(size("", 2), 0.055, 0.07), varying(size("", 4), 0.055, 0.06)}),
+              {varying(size("anvil", 2), 0.055, 0.07), varying(size("anvil", 4), 0.055, 0.06)}),
            60}};
 }
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/model/compiled_model.hpp"
@@ -135,8 +136,9 @@ TEST(SceneNumbers, HaveOneNameAndUnitFromTheSceneToTheFile) {
     Batch batch(model, 3, 7);
     const int block_row = compiled(model).randomized_row[0];
     const bool of_quaternion = number.field == NumberField::q && std::string(row.unit) == "1";
-    if (!of_quaternion)  // made of length 1 after the draw
+    if (!of_quaternion) {  // made of length 1 after the draw
       EXPECT_EQ(batch.block(0)[block_row * kernels::kBlock + 1], batch.randomized_value(1, 0));
+    }
     EXPECT_EQ(batch.is_parameter(0), !is_of_start(number));
     if (batch.is_parameter(0)) {
       batch.set_randomized_value(1, 0, 0.2);
