@@ -84,6 +84,7 @@ struct Case {
   const char* name;
   Scene (*scene)();
   double duration;
+  int few;  ///< steps that order 3 shows at: its errors come to the reference's own soon
 };
 
 class Convergence : public ::testing::TestWithParam<Case> {};
@@ -95,7 +96,7 @@ TEST_P(Convergence, SchemesHaveTheirOrder) {
   const struct {
     double slack;
     int steps;
-  } kByOrder[] = {{0.1, 400}, {0.15, 400}, {0.25, 400}};
+  } kByOrder[] = {{0.1, 400}, {0.15, 400}, {0.25, c.few}};
   for (const Integrator integrator : testing::all_integrators()) {
     const int order = integrator.scheme().order;
     const auto& s = kByOrder[order - 1];
@@ -111,10 +112,10 @@ TEST_P(Convergence, SchemesHaveTheirOrder) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Convergence,
-                         ::testing::Values(Case{"tumbling", tumbling, 0.4},
-                                           Case{"chain", chain, 0.4},
-                                           Case{"ball_chain", ball_chain, 0.4},
-                                           Case{"resting", resting, 0.1}),
+                         ::testing::Values(Case{"tumbling", tumbling, 0.4, 100},
+                                           Case{"chain", chain, 0.4, 100},
+                                           Case{"ball_chain", ball_chain, 0.4, 100},
+                                           Case{"resting", resting, 0.1, 400}),
                          [](const auto& param) { return std::string(param.param.name); });
 
 TEST(Convergence, ASplitInsideBdf2KeepsOrderTwo) {
