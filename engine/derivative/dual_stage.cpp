@@ -5,9 +5,9 @@
 
 #include <algorithm>
 
-#include "kernels/reverse/parameter_adjoint-inl.hpp"
-#include "kernels/step/jacobian-inl.hpp"
-#include "kernels/step/link_poses-inl.hpp"
+#include "kernels/reverse/parameter_adjoint.hpp"
+#include "kernels/step/jacobian.hpp"
+#include "kernels/step/link_poses.hpp"
 
 namespace tangere {
 

@@ -36,7 +36,7 @@ struct CompiledJoint {
 };
 
 /// Motor on one dof. Force motors: force = low + (clip(u) + 1)/2 (high - low). Position motors
-/// evaluated at the end of the step are effects of their joint (kernels/step/joint_effects-inl.hpp),
+/// evaluated at the end of the step are effects of their joint (kernels/step/joint_effects.hpp),
 /// which u is the target of.
 struct CompiledMotor {
   int dof;

@@ -4,7 +4,7 @@
 //
 // Accepted when a trial x - αΔ passes the natural test ‖D^½ A⁻¹ g(x - αΔ)‖ ≤ (1 - α/4) ‖D^½ Δ‖ with
 // the factor at hand (D = diag M at the first point), when its scaled residual r
-// (kernels/step/norms-inl.hpp) is at most (1 - α/4) of the last point's, or when r is at most the
+// (kernels/step/norms.hpp) is at most (1 - α/4) of the last point's, or when r is at most the
 // tolerance. One test alone stalls at first touches: the natural test where a factor from before
 // the touch says nothing of the forces after it, the residual where a long way must first be gone
 // uphill. The rounding floor in r comes from the last point that a direction was computed at.

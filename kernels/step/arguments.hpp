@@ -75,7 +75,7 @@ inline int parameter_numbers(const ModelView& m) {
 }
 
 /// Cotangents on their way back through a solved stage; every array is (nv), positions by their
-/// right tangent (kernels/reverse/adjoint-inl.hpp).
+/// right tangent (kernels/reverse/adjoint.hpp).
 template <int L>
 struct StageAdjoint {
   const Row<L>*q_bar, *v_bar;  ///< of the stage's result

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/model/compiled_model.hpp"
-#include "kernels/step/jacobian-inl.hpp"
+#include "kernels/step/jacobian.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
 namespace tangere::testing {

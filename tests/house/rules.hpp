@@ -32,7 +32,7 @@ Tree read_tree(const std::filesystem::path& root);
 /// that own them.
 std::vector<Violation> check_includes(const Tree& tree);
 
-/// What is compiled once per instruction set (kernels/*-inl.hpp and all it includes) uses no type
+/// What is compiled once per instruction set (kernels/table/*_part.hpp and all it includes) uses no type
 /// whose functions the linker might merge across instruction sets: containers, strings, streams,
 /// functions.
 std::vector<Violation> check_kernel_includes(const Tree& tree);

@@ -93,7 +93,8 @@ TEST(HouseRules, SeeAFolderNobodyTold) {
 }
 
 TEST(HouseRules, SeeAContainerBehindAKernel) {
-  const Tree tree{{"kernels/step/lu-inl.hpp", "#include \"kernels/view.hpp\"\n#include <cmath>\n"},
+  const Tree tree{{"kernels/table/step_part.hpp", "#include \"kernels/step/lu.hpp\"\n"},
+                  {"kernels/step/lu.hpp", "#include \"kernels/view.hpp\"\n#include <cmath>\n"},
                   {"kernels/view.hpp", "#include <vector>\n"},
                   {"kernels/table.cpp", "#include <string>\n"}};
   EXPECT_THAT(check_kernel_includes(tree), ElementsAre(Says("kernels/view.hpp", 1, "<vector>")));

@@ -7,7 +7,7 @@
 //   q̄_i = Sᵀ δ̄ + Ψ̇ᵀ V̄ = Sᵀ (δ̄ - V_p ×* V̄);   v̄_i = Sᵀ V̄
 #pragma once
 
-#include "kernels/step/link_poses-inl.hpp"
+#include "kernels/step/link_poses.hpp"
 
 namespace tangere::kernels {
 

@@ -6,7 +6,7 @@
 // w₁ × S. Dofs that move both bodies alike have ε = 0 and only appear as rows.
 #pragma once
 
-#include "kernels/step/inertial_jacobian-inl.hpp"
+#include "kernels/step/inertial_jacobian.hpp"
 
 namespace tangere::kernels {
 

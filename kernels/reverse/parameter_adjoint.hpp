@@ -11,7 +11,7 @@
 // and Σ ξ̄·∂ξ/∂size.
 #pragma once
 
-#include "kernels/reverse/adjoint-inl.hpp"
+#include "kernels/reverse/adjoint.hpp"
 #include "kernels/reverse/point_pullback.hpp"
 
 namespace tangere::kernels {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // How a tactile field changes with the motion of the shapes on it, eight points at a time, in
 // double (the δ's of kernels/contact/pair_contact.hpp). What reverse mode is in
-// kernels/reverse/tactile_pullback-inl.hpp, forward.
+// kernels/reverse/tactile_pullback.hpp, forward.
 #pragma once
 
-#include "kernels/reverse/tactile_pullback-inl.hpp"
+#include "kernels/reverse/tactile_pullback.hpp"
 
 namespace tangere::kernels {
 

@@ -6,7 +6,7 @@
 // either way.
 #pragma once
 
-#include "kernels/tactile/tactile-inl.hpp"
+#include "kernels/tactile/tactile.hpp"
 
 namespace tangere::kernels {
 

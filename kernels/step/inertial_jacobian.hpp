@@ -16,7 +16,7 @@
 // and summed.
 #pragma once
 
-#include "kernels/step/residual-inl.hpp"
+#include "kernels/step/residual.hpp"
 
 namespace tangere::kernels {
 

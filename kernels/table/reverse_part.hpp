@@ -2,12 +2,12 @@
 // The functions in reverse of an instruction set's table: of stages and of readings.
 #pragma once
 
-#include "kernels/reverse/motion_pullback-inl.hpp"
-#include "kernels/reverse/parameter_adjoint-inl.hpp"
-#include "kernels/reverse/tactile_pullback-inl.hpp"
-#include "kernels/reverse/tactile_tangent-inl.hpp"
+#include "kernels/reverse/motion_pullback.hpp"
+#include "kernels/reverse/parameter_adjoint.hpp"
+#include "kernels/reverse/tactile_pullback.hpp"
+#include "kernels/reverse/tactile_tangent.hpp"
 #include "kernels/table/parts.hpp"
-#include "kernels/table/stage_view-inl.hpp"
+#include "kernels/table/stage_view.hpp"
 
 namespace tangere::kernels {
 

@@ -2,13 +2,13 @@
 // The forward functions of an instruction set's table: kernels that a stage's numbers are put to.
 #pragma once
 
-#include "kernels/step/detection-inl.hpp"
-#include "kernels/step/jacobian-inl.hpp"
-#include "kernels/step/link_poses-inl.hpp"
-#include "kernels/step/lu-inl.hpp"
-#include "kernels/step/norms-inl.hpp"
+#include "kernels/step/detection.hpp"
+#include "kernels/step/jacobian.hpp"
+#include "kernels/step/link_poses.hpp"
+#include "kernels/step/lu.hpp"
+#include "kernels/step/norms.hpp"
 #include "kernels/table/parts.hpp"
-#include "kernels/table/stage_view-inl.hpp"
+#include "kernels/table/stage_view.hpp"
 
 namespace tangere::kernels {
 

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "kernels/table/parts.hpp"
-#include "kernels/tactile/tactile_block-inl.hpp"
+#include "kernels/tactile/tactile_block.hpp"
 
 namespace tangere::kernels {
 

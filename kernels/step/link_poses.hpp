@@ -3,7 +3,7 @@
 #pragma once
 
 #include "kernels/step/arguments.hpp"
-#include "kernels/step/residual-inl.hpp"
+#include "kernels/step/residual.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 
 namespace tangere::kernels {

@@ -15,7 +15,7 @@
 #pragma once
 
 #include "kernels/step/arguments.hpp"
-#include "kernels/step/inertial_jacobian-inl.hpp"
+#include "kernels/step/inertial_jacobian.hpp"
 
 namespace tangere::kernels {
 
