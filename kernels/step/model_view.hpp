@@ -78,7 +78,8 @@ struct PairContact {
   Frame<double> frame2;  ///< shape frame in link2 (or the world)
   PrimitiveShape shape;
   Vec3<double>
-      size;  ///< sphere: radius in x; cuboid: half edges; rods: radius, half length of the axis
+      size;  ///< sphere: radius in x; cuboid: half edges; rods: radius, half length of the axis;
+             ///< ellipsoid: semi-axes
   ContactLaw law;
   double ramp;
   ContactParameters parameters;
