@@ -78,8 +78,7 @@ struct PairContact {
   Frame<double> frame2;  ///< shape frame in link2 (or the world)
   PrimitiveShape shape;
   Vec3<double>
-      size;  ///< sphere: radius in x; cuboid: half edges; rods: radius, half length of the axis;
-             ///< ellipsoid: semi-axes
+      size;  ///< sphere: radius in x; cuboid: half edges; rods: radius, half axis; ellipsoid: axes/2
   ContactLaw law;
   double ramp;
   ContactParameters parameters;
