@@ -81,8 +81,6 @@ int dof_count(JointType type) {
   }
 }
 
-}
-
 bool dof_turns(JointType type, int k) {
   switch (type) {
     case JointType::revolute:

@@ -155,14 +155,16 @@ SceneNumber size_of_body(const std::string& body, int which) {
 }
 
 std::string owner_of(const SceneNumber& n) {
-  return std::string(owner_name(n.owner)) + " " + n.name +
-         (n.owner == Owner::contact ? " " + n.second_name : "");
+  std::string text = std::string(owner_name(n.owner)) + ' ' + n.name;
+  if (n.owner == Owner::contact) text.append(1, ' ').append(n.second_name);
+  return text;
 }
 
 std::string name_of(const SceneNumber& n) {
   const NumberKind& kind = number_kind(n.owner, n.field);
-  return owner_of(n) + " " + kind.name +
-         (kind.indexed ? "[" + std::to_string(n.component) + "]" : "");
+  std::string text = owner_of(n) + ' ' + kind.name;
+  if (kind.indexed) text.append(1, '[').append(std::to_string(n.component)).append(1, ']');
+  return text;
 }
 
 std::string unit_of(const Scene& scene, const SceneNumber& n) {
