@@ -71,11 +71,12 @@ set(public_headers
   tasks/gradients/identification.hpp
   tasks/gradients/losses.hpp
   tasks/run/benchmark_run.hpp
+  tasks/run/block_worker.hpp
+  tasks/run/episode_program.hpp
   tasks/run/episodes.hpp
   tasks/run/policy.hpp
   tasks/run/rollout.hpp
-  tasks/run/task_episodes.hpp
-  tasks/run/task_pilot.hpp
+  tasks/run/step_tally.hpp
   tasks/run/vector_task.hpp)
 foreach(header ${public_headers})
   cmake_path(GET header PARENT_PATH folder)
