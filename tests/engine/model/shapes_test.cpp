@@ -105,7 +105,7 @@ TEST(Shapes, MassesFollowSizes) {
   for (const Shape& shape : {Shape(SphereShape{0.07}), Shape(CuboidShape{{0.3, 0.2, 0.1}}),
                              Shape(CylinderShape{0.3, 0.07}), Shape(CapsuleShape{0.3, 0.07}),
                              Shape(EllipsoidShape{{0.3, 0.2, 0.1}})})
-    for (int which = 0; which < kSizeNames; ++which) {
+    for (int which = 0; which < kSizeIndices; ++which) {
       Shape more = shape, less = shape;
       if (size_number(more, which) == nullptr) continue;
       *size_number(more, which) += 1e-6, *size_number(less, which) -= 1e-6;

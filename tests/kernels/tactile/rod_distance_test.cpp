@@ -138,11 +138,11 @@ TEST_P(RodDistance, GradientAndHessianMatchDualNumbersAndDifferences) {
     const Vec3<double> n = {at.n.x.value, at.n.y.value, at.n.z.value};
     const Vec3<double> turn = {at.n.x.epsilon, at.n.y.epsilon, at.n.z.epsilon};
     EXPECT_NEAR(at.d.epsilon, dot(n, e), 1e-14);
-    const auto hessian = with_distance<double>(GetParam(), kSize, [&]<class S>(const S& s) {
-      if constexpr (S::kBending == Bending::ball || std::is_same_v<S, CuboidDistance<double>>) {
-        return zero33<double>();
-      } else {
+    const auto hessian = with_distance<double>(GetParam(), kSize, [&](const auto& s) {
+      if constexpr (requires { s.hessian(y); }) {
         return s.hessian(y);
+      } else {  // none of the shapes of this test
+        return zero33<double>();
       }
     });
     const double scale = 1 + length(hessian * e);
