@@ -106,7 +106,8 @@ void Parser::check_words() const {
 
 CLI::App& add_command(CLI::App& program, const std::string& name, const std::string& description,
                       const std::string& example) {
-  // What the parser cannot place is reported by us, with the nearest name; subcommands inherit that.
+  // What the parser cannot place is reported by us, with the nearest name; subcommands inherit
+  // that.
   program.require_subcommand(0, 1);
   program.allow_extras();
   CLI::App* command = program.add_subcommand(name, description);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The command line: options as numbers, and what to say about words that are no option. The parser's
-// library is slow to compile, so its headers stay behind this one (arguments.cpp).
+// The command line: options as numbers, and what to say about words that are no option. The
+// parser's library is slow to compile, so its headers stay behind this one (arguments.cpp).
 #pragma once
 
 #include <cstdint>

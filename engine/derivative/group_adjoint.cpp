@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The stages of a scheme backwards (engine/model/scheme.hpp). Lanes outside the mask compute with what
-// stands there and change nothing.
+// The stages of a scheme backwards (engine/model/scheme.hpp). Lanes outside the mask compute with
+// what stands there and change nothing.
 #include "engine/derivative/group_adjoint.hpp"
 
 #include <algorithm>

@@ -12,8 +12,9 @@
 namespace tangere {
 
 /// Owns the scratch of one thread; allocates when made, and for more tiles at once than ever
-/// before. For each state: place(), then for each loss clear(), any number of fields and end effectors,
-/// and finish(). Fields are computed anew in double; nothing is kept of how they were read.
+/// before. For each state: place(), then for each loss clear(), any number of fields and end
+/// effectors, and finish(). Fields are computed anew in double; nothing is kept of how they were
+/// read.
 class ReadoutPullback {
  public:
   explicit ReadoutPullback(const Model& model);

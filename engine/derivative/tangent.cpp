@@ -194,8 +194,8 @@ struct Tangent::Impl {
     }
   }
 
-  /// One solve of `scheme` from `at`; `before`: the state one step earlier. q1: its result, x_inner:
-  /// its inner stages, `stride` apart.
+  /// One solve of `scheme` from `at`; `before`: the state one step earlier. q1: its result,
+  /// x_inner: its inner stages, `stride` apart.
   DualState solve_step(const Scheme& scheme, double h, const DualState& at, const DualState& before,
                        const double* q1, const double* x_inner, int stride) {
     stage.centre = at.q;

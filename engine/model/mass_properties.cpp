@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mass and inertia of a body on its link, and of meshes by volume integrals; other shapes have closed
-// forms in shapes.cpp.
+// Mass and inertia of a body on its link, and of meshes by volume integrals; other shapes have
+// closed forms in shapes.cpp.
 #include "engine/model/compiled_model.hpp"
 
 namespace tangere {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Symbolic analysis of the Jacobian, once per scene: which entries exist, in which order to eliminate,
-// what fills in.
+// Symbolic analysis of the Jacobian, once per scene: which entries exist, in which order to
+// eliminate, what fills in.
 #pragma once
 
 #include <utility>

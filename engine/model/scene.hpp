@@ -86,8 +86,8 @@ struct CapsuleShape {
   int contact_rings = 5;
   int contact_angles = 4;  ///< points on a ring
 };
-/// Semi-axes are half its size, which at most differ by a factor of 100. Contact points: evenly spread
-/// on a ball along a spiral from pole to pole, stretched with it.
+/// Semi-axes are half its size, which at most differ by a factor of 100. Contact points: evenly
+/// spread on a ball along a spiral from pole to pole, stretched with it.
 struct EllipsoidShape {
   Vector3 size{0, 0, 0};  ///< full lengths along the body's axes [m]
   int contact_count = 100;
@@ -276,8 +276,8 @@ const char* to_string(ContactLaw value);
 /// "sphere", "cuboid" …
 const char* shape_name(const Shape& shape);
 
-/// The numbers of a size: 0 radius, 1 length, 2 … 4 lengths along the axes [m]. nullptr where a shape
-/// has no such number.
+/// The numbers of a size: 0 radius, 1 length, 2 … 4 lengths along the axes [m]. nullptr where a
+/// shape has no such number.
 double* size_number(Shape& shape, int which);
 inline constexpr int kSizeIndices = 5;
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The table of schemes.
 //
-// Runge-Kutta: X_i = h Σ a_ij ẋ_j, V_i = v₀ + h Σ a_ij v̇_j. With η a_jk = a_ik for the rows before,
-// ẋ_i = (X_i - Σ η_j X_j)/(a_ii h) and v̇_i = (V_i - v₀ - Σ η_j (V_j - v₀))/(a_ii h).
+// Runge-Kutta: X_i = h Σ a_ij ẋ_j, V_i = v₀ + h Σ a_ij v̇_j. With η a_jk = a_ik for the rows
+// before, ẋ_i = (X_i - Σ η_j X_j)/(a_ii h) and v̇_i = (V_i - v₀ - Σ η_j (V_j - v₀))/(a_ii h).
 #include "engine/model/scheme.hpp"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Time-stepping schemes as values. A scheme is a row of numbers that the step, the tape, the adjoint
-// and the tangent read; none of them knows a scheme by name.
+// Time-stepping schemes as values. A scheme is a row of numbers that the step, the tape, the
+// adjoint and the tangent read; none of them knows a scheme by name.
 //
 // A step of length h from (q₀, v₀) is one implicit solve per stage, for the displacement x from q₀:
 //   ẋ = (c₀ x + r)/h    v = J(x) ẋ    a = (c₀ v + s)/h    g(q, v, a) = 0    q = q₀ ⊕ x
@@ -56,9 +56,9 @@ struct Scheme {
   [[nodiscard]] int most_inner_stages() const;
 };
 
-/// The scheme of a Runge-Kutta method whose last stage is its result: `matrix` has its coefficients,
-/// lower-triangular, row by row, with nothing but implicit stages, at most kMostStages. Throws
-/// InputError for any other.
+/// The scheme of a Runge-Kutta method whose last stage is its result: `matrix` has its
+/// coefficients, lower-triangular, row by row, with nothing but implicit stages, at most
+/// kMostStages. Throws InputError for any other.
 Scheme runge_kutta(const char* name, int order, std::initializer_list<std::vector<double>> matrix);
 
 /// Which scheme: those of the table by name, or any other that lives longer.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table of shapes: everything but their distance (kernels/contact/shapes) that differs from shape
-// to shape.
+// The table of shapes: everything but their distance (kernels/contact/shapes) that differs from
+// shape to shape.
 #pragma once
 
 #include <functional>

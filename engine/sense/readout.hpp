@@ -36,8 +36,8 @@ class Readout {
   /// order; with `velocity`, theirs too (end effectors, 3) [m/s], world axes.
   void end_effectors(const Batch& batch, int environment, std::span<double> position,
                      std::span<double> velocity = {});
-  /// Positions in the environments 16 block …, (end effectors, 3) each: the same bits, kinematics once
-  /// for eight of them. Environments beyond the last of the batch may be missing.
+  /// Positions in the environments 16 block …, (end effectors, 3) each: the same bits, kinematics
+  /// once for eight of them. Environments beyond the last of the batch may be missing.
   void read_end_effectors(const Batch& batch, int block,
                           std::span<const std::span<double>> positions);
   /// (end effectors, 3, nv): derivative of each position by displacements of q along the dofs of v,

@@ -108,8 +108,8 @@ std::vector<std::string> DatasetFolder::files_ending(const std::string& suffix) 
   return files;
 }
 
-/// As io/dataset/dataset_merge.hpp and io/dataset/minari_view.hpp name them, those that are there; robomimic's
-/// last.
+/// As io/dataset/dataset_merge.hpp and io/dataset/minari_view.hpp name them, those that are there;
+/// robomimic's last.
 std::vector<std::string> DatasetFolder::merged_files(const std::string& suffix) const {
   std::vector<std::string> files;
   std::error_code none_there;

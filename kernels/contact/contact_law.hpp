@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The penalty law of one point, over any number type (docs/contact.md): contacts, the ground, tactile
-// points and their reverse all take it from here.
+// The penalty law of one point, over any number type (docs/contact.md): contacts, the ground,
+// tactile points and their reverse all take it from here.
 //
 //   N(d, ḋ) the normal force, d < 0 the penetration;  f = N n + f_t
-//   R = (-k_n + k_d ḋ) d, law linear: -k_n d - c ḋ, c fading below the ramp;  N = max(0, R), paper: R
+//   R = (-k_n + k_d ḋ) d, law linear: -k_n d - c ḋ, c fading below the ramp
+//   N = max(0, R), paper: R
 //   f_t = -k_t v_t            if k_t |v_t| ≤ μ |N|    (stick; also at v_t = 0 and on the kink)
 //       = -μ |N| v_t / |v_t|  else                    (slip)
 //   law linear with ramp 0 takes μ k_n |d| as its friction bound, as published.

@@ -4,8 +4,8 @@
 //
 // Inside, H = κ a aᵀ with a the unit vector around a cylinder's side (κ = 0 on flat faces).
 // Everything is in body 1's axes;
-// ε = (θ; ρ), δW and the rest as in kernels/contact/pair_contact.hpp. A vector b at a place x is the wrench
-// b̃ = (x × b; b), so that
+// ε = (θ; ρ), δW and the rest as in kernels/contact/pair_contact.hpp. A vector b at a place x is
+// the wrench b̃ = (x × b; b), so that
 // b·(ρ + θ × x) = b̃·ε. At the surface point x = ξ - d n, with h = a·(ρ + θ × ξ):
 //   δd = -ñ·ε,  δn = θ × n - κ a h,  δx = n (ñ·ε) - d δn,  δu = -Γ δW - ω × δx
 //   ∂f/∂u = α nᵀ + s t tᵀ - s I,  α = A n - γ t,  A = ∂N/∂ḋ + s,  γ = μ ∂B/∂ḋ,  m = N + ḋ s

@@ -186,8 +186,8 @@ void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& l
 }
 
 /// A point or a sphere on the ground, with velocity and force at the body's own point ξ = ξ_c - r m
-/// (r = 0: a material point), p.x2. m = Rᵀ n_ground, `height` = n·(p - ground point), V = body twist,
-/// all in body axes. False where no lane touches; then `p` holds d alone.
+/// (r = 0: a material point), p.x2. m = Rᵀ n_ground, `height` = n·(p - ground point), V = body
+/// twist, all in body axes. False where no lane touches; then `p` holds d alone.
 template <class N>
 bool ground_contact(const LawParameters<N>& law, const Vec3<N>& m, const N& height,
                     const Vec6<N>& V, const Vec3<N>& centre, const N& radius, PointContact<N>& p) {

@@ -7,8 +7,8 @@
 // with X = A, and with X = V and -V × Λ in place of Λ. Sizes act through d and n where a body is
 // touched, and through the
 // places ξ of its own points, which move with its surface: with ξ̄, ρ̄ from f̄ = Y_l + Y_a × x₂ and
-// x̄ = f × Y_a (kernels/reverse/point_pullback.hpp), a size's share is that of ρ̄ (kernels/contact/distance.hpp)
-// and Σ ξ̄·∂ξ/∂size.
+// x̄ = f × Y_a (kernels/reverse/point_pullback.hpp), a size's share is that of ρ̄
+// (kernels/contact/distance.hpp) and Σ ξ̄·∂ξ/∂size.
 #pragma once
 
 #include "kernels/reverse/adjoint.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reverse mode through one touching point (kernels/contact/pair_contact.hpp): from a cotangent f̄ of its
-// force on body 1 to those of the displacement ε = (θ; ρ) and relative twist W of body 2, and of
-// the contact's coefficients. Some 150 operations, no
+// Reverse mode through one touching point (kernels/contact/pair_contact.hpp): from a cotangent f̄
+// of its force on body 1 to those of the displacement ε = (θ; ρ) and relative twist W of body 2,
+// and of the contact's coefficients. Some 150 operations, no
 // matrices. With m̄ = μ t (t = 0 when sticking), B the bound of friction over μ:
 //   d̄ = (N_d n - B_d m̄)·f̄,  r̄ = (N_ḋ n - B_ḋ m̄)·f̄,  n̄ = N f̄,  s̄ = -s (f̄ - t (t·f̄))
 //       through f = N n + f_t(v_t, B)

@@ -9,8 +9,8 @@
 namespace tangere::kernels {
 
 /// Everything a group of L environments needs to evaluate and solve a stage; rows of L lanes
-/// (eight, or one), sized by make_workspace_sizes(). Link and contact scratch is opaque bytes: its
-/// layout belongs to the kernels.
+/// (eight, or one), sized by engine/step/workspace.cpp. Link and contact scratch is opaque bytes:
+/// its layout belongs to the kernels.
 template <int L>
 struct Stage {
   Row<L>*centre, *x, *r, *s, *tau, *target;  // inputs
@@ -48,7 +48,8 @@ struct OlderState {
   const R* difference;  ///< q ⊖ q_centre
   R *q, *v;             ///< cotangents, added to: q unless ρ is zero, v unless s is zero
 };
-/// How a stage's rates hang on what came before: r = Σ ρ (q ⊖ q_centre), s = s_centre v_centre + Σ s v.
+/// How a stage's rates hang on what came before: r = Σ ρ (q ⊖ q_centre),
+/// s = s_centre v_centre + Σ s v.
 template <class R>
 struct StageHistory {
   static constexpr int kMost = 4;

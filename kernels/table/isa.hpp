@@ -4,8 +4,8 @@
 
 namespace tangere::kernels {
 
-/// "avx512", "avx2", "sse2" or "scalar": the best one that the machine runs, or the one named by the
-/// environment variable TANGERE_ISA when the program started.
+/// "avx512", "avx2", "sse2" or "scalar": the best one that the machine runs, or the one named by
+/// the environment variable TANGERE_ISA when the program started.
 const char* active_isa_name();
 
 /// "" or why TANGERE_ISA cannot be honoured, with the names that can. Programs check it at start.

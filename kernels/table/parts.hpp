@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The functions of one instruction set's table, in parts that are compiled on their own: a change in
-// a kernel recompiles the parts that use it. Arch: xsimd's tag of the instruction set, or ScalarArch.
+// The functions of one instruction set's table, in parts that are compiled on their own: a change
+// in a kernel recompiles the parts that use it. Arch: xsimd's tag of the instruction set, or
+// ScalarArch.
 #pragma once
 
 #include "kernels/step/arguments.hpp"

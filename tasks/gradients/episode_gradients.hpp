@@ -20,8 +20,9 @@ namespace tangere {
 enum class GradientKind { none, returns, jacobians };
 const char* to_string(GradientKind kind);
 
-/// Fills in derivatives of up to 16 episodes, which it plays again: one list of numbers per array, as
-/// EpisodeRows::gradients has them, all rows, zeros to begin with. Holds the scratch of one thread.
+/// Fills in derivatives of up to 16 episodes, which it plays again: one list of numbers per array,
+/// as EpisodeRows::gradients has them, all rows, zeros to begin with. Holds the scratch of one
+/// thread.
 using EpisodeGradients = std::function<void(std::int64_t first_episode, int episodes,
                                             std::vector<std::vector<double>>& out)>;
 

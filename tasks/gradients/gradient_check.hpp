@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of one environment's rollout and of one episode's return, checked on the spot: the adjoint
-// against central differences of the whole and against tangents in dual numbers.
+// Gradients of one environment's rollout and of one episode's return, checked on the spot: the
+// adjoint against central differences of the whole and against tangents in dual numbers.
 #pragma once
 
 #include <functional>

@@ -119,7 +119,8 @@ class GradientChecker {
       : model_(model), options_(options), parameters_(model) {}
 
   /// What each of `inputs` comes to, side by side, NaN where a step finds no solution; in `other`,
-  /// or in the scene as it is when that is null. `varying`: what the scene randomises, in its order.
+  /// or in the scene as it is when that is null. `varying`: what the scene randomises, in its
+  /// order.
   [[nodiscard]] virtual std::vector<double> values(const Scene* other,
                                                    const std::vector<CheckInputs>& inputs,
                                                    const std::vector<double>& varying) const = 0;

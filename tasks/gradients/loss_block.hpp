@@ -11,8 +11,8 @@
 
 namespace tangere {
 
-/// A loss at one environment's state: what it looks at, and room for its derivatives. Made once, used
-/// for state after state.
+/// A loss at one environment's state: what it looks at, and room for its derivatives. Made once,
+/// used for state after state.
 class LossReading {
  public:
   explicit LossReading(const Model& model);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Differences sixteen episodes at a time: all step sizes of one entry are lanes of one block. And how
-// a return changes along a direction, forward: a row of a task's derivative is what its reverse gives
-// for one number, a tangent is all rows times the change; its steps in dual numbers.
+// Differences sixteen episodes at a time: all step sizes of one entry are lanes of one block. And
+// how a return changes along a direction, forward: a row of a task's derivative is what its reverse
+// gives for one number, a tangent is all rows times the change; its steps in dual numbers.
 #include "tasks/gradients/gradient_check.hpp"
 
 #include <fmt/format.h>

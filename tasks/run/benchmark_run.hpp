@@ -48,7 +48,8 @@ struct BenchmarkResult {
   std::int64_t tactile_points = 0;          ///< read in one pass
   std::vector<FailedEnvironment> failures;  ///< in the order of their steps
   /// One per environment: chains the bits of every field in the order of time, then of the final
-  /// state; of a task those of observations, rewards and flags. Depends on the environment's episode, not on threads, blocks or the size of the batch.
+  /// state; of a task those of observations, rewards and flags. Depends on the environment's
+  /// episode, not on threads, blocks or the size of the batch.
   std::vector<std::uint64_t> checksums;
   bool stopped = false;  ///< `go_on` returned false; the times are of complete passes only
 

@@ -26,8 +26,8 @@ struct EnvironmentData {
 
   /// All of them start the episodes that the batch has drawn.
   void restart(const Batch& batch);
-  /// Those from `first` on whose episode is over start another one at their next action: environment
-  /// e plays e, e + E, e + 2 E … of the first ones.
+  /// Those from `first` on whose episode is over start another one at their next action:
+  /// environment e plays e, e + E, e + 2 E … of the first ones.
   void start_next(int first, int environments);
 
   std::vector<double> memory, action, observation, u, q, v;

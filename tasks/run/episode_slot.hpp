@@ -36,8 +36,8 @@ struct EpisodeSource {
   std::function<std::unique_ptr<EpisodeProgram>(const Batch&)> program;
 };
 
-/// Throws InputError when steps is no multiple of every, or the controls are too short, were laid out
-/// for another timestep, or change while an action is held.
+/// Throws InputError when steps is no multiple of every, or the controls are too short, were laid
+/// out for another timestep, or change while an action is held.
 EpisodeSource source_of(const Model& model, const StepperOptions& solver,
                         const ControlProgram& controls, const EpisodeOptions& options);
 EpisodeSource source_of(const Task& task, const Policy& policy, const EpisodeOptions& options);

@@ -40,9 +40,9 @@ using RolloutProgress = std::function<bool(std::int64_t done)>;
 
 /// Steps the batch and hands every row to the sink: row 0 of the state, then for each step its
 /// StepRow, of a task the ActionRow that it ends, the StateRow after it and the tactile rows due.
-/// Rows of a tactile sensor are read after steps K, 2K, …: field k comes from row (k + 1) K of q. In
-/// a StepRow, an environment that failed earlier has 0 iterations and its last status and residual.
-/// `program` has started every block and takes all of them through a step in turn. Throws
+/// Rows of a tactile sensor are read after steps K, 2K, …: field k comes from row (k + 1) K of q.
+/// In a StepRow, an environment that failed earlier has 0 iterations and its last status and
+/// residual. `program` has started every block and takes all of them through a step in turn. Throws
 /// InputError when steps < 1, every < 0, first_step < 0, and passes on what the sink throws.
 RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,

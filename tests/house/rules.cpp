@@ -21,8 +21,8 @@ struct Folder {
   Names foreign_libraries;  ///< that belong elsewhere: beginnings of what stands between < and >
 };
 
-/// A folder with rows for its own folders has none itself: a source stands in one of them. In a row,
-/// "kernels" stands for all of them.
+/// A folder with rows for its own folders has none itself: a source stands in one of them. In a
+/// row, "kernels" stands for all of them.
 const std::map<std::string, Folder, std::less<>>& folders() {
   static const Names of_kernels{"Eigen",    "tbb", "oneapi", "hdf5",    "H5",
                                 "tinyxml2", "CLI", "fmt",    "nlohmann"};

@@ -12,8 +12,8 @@
 
 namespace tangere::house {
 
-/// Path from the project's root ("engine/model/model.hpp") → contents. Tests plant violations in trees
-/// made by hand.
+/// Path from the project's root ("engine/model/model.hpp") → contents. Tests plant violations in
+/// trees made by hand.
 using Tree = std::map<std::string, std::string, std::less<>>;
 
 struct Violation {
@@ -32,20 +32,20 @@ Tree read_tree(const std::filesystem::path& root);
 /// that own them.
 std::vector<Violation> check_includes(const Tree& tree);
 
-/// What is compiled once per instruction set (kernels/table/*_part.hpp and all it includes) uses no type
-/// whose functions the linker might merge across instruction sets: containers, strings, streams,
-/// functions.
+/// What is compiled once per instruction set (kernels/table/*_part.hpp and all it includes) uses no
+/// type whose functions the linker might merge across instruction sets: containers, strings,
+/// streams, functions.
 std::vector<Violation> check_kernel_includes(const Tree& tree);
 
 /// Headers that cmake/install.cmake installs include each other and the standard library, nothing
 /// else.
 std::vector<Violation> check_public_headers(const Tree& tree);
 
-/// Nobody outside includes a private header: of engine and kernels, io, tasks, apps and examples see
-/// what cmake/install.cmake installs. Tests and benchmarks may look inside.
+/// Nobody outside includes a private header: of engine and kernels, io, tasks, apps and examples
+/// see what cmake/install.cmake installs. Tests and benchmarks may look inside.
 std::vector<Violation> check_private_headers(const Tree& tree);
-/// No more sources of a folder reach a header that takes long to compile than the table in rules.cpp
-/// allows; tests and benchmarks are free.
+/// No more sources of a folder reach a header that takes long to compile than the table in
+/// rules.cpp allows; tests and benchmarks are free.
 std::vector<Violation> check_heavy_headers(const Tree& tree);
 
 /// A source of the libraries and the command has a header of its own name, or a reason not to.

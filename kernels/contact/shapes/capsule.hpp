@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All points within r of a segment along z. Under a pad, about the nearest point of the axis: beside it as
-// a cylinder's side, beyond an end with z = ±h:
+// All points within r of a segment along z. Under a pad, about the nearest point of the axis:
+// beside it as a cylinder's side, beyond an end with z = ±h:
 //   |D|² - r² = [y_x² + y_y² + (y_z ∓ h)² - r²] + e_x(…) + e_y(…) + e_z(e_z + 2 [y_z ∓ h])
 #pragma once
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A cylinder with caps along z. Under a pad its side is as a sphere in the plane:
-//   ρ² - r² = e_x(e_x + 2 y_x) + e_y(e_y + 2 y_y) + [y_x² + y_y² - r²];  caps: d = max([y_z - h] + e_z,
-//   [-y_z - h] - e_z)
+//   ρ² - r² = e_x(e_x + 2 y_x) + e_y(e_y + 2 y_y) + [y_x² + y_y² - r²]
+// and its caps: d = max([y_z - h] + e_z, [-y_z - h] - e_z)
 #pragma once
 
 #include "kernels/contact/shapes/rod.hpp"

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// An ellipsoid with semi-axes a along its axes: the exact distance, because contact needs |n| = 1 and
-// the nearest point of the surface itself; a first-order distance has neither.
+// An ellipsoid with semi-axes a along its axes: the exact distance, because contact needs |n| = 1
+// and the nearest point of the surface itself; a first-order distance has neither.
 //
 // The nearest point is x = a² y / (w + a² - c²), c the shortest semi-axis, where w > 0 solves
 //   S(w) = Σ u² = 1,  u = a |y| / (w + a² - c²)
 // S falls and is convex; 1/√S is concave and nearly straight, so Newton's method on it rises to the
 // root from below. Bounds, since every term is at most 1 and no divisor less than w:
 //   max(a |y| - a² + c²) ≤ w ≤ |a y|
-// Geometric bisection first: near the middle plane of the shortest axis, where the two nearest points
-// meet, the bounds are many orders of magnitude apart. Steps are fixed in number, so that a lane has
-// the same bits beside any other. With h the distance of the tangent plane from the centre,
+// Geometric bisection first: near the middle plane of the shortest axis, where the two nearest
+// points meet, the bounds are many orders of magnitude apart. Steps are fixed in number, so that a
+// lane has the same bits beside any other. With h the distance of the tangent plane from the
+// centre,
 //   n = g/|g|, g = y / (w + a² - c²);  h = |a n|;  d = n·y - h
 // d is the largest of n·y - h over all unit n: an error of n enters squared, and only downwards.
 //   κ₁ + κ₂ = h (Σ A - n·A n), κ₁ κ₂ = h⁴/(a b c)², A = diag(1/a²): curvatures of the surface at x
@@ -36,7 +37,8 @@ struct EllipsoidDistance {
 
   Distance<N> evaluate(const Vec3<N>& y) const {
     const N zero(0.0), one(1.0), least = min(axes.x, min(axes.y, axes.z));
-    // On the middle plane of the shortest axis: outward where y = 0 is +, by an unmeasurable amount.
+    // On the middle plane of the shortest axis: outward where y = 0 is +, by an unmeasurable
+    // amount.
     const N tiny = N(1e-30) * least;
     const N z_off = select(axes.z <= least, tiny, zero);
     const N y_off = select(axes.z <= least, zero, select(axes.y <= least, tiny, zero));
@@ -124,8 +126,8 @@ struct EllipsoidDistance {
   }
 };
 
-/// What is nearer than m lies in the box with half edges a + m, and in the ellipsoid whose tangent planes
-/// are h' away with h'² = (1 + m/c) h² + (1 + c/m) m² ≥ (h + m)².
+/// What is nearer than m lies in the box with half edges a + m, and in the ellipsoid whose tangent
+/// planes are h' away with h'² = (1 + m/c) h² + (1 + c/m) m² ≥ (h + m)².
 template <class N>
 auto nearer_than(const EllipsoidDistance<N>& shape, const Vec3<N>& y, const N& m) {
   const Vec3<N>& a = shape.axes;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The general form of a shape under a pad: its plain distance at every point, in double. Where points
-// are floats, a tile's centre in the shape's axes comes as a float and what the float leaves out, so
-// that d keeps the accuracy that brackets give the other shapes.
+// The general form of a shape under a pad: its plain distance at every point, in double. Where
+// points are floats, a tile's centre in the shape's axes comes as a float and what the float leaves
+// out, so that d keeps the accuracy that brackets give the other shapes.
 #pragma once
 
 #include "kernels/contact/shapes/shape.hpp"

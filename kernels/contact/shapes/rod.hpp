@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// What cylinders and capsules have in common: how their surface stretches, and what lies under a pad.
+// What cylinders and capsules have in common: how their surface stretches, and what lies under a
+// pad.
 #pragma once
 
 #include "kernels/contact/shapes/shape.hpp"
 
 namespace tangere::kernels {
 
-/// Where a point on a rod's surface is that keeps its place there while the rod's size changes; z_axis: of
-/// the nearest point of the axis (a cylinder's: of the point itself).
+/// Where a point on a rod's surface is that keeps its place there while the rod's size changes;
+/// z_axis: of the nearest point of the axis (a cylinder's: of the point itself).
 template <class N>
 Vec3<N> stretched_rod(const Vec3<N>& to, const Vec3<double>& from, const Vec3<double>& y,
                       double z_axis) {

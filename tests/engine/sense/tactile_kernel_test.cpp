@@ -98,8 +98,8 @@ Touch<double> random_pose(Random& random) {
 }
 
 /// A shape that is sunk in the pad somewhere, in any orientation, moving. Half-spaces leave a part
-/// of the pad free. Rods and ellipsoids are sunk to half their radius: near the axis the normal turns with the
-/// last digit of the position, in any precision.
+/// of the pad free. Rods and ellipsoids are sunk to half their radius: near the axis the normal
+/// turns with the last digit of the position, in any precision.
 Touch<double> random_touch(Random& random, const TouchShape& s) {
   const bool rod = s.shape == PrimitiveShape::cylinder || s.shape == PrimitiveShape::capsule ||
                    s.shape == PrimitiveShape::ellipsoid;

@@ -42,8 +42,8 @@ V along_ray(const V& a, double fraction, Random& random) {
   return {fraction * a.x * s.x, fraction * a.y * s.y, fraction * a.z * s.z};
 }
 
-/// 200 bisections of the equation at the head of ellipsoid.hpp. On the middle plane of the shortest axis,
-/// where there is no root, the point's component along that axis is what the others leave.
+/// 200 bisections of the equation at the head of ellipsoid.hpp. On the middle plane of the shortest
+/// axis, where there is no root, the point's component along that axis is what the others leave.
 Real exact_distance(const V& axes, const V& y) {
   const Real a[3] = {axes.x, axes.y, axes.z}, p[3] = {std::abs(y.x), std::abs(y.y), std::abs(y.z)};
   const Real c = std::min({a[0], a[1], a[2]});
@@ -206,8 +206,8 @@ TEST(Ellipsoid, NothingNearIsCulled) {
   EXPECT_GT(out, 3000);
 }
 
-/// Lanes of every instruction set, and lanes alone, against plain double; AVX2 and AVX-512 bit for bit; NaN
-/// stays in its lane.
+/// Lanes of every instruction set, and lanes alone, against plain double; AVX2 and AVX-512 bit for
+/// bit; NaN stays in its lane.
 TEST(Ellipsoid, LanesAgreeOnEveryInstructionSet) {
   Random random(46);
   for (int k = 0; k < 200; ++k) {
