@@ -17,10 +17,10 @@ struct BlockCotangent {
   AlignedVector<double> q, v;                    ///< (nv, 16) of the newest state
   AlignedVector<double> previous_q, previous_v;  ///< (nv, 16) of the state one step before it
   AlignedVector<double> u;  ///< (nu, 16) of the controls of the step reversed last
-  AlignedVector<double>
-      parameters;  ///< (parameter_rows, 16), summed over steps (engine/derivative/number_gradients.hpp); or empty
-  AlignedVector<double>
-      points;  ///< (16, tactile points, kPointNumbers), the same (engine/derivative/point_numbers.hpp)
+  /// (parameter_rows, 16), summed over steps (engine/derivative/number_gradients.hpp); or empty
+  AlignedVector<double> parameters;
+  /// (16, tactile points, kPointNumbers), the same (engine/derivative/point_numbers.hpp)
+  AlignedVector<double> points;
 
   /// A lane's part of those, of one sensor; empty if there are none.
   [[nodiscard]] std::span<double> points_of(const Model& model, int sensor, int lane);

@@ -77,8 +77,8 @@ struct PairContact {
   int link1, link2;      ///< -1: fixed in the world; then frame1/frame2 are world frames
   Frame<double> frame2;  ///< shape frame in link2 (or the world)
   PrimitiveShape shape;
-  Vec3<double>
-      size;  ///< sphere: radius in x; cuboid: half edges; rods: radius, half axis; ellipsoid: axes/2
+  /// Sphere: radius in x; cuboid: half edges; rods: radius, half axis; ellipsoid: semi-axes.
+  Vec3<double> size;
   ContactLaw law;
   double ramp;
   ContactParameters parameters;
