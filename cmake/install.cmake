@@ -70,6 +70,10 @@ set(public_headers
   tasks/gradients/gradients.hpp
   tasks/gradients/identification.hpp
   tasks/gradients/losses.hpp
+  tasks/gradients/task_gradients.hpp
+  tasks/gradients/task_rollout.hpp
+  tasks/gradients/gradient_check.hpp
+  tasks/gradients/gradient_compare.hpp
   tasks/run/benchmark_run.hpp
   tasks/run/block_worker.hpp
   tasks/run/episode_program.hpp

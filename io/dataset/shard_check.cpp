@@ -68,7 +68,7 @@ class ShardChecker {
       return {content_, problems_};
     }
     if (const std::int64_t version = number(file_, "format_version"); version != kDatasetFormat) {
-      fail(fmt::format("its format_version is {}; expected {}; generate the data set again",
+      fail(fmt::format("its format_version is {}; expected {} (generate the data set again)",
                        version, kDatasetFormat));
       return {content_, problems_};
     }

@@ -129,7 +129,11 @@ PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact
   Mat3<N> n_rho, n_theta;
   if constexpr (Shape::kBending == Bending::general) {
     n_rho = -p.hessian;
-    n_theta = p.d * times_skew(p.hessian, n) - skew(n);
+    // Fused by hand: sums of products with alternating signs are what GCC 12 fuses by itself in one
+    // number type and not in the other, whatever -ffp-contract says.
+    const Mat3<N> turned = times_skew(p.hessian, n), turn = skew(n);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) n_theta.m[i][j] = mul_add(p.d, turned.m[i][j], -turn.m[i][j]);
   } else {
     n_rho = kFlat ? zero33<N>() : (-p.curvature) * P;
     const N flatten = kFlat ? one : mul_sub_from(p.d, p.curvature, one);

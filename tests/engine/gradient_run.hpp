@@ -153,10 +153,10 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
 }
 
 /// The central difference that changes least from one step size to the next; NaN where none settles
-/// (a kink).
+/// (a kink). The smallest steps are for runs that have a kink or a split step close by.
 inline double best_difference(const std::function<double(double)>& f, double start) {
   double best = NAN, least = HUGE_VAL, before = NAN;
-  for (double e = start; e > 1e-4 * start; e *= 0.25) {
+  for (double e = start; e > 1e-5 * start; e *= 0.25) {
     // Richardson's: the error of second order taken out.
     const double coarse = (f(2 * e) - f(-2 * e)) / (4 * e), fine = (f(e) - f(-e)) / (2 * e);
     const double value = (4 * fine - coarse) / 3;

@@ -13,6 +13,11 @@ shared=$(nm -C "$library" | awk '
   END { for (name in count) if (count[name] > 1) print name }')
 isas=$(nm "$library" 2>/dev/null | sed -n 's/^kernels\.\([^.]*\)\..*:$/\1/p' | sort -u | tr '\n' ' ')
 [ -n "$isas" ] || { echo "no objects of kernels in $library"; exit 1; }
+# GCC 12 makes these of sums of products with alternating signs, whatever -ffp-contract says: other bits.
+if command -v objdump >/dev/null && objdump -d "$library" | grep -qE 'vfm(addsub|subadd)'; then
+  echo "an instruction that fuses what the source does not: vfmaddsub or vfmsubadd"
+  exit 1
+fi
 if [ -n "$shared" ]; then
   echo "in the objects of more than one instruction set:"
   echo "$shared"

@@ -153,7 +153,7 @@ TEST(DatasetMerge, NamesTheShardThatHasNotAllItsEpisodes) {
          [](hid_t file) { EXPECT_GE(H5Ldelete(file, "data/demo_9", H5P_DEFAULT), 0); });
   EXPECT_THAT(
       complaint(dataset, false),
-      HasSubstr("shard-00000.h5' is damaged: it has 15 demos and 0 failed episodes, expected 16"));
+      HasSubstr("shard-00000.h5' is damaged: it has 15 demos and 0 failed episodes; expected 16"));
 }
 
 /// Links show what is in the shards, and validate says what is wrong with it; a copy is not made of

@@ -81,7 +81,7 @@ TEST_F(ShardCheck, RefusesEarlierFormats) {
   for (const std::int64_t version : {1, 2}) {
     change([&](hid_t file) { set(file, "/", "format_version", version); });
     EXPECT_THAT(complaint(), HasSubstr("its format_version is " + std::to_string(version) +
-                                       ", expected 3; generate the data set again"));
+                                       "; expected 3 (generate the data set again)"));
   }
 }
 

@@ -10,8 +10,8 @@
 #include "engine/step/displacement.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "tasks/catalogue/task_list.hpp"
-#include "tasks/gradients/row_jacobians.hpp"
 #include "tasks/gradients/gradient_check.hpp"
+#include "tasks/gradients/row_jacobians.hpp"
 #include "tasks/run/policy.hpp"
 #include "tests/tasks/task_check.hpp"
 
