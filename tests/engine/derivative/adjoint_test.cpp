@@ -63,6 +63,22 @@ int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance
   return compared;
 }
 
+/// Whether a step of the run is split. The run jumps where that decision flips, so differences across
+/// it are no derivatives.
+bool splits(const Scene& scene, Integrator scheme, unsigned seed) {
+  const Model model(scene);
+  const RunInput in = random_input(model, seed, kSteps);
+  Batch batch(model, 1);
+  batch.set_state(0, in.q, in.v);
+  Stepper stepper(model, testing::options(scheme, scene.timestep, 1e-13));
+  bool split = false;
+  for (const std::vector<double>& u : in.u) {
+    stepper.step(batch, u);
+    split = split || batch.status(0) == StepStatus::split;
+  }
+  return split;
+}
+
 class AdjointScheme : public ::testing::TestWithParam<Integrator> {};
 
 TEST_P(AdjointScheme, TreesMatchDifferences) {
@@ -104,7 +120,7 @@ TEST_P(AdjointScheme, MotorsTimedAtTheStartMatchDifferences) {
     for (MotorDescription& m : s.motors)
       m.timing = MotorTiming::start, motors += m.control == MotorControl::position;
     SCOPED_TRACE("seed " + std::to_string(seed));
-    compared += check(s, GetParam(), seed, 1e-7);
+    if (!splits(s, GetParam(), seed)) compared += check(s, GetParam(), seed, 1e-7);
   }
   EXPECT_GT(motors, 10);
   EXPECT_GT(compared, 500);
