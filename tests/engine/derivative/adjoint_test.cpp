@@ -63,8 +63,8 @@ int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance
   return compared;
 }
 
-/// Whether a step of the run is split. The run jumps where that decision flips, so differences across
-/// it are no derivatives.
+/// Whether a step of the run is split. The run jumps where that decision flips, and a difference
+/// across the jump is not a derivative.
 bool splits(const Scene& scene, Integrator scheme, unsigned seed) {
   const Model model(scene);
   const RunInput in = random_input(model, seed, kSteps);
