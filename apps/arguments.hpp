@@ -19,6 +19,9 @@ class Option;
 
 namespace tangere::apps {
 
+/// Of one run: more is a mistyped number.
+inline constexpr int kMostThreads = 4096;
+
 /// A program's command line: its options and, if it has any, its subcommands. Made once; options
 /// point into their variables.
 class Parser {

@@ -23,11 +23,10 @@
 namespace tangere::apps {
 namespace {
 
-constexpr int kMostThreads = 1024;
 constexpr int kMostPasses = 1'000'000;
 constexpr int kDefaultEnvironments = 256;  // 16 blocks: a few for each thread of a usual machine
 
-struct Options {
+struct BenchArguments {
   std::string scene, frames, policy, precision = "mixed", svg, csv;
   std::vector<int> threads;
   std::optional<std::int64_t> steps;
@@ -47,7 +46,7 @@ FrameKind frames_named(const std::string& name) {
   throw InputError("unknown frames '" + name + "'" + suggestion(name, names));
 }
 
-void check_arguments(const Options& options) {
+void check_arguments(const BenchArguments& options) {
   for (const std::string& output : {options.svg, options.csv})
     if (!output.empty()) check_not_same_file(output, options.scene);
   if (!options.svg.empty() && options.svg == options.csv)
@@ -73,7 +72,7 @@ void note_idle_threads(const Console& console, int environments, int most_thread
 /// The files asked for, reserved before the first step, complete or absent at the end.
 class Outputs {
  public:
-  explicit Outputs(const Options& options) {
+  explicit Outputs(const BenchArguments& options) {
     if (!options.svg.empty()) svg_.emplace(options.svg, options.overwrite);
     if (!options.csv.empty()) csv_.emplace(options.csv, options.overwrite);
   }
@@ -100,7 +99,7 @@ void tell_passes(const Console& console, const BenchRun& run) {
                                time.cpu_seconds));
 }
 
-int report(const Options& options, const Console& console, const BenchSetting& setting,
+int report(const BenchArguments& options, const Console& console, const BenchSetting& setting,
            const Model& model, const Json& of_task, const Json& entries) {
   const bool any_failed = !entries.at(0).at("failed").empty();
   const ExitCode code = any_failed ? kSomeFailed : kDone;
@@ -120,7 +119,7 @@ int report(const Options& options, const Console& console, const BenchSetting& s
   return code;
 }
 
-BenchSetting setting_of(const Options& options, const Model& model,
+BenchSetting setting_of(const BenchArguments& options, const Model& model,
                         const ControlProgram& controls) {
   BenchSetting setting;
   setting.scene = options.scene;
@@ -138,7 +137,7 @@ BenchSetting setting_of(const Options& options, const Model& model,
 
 /// Runs `run` with setting.options.threads at each of `threads` and tells what came out.
 template <class Run>
-int measure(const Options& options, const Console& console, BenchSetting& setting,
+int measure(const BenchArguments& options, const Console& console, BenchSetting& setting,
             const std::vector<int>& threads, const Model& model, const Json& of_task,
             const Run& run) {
   const StopSignals signals;
@@ -163,11 +162,11 @@ int measure(const Options& options, const Console& console, BenchSetting& settin
 }
 
 /// Thread counts asked for, or the usual ones.
-std::vector<int> thread_counts(const Options& options) {
+std::vector<int> thread_counts(const BenchArguments& options) {
   return options.threads.empty() ? default_thread_counts() : options.threads;
 }
 
-int bench_task(const Options& options, const Console& console, const Task& task) {
+int bench_task(const BenchArguments& options, const Console& console, const Task& task) {
   refuse_with_task(task,
                    {{"--every", options.every.has_value()}, {"--frames", !options.frames.empty()}});
   const PolicyKind kind = policy_named(options.policy, "", PolicyKind::random);
@@ -198,7 +197,7 @@ int bench_task(const Options& options, const Console& console, const Task& task)
                  });
 }
 
-int bench(const Options& options, const Console& console) {
+int bench(const BenchArguments& options, const Console& console) {
   check_arguments(options);
   // A wrong word is reported before a scene is read.
   frames_named(options.frames);
@@ -231,9 +230,9 @@ int bench(const Options& options, const Console& console) {
 }  // namespace
 
 Command add_bench(CLI::App& program) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<BenchArguments>();
   const auto console = std::make_shared<Console>();
-  Options& o = *options;
+  BenchArguments& o = *options;
   CLI::App& app =
       add_command(program, "bench", "Measure how fast a scene or a task runs, by threads",
                   "tangere bench scenes/rolling_ball_small.xml --envs 32 --steps 50 --threads 1,2 "

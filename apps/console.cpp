@@ -2,6 +2,7 @@
 // Writes lines to streams. main notices a stream that cannot be written when it flushes stdout.
 #include "apps/console.hpp"
 
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -13,6 +14,8 @@ void write_line(std::FILE* stream, const std::string& text) {
 }
 
 }  // namespace
+
+Json finite(double x) { return std::isfinite(x) ? Json(x) : Json(); }
 
 void Console::fail(const std::string& text) const { write_line(stderr, text); }
 

@@ -20,6 +20,9 @@ enum ExitCode {
 /// Keys keep the order in which they are written.
 using Json = nlohmann::ordered_json;
 
+/// A number, or null where it is infinite: JSON has no infinity.
+Json finite(double x);
+
 struct Console {
   bool json = false, quiet = false, verbose = false;
 

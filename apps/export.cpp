@@ -12,12 +12,12 @@
 namespace tangere::apps {
 namespace {
 
-struct Options {
+struct ExportArguments {
   std::string input, output;
   ExportOptions what;
 };
 
-int export_table(const Options& options, const Console& console) {
+int export_table(const ExportArguments& options, const Console& console) {
   check_not_same_file(options.output, options.input);
   const ExportResult result = export_csv(find_dataset(options.input), options.output, options.what);
   console.print(
@@ -38,9 +38,9 @@ int export_table(const Options& options, const Console& console) {
 }  // namespace
 
 Command add_export(CLI::App& program) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ExportArguments>();
   const auto console = std::make_shared<Console>();
-  Options& o = *options;
+  ExportArguments& o = *options;
   CLI::App& app = add_command(program, "export", "Write rows of a data set as a table",
                               "tangere export balls --csv balls.csv --episode 3");
   add_text(app, "DIR", o.input, "", "Folder of shards, or one file of a data set").required();

@@ -29,7 +29,6 @@ namespace {
 
 constexpr std::int64_t kMostEpisodes = 1'000'000'000;
 constexpr int kMostInterval = 1'000'000'000;
-constexpr int kMostThreads = 4096;
 
 EpisodeOptions episode_options(const GenerateOptions& options, const Model& model,
                                const ControlProgram& controls) {

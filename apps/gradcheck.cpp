@@ -25,7 +25,7 @@ constexpr int kDefaultEntries = 24;
 constexpr double kTolerance =
     1e-12;  // what a solve leaves is what differences of rollouts cannot see through
 
-struct Options {
+struct GradcheckArguments {
   std::string scene, loss, controls, policy;
   std::optional<std::int64_t> steps, actions;
   std::optional<int> every, entries;
@@ -40,7 +40,7 @@ LossKind loss_of(const std::string& name, const Model& model) {
 }
 
 /// As many steps as the scene's own run, but a hundred if that is longer or has no end.
-std::int64_t steps_of(const Options& o, const ControlProgram& controls) {
+std::int64_t steps_of(const GradcheckArguments& o, const ControlProgram& controls) {
   if (o.steps) {
     controls.check_covers(*o.steps);
     return *o.steps;
@@ -123,7 +123,7 @@ Json json_of_check(const GradientCheck& check, std::uint64_t seed, const Stepper
 }
 
 /// --actions, or as many as take a hundred steps.
-std::int64_t actions_of(const Options& o, const TaskSpec& spec) {
+std::int64_t actions_of(const GradcheckArguments& o, const TaskSpec& spec) {
   if (o.actions.value_or(0) > spec.horizon)
     throw InputError(fmt::format("--actions {} with task '{}'; expected at most {}, its horizon",
                                  *o.actions, spec.name, spec.horizon));
@@ -131,7 +131,7 @@ std::int64_t actions_of(const Options& o, const TaskSpec& spec) {
       std::clamp<std::int64_t>(kDefaultSteps / spec.steps_per_action, 1, spec.horizon));
 }
 
-int run_task(const Options& o, const Console& console, const Task& task) {
+int run_task(const GradcheckArguments& o, const Console& console, const Task& task) {
   refuse_with_task(task, {{"--loss", !o.loss.empty()},
                           {"--steps", o.steps.has_value()},
                           {"--every", o.every.has_value()},
@@ -166,7 +166,7 @@ int run_task(const Options& o, const Console& console, const Task& task) {
   return exit_code(check);
 }
 
-int run(const Options& o, const Console& console) {
+int run(const GradcheckArguments& o, const Console& console) {
   if (const std::unique_ptr<Task> task = find_task(o.scene, console))
     return run_task(o, console, *task);
   refuse_with_scene(o.scene,
@@ -208,9 +208,9 @@ int run(const Options& o, const Console& console) {
 }  // namespace
 
 Command add_gradcheck(CLI::App& program) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<GradcheckArguments>();
   const auto console = std::make_shared<Console>();
-  Options& o = *options;
+  GradcheckArguments& o = *options;
   CLI::App& app = add_command(
       program, "gradcheck", "Check gradients of a scene or a task against differences and tangents",
       "tangere gradcheck scenes/rolling_ball_small.xml --loss shear --steps 100");

@@ -19,7 +19,7 @@
 namespace tangere::apps {
 namespace {
 
-struct Options {
+struct InspectArguments {
   std::string scene;
   bool allow_unknown = false;
 };
@@ -191,7 +191,7 @@ int report(const Model& model, const TaskSpec* task, const Console& console) {
   return kDone;
 }
 
-int inspect(const Options& options, const Console& console) {
+int inspect(const InspectArguments& options, const Console& console) {
   if (const std::unique_ptr<Task> task = find_task(options.scene, console)) {
     refuse_with_task(*task, {{"--allow-unknown", options.allow_unknown}});
     return report(task->model(), &task->spec(), console);
@@ -203,7 +203,7 @@ int inspect(const Options& options, const Console& console) {
 }  // namespace
 
 Command add_inspect(CLI::App& program) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<InspectArguments>();
   const auto console = std::make_shared<Console>();
   CLI::App& app =
       add_command(program, "inspect", "Show what a scene compiles to, and what a task declares",

@@ -34,8 +34,6 @@ std::vector<Named> named_effects(const Scene& scene) {
   return list;
 }
 
-Json finite(double x) { return std::isfinite(x) ? Json(x) : Json(); }
-
 std::string range_text(const MotorDescription& m) {
   if (std::isinf(m.low) && std::isinf(m.high)) return "no range";
   return fmt::format("range {:.6g} {:.6g}", m.low, m.high);

@@ -11,8 +11,6 @@
 namespace tangere::apps {
 namespace {
 
-Json finite(double x) { return std::isfinite(x) ? Json(x) : Json(); }
-
 Json tensor_json(const TensorSpec& t) {
   return {{"name", t.name},       {"shape", t.shape},     {"unit", t.unit},
           {"meaning", t.meaning}, {"low", finite(t.low)}, {"high", finite(t.high)}};

@@ -16,14 +16,14 @@ namespace {
 
 constexpr int kMostFrames = 1000;  // of a strip; each is a picture of its own
 
-struct Options {
+struct PlotArguments {
   std::string input, output, sensor;
   std::optional<std::int64_t> environment, frame;
   std::optional<int> strip;
   bool overwrite = false;
 };
 
-int plot(const Options& options, const Console& console) {
+int plot(const PlotArguments& options, const Console& console) {
   check_not_same_file(options.output, options.input);
   PlotOptions what;
   what.sensor = options.sensor;
@@ -54,9 +54,9 @@ int plot(const Options& options, const Console& console) {
 }  // namespace
 
 Command add_plot(CLI::App& program) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<PlotArguments>();
   const auto console = std::make_shared<Console>();
-  Options& o = *options;
+  PlotArguments& o = *options;
   constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
   CLI::App& app = add_command(program, "plot", "Draw tactile fields of a trajectory as SVG",
                               "tangere plot ball.h5 -o ball.svg --sensor pad --env 2 --strip 4");

@@ -28,7 +28,7 @@
 namespace tangere::apps {
 namespace {
 
-struct Options {
+struct SimulateArguments {
   std::string scene, output, controls, policy, integrator, precision = "double", state_from,
                                                            gradients;
   std::optional<std::int64_t> steps, row;
@@ -50,7 +50,7 @@ Integrator integrator_named(const std::string& name) {
   throw InputError("unknown integrator '" + name + "'" + suggestion(name, integrator_names()));
 }
 
-void check_arguments(const Options& options) {
+void check_arguments(const SimulateArguments& options) {
   check_not_same_file(options.output, options.scene);
   for (const std::string& input : {options.controls, options.state_from})
     if (!input.empty()) check_not_same_file(options.output, input);
@@ -101,7 +101,7 @@ struct TaskReport {
   std::string line = "no task: every reward is 0";
 };
 
-int report(const Options& options, const Console& console, const Batch& batch,
+int report(const SimulateArguments& options, const Console& console, const Batch& batch,
            const Stepper& stepper, const RolloutOptions& rollout, const RolloutSummary& summary,
            const TaskReport& of_task = {}) {
   const ExitCode code = summary.failures.empty() ? kDone : kSomeFailed;
@@ -158,7 +158,7 @@ struct Start {
   std::int64_t first_step = 0;
   bool continues = false;  ///< steps as the run before would have: same step size, with its history
 
-  Start(const Options& options, const Stepper& stepper) {
+  Start(const SimulateArguments& options, const Stepper& stepper) {
     if (!options.state_from.empty()) saved = read_state(options.state_from, options.row);
     seed = options.seed.value_or(saved ? saved->seed : 0);
     environments = options.environments.value_or(saved ? saved->environments : 1);
@@ -190,7 +190,7 @@ struct Start {
 };
 
 /// --steps, or as many as the controls last after the start.
-std::int64_t steps_left(const Options& options, const ControlProgram& controls,
+std::int64_t steps_left(const SimulateArguments& options, const ControlProgram& controls,
                         std::int64_t first_step) {
   if (options.steps) return *options.steps;
   const std::int64_t left = step_count({}, controls) - first_step;
@@ -210,7 +210,7 @@ struct Gradients {
   std::vector<double> value;
   std::int64_t recomputed_steps = 0;
 
-  Gradients(const Options& arguments, const Batch& batch, const Stepper& stepper,
+  Gradients(const SimulateArguments& arguments, const Batch& batch, const Stepper& stepper,
             const RolloutOptions& rollout)
       : name(arguments.gradients) {
     if (name.empty()) return;
@@ -270,7 +270,7 @@ struct Gradients {
 
 /// Steps and writes; `run`: the rollout into the file, told how many steps are done.
 template <class Run>
-int write_run(const Options& options, const Console& console, const Batch& batch,
+int write_run(const SimulateArguments& options, const Console& console, const Batch& batch,
               const Stepper& stepper, const RolloutOptions& rollout, TrajectoryFile& output,
               const StopSignals& signals, const Run& run,
               const std::function<TaskReport()>& of_task) {
@@ -291,7 +291,7 @@ int write_run(const Options& options, const Console& console, const Batch& batch
   return report(options, console, batch, stepper, rollout, summary, of_task());
 }
 
-int simulate_task(const Options& options, const Console& console, const ProgramInfo& info,
+int simulate_task(const SimulateArguments& options, const Console& console, const ProgramInfo& info,
                   const Task& task, Precision precision) {
   refuse_with_task(task, {{"--gradients", !options.gradients.empty()},
                           {"--steps", options.steps.has_value()},
@@ -337,7 +337,7 @@ int simulate_task(const Options& options, const Console& console, const ProgramI
       });
 }
 
-int simulate(const Options& options, const Console& console, const ProgramInfo& info) {
+int simulate(const SimulateArguments& options, const Console& console, const ProgramInfo& info) {
   check_arguments(options);
   const Precision precision = precision_named(options.precision);
   if (const std::unique_ptr<Task> task = find_task(options.scene, console))
@@ -383,9 +383,9 @@ int simulate(const Options& options, const Console& console, const ProgramInfo& 
 }  // namespace
 
 Command add_simulate(CLI::App& program) {
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<SimulateArguments>();
   const auto console = std::make_shared<Console>();
-  Options& o = *options;
+  SimulateArguments& o = *options;
   CLI::App& app = add_command(
       program, "simulate", "Run a scene or a task and write its trajectory",
       "tangere simulate scenes/rolling_ball.xml --output ball.h5 --envs 4 --every 5 --seed 1");

@@ -25,6 +25,7 @@ install(TARGETS tangere_kernels tangere_engine tangere_tasks tangere_io tangere_
 install(TARGETS tangere RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 set(public_headers
   engine/base/aligned.hpp
+  engine/base/as_size.hpp
   engine/base/error.hpp
   engine/base/precision.hpp
   engine/base/vector3.hpp
@@ -32,7 +33,7 @@ set(public_headers
   engine/derivative/field_tangent.hpp
   engine/derivative/loss.hpp
   engine/derivative/number_gradients.hpp
-  engine/derivative/point_numbers.hpp
+  engine/derivative/tactile_point_numbers.hpp
   engine/derivative/readout_pullback.hpp
   engine/derivative/step_jacobian.hpp
   engine/derivative/tangent.hpp

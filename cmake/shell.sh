@@ -92,12 +92,13 @@ jobs() {
   if [ "$cores" -lt "$memory" ]; then echo "$cores"; else echo "$memory"; fi
 }
 
-# build PRESET ISAS [TARGET…]: configures and builds into build/PRESET. ISAS: of the option TANGERE_ISAS.
+# build PRESET ISAS [TARGET…]: configures and builds into build/PRESET. ISAS: of the option TANGERE_ISAS. With unity=ON it
+# compiles several sources as one (cmake/flags.cmake).
 build() {
   local preset=$1 isas=$2
   shift 2
   check_cmake
-  cmake --preset "$preset" "-DTANGERE_ISAS=$isas" </dev/null || fail "cmake could not configure the build (its reason is above)." \
+  cmake --preset "$preset" "-DTANGERE_ISAS=$isas" "-DCMAKE_UNITY_BUILD=${unity:-OFF}" </dev/null || fail "cmake could not configure the build (its reason is above)." \
     "If build/$preset is left from another place or compiler, remove it: rm -r build/$preset"
   cmake --build "build/$preset" --parallel "$(jobs)" ${1:+--target "$@"} </dev/null ||
     fail "the build of build/$preset failed (the compiler's reason is above)." \

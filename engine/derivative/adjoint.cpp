@@ -8,7 +8,7 @@
 #include "engine/derivative/group_adjoint.hpp"
 #include "engine/derivative/motor_pullback.hpp"
 #include "engine/derivative/number_gradients.hpp"
-#include "engine/derivative/point_numbers.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/step/step_settings.hpp"
 
 namespace tangere {

@@ -19,7 +19,7 @@ struct BlockCotangent {
   AlignedVector<double> u;  ///< (nu, 16) of the controls of the step reversed last
   /// (parameter_rows, 16), summed over steps (engine/derivative/number_gradients.hpp); or empty
   AlignedVector<double> parameters;
-  /// (16, tactile points, kPointNumbers), the same (engine/derivative/point_numbers.hpp)
+  /// (16, tactile points, kPointNumbers), the same (engine/derivative/tactile_point_numbers.hpp)
   AlignedVector<double> points;
 
   /// A lane's part of those, of one sensor; empty if there are none.

@@ -9,7 +9,7 @@
 #include <array>
 
 #include "engine/derivative/number_gradients.hpp"
-#include "engine/derivative/point_numbers.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/sense/dense_tiles.hpp"
 #include "engine/sense/pad_reader.hpp"
 

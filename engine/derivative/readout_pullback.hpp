@@ -30,7 +30,7 @@ class ReadoutPullback {
   /// nothing touches, have no derivative. `parameters`: (parameter_rows, 16) of the loss to add
   /// those by the sensor's coefficients and the sizes of what touches it to, or empty. `points`:
   /// (points, kPointNumbers) of the sensor to add those by every point's own numbers to
-  /// (engine/derivative/point_numbers.hpp), or empty.
+  /// (engine/derivative/tactile_point_numbers.hpp), or empty.
   void field(int lane, int sensor, std::span<const int> tiles, std::span<const double> cotangents,
              std::span<double> parameters = {}, std::span<double> points = {});
   /// The same with `cotangents` of the whole field, (points, 3).

@@ -34,7 +34,7 @@ class Tangent {
 
   /// How a sensor's field (points, 3) changes with a state of the tape, with the scene's numbers,
   /// and with `points_dot`, (points, kPointNumbers): every point's own numbers
-  /// (engine/derivative/point_numbers.hpp), or empty.
+  /// (engine/derivative/tactile_point_numbers.hpp), or empty.
   void field(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step,
              int sensor, std::span<const double> numbers_dot, std::span<const double> points_dot,
              const StateTangent& state, std::span<double> field_dot);

@@ -130,19 +130,6 @@ std::string line_of_difference(const std::string& there, const std::string& here
 
 }  // namespace
 
-std::string json_text(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\')
-      out += {'\\', c};
-    else if (static_cast<unsigned char>(c) < 0x20)
-      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
-    else
-      out += c;
-  }
-  return out + '"';
-}
-
 void describe_dataset(const h5::Id& file, const DatasetLayout& layout) {
   h5::write_attribute(file, "format", "tangere dataset");
   h5::write_scalar<std::int64_t>(file, "format_version", kDatasetFormat);

@@ -18,9 +18,6 @@ inline constexpr std::int64_t kDatasetFormat = 3;
 /// Attributes of the root that belong to the whole data set, and the group /scene.
 void describe_dataset(const h5::Id& file, const DatasetLayout& layout);
 
-/// A JSON string, quotes included. Bytes from 0x80 on are UTF-8 already.
-std::string json_text(const std::string& text);
-
 /// All settings that decide which numbers a data set holds, in a fixed order: from a layout, from a
 /// file.
 std::vector<Setting> settings_of(const DatasetLayout& layout);

@@ -16,8 +16,6 @@ std::array<unsigned char, sizeof(T)> bytes_of_number(T value) {
   return std::bit_cast<std::array<unsigned char, sizeof(T)>>(value);
 }
 
-std::size_t aligned(std::size_t bytes) { return (bytes + 7) / 8 * 8; }
-
 }  // namespace
 
 DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_number(facts.rows)) {
@@ -93,7 +91,7 @@ std::int64_t DemoFormat::chunk_rows(std::size_t dataset, std::int64_t rows) cons
 std::size_t DemoFormat::data_bytes(std::int64_t rows) const {
   std::size_t bytes = 0;
   for (std::size_t k = 0; k < datasets(); ++k)
-    bytes += aligned(static_cast<std::size_t>(rows_of(k, rows)) * row_bytes_[k]);
+    bytes += h5::aligned(static_cast<std::size_t>(rows_of(k, rows)) * row_bytes_[k]);
   return bytes;
 }
 

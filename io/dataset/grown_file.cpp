@@ -7,8 +7,6 @@ namespace {
 
 constexpr hsize_t kDescriptionBlock = hsize_t{1} << 16;
 
-std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 7) / 8 * 8; }
-
 }  // namespace
 
 GrownFile::GrownFile(const std::string& path, bool overwrite, bool views)
@@ -23,13 +21,13 @@ GrownFile::~GrownFile() {
 
 void GrownFile::close() {
   h5::close_file(file_, part_.path());
-  here_ = aligned(part_.size());
+  here_ = h5::aligned(part_.size());
 }
 
 void GrownFile::append(const h5::Bytes& bytes) {
   placed_.add(here_, bytes.all());
   placed_.flush();
-  here_ = aligned(here_ + bytes.size());
+  here_ = h5::aligned(here_ + bytes.size());
 }
 
 std::uint64_t GrownFile::append_group(std::string_view prefix, std::vector<h5::FileMember> members,
@@ -41,7 +39,7 @@ std::uint64_t GrownFile::append_group(std::string_view prefix, std::vector<h5::F
   placed_.add(here_, out.all().first(group - here_));
   placed_.flush();
   placed_.write_unchecked(group, out.from(group - here_));
-  here_ = aligned(here_ + out.size());
+  here_ = h5::aligned(here_ + out.size());
   return group;
 }
 

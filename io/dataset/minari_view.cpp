@@ -9,9 +9,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "engine/base/error.hpp"
-#include "io/dataset/dataset_description.hpp"
 #include "io/files/part_file.hpp"
 #include "io/hdf5/h5_listing.hpp"
 
@@ -19,6 +19,7 @@ namespace tangere {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
 
 constexpr const char* kMinariVersion = "0.5.3";    // the layout that is written here
 constexpr const char* kToFolder = "../../../../";  // from …/minari/tangere/NAME-v0/data
@@ -43,7 +44,8 @@ std::string nested(const std::vector<std::uint64_t>& shape, std::size_t from,
   return text + "]";
 }
 
-/// A Gymnasium Box as Minari writes it; infinite bounds are bare words there.
+/// A Gymnasium Box as Minari reads it: with infinite bounds as bare words, which are Python's and no
+/// JSON library's.
 std::string box(const DemoArray& array, const std::string& low, const std::string& high) {
   return fmt::format(R"({{"type": "Box", "dtype": "{}", "shape": [{}], "low": {}, "high": {}}})",
                      array.type == h5::NumberType::float32 ? "float32" : "float64",
@@ -101,18 +103,21 @@ void MinariView::commit() {
 std::string MinariView::metadata() const {
   std::string subspaces;
   for (const DemoArray& array : members_.observations)
-    subspaces += fmt::format("{}{}: {}", subspaces.empty() ? "" : ", ", json_text(array.name),
+    subspaces += fmt::format("{}{}: {}", subspaces.empty() ? "" : ", ", Json(array.name).dump(),
                              box(array, "-Infinity", "Infinity"));
-  const std::string observation =
-      fmt::format(R"({{"type": "Dict", "subspaces": {{{}}}}})", subspaces);
-  return fmt::format(
-      "{{\"dataset_id\": {}, \"data_format\": \"hdf5\", \"minari_version\": \"{}\", "
-      "\"total_episodes\": {}, "
-      "\"total_steps\": {}, \"observation_space\": {}, \"action_space\": {}, \"algorithm_name\": "
-      "{}, "
-      "\"description\": {}}}\n",
-      json_text(id_), kMinariVersion, count_, steps_, json_text(observation),
-      json_text(box(members_.actions, low_, high_)), json_text("tangere"), json_text(command_));
+  const Json metadata = {
+      {"dataset_id", id_},
+      {"data_format", "hdf5"},
+      {"minari_version", kMinariVersion},
+      {"total_episodes", count_},
+      {"total_steps", steps_},
+      {"observation_space", fmt::format(R"({{"type": "Dict", "subspaces": {{{}}}}})", subspaces)},
+      {"action_space", box(members_.actions, low_, high_)},
+      {"algorithm_name", "tangere"},
+      {"description", command_},
+  };
+  // A command line may hold any bytes.
+  return metadata.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace tangere

@@ -12,7 +12,7 @@
 namespace tangere {
 namespace {
 
-constexpr std::size_t kReadBytes = std::size_t{1} << 20;
+constexpr std::size_t kMostRead = std::size_t{1} << 20;
 constexpr std::size_t kMostQueued = 1024;
 constexpr std::size_t kRawName = ~std::size_t{0};  // no dataset has this number
 
@@ -75,7 +75,7 @@ void PlacedFile::verify() const {
     std::uint64_t bytes = 0;
     for (; end < places.size(); ++end) {
       const std::uint64_t with_it = places[end].address + bytes_of(places[end].rows) - begin;
-      if (end > first && with_it > kReadBytes) break;
+      if (end > first && with_it > kMostRead) break;
       bytes = with_it;
     }
     buffer.resize(std::max<std::size_t>(buffer.size(), bytes));

@@ -7,10 +7,10 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "engine/base/as_size.hpp"
+
 namespace tangere {
 namespace {
-
-std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 const unsigned char* bytes_at(const EpisodeRows& piece, std::size_t name) {
   return std::visit(
@@ -23,23 +23,23 @@ void add_observation(const DemoFormat& format, const EpisodeRows& piece, int epi
   const std::int64_t taken = std::min<std::int64_t>(piece.action_rows, rows - piece.first_row);
   const std::size_t bytes = format.row_bytes(format.obs(name));
   const unsigned char* const data =
-      bytes_at(piece, format.source(name)) + size(episode) * size(piece.rows) * bytes;
+      bytes_at(piece, format.source(name)) + as_size(episode) * as_size(piece.rows) * bytes;
   const std::int64_t number = piece.first_episode + episode;
   slices[format.obs(name)] = {
       {number, name + 1, piece.first_row, taken, bytes}, piece.first_row, data};
   if (piece.rows > taken)
     slices[format.final_obs(name)] = {
-        {number, name + 1, piece.first_row + taken, 1, bytes}, 0, data + size(taken) * bytes};
+        {number, name + 1, piece.first_row + taken, 1, bytes}, 0, data + as_size(taken) * bytes};
 }
 
 void add_gradient(const DemoFormat& format, const EpisodeRows& piece, int episode,
                   std::int64_t rows, std::size_t k, std::vector<PieceSlice>& slices) {
   const std::span<const double> all = piece.gradients[format.source_of_gradient(k)];
-  const std::size_t dataset = format.gradient(k), each = all.size() / size(piece.episodes);
+  const std::size_t dataset = format.gradient(k), each = all.size() / as_size(piece.episodes);
   slices[dataset] = {{piece.first_episode + episode, format.observations() + 2 + k, 0,
                       format.rows_of(dataset, rows), format.row_bytes(dataset)},
                      0,
-                     reinterpret_cast<const unsigned char*>(all.data() + size(episode) * each)};
+                     reinterpret_cast<const unsigned char*>(all.data() + as_size(episode) * each)};
 }
 
 /// Rows of a dataset as they lie: height × width cells each; a field of points, or one cell for all
@@ -99,12 +99,12 @@ class Cutter {
   void cut(int episode, std::size_t dataset, const PieceSlice& slice, std::int64_t each) {
     const Cells cells(format_.shape(dataset), format_.plan(dataset).tile, slice.rows.row_bytes);
     for (std::int64_t row = 0; row < slice.rows.rows; row += each) {
-      const unsigned char* const data = slice.data + size(row) * cells.row_bytes();
-      const std::size_t used = size(std::min(each, slice.rows.rows - row));
+      const unsigned char* const data = slice.data + as_size(row) * cells.row_bytes();
+      const std::size_t used = as_size(std::min(each, slice.rows.rows - row));
       for (std::size_t r = 0; r < cells.height; r += cells.tile_height)
         for (std::size_t c = 0; c < cells.width; c += cells.tile_width)
           add({episode, dataset, cells.first(slice.first + row, r, c), {}}, cells, data, used,
-              size(each));
+              as_size(each));
     }
   }
 
@@ -133,7 +133,7 @@ class Cutter {
 
 std::int64_t rows_of_episode(const DatasetLayout& layout, const EpisodeRows& piece, int episode) {
   return piece.ends.empty() ? layout.rows()
-                            : std::max<std::int64_t>(1, piece.ends[size(episode)].length);
+                            : std::max<std::int64_t>(1, piece.ends[as_size(episode)].length);
 }
 
 std::vector<PieceSlice> slices_of(const DemoFormat& format, const EpisodeRows& piece, int episode,
@@ -145,13 +145,13 @@ std::vector<PieceSlice> slices_of(const DemoFormat& format, const EpisodeRows& p
   const auto* const actions = reinterpret_cast<const unsigned char*>(piece.actions.data());
   slices[DemoFormat::kActions] = {{number, 0, piece.first_row, taken, bytes},
                                   piece.first_row,
-                                  actions + size(episode) * size(piece.action_rows) * bytes};
+                                  actions + as_size(episode) * as_size(piece.action_rows) * bytes};
   if (!piece.ends.empty())
     slices[DemoFormat::kRewards] = {
         {number, format.observations() + 1, 0, rows, sizeof(float)},
         0,
         reinterpret_cast<const unsigned char*>(piece.rewards.data() +
-                                               size(episode) * size(piece.action_rows))};
+                                               as_size(episode) * as_size(piece.action_rows))};
   for (std::size_t name = 0; name < format.observations(); ++name)
     add_observation(format, piece, episode, rows, name, slices);
   if (!piece.gradients.empty())
@@ -163,7 +163,7 @@ std::vector<PieceSlice> slices_of(const DemoFormat& format, const EpisodeRows& p
 PreparedPiece prepare_piece(const DatasetLayout& layout, const DemoFormat& format,
                             const EpisodeRows& piece) {
   PreparedPiece prepared;
-  prepared.sums.resize(size(piece.episodes));
+  prepared.sums.resize(as_size(piece.episodes));
   Cutter cutter(layout, format, prepared.chunks);
   for (int e = 0; e < piece.episodes; ++e) {
     const std::int64_t rows = rows_of_episode(layout, piece, e);
@@ -171,8 +171,8 @@ PreparedPiece prepare_piece(const DatasetLayout& layout, const DemoFormat& forma
     for (std::size_t dataset = 0; dataset < slices.size(); ++dataset) {
       const PlacedRows& r = slices[dataset].rows;
       if (r.rows == 0) continue;
-      prepared.sums[size(e)].add(r.episode, r.name, r.first_row, r.rows, r.row_bytes,
-                                 slices[dataset].data);
+      prepared.sums[as_size(e)].add(r.episode, r.name, r.first_row, r.rows, r.row_bytes,
+                                    slices[dataset].data);
       const std::int64_t each = format.chunk_rows(dataset, rows);
       if (each == 0) continue;
       if (slices[dataset].first % each != 0)

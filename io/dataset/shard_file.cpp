@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <nlohmann/json.hpp>
 
 #include "io/dataset/dataset_description.hpp"
 
@@ -15,8 +16,6 @@ namespace {
 
 constexpr std::int64_t kBlockEpisodes = 16;
 constexpr std::size_t kMostHeld = std::size_t{64} << 20;
-
-std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 7) / 8 * 8; }
 
 template <class T>
 std::span<const unsigned char> bytes_of(std::span<const T> numbers) {
@@ -46,7 +45,7 @@ ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const
     part_.empty();
     throw;
   }
-  texts_ = aligned(part_.size());
+  texts_ = h5::aligned(part_.size());
   const h5::Bytes texts = format_.texts();
   placed_.add(texts_, texts.all());
   placed_.flush();
@@ -99,8 +98,8 @@ void ShardFile::give_place(Block& block, std::int64_t first_episode) {
   for (Demo& demo : block.demos)
     for (std::size_t k = 0; k < format_.datasets(); ++k) {
       demo.addresses[k] = at;
-      at += aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) *
-                    format_.row_bytes(k));
+      at += h5::aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) *
+                        format_.row_bytes(k));
     }
   free_ = std::max(free_, at);
 }
@@ -156,7 +155,7 @@ void ShardFile::hold(Block& block, std::vector<PreparedChunk>& chunks) {
       held.place.address = free_;
       placed_.add(free_, held.bytes);
       placed_.flush();
-      free_ = aligned(free_ + held.bytes.size());
+      free_ = h5::aligned(free_ + held.bytes.size());
       held.bytes = {};
     }
     block.demos[static_cast<std::size_t>(chunk.episode)].chunks[chunk.dataset].push_back(
@@ -177,7 +176,7 @@ void ShardFile::hold(Demo& demo, std::size_t dataset, const PieceSlice& slice) {
     }
     held.address = free_;
     const auto rows = static_cast<std::uint64_t>(format_.rows_of(dataset, demo.facts.rows));
-    free_ = aligned(free_ + rows * slice.rows.row_bytes);
+    free_ = h5::aligned(free_ + rows * slice.rows.row_bytes);
     placed_.add(held.address, held.bytes);
     placed_.flush();
     held_bytes_ -= held.bytes.size();
@@ -230,15 +229,15 @@ void ShardFile::give_place_to_held(Block& block) {
         continue;
       }
       if (rows == 0) {
-        at += aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) *
-                      format_.row_bytes(k));
+        at += h5::aligned(static_cast<std::uint64_t>(format_.rows_of(k, demo.facts.rows)) *
+                          format_.row_bytes(k));
         continue;
       }
       std::vector<h5::FileChunk> places;
       for (Chunk& chunk : demo.chunks[k]) {
         if (!chunk.bytes.empty()) {
           chunk.place.address = at;
-          at = aligned(at + chunk.bytes.size());
+          at = h5::aligned(at + chunk.bytes.size());
         }
         places.push_back(chunk.place);
       }
@@ -302,9 +301,10 @@ void ShardFile::complete_description(std::uint64_t data) {
   file_ = h5::change_file(part_.path());
   h5::link_object(file_, "data", data);
   const h5::Id group = h5::open_group(file_, "data");
+  const nlohmann::ordered_json environment = {
+      {"env_name", layout_.scene_name}, {"type", 2}, {"env_kwargs", nlohmann::json::object()}};
   h5::write_attribute(group, "env_args",
-                      fmt::format(R"({{"env_name": {}, "type": 2, "env_kwargs": {{}}}})",
-                                  json_text(layout_.scene_name)));
+                      environment.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   h5::write_scalar<std::int64_t>(group, "total", rows_);
   record_failures();
   h5::write_scalar<std::uint64_t>(file_, "content_sum", sum_.value());

@@ -19,6 +19,9 @@ namespace tangere::h5 {
 /// An address that leads nowhere.
 inline constexpr std::uint64_t kNowhere = ~std::uint64_t{0};
 
+/// The next multiple of eight bytes, where objects and rows begin.
+constexpr std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 7) / 8 * 8; }
+
 /// Bytes of a file that is to be written, little-endian.
 class Bytes {
  public:
@@ -33,7 +36,7 @@ class Bytes {
   void text(std::string_view text) { bytes_.insert(bytes_.end(), text.begin(), text.end()); }
   void zeros(std::size_t count) { bytes_.resize(bytes_.size() + count, 0); }
   /// Adds zeros up to a multiple of eight bytes.
-  void align() { zeros((8 - bytes_.size() % 8) % 8); }
+  void align() { bytes_.resize(aligned(bytes_.size()), 0); }
   void clear() { bytes_.clear(); }
   [[nodiscard]] std::size_t size() const { return bytes_.size(); }
   [[nodiscard]] std::span<const unsigned char> from(std::size_t first) const {

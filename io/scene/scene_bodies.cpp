@@ -14,7 +14,6 @@ namespace tangere {
 namespace {
 
 constexpr int kLargestResolution = 1000;  // contact points along one edge or around one ring
-constexpr int kMostPoints = 1 << 20;      // of a hemisphere
 
 using Names = std::vector<std::string>;
 

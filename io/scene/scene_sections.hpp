@@ -10,6 +10,9 @@
 
 namespace tangere {
 
+/// Of the surface points of a body and of the points of a sensor.
+inline constexpr int kMostPoints = 1 << 20;
+
 /// A body in its joint's frame; files that it names are read.
 BodyDescription read_body(const SceneNode& node);
 /// Whether the pose of a mesh is given in the world, not in the joint's frame.

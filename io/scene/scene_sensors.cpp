@@ -11,8 +11,7 @@
 namespace tangere {
 namespace {
 
-constexpr int kLargestArray = 4096;   // rows or columns of a tactile array
-constexpr int kMostPoints = 1 << 20;  // of a list
+constexpr int kLargestArray = 4096;  // rows or columns of a tactile array
 const std::vector<std::string> kTypes = {"rect_array", "abstract", "hemisphere", "cylinder",
                                          "mesh"};
 using Names = std::vector<std::string>;

@@ -13,7 +13,7 @@
 namespace tangere {
 namespace {
 
-constexpr int kMostPoints = 1 << 24;
+constexpr int kMostInFile = 1 << 24;
 
 TactilePoint point_at(const Vector3& position, const Vector3& normal, const Vector3& axis0) {
   TactilePoint p;
@@ -44,8 +44,8 @@ TactilePoint parse_point(const WordReader& file) {
   for (std::size_t k = 0; k < 3; ++k) p.position[k] = file.position(k);
   for (std::size_t k = 0; k < 2; ++k) {
     const long x = file.integer(file.words[3 + k], "a whole number, or -1 for no pixel");
-    if (x < -1 || x > kMostPoints)
-      file.fail(fmt::format("pixel {}; expected -1 to {}", x, kMostPoints));
+    if (x < -1 || x > kMostInFile)
+      file.fail(fmt::format("pixel {}; expected -1 to {}", x, kMostInFile));
     p.pixel[k] = static_cast<int>(x);
   }
   p.normal = direction(file, 5, "the normal");
@@ -147,8 +147,8 @@ std::vector<TactilePoint> read_tactile_points(const std::string& path) {
   WordReader file(path);
   if (!file.next()) throw InputError(path + ": empty; expected a count of points");
   const long count = file.integer(file.words[0], "a count of points");
-  if (file.words.size() != 1 || count < 1 || count > kMostPoints)
-    file.fail(fmt::format("the first line is no count of points from 1 to {}", kMostPoints));
+  if (file.words.size() != 1 || count < 1 || count > kMostInFile)
+    file.fail(fmt::format("the first line is no count of points from 1 to {}", kMostInFile));
   std::vector<TactilePoint> points;
   while (std::ssize(points) < count) {
     if (!file.next())

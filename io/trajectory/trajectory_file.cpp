@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "engine/derivative/point_numbers.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 #include "io/files/part_file.hpp"
 #include "io/hdf5/h5.hpp"
 #include "io/trajectory/sensor_description.hpp"

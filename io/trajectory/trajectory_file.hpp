@@ -19,7 +19,7 @@ struct GradientArrays {
   std::span<const double> numbers;                          ///< (E, k) by the scene's numbers
   std::span<const std::string> number_names, number_units;  ///< (k)
   std::span<const double> points;  ///< (E, all tactile points, kPointNumbers) by their own numbers
-                                   ///< (engine/derivative/point_numbers.hpp); or empty
+                                   ///< (engine/derivative/tactile_point_numbers.hpp); or empty
 };
 
 /// Writes `<output>.part` and gives it its name on commit(). Destroyed before that, it leaves

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "engine/base/as_size.hpp"
 #include "engine/derivative/number_gradients.hpp"
 #include "tasks/gradients/loss_block.hpp"
 #include "tasks/gradients/return_block.hpp"
@@ -18,8 +19,6 @@ using kernels::kBlock;
 /// Of a task: one that a thread plays and those that wait for an earlier one to be written
 /// (EpisodeOptions::blocks_in_flight).
 constexpr double kBlocksOfThread = 3;
-
-std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 std::vector<std::string> texts(std::span<const std::string> all) {
   return {all.begin(), all.end()};
@@ -48,7 +47,7 @@ Named displacements(const Model& model) {
 }
 Named velocities(const Model& model) { return {texts(model.v_names()), texts(model.v_units())}; }
 Named actions_of(const Model& model) {
-  return {texts(model.u_names()), std::vector<std::string>(size(model.nu()), "1")};
+  return {texts(model.u_names()), std::vector<std::string>(as_size(model.nu()), "1")};
 }
 Named actions_of(const Task& task) {
   Named n;
@@ -68,7 +67,7 @@ GradientArray array(const char* name, std::vector<std::uint64_t> shape, bool by_
 /// `of`: "the return", "the loss".
 std::vector<GradientArray> arrays_of_return(const Model& model, const Named& actions,
                                             const std::string& of) {
-  const std::uint64_t nv = size(model.nv());
+  const std::uint64_t nv = as_size(model.nv());
   Named numbers;
   const NumberGradients parameters(model);
   for (const NumberInfo& info : parameters.infos()) {
@@ -92,7 +91,7 @@ std::vector<GradientArray> arrays_of_return(const Model& model, const Named& act
 }
 
 std::vector<GradientArray> arrays_of_jacobians(const Model& model, const Named& actions) {
-  const std::uint64_t n = 2 * size(model.nv());
+  const std::uint64_t n = 2 * as_size(model.nv());
   Named state = displacements(model);
   state.append(velocities(model));
   const std::string of =
@@ -114,7 +113,8 @@ void make_room(const std::vector<GradientArray>& arrays, int episodes, std::int6
                std::vector<std::vector<double>>& out) {
   out.resize(arrays.size());
   for (std::size_t k = 0; k < arrays.size(); ++k)
-    out[k].assign(size(episodes) * arrays[k].width() * (arrays[k].by_row ? size(rows) : 1), 0.0);
+    out[k].assign(as_size(episodes) * arrays[k].width() * (arrays[k].by_row ? as_size(rows) : 1),
+                  0.0);
 }
 
 double bytes_of(const std::vector<GradientArray>& arrays, std::int64_t rows) {
@@ -142,8 +142,8 @@ EpisodeGradients scene_returns(const Model& model, const ControlProgram& control
   const auto block = std::make_shared<LossBlock>(model, options, std::span(&loss, 1));
   return [&model, &controls, &run, options, block](std::int64_t first, int episodes, auto& out) {
     Batch batch(model, episodes, run.seed, first);
-    const std::size_t nu = size(model.nu());
-    std::vector<double> u(size(episodes) * nu);
+    const std::size_t nu = as_size(model.nu());
+    std::vector<double> u(as_size(episodes) * nu);
     GradientSummary summary = empty_gradients(model, episodes, options, 1);
     std::vector<FailedEnvironment> failures;
     block->run(
@@ -154,7 +154,7 @@ EpisodeGradients scene_returns(const Model& model, const ControlProgram& control
         u, summary, failures);
     LossGradient& g = summary.losses[0];
     for (std::size_t i = 0; i < g.u.size(); ++i)  // an action is held for K steps
-      out[0][i / nu / size(run.every) * nu + i % nu] += g.u[i];
+      out[0][i / nu / as_size(run.every) * nu + i % nu] += g.u[i];
     out[1] = std::move(g.q);
     out[2] = std::move(g.v);
     if (!g.parameters.empty()) out[3] = std::move(g.parameters);
@@ -186,7 +186,7 @@ EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& contr
     BlockTape tape;
     std::vector<RowChain> chains;
   };
-  const std::size_t nu = size(model.nu()), nv = size(model.nv());
+  const std::size_t nu = as_size(model.nu()), nv = as_size(model.nv());
   const auto s = std::make_shared<Scratch>(
       Scratch{Stepper(model), StepJacobians(model), BlockTape(model, model.integrator(), run.every),
               std::vector<RowChain>(kBlock, RowChain(model.nv(), nu))});
@@ -195,12 +195,12 @@ EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& contr
   return [&model, &controls, &run, nu, s, held](std::int64_t first, int episodes, auto& out) {
     const std::int64_t rows = run.steps / run.every;
     Batch batch(model, episodes, run.seed, first);
-    std::vector<double> u(size(episodes) * nu);
+    std::vector<double> u(as_size(episodes) * nu);
     StepJacobian step;
     RowJacobian row;
     for (std::int64_t j = 0; j < rows; ++j) {
       for (int e = 0; e < episodes; ++e)
-        controls.evaluate(j * run.every, first + e, std::span(u).subspan(size(e) * nu, nu));
+        controls.evaluate(j * run.every, first + e, std::span(u).subspan(as_size(e) * nu, nu));
       s->tape.start(batch, 0);
       for (int k = 0; k < run.every; ++k) s->stepper.step_block(batch, 0, u, &s->tape);
       for (RowChain& chain : s->chains) chain.begin();
@@ -208,12 +208,12 @@ EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& contr
         s->jacobians.evaluate(batch, 0, s->tape, k, u);
         for (int e = 0; e < episodes; ++e) {
           s->jacobians.get(e, step);
-          s->chains[size(e)].add(step, held);
+          s->chains[as_size(e)].add(step, held);
         }
       }
       for (int e = 0; e < episodes; ++e) {
-        s->chains[size(e)].get(row);
-        put_row(row, out.size() == 3, size(e) * size(rows) + size(j), out);
+        s->chains[as_size(e)].get(row);
+        put_row(row, out.size() == 3, as_size(e) * as_size(rows) + as_size(j), out);
       }
     }
   };
@@ -242,8 +242,9 @@ EpisodeGradients task_jacobians(const Task& task, const TaskActions& actions,
       s->rollout.take_steps(&s->tape);
       s->jacobians.evaluate(s->rollout, s->record, a, s->tape);
       for (int e = 0; e < episodes; ++e)
-        if (s->record.taken[size(e)])
-          put_row(s->jacobians.of(e), out.size() == 3, size(e) * size(rows) + size(a), out);
+        if (s->record.taken[as_size(e)])
+          put_row(s->jacobians.of(e), out.size() == 3, as_size(e) * as_size(rows) + as_size(a),
+                  out);
       s->rollout.conclude();
     }
   };

@@ -8,15 +8,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/as_size.hpp"
+
 namespace tangere {
 
 using kernels::kBlock;
-
-namespace {
-
-std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
-
-}  // namespace
 
 double checkpoint_bytes(const Model& model) {
   return double(model.state_bytes_per_environment()) * kBlock;
@@ -62,12 +58,12 @@ void GradientBlock::run(Batch& batch, int block) {
   for (taken_ = 0; taken_ < plan_.stretches && may_go_on() && begin_stretch(taken_); ++taken_) {
     if (!plan_.whole() && taken_ % plan_.segment == 0)
       checkpoints_.push_back(batch.save_block(block));
-    take_steps(taken_, plan_.whole() ? &tapes_[size(taken_)] : nullptr);
+    take_steps(taken_, plan_.whole() ? &tapes_[as_size(taken_)] : nullptr);
   }
   if (stopped_) return;
   adjoint_.clear();
   if (plan_.whole()) {
-    for (std::int64_t s = taken_; s-- > 0 && may_go_on();) reverse(s, tapes_[size(s)]);
+    for (std::int64_t s = taken_; s-- > 0 && may_go_on();) reverse(s, tapes_[as_size(s)]);
     return;
   }
   for (std::size_t k = checkpoints_.size(); k-- > 0;) {
@@ -75,10 +71,10 @@ void GradientBlock::run(Batch& batch, int block) {
                        end = std::min(first + plan_.segment, taken_);
     batch.restore_block(block, checkpoints_[k]);
     for (std::int64_t s = first; s < end; ++s) {
-      retake_steps(s, s == first, tapes_[size(s - first)]);
-      recomputed_steps_ += tapes_[size(s - first)].steps();
+      retake_steps(s, s == first, tapes_[as_size(s - first)]);
+      recomputed_steps_ += tapes_[as_size(s - first)].steps();
     }
-    for (std::int64_t s = end; s-- > first && may_go_on();) reverse(s, tapes_[size(s - first)]);
+    for (std::int64_t s = end; s-- > first && may_go_on();) reverse(s, tapes_[as_size(s - first)]);
   }
 }
 
@@ -86,7 +82,7 @@ void GradientBlock::get_start(int loss, const Batch& batch, int environment, std
                               std::span<double> v, std::span<double> parameters,
                               std::span<double> points) const {
   const BlockCotangent& c = adjoint_.loss(loss);
-  const std::size_t lane = size(environment % kBlock);
+  const std::size_t lane = as_size(environment % kBlock);
   for (std::size_t i = 0; i < q.size(); ++i) {
     q[i] = c.q[i * kBlock + lane];
     v[i] = c.v[i * kBlock + lane];

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <string>
 
-#include "engine/derivative/point_numbers.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 #include "kernels/numbers/block.hpp"
 #include "tasks/gradients/loss_block.hpp"
 

@@ -31,7 +31,7 @@ struct GradientOptions {
       Precision::f64;  ///< of the tactile fields that losses see; derivatives are taken in double
   bool parameters = false;  ///< by the scene's numbers too (engine/derivative/number_gradients.hpp)
   bool points =
-      false;  ///< by every tactile point's own numbers too (engine/derivative/point_numbers.hpp)
+      false;  ///< by every tactile point's own numbers too (engine/derivative/tactile_point_numbers.hpp)
   /// The states on a thread's tape may take so much [bytes]; a longer rollout is run again from
   /// checkpoints, with the same bits.
   double tape_bytes = 1e9;

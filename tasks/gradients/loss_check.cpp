@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "engine/derivative/number_gradients.hpp"
-#include "engine/derivative/point_numbers.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/derivative/tangent.hpp"
 #include "engine/sense/readout.hpp"
 #include "tasks/gradients/loss_block.hpp"

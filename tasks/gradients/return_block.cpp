@@ -10,13 +10,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/as_size.hpp"
+
 namespace tangere {
 
 using kernels::kBlock;
 
 namespace {
-
-std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 double tape_bytes(const Task& task, const TaskGradientOptions& o) {
   const Integrator scheme = o.stepper.integrator.value_or(task.model().integrator());
@@ -47,13 +47,14 @@ ReturnBlock::ReturnBlock(const Task& task, const TaskGradientOptions& options)
       options_(options),
       rollout_(task, options.stepper, options.precision),
       moments_(task.spec().moments.size()),
-      start_q_(kBlock * size(task.model().nv())),
+      start_q_(kBlock * as_size(task.model().nv())),
       start_v_(start_q_.size()),
-      by_u_(kBlock * size(task.model().nu())),
-      by_memory_(kBlock * size(task.spec().memory)),
+      by_u_(kBlock * as_size(task.model().nu())),
+      by_memory_(kBlock * as_size(task.spec().memory)),
       sound_(kBlock) {
-  records_.assign(size(options.actions), ActionRecord(task));
-  by_action_.assign(size(options.actions), std::vector<double>(kBlock * task.spec().action.size()));
+  records_.assign(as_size(options.actions), ActionRecord(task));
+  by_action_.assign(as_size(options.actions),
+                    std::vector<double>(kBlock * task.spec().action.size()));
   for (MomentRows& m : moments_) {
     m.q = m.v = start_q_;
     m.end_effectors.resize(kBlock * task.end_effectors_size());
@@ -85,16 +86,16 @@ void ReturnBlock::run(std::int64_t first, int count, const TaskActions& actions,
 void ReturnBlock::note(std::int64_t action) {
   for (int l = 0; l < rollout_.lanes(); ++l) {
     const bool now = !failed(rollout_.batch().status(l));
-    if (!now && (action < 0 || sound_[size(l)]))
+    if (!now && (action < 0 || sound_[as_size(l)]))
       lost_.push_back({l, action, rollout_.batch().status(l)});
-    sound_[size(l)] = now;
+    sound_[as_size(l)] = now;
   }
 }
 
 bool ReturnBlock::begin_stretch(std::int64_t action) {
   if (!rollout_.running()) return false;
-  rollout_.choose(*choose_, records_[size(action)]);
-  rollout_.begin(records_[size(action)]);
+  rollout_.choose(*choose_, records_[as_size(action)]);
+  rollout_.begin(records_[as_size(action)]);
   return true;
 }
 
@@ -105,17 +106,17 @@ void ReturnBlock::take_steps(std::int64_t action, BlockTape* tape) {
 }
 
 void ReturnBlock::retake_steps(std::int64_t action, bool from_checkpoint, BlockTape& tape) {
-  if (!from_checkpoint) rollout_.place_again(records_[size(action)], action);
-  rollout_.retake_steps(records_[size(action)], action, tape);
+  if (!from_checkpoint) rollout_.place_again(records_[as_size(action)], action);
+  rollout_.retake_steps(records_[as_size(action)], action, tape);
 }
 
 /// From the state after an action, whose cotangents stand in the adjoint, to that in which it was
 /// chosen.
 void ReturnBlock::reverse(std::int64_t action, const BlockTape& tape) {
-  const ActionRecord& r = records_[size(action)];
+  const ActionRecord& r = records_[as_size(action)];
   const std::vector<int>& looks = task_.spec().moments;
   const int every = task_.spec().control_every;
-  for (std::vector<double>* x : {&start_q_, &start_v_, &by_u_, &by_action_[size(action)]})
+  for (std::vector<double>* x : {&start_q_, &start_v_, &by_u_, &by_action_[as_size(action)]})
     std::fill(x->begin(), x->end(), 0.0);
   rollout_.look_again(tape);
   reverse_rewards(r, action);
@@ -128,7 +129,7 @@ void ReturnBlock::reverse(std::int64_t action, const BlockTape& tape) {
     for (int l = 0; l < rollout_.lanes(); ++l) {
       const std::span<double> by_u = part(by_u_, l);
       for (std::size_t k = 0; k < by_u.size(); ++k)
-        by_u[k] += adjoint_.loss(0).u[k * kBlock + size(l)];
+        by_u[k] += adjoint_.loss(0).u[k * kBlock + as_size(l)];
     }
     if ((t - 1) % every == 0) reverse_controls(r, action, t - 1, tape);
   }
@@ -141,10 +142,10 @@ void ReturnBlock::reverse_rewards(const ActionRecord& r, std::int64_t action) {
       std::fill(x->begin(), x->end(), 0.0);
   std::vector<MomentCotangent> to(moments_.size());
   for (int l = 0; l < rollout_.lanes(); ++l) {
-    if (!r.taken[size(l)]) continue;
+    if (!r.taken[as_size(l)]) continue;
     for (std::size_t m = 0; m < to.size(); ++m) to[m] = cotangent(m, l);
     task_.reward_vjp(rollout_.view(r, action + 1, l, part(r.memory, l), rollout_.moments(l)), 1,
-                     {to, part(by_action_[size(action)], l), part(by_memory_, l)});
+                     {to, part(by_action_[as_size(action)], l), part(by_memory_, l)});
   }
 }
 
@@ -155,8 +156,8 @@ void ReturnBlock::add_moment(std::size_t moment, const BlockTape& tape) {
   for (int l = 0; l < rollout_.lanes(); ++l) {
     const std::span<const double> q = part(m.q, l), v = part(m.v, l);
     for (std::size_t i = 0; i < q.size(); ++i) {
-      c.q[i * kBlock + size(l)] += q[i];
-      c.v[i * kBlock + size(l)] += v[i];
+      c.q[i * kBlock + as_size(l)] += q[i];
+      c.v[i * kBlock + as_size(l)] += v[i];
     }
   }
   if (m.end_effectors.empty() && m.tactile.empty()) return;
@@ -174,7 +175,7 @@ void ReturnBlock::add_fields(std::size_t moment, int lane) {
     pullback_.end_effector(lane, static_cast<int>(k), end_effectors.subspan(3 * k, 3));
   const auto sensors = task_.model().sensors();
   for (std::size_t s = 0; s < sensors.size() && !fields.empty(); ++s) {
-    const std::size_t numbers = 3 * size(sensors[s].points);
+    const std::size_t numbers = 3 * as_size(sensors[s].points);
     pullback_.dense_field(lane, static_cast<int>(s), fields.first(numbers),
                           adjoint_.loss(0).parameters);
     fields = fields.subspan(numbers);
@@ -185,12 +186,12 @@ void ReturnBlock::add_fields(std::size_t moment, int lane) {
 void ReturnBlock::reverse_controls(const ActionRecord& r, std::int64_t action, int step,
                                    const BlockTape& tape) {
   for (int l = 0; l < rollout_.lanes(); ++l) {
-    if (!r.taken[size(l)]) continue;
+    if (!r.taken[as_size(l)]) continue;
     const Moment first = rollout_.first_moment(tape, l);
     const MomentCotangent to{part(start_q_, l), part(start_v_, l), {}, {}};
     task_.controls_vjp(rollout_.view(r, action, l, part(r.memory, l), {&first, 1}), step,
                        part(by_u_, l),
-                       {{&to, 1}, part(by_action_[size(action)], l), part(by_memory_, l)});
+                       {{&to, 1}, part(by_action_[as_size(action)], l), part(by_memory_, l)});
   }
   std::fill(by_u_.begin(), by_u_.end(), 0.0);
 }
@@ -198,15 +199,15 @@ void ReturnBlock::reverse_controls(const ActionRecord& r, std::int64_t action, i
 /// Where the action was chosen: back through a restart, and through what the task keeps of it.
 void ReturnBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
   BlockCotangent& c = adjoint_.loss(0);
-  const std::size_t nv = size(task_.model().nv());
+  const std::size_t nv = as_size(task_.model().nv());
   for (int l = 0; l < rollout_.lanes(); ++l) {
-    if (!r.taken[size(l)]) continue;
+    if (!r.taken[as_size(l)]) continue;
     const auto at = [l](AlignedVector<double>& rows, std::size_t i) -> double& {
-      return rows[i * kBlock + size(l)];
+      return rows[i * kBlock + as_size(l)];
     };
     const std::span<double> q = part(start_q_, l), v = part(start_v_, l),
                             memory = part(by_memory_, l);
-    const std::span<double> by_action = part(by_action_[size(action)], l);
+    const std::span<double> by_action = part(by_action_[as_size(action)], l);
     const Moment seen{part(r.q, l), part(r.v, l), {}, {}};
     if (task_.spec().restarts) {
       std::vector<double> placed_q(q.begin(), q.end()), placed_v(v.begin(), v.end());
@@ -231,15 +232,15 @@ void ReturnBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
 
 void ReturnBlock::finish(std::int64_t to, TaskGradients& out) {
   const TensorSpec& spec = task_.spec().action;
-  const std::size_t width = spec.size(), nv = size(task_.model().nv()),
-                    numbers = options_.parameters ? size(parameters_.count()) : 0;
+  const std::size_t width = spec.size(), nv = as_size(task_.model().nv()),
+                    numbers = options_.parameters ? as_size(parameters_.count()) : 0;
   for (int l = 0; l < rollout_.lanes(); ++l) {
-    const std::size_t e = size(to + l);
-    out.value[e] = rollout_.data().returns[size(l)];
-    out.length[e] = rollout_.data().length[size(l)];
-    for (std::size_t a = 0; a < size(out.length[e]); ++a)
+    const std::size_t e = as_size(to + l);
+    out.value[e] = rollout_.data().returns[as_size(l)];
+    out.length[e] = rollout_.data().length[as_size(l)];
+    for (std::size_t a = 0; a < as_size(out.length[e]); ++a)
       for (std::size_t k = 0; k < width; ++k) {
-        const std::size_t at = (e * size(options_.actions) + a) * width + k;
+        const std::size_t at = (e * as_size(options_.actions) + a) * width + k;
         const double asked = part(records_[a].asked, l)[k];
         out.action[at] = asked;
         out.by_action[at] = asked < spec.low || asked > spec.high ? 0 : part(by_action_[a], l)[k];
@@ -252,11 +253,11 @@ void ReturnBlock::finish(std::int64_t to, TaskGradients& out) {
 
 std::span<double> ReturnBlock::part(std::vector<double>& all, int lane) const {
   const std::size_t width = all.size() / kBlock;
-  return std::span(all).subspan(size(lane) * width, width);
+  return std::span(all).subspan(as_size(lane) * width, width);
 }
 std::span<const double> ReturnBlock::part(const std::vector<double>& all, int lane) const {
   const std::size_t width = all.size() / kBlock;
-  return std::span(all).subspan(size(lane) * width, width);
+  return std::span(all).subspan(as_size(lane) * width, width);
 }
 
 MomentCotangent ReturnBlock::cotangent(std::size_t moment, int lane) {

@@ -11,6 +11,7 @@
 #include <numeric>
 #include <optional>
 
+#include "engine/base/as_size.hpp"
 #include "engine/derivative/tangent.hpp"
 #include "engine/sense/readout.hpp"
 
@@ -19,8 +20,6 @@ namespace {
 
 constexpr double kMargin =
     2e-2;  // actions stay so far within their bounds: more than differences move them
-
-std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 double dot(std::span<const double> a, std::span<const double> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
@@ -69,8 +68,8 @@ struct TaskTangent::OwnCotangent {
   std::vector<MomentCotangent> moments;
 
   OwnCotangent(const Task& task, std::size_t count)
-      : memory(size(task.spec().memory)), action(task.spec().action.size()) {
-    const std::vector<double> dofs(size(task.model().nv()));
+      : memory(as_size(task.spec().memory)), action(task.spec().action.size()) {
+    const std::vector<double> dofs(as_size(task.model().nv()));
     for (std::size_t m = 0; m < count; ++m) {
       q.push_back(dofs);
       v.push_back(dofs);
@@ -94,7 +93,7 @@ TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
       task_(rollout.task()),
       tangent_(task_.model(), options),
       readout_(task_.model()),
-      memory_(size(task_.spec().memory)),
+      memory_(as_size(task_.spec().memory)),
       action_(task_.spec().action.size()) {
   for (std::size_t a = 0; a * action_.size() < actions.size(); ++a) {
     ActionRecord& r = records_.emplace_back(task_);
@@ -111,7 +110,7 @@ double TaskTangent::along(const InputDirection& d) {
   const auto given = [](std::span<const double> x, std::size_t n) {
     return x.empty() ? std::vector<double>(n) : std::vector<double>(x.begin(), x.end());
   };
-  const std::size_t nv = size(task_.model().nv()), moments = task_.spec().moments.size();
+  const std::size_t nv = as_size(task_.model().nv()), moments = task_.spec().moments.size();
   state_ = {given(d.q, nv), given(d.v, nv), std::vector<double>(nv), std::vector<double>(nv)};
   std::fill(memory_.begin(), memory_.end(), 0.0);
   double sum = 0;
@@ -163,7 +162,7 @@ void TaskTangent::take_steps(std::size_t action, const InputDirection& d, ViewTa
   const BlockTape& tape = tapes_[action];
   const TaskSpec& spec = task_.spec();
   const StateTangent start = state_;
-  const std::size_t nu = size(task_.model().nu());
+  const std::size_t nu = as_size(task_.model().nu());
   std::vector<double> u_dot(nu);
   std::size_t next = 0;
   for (int t = 0; t < spec.steps_per_action; ++t) {
@@ -204,7 +203,7 @@ void TaskTangent::look(std::size_t action, std::size_t moment, const InputDirect
   if (task_.tactile_size() == 0) return;
   const auto sensors = task_.model().sensors();
   for (std::size_t s = 0; s < sensors.size(); ++s) {
-    std::vector<double> change(3 * size(sensors[s].points));
+    std::vector<double> change(3 * as_size(sensors[s].points));
     tangent_.field(rollout_.batch(), 0, 0, tape, step, static_cast<int>(s), d.numbers, {}, state_,
                    change);
     seen.tactile[moment].insert(seen.tactile[moment].end(), change.begin(), change.end());
@@ -236,7 +235,7 @@ class ReturnChecker : public GradientChecker {
                                    to_string(gradient.failures[0].status)));
     out_.loss = gradient.value[0];
     length_ = gradient.length[0];
-    const std::size_t numbers = size(length_) * task.spec().action.size();
+    const std::size_t numbers = as_size(length_) * task.spec().action.size();
     gradient.action.resize(numbers);
     gradient.by_action.resize(numbers);
     u_name_ = "actions";
@@ -287,7 +286,7 @@ class ReturnChecker : public GradientChecker {
       for (std::size_t k = 0; k < varying.size(); ++k)
         if (rollout.batch().is_parameter(static_cast<int>(k)))
           rollout.batch().set_randomized_value(l, static_cast<int>(k), varying[k]);
-      rollout.displace(l, inputs[size(l)].q, inputs[size(l)].v);
+      rollout.displace(l, inputs[as_size(l)].q, inputs[as_size(l)].v);
     }
     const std::size_t width = task.spec().action.size();
     ActionRecord record(task);
@@ -301,7 +300,7 @@ class ReturnChecker : public GradientChecker {
     }
     std::vector<double> sums = rollout.data().returns;
     for (int l = 0; l < rollout.lanes(); ++l)
-      if (failed(rollout.batch().status(l))) sums[size(l)] = NAN;
+      if (failed(rollout.batch().status(l))) sums[as_size(l)] = NAN;
     return sums;
   }
 

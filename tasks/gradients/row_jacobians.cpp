@@ -5,13 +5,13 @@
 
 #include <algorithm>
 
+#include "engine/base/as_size.hpp"
+
 namespace tangere {
 
 using kernels::kBlock;
 
 namespace {
-
-std::size_t size(int n) { return static_cast<std::size_t>(n); }
 
 /// to (rows, columns) += a (rows, inner) times b (inner, columns).
 void add_product(std::span<double> to, std::span<const double> a, std::span<const double> b,
@@ -27,7 +27,7 @@ void add_product(std::span<double> to, std::span<const double> a, std::span<cons
 
 std::span<const double> of_lane(const std::vector<double>& all, int lane) {
   const std::size_t width = all.size() / kBlock;
-  return std::span(all).subspan(size(lane) * width, width);
+  return std::span(all).subspan(as_size(lane) * width, width);
 }
 
 /// What a task's reverse functions add to, for one number.
@@ -51,7 +51,7 @@ void add_times(std::span<double> to, double x, std::span<const double> from) {
 }  // namespace
 
 RowChain::RowChain(int nv, std::size_t others)
-    : state_(2 * size(nv)), others_(others), columns_(2 * state_ + others) {
+    : state_(2 * as_size(nv)), others_(others), columns_(2 * state_ + others) {
   for (auto* x : {&now_, &before_, &next_}) x->resize(state_ * columns_);
 }
 
@@ -96,11 +96,12 @@ void RowChain::get(RowJacobian& out) const {
 ActionJacobians::ActionJacobians(const Task& task, const StepperOptions& options)
     : task_(task),
       steps_(task.model(), options),
-      state_(2 * size(task.model().nv())),
+      state_(2 * as_size(task.model().nv())),
       width_(task.spec().action.size()),
-      memory_(size(task.spec().memory)),
+      memory_(as_size(task.spec().memory)),
       chains_(kBlock, RowChain(task.model().nv(), width_ + memory_)),
-      controls_(kBlock, std::vector<double>(size(task.model().nu()) * (state_ + width_ + memory_))),
+      controls_(kBlock,
+                std::vector<double>(as_size(task.model().nu()) * (state_ + width_ + memory_))),
       rows_(kBlock) {}
 
 void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std::int64_t action,
@@ -116,7 +117,7 @@ void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std:
     steps_.evaluate(rollout.batch(), 0, tape, t, rollout.u());
     for (int l = 0; l < rollout.lanes(); ++l) {
       steps_.get(l, step);
-      chains_[size(l)].add(step, controls_[size(l)]);
+      chains_[as_size(l)].add(step, controls_[as_size(l)]);
     }
   }
   for (int l = 0; l < rollout.lanes(); ++l) compose(rollout, r, action, l);
@@ -126,10 +127,10 @@ void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std:
 /// memory.
 void ActionJacobians::ask(TaskRollout& rollout, const ActionRecord& r, std::int64_t action,
                           int step, const BlockTape& tape, int lane) {
-  std::vector<double>& d = controls_[size(lane)];
+  std::vector<double>& d = controls_[as_size(lane)];
   std::fill(d.begin(), d.end(), 0.0);
-  if (!r.taken[size(lane)]) return;
-  const std::size_t nu = size(task_.model().nu()), given = state_ + width_ + memory_;
+  if (!r.taken[as_size(lane)]) return;
+  const std::size_t nu = as_size(task_.model().nu()), given = state_ + width_ + memory_;
   for (std::size_t k = 0; k < nu; ++k) {
     Bars bars(state_, width_, memory_);
     std::vector<double> weight(nu);
@@ -147,8 +148,8 @@ void ActionJacobians::ask(TaskRollout& rollout, const ActionRecord& r, std::int6
 void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::int64_t action,
                               int lane) {
   RowJacobian chain;
-  chains_[size(lane)].get(chain);
-  RowJacobian& out = rows_[size(lane)];
+  chains_[as_size(lane)].get(chain);
+  RowJacobian& out = rows_[as_size(lane)];
   out = {chain.state, chain.previous, std::vector<double>(state_ * width_)};
   std::vector<double> by_memory(state_ * memory_);
   const auto row = [](std::vector<double>& all, std::size_t i, std::size_t width) {
@@ -160,7 +161,7 @@ void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::
     std::copy_n(others.begin() + static_cast<std::ptrdiff_t>(width_), memory_,
                 row(by_memory, i, memory_).begin());
   }
-  if (!r.taken[size(lane)]) return;
+  if (!r.taken[as_size(lane)]) return;
   const Moment seen{of_lane(r.q, lane), of_lane(r.v, lane), {}, {}};
   if (task_.spec().restarts) {
     std::fill(out.state.begin(), out.state.end(), 0.0);

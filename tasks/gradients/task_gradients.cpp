@@ -6,12 +6,11 @@
 
 #include <algorithm>
 
+#include "engine/base/as_size.hpp"
 #include "tasks/gradients/return_block.hpp"
 
 namespace tangere {
 namespace {
-
-std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 TaskGradientOptions checked(const Task& task, TaskGradientOptions o) {
   if (o.episodes < 1 || o.threads < 1)
@@ -30,16 +29,17 @@ TaskGradientOptions checked(const Task& task, TaskGradientOptions o) {
 }  // namespace
 
 TaskGradients empty_task_gradients(const Task& task, const TaskGradientOptions& o) {
-  const std::size_t episodes = size(o.episodes),
-                    actions = size(o.actions) * task.spec().action.size();
+  const std::size_t episodes = as_size(o.episodes),
+                    actions = as_size(o.actions) * task.spec().action.size();
   TaskGradients out;
   out.value.resize(episodes);
   out.length.resize(episodes);
   out.action.resize(episodes * actions);
   out.by_action.resize(episodes * actions);
-  out.by_q.resize(episodes * size(task.model().nv()));
+  out.by_q.resize(episodes * as_size(task.model().nv()));
   out.by_v.resize(out.by_q.size());
-  if (o.parameters) out.by_parameter.resize(episodes * size(NumberGradients(task.model()).count()));
+  if (o.parameters)
+    out.by_parameter.resize(episodes * as_size(NumberGradients(task.model()).count()));
   return out;
 }
 
@@ -49,7 +49,7 @@ TaskGradients task_gradients(const Task& task, const TaskActions& actions,
   const auto blocks = static_cast<int>((o.episodes + kernels::kBlock - 1) / kernels::kBlock);
   TaskGradients out = empty_task_gradients(task, o);
   std::vector<ReturnBlock> workers;  // by the thread's index in the arena
-  workers.reserve(size(o.threads));
+  workers.reserve(as_size(o.threads));
   for (int i = 0; i < o.threads; ++i) workers.emplace_back(task, o);
   BlockThreads threads(o.threads);
   run_gradients(threads, workers, blocks, go_on, out,

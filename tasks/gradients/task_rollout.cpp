@@ -7,36 +7,24 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/base/as_size.hpp"
+#include "tasks/run/number_row.hpp"
+
 namespace tangere {
 
 using kernels::kBlock;
 
-namespace {
-
-std::size_t size(int n) { return static_cast<std::size_t>(n); }
-
-template <class T>
-std::span<T> row(std::vector<T>& all, int lane, std::size_t width) {
-  return std::span(all).subspan(size(lane) * width, width);
-}
-template <class T>
-std::span<const T> row(const std::vector<T>& all, int lane, std::size_t width) {
-  return std::span(all).subspan(size(lane) * width, width);
-}
-
-}  // namespace
-
 ActionRecord::ActionRecord(const Task& task) {
   const auto rows = [](std::size_t width) { return std::vector<double>(kBlock * width); };
-  q = rows(size(task.model().nq()));
-  v = rows(size(task.model().nv()));
-  found = memory = rows(size(task.spec().memory));
+  q = rows(as_size(task.model().nq()));
+  v = rows(as_size(task.model().nv()));
+  found = memory = rows(as_size(task.spec().memory));
   asked = action = rows(task.spec().action.size());
 }
 
 double ActionRecord::bytes(const Task& task) {
-  const std::size_t numbers = size(task.model().nq()) + size(task.model().nv()) +
-                              2 * size(task.spec().memory) + 2 * task.spec().action.size();
+  const std::size_t numbers = as_size(task.model().nq()) + as_size(task.model().nv()) +
+                              2 * as_size(task.spec().memory) + 2 * task.spec().action.size();
   return static_cast<double>(numbers * kBlock * sizeof(double) + sizeof(ActionRecord));
 }
 
@@ -44,9 +32,9 @@ TaskRollout::TaskRollout(const Task& task, const StepperOptions& options, Precis
     : task_(task),
       worker_(task, precision),
       stepper_(task.model(), options),
-      u_(kBlock * size(task.model().nu())),
-      q_(size(task.model().nq())),
-      v_(size(task.model().nv())) {}
+      u_(kBlock * as_size(task.model().nu())),
+      q_(as_size(task.model().nq())),
+      v_(as_size(task.model().nv())) {}
 
 void TaskRollout::start(std::uint64_t seed, std::span<const std::int64_t> episodes) {
   const auto count = static_cast<int>(episodes.size());
@@ -70,8 +58,8 @@ void TaskRollout::start(std::uint64_t seed, std::span<const std::int64_t> episod
 
 void TaskRollout::displace(int lane, std::span<const double> q, std::span<const double> v) {
   batch_->displace_state(lane, q, v);
-  std::copy(q.begin(), q.end(), row(data_->q, lane, q.size()).begin());
-  std::copy(v.begin(), v.end(), row(data_->v, lane, v.size()).begin());
+  std::copy(q.begin(), q.end(), number_row(data_->q, lane, q.size()).begin());
+  std::copy(v.begin(), v.end(), number_row(data_->v, lane, v.size()).begin());
 }
 
 bool TaskRollout::running() const {
@@ -82,20 +70,20 @@ bool TaskRollout::running() const {
 void TaskRollout::choose(const TaskActions& actions, ActionRecord& r) {
   const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
   for (int l = 0; l < lanes(); ++l) {
-    if (data_->state[size(l)] != EnvironmentState::running) continue;
-    const std::span<double> asked = row(r.asked, l, width);
-    actions(view_of(*batch_, *data_, l), row(data_->observation, l, seen), asked);
+    if (data_->state[as_size(l)] != EnvironmentState::running) continue;
+    const std::span<double> asked = number_row(r.asked, l, width);
+    actions(view_of(*batch_, *data_, l), number_row(data_->observation, l, seen), asked);
     for (std::size_t k = 0; k < width; ++k)
       if (!std::isfinite(asked[k]))
         throw InputError(
             fmt::format("number {} of action {} of episode {} is {}; expected a finite number", k,
-                        data_->length[size(l)], data_->episodes[size(l)], asked[k]));
+                        data_->length[as_size(l)], data_->episodes[as_size(l)], asked[k]));
   }
 }
 
 void TaskRollout::begin(ActionRecord& r) {
   for (int l = 0; l < lanes(); ++l)
-    r.taken[size(l)] = data_->state[size(l)] == EnvironmentState::running;
+    r.taken[as_size(l)] = data_->state[as_size(l)] == EnvironmentState::running;
   const auto keep = [&](const std::vector<double>& from, std::vector<double>& to) {
     std::copy(from.begin(), from.end(), to.begin());
   };
@@ -121,19 +109,20 @@ void TaskRollout::conclude() { worker_.conclude(*batch_, *data_, 0, counts_); }
 void TaskRollout::place_again(const ActionRecord& r, std::int64_t action) {
   if (!task_.spec().restarts) return;
   for (int l = 0; l < lanes(); ++l) {
-    if (!r.taken[size(l)]) continue;
-    const auto q = row(r.q, l, q_.size()), v = row(r.v, l, v_.size());
+    if (!r.taken[as_size(l)]) continue;
+    const auto q = number_row(r.q, l, q_.size()), v = number_row(r.v, l, v_.size());
     std::copy(q.begin(), q.end(), q_.begin());
     std::copy(v.begin(), v.end(), v_.begin());
     const Moment seen{q, v, {}, {}};
-    task_.place(view(r, action, l, row(r.memory, l, size(task_.spec().memory)), {&seen, 1}), q_,
-                v_);
+    task_.place(
+        view(r, action, l, number_row(r.memory, l, as_size(task_.spec().memory)), {&seen, 1}), q_,
+        v_);
     batch_->set_state(l, q_, v_);
   }
 }
 
 void TaskRollout::retake_steps(const ActionRecord& r, std::int64_t action, BlockTape& tape) {
-  for (int l = 0; l < lanes(); ++l) batch_->hold(l, !r.taken[size(l)]);
+  for (int l = 0; l < lanes(); ++l) batch_->hold(l, !r.taken[as_size(l)]);
   tape.start(*batch_, 0);
   const int every = task_.spec().control_every;
   for (int k = 0; k < task_.spec().steps_per_action; ++k) {
@@ -144,12 +133,12 @@ void TaskRollout::retake_steps(const ActionRecord& r, std::int64_t action, Block
 
 void TaskRollout::ask_again(const ActionRecord& r, std::int64_t action, int step,
                             const BlockTape& tape) {
-  const std::size_t memory = size(task_.spec().memory);
+  const std::size_t memory = as_size(task_.spec().memory);
   for (int l = 0; l < lanes(); ++l) {
-    if (!r.taken[size(l)]) continue;
+    if (!r.taken[as_size(l)]) continue;
     const Moment first = first_moment(tape, l);
-    task_.controls(view(r, action, l, row(r.memory, l, memory), {&first, 1}), step,
-                   row(u_, l, size(task_.model().nu())));
+    task_.controls(view(r, action, l, number_row(r.memory, l, memory), {&first, 1}), step,
+                   number_row(u_, l, as_size(task_.model().nu())));
   }
 }
 
@@ -163,10 +152,10 @@ void TaskRollout::look_again(const BlockTape& tape) {
 TaskView TaskRollout::view(const ActionRecord& r, std::int64_t action, int lane,
                            std::span<const double> memory, std::span<const Moment> now) const {
   return {batch_->seed(),
-          data_->episodes[size(lane)],
+          data_->episodes[as_size(lane)],
           action,
           memory,
-          row(r.action, lane, task_.spec().action.size()),
+          number_row(r.action, lane, task_.spec().action.size()),
           now};
 }
 

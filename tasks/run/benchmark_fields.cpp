@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "engine/base/as_size.hpp"
 #include "kernels/numbers/block.hpp"
 
 namespace tangere {
@@ -13,13 +14,11 @@ namespace {
 using kernels::kBlock;
 constexpr int kTileSide = 8;
 
-std::size_t size(int n) { return static_cast<std::size_t>(n); }
-
 template <class Frame>
 std::vector<std::vector<Frame>> make(const Model& model, int environments) {
   std::vector<std::vector<Frame>> frames(model.sensors().size());
   for (std::size_t s = 0; s < frames.size(); ++s) {
-    frames[s].reserve(size(environments));
+    frames[s].reserve(as_size(environments));
     for (int e = 0; e < environments; ++e) frames[s].emplace_back(model, static_cast<int>(s));
   }
   return frames;
@@ -60,11 +59,11 @@ void BenchmarkFields::read(Readout& readout, const Batch& batch, int block, int 
   std::visit(
       [&](auto& store) {
         if constexpr (!std::is_same_v<std::decay_t<decltype(store)>, std::monostate>) {
-          auto& frames = store[size(sensor)];
-          const std::size_t first = size(block * kBlock);
+          auto& frames = store[as_size(sensor)];
+          const std::size_t first = as_size(block * kBlock);
           readout.read_block(
               batch, block,
-              std::span(frames).subspan(first, std::min(frames.size() - first, size(kBlock))));
+              std::span(frames).subspan(first, std::min(frames.size() - first, as_size(kBlock))));
         }
       },
       frames_);
@@ -76,7 +75,7 @@ std::uint64_t BenchmarkFields::chain(std::uint64_t checksum, int environment, in
         if constexpr (std::is_same_v<std::decay_t<decltype(store)>, std::monostate>) {
           return checksum;
         } else {
-          return chain_field(checksum, store[size(sensor)][size(environment)]);
+          return chain_field(checksum, store[as_size(sensor)][as_size(environment)]);
         }
       },
       frames_);

@@ -11,6 +11,7 @@
 #include <ctime>
 #include <string>
 
+#include "engine/base/as_size.hpp"
 #include "engine/step/stepper.hpp"
 #include "kernels/numbers/block.hpp"
 #include "tasks/run/benchmark_fields.hpp"
@@ -41,8 +42,6 @@ double cpu_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
-
 /// Scratch of one thread.
 struct Worker {
   Stepper stepper;
@@ -70,10 +69,10 @@ class Benchmark {
         go_on_(go_on),
         data_(std::move(task_data)),
         frames_(data_ == nullptr ? options.frames : FrameKind::none),
-        u_(size(start.environments()) * size(start.model().nu())),
+        u_(as_size(start.environments()) * as_size(start.model().nu())),
         fields_(start.model(), start.environments(), frames_, options.precision),
-        tallies_(size(start.blocks())),
-        checksums_(size(start.environments())),
+        tallies_(as_size(start.blocks())),
+        checksums_(as_size(start.environments())),
         threads_(options.threads) {
     for (int i = 0; i < options.threads; ++i)
       workers_.push_back(
@@ -151,7 +150,7 @@ class Benchmark {
     StepTally steps(batch_, first, last - first);
     if (checked)
       for (int e = first; e < last; ++e)
-        checksums_[size(e)] = static_cast<std::uint64_t>(start_.episode(e));
+        checksums_[as_size(e)] = static_cast<std::uint64_t>(start_.episode(e));
     for (std::int64_t row = 0; row < options_.rollout.steps; ++row) {
       for (int k = 0; k < program.steps_per_row(); ++k) {
         if (go_on_ && !go_on_()) {
@@ -175,7 +174,7 @@ class Benchmark {
       tally.failures = std::move(steps.failures);
       if (checked) chain_states(first, last);
     }
-    tallies_[size(block)] = std::move(tally);
+    tallies_[as_size(block)] = std::move(tally);
   }
 
   /// The fields due after `done` steps.
@@ -189,17 +188,17 @@ class Benchmark {
       for (int e = first; e < last; ++e) {
         if (!steps.live(e)) continue;
         tally.tactile_points += sensors[s].points;
-        if (checked) checksums_[size(e)] = fields_.chain(checksums_[size(e)], e, sensor);
+        if (checked) checksums_[as_size(e)] = fields_.chain(checksums_[as_size(e)], e, sensor);
       }
     }
   }
 
   void chain_states(int first, int last) {
-    std::vector<double> q(size(batch_.model().nq())), v(size(batch_.model().nv()));
+    std::vector<double> q(as_size(batch_.model().nq())), v(as_size(batch_.model().nv()));
     for (int e = first; e < last; ++e) {
       batch_.get_q(e, q);
       batch_.get_v(e, v);
-      checksums_[size(e)] = chain_bits(chain_bits(checksums_[size(e)], q), v);
+      checksums_[as_size(e)] = chain_bits(chain_bits(checksums_[as_size(e)], q), v);
     }
   }
 
@@ -207,7 +206,7 @@ class Benchmark {
     const EnvironmentData& d = *data_;
     const std::size_t seen = d.observation.size() / d.reward.size();
     for (int e = first; e < last; ++e) {
-      const std::size_t i = size(e);
+      const std::size_t i = as_size(e);
       const std::array<double, 4> rest{d.reward[i], double(d.terminated[i]), double(d.truncated[i]),
                                        double(d.success[i])};
       checksums_[i] =

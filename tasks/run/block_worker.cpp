@@ -7,38 +7,25 @@
 #include <array>
 #include <cmath>
 
+#include "engine/base/as_size.hpp"
 #include "kernels/numbers/block.hpp"
 #include "tasks/run/block_reader.hpp"
+#include "tasks/run/number_row.hpp"
 
 namespace tangere {
 
 using kernels::kBlock;
 
-namespace {
-
-std::size_t size(int n) { return static_cast<std::size_t>(n); }
-
-template <class T>
-std::span<T> row(std::vector<T>& all, int environment, std::size_t width) {
-  return std::span(all).subspan(size(environment) * width, width);
-}
-template <class T>
-std::span<const T> row(const std::vector<T>& all, int environment, std::size_t width) {
-  return std::span(all).subspan(size(environment) * width, width);
-}
-
-}  // namespace
-
 EnvironmentData::EnvironmentData(const Task& task, int environments) {
   const TaskSpec& spec = task.spec();
   const Model& model = task.model();
-  const std::size_t e = size(environments);
-  memory.resize(e * size(spec.memory));
+  const std::size_t e = as_size(environments);
+  memory.resize(e * as_size(spec.memory));
   action.resize(e * spec.action.size());
   observation.resize(e * spec.observation_size());
-  u.resize(e * size(model.nu()));
-  q.resize(e * size(model.nq()));
-  v.resize(e * size(model.nv()));
+  u.resize(e * as_size(model.nu()));
+  q.resize(e * as_size(model.nq()));
+  v.resize(e * as_size(model.nv()));
   for (std::vector<double>* numbers : {&reward, &returns}) numbers->resize(e);
   for (std::vector<std::uint8_t>* flags : {&terminated, &truncated, &success, &starting})
     flags->resize(e);
@@ -47,14 +34,15 @@ EnvironmentData::EnvironmentData(const Task& task, int environments) {
   next_episode.resize(e);
   state.assign(e, EnvironmentState::to_start);
   for (int i = 0; i < environments; ++i)
-    now.push_back({row(q, i, size(model.nq())), row(v, i, size(model.nv())), {}, {}});
+    now.push_back(
+        {number_row(q, i, as_size(model.nq())), number_row(v, i, as_size(model.nv())), {}, {}});
 }
 
 double EnvironmentData::bytes(const Task& task) {
   const TaskSpec& spec = task.spec();
   const Model& model = task.model();
-  const std::size_t numbers = size(spec.memory) + spec.action.size() + spec.observation_size() +
-                              size(model.nu()) + size(model.nq()) + size(model.nv()) + 5;
+  const std::size_t numbers = as_size(spec.memory) + spec.action.size() + spec.observation_size() +
+                              as_size(model.nu()) + as_size(model.nq()) + as_size(model.nv()) + 5;
   return static_cast<double>(numbers * sizeof(double) + 5 + sizeof(Moment));
 }
 
@@ -65,7 +53,7 @@ void EnvironmentData::restart(const Batch& batch) {
 }
 
 void EnvironmentData::start_next(int first, int environments) {
-  for (std::size_t e = size(first); e < size(first + environments); ++e) {
+  for (std::size_t e = as_size(first); e < as_size(first + environments); ++e) {
     if (state[e] != EnvironmentState::over) continue;
     state[e] = EnvironmentState::to_start;
     next_episode[e] = episodes[e] + std::ssize(state);
@@ -73,14 +61,14 @@ void EnvironmentData::start_next(int first, int environments) {
 }
 
 TaskView view_of(const Batch& batch, const EnvironmentData& data, int environment) {
-  const std::size_t e = size(environment), environments = data.reward.size();
+  const std::size_t e = as_size(environment), environments = data.reward.size();
   const std::size_t memory = data.memory.size() / environments,
                     action = data.action.size() / environments;
   return {batch.seed(),
           data.episodes[e],
           data.length[e],
-          row(data.memory, environment, memory),
-          row(data.action, environment, action),
+          number_row(data.memory, environment, memory),
+          number_row(data.action, environment, action),
           {&data.now[e], 1}};
 }
 
@@ -90,8 +78,8 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
       varying_(task.model().scene().randomizations.size()) {
   const TaskSpec& spec = task.spec();
   const std::size_t moments = spec.moments.size();
-  q_.resize(moments * kBlock * size(task.model().nq()));
-  v_.resize(moments * kBlock * size(task.model().nv()));
+  q_.resize(moments * kBlock * as_size(task.model().nq()));
+  v_.resize(moments * kBlock * as_size(task.model().nv()));
   end_effectors_.resize(moments * kBlock * task.end_effectors_size());
   tactile_.resize(moments * kBlock * task.tactile_size());
   for (int lane = 0; lane < kBlock; ++lane)
@@ -105,7 +93,7 @@ BlockWorker::BlockWorker(const Task& task, Precision precision)
 }
 
 double BlockWorker::bytes(const Task& task) {
-  const std::size_t numbers = size(task.model().nq()) + size(task.model().nv()) +
+  const std::size_t numbers = as_size(task.model().nq()) + as_size(task.model().nv()) +
                               task.end_effectors_size() + task.tactile_size();
   return static_cast<double>(task.spec().moments.size() * kBlock * numbers * sizeof(double));
 }
@@ -113,7 +101,7 @@ double BlockWorker::bytes(const Task& task) {
 std::span<double> BlockWorker::part(std::vector<double>& of_moments, std::size_t moment,
                                     int lane) const {
   const std::size_t width = of_moments.size() / (task_.spec().moments.size() * kBlock);
-  return std::span(of_moments).subspan((moment * kBlock + size(lane)) * width, width);
+  return std::span(of_moments).subspan((moment * kBlock + as_size(lane)) * width, width);
 }
 
 void BlockWorker::act(Batch& batch, Stepper& stepper, EnvironmentData& data, int block,
@@ -131,10 +119,10 @@ void BlockWorker::begin(Batch& batch, EnvironmentData& data, int block,
                         std::span<const double> actions) {
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
   for (int e = first; e < last; ++e) {
-    data.starting[size(e)] = data.state[size(e)] == EnvironmentState::to_start ? 1 : 0;
-    if (data.starting[size(e)] != 0) {
+    data.starting[as_size(e)] = data.state[as_size(e)] == EnvironmentState::to_start ? 1 : 0;
+    if (data.starting[as_size(e)] != 0) {
       start(batch, data, e);
-    } else if (data.state[size(e)] == EnvironmentState::running) {
+    } else if (data.state[as_size(e)] == EnvironmentState::running) {
       take_action(batch, data, e, actions);
     }
   }
@@ -146,7 +134,8 @@ void BlockWorker::ask_for_controls(const Batch& batch, EnvironmentData& data, in
   const int first = block * kBlock, last = std::min(first + kBlock, batch.environments());
   for (int e = first; e < last; ++e)
     if (!batch.held(e))
-      task_.controls(view_of(batch, data, e), step, row(data.u, e, size(task_.model().nu())));
+      task_.controls(view_of(batch, data, e), step,
+                     number_row(data.u, e, as_size(task_.model().nu())));
 }
 
 void BlockWorker::look_after(const Batch& batch, int block, int step, VectorCounts& counts) {
@@ -159,7 +148,7 @@ void BlockWorker::look_after(const Batch& batch, int block, int step, VectorCoun
   }
   const std::vector<int>& moments = task_.spec().moments;
   const auto moment = std::lower_bound(moments.begin(), moments.end(), step + 1);
-  if (*moment == step + 1) look(batch, block, size(static_cast<int>(moment - moments.begin())));
+  if (*moment == step + 1) look(batch, block, as_size(static_cast<int>(moment - moments.begin())));
 }
 
 void BlockWorker::look_at_start(const Batch& batch, int block) {
@@ -173,15 +162,15 @@ void BlockWorker::conclude(Batch& batch, EnvironmentData& data, int block, Vecto
 
 std::span<const Moment> BlockWorker::moments(int lane) const {
   const std::size_t count = task_.spec().moments.size();
-  return std::span(moments_).subspan(size(lane) * count, count);
+  return std::span(moments_).subspan(as_size(lane) * count, count);
 }
 
 void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
   const TaskSpec& spec = task_.spec();
-  const std::size_t e = size(environment);
-  const std::span<double> q = row(data.q, environment, size(task_.model().nq()));
-  const std::span<double> v = row(data.v, environment, size(task_.model().nv()));
-  const std::span<double> memory = row(data.memory, environment, size(spec.memory));
+  const std::size_t e = as_size(environment);
+  const std::span<double> q = number_row(data.q, environment, as_size(task_.model().nq()));
+  const std::span<double> v = number_row(data.v, environment, as_size(task_.model().nv()));
+  const std::span<double> memory = number_row(data.memory, environment, as_size(spec.memory));
   data.episodes[e] = data.next_episode[e];
   data.length[e] = 0;
   data.returns[e] = 0;
@@ -195,7 +184,7 @@ void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
   for (std::size_t k = 0; k < varying_.size(); ++k)
     if (batch.is_parameter(static_cast<int>(k)))
       batch.set_randomized_value(environment, static_cast<int>(k), varying_[k]);
-  const std::span<double> action = row(data.action, environment, spec.action.size());
+  const std::span<double> action = number_row(data.action, environment, spec.action.size());
   std::fill(action.begin(), action.end(), 0.0);
   if (spec.settling_steps > 0) settle(batch, data, environment);
   batch.set_state(environment, q, v);
@@ -210,33 +199,33 @@ void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
 void BlockWorker::settle(const Batch& batch, EnvironmentData& data, int environment) {
   const Model& model = task_.model();
   if (!settling_ || settling_->seed() != batch.seed()) settling_.emplace(model, 1, batch.seed());
-  const Moment& now = data.now[size(environment)];
-  settling_->reset(0, data.episodes[size(environment)]);
+  const Moment& now = data.now[as_size(environment)];
+  settling_->reset(0, data.episodes[as_size(environment)]);
   for (std::size_t k = 0; k < varying_.size(); ++k)
     if (batch.is_parameter(static_cast<int>(k)))
       settling_->set_randomized_value(0, static_cast<int>(k), varying_[k]);
   settling_->set_state(0, now.q, now.v);
-  const std::span<double> u = row(data.u, environment, size(model.nu()));
+  const std::span<double> u = number_row(data.u, environment, as_size(model.nu()));
   task_.controls(view_of(batch, data, environment), 0, u);
   for (int k = 0; k < task_.spec().settling_steps; ++k) settling_stepper_->step(*settling_, u);
-  settling_->get_q(0, row(data.q, environment, now.q.size()));
-  settling_->get_v(0, row(data.v, environment, now.v.size()));
+  settling_->get_q(0, number_row(data.q, environment, now.q.size()));
+  settling_->get_v(0, number_row(data.v, environment, now.v.size()));
 }
 
 void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environment,
                               std::span<const double> actions) {
   const TensorSpec& spec = task_.spec().action;
-  const std::span<double> action = row(data.action, environment, spec.size());
+  const std::span<double> action = number_row(data.action, environment, spec.size());
   for (std::size_t k = 0; k < action.size(); ++k) {
-    const double asked = actions[size(environment) * spec.size() + k];
+    const double asked = actions[as_size(environment) * spec.size() + k];
     // clamp() lets NaN pass: the controls are NaN then, and the step says so.
     action[k] = std::clamp(asked, spec.low, spec.high);
   }
   task_.begin_action(view_of(batch, data, environment),
-                     row(data.memory, environment, size(task_.spec().memory)));
+                     number_row(data.memory, environment, as_size(task_.spec().memory)));
   if (!task_.spec().restarts) return;
-  const std::span<double> q = row(data.q, environment, size(task_.model().nq()));
-  const std::span<double> v = row(data.v, environment, size(task_.model().nv()));
+  const std::span<double> q = number_row(data.q, environment, as_size(task_.model().nq()));
+  const std::span<double> v = number_row(data.v, environment, as_size(task_.model().nv()));
   task_.place(view_of(batch, data, environment), q, v);
   batch.set_state(environment, q, v);
 }
@@ -253,7 +242,7 @@ void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
   if (!task_.spec().looks_at_tactile) return;
   std::size_t offset = 0;
   for (std::size_t s = 0; s < task_.model().sensors().size(); ++s) {
-    const std::size_t numbers = 3 * size(task_.model().sensors()[s].points);
+    const std::size_t numbers = 3 * as_size(task_.model().sensors()[s].points);
     read_field<double>(readout_, batch, block, static_cast<int>(s), [&](int e) {
       return part(tactile_, moment, e - first).subspan(offset, numbers);
     });
@@ -264,15 +253,15 @@ void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
 void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environment,
                                VectorCounts& counts) {
   const TaskSpec& spec = task_.spec();
-  const std::size_t e = size(environment);
+  const std::size_t e = as_size(environment);
   data.reward[e] = 0;
   if (data.state[e] == EnvironmentState::over) return;
   TaskView view = view_of(batch, data, environment);
   const std::span<const Moment> moments = this->moments(environment % kBlock);
   view.moments = moments;
   const Moment& now = moments.back();
-  std::copy(now.q.begin(), now.q.end(), row(data.q, environment, now.q.size()).begin());
-  std::copy(now.v.begin(), now.v.end(), row(data.v, environment, now.v.size()).begin());
+  std::copy(now.q.begin(), now.q.end(), number_row(data.q, environment, now.q.size()).begin());
+  std::copy(now.v.begin(), now.v.end(), number_row(data.v, environment, now.v.size()).begin());
   data.terminated[e] = data.truncated[e] = data.success[e] = 0;
   if (data.starting[e] != 0) {
     if (!spec.opening) {
@@ -295,7 +284,7 @@ void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environm
       batch.hold(environment);
     }
   }
-  task_.observe(view, row(data.observation, environment, spec.observation_size()));
+  task_.observe(view, number_row(data.observation, environment, spec.observation_size()));
 }
 
 }  // namespace tangere

@@ -7,12 +7,11 @@
 
 #include <algorithm>
 
+#include "engine/base/as_size.hpp"
 #include "tasks/run/block_reader.hpp"
 
 namespace tangere {
 namespace {
-
-std::size_t size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 constexpr std::size_t kQ = 0, kV = 1, kThird = 2;  // names of observations
 
@@ -41,7 +40,7 @@ int whole_rows(int most) {
 /// Every action is held for K steps, so the controls may not change in between. The kinds of
 /// control change at the same steps in every episode, so one is looked at.
 void check_held(const ControlProgram& controls, const EpisodeOptions& options, int nu) {
-  std::vector<double> action(size(nu)), u(size(nu));
+  std::vector<double> action(as_size(nu)), u(as_size(nu));
   for (std::int64_t t = 0; options.every > 1 && t < options.steps; ++t) {
     std::vector<double>& now = t % options.every == 0 ? action : u;
     controls.evaluate(t, 0, now);
@@ -60,11 +59,11 @@ EpisodeSource shape_of(const Model& model, const EpisodeOptions& options) {
   EpisodeSource s;
   s.model = &model;
   s.rows = action_rows(options);
-  s.action = size(model.nu());
-  s.widths = {size(model.nq()), size(model.nv())};
+  s.action = as_size(model.nu());
+  s.widths = {as_size(model.nq()), as_size(model.nv())};
   if (!model.end_effectors().empty()) s.widths.push_back(3 * model.end_effectors().size());
   s.first_sensor = s.widths.size();
-  for (const SensorInfo& sensor : model.sensors()) s.widths.push_back(3 * size(sensor.points));
+  for (const SensorInfo& sensor : model.sensors()) s.widths.push_back(3 * as_size(sensor.points));
   return s;
 }
 
@@ -73,7 +72,7 @@ EpisodeSource shape_of(const Task& task) {
   s.model = &task.model();
   s.rows = task.spec().horizon;
   s.action = task.spec().action.size();
-  s.widths = {size(task.model().nq()), size(task.model().nv())};
+  s.widths = {as_size(task.model().nq()), as_size(task.model().nv())};
   for (const TensorSpec& tensor : task.spec().observations) s.widths.push_back(tensor.size());
   s.first_sensor = s.widths.size();
   s.whole = true;
@@ -127,13 +126,13 @@ EpisodeSlot<T>::EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& o
       piece_rows_(piece_rows(source, options)),
       stepper_(*source.model, source.solver),
       readout_(*source.model, options.precision),
-      u_(kBlockEpisodes * size(source.model->nu())),
+      u_(kBlockEpisodes * as_size(source.model->nu())),
       values_(source.widths.size()),
-      actions_(kBlockEpisodes * size(piece_rows_) * source.action),
-      rewards_(source.whole ? kBlockEpisodes * size(piece_rows_) : 0),
+      actions_(kBlockEpisodes * as_size(piece_rows_) * source.action),
+      rewards_(source.whole ? kBlockEpisodes * as_size(piece_rows_) : 0),
       observations_(source.widths.size()) {
   for (std::size_t name = 0; name < values_.size(); ++name) {
-    values_[name].resize(kBlockEpisodes * size(piece_rows_) * source.widths[name]);
+    values_[name].resize(kBlockEpisodes * as_size(piece_rows_) * source.widths[name]);
     small_.resize(std::max(small_.size(), name < source.first_sensor ? source.widths[name] : 0));
   }
 }
@@ -154,7 +153,7 @@ void EpisodeSlot<T>::begin(EpisodeRange range) {
   for (int e = 0; e < episodes; ++e)
     for (int k = 0; k < std::ssize(source_.model->scene().randomizations); ++k)
       randomized_.push_back(batch_->randomized_value(e, k));
-  playing_.assign(size(episodes), true);
+  playing_.assign(as_size(episodes), true);
   ends_.clear();
   failures_.clear();
 }
@@ -177,14 +176,15 @@ bool EpisodeSlot<T>::simulate(const StopRequest& stop,
   for (std::size_t name = 0; name < values_.size(); ++name)
     observations_[name] =
         std::span<const T>(values_[name])
-            .first(size(batch_->environments()) * size(rows_) * source_.widths[name]);
+            .first(as_size(batch_->environments()) * as_size(rows_) * source_.widths[name]);
   return true;
 }
 
 template <class T>
 std::span<T> EpisodeSlot<T>::numbers(std::size_t name, int episode, int row) {
   const std::size_t width = source_.widths[name];
-  return std::span(values_[name]).subspan((size(episode) * size(rows_) + size(row)) * width, width);
+  return std::span(values_[name])
+      .subspan((as_size(episode) * as_size(rows_) + as_size(row)) * width, width);
 }
 
 template <class T>
@@ -203,7 +203,7 @@ std::int64_t EpisodeSlot<T>::environment_steps() const {
 template <class T>
 void EpisodeSlot<T>::observe(int row) {
   for (int e = 0; e < batch_->environments(); ++e) {
-    if (!playing_[size(e)]) continue;
+    if (!playing_[as_size(e)]) continue;
     const std::span<double> q = std::span(small_).first(source_.widths[kQ]),
                             v = std::span(small_).first(source_.widths[kV]);
     batch_->get_q(e, q);
@@ -223,22 +223,23 @@ void EpisodeSlot<T>::observe_task(const TaskProgram& task, int row) {
   const EnvironmentData& data = task.data();
   const std::size_t width = task.task().spec().observation_size();
   for (int e = 0; e < batch_->environments(); ++e) {
-    if (!playing_[size(e)]) continue;
-    std::span<const double> rest = std::span(data.observation).subspan(size(e) * width, width);
+    if (!playing_[as_size(e)]) continue;
+    std::span<const double> rest = std::span(data.observation).subspan(as_size(e) * width, width);
     for (std::size_t name = kThird; name < source_.widths.size(); ++name) {
       put(name, e, row, rest.first(source_.widths[name]));
       rest = rest.subspan(source_.widths[name]);
     }
-    playing_[size(e)] = data.state[size(e)] == EnvironmentState::running;
+    playing_[as_size(e)] = data.state[as_size(e)] == EnvironmentState::running;
   }
 }
 
 template <class T>
 void EpisodeSlot<T>::observe_scene(int row) {
   if (source_.first_sensor > kThird) {
-    std::vector<double> positions(size(batch_->environments()) * source_.widths[kThird]);
+    std::vector<double> positions(as_size(batch_->environments()) * source_.widths[kThird]);
     const auto place = [&](int e) {
-      return std::span(positions).subspan(size(e) * source_.widths[kThird], source_.widths[kThird]);
+      return std::span(positions).subspan(as_size(e) * source_.widths[kThird],
+                                          source_.widths[kThird]);
     };
     read_end_effectors(readout_, *batch_, 0, place);
     for (int e = 0; e < batch_->environments(); ++e) put(kThird, e, row, place(e));
@@ -258,9 +259,9 @@ bool EpisodeSlot<T>::act(int row, const StopRequest& stop) {
   program_->judge(*batch_, 0);
   if (const TaskProgram* const task = program_->judged())
     for (int e = 0; e < batch_->environments(); ++e)
-      if (playing_[size(e)])
-        rewards_[size(e) * size(action_rows_) + size(row)] =
-            static_cast<float>(task->data().reward[size(e)]);
+      if (playing_[as_size(e)])
+        rewards_[as_size(e) * as_size(action_rows_) + as_size(row)] =
+            static_cast<float>(task->data().reward[as_size(e)]);
   return true;
 }
 
@@ -284,11 +285,11 @@ void EpisodeSlot<T>::keep_action(int row) {
   const TaskProgram* const task = program_->judged();
   const std::size_t width = source_.action;
   for (int e = 0; e < batch_->environments(); ++e) {
-    if (!playing_[size(e)]) continue;
+    if (!playing_[as_size(e)]) continue;
     const std::vector<double>& from = task != nullptr ? task->data().action : u_;
-    float* const to = actions_.data() + (size(e) * size(action_rows_) + size(row)) * width;
+    float* const to = actions_.data() + (as_size(e) * as_size(action_rows_) + as_size(row)) * width;
     for (std::size_t k = 0; k < width; ++k) {
-      const double x = from[size(e) * width + k];
+      const double x = from[as_size(e) * width + k];
       to[k] = static_cast<float>(task != nullptr ? x : std::clamp(x, -1.0, 1.0));
     }
   }
@@ -316,7 +317,8 @@ void EpisodeSlot<T>::collect() {
 template <class T>
 std::int64_t EpisodeSlot<T>::step_of_failure(int episode) const {
   if (!ends_.empty())
-    return std::max<std::int64_t>(0, ends_[size(episode)].length - 1) * program_->steps_per_row();
+    return std::max<std::int64_t>(0, ends_[as_size(episode)].length - 1) *
+           program_->steps_per_row();
   return std::find_if(tally_->failures.begin(), tally_->failures.end(),
                       [episode](const auto& f) { return f.environment == episode; })
       ->step;
@@ -338,16 +340,16 @@ void EpisodeSlot<T>::add_to(EpisodeSummary& run) const {
       ++failure;
       continue;
     }
-    run.rows += task != nullptr ? ends_[size(e)].length : source_.rows;
+    run.rows += task != nullptr ? ends_[as_size(e)].length : source_.rows;
     if (task == nullptr) continue;
-    run.successes += ends_[size(e)].success ? 1 : 0;
-    run.mean_return += ends_[size(e)].total;
+    run.successes += ends_[as_size(e)].success ? 1 : 0;
+    run.mean_return += ends_[as_size(e)].total;
   }
 }
 
 template <class T>
 EpisodeRows EpisodeSlot<T>::piece() const {
-  const std::size_t actions = size(batch_->environments()) * size(action_rows_);
+  const std::size_t actions = as_size(batch_->environments()) * as_size(action_rows_);
   EpisodeRows piece{batch_->episode(0), batch_->environments(),
                     first_row_,         rows_,
                     action_rows_,       std::span(actions_).first(actions * source_.action),

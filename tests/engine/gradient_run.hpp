@@ -152,15 +152,20 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
   return g;
 }
 
-/// The central difference that changes least from one step size to the next; NaN where none settles
-/// (a kink). The smallest steps are for runs that have a kink or a split step close by.
+/// The central difference of least error; NaN where none settles (a kink). Its error is taken as its
+/// change from the step size before and what rounding makes of it: at the smallest steps, which are
+/// for runs with a kink or a split step close by, two differences can agree by chance.
 inline double best_difference(const std::function<double(double)>& f, double start) {
+  constexpr double kRounding = 1e-14;  // of a run's loss, relative
   double best = NAN, least = HUGE_VAL, before = NAN;
   for (double e = start; e > 1e-5 * start; e *= 0.25) {
     // Richardson's: the error of second order taken out.
-    const double coarse = (f(2 * e) - f(-2 * e)) / (4 * e), fine = (f(e) - f(-e)) / (2 * e);
+    const double above = f(e), below = f(-e);
+    const double coarse = (f(2 * e) - f(-2 * e)) / (4 * e), fine = (above - below) / (2 * e);
     const double value = (4 * fine - coarse) / 3;
-    if (std::abs(value - before) < least) least = std::abs(value - before), best = value;
+    const double rounding = kRounding * (std::abs(above) + std::abs(below)) / e;
+    const double error = std::abs(value - before) + rounding;
+    if (error < least) least = error, best = value;
     before = value;
   }
   return best;

@@ -7,8 +7,8 @@
 
 #include "engine/derivative/field_tangent.hpp"
 #include "engine/derivative/number_gradients.hpp"
-#include "engine/derivative/point_numbers.hpp"
 #include "engine/derivative/readout_pullback.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/derivative/tangent.hpp"
 #include "engine/sense/readout.hpp"
 #include "kernels/table/kernel_table.hpp"

@@ -118,7 +118,7 @@ TEST(Random, LogUniformBetweenBounds) {
   const auto draws = series(d, of_episode);
   EXPECT_LT(distance(draws, [](double x) { return std::log(x / 1e-3) / std::log(1e4); }),
             kLargestDistance);
-  EXPECT_THAT(draws, testing::Each(testing::AllOf(testing::Ge(1e-3), testing::Le(10))));
+  EXPECT_THAT(draws, ::testing::Each(::testing::AllOf(::testing::Ge(1e-3), ::testing::Le(10))));
   EXPECT_EQ(log_uniform(of_episode(1), 0.1, 0.1), 0.1);
 }
 

@@ -139,7 +139,7 @@ TEST(Dataset, SaysWhatItsNumbersAre) {
   const h5::Id data = h5::open_group(file, "data");
   EXPECT_EQ(whole(data, "total"), 18 * 3);
   EXPECT_EQ(h5::read_text(data, "env_args"),
-            R"({"env_name": "syn \"thetic\"", "type": 2, "env_kwargs": {}})");
+            R"({"env_name":"syn \"thetic\"","type":2,"env_kwargs":{}})");
   const h5::Id scene = h5::open_group(file, "scene");
   EXPECT_EQ(h5::read_text(scene, "text"), "<tangere/>");
   EXPECT_EQ(h5::read_numbers<std::uint64_t>(scene, "seed").at(0), 18446744073709551615ULL);

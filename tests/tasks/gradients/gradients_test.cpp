@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "engine/derivative/point_numbers.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/tape.hpp"
 #include "io/scene/scene_reader.hpp"

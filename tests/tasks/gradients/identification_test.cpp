@@ -123,7 +123,7 @@ TEST(Identification, RefusesWhatCannotBeFitted) {
   };
   EXPECT_THAT(message(r.scene, r.clean, {"tactile pad stiffness"}),
               HasSubstr("no number 'tactile pad stiffness'"));
-  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball kn"}), testing::IsEmpty())
+  EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball kn"}), ::testing::IsEmpty())
       << "any number of the scene";
   // The ball never slips on the ground.
   EXPECT_THAT(message(r.scene, r.clean, {"tactile pad kn", "ground ball mu"}),

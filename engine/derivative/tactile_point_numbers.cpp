@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Counts of tactile points, and an array of them one by one.
-#include "engine/derivative/point_numbers.hpp"
+#include "engine/derivative/tactile_point_numbers.hpp"
 
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/frames.hpp"

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Numbers of many environments lie in one list, as many for each.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/base/as_size.hpp"
+
+namespace tangere {
+
+/// The `width` numbers of one environment.
+template <class T>
+std::span<T> number_row(std::vector<T>& all, int environment, std::size_t width) {
+  return std::span(all).subspan(as_size(environment) * width, width);
+}
+template <class T>
+std::span<const T> number_row(const std::vector<T>& all, int environment, std::size_t width) {
+  return std::span(all).subspan(as_size(environment) * width, width);
+}
+
+}  // namespace tangere
