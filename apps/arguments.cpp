@@ -25,7 +25,7 @@ bool parse(const std::string& text, T& number) {
   return result.ec == std::errc() && result.ptr == end;
 }
 
-/// "--output" of "-o,--output".
+/// Returns "--output" for "-o,--output".
 std::string long_name(const std::string& flags) { return flags.substr(flags.find("--")); }
 
 /// Uses long names only, because every single letter resembles every other.
@@ -99,15 +99,14 @@ std::string Parser::chosen_name() const {
   return command == nullptr ? "" : command->get_name();
 }
 
-/// A word out of place says more than what is missing because of it.
+/// Checks words first: a word out of place explains more than what is missing because of it.
 void Parser::check_words() const {
   if (!root_->get_subcommands({}).empty()) check_no_extras(*root_, chosen());
 }
 
 CLI::App& add_command(CLI::App& program, const std::string& name, const std::string& description,
                       const std::string& example) {
-  // What the parser cannot place is reported by us, with the nearest name; subcommands inherit
-  // that.
+  // We report what the parser cannot place, with the nearest name. Subcommands inherit that.
   program.require_subcommand(0, 1);
   program.allow_extras();
   CLI::App* command = program.add_subcommand(name, description);

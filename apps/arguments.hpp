@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The command line: options as numbers, and what to say about words that are no option. The
-// parser's library is slow to compile, so its headers stay behind this one (arguments.cpp).
+// The command line: turns options into numbers and explains words that are no option. The parser's
+// library is slow to compile, so only arguments.cpp includes its headers.
 #pragma once
 
 #include <cstdint>
@@ -19,11 +19,11 @@ class Option;
 
 namespace tangere::apps {
 
-/// Of one run: more is a mistyped number.
+/// Limit for one run; a larger number is a typing mistake.
 inline constexpr int kMostThreads = 4096;
 
-/// A program's command line: its options and, if it has any, its subcommands. Made once; options
-/// point into their variables.
+/// A program's command line: its options and, if it has any, its subcommands. Made once, because
+/// options point into their variables.
 class Parser {
  public:
   Parser(const std::string& description, const std::string& name, const std::string& footer);
@@ -31,13 +31,13 @@ class Parser {
   Parser(const Parser&) = delete;
   Parser& operator=(const Parser&) = delete;
 
-  /// What functions below add options and subcommands to.
+  /// The object to which the functions below add options and subcommands.
   [[nodiscard]] CLI::App& root() { return *root_; }
-  /// --version prints the text.
+  /// Makes --version print the text.
   void add_version(const std::function<std::string()>& text, const std::string& description);
 
-  /// False when --help or --version was answered, on stdout. Throws InputError for everything that
-  /// does not belong, with the nearest name where a word is unknown.
+  /// Returns false if --help or --version was answered on stdout. Throws InputError for everything
+  /// that does not belong, with the nearest name for an unknown word.
   bool parse(int argc, char** argv);
 
   /// The chosen subcommand; null when there is none.
@@ -51,11 +51,11 @@ class Parser {
   std::unique_ptr<CLI::App> root_;
 };
 
-/// Adds the subcommand `name`. `example`: a command line that works, shown below its options.
+/// Adds the subcommand `name`. `example`: a working command line, shown below its options.
 CLI::App& add_command(CLI::App& program, const std::string& name, const std::string& description,
                       const std::string& example);
 
-/// An option or argument that was added: what else holds for it.
+/// An added option or argument, to set what else holds for it.
 class AddedOption {
  public:
   explicit AddedOption(CLI::Option& option) : option_(&option) {}
@@ -66,38 +66,38 @@ class AddedOption {
   CLI::Option* option_;
 };
 
-/// Adds `flags` whose value is a whole number from `low` to `high`; `value` stays as it is when the
-/// option is not given. Parsing throws InputError naming the option, what was found and the range.
+/// Adds `flags` with a whole number from `low` to `high` as value. `value` keeps its content if the
+/// option is not given. Parsing throws InputError naming the option, the value found and the range.
 template <class T>
 AddedOption add_whole_number(CLI::App& command, const std::string& flags, std::optional<T>& value,
                              T low, T high, const std::string& description);
 
-/// The same for a list of different numbers separated by commas, "1,2,4".
+/// Does the same for a list of different numbers separated by commas, "1,2,4".
 void add_whole_numbers(CLI::App& command, const std::string& flags, std::vector<int>& values,
                        int low, int high, const std::string& description);
 
-/// The same for one positive finite number.
+/// Does the same for one positive finite number.
 void add_positive_number(CLI::App& command, const std::string& flags, std::optional<double>& value,
                          const std::string& description);
 
-/// The same for an amount of memory in bytes: a positive number and B, kB, MB, GB, TB (powers of
-/// 1000) or KiB, MiB, GiB, TiB (of 1024).
+/// Does the same for an amount of memory in bytes: a positive number and B, kB, MB, GB, TB (powers
+/// of 1000) or KiB, MiB, GiB, TiB (of 1024).
 void add_memory_size(CLI::App& command, const std::string& flags, std::optional<double>& bytes,
                      const std::string& description);
 
-/// Adds an argument (`flags` without dashes) or option that takes text. Empty text is an error,
-/// because it is mostly a shell variable that was not set.
+/// Adds an argument (`flags` without dashes) or option with text as value. Empty text is an error,
+/// because it usually comes from a shell variable that was not set.
 AddedOption add_text(CLI::App& command, const std::string& flags, std::string& value,
                      const std::string& type, const std::string& description);
 
-/// An option without a value: true when it is given.
+/// Adds an option without a value; `value` becomes true when it is given.
 AddedOption add_flag(CLI::App& command, const std::string& flags, bool& value,
                      const std::string& description);
 
 /// Adds --json, -q and -v, which all subcommands share.
 void add_console_options(CLI::App& command, Console& console);
 
-/// Throws InputError when writing `output` would replace `input`, --overwrite or not.
+/// Throws InputError if writing `output` would replace `input`, even with --overwrite.
 void check_not_same_file(const std::string& output, const std::string& input);
 
 }  // namespace tangere::apps

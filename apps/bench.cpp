@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere bench: how fast a scene or a task runs here, by threads. Everything is checked before the
-// first step.
+// tangere bench: measures how fast a scene or a task runs here, by number of threads. Everything is
+// checked before the first step.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ namespace tangere::apps {
 namespace {
 
 constexpr int kMostPasses = 1'000'000;
-constexpr int kDefaultEnvironments = 256;  // 16 blocks: a few for each thread of a usual machine
+constexpr int kDefaultEnvironments = 256;  // 16 blocks: several per thread on usual machines
 
 struct BenchArguments {
   std::string scene, frames, policy, precision = "mixed", svg, csv;
@@ -35,7 +35,7 @@ struct BenchArguments {
   bool overwrite = false, allow_unknown = false;
 };
 
-/// As given, or dense.
+/// The kind as given, or dense.
 FrameKind frames_named(const std::string& name) {
   if (name.empty()) return FrameKind::dense;
   std::vector<std::string> names;
@@ -53,7 +53,7 @@ void check_arguments(const BenchArguments& options) {
     throw InputError(fmt::format("--svg and --csv are both '{}'; expected two files", options.svg));
 }
 
-/// `of_benchmark`: memory that it takes besides the batch it starts from [bytes].
+/// `of_benchmark`: memory of the benchmark besides the batch from which it starts [bytes].
 void check_size(const Model& model, int environments, double of_benchmark) {
   const double start = static_cast<double>(model.state_bytes_per_environment()) * environments;
   check_memory(start + of_benchmark, fmt::format("--envs {}", environments));
@@ -69,7 +69,8 @@ void note_idle_threads(const Console& console, int environments, int most_thread
                              processor_count() == 1 ? "" : "s"));
 }
 
-/// The files asked for, reserved before the first step, complete or absent at the end.
+/// The requested files. They are reserved before the first step; at the end they are complete or
+/// absent.
 class Outputs {
  public:
   explicit Outputs(const BenchArguments& options) {
@@ -135,7 +136,7 @@ BenchSetting setting_of(const BenchArguments& options, const Model& model,
   return setting;
 }
 
-/// Runs `run` with setting.options.threads at each of `threads` and tells what came out.
+/// Calls `run` with setting.options.threads set to each of `threads` and reports the results.
 template <class Run>
 int measure(const BenchArguments& options, const Console& console, BenchSetting& setting,
             const std::vector<int>& threads, const Model& model, const Json& of_task,
@@ -161,7 +162,7 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
   return report(options, console, setting, model, of_task, entries);
 }
 
-/// Thread counts asked for, or the usual ones.
+/// The requested thread counts, or the default ones.
 std::vector<int> thread_counts(const BenchArguments& options) {
   return options.threads.empty() ? default_thread_counts() : options.threads;
 }
@@ -199,7 +200,7 @@ int bench_task(const BenchArguments& options, const Console& console, const Task
 
 int bench(const BenchArguments& options, const Console& console) {
   check_arguments(options);
-  // A wrong word is reported before a scene is read.
+  // Reports a wrong word before a scene is read.
   frames_named(options.frames);
   precision_named(options.precision);
   if (const std::unique_ptr<Task> task = find_task(options.scene, console))

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Computes all rates, from counts and times.
+// Computes all rates from counts and times.
 #include "apps/bench_report.hpp"
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@ double newton_per_step(const BenchmarkResult& result) {
   return rate(result.newton_iterations, static_cast<double>(result.simulation_steps));
 }
 
-/// Not a number in JSON: many readers keep 53 bits only.
+/// Writes a checksum as text, because many JSON readers keep only 53 bits of a number.
 std::string hexadecimal(std::uint64_t checksum) { return fmt::format("{:016x}", checksum); }
 
 std::string frames_text(const BenchSetting& setting) {

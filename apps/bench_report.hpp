@@ -17,7 +17,7 @@ struct BenchSetting {
   std::string scene;  ///< path
   std::string model, machine, isa;
   int environments = 0;
-  BenchmarkOptions options;  ///< threads: of no meaning here
+  BenchmarkOptions options;  ///< its threads have no meaning here
   int every = 0;             ///< steps between fields; 0: none, or sensors differ
 };
 
@@ -26,7 +26,7 @@ struct BenchRun {
   BenchmarkResult result;
 };
 
-/// Of the environments of a run.
+/// Failures of the environments of a run.
 std::vector<Failure> failures_of(const BenchRun& run);
 
 /// Steps between fields when all sensors agree, else 0.

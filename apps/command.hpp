@@ -20,6 +20,8 @@ struct ProgramInfo {
 struct Command {
   const CLI::App* app = nullptr;
   std::function<int(const ProgramInfo&)> run;  ///< returns an ExitCode; throws InputError, IoError
+  /// Whether it reads HDF5 files, as its options are; never if empty.
+  std::function<bool()> reads_files = {};
 };
 
 Command add_inspect(CLI::App& program);

@@ -20,7 +20,7 @@ enum ExitCode {
 /// Keys keep the order in which they are written.
 using Json = nlohmann::ordered_json;
 
-/// A number, or null where it is infinite: JSON has no infinity.
+/// Returns a number, or null if it is infinite, because JSON has no infinity.
 Json finite(double x);
 
 struct Console {

@@ -49,7 +49,8 @@ Command add_export(CLI::App& program) {
                                  "Write only this episode");
   add_flag(app, "--overwrite", o.what.overwrite, "Replace the output if it exists");
   add_console_options(app, *console);
-  return {&app, [=](const ProgramInfo&) { return export_table(*options, *console); }};
+  return {&app, [=](const ProgramInfo&) { return export_table(*options, *console); },
+          [] { return true; }};
 }
 
 }  // namespace tangere::apps

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere generate: a scene or a task, many episodes on all cores, a folder of shards. Everything
-// is checked before the first step.
+// tangere generate: plays many episodes of a scene or a task on all cores and writes a folder of
+// shards. Everything is checked before the first step.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
@@ -19,6 +17,7 @@
 #include "apps/task_run.hpp"
 #include "apps/workers.hpp"
 #include "io/files/nearest_name.hpp"
+#include "io/files/text_file.hpp"
 #include "kernels/table/isa.hpp"
 #include "tasks/gradients/episode_gradients.hpp"
 #include "tasks/gradients/losses.hpp"
@@ -39,7 +38,7 @@ EpisodeOptions episode_options(const GenerateOptions& options, const Model& mode
   run.seed = options.seed.value_or(0);
   run.precision = precision_named(options.precision);
   run.threads = options.threads.value_or(available_threads());
-  // One more than can be simulated, so no thread waits for the one that writes.
+  // One more than can be simulated at a time, so that no thread waits for the one that writes.
   run.blocks_in_flight = run.threads + 1;
   static_cast<void>(action_rows(run));
   return run;
@@ -48,14 +47,14 @@ EpisodeOptions episode_options(const GenerateOptions& options, const Model& mode
 /// Names a table by its content, because a path may lead elsewhere on another machine.
 std::string controls_named(const std::string& path) {
   if (path.empty()) return "of the scene";
-  std::ifstream file(path, std::ios::binary);
+  constexpr std::size_t kLargestTable = std::size_t{1} << 32;
   std::uint64_t hash = 0xCBF29CE484222325ULL;  // FNV-1a
-  for (std::istreambuf_iterator<char> at(file), end; at != end; ++at)
-    hash = (hash ^ static_cast<unsigned char>(*at)) * 0x100000001B3ULL;
+  for (const char c : read_text_file(path, kLargestTable, "a csv file"))
+    hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3ULL;
   return fmt::format("a table of checksum {:016x}", hash);
 }
 
-/// Of a list separated by commas. Throws InputError for empty words.
+/// Splits a list at its commas. Throws InputError for empty words.
 std::vector<std::string> words_of(const std::string& list) {
   std::vector<std::string> words;
   if (list.empty()) return words;
@@ -64,11 +63,15 @@ std::vector<std::string> words_of(const std::string& list) {
     words.push_back(list.substr(begin, end == std::string::npos ? end : end - begin));
     if (words.back().empty())
       throw InputError(fmt::format("--record '{}'; expected names separated by commas", list));
+    if (std::count(words.begin(), words.end(), words.back()) > 1)
+      throw InputError(fmt::format(
+          "--record '{}': '{}' stands there twice; expected each name once", list, words.back()));
   }
   return words;
 }
 
-/// The command that makes the same data set again, in any folder and on any number of threads.
+/// Returns the command that makes the same data set again, in any folder and on any number of
+/// threads.
 std::string command_of(const GenerateOptions& options, const EpisodeOptions& run,
                        const std::string& policy) {
   std::string command = fmt::format("tangere generate {} --episodes {} --seed {} --precision {}",
@@ -144,8 +147,8 @@ TaskReport report_of(const Task& task, PolicyKind policy, const EpisodeSummary& 
   return report;
 }
 
-/// What is done to finished blocks by many threads: gradients are taken there, too. Checksums
-/// always are; they take least.
+/// Names the work of many threads on finished blocks. Gradients are computed there, too. Checksums
+/// always are, but take the least time.
 std::string preparation_of(const Job& job) {
   std::vector<std::string> kinds;
   if (!job.layout.gradients.empty()) kinds.emplace_back("gradients");
@@ -154,8 +157,7 @@ std::string preparation_of(const Job& job) {
   return kinds.empty() ? "checksums" : fmt::format("{}", fmt::join(kinds, " and "));
 }
 
-/// Which of the three kinds of work kept the others waiting, and for how long all of them were at
-/// it.
+/// Names the kind of work that kept the two others waiting.
 std::string limit_of(const EpisodeSummary& summary, const Job& job) {
   const EpisodeOptions& run = job.run;
   const double simulation = summary.simulation_seconds / run.threads,
@@ -237,7 +239,7 @@ int stopped(const GenerateOptions& options, const Console& console, int signal,
       {{"shards", output.shards()}});
 }
 
-/// Throws before anything is made if the tapes are too small.
+/// Throws if the tapes are too small, before anything is made.
 GradientPlan checked(GradientPlan plan) {
   if (plan.make) static_cast<void>(plan.make());
   return plan;
@@ -254,7 +256,8 @@ auto with_gradients(const GradientPlan& plan, EpisodeSink& sink, const Run& run)
 /// Makes the missing shards.
 int make(const GenerateOptions& options, const Console& console, const Job& job) {
   if (options.dry_run) return dry_run(options, console, job);
-  // Before the folder is made and until it is gone or complete: nothing half-written stays.
+  // Lives from before the folder is made until it is gone or complete, so nothing half-written
+  // stays.
   const StopSignals signals;
   DatasetWriter output(output_for(options, job.layout, console), job.layout);
   EpisodeOptions run = job.run;
@@ -290,7 +293,7 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   job.run.seed = options.seed.value_or(0);
   job.run.precision = precision_named(options.precision);
   job.run.threads = options.threads.value_or(available_threads());
-  // Those that wait for an earlier one to be written included: episodes differ in length.
+  // Includes blocks that wait until an earlier one is written, because episodes differ in length.
   job.run.blocks_in_flight = 2 * job.run.threads + 1;
   const GradientKind gradients = gradients_wanted(options, true);
   const TaskActions actions = [&](const TaskView& view, std::span<const double> observation,
@@ -324,7 +327,7 @@ void check_word(const char* what, const std::string& word, const std::vector<std
 
 int generate(GenerateOptions options, const Console& console, const ProgramInfo& info) {
   static_cast<void>(
-      precision_named(options.precision));  // a wrong word is said before a scene is read
+      precision_named(options.precision));  // reports a wrong word before a scene is read
   check_word("compression", options.compress, {"none", "deflate", "lz4"});
   check_word("kind of tactile fields", options.tactile, {"dense", "sparse"});
   if (options.compress == "lz4")
@@ -436,7 +439,8 @@ Command add_generate(CLI::App& program) {
   add_flag(app, "--allow-unknown", o.allow_unknown,
            "Unknown elements and attributes of the scene are warnings, not errors");
   add_console_options(app, *console);
-  return {&app, [=](const ProgramInfo& info) { return generate(*options, *console, info); }};
+  return {&app, [=](const ProgramInfo& info) { return generate(*options, *console, info); },
+          [=] { return options->resume; }};
 }
 
 }  // namespace tangere::apps

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Works out what is known of a data set before its first step.
+// Computes what is known of a data set before its first step.
 #include "apps/generate_job.hpp"
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A sink that takes episodes and forgets them.
+/// A sink that discards episodes.
 class NoSink : public EpisodeSink {
  public:
   void write(const EpisodeRows&) override {}
@@ -133,7 +133,7 @@ Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output) 
     return merged;
   }
   MergeOptions replace;
-  replace.overwrite = true;  // links of an earlier run lead to other shards, or to as many
+  replace.overwrite = true;  // links of an earlier run may lead to other shards
   const MergeResult result = merge_dataset(find_dataset(options.output), replace);
   merged.keys["merged"] = result.file;
   merged.line = fmt::format("\nmerged: {}", result.file);

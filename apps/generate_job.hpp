@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A data set that was requested, checked and is ready to be made. One call hides what scenes and
-// tasks do differently.
+// A data set that was requested, checked and is ready to be made. One call hides the differences
+// between scenes and tasks.
 #pragma once
 
 #include <functional>
@@ -28,7 +28,7 @@ struct GenerateOptions {
   bool overwrite = false, resume = false, dry_run = false, no_merge = false, allow_unknown = false;
 };
 
-/// What a run of a task adds: keys of the JSON object, a line for people.
+/// What a run of a task adds: keys of the JSON object and a line for people.
 struct TaskReport {
   Json keys{{"task", nullptr}};
   std::string line = "no task: every reward is 0";
@@ -44,14 +44,14 @@ struct Job {
   EpisodeOptions run;
   double memory_bytes = 0;           ///< of the simulation, without the program itself
   std::string unit;                  ///< what progress counts: "environment step", "action"
-  std::vector<std::string> effects;  ///< that are on
+  std::vector<std::string> effects;  ///< that are switched on
   std::function<JobResult(const EpisodeOptions&, EpisodeSink&, const EpisodeProgress&,
                           const StopRequest&)>
       simulate;
 };
 
-/// What --gradients and its companions ask for. Throws InputError for options that do not go
-/// together.
+/// Returns what --gradients and its companions request. Throws InputError for options that do not
+/// go together.
 GradientKind gradients_wanted(const GenerateOptions& options, bool of_task);
 /// Memory for the tapes of one thread [bytes].
 double tape_bytes(const GenerateOptions& options, int threads);
@@ -62,15 +62,15 @@ DatasetOutput output_for(const GenerateOptions& options, const DatasetLayout& la
                          const Console& console);
 
 /// The merged files of a complete data set: paths for the JSON object, null if the set is not
-/// complete or merging is not wanted, and the reason if all shards seem to exist.
+/// complete or merging was not requested, and the reason if all shards seem to exist.
 struct Merged {
   Json keys{{"merged", nullptr}, {"minari_id", nullptr}, {"not_merged", nullptr}};
   std::string line;
 };
 Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output);
 
-/// Prints what would be made and how long it may take. Simulates some episodes for this, and writes
-/// nothing.
+/// Prints what would be made and how long it may take. It simulates some episodes for this, and
+/// writes nothing.
 int dry_run(const GenerateOptions& options, const Console& console, const Job& job);
 
 }  // namespace tangere::apps

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere gradcheck: are the gradients of this scene, or of this task's return, right? A table per
+// tangere gradcheck: checks the gradients of a scene, or of a task's return. Prints a table per
 // input, and one number.
 #include <fmt/format.h>
 
@@ -23,7 +23,7 @@ namespace {
 constexpr std::int64_t kDefaultSteps = 100;
 constexpr int kDefaultEntries = 24;
 constexpr double kTolerance =
-    1e-12;  // what a solve leaves is what differences of rollouts cannot see through
+    1e-12;  // differences of rollouts see no error below the solve's residual
 
 struct GradcheckArguments {
   std::string scene, loss, controls, policy;
@@ -33,13 +33,13 @@ struct GradcheckArguments {
   bool allow_unknown = false;
 };
 
-/// The loss as given; by default tactile if there is a sensor, else the final state.
+/// The loss as given. The default is tactile if there is a sensor, else the final state.
 LossKind loss_of(const std::string& name, const Model& model) {
   if (!name.empty()) return loss_named(name);
   return model.sensors().empty() ? LossKind::final_state : LossKind::tactile;
 }
 
-/// As many steps as the scene's own run, but a hundred if that is longer or has no end.
+/// The steps of the scene's own run, but a hundred if that is longer or has no end.
 std::int64_t steps_of(const GradcheckArguments& o, const ControlProgram& controls) {
   if (o.steps) {
     controls.check_covers(*o.steps);
@@ -54,7 +54,7 @@ ExitCode exit_code(const GradientCheck& check) {
   return check.entries() == 0 ? kSomeFailed : kDone;
 }
 
-/// Why, and what may help. `what`: the loss.
+/// Explains why nothing was compared, and what may help. `what`: the loss.
 std::string nothing_compared(const GradientCheck& check, const char* what,
                              const char* try_instead) {
   const auto without = std::count_if(check.inputs.begin(), check.inputs.end(),
@@ -71,7 +71,7 @@ std::string nothing_compared(const GradientCheck& check, const char* what,
   return fmt::format("nothing could be compared with differences: {}; try {}", why, try_instead);
 }
 
-/// `what`: the loss; `try_instead`: where nothing can be compared.
+/// `what`: the loss. `try_instead`: advice if nothing can be compared.
 void print(const Console& console, const GradientCheck& check, const char* what,
            const char* try_instead) {
   console.print(fmt::format("{:<8} {:>7} {:>8} {:>6} {:>12} {:>12} {:>12}  {}", "input", "entries",
@@ -109,7 +109,7 @@ Json json_of(const GradientCheck& check) {
   return inputs;
 }
 
-/// What scenes and tasks have in common.
+/// The keys that scenes and tasks have in common.
 Json json_of_check(const GradientCheck& check, std::uint64_t seed, const Stepper& stepper) {
   return {{"command", "gradcheck"},
           {"exit_code", static_cast<int>(exit_code(check))},
@@ -122,7 +122,7 @@ Json json_of_check(const GradientCheck& check, std::uint64_t seed, const Stepper
           {"inputs", json_of(check)}};
 }
 
-/// --actions, or as many as take a hundred steps.
+/// --actions, or the number that takes a hundred steps.
 std::int64_t actions_of(const GradcheckArguments& o, const TaskSpec& spec) {
   if (o.actions.value_or(0) > spec.horizon)
     throw InputError(fmt::format("--actions {} with task '{}'; expected at most {}, its horizon",

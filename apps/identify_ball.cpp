@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An example: the stiffness, damping and friction of a tactile skin and the mass of a ball from one
-// noisy recording.
+// An example: finds the stiffness, damping and friction of a tactile skin and the mass of a ball
+// from one noisy recording.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -19,7 +19,7 @@
 namespace tangere::apps {
 namespace {
 
-/// A sphere's density stands for its mass.
+/// The density of a sphere stands for its mass.
 const std::vector<std::string> kSought = {"tactile pad kn", "tactile pad kt", "tactile pad mu",
                                           "body ball density"};
 constexpr std::array<const char*, 4> kShort = {"kn", "kt", "mu", "mass"};
@@ -32,7 +32,7 @@ struct Options {
   bool overwrite = false;
 };
 
-/// Values of the sought numbers as they are printed: the last a mass [g].
+/// Values of the sought numbers as printed; the last one is a mass [g].
 std::vector<double> shown(const Scene& scene, std::vector<double> values) {
   for (const LinkDescription& link : scene.links)
     if (const auto* ball = std::get_if<SphereShape>(&link.body.shape);
@@ -48,7 +48,7 @@ double peak_of(const FieldSequence& sequence) {
   return peak;
 }
 
-/// The truth times factors of ½ to 2 that the seed draws.
+/// Multiplies the true values by random factors of ½ to 2.
 std::vector<double> wrong_start(const std::vector<double>& truth, std::uint64_t seed) {
   std::vector<double> out;
   for (std::uint32_t k = 0; k < truth.size(); ++k)
@@ -103,7 +103,7 @@ CurvePanel values_panel(const std::vector<double>& truth, const Identification& 
   return panel;
 }
 
-/// Forces of the whole pad over time, recorded and as the fit has them.
+/// Forces of the whole pad over time, recorded and fitted.
 CurvePanel forces_panel(const FieldSequence& recorded, const FieldSequence& fitted,
                         double timestep) {
   CurvePanel panel{

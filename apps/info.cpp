@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere info: what a data set is, without reading its numbers.
+// tangere info: describes a data set without reading its numbers.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
@@ -11,7 +11,7 @@
 namespace tangere::apps {
 namespace {
 
-constexpr std::size_t kLongValue = 200;  // bytes: beyond it a setting is for --json
+constexpr std::size_t kLongValue = 200;  // bytes; only --json shows longer settings
 
 int info(const std::string& path, const Console& console) {
   const DatasetFiles dataset = find_dataset(path);
@@ -58,7 +58,7 @@ Command add_info(CLI::App& program) {
                               "tangere info balls");
   add_text(app, "DIR", *input, "", "Folder of shards, or one file of a data set").required();
   add_console_options(app, *console);
-  return {&app, [=](const ProgramInfo&) { return info(*input, *console); }};
+  return {&app, [=](const ProgramInfo&) { return info(*input, *console); }, [] { return true; }};
 }
 
 }  // namespace tangere::apps

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere inspect: what a scene compiles to, and what a task declares.
+// tangere inspect: shows what a scene compiles to and what a task declares.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -48,7 +48,7 @@ std::vector<std::string> randomized_units(const Scene& scene) {
   return units;
 }
 
-/// Steps of an unattended run, -1 when the scene does not say.
+/// Steps of a scene's own run; -1 if the scene does not say.
 std::int64_t steps_of(const Model& model) {
   return ControlProgram(model, model.timestep(), 0).steps();
 }

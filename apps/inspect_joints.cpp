@@ -22,7 +22,7 @@ bool any(const JointEffects& e) {
          (e.limits && e.limit_stiffness != 0);
 }
 
-/// Joints that have effects; the dofs that turn on their own line where theirs differ.
+/// Joints that have effects. Dofs that turn get their own line if their effects differ.
 std::vector<Named> named_effects(const Scene& scene) {
   std::vector<Named> list;
   for (const LinkDescription& l : scene.links) {

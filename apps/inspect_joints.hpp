@@ -9,7 +9,7 @@
 
 namespace tangere::apps {
 
-/// The effects of every joint that has some, in SI. Limits and rest are null where there are none.
+/// The effects of every joint that has any, in SI. Missing limits and rest positions are null.
 Json joint_effects_json(const Scene& scene);
 std::string joint_effects_text(const Scene& scene);
 

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The command `tangere`: chooses a subcommand and turns exceptions into messages and exit codes.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <new>
@@ -12,6 +14,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/reader_process.hpp"
 #include "engine/base/error.hpp"
 #include "kernels/table/isa.hpp"
 
@@ -48,17 +51,20 @@ struct Program {
   }
 };
 
-int run(Program& program, int argc, char** argv) {
-  if (!program.parser.parse(argc, argv)) return kDone;
+const Command& chosen_command(const Program& program) {
   const auto command =
       std::find_if(program.commands.begin(), program.commands.end(),
                    [&](const Command& c) { return c.app == program.parser.chosen(); });
   if (command == program.commands.end())
     throw InputError("no subcommand given; see 'tangere --help'");
+  return *command;
+}
+
+int run(const Command& command, int argc, char** argv) {
   if (*kernels::forced_isa_error() != '\0') throw InputError(kernels::forced_isa_error());
   ProgramInfo info{TANGERE_VERSION, {}};
   for (int i = 0; i < argc; ++i) info.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
-  return command->run(info);
+  return command.run(info);
 }
 
 /// The message for people on stderr and, where JSON was asked for, the object that a program waits
@@ -74,10 +80,10 @@ int report(const Program& program, int argc, char** argv, ExitCode code, const s
   return code;
 }
 
-int guarded(int argc, char** argv) {
-  Program program;
+/// Turns what `body` throws into a message and an exit code.
+int guarded(const Program& program, int argc, char** argv, const std::function<int()>& body) {
   try {
-    return run(program, argc, argv);
+    return body();
   } catch (const InputError& error) {
     return report(program, argc, argv, kUsage, error.what());
   } catch (const IoError& error) {
@@ -94,11 +100,63 @@ int guarded(int argc, char** argv) {
   }
 }
 
+/// Reports what nobody could catch: memory that ran out while an error was being reported, or a
+/// failure in a thread of a library. Nothing here allocates.
+[[noreturn]] void end_uncaught() noexcept {
+  const char* reason = "a failure that it could not handle";
+  int code = kInputOutput;
+  try {
+    if (const std::exception_ptr failure = std::current_exception())
+      std::rethrow_exception(failure);
+  } catch (const std::bad_alloc&) {
+    reason = "out of memory; ask for fewer environments";
+    code = kUsage;
+  } catch (const std::exception& error) {
+    reason = error.what();
+  } catch (...) {
+  }
+  std::fputs("tangere: ", stderr);
+  std::fputs(reason, stderr);
+  std::fputs("\n", stderr);
+  _exit(code);
+}
+
+bool came_to_its_end = false;
+
+/// HDF5 calls exit(-1), without a word, where memory runs out at some places.
+void end_by_library() {
+  if (came_to_its_end) return;
+  std::fputs("tangere: a library ended the program; most likely memory ran out\n", stderr);
+  _exit(kUsage);
+}
+
+/// Set before other objects of the program are made: they allocate, too.
+struct LastResort {
+  LastResort() {
+    std::set_terminate(end_uncaught);
+    std::atexit(end_by_library);
+  }
+};
+[[gnu::init_priority(101)]] const LastResort last_resort;
+
+int start(int argc, char** argv) {
+  Program program;
+  return guarded(program, argc, argv, [&]() -> int {
+    if (!program.parser.parse(argc, argv)) return kDone;
+    const Command& command = chosen_command(program);
+    const auto body = [&] {
+      return guarded(program, argc, argv, [&] { return run(command, argc, argv); });
+    };
+    return command.reads_files && command.reads_files() ? run_in_child(body) : body();
+  });
+}
+
 }  // namespace
 }  // namespace tangere::apps
 
 int main(int argc, char** argv) {
-  const int code = tangere::apps::guarded(argc, argv);
+  const int code = tangere::apps::start(argc, argv);
+  tangere::apps::came_to_its_end = true;
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
   std::fputs("tangere: writing to stdout failed\n", stderr);
   return tangere::apps::kInputOutput;

@@ -7,12 +7,12 @@
 
 namespace tangere::apps {
 
-/// Memory that this process can still take without pushing others out [bytes]. It is that of the
-/// machine or of the container (control group), whichever is less. Infinite when the system does
+/// Returns the memory that this process can still take without pushing others out [bytes]: that of
+/// the machine or of the container (control group), whichever is less. Infinite if the system does
 /// not say.
 double available_memory();
 
-/// Throws InputError naming both numbers when a request needs more bytes than there are.
+/// Throws InputError naming both numbers when a request needs more bytes than are available.
 void check_memory(double bytes, const std::string& request);
 
 }  // namespace tangere::apps

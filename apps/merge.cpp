@@ -8,6 +8,8 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/scene_run.hpp"
+#include "apps/stop_signals.hpp"
 #include "engine/base/error.hpp"
 #include "io/dataset/dataset_merge.hpp"
 #include "io/files/folder_lock.hpp"
@@ -15,7 +17,8 @@
 namespace tangere::apps {
 namespace {
 
-int merge(const std::string& path, const MergeOptions& options, const Console& console) {
+int merge(const std::string& path, MergeOptions options, const Console& console) {
+  const StopSignals signals;  // before anything is written and until it is gone or complete
   // Alone: whoever replaces shards shares the folder, and would mix them in while links are made.
   std::optional<FolderLock> lock;
   if (std::filesystem::is_directory(path)) lock.emplace(path);
@@ -25,7 +28,9 @@ int merge(const std::string& path, const MergeOptions& options, const Console& c
                     "expected a folder that "
                     "nobody writes into, merge when it has ended",
                     path));
+  options.stop = [&] { return signals.received() != 0; };
   const MergeResult result = merge_dataset(find_dataset(path), options);
+  if (result.stopped) return report_stop(console, "merge", signals.received(), "while it merged");
   console.print(fmt::format(
       "wrote {} ({} bytes, {}): {} demos, {} to train on and {} to validate; failed episodes: {}",
       result.file, result.bytes, options.copy ? "a copy of all numbers" : "links to the shards",
@@ -61,7 +66,8 @@ Command add_merge(CLI::App& program) {
            "Copy all numbers, so that the file needs no shards beside it");
   add_flag(app, "--overwrite", options->overwrite, "Replace what an earlier merge wrote");
   add_console_options(app, *console);
-  return {&app, [=](const ProgramInfo&) { return merge(*input, *options, *console); }};
+  return {&app, [=](const ProgramInfo&) { return merge(*input, *options, *console); },
+          [] { return true; }};
 }
 
 }  // namespace tangere::apps

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere plot: tactile fields of a trajectory file as a picture.
+// tangere plot: draws tactile fields of a trajectory file.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -14,7 +14,7 @@
 namespace tangere::apps {
 namespace {
 
-constexpr int kMostFrames = 1000;  // of a strip; each is a picture of its own
+constexpr int kMostFrames = 1000;  // in a strip; each is a panel of its own
 
 struct PlotArguments {
   std::string input, output, sensor;
@@ -73,7 +73,7 @@ Command add_plot(CLI::App& program) {
       .excludes(frame);
   add_flag(app, "--overwrite", o.overwrite, "Replace the output if it exists");
   add_console_options(app, *console);
-  return {&app, [=](const ProgramInfo&) { return plot(*options, *console); }};
+  return {&app, [=](const ProgramInfo&) { return plot(*options, *console); }, [] { return true; }};
 }
 
 }  // namespace tangere::apps

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shows how far a run is to people who wait.
+// Shows waiting people how far a run is.
 #pragma once
 
 #include <chrono>
@@ -10,11 +10,11 @@
 
 namespace tangere::apps {
 
-/// On a terminal this is one line that rewrites itself at most ten times a second. Elsewhere it is
-/// nothing, or a line every ten seconds when verbose. When quiet it is nothing.
+/// On a terminal this is one line that rewrites itself at most ten times a second. Elsewhere it
+/// prints a line every ten seconds when verbose, else nothing. When quiet it prints nothing.
 class Progress {
  public:
-  /// `unit` names what is counted up to `steps`. Each of them is a step of `environments`.
+  /// `unit` names what is counted up to `steps`. Each step counts for `environments` environments.
   Progress(const Console& console, std::string unit, std::int64_t steps, int environments);
   ~Progress();
   Progress(const Progress&) = delete;

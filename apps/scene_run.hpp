@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all commands that run a scene have in common: reading it and its controls, its length, and
-// reporting what failed.
+// What all commands that run a scene share: reading it and its controls, its length, and reports of
+// failures.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@
 
 namespace tangere::apps {
 
-/// Largest --envs and --steps: beyond any machine, and safe to multiply.
+/// Largest --envs and --steps: beyond any machine, but safe to multiply.
 constexpr int kMostEnvironments = 1'000'000'000;
 constexpr std::int64_t kMostSteps = 1'000'000'000'000;
 
@@ -34,17 +34,17 @@ Scene read_scene_for(const std::string& path, bool allow_unknown, const Console&
 ControlProgram make_controls(const std::string& path, std::uint64_t seed, const Model& model,
                              const Stepper& stepper, const Console& console);
 
-/// --steps, or as many as the controls last. Throws InputError when neither says.
+/// --steps, or the number of steps that the controls last. Throws InputError if neither is given.
 std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlProgram& controls);
 
 /// Prints notes on sensors that are not read after every step.
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout);
 
-/// Reports that a signal ended the run, when ("after 3 of 9 steps") and what is left. Returns the
+/// Reports that a signal ended the run, when ("after 3 of 9 steps"), and what is left. Returns the
 /// exit code. The JSON object includes `result`.
 int report_stop(const Console& console, const std::string& command, int signal,
                 const std::string& when, const std::string& left, const Json& result);
-/// Where nothing is left.
+/// Does the same if nothing is left.
 int report_stop(const Console& console, const std::string& command, int signal,
                 const std::string& when);
 
@@ -56,10 +56,10 @@ struct Failure {
 };
 
 /// Prints a line for each of the first failures, and how many more there are. `what` is
-/// "environment" or "episode"; `where` says what names all of them.
+/// "environment" or "episode". `where` says where all failures are listed.
 void list_failures(const Console& console, const std::string& what,
                    const std::vector<Failure>& failures, const std::string& where);
-/// All of them; `what` is the key of the number.
+/// Lists all failures. `what` is the key of the number.
 Json failures_json(const std::string& what, const std::vector<Failure>& failures);
 
 }  // namespace tangere::apps

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere simulate: a scene or a task, a batch, a file. Everything is checked before the first
-// step.
+// tangere simulate: runs a scene or a task as a batch and writes a file. Everything is checked
+// before the first step.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -95,7 +95,7 @@ std::vector<Failure> failures_of(const RolloutSummary& summary) {
   return failures;
 }
 
-/// What a run of a task adds: keys of the JSON object, a line for people.
+/// What a run of a task adds: keys of the JSON object and a line for people.
 struct TaskReport {
   Json keys{{"task", nullptr}};
   std::string line = "no task: every reward is 0";
@@ -150,13 +150,13 @@ int report(const SimulateArguments& options, const Console& console, const Batch
   return code;
 }
 
-/// Where the run begins: at the scene's start, or at a row of another run.
+/// The start of the run: the scene's own, or a row of another run.
 struct Start {
   std::optional<SavedState> saved;
   std::uint64_t seed = 0;
   int environments = 1;
   std::int64_t first_step = 0;
-  bool continues = false;  ///< steps as the run before would have: same step size, with its history
+  bool continues = false;  ///< steps like the run before: same step size, with its history
 
   Start(const SimulateArguments& options, const Stepper& stepper) {
     if (!options.state_from.empty()) saved = read_state(options.state_from, options.row);
@@ -189,7 +189,7 @@ struct Start {
   }
 };
 
-/// --steps, or as many as the controls last after the start.
+/// --steps, or the number of steps that the controls last after the start.
 std::int64_t steps_left(const SimulateArguments& options, const ControlProgram& controls,
                         std::int64_t first_step) {
   if (options.steps) return *options.steps;
@@ -201,7 +201,7 @@ std::int64_t steps_left(const SimulateArguments& options, const ControlProgram& 
   return left;
 }
 
-/// --gradients: the loss's derivatives over the run that has just been made.
+/// --gradients: derivatives of the loss over the run that has just been made.
 struct Gradients {
   std::optional<Batch> start;
   std::unique_ptr<RolloutLoss> loss;
@@ -237,7 +237,7 @@ struct Gradients {
   }
   [[nodiscard]] bool wanted() const { return start.has_value(); }
 
-  /// False when a signal stopped it.
+  /// Returns false if a signal stopped it.
   bool write(const ControlProgram& controls, const RolloutOptions& rollout,
              const StopSignals& signals, TrajectoryFile& output) {
     const GradientSummary summary = rollouts->run(
@@ -268,7 +268,7 @@ struct Gradients {
   }
 };
 
-/// Steps and writes; `run`: the rollout into the file, told how many steps are done.
+/// Steps and writes. `run`: the rollout into the file; it receives a progress function.
 template <class Run>
 int write_run(const SimulateArguments& options, const Console& console, const Batch& batch,
               const Stepper& stepper, const RolloutOptions& rollout, TrajectoryFile& output,
@@ -361,7 +361,8 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   if (start.saved) restore_state(*start.saved, start.continues, batch);
   Gradients gradients(options, batch, stepper, rollout);
 
-  // Before the file is created and until it is gone or complete: nothing half-written stays.
+  // Lives from before the file is created until it is gone or complete, so nothing half-written
+  // stays.
   const StopSignals signals;
   TrajectoryFile output(options.output, make_layout(batch, stepper, rollout, info),
                         options.overwrite);
@@ -430,7 +431,8 @@ Command add_simulate(CLI::App& program) {
   add_flag(app, "--allow-unknown", o.allow_unknown,
            "Unknown elements and attributes of the scene are warnings, not errors");
   add_console_options(app, *console);
-  return {&app, [=](const ProgramInfo& info) { return simulate(*options, *console, info); }};
+  return {&app, [=](const ProgramInfo& info) { return simulate(*options, *console, info); },
+          [=] { return !options->state_from.empty(); }};
 }
 
 }  // namespace tangere::apps

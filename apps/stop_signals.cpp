@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A handler may do little more than set a flag. Code that works in steps asks for the flag.
+// A handler may do little more than set a flag. Code that works in steps checks the flag.
 #include "apps/stop_signals.hpp"
 
 #include <atomic>

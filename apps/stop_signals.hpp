@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ctrl-C and a scheduler's SIGTERM end a run between two steps, where nothing half-written is left.
+// Lets Ctrl-C and a scheduler's SIGTERM end a run between two steps, where nothing is half-written.
 #pragma once
 
 #include <array>
@@ -8,7 +8,8 @@
 namespace tangere::apps {
 
 /// While an object lives, SIGINT and SIGTERM are remembered instead of ending the program (unless
-/// the parent had them ignored), and a file-size limit is an error of the write instead of SIGXFSZ.
+/// the parent ignored them), and exceeding a file-size limit fails the write instead of raising
+/// SIGXFSZ.
 class StopSignals {
  public:
   StopSignals();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all commands that accept a task have in common: telling tasks from scene files, making the
-// task and its policy, and reporting on it.
+// What all commands that accept a task share: telling tasks from scene files, making the task and
+// its policy, and reporting on it.
 #pragma once
 
 #include <memory>
@@ -13,8 +13,8 @@
 
 namespace tangere::apps {
 
-/// The task that `word` names, on its own scene; null when it names a file. Throws InputError, with
-/// the nearest task, for a plain word that is neither.
+/// Returns the task that `word` names, on its own scene; null if it names a file. Throws InputError
+/// with the nearest task for a plain word that is neither.
 std::unique_ptr<Task> find_task(const std::string& word, const Console& console);
 
 /// The policy called `name`, or `fallback` if that is empty. With a table it is csv. Throws
@@ -22,17 +22,17 @@ std::unique_ptr<Task> find_task(const std::string& word, const Console& console)
 PolicyKind policy_named(const std::string& name, const std::string& table, PolicyKind fallback);
 Policy make_policy(const Task& task, PolicyKind kind, const std::string& table);
 
-/// Takes options that have no meaning with a task, and whether they were given. Throws InputError
-/// for an option that was given.
+/// An option that has no meaning with a task, and whether it was given. The function below throws
+/// InputError for one that was given.
 struct GivenOption {
   const char* name;
   bool given;
 };
 void refuse_with_task(const Task& task, const std::vector<GivenOption>& options);
-/// The same for options that a scene alone does not have.
+/// Does the same for options that only tasks have.
 void refuse_with_scene(const std::string& scene, const std::vector<GivenOption>& options);
 
-/// The text of a scene that comes with the program, null for other names.
+/// Returns the text of a scene that the program contains; null for other names.
 const char* task_scene(const std::string& file);
 
 }  // namespace tangere::apps

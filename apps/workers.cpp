@@ -20,8 +20,8 @@ struct Variables {
   const char* count;
 };
 
-// Slurm's own numbers come last, because for mpirun within a Slurm job they are those of the nodes'
-// daemons. SLURM_NTASKS will not do in place of SLURM_STEP_NUM_TASKS: it is also set in a batch
+// Slurm's own numbers come last, because for mpirun within a Slurm job they are those of the
+// daemons on the nodes. SLURM_NTASKS cannot replace SLURM_STEP_NUM_TASKS: it is also set in a batch
 // script, whose plain commands run once.
 constexpr Variables kProcess[] = {{"OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"},
                                   {"PMI_RANK", "PMI_SIZE"},
@@ -50,7 +50,7 @@ void check_below(const char* variable, std::int64_t index, std::int64_t count) {
                                  count, count - 1));
 }
 
-/// Position in the array's list of numbers, which may begin anywhere and leave some out.
+/// Returns the position in the array's list of numbers, which may begin anywhere and have gaps.
 std::optional<Worker> array_worker() {
   if (std::getenv("SLURM_ARRAY_TASK_ID") == nullptr) return std::nullopt;
   const std::int64_t id = number_of("SLURM_ARRAY_TASK_ID"),

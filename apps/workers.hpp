@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which share of a data set this process makes when a scheduler started several. The processes
-// share nothing but a folder.
+// Determines which share of a data set this process makes if a scheduler started several. The
+// processes share only a folder.
 #pragma once
 
 #include <cstdint>
@@ -11,18 +11,18 @@ namespace tangere::apps {
 
 struct Worker {
   std::int64_t index = 0, count = 1;
-  std::string source;  ///< variables that said so, empty when none did
+  std::string source;  ///< the variables that gave it; empty if none did
 };
 
 /// Reads the environment that mpirun, srun or a Slurm array gives a process. If each task of an
-/// array starts several processes, all of them count. The process is alone when nothing is set.
+/// array starts several processes, all of them count. If nothing is set, the process is alone.
 /// Throws InputError, naming the variable, for values that are no index below a count.
 Worker worker_from_environment();
 
 /// Reads "k/S". Throws InputError for anything other than 0 <= k < S.
 Worker worker_named(const std::string& words);
 
-/// index, index + count, … below `shards`.
+/// Returns index, index + count, … below `shards`.
 std::vector<std::int64_t> shards_of(const Worker& worker, std::int64_t shards);
 
 }  // namespace tangere::apps

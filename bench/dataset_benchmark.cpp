@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The writer of data sets alone, one thread: episodes, HDF5 objects and bytes per second, by length
-// of episode and compression; its parts; and merging. Numbers are those of a field that is pressed
-// in the middle. Files go to the folder of temporary files.
+// Measures the writer of data sets alone on one thread: episodes, HDF5 objects and bytes per
+// second, by length of episode and compression. Also measures its parts, and merging. The numbers
+// are those of a field that is pressed in the middle. Files go to the folder of temporary files.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -21,9 +21,9 @@ namespace {
 
 constexpr int kBlock = 16;
 constexpr std::size_t kObjects =
-    12;  // of a demo: three groups, actions, rewards, dones, three observations twice
+    12;  // per demo: three groups, actions, rewards, dones, three observations twice
 
-// Of a demo in both files: its group and next_obs, its episode and observations; three virtual
+// Per demo in both files: its group and next_obs, its episode and observations; three virtual
 // datasets twice, flags, five and three links.
 constexpr std::size_t kMergedObjects = 4 + 6 + 1 + 8;
 
@@ -57,7 +57,7 @@ DatasetLayout layout_of(std::int64_t episodes, std::int64_t rows, int side,
   return l;
 }
 
-/// A third of the points in touch, each with a little noise of its own.
+/// A field with a third of its points in touch, each with a little noise of its own.
 std::vector<float> field(std::size_t frames, int side) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> noise(0.9F, 1.1F);
@@ -73,7 +73,7 @@ std::vector<float> field(std::size_t frames, int side) {
   return numbers;
 }
 
-/// A block of 16 episodes, the same again and again.
+/// A block of 16 episodes, used again and again.
 class Block {
  public:
   explicit Block(const DatasetLayout& l) : rows_(static_cast<int>(l.rows())) {
@@ -96,7 +96,7 @@ class Block {
   std::vector<Observation> observations_;
 };
 
-/// Whole shards: prepared, written, read back, synced, renamed.
+/// Measures whole shards: prepared, written, read back, synced, renamed.
 void write_shards(benchmark::State& state, std::int64_t episodes, std::int64_t rows, int side,
                   const char* compression, bool sparse = false) {
   DatasetLayout l = layout_of(episodes, rows, side, compression);
@@ -151,8 +151,8 @@ BENCHMARK(large_fields_lz4)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTim
 BENCHMARK(large_fields_sparse)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 BENCHMARK(large_fields_sparse_deflate)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
 
-/// One file of links and the view for Minari, of episodes as above: time must grow as their number
-/// does.
+/// Measures one file of links and the view for Minari, for episodes as above. Time must grow in
+/// proportion to their number.
 void merge(benchmark::State& state) {
   const std::int64_t episodes = state.range(0);
   const DatasetLayout l = layout_of(episodes, 5, 4, "none");
@@ -181,7 +181,7 @@ BENCHMARK(merge)
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime();
 
-/// What the library takes for a demo like those: why the writer lays objects out itself.
+/// Measures the library on such a demo: the reason why the writer lays objects out itself.
 void library_objects(benchmark::State& state) {
   constexpr int kDemos = 256;
   for (auto _ : state) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rollouts with gradients against the same rollouts without, one after the other in one run, on one
-// thread.
+// Compares rollouts with gradients and the same rollouts without, one after the other in one run on
+// one thread.
 #include <benchmark/benchmark.h>
 
 #include <ctime>
@@ -30,7 +30,7 @@ double cpu_seconds() {
   return double(now.tv_sec) + 1e-9 * double(now.tv_nsec);
 }
 
-/// ½ |v|² after the last step, `number` its weight.
+/// ½ |v|² after the last step, weighted with `number`.
 class LastSpeed : public RolloutLoss {
  public:
   explicit LastSpeed(double weight) : weight_(weight) {}
@@ -70,7 +70,7 @@ class Rollout {
 
   [[nodiscard]] double steps() const { return double(options_.steps) * start_.environments(); }
 
-  /// The rollout alone, with the fields its loss looks at. Returns its processor time.
+  /// Runs the rollout alone, with the fields that its loss reads. Returns its processor time.
   double forward() {
     Batch batch = start_;
     std::vector<double> u(std::size_t(batch.environments() * model_.nu()));
@@ -155,7 +155,7 @@ TANGERE_GRADIENTS(stable_grasp_tactile, "stable_grasp", true, 1, false);
 TANGERE_GRADIENTS(cap_opening, "cap_opening", false, 1, false);
 TANGERE_GRADIENTS(insertion, "insertion", false, 1, false);
 
-/// Nanoseconds of processor time per point of the touched tiles, best of several.
+/// Returns processor time per point of the touched tiles [ns], best of several runs.
 template <class F>
 double per_point(std::size_t tiles, const F& f) {
   constexpr int kRepeats = 200;
@@ -168,8 +168,8 @@ double per_point(std::size_t tiles, const F& f) {
   return 1e9 * best / kRepeats / (64 * double(tiles));
 }
 
-/// The field of the rolling ball in the middle of its run: read, along a direction of the state, in
-/// reverse; in reverse by the scene's numbers too, and by every point's own.
+/// Measures the field of the rolling ball in the middle of its run: read, along a direction of the
+/// state, and in reverse; in reverse also by the scene's numbers and by every point's own.
 void BM_FieldDerivatives(benchmark::State& state) {
   const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene);
   Batch batch(model, 16, 1);

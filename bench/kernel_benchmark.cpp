@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the parts of a step cost: kernels of one group of eight environments, the rolling ball in
-// contact. Time is that of the whole group; ns/env divides it by eight (or by one where a lane is
-// evaluated alone).
+// Measures the parts of a step: kernels of one group of eight environments, the rolling ball in
+// contact. Time is that of the whole group. ns/env divides it by eight, or by one if a lane is
+// evaluated alone.
 #include <benchmark/benchmark.h>
 
 #include <vector>
@@ -109,7 +109,7 @@ void BM_Evaluate(benchmark::State& s) {
 void BM_EvaluateOneLane(benchmark::State& s) {
   run(s, 1, [](Group& g) { g.table().group.evaluate(g.view(), g.work().stage, 0); });
 }
-/// Without contact: the difference to the above is what contact costs.
+/// The same without contact; the difference to the above is the cost of contact.
 void BM_EvaluateWithoutCandidates(benchmark::State& s) {
   run(s, kGroup, [](Group& g) {
     g.work().lists[0].count = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Factor and solve of a tree with 30 dofs: eight environments in lanes on the scene's pattern,
-// against Eigen's dense LU with pivoting, one environment at a time. Both in one run: their ratio
-// counts.
+// Measures factor and solve of a tree with 30 dofs: eight environments in lanes on the scene's
+// pattern, against Eigen's dense LU with pivoting, one environment at a time. Both run together,
+// because their ratio is the result.
 #include <benchmark/benchmark.h>
 #include <Eigen/LU>
 
@@ -45,8 +45,8 @@ Scene hand() {
   return s;
 }
 
-/// Matrices on the hand's pattern, each as lanes and dense; diagonals dominate, as masses over h²
-/// do.
+/// Matrices on the hand's pattern, each in lanes and dense. The diagonals dominate, as masses over
+/// h² do.
 struct Systems {
   std::shared_ptr<const CompiledModel> model = compile(hand());
   Workspace work{*model};

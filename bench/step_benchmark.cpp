@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Environment-steps per second of the rolling ball on one thread, by batch size, size of pad, kind
-// of frame and precision: what the whole program can do at best.
+// Measures environment steps per second of the rolling ball on one thread, by batch size, size of
+// pad, kind of frame and precision. This is the upper limit for the whole program.
 #include <benchmark/benchmark.h>
 
 #include <cstddef>
@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::uint64_t kSeed = 1;
 
-/// The scene's own run: its controls, its length, its tactile interval.
+/// The scene's own run with its controls, its length and its tactile interval.
 class RollingBall {
  public:
   RollingBall(int environments, int resolution, FrameKind frames, Precision precision)
@@ -78,7 +78,7 @@ class RollingBall {
   Readout readout_;
   BenchmarkFields fields_;
   ControlProgram program_;
-  std::size_t row_;               // numbers in the controls of one step, (E, nu)
+  std::size_t row_;               // count of numbers in the controls of one step, (E, nu)
   std::vector<double> controls_;  // (T, E, nu)
   std::vector<int> intervals_;
 };
@@ -87,7 +87,7 @@ void BM_RollingBall(benchmark::State& state, FrameKind frames, Precision precisi
   const auto environments = static_cast<int>(state.range(0)),
              resolution = static_cast<int>(state.range(1));
   RollingBall ball(environments, resolution, frames, precision);
-  ball.run();  // warms caches and pages; its state is thrown away
+  ball.run();  // warms caches and pages; its state is discarded
   std::int64_t passes = 0;
   for (auto _ : state) {
     state.PauseTiming();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a tactile point costs: the kernels alone, on pads that are touched everywhere or in the
-// middle, against one point at a time in plain C++. Fields, lanes and files come after them.
+// Measures the cost of a tactile point: the kernels alone, on pads that are touched everywhere or
+// in the middle, against one point at a time in plain C++. Fields, lanes and files follow.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -27,8 +27,8 @@ using kernels::kTactileTile;
 using kernels::Touch;
 using kernels::TouchShape;
 
-/// Operations of a point that a sphere touches, law `clamped`, counted in the machine code of the
-/// loops: sums, products, comparisons and choices one each, a multiply-add two.
+/// Operations per point that a sphere touches, law `clamped`, counted in the machine code of the
+/// loops. Sums, products, comparisons and choices count one each, a multiply-add two.
 constexpr double kOperationsDouble = 113, kOperationsMixed = 110;
 
 Model pad_model(int resolution) {
@@ -37,7 +37,7 @@ Model pad_model(int resolution) {
   return Model(scene);
 }
 
-/// A ball whose lowest point is `depth` inside a pad of 5 × 5 cm, rolling.
+/// A rolling ball whose lowest point is `depth` inside a pad of 5 × 5 cm.
 struct Press {
   TouchShape shape;
   Touch<double> touch;
@@ -50,9 +50,9 @@ struct Press {
     touch.law = {1, 0.01, 2, 0.003};
   }
 };
-/// Every point of the pad is inside.
+/// Every point of the pad is in contact.
 const Press kEverywhere(0.5, 2e-3);
-/// The ball of the scene, as deep as it gets: a 25th of the points.
+/// The ball of the scene at its greatest depth; it touches a 25th of the points.
 const Press kMiddle(0.02, 1e-3);
 
 int run(const kernels::TactileArgs<double>& a) { return kernels::active_kernels().tactile(a); }
@@ -70,7 +70,7 @@ void count(benchmark::State& state, double points, double operations = 0) {
   state.SetLabel(kernels::active_isa_name());
 }
 
-/// Tiles into a list (compact) or an array (dense).
+/// Evaluates tiles into a list (compact) or an array (dense).
 template <class Real>
 void field(benchmark::State& state, const Press& press, int resolution, bool dense) {
   const Model model = pad_model(resolution);
@@ -98,7 +98,7 @@ void field(benchmark::State& state, const Press& press, int resolution, bool den
   state.counters["tiles"] = tiles;
 }
 
-/// A small pad in every environment of a group or block, points one after the other.
+/// Evaluates a small pad in every environment of a group or block, one point after the other.
 template <class Real>
 void block(benchmark::State& state, int resolution) {
   constexpr std::size_t kLanes = sizeof(Real) == 4 ? 16 : 8;
@@ -126,7 +126,7 @@ void block(benchmark::State& state, int resolution) {
   count(state, double(sensor.points()) * double(kLanes));
 }
 
-/// The same field point by point, as a textbook would: what the kernels are compared with.
+/// Evaluates the same field point by point, like a textbook. The kernels are compared with this.
 void BM_OnePointAtATime(benchmark::State& state) {
   const Model model = pad_model(200);
   const kernels::PadTiles pad = compiled(model).sensors[0].tiles();
@@ -150,7 +150,8 @@ void BM_OnePointAtATime(benchmark::State& state) {
 }
 
 #if defined(__x86_64__)
-// Multiply-adds that wait for nothing: ten chains are more than two units of latency four can take.
+// Independent multiply-adds: two units with a latency of four keep at most eight chains busy, fewer
+// than ten.
 constexpr int kChains = 10, kRounds = 100;
 __attribute__((target("avx512f"))) void multiply_add_512(float* x) {
   __m512 chain[kChains];
@@ -168,7 +169,7 @@ __attribute__((target("avx2,fma"))) void multiply_add_256(float* x) {
     for (__m256& y : chain) y = _mm256_fmadd_ps(y, a, b);
   for (int c = 0; c < kChains; ++c) x[c] = _mm256_cvtss_f32(chain[c]);
 }
-/// What this core can do in single precision at most; half of it in double.
+/// Measures the peak of this core in single precision; double precision reaches half of it.
 void BM_PeakMultiplyAdd(benchmark::State& state) {
   const std::string_view isa = kernels::active_isa_name();
   const int width = isa == "avx512" ? 16 : 8;
@@ -200,8 +201,8 @@ Model list_model() {
     }
   return Model(scene);
 }
-/// Tiles of a curved pad that is touched everywhere. The pad's axes are the body's: the ball comes
-/// from below.
+/// Evaluates tiles of a curved pad that is touched everywhere. The pad's axes are the body's: the
+/// ball comes from below.
 template <class Real>
 void curved(benchmark::State& state) {
   const Model model = list_model();

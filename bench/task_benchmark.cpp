@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the task layer costs: box pushing through a VectorTask, and the same states, controls and
-// fields through a bare Stepper and Readout, on one thread.
+// Measures the cost of the task layer: box pushing through a VectorTask, against the same states,
+// controls and fields through a bare Stepper and Readout, on one thread.
 #include <benchmark/benchmark.h>
 
 #include <array>
@@ -22,7 +22,7 @@ namespace {
 constexpr int kEnvironments = 1024;
 constexpr std::size_t kActs = 3, kControls = 6;
 
-/// One episode of every environment under random actions, which are drawn beforehand.
+/// One episode of every environment under random actions that were drawn in advance.
 struct Pushing {
   std::unique_ptr<Task> task =
       make_task("box_pushing", read_scene(TANGERE_SOURCE_DIR "/scenes/box_pushing.xml").scene);

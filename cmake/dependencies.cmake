@@ -4,12 +4,12 @@ find_package(Threads REQUIRED)
 find_package(TBB CONFIG REQUIRED)
 find_package(Eigen3 CONFIG REQUIRED)
 find_package(xsimd CONFIG REQUIRED)
-# Debian's xsimd 8 asks to link xtl, a library of headers that neither it nor we include.
+# Debian's xsimd 8 links xtl, a header-only library that neither it nor we include.
 if(NOT TARGET xtl)
   set_property(TARGET xsimd PROPERTY INTERFACE_LINK_LIBRARIES "")
 endif()
 find_package(HDF5 REQUIRED COMPONENTS C)
-# Debian 12's libdeflate and liblz4 come without files for CMake; io links them by their plain names.
+# Debian 12's libdeflate and liblz4 have no CMake files, so io links them by their plain names.
 find_path(LIBDEFLATE_INCLUDE_DIR libdeflate.h REQUIRED)
 find_library(LIBDEFLATE_LIBRARY deflate REQUIRED)
 find_path(LIBLZ4_INCLUDE_DIR lz4.h REQUIRED)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Flags of every target of ours, and the reason beside each.
+# The flags of all our targets, each with its reason.
 add_library(tangere_flags INTERFACE)
 target_compile_features(tangere_flags INTERFACE cxx_std_20)
 target_compile_options(tangere_flags INTERFACE
@@ -15,16 +15,16 @@ target_include_directories(tangere_flags INTERFACE $<BUILD_INTERFACE:${PROJECT_S
 set(precompiled_warnings
   "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-stringop-overflow;-Wno-stringop-overread>")
 
-# Who builds once (./run-demo, ./run-tests) compiles eight sources as one, in half the time. Who edits (./dev) does not, so
-# that a change recompiles one source, and that a source which lacks an include is found.
+# ./run-demo and ./run-tests build once and compile eight sources as one, in half the time. ./dev
+# does not: a change then recompiles one source, and a missing include is found.
 set(CMAKE_UNITY_BUILD_BATCH_SIZE 8)
 if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  # A class that only its own source sees may have members from that source's anonymous namespace.
+  # A class that only one source uses may have members from that source's anonymous namespace.
   target_compile_options(tangere_flags INTERFACE -Wno-subobject-linkage)
 endif()
 
-# A warning is an error with the compiler the project is developed with. What another compiler, or the next release of
-# this one, warns about must not stop somebody who only wants to build the program.
+# With the compiler that the project is developed with, warnings are errors. Warnings of other
+# compilers, or of its next release, must not stop people who only want to build the program.
 if(NOT DEFINED CMAKE_COMPILE_WARNING_AS_ERROR AND PROJECT_IS_TOP_LEVEL
    AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   set(CMAKE_COMPILE_WARNING_AS_ERROR ON)

@@ -3,8 +3,8 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# Headers keep the names they have here, "engine/model/model.hpp", because they include each other by them. So the folder that
-# users get on their include path is include/tangere.
+# Headers keep their names, such as "engine/model/model.hpp", because they include each other by
+# them. So the folder on users' include path is include/tangere.
 set(headers ${CMAKE_INSTALL_INCLUDEDIR}/tangere)
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/tangere)
 
@@ -18,7 +18,7 @@ foreach(library kernels engine tasks io)
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${headers}>)
   target_compile_features(tangere_${library} INTERFACE cxx_std_20)
 endforeach()
-set_target_properties(tangere_flags PROPERTIES EXPORT_NAME flags)  # carries a sanitizer to whoever links the libraries
+set_target_properties(tangere_flags PROPERTIES EXPORT_NAME flags)  # passes a sanitizer on to users of the libraries
 
 install(TARGETS tangere_kernels tangere_engine tangere_tasks tangere_io tangere_umbrella tangere_flags
   EXPORT tangere ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})

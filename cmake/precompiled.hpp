@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What most sources of the libraries include anyway, parsed once for all of them. A source still
-// includes what it uses.
+// Headers that most sources of the libraries include anyway, parsed once for all of them. Every
+// source still includes what it uses.
 #pragma once
 
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A whole file as a string, in one call: byte by byte, a sanitizer makes minutes of the larger
-// ones.
+// Reads a whole file into a string in one call. Byte by byte, larger files would take minutes under
+// a sanitizer.
 #pragma once
 
 #include <filesystem>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether a sanitizer watches this build: it keeps memory that was given back, and takes ten to a
-// hundred times as long.
+// Whether a sanitizer watches this build. A sanitizer keeps freed memory and makes programs ten to
+// a hundred times slower.
 #pragma once
 
 namespace tangere {

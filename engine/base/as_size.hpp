@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts are signed here, and the standard library's are not.
+// Converts counts, which are signed here, to the unsigned ones of the standard library.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 
 namespace tangere {
 
-/// A count or an index, not negative, as containers take it.
+/// Returns a count or an index, which must not be negative, in the type of containers.
 constexpr std::size_t as_size(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 }  // namespace tangere

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The exceptions of the whole program, one per exit code, so that a message reaches the user once
-// and unchanged.
+// The exceptions of the whole program, one per exit code. A message reaches the user once and
+// unchanged.
 #pragma once
 
 #include <stdexcept>
@@ -29,7 +29,7 @@ struct Source {
   std::string file;
   int line = 0;
 
-  /// "file:line: " or "" when there is no file.
+  /// Returns "file:line: ", or "" when there is no file.
   [[nodiscard]] std::string prefix() const {
     return line > 0 ? file + ":" + std::to_string(line) + ": " : std::string();
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which numbers a tactile field is computed with. The state of a batch is always in double.
+// The number type in which a tactile field is computed. The state of a batch is always in double.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@ namespace tangere {
 
 enum class Precision : std::uint8_t {
   f64,    ///< "double"
-  mixed,  ///< "mixed": poses and what cancels in double, points in float; 1e-6 of the field's peak
-          ///< (docs/contact.md)
+  mixed,  ///< "mixed": double for poses and whatever cancels, float for points; error 1e-6 of the
+          ///< field's peak (docs/contact.md)
 };
 
 inline const char* to_string(Precision value) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vectors of a scene: three numbers and what is done with them while a scene is read.
+// Vectors of a scene, and the arithmetic that reading a scene needs.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ inline double dot(const Vector3& a, const Vector3& b) {
 inline Vector3 cross(const Vector3& a, const Vector3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
-/// Of length one.
+/// Returns the vector scaled to length one.
 inline Vector3 unit(const Vector3& a) { return (1 / std::sqrt(dot(a, a))) * a; }
 
 }  // namespace tangere

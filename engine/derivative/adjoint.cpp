@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between the tape and the group: gathers states and cotangents of eight lanes, reverses their
-// step, scatters.
+// Connects the tape with the group: gathers states and cotangents of eight lanes, reverses their
+// step, scatters the results.
 #include "engine/derivative/adjoint.hpp"
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using kernels::Row;
 
 namespace {
 
-/// Both sizes of lanes a step may have been taken in.
+/// Scratch for the two lane counts that a step may have been taken with.
 template <int L>
 struct Lanes {
   BasicWorkspace<L> work;
@@ -28,7 +28,7 @@ struct Lanes {
       : work(m, inner_stages), adjoint(m, wanted.losses, wanted.parameters, inner_stages) {}
 };
 
-/// A step of one group: environment `first` + l of the block in lane l of the batch.
+/// The step of one group. Environment `first` + l of the block is in lane l.
 struct GroupStepInHand {
   const BlockTape& tape;
   std::int64_t step;
@@ -45,8 +45,8 @@ struct Adjoint::Impl {
   Lanes<kGroup> eight;
   Lanes<1> one;
   std::vector<BlockCotangent> losses;
-  AlignedVector<double>
-      rows;  ///< a block as it was before the step: states from the tape, parameters from the batch
+  /// A block as it was before the step: states from the tape, parameters from the batch.
+  AlignedVector<double> rows;
 
   Impl(const Model& m, const StepSettings& s, const AdjointOptions& wanted)
       : model(m),
@@ -66,7 +66,7 @@ struct Adjoint::Impl {
     }
   }
 
-  /// The block's rows as they stood before `step`.
+  /// Restores the block's rows to their values before `step`.
   void restore(const Batch& batch, int block, const BlockTape& tape, std::int64_t step) {
     const BlockLayout& layout = compiled(model).layout;
     const double* now = batch.block(block);
@@ -86,7 +86,7 @@ struct Adjoint::Impl {
     }
   }
 
-  /// Rows of a block from lane `first` on.
+  /// Gathers rows of a block from lane `first` on.
   template <int L>
   static void gather(Row<L>* to, const double* from, int count, int first) {
     for (int i = 0; i < count; ++i)
@@ -117,8 +117,8 @@ struct Adjoint::Impl {
     }
   }
 
-  /// The solves of one lane's special step, last first. What the step's result hands to its inner
-  /// states stays in the lane.
+  /// Reverses the solves of one lane's special step, last first. Cotangents of its inner states
+  /// stay in the lane.
   template <int L>
   void reverse_special(Lanes<L>& x, const TapedStep& special, int lane, const GroupStepInHand& g) {
     BasicWorkspace<L>& w = x.work;
@@ -171,8 +171,8 @@ struct Adjoint::Impl {
         if (has(g.live, l)) scatter(x.adjoint.losses[k], losses[k], l, g.first + l, controls);
   }
 
-  /// One lane's results to its column; forces known at the start hang on the state there and on the
-  /// controls.
+  /// Writes one lane's results to its column. Forces that are known at the start depend on the
+  /// state there and on the controls.
   template <int L>
   void scatter(LossRows<L>& o, BlockCotangent& c, int lane, int column,
                std::span<const double> controls) {
@@ -194,7 +194,7 @@ struct Adjoint::Impl {
       c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];
   }
 
-  /// A step that was not taken: both states are the same.
+  /// Reverses a step that was not taken: both states are the same.
   void stand_still(int column) {
     for (BlockCotangent& c : losses) {
       for (int i = 0; i < model.nv(); ++i) {
@@ -248,8 +248,8 @@ void Adjoint::reverse_step(const Batch& batch, int block, const BlockTape& tape,
       }
     }
     if (g.live == 0) continue;
-    if ((g.live & (g.live - 1)) ==
-        0) {  // as in the step: the same bits either way, a third of the time
+    // As in the step, a lone lane takes a third of the time and has the same bits.
+    if ((g.live & (g.live - 1)) == 0) {
       g.first += __builtin_ctz(g.live);
       g.live = 1;
       impl_->reverse<1>(g, of_block);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kernels' templates over Dual<double>. Every number that a scene gives gets a row of its own:
-// value in lane 0, tangent in lane 1 (kernels/step/stage.hpp).
+// The kernels' templates over Dual<double>. Every number of the scene gets a row of its own, with
+// its value in lane 0 and its tangent in lane 1 (kernels/step/stage.hpp).
 #include "engine/derivative/dual_stage.hpp"
 
 #include <algorithm>
@@ -23,13 +23,13 @@ struct DualStage::Impl {
   std::vector<kernels::GroundContact> grounds;
   std::vector<kernels::DofEffects> effects;
   std::vector<kernels::Link> bodies;  ///< links with the environment's masses
-  std::vector<Parameter> origin;      ///< of every row
-  std::vector<int> number;            ///< of every row: which number it is
+  std::vector<Parameter> origin;      ///< for every row: where its number comes from
+  std::vector<int> number;            ///< for every row: the index of its number, -1: none
   std::vector<double> block;          ///< (rows, 16)
-  std::vector<double> inertia;        ///< tangents of masses, moments, inertias, (n_links, 10)
-  bool heavier = false;               ///< some of them are not zero
+  std::vector<double> inertia;        ///< tangents of masses, moments and inertias, (n_links, 10)
+  bool heavier = false;               ///< some of `inertia` are not zero
   bool frozen = false;
-  std::vector<double> tangents;  ///< of the rows, while frozen
+  std::vector<double> tangents;  ///< tangents of the rows, kept while frozen
   std::vector<double> stretch;   ///< tangents of the solids' sizes, (n_solids, 3)
 
   std::vector<D> force_scale, mass_diagonal, A, excess;
@@ -65,7 +65,7 @@ struct DualStage::Impl {
       row(e.armature, -1);
       row(e.limit_stiffness, -1);
     }
-    // `first`: row of the block that held the first of them, or -1: they are `values`.
+    // `first`: row of the block that holds the first number, or -1: the numbers are `values`.
     const auto side_by_side = [this](int& first, int count, const double* values, int which) {
       const int from = first;
       first = static_cast<int>(origin.size());
@@ -106,7 +106,7 @@ struct DualStage::Impl {
     }
   }
 
-  /// How a contact point of a body, link axes, moves with the body's size.
+  /// Returns the tangent of a body's contact point, link axes, with the body's size.
   [[nodiscard]] kernels::Vec3<double> stretched(int body, const kernels::Vec3<double>& at) const {
     const kernels::Solid& s = m.solids[std::size_t(body)];
     if (!s.stretches) return kernels::zero3<double>();
@@ -123,7 +123,7 @@ struct DualStage::Impl {
            });
   }
 
-  /// Tangents of the points in the ground.
+  /// Sets the tangents of the points that touch the ground.
   void stretch_grounds() {
     for (std::size_t g = 0; g < grounds.size(); ++g) {
       const double* p = grounds[g].points;
@@ -137,8 +137,8 @@ struct DualStage::Impl {
     }
   }
 
-  /// Lists of the points that touch at the poses of kinematics(); the others add nothing to values
-  /// or tangents. Points move with the sizes of their bodies.
+  /// Lists the points that touch at the poses of kinematics(). The others add nothing to values or
+  /// tangents. Points move with the sizes of their bodies.
   void find_touching() {
     stretch_grounds();
     for (int k = 0; k < view.n_link_pairs; ++k) {
@@ -161,7 +161,7 @@ struct DualStage::Impl {
               transposed_times(shape.R, kernels::Vec3<double>{p[0], p[1], p[2]} - shape.p);
           const double d = kernels::with_distance<double>(
               pair.shape, size, [&](const auto& s) { return distance_at(s, y).d; });
-          if (!(d < 1e-9)) continue;  // [m] beyond rounding
+          if (!(d < 1e-9)) continue;  // [m], above rounding
           const kernels::Vec3<double> moves =
               frozen ? kernels::zero3<double>() : stretched(pair.body1, {p[0], p[1], p[2]});
           list[std::size_t(3 * count)] = {p[0], moves.x};
@@ -174,8 +174,8 @@ struct DualStage::Impl {
     }
   }
 
-  /// g and A are linear in masses: what the tangents of masses weigh, without contacts, motors and
-  /// effects.
+  /// Computes what the tangents of masses add to g and A, which are linear in masses. Contacts,
+  /// motors and effects are left out.
   void weigh(const kernels::StageArgs<D>& a, std::vector<D>& g, D* entries) {
     std::vector<kernels::Link> light = bodies;
     for (std::size_t k = 0; k < light.size(); ++k) {
@@ -330,12 +330,12 @@ void DualStage::products(std::span<const double> lambda, std::vector<DualNumber>
 
 namespace {
 
-/// A point of a pad in pad axes, and the rows that its field is stored by, acting on the force.
+/// A point of a pad in pad axes, and the rows that turn a force into its field.
 struct PadPoint {
   kernels::Vec3<double> at;
   double rows[9];
   double factors[4];
-  int index;  ///< of the field, -1: filler
+  int index;  ///< in the field; -1: filler
 };
 PadPoint pad_point(const kernels::PadTiles& pad, int tile, int k) {
   using kernels::kTactileTile;

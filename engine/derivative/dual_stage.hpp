@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One environment's stage in dual numbers: the plain templates of the kernels with a tangent beside
-// every input. Slow. For tangents that the adjoint is checked against, and for the adjoint of the
-// linearly implicit step.
+// every input. It is slow. It serves the tangents that the adjoint is checked against, and the
+// adjoint of the linearly implicit step.
 #pragma once
 
 #include <memory>
@@ -15,7 +15,7 @@ namespace tangere {
 
 using DualNumber = kernels::Dual<double>;
 
-/// Inputs are set by the caller. Contacts are summed over the points that touch.
+/// The caller sets the inputs. Contacts are summed over the points that touch.
 class DualStage {
  public:
   explicit DualStage(const CompiledModel& model);
@@ -25,28 +25,28 @@ class DualStage {
   double c0_over_h = 0, inverse_h = 0;
   std::vector<DualNumber> v, g;  ///< (nv) out
 
-  /// The numbers of an environment whose column of a block this is, and their tangents:
-  /// (parameter_numbers) as in kernels/table/kernel_table.hpp; empty: zeros.
+  /// Sets the numbers of one environment from its column of a block, and their tangents:
+  /// (parameter_numbers), in the order of kernels/step/arguments.hpp; empty: zeros.
   void set_numbers(const double* column, std::span<const double> tangents = {});
 
   /// While frozen, the numbers' tangents count as zero.
   void freeze_numbers(bool frozen);
 
-  /// v and g; the tangents of masses included.
+  /// Computes v and g, with the tangents of masses included.
   void residual();
-  /// v alone.
+  /// Computes v alone.
   void rates();
 
-  /// How the field of a sensor, (points, 3), changes at the state centre ⊕ 0 with twist r
-  /// (c0_over_h = 0, inverse_h = 1). `numbers`: tangents as rows of BlockCotangent::parameters,
-  /// `points`: (points, kPointNumbers) of every point's own; or empty.
+  /// Computes how the field of a sensor, (points, 3), changes at the state centre ⊕ 0 with twist r
+  /// (c0_over_h = 0, inverse_h = 1). `numbers`: tangents as rows of BlockCotangent::parameters; or
+  /// empty. `points`: (points, kPointNumbers), tangents of every point's own numbers; or empty.
   void field(int sensor, const double* column, std::span<const double> numbers,
              std::span<const double> points, std::span<double> field_dot);
 
-  /// For the values: A of residual() by its tangent inputs, (n, n) row-major, and its own tangents.
+  /// Computes A of residual(), (n, n) row-major, and its tangents along the inputs' tangents.
   void jacobian(std::vector<DualNumber>& A);
-  /// After jacobian(): Cᵀ λ, M λ and the targets' cotangents, (nv) each, and parameter_products(),
-  /// added to `numbers`.
+  /// After jacobian(): computes Cᵀ λ, M λ and the targets' cotangents, (nv) each, and adds
+  /// parameter_products() to `numbers`.
   void products(std::span<const double> lambda, std::vector<DualNumber>& c_lambda,
                 std::vector<DualNumber>& m_lambda, std::vector<DualNumber>& targets,
                 std::vector<DualNumber>* numbers);

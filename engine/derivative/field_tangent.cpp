@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tangents of links outward, in doubles, then of fields across points. With δ = (θ; ρ) a link's
-// displacement and δV the change of its twist, both in its axes, and V_p its parent's twist there:
+// Tangents of links from the root outward, in double, then of fields across points. Let δ = (θ; ρ)
+// be a link's displacement and δV the change of its twist, both in its axes, and V_p its parent's
+// twist there:
 //   δ = X δ_p + S q̇;  δV = X δV_p + V_p × (S q̇) + S v̇;      ε = Ad δ₂ - δ₁,
 //       δW = Ad δV₂ - δV₁ - Z × ε  in a pad's axes
 #include "engine/derivative/field_tangent.hpp"
@@ -24,7 +25,7 @@ struct LinkTangent {
   Vec6<double> pose, twist;
 };
 
-/// S x of a joint.
+/// Returns S x of a joint.
 Vec6<double> along_joint(const Link& link, std::span<const double> x) {
   const auto v = std::size_t(link.v);
   const Vec3<double> sum =
@@ -40,7 +41,7 @@ struct FieldTangent::Impl {
   PadReader reader;
   const Batch* batch = nullptr;
   int block = 0, lane = 0;
-  int met_group = -1, met_sensor = -1;  ///< whose shapes the reader holds
+  int met_group = -1, met_sensor = -1;  ///< group and sensor of the shapes that the reader holds
   std::vector<LinkTangent> links;
   std::vector<kernels::TouchTangent> touches;
 
@@ -59,7 +60,7 @@ struct FieldTangent::Impl {
                     : links[std::size_t(link)];
   }
 
-  /// Of one shape against a pad.
+  /// Tangent of one shape against a pad.
   [[nodiscard]] kernels::TouchTangent against(const CompiledSensor& s,
                                               const CompiledBody& body) const {
     const LinkPose<double> one = pose(s.link), two = pose(body.link);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The stages of a scheme backwards (engine/model/scheme.hpp). Lanes outside the mask compute with
-// what stands there and change nothing.
+// whatever is there and change nothing.
 #include "engine/derivative/group_adjoint.hpp"
 
 #include <algorithm>
@@ -57,7 +57,7 @@ void add_lanes(Row<L>* to, const Row<L>* from, int count, LaneBits lanes) {
 
 }  // namespace
 
-/// A and its factor at the stage's x; everything else of the stage is set.
+/// Computes A and its factor at the stage's x. Everything else of the stage must be set.
 template <int L>
 void GroupAdjoint::assemble(const StageInHand<L>& s) const {
   BasicWorkspace<L>& w = s.w;
@@ -71,7 +71,7 @@ void GroupAdjoint::assemble(const StageInHand<L>& s) const {
   kernel.factor(model_.view, w.stage, nullptr);
 }
 
-/// λ from the right-hand side; lanes whose factor is useless get a pivoted one.
+/// Computes λ from the right-hand side. Lanes whose factor is useless get a pivoted one.
 template <int L>
 void GroupAdjoint::solve(const StageInHand<L>& s) const {
   BasicWorkspace<L>& w = s.w;
@@ -84,7 +84,8 @@ void GroupAdjoint::solve(const StageInHand<L>& s) const {
   }
 }
 
-/// What a stage hangs on beside its centre: the state one step before, then the earlier stages.
+/// Returns what a stage depends on besides its centre: the state one step before, then the earlier
+/// stages.
 template <int L>
 kernels::StageHistory<Row<L>> GroupAdjoint::history_of(const StageInHand<L>& s,
                                                        const Scheme& scheme, int stage) const {
@@ -107,7 +108,7 @@ kernels::StageHistory<Row<L>> GroupAdjoint::history_of(const StageInHand<L>& s,
   return history;
 }
 
-/// One loss through the stage in hand.
+/// Passes one loss back through the present stage.
 template <int L>
 void GroupAdjoint::hand_on(const StageInHand<L>& s, const Scheme& scheme, int stage,
                            const LossRows<L>& loss) const {
@@ -134,7 +135,7 @@ void GroupAdjoint::hand_on(const StageInHand<L>& s, const Scheme& scheme, int st
   kernel.adjoint_products(model_.view, s.w.stage, d);
   add_lanes(loss.q_centre, a.q_centre, n, s.lanes);
   add_lanes(loss.v_centre, a.v_centre, n, s.lanes);
-  const int before = d.history.count - stage;  // 1: of a scheme with history
+  const int before = d.history.count - stage;  // 1 if the scheme has history, else 0
   add_lanes(loss.q_before, a.q_older, before * n, s.lanes);
   add_lanes(loss.v_before, a.v_older, before * n, s.lanes);
   add_lanes(loss.q_inner, a.q_older + before * n, stage * n, s.lanes);
@@ -148,14 +149,15 @@ void GroupAdjoint::hand_on(const StageInHand<L>& s, const Scheme& scheme, int st
   add_lanes(loss.parameters, a.numbers, count, s.lanes);
 }
 
-/// v_inner from x_inner, by the stages' kinematics.
+/// Computes v_inner from x_inner, by the stages' kinematics.
 template <int L>
 void GroupAdjoint::find_inner_velocities(const StageInHand<L>& s, const Scheme& scheme,
                                          double h) const {
   BasicWorkspace<L>& w = s.w;
   for (int k = 0; k < scheme.inner_stages(); ++k) {
     set_stage(model_, scheme, k, h, w);
-    // c₀/h once more: by the product a_kk h, which the last bits of gradients hang on.
+    // c₀/h is computed anew from the product a_kk h, because the last bits of gradients depend on
+    // it.
     fill(w.stage.c0_over_h, 1 / (scheme.stages[std::size_t(k)].s_divisor * h));
     std::copy_n(w.x_inner + k * model_.nv, model_.nv, w.stage.x);
     s.table.template stage<L>().kinematics(model_.view, w.stage);
@@ -214,7 +216,7 @@ template void GroupAdjoint::reverse(const Scheme&, double, const kernels::Kernel
 template void GroupAdjoint::reverse(const Scheme&, double, const kernels::KernelTable&,
                                     SingleWorkspace&, AdjointWorkspace<1>&, LaneBits) const;
 
-// linear_adjoint.cpp calls it.
+// Instantiated for linear_adjoint.cpp, which calls it.
 template void GroupAdjoint::solve(const StageInHand<kernels::kGroup>&) const;
 template void GroupAdjoint::solve(const StageInHand<1>&) const;
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One step of a group in reverse: the stages of its scheme backwards, each assembled and factored
-// anew at its accepted state and solved transposed for every loss (docs/gradients.md).
+// One step of a group in reverse. The stages of its scheme are taken backwards. Each is assembled
+// and factored anew at its accepted state, then solved transposed for every loss
+// (docs/gradients.md).
 #pragma once
 
 #include <memory>
@@ -10,19 +11,19 @@
 
 namespace tangere {
 
-/// Cotangents of one loss in a group, rows (nv); positions by their right tangent.
+/// Cotangents of one loss in a group, rows (nv). Positions are by their right tangent.
 template <int L>
 struct LossRows {
   using Rows = kernels::Row<L>*;
   Rows q, v;                ///< in: of the state after the step
   Rows q_centre, v_centre;  ///< out: of the state before it
   Rows q_before, v_before;  ///< out: of the one before that
-  Rows q_inner, v_inner;    ///< of inner stages, (nv) after one another
-  Rows tau, target;         ///< out: of forces known when the step begins, of motors' targets
+  Rows q_inner, v_inner;    ///< of inner stages, (nv) each, one after another
+  Rows tau, target;         ///< out: of forces known when the step begins, and of motors' targets
   Rows parameters;          ///< out: (parameter_numbers), or null
 };
 
-/// Scratch of one thread beside a workspace.
+/// Scratch of one thread, besides a workspace.
 template <int L>
 struct AdjointWorkspace {
   using Row = kernels::Row<L>;
@@ -30,18 +31,18 @@ struct AdjointWorkspace {
 
   AlignedVector<Row> memory;
   std::vector<LossRows<L>> losses;
-  // One stage: the system, and what it hands on before lanes are picked.
+  // One stage: the system, and what it hands on in all lanes before some are picked.
   Row *rhs, *lambda, *nu, *mass_lambda, *target, *difference, *q_centre, *v_centre;
-  Row *q_older, *v_older;  ///< (nv) of each state that a stage may hang on after one another
+  Row *q_older, *v_older;  ///< (nv) for each state that a stage may depend on, one after another
   Row* numbers;            ///< (parameter_numbers), or null
   Row sound;
-  std::unique_ptr<DualStage>
-      dual;  ///< the linearly implicit step's, made when it is first reversed
+  /// For the linearly implicit step; made when one is first reversed.
+  std::unique_ptr<DualStage> dual;
 };
 
-/// Reverses solves whose states stand in the workspace: q0, v0 where it began, q_before, v_before
-/// one step earlier, q1 its result, x_inner its inner stages; tau, target and the block of
-/// parameters as in the step.
+/// Reverses solves whose states are in the workspace: q0, v0 where the solve began, q_before,
+/// v_before one step earlier, q1 its result, x_inner its inner stages. tau, target and the block of
+/// parameters are as in the step.
 class GroupAdjoint {
  public:
   explicit GroupAdjoint(const CompiledModel& model) : model_(model) {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One environment after the other, in dual numbers.
+// Goes through the environments one after the other, in dual numbers.
 #include "engine/derivative/linear_adjoint.hpp"
 
 #include "engine/derivative/dual_stage.hpp"
@@ -14,7 +14,7 @@ using D = DualNumber;
 
 namespace {
 
-/// What value - tangent leaves.
+/// Returns value - tangent: the derivatives Ĝ_z of linear_adjoint.hpp.
 double hatted(const D& a) { return a.value - a.epsilon; }
 
 template <class N>
@@ -23,7 +23,7 @@ Vec3<N> three(const std::vector<N>& a, int i) {
   return {a[k], a[k + 1], a[k + 2]};
 }
 
-/// exp(x) J⁻ᵀ (Aᵀ λ - V_xᵀ Cᵀ λ) of a spherical joint, by the tangent of q₀.
+/// Returns exp(x) J⁻ᵀ (Aᵀ λ - V_xᵀ Cᵀ λ) of a spherical joint, by the tangent of q₀.
 Vec3<D> by_turned_centre(const Vec3<D>& x, double h, const Vec3<D>& a_lambda,
                          const Vec3<D>& c_lambda) {
   const kernels::RotationSeries<D> k = kernels::rotation_series(x);

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Motors in reverse: cotangents of forces and targets to those of the controls and of the state
-// that a step begins with.
+// Motors in reverse: turns cotangents of forces and targets into those of the controls and of the
+// state at the beginning of a step.
 //
 // Force motors: u ↦ low + (u + 1)/2 (high - low), constant beyond |u| = 1. Position motors timed at
-// the start:
-// clip(P ψ - D v), ψ = u - q or log(q⁻¹ exp u), with ∂ψ/∂q = -J_l⁻¹(ψ), ∂ψ/∂u = J_r⁻¹(ψ) J_r(u). At
-// a bound of a range the derivative is that of its inside.
+// the start: clip(P ψ - D v), ψ = u - q or log(q⁻¹ exp u), with ∂ψ/∂q = -J_l⁻¹(ψ) and
+// ∂ψ/∂u = J_r⁻¹(ψ) J_r(u). At a bound of a range the derivative is that of its inside.
 #pragma once
 
 #include "engine/derivative/group_adjoint.hpp"
@@ -14,15 +13,16 @@
 
 namespace tangere {
 
-/// Of one lane.
+/// The motors of one lane.
 template <int L>
 struct MotorPullback {
   const CompiledModel& m;
-  const double* state;        ///< its column of the block the step began with
+  const double* state;        ///< the lane's column of the block that the step began with
   std::span<const double> u;  ///< (nu)
   int lane;
 
-  /// Adds to the cotangents of u, numbers kBlock apart, and of the state before the step.
+  /// Adds to the cotangents of u, which are kBlock apart, and to those of the state before the
+  /// step.
   void run(LossRows<L>& o, double* u_bar) const {
     for (int k = 0; k < m.nu; ++k) {
       const CompiledMotor& motor = m.motors[std::size_t(k)];

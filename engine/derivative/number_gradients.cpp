@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which numbers there are, and how each enters what the kernels differentiate by.
+// Lists the numbers that have a gradient, and how each enters the kernels' derivatives.
 #include "engine/derivative/number_gradients.hpp"
 
 #include <algorithm>
@@ -60,7 +60,7 @@ void NumberGradients::add_contacts() {
 
 namespace {
 
-/// Whether anything in the scene looks at a body's size.
+/// Whether anything in the scene depends on a body's size.
 bool size_matters(const CompiledModel& m, int body) {
   const CompiledBody& b = m.bodies[std::size_t(body)];
   const auto touches = [body](const kernels::PairContact& p) {
@@ -84,7 +84,7 @@ bool varies(const Scene& scene, const std::string& body) {
 
 }  // namespace
 
-/// Density, or the mass of an abstract body, and every number of a size.
+/// Adds the density, or the mass of an abstract body, and every number of a size.
 void NumberGradients::add_bodies() {
   const CompiledModel& m = compiled(model_);
   for (int b = 0; b < static_cast<int>(m.bodies.size()); ++b) {
@@ -136,7 +136,7 @@ NumberGradients::Masses NumberGradients::masses_by(std::size_t k, const Batch& b
   const BodyDescription& d = scene.links[std::size_t(body)].body;
   std::optional<Shape> sized;  // a mesh, whose size cannot vary, is not copied
   double density = d.density;
-  for (std::size_t r = 0; r < scene.randomizations.size(); ++r) {  // the last one holds
+  for (std::size_t r = 0; r < scene.randomizations.size(); ++r) {  // the last one applies
     const SceneNumber& varied = scene.randomizations[r].number;
     if (varied.owner != Owner::body || varied.name != d.name) continue;
     const double value = batch.randomized_value(environment, static_cast<int>(r));
@@ -161,7 +161,7 @@ NumberGradients::Terms NumberGradients::of_dofs(std::size_t joint, int which, in
   return terms;
 }
 
-/// Dofs have damping, stiffness, P, D (kernels/step/arguments.hpp).
+/// Dofs have damping, stiffness, P and D (kernels/step/arguments.hpp).
 void NumberGradients::add_joints() {
   for (std::size_t i = 0; i < model_.scene().links.size(); ++i) {
     const JointDescription& d = model_.scene().links[i].joint;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The numbers of a scene that gradients are taken by, and how each enters the rows of derivatives
-// that the kernels give.
+// The numbers of a scene by which gradients are taken, and how each enters the rows of derivatives
+// that the kernels compute.
 #pragma once
 
 #include <array>
@@ -19,20 +19,20 @@ struct NumberInfo {
 };
 
 /// Coefficients of contacts and sensors, densities (or masses) and sizes of bodies, damping and
-/// stiffness of joints, gains of position motors, once each: a number that a scene gives for a
-/// whole joint has one derivative. Their order is that of every gradient by them.
+/// stiffness of joints, gains of position motors. Each appears once: a number that a scene gives
+/// for a whole joint has one derivative. Every gradient by them has their order.
 class NumberGradients {
  public:
   explicit NumberGradients(const Model& model);
 
   [[nodiscard]] std::span<const NumberInfo> infos() const { return infos_; }
   [[nodiscard]] int count() const { return static_cast<int>(infos_.size()); }
-  /// Derivatives of a loss by all of them, (count), for an environment of the batch that an Adjoint
-  /// made with parameters has reversed.
+  /// Computes the derivatives of a loss by all numbers, (count), for one environment of the batch.
+  /// An Adjoint made with parameters must have reversed it.
   void gradient(const BlockCotangent& cotangent, const Batch& batch, int environment,
                 std::span<double> out) const;
-  /// The other way: how the rows of BlockCotangent::parameters change when these numbers of an
-  /// environment, (count), do.
+  /// The transpose: computes how the rows of BlockCotangent::parameters change when these numbers
+  /// of an environment, (count), change.
   void spread(std::span<const double> change, const Batch& batch, int environment,
               std::span<double> rows) const;
 
@@ -45,7 +45,7 @@ class NumberGradients {
   using Masses = std::array<double, 10>;  ///< rows of a link's mass, moment and inertia
   struct Entry {
     Terms terms;
-    int body = -1;  ///< whose masses follow as each environment has them, and not by terms
+    int body = -1;  ///< if ≥ 0, the masses of this body vary by environment and are not in `terms`
   };
   void add(const SceneNumber& number, Terms terms, int body = -1);
   void add_coefficients(SceneNumber of, int row);
@@ -53,12 +53,12 @@ class NumberGradients {
   void add_bodies();
   void add_joints();
   void add_motors();
-  /// Of number `which` of every dof from `first` on of a joint.
+  /// Terms of number `which` of the dofs `first` … `end` - 1 of a joint.
   [[nodiscard]] Terms of_dofs(std::size_t joint, int which, int first, int end) const;
-  /// How the masses of its link change with a number of a body that is so.
+  /// How the masses of a body's link change with a number of a body of this shape and density.
   [[nodiscard]] Masses masses_by(const SceneNumber& number, int body, const Shape& shape,
                                  double density) const;
-  /// The same in an environment of its own density and size.
+  /// The same for entry k, with the density and size that an environment has.
   [[nodiscard]] Masses masses_by(std::size_t k, const Batch& batch, int environment) const;
   [[nodiscard]] int mass_row(int body) const;
 
@@ -67,7 +67,8 @@ class NumberGradients {
   std::vector<Entry> entries_;  // parallel to infos_
 };
 
-/// Rows of BlockCotangent::parameters: those of the kernels, then the coefficients of every sensor.
+/// Number of rows of BlockCotangent::parameters: those of the kernels, then the coefficients of
+/// every sensor.
 int parameter_rows(const Model& model);
 
 }  // namespace tangere

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Fields across points, then wrenches up the tree in lanes (docs/gradients.md).
 //
-// Of a shape in pad axes, W = Ad V₂ - V₁, δW = Ad δV₂ - δV₁ - Z × ε, ε = Ad δ₂ - δ₁, Z = Ad V₂:
+// For a shape in pad axes, with Z = Ad V₂, W = Z - V₁, ε = Ad δ₂ - δ₁, δW = Ad δV₂ - δV₁ - Z × ε:
 //   ε̄ += Z ×* W̄;  δ̄₂ = Adᵀ ε̄, δ̄₁ = -ε̄, V̄₂ = Adᵀ W̄, V̄₁ = -W̄
 #include "engine/derivative/readout_pullback.hpp"
 
@@ -40,13 +40,13 @@ struct ReadoutPullback::Impl {
   PadReader reader;
   const Batch* batch = nullptr;
   int block = 0;
-  std::vector<int> met;  ///< (kGroups) sensor whose shapes the reader holds, -1
+  std::vector<int> met;  ///< (kGroups) sensor whose shapes the reader holds; -1: none
   std::array<AlignedVector<kernels::MotionCotangent<LaneRow>>, kGroups> links;
   std::array<bool, kGroups> used{};
   AlignedVector<LaneRow> rows;  ///< q, v, zeros, rates, q̄, v̄ of one group
   AlignedVector<std::byte> scratch;
   std::vector<kernels::TouchCotangent<double>> touches;
-  std::vector<int> tiles;  ///< of a whole field: those that are not zero
+  std::vector<int> tiles;  ///< tiles of a whole field that are not zero
   std::vector<double> of_tiles;
   AlignedVector<double> own;  ///< (tiles, kPointNumbers, 64)
 
@@ -66,7 +66,7 @@ struct ReadoutPullback::Impl {
     return links[std::size_t(group)][std::size_t(link)];
   }
 
-  /// Own numbers of the points of tiles, from pad axes to the body's.
+  /// Adds the derivatives by the points' own numbers, turned from pad axes to the body's.
   void hand_on_points(const CompiledSensor& s, std::span<const int> touched,
                       std::span<double> points) const {
     const kernels::PadTiles pad = s.tiles();
@@ -83,7 +83,7 @@ struct ReadoutPullback::Impl {
       });
   }
 
-  /// One shape's sums, in pad axes, to its link and the sensor's.
+  /// Hands one shape's sums, in pad axes, on to its link and the sensor's.
   void hand_on(const kernels::TouchCotangent<double>& c, const CompiledSensor& s,
                const CompiledBody& body, int group, int lane) {
     const LinkPose<double> one = reader.link(s.link, group, lane),

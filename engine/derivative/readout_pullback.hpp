@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a batch is measured by, in reverse: cotangents of tactile fields and end effectors to those
-// of the state.
+// The readings of a batch in reverse: turns cotangents of tactile fields and end effectors into
+// those of the state.
 #pragma once
 
 #include <memory>
@@ -11,10 +11,10 @@
 
 namespace tangere {
 
-/// Owns the scratch of one thread; allocates when made, and for more tiles at once than ever
-/// before. For each state: place(), then for each loss clear(), any number of fields and end
-/// effectors, and finish(). Fields are computed anew in double; nothing is kept of how they were
-/// read.
+/// Owns the scratch of one thread. Allocates when made, and when it meets more tiles at once than
+/// before. For each state call place(); then for each loss clear(), any number of fields and end
+/// effectors, and finish(). Fields are computed anew in double. The way they were read does not
+/// matter.
 class ReadoutPullback {
  public:
   explicit ReadoutPullback(const Model& model);
@@ -22,23 +22,23 @@ class ReadoutPullback {
   ReadoutPullback(ReadoutPullback&&) noexcept;
   ReadoutPullback& operator=(ReadoutPullback&&) noexcept;
 
-  /// Poses and twists of the environments of a block in their present state.
+  /// Computes poses and twists of the environments of a block in their present state.
   void place(const Batch& batch, int block);
   void clear();
-  /// Of the field of a sensor in lane `lane` of the block, as `tiles` of 8 × 8 points
+  /// Takes the cotangents of a sensor's field in lane `lane` of the block: `tiles` of 8 × 8 points
   /// (CompactFrame::tiles) with `cotangents` (tiles, 3, 8, 8). Points outside the tiles, or where
-  /// nothing touches, have no derivative. `parameters`: (parameter_rows, 16) of the loss to add
-  /// those by the sensor's coefficients and the sizes of what touches it to, or empty. `points`:
-  /// (points, kPointNumbers) of the sensor to add those by every point's own numbers to
-  /// (engine/derivative/tactile_point_numbers.hpp), or empty.
+  /// nothing touches, have no derivative. `parameters`: (parameter_rows, 16) of the loss, to which
+  /// derivatives by the sensor's coefficients and the sizes of what touches it are added, or empty.
+  /// `points`: (points, kPointNumbers) of the sensor, to which derivatives by every point's own
+  /// numbers are added (engine/derivative/tactile_point_numbers.hpp), or empty.
   void field(int lane, int sensor, std::span<const int> tiles, std::span<const double> cotangents,
              std::span<double> parameters = {}, std::span<double> points = {});
-  /// The same with `cotangents` of the whole field, (points, 3).
+  /// The same for `cotangents` of the whole field, (points, 3).
   void dense_field(int lane, int sensor, std::span<const double> cotangents,
                    std::span<double> parameters = {}, std::span<double> points = {});
-  /// Of the world position of an end effector, (3).
+  /// Takes the cotangent of an end effector's world position, (3).
   void end_effector(int lane, int end_effector, std::span<const double> cotangent);
-  /// Adds what was collected to q and v of `out`, all lanes.
+  /// Adds the collected cotangents to q and v of `out`, in all lanes.
   void finish(BlockCotangent& out);
 
  private:

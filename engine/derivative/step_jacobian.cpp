@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each number of the state after the step is a loss of its own.
+// Each number of the state after the step is treated as a loss of its own.
 #include "engine/derivative/step_jacobian.hpp"
 
 #include "kernels/numbers/linalg.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts of tactile points, and an array of them one by one.
+// Counts tactile points, and lists those of an array one by one.
 #include "engine/derivative/tactile_point_numbers.hpp"
 
 #include "engine/model/compiled_model.hpp"

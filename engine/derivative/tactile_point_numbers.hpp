@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers that every tactile point has of its own: where it is, and its coefficients. Derivatives
-// by them say where sensing pays, and fit a skin that is not the same everywhere.
+// Numbers that every tactile point has of its own: its position and its coefficients. Derivatives
+// by them show where sensing pays, and fit a skin that is not uniform.
 #pragma once
 
 #include <array>
@@ -13,28 +13,30 @@ namespace tangere {
 
 class Batch;
 
-/// Of a point: its place x y z in its body's frame, its axes left as they are; then its own
-/// coefficients (the sensor's times its factors).
+/// A point's own numbers: its position x y z in its body's frame, with its axes held fixed, then
+/// its coefficients (the sensor's times the point's factors).
 inline constexpr int kPointNumbers = 7;
 
-/// "x", "y", "z", "kn" …, and their units where a sensor has this law.
+/// Name of number k, "x", "y", "z", "kn" …, and its unit where a sensor has this law.
 const char* point_number_name(int k);
 const char* point_number_unit(int k, ContactLaw law);
 
-/// All points of all sensors, one sensor after the other, each in the order of its field.
+/// Number of points of all sensors. They are ordered sensor by sensor, each in the order of its
+/// field.
 int tactile_points(const Model& model);
-/// Of which these come before those of a sensor.
+/// Index of a sensor's first point in that order.
 int first_tactile_point(const Model& model, int sensor);
 
-/// kn, kt, mu and damping that a sensor has in an environment.
+/// Returns kn, kt, mu and damping of a sensor in an environment.
 ContactCoefficients sensor_coefficients(const Batch& batch, int environment, int sensor);
 
-/// The points of an array, row by row, with its axes: given one by one they have the same field.
+/// Lists the points of an array, row by row, with its axes. The list has the same field as the
+/// array.
 std::vector<TactilePoint> list_points(const RectArray& array);
 
-/// Adds to the own numbers of a sensor's points, (points, kPointNumbers), in their units; an array
-/// becomes a list, which has neither rows nor columns. Throws InputError for a change of another
-/// size, and for one of coefficients that the sensor has as 0: points have parts of the sensor's.
+/// Adds `change`, (points, kPointNumbers), to the own numbers of a sensor's points, in their units.
+/// An array becomes a list, which has neither rows nor columns. Throws InputError if `change` has
+/// another size, or changes a coefficient that is 0 for the sensor: points only have factors of it.
 void add_to_points(TactileDescription& sensor, std::span<const double> change);
 
 }  // namespace tangere

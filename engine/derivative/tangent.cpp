@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every solve of a step by the implicit function: A ẋ = -ġ, columns of A by dual numbers too.
+// Differentiates every solve of a step by the implicit function theorem: A ẋ = -ġ. The columns of A
+// also come from dual numbers.
 #include "engine/derivative/tangent.hpp"
 
 #include <Eigen/LU>
@@ -43,7 +44,7 @@ void put(Duals& to, int i, const Vec3<D>& x) {
 }
 D scaled(double a, const D& x) { return {a * x.value, a * x.epsilon}; }
 
-/// q with its tangent along the dofs of v.
+/// Returns q with its tangent along the dofs of v.
 Duals with_tangent(const CompiledModel& m, const double* q, int stride,
                    const std::vector<double>& dot) {
   Duals out(std::size_t(m.nq));
@@ -70,7 +71,7 @@ Duals with_tangent(const double* x, int stride, const std::vector<double>& dot) 
   return out;
 }
 
-/// Tangents of q along the dofs of v.
+/// Returns the tangents of q along the dofs of v.
 std::vector<double> tangent_of(const CompiledModel& m, const Duals& q) {
   std::vector<double> out(static_cast<std::size_t>(m.nv));
   for (const Link& link : m.links) {
@@ -88,7 +89,7 @@ std::vector<double> tangent_of(const CompiledModel& m, const Duals& q) {
   return out;
 }
 
-/// to ⊖ from.
+/// Returns to ⊖ from.
 Duals difference(const CompiledModel& m, const Duals& to, const Duals& from) {
   Duals out(std::size_t(m.nv));
   for (const Link& link : m.links) {
@@ -104,7 +105,7 @@ Duals difference(const CompiledModel& m, const Duals& to, const Duals& from) {
   return out;
 }
 
-/// from ⊕ x.
+/// Returns from ⊕ x.
 Duals moved(const CompiledModel& m, const Duals& from, const Duals& x) {
   Duals out(from.size());
   for (const Link& link : m.links) {
@@ -130,7 +131,8 @@ struct Tangent::Impl {
   Impl(const Model& m, const StepSettings& s) : model(m), settings(s), stage(compiled(model)) {}
   [[nodiscard]] const CompiledModel& m() const { return compiled(model); }
 
-  /// The tangent of x with g(x) = 0 at the value of x; leaves v of it in the stage.
+  /// Computes the tangent of x with g(x) = 0 at the value of x. Leaves the v of that x in the
+  /// stage.
   Duals solve(const std::vector<double>& x) {
     const std::size_t n = x.size();
     const auto size = static_cast<Eigen::Index>(n);
@@ -177,7 +179,7 @@ struct Tangent::Impl {
     return x;
   }
 
-  /// r and s of a stage, by the states and the earlier stages that it hangs on.
+  /// Sets r and s of a stage from the states and the earlier stages that it depends on.
   void set_history(const SchemeStage& row, const DualState& at, const DualState& before,
                    const std::vector<DualState>& inner) {
     const Duals way = row.r_before == 0 ? Duals() : difference(m(), before.q, at.q);
@@ -194,8 +196,8 @@ struct Tangent::Impl {
     }
   }
 
-  /// One solve of `scheme` from `at`; `before`: the state one step earlier. q1: its result,
-  /// x_inner: its inner stages, `stride` apart.
+  /// Differentiates one solve of `scheme` from `at`. `before`: the state one step earlier. q1: the
+  /// solve's result. x_inner: its inner stages, `stride` apart.
   DualState solve_step(const Scheme& scheme, double h, const DualState& at, const DualState& before,
                        const double* q1, const double* x_inner, int stride) {
     stage.centre = at.q;
@@ -218,7 +220,7 @@ struct Tangent::Impl {
     return {moved(m(), at.q, found.back().q), found.back().v};
   }
 
-  /// A ṡ = ġ - Ȧ s at the predictor.
+  /// Solves A ṡ = ġ - Ȧ s at the predictor.
   DualState linear(double h, const DualState& at) {
     const std::size_t n = at.v.size();
     const auto index = [](std::size_t i) { return Eigen::Index(i); };
@@ -248,7 +250,7 @@ struct Tangent::Impl {
     return {moved(m(), at.q, x), v};
   }
 
-  /// Motors, as set_motors() does it.
+  /// Sets the motors as set_motors() does.
   void set_motors(const DualState& at, std::span<const double> u, std::span<const double> u_dot,
                   std::span<const double> numbers_dot, const double* column) {
     const int first_dof = kernels::first_dof_number(m().view);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forward derivatives of taped steps along one direction, in dual numbers through the kernels' own
-// templates: the second route that gradients are checked by. One environment at a time, a hundred
-// times slower than a step.
+// Forward derivatives of taped steps along one direction, by dual numbers in the kernels' own
+// templates. They are the second route by which gradients are checked. One environment at a time, a
+// hundred times slower than a step.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,7 @@
 
 namespace tangere {
 
-/// How a state changes along a direction, (nv) each; positions along the dofs of v.
+/// How a state changes along a direction, (nv) each. Positions are along the dofs of v.
 struct StateTangent {
   std::vector<double> q, v;
   std::vector<double> previous_q, previous_v;  ///< of the state one step before
@@ -24,16 +24,15 @@ class Tangent {
   explicit Tangent(const Model& model, const StepperOptions& options = {});
   ~Tangent();
 
-  /// Takes the tangent of the state after `step` steps to that after one more, along a step that
-  /// environment `lane` of the block took. `u`, `u_dot`: (nu) its controls and how they change;
-  /// `numbers_dot`: how the scene's numbers change, as rows of BlockCotangent::parameters, or
-  /// empty.
+  /// Advances the tangent of the state after `step` steps by one step, as environment `lane` of the
+  /// block took it. `u`, `u_dot`: (nu) its controls and how they change. `numbers_dot`: how the
+  /// scene's numbers change, as rows of BlockCotangent::parameters, or empty.
   void step(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step,
             std::span<const double> u, std::span<const double> u_dot,
             std::span<const double> numbers_dot, StateTangent& state);
 
-  /// How a sensor's field (points, 3) changes with a state of the tape, with the scene's numbers,
-  /// and with `points_dot`, (points, kPointNumbers): every point's own numbers
+  /// Computes how a sensor's field, (points, 3), changes with a state of the tape, with the scene's
+  /// numbers and with every point's own numbers. `points_dot`: (points, kPointNumbers)
   /// (engine/derivative/tactile_point_numbers.hpp), or empty.
   void field(const Batch& batch, int block, int lane, const BlockTape& tape, std::int64_t step,
              int sensor, std::span<const double> numbers_dot, std::span<const double> points_dot,

@@ -52,7 +52,7 @@ void name_coordinates(CompiledModel& m, const JointDescription& d) {
   }
 }
 
-/// The numbers that hold for one dof of a joint.
+/// Returns the effects that apply to one dof of a joint.
 const JointEffects& effects_of(const JointDescription& d, int k) {
   return d.turning && dof_turns(d.type, k) ? *d.turning : d;
 }
@@ -97,7 +97,7 @@ std::uint8_t flags_of(const JointEffects& e) {
   return static_cast<std::uint8_t>(flags);
 }
 
-/// The elementary link of one dof.
+/// Returns the elementary link of one dof.
 int link_of_dof(const CompiledModel& m, int dof) {
   for (int i = 0;; ++i)
     if (dof < m.links[std::size_t(i)].v + kernels::dofs(m.links[std::size_t(i)].kind)) return i;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A body's size is what a scene gives it: the half lengths that kernels read, mass and inertia
-// follow. A joint's place moves the frame of its first link.
+// A body's size is what a scene gives. The half lengths that kernels read, mass and inertia follow
+// from it. A joint's place moves the frame of its first link.
 #include "engine/model/compile_variations.hpp"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ using kernels::Vec3;
 
 namespace {
 
-/// The entry of a link, made when it is first asked for.
+/// Returns the entry of a link. Makes it on first use.
 VaryingInertia& varying_inertia(CompiledModel& m, int link) {
   for (VaryingInertia& v : m.varying_inertia)
     if (v.link == link) return v;
@@ -28,7 +28,7 @@ VaryingInertia& varying_inertia(CompiledModel& m, int link) {
   return m.varying_inertia.back();
 }
 
-/// All bodies of a link, in the order in which compile() adds them.
+/// Sums the inertia of all bodies of a link, in the order in which compile() adds them.
 InertiaRows sum_anew(const CompiledModel& m, const VaryingInertia& varying, const double* column) {
   Link link{};
   for (std::size_t b = 0; b < m.bodies.size(); ++b) {
@@ -48,19 +48,19 @@ InertiaRows sum_anew(const CompiledModel& m, const VaryingInertia& varying, cons
   return inertia_rows(link);
 }
 
-/// The least and the most that a distribution of positive numbers may draw.
+/// Returns the least and the greatest value that a distribution of positive numbers may draw.
 std::array<double, 2> bounds(const Distribution& d) {
   if (d.kind != Distribution::Kind::list) return {d.a, d.b};
   const auto [low, high] = std::minmax_element(d.values.begin(), d.values.end());
   return {*low, *high};
 }
 
-/// What is wrong with a size some of whose numbers are drawn.
+/// Returns what is wrong with a size some of whose numbers are drawn; "" if nothing is.
 std::string drawn_slenderness_fault(const Scene& scene, BodyDescription& body) {
   double least = INFINITY, most = 0;
   for (const SizeNumber& s : row_of(body.shape).sizes) {
     std::array<double, 2> of = {*s.at(body.shape), *s.at(body.shape)};
-    for (const RandomizationDescription& r : scene.randomizations)  // the last one holds
+    for (const RandomizationDescription& r : scene.randomizations)  // the last one applies
       if (r.number.owner == NumberOwner::body && r.number.field != NumberField::density &&
           r.number.name == body.name && size_index(r.number) == s.which)
         of = bounds(r.distribution);

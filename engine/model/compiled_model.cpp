@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// compile(scene): names become indices, fixed joints fold into what they hang on, joints become
-// elementary links.
+// compile(scene): names become indices, fixed joints fold into what they are attached to, joints
+// become elementary links.
 #include "engine/model/compiled_model.hpp"
 
 #include <algorithm>
@@ -148,7 +148,8 @@ class Compiler {
     }
   }
 
-  /// Points and bounds of the tiles as vectors read them, padded to whole tiles and whole vectors.
+  /// Stores points and bounds of the tiles in the order in which vectors read them, padded to whole
+  /// tiles and whole vectors.
   void lay_out_tiles(kernels::PairContact& pair, const std::vector<double>& tiles) {
     constexpr int kTile = kernels::kContactTile, kLanes = kernels::kGroup;
     AlignedVector<double> points(std::size_t(pair.n_tiles) * 3 * kTile, kernels::kFarAway);
@@ -234,7 +235,8 @@ class Compiler {
 
   // --- state and what varies ---
 
-  /// Lengths are rounded against the farthest point of any body from the world's origin at rest.
+  /// Sets the scales of unknowns. Lengths are rounded relative to the greatest distance of any
+  /// body's point from the world's origin at rest.
   void unknown_scales() {
     std::vector<Frame<double>> world;
     double extent = 0;
@@ -255,7 +257,7 @@ class Compiler {
     m_.layout = {0, m_.nq, m_.nq + m_.nv, 2 * m_.nq + m_.nv, 2 * (m_.nq + m_.nv), 0};
     int next = m_.layout.parameters;
     for (const RandomizationDescription& d : m_.scene.randomizations) {
-      name_of(d.number);  // or throws
+      name_of(d.number);  // throws if there is no such number
       if (!is_of_start(d.number)) vary(d, next);
       m_.randomized_row.push_back(is_of_start(d.number) ? state_row(d) : next++);
     }
@@ -274,7 +276,7 @@ class Compiler {
     return position ? m_.layout.q + m_.joints[i].q + k : m_.layout.v + m_.joints[i].v + k;
   }
 
-  /// Lets a number come from a row of the block.
+  /// Makes a row of the block the source of a number.
   void vary(const RandomizationDescription& d, int row) {
     const SceneNumber& n = d.number;
     const auto coefficient = [&](kernels::ContactParameters& of) {
@@ -308,8 +310,8 @@ class Compiler {
 
 }  // namespace
 
-/// Everything of a model, views included. The result must not be copied: its view points into its
-/// own vectors.
+/// Everything in a model, views included. It must not be copied: its view points into its own
+/// vectors.
 std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   auto m = std::make_shared<CompiledModel>(Compiler(scene).run());
   decide_effects(*m);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The arrays behind a Model. Private to the engine: kernels see them through ModelView, and nobody
-// else gets at them.
+// The arrays behind a Model. They are private to the engine: kernels see them through ModelView,
+// and no one else has access.
 #pragma once
 
 #include <array>
@@ -19,42 +19,42 @@ namespace tangere {
 struct CompiledBody {
   int link = -1;
   kernels::Frame<double> frame;  ///< body frame in the link (or the world)
-  bool touchable = true;  ///< has a distance; else `shape` says nothing and size.x is its extent
+  bool touchable = true;         ///< has a distance; else `shape` is unused and size.x the extent
   PrimitiveShape shape = PrimitiveShape::sphere;
   kernels::Vec3<double> size{};    ///< as in kernels::PairContact
-  kernels::Vec3<double> centre{};  ///< of mass, body frame [m]
+  kernels::Vec3<double> centre{};  ///< centre of mass, body frame [m]
   double mass = 0;                 ///< [kg]
-  int size_row = -1;               ///< ≥ 0: size stands in three rows of the block instead
+  int size_row = -1;               ///< ≥ 0: size is read from three rows of the block instead
 };
 
 /// A joint of the scene: its elementary links and its coordinates.
 struct CompiledJoint {
   int first_link = -1, link_count = 0;  ///< none for a fixed joint
   int q = 0, v = 0;                     ///< first coordinate, first dof
-  int link = -1;                        ///< what bodies of this joint move with
+  int link = -1;                        ///< the link that bodies of this joint move with
   kernels::Frame<double> frame;         ///< joint frame in that link
 };
 
 /// Motor on one dof. Force motors: force = low + (clip(u) + 1)/2 (high - low). Position motors
 /// evaluated at the end of the step are effects of their joint (kernels/step/joint_effects.hpp),
-/// which u is the target of.
+/// and u is their target.
 struct CompiledMotor {
   int dof;
   double low, high;
   MotorControl control;
   MotorTiming timing;
-  int link, component;  ///< elementary link, and which of its dofs
+  int link, component;  ///< elementary link, and the index of the dof within it
   kernels::Parameter P, D;
 };
 
-/// Flat pads of at most so many points are read in all environments at once.
+/// Flat pads with at most this many points are read in all environments at once.
 inline constexpr int kSmallPad = 512;
 
 /// Points of one sensor in tiles of 8×8, in its pad's axes (kernels/tactile/tactile_types.hpp).
 struct CompiledSensor {
   int body = -1, link = -1;
-  kernels::Frame<double>
-      pad;  ///< pad frame in the link: axis0, axis1, their product; the array's middle
+  /// Pad frame in the link: axes axis0, axis1 and their product, origin at the array's middle.
+  kernels::Frame<double> pad;
   int rows = 0, cols = 0, tile_rows = 0, tile_cols = 0;
   AlignedVector<double> tile_x, tile_y, tile_z, tile_radius;  ///< (n_tiles, padded to 8)
   std::vector<int> tile_kind;                                 ///< (n_tiles)
@@ -67,8 +67,8 @@ struct CompiledSensor {
   double axes[9] = {};  ///< rows axis0, axis1, -(axis0 × axis1), pad axes
   kernels::ContactParameters parameters{};
   ContactLaw law = ContactLaw::clamped;
-  std::vector<int> targets;  ///< bodies it can feel
-  bool sizes_vary = false;   ///< of some of them
+  std::vector<int> targets;  ///< bodies that it can feel
+  bool sizes_vary = false;   ///< some of their sizes vary
 
   [[nodiscard]] int points() const { return rows * cols; }
   [[nodiscard]] int n_tiles() const { return tile_rows * tile_cols; }
@@ -81,7 +81,7 @@ struct CompiledEndEffector {
   kernels::Vec3<double> point{};  ///< link axes (or the world's) [m]
 };
 
-/// Rows of a block: q, v, the state one step before, then the numbers that vary.
+/// Rows of a block: q, v, the state one step before, then the varying numbers.
 struct BlockLayout {
   int q = 0, v = 0, previous_q = 0, previous_v = 0, parameters = 0, rows = 0;
 };
@@ -90,36 +90,37 @@ struct BlockLayout {
 /// origin [kg m²], link axes.
 using InertiaRows = std::array<double, 10>;
 
-/// A link some of whose bodies have densities that vary: rows `row` … of the block are constant + Σ
-/// density of_density.
+/// A link with bodies whose density varies. Rows `row` … of the block are constant + Σ density
+/// of_density.
 struct VaryingInertia {
   struct Part {
     int body;
-    int row;                 ///< of the block: the density [kg/m³]
+    int row;                 ///< row of the block that holds the density [kg/m³]
     InertiaRows of_density;  ///< for a density of 1
   };
   int link = -1;
   int row = 0;
-  bool anew = false;  ///< sizes vary too: the sum over all bodies is made anew instead
+  bool anew = false;  ///< sizes vary too: the sum over all bodies is computed anew instead
   InertiaRows constant{};
   std::vector<Part> parts;
 };
 
-/// A number that a row of the block holds: which of a size (size_number), or which component.
+/// A number that a row of the block holds. `which`: index within a size (size_number), or
+/// component.
 struct VaryingNumber {
   int which, row;
 };
-/// Rows `row` … of the block: size as in CompiledBody.
+/// Rows `row` … of the block hold a size as in CompiledBody.
 struct VaryingSize {
   int body = -1;
   int row = 0;
   std::vector<VaryingNumber> numbers;
 };
-/// Rows `row` … of the block: where the first link of a joint is at rest, in its parent link.
+/// Rows `row` … of the block hold the place of a joint's first link at rest, in its parent link.
 struct VaryingPlace {
   int joint = -1;
   int row = 0;
-  kernels::Frame<double> base;  ///< that the scene gives the joint's place in
+  kernels::Frame<double> base;  ///< frame in which the scene gives the joint's place
   std::vector<VaryingNumber> numbers;
 };
 
@@ -145,8 +146,8 @@ struct CompiledModel {
   std::vector<VaryingSize> varying_sizes;
   std::vector<VaryingPlace> varying_places;
   std::vector<kernels::DofEffects> dof_effects;  ///< (nv)
-  std::vector<double>
-      unknown_scale;  ///< (nv) what an unknown is rounded against: extent of the scene [m], 1 [rad]
+  /// (nv) magnitude to which an unknown is rounded: extent of the scene [m], 1 [rad].
+  std::vector<double> unknown_scale;
   std::vector<double> initial_q, initial_v;
   PatternStorage pattern;
   BlockLayout layout;
@@ -161,51 +162,54 @@ struct CompiledModel {
   std::vector<std::string> q_names, v_names, u_names, q_units, v_units, u_units, body_names;
 };
 
-/// Of a body, in its own axes; inertia about its centre of mass.
+/// Mass properties of a body, in its own axes. Inertia is about its centre of mass.
 struct MassProperties {
   double mass;                    ///< [kg]
-  kernels::Vec3<double> centre;   ///< of mass, body frame [m]
+  kernels::Vec3<double> centre;   ///< centre of mass, body frame [m]
   kernels::Mat3<double> inertia;  ///< [kg m²]
 };
 MassProperties mass_properties(const Shape& shape, double density);
 MassProperties mesh_mass(const MeshShape& mesh, double density);
-/// Its derivative by a number of the shape's size (size_number) that it has; the centre of mass
-/// stays.
+/// Derivative of the mass properties by a number of the shape's size (size_number). The shape must
+/// have that number. The centre of mass does not move.
 MassProperties mass_properties_by_size(const Shape& shape, double density, int which);
-/// What a body of these adds to its link.
+/// Returns what a body with these properties adds to its link.
 InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& properties);
-/// A link's own.
+/// Returns the rows of a link's own inertia.
 InertiaRows inertia_rows(const kernels::Link& link);
 /// Adds a body to its link.
 void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProperties& properties);
-/// Shape and size of a body, and whether it can be touched.
+/// Sets shape and size of a body, and whether it can be touched.
 void place_shape(const Shape& shape, CompiledBody& body);
 
-/// Points of the body that meet other bodies, in its body frame, (n, 3): perhaps none.
+/// Returns the points of the body that meet other bodies, (n, 3) in its body frame; may be empty.
 std::vector<double> contact_points(const Shape& shape);
-/// A body whose points these are.
+/// Returns the solid of a body that has these contact points.
 kernels::Solid solid_of(const Shape& shape, const CompiledBody& body);
 
-/// Reorders (n, 3) points so that every kContactTile consecutive ones are neighbours; returns their
-/// (tiles, 4) bounds.
+/// Reorders (n, 3) points so that every `tile` consecutive ones are neighbours. Returns the tiles'
+/// bounds, (tiles, 4).
 std::vector<double> sort_into_tiles(std::vector<double>& points, int tile);
 
-/// Tiles, bounds, axes and pressure sign of a sensor. Throws InputError for degenerate arrays.
+/// Computes tiles, bounds, axes and pressure sign of a sensor. Throws InputError for degenerate
+/// arrays.
 CompiledSensor compile_sensor(const TactileDescription& description, const CompiledBody& body,
                               SensorInfo& info);
 /// The same for a list of points.
 CompiledSensor compile_points(const TactileDescription& description, const CompiledBody& body,
                               SensorInfo& info);
-/// Positive where a direction points out of a body near a place on its surface, body frame.
+/// Returns a positive number where a direction points out of a body near a place on its surface,
+/// body frame.
 double points_outward(const CompiledBody& body, const kernels::Vec3<double>& at,
                       const kernels::Vec3<double>& direction);
-/// Where missing points and tiles are put [m]: beyond any shape, finite, so that nothing overflows.
+/// Where missing points and tiles are put [m]: beyond any shape, but finite, so that nothing
+/// overflows.
 inline constexpr double kFarAway = 1e6;
 
-/// Names to indices, joints to elementary links. Throws InputError.
+/// Turns names into indices and joints into elementary links. Throws InputError.
 std::shared_ptr<const CompiledModel> compile(const Scene& scene);
 
-/// What a model was compiled to.
+/// Returns the arrays behind a model.
 const CompiledModel& compiled(const Model& model);
 
 }  // namespace tangere

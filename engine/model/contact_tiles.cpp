@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contact points in an order in which neighbours share a tile.
+// Orders contact points so that neighbours share a tile.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -10,8 +10,8 @@ namespace tangere {
 
 namespace {
 
-/// Splits the longest side of a range in half until it fits a tile. Full tiles first, so only the
-/// last is short.
+/// Splits a range in half along its longest side until it fits a tile. Tiles are filled from the
+/// front, so only the last one is not full.
 void split(const std::vector<double>& points, std::vector<int>& order, std::size_t begin,
            std::size_t end, int tile) {
   if (end - begin <= std::size_t(tile)) return;
@@ -61,7 +61,7 @@ std::vector<double> sort_into_tiles(std::vector<double>& points, int tile) {
         r += (points[3 * k + a] - centre[a]) * (points[3 * k + a] - centre[a]);
       square = std::max(square, r);
     }
-    // Rounded up: a bound that is short by one bit would be no bound.
+    // Rounded up: a bound that is too small by one bit would be no bound.
     bounds.insert(bounds.end(),
                   {centre[0], centre[1], centre[2], std::sqrt(square) * (1 + 1e-12) + 1e-300});
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The words that `inspect` prints.
+// The texts that `inspect` prints.
 #include "engine/model/effects_and_stages.hpp"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 using kernels::JointKind;
 using kernels::Link;
 
-/// How the points of a shape are added up (kernels/step/point_sums.hpp).
+/// Returns how the points of a shape are summed (kernels/step/point_sums.hpp).
 const char* sums_of(PrimitiveShape shape) {
   using kernels::Bending;
   using kernels::PointSumForm;
@@ -30,7 +30,7 @@ std::string counted(std::size_t n, const std::string& one, const std::string& ma
   return std::to_string(n) + " " + (n == 1 ? one : many);
 }
 
-/// "cuboid: products, flat faces; …", each shape once, and what pairs of links leave out.
+/// Returns "cuboid: products, flat faces; …" with each shape once, then how many bodies move.
 std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links) {
   std::vector<PrimitiveShape> shapes;
   for (int i = links.first; i < links.first + links.count; ++i) {
@@ -44,8 +44,8 @@ std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links)
   return text + "both bodies move";
 }
 
-/// The body of a link (-1: the world) that a contact declares, and how many more contacts share its
-/// links.
+/// Returns the two bodies of the first contact between these links, and how many more contacts the
+/// links have.
 std::string pair_name(const CompiledModel& m, const kernels::LinkPair& links) {
   const ContactInfo& first = m.contact_info[std::size_t(m.pair_order[std::size_t(links.first)])];
   std::string text = first.first + " on " + first.second;

@@ -14,7 +14,7 @@ kernels::Frame<double> to_frame(const Pose& pose) {
 }
 
 kernels::Quat<double> quaternion_of(const kernels::Mat3<double>& R) {
-  // The largest of the four squares is divided by: never near zero.
+  // The divisor is the largest of the four squares, which is never near zero.
   const auto& m = R.m;
   const double w = 1 + m[0][0] + m[1][1] + m[2][2], x = 1 + m[0][0] - m[1][1] - m[2][2];
   const double y = 1 - m[0][0] + m[1][1] - m[2][2], z = 1 - m[0][0] - m[1][1] + m[2][2];

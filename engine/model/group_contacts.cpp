@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Balls around the points of a contact, then contacts sorted by their links.
+// Bounds the points of each contact by a ball, then sorts contacts by their links.
 #include "engine/model/group_contacts.hpp"
 
 #include <algorithm>
@@ -12,7 +12,8 @@ namespace tangere {
 
 namespace {
 
-/// A ball around points (n, 3): the middle of their box, and the farthest of them from it.
+/// Computes a ball around points (n, 3): its centre is the middle of their box, its radius the
+/// distance of the farthest of them.
 void bound(const double* points, int n, kernels::Vec3<double>& middle, double& extent) {
   const kernels::Vec3<double> first = {points[0], points[1], points[2]};
   kernels::Vec3<double> low = first, high = first;
@@ -28,13 +29,13 @@ void bound(const double* points, int n, kernels::Vec3<double>& middle, double& e
         kernels::Vec3<double>{points[3 * k], points[3 * k + 1], points[3 * k + 2]} - middle;
     square = std::max(square, dot(arm, arm));
   }
-  // Rounded up, by far more than poses are rounded: a bound that is short by one bit would be no
-  // bound.
+  // Rounded up by far more than the rounding of poses: a bound that is too small by one bit would
+  // be no bound.
   extent = std::sqrt(square) * (1 + 1e-9) + 1e-9;
 }
 
-/// Indices of `items` group by group, in the order of first appearance; `same` tells which belong
-/// together. Returns where each group begins, and the end.
+/// Appends the indices of `items` to `order` group by group, in the order of first appearance.
+/// `same` tells which items belong together. Returns where each group begins, and the end.
 template <class Item, class Same>
 std::vector<int> gather(const std::vector<Item>& items, const Same& same, std::vector<int>& order) {
   std::vector<int> begins;
@@ -75,8 +76,8 @@ void group_contacts(CompiledModel& m) {
       links.reach = std::max(links.reach, pair.reach);
       pitch = std::min(pitch, pair.extent * std::sqrt(4 * M_PI / pair.n_points));
     }
-    // What a lane may move before it is searched again. Where points are far apart a wide margin
-    // lists few more of them.
+    // How far a lane may move before it is searched again. Where points are far apart, a wide
+    // margin lists few more of them.
     links.margin = std::max(links.reach / 200, pitch / 16);
     m.link_pairs.push_back(links);
   }

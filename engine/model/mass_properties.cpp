@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mass and inertia of a body on its link, and of meshes by volume integrals; other shapes have
-// closed forms in shapes.cpp.
+// Mass and inertia of a body on its link, and volume integrals of meshes. Other shapes have closed
+// forms in shapes.cpp.
 #include "engine/model/compiled_model.hpp"
 
 namespace tangere {
 
-/// Tetrahedra from the first vertex to every triangle, about that vertex: far from its frame's
-/// origin a body loses nothing. With corners a, b, c: volume = a·(b × c)/6, ∫x = volume (a + b +
-/// c)/4, ∫x xᵀ = volume (aaᵀ + bbᵀ + ccᵀ + ssᵀ)/20, s = a + b + c.
+/// Sums tetrahedra from the first vertex to every triangle, about that vertex. A body far from its
+/// frame's origin thus loses no digits. With corners a, b, c and s = a + b + c:
+///   volume = a·(b × c)/6, ∫x = volume (a + b + c)/4, ∫x xᵀ = volume (aaᵀ + bbᵀ + ccᵀ + ssᵀ)/20
 MassProperties mesh_mass(const MeshShape& mesh, double density) {
   using kernels::Vec3;
   const auto vertex = [&](int k) {

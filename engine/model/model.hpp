@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A compiled scene: indices and constants, no strings on any hot path. Immutable; shared by every
-// batch and thread.
+// A compiled scene: indices and constants, without strings on hot paths. It is immutable, and all
+// batches and threads share it.
 #pragma once
 
 #include <cstddef>
@@ -21,8 +21,8 @@ struct SensorInfo {
   std::string body;
   int rows = 0, cols = 0;  ///< of a rectangular array; points = rows * cols, row-major
   int points = 0;
-  int every = 0;          ///< as in the scene; 0: the caller decides
-  int pressure_sign = 1;  ///< +1: the third component is positive under pressure
+  int every = 0;          ///< as in the scene; 0: the caller chooses
+  int pressure_sign = 1;  ///< +1: the third component is positive under pressure; -1: negative
 };
 
 /// An end effector after compilation.
@@ -38,7 +38,7 @@ struct ContactInfo {
   std::string law;
 };
 
-/// An effect that compile() decided on, and why: `inspect` prints it.
+/// An effect that compile() switched on or off, and why. `inspect` prints it.
 struct EffectInfo {
   std::string name;
   bool on = false;
@@ -52,20 +52,20 @@ struct StageInfo {
 
 class Model {
  public:
-  /// Compiles a scene. Throws InputError (file:line) for references to nothing, massless leaves,
-  /// degenerate sensors, …
+  /// Compiles a scene. Throws InputError (file:line) for references to names that do not exist,
+  /// massless leaves, degenerate sensors, …
   explicit Model(const Scene& scene);
 
   [[nodiscard]] const Scene& scene() const;
-  [[nodiscard]] int nq() const;               ///< configuration coordinates (quaternions count 4)
-  [[nodiscard]] int nv() const;               ///< velocity dofs
-  [[nodiscard]] int nu() const;               ///< controls: motors in file order, each dof in turn
-  [[nodiscard]] int nb() const;               ///< bodies of the scene, folded or not, in file order
+  [[nodiscard]] int nq() const;  ///< configuration coordinates (quaternions count 4)
+  [[nodiscard]] int nv() const;  ///< velocity dofs
+  [[nodiscard]] int nu() const;  ///< controls: motors in file order, one control per dof
+  [[nodiscard]] int nb() const;  ///< bodies of the scene, folded or not, in file order
   [[nodiscard]] double mass(int body) const;  ///< [kg]
   [[nodiscard]] double timestep() const;      ///< [s]
   [[nodiscard]] Integrator integrator() const;
   [[nodiscard]] const SolverOptions& solver() const;
-  [[nodiscard]] std::span<const double> initial_q() const;  ///< (nq) where the scene begins
+  [[nodiscard]] std::span<const double> initial_q() const;  ///< (nq) where the scene starts
   [[nodiscard]] std::span<const SensorInfo> sensors() const;
   [[nodiscard]] std::span<const EndEffectorInfo> end_effectors()
       const;  ///< end effectors, in file order
@@ -80,7 +80,7 @@ class Model {
   [[nodiscard]] std::span<const std::string> u_units()
       const;  ///< "1": controls are dimensionless for force motors
   [[nodiscard]] std::span<const std::string> body_names() const;
-  [[nodiscard]] std::size_t state_bytes_per_environment() const;  ///< of a Batch
+  [[nodiscard]] std::size_t state_bytes_per_environment() const;  ///< memory in a Batch
 
   /// Whether both are the same compiled scene, not only equal ones.
   friend bool operator==(const Model& a, const Model& b) { return a.compiled_ == b.compiled_; }

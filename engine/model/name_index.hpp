@@ -9,7 +9,7 @@
 
 namespace tangere {
 
-/// Name → index of one kind of thing; a second use of a name is an error.
+/// Maps names of one kind of thing to indices. A second use of a name is an error.
 class NameIndex {
  public:
   void add(const std::string& kind, const std::string& name, int index, const Source& source) {

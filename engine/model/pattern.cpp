@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Greedy elimination, then runs of factor entries that one loop can take.
+// Finds a greedy elimination order, then runs of factor entries that one loop can process.
 #include "engine/model/pattern.hpp"
 
 #include <algorithm>
@@ -10,7 +10,7 @@ namespace {
 
 using Structure = std::vector<std::vector<char>>;
 
-/// Dofs that move a body: those of its link and of every ancestor.
+/// Returns the dofs that move a body: those of its link and of every ancestor.
 std::vector<int> support(const std::vector<kernels::Link>& links, int link) {
   std::vector<int> dofs;
   for (int i = link; i >= 0; i = links[i].parent)
@@ -23,7 +23,7 @@ void couple(Structure& s, const std::vector<int>& dofs) {
     for (int j : dofs) s[i][j] = 1;
 }
 
-/// Eliminates, at every turn, the dof that creates fewest new entries; the lowest index on ties.
+/// Eliminates at every step the dof that creates fewest new entries; the lowest index on ties.
 std::vector<int> minimum_fill_order(Structure s) {
   const int n = static_cast<int>(s.size());
   std::vector<int> order;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Symbolic analysis of the Jacobian, once per scene: which entries exist, in which order to
-// eliminate, what fills in.
+// Symbolic analysis of the Jacobian, once per scene: which entries exist, in which order dofs are
+// eliminated, and which entries fill in.
 #pragma once
 
 #include <utility>
@@ -19,7 +19,7 @@ struct PatternStorage {
   [[nodiscard]] kernels::Pattern view() const;
 };
 
-/// Minimum-fill elimination of the structure of the tree and of every contact.
+/// Finds a minimum-fill elimination of the structure that the tree and all contacts make.
 PatternStorage analyse_pattern(const std::vector<kernels::Link>& links, int nv,
                                const std::vector<std::pair<int, int>>& touching);
 

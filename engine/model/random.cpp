@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Philox4x32-10 and the few distributions that scenes name.
+// Philox4x32-10 and the distributions that scenes name.
 #include "engine/model/random.hpp"
 
 #include <fmt/core.h>
@@ -16,10 +16,10 @@ constexpr std::array<std::uint32_t, 2> kMultiplier{0xD2511F53, 0xCD9E8D57};
 // Added to the key after each round: the golden ratio and sqrt(3) - 1, in units of 2^-32.
 constexpr std::array<std::uint32_t, 2> kKeyStep{0x9E3779B9, 0xBB67AE85};
 
-constexpr int kCountBits = 48;  // of episode and step
+constexpr int kCountBits = 48;  // bits of episode and of step
 constexpr int kIndexBits = 24;
 
-// The 128 bits of a key's counter: episode (48), step (48), purpose (8), index (24).
+// Packs a key's counter into 128 bits: episode (48), step (48), purpose (8), index (24).
 std::array<std::uint32_t, 4> random_bits(const RandomKey& key) {
   const auto episode = static_cast<std::uint64_t>(key.episode);
   const auto step = static_cast<std::uint64_t>(key.step);
@@ -37,7 +37,7 @@ std::array<std::uint32_t, 4> random_bits(const RandomKey& key) {
                     {low(key.seed), high(key.seed)});
 }
 
-// The 53 highest of 64 bits, as a fraction in [0, 1).
+// Returns the 53 highest of 64 bits as a fraction in [0, 1).
 double fraction(std::uint32_t high, std::uint32_t low) {
   const std::uint64_t bits = std::uint64_t{high} << 32 | low;
   return static_cast<double>(bits >> 11) * 0x1p-53;

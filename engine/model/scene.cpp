@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names and sizes of a scene's enumerations, and its poses; those of shapes are in shapes.cpp.
+// Names and sizes of a scene's enumerations, and its poses. Those of shapes are in shapes.cpp.
 #include "engine/model/scene.hpp"
 
 #include <iterator>
@@ -52,7 +52,7 @@ const char* to_string(ContactLaw value) {
 
 bool is_inertia(const std::array<double, 6>& inertia) {
   const auto& [xx, xy, xz, yy, yz, zz] = inertia;
-  // ∫ρ x xᵀ = ½ tr(I) 1 - I must be positive definite: leading minors.
+  // ∫ρ x xᵀ = ½ tr(I) 1 - I must be positive definite: its leading minors must be positive.
   const double half = 0.5 * (xx + yy + zz), a = half - xx, b = half - yy, c = half - zz;
   const double second = a * b - xy * xy;
   const double third = a * (b * c - yz * yz) - xy * (xy * c + yz * xz) - xz * (xy * yz + b * xz);

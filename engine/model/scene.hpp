@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene as its author wrote it: names, SI units, defaults filled in. The only place that holds
-// strings. io/scene/scene_reader.hpp reads it from XML; Model turns it into index
-// arrays.
+// A scene as its author wrote it: names, SI units, defaults filled in. No other type holds strings.
+// io/scene/scene_reader.hpp reads it from XML. Model turns it into index arrays.
 #pragma once
 
 #include <array>
@@ -23,32 +22,32 @@ using Quaternion = std::array<double, 4>;  ///< w x y z, unit length
 
 enum class JointType { fixed, revolute, prismatic, planar, translational, free2d, spherical, free };
 enum class MotorControl { force, position };
-/// end: implicit, stable for any gain. start: the published explicit law, unstable once h D/I
-/// exceeds 2.
+/// When a position motor's force is computed. end: implicit, stable for any gain. start: the
+/// published explicit law, unstable once h D/I exceeds 2.
 enum class MotorTiming { end, start };
 
-/// A frame given in another: x_outer = R(orientation) x_inner + position [m].
+/// A frame relative to another: x_outer = R(orientation) x_inner + position [m].
 struct Pose {
   Vector3 position{0, 0, 0};
   Quaternion orientation{1, 0, 0, 0};
 };
-/// A point and a direction of the inner frame, in the outer.
+/// Return a point and a direction of the inner frame, expressed in the outer frame.
 Vector3 outer_point(const Pose& pose, const Vector3& point);
 Vector3 outer_direction(const Pose& pose, const Vector3& direction);
-/// A pose in the last frame of `way`, each of which is given in the one before; `pose` is given
-/// where the first one is.
+/// Returns `pose` expressed in the last frame of `way`. Each frame of `way` is given in the one
+/// before. `pose` is given in the same frame as the first.
 Pose pose_at_end(std::span<const Pose> way, const Pose& pose);
 
-/// Of one penalty contact or tactile point.
+/// Coefficients of one penalty contact or tactile point.
 using ContactCoefficients = Coefficients<double>;
 
-/// What acts on every dof of a joint, in SI by the dof's kind. Spherical joints have components of
-/// a rotation vector in place of q, torques and accelerations in body axes (docs/dynamics.md).
+/// Effects on every dof of a joint, in SI by the dof's kind. Spherical joints have components of a
+/// rotation vector in place of q, and torques and accelerations in body axes (docs/dynamics.md).
 struct JointEffects {
-  double damping = 0;          ///< force = -damping v [N s/m or N m s/rad]
-  double armature = 0;         ///< inertia that moves with the dof alone, a rotor's [kg or kg m²]
+  double damping = 0;   ///< force = -damping v [N s/m or N m s/rad]
+  double armature = 0;  ///< inertia that moves with the dof alone, such as a rotor's [kg or kg m²]
   double stiffness = 0;        ///< force = -stiffness (q - rest) [N/m or N m/rad]
-  double limit_stiffness = 0;  ///< force = limit_stiffness times how far q is outside the limits
+  double limit_stiffness = 0;  ///< force per distance of q outside the limits [N/m or N m/rad]
   std::optional<std::array<double, 2>> limits;  ///< low, high [m or rad]
 };
 
@@ -58,17 +57,17 @@ struct JointDescription : JointEffects {
   Pose pose;  ///< joint frame in the parent joint's frame (frame="WORLD" is resolved by the reader)
   Vector3 axis0{0, 0, 1};  ///< revolute, prismatic, planar: unit, in the joint frame
   Vector3 axis1{0, 1, 0};  ///< planar only
-  std::vector<double>
-      rest;  ///< of the spring, one per dof; empty: zeros. free: x y z, then a rotation vector
-  std::optional<JointEffects>
-      turning;  ///< free2d, free: of the dofs that turn, where they differ from those that slide
+  /// Rest position of the spring, one number per dof; empty: zeros. free: x y z, then a rotation
+  /// vector.
+  std::vector<double> rest;
+  /// free2d, free: effects of the dofs that turn, where they differ from those that slide.
+  std::optional<JointEffects> turning;
   Source source;
 };
 
 struct CuboidShape {
-  Vector3 size{0, 0, 0};  ///< full edge lengths [m]
-  std::array<int, 3> contact_resolution{6, 6,
-                                        6};  ///< surface nodes of this grid are the contact points
+  Vector3 size{0, 0, 0};                           ///< full edge lengths [m]
+  std::array<int, 3> contact_resolution{6, 6, 6};  ///< grid whose surface nodes are the points
 };
 struct SphereShape {
   double radius = 0;  ///< [m]
@@ -77,31 +76,31 @@ struct SphereShape {
 struct CylinderShape {
   double length = 0, radius = 0;  ///< [m]
   int contact_angles = 8;         ///< points on a ring
-  int contact_rings = 3;          ///< rings on a face, radii r k/rings
+  int contact_rings = 3;          ///< rings on a face; ring k has radius r k/rings
 };
 /// All points within `radius` of a segment of `length` along the body's z. Contact points: two
-/// poles, and rings around the straight part, ends included.
+/// poles, and rings around the straight part, its ends included.
 struct CapsuleShape {
   double length = 0, radius = 0;  ///< [m]; from pole to pole it is length + 2 radius
   int contact_rings = 5;
   int contact_angles = 4;  ///< points on a ring
 };
-/// Semi-axes are half its size, which at most differ by a factor of 100. Contact points: evenly
-/// spread on a ball along a spiral from pole to pole, stretched with it.
+/// The semi-axes are half the size. They differ by a factor of 100 at most. Contact points: a
+/// spiral from pole to pole, evenly spread on a ball and stretched with it.
 struct EllipsoidShape {
   Vector3 size{0, 0, 0};  ///< full lengths along the body's axes [m]
   int contact_count = 100;
 };
 /// The half-space z < 0 of the body frame: no mass, no contact points.
 struct PlaneShape {};
-/// A closed surface of triangles, corners anticlockwise seen from outside. Contact points: its
-/// vertices. Nothing touches its faces: it has no distance.
+/// A closed surface of triangles, whose corners are anticlockwise seen from outside. Contact
+/// points: its vertices. It has no distance, so nothing touches its faces.
 struct MeshShape {
   std::vector<double> vertices;  ///< (n, 3), body frame [m]
   std::vector<std::array<int, 3>> triangles;
 };
-/// Known by its mass, inertia and contact points alone; no distance. Its centre of mass is the body
-/// frame's origin.
+/// A body given by its mass, inertia and contact points alone. It has no distance. Its centre of
+/// mass is the body frame's origin.
 struct AbstractShape {
   double mass = 0;                     ///< [kg]; density has no effect
   std::array<double, 6> inertia{};     ///< xx xy xz yy yz zz, body axes [kg m²]
@@ -128,8 +127,8 @@ struct LinkDescription {
 };
 
 /// Force motor: u in [-1, 1] per dof of the joint is clipped and mapped linearly to [low, high].
-/// Position motor: u is the target of q (spherical: a rotation vector), force = clip(P (u - q) - D
-/// v) to [low, high].
+/// Position motor: u is the target of q (spherical: a rotation vector), and the force is
+/// P (u - q) - D v, clipped to [low, high].
 struct MotorDescription {
   std::string joint;
   double low = -1;  ///< force at u = -1 [N or N m]; position: smallest force, -infinity for none
@@ -137,7 +136,7 @@ struct MotorDescription {
   Source source;
   MotorControl control = MotorControl::force;
   double P = 0, D = 0;                    ///< position: gains [N/m, N s/m or N m/rad, N m s/rad]
-  MotorTiming timing = MotorTiming::end;  ///< position: which q and v the force is computed from
+  MotorTiming timing = MotorTiming::end;  ///< position motors: when q and v are taken for the force
 };
 
 /// Rectangular array of tactile points: p(i, j) = corner0 + i Δ0 axis0 + j Δ1 axis1, in the body
@@ -148,12 +147,12 @@ struct RectArray {
   int rows = 1, cols = 1;
 };
 
-/// A tactile point of its own, in the body frame.
+/// A tactile point with its own position and axes, in the body frame.
 struct TactilePoint {
   Vector3 position{};                         ///< [m]
   Vector3 normal{}, axis0{}, axis1{};         ///< unit
   std::array<int, 2> pixel{-1, -1};           ///< row and column in an image; -1: none
-  std::array<double, 4> factors{1, 1, 1, 1};  ///< times the sensor's kn, kt, mu, damping
+  std::array<double, 4> factors{1, 1, 1, 1};  ///< multiply the sensor's kn, kt, mu, damping
 };
 
 struct TactileDescription {
@@ -162,19 +161,19 @@ struct TactileDescription {
   ContactCoefficients coefficients{};
   ContactLaw law = ContactLaw::clamped;
   RectArray array;
-  std::vector<TactilePoint> points;  ///< a curved pad, in the order of its field; empty: the array
-  int every = 0;                     ///< read every k-th step; 0: not given, left to the caller
+  std::vector<TactilePoint> points;  ///< a curved pad, in field order; empty: `array` is used
+  int every = 0;                     ///< read every k-th step; 0: not given, the caller chooses
   std::optional<int> pressure_sign;  ///< +1 or -1; found from the geometry when not given
   Source source;
 };
 
-/// An end effector: a point that moves with a joint, whose position in the world is an output.
+/// An end effector: a point that moves with a joint. Its world position is an output.
 struct EndEffectorDescription {
   std::string name;
   std::string joint;
-  Vector3 position{0, 0,
-                   0};   ///< in the joint's moving frame, the one that bodies are placed in [m]
-  double radius = 2e-3;  ///< [m]; for pictures only, as the colour
+  /// In the joint's moving frame, in which bodies are placed too [m].
+  Vector3 position{0, 0, 0};
+  double radius = 2e-3;  ///< [m]; only for pictures, like the colour
   std::array<double, 4> rgba{1, 0, 0, 1};
   Source source;
 };
@@ -188,8 +187,8 @@ struct GroundContactDescription {
   std::string body;
   ContactCoefficients coefficients{};
   ContactLaw law = ContactLaw::linear;
-  double ramp =
-      1e-5;  ///< depth over which the linear law's damper fades in [m]; 0: the published law
+  /// Depth [m] over which the linear law's damper fades in; 0: the published law.
+  double ramp = 1e-5;
   Source source;
 };
 
@@ -198,7 +197,7 @@ struct PairContactDescription {
   std::string general_body, primitive_body;
   ContactCoefficients coefficients{};
   ContactLaw law = ContactLaw::clamped;
-  double ramp = 1e-5;  ///< law linear only
+  double ramp = 1e-5;  ///< [m]; law linear only
   Source source;
 };
 
@@ -206,20 +205,20 @@ struct PairContactDescription {
 struct InitialState {
   std::string joint;
   std::vector<double> q;  ///< free: x y z qw qx qy qz; spherical: qw qx qy qz; else one per dof
-  std::vector<double>
-      v;  ///< tangent space: free: linear (joint frame axes), then angular (body axes)
+  /// One number per dof; free: linear (joint frame axes), then angular (body axes).
+  std::vector<double> v;
   Source source;
 };
 
-/// What drives an unattended rollout. Values are one per control, motors in file order, each dof in
-/// turn.
+/// Controls of an unattended rollout. There is one value per control: motors in file order, each
+/// dof in turn.
 struct ConstantControl {
   std::vector<double> values;
 };
 struct PiecewiseControl {     ///< values[k] holds from times[k] until times[k+1]; times[0] = 0
   std::vector<double> times;  ///< [s], ascending
   std::vector<std::vector<double>> values;
-  double end = 0;  ///< [s] length of the run it describes; 0: open
+  double end = 0;  ///< [s] length of the run that it describes; 0: open
 };
 struct CsvControl {
   std::vector<std::vector<double>>
@@ -246,7 +245,7 @@ struct RandomizationDescription {
 };
 
 struct SolverOptions {
-  double tolerance = 1e-9;  ///< on the scaled residual, dimensionless (docs/solver.md)
+  double tolerance = 1e-9;  ///< of the scaled residual, dimensionless (docs/solver.md)
   int max_iterations = 20;  ///< Newton passes before a step is split
 };
 
@@ -273,28 +272,28 @@ struct Scene {
 /// The name users write and read: "free", "clamped" …
 const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
-/// "sphere", "cuboid" …
+/// Returns "sphere", "cuboid" …
 const char* shape_name(const Shape& shape);
 
-/// The numbers of a size: 0 radius, 1 length, 2 … 4 lengths along the axes [m]. nullptr where a
-/// shape has no such number.
+/// Returns a number of a shape's size: 0 radius, 1 length, 2 … 4 lengths along the axes [m].
+/// nullptr where the shape has no such number.
 double* size_number(Shape& shape, int which);
 inline constexpr int kSizeIndices = 5;
 
-/// Whether contact points may touch it, and whether it has such points itself.
+/// Whether contact points may touch the shape, and whether it has contact points itself.
 bool has_distance(const Shape& shape);
 bool has_contact_points(const Shape& shape);
-/// Whether it looks the same from every side: then the ground touches its lowest point.
+/// Whether the shape looks the same from every side. The ground then touches its lowest point.
 bool is_ball(const Shape& shape);
-/// Whether xx xy xz yy yz zz can be the inertia of a body with volume: principal moments positive,
-/// none as large as the other two together.
+/// Whether xx xy xz yy yz zz can be the inertia of a body with volume: principal moments are
+/// positive, and none is as large as the sum of the other two.
 bool is_inertia(const std::array<double, 6>& inertia);
 
-/// Number of configuration coordinates and of velocity dofs of a joint type: free is 7 and 6.
+/// Numbers of configuration coordinates and of velocity dofs of a joint type: free has 7 and 6.
 int position_count(JointType type);
 int dof_count(JointType type);
 
-/// Dof `k` of a joint type turns; it slides otherwise.
+/// Whether dof `k` of a joint type turns; otherwise it slides.
 bool dof_turns(JointType type, int k);
 
 /// Unit of coordinate `k` of a joint type: "m", "rad", or "1" in a quaternion.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table of all kinds of numbers, and the lookups that go by it.
+// The table of all kinds of numbers, and the lookups that use it.
 #include "engine/model/scene_number.hpp"
 
 #include <algorithm>
@@ -52,7 +52,7 @@ const LinkDescription* link_of(const Scene& scene, const SceneNumber& n) {
   return nullptr;
 }
 
-/// The contact or the sensor that owns a number: f(coefficients, law).
+/// Finds the contact or the sensor that owns a number and calls f(coefficients, law).
 template <class Function>
 bool with_law(const Scene& scene, const SceneNumber& n, const Function& f) {
   const auto use = [&](const auto& list, const auto& matches) {
@@ -78,7 +78,7 @@ bool with_law(const Scene& scene, const SceneNumber& n, const Function& f) {
 const double* of_body(const BodyDescription& body, const SceneNumber& n) {
   if (n.field == Field::density) return &body.density;
   if (n.field != Field::mass)
-    return size_number(const_cast<Shape&>(body.shape), size_index(n));  // given back as const
+    return size_number(const_cast<Shape&>(body.shape), size_index(n));  // returned as const
   const auto* const abstract = std::get_if<AbstractShape>(&body.shape);
   return abstract == nullptr ? nullptr : &abstract->mass;
 }
@@ -109,9 +109,9 @@ const double* of_joint(const Scene& scene, const JointDescription& joint, const 
   }
 }
 
-/// nullptr where the scene has no such number.
+/// Returns nullptr where the scene has no such number.
 const double* find_number(const Scene& scene, const SceneNumber& n) {
-  number_kind(n.owner, n.field);  // or throws
+  number_kind(n.owner, n.field);  // throws if there is no such kind
   const double* found = nullptr;
   if (n.owner == Owner::motor) {
     for (const MotorDescription& motor : scene.motors)
@@ -183,7 +183,8 @@ std::string unit_of(const Scene& scene, const SceneNumber& n) {
   if (n.field == Field::v) return kind.unit_of(dof_turns(type, n.component));
   bool slides = false, turns = false;
   for (int k = 0; k < dof_count(type); ++k) (dof_turns(type, k) ? turns : slides) = true;
-  if (link->joint.turning && n.owner == Owner::joint) turns = false;  // those have their own
+  // Dofs that turn may have a field of their own.
+  if (link->joint.turning && n.owner == Owner::joint) turns = false;
   if (slides && turns && kind.other != nullptr) return std::string(kind.unit) + ", " + kind.other;
   return kind.unit_of(turns);
 }
@@ -191,15 +192,15 @@ std::string unit_of(const Scene& scene, const SceneNumber& n) {
 double& number_in(Scene& scene, const SceneNumber& number) {
   const double* const found = find_number(scene, number);
   if (found == nullptr) fail_to_find(scene, number);
-  return const_cast<double&>(*found);  // of a scene that is not const
+  return const_cast<double&>(*found);  // the scene is not const
 }
 
 double number_in(const Scene& scene, const SceneNumber& number) {
-  return number_in(const_cast<Scene&>(scene), number);  // read alone
+  return number_in(const_cast<Scene&>(scene), number);  // only read
 }
 
 int randomization_of(const Scene& scene, const SceneNumber& number) {
-  for (std::size_t k = scene.randomizations.size(); k-- > 0;)  // the last one holds
+  for (std::size_t k = scene.randomizations.size(); k-- > 0;)  // the last one applies
     if (scene.randomizations[k].number == number) return static_cast<int>(k);
   return -1;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The address of a number of a scene. One table gives its name, its unit and where it stands, to
+// The address of a number in a scene. One table gives its name, its unit and its place to
 // <randomize>, gradients, identification and every file.
 #pragma once
 
@@ -10,11 +10,11 @@ namespace tangere {
 
 struct Scene;
 
-/// Whose a number is. Its name begins with that word.
+/// The owner of a number. The number's name begins with this word.
 enum class NumberOwner { contact, ground, tactile, body, joint, motor };
 
-/// Some are counted from the first of their kind: coefficients of a contact or a sensor from kn on,
-/// effects of a joint from damping on, numbers of a size from radius on.
+/// Some fields are counted from the first of their kind: coefficients of a contact or a sensor from
+/// kn on, effects of a joint from damping on, numbers of a size from radius on.
 enum class NumberField {
   kn,
   kt,
@@ -36,28 +36,28 @@ enum class NumberField {
   q,
   v
 };
-/// How far a field is from the first of its kind.
+/// Returns how far a field is from the first of its kind.
 constexpr int from(NumberField first, NumberField field) {
   return static_cast<int>(field) - static_cast<int>(first);
 }
 
-/// A number of a scene. A number of a joint holds for all of its dofs.
+/// Names a number of a scene. A number of a joint applies to all of its dofs.
 struct SceneNumber {
   NumberOwner owner = NumberOwner::joint;
   NumberField field = NumberField::q;
-  std::string name;           ///< of the owner; of a motor its joint, of a contact its general body
-  int component = 0;          ///< of size, pos, q and v
-  std::string second_name{};  ///< of a contact: its primitive body
+  std::string name;   ///< of the owner; for a motor its joint, for a contact its general body
+  int component = 0;  ///< of size, pos, q and v
+  std::string second_name{};  ///< for a contact: its primitive body
   bool operator==(const SceneNumber&) const = default;
 };
 
-/// A row of the table.
+/// A row of the table of kinds.
 struct NumberKind {
   NumberOwner owner;
   NumberField field;
-  const char* name;   ///< of the field: what <randomize> calls it
-  const char* unit;   ///< "N/m", "1"; where dofs slide, and of laws that are not linear
-  const char* other;  ///< where dofs turn, and of the law linear; nullptr: the same
+  const char* name;   ///< name of the field, as in <randomize>
+  const char* unit;   ///< "N/m", "1"; for dofs that slide, and for laws other than linear
+  const char* other;  ///< for dofs that turn, and for law linear; nullptr: the same
   bool indexed;       ///< it has components
 
   [[nodiscard]] const char* unit_of(bool turns_or_linear) const {
@@ -68,9 +68,9 @@ std::span<const NumberKind> number_kinds();
 /// Throws InputError where an owner has no such field.
 const NumberKind& number_kind(NumberOwner owner, NumberField field);
 
-/// Coefficient k of a contact or a sensor.
+/// Returns the field of coefficient k of a contact or a sensor.
 constexpr NumberField coefficient_field(int k) { return static_cast<NumberField>(k); }
-/// Number `which` of a shape's size (size_number), and back.
+/// Returns number `which` of a body's size (size_number). size_index() is the inverse.
 SceneNumber size_of_body(const std::string& body, int which);
 inline int size_index(const SceneNumber& number) {
   return from(NumberField::radius, number.field) + number.component;
@@ -80,20 +80,22 @@ inline bool is_of_start(const SceneNumber& number) {
   return number.field == NumberField::q || number.field == NumberField::v;
 }
 
-/// "contact pad ball kn", "ground ball mu", "tactile pad kt", "body ball density",
+/// Returns "contact pad ball kn", "ground ball mu", "tactile pad kt", "body ball density",
 /// "body pad size[0]", "joint arm damping", "joint arm q[0]", "motor arm P".
 std::string name_of(const SceneNumber& number);
-/// In words that name_of() begins with, without the field: "contact pad ball".
+/// Returns the words with which name_of() begins, without the field: "contact pad ball".
 std::string owner_of(const SceneNumber& number);
-/// Of a number that the scene has; two units for a joint that slides and turns. Throws InputError.
+/// Returns the unit of a number that the scene has. A joint that slides and turns has two units.
+/// Throws InputError.
 std::string unit_of(const Scene& scene, const SceneNumber& number);
 
-/// Where it stands in a scene, and its value in SI. Both throw InputError for a number that is not
-/// there.
+/// Returns a reference to the number in the scene, or its value in SI. Both throw InputError for a
+/// number that is not there.
 double& number_in(Scene& scene, const SceneNumber& number);
 double number_in(const Scene& scene, const SceneNumber& number);
 
-/// Which of Scene::randomizations it follows, -1: none, it is the scene's.
+/// Returns the index in Scene::randomizations that the number follows; -1: it keeps the scene's
+/// value.
 int randomization_of(const Scene& scene, const SceneNumber& number);
 
 }  // namespace tangere

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The table of schemes.
 //
-// Runge-Kutta: X_i = h Σ a_ij ẋ_j, V_i = v₀ + h Σ a_ij v̇_j. With η a_jk = a_ik for the rows
-// before, ẋ_i = (X_i - Σ η_j X_j)/(a_ii h) and v̇_i = (V_i - v₀ - Σ η_j (V_j - v₀))/(a_ii h).
+// Runge-Kutta: X_i = h Σ a_ij ẋ_j, V_i = v₀ + h Σ a_ij v̇_j. η solves η a_jk = a_ik over the rows
+// before i. Then
+//   ẋ_i = (X_i - Σ η_j X_j)/(a_ii h),  v̇_i = (V_i - v₀ - Σ η_j (V_j - v₀))/(a_ii h)
 #include "engine/model/scheme.hpp"
 
 #include <algorithm>
@@ -54,7 +55,7 @@ const Scheme kBdf1 = runge_kutta("BDF1", 1, {{1}});
 
 const Scheme kSdirk2 = runge_kutta("SDIRK2", 2, {{kGamma}, {1 - kGamma, kGamma}});
 
-// Order 2 must survive in the parts of a step, and so must the history of the next one.
+// The parts of a split step must keep order 2, and so must the history of the next step.
 const Scheme kBdf2 = {.name = "BDF2",
                       .order = 2,
                       .solve = StageSolve::newton,

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Time-stepping schemes as values. A scheme is a row of numbers that the step, the tape, the
-// adjoint and the tangent read; none of them knows a scheme by name.
+// adjoint and the tangent read. None of them knows a scheme by name.
 //
-// A step of length h from (q₀, v₀) is one implicit solve per stage, for the displacement x from q₀:
+// A step of length h from (q₀, v₀) has one implicit solve per stage, for the displacement x from
+// q₀:
 //   ẋ = (c₀ x + r)/h    v = J(x) ẋ    a = (c₀ v + s)/h    g(q, v, a) = 0    q = q₀ ⊕ x
 //   r = r_before (q_before ⊖ q₀) + Σ r_inner x_j
 //   s = (s_centre v₀ + s_before v_before + Σ s_inner (v_j - v₀)) / s_divisor
-// (q_before, v_before) is the state one step before, (x_j, v_j) an earlier stage of the same step.
-// The last stage's result is the state after the step.
+// (q_before, v_before) is the state one step before. (x_j, v_j) is an earlier stage of the same
+// step. The last stage's result is the state after the step.
 #pragma once
 
 #include <initializer_list>
@@ -18,12 +19,12 @@ namespace tangere {
 
 inline constexpr int kMostStages = 4;
 
-/// What an earlier stage of a step gives to a later one.
+/// What an earlier stage of a step contributes to a later one.
 struct InnerWeight {
   double r, s;
 };
 
-/// One stage: c₀, what it takes from older states, and the time `end` in steps that it ends at.
+/// One stage: c₀, the weights of older states, and the time `end`, in steps, at which it ends.
 struct SchemeStage {
   double end;
   double c0;
@@ -32,36 +33,36 @@ struct SchemeStage {
   std::vector<InnerWeight> inner;  ///< one for each stage before this one
 };
 
-/// How a stage is solved: by Newton's iteration until g = 0, or by one Newton direction from the
-/// first guess, without a test, and then v = x/h.
+/// How a stage is solved: by Newton's iteration until g = 0, or by a single Newton direction from
+/// the first guess, without a test and with v = x/h.
 enum class StageSolve { newton, one_direction };
 
 struct Scheme {
-  const char* name;  ///< as in scenes and files
+  const char* name;  ///< the name in scenes and files
   int order;
   StageSolve solve;
   std::vector<SchemeStage> stages;
-  /// The first guess moves with v₀ + extrapolation (v₀ - v_before).
+  /// The first guess moves with velocity v₀ + extrapolation (v₀ - v_before).
   double extrapolation;
-  /// The scheme of steps without a state one step before; null where none is needed.
+  /// The scheme of a step that has no state one step before; null where none is needed.
   const Scheme* start;
-  /// The scheme of the parts of a step that is split; null: this one.
+  /// The scheme of the parts of a split step; null: this one.
   const Scheme* parts;
 
-  /// Stages whose results a tape keeps.
+  /// Number of stages whose results a tape keeps.
   [[nodiscard]] int inner_stages() const { return static_cast<int>(stages.size()) - 1; }
   [[nodiscard]] bool needs_history() const { return start != nullptr; }
   [[nodiscard]] const Scheme& of_parts() const { return parts == nullptr ? *this : *parts; }
-  /// The most inner stages of this scheme, its start and its parts.
+  /// The largest number of inner stages of this scheme, its start and its parts.
   [[nodiscard]] int most_inner_stages() const;
 };
 
-/// The scheme of a Runge-Kutta method whose last stage is its result: `matrix` has its
-/// coefficients, lower-triangular, row by row, with nothing but implicit stages, at most
-/// kMostStages. Throws InputError for any other.
+/// Makes the scheme of a Runge-Kutta method whose last stage is its result. `matrix` has its
+/// coefficients row by row. It must be lower-triangular and have only implicit stages, at most
+/// kMostStages of them. Throws InputError for any other.
 Scheme runge_kutta(const char* name, int order, std::initializer_list<std::vector<double>> matrix);
 
-/// Which scheme: those of the table by name, or any other that lives longer.
+/// A reference to a scheme: one of the table by name, or any other that outlives it.
 class Integrator {
  public:
   explicit constexpr Integrator(const Scheme& scheme) : scheme_(&scheme) {}
@@ -74,10 +75,10 @@ class Integrator {
   const Scheme* scheme_;
 };
 
-/// Those of the table.
+/// Returns the schemes of the table.
 std::span<const Integrator> integrators();
 
-/// The name users write and read: "BDF1" …
+/// Returns the name that users write and read: "BDF1" …
 inline const char* to_string(Integrator integrator) { return integrator.scheme().name; }
 
 }  // namespace tangere

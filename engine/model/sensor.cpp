@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A rectangular array of tactile points, cut into 8×8 tiles and moved into its pad's axes;
-// tactile_points.cpp does lists.
+// Cuts a rectangular array of tactile points into 8×8 tiles and moves it into its pad's axes.
+// tactile_points.cpp does this for lists.
 #include <algorithm>
 #include <cmath>
 
@@ -16,8 +16,8 @@ namespace {
 
 Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
 
-/// +1 when axis0 × axis1 points out of the body: then pressure, a force into the body, reads
-/// positive.
+/// Returns +1 when axis0 × axis1 points out of the body. Pressure, a force into the body, then
+/// reads positive.
 int find_pressure_sign(const TactileDescription& d, const CompiledBody& body,
                        const Vec3<double>& normal) {
   if (d.pressure_sign) return *d.pressure_sign;
@@ -25,12 +25,12 @@ int find_pressure_sign(const TactileDescription& d, const CompiledBody& body,
   return points_outward(body, 0.5 * (vec(a.corner0) + vec(a.corner1)), normal) >= 0 ? 1 : -1;
 }
 
-/// Spacing of the array's points in pad axes: from row to row, and from column to column [m].
+/// Spacing of the array's points in pad axes [m]: from row to row, and from column to column.
 struct Lattice {
   double row_x, row_y, col_x, col_y;
 };
 
-/// Points of a tile that starts at `first`, along one axis.
+/// Returns the number of points, along one axis, of a tile that starts at `first`.
 int points_in(int first, int total) { return std::min(kernels::kTileSide, total - first); }
 
 void place_tiles(CompiledSensor& s, const Lattice& lattice) {
@@ -67,8 +67,8 @@ void place_tiles(CompiledSensor& s, const Lattice& lattice) {
       }
       square = std::max(square, at[0] * at[0] + at[1] * at[1]);
     }
-    // What is left out must not touch in either precision: the margin is far above the rounding of
-    // both.
+    // A tile that its radius rules out must not touch in either precision. The margin is far above
+    // the rounding of both.
     s.tile_radius[std::size_t(t)] = std::sqrt(square) * (1 + 1e-5) + 1e-12;
   }
 }
@@ -89,7 +89,7 @@ CompiledSensor compile_array(const TactileDescription& d, const CompiledBody& bo
   s.link = body.link;
   s.rows = a.rows;
   s.cols = a.cols;
-  // Orthonormal to the last digit; what the scene's axes lack of that is made up for in the forces.
+  // Orthonormal to the last digit. Where the scene's axes are not, the forces make up for it.
   const Vec3<double> e0 = (1 / std::sqrt(dot(axis0, axis0))) * axis0;
   const Vec3<double> e2 = (1 / std::sqrt(dot(normal, normal))) * normal;
   const Vec3<double> e1 = cross(e2, e0);

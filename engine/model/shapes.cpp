@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One row for each shape: its name and size in files, mass and inertia for uniform density, contact
-// points.
+// One row for each shape: its name and size in files, its mass and inertia for uniform density, and
+// its contact points.
 #include "engine/model/shapes.hpp"
 
 #include <algorithm>
@@ -96,7 +96,7 @@ MassProperties mass_slope(const Shape& shape, double density, int which) {
 
 // --- contact points ---
 
-/// Surface nodes of the grid.
+/// Returns the surface nodes of the grid.
 std::vector<double> points_of(const CuboidShape& shape) {
   const std::array<int, 3>& n = shape.contact_resolution;
   std::vector<double> points;
@@ -113,7 +113,7 @@ std::vector<double> points_of(const CuboidShape& shape) {
   return points;
 }
 
-/// `count` points around z, the first along x.
+/// Appends `count` points around z, the first along x.
 void add_ring(std::vector<double>& points, int count, double radius, double z) {
   for (int j = 0; j < count; ++j) {
     const double angle = 2 * M_PI * j / count;
@@ -143,7 +143,7 @@ std::vector<double> points_of(const CapsuleShape& shape) {
   return points;
 }
 
-/// Each has the same area of the ball.
+/// Each point stands for the same area of the ball.
 std::vector<double> points_of(const EllipsoidShape& shape) {
   std::vector<double> points;
   const int count = shape.contact_count;
@@ -189,7 +189,7 @@ int* cuboid_nodes(Shape& shape) {
   return &std::get<CuboidShape>(shape).contact_resolution[Axis];
 }
 
-/// A size in three lengths along the body's axes.
+/// Returns a size as three lengths along the body's axes.
 template <class S>
 std::vector<SizeNumber> edges() {
   return {{2, 0, 0.5, edge<S, 0>}, {3, 1, 0.5, edge<S, 1>}, {4, 2, 0.5, edge<S, 2>}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A list of tactile points, cut into tiles of 64 that are near each other, in the body's axes.
+// Cuts a list of tactile points into tiles of 64 neighbours each, in the body's axes.
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -37,7 +37,8 @@ struct Box {
   }
 };
 
-/// Halves a list across its longest side until every part is a tile; all but the last are full.
+/// Halves a list across its longest side until every part is a tile. All tiles but the last are
+/// full.
 void cut_tiles(const std::vector<TactilePoint>& points, std::span<int> which) {
   const std::size_t tiles = (which.size() + kTactileTile - 1) / kTactileTile;
   if (tiles <= 1) {
@@ -55,7 +56,7 @@ void cut_tiles(const std::vector<TactilePoint>& points, std::span<int> which) {
   cut_tiles(points, which.subspan(first));
 }
 
-/// Row `row` of what a point is stored with, point k of a tile.
+/// Returns row `row` of the numbers stored for point k of a tile.
 double& entry(AlignedVector<double>& all, std::size_t rows, std::size_t tile, std::size_t row,
               std::size_t k) {
   return all[(tile * rows + row) * kTactileTile + k];
@@ -66,7 +67,7 @@ void place_point(const TactilePoint& p, std::size_t tile, std::size_t k, Compile
       vec(p.position) - Vec3<double>{s.tile_x[tile], s.tile_y[tile], s.tile_z[tile]};
   const double place[3] = {offset.x, offset.y, offset.z};
   for (std::size_t c = 0; c < 3; ++c) entry(s.offsets, 3, tile, c, k) = place[c];
-  // Times (f·x, f·y, -f·z), as the kernels give the force: the sign of the third is turned back.
+  // The rows act on (f·x, f·y, -f·z), the kernels' force, so the sign of the third is turned back.
   for (std::size_t c = 0; c < 3; ++c) {
     const double sign = c == 2 ? -1 : 1;
     entry(s.frames, 9, tile, c, k) = sign * p.axis0[c];
@@ -86,7 +87,7 @@ AlignedVector<float> narrowed(const AlignedVector<double>& from) {
   return to;
 }
 
-/// Pressure reads positive where most normals point out of the body.
+/// Returns the sign with which pressure reads positive where most normals point out of the body.
 int sign_of_most(const std::vector<TactilePoint>& points, const CompiledBody& body) {
   std::ptrdiff_t outward = 0;
   for (const TactilePoint& p : points)

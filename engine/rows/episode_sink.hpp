@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run of many episodes hands to whoever stores it. The only place where tasks/ (which
+// The interface between a run of many episodes and whoever stores it. Only here do tasks/ (which
 // produces) and io/ (which stores) meet when episodes are generated.
 #pragma once
 
@@ -13,25 +13,25 @@
 
 namespace tangere {
 
-/// Numbers of one name as they are stored: float64 or float32.
+/// The numbers of one observation as they are stored: float64 or float32.
 using Observation = std::variant<std::span<const double>, std::span<const float>>;
 
 /// How an episode of a task ended.
 struct EpisodeEnd {
-  std::int64_t length = 0;  ///< actions taken: rows behind belong to nothing
+  std::int64_t length = 0;  ///< number of actions taken; rows after these are meaningless
   double total = 0;         ///< sum of its rewards
-  bool terminated = false;  ///< by itself, not for want of time
+  bool terminated = false;  ///< the task ended it; false if time ran out
   bool success = false;
 };
 
 /// Derivatives that are stored beside an episode's numbers, as float64.
 struct GradientArray {
   std::string name;                  ///< "grad_actions"
-  std::vector<std::uint64_t> shape;  ///< of a row, or of all of it
-  bool by_row = false;               ///< one for every row with an action
+  std::vector<std::uint64_t> shape;  ///< of one row, or of the whole array
+  bool by_row = false;               ///< one array for every row with an action
   std::string meaning;
-  std::vector<std::string> by_names,
-      by_units;  ///< what the derivatives are by, along the last dimension
+  /// Names and units of the numbers that the derivatives are by, along the last dimension.
+  std::vector<std::string> by_names, by_units;
   [[nodiscard]] std::size_t width() const {
     std::size_t numbers = 1;
     for (const std::uint64_t n : shape) numbers *= n;
@@ -39,53 +39,54 @@ struct GradientArray {
   }
 };
 
-/// Rows [first_row, first_row + rows) of consecutive episodes. Row j is the state after j K steps;
-/// an episode of R actions has R + 1 of them, the last one without an action.
+/// Rows [first_row, first_row + rows) of consecutive episodes. Row j is the state after j K steps,
+/// with K steps per action. An episode of R actions has R + 1 rows; the last one has no action.
 struct EpisodeRows {
   std::int64_t first_episode = 0;  ///< a multiple of 16
   int episodes = 0;                ///< 16, fewer at the end of the run
   std::int64_t first_row = 0;
   int rows = 0;
-  int action_rows = 0;             ///< rows, one less when the last row is among them
+  int action_rows = 0;             ///< `rows`, or one less when the last row is among them
   std::span<const float> actions;  ///< (episodes, action_rows, nu) in [-1, 1]
-  /// q, v, then of a task its observations, of a scene end effectors if any and sensors: (episodes,
-  /// rows, width)
+  /// q and v, then the observations of a task, or the end effectors (if any) and sensors of a
+  /// scene. Each is (episodes, rows, width).
   std::span<const Observation> observations;
-  std::span<const float> rewards = {};  ///< of a task: (episodes, action_rows)
-  std::span<const double> randomized =
-      {};  ///< what varies between episodes: (episodes, as many as the scene varies)
-  std::span<const EpisodeEnd> ends =
-      {};  ///< of a task, whose blocks come whole and in ascending order: (episodes)
-  /// With the last row, of the whole episodes: for each GradientArray of the run (episodes,
-  /// [actions of an episode at most,] shape).
+  std::span<const float> rewards = {};  ///< (episodes, action_rows); tasks only
+  /// (episodes, as many as the scene varies) numbers that vary between episodes.
+  std::span<const double> randomized = {};
+  /// (episodes); tasks only, whose blocks come whole and in ascending order.
+  std::span<const EpisodeEnd> ends = {};
+  /// Set with the last row, for whole episodes: (episodes, [most actions of an episode,] shape) for
+  /// each GradientArray of the run.
   std::span<const std::span<const double>> gradients = {};
 };
 
-/// Consecutive episodes [first, end) of a run; both are multiples of 16, the end of the run apart.
+/// Consecutive episodes [first, end) of a run. Both are multiples of 16, except at the end of the
+/// run.
 struct EpisodeRange {
   std::int64_t first = 0, end = 0;
 };
 
-/// An episode that no solution was found for.
+/// An episode for which no solution was found.
 struct FailedEpisode {
   std::int64_t episode = 0;
-  std::int64_t step = 0;  ///< the first that failed
+  std::int64_t step = 0;  ///< first step that failed
   StepStatus status = StepStatus::not_converged;
   std::vector<double> q, v;  ///< the state before that step: (nq), (nv)
 };
 
-/// Receives episodes in pieces: those of one block of 16 in ascending rows, blocks in any order
-/// among each other. Called by one thread at a time, prepare() apart. What is stored must depend on
-/// the pieces alone, not on the order of blocks. A sink that cannot store throws IoError; the run
-/// stops and passes it on.
+/// Receives episodes in pieces. Pieces of one block of 16 come in ascending rows; blocks come in
+/// any order and may interleave. One thread at a time calls it, except prepare(). What is stored
+/// must depend on the pieces alone, not on the order of blocks. A sink that cannot store throws
+/// IoError; the run stops and passes it on.
 class EpisodeSink {
  public:
   virtual ~EpisodeSink() = default;
-  /// What can be done to a piece by many threads at once, before write() gets the same piece:
-  /// compressing it.
+  /// Work on a piece that many threads can do at once, before write() gets the same piece:
+  /// compression.
   virtual void prepare(const EpisodeRows&) {}
   virtual void write(const EpisodeRows& rows) = 0;
-  /// The last row of the block that begins with this episode has been written.
+  /// Called when the last row of the block that begins with this episode has been written.
   virtual void finish(std::int64_t first_episode, std::span<const FailedEpisode> failures) = 0;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a rollout hands to whoever stores it. The only place where tasks/ (which produces) and io/
-// (which stores) meet.
+// The interface between a rollout and whoever stores it. Only here do tasks/ (which produces) and
+// io/ (which stores) meet.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace tangere {
 
-/// Row t of a trajectory, all environments: the state before step t (row 0: the start).
+/// Row t of a trajectory, for all environments: the state before step t (row 0: the start).
 struct StateRow {
   std::int64_t step;          ///< t
   double time;                ///< t h [s]
@@ -22,7 +22,7 @@ struct StateRow {
       {};  ///< (E, n, 3) world positions of the end effectors [m]; empty if n = 0
 };
 
-/// What step t (from row t to row t + 1) used and how its solve went.
+/// What step t (from row t to row t + 1) used, and how its solve went.
 struct StepRow {
   std::int64_t step;                         ///< t
   std::span<const double> u;                 ///< (E, nu) controls as given, before clipping
@@ -31,23 +31,23 @@ struct StepRow {
   std::span<const double> residual;          ///< (E) scaled residual at acceptance, dimensionless
 };
 
-/// A tactile field of one sensor, all environments.
+/// A tactile field of one sensor, for all environments.
 struct TactileRow {
   int sensor;                     ///< index into Model::sensors()
   std::int64_t frame;             ///< 0, 1, 2 …
-  std::int64_t step;              ///< the row of q it was read from
+  std::int64_t step;              ///< row of q that it was read from
   std::span<const double> force;  ///< (E, points, 3) [N]: f·axis0, f·axis1, -f·(axis0 × axis1)
 };
 
-/// What action j of a task was and came to, all environments. Those whose episode is over take
-/// none: their rows hold 0.
+/// Action j of a task and its result, for all environments. Environments whose episode is over take
+/// no action: their rows hold 0.
 struct ActionRow {
   std::int64_t action;             ///< j
-  std::int64_t step;               ///< row of q after it
-  std::span<const double> u;       ///< (E, width) as the task took it
+  std::int64_t step;               ///< row of q after the action
+  std::span<const double> u;       ///< (E, width) as the task received it
   std::span<const double> reward;  ///< (E)
-  std::span<const std::uint8_t> terminated, truncated,
-      success;  ///< (E) of the episode, from its last action on
+  /// (E) whether the episode has succeeded; set from its last action on.
+  std::span<const std::uint8_t> terminated, truncated, success;
 };
 
 /// Receives rows in ascending order. A sink that cannot store throws IoError; the rollout stops and
@@ -58,7 +58,7 @@ class RowSink {
   virtual void write(const StateRow& row) = 0;
   virtual void write(const StepRow& row) = 0;
   virtual void write(const TactileRow& row) = 0;
-  virtual void write(const ActionRow&) {}  ///< of a task only
+  virtual void write(const ActionRow&) {}  ///< tasks only
 };
 
 }  // namespace tangere

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sizes of what a task declares, and what may not be declared.
+// Sizes of what a task declares, and checks of the declaration.
 #include "engine/rows/task_spec.hpp"
 
 #include <fmt/format.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a task declares: its arrays with names, shapes, units and bounds, and how time goes.
-// Buffers, files and the command's tables follow from it. Description only; what a task does is in
+// What a task declares: its arrays with names, shapes, units and bounds, and its timing. Buffers,
+// files and the command's tables follow from it. It is description only; what a task does is in
 // tasks/catalogue/task.hpp.
 #pragma once
 
@@ -11,7 +11,7 @@
 
 namespace tangere {
 
-/// An array of numbers that an environment takes or gives.
+/// An array of numbers that an environment receives or returns.
 struct TensorSpec {
   static constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
@@ -19,7 +19,7 @@ struct TensorSpec {
   std::vector<std::size_t> shape;  ///< row-major
   std::string unit;                ///< "m", "N", "1" …
   std::string meaning;
-  double low = -kUnbounded, high = kUnbounded;  ///< of every number
+  double low = -kUnbounded, high = kUnbounded;  ///< bounds of every number
 
   [[nodiscard]] std::size_t size() const;
 };
@@ -30,20 +30,22 @@ struct TaskSpec {
   std::string scene;    ///< file below scenes/
   std::string success;  ///< when an episode counts as solved, in words
   TensorSpec action;
-  std::vector<TensorSpec>
-      observations;          ///< an environment's lie one behind the other, in this order
+  /// Stored one after another for each environment, in this order.
+  std::vector<TensorSpec> observations;
   int steps_per_action = 1;  ///< simulation steps of an environment step
-  int control_every = 0;     ///< controls are asked for every so many of them; 0: once per action
-  std::vector<int> moments;  ///< steps of an action after which it looks, ascending, the last one
-                             ///< steps_per_action
-  int horizon = 1;           ///< actions of an episode; then it is truncated
-  bool opening = false;  ///< a reset is followed by one action of zeros, which belongs to the reset
+  int control_every = 0;     ///< simulation steps between requests for controls; 0: once per action
+  /// Steps of an action after which the task looks at the state: ascending, the last one is
+  /// steps_per_action.
+  std::vector<int> moments;
+  int horizon = 1;  ///< actions of an episode, after which it is truncated
+  /// A reset is followed by one action of zeros, which belongs to the reset.
+  bool opening = false;
   bool restarts = false;   ///< every action starts from a state that the task gives
-  int settling_steps = 0;  ///< a reset ends with so many steps of `settling_timestep` [s]
+  int settling_steps = 0;  ///< a reset ends with this many steps of `settling_timestep` [s]
   double settling_timestep = 0;
-  int memory = 0;  ///< numbers of its own that an episode keeps: a goal, a force
-  bool looks_at_end_effectors = false,
-       looks_at_tactile = false;  ///< what its moments hold besides q and v
+  int memory = 0;  ///< numbers that an episode keeps for the task: a goal, a force
+  /// What the task looks at besides q and v.
+  bool looks_at_end_effectors = false, looks_at_tactile = false;
 
   [[nodiscard]] std::size_t observation_size() const;
   /// Throws InputError when something is missing or contradicts something else.

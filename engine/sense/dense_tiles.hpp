@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tiles of a (points, 3) array: zeroed, filled from (3, 64), or read into it.
+// Tiles of a (points, 3) array: zeroes them, fills them from (3, 64), or reads them into it.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,8 @@ void clear_tile(const kernels::PadTiles& pad, int tile, T* dense) {
   for (int i = 0; i < rows; ++i, row += 3 * pad.cols) std::fill(row, row + numbers, T(0));
 }
 
-/// Zeroes every tile that is not in `tiles` (rising): rows of tiles with none of them in one piece.
+/// Zeroes every tile that is not in `tiles` (rising). Rows of tiles without any of them are zeroed
+/// in one piece.
 template <class T>
 void clear_tiles_between(const kernels::PadTiles& pad, std::span<const int> tiles, T* dense) {
   std::size_t next = 0;
@@ -42,7 +43,7 @@ void clear_tiles_between(const kernels::PadTiles& pad, std::span<const int> tile
   }
 }
 
-/// (3, 64) to the tile's rows, converted.
+/// Writes (3, 64) to the tile's rows, converted to T.
 template <class Real, class T>
 void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* dense) {
   if (pad.curved()) {
@@ -61,7 +62,7 @@ void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* de
             static_cast<T>(from[c * kernels::kTactileTile + i * kernels::kTileSide + j]);
 }
 
-/// f(slot in the tile, point of the array) for all points of a tile.
+/// Calls f(slot in the tile, point of the array) for all points of a tile.
 template <class F>
 void for_points_of_tile(const kernels::PadTiles& pad, int tile, const F& f) {
   if (pad.curved()) {
@@ -73,7 +74,8 @@ void for_points_of_tile(const kernels::PadTiles& pad, int tile, const F& f) {
     for (int j = 0; j < cols; ++j) f(i * kernels::kTileSide + j, first + i * pad.cols + j);
 }
 
-/// The other way, zeros where the tile has no point; false where all of it is zero.
+/// Reads a tile into (3, 64), with zeros where it has no point. Returns false where all of it is
+/// zero.
 template <class T, class Real>
 bool gather_tile(const kernels::PadTiles& pad, int tile, const T* dense, Real* to) {
   std::fill_n(to, 3 * kernels::kTactileTile, Real(0));

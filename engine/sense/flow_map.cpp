@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two passes: shear and its largest length, then the division.
+// Two passes: first shear and its largest length, then the division.
 #include "engine/sense/flow_map.hpp"
 
 #include <algorithm>
@@ -45,13 +45,13 @@ double normalise(std::span<const ShearField<T>> fields, std::span<T> flow, doubl
   if (!(longest > smallest)) {
     std::fill(flow.begin(), flow.end(), T(0));
   } else {
-    // Divided, not multiplied by the inverse, which is infinite for the smallest lengths.
+    // Divided, because the inverse of the smallest lengths is infinite.
     for (T& x : flow) x = static_cast<T>(double(x) / longest);
   }
   return longest;
 }
 
-/// Shear of one point.
+/// The shear of one point.
 struct Shear {
   double x, y;
 };
@@ -89,7 +89,7 @@ void normalised_flow_vjp(std::span<const ShearField<double>> fields,
   for (std::size_t f = 0; f < fields.size(); ++f)
     for (std::size_t k = 0; k < fields[f].force.size(); k += 3, from += 2)
       add_shear(out[f], k, from[0] / longest, from[1] / longest);
-  // F = S/L, L the length at `place`.
+  // F = S/L, where L is the length at `place`.
   const Shear s = shear_at(fields[field_of_longest], place);
   const double by_length = -product / (longest * longest);
   add_shear(out[field_of_longest], place, by_length * s.x / longest, by_length * s.y / longest);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between batched rows and the plain arrays of the tactile kernels.
+// Converts batched rows to the plain arrays of the tactile kernels.
 #include "engine/sense/pad_reader.hpp"
 
 #include <algorithm>

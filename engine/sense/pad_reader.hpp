@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kinematics of eight environments at a time and the shapes that meet a pad, handed to the tactile
-// kernels.
+// Kinematics of eight environments at a time and the shapes that meet a pad, prepared for the
+// tactile kernels.
 #pragma once
 
 #include <vector>
@@ -12,23 +12,23 @@
 
 namespace tangere {
 
-/// Scratch of one thread.
+/// Owns the scratch of one thread.
 class PadReader {
  public:
   explicit PadReader(const Model& model);
 
-  /// Poses and twists of all links in group `group` (0 or 1) of a block.
+  /// Computes poses and twists of all links in group `group` (0 or 1) of a block.
   void move(const Batch& batch, int block, int group);
-  /// What lane `lane` of a group has: the world for link -1.
+  /// Returns a link's pose and twist in lane `lane` of a group; those of the world for link -1.
   [[nodiscard]] kernels::LinkPose<double> link(int link, int group, int lane) const;
 
-  /// Every shape the sensor can feel, in its pad's axes, in the group moved last.
+  /// Finds every shape that the sensor can feel, in its pad's axes, in the group moved last.
   void find_touches(const Batch& batch, int block, int group, int sensor);
-  /// Arguments for one environment of a group that was met. No output is set but the list of tiles,
-  /// `active`.
+  /// Returns the arguments for one environment of a group whose touches were found. The only output
+  /// that is set is the list of tiles, `active`.
   template <class Real>
   kernels::TactileArgs<Real> arguments(int sensor, int group, int lane);
-  /// Arguments for a group (double) or both (float).
+  /// Returns the arguments for one group (double) or both (float).
   template <class Real>
   kernels::TactileBlockArgs<Real> block_arguments(int sensor, int group);
 
@@ -38,7 +38,7 @@ class PadReader {
   using Rows = AlignedVector<kernels::LaneRow>;
   static constexpr int kGroups = kernels::kBlock / kernels::kGroup;
 
-  /// The shapes that a sensor can feel, of the sizes that one lane has.
+  /// Returns the shapes that a sensor can feel, with the sizes of one lane.
   const kernels::TouchShape* shapes(int sensor, int group, int lane);
 
   struct Pad {
@@ -51,9 +51,9 @@ class PadReader {
   std::vector<Pad> pads_;                                     // per sensor
   AlignedVector<kernels::Touch<kernels::LaneRow>> touches_;   // (targets, kGroups)
   std::vector<const kernels::Touch<kernels::LaneRow>*> touch_of_group_;
-  std::vector<kernels::Touch<double>> one_;      // (targets) one environment's
+  std::vector<kernels::Touch<double>> one_;      // (targets) of one environment
   std::vector<kernels::TouchShape> one_shapes_;  // (targets)
-  AlignedVector<kernels::LaneRow> sizes_;        // (targets, kGroups, 3) of those that vary
+  AlignedVector<kernels::LaneRow> sizes_;  // (targets, kGroups, 3) of shapes whose size varies
 };
 
 }  // namespace tangere

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kinematics in lanes, then the tactile kernel: per environment on large pads, per block on small
+// Kinematics in lanes, then the tactile kernel: per environment for large pads, per block for small
 // ones.
 #include "engine/sense/readout.hpp"
 
@@ -18,7 +18,7 @@ using kernels::kBlock;
 using kernels::kGroup;
 using kernels::kTactileTile;
 
-/// Fewer environments of a block than this are read one by one: the same bits, less work.
+/// If fewer environments of a block are wanted, they are read one by one: the same bits, less work.
 constexpr int kFewest = 6;
 
 static void write3(const kernels::Vec3<double>& a, double* to) {
@@ -29,8 +29,9 @@ struct Readout::Impl {
   Model model;
   Precision precision;
   PadReader reader;
-  AlignedVector<double>
-      wide;  // fields computed in the other type than asked for: one, or those of a block
+  // Fields in the precision of the readout when T is the other type: one field, or those of a
+  // block.
+  AlignedVector<double> wide;
   AlignedVector<float> single;
 
   Impl(const Model& m, Precision p) : model(m), precision(p), reader(m) {
@@ -64,13 +65,13 @@ struct Readout::Impl {
     kernels::active_kernels().tactile_block_mixed(a);
   }
 
-  /// Calls `body` with a zero of the type the readout computes in.
+  /// Calls `body` with a zero of the type in which the readout computes.
   template <class Body>
   auto in_precision(const Body& body) {
     return precision == Precision::f64 ? body(double{}) : body(float{});
   }
 
-  /// In the world, in the group moved last.
+  /// Returns an end effector's world position in the group moved last.
   [[nodiscard]] kernels::Vec3<double> position_of(const CompiledEndEffector& v, int group,
                                                   int lane) const {
     const kernels::Frame<double> at = reader.link(v.link, group, lane).world;
@@ -88,8 +89,8 @@ struct Readout::Impl {
     reader.find_touches(batch, block, group, sensor);
   }
 
-  /// Writes the touched tiles of an environment that has been placed; returns how many, listed in
-  /// reader.active.
+  /// Writes the touched tiles of an environment whose touches were found. Returns their number and
+  /// lists them in reader.active.
   template <class T>
   int write_touched(int environment, int sensor, T* dense) {
     return in_precision([&](auto zero) {
@@ -115,7 +116,7 @@ struct Readout::Impl {
                            dense);
   }
 
-  /// Writes what is touched now, zeroes what was and is no longer.
+  /// Writes the tiles touched now and zeroes those that no longer are.
   template <class T>
   void refresh(int environment, DenseFrame<T>& frame) {
     const kernels::PadTiles pad = sensor_of(frame.sensor_).tiles();
@@ -130,7 +131,8 @@ struct Readout::Impl {
     frame.count_ = count;
   }
 
-  /// Touched tiles of a small pad into the arrays of `environments` environments, zeros elsewhere.
+  /// Writes the touched tiles of a small pad to the arrays of `environments` environments, and
+  /// zeros elsewhere.
   template <class T>
   void fill_block(int sensor, int environments, const std::array<T*, kBlock>& dense) {
     const auto numbers = 3 * std::size_t(sensor_of(sensor).points());
@@ -179,7 +181,8 @@ struct Readout::Impl {
     });
   }
 
-  /// Both groups of a block; the second even if empty: a vector of floats reads both.
+  /// Finds the touches of both groups of a block, also of an empty second one: a vector of floats
+  /// reads both.
   void place_block(const Batch& batch, int number, int sensor) {
     for (int g = 0; g < kBlock / kGroup; ++g) {
       reader.move(batch, number, g);
@@ -188,7 +191,7 @@ struct Readout::Impl {
   }
 
   /// Small pads are read in all environments of a block at once, unless most lanes would be idle or
-  /// feel shapes of sizes of their own.
+  /// shapes differ in size between lanes.
   [[nodiscard]] bool together(const Batch& batch, int number, int sensor) const {
     return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary &&
            environments_of(batch, number) >= kFewest;
@@ -197,7 +200,7 @@ struct Readout::Impl {
     return std::min(kBlock, batch.environments() - number * kBlock);
   }
 
-  /// All environments at once, or `one` for each, its group placed.
+  /// Reads all environments at once, or calls `one` for each with its group placed.
   template <class T, class One>
   void block(const Batch& batch, int number, int sensor, const std::array<T*, kBlock>& dense,
              const One& one) {
@@ -337,8 +340,8 @@ void Readout::read_block(const Batch& batch, int block, std::span<DenseFrame<T>>
   for (std::size_t e = 0; e < std::min(frames.size(), std::size_t(kBlock)); ++e) {
     dense[e] = frames[e].values_.data();
     if (whole)
-      frames[e].mark_all();  // whoever reads one of them alone afterwards must find all tiles in
-                             // its list
+      // A later reading of one of them alone must find all tiles in its list.
+      frames[e].mark_all();
   }
   impl_->block<T>(batch, block, frames[0].sensor_, dense,
                   [&](int e) { impl_->refresh(e, frames[std::size_t(e)]); });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a batch is measured by: poses and twists of bodies, end effectors, tactile fields. Reads the
+// The readings of a batch: poses and twists of bodies, end effectors, tactile fields. Reads the
 // state and changes nothing.
 #pragma once
 
@@ -12,12 +12,12 @@
 
 namespace tangere {
 
-/// Reads any batch of its model. Owns the scratch of one thread; allocates only when made.
+/// Reads any batch of its model. Owns the scratch of one thread. Allocates only when made.
 ///
-/// Tactile fields are in [N]: f·axis0, f·axis1, -f·(axis0 × axis1), f the force on the sensor's
-/// body. Exactly zero where nothing touches. They feel every body that can move against the sensor.
-/// Every way of reading gives the same numbers: those of the readout's precision, converted where T
-/// is another type. T is float or double.
+/// Tactile fields are in [N]: f·axis0, f·axis1, -f·(axis0 × axis1), where f is the force on the
+/// sensor's body. They are exactly zero where nothing touches. They feel every body that can move
+/// relative to the sensor. Every way of reading gives the same numbers: those of the readout's
+/// precision, converted where T is the other type. T is float or double.
 class Readout {
  public:
   explicit Readout(const Model& model, Precision precision = Precision::f64);
@@ -27,41 +27,42 @@ class Readout {
 
   [[nodiscard]] Precision precision() const;
 
-  /// World poses (nb, 7: x y z qw qx qy qz of the body frame) and twists (nb, 6: angular, then
-  /// linear velocity of the body frame's origin, world axes) of one environment, every body of the
-  /// scene in file order.
+  /// Reads world poses (nb, 7: x y z qw qx qy qz of the body frame) and twists (nb, 6: angular,
+  /// then linear velocity of the body frame's origin, world axes) of one environment, for every
+  /// body of the scene in file order.
   void bodies(const Batch& batch, int environment, std::span<double> pose, std::span<double> twist);
 
-  /// World positions of the scene's end effectors (end effectors, 3) [m] of one environment, file
-  /// order; with `velocity`, theirs too (end effectors, 3) [m/s], world axes.
+  /// Reads world positions of the scene's end effectors, (end effectors, 3) [m], of one environment
+  /// in file order; with `velocity`, also their velocities, (end effectors, 3) [m/s], world axes.
   void end_effectors(const Batch& batch, int environment, std::span<double> position,
                      std::span<double> velocity = {});
-  /// Positions in the environments 16 block …, (end effectors, 3) each: the same bits, kinematics
-  /// once for eight of them. Environments beyond the last of the batch may be missing.
+  /// Reads the positions in the environments from 16 block on, (end effectors, 3) each. The bits
+  /// are the same; kinematics is computed once for eight environments. Arrays beyond the batch's
+  /// last environment may be missing.
   void read_end_effectors(const Batch& batch, int block,
                           std::span<const std::span<double>> positions);
-  /// (end effectors, 3, nv): derivative of each position by displacements of q along the dofs of v,
-  /// rotations on the right (docs/dynamics.md), so that velocity = jacobian v.
+  /// Computes (end effectors, 3, nv): the derivative of each position by displacements of q along
+  /// the dofs of v, rotations on the right (docs/dynamics.md), so that velocity = jacobian v.
   void end_effector_jacobian(const Batch& batch, int environment, std::span<double> jacobian);
 
-  /// Field of one sensor and environment into (points, 3), zeros included.
+  /// Reads the field of one sensor and environment into (points, 3), zeros included.
   void tactile(const Batch& batch, int environment, int sensor, std::span<double> force);
   void tactile(const Batch& batch, int environment, int sensor, std::span<float> force);
 
-  /// Field of the frame's sensor.
+  /// Reads the field of the frame's sensor.
   template <class T>
   void read(const Batch& batch, int environment, DenseFrame<T>& frame);
   template <class T>
   void read(const Batch& batch, int environment, CompactFrame<T>& frame);
 
-  /// Fields of the environments 16 block …, (points, 3) each, one array per environment; those
-  /// beyond the last environment of the batch are left alone and may be missing. Flat pads of up to
-  /// kSmallPad points are read in all environments at once.
+  /// Reads the fields of the environments from 16 block on, (points, 3) each, one array per
+  /// environment. Arrays beyond the batch's last environment are left alone and may be missing.
+  /// Flat pads of up to kSmallPad points are read in all environments at once.
   void read_block(const Batch& batch, int block, int sensor,
                   std::span<const std::span<double>> fields);
   void read_block(const Batch& batch, int block, int sensor,
                   std::span<const std::span<float>> fields);
-  /// The same into one frame per environment, all of one sensor.
+  /// The same into one frame per environment, all of the same sensor.
   template <class T>
   void read_block(const Batch& batch, int block, std::span<DenseFrame<T>> frames);
   template <class T>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory of frames; what is written into it is the business of the readout.
+// The memory of frames. The readout decides what is written to it.
 #include "engine/sense/tactile_frame.hpp"
 
 #include <numeric>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a tactile field is kept between readings, so that reading again costs what is touched, not
-// what there is.
+// Keeps a tactile field between readings, so that reading again costs time for the touched tiles
+// alone.
 #pragma once
 
 #include <memory>
@@ -12,12 +12,12 @@
 
 namespace tangere {
 
-/// One field as (points, 3), row-major [N]. Reading zeroes the tiles that the reading before wrote,
-/// and no others. T is float or double.
+/// One field as (points, 3), row-major [N]. A reading zeroes the tiles that the previous reading
+/// wrote, and no others. T is float or double.
 template <class T>
 class DenseFrame {
  public:
-  /// All zero. Throws InputError when there is no such sensor.
+  /// Makes a frame of zeros. Throws InputError when there is no such sensor.
   DenseFrame(const Model& model, int sensor);
 
   [[nodiscard]] int sensor() const { return sensor_; }
@@ -29,8 +29,8 @@ class DenseFrame {
   Model model_;
   int sensor_;
   AlignedVector<T> values_;
-  std::vector<int>
-      written_;  // (tiles), `count_` of them in use: those that may hold something, in rising order
+  // (tiles), of which `count_` are in use: those that may be nonzero, in rising order.
+  std::vector<int> written_;
   int count_ = 0;
 };
 
@@ -38,23 +38,24 @@ class DenseFrame {
 template <class T>
 class CompactFrame {
  public:
-  /// Empty, with room for every tile of the sensor. Throws InputError when there is no such sensor.
+  /// Makes an empty frame with room for every tile of the sensor. Throws InputError when there is
+  /// no such sensor.
   CompactFrame(const Model& model, int sensor);
 
   [[nodiscard]] int sensor() const { return sensor_; }
-  /// Indices of the touched tiles, rising; tile t holds rows 8 (t / tile_cols()) … and columns 8 (t
-  /// % tile_cols()) ….
+  /// Indices of the touched tiles, rising. Tile t holds the 8 rows from 8 (t / tile_cols()) on and
+  /// the 8 columns from 8 (t % tile_cols()) on.
   [[nodiscard]] std::span<const int> tiles() const { return {tiles_.data(), std::size_t(count_)}; }
   [[nodiscard]] int tile_cols() const;
   /// (tiles().size(), 3, 8, 8) [N], zero for points beyond the edge of the array.
   [[nodiscard]] std::span<const T> values() const {
     return {values_.get(), std::size_t(count_) * 192};
   }
-  /// Numbers of the whole field, 3 per point.
+  /// Count of numbers in the whole field, 3 per point.
   [[nodiscard]] std::size_t dense_size() const;
-  /// The whole field, (points, 3), zeros included.
+  /// Writes the whole field, (points, 3), zeros included.
   void expand(std::span<T> dense) const;
-  /// Numbers in the layout of values(), of the same tiles, as a whole field.
+  /// Writes numbers for the same tiles, laid out as values(), as a whole field.
   void spread(std::span<const T> of_tiles, std::span<T> dense) const;
 
  private:
@@ -69,12 +70,12 @@ class CompactFrame {
   int count_ = 0;
 };
 
-inline constexpr int kTilePoints = 64;  ///< places of a tile, rows of 8
+inline constexpr int kTilePoints = 64;  ///< points in a tile, in rows of 8
 /// A point of a sensor's field, and its place in a tile.
 struct TilePoint {
   int point, place;
 };
-/// Of every tile of a sensor, (tiles).
+/// Returns the points of every tile of a sensor, (tiles).
 std::vector<std::vector<TilePoint>> points_by_tile(const Model& model, int sensor);
 
 extern template class DenseFrame<float>;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// States in lanes: allocation, the start of an episode, one environment in and out.
+// States in lanes: allocates them, begins episodes, copies one environment in and out.
 #include "engine/step/batch.hpp"
 
 #include <algorithm>
@@ -75,7 +75,7 @@ double* Batch::column(std::size_t lane) {
   return data_.data() + (lane / kBlock) * block_stride_ + lane % kBlock;
 }
 
-/// Padding lanes keep the scene's own numbers.
+/// Draws an episode's numbers. Padding lanes keep the scene's own numbers.
 void Batch::draw_episode(std::size_t lane) {
   const CompiledModel& m = compiled(model_);
   const bool padding = lane >= std::size_t(environments_);
@@ -119,7 +119,7 @@ void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<c
   complete_state(lane);
 }
 
-/// Quaternions of length one; the state before is the same.
+/// Scales quaternions to length one. The state one step before becomes the same state.
 void Batch::complete_state(std::size_t lane) {
   const CompiledModel& m = compiled(model_);
   double* const own = column(lane);
@@ -129,7 +129,7 @@ void Batch::complete_state(std::size_t lane) {
     const int first = m.layout.q + link.q;
     double square = 0;
     for (int k = 0; k < 4; ++k) square += at(first + k) * at(first + k);
-    // Already unit to rounding: kept as it is, so that a stored state continues bit for bit.
+    // Already unit to rounding: kept as is, so that a stored state continues bit for bit.
     if (std::abs(square - 1) < 1e-14) continue;
     const double scale = 1 / std::sqrt(square);
     for (int k = 0; k < 4; ++k) at(first + k) *= scale;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The state of many environments in blocks of 16 lanes, [block][row][lane]: what a checkpoint
-// stores, nothing else.
+// The state of many environments in blocks of 16 lanes, [block][row][lane]. It is exactly what a
+// checkpoint stores.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ enum class StepStatus : std::int8_t {
 const char* to_string(StepStatus value);
 inline bool failed(StepStatus s) { return static_cast<std::int8_t>(s) < 0; }
 
-/// Everything of one block that a step may change.
+/// Everything in one block that a step may change.
 struct BlockState {
   AlignedVector<double> rows;
   std::vector<StepStatus> status;
@@ -35,9 +35,8 @@ struct BlockState {
 /// again until reset.
 class Batch {
  public:
-  /// `environments` states drawn from the scene's <initial> and <randomize>, keyed by (seed,
-  /// first_episode + e). Throws InputError when environments < 1 or the memory for it cannot be
-  /// had.
+  /// Makes `environments` states drawn from the scene's <initial> and <randomize>, keyed by
+  /// (seed, first_episode + e). Throws InputError when environments < 1 or memory does not suffice.
   Batch(const Model& model, int environments, std::uint64_t seed = 0,
         std::int64_t first_episode = 0);
 
@@ -49,28 +48,29 @@ class Batch {
     return episode_[std::size_t(environment)];
   }
 
-  /// Draws another episode into one environment, as a new batch would have it: the same bits
-  /// wherever it is drawn. Environments of different blocks may be reset from different threads.
+  /// Draws another episode into one environment, with the same bits as in a new batch. Environments
+  /// of different blocks may be reset from different threads.
   void reset(int environment, std::int64_t episode);
-  /// A held environment is not stepped and keeps its state; reset() lets it go as well.
+  /// A held environment is not stepped and keeps its state. reset() also releases it.
   void hold(int environment, bool held = true) { held_[std::size_t(environment)] = held ? 1 : 0; }
   [[nodiscard]] bool held(int environment) const { return held_[std::size_t(environment)] != 0; }
 
-  /// One environment's coordinates, copied out of or into its lane: (nq), (nv).
+  /// Copy one environment's coordinates out of its lane: (nq), (nv).
   void get_q(int environment, std::span<double> q) const;
   void get_v(int environment, std::span<double> v) const;
-  /// Sets a state and drops the integrator's history (the next step is a start). Quaternions are
-  /// normalised here.
+  /// Sets a state and drops the integrator's history, so the next step is a start. Quaternions are
+  /// normalised.
   void set_state(int environment, std::span<const double> q, std::span<const double> v);
-  /// The two newest states of a BDF2 run: (q, v) now and one step before; the next step continues
-  /// the run.
+  /// Sets the two newest states of a BDF2 run: (q, v) now and one step before. The next step
+  /// continues the run.
   void set_state(int environment, std::span<const double> q, std::span<const double> v,
                  std::span<const double> previous_q, std::span<const double> previous_v);
 
-  /// The newest state alone, for differences: quaternions as they are, history and status kept.
+  /// Sets the newest state alone, for differences. Quaternions are taken as they are; history and
+  /// status are kept.
   void displace_state(int environment, std::span<const double> q, std::span<const double> v);
 
-  /// Freezes an environment as a failed step would. Throws InputError when `status` is none of
+  /// Freezes an environment as a failed step would. Throws InputError when `status` is not a
   /// failure.
   void set_failed(int environment, StepStatus status);
 
@@ -94,24 +94,24 @@ class Batch {
   }
   [[nodiscard]] int failed_count() const;
 
-  /// Whether the next step continues a run: the state one step before is known.
+  /// Whether the next step continues a run, because the state one step before is known.
   [[nodiscard]] bool has_history(int environment) const {
     return has_history_[std::size_t(environment)] != 0;
   }
-  /// A block as it is, and back to that.
+  /// Saves a block, and restores it.
   [[nodiscard]] BlockState save_block(int block) const;
   void restore_block(int block, const BlockState& state);
 
-  /// Value of randomised number k (in the order of Scene::randomizations) in an environment: what
-  /// was drawn for it, or set since if it is no number of the starting state.
+  /// Returns randomised number k (in the order of Scene::randomizations) of an environment: the
+  /// drawn value, or the one set since then unless it belongs to the starting state.
   [[nodiscard]] double randomized_value(int environment, int k) const;
   /// Whether randomised number k is a parameter, not one of the starting state.
   [[nodiscard]] bool is_parameter(int k) const;
-  /// Sets randomised number k of an environment until its next reset. Throws InputError for one of
-  /// the starting state.
+  /// Sets randomised number k of an environment until its next reset. Throws InputError for a
+  /// number of the starting state.
   void set_randomized_value(int environment, int k, double value);
 
-  /// First row of a block: row r, lane l at block(b)[r * 16 + l]. For the stepper and the tests.
+  /// First row of a block. Row r of lane l is block(b)[r * 16 + l]. For the stepper and the tests.
   double* block(int b) { return data_.data() + std::size_t(b) * block_stride_; }
   [[nodiscard]] const double* block(int b) const {
     return data_.data() + std::size_t(b) * block_stride_;

@@ -13,7 +13,8 @@
 namespace tangere {
 namespace {
 
-constexpr double kStepTolerance = 1e-6;  // of a step: times in decimals land on the step they mean
+// In steps; a time written in decimals then selects the step that it means.
+constexpr double kStepTolerance = 1e-6;
 
 void check_values(std::span<const double> values, int nu, const std::string& what) {
   if (values.size() != static_cast<std::size_t>(nu))
@@ -24,7 +25,7 @@ void check_values(std::span<const double> values, int nu, const std::string& wha
       throw InputError(fmt::format("{}: {}; expected finite numbers", what, x));
 }
 
-/// The first step that starts at or after a time; beyond 2^62, 2^62.
+/// Returns the first step that starts at or after a time; 2^62 for anything later.
 std::int64_t step_at(double time, double timestep) {
   return static_cast<std::int64_t>(std::min(std::ceil(time / timestep - kStepTolerance), 0x1p62));
 }
@@ -92,7 +93,7 @@ std::int64_t ControlProgram::steps() const {
   if (const auto* t = std::get_if<CsvControl>(&description_))
     return static_cast<std::int64_t>(t->rows.size());
   if (const auto* p = std::get_if<PiecewiseControl>(&description_); p != nullptr && p->end > 0)
-    return std::max<std::int64_t>(step_at(p->end, timestep_), 1);  // a step longer than the run
+    return std::max<std::int64_t>(step_at(p->end, timestep_), 1);  // one step may exceed the run
   return -1;
 }
 
@@ -115,7 +116,7 @@ void ControlProgram::evaluate(std::int64_t step, std::int64_t episode, std::span
     const auto& values = table->rows[static_cast<std::size_t>(step)];
     std::copy(values.begin(), values.end(), u.begin());
   } else {
-    // Uniform knots joined by half cosines: smooth, and never beyond the amplitude.
+    // Uniform knots are joined by half cosines: smooth, and never beyond the amplitude.
     const auto& random = std::get<RandomControl>(description_);
     const double position = static_cast<double>(step) * timestep_ / random.period;
     const double before = std::min(std::floor(position), 0x1p62);  // beyond any key: refused below

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Controls of an unattended rollout, from the scene's <control> or a table given by the caller.
+// Controls of an unattended rollout, from the scene's <control> or a table that the caller gives.
 #pragma once
 
 #include <cstdint>
@@ -10,25 +10,27 @@
 
 namespace tangere {
 
-/// u(step, environment) for a scene. No state: any step of any environment can be asked for alone.
+/// u(step, environment) for a scene. It has no state, so any step of any environment can be
+/// evaluated alone.
 class ControlProgram {
  public:
-  /// The scene's own <control>; zero for every control when it has none. Throws InputError when the
-  /// timestep [s] is not positive or the description does not fit the model: a count of values that
-  /// is not nu, NaN, times that do not ascend from 0, an empty table.
+  /// Uses the scene's own <control>; all controls are zero when it has none. Throws InputError when
+  /// the timestep [s] is not positive or the description does not fit the model: the number of
+  /// values is not nu, a value is NaN, times do not ascend from 0, a table is empty.
   ControlProgram(const Model& model, double timestep, std::uint64_t seed);
   ControlProgram(const Model& model, double timestep, std::uint64_t seed,
                  ControlDescription description);
 
-  /// Controls of one environment's step, (nu), before clipping. `episode` keys the random kind.
-  /// A time of the piecewise kind within 1e-6 steps of a step's start counts as that start. Throws
-  /// InputError beyond a table's last row.
+  /// Computes the controls of one environment's step, (nu), before clipping. `episode` keys the
+  /// random kind. A time of the piecewise kind within 1e-6 steps of a step's start counts as that
+  /// start. Throws InputError beyond a table's last row.
   void evaluate(std::int64_t step, std::int64_t episode, std::span<double> u) const;
 
-  /// Number of steps it describes: rows of a table, the end of a piecewise program; -1 when open.
+  /// Number of steps that it describes: rows of a table, or the end of a piecewise program; -1 when
+  /// open.
   [[nodiscard]] std::int64_t steps() const;
-  /// Throws InputError naming both numbers when a table has fewer rows than `steps`. The last value
-  /// of a piecewise program holds beyond its end.
+  /// Throws InputError that names both numbers when a table has fewer rows than `steps`. The last
+  /// value of a piecewise program holds beyond its end.
   void check_covers(std::int64_t steps) const;
 
   [[nodiscard]] double timestep() const { return timestep_; }  ///< [s]

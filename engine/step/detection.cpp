@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One lane after the other through the search kernel.
+// Runs the search kernel for one lane after another.
 #include "engine/step/detection.hpp"
 
 namespace tangere {
@@ -13,7 +13,7 @@ void clear_candidates(BasicWorkspace<L>& w) {
   }
 }
 
-/// Size of a pair's shape in one lane.
+/// Returns the size of a pair's shape in one lane.
 template <int L>
 kernels::Vec3<double> size_of(const kernels::PairContact& pair, const kernels::Stage<L>& stage,
                               int lane) {

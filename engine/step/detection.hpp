@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which contact points may touch during this step: found once, at the predicted pose, with a
+// Finds the contact points that may touch during this step: once, at the predicted pose, with a
 // margin.
 #pragma once
 
@@ -7,17 +7,17 @@
 
 namespace tangere {
 
-/// Rebuilds the candidate lists of the lanes in `lanes` at the poses that kinematics() left. Other
-/// lanes keep theirs. Membership never changes a result: points that do not touch add exact zeros,
-/// and a lane that moves further than its margin is found by the next kinematics() and rebuilt.
+/// Rebuilds the candidate lists of the lanes in `lanes` at the poses of kinematics(). Other lanes
+/// keep theirs. Membership never changes a result: points that do not touch add exact zeros. If a
+/// lane moves farther than its margin, the next kinematics() finds out and its lists are rebuilt.
 template <int L>
 void find_candidates(const CompiledModel& model, const kernels::KernelTable& kernels,
                      BasicWorkspace<L>& w, LaneBits lanes);
 
-/// Puts the lists of `lanes` into rows, for evaluations of more than one lane.
+/// Copies the lists of `lanes` into rows, for evaluations of more than one lane.
 void lists_to_rows(const kernels::KernelTable& kernels, Workspace& w, LaneBits lanes);
 
-/// Empties every list: before the first stage of a group.
+/// Empties every list. Call before the first stage of a group.
 template <int L>
 void clear_candidates(BasicWorkspace<L>& w);
 

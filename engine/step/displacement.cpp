@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// δq = q ⊗ (0, θ)/2 for quaternions; coordinates that are dofs for the rest.
+// δq = q ⊗ (0, θ)/2 for quaternions. Other coordinates are dofs.
 #include "engine/step/displacement.hpp"
 
 #include "engine/model/compiled_model.hpp"

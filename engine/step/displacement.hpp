@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions changed along the dofs of v, and derivatives by coordinates turned into derivatives
-// along them.
+// Displaces positions along the dofs of v, and turns derivatives by coordinates into derivatives
+// along dofs.
 #pragma once
 
 #include <span>
@@ -9,11 +9,11 @@
 
 namespace tangere {
 
-/// q ⊕ e along one dof, in place; rotations on the right.
+/// Computes q ⊕ e along one dof, in place. Rotations are on the right.
 void displace(const Model& model, std::span<double> q, int dof, double e);
 
-/// Adds to `out`, (nv), the derivatives along the dofs of what has the derivatives `by_q`, (nq), by
-/// coordinates at q. The four of a quaternion are as if each were free.
+/// Turns the derivatives `by_q`, (nq), by coordinates at q into derivatives along the dofs of v and
+/// adds them to `out`, (nv). `by_q` treats the four coordinates of a quaternion as free.
 void add_along_dofs(const Model& model, std::span<const double> q, std::span<const double> by_q,
                     std::span<double> out);
 

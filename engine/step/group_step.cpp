@@ -18,14 +18,13 @@ using kernels::Vec3;
 namespace {
 
 constexpr int kDeepestSplit = 6;  // h / 2^6
-// Inside a split the search may be long: a short leash there loses runs that a patient one
-// finishes.
+// Inside a split the search may be long: a tight limit loses runs that a patient search finishes.
 constexpr int kHalvings = 10, kSplitHalvings = 20, kSplitIterations = 40;
 constexpr int kPatience = 4, kSplitPatience = 40;
 
 }  // namespace
 
-/// From the first guess in the stage.
+/// Solves the stage from its first guess.
 template <int L>
 LaneBits GroupStep::solve_one_stage(StageSolve how, const kernels::KernelTable& table,
                                     BasicWorkspace<L>& w, LaneBits lanes, double h,
@@ -47,7 +46,7 @@ LaneBits GroupStep::solve_one_stage(StageSolve how, const kernels::KernelTable& 
   return kNoLane;
 }
 
-/// The stages of a step, each for the lanes that found the one before.
+/// Solves the stages of a step, each for the lanes that found the one before.
 template <int L>
 LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
@@ -66,7 +65,8 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
   return resolved;
 }
 
-/// q1 = centre ⊕ x, v1 = v. A joint that turned by π or more is not resolved: its chart ends there.
+/// Computes q1 = centre ⊕ x, v1 = v. A joint that turned by π or more is not resolved: its chart
+/// ends there.
 template <int L>
 void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits& resolved,
                        NewtonReport& report) const {
@@ -94,7 +94,7 @@ void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits&
   }
 }
 
-/// Adds the solve that ended in q0, v0.
+/// Adds the solve that ended in q0, v0 to the log.
 template <int L>
 void GroupStep::note(const BasicWorkspace<L>& w, int lane, const Scheme& scheme, double h,
                      std::vector<TapedSolve>* to) const {
@@ -108,7 +108,7 @@ void GroupStep::note(const BasicWorkspace<L>& w, int lane, const Scheme& scheme,
                  column(w.x_inner, scheme.inner_stages() * model_.nv)});
 }
 
-/// Two half steps from q0, v0, split again where needed.
+/// Takes two half steps from q0, v0, split again where needed.
 bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
                       NewtonReport& report, std::vector<TapedSolve>* solves) const {
   if (depth > kDeepestSplit) return false;
@@ -125,7 +125,7 @@ bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, dou
   return true;
 }
 
-/// Splits the step of one lane of a group; the others wait.
+/// Splits the step of one lane of a group. The other lanes wait.
 template <int L>
 bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane,
                            SingleWorkspace& alone, NewtonReport& report,
@@ -181,7 +181,7 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
   clear_candidates(w);
   if ((lanes & ~starting) != 0) {
     commit(run(scheme, table, w, lanes & ~starting, h, false, report));
-    if (log != nullptr)  // before a start or a split of some lane overwrites them
+    if (log != nullptr)  // before starts or splits of other lanes overwrite them
       for (int i = 0; i < scheme.inner_stages() * model_.nv; ++i)
         for (int l = 0; l < L; ++l)
           if (has(resolved, l)) log->inner[i * kernels::kBlock + l] = w.x_inner[i][l];
@@ -201,8 +201,8 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
       report.status[l] = first;
     }
   }
-  // The next step's history is log(R₁ᵀR₀): a turn of π or more in this one would be read as its
-  // complement.
+  // The next step's history is log(R₁ᵀR₀). If this step turned by π or more, it would be read as
+  // its complement.
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l) || failed(report.status[l])) continue;
     for (const kernels::Link& link : model_.links) {

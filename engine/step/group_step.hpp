@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One step of a group of eight environments by the stages of its scheme (engine/model/scheme.hpp),
-// and the splitting of steps that do not converge.
+// Takes one step of a group of eight environments by the stages of its scheme
+// (engine/model/scheme.hpp), and splits steps that do not converge.
 #pragma once
 
 #include "engine/step/newton.hpp"
@@ -15,25 +15,25 @@ struct StepSettings {
   int max_iterations;
 };
 
-/// What a tape wants to know of a step beside its result.
+/// What a tape needs to know about a step besides its result.
 struct SolveLog {
-  std::array<std::vector<TapedSolve>, kernels::kGroup>
-      special;  ///< of lanes whose step is not one plain step of the scheme
-  /// Inner stages of plain steps: dof i of stage k of lane l at [(k * nv + i) * kBlock + l].
+  /// Steps of lanes that are not one plain step of the scheme.
+  std::array<std::vector<TapedSolve>, kernels::kGroup> special;
+  /// Inner stages of plain steps. Dof i of stage k of lane l is at [(k * nv + i) * kBlock + l].
   double* inner = nullptr;
 };
 
-/// States of a group come in and go out through the workspace's rows q0, v0, q_before, v_before.
+/// States of a group enter and leave through the workspace's rows q0, v0, q_before, v_before.
 class GroupStep {
  public:
   GroupStep(const CompiledModel& model, const StepSettings& settings)
       : model_(model), settings_(settings) {}
 
-  /// Advances `lanes` by one step; `history`: those with a valid state one step before.
-  /// Afterwards q0, v0 hold the new state of every lane whose status did not fail; rows of other
-  /// lanes are untouched. Steps that are split run in `alone`, which may be `w` itself: the same
-  /// bits as in the group, for less. With `log`, starts, the parts of split steps and inner stages
-  /// are added to it.
+  /// Advances `lanes` by one step. `history`: lanes with a valid state one step before. Afterwards
+  /// q0, v0 hold the new state of every lane whose status is not a failure. Rows of other lanes are
+  /// unchanged. Split steps run in `alone`, which may be `w` itself: the same bits as in the group,
+  /// for less time. Starts, the parts of split steps and inner stages are added to `log`, unless it
+  /// is null.
   template <int L>
   void advance(const kernels::KernelTable& table, BasicWorkspace<L>& w, SingleWorkspace& alone,
                LaneBits lanes, LaneBits history, NewtonReport& report,

@@ -13,8 +13,8 @@
 
 namespace tangere {
 
-/// Force of a motor [N or N m]. `state`: one environment's column of its block; `u`: controls of
-/// the motor's joint from the first dof of its elementary link on.
+/// Returns the force of a motor [N or N m]. `state`: one environment's column of its block. `u`:
+/// controls of the motor's joint, from the first dof of its elementary link on.
 inline double force_at_start(const CompiledModel& m, const CompiledMotor& motor,
                              const double* state, const double* u) {
   if (motor.control == MotorControl::force)
@@ -25,7 +25,7 @@ inline double force_at_start(const CompiledModel& m, const CompiledMotor& motor,
   const kernels::Link& link = m.links[std::size_t(motor.link)];
   const int q = m.layout.q + link.q;
   double error;
-  if (link.kind == kernels::JointKind::spherical) {  // from here to the target, in body axes
+  if (link.kind == kernels::JointKind::spherical) {  // from q to the target, in body axes
     const kernels::Quat<double> here = {row(q), row(q + 1), row(q + 2), row(q + 3)};
     const kernels::Quat<double> there =
         kernels::quaternion_exp(kernels::Vec3<double>{u[0], u[1], u[2]});
@@ -38,8 +38,8 @@ inline double force_at_start(const CompiledModel& m, const CompiledMotor& motor,
                     motor.low, motor.high);
 }
 
-/// What the motors of one lane do: forces known at the start of the step, targets of the others.
-/// `state`: the lane's column of its block. Returns false when a control is not finite.
+/// Sets what the motors of one lane do: forces known at the start of the step, and the targets of
+/// the others. `state`: the lane's column of its block. Returns false when a control is not finite.
 template <int L>
 bool set_motors(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const double* state,
                 std::span<const double> u) {

@@ -2,29 +2,33 @@
 // Newton in lanes. All searching lanes are evaluated together; each lane accepts or halves its own
 // step.
 //
-// Accepted when a trial x - αΔ passes the natural test ‖D^½ A⁻¹ g(x - αΔ)‖ ≤ (1 - α/4) ‖D^½ Δ‖ with
-// the factor at hand (D = diag M at the first point), when its scaled residual r
-// (kernels/step/norms.hpp) is at most (1 - α/4) of the last point's, or when r is at most the
-// tolerance. One test alone stalls at first touches: the natural test where a factor from before
-// the touch says nothing of the forces after it, the residual where a long way must first be gone
-// uphill. The rounding floor in r comes from the last point that a direction was computed at.
+// A trial x - αΔ is accepted when one of three tests passes:
+//   natural test: ‖D^½ A⁻¹ g(x - αΔ)‖ ≤ (1 - α/4) ‖D^½ Δ‖ with the present factor,
+//       D = diag M at the first point
+//   residual test: the scaled residual r (kernels/step/norms.hpp) is at most (1 - α/4) of the last
+//       point's
+//   tolerance test: r is at most the tolerance
+// One test alone stalls at first touches. The natural test stalls where a factor from before the
+// touch says nothing about the forces after it, the residual test where the residual must first
+// rise for a long way. The rounding floor in r comes from the last point at which a direction was
+// computed.
 //
-// Where a direction brings no new lowest residual, the search goes back and forth between sticking
-// and slipping: the slope of one side leads far into the other. The next directions then take
-// friction by its secant, -s v_t with s as it is. That converges slowly from anywhere, so any
-// decrease will do, and a few such directions reach the side that the root is on. A lane that finds
-// no new lowest residual for `patience` directions gives up.
+// Where a direction brings no new lowest residual, the search alternates between sticking and
+// slipping: the slope of one side leads far into the other. The next directions then take friction
+// by its secant, -s v_t with fixed s. That converges slowly from anywhere, so any decrease is
+// accepted, and a few such directions reach the side of the root. A lane that finds no new lowest
+// residual for `patience` directions gives up.
 //
-// The natural test has A⁻¹ g at the new point already: the next step if the factor at hand is used
-// again (a chord step). Such steps leave a fixed share ρ of the residual, about twice what the
-// Newton step before them left of its own, and they cost a third of a Newton step. They are taken
-// where three of them should meet the tolerance. A chord step that fails the natural test is taken
-// back for a Newton step.
+// The natural test already computes A⁻¹ g at the new point. That is the next step if the present
+// factor is used again (a chord step). Chord steps leave a fixed share ρ of the residual, about
+// twice what the preceding Newton step left of its own, and cost a third of a Newton step. They are
+// taken where three of them should meet the tolerance. A chord step that fails the natural test is
+// undone, and a Newton step follows.
 //
-// Whether an evaluation brings the Jacobian along is a guess about cost, never about results: g
-// alone where every lane should be done or take a chord step, and the Jacobian after it when one
-// was not. The Jacobian of one lane costs its contacts a third of a group's: where a single lane
-// needs one, it comes after g too.
+// Whether an evaluation includes the Jacobian is a guess that affects cost, never results. g alone
+// is evaluated where every lane should be done or take a chord step, and the Jacobian afterwards if
+// one was not. The Jacobian of one lane costs its contacts a third of a group's. Where a single
+// lane needs one, it therefore also comes after g.
 #include "engine/step/newton.hpp"
 
 #include <cmath>
@@ -35,8 +39,8 @@ namespace tangere {
 
 namespace {
 
-// Decrease that a trial must bring, per α: of Newton's directions and of those by the secant, of
-// which there are `kSecants` in a row.
+// Decrease that a trial must bring, per α: for Newton's directions, and for those by the secant, of
+// which `kSecants` follow in a row.
 constexpr double kDecrease = 0.25, kSecantDecrease = 0.01;
 constexpr int kSecants = 3;
 
@@ -51,15 +55,15 @@ struct Search {
   double gravity;
   LaneBits searching;
   LaneBits on_trial = 0;     ///< lanes whose x is a trial along delta
-  LaneBits use_pivoted = 0;  ///< lanes whose factor at hand is the pivoted one
+  LaneBits use_pivoted = 0;  ///< lanes whose present factor is the pivoted one
   std::array<double, L> alpha{}, delta_norm{};
   std::array<double, L> last{};    ///< scaled residual of the last accepted point
-  std::array<double, L> lowest{};  ///< of all accepted points
-  std::array<double, L>
-      expected{};             ///< what should be left once the next point has had its chord step
+  std::array<double, L> lowest{};  ///< lowest scaled residual of all accepted points
+  /// Residual to expect once the next point has had its chord step.
+  std::array<double, L> expected{};
   LaneBits chord = 0;         ///< lanes whose trial is a chord step
-  LaneBits no_chord = 0;      ///< lanes that had one fail
-  bool with_jacobian = true;  ///< the last evaluation
+  LaneBits no_chord = 0;      ///< lanes in which a chord step failed
+  bool with_jacobian = true;  ///< whether the last evaluation included it
   std::array<int, L> halvings{}, directions{};
   std::array<int, L> idle{};     ///< directions since the lowest residual
   std::array<int, L> secants{};  ///< directions left that take friction by its secant
@@ -67,10 +71,10 @@ struct Search {
   [[nodiscard]] int n() const { return model.nv; }
   [[nodiscard]] const kernels::StageKernels<L>& kernel() const { return table.stage<L>(); }
 
-  /// The only one of `lanes`, of which there are some, or -1.
+  /// Returns the lane if there is exactly one in `lanes`, else -1. `lanes` must not be empty.
   static int lone(LaneBits lanes) { return (lanes & (lanes - 1)) == 0 ? __builtin_ctz(lanes) : -1; }
 
-  /// Poses at x; lists of lanes that have none yet or outran theirs.
+  /// Computes poses at x. Finds candidates for lanes that have no list yet or outran theirs.
   void locate(bool first) {
     kernel().kinematics(model.view, w.stage);
     LaneBits stale = first ? searching : 0;
@@ -81,7 +85,8 @@ struct Search {
       if (lone(searching) < 0) lists_to_rows(table, w, searching);
   }
 
-  /// The pass that is due: g alone where all lanes but one should be done, else everything.
+  /// Makes the evaluation that is due: g alone where all lanes but one should be done, else
+  /// everything.
   void evaluate(bool first) {
     locate(first);
     LaneBits open = 0;
@@ -169,13 +174,12 @@ struct Search {
     return accepted;
   }
 
-  /// Of a chord step only the natural test counts: what its factor leaves is what decides about the
-  /// next.
+  /// Chord steps pass by the natural test alone: what their factor leaves decides about the next.
   [[nodiscard]] bool descends(int l, double test_norm, double residual) const {
     const double share = 1 - (secants[l] > 0 ? kSecantDecrease : kDecrease) * alpha[l];
     return test_norm <= share * delta_norm[l] || (!has(chord, l) && residual <= share * last[l]);
   }
-  /// Chooses how the next direction takes friction; whether there should be none.
+  /// Chooses how the next direction takes friction. Returns true where the lane should give up.
   [[nodiscard]] bool stalls(int l, double residual) {
     if (residual < lowest[l]) {
       lowest[l] = residual;
@@ -188,7 +192,7 @@ struct Search {
   }
   void use_secant(int l, int directions_left) {
     if ((secants[l] > 0) != (directions_left > 0))
-      with_jacobian = false;  // the one at hand is of the other kind
+      with_jacobian = false;  // the present one takes friction the other way
     secants[l] = directions_left;
     w.stage.friction_tangent[l] = directions_left > 0 ? 0 : 1;
   }
@@ -197,7 +201,7 @@ struct Search {
     return alpha[l] == 1 && !has(no_chord, l) &&
            residual * share * share * share <= limits.tolerance;
   }
-  /// The natural test's vector as the next step.
+  /// Takes the natural test's vector as the next step.
   void take_chord(int l, double norm) {
     chord |= 1U << l;
     expected[l] = 0;
@@ -208,7 +212,7 @@ struct Search {
       w.stage.x[i][l] -= w.test[i][l];
     }
   }
-  /// Back to where the chord step began, for a Newton direction from there.
+  /// Returns to where the chord step began, for a Newton direction from there.
   void take_back(int l) {
     chord &= ~(1U << l);
     no_chord |= 1U << l;
@@ -217,7 +221,7 @@ struct Search {
     for (int i = 0; i < n(); ++i) w.stage.x[i][l] = w.base[i][l];
   }
 
-  /// New directions at the accepted points, and the full step along each as the next trial.
+  /// Computes new directions at the accepted points. The full step along each is the next trial.
   void new_directions(LaneBits accepted) {
     if (!with_jacobian) kernel().evaluate(model.view, w.stage, lone(accepted));
     set_floor(accepted);

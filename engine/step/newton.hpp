@@ -11,15 +11,15 @@ namespace tangere {
 
 struct NewtonLimits {
   double tolerance;    ///< on the scaled residual
-  int max_iterations;  ///< Newton directions
+  int max_iterations;  ///< largest number of Newton directions
   int max_halvings;    ///< per direction
-  int patience;        ///< directions in a row without a new lowest residual
+  int patience;        ///< directions in a row that may bring no new lowest residual
 };
 
-/// Per lane: how the solve went. Lanes that were not asked for keep what they had.
+/// How the solve went, per lane. Lanes that were not requested keep their values.
 struct NewtonReport {
   std::array<StepStatus, kernels::kGroup> status{};
-  std::array<int, kernels::kGroup> iterations{};   ///< evaluations of the residual; added up
+  std::array<int, kernels::kGroup> iterations{};   ///< evaluations of the residual, accumulated
   std::array<double, kernels::kGroup> residual{};  ///< scaled residual at the last accepted point
 };
 
@@ -31,8 +31,8 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
                      BasicWorkspace<L>& w, LaneBits lanes, const NewtonLimits& limits,
                      NewtonReport& report);
 
-/// One direction from the x in the stage, without a test: the linearly implicit step. Returns the
-/// lanes where it is finite.
+/// Takes one direction from the x in the stage, without a test: the linearly implicit step. Returns
+/// the lanes where it is finite.
 template <int L>
 LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table,
                      BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Eigen's; its headers take a second to parse, so that they are here alone.
+// Uses Eigen. Its headers take a second to parse, so no other source includes them.
 #include "engine/step/pivoted_factors.hpp"
 
 #include <Eigen/LU>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// LU with row exchanges, lane by lane, for the few matrices that plain elimination spoils.
+// LU with row exchanges, lane by lane, for the few matrices on which plain elimination fails.
 #pragma once
 
 #include <memory>
@@ -10,20 +10,20 @@ namespace tangere {
 
 class PivotedFactors {
  public:
-  /// For `lanes` matrices of (n, n).
+  /// Makes room for `lanes` matrices of (n, n).
   PivotedFactors(int lanes, int n);
   ~PivotedFactors();
   PivotedFactors(PivotedFactors&&) noexcept;
   PivotedFactors& operator=(PivotedFactors&&) noexcept;
 
-  /// Of lane `lane` of the matrix whose entries on the pattern are `A`, or of its transpose.
+  /// Factors the matrix of lane `lane` whose entries on the pattern are `A`, or its transpose.
   template <int L>
   void factor(const kernels::Pattern& pattern, const kernels::Row<L>* A, int lane, bool transposed);
-  /// That lane of (n) `out` from that of `b`, by its latest factor.
+  /// Solves lane `lane` of `out`, (n), from that of `b`, by its latest factor.
   template <int L>
   void solve(int lane, const kernels::Row<L>* b, kernels::Row<L>* out);
 
-  /// Of memory.
+  /// Returns the memory that this takes [bytes].
   static std::size_t bytes(int lanes, int n);
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// log of a rotation through its quaternion: exact up to π, where only the sign of the vector is
+// log of a rotation by its quaternion. It is exact up to π, where only the sign of the vector is
 // undetermined.
 #pragma once
 
@@ -9,8 +9,8 @@
 
 namespace tangere {
 
-/// Rotation vector x with exp(x) = q, |x| ≤ π. θ = 2 atan2(|u|, w), x = θ u/|u|; a series where |u|
-/// is small.
+/// Returns the rotation vector x with exp(x) = q, |x| ≤ π. θ = 2 atan2(|u|, w), x = θ u/|u|; a
+/// series where |u| is small.
 inline kernels::Vec3<double> rotation_log(kernels::Quat<double> q) {
   if (q.w < 0) q = {-q.w, -q.x, -q.y, -q.z};
   const kernels::Vec3<double> u = {q.x, q.y, q.z};

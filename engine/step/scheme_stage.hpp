@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a stage of a scheme begins with, in a workspace's rows: the equations at the head of
+// What a stage of a scheme begins with, in a workspace's rows, by the equations at the head of
 // engine/model/scheme.hpp.
 #pragma once
 
@@ -9,13 +9,13 @@
 
 namespace tangere {
 
-/// The same in all lanes.
+/// Sets all lanes to the same value.
 template <int L>
 void fill(kernels::Row<L>& row, double value) {
   for (double& x : row.lane) x = value;
 }
 
-/// Centre, c₀/h, r and s of stage `k`, from the states and the earlier stages in the workspace.
+/// Sets centre, c₀/h, r and s of stage `k` from the states and the earlier stages in the workspace.
 template <int L>
 void set_stage(const CompiledModel& m, const Scheme& scheme, int k, double h,
                BasicWorkspace<L>& w) {
@@ -40,7 +40,8 @@ void set_stage(const CompiledModel& m, const Scheme& scheme, int k, double h,
     }
 }
 
-/// The first guess of x: from the stage before with its velocity, the first from the start.
+/// Sets the first guess of x: from the stage before, moved with its velocity; for the first stage,
+/// from the start.
 template <int L>
 void guess_stage(const CompiledModel& m, const Scheme& scheme, int k, double h,
                  BasicWorkspace<L>& w) {

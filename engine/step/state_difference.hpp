@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// q₁ ⊖ q₀ in lanes: what takes q₀ to q₁, by its right tangent.
+// q₁ ⊖ q₀ in lanes: the displacement from q₀ to q₁, by its right tangent.
 #pragma once
 
 #include "engine/model/compiled_model.hpp"
@@ -12,7 +12,7 @@ kernels::Quat<double> quat_at(const kernels::Row<L>* q, int lane) {
   return {q[0][lane], q[1][lane], q[2][lane], q[3][lane]};
 }
 
-/// out (nv) = to ⊖ from, (nq) each.
+/// Computes out = to ⊖ from: (nv) from (nq) each.
 template <int L>
 void state_difference(const CompiledModel& m, const kernels::Row<L>* to,
                       const kernels::Row<L>* from, kernels::Row<L>* out) {

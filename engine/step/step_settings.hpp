@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The settings in force: the caller's, else the scene's.
+// The settings in force: the caller's if given, else the scene's.
 #pragma once
 
 #include "engine/step/group_step.hpp"
@@ -7,7 +7,7 @@
 
 namespace tangere {
 
-/// Throws InputError for a step or a tolerance that is not a positive number.
+/// Throws InputError if the timestep or the tolerance is not a positive number.
 StepSettings step_settings(const Model& model, const StepperOptions& options);
 
 }  // namespace tangere

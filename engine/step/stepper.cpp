@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Between the batch and the group: gathers eight lanes, steps them, scatters what succeeded.
+// Connects the batch with the group: gathers eight lanes, steps them, scatters those that
+// succeeded.
 #include "engine/step/stepper.hpp"
 
 #include <algorithm>
@@ -26,9 +27,9 @@ StepSettings step_settings(const Model& model, const StepperOptions& o) {
   return s;
 }
 
-/// Lanes of one group of a block: environment `first` + l in lane l.
+/// Lanes of one group of a block. Environment `first` + l is in lane l.
 struct GroupOfBlock {
-  double* rows;  ///< row r of the block's lane l: rows[r * kBlock + l]
+  double* rows;  ///< row r of lane l: rows[r * kBlock + l]
   int first;
   LaneBits live = 0, history = 0;
 };
@@ -47,7 +48,7 @@ struct Stepper::Impl {
         work(compiled(model), s.integrator.scheme().most_inner_stages()),
         single(compiled(model), s.integrator.scheme().most_inner_stages()) {}
 
-  /// Steps the live lanes of a group; `lane`: which of them stands in lane 0 of a workspace of one.
+  /// Steps the live lanes of a group. `lane`: the one that is in lane 0 of a workspace of one.
   template <int L>
   void step_lanes(Batch& batch, BasicWorkspace<L>& w, const GroupOfBlock& g, int lane,
                   BlockTape* tape) {
@@ -120,8 +121,7 @@ void Stepper::step_block(Batch& batch, int block, std::span<const double> contro
       g.live |= 1U << l;
       if (batch.has_history_[e] != 0) g.history |= 1U << l;
     }
-    // An environment on its own goes through kernels of one lane: the same bits, a third of the
-    // time.
+    // A lone environment goes through kernels of one lane: the same bits, a third of the time.
     const bool alone = g.live != 0 && (g.live & (g.live - 1)) == 0;
     for (int l = 0; l < kGroup; ++l) {
       if (!has(g.live, l)) continue;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One implicit step of a batch: predict, detect, Newton in lanes, commit; lanes that fail are split
+// One implicit step of a batch: predict, detect, Newton in lanes, commit. Lanes that fail are split
 // and solved alone.
 #pragma once
 
@@ -13,14 +13,14 @@ namespace tangere {
 
 class BlockTape;
 
-/// What a caller may change about the solve; defaults come from the scene.
+/// What a caller may change about the solve. Defaults come from the scene.
 struct StepperOptions {
   std::optional<Integrator> integrator;
   std::optional<double> timestep;   ///< [s]
   std::optional<double> tolerance;  ///< scaled residual, dimensionless
 };
 
-/// Owns the scratch of one thread. Steps any batch of its model; results do not depend on which
+/// Owns the scratch of one thread. Steps any batch of its model. Results do not depend on which
 /// Stepper ran.
 class Stepper {
  public:
@@ -37,12 +37,12 @@ class Stepper {
   /// the motors' range.
   void step(Batch& batch, std::span<const double> controls);
 
-  /// The same for one block of 16; `controls`: (E, nu) of the whole batch. The states after it are
+  /// The same for one block of 16. `controls`: (E, nu) of the whole batch. The resulting states are
   /// added to `tape`.
   void step_block(Batch& batch, int block, std::span<const double> controls,
                   BlockTape* tape = nullptr);
 
-  /// Memory that a stepper of this model takes, [bytes].
+  /// Memory that a stepper of this model takes [bytes].
   static std::size_t workspace_bytes(const Model& model);
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the reverse sweep needs of one block's rollout: its states, and of steps that were not plain
-// steps of the scheme how they came about.
+// What the reverse sweep needs to know of one block's rollout: its states, and the solves of steps
+// that were not plain steps of the scheme.
 #pragma once
 
 #include <cstdint>
@@ -14,12 +14,12 @@ namespace tangere {
 
 class Batch;
 
-/// One solve of a step that had others than its scheme has: a start, the parts of a split step.
+/// One solve of a step that differs from a plain step: a start, or a part of a split step.
 struct TapedSolve {
   Integrator integrator;
   double h;                   ///< [s]
   std::vector<double> q, v;   ///< its result: (nq), (nv)
-  std::vector<double> inner;  ///< inner stages relative to where it began, (inner_stages, nv)
+  std::vector<double> inner;  ///< inner stages relative to the solve's start, (inner_stages, nv)
 };
 
 /// The solves of one environment's step, first to last.
@@ -32,38 +32,38 @@ struct TapedStep {
 /// States of the 16 environments of a block after 0, 1, … steps, and one step before the first.
 class BlockTape {
  public:
-  /// Room for `steps` steps, with the inner stages of schemes that have some.
+  /// Makes room for `steps` steps, with the inner stages of schemes that have some.
   BlockTape(const Model& model, Integrator integrator, std::int64_t steps);
 
   /// Begins anew with the states of a block. Steps are counted from here on.
   void start(const Batch& batch, int block);
-  /// Adds the states that a block has now. Lanes that have failed or are held keep theirs.
+  /// Adds the present states of a block. Lanes that have failed or are held keep theirs.
   void append(const Batch& batch, int block);
-  /// Where the inner stages of the step that will be appended next go, rows (inner_stages, nv, 16);
-  /// null when the scheme has none.
+  /// Where to write the inner stages of the step that is appended next, rows (inner_stages, nv,
+  /// 16); null when the scheme has none.
   [[nodiscard]] double* next_inner();
   void add(TapedStep step) { special_.push_back(std::move(step)); }
 
-  /// Puts the states after `step` steps into a block, where they are read; what it needs to go on
+  /// Copies the states after `step` steps into a block, for reading. What the block needs to go on
   /// is not restored.
   void show(std::int64_t step, Batch& batch, int block) const;
 
   [[nodiscard]] std::int64_t steps() const { return steps_; }
-  /// Rows (nq + nv, 16) after `step` steps; -1: one step before the first.
+  /// Rows (nq + nv, 16) after `step` steps. -1: one step before the first.
   [[nodiscard]] const double* state(std::int64_t step) const {
     return states_.data() + std::size_t(step + 1) * row_count_ * 16;
   }
-  /// Rows (inner_stages, nv, 16) of step `step`, each relative to where it began.
+  /// Rows (inner_stages, nv, 16) of step `step`, each relative to where the step began.
   [[nodiscard]] const double* inner(std::int64_t step) const {
     return state(step + 1) + std::size_t(nq_ + nv_) * 16;
   }
-  /// Of one environment's step, null for a plain one.
+  /// The solves of one environment's step; null for a plain step.
   [[nodiscard]] const TapedStep* special(std::int64_t step, int lane) const;
   /// Whether the environment took that step.
   [[nodiscard]] bool took(std::int64_t step, int lane) const {
     return step < taken_[std::size_t(lane)];
   }
-  /// Memory of a block's tape for so many steps.
+  /// Memory of a block's tape for this many steps [bytes].
   static std::size_t bytes(const Model& model, Integrator integrator, std::int64_t steps);
 
  private:

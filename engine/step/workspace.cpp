@@ -11,7 +11,7 @@ using kernels::Row;
 
 namespace {
 
-/// Walks over all rows, counting them (base = nullptr) or handing them out.
+/// Walks over all rows: counts them (base = nullptr) or hands them out.
 template <int L>
 std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) {
   using LaneRow = Row<L>;
@@ -71,11 +71,11 @@ BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
     list.own = own_points.data() + own;
     own += std::size_t(L * 3 * list.stride);
   }
-  std::size_t bytes = 0;  // any instruction set may be chosen later
+  std::size_t bytes = 0;  // the largest of all instruction sets, any of which may be chosen later
   for (const kernels::KernelTable* table : kernels::available_kernels())
     bytes = std::max(bytes, table->stage<L>().scratch_bytes(m.view));
   scratch.resize(bytes);
-  // A lane that never lived holds unit quaternions, so that it computes with finite numbers.
+  // Lanes that never lived hold unit quaternions, so that they compute with finite numbers.
   for (const kernels::Link& link : m.links) {
     if (link.kind != kernels::JointKind::spherical) continue;
     for (LaneRow* q : {stage.centre, q0, q_before, q1})

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scratch of one thread: one group of eight lanes, or a single one, through one step. Nothing here
-// outlives a step.
+// Scratch of one thread for one step of a group of eight lanes, or of a single lane. Nothing in it
+// outlives the step.
 #pragma once
 
 #include <cstdint>
@@ -19,37 +19,37 @@ inline constexpr LaneBits kNoLane = 0;
 inline constexpr LaneBits kAllLanes = (1U << kernels::kGroup) - 1;
 inline bool has(LaneBits bits, int lane) { return ((bits >> lane) & 1U) != 0; }
 
-/// The most inner stages of a scheme in the table.
+/// The largest number of inner stages of a scheme in the table.
 inline constexpr int kInnerStages = 1;
 
 template <int L>
 struct BasicWorkspace {
   using LaneRow = kernels::Row<L>;
 
-  /// `inner_stages`: of the schemes that it will be used for.
+  /// `inner_stages`: the largest number in the schemes that it will be used for.
   explicit BasicWorkspace(const CompiledModel& model, int inner_stages = kInnerStages);
   static std::size_t bytes(const CompiledModel& model);
 
   using Rows = AlignedVector<LaneRow>;
   Rows memory;  ///< every row below, in one allocation
   AlignedVector<std::byte> scratch;
-  AlignedVector<double> own_points;  ///< the lists' points lane by lane
+  AlignedVector<double> own_points;  ///< the lists' points, lane by lane
   std::vector<typename kernels::Stage<L>::List> lists;
-  LaneBits in_rows = 0;  ///< lanes whose lists stand in the rows as well
-  LaneRow* references;   ///< (n_link_pairs, 12) what the lists' references point into
+  LaneBits in_rows = 0;  ///< lanes whose lists are also in the rows
+  LaneRow* references;   ///< (n_link_pairs, 12) memory of the lists' references
   std::vector<unsigned> near_lanes;
   kernels::NearPairs<L> near;
   kernels::Stage<L> stage;
 
-  // The group's states: now, one step before, and the result of the solve in hand.
+  // The group's states: now, one step before, and the result of the present solve.
   LaneRow *q0, *v0, *q_before, *v_before, *q1, *v1;
-  // Inner stages, x relative to q0: (nv) of each after one another.
+  // Inner stages: x relative to q0, (nv) each, one after another.
   int inner_stages;
   LaneRow *x_inner, *v_inner;
-  // Newton: direction, point it starts from, natural test vector.
+  // Newton: direction, its starting point, vector of the natural test.
   LaneRow *delta, *base, *test;
   LaneRow sound;
-  PivotedFactors pivoted;  ///< of lanes whose plain LU is useless
+  PivotedFactors pivoted;  ///< for lanes whose plain LU is useless
 };
 using Workspace = BasicWorkspace<kernels::kGroup>;
 using SingleWorkspace = BasicWorkspace<1>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The smallest useful program: 100 steps of 16 environments of a scene, and the hardest press on
-// its first sensor.
+// The smallest useful program: takes 100 steps of 16 environments of a scene and prints the hardest
+// press on its first sensor.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// libdeflate: twice zlib's speed and more, the same format.
+// Uses libdeflate, which writes zlib's format at least twice as fast as zlib.
 #include "io/dataset/chunk_codec.hpp"
 
 #include <libdeflate.h>
@@ -18,15 +18,15 @@ namespace {
 
 constexpr double kChunkBytes = 64 << 10;  // a loader's random access reads a whole chunk
 constexpr double kTileBytes =
-    24 << 10;  // a tile in touch for one row is stored for all rows of its chunk
+    24 << 10;  // a tile that is touched in one row is stored for all rows of its chunk
 constexpr double kTogetherBytes =
-    512 << 10;  // rows of all observations in the span of a chunk: a piece holds at least as many
+    512 << 10;  // all observations over the rows of a chunk; a piece holds at least as many rows
 constexpr std::int64_t kMostRows = 64;
 constexpr std::size_t kLeastRowBytes =
-    256;  // smaller rows: a chunk's index would cost more than compression gives
+    256;  // for smaller rows a chunk's index would cost more than compression gains
 constexpr std::size_t kLeastLastBytes = 8 << 10, kLeastTiledBytes = 8 << 10;
-// Tiles of a field, of which those that nothing touches are left out: points a side, of large
-// fields twice as many; of a curved pad.
+// Points along a side of a field's tile, twice as many for large fields; points in a tile of a
+// curved pad. Tiles that nothing touches are left out.
 constexpr std::uint64_t kTileSide = 16, kLargeSide = 128, kTilePoints = 256;
 
 std::size_t numbers_of(const std::vector<std::uint64_t>& shape) {
@@ -52,11 +52,11 @@ libdeflate_compressor* compressor_of_thread() {
   return compressor.get();
 }
 
-/// Byte b of every number to its place from b * `stride` on. Shifted words, because compilers make
-/// vectors of those.
+/// Moves byte b of every number to its place from b * `stride` on. It shifts words, because
+/// compilers vectorise that.
 template <class Word>
 void split(const unsigned char* data, std::size_t numbers, unsigned char* out, std::size_t stride) {
-  constexpr std::size_t kTogether = 1024;  // stay in the first cache
+  constexpr std::size_t kTogether = 1024;  // numbers that fit the first cache
   for (std::size_t first = 0; first < numbers; first += kTogether) {
     const std::size_t count = std::min(kTogether, numbers - first);
     for (std::size_t b = 0; b < sizeof(Word); ++b) {
@@ -85,8 +85,8 @@ void add_big_endian(std::vector<unsigned char>& out, std::uint64_t value, std::s
   for (std::size_t k = bytes; k-- > 0;) out.push_back(static_cast<unsigned char>(value >> (8 * k)));
 }
 
-/// One block, as the plug-in of the HDF Group reads it: size of all and of a block, then each
-/// block's size and bytes, big-endian.
+/// Writes one block in the format of the HDF Group's plug-in: size of the data and of a block, then
+/// each block's size and bytes, big-endian.
 std::vector<unsigned char> lz4(const std::vector<unsigned char>& plain) {
   const auto bytes = static_cast<int>(plain.size());
   thread_local std::vector<char> room;
@@ -94,7 +94,7 @@ std::vector<unsigned char> lz4(const std::vector<unsigned char>& plain) {
   const int size = LZ4_compress_default(reinterpret_cast<const char*>(plain.data()), room.data(),
                                         bytes, static_cast<int>(room.size()));
   if (size <= 0) throw std::logic_error("LZ4 needs more room than its own bound");
-  const bool smaller = size < bytes;  // a block of its own size is not compressed
+  const bool smaller = size < bytes;  // a block that keeps its size is not compressed
   std::vector<unsigned char> out;
   add_big_endian(out, plain.size(), 8);
   add_big_endian(out, plain.size(), 4);

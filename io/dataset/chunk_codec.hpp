@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Makes chunks as HDF5's filters shuffle, deflate and LZ4 would, but on any thread. The library has
-// one lock for all threads.
+// Makes chunks as HDF5's filters shuffle, deflate and LZ4 would, but on any thread. The library
+// itself has one lock for all threads.
 #pragma once
 
 #include <cstddef>
@@ -13,22 +13,21 @@
 
 namespace tangere {
 
-/// Deflate's level; shuffled tactile fields, zeros mostly, gain little from higher ones.
+/// Deflate's level. Shuffled tactile fields are mostly zeros and gain little from higher levels.
 inline constexpr int kDeflateLevel = 1;
 
-/// How an observation is cut.
+/// How an observation is cut into chunks.
 struct ChunkPlan {
-  std::int64_t rows = 0;  ///< of a chunk, a power of two, so that pieces of episodes hold whole
-                          ///< chunks; 0: contiguous
-  std::vector<std::uint64_t> tile;  ///< of a row: its shape, or a part of it
-  bool may_be_absent = false;       ///< chunks that hold zeros alone are left out
-  bool last_row = false;            ///< the one row of final_obs is cut as well
+  std::int64_t rows = 0;  ///< of a chunk, a power of two: pieces hold whole chunks; 0: contiguous
+  std::vector<std::uint64_t> tile;  ///< the part of a row in a chunk, or a row's shape
+  bool may_be_absent = false;       ///< chunks of only zeros are left out
+  bool last_row = false;            ///< the one row of final_obs is cut, too
 };
 
-/// One plan for each observation. It is contiguous without compression and sparseness, and where a
-/// row is too small for them.
+/// Returns one plan per observation. An observation is contiguous if neither compression nor
+/// sparseness is requested, and if its rows are too small for them.
 std::vector<ChunkPlan> chunk_plans(const DatasetLayout& layout);
-/// Whether any observation is cut. Then the size of an episode is not known beforehand.
+/// Whether any observation is cut. The size of an episode is then not known in advance.
 bool has_chunks(const DatasetLayout& layout);
 
 /// The filters that a file declares for chunks of numbers of `number_bytes` each.
@@ -37,8 +36,8 @@ std::vector<h5::FileFilter> file_filters(const std::string& compression, std::si
 std::vector<unsigned char> compressed(const DatasetLayout& layout, const unsigned char* data,
                                       std::size_t used, std::size_t bytes);
 
-/// HDF5's shuffle: byte 0 of all numbers, then byte 1 of all …. `out` has room for all of them;
-/// numbers from `used` bytes on are zeros. `width`: bytes of a number.
+/// Shuffles as HDF5 does: byte 0 of all numbers, then byte 1 of all, and so on. `out` has room for
+/// all numbers. Numbers from `used` bytes on are zeros. `width`: bytes of a number.
 void shuffle(const unsigned char* data, std::size_t used, std::size_t width,
              std::vector<unsigned char>& out);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Settings are compared as a file would hold them: what is written cannot be forgotten in the
+// Compares settings in the form in which a file holds them, so that no written setting escapes the
 // comparison.
 #include "io/dataset/dataset_description.hpp"
 
@@ -15,9 +15,11 @@
 namespace tangere {
 namespace {
 
-constexpr const char* kGradients = "gradients";  // of /scene: the attribute and the group
+constexpr const char* kGradients =
+    "gradients";  // the name of an attribute and of a group of /scene
 constexpr const char* kByRow = "one for each action";
-constexpr std::size_t kLongText = 60;  // bytes: beyond it a value is shown by the line that differs
+constexpr std::size_t kLongText =
+    60;  // bytes; of a longer value only the line that differs is shown
 
 void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
   if (!layout.task) {
@@ -131,7 +133,7 @@ std::string line_of_difference(const std::string& there, const std::string& here
 }  // namespace
 
 void describe_dataset(const h5::Id& file, const DatasetLayout& layout) {
-  h5::write_attribute(file, "format", "tangere dataset");
+  h5::write_attribute(file, "format", kFormatName);
   h5::write_scalar<std::int64_t>(file, "format_version", kDatasetFormat);
   h5::write_scalar<std::int64_t>(file, "dataset_episodes", layout.episodes);
   h5::write_scalar<std::int64_t>(file, "dataset_shards", layout.shard_count());
@@ -209,7 +211,7 @@ std::vector<std::int64_t> demo_numbers(const h5::Id& data) {
     constexpr std::string_view kBegin = "demo_";
     if (!name.starts_with(kBegin)) continue;
     const auto [at, error] = std::from_chars(name.data() + kBegin.size(), end, number);
-    if (error == std::errc() && at == end) numbers.push_back(number);
+    if (error == std::errc() && at == end && number >= 0) numbers.push_back(number);
   }
   std::sort(numbers.begin(), numbers.end());
   return numbers;

@@ -12,19 +12,21 @@
 
 namespace tangere {
 
-/// `format_version` of the shards that are written, and of those that are checked and merged.
+/// `format_version` of shards: written, and required in checks and merges.
 inline constexpr std::int64_t kDatasetFormat = 3;
+/// `format` of all of them.
+inline constexpr const char* kFormatName = "tangere dataset";
 
-/// Attributes of the root that belong to the whole data set, and the group /scene.
+/// Writes the attributes of the root that belong to the whole data set, and the group /scene.
 void describe_dataset(const h5::Id& file, const DatasetLayout& layout);
 
-/// All settings that decide which numbers a data set holds, in a fixed order: from a layout, from a
-/// file.
+/// Returns all settings that decide which numbers a data set holds, in a fixed order, from a layout
+/// or from a file.
 std::vector<Setting> settings_of(const DatasetLayout& layout);
 std::vector<Setting> read_settings(const h5::Id& file);
 
-/// One line for each difference: "seed: 9 there, 1 here". For long texts, the first lines that
-/// differ. Empty when nothing differs.
+/// Returns one line for each difference: "seed: 9 there, 1 here". For long texts it shows the first
+/// lines that differ. Empty when nothing differs.
 std::vector<std::string> differences(const std::vector<Setting>& there,
                                      const std::vector<Setting>& here);
 
@@ -33,10 +35,10 @@ struct GradientSaid {
   std::string name, meaning;
   bool by_row = false;  ///< a row for each action
 };
-/// By name; none in most.
+/// Returns the descriptions by name; most files have none.
 std::vector<GradientSaid> gradients_said(const h5::Id& scene);
 
-/// Numbers of the demos in an open /data, ascending.
+/// Returns the numbers of the demos in an open /data, ascending.
 std::vector<std::int64_t> demo_numbers(const h5::Id& data);
 
 }  // namespace tangere

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Writes each number with the fewest digits that read back as the same number.
+// Writes each number with the fewest digits that give the same number back.
 #include "io/dataset/dataset_export.hpp"
 
 #include <fmt/format.h>
@@ -16,13 +16,14 @@
 namespace tangere {
 namespace {
 
-constexpr std::size_t kWidest = 64;  // numbers of an observation in a table
+constexpr std::size_t kWidest = 64;  // most numbers of an observation in a table
+constexpr std::size_t kMostNumbers = std::size_t{1} << 26;  // of a demo, which is read whole
 
 /// One dataset of a demo, read whole.
 struct Column {
   std::size_t width = 1;
   std::vector<double> values;  // (rows, width)
-  bool single = false;         // float32 on disk: shorter digits give it back
+  bool single = false;         // float32 on disk, so fewer digits are enough
 };
 
 Column read_column(const h5::Id& group, const std::string& name) {
@@ -30,7 +31,11 @@ Column read_column(const h5::Id& group, const std::string& name) {
   h5::Dims dims = h5::dimensions(dataset);
   Column column;
   for (std::size_t i = 1; i < dims.size(); ++i) column.width *= dims[i];
-  column.values.resize((dims.empty() ? 0 : dims[0]) * column.width);
+  const std::size_t numbers = (dims.empty() ? 0 : dims[0]) * column.width;
+  if (numbers > kMostNumbers)
+    throw IoError(fmt::format("'{}' of a demo claims {} numbers; expected at most {}", name,
+                              numbers, kMostNumbers));
+  column.values.resize(numbers);
   const h5::Id type(H5Dget_type(dataset.get()));
   column.single = H5Tget_class(type.get()) == H5T_FLOAT && H5Tget_size(type.get()) == sizeof(float);
   if (!column.values.empty())
@@ -101,8 +106,7 @@ class CsvExport {
       columns.push_back(read_column(demo, name));
     const h5::Id obs = h5::open_group(demo, "obs");
     for (const std::string& name : names_) columns.push_back(read_column(obs, name));
-    const auto rows =
-        static_cast<std::size_t>(h5::read_numbers<std::int64_t>(demo, "num_samples").at(0));
+    const auto rows = static_cast<std::size_t>(h5::read_number<std::int64_t>(demo, "num_samples"));
     for (const Column& column : columns)
       if (column.values.size() != rows * column.width)
         throw IoError(fmt::format(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows of a data set as a table, for tools that read nothing else.
+// Exports rows of a data set as a table, for tools that cannot read HDF5.
 #pragma once
 
 #include <cstdint>
@@ -18,11 +18,11 @@ struct ExportOptions {
 
 struct ExportResult {
   std::int64_t rows = 0, columns = 0;
-  std::vector<std::string> left_out;  ///< observations too wide for a table, tactile fields mostly
+  std::vector<std::string> left_out;  ///< observations too wide for a table, mostly tactile fields
 };
 
-/// One line per row: episode, row, actions, reward, done, then every observation of at most 64
-/// numbers. Throws IoError.
+/// Writes one line per row: episode, row, actions, reward, done, then every observation of at most
+/// 64 numbers. Throws IoError.
 ExportResult export_csv(const DatasetFiles& dataset, const std::string& path,
                         const ExportOptions& options);
 

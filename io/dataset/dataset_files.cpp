@@ -20,10 +20,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kMostShards =
-    100'000'000;  // a damaged count must not become a loop for ever
+constexpr std::int64_t kMostShards = 1'000'000;  // a damaged count must not fill the memory
+constexpr int kDeepest = 4;                      // groups of a demo inside each other
 
-/// "shard-00042.h5".
+/// Matches names like "shard-00042.h5".
 bool is_shard(std::string_view name) {
   constexpr std::string_view kBegin = "shard-", kEnd = ".h5";
   if (!name.starts_with(kBegin) || !name.ends_with(kEnd) ||
@@ -34,7 +34,7 @@ bool is_shard(std::string_view name) {
   return number.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
-/// By number: names of more digits come later.
+/// Compares by number: names with more digits come later.
 bool before(const std::string& a, const std::string& b) {
   return std::pair(a.size(), a) < std::pair(b.size(), b);
 }
@@ -47,13 +47,16 @@ std::vector<std::string> shards_in(const std::string& folder) {
   return files;
 }
 
-/// Compares the files with the shards that the settings count.
+/// Compares the files with the number of shards in the settings.
 void count_shards(DatasetFiles& dataset) {
   const std::string text = value_of(dataset.settings, "dataset_shards");
   std::int64_t count = 0;
   std::from_chars(text.data(), text.data() + text.size(), count);
+  if (count < 1 || count > kMostShards)
+    throw IoError(fmt::format("'{}' counts {} shards; expected 1 to {}", dataset.files.front(),
+                              count, kMostShards));
   auto file = dataset.files.begin();
-  for (std::int64_t shard = 0; shard < std::min(count, kMostShards); ++shard) {
+  for (std::int64_t shard = 0; shard < count; ++shard) {
     const std::string path =
         (fs::path(dataset.folder) / fmt::format("shard-{:05}.h5", shard)).string();
     for (; file != dataset.files.end() && before(*file, path); ++file)
@@ -66,7 +69,7 @@ void count_shards(DatasetFiles& dataset) {
   dataset.surplus.insert(dataset.surplus.end(), file, dataset.files.end());
 }
 
-/// Settings of a file, and what differs from those of the data set; damage counts as a difference.
+/// Compares the settings of a file with those of the data set. Damage counts as a difference.
 std::vector<std::string> differences_of(const std::string& file,
                                         const std::vector<Setting>& settings) {
   try {
@@ -88,12 +91,15 @@ void add_shape(const h5::Id& group, const std::string& name, const std::string& 
       prefix + name, fmt::format("({}) {}", fmt::join(h5::dimensions(dataset), ", "), word));
 }
 
-void add_shapes(const h5::Id& group, const std::string& prefix, DatasetSummary& summary) {
+void add_shapes(const h5::Id& group, const std::string& prefix, int depth,
+                DatasetSummary& summary) {
+  if (depth > kDeepest)
+    throw IoError(fmt::format("'{}': groups lie deeper in each other than {}", prefix, kDeepest));
   for (const std::string& name : h5::link_names(group)) {
     if (h5::is_dataset(group, name)) {
       add_shape(group, name, prefix, summary);
     } else {
-      add_shapes(h5::open_group(group, name), prefix + name + "/", summary);
+      add_shapes(h5::open_group(group, name), prefix + name + "/", depth + 1, summary);
     }
   }
 }
@@ -102,13 +108,13 @@ void summarise_file(const std::string& path, DatasetSummary& summary) {
   const h5::Id file = h5::open_file(path), data = h5::open_group(file, "data");
   for (const std::int64_t demo : demo_numbers(data)) {
     const h5::Id group = h5::open_group(data, fmt::format("demo_{}", demo));
-    summary.rows += h5::read_numbers<std::int64_t>(group, "num_samples").at(0);
-    if (summary.shapes.empty()) add_shapes(group, "", summary);
+    summary.rows += h5::read_number<std::int64_t>(group, "num_samples");
+    if (summary.shapes.empty()) add_shapes(group, "", 1, summary);
     ++summary.demos;
     const std::vector<std::string> names = h5::attribute_names(group);
     if (!std::binary_search(names.begin(), names.end(), "success")) continue;
     summary.has_success = true;
-    summary.successes += h5::read_numbers<std::int64_t>(group, "success").at(0) != 0 ? 1 : 0;
+    summary.successes += h5::read_number<std::int64_t>(group, "success") != 0 ? 1 : 0;
   }
   summary.failed +=
       static_cast<std::int64_t>(h5::link_names(h5::open_group(file, "failed")).size());
@@ -138,7 +144,11 @@ DatasetFiles find_dataset(const std::string& path) {
   std::string reason;
   for (const std::string& file : dataset.files) {
     try {
-      dataset.settings = read_settings(h5::open_file(file));
+      std::vector<Setting> settings = read_settings(h5::open_file(file));
+      if (const std::string format = value_of(settings, "format"); format != kFormatName)
+        throw IoError(
+            fmt::format("'{}' has the format '{}'; expected '{}'", file, format, kFormatName));
+      dataset.settings = std::move(settings);
       break;
     } catch (const IoError& error) {
       if (reason.empty()) reason = error.what();

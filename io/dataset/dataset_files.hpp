@@ -20,18 +20,18 @@ struct DatasetFiles {
   std::string folder;             ///< empty when a file was named
 };
 
-/// The value of a setting; empty when there is none of this name.
+/// Returns the value of a setting; empty if there is none of this name.
 std::string value_of(const std::vector<Setting>& settings, const std::string& name);
 
-/// The shards of a folder, or a file. Throws IoError when there is none.
+/// Finds the shards of a folder, or a single file. Throws IoError if there are none.
 DatasetFiles find_dataset(const std::string& path);
 
-/// Throws IoError when shards are missing, when shards differ in their settings, or when a file is
-/// named like a shard and is none. The message names the first such file.
+/// Throws IoError when shards are missing, when shards differ in their settings, or when a file has
+/// a shard's name but is no shard. The message names the first such file.
 void check_complete(const DatasetFiles& dataset);
 
-/// All that is wrong: shards missing, surplus, of other settings, damaged; each with its file.
-/// Reads everything.
+/// Reads everything and reports all that is wrong, each with its file: shards that are missing,
+/// surplus, damaged, or have other settings.
 struct DatasetReport {
   std::vector<std::string> problems;
   std::int64_t shards = 0, demos = 0, failed = 0, rows = 0;
@@ -39,13 +39,13 @@ struct DatasetReport {
 };
 DatasetReport examine_dataset(const DatasetFiles& dataset);
 
-/// What a file says of itself, without reading its numbers.
+/// What a file says of itself, without its numbers.
 struct DatasetSummary {
   std::int64_t demos = 0, failed = 0, rows = 0, successes = 0;
   bool has_success = false;
   std::uint64_t bytes = 0;
   std::vector<std::pair<std::string, std::string>>
-      shapes;  ///< of the first demo: dataset, "(35, 3) float32"
+      shapes;  ///< in the first demo: dataset, "(35, 3) float32"
 };
 DatasetSummary summarise(const DatasetFiles& dataset);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Everything is removed under the lock, merged files before shards.
+// Removes everything under the lock, merged files before shards.
 #include "io/dataset/dataset_folder.hpp"
 
 #include <fmt/format.h>
@@ -26,7 +26,7 @@ constexpr std::string_view kPart = ".part";
   throw IoError(fmt::format("cannot {} '{}': {}", operation, path, std::strerror(error)));
 }
 
-/// "shard-00042.h5" and a suffix.
+/// Matches names like "shard-00042.h5" followed by `suffix`.
 bool is_shard(const std::string& name, const std::string& suffix) {
   constexpr std::string_view kBegin = "shard-";
   if (!name.starts_with(kBegin) || !name.ends_with(suffix)) return false;
@@ -59,8 +59,8 @@ DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool sha
 }
 
 DatasetFolder::~DatasetFolder() {
-  // Another process may be about to write into a shared one.
-  if (created_ && !shared_) rmdir(path_.c_str());  // refused when there is something in it
+  // Another process may be about to write into a shared folder.
+  if (created_ && !shared_) rmdir(path_.c_str());  // fails if it is not empty
 }
 
 void DatasetFolder::hold() {
@@ -83,14 +83,14 @@ bool DatasetFolder::hold_alone() {
 }
 
 void DatasetFolder::clean() {
-  // Taken over and dropped: a .part that is being written by somebody else is an error.
+  // Takes the .part over and drops it. If another process is writing it, that is an error.
   const auto remove = [](const std::string& part) {
     const PartFile stale(part.substr(0, part.size() - kPart.size()), true);
   };
   if (!shared_)
     for (const std::string& part : files_ending(fmt::format(".h5{}", kPart))) remove(part);
-  // Nobody merges while this process holds the folder: the merge was killed, and at most another
-  // process cleans up after it.
+  // Nobody merges while this process holds the folder, so these files are from a merge that was
+  // killed. At most, another process cleans up after it, too.
   for (const std::string& part : merged_files(std::string(kPart))) {
     try {
       remove(part);
@@ -108,16 +108,15 @@ std::vector<std::string> DatasetFolder::files_ending(const std::string& suffix) 
   return files;
 }
 
-/// As io/dataset/dataset_merge.hpp and io/dataset/minari_view.hpp name them, those that are there;
-/// robomimic's last.
+/// Names the files as in io/dataset/dataset_merge.hpp and io/dataset/minari_view.hpp, if they
+/// exist. robomimic's file comes last.
 std::vector<std::string> DatasetFolder::merged_files(const std::string& suffix) const {
   std::vector<std::string> files;
   std::error_code none_there;
   for (const fs::directory_entry& entry :
        fs::directory_iterator(fs::path(path_) / "minari" / "tangere", none_there))
     for (const char* name :
-         {"main_data.hdf5",
-          "metadata.json"})  // the last is removed first: without it there is no data set
+         {"main_data.hdf5", "metadata.json"})  // removed first: without it there is no data set
       files.push_back((entry.path() / "data" / name).string());
   files.push_back((fs::path(path_) / "robomimic.hdf5").string());
   for (std::string& file : files) file += suffix;
@@ -148,15 +147,14 @@ void DatasetFolder::remove_old_shards(std::int64_t count) {
   std::reverse(files.begin(), files.end());
   for (const std::string& file : files)
     if (unlink(file.c_str()) != 0 && errno != ENOENT)
-      fail("remove", file, errno);  // gone: others that share it do the same
+      fail("remove", file, errno);  // gone: other processes that share it remove it, too
   const fs::path views = fs::path(path_) / "minari" / "tangere";
   std::vector<fs::path> emptied;
   std::error_code none_there;
   for (const fs::directory_entry& entry : fs::directory_iterator(views, none_there))
     emptied.insert(emptied.end(), {entry.path() / "data", entry.path()});
   emptied.insert(emptied.end(), {views, views.parent_path()});
-  for (const fs::path& folder : emptied)
-    rmdir(folder.c_str());  // refused when there is something in it
+  for (const fs::path& folder : emptied) rmdir(folder.c_str());  // fails if it is not empty
 }
 
 }  // namespace tangere

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The folder of a data set. One process holds it, or several share it, and its shards belong to one
-// run.
+// The folder of a data set. One process holds it alone, or several share it. All its shards belong
+// to one run.
 #pragma once
 
 #include <cstdint>
@@ -13,19 +13,19 @@
 
 namespace tangere {
 
-/// How long a process that shares a folder waits: to share it while another process merges, and to
-/// be alone while others look at it.
+/// How long a process that shares a folder waits until another one has merged, and how long it
+/// waits to be alone while others read it.
 struct FolderPatience {
   LockPatience to_share = LockPatience::seconds(10), to_be_alone = LockPatience::seconds(1);
 };
 
 class DatasetFolder {
  public:
-  /// Creates the folder when it is missing, and locks out other processes. With `shared` it locks
-  /// out only those that want the folder alone. Removes what a killed run or merge left unfinished,
-  /// except shards of others that share the folder. Throws IoError when it is something else,
-  /// cannot be written, is held by another process, or is not shared and has shards that it should
-  /// not have.
+  /// Creates the folder if it is missing, and locks out other processes. With `shared` it locks out
+  /// only those that want the folder alone. Removes what a killed run or merge left unfinished,
+  /// except shards of others that share the folder. Throws IoError if the path is no folder, cannot
+  /// be written, is held by another process, or is not shared and has shards that it should not
+  /// have.
   DatasetFolder(std::string path, ExistingShards existing, bool shared = false,
                 FolderPatience patience = {});
   /// Removes the folder if it was created here and is empty.
@@ -33,7 +33,7 @@ class DatasetFolder {
   DatasetFolder(const DatasetFolder&) = delete;
   DatasetFolder& operator=(const DatasetFolder&) = delete;
 
-  /// Lets go of a shared folder for good. Others may go on writing.
+  /// Releases a shared folder for good. Others may go on writing.
   void let_go();
   /// Whether this process holds the folder alone, or could from now on.
   [[nodiscard]] bool hold_alone();
@@ -42,9 +42,9 @@ class DatasetFolder {
   [[nodiscard]] std::vector<std::string> shards() const { return files_ending(".h5"); }
   /// Space on the disk that shards may fill [bytes], including the space of shards to be removed.
   [[nodiscard]] double free_bytes() const;
-  /// If an earlier run is to be replaced, removes its merged files, then its shards, the last one
-  /// first, so that what is left begins with 0. In a shared folder each process replaces its own
-  /// shards, so only those are removed that do not belong to `count` shards.
+  /// If an earlier run is to be replaced, removes its merged files, then its shards from the last
+  /// to the first, so that the remaining ones start at 0. In a shared folder each process replaces
+  /// its own shards, so this removes only shards with numbers beyond `count`.
   void remove_old_shards(std::int64_t count);
 
  private:
@@ -57,7 +57,7 @@ class DatasetFolder {
   ExistingShards existing_;
   bool shared_ = false, created_ = false;
   FolderPatience patience_;
-  std::optional<FolderLock> lock_;  // let go of, however the constructor ends
+  std::optional<FolderLock> lock_;  // released however the constructor ends
 };
 
 }  // namespace tangere

@@ -15,7 +15,7 @@ namespace tangere {
 namespace {
 
 constexpr std::int64_t kBlockEpisodes = 16;
-// Short episodes: creating objects is what costs, and a shard that is lost should be cheap.
+// For short episodes: creating objects is what costs, and losing a shard should be cheap.
 constexpr std::int64_t kMostEpisodes = 4096;
 std::int64_t blocks_of(std::int64_t episodes) {
   return (episodes + kBlockEpisodes - 1) / kBlockEpisodes;
@@ -23,7 +23,7 @@ std::int64_t blocks_of(std::int64_t episodes) {
 
 constexpr const char* kEndEffectors = "variables";
 
-/// What the format of a group in a file has room for.
+/// Checks lengths against the limits of the format of a group.
 void check_lengths(const std::vector<std::string>& observations) {
   constexpr std::size_t kLongest = 255, kShown = 32, kAll = 65000, kBesidesName = 16;
   std::size_t bytes = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // All that the shards of a data set say besides their numbers, and which episodes go into which
-// shard. Nothing in it depends on threads, folders or the time, so that the same request gives the
-// same bytes.
+// shard. It does not depend on threads, folders or the time, so the same request gives the same
+// bytes.
 #pragma once
 
 #include <cstdint>
@@ -35,51 +35,49 @@ struct DatasetLayout {
   std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
   std::vector<std::string> randomized_names, randomized_units;  ///< what varies between episodes
-  std::optional<TaskSpec>
-      task;            ///< whose actions, observations and rewards these are; none: a scene alone
-  std::string policy;  ///< of a task
+  std::optional<TaskSpec> task;  ///< defines actions, observations and rewards; none: only a scene
+  std::string policy;            ///< of a task
   std::string scene_name, scene_text;
-  std::string tables = "none";  ///< of files that the text refers to: their checksum
+  std::string tables = "none";  ///< checksum of the files that the text refers to
   std::string integrator;
   double timestep = 0;   ///< [s]
   double tolerance = 0;  ///< of the scaled residual, dimensionless
   std::string precision, version, instruction_set;
-  std::string controls = "of the scene";  ///< or which table, by its content
-  std::string
-      command;  ///< that makes this data set, without what does not change it (threads, folder …)
-  double shard_bytes = 1 << 30;  ///< a shard stays below it, unless 16 episodes are more
-  std::int64_t shards = 0;       ///< how many; 0: as shard_bytes says
+  std::string controls = "of the scene";  ///< or a table, named by its content
+  std::string command;  ///< makes this data set again; without threads, folder and the like
+  double shard_bytes = 1 << 30;  ///< upper limit of a shard, unless 16 episodes are more
+  std::int64_t shards = 0;       ///< number of shards; 0: as shard_bytes determines
   std::string compression =
-      "none";           ///< or "deflate", "lz4": of observations whose rows are large enough
+      "none";           ///< or "deflate", "lz4", for observations with rows large enough
   bool sparse = false;  ///< parts of large fields that are zero are left out
-  std::vector<std::string> record;  ///< observations to store; none: all there are
-  std::string gradients_of;         ///< what derivatives are of, in words; empty: there are none
+  std::vector<std::string> record;  ///< observations to store; none: all of them
+  std::string gradients_of;         ///< the quantity that derivatives are of, in words; empty: none
   std::vector<GradientArray> gradients;  ///< those stored with an episode
 
-  /// R: actions of an episode, of a task at most.
+  /// R: actions of an episode, for a task at most.
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
   /// Names of the numbers of an action.
   [[nodiscard]] std::vector<std::string> action_names() const;
-  /// All observations: q, v, then what a task observes, or "variables" if there are end effectors
-  /// and the sensors.
+  /// All observations: q and v, then what a task observes, or "variables" (if there are end
+  /// effectors) and the sensors.
   [[nodiscard]] std::vector<std::string> all_observation_names() const;
-  /// Places in that list, and in pieces of episodes, of those that are stored, ascending.
+  /// Indices of the stored observations in that list, and in pieces of episodes, ascending.
   [[nodiscard]] std::vector<std::size_t> recorded() const;
-  /// Names below obs.
+  /// Names of the stored observations below obs.
   [[nodiscard]] std::vector<std::string> observation_names() const;
-  /// Shapes of one row of each of them: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
+  /// Shapes of one row of each stored observation: {nq}, {nv}, {n, 3}, {rows, cols, 3} …
   [[nodiscard]] std::vector<std::vector<std::uint64_t>> observation_shapes() const;
-  /// Numbers of one episode on disk, without HDF5's own [bytes].
+  /// Size of one episode's numbers on disk, without HDF5's own data [bytes].
   [[nodiscard]] double episode_bytes() const;
-  /// As many as stay below shard_bytes, a multiple of 16; depends on the data set alone.
+  /// As many episodes as stay below shard_bytes, a multiple of 16. Depends on the data set alone.
   [[nodiscard]] std::int64_t episodes_per_shard() const;
   [[nodiscard]] std::int64_t shard_count() const;
-  /// Whole blocks of 16 episodes; where `shards` is given, as many in each as in any other, or one
-  /// more.
+  /// Whole blocks of 16 episodes. If `shards` is given, the shards' numbers of blocks differ by at
+  /// most one.
   [[nodiscard]] EpisodeRange shard_episodes(std::int64_t shard) const;
   [[nodiscard]] std::int64_t shard_of(std::int64_t episode) const;
-  /// Throws InputError when a sensor cannot be a name in a file, there are more shards than blocks,
-  /// or what is to be recorded is not there.
+  /// Throws InputError when a sensor's name cannot be a name in a file, when there are more shards
+  /// than blocks, or when an observation to record does not exist.
   void check() const;
 };
 

@@ -72,14 +72,19 @@ class Merger {
     return result_;
   }
 
+  /// What ends a merge that was asked to stop.
+  struct Stopped {};
+
  private:
+  void check_stop() const {
+    if (options_.stop && options_.stop()) throw Stopped();
+  }
+
   void describe(const std::string& shard) {
     const h5::Id from = h5::open_file(shard);
     for (const char* name : {"format", "command"})
       h5::write_attribute(file_.file(), name, h5::read_text(from, name));
-    const auto number = [&](const char* name) {
-      return h5::read_numbers<std::int64_t>(from, name).at(0);
-    };
+    const auto number = [&](const char* name) { return h5::read_number<std::int64_t>(from, name); };
     h5::write_scalar<std::int64_t>(file_.file(), "format_version", number("format_version"));
     for (const char* name : {"dataset_episodes", "dataset_shards"})
       h5::write_scalar<std::int64_t>(file_.file(), name, number(name));
@@ -108,15 +113,15 @@ class Merger {
     const std::string name = fs::path(shard).filename();
     std::vector<LinkedDemo> batch;
     for (const std::int64_t number : demo_numbers(data)) {
+      check_stop();
       batch.push_back(described(shard, data, number));
       demos_.push_back(number);
       if (batch.size() == kBatch) put(data, name, batch);
     }
     put(data, name, batch);
     for (const std::string& episode : h5::link_names(failed)) failed_.push_back({name, episode});
-    rows_ += h5::read_numbers<std::int64_t>(data, "total").at(0);
-    sum_ += h5::read_numbers<std::uint64_t>(from, "content_sum")
-                .at(0);  // modulo 2⁶⁴, as within a shard
+    rows_ += h5::read_number<std::int64_t>(data, "total");
+    sum_ += h5::read_number<std::uint64_t>(from, "content_sum");  // modulo 2⁶⁴, as within a shard
   }
 
   LinkedDemo described(const std::string& shard, const h5::Id& data, std::int64_t number) {
@@ -135,7 +140,10 @@ class Merger {
   void put(const h5::Id& data, const std::string& shard, std::vector<LinkedDemo>& batch) {
     if (batch.empty()) return;
     if (options_.copy) {
-      for (const LinkedDemo& demo : batch) try_copy(data, shard, demo);
+      for (const LinkedDemo& demo : batch) {
+        check_stop();
+        try_copy(data, shard, demo);
+      }
     } else {
       h5::Bytes out;
       for (const h5::FileMember& group : add_demo_links(out, file_.here(), *members_, shard, batch))
@@ -230,7 +238,13 @@ MergeResult merge_dataset(const DatasetFiles& dataset, const MergeOptions& optio
     throw IoError(
         fmt::format("'{}' is a file; expected the folder of its shards", dataset.files.front()));
   check_complete(dataset);
-  return Merger(dataset, options).merge();
+  try {
+    return Merger(dataset, options).merge();
+  } catch (const Merger::Stopped&) {
+    MergeResult nothing;
+    nothing.stopped = true;
+    return nothing;
+  }
 }
 
 }  // namespace tangere

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "io/dataset/dataset_files.hpp"
@@ -12,6 +13,8 @@ namespace tangere {
 struct MergeOptions {
   bool copy = false;       ///< numbers too, not links to the shards
   bool overwrite = false;  ///< replace what an earlier merge made
+  /// Asked between demos; true ends the merge, which then leaves nothing. Empty: never.
+  std::function<bool()> stop = {};
 };
 
 struct MergeResult {
@@ -20,6 +23,7 @@ struct MergeResult {
   std::string minari_id;  ///< tangere/NAME-v0
   std::int64_t demos = 0, failed = 0, train = 0, valid = 0;
   std::uint64_t bytes = 0;  ///< of the file
+  bool stopped = false;     ///< nothing was written, all else is empty
 };
 
 /// Merges a folder's shards. Opens every member that it links, reads all numbers that it copies.

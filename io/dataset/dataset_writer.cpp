@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several shards are open where blocks of the next one overtake the last of one.
+// Several shards may be open at once, because blocks of the next shard may overtake the last of
+// one.
 #include "io/dataset/dataset_writer.hpp"
 
 #include <fmt/format.h>
@@ -25,7 +26,7 @@ namespace tangere {
 namespace {
 
 std::int64_t number(const h5::Id& file, const char* name) {
-  return h5::read_numbers<std::int64_t>(file, name).at(0);
+  return h5::read_number<std::int64_t>(file, name);
 }
 
 }  // namespace
@@ -114,7 +115,7 @@ struct DatasetWriter::Impl {
     complete.insert(shard);
   }
 
-  /// Of this data set or of another one that has as many.
+  /// Whether all shards exist, of this data set or of another one with as many shards.
   [[nodiscard]] bool all_there() const {
     const std::vector<std::string> files = folder.shards();
     if (std::ssize(files) < layout.shard_count()) return false;
@@ -124,20 +125,15 @@ struct DatasetWriter::Impl {
     return true;
   }
 
-  /// What is wrong with the first shard that does not belong to this data set; empty if there is
-  /// none. Other processes may be about to replace it.
+  /// Describes the first shard that does not belong to this data set; empty if there is none. Other
+  /// processes may be about to replace it.
   [[nodiscard]] std::string of_another_run() const {
     const std::vector<Setting> here = settings_of(layout);
     std::vector<std::string> files = folder.shards();
     for (const std::string& file : files) {
-      try {
-        const std::vector<std::string> lines =
-            differences(read_settings(h5::open_file(file)), here);
-        if (!lines.empty())
-          return fmt::format("'{}' belongs to another run: {}", file, fmt::join(lines, "; "));
-      } catch (const IoError& error) {
-        return error.what();
-      }
+      const std::vector<std::string> lines = differences(read_settings(h5::open_file(file)), here);
+      if (!lines.empty())
+        return fmt::format("'{}' belongs to another run: {}", file, fmt::join(lines, "; "));
     }
     if (std::ssize(files) == layout.shard_count()) return {};
     for (std::int64_t shard = 0; shard < layout.shard_count(); ++shard)
@@ -147,7 +143,7 @@ struct DatasetWriter::Impl {
   }
 
   void check_space(double episodes) const {
-    if (has_chunks(layout)) return;  // nobody knows before
+    if (has_chunks(layout)) return;  // sizes are not known in advance
     const double needed = layout.episode_bytes() * episodes, available = folder.free_bytes();
     if (needed > available)
       throw IoError(fmt::format("{}: needs at least {:.0f} bytes and the disk has {:.0f} free",
@@ -205,8 +201,8 @@ void DatasetWriter::finish(std::int64_t first_episode, std::span<const FailedEpi
 
 bool DatasetWriter::complete() {
   impl_->folder.let_go();
-  // Every process lets go first. So the last one to look sees all shards, and no earlier one is in
-  // its way.
+  // Every process lets go first. So the last one to check sees all shards, and no earlier one
+  // blocks it.
   if (!impl_->all_there()) return false;
   if (!impl_->folder.hold_alone()) {
     impl_->obstacle = fmt::format(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `generate` writes: a folder of HDF5 shards (layout in docs/datasets.md).
+// Writes what `generate` makes: a folder of HDF5 shards (layout in docs/datasets.md).
 #pragma once
 
 #include <memory>
@@ -15,25 +15,25 @@ namespace tangere {
 struct DatasetOutput {
   std::string folder;
   ExistingShards existing = ExistingShards::refuse;
-  /// Shards to make, ascending; other processes may make others at the same time. None: this
-  /// process makes all of them alone.
+  /// Shards to make, ascending. Other processes may make the others at the same time. None: this
+  /// process makes all shards alone.
   std::optional<std::vector<std::int64_t>> only = {};
 };
 
-/// Deals episodes to shards. A shard gets its name when all its episodes are there and have been
-/// read back; destroyed before that, it leaves nothing behind.
+/// Distributes episodes to shards. A shard gets its name when all its episodes have been written
+/// and read back. A shard destroyed before that leaves nothing behind.
 class DatasetWriter : public EpisodeSink {
  public:
   /// Creates the folder and touches no shard. Throws InputError for names that no file can hold,
-  /// and for shards to keep that have other settings, naming what differs. Throws IoError when the
-  /// folder cannot be written, is being written by another process, has shards that are neither to
-  /// be kept nor replaced, or the disk has no room for the data set.
+  /// and for shards to keep that have other settings, naming what differs. Throws IoError if the
+  /// folder cannot be written, another process writes it, it has shards that are neither to be kept
+  /// nor replaced, or the disk has no room for the data set.
   DatasetWriter(const DatasetOutput& output, const DatasetLayout& layout);
   ~DatasetWriter() override;
 
-  /// Episodes that are to be written, in whole shards; none when all are there.
+  /// Episodes to write, in whole shards; none if all shards exist.
   [[nodiscard]] const std::vector<EpisodeRange>& missing() const;
-  /// Shards of an earlier run that stay, and the failed episodes in them.
+  /// Shards kept from an earlier run, and the failed episodes in them.
   [[nodiscard]] std::int64_t kept() const;
   [[nodiscard]] std::int64_t kept_failed() const;
 
@@ -46,8 +46,8 @@ class DatasetWriter : public EpisodeSink {
   /// Paths of the complete shards, kept ones among them, in ascending order.
   [[nodiscard]] std::vector<std::string> shards() const;
   /// Whether the data set is complete and no other process writes into its folder or can do so from
-  /// now on. Of several processes that end at the same time, at least one gets true. This writer
-  /// must not write afterwards; if the data set is not complete, other processes may.
+  /// now on. If several processes end at the same time, at least one gets true. This writer must
+  /// not write afterwards. If the data set is not complete, other processes may.
   [[nodiscard]] bool complete();
   /// Why complete() returned false although all shards exist; else empty.
   [[nodiscard]] const std::string& obstacle() const;

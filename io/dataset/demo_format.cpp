@@ -59,7 +59,7 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
   for (const GradientArray& array : gradients_) {
     const auto from =
         array.shape.begin() +
-        (array.by_row ? 0 : 1);  // one for the episode: its first dimension counts its rows
+        (array.by_row ? 0 : 1);  // one per episode: the array's own first dimension counts its rows
     shapes_.emplace_back(from, array.shape.end());
     types_.push_back(NumberType::float64);
   }

@@ -23,7 +23,7 @@ struct DemoFacts {
   std::vector<double> randomized;  ///< as many as the layout has names
 };
 
-/// The same facts as attributes of the group. all() refers to the facts given and to this object.
+/// The same facts as attributes of the group. all() refers to the given facts and to this object.
 class DemoAttributes {
  public:
   explicit DemoAttributes(const DemoFacts& facts);
@@ -63,7 +63,7 @@ class DemoFormat {
   [[nodiscard]] const ChunkPlan& plan(std::size_t dataset) const {
     return plans_[(dataset - kFirst) % names_.size()];
   }
-  /// The place of an observation in pieces of episodes.
+  /// Index of an observation in pieces of episodes.
   [[nodiscard]] std::size_t source(std::size_t name) const { return sources_[name]; }
   [[nodiscard]] std::size_t source_of_gradient(std::size_t k) const { return gradient_sources_[k]; }
   /// The shape of one row.
@@ -72,16 +72,15 @@ class DemoFormat {
   }
   /// Bytes of all datasets of an uncompressed demo, each rounded up to a multiple of eight.
   [[nodiscard]] std::size_t data_bytes(std::int64_t rows) const;
-  /// Bytes of a demo's description; all demos have the same.
+  /// Bytes of a demo's description, equal for all demos.
   [[nodiscard]] std::size_t header_bytes() const { return header_bytes_; }
 
-  /// The texts that descriptions of demos refer to. A file has them once; empty without
-  /// derivatives.
+  /// Texts that descriptions of demos refer to, stored once per file; empty without derivatives.
   [[nodiscard]] h5::Bytes texts() const;
 
-  /// Appends the description of a demo to what begins at `base` in the file. Returns the address of
-  /// its group. `addresses` are those of the numbers of each dataset, or of the index of its
-  /// chunks. `texts` is the address of texts().
+  /// Appends the description of a demo to bytes that begin at `base` in the file. Returns the
+  /// address of its group. `addresses` has, for each dataset, the address of its numbers or of the
+  /// index of its chunks. `texts` is the address of texts().
   std::uint64_t describe(h5::Bytes& out, std::uint64_t base, const DemoFacts& facts,
                          std::span<const std::uint64_t> addresses, std::uint64_t texts) const;
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// For each batch of demos the file has what its virtual datasets show, then the objects.
+// For each batch of demos, the file has the contents of its virtual datasets first, then the
+// objects.
 #include "io/dataset/demo_links.hpp"
 
 #include <fmt/format.h>
@@ -17,6 +18,8 @@ namespace {
 
 using h5::Bytes;
 
+constexpr std::int64_t kMostRows = 1 << 26;  // of a demo; a claim becomes that many bytes
+
 /// "/data/demo_3/obs/pad".
 std::string path_of(std::int64_t demo, std::string_view group, std::string_view name = {}) {
   return name.empty() ? fmt::format("/data/demo_{}/{}", demo, group)
@@ -33,11 +36,10 @@ bool has_numbers(const DemoArray& array) {
   return std::find(array.shape.begin(), array.shape.end(), 0) == array.shape.end();
 }
 
-/// Observations of a batch of demos one row later, or with one row more, as virtual datasets.
+/// Virtual datasets with the observations of a batch of demos, one row later or with one row more.
 class ShownObservations {
  public:
-  /// `skipped` is how many rows of obs are left out before final_obs follows. Appends what is
-  /// shown.
+  /// `skipped`: rows of obs to leave out before final_obs follows. Appends the contents.
   ShownObservations(Bytes& out, std::uint64_t base, const DemoMembers& members,
                     std::string_view file, std::span<const LinkedDemo> demos, std::uint64_t skipped)
       : out_(out), base_(base), members_(members), skipped_(skipped) {
@@ -50,7 +52,7 @@ class ShownObservations {
     h5::add_texts(out, std::vector<std::string_view>(texts.begin(), texts.end()));
   }
 
-  /// Appends the group of the next demo's. Returns its address.
+  /// Appends the group of the next demo. Returns its address.
   std::uint64_t add(const DemoFacts& facts) {
     std::vector<h5::FileLink> links;
     for (const DemoArray& array : members_.observations) {
@@ -104,7 +106,7 @@ DemoArray array_of(const h5::Id& group, const std::string& name) {
 DemoMembers members_of(const h5::Id& demo) {
   DemoMembers members;
   members.names = h5::link_names(demo);
-  // Virtual datasets of their own are laid out anew.
+  // These virtual datasets are laid out anew for this file.
   members.names.erase(std::remove(members.names.begin(), members.names.end(), "next_obs"),
                       members.names.end());
   for (const std::string& name : members.names)
@@ -121,14 +123,14 @@ DemoMembers members_of(const h5::Id& demo) {
 
 DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
   const auto flag = [&](const char* name) {
-    return h5::read_numbers<std::int64_t>(demo, name).at(0) != 0;
+    return h5::read_number<std::int64_t>(demo, name) != 0;
   };
   DemoFacts facts;
-  facts.rows = h5::read_numbers<std::int64_t>(demo, "num_samples").at(0);
-  if (facts.rows < 1)
-    throw IoError(fmt::format("a demo has {} rows; expected at least 1", facts.rows));
+  facts.rows = h5::read_number<std::int64_t>(demo, "num_samples");
+  if (facts.rows < 1 || facts.rows > kMostRows)
+    throw IoError(fmt::format("a demo has {} rows; expected 1 to {}", facts.rows, kMostRows));
   if (members.of_task) {
-    const double total = h5::read_numbers<double>(demo, "return").at(0);
+    const double total = h5::read_number<double>(demo, "return");
     facts.end = EpisodeEnd{facts.rows, total, flag("terminated"), flag("success")};
   }
   if (members.varies) facts.randomized = h5::read_numbers<double>(demo, "randomized");
@@ -201,7 +203,7 @@ std::vector<h5::FileMember> add_minari_episodes(Bytes& out, std::uint64_t base,
       derivatives.push_back({members.derivatives[k], h5::kNowhere, file, paths[k]});
     const std::uint64_t infos = base + out.size();
     h5::add_group(out,
-                  derivatives);  // empty where there are none: Minari prints no episode without it
+                  derivatives);  // also if empty, because Minari prints no episode without it
     const std::array links{
         h5::FileLink{"actions", h5::kNowhere, file, actions},
         h5::FileLink{"infos", infos},

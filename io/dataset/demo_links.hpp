@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Demos of shards as members of another file: links and virtual datasets, as bytes, for robomimic
-// and for Minari.
+// Makes demos of shards members of another file, with links and virtual datasets as bytes, for
+// robomimic and for Minari.
 #pragma once
 
 #include <cstdint>
@@ -31,12 +31,12 @@ struct DemoMembers {
   bool of_task = false, varies = false;
 };
 
-/// Throws IoError.
+/// Reads the members of a demo. Throws IoError.
 DemoMembers members_of(const h5::Id& demo);
-/// Throws IoError.
+/// Reads the facts of a demo. Throws IoError.
 DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members);
-/// Opens every member, without its numbers. Throws IoError where one is missing, damaged, or of
-/// another shape or type.
+/// Opens every member, but does not read its numbers. Throws IoError if one is missing, damaged, or
+/// of another shape or type.
 void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFacts& facts);
 
 struct LinkedDemo {
@@ -44,15 +44,15 @@ struct LinkedDemo {
   DemoFacts facts;
 };
 
-/// Appends groups demo_<i> to what begins at `base`: attributes and members of the demos of `file`,
-/// given relative to the folder of the file that is written, and next_obs, whose row j is row j + 1
-/// of obs and whose last row is final_obs. Returns the groups.
+/// Appends groups demo_<i> to bytes that begin at `base`: attributes and members of the demos of
+/// `file`, and next_obs, whose row j is row j + 1 of obs and whose last row is final_obs. `file` is
+/// relative to the folder of the file being written. Returns the groups.
 std::vector<h5::FileMember> add_demo_links(h5::Bytes& out, std::uint64_t base,
                                            const DemoMembers& members, std::string_view file,
                                            std::span<const LinkedDemo> demos);
 
-/// The same as groups episode_<j>, j from `first`, as Minari lays them out; derivatives below
-/// infos. `seed`: of the data set.
+/// Does the same with groups episode_<j>, j from `first`, in Minari's layout, with derivatives
+/// below infos. `seed`: seed of the data set.
 std::vector<h5::FileMember> add_minari_episodes(h5::Bytes& out, std::uint64_t base,
                                                 const DemoMembers& members, std::string_view file,
                                                 std::span<const LinkedDemo> demos,

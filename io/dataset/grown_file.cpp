@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The library finds what was appended because it is told where the file ends.
+// The library finds appended bytes because this code updates the end of the file in its header.
 #include "io/dataset/grown_file.hpp"
 
 namespace tangere {
@@ -13,11 +13,6 @@ GrownFile::GrownFile(const std::string& path, bool overwrite, bool views)
     : part_(path, overwrite),
       placed_(part_),
       file_(h5::create_file(part_.path(), kDescriptionBlock, views)) {}
-
-GrownFile::~GrownFile() {
-  // On a full disk the library can only close its file once there is room again.
-  if (file_.get() >= 0) part_.empty();
-}
 
 void GrownFile::close() {
   h5::close_file(file_, part_.path());

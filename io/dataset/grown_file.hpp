@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file that the HDF5 library begins and ends. Its thousands of members are laid out in between.
+// A file that the HDF5 library begins and ends. The thousands of members between are laid out here.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,6 @@ class GrownFile {
   /// Begins `<path>.part`; `views` as for h5::create_file.
   GrownFile(const std::string& path, bool overwrite, bool views);
   /// Leaves nothing behind unless it was committed.
-  ~GrownFile();
   GrownFile(const GrownFile&) = delete;
   GrownFile& operator=(const GrownFile&) = delete;
 
@@ -30,18 +29,18 @@ class GrownFile {
   [[nodiscard]] const std::string& output() const { return part_.output(); }
 
   void close();
-  /// Where the next bytes will be.
+  /// Address of the next bytes.
   [[nodiscard]] std::uint64_t here() const { return here_; }
   void append(const h5::Bytes& bytes);
-  /// Appends a group to which the library may add. The arguments are those of h5::add_large_group.
-  /// Returns its address.
+  /// Appends a group to which the library may add members. The arguments are those of
+  /// h5::add_large_group. Returns its address.
   std::uint64_t append_group(std::string_view prefix, std::vector<h5::FileMember> members,
                              bool root = false);
-  /// `root`: address of the group "/"; if it leads nowhere, the group stays where it was.
+  /// `root`: address of the group "/"; h5::kNowhere leaves the group where it was.
   void open(std::uint64_t root = h5::kNowhere);
 
-  /// Reads back what was appended, calls `last` with the path of the .part, syncs, renames. Returns
-  /// the size in bytes.
+  /// Reads back what was appended, calls `last` with the path of the .part, syncs and renames.
+  /// Returns the size in bytes.
   std::uint64_t commit(const std::function<void(const std::string&)>& last = {});
 
  private:

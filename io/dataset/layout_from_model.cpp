@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Turns what the engine knows of a run into what its file says.
+// Turns what the engine knows of a run into what the files say about it.
 #include <fmt/format.h>
 
 #include <stdexcept>
@@ -41,7 +41,7 @@ SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& des
   return layout;
 }
 
-/// Names and units of what varies.
+/// Fills in the names and units of what varies.
 template <class Layout>
 void describe_randomized(const Scene& scene, Layout& layout) {
   for (const RandomizationDescription& d : scene.randomizations) {

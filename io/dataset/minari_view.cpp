@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Minari wants episodes numbered without gaps, one more observation than actions, and both ends of
-// an episode apart.
+// Minari requires episodes numbered without gaps, one more observation than actions, and the two
+// ways in which an episode ends kept apart.
 #include "io/dataset/minari_view.hpp"
 
 #include <fmt/format.h>
@@ -24,7 +24,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kMinariVersion = "0.5.3";    // the layout that is written here
 constexpr const char* kToFolder = "../../../../";  // from …/minari/tangere/NAME-v0/data
 
-/// Letters, digits, - and _ are what Minari accepts.
+/// Keeps letters, digits, - and _, which are all that Minari accepts.
 std::string dataset_name(std::string name) {
   for (char& c : name) {
     const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
@@ -34,7 +34,7 @@ std::string dataset_name(std::string name) {
   return name.empty() ? "dataset" : name;
 }
 
-/// A number in as many lists as a shape says: all bounds are the same.
+/// Writes a number in nested lists of a given shape, because all bounds are equal.
 std::string nested(const std::vector<std::uint64_t>& shape, std::size_t from,
                    const std::string& number) {
   if (from == shape.size()) return number;
@@ -44,8 +44,8 @@ std::string nested(const std::vector<std::uint64_t>& shape, std::size_t from,
   return text + "]";
 }
 
-/// A Gymnasium Box as Minari reads it: with infinite bounds as bare words, which are Python's and no
-/// JSON library's.
+/// Writes a Gymnasium Box as Minari reads it. Infinite bounds are bare words, which Python reads
+/// but no JSON library writes.
 std::string box(const DemoArray& array, const std::string& low, const std::string& high) {
   return fmt::format(R"({{"type": "Box", "dtype": "{}", "shape": [{}], "low": {}, "high": {}}})",
                      array.type == h5::NumberType::float32 ? "float32" : "float64",
@@ -67,13 +67,20 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
   const std::string task = h5::read_text(scene, "task");
   id_ = fmt::format("tangere/{}-v0",
                     dataset_name(task.starts_with("none") ? h5::read_text(scene, "name") : task));
-  seed_ = h5::read_numbers<std::uint64_t>(scene, "seed").at(0);
+  seed_ = h5::read_number<std::uint64_t>(scene, "seed");
   if (members.of_task) {
-    low_ = bound(h5::read_numbers<double>(scene, "action_low").at(0));
-    high_ = bound(h5::read_numbers<double>(scene, "action_high").at(0));
+    low_ = bound(h5::read_number<double>(scene, "action_low"));
+    high_ = bound(h5::read_number<double>(scene, "action_high"));
   }
   folder_ = (fs::path(folder) / "minari" / id_ / "data").string();
   std::error_code error;
+  // A link on the way would lead the view, and what --overwrite removes, elsewhere.
+  fs::path place = folder;
+  for (const fs::path& part : fs::path("minari") / id_ / "data") {
+    place /= part;
+    if (fs::is_symlink(fs::symlink_status(place, error)))
+      throw IoError(fmt::format("'{}' is a symbolic link; expected a folder", place.string()));
+  }
   fs::create_directories(folder_, error);
   if (error)
     throw IoError(fmt::format("cannot create the folder '{}': {}", folder_, error.message()));

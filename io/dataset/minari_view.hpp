@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A data set as Minari lays it out: links and virtual datasets, no number twice.
+// Lays a data set out for Minari with links and virtual datasets; no number is stored twice.
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,15 @@
 
 namespace tangere {
 
-/// FOLDER/minari/tangere/NAME-v0/data. Everything throws IoError.
+/// The view at FOLDER/minari/tangere/NAME-v0/data. Everything throws IoError.
 class MinariView {
  public:
   /// Begins the view and replaces an existing one. `shard` is any object in one of the folder's
   /// shards. `members` must outlive the view.
   MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members);
 
-  /// Adds demos of a file in the data set's folder, in ascending order. The file is given without
-  /// its path.
+  /// Adds demos of a file in ascending order. `file` is a name in the data set's folder, without
+  /// path.
   void add(std::string_view file, std::span<const LinkedDemo> demos);
   /// Writes what is left, and metadata.json.
   void commit();

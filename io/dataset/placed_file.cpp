@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Neighbours in the file go out in one call, and come back in one.
+// Writes neighbouring bytes in one call, and reads them back in one.
 #include "io/dataset/placed_file.hpp"
 
 #include <fmt/format.h>

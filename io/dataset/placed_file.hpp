@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file that is written in places, in any order, and read back afterwards to compare the disk with
-// what was written.
+// A file that is written at given addresses in any order. It is read back afterwards to compare the
+// disk with what was written.
 #pragma once
 
 #include <sys/uio.h>
@@ -15,7 +15,7 @@
 
 namespace tangere {
 
-/// Rows in the terms of ContentSum.
+/// Rows as ContentSum identifies them.
 struct PlacedRows {
   std::int64_t episode = 0;
   std::size_t name = 0;
@@ -27,20 +27,20 @@ class PlacedFile {
  public:
   explicit PlacedFile(PartFile& part) : part_(part) {}
 
-  /// Adds rows; the caller gives their checksum to expect(). `data` must stay valid until flush().
-  /// Addresses ascend between two calls of flush().
+  /// Adds rows. The caller gives their checksum to expect(). `data` must stay valid until flush().
+  /// Addresses must ascend between two calls of flush().
   void add(std::uint64_t address, const PlacedRows& rows, const void* data);
   void expect(const ContentSum& sum) { expected_.add(sum); }
-  /// Adds bytes without a checksum of their own. They must stay valid until flush() as well.
+  /// Adds bytes without a checksum of their own. They must also stay valid until flush().
   void add(std::uint64_t address, std::span<const unsigned char> bytes);
-  /// Writes what was added; gaps of less than eight bytes become zeros.
+  /// Writes what was added. Gaps of less than eight bytes become zeros.
   void flush();
 
-  /// Writes at once. verify() does not look at these bytes.
+  /// Writes at once. verify() does not check these bytes.
   void write_unchecked(std::uint64_t address, std::span<const unsigned char> bytes);
 
-  /// Tells the library where the file ends and, unless `root` leads nowhere, where its group "/"
-  /// is. verify() does not look at this.
+  /// Tells the library where the file ends and, unless `root` is h5::kNowhere, where its group "/"
+  /// is. verify() does not check this.
   void end_at(std::uint64_t end, std::uint64_t root = h5::kNowhere);
 
   /// Reads back all that was added. Throws IoError when it differs from what was written.

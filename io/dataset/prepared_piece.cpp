@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The numbers that ContentSum gives datasets: 0 actions, then observations, then rewards of tasks,
-// then derivatives.
+// ContentSum numbers the datasets: 0 for actions, then observations, then rewards of tasks, then
+// derivatives.
 #include "io/dataset/prepared_piece.hpp"
 
 #include <algorithm>
@@ -42,8 +42,8 @@ void add_gradient(const DemoFormat& format, const EpisodeRows& piece, int episod
                      reinterpret_cast<const unsigned char*>(all.data() + as_size(episode) * each)};
 }
 
-/// Rows of a dataset as they lie: height × width cells each; a field of points, or one cell for all
-/// of a row.
+/// Layout of a dataset's rows: height × width cells each. A cell is a point of a field, or the
+/// whole row.
 struct Cells {
   std::size_t height = 1, width = 1, bytes = 0;  ///< of a cell
   std::size_t tile_height = 1, tile_width = 1;
@@ -71,7 +71,7 @@ struct Cells {
   }
 };
 
-/// The tile that begins with row r, column c, of each of `rows` rows; what lies outside is zero.
+/// Cuts the tile that begins at row r, column c, from each of `rows` rows. Cells outside are zero.
 void cut_tile(const Cells& cells, const unsigned char* data, std::size_t rows, std::size_t r,
               std::size_t c, std::vector<unsigned char>& out) {
   const std::size_t high = std::min(cells.tile_height, cells.height - r),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The work on a piece of episodes that any thread can do before the one writing thread gets it:
+// Work on a piece of episodes that any thread can do before the single writing thread gets it:
 // checksums and compressed chunks.
 #pragma once
 
@@ -15,24 +15,24 @@ namespace tangere {
 
 /// Rows of one dataset of one episode, as a piece has them.
 struct PieceSlice {
-  PlacedRows rows;         ///< none where the piece has nothing of the dataset
-  std::int64_t first = 0;  ///< row of the dataset that they begin with
+  PlacedRows rows;         ///< none if the piece has nothing of the dataset
+  std::int64_t first = 0;  ///< row of the dataset that comes first
   const unsigned char* data = nullptr;
 };
 
 /// R of an episode of the piece. An episode that failed in its first action has no row. It gets
-/// one, which no reader will see.
+/// one, which no reader sees.
 std::int64_t rows_of_episode(const DatasetLayout& layout, const EpisodeRows& piece, int episode);
 
-/// Of an episode of the piece, per dataset. Rewards only of tasks, dones never: those follow from
-/// R.
+/// Slices of an episode of the piece, per dataset. Only tasks have rewards. Dones have no slice,
+/// because they follow from R.
 std::vector<PieceSlice> slices_of(const DemoFormat& format, const EpisodeRows& piece, int episode,
                                   std::int64_t rows);
 
 struct PreparedChunk {
   int episode = 0;  ///< in the piece
   std::size_t dataset = 0;
-  std::array<std::uint64_t, 3> first{};  ///< row, then where the tile begins
+  std::array<std::uint64_t, 3> first{};  ///< row, then the start of the tile
   std::vector<unsigned char> bytes;
 };
 

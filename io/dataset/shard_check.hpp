@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Whether a shard holds what its writer was given: counts, shapes, and a checksum of every number.
+// Checks whether a shard holds what its writer was given: counts, shapes, a checksum of all
+// numbers.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +10,8 @@
 
 namespace tangere {
 
-/// Order-independent: the sum over rows of a hash of (episode, name, row, bytes), so that rows may
-/// come in any order and be read back in another.
+/// A checksum that does not depend on order: the sum over rows of a hash of (episode, name, row,
+/// bytes). Rows may be written in any order and read back in another.
 class ContentSum {
  public:
   /// `name` numbers the dataset: 0 actions, then the observations. `rows` rows of `row_bytes` each.
@@ -31,18 +32,18 @@ struct ShardContent {
 
 struct ShardReport {
   ShardContent content;
-  std::vector<std::string> problems;  ///< each with the dataset it is about; a hundred at most
+  std::vector<std::string> problems;  ///< each with its dataset; at most a hundred
 };
 
-/// Reads a shard whole and reports all that is wrong with it, including numbers that are not
+/// Reads a whole shard and reports all that is wrong with it, including numbers that are not
 /// finite. A file that cannot be read is a problem in the report, not an exception.
 ShardReport examine_shard(const std::string& path);
 
-/// Reads a shard whole. Throws IoError naming the file and what is missing or differs.
+/// Reads a whole shard. Throws IoError naming the file and what is missing or differs.
 ShardContent check_shard(const std::string& path);
 
-/// Counts all episodes and reads the first and the last one. For a shard whose bytes have been
-/// compared already, this checks that they form a data set. Throws IoError as check_shard().
+/// Counts all episodes and reads the first and the last one. It checks that a shard whose bytes
+/// were compared before forms a data set. Throws IoError like check_shard().
 void sample_shard(const std::string& path);
 
 }  // namespace tangere

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A block has the descriptions of its demos, indexes of chunks if any, then the numbers, demo after
-// demo.
+// A block has the descriptions of its demos, then indexes of chunks if there are any, then the
+// numbers, demo by demo.
 #include "io/dataset/shard_file.hpp"
 
 #include <fmt/format.h>
@@ -39,22 +39,12 @@ ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const
       no_rewards_(static_cast<std::size_t>(layout.rows()), 0.0F),
       dones_(no_rewards_.size(), 0) {
   dones_.back() = 1;
-  try {
-    describe();
-  } catch (...) {
-    part_.empty();
-    throw;
-  }
+  describe();
   texts_ = h5::aligned(part_.size());
   const h5::Bytes texts = format_.texts();
   placed_.add(texts_, texts.all());
   placed_.flush();
   begin_ = free_ = texts_ + texts.size();
-}
-
-ShardFile::~ShardFile() {
-  // On a full disk the library can only close its file once there is room again.
-  if (file_.get() >= 0) part_.empty();
 }
 
 void ShardFile::describe() {
@@ -75,7 +65,7 @@ ShardFile::Block& ShardFile::block_of(const EpisodeRows& rows) {
     demo.facts.rows = rows_of_episode(layout_, rows, e);
     const auto i = static_cast<std::size_t>(e);
     if (!rows.ends.empty()) demo.facts.end = rows.ends[i];
-    // Pieces that no engine made may say nothing of what varied.
+    // Pieces that do not come from the engine may leave out what varied.
     demo.facts.randomized.assign(varied, 0);
     if (!rows.randomized.empty())
       std::copy_n(rows.randomized.begin() + static_cast<std::ptrdiff_t>(i * varied), varied,
@@ -88,7 +78,7 @@ ShardFile::Block& ShardFile::block_of(const EpisodeRows& rows) {
   return block;
 }
 
-/// Demos of a scene are of one size, so the place of a block follows from its number; those of a
+/// Demos of a scene have one size, so the place of a block follows from its number. Blocks of a
 /// task come in ascending order.
 void ShardFile::give_place(Block& block, std::int64_t first_episode) {
   const std::uint64_t of_demo = format_.header_bytes() + format_.data_bytes(layout_.rows());
@@ -135,7 +125,7 @@ void ShardFile::write_slices(Block& block, const EpisodeRows& rows, int episode)
   }
 }
 
-/// Numbers that follow from R; none of the other datasets.
+/// Returns numbers that follow from R; nothing for other datasets.
 std::span<const unsigned char> ShardFile::constant(std::size_t dataset, std::int64_t rows) const {
   const auto count = static_cast<std::size_t>(rows);
   if (dataset == DemoFormat::kDones) return bytes_of(std::span(dones_).last(count));
@@ -150,7 +140,7 @@ void ShardFile::hold(Block& block, std::vector<PreparedChunk>& chunks) {
                std::move(chunk.bytes)};
     held_bytes_ += held.bytes.size();
     if (held_bytes_ >
-        kMostHeld) {  // memory is bounded; where it lies then depends on the order of pieces
+        kMostHeld) {  // bounds the memory; the place then depends on the order of pieces
       held_bytes_ -= held.bytes.size();
       held.place.address = free_;
       placed_.add(free_, held.bytes);
@@ -163,7 +153,7 @@ void ShardFile::hold(Block& block, std::vector<PreparedChunk>& chunks) {
   }
 }
 
-/// The same for rows: where memory is full, all of the dataset gets its place.
+/// Does the same for rows. If memory is full, the whole dataset gets its place.
 void ShardFile::hold(Demo& demo, std::size_t dataset, const PieceSlice& slice) {
   HeldRows& held = demo.held[dataset];
   const std::span<const unsigned char> bytes(
@@ -210,7 +200,7 @@ void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode
   }
 }
 
-/// Everything in the order of the file, in few large writes.
+/// Places everything in the order of the file, in few large writes.
 void ShardFile::give_place_to_held(Block& block) {
   block.base = free_;
   std::size_t indexes = 0;
@@ -269,7 +259,7 @@ void ShardFile::close_block(Block& block, std::int64_t first_episode, const h5::
     const Demo& demo = block.demos[e];
     const std::uint64_t group =
         format_.describe(descriptions, block.base, demo.facts, demo.addresses, texts_);
-    if (demo.failed) continue;  // its bytes stay, nothing leads to them
+    if (demo.failed) continue;  // its bytes stay, but no link leads to them
     members_.push_back({first_episode + static_cast<std::int64_t>(e), group});
     rows_ += demo.facts.rows;
     sum_.add(demo.sum);
@@ -317,15 +307,10 @@ void ShardFile::commit() {
                                        group = out.all().subspan(data - free_);
   placed_.add(free_, members);
   placed_.flush();
-  placed_.write_unchecked(data, group);  // the library will add to it
+  placed_.write_unchecked(data, group);  // the library adds members to it later
   placed_.end_at(free_ + out.size());
-  try {
-    complete_description(data);
-    h5::close_file(file_, part_.path());
-  } catch (...) {
-    part_.empty();
-    throw;
-  }
+  complete_description(data);
+  h5::close_file(file_, part_.path());
   placed_.verify();
   sample_shard(part_.path());
   part_.commit();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One HDF5 file of a data set, whose bytes do not depend on the order in which blocks are finished.
-// The library writes what the file says of the data set; demos, thousands of them, are laid out
-// here.
+// One HDF5 file of a data set. Its bytes do not depend on the order in which blocks finish. The
+// library writes what the file says of the data set; the thousands of demos are laid out here.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +26,6 @@ class ShardFile {
   /// shards of a data set together keep in memory.
   ShardFile(const std::string& path, const DatasetLayout& layout, const DemoFormat& format,
             EpisodeRange range, bool overwrite, std::size_t& held_bytes);
-  ~ShardFile();
   ShardFile(const ShardFile&) = delete;
   ShardFile& operator=(const ShardFile&) = delete;
 
@@ -40,12 +38,14 @@ class ShardFile {
   void commit();
 
  private:
-  /// A chunk is in memory until its block has a place. If memory is full, it is on disk already.
+  /// A chunk stays in memory until its block has a place. If memory is full, it goes to disk at
+  /// once.
   struct Chunk {
     h5::FileChunk place;
     std::vector<unsigned char> bytes;
   };
-  /// Numbers of a contiguous dataset in a block without a place. With an address they are on disk.
+  /// Numbers of a contiguous dataset in a block without a place. If they have an address, they are
+  /// on disk.
   struct HeldRows {
     std::vector<unsigned char> bytes;
     std::uint64_t address = h5::kNowhere;
@@ -66,7 +66,7 @@ class ShardFile {
 
   void describe();
   void complete_description(std::uint64_t data);
-  [[nodiscard]] bool waits() const { return cut_; }  // sizes are known when a block has ended
+  [[nodiscard]] bool waits() const { return cut_; }  // sizes are known when a block ends
   Block& block_of(const EpisodeRows& rows);
   void give_place(Block& block, std::int64_t first_episode);
   void write_slices(Block& block, const EpisodeRows& rows, int episode);
@@ -82,21 +82,21 @@ class ShardFile {
   const DatasetLayout& layout_;
   const DemoFormat& format_;
   std::int64_t first_episode_, end_, unfinished_,
-      next_;                 // blocks that are unfinished; the first one without a place
+      next_;                 // unfinished blocks; the first one without a place
   bool cut_;                 // into chunks
   std::size_t& held_bytes_;  // of chunks and rows, of all shards
   PartFile part_;
   PlacedFile placed_;
   h5::Id file_;
-  std::uint64_t texts_ = 0, begin_ = 0;   // of what demos refer to; of the blocks
-  std::uint64_t free_ = 0;                // behind the last byte that is taken
+  std::uint64_t texts_ = 0, begin_ = 0;   // addresses of the texts of demos and of the first block
+  std::uint64_t free_ = 0;                // address behind the last used byte
   std::map<std::int64_t, Block> blocks_;  // by their first episode
   std::vector<float> no_rewards_;
   std::vector<std::int8_t> dones_;
   std::vector<h5::FileMember> members_;
   std::vector<FailedEpisode> failures_;
   std::map<std::int64_t, std::vector<double>> randomized_of_failures_;  // by episode
-  std::int64_t rows_ = 0;  // of demos, failed ones left out
+  std::int64_t rows_ = 0;  // in demos, without failed ones
   ContentSum sum_;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A strict reader: whatever is not a number where one belongs is an error with its place, never a
-// zero.
+// A strict reader: if a field is not a number where one is expected, that is an error with its
+// place.
 #include "io/files/csv.hpp"
 
 #include <fmt/format.h>
@@ -8,20 +8,20 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <string_view>
 #include <utility>
 
 #include "engine/base/error.hpp"
+#include "io/files/text_file.hpp"
 
 namespace tangere {
 namespace {
 
-// Longer lines do not belong to tables of controls, and a device that never ends a line must not
-// fill the memory.
+// Longer lines do not occur in tables of controls. The limit also keeps a device that never ends a
+// line from filling the memory.
 constexpr std::streamsize kLongestLine = 1 << 20;
-constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // spreadsheets begin a file with it
+constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // spreadsheets write it first
 
 std::string_view trim(std::string_view text) {
   constexpr std::string_view kBlank = " \t\r";
@@ -41,8 +41,8 @@ std::vector<std::string_view> split(std::string_view line) {
   return fields;
 }
 
-/// A word begins with a letter, an underscore or a quote and is not a number ("nan" and "inf" are
-/// numbers).
+/// A word begins with a letter, an underscore or a quote and is not a number. "nan" and "inf" are
+/// numbers.
 bool is_word(std::string_view field) {
   double number = 0;
   if (field.empty() ||
@@ -87,9 +87,7 @@ void check_header(const std::vector<std::string_view>& header, std::span<const s
 
 std::vector<std::vector<double>> read_csv(const std::string& path, std::size_t columns,
                                           std::span<const std::string> names) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored))
-    throw IoError(path + ": is a folder; expected a csv file");
+  require_regular_file(path, "a csv file");
   std::ifstream file(path);
   if (!file) throw IoError(path + ": cannot be opened for reading");
 

@@ -8,7 +8,7 @@
 
 namespace tangere {
 
-/// How often to request a lock that others hold, and what to do in between.
+/// How often to retry a lock that others hold, and what to do in between.
 struct LockPatience {
   int tries = 1;
   std::function<void()> pause = {};
@@ -28,8 +28,8 @@ class FolderLock {
   FolderLock& operator=(const FolderLock&) = delete;
 
   /// Returns whether the lock is held now. If others hold it, this object holds none, not even its
-  /// former one. Returns true on file systems without locks; there the .part of each file keeps
-  /// writers apart where that is possible.
+  /// former one. Returns true on file systems without locks; the .part of each file then keeps
+  /// writers apart as far as possible.
   [[nodiscard]] bool take(Kind kind, const LockPatience& patience = {});
   void let_go();
 

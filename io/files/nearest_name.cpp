@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edit distance, ignoring case.
+// Uses the edit distance, ignoring case.
 #include "io/files/nearest_name.hpp"
 
 #include <algorithm>

@@ -8,11 +8,11 @@
 
 namespace tangere {
 
-/// The candidate with the smallest edit distance; "" when none is near (more than about half of it
-/// would change).
+/// Returns the candidate with the smallest edit distance; "" if none is near (more than about half
+/// of the word would change).
 std::string nearest_name(std::string_view wrong, std::span<const std::string> candidates);
 
-/// "; did you mean 'x'?" or "; expected one of a, b, c" or "" when there are no candidates.
+/// Returns "; did you mean 'x'?" or "; expected one of a, b, c", or "" if there are no candidates.
 std::string suggestion(std::string_view wrong, std::span<const std::string> candidates);
 
 }  // namespace tangere

@@ -207,10 +207,6 @@ std::uint64_t PartFile::size() const {
   return static_cast<std::uint64_t>(info.st_size);
 }
 
-void PartFile::empty() noexcept {
-  if (ftruncate(descriptor_, 0) != 0) return;  // the destructor still removes it
-}
-
 void PartFile::commit() {
   if (fsync(descriptor_) != 0) fail("flush", path_, errno);
   const int error = rename_to(path_, output_, overwrite_);

@@ -35,8 +35,6 @@ class PartFile {
   /// Throws IoError if the file ends before.
   void read_at(std::uint64_t offset, std::span<unsigned char> bytes) const;
   [[nodiscard]] std::uint64_t size() const;
-  /// Gives the space back at once, so that a library can close its file on a disk that is full.
-  void empty() noexcept;
   /// Forces the bytes to the disk and renames the .part to the output. Throws IoError.
   void commit();
 

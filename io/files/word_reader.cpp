@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "engine/base/error.hpp"
+#include "io/files/text_file.hpp"
 
 namespace tangere {
 namespace {
@@ -21,7 +22,7 @@ constexpr double kLargestPosition = 1e6;  // [file's unit]
 double parse(std::string_view word) {
   double x = 0;
   if (word.size() > 1 && word[0] == '+' && word[1] != '-')
-    word.remove_prefix(1);  // the library knows no plus sign
+    word.remove_prefix(1);  // the library does not accept a plus sign
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), x);
   return error == std::errc() && end == word.data() + word.size() ? x : NAN;
 }
@@ -30,8 +31,7 @@ double parse(std::string_view word) {
 
 WordReader::WordReader(const std::string& path) : path_(path) {
   std::error_code error;
-  if (std::filesystem::is_directory(path, error))
-    throw IoError(path + ": is a folder; expected a file");
+  require_regular_file(path, "a surface or a list of points");
   file_.open(path, std::ios::binary);
   if (!file_) throw IoError(path + ": cannot be opened for reading");
   if (std::filesystem::file_size(path, error) > kLargestFile && !error)

@@ -15,19 +15,20 @@ class WordReader {
   /// Throws IoError if the file cannot be opened, InputError if it is larger than 256 MiB.
   explicit WordReader(const std::string& path);
 
-  /// The next line that has words; false at the end. A word that starts with # ends its line.
+  /// Moves to the next line that has words. Returns false at the end. A word that starts with #
+  /// ends its line.
   bool next();
   /// Throws InputError with file and line.
   [[noreturn]] void fail(const std::string& message) const;
 
-  /// Word k of the line as a finite number; as a number of at most a million, beyond which no
-  /// simulation is accurate; as a whole number, where `expected` says what is wanted. They fail
-  /// otherwise.
+  /// These return word k of the line: as a finite number; as a position, at most a million because
+  /// no simulation is accurate beyond that; as a whole number, where `expected` says what is
+  /// wanted. They fail if the word is something else.
   [[nodiscard]] double number(std::size_t k) const;
   [[nodiscard]] double position(std::size_t k) const;
   [[nodiscard]] long integer(std::string_view word, const char* expected) const;
 
-  std::vector<std::string_view> words;  ///< of the line, valid until the next
+  std::vector<std::string_view> words;  ///< of the line, valid until next()
 
  private:
   std::string path_, line_;

@@ -4,10 +4,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
 #include <utility>
 
 #include "engine/base/error.hpp"
+#include "io/files/text_file.hpp"
+#include "io/hdf5/h5_driver.hpp"
 #include "io/hdf5/h5_lz4.hpp"
+#include "io/hdf5/reading_note.hpp"
 
 namespace tangere::h5 {
 namespace {
@@ -58,6 +64,73 @@ std::string file_of(hid_t object) {
   }
   throw IoError(
       fmt::format("cannot {} '{}' in '{}': {}", operation, where, file_of(object.get()), reason));
+}
+
+/// The library takes bytes that it cannot write yet, and its driver those that the disk refuses.
+void check_written(const Id& object) {
+  if (!any_write_failure()) return;
+  const Id file(H5Iget_file_id(object.get()));
+  if (const auto failure = write_failure(file.get()); failure != nullptr && failure->error != 0)
+    fail("write", object, {}, std::strerror(failure->error));
+}
+
+/// Whether a file may lead to another: to one beside it ("shard-00001.h5"), and Minari's view in
+/// DATASET/minari/tangere/NAME/data to one of the data set ("../../../../shard-00001.h5").
+bool may_lead_to(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (to.empty() || to.is_absolute() || to.filename() == "..") return false;
+  std::filesystem::path up;
+  const std::filesystem::path view = from.parent_path().parent_path().parent_path().parent_path();
+  if (from.filename() == "main_data.hdf5" && view.filename() == "minari") up = "../../../..";
+  return to.parent_path().empty() || (!up.empty() && to.parent_path() == up);
+}
+
+/// What the library asks before it follows a link to another file; a negative answer refuses.
+herr_t allow_link(const char* from, const char*, const char* to, const char*, unsigned*, hid_t,
+                  void*) {
+  return may_lead_to(from, to) ? 0 : -1;
+}
+
+/// Refuses numbers that lie outside HDF5 files, views of other folders and views of themselves.
+void check_source(const Id& dataset, const Id& parent, const std::string& name) {
+  if (H5Dget_offset(dataset.get()) != HADDR_UNDEF) return;  // one piece of this file
+  const Id creation(H5Dget_create_plist(dataset.get()));
+  if (H5Pget_external_count(creation.get()) > 0)
+    fail("open dataset", parent, name, "its numbers lie in another file, which is not HDF5");
+  if (H5Pget_layout(creation.get()) != H5D_VIRTUAL) return;
+  std::size_t views = 0;
+  H5Pget_virtual_count(creation.get(), &views);
+  const std::string own = name_of(dataset.get());
+  for (std::size_t k = 0; k < views; ++k) {
+    const auto text = [&](auto get) {
+      const ssize_t size = get(creation.get(), k, nullptr, std::size_t{0});
+      std::string value(static_cast<std::size_t>(std::max<ssize_t>(size, 0)) + 1, '\0');
+      get(creation.get(), k, value.data(), value.size());
+      value.pop_back();
+      return value;
+    };
+    const std::string file = text(H5Pget_virtual_filename);
+    if (!may_lead_to(file_of(dataset.get()), file))
+      fail("open dataset", parent, name, fmt::format("it shows '{}', in another folder", file));
+    if (file == "." && text(H5Pget_virtual_dsetname) == own)
+      fail("open dataset", parent, name, "it shows itself");
+  }
+}
+
+/// Of a chunk when it is unpacked; 0 if the dataset has none.
+std::uint64_t chunk_bytes(const Id& dataset) {
+  if (H5Dget_offset(dataset.get()) != HADDR_UNDEF) return 0;
+  const Id creation(H5Dget_create_plist(dataset.get()));
+  if (H5Pget_layout(creation.get()) != H5D_CHUNKED) return 0;
+  hsize_t sides[H5S_MAX_RANK];
+  const int rank = H5Pget_chunk(creation.get(), H5S_MAX_RANK, sides);
+  const Id type(H5Dget_type(dataset.get()));
+  std::uint64_t bytes = H5Tget_size(type.get());
+  for (int i = 0; i < rank; ++i) bytes *= sides[i];
+  return bytes;
+}
+
+std::string open_reason() {
+  return last_open_error() != 0 ? std::strerror(last_open_error()) : last_reason();
 }
 
 template <class T>
@@ -114,6 +187,7 @@ void store(const Id& object, const std::string& name, hid_t disk, hid_t memory, 
   if (attribute.get() < 0) fail("create attribute", object, name);
   if (H5Sget_simple_extent_npoints(space.get()) == 0) return;
   if (H5Awrite(attribute.get(), memory, data) < 0) fail("write attribute", object, name);
+  check_written(object);
 }
 
 Id list_space(std::size_t size) {
@@ -141,8 +215,9 @@ struct Box {
 struct OpenAttribute {
   Id attribute, space, type;
   std::size_t elements = 0;
-  OpenAttribute(const Id& object, const std::string& name)
-      : attribute(H5Aopen(object.get(), name.c_str(), H5P_DEFAULT)) {
+  OpenAttribute(const Id& object, const std::string& name) {
+    note_object(name);
+    attribute = Id(H5Aopen(object.get(), name.c_str(), H5P_DEFAULT));
     if (attribute.get() < 0) fail("read attribute", object, name);
     space = Id(H5Aget_space(attribute.get()));
     type = Id(H5Aget_type(attribute.get()));
@@ -155,6 +230,12 @@ struct OpenAttribute {
 };
 
 }  // namespace
+
+Id link_access(hid_t kind) {
+  Id access(H5Pcreate(kind));
+  H5Pset_elink_cb(access.get(), allow_link, nullptr);
+  return access;
+}
 
 Quiet::Quiet() {
   // Otherwise the library would try again, and complain, at the end of the program about a file
@@ -184,8 +265,9 @@ Id create_file(const std::string& path, hsize_t description_block, bool views) {
   H5Pset_meta_block_size(access.get(), description_block);
   H5Pset_file_locking(access.get(), false, true);  // io/files/part_file.hpp holds the lock
   const Id creation = without_times(H5P_FILE_CREATE);
+  use_checked_driver(access.get());
   Id file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()));
-  if (file.get() < 0) throw IoError(fmt::format("cannot create '{}': {}", path, last_reason()));
+  if (file.get() < 0) throw IoError(fmt::format("cannot create '{}': {}", path, open_reason()));
   return file;
 }
 
@@ -204,6 +286,8 @@ Id create_memory_file() {
 
 Id open_file(const std::string& path, bool forget) {
   const Quiet quiet;
+  note_file(path);
+  require_regular_file(path, "an HDF5 file");
   allow_lz4();
   const Id access(H5Pcreate(H5P_FILE_ACCESS));
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
@@ -220,8 +304,9 @@ Id change_file(const std::string& path) {
   H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
   H5Pset_file_locking(access.get(), false, true);
+  use_checked_driver(access.get());
   Id file(H5Fopen(path.c_str(), H5F_ACC_RDWR, access.get()));
-  if (file.get() < 0) throw IoError(fmt::format("cannot write into '{}': {}", path, last_reason()));
+  if (file.get() < 0) throw IoError(fmt::format("cannot write into '{}': {}", path, open_reason()));
   return file;
 }
 
@@ -235,11 +320,13 @@ void link_object(const Id& parent, const std::string& name, std::uint64_t addres
 
 void close_file(Id& file, const std::string& path) {
   const Quiet quiet;
-  if (H5Fflush(file.get(), H5F_SCOPE_GLOBAL) < 0)
-    throw IoError(fmt::format("cannot write '{}': {}", path, last_reason()));
-  if (H5Fclose(file.get()) < 0)
-    throw IoError(fmt::format("cannot close '{}': {}", path, last_reason()));
-  file.release();
+  const auto failure = write_failure(file.get());
+  std::string reason;
+  if (H5Fflush(file.get(), H5F_SCOPE_GLOBAL) < 0) reason = last_reason();
+  if (H5Fclose(file.get()) < 0 && reason.empty()) reason = last_reason();
+  file.release();  // also where closing failed: a second try would find a file half closed
+  if (failure != nullptr && failure->error != 0) reason = std::strerror(failure->error);
+  if (!reason.empty()) throw IoError(fmt::format("cannot write '{}': {}", path, reason));
 }
 
 Id create_group(const Id& parent, const std::string& name) {
@@ -252,7 +339,9 @@ Id create_group(const Id& parent, const std::string& name) {
 
 Id open_group(const Id& parent, const std::string& name) {
   const Quiet quiet;
-  Id group(H5Gopen2(parent.get(), name.c_str(), H5P_DEFAULT));
+  note_object(name);
+  const Id access = link_access(H5P_GROUP_ACCESS);
+  Id group(H5Gopen2(parent.get(), name.c_str(), access.get()));
   if (group.get() < 0) fail("open group", parent, name);
   return group;
 }
@@ -299,12 +388,16 @@ void create_flags(const Id& parent, const std::string& name, std::span<const std
   if (dataset.get() < 0) fail("create dataset", parent, name);
   if (H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, flags.data()) < 0)
     fail("write", dataset);
+  check_written(dataset);
 }
 
 Id open_dataset(const Id& parent, const std::string& name) {
   const Quiet quiet;
-  Id dataset(H5Dopen2(parent.get(), name.c_str(), H5P_DEFAULT));
+  note_object(name);
+  const Id access = link_access(H5P_DATASET_ACCESS);
+  Id dataset(H5Dopen2(parent.get(), name.c_str(), access.get()));
   if (dataset.get() < 0) fail("open dataset", parent, name);
+  check_source(dataset, parent, name);
   return dataset;
 }
 
@@ -315,6 +408,14 @@ Dims dimensions(const Id& dataset) {
   if (rank < 0) fail("read the shape of", dataset);
   Dims dims(static_cast<std::size_t>(rank));
   if (rank > 0) H5Sget_simple_extent_dims(space.get(), dims.data(), nullptr);
+  // Who multiplies these may rely on the product.
+  constexpr hsize_t kMost = hsize_t{1} << 48;
+  hsize_t numbers = 1;
+  for (const hsize_t size : dims) {
+    if (size != 0 && numbers > kMost / size)
+      fail("read the shape of", dataset, {}, "it claims more numbers than any file holds");
+    if (size != 0) numbers *= size;  // a list of nothing may still claim wide rows
+  }
   return dims;
 }
 
@@ -325,12 +426,14 @@ void write_box(const Id& dataset, const Dims& offset, const Dims& count, const T
   if (H5Dwrite(dataset.get(), Types<T>::memory(), box.memory.get(), box.disk.get(), H5P_DEFAULT,
                data) < 0)
     fail("write", dataset);
+  check_written(dataset);
 }
 
 template <class T>
 void read_box(const Id& dataset, const Dims& offset, const Dims& count, T* data) {
   const Quiet quiet;
   const Box box(dataset, offset, count);
+  const ExpectedChunk chunk(chunk_bytes(dataset));
   if (H5Dread(dataset.get(), Types<T>::memory(), box.memory.get(), box.disk.get(), H5P_DEFAULT,
               data) < 0)
     fail("read", dataset);
@@ -410,13 +513,25 @@ std::vector<T> read_numbers(const Id& object, const std::string& name) {
   return values;
 }
 
+template <class T>
+T read_number(const Id& object, const std::string& name) {
+  const std::vector<T> values = read_numbers<T>(object, name);
+  if (values.size() != 1) {
+    const Quiet quiet;
+    fail("read attribute", object, name,
+         fmt::format("expected one number; found {}", values.size()));
+  }
+  return values[0];
+}
+
 #define TANGERE_H5_TYPE(T)                                                                   \
   template Id create_dataset<T>(const Id&, const std::string&, const Dims&, const Storage&); \
   template void write_box<T>(const Id&, const Dims&, const Dims&, const T*);                 \
   template void read_box<T>(const Id&, const Dims&, const Dims&, T*);                        \
   template void write_scalar<T>(const Id&, const std::string&, T);                           \
   template void write_list<T>(const Id&, const std::string&, std::span<const T>);            \
-  template std::vector<T> read_numbers<T>(const Id&, const std::string&);
+  template std::vector<T> read_numbers<T>(const Id&, const std::string&);                    \
+  template T read_number<T>(const Id&, const std::string&);
 TANGERE_H5_TYPE(double)
 TANGERE_H5_TYPE(float)
 TANGERE_H5_TYPE(std::int8_t)

@@ -33,7 +33,7 @@ class Id {
   ~Id() { reset(); }
 
   [[nodiscard]] hid_t get() const { return id_; }
-  /// Closes and ignores failures, because only cleaning up calls it. To keep data, use close_file.
+  /// Closes. What a file's last bytes failed of, close_file says.
   void reset() noexcept;
   /// Forgets an identifier that was closed elsewhere.
   void release() noexcept { id_ = -1; }
@@ -55,6 +55,10 @@ class Quiet {
   void* data_ = nullptr;
 };
 
+/// Properties of a class of access (H5P_GROUP_ACCESS …) with which links are followed to files of
+/// the same folder and no further.
+Id link_access(hid_t kind);
+
 using Dims = std::vector<hsize_t>;
 
 /// Creates a file, replacing what is at `path`. Readable by HDF5 1.8 and later; two runs that write
@@ -64,14 +68,17 @@ using Dims = std::vector<hsize_t>;
 Id create_file(const std::string& path, hsize_t description_block = 2048, bool views = false);
 /// A file that is never on disk.
 Id create_memory_file();
-/// Opens a file for reading. With `forget` the library does not keep descriptions of closed
+/// Opens a regular file for reading; other kinds (devices, FIFOs, folders) are refused. What it
+/// leads to in other files has to lie in its own folder: links and views elsewhere cannot be
+/// opened, and raw data outside HDF5 files neither. With `forget` the library does not keep descriptions of closed
 /// objects, because searching tens of thousands of them is slow.
 Id open_file(const std::string& path, bool forget = false);
 /// Opens a file for reading and writing, as create_file left it.
 Id change_file(const std::string& path);
 /// Gives a name to the object at an address of the file.
 void link_object(const Id& parent, const std::string& name, std::uint64_t address);
-/// Flushes and closes a file; unlike Id::reset, it reports what could not be written.
+/// Flushes and closes a file, and throws if any byte since it was opened could not be written. The
+/// file is closed in any case.
 void close_file(Id& file, const std::string& path);
 
 Id create_group(const Id& parent, const std::string& name);
@@ -115,5 +122,8 @@ void write_list(const Id& object, const std::string& name, std::span<const T> va
 /// The elements of a numeric attribute, whatever its rank (a scalar gives one).
 template <class T>
 [[nodiscard]] std::vector<T> read_numbers(const Id& object, const std::string& name);
+/// A numeric attribute of one element.
+template <class T>
+[[nodiscard]] T read_number(const Id& object, const std::string& name);
 
 }  // namespace tangere::h5

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// External links, virtual datasets, copies.
+// Makes external links and virtual datasets, and copies groups.
 #include "io/hdf5/h5_links.hpp"
 
 #include <fmt/format.h>

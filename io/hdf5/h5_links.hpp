@@ -10,21 +10,21 @@
 
 namespace tangere::h5 {
 
-/// `file`: relative to the folder of the file that the link is in. Opening the link fails if that
+/// `file` is relative to the folder of the file that holds the link. Opening the link fails if that
 /// file is missing.
 void link_external(const Id& group, const std::string& name, const std::string& file,
                    const std::string& path);
 
-/// Copies a group and all below it, from one file to another, under another name.
+/// Copies a group and everything below it to another file under another name.
 void copy_group(const Id& from, const std::string& name, const Id& to, const std::string& as);
 
 /// A whole dataset of another file.
 struct Source {
-  std::string file;  ///< as for link_external; ".": the one with the virtual dataset
+  std::string file;  ///< as for link_external; ".": the file of the virtual dataset itself
   std::string path;
 };
-/// Shows `first` without its first `skipped` rows, followed by the one row of `last`, as one
-/// dataset. `like` is the open dataset that `first` names. Reading gives NaN where a file is
+/// Makes one dataset that shows `first` without its first `skipped` rows, followed by the one row
+/// of `last`. `like` is the open dataset that `first` names. Reading gives NaN if a file is
 /// missing.
 void create_virtual(const Id& group, const std::string& name, const Id& like, const Source& first,
                     const Source& last, hsize_t skipped = 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Iterates by name, so that two files of the same content are listed alike.
+// Iterates by name, so that files with the same content give the same list.
 #include "io/hdf5/h5_listing.hpp"
 
 #include <fmt/format.h>
@@ -71,7 +71,8 @@ std::string attribute_text(const Id& object, const std::string& name) {
 
 bool is_dataset(const Id& parent, const std::string& name) {
   const Quiet quiet;
-  const Id object(H5Oopen(parent.get(), name.c_str(), H5P_DEFAULT));
+  const Id access = link_access(H5P_LINK_ACCESS);
+  const Id object(H5Oopen(parent.get(), name.c_str(), access.get()));
   return object.get() >= 0 && H5Iget_type(object.get()) == H5I_DATASET;
 }
 

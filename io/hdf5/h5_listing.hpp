@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lists what is in a file that is not known beforehand: names of links and attributes, values as
-// text.
+// Lists the contents of an unknown file: names of links and attributes, values as text.
 #pragma once
 
 #include <string>
@@ -15,7 +14,8 @@ std::vector<std::string> link_names(const Id& group);
 std::size_t link_count(const Id& group);
 /// Names of an object's attributes, sorted. Throws IoError.
 std::vector<std::string> attribute_names(const Id& object);
-/// Elements separated by ", "; numbers in the fewest digits that give them back. Throws IoError.
+/// Returns elements separated by ", ", numbers in the fewest digits that give them back. Throws
+/// IoError.
 std::string attribute_text(const Id& object, const std::string& name);
 /// Whether a link leads to a dataset, not to a group.
 [[nodiscard]] bool is_dataset(const Id& parent, const std::string& name);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The format of the HDF Group's LZ4 plug-in: u64 size of all, u32 size of a block, then each
-// block's u32 size and bytes; all big-endian. A block as large as it is decompressed is not
+// The format of the HDF Group's LZ4 plug-in: u64 size of the data, u32 size of a block, then u32
+// size and bytes of each block, all big-endian. A block as large as its decompressed data is not
 // compressed.
 #include "io/hdf5/h5_lz4.hpp"
 
@@ -17,13 +17,16 @@ namespace tangere::h5 {
 namespace {
 
 constexpr std::uint64_t kMostBytes = std::uint64_t{1}
-                                     << 32;  // of a chunk, whatever a damaged file says
+                                     << 32;  // of a chunk, even if a damaged file says more
 
 std::uint64_t big_endian(const unsigned char* from, std::size_t bytes) {
   std::uint64_t value = 0;
   for (std::size_t k = 0; k < bytes; ++k) value = value << 8 | from[k];
   return value;
 }
+
+/// 0: unknown.
+thread_local std::uint64_t expected_bytes = 0;
 
 /// Decompresses `in` into `out`. Returns false if it is damaged.
 bool decompress(const unsigned char* in, std::size_t size, unsigned char* out, std::uint64_t total,
@@ -49,7 +52,8 @@ bool decompress(const unsigned char* in, std::size_t size, unsigned char* out, s
   return true;
 }
 
-/// The function that H5Z calls; 0 is failure. It only reads, because our own threads write chunks.
+/// The function that H5Z calls. Returns 0 on failure. It only decompresses, because our own threads
+/// write chunks.
 std::size_t filter(unsigned flags, std::size_t, const unsigned*, std::size_t size,
                    std::size_t* room, void** buffer) {
   constexpr std::size_t kHead = 12, kTotal = 8;
@@ -58,6 +62,7 @@ std::size_t filter(unsigned flags, std::size_t, const unsigned*, std::size_t siz
   const std::uint64_t total = big_endian(in, kTotal),
                       block = big_endian(in + kTotal, kHead - kTotal);
   if (total == 0 || total > kMostBytes || block == 0) return 0;
+  if (expected_bytes != 0 && total != expected_bytes) return 0;  // the library would read on
   void* const out = H5allocate_memory(total, false);
   if (out == nullptr) return 0;
   if (!decompress(in + kHead, size - kHead, static_cast<unsigned char*>(out), total, block)) {
@@ -72,12 +77,14 @@ std::size_t filter(unsigned flags, std::size_t, const unsigned*, std::size_t siz
 
 }  // namespace
 
+ExpectedChunk::ExpectedChunk(std::uint64_t bytes) { expected_bytes = bytes; }
+ExpectedChunk::~ExpectedChunk() { expected_bytes = 0; }
+
 void allow_lz4() {
   static const H5Z_class2_t kind{H5Z_CLASS_T_VERS, kLz4Filter, 0,     1, "lz4",
                                  nullptr,          nullptr,    filter};
   static const herr_t registered = H5Zregister(&kind);
-  static_cast<void>(
-      registered);  // refused: files with such chunks cannot be read, and the error says so
+  static_cast<void>(registered);  // if refused, such chunks cannot be read, and the error says so
 }
 
 }  // namespace tangere::h5

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Version 2 object headers: "OHDR", messages, checksum.
+// Writes version 2 object headers: "OHDR", messages, checksum.
 #include "io/hdf5/h5_objects.hpp"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ class Header {
  public:
   explicit Header(Bytes& out) : out_(out), begin_(out.size()) {}
 
-  /// One message; `body` appends it.
+  /// Adds one message; `body` appends its content.
   template <class Body>
   void message(Message type, const Body& body) {
     scratch_.clear();
@@ -81,7 +81,7 @@ void add_integer(Bytes& out, std::uint32_t size, bool is_signed = true) {
   out.number(static_cast<std::uint16_t>(8 * size));
 }
 
-/// `exponent`: its number of bits; the rest but the sign are the mantissa.
+/// `exponent`: bits of the exponent. The rest except the sign is the mantissa.
 void add_float(Bytes& out, std::uint32_t size, std::uint8_t exponent) {
   constexpr std::uint8_t kClass = 0x11, kLeadingOneImplied = 0x20;
   const auto bits = static_cast<std::uint16_t>(8 * size);
@@ -100,7 +100,7 @@ void add_float(Bytes& out, std::uint32_t size, std::uint8_t exponent) {
   out.number((std::uint32_t{1} << (exponent - 1)) - 1);
 }
 
-/// h5py's: an enumeration FALSE = 0, TRUE = 1 of one byte.
+/// h5py's boolean: an enumeration FALSE = 0, TRUE = 1 of one byte.
 void add_boolean(Bytes& out) {
   constexpr std::uint8_t kClass = 0x18;
   out.number(kClass);
@@ -134,7 +134,7 @@ void add_layout(Bytes& out, const FileDataset& dataset) {
     out.number(kVersionOfViews);
     out.number(kView);
     out.number(dataset.view->texts);
-    out.number(dataset.view->number + 1);  // 0 is what is free
+    out.number(dataset.view->number + 1);  // 0 stands for free space
     return;
   }
   out.number(kVersion);
@@ -153,7 +153,7 @@ void add_layout(Bytes& out, const FileDataset& dataset) {
   out.number(static_cast<std::uint32_t>(bytes_of(dataset.type)));
 }
 
-/// The value of elements that were not stored.
+/// Adds the value of elements that are not stored.
 void add_fill(Bytes& out, const FileDataset& dataset) {
   constexpr std::uint8_t kVersion = 3, kEarly = 1, kLate = 2, kIncremental = 3,
                          kNeverFilled = 1 << 2, kFilledIfSet = 2 << 2;
@@ -196,7 +196,7 @@ void add_link(Bytes& out, const FileLink& link) {
   if (link.name.size() > UINT8_MAX) throw std::logic_error("a name above 255 bytes in a file");
   const bool external = !link.file.empty();
   out.number(kVersion);
-  // Otherwise a hard link; a length of one byte, no order of creation.
+  // Without a type it is a hard link. Names have one byte for their length; no order of creation.
   out.number<std::uint8_t>(external ? kCharacterSet | kTypeFollows : kCharacterSet);
   if (external) out.number(kExternal);
   out.number(kUtf8);
@@ -214,7 +214,7 @@ void add_link(Bytes& out, const FileLink& link) {
   }
 }
 
-/// A text of any length in UTF-8 is stored elsewhere; its place holds the address.
+/// Adds the type of UTF-8 text of any length. The text lies elsewhere; the value holds its address.
 void add_text_type(Bytes& out) {
   constexpr std::uint8_t kClass = 0x19, kText = 1, kUtf8 = 1;
   out.number(kClass);
@@ -225,7 +225,7 @@ void add_text_type(Bytes& out) {
   add_integer(out, 1, false);
 }
 
-/// `type`, `space`: messages.
+/// `type`, `space`: encoded messages.
 void add_attribute(Bytes& out, std::string_view name, const Bytes& type, const Bytes& space,
                    std::span<const unsigned char> values) {
   constexpr std::uint8_t kVersion = 3, kNotShared = 0, kUtf8 = 1;
@@ -256,11 +256,11 @@ void add_attribute(Bytes& out, const FileText& text) {
   add_dataspace(space, {}, true);
   place.number(text.bytes);
   place.number(text.texts);
-  place.number(text.number + 1);  // 0 is what is free
+  place.number(text.number + 1);  // 0 stands for free space
   add_attribute(out, text.name, type, space, place.all());
 }
 
-/// Without this message the library finds attributes by name but counts none.
+/// Without this message the library finds attributes by name but counts none of them.
 void add_attribute_info(Header& header) {
   header.message(kAttributeInfo, [](Bytes& to) {
     to.number<std::uint16_t>(0);  // version, flags
@@ -327,8 +327,8 @@ std::size_t bytes_of(NumberType type) {
   return 0;
 }
 
-/// A global heap collection, in which every object has a head of 16 bytes, the free rest among
-/// them.
+/// Writes a global heap collection. Every object in it has a head of 16 bytes, and so does the free
+/// rest.
 void add_texts(Bytes& out, std::span<const std::string_view> texts) {
   constexpr std::uint8_t kVersion = 1;
   constexpr std::size_t kHead = 16, kLeast = 4096;
@@ -339,7 +339,7 @@ void add_texts(Bytes& out, std::span<const std::string_view> texts) {
   std::uint16_t index = 0;
   for (const std::string_view text : texts) {
     objects.number(++index);
-    objects.zeros(6);  // no count of references
+    objects.zeros(6);  // no reference count
     objects.number<std::uint64_t>(text.size());
     objects.text(text);
     objects.align();

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Objects of HDF5 files as bytes, made without the library and by any thread. The library takes 17
-// µs per object on one thread, 0.2 ms for an episode that takes 0.86 ms of one core to simulate
-// (docs/datasets.md). Formats: HDF5 File Format Specification, version 3. Tests and `tangere
-// validate` read everything made here back through the library.
+// Makes objects of HDF5 files as bytes, without the library and on any thread. The library takes 17
+// µs per object on one thread. That is 0.2 ms for an episode that takes 0.86 ms of one core to
+// simulate (docs/datasets.md). Formats: HDF5 File Format Specification, version 3. Tests and
+// `tangere validate` read everything made here back through the library.
 #pragma once
 
 #include <array>
@@ -16,13 +16,13 @@
 
 namespace tangere::h5 {
 
-/// An address that leads nowhere.
+/// The address that stands for "none".
 inline constexpr std::uint64_t kNowhere = ~std::uint64_t{0};
 
-/// The next multiple of eight bytes, where objects and rows begin.
+/// Rounds up to a multiple of eight bytes, where objects and rows begin.
 constexpr std::uint64_t aligned(std::uint64_t bytes) { return (bytes + 7) / 8 * 8; }
 
-/// Bytes of a file that is to be written, little-endian.
+/// Little-endian bytes of a file to be written.
 class Bytes {
  public:
   template <class T>
@@ -48,62 +48,63 @@ class Bytes {
   std::vector<unsigned char> bytes_;
 };
 
-/// The library's checksum of descriptions of objects: Jenkins' lookup3.
+/// The library's checksum of object descriptions: Jenkins' lookup3.
 std::uint32_t object_checksum(std::span<const unsigned char> bytes);
 
-/// LZ4's number among registered filters. Readers need its plug-in, or allow_lz4() of
-/// io/hdf5/h5_lz4.hpp.
+/// LZ4's number among registered filters. Readers need its plug-in or allow_lz4()
+/// (io/hdf5/h5_lz4.hpp).
 inline constexpr std::uint16_t kLz4Filter = 32004;
 
-/// The head of a file that the library made for readers of HDF5 1.8.
+/// Size of the head of a file that the library made for readers of HDF5 1.8.
 inline constexpr std::size_t kSuperblockBytes = 48;
-/// Writes where the file ends, after it was made longer, and, unless `root` leads nowhere, the
-/// address of its group "/".
+/// Writes where the file ends after it grew and, unless `root` is kNowhere, the address of its
+/// group "/".
 void set_end_of_file(std::span<unsigned char, kSuperblockBytes> superblock, std::uint64_t end,
                      std::uint64_t root = kNowhere);
 
-/// Types on disk, as the format has them.
+/// Types of the format.
 enum class NumberType { float32, float64, int8, int64, uint64, boolean };
 std::size_t bytes_of(NumberType type);
 
 struct FileFilter {
   std::uint16_t id = 0;
-  std::string_view name = {};  ///< of ids from 256 on
+  std::string_view name = {};  ///< for filter numbers from 256 on
   std::vector<std::uint32_t> values = {};
 };
 
-/// Names the text that says whose rows a virtual dataset shows. add_texts made the list of texts.
+/// Names the text that says which rows a virtual dataset shows, in a list that add_texts made.
 struct FileView {
   std::uint64_t texts = 0;   ///< address of the list
-  std::uint32_t number = 0;  ///< in the list
+  std::uint32_t number = 0;  ///< index in the list
 };
 
-/// A text of a list that add_texts made. Objects can share it in files that are only read; a change
-/// through one object would take the text from the others.
+/// A text in a list that add_texts made. Objects of read-only files can share it. A change through
+/// one object would take the text from the others.
 struct FileText {
   std::string_view name;     ///< of the attribute
   std::uint64_t texts = 0;   ///< address of the list
-  std::uint32_t number = 0;  ///< in the list
+  std::uint32_t number = 0;  ///< index in the list
   std::uint32_t bytes = 0;
 };
 
-/// A dataset. Elements that its chunks leave out are zero. Elements that a view does not find are
+/// A dataset. Elements that its chunks leave out are zero. Elements that a view cannot find are
 /// NaN.
 struct FileDataset {
   NumberType type = NumberType::float32;
   std::vector<std::uint64_t> dims;
   std::vector<std::uint64_t> chunk = {};  ///< empty: contiguous
-  std::uint64_t address = kNowhere;       ///< of its numbers, or of the index of its chunks
+  std::uint64_t address = kNowhere;       ///< of the numbers, or of the index of the chunks
   std::span<const FileFilter> filters = {};
   std::span<const FileText> texts = {};  ///< attributes
-  std::optional<FileView> view = {};  ///< it has no numbers of its own; of floating-point numbers
+  std::optional<FileView> view =
+      {};  ///< shows floating-point numbers of other datasets; none of its own
 };
 
 struct FileLink {
   std::string_view name;
-  std::uint64_t address = kNowhere;  ///< of the object, where it is in the same file
-  std::string_view file = {};        ///< of another file, relative to the folder of this one
-  std::string_view path = {};        ///< in that file
+  std::uint64_t address = kNowhere;  ///< of the object, if it is in this file
+  std::string_view file = {};  ///< of the object, if in another file; relative to this one's folder
+  std::string_view path = {};  ///< in that file
 };
 
 /// A number, or a list of them.
@@ -114,12 +115,12 @@ struct FileAttribute {
   std::span<const unsigned char> values;  ///< little-endian
 };
 
-/// Appends texts, or bytes of other kinds, that attributes and views refer to. Appends nothing for
-/// an empty list.
+/// Appends texts, or other bytes, that attributes and views refer to. Appends nothing for an empty
+/// list.
 void add_texts(Bytes& out, std::span<const std::string_view> texts);
-/// Appends a dataset's description.
+/// Appends the description of a dataset.
 void add_dataset(Bytes& out, const FileDataset& dataset);
-/// Appends a group that holds its links itself. This suits groups of few links.
+/// Appends a group that stores its links in its own header. This suits groups of few links.
 void add_group(Bytes& out, std::span<const FileLink> links,
                std::span<const FileAttribute> attributes = {});
 

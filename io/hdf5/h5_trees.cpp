@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Version 1 B-trees: nodes of a fixed size, keys between children, siblings linked.
+// Writes version 1 B-trees: nodes of a fixed size, keys between children, siblings linked.
 #include "io/hdf5/h5_trees.hpp"
 
 #include <algorithm>
@@ -8,11 +8,11 @@
 namespace tangere::h5 {
 namespace {
 
-// Half of the children of a node, as the library assumes if a file says nothing else.
+// Half of the children of a node: the library's default if a file gives no other number.
 constexpr std::size_t kGroupNodeHalf = 16, kChunkNodeHalf = 32, kLeafHalf = 4;
 constexpr std::size_t kNodeHead = 24, kAddress = 8;
 
-/// A kind of tree: how many children a node may have, what a key takes.
+/// A kind of tree: the most children of a node and the size of a key.
 struct TreeKind {
   std::uint8_t type;
   std::size_t most, key_bytes;
@@ -24,17 +24,18 @@ struct TreeKind {
 TreeKind group_tree() { return {0, 2 * kGroupNodeHalf, kAddress}; }
 TreeKind chunk_tree(std::size_t rank) { return {1, 2 * kChunkNodeHalf, 8 + 8 * (rank + 1)}; }
 
-/// Nodes of one level over n children.
+/// Number of nodes of one level over n children.
 std::size_t nodes_over(std::size_t n, std::size_t most) {
   return std::max<std::size_t>(1, (n + most - 1) / most);
 }
 
-/// Children in order. `key(out, i)` appends key i of the leaves: i = 0 before the first child, the
-/// count of children behind the last one.
+/// Adds a tree over ordered children. `key(out, i)` appends key i of the leaves: i = 0 lies before
+/// the first child, i = count behind the last.
 template <class Key>
 std::uint64_t add_tree(Bytes& out, std::uint64_t base, const TreeKind& kind,
                        std::vector<std::uint64_t> children, const Key& key) {
-  std::vector<std::size_t> ends(children.size());  // leaf children up to the end of each child
+  std::vector<std::size_t> ends(
+      children.size());  // number of leaf children up to the end of each child
   for (std::size_t i = 0; i < ends.size(); ++i) ends[i] = i + 1;
   for (std::uint8_t level = 0;; ++level) {
     const std::size_t nodes = nodes_over(children.size(), kind.most);
@@ -75,14 +76,14 @@ std::size_t tree_bytes(const TreeKind& kind, std::size_t children) {
   }
 }
 
-/// Bytes of a group. They are handed on in portions.
+/// The bytes of a group, handed on in portions.
 class GroupBytes {
  public:
   GroupBytes(Bytes& bytes, std::uint64_t base, const Spill& spill)
       : out(bytes), base_(base), spill_(spill) {}
-  /// The address of what is appended next.
+  /// Address of the next byte.
   [[nodiscard]] std::uint64_t here() const { return base_ + out.size(); }
-  /// The address of the first byte that is still here.
+  /// Address of the first byte that was not handed on yet.
   [[nodiscard]] std::uint64_t base() const { return base_; }
   void breathe() {
     constexpr std::size_t kMost = std::size_t{1} << 20;
@@ -103,8 +104,8 @@ std::string name_of(std::string_view prefix, const FileMember& member) {
   return std::string(prefix) + std::to_string(member.number);
 }
 
-/// Where the name of each member begins among all, each ended by zeros up to a multiple of eight,
-/// and where the last one ends; 0 is the empty name.
+/// Returns the offset of each member's name in the list of names, and of its end. Zeros end each
+/// name and fill it up to a multiple of eight. Offset 0 is the empty name.
 std::vector<std::uint64_t> name_begins(std::string_view prefix,
                                        const std::vector<FileMember>& members) {
   std::vector<std::uint64_t> begins;
@@ -137,7 +138,8 @@ std::uint64_t add_names(GroupBytes& to, std::string_view prefix,
   return heap;
 }
 
-/// Symbol nodes of up to 2 kLeafHalf members each; `ends`: members up to the end of each.
+/// Adds symbol nodes of up to 2 kLeafHalf members each. `ends`: number of members up to the end of
+/// each node.
 std::vector<std::uint64_t> add_leaves(GroupBytes& to, const std::vector<FileMember>& members,
                                       const std::vector<std::uint64_t>& begins,
                                       std::vector<std::size_t>& ends) {
@@ -154,7 +156,7 @@ std::vector<std::uint64_t> add_leaves(GroupBytes& to, const std::vector<FileMemb
     for (std::size_t i = first; i < end; ++i) {
       to.out.number(begins[i]);
       to.out.number(members[i].address);
-      to.out.zeros(kEntry - 2 * kAddress);  // nothing of the object is kept here
+      to.out.zeros(kEntry - 2 * kAddress);  // no cached data of the object
     }
     to.out.zeros(at + kHead + kMost * kEntry - to.out.size());
     ends.push_back(end);
@@ -173,8 +175,8 @@ std::uint64_t add_chunk_index(Bytes& out, std::uint64_t base, std::span<const Fi
   return add_tree(out, base, chunk_tree(rank), addresses, [&](Bytes& to, std::size_t i) {
     const bool behind = i == chunks.size();
     to.number<std::uint32_t>(behind ? 0 : chunks[i].bytes);
-    to.number<std::uint32_t>(0);  // no filter was left out
-    // One dimension more than the dataset has: within a number.
+    to.number<std::uint32_t>(0);  // no filter was skipped
+    // One more than the dimensions of the dataset: the bytes of a number count as one.
     for (std::size_t k = 0; k <= rank; ++k) {
       const std::uint64_t past = k == 0 ? chunks.back().first[0] + chunk_rows : 0;
       to.number(behind ? past : k < chunks[i].first.size() ? chunks[i].first[k] : std::uint64_t{0});
@@ -189,14 +191,14 @@ std::size_t chunk_index_bytes(std::size_t chunks, std::size_t rank) {
 std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::string_view prefix,
                               std::vector<FileMember> members, bool root, const Spill& spill) {
   std::sort(members.begin(), members.end(), [](const FileMember& a, const FileMember& b) {
-    return std::to_string(a.number) < std::to_string(b.number);  // as names are
+    return std::to_string(a.number) < std::to_string(b.number);  // the order of names
   });
   const std::vector<std::uint64_t> begins = name_begins(prefix, members);
   GroupBytes to(out, base, spill);
   const std::uint64_t heap = add_names(to, prefix, members, begins.back());
   std::vector<std::size_t> ends;
   const std::vector<std::uint64_t> leaves = add_leaves(to, members, begins, ends);
-  // Key i: the last name before child i, the empty one before the first.
+  // Key i: the last name before child i; the empty name before the first child.
   const std::uint64_t tree =
       add_tree(out, to.base(), group_tree(), leaves, [&](Bytes& keys, std::size_t i) {
         keys.number(i == 0 ? std::uint64_t{0} : begins[ends[i - 1] - 1]);
@@ -207,7 +209,7 @@ std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::string_view p
   out.number(kVersion);
   out.zeros(1);
   out.number<std::uint16_t>(1);             // messages
-  out.number<std::uint32_t>(root ? 1 : 0);  // links to it
+  out.number<std::uint32_t>(root ? 1 : 0);  // number of links to it
   out.number<std::uint32_t>(8 + kBytes);
   out.zeros(4);
   out.number(kSymbolTable);

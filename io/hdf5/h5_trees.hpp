@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Search trees of HDF5 files as bytes, built at once from sorted entries: where the chunks of a
-// dataset are, and the members of a group of thousands.
+// Makes search trees of HDF5 files as bytes, built at once from sorted entries: the index of a
+// dataset's chunks, and the members of a group of thousands.
 #pragma once
 
 #include <array>
@@ -17,32 +17,32 @@ namespace tangere::h5 {
 /// A chunk on disk, all filters applied.
 struct FileChunk {
   std::array<std::uint64_t, 3>
-      first{};  ///< of its numbers, in the first dimensions; 0 in the others
+      first{};  ///< its first number's place in the first dimensions; 0 in the others
   std::uint64_t address = 0;
   std::uint32_t bytes = 0;
 };
 
-/// Appends the index of a dataset's chunks, ascending, to what begins at `base` in the file.
-/// Returns its address; that of no chunks leads nowhere. `rank`: of the dataset, whose chunks have
-/// `chunk_rows` rows each.
+/// Appends the index of a dataset's chunks, ascending, to bytes that begin at `base` in the file.
+/// Returns its address, or kNowhere if there are no chunks. `rank`: rank of the dataset. Its chunks
+/// have `chunk_rows` rows each.
 std::uint64_t add_chunk_index(Bytes& out, std::uint64_t base, std::span<const FileChunk> chunks,
                               std::size_t rank, std::uint64_t chunk_rows);
-/// Bytes that the index takes.
+/// Size of the index [bytes].
 std::size_t chunk_index_bytes(std::size_t chunks, std::size_t rank);
 
-/// A member of a group. Its name is the prefix of all members and its number.
+/// A member of a group. Its name is the common prefix followed by its number.
 struct FileMember {
   std::int64_t number = 0;    ///< from 0 on
   std::uint64_t address = 0;  ///< of the object
 };
 
-/// Receives bytes that follow those it received before.
+/// Receives the bytes that follow those of the call before.
 using Spill = std::function<void(const Bytes&)>;
 
 /// Appends a group of any number of members, in any order. Returns the address of the group. Its
-/// count of links is 0, so link it; with `root` it is 1, for the group "/". With `spill`, bytes are
-/// handed on as they are made, except the last ones, which include the group itself. What is left
-/// in `out` follows the bytes handed on.
+/// count of links is 0 until it is linked; with `root` it is 1, for the group "/". With `spill`,
+/// bytes are handed on as they are made, except the last ones, which include the group itself. The
+/// bytes left in `out` follow those handed on.
 std::uint64_t add_large_group(Bytes& out, std::uint64_t base, std::string_view prefix,
                               std::vector<FileMember> members, bool root = false,
                               const Spill& spill = {});

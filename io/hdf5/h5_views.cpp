@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A list of (file, dataset, what is taken of it, where that is shown), and its checksum.
+// Writes a list of (file, dataset, selection in it, selection in the view), and its checksum.
 #include "io/hdf5/h5_views.hpp"
 
 #include <stdexcept>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint32_t kSelectionVersion = 1;
 
-/// All of a dataset, however large.
+/// Selects a whole dataset of any size.
 void add_whole(Bytes& out) {
   constexpr std::uint32_t kAll = 3;
   out.number(kAll);
@@ -19,7 +19,7 @@ void add_whole(Bytes& out) {
   out.zeros(8);
 }
 
-/// A box that has all of the dimensions behind the first.
+/// Selects rows in the first dimension and everything in the others.
 void add_rows(Bytes& out, std::uint64_t first, std::uint64_t rows,
               const std::vector<std::uint64_t>& dims) {
   constexpr std::uint32_t kBoxes = 2, kOne = 1;
@@ -27,12 +27,12 @@ void add_rows(Bytes& out, std::uint64_t first, std::uint64_t rows,
   out.number(kBoxes);
   out.number(kSelectionVersion);
   out.zeros(4);
-  out.number(static_cast<std::uint32_t>(4 + 4 + 2 * 4 * rank));  // bytes that follow
+  out.number(static_cast<std::uint32_t>(4 + 4 + 2 * 4 * rank));  // number of bytes that follow
   out.number(static_cast<std::uint32_t>(rank));
   out.number(kOne);
   out.number(static_cast<std::uint32_t>(first));
   out.zeros(4 * (rank - 1));
-  out.number(static_cast<std::uint32_t>(first + rows - 1));  // the last one, not the one behind
+  out.number(static_cast<std::uint32_t>(first + rows - 1));  // the last row, not the one behind it
   for (std::size_t k = 1; k < rank; ++k) out.number(static_cast<std::uint32_t>(dims[k] - 1));
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layout: captions, the axes, a line that explains the marks. Lengths in SVG units (pixels at 96
-// dpi).
+// Layout: captions, the axes, a line that explains the marks. Lengths are in SVG units (pixels at
+// 96 dpi).
 #include "io/picture/scaling_plot.hpp"
 
 #include <fmt/format.h>
@@ -22,7 +22,7 @@ constexpr double kLabelWidth = 26;  // labels of threads closer than this would 
 constexpr const char* kEnd = "text-anchor=\"end\" font-size=\"11\"";
 constexpr const char* kMiddle = "text-anchor=\"middle\" font-size=\"11\"";
 
-/// "250 k" instead of "250000".
+/// Writes "250 k" instead of "250000".
 std::string short_number(double x) {
   if (x >= 1e6) return fmt::format("{:.3g} M", x / 1e6);
   if (x >= 1e3) return fmt::format("{:.3g} k", x / 1e3);
@@ -38,7 +38,7 @@ class Picture {
     most_threads_ = points_.back().threads;
     highest_ = slope_ * most_threads_;
     for (const ScalingPoint& p : points_) highest_ = std::max(highest_, p.best);
-    highest_ *= 1.06;  // the highest dot is not cut by the frame
+    highest_ *= 1.06;  // so that the frame does not cut the highest dot
     top_ = kHead + kLine * static_cast<double>(curve.captions.size()) + 12;
   }
 
@@ -119,7 +119,7 @@ class Picture {
   }
 
   const ScalingCurve& curve_;
-  std::vector<ScalingPoint> points_;  // by threads
+  std::vector<ScalingPoint> points_;  // sorted by threads
   double slope_ = 0;                  // of the ideal line [1/s per thread]
   double most_threads_ = 1, highest_ = 1, top_ = 0;
   std::string out_;

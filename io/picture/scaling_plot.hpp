@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A picture of speed against threads, with the ideal straight line. It writes SVG and opens no
-// window.
+// Draws speed against threads, with the ideal straight line, as SVG. It opens no window.
 #pragma once
 
 #include <string>
@@ -19,9 +18,9 @@ struct ScalingCurve {
   std::vector<ScalingPoint> points;   ///< at least one, in any order
 };
 
-/// A dot for the best and a bar down to the median of each thread count; both axes start at zero.
-/// The ideal line goes through zero and the point with the fewest threads. Throws InputError
-/// without points, or for one that is not finite and positive.
+/// Draws a dot for the best speed of each thread count, and a bar down to the median. Both axes
+/// start at zero. The ideal line goes through zero and the point with the fewest threads. Throws
+/// InputError without points, or for one that is not finite and positive.
 std::string render_scaling_svg(const ScalingCurve& curve);
 
 }  // namespace tangere

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layout: captions, then panels of one size. Lengths in SVG units (pixels at 96 dpi).
+// Layout: captions, then panels of one size. Lengths are in SVG units (pixels at 96 dpi).
 #include "io/picture/series_plot.hpp"
 
 #include <fmt/format.h>
@@ -20,7 +20,7 @@ using svg::text;
 constexpr double kWidth = 720, kPanel = 190, kLeft = 88, kRight = 24, kHead = 34, kLine = 17,
                  kMargin = 24;
 constexpr double kAbove = 46,
-                 kBelow = 50;    // of a panel: its title and the names of its curves; its x axis
+                 kBelow = 50;    // in a panel: space for title and curve names; for the x axis
 constexpr double kLetter = 6.2;  // mean width at 11 px
 constexpr std::array<const char*, 6> kColours = {"#1e708e", "#c8553d", "#588b3a",
                                                  "#8a5aa8", "#b58a1b", "#555555"};
@@ -30,7 +30,7 @@ constexpr const char* kMiddle = "text-anchor=\"middle\" font-size=\"11\"";
 struct Range {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   void take(double a) { low = std::min(low, a), high = std::max(high, a); }
-  /// Of one value, or none: a width to draw in.
+  /// Gives a range of one value, or of none, a width.
   void widen() {
     const double more = high > low ? 0.04 * (high - low) : 0.5 * std::max(std::abs(low), 1e-9);
     low -= more, high += more;
@@ -141,7 +141,7 @@ class Panel {
 
   const CurvePanel& panel_;
   double top_;
-  Range x_, y_;  // y as it is drawn: decades on a logarithmic scale
+  Range x_, y_;  // y as drawn: in decades on a logarithmic scale
   std::string out_;
 };
 

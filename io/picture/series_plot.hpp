@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of curves, one panel below the other, of a fit or a run. It writes SVG and opens no
-// window.
+// Draws the curves of a fit or a run as SVG, one panel below the other. It opens no window.
 #pragma once
 
 #include <span>
@@ -12,9 +11,9 @@ namespace tangere {
 struct Curve {
   std::string name;  ///< "": not explained
   std::vector<double> x,
-      y;  ///< as many of each; not finite, or not positive on a logarithmic scale: left out
+      y;  ///< same length; left out if not finite, or not positive on a logarithmic scale
   bool dots = false;  ///< measured points instead of a line
-  int colour = 0;     ///< of six; curves that belong together share one
+  int colour = 0;     ///< one of six; curves that belong together share one
 };
 
 struct CurvePanel {
@@ -23,7 +22,7 @@ struct CurvePanel {
   std::vector<Curve> curves;
 };
 
-/// Every panel has its own axes, which hold all of its curves. Throws InputError for a panel
+/// Every panel has its own axes, which cover all of its curves. Throws InputError for a panel
 /// without a point to draw, or a curve with unequal numbers of x and y.
 std::string render_curves_svg(const std::string& title, std::span<const std::string> captions,
                               std::span<const CurvePanel> panels);

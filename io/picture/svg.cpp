@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// SVG is written by hand, because a library would take more to learn than these functions.
+// Writes SVG by hand, because a library would take more to learn than these functions.
 #include "io/picture/svg.hpp"
 
 #include <fmt/format.h>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// In an image, down is the direction in which the rows of points increase along the body: the sum
-// of their places, each times its row. Right is found in the same way from columns.
+// In an image, "down" is the direction in which the row numbers of points increase along the body:
+// the sum of the points' positions, each times its row. "Right" follows in the same way from
+// columns.
 #include "io/picture/tactile_drawing.hpp"
 
 #include <algorithm>
@@ -13,7 +14,7 @@ double dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1
 
 bool has_pixel(const TactilePoint& p) { return p.pixel[0] >= 0 && p.pixel[1] >= 0; }
 
-/// Of length 1, or 0 where all points share a row (which = 0) or column (1).
+/// Returns a direction of length 1, or 0 if all points share a row (which = 0) or column (1).
 Vector3 direction(const std::vector<TactilePoint>& points, std::size_t which) {
   double mean = 0, count = 0;
   for (const TactilePoint& p : points)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a picture of a tactile field puts each point, and which way its shear points there.
+// Decides where a picture of a tactile field puts each point, and how the point's shear is drawn.
 #pragma once
 
 #include <array>
@@ -9,22 +9,22 @@
 
 namespace tangere {
 
-/// A rectangular array, or the image that a list of points has pixels in.
+/// A rectangular array, or the image in which the points of a list have pixels.
 struct TactileDrawing {
   int rows = 0, cols = 0;
-  double height = 0, width = 0;  ///< [m]; of an image, of its points along its rows and columns
+  double height = 0,
+         width = 0;  ///< [m]; for an image, the extent of its points along rows and columns
   std::vector<std::array<int, 2>> cell;  ///< (points) row and column; -1: not drawn
   std::vector<std::array<double, 4>>
-      turn;  ///< (points) force along axis0, axis1 to down, right; empty: by the signs below
+      turn;  ///< (points) from force along axis0, axis1 to down, right; empty: see below
   double down = 1,
-         right = 1;  ///< arrays: whether rows go down along axis0, columns to the right along axis1
+         right = 1;  ///< arrays: whether rows go down along axis0 and columns right along axis1
 
-  /// Down and right of a force along axis0 and axis1.
+  /// Returns the components {down, right} of a force along axis0 and axis1.
   [[nodiscard]] std::array<double, 2> shear(std::size_t point, double f0, double f1) const;
 };
 
-/// Whether a sensor can be drawn. It must be an array, or a list with pixels for some of its
-/// points.
+/// Whether a sensor can be drawn: an array, or a list with pixels for some of its points.
 bool drawable(const SensorLayout& sensor);
 TactileDrawing drawing_of(const SensorLayout& sensor);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layout: panels side by side, a colour bar at the right, captions below. Lengths in SVG units
+// Layout: panels side by side, a colour bar at the right, captions below. Lengths are in SVG units
 // (pixels at 96 dpi).
 #include "io/picture/tactile_plot.hpp"
 
@@ -22,7 +22,7 @@ namespace {
 using svg::round_down;
 using svg::text;
 
-constexpr int kMostCells = 80;   // cells of a map along one side: keeps the file under a megabyte
+constexpr int kMostCells = 80;   // cells along one side of a map; keeps files under a megabyte
 constexpr int kMostArrows = 16;  // arrows along one side
 constexpr double kPanel = 240, kGap = 28, kLeft = 64, kTop = 84, kBar = 110, kBottom = 86;
 
@@ -73,7 +73,7 @@ Panel make_panel(const TrajectoryReader& file, std::size_t sensor, std::int64_t 
   return p;
 }
 
-/// Dark blue to pale yellow; lightness rises evenly, so equal steps of force look equal.
+/// Goes from dark blue to pale yellow. Lightness rises evenly, so equal steps of force look equal.
 std::string colour(double x) {
   static constexpr double kStops[][3] = {{20, 22, 60},   {42, 60, 120},  {30, 112, 142},
                                          {62, 162, 122}, {158, 200, 88}, {250, 236, 130}};
@@ -274,7 +274,7 @@ class Picture {
   std::string out_;
 };
 
-/// Frames spread evenly over those with contact; the last one alone when nothing ever touches.
+/// Chooses frames spread evenly over those with contact; only the last one if nothing ever touches.
 std::vector<Panel> choose_panels(const TrajectoryReader& file, std::size_t sensor,
                                  const PlotOptions& o) {
   const std::int64_t frames = file.frames(sensor);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A picture of tactile fields: pressure as a map with a colour bar, shear as arrows. It writes SVG
-// and opens no window.
+// Draws tactile fields as SVG: pressure as a map with a colour bar, shear as arrows. It opens no
+// window.
 #pragma once
 
 #include <cstdint>
@@ -13,19 +13,19 @@
 namespace tangere {
 
 struct PlotOptions {
-  std::string sensor;  ///< "": the first that can be drawn
+  std::string sensor;  ///< "": the first sensor that can be drawn
   std::int64_t environment = 0;
   std::optional<std::int64_t> frame;  ///< one frame instead of a strip
-  int strip = 6;                      ///< most frames of a strip, spread over those with contact
+  int strip = 6;                      ///< most frames in a strip, spread over those with contact
 };
 
-/// Names of the sensors that can be drawn, rectangular arrays and those with an image, in
+/// Names of the sensors that can be drawn (rectangular arrays, and lists with an image), in
 /// alphabetical order, as files list them.
 std::vector<std::string> drawable_sensors(const TrajectoryReader& file);
 
-/// Column axis1 runs to the right and row axis0 downwards, as in the array; or columns and rows of
-/// the image. All frames share one colour scale and one arrow scale. Throws InputError for a
-/// sensor, environment or frame that is not there, or cannot be drawn.
+/// In an array, axis1 (columns) points right and axis0 (rows) down; otherwise the columns and rows
+/// of the image do. All frames share one colour scale and one arrow scale. Throws InputError for a
+/// sensor, environment or frame that does not exist or cannot be drawn.
 std::string render_tactile_svg(const TrajectoryReader& file, const PlotOptions& options);
 
 }  // namespace tangere

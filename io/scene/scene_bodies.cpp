@@ -17,7 +17,7 @@ constexpr int kLargestResolution = 1000;  // contact points along one edge or ar
 
 using Names = std::vector<std::string>;
 
-/// Which attributes this element's type uses. The other attributes of bodies have no effect.
+/// The attributes that this element's type uses. The other attributes of bodies have no effect.
 class Attributes {
  public:
   void use(std::initializer_list<const char*> names) {
@@ -44,7 +44,7 @@ class Attributes {
                 "inertia"};
 };
 
-/// A shape that its size and the counts of its contact points say all about.
+/// Reads a shape that its size and the numbers of its contact points define completely.
 void read_sized(const SceneNode& node, const ShapeRow& row, Shape& shape, Attributes& attributes) {
   const double length = node.context().length;
   for (const SizeNumber& n : row.sizes) {
@@ -75,7 +75,7 @@ void read_sized(const SceneNode& node, const ShapeRow& row, Shape& shape, Attrib
   if (const std::string fault = slenderness_fault(shape); !fault.empty()) node.fail(fault);
 }
 
-/// Contact points of an abstract body, in the scene's unit: those of a file, or of a hemisphere.
+/// Reads contact points of an abstract body in the scene's unit, from a file or for a hemisphere.
 std::vector<double> read_collision(const SceneNode& node) {
   const bool generated = node.has("radius") || node.has("count");
   if (generated == node.has("contacts"))

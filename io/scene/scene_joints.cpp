@@ -11,7 +11,7 @@ namespace tangere {
 
 namespace {
 
-/// The effects of the dofs that turn, or of those that slide.
+/// Reads the effects of the dofs that turn, or of those that slide, in SI.
 JointEffects effects_in_si(const SceneNode& node, bool turns) {
   const SceneContext& c = node.context();
   const auto number = [&](NumberField field) {
@@ -33,7 +33,8 @@ JointEffects effects_in_si(const SceneNode& node, bool turns) {
   return e;
 }
 
-/// One number for every dof, or one each. A spherical joint's three are a rotation vector.
+/// Reads one number for all dofs, or one for each. A spherical joint's three form a rotation
+/// vector.
 std::vector<double> read_rest(const SceneNode& node, JointType type) {
   std::vector<double> rest = node.numbers("rest");
   const auto count = std::size_t(dof_count(type));
@@ -59,7 +60,7 @@ bool has_effect(const JointEffects& e) {
   return e.damping != 0 || e.armature != 0 || e.stiffness != 0 || e.limit_stiffness != 0;
 }
 
-/// Range and gains of a motor. The dofs it drives all slide or all turn.
+/// Reads range and gains of a motor. Its dofs either all slide or all turn.
 void read_motor(const SceneNode& node, bool turns, MotorDescription& motor) {
   const SceneContext& c = node.context();
   const bool position = motor.control == MotorControl::position;
@@ -95,7 +96,7 @@ void read_joint_effects(const SceneNode& node, JointDescription& joint) {
   const bool mixed = joint.type == JointType::free || joint.type == JointType::free2d;
   if (joint.type == JointType::fixed) {
     joint.damping = node.not_negative("damping", 0.0) *
-                    node.context().damping_force;  // checked, though nothing moves
+                    node.context().damping_force;  // checked even if nothing moves
     return;
   }
   static_cast<JointEffects&>(joint) = effects_in_si(node, !mixed && dof_turns(joint.type, 0));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parses attributes. Values must be complete and finite; they are read in double precision.
+// Parses attributes. Values must be complete and finite, and have double precision.
 #include "io/scene/scene_node.hpp"
 
 #include <fmt/format.h>
@@ -29,7 +29,7 @@ double SceneContext::factor(std::string_view unit) const {
   if (unit == "N s/m^2") return damping_area;
   if (unit == "kg/m^3") return density;
   if (unit == "kg") return density * length * length * length;
-  // Torque per angle, its rate or its acceleration: a mass times a length twice.
+  // Torque per angle, rate or acceleration: a mass times a squared length.
   if (unit == "N m/rad" || unit == "N m s/rad" || unit == "kg m^2") return rotational;
   return 1;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One XML element while a scene is read: attributes as checked values, errors with file and line.
+// One XML element during reading: attributes as checked values, errors with file and line.
 #pragma once
 
 #include <tinyxml2.h>
@@ -21,19 +21,19 @@ struct SceneContext {
   std::string file;
   bool allow_unknown = false;
   std::vector<std::string> warnings;
-  /// A value from <default> and the line it stands in.
+  /// A value from <default> and the number of its line.
   struct Default {
     std::string value;
     int line;
   };
-  /// Attribute values for elements that leave them out: [element][attribute].
+  /// Values for attributes that an element leaves out: [element][attribute].
   std::map<std::string, std::map<std::string, Default>> defaults;
 
   // Factors to SI, by dimension.
   double length = 1, stiffness = 1, damping_force = 1, damping_area = 1, density = 1, force = 1,
          torque = 1, rotational = 1;
   void use_centimetres_and_grams();
-  /// From the scene's units to a unit of the table in engine/model/scene_number.cpp.
+  /// Factor from the scene's units to a unit of the table in engine/model/scene_number.cpp.
   [[nodiscard]] double factor(std::string_view unit) const;
 };
 
@@ -50,19 +50,20 @@ class SceneNode {
   [[noreturn]] void fail_at(const char* attribute, const std::string& message) const;
   void warn(const std::string& message) const;
 
-  /// Refuses attributes outside the three lists. `used` are read. `pictures` matter to viewers only
-  /// and pass silently. `unused` belong to other types of this element and give warnings.
+  /// Refuses attributes outside the three lists. Attributes in `used` are read. Those in `pictures`
+  /// matter only to viewers and pass silently. Those in `unused` belong to other types of this
+  /// element and give warnings.
   void check_attributes(const std::vector<std::string>& used,
                         const std::vector<std::string>& pictures = {},
                         const std::vector<std::string>& unused = {}) const;
 
-  /// Children in order. Names outside `known` are errors; stray text is a warning.
+  /// Returns the children in order. Names outside `known` are errors. Stray text gives a warning.
   [[nodiscard]] std::vector<SceneNode> children(const std::vector<std::string>& known) const;
 
   [[nodiscard]] bool has(const char* attribute) const { return find(attribute) != nullptr; }
   [[nodiscard]] std::string text(const char* attribute) const;  ///< required
   [[nodiscard]] std::string text(const char* attribute, const std::string& fallback) const;
-  /// The position of the value among `words`.
+  /// Returns the index of the value among `words`.
   [[nodiscard]] int choice(const char* attribute, const std::vector<std::string>& words,
                            std::optional<int> fallback = std::nullopt) const;
   [[nodiscard]] double number(const char* attribute,
@@ -73,10 +74,10 @@ class SceneNode {
                                     std::optional<double> fallback = std::nullopt) const;
   [[nodiscard]] int integer(const char* attribute, int lowest, int highest,
                             std::optional<int> fallback = std::nullopt) const;
-  /// As many integers as the fallback has, each from `lowest` to `highest`.
+  /// Returns as many integers as the fallback has, each from `lowest` to `highest`.
   [[nodiscard]] std::vector<int> integers(const char* attribute, const std::vector<int>& fallback,
                                           int lowest, int highest) const;
-  /// Any number of finite numbers, or exactly `count` if it is positive.
+  /// Returns any number of finite numbers, or exactly `count` if it is positive.
   [[nodiscard]] std::vector<double> numbers(const char* attribute, std::size_t count = 0) const;
   [[nodiscard]] Vector3 vector(const char* attribute,
                                std::optional<Vector3> fallback = std::nullopt) const;

@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads the file as a whole: options, defaults, the tree of links. scene_sections.cpp reads what
-// hangs on the tree.
+// Reads the file as a whole: options, defaults, the tree of links. scene_sections.cpp reads the
+// sections beside the tree.
 #include "io/scene/scene_reader.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <map>
 
+#include "io/files/text_file.hpp"
 #include "io/scene/scene_sections.hpp"
 
 namespace tangere {
 
 namespace {
 
-constexpr std::uintmax_t kLargestFile = 64U << 20;  // a scene is text written by people
+constexpr std::uintmax_t kLargestFile = 64U
+                                        << 20;  // people write scenes; larger files are a mistake
 constexpr int kDeepestTree = 200;
 
 const std::vector<std::string> kJointTypes = {
@@ -46,7 +47,7 @@ class TreeReader {
     unique("link", link.name, node);
     std::vector<SceneNode> inner;
     int joints = 0, bodies = 0;
-    bool in_world = false;  // whether the body's pose is given there
+    bool in_world = false;  // whether the body's pose is given in the world
     for (const SceneNode& child : node.children({"joint", "body", "link"})) {
       if (child.name() == "joint") {
         if (++joints > 1) child.fail("a second joint in link '" + link.name + "'; expected one");
@@ -179,8 +180,8 @@ void read_root(const SceneNode& root, Scene& scene) {
     });
     return count > 0;
   };
-  // Units come first because every other number depends on them. Sections that others refer to
-  // follow.
+  // Units come first because every other number depends on them. Then come sections to which others
+  // refer.
   SceneContext& c = root.context();
   bool metres = false;
   each("option", [&](const SceneNode& s) { metres = s.choice("unit", {"cm-g", "m-kg"}, 0) == 1; });
@@ -210,7 +211,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   once("randomize", [&](const SceneNode& s) { read_randomize(scene, s); });
 }
 
-/// Describes the error of the parser.
+/// Describes an error of the XML parser.
 const char* fault_of(tinyxml2::XMLError error) {
   switch (error) {
     case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT:
@@ -235,6 +236,11 @@ SceneFile parse_scene(const std::string& text, const std::string& name,
   tinyxml2::XMLDocument document;
   if (text.find('\0') != std::string::npos)
     throw InputError(name + ": holds a zero byte; expected XML text");
+  if (const std::size_t bad = find_invalid_utf8(text); bad != std::string_view::npos)
+    throw InputError(fmt::format(
+        "{}:{}: byte 0x{:02x} is no UTF-8; expected text in UTF-8", name,
+        1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(bad), '\n'),
+        static_cast<unsigned char>(text[bad])));
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
     const int line = document.ErrorLineNum();
     throw InputError(fmt::format("{}:{}: not well-formed XML: {}", name, std::max(line, 1),
@@ -264,16 +270,8 @@ SceneFile parse_scene(const std::string& text, const std::string& name,
 }
 
 SceneFile read_scene(const std::filesystem::path& path, const SceneReadOptions& options) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error))
-    throw IoError(path.string() + ": is a folder; expected a scene file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw IoError(path.string() + ": cannot be opened for reading");
-  if (std::filesystem::file_size(path, error) > kLargestFile && !error)
-    throw InputError(path.string() + ": larger than 64 MiB; expected a scene file");
-  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  if (file.bad()) throw IoError(path.string() + ": reading failed");
-  return parse_scene(text, path.string(), options);
+  return parse_scene(read_text_file(path.string(), kLargestFile, "a scene file"), path.string(),
+                     options);
 }
 
 }  // namespace tangere

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads scene files: the dialect of the paper's published simulator (root <redmax>) and ours (root
-// <tangere>). Both have the same elements.
+// Reads scene files in two dialects: that of the paper's published simulator (root <redmax>) and
+// ours (root <tangere>). Both have the same elements.
 #pragma once
 
 #include <filesystem>
@@ -20,12 +20,13 @@ struct SceneFile {
   std::vector<std::string> warnings;  ///< "file:line: …", in the order of the file
 };
 
-/// Reads and checks a scene. Throws IoError when the file cannot be read, InputError ("file:line:
-/// what; expected …") for anything in it that is unknown, missing, malformed or impossible.
+/// Reads and checks a scene. Throws IoError when the file cannot be read. Throws InputError
+/// ("file:line: what; expected …") for anything in it that is unknown, missing, malformed or
+/// impossible.
 SceneFile read_scene(const std::filesystem::path& path, const SceneReadOptions& options = {});
 
-/// The same for text in memory; `name` stands for the file in messages, and csv files are sought
-/// beside it.
+/// Does the same for text in memory. `name` stands for the file in messages, and csv files are
+/// looked for beside it.
 SceneFile parse_scene(const std::string& text, const std::string& name,
                       const SceneReadOptions& options = {});
 

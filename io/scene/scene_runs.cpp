@@ -21,7 +21,7 @@ std::vector<double> read_coordinates(const SceneNode& node, const char* attribut
   return x;
 }
 
-/// The attribute `value`: one per control, targets of position motors in the scene's lengths.
+/// Reads `value`: one number per control. Targets of position motors use the scene's lengths.
 std::vector<double> read_controls(const Scene& scene, const SceneNode& node) {
   std::vector<double> values = node.numbers("value");
   const std::vector<double> scales = control_scales(scene, node.context());
@@ -52,7 +52,7 @@ PiecewiseControl read_piecewise(const Scene& scene, const SceneNode& node) {
   return control;
 }
 
-/// Exactly one of uniform, log_uniform, normal, list; numbers times `scale`.
+/// Reads exactly one of uniform, log_uniform, normal, list, with numbers times `scale`.
 Distribution read_distribution(const SceneNode& node, double scale) {
   Distribution d;
   const char* const kinds[] = {"uniform", "log_uniform", "normal", "list"};
@@ -79,7 +79,7 @@ Distribution read_distribution(const SceneNode& node, double scale) {
   return d;
 }
 
-/// A coefficient must stay zero or more whatever is drawn, so a normal distribution is refused.
+/// Refuses a normal distribution, because every draw of a coefficient must be zero or more.
 void check_coefficient(const SceneNode& node, const Distribution& d) {
   if (d.kind == Distribution::Kind::normal)
     node.fail("normal can draw a negative coefficient; expected uniform, log_uniform or list");
@@ -88,7 +88,7 @@ void check_coefficient(const SceneNode& node, const Distribution& d) {
   if (negative) node.fail("a coefficient may not be negative");
 }
 
-/// The attribute `field`: one of those that an owner has, from `first` to `last`.
+/// Reads the attribute `field`: one of the owner's fields from `first` to `last`.
 NumberField read_field(const SceneNode& node, NumberOwner owner, NumberField first,
                        NumberField last) {
   std::vector<std::string> names;
@@ -97,12 +97,12 @@ NumberField read_field(const SceneNode& node, NumberOwner owner, NumberField fir
   return static_cast<NumberField>(static_cast<int>(first) + int(node.choice("field", names)));
 }
 
-/// Draws in the unit of a number.
+/// Reads a distribution in the unit of a number.
 Distribution read_distribution(const Scene& scene, const SceneNode& node, const SceneNumber& n) {
   return read_distribution(node, node.context().factor(unit_of(scene, n)));
 }
 
-/// damping, armature, stiffness, lim_stiffness of a joint, or P, D of its motor.
+/// Reads damping, armature, stiffness, lim_stiffness of a joint, or P, D of its motor.
 void read_joint_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
   const bool motor = node.name() == "motor";
   const char* by = motor ? "joint" : "name";
@@ -133,7 +133,7 @@ void read_joint_variation(const Scene& scene, const SceneNode& node, Randomizati
   check_coefficient(node, d.distribution);
 }
 
-/// A coordinate or a velocity at the start, or where the joint stands.
+/// Reads a coordinate or velocity at the start, or the place of a joint.
 void read_state_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
   node.check_attributes({"name", "q", "v", "pos", "uniform", "log_uniform", "normal", "list"});
   const int joint = find_joint(scene, node, "name");
@@ -156,7 +156,7 @@ void read_state_variation(const Scene& scene, const SceneNode& node, Randomizati
   d.distribution = read_distribution(scene, node, d.number);
 }
 
-/// Masses and sizes are positive whatever is drawn.
+/// Requires positive draws for masses and sizes.
 void check_positive(const SceneNode& node, const RandomizationDescription& of) {
   const Distribution& d = of.distribution;
   if (d.kind == Distribution::Kind::normal)
@@ -170,7 +170,7 @@ void check_positive(const SceneNode& node, const RandomizationDescription& of) {
                           name_of(of.number), least));
 }
 
-/// The density of a body, or a number of its size.
+/// Reads the density of a body, or a number of its size.
 void read_body_variation(const Scene& scene, const SceneNode& node, RandomizationDescription& d) {
   node.check_attributes({"name", "field", "size", "uniform", "log_uniform", "normal", "list"});
   const BodyDescription& body = scene.links[std::size_t(find_body(scene, node, "name"))].body;

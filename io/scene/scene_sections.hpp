@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sections of a scene beside its tree of links. Each appends to the scene; references are
-// checked where they stand.
+// Readers of the sections beside the tree of links. Each appends to the scene and checks references
+// where they appear.
 #pragma once
 
 #include <filesystem>
@@ -10,10 +10,10 @@
 
 namespace tangere {
 
-/// Of the surface points of a body and of the points of a sensor.
+/// Limit of the surface points of a body and of the points of a sensor.
 inline constexpr int kMostPoints = 1 << 20;
 
-/// A body in its joint's frame; files that it names are read.
+/// Reads a body in its joint's frame, including files that it names.
 BodyDescription read_body(const SceneNode& node);
 /// Whether the pose of a mesh is given in the world, not in the joint's frame.
 bool placed_in_world(const SceneNode& node, const BodyDescription& body);
@@ -21,7 +21,7 @@ void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
 void read_sensors(Scene& scene, const SceneNode& section);
 void read_end_effectors(Scene& scene, const SceneNode& section);
-/// Names end effectors that have no name: "endeffector" and their place in the file, or the next
+/// Names end effectors that have no name: "endeffector" and their position in the file, or the next
 /// free number.
 void name_end_effectors(Scene& scene);
 void read_initial(Scene& scene, const SceneNode& section);
@@ -40,10 +40,10 @@ auto read_beside(const SceneNode& node, const char* attribute, Read&& read) {
   }
 }
 
-/// The closed surface of `filename`, scaled by `scale` and to metres.
+/// Reads the closed surface of `filename`, scaled by `scale` and to metres.
 MeshShape read_mesh(const SceneNode& node, double length);
 
-/// k_n, k_t, μ and the damping that a law means, in SI; all 0 by default.
+/// Reads k_n, k_t, μ and the damping that a law uses, in SI; all 0 by default.
 ContactCoefficients read_coefficients(const SceneNode& node, ContactLaw law);
 
 inline Vector3 scaled(const Vector3& a, double s) { return {s * a[0], s * a[1], s * a[2]}; }
@@ -52,13 +52,13 @@ inline Vector3 scaled(const Vector3& a, double s) { return {s * a[0], s * a[1], 
 /// missing.
 void read_colour(const SceneNode& node, std::array<double, 4>& rgba);
 
-/// Index of the named joint or body. If there is none, fails at the attribute's element with the
-/// nearest name.
+/// Returns the index of the named joint or body. If there is none, fails at the attribute's element
+/// with the nearest name.
 int find_joint(const Scene& scene, const SceneNode& node, const char* attribute);
 int find_body(const Scene& scene, const SceneNode& node, const char* attribute);
 
-/// Factor to SI of coordinate `index` of a joint type, and of velocity `index`: both have lengths
-/// in the same places.
+/// Factor to SI of coordinate `index` of a joint type, and of velocity `index`. Both have lengths
+/// at the same indices.
 double coordinate_scale(JointType type, int index, const SceneContext& context);
 
 /// Number of controls of the motors read so far.
@@ -67,7 +67,7 @@ int control_count(const Scene& scene);
 /// motors have no unit.
 std::vector<double> control_scales(const Scene& scene, const SceneContext& context);
 
-/// Damping, armature, spring and limits of a joint whose type is known.
+/// Reads damping, armature, spring and limits of a joint whose type is known.
 void read_joint_effects(const SceneNode& node, JointDescription& joint);
 
 }  // namespace tangere

@@ -16,7 +16,7 @@ const std::vector<std::string> kTypes = {"rect_array", "abstract", "hemisphere",
                                          "mesh"};
 using Names = std::vector<std::string>;
 
-/// Attributes that only some layouts use, with these layouts.
+/// Attributes that only some layouts use, each with these layouts.
 Names attributes_of(int type) {
   switch (type) {
     case 0: return {"rect_pos0", "rect_pos1", "axis0", "axis1", "resolution"};
@@ -41,7 +41,7 @@ void check_attributes(const SceneNode& node, int type) {
   node.check_attributes(used, {"render"}, idle);
 }
 
-/// Rows and columns.
+/// Reads rows and columns.
 std::array<int, 2> read_resolution(const SceneNode& node) {
   const std::vector<double> n = node.numbers("resolution", 2);
   for (double k : n)
@@ -81,7 +81,7 @@ std::vector<TactilePoint> read_surface(const SceneNode& node, double length) {
   return points;
 }
 
-/// With a resolution, every point has a pixel of its own.
+/// Reads a hemisphere. With a resolution, every point gets a pixel of its own.
 std::vector<TactilePoint> read_hemisphere(const SceneNode& node, double radius) {
   std::vector<TactilePoint> points =
       hemisphere_points(radius, node.integer("count", 1, kMostPoints));

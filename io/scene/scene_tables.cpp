@@ -14,8 +14,8 @@ namespace {
 
 class Checksum {
  public:
-  /// Adds numbers of one kind. An empty list changes the sum as well, but does not make a table
-  /// alone.
+  /// Adds numbers of one kind. An empty list changes the sum, too, but alone does not count as a
+  /// table.
   template <class T>
   void add(std::span<const T> numbers) {
     const std::uint64_t count = numbers.size();

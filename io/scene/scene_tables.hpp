@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A checksum of what a scene takes from other files (meshes, lists of points, tables). It depends
-// on their content, because names can stay while files change.
+// Computes a checksum of what a scene takes from other files (meshes, lists of points, tables). It
+// depends on their content, because names can stay while files change.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace tangere {
 
-/// "none", or a checksum of all numbers that a scene's text alone does not hold.
+/// Returns "none", or a checksum of all numbers that a scene's text alone does not contain.
 std::string tables_of(const Scene& scene);
 
 }  // namespace tangere

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A surface is closed, and its volume defined, when every directed edge has as many partners in the
+// A surface is closed, and its volume defined, if every directed edge has as many partners in the
 // opposite direction.
 #include "io/scene/surface_files.hpp"
 
@@ -21,7 +21,8 @@ struct RawMesh {
   std::vector<std::array<int, 3>> triangles;
 };
 
-/// Index of a face's corner "7", "7/1", "7//2" or "-1": from 1, or back from the latest vertex.
+/// Returns the index of a face's corner "7", "7/1", "7//2" or "-1". Files count from 1, or
+/// backwards from the latest vertex.
 int corner(const WordReader& file, std::string_view word, std::size_t vertices) {
   const long n = file.integer(word.substr(0, word.find('/')), "the number of a vertex");
   const long index = n > 0 ? n - 1 : static_cast<long>(vertices) + n;
@@ -54,8 +55,8 @@ RawMesh parse_obj(WordReader& file) {
   return mesh;
 }
 
-/// One vertex per position that a face uses, in order of use; faces without area by equal corners
-/// are dropped.
+/// Makes one vertex per position that a face uses, in order of use. Drops faces that
+/// have equal corners and so no area.
 MeshShape weld(const RawMesh& raw) {
   MeshShape mesh;
   std::map<Vector3, int> index;
@@ -63,7 +64,7 @@ MeshShape weld(const RawMesh& raw) {
     std::array<int, 3> welded{};
     for (std::size_t k = 0; k < 3; ++k) {
       Vector3 at = raw.positions[std::size_t(t[k])];
-      for (double& x : at) x += 0.0;  // -0 and +0 are one place
+      for (double& x : at) x += 0.0;  // -0 and +0 are the same position
       const auto [found, fresh] = index.emplace(at, static_cast<int>(index.size()));
       if (fresh) mesh.vertices.insert(mesh.vertices.end(), at.begin(), at.end());
       welded[k] = found->second;
@@ -75,7 +76,7 @@ MeshShape weld(const RawMesh& raw) {
 }
 
 void check_closed(const MeshShape& mesh, const std::string& path) {
-  std::map<std::pair<int, int>, int> surplus;  // of an edge one way round over the other
+  std::map<std::pair<int, int>, int> surplus;  // of an edge's one direction over the other
   for (const std::array<int, 3>& t : mesh.triangles)
     for (std::size_t k = 0; k < 3; ++k) {
       const int a = t[k], b = t[(k + 1) % 3];
@@ -93,7 +94,7 @@ void check_closed(const MeshShape& mesh, const std::string& path) {
           path, place(edge.first), place(edge.second)));
 }
 
-/// Six times the volume, from tetrahedra on the first vertex.
+/// Sums six times the volume over tetrahedra on the first vertex.
 double six_volumes(const MeshShape& mesh) {
   double sum = 0;
   for (const std::array<int, 3>& t : mesh.triangles) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that bodies are made of: closed surfaces (OBJ) and lists of contact points.
+// Reads files that bodies are made of: closed surfaces (OBJ) and lists of contact points.
 #pragma once
 
 #include <string>
@@ -8,15 +8,15 @@
 
 namespace tangere {
 
-/// Positions and faces of an OBJ file, in its own unit. Faces become fans of triangles, and equal
-/// positions one vertex. Vertices that no face uses are left out. Texture, normals, groups and
-/// materials are skipped. Throws IoError if the file cannot be read, InputError with file:line if
-/// it is not an OBJ file, and InputError without a line if the surface is open, encloses no volume,
-/// or faces inwards.
+/// Reads positions and faces of an OBJ file, in its own unit. Faces become fans of triangles, and
+/// equal positions become one vertex. Vertices that no face uses are left out. Texture, normals,
+/// groups and materials are skipped. Throws IoError if the file cannot be read, InputError with
+/// file:line if it is not an OBJ file, and InputError without a line if the surface is open,
+/// encloses no volume, or faces inwards.
 MeshShape read_obj(const std::string& path);
 
-/// Reads a count, then as many lines x y z: (n, 3) numbers in the file's own unit. Throws as
-/// read_obj.
+/// Reads a count, then as many lines x y z. Returns (n, 3) numbers in the file's own unit. Throws
+/// like read_obj.
 std::vector<double> read_contact_points(const std::string& path);
 
 }  // namespace tangere

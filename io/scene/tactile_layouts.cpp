@@ -24,7 +24,7 @@ TactilePoint point_at(const Vector3& position, const Vector3& normal, const Vect
   return p;
 }
 
-/// Three numbers from the k-th, of unit length.
+/// Reads three numbers from the k-th on and normalises them.
 Vector3 direction(const WordReader& file, std::size_t k, const char* what) {
   const Vector3 a = {file.number(k), file.number(k + 1), file.number(k + 2)};
   if (!(dot(a, a) > 0)) file.fail(fmt::format("{} has no length; expected a direction", what));
@@ -59,9 +59,8 @@ TactilePoint parse_point(const WordReader& file) {
   return p;
 }
 
-/// Maps a direction on the half z ≥ 0 to its place in the square [-1, 1]². Rings about the pole
-/// become square rings that hold the same share of the area, and an eighth of a ring one half of an
-/// edge.
+/// Maps a direction with z ≥ 0 to its place in the square [-1, 1]². Rings about the pole become
+/// square rings with the same share of the area. An eighth of a ring becomes one half of an edge.
 std::array<double, 2> square_place(const Vector3& n) {
   const double ring = std::sqrt(std::max(0.0, 1 - n[2])), x = std::abs(n[0]), y = std::abs(n[1]);
   const double along = ring * std::atan2(std::min(x, y), std::max(x, y)) * 4 / M_PI;
@@ -126,7 +125,7 @@ std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::
   for (const std::array<int, 3>& t : mesh.triangles) {
     const Vector3 a = vertex(t[0]), ab = vertex(t[1]) - a, ac = vertex(t[2]) - a, bc = ac - ab;
     const Vector3 area = cross(ab, ac);
-    if (!(dot(area, area) > 0)) continue;  // nothing to feel on
+    if (!(dot(area, area) > 0)) continue;  // a point without area feels nothing
     const double longest = std::sqrt(std::max({dot(ab, ab), dot(ac, ac), dot(bc, bc)})),
                  cuts = std::ceil(longest / pitch);
     if (cuts * cuts + double(points.size()) > double(most)) return {};
@@ -137,7 +136,8 @@ std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::
     for (int i = 0; i < n; ++i)
       for (int j = 0; i + j < n; ++j) {
         add(3 * i + 1, 3 * j + 1);
-        if (i + j + 1 < n) add(3 * i + 2, 3 * j + 2);  // the small triangle turned the other way
+        if (i + j + 1 < n)
+          add(3 * i + 2, 3 * j + 2);  // the small triangle with the opposite orientation
       }
   }
   return points;

@@ -10,14 +10,7 @@
 namespace tangere {
 namespace {
 
-template <class T>
-T number(const h5::Id& object, const std::string& name, const std::string& path) {
-  const std::vector<T> values = h5::read_numbers<T>(object, name);
-  if (values.size() != 1) throw IoError(fmt::format("{}: attribute '{}' is damaged", path, name));
-  return values[0];
-}
-
-/// Row `row` of a (rows, E, width) dataset.
+/// Reads row `row` of a (rows, E, width) dataset.
 std::vector<double> read_row(const h5::Id& dataset, std::int64_t row) {
   const h5::Dims dims = h5::dimensions(dataset);
   std::vector<double> values(dims[1] * dims[2]);
@@ -56,15 +49,15 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row) 
     throw IoError(path + ": not a trajectory file of 'tangere simulate'");
   SavedState state;
   state.path = path;
-  const auto steps = number<std::int64_t>(file, "steps", path);
+  const auto steps = h5::read_number<std::int64_t>(file, "steps");
   state.row = row.value_or(steps);
   if (state.row < 0 || state.row > steps)
     throw InputError(fmt::format("row {} of {}; expected 0 to {}", state.row, path, steps));
-  state.step = number<std::int64_t>(file, "first_step", path) + state.row;
-  state.environments = static_cast<int>(number<std::int64_t>(file, "environments", path));
-  state.seed = number<std::uint64_t>(file, "seed", path);
-  state.first_episode = number<std::int64_t>(file, "first_episode", path);
-  state.timestep = number<double>(file, "timestep", path);
+  state.step = h5::read_number<std::int64_t>(file, "first_step") + state.row;
+  state.environments = static_cast<int>(h5::read_number<std::int64_t>(file, "environments"));
+  state.seed = h5::read_number<std::uint64_t>(file, "seed");
+  state.first_episode = h5::read_number<std::int64_t>(file, "first_episode");
+  state.timestep = h5::read_number<double>(file, "timestep");
   state.integrator = h5::read_text(file, "integrator");
   state.scene_text = h5::read_text(file, "scene_text");
   const h5::Id q = h5::open_dataset(file, "q"), v = h5::open_dataset(file, "v");

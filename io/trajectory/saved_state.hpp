@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A row of a trajectory file as the start of another run.
+// Uses a row of a trajectory file as the start of another run.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,12 @@
 
 namespace tangere {
 
-/// Row K of a file: all that the steps after it depend on.
+/// Row K of a file: everything on which the following steps depend.
 struct SavedState {
   std::string path;
-  std::int64_t row = 0;  ///< K
-  std::int64_t step =
-      0;  ///< steps since the very first run of a chain: K of a run that continued none
-  int environments = 0;  ///< E
+  std::int64_t row = 0;   ///< K
+  std::int64_t step = 0;  ///< steps since the first run of a chain; K if the run continued none
+  int environments = 0;   ///< E
   std::uint64_t seed = 0;
   std::int64_t first_episode = 0;
   double timestep = 0;  ///< [s]
@@ -26,16 +25,17 @@ struct SavedState {
   std::vector<std::string> v_names;            ///< (nv)
   std::vector<double> q, v;                    ///< (E, nq), (E, nv)
   std::vector<double> previous_q, previous_v;  ///< of row K - 1; empty for row 0
-  std::vector<StepStatus> status;  ///< (E) of the step that led here; converged for row 0
+  std::vector<StepStatus> status;              ///< (E) of the step to this row; converged for row 0
 };
 
-/// `row` is the last one if not given. Throws IoError for a file that is missing, damaged or not a
-/// trajectory. Throws InputError for a row that does not exist, naming those that do.
+/// Reads `row`, or the last one if it is not given. Throws IoError for a file that is missing,
+/// damaged or not a trajectory. Throws InputError for a row that does not exist, naming the rows
+/// that do.
 SavedState read_state(const std::string& path, std::optional<std::int64_t> row);
 
-/// Puts environment e of a saved state into environment e of a batch. With `continues` it also sets
+/// Copies environment e of a saved state to environment e of a batch. With `continues` it also sets
 /// the row before, so that the next step continues BDF2. An environment that had failed stays
-/// failed. Throws InputError when the coordinates are not those of the model or the batch is larger
+/// failed. Throws InputError when the coordinates do not match the model or the batch is larger
 /// than the file's.
 void restore_state(const SavedState& from, bool continues, Batch& batch);
 

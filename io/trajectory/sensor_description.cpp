@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points are in the order of the field: row k of the list belongs to row k of the field.
+// Points are in the order of the field: entry k of the list belongs to entry k of the field.
 #include "io/trajectory/sensor_description.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What files of either kind say about a tactile sensor.
+// Writes what both kinds of files say about a tactile sensor.
 #pragma once
 
 #include "io/hdf5/h5.hpp"
@@ -7,9 +7,9 @@
 
 namespace tangere {
 
-/// Attributes of `object`: units, components, frame, body, pressure_sign and, of a rectangular
-/// array, where it is. Of a list of points: datasets position, normal, axis0, axis1 (points, 3)
-/// and, if they have an image, pixel (points, 2) below `group`.
+/// Writes attributes of `object`: units, components, frame, body, pressure_sign and, for a
+/// rectangular array, its place. For a list of points, writes the datasets position, normal, axis0,
+/// axis1 (points, 3) and, if they have an image, pixel (points, 2) below `group`.
 void describe_sensor(const h5::Id& object, const h5::Id& group, const SensorLayout& sensor);
 
 }  // namespace tangere

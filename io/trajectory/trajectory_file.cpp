@@ -69,16 +69,11 @@ struct TrajectoryFile::Impl {
       throw IoError(fmt::format("{}: needs at least {} bytes and the disk has {} free", output,
                                 needed, available));
     file = h5::create_file(part.path());
-    try {
-      describe_run();
-      create_trajectory();
-      for (const SensorLayout& s : layout.sensors) create_sensor(s);
-      create_randomized();
-      create_task();
-    } catch (...) {
-      part.empty();
-      throw;
-    }
+    describe_run();
+    create_trajectory();
+    for (const SensorLayout& s : layout.sensors) create_sensor(s);
+    create_randomized();
+    create_task();
   }
 
   template <class T>
@@ -263,10 +258,7 @@ struct TrajectoryFile::Impl {
 TrajectoryFile::TrajectoryFile(const std::string& output, const TrajectoryLayout& layout,
                                bool overwrite)
     : impl_(std::make_unique<Impl>(output, layout, overwrite)) {}
-TrajectoryFile::~TrajectoryFile() {
-  // On a full disk the library can only close its file once there is room again.
-  if (impl_ != nullptr && impl_->file.get() >= 0) impl_->part.empty();
-}
+TrajectoryFile::~TrajectoryFile() = default;
 
 void TrajectoryFile::write(const StateRow& row) {
   Impl& f = *impl_;

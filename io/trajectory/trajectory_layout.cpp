@@ -11,7 +11,7 @@
 namespace tangere {
 namespace {
 
-/// A sum of products that says when it leaves 2^63 instead of wrapping.
+/// A sum of products that reports when it exceeds 2^63 instead of wrapping.
 class Bytes {
  public:
   void add(std::initializer_list<std::int64_t> factors) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// All that a trajectory file says besides its numbers, known before the first step is taken.
+// Everything that a trajectory file says besides its numbers. It is known before the first step.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ namespace tangere {
 struct SensorLayout {
   std::string name;
   std::string body;
-  int rows = 0, cols = 0;  ///< of a rectangular array, points row-major; both 0: a list of points
+  int rows = 0, cols = 0;  ///< of a rectangular array, points row-major; both 0 for a list
   int points = 0;          ///< rows * cols for a rectangular array
   int every = 1;  ///< K: fields are read after steps K, 2K, … of the first run of a chain
   ContactLaw law = ContactLaw::clamped;  ///< decides the unit of its damping
@@ -32,7 +32,7 @@ struct SensorLayout {
   [[nodiscard]] bool rectangular() const { return rows > 0; }
   /// {pitch0, pitch1} [m]; negative when the corners run against an axis, 0 for a single row.
   [[nodiscard]] std::array<double, 2> pitch() const;
-  /// Fields that `steps` steps give after `first_step` of an earlier run.
+  /// Fields that `steps` steps give after `first_step` steps of earlier runs.
   [[nodiscard]] std::int64_t frames(std::int64_t steps, std::int64_t first_step) const {
     return (first_step + steps) / every - first_step / every;
   }
@@ -46,7 +46,7 @@ struct StatusMeaning {
 
 struct TrajectoryLayout {
   std::int64_t steps = 0;       ///< T
-  std::int64_t first_step = 0;  ///< steps before row 0, of the runs that this one continues
+  std::int64_t first_step = 0;  ///< steps before row 0, from runs that this one continues
   int environments = 1;         ///< E
   std::vector<std::string> q_names, q_units;    ///< (nq)
   std::vector<std::string> v_names, v_units;    ///< (nv)
@@ -62,17 +62,17 @@ struct TrajectoryLayout {
   std::string integrator;
   double timestep = 0;   ///< [s]
   double tolerance = 0;  ///< of the scaled residual, dimensionless
-  int every = 0;         ///< the option as given; 0: each sensor's own
+  int every = 0;         ///< the option as given; 0: each sensor's own interval
   std::uint64_t seed = 0;
   std::int64_t first_episode = 0;
   std::string precision, command_line, version, instruction_set;
-  std::optional<TaskSpec> task;  ///< that a policy plays here; none: a scene alone
+  std::optional<TaskSpec> task;  ///< the task that a policy plays; none: only a scene
   std::string policy;            ///< of a task
 
   /// Throws InputError when counts contradict each other or a sensor cannot be a name in a file.
   void check() const;
-  /// Size without compression, of all but the tactile fields and of everything [bytes].
-  /// Throws InputError when the size is beyond 2^63.
+  /// Size without compression of everything except the tactile fields, and of everything [bytes].
+  /// Throws InputError when the size exceeds 2^63.
   [[nodiscard]] std::uint64_t bytes_without_tactile() const;
   [[nodiscard]] std::uint64_t bytes() const;
 };
@@ -80,7 +80,7 @@ struct TrajectoryLayout {
 /// What the model and the batch do not know about a run.
 struct RunDescription {
   std::int64_t steps = 0, first_step = 0;
-  int every = 0;                       ///< the option as given; 0: each sensor's own
+  int every = 0;                       ///< the option as given; 0: each sensor's own interval
   std::vector<int> tactile_intervals;  ///< K in force, one per sensor
   std::string precision, command_line, version, instruction_set;
   std::optional<TaskSpec> task;

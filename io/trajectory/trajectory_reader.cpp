@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "engine/base/error.hpp"
 #include "io/files/nearest_name.hpp"
@@ -14,7 +15,8 @@ namespace tangere {
 
 namespace {
 constexpr std::int64_t kLargestImage = std::int64_t{1} << 30;  // pixels along one side
-}
+constexpr hsize_t kMostPoints = hsize_t{1} << 26;              // of a sensor
+}  // namespace
 
 struct TrajectoryReader::Impl {
   std::string path, scene_name;
@@ -29,8 +31,8 @@ struct TrajectoryReader::Impl {
         h5::read_text(file, "format") != "tangere trajectory")
       throw IoError(path + ": not a trajectory file of 'tangere simulate'");
     scene_name = h5::read_text(file, "scene_name");
-    environments = one<std::int64_t>(file, "environments");
-    timestep = one<double>(file, "timestep");
+    environments = h5::read_number<std::int64_t>(file, "environments");
+    timestep = h5::read_number<double>(file, "timestep");
     if (!h5::has_link(file, "tactile")) return;
     const h5::Id group = h5::open_group(file, "tactile");
     H5G_info_t info;
@@ -44,14 +46,7 @@ struct TrajectoryReader::Impl {
     }
   }
 
-  template <class T>
-  T one(const h5::Id& object, const std::string& name) const {
-    const std::vector<T> values = h5::read_numbers<T>(object, name);
-    if (values.empty()) throw IoError(path + ": attribute '" + name + "' is empty");
-    return values[0];
-  }
-
-  /// What a picture of a list of points needs.
+  /// Reads what a picture of a list of points needs.
   void read_image(const h5::Id& group, SensorLayout& s) const {
     const auto n = static_cast<hsize_t>(s.points);
     s.list.resize(n);
@@ -67,6 +62,7 @@ struct TrajectoryReader::Impl {
     const auto vectors = [&](const char* name, Vector3 TactilePoint::*to) {
       std::vector<double> x(3 * n);
       h5::read_box<double>(h5::open_dataset(group, name), {0, 0}, {n, 3}, x.data());
+      check_finite(x, s.name, name);
       for (std::size_t p = 0; p < n; ++p) std::copy_n(&x[3 * p], 3, (s.list[p].*to).begin());
     };
     vectors("position", &TactilePoint::position);
@@ -74,19 +70,43 @@ struct TrajectoryReader::Impl {
     vectors("axis1", &TactilePoint::axis1);
   }
 
+  void check_finite(const std::vector<double>& x, const std::string& sensor,
+                    const std::string& what) const {
+    for (const double number : x)
+      if (!std::isfinite(number))
+        throw IoError(
+            fmt::format("{}: sensor '{}': {} has a number that is {}; expected finite "
+                        "numbers",
+                        path, sensor, what, number));
+  }
+
   void add_sensor(const h5::Id& group, const std::string& name) {
     const h5::Id force = h5::open_dataset(group, "force");
     SensorLayout s;
     s.name = name;
     s.body = h5::read_text(force, "body");
-    s.pressure_sign = static_cast<int>(one<std::int64_t>(force, "pressure_sign"));
-    s.every = static_cast<int>(one<std::int64_t>(force, "every"));
+    s.pressure_sign = static_cast<int>(h5::read_number<std::int64_t>(force, "pressure_sign"));
+    s.every = static_cast<int>(h5::read_number<std::int64_t>(force, "every"));
     const auto copy = [&](const char* attribute, std::array<double, 3>& to) {
       const std::vector<double> x = h5::read_numbers<double>(force, attribute);
       if (x.size() != 3) throw IoError(path + ": attribute '" + attribute + "' is damaged");
+      check_finite(x, name, attribute);
       std::copy(x.begin(), x.end(), to.begin());
     };
     const h5::Dims dims = h5::dimensions(force);
+    if (s.every < 1)
+      throw IoError(fmt::format("{}: sensor '{}' is read every {} steps; expected 1 or more", path,
+                                name, s.every));
+    // No run writes larger ones: what this guards are products of what a damaged file claims.
+    for (std::size_t i = 2; i < dims.size(); ++i)
+      if (dims[i] > kMostPoints)
+        throw IoError(
+            fmt::format("{}: sensor '{}' claims {} points along one side", path, name, dims[i]));
+    if (dims.size() == 5 && dims[2] * dims[3] > kMostPoints)
+      throw IoError(fmt::format("{}: sensor '{}' claims {} points", path, name, dims[2] * dims[3]));
+    if (dims.size() > 1 && dims.back() != 3)
+      throw IoError(fmt::format("{}: sensor '{}' has {} numbers a point; expected 3", path, name,
+                                dims.back()));
     if (dims.size() == 5) {
       s.rows = static_cast<int>(dims[2]);
       s.cols = static_cast<int>(dims[3]);
@@ -155,6 +175,7 @@ std::vector<double> TrajectoryReader::force(std::size_t sensor, std::int64_t fra
     count.insert(count.end(), {static_cast<hsize_t>(s.points), 3});
   }
   h5::read_box<double>(impl_->open(sensor, "force"), offset, count, values.data());
+  impl_->check_finite(values, s.name, fmt::format("frame {}", frame));
   return values;
 }
 

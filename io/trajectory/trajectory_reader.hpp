@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads trajectory files back: what a plot needs, one field at a time.
+// Reads trajectory files back for plots, one field at a time.
 #pragma once
 
 #include <cstdint>
@@ -26,9 +26,9 @@ class TrajectoryReader {
   /// Index of a sensor; "" is the first. Throws InputError that names the sensors of the file.
   [[nodiscard]] std::size_t find_sensor(const std::string& name) const;
   [[nodiscard]] std::int64_t frames(std::size_t sensor) const;
-  /// Row of /q that a frame was read from.
+  /// Returns the row of /q from which a frame was read.
   [[nodiscard]] std::int64_t step(std::size_t sensor, std::int64_t frame) const;
-  /// (points, 3) [N].
+  /// Returns a field, (points, 3) [N].
   [[nodiscard]] std::vector<double> force(std::size_t sensor, std::int64_t frame,
                                           std::int64_t environment) const;
 

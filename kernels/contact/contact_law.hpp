@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The penalty law of one point, over any number type (docs/contact.md): contacts, the ground,
-// tactile points and their reverse all take it from here.
+// The penalty law of one point, over any number type (docs/contact.md). Contacts, the ground,
+// tactile points and their reverse mode all use it.
 //
-//   N(d, ḋ) the normal force, d < 0 the penetration;  f = N n + f_t
-//   R = (-k_n + k_d ḋ) d, law linear: -k_n d - c ḋ, c fading below the ramp
-//   N = max(0, R), paper: R
+//   N(d, ḋ) is the normal force, d < 0 the penetration;  f = N n + f_t
+//   R = (-k_n + k_d ḋ) d;  law linear: R = -k_n d - c ḋ, where c fades at depths below the ramp
+//   N = max(0, R);  law paper: N = R
 //   f_t = -k_t v_t            if k_t |v_t| ≤ μ |N|    (stick; also at v_t = 0 and on the kink)
 //       = -μ |N| v_t / |v_t|  else                    (slip)
-//   law linear with ramp 0 takes μ k_n |d| as its friction bound, as published.
+// With ramp 0, law linear takes μ k_n |d| as its friction bound, as published.
 #pragma once
 
 #include "kernels/contact/contact_types.hpp"
@@ -20,12 +20,12 @@ template <class N>
 struct LawParameters : Coefficients<N> {
   ContactLaw law;
   double ramp;
-  /// Whether slipping points bring the derivative of -scale v_t (1) or, by its secant, -scale alone
-  /// (0).
+  /// At slipping points, 1 takes the derivative of -scale v_t, and 0 takes its secant, -scale.
   N friction_tangent = N(1.0);
 };
 
-/// How a b + c is rounded: contacts of bodies twice, tactile points once where lanes fuse.
+/// How a b + c is rounded. Contacts of bodies round twice. Tactile points round once where lanes
+/// fuse.
 struct Rounded {
   template <class N>
   static N add(const N& a, const N& b, const N& c) {
@@ -47,7 +47,8 @@ struct Fused {
   }
 };
 
-/// R, wherever the point is; `damping` of the linear law with its ramp.
+/// Returns R whether or not the point touches. `damping` of the linear law already includes its
+/// ramp.
 template <class Rounding, class N>
 [[gnu::always_inline]] inline N raw_force(ContactLaw law, const N& minus_kn, const N& damping,
                                           const N& d, const N& rate) {
@@ -55,8 +56,8 @@ template <class Rounding, class N>
   return Rounding::add(damping, rate, minus_kn) * d;
 }
 
-/// N and the friction bound over μ of a tactile point, whose linear law is the published one. d = 0
-/// gives zeros.
+/// Computes N and the friction bound divided by μ for a tactile point. Its linear law is the
+/// published one. d = 0 gives zeros.
 template <ContactLaw Law, class N, class M>
 void normal_force_alone(const N& minus_kn, const N& damping, const N& d, const N& rate,
                         const M& touching, N& force, N& bound) {
@@ -70,20 +71,20 @@ void normal_force_alone(const N& minus_kn, const N& damping, const N& d, const N
   }
 }
 
-/// f_t = -scale v_t: the smaller of k_t and μ B/|v_t|. `square` = |v_t|², above zero.
+/// Returns the scale in f_t = -scale v_t: the smaller of k_t and μ B/|v_t|. `square` = |v_t|² > 0.
 template <class N>
 N friction_scale(const N& kt, const N& mu, const N& bound, const N& square) {
   return min(kt, mu * bound * inverse_sqrt(square));
 }
 
-/// N and the friction bound over μ, with their slopes.
+/// N and the friction bound divided by μ, with their slopes.
 template <class N>
 struct NormalForce {
   N force, d_slope, rate_slope;  ///< N, ∂N/∂d, ∂N/∂ḋ
   N bound, bound_d, bound_rate;  ///< B with |f_t| ≤ μ B, and its slopes
 };
 
-/// Values for d < 0; zero force and slopes elsewhere and where clamped.
+/// Returns the values for d < 0. Force and slopes are zero elsewhere and where the law clamps.
 template <class N>
 NormalForce<N> normal_force(const LawParameters<N>& p, const N& d, const N& rate) {
   const N zero(0.0);
@@ -126,8 +127,8 @@ NormalForce<N> normal_force(const LawParameters<N>& p, const N& d, const N& rate
   return r;
 }
 
-/// From cotangents of N and of B to those of k_n and k_d. Zero where the normal
-/// force is clamped.
+/// Turns cotangents of N and B into those of k_n and k_d. They are zero where the normal force is
+/// clamped.
 template <class N>
 void pull_back_normal_force(const LawParameters<N>& p, const N& d, const N& rate,
                             const NormalForce<N>& at, const N& force, const N& bound,
@@ -152,7 +153,7 @@ void pull_back_normal_force(const LawParameters<N>& p, const N& d, const N& rate
   out.damping = mul_add(active * both, d * rate, out.damping);
 }
 
-/// f_t = -scale v_t, and what its derivative needs.
+/// f_t = -scale v_t, with what its derivative needs.
 template <class N>
 struct Friction {
   N scale;            ///< k_t when sticking, μ B / |v_t| when slipping
@@ -160,7 +161,7 @@ struct Friction {
   Vec3<N> direction;  ///< v_t / |v_t| where slip is 1, else 0
 };
 
-/// `square` = |v_t|², `inverse_speed` = 1/|v_t|, finite at v_t = 0.
+/// `square` = |v_t|². `inverse_speed` = 1/|v_t|, finite at v_t = 0.
 template <class N>
 Friction<N> friction(const LawParameters<N>& p, const NormalForce<N>& normal, const Vec3<N>& vt,
                      const N& square, const N& inverse_speed) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a scene and a kernel share: which law a contact follows, its coefficients, which shape is
+// Types that scenes and kernels share: contact laws, their coefficients and the shapes that can be
 // touched.
 #pragma once
 
@@ -15,8 +15,8 @@ enum class ContactLaw : std::uint8_t {
   linear,   ///< max(0, -kn d - c min(1, |d|/ramp) ḋ); ramp = 0 is the published ground law
 };
 
-/// Coefficients of a contact or a tactile sensor, and what there is one of for each of them, in the
-/// one order that they have everywhere.
+/// Coefficients of a contact or a tactile sensor, or one value for each of them. The order is the
+/// same everywhere.
 template <class N>
 struct Coefficients {
   N kn;       ///< normal stiffness [N/m]
@@ -35,14 +35,14 @@ struct Coefficients {
 };
 inline constexpr int kCoefficients = 4;
 
-/// f of each of them, in order.
+/// Applies f to each coefficient, in order.
 template <class N, class F>
 [[gnu::always_inline]] inline auto transformed(const Coefficients<N>& c, const F& f)
     -> Coefficients<decltype(f(c.kn))> {
   return {f(c.kn), f(c.kt), f(c.mu), f(c.damping)};
 }
 
-/// Shapes with a signed distance that a contact or tactile point may touch.
+/// Shapes with a signed distance, which contact points and tactile points can touch.
 enum class PrimitiveShape : std::uint8_t { sphere, cuboid, plane, cylinder, capsule, ellipsoid };
 inline constexpr int kPrimitiveShapes = 6;
 

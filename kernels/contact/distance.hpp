@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shapes, and the one place that chooses between them.
+// The list of shapes, and the one place that chooses between them.
 #pragma once
 
 #include <array>
@@ -34,19 +34,19 @@ auto with_distance_of(PrimitiveShape shape, const Vec3<N>& size, const F& f,
     if (shape != First<N>::kShape) return with_distance_of<N>(shape, size, f, ShapeList<Rest...>{});
   return f(First<N>::of(size));
 }
-/// Calls f with the distance of a shape; `size` as in PairContact.
+/// Calls f with the distance of a shape. `size` is as in PairContact.
 template <class N, class F>
 auto with_distance(PrimitiveShape shape, const Vec3<N>& size, const F& f) {
   return with_distance_of<N>(shape, size, f, Shapes{});
 }
-/// The same size in every lane.
+/// The same with one size for every lane.
 template <class N, class F>
 requires(!std::is_same_v<N, double>) auto with_distance(PrimitiveShape shape,
                                                         const Vec3<double>& size, const F& f) {
   return with_distance<N>(shape, broadcast<N>(size), f);
 }
 
-/// Value and gradient alone.
+/// Returns value and gradient alone.
 template <class Shape, class N>
 Distance<N> distance_at(const Shape& shape, const Vec3<N>& y) {
   N curvature, straight;
@@ -59,7 +59,7 @@ Distance<N> distance_at(const Shape& shape, const Vec3<N>& y) {
   }
 }
 
-/// f<Pad>() of what every shape is under a pad, in the order of PrimitiveShape.
+/// Returns f<Pad>() for the Pad of every shape, in the order of PrimitiveShape.
 template <class P, class F, template <class> class... S>
 constexpr auto by_pad(const F& f, ShapeList<S...>) {
   return std::array{f.template operator()<typename S<double>::template Pad<P>>()...};

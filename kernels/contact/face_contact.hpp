@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of body 1 against faces: planes, cuboids and cylinders, whose surface bends in one
-// direction at most.
+// Points of body 1 against faces: planes, cuboids and cylinders. Their surface bends in at most one
+// direction.
 //
-// Inside, H = κ a aᵀ with a the unit vector around a cylinder's side (κ = 0 on flat faces).
-// Everything is in body 1's axes;
-// ε = (θ; ρ), δW and the rest as in kernels/contact/pair_contact.hpp. A vector b at a place x is
-// the wrench b̃ = (x × b; b), so that
-// b·(ρ + θ × x) = b̃·ε. At the surface point x = ξ - d n, with h = a·(ρ + θ × ξ):
+// Inside, H = κ a aᵀ, where a is the unit vector around a cylinder's side (κ = 0 on flat faces).
+// Everything is in body 1's axes. ε = (θ; ρ), δW and the other symbols are as in
+// kernels/contact/pair_contact.hpp. A vector b at a place x is written as the wrench
+// b̃ = (x × b; b), so that b·(ρ + θ × x) = b̃·ε. At the surface point x = ξ - d n, with
+// h = a·(ρ + θ × ξ):
 //   δd = -ñ·ε,  δn = θ × n - κ a h,  δx = n (ñ·ε) - d δn,  δu = -Γ δW - ω × δx
 //   ∂f/∂u = α nᵀ + s t tᵀ - s I,  α = A n - γ t,  A = ∂N/∂ḋ + s,  γ = μ ∂B/∂ḋ,  m = N + ḋ s
 //   M v = m v - d s ω × v + α (v_t + d n × ω)·v + s t (-ḋ t + d t × ω)·v
-//       for v ⊥ n: what δn = v does to f
+//     where M v is what δn = v ⊥ n does to f
 // so that δf = p (ñ·ε) + M(θ × n) + r h - ∂f/∂u Γ δW, with
 //   p = -∂N/∂d n + μ ∂B/∂d t + s (ω × n) - s t (t·(ω × n)),  r = -κ M a
 //   M(θ × n) = m θ × n + d s (n ωᵀ - (n·ω) I) θ + α e·θ + s t e_t·θ
@@ -45,9 +45,9 @@ struct FaceMotion {
   [[no_unique_address]] Shape<N> shape;
 };
 
-/// What one point adds to the sums: exact zeros if it does not touch. Numbers throughout: those of
-/// the value, those of the derivative, those that only slipping points set, those that only bent
-/// faces set.
+/// What one point adds to the sums. All are exact zeros if it does not touch. The struct consists
+/// of numbers only, in this order: those of the value, those of the derivative, those that only
+/// slipping points set, those that only bent faces set.
 template <class N, bool Bent>
 struct FacePoint {
   using Number = N;
@@ -64,7 +64,7 @@ struct FacePoint {
   static constexpr int kBent = kSlipping + (Bent ? 12 : 0), kNumbers = kSlipping + 12;
 };
 
-/// Blocks {torque, force} × {angular, linear} of a sum of products of two wrenches.
+/// Sum of products of two wrenches, in blocks {torque, force} × {angular, linear}.
 template <class N>
 struct ProductSums {
   Mat3<N> m[2][2];
@@ -88,8 +88,8 @@ struct TurnSums {
   Vec3<N> dn, dxn, dwx;
 };
 
-/// Every sum runs over the points in order, so that chunks may be cut anywhere: what all touching
-/// points add and what slipping ones add are kept apart until the end.
+/// Every sum runs over the points in order, so chunks may be cut anywhere. What all touching points
+/// add and what slipping points add are kept apart until the end.
 template <class N>
 struct FaceSums {
   Vec3<N> f, xf;
@@ -122,7 +122,7 @@ void clear(FaceSums<N>& s) {
   }
 }
 
-/// Between the three passes of a chunk.
+/// What the three passes of a chunk hand to each other.
 template <class N>
 struct FacePass {
   Vec3<N> xi, n, x, vt, a;
@@ -159,7 +159,7 @@ void find_slide(const FaceMotion<Shape, N>& z, const typename FaceMotion<Shape, 
   pass.inverse_speed = inverse_sqrt(pass.square);
 }
 
-/// r̃ and ã of a bent face where nothing slips; `out` has f, x and s already.
+/// Sets r̃ and ã of a bent face where nothing slips. `out` already has f, x and s.
 template <class N>
 void bend(const Vec3<N>& omega, const FacePass<N>& pass, const N& m, const N& slope,
           FacePoint<N, true>& out) {
@@ -171,8 +171,8 @@ void bend(const Vec3<N>& omega, const FacePass<N>& pass, const N& m, const N& sl
   out.xa = cross(pass.xi, a);
 }
 
-/// What slipping adds to p and sets in `out`. `gamma`, `gamma_d`: μ ∂B/∂ḋ, μ ∂B/∂d; all zero where
-/// nothing slips.
+/// Adds what slipping contributes to p and sets the numbers of slipping points in `out`. `gamma`
+/// and `gamma_d` are μ ∂B/∂ḋ and μ ∂B/∂d. All are zero where nothing slips.
 template <bool Bent, class N>
 void slip(const Vec3<N>& omega, const FacePass<N>& pass, const Vec3<N>& t, const N& gamma,
           const N& gamma_d, FacePoint<N, Bent>& out) {
@@ -194,7 +194,7 @@ void slip(const Vec3<N>& omega, const FacePass<N>& pass, const Vec3<N>& t, const
   }
 }
 
-/// Force and what its derivative needs; where the point slips.
+/// Computes the force and what its derivative needs. Returns where the point slips.
 template <bool Derivatives, template <class> class Shape, class N>
 auto find_force(const FaceMotion<Shape, N>& z, const LawParameters<N>& law, const FacePass<N>& pass,
                 typename FaceMotion<Shape, N>::Point& out) {
@@ -296,13 +296,13 @@ template <bool Derivatives, bool Bent, class N>
   }
 }
 
-/// The trace of M times the unit matrix, less M.
+/// Returns the trace of M times the unit matrix, minus M.
 template <class N>
 Mat3<N> trace_less(const Mat3<N>& m) {
   return diagonal(m.m[0][0] + m.m[1][1] + m.m[2][2]) - m;
 }
 
-/// Adds wrench, stiffness and damping of all faces that move alike.
+/// Adds wrench, stiffness and damping of all faces with the same motion.
 template <bool Derivatives, class N>
 void add_finished(const Vec6<N>& W, const FaceSums<N>& s, PairSums<N>& out) {
   out.wrench.l += s.f;

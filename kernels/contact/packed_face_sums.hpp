@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The face sums of a lone lane, eight of them in a vector: a product of two wrenches is six vectors
-// instead of 36 numbers. Numbers are added in the same order and with the same roundings as in
-// FaceSums, so the bits are the same.
+// The face sums of a lone lane, packed eight to a vector: a product of two wrenches takes six
+// vectors instead of 36 numbers. Numbers are added in the same order and with the same roundings as
+// in FaceSums, so the bits are the same.
 #pragma once
 
 #include "kernels/contact/face_contact.hpp"
@@ -10,9 +10,9 @@
 
 namespace tangere::kernels {
 
-/// Row i of a product: component i of its left wrench (force, then torque) times its right wrench
-/// in lanes 0 … 5. Columns k of a product with a vector: component k of the vector times the
-/// wrench. Other lanes hold leftovers.
+/// In the sum of products of two wrenches, row i is component i of the left wrench (force, then
+/// torque) times the right wrench, which fills lanes 0 … 5. In the sum of products of a wrench with
+/// a vector, column k is component k of the vector times the wrench. Other lanes hold leftovers.
 template <class A>
 struct PackedFaceSums {
   using N = Lanes<A>;
@@ -30,12 +30,12 @@ void clear(PackedFaceSums<A>& s) {
   for (std::size_t i = 0; i < count; ++i) all[i] = Lanes<A>(0.0);
 }
 
-/// Eight numbers of a point from a vector on.
+/// Loads eight numbers of a point, starting at a vector.
 template <class A>
 Lanes<A> eight_from(const Vec3<OneLane<A>>& first) {
   return load_lanes_anywhere<A>(&first.x.x);
 }
-/// sum[i] += left_i right for `Count` numbers from a vector on.
+/// sum[i] += left_i right for `Count` numbers, starting at a vector.
 template <int Count, class A>
 [[gnu::always_inline]] inline void add_products(Lanes<A> (&sum)[Count],
                                                 const Vec3<OneLane<A>>& left,
@@ -76,7 +76,7 @@ void add_chunk(PackedFaceSums<A>& sums, const PointChunk<FacePoint<OneLane<A>, B
   sums = s;
 }
 
-/// The same sums one by one.
+/// Returns the same sums number by number.
 template <bool Derivatives, class A>
 FaceSums<OneLane<A>> unpacked(const PackedFaceSums<A>& s) {
   const auto at = [](const Lanes<A>& row, int i) {
@@ -85,7 +85,7 @@ FaceSums<OneLane<A>> unpacked(const PackedFaceSums<A>& s) {
   const auto vector = [&](const Lanes<A>& row, int first) {
     return Vec3<OneLane<A>>{at(row, first), at(row, first + 1), at(row, first + 2)};
   };
-  // Block of rows and columns from (row, column) on.
+  // The 3×3 block that starts at (row, column).
   const auto block = [&](const Lanes<A>* rows, int row, int column) {
     Mat3<OneLane<A>> m;
     for (int i = 0; i < 3; ++i)
@@ -101,7 +101,7 @@ FaceSums<OneLane<A>> unpacked(const PackedFaceSums<A>& s) {
                                      block(rows, 3, 0)};
   };
   const auto product =
-      [&](const Lanes<A>* rows) {  // torques stand first in blocks, forces in vectors
+      [&](const Lanes<A>* rows) {  // torques come first in blocks, forces in vectors
         return ProductSums<OneLane<A>>{
             {{block(rows, 3, 3), block(rows, 3, 0)}, {block(rows, 0, 3), block(rows, 0, 0)}}};
       };
@@ -124,12 +124,12 @@ FaceSums<OneLane<A>> unpacked(const PackedFaceSums<A>& s) {
   return out;
 }
 
-/// Spheres keep their sums one by one.
+/// Spheres do not pack their sums.
 template <bool Derivatives, class A>
 const SphereSums<OneLane<A>>& unpacked(const SphereSums<OneLane<A>>& s) {
   return s;
 }
-/// How a lone lane keeps a family's sums.
+/// The type in which a lone lane keeps the sums of a family of shapes.
 template <template <class> class Sums, class A>
 struct OwnSums {
   using Type = Sums<OneLane<A>>;

@@ -2,14 +2,13 @@
 // Force and derivative of one touching point, and their sums over a pair of bodies.
 //
 // Everything is in the axes of body 1, which carries the point ξ. G = (Q, c) is body 2's shape
-// frame there, W = (ω; v)
-// the twist of body 2 relative to body 1 at body 1's origin. d, n = distance and gradient at ξ; x₂
-// = ξ - d n is the nearest point on the touched surface, where velocities are compared and forces
-// act:
+// frame there. W = (ω; v) is the twist of body 2 relative to body 1 at body 1's origin. d and n are
+// distance and gradient at ξ. x₂ = ξ - d n is the nearest point on the touched surface. Velocities
+// are compared there, and forces act there:
 //   u = -(v + ω × x₂)  velocity of body 1 relative to body 2 at x₂;  ḋ = n·u;  v_t = u - ḋ n;
-//       f on body 1.
-// Derivative with respect to ε = (θ; ρ), the displacement of body 2 relative to body 1, and to δW.
-// With ρ₂ = ρ + θ × x₂ the displacement of body 2's material at x₂, and H the Hessian of d:
+//     f acts on body 1.
+// Derivatives are by ε = (θ; ρ), the displacement of body 2 relative to body 1, and by δW. With
+// ρ₂ = ρ + θ × x₂ the displacement of body 2's material at x₂, and H the Hessian of d:
 //   δd = -n·ρ₂,  δn = -H ρ₂ + (I - dH)(θ × n),  δx₂ = -δd n - d δn,  δu = -(δv + δω × x₂) - ω × δx₂
 //   δḋ = δn·u + n·δu,  δv_t = δu - δḋ n - ḋ δn,  δN = N_d δd + N_ḋ δḋ
 //   δf = δN n + N δn + δf_t,  δf_t = -s (δv_t - t (t·δv_t)) - μ t δB
@@ -22,7 +21,7 @@
 
 namespace tangere::kernels {
 
-/// What a point of body 1 meets on body 2, in body 1's axes.
+/// How a point of body 1 meets body 2, in body 1's axes.
 template <class N>
 struct PointContact {
   N d, rate;  ///< d, ḋ
@@ -35,7 +34,7 @@ struct PointContact {
   Mat3<N> hessian;  ///< Bending::general only: H
 };
 
-/// Distance, velocities and force at ξ. `Q`, `c`: shape frame in body 1; `omega`, `v`: W.
+/// Computes distance, velocities and force at ξ. `Q`, `c`: shape frame in body 1. `omega`, `v`: W.
 template <class Shape, class N>
 PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, const Mat3<N>& Q,
                               const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
@@ -57,7 +56,7 @@ PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, c
     p.d = at.d;
     p.n = Q * at.n;
     p.hessian = Q * shape.hessian(at) * transpose(Q);
-  } else {  // a sphere looks the same from every side
+  } else {  // a sphere has no orientation
     const Distance<N> at = shape.evaluate(arm, p.curvature);
     p.d = at.d;
     p.n = at.n;
@@ -73,8 +72,8 @@ PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, c
   return p;
 }
 
-/// Sums over the points of a pair, in body 1's axes about its origin: wrench, and 6×6 stiffness and
-/// damping in blocks {torque, force} × {angular, linear}.
+/// Sums over the points of a pair, in body 1's axes about its origin: the wrench, and 6×6 stiffness
+/// and damping in blocks {torque, force} × {angular, linear}.
 template <class N>
 struct PairSums {
   Vec6<N> wrench;
@@ -90,13 +89,13 @@ struct PairSums {
   }
 };
 
-/// Derivatives of the force: ∂f/∂u at fixed geometry, and ∂f, ∂x₂ by ρ₂ and θ.
+/// Derivatives of the force: ∂f/∂u at fixed geometry; ∂f and ∂x₂ by ρ₂ and θ.
 template <class N>
 struct PointDerivative {
   Mat3<N> f_u, f_rho, f_theta, x_rho, x_theta;
 };
 
-/// ∂f by n, u and d at a point.
+/// Derivatives of f by n, u and d at a point.
 template <class N>
 struct ForceDerivative {
   Mat3<N> by_n, by_u;
@@ -129,7 +128,7 @@ PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact
   Mat3<N> n_rho, n_theta;
   if constexpr (Shape::kBending == Bending::general) {
     n_rho = -p.hessian;
-    // Fused by hand: sums of products with alternating signs are what GCC 12 fuses by itself in one
+    // Products are fused by hand. GCC 12 fuses sums of products with alternating signs in one
     // number type and not in the other, whatever -ffp-contract says.
     const Mat3<N> turned = times_skew(p.hessian, n), turn = skew(n);
     for (int i = 0; i < 3; ++i)
@@ -173,7 +172,7 @@ void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& l
     r.f_u = gate * r.f_u;
     r.f_rho = gate * r.f_rho;
     r.f_theta = gate * r.f_theta;
-    // By ε = (θ; ρ): ρ₂ = ρ - [x₂]θ.  By δW = (δω; δv): δu = -(δv - [x₂]δω).
+    // By ε = (θ; ρ): ρ₂ = ρ - [x₂]θ. By δW = (δω; δv): δu = -(δv - [x₂]δω).
     const Mat3<N> f_eps_a = r.f_theta - times_skew(r.f_rho, p.x2);
     const Mat3<N> f_w_a = times_skew(r.f_u, p.x2);
     const Mat3<N> x_eps_a = r.x_theta - times_skew(r.x_rho, p.x2);
@@ -189,9 +188,10 @@ void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& l
   }
 }
 
-/// A point or a sphere on the ground, with velocity and force at the body's own point ξ = ξ_c - r m
-/// (r = 0: a material point), p.x2. m = Rᵀ n_ground, `height` = n·(p - ground point), V = body
-/// twist, all in body axes. False where no lane touches; then `p` holds d alone.
+/// Computes a point or a sphere on the ground, with velocity and force at the body's own point
+/// p.x2 = ξ = ξ_c - r m (r = 0: a material point). m = Rᵀ n_ground, `height` = n·(p - ground point)
+/// and V = body twist, all in body axes. Returns false where no lane touches; then `p` holds d
+/// alone.
 template <class N>
 bool ground_contact(const LawParameters<N>& law, const Vec3<N>& m, const N& height,
                     const Vec6<N>& V, const Vec3<N>& centre, const N& radius, PointContact<N>& p) {
@@ -210,11 +210,10 @@ bool ground_contact(const LawParameters<N>& law, const Vec3<N>& m, const N& heig
   return true;
 }
 
-/// Its sums.
-///   δm = m × θ, δξ = -r m × θ, δd = m·(ρ + θ × ξ_c), u = v + ω × ξ, ḋ = m·u     (θ, ρ of the body
-///   itself)
-/// In the pair's convention body 2 is the ground: ε = -δ₁, δW = -δV₁, hence the signs of k and d.
-/// False where no lane touches.
+/// Adds it to the sums. With θ and ρ of the body itself:
+///   δm = m × θ, δξ = -r m × θ, δd = m·(ρ + θ × ξ_c), u = v + ω × ξ, ḋ = m·u
+/// In the pair's convention body 2 is the ground: ε = -δ₁, δW = -δV₁. Hence the signs of k and d.
+/// Returns false where no lane touches.
 template <bool Derivatives, class N>
 bool accumulate_ground(PairSums<N>& sums, const LawParameters<N>& law, const Vec3<N>& m,
                        const N& height, const Vec6<N>& V, const Vec3<N>& centre, const N& radius) {

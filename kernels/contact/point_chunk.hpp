@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A few contact points on their way through the law and into the sums of their pair.
+// A few contact points that go together through the law and into the sums of their pair.
 //
-// A family of shapes brings a Motion (numbers only, the same for all points), its Point, Pass and
+// A family of shapes provides a Motion (numbers only, the same for all points), its Point, Pass and
 // Sums, and
 //   find_distance(motion, ξ, point, pass)    distance and normal; returns where the point touches
 //   find_slide(motion, point, pass)          velocities
@@ -22,14 +22,14 @@ struct PointChunk {
   using N = typename P::Number;
   using Mask = decltype(std::declval<N>() < std::declval<N>());
   static constexpr int kPoints =
-      sizeof(N) == sizeof(double) ? 8 : 4;  // of lanes, what the first-level cache holds
+      sizeof(N) == sizeof(double) ? 8 : 4;  // as many of lanes as the first-level cache holds
   P point[kPoints];
-  Mask touch[kPoints], slip[kPoints];        ///< lane by lane, where some lane touches
-  int touching[kPoints], slipping[kPoints];  ///< which touch, and which of them slip, in some lane
+  Mask touch[kPoints], slip[kPoints];        ///< the lanes in which a point touches and slips
+  int touching[kPoints], slipping[kPoints];  ///< indices of points that touch or slip in some lane
   int count = 0, slips = 0;
 };
 
-/// Takes `count` ≤ kPoints points through the law. Each pass waits for one root, so that roots of
+/// Evaluates the law at `count` ≤ kPoints points. Each pass waits for one root, so roots of
 /// different points overlap.
 template <bool Derivatives, class Motion, class N>
 void fill_chunk(const Motion& z, const LawParameters<N>& law, const Vec3<N>* xi, int count,
@@ -49,8 +49,8 @@ void fill_chunk(const Motion& z, const LawParameters<N>& law, const Vec3<N>* xi,
   }
 }
 
-// The sums below live in registers, which GCC's own limits on inlining would make a matter of
-// chance.
+// The sums below live in registers. They are inlined by force, because GCC's own limits on inlining
+// would make that a matter of chance.
 template <class N>
 [[gnu::always_inline]] inline void add_outer(Mat3<N>& sum, const Vec3<N>& a, const Vec3<N>& b) {
   const N x[3] = {a.x, a.y, a.z}, y[3] = {b.x, b.y, b.z};
@@ -63,7 +63,7 @@ template <class N>
 struct UpperTriangle {
   N m[6];
 };
-/// a bᵀ, known to be symmetric.
+/// Adds a bᵀ, which is known to be symmetric.
 template <class N>
 [[gnu::always_inline]] inline void add_upper(UpperTriangle<N>& sum, const Vec3<N>& a,
                                              const Vec3<N>& b) {
@@ -79,7 +79,7 @@ Mat3<N> full(const UpperTriangle<N>& s) {
   return {{{s.m[0], s.m[1], s.m[2]}, {s.m[1], s.m[3], s.m[4]}, {s.m[2], s.m[4], s.m[5]}}};
 }
 
-/// Adds points one after the other to a few sums, which stay in registers: f(sum, point).
+/// Adds points one after the other to a few sums that stay in registers: f(sum, point).
 template <class Sum, class P, class F>
 [[gnu::always_inline]] inline void add_each(Sum& sum, const P* point, const int* which, int count,
                                             const F& f) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of body 1 against a sphere of body 2, about the sphere's centre c, where most of a point's
-// derivative vanishes.
+// Points of body 1 against a sphere of body 2. Sums are taken about the sphere's centre c, where
+// most of a point's derivative vanishes.
 //
-// D = ξ - c = (r + d) n, forces act at c + r n, and with q = -(v + ω × c), o = -r ω, the same for
-// all points,
+// D = ξ - c = (r + d) n, and forces act at c + r n. With q = -(v + ω × c) and o = -r ω, which are
+// the same for all points,
 //   u = q + o × n,  ḋ = n·q,  v_t = u - ḋ n,  f = N n - s v_t,  moment about c: r n × f
 //   κ = 1/|D|,  γ = μ ∂B/∂ḋ,  t = v_t/|v_t| when slipping, else 0,  b = n × t,
 //       α = (∂N/∂ḋ + s) n - γ t,  e = t × o - ḋ t
@@ -12,7 +12,7 @@
 //   ∂f/∂D = g nᵀ + κ(α qᵀ + s t eᵀ + (N + ḋ s) I - s [o])
 //           g = (∂N/∂d - κ(N + ḋ(∂N/∂ḋ + 2 s))) n - (μ ∂B/∂d + κ(s o·b - ḋ γ)) t + κ s o × n
 //   ∂(n×f)/∂D = k nᵀ + κ(s b eᵀ - γ b qᵀ + s [u] - s o nᵀ + s (n·o) I),  k = n × g - κ n × f
-// What does not depend on the point comes out of the sums. Derivation: docs/contact.md.
+// What does not depend on the point is taken out of the sums. Derivation: docs/contact.md.
 #pragma once
 
 #include "kernels/contact/pair_contact.hpp"
@@ -45,16 +45,16 @@ SphereMotion<N> sphere_motion(const Vec3<N>& centre, const Vec6<N>& W, const N& 
   return {centre, -(W.l + cross(W.a, centre)), (-radius) * W.a, radius};
 }
 
-/// What one point adds to the sums: exact zeros if it does not touch. Numbers throughout, in the
-/// order in which fewer and fewer of them are set.
+/// What one point adds to the sums. All are exact zeros if it does not touch. The struct consists
+/// of numbers only: first those that every touching point sets, then those that fewer points set.
 template <class N>
 struct SpherePoint {
   using Number = N;
   Vec3<N> f, m;  ///< force, n × f
-  // With derivatives only.
+  // Set only with derivatives.
   Vec3<N> n, alpha, g, k, sn;  ///< normal, α, g, k, s n
   N s, curvature, spread;      ///< s, κ, N + ḋ s
-  // Where it slips only.
+  // Set only where the point slips.
   Vec3<N> t, b, st, sb, ke, turn;  ///< t, b, s t, s b, κ e, s t - γ n
   N k_gamma;                       ///< κ γ
 
@@ -69,8 +69,8 @@ struct ScaledSums {
   N s, ks, k_spread;
 };
 
-/// Every sum runs over the points in order, so that chunks may be cut anywhere: what all touching
-/// points add and what slipping ones add are kept apart until the end.
+/// Every sum runs over the points in order, so chunks may be cut anywhere. What all touching points
+/// add and what slipping points add are kept apart until the end.
 template <class N>
 struct SphereSums {
   Vec3<N> f, m;               ///< Σ f, Σ n × f
@@ -94,14 +94,14 @@ void clear(SphereSums<N>& s) {
   }
 }
 
-/// Between the three passes of a chunk.
+/// What the three passes of a chunk hand to each other.
 template <class N>
 struct SpherePass {
   Vec3<N> vt, turned;
   N d, kappa, rate, square, inverse_speed;
 };
 
-/// n, d, κ; where the point touches.
+/// Computes n, d and κ. Returns where the point touches.
 template <class N>
 auto find_distance(const SphereMotion<N>& z, const Vec3<N>& xi, SpherePoint<N>& out,
                    SpherePass<N>& pass) {
@@ -111,7 +111,7 @@ auto find_distance(const SphereMotion<N>& z, const Vec3<N>& xi, SpherePoint<N>& 
   return at.d < N(0.0);
 }
 
-/// ḋ, v_t, 1/|v_t|.
+/// Computes ḋ, v_t and 1/|v_t|.
 template <class N>
 void find_slide(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePass<N>& pass) {
   pass.rate = dot(out.n, z.q);
@@ -121,7 +121,7 @@ void find_slide(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePass<
   pass.inverse_speed = inverse_sqrt(pass.square);
 }
 
-/// Force and what its derivative needs; where the point slips.
+/// Computes the force and what its derivative needs. Returns where the point slips.
 template <bool Derivatives, class N>
 auto find_force(const SphereMotion<N>& z, const LawParameters<N>& law, const SpherePass<N>& pass,
                 SpherePoint<N>& out) {
@@ -202,8 +202,8 @@ template <bool Derivatives, class N>
   }
 }
 
-/// Adds wrench, stiffness and damping of the pair about body 1's origin from the sums about the
-/// centre: with δc = ρ + θ × c,  δD = -δc,  δq = -(δv + δω × c) - ω × δc,  δo = -r δω.
+/// Adds wrench, stiffness and damping of the pair about body 1's origin, from the sums about the
+/// centre. With δc = ρ + θ × c:  δD = -δc,  δq = -(δv + δω × c) - ω × δc,  δo = -r δω.
 template <bool Derivatives, class N>
 void add_finished(const SphereMotion<N>& z, const Vec6<N>& W, const SphereSums<N>& s,
                   PairSums<N>& out) {

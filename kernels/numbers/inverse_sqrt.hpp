@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// 1/√a from an integer seed and two steps of order four: the same bits on every machine, a fifth of
-// the cycles of the square root and the division that it replaces.
+// 1/√a from an integer seed and two steps of order four. The bits are the same on every machine. It
+// takes a fifth of the cycles of the square root and the division that it replaces.
 //
 //   y₀ = bits(0x5fe6eb50c7b537a9 - bits(a) / 2), |a y₀² - 1| < 0.07;   e = 1 - a y²,
 //       y ← y + y e (1/2 + 3/8 e + 5/16 e²)
-// After two steps e is at rounding: relative error below 4e-16. For a = 0 the result is large and
-// finite, so that a · inverse_sqrt(a) is 0, not NaN.
+// After two steps e is at rounding: the relative error is below 4e-16. For a = 0 the result is
+// large and finite, so that a · inverse_sqrt(a) is 0, not NaN.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ N inverse_sqrt_step(const N& a, const N& y) {
 }
 }  // namespace detail
 
-/// 1/√a for a ≥ 0.
+/// Returns 1/√a for a ≥ 0.
 template <class A>
 inline Lanes<A> inverse_sqrt(const Lanes<A>& a) {
   Lanes<A> y;
@@ -43,8 +43,8 @@ inline Lanes<A> inverse_sqrt(const Lanes<A>& a) {
 }
 inline double inverse_sqrt(double a) { return a > 0 ? 1 / std::sqrt(a) : 1e100; }
 
-/// √a from its inverse root, one correction deep: within an ulp where products are fused. 0 for a =
-/// 0.
+/// Returns √a from its inverse root with one correction: within an ulp where products are fused.
+/// Returns 0 for a = 0.
 template <class N>
 N root_of(const N& a, const N& inverse) {
   const N root = a * inverse;

@@ -32,8 +32,8 @@ struct alignas(8 * L) Row {
 
 using LaneRow = Row<kGroup>;
 
-/// Tag of the build that uses no SIMD type at all: plain loops over eight doubles, for other
-/// processors and as a check.
+/// Tag of the build that uses no SIMD type: plain loops over eight doubles, for other processors
+/// and as a check.
 struct ScalarArch {};
 
 /// Registers of Arch holding eight lanes.
@@ -72,14 +72,14 @@ struct LaneMask<ScalarArch> {
   static constexpr int kRegisters = kGroup;
 };
 
-/// Whether mul_add rounds once.
+/// Whether mul_add rounds only once.
 template <class Arch>
 inline constexpr bool kFuses =
     std::is_same_v<Arch, xsimd::avx2> || std::is_same_v<Arch, xsimd::avx512bw>;
 
 namespace detail {
 
-// One register's worth of each operation; overloads on double serve the scalar build.
+// Each operation on one register. Overloads on double serve the scalar build.
 inline double fuse(double a, double b, double c) { return a * b + c; }
 inline double fuse_negated(double a, double b, double c) { return c - a * b; }
 inline double choose(bool m, double a, double b) { return m ? a : b; }
@@ -146,7 +146,7 @@ template <class A>
 xsimd::batch<double, A> magnitude(const xsimd::batch<double, A>& a) {
   return xsimd::abs(a);
 }
-// Spelled with a comparison so that NaN in a gives b, on every instruction set alike.
+// Written as a comparison so that NaN in a gives b on every instruction set.
 template <class A>
 xsimd::batch<double, A> larger(const xsimd::batch<double, A>& a, const xsimd::batch<double, A>& b) {
   return xsimd::select(a > b, a, b);
@@ -228,14 +228,14 @@ inline LaneMask<A> operator|(const LaneMask<A>& a, const LaneMask<A>& b) {
   return m;
 }
 
-/// a b + c; fused on AVX2 and AVX-512.
+/// Returns a b + c, fused on AVX2 and AVX-512.
 template <class A>
 inline Lanes<A> mul_add(const Lanes<A>& a, const Lanes<A>& b, const Lanes<A>& c) {
   Lanes<A> d;
   for (int i = 0; i < Lanes<A>::kRegisters; ++i) d.r[i] = detail::fuse(a.r[i], b.r[i], c.r[i]);
   return d;
 }
-/// c - a b.
+/// Returns c - a b.
 template <class A>
 inline Lanes<A> mul_sub_from(const Lanes<A>& a, const Lanes<A>& b, const Lanes<A>& c) {
   Lanes<A> d;
@@ -243,7 +243,7 @@ inline Lanes<A> mul_sub_from(const Lanes<A>& a, const Lanes<A>& b, const Lanes<A
     d.r[i] = detail::fuse_negated(a.r[i], b.r[i], c.r[i]);
   return d;
 }
-/// Lane by lane: m ? a : b.
+/// Returns m ? a : b, lane by lane.
 template <class A>
 inline Lanes<A> select(const LaneMask<A>& m, const Lanes<A>& a, const Lanes<A>& b) {
   Lanes<A> d;
@@ -262,14 +262,14 @@ inline Lanes<A> abs(const Lanes<A>& a) {
   for (int i = 0; i < Lanes<A>::kRegisters; ++i) d.r[i] = detail::magnitude(a.r[i]);
   return d;
 }
-/// The larger; b where a is NaN.
+/// Returns the larger; b where a is NaN.
 template <class A>
 inline Lanes<A> max(const Lanes<A>& a, const Lanes<A>& b) {
   Lanes<A> d;
   for (int i = 0; i < Lanes<A>::kRegisters; ++i) d.r[i] = detail::larger(a.r[i], b.r[i]);
   return d;
 }
-/// The smaller; b where a is NaN.
+/// Returns the smaller; b where a is NaN.
 template <class A>
 inline Lanes<A> min(const Lanes<A>& a, const Lanes<A>& b) {
   Lanes<A> d;
@@ -283,7 +283,7 @@ inline bool any(const LaneMask<A>& m) {
   return false;
 }
 
-/// Bit l: lane l.
+/// Bit l of the result is lane l.
 template <class A>
 inline unsigned lane_bits(const LaneMask<A>& m) {
   unsigned bits = 0;
@@ -330,16 +330,16 @@ inline void store_lanes(const Lanes<A>& d, double* p) {  // 64-byte aligned
   }
 }
 
-/// The nearest integer, ties to even, for |a| < 2^51: adding 1.5 · 2^52 leaves no bits for a
-/// fraction.
+/// Returns the nearest integer, ties to even, for |a| < 2^51: adding 1.5 · 2^52 leaves no bits for
+/// a fraction.
 template <class A>
 inline Lanes<A> round_nearest(const Lanes<A>& a) {
   const Lanes<A> shift(6755399441055744.0);
   return (a + shift) - shift;
 }
 
-// The same names on plain double, so that templates over the number type run on it as the scalar
-// reference.
+// The same names on plain double, so that templates over the number type also run on it, as the
+// scalar reference.
 inline double mul_add(double a, double b, double c) { return a * b + c; }
 inline double mul_sub_from(double a, double b, double c) { return c - a * b; }
 inline double select(bool m, double a, double b) { return m ? a : b; }

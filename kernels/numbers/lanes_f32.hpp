@@ -2,9 +2,8 @@
 // Sixteen floats on any instruction set: points of a tile, or the environments of a block, in
 // single precision.
 //
-// The same rules as in lanes.hpp: sixteen lanes however wide the registers are, every operation
-// lane by lane, products fused by mul_add alone and only on AVX2 and AVX-512, which agree with each
-// other bit for bit.
+// The rules of lanes.hpp hold: sixteen lanes however wide the registers are, and every operation
+// lane by lane. Only mul_add fuses products, and only on AVX2 and AVX-512, which agree bit for bit.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +16,7 @@ inline constexpr int kLanesF = 16;  ///< lanes of single precision: one AVX-512 
 
 namespace detail {
 
-// One register of each instruction set: what the lanes below are made of.
+// One register of each instruction set, of which the lanes below are made.
 template <class Arch>
 struct RegisterF {
   using Type = xsimd::batch<float, Arch>;
@@ -42,7 +41,7 @@ inline float inverse_sqrt_seed(float x) {
   return __builtin_bit_cast(float, kInverseSqrtSeedF - (__builtin_bit_cast(std::uint32_t, x) >> 1));
 }
 
-// maxps and minps give the second operand when either is NaN, as the comparison above does.
+// maxps and minps return the second operand when either is NaN, as the comparison above does.
 #if defined(__SSE2__)
 using FloatSse = xsimd::batch<float, xsimd::sse2>;
 inline FloatSse fuse(const FloatSse& a, const FloatSse& b, const FloatSse& c) { return a * b + c; }
@@ -140,8 +139,8 @@ TANGERE_LANES_F(operator*, LanesF, a.r[i] * b.r[i])
 TANGERE_LANES_F(operator<, MaskF, a.r[i] < b.r[i])
 TANGERE_LANES_F(operator>, MaskF, a.r[i] > b.r[i])
 TANGERE_LANES_F(operator>=, MaskF, a.r[i] >= b.r[i])
-TANGERE_LANES_F(max, LanesF, detail::larger(a.r[i], b.r[i]))   // b where one is NaN
-TANGERE_LANES_F(min, LanesF, detail::smaller(a.r[i], b.r[i]))  // b where one is NaN
+TANGERE_LANES_F(max, LanesF, detail::larger(a.r[i], b.r[i]))   // b where either is NaN
+TANGERE_LANES_F(min, LanesF, detail::smaller(a.r[i], b.r[i]))  // b where either is NaN
 #undef TANGERE_LANES_F
 
 template <class A>
@@ -150,14 +149,14 @@ inline MaskF<A> operator&(const MaskF<A>& a, const MaskF<A>& b) {
   for (int i = 0; i < LanesF<A>::kRegisters; ++i) m.r[i] = a.r[i] && b.r[i];
   return m;
 }
-/// a b + c; fused on AVX2 and AVX-512.
+/// Returns a b + c, fused on AVX2 and AVX-512.
 template <class A>
 inline LanesF<A> mul_add(const LanesF<A>& a, const LanesF<A>& b, const LanesF<A>& c) {
   LanesF<A> d;
   for (int i = 0; i < LanesF<A>::kRegisters; ++i) d.r[i] = detail::fuse(a.r[i], b.r[i], c.r[i]);
   return d;
 }
-/// c - a b.
+/// Returns c - a b.
 template <class A>
 inline LanesF<A> mul_sub_from(const LanesF<A>& a, const LanesF<A>& b, const LanesF<A>& c) {
   LanesF<A> d;
@@ -165,7 +164,7 @@ inline LanesF<A> mul_sub_from(const LanesF<A>& a, const LanesF<A>& b, const Lane
     d.r[i] = detail::fuse_negated(a.r[i], b.r[i], c.r[i]);
   return d;
 }
-/// Lane by lane: m ? a : b.
+/// Returns m ? a : b, lane by lane.
 template <class A>
 inline LanesF<A> select(const MaskF<A>& m, const LanesF<A>& a, const LanesF<A>& b) {
   LanesF<A> d;
@@ -204,7 +203,7 @@ inline void store_lanes_f(const LanesF<A>& d, float* p) {  // 64-byte aligned
   }
 }
 
-/// Two groups of eight doubles rounded to the sixteen floats of their block.
+/// Rounds two groups of eight doubles to the sixteen floats of their block.
 template <class A>
 inline LanesF<A> narrow(const Lanes<A>& low, const Lanes<A>& high) {
   LanesF<A> d;
@@ -229,8 +228,8 @@ inline LanesF<A> narrow(const Lanes<A>& low, const Lanes<A>& high) {
   return d;
 }
 
-/// 1/√x for normal, positive, finite x, relative error at most 2e-7: an integer seed, e = 1 - x y²,
-/// then (1 - e)^-½ by the polynomial that is best for |e| < 0.07 (2.6e-8 relative).
+/// Returns 1/√x for normal, positive, finite x, with relative error at most 2e-7: an integer seed,
+/// e = 1 - x y², then (1 - e)^-½ by the polynomial that is best for |e| < 0.07 (2.6e-8 relative).
 template <class A>
 inline LanesF<A> inverse_sqrt(const LanesF<A>& x) {
   LanesF<A> y;

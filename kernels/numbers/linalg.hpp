@@ -52,7 +52,7 @@ template <class N>
 Vec3<N>& operator-=(Vec3<N>& a, const Vec3<N>& b) {
   return a = a - b;
 }
-/// s a + b.
+/// Returns s a + b.
 template <class N>
 Vec3<N> mul_add(const N& s, const Vec3<N>& a, const Vec3<N>& b) {
   return {mul_add(s, a.x, b.x), mul_add(s, a.y, b.y), mul_add(s, a.z, b.z)};
@@ -127,7 +127,7 @@ Vec3<N> operator*(const Mat3<N>& a, const Vec3<N>& b) {
     c[i] = mul_add(a.m[i][0], b.x, mul_add(a.m[i][1], b.y, a.m[i][2] * b.z));
   return {c[0], c[1], c[2]};
 }
-/// aᵀ b.
+/// Returns aᵀ b.
 template <class N>
 Vec3<N> transposed_times(const Mat3<N>& a, const Vec3<N>& b) {
   N c[3];
@@ -157,12 +157,12 @@ Mat3<N> outer(const Vec3<N>& a, const Vec3<N>& b) {
            {a.y * b.x, a.y * b.y, a.y * b.z},
            {a.z * b.x, a.z * b.y, a.z * b.z}}};
 }
-/// [a], the matrix of a ×.
+/// Returns [a], the matrix of a ×.
 template <class N>
 Mat3<N> skew(const Vec3<N>& a) {
   return {{{N(0.0), -a.z, a.y}, {a.z, N(0.0), -a.x}, {-a.y, a.x, N(0.0)}}};
 }
-/// [a] B, column by column, without forming [a].
+/// Returns [a] B, column by column, without forming [a].
 template <class N>
 Mat3<N> cross_columns(const Vec3<N>& a, const Mat3<N>& b) {
   Mat3<N> c;
@@ -174,7 +174,7 @@ Mat3<N> cross_columns(const Vec3<N>& a, const Mat3<N>& b) {
   }
   return c;
 }
-/// B [a]: (B [a])ᵀ = -[a] Bᵀ, so each row r of B becomes r × a.
+/// Returns B [a]. (B [a])ᵀ = -[a] Bᵀ, so each row r of B becomes r × a.
 template <class N>
 Mat3<N> times_skew(const Mat3<N>& b, const Vec3<N>& a) {
   Mat3<N> c;
@@ -211,7 +211,7 @@ template <class N>
 Vec6<N>& operator-=(Vec6<N>& a, const Vec6<N>& b) {
   return a = a - b;
 }
-/// s a + b.
+/// Returns s a + b.
 template <class N>
 Vec6<N> mul_add(const N& s, const Vec6<N>& a, const Vec6<N>& b) {
   return {mul_add(s, a.a, b.a), mul_add(s, a.l, b.l)};
@@ -257,13 +257,13 @@ template <class N>
 Vec6<N> wrench_to_child(const Frame<N>& x, const Vec6<N>& f) {
   return {transposed_times(x.R, f.a - cross(x.p, f.l)), transposed_times(x.R, f.l)};
 }
-/// Frame c in a, from b in a and c in b.
+/// Returns frame c in a, from b in a and c in b.
 template <class N>
 Frame<N> compose(const Frame<N>& ab, const Frame<N>& bc) {
   return {ab.R * bc.R, ab.R * bc.p + ab.p};
 }
-/// Frame 2 in frame 1, from both in the world: only the difference of the two origins meets
-/// rounding.
+/// Returns frame 2 in frame 1, from both in the world. Only the difference of the two origins is
+/// rounded.
 template <class N>
 Frame<N> relative(const Frame<N>& w1, const Frame<N>& w2) {
   return {transpose(w1.R) * w2.R, transposed_times(w1.R, w2.p - w1.p)};

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One lane of Lanes<Arch> on its own: a number that rounds like a lane in every operation, so that
-// a lone environment can go through the same templates with an eighth of the memory and get the
-// same bits.
+// One lane of Lanes<Arch> on its own. The number rounds like a lane in every operation, so a lone
+// environment goes through the same templates with an eighth of the memory and gets the same bits.
 #pragma once
 
 #include "kernels/numbers/inverse_sqrt.hpp"
@@ -86,7 +85,7 @@ template <class A>
 inline OneLane<A> abs(OneLane<A> a) {
   return std::fabs(a.x);
 }
-/// The larger; b where a is NaN.
+/// Returns the larger; b where a is NaN.
 template <class A>
 inline OneLane<A> max(OneLane<A> a, OneLane<A> b) {
   return a.x > b.x ? a : b;

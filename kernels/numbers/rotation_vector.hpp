@@ -10,9 +10,9 @@
 //   φ = log q = 4 A m;   J_r⁻¹ = I + X/2 + e X²,  X = [φ],
 //       e = (1 - (θ/2) cot(θ/2))/θ² = (A + B)/(16 A²)
 //
-// Halving the angle twice leaves no root of a small number and no difference of nearly equal ones:
-// exact near 0 and up to π, where only the sign of φ is undetermined. The lanes have no arc
-// tangent.
+// Halving the angle twice leaves no root of a small number and no difference of nearly equal ones.
+// The result is exact near 0 and up to π, where only the sign of φ is undetermined. The lanes have
+// no arc tangent.
 #pragma once
 
 #include "kernels/numbers/dual.hpp"
@@ -23,7 +23,7 @@ namespace tangere::kernels {
 namespace detail {
 inline constexpr int kArcTerms = 20;
 
-/// A and e above as functions of r.
+/// A and e above, as functions of r.
 template <class N>
 struct ArcFactors {
   N a, e;
@@ -41,7 +41,7 @@ ArcFactors<N> arc_factors(const N& r) {
 }
 }  // namespace detail
 
-/// φ = log q with what its inverse Jacobians need.
+/// φ = log q, with what its inverse Jacobians need.
 template <class N>
 struct RotationVector {
   Vec3<N> phi;

@@ -94,8 +94,8 @@ Mat3<N> right_jacobian_derivative(const Vec3<N>& x, const RotationSeries<N>& k, 
   return k.b * skew(w) + outer(g, x) - k.c * (skew(xw) + cross_columns(x, skew(w)));
 }
 
-/// The angle of a revolute joint, brought into [-π, π] where the series holds; 2π in two parts
-/// (Cody and Waite).
+/// Brings the angle of a revolute joint into [-π, π], where the series holds. 2π is split in two
+/// parts (Cody and Waite).
 template <class N>
 N reduce_angle(const N& q) {
   const N turns = round_nearest(N(0.15915494309189535) * q);
@@ -122,7 +122,7 @@ Quat<N> operator*(const Quat<N>& a, const Quat<N>& b) {
       a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
       a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x, a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w};
 }
-/// (cos|x|/2, sin(|x|/2) x/|x|), by the same series at x/2.
+/// Returns (cos(|x|/2), sin(|x|/2) x/|x|), by the same series at x/2.
 template <class N>
 Quat<N> quaternion_exp(const Vec3<N>& x) {
   const N quarter = 0.25 * dot(x, x);
@@ -131,7 +131,7 @@ Quat<N> quaternion_exp(const Vec3<N>& x) {
   const Vec3<N> u = (0.5 * detail::series<1>(quarter)) * x;
   return {w, u.x, u.y, u.z};
 }
-/// q ⊗ exp(x), normalised: a unit quaternion stays one over any number of steps.
+/// Returns q ⊗ exp(x), normalised: a unit quaternion stays one over any number of steps.
 template <class N>
 Quat<N> rotate_by(const Quat<N>& q, const Vec3<N>& x) {
   const Quat<N> r = q * quaternion_exp(x);

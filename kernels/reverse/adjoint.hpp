@@ -8,7 +8,7 @@
 // Products with Cᵀ and M need no matrix. φ = λᵀ g is the power of all wrenches along the twists Λ =
 // X Λ_p + S λ:
 //   φ = Σ Λᵀ (I A + V ×* I V) + Σ_pairs Yᵀ w₁ - λᵀ τ …,   Y = Ad Λ₂ - Λ₁
-// and one inward sweep of Ā = I Λ, V̄ = -Λ ×* I V - I (V × Λ) + contacts gives all its derivatives
+// One inward sweep of Ā = I Λ, V̄ = -Λ ×* I V - I (V × Λ) + contacts gives all its derivatives
 // by v at fixed q:
 //   V̄ += (S q̇) ×* Ā;   (M λ)_i = Sᵀ Ā;   (Cᵀ λ)_i = Sᵀ (V̄ - V ×* Ā) + (c₀/h) Sᵀ Ā;
 //       Ā_p += X* Ā, V̄_p += X* V̄
@@ -19,7 +19,7 @@
 
 namespace tangere::kernels {
 
-/// What the sweeps pass on per link, in its axes.
+/// What the sweeps pass on per link, in the link's axes.
 template <class N>
 struct LinkAdjoint {
   Vec6<N> twist;  ///< Λ
@@ -33,14 +33,14 @@ struct AdjointArgs {
   const N *q_bar, *v_bar;  ///< (nv) cotangents of the stage's result, q by its right tangent
   N* rhs;                  ///< (nv) out: Jᵀ q̄ + V_xᵀ v̄
   const N* lambda;         ///< (nv) the solution
-  N *nu, *mass_lambda;     ///< (nv) out: ν, M λ
-  N* target;  ///< (nv) out: cotangent of the targets of position motors, zero where there are none
+  N *nu, *mass_lambda;     ///< (nv) out: ν and M λ
+  N* target;  ///< (nv) out: cotangents of position motors' targets; zero where there are none
   N *q_centre, *v_centre;  ///< (nv) added to
   StageHistory<N> history;
   LinkAdjoint<N>* links;  ///< (n_links) scratch
 };
 
-/// Jᵀ q̄ + V_xᵀ v̄.
+/// Writes Jᵀ q̄ + V_xᵀ v̄.
 template <class N>
 void adjoint_rhs(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
   for (int i = 0; i < model.n_links; ++i) {
@@ -61,7 +61,7 @@ void adjoint_rhs(const ModelView& model, const StageArgs<N>& a, const AdjointArg
   }
 }
 
-/// S x for one joint.
+/// Returns S x for one joint.
 template <JointKind K, class N>
 Vec6<N> along_joint(const Link& link, const N* x) {
   Vec3<N> sum = x[link.v] * joint_axis<K, N>(link, 0);
@@ -69,7 +69,7 @@ Vec6<N> along_joint(const Link& link, const N* x) {
   return slides(K) ? Vec6<N>{zero3<N>(), sum} : Vec6<N>{sum, zero3<N>()};
 }
 
-/// Λ, and what inertia gives to Ā and V̄.
+/// Computes Λ and the shares of inertia in Ā and V̄.
 template <class N>
 void adjoint_outward(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
   for (int i = 0; i < model.n_links; ++i) {
@@ -103,8 +103,8 @@ Vec6<N> transposed_damping(const PairSums<N>& s, const Vec6<N>& y) {
           transposed_times(s.d[0][1], y.a) + transposed_times(s.d[1][1], y.l)};
 }
 
-/// Y of a pair of links: the rate at which body 2 moves against body 1 along λ, in body 1's axes at
-/// its origin.
+/// Returns Y of a pair of links: the rate at which body 2 moves against body 1 along λ, in body 1's
+/// axes at its origin.
 template <class N>
 Vec6<N> adjoint_slip(const LinkPair& pair, const ContactScratch<N>& o,
                      const LinkAdjoint<N>* links) {
@@ -113,7 +113,7 @@ Vec6<N> adjoint_slip(const LinkPair& pair, const ContactScratch<N>& o,
   return y;
 }
 
-/// What contacts give to V̄: w₁ depends on W = Ad V₂ - V₁.
+/// Adds the share of contacts to V̄: w₁ depends on W = Ad V₂ - V₁.
 template <class N>
 void adjoint_contacts(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
   for (int k = 0; k < model.n_link_pairs; ++k) {
@@ -132,7 +132,7 @@ void adjoint_contacts(const ModelView& model, const StageArgs<N>& a, const Adjoi
   }
 }
 
-/// Cotangents of the targets of one joint's motors: (∂force/∂u)ᵀ λ.
+/// Computes cotangents of the targets of one joint's motors: (∂force/∂u)ᵀ λ.
 template <JointKind K, class N>
 void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& link,
                      const N* lambda, N* target) {
@@ -162,7 +162,7 @@ void adjoint_targets(const ModelView& model, const StageArgs<N>& a, const Link& 
   }
 }
 
-/// What acts on the dofs of one joint, on top of the sweep's Cᵀ λ and M λ.
+/// Adds what acts on the dofs of one joint to the sweep's Cᵀ λ and M λ.
 template <JointKind K, class N>
 void adjoint_effects(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
                      const Link& link, N* by_v) {
@@ -181,7 +181,7 @@ void adjoint_effects(const ModelView& model, const StageArgs<N>& a, const Adjoin
   if (link.effects & kDriven) adjoint_targets<K>(model, a, link, d.lambda, d.target);
 }
 
-/// M λ, ν and the targets, leaves first.
+/// Computes M λ, ν and the targets' cotangents, leaves first.
 template <class N>
 void adjoint_inward(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
   for (int i = 0; i < model.nv; ++i) d.target[i] = N(0.0);
@@ -215,7 +215,7 @@ template <class N>
 void add3(N* to, const Vec3<N>& x) {
   to[0] += x.x, to[1] += x.y, to[2] += x.z;
 }
-/// Rotation vector x, |x| < π, with what its inverse Jacobians need.
+/// A rotation vector x, |x| < π, with what its inverse Jacobians need.
 template <class N>
 RotationVector<N> with_inverse_jacobians(const N* x) {
   RotationVector<N> r = rotation_vector<false>(quaternion_exp(Vec3<N>{x[0], x[1], x[2]}));
@@ -223,8 +223,8 @@ RotationVector<N> with_inverse_jacobians(const N* x) {
   return r;
 }
 
-/// ∂v/∂q_k at a fixed newest pose: by the centre -V_x J_l⁻¹(x) - Σ (ρ/h) J_r(x) J_l⁻¹(y), by an
-/// older state (ρ/h) J_r(x) J_r⁻¹(y), y = q ⊖ q_centre.
+/// ∂v/∂q_k at a fixed newest pose. For the centre it is -V_x J_l⁻¹(x) - Σ (ρ/h) J_r(x) J_l⁻¹(y).
+/// For an older state it is (ρ/h) J_r(x) J_r⁻¹(y), y = q ⊖ q_centre.
 template <class N>
 void adjoint_turning_history(const StageArgs<N>& a, const AdjointArgs<N>& d, const Link& link,
                              const LinkScratch<N>& o) {
@@ -242,7 +242,7 @@ void adjoint_turning_history(const StageArgs<N>& a, const AdjointArgs<N>& d, con
   }
 }
 
-/// Hands ν and M λ on to the states that the stage hangs on.
+/// Hands ν and M λ on to the states that the stage depends on.
 template <class N>
 void adjoint_history(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
   const StageHistory<N>& h = d.history;
@@ -266,7 +266,7 @@ void adjoint_history(const ModelView& model, const StageArgs<N>& a, const Adjoin
   }
 }
 
-/// ν, M λ, the motors' targets, and the history, from λ.
+/// Computes from λ: ν, M λ, the cotangents of the motors' targets and those of the history.
 template <class N>
 void adjoint_products(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d) {
   adjoint_outward(model, a, d);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cotangents of link poses and twists to those of q and v (docs/gradients.md).
+// Turns cotangents of link poses and twists into those of q and v (docs/gradients.md).
 //
-// A link's displacement δ (right, body axes) and twist V hang on joint i above it by ∂δ/∂q_i = X
-// S_i, ∂V/∂q_i = X Ψ̇_i,
-// ∂V/∂v_i = X S_i, Ψ̇ = V_p × S. So δ̄ and V̄ travel up the tree as wrenches, and
+// A link's displacement δ (right, body axes) and twist V depend on joint i above it by
+// ∂δ/∂q_i = X S_i, ∂V/∂q_i = X Ψ̇_i, ∂V/∂v_i = X S_i, with Ψ̇ = V_p × S. So δ̄ and V̄ travel up the
+// tree as wrenches, and
 //   q̄_i = Sᵀ δ̄ + Ψ̇ᵀ V̄ = Sᵀ (δ̄ - V_p ×* V̄);   v̄_i = Sᵀ V̄
 #pragma once
 
@@ -18,8 +18,8 @@ struct LinkMotion {
   Vec6<N> Vp, V;
 };
 
-/// Adds to q̄ and v̄ (nv). `links` (n_links) is used up; `scratch` (n_links). The state is that of
-/// link_poses().
+/// Adds to q̄ and v̄, (nv) each. Overwrites `links`, (n_links). `scratch`: (n_links). The state is
+/// that of link_poses().
 template <class N>
 void pull_back_links(const ModelView& model, const StageArgs<N>& a, LinkMotion<N>* scratch,
                      MotionCotangent<N>* links, N* q_bar, N* v_bar) {

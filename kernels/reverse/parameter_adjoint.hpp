@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// -(∂g/∂p)ᵀ λ for the numbers of a scene, after adjoint_products(): φ = λᵀ g is linear in masses,
-// dampings, stiffnesses and gains, and what a contact's coefficients do to its points' forces is
-// weighed by Y, the slip along λ:
+// -(∂g/∂p)ᵀ λ for the numbers of a scene, after adjoint_products(). φ = λᵀ g is linear in masses,
+// dampings, stiffnesses and gains. The effect of a contact's coefficients on its points' forces is
+// weighted by Y, the slip along λ:
 //   ∂φ/∂p = Σ (Y_l + Y_a × x₂)·∂f/∂p
 //       ∂φ/∂(m, c, J) of Λᵀ I X = Λ_a·(J α + c × a) + Λ_l·(m a - c × α), X = (α; a)
-// with X = A, and with X = V and -V × Λ in place of Λ. Sizes act through d and n where a body is
-// touched, and through the
-// places ξ of its own points, which move with its surface: with ξ̄, ρ̄ from f̄ = Y_l + Y_a × x₂ and
-// x̄ = f × Y_a (kernels/reverse/point_pullback.hpp), a size's share is that of ρ̄
-// (kernels/contact/distance.hpp) and Σ ξ̄·∂ξ/∂size.
+// with X = A, and with X = V and -V × Λ in place of Λ. Sizes act through d and n of the touched
+// body, and through the places ξ of a body's own points, which move with its surface. ξ̄ and ρ̄
+// follow from f̄ = Y_l + Y_a × x₂ and x̄ = f × Y_a (kernels/reverse/point_pullback.hpp). A size's
+// share is that of ρ̄ (kernels/contact/distance.hpp) plus Σ ξ̄·∂ξ/∂size.
 #pragma once
 
 #include "kernels/reverse/adjoint.hpp"
@@ -21,18 +20,18 @@ void subtract_law(const Coefficients<N>& c, N* out) {
   for (std::size_t k = 0; k < kCoefficients; ++k) out[k] -= c[k];
 }
 
-/// Of one pair or ground contact: what its points add up to.
+/// Sums over the points of one pair or ground contact.
 template <class N>
 struct ContactCotangent {
   Coefficients<N> law;
-  Vec3<N> size, stretch;  ///< of the touched shape; of the body whose points touch
+  Vec3<N> size, stretch;  ///< size of the touched shape, and of the body whose points touch
 };
 template <class N>
 ContactCotangent<N> zero_contact() {
   return {{N(0.0), N(0.0), N(0.0), N(0.0)}, zero3<N>(), zero3<N>()};
 }
 
-/// Σ ξ̄·∂ξ/∂size for a point of a body at ξ, link axes.
+/// Returns Σ ξ̄·∂ξ/∂size for a point of a body at ξ, link axes.
 template <class N>
 Vec3<N> stretch_share(const Solid& body, const Vec3<N>& xi, const Vec3<N>& xi_bar) {
   if (!body.stretches) return zero3<N>();
@@ -48,7 +47,7 @@ Vec3<N> stretch_share(const Solid& body, const Vec3<N>& xi, const Vec3<N>& xi_ba
   });
 }
 
-/// One point of a pair; `slip`: Y. Nothing where it does not touch.
+/// Adds one point of a pair, if it touches. `slip`: Y.
 template <class Shape, class N>
 void add_point(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
                const LawParameters<N>& law, const Solid& body, const Vec6<N>& slip,
@@ -82,7 +81,7 @@ void pair_adjoint(const Shape& shape, const Frame<N>& at, const Vec6<N>& W,
   }
 }
 
-/// Where contacts add what they find.
+/// Where contacts add their derivatives.
 template <class N>
 struct ContactRows {
   N* law;   ///< (n_pairs + n_grounds, kCoefficients)
@@ -93,7 +92,7 @@ void subtract(const Vec3<N>& sum, N* out) {
   out[0] -= sum.x, out[1] -= sum.y, out[2] -= sum.z;
 }
 
-/// Coefficients and sizes of every shape of two links.
+/// Adds the derivatives by coefficients and sizes of every shape of two links.
 template <class N>
 void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const LinkPair& links,
                           const ContactScratch<N>& o, const LinkAdjoint<N>* adjoint,
@@ -117,8 +116,8 @@ void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const L
   }
 }
 
-/// Of one body against the ground: Y = -Λ. Forces act at ξ = ξ_c - r m itself, ξ_c a point of the
-/// body or a ball's centre.
+/// Sums over one body against the ground, with Y = -Λ. Forces act at ξ = ξ_c - r m itself, where
+/// ξ_c is a point of the body or a ball's centre.
 template <class N>
 ContactCotangent<N> ground_adjoint(const ModelView& model, const StageArgs<N>& a,
                                    const GroundContact& ground, const Vec6<N>& twist) {
@@ -149,7 +148,7 @@ ContactCotangent<N> ground_adjoint(const ModelView& model, const StageArgs<N>& a
   return sum;
 }
 
-/// Of every pair and ground contact.
+/// Adds the derivatives of every pair and ground contact.
 template <class N>
 void contact_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
                         const ContactRows<N>& out) {
@@ -169,7 +168,7 @@ void contact_parameters(const ModelView& model, const StageArgs<N>& a, const Lin
   }
 }
 
-/// Adds ∂(Λᵀ I X) by (m, c, J), times -1; J as xx xy xz yy yz zz.
+/// Adds -∂(Λᵀ I X) by (m, c, J), with J as xx xy xz yy yz zz.
 template <class N>
 void subtract_inertia(const Vec6<N>& twist, const Vec6<N>& x, N* out) {
   out[0] -= dot(twist.l, x.l);
@@ -184,7 +183,7 @@ void subtract_inertia(const Vec6<N>& twist, const Vec6<N>& x, N* out) {
   out[9] -= t.z * w.z;
 }
 
-/// Mass, moment and inertia of every link, ten each.
+/// Adds the derivatives by mass, moment and inertia of every link, ten numbers each.
 template <class N>
 void inertia_parameters(const ModelView& model, const StageArgs<N>& a, const LinkAdjoint<N>* links,
                         N* out) {
@@ -199,8 +198,8 @@ void inertia_parameters(const ModelView& model, const StageArgs<N>& a, const Lin
   }
 }
 
-/// Damping, stiffness, P and D of a joint's dofs; a ball joint has one stiffness, that of its first
-/// dof.
+/// Adds the derivatives by damping, stiffness, P and D of a joint's dofs. A ball joint has one
+/// stiffness, that of its first dof.
 template <JointKind K, class N>
 void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link& link,
                       const N* lambda, N* out) {
@@ -236,7 +235,7 @@ void joint_parameters(const ModelView& model, const StageArgs<N>& a, const Link&
   }
 }
 
-/// Adds to (parameter_numbers(model)).
+/// Adds all derivatives to (parameter_numbers(model)).
 template <class N>
 void parameter_products(const ModelView& model, const StageArgs<N>& a, const AdjointArgs<N>& d,
                         N* out) {

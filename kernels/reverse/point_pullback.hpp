@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reverse mode through one touching point (kernels/contact/pair_contact.hpp): from a cotangent f̄
-// of its force on body 1 to those of the displacement ε = (θ; ρ) and relative twist W of body 2,
-// and of the contact's coefficients. Some 150 operations, no
-// matrices. With m̄ = μ t (t = 0 when sticking), B the bound of friction over μ:
+// Reverse mode through one touching point (kernels/contact/pair_contact.hpp). It turns a cotangent
+// f̄ of the force on body 1 into those of the displacement ε = (θ; ρ) and relative twist W of body
+// 2, and of the contact's coefficients. It takes some 150 operations and no matrices. With m̄ = μ t
+// (t = 0 when sticking) and B the friction bound divided by μ:
 //   d̄ = (N_d n - B_d m̄)·f̄,  r̄ = (N_ḋ n - B_ḋ m̄)·f̄,  n̄ = N f̄,  s̄ = -s (f̄ - t (t·f̄))
 //       through f = N n + f_t(v_t, B)
 //   r̄ -= n·s̄,  n̄ -= ḋ s̄
@@ -22,7 +22,7 @@
 
 namespace tangere::kernels {
 
-/// Cotangents of the law's coefficients; f̄ zero where nothing touches.
+/// Adds cotangents of the law's coefficients. f̄ is zero where nothing touches.
 template <class N>
 void pull_back_law(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& f_bar,
                    Coefficients<N>& out) {
@@ -33,14 +33,14 @@ void pull_back_law(const LawParameters<N>& law, const PointContact<N>& p, const 
   pull_back_normal_force(law, p.d, p.rate, p.normal, dot(p.n, f_bar), -(law.mu * along_t), out);
 }
 
-/// Cotangents of what a point's force hangs on besides its coefficients, at fixed n.
+/// Cotangents of everything but the coefficients that a point's force depends on, at fixed n.
 template <class N>
 struct ForceCotangent {
-  Vec3<N> slide, u;  ///< of v_t beside u; of u
+  Vec3<N> slide, u;  ///< of v_t at fixed u, and of u
   N rate, d;
 };
 
-/// Through f = N n + f_t, v_t = u - ḋ n and ḋ = n·u.
+/// Computes them through f = N n + f_t, v_t = u - ḋ n and ḋ = n·u.
 template <class N>
 ForceCotangent<N> pull_back_force(const LawParameters<N>& law, const PointContact<N>& p,
                                   const Vec3<N>& f_bar) {
@@ -53,7 +53,7 @@ ForceCotangent<N> pull_back_force(const LawParameters<N>& law, const PointContac
           mul_add(p.normal.d_slope, along_n, p.normal.bound_d * bound)};
 }
 
-/// H n̄; H = κ (I - n nᵀ - e z zᵀ) of balls and rods.
+/// Returns H n̄, where H = κ (I - n nᵀ - e z zᵀ) for balls and rods.
 template <class Shape, class N>
 Vec3<N> bend(const PointContact<N>& p, const Vec3<N>& n_bar) {
   if constexpr (Shape::kBending == Bending::general) return p.hessian * n_bar;
@@ -62,14 +62,15 @@ Vec3<N> bend(const PointContact<N>& p, const Vec3<N>& n_bar) {
   return p.curvature * bent;
 }
 
-/// Cotangents of where a point and a shape are: of ρ₂, by which d and n hang on the shape's place,
-/// and of x₂ beside them. Moving the point instead of the shape, ξ̄ = x̄ - ρ̄.
+/// Cotangents of the places of a point and a shape: ρ̄ is that of ρ₂, through which d and n depend
+/// on the shape's place, and x̄ is that of x₂ at fixed d and n. If the point moves instead of the
+/// shape, ξ̄ = x̄ - ρ̄.
 template <class N>
 struct PlaceCotangent {
   Vec3<N> x, rho;
 };
 
-/// Adds the motion's share of one point; f̄ zero where nothing touches.
+/// Adds one point's share of the motion's cotangents. f̄ is zero where nothing touches.
 template <class Shape, class N>
 PlaceCotangent<N> pull_back_motion(const LawParameters<N>& law, const PointContact<N>& p,
                                    const Vec3<N>& omega, const Vec3<N>& f_bar,
@@ -92,7 +93,7 @@ PlaceCotangent<N> pull_back_motion(const LawParameters<N>& law, const PointConta
   return {x_bar, rho};
 }
 
-/// What a cotangent of x₂ = ξ - d n alone adds: x̄ and ρ̄ = n (n·x̄) + d H x̄.
+/// Returns what a cotangent x̄ of x₂ = ξ - d n contributes alone: x̄ and ρ̄ = n (n·x̄) + d H x̄.
 template <class Shape, class N>
 PlaceCotangent<N> pull_back_place(const PointContact<N>& p, const Vec3<N>& x_bar) {
   Vec3<N> rho = dot(p.n, x_bar) * p.n;
@@ -100,8 +101,8 @@ PlaceCotangent<N> pull_back_place(const PointContact<N>& p, const Vec3<N>& x_bar
   return {x_bar, rho};
 }
 
-/// Cotangent of a shape's size from that of ρ₂; y: the point, in the shape's axes, whose columns Q
-/// are.
+/// Returns the cotangent of a shape's size from that of ρ₂. y: the point in the shape's axes, which
+/// are the columns of Q.
 template <class Shape, class N>
 Vec3<N> pull_back_size(const Shape& shape, const PointContact<N>& p, const Mat3<N>& Q,
                        const Vec3<N>& c, const Vec3<N>& xi, const Vec3<N>& rho) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tactile field in reverse: cotangents of its touched tiles to displacements and twists of every
-// shape, eight points at a time, in double. The field itself is computed anew; nothing of it is
-// stored.
+// A tactile field in reverse: turns cotangents of its touched tiles into those of every shape's
+// displacement and twist, eight points at a time, in double. The field itself is computed anew;
+// none of it is stored.
 #pragma once
 
 #include "kernels/reverse/point_pullback.hpp"
@@ -26,7 +26,7 @@ PadMotion<N> pad_motion(const Touch<double>& t, ContactLaw law) {
           {transformed(t.law, [](double a) { return N(a); }), law, 0.0}};
 }
 
-/// Eight numbers from anywhere: what callers hand in need not be aligned.
+/// Loads eight numbers from any address: callers' arrays need not be aligned.
 template <class A>
 Lanes<A> load_anywhere(const double* p) {
   Lanes<A> x;
@@ -34,7 +34,8 @@ Lanes<A> load_anywhere(const double* p) {
   return x;
 }
 
-/// Cotangent of the force, pad axes, from that of the field at points k … of a tile.
+/// Returns the cotangent of the force, pad axes, from that of the field at the points of a tile
+/// from k on.
 template <class A>
 Vec3<Lanes<A>> force_cotangent(const PadTiles& pad, int tile, int k, const double* field) {
   using N = Lanes<A>;
@@ -58,7 +59,7 @@ Vec3<Lanes<A>> force_cotangent(const PadTiles& pad, int tile, int k, const doubl
   return {f[0], f[1], f[2]};
 }
 
-/// Points k … of a tile, pad axes.
+/// Returns the points of a tile from k on, pad axes.
 template <class A>
 Vec3<Lanes<A>> tile_points(const PadTiles& pad, int tile, int k) {
   using N = Lanes<A>;
@@ -74,7 +75,8 @@ void store_anywhere(const N& x, double* p) {
   __builtin_memcpy(p, &x, sizeof x);
 }
 
-/// Coefficients of eight points: the sensor's, or times factors of their own.
+/// Returns the coefficients of eight points: the sensor's, or the sensor's times each point's
+/// factors.
 template <class A>
 LawParameters<Lanes<A>> law_of_points(const PadTiles& pad, int tile, int k,
                                       const LawParameters<Lanes<A>>& of_sensor) {
@@ -87,14 +89,14 @@ LawParameters<Lanes<A>> law_of_points(const PadTiles& pad, int tile, int k,
   return law;
 }
 
-/// False where no point of a tile can touch the shape.
+/// Returns false where no point of a tile can touch the shape.
 template <class Shape, class N>
 bool reaches(const Shape& shape, const PadMotion<N>& m, const PadTiles& pad, int tile) {
   const Vec3<N> centre = {N(pad.x[tile]), N(pad.y[tile]), N(pad.z[tile])};
   return any(distance_at(shape, transposed_times(m.Q, centre - m.c)).d < N(pad.radius[tile]));
 }
 
-/// Adds to eight points' own numbers; `to`: (kPointNumbers, 64) at the first of them.
+/// Adds to the own numbers of eight points. `to`: (kPointNumbers, 64), at the first of the points.
 template <class A>
 void add_to_points(const PlaceCotangent<Lanes<A>>& place, const Coefficients<Lanes<A>>& law,
                    double* to) {
@@ -104,7 +106,7 @@ void add_to_points(const PlaceCotangent<Lanes<A>>& place, const Coefficients<Lan
     store_lanes(load_lanes<A>(to + i * kTactileTile) + numbers[i], to + i * kTactileTile);
 }
 
-/// Adds eight points. `own`: the tile's (kPointNumbers, 64), or nullptr.
+/// Adds eight points. `own`: (kPointNumbers, 64) of the tile, or nullptr.
 template <class A, bool OfLaw, class Shape>
 void pull_back_points(const PadTiles& pad, int tile, int k, const double* field, const Shape& shape,
                       const PadMotion<Lanes<A>>& m, double* own, TouchCotangent<Lanes<A>>& sums) {
@@ -129,7 +131,7 @@ void pull_back_points(const PadTiles& pad, int tile, int k, const double* field,
     sums.law[c] = mul_add(factor(static_cast<int>(c)), of_law[c], sums.law[c]);
 }
 
-/// Sum over the lanes, in order.
+/// Sums over the lanes, in order.
 template <class N>
 double lane_sum(const N& a) {
   alignas(64) double x[kGroup];

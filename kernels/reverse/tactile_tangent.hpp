@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // How a tactile field changes with the motion of the shapes on it, eight points at a time, in
-// double (the δ's of kernels/contact/pair_contact.hpp). What reverse mode is in
-// kernels/reverse/tactile_pullback.hpp, forward.
+// double (the δ's of kernels/contact/pair_contact.hpp). This is the forward counterpart of
+// kernels/reverse/tactile_pullback.hpp.
 #pragma once
 
 #include "kernels/reverse/tactile_pullback.hpp"
 
 namespace tangere::kernels {
 
-/// δf of one touching point for the displacement ε = (θ; ρ) and δW of body 2.
+/// Returns δf of one touching point for body 2's displacement ε = (θ; ρ) and δW.
 template <class Shape, class N>
 Vec3<N> force_tangent(const LawParameters<N>& law, const PointContact<N>& p, const Vec3<N>& omega,
                       const Vec6<N>& displacement, const Vec6<N>& twist) {
@@ -27,7 +27,8 @@ Vec3<N> force_tangent(const LawParameters<N>& law, const PointContact<N>& p, con
   return mul_add(normal, n, p.normal.force * dn) - mul_add(p.tangential.scale, dvt, along * t);
 }
 
-/// The field of a force on the points k … of a tile: force_cotangent() the other way.
+/// Returns the field that a force causes at the points of a tile from k on: the transpose of
+/// force_cotangent().
 template <class A>
 Vec3<Lanes<A>> field_of_force(const PadTiles& pad, int tile, int k, const Vec3<Lanes<A>>& f) {
   const Vec3<Lanes<A>> turned = {f.x, f.y, -f.z};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the engine hands to kernels of a step and what they hand back: rows, poses, cotangents.
+// What the engine and the kernels of a step exchange: rows, poses, cotangents.
 #pragma once
 
 #include <cstddef>
@@ -8,26 +8,26 @@
 
 namespace tangere::kernels {
 
-/// Everything a group of L environments needs to evaluate and solve a stage; rows of L lanes
-/// (eight, or one), sized by engine/step/workspace.cpp. Link and contact scratch is opaque bytes:
-/// its layout belongs to the kernels.
+/// Everything that a group of L environments needs to evaluate and solve a stage. Rows have L lanes
+/// (eight, or one) and are sized by engine/step/workspace.cpp. Link and contact scratch is opaque
+/// bytes, whose layout belongs to the kernels.
 template <int L>
 struct Stage {
   Row<L>*centre, *x, *r, *s, *tau, *target;  // inputs
   Row<L> c0_over_h, inverse_h;
   const double* block;
   int group;
-  /// Candidate points of a pair: by lane as they are found, and in rows of eight lanes once more
-  /// than one lane needs them.
+  /// Candidate points of a pair: lane by lane as they are found, and also in rows of eight lanes if
+  /// more than one lane needs them.
   struct List {
-    double*
-        own;  ///< (L, 3, stride): x, y, z of each lane's points, padded to eights with far points
-    int own_count[L];  ///< padding not included
-    int stride;  ///< the number of the pair's points, rounded up to eights, and eight more: a list
-                 ///< cannot overflow
-    Row<L>* points;     ///< (stride, 3)
-    int count;          ///< rows in use
-    Row<L>* reference;  ///< (12) pose of link 2 in link 1 that the list was made at; pairs of the
+    /// (L, 3, stride): x, y, z of each lane's points, padded to multiples of eight with far points.
+    double* own;
+    int own_count[L];  ///< without padding
+    int stride;        ///< the number of the pair's points, rounded up to a multiple of eight, plus
+                       ///< eight: a list cannot overflow
+    Row<L>* points;    ///< (stride, 3)
+    int count;         ///< rows in use
+    Row<L>* reference;  ///< (12) pose of link 2 in link 1 at which the list was made; pairs of the
                         ///< same links share it
     double margin;
   };
@@ -35,20 +35,21 @@ struct Stage {
   std::byte* scratch;  ///< scratch_bytes(model)
   Row<L>*v, *g, *force_scale, *mass_diagonal, *A, *LU, *work, *excess;
   Row<L>*weight, *inverse_weight;  ///< (nv) D^½ and D^-½, D the mass diagonal
-  Row<L> friction_tangent = Row<L>::all(
-      1);        ///< 1: the Jacobian is that of g; 0: friction of slipping points by its secant
-  Row<L> floor;  ///< smallest ‖D^-½ g‖² that one rounding of x lets one see
+  /// 1: the Jacobian is that of g. 0: it takes friction of slipping points by its secant.
+  Row<L> friction_tangent = Row<L>::all(1);
+  Row<L> floor;  ///< smallest ‖D^-½ g‖² that the rounding of x can resolve
 };
 using GroupStage = Stage<kGroup>;
 
-/// A state that a stage hangs on beside its centre; rows (nv), R a row of lanes or a number.
+/// A state other than the centre that a stage depends on. Rows (nv); R is a row of lanes or a
+/// number.
 template <class R>
 struct OlderState {
-  double rho, s;        ///< r has ρ (q ⊖ q_centre), s has s v
+  double rho, s;        ///< r contains ρ (q ⊖ q_centre), s contains s v
   const R* difference;  ///< q ⊖ q_centre
-  R *q, *v;             ///< cotangents, added to: q unless ρ is zero, v unless s is zero
+  R *q, *v;             ///< cotangents; added to q unless ρ is zero, to v unless s is zero
 };
-/// How a stage's rates hang on what came before: r = Σ ρ (q ⊖ q_centre),
+/// How a stage's rates depend on earlier states: r = Σ ρ (q ⊖ q_centre),
 /// s = s_centre v_centre + Σ s v.
 template <class R>
 struct StageHistory {
@@ -58,9 +59,10 @@ struct StageHistory {
   OlderState<R> older[kMost];
 };
 
-/// Numbers of a scene with a derivative, as parameter_products() lays them out: of each pair and
-/// ground contact its coefficients; of each link mass, moment, inertia (xx xy xz yy yz zz); of
-/// each dof damping, stiffness, P, D; of each solid its size as contacts see it, masses left alone.
+/// Numbers of a scene that have a derivative, in the order of parameter_products(): the
+/// coefficients of each pair and ground contact; mass, moment and inertia (xx xy xz yy yz zz) of
+/// each link; damping, stiffness, P and D of each dof; the size of each solid as contacts see it,
+/// with masses held fixed.
 inline constexpr int kInertiaNumbers = 10, kDofNumbers = 4, kSizeNumbers = 3;
 inline int first_inertia_number(const ModelView& m) {
   return kCoefficients * (m.n_pairs + m.n_grounds);
@@ -75,14 +77,14 @@ inline int parameter_numbers(const ModelView& m) {
   return first_size_number(m) + kSizeNumbers * m.n_solids;
 }
 
-/// Cotangents on their way back through a solved stage; every array is (nv), positions by their
-/// right tangent (kernels/reverse/adjoint.hpp).
+/// Cotangents that pass back through a solved stage. Every array is (nv), positions by their right
+/// tangent (kernels/reverse/adjoint.hpp).
 template <int L>
 struct StageAdjoint {
   const Row<L>*q_bar, *v_bar;  ///< of the stage's result
   Row<L>*rhs, *lambda;
-  Row<L>*nu, *mass_lambda;  ///< out: v̄ - Cᵀ λ, M λ
-  Row<L>* target;           ///< out: of the targets of position motors, zero where there are none
+  Row<L>*nu, *mass_lambda;  ///< out: v̄ - Cᵀ λ and M λ
+  Row<L>* target;           ///< out: of the targets of position motors; zero where there are none
   Row<L>*q_centre, *v_centre;  ///< added to
   StageHistory<Row<L>> history;
 };
@@ -91,15 +93,15 @@ struct StageAdjoint {
 template <int L>
 struct NearPairs {
   Row<L>* link_poses;   ///< (n_link_pairs, 12) link 2 in link 1: R row-major, then p
-  Row<L>* shape_poses;  ///< (n_pairs, 12) shape in body 1, of pairs with a near lane
-  unsigned* lanes;  ///< (n_pairs) bit l: lane l has points that may be nearer to the shape than the
-                    ///< list's margin
+  Row<L>* shape_poses;  ///< (n_pairs, 12) shape in body 1, for pairs that are near in some lane
+  unsigned* lanes;      ///< (n_pairs) bit l: in lane l, points may be nearer to the shape than the
+                        ///< list's margin
 };
 
 /// One lane's search for points near a shape.
 struct CandidateSearch {
   const PairContact* pair;
-  Vec3<double> size;   ///< the lane's, as in PairContact
+  Vec3<double> size;   ///< of this lane, as in PairContact
   const double* pose;  ///< (12) shape in body 1: R row-major, then p
   double margin;       ///< points nearer than this to the surface, or inside, are candidates [m]
   double* points;      ///< (3, stride)
@@ -113,19 +115,19 @@ struct LinkPose {
   Vec6<N> V;
 };
 
-/// Cotangents of a link's displacement and body twist, its axes and origin.
+/// Cotangents of a link's displacement and body twist, in its axes at its origin.
 template <class N>
 struct MotionCotangent {
   Vec6<N> pose, twist;
 };
 
-/// State of eight environments as rows.
+/// State of eight environments, as rows.
 struct GroupState {
   const LaneRow *q, *v;
   const LaneRow* zero;            ///< (nv) zeros
   LaneRow* rates;                 ///< (nv) scratch
-  const double* block = nullptr;  ///< of the batch, for places that vary
-  int group = 0;                  ///< which half of it
+  const double* block = nullptr;  ///< of the batch, for parameters that vary
+  int group = 0;                  ///< which half of the block
 };
 
 }  // namespace tangere::kernels

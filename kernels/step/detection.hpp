@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which points of a body may touch a shape: all of them by one bounding sphere across environments,
-// then tiles by theirs and points, eight at a time.
+// Finds which points of a body may touch a shape. First one bounding sphere of all points is tested
+// across environments, then those of tiles, then points, eight at a time.
 #pragma once
 
 #include "kernels/contact/distance.hpp"
@@ -10,7 +10,7 @@
 
 namespace tangere::kernels {
 
-/// Which of eight places in body 1 are nearer to a shape posed there than m.
+/// Returns which of eight places in body 1 are nearer than m to a shape posed there.
 template <class Shape, class N>
 unsigned near_shape(const Shape& shape, const Frame<N>& pose, const Vec3<N>& place, const N& m) {
   const Vec3<N> arm = place - pose.p;
@@ -27,7 +27,8 @@ void store_frame(const Frame<N>& x, N* rows) {
   rows[9] = x.p.x, rows[10] = x.p.y, rows[11] = x.p.z;
 }
 
-/// Pairs whose points may be near: the ball that holds them against the shape.
+/// Finds the pairs whose points may be near: tests the ball that holds all points against the
+/// shape.
 template <class N, int L>
 void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out) {
   const auto view = [](Row<L>* p) { return reinterpret_cast<N*>(p); };
@@ -52,7 +53,7 @@ void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out
   }
 }
 
-/// Appends the lanes in `which`; writes up to eight numbers, whatever their count.
+/// Appends the lanes in `which`. It may write up to eight numbers, however many are appended.
 template <class A>
 void append(const Lanes<A>& a, unsigned which, double* out) {
 #if defined(__AVX512F__)
@@ -66,8 +67,8 @@ void append(const Lanes<A>& a, unsigned which, double* out) {
   for (; which != 0; which &= which - 1) *out++ = lanes[__builtin_ctz(which)];
 }
 
-/// Shape and pose are its own copies: for all the compiler knows, storing to `points` could change
-/// them otherwise.
+/// Shape and pose are local copies. Otherwise the compiler would have to assume that storing to
+/// `points` can change them.
 template <class A, class Shape>
 int search_shape(const CandidateSearch& s, Shape shape) {
   using N = Lanes<A>;
@@ -110,7 +111,7 @@ int search_candidates(const CandidateSearch& s) {
   });
 }
 
-/// Rows of eight lanes from the lanes' own lists; shorter ones end in far points.
+/// Makes rows of eight lanes from the lanes' own lists. Shorter lists end in far points.
 template <class A>
 void transpose_rows(GroupStage::List& list) {
   list.count = 0;

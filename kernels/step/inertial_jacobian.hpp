@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-// The inertial part of the Jacobian A = ∂g/∂x after residual<true>() has filled the scratch.
-// Wrenches by q and by v of a joint's columns are combined into wrenches by x before anything is
+// The inertial part of the Jacobian A = ∂g/∂x, after residual<true>() has filled the scratch. The
+// wrenches of a joint's columns by q and by v are combined into wrenches by x before anything is
 // projected:
 //   A = G_q J + C V_x,  C = G_v + (c₀/h) M;
-//       J = 1, V_x = c₀/h but for spherical joints (kernels/step/stage.hpp)
+//       J = 1, V_x = c₀/h except for spherical joints (kernels/step/stage.hpp)
 //
-// Inertial part, composites Iᶜ, Bᶜ, Fᶜ of subtrees (Fᶜ is the F of the inward sweep), for dof i and
+// Iᶜ, Bᶜ and Fᶜ are composites of subtrees (Fᶜ is the F of the inward sweep). For dof i and
 // ancestor-or-self j:
 //   ∂ID_j/∂q_i = S_jᵀ(Bᶜ Ψ̇_i + Iᶜ Ψ̈_i + [j ≠ i] Fᶜ ×̄* S_i)
 //       ∂ID_i/∂q_j = S_iᵀ(Bᶜ Ψ̇_j + Iᶜ Ψ̈_j)
 //   ∂ID_j/∂v_i = S_jᵀ(Bᶜ S_i + Iᶜ (Ψ̇_i + Ṡ_i))
 //       ∂ID_i/∂v_j = S_iᵀ(Bᶜ S_j + Iᶜ (Ψ̇_j + Ṡ_j))
 //   M_ji = S_jᵀ Iᶜ S_i
-// B of a rigid body acts on the angular part alone, (bias; -2 [momentum]), and stays so when moved
-// and summed.
+// B of a rigid body acts on the angular part alone, as (bias; -2 [momentum]). It keeps this form
+// when moved and summed.
 #pragma once
 
 #include "kernels/step/residual.hpp"
@@ -24,14 +24,14 @@ template <class N>
 Vec6<N> bias_times(const LinkScratch<N>& o, const Vec6<N>& m) {
   return {o.bias * m.a, N(-2.0) * cross(o.momentum, m.a)};
 }
-/// F ×̄* m = m ×* F.
+/// Returns F ×̄* m = m ×* F.
 template <class N>
 Vec6<N> turned(const Vec6<N>& f, const Vec6<N>& m) {
   return cross_wrench(m, f);
 }
 
-/// Own bias B = V×* I - I V× + (I V) ×̄*: upper left W J - J W - (U C + C U) - [h], W = [ω], U =
-/// [v], C = [moment].
+/// A body's own bias B = V×* I - I V× + (I V) ×̄*. Its upper left is W J - J W - (U C + C U) - [h],
+/// with W = [ω], U = [v], C = [moment].
 template <class N>
 void own_bias(LinkScratch<N>& o) {
   const Vec6<N> h = inertia_times(o.mass, o.moment, o.inertia, o.V);
@@ -68,8 +68,8 @@ void add_composites(const Link& link, const LinkScratch<N>& o, LinkScratch<N>& p
   p.bias += bias;
 }
 
-/// Own inertia and bias of each link, then sums over subtrees. Of a link that never turns only the
-/// mass is asked for.
+/// Sets the own inertia and bias of each link, then sums them over subtrees. A link that never
+/// turns needs only its mass.
 template <class N>
 void composite_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int i = 0; i < model.n_links; ++i) {
@@ -98,7 +98,7 @@ void composite_sweep(const ModelView& model, const StageArgs<N>& a) {
   }
 }
 
-/// Ψ̇, Ψ̈, Ṡ of a joint's dofs.
+/// Computes Ψ̇, Ψ̈ and Ṡ of a joint's dofs.
 template <JointKind K, class N>
 void joint_rates(const Link& link, LinkScratch<N>& o) {
   for (int k = 0; k < dofs(K); ++k) {
@@ -121,7 +121,7 @@ void joint_rates(const Link& link, LinkScratch<N>& o) {
   }
 }
 
-/// A joint's columns by x from its columns by q and v; T is a number or a wrench.
+/// Combines a joint's columns by q and v into its columns by x. T is a number or a wrench.
 template <JointKind K, class T, class N>
 void combine(const LinkScratch<N>& o, const N& c0_over_h, const T* by_q, const T* by_v, T* by_x) {
   if constexpr (K != JointKind::spherical) {
@@ -136,14 +136,14 @@ void combine(const LinkScratch<N>& o, const N& c0_over_h, const T* by_q, const T
   }
 }
 
-/// Wrenches of a joint's columns by x and by a, and of its rows: Bᶜᵀ S, which has no force.
+/// Wrenches of a joint's columns by x and by a, and of its rows, Bᶜᵀ S, which have no force.
 template <class N>
 struct JointWrenches {
   Vec6<N> by_x[3], by_a[3];
   Vec3<N> row[3];
 };
 
-/// I m of a motion without angular part.
+/// Returns I m for a motion without angular part.
 template <class N>
 Vec6<N> inertia_times_linear(const LinkScratch<N>& o, const Vec3<N>& l) {
   return {cross(o.moment, l), o.mass * l};
@@ -152,7 +152,7 @@ Vec6<N> inertia_times_linear(const LinkScratch<N>& o, const Vec3<N>& l) {
 template <JointKind K, class N>
 void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_h,
                     JointWrenches<N>& w) {
-  if (slides(K) && link.still) {  // of everything only the force by a matters
+  if (slides(K) && link.still) {  // only the force by a matters
     for (int k = 0; k < dofs(K); ++k) {
       w.by_a[k] = {zero3<N>(), o.mass * joint_axis<K, N>(link, k)};
       w.by_x[k] = {zero3<N>(), (c0_over_h * c0_over_h) * w.by_a[k].l};
@@ -186,7 +186,8 @@ void joint_wrenches(const Link& link, const LinkScratch<N>& o, const N& c0_over_
   combine<K>(o, c0_over_h, by_q, by_v, w.by_x);
 }
 
-/// Entries of dof d and the dofs of one ancestor's joint, everything in the ancestor's axes.
+/// Adds the entries of dof d with the dofs of one ancestor's joint. Everything is in the ancestor's
+/// axes.
 template <JointKind K, class N>
 void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int d,
                       const Vec6<N>& by_x, const Vec6<N>& by_a, const Vec3<N>& row) {
@@ -207,7 +208,7 @@ void ancestor_entries(const ModelView& model, const StageArgs<N>& a, int up, int
   for (int j = 0; j < dofs(K); ++j) a.A[model.pattern.slot[d * n + ancestor.v + j]] = x[j];
 }
 
-/// Rows and columns of a joint's dofs in the ancestors of its link.
+/// Adds the rows and columns that a joint's dofs have with the ancestors of its link.
 template <class N>
 void walk_ancestors(const ModelView& model, const StageArgs<N>& a, int i, JointWrenches<N>& w) {
   const int first = model.links[i].v, count = dofs(model.links[i].kind);
@@ -219,7 +220,7 @@ void walk_ancestors(const ModelView& model, const StageArgs<N>& a, int i, JointW
         w.by_x[k] = wrench_to_parent(link, local, w.by_x[k]);
         w.by_a[k] = wrench_to_parent(link, local, w.by_a[k]);
         if (link.turned) w.row[k] = local.R * w.row[k];
-      } else if (link.turned) {  // nothing above turns: torques no longer matter
+      } else if (link.turned) {  // nothing above turns, so torques no longer matter
         w.by_x[k].l = local.R * w.by_x[k].l;
         w.by_a[k].l = local.R * w.by_a[k].l;
       }

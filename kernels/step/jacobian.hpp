@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// The analytic Jacobian A = ∂g/∂x: what inertia and damping give, then what every contact adds.
+// The analytic Jacobian A = ∂g/∂x: the terms of inertia and damping, then those of every contact.
 //
-// Contacts: δw₁ = K ε + D δW per column of the two bodies' joints, in body 1's axes; ε = S for dofs
-// of body 2 and -S for dofs of body 1. Rows of body 1 take -δw₁, rows of body 2 the reaction δw₁ -
-// w₁ × S. Dofs that move both bodies alike have ε = 0 and only appear as rows.
+// Contacts: δw₁ = K ε + D δW per column of the two bodies' joints, in body 1's axes. ε = S for dofs
+// of body 2 and -S for dofs of body 1. Rows of body 1 take -δw₁. Rows of body 2 take the reaction
+// δw₁ - w₁ × S. Dofs that move both bodies alike have ε = 0 and only appear as rows.
 #pragma once
 
 #include "kernels/step/inertial_jacobian.hpp"
 
 namespace tangere::kernels {
 
-/// Columns of one body of a pair, in body 1's axes, joint by joint from the body to the root.
-/// Returns how many joints. `in_1`: frame of the body's link in body 1, null for body 1 itself.
+/// Writes the columns of one body of a pair, in body 1's axes, joint by joint from the body to the
+/// root. Returns the number of joints. `in_1`: frame of the body's link in body 1, null for body 1
+/// itself.
 template <class N>
 int body_columns(const ModelView& model, const StageArgs<N>& a, int body, const Frame<N>* in_1,
                  JointColumns<N>* out) {
@@ -46,13 +47,13 @@ int body_columns(const ModelView& model, const StageArgs<N>& a, int body, const 
   return count;
 }
 
-/// M m, the angular part of m left out where it is zero.
+/// Returns M m. Leaves out the angular part of m where it is zero.
 template <bool Linear, class N>
 Vec6<N> times(const Mat3<N> (&m)[2][2], const Vec6<N>& v) {
   if constexpr (Linear) return {m[0][1] * v.l, m[1][1] * v.l};
   return {m[0][0] * v.a + m[0][1] * v.l, m[1][0] * v.a + m[1][1] * v.l};
 }
-/// M S_k.
+/// Returns M S_k.
 template <JointKind K, class N>
 Vec6<N> times_column(const Mat3<N> (&m)[2][2], const JointColumns<N>& c, int k) {
   if (dofs(K) == 1 || !c.own) return times<slides(K)>(m, c.S[k]);
@@ -61,8 +62,8 @@ Vec6<N> times_column(const Mat3<N> (&m)[2][2], const JointColumns<N>& c, int k) 
           {m[1][part].m[0][k], m[1][part].m[1][k], m[1][part].m[2][k]}};
 }
 
-/// δw₁ and the reaction by x of one joint's columns, unsigned. `Z`: twist of body 2 in body 1's
-/// axes, null when it is fixed in the world.
+/// Computes δw₁ and the reaction by x of one joint's columns, without sign. `Z`: twist of body 2 in
+/// body 1's axes, null when it is fixed in the world.
 template <JointKind K, class N>
 void column_wrenches(const LinkScratch<N>& link, const ContactScratch<N>& o,
                      const JointColumns<N>& c, const Vec6<N>* Z, const N& c0_over_h, Vec6<N>* by_x,
@@ -144,7 +145,7 @@ void contact_jacobian(const ModelView& model, const StageArgs<N>& a, int body1, 
   }
 }
 
-/// A at the x that residual<true>() has just been evaluated at.
+/// Computes A at the x of the last residual<true>().
 template <class N>
 void jacobian(const ModelView& model, const StageArgs<N>& a) {
   for (int e = 0; e < model.pattern.entries; ++e) a.A[e] = N(0.0);

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-// What acts on the dofs of a joint: damping, armature, springs, limits, position motors; and its
-// derivatives. Per dof
+// What acts on the dofs of a joint: damping, armature, springs, limits and position motors, with
+// their derivatives. Per dof
 //
-//   f = -c v - I_a a - k (q - rest) + k_l max(0, lo - q) - k_l max(0, q - hi) + clip(P (u - q) - D
-//       v, range)
+//   f = -c v - I_a a - k (q - rest) + k_l max(0, lo - q) - k_l max(0, q - hi)
+//       + clip(P (u - q) - D v, range)
 //
-// A spherical joint has rotation vectors in place of q, φ = log q, φ_s = log(rest⁻¹ q), ψ = log(q⁻¹
-// exp u). Torques, body axes: spring -k φ_s (the gradient of k|φ_s|²/2, as J_r⁻ᵀ(φ) φ = φ); limits
-// J_r⁻ᵀ(φ) f(φ), f per component; motor
-// clip(P ψ - D ω). By the right tangent θ: ∂φ/∂θ = J_r⁻¹(φ), ∂ψ/∂θ = -J_r⁻ᵀ(ψ).
+// A spherical joint has rotation vectors in place of q: φ = log q, φ_s = log(rest⁻¹ q),
+// ψ = log(q⁻¹ exp u). Torques in body axes: spring -k φ_s (the gradient of k|φ_s|²/2, as
+// J_r⁻ᵀ(φ) φ = φ); limits J_r⁻ᵀ(φ) f(φ), f per component; motor clip(P ψ - D ω). By the right
+// tangent θ: ∂φ/∂θ = J_r⁻¹(φ), ∂ψ/∂θ = -J_r⁻ᵀ(ψ).
 //
-// Flags of the link decide outside the lanes what is evaluated. At a bound of a limit the
-// derivative is that of its inside, at a bound of a motor's range that of the unclipped force.
+// Flags of the link decide, outside the lanes, what is evaluated. At a bound of a limit the
+// derivative is that of its inside. At a bound of a motor's range it is that of the unclipped
+// force.
 #pragma once
 
 #include "kernels/numbers/rotation_vector.hpp"
@@ -19,15 +20,15 @@
 
 namespace tangere::kernels {
 
-/// Forces on the dofs of one joint [N, N m], damping left out, and derivatives of -force as the
-/// Jacobian wants them.
+/// Forces on the dofs of one joint [N, N m] without damping, and derivatives of -force in the form
+/// that the Jacobian needs.
 template <class N>
 struct JointLoad {
   N force[3];
-  N magnitude[3];   ///< sum of the magnitudes of its parts, inertia left out
-  N by_q[3];        ///< joints that do not turn freely: diagonal
-  Mat3<N> by_turn;  ///< spherical: by the right tangent
-  N by_v[3];        ///< diagonal; c₀/h times the armature included
+  N magnitude[3];   ///< sum of the magnitudes of its parts, without inertia
+  N by_q[3];        ///< diagonal; joints that do not turn freely
+  Mat3<N> by_turn;  ///< by the right tangent; spherical joints
+  N by_v[3];        ///< diagonal; includes c₀/h times the armature
   N armature[3];
 };
 
@@ -42,7 +43,7 @@ void add_force(JointLoad<N>& out, int k, const N& force) {
   out.magnitude[k] += abs(force);
 }
 
-/// Force of a limit at q; `slope`: derivative of -force.
+/// Returns the force of a limit at q. `slope`: derivative of -force.
 template <class N>
 N limit_force(const DofEffects& e, const N& stiffness, const N& q, N& slope) {
   const N low(e.low), high(e.high), zero(0.0);
@@ -50,8 +51,8 @@ N limit_force(const DofEffects& e, const N& stiffness, const N& q, N& slope) {
   return select(q < low, stiffness * (low - q), select(q > high, stiffness * (high - q), zero));
 }
 
-/// Force of a position motor at the distance `error` from its target; `inside`: 1 where it is not
-/// clipped.
+/// Returns the force of a position motor at the distance `error` from its target. `inside` is 1
+/// where the force is not clipped.
 template <class N>
 N motor_force(const DofEffects& e, const N& P, const N& D, const N& error, const N& v, N& inside) {
   const N low(e.force_low), high(e.force_high);
@@ -146,7 +147,7 @@ void add_turning_effects(const StageArgs<N>& a, const Link& link, const DofEffec
   if (link.effects & kDriven) add_turning_motor<Derivatives>(a, link, e, q, out);
 }
 
-/// Damping alone: most joints have nothing else.
+/// Adds damping alone: most joints have nothing else.
 template <JointKind K, class N>
 void add_damping(const ModelView& model, const StageArgs<N>& a, const Link& link) {
   for (int k = 0; k < dofs(K); ++k) {
@@ -157,7 +158,7 @@ void add_damping(const ModelView& model, const StageArgs<N>& a, const Link& link
   }
 }
 
-/// All other effects of one joint at the stage's x; a.v of its dofs must be there.
+/// Adds all other effects of one joint at the stage's x. a.v of its dofs must be set.
 template <JointKind K, bool Derivatives, class N>
 void joint_load(const ModelView& model, const StageArgs<N>& a, const Link& link,
                 JointLoad<N>& out) {
@@ -177,7 +178,7 @@ void joint_load(const ModelView& model, const StageArgs<N>& a, const Link& link,
     if (link.effects & kOfPosition) add_turning_effects<Derivatives>(a, link, e, out);
 }
 
-// Kept out of line: inlined, its frame would cost joints that have no such effects.
+// Not inlined: its frame would cost time in joints that have no such effects.
 template <JointKind K, class N>
 [[gnu::noinline]] void add_joint_load(const ModelView& model, const StageArgs<N>& a,
                                       const Link& link) {
@@ -189,7 +190,7 @@ template <JointKind K, class N>
   }
 }
 
-/// Adds a force's derivatives by v, diagonal, to the joint's block of A.
+/// Adds the derivatives of a force by v, which are diagonal, to the joint's block of A.
 template <JointKind K, class N>
 void add_by_v(const ModelView& model, const StageArgs<N>& a, const Link& link, int j,
               const N& by_v) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// World poses and twists of all links of eight environments, and of a shape against a pad.
+// World poses and twists of all links of eight environments, and those of a shape against a pad.
 #pragma once
 
 #include "kernels/step/arguments.hpp"
@@ -8,8 +8,8 @@
 
 namespace tangere::kernels {
 
-/// Poses and body twists at (centre, r): with x = 0, c₀/h = 0 and 1/h = 1 the rates of a stage are
-/// r itself.
+/// Computes poses and body twists at (centre, r). With x = 0, c₀/h = 0 and 1/h = 1, the rates of a
+/// stage are r itself.
 template <class N>
 void link_poses(const ModelView& model, const StageArgs<N>& a, LinkPose<N>* out) {
   LinkScratch<N> scratch;
@@ -27,7 +27,8 @@ void link_poses(const ModelView& model, const StageArgs<N>& a, LinkPose<N>* out)
   }
 }
 
-/// The shape `body_frame` of `body` against the pad `pad_frame` of `sensor`; nullptr is the world.
+/// Returns the shape at `body_frame` of `body` against the pad at `pad_frame` of `sensor`. nullptr
+/// is the world.
 template <class N>
 void pad_touch(const LinkPose<N>* sensor, const Frame<double>& pad_frame, const LinkPose<N>* body,
                const Frame<double>& body_frame, Touch<N>& out) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sparse LU without pivoting in lanes, on the scene's pattern, and a watched solve.
+// Sparse LU without pivoting in lanes, on the scene's pattern, and a solve that checks its result.
 //
 // The elimination is interpreted: all lanes share one list of slots. Without pivoting a factor can
-// be useless, so each solve is refined once and judged in the scaling S = diag(|a_ii|^-1/2), which
-// makes the figures free of units:
+// be useless. Each solve is therefore refined once and judged in the scaling S = diag(|a_ii|^-1/2),
+// which removes all units:
 //   accepted if β = ‖S(b - Ax)‖∞ / (‖SAS‖∞ ‖S⁻¹x‖∞ + ‖Sb‖∞) ≤ 1e-13 and the correction ≤ 1e-6
 //       ‖S⁻¹x‖∞
 #pragma once
@@ -13,7 +13,7 @@
 
 namespace tangere::kernels {
 
-/// Unit lower factor in place; U's diagonal is stored as its reciprocal.
+/// Factors in place, with unit lower factor. U's diagonal is stored as its reciprocal.
 template <class N>
 void eliminate(const Pattern& p, N* work) {
   for (int k = 0; k < p.n; ++k) {
@@ -32,8 +32,8 @@ void eliminate(const Pattern& p, N* work) {
   }
 }
 
-/// Factors A into LU (factor_entries): everywhere (accept null), or where `accept` is 1, keeping LU
-/// elsewhere. `work`: (factor_entries).
+/// Factors A into LU, (factor_entries): in all lanes if `accept` is null, else in those where it is
+/// 1; the other lanes keep their LU. `work`: (factor_entries).
 template <class N>
 void factor(const Pattern& p, const N* A, const N* accept, N* LU, N* work) {
   N* to = accept == nullptr ? LU : work;
@@ -46,7 +46,7 @@ void factor(const Pattern& p, const N* A, const N* accept, N* LU, N* work) {
   for (int e = 0; e < p.factor_entries; ++e) LU[e] = select(mask, work[e], LU[e]);
 }
 
-/// b_k less the products of factor slots begin … end - 1 with work, two sums at a time.
+/// Returns b_k minus the products of factor slots begin … end - 1 with work, two sums at a time.
 template <class N>
 N reduced(const Pattern& p, const N* LU, int begin, int end, const N& b, const N* work) {
   N even = b, odd(0.0);
@@ -59,7 +59,7 @@ N reduced(const Pattern& p, const N* LU, int begin, int end, const N& b, const N
   return even + odd;
 }
 
-/// x = A⁻¹ b from the factor. b and x in dof order; `work`: (n).
+/// Solves x = A⁻¹ b from the factor. b and x are in dof order. `work`: (n).
 template <class N>
 void solve(const Pattern& p, const N* LU, const N* b, N* x, N* work) {
   for (int k = 0; k < p.n; ++k)
@@ -71,7 +71,7 @@ void solve(const Pattern& p, const N* LU, const N* b, N* x, N* work) {
   }
 }
 
-/// x = A⁻ᵀ b from the same factor: Uᵀ, then Lᵀ, row by row of the factor.
+/// Solves x = A⁻ᵀ b from the same factor: Uᵀ, then Lᵀ, row by row of the factor.
 template <class N>
 void solve_transposed(const Pattern& p, const N* LU, const N* b, N* x, N* work) {
   const auto take = [&](int begin, int end, const N& y) {
@@ -89,7 +89,7 @@ void solve_transposed(const Pattern& p, const N* LU, const N* b, N* x, N* work) 
   }
 }
 
-/// b - A x, or b - Aᵀ x.
+/// Computes b - A x, or b - Aᵀ x.
 template <bool Transposed, class N>
 void defect(const Pattern& p, const N* A, const N* x, const N* b, N* out) {
   if constexpr (Transposed) {
@@ -107,7 +107,7 @@ void defect(const Pattern& p, const N* A, const N* x, const N* b, N* out) {
   }
 }
 
-/// Largest row sum of |S A S|, of its columns for the transposed.
+/// Returns the largest row sum of |S A S|; the largest column sum if transposed.
 template <bool Transposed, class N>
 N scaled_norm(const Pattern& p, const N* A, const N* scale, N* sums) {
   N norm(0.0);
@@ -121,8 +121,8 @@ N scaled_norm(const Pattern& p, const N* A, const N* scale, N* sums) {
   return norm;
 }
 
-/// x = A⁻¹ b or A⁻ᵀ b, refined once; `sound` is 1 where the result passed the test above. `work`:
-/// (5 n).
+/// Solves x = A⁻¹ b or A⁻ᵀ b, refined once. `sound` is 1 where the result passed the test above.
+/// `work`: (5 n).
 template <bool Transposed, class N>
 void solve_watched(const Pattern& p, const N* A, const N* LU, const N* b, N* x, N* sound, N* work) {
   const int n = p.n;
@@ -151,7 +151,7 @@ void solve_watched(const Pattern& p, const N* A, const N* LU, const N* b, N* x, 
     norm_x = max(abs(x[i]) * inverse_scale[i], norm_x);
     norm_d = max(abs(correction[i]) * inverse_scale[i], norm_d);
   }
-  // A NaN anywhere reaches x and fails the finiteness test, because max() above drops it.
+  // A NaN anywhere reaches x and fails this test of finiteness, because max() above drops it.
   N finite = zero;
   for (int i = 0; i < n; ++i) finite = mul_add(zero, x[i], finite);
   const auto ok = (norm_r <= 1e-13 * mul_add(norm_a, norm_x, norm_b)) & (norm_d <= 1e-6 * norm_x) &

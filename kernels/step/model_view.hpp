@@ -13,7 +13,7 @@ namespace tangere::kernels {
 /// translational link without mass, then a spherical one; planar is two prismatic links.
 enum class JointKind : std::uint8_t { revolute, prismatic, translational, spherical };
 
-/// The motion subspace has no angular part.
+/// Whether the motion subspace has no angular part.
 constexpr bool slides(JointKind k) {
   return k == JointKind::prismatic || k == JointKind::translational;
 }
@@ -22,7 +22,7 @@ constexpr int dofs(JointKind k) {
 }
 constexpr int coordinates(JointKind k) { return k == JointKind::spherical ? 4 : dofs(k); }
 
-/// What acts on a joint's dofs beside inertia and contacts; bits of Link::effects.
+/// What acts on a joint's dofs besides inertia and contacts. Bits of Link::effects.
 enum JointEffect : std::uint8_t {
   kDamped = 1,
   kArmoured = 2,
@@ -43,16 +43,16 @@ struct Link {
   bool rotated;         ///< frame.R is not the identity
   bool turned;          ///< the link's axes may differ from its parent's
   bool placed;          ///< its origin may differ from its parent's
-  bool steady;          ///< no ancestor ever turns: the parent's ω and α are zero
-  bool still;  ///< nor does this joint: ω and α are zero, and of a wrench only the force does work
+  bool steady;          ///< no ancestor ever turns: ω and α of the parent are zero
+  bool still;  ///< nor does this joint: ω and α are zero, and only the force of a wrench does work
   bool massive;          ///< false: no inertia of its own
-  std::uint8_t effects;  ///< JointEffect bits: what some dof of the joint has
+  std::uint8_t effects;  ///< JointEffect bits: effects that some dof of the joint has
   double mass;           ///< [kg]
   Vec3<double> moment;   ///< mass times centre of mass, link axes [kg m]
   Mat3<double> inertia;  ///< about the link's origin, link axes [kg m²]
-  int inertia_row = -1;  ///< ≥ 0: mass, moment and xx xy xz yy yz zz of the inertia stand in ten
+  int inertia_row = -1;  ///< ≥ 0: mass, moment and inertia (xx xy xz yy yz zz) are read from ten
                          ///< rows of the block instead
-  int place_row = -1;    ///< ≥ 0: frame.p stands in three rows of the block instead
+  int place_row = -1;    ///< ≥ 0: frame.p is read from three rows of the block instead
 };
 
 /// A number of the scene: the same for all environments, or one row of the batch.
@@ -61,13 +61,13 @@ struct Parameter {
   int row;  ///< row of the block, -1: constant
 };
 
-/// Effects on one dof [SI of its kind]; those that its link's flags leave out are not read.
+/// Effects on one dof [SI of its kind]. Effects that its link's flags leave out are not read.
 struct DofEffects {
   Parameter damping, armature, stiffness, limit_stiffness;
-  double rest;       ///< of the spring; spherical: component of a rotation vector [m, rad]
-  double low, high;  ///< limits [m, rad]
-  Parameter P, D;    ///< gains of a position motor evaluated at the end of the step
-  double force_low, force_high;  ///< its range; infinite: none
+  double rest;  ///< rest value of the spring; spherical: component of a rotation vector [m, rad]
+  double low, high;              ///< limits [m, rad]
+  Parameter P, D;                ///< gains of a position motor evaluated at the end of the step
+  double force_low, force_high;  ///< range of the motor's force; infinite: none
 };
 
 using ContactParameters = Coefficients<Parameter>;
@@ -82,30 +82,30 @@ struct PairContact {
   ContactLaw law;
   double ramp;
   ContactParameters parameters;
-  const double* points;       ///< (n_points, 3) in link1's axes (or the world's), sorted into tiles
-  const double* tile_points;  ///< (n_tiles, 3, 32) the same: x, y, z of kContactTile points, padded
-                              ///< with far points
+  const double* points;  ///< (n_points, 3) in link1's axes (or the world's), in the order of tiles
+  const double* tile_points;  ///< (n_tiles, 3, 32) the same points tile by tile: x, y, z of
+                              ///< kContactTile points, padded with far points
   const double* tile_bounds;  ///< (ceil(n_tiles/8), 4, 8) centres and radii of the tiles, padded
-                              ///< with far ones
+                              ///< with far tiles
   int n_points, n_tiles;
-  Vec3<double> middle;         ///< of a ball that holds all points, link1's axes
+  Vec3<double> middle;         ///< centre of a ball that holds all points, link1's axes
   double extent;               ///< its radius [m]
-  double reach;                ///< largest |point| [m]: bounds how far a rotation moves one
-  int size_row = -1;           ///< ≥ 0: size stands in three rows of the block instead
-  int body1 = -1, body2 = -1;  ///< of ModelView::solids
+  double reach;                ///< largest |point| [m]: bounds how far a rotation moves a point
+  int size_row = -1;           ///< ≥ 0: size is read from three rows of the block instead
+  int body1 = -1, body2 = -1;  ///< indices into ModelView::solids
 };
 inline constexpr int kContactTile = 32;
 inline constexpr double kFarAway =
-    1e6;  ///< [m] coordinates of filler points: finite, and no shape is there
+    1e6;  ///< [m] coordinates of filler points: finite, and far from any shape
 
-/// Two links that touch through one shape or several: one relative motion, one 6×6 block.
+/// Two links that touch through one or several shapes: one relative motion, one 6×6 block.
 struct LinkPair {
-  int link1, link2;  ///< of all its members
+  int link1, link2;  ///< the links of all members
   int first, count;  ///< members: pairs pair_order[first] … pair_order[first + count - 1]
-  double reach;      ///< largest of its members' [m]
-  double margin;     ///< of candidate lists: points this near to a shape are listed [m]
-  bool ball;  ///< its only shape is a sphere, centred at `centre` in link 2: turning it changes
-              ///< nothing
+  double reach;      ///< largest reach of its members [m]
+  double margin;     ///< of candidate lists: points nearer than this to the surface are listed [m]
+  bool ball;  ///< its only shape is a sphere, centred at `centre` in link 2, so that turning it
+              ///< changes nothing
   Vec3<double> centre;
 };
 
@@ -118,15 +118,15 @@ struct GroundContact {
   ContactParameters parameters;
   const double* points;  ///< (n_points, 3), link axes
   int n_points;
-  Vec3<double> middle;  ///< of a ball that holds all of the body's points, link axes
+  Vec3<double> middle;  ///< centre of a ball that holds all of the body's points, link axes
   double extent;        ///< its radius [m]
-  int radius_row = -1;  ///< ≥ 0: a sphere's radius stands there instead, and is not in `extent`
-  int body = -1;        ///< of ModelView::solids
-  const double* point_tangents =
-      nullptr;  ///< (n_points, 3) of `points`, for dual numbers alone; nullptr: they stay
+  int radius_row = -1;  ///< ≥ 0: the row of a sphere's radius, which is not in `extent`
+  int body = -1;        ///< index into ModelView::solids
+  /// (n_points, 3) tangents of `points`, used by dual numbers alone; nullptr: points stay fixed.
+  const double* point_tangents = nullptr;
 };
 
-/// A body of the scene, for derivatives by its size: its own contact points keep their place on its
+/// A body of the scene, for derivatives by its size. Its own contact points keep their place on its
 /// surface.
 struct Solid {
   Frame<double> frame;  ///< in its link (or the world)
@@ -135,13 +135,13 @@ struct Solid {
   Vec3<double> size;  ///< as in PairContact
 };
 
-/// A link that touches the ground with one body or several: one 6×6 block.
+/// A link that touches the ground with one or several bodies: one 6×6 block.
 struct GroundedLink {
   int link;
   int first, count;  ///< members: grounds ground_order[first] … ground_order[first + count - 1]
 };
 
-/// Structure of matrices over dofs, shared by every environment and step.
+/// Structure of matrices over dofs, shared by all environments and steps.
 struct Pattern {
   int n;            ///< dofs
   int entries;      ///< stored entries of G_q, C and A
@@ -149,9 +149,9 @@ struct Pattern {
   const int*
       entry_begin;  ///< (n + 1): entries of row i are entry_begin[i] … entry_begin[i + 1] - 1
   const int* entry_column;  ///< (entries)
-  // LU: entries of A scattered to factor slots, then an interpreted elimination. Factor slots go
-  // row by row in elimination order: L(i, ·), U(i, i), U(i, ·), so that what is right of a pivot
-  // lies side by side.
+  // LU: entries of A are scattered to factor slots, then eliminated by interpreting these lists.
+  // Factor slots go row by row in elimination order: L(i, ·), U(i, i), U(i, ·). The entries to the
+  // right of a pivot are thus adjacent.
   int factor_entries;
   const int* permutation;    ///< (n) elimination step → dof
   const int* scatter;        ///< (entries) slot of A → slot of LU
@@ -160,7 +160,7 @@ struct Pattern {
   const int* factor_column;  ///< (factor_entries) elimination step j of each slot
   const int* lower_begin;    ///< (n + 1) into lower_slot: the entries below pivot k
   const int* lower_slot;     ///< slot of L(i, k)
-  const int* run_begin;      ///< (lower entries + 1) into runs: what row i takes from row k
+  const int* run_begin;      ///< (lower entries + 1) into runs: what row i subtracts of row k
   const struct EliminationRun* runs;
 };
 
@@ -183,11 +183,11 @@ struct ModelView {
   const GroundedLink* grounded;
   const int *pair_order, *ground_order;  ///< (n_pairs), (n_grounds): members side by side
   int n_solids;
-  const Solid* solids;  ///< (n_solids) every body of the scene
+  const Solid* solids;  ///< (n_solids) all bodies of the scene
   Pattern pattern;
 };
 
-/// Start of the row holding environment lanes 8 g … 8 g + 7 of a block.
+/// Start of the row that holds the environments of lanes 8 g … 8 g + 7 of a block.
 inline const double* row_of(const double* block, int row, int group) {
   return block + row * kBlock + group * kGroup;
 }

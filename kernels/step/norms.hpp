@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a residual is measured by. With D the diagonal of the mass matrix:
+// The norm in which residuals are measured. With D the diagonal of the mass matrix:
 //   ‖D^-½ g‖ / (‖D^½ v‖ c₀/h + ‖D^½‖ |gravity| + ‖D^-½ f‖),
 //       f the magnitudes of contact, motor and damping forces
-// is free of units. No residual can be smaller than what one rounding of a position does to it:
-// below the floor ‖D^-½ φ‖², φ_i = 4 ε |A_ii| (extent of the scene, or 1 rad), it counts as zero.
+// is free of units. A residual cannot be smaller than the effect of rounding a position once. It
+// counts as zero below the floor ‖D^-½ φ‖², φ_i = 4 ε |A_ii| (extent of the scene, or 1 rad).
 #pragma once
 
 #include <limits>
@@ -54,7 +54,7 @@ struct ResidualScale {
   N c0_over_h, gravity, floor;
 };
 
-/// A NaN in g comes back as NaN.
+/// A NaN in g is returned as NaN.
 template <class N>
 N scaled_residual(int n, const N* g, const ResidualScale<N>& s) {
   N residual(0.0), motion(0.0), mass(0.0), force(0.0);

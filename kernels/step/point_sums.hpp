@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contact sums over candidates, of one shape after the other. Many lanes: row by row of the list.
-// One lane: eight of its points at a time through the law, then one after the other into the sums,
-// in list order. The same bits, for a third of the work.
+// Contact sums over candidates, one shape after the other. Many lanes go through the list row by
+// row. A lone lane evaluates the law at eight of its points at a time and adds them one by one in
+// list order. This gives the same bits for a third of the work.
 #pragma once
 
 #include "kernels/contact/packed_face_sums.hpp"
@@ -9,7 +9,7 @@
 
 namespace tangere::kernels {
 
-/// One row of the list after the other.
+/// Adds the list row by row.
 template <bool Derivatives, class Motion, class N>
 void add_rows(const Motion& motion, const LawParameters<N>& law, const CandidateList<N>& list,
               typename Motion::Sums& sums) {
@@ -49,7 +49,7 @@ void add_row(const Rows& rows, int i, Sums& sums, PointChunk<Point>& chunk) {
   add_chunk<Derivatives>(sums, chunk);
 }
 
-/// Adds one lane's own candidates; motion and law the same in every lane of the vectors.
+/// Adds one lane's own candidates. Motion and law are the same in every lane of the vectors.
 template <bool Derivatives, class Motion, class A, class List, class Sums>
 void add_own_points(const Motion& motion, const LawParameters<Lanes<A>>& law, const List& list,
                     Sums& sums) {
@@ -71,7 +71,7 @@ void add_own_points(const Motion& motion, const LawParameters<Lanes<A>>& law, co
   }
 }
 
-/// A motion in the number type that has x in every lane; lane `from` of a vector.
+/// Broadcasts a motion to all lanes. If it is made of vectors, lane `from` of each is taken.
 template <class A, class Motion>
 auto in_all_lanes(const Motion& motion, int from) {
   using To = typename Motion::template Of<Lanes<A>>;
@@ -84,7 +84,7 @@ auto in_all_lanes(const Motion& motion, int from) {
   return out;
 }
 
-/// Where the points of a pair of links are added up: row by row of their lists.
+/// How the points of a pair of links are summed: row by row of their lists.
 template <bool Derivatives, template <class> class Sums, class N>
 struct PointSums {
   Sums<N> sums;
@@ -97,7 +97,7 @@ struct PointSums {
   const Sums<N>& result(int) { return sums; }
 };
 
-/// Of a lane on its own: across its points.
+/// For a lone environment: across its points.
 template <bool Derivatives, template <class> class Sums, class A>
 struct PointSums<Derivatives, Sums, OneLane<A>> {
   typename OwnSums<Sums, A>::Type own;
@@ -115,7 +115,7 @@ struct PointSums<Derivatives, Sums, OneLane<A>> {
   Sums<OneLane<A>> result(int) { return unpacked<Derivatives>(own); }
 };
 
-/// Of a group: by rows, or across the points of the lane that is evaluated alone.
+/// For a group: by rows, or across the points of the lane that is evaluated alone.
 template <bool Derivatives, template <class> class Sums, class A>
 struct PointSums<Derivatives, Sums, Lanes<A>> {
   using N = Lanes<A>;

@@ -13,8 +13,8 @@
 
 namespace tangere::kernels {
 
-/// Pose of a child link in its parent, and its joint's rates. q̇ and q̈ come back in `rate` and
-/// `acceleration`.
+/// Computes the pose of a child link in its parent and its joint's rates. Writes q̇ and q̈ to
+/// `rate` and `acceleration`.
 template <class N>
 void joint_motion(const Link& link, const StageArgs<N>& a, LinkScratch<N>& out, Vec6<N>& rate,
                   Vec6<N>& acceleration) {
@@ -78,14 +78,14 @@ void joint_motion(const Link& link, const StageArgs<N>& a, LinkScratch<N>& out, 
   out.local.p = slides(link.kind) ? (link.rotated ? base.R * moved.p : moved.p) + base.p : base.p;
 }
 
-/// I m for a rigid body: (J ω + c × v; m v - c × ω), c = mass times centre of mass.
+/// Returns I m for a rigid body: (J ω + c × v; m v - c × ω), c = mass times centre of mass.
 template <class N>
 Vec6<N> inertia_times(const N& mass, const Vec3<N>& moment, const Mat3<N>& inertia,
                       const Vec6<N>& m) {
   return {inertia * m.a + cross(moment, m.l), mass * m.l - cross(moment, m.a)};
 }
 
-/// Poses, twists and accelerations of every link.
+/// Computes poses, twists and accelerations of every link.
 template <class N>
 void outward_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int i = 0; i < model.n_links; ++i) {
@@ -110,7 +110,7 @@ void outward_sweep(const ModelView& model, const StageArgs<N>& a) {
   }
 }
 
-/// Inertial wrench of every link about its own origin.
+/// Computes the inertial wrench of every link about its own origin.
 template <class N>
 void inertial_wrenches(const ModelView& model, const StageArgs<N>& a) {
   for (int i = 0; i < model.n_links; ++i) {
@@ -128,7 +128,7 @@ void inertial_wrenches(const ModelView& model, const StageArgs<N>& a) {
   }
 }
 
-/// Relative pose and twist of two links. The world has its own frame and no twist.
+/// Computes relative pose and twist of two links. The world has its own frame and no twist.
 template <class N>
 void pair_motion(const LinkPair& pair, const StageArgs<N>& a, ContactScratch<N>& o) {
   const Frame<N> origin = {diagonal(N(1.0)), zero3<N>()};
@@ -139,9 +139,9 @@ void pair_motion(const LinkPair& pair, const StageArgs<N>& a, ContactScratch<N>&
   o.W = pair.link1 < 0 ? o.Z : o.Z - a.links[pair.link1].V;
 }
 
-/// How far any point of body 1 may have come nearer to a shape since the lists were made, beyond
-/// the margin. With G = (R, p) of the links, a point ξ is at Rᵀ(ξ - p) in body 2 and so in every
-/// shape that is fixed there.
+/// Returns how much nearer any point of body 1 may have come to a shape since the lists were made,
+/// beyond the margin. With G = (R, p) of the links, a point ξ is at Rᵀ(ξ - p) in body 2, and so in
+/// every shape that is fixed there.
 template <class N>
 N list_excess(const LinkPair& pair, const CandidateList<N>& list, const Frame<N>& now) {
   const N* ref = list.reference;
@@ -163,7 +163,7 @@ N list_excess(const LinkPair& pair, const CandidateList<N>& list, const Frame<N>
   return moved - list.margin;
 }
 
-/// Adds the points of a capsule, whose ends bend in two directions, one candidate after the other.
+/// Adds the points of a capsule one candidate after the other: its ends bend in two directions.
 template <bool Derivatives, class Shape, class N>
 void add_candidates(const Shape& shape, const LawParameters<N>& law, const CandidateList<N>& list,
                     int lone, const Frame<N>& frame, const Vec6<N>& W, PairSums<N>& sums) {
@@ -195,7 +195,7 @@ template <bool Derivatives, class N>
   add_finished<Derivatives>(motion, W, sphere.result(lone), sums);
 }
 
-/// Zeros; without derivatives, only those of the wrench.
+/// Sets the sums to zero; without derivatives, only those of the wrench.
 template <bool Derivatives, class N>
 void start(PairSums<N>& sums) {
   if constexpr (Derivatives) {
@@ -205,8 +205,8 @@ void start(PairSums<N>& sums) {
   }
 }
 
-/// Sums over all shapes of two links. Flat and bent faces share theirs, which are about body 1's
-/// origin.
+/// Computes the sums over all shapes of two links. Flat and bent faces share their sums, which are
+/// about body 1's origin.
 template <bool Derivatives, class N>
 void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArgs<N>& a,
                    ContactScratch<N>& o) {
@@ -239,7 +239,7 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
   if (any_face) add_finished<Derivatives>(o.W, faces.result(a.lone), o.sums);
 }
 
-/// Points of one link in the ground; false where there are none in any lane.
+/// Adds the points of one link that are in the ground. Returns false where no lane has any.
 template <bool Derivatives, class N>
 bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const StageArgs<N>& a,
                   PairSums<N>& sums) {
@@ -265,8 +265,8 @@ bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const St
   return near;
 }
 
-/// -0 to +0: a contact that is near in another lane only adds ±0, which must not show in this
-/// lane's bits.
+/// Turns -0 into +0. A contact that is near in another lane only adds ±0, which must not show in
+/// this lane's bits.
 template <class N>
 void without_negative_zeros(N* x, int count) {
   for (int i = 0; i < count; ++i) x[i] = x[i] + N(0.0);
@@ -279,8 +279,8 @@ bool near(const ModelView& model, const LinkPair& links, const StageArgs<N>& a) 
   return false;
 }
 
-/// Contact sums of every pair of links and grounded link; their wrenches are taken from the links'
-/// F.
+/// Computes the contact sums of every pair of links and grounded link. Subtracts their wrenches
+/// from the links' F.
 template <bool Derivatives, class N>
 void contact_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int k = 0; k < model.n_link_pairs; ++k) {
@@ -299,7 +299,7 @@ void contact_sweep(const ModelView& model, const StageArgs<N>& a) {
   }
 }
 
-/// Joint forces from the wrenches, leaves first. Also |forces| for the stopping test.
+/// Computes joint forces from the wrenches, leaves first, and |forces| for the stopping test.
 template <class N>
 void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
   for (int i = model.n_links - 1; i >= 0; --i) {
@@ -318,8 +318,8 @@ void inward_sweep(const ModelView& model, const StageArgs<N>& a) {
   }
 }
 
-/// Adds |generalised force| of one contact wrench on a link to the scale of every dof that carries
-/// it.
+/// Adds |generalised force| of one contact wrench on a link to the scale of every dof that moves
+/// the link.
 template <class N>
 void add_force_scale(const ModelView& model, const StageArgs<N>& a, int link, Vec6<N> wrench) {
   for (int i = link; i >= 0; i = model.links[i].parent) {
@@ -332,7 +332,7 @@ void add_force_scale(const ModelView& model, const StageArgs<N>& a, int link, Ve
   }
 }
 
-/// Poses and motions at x, and how far each lane has outrun its candidate lists.
+/// Computes poses and motions at x, and how far each lane has outrun its candidate lists.
 template <class N>
 void kinematics(const ModelView& model, const StageArgs<N>& a) {
   outward_sweep(model, a);
@@ -345,7 +345,8 @@ void kinematics(const ModelView& model, const StageArgs<N>& a) {
   }
 }
 
-/// g at the x of kinematics(), with everything the Jacobian needs left in the scratch.
+/// Computes g at the x of kinematics() and leaves everything that the Jacobian needs in the
+/// scratch.
 template <bool Derivatives, class N>
 void residual(const ModelView& model, const StageArgs<N>& a) {
   inertial_wrenches(model, a);

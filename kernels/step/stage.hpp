@@ -13,7 +13,7 @@
 
 namespace tangere::kernels {
 
-/// Scratch of one link: everything the sweeps pass on.
+/// Scratch of one link: everything that the sweeps pass on.
 template <class N>
 struct LinkScratch {
   Frame<N> local;  ///< in the parent link
@@ -23,7 +23,7 @@ struct LinkScratch {
   Vec6<N> F;           ///< wrench through the joint: inertial minus external, of the whole subtree
   Mat3<N> chart;       ///< spherical: J = J_r(x)
   Mat3<N> chart_rate;  ///< spherical: V_x = (c₀/h) J + D(x, ẋ)
-  N mass;  ///< composite inertia of the subtree: mass, moment, inertia about this origin
+  N mass;              ///< composite of the subtree: mass, moment, inertia about this origin
   Vec3<N> moment;
   Mat3<N> inertia;
   Mat3<N> bias;  ///< composite B: B m = (bias m.a; -2 momentum × m.a)
@@ -41,11 +41,10 @@ struct ContactScratch {
   Vec6<N> W;            ///< Z - V₁
   PairSums<N> sums;     ///< valid where `near`
   bool near;  ///< some lane has a candidate, or a point in the ground; else nothing is added
-              ///< anywhere
 };
 
-/// Candidate points of a pair, per lane, and the pose they were found at, which all pairs of the
-/// same links share.
+/// Candidate points of a pair, per lane, and the pose at which they were found, which all pairs of
+/// the same links share.
 template <class N>
 struct CandidateList {
   const N* points;  ///< (count, 3) in body 1's axes; lanes with fewer hold far points
@@ -53,17 +52,17 @@ struct CandidateList {
   const N* reference;  ///< (12) link2_in_1 when the list was made: R row-major, then p
   double margin;       ///< a point missing from the list was at least this far away [m]
   const double* own;   ///< (3, stride) candidates of the lane that is evaluated alone, padded to
-                       ///< eights with far points
+                       ///< multiples of eight with far points
   int own_count, stride;
 };
 
-/// The dofs of a joint that moves a body of a pair: S and Ψ̇ of each in body 1's axes.
+/// The dofs of a joint that moves a body of a pair: S and Ψ̇ of each, in body 1's axes.
 template <class N>
 struct JointColumns {
   Vec6<N> S[3], psi_dot[3];
   int link;
-  bool rates;  ///< Ψ̇ is set: it may differ from zero
-  bool own;    ///< of body 1's own link: S_k is the unit vector k
+  bool rates;  ///< Ψ̇ is set; else it is zero
+  bool own;    ///< the joint of body 1's own link: S_k is the unit vector k
 };
 
 template <class N>
@@ -73,14 +72,14 @@ struct StageArgs {
   const N* r;       ///< (nv) history of ẋ
   const N* s;       ///< (nv) history of a
   const N* tau;     ///< (nv) actuator force
-  const N* target;  ///< (nv) of position motors
+  const N* target;  ///< (nv) targets of position motors
   N c0_over_h, inverse_h;
-  N friction_tangent = N(1.0);         ///< of a derivative: kernels/contact/contact_law.hpp
+  N friction_tangent = N(1.0);         ///< for derivatives; see kernels/contact/contact_law.hpp
   const double* block;                 ///< of the batch, for parameters that vary
   int group;                           ///< 0 or 1: which half of the block
   const CandidateList<N>* candidates;  ///< (n_pairs)
-  int lone;  ///< the only lane whose result matters: its contacts are summed across points; -1: all
-             ///< do
+  int lone;  ///< the only lane whose result matters; its contacts are summed across points. -1: all
+             ///< lanes matter
   // scratch
   LinkScratch<N>* links;        ///< (n_links)
   ContactScratch<N>* contacts;  ///< (n_link_pairs + n_grounded)
@@ -91,12 +90,12 @@ struct StageArgs {
   N* force_scale;    ///< (nv) sum of the magnitudes of actuator, damping and contact forces
   N* mass_diagonal;  ///< (nv)
   N* A;              ///< (entries)
-  N* excess;         ///< (1) how far some pair moved beyond its list's margin [m]; > 0: rebuild and
-                     ///< evaluate again
+  N* excess;         ///< (1) how far some pair moved beyond its list's margin [m]; > 0: rebuild the
+                     ///< list and evaluate again
 };
 
-/// Calls `f` with the kind of a joint as a template argument, so that what it asks of the kind
-/// costs nothing.
+/// Calls `f` with the kind of a joint as a template argument, so that asking for the kind costs
+/// nothing.
 template <class F>
 void with_kind(JointKind kind, const F& f) {
   switch (kind) {
@@ -115,13 +114,13 @@ Vec3<N> joint_axis(const Link& link, int k) {
   const N zero(0.0), one(1.0);
   return {k == 0 ? one : zero, k == 1 ? one : zero, k == 2 ? one : zero};
 }
-/// a · s_k without multiplying by ones and zeros.
+/// Returns a · s_k without multiplying by ones and zeros.
 template <JointKind K, class N>
 N along_axis(const Link& link, int k, const Vec3<N>& a) {
   if constexpr (dofs(K) == 1) return dot(broadcast<N>(link.axis), a);
   return k == 0 ? a.x : k == 1 ? a.y : a.z;
 }
-/// a × s_k.
+/// Returns a × s_k.
 template <JointKind K, class N>
 Vec3<N> cross_axis(const Link& link, int k, const Vec3<N>& a) {
   if constexpr (dofs(K) == 1) return cross(a, broadcast<N>(link.axis));
@@ -130,19 +129,19 @@ Vec3<N> cross_axis(const Link& link, int k, const Vec3<N>& a) {
   if (k == 1) return {-a.z, zero, a.x};
   return {a.y, -a.x, zero};
 }
-/// M s_k.
+/// Returns M s_k.
 template <JointKind K, class N>
 Vec3<N> times_axis(const Link& link, int k, const Mat3<N>& M) {
   if constexpr (dofs(K) == 1) return M * broadcast<N>(link.axis);
   return {M.m[0][k], M.m[1][k], M.m[2][k]};
 }
-/// S_kᵀ f.
+/// Returns S_kᵀ f.
 template <JointKind K, class N>
 N project(const Link& link, int k, const Vec6<N>& f) {
   return along_axis<K>(link, k, slides(K) ? f.l : f.a);
 }
 
-// Between a link and its parent, leaving out what the joint never does.
+// Transforms between a link and its parent. They leave out what the joint never does.
 template <class N>
 Vec6<N> motion_to_child(const Link& link, const Frame<N>& x, const Vec6<N>& v) {
   const Vec3<N> l = link.placed && !link.steady ? v.l + cross(v.a, x.p) : v.l;
@@ -160,7 +159,7 @@ Frame<N> compose(const Link& link, const Frame<N>& parent, const Frame<N>& x) {
           link.placed ? parent.R * x.p + parent.p : parent.p};
 }
 
-/// A parameter of the scene in these lanes.
+/// Loads a parameter of the scene for these lanes.
 template <class N>
 struct ParameterLoad {
   static N load(const Parameter& p, const double* block, int group) {
@@ -182,19 +181,19 @@ struct ParameterLoad<Dual<double>> {
     return {row[0], row[1]};
   }
 };
-/// Three numbers that stand side by side in the block; row < 0: the same in all lanes.
+/// Loads three adjacent numbers from the block. row < 0: `value` in all lanes.
 template <class N>
 Vec3<N> load_vector(const Vec3<double>& value, int row, const double* block, int group) {
   if (row < 0) return broadcast<N>(value);
   const auto one = [&](int i) { return ParameterLoad<N>::load({0, row + i}, block, group); };
   return {one(0), one(1), one(2)};
 }
-/// Of a sphere on the ground; 0: points.
+/// Radius of a sphere on the ground; 0 for points.
 template <class N>
 N ground_radius(const GroundContact& ground, const double* block, int group) {
   return ParameterLoad<N>::load({ground.radius, ground.radius_row}, block, group);
 }
-/// Place k of a body's points; in dual numbers it may move.
+/// Place k of a body's points. In dual numbers it may move.
 template <class N>
 Vec3<N> ground_point(const GroundContact& ground, int k) {
   const double* p = ground.points + 3 * k;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The instruction set in use, for people and files.
+// The name of the instruction set in use, for people and files.
 #pragma once
 
 namespace tangere::kernels {
@@ -8,7 +8,8 @@ namespace tangere::kernels {
 /// the environment variable TANGERE_ISA when the program started.
 const char* active_isa_name();
 
-/// "" or why TANGERE_ISA cannot be honoured, with the names that can. Programs check it at start.
+/// Returns "", or why TANGERE_ISA cannot be honoured, with the names that can. Programs check it at
+/// start.
 const char* forced_isa_error();
 
 }  // namespace tangere::kernels

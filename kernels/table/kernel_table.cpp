@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which tables there are and which of them the processor can run. Asked of the compiler's own
-// detection, which also checks the operating system.
+// Finds the tables that were built and that the processor can run. The compiler's own detection
+// decides, which also checks the operating system.
 #include "kernels/table/kernel_table.hpp"
 
 #include <array>
@@ -38,7 +38,8 @@ constexpr StageKernels<L> stage_kernels() {
           Adjoint::parameter_products};
 }
 
-/// Its functions are compiled elsewhere, with the flags of Arch (kernels/CMakeLists.txt).
+/// The functions of this table are compiled elsewhere, with the flags of Arch
+/// (kernels/CMakeLists.txt).
 template <class Arch>
 constexpr KernelTable table_of(const char* name) {
   using Group = GroupPart<Arch>;
@@ -61,7 +62,7 @@ constexpr KernelTable table_of(const char* name) {
           Pullback::field_tangent};
 }
 
-/// What was built, and whether this machine runs it. Best first.
+/// The tables that were built, and whether this machine runs them. Best first.
 struct Built {
   KernelTable table;
   bool (*runs)();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The functions of one instruction set's table, in parts that are compiled on their own: a change
-// in a kernel recompiles the parts that use it. Arch: xsimd's tag of the instruction set, or
-// ScalarArch.
+// The functions of one instruction set's table, in parts that are compiled separately, so that a
+// change in a kernel recompiles only the parts that use it. Arch: xsimd's tag of the instruction
+// set, or ScalarArch.
 #pragma once
 
 #include "kernels/step/arguments.hpp"
@@ -9,7 +9,7 @@
 
 namespace tangere::kernels {
 
-/// A stage forward, in numbers N of L lanes: what StageKernels says of each.
+/// A stage forward, in numbers N of L lanes. StageKernels documents each function.
 template <class N, int L>
 struct StepPart {
   static void kinematics(const ModelView&, const Stage<L>&);
@@ -29,7 +29,7 @@ struct StepPart {
                                Row<L>* sound);
 };
 
-/// A stage in reverse; it knows all of a stage's scratch.
+/// A stage in reverse. This part knows all of a stage's scratch.
 template <class N, int L>
 struct AdjointPart {
   static std::size_t scratch_bytes(const ModelView&);
@@ -39,7 +39,7 @@ struct AdjointPart {
                                  int lone, Row<L>* out);
 };
 
-/// What a group needs beside its stages: what KernelTable says of each, here and below.
+/// What a group needs besides its stages. KernelTable documents these functions and those below.
 template <class Arch>
 struct GroupPart {
   static int find_candidates(const CandidateSearch&);
@@ -50,7 +50,7 @@ struct GroupPart {
                         Touch<LaneRow>* out);
 };
 
-/// Fields.
+/// Tactile fields.
 template <class Arch>
 struct TactilePart {
   static int tactile(const TactileArgs<double>&);
@@ -59,7 +59,7 @@ struct TactilePart {
   static void tactile_block_mixed(const TactileBlockArgs<float>&);
 };
 
-/// Readings in reverse, and along a change.
+/// Readings in reverse, and their change along a change of motion.
 template <class Arch>
 struct ReadingPullbackPart {
   static void pull_back_links(const ModelView&, const GroupState&, std::byte* scratch,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The functions in reverse of an instruction set's table: of stages and of readings.
+// The reverse functions of an instruction set's table: those of stages and of readings.
 #pragma once
 
 #include "kernels/reverse/motion_pullback.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the engine hands over as rows of doubles, read as a kernel's numbers.
+// Views the engine's rows of doubles as a kernel's numbers.
 #pragma once
 
 #include "kernels/step/arguments.hpp"
@@ -7,7 +7,7 @@
 
 namespace tangere::kernels {
 
-// A row of L doubles and the number type N of L lanes have the same layout; vector types may alias
+// A row of L doubles and the number type N of L lanes have the same layout. Vector types may alias
 // anything, and OneLane is a double.
 template <class N, int L>
 struct StageView {
@@ -69,7 +69,7 @@ struct StageView {
   }
 };
 
-/// A state as a stage at x = 0 whose rates are v.
+/// Presents a state as a stage at x = 0 whose rates are v.
 template <class N>
 StageArgs<N> at_state(const GroupState& s) {
   using View = StageView<N, kGroup>;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The forward functions of an instruction set's table: kernels that a stage's numbers are put to.
+// The forward functions of an instruction set's table. They view a stage as numbers and call its
+// kernels.
 #pragma once
 
 #include "kernels/step/detection.hpp"

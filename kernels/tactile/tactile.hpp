@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tactile field of one environment: brackets of eight tiles at a time, then the points of the tiles
-// within reach.
+// Tactile field of one environment: first the brackets of eight tiles at a time, then the points of
+// the tiles within reach.
 #pragma once
 
 #include "kernels/contact/distance.hpp"
@@ -23,7 +23,7 @@ void store_row(const D& x, Real* out) {
   for (int l = 0; l < kGroup; ++l) out[l] = static_cast<Real>(wide[l]);
 }
 
-/// False where none of the eight tiles is within reach; then the rows are not written.
+/// Returns false where none of the eight tiles is within reach; then the rows are not written.
 template <class P, class Shape>
 bool chunk_brackets(const PadTiles& pad, int first, const TouchShape& shape,
                     const Touch<Lanes<typename P::Architecture>>& at,
@@ -52,7 +52,7 @@ PointLaw<N> point_law(const Touch<double>& t) {
   return {broadcast<N>(t.omega), N(-t.law.kn), N(t.law.kt), N(t.law.mu), N(t.law.damping)};
 }
 
-/// Points k … of a tile, `offsets` (2 or 3, 64).
+/// Returns the points of a tile from k on. `offsets`: (2 or 3, 64).
 template <class P>
 typename P::Offset load_offset(const typename P::Real* offsets, int k) {
   if constexpr (P::kCurved) {
@@ -63,8 +63,8 @@ typename P::Offset load_offset(const typename P::Real* offsets, int k) {
   }
 }
 
-/// The force on points k … of a tile in the axes in which it is stored; false where nothing
-/// touches.
+/// Computes the force on the points of a tile from k on, in the axes in which it is stored. Returns
+/// false where nothing touches.
 template <class P, ContactLaw Law, class Shape, class N = typename P::N>
 bool stored_force(const PadTiles& pad, int tile, int k, const Shape& shape, const PointLaw<N>& law,
                   Vec3<N>& f) {
@@ -83,8 +83,8 @@ bool stored_force(const PadTiles& pad, int tile, int k, const Shape& shape, cons
   return true;
 }
 
-/// The points of one tile. `out` (3, 64): written whole when `fresh` and something touches, else
-/// added to.
+/// Computes the points of one tile. `out`, (3, 64), is written whole when `fresh` and something
+/// touches, else added to.
 template <class P, ContactLaw Law, class Shape>
 bool tile_force(const PadTiles& pad, int tile, const Shape& shape,
                 const PointLaw<typename P::N>& law, bool fresh, typename P::Real* out) {
@@ -107,8 +107,8 @@ bool tile_force(const PadTiles& pad, int tile, const Shape& shape,
   return touched;
 }
 
-/// Adds one shape to eight tiles from `first`; returns the bits of those touched, `written`
-/// included.
+/// Adds one shape to eight tiles from `first` on. Returns the bits of all touched tiles, those in
+/// `written` included.
 template <class P, ContactLaw Law, class Shape>
 unsigned chunk_force(const TactileArgs<typename P::Real>& a, int touch, int first, unsigned written,
                      typename P::Real* buffer) {
@@ -146,7 +146,8 @@ struct EightOf<float> {
   typedef float Type __attribute__((vector_size(32)));
 };
 
-/// x, y, z of eight points to (8, 3), in registers: two shuffles for each third of the result.
+/// Interleaves x, y, z of eight points to (8, 3) in registers: two shuffles for each third of the
+/// result.
 template <class Arch, class Real>
 void interleave_row(const Real* from, Real* to) {
   using Eight = typename EightOf<Real>::Type;
@@ -165,7 +166,7 @@ void interleave_row(const Real* from, Real* to) {
   __builtin_memcpy(to + 16, &third, sizeof third);
 }
 
-/// (3, 64) to rows of (point, 3) in the array, or to places in a list.
+/// Writes (3, 64) to rows of (point, 3) in the array, or to the points' places in a list.
 template <class Arch, class Real>
 void write_dense(const PadTiles& pad, int tile, const Real* from, Real* dense) {
   if (pad.curved()) {
@@ -189,7 +190,7 @@ void write_dense(const PadTiles& pad, int tile, const Real* from, Real* dense) {
   }
 }
 
-/// f<Shape>() of every shape: the choice is made once per tile or chunk of tiles.
+/// Returns f<Shape>() for every shape. A shape is then chosen once per tile or chunk of tiles.
 template <class P, class F>
 constexpr auto by_shape(const F& f) {
   return by_pad<P>(f, Shapes{});

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tactile fields of many environments with a small, flat pad: one lane each, the points of a tile
-// one after the other.
+// Tactile fields of many environments with a small, flat pad. Each environment has one lane, and
+// the points of a tile follow one another.
 //
-// The same arithmetic as across points, lane by lane, so that an environment has the same bits
+// The arithmetic is the same as across points, lane by lane, so an environment has the same bits
 // either way.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace tangere::kernels {
 
-/// Eight environments in double, or two groups of eight rounded to single precision.
+/// Loads eight environments in double, or rounds two groups of eight to single precision.
 template <class P, class Pick>
 typename P::N lanes_of(const Touch<LaneRow>* touch, const Pick& pick) {
   using Arch = typename P::Architecture;
@@ -37,7 +37,8 @@ PointLaw<typename P::N> point_law(const Touch<LaneRow>* touch) {
   return {lanes_of<P>(touch, &Touch<LaneRow>::omega), N(0.0) - one(0), one(1), one(2), one(3)};
 }
 
-/// The brackets of one tile in every environment; false where it is out of reach of all.
+/// Computes the brackets of one tile in every environment. Returns false where the tile is out of
+/// reach in all of them.
 template <class P, class Shape>
 bool lane_brackets(const PadTiles& pad, int tile, const TouchShape& s, const Touch<LaneRow>* touch,
                    Shape& shape) {
@@ -68,8 +69,8 @@ bool lane_brackets(const PadTiles& pad, int tile, const TouchShape& s, const Tou
   return true;
 }
 
-/// One shape on one tile: `out` (64, 3) lanes, written whole when `fresh` and something touches,
-/// else added to.
+/// Computes one shape on one tile. `out`, (64, 3) lanes, is written whole when `fresh` and
+/// something touches, else added to.
 template <class P, ContactLaw Law, class Shape>
 bool tile_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, int k, bool fresh,
                 typename P::N* out) {
@@ -108,7 +109,7 @@ bool tile_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, int k, bo
   return touched;
 }
 
-/// (64, 3) lanes to rows of (point, 3) in the array of each lane.
+/// Writes (64, 3) lanes to rows of (point, 3) in the array of each lane.
 template <class P>
 void write_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, const typename P::N* from) {
   const PadTiles& pad = *a.pad;

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The force on tactile points, relative to their tile, so that single precision loses nothing
-// (docs/contact.md).
+// The force on tactile points. Positions are relative to the points' tile, so that single precision
+// loses nothing (docs/contact.md).
 //
-// A point is ξ = t + s, t its tile's centre, s the offset. Whatever cancels is a bracket, taken in
-// double once per tile:
+// A point is ξ = t + s, with t its tile's centre and s the offset. Terms that cancel are collected
+// in brackets, which are computed in double once per tile:
 //   sphere: a = t - c;  D = a + s;  D² - r² = s·(s + 2a) + [a² - r²];  d = |D| - r from it
 //   others: y = Qᵀ(t - c), the tile's centre in the shape's axes, e = Qᵀs (kernels/contact/shapes)
 //   velocity at x₂ = ξ - d n:  u = [-(v + ω × t)] + ω × (d n - s)
-// Every function acts lane by lane: lanes may be tiles or environments (brackets), points or
-// environments (forces).
+// Every function acts lane by lane. Lanes are tiles or environments for brackets, and points or
+// environments for forces.
 #pragma once
 
 #include "kernels/contact/contact_law.hpp"
@@ -17,7 +17,7 @@
 
 namespace tangere::kernels {
 
-/// Double precision: eight lanes.
+/// Everything in double precision: eight points at a time.
 template <class Arch>
 struct InDouble {
   using Architecture = Arch;
@@ -34,7 +34,7 @@ struct InDouble {
   static const double* factors(const PadTiles& pad) { return pad.factors; }
 };
 
-/// Brackets in double, sixteen points in single precision.
+/// Brackets in double, points in single precision, sixteen at a time.
 template <class Arch>
 struct InMixed {
   using Architecture = Arch;
@@ -51,14 +51,14 @@ struct InMixed {
   static const float* factors(const PadTiles& pad) { return pad.factors_f; }
 };
 
-/// The points of P on a curved pad.
+/// The number type P for points on a curved pad.
 template <class P>
 struct OnCurvedPad : P {
   using Offset = PointOffset<typename P::N, true>;
   static constexpr bool kCurved = true;
 };
 
-/// Contact parameters and rotation as a point needs them.
+/// Contact parameters and rotation, in the form that a point needs.
 template <class N>
 struct PointLaw {
   Vec3<N> omega;
@@ -71,8 +71,8 @@ Vec3<D> tile_velocity(const Touch<D>& at, const Vec3<D>& t) {
   return cross(t, at.omega) - at.v;
 }
 
-/// Force on the points at offset s: (f·e0, f·e1, -f·e2) in pad axes, +0 where nothing touches.
-/// False, and `force` left alone, where nothing touches in any lane.
+/// Computes the force on the points at offset s: (f·e0, f·e1, -f·e2) in pad axes, +0 where nothing
+/// touches. Returns false and leaves `force` alone where no lane touches.
 template <class P, ContactLaw Law, class Shape, class N = typename P::N>
 bool point_force(const Shape& shape, const PointLaw<N>& law, const typename P::Offset& s,
                  Vec3<N>& force) {
@@ -93,17 +93,17 @@ bool point_force(const Shape& shape, const PointLaw<N>& law, const typename P::O
   N normal, bound;
   normal_force_alone<Law>(law.minus_kn, law.damping, select(touching, d, zero), rate, touching,
                           normal, bound);
-  // Without sliding the bound over |v_t| is huge, never a division by zero.
+  // Without sliding, the bound divided by |v_t| is huge, but nothing is divided by zero.
   const N square = max(dot(slide, slide), N(P::kSmallest * P::kSmallest));
   const N scale = friction_scale(law.kt, law.mu, bound, square);
-  // Each sum starts from +0, so that no -0 is left where a factor is zero.
+  // Each sum starts from +0, so that no -0 remains where a factor is zero.
   force = {mul_add(normal, n.x, mul_sub_from(scale, slide.x, zero)),
            mul_add(normal, n.y, mul_sub_from(scale, slide.y, zero)),
            mul_sub_from(normal, n.z, mul_add(scale, slide.z, zero))};
   return true;
 }
 
-/// Coefficients of points that have factors of their own; `factors` (4, 64).
+/// Returns the coefficients of points that have factors of their own. `factors`: (4, 64).
 template <class P, class N = typename P::N>
 PointLaw<N> scaled_law(const PointLaw<N>& law, const typename P::Real* factors) {
   const auto factor = [&](int k) { return P::load(factors + k * kTactileTile); };
@@ -111,7 +111,7 @@ PointLaw<N> scaled_law(const PointLaw<N>& law, const typename P::Real* factors) 
           law.damping * factor(3)};
 }
 
-/// The same in the points' own axes; `frames` (9, 64).
+/// Returns the force in the points' own axes. `frames`: (9, 64).
 template <class P, class N = typename P::N>
 Vec3<N> in_point_axes(const typename P::Real* frames, const Vec3<N>& f) {
   const auto component = [&](int row) {
@@ -121,7 +121,7 @@ Vec3<N> in_point_axes(const typename P::Real* frames, const Vec3<N>& f) {
   return {component(0), component(1), component(2)};
 }
 
-/// The same in the sensor's own axes, when those are not orthonormal.
+/// Returns the force in the sensor's own axes, when those are not orthonormal.
 template <class N>
 Vec3<N> in_skewed_axes(const double* axes, const Vec3<N>& force) {
   const N f[3] = {force.x, force.y, N(0.0) - force.z};

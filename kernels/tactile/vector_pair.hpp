@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two vectors side by side as one number: the force on a point is a chain of some 150 cycles, and
-// what a processor keeps waiting is a hundred operations. Two independent chains in a row are half
-// as long.
+// Two vectors side by side as one number. The force on a point is a chain of some 150 cycles, and a
+// processor keeps about a hundred operations in flight. Two interleaved independent chains take
+// half the time of two in a row.
 #pragma once
 
 #include "kernels/tactile/tactile_point.hpp"
@@ -55,7 +55,7 @@ template <class N>
 inline Twice<N> mul_add(const Twice<N>& x, const Twice<N>& y, const Twice<N>& z) {
   return {mul_add(x.a, y.a, z.a), mul_add(x.b, y.b, z.b)};
 }
-/// z - x y.
+/// Returns z - x y.
 template <class N>
 inline Twice<N> mul_sub_from(const Twice<N>& x, const Twice<N>& y, const Twice<N>& z) {
   return {mul_sub_from(x.a, y.a, z.a), mul_sub_from(x.b, y.b, z.b)};
@@ -69,7 +69,8 @@ inline Twice<N> inverse_sqrt(const Twice<N>& x) {
   return {inverse_sqrt(x.a), inverse_sqrt(x.b)};
 }
 
-/// The points of P (kernels/tactile/tactile_point.hpp), twice as many at a time: the same bits.
+/// The number type P (kernels/tactile/tactile_point.hpp) with twice as many points at a time. The
+/// bits are the same.
 template <class P>
 struct Paired {
   using Architecture = typename P::Architecture;
@@ -89,7 +90,7 @@ struct Paired {
   static const Real* factors(const PadTiles& pad) { return P::factors(pad); }
 };
 
-/// Paired where a vector is one register; more would not fit.
+/// Paired where a vector is one register. Otherwise a pair would not fit into the registers.
 template <class P, int Registers>
 struct PairedIfOne {
   using Type = P;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ball rolling: a pad presses a ball onto the ground and rolls it to a goal. The paper has it for
-// speed alone; goal and reward are ours.
+// Ball rolling: a pad presses a ball onto the ground and rolls it to a goal. The paper uses this
+// task only to measure speed; the goal and the reward are ours.
 //   reward = -|Δ/10 mm|² - 0.01 |a|²,   Δ: ball's centre to the goal, horizontal
 #include <algorithm>
 #include <cmath>
@@ -11,9 +11,9 @@ namespace tangere {
 namespace {
 
 constexpr double kReach =
-    0.01;  // the goal is at most so far from the ball's start in x and in y [m]
+    0.01;  // largest distance of the goal from the ball's start, in x and in y [m]
 constexpr double kTolerance = 2e-3;  // [m]
-constexpr double kLength = 0.01;     // of the reward [m]
+constexpr double kLength = 0.01;     // scale of the distance in the reward [m]
 constexpr double kEffort = 0.01;
 constexpr std::int64_t kActions = 70;
 
@@ -25,7 +25,7 @@ class BallRolling : public Task {
         ball_q_(coordinate("ball_joint")),
         ball_v_(dof("ball_joint")) {}
 
-  /// The goal stands in the memory.
+  /// Stores the goal in the memory.
   void start(const TaskStart& s) const override {
     for (std::uint32_t k = 0; k < 2; ++k)
       s.memory[k] = s.q[ball_q_ + k] + task_uniform(s.seed, s.episode, 0, k, -kReach, kReach);
@@ -64,11 +64,13 @@ class BallRolling : public Task {
     for (std::size_t k = 0; k < 3; ++k) out.action[k] += weight[k];
   }
 
-  /// The pad's speed is its force over its damping, 1 N s/m, and the ball rolls at half of it.
+  /// The pad's speed is its force divided by its damping, 1 N s/m. The ball rolls at half that
+  /// speed.
   void scripted(const TaskView& view, std::span<const double>,
                 std::span<double> action) const override {
-    constexpr double kRate = 5, kFastest = 0.1;  // [1/s], [m/s] of the ball
-    constexpr double kTouching = -0.0155;  // of the pad's z: it starts 15 mm above the ball [m]
+    constexpr double kRate = 5, kFastest = 0.1;  // [1/s], [m/s]: rate and top speed of the ball
+    constexpr double kTouching =
+        -0.0155;  // the pad touches below this z; it starts 15 mm above the ball [m]
     const bool touching = view.now().q[pad_q_ + 2] < kTouching;
     for (std::size_t k = 0; k < 2; ++k)
       action[k] = touching ? 2 * std::clamp(kRate * to_goal(view, k), -kFastest, kFastest) : 0;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Box pushing: a finger pushes a box to a pose while somebody else pushes it too (Xu et al., third
+// Box pushing: a finger pushes a box to a pose while random pushes disturb it (Xu et al., third
 // experiment).
 //   reward = -0.01 |Δp/10 mm|² - 0.1 (Δθ/5°)² - |x_tip - x_face|²/(20 mm)² - 0.1 |u|²
-// Δp, Δθ: box to goal; x_tip, x_face: middle of the pad and of the face that it pushes, horizontal;
-// u: the action, whose tanh drives the motors.
+// Δp, Δθ: position and angle between box and goal. x_tip, x_face: horizontal middle of the pad and
+// of the face that it pushes. u: the action; its tanh drives the motors.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -16,10 +16,10 @@ namespace tangere {
 namespace {
 
 constexpr int kActions = 100;
-constexpr int kPushActions = 10;  // a random push lasts so many actions, 0.25 s
+constexpr int kPushActions = 10;  // length of a random push [actions], 0.25 s
 constexpr double kAngleUnit = std::numbers::pi / 36, kLengthUnit = 0.01, kGap = 0.02;
 constexpr double kPosition = 0.01, kAngle = 0.1, kEffort = 0.1;  // weights
-constexpr double kNear = 0.03, kAligned = 0.1;                   // of a success [m], [rad]
+constexpr double kNear = 0.03, kAligned = 0.1;  // a success is nearer than this [m], [rad]
 // Memory: the goal's x, y, yaw; the push on the box, in units of its motors.
 constexpr std::size_t kGoal = 0, kPush = 3;
 constexpr std::size_t kTip = 0, kFace = 3;  // in Moment::end_effectors
@@ -55,7 +55,7 @@ class BoxPushing : public Task {
     s.memory[kGoal + 2] = number(3, yaw - spread, yaw + spread);
   }
 
-  /// Every tenth action there is a new push, or none, each with probability ½.
+  /// Every tenth action draws a new push or none, each with probability ½.
   void begin_action(const TaskView& view, std::span<double> memory) const override {
     if (view.actions % kPushActions != 0) return;
     const auto number = [&](std::uint32_t k) {
@@ -125,10 +125,10 @@ class BoxPushing : public Task {
   void begin_action_vjp(const TaskView& view, std::span<double> memory,
                         const ViewCotangent&) const override {
     if (view.actions % kPushActions != 0) return;
-    memory[kPush] = memory[kPush + 1] = 0;  // drawn
+    memory[kPush] = memory[kPush + 1] = 0;  // begin_action draws the push
   }
 
-  /// Feedback of the state, whatever is observed.
+  /// Feeds back the state, whatever the task observes.
   void scripted(const TaskView& view, std::span<const double>,
                 std::span<double> action) const override {
     const Moment& now = view.now();
@@ -149,13 +149,13 @@ class BoxPushing : public Task {
     return {script_.box_rest()[0] + now.q[box_], script_.box_rest()[1] + now.q[box_ + 1],
             now.q[box_turn_]};
   }
-  /// The box from its goal.
+  /// Pose of the box minus its goal.
   [[nodiscard]] std::array<double, 3> to_goal(const TaskView& view) const {
     std::array<double, 3> off = box_pose(view.now());
     for (std::size_t k = 0; k < 3; ++k) off[k] -= view.memory[kGoal + k];
     return off;
   }
-  /// A pose as seen from the middle of the pad, x where it pushes.
+  /// Writes a pose relative to the middle of the pad; the pad pushes along x.
   void in_hand(const Moment& now, const std::array<double, 3>& pose, std::span<double> o) const {
     const double c = std::cos(now.q[turn_]), s = std::sin(now.q[turn_]);
     const double x = pose[0] - now.end_effectors[kTip], y = pose[1] - now.end_effectors[kTip + 1];

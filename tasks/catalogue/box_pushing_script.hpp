@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How to push a box to a pose when everything is known: the velocity that the box should have, the
-// hand's that gives it, and the forces for that.
+// How to push a box to a pose when the whole state is known: computes the velocity that the box
+// should have, the velocity of the hand that gives it, and the forces that this takes.
 #pragma once
 
 #include <array>
@@ -18,10 +18,11 @@ struct PushState {
 
 class PushScript {
  public:
-  /// Takes places of joints and the end effectors tip and face from the scene.
+  /// Reads the places of the joints and of the end effectors "tip" and "face" from the scene.
   explicit PushScript(const Scene& scene);
 
-  /// Of the hand's motors: x, y, turn; beyond ±1 where they are too weak.
+  /// Returns the controls of the hand's motors: x, y, turn. They exceed ±1 where a motor is too
+  /// weak.
   [[nodiscard]] std::array<double, 3> controls(const PushState& state) const;
   [[nodiscard]] const std::array<double, 2>& box_rest() const {
     return box_rest_;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cap opening: three fingers turn a cap, whose damping, radius and place nobody tells, by an eighth
-// of a turn (Xu et al., fourth experiment).
+// Cap opening: three fingers turn a cap by an eighth of a turn. They do not know its damping,
+// radius and place (Xu et al., fourth experiment).
 //   reward = -0.5 for each finger that does not touch - min(θ - π/4, 0)² - 0.005 |a|²,
-//   and 50 with the end if θ > π/4, or -50 with the end if a fingertip is above 50 mm
-// θ: angle of the cap. a: the action; each angle's target is the angle plus 0.06 rad times a.
+//   +50 if θ > π/4 (the episode ends), -50 if a fingertip is above 50 mm (the episode ends)
+// θ: angle of the cap. a: the action; the target of each angle is the angle plus 0.06 rad times a.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,20 +19,20 @@ namespace tangere {
 namespace {
 
 constexpr std::size_t kFingers = 3, kAngles = 9, kPoints = 302, kField = 3 * kPoints;
-constexpr int kSide = 20;  // of an image
+constexpr int kSide = 20;  // pixels along a side of an image
 constexpr int kActions = 200;
-constexpr double kStep = 0.06;                             // of a target, at a = 1 [rad]
-constexpr double kOpen = std::numbers::pi / 4;             // [rad]
-constexpr double kHighest = 0.05;                          // of a fingertip [m]
-constexpr double kIdle = 0.5, kEffort = 0.005, kEnd = 50;  // of the reward
+constexpr double kStep = 0.06;                  // change of a target at a = 1 [rad]
+constexpr double kOpen = std::numbers::pi / 4;  // [rad]
+constexpr double kHighest = 0.05;               // upper limit of a fingertip's height [m]
+constexpr double kIdle = 0.5, kEffort = 0.005, kEnd = 50;  // weights of the reward
 constexpr FingerAngles kStart{0, -0.5, 0.8};               // [rad]
-constexpr double kSpread = 0.05;                           // of the start [rad]
+constexpr double kSpread = 0.05;                           // spread of the start angles [rad]
 constexpr double kSmallest = 0.02, kLargest = 0.08;        // radius of the cap [m]
-constexpr double kOffset = 0.02;                           // of its axis, along x and y [m]
-constexpr double kLeast = 1e-3;  // a tip starts so far from the cap, or farther [m]
+constexpr double kOffset = 0.02;  // largest offset of its axis, along x and y [m]
+constexpr double kLeast = 1e-3;   // least distance of a tip from the cap at the start [m]
 
-/// The scene with the cap's damping, radius and place as what varies, in this order; how an episode
-/// starts is up to the task.
+/// Returns the scene with the cap's damping, radius and place as its varying numbers, in this
+/// order. The task itself decides how an episode starts.
 Scene with_cap_varying(Scene scene) {
   std::erase_if(scene.randomizations, [](const RandomizationDescription& d) {
     const bool starts_or_stands = is_of_start(d.number) || d.number.field == NumberField::pos;
@@ -74,7 +74,7 @@ class CapOpening : public Task {
           limits_[k] = link.joint.limits.value_or(limits_[k]);
   }
 
-  /// Every angle is off by chance; a finger that would begin in the cap is drawn again.
+  /// Draws every angle. Draws a finger again if it would begin inside the cap.
   void start(const TaskStart& s) const override {
     std::copy_n(s.varying.end() - 3, 3, s.memory.begin() + kFingers);
     std::uint32_t drawn = 0;
@@ -89,14 +89,14 @@ class CapOpening : public Task {
     }
   }
 
-  /// The memory is the script's: which fingers press; radius and place of the cap.
+  /// The memory belongs to the script: which fingers press, then radius and place of the cap.
   void begin_action(const TaskView& view, std::span<double> memory) const override {
     for (std::size_t f = 0; f < kFingers; ++f)
       memory[f] = script_.presses(angles(view, f), cap(memory, f), memory[f] != 0) ? 1 : 0;
   }
   void begin_action_vjp(const TaskView&, std::span<double> memory,
                         const ViewCotangent&) const override {
-    std::fill_n(memory.begin(), kFingers, 0.0);  // yes or no
+    std::fill_n(memory.begin(), kFingers, 0.0);  // flags: 1 if the finger presses
   }
 
   void controls(const TaskView& view, int, std::span<double> u) const override {
@@ -143,7 +143,7 @@ class CapOpening : public Task {
     }
   }
 
-  /// Feedback of the state, whatever is observed.
+  /// Feeds back the state, whatever the task observes.
   void scripted(const TaskView& view, std::span<const double>,
                 std::span<double> action) const override {
     for (std::size_t f = 0; f < kFingers; ++f) {
@@ -155,7 +155,7 @@ class CapOpening : public Task {
   }
 
  private:
-  /// Where the points of the next tip are in the images, as the scene says.
+  /// Assigns the points of the next tip to pixels of the images, as the scene says.
   void draw(const TactileDescription& tip, const std::string& path) {
     const std::size_t image = pixel_.size() / kPoints * std::size_t{kSide} * kSide;
     bool fits = tip.points.size() == kPoints;
@@ -171,7 +171,7 @@ class CapOpening : public Task {
                       "its own of {} × {}",
                       path, tip.name, kPoints, kSide, kSide));
   }
-  /// The cap as a finger sees it: the fingers stand a third of a turn apart.
+  /// Returns the cap as a finger sees it. The fingers stand a third of a turn apart.
   static CapSeen cap(std::span<const double> memory, std::size_t finger) {
     const double turn = 2 * std::numbers::pi / kFingers * static_cast<double>(finger),
                  c = std::cos(turn), s = std::sin(turn);
@@ -182,7 +182,7 @@ class CapOpening : public Task {
     const double* const q = &view.now().q[finger_ + 3 * finger];
     return {q[0], q[1], q[2]};
   }
-  /// Of an angle, before its limits.
+  /// Target of an angle, before its limits apply.
   [[nodiscard]] double target(const TaskView& view, std::size_t k) const {
     return view.now().q[finger_ + k] + kStep * view.action[k];
   }
@@ -198,7 +198,7 @@ class CapOpening : public Task {
   }
 
   CapObservation observation_;
-  std::vector<std::size_t> pixel_;  // of each point of the field, among the pixels of all images
+  std::vector<std::size_t> pixel_;  // for each point of the field, its pixel among all images
   std::size_t cap_, finger_;        // coordinates: the cap's, the first of nine in a row
   std::array<std::array<double, 2>, kAngles> limits_ = [] {
     std::array<std::array<double, 2>, kAngles> none{};

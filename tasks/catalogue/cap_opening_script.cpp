@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A finger is a swing about its radius and two links in the plane that it swings. A tip does not
-// turn while it goes around the cap, so it rolls on it, and its contact moves across the
+// A finger swings about the cap's radius and has two links in the plane of the swing. A tip does
+// not turn while it goes around the cap. So it rolls on the cap, and its contact moves across the
 // hemisphere.
 #include "tasks/catalogue/cap_opening_script.hpp"
 
@@ -10,17 +10,16 @@
 namespace tangere {
 namespace {
 
-constexpr double kWidest =
-    0.65;  // a stroke goes so far around to either side: tips stay apart [rad]
-constexpr double kFarthest = 0.046;  // or as far as this is along the cap, if that is less [m]
-constexpr double kReached = 0.05;    // [rad]
-constexpr double kInto = 0.015;      // a pressing tip aims so far into the cap [m]
-constexpr double kAway = 6e-3;       // a tip goes back so far from the cap [m]
-constexpr double kClear = 2e-3;      // and around when it is so far away [m]
-constexpr double kTouching = 5e-4;   // closer it goes around with the cap [m]
-constexpr double kAhead = 0.012;     // and so far ahead of itself [m]
+constexpr double kWidest = 0.65;     // limit of a stroke to either side: tips stay apart [rad]
+constexpr double kFarthest = 0.046;  // the same along the cap; the smaller limit holds [m]
+constexpr double kReached = 0.05;   // a tip this near to the start of a stroke has reached it [rad]
+constexpr double kInto = 0.015;     // depth of a pressing tip's target in the cap [m]
+constexpr double kAway = 6e-3;      // distance from the cap to which a tip goes back [m]
+constexpr double kClear = 2e-3;     // beyond this distance a tip goes back around the cap [m]
+constexpr double kTouching = 5e-4;  // below this distance a tip turns the cap [m]
+constexpr double kAhead = 0.012;    // its target is then so far ahead of it [m]
 
-/// Of contact points about the middle of their hemisphere.
+/// Largest distance of the contact points from the middle of their hemisphere.
 double tip_radius(const BodyDescription& body) {
   const auto* shape = std::get_if<AbstractShape>(&body.shape);
   double square = 0;
@@ -80,7 +79,7 @@ bool CapScript::presses(const FingerAngles& q, const CapSeen& cap, bool now) con
 
 FingerAngles CapScript::targets(const FingerAngles& q, const CapSeen& cap, bool pressing) const {
   const double around = place(q, cap).around, off = gap(q, cap), middle = cap.radius + tip_;
-  if (pressing && off < kTouching) {  // inward from where it is, and along the cap
+  if (pressing && off < kTouching) {  // a target inward of the tip and ahead along the cap
     const double inward = middle - kInto;
     return angles_at({std::hypot(inward, kAhead), around + std::atan2(kAhead, inward)}, cap);
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a finger turns a cap when everything is known: where its tip is, where it should go, and the
-// angles for that. It goes back out of touch, presses, and goes around the cap as far as it
-// reaches.
+// How a finger turns a cap when the whole state is known: computes where its tip is, where the tip
+// should go, and the angles for that. The finger moves back without touching, presses, and goes
+// around the cap as far as it reaches.
 #pragma once
 
 #include <array>
@@ -13,40 +13,41 @@ namespace tangere {
 /// Angles of a finger: swing, upper, lower [rad].
 using FingerAngles = std::array<double, 3>;
 
-/// A cap as a finger sees it: its radius, and where its axis is from the one that the fingers stand
-/// around, along the finger's radius and to its left [m].
+/// A cap as a finger sees it: its radius, and the place of its axis relative to the axis around
+/// which the fingers stand, along the finger's radius and to its left [m].
 struct CapSeen {
   double radius = 0, out = 0, left = 0;
 };
 
 class CapScript {
  public:
-  /// Takes lengths from the scene: all three fingers are like the first.
+  /// Reads lengths from the scene. All three fingers are like the first.
   explicit CapScript(const Scene& scene);
 
-  /// From the cap to the tip [m]; negative: they would touch.
+  /// Distance from the cap to the tip [m]; negative if they overlap.
   [[nodiscard]] double gap(const FingerAngles& q, const CapSeen& cap) const;
   /// Whether a finger presses next, given whether it does now.
   [[nodiscard]] bool presses(const FingerAngles& q, const CapSeen& cap, bool now) const;
-  /// Where the angles should go.
+  /// Target angles.
   [[nodiscard]] FingerAngles targets(const FingerAngles& q, const CapSeen& cap,
                                      bool pressing) const;
 
  private:
-  /// Of the middle of the tip's sphere: from the cap's axis [m], around it [rad] from where the
-  /// finger points.
+  /// Place of the middle of the tip's sphere: distance from the cap's axis [m], and angle around it
+  /// from the direction of the finger [rad].
   struct Place {
     double out, around;
   };
   [[nodiscard]] Place place(const FingerAngles& q, const CapSeen& cap) const;
-  /// Where a stroke ends; it begins as far on the other side.
+  /// Angle at which a stroke ends [rad]; it begins at the negative of this.
   [[nodiscard]] double end(const CapSeen& cap) const;
-  /// Angles at which a tip is there, at the height of the cap's middle.
+  /// Angles that put a tip at `place`, at the height of the cap's middle.
   [[nodiscard]] FingerAngles angles_at(const Place& place, const CapSeen& cap) const;
 
-  double hip_ = 0, upper_ = 0, lower_ = 0;  // hip from its axis, lengths of the links [m]
-  double tip_ = 0;                          // radius of a tip [m]
-  double below_ = 0;  // tips work so far below the hip: at the middle of the cap [m]
+  double hip_ = 0, upper_ = 0,
+         lower_ = 0;  // distance of the hip from its axis, lengths of the links [m]
+  double tip_ = 0;    // radius of a tip [m]
+  double below_ = 0;  // depth of the cap's middle, where tips work, below the hip [m]
 };
 
 }  // namespace tangere

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The smallest task, to be copied: hold a pad at the height of a goal. docs/tasks.md says what each
-// part of it is for.
+// The smallest task, meant as a template: hold a pad at the height of a goal. docs/tasks.md
+// explains each part.
 #include <algorithm>
 
 #include "tasks/catalogue/task_list.hpp"

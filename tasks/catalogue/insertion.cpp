@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Insertion: a held box is lowered onto a hole that it misses, and moved by what the pads feel when
-// it hits the rim (Xu et al., fifth experiment). Every attempt starts anew above the hole, e = (x,
-// y, yaw) off it, with e changed by the action.
-//   reward = 10 and the end if the box is in the hole, else -|e_xy|²/(6 mm)² - (e_yaw/10°)²
+// Insertion: the hand lowers a box onto a hole but misses it. The pads feel the box hit the rim,
+// and the hand corrects its pose (Xu et al., fifth experiment). Every attempt starts anew above the
+// hole with the error e = (x, y, yaw), which the action changes.
+//   reward = 10 if the box is in the hole (the episode ends), else -|e_xy|²/(6 mm)² - (e_yaw/10°)²
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,20 +18,23 @@ namespace {
 constexpr int kSteps = 45, kAttempts = 15;
 constexpr std::size_t kRows = 13, kCols = 10, kPads = 2, kPoints = kRows * kCols;
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr std::array<double, 3> kAct{0.02, 0.02, 10 * kDegree};  // of an action [m, m, rad]
-constexpr std::array<double, 3> kOff{6e-3, 6e-3, 10 * kDegree};  // at the start, at most
+constexpr std::array<double, 3> kAct{0.02, 0.02,
+                                     10 * kDegree};  // of an action, at most [m, m, rad]
+constexpr std::array<double, 3> kOff{6e-3, 6e-3, 10 * kDegree};  // largest e at the start
 constexpr double kInside = 0.0247;  // height of the box's lower corners [m]
 constexpr double kSuccess = 10, kNoise = 1e-5,
                  kTooLittle = 1e-4;  // reward; noise of a reading, least shear [N]
-constexpr double kShift = 4.1e-3, kTurn = 5 * kDegree;  // of the script: amid what does not go in
-constexpr double kApartNoise = 0.01, kTurningNoise = 0.04;  // less is no sign
-constexpr int kPatience = 3;    // the script turns every so many attempts at least
-constexpr double kLift = 6e-3;  // targets begin so high and end so low [m]
-// Memory: e before the action in hand, e in it, height of the grip [m], share of 20 N that grips,
-// yaw that actions have added, which a script may know [rad].
+constexpr double kShift = 4.1e-3,
+                 kTurn = 5 * kDegree;  // steps of the script: a mean e that misses
+constexpr double kApartNoise = 0.01, kTurningNoise = 0.04;  // smaller readings are noise
+constexpr int kPatience = 3;    // attempts between turns of the script, at least
+constexpr double kLift = 6e-3;  // targets start this far above the grip, end as far below [m]
+// Memory: e before the current action, e in it, height of the grip [m], gripping force as a share
+// of 20 N, yaw that actions have added [rad], which a script may know.
 constexpr std::size_t kBefore = 0, kNow = 3, kHeight = 6, kGrip = 7, kTurned = 8;
 
-/// The scene with what nobody knows of the skin as what varies: of both pads alike.
+/// Returns the scene with the unknown coefficients of the skin as its varying numbers, equal for
+/// both pads.
 Scene with_skin(Scene scene) {
   scene.randomizations.clear();
   const auto vary = [&](const SceneNumber& number) {
@@ -98,7 +101,8 @@ class Insertion : public Task {
     hold(view, q, v);
   }
 
-  /// Hand x, y, z, turn; fingers. They close in five steps, then the hand goes down.
+  /// Controls: hand x, y, z, turn; fingers. The fingers close in five steps, then the hand
+  /// descends.
   void controls(const TaskView& view, int step, std::span<double> u) const override {
     const std::array<double, 3> e = off(view);
     u[0] = e[0];
@@ -163,7 +167,7 @@ class Insertion : public Task {
     for (std::size_t k = 0; k < 3; ++k) memory[kNow + k] += std::exchange(memory[kBefore + k], 0.0);
   }
 
-  /// Of hold(): hand and box turn about the same axis.
+  /// Reverse of hold(): hand and box turn about the same axis.
   void place_vjp(const TaskView&, std::span<const double> q, std::span<const double>,
                  const ViewCotangent& out) const override {
     for (std::size_t k = 0; k < 2; ++k) out.memory[kNow + k] += q[hand_v_ + k] + q[box_v_ + k];
@@ -175,10 +179,11 @@ class Insertion : public Task {
                 std::span<double> action) const override;
 
  private:
-  static constexpr std::array<double, 3> kHalf{0.0175, 0.025, 0.03};  // edges of the box [m]
-  static constexpr double kApart = -0.0177;  // fingers: 0.2 mm from the box [m]
+  static constexpr std::array<double, 3> kHalf{0.0175, 0.025, 0.03};  // half edges of the box [m]
+  static constexpr double kApart = -0.0177;  // position of the fingers: 0.2 mm from the box [m]
 
-  /// Of the corners of the box's lower face [m]: a box that tilts in its grip is not inside.
+  /// Height of the highest corner of the box's lower face [m]. A box that tilts in its grip is not
+  /// inside.
   [[nodiscard]] double highest_below(const Moment& m) const {
     const double* const r = &m.q[box_ + 3];
     const double zx = 2 * (r[1] * r[3] - r[0] * r[2]), zy = 2 * (r[2] * r[3] + r[0] * r[1]);
@@ -188,7 +193,7 @@ class Insertion : public Task {
   }
   [[nodiscard]] bool slides() const { return moved_.front() == 0; }
   [[nodiscard]] bool turns() const { return moved_.back() == 2; }
-  /// e in the action in hand: memory before it plus what it asks for.
+  /// e in the current action: e before it plus the change that it asks for.
   [[nodiscard]] std::array<double, 3> off(const TaskView& view) const {
     std::array<double, 3> e{view.memory[kBefore], view.memory[kBefore + 1],
                             view.memory[kBefore + 2]};
@@ -219,16 +224,16 @@ class Insertion : public Task {
     q[box_ + 6] = std::sin(e[2] / 2);
   }
 
-  std::vector<std::size_t> moved_;          // which of e an action changes
+  std::vector<std::size_t> moved_;          // the components of e that an action changes
   std::size_t hand_, turn_, finger_, box_;  // coordinates
   std::size_t hand_v_, turn_v_, box_v_;     // dofs
-  Vector3 rest_{};                          // of the box's joint
+  Vector3 rest_{};                          // rest position of the box's joint
 };
 
-/// Where the rim pushes. Off in x, one finger is pushed up more than the other; off in y, the box
-/// turns about the grip: then it is moved the other way, by what is off on average where it does
-/// not go in. A turned box stands on two opposite corners, which feels the same to either side, so
-/// the script tries one side, then the other.
+/// Infers from the rim's forces where the box is off. Off in x, the rim pushes one finger up more
+/// than the other. Off in y, the box turns about the grip. The script then moves the box the other
+/// way, by the mean offset that misses the hole. A turned box stands on two opposite corners. That
+/// feels the same for both directions, so the script tries one, then the other.
 void Insertion::scripted(const TaskView& view, std::span<const double> o,
                          std::span<double> action) const {
   std::array<double, kPads> up{};
@@ -255,7 +260,7 @@ void Insertion::scripted(const TaskView& view, std::span<const double> o,
     move[1] = -std::copysign(kShift, turning);
   const bool straight = move[0] == 0 && move[1] == 0;
   if (feels && straight && !turns()) {
-    // Something is off all the same: what shows most.
+    // The box is off, but no reading exceeds the noise: take the largest.
     const std::size_t k = std::abs(apart) / kApartNoise > std::abs(turning) / kTurningNoise ? 0 : 1;
     move[k] = -std::copysign(kShift, k == 0 ? apart : turning);
   }

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stable grasp: find where a bar of unknown densities can be lifted without tilting (Xu et al.,
-// second experiment). A grasp is 180 targets of the hand: close, hold, lift, hold, down, hold,
-// open. Lifted, the bar hangs level where it is held at its centre of mass; elsewhere it turns
-// about the grip, and the pads read that turning as a vortex of shear.
-//   reward = 100 and the end where |tilt| < 0.02 rad and the bar is lifted by 5 mm after step 60,
+// Stable grasp: find where to lift a bar of unknown densities without tilting it (Xu et al., second
+// experiment). A grasp is 180 targets of the hand: close, hold, lift, hold, lower, hold, open. Held
+// at its centre of mass, the lifted bar stays level. Held elsewhere, it turns about the grip, and
+// the pads read the turning as a vortex of shear.
+//   reward = 100 if |tilt| < 0.02 rad and the bar is lifted by 5 mm after step 60 (the episode
+//   ends),
 //       else -10 |tilt|
-// tilt = asin(e_z · R e_y), R the bar's orientation.
+// tilt = asin(e_z · R e_y), R: orientation of the bar.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,21 +20,21 @@ namespace {
 
 constexpr int kBlocks = 11, kRows = 13, kCols = 10, kPads = 2;
 constexpr int kSteps = 180, kLook = 60, kGrasps = 10;
-constexpr double kBlock = 0.025;                               // edge of a block [m]
-constexpr double kReach = 0.05, kFarthest = 0.11;              // of an action, of the hand [m]
-constexpr double kLevel = 0.02, kLifted = 5e-3;                // [rad], [m]
-constexpr double kSuccess = 100, kTilt = 10;                   // of the reward
+constexpr double kBlock = 0.025;                   // edge of a block [m]
+constexpr double kReach = 0.05, kFarthest = 0.11;  // reach of an action and of the hand [m]
+constexpr double kLevel = 0.02, kLifted = 5e-3;    // [rad], [m]
+constexpr double kSuccess = 100, kTilt = 10;       // of the reward
 constexpr double kOpen = -0.025, kClosed = 0, kHeight = 0.03;  // targets of fingers and hand [m]
-constexpr double kTooLittle = 1e-6;                            // shear that counts as none [N]
+constexpr double kTooLittle = 1e-6;                            // less shear counts as none [N]
 // Memory: where the hand grasps, where it grasped before [m], height of the bar at rest [m].
 constexpr std::size_t kPlace = 0, kBefore = 1, kRest = 2;
 
-/// 0 before step `from`, 1 after `length` more.
+/// 0 before step `from`, 1 from step `from + length` on, linear in between.
 double ramp(int step, int from, int length) {
   return std::clamp(static_cast<double>(step + 1 - from) / length, 0.0, 1.0);
 }
 
-/// The scene with densities as what varies, block by block.
+/// Returns the scene with the density of each block as its varying numbers.
 Scene with_densities(Scene scene) {
   scene.randomizations.clear();
   for (int b = 0; b < kBlocks; ++b) {
@@ -58,9 +59,10 @@ class StableGrasp : public Task {
         throw InputError(model().scene().path + ": stable grasp needs two pads of 13 × 10 points");
   }
 
-  /// Densities that balance at `centre`, in blocks from the bar's right end: the block there is
-  /// drawn, and so is the sum; what is left goes to both sides so that their moments about `centre`
-  /// are equal, shared among the blocks of a side by chance.
+  /// Draws densities that balance at `centre`, measured in blocks from the bar's right end. The
+  /// density of the block at the centre is drawn, and so is the sum of all. The two sides share the
+  /// rest so that their moments about `centre` are equal. Random shares divide it among the blocks
+  /// of a side.
   void start(const TaskStart& s) const override {
     std::uint32_t next = 0;
     const auto number = [&](double low, double high) {
@@ -96,7 +98,7 @@ class StableGrasp : public Task {
     memory[kPlace] = place(view);
   }
 
-  /// Hand x, y, z, turn; fingers. The hand is over its place before the fingers touch.
+  /// Controls: hand x, y, z, turn; fingers. The hand is above its place before the fingers touch.
   void controls(const TaskView& view, int step, std::span<double> u) const override {
     const double moved = ramp(step, 0, 10), closed = ramp(step, 10, 10) - ramp(step, 160, 20);
     u[0] = u[3] = 0;
@@ -152,9 +154,10 @@ class StableGrasp : public Task {
     memory[kPlace] = by_place + std::exchange(memory[kBefore], 0.0);
   }
 
-  /// Towards the heavier side. The bar slides and turns in the grip at rates that its weight and
-  /// its moment drive, and shear is proportional to a point's velocity: with v downward and ω about
-  /// the grip, the centre of mass is ω/v Σ r²/n away, the mean over the points that hold the bar.
+  /// Moves towards the heavier side. The bar slides and turns in the grip at rates proportional to
+  /// its weight and its moment, and shear is proportional to a point's velocity. With v downward
+  /// and ω about the grip, the centre of mass is ω/v Σ r²/n away, the mean over the points that
+  /// hold the bar.
   void scripted(const TaskView&, std::span<const double> o,
                 std::span<double> action) const override {
     double weight = 0, moment = 0, square = 0;
@@ -179,12 +182,12 @@ class StableGrasp : public Task {
   }
 
  private:
-  static constexpr double kPitch = 1.5e-3;  // of the pads' points [m]
+  static constexpr double kPitch = 1.5e-3;  // distance between neighbouring points of a pad [m]
   static constexpr double kMeanSquare =
-      0.4545 * 0.018 * 0.018;  // of a pad's 33 contact points [m²]
+      0.4545 * 0.018 * 0.018;  // mean of r² over a pad's 33 contact points [m²]
   static constexpr double kGain = 1;
 
-  /// Where the action in hand grasps [m].
+  /// Where the current action grasps [m].
   static double place(const TaskView& view) {
     return std::clamp(view.memory[kBefore] + kReach * view.action[0], -kFarthest, kFarthest);
   }
@@ -192,7 +195,7 @@ class StableGrasp : public Task {
     return std::abs(before + kReach * action) <= kFarthest;
   }
   static const Moment& lifted(const TaskView& view) { return view.moments.front(); }
-  /// e_z · R e_y.
+  /// Returns e_z · R e_y.
   [[nodiscard]] double slope(const Moment& m) const {
     const double* const r = &m.q[bar_ + 3];
     return std::clamp(2 * (r[2] * r[3] + r[0] * r[1]), -1.0, 1.0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all tasks share: the compiled scene, places of joints, random numbers.
+// What all tasks share: the compiled scene, the places of joints, random numbers.
 #include "tasks/catalogue/task.hpp"
 
 #include <fmt/format.h>
@@ -9,7 +9,7 @@
 namespace tangere {
 namespace {
 
-/// Of the first joint `name` or of the joints before it, summed.
+/// Sums `count` over the joints before the joint `name`. Throws InputError if there is none.
 std::size_t place_of(const Scene& scene, const std::string& name, int (*count)(JointType)) {
   int place = 0;
   for (const LinkDescription& link : scene.links) {

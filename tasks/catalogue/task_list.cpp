@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Names of tasks and how to make them.
+// The names of tasks and how to make each task.
 #include "tasks/catalogue/task_list.hpp"
 
 #include <fmt/format.h>
@@ -15,7 +15,7 @@ struct Entry {
   std::function<std::unique_ptr<Task>(const Scene&)> make;
 };
 
-/// A task with variants: `variant` goes to both functions.
+/// Entry of a task with variants; both functions receive `variant`.
 template <class Declare, class Make, class Variant>
 Entry entry(Declare declare, Make make, Variant variant) {
   return {[=] { return declare(variant); },

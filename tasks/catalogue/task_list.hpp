@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tasks there are, by name. A new one gets its two functions here and a line in task_list.cpp.
+// All tasks by name. A new task needs its two functions here and a line in task_list.cpp.
 #pragma once
 
 #include <memory>
@@ -13,11 +13,11 @@ namespace tangere {
 /// Names of all tasks, those meant for experiments first.
 std::vector<std::string> task_names();
 bool is_task(const std::string& name);
-/// What a task declares. Throws InputError for a name that is none.
+/// Returns what a task declares. Throws InputError for an unknown name.
 TaskSpec task_spec(const std::string& name);
-/// The task of that name on its scene (spec.scene, as read from its file); its own distributions
-/// replace what the file randomises. Throws InputError for a name that is none and for a scene that
-/// is not the task's.
+/// Makes the task of that name on its scene (spec.scene, as read from its file). The task's own
+/// distributions replace what the file randomises. Throws InputError for an unknown name and for a
+/// scene that does not belong to the task.
 std::unique_ptr<Task> make_task(const std::string& name, const Scene& scene);
 
 TaskSpec declare_dummy();
@@ -31,17 +31,17 @@ std::unique_ptr<Task> make_ball_rolling(const Scene& scene, BallPad pad);
 TaskSpec declare_stable_grasp();
 std::unique_ptr<Task> make_stable_grasp(const Scene& scene);
 
-/// What is observed of the box besides the goal: touch, its pose, nothing.
+/// What the task observes of the box besides the goal: touch, its pose, or nothing.
 enum class PushObservation { tactile, privileged, reduced };
 TaskSpec declare_box_pushing(PushObservation observation);
 std::unique_ptr<Task> make_box_pushing(const Scene& scene, PushObservation observation);
 
-/// What is observed besides angles and fingertips: touch, nothing.
+/// What the task observes besides angles and fingertips: touch or nothing.
 enum class CapObservation { tactile, blind };
 TaskSpec declare_cap_opening(CapObservation observation);
 std::unique_ptr<Task> make_cap_opening(const Scene& scene, CapObservation observation);
 
-/// What is off at the start and what an action corrects.
+/// Which components are off at the start and corrected by actions.
 enum class InsertionMotion { both, translation, rotation };
 TaskSpec declare_insertion(InsertionMotion motion);
 std::unique_ptr<Task> make_insertion(const Scene& scene, InsertionMotion motion);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every block is played again with a tape, the same bits as those that are stored.
+// Plays every block again with a tape. The repeated steps give the same bits as the stored ones.
 #include "tasks/gradients/episode_gradients.hpp"
 
 #include <algorithm>
@@ -16,15 +16,15 @@ namespace {
 
 using kernels::kBlock;
 
-/// Of a task: one that a thread plays and those that wait for an earlier one to be written
-/// (EpisodeOptions::blocks_in_flight).
+/// Blocks per thread for a task: the one that the thread plays and those that wait until an earlier
+/// one is written (EpisodeOptions::blocks_in_flight).
 constexpr double kBlocksOfThread = 3;
 
 std::vector<std::string> texts(std::span<const std::string> all) {
   return {all.begin(), all.end()};
 }
 
-/// Units of displacements along dofs.
+/// Units of displacements along the dofs.
 std::vector<std::string> displacement_units(const Model& model) {
   std::vector<std::string> units;
   for (const std::string& unit : model.v_units())
@@ -64,7 +64,7 @@ GradientArray array(const char* name, std::vector<std::uint64_t> shape, bool by_
       name, std::move(shape), by_row, std::move(meaning), std::move(by.names), std::move(by.units)};
 }
 
-/// `of`: "the return", "the loss".
+/// Arrays for the derivatives of `of`: "the return" or "the loss".
 std::vector<GradientArray> arrays_of_return(const Model& model, const Named& actions,
                                             const std::string& of) {
   const std::uint64_t nv = as_size(model.nv());
@@ -108,7 +108,7 @@ std::vector<GradientArray> arrays_of_jacobians(const Model& model, const Named& 
   return all;
 }
 
-/// Zeros for `episodes` episodes of at most `rows` rows.
+/// Makes zeros for `episodes` episodes of at most `rows` rows.
 void make_room(const std::vector<GradientArray>& arrays, int episodes, std::int64_t rows,
                std::vector<std::vector<double>>& out) {
   out.resize(arrays.size());
@@ -124,7 +124,7 @@ double bytes_of(const std::vector<GradientArray>& arrays, std::int64_t rows) {
   return 8.0 * kBlock * numbers;
 }
 
-/// A lane's row into the arrays of Jacobians.
+/// Writes a lane's row into the arrays of Jacobians.
 void put_row(const RowJacobian& j, bool with_previous, std::size_t row,
              std::vector<std::vector<double>>& out) {
   const auto put = [row](const std::vector<double>& from, std::vector<double>& to) {
@@ -250,7 +250,7 @@ EpisodeGradients task_jacobians(const Task& task, const TaskActions& actions,
   };
 }
 
-/// Of Jacobians: one thread's scratch and `blocks` results.
+/// Memory for Jacobians: one thread's scratch and `blocks` results.
 GradientPlan plan_of_jacobians(const Model& model, const Named& actions, std::int64_t rows,
                                double blocks, std::function<EpisodeGradients()> make) {
   GradientPlan plan{arrays_of_jacobians(model, actions), rows, std::move(make), 0};

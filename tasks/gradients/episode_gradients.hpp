@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Derivatives of the episodes of a data set, block by block, between those who simulate them and
-// those who store them.
+// Computes derivatives of a data set's episodes block by block, between simulation and storage.
 #pragma once
 
 #include <functional>
@@ -15,18 +14,17 @@
 
 namespace tangere {
 
-/// What is stored of each episode: derivatives of a return or a loss, or of every row's state by
-/// the row before.
+/// What is stored with each episode: derivatives of a return or a loss, or derivatives of every
+/// row's state by the row before.
 enum class GradientKind { none, returns, jacobians };
 const char* to_string(GradientKind kind);
 
-/// Fills in derivatives of up to 16 episodes, which it plays again: one list of numbers per array,
-/// as EpisodeRows::gradients has them, all rows, zeros to begin with. Holds the scratch of one
-/// thread.
+/// Plays up to 16 episodes again and fills in their derivatives: one list of numbers per array, in
+/// the layout of EpisodeRows::gradients, all rows, zeros on entry. Holds the scratch of one thread.
 using EpisodeGradients = std::function<void(std::int64_t first_episode, int episodes,
                                             std::vector<std::vector<double>>& out)>;
 
-/// What is stored and who computes it: `make` is called once for each thread.
+/// What is stored and who computes it. `make` is called once per thread.
 struct GradientPlan {
   std::vector<GradientArray> arrays;
   std::int64_t rows = 0;  ///< of an episode, at most
@@ -34,21 +32,21 @@ struct GradientPlan {
   double bytes = 0;  ///< memory of one thread's scratch and of its blocks' results
 };
 
-/// Of a scene's episodes. `loss`, of returns alone, and all else must outlive the plan;
-/// `loss_meaning` says what it is.
+/// Plan for a scene's episodes. Only returns use `loss`; `loss_meaning` describes it in words.
+/// Everything passed must outlive the plan.
 GradientPlan scene_gradients(const Model& model, const ControlProgram& controls,
                              const EpisodeOptions& run, GradientKind kind, const RolloutLoss* loss,
                              const std::string& loss_meaning, double tape_bytes);
-/// Of a task's episodes that `actions` plays.
+/// Plan for a task's episodes, which `actions` plays.
 GradientPlan task_episode_gradients(const Task& task, const TaskActions& actions,
                                     const EpisodeOptions& run, GradientKind kind,
                                     double tape_bytes);
 
-/// Adds them to the pieces on their way to another sink, as many blocks at a time as there are
-/// threads that prepare.
+/// Adds derivatives to pieces on their way to another sink. It computes as many blocks at a time as
+/// there are preparing threads.
 class GradientSink : public EpisodeSink {
  public:
-  /// Both must outlive it.
+  /// `plan` and `next` must outlive this object.
   GradientSink(const GradientPlan& plan, EpisodeSink& next) : plan_(plan), next_(next) {}
 
   void prepare(const EpisodeRows& rows) override;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Forward with checkpoints, then segment by segment back: each is run again onto the tapes unless
-// it is the only one.
+// Runs forward with checkpoints, then back segment by segment. Each segment is run again onto the
+// tapes unless it is the only one.
 #include "tasks/gradients/gradient_block.hpp"
 
 #include <fmt/format.h>

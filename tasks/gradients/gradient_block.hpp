@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// One block through a rollout and back: forward with tapes or checkpoints, then stretch by stretch
-// from the end. What a stretch is, how it is stepped and how derivatives enter and leave is said by
-// the losses of a scene (loss_block.hpp) and by the return of a task (return_block.hpp).
+// Takes one block through a rollout and back: forward with tapes or checkpoints, then stretch by
+// stretch from the end. Derived classes define a stretch, its steps, and how derivatives enter and
+// leave: the losses of a scene (loss_block.hpp) and the return of a task (return_block.hpp).
 #pragma once
 
 #include <algorithm>
@@ -15,21 +15,22 @@
 
 namespace tangere {
 
-/// How a rollout lies on tapes, each of which holds a stretch of it.
+/// How a rollout is split into tapes. Each tape holds a stretch of it.
 struct TapePlan {
-  std::int64_t stretches = 1;  ///< of a rollout
-  std::int64_t steps = 1;      ///< of a stretch; the last one may have fewer
-  std::int64_t segment = 1;    ///< stretches on tapes at a time
+  std::int64_t stretches = 1;  ///< in a rollout
+  std::int64_t steps = 1;      ///< in a stretch; the last one may have fewer
+  std::int64_t segment = 1;    ///< stretches that are on tapes at a time
   [[nodiscard]] bool whole() const { return segment == stretches; }
 };
 
-/// Of `all` units of a rollout those on tapes at a time: all, or as many as make tapes and
-/// checkpoints together smallest. `bytes_with`: of tapes of so many and the checkpoints between
-/// them; `one`: of a unit's tape [bytes]. Throws InputError when they do not fit into `most` bytes.
+/// Returns how many of a rollout's `all` units are on tapes at a time: all, or the number that
+/// makes tapes and checkpoints together smallest. `bytes_with(n)`: tapes of n units and the
+/// checkpoints between them [bytes]. `one`: the tape of one unit [bytes]. Throws InputError when
+/// they do not fit into `most` bytes.
 std::int64_t units_on_tape(const Model& model, std::int64_t all, double one, double most,
                            const std::function<double(std::int64_t)>& bytes_with,
                            const char* units);
-/// Of a block [bytes].
+/// Size of a block's checkpoint [bytes].
 double checkpoint_bytes(const Model& model);
 
 /// Scratch of one thread.
@@ -38,7 +39,7 @@ class GradientBlock {
   virtual ~GradientBlock() = default;
   GradientBlock(GradientBlock&&) noexcept = default;
 
-  /// Counts from 0; `go_on` (empty: always) must outlive the runs that follow.
+  /// Sets the counts to 0. An empty `go_on` means always; it must outlive the runs that follow.
   void begin(const GradientGoOn& go_on);
   [[nodiscard]] bool stopped() const { return stopped_; }
   [[nodiscard]] std::int64_t newton_iterations() const { return newton_iterations_; }
@@ -48,19 +49,19 @@ class GradientBlock {
   GradientBlock(const Model& model, const StepperOptions& stepper, const AdjointOptions& wanted,
                 const TapePlan& plan);
 
-  /// Forward and back, from the state that `block` has.
+  /// Runs forward and back from the current state of `block`.
   void run(Batch& batch, int block);
-  /// False: nobody goes on.
+  /// Returns false when no environment goes on.
   virtual bool begin_stretch(std::int64_t stretch) = 0;
-  /// Onto `tape`, if any, which is begun anew.
+  /// Takes the steps of a stretch. Clears `tape`, if any, and records them on it.
   virtual void take_steps(std::int64_t stretch, BlockTape* tape) = 0;
-  /// The same steps again, from a checkpoint or from where the stretch before ended.
+  /// Takes the same steps again, from a checkpoint or from the end of the stretch before.
   virtual void retake_steps(std::int64_t stretch, bool from_checkpoint, BlockTape& tape) = 0;
-  /// From the state after a stretch, whose cotangents stand in the adjoint, to that before it.
+  /// Moves the adjoint's cotangents from the state after a stretch to the state before it.
   virtual void reverse(std::int64_t stretch, const BlockTape& tape) = 0;
 
   [[nodiscard]] bool may_go_on();
-  /// Derivatives by a lane's first state and by the scene's numbers; what is empty is left out.
+  /// Fills derivatives by a lane's first state and by the scene's numbers. Skips empty spans.
   void get_start(int loss, const Batch& batch, int environment, std::span<double> q,
                  std::span<double> v, std::span<double> parameters, std::span<double> points) const;
 

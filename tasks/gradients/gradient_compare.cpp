@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which step size is right shows in its neighbours: they agree there, or there is a kink.
+// Chooses the step size by its neighbours: if they agree, it is right; if they do not, there is a
+// kink.
 #include "tasks/gradients/gradient_compare.hpp"
 
 #include <algorithm>
@@ -15,16 +16,16 @@ namespace {
 
 constexpr double kLargest = 1e-3;  // step size, times the input's scale
 constexpr double kNoInfluence =
-    1e-10;  // of the loss: an input whose derivatives are all smaller does not act on it
+    1e-10;  // of the loss: an input has no influence if all its derivatives are smaller
 
 double norm_of(std::span<const double> x) {
   return std::sqrt(std::inner_product(x.begin(), x.end(), x.begin(), 0.0));
 }
 
-/// What is not finite is as wrong as can be.
+/// Makes an error that is not finite infinite, so that it is the worst.
 double finite_error(double error) { return std::isfinite(error) ? error : HUGE_VAL; }
 
-/// Which of `all` are compared: every one, or `wanted`, drawn.
+/// Returns the entries to compare: all of `all`, or `wanted` of them at random.
 std::vector<std::size_t> chosen(std::vector<std::size_t> all, std::size_t wanted,
                                 std::uint64_t seed, std::uint32_t purpose) {
   if (wanted == 0 || all.size() <= wanted) return all;
@@ -51,7 +52,7 @@ std::array<double, 2 * kSweepLevels> sweep(double scale) {
 
 Difference best_difference(std::span<const double> values, double scale) {
   std::array<double, kSweepLevels>
-      slopes{};  // the error of second order taken out; none at the first
+      slopes{};  // without the error of second order; none for the first size
   double step = kLargest * scale, coarse = NAN;
   for (std::size_t k = 0; k < kSweepLevels; ++k, step *= 0.25) {
     const double central = (values[2 * k] - values[2 * k + 1]) / (2 * step);
@@ -198,7 +199,7 @@ void GradientChecker::check_velocities() {
       });
 }
 
-/// By relative changes of what this environment has: units differ.
+/// Takes relative changes of the environment's own values, because units differ.
 void GradientChecker::check_numbers() {
   const RelativeGradient r(parameters_, model_.scene(), varying_, by_numbers_);
   const auto of_number = [&](std::size_t k) {

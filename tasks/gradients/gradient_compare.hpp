@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A gradient against central differences, over a sweep of step sizes, and against a derivative
-// along one direction: input by input, of whatever a rollout or an episode comes to.
+// Compares a gradient, input by input, with central differences over a sweep of step sizes and with
+// a derivative along one direction. It works for any function of a rollout or an episode.
 #pragma once
 
 #include <array>
@@ -14,49 +14,47 @@
 
 namespace tangere {
 
-/// One kind of input. Errors are relative to the norm of the gradient by it, (numbers of the scene:
-/// by their relative change).
+/// One kind of input. Errors are relative to the norm of the gradient by it; for numbers of the
+/// scene, by their relative changes.
 struct CheckedInput {
   std::string name;          ///< "u" or "actions", "q", "v", "numbers", "points"
-  std::size_t entries = 0;   ///< the gradient has
+  std::size_t entries = 0;   ///< in the gradient
   std::size_t compared = 0;  ///< with differences
   std::size_t kinks =
-      0;            ///< left out: differences that do not settle, or whose runs find no solution
+      0;  ///< entries left out: their differences do not settle, or their runs find no solution
   double norm = 0;  ///< of the gradient
   double scale =
-      0;  ///< what errors are measured by: that, or the norm of the differences if it is larger
-  bool influence = true;        ///< false: derivatives and differences are nothing beside the loss;
-                                ///< nothing is compared
-  double difference_error = 0;  ///< largest among those compared
-  std::string worst;            ///< where
+      0;  ///< reference of the errors: that norm, or the norm of the differences if larger
+  bool influence = true;  ///< false: all derivatives and differences are negligible, none compared
+  double difference_error = 0;  ///< largest among the compared entries
+  std::string worst;            ///< the entry of that error
   double tangent_error = 0;     ///< |g·d - tangent|/(|g| |d|) along a random direction
 };
 
-/// Step sizes of a sweep, each a quarter of the one before, forward and back: a block of
-/// environments.
+/// Number of step sizes of a sweep. Each is a quarter of the one before and is taken in both
+/// directions, so a sweep fills a block of environments.
 inline constexpr int kSweepLevels = 8;
-/// Changes of an input whose entries are of size `scale`: +, -, of the largest step size first.
+/// Changes of an input whose entries have size `scale`: +, -, largest step size first.
 std::array<double, 2 * kSweepLevels> sweep(double scale);
 
 /// The central difference at which three neighbouring step sizes agree best, and how well.
 struct Difference {
   double value, doubt;
 };
-/// `values`: of the function after the changes of sweep(scale).
+/// `values`: the function after each change of sweep(scale).
 Difference best_difference(std::span<const double> values, double scale);
 
-/// Changes of positions are as they are, times 1 m or rad; velocities and controls change more.
+/// Scales of changes. Positions use 1 (m or rad); velocities and controls change more.
 inline constexpr double kVelocityScale = 10, kControlScale = 10;
 
 struct CompareOptions {
-  int entries =
-      24;  ///< of each input that differences are taken of, drawn if there are more; 0: all
-  std::uint64_t seed = 0;  ///< of that draw and of the directions
-  double settled = 3e-6;   ///< of the gradient's norm: neighbouring step sizes agree so far, or it
-                           ///< counts as a kink
+  int entries = 24;        ///< compared entries per input, drawn if there are more; 0: all
+  std::uint64_t seed = 0;  ///< for that draw and the directions
+  double settled =
+      3e-6;  ///< agreement of neighbouring step sizes, of the gradient's norm; else a kink
 };
 
-/// What is compared of one input.
+/// One input to compare.
 struct Comparison {
   std::string name;
   std::span<const double> gradient;
@@ -64,17 +62,18 @@ struct Comparison {
   std::function<Difference(std::size_t)> difference;  ///< by entry
   std::function<std::string(std::size_t)> entry_name;
 };
-/// `loss`: what an influence is measured by; `purpose` keys the draw of entries.
+/// `loss`: reference for the influence of the input. `purpose`: key for the draw of entries.
 CheckedInput compare(const Comparison& c, double loss, const CompareOptions& options,
                      std::uint32_t purpose);
-/// `along`: the derivative along `direction` by another way.
+/// `along`: the derivative along `direction`, computed another way.
 void compare_along(CheckedInput& c, std::span<const double> gradient,
                    std::span<const double> direction, double along);
 
-/// A gradient by numbers of a scene, by their relative change.
+/// A gradient by relative changes of a scene's numbers.
 struct RelativeGradient {
-  std::vector<double> has, gradient;  ///< what the environment has of them; times what it was
-  std::vector<std::size_t> given;     ///< not zero: there is something to change a little
+  std::vector<double> has, gradient;  ///< values in the environment; gradient times values
+  std::vector<std::size_t>
+      given;  ///< indices of values that are not zero, which a relative change moves
 
   /// `varying`: values of what the scene randomises, in its order.
   RelativeGradient(const NumberGradients& parameters, const Scene& scene,
@@ -86,7 +85,7 @@ struct GradientCheck {
   double loss = 0;
   std::vector<CheckedInput> inputs;
   [[nodiscard]] double max_relative_error() const;
-  [[nodiscard]] std::size_t entries() const;  ///< compared
+  [[nodiscard]] std::size_t entries() const;  ///< that are compared
   [[nodiscard]] std::size_t kinks() const;
 };
 
@@ -96,21 +95,22 @@ struct CheckInputs {
   std::vector<double> u;     ///< (steps, nu) controls, or (A, action) of a task
 };
 
-/// Changes of them; empty: none.
+/// Changes of the inputs; an empty span means no change.
 struct InputDirection {
   std::span<const double> u, q, v;  ///< as in CheckInputs, q along the dofs: (nv)
   std::span<const double> numbers;  ///< as rows of BlockCotangent::parameters
 };
 
-/// Checks a gradient by all its inputs, one after the other. Of what, a scene's loss or a task's
-/// return, says a class derived from it.
+/// Checks a gradient by all its inputs, one after the other. A derived class defines the function:
+/// a scene's loss or a task's return.
 class GradientChecker {
  public:
   virtual ~GradientChecker() = default;
   GradientChecker(const GradientChecker&) = delete;
   GradientChecker& operator=(const GradientChecker&) = delete;
 
-  /// By controls or actions, if there are any, first state and the scene's numbers.
+  /// Checks by controls or actions, if there are any, by the first state and by the scene's
+  /// numbers.
   void check();
   [[nodiscard]] const GradientCheck& result() const { return out_; }
 
@@ -118,28 +118,28 @@ class GradientChecker {
   GradientChecker(const Model& model, const CompareOptions& options)
       : model_(model), options_(options), parameters_(model) {}
 
-  /// What each of `inputs` comes to, side by side, NaN where a step finds no solution; in `other`,
-  /// or in the scene as it is when that is null. `varying`: what the scene randomises, in its
-  /// order.
+  /// Returns the function's value for each of `inputs`, all in one batch; NaN where a step finds no
+  /// solution. Uses the scene `other`, or the unchanged scene if that is null. `varying`: values of
+  /// what the scene randomises, in its order.
   [[nodiscard]] virtual std::vector<double> values(const Scene* other,
                                                    const std::vector<CheckInputs>& inputs,
                                                    const std::vector<double>& varying) const = 0;
   [[nodiscard]] virtual double along(const InputDirection& direction) = 0;
-  /// Whose environment 0 has the numbers of the scene that are changed.
+  /// The batch whose environment 0 has the scene's numbers to change.
   [[nodiscard]] virtual const Batch& batch() const = 0;
   [[nodiscard]] virtual std::string control_name(std::size_t entry) const = 0;
 
-  /// `along`: the derivative along a direction by another way.
+  /// `along`: the derivative along a direction, computed another way.
   void add(const Comparison& c, std::uint32_t purpose,
            const std::function<double(const std::vector<double>&)>& along);
   void check_controls();
   void check_positions();
   void check_velocities();
   void check_numbers();
-  /// change(inputs, e): one entry of the inputs moved by e.
+  /// change(inputs, e) moves one entry of the inputs by e.
   [[nodiscard]] Difference difference(
       double scale, const std::function<void(CheckInputs&, double)>& change) const;
-  /// change(scene, varying, e): numbers of the scene, by their relative change.
+  /// change(scene, varying, e) changes numbers of the scene by the relative amount e.
   [[nodiscard]] Difference difference_of_scene(
       const std::function<void(Scene&, std::vector<double>&, double)>& change) const;
 
@@ -154,7 +154,7 @@ class GradientChecker {
 };
 
 std::vector<std::size_t> all_of(std::size_t count);
-/// Numbers in [-1, 1].
+/// Returns n random numbers in [-1, 1].
 std::vector<double> random_direction(std::size_t n, std::uint64_t seed, std::uint32_t purpose);
 
 }  // namespace tangere

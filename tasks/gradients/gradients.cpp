@@ -92,7 +92,7 @@ double gradient_bytes(const Model& model, int environments, const GradientOption
   const Integrator scheme = o.stepper.integrator.value_or(model.integrator());
   const double tape = std::min(double(BlockTape::bytes(model, scheme, o.steps)), o.tape_bytes);
   const double of_points =
-      double(kernels::kBlock) * double(point_count(model, o)) * losses;  // every thread's own sums
+      double(kernels::kBlock) * double(point_count(model, o)) * losses;  // each thread's own sums
   return 8 * results * environments * losses +
          o.threads * (tape + 2 * double(Stepper::workspace_bytes(model)) + 8 * of_points);
 }

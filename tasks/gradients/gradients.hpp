@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rollouts of a batch and the gradients of losses over them: forward, then back, block by block on
-// all threads.
+// Computes rollouts of a batch and gradients of losses over them: forward, then back, block by
+// block on all threads.
 #pragma once
 
 #include <cstdint>
@@ -17,10 +17,10 @@
 
 namespace tangere {
 
-/// Asked before every step; false stops at this safe point.
+/// Is called before every step. False stops the computation before that step.
 using GradientGoOn = std::function<bool()>;
-/// Fills the controls (nu) of one environment's step. Called from several threads, more than once
-/// for a step.
+/// Fills the controls (nu) of one environment's step. Several threads call it, possibly more than
+/// once for a step.
 using StepControls = std::function<void(std::int64_t step, int environment, std::span<double> u)>;
 
 struct GradientOptions {
@@ -28,17 +28,18 @@ struct GradientOptions {
   int threads = 1;
   StepperOptions stepper;
   Precision precision =
-      Precision::f64;  ///< of the tactile fields that losses see; derivatives are taken in double
-  bool parameters = false;  ///< by the scene's numbers too (engine/derivative/number_gradients.hpp)
+      Precision::f64;  ///< of the tactile fields that losses see; derivatives are in double
+  bool parameters =
+      false;  ///< also by the scene's numbers (engine/derivative/number_gradients.hpp)
   bool points =
-      false;  ///< by every tactile point's own numbers too (engine/derivative/tactile_point_numbers.hpp)
-  /// The states on a thread's tape may take so much [bytes]; a longer rollout is run again from
+      false;  ///< also by tactile points' own numbers (engine/derivative/tactile_point_numbers.hpp)
+  /// Limit for the states on a thread's tape [bytes]. A longer rollout is run again from
   /// checkpoints, with the same bits.
   double tape_bytes = 1e9;
 };
 
-/// Of one loss, for every environment. Of one that failed: of its states until then, standing still
-/// afterwards.
+/// Gradient of one loss, for every environment. An environment that fails contributes its states
+/// until then and stands still afterwards.
 struct LossGradient {
   std::vector<double> value;       ///< (E)
   std::vector<double> u;           ///< (E, steps, nu)
@@ -47,34 +48,34 @@ struct LossGradient {
   std::vector<double> points;      ///< (E, tactile_points(model), kPointNumbers) or empty
 };
 
-/// How the rollouts or episodes of gradients went.
+/// How the rollouts or episodes went.
 struct GradientCounts {
-  /// In the order of environments. Of a task: those of its episodes in their order, steps are
-  /// actions, -1 the reset.
+  /// In the order of environments. For a task: in the order of its episodes; steps count actions,
+  /// and -1 is the reset.
   std::vector<FailedEnvironment> failures;
   std::int64_t newton_iterations = 0;
-  std::int64_t recomputed_steps = 0;  ///< of blocks, from checkpoints
-  bool stopped = false;               ///< on the way: gradients are not complete
+  std::int64_t recomputed_steps = 0;  ///< from checkpoints, counted by block
+  bool stopped = false;               ///< before the end: gradients are incomplete
 };
 
 struct GradientSummary : GradientCounts {
   std::vector<LossGradient> losses;
 };
 
-/// Owns the threads and their scratch: for many rollouts of one model, as in a descent.
+/// Owns the threads and their scratch. Use it for many rollouts of one model, as in a descent.
 class GradientRollouts {
  public:
-  /// `losses` must outlive it. Throws InputError for steps or threads below 1 and for a tape_bytes
-  /// that does not hold the states of a rollout with checkpoints.
+  /// `losses` must outlive this object. Throws InputError when steps or threads is below 1, and
+  /// when tape_bytes is too small for a rollout with checkpoints.
   GradientRollouts(const Model& model, const GradientOptions& options,
                    std::span<const RolloutLoss* const> losses);
   ~GradientRollouts();
   GradientRollouts(GradientRollouts&&) noexcept;
   GradientRollouts& operator=(GradientRollouts&&) noexcept;
 
-  /// Gradients of every loss over `steps` steps from the states of `start`, which is not changed.
-  /// The same bits for any number of threads and whatever tape_bytes. Throws InputError when
-  /// `start` is of another Model.
+  /// Returns gradients of every loss over `steps` steps from the states of `start`, which does not
+  /// change. The bits depend neither on the number of threads nor on tape_bytes. Throws InputError
+  /// when `start` is of another Model.
   GradientSummary run(const Batch& start, const StepControls& controls,
                       const GradientGoOn& go_on = {});
 
@@ -83,7 +84,7 @@ class GradientRollouts {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Room for them, zeros.
+/// Makes room for gradients, filled with zeros.
 GradientSummary empty_gradients(const Model& model, int environments,
                                 const GradientOptions& options, std::size_t losses);
 
@@ -91,7 +92,7 @@ GradientSummary empty_gradients(const Model& model, int environments,
 double gradient_bytes(const Model& model, int environments, const GradientOptions& options,
                       int losses);
 
-/// The same, once.
+/// Does the same for one rollout.
 GradientSummary rollout_gradients(const Batch& start, const StepControls& controls,
                                   const GradientOptions& options,
                                   std::span<const RolloutLoss* const> losses);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Residuals, their Jacobian, and the fit: minimise ½|r(exp x)|² by (F + λ diag F) δ = −g, F = JᵀJ.
+// Residuals, their Jacobian and the fit: minimise ½|r(exp x)|² by (F + λ diag F) δ = −g, F = JᵀJ.
 #include "tasks/gradients/identification.hpp"
 
 #include <fmt/format.h>
@@ -21,9 +21,9 @@ using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
 constexpr double kDifference =
-    1e-6;  // of logarithms; small, so that few points begin to touch or to slip within it
+    1e-6;  // of logarithms; small, so that few points start to touch or slip within it
 constexpr double kRounding = 1e-8;  // of logarithms
-constexpr double kLongest = 1.5;    // of logarithms in one step: the model is linear
+constexpr double kLongest = 1.5;    // of logarithms in one step, because the model is linear
 
 std::size_t numbers_of_fields(const Model& model) {
   std::size_t n = 0;
@@ -56,7 +56,7 @@ std::vector<int> places_of(const NumberGradients& parameters, const Scene& scene
   return out;
 }
 
-/// The sequence as a function of x, logarithms of the sought numbers.
+/// The residuals of the sequence as a function of x, the logarithms of the sought numbers.
 class Problem {
  public:
   Problem(const Scene& scene, const RecordedRun& run, const FieldSequence& recorded,
@@ -83,7 +83,7 @@ class Problem {
   }
 
   struct Value {
-    double misfit;    // infinite: the rollout fails there
+    double misfit;    // infinite if the rollout fails there
     Vector gradient;  // by x
   };
   [[nodiscard]] Value evaluate(const Vector& x) const {
@@ -104,7 +104,7 @@ class Problem {
     return out;
   }
 
-  /// ∂ fields / ∂x, (numbers of the whole sequence, count).
+  /// Returns ∂ fields / ∂x, (numbers of the whole sequence, count).
   [[nodiscard]] Matrix jacobian(const Vector& x) const {
     Matrix J(static_cast<Eigen::Index>(recorded_.readings.size() * recorded_.readings[0].size()),
              count());
@@ -138,16 +138,16 @@ class Problem {
   const RecordedRun& run_;
   const FieldSequence& recorded_;
   const std::vector<std::string>& names_;
-  std::vector<int> places_;  // among NumberGradients::infos()
+  std::vector<int> places_;  // indices in NumberGradients::infos()
 };
 
-/// JᵀJ. A lazy product has few columns in mind and compiles in a tenth of the time of a fast one.
+/// Returns JᵀJ. A lazy product suits few columns and compiles in a tenth of the time of a fast one.
 Matrix information(const Matrix& J) { return J.transpose().lazyProduct(J); }
 
-/// Whether a step that changed the misfit by `gain` is worth no more than `tolerance` standard
-/// deviations of the numbers, which are ½ tolerance² variances of a residual, or is a rounding.
-/// Creases (points that begin to touch or to slip) may hold a minimum where the gradient does not
-/// vanish: what is left to gain is what counts.
+/// Whether the fit may end. A step that changed the misfit by `gain` ends it if it is worth at most
+/// `tolerance` standard deviations of the numbers, which is ½ tolerance² variances of a residual,
+/// or if it is a rounding error. The gradient is no criterion: a minimum may lie on a crease, where
+/// points start to touch or to slip, and the gradient does not vanish there.
 bool is_end(double gain, double misfit, Eigen::Index residuals, double tolerance,
             const Vector& step) {
   const double variance = 2 * misfit / static_cast<double>(residuals);
@@ -172,7 +172,7 @@ void judge(const Problem& problem, double misfit, const Matrix& J, Identificatio
   const Matrix F = scale * information(J);
   const Eigen::SelfAdjointEigenSolver<Matrix> modes(F);
   out.condition = modes.eigenvalues().maxCoeff() / modes.eigenvalues().minCoeff();
-  for (Eigen::Index k = 0; k < n; ++k)  // the diagonal of F⁻¹
+  for (Eigen::Index k = 0; k < n; ++k)  // diagonal of F⁻¹
     out.deviation.push_back(std::sqrt(
         (modes.eigenvectors().row(k).transpose().array().square() / modes.eigenvalues().array())
             .sum()));
@@ -228,7 +228,7 @@ FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run) {
 void add_noise(FieldSequence& sequence, double deviation, std::uint64_t seed) {
   for (std::size_t k = 0; k < sequence.readings.size(); ++k)
     for (std::size_t i = 0; i < sequence.readings[k].size(); ++i)
-      // Steps from 1 on: what <randomize> draws for sensors has step 0.
+      // Steps start at 1, because <randomize> draws for sensors with step 0.
       sequence.readings[k][i] += normal({seed, 0, static_cast<std::int64_t>(k) + 1,
                                          Purpose::tactile, static_cast<std::uint32_t>(i)},
                                         0, deviation);
@@ -258,7 +258,7 @@ FieldMisfit::FieldMisfit(const Model& model, const FieldSequence& recorded)
   }
 }
 
-/// Where nothing touches, T = 0 and the share of a tile is ½ T_recorded²: known beforehand, and
+/// Where nothing touches, T = 0 and a tile contributes ½ T_recorded². That is known in advance and
 /// constant.
 double FieldMisfit::evaluate(const LossPoint& at, const LossCotangent& out) const {
   if (!reads_fields(at.step)) return 0;

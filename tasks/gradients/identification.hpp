@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers of a scene from recorded tactile fields: least squares over a rollout, its gradient by
-// the adjoint.
+// Finds numbers of a scene from recorded tactile fields: least squares over a rollout, with the
+// gradient from the adjoint.
 #pragma once
 
 #include <cstdint>
@@ -13,33 +13,34 @@
 
 namespace tangere {
 
-/// Fields of every sensor, one after the other, each (points, 3) [N]: readings[k] after (k + 1)
-/// `every` steps.
+/// Fields of every sensor in turn, each (points, 3) [N]. readings[k] follows step
+/// (k + 1) `every`.
 struct FieldSequence {
   std::int64_t every = 1;
   std::vector<std::vector<double>> readings;
 };
 
-/// Values of a scene's numbers by their names ("tactile pad kn"); the scene with others. Both
-/// throw InputError for a name that the scene does not have.
+/// Returns the values of a scene's numbers by their names ("tactile pad kn"), and the scene with
+/// other values. Both throw InputError for a name that the scene does not have.
 std::vector<double> numbers_of(const Scene& scene, std::span<const std::string> names);
 Scene with_numbers(const Scene& scene, std::span<const std::string> names,
                    std::span<const double> values);
 
-/// The run that was recorded, from the state that the scene gives.
+/// The recorded run, from the state that the scene gives.
 struct RecordedRun {
-  StepControls controls;  ///< of environment 0
+  StepControls controls;  ///< for environment 0
   std::int64_t steps = 0;
   std::int64_t every = 1;
 };
 
-/// What the scene gives under these controls. Throws InputError when an environment fails.
+/// Simulates the fields of the scene under these controls. Throws InputError when an environment
+/// fails.
 FieldSequence simulate_fields(const Scene& scene, const RecordedRun& run);
 
 /// Adds independent normal noise to every number of every field.
 void add_noise(FieldSequence& sequence, double deviation, std::uint64_t seed);
 
-/// ½ Σ (T − T_recorded)² over all readings that the rollout comes to, points and components [N²].
+/// ½ Σ (T − T_recorded)² over all readings that the rollout reaches, points and components [N²].
 class FieldMisfit : public RolloutLoss {
  public:
   FieldMisfit(const Model& model, const FieldSequence& recorded);
@@ -54,14 +55,14 @@ class FieldMisfit : public RolloutLoss {
   const FieldSequence& recorded_;                           // outlives this
   std::vector<std::vector<std::vector<TilePoint>>> tiles_;  // of every sensor
   std::vector<std::vector<double>>
-      squares_;  // ½ |T_recorded|² of every sensor's tiles in each reading
+      squares_;  // ½ |T_recorded|² of every sensor's tiles, for each reading
 };
 
 struct IdentificationOptions {
   std::vector<std::string>
-      numbers;              ///< what is sought, by name_of(); positive, fitted as logarithms
-  int max_iterations = 60;  ///< rollouts with gradients, those of rejected steps included
-  double tolerance = 1e-2;  ///< ends at a step that is worth so many standard deviations
+      numbers;              ///< sought numbers by name_of(); positive, fitted as logarithms
+  int max_iterations = 60;  ///< rollouts with gradients, rejected steps included
+  double tolerance = 1e-2;  ///< ends at a step worth this many standard deviations
 };
 
 /// One accepted point of the fit.
@@ -79,13 +80,13 @@ struct Identification {
   std::vector<double> information;  ///< (n, n) Fisher: JᵀJ / noise², J by logarithms
   double condition = 0;             ///< its largest eigenvalue over its smallest
   double gradient_difference =
-      0;  ///< at the start, |adjoint − Jᵀr| / |Jᵀr|: J is of central differences
+      0;  ///< at the start, |adjoint − Jᵀr| / |Jᵀr|; J from central differences
 
   [[nodiscard]] const std::vector<double>& values() const { return points.back().values; }
 };
 
-/// Levenberg-Marquardt in logarithms, from the values that `scene` has. The gradient comes from
-/// rollout_gradients; JᵀJ from one central difference of the whole sequence for each number. Throws
+/// Fits by Levenberg-Marquardt in logarithms, from the values in `scene`. The gradient comes from
+/// rollout_gradients, JᵀJ from one central difference of the whole sequence per number. Throws
 /// InputError for a name that is not a number of the scene, a value that is not positive, a number
 /// that no field depends on, a recording that does not fit the run, and a start whose rollout
 /// fails.

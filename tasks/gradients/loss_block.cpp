@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A stretch is as long as fits onto the tape: where all steps do, there is one.
+// A stretch is as long as the tape allows. If all steps fit, there is one stretch.
 #include "tasks/gradients/loss_block.hpp"
 
 #include <algorithm>
@@ -101,7 +101,7 @@ std::int64_t LossBlock::end_of(std::int64_t stretch) const {
   return std::min((stretch + 1) * plan_.steps, options_.steps);
 }
 
-/// Controls of a step of all lanes into u.
+/// Fills the controls of a step of all lanes into u.
 void LossBlock::ask(std::int64_t step) {
   const std::size_t nu = count(model_.nu());
   for (int e = hand_->first; e < hand_->last; ++e)
@@ -126,7 +126,7 @@ void LossBlock::retake_steps(std::int64_t stretch, bool /*from_checkpoint*/, Blo
   }
 }
 
-/// The state before a stretch is looked at only where the rollout begins.
+/// The losses look at the state before a stretch only where the rollout begins.
 void LossBlock::reverse(std::int64_t stretch, const BlockTape& tape) {
   const InHand& h = *hand_;
   const std::size_t nu = count(model_.nu()), steps = count(options_.steps);
@@ -149,7 +149,7 @@ void LossBlock::reverse(std::int64_t stretch, const BlockTape& tape) {
   look(0);
 }
 
-/// Fields that some loss looks at after `step` steps.
+/// Reads the fields that some loss needs after `step` steps.
 void LossBlock::read(std::int64_t step) {
   const InHand& h = *hand_;
   if (std::none_of(losses_.begin(), losses_.end(),
@@ -159,7 +159,7 @@ void LossBlock::read(std::int64_t step) {
     readout_.read_block(h.batch, h.block, std::span(frames).first(count(h.last - h.first)));
 }
 
-/// Every loss at the state in the batch: values, and cotangents into the adjoint.
+/// Evaluates every loss at the state in the batch. Adds the cotangents to the adjoint.
 void LossBlock::look(std::int64_t step) {
   const InHand& h = *hand_;
   read(step);
@@ -177,7 +177,7 @@ void LossBlock::look(std::int64_t step) {
   }
 }
 
-/// One loss at one environment's state.
+/// Evaluates one loss at one environment's state.
 void LossBlock::judge(std::int64_t step, std::size_t loss, int e) {
   const InHand& h = *hand_;
   const RolloutLoss& l = *losses_[loss];
@@ -209,7 +209,7 @@ void LossBlock::judge(std::int64_t step, std::size_t loss, int e) {
                            reading_.end_effectors_bar().subspan(3 * k, 3));
 }
 
-/// Gradients by the initial state and by the scene's numbers.
+/// Writes gradients by the initial state and by the scene's numbers.
 void LossBlock::finish() {
   for (std::size_t k = 0; k < losses_.size(); ++k) {
     LossGradient& g = hand_->out.losses[k];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Losses of a scene: one block of a batch through its rollout and back, the losses looking at every
+// Takes one block of a batch through its rollout and back. The losses of a scene look at every
 // state on the way.
 #pragma once
 
@@ -11,21 +11,23 @@
 
 namespace tangere {
 
-/// A loss at one environment's state: what it looks at, and room for its derivatives. Made once,
-/// used for state after state.
+/// What a loss reads at one environment's state, and room for its derivatives. Made once and used
+/// for state after state.
 class LossReading {
  public:
   explicit LossReading(const Model& model);
 
-  /// Of a sensor, already read where the loss reads fields; it must live until evaluate() is done.
+  /// Sets a sensor's field that has been read already. The frame must live until evaluate() is
+  /// done.
   void set_field(std::size_t sensor, const CompactFrame<double>& frame) {
     fields_[sensor] = &frame;
   }
-  /// Reads the rest and evaluates. `u`: of the step that follows; empty after the last.
+  /// Reads the rest and evaluates. `u`: controls of the step that follows; empty after the last.
   double evaluate(const RolloutLoss& loss, const Batch& batch, Readout& readout, int environment,
                   std::int64_t step, std::int64_t steps, std::span<const double> u);
 
-  // Derivatives of the loss evaluated last; of end effectors and fields if it reads them.
+  // Derivatives of the loss evaluated last; those by end effectors and fields only if it reads
+  // them.
   [[nodiscard]] std::span<const double> q_bar() const { return q_bar_; }
   [[nodiscard]] std::span<const double> v_bar() const { return v_bar_; }
   [[nodiscard]] std::span<const double> u_bar() const {
@@ -48,8 +50,8 @@ class LossBlock : public GradientBlock {
   LossBlock(const Model& model, const GradientOptions& options,
             std::span<const RolloutLoss* const> losses);
 
-  /// Results go to `out`, failures of the block to `failures`; blocks of one batch may run at the
-  /// same time. `u`: room for the batch's controls.
+  /// Writes results to `out` and failures of the block to `failures`. Blocks of one batch may run
+  /// at the same time. `u`: room for the batch's controls.
   void run(Batch& batch, int block, const StepControls& controls, std::span<double> u,
            GradientSummary& out, std::vector<FailedEnvironment>& failures);
 
@@ -79,7 +81,7 @@ class LossBlock : public GradientBlock {
   Readout readout_;
   std::vector<std::vector<CompactFrame<double>>> frames_;  // (sensors, 16)
   LossReading reading_;
-  InHand* hand_ = nullptr;  // of run()
+  InHand* hand_ = nullptr;  // set during run()
 };
 
 }  // namespace tangere

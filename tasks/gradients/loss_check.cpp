@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Differences sixteen rollouts at a time: all step sizes of one entry are environments of one
+// Takes differences sixteen rollouts at a time: all step sizes of one entry are environments of one
 // batch.
 #include "tasks/gradients/gradient_check.hpp"
 
@@ -32,7 +32,7 @@ struct Setting {
 
 std::vector<double> numbers(int n) { return std::vector<double>(std::size_t(n)); }
 
-/// Reads a loss where one environment is, fields included.
+/// Reads a loss at the current state of one environment, fields included.
 class Look {
  public:
   explicit Look(const Model& model) : readout_(model), reading_(model) {
@@ -59,7 +59,8 @@ class Look {
   std::vector<std::unique_ptr<CompactFrame<double>>> frames_;
 };
 
-/// Loss of each of `inputs`, as environments of one batch; NaN where a step finds no solution.
+/// Returns the loss of each of `inputs`, as environments of one batch; NaN where a step finds no
+/// solution.
 std::vector<double> losses_of(const Setting& s, const Model& model,
                               const std::vector<CheckInputs>& inputs,
                               const std::vector<double>& varying) {
@@ -87,8 +88,8 @@ std::vector<double> losses_of(const Setting& s, const Model& model,
   return sums;
 }
 
-/// Changes of all points of a sensor at once, by one of their numbers: random from point to point,
-/// places by parts of the sensor's size, coefficients of what they are.
+/// Changes one kind of number at all points of a sensor at once. They are random from point to
+/// point. Positions change by parts of the sensor's size, coefficients by parts of their values.
 struct PointChange {
   int sensor, number;
   std::vector<double> own;  ///< (points, kPointNumbers)
@@ -125,7 +126,7 @@ std::vector<PointChange> point_changes(const Model& model, std::span<const doubl
   return changes;
 }
 
-/// Tangents along one direction per input.
+/// Computes tangents along one direction per input.
 class Directions {
  public:
   explicit Directions(const Setting& s) : s_(s) {
@@ -147,7 +148,7 @@ class Directions {
     }
   }
 
-  /// dL; `points`: changes of their own numbers, by sensor.
+  /// Returns dL. `points`: changes of the points' own numbers, by sensor.
   double along(const InputDirection& d, const std::vector<std::vector<double>>& points = {}) {
     const Model& model = s_.start.model();
     const auto nu = std::size_t(model.nu());
@@ -173,7 +174,7 @@ class Directions {
   }
 
  private:
-  /// The loss's own derivatives at a state, times how that changes.
+  /// The loss's own derivatives at a state, times the change of that state.
   double change_at(const Batch& batch, Look& look, Tangent& tangent, std::int64_t t,
                    const StateTangent& state, std::span<const double> u_dot,
                    std::span<const double> rows, const std::vector<std::vector<double>>& points) {
@@ -188,7 +189,7 @@ class Directions {
       std::vector<double> change(look.frame(k).dense_size()), of_tiles(change.size());
       tangent.field(batch, 0, 0, *tape_, t, static_cast<int>(k), rows,
                     points.empty() ? std::span<const double>{} : points[k], state, change);
-      // The cotangents' layout is that of the tiles: spread them as the frame spreads its values.
+      // The cotangents have the layout of the tiles. Spread them as the frame spreads its values.
       look.frame(k).spread(bar.field_bar(k), of_tiles);
       sum += std::inner_product(change.begin(), change.end(), of_tiles.begin(), 0.0);
     }
@@ -266,9 +267,9 @@ class LossChecker : public GradientChecker {
     out_.loss = g.value[0];
   }
 
-  /// By places and coefficients of all points of a sensor at once.
+  /// Checks by positions and coefficients of all points of a sensor at once.
   void points() {
-    std::vector<double> coefficients;  // this environment's
+    std::vector<double> coefficients;  // of this environment
     for (std::size_t s = 0; s < model_.sensors().size(); ++s)
       for (std::size_t k = 0; k < kCoefficients; ++k)
         coefficients.push_back(sensor_coefficients(s_.start, 0, static_cast<int>(s))[k]);
@@ -304,7 +305,7 @@ class LossChecker : public GradientChecker {
     return "step " + std::to_string(i / nu) + " " + std::string(model_.u_names()[i % nu]);
   }
 
-  /// `coefficients`: what this environment's sensors have, (sensors, 4); points have parts of them.
+  /// `coefficients`: those of this environment's sensors, (sensors, 4); points have parts of them.
   [[nodiscard]] Difference difference_of_points(const PointChange& change,
                                                 std::span<const double> coefficients) const {
     return difference_of_scene([&](Scene& scene, std::vector<double>&, double e) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Half squares: their derivatives are the numbers themselves.
+// The losses are half squares, so their derivatives are the numbers themselves.
 #include "tasks/gradients/losses.hpp"
 
 #include <numeric>
@@ -52,7 +52,7 @@ class Fields : public RolloutLoss {
   }
   double evaluate(const LossPoint& at, const LossCotangent& out) const override {
     constexpr std::size_t kLanes = 8, kTile = 64;
-    double squares[kLanes] = {};  // side by side: one sum would wait for itself at every number
+    double squares[kLanes] = {};  // independent sums: a single one would wait for every addition
     for (std::size_t s = 0; s < at.fields.size(); ++s) {
       const std::span<const double> values = at.fields[s]->values();  // (tiles, 3, 64)
       for (std::size_t row = 0; row < values.size() / kTile; ++row) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A stretch is an action, with a tape of its own.
-// Of an action that begins at x, with memory m found and m⁺ left, K steps and looks in between:
+// A stretch is one action, with a tape of its own.
+// An action begins at x and finds the memory m. It leaves m⁺, with K steps and looks in between:
 //   r = judge(moments, m⁺, a);  x_(k+1) = step(x_k, controls(x_0, m⁺, a));
 //       x_0 = place(x, m⁺, a);  m⁺ = begin_action(x, m, a)
 #include "tasks/gradients/return_block.hpp"
@@ -23,7 +23,7 @@ double tape_bytes(const Task& task, const TaskGradientOptions& o) {
   return double(BlockTape::bytes(task.model(), scheme, task.spec().steps_per_action));
 }
 
-/// Of tapes of `segment` actions and checkpoints between them.
+/// Bytes of tapes of `segment` actions and of the checkpoints between them.
 double bytes_with(const Task& task, const TaskGradientOptions& o, std::int64_t segment) {
   const double records = double(o.actions) * ActionRecord::bytes(task);
   const double checkpoints = segment == o.actions ? 0
@@ -82,7 +82,7 @@ void ReturnBlock::run(std::int64_t first, int count, const TaskActions& actions,
   if (!stopped()) finish(to, out);
 }
 
-/// Who has failed in an action.
+/// Notes which lanes have failed in an action.
 void ReturnBlock::note(std::int64_t action) {
   for (int l = 0; l < rollout_.lanes(); ++l) {
     const bool now = !failed(rollout_.batch().status(l));
@@ -110,8 +110,8 @@ void ReturnBlock::retake_steps(std::int64_t action, bool from_checkpoint, BlockT
   rollout_.retake_steps(records_[as_size(action)], action, tape);
 }
 
-/// From the state after an action, whose cotangents stand in the adjoint, to that in which it was
-/// chosen.
+/// Moves the adjoint's cotangents from the state after an action to the state in which the action
+/// was chosen.
 void ReturnBlock::reverse(std::int64_t action, const BlockTape& tape) {
   const ActionRecord& r = records_[as_size(action)];
   const std::vector<int>& looks = task_.spec().moments;
@@ -149,7 +149,7 @@ void ReturnBlock::reverse_rewards(const ActionRecord& r, std::int64_t action) {
   }
 }
 
-/// Of the state after one of an action's steps.
+/// Adds cotangents of the state after one of an action's steps.
 void ReturnBlock::add_moment(std::size_t moment, const BlockTape& tape) {
   const MomentRows& m = moments_[moment];
   BlockCotangent& c = adjoint_.loss(0);
@@ -182,7 +182,7 @@ void ReturnBlock::add_fields(std::size_t moment, int lane) {
   }
 }
 
-/// Of the controls that hold from `step` on.
+/// Reverses the controls that hold from `step` on.
 void ReturnBlock::reverse_controls(const ActionRecord& r, std::int64_t action, int step,
                                    const BlockTape& tape) {
   for (int l = 0; l < rollout_.lanes(); ++l) {
@@ -196,7 +196,8 @@ void ReturnBlock::reverse_controls(const ActionRecord& r, std::int64_t action, i
   std::fill(by_u_.begin(), by_u_.end(), 0.0);
 }
 
-/// Where the action was chosen: back through a restart, and through what the task keeps of it.
+/// Goes back to where the action was chosen, through a restart and through the update of the
+/// memory.
 void ReturnBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
   BlockCotangent& c = adjoint_.loss(0);
   const std::size_t nv = as_size(task_.model().nv());

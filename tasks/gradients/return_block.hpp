@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The return of a task: sixteen episodes forward onto tapes and back, through rewards, steps,
-// controls, restarts and memory, action by action.
+// Gradient of a task's return: takes sixteen episodes forward onto tapes and back, through rewards,
+// steps, controls, restarts and memory, action by action.
 #pragma once
 
 #include <vector>
@@ -12,11 +12,11 @@ namespace tangere {
 
 class ReturnBlock : public GradientBlock {
  public:
-  /// `options.actions` is the number there are.
+  /// `options.actions` is the final number of actions, not 0.
   ReturnBlock(const Task& task, const TaskGradientOptions& options);
 
-  /// Up to 16 episodes from number `first` on. Results go to places `to`, to + 1 … of `out`,
-  /// failures by these places.
+  /// Plays up to 16 episodes from number `first` on. Writes results to places `to`, to + 1 … of
+  /// `out`, and failures with these places as their numbers.
   void run(std::int64_t first, int episodes, const TaskActions& actions, std::int64_t to,
            TaskGradients& out, std::vector<FailedEnvironment>& failures);
 
@@ -36,7 +36,7 @@ class ReturnBlock : public GradientBlock {
   void note(std::int64_t action);
   void finish(std::int64_t to, TaskGradients& out);
 
-  /// A cotangent's part of a lane.
+  /// A lane's part of a cotangent.
   [[nodiscard]] std::span<double> part(std::vector<double>& all, int lane) const;
   [[nodiscard]] std::span<const double> part(const std::vector<double>& all, int lane) const;
   [[nodiscard]] MomentCotangent cotangent(std::size_t moment, int lane);
@@ -48,12 +48,12 @@ class ReturnBlock : public GradientBlock {
   struct MomentRows {
     std::vector<double> q, v, end_effectors, tactile;  // (16, width)
   };
-  std::vector<MomentRows> moments_;             // cotangents of an action's moments
-  std::vector<double> start_q_, start_v_;       // (16, nv) of its first state
-  std::vector<double> by_u_;                    // (16, nu) of the controls in hand
-  std::vector<double> by_memory_;               // (16, memory), of the memory after begin_action
+  std::vector<MomentRows> moments_;        // cotangents of an action's moments
+  std::vector<double> start_q_, start_v_;  // (16, nv) cotangents of its first state
+  std::vector<double> by_u_;               // (16, nu) cotangents of the current controls
+  std::vector<double> by_memory_;  // (16, memory) cotangents of the memory after begin_action
   std::vector<std::vector<double>> by_action_;  // (actions) of (16, action)
-  const TaskActions* choose_ = nullptr;         // of run()
+  const TaskActions* choose_ = nullptr;         // set during run()
   std::vector<FailedEnvironment> lost_;         // by lane
   std::vector<bool> sound_;                     // (16)
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Differences sixteen episodes at a time: all step sizes of one entry are lanes of one block. And
-// how a return changes along a direction, forward: a row of a task's derivative is what its reverse
-// gives for one number, a tangent is all rows times the change; its steps in dual numbers.
+// Takes differences sixteen episodes at a time: all step sizes of one entry are lanes of one block.
+// Computes tangents of a return forward: the reverse function of a task gives one row of its
+// derivative at a time, and the tangent is all rows times the change. Steps run in dual numbers.
 #include "tasks/gradients/gradient_check.hpp"
 
 #include <fmt/format.h>
@@ -19,13 +19,13 @@ namespace tangere {
 namespace {
 
 constexpr double kMargin =
-    2e-2;  // actions stay so far within their bounds: more than differences move them
+    2e-2;  // distance of actions from their bounds: more than differences move them
 
 double dot(std::span<const double> a, std::span<const double> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
-/// Lane 0 of rows by lane.
+/// Lane 0 of an array of rows by lane.
 std::span<const double> of_lane(const std::vector<double>& all) {
   return std::span(all).first(all.size() / kernels::kBlock);
 }
@@ -58,10 +58,10 @@ class TaskTangent {
   std::vector<BlockTape> tapes_;
   StateTangent state_;
   std::vector<double> memory_,
-      action_;  // how they change: what begin_action left, the action in hand
+      action_;  // changes of the memory after begin_action and of the current action
 };
 
-/// Room for what a task's reverse functions add to.
+/// Room for the results of a task's reverse functions.
 struct TaskTangent::OwnCotangent {
   std::vector<std::vector<double>> q, v, end_effectors, tactile;
   std::vector<double> memory, action;
@@ -80,7 +80,7 @@ struct TaskTangent::OwnCotangent {
       moments.push_back({q[m], v[m], end_effectors[m], tactile[m]});
   }
   [[nodiscard]] ViewCotangent out() { return {moments, action, memory}; }
-  /// Times the changes of an action's start.
+  /// Product with the changes of an action's start.
   [[nodiscard]] double start_dot(const StateTangent& x, const std::vector<double>& dm,
                                  const std::vector<double>& da) const {
     return dot(q[0], x.q) + dot(v[0], x.v) + dot(memory, dm) + dot(action, da);
@@ -129,7 +129,7 @@ double TaskTangent::along(const InputDirection& d) {
   return sum;
 }
 
-/// What the action keeps, and the state that it starts from.
+/// Computes the memory that the action keeps, and the state from which it starts.
 void TaskTangent::begin(std::size_t action) {
   const ActionRecord& r = records_[action];
   const Moment seen{of_lane(r.q), of_lane(r.v), {}, {}};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// J⁺ = S J + P J⁻ + U D: S, P, U of the step by the state before it, the one before that and its
-// controls; D of the controls.
+// J⁺ = S J + P J⁻ + U D. S, P, U: derivatives of the step by the state before it, by the state
+// before that, and by its controls. D: derivatives of the controls.
 #include "tasks/gradients/row_jacobians.hpp"
 
 #include <algorithm>
@@ -30,7 +30,7 @@ std::span<const double> of_lane(const std::vector<double>& all, int lane) {
   return std::span(all).subspan(as_size(lane) * width, width);
 }
 
-/// What a task's reverse functions add to, for one number.
+/// Results of a task's reverse functions for one number.
 struct Bars {
   std::vector<double> state, action, memory;  // (2 nv), …
   MomentCotangent moment;
@@ -123,8 +123,8 @@ void ActionJacobians::evaluate(TaskRollout& rollout, const ActionRecord& r, std:
   for (int l = 0; l < rollout.lanes(); ++l) compose(rollout, r, action, l);
 }
 
-/// How a lane's controls from `step` on hang on the action's first state, the action and the
-/// memory.
+/// Computes the derivatives of a lane's controls from `step` on by the action's first state, the
+/// action and the memory.
 void ActionJacobians::ask(TaskRollout& rollout, const ActionRecord& r, std::int64_t action,
                           int step, const BlockTape& tape, int lane) {
   std::vector<double>& d = controls_[as_size(lane)];
@@ -144,7 +144,8 @@ void ActionJacobians::ask(TaskRollout& rollout, const ActionRecord& r, std::int6
   }
 }
 
-/// From the first state, the action and the memory to where the action was chosen.
+/// Turns derivatives by the first state, the action and the memory into derivatives at the point
+/// where the action was chosen.
 void ActionJacobians::compose(TaskRollout& rollout, const ActionRecord& r, std::int64_t action,
                               int lane) {
   RowJacobian chain;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How the state of a row hangs on the state and the action of the row before: Jacobians of steps,
-// chained over a row.
+// Computes how the state of a row depends on the state and the action of the row before, by
+// chaining Jacobians of steps over a row.
 #pragma once
 
 #include <span>
@@ -11,22 +11,22 @@
 
 namespace tangere {
 
-/// Row-major, of one environment. Rows: displacement and velocity after the row, (2 nv).
+/// Row-major, for one environment. Rows: displacement and velocity after the row, (2 nv).
 struct RowJacobian {
   std::vector<double> state;  ///< (2 nv, 2 nv) by the state of the row before
   std::vector<double>
-      previous;  ///< (2 nv, 2 nv) by the state one step before that: not zero under BDF2 alone
-  std::vector<double> others;  ///< (2 nv, n) by what else the controls hang on
+      previous;  ///< (2 nv, 2 nv) by the state one step before that; nonzero only for BDF2
+  std::vector<double> others;  ///< (2 nv, n) by the other numbers that the controls depend on
 };
 
 /// Chains the steps of a row of one environment.
 class RowChain {
  public:
-  /// `others`: numbers that controls may hang on besides the state where the row begins.
+  /// `others`: how many numbers controls may depend on besides the state where the row begins.
   RowChain(int nv, std::size_t others);
   void begin();
-  /// `controls`: (nu, 2 nv + others), how the step's controls hang on the row's first state and on
-  /// the others.
+  /// `controls`: (nu, 2 nv + others), derivatives of the step's controls by the row's first state
+  /// and by the others.
   void add(const StepJacobian& step, std::span<const double> controls);
   void get(RowJacobian& out) const;
 
@@ -35,16 +35,16 @@ class RowChain {
   std::vector<double> now_, before_, next_;  // (2 nv, columns)
 };
 
-/// Of an action of a task, from where it was chosen: through what the task keeps, its restart, its
-/// controls and steps.
+/// Jacobian of an action of a task from where it was chosen, through the update of the memory, the
+/// restart, the controls and the steps.
 class ActionJacobians {
  public:
   ActionJacobians(const Task& task, const StepperOptions& options);
-  /// Of all lanes of a rollout that has taken the steps of an action, onto `tape`.
+  /// Evaluates all lanes of a rollout that has taken the steps of an action onto `tape`.
   void evaluate(TaskRollout& rollout, const ActionRecord& record, std::int64_t action,
                 const BlockTape& tape);
-  /// `others`: the action, 0 for numbers beyond their bounds. Of a lane that did not take it: the
-  /// state stays.
+  /// Here `others` is the action, with 0 for components beyond their bounds. For a lane that did
+  /// not take the action, the state stays.
   [[nodiscard]] const RowJacobian& of(int lane) const { return rows_[std::size_t(lane)]; }
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of a VectorTask's action, taken one by one, and again in reverse.
+// Takes the parts of a VectorTask's action one by one, and repeats them for the reverse pass.
 #include "tasks/gradients/task_rollout.hpp"
 
 #include <fmt/format.h>

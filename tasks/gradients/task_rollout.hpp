@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Up to sixteen episodes side by side, an action at a time, with what their derivatives need to
-// know of it.
+// Plays up to sixteen episodes side by side, an action at a time, and records what their
+// derivatives need.
 #pragma once
 
 #include <array>
@@ -14,13 +14,13 @@
 
 namespace tangere {
 
-/// Fills the action of an episode that shows `view` and `observation`. Called from several threads.
+/// Fills the action of an episode from `view` and `observation`. Several threads call it.
 using TaskActions = std::function<void(const TaskView& view, std::span<const double> observation,
                                        std::span<double> action)>;
 
-/// An action as it began, of every lane.
+/// The start of an action, for every lane.
 struct ActionRecord {
-  std::vector<double> q, v;  ///< (16, nq), (16, nv) where it was chosen: before a task restarts
+  std::vector<double> q, v;  ///< (16, nq), (16, nv) when it was chosen, before a task restarts
   std::vector<double> found, memory;          ///< (16, memory) before and after begin_action
   std::vector<double> asked, action;          ///< (16, action): as chosen, as taken
   std::array<bool, kernels::kBlock> taken{};  ///< false: the episode had ended
@@ -34,29 +34,29 @@ class TaskRollout {
  public:
   TaskRollout(const Task& task, const StepperOptions& options, Precision precision);
 
-  /// Resets so many episodes, their openings included: what comes next is their first action.
+  /// Resets one episode per lane, openings included. The first action comes next.
   void start(std::uint64_t seed, std::span<const std::int64_t> episodes);
-  /// Starts a lane's first action from another state; what a scheme of two steps remembers stays.
+  /// Starts a lane's first action from another state. The history of a scheme of two steps stays.
   void displace(int lane, std::span<const double> q, std::span<const double> v);
 
   [[nodiscard]] bool running() const;  ///< whether some episode goes on
-  /// Chooses the next action of who is running, into record.asked. Throws InputError for one that
-  /// is not finite.
+  /// Chooses the next action of every running lane into record.asked. Throws InputError for one
+  /// that is not finite.
   void choose(const TaskActions& actions, ActionRecord& record);
-  /// Begins record.asked and fills in the rest.
+  /// Begins record.asked and fills in the rest of the record.
   void begin(ActionRecord& record);
-  /// Its steps; `tape`, if any, is begun anew.
+  /// Takes the steps of the action. Clears `tape`, if any, and records them on it.
   void take_steps(BlockTape* tape);
-  /// Rewards, and who has ended.
+  /// Evaluates rewards and finds which lanes have ended.
   void conclude();
-  /// The steps of an action again, from the state that it began with.
+  /// Takes the steps of an action again, from the state in which it began.
   void retake_steps(const ActionRecord& record, std::int64_t action, BlockTape& tape);
-  /// Puts a lane where a task restarts.
+  /// Restarts a lane again as the task did.
   void place_again(const ActionRecord& record, std::int64_t action);
-  /// Controls for the steps of an action from `step` on into u(), of lanes that took it; the
-  /// action's first state is at 0 of `tape`.
+  /// Fills u() with the controls for the steps of an action from `step` on, for lanes that took it.
+  /// The action's first state is entry 0 of `tape`.
   void ask_again(const ActionRecord& record, std::int64_t action, int step, const BlockTape& tape);
-  /// What was seen during an action: on its tape again.
+  /// Reads again what the task saw during the action on `tape`.
   void look_again(const BlockTape& tape);
 
   [[nodiscard]] const Task& task() const { return task_; }
@@ -69,7 +69,7 @@ class TaskRollout {
   [[nodiscard]] Integrator integrator() const { return stepper_.integrator(); }
   [[nodiscard]] const VectorCounts& counts() const { return counts_; }
 
-  /// What the task saw when it took action number `action`, of which `memory` and `now` are given.
+  /// What the task saw when it took action number `action`. The caller gives `memory` and `now`.
   [[nodiscard]] TaskView view(const ActionRecord& record, std::int64_t action, int lane,
                               std::span<const double> memory, std::span<const Moment> now) const;
   /// A lane's first state of an action, from its tape.
@@ -82,8 +82,8 @@ class TaskRollout {
   std::optional<Batch> batch_;
   std::optional<EnvironmentData> data_;
   VectorCounts counts_, recounted_;
-  std::vector<double> u_;      // (16, nu) of ask_again
-  std::vector<double> q_, v_;  // (nq), (nv) of first_moment
+  std::vector<double> u_;      // (16, nu) written by ask_again
+  std::vector<double> q_, v_;  // (nq), (nv) written by first_moment
 };
 
 }  // namespace tangere

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One visit per block and sensor picks the kind of frame; nothing below it asks again.
+// One visit per block and sensor selects the kind of frame; the code below it does not check again.
 #include "tasks/run/benchmark_fields.hpp"
 
 #include <algorithm>

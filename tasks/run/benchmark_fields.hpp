@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory for the tactile fields of a benchmark: a frame of every sensor for every environment, kept
-// from reading to reading.
+// Memory for the tactile fields of a benchmark: one frame per sensor and environment, reused for
+// every reading.
 #pragma once
 
 #include <cstdint>
@@ -16,10 +16,10 @@ class BenchmarkFields {
  public:
   BenchmarkFields(const Model& model, int environments, FrameKind kind, Precision precision);
 
-  /// Reads one sensor of all environments of a block, in the precision of the readout, which must
-  /// be that of the fields.
+  /// Reads one sensor of all environments of a block. The precision of the readout must be that of
+  /// the fields.
   void read(Readout& readout, const Batch& batch, int block, int sensor);
-  /// Continues a checksum with the bits of a field as it was read last: every point, whatever the
+  /// Continues a checksum with the bits of the last reading of a field: every point, whatever the
   /// frames keep.
   [[nodiscard]] std::uint64_t chain(std::uint64_t checksum, int environment, int sensor) const;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A thread takes a block and steps it through the whole episode: its state stays in that thread's
-// cache, and no thread waits for another between steps.
+// A thread steps a block through the whole episode. The block's state stays in that thread's cache,
+// and no thread waits for another between steps.
 #include "tasks/run/benchmark_run.hpp"
 
 #include <algorithm>
@@ -28,7 +28,7 @@ std::uint64_t mix(std::uint64_t hash, std::uint64_t bits) {
 
 template <class Bits, class T>
 std::uint64_t chain(std::uint64_t checksum, std::span<const T> numbers) {
-  // Four chains beside each other: in a single one each product would wait for the one before.
+  // Four independent chains: in a single one each product would wait for the one before.
   std::array<std::uint64_t, 4> chains{checksum, checksum + 1, checksum + 2, checksum + 3};
   for (std::size_t i = 0; i < numbers.size(); ++i)
     chains[i % 4] = mix(chains[i % 4], std::bit_cast<Bits>(numbers[i]));
@@ -60,7 +60,7 @@ class Benchmark {
  public:
   using MakeProgram = std::function<std::unique_ptr<EpisodeProgram>()>;
 
-  /// `task_data`: what programs of a task share, null for a scene.
+  /// `task_data`: shared by the programs of a task; null for a scene.
   Benchmark(const Batch& start, const BenchmarkOptions& options, const BenchmarkGoOn& go_on,
             std::shared_ptr<EnvironmentData> task_data, const MakeProgram& make_program)
       : start_(start),
@@ -92,7 +92,7 @@ class Benchmark {
   }
 
  private:
-  /// One pass from the start; with `checked`, checksums are made, which takes time.
+  /// Runs one pass from the start. With `checked` it computes checksums, which takes time.
   BenchmarkTime pass(bool checked) {
     batch_ = start_;
     for (Worker& worker : workers_)
@@ -109,7 +109,7 @@ class Benchmark {
     return {wall.count(), cpu_seconds() - cpu};
   }
 
-  /// Of the pass before.
+  /// Reports the pass before.
   void report(BenchmarkResult& result) const {
     for (const BlockTally& tally : tallies_) {
       result.environment_steps += tally.environment_steps;
@@ -177,7 +177,7 @@ class Benchmark {
     tallies_[as_size(block)] = std::move(tally);
   }
 
-  /// The fields due after `done` steps.
+  /// Reads the fields that are due after `done` steps.
   void read_fields(int first, int last, std::int64_t done, const StepTally& steps, Worker& worker,
                    bool checked, BlockTally& tally) {
     const std::span<const SensorInfo> sensors = batch_.model().sensors();

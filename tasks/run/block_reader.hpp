@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where states, end effectors and tactile fields of a block are read: by the rollout, the player of
-// episodes and tasks, each into rows of its own.
+// Reads states, end effectors and tactile fields of a block. The rollout, the player of episodes
+// and tasks use it, each with its own destination.
 #pragma once
 
 #include <array>
@@ -11,9 +11,9 @@
 
 namespace tangere {
 
-// `place(environment)`: where the numbers of an environment of the batch go.
+// `place(environment)` returns the destination for the numbers of an environment of the batch.
 
-/// Coordinates (nq) and velocities (nv).
+/// Reads coordinates (nq) and velocities (nv).
 template <class PlaceQ, class PlaceV>
 void read_states(const Batch& batch, int block, const PlaceQ& q, const PlaceV& v) {
   const int first = block * kernels::kBlock;
@@ -23,7 +23,7 @@ void read_states(const Batch& batch, int block, const PlaceQ& q, const PlaceV& v
   }
 }
 
-/// What place(environment) says for each lane.
+/// Returns place(environment) for each lane.
 template <class T, class Place>
 std::array<std::span<T>, kernels::kBlock> places_of(const Batch& batch, int block,
                                                     const Place& place) {
@@ -33,14 +33,14 @@ std::array<std::span<T>, kernels::kBlock> places_of(const Batch& batch, int bloc
   return places;
 }
 
-/// World positions (end effectors, 3) [m]; nothing where the scene has none.
+/// Reads world positions (end effectors, 3) [m]; nothing if the scene has none.
 template <class Place>
 void read_end_effectors(Readout& readout, const Batch& batch, int block, const Place& place) {
   if (!batch.model().end_effectors().empty())
     readout.read_end_effectors(batch, block, places_of<double>(batch, block, place));
 }
 
-/// The field of one sensor, (points, 3) [N]; T: double or float.
+/// Reads the field of one sensor, (points, 3) [N]. T: double or float.
 template <class T, class Place>
 void read_field(Readout& readout, const Batch& batch, int block, int sensor, const Place& place) {
   const auto places = places_of<T>(batch, block, place);

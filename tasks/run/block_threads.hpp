@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blocks of environments spread over threads: what everything that shares nothing but the model
-// between blocks runs on.
+// Spreads blocks of environments over threads, for work whose blocks share nothing but the model.
 #pragma once
 
 #include <tbb/blocked_range.h>
@@ -10,25 +9,29 @@
 
 #include <cstddef>
 
+#include "tasks/run/thread_probe.hpp"
 #include "tasks/run/tsan_order.hpp"
 
 namespace tangere {
 
-/// So many threads, one of them the caller's.
+/// A number of threads, of which the caller's is one.
 class BlockThreads {
  public:
-  explicit BlockThreads(int threads) : threads_(threads), arena_(threads) {}
+  /// Throws InputError when the system refuses so many threads.
+  explicit BlockThreads(int threads) : threads_(threads), arena_(threads) {
+    require_threads(threads);
+  }
 
-  /// Calls body(workers[k], block) for every block: one block at a time to whoever is free, because
-  /// some take longer than others and other programs may be on some cores. No worker is used by two
-  /// threads at once. Passes on what body throws.
+  /// Calls body(workers[k], block) for every block. A thread that becomes free takes the next
+  /// block, because some blocks take longer and other programs may use some cores. No two threads
+  /// use a worker at once. Passes on what body throws.
   template <class Workers, class Body>
   void for_each(int blocks, Workers& workers, const Body& body) {
     if (threads_ == 1) {
       for (int b = 0; b < blocks; ++b) body(workers[0], b);
       return;
     }
-    // The arena alone is not enough where more threads are asked for than there are cores.
+    // The arena alone is not enough if there are more threads than cores.
     const tbb::global_control cap(tbb::global_control::max_allowed_parallelism,
                                   static_cast<std::size_t>(threads_));
     const auto run = [&](const tbb::blocked_range<int>& range) {

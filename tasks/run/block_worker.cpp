@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An action of a block, in order: start or take actions, K steps with looks in between, then
-// rewards and observations.
+// Takes a block through an action: starts episodes or takes actions, then K steps with looks in
+// between, then rewards and observations.
 #include "tasks/run/block_worker.hpp"
 
 #include <algorithm>
@@ -195,7 +195,7 @@ void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
   }
 }
 
-/// On its own, so that the steps of the others are not held up.
+/// Settles one environment alone, so that the others' steps do not wait for it.
 void BlockWorker::settle(const Batch& batch, EnvironmentData& data, int environment) {
   const Model& model = task_.model();
   if (!settling_ || settling_->seed() != batch.seed()) settling_.emplace(model, 1, batch.seed());
@@ -218,7 +218,7 @@ void BlockWorker::take_action(Batch& batch, EnvironmentData& data, int environme
   const std::span<double> action = number_row(data.action, environment, spec.size());
   for (std::size_t k = 0; k < action.size(); ++k) {
     const double asked = actions[as_size(environment) * spec.size() + k];
-    // clamp() lets NaN pass: the controls are NaN then, and the step says so.
+    // clamp() lets NaN pass. The controls are then NaN, and the step reports it.
     action[k] = std::clamp(asked, spec.low, spec.high);
   }
   task_.begin_action(view_of(batch, data, environment),

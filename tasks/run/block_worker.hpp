@@ -18,16 +18,16 @@ enum class EnvironmentState : std::uint8_t {
   over,
 };
 
-/// What a VectorTask knows of its environments besides their states, (E, width) each. A block's
-/// part is one thread's.
+/// What a VectorTask knows of its environments besides their states, (E, width) each. Only one
+/// thread uses a block's part.
 struct EnvironmentData {
   EnvironmentData(const Task& task, int environments);
-  static double bytes(const Task& task);  ///< of one environment
+  static double bytes(const Task& task);  ///< per environment
 
-  /// All of them start the episodes that the batch has drawn.
+  /// Makes all environments start the episodes that the batch has drawn.
   void restart(const Batch& batch);
-  /// Those from `first` on whose episode is over start another one at their next action:
-  /// environment e plays e, e + E, e + 2 E … of the first ones.
+  /// From environment `first` on, makes those whose episode is over start another one at their next
+  /// action. Environment e plays e, e + E, e + 2 E … counted from the first episode.
   void start_next(int first, int environments);
 
   std::vector<double> memory, action, observation, u, q, v;
@@ -42,20 +42,20 @@ class BlockWorker {
  public:
   BlockWorker(const Task& task, Precision precision);
 
-  /// `actions`: (E, action), empty where every environment of the block starts.
+  /// `actions`: (E, action); empty if every environment of the block starts.
   void act(Batch& batch, Stepper& stepper, EnvironmentData& data, int block,
            std::span<const double> actions, VectorCounts& counts);
 
-  // The parts of act(), for whoever steps the batch himself: begin, for every step k ask, step,
-  // look, then conclude.
+  // The parts of act(), for callers that step the batch themselves: begin; for every step k ask,
+  // step, look; then conclude.
   void begin(Batch& batch, EnvironmentData& data, int block, std::span<const double> actions);
-  /// Controls for the step k into data.u.
+  /// Writes the controls for step k into data.u.
   void ask_for_controls(const Batch& batch, EnvironmentData& data, int block, int step) const;
   void look_after(const Batch& batch, int block, int step, VectorCounts& counts);
-  /// In place of steps and looks: where every environment starts and there is no opening.
+  /// Replaces steps and looks if every environment starts and there is no opening.
   void look_at_start(const Batch& batch, int block);
   void conclude(Batch& batch, EnvironmentData& data, int block, VectorCounts& counts);
-  /// What was seen of a lane of the block looked at last, one of each of the task's moments.
+  /// What was seen of a lane of the block looked at last: each of the task's moments.
   [[nodiscard]] std::span<const Moment> moments(int lane) const;
 
   static double bytes(const Task& task);
@@ -74,12 +74,12 @@ class BlockWorker {
   Readout readout_;
   std::optional<Stepper> settling_stepper_;
   std::optional<Batch> settling_;                        // one environment
-  std::vector<double> varying_;                          // of the environment that starts
+  std::vector<double> varying_;                          // values of the environment that starts
   std::vector<double> q_, v_, end_effectors_, tactile_;  // (moments, 16, width)
   std::vector<Moment> moments_;                          // (16, moments): views of them
 };
 
-/// What a task may look at of an environment between two actions.
+/// Returns what a task may look at between two actions of an environment.
 TaskView view_of(const Batch& batch, const EnvironmentData& data, int environment);
 
 }  // namespace tangere

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long threads were busy with one kind of work, all of them together.
+// Measures how long threads were busy with one kind of work, summed over the threads.
 #pragma once
 
 #include <atomic>
@@ -17,7 +17,7 @@ class BusyTime {
   std::atomic<std::int64_t> nanoseconds_{0};
 };
 
-/// Counts from here to the end of the scope.
+/// Measures from its construction to the end of the scope.
 class Stopwatch {
  public:
   explicit Stopwatch(BusyTime& time) : time_(time), start_(Clock::now()) {}

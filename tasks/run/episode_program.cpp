@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A scene asks its controls; a task takes the parts of an action one after the other.
+// A scene only supplies controls; a task takes the parts of an action one after the other.
 #include "tasks/run/episode_program.hpp"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // An episode as a program: how a block of 16 starts, which controls each step takes, what is looked
-// at and how a row is judged. A scene and a task are its two makers; whoever plays episodes (the
-// rollout, the player of data sets, the benchmark) knows nothing else of them.
+// at, and how a row is judged. There is one program for scenes and one for tasks. The code that
+// plays episodes (the rollout, the player of data sets, the benchmark) knows only this interface.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,10 @@ namespace tangere {
 
 class TaskProgram;
 
-/// Steps are counted from the start of the episodes, their opening included. For every step:
-/// controls(), the step, look(); after the last step of the opening and of each row: judge().
-/// Different blocks of a batch may be in different threads, each with a program of its own.
+/// Steps count from the start of the episodes, including their opening. Every step calls
+/// controls(), steps, and calls look(). After the last step of the opening and of each row, judge()
+/// follows. Different blocks of a batch may be in different threads, each with a program of its
+/// own.
 class EpisodeProgram {
  public:
   virtual ~EpisodeProgram() = default;
@@ -27,22 +28,23 @@ class EpisodeProgram {
   /// Steps before the first row.
   [[nodiscard]] virtual int opening_steps() const { return 0; }
 
-  /// The batch has drawn the episodes of the block.
+  /// Starts the block, for which the batch has drawn the episodes.
   virtual void start(Batch& /*batch*/, int /*block*/) {}
-  /// Controls of the block's environments into u, (E, nu), which holds those of the step before.
+  /// Writes the controls of the block's environments into u, (E, nu), which holds those of the step
+  /// before.
   virtual void controls(std::int64_t step, Batch& batch, int block, std::span<double> u) = 0;
   virtual void look(std::int64_t /*step*/, const Batch& /*batch*/, int /*block*/) {}
   virtual void judge(Batch& /*batch*/, int /*block*/) {}
-  /// Whose rows have actions, rewards and an end of their own; null: a scene, whose controls are
-  /// its actions, whose reward is 0 and whose episodes last as long as asked for.
+  /// Returns the task program whose rows have actions, rewards and an end. Null for a scene: its
+  /// controls are its actions, its reward is 0, and its episodes last as long as requested.
   [[nodiscard]] virtual TaskProgram* judged() { return nullptr; }
 };
 
-/// A scene's, driven by its controls or a table.
+/// The program of a scene, driven by its controls or a table.
 class SceneProgram : public EpisodeProgram {
  public:
-  /// `first_step`: that of the controls which step 0 takes. Those of a row's first step are held
-  /// for all of it. `controls` must outlive it.
+  /// `first_step`: the step of the controls that step 0 uses. A row holds the controls of its first
+  /// step. `controls` must outlive this object.
   explicit SceneProgram(const ControlProgram& controls, int steps_per_row = 1,
                         std::int64_t first_step = 0)
       : controls_(controls), steps_per_row_(steps_per_row), first_step_(first_step) {}
@@ -56,16 +58,16 @@ class SceneProgram : public EpisodeProgram {
   std::int64_t first_step_;
 };
 
-/// A task's, played by a policy: a row is an action.
+/// The program of a task, played by a policy. A row is an action.
 class TaskProgram : public EpisodeProgram {
  public:
   enum class AtEnd {
     hold,   ///< an environment whose episode is over keeps its last state
-    again,  ///< it starts another one, as those of a VectorTask do
+    again,  ///< it starts another one, as in a VectorTask
   };
-  /// Of the environments of `data`, which programs of several threads may share. `in_turn`: so many
-  /// blocks are taken through a step before any of them through the next. Task and policy must
-  /// outlive it.
+  /// Plays the environments of `data`, which programs of several threads may share. `in_turn`: the
+  /// number of blocks that take a step before any of them takes the next. Task and policy must
+  /// outlive this object.
   TaskProgram(const Task& task, const Policy& policy, std::shared_ptr<EnvironmentData> data,
               Precision precision, int in_turn = 1, AtEnd at_end = AtEnd::hold);
 
@@ -81,11 +83,11 @@ class TaskProgram : public EpisodeProgram {
 
   [[nodiscard]] const Task& task() const { return task_; }
   [[nodiscard]] const EnvironmentData& data() const { return *data_; }
-  /// Of all blocks until now.
+  /// Counts over all blocks so far.
   [[nodiscard]] const VectorCounts& counts() const { return counts_; }
   void clear_counts() { counts_ = {}; }
 
-  /// Simulation steps of a whole episode, an opening included.
+  /// Simulation steps of a whole episode, opening included.
   static std::int64_t steps(const TaskSpec& spec);
 
  private:
@@ -97,7 +99,7 @@ class TaskProgram : public EpisodeProgram {
   const Task& task_;
   const Policy& policy_;
   std::shared_ptr<EnvironmentData> data_;
-  std::vector<BlockWorker> workers_;  // what each saw last of its block is in it
+  std::vector<BlockWorker> workers_;  // each holds what it last saw of its block
   std::vector<double> actions_;       // (E, action)
   AtEnd at_end_;
   VectorCounts counts_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Row j: what is observed before action j, then the action, held or followed for K steps. The row
-// after the last action is observed only.
+// Row j holds the observations before action j and the action, which is held or followed for K
+// steps. The row after the last action has observations only.
 #include "tasks/run/episode_slot.hpp"
 
 #include <fmt/format.h>
@@ -19,7 +19,7 @@ std::size_t number_bytes(const EpisodeOptions& options) {
   return options.precision == Precision::mixed ? sizeof(float) : sizeof(double);
 }
 
-/// Of one row of one episode in a slot's buffers.
+/// Bytes of one row of one episode in a slot's buffers.
 double row_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
   double bytes = static_cast<double>(source.action + (source.whole ? 1 : 0)) * sizeof(float);
   for (const std::size_t width : source.widths)
@@ -27,8 +27,8 @@ double row_bytes(const EpisodeSource& source, const EpisodeOptions& options) {
   return bytes;
 }
 
-/// Multiples of 64, below that powers of two: whoever stores rows in chunks of such sizes gets
-/// whole ones.
+/// Rounds down to a multiple of 64, below 64 to a power of two. Chunks of such sizes are then
+/// whole.
 int whole_rows(int most) {
   constexpr int kRows = 64;
   if (most >= kRows) return most / kRows * kRows;
@@ -37,8 +37,8 @@ int whole_rows(int most) {
   return rows;
 }
 
-/// Every action is held for K steps, so the controls may not change in between. The kinds of
-/// control change at the same steps in every episode, so one is looked at.
+/// Every action is held for K steps, so the controls must not change within them. Each kind of
+/// control changes at the same steps in every episode, so checking one episode is enough.
 void check_held(const ControlProgram& controls, const EpisodeOptions& options, int nu) {
   std::vector<double> action(as_size(nu)), u(as_size(nu));
   for (std::int64_t t = 0; options.every > 1 && t < options.steps; ++t) {
@@ -109,7 +109,7 @@ int piece_rows(const EpisodeSource& source, const EpisodeOptions& options) {
   if (source.whole) return static_cast<int>(source.rows) + 1;
   const double fitting =
       static_cast<double>(options.piece_bytes) / (kBlockEpisodes * row_bytes(source, options));
-  constexpr std::int64_t kMostRows = 1 << 20;  // rows without numbers still are counted by an int
+  constexpr std::int64_t kMostRows = 1 << 20;  // an int counts rows even if they hold no numbers
   const auto rows = static_cast<int>(
       std::clamp(fitting, 1.0, static_cast<double>(std::min(source.rows + 1, kMostRows))));
   return rows <= source.rows ? whole_rows(rows) : rows;
@@ -199,7 +199,7 @@ std::int64_t EpisodeSlot<T>::environment_steps() const {
   return task != nullptr ? task->counts().environment_steps : tally_->environment_steps;
 }
 
-/// Of episodes that are over: no more.
+/// Skips episodes that are over.
 template <class T>
 void EpisodeSlot<T>::observe(int row) {
   for (int e = 0; e < batch_->environments(); ++e) {
@@ -265,7 +265,7 @@ bool EpisodeSlot<T>::act(int row, const StopRequest& stop) {
   return true;
 }
 
-/// The controls of step `from` are in place if it begins a row.
+/// If step `from` begins a row, its controls are already in place.
 template <class T>
 bool EpisodeSlot<T>::take_steps(std::int64_t from, std::int64_t count, const StopRequest& stop) {
   const bool asked = from >= program_->opening_steps();
@@ -279,7 +279,7 @@ bool EpisodeSlot<T>::take_steps(std::int64_t from, std::int64_t count, const Sto
   return true;
 }
 
-/// As it was taken: within its bounds.
+/// Keeps the action as taken, within its bounds.
 template <class T>
 void EpisodeSlot<T>::keep_action(int row) {
   const TaskProgram* const task = program_->judged();
@@ -295,7 +295,7 @@ void EpisodeSlot<T>::keep_action(int row) {
   }
 }
 
-/// How the block's episodes ended.
+/// Collects how the block's episodes ended.
 template <class T>
 void EpisodeSlot<T>::collect() {
   if (const TaskProgram* const task = program_->judged()) {
@@ -313,7 +313,7 @@ void EpisodeSlot<T>::collect() {
   }
 }
 
-/// Of a task: the first step of the action that could not be carried through.
+/// For a task: the first step of the action that failed.
 template <class T>
 std::int64_t EpisodeSlot<T>::step_of_failure(int episode) const {
   if (!ends_.empty())

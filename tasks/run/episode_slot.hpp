@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A place for one block on its way: its batch, a stepper and a readout, and the rows of one piece.
-// Made once and used for block after block; only begin() allocates.
+// Holds one block while it is processed: its batch, a stepper, a readout, and the rows of one
+// piece. It is made once and used for block after block; only begin() allocates.
 #pragma once
 
 #include <cstdint>
@@ -18,58 +18,59 @@ namespace tangere {
 
 inline constexpr int kBlockEpisodes = 16;  // lanes of a block of a Batch: one stepper's work
 
-/// What is played: a scene's or a task's program, and what its rows hold. What it was made of must
-/// outlive it.
+/// What is played: the program of a scene or a task, and what its rows hold. The objects that it
+/// was made from must outlive it.
 struct EpisodeSource {
   const Model* model = nullptr;
   StepperOptions solver;
-  std::int64_t rows = 0;         ///< R, actions of an episode at most
-  std::size_t action = 0;        ///< numbers of one
-  std::size_t first_sensor = 0;  ///< place of its fields in widths
-  /// Numbers of a row of q, v, then of a scene its end effectors, if it has any, and every sensor's
-  /// field; of a task its observations.
+  std::int64_t rows = 0;         ///< R, actions of an episode, at most
+  std::size_t action = 0;        ///< numbers in one action
+  std::size_t first_sensor = 0;  ///< index of its field in widths
+  /// Numbers in a row of q and of v. Then, for a scene, of the end effectors if there are any and
+  /// of every sensor's field; for a task, of each observation.
   std::vector<std::size_t> widths;
-  /// Episodes end when they like: only then is it known how long they are, so their blocks are
-  /// handed on whole and in ascending order.
+  /// Episodes may end at any time. Their length is then known only at the end, so their blocks
+  /// leave whole and in ascending order.
   bool whole = false;
-  /// For one block of a batch.
+  /// Makes the program for one block of a batch.
   std::function<std::unique_ptr<EpisodeProgram>(const Batch&)> program;
 };
 
-/// Throws InputError when steps is no multiple of every, or the controls are too short, were laid
-/// out for another timestep, or change while an action is held.
+/// Throws InputError when steps is no multiple of every, and when the controls are too short, were
+/// laid out for another timestep, or change while an action is held.
 EpisodeSource source_of(const Model& model, const StepperOptions& solver,
                         const ControlProgram& controls, const EpisodeOptions& options);
 EpisodeSource source_of(const Task& task, const Policy& policy, const EpisodeOptions& options);
 
-/// The same without a program: what memory is reckoned by.
+/// Returns the same without a program, to compute memory sizes.
 EpisodeSource shape_of(const Model& model, const EpisodeOptions& options);
 EpisodeSource shape_of(const Task& task);
 
-/// Rows of a piece, fewer at the end: as many as fit, at least one; all of them where blocks come
-/// whole.
+/// Rows of a piece: as many as fit, at least one; all of them if blocks leave whole. The last piece
+/// may have fewer.
 int piece_rows(const EpisodeSource& source, const EpisodeOptions& options);
 /// Buffers of one slot [bytes].
 double piece_bytes(const EpisodeSource& source, const EpisodeOptions& options);
 
-/// T: what numbers leave as, double or float.
+/// T: type of the numbers in pieces, double or float.
 template <class T>
 class EpisodeSlot {
  public:
   EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& options);
 
-  /// Starts a block: the episodes of `range`, 16 at most.
+  /// Starts a block with the episodes of `range`, at most 16.
   void begin(EpisodeRange range);
-  /// Steps through the rows of the next piece; `told` gets the environment steps of each. False:
-  /// `stop` wanted it to end, the piece is void.
+  /// Steps through the rows of the next piece. `told` gets the environment steps of each. Returns
+  /// false if `stop` ended it; the piece is then void.
   [[nodiscard]] bool simulate(const StopRequest& stop,
                               const std::function<void(std::int64_t)>& told);
 
   [[nodiscard]] EpisodeRows piece() const;  ///< valid until the next simulate()
   [[nodiscard]] bool last() const { return next_row_ > source_.rows; }  ///< of the block's pieces
-  /// Of the whole block, after its last piece: what it adds to a run, returns as their sum.
+  /// Adds the results of the whole block to the run's summary, with returns as a sum. Call it after
+  /// the last piece.
   void add_to(EpisodeSummary& summary) const;
-  /// Ascending.
+  /// In ascending order.
   [[nodiscard]] const std::vector<FailedEpisode>& failures() const { return failures_; }
 
  private:
@@ -97,7 +98,7 @@ class EpisodeSlot {
   int rows_ = 0, action_rows_ = 0;      // of the piece
   std::vector<double> randomized_;      // (episodes, what varies)
   std::vector<double> u_;               // (episodes, nu)
-  std::vector<double> small_;           // of one episode, before it is converted
+  std::vector<double> small_;           // one episode, before conversion
   std::vector<std::vector<T>> values_;  // per name: (episodes, rows, width)
   std::vector<float> actions_;          // (episodes, action rows, action)
   std::vector<float> rewards_;          // of a task: (episodes, action rows)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The flow graph. A block owns its slot from the limiter to its last piece, so memory is bounded by
-// the limiter and no piece waits for another block's: the sink has a place for each.
+// The flow graph. A block owns its slot from the limiter to its last piece, so the limiter bounds
+// the memory. No piece waits for another block, because the sink has a place for each.
 #include "tasks/run/episodes.hpp"
 
 #include <fmt/format.h>
@@ -19,6 +19,7 @@
 
 #include "tasks/run/busy_time.hpp"
 #include "tasks/run/episode_slot.hpp"
+#include "tasks/run/thread_probe.hpp"
 #include "tasks/run/tsan_order.hpp"
 
 namespace tangere {
@@ -36,7 +37,7 @@ void check(const EpisodeOptions& options) {
   check_at_least_one("blocks in flight", options.blocks_in_flight);
 }
 
-/// As many slots as blocks may be in flight, made when first needed.
+/// Slots for the blocks in flight, made when first needed.
 template <class Slot>
 class SlotPool {
  public:
@@ -68,15 +69,15 @@ class SlotPool {
   std::vector<Slot*> free_;
 };
 
-/// A block on its way; without a slot until it is first simulated.
+/// A block on its way. It has no slot until it is first simulated.
 template <class T>
 struct Traveller {
-  std::size_t number = 0;  // of blocks
+  std::size_t number = 0;  // counts blocks
   EpisodeRange range;
   EpisodeSlot<T>* slot = nullptr;
 };
 
-/// T: what numbers leave as.
+/// T: type of the numbers in pieces.
 template <class T>
 class EpisodeGraph {
  public:
@@ -138,7 +139,7 @@ class EpisodeGraph {
 
  private:
   void wait_for_all(flow::input_node<Traveller<T>>& blocks) {
-    struct AtEnd {  // also where waiting throws
+    struct AtEnd {  // runs also if waiting throws
       EpisodeGraph& run;
       ~AtEnd() {
         run.order_.end();
@@ -198,7 +199,7 @@ class EpisodeGraph {
     progress_(steps_ += steps);
   }
 
-  /// True when that was the block's last piece.
+  /// Returns true if that was the block's last piece.
   bool write(const Traveller<T>& t) {
     const TsanOrder::Task writer(order_, &summary_), task(order_, t.slot);
     const Stopwatch watch(writing_);
@@ -232,7 +233,8 @@ class EpisodeGraph {
 EpisodeSummary run(const EpisodeSource& source, const EpisodeOptions& options, EpisodeSink& sink,
                    const EpisodeProgress& progress, const StopRequest& stop) {
   const auto start = std::chrono::steady_clock::now();
-  // More threads than cores need both; the same bits at any number are tested that way.
+  require_threads(options.threads);
+  // More threads than cores need both. Tests use that to compare bits at any number of threads.
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(options.threads));
   tbb::task_arena arena(options.threads);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers of many environments lie in one list, as many for each.
+// Access to one list that holds the numbers of many environments, the same number for each.
 #pragma once
 
 #include <span>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Policies without state: an action follows from the view alone.
+// Policies without state: the action depends on the view alone.
 #include "tasks/run/policy.hpp"
 
 #include <fmt/format.h>

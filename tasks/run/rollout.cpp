@@ -61,7 +61,7 @@ class Recorder {
     sink_.write(StateRow{step, time, q_, v_, pose_, twist_, end_effectors_});
   }
 
-  /// Step `step` has been taken and not been counted yet.
+  /// Writes step `step`, which has been taken but not counted yet.
   void write_step(std::int64_t step, std::span<const double> u, const StepTally& tally) {
     for (int e = 0; e < environments_; ++e) {
       const auto i = static_cast<std::size_t>(e);
@@ -104,7 +104,8 @@ void check(const RolloutOptions& options) {
                      "; expected 0 or more");
 }
 
-/// What the action came to that ends with step `step`, if it is none of an opening.
+/// Writes the result of the action that ends with step `step`, unless the step belongs to an
+/// opening.
 void write_action(EpisodeProgram& program, std::int64_t step, RowSink& sink) {
   const TaskProgram* const task = program.judged();
   if (task == nullptr || step < task->opening_steps()) return;
@@ -160,7 +161,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
     for (int b = 0; b < batch.blocks(); ++b) body(b);
   };
 
-  // Times come from the counter, so that they do not drift.
+  // Times come from the step counter, so they do not drift.
   const auto time = [&](std::int64_t row) {
     return static_cast<double>(options.first_step + row) * stepper.timestep();
   };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One unattended rollout of a batch: controls in, every row out. Serial: for many episodes on many
-// threads, tasks/run/episodes.hpp.
+// Runs a batch once: takes controls and writes every row. It is serial; tasks/run/episodes.hpp runs
+// many episodes on many threads.
 #pragma once
 
 #include <cstdint>
@@ -18,15 +18,15 @@ namespace tangere {
 
 struct RolloutOptions {
   std::int64_t steps = 0;
-  int every = 0;  ///< tactile every k-th step; 0: the scene's `every`, or 1 where it has none
+  int every = 0;  ///< steps between fields; 0: the scene's `every`, or 1 if it has none
   Precision precision = Precision::f64;  ///< of tactile fields
-  /// Steps taken before row 0, by a run that this one continues: counted in times, controls and the
-  /// rhythm of fields.
+  /// Steps taken before row 0 by the run that this one continues. Times, controls and intervals of
+  /// fields count them.
   std::int64_t first_step = 0;
 };
 
 struct RolloutSummary {
-  std::int64_t steps = 0;              ///< done: fewer than asked when the caller stopped it
+  std::int64_t steps = 0;              ///< done; fewer than requested if the caller stopped it
   std::int64_t environment_steps = 0;  ///< tried, failing ones included
   std::int64_t newton_iterations = 0;
   std::int64_t split_steps = 0;
@@ -35,27 +35,27 @@ struct RolloutSummary {
   double seconds = 0;                       ///< wall clock of the whole rollout, sink included
 };
 
-/// Called after each step with the number done; returns false to stop at this safe point.
+/// Is called after each step with the number of steps done. False stops the run at this safe point.
 using RolloutProgress = std::function<bool(std::int64_t done)>;
 
 /// Steps the batch and hands every row to the sink: row 0 of the state, then for each step its
-/// StepRow, of a task the ActionRow that it ends, the StateRow after it and the tactile rows due.
-/// Rows of a tactile sensor are read after steps K, 2K, …: field k comes from row (k + 1) K of q.
-/// In a StepRow, an environment that failed earlier has 0 iterations and its last status and
-/// residual. `program` has started every block and takes all of them through a step in turn. Throws
-/// InputError when steps < 1, every < 0, first_step < 0, and passes on what the sink throws.
+/// StepRow, the ActionRow if it ends a task's action, the StateRow after it, and the tactile rows
+/// due. A tactile sensor is read after steps K, 2K, …, so field k comes from row (k + 1) K of q. In
+/// a StepRow, an environment that failed earlier has 0 iterations and its last status and residual.
+/// `program` must have started every block; it takes all of them through a step in turn. Throws
+/// InputError when steps < 1, every < 0 or first_step < 0. Passes on what the sink throws.
 RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& program,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});
-/// Of a scene. Throws InputError as well when a table of controls is too short or was laid out for
-/// another timestep.
+/// Does the same for a scene. Also throws InputError when a table of controls is too short or was
+/// laid out for another timestep.
 RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram& controls,
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});
 
-/// The step between fields of a sensor under these options.
+/// Steps between the fields of a sensor under these options.
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options);
-/// Fields that a rollout reads of a sensor.
+/// Number of fields that a rollout reads of a sensor.
 std::int64_t tactile_frames(const SensorInfo& sensor, const RolloutOptions& options);
 
 /// Memory that a rollout allocates besides batch and stepper [bytes].

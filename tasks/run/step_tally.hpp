@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What steps took and which environments failed in them, counted in one way for rollouts, episodes,
+// Counts what steps took and which environments failed in them, in one way for rollouts, episodes,
 // benchmarks and gradients.
 #pragma once
 
@@ -12,14 +12,14 @@
 
 namespace tangere {
 
-/// An environment that no solution was found for. It keeps the state before that step.
+/// An environment for which no solution was found. It keeps the state before that step.
 struct FailedEnvironment {
   int environment;
-  std::int64_t step;  ///< the first that failed, -1: before this run
+  std::int64_t step;  ///< the first that failed; -1: before this run
   StepStatus status;  ///< why
 };
 
-/// Environments of a block.
+/// Number of environments in a block.
 inline int lanes_of(const Batch& batch, int block) {
   return std::min(kernels::kBlock, batch.environments() - block * kernels::kBlock);
 }
@@ -30,7 +30,7 @@ struct StepTally {
   std::int64_t split_steps = 0;
   std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
 
-  /// Of `environments` from number `first` on, before the first step.
+  /// Counts `environments` environments from number `first` on. Construct it before the first step.
   StepTally(const Batch& batch, int first, int environments)
       : first_(first), live_(static_cast<std::size_t>(environments)) {
     for (int e = first; e < first + environments; ++e) {
@@ -39,13 +39,13 @@ struct StepTally {
     }
   }
 
-  /// Whether an environment takes, or has just taken and not yet counted, a step.
+  /// Whether an environment takes a step, or has just taken one that is not counted yet.
   [[nodiscard]] bool steps(const Batch& batch, int environment) const {
     return live_[lane(environment)] && !batch.held(environment);
   }
   [[nodiscard]] bool live(int environment) const { return live_[lane(environment)]; }
 
-  /// After step `step`.
+  /// Counts step `step` after it was taken.
   void count(const Batch& batch, std::int64_t step) {
     for (int e = first_; e < first_ + static_cast<int>(live_.size()); ++e) {
       if (!steps(batch, e)) continue;

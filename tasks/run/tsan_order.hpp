@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What oneTBB orders, told to the thread sanitizer: it cannot see into the distribution's library,
-// which is not built with it, and would call every hand-over a race. Nothing in other builds. Says
-// no more than oneTBB promises (a task starts after what spawned it, a graph's message arrives
-// after it was sent, waiting ends after all tasks), so real races are still found.
+// Tells the thread sanitizer what oneTBB orders. The distribution's library is not built with the
+// sanitizer, so it would report every hand-over as a race. In other builds this does nothing. It
+// states no more than oneTBB promises (a task starts after what spawned it, a graph's message
+// arrives after it was sent, waiting ends after all tasks), so real races are still found.
 #pragma once
 
 #include <utility>
@@ -13,7 +13,7 @@
 
 namespace tangere {
 
-/// A function as oneTBB may copy it from task to task: a pointer is all that is copied.
+/// A function that oneTBB may copy from task to task. Only a pointer is copied.
 template <class Function>
 struct ByReference {
   const Function* function;
@@ -25,7 +25,7 @@ struct ByReference {
 template <class Function>
 ByReference(const Function*) -> ByReference<Function>;
 
-/// What this thread did until now comes before what others do after tsan_acquire() of the same
+/// Orders what this thread did so far before what others do after tsan_acquire() of the same
 /// address.
 inline void tsan_release([[maybe_unused]] const void* address) {
 #if defined(__SANITIZE_THREAD__)
@@ -39,9 +39,9 @@ inline void tsan_acquire([[maybe_unused]] const void* address) {
 #endif
 }
 
-/// After graph.wait_for_all(): what the graph itself did in other threads, the last of it after our
-/// bodies, is over. Its tasks count themselves off in the header, so touching the counter here is
-/// enough.
+/// Orders what the graph itself did in other threads, some of it after our bodies, before what
+/// follows. Call it after graph.wait_for_all(). The graph's tasks decrement a counter in its
+/// header, so touching this counter is enough.
 template <class Graph>
 void tsan_acquire_tasks_of([[maybe_unused]] Graph& graph) {
 #if defined(__SANITIZE_THREAD__)
@@ -50,17 +50,16 @@ void tsan_acquire_tasks_of([[maybe_unused]] Graph& graph) {
 #endif
 }
 
-/// The tasks of one wait: each starts after begin(), and end() comes after all of them.
+/// Orders the tasks of one wait: each starts after begin(), and end() comes after all of them.
 class TsanOrder {
  public:
   void begin() const { tsan_release(&begin_); }
-  /// First thing in a task whose function itself, with what it captured, lives where begin() was
+  /// Call it first in a task whose function object, with its captures, was made where begin() was
   /// called.
   static void arrive() { tsan_acquire(&begin_); }
   void end() const { tsan_acquire(&end_); }
 
-  /// While a task runs. `mine`: what tasks hand from one to the next and none uses at the same time
-  /// as another.
+  /// Lives while a task runs. `mine`: data that tasks hand on and never use at the same time.
   class Task {
    public:
     Task(const TsanOrder& order, const void* mine) : order_(order), mine_(mine) {
@@ -80,7 +79,7 @@ class TsanOrder {
   };
 
  private:
-  static inline char begin_ = 0;  // addresses matter, nothing is in them
+  static inline char begin_ = 0;  // only the addresses matter
   char end_ = 0;
 };
 

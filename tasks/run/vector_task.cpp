@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A thread takes a block of 16 environments through one action: start those whose episode is over,
-// step, look, judge.
+// A thread takes a block of 16 environments through one action: it starts new episodes, steps,
+// looks and judges.
 #include "tasks/run/vector_task.hpp"
 
 #include <algorithm>

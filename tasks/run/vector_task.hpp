@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many environments of one task, stepped together: each has its own episode, clock and numbers that
-// vary, and starts its next episode by itself. The contract is that of Gymnasium's vector interface
-// with next-step autoreset.
+// Many environments of one task, stepped together. Each has its own episode, clock and varying
+// numbers, and starts its next episode by itself. The interface follows Gymnasium's vector
+// interface with next-step autoreset.
 #pragma once
 
 #include <cstdint>
@@ -19,25 +19,24 @@ struct VectorOptions {
   std::int64_t first_episode = 0;  ///< of environment 0
   int threads = 1;
   Precision precision = Precision::mixed;  ///< of tactile fields
-  /// After its end an environment starts another episode; else it keeps its last state and shows it
-  /// again.
+  /// Whether an environment starts another episode after its end. If not, it keeps its last state
+  /// and shows it again.
   bool autoreset = true;
 };
 
 /// Counts of the steps taken since the last reset(seed), over all environments.
 struct VectorCounts {
-  std::int64_t environment_steps = 0;  ///< actions taken, those of openings left out
+  std::int64_t environment_steps = 0;  ///< actions taken, without those of openings
   std::int64_t simulation_steps = 0;
   std::int64_t newton_iterations = 0, split_steps = 0;
 };
 
-/// Environment e plays episodes first + e, first + e + E, first + e + 2 E … What happens in an
-/// episode depends on the task, the seed, its number and the actions alone, not on E, threads, or
-/// what the neighbours do.
+/// Environment e plays episodes first + e, first + e + E, first + e + 2 E … An episode depends only
+/// on the task, the seed, its number and the actions, not on E, threads, or the other environments.
 class VectorTask {
  public:
-  /// `task` must outlive it. Makes E environments and resets them. Throws InputError when E or
-  /// threads is below 1.
+  /// Makes E environments and resets them. `task` must outlive this object. Throws InputError when
+  /// E or threads is below 1.
   VectorTask(const Task& task, int environments, const VectorOptions& options = {});
   ~VectorTask();
   VectorTask(VectorTask&&) noexcept;
@@ -45,14 +44,14 @@ class VectorTask {
 
   /// Starts the first episodes of a seed.
   void reset(std::uint64_t seed);
-  /// One action of every environment, (E, action). An environment whose episode ended in the step
-  /// before ignores its action and shows the start of its next one instead, with reward 0. Actions
-  /// are clipped to their bounds; one that is not a number fails its environment.
+  /// Takes one action of every environment, (E, action). An environment whose episode ended in the
+  /// step before ignores its action and shows the start of its next episode, with reward 0. Actions
+  /// are clipped to their bounds. An action that is not a number fails its environment.
   void step(std::span<const double> actions);
 
   [[nodiscard]] const Task& task() const;
   [[nodiscard]] int environments() const;
-  /// Views of what reset and step left behind; they stay in place as long as the object.
+  /// Views of the results of the last reset or step. They stay valid as long as the object.
   [[nodiscard]] std::span<const double> observations() const;  ///< (E, observation)
   [[nodiscard]] std::span<const double> observation(int environment) const;
   [[nodiscard]] std::span<const double> actions()
@@ -61,23 +60,23 @@ class VectorTask {
   [[nodiscard]] std::span<const std::uint8_t> terminated()
       const;  ///< (E) the episode ended: 0 or 1
   [[nodiscard]] std::span<const std::uint8_t> truncated()
-      const;  ///< (E) it ran out of time, or could not be solved
+      const;  ///< (E) it ran out of time or had no solution
   [[nodiscard]] std::span<const std::uint8_t> success() const;   ///< (E)
   [[nodiscard]] std::span<const std::uint8_t> starting() const;  ///< (E) the step was a reset
   [[nodiscard]] std::span<const double> returns()
-      const;  ///< (E) sum of the episode's rewards until now
-  [[nodiscard]] std::span<const std::int64_t> lengths() const;   ///< (E) its actions until now
+      const;  ///< (E) sum of the episode's rewards so far
+  [[nodiscard]] std::span<const std::int64_t> lengths() const;   ///< (E) its actions so far
   [[nodiscard]] std::span<const std::int64_t> episodes() const;  ///< (E) its number
-  /// Whose simulation failed: that ends the episode as truncated, with the reward of the last state
+  /// Status of the simulation. A failure truncates the episode, with the reward of the last state
   /// that was found.
   [[nodiscard]] StepStatus status(int environment) const;
-  /// What a policy with access to the state looks at: q, v and the task's memory, now.
+  /// What a policy with access to the state looks at: the current q, v and memory of the task.
   [[nodiscard]] TaskView view(int environment) const;
   [[nodiscard]] VectorCounts counts() const;
   /// The states themselves.
   [[nodiscard]] const Batch& batch() const;
 
-  /// Memory of it [bytes].
+  /// Memory that a VectorTask takes [bytes].
   static double bytes(const Task& task, int environments, int threads);
 
  private:

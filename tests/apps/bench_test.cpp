@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `tangere bench` as users meet it: its keys, its files, its refusals. No test looks at how long
-// anything took.
+// Tests `tangere bench` as users see it: its keys, its files, its refusals. No test looks at how
+// long anything took.
 #include <gmock/gmock.h>
 #include <tinyxml2.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every subcommand promises: help with an example that works, one JSON object, exit codes that
-// say whose fault it is, messages that name the nearest word, and nothing half-done left behind.
+// Tests what every subcommand promises: help with an example that works, one JSON object, exit
+// codes that say whose mistake it is, messages that name the nearest word, and nothing half-written
+// left.
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
@@ -208,8 +209,8 @@ INSTANTIATE_TEST_SUITE_P(
                 2,
                 "expected another file"},
         Mistake{"controls_missing", simulate({"--controls", "nowhere.csv"}), 3, "nowhere.csv"},
-        Mistake{"controls_endless", simulate({"--controls", "/dev/zero"}), 2,
-                "/dev/zero:1: line longer"},
+        Mistake{"controls_endless", simulate({"--controls", "/dev/zero"}), 3,
+                "/dev/zero: is a device; expected a csv file"},
         Mistake{"plot_missing", {"plot", "nowhere.h5", "-o", "x.svg"}, 3, "nowhere.h5"},
         Mistake{"plot_no_trajectory",
                 {"plot", scene("rolling_ball_small.xml"), "-o", "x.svg"},

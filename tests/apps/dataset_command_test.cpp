@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// validate, info, merge and export: what they say of a data set that is whole, and of one that is
-// not.
+// Tests what validate, info, merge and export say of a complete data set and of a damaged one.
 #include <gmock/gmock.h>
 
 #include <sys/resource.h>
@@ -48,12 +47,12 @@ class DatasetCommand : public testing::Test {
     const json object = json::parse(outcome.out);
     EXPECT_EQ(object.at("command"), words[0]);
     json known = object;
-    known.erase("settings");  // names of attributes and datasets: docs/datasets.md has them
+    known.erase("settings");  // names of attributes and datasets, described in docs/datasets.md
     known.erase("datasets");
     EXPECT_THAT(undocumented_keys(known), IsEmpty());
     return object;
   }
-  /// Changes a number of a shard behind its back.
+  /// Changes a number of a shard without updating its checksum.
   void spoil(const std::string& shard, const std::string& dataset, float value) const {
     const hid_t file = H5Fopen(folder_.path("set/" + shard).c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
     const hid_t id = H5Dopen2(file, dataset.c_str(), H5P_DEFAULT);
@@ -143,7 +142,7 @@ TEST_F(DatasetCommand, MergedItIsOneFileOfLinksOrOfCopies) {
   EXPECT_EQ(merged.at("valid"), 4);
   EXPECT_EQ(answer({"merge", "set"}, 3).at("error"),
             "'set/robomimic.hdf5' exists already; give --overwrite to replace it");
-  // Links lead on where the folder is moved, and shards cannot be missed in silence.
+  // Links still work after the folder moves, and a missing shard is an error.
   fs::rename(folder_.path("set"), folder_.path("moved"));
   EXPECT_EQ(answer({"validate", "moved/robomimic.hdf5"}).at("rows"), 160);
   EXPECT_EQ(answer({"info", "moved/robomimic.hdf5"}).at("settings"),
@@ -216,7 +215,7 @@ TEST_F(DatasetCommand, MergedDemosHaveNextObservationsAndAllThatTheirShardsSay) 
 
 TEST_F(DatasetCommand, NextObservationsThatAreNotThoseOfTheNextRowAreAProblem) {
   answer({"merge", "set"});
-  // Those of another demo.
+  // Puts the numbers of another demo there.
   const hid_t file = H5Fopen(folder_.path("set/robomimic.hdf5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
   const hid_t group = H5Gopen2(file, "data/demo_3/next_obs", H5P_DEFAULT);
   const hid_t other = H5Gopen2(file, "data/demo_4/next_obs", H5P_DEFAULT);
@@ -254,8 +253,8 @@ TEST_F(DatasetCommand, MergedFilesGrowByTheSameForEachEpisode) {
       EXPECT_NEAR(then, first, 0.02 * first) << "bytes per episode";
       EXPECT_LT(then, 2000);
     }
-  if (kSanitized) return;  // it keeps what was freed
-  // Seven thousand episodes more; whoever kept 5 kB of each would need 35 MB.
+  if (kSanitized) return;  // a sanitizer keeps freed memory
+  // There are seven thousand more episodes. If a command kept 5 kB of each, it would need 35 MB.
   EXPECT_LT(peak_memory() - memory, 32 << 20) << "from " << memory;
 }
 
@@ -286,7 +285,7 @@ TEST_F(DatasetCommand, TheViewForMinariShowsTheSameNumbers) {
   EXPECT_EQ(metadata.at("total_episodes"), 40);
   EXPECT_EQ(metadata.at("total_steps"), 160);
   EXPECT_THAT(metadata.at("observation_space").get<std::string>(), HasSubstr("-Infinity"));
-  // One file at a time: the library follows no link to a file that is open in another way.
+  // Opens one file at a time: the library follows no link to a file that is open in another mode.
   const auto read = [&](const std::string& file_name, const std::string& name) {
     const h5::Id file = h5::open_file(folder_.path(file_name)),
                  dataset = h5::open_dataset(file, name);

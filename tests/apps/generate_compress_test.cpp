@@ -121,7 +121,7 @@ TEST(GenerateCompress, EveryKindHoldsTheSameNumbers) {
   EXPECT_THAT(lz4.err, HasSubstr("plug-in"));
   EXPECT_THAT(layout_of(folder, "lz4", "data/demo_1/obs/pad").filters,
               ElementsAre(H5Z_FILTER_SHUFFLE, 32004));
-  // Copied as they are, and read through links.
+  // Copied unchanged, and read through links.
   EXPECT_EQ(run(folder, {"merge", "sparse-lz4", "--copy", "--overwrite"}).exit_code, 0);
   EXPECT_EQ(run(folder, {"validate", "sparse-lz4/robomimic.hdf5"}).exit_code, 0);
   EXPECT_EQ(run(folder, {"merge", "sparse-none", "--overwrite"}).exit_code, 0);

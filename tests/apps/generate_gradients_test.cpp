@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Derivatives in data sets: those of the library, the same bytes on any number of threads, checked,
-// compared and refused.
+// Tests derivatives in data sets: they equal those of the library and have the same bytes on any
+// number of threads; they are checked, compared and refused.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -116,7 +116,7 @@ TEST(GenerateGradients, OfASceneAreOfALossByItsActions) {
   EXPECT_THAT(read(file, 1, "loss").values, ElementsAre(g.value[1]));
 }
 
-/// One step per row: then a row's Jacobian is that of its step.
+/// With one step per row, a row's Jacobian is that of its step.
 TEST(GenerateGradients, JacobiansOfRowsAreThoseOfSteps) {
   const Folder folder;
   const Words words{kBox, "--episodes", "2", "--steps", "60", "--gradients", "jacobians"};
@@ -207,7 +207,7 @@ TEST(GenerateGradients, AreCheckedAndCompared) {
   EXPECT_THAT(examine_shard(shard).problems, testing::Not(IsEmpty()));
 }
 
-/// What is no demo has no derivatives either.
+/// Failed episodes are no demos and have no derivatives either.
 TEST(GenerateGradients, FailedEpisodesLeaveNone) {
   const Folder folder;
   std::string text = file_bytes(kSmall);
@@ -223,8 +223,8 @@ TEST(GenerateGradients, FailedEpisodesLeaveNone) {
   }
 }
 
-/// However observations are stored, derivatives are the same numbers, contiguous, with what they
-/// mean.
+/// However observations are stored, derivatives are the same contiguous numbers with the same
+/// descriptions.
 TEST(GenerateGradients, AreTheSameBesideAnyObservations) {
   const Folder folder;
   const Words task{"dummy", "--episodes", "20", "--gradients", "return"};
@@ -267,7 +267,7 @@ TEST(GenerateGradients, AreTheSameBesideAnyObservations) {
   }
 }
 
-/// What is done between simulation and disk is called by what was asked for, no more and no less.
+/// The report names the requested work between simulation and disk, no more and no less.
 TEST(GenerateGradients, SayWhatTheyWereMadeWith) {
   const std::vector<std::pair<Words, std::string>> ways{
       {{}, "checksums"},

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A shared folder whose shards are replaced one by one: what shows them as one is never of two
-// runs, nor made while they change.
+// Tests a shared folder whose shards are replaced one by one. The merged files never mix two runs,
+// and are not made while shards change.
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A data set cut into shards: the same by one process or by several, at once or in turns, and never
-// of two minds.
+// Tests a data set cut into shards. One process or several, at once or in turns, make the same set,
+// and never a mixture.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -101,7 +101,7 @@ TEST(GenerateShards, OneByOneOrByThreeProcessesTheyAreTheSame) {
   run_beside(folder, generate({"--threads", "2"}, "pmi"), three("PMI_RANK", "PMI_SIZE"));
   run_beside(folder, generate({"--threads", "1"}, "srun"),
              three("SLURM_PROCID", "SLURM_STEP_NUM_TASKS"));
-  // An array that begins at 4 and goes in steps of 2 is three tasks all the same.
+  // An array that begins at 4 with steps of 2 still has three tasks.
   std::vector<Words> array;
   for (const char* id : {"4", "6", "8"})
     array.push_back({std::string("SLURM_ARRAY_TASK_ID=") + id, "SLURM_ARRAY_TASK_COUNT=3",
@@ -143,7 +143,7 @@ TEST(GenerateShards, ResumeKeepsWhatIsThereAndMakesTheRest) {
   const json nothing = answer_of(run(folder, generate({"--resume", "--json"})));
   EXPECT_EQ(nothing.at("episodes"), 0);
   EXPECT_EQ(nothing.at("kept"), 5);
-  // A folder that is not there yet, and a task.
+  // A folder that does not exist yet, and a task.
   const Words task{"generate", "dummy",    "--output", "task",    "--episodes",
                    "40",       "--shards", "3",        "--resume"};
   ASSERT_EQ(run(folder, task).exit_code, 0);
@@ -218,7 +218,7 @@ TEST(GenerateShards, AreMergedByTheLastProcessAndNotBefore) {
   const json again = answer_of(run(folder, generate({"--json", "--resume"})));
   EXPECT_EQ(again.at("merged"), "set/robomimic.hdf5");
   EXPECT_EQ(again.at("minari_id"), "tangere/rolling_ball_small-v0");
-  // Of an earlier run nothing stays that could be taken for this one's.
+  // Nothing of an earlier run stays that could be mistaken for this one's.
   EXPECT_TRUE(answer_of(run(folder, generate({"--json", "--overwrite", "--no-merge"})))
                   .at("merged")
                   .is_null());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A data set whose run is killed or stopped at any moment holds whole shards and nothing that looks
-// like one.
+// Tests that a data set whose run is killed or stopped at any moment holds whole shards, and
+// nothing that only looks like one.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ using testing::IsEmpty;
 
 const std::string kFirst = "set/shard-00000.h5";
 
-/// A scene whose episodes take no time, so that a run spends it all on writing.
+/// A scene whose episodes take no time, so that a run spends all its time on writing.
 class GenerateStop : public testing::Test {
  protected:
   GenerateStop() {
@@ -39,7 +39,7 @@ class GenerateStop : public testing::Test {
 <randomize><joint name="a" q="0" uniform="-1 1"/></randomize></tangere>)");
   }
 
-  /// `generate` of a shard of 4096 episodes and what is left of `episodes`.
+  /// `generate` for one shard of 4096 episodes and another with the rest of `episodes`.
   static Words words(const std::string& episodes, const Words& more = {}) {
     Words all{"generate", "free.xml", "--output",  "set", "--episodes", episodes,
               "--steps",  "2",        "--threads", "2",   "--no-merge"};
@@ -47,7 +47,7 @@ class GenerateStop : public testing::Test {
     return all;
   }
 
-  /// After a minute the machine is not slow but broken.
+  /// Waits for a file. After a minute, something is broken.
   void wait_for(const std::string& name) const {
     const auto deadline = steady_clock::now() + std::chrono::minutes(1);
     while (!fs::exists(folder_.path(name))) {
@@ -56,7 +56,7 @@ class GenerateStop : public testing::Test {
     }
   }
 
-  /// Names of what is in the set; every shard is whole.
+  /// Names of the files in the set. Expects every shard to be whole.
   [[nodiscard]] std::vector<std::string> shards_and_parts() const {
     std::vector<std::string> names;
     if (!fs::exists(folder_.path("set"))) return names;
@@ -156,7 +156,7 @@ TEST_F(GenerateStop, APartOfAKilledRunIsCleanedWithoutAsking) {
     EXPECT_EQ(program.wait().signal, SIGKILL);
   }
   EXPECT_THAT(shards_and_parts(), testing::Contains("shard-00000.h5.part"));
-  // As if blocks of the next shard had overtaken: a .part that the next run does not write itself.
+  // A .part that the next run does not write itself, as if blocks of the next shard had overtaken.
   folder_.write("set/shard-00003.h5.part", "half");
   const Outcome next = run(folder_, words("40"));
   EXPECT_EQ(next.exit_code, 0) << next.err;
@@ -213,7 +213,7 @@ TEST_P(GenerateSignal, WithOverwriteOlderShardsGoWithTheFirstStepNotBefore) {
   const auto [signal, exit_code] = GetParam();
   ASSERT_EQ(run(folder_, words("40")).exit_code, 0);
   const std::map<std::string, std::string> before = bytes();
-  // An error that comes up before the first step, instead of a signal that could come too late.
+  // Uses an error before the first step, because a signal could come too late.
   EXPECT_EQ(run(folder_, words("40", {"--overwrite", "--every", "7"})).exit_code, 2);
   EXPECT_TRUE(bytes() == before);
   Program program(folder_, words(kManyShards, {"--overwrite"}));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `tangere generate` as users meet it: its keys, its shards, its refusals; the same bytes on any
-// number of threads.
+// Tests `tangere generate` as users see it: its keys, its shards, its refusals, and the same bytes
+// on any number of threads.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
@@ -115,7 +115,7 @@ TEST(Generate, SameBytesOnAnyNumberOfThreadsAndWhenRunTwice) {
       return folder.read("set/shard-00000.h5");
     };
     const std::string one = bytes("1");
-    // == : a megabyte that differs is no message.
+    // Uses ==, because a message with a megabyte of differences would not help.
     EXPECT_TRUE(bytes("1") == one) << precision;
     EXPECT_TRUE(bytes("2") == one) << precision;
     EXPECT_TRUE(bytes("4") == one) << precision;
@@ -156,7 +156,7 @@ TEST(Generate, ControlsComeFromATable) {
 }
 
 TEST(Generate, FailedEpisodesAreListedAndTheShardIsWhole) {
-  // No step of a day has a solution: the ball turns too far.
+  // No step of one day has a solution: the ball turns too far.
   const Folder folder;
   const std::string days = changed_scene(folder, "timestep=\"5e-3\"", "timestep=\"86400\"");
   const Words words{"--episodes", "25", "--steps", "2", "--every", "1"};
@@ -195,7 +195,8 @@ TEST(Generate, ShardsThatExistAreKeptUnlessOverwritten) {
   other.emplace_back("--overwrite");
   generate_json(folder, other);
   EXPECT_FALSE(folder.read("set/shard-00000.h5") == before);
-  // A shard of the older run is gone: nobody reads two data sets as one. What is no shard stays.
+  // A shard of the older run is gone, so nobody reads two data sets as one. Files that are no
+  // shards stay.
   EXPECT_FALSE(std::filesystem::exists(folder.path("set/shard-00007.h5")));
   EXPECT_EQ(folder.read("set/notes.txt"), "mine");
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The example as a user runs it: a table with four numbers within 1 %, a picture, and words for
-// what is wrong.
+// Tests the example as a user runs it: a table with four numbers within 1 %, a picture, and
+// messages for mistakes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

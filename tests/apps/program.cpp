@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// fork and exec: no shell comes between a test and what it says.
+// Uses fork and exec, so that no shell interprets the arguments of a test.
 #include "tests/apps/program.hpp"
 
 #include <fcntl.h>
@@ -33,11 +33,11 @@ void redirect(const std::string& path, int descriptor) {
   close(file);
 }
 
-/// In the child, between fork and exec.
+/// Runs in the child, between fork and exec.
 [[noreturn]] void become_program(const std::string& folder, const std::vector<std::string>& words,
                                  const std::vector<std::string>& environment,
                                  const std::string& out, const std::string& err) {
-  // A test runner in the background has them ignored, and the program would inherit that.
+  // A test runner in the background may ignore them, and the program would inherit that.
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
   if (chdir(folder.c_str()) != 0) _exit(126);

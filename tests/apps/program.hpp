@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The built program in a folder of its own, run the way a user runs it: arguments in; exit code,
-// output and files out.
+// Runs the built program in a folder of its own, as a user would: arguments in; exit code, output
+// and files out.
 #pragma once
 
 #include <sys/types.h>
@@ -18,7 +18,7 @@ inline Words operator+(Words first, const Words& second) {
   return first;
 }
 
-/// A folder for one test, deleted at its end. `path("a.h5")` is a file in it.
+/// A folder for one test, deleted at its end. `path("a.h5")` is the path of a file in it.
 class Folder {
  public:
   Folder();
@@ -27,7 +27,7 @@ class Folder {
   Folder& operator=(const Folder&) = delete;
 
   [[nodiscard]] std::string path(const std::string& name = "") const { return root_ / name; }
-  /// Names of the files in it, sorted.
+  /// Names of the files in the folder, sorted.
   [[nodiscard]] std::vector<std::string> files() const;
   std::string write(const std::string& name, const std::string& text) const;
   [[nodiscard]] std::string read(const std::string& name) const;
@@ -42,12 +42,12 @@ struct Outcome {
   std::string out, err;
 };
 
-/// Where the program's streams go; "": into the outcome.
+/// Destinations of the program's streams; "": the outcome.
 struct Streams {
   std::string out, err;
 };
 
-/// `tangere ARGUMENTS` with the folder as its current one.
+/// Runs `tangere ARGUMENTS` with the folder as its current one.
 class Program {
  public:
   /// Starts it. `environment`: "NAME=value", added to this process's own.
@@ -61,7 +61,7 @@ class Program {
   [[nodiscard]] Outcome wait();
 
  private:
-  std::filesystem::path scratch_;  // of stdout and stderr: outside the folder that tests look at
+  std::filesystem::path scratch_;  // for stdout and stderr, outside the folder that tests inspect
   pid_t process_ = -1;
 };
 
@@ -72,11 +72,11 @@ Outcome run(const Folder& folder, std::vector<std::string> arguments,
 /// Names of an object's keys that docs/command.md does not mention, nested ones included.
 std::vector<std::string> undocumented_keys(const nlohmann::json& object);
 
-/// `tangere WORDS --json`: the object that it prints, which names the subcommand, the exit code and
-/// documented keys alone.
+/// Runs `tangere WORDS --json` and returns the object that it prints. Expects it to name the
+/// subcommand and the exit code, and to have only documented keys.
 nlohmann::json run_json(const Folder& folder, const Words& words, int exit_code = 0);
 
-/// A scene of the project.
+/// Path of a scene of the project.
 std::string scene(const std::string& name);
 
 }  // namespace tangere::apps

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The readers of docs/datasets.md, run as they stand there.
+// Runs the readers of docs/datasets.md as printed there.
 #include <gmock/gmock.h>
 
 #include <cstdio>
@@ -74,7 +74,7 @@ TEST(Readers, OfThePageReadADataSet) {
   EXPECT_GE(tried, 4);
 }
 
-/// What h5py makes of types, texts and counts: HDF5's C library hides mistakes in these.
+/// Checks what h5py makes of types, texts and counts. HDF5's C library hides mistakes in these.
 TEST(Readers, SeeDerivativesAndNextObservationsAsDescribed) {
   const std::string interpreter = python();
   if (interpreter.empty())

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which rows a rollout gives, in which order, and what it says about failures and stops.
+// Tests which rows a rollout gives, in which order, and what it reports about failures and stops.
 #include "tasks/run/rollout.hpp"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// A pad that sinks onto a ball, with a sensor read every 2 steps and one that leaves it open.
+/// A pad that sinks onto a ball, with a sensor read every 2 steps and one without an interval.
 Model pad_on_ball() {
   return Model(parse_scene(R"(<tangere model="pad">
   <option unit="m-kg" gravity="0 0 -9.8" timestep="5e-3" integrator="BDF1"/>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `simulate` and `plot` write: the run that was asked for, the same bytes for the same
+// Tests what `simulate` and `plot` write: the requested run, and the same bytes for the same
 // request.
 #include <gmock/gmock.h>
 
@@ -57,8 +57,8 @@ std::string rows(int count, const std::string& row) {
   return text;
 }
 
-/// The loss is that of the fields beside it, and a control's derivative that of two runs whose
-/// tables differ in it.
+/// The loss is computed from the fields beside it. A control's derivative matches two runs whose
+/// tables differ in that control.
 TEST(Simulate, WritesGradientsBesideTheTrajectory) {
   const Folder folder;
   const auto table = [&](double first) {
@@ -105,7 +105,7 @@ TEST(Simulate, WritesGradientsBesideTheTrajectory) {
   EXPECT_THAT(names, testing::Contains("tactile pad kn"));
 }
 
-/// The sensor's coefficients act on all of its points: their derivatives are sums over points.
+/// The sensor's coefficients act on all of its points, so their derivatives are sums over points.
 TEST(Simulate, WritesGradientsOfTactilePoints) {
   const Folder folder;
   simulate(
@@ -317,7 +317,7 @@ TEST(Simulate, AnOutputThatExistsIsKept) {
 }
 
 TEST(Simulate, FailedEnvironmentsAreListedAndTheFileIsWhole) {
-  // A step of a day cannot be solved: the ball would turn by more than a rotation can say.
+  // A step of one day has no solution: the ball would turn by more than a rotation can express.
   const Folder folder;
   const json answer =
       simulate(folder, kSmall, {"--timestep", "86400", "--steps", "3", "--envs", "25"}, 1);
@@ -371,7 +371,7 @@ TEST_P(Continued, GoesOnBitForBit) {
   EXPECT_EQ(read_array(parts, "/tactile/pad/force").values,
             rows_from(read_array(whole, "/tactile/pad/force"), 12));
   EXPECT_EQ(read_array(parts, "/tactile/pad/step").values.front(), 2);
-  // A continued run continued: the last row by default.
+  // Continues a continued run, by default from its last row.
   std::filesystem::rename(parts.path("out.h5"), parts.path("second.h5"));
   simulate(whole, kSmall, with({"--steps", "95", "--overwrite"}));
   const json third = simulate(

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run that is stopped in the middle ends soon, says so, and leaves no file, neither whole nor
-// half.
+// Tests that a run stopped in the middle ends soon, says so, and leaves no file, neither whole nor
+// partial.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -21,10 +21,10 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-// Much work, so that a signal always finds the run in the middle of it.
+// Enough work that a signal always arrives in the middle of the run.
 constexpr const char* kManySteps = "500000";
 
-/// Waits for the file that a run writes to; after a minute the machine is not slow but broken.
+/// Waits for the file that a run writes to. After a minute, something is broken.
 void wait_for(const std::string& path) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(1);
   while (!std::filesystem::exists(path)) {
@@ -79,7 +79,7 @@ TEST(Progress, RewritesOneLineOfATerminal) {
   ASSERT_EQ(unlockpt(terminal), 0);
   const Folder folder;
   Program program(folder, long_run(), {}, {"", ptsname(terminal)});
-  // Three rewrites, then the stop; a terminal without its program reads as an error.
+  // Waits for three rewrites, then stops. Reading a terminal whose program has ended is an error.
   std::string shown;
   char buffer[256];
   bool stopped = false;
@@ -95,7 +95,7 @@ TEST(Progress, RewritesOneLineOfATerminal) {
   EXPECT_THAT(shown, HasSubstr(std::string("\rstep ")));
   EXPECT_THAT(shown, HasSubstr(std::string(" of ") + kManySteps + ", "));
   EXPECT_THAT(shown, HasSubstr("env-steps/s"));
-  // The line is wiped before the last message.
+  // The line is erased before the last message.
   EXPECT_THAT(shown, HasSubstr("\r\x1b[Ktangere: stopped by SIGINT"));
   EXPECT_EQ(shown.find('\n'), shown.rfind('\n')) << "progress made more than one line";
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tasks on the command line: files with rewards and ends, summaries with successes, and what is
-// refused.
+// Tests tasks on the command line: files with rewards and ends, summaries with successes, and
+// refusals.
 #include <gmock/gmock.h>
 
 #include <nlohmann/json.hpp>
@@ -81,7 +81,7 @@ TEST(Tasks, SimulateStoresActionsAndRewards) {
   const h5::Id file = h5::open_file(folder.path("d.h5"));
   EXPECT_EQ(h5::read_text(file, "task"), "dummy");
   EXPECT_EQ(h5::dimensions(h5::open_dataset(file, "task/action")), (h5::Dims{40, 18, 1}));
-  // Row 40 of an episode is what both see last.
+  // Both show row 40 of an episode last.
   std::vector<double> q(10), final_q(10);
   h5::read_box(h5::open_dataset(file, "q"), {200, 17, 0}, {1, 1, 10}, q.data());
   h5::read_box(h5::open_dataset(h5::open_file(folder.path("set/shard-00000.h5")),
@@ -168,7 +168,7 @@ TEST(Tasks, GradcheckChecksTheReturn) {
   EXPECT_EQ(answer.at("inputs").at(0).at("size"), 36);
 }
 
-/// A grasp that is lifted level pays 100, whatever acts on it a little.
+/// A grasp that is lifted level pays 100, even under small disturbances.
 TEST(Tasks, GradcheckThatComparesNothingFails) {
   const Folder folder;
   const Words words{"gradcheck", "stable_grasp", "--actions", "1", "--entries", "1"};
@@ -181,8 +181,8 @@ TEST(Tasks, GradcheckThatComparesNothingFails) {
   EXPECT_EQ(run_json(folder, words, 1).at("entries"), 0);
 }
 
-/// Every observation, shape and unit that a task declares; then the scene, with what the task
-/// varies.
+/// Shows every observation, shape and unit that a task declares; then the scene, with the numbers
+/// that the task varies.
 TEST(Tasks, InspectShowsWhatATaskDeclares) {
   const Folder folder;
   const Outcome text = run(folder, {"inspect", "box_pushing"});

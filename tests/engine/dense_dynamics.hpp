@@ -5,7 +5,7 @@
 //
 //   M = Σ m Jᵀ J + J_ωᵀ I J_ω,   M a + b = Q,   b = Σ Jᵀ m (a₀ - g) + J_ωᵀ (I α₀ + ω × I ω)
 //       (a₀, α₀: with q̈ = 0)
-//   Q: joint effects and motors. Joints of the scene are taken whole, not as chains.
+//   Q: joint effects and motors. Joints of the scene are used whole, not split into chains.
 #pragma once
 
 #include <Eigen/Dense>
@@ -68,7 +68,7 @@ class DenseDynamics {
     return t.mass.ldlt().solve(t.force - t.bias);
   }
 
-  /// q̇ of a state: quaternions turn by half of themselves times (0, ω).
+  /// q̇ of a state. The rate of a quaternion is half its product with (0, ω).
   [[nodiscard]] Vector rate(const Vector& q, const Vector& v) const {
     Vector out(nq);
     for (std::size_t i = 0; i < scene_.links.size(); ++i) {
@@ -109,8 +109,8 @@ class DenseDynamics {
     int dof;
     V3 angular, linear, at;  ///< world axes; linear velocity of the material point at `at`
   };
-  /// A joint frame in world axes: pose, twist, acceleration with q̈ = 0, and how its motion depends
-  /// on v.
+  /// A joint frame in world axes: pose, twist, acceleration for q̈ = 0, and the dependence of its
+  /// motion on v.
   struct Motion {
     M3 R = M3::Identity();
     V3 p = V3::Zero(), omega = V3::Zero(), velocity = V3::Zero(), alpha = V3::Zero(),
@@ -158,7 +158,7 @@ class DenseDynamics {
     return {m, M3(V3(s2.y() + s2.z(), s2.x() + s2.z(), s2.x() + s2.y()).asDiagonal()) * (m / 12)};
   }
 
-  /// The frame fixed to the one at hand, at c.
+  /// Moves to the frame that is fixed to the current one at c.
   static void shift(Motion& m, const V3& c, const V3& slide = V3::Zero()) {
     const V3 d = c + slide;
     m.velocity += m.omega.cross(d);

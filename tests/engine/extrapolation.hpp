@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Explicit integration to rounding, for references: the modified midpoint rule, extrapolated
+// Explicit integration to rounding, for references: the modified midpoint rule with extrapolation
 // (Gragg, Bulirsch and Stoer).
 #pragma once
 
@@ -8,8 +8,8 @@
 
 namespace tangere::testing {
 
-/// y(duration) of ẏ = f(y). Eight midpoint runs a step, 2 … 16 substeps, whose errors are series in
-/// h²: order 16.
+/// Returns y(duration) of ẏ = f(y). A step has eight midpoint runs of 2 … 16 substeps. Their errors
+/// are series in h², so the order is 16.
 template <class Vector, class F, class S>
 Vector extrapolate(const F& f, Vector y, S duration, int steps) {
   constexpr int kRuns = 8;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Short rollouts with a loss that is linear in every state: their gradients by the adjoint and by
-// differences.
+// Short rollouts with a loss that is linear in every state, and their gradients by the adjoint and
+// by differences.
 #pragma once
 
 #include <algorithm>
@@ -24,13 +24,13 @@ inline std::vector<double> moved(const Model& model, std::vector<double> q, int 
   return q;
 }
 
-/// Where a run starts and what drives it.
+/// The start of a run and its controls.
 struct RunInput {
   std::vector<double> q, v;
   std::vector<std::vector<double>> u;  ///< one row per step
 };
 
-/// Near the scene's start, moving, with controls about zero.
+/// A moving state near the scene's start, with controls about zero.
 inline RunInput random_input(const Model& model, unsigned seed, int steps) {
   Random random(seed);
   RunInput in;
@@ -107,7 +107,7 @@ struct RunGradient {
   }
 };
 
-/// Of environment `lane` among `inputs`, which run together.
+/// Gradient of environment `lane` of `inputs`, which run together.
 inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& options,
                                   const std::vector<RunInput>& inputs, const StateLoss& loss,
                                   int lane) {
@@ -152,14 +152,14 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
   return g;
 }
 
-/// The central difference of least error; NaN where none settles (a kink). Its error is taken as its
-/// change from the step size before and what rounding makes of it: at the smallest steps, which are
-/// for runs with a kink or a split step close by, two differences can agree by chance.
+/// The central difference of least error; NaN if none settles (a kink). Its error is estimated as
+/// its change from the step size before, plus the effect of rounding. At the smallest steps, which
+/// serve runs with a kink or a split step close by, two differences can agree by chance.
 inline double best_difference(const std::function<double(double)>& f, double start) {
   constexpr double kRounding = 1e-14;  // of a run's loss, relative
   double best = NAN, least = HUGE_VAL, before = NAN;
   for (double e = start; e > 1e-5 * start; e *= 0.25) {
-    // Richardson's: the error of second order taken out.
+    // Richardson's extrapolation removes the error of second order.
     const double above = f(e), below = f(-e);
     const double coarse = (f(2 * e) - f(-2 * e)) / (4 * e), fine = (above - below) / (2 * e);
     const double value = (4 * fine - coarse) / 3;
@@ -194,7 +194,7 @@ inline RunGradient differences_of_run(const Model& model, const StepperOptions& 
   const NumberGradients parameters(model);
   for (int k = 0; k < parameters.count(); ++k) {
     const double size = parameters.infos()[std::size_t(k)].value;
-    if (size == 0) {  // at a bound of what a scene may say: one-sided
+    if (size == 0) {  // at a bound of the scene's numbers: one-sided
       g.parameters.push_back(NAN);
       continue;
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Seeded random trees with joint effects, motors, massless bodies, and contacts with bodies fixed
-// in the world.
+// Seeded random trees with joint effects, motors, massless bodies, and contacts with bodies that
+// are fixed in the world.
 #pragma once
 
 #include <cmath>
@@ -9,8 +9,8 @@
 
 namespace tangere::testing {
 
-/// Damping, armature, a spring and limits, each with probability `share`; coordinates of tests lie
-/// around the limits.
+/// Damping, armature, a spring and limits, each with probability `share`. The tests' coordinates
+/// lie around the limits.
 inline JointEffects random_effects(Random& random, double share) {
   const auto maybe = [&](double low, double high) {
     const double x = random.uniform(low, high);
@@ -26,7 +26,7 @@ inline JointEffects random_effects(Random& random, double share) {
   return e;
 }
 
-/// The bodies that have something with mass on them lose theirs, some of them.
+/// Takes the mass from some of the bodies that carry something with mass.
 inline void drop_masses(Scene& s, Random& random) {
   std::vector<char> carries(s.links.size(), 0);
   for (std::size_t i = s.links.size(); i-- > 0;) {
@@ -36,7 +36,8 @@ inline void drop_masses(Scene& s, Random& random) {
   }
 }
 
-/// A tree in which every effect of a joint occurs, motors of both kinds and massless bodies too.
+/// A tree in which every effect of a joint occurs, and motors of both kinds and massless bodies as
+/// well.
 inline Scene random_machine(unsigned seed, int links) {
   Scene s = random_tree(seed, links);
   Random random(seed + 5000);
@@ -66,7 +67,7 @@ inline Scene random_machine(unsigned seed, int links) {
   return s;
 }
 
-/// A tree on a fixed root: its cuboids touch the root's body and are touched by its points.
+/// A tree on a fixed root. Its cuboids touch the root's body, whose points touch them.
 inline Scene random_machine_on_a_base(unsigned seed, int links) {
   Scene s = random_machine(seed, links);
   Random random(seed + 9000);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes for tests, built in code: seeded random trees with every joint kind, touching bodies,
+// Scenes for tests, built in code: seeded random trees with every joint kind, touching bodies and
 // ground.
 #pragma once
 
@@ -58,8 +58,8 @@ inline Scene random_tree(unsigned seed, int links) {
   return s;
 }
 
-/// The same with every body that has contact points touching every other it can move against, and
-/// the ground in reach. A half-space is fixed in the world, or to the first link.
+/// The same, but every body with contact points touches every other body that can move relative to
+/// it, and the ground is in reach. A half-space is fixed in the world or to the first link.
 inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
   Scene s = random_tree(seed, links);
   Random random(seed + 1000);
@@ -74,7 +74,7 @@ inline Scene random_contacts(unsigned seed, int links, ContactLaw law) {
         random.uniform(50, 500), random.uniform(0.1, 2), random.uniform(0.2, 1.2),
         law == ContactLaw::linear ? random.uniform(0, 0.1) : random.uniform(0, 10)};
   };
-  // The link that a body moves with, -1 the world: bodies on fixed joints follow what they hang on.
+  // The link with which a body moves; -1: the world. Bodies on fixed joints follow their parents.
   std::vector<int> moves_with;
   for (const LinkDescription& l : s.links)
     moves_with.push_back(l.joint.type != JointType::fixed ? static_cast<int>(moves_with.size())

@@ -14,14 +14,15 @@ inline void PrintTo(Integrator integrator, std::ostream* out) { *out << to_strin
 
 namespace testing {
 
-/// A scheme that no table has: Alexander's of order 3, three implicit stages, the last its result.
+/// A scheme that is in no table: Alexander's of order 3, three implicit stages, the last its
+/// result.
 inline Integrator sdirk3() {
   constexpr double kG = 0.43586652150845899942, kB = -1.5 * kG * kG + 4 * kG - 0.25;
   static const Scheme kScheme =
       runge_kutta("SDIRK3", 3, {{kG}, {0.5 * (1 - kG), kG}, {kB, 1 - kB - kG, kG}});
   return Integrator(kScheme);
 }
-/// Those of the table and that one.
+/// The schemes of the table and that one.
 inline std::vector<Integrator> all_integrators() {
   std::vector<Integrator> all(integrators().begin(), integrators().end());
   all.push_back(sdirk3());
@@ -47,7 +48,7 @@ inline std::vector<double> v_of(const Batch& b, int e = 0) {
   return v;
 }
 
-/// The same controls for every environment.
+/// Steps with the same controls for every environment.
 inline void step_all(Stepper& stepper, Batch& batch, const std::vector<double>& u) {
   std::vector<double> all;
   for (int e = 0; e < batch.environments(); ++e) all.insert(all.end(), u.begin(), u.end());

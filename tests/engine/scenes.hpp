@@ -21,8 +21,8 @@ inline LinkDescription link(const std::string& name, JointType type, Vector3 at,
   return l;
 }
 
-/// A pad above a light ball on the ground. `published`: laws and single-precision numbers of the
-/// published simulator.
+/// A pad above a light ball on the ground. `published`: uses laws and single-precision numbers of
+/// the published simulator.
 inline Scene rolling_ball(bool published = false, int resolution = 200) {
   const auto number = [published](double x) { return published ? double(float(x)) : x; };
   Scene s;
@@ -54,7 +54,7 @@ inline Scene rolling_ball(bool published = false, int resolution = 200) {
   return s;
 }
 
-/// The five phases of its controls.
+/// Controls of the rolling ball, in five phases.
 inline std::vector<double> rolling_ball_control(int step) {
   if (step < 100) return {0, 0, 0.2};
   if (step < 150) return {0.1, 0, 0.2};

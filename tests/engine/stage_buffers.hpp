@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Everything one evaluation of a stage needs, for any number type: the plain scalar run of the
-// kernels.
+// Everything that one evaluation of a stage needs, for any number type: runs the kernels in plain
+// scalars.
 #pragma once
 
 #include <vector>
@@ -11,7 +11,7 @@
 
 namespace tangere::testing {
 
-/// All contact points of each pair are candidates: nothing is culled.
+/// Makes all contact points of each pair candidates, so nothing is culled.
 template <class N>
 class StageBuffers {
  public:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What ./run-demo says about its data set is true of the shard that its own command writes.
+// Tests that what ./run-demo says about its data set holds for the shard that its command writes.
 #include <gtest/gtest.h>
 
 #include <cstdlib>

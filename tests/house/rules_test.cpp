@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The project keeps its own rules, and the checkers see a violation when there is one.
+// Tests that the project keeps its own rules, and that the checkers find violations.
 #include "tests/house/rules.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A data set that no engine made: every number says where it belongs.
+// A data set without the engine, in which every number encodes its own place.
 #pragma once
 
 #include <algorithm>
@@ -37,7 +37,7 @@ inline DatasetLayout dataset_layout(std::int64_t episodes, bool single = true) {
   return l;
 }
 
-/// Number k of a row; name 0 is the actions, then q, v, end effectors if any, skin. Exact in
+/// Number k of a row. Name 0 is the actions, then q, v, end effectors if any, and skin. Exact in
 /// float32.
 template <class T>
 T dataset_number(std::int64_t episode, std::size_t name, std::int64_t row, std::size_t k) {
@@ -47,7 +47,7 @@ T dataset_number(std::int64_t episode, std::size_t name, std::int64_t row, std::
            static_cast<double>(row) + static_cast<double>(k) / 64);
 }
 
-/// Rows [first_row, first_row + rows) of a block, with memory of its own.
+/// Rows [first_row, first_row + rows) of a block, in memory of their own.
 template <class T>
 class SyntheticPiece {
  public:
@@ -94,7 +94,7 @@ inline FailedEpisode failure(std::int64_t episode) {
   return {episode, 3, StepStatus::rotation, {1.5, static_cast<double>(episode), 0.1}, {-2, 0.3}};
 }
 
-/// A block as one piece, and its end.
+/// Writes a block as one piece, and its end.
 inline void write_block(EpisodeSink& sink, const DatasetLayout& l, std::int64_t first_episode,
                         const std::vector<FailedEpisode>& failures = {}) {
   write_piece(sink, l, first_episode, 0, static_cast<int>(l.rows()) + 1);

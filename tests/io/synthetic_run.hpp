@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run that no engine made: every number says where it belongs.
+// A run without the engine, in which every number encodes its own place.
 #pragma once
 
 #include <unistd.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which probes this machine can run.
+// Finds the probes that this machine can run.
 #include "tests/kernels/lane_probe.hpp"
 
 #include <cstring>
@@ -9,7 +9,7 @@
 
 namespace tangere::testing {
 
-// TANGERE_PROBES: PROBE(scalar) PROBE(avx2) and so on, of the instruction sets that were built.
+// TANGERE_PROBES: PROBE(scalar) PROBE(avx2) and so on, for the instruction sets that were built.
 #define PROBE(isa) extern const LaneProbe kProbe_##isa;
 TANGERE_PROBES
 #undef PROBE

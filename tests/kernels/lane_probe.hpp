@@ -19,13 +19,13 @@ inline constexpr int kDistanceRows =
 struct LaneProbe {
   const char* name;                                  ///< as in KernelTable
   void (*inverse_sqrt)(const double* x, double* y);  ///< (8) each, 64-byte aligned
-  /// At y (3, 8): out (kDistanceRows, 8), 64-byte aligned.
+  /// Evaluates at y (3, 8) into out (kDistanceRows, 8), both 64-byte aligned.
   void (*distance)(const DistanceProbe& shape, const double* y, double* out);
-  /// The same with lanes one at a time.
+  /// Does the same with lanes one at a time.
   void (*distance_alone)(const DistanceProbe& shape, const double* y, double* out);
 };
 
-/// Those this machine can run; the first is the scalar one.
+/// The probes that this machine can run; the first is the scalar one.
 std::span<const LaneProbe* const> lane_probes();
 
 }  // namespace tangere::testing

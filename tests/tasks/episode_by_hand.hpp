@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The run that the tests of episodes vary, and one episode of it stepped by hand.
+// The run that tests of episodes vary, and one of its episodes stepped by hand.
 #pragma once
 
 #include <algorithm>
@@ -45,7 +45,7 @@ inline EpisodeSummary run(const Model& model, const EpisodeOptions& o, EpisodeSi
   return run_episodes(model, {}, ControlProgram(model, model.timestep(), kSeed), o, sink, {}, stop);
 }
 
-/// One episode, stepped by hand. T: what observations leave as.
+/// One episode, stepped by hand. T: type of the stored observations.
 template <class T>
 struct ByHand {
   RecordedEpisode episode;

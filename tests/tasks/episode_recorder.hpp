@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sink that keeps every bit, and complains about pieces that come out of order or two at a time.
+// A sink that keeps every bit, and reports pieces that arrive out of order or two at a time.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the tests of tasks share: a task by name, episodes of it, derivatives of its reward by
+// Shared by the tests of tasks: a task by name, its episodes, derivatives of its reward by
 // differences.
 #pragma once
 
@@ -20,7 +20,7 @@ inline std::unique_ptr<Task> task_named(const std::string& name) {
   return make_task(name, read_scene(TANGERE_SOURCE_DIR "/scenes/" + task_spec(name).scene).scene);
 }
 
-/// Everything that an environment showed, episode by episode: equal where every bit is.
+/// Everything that an environment showed, episode by episode. Equality compares every bit.
 struct Shown {
   std::vector<double> numbers;
   int resets = 0, ends = 0;
@@ -50,7 +50,7 @@ inline std::vector<Shown> play(const Task& task, PolicyKind kind, int environmen
   return shown;
 }
 
-/// Episodes of a policy, one per environment, to their ends.
+/// Episodes that a policy played to their ends, one per environment.
 struct Played {
   int episodes = 0, successes = 0, failures = 0;
   double mean_return = 0, mean_length = 0;
@@ -86,7 +86,7 @@ inline Played play_episodes(const Task& task, PolicyKind kind, int episodes,
   return p;
 }
 
-/// Numbers of one environment that a view can look at, owned.
+/// Owns the numbers of one environment that a view can look at.
 struct OwnView {
   std::vector<double> memory, action;
   std::vector<std::vector<double>> q, v, end_effectors, tactile;  // per moment

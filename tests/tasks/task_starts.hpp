@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Starts of many episodes of a task, and whether what they draw follows its distribution.
+// Draws starts of many episodes of a task, and measures whether they follow their distribution.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace tangere::testing {
 
 /// Largest distance between the distribution of `x` and the one that is below y with probability
-/// `below(y)`, times √n: below 1.63 with probability 0.99 (Kolmogorov, Smirnov).
+/// `below(y)`, times √n. It is below 1.63 with probability 0.99 (Kolmogorov, Smirnov).
 inline double distance_from(std::vector<double> x, const std::function<double(double)>& below) {
   std::sort(x.begin(), x.end());
   double most = 0;
@@ -25,11 +25,11 @@ inline double distance_from(std::vector<double> x, const std::function<double(do
   }
   return most * std::sqrt(n);
 }
-/// From the uniform distribution on [low, high].
+/// Distance from the uniform distribution on [low, high].
 inline double uniform_distance(std::vector<double> x, double low, double high) {
   return distance_from(std::move(x), [=](double y) { return (y - low) / (high - low); });
 }
-/// From the normal distribution.
+/// Distance from the normal distribution.
 inline double normal_distance(std::vector<double> x, double mean, double deviation) {
   return distance_from(std::move(x), [=](double y) {
     return 0.5 * std::erfc((mean - y) / (deviation * std::sqrt(2.0)));

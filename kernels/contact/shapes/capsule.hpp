@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// All points within r of a segment along z. Under a pad, about the nearest point of the axis:
-// beside it as a cylinder's side, beyond an end with z = ±h:
+// All points within r of a segment along z. Under a pad, the distance is taken from the nearest
+// point of the axis: as for a cylinder's side, or beyond an end with z = ±h:
 //   |D|² - r² = [y_x² + y_y² + (y_z ∓ h)² - r²] + e_x(…) + e_y(…) + e_z(e_z + 2 [y_z ∓ h])
 #pragma once
 
@@ -11,9 +11,9 @@ namespace tangere::kernels {
 template <class P>
 struct CapsulePad;
 
-/// Capsule: all points within r of the segment |z| ≤ h. D = y - (nearest point of the segment), d =
-/// |D| - r, H = (I - n nᵀ - e z zᵀ)/|D| with e = 1 beside the segment. On the segment: n = x, H =
-/// 0.
+/// Capsule: all points within r of the segment |z| ≤ h. D = y - (nearest point of the segment),
+/// d = |D| - r, H = (I - n nᵀ - e z zᵀ)/|D| with e = 1 beside the segment. On the segment, n = x
+/// and H = 0.
 template <class N>
 struct CapsuleDistance {
   static constexpr Bending kBending = Bending::rod;
@@ -39,8 +39,8 @@ struct CapsuleDistance {
              select(regular, inverse * D.z, zero)}};
   }
 
-  /// By radius and half length, from a cotangent ρ of the shape's place: beyond an end that half
-  /// ball moves with it.
+  /// Cotangents of radius and half length, from a cotangent ρ of the shape's place. Beyond an end,
+  /// the half ball moves with the half length.
   Vec3<N> size_share(const Vec3<N>& y, const Vec3<N>& n, const Vec3<N>& rho) const {
     const N zero(0.0);
     return {dot(n, rho), select(y.z > half, rho.z, select(y.z < -half, -rho.z, zero)), zero};
@@ -68,14 +68,14 @@ auto nearer_than(const CapsuleDistance<N>& shape, const Vec3<N>& y, const N& m) 
   return mul_add(over, over, mul_add(y.x, y.x, y.y * y.y)) < reach * reach;
 }
 
-/// Brackets: kernels/tactile/tactile_point.hpp.
+/// The brackets are explained in kernels/tactile/tactile_point.hpp.
 template <class P>
 struct CapsulePad : RodPad<P> {
   using Base = RodPad<P>;
   using N = typename P::N;
   using Offset = typename P::Offset;
   static constexpr int kRows =
-      10;  // y_x, y_y, y_z - h, y_z + h, the rests beside the axis, above and below it, u
+      10;  // y_x, y_y, y_z - h, y_z + h, the remainders beside the axis, above it and below it, u
 
   N above, below, beside_rest, above_rest, below_rest;
 

@@ -9,9 +9,9 @@ namespace tangere::kernels {
 template <class P>
 struct CuboidPad;
 
-/// Cuboid with half edges s. Inside: the nearest face (the first of x, y, z on ties, outward where
-/// y_k = 0 is +). Outside: the distance to the nearest face, edge or corner. H = 0 inside, the only
-/// place where contact looks.
+/// Cuboid with half edges s. Inside, d is the distance to the nearest face (ties: the first of x,
+/// y, z; at y_k = 0 outward is +). Outside, it is the distance to the nearest face, edge or corner.
+/// H = 0 inside, and contact looks nowhere else.
 template <class N>
 struct CuboidDistance {
   static constexpr Bending kBending = Bending::flat;
@@ -46,7 +46,7 @@ struct CuboidDistance {
              sign.z * select(outside, inverse * out.z, pick_z)}};
   }
 
-  /// The same where d < 0; elsewhere some d ≥ 0 and a unit vector, without a root.
+  /// The same where d < 0. Elsewhere, without a root: some d ≥ 0 and a unit vector.
   Distance<N> inside(const Vec3<N>& y, N& curvature) const {
     const N zero(0.0), one(1.0);
     curvature = zero;
@@ -60,7 +60,8 @@ struct CuboidDistance {
              select(x_first, zero, select(y_first, zero, sign.z))}};
   }
 
-  /// Inside: by half edges, from a cotangent ρ of the shape's place. A face moves along its normal.
+  /// Inside: cotangents of the half edges, from a cotangent ρ of the shape's place. A face moves
+  /// along its normal.
   Vec3<N> size_share(const Vec3<N>&, const Vec3<N>& n, const Vec3<N>& rho) const {
     return {n.x * rho.x, n.y * rho.y, n.z * rho.z};
   }
@@ -72,7 +73,8 @@ struct CuboidDistance {
     return axes_stretch_share(size, y, bar);
   }
 
-  /// H = (P - n nᵀ)/d outside, P the axes on which the point lies beyond its face; 0 inside.
+  /// H = (P - n nᵀ)/d outside, where P projects on the axes along which the point lies beyond its
+  /// face. H = 0 inside.
   Mat3<N> hessian(const Vec3<N>& y) const {
     const N zero(0.0), one(1.0);
     N unused;
@@ -95,7 +97,7 @@ auto nearer_than(const CuboidDistance<N>& shape, const Vec3<N>& y, const N& m) {
   return dot(out, out) < m * m;
 }
 
-/// A cuboid with half edges h. Only inside do forces act: there d is the largest of six signed face
+/// A cuboid with half edges h. Forces act only inside, where d is the largest of six signed face
 /// distances.
 template <class P>
 struct CuboidPad {

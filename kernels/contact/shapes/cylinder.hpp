@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A cylinder with caps along z. Under a pad its side is as a sphere in the plane:
+// A cylinder with caps along z. Under a pad its side is like a sphere in the plane:
 //   ρ² - r² = e_x(e_x + 2 y_x) + e_y(e_y + 2 y_y) + [y_x² + y_y² - r²]
 // and its caps: d = max([y_z - h] + e_z, [-y_z - h] - e_z)
 #pragma once
@@ -11,7 +11,7 @@ namespace tangere::kernels {
 template <class P>
 struct CylinderPad;
 
-/// Distance from the z axis and the direction away from it; on the axis, x.
+/// Distance from the z axis, and the direction away from it, which is x on the axis.
 template <class N>
 struct AxisDistance {
   N rho, inverse;  ///< ρ and 1/ρ; 0 and 0 on the axis
@@ -28,9 +28,9 @@ struct AxisDistance {
   }
 };
 
-/// Cylinder with caps: radius r, half length h along z. With a = ρ - r and b = |z| - h, d = max(a,
-/// b) inside (the side on ties) and |max((a, b), 0)| outside, where the rim is nearest when both
-/// are positive. z = 0 counts as above.
+/// Cylinder with caps: radius r, half length h along z. With a = ρ - r and b = |z| - h,
+/// d = max(a, b) inside (ties: the side) and |max((a, b), 0)| outside, where the rim is nearest
+/// when both are positive. z = 0 counts as the upper half.
 template <class N>
 struct CylinderDistance {
   static constexpr Bending kBending = Bending::rod;
@@ -60,12 +60,12 @@ struct CylinderDistance {
             {radial * axis.x, radial * axis.y, axial * up}};
   }
 
-  /// False where d ≥ 0 for certain, without a root.
+  /// Returns false where d ≥ 0 for certain. Takes no root.
   auto may_hold(const Vec3<N>& y) const -> decltype(y.x < y.y) {
     const N slack(1 + 1e-12);
     return (mul_add(y.x, y.x, y.y * y.y) < slack * (radius * radius)) & (abs(y.z) < half);
   }
-  /// The same as evaluate() where d < 0; elsewhere some d ≥ 0 and a unit vector.
+  /// The same as evaluate() where d < 0. Elsewhere some d ≥ 0 and a unit vector.
   Distance<N> inside(const Vec3<N>& y, N& curvature) const {
     const N zero(0.0), one(1.0);
     const AxisDistance<N> axis(y);
@@ -77,8 +77,8 @@ struct CylinderDistance {
              select(side, zero, select(y.z < zero, -one, one))}};
   }
 
-  /// Inside: by radius and half length, from a cotangent ρ of the shape's place (n is radial or
-  /// axial).
+  /// Inside: cotangents of radius and half length, from a cotangent ρ of the shape's place (n is
+  /// radial or axial).
   Vec3<N> size_share(const Vec3<N>&, const Vec3<N>& n, const Vec3<N>& rho) const {
     return {mul_add(n.x, rho.x, n.y * rho.y), n.z * rho.z, N(0.0)};
   }
@@ -90,7 +90,7 @@ struct CylinderDistance {
     return rod_stretch_share(size, y, bar, y.z);
   }
 
-  /// H = (n_ρ/ρ) t tᵀ, t the direction around the axis; outside the rim, 1/d across it as well.
+  /// H = (n_ρ/ρ) t tᵀ, t the direction around the axis. Outside the rim, H also has 1/d across it.
   Mat3<N> hessian(const Vec3<N>& y) const {
     const N zero(0.0), one(1.0);
     const AxisDistance<N> axis(y);
@@ -105,14 +105,14 @@ struct CylinderDistance {
   }
 };
 
-/// Without a root; at the rim, true as well for some points up to √2 m away.
+/// Takes no root. At the rim it is also true for some points up to √2 m away.
 template <class N>
 auto nearer_than(const CylinderDistance<N>& shape, const Vec3<N>& y, const N& m) {
   const N reach = shape.radius + m;
   return (mul_add(y.x, y.x, y.y * y.y) < reach * reach) & (abs(y.z) < shape.half + m);
 }
 
-/// Brackets: kernels/tactile/tactile_point.hpp.
+/// The brackets are explained in kernels/tactile/tactile_point.hpp.
 template <class P>
 struct CylinderPad : RodPad<P> {
   using Base = RodPad<P>;

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// An ellipsoid with semi-axes a along its axes: the exact distance, because contact needs |n| = 1
-// and the nearest point of the surface itself; a first-order distance has neither.
+// An ellipsoid with semi-axes a along its axes. The distance is exact, because contact needs
+// |n| = 1 and the nearest point of the surface itself. A first-order distance has neither.
 //
 // The nearest point is x = a² y / (w + a² - c²), c the shortest semi-axis, where w > 0 solves
 //   S(w) = Σ u² = 1,  u = a |y| / (w + a² - c²)
-// S falls and is convex; 1/√S is concave and nearly straight, so Newton's method on it rises to the
-// root from below. Bounds, since every term is at most 1 and no divisor less than w:
+// S falls and is convex. 1/√S is concave and nearly straight, so Newton's method on it rises to the
+// root from below. Every term is at most 1 and no divisor is less than w, which gives the bounds
 //   max(a |y| - a² + c²) ≤ w ≤ |a y|
-// Geometric bisection first: near the middle plane of the shortest axis, where the two nearest
-// points meet, the bounds are many orders of magnitude apart. Steps are fixed in number, so that a
-// lane has the same bits beside any other. With h the distance of the tangent plane from the
-// centre,
+// Geometric bisection comes first: near the middle plane of the shortest axis, where the two
+// nearest points meet, the bounds are many orders of magnitude apart. The number of steps is fixed,
+// so that a lane has the same bits whatever its neighbours. With h the distance of the tangent
+// plane from the centre,
 //   n = g/|g|, g = y / (w + a² - c²);  h = |a n|;  d = n·y - h
-// d is the largest of n·y - h over all unit n: an error of n enters squared, and only downwards.
+// d is the largest of n·y - h over all unit n. An error of n enters squared, and only downwards.
 //   κ₁ + κ₂ = h (Σ A - n·A n), κ₁ κ₂ = h⁴/(a b c)², A = diag(1/a²): curvatures of the surface at x
 //   H = (h P A P + d κ₁κ₂ P) / (1 + d (κ₁ + κ₂) + d² κ₁κ₂), P = I - n nᵀ
-// By a_i at fixed y: ∂d/∂a_i = -n_i x_i/a_i, and d and n change as if the shape moved by
+// For the derivative by a_i at fixed y, ∂d/∂a_i = -n_i x_i/a_i, and d and n change as if the shape
+// moved by
 //   (x_i/a_i)(2 e_i - (x_i/a_i²) x),  x = a² n / h
 #pragma once
 
@@ -37,7 +38,7 @@ struct EllipsoidDistance {
 
   Distance<N> evaluate(const Vec3<N>& y) const {
     const N zero(0.0), one(1.0), least = min(axes.x, min(axes.y, axes.z));
-    // On the middle plane of the shortest axis: outward where y = 0 is +, by an unmeasurable
+    // On the middle plane of the shortest axis, y is moved outward, towards +, by an unmeasurable
     // amount.
     const N tiny = N(1e-30) * least;
     const N z_off = select(axes.z <= least, tiny, zero);
@@ -75,7 +76,7 @@ struct EllipsoidDistance {
     return {dot(n, y) - support(n), n};
   }
 
-  /// H at a distance and its normal.
+  /// Returns H at a distance and its normal.
   Mat3<N> hessian(const Distance<N>& at) const {
     const Vec3<N>& n = at.n;
     const N one(1.0), h = support(n);
@@ -97,10 +98,10 @@ struct EllipsoidDistance {
     return H;
   }
 
-  /// By the semi-axes, from a cotangent ρ of the shape's place.
+  /// Cotangents of the semi-axes, from a cotangent ρ of the shape's place.
   Vec3<N> size_share(const Vec3<N>&, const Vec3<N>& n, const Vec3<N>& rho) const {
     const N inverse = N(1.0) / support(n);
-    // x_i/a_i, and x·ρ over the a_i: x_i = a_i s_i.
+    // x_i/a_i, and x·ρ divided by the a_i: x_i = a_i s_i.
     const Vec3<N> s = {inverse * axes.x * n.x, inverse * axes.y * n.y, inverse * axes.z * n.z};
     const N along =
         mul_add(axes.x * s.x, rho.x, mul_add(axes.y * s.y, rho.y, axes.z * s.z * rho.z));
@@ -119,15 +120,15 @@ struct EllipsoidDistance {
 
  private:
   static N root(const N& x) { return root_of(x, inverse_sqrt(x)); }
-  /// Distance of the tangent plane with normal n from the centre.
+  /// Returns the distance from the centre to the tangent plane with normal n.
   N support(const Vec3<N>& n) const {
     const Vec3<N> a = {axes.x * n.x, axes.y * n.y, axes.z * n.z};
     return root(dot(a, a));
   }
 };
 
-/// What is nearer than m lies in the box with half edges a + m, and in the ellipsoid whose tangent
-/// planes are h' away with h'² = (1 + m/c) h² + (1 + c/m) m² ≥ (h + m)².
+/// Points nearer than m lie in the box with half edges a + m, and in the ellipsoid whose tangent
+/// planes are at h' with h'² = (1 + m/c) h² + (1 + c/m) m² ≥ (h + m)².
 template <class N>
 auto nearer_than(const EllipsoidDistance<N>& shape, const Vec3<N>& y, const N& m) {
   const Vec3<N>& a = shape.axes;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The general form of a shape under a pad: its plain distance at every point, in double. Where
-// points are floats, a tile's centre in the shape's axes comes as a float and what the float leaves
-// out, so that d keeps the accuracy that brackets give the other shapes.
+// points are floats, a tile's centre in the shape's axes is split into a float and the remainder
+// that the float leaves out. d then keeps the accuracy that brackets give the other shapes.
 #pragma once
 
 #include "kernels/contact/shapes/shape.hpp"
@@ -9,7 +9,7 @@
 
 namespace tangere::kernels {
 
-/// Half of sixteen floats in double, and the other way.
+/// Converts one half of sixteen floats to double, and back.
 template <class A>
 Lanes<A> widen(const LanesF<A>& x, int half) {
   alignas(64) float narrow[kLanesF];
@@ -19,7 +19,7 @@ Lanes<A> widen(const LanesF<A>& x, int half) {
   return load_lanes<A>(wide);
 }
 
-/// Distance at high + low + offset.
+/// Returns the distance at high + low + offset.
 template <template <class> class Shape, class A>
 Distance<Lanes<A>> wide_distance(const double* size, const Vec3<Lanes<A>>& high,
                                  const Vec3<Lanes<A>>&, const Vec3<Lanes<A>>& offset) {
@@ -57,7 +57,7 @@ struct GeneralPad {
   using N = typename P::N;
   using Offset = typename P::Offset;
   static constexpr bool kTurns = true;
-  static constexpr int kRows = 9;  // y as floats, what they leave out, u
+  static constexpr int kRows = 9;  // y as floats, their remainders, u
 
   Mat3<N> Q;
   double size[3];

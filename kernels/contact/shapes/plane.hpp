@@ -9,8 +9,8 @@ namespace tangere::kernels {
 template <class P>
 struct PlanePad;
 
-/// Beyond this distance from a half-space's origin there is nothing [m]: what fills up candidate
-/// lists lies at 1e6 m and must not touch it.
+/// Nothing lies beyond this distance from a half-space's origin [m]. Filler points of candidate
+/// lists lie at 1e6 m and must not touch it.
 inline constexpr double kPlaneReach = 5e5;
 
 /// The half-space z < 0: d = z, n = z, H = 0.
@@ -48,8 +48,8 @@ struct PlanePad {
   using Offset = typename P::Offset;
   static constexpr bool kTurns = true;
   static constexpr int kRows = 4;  // y_z, u
-  /// Offsets beyond this are not points but what fills up edge tiles, and a half-space reaches that
-  /// far [m].
+  /// Offsets beyond this [m] are not points but fill up edge tiles. A half-space reaches that far,
+  /// so they are left out.
   static constexpr double kFiller = 1e5;
 
   Vec3<N> normal;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What cylinders and capsules have in common: how their surface stretches, and what lies under a
+// What cylinders and capsules have in common: how their surface stretches, and their form under a
 // pad.
 #pragma once
 
@@ -7,8 +7,8 @@
 
 namespace tangere::kernels {
 
-/// Where a point on a rod's surface is that keeps its place there while the rod's size changes;
-/// z_axis: of the nearest point of the axis (a cylinder's: of the point itself).
+/// Returns where a point fixed to a rod's surface goes when the rod's size changes. `z_axis`: z of
+/// the nearest point of the axis (for a cylinder, of the point itself).
 template <class N>
 Vec3<N> stretched_rod(const Vec3<N>& to, const Vec3<double>& from, const Vec3<double>& y,
                       double z_axis) {
@@ -23,7 +23,7 @@ Vec3<N> rod_stretch_share(const Vec3<double>& size, const Vec3<N>& y, const Vec3
           N(0.0)};
 }
 
-/// What cylinders and capsules have in common: offsets and the distance from the axis.
+/// What cylinders and capsules have in common under a pad: offsets and the distance from the axis.
 template <class P>
 struct RodPad {
   using N = typename P::N;
@@ -53,8 +53,8 @@ struct RodPad {
     return mul_add(e.x, e.x + (x0 + x0), mul_add(e.y, e.y + (y0 + y0), rest));
   }
 
-  /// |D| - r, from |D|² and, in single precision, one Newton step on |D|² - r², which does not
-  /// cancel (SpherePad).
+  /// Returns |D| - r from |D|². Single precision adds one Newton step on |D|² - r², which does not
+  /// cancel (as in SpherePad).
   N beyond_radius(const N& square, const N& inverse, const N& excess) const {
     const N length = square * inverse, rounded = length - radius;
     if constexpr (P::kSingle) {
@@ -63,7 +63,7 @@ struct RodPad {
       return rounded;
     }
   }
-  /// Whether a direction can be told from D; on the axis it is the shape's x.
+  /// Whether D is long enough to give a direction. On the axis the direction is the shape's x.
   static auto regular(const N& square) { return square > N(P::kSmallest * P::kSmallest); }
 };
 

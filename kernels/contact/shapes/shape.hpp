@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a shape is to contacts and pads. Each file beside this one is one shape, over any number
-// type: its signed distance d (< 0 inside) with unit gradient n = ∇d everywhere, also where the
-// distance has a kink (centre, axis, edge, corner).
+// What contacts and pads require of a shape. Each file beside this one is one shape, over any
+// number type: its signed distance d (< 0 inside) and the unit gradient n = ∇d. n is defined
+// everywhere, also where the distance has a kink (centre, axis, edge, corner).
 //
 // A shape is a template S<N> with
 //   kShape, kBending, kSums      what it is, what its Hessian looks like, how its points are summed
 //   Pad<P>                       its distance under a pad, relative to a tile
 //   of(size)                     the shape of a size as in PairContact
-//   evaluate(y, …)               d and n; ball, flat: and κ; rod: and κ, e
+//   evaluate(y, …)               d and n; ball and flat: also κ; rod: also κ and e
 //   size_share(y, n, ρ̄)          cotangent of the size from that of the shape's place, inside
-//   nearer_than(shape, y, m)     whether d < m, m > 0; true by mistake at worst
-// and, where bodies of it have contact points of their own that follow their size,
+//   nearer_than(shape, y, m)     whether d < m, m > 0; may also be true for slightly larger d
+// and, for bodies whose own contact points follow their size,
 //   stretched(to, from, y)       where the contact point y of a shape `from` is on a shape `to`
 //   stretch_share(size, y, ȳ)    the same in reverse: Σ ȳ·∂y/∂size
-// and for faces, inside(y, κ): as evaluate() where d < 0, elsewhere some d ≥ 0.
-// What a shape does not specialise has a general form: Bending::general with hessian(d, n), sums
-// point by point, GeneralPad.
+// and for faces, inside(y, κ): like evaluate() where d < 0, elsewhere some d ≥ 0. A shape that does
+// not specialise one of these gets a general form: Bending::general with hessian(d, n), sums point
+// by point, GeneralPad.
 #pragma once
 
 #include "kernels/contact/contact_types.hpp"
@@ -25,14 +25,14 @@
 
 namespace tangere::kernels {
 
-/// Value and gradient. Curvature comes apart.
+/// Value and gradient. Curvature is returned separately.
 template <class N>
 struct Distance {
   N d;
   Vec3<N> n;
 };
 
-/// What the Hessian is inside a shape, the only place where contact looks.
+/// The form of the Hessian inside a shape, the only place where contact looks.
 enum class Bending {
   flat,  ///< H = 0
   ball,  ///< H = κ (I - n nᵀ), and the shape looks the same from every side: it needs no
@@ -42,14 +42,15 @@ enum class Bending {
   general,  ///< any symmetric H with H n = 0
 };
 
-/// How the forces of many points on a shape are added up, with their derivatives.
+/// How the forces of many points on a shape are summed, with their derivatives.
 enum class PointSumForm {
-  about_centre,  ///< products about a ball's centre (sphere_contact.hpp)
-  faces,         ///< products, faces that bend in one direction at most (face_contact.hpp)
-  points,        ///< one point after the other (pair_contact.hpp)
+  about_centre,  ///< products of vectors about a ball's centre (sphere_contact.hpp)
+  faces,  ///< products of wrenches, for faces that bend in at most one direction (face_contact.hpp)
+  points,  ///< one point after the other (pair_contact.hpp)
 };
 
-/// Where a contact point keeps its place relative to a shape's lengths along its axes.
+/// Where a contact point stays, relative to a shape's lengths along its axes, when its size
+/// changes.
 template <class N>
 Vec3<N> stretched_along_axes(const Vec3<N>& to, const Vec3<double>& from, const Vec3<double>& y) {
   return {N(y.x / from.x) * to.x, N(y.y / from.y) * to.y, N(y.z / from.z) * to.z};

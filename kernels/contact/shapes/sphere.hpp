@@ -33,13 +33,13 @@ struct SphereDistance {
              select(regular, inverse * y.z, N(1.0))}};
   }
 
-  /// By the radius, from a cotangent ρ of the sphere's place, in any axes.
+  /// Cotangent of the radius, from a cotangent ρ of the sphere's place, in any axes.
   Vec3<N> size_share(const Vec3<N>&, const Vec3<N>& n, const Vec3<N>& rho) const {
     return {dot(n, rho), N(0.0), N(0.0)};
   }
 };
 
-/// Whether the distance at y is below m > 0, without a root.
+/// Whether the distance at y is below m > 0. Takes no root.
 template <class N>
 auto nearer_than(const SphereDistance<N>& shape, const Vec3<N>& y, const N& m) {
   const N reach = shape.radius + m;
@@ -58,17 +58,18 @@ struct SpherePad {
   N ax, ay, az, twice_ax, twice_ay, twice_az, square_az, excess;
   Vec3<N> u;
 
-  /// Constants of a shape; `pose` is its rotation, the same everywhere for a sphere.
+  /// Constants of a shape. `pose` is its rotation, which a sphere ignores.
   SpherePad(const TouchShape& s, const Mat3<N>&)
       : radius(s.size[0]), minus_radius(-s.size[0]), inverse_diameter(0.5 / s.size[0]) {}
 
-  /// Negative where the shape may reach a tile at t. `row`: its brackets, all but the velocity.
+  /// Returns a negative number where the shape may reach a tile at t. `row`: its brackets, all but
+  /// the velocity.
   template <class D>
   static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach,
                    D* row) {
     const D ax = t.x - at.c.x, ay = t.y - at.c.y, height = t.z - at.c.z;
-    // Off the plane by some unmeasurable distance: then |D| is never zero, and the normal at the
-    // centre is ±z.
+    // z is moved off the plane by an unmeasurable distance. Then |D| is never zero, and the normal
+    // at the centre is ±z.
     const D smallest(P::kSmallest);
     const D az = select(abs(height) < smallest, smallest, height);
     const D square = mul_add(ax, ax, mul_add(ay, ay, az * az));
@@ -94,8 +95,8 @@ struct SpherePad {
     }
     const N square = mul_add(x, x, mul_add(y, y, square_z));
     if constexpr (P::kSingle) {
-      // |D| rounded, then one Newton step on D² - r², whose value does not cancel. Its slope 2|D|
-      // is taken at the surface, where |D| - r cancels; deep inside nothing does.
+      // |D| is rounded, then corrected by one Newton step on D² - r², whose value does not cancel.
+      // Its slope 2|D| is taken at the surface, where |D| - r cancels. Deep inside nothing cancels.
       const N surplus = mul_add(s.x, s.x + twice_ax, mul_add(s.y, s.y + twice_ay, rest));
       const N inverse = inverse_sqrt(square);
       const N length = square * inverse, rounded = length - radius;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A shape against the points of one tile of a pad: what a shape's file needs to take its brackets.
+// A shape against the points of one tile of a pad: what the files of shapes need to compute their
+// brackets.
 #pragma once
 
 #include "kernels/contact/contact_types.hpp"
@@ -7,8 +8,8 @@
 
 namespace tangere::kernels {
 
-/// A shape in pad axes: pose, twist relative to the pad at the pad's origin, contact parameters of
-/// the sensor.
+/// A shape in pad axes: pose, twist relative to the pad at the pad's origin, and the sensor's
+/// contact parameters.
 template <class N>
 struct Touch {
   Mat3<N> Q;
@@ -22,7 +23,7 @@ struct TouchShape {
   double size[3];  ///< as in PairContact [m]
 };
 
-/// A point from its tile's centre, pad axes [m].
+/// A point relative to its tile's centre, pad axes [m].
 template <class N, bool Curved>
 struct PointOffset {
   N x, y;  ///< z = 0
@@ -31,7 +32,7 @@ template <class N>
 struct PointOffset<N, true> {
   N x, y, z;
 };
-/// A row of a matrix times it: a x + b y + c z.
+/// Returns a row of a matrix times the offset: a x + b y + c z.
 template <class N>
 N along(const N& a, const N& b, const N&, const PointOffset<N, false>& s) {
   return mul_add(a, s.x, b * s.y);
@@ -41,6 +42,6 @@ N along(const N& a, const N& b, const N& c, const PointOffset<N, true>& s) {
   return mul_add(a, s.x, mul_add(b, s.y, c * s.z));
 }
 
-inline constexpr int kBracketRows = 10;  ///< the most that a shape has
+inline constexpr int kBracketRows = 10;  ///< largest number that a shape has
 
 }  // namespace tangere::kernels

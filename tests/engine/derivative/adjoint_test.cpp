@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of rollouts: the adjoint against differences of whole runs, for every scheme, joint
-// kind, contact law and motor.
+// Tests gradients of rollouts: the adjoint against differences of whole runs, for every scheme,
+// joint kind, contact law and motor.
 #include <gtest/gtest.h>
 
 #include "tests/engine/gradient_run.hpp"
@@ -16,7 +16,8 @@ using testing::StateLoss;
 
 constexpr int kSteps = 6;
 
-/// Every entry relative to the gradient's norm over its group; returns how many were compared.
+/// Compares every entry relative to the gradient's norm over its group. Returns how many it
+/// compared.
 int compare(const std::vector<double>& a, const std::vector<double>& b, double scale,
             double tolerance, const char* what) {
   int compared = 0;
@@ -35,7 +36,7 @@ double norm(const std::vector<double>& x) {
   return std::sqrt(sum);
 }
 
-/// Returns how many derivatives were compared: none where a step of the run finds no solution.
+/// Returns how many derivatives were compared; 0 if a step of the run finds no solution.
 int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance) {
   const Model model(scene);
   const StepperOptions options = testing::options(scheme, scene.timestep, 1e-13);
@@ -63,8 +64,8 @@ int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance
   return compared;
 }
 
-/// Whether a step of the run is split. The run jumps where that decision flips, and a difference
-/// across the jump is not a derivative.
+/// Whether a step of the run is split. The run jumps where that decision changes, and a difference
+/// across the jump is no derivative.
 bool splits(const Scene& scene, Integrator scheme, unsigned seed) {
   const Model model(scene);
   const RunInput in = random_input(model, seed, kSteps);
@@ -112,7 +113,7 @@ TEST_P(AdjointScheme, ContactsMatchDifferences) {
   EXPECT_GT(compared, 150);
 }
 
-/// Position motors whose force is that of the step's start, one of them on a ball joint.
+/// Position motors use the state at the start of the step; one of them drives a ball joint.
 TEST_P(AdjointScheme, MotorsTimedAtTheStartMatchDifferences) {
   int motors = 0, compared = 0;
   for (unsigned seed = 1; seed <= 20; ++seed) {
@@ -126,7 +127,7 @@ TEST_P(AdjointScheme, MotorsTimedAtTheStartMatchDifferences) {
   EXPECT_GT(compared, 500);
 }
 
-/// Together with others, alone in its group or in a batch of one: the same bits.
+/// Together with others, alone in its group or in a batch of one, an environment has the same bits.
 TEST_P(AdjointScheme, CompanyChangesNothing) {
   for (unsigned seed = 1; seed <= 6; ++seed) {
     const Scene scene = testing::random_contacts(seed, 3, ContactLaw(seed % 3));

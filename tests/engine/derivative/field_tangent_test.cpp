@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fields along a direction against dual numbers and against fields in reverse; every point's own
-// numbers by three routes.
+// Tests fields along a direction against dual numbers and against fields in reverse, and every
+// point's own numbers by three routes.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -43,7 +43,7 @@ struct Placed {
     tape.start(batch, 0);
     Readout(model).read(batch, lane, frame);
   }
-  /// How the whole field changes, in dual numbers.
+  /// Change of the whole field, in dual numbers.
   std::vector<double> by_duals(int lane, const std::vector<double>& points_dot,
                                const StateTangent& state) {
     std::vector<double> change(frame.dense_size());
@@ -55,7 +55,7 @@ struct Placed {
 using Case = std::tuple<PrimitiveShape, ContactLaw, Pad>;
 class AlongADirection : public ::testing::TestWithParam<Case> {};
 
-/// The three ways agree, on every instruction set and with other states in the neighbouring lanes.
+/// The three routes agree on every instruction set and with other states in the neighbouring lanes.
 TEST_P(AlongADirection, MatchesDualNumbersAndTheReverse) {
   const auto [shape, law, pad] = GetParam();
   const Model model(testing::pad_scene(shape, law, pad));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tactile fields and end effectors in reverse, against differences of what is read: every shape,
-// law and kind of pad.
+// Tests tactile fields and end effectors in reverse against differences of readings, for every
+// shape, law and kind of pad.
 #include <gtest/gtest.h>
 
 #include "engine/derivative/readout_pullback.hpp"
@@ -17,7 +17,7 @@ using testing::Random;
 using testing::Pad;
 using State = testing::PadState;
 
-/// Σ weights · what is read.
+/// Σ weights · readings.
 class Reading {
  public:
   Reading(const Model& model, unsigned seed) : model_(model) {
@@ -40,7 +40,8 @@ class Reading {
     for (std::size_t i = 0; i < 6; ++i) sum += of_end_effectors_[i] * position[i];
     return sum;
   }
-  /// In lane `lane` of a block, the others in other states. Returns how many tiles were touched.
+  /// Uses lane `lane` of a block; the other lanes have other states. Returns how many tiles were
+  /// touched.
   std::size_t pull_back(const State& s, int lane, BlockCotangent& out) const {
     Batch batch(model_, kBlock);
     batch.set_state(lane, s.q, s.v);
@@ -62,7 +63,7 @@ class Reading {
   }
 
  private:
-  /// The weights in the layout of the tiles.
+  /// Fills in the weights in the layout of the tiles.
   void tile_weights(const CompactFrame<double>& frame, std::vector<double>& out) const {
     const kernels::PadTiles pad = compiled(model_).sensors[0].tiles();
     for (std::size_t k = 0; k < frame.tiles().size(); ++k) {
@@ -143,7 +144,7 @@ TEST_P(FieldPullback, MatchesDifferences) {
           },
           g, std::max(1.0, std::abs(g)), 1e-6, info.name.c_str());
     }
-    // Lanes that nothing was put into stay untouched.
+    // Lanes without input stay unchanged.
     for (int i = 0; i < model.nv(); ++i)
       for (int l = 0; l < kBlock; ++l)
         EXPECT_TRUE(l == lane || c.q[std::size_t(i * kBlock + l)] == 0.0);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Derivatives by the sizes of bodies through contact alone: what is touched, what touches with
-// points of its own, what lies on the ground. The bodies weigh nothing, so that no size acts
-// through mass; abstract ones at the same joints do.
+// Tests derivatives by the sizes of bodies through contact alone: bodies that are touched, that
+// touch with their own points, or that lie on the ground. The bodies have no mass, so no size acts
+// through mass. Abstract bodies at the same joints have the mass.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -24,7 +24,7 @@ Shape one_ring() { return CapsuleShape{0.03, 0.018, 1, 6}; }
 Shape ellipsoid() { return EllipsoidShape{{0.06, 0.05, 0.036}, 30}; }
 Shape ball() { return SphereShape{0.025}; }
 
-/// A free body of 100 g, and with it a shape that weighs nothing.
+/// Adds a free body of 100 g that carries a massless shape.
 void add_carried(Scene& s, const std::string& name, const Vector3& at, const Shape& shape,
                  Random& random) {
   AbstractShape weight;
@@ -48,7 +48,7 @@ RunInput input_of(const Model& model, Random& random) {
   return in;
 }
 
-/// Adds to `seen` how many trials a size acted in. Nothing but contact can make it act.
+/// Adds to `seen` in how many trials a size had an effect. Only contact can give it one.
 void compare(const Scene& scene, Random& random, std::map<std::string, int>& seen) {
   const Model model(scene);
   const StepperOptions options = testing::options(Integrator::bdf1, scene.timestep, 1e-13);

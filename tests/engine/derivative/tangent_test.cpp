@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The second route: tangents in dual numbers through whole rollouts against the adjoint, for every
-// scheme and every input, fields included. λᵀ(J d) = (Jᵀλ)ᵀ d to rounding.
+// Tests tangents in dual numbers through whole rollouts against the adjoint, for every scheme and
+// every input, fields included: λᵀ(J d) = (Jᵀλ)ᵀ d to rounding.
 #include <gtest/gtest.h>
 
 #include "engine/derivative/readout_pullback.hpp"
@@ -44,8 +44,8 @@ struct Products {
   int splits = 0;                  ///< steps that were split
 };
 
-/// Of a loss that is linear in states, and in the first sensor's fields every `every` steps (0: not
-/// at all).
+/// Products for a loss that is linear in the states, and in the first sensor's fields every `every`
+/// steps (0: never).
 Products products(const Model& model, const StepperOptions& options, const RunInput& in,
                   unsigned seed, int every) {
   const CompiledModel& m = compiled(model);
@@ -174,8 +174,8 @@ TEST_P(TangentScheme, ContactsHaveTheSameProducts) {
   }
 }
 
-/// A search that may take one direction only: most steps are split, some of them again. No
-/// differences here: neighbouring runs may split elsewhere.
+/// A search that may take only one direction: most steps are split, some of them twice. There are
+/// no differences here, because neighbouring runs may split elsewhere.
 TEST_P(TangentScheme, SplitStepsHaveTheSameProducts) {
   int splits = 0;
   for (unsigned seed = 1; seed <= 12; ++seed) {
@@ -187,11 +187,11 @@ TEST_P(TangentScheme, SplitStepsHaveTheSameProducts) {
     EXPECT_NEAR(p.forward, p.backward, 1e-11 * p.size) << "seed " << seed;
     splits += p.splits;
   }
-  // The linearly implicit step solves nothing that could fail.
+  // The linearly implicit step has no search that could fail.
   EXPECT_TRUE(GetParam().scheme().solve == StageSolve::one_direction || splits > 10) << splits;
 }
 
-/// From the first touch on: pressed, rolled, turned round; fields every fifth step.
+/// From the first touch on: the ball is pressed, rolled and turned round. Fields every fifth step.
 TEST_P(TangentScheme, RollingBallHasTheSameProducts) {
   const Scene s = testing::rolling_ball(false, 40);
   const Model model(s);

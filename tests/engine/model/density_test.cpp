@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Densities that vary by environment: each moves as in a scene of its own that has its density, and
-// resets keep to their keys.
+// Tests densities that vary by environment: each environment moves as in a scene with its density,
+// and resets keep to their keys.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -32,7 +32,7 @@ RandomizationDescription density_of(const std::string& body, double low, double 
   return d;
 }
 
-/// States after `steps` steps of the scene's control.
+/// States after `steps` steps of the scene's controls.
 std::vector<std::vector<double>> run(const Model& model, Batch& batch, int steps) {
   Stepper stepper(model);
   const ControlProgram control(model, model.timestep(), batch.seed());
@@ -56,7 +56,7 @@ TEST(Density, EachEnvironmentMovesAsInASceneOfItsOwn) {
     const char *scene, *body;
     int steps;
   };
-  // A block folded into a free bar; a box on two joints, the hand's own.
+  // A block folded into a free bar; a box on two joints; the hand itself.
   for (const Case& c : {Case{"stable_grasp", "block_8", 90}, Case{"box_pushing", "box", 120},
                         Case{"box_pushing", "hand", 120}}) {
     Scene varied = scene_named(c.scene);

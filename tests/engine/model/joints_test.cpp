@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Joints in motion, with known answers: folded bodies, static bodies, limits.
+// Tests joints in motion against known answers: folded bodies, static bodies, limits.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,8 +28,8 @@ void run(const Model& model, Batch& batch, Integrator scheme, double timestep, i
 
 // --- fixed joints ---
 
-/// A box with a weightless ball under it; `parts`: in two halves on turned fixed joints, the ball
-/// on the second.
+/// A box with a weightless ball under it. With `parts` it is two halves on turned fixed joints,
+/// with the ball on the second.
 Scene thrown_box(bool parts) {
   Scene s;
   s.ground = GroundDescription{};
@@ -43,8 +43,8 @@ Scene thrown_box(bool parts) {
     s.links[0].body.pose.position = {-0.05, 0, 0};
     s.links[1].parent = 0;
     s.links[1].joint.pose.orientation = {0.8, 0.6, 0, 0};
-    // Back from the turned joint to the box's axes: the inverse of (0.03, 0.04, 0.1) and the
-    // rotation.
+    // Back from the turned joint to the box's axes: the inverse of the offset
+    // (0.03, 0.04, 0.1) and of the rotation.
     s.links[1].body.pose.orientation = {0.8, -0.6, 0, 0};
     const auto R = to_frame(s.links[1].joint.pose).R;
     const auto at = kernels::transposed_times(R, kernels::Vec3<double>{0.05 - 0.03, -0.04, -0.1});
@@ -97,7 +97,7 @@ TEST(FixedJoints, PartsMoveAndFeelLikeOneBody) {
 }
 
 TEST(FixedJoints, MotorsFollow) {
-  // A hinge on a bracket fixed to the world, and the hinge placed there directly.
+  // A hinge on a bracket that is fixed to the world, and a hinge placed there directly.
   Scene s;
   s.links = {link("bracket", JointType::fixed, {0.1, 0.2, 0.3}, kBox, 500),
              link("arm", JointType::revolute, {0, 0.1, 0}, kBox, 500)};
@@ -162,7 +162,7 @@ TEST(Limits, StopAFallWhereTheSpringCarriesIt) {
   EXPECT_NEAR(q_of(batch)[2], 0, 1e-12);
 }
 
-/// How deep a turning body goes beyond its limit follows from its energy; then it comes back as
+/// The energy of a turning body determines how deep it goes beyond its limit. It comes back equally
 /// fast.
 TEST(Limits, GiveTheEnergyBack) {
   for (JointType type : {JointType::revolute, JointType::spherical}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The generator against its published answers, the distributions against theirs.
+// Tests the generator against its published values, and the distributions against their formulas.
 #include "engine/model/random.hpp"
 
 #include <gmock/gmock.h>
@@ -16,7 +16,7 @@ namespace tangere {
 namespace {
 
 constexpr int kDraws = 10'000;
-// Kolmogorov–Smirnov: one seed in a thousand exceeds it by chance; ours is fixed.
+// Kolmogorov–Smirnov: one seed in a thousand exceeds this by chance; our seed is fixed.
 const double kLargestDistance = 1.95 / std::sqrt(double{kDraws});
 
 double distance(std::vector<double> draws, const std::function<double(double)>& probability) {
@@ -51,8 +51,9 @@ TEST(Philox, GivesThePublishedAnswers) {
 }
 
 TEST(Random, KeysMeanTheSameNumbersForEver) {
-  // Files store seeds: a change of these numbers changes what every stored seed means. The second
-  // was worked out by another implementation; in it every bit of the counter comes from one field.
+  // Files store seeds, so a change of these numbers changes the meaning of every stored seed.
+  // Another implementation computed the second number; in it every bit of the counter comes from
+  // one field.
   EXPECT_EQ(uniform({0, 0, 0, Purpose::initial_state, 0}), 0x1.989fa35785a70p-2);
   EXPECT_EQ(
       uniform({0x0123456789abcdef, 0x123456789abc, 0xfedcba987654, Purpose::control, 0xabcdef}),
@@ -79,7 +80,8 @@ TEST(Random, UniformAlongEveryFieldOfTheKey) {
     EXPECT_LT(distance(draws, [](double x) { return x; }), kLargestDistance) << name;
     EXPECT_GE(*std::min_element(draws.begin(), draws.end()), 0) << name;
     EXPECT_LT(*std::max_element(draws.begin(), draws.end()), 1) << name;
-    // Neighbours along the field are uncorrelated: five standard deviations of the sample's.
+    // Neighbours along the field are uncorrelated, within five standard deviations of the sample's
+    // correlation.
     double product = 0;
     for (std::size_t i = 1; i < draws.size(); ++i)
       product += (draws[i] - 0.5) * (draws[i - 1] - 0.5);
@@ -128,7 +130,7 @@ TEST(Random, NormalWithItsMeanAndDeviation) {
   EXPECT_LT(
       distance(draws, [](double x) { return 0.5 * std::erfc(-(x - 2) / 0.5 / std::sqrt(2)); }),
       kLargestDistance);
-  // Five standard deviations of the sample's own mean and variance.
+  // Five standard deviations of the sample's mean and variance.
   double mean = 0, variance = 0;
   for (double x : draws) mean += x / kDraws;
   for (double x : draws) variance += (x - mean) * (x - mean) / kDraws;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows of schemes: what they say of uniform motion, what is refused.
+// Tests the rows of schemes: uniform motion, and what is refused.
 #include "engine/model/scheme.hpp"
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 namespace tangere {
 namespace {
 
-/// x = ẋ t with v = ẋ throughout: every stage must find that rate and no acceleration.
+/// For x = ẋ t with v = ẋ throughout, every stage must find that rate and no acceleration.
 TEST(Schemes, EveryStageKeepsUniformMotion) {
   for (const Integrator integrator : testing::all_integrators()) {
     const Scheme& scheme = integrator.scheme();

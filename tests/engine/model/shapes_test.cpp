@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a body's shape comes to: mass by integration along its axis, where its contact points lie,
-// how it rests.
+// Tests bodies' shapes: mass by integration along the axis, positions of contact points, rest on
+// others.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -36,7 +36,7 @@ TEST(Shapes, TheTableIsInOrder) {
   }
 }
 
-/// Discs of radius R(z), summed by Simpson's rule from piece to piece: mass, I_xx, I_zz.
+/// Sums discs of radius R(z) piece by piece with Simpson's rule: mass, I_xx, I_zz.
 std::array<double, 3> integrate(double density, const std::vector<double>& pieces,
                                 const std::function<double(double)>& R) {
   std::array<double, 3> sum{};
@@ -119,7 +119,7 @@ TEST(Shapes, MassesFollowSizes) {
     }
 }
 
-/// Distance of every contact point from the surface of its own body: rounding.
+/// Expects every contact point on the surface of its own body, to rounding.
 void expect_on_surface(const Shape& shape, PrimitiveShape kind, const kernels::Vec3<double>& size) {
   const std::vector<double> p = contact_points(shape);
   for (std::size_t k = 0; k < p.size(); k += 3)
@@ -173,7 +173,7 @@ TEST(Shapes, EllipsoidPointsAreSpreadOverIt) {
   const std::vector<double> p = contact_points(shape);
   ASSERT_EQ(p.size(), 3U * 400);
   expect_on_surface(shape, PrimitiveShape::ellipsoid, {0.1, 0.06, 0.03});
-  // On the ball that they are stretched from, no cap of a fiftieth of its area is without a point.
+  // On the ball from which they are stretched, every cap of a fiftieth of its area has a point.
   for (int k = 0; k < 500; ++k) {
     const double z = 1 - (k + 0.5) / 250, turn = 2.1 * k, across = std::sqrt(1 - z * z);
     double nearest = -1;
@@ -185,7 +185,7 @@ TEST(Shapes, EllipsoidPointsAreSpreadOverIt) {
   }
 }
 
-/// A cylinder on its face sinks into a half-space until the springs of that face carry it.
+/// A cylinder standing on its face sinks into a half-space until the springs of that face carry it.
 TEST(Shapes, ACylinderRestsOnAPlane) {
   Scene s;
   s.links = {link("floor", JointType::fixed, {0, 0, 0.5}, PlaneShape{}, 1),
@@ -200,8 +200,7 @@ TEST(Shapes, ACylinderRestsOnAPlane) {
   for (const double v : v_of(batch)) EXPECT_NEAR(v, 0, 1e-8);
 }
 
-/// A plate on two parallel rods that cannot move: it sinks until their four lines of points carry
-/// it.
+/// A plate on two parallel fixed rods sinks until their four lines of points carry it.
 TEST(Shapes, APlateRestsOnRods) {
   for (const Shape& rod : {Shape(CylinderShape{0.4, 0.02}), Shape(CapsuleShape{0.4, 0.02})}) {
     Scene s;
@@ -223,7 +222,7 @@ TEST(Shapes, APlateRestsOnRods) {
   }
 }
 
-/// A pad pressed on a rod reads the rod's shape: peak depth, no shear, symmetric; nothing where
+/// A pad pressed on a rod reads the rod's shape: peak depth, no shear, symmetry, and zero where
 /// nothing touches.
 TEST(Shapes, APadReadsTheRodsItLiesOn) {
   for (const Shape& rod : {Shape(CylinderShape{0.032, 0.02}), Shape(CapsuleShape{0.032, 0.02})}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sizes and places that vary by environment: each moves, and is felt, as in a scene of its own that
-// has its numbers, whatever its neighbours have, on every instruction set.
+// Tests sizes and places that vary by environment. Each environment moves, and is felt, as in a
+// scene with its numbers, whatever its neighbours have, on every instruction set.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -42,8 +42,8 @@ SceneNumber density(const std::string& body) {
   return {NumberOwner::body, NumberField::density, body};
 }
 
-/// A pad driven onto a shape on springs, whose joint stands on an arm that turns: numbers of the
-/// shape, of where it is, of its density.
+/// A pad driven onto a shape on springs, whose joint stands on an arm that turns. Varies numbers of
+/// the shape, of its place and of its density.
 Scene pad_on(const Shape& shape, const std::vector<RandomizationDescription>& numbers) {
   Scene s;
   s.integrator = Integrator::bdf2;
@@ -67,14 +67,14 @@ Scene pad_on(const Shape& shape, const std::vector<RandomizationDescription>& nu
              {0, -1, 0},
              {1, 0, 0},
              12,
-             12};  // small: read in lanes otherwise
+             12};  // small pads are read in lanes otherwise
   s.sensors.push_back(t);
   s.control = PiecewiseControl{{0, 0.1}, {{0, 0, 0.05}, {0.1, 0.05, 0.05}}, 0};
   s.randomizations = numbers;
   return s;
 }
 
-/// The scene with the numbers of one environment in place of what varies.
+/// The scene with the numbers of one environment in place of those that vary.
 Scene written(const Scene& scene, const Batch& batch, int environment) {
   Scene own = scene;
   own.randomizations.clear();
@@ -188,7 +188,7 @@ std::vector<Case> cases() {
            60}};
 }
 
-/// Bit for bit.
+/// Each environment equals its own scene bit for bit.
 TEST(VaryingGeometry, EachEnvironmentIsASceneOfItsOwn) {
   constexpr int kEnvironments = 21;  // two blocks, three groups
   on_every_table([&] {
@@ -251,7 +251,8 @@ TEST(VaryingGeometry, NumbersCanBeSetAndAResetDrawsThemAgain) {
   EXPECT_EQ(std::vector<double>(batch.block(0), batch.block(0) + before.size()), before);
 }
 
-/// A number that varies within a point is the scene's own: the same bits as without.
+/// A number that varies within a single point is the scene's own: the bits are those without
+/// variation.
 TEST(VaryingGeometry, AScenesOwnNumbersAsWhatVariesChangeNothing) {
   for (Case c : cases()) {
     SCOPED_TRACE(c.name);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pads whose points have places, axes and coefficients of their own: kernels against one point at a
-// time, readings against each other.
+// Tests pads whose points have their own positions, axes and coefficients: kernels against one
+// point at a time, and readings against each other.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -58,7 +58,7 @@ std::vector<TactilePoint> wave(int count, bool own_factors) {
 Scene curved_ball(int count, bool own_factors = false) {
   Scene scene = testing::rolling_ball();
   scene.sensors[0].points = wave(count, own_factors);
-  // Below the pad's body, looking down: the wave is turned over.
+  // The wave is below the pad's body and faces down, so it is turned over.
   for (TactilePoint& p : scene.sensors[0].points)
     for (Vector3* a : {&p.position, &p.normal, &p.axis0, &p.axis1})
       (*a)[1] = -(*a)[1], (*a)[2] = -(*a)[2];
@@ -73,7 +73,7 @@ TouchShape shape_of(PrimitiveShape shape) {
                                          : TouchShape{shape, {0.02, 0.015, 0.01}};
 }
 
-/// What touches the wave from below, by some of its extent.
+/// Touches the wave from below, to a depth of some of the shape's extent.
 Touch<double> random_touch(Random& random, const TouchShape& s) {
   static const Scene scene = curved_ball(300);
   Touch<double> t;
@@ -116,7 +116,7 @@ int run(const KernelTable& table, const kernels::TactileArgs<float>& a) {
   return table.tactile_mixed(a);
 }
 
-/// (points, 3); tiles written go to `active`.
+/// Returns (points, 3). Writes the touched tiles to `active`.
 template <class Real>
 std::vector<Real> field(const KernelTable& table, const PadTiles& pad, ContactLaw law,
                         const TouchShape& shape, const Touch<double>& touch,
@@ -143,7 +143,7 @@ void check(const Case& c, double tolerance) {
   const std::vector<TactilePoint>& points = model.scene().sensors[0].points;
   PadTiles pad = compiled(model).sensors[0].tiles();
   ASSERT_EQ(pad.tiles(), 5);
-  // What fills the last tile up holds NaN: it must reach no real point.
+  // The padding of the last tile holds NaN, which must reach no real point.
   AlignedVector<double> offsets = compiled(model).sensors[0].offsets;
   AlignedVector<float> offsets_f = compiled(model).sensors[0].offsets_f;
   for (std::size_t k = 0; k < offsets.size(); ++k)
@@ -187,7 +187,7 @@ void check(const Case& c, double tolerance) {
 }
 
 TEST_P(CurvedPad, DoubleMatchesOnePointAtATime) { check<double>(GetParam(), 1e-12); }
-// Tiles of a centimetre, not of two millimetres: the rounding of offsets weighs more.
+// Tiles are a centimetre wide, not two millimetres, so the rounding of offsets weighs more.
 TEST_P(CurvedPad, MixedIsAFewMillionthsOfThePeakAway) { check<float>(GetParam(), 5e-6); }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -201,7 +201,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{PrimitiveShape::ellipsoid, ContactLaw::clamped, true},
                       Case{PrimitiveShape::capsule, ContactLaw::paper, true}));
 
-/// The ball under the wave of environment e.
+/// Puts the ball under the wave of environment e.
 void press(Batch& batch, int e, double depth, double where) {
   std::vector<double> q = testing::q_of(batch, e), v = testing::v_of(batch, e);
   q[2] = -0.012 - depth;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Positions, velocities and Jacobians of end effectors against closed forms, differences and
+// Tests positions, velocities and Jacobians of end effectors against closed forms, differences and
 // motion.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -94,7 +94,7 @@ TEST(EndEffectors, OfAFreeBodyTurnAndFlyWithIt) {
               "position");
   // ω = 3 x in body axes: ω × p = 3 (0, -0.3, 0.2) there, (0.6, 0, -0.9) in the world.
   expect_near(r.velocity, {1 + 0.6, -1, 2 - 0.9, 0, 0, 0}, 1e-15, "velocity");
-  // Columns of rotation: e × p in body axes, its components moved on by one.
+  // Columns of rotation: e × p in body axes; the pose moves each component on by one.
   expect_near(r.jacobian, {1, 0, 0, 0.2,  -0.1, 0,     //
                            0, 1, 0, 0,    0.3,  -0.2,  //
                            0, 0, 1, -0.3, 0,    0.1,   //
@@ -116,7 +116,7 @@ std::vector<double> random_numbers(Random& random, int count) {
   for (double& value : x) value = random.uniform(-1, 1);
   return x;
 }
-/// q moved by `by` along a dof, rotations on the right.
+/// Moves q by `by` along a dof, with rotations on the right.
 std::vector<double> moved(const Model& model, std::vector<double> q, int dof, double by) {
   for (const kernels::Link& l : compiled(model).links) {
     const int k = dof - l.v;
@@ -163,7 +163,7 @@ TEST(EndEffectors, JacobianIsTheDifferenceOfPositionsAndGivesTheVelocity) {
 }
 
 TEST(EndEffectors, VelocityIsThatOfTheMotion) {
-  // Second order in the step: a fifth of the step, a twenty-fifth of the error, give or take.
+  // Second order in the step: a fifth of the step gives about a twenty-fifth of the error.
   const Model model(marked_tree(3));
   const auto error = [&](double h) {
     Random random(9);

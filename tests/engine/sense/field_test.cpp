@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a tactile field says about a contact: directions and patterns of shear, uniform pressure,
-// zero after release, and its balance with the wrench of the contact.
+// Tests what a tactile field says about a contact: directions and patterns of shear, uniform
+// pressure, zero after release, and its balance with the wrench of the contact.
 //
 // The pad lies above its object and feels with its lower face. axis0 = x and axis1 = -y of the pad,
-// their product points down and out: the numbers are f_x, -f_y, f_z of the force on the pad, and
+// so their product points down and out. The numbers are f_x, -f_y, f_z of the force on the pad, and
 // pressure is positive.
 #include <gtest/gtest.h>
 
@@ -37,7 +37,7 @@ TactileDescription skin() {
   return t;
 }
 
-/// A pad, pressed by kDepth onto an object whose middle is the world's origin.
+/// A pad pressed by kDepth onto an object whose middle is the world's origin.
 Scene pad_on(JointType pad_joint, JointType object_joint, const Shape& object, double top) {
   Scene s;
   s.gravity = {0, 0, 0};
@@ -54,7 +54,7 @@ Scene on_block(JointType pad_joint, JointType block_joint = JointType::fixed) {
   return pad_on(pad_joint, block_joint, CuboidShape{{0.1, 0.1, 0.02}, {2, 2, 2}}, 0.01);
 }
 
-/// The force on the pad at each point, in the pad's axes [N], and where the point is.
+/// The force on the pad at each point in the pad's axes [N], and the point's position.
 struct Field {
   std::vector<double> numbers;
   [[nodiscard]] int points() const { return int(numbers.size() / 3); }
@@ -129,7 +129,7 @@ TEST(Field, PressingAloneReadsNoShear) {
   const Field flat = read(Model(on_block(JointType::translational)), {0, 0, 0}, {0, 0, -0.05});
   EXPECT_EQ(flat.largest_shear(), 0);
   EXPECT_GT(flat.sum().z, 0);
-  // A ball pushes its dent apart: shear is radial, and adds up to nothing.
+  // A ball pushes its dent apart, so shear is radial and its sum is zero.
   const Field round = read(Model(on_ball(JointType::translational)), {0, 0, 0}, {0, 0, -0.05});
   for (int p = 0; p < round.points(); ++p) {
     const Vec3<double> r = Field::at(p), f = round.force(p);
@@ -190,8 +190,8 @@ TEST(Field, AYawedPadReadsInItsOwnAxes) {
     EXPECT_NEAR(quarter.numbers[k], straight.numbers[k], 1e-14);
     EXPECT_NEAR(askew.numbers[k], straight.numbers[k], 1e-14);
   }
-  // Turned by 90° and dragged along the world's +x, which is -y of the pad: dragged back along +y
-  // of the pad.
+  // The pad is turned by 90° and dragged along the world's +x, its own -y. The shear drags it back
+  // along its +y.
   const Field across = read(model, {0, 0, std::acos(-1.0) / 2}, {0.1, 0, 0});
   EXPECT_GT(across.sum().y, 0);
   EXPECT_NEAR(across.sum().x, 0, 1e-12 * across.sum().y);
@@ -254,8 +254,8 @@ TEST(Field, NothingIsLeftAfterRelease) {
   EXPECT_EQ(read_all(0.1), 0);
 }
 
-/// Where points and coefficients of sensor and contact are the same, forces and moments of the
-/// field are the wrench that the dynamics feels, taken from its residual: with the contact less
+/// If sensor and contact have the same points and coefficients, forces and moments of the field are
+/// the contact's wrench in the dynamics. That is the residual with the contact minus the residual
 /// without.
 TEST(Field, SumAndMomentAreTheWrenchOfTheContact) {
   testing::Random random(5);
@@ -268,7 +268,8 @@ TEST(Field, SumAndMomentAreTheWrenchOfTheContact) {
         {"pad", "object", s.sensors[0].coefficients, ContactLaw::clamped, 1e-5, {}});
     const Model model(s);
     for (int trial = 0; trial < 20; ++trial) {
-      // Both turned a little, the pad pressed in deeper; joint frames are at the bodies' middles.
+      // Both are turned a little, and the pad is pressed in deeper. Joint frames are at the bodies'
+      // middles.
       std::vector<double> q(14), v(12);
       for (const std::size_t body : {0U, 1U}) {
         const Vec3<double> small = random.vector(0.02);

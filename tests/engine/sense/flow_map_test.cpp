@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Flow maps: hand-computed numbers, one scale for all fields, zero without contact, no scale left
-// in the result.
+// Tests flow maps: numbers computed by hand, one scale for all fields, zero without contact, no
+// scale left in the result.
 #include "engine/sense/flow_map.hpp"
 
 #include <gmock/gmock.h>
@@ -27,7 +27,7 @@ class FlowMap : public ::testing::Test {
  protected:
   using Field = std::vector<T>;
 
-  /// Of whole fields, one after the other.
+  /// Flow map of whole fields, one after the other.
   Field flow(const std::vector<Field>& fields, double smallest = 0) {
     std::vector<ShearField<T>> in;
     std::size_t points = 0;
@@ -55,8 +55,8 @@ using Types = ::testing::Types<float, double>;
 TYPED_TEST_SUITE(FlowMap, Types);
 
 TYPED_TEST(FlowMap, DividesShearByTheLongestOfAllFields) {
-  // Lengths 5, 0 on one pad, 10, 2.5 on the other; pressure is larger than all of them and does not
-  // count.
+  // Lengths are 5, 0 on one pad and 10, 2.5 on the other. Pressure is larger than all of them but
+  // does not count.
   const auto map = this->flow({{3, 4, 100, 0, 0, 50}, {-6, 8, -1000, 0, -2.5, 0}});
   EXPECT_EQ(this->longest, 10);
   using T = TypeParam;
@@ -94,8 +94,8 @@ TYPED_TEST(FlowMap, IsZeroUpToTheSmallestThatCounts) {
 
 TYPED_TEST(FlowMap, HasALongestArrowOfOneAndNoScale) {
   using T = TypeParam;
-  // A power of two changes no digit, another factor the last ones; nor do the ends of the range
-  // overflow or vanish.
+  // A power of two changes no digit; another factor changes the last digits. The ends of the range
+  // neither overflow nor vanish.
   constexpr int kFar = sizeof(T) == 4 ? 100 : 1000;
   const double tiny = std::ldexp(1.0, -kFar), huge = std::ldexp(1.0, kFar);
   const double rounding = 4 * double(std::numeric_limits<T>::epsilon());
@@ -163,7 +163,8 @@ TEST(FlowMapOfARun, IsZeroBeforeContactAndThenTheShearWithoutItsScale) {
   EXPECT_NEAR(most, 1, 1e-15);
 }
 
-/// Derivatives against differences, by every number of two fields, one of them less a field before.
+/// Derivatives against differences by every number of two fields; one has an earlier field
+/// subtracted.
 TEST(FlowMap, DerivativesMatchDifferences) {
   std::vector<double> first, second, before, weights;
   for (int i = 0; i < 15; ++i)

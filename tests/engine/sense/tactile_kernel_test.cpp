@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tactile kernels of every instruction set, both precisions, across points and across
-// environments, against one point at a time. Padding, culling and what else is on the pad must not
-// matter.
+// Tests the tactile kernels of every instruction set, in both precisions, across points and across
+// environments, against one point at a time. Padding, culling and other contacts of the pad must
+// not matter.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,7 +39,7 @@ const CompiledSensor& pad_sensor() {
   return compiled(model).sensors[0];
 }
 
-/// The pad with NaN where an edge tile has no point: none may reach a real one.
+/// The pad with NaN where an edge tile has no point. No NaN may reach a real point.
 struct PoisonedPad {
   PadTiles tiles = pad_sensor().tiles();
   AlignedVector<double> offsets = pad_sensor().offsets;
@@ -97,7 +97,7 @@ Touch<double> random_pose(Random& random) {
   return t;
 }
 
-/// A shape that is sunk in the pad somewhere, in any orientation, moving. Half-spaces leave a part
+/// A moving shape that is sunk in the pad somewhere, in any orientation. Half-spaces leave a part
 /// of the pad free. Rods and ellipsoids are sunk to half their radius: near the axis the normal
 /// turns with the last digit of the position, in any precision.
 Touch<double> random_touch(Random& random, const TouchShape& s) {
@@ -261,7 +261,7 @@ TEST_P(TactileKernel, TilesHoldTheDenseField) {
   check_tiles<float>(GetParam());
 }
 
-/// Sixteen environments; those of `absent` are read by nobody and hold NaN.
+/// Sixteen environments. Nobody reads those of `absent`, which hold NaN.
 template <class Real>
 void check_block(const Case& c) {
   constexpr int kLanes = std::is_same_v<Real, float> ? 16 : 8;
@@ -325,8 +325,8 @@ TEST_P(TactileKernel, AxesThatAreNotQuitePerpendicularGetTheirOwnComponents) {
   }
 }
 
-/// The axis of a rod through a point of the pad, along and across it; a corner of the rim in the
-/// pad; a face in its plane: finite forces, the same as one point at a time in double precision.
+/// A rod's axis through a point of the pad, along and across it; a corner of its rim in the pad; a
+/// face in the pad's plane. Forces are finite and equal one point at a time in double precision.
 TEST_P(TactileKernel, KinksHaveTheForceOfOnePoint) {
   const TouchShape shape = shape_of(GetParam().shape);
   const PoisonedPad pad;

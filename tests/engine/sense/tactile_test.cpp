@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Readings of tactile fields: every way of reading gives the same numbers, in either precision,
-// wherever the environment is.
+// Tests readings of tactile fields: every way of reading gives the same numbers, in either
+// precision, wherever the environment is in the batch.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,8 +20,8 @@ namespace {
 
 using kernels::Vec3;
 
-/// The ball under the pad of environment e, sunk by `depth` [m], turning and sliding; `far` [m]
-/// away from the origin.
+/// Puts the ball under the pad of environment e, sunk by `depth` [m], turning and sliding, `far`
+/// [m] away from the origin.
 void press(Batch& batch, int e, double depth, double where, double far = 0) {
   std::vector<double> q = testing::q_of(batch, e), v = testing::v_of(batch, e);
   q[0] = far, q[1] = -far, q[2] = -0.015 - depth + far;
@@ -62,7 +62,8 @@ struct Reading {
 };
 class TactileReading : public ::testing::TestWithParam<Reading> {};
 
-/// Frames that live on from reading to reading, alone and by blocks, against fields read whole.
+/// Compares frames that are reused from reading to reading, alone and by blocks, with fields read
+/// whole.
 template <class Frame, class T>
 void check_frames(const Reading& c, int environments) {
   const Model model(testing::rolling_ball(false, c.resolution));
@@ -85,7 +86,7 @@ void check_frames(const Reading& c, int environments) {
     for (int e = 0; e < environments; ++e)
       EXPECT_EQ(values(block[std::size_t(e)]), field<T>(readout, batch, e))
           << "environment " << e << " by block";
-    // One of a block read alone in between.
+    // Reads one environment of a block alone in between.
     readout.read(pressed(model, environments, moment + 3), 0, block[0]);
   }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Same seed, same bits: any batch size, any lane, whatever the neighbours do, on every instruction
-// set.
+// Tests that the same seed gives the same bits, for any batch size, in any lane, whatever the
+// neighbours do, on every instruction set.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -73,7 +73,7 @@ TEST(Batch, AThousandNeighboursChangeNothing) {
   EXPECT_EQ(run(model, 1, 0, 999, 90), run(model, 1000, 999, 0, 90));
 }
 
-/// Trees of random joints, spheres and cuboids in contact, thrown about: an environment on its own
+/// Trees of random joints, with spheres and cuboids in contact, thrown about: an environment alone
 /// against the same one in a group of eight and in a crowd.
 TEST(Batch, RandomScenesHaveTheSameBitsAloneAndInAGroup) {
   int touching = 0;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Against the published simulator's box pushing: fields at its states, its states in our residual,
-// its trajectory.
+// Compares with the published simulator's box pushing: fields at its states, its states in our
+// residual, its trajectory.
 //
-// A "switch" computes a point's force as published, in world axes and apart from the kernels' sums:
-// the pad's velocity at its own point x, the box's at x₂; the force on the pad acts at x; friction
-// of the dynamics is bounded by μ √(1 + |x × n|²) |N|.
+// A "switch" computes a point's force as published, in world axes and separately from the kernels'
+// sums. It uses the velocity of the pad at its own point x and that of the box at x₂. The force on
+// the pad acts at x. In the dynamics, friction is bounded by μ √(1 + |x × n|²) |N|.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -54,7 +54,7 @@ Pose pose_at(const std::vector<std::string>& cells, std::size_t first) {
   return {{x(0), x(1), x(2)}, {x(3), x(4), x(5), x(6)}};
 }
 
-/// Their scene from bodies.csv: masses and inertias as they are, but for the pad and the box, which
+/// Their scene from bodies.csv, with masses and inertias as given, except that the pad and the box
 /// have shapes.
 Scene pushing() {
   const double length = double(0.003F), radius = double(0.018F);
@@ -143,7 +143,8 @@ struct Pushing {
   [[nodiscard]] Vec3<double> box_velocity(const Vec3<double>& x) const {
     return box_slide + cross(Vec3<double>{0, 0, box_rate}, x - box.p);
   }
-  /// What a force on the pad at x, and its opposite on the box at x2, do on the seven dofs.
+  /// Adds the effect on the seven dofs of a force on the pad at x and its opposite on the box at
+  /// x2.
   void add(std::vector<double>& forces, const Vec3<double>& f, const Vec3<double>& x,
            const Vec3<double>& x2, double sign) const {
     const double on[7] = {cross(x - base, f).z,   dot(hand_x, f), dot(hand_y, f), -f.x, -f.y, -f.z,
@@ -152,7 +153,7 @@ struct Pushing {
   }
 };
 
-/// One point as published (`switched`) or as ours.
+/// The force of one point, as published (`switched`) or as ours.
 struct PointForce {
   double d = 0;
   bool slips = false;
@@ -240,7 +241,7 @@ TEST_F(BoxPushing, ItsStatesSolveOurResidual) {
     std::copy(tau, tau + 7, b.tau.begin());
     b.residual(1 / h, 1 / h);
     for (double g : b.g) worst = std::max(worst, std::abs(g));
-    // g loses what contacts do: take ours back, and give theirs.
+    // g has lost what contacts do: add our forces back, and subtract theirs.
     std::vector<double> theirs = b.g;
     const Pushing at(m.scene, q[t + 1], rate[t + 1]);
     bool slips = false;
@@ -265,9 +266,9 @@ TEST_F(BoxPushing, ItsStatesSolveOurResidual) {
   EXPECT_GT(worst, 1e-4) << "then the switch would switch nothing";
 }
 
-/// The switch leaves 1e-8 N unexplained, so where the trajectories part it is by those two laws.
-/// They part by less than 0.4 of what our own positions move when h is halved, rates by less than
-/// 0.1: the difference is below the scheme's error.
+/// The switch leaves 1e-8 N unexplained, so only those two laws separate the trajectories. The
+/// distance is below 0.4 of the change of our own positions when h is halved, and below 0.1 for
+/// rates. So the difference is below the scheme's error.
 TEST_F(BoxPushing, TrajectoriesDifferByLessThanTheStepSizeMatters) {
   const auto run = [&](int refine) {
     StepperOptions o;
@@ -293,8 +294,8 @@ TEST_F(BoxPushing, TrajectoriesDifferByLessThanTheStepSizeMatters) {
       most = std::max(most, std::abs(a[t][i] - b[t + shift][i]));
     return most;
   };
-  // Measured: 1.5e-6 rad, 2.2e-7 m, 2.7e-6 m; 2.2e-7 m, 2.5e-6 m, 2.1e-9 m, 4.8e-5 rad on ways of
-  // up to 0.12 m and 0.06 rad.
+  // Measured: 1.5e-6 rad, 2.2e-7 m, 2.7e-6 m; 2.2e-7 m, 2.5e-6 m, 2.1e-9 m, 4.8e-5 rad, over
+  // distances of up to 0.12 m and 0.06 rad.
   const double limits[7] = {2e-6, 3e-7, 4e-6, 3e-7, 4e-6, 3e-9, 6e-5};
   for (std::size_t i = 0; i < 7; ++i) {
     EXPECT_LT(apart(ours.first, q, i, 1), limits[i]) << "coordinate " << i << " [rad, m]";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Candidate lists decide speed, never results: any margin gives the same bits, and a lane that
-// outruns its list is noticed.
+// Tests that candidate lists affect speed but never results: any margin gives the same bits, and a
+// lane that outruns its list is noticed.
 #include <gtest/gtest.h>
 
 #include "engine/step/detection.hpp"
@@ -18,8 +18,8 @@ struct Trajectory {
   int rows = 0;  // longest list seen
 };
 
-/// Eight balls under a pad at different places, stepped by hand so that the margin is ours to
-/// choose.
+/// Eight balls at different places under a pad, stepped by hand so that the test can choose the
+/// margin.
 Trajectory run(double margin, const kernels::KernelTable& table) {
   const auto m = compile(testing::rolling_ball(false, 8));
   Workspace w(*m);
@@ -41,7 +41,7 @@ Trajectory run(double margin, const kernels::KernelTable& table) {
       const std::vector<double> u = testing::rolling_ball_control(100);
       for (int i = 0; i < 3; ++i) w.stage.tau[i][l] = u[std::size_t(i)];
     }
-    // What the stepper does around advance(): the state before becomes the history.
+    // Does what the stepper does around advance(): the state before becomes the history.
     std::vector<kernels::LaneRow> q0(w.q0, w.q0 + m->nq), v0(w.v0, w.v0 + m->nv);
     NewtonReport report;
     step.advance(table, w, alone, kAllLanes, history, report);
@@ -71,8 +71,8 @@ TEST(Candidates, AnyMarginGivesTheSameBits) {
   }
 }
 
-/// A bar of three blocks above a table, a cylinder and a ball, all fixed: nine pairs of shapes, one
-/// pair of links.
+/// A bar of three blocks above a table, a cylinder and a ball, all fixed: nine pairs of shapes but
+/// one pair of links.
 Scene bar_above_shapes() {
   Scene s;
   s.name = "bar";
@@ -95,7 +95,7 @@ Scene bar_above_shapes() {
   return s;
 }
 
-/// States after some steps; `margin` 0: the model's own. Counts the candidates that were listed.
+/// States after some steps. `margin` 0: the model's own. Counts the listed candidates.
 Trajectory drop_bar(double margin, const kernels::KernelTable& table) {
   const auto m = compile(bar_above_shapes());
   EXPECT_EQ(m->link_pairs.size(), 1U);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which control holds in which step, and what is no control.
+// Tests which control holds in which step, and which controls are refused.
 #include "engine/step/control.hpp"
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Orders of convergence of every scheme on smooth motion, in q and in v.
+// Tests the order of convergence of every scheme on smooth motion, in q and in v.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -84,7 +84,7 @@ struct Case {
   const char* name;
   Scene (*scene)();
   double duration;
-  int few;  ///< steps that order 3 shows at: its errors come to the reference's own soon
+  int few;  ///< steps that show order 3: its errors soon reach the reference's own
 };
 
 class Convergence : public ::testing::TestWithParam<Case> {};
@@ -119,8 +119,8 @@ INSTANTIATE_TEST_SUITE_P(Scenes, Convergence,
                          [](const auto& param) { return std::string(param.param.name); });
 
 TEST(Convergence, ASplitInsideBdf2KeepsOrderTwo) {
-  // Steps replaced by SDIRK2 half steps, as a split does: the history at the grid points stays
-  // valid.
+  // Replaces some steps by two half steps of SDIRK2, as a split does. The history at the grid
+  // points stays valid.
   const Model model(tumbling());
   const double duration = 0.4;
   const State exact = run(model, Integrator::sdirk2, duration, 6400);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mass matrix, bias, joint forces and accelerations against the dense derivation in world axes, on
-// random trees.
+// Tests mass matrix, bias, joint forces and accelerations against the dense derivation in world
+// axes, on random trees.
 #include <gtest/gtest.h>
 
 #include "tests/engine/dense_dynamics.hpp"
@@ -16,8 +16,8 @@ using testing::StageBuffers;
 using Vector = Eigen::VectorXd;
 using Matrix = Eigen::MatrixXd;
 
-/// ID(q, v, a) less the joints' forces by the kernels: with x = 0, c₀/h = 0 and 1/h = 1 a stage's
-/// rates are r, its a is s.
+/// The kernels' ID(q, v, a) minus the joints' forces. With x = 0, c₀/h = 0 and 1/h = 1, the rates
+/// of a stage are r and its a is s.
 class Kernels {
  public:
   explicit Kernels(const CompiledModel& m) : m_(m), b_(m) {}
@@ -32,8 +32,8 @@ class Kernels {
     b_.residual(0, 1);
     return Eigen::Map<const Vector>(b_.g.data(), m_.nv);
   }
-  /// At rest: the residual is linear in a, and large accelerations drown the rounding of what does
-  /// not depend on a.
+  /// Computed at rest: the residual is linear in a, and large accelerations make the rounding of
+  /// the other terms negligible.
   Matrix mass() {
     b_.r.assign(b_.r.size(), 0);
     const Vector rest = residual(Vector::Zero(m_.nv));
@@ -60,8 +60,8 @@ State random_state(const CompiledModel& m, Random& random) {
   return s;
 }
 
-/// Controls as motors take them: targets of position motors; force motors rest at the middle of
-/// their range.
+/// Controls in the form that motors take: targets of position motors, while force motors stay in
+/// the middle of their range.
 std::vector<double> controls(const CompiledModel& m, const Vector& target, Vector& middle) {
   std::vector<double> u;
   middle = Vector::Zero(m.nv);
@@ -98,8 +98,8 @@ void compare(const Scene& scene, unsigned seed, bool solve) {
     for (int i = 0; i < m->nv; ++i) EXPECT_NEAR(rest[i], expected[i], 1e-10 * scale) << "dof " << i;
     if (!solve) continue;
     const Vector a = dense.acceleration(s.q, s.v, controls(*m, s.target, middle));
-    const Vector left =
-        kernels.residual(a) - middle;  // no residual at the independent accelerations, and back
+    const Vector left = kernels.residual(a) -
+                        middle;  // the residual is zero at the independent accelerations; and back
     EXPECT_LT(left.norm(), 1e-10 * (scale + (t.mass * a).norm()));
     const Vector ours = -M.ldlt().solve(rest);
     EXPECT_LT((ours - a).norm(), 1e-10 * a.norm());
@@ -116,13 +116,13 @@ TEST(Dynamics, TreesMatchTheDenseDerivation) {
 TEST(Dynamics, MachinesMatchTheDenseDerivation) {
   for (unsigned seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    // Two slides along one direction with nothing between them have a singular mass matrix: forces
-    // only.
+    // Two slides along one direction with nothing between them have a singular mass matrix, so this
+    // compares only forces.
     compare(testing::random_machine(seed, 2 + static_cast<int>(seed % 9)), seed, false);
   }
 }
 
-/// Deep trees of one joint type: errors would grow with depth.
+/// Deep trees of one joint type, because errors would grow with depth.
 TEST(Dynamics, DeepChainsMatchTheDenseDerivation) {
   for (JointType type :
        {JointType::revolute, JointType::prismatic, JointType::planar, JointType::translational,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The analytic Jacobian of the residual: three routes on random trees with and without contact,
-// every joint kind.
+// Tests the analytic Jacobian of the residual by three routes, on random trees with and without
+// contact, with every joint kind.
 #include <gtest/gtest.h>
 
 #include "kernels/numbers/dual.hpp"
@@ -23,8 +23,8 @@ double norm_of(const CompiledModel& m, const StageBuffers<double>& b) {
   return worst;
 }
 
-/// Each row is measured by its own largest entry: rows of light and heavy bodies differ by many
-/// decades.
+/// Measures each row by its own largest entry, because rows of light and heavy bodies differ by
+/// many decades.
 std::vector<double> row_scales(const CompiledModel& m, const StageBuffers<double>& b) {
   std::vector<double> scale(std::size_t(m.nv), 0);
   for (int i = 0; i < m.nv; ++i)
@@ -106,7 +106,7 @@ TEST(Jacobian, ContactsWithFixedBodiesMatchDualNumbers) {
   EXPECT_GT(touched, 200);
 }
 
-/// Returns how many entries were compared; those with a kink within ±e are left out.
+/// Returns how many entries were compared. Leaves out entries with a kink within ±e.
 int compare_with_central_differences(const CompiledModel& m, StageBuffers<double>& b, double e,
                                      double tolerance) {
   b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
@@ -153,8 +153,8 @@ using TypeAndEffect = std::tuple<JointType, Effect>;
 
 class JointEffectJacobian : public ::testing::TestWithParam<TypeAndEffect> {};
 
-/// A joint with one effect between a free body and another: every derivative of it, and that it is
-/// there at all.
+/// A joint with one effect between a free body and another. Tests all of its derivatives, and that
+/// the effect exists.
 TEST_P(JointEffectJacobian, MatchesDualNumbersAndActs) {
   const auto [type, effect] = GetParam();
   const bool mixed = type == JointType::free || type == JointType::free2d;
@@ -188,7 +188,7 @@ TEST_P(JointEffectJacobian, MatchesDualNumbersAndActs) {
     acting += plain.g != b.g;
     felt += plain.A != b.A;
   }
-  // Inside its limits a joint feels nothing; a clipped motor pushes without being felt in A.
+  // Inside its limits a joint has no effect. A clipped motor pushes but does not appear in A.
   EXPECT_GT(acting, effect == Effect::limit ? 5 : 19);
   EXPECT_GT(felt, effect == Effect::limit || effect == Effect::clipped_motor ? 1 : 19);
 }

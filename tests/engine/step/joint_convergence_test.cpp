@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Orders of convergence against solutions found another way: dense equations in world axes,
+// Tests orders of convergence against solutions from another method: dense equations in world axes,
 // extrapolated in long double.
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ using testing::link;
 using Long = long double;
 using Dense = testing::DenseDynamics<Long>;
 
-/// Bars hanging on each other on skew hinges.
+/// Bars that hang on each other by skew hinges.
 Scene bars(int count, double damping) {
   Scene s;
   const Vector3 axes[] = {{0, 1, 0}, {0.6, 0.8, 0}, {0, 0.6, 0.8}};
@@ -35,7 +35,7 @@ Scene bars(int count, double damping) {
 
 Scene pendulum() { return bars(4, 0); }
 
-/// Seven damped joints with springs and rotors, one of them driven to a target.
+/// Seven damped joints with springs and rotors; a motor drives one of them to a target.
 Scene arm() {
   Scene s = bars(7, 0.02);
   for (std::size_t i = 0; i < 7; ++i) {
@@ -98,7 +98,8 @@ Scene branches() {
   return s;
 }
 
-/// A free body of three different moments of inertia turning about the middle one: it flips.
+/// A free body with three different moments of inertia that turns about the middle one, so it
+/// flips.
 Scene tumbling() {
   Scene s;
   s.gravity = {0, 0, 0};
@@ -116,7 +117,7 @@ struct Case {
   int steps;  ///< of the first-order schemes' coarse run
 };
 
-/// (q, v) of the dense equations after a time, quaternions of unit length.
+/// Returns (q, v) of the dense equations after a time, with quaternions of unit length.
 Dense::Vector reference(const Scene& scene, const std::vector<double>& u, double duration,
                         int steps) {
   const Dense dense(scene);
@@ -135,7 +136,7 @@ struct Errors {
   double q, v;
 };
 
-/// Distance to the reference in q and v; the sign of a quaternion means nothing.
+/// Distance to the reference in q and v. The sign of a quaternion does not matter.
 Errors errors(const Model& model, Integrator scheme, const std::vector<double>& u, double duration,
               int steps, const Dense::Vector& exact) {
   Stepper stepper(model, testing::options(scheme, duration / steps, 1e-13));
@@ -185,7 +186,7 @@ TEST_P(JointConvergence, SchemesReachTheIndependentSolutionWithTheirOrder) {
         << to_string(s.scheme) << ", error " << fine.q;
     EXPECT_NEAR(std::log2(coarse.v / fine.v), s.order, s.slack)
         << to_string(s.scheme) << ", error " << fine.v;
-    // Of the size of the errors of a finer step: the right solution, not just any.
+    // Errors are as small as those of a finer step, so the solution is the right one.
     EXPECT_LT(fine.q, s.order == 1 ? 0.05 : 2e-3) << to_string(s.scheme);
   }
 }

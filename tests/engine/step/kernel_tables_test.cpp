@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every kernel table this machine can run, against the plain scalar run of the same templates, with
-// poisoned neighbour lanes; AVX2 and AVX-512 bit for bit.
+// Tests every kernel table that this machine can run against the plain scalar run of the same
+// templates, with poisoned neighbour lanes. AVX2 and AVX-512 agree bit for bit.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -20,7 +20,7 @@ using testing::StageBuffers;
 
 constexpr double kStep = 0.004, kC0 = 1.5;
 
-/// A workspace whose candidate lists hold every point, in all lanes.
+/// A workspace whose candidate lists contain every point, in all lanes.
 template <int L>
 void list_everything(const CompiledModel& m, BasicWorkspace<L>& w) {
   for (std::size_t k = 0; k < m.pairs.size(); ++k) {
@@ -83,7 +83,7 @@ void expect_close(const std::vector<double>& a, const std::vector<double>& b, do
 
 class KernelTables : public ::testing::TestWithParam<unsigned> {};
 
-/// `friction_tangent`: of the lane that is looked at; its neighbours have the other.
+/// `friction_tangent`: for the lane under test; its neighbours have the other value.
 void compare_tables(const Scene& scene, unsigned seed, double friction_tangent = 1) {
   const auto m = compile(scene);
   StageBuffers<double> b(*m);
@@ -221,7 +221,8 @@ TEST_P(KernelTables, LuSolvesAndJudgesItself) {
 INSTANTIATE_TEST_SUITE_P(Seeds, KernelTables, ::testing::Range(1U, 13U));
 
 TEST(KernelTable, AUselessFactorIsNotSound) {
-  // A leaf whose own block nearly vanishes while it is coupled: plain elimination loses all digits.
+  // A leaf whose own block nearly vanishes although it is coupled: plain elimination loses all
+  // digits.
   const auto m = compile(testing::random_contacts(5, 3, ContactLaw::clamped));
   const int n = m->nv;
   for (const kernels::KernelTable* table : kernels::available_kernels()) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exactly at a kink a derivative is finite and that of one side, which a one-sided difference gives
-// as well: of no contact at the first touch, of sticking on the bound of friction, of the inside at
-// a limit and at a clip.
+// Tests that exactly at a kink a derivative is finite and belongs to one side, where a one-sided
+// difference agrees. At the first touch it is the side without contact, on the bound of friction
+// that of sticking, at a limit and at a clip the inside.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -19,7 +19,7 @@ using testing::StateLoss;
 
 constexpr double kStep = 5e-3;
 
-/// A ball that slides on the ground, in x, y, z, pushed by up to 10 N; without gravity.
+/// A ball that slides on the ground, with dofs x, y, z and pushes of up to 10 N, without gravity.
 Scene ball_on_ground() {
   Scene s;
   s.name = "ball_on_ground";
@@ -51,7 +51,7 @@ struct Case {
     return testing::adjoint_of_run(model, options, {in}, loss, 0);
   }
 
-  /// Derivative towards one side, of second order; `change`(input, e).
+  /// Derivative towards one side, of second order. `change`(input, e) moves the input by e.
   template <class Change>
   [[nodiscard]] double towards(double side, const Change& change) const {
     const auto at = [&](double e) {
@@ -121,8 +121,8 @@ TEST_P(Kinks, AtAClipItIsThatOfTheInside) {
   }
 }
 
-/// The push at which the ball begins to slip, to the last bit: the largest that it sticks at, and
-/// the next.
+/// Finds the push at which the ball begins to slip, to the last bit: the largest push at which it
+/// sticks, and the next number.
 TEST_P(Kinks, BetweenStickAndSlipItIsThatOfEitherSide) {
   Scene s = ball_on_ground();
   s.gravity = {0, 0, -9.8};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Position motors with known answers, at either timing; numbers of joints and motors that vary.
+// Tests position motors against known answers, at either timing, and varying numbers of joints and
+// motors.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Closed forms and invariants: free fall, tumbling, rest, rolling, signs of shear, uniform
+// Tests closed forms and invariants: free fall, tumbling, rest, rolling, signs of shear, uniform
 // pressure, first touches.
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ TEST(Physics, FreeFallIsAParabola) {
     for (int k = 0; k < 50; ++k) stepper.step(batch, {});
     const double t = 0.5;
     EXPECT_NEAR(q_of(batch)[0], 0.3 * t, 1e-11);
-    // BDF2 and SDIRK2 integrate constant acceleration exactly but for the start.
+    // BDF2 and SDIRK2 integrate constant acceleration exactly, except at the start.
     EXPECT_NEAR(q_of(batch)[2], 1 * t - 0.5 * 9.8 * t * t, 2e-4);
     EXPECT_NEAR(v_of(batch)[2], 1 - 9.8 * t, 1e-10);
     EXPECT_NEAR(v_of(batch)[4], 5, 1e-11);
@@ -79,8 +79,8 @@ TEST(Physics, SphereRestsWhereTheSpringCarriesIt) {
 }
 
 TEST(Physics, BallRollsWithoutSlippingUnderAMovingPad) {
-  // Viscous stick needs a little creep; with a heavy pad and a light ball the contact speeds match
-  // to the creep.
+  // Viscous sticking needs a little creep. With a heavy pad and a light ball the contact speeds
+  // agree up to that creep.
   Scene s = testing::rolling_ball(false, 8);
   const Model model(s);
   Stepper stepper(model);
@@ -96,7 +96,7 @@ TEST(Physics, BallRollsWithoutSlippingUnderAMovingPad) {
   EXPECT_NEAR(v[3] - omega.y * r, 0, 0.02 * v[0]);     // bottom stands on the ground
 }
 
-/// A pad dragged over a ball that cannot move: the shear on the pad opposes the motion.
+/// A pad is dragged over a fixed ball. The shear on the pad opposes the motion.
 TEST(Physics, ShearOpposesSliding) {
   Scene s;
   s.gravity = {0, 0, 0};
@@ -166,7 +166,7 @@ TEST(Physics, FieldAndObjectMovingTogetherReadNoShear) {
   const Model model(s);
   Readout readout(model);
   Batch batch(model, 1);
-  // Both turn about the world's origin with ω and translate with v: a rigid motion of the pair.
+  // Both turn about the world's origin with ω and translate with v, so the pair moves rigidly.
   const kernels::Vec3<double> omega = {0.7, -1.1, 2}, shift = {0.2, 0.1, -0.3};
   std::vector<double> q(14, 0), v(12, 0);
   q[3] = q[10] = 1;

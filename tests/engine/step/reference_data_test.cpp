@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Against the published simulator's rolling ball: fields at its states, its states in our residual,
-// its trajectory.
+// Compares with the published simulator's rolling ball: fields at its states, its states in our
+// residual, its trajectory.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -40,8 +40,8 @@ class Reference : public ::testing::Test {
   Model model{testing::rolling_ball(true)};
   Table u = read("u.csv"), q = read("q_tight.csv"), rate = read("qdot_tight.csv");
 
-  /// Their coordinates in ours: rotation vector to quaternion, ṙ to the body's angular velocity ω =
-  /// J_r(r) ṙ.
+  /// Converts their coordinates to ours: rotation vector to quaternion, and ṙ to the body's angular
+  /// velocity ω = J_r(r) ṙ.
   void state(std::size_t row, std::vector<double>& our_q, std::vector<double>& our_v) const {
     our_q.assign(10, 0);
     our_v.assign(9, 0);
@@ -96,8 +96,8 @@ TEST_F(Reference, TactileFieldsAtItsStatesAgreeToRounding) {
   EXPECT_LT(worst, 1e-15 * 1e2 * peak);
 }
 
-/// Their row t + 1 in our BDF2 residual, rotation chart centred on row t. Planar rows only: there
-/// both charts coincide.
+/// Puts their row t + 1 into our BDF2 residual, with the rotation chart centred on row t. Uses
+/// planar rows only, because both charts coincide there.
 TEST_F(Reference, ItsStatesSolveOurResidual) {
   const CompiledModel& m = compiled(model);
   testing::StageBuffers<double> b(m);
@@ -124,7 +124,7 @@ TEST_F(Reference, ItsStatesSolveOurResidual) {
       b.tau[i] = i < 3 ? u[t][i] : 0;
     }
     b.residual(1.5 / h, 1 / h);
-    // Points that slip are where the friction bounds differ (their norm is of a 6-D wrench).
+    // The friction bounds differ only at slipping points (theirs uses the norm of a 6-D wrench).
     const kernels::PairContact& pair = m.pairs[0];
     bool slips = false;
     const kernels::Mat3<double> turned = to_matrix(quat(next_q));
@@ -143,7 +143,7 @@ TEST_F(Reference, ItsStatesSolveOurResidual) {
                         centre, omega, relative - cross(omega, centre), xi);
       if (!(p.d < 0)) continue;
       slips = slips || p.tangential.slip > 0;
-      // Their bound takes the norm of the normal wrench at the pad's origin, torque and all.
+      // Their bound takes the norm of the normal wrench at the pad's origin, torque included.
       // Nothing else differs here: the pad does not turn, so the points of velocity and of force
       // make no difference to any dof.
       const Vec3<double> arm = cross(xi, p.n);
@@ -151,7 +151,7 @@ TEST_F(Reference, ItsStatesSolveOurResidual) {
                    bound = law.mu * std::sqrt(1 + dot(arm, arm)) * p.normal.bound;
       const double scale = law.kt * speed > bound ? bound / speed : law.kt;
       const Vec3<double> more =
-          (p.tangential.scale - scale) * p.vt;  // their force on the pad less ours
+          (p.tangential.scale - scale) * p.vt;  // their force on the pad minus ours
       const Vec3<double> torque = transposed_times(turned, cross(p.x2 - centre, more));
       const double change[9] = {-more.x, -more.y,  -more.z,  more.x,  more.y,
                                 more.z,  torque.x, torque.y, torque.z};
@@ -188,8 +188,9 @@ TEST_F(Reference, FirstStepIsTheSameSdirkStep) {
 
 TEST_F(Reference, PlanarTrajectoryAgreesWithinTheFrictionDifference) {
   // The bounds differ by √(1 + |x × n|²) - 1 ≤ 3e-4 of a slipping point's friction (|x| ≤ 25 mm),
-  // at most a few of which slip at a time. 0.2 N acting through it for 0.6 s on 25 g with damping 1
-  // N s/m moves the pad by under 1e-5 m; what is measured is far less because slip is rare.
+  // and at most a few points slip at a time. If 0.2 N acted this way for 0.6 s on 25 g with damping
+  // 1 N s/m, the pad would move by under 1e-5 m. The measured distance is far less, because slip is
+  // rare.
   StepperOptions o;
   o.tolerance = 1e-12;
   Stepper stepper(model, o);
@@ -206,8 +207,8 @@ TEST_F(Reference, PlanarTrajectoryAgreesWithinTheFrictionDifference) {
 }
 
 TEST_F(Reference, LaterRowsDifferByNoMoreThanOurStepSize) {
-  // From row 200 on the charts differ, so the two discretisations do: bounded by how far our own
-  // answer moves when h is halved.
+  // From row 200 on the charts differ, and so do the two discretisations. The bound is the change
+  // of our own answer when h is halved.
   const auto run = [&](int refine) {
     StepperOptions o;
     o.tolerance = 1e-11;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shuffled, compressed, cut into tiles, left out: the numbers that HDF5 reads are those that were
-// written.
+// Tests that HDF5 reads the numbers that were written, after they were shuffled, compressed, cut
+// into tiles or left out.
 #include "io/dataset/chunk_codec.hpp"
 
 #include <gmock/gmock.h>
@@ -23,7 +23,7 @@ using ::tangere::testing::Folder;
 
 constexpr std::int64_t kRows = 37;
 
-/// Byte by byte, as the specification of the filter says it.
+/// Shuffles byte by byte, as the specification of the filter says.
 std::vector<unsigned char> shuffled(const std::vector<unsigned char>& data, std::size_t used,
                                     std::size_t width) {
   std::vector<unsigned char> out(data.size(), 0);
@@ -64,7 +64,7 @@ DatasetLayout layout_of(bool single, const std::string& compression, bool sparse
   return l;
 }
 
-/// Zeros but for a spot that moves; noise leaves nothing to compress.
+/// Zeros except for a moving spot. Its noise cannot be compressed.
 template <class T>
 class Piece {
  public:
@@ -204,7 +204,7 @@ TEST(ChunkCodec, RowsThatWaitBesideChunksAreBoundedAsWell) {
     for (std::size_t k = 0; k < gradient.size(); ++k)
       gradient[k] = static_cast<double>(first) + 1e-6 * static_cast<double>(k);
     const std::span<const double> all_of_it(gradient);
-    // In two pieces, the derivatives with the last one.
+    // Uses two pieces; the derivatives come with the last one.
     for (const int row : {0, 16}) {
       const Piece<float> piece(l, first, row, row == 0 ? 16 : all - 16);
       EpisodeRows rows = piece.rows();
@@ -253,7 +253,7 @@ TEST(ChunkCodec, DamagedLz4IsAnErrorOrChangesNothing) {
     const std::string path = folder / "damaged.h5";
     std::ofstream(path, std::ios::binary) << damaged;
     try {
-      check_shard(path);  // bytes may change and numbers not: a zero may be copied from elsewhere
+      check_shard(path);  // bytes may change but numbers may not: a zero may be a copy
     } catch (const IoError&) {
       ++found;
     }

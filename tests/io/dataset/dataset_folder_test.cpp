@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The folder of a data set: one run at a time, no shard lost without being asked for, nothing
+// Tests the folder of a data set: one run at a time, no shard removed unless requested, nothing
 // half-written kept.
 #include "io/dataset/dataset_folder.hpp"
 
@@ -135,7 +135,7 @@ TEST(DatasetFolder, IsHeldByOneAtATime) {
   EXPECT_EQ(complaint(place / "set"), "");
 }
 
-/// Tries and what is done between them, in place of waiting.
+/// A number of tries, and what is done between them instead of waiting.
 LockPatience tries(int count, std::function<void()> between) { return {count, std::move(between)}; }
 
 TEST(DatasetFolder, IsSharedOnceTheOneThatMergesHasEnded) {
@@ -174,7 +174,7 @@ TEST(DatasetFolder, IsHeldAloneOnceOthersHaveLetGo) {
   EXPECT_TRUE(waits.hold_alone()) << "in its third try the other one has let go";
   EXPECT_EQ(pauses, 5);
   EXPECT_FALSE(other->hold_alone());
-  // Of those that failed none keeps anything.
+  // Those that failed hold no lock.
   waits.let_go();
   EXPECT_TRUE(other->hold_alone());
 }

@@ -53,6 +53,27 @@ std::vector<double> row(const h5::Id& file, const std::string& dataset, hsize_t 
   return numbers;
 }
 
+TEST(DatasetMerge, ThatIsStoppedLeavesTheShardsAlone) {
+  for (const bool copy : {false, true}) {
+    const Folder folder;
+    const DatasetFiles dataset = write_with_gaps(folder, true, "none");
+    std::vector<std::string> before = dataset.files, after;
+    for (const int asked : {0, 1, 21}) {
+      int questions = 0;
+      const MergeResult result =
+          merge_dataset(dataset, {copy, false, [&] { return questions++ >= asked; }});
+      EXPECT_TRUE(result.stopped) << asked;
+      EXPECT_TRUE(result.file.empty());
+      after.clear();
+      for (const auto& entry : std::filesystem::recursive_directory_iterator(dataset.folder))
+        if (entry.is_regular_file()) after.push_back(entry.path().string());
+      std::sort(after.begin(), after.end());
+      EXPECT_EQ(after, before) << asked;
+    }
+    EXPECT_FALSE(merge_dataset(dataset, {copy, false, [] { return false; }}).stopped);
+  }
+}
+
 TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
   for (const bool single : {true, false})
     for (const bool copy : {false, true}) {

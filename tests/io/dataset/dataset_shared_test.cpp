@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Several writers of one folder: the last of them says that it is complete, of one run, and none
-// keeps another out.
+// Tests several writers of one folder. The last one reports that the set is complete and of one
+// run, and none keeps another out.
 #include <gmock/gmock.h>
 
 #include "engine/base/error.hpp"
@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::write_block;
 
-/// 48 episodes, a shard for each block of 16.
+/// 48 episodes, one shard for each block of 16.
 DatasetLayout three_shards(std::uint64_t seed = 1) {
   DatasetLayout l = dataset_layout(48);
   l.shards = 3;
@@ -49,7 +49,7 @@ TEST(DatasetShared, IsLetGoOfByWhoeverEndsAndHeldByWhoeverSeesAll) {
   DatasetWriter second(one(folder, 1), l), third(one(folder, 2), l);
   write_block(second, l, 16);
   write_block(third, l, 32);
-  // Both have ended their shards: the second is not alone yet, the third is.
+  // Both have finished their shards. The second writer is not alone yet; the third is.
   EXPECT_FALSE(second.complete());
   EXPECT_THAT(second.obstacle(), HasSubstr("other processes hold '" + folder / "set'"));
   EXPECT_TRUE(third.complete());
@@ -92,7 +92,7 @@ TEST(DatasetShared, IsNotCompleteWithAFileThatIsNoneOfItsShards) {
   EXPECT_FALSE(again.complete());
   EXPECT_THAT(again.obstacle(),
               HasSubstr("shard-00007.h5' is not one of the 3 shards of this run"));
-  // Whoever reads or merges the folder says so as well.
+  // Readers and merges of the folder report it as well.
   const DatasetFiles files = find_dataset(folder / "set");
   EXPECT_THAT(files.missing, IsEmpty());
   EXPECT_THAT(files.surplus, ElementsAre(folder / "set/shard-00007.h5"));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shards hold what they were given where docs/datasets.md says, and the same bytes in whatever
-// order it came.
+// Tests that shards hold what they were given, where docs/datasets.md says, with the same bytes for
+// any order of arrival.
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
@@ -70,7 +70,7 @@ void expect_demo(const h5::Id& file, std::int64_t episode) {
   const h5::Id flags = h5::open_dataset(file, demo + "/dones");
   h5::read_box(flags, {0}, {3}, dones.data());
   EXPECT_THAT(dones, ElementsAre(0, 0, 1));
-  // What h5py shows as bool.
+  // The type that h5py shows as bool.
   const h5::Id type(H5Dget_type(flags.get()));
   ASSERT_EQ(H5Tget_class(type.get()), H5T_ENUM);
   EXPECT_EQ(H5Tget_member_index(type.get(), "FALSE"), 0);
@@ -330,7 +330,8 @@ TEST(Dataset, AFullDiskIsAnErrorAndLeavesWholeShardsOnly) {
     write_block(writer, l, 16);
     size = std::filesystem::file_size(measured / "set/shard-00000.h5");
   }
-  // From room for nothing, through data and descriptions, to all but the last bytes.
+  // From no room at all, through room for data and descriptions, to room for all but the last
+  // bytes.
   for (const double part : {0.0, 0.01, 0.2, 0.5, 0.8, 0.95, 0.999}) {
     const Folder folder;
     {

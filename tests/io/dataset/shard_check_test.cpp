@@ -32,7 +32,7 @@ class ShardCheck : public ::testing::Test {
     testing::write_block(writer, l, 16, {testing::failure(17)});
   }
 
-  /// What check_shard says; "" when it finds nothing.
+  /// The message of check_shard; "" if it finds nothing.
   [[nodiscard]] std::string complaint() const {
     try {
       static_cast<void>(check_shard(path_));
@@ -47,7 +47,7 @@ class ShardCheck : public ::testing::Test {
     std::ofstream(path_, std::ios::binary | std::ios::trunc) << bytes;
   }
 
-  /// Opens the shard for writing, as no program of ours does.
+  /// Opens the shard for writing, unlike our programs.
   void change(const std::function<void(hid_t)>& how) const {
     const hid_t file = H5Fopen(path_.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
     ASSERT_GE(file, 0);
@@ -76,7 +76,7 @@ std::string bytes_of_row(std::int64_t episode, std::size_t name, std::int64_t ro
 
 TEST_F(ShardCheck, FindsNothingInAWholeOne) { EXPECT_EQ(complaint(), ""); }
 
-/// Earlier formats have other names and units of the scene's numbers, or another checksum.
+/// Earlier formats have other names and units for the scene's numbers, or another checksum.
 TEST_F(ShardCheck, RefusesEarlierFormats) {
   for (const std::int64_t version : {1, 2}) {
     change([&](hid_t file) { set(file, "/", "format_version", version); });
@@ -159,7 +159,7 @@ TEST_F(ShardCheck, FindsEpisodesThatAreMissingOrThereTwice) {
     H5Lmove(file, "data/demo_3", file, "failed/episode_3", H5P_DEFAULT, H5P_DEFAULT);
   });
   EXPECT_THAT(complaint(), HasSubstr("/data counts 57 rows; its demos have 54"));
-  // Two demos under each other's names.
+  // Two demos exchange their names.
   write(whole);
   change([](hid_t file) {
     H5Lmove(file, "data/demo_3", file, "data/x", H5P_DEFAULT, H5P_DEFAULT);

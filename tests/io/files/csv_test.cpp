@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is a table of numbers and what is not, with the place of whatever is wrong.
+// Tests which texts are tables of numbers, and that errors name the place of the mistake.
 #include "io/files/csv.hpp"
 
 #include <gmock/gmock.h>
@@ -28,7 +28,7 @@ class Csv : public testing::Test {
     return read_csv(path_, columns, names);
   }
 
-  /// What reading says; "" when it succeeds. The path itself is left out.
+  /// The message of the reader; "" if it succeeds. Leaves out the path.
   std::string complaint(const std::string& text, std::size_t columns,
                         const std::vector<std::string>& names = {}) {
     try {

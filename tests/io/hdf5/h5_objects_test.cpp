@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Objects that are laid out without the library, read through it.
+// Reads objects that are laid out without the library through the library.
 #include "io/hdf5/h5_objects.hpp"
 
 #include <gmock/gmock.h>
@@ -28,7 +28,7 @@ namespace {
 using h5::Bytes;
 using ::tangere::testing::Folder;
 
-/// A file that the library begins, and objects behind its end.
+/// A file that the library begins, with objects appended behind its end.
 class Extended {
  public:
   explicit Extended(std::string path) : path_(std::move(path)) {
@@ -40,7 +40,7 @@ class Extended {
   [[nodiscard]] std::uint64_t base() const { return base_; }
   [[nodiscard]] std::uint64_t here() const { return base_ + objects_.size(); }
 
-  /// Writes the objects and opens the file; `address`: of what is called "object" in it.
+  /// Writes the objects and opens the file. `address`: address of the object called "object".
   h5::Id open(std::uint64_t address) {
     std::string bytes = read();
     bytes.append(reinterpret_cast<const char*>(objects_.all().data()), objects_.size());
@@ -95,7 +95,7 @@ TEST(H5Objects, ADatasetHoldsItsNumbersWhereverTheyAre) {
 
 TEST(H5Objects, ADatasetSharesTextsThatTheLibraryReadsAndCopies) {
   const Folder folder;
-  // Below and above the least that the library makes room for.
+  // Lengths below and above the least that the library allocates.
   for (const std::size_t length : {1UL, 23UL, 4000UL, 4063UL, 4064UL, 100000UL}) {
     const std::string path = folder / (std::to_string(length) + ".h5"), second(length, 'x');
     Extended file(path);
@@ -231,7 +231,8 @@ TEST(H5Objects, AGroupHoldsLinksAndLists) {
   EXPECT_EQ(info.num_attrs, 1U) << "h5py's len(), and what h5diff compares";
 }
 
-/// A file of two datasets of `shape` per row: "many" of five rows, "one" of one, numbered through.
+/// A file with two datasets of shape `shape` per row: "many" of five rows and "one" of one, with
+/// consecutive numbers.
 void write_sources(const std::string& path, h5::Dims shape, bool single) {
   h5::Id file = h5::create_file(path);
   double next = 0;
@@ -356,7 +357,7 @@ TEST(H5Objects, TheFirstGroupOfAFileMayBeALargeOne) {
   file.close();
   std::vector<h5::FileMember> members;
   h5::Bytes out;
-  constexpr int kMany = 50000;  // bytes leave memory on the way
+  constexpr int kMany = 50000;  // bytes leave the memory on the way
   for (int k = 0; k < kMany; ++k) {
     members.push_back({k, file.here() + out.size()});
     h5::add_group(out, {});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The picture of speed by threads: well-formed, every mark where its numbers say, whatever a name
-// contains.
+// Tests the picture of speed by threads: well-formed, every mark at the place of its numbers,
+// whatever a name contains.
 #include "io/picture/scaling_plot.hpp"
 
 #include <gmock/gmock.h>

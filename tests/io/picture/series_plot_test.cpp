@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures of curves: well-formed, every mark where its numbers say, gaps left out, whatever a name
-// contains.
+// Tests pictures of curves: well-formed, every mark at the place of its numbers, gaps left out,
+// whatever a name contains.
 #include "io/picture/series_plot.hpp"
 
 #include <gmock/gmock.h>

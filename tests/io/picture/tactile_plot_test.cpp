@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures: well-formed, with the value where it belongs, and honest when nothing touches.
+// Tests pictures of fields: well-formed, every value in its place, and correct without contact.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tinyxml2.h>
@@ -74,7 +74,7 @@ TEST(TactilePlot, NoContactIsSaid) {
 
 TEST(TactilePlot, DrawsTheFirstRectangularArrayAndNamesThemAll) {
   const Folder folder;
-  TrajectoryLayout l = layout(0);  // no field is needed to be told which could be drawn
+  TrajectoryLayout l = layout(0);  // naming the sensors that can be drawn needs no field
   SensorLayout rod = l.sensors[0], second = rod;
   rod.name = "rod";
   rod.rows = rod.cols = 0;
@@ -100,7 +100,7 @@ TEST(TactilePlot, DrawsTheFirstRectangularArrayAndNamesThemAll) {
                                         "that can be drawn: second, skin"));
 }
 
-/// Points that go round: down is -z of the body, right is y, wherever their own axes point.
+/// Points around a body: down is -z of the body, right is y, whatever the points' own axes are.
 TEST(TactilePlot, AnImageHasItsPointsAtTheirPixelsAndShearAlongRowsAndColumns) {
   SensorLayout s = layout().sensors[0];
   s.rows = s.cols = 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files in the published dialect: together they use its elements and oddities. They load, say what
-// they leave out, and run; what is not simulated yet is refused by name.
+// Tests files in the published dialect that together use its elements and oddities. They load,
+// report what they leave out, and run. Files with features that are not simulated are refused by
+// name.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -34,7 +35,7 @@ std::string warnings_of(const SceneFile& file) {
   return all;
 }
 
-/// Steps with constant controls; the last q.
+/// Steps with constant controls. Returns the last q.
 std::vector<double> run(const Model& model, const std::vector<double>& u, int steps) {
   Batch batch(model, 1);
   Stepper stepper(model);
@@ -134,11 +135,12 @@ TEST(Dialect, YardLoadsAndRuns) {
   EXPECT_NEAR(coordinate(model, q, "table.axis0"), 0.02, 0.01);
   EXPECT_NEAR(coordinate(model, q, "lift.x"), 0, 1e-15) << "u = -1 of 0 … 2 N is none";
   EXPECT_NEAR(coordinate(model, q, "lift.z"), 0, 1e-12) << "carried by 1 + u N";
-  // The die's joint is tilted, and its coordinates with it; in the world it lies on a face.
+  // The die's joint is tilted, and so are its coordinates; in the world it lies on a face.
   EXPECT_NEAR(pose_of(model, q, 4)[2], 0.025 - model.mass(4) * 9.8 / 4e3, 1e-4);
 }
 
-/// What a file needs and is not simulated is refused where it stands, before anything runs.
+/// If a file needs something that is not simulated, it is refused at that line before anything
+/// runs.
 TEST(Dialect, WhatIsNotSimulatedIsRefusedByName) {
   const auto refusal = [](const std::string& from, const std::string& to) {
     std::string text = text_of("dialect_hand.xml");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What Newton's search needs in scenes with many stiff touches: passes and splits are counts, the
-// same on every machine.
+// Tests how much work Newton's search needs in scenes with many stiff contacts. Passes and splits
+// are counts, equal on every machine.
 #include <gtest/gtest.h>
 
 #include "engine/step/control.hpp"
@@ -13,7 +13,7 @@ namespace {
 constexpr int kEnvironments = 64;
 
 struct Effort {
-  double passes = 0;  ///< evaluations of the residual, a step and environment
+  double passes = 0;  ///< evaluations of the residual per step and environment
   int splits = 0, failures = 0;
 };
 
@@ -39,7 +39,7 @@ Effort run(const std::string& name) {
   return effort;
 }
 
-// Needed are 3.1 passes and no split; with the natural test alone it was 5.2 passes and 17 splits.
+// It takes 3.1 passes and no split. With the natural test alone it took 5.2 passes and 17 splits.
 TEST(NewtonEffort, InsertionTouchesWithoutSplits) {
   const Effort e = run("insertion");
   EXPECT_EQ(e.failures, 0);
@@ -47,7 +47,7 @@ TEST(NewtonEffort, InsertionTouchesWithoutSplits) {
   EXPECT_LE(e.splits, 2);
 }
 
-// Two of 11 520 steps; without friction by its secant 19.
+// Two of 11 520 steps split; without the secant of friction 19 did.
 TEST(NewtonEffort, StableGraspSeldomSplits) {
   const Effort e = run("stable_grasp");
   EXPECT_EQ(e.failures, 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// End effectors as scene files give them: units, defaults, names.
+// Tests end effectors in scene files: units, defaults, names.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

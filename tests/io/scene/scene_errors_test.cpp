@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every message of the scene reader: the line, the value, what was expected, the nearest name.
+// Tests every message of the scene reader: the line, the value, what was expected, the nearest
+// name.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -77,7 +77,7 @@ TEST(SceneFuzz, TwoThousandMutantsAreReadOrRefused) {
     const std::string text = Mutator(seed)(sources[seed % std::size(sources)]);
     try {
       SceneFile file = parse_scene(text, "mutant.xml");
-      // Valid but huge grids are memory, not bugs: kept small here.
+      // Valid but huge grids use memory and are no bugs, so they are kept small here.
       for (LinkDescription& l : file.scene.links) {
         if (auto* box = std::get_if<CuboidShape>(&l.body.shape))
           for (int& n : box->contact_resolution) n = std::min(n, 12);

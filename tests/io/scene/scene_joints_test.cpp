@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Joints, their effects and motors as scene files give them, in centimetres and grams; and that
-// such a scene runs.
+// Tests joints, their effects and motors in scene files, in centimetres and grams, and that such a
+// scene runs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

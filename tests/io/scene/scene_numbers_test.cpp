@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One identity of every number: what <randomize> calls it, its name and unit, its place in the
-// scene, its row in a block and in a gradient, and what files say of it.
+// Tests that every number has one identity: its name in <randomize>, its name and unit, its place
+// in the scene, its row in a block and in a gradient, and its description in files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,8 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-/// One name for all that can have one: a sensor, a joint, a motor and a body called "skin".
+/// Uses one name for everything that can have one: a sensor, a joint, a motor and a body called
+/// "skin".
 std::string scene_with(const std::string& lines) {
   return R"(<tangere model="numbers">
 <option unit="m-kg" gravity="0 0 -9.8" timestep="5e-3" integrator="BDF2"/>
@@ -59,12 +60,12 @@ std::string scene_with(const std::string& lines) {
          "\n</randomize>\n</tangere>\n";
 }
 
-/// A row of the table as a scene writes it; `xml` empty: <randomize> does not take it.
+/// A row of the table as a scene writes it. `xml` empty: <randomize> does not accept it.
 struct Row {
   const char* xml;
   const char *name, *unit;
   bool has_gradient;
-  double value;  ///< in the scene; NAN: the start is not given there
+  double value;  ///< in the scene; NAN: the scene does not give the start
 };
 const Row kRows[] = {
     {R"(general_primitive_contact general_body="skin" primitive_body="ball" field="kn")",
@@ -165,7 +166,7 @@ TEST(SceneNumbers, HaveOneNameAndUnitFromTheSceneToTheFile) {
   }
 }
 
-/// Every row of the table has a case here, and what <randomize> leaves out has its gradient.
+/// Every row of the table has a case here. Rows that <randomize> leaves out have gradients, too.
 TEST(SceneNumbers, NoKindIsForgotten) {
   const Scene scene = read("");
   const Model model(scene);
@@ -191,7 +192,7 @@ TEST(SceneNumbers, NoKindIsForgotten) {
   }
 }
 
-/// A sensor, a joint, a motor and a body may be called alike; no two numbers are.
+/// A sensor, a joint, a motor and a body may have one name, but no two numbers may.
 TEST(SceneNumbers, NoTwoHaveOneName) {
   std::string lines;
   std::size_t count = 0;

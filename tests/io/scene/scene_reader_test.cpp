@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What scene files come to: the published dialect, our extensions, units.
+// Tests what scene files are read as: the published dialect, our extensions, units.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

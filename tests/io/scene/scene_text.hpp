@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A small complete scene as text, to be changed one place at a time.
+// A small complete scene as text, for tests that change one place at a time.
 #pragma once
 
 #include <stdexcept>

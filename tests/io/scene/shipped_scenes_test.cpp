@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every file in scenes/, run for its whole control with four environments: none fails, and it does
-// what it says.
+// Runs every file in scenes/ for all of its controls with four environments. None fails, and each
+// does what it says.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,13 +20,13 @@ constexpr int kEnvironments = 4;
 
 /// The field of one sensor, summed.
 struct Touch {
-  int points = 0;       ///< that are not exactly zero in all components
+  int points = 0;       ///< with any component that is not exactly zero
   double pressure = 0;  ///< sum of the third components, positive under pressure [N]
   double shear = 0;     ///< largest length of the first two components [N]
   double along = 0;     ///< sum of the first components: force on the pad along axis0 [N]
 };
 
-/// A scene after each step of its control. Everything is found by name.
+/// The states of a scene after each step of its controls. Everything is found by name.
 class SceneRun {
  public:
   explicit SceneRun(const std::string& name)
@@ -177,7 +177,7 @@ TEST(ShippedScenes, InsertionHitsTheRim) {
     const double bottom = r.body(last, e, "box", 2) - 0.03;
     EXPECT_GT(bottom, 0.022) << "stopped by the rim, at 25 mm";
     EXPECT_LT(bottom, 0.0251);
-    // axis0 of the left pad is up, of the right pad down: a box that hangs pulls the pads down, the
+    // axis0 is up on the left pad and down on the right one. A hanging box pulls the pads down; the
     // rim pushes them up.
     const int hanging = r.at(0.05);
     EXPECT_LT(r.touch(hanging, e, 0).along - r.touch(hanging, e, 1).along, 0)
@@ -218,8 +218,8 @@ TEST(ShippedScenes, BallToIdentifyIsPressedRolledAndSlidOver) {
     for (int k = r.at(0.01); k < r.steps; ++k)
       ASSERT_GT(r.touch(k, e, 0).pressure, 0.1) << "step " << k;
     EXPECT_NEAR(r.touch(r.at(0.24), e, 0).pressure, 0.6 + 0.245, 0.1) << "motor and weight";
-    // A ball rolls half the way of what it carries; sliding, the shear is at the limit of friction,
-    // 0.5.
+    // A ball rolls half as far as the pad that it carries. When sliding, the shear is at the limit
+    // of friction, 0.5.
     EXPECT_NEAR(r.q(r.at(0.4), e, "ball_joint.x"), 0.5 * r.q(r.at(0.4), e, "pad_joint.x"), 1e-3);
     EXPECT_GT(r.q(r.at(0.4), e, "ball_joint.x"), 4e-3);
     for (double time : {0.3, 0.4})

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshes and contact points from files: what they come to, and what is said of files that are none.
+// Tests meshes and contact points from files: the results, and the messages for malformed files.
 #include "io/scene/surface_files.hpp"
 
 #include <gmock/gmock.h>
@@ -184,7 +184,7 @@ TEST_F(SurfaceFiles, ContactPointsFollowTheirCount) {
   EXPECT_THAT(points_error(""), HasSubstr("p.txt: empty"));
 }
 
-/// A mesh whose origin is a corner moves exactly as the cuboid placed where the mesh is.
+/// A mesh whose origin is at a corner moves exactly like the cuboid in the same place.
 TEST_F(SurfaceFiles, ACompiledMeshIsTheCuboidInItsPlace) {
   write("box.obj", kBox);
   const std::string mesh =
@@ -230,8 +230,8 @@ TEST_F(SurfaceFiles, AnAbstractBodyIsWhatItsNumbersSay) {
   EXPECT_NEAR(model->links.back().inertia.m[0][1], 0.1e-7, 1e-22);
 }
 
-/// The same points as a tactile hemisphere of that radius and count, in the scene's unit, where pos
-/// and quat put them.
+/// An abstract body has the points of a tactile hemisphere of the same radius and count, in the
+/// scene's unit, placed by pos and quat.
 TEST_F(SurfaceFiles, AnAbstractBodyMayTouchWithAHemisphere) {
   const std::string text = R"(<body name="a" type="abstract" mass="5" inertia="2 2 3">
 <collision radius="2" count="144" pos="0 0 -0.75" quat="1 0 0 1"/></body>)";
@@ -293,8 +293,8 @@ TEST_F(SurfaceFiles, ScenesSayWhatIsWrongWithTheirBodies) {
               HasSubstr("no solid body"));
 }
 
-/// Without a distance a body can touch but not be touched, in a file or in a scene built in code;
-/// no sensor feels it.
+/// Without a distance function a body can touch but not be touched, in a file or in a scene built
+/// in code. No sensor feels it.
 TEST_F(SurfaceFiles, NothingTouchesAMesh) {
   write("box.obj", kBox);
   const std::string cans =

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points of curved pads: evenly spread, in their order, with axes that turn the right way; files
-// that say what is wrong.
+// Tests points of curved pads: evenly spread, in order, with axes that turn the right way. Also
+// tests messages for malformed files.
 #include "io/scene/tactile_layouts.hpp"
 
 #include <gmock/gmock.h>
@@ -96,14 +96,14 @@ TEST(TactileLayouts, AHemisphereIsDrawnWithOnePixelAPoint) {
     const auto [row, col] = p.pixel;
     ASSERT_TRUE(row >= 0 && row < 20 && col >= 0 && col < 20);
     EXPECT_TRUE(taken.insert(p.pixel).second) << row << ' ' << col;
-    // Lower rows are at negative x and columns at negative y, but for those that gave way.
+    // Lower rows are at negative x and lower columns at negative y, except for displaced points.
     if (std::abs(p.position[0]) > 2e-3) {
       EXPECT_EQ(row >= 10, p.position[0] > 0);
     }
     if (std::abs(p.position[1]) > 2e-3) {
       EXPECT_EQ(col >= 10, p.position[1] > 0);
     }
-    // A square ring holds the share of points that it has of the area.
+    // A square ring holds the same share of points as of area.
     const double ring = std::max(std::abs(row - 9.5), std::abs(col - 9.5)) / 10;
     EXPECT_NEAR(ring, std::sqrt(1 - p.normal[2]), 0.15);
     ++halves[0][row >= 10], ++halves[1][col >= 10];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A machine written in metres and kilogrammes and the same in centimetres and grams move alike:
-// every output is SI.
+// Tests that a machine written in metres and kilograms and the same in centimetres and grams move
+// alike: every output is SI.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -48,7 +48,7 @@ Series run(const std::string& name) {
   return s;
 }
 
-/// Largest difference of each number over its largest size in the run.
+/// Largest difference of each number, relative to its largest size in the run.
 double apart(const std::vector<std::vector<double>>& a, const std::vector<std::vector<double>>& b) {
   double worst = 0;
   for (std::size_t i = 0; i < a[0].size(); ++i) {

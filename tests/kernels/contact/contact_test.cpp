@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The law of one point: values against the formulas written out, derivatives against dual numbers
+// Tests the law of one point: values against explicit formulas, derivatives against dual numbers
 // and differences.
 #include <gtest/gtest.h>
 
@@ -53,8 +53,8 @@ struct State {
   LawParameters<double> law;
 };
 
-/// A point of the shape's own frame that lies `depth` under its surface, on every kind of surface
-/// that it has.
+/// A point in the shape's own frame that lies `depth` under its surface, on each of its kinds of
+/// surface.
 Vec3<double> point_under(PrimitiveShape shape, Random& random, double depth) {
   const double around = random.uniform(-3, 3), along = random.uniform(-0.012, 0.012),
                face = random.uniform(0, 1);
@@ -80,7 +80,7 @@ Vec3<double> point_under(PrimitiveShape shape, Random& random, double depth) {
                     : (0.02 - depth) * radial + along * Vec3<double>{0, 0, 1};
 }
 
-/// A point somewhere inside the shape, sliding slowly or fast so that stick and slip both appear.
+/// A point inside the shape that slides slowly or fast, so that both stick and slip occur.
 State random_state(Random& random, const Case& test) {
   State s;
   s.Q = random.rotation();
@@ -188,7 +188,7 @@ TEST_P(PairDerivative, MatchesCentralDifferences) {
   EXPECT_GT(compared, 150);
 }
 
-/// Every law for the first `shapes` shapes; spheres come first.
+/// Every law for the first `shapes` shapes, of which spheres come first.
 std::vector<Case> laws_and_shapes(int shapes) {
   std::vector<Case> cases;
   for (int shape = 0; shape < shapes; ++shape)
@@ -255,8 +255,8 @@ TEST(ContactLaw, FrictionBySecantHasTheSameForceAndAConstantScale) {
     };
     const PairSums<double> exact = sums(1), secant = sums(0);
     for (int i = 0; i < 3; ++i) EXPECT_EQ((&exact.wrench.l.x)[i], (&secant.wrench.l.x)[i]);
-    // The normal is z: of a point that slips, what the force across it is by the velocity across
-    // it. In the derivative that is -s (I - t tᵀ), by the secant -s I.
+    // The normal is z. For a slipping point this is the force across the normal by the velocity
+    // across it. In the derivative it is -s (I - t tᵀ), by the secant -s I.
     const auto block = [](const PairSums<double>& s) {
       return std::array{s.d[1][1].m[0][0], s.d[1][1].m[0][1], s.d[1][1].m[1][1]};
     };
@@ -326,7 +326,7 @@ TEST(GroundContact, DerivativesMatchDualNumbersForPointsAndSpheres) {
       }
 }
 
-/// Sums in products, chunk by chunk, against the general sums of the same points.
+/// Compares sums in products, chunk by chunk, with the general sums of the same points.
 template <class Motion>
 void expect_same_sums(const Motion& motion, const State& s, const std::vector<Vec3<double>>& xi,
                       const PairSums<double>& general) {
@@ -378,8 +378,8 @@ TEST_P(ProductSumsOf, PointsAreTheGeneralSums) {
           PairSums<double> general = PairSums<double>::zero();
           std::vector<Vec3<double>> xi;
           for (int k = 0; k < 12; ++k) {
-            // Some of them outside, most inside; the state's own point first, then others under the
-            // surface.
+            // Most points are inside, some outside: the state's own point first, then others under
+            // the surface.
             const double depth = 1e-3 * random.uniform(-0.3, 1);
             xi.push_back(k == 0 ? s.xi : s.c + s.Q * point_under(test.shape, random, depth));
             accumulate<true>(general, shape, s.law, s.Q, s.c, s.omega, s.v, xi.back());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Distance functions: exact values, unit gradients, Hessians by differences, defined on kinks.
+// Tests distance functions: exact values, unit gradients, Hessians by differences, finite on kinks.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,8 +19,8 @@ Vec3<D> seeded(const Vec3<double>& y, const Vec3<double>& e) {
   return {{y.x, e.x}, {y.y, e.y}, {y.z, e.z}};
 }
 
-/// Distance to a box by brute force: nearest of many surface samples bounds it from above; exact
-/// outside by clamping.
+/// Distance to a box by brute force. Inside, the nearest of many surface samples bounds it from
+/// above. Outside, clamping is exact.
 double box_distance(const Vec3<double>& y, const Vec3<double>& s) {
   const double q[3] = {std::abs(y.x) - s.x, std::abs(y.y) - s.y, std::abs(y.z) - s.z};
   double square = 0;

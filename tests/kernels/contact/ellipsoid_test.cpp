@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The distance to an ellipsoid: against bisection in long double and a search over the surface,
-// derivatives against dual numbers, limits, every instruction set.
+// Tests the distance to an ellipsoid against bisection in long double and a search over the
+// surface; derivatives against dual numbers; limits; every instruction set.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ double length(const V& a) { return std::sqrt(dot(a, a)); }
 double longest(const V& a) { return std::max({a.x, a.y, a.z}); }
 double shortest(const V& a) { return std::min({a.x, a.y, a.z}); }
 
-/// Semi-axes up to 100 times apart, some of them alike.
+/// Semi-axes that differ by a factor of up to 100; some of them are equal.
 V random_axes(Random& random) {
   double a[3];
   for (double& x : a) x = std::pow(10, random.uniform(-2, 0));
@@ -36,14 +36,15 @@ V random_axes(Random& random) {
   return {a[0], a[1], a[2]};
 }
 
-/// Where the ray through a random point of the surface is at this fraction of its way.
+/// The point at a fraction of the way along the ray through a random point of the surface.
 V along_ray(const V& a, double fraction, Random& random) {
   const V s = random.direction();
   return {fraction * a.x * s.x, fraction * a.y * s.y, fraction * a.z * s.z};
 }
 
-/// 200 bisections of the equation at the head of ellipsoid.hpp. On the middle plane of the shortest
-/// axis, where there is no root, the point's component along that axis is what the others leave.
+/// Does 200 bisections of the equation at the head of ellipsoid.hpp. On the middle plane of the
+/// shortest axis there is no root; the other components then determine the nearest point's
+/// component along that axis.
 Real exact_distance(const V& axes, const V& y) {
   const Real a[3] = {axes.x, axes.y, axes.z}, p[3] = {std::abs(y.x), std::abs(y.y), std::abs(y.z)};
   const Real c = std::min({a[0], a[1], a[2]});
@@ -187,7 +188,7 @@ TEST(Ellipsoid, TheMiddleAndFarAwayAreDefined) {
   EXPECT_EQ(Ellipsoid({0.5, 1, 0.2}).evaluate({0.1, 0, 0}).n.y, 0);  // symmetric to the last digit
 }
 
-/// What is near is never left out, and what is left in is near the box or the ellipsoid around it.
+/// Culling never removes what is near. What it keeps is near the box or the ellipsoid around it.
 TEST(Ellipsoid, NothingNearIsCulled) {
   Random random(45);
   int out = 0;
@@ -206,8 +207,8 @@ TEST(Ellipsoid, NothingNearIsCulled) {
   EXPECT_GT(out, 3000);
 }
 
-/// Lanes of every instruction set, and lanes alone, against plain double; AVX2 and AVX-512 bit for
-/// bit; NaN stays in its lane.
+/// Compares lanes of every instruction set, and lanes alone, with plain double. AVX2 and AVX-512
+/// agree bit for bit. NaN stays in its lane.
 TEST(Ellipsoid, LanesAgreeOnEveryInstructionSet) {
   Random random(46);
   for (int k = 0; k < 200; ++k) {

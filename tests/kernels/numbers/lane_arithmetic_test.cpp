@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Arithmetic of lanes on every instruction set against the standard library.
+// Tests arithmetic of lanes on every instruction set against the standard library.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +17,7 @@ using testing::LaneProbe;
 
 bool fuses(const LaneProbe& p) { return std::strncmp(p.name, "avx", 3) == 0; }
 
-/// A number of every binade in turn, ends included.
+/// A number of each binade in turn, ends included.
 double positive(testing::Random& random, int n) {
   const int exponent = -1022 + n % 2046;
   const double mantissa = n < 2046   ? 1.0

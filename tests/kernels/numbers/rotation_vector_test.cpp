@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rotation vectors without an arc tangent: against the library's, closed forms in long double, and
-// dual numbers.
+// Tests rotation vectors without an arc tangent against the library's, closed forms in long double,
+// and dual numbers.
 #include "kernels/numbers/rotation_vector.hpp"
 
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rotations: the series against closed forms in long double, identities, and derivatives by dual
-// numbers.
+// Tests rotations: the series against closed forms in long double, identities, and derivatives by
+// dual numbers.
 #include <gtest/gtest.h>
 
 #include "engine/step/rotation_log.hpp"
@@ -24,7 +24,7 @@ double largest_difference(const Mat3<double>& a, const Mat3<double>& b) {
   return worst;
 }
 
-/// Rodrigues in long double, where the closed form is safe.
+/// Rodrigues' formula in long double, where the closed form is accurate.
 Mat3<double> rodrigues(const Vec3<double>& axis, double angle) {
   const long double s = sinl(angle), c = 1 - cosl(angle);
   const Mat3<double> X = skew(axis), X2 = X * X;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Distances of half-spaces, cylinders and capsules against a search along their outline in long
-// double, against dual numbers and differences, at places where they have kinks, in lanes of every
+// Tests distances of half-spaces, cylinders and capsules against a search along their outline in
+// long double, against dual numbers and differences, at their kinks, and in lanes of every
 // instruction set.
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ constexpr PrimitiveShape kShapes[] = {PrimitiveShape::plane, PrimitiveShape::cyl
                                       PrimitiveShape::capsule};
 const Vec3<double> kSize = {kRadius, kHalf, 0};
 
-/// The least of f on [a, b], where it may have several minima: sampled, then narrowed around the
+/// Minimum of f on [a, b], which may have several local minima: samples, then narrows around the
 /// best.
 template <class F>
 Real least(const F& f, Real a, Real b) {
@@ -47,7 +47,7 @@ Real least(const F& f, Real a, Real b) {
   return f((low + high) / 2);
 }
 
-/// Outline in the half plane (ρ ≥ 0, z): its least distance, negative inside.
+/// Least distance to the outline in the half plane (ρ ≥ 0, z), negative inside.
 Real reference(PrimitiveShape shape, const Vec3<double>& y) {
   if (shape == PrimitiveShape::plane) return y.z;
   const Real rho = std::sqrt(Real(y.x) * y.x + Real(y.y) * y.y), z = y.z, r = kRadius, h = kHalf;
@@ -78,8 +78,8 @@ double length(const Vec3<double>& a) { return std::sqrt(dot(a, a)); }
 
 class RodDistance : public ::testing::TestWithParam<PrimitiveShape> {};
 
-/// Random places, and all the places where two formulas meet: axis, ends, faces, rim, seams,
-/// origin; and very near.
+/// Random places, the places where two formulas meet (axis, ends, faces, rim, seams, origin), and
+/// places very near to them.
 std::vector<Vec3<double>> special_places() {
   std::vector<Vec3<double>> places;
   for (const double rho :
@@ -158,7 +158,7 @@ TEST_P(RodDistance, GradientAndHessianMatchDualNumbersAndDifferences) {
   EXPECT_LT(kinks, 10);
 }
 
-/// κ and e, with which contact works, are the Hessian inside.
+/// κ and e, which contact uses, are the Hessian inside.
 TEST_P(RodDistance, BendingIsTheHessianInside) {
   Random random(34);
   int inside = 0;
@@ -208,8 +208,8 @@ TEST_P(RodDistance, KinksHaveTheirChosenNormal) {
   }
 }
 
-/// Lanes of every instruction set, and lanes alone, against plain double; AVX2 and AVX-512 bit for
-/// bit; NaN stays in its lane.
+/// Compares lanes of every instruction set, and lanes alone, with plain double. AVX2 and AVX-512
+/// agree bit for bit. NaN stays in its lane.
 TEST_P(RodDistance, LanesAgreeOnEveryInstructionSet) {
   Random random(35);
   std::vector<Vec3<double>> places = special_places();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cap opening: what it draws, pays, shows and makes of an action. Derivatives and the script are
-// tested with those of all tasks.
+// Tests cap opening: its draws, rewards, observations and actions. The tests of all tasks cover its
+// derivatives and script.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -51,7 +51,7 @@ TEST(CapOpening, StartsFollowTheirDistributionsOutsideTheCap) {
       ASSERT_GT(std::hypot(x - s.varying[2], y - s.varying[3]), s.varying[1] + 0.013 - 1e-12);
     }
   }
-  // Few draws are refused, and those of a swing nearly as often to either side.
+  // Few draws are refused, and nearly as many swings to either side.
   EXPECT_NEAR(mean / (3 * kDraws), 0, 2.58 * 0.05 / std::sqrt(3 * kDraws));
   EXPECT_NEAR(std::sqrt(square / (3 * kDraws)), 0.05, 1e-3);
   VectorTask vector(*task, 64);
@@ -148,8 +148,8 @@ TEST(CapOpening, ObservesTouchOrNot) {
   VectorTask seeing(*task, 2), unseeing(*blind, 2);
   for (std::size_t k = 0; k < 18; ++k)
     EXPECT_EQ(seeing.observation(1)[k], unseeing.observation(1)[k]);
-  // Every fingertip stands where its angles put it: so far from the axis, and a third of a turn
-  // from the next.
+  // Every fingertip is where its angles put it: at that distance from the axis, and a third of a
+  // turn from the next one.
   for (std::size_t f = 0; f < 3; ++f) {
     const auto o = seeing.observation(1);
     const double *q = &o[3 * f], *tip = &o[9 + 3 * f];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tasks can be solved without learning: the shares of 1000 episodes that docs/tasks.md states.
+// Tests that tasks can be solved without learning, at the rates over 1000 episodes in
+// docs/tasks.md.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,7 +17,8 @@ using testing::task_named;
 
 constexpr int kEpisodes = 1000;
 
-/// `documented`: the share that docs/tasks.md states; not less, but for half of its 95 % interval.
+/// `documented`: the rate in docs/tasks.md. The measured rate is at least that, less half of its 95
+/// % interval.
 void expect_solved(const std::string& name, double documented) {
   const auto task = task_named(name);
   const Played scripted = play_episodes(*task, PolicyKind::scripted, kEpisodes);

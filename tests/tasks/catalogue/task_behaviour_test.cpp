@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tasks draw, what they pay, and what policies are.
+// Tests what tasks draw, their rewards, and policies.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -112,7 +112,7 @@ TEST(StableGrasp, BarsBalanceWhereTheyShallAndWeighWhatTheyShall) {
   for (const Start& s : all) ASSERT_GT(*std::min_element(s.varying.begin(), s.varying.end()), 0);
 }
 
-/// Where the centre of mass is from the bar's middle [m].
+/// Distance of the centre of mass from the bar's middle [m].
 double offset_of(const Batch& batch, int e) {
   double moment = 0, sum = 0;
   for (int b = 0; b < 11; ++b) {
@@ -123,8 +123,8 @@ double offset_of(const Batch& batch, int e) {
   return moment / sum;
 }
 
-/// Of a field of shear (rows, cols), both pads: how much of it a common translation and rotation
-/// explain, and the latter.
+/// For fields of shear (rows, cols) of both pads: the part that a common translation and rotation
+/// explain, and the rotation.
 struct Vortex {
   double explained = 0, rotation = 0;
 };
@@ -142,8 +142,8 @@ Vortex vortex_of(std::span<const double> flow) {
   return {((fy * fy + fz * fz) / (2 * kPoints) + turning) / all, moment / square};
 }
 
-/// The paper's Fig. 3: a bar that is not held at its centre of mass turns, the more the farther,
-/// and the pads read a vortex.
+/// The paper's Fig. 3: a bar that is not held at its centre of mass turns, and more so the farther
+/// away it is held. The pads read a vortex.
 TEST(StableGrasp, TiltGrowsWithTheOffsetAndShearIsARotation) {
   const auto task = task_named("stable_grasp");
   constexpr int kEnvironments = 64;
@@ -165,7 +165,7 @@ TEST(StableGrasp, TiltGrowsWithTheOffsetAndShearIsARotation) {
     }
   }
   vector.step(
-      std::vector<double>(kEnvironments, 0.0));  // at the middle again: its reward tells the tilt
+      std::vector<double>(kEnvironments, 0.0));  // in the middle again; the reward shows the tilt
   std::vector<std::pair<double, double>> by_offset;
   for (int e = 0; e < kEnvironments; ++e) {
     const double offset = std::abs(offset_of(vector.batch(), e)),
@@ -183,8 +183,8 @@ TEST(StableGrasp, TiltGrowsWithTheOffsetAndShearIsARotation) {
   }
 }
 
-/// Fifty steps of 50 ms reach what 500 steps of 5 ms do: an implicit step of any length ends at
-/// rest.
+/// Fifty steps of 50 ms reach the same state as 500 steps of 5 ms, because an implicit step of any
+/// length ends at rest.
 TEST(StableGrasp, SettlesInFewerStepsToTheSameRest) {
   const auto task = task_named("stable_grasp");
   const auto all = starts(*task);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every task pays and does, one function at a time, against differences.
+// Tests the reward and the other functions of every task, one at a time, against differences.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +17,7 @@ namespace {
 using testing::OwnView;
 using testing::task_named;
 
-/// A small step of one number of a view, however it is stored.
+/// Changes one number of a view by a small step, however it is stored.
 class Differences {
  public:
   Differences(const Task& task, OwnView& own) : task_(task), own_(own) {}
@@ -111,7 +111,7 @@ TEST_P(EveryTask, TheRewardsDerivativesAreThoseOfDifferences) {
   }
 }
 
-/// A view whose numbers are drawn, positions and memory small.
+/// Makes a view with random numbers; positions and memory are small.
 void draw(OwnView& own, std::uint64_t seed) {
   std::uint32_t index = 0;
   const auto number = [&] { return uniform({seed, 0, 0, Purpose::control, index++}, -1, 1); };
@@ -120,8 +120,8 @@ void draw(OwnView& own, std::uint64_t seed) {
   for (double& x : own.q.back()) x = 0.1 * number();
 }
 
-/// What a function of a view hands back, against differences of weight · function by memory, action
-/// and q.
+/// Compares what a function of a view hands back with differences of weight · function by memory,
+/// action and q.
 class ViewDerivatives {
  public:
   ViewDerivatives(const Task& task, OwnView& own)
@@ -163,7 +163,7 @@ class ViewDerivatives {
   std::vector<MomentCotangent> to_;
 };
 
-/// Coordinates before the first joint that has a quaternion: of them dofs have the same places.
+/// Number of coordinates before the first quaternion. They have the same indices as their dofs.
 std::size_t plain_coordinates(const Task& task) {
   std::size_t count = 0;
   for (const LinkDescription& link : task.model().scene().links) {

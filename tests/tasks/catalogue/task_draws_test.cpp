@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Distributions that are not plain: shares of what a bar weighs, angles of fingers that may be
-// drawn again, noise of readings.
+// Tests distributions that are not elementary: shares of a bar's weight, angles of fingers that may
+// be drawn again, noise of readings.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -30,8 +30,8 @@ double share_below(double y) {
   return k * (b * b - a * a) / 2 - 0.1 * (b - a) + (1.1 - b);
 }
 
-/// Of two blocks on the same side of the middle one: their shares are drawn alike, whatever the
-/// side weighs.
+/// Uses two blocks on the same side of the middle one. Their shares have the same distribution,
+/// whatever the side weighs.
 TEST(StableGrasp, BlocksOfASideShareItByChance) {
   std::vector<double> right, left;
   for (const Start& s : starts(*task_named("stable_grasp"))) {
@@ -52,9 +52,9 @@ TEST(StableGrasp, BlocksOfASideShareItByChance) {
   EXPECT_LT(distance_from(right, share_below), kUnlikely);
 }
 
-/// Fingers whose tips stand so far from the cap, 50 mm or four deviations, that a redraw is out of
-/// the question. The cap decides that, so their angles follow the distribution as it is. (The
-/// distances of 1.9 million of them are below 0.85.)
+/// Uses fingers whose tips are so far from the cap (50 mm or four deviations) that a redraw is
+/// practically impossible. The cap alone decides that, so their angles follow the plain
+/// distribution. (The distances of 1.9 million of them are below 0.85.)
 TEST(CapOpening, AnglesFollowTheirDistributions) {
   const double mean[] = {0, -0.5, 0.8};
   const double out = 0.097 - 0.12 * std::sin(mean[1]) - 0.12 * std::sin(mean[1] + mean[2]);
@@ -73,8 +73,8 @@ TEST(CapOpening, AnglesFollowTheirDistributions) {
   }
 }
 
-/// Two readings are subtracted, each with noise of 1e-5 N. One point whose shear is 1 N makes the
-/// flow that of newtons.
+/// A flow subtracts two readings, each with noise of 1e-5 N. One point with a shear of 1 N sets the
+/// flow's scale to newtons.
 TEST(Insertion, BothReadingsOfAFlowHaveNoise) {
   const auto task = task_named("insertion");
   OwnView own(*task);

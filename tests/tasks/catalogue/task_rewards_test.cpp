@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What tasks pay, in numbers worked out by hand. Box pushing and cap opening have theirs in tests
-// of their own.
+// Tests rewards against numbers worked out by hand. Box pushing and cap opening have tests of their
+// own.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -44,7 +44,7 @@ TEST(Rewards, OfStableGrasp) {
         own.q[0][bar + 3] = std::cos(tilt / 2);
         own.q[0][bar + 4] = std::sin(tilt / 2);
       };
-  own.q[1][bar + 3] = 1;  // what is after the grasp, level and down, is of no account
+  own.q[1][bar + 3] = 1;  // what follows the grasp, level and lowered, does not count
   struct Case {
     double lifted, tilt;  // [mm], [rad]
     double reward;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients that descend: open-loop pushes found by Adam bring a box nearer to its goals.
+// Tests that gradients descend: open-loop pushes found by Adam bring a box nearer to its goals.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,10 +18,10 @@ namespace {
 constexpr int kEnvironments = 16, kHeld = 5, kActions = 60;
 constexpr int kHandControls = 3;  // hand x, y, turn; the other three disturb the box and stay 0
 
-/// Displacement of the box that is asked for [m], from where it starts.
+/// Requested displacement of the box [m], from where it starts.
 using Goal = std::array<double, 2>;
 
-/// ½ |box − goal|² at the end [m²] and a small cost of controls.
+/// ½ |box − goal|² at the end [m²], plus a small cost of controls.
 class ReachGoal : public RolloutLoss {
  public:
   ReachGoal(std::size_t box, std::span<const Goal> goals) : box_(box), goals_(goals) {}
@@ -82,7 +82,7 @@ struct Pushes {
   }
 };
 
-/// Σ over the steps that hold an action; zero for controls that are not sought.
+/// Sums over the steps that hold an action; zero for controls that are not optimised.
 std::vector<double> by_actions(const Pushes& p, std::span<const double> by_steps) {
   const std::size_t nu = std::size_t(p.model.nu()), steps = std::size_t(kActions * kHeld);
   std::vector<double> out(p.actions.size());
@@ -114,7 +114,7 @@ double mean_distance(const Pushes& p, const ReachGoal& loss) {
 TEST(Descent, FiftyAdamStepsHalveTheDistanceOfAPushedBox) {
   Pushes p{Model(read_scene(TANGERE_SOURCE_DIR "/scenes/box_pushing.xml").scene), {}};
   p.actions.resize(kEnvironments * kActions * kHandControls);
-  // A little push that brings the pad to the box: out of touch no control has a gradient.
+  // A small push that brings the pad to the box, because without contact no control has a gradient.
   for (std::size_t k = 0; k < p.actions.size(); k += kHandControls) p.actions[k] = 0.05;
   const auto names = p.model.q_names();
   const auto box =
@@ -143,8 +143,8 @@ TEST(Descent, FiftyAdamStepsHalveTheDistanceOfAPushedBox) {
   EXPECT_LT(after, 0.5 * before) << "mean distances [m]";
 }
 
-/// The same of a task: what is climbed is its return, by the actions of 16 episodes that are pushed
-/// by others as well.
+/// Does the same for a task: Adam raises its return by the actions of 16 episodes with random
+/// pushes.
 TEST(Descent, AdamOnActionsRaisesTheReturnOfBoxPushing) {
   const auto task = make_task("box_pushing_reduced",
                               read_scene(TANGERE_SOURCE_DIR "/scenes/box_pushing.xml").scene);

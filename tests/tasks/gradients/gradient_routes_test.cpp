@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Adjoint, tangents in dual numbers and differences of whole rollouts on every scene of a task,
-// over 1 to 350 steps, under the schemes that people ask for; and what published code gets wrong.
+// Tests adjoint, tangents in dual numbers and differences of whole rollouts on every scene of a
+// task, over 1 to 350 steps, under the usual schemes. Also tests what the published code gets
+// wrong.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +22,7 @@ Scene shipped(const std::string& name) {
   return read_scene(TANGERE_SOURCE_DIR "/scenes/" + name + ".xml").scene;
 }
 
-/// Of a shipped scene under a scheme.
+/// Checks a shipped scene under a scheme.
 GradientCheck check(const Scene& scene, LossKind kind, std::int64_t steps, int entries) {
   const Model model(scene);
   const Batch start(model, 1, 3);
@@ -48,7 +49,7 @@ void PrintTo(const Routes& r, std::ostream* out) {
 
 class EveryScene : public ::testing::TestWithParam<Routes> {};
 
-/// Half squares of speeds and of shear are much like those of states and of fields: short runs are
+/// Half squares of speeds and of shear resemble those of states and of fields, so short runs are
 /// enough.
 std::vector<std::int64_t> lengths(LossKind loss) {
   if (loss == LossKind::path || loss == LossKind::shear) return {1, 20};
@@ -71,7 +72,7 @@ TEST_P(EveryScene, ThreeRoutesAgreeOverAnyLength) {
     for (const CheckedInput& i : c.inputs)
       if (i.influence && (i.name == "numbers" || i.name == "points"))
         compared[i.name] += i.compared;
-    // By the start of cap opening, whose motors have long since forgotten it, differences drown in
+    // The motors of cap opening have long forgotten its start. Differences by the start drown in
     // the loss.
     EXPECT_TRUE(steps != 100 || c.entries() > 0) << c.kinks() << " kinks";
   }
@@ -102,14 +103,14 @@ void expect_right(const GradientCheck& c, double tolerance) {
   EXPECT_GE(c.entries(), 10U) << c.kinks() << " kinks";
 }
 
-/// The published code's is 0 there: it keeps derivatives of fields for BDF1 alone.
+/// The published gradient is 0 there, because that code keeps derivatives of fields only for BDF1.
 TEST(PublishedFaults, TactileLossUnderBdf2IsNotZero) {
   Scene scene = shipped("rolling_ball_small");
   scene.integrator = Integrator::bdf2;
   expect_right(check(scene, LossKind::tactile, 120, 6), 1e-6);
 }
 
-/// The published code is 5 to 107 % off: the contact point of a sphere moves over it.
+/// The published gradient is 5 to 107 % off: the contact point of a sphere moves over it.
 TEST(PublishedFaults, RollingBallGradientIsRight) {
   for (const Integrator scheme : {Integrator::bdf1, Integrator::bdf2}) {
     Scene scene = shipped("rolling_ball_small");
@@ -118,8 +119,8 @@ TEST(PublishedFaults, RollingBallGradientIsRight) {
   }
 }
 
-/// The published code is 38 to 108 % off: the motor's force follows the state that the step solves
-/// for.
+/// The published gradient is 38 to 108 % off: the motor's force follows the state that the step
+/// solves for.
 TEST(PublishedFaults, PositionControlGradientIsRight) {
   for (const char* name : {"insertion", "cap_opening"})
     for (const MotorTiming timing : {MotorTiming::end, MotorTiming::start}) {
@@ -130,7 +131,7 @@ TEST(PublishedFaults, PositionControlGradientIsRight) {
         ++motors;
         motor.timing = timing;
         if (timing == MotorTiming::start)
-          motor.P *= 0.1, motor.D *= 0.1;  // explicit, they are not stable at full gain
+          motor.P *= 0.1, motor.D *= 0.1;  // with explicit timing they are unstable at full gain
       }
       EXPECT_GT(motors, 0);
       expect_right(check(scene, LossKind::final_state, 30, 6), 1e-6);
@@ -176,8 +177,8 @@ double distance(const Model& model, const LossGradient& a, const LossGradient& b
   return worst;
 }
 
-/// What a solve leaves over is all that is wrong. With the factor that Newton's search left, the
-/// error would go with the root.
+/// The residual of a solve is the only error. With the factor that Newton's search left, the error
+/// would be proportional to the tolerance's root.
 TEST(Gradients, TheirErrorIsProportionalToTheTolerance) {
   for (const char* name : {"rolling_ball_small", "box_pushing", "stable_grasp"}) {
     const Model model(shipped(name));
@@ -195,7 +196,7 @@ TEST(Gradients, TheirErrorIsProportionalToTheTolerance) {
   }
 }
 
-/// With fields in float, λᵀ(Jd) is (Jᵀλ)ᵀd to single precision: tangents know nothing of floats.
+/// With fields in float, λᵀ(Jd) equals (Jᵀλ)ᵀd to single precision, because tangents use no floats.
 TEST(Gradients, FieldsInFloatKeepTheDotProduct) {
   for (const char* name : {"rolling_ball_small", "box_pushing", "stable_grasp", "insertion"}) {
     const Model model(shipped(name));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of whole batches: the same bits however they are computed, and right on every scene
-// that is shipped.
+// Tests gradients of whole batches: the same bits however they are computed, and correct on every
+// shipped scene.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -176,8 +176,8 @@ void PrintTo(const Checked& c, std::ostream* out) {
 
 class ShippedScene : public ::testing::TestWithParam<Checked> {};
 
-/// Fields under BDF2, a ball that rolls, motors that hold positions: where others' derivatives are
-/// zero or wrong.
+/// Fields under BDF2, a rolling ball, motors that hold positions: cases in which other programs'
+/// derivatives are zero or wrong.
 TEST_P(ShippedScene, GradientsAgreeByThreeRoutes) {
   const auto [name, kind, steps] = GetParam();
   const Model model(shipped(name));

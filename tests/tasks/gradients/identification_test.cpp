@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Numbers put into a scene come out of its noisy recording, as well as the fit says; what cannot be
-// fitted is refused.
+// Tests that a fit recovers a scene's numbers from its noisy recording, to the accuracy that it
+// reports. Numbers that cannot be fitted are refused.
 #include "tasks/gradients/identification.hpp"
 
 #include <gmock/gmock.h>
@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 const std::vector<std::string> kSought = {"tactile pad kn", "tactile pad kt", "tactile pad mu",
                                           "body ball density"};
 
-/// The shipped scene with a pad of 20 × 20 points, and what it records.
+/// The shipped scene with a pad of 20 × 20 points, and its recording.
 class Recording {
  public:
   Recording()
@@ -77,14 +77,14 @@ TEST(Identification, FindsSkinAndMassWithinOnePercent) {
   }
 }
 
-/// Without noise nothing is left but the tolerance of the steps.
+/// Without noise only the tolerance of the steps limits the result.
 TEST(Identification, IsExactWithoutNoise) {
   const Recording r;
   const Identification found = fit(r, r.clean, {1.5, 0.8, 0.8, 1.3});
   EXPECT_TRUE(found.converged);
   for (std::size_t k = 0; k < r.truth.size(); ++k)
     EXPECT_NEAR(found.values()[k] / r.truth[k], 1, 1e-6) << kSought[k];
-  // Differences across points that begin to touch or to slip are not exact.
+  // Differences are inexact across points that begin to touch or to slip.
   EXPECT_LT(found.gradient_difference, 1e-4);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of returns: right for every task by three routes, the same bits however they are
-// computed, and of the same episodes that a VectorTask plays.
+// Tests gradients of returns: correct for every task by three routes, the same bits however they
+// are computed, and for the same episodes that a VectorTask plays.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -81,8 +81,8 @@ INSTANTIATE_TEST_SUITE_P(Tasks, TaskReturn,
                                            Checked{"insertion_rotation", PolicyKind::random, 2, 1}),
                          [](const auto& given) { return std::string(given.param.task); });
 
-/// Looks at everything that a task can look at, at two moments, and restarts from what it remembers
-/// of where it was.
+/// A task that looks at everything possible, at two moments, and restarts from the place that it
+/// remembers.
 class Everything : public Task {
  public:
   explicit Everything(const Scene& scene)
@@ -229,7 +229,7 @@ TEST(TaskGradients, ThreadsAndNeighboursChangeNothing) {
   EXPECT_EQ(one.recomputed_steps, 0);
 }
 
-/// Restarts, ends at different times and a scheme of two steps among them.
+/// Includes restarts, ends at different times and a scheme of two steps.
 TEST(TaskGradients, CheckpointsChangeNothing) {
   expect_same(gradients(*task_named("ball_rolling_small"), 18, 1, 1e9, 40),
               gradients(*task_named("ball_rolling_small"), 18, 1, 6e5, 40));
@@ -301,12 +301,12 @@ TEST(TaskGradients, RefusesWhatItCannotDo) {
       InputError);
 }
 
-/// The state of every lane after one more action, from where its own change has put it.
+/// The state of every lane after one more action, with its own change at the start.
 struct Lanes {
   std::vector<std::vector<double>> q, v;
 };
 
-/// What the states after action `last` are, with the state before it or the action itself moved
+/// Returns the states after action `last`, if the state before it or the action itself is moved
 /// lane by lane.
 template <class Change>
 Lanes after(const Task& task, std::int64_t last, const TaskActions& actions, const Change& change) {
@@ -330,8 +330,8 @@ Lanes after(const Task& task, std::int64_t last, const TaskActions& actions, con
   return out;
 }
 
-/// Columns of a row's Jacobian against differences, in v and in the coordinates before the first
-/// quaternion.
+/// Compares columns of a row's Jacobian with differences, in v and in the coordinates before the
+/// first quaternion.
 void check_row(const Task& task, std::int64_t last) {
   const Policy policy(task, PolicyKind::random);
   const TaskActions actions = actions_of(policy);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients where sizes and places vary by environment: each has those of its own numbers, by three
-// routes.
+// Tests gradients if sizes and places vary by environment: each environment has those of its own
+// numbers, by three routes.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -15,7 +15,7 @@
 namespace tangere {
 namespace {
 
-/// A scene with more numbers that vary; they come last, so that the others are drawn as without
+/// A scene with additional varying numbers. They come last, so that the others are drawn as without
 /// them.
 Scene varied(const std::string& name, const std::string& lines) {
   const std::string path = TANGERE_SOURCE_DIR "/scenes/" + name + ".xml";
@@ -72,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"rolling_ball_small", kBall, LossKind::tactile, 100},
                       Case{"rolling_ball_small", kBall, LossKind::shear, 120}));
 
-/// A scene with the numbers of one environment in place of its last `count`.
+/// The scene with the numbers of one environment in place of its last `count`.
 Scene written(Scene scene, const Batch& batch, int environment, std::size_t count) {
   for (; count > 0; --count) {
     const RandomizationDescription d = scene.randomizations.back();
@@ -88,8 +88,8 @@ std::vector<double> part(const std::vector<double>& x, std::size_t i, std::size_
   return {x.begin() + std::ptrdiff_t(i * n), x.begin() + std::ptrdiff_t((i + 1) * n)};
 }
 
-/// The gradient of an environment among others, in either group of a block, is that of its numbers
-/// alone.
+/// The gradient of an environment among others, in either group of a block, is that of its own
+/// numbers alone.
 TEST(VaryingGradients, OfABatchAreThoseOfScenesOfTheirOwn) {
   for (const auto& [name, lines, count] :
        {std::tuple{"rolling_ball_small", kBall, 1}, {"cap_opening", kCap, 4}}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Episodes for the clock take the same steps and read the same fields, however they are spread over
-// threads and batches.
+// Tests that timed episodes take the same steps and read the same fields, however they are spread
+// over threads and batches.
 #include "tasks/run/benchmark_run.hpp"
 
 #include <gmock/gmock.h>
@@ -61,7 +61,7 @@ TEST(BenchmarkRun, AnEnvironmentHasItsChecksumInAnyBatch) {
     const std::vector<std::uint64_t> some = result_of(environments, options(1)).checksums;
     EXPECT_THAT(some, ElementsAreArray(all.begin(), all.begin() + environments));
   }
-  // Where it is in the batch does not matter either: episode 16 … 39 as environments 0 … 23.
+  // The place in the batch does not matter either: episodes 16 … 39 are environments 0 … 23.
   const BenchmarkResult later = result_of(Batch(small_ball(), 24, kSeed, 16), options(1));
   EXPECT_THAT(later.checksums, ElementsAreArray(all.begin() + 16, all.end()));
 }
@@ -200,7 +200,7 @@ TEST(BenchmarkRun, StopsBetweenSteps) {
   EXPECT_LE(asked, 50 + 3) << "a stopped block was stepped on";
 }
 
-/// Episodes that end and start anew included, on any number of threads.
+/// This includes episodes that end and start anew, on any number of threads.
 TEST(BenchmarkRun, ATaskIsPlayedAsAVectorTaskPlaysIt) {
   constexpr int kEnvironments = 20;
   for (const char* name : {"dummy", "insertion_translation"}) {

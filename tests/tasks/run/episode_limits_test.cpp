@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run of episodes keeps to its limits, ends when it must, and refuses what makes no sense.
+// Tests that a run of episodes keeps its limits, ends when it must, and refuses invalid requests.
 #include "tasks/run/episodes.hpp"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 
 constexpr std::size_t kWhole = std::size_t{1} << 28, kSome = std::size_t{1} << 21;
 
-/// Keeps the first caller until the threads have simulated all they are allowed to.
+/// Holds the first caller until the threads have simulated all that the limit allows.
 class SlowSink : public EpisodeSink {
  public:
   SlowSink(const std::atomic<std::int64_t>& asked, std::int64_t all) : asked_(asked), all_(all) {}
@@ -69,7 +69,7 @@ TEST(EpisodeLimits, MemoryGrowsWithBlocksInFlightAndPieces) {
   EXPECT_GT(episode_bytes(small_ball(), o), 16 * (10 + 9 + 3 * 1024) * 8.0);
 }
 
-/// Throws at the n-th call of all.
+/// Throws at the n-th call, whichever function is called.
 class FailingSink : public EpisodeSink {
  public:
   explicit FailingSink(int call) : call_(call) {}
@@ -111,7 +111,7 @@ TEST(EpisodeLimits, EndWhenAskedTo) {
     const EpisodeSummary summary =
         run(small_ball(), o, recorder, [&] { return ++asked > std::int64_t{7} * kSteps; });
     EXPECT_TRUE(summary.stopped);
-    // Every thread may be asked once more before it sees that another one was told to stop.
+    // Every thread may ask once more before it sees that another one was told to stop.
     EXPECT_LE(asked, std::int64_t{7} * kSteps + threads);
     EXPECT_EQ(summary.episodes, 16 * std::ssize(recorder.finished));
     EXPECT_LE(summary.episodes, 16 * 7);
@@ -132,7 +132,7 @@ TEST(EpisodeLimits, ProgressCountsEveryStep) {
   EXPECT_EQ(seen.back(), kEpisodes * kSteps);
 }
 
-/// What is wrong with them.
+/// The message of the error; "" if there is none.
 std::string complaint(const EpisodeOptions& o, const ControlProgram& controls) {
   FailingSink sink(1);  // called: not refused
   try {

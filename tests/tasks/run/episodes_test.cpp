@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Episodes that many threads simulate are, bit for bit, those that one stepper steps by hand.
+// Tests that episodes from many threads equal, bit for bit, those that one stepper steps by hand.
 #include "tasks/run/episodes.hpp"
 
 #include <gmock/gmock.h>
@@ -13,8 +13,8 @@ namespace {
 
 using namespace testing;
 
-/// Far from the pad, a ball that a motor turns faster and faster: some episodes start with so much
-/// spin that a step soon turns by more than half a turn, which has no solution.
+/// A ball far from the pad that a motor turns ever faster. Some episodes start with so much spin
+/// that a step soon turns by more than half a turn, which has no solution.
 Model with_failing_spinner() {
   Scene scene = small_scene();
   LinkDescription link;
@@ -58,7 +58,7 @@ void expect_as_by_hand(const Model& model, const EpisodeOptions& o, const Record
   }
 }
 
-/// Whether the last field of an episode is more than zeros.
+/// Whether the last field of an episode has anything but zeros.
 bool touched(const RecordedEpisode& episode, std::size_t points, std::size_t number_bytes) {
   const std::string& all = episode.observations.at(2);
   const std::string last = all.substr(all.size() - 3 * points * number_bytes);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Episodes of tasks on their way to a sink: in ascending order, the same bits on any number of
-// threads, few at a time, ended by errors and when asked to.
+// Tests episodes of tasks on their way to a sink: in ascending order, the same bits on any number
+// of threads, few at a time, ended by errors and on request.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using ::tangere::testing::task_named;
 
 constexpr std::int64_t kEpisodes = kSanitized ? 104 : 200;  // the last block is short
 
-/// Keeps what it is given, and complains about what is out of order.
+/// Keeps what it receives, and reports what is out of order.
 class Keeper : public EpisodeSink {
  public:
   void prepare(const EpisodeRows& piece) override {
@@ -45,7 +45,7 @@ class Keeper : public EpisodeSink {
       all.append(reinterpret_cast<const char*>(&end.total), sizeof end.total);
     }
     if (slow) std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    // A first write that lasts until another block is played shows that writing holds up nobody.
+    // The first write lasts until another block is played, which shows that writing delays nobody.
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(2);
     while (slow && most_ahead < 1 && std::chrono::steady_clock::now() < deadline)
       std::this_thread::yield();
@@ -56,7 +56,7 @@ class Keeper : public EpisodeSink {
     EXPECT_EQ(first, last_);
   }
 
-  std::vector<std::string> episodes;  // bytes of each
+  std::vector<std::string> episodes;  // bytes of each episode
   std::int64_t fail_at = -1;
   bool slow = false;
   std::atomic<int> prepared{0}, written{0};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many environments of a task: an episode is the same alone or among others, on any number of
-// threads, and the order of ends and starts is Gymnasium's.
+// Tests many environments of a task: an episode is the same alone or among others, on any number of
+// threads, and ends and starts follow Gymnasium's order.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -32,13 +32,13 @@ TEST_P(EveryTask, DeclaresWhatItDoes) {
   EXPECT_THROW(vector.step(std::vector<double>(1)), InputError);
 }
 
-/// The first steps of 1000 environments, where they are cheap, else of 19, against some of them
-/// played alone with another number of threads.
+/// Compares the first steps of 1000 environments (of 19 if they are expensive) with some of them
+/// played alone on another number of threads.
 TEST_P(EveryTask, AnEpisodeIsTheSameAloneOrAmongOthers) {
   const auto task = task_named(GetParam());
   VectorOptions options;
   options.seed = 11;
-  options.autoreset = false;  // the episode after depends on how many environments there are
+  options.autoreset = false;  // the next episode depends on the number of environments
   const bool cheap = GetParam() == "dummy" || GetParam() == "box_pushing";
   const int environments = !cheap ? 19 : kSanitized ? 100 : 1000;
   const int steps = task->spec().steps_per_action > 20 ? 3 : 8;
@@ -56,8 +56,8 @@ TEST_P(EveryTask, AnEpisodeIsTheSameAloneOrAmongOthers) {
 INSTANTIATE_TEST_SUITE_P(Tasks, EveryTask, ::testing::ValuesIn(task_names()),
                          [](const auto& given) { return given.param; });
 
-/// Resets of many environments by several threads at once: what an episode draws is its own on its
-/// way into its lane.
+/// Several threads reset many environments at once. No other episode's draws enter an environment's
+/// lane.
 TEST(VectorTask, DrawsTheSameStartsOnAnyNumberOfThreads) {
   const auto task = task_named("dummy");
   constexpr int kEnvironments = 1000;

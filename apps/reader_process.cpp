@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// fork before any thread starts. The child tells what it reads through shared memory, which is
+// still there when it is not.
+#include "apps/reader_process.hpp"
+
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <span>
+
+#include "apps/console.hpp"
+#include "engine/base/error.hpp"
+#include "io/hdf5/reading_note.hpp"
+
+namespace tangere::apps {
+namespace {
+
+constexpr std::size_t kNoteBytes = 4096;
+
+std::atomic<int> child{0}, passed_on{0};
+static_assert(std::atomic<int>::is_always_lock_free, "the handler may not wait");
+
+void pass_on(int signal) {
+  passed_on = signal;
+  if (child > 0) kill(child, signal);
+}
+
+/// While this lives, signals that would end this process go to the child.
+class PassSignals {
+ public:
+  PassSignals() {
+    struct sigaction action {};
+    action.sa_handler = pass_on;
+    for (std::size_t i = 0; i < 2; ++i) {
+      sigaction(kSignals[i], nullptr, &previous_[i]);
+      if (previous_[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &action, nullptr);
+    }
+  }
+  ~PassSignals() { restore(); }
+  PassSignals(const PassSignals&) = delete;
+  PassSignals& operator=(const PassSignals&) = delete;
+  void restore() {
+    for (std::size_t i = 0; i < 2; ++i) sigaction(kSignals[i], &previous_[i], nullptr);
+  }
+
+ private:
+  static constexpr int kSignals[] = {SIGINT, SIGTERM};
+  struct sigaction previous_[2]{};
+};
+
+/// Memory that parent and child see both; empty where there is none to have.
+std::span<char> shared_note() {
+  void* const memory =
+      mmap(nullptr, kNoteBytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) return {};
+  return {static_cast<char*>(memory), kNoteBytes};
+}
+
+[[noreturn]] void be_child(pid_t parent, const std::function<int()>& command,
+                           std::span<char> note) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);  // who kills the command means all of it
+  if (getppid() != parent) _exit(kInputOutput);
+  h5::note_reading_in(note);
+  int code = command();
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    std::fputs("tangere: writing to stdout failed\n", stderr);
+    code = kInputOutput;
+  }
+  _exit(code);
+}
+
+}  // namespace
+
+int run_in_child(const std::function<int()>& command) {
+  const std::span<char> note = shared_note();
+  const pid_t parent = getpid();
+  PassSignals signals;
+  child = 0;
+  passed_on = 0;
+  const pid_t process = fork();
+  if (process < 0) return command();  // no process to be had: read without that protection
+  if (process == 0) {
+    signals.restore();
+    be_child(parent, command, note);
+  }
+  child = process;
+  if (passed_on != 0) kill(process, passed_on);  // it came before there was a child to send it to
+  int status = 0;
+  while (waitpid(process, &status, 0) < 0)
+    if (errno != EINTR)
+      throw IoError(fmt::format("cannot wait for the reading process: {}", std::strerror(errno)));
+  const std::string reading(note.data(), note.empty() ? 0 : strnlen(note.data(), note.size()));
+  if (!note.empty()) munmap(note.data(), note.size());
+  if (WIFEXITED(status)) return WEXITSTATUS(status);
+  const int signal = WTERMSIG(status);
+  if (signal == SIGINT) return kInterrupted;
+  if (signal == SIGTERM) return kTerminated;
+  throw IoError(fmt::format(
+      "cannot read {}: the process that read it was ended by a signal ({}); a file that makes the "
+      "HDF5 library crash is damaged",
+      reading.empty() ? "the input" : reading, strsignal(signal)));
+}
+
+}  // namespace tangere::apps

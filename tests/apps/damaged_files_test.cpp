@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+// HDF5 files that are damaged or made to do harm: every command that reads them ends with code 3
+// and a message, never by a signal, and never as "a mistake in tangere".
+#include <gmock/gmock.h>
+#include <hdf5.h>
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+
+#include "tests/apps/program.hpp"
+#include "tests/files.hpp"
+
+namespace tangere::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// Opens a file, changes it and closes it.
+void change(const std::string& path, const std::function<void(hid_t)>& edit) {
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  ASSERT_GE(file, 0);
+  edit(file);
+  ASSERT_GE(H5Fclose(file), 0);
+}
+
+/// Replaces an attribute by a list of numbers; of one that is written as a scalar, too.
+void put_numbers(hid_t file, const char* object, const char* name,
+                 const std::vector<std::int64_t>& numbers) {
+  H5Adelete_by_name(file, object, name, H5P_DEFAULT);
+  const hsize_t size = numbers.size();
+  const hid_t space = numbers.size() == 1 ? H5Screate(H5S_SCALAR)
+                      : numbers.empty()   ? H5Screate(H5S_NULL)
+                                          : H5Screate_simple(1, &size, nullptr);
+  const hid_t attribute = H5Acreate_by_name(file, object, name, H5T_STD_I64LE, space, H5P_DEFAULT,
+                                            H5P_DEFAULT, H5P_DEFAULT);
+  ASSERT_GE(attribute, 0);
+  if (!numbers.empty()) {
+    ASSERT_GE(H5Awrite(attribute, H5T_NATIVE_INT64, numbers.data()), 0);
+  }
+  H5Aclose(attribute);
+  H5Sclose(space);
+}
+
+std::function<void(hid_t)> number(const char* object, const char* name, std::int64_t value) {
+  return [=](hid_t file) { put_numbers(file, object, name, {value}); };
+}
+
+/// Replaces demo_0's q by a dataset with these properties.
+void put_q(hid_t file, hid_t properties, std::vector<hsize_t> dims) {
+  const char* const name = "data/demo_0/obs/q";
+  ASSERT_GE(H5Ldelete(file, name, H5P_DEFAULT), 0);
+  const hid_t space = H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr);
+  const hid_t made =
+      H5Dcreate2(file, name, H5T_IEEE_F32LE, space, H5P_DEFAULT, properties, H5P_DEFAULT);
+  ASSERT_GE(made, 0);
+  H5Dclose(made);
+  H5Sclose(space);
+  H5Pclose(properties);
+}
+
+void show_itself(hid_t file) {
+  const std::array<hsize_t, 2> dims{2, 10};
+  const hid_t properties = H5Pcreate(H5P_DATASET_CREATE),
+              space = H5Screate_simple(2, dims.data(), nullptr);
+  ASSERT_GE(H5Pset_virtual(properties, space, ".", "/data/demo_0/obs/q", space), 0);
+  H5Sclose(space);
+  put_q(file, properties, {dims[0], dims[1]});
+}
+
+void show_a_system_file(hid_t file) {
+  const hid_t properties = H5Pcreate(H5P_DATASET_CREATE);
+  ASSERT_GE(H5Pset_external(properties, "/etc/passwd", 0, 80), 0);
+  put_q(file, properties, {2, 10});
+}
+
+void claim_too_much(hid_t file) {
+  const hid_t properties = H5Pcreate(H5P_DATASET_CREATE);
+  const std::array<hsize_t, 3> chunk{1, 1, 1};
+  ASSERT_GE(H5Pset_chunk(properties, 3, chunk.data()), 0);
+  put_q(file, properties, {hsize_t{1} << 31, hsize_t{1} << 31, hsize_t{1} << 31});
+}
+
+void link_outside(hid_t file) {
+  ASSERT_GE(H5Ldelete(file, "data/demo_0/obs/q", H5P_DEFAULT), 0);
+  ASSERT_GE(H5Lcreate_external("/tmp/elsewhere.h5", "/q", file, "data/demo_0/obs/q", H5P_DEFAULT,
+                               H5P_DEFAULT),
+            0);
+}
+
+void contain_itself(hid_t file) {
+  ASSERT_GE(H5Lcreate_hard(file, "data/demo_0/obs", file, "data/demo_0/obs/again", H5P_DEFAULT,
+                           H5P_DEFAULT),
+            0);
+}
+
+/// Garbage where the texts of attributes lie, which HDF5 1.10 does not check.
+void damage_heaps(const std::string& path) {
+  std::string bytes = file_bytes(path);
+  for (std::size_t at = bytes.find("GCOL"); at != std::string::npos;
+       at = bytes.find("GCOL", at + 4))
+    for (std::size_t k = 16; k < 80 && at + k < bytes.size(); ++k) bytes[at + k] = '\xFF';
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+struct Damage {
+  std::string name;
+  std::function<void(hid_t)> edit;
+  std::string said;  ///< by `validate`
+};
+void PrintTo(const Damage& damage, std::ostream* out) { *out << damage.name; }
+
+class DamagedShard : public ::testing::TestWithParam<Damage> {};
+
+Words generate() {
+  return {"generate",   scene("rolling_ball_small.xml"),
+          "--episodes", "3",
+          "--steps",    "10",
+          "--every",    "5",
+          "--threads",  "1",
+          "-o",         "set"};
+}
+
+void expect_answer(const Outcome& outcome, const std::string& command, const std::string& said) {
+  SCOPED_TRACE(command);
+  EXPECT_EQ(outcome.signal, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, Not(HasSubstr("mistake in tangere")));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("root:")));
+  if (said.empty()) return;
+  EXPECT_NE(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.err + outcome.out, HasSubstr(said));
+}
+
+TEST_P(DamagedShard, EndsInAMessage) {
+  const Folder folder;
+  ASSERT_EQ(run(folder, generate()).exit_code, 0);
+  change(folder.path("set/shard-00000.h5"), GetParam().edit);
+  expect_answer(run(folder, {"validate", "set"}), "validate", GetParam().said);
+  expect_answer(run(folder, {"info", "set"}), "info", "");
+  expect_answer(run(folder, {"export", "set", "--csv", "x.csv"}), "export", "");
+  expect_answer(run(folder, {"merge", "set", "--copy", "--overwrite"}), "merge", "");
+  expect_answer(run(folder, generate() + Words{"--resume"}), "resume", "");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Files, DamagedShard,
+    ::testing::Values(
+        Damage{"no_interval", number("scene", "every", 0), "'every' is 0; expected 1"},
+        Damage{"no_steps", number("scene", "steps", 0), "'steps' is 0; expected 1"},
+        Damage{"endless_episodes", number(".", "episodes", 1'000'000'000'000'000),
+               "expected 1000000000000000 together"},
+        Damage{"endless_shards", number(".", "dataset_shards", 1'000'000'000),
+               "counts 1000000000 shards; expected 1 to 1000000"},
+        Damage{"endless_rows", number("data/demo_0", "num_samples", 3'000'000'000),
+               "demo_0 has 3000000000 rows, expected 2"},
+        Damage{"an_empty_number", [](hid_t file) { put_numbers(file, "scene", "steps", {}); },
+               "expected one number; found 0"},
+        Damage{"two_numbers",
+               [](hid_t file) {
+                 put_numbers(file, "scene", "steps", {1, 2});
+               },
+               "expected one number; found 2"},
+        Damage{"a_view_of_itself", show_itself, "it shows itself"},
+        Damage{"numbers_of_the_system", show_a_system_file, "its numbers lie in another file"},
+        Damage{"more_than_any_file", claim_too_much, "more numbers than any file holds"},
+        Damage{"a_link_outside", link_outside, "cannot open dataset"},
+        Damage{"a_group_in_itself", contain_itself, ""}),
+    [](const auto& damage) { return damage.param.name; });
+
+TEST(DamagedFile, HeapsThatTheLibraryTrustsEndInAMessage) {
+  const Folder folder;
+  ASSERT_EQ(run(folder, generate()).exit_code, 0);
+  damage_heaps(folder.path("set/shard-00000.h5"));
+  for (const Words& words :
+       {Words{"validate", "set"}, Words{"info", "set"}, Words{"merge", "set", "--overwrite"},
+        generate() + Words{"--resume"}}) {
+    const Outcome outcome = run(folder, words);
+    expect_answer(outcome, words[0], "");
+    EXPECT_NE(outcome.exit_code, 0);
+    EXPECT_THAT(outcome.err + outcome.out, HasSubstr("shard-00000.h5"));
+  }
+}
+
+TEST(DamagedFile, ATrajectoryWithoutFiniteForcesIsNotDrawn) {
+  const Folder folder;
+  ASSERT_EQ(run(folder, {"simulate", scene("rolling_ball_small.xml"), "--steps", "20", "--every",
+                         "1", "-o", "run.h5"})
+                .exit_code,
+            0);
+  change(folder.path("run.h5"), [](hid_t file) {
+    const hid_t force = H5Dopen2(file, "tactile/pad/force", H5P_DEFAULT), all = H5Dget_space(force);
+    const std::array<hsize_t, 5> first{0, 0, 0, 0, 0}, one{1, 1, 1, 1, 1};
+    H5Sselect_hyperslab(all, H5S_SELECT_SET, first.data(), nullptr, one.data(), nullptr);
+    const hid_t memory = H5Screate_simple(5, one.data(), nullptr);
+    const double nan = NAN;
+    EXPECT_GE(H5Dwrite(force, H5T_NATIVE_DOUBLE, memory, all, H5P_DEFAULT, &nan), 0);
+    for (const hid_t space : {all, memory}) H5Sclose(space);
+    H5Dclose(force);
+  });
+  const Outcome outcome = run(folder, {"plot", "run.h5", "-o", "pads.svg"});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("sensor 'pad': frame 0 has a number that is nan"));
+  change(folder.path("run.h5"),
+         [](hid_t file) { put_numbers(file, "tactile/pad/force", "every", {0}); });
+  EXPECT_THAT(run(folder, {"plot", "run.h5", "-o", "pads.svg"}).err, HasSubstr("every 0 steps"));
+}
+
+TEST(DamagedFile, OtherThanRegularFilesAreRefused) {
+  const Folder folder;
+  for (const Words& words :
+       {Words{"simulate", "/dev/zero", "-o", "x.h5"}, Words{"validate", "/dev/zero"},
+        Words{"plot", "/dev/zero", "-o", "x.svg"}}) {
+    const Outcome outcome = run(folder, words);
+    EXPECT_EQ(outcome.exit_code, 3) << words[0];
+    EXPECT_THAT(outcome.err, HasSubstr("/dev/zero: is a device")) << words[0];
+  }
+}
+
+TEST(DamagedFile, TextThatIsNoUtf8IsRefusedWithItsLine) {
+  const Folder folder;
+  folder.write("scene.xml", "<redmax>\n  <!-- \xFF -->\n</redmax>\n");
+  const Outcome outcome = run(folder, {"inspect", "scene.xml"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("scene.xml:2: byte 0xff is no UTF-8"));
+}
+
+TEST(DamagedFile, NamesToRecordStandOnce) {
+  const Folder folder;
+  const Outcome outcome = run(folder, generate() + Words{"--record", "q,q"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("'q' stands there twice"));
+}
+
+TEST(DamagedFile, TheViewForMinariDoesNotFollowLinks) {
+  const Folder folder, elsewhere;
+  ASSERT_EQ(run(folder, generate() + Words{"--no-merge"}).exit_code, 0);
+  fs::create_directory_symlink(elsewhere.path(), folder.path("set/minari"));
+  const Outcome outcome = run(folder, {"merge", "set"});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("is a symbolic link"));
+  EXPECT_TRUE(elsewhere.files().empty());
+}
+
+}  // namespace
+}  // namespace tangere::apps

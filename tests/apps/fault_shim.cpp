@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// Preloaded into a program (LD_PRELOAD), it makes one call of the operating system fail.
+//
+// TANGERE_FAULT=kind:n fails the n-th call of a kind, counted from 1, with EIO (writes: ENOSPC,
+// threads: EAGAIN, and all later ones too, memory: ENOMEM). TANGERE_FAULT_COUNT=file writes there, when the program ends,
+// how many calls of that kind there were. Kinds: write, sync, rename, close, truncate, open,
+// thread, memory.
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <sys/stat.h>
+#include <sys/uio.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* pointer, std::size_t size);
+}
+
+namespace {
+
+// Nothing here may allocate: memory is one of the kinds. The environment is read when the library
+// is loaded; calls before that succeed.
+char kind[16];
+long failing = -1;  // -1: not loaded yet
+std::atomic<long> calls{0};
+
+/// Whether this call is the one that fails.
+bool fails(const char* of) {
+  return failing >= 0 && std::strcmp(of, kind) == 0 && ++calls == failing;
+}
+
+template <class F>
+F* real(const char* name) {
+  void* const found = dlsym(RTLD_NEXT, name);
+  F* function = nullptr;
+  static_assert(sizeof function == sizeof found);
+  std::memcpy(&function, &found, sizeof found);
+  return function;
+}
+
+__attribute__((constructor)) void load() {
+  const char* const fault = std::getenv("TANGERE_FAULT");
+  const char* const colon = fault == nullptr ? nullptr : std::strchr(fault, ':');
+  if (colon == nullptr || colon - fault >= static_cast<long>(sizeof kind)) return;
+  std::memcpy(kind, fault, static_cast<std::size_t>(colon - fault));
+  failing = std::atol(colon + 1);
+}
+
+__attribute__((destructor)) void report() {
+  const char* const path = std::getenv("TANGERE_FAULT_COUNT");
+  if (path == nullptr) return;
+  const long counted = calls;
+  failing = -1;
+  if (std::FILE* const file = std::fopen(path, "w")) {
+    std::fprintf(file, "%ld\n", counted);
+    std::fclose(file);
+  }
+}
+
+}  // namespace
+
+// FAULTY(kind, errno, type, name, (parameters), (arguments)): the call, or its failure. Only calls
+// that return -1 when they fail.
+#define FAULTY(of, error, type, name, parameters, arguments) \
+  extern "C" type name parameters {                          \
+    static auto* const call = real<type parameters>(#name);  \
+    if (fails(of)) {                                         \
+      errno = error;                                         \
+      return static_cast<type>(-1);                          \
+    }                                                        \
+    return call arguments;                                   \
+  }
+
+FAULTY("write", ENOSPC, ssize_t, write, (int fd, const void* data, size_t size), (fd, data, size))
+FAULTY("write", ENOSPC, ssize_t, pwrite, (int fd, const void* data, size_t size, off_t at),
+       (fd, data, size, at))
+FAULTY("write", ENOSPC, ssize_t, pwrite64, (int fd, const void* data, size_t size, off64_t at),
+       (fd, data, size, at))
+FAULTY("write", ENOSPC, ssize_t, writev, (int fd, const iovec* pieces, int count),
+       (fd, pieces, count))
+FAULTY("write", ENOSPC, ssize_t, pwritev, (int fd, const iovec* pieces, int count, off_t at),
+       (fd, pieces, count, at))
+FAULTY("write", ENOSPC, ssize_t, pwritev64, (int fd, const iovec* pieces, int count, off64_t at),
+       (fd, pieces, count, at))
+FAULTY("sync", EIO, int, fsync, (int fd), (fd))
+FAULTY("sync", EIO, int, fdatasync, (int fd), (fd))
+FAULTY("rename", EIO, int, rename, (const char* from, const char* to), (from, to))
+FAULTY("rename", EIO, int, renameat2,
+       (int a, const char* from, int b, const char* to, unsigned flags), (a, from, b, to, flags))
+FAULTY("truncate", EIO, int, ftruncate, (int fd, off_t size), (fd, size))
+FAULTY("truncate", EIO, int, ftruncate64, (int fd, off64_t size), (fd, size))
+
+/// The file is closed even where closing says that something failed, as on Linux.
+extern "C" int close(int fd) {
+  static auto* const call = real<int(int)>("close");
+  const bool failed = fails("close");
+  const int result = call(fd);
+  if (!failed) return result;
+  errno = EIO;
+  return -1;
+}
+
+#define FAULTY_OPEN(name)                                              \
+  extern "C" int name(const char* path, int flags, ...) {              \
+    static auto* const call = real<int(const char*, int, ...)>(#name); \
+    va_list rest;                                                      \
+    va_start(rest, flags);                                             \
+    const auto mode = static_cast<mode_t>(va_arg(rest, int));          \
+    va_end(rest);                                                      \
+    if (fails("open")) {                                               \
+      errno = EIO;                                                     \
+      return -1;                                                       \
+    }                                                                  \
+    return call(path, flags, mode);                                    \
+  }
+FAULTY_OPEN(open)
+FAULTY_OPEN(open64)
+
+extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* how, void* (*run)(void*),
+                              void* with) {
+  static auto* const call =
+      real<int(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*)>("pthread_create");
+  // A limit on threads stays met: all later ones fail as well.
+  return fails("thread") || (std::strcmp(kind, "thread") == 0 && failing > 0 && calls > failing)
+             ? EAGAIN
+             : call(thread, how, run, with);
+}
+
+extern "C" void* malloc(std::size_t size) {
+  if (!fails("memory")) return __libc_malloc(size);
+  errno = ENOMEM;
+  return nullptr;
+}
+extern "C" void* calloc(std::size_t count, std::size_t size) {
+  if (!fails("memory")) return __libc_calloc(count, size);
+  errno = ENOMEM;
+  return nullptr;
+}
+extern "C" void* realloc(void* pointer, std::size_t size) {
+  if (!fails("memory")) return __libc_realloc(pointer, size);
+  errno = ENOMEM;
+  return nullptr;
+}
