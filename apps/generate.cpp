@@ -439,8 +439,7 @@ Command add_generate(CLI::App& program) {
   add_flag(app, "--allow-unknown", o.allow_unknown,
            "Unknown elements and attributes of the scene are warnings, not errors");
   add_console_options(app, *console);
-  return {&app, [=](const ProgramInfo& info) { return generate(*options, *console, info); },
-          [=] { return options->resume; }};
+  return {&app, [=](const ProgramInfo& info) { return generate(*options, *console, info); }};
 }
 
 }  // namespace tangere::apps

@@ -132,10 +132,7 @@ void end_by_library() {
 
 /// Set before other objects of the program are made: they allocate, too.
 struct LastResort {
-  LastResort() {
-    std::set_terminate(end_uncaught);
-    std::atexit(end_by_library);
-  }
+  LastResort() { std::set_terminate(end_uncaught); }
 };
 [[gnu::init_priority(101)]] const LastResort last_resort;
 
@@ -155,6 +152,7 @@ int start(int argc, char** argv) {
 }  // namespace tangere::apps
 
 int main(int argc, char** argv) {
+  std::atexit(tangere::apps::end_by_library);  // what is registered last runs first
   const int code = tangere::apps::start(argc, argv);
   tangere::apps::came_to_its_end = true;
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;

@@ -8,6 +8,9 @@
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#ifdef __SANITIZE_ADDRESS__
+#include <sanitizer/lsan_interface.h>
+#endif
 
 #include <algorithm>
 #include <atomic>
@@ -29,9 +32,10 @@ constexpr std::size_t kNoteBytes = 4096;
 std::atomic<int> child{0}, passed_on{0};
 static_assert(std::atomic<int>::is_always_lock_free, "the handler may not wait");
 
-void pass_on(int signal) {
+/// A signal that the terminal sends reaches the child by itself; what a process sends does not.
+void pass_on(int signal, siginfo_t* info, void*) {
   passed_on = signal;
-  if (child > 0) kill(child, signal);
+  if (child > 0 && info->si_code <= 0) kill(child, signal);
 }
 
 /// While this lives, signals that would end this process go to the child.
@@ -39,22 +43,28 @@ class PassSignals {
  public:
   PassSignals() {
     struct sigaction action {};
-    action.sa_handler = pass_on;
+    action.sa_sigaction = pass_on;
+    action.sa_flags = SA_SIGINFO;
     for (std::size_t i = 0; i < 2; ++i) {
       sigaction(kSignals[i], nullptr, &previous_[i]);
       if (previous_[i].sa_handler != SIG_IGN) sigaction(kSignals[i], &action, nullptr);
     }
+    // Ignored by some parents: the child would then leave without a trace.
+    struct sigaction wait {};
+    wait.sa_handler = SIG_DFL;
+    sigaction(SIGCHLD, &wait, &child_);
   }
   ~PassSignals() { restore(); }
   PassSignals(const PassSignals&) = delete;
   PassSignals& operator=(const PassSignals&) = delete;
   void restore() {
     for (std::size_t i = 0; i < 2; ++i) sigaction(kSignals[i], &previous_[i], nullptr);
+    sigaction(SIGCHLD, &child_, nullptr);
   }
 
  private:
   static constexpr int kSignals[] = {SIGINT, SIGTERM};
-  struct sigaction previous_[2]{};
+  struct sigaction previous_[2]{}, child_{};
 };
 
 /// Memory that parent and child see both; empty where there is none to have.
@@ -75,7 +85,16 @@ std::span<char> shared_note() {
     std::fputs("tangere: writing to stdout failed\n", stderr);
     code = kInputOutput;
   }
+#ifdef __SANITIZE_ADDRESS__
+  __lsan_do_leak_check();  // it would otherwise look at the end of main
+#endif
   _exit(code);
+}
+
+/// Signals by which the system ends a process for what it did itself.
+bool is_crash(int signal) {
+  return signal == SIGSEGV || signal == SIGBUS || signal == SIGABRT || signal == SIGFPE ||
+         signal == SIGILL;
 }
 
 }  // namespace
@@ -86,11 +105,16 @@ int run_in_child(const std::function<int()>& command) {
   PassSignals signals;
   child = 0;
   passed_on = 0;
+  std::fflush(stdout);
   const pid_t process = fork();
-  if (process < 0) return command();  // no process to be had: read without that protection
   if (process == 0) {
     signals.restore();
     be_child(parent, command, note);
+  }
+  if (process < 0) {  // no process to be had: read without that protection
+    signals.restore();
+    if (!note.empty()) munmap(note.data(), note.size());
+    return command();
   }
   child = process;
   if (passed_on != 0) kill(process, passed_on);  // it came before there was a child to send it to
@@ -98,16 +122,22 @@ int run_in_child(const std::function<int()>& command) {
   while (waitpid(process, &status, 0) < 0)
     if (errno != EINTR)
       throw IoError(fmt::format("cannot wait for the reading process: {}", std::strerror(errno)));
+  child = 0;
   const std::string reading(note.data(), note.empty() ? 0 : strnlen(note.data(), note.size()));
   if (!note.empty()) munmap(note.data(), note.size());
   if (WIFEXITED(status)) return WEXITSTATUS(status);
   const int signal = WTERMSIG(status);
   if (signal == SIGINT) return kInterrupted;
   if (signal == SIGTERM) return kTerminated;
+  if (!is_crash(signal)) {  // a closed pipe, a limit: end as the child did
+    signals.restore();
+    std::signal(signal, SIG_DFL);
+    raise(signal);
+  }
   throw IoError(fmt::format(
-      "cannot read {}: the process that read it was ended by a signal ({}); a file that makes the "
+      "the reading process was ended by a signal ({}); it had last read {}; a file that makes the "
       "HDF5 library crash is damaged",
-      reading.empty() ? "the input" : reading, strsignal(signal)));
+      strsignal(signal), reading.empty() ? "nothing" : reading));
 }
 
 }  // namespace tangere::apps

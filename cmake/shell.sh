@@ -11,7 +11,8 @@ fail() {
   exit 1
 }
 
-package_list() { sed -e 's/#.*//' -e '/^[[:space:]]*$/d' cmake/packages.txt; }
+package_files=(cmake/packages.txt)
+package_list() { sed -e 's/#.*//' -e '/^[[:space:]]*$/d' "${package_files[@]}"; }
 missing_packages() {
   local package
   for package in $(package_list); do
@@ -19,7 +20,7 @@ missing_packages() {
   done
 }
 
-# Installs what cmake/packages.txt lists and this machine lacks; the only part that needs root.
+# Installs what the files in $package_files list and this machine lacks; the only part that needs root.
 install_packages() {
   if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
     fail "this machine has no dpkg-query and apt-get, so packages cannot be installed from here." \
@@ -29,7 +30,7 @@ install_packages() {
   local missing
   missing=$(missing_packages | tr '\n' ' ')
   if [ -z "$missing" ]; then
-    say "All packages of cmake/packages.txt are installed."
+    say "All packages of ${package_files[*]} are installed."
     return
   fi
   say "To install, once, with apt-get (as root, because it writes to /usr): $missing"

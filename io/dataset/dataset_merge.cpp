@@ -61,6 +61,7 @@ class Merger {
     // The view comes first: as long as the merged file is missing, a view is replaced without
     // --overwrite.
     result_.bytes = file_.commit([this](const std::string& part) {
+      check_stop();
       if (options_.copy) check_copy(part);
       if (view_) view_->commit();
     });

@@ -57,6 +57,11 @@ std::string file_of(hid_t object) {
 [[noreturn]] void fail(std::string_view operation, const Id& object, std::string_view child = {},
                        std::string reason = {}) {
   if (reason.empty()) reason = last_reason();  // before any other call of the library clears it
+  if (any_write_failure()) {                   // then what the library says is only a consequence
+    const Id file(H5Iget_file_id(object.get()));
+    if (const auto failure = write_failure(file.get()); failure != nullptr && failure->error != 0)
+      reason = std::strerror(failure->error);
+  }
   std::string where = name_of(object.get());
   if (!child.empty()) {
     if (!where.ends_with('/')) where += '/';
@@ -92,7 +97,6 @@ herr_t allow_link(const char* from, const char*, const char* to, const char*, un
 
 /// Refuses numbers that lie outside HDF5 files, views of other folders and views of themselves.
 void check_source(const Id& dataset, const Id& parent, const std::string& name) {
-  if (H5Dget_offset(dataset.get()) != HADDR_UNDEF) return;  // one piece of this file
   const Id creation(H5Dget_create_plist(dataset.get()));
   if (H5Pget_external_count(creation.get()) > 0)
     fail("open dataset", parent, name, "its numbers lie in another file, which is not HDF5");
@@ -326,6 +330,7 @@ void close_file(Id& file, const std::string& path) {
   if (H5Fclose(file.get()) < 0 && reason.empty()) reason = last_reason();
   file.release();  // also where closing failed: a second try would find a file half closed
   if (failure != nullptr && failure->error != 0) reason = std::strerror(failure->error);
+  if (failure == nullptr) reason = "HDF5 does not say whether its writes succeeded";
   if (!reason.empty()) throw IoError(fmt::format("cannot write '{}': {}", path, reason));
 }
 
@@ -348,7 +353,8 @@ Id open_group(const Id& parent, const std::string& name) {
 
 bool has_link(const Id& parent, const std::string& name) {
   const Quiet quiet;
-  return H5Lexists(parent.get(), name.c_str(), H5P_DEFAULT) > 0;
+  const Id access = link_access(H5P_LINK_ACCESS);
+  return H5Lexists(parent.get(), name.c_str(), access.get()) > 0;
 }
 
 template <class T>

@@ -135,8 +135,8 @@ herr_t write(H5FD_t* file, H5FD_mem_t, hid_t, haddr_t address, size_t size, cons
     if (f->failure->error != 0) return 0;  // the file is lost: spare a full disk the rest
     const ssize_t put = pwrite(f->descriptor, from, size, static_cast<off_t>(address));
     if (put < 0 && errno == EINTR) continue;
-    if (put < 0) {
-      f->fail(errno);
+    if (put <= 0) {
+      f->fail(put < 0 ? errno : EIO);
       return 0;
     }
     from += put;
@@ -159,7 +159,7 @@ H5FD_class_t driver() {
   H5FD_class_t c{};
 #ifdef H5FD_CLASS_VERSION
   c.version = H5FD_CLASS_VERSION;
-  c.value = static_cast<H5FD_class_value_t>(600);  // from 512 on they are anybody's
+  c.value = static_cast<H5FD_class_value_t>(511);  // below 512: registered with nobody
 #endif
   c.name = "tangere";
   c.maxaddr = static_cast<haddr_t>(std::numeric_limits<off_t>::max());
@@ -190,6 +190,7 @@ hid_t driver_id() {
 }  // namespace
 
 void use_checked_driver(hid_t access) {
+  open_error = 0;
   if (driver_id() < 0 || H5Pset_driver(access, driver_id(), nullptr) < 0)
     throw IoError("HDF5 does not take a driver for files");
 }

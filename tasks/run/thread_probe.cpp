@@ -18,6 +18,7 @@ void require_threads(int threads) {
   std::promise<void> all;
   const std::shared_future<void> started = all.get_future().share();
   std::vector<std::thread> others;
+  others.reserve(static_cast<std::size_t>(threads) - 1);
   std::string refused;
   try {
     for (int k = 1; k < threads; ++k) others.emplace_back([started] { started.wait(); });

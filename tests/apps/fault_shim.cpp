@@ -8,6 +8,7 @@
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <pthread.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/uio.h>
 #include <unistd.h>
@@ -19,6 +20,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <new>
 
 extern "C" {
 void* __libc_malloc(std::size_t size);
@@ -32,11 +34,12 @@ namespace {
 // is loaded; calls before that succeed.
 char kind[16];
 long failing = -1;  // -1: not loaded yet
-std::atomic<long> calls{0};
+std::atomic<long> unshared{0};
+std::atomic<long>* calls = &unshared;  // of the program and of its child processes together
 
 /// Whether this call is the one that fails.
 bool fails(const char* of) {
-  return failing >= 0 && std::strcmp(of, kind) == 0 && ++calls == failing;
+  return failing >= 0 && std::strcmp(of, kind) == 0 && ++*calls == failing;
 }
 
 template <class F>
@@ -53,13 +56,16 @@ __attribute__((constructor)) void load() {
   const char* const colon = fault == nullptr ? nullptr : std::strchr(fault, ':');
   if (colon == nullptr || colon - fault >= static_cast<long>(sizeof kind)) return;
   std::memcpy(kind, fault, static_cast<std::size_t>(colon - fault));
+  void* const page =
+      mmap(nullptr, sizeof *calls, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (page != MAP_FAILED) calls = new (page) std::atomic<long>(0);
   failing = std::atol(colon + 1);
 }
 
 __attribute__((destructor)) void report() {
   const char* const path = std::getenv("TANGERE_FAULT_COUNT");
   if (path == nullptr) return;
-  const long counted = calls;
+  const long counted = *calls;
   failing = -1;
   if (std::FILE* const file = std::fopen(path, "w")) {
     std::fprintf(file, "%ld\n", counted);
@@ -131,7 +137,7 @@ extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* how, void
   static auto* const call =
       real<int(pthread_t*, const pthread_attr_t*, void* (*)(void*), void*)>("pthread_create");
   // A limit on threads stays met: all later ones fail as well.
-  return fails("thread") || (std::strcmp(kind, "thread") == 0 && failing > 0 && calls > failing)
+  return fails("thread") || (std::strcmp(kind, "thread") == 0 && failing > 0 && *calls > failing)
              ? EAGAIN
              : call(thread, how, run, with);
 }
