@@ -64,8 +64,8 @@ std::vector<std::string> words_of(const std::string& list) {
     if (words.back().empty())
       throw InputError(fmt::format("--record '{}'; expected names separated by commas", list));
     if (std::count(words.begin(), words.end(), words.back()) > 1)
-      throw InputError(fmt::format(
-          "--record '{}': '{}' stands there twice; expected each name once", list, words.back()));
+      throw InputError(fmt::format("--record '{}': '{}' is listed twice; expected each name once",
+                                   list, words.back()));
   }
   return words;
 }

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kMostShards = 1'000'000;  // a damaged count must not fill the memory
-constexpr int kDeepest = 4;                      // groups of a demo inside each other
+constexpr int kDeepest = 4;                      // nesting of the groups of a demo
 
 /// Matches names like "shard-00042.h5".
 bool is_shard(std::string_view name) {
@@ -94,7 +94,7 @@ void add_shape(const h5::Id& group, const std::string& name, const std::string& 
 void add_shapes(const h5::Id& group, const std::string& prefix, int depth,
                 DatasetSummary& summary) {
   if (depth > kDeepest)
-    throw IoError(fmt::format("'{}': groups lie deeper in each other than {}", prefix, kDeepest));
+    throw IoError(fmt::format("'{}': groups are nested deeper than {}", prefix, kDeepest));
   for (const std::string& name : h5::link_names(group)) {
     if (h5::is_dataset(group, name)) {
       add_shape(group, name, prefix, summary);

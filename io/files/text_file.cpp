@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Read by the system's own calls: a stream tells an error of the disk from the end by exceptions.
+// Uses the system's own calls, because a stream does not say why a read failed.
 #include "io/files/text_file.hpp"
 
 #include <fcntl.h>

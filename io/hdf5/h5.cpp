@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <filesystem>
 #include <utility>
@@ -71,7 +72,8 @@ std::string file_of(hid_t object) {
       fmt::format("cannot {} '{}' in '{}': {}", operation, where, file_of(object.get()), reason));
 }
 
-/// The library takes bytes that it cannot write yet, and its driver those that the disk refuses.
+/// Throws if the disk refused an earlier write: the library buffers bytes, and its driver hides
+/// failures from it.
 void check_written(const Id& object) {
   if (!any_write_failure()) return;
   const Id file(H5Iget_file_id(object.get()));
@@ -95,8 +97,23 @@ herr_t allow_link(const char* from, const char*, const char* to, const char*, un
   return may_lead_to(from, to) ? 0 : -1;
 }
 
+/// Whether a description has a message of type 7: a list of external files. Much faster than to ask
+/// for the properties, which copies all of them.
+bool has_external_list(const Id& dataset) {
+#if H5_VERSION_GE(1, 12, 0)
+  H5O_native_info_t info;
+  if (H5Oget_native_info(dataset.get(), &info, H5O_NATIVE_INFO_HDR) < 0) return true;
+#else
+  H5O_info_t info;
+  if (H5Oget_info2(dataset.get(), &info, H5O_INFO_HDR) < 0) return true;
+#endif
+  constexpr unsigned kExternalFiles = 7;
+  return (info.hdr.mesg.present >> kExternalFiles & 1U) != 0;
+}
+
 /// Refuses numbers that lie outside HDF5 files, views of other folders and views of themselves.
 void check_source(const Id& dataset, const Id& parent, const std::string& name) {
+  if (H5Dget_offset(dataset.get()) != HADDR_UNDEF && !has_external_list(dataset)) return;
   const Id creation(H5Dget_create_plist(dataset.get()));
   if (H5Pget_external_count(creation.get()) > 0)
     fail("open dataset", parent, name, "its numbers lie in another file, which is not HDF5");
@@ -235,10 +252,17 @@ struct OpenAttribute {
 
 }  // namespace
 
-Id link_access(hid_t kind) {
-  Id access(H5Pcreate(kind));
-  H5Pset_elink_cb(access.get(), allow_link, nullptr);
-  return access;
+hid_t link_access(hid_t kind) {
+  const auto made = [](hid_t of) {
+    const hid_t access = H5Pcreate(of);
+    H5Pset_elink_cb(access, allow_link, nullptr);
+    return std::pair(of, access);
+  };
+  // Made once and kept: making one takes longer than opening an object with it.
+  static const std::array all{made(H5P_GROUP_ACCESS), made(H5P_DATASET_ACCESS),
+                              made(H5P_LINK_ACCESS)};
+  return std::find_if(all.begin(), all.end(), [&](const auto& a) { return a.first == kind; })
+      ->second;
 }
 
 Quiet::Quiet() {
@@ -345,16 +369,14 @@ Id create_group(const Id& parent, const std::string& name) {
 Id open_group(const Id& parent, const std::string& name) {
   const Quiet quiet;
   note_object(name);
-  const Id access = link_access(H5P_GROUP_ACCESS);
-  Id group(H5Gopen2(parent.get(), name.c_str(), access.get()));
+  Id group(H5Gopen2(parent.get(), name.c_str(), link_access(H5P_GROUP_ACCESS)));
   if (group.get() < 0) fail("open group", parent, name);
   return group;
 }
 
 bool has_link(const Id& parent, const std::string& name) {
   const Quiet quiet;
-  const Id access = link_access(H5P_LINK_ACCESS);
-  return H5Lexists(parent.get(), name.c_str(), access.get()) > 0;
+  return H5Lexists(parent.get(), name.c_str(), link_access(H5P_LINK_ACCESS)) > 0;
 }
 
 template <class T>
@@ -400,8 +422,7 @@ void create_flags(const Id& parent, const std::string& name, std::span<const std
 Id open_dataset(const Id& parent, const std::string& name) {
   const Quiet quiet;
   note_object(name);
-  const Id access = link_access(H5P_DATASET_ACCESS);
-  Id dataset(H5Dopen2(parent.get(), name.c_str(), access.get()));
+  Id dataset(H5Dopen2(parent.get(), name.c_str(), link_access(H5P_DATASET_ACCESS)));
   if (dataset.get() < 0) fail("open dataset", parent, name);
   check_source(dataset, parent, name);
   return dataset;

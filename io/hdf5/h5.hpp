@@ -33,7 +33,7 @@ class Id {
   ~Id() { reset(); }
 
   [[nodiscard]] hid_t get() const { return id_; }
-  /// Closes. What a file's last bytes failed of, close_file says.
+  /// Closes without a report. close_file reports what could not be written.
   void reset() noexcept;
   /// Forgets an identifier that was closed elsewhere.
   void release() noexcept { id_ = -1; }
@@ -55,9 +55,9 @@ class Quiet {
   void* data_ = nullptr;
 };
 
-/// Properties of a class of access (H5P_GROUP_ACCESS …) with which links are followed to files of
-/// the same folder and no further.
-Id link_access(hid_t kind);
+/// Properties of H5P_GROUP_ACCESS, H5P_DATASET_ACCESS or H5P_LINK_ACCESS with which links are
+/// followed only to files of the same folder. The caller does not close them.
+hid_t link_access(hid_t kind);
 
 using Dims = std::vector<hsize_t>;
 
@@ -68,10 +68,10 @@ using Dims = std::vector<hsize_t>;
 Id create_file(const std::string& path, hsize_t description_block = 2048, bool views = false);
 /// A file that is never on disk.
 Id create_memory_file();
-/// Opens a regular file for reading; other kinds (devices, FIFOs, folders) are refused. What it
-/// leads to in other files has to lie in its own folder: links and views elsewhere cannot be
-/// opened, and raw data outside HDF5 files neither. With `forget` the library does not keep descriptions of closed
-/// objects, because searching tens of thousands of them is slow.
+/// Opens a file for reading. Devices, pipes and folders are refused. Links and views may name files
+/// of the same folder only, and datasets with external raw storage cannot be opened. With `forget`
+/// the library does not keep descriptions of closed objects, because searching tens of thousands of
+/// them is slow.
 Id open_file(const std::string& path, bool forget = false);
 /// Opens a file for reading and writing, as create_file left it.
 Id change_file(const std::string& path);

@@ -159,7 +159,7 @@ H5FD_class_t driver() {
   H5FD_class_t c{};
 #ifdef H5FD_CLASS_VERSION
   c.version = H5FD_CLASS_VERSION;
-  c.value = static_cast<H5FD_class_value_t>(511);  // below 512: registered with nobody
+  c.value = static_cast<H5FD_class_value_t>(511);  // values below 512 are not registered
 #endif
   c.name = "tangere";
   c.maxaddr = static_cast<haddr_t>(std::numeric_limits<off_t>::max());

@@ -71,8 +71,7 @@ std::string attribute_text(const Id& object, const std::string& name) {
 
 bool is_dataset(const Id& parent, const std::string& name) {
   const Quiet quiet;
-  const Id access = link_access(H5P_LINK_ACCESS);
-  const Id object(H5Oopen(parent.get(), name.c_str(), access.get()));
+  const Id object(H5Oopen(parent.get(), name.c_str(), link_access(H5P_LINK_ACCESS)));
   return object.get() >= 0 && H5Iget_type(object.get()) == H5I_DATASET;
 }
 

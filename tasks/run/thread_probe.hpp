@@ -6,7 +6,7 @@
 namespace tangere {
 
 /// Starts `threads` - 1 threads at once and ends them. Throws InputError, naming the limit that was
-/// met, when the system refuses one. Takes about 20 µs a thread.
+/// met, when the system refuses one.
 void require_threads(int threads);
 
 }  // namespace tangere

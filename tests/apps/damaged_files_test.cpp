@@ -233,7 +233,7 @@ TEST(DamagedFile, NamesToRecordStandOnce) {
   const Folder folder;
   const Outcome outcome = run(folder, generate() + Words{"--record", "q,q"});
   EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("'q' stands there twice"));
+  EXPECT_THAT(outcome.err, HasSubstr("'q' is listed twice"));
 }
 
 TEST(DamagedFile, TheViewForMinariDoesNotFollowLinks) {
