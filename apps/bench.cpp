@@ -14,6 +14,7 @@
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
+#include "engine/step/stepper.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/files/part_file.hpp"
 #include "kernels/numbers/block.hpp"
@@ -111,7 +112,7 @@ int report(const BenchArguments& options, const Console& console, const BenchSet
               {"seed", options.seed.value_or(0)},
               {"timestep", model.timestep()},
               {"integrator", to_string(model.integrator())},
-              {"tolerance", model.solver().tolerance},
+              {"tolerance", Stepper(model).tolerance()},
               {"svg", options.svg.empty() ? Json() : Json(options.svg)},
               {"csv", options.csv.empty() ? Json() : Json(options.csv)},
               {"runs", entries}};

@@ -34,5 +34,6 @@ Command add_export(CLI::App& program);
 Command add_plot(CLI::App& program);
 Command add_bench(CLI::App& program);
 Command add_gradcheck(CLI::App& program);
+Command add_accuracy(CLI::App& program);
 
 }  // namespace tangere::apps

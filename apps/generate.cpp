@@ -344,10 +344,15 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
                       options.shard, *options.shards));
     options.shards = shard.count;
   }
-  if (const std::unique_ptr<Task> task = find_task(options.scene, console))
+  // The same for the episodes and their gradients, which play them again.
+  std::optional<double> tolerance;
+  if (options.gradients != "none") tolerance = kGradientTolerance;
+  if (const std::unique_ptr<Task> task = find_task(options.scene, console, tolerance))
     return generate_task(options, console, info, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
-  const Model model(read_scene_for(options.scene, options.allow_unknown, console));
+  Scene scene = read_scene_for(options.scene, options.allow_unknown, console);
+  if (!scene.solver.tolerance) scene.solver.tolerance = tolerance;
+  const Model model(scene);
   const Stepper stepper(model);
   const ControlProgram controls =
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);

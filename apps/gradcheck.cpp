@@ -143,8 +143,8 @@ int run_task(const GradcheckArguments& o, const Console& console, const Task& ta
   options.actions = actions_of(o, spec);
   options.entries = o.entries.value_or(kDefaultEntries);
   options.seed = o.seed.value_or(0);
-  options.stepper.tolerance = std::min(task.model().solver().tolerance, kTolerance);
   const Stepper stepper(task.model());
+  options.stepper.tolerance = std::min(stepper.tolerance(), kTolerance);
   console.print(fmt::format("task {}: at most {} actions of {} steps of {:g} s, {}, policy {}",
                             spec.name, options.actions, spec.steps_per_action, stepper.timestep(),
                             to_string(stepper.integrator()), to_string(kind)));
@@ -179,7 +179,7 @@ int run(const GradcheckArguments& o, const Console& console) {
   options.steps = steps_of(o, controls);
   options.entries = o.entries.value_or(kDefaultEntries);
   options.seed = o.seed.value_or(0);
-  options.stepper.tolerance = std::min(model.solver().tolerance, kTolerance);
+  options.stepper.tolerance = std::min(stepper.tolerance(), kTolerance);
   const LossKind kind = loss_of(o.loss, model);
   RolloutOptions rollout;
   rollout.every = o.every.value_or(0);

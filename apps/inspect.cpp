@@ -13,6 +13,7 @@
 #include "apps/task_run.hpp"
 #include "engine/model/model.hpp"
 #include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
 #include "io/trajectory/trajectory_layout.hpp"
 #include "kernels/table/isa.hpp"
 
@@ -92,7 +93,7 @@ Json as_json(const Model& model) {
           {"model", scene.name},
           {"integrator", to_string(model.integrator())},
           {"timestep", model.timestep()},
-          {"tolerance", model.solver().tolerance},
+          {"tolerance", Stepper(model).tolerance()},
           {"gravity", scene.gravity},
           {"bodies", bodies},
           {"q_names", model.q_names()},
@@ -154,7 +155,7 @@ std::string as_text(const Model& model) {
   const Scene& scene = model.scene();
   std::string text =
       fmt::format("scene {} ({}): {}, h = {} s, tolerance {}\n\n", scene.name, scene.path,
-                  to_string(model.integrator()), model.timestep(), model.solver().tolerance);
+                  to_string(model.integrator()), model.timestep(), Stepper(model).tolerance());
   text += bodies_text(model) + '\n';
   text += names_line("coordinates", model.q_names());
   text += names_line("dofs", model.v_names());

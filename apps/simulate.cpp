@@ -347,6 +347,7 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   if (!options.integrator.empty()) solver.integrator = integrator_named(options.integrator);
 
   const Model model(read_scene_for(options.scene, options.allow_unknown, console));
+  if (!options.gradients.empty()) solver = for_gradients(model, solver);
   Stepper stepper(model, solver);
   const Start start(options, stepper);
   start.tell(console, model.scene(), stepper);

@@ -13,7 +13,8 @@
 
 namespace tangere::apps {
 
-std::unique_ptr<Task> find_task(const std::string& word, const Console& console) {
+std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
+                                std::optional<double> tolerance) {
   if (is_task(word)) {
     const TaskSpec spec = task_spec(word);
     const char* const text = task_scene(spec.scene);
@@ -21,6 +22,7 @@ std::unique_ptr<Task> find_task(const std::string& word, const Console& console)
       throw InputError(fmt::format("task '{}': its scene {} is not there", word, spec.scene));
     SceneFile file = parse_scene(text, spec.scene);
     for (const std::string& warning : file.warnings) console.note("warning: " + warning);
+    if (!file.scene.solver.tolerance) file.scene.solver.tolerance = tolerance;
     return make_task(word, file.scene);
   }
   const bool plain = word.find('/') == std::string::npos && word.find('.') == std::string::npos;

@@ -14,8 +14,10 @@
 namespace tangere::apps {
 
 /// Returns the task that `word` names, on its own scene; null if it names a file. Throws InputError
-/// with the nearest task for a plain word that is neither.
-std::unique_ptr<Task> find_task(const std::string& word, const Console& console);
+/// with the nearest task for a plain word that is neither. `tolerance`: of its steps, where the scene
+/// names none.
+std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
+                                std::optional<double> tolerance = std::nullopt);
 
 /// The policy called `name`, or `fallback` if that is empty. With a table it is csv. Throws
 /// InputError for another name, for csv without a table, and for a table with another policy.

@@ -5,8 +5,6 @@
 
 #include <algorithm>
 
-#include "kernels/reverse/parameter_adjoint.hpp"
-#include "kernels/step/jacobian.hpp"
 #include "kernels/step/link_poses.hpp"
 
 namespace tangere {
@@ -32,11 +30,10 @@ struct DualStage::Impl {
   std::vector<double> tangents;  ///< tangents of the rows, kept while frozen
   std::vector<double> stretch;   ///< tangents of the solids' sizes, (n_solids, 3)
 
-  std::vector<D> force_scale, mass_diagonal, A, excess;
+  std::vector<D> force_scale, mass_diagonal, excess;
   std::vector<kernels::LinkScratch<D>> links;
   std::vector<kernels::ContactScratch<D>> contacts;
   std::vector<kernels::JointColumns<D>> columns;
-  std::vector<kernels::LinkAdjoint<D>> adjoint;
   std::vector<std::vector<double>> ground_tangents;  ///< of the points in the ground
   std::vector<std::vector<D>> points, references;
   std::vector<kernels::CandidateList<D>> lists;
@@ -95,8 +92,7 @@ struct DualStage::Impl {
     stretch.assign(std::size_t(kernels::kSizeNumbers * view.n_solids), 0.0);
     const std::size_t nv = std::size_t(m.nv);
     force_scale.resize(nv), mass_diagonal.resize(nv), excess.resize(1);
-    A.resize(std::size_t(m.pattern.entries));
-    links.resize(m.links.size()), adjoint.resize(m.links.size()),
+    links.resize(m.links.size()),
         columns.resize(2 * m.links.size());
     contacts.resize(std::size_t(view.n_link_pairs + view.n_grounded));
     for (const kernels::PairContact& p : pairs) {
@@ -174,9 +170,9 @@ struct DualStage::Impl {
     }
   }
 
-  /// Computes what the tangents of masses add to g and A, which are linear in masses. Contacts,
-  /// motors and effects are left out.
-  void weigh(const kernels::StageArgs<D>& a, std::vector<D>& g, D* entries) {
+  /// Computes what the tangents of masses add to g, which is linear in masses. Contacts, motors and
+  /// effects are left out.
+  void weigh(const kernels::StageArgs<D>& a, std::vector<D>& g) {
     std::vector<kernels::Link> light = bodies;
     for (std::size_t k = 0; k < light.size(); ++k) {
       const double* n = &inertia[k * kernels::kInertiaNumbers];
@@ -193,14 +189,8 @@ struct DualStage::Impl {
     kernels::StageArgs<D> b = a;
     b.g = g.data();
     b.tau = no_tau.data();
-    b.A = entries;
     kernels::kinematics(weight, b);
-    if (entries == nullptr) {
-      kernels::residual<false>(weight, b);
-    } else {
-      kernels::residual<true>(weight, b);
-      kernels::jacobian(weight, b);
-    }
+    kernels::residual<false>(weight, b);
   }
 
   kernels::StageArgs<D> arguments(DualStage& s) {
@@ -224,7 +214,6 @@ struct DualStage::Impl {
     a.g = s.g.data();
     a.force_scale = force_scale.data();
     a.mass_diagonal = mass_diagonal.data();
-    a.A = A.data();
     a.excess = excess.data();
     return a;
   }
@@ -284,48 +273,8 @@ void DualStage::residual() {
   kernels::residual<false>(i.view, a);
   if (!i.heavier || i.frozen) return;
   std::vector<D> of_mass(g.size());
-  i.weigh(a, of_mass, nullptr);
+  i.weigh(a, of_mass);
   for (std::size_t k = 0; k < g.size(); ++k) g[k].epsilon += of_mass[k].value;
-}
-
-void DualStage::jacobian(std::vector<DualNumber>& A) {
-  Impl& i = *impl_;
-  const auto a = i.arguments(*this);
-  kernels::kinematics(i.view, a);
-  i.find_touching();
-  kernels::residual<true>(i.view, a);
-  kernels::jacobian(i.view, a);
-  const int n = i.m.nv;
-  A.assign(std::size_t(n * n), D(0.0));
-  for (int k = 0; k < n * n; ++k)
-    if (const int slot = i.m.view.pattern.slot[k]; slot >= 0)
-      A[std::size_t(k)] = i.A[std::size_t(slot)];
-  if (!i.heavier) return;
-  std::vector<D> of_mass(g.size()), of_A(i.A.size());
-  i.weigh(a, of_mass, of_A.data());
-  for (int k = 0; k < n * n; ++k)
-    if (const int slot = i.m.view.pattern.slot[k]; slot >= 0)
-      A[std::size_t(k)].epsilon += of_A[std::size_t(slot)].value;
-}
-
-void DualStage::products(std::span<const double> lambda, std::vector<DualNumber>& c_lambda,
-                         std::vector<DualNumber>& m_lambda, std::vector<DualNumber>& targets,
-                         std::vector<DualNumber>* numbers) {
-  Impl& i = *impl_;
-  const std::size_t n = g.size();
-  std::vector<D> along(n), zero(n, D(0.0)), nu(n), unused(2 * n, D(0.0));
-  for (std::size_t k = 0; k < n; ++k) along[k] = D(lambda[k]);
-  m_lambda.assign(n, D(0.0));
-  targets.assign(n, D(0.0));
-  const kernels::AdjointArgs<D> d = {zero.data(),    zero.data(),     nullptr,
-                                     along.data(),   nu.data(),       m_lambda.data(),
-                                     targets.data(), unused.data(),   unused.data() + n,
-                                     {0, 0, {}},     i.adjoint.data()};
-  const auto a = i.arguments(*this);
-  kernels::adjoint_products(i.view, a, d);
-  c_lambda.resize(n);
-  for (std::size_t k = 0; k < n; ++k) c_lambda[k] = -nu[k];  // v̄ = 0
-  if (numbers != nullptr) kernels::parameter_products(i.view, a, d, numbers->data());
 }
 
 namespace {

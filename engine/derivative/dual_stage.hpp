@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // One environment's stage in dual numbers: the plain templates of the kernels with a tangent beside
-// every input. It is slow. It serves the tangents that the adjoint is checked against, and the
-// adjoint of the linearly implicit step.
+// every input. It is slow. It serves the tangents that the adjoint is checked against.
 #pragma once
 
 #include <memory>
@@ -42,14 +41,6 @@ class DualStage {
   /// empty. `points`: (points, kPointNumbers), tangents of every point's own numbers; or empty.
   void field(int sensor, const double* column, std::span<const double> numbers,
              std::span<const double> points, std::span<double> field_dot);
-
-  /// Computes A of residual(), (n, n) row-major, and its tangents along the inputs' tangents.
-  void jacobian(std::vector<DualNumber>& A);
-  /// After jacobian(): computes Cᵀ λ, M λ and the targets' cotangents, (nv) each, and adds
-  /// parameter_products() to `numbers`.
-  void products(std::span<const double> lambda, std::vector<DualNumber>& c_lambda,
-                std::vector<DualNumber>& m_lambda, std::vector<DualNumber>& targets,
-                std::vector<DualNumber>* numbers);
 
  private:
   struct Impl;

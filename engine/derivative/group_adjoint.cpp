@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "engine/derivative/linear_adjoint.hpp"
 #include "engine/step/detection.hpp"
 #include "engine/step/scheme_stage.hpp"
 
@@ -186,27 +185,10 @@ void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme,
 }
 
 template <int L>
-void GroupAdjoint::reverse_linear(const StageInHand<L>& s, const Scheme& scheme, double h) const {
-  state_difference(model_, s.w.q1, s.w.q0, s.a.difference);
-  set_stage(model_, scheme, 0, h, s.w);
-  guess_stage(model_, scheme, 0, h, s.w);
-  assemble(s);
-  for (const LossRows<L>& o : s.a.losses) {
-    linear_rhs(model_, o, h, s.a);
-    solve(s);
-    for (int l = 0; l < L; ++l)
-      if (has(s.lanes, l)) hand_on_linear(model_, o, h, l, s.w, s.a);
-  }
-}
-
-template <int L>
 void GroupAdjoint::reverse(const Scheme& scheme, double h, const kernels::KernelTable& table,
                            BasicWorkspace<L>& w, AdjointWorkspace<L>& a, LaneBits lanes) const {
   const StageInHand<L> s = {table, w, a, lanes};
-  switch (scheme.solve) {
-    case StageSolve::newton: return reverse_stages(s, scheme, h);
-    case StageSolve::one_direction: return reverse_linear(s, scheme, h);
-  }
+  reverse_stages(s, scheme, h);
 }
 
 template struct AdjointWorkspace<kernels::kGroup>;
@@ -215,9 +197,5 @@ template void GroupAdjoint::reverse(const Scheme&, double, const kernels::Kernel
                                     AdjointWorkspace<kernels::kGroup>&, LaneBits) const;
 template void GroupAdjoint::reverse(const Scheme&, double, const kernels::KernelTable&,
                                     SingleWorkspace&, AdjointWorkspace<1>&, LaneBits) const;
-
-// Instantiated for linear_adjoint.cpp, which calls it.
-template void GroupAdjoint::solve(const StageInHand<kernels::kGroup>&) const;
-template void GroupAdjoint::solve(const StageInHand<1>&) const;
 
 }  // namespace tangere

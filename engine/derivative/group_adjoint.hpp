@@ -6,7 +6,6 @@
 
 #include <memory>
 
-#include "engine/derivative/dual_stage.hpp"
 #include "engine/step/group_step.hpp"
 
 namespace tangere {
@@ -36,8 +35,6 @@ struct AdjointWorkspace {
   Row *q_older, *v_older;  ///< (nv) for each state that a stage may depend on, one after another
   Row* numbers;            ///< (parameter_numbers), or null
   Row sound;
-  /// For the linearly implicit step; made when one is first reversed.
-  std::unique_ptr<DualStage> dual;
 };
 
 /// Reverses solves whose states are in the workspace: q0, v0 where the solve began, q_before,
@@ -77,8 +74,6 @@ class GroupAdjoint {
   void find_inner_velocities(const StageInHand<L>& s, const Scheme& scheme, double h) const;
   template <int L>
   void reverse_stages(const StageInHand<L>& s, const Scheme& scheme, double h) const;
-  template <int L>
-  void reverse_linear(const StageInHand<L>& s, const Scheme& scheme, double h) const;
 
   const CompiledModel& model_;
 };

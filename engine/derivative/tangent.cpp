@@ -202,10 +202,6 @@ struct Tangent::Impl {
                        const double* q1, const double* x_inner, int stride) {
     stage.centre = at.q;
     stage.inverse_h = 1 / h;
-    switch (scheme.solve) {
-      case StageSolve::newton: break;
-      case StageSolve::one_direction: return linear(h, at);
-    }
     std::vector<DualState> found;  // (x, v) of the stages so far
     for (const SchemeStage& row : scheme.stages) {
       stage.c0_over_h = row.c0 / h;
@@ -218,36 +214,6 @@ struct Tangent::Impl {
       found.push_back({std::move(changing), stage.v});
     }
     return {moved(m(), at.q, found.back().q), found.back().v};
-  }
-
-  /// Solves A ṡ = ġ - Ȧ s at the predictor.
-  DualState linear(double h, const DualState& at) {
-    const std::size_t n = at.v.size();
-    const auto index = [](std::size_t i) { return Eigen::Index(i); };
-    stage.c0_over_h = 1 / h;
-    for (std::size_t i = 0; i < n; ++i)
-      stage.r[i] = D(0.0), stage.s[i] = -at.v[i], stage.x[i] = scaled(h, at.v[i]);
-    const Duals predicted = stage.x;
-    stage.residual();
-    const Duals g = stage.g;
-    Duals entries;
-    stage.jacobian(entries);
-    Eigen::MatrixXd A(index(n), index(n)), A_dot(index(n), index(n));
-    Eigen::VectorXd value(index(n)), dot(index(n));
-    for (std::size_t i = 0; i < n; ++i) {
-      value[index(i)] = g[i].value, dot[index(i)] = g[i].epsilon;
-      for (std::size_t j = 0; j < n; ++j)
-        A(index(i), index(j)) = entries[i * n + j].value,
-                    A_dot(index(i), index(j)) = entries[i * n + j].epsilon;
-    }
-    const auto factor = A.partialPivLu();
-    const Eigen::VectorXd s = factor.solve(value), s_dot = factor.solve(dot - A_dot * s);
-    Duals x(n), v(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      x[i] = predicted[i] - D(s[index(i)], s_dot[index(i)]);
-      v[i] = scaled(1 / h, x[i]);
-    }
-    return {moved(m(), at.q, x), v};
   }
 
   /// Sets the motors as set_motors() does.

@@ -246,6 +246,8 @@ class Compiler {
       const Frame<double> at = b.link < 0 ? b.frame : compose(world[std::size_t(b.link)], b.frame);
       extent = std::max(extent, std::sqrt(dot(at.p, at.p)) + std::sqrt(dot(b.size, b.size)));
     }
+    m_.fall_time =
+        std::sqrt(extent / std::sqrt(dot(vec3_of(m_.scene.gravity), vec3_of(m_.scene.gravity))));
     for (const Link& l : m_.links) {
       const bool turns = l.kind == JointKind::revolute || l.kind == JointKind::spherical;
       m_.unknown_scale.insert(m_.unknown_scale.end(), std::size_t(kernels::dofs(l.kind)),

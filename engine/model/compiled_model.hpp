@@ -148,6 +148,7 @@ struct CompiledModel {
   std::vector<kernels::DofEffects> dof_effects;  ///< (nv)
   /// (nv) magnitude to which an unknown is rounded: extent of the scene [m], 1 [rad].
   std::vector<double> unknown_scale;
+  double fall_time = 0;  ///< √(extent of the scene/|gravity|) [s]; infinite without gravity
   std::vector<double> initial_q, initial_v;
   PatternStorage pattern;
   BlockLayout layout;

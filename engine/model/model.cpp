@@ -1,8 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The public face of a compiled scene.
+#include <algorithm>
+
 #include "engine/model/compiled_model.hpp"
 
 namespace tangere {
+namespace {
+
+// Bounds of the tolerance that follows the step. Below the first, evaluations chase rounding.
+constexpr double kTightTolerance = 1e-9, kLooseTolerance = 1e-4;
+
+}  // namespace
 
 const CompiledModel& compiled(const Model& model) { return *model.compiled_; }
 
@@ -17,6 +25,13 @@ double Model::mass(int body) const { return compiled_->bodies[std::size_t(body)]
 double Model::timestep() const { return compiled_->scene.timestep; }
 Integrator Model::integrator() const { return compiled_->scene.integrator; }
 const SolverOptions& Model::solver() const { return compiled_->scene.solver; }
+double Model::following_tolerance(Integrator integrator, double timestep) const {
+  const double share = timestep / compiled_->fall_time;
+  if (!(share > 0)) return kTightTolerance;  // there is no gravity, so nothing to compare h with
+  const double tolerance =
+      integrator.scheme().order > 1 ? 2.5e-3 * share * share * share : 1e-2 * share * share;
+  return std::clamp(tolerance, kTightTolerance, kLooseTolerance);
+}
 std::span<const double> Model::initial_q() const { return compiled_->initial_q; }
 std::span<const SensorInfo> Model::sensors() const { return compiled_->sensor_info; }
 std::span<const EndEffectorInfo> Model::end_effectors() const {

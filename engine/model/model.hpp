@@ -65,6 +65,9 @@ class Model {
   [[nodiscard]] double timestep() const;      ///< [s]
   [[nodiscard]] Integrator integrator() const;
   [[nodiscard]] const SolverOptions& solver() const;
+  /// The tolerance that leaves errors well below those of a step [s] of this scheme
+  /// (docs/solver.md). In force where neither scene nor caller names one.
+  [[nodiscard]] double following_tolerance(Integrator integrator, double timestep) const;
   [[nodiscard]] std::span<const double> initial_q() const;  ///< (nq) where the scene starts
   [[nodiscard]] std::span<const SensorInfo> sensors() const;
   [[nodiscard]] std::span<const EndEffectorInfo> end_effectors()

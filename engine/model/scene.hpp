@@ -245,7 +245,9 @@ struct RandomizationDescription {
 };
 
 struct SolverOptions {
-  double tolerance = 1e-9;  ///< of the scaled residual, dimensionless (docs/solver.md)
+  /// Of the scaled residual, dimensionless. None: the one that follows scheme and step
+  /// (docs/solver.md).
+  std::optional<double> tolerance{};
   int max_iterations = 20;  ///< Newton passes before a step is split
 };
 

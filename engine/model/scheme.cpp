@@ -24,7 +24,7 @@ Scheme runge_kutta(const char* name, int order, std::initializer_list<std::vecto
   if (a.empty() || a.size() > kMostStages)
     throw InputError(std::string(name) + ": " + std::to_string(a.size()) +
                      " stages; expected 1 to " + std::to_string(kMostStages));
-  Scheme scheme{name, order, StageSolve::newton, {}, 0, nullptr, nullptr};
+  Scheme scheme{name, order, {}, 0, nullptr, nullptr};
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (a[i].size() != i + 1 || !(a[i][i] > 0))
       throw InputError(std::string(name) + ": stage " + std::to_string(i) +
@@ -55,10 +55,25 @@ const Scheme kBdf1 = runge_kutta("BDF1", 1, {{1}});
 
 const Scheme kSdirk2 = runge_kutta("SDIRK2", 2, {{kGamma}, {1 - kGamma, kGamma}});
 
+// Alexander 1977: the root of g³ - 3g² + 3g/2 - 1/6 that makes three stages L-stable and of order 3.
+const double kThird = 0.43586652150845899942;
+const Scheme kSdirk3 = runge_kutta("SDIRK3", 3,
+                                   {{kThird},
+                                    {(1 - kThird) / 2, kThird},
+                                    {-(6 * kThird * kThird - 16 * kThird + 1) / 4,
+                                     (6 * kThird * kThird - 20 * kThird + 5) / 4, kThird}});
+
+// Hairer and Wanner, Solving Ordinary Differential Equations II, table IV.6.5: L-stable, order 4.
+const Scheme kSdirk4 = runge_kutta("SDIRK4", 4,
+                                   {{1.0 / 4},
+                                    {1.0 / 2, 1.0 / 4},
+                                    {17.0 / 50, -1.0 / 25, 1.0 / 4},
+                                    {371.0 / 1360, -137.0 / 2720, 15.0 / 544, 1.0 / 4},
+                                    {25.0 / 24, -49.0 / 48, 125.0 / 16, -85.0 / 12, 1.0 / 4}});
+
 // The parts of a split step must keep order 2, and so must the history of the next step.
 const Scheme kBdf2 = {.name = "BDF2",
                       .order = 2,
-                      .solve = StageSolve::newton,
                       .stages = {{.end = 1,
                                   .c0 = 1.5,
                                   .r_before = 0.5,
@@ -70,24 +85,17 @@ const Scheme kBdf2 = {.name = "BDF2",
                       .start = &kSdirk2,
                       .parts = &kSdirk2};
 
-const Scheme kLinearImplicit = {.name = "linear-implicit",
-                                .order = 1,
-                                .solve = StageSolve::one_direction,
-                                .stages = kBdf1.stages,
-                                .extrapolation = 0,
-                                .start = nullptr,
-                                .parts = &kBdf1};
-
 }  // namespace
 
 constinit const Integrator Integrator::bdf1{kBdf1};
 constinit const Integrator Integrator::bdf2{kBdf2};
 constinit const Integrator Integrator::sdirk2{kSdirk2};
-constinit const Integrator Integrator::linear_implicit{kLinearImplicit};
+constinit const Integrator Integrator::sdirk3{kSdirk3};
+constinit const Integrator Integrator::sdirk4{kSdirk4};
 
 std::span<const Integrator> integrators() {
   static constexpr Integrator kAll[] = {Integrator(kBdf1), Integrator(kBdf2), Integrator(kSdirk2),
-                                        Integrator(kLinearImplicit)};
+                                        Integrator(kSdirk3)};
   return kAll;
 }
 

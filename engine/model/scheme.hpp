@@ -17,7 +17,7 @@
 
 namespace tangere {
 
-inline constexpr int kMostStages = 4;
+inline constexpr int kMostStages = 5;
 
 /// What an earlier stage of a step contributes to a later one.
 struct InnerWeight {
@@ -33,14 +33,9 @@ struct SchemeStage {
   std::vector<InnerWeight> inner;  ///< one for each stage before this one
 };
 
-/// How a stage is solved: by Newton's iteration until g = 0, or by a single Newton direction from
-/// the first guess, without a test and with v = x/h.
-enum class StageSolve { newton, one_direction };
-
 struct Scheme {
   const char* name;  ///< the name in scenes and files
   int order;
-  StageSolve solve;
   std::vector<SchemeStage> stages;
   /// The first guess moves with velocity v₀ + extrapolation (v₀ - v_before).
   double extrapolation;
@@ -66,7 +61,8 @@ Scheme runge_kutta(const char* name, int order, std::initializer_list<std::vecto
 class Integrator {
  public:
   explicit constexpr Integrator(const Scheme& scheme) : scheme_(&scheme) {}
-  static const Integrator bdf1, bdf2, sdirk2, linear_implicit;
+  static const Integrator bdf1, bdf2, sdirk2, sdirk3;
+  static const Integrator sdirk4;  ///< not in the table: what others are compared with
 
   [[nodiscard]] const Scheme& scheme() const { return *scheme_; }
   friend bool operator==(Integrator, Integrator) = default;

@@ -14,15 +14,14 @@ using kernels::Vec3;
 
 namespace {
 
-Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
-
 /// Returns +1 when axis0 × axis1 points out of the body. Pressure, a force into the body, then
 /// reads positive.
 int find_pressure_sign(const TactileDescription& d, const CompiledBody& body,
                        const Vec3<double>& normal) {
   if (d.pressure_sign) return *d.pressure_sign;
   const RectArray& a = d.array;
-  return points_outward(body, 0.5 * (vec(a.corner0) + vec(a.corner1)), normal) >= 0 ? 1 : -1;
+  return points_outward(body, 0.5 * (vec3_of(a.corner0) + vec3_of(a.corner1)), normal) >= 0 ? 1
+                                                                                            : -1;
 }
 
 /// Spacing of the array's points in pad axes [m]: from row to row, and from column to column.
@@ -77,8 +76,8 @@ CompiledSensor compile_array(const TactileDescription& d, const CompiledBody& bo
                              SensorInfo& info) {
   CompiledSensor s;
   const RectArray& a = d.array;
-  const Vec3<double> p0 = vec(a.corner0), axis0 = vec(a.axis0), axis1 = vec(a.axis1);
-  const Vec3<double> diagonal = vec(a.corner1) - p0;
+  const Vec3<double> p0 = vec3_of(a.corner0), axis0 = vec3_of(a.axis0), axis1 = vec3_of(a.axis1);
+  const Vec3<double> diagonal = vec3_of(a.corner1) - p0;
   const double step0 = a.rows > 1 ? dot(diagonal, axis0) / (a.rows - 1) : 0;
   const double step1 = a.cols > 1 ? dot(diagonal, axis1) / (a.cols - 1) : 0;
   const Vec3<double> normal = cross(axis0, axis1);

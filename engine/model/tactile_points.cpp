@@ -14,8 +14,6 @@ using kernels::Vec3;
 
 namespace {
 
-Vec3<double> vec(const Vector3& a) { return {a[0], a[1], a[2]}; }
-
 struct Box {
   double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
 
@@ -64,7 +62,7 @@ double& entry(AlignedVector<double>& all, std::size_t rows, std::size_t tile, st
 
 void place_point(const TactilePoint& p, std::size_t tile, std::size_t k, CompiledSensor& s) {
   const Vec3<double> offset =
-      vec(p.position) - Vec3<double>{s.tile_x[tile], s.tile_y[tile], s.tile_z[tile]};
+      vec3_of(p.position) - Vec3<double>{s.tile_x[tile], s.tile_y[tile], s.tile_z[tile]};
   const double place[3] = {offset.x, offset.y, offset.z};
   for (std::size_t c = 0; c < 3; ++c) entry(s.offsets, 3, tile, c, k) = place[c];
   // The rows act on (f·x, f·y, -f·z), the kernels' force, so the sign of the third is turned back.
@@ -91,7 +89,7 @@ AlignedVector<float> narrowed(const AlignedVector<double>& from) {
 int sign_of_most(const std::vector<TactilePoint>& points, const CompiledBody& body) {
   std::ptrdiff_t outward = 0;
   for (const TactilePoint& p : points)
-    outward += points_outward(body, vec(p.position), vec(p.normal)) >= 0 ? 1 : -1;
+    outward += points_outward(body, vec3_of(p.position), vec3_of(p.normal)) >= 0 ? 1 : -1;
   return outward >= 0 ? 1 : -1;
 }
 

@@ -24,38 +24,19 @@ constexpr int kPatience = 4, kSplitPatience = 40;
 
 }  // namespace
 
-/// Solves the stage from its first guess.
-template <int L>
-LaneBits GroupStep::solve_one_stage(StageSolve how, const kernels::KernelTable& table,
-                                    BasicWorkspace<L>& w, LaneBits lanes, double h,
-                                    bool inside_split, NewtonReport& report) const {
-  switch (how) {
-    case StageSolve::newton: {
-      const NewtonLimits limits = {
-          settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
-          inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience};
-      return solve_stage(model_, table, w, lanes, limits, report);
-    }
-    case StageSolve::one_direction: {
-      const LaneBits finite = linear_step(model_, table, w, lanes, report);
-      for (int i = 0; i < model_.nv; ++i)
-        for (int l = 0; l < L; ++l) w.stage.v[i][l] = w.stage.x[i][l] / h;
-      return finite;
-    }
-  }
-  return kNoLane;
-}
-
 /// Solves the stages of a step, each for the lanes that found the one before.
 template <int L>
 LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
                         NewtonReport& report) const {
   const int n = model_.nv;
+  const NewtonLimits limits = {
+      settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
+      inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience};
   for (int k = 0; k <= scheme.inner_stages(); ++k) {
     set_stage(model_, scheme, k, h, w);
     guess_stage(model_, scheme, k, h, w);
-    lanes = solve_one_stage(scheme.solve, table, w, lanes, h, inside_split, report);
+    lanes = solve_stage(model_, table, w, lanes, limits, report);
     if (k == scheme.inner_stages()) break;
     std::copy_n(w.stage.x, n, w.x_inner + k * n);
     std::copy_n(w.stage.v, n, w.v_inner + k * n);

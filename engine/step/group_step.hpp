@@ -43,9 +43,6 @@ class GroupStep {
   template <int L>
   LaneBits run(const Scheme& scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                LaneBits lanes, double h, bool inside_split, NewtonReport& report) const;
-  template <int L>
-  LaneBits solve_one_stage(StageSolve how, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-                           LaneBits lanes, double h, bool inside_split, NewtonReport& report) const;
   bool split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
              NewtonReport& report, std::vector<TapedSolve>* solves) const;
   template <int L>

@@ -285,33 +285,8 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
   return converged;
 }
 
-template <int L>
-LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table,
-                     BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report) {
-  static constexpr NewtonLimits kOnce{0, 1, 0, 0};
-  Search<L> s{model, table, w, kOnce, report, magnitude(model.view.gravity), lanes};
-  s.evaluate(true);
-  kernels::Row<L> residual;
-  s.scaled_residuals(residual);
-  for (int l = 0; l < L; ++l) {
-    if (!has(lanes, l)) continue;
-    ++report.iterations[l];
-    report.residual[l] = residual[l];
-    if (!std::isfinite(residual[l])) s.stop(l, StepStatus::non_finite);
-  }
-  s.new_directions(s.searching);
-  for (int l = 0; l < L; ++l)
-    if (has(s.searching, l)) report.status[l] = StepStatus::converged;
-  return s.searching;
-}
-
 template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, Workspace&,
                               LaneBits, const NewtonLimits&, NewtonReport&);
 template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
                               LaneBits, const NewtonLimits&, NewtonReport&);
-template LaneBits linear_step(const CompiledModel&, const kernels::KernelTable&, Workspace&,
-                              LaneBits, NewtonReport&);
-template LaneBits linear_step(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
-                              LaneBits, NewtonReport&);
-
 }  // namespace tangere

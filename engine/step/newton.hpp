@@ -31,10 +31,4 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
                      BasicWorkspace<L>& w, LaneBits lanes, const NewtonLimits& limits,
                      NewtonReport& report);
 
-/// Takes one direction from the x in the stage, without a test: the linearly implicit step. Returns
-/// the lanes where it is finite.
-template <int L>
-LaneBits linear_step(const CompiledModel& model, const kernels::KernelTable& table,
-                     BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report);
-
 }  // namespace tangere

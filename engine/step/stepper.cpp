@@ -16,15 +16,21 @@ using kernels::kBlock;
 using kernels::kGroup;
 
 StepSettings step_settings(const Model& model, const StepperOptions& o) {
-  const StepSettings s = {
-      o.integrator.value_or(model.integrator()), o.timestep.value_or(model.timestep()),
-      o.tolerance.value_or(model.solver().tolerance), model.solver().max_iterations};
+  StepSettings s = {o.integrator.value_or(model.integrator()),
+                    o.timestep.value_or(model.timestep()), 0, model.solver().max_iterations};
   if (!(s.timestep > 0) || !std::isfinite(s.timestep))
     throw InputError("timestep " + std::to_string(s.timestep) + " s; expected a positive number");
+  s.tolerance = o.tolerance.value_or(
+      model.solver().tolerance.value_or(model.following_tolerance(s.integrator, s.timestep)));
   if (!(s.tolerance > 0) || !std::isfinite(s.tolerance))
     throw InputError("solver tolerance " + std::to_string(s.tolerance) +
                      "; expected a positive number");
   return s;
+}
+
+StepperOptions for_gradients(const Model& model, StepperOptions options) {
+  if (!options.tolerance && !model.solver().tolerance) options.tolerance = kGradientTolerance;
+  return options;
 }
 
 /// Lanes of one group of a block. Environment `first` + l is in lane l.

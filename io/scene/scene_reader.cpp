@@ -131,12 +131,17 @@ void read_option(Scene& scene, const SceneNode& node) {
   scene.timestep = node.positive("timestep", 0.02);
   std::vector<std::string> names;
   for (const Integrator known : integrators()) names.emplace_back(to_string(known));
+  if (node.has("integrator") && node.text("integrator") == "linear-implicit")
+    throw InputError(node.source().prefix() +
+                     "integrator 'linear-implicit' is gone: its fields were off by more than their "
+                     "own size wherever a contact changed; expected BDF1, which it resembled, or "
+                     "another of this list: see docs/accuracy.md");
   scene.integrator = integrators()[std::size_t(node.choice("integrator", names, 0))];
 }
 
 void read_solver(Scene& scene, const SceneNode& node) {
   node.check_attributes({"tol", "max_iter"}, {}, {"max_ls"});
-  scene.solver.tolerance = node.positive("tol", scene.solver.tolerance);
+  if (node.has("tol")) scene.solver.tolerance = node.positive("tol");
   scene.solver.max_iterations = node.integer("max_iter", 1, 100000, scene.solver.max_iterations);
 }
 

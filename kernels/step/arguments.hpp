@@ -53,7 +53,7 @@ struct OlderState {
 /// s = s_centre v_centre + Σ s v.
 template <class R>
 struct StageHistory {
-  static constexpr int kMost = 4;
+  static constexpr int kMost = 5;
   double s_centre;
   int count;
   OlderState<R> older[kMost];

@@ -76,7 +76,7 @@ LossBlock::LossBlock(const Model& model, const GradientOptions& options,
                     plan_of(model, options)),
       options_(options),
       losses_(losses.begin(), losses.end()),
-      stepper_(model, options.stepper),
+      stepper_(model, for_gradients(model, options.stepper)),
       readout_(model, options.precision),
       reading_(model) {
   for (std::size_t s = 0; s < model.sensors().size(); ++s) {

@@ -381,7 +381,7 @@ TEST_P(Continued, GoesOnBitForBit) {
   EXPECT_EQ(read_array(parts, "/q").values, rows_from(read_array(whole, "/q"), 90));
 }
 INSTANTIATE_TEST_SUITE_P(Schemes, Continued,
-                         ::testing::Values("BDF1", "BDF2", "SDIRK2", "linear-implicit"),
+                         ::testing::Values("BDF1", "BDF2", "SDIRK2", "SDIRK3"),
                          [](const auto& scheme) { return scheme.param.substr(0, 6); });
 
 TEST(Continue, SaysWhatDoesNotFit) {

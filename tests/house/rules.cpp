@@ -47,6 +47,7 @@ const std::map<std::string, Folder, std::less<>>& folders() {
       {"tasks/catalogue", {{"engine", "kernels"}, of_tasks}},
       {"tasks/run", {{"tasks/catalogue", "engine", "kernels"}, of_tasks}},
       {"tasks/gradients", {{"tasks/run", "tasks/catalogue", "engine", "kernels"}, of_tasks}},
+      {"tasks/accuracy", {{"tasks/run", "tasks/catalogue", "engine", "kernels"}, of_tasks}},
       {"io/files", {{"engine"}, of_io}},
       {"io/scene", {{"io/files", "engine", "kernels"}, of_io}},
       {"io/hdf5", {{"io/files", "engine"}, of_io}},

@@ -148,7 +148,7 @@ TEST_P(AdjointScheme, CompanyChangesNothing) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, AdjointScheme, ::testing::ValuesIn(testing::all_integrators()));
+INSTANTIATE_TEST_SUITE_P(All, AdjointScheme, ::testing::ValuesIn(integrators()));
 
 }  // namespace
 }  // namespace tangere

@@ -187,8 +187,7 @@ TEST_P(TangentScheme, SplitStepsHaveTheSameProducts) {
     EXPECT_NEAR(p.forward, p.backward, 1e-11 * p.size) << "seed " << seed;
     splits += p.splits;
   }
-  // The linearly implicit step has no search that could fail.
-  EXPECT_TRUE(GetParam().scheme().solve == StageSolve::one_direction || splits > 10) << splits;
+  EXPECT_GT(splits, 10);
 }
 
 /// From the first touch on: the ball is pressed, rolled and turned round. Fields every fifth step.
@@ -249,7 +248,7 @@ TEST_P(TangentScheme, StepJacobiansTimesDirectionsAreTangents) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, TangentScheme, ::testing::ValuesIn(testing::all_integrators()));
+INSTANTIATE_TEST_SUITE_P(All, TangentScheme, ::testing::ValuesIn(integrators()));
 
 }  // namespace
 }  // namespace tangere

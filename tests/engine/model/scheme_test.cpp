@@ -37,15 +37,17 @@ TEST(Schemes, HaveNamesOfTheirOwn) {
   for (const Integrator a : integrators())
     for (const Integrator b : integrators())
       EXPECT_EQ(std::string(to_string(a)) == to_string(b), a == b);
-  EXPECT_EQ(testing::all_integrators().size(), integrators().size() + 1);
+  for (const Integrator a : integrators()) EXPECT_NE(a, Integrator::sdirk4);
 }
 
 TEST(Schemes, RefuseWhatNoStageSolves) {
   EXPECT_THROW((runge_kutta("none", 1, {})), InputError);
   EXPECT_THROW((runge_kutta("explicit", 2, {{0}, {0.5, 0.5}})), InputError);
   EXPECT_THROW((runge_kutta("full", 2, {{0.5, -0.1}, {0.5, 0.5}})), InputError);
-  EXPECT_THROW((runge_kutta("long", 1, {{1}, {0, 1}, {0, 0, 1}, {0, 0, 0, 1}, {0, 0, 0, 0, 1}})),
-               InputError);
+  EXPECT_THROW(
+      (runge_kutta("long", 1,
+                   {{1}, {0, 1}, {0, 0, 1}, {0, 0, 0, 1}, {0, 0, 0, 0, 1}, {0, 0, 0, 0, 0, 1}})),
+      InputError);
   EXPECT_THROW((runge_kutta("short", 1, {{0.5}})), InputError);
 }
 

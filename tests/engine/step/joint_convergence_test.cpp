@@ -176,7 +176,6 @@ TEST_P(JointConvergence, SchemesReachTheIndependentSolutionWithTheirOrder) {
     double order, slack;
     int steps;
   } kSchemes[] = {{Integrator::bdf1, 1, 0.1, c.steps},
-                  {Integrator::linear_implicit, 1, 0.1, c.steps},
                   {Integrator::bdf2, 2, 0.15, c.steps / 2},
                   {Integrator::sdirk2, 2, 0.15, c.steps / 4}};
   for (const auto& s : kSchemes) {

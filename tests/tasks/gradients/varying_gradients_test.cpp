@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(
     Scenes, VaryingNumbers,
     ::testing::Values(Case{"cap_opening", kCap, LossKind::final_state, 100},
                       Case{"cap_opening", kCap, LossKind::tactile, 100},
-                      Case{"cap_opening", kCap, LossKind::tactile, 80, Integrator::linear_implicit},
+                      Case{"cap_opening", kCap, LossKind::tactile, 80, Integrator::sdirk3},
                       Case{"cap_opening", kCap, LossKind::end_effectors, 80, Integrator::sdirk2},
                       Case{"rolling_ball_small", kBall, LossKind::tactile, 100},
                       Case{"rolling_ball_small", kBall, LossKind::shear, 120}));

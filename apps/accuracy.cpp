@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+// tangere accuracy: what accuracy costs in time, for a scene or a task, and which setting is the
+// cheapest for the accuracy that is needed.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "apps/accuracy_report.hpp"
+#include "apps/arguments.hpp"
+#include "apps/command.hpp"
+#include "apps/machine.hpp"
+#include "apps/memory.hpp"
+#include "apps/scene_run.hpp"
+#include "apps/stop_signals.hpp"
+#include "apps/task_run.hpp"
+#include "io/files/nearest_name.hpp"
+#include "io/files/part_file.hpp"
+#include "kernels/numbers/block.hpp"
+#include "kernels/table/isa.hpp"
+
+namespace tangere::apps {
+namespace {
+
+constexpr int kComparedEnvironments = 32;
+
+struct AccuracyArguments {
+  std::string scene, quantity, controls, policy, svg, csv;
+  std::optional<double> target, tolerance;
+  std::optional<std::int64_t> steps;
+  std::optional<int> environments, threads;
+  std::optional<std::uint64_t> seed;
+  bool overwrite = false, allow_unknown = false;
+};
+
+/// The quantity as given. The default is tactile if there is a sensor, else the state.
+AccuracyQuantity quantity_named(const std::string& name, const Model& model) {
+  if (name.empty())
+    return model.sensors().empty() ? AccuracyQuantity::state : AccuracyQuantity::tactile;
+  std::vector<std::string> names;
+  for (const AccuracyQuantity value : {AccuracyQuantity::tactile, AccuracyQuantity::state}) {
+    names.emplace_back(to_string(value));
+    if (names.back() == name) return value;
+  }
+  throw InputError("unknown quantity '" + name + "'" + suggestion(name, names));
+}
+
+void check_arguments(const AccuracyArguments& o) {
+  for (const std::string& output : {o.svg, o.csv})
+    if (!output.empty()) check_not_same_file(output, o.scene);
+  if (!o.svg.empty() && o.svg == o.csv)
+    throw InputError(fmt::format("--svg and --csv are both '{}'; expected two files", o.svg));
+  if (o.target.value_or(0.5) >= 1)
+    throw InputError(
+        fmt::format("--target {:g}; expected a share below 1: 0.01 is one percent", *o.target));
+}
+
+/// A file that is reserved before the first step and written at the end.
+class Output {
+ public:
+  Output(const std::string& path, bool overwrite) {
+    if (!path.empty()) file_.emplace(path, overwrite);
+  }
+  template <class Text>
+  void write(const Console& console, const Text& text) {
+    if (!file_) return;
+    const std::string content = text();
+    file_->write(content);
+    file_->commit();
+    console.print(fmt::format("wrote {} ({} bytes)", file_->output(), content.size()));
+  }
+
+ private:
+  std::optional<PartFile> file_;
+};
+
+int run_sweep(const AccuracyArguments& o, const Console& console, const FixedEpisodes& episodes,
+              const std::string& name) {
+  const Model& model = episodes.start.model();
+  AccuracyOptions options;
+  options.quantity = quantity_named(o.quantity, model);
+  options.target = o.target.value_or(options.target);
+  options.tolerance = o.tolerance;
+  options.threads = std::min(o.threads.value_or(processor_count()), episodes.start.blocks());
+  check_memory(accuracy_bytes(episodes, options.quantity),
+               fmt::format("--envs {}", episodes.start.environments()));
+  const AccuracySubject subject{o.scene,
+                                name,
+                                processor_name(),
+                                kernels::active_isa_name(),
+                                episodes.start.environments(),
+                                episodes.samples * episodes.interval(),
+                                options.quantity,
+                                options.target};
+  const StopSignals signals;
+  Output svg(o.svg, o.overwrite), csv(o.csv, o.overwrite);
+  console.print(accuracy_heading(subject, episodes));
+  AccuracyListener listener;
+  listener.go_on = [&] { return signals.received() == 0; };
+  listener.reference = [&](const AccuracyReference& r) { console.print(reference_row(r)); };
+  bool head = false;
+  listener.setting = [&](std::span<const AccuracyPoint> points) {
+    if (!head) console.print(accuracy_head());
+    head = true;
+    console.print(accuracy_row(points));
+  };
+  const AccuracyReport report = accuracy_sweep(episodes, options, listener);
+  if (report.points.empty())
+    return report_stop(console, "accuracy", signals.received(), "before the first setting");
+  console.print("\n" + advice_text(subject, report, model));
+  svg.write(console, [&] { return accuracy_svg(subject, report); });
+  csv.write(console, [&] { return accuracy_csv(subject, report); });
+  int code = report.resolved && report.advice >= 0 ? kDone : kSomeFailed;
+  if (report.stopped) code = signals.received() == SIGINT ? kInterrupted : kTerminated;
+  Json result = accuracy_json(subject, report, model);
+  result["exit_code"] = code;
+  console.result(result);
+  return code;
+}
+
+int accuracy_of_task(const AccuracyArguments& o, const Console& console, const Task& task) {
+  refuse_with_task(task, {{"--steps", o.steps.has_value()}, {"--allow-unknown", o.allow_unknown}});
+  const PolicyKind kind = policy_named(o.policy, o.controls, PolicyKind::scripted);
+  const Policy policy = make_policy(task, kind, o.controls);
+  const Batch start(task.model(), o.environments.value_or(kComparedEnvironments),
+                    o.seed.value_or(0));
+  console.note("controls are those that the policy asks for at the scene's own scheme and step");
+  return run_sweep(
+      o, console,
+      task_episodes(start, task, policy,
+                    std::min(sample_interval(task.model()), task.spec().steps_per_action)),
+      "task " + task.spec().name);
+}
+
+int accuracy(const AccuracyArguments& o, const Console& console) {
+  check_arguments(o);
+  if (const std::unique_ptr<Task> task = find_task(o.scene, console))
+    return accuracy_of_task(o, console, *task);
+  refuse_with_scene(o.scene, {{"--policy", !o.policy.empty()}});
+  const Model model(read_scene_for(o.scene, o.allow_unknown, console));
+  const ControlProgram controls =
+      make_controls(o.controls, o.seed.value_or(0), model, Stepper(model), console);
+  const Batch start(model, o.environments.value_or(kComparedEnvironments), o.seed.value_or(0));
+  return run_sweep(
+      o, console,
+      scene_episodes(start, controls, step_count(o.steps, controls), sample_interval(model)),
+      model.scene().name);
+}
+
+}  // namespace
+
+Command add_accuracy(CLI::App& program) {
+  const auto options = std::make_shared<AccuracyArguments>();
+  const auto console = std::make_shared<Console>();
+  AccuracyArguments& o = *options;
+  CLI::App& app = add_command(
+      program, "accuracy", "Show what accuracy costs in time, and name the cheapest setting",
+      "tangere accuracy scenes/rolling_ball_small.xml --target 1e-2 --svg cost.svg");
+  add_text(app, "SCENE", o.scene, "", "Scene file (XML), or the name of a task").required();
+  add_text(app, "--quantity", o.quantity, "NAME",
+           "What is compared: tactile, or state [default: tactile, or state without a sensor]");
+  add_positive_number(app, "--target", o.target,
+                      "Relative error that is good enough [default: 0.01]");
+  add_whole_number<int>(app, "--envs", o.environments, 1, kMostEnvironments,
+                        "Environments, each with its own random numbers [default: 32]");
+  add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
+                                 "Length in steps of the scene [default: as many as the controls "
+                                 "last]");
+  add_text(app, "--controls", o.controls, "U.csv",
+           "Table of controls, one row per step of the scene; for a task, of actions");
+  add_text(
+      app, "--policy", o.policy, "NAME",
+      "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
+  add_positive_number(app, "--tol", o.tolerance,
+                      "Tolerance of every setting [default: the one that follows the step]");
+  add_whole_number<int>(app, "--threads", o.threads, 1, kMostThreads,
+                        "Threads [default: the processors here]");
+  add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
+                                  "Seed of all that varies between environments [default: 0]");
+  add_text(app, "--svg", o.svg, "F.svg", "Write a picture of cost against error");
+  add_text(app, "--csv", o.csv, "F.csv", "Write a table of all figures");
+  add_flag(app, "--overwrite", o.overwrite, "Replace the outputs if they exist");
+  add_flag(app, "--allow-unknown", o.allow_unknown,
+           "Unknown elements and attributes of the scene are warnings, not errors");
+  add_console_options(app, *console);
+  return {&app, [=](const ProgramInfo&) { return accuracy(*options, *console); }};
+}
+
+}  // namespace tangere::apps

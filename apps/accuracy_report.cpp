@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/accuracy_report.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "io/picture/precision_plot.hpp"
+
+namespace tangere::apps {
+namespace {
+
+std::string percent(double error) {
+  return std::isfinite(error) ? fmt::format("{:.2g} %", 100 * error) : std::string("-");
+}
+
+std::string setting_text(const AccuracyPoint& point) {
+  return fmt::format("{}, {:g} ms, tol {:.0e}", to_string(point.setting.integrator),
+                     1e3 * point.step, point.setting.tolerance);
+}
+
+Json point_json(const AccuracyPoint& p) {
+  return {{"scheme", to_string(p.setting.integrator)},
+          {"step", p.step},
+          {"precision", to_string(p.precision)},
+          {"tolerance", p.setting.tolerance},
+          {"error", finite(p.error)},
+          {"median_error", finite(p.median)},
+          {"simulated_seconds_per_cpu_second", finite(p.rate)},
+          {"evaluations_per_step", p.evaluations},
+          {"split_share", p.split},
+          {"blurred", p.blurred},
+          {"failed", p.failed},
+          {"status", p.status}};
+}
+
+Json points_json(const std::vector<AccuracyPoint>& points) {
+  Json all = Json::array();
+  for (const AccuracyPoint& p : points) all.push_back(point_json(p));
+  return all;
+}
+
+std::string method_text(const AccuracyReference& reference) {
+  return fmt::format("{}, {:g} ms, tol {:.0e}", to_string(reference.setting.integrator),
+                     1e3 * reference.step, reference.setting.tolerance);
+}
+
+/// Why the reference cannot judge, and what helps.
+std::string unresolved_text(const AccuracySubject& subject, const AccuracyReport& report,
+                            const Model& model) {
+  const AccuracyReference& r = report.reference;
+  std::string text = fmt::format(
+      "not resolved: even at {:g} ms SDIRK4 and SDIRK2 differ by {}, so no error below {} can be "
+      "told, and no setting is known to reach {}.",
+      1e3 * r.step, percent(r.error), percent(3 * r.error), percent(subject.target));
+  if (report.vibration.sensor >= 0)
+    text += fmt::format(
+        " {:.2g} % of the energy of the force on '{}' lies above half a swing between samples; the "
+        "strongest vibration there has {:.3g} Hz. Give the contact or the joints that hold it more "
+        "damping, or average fields over that time, or compare --quantity state.",
+        100 * report.vibration.share,
+        model.sensors()[static_cast<std::size_t>(report.vibration.sensor)].name,
+        report.vibration.frequency);
+  return text;
+}
+
+}  // namespace
+
+std::string accuracy_heading(const AccuracySubject& subject, const FixedEpisodes& episodes) {
+  return fmt::format(
+      "{}: {} of {} environments over {:g} s, sampled every {:g} ms, against a reference; {}; {}\n"
+      "error: not exceeded in 95 % of the environments; ~: within a hundredfold of the "
+      "reference's own\n",
+      subject.name, to_string(subject.quantity), subject.environments, subject.seconds,
+      1e3 * episodes.interval(), subject.isa, subject.machine);
+}
+
+std::string reference_row(const AccuracyReference& reference) {
+  return fmt::format("reference {}: SDIRK2 at the same step differs by {:.1e}",
+                     method_text(reference), reference.error);
+}
+
+std::string accuracy_head() {
+  return fmt::format("\n{:<10} {:>9} {:>8} {:>10} {:>10} {:>11}   simulated seconds per CPU second",
+                     "scheme", "step [ms]", "tol", "error", "median", "evaluations");
+}
+
+std::string accuracy_row(std::span<const AccuracyPoint> points) {
+  const AccuracyPoint& p = points.front();
+  std::string row =
+      fmt::format("{:<10} {:>9.4g} {:>8.0e} {:>9}{} {:>10} {:>11.2f}   ",
+                  to_string(p.setting.integrator), 1e3 * p.step, p.setting.tolerance,
+                  percent(p.error), p.blurred ? "~" : " ", percent(p.median), p.evaluations);
+  for (const AccuracyPoint& q : points)
+    row += fmt::format("{:.4g}{}", q.rate,
+                       points.size() == 1 ? "" : fmt::format(" {}  ", to_string(q.precision)));
+  if (p.failed > 0) row += p.status;
+  return row;
+}
+
+std::string advice_text(const AccuracySubject& subject, const AccuracyReport& report,
+                        const Model& model) {
+  if (!report.resolved) return unresolved_text(subject, report, model);
+  const std::string own =
+      report.own.rate > 0
+          ? fmt::format(" The scene's own setting ({}) reaches {} at {:.4g}.",
+                        setting_text(report.own), percent(report.own.error), report.own.rate)
+          : std::string();
+  if (report.advice < 0)
+    return fmt::format("No setting reaches {}.{}", percent(subject.target), own);
+  const AccuracyPoint& best = report.points[static_cast<std::size_t>(report.advice)];
+  return fmt::format("For {} use {}, {} fields: {} at {:.4g} simulated seconds per CPU second.{}",
+                     percent(subject.target), setting_text(best), to_string(best.precision),
+                     percent(best.error), best.rate, own);
+}
+
+Json accuracy_json(const AccuracySubject& subject, const AccuracyReport& report,
+                   const Model& model) {
+  Json advice = report.advice >= 0
+                    ? point_json(report.points[static_cast<std::size_t>(report.advice)])
+                    : Json::object();
+  if (!report.resolved) advice = Json::object();
+  advice["resolved"] = report.resolved;
+  advice["text"] = advice_text(subject, report, model);
+  Json vibration;
+  if (report.vibration.sensor >= 0)
+    vibration = {
+        {"sensor", model.sensors()[static_cast<std::size_t>(report.vibration.sensor)].name},
+        {"frequency", report.vibration.frequency},
+        {"share", report.vibration.share}};
+  return {{"command", "accuracy"},
+          {"scene", subject.scene},
+          {"quantity", to_string(subject.quantity)},
+          {"target", subject.target},
+          {"envs", subject.environments},
+          {"seconds", subject.seconds},
+          {"machine", subject.machine},
+          {"isa", subject.isa},
+          {"stopped", report.stopped},
+          {"reference",
+           {{"method", method_text(report.reference)},
+            {"step", report.reference.step},
+            {"error", finite(report.reference.error)},
+            {"envs", report.reference.environments}}},
+          {"points", points_json(report.points)},
+          {"tolerances", points_json(report.tolerances)},
+          {"own", report.own.rate > 0 ? point_json(report.own) : Json()},
+          {"vibration", vibration},
+          {"advice", advice}};
+}
+
+std::string accuracy_csv(const AccuracySubject& subject, const AccuracyReport& report) {
+  std::string text =
+      "scene,quantity,sweep,scheme,step,precision,tolerance,error,median_error,"
+      "simulated_seconds_per_cpu_second,evaluations_per_step,split_share,blurred,failed\n";
+  const auto rows = [&](const char* sweep, const std::vector<AccuracyPoint>& points) {
+    for (const AccuracyPoint& p : points)
+      text += fmt::format(
+          "\"{}\",{},{},{},{:.9g},{},{:g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{}\n",
+          subject.name, to_string(subject.quantity), sweep, to_string(p.setting.integrator), p.step,
+          to_string(p.precision), p.setting.tolerance, p.error, p.median, p.rate, p.evaluations,
+          p.split, p.blurred, p.failed);
+  };
+  rows("step", report.points);
+  rows("tolerance", report.tolerances);
+  if (report.own.rate > 0) rows("own", {report.own});
+  return text;
+}
+
+std::string accuracy_svg(const AccuracySubject& subject, const AccuracyReport& report) {
+  PrecisionPlot plot;
+  plot.title = subject.name + ": what accuracy costs";
+  plot.captions = {
+      fmt::format("{} of {} environments over {:g} s; {}, {}", to_string(subject.quantity),
+                  subject.environments, subject.seconds, subject.machine, subject.isa),
+      fmt::format("reference {}, its own error {:.1e} (line); hollow: within a hundredfold of it",
+                  method_text(report.reference), report.reference.error)};
+  plot.x_label = fmt::format("relative error of the {}, not exceeded in 95 % of the environments",
+                             report.points.empty() ? "" : to_string(subject.quantity));
+  plot.y_label = "CPU seconds per simulated second [1]";
+  plot.floor = report.reference.error;
+  plot.target = subject.target;
+  for (const Integrator integrator : integrators()) {
+    PrecisionCurve curve{to_string(integrator), {}};
+    for (const AccuracyPoint& p : report.points)
+      if (p.setting.integrator == integrator && p.precision == Precision::f64)
+        curve.points.push_back({p.error, 1 / p.rate, p.blurred, fmt::format("{:g}", 1e3 * p.step)});
+    if (!curve.points.empty()) plot.curves.push_back(std::move(curve));
+  }
+  if (report.own.rate > 0)
+    plot.marked = {report.own.error, 1 / report.own.rate, false, "the scene's"};
+  return render_precision_svg(plot);
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// Plays fixed episodes with one setting after another and compares what is sampled with a
+// reference.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "engine/base/precision.hpp"
+#include "tasks/accuracy/fixed_episodes.hpp"
+#include "tasks/run/step_tally.hpp"
+
+namespace tangere {
+
+/// What is compared.
+enum class AccuracyQuantity {
+  tactile,  ///< the fields of all sensors; error relative to the norm of the reference's
+  state,    ///< q; error relative to the range that each coordinate covers
+};
+const char* to_string(AccuracyQuantity value);
+
+struct AccuracySetting {
+  Integrator integrator = Integrator::bdf1;
+  int parts = 1;  ///< steps between samples
+  double tolerance = 1e-9;
+};
+
+/// The two precisions in which fields are read, as indices below.
+inline constexpr std::array kPrecisions = {Precision::f64, Precision::mixed};
+
+/// What a setting costs and how far it is off. An environment that failed has an infinite error.
+struct AccuracyOutcome {
+  /// (precisions, E) ‖x - x_ref‖/‖x_ref‖ over samples; NaN where the reference is zero throughout.
+  std::array<std::vector<double>, kPrecisions.size()> error;
+  double step_seconds = 0;                                ///< CPU time of all steps
+  std::array<double, kPrecisions.size()> read_seconds{};  ///< CPU time of reading fields
+  std::int64_t environment_steps = 0, evaluations = 0, split_steps = 0;
+  double simulated_seconds = 0;             ///< over all environments
+  std::vector<FailedEnvironment> failures;  ///< steps count from the start of the episode
+  bool stopped = false;
+};
+
+/// Is called before every sample of every block, from any thread. False stops the run.
+using AccuracyGoOn = std::function<bool()>;
+
+class AccuracyRun {
+ public:
+  /// `episodes` must outlive this object. Throws InputError for tactile without a sensor, and when
+  /// the system refuses so many threads.
+  AccuracyRun(const FixedEpisodes& episodes, AccuracyQuantity quantity, int threads);
+  ~AccuracyRun();
+
+  /// Plays with a setting and keeps its samples as the reference. Errors are left empty.
+  AccuracyOutcome make_reference(const AccuracySetting& setting, const AccuracyGoOn& go_on);
+  /// Plays with a setting and compares with the reference.
+  AccuracyOutcome compare(const AccuracySetting& setting, const AccuracyGoOn& go_on);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Memory of the reference, if a tenth of the points is touched [bytes].
+double accuracy_bytes(const FixedEpisodes& episodes, AccuracyQuantity quantity);
+
+}  // namespace tangere

@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+// The reference is SDIRK4, which is not among the schemes that are measured. Its step shrinks until
+// SDIRK2 agrees with it to a fortieth of the target, or until finer steps bring them no closer.
+#include "tasks/accuracy/accuracy_sweep.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "engine/base/as_size.hpp"
+#include "engine/step/stepper.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr double kReferenceTolerance = 1e-12;
+/// Steps of the reference in a timestep of the scene.
+constexpr std::array kReferenceParts = {8, 32, 128};
+constexpr std::array kParts = {1, 2, 5, 10, 20, 50, 100};
+constexpr std::array kTolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
+constexpr int kPasses = 3;
+constexpr double kEnoughSeconds = 0.3;  // of CPU time, after which a pass is not repeated
+constexpr double kBlur = 100, kFineEnough = 40;
+
+/// The value that `share` of the numbers do not exceed. NaN entries do not count.
+double quantile(std::vector<double> numbers, double share) {
+  std::erase_if(numbers, [](double x) { return std::isnan(x); });
+  if (numbers.empty()) return std::nan("");
+  std::sort(numbers.begin(), numbers.end());
+  const double rank = std::ceil(share * static_cast<double>(numbers.size()));
+  return numbers[as_size(std::max(0, static_cast<int>(rank) - 1))];
+}
+
+std::string status_of(const AccuracyOutcome& outcome, int environments) {
+  if (outcome.failures.empty()) return "ok";
+  const FailedEnvironment& first = outcome.failures.front();
+  return std::to_string(outcome.failures.size()) + " of " + std::to_string(environments) +
+         " environments failed, " + std::to_string(first.environment) +
+         " first: " + to_string(first.status) + " in step " + std::to_string(first.step);
+}
+
+class Sweep {
+ public:
+  Sweep(const FixedEpisodes& episodes, const AccuracyOptions& options,
+        const AccuracyListener& listener)
+      : episodes_(episodes),
+        options_(options),
+        listener_(listener),
+        run_(episodes, options.quantity, options.threads) {}
+
+  AccuracyReport run() {
+    if (!find_reference()) return stop();
+    report_.resolved = report_.reference.error <= options_.target / 3;
+    if (!report_.resolved) look_for_vibration();
+    if (!measure_points()) return stop();
+    choose();
+    if (!measure_own() || !measure_tolerances()) return stop();
+    return std::move(report_);
+  }
+
+ private:
+  AccuracyReport stop() {
+    report_.stopped = true;
+    choose();
+    return std::move(report_);
+  }
+
+  bool find_reference() {
+    double last = HUGE_VAL;
+    for (const int per_step : kReferenceParts) {
+      AccuracySetting setting{Integrator::sdirk4, episodes_.every * per_step, kReferenceTolerance};
+      const AccuracyOutcome made = run_.make_reference(setting, listener_.go_on);
+      // An unfinished reference is worth nothing. What came before was judged too coarse.
+      if (made.stopped) return false;
+      setting.integrator = Integrator::sdirk2;
+      const AccuracyOutcome other = run_.compare(setting, listener_.go_on);
+      if (other.stopped) return false;
+      setting.integrator = Integrator::sdirk4;
+      const std::vector<double>& errors = other.error[0];
+      report_.reference = {
+          setting, episodes_.interval() / setting.parts, quantile(errors, 0.95),
+          static_cast<int>(std::count_if(errors.begin(), errors.end(),
+                                         [](double x) { return !std::isnan(x); }))};
+      if (report_.reference.environments == 0)
+        throw InputError(made.failures.empty()
+                             ? "no environment has anything to compare: every field stays zero"
+                             : "the reference failed: " +
+                                   status_of(made, episodes_.start.environments()));
+      if (listener_.reference) listener_.reference(report_.reference);
+      const double error = report_.reference.error;
+      errors_of_environments_ = errors;
+      if (error <= options_.target / kFineEnough || error > 0.5 * last) break;
+      last = error;
+    }
+    return true;
+  }
+
+  /// Looks where the reference is as wrong as in the middle of the environments.
+  void look_for_vibration() {
+    if (episodes_.start.model().sensors().empty()) return;
+    const double middle = quantile(errors_of_environments_, 0.5);
+    const auto at = std::ranges::find(errors_of_environments_, middle);
+    report_.vibration = strongest_vibration(
+        episodes_, static_cast<int>(at - errors_of_environments_.begin()), Integrator::sdirk2,
+        episodes_.every * kReferenceParts[0], kReferenceTolerance);
+  }
+
+  [[nodiscard]] double tolerance_of(const AccuracySetting& setting) const {
+    return options_.tolerance.value_or(episodes_.start.model().following_tolerance(
+        setting.integrator, episodes_.interval() / setting.parts));
+  }
+
+  /// Plays a setting up to kPasses times; the least times count. Returns false when stopped.
+  bool measure(const AccuracySetting& setting, std::vector<AccuracyPoint>& points) {
+    AccuracyOutcome best = run_.compare(setting, listener_.go_on);
+    double spent = best.step_seconds;
+    for (int pass = 1; pass < kPasses && spent < kEnoughSeconds && !best.stopped; ++pass) {
+      const AccuracyOutcome again = run_.compare(setting, listener_.go_on);
+      best.stopped = again.stopped;
+      spent += again.step_seconds;
+      best.step_seconds = std::min(best.step_seconds, again.step_seconds);
+      for (std::size_t p = 0; p < kPrecisions.size(); ++p)
+        best.read_seconds[p] = std::min(best.read_seconds[p], again.read_seconds[p]);
+    }
+    if (best.stopped) return false;
+    // A state has one precision, whatever fields are read in.
+    const std::size_t count = options_.quantity == AccuracyQuantity::state ? 1 : kPrecisions.size();
+    for (std::size_t p = 0; p < count; ++p) points.push_back(point_of(setting, best, p));
+    if (listener_.setting) listener_.setting(std::span(points).last(count));
+    return true;
+  }
+
+  [[nodiscard]] AccuracyPoint point_of(const AccuracySetting& setting,
+                                       const AccuracyOutcome& outcome, std::size_t p) const {
+    AccuracyPoint point;
+    point.setting = setting;
+    point.precision = kPrecisions[p];
+    point.step = episodes_.interval() / setting.parts;
+    point.error = quantile(outcome.error[p], 0.95);
+    point.median = quantile(outcome.error[p], 0.5);
+    const auto steps = static_cast<double>(std::max<std::int64_t>(1, outcome.environment_steps));
+    point.evaluations = static_cast<double>(outcome.evaluations) / steps;
+    point.split = static_cast<double>(outcome.split_steps) / steps;
+    point.rate = outcome.simulated_seconds / (outcome.step_seconds + outcome.read_seconds[p]);
+    point.blurred = point.error < kBlur * report_.reference.error;
+    point.failed = static_cast<int>(outcome.failures.size());
+    point.status = status_of(outcome, episodes_.start.environments());
+    return point;
+  }
+
+  bool measure_points() {
+    std::vector<int> cuts(kParts.begin(), kParts.end());
+    cuts.push_back(episodes_.every);
+    std::sort(cuts.begin(), cuts.end());
+    cuts.erase(std::unique(cuts.begin(), cuts.end()), cuts.end());
+    for (const int parts : cuts) {
+      if (!episodes_.can_cut(parts) || 2 * parts > report_.reference.setting.parts) continue;
+      for (const Integrator integrator : integrators()) {
+        AccuracySetting setting{integrator, parts, 0};
+        setting.tolerance = tolerance_of(setting);
+        if (!measure(setting, report_.points)) return false;
+      }
+    }
+    return true;
+  }
+
+  bool measure_own() {
+    const Model& model = episodes_.start.model();
+    std::vector<AccuracyPoint> own;
+    if (!measure({model.integrator(), episodes_.every, Stepper(model).tolerance()}, own))
+      return false;
+    report_.own = own.front();
+    return true;
+  }
+
+  void choose() {
+    for (std::size_t i = 0; i < report_.points.size(); ++i) {
+      const AccuracyPoint& p = report_.points[i];
+      if (!(p.error <= options_.target)) continue;
+      if (report_.advice < 0 || p.rate > report_.points[as_size(report_.advice)].rate)
+        report_.advice = static_cast<int>(i);
+    }
+  }
+
+  bool measure_tolerances() {
+    AccuracySetting setting = report_.own.setting;
+    if (report_.advice >= 0) setting = report_.points[as_size(report_.advice)].setting;
+    for (const double tolerance : kTolerances) {
+      setting.tolerance = tolerance;
+      if (!measure(setting, report_.tolerances)) return false;
+    }
+    return true;
+  }
+
+  const FixedEpisodes& episodes_;
+  const AccuracyOptions& options_;
+  const AccuracyListener& listener_;
+  AccuracyRun run_;
+  AccuracyReport report_;
+  std::vector<double> errors_of_environments_;
+};
+
+}  // namespace
+
+AccuracyReport accuracy_sweep(const FixedEpisodes& episodes, const AccuracyOptions& options,
+                              const AccuracyListener& listener) {
+  return Sweep(episodes, options, listener).run();
+}
+
+}  // namespace tangere

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sweeps scheme, step, precision and tolerance over fixed episodes, and says which of them is the
+// cheapest that is accurate enough.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tasks/accuracy/accuracy_run.hpp"
+#include "tasks/accuracy/vibration.hpp"
+
+namespace tangere {
+
+struct AccuracyOptions {
+  AccuracyQuantity quantity = AccuracyQuantity::tactile;
+  double target = 1e-2;             ///< relative error
+  std::optional<double> tolerance;  ///< of all settings; none: the one that follows the step
+  int threads = 1;
+};
+
+/// One setting in one precision.
+struct AccuracyPoint {
+  AccuracySetting setting;
+  Precision precision = Precision::f64;  ///< of fields
+  double step = 0;                       ///< [s]
+  double error = 0;        ///< not exceeded in 95 % of the environments; infinite where more failed
+  double median = 0;       ///< of the errors of environments
+  double evaluations = 0;  ///< of the residual, per step
+  double split = 0;        ///< share of steps
+  double rate = 0;         ///< simulated seconds per CPU second, over all environments
+  bool blurred = false;    ///< error within a hundredfold of the reference's own
+  int failed = 0;          ///< environments
+  std::string status;      ///< "ok", or why environments failed
+};
+
+struct AccuracyReference {
+  AccuracySetting setting;
+  double step = 0;       ///< [s]
+  double error = 0;      ///< distance to SDIRK2 at the same step, in 95 % of the environments
+  int environments = 0;  ///< of which the reference says something
+};
+
+struct AccuracyReport {
+  AccuracyReference reference;
+  std::vector<AccuracyPoint> points;      ///< scheme by step by precision
+  std::vector<AccuracyPoint> tolerances;  ///< tolerances alone, at the setting of the advice
+  AccuracyPoint own;                      ///< the scene's setting: its scheme, step and tolerance
+  int advice = -1;        ///< index of the cheapest point that meets the target; -1: none does
+  bool resolved = false;  ///< the reference is accurate enough to judge by
+  Vibration vibration;    ///< where it is not
+  bool stopped = false;
+};
+
+/// Told as the sweep goes on.
+struct AccuracyListener {
+  AccuracyGoOn go_on;
+  std::function<void(const AccuracyReference&)> reference;      ///< each attempt, ever finer
+  std::function<void(std::span<const AccuracyPoint>)> setting;  ///< in every precision
+};
+
+/// A stop leaves what there is by then. Throws InputError when no environment has a number to
+/// compare, or the reference fails in all of them.
+AccuracyReport accuracy_sweep(const FixedEpisodes& episodes, const AccuracyOptions& options,
+                              const AccuracyListener& listener);
+
+}  // namespace tangere

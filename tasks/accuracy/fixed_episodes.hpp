@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Episodes whose starts and controls are fixed, so that they can be played again with any scheme
+// and any step.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/step/batch.hpp"
+#include "engine/step/control.hpp"
+#include "tasks/run/policy.hpp"
+
+namespace tangere {
+
+/// Controls hold for a timestep each. Samples are taken every `every` timesteps.
+struct FixedEpisodes {
+  Batch start;
+  double timestep = 0;             ///< of the controls [s]
+  int every = 1;                   ///< timesteps between samples
+  int samples = 0;                 ///< of the longest episode
+  std::vector<int> samples_of;     ///< (E) before the episode ends
+  std::vector<double> controls{};  ///< (samples * every, E, nu)
+
+  /// Time between samples [s].
+  [[nodiscard]] double interval() const { return timestep * every; }
+  /// Whether the time between samples can be cut into `parts` steps in none of which a control
+  /// changes.
+  [[nodiscard]] bool can_cut(int parts) const;
+  /// Controls (E, nu) of one of the steps into which the time before sample `sample` is cut.
+  [[nodiscard]] std::span<const double> controls_of(int sample, int parts, int part) const;
+};
+
+/// Episodes of a scene from the states of `start`. Throws InputError when the controls are too
+/// short or `steps` does not reach the first sample.
+FixedEpisodes scene_episodes(const Batch& start, const ControlProgram& controls, std::int64_t steps,
+                             int every);
+
+/// Episodes of a task from `start`, whose states are replaced. The controls are those that the
+/// policy asks for at the scene's own scheme and step. Of a task whose actions restart, an episode
+/// is the first action.
+FixedEpisodes task_episodes(const Batch& start, const Task& task, const Policy& policy, int every);
+
+/// Timesteps between samples: those between fields if all sensors agree and that is 10 ms or more,
+/// else as many as make about 25 ms.
+int sample_interval(const Model& model);
+
+}  // namespace tangere

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tasks/accuracy/vibration.hpp"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "engine/base/as_size.hpp"
+#include "engine/sense/readout.hpp"
+#include "engine/step/stepper.hpp"
+
+namespace tangere {
+namespace {
+
+/// Net force on each sensor after each step, (sensors, 3, steps) [N].
+using Series = std::vector<std::array<std::vector<double>, 3>>;
+
+Series net_forces(const FixedEpisodes& episodes, int environment, const StepperOptions& options,
+                  int parts) {
+  const Model& model = episodes.start.model();
+  Batch batch = episodes.start;
+  for (int e = 0; e < batch.environments(); ++e) batch.hold(e, e != environment);
+  Stepper stepper(model, options);
+  Readout readout(model);
+  Series series(model.sensors().size());
+  std::vector<double> field;
+  for (int k = 0; k < episodes.samples_of[as_size(environment)]; ++k)
+    for (int part = 0; part < parts; ++part) {
+      stepper.step_block(batch, environment / kernels::kBlock,
+                         episodes.controls_of(k, parts, part));
+      if (failed(batch.status(environment))) return series;
+      for (std::size_t s = 0; s < series.size(); ++s) {
+        field.resize(3 * as_size(model.sensors()[s].points));
+        readout.tactile(batch, environment, static_cast<int>(s), field);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          double sum = 0;
+          for (std::size_t i = axis; i < field.size(); i += 3) sum += field[i];
+          series[s][axis].push_back(sum);
+        }
+      }
+    }
+  return series;
+}
+
+/// |Σ x e^{-iωt}|² at `turns` swings over the series.
+double power(const std::vector<double>& x, int turns) {
+  const double angle = 2 * std::numbers::pi * turns / static_cast<double>(x.size());
+  // Goertzel: s_t = x_t + 2 cos ω s_{t-1} - s_{t-2}
+  double last = 0, before = 0;
+  for (const double value : x) {
+    const double now = value + 2 * std::cos(angle) * last - before;
+    before = last;
+    last = now;
+  }
+  return last * last + before * before - 2 * std::cos(angle) * last * before;
+}
+
+}  // namespace
+
+Vibration strongest_vibration(const FixedEpisodes& episodes, int environment, Integrator integrator,
+                              int parts, double tolerance) {
+  StepperOptions options;
+  options.integrator = integrator;
+  options.timestep = episodes.interval() / parts;
+  options.tolerance = tolerance;
+  const Series series = net_forces(episodes, environment, options, parts);
+  Vibration strongest;
+  double most = 0;
+  for (std::size_t s = 0; s < series.size(); ++s) {
+    const int steps = static_cast<int>(series[s][0].size());
+    const int slow = steps / (2 * parts);  // half a swing between samples
+    double whole = 0, fast = 0, peak = 0;
+    int at = 0;
+    for (int turns = 0; turns < steps / 2; ++turns) {
+      double here = 0;
+      for (const std::vector<double>& x : series[s]) here += power(x, turns);
+      whole += here;
+      if (turns <= slow) continue;
+      fast += here;
+      if (here > peak) {
+        peak = here;
+        at = turns;
+      }
+    }
+    if (fast <= most) continue;
+    most = fast;
+    strongest = {static_cast<int>(s), at / (steps * options.timestep.value()), fast / whole};
+  }
+  return strongest;
+}
+
+}  // namespace tangere

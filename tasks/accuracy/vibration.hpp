@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finds the oscillation that samples miss: which sensor shows it and how fast it is.
+#pragma once
+
+#include "tasks/accuracy/fixed_episodes.hpp"
+
+namespace tangere {
+
+struct Vibration {
+  int sensor = -1;       ///< -1: no sensor feels a force
+  double frequency = 0;  ///< strongest one above half a swing between samples [Hz]
+  double share = 0;      ///< of the force's energy that lies above that
+};
+
+/// Steps one environment with `parts` steps between samples and looks at the net force on
+/// each sensor after every step.
+Vibration strongest_vibration(const FixedEpisodes& episodes, int environment, Integrator integrator,
+                              int parts, double tolerance);
+
+}  // namespace tangere

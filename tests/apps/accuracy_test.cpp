@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests `tangere accuracy` as users see it: its keys, its files, its refusals. No test looks at how
+// long anything took.
+#include <gmock/gmock.h>
+#include <tinyxml2.h>
+
+#include <chrono>
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "tests/apps/program.hpp"
+#include "tests/files.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using nlohmann::json;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+const std::string kSmall = scene("rolling_ball_small.xml");
+
+TEST(Accuracy, NamesTheCheapestSettingAndDrawsTheOthers) {
+  const Folder folder;
+  const json answer =
+      run_json(folder, {"accuracy", kSmall, "--steps", "100", "--envs", "3", "--target", "0.03",
+                        "--svg", "cost.svg", "--csv", "cost.csv"});
+  EXPECT_EQ(answer.at("quantity"), "tactile");
+  EXPECT_EQ(answer.at("envs"), 3);
+  EXPECT_EQ(answer.at("seconds"), 0.5);
+  EXPECT_LT(answer.at("reference").at("error"), 1e-3);
+  EXPECT_THAT(answer.at("reference").at("method").get<std::string>(), HasSubstr("SDIRK4"));
+  const json& advice = answer.at("advice");
+  EXPECT_EQ(advice.at("resolved"), true);
+  EXPECT_LE(advice.at("error"), 0.03);
+  EXPECT_THAT(advice.at("text").get<std::string>(),
+              AllOf(HasSubstr("For 3 % use "), HasSubstr("own setting (BDF2, 5 ms")));
+  for (const json& point : answer.at("points")) {
+    EXPECT_GT(point.at("simulated_seconds_per_cpu_second"), 0);
+    EXPECT_EQ(point.at("status"), "ok");
+    if (point.at("error") <= 0.03) {
+      EXPECT_LE(point.at("simulated_seconds_per_cpu_second"),
+                advice.at("simulated_seconds_per_cpu_second"));
+    }
+  }
+  tinyxml2::XMLDocument picture;
+  EXPECT_EQ(picture.LoadFile(folder.path("cost.svg").c_str()), tinyxml2::XML_SUCCESS);
+  EXPECT_THAT(file_bytes(folder.path("cost.csv")),
+              AllOf(HasSubstr("scene,quantity,sweep,scheme,step"), HasSubstr(",tolerance,"),
+                    HasSubstr(",own,BDF2,0.005,")));
+}
+
+TEST(Accuracy, ComparesTheStateWhereThereIsNoSensorOrItIsAskedFor) {
+  const Folder folder;
+  const json answer = run_json(folder, {"accuracy", kSmall, "--steps", "60", "--envs", "2",
+                                        "--quantity", "state", "--tol", "1e-7"});
+  EXPECT_EQ(answer.at("quantity"), "state");
+  for (const json& point : answer.at("points")) {
+    EXPECT_EQ(point.at("tolerance"), 1e-7);
+    EXPECT_EQ(point.at("precision"), "double");
+  }
+}
+
+TEST(Accuracy, TakesATask) {
+  const Folder folder;
+  const Outcome outcome = run(folder, {"accuracy", "insertion", "--envs", "2", "--quantity",
+                                       "state", "--target", "0.2", "--json"});
+  const json answer = json::parse(outcome.out);
+  EXPECT_EQ(answer.at("scene"), "insertion");
+  EXPECT_FALSE(answer.at("points").empty());
+}
+
+TEST(Accuracy, SaysWhyNothingIsResolved) {
+  const Folder folder;
+  const json answer =
+      run_json(folder, {"accuracy", scene("stable_grasp.xml"), "--steps", "60", "--envs", "2"}, 1);
+  EXPECT_EQ(answer.at("advice").at("resolved"), false);
+  EXPECT_THAT(answer.at("advice").at("text").get<std::string>(),
+              AllOf(HasSubstr("not resolved"), HasSubstr(" Hz")));
+  EXPECT_GT(answer.at("vibration").at("frequency"), 20);
+}
+
+class AccuracyRefuses : public ::testing::TestWithParam<std::pair<Words, const char*>> {};
+
+TEST_P(AccuracyRefuses, WithAMessage) {
+  const Folder folder;
+  Words words{"accuracy", kSmall};
+  words.insert(words.end(), GetParam().first.begin(), GetParam().first.end());
+  const Outcome outcome = run(folder, words);
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr(GetParam().second));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Values, AccuracyRefuses,
+    ::testing::Values(std::pair{Words{"--quantity", "tactil"}, "did you mean 'tactile'"},
+                      std::pair{Words{"--target", "1"}, "expected a share below 1"},
+                      std::pair{Words{"--steps", "4"}, "expected at least one sample"},
+                      std::pair{Words{"--steps", "5"}, "every field stays zero"},
+                      std::pair{Words{"--svg", "a", "--csv", "a"}, "expected two files"},
+                      std::pair{Words{"--policy", "hold"}, "--policy"},
+                      std::pair{Words{"--envs", "900000000"}, "--envs"}));
+
+TEST(Accuracy, StopsAndKeepsWhatThereIs) {
+  const Folder folder;
+  Program program(folder, {"accuracy", kSmall, "--envs", "48", "--svg", "cost.svg", "--json"}, {},
+                  {"", "rows"});
+  while (file_bytes(folder.path("rows")).find("BDF1 ") == std::string::npos)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  program.send(SIGINT);
+  const Outcome outcome = program.wait();
+  EXPECT_EQ(outcome.exit_code, 130);
+  const json answer = json::parse(outcome.out);
+  EXPECT_EQ(answer.at("stopped"), true);
+  EXPECT_FALSE(answer.at("points").empty());
+  EXPECT_TRUE(std::filesystem::exists(folder.path("cost.svg")));
+}
+
+}  // namespace
+}  // namespace tangere::apps

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests that the same episodes are played with every setting, and that distances are measured as
+// they are said to be.
+#include "tasks/accuracy/accuracy_run.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "io/scene/scene_reader.hpp"
+#include "tasks/accuracy/accuracy_sweep.hpp"
+#include "tasks/catalogue/task_list.hpp"
+#include "tests/tasks/task_check.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::Each;
+using ::testing::Gt;
+
+const Model& small_ball() {
+  static const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball_small.xml").scene);
+  return model;
+}
+
+FixedEpisodes ball_episodes(int environments, int steps = 60) {
+  const Batch start(small_ball(), environments, 3);
+  return scene_episodes(start, ControlProgram(small_ball(), small_ball().timestep(), 3), steps, 5);
+}
+
+TEST(FixedEpisodes, CutWhereNoControlChanges) {
+  FixedEpisodes episodes = ball_episodes(2);
+  EXPECT_DOUBLE_EQ(episodes.interval(), 0.025);
+  EXPECT_EQ(episodes.samples, 12);
+  for (const int parts : {1, 2, 3, 5, 10}) EXPECT_TRUE(episodes.can_cut(parts)) << parts;
+  // The control of the third of five timesteps differs: 2 parts meet in its middle.
+  const std::size_t width = episodes.controls.size() / 60;
+  episodes.controls[2 * width] += 0.5;
+  for (const int parts : {1, 2, 3}) EXPECT_FALSE(episodes.can_cut(parts)) << parts;
+  for (const int parts : {5, 10, 15}) EXPECT_TRUE(episodes.can_cut(parts)) << parts;
+  EXPECT_EQ(episodes.controls_of(0, 10, 4)[0], episodes.controls[2 * width]);
+  EXPECT_EQ(episodes.controls_of(0, 10, 6)[0], episodes.controls[3 * width]);
+  EXPECT_EQ(episodes.controls_of(1, 5, 0)[0], episodes.controls[5 * width]);
+}
+
+TEST(FixedEpisodes, AreLongEnoughForASample) { EXPECT_THROW(ball_episodes(2, 4), InputError); }
+
+/// A task's own step gives the states that the policy saw, so nothing differs from playing it.
+TEST(FixedEpisodes, OfATaskReplayItsControls) {
+  const auto task = testing::task_named("box_pushing");
+  const Policy policy(*task, PolicyKind::scripted);
+  const FixedEpisodes episodes = task_episodes(Batch(task->model(), 3, 1), *task, policy, 5);
+  EXPECT_THAT(episodes.samples_of, Each(Gt(10)));
+  double largest = 0;
+  for (const double u : episodes.controls) largest = std::max(largest, std::abs(u));
+  EXPECT_GT(largest, 0.1);
+}
+
+TEST(AccuracyRun, AReferenceIsAtNoDistanceFromItself) {
+  const FixedEpisodes episodes = ball_episodes(3);
+  for (const AccuracyQuantity what : {AccuracyQuantity::tactile, AccuracyQuantity::state}) {
+    AccuracyRun run(episodes, what, 1);
+    const AccuracySetting setting{Integrator::sdirk2, 10, 1e-10};
+    const AccuracyOutcome made = run.make_reference(setting, {});
+    EXPECT_NEAR(made.simulated_seconds, 3 * 0.3, 1e-12);
+    EXPECT_EQ(made.environment_steps, 3 * 120);
+    EXPECT_THAT(run.compare(setting, {}).error[0], Each(0.0));
+  }
+}
+
+/// Halving the step of a scheme of order 2 quarters the error; mixed fields are off by 1e-6 more.
+TEST(AccuracyRun, ErrorsFallWithTheOrder) {
+  const FixedEpisodes episodes = ball_episodes(4, 100);
+  AccuracyRun run(episodes, AccuracyQuantity::state, 1);
+  run.make_reference({Integrator::sdirk4, 160, 1e-13}, {});
+  const auto error = [&](Integrator integrator, int parts) {
+    return run.compare({integrator, parts, 1e-12}, {}).error[0][1];
+  };
+  EXPECT_NEAR(std::log2(error(Integrator::bdf1, 40) / error(Integrator::bdf1, 80)), 1, 0.15);
+  EXPECT_GT(error(Integrator::sdirk2, 5), 3 * error(Integrator::sdirk2, 10));
+  EXPECT_LT(error(Integrator::sdirk2, 20), 0.1 * error(Integrator::bdf1, 20));
+}
+
+TEST(AccuracyRun, ErrorsAreTheSameBitsOnAnyNumberOfThreads) {
+  const FixedEpisodes episodes = ball_episodes(40, 50);
+  std::vector<double> first;
+  for (const int threads : {1, 3}) {
+    AccuracyRun run(episodes, AccuracyQuantity::tactile, threads);
+    run.make_reference({Integrator::sdirk2, 20, 1e-10}, {});
+    const AccuracyOutcome out = run.compare({Integrator::bdf2, 5, 1e-6}, {});
+    if (first.empty()) first = out.error[0];
+    EXPECT_EQ(out.error[0], first);
+    EXPECT_GT(first[0], 1e-4);
+    EXPECT_NE(out.error[1], first) << "mixed fields are rounded";
+    EXPECT_NEAR(out.error[1][0], first[0], 1e-5);
+  }
+}
+
+TEST(AccuracyRun, StopsWhereItIsTold) {
+  const FixedEpisodes episodes = ball_episodes(2);
+  AccuracyRun run(episodes, AccuracyQuantity::tactile, 1);
+  int asked = 0;
+  EXPECT_TRUE(run.make_reference({Integrator::bdf1, 5, 1e-6}, [&] { return ++asked < 4; }).stopped);
+  EXPECT_EQ(asked, 4);
+}
+
+AccuracyOptions quick() {
+  AccuracyOptions options;
+  options.target = 0.03;
+  return options;
+}
+
+TEST(AccuracySweep, NamesTheFastestSettingThatIsAccurateEnough) {
+  const FixedEpisodes episodes = ball_episodes(4, 150);
+  const AccuracyReport report = accuracy_sweep(episodes, quick(), {});
+  EXPECT_TRUE(report.resolved);
+  EXPECT_FALSE(report.stopped);
+  EXPECT_LT(report.reference.error, 1e-3);
+  ASSERT_GE(report.advice, 0);
+  const AccuracyPoint& best = report.points[static_cast<std::size_t>(report.advice)];
+  EXPECT_LE(best.error, 0.03);
+  for (const AccuracyPoint& p : report.points)
+    if (p.error <= 0.03) EXPECT_LE(p.rate, best.rate);
+  EXPECT_EQ(report.own.setting.integrator, Integrator::bdf2);
+  EXPECT_DOUBLE_EQ(report.own.step, 5e-3);
+  EXPECT_THAT(report.tolerances, ::testing::SizeIs(16));
+  // Looser tolerances take fewer evaluations.
+  EXPECT_LT(report.tolerances.front().evaluations, report.tolerances.back().evaluations);
+}
+
+TEST(AccuracySweep, KeepsWhatThereIsWhenItIsStopped) {
+  const FixedEpisodes episodes = ball_episodes(2, 100);
+  int settings = 0;
+  AccuracyListener listener;
+  listener.setting = [&](std::span<const AccuracyPoint>) { ++settings; };
+  listener.go_on = [&] { return settings < 2; };
+  const AccuracyReport report = accuracy_sweep(episodes, quick(), listener);
+  EXPECT_TRUE(report.stopped);
+  EXPECT_THAT(report.points, ::testing::SizeIs(4)) << "two settings in two precisions";
+  EXPECT_GT(report.reference.step, 0);
+}
+
+TEST(AccuracySweep, SaysThatNothingTouches) {
+  const Batch start(small_ball(), 2, 3);
+  // The pad is above the ball for the first 25 ms.
+  const FixedEpisodes episodes =
+      scene_episodes(start, ControlProgram(small_ball(), small_ball().timestep(), 3), 5, 5);
+  try {
+    accuracy_sweep(episodes, quick(), {});
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("every field stays zero"));
+  }
+}
+
+/// A pad of 25 g on a spring of 400 Hz. It is 1 mm deep in a ball and swings by 0.2 mm.
+constexpr const char* kSwinging = R"(<tangere model="swinging">
+  <option unit="m-kg" gravity="0 0 0" timestep="5e-3" integrator="SDIRK2"/>
+  <robot>
+    <link name="pad">
+      <joint name="pad" type="prismatic" axis="0 0 1" pos="0 0 0.044" stiffness="157914"/>
+      <body name="pad" type="cuboid" size="0.05 0.05 0.01" density="1000"/>
+    </link>
+  </robot>
+  <robot>
+    <link name="ball">
+      <joint name="ball" type="fixed" pos="0 0 0.02"/>
+      <body name="ball" type="sphere" radius="0.02" density="1000"/>
+    </link>
+  </robot>
+  <sensor>
+    <tactile name="pad" body="pad" type="rect_array" rect_pos0="-0.025 0.025 -0.005"
+             rect_pos1="0.025 -0.025 -0.005" axis0="0 -1 0" axis1="1 0 0" resolution="20 20"
+             kn="10" kt="0" mu="0" damping="0"/>
+  </sensor>
+  <initial><joint name="pad" v="0.5"/></initial>
+</tangere>)";
+
+TEST(Vibration, IsFoundWithItsFrequency) {
+  const Model model(parse_scene(kSwinging, "swinging.xml").scene);
+  const FixedEpisodes episodes =
+      scene_episodes(Batch(model, 1, 0), ControlProgram(model, model.timestep(), 0), 100, 5);
+  const Vibration found = strongest_vibration(episodes, 0, Integrator::sdirk2, 200, 1e-9);
+  ASSERT_EQ(found.sensor, 0);
+  EXPECT_NEAR(found.frequency, 400, 10);
+  EXPECT_GT(found.share, 1e-3);
+}
+
+}  // namespace
+}  // namespace tangere
