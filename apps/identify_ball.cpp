@@ -126,7 +126,9 @@ CurvePanel forces_panel(const FieldSequence& recorded, const FieldSequence& fitt
 int identify_ball(const Options& o) {
   const double share = o.noise.value_or(0.01);
   const std::uint64_t seed = o.seed.value_or(1);
-  const Scene scene = read_scene(o.scene).scene;
+  const SceneFile file = read_scene(o.scene);
+  for (const std::string& warning : file.warnings) fmt::print(stderr, "warning: {}\n", warning);
+  const Scene& scene = file.scene;
   const Model model(scene);
   const std::vector<double> truth = numbers_of(scene, kSought), start = wrong_start(truth, seed);
   const ControlProgram program(model, model.timestep(), 0);

@@ -39,6 +39,10 @@ std::string range_text(const MotorDescription& m) {
   return fmt::format("range {:.6g} {:.6g}", m.low, m.high);
 }
 
+std::string force_text(const std::string& joint, double low, double high) {
+  return fmt::format("  {}: force, u from -1 to 1 is {:.6g} to {:.6g}\n", joint, low, high);
+}
+
 }  // namespace
 
 Json joint_effects_json(const Scene& scene) {
@@ -83,6 +87,7 @@ Json motors_json(const Scene& scene) {
     Json motor = {{"joint", m.joint},
                   {"control", position ? "position" : "force"},
                   {"range", Json::array({finite(m.low), finite(m.high)})}};
+    if (m.turning) motor["turning_range"] = *m.turning;
     if (position) {
       motor["P"] = m.P;
       motor["D"] = m.D;
@@ -97,8 +102,8 @@ std::string motors_text(const Scene& scene) {
   std::string text = fmt::format("motors ({})\n", scene.motors.size());
   for (const MotorDescription& m : scene.motors) {
     if (m.control == MotorControl::force) {
-      text +=
-          fmt::format("  {}: force, u from -1 to 1 is {:.6g} to {:.6g}\n", m.joint, m.low, m.high);
+      text += force_text(m.turning ? m.joint + " (sliding)" : m.joint, m.low, m.high);
+      if (m.turning) text += force_text(m.joint + " (turning)", (*m.turning)[0], (*m.turning)[1]);
     } else {
       text +=
           fmt::format("  {}: position, P {:.6g}, D {:.6g}, {}, from the {} of the step\n", m.joint,

@@ -104,12 +104,15 @@ int link_of_dof(const CompiledModel& m, int dof) {
 }
 
 void check_motor(const MotorDescription& d) {
-  if (!(d.low <= d.high))
-    throw InputError(d.source.prefix() + "motor of joint '" + d.joint + "': range " +
-                     std::to_string(d.low) + " " + std::to_string(d.high) +
-                     "; expected low, then high");
-  const bool finite =
-      std::isfinite(d.low) && std::isfinite(d.high) && std::isfinite(d.P) && std::isfinite(d.D);
+  bool finite = std::isfinite(d.P) && std::isfinite(d.D);
+  const std::array<double, 2> sliding = {d.low, d.high};
+  for (const auto& [low, high] : {sliding, d.turning.value_or(sliding)}) {
+    if (!(low <= high))
+      throw InputError(d.source.prefix() + "motor of joint '" + d.joint + "': range " +
+                       std::to_string(low) + " " + std::to_string(high) +
+                       "; expected low, then high");
+    finite = finite && std::isfinite(low) && std::isfinite(high);
+  }
   if (d.control == MotorControl::force ? !finite : !(d.P >= 0 && d.D >= 0))
     throw InputError(d.source.prefix() + "motor of joint '" + d.joint +
                      "': expected a finite range, or gains P and D of zero or more");
@@ -217,8 +220,10 @@ void compile_motors(CompiledModel& m, const NameIndex& joints) {
     for (int k = 0; k < dof_count(type); ++k) {
       const int dof = m.joints[i].v + k, at = link_of_dof(m, dof);
       Link& link = m.links[std::size_t(at)];
+      const auto [low, high] =
+          d.turning && dof_turns(type, k) ? *d.turning : std::array{d.low, d.high};
       m.motors.push_back(
-          {dof, d.low, d.high, d.control, d.timing, at, dof - link.v, {d.P, -1}, {d.D, -1}});
+          {dof, low, high, d.control, d.timing, at, dof - link.v, {d.P, -1}, {d.D, -1}});
       m.u_names.push_back(m.v_names[std::size_t(dof)]);
       const bool position = d.control == MotorControl::position;
       m.u_units.emplace_back(!position ? "1" : dof_turns(type, k) ? "rad" : "m");
@@ -227,8 +232,8 @@ void compile_motors(CompiledModel& m, const NameIndex& joints) {
       kernels::DofEffects& e = m.dof_effects[std::size_t(dof)];
       e.P = {d.P, -1};
       e.D = {d.D, -1};
-      e.force_low = d.low;
-      e.force_high = d.high;
+      e.force_low = low;
+      e.force_high = high;
     }
   }
   m.nu = static_cast<int>(m.motors.size());

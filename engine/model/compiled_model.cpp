@@ -143,7 +143,7 @@ class Compiler {
                     static_cast<int>(m_.pairs.size()), d.source);
       m_.pairs.push_back(pair);
       m_.contact_info.push_back(
-          {d.general_body, d.primitive_body, pair.n_points, to_string(d.law)});
+          {d.general_body, d.primitive_body, pair.n_points, law_name(d.law, d.ramp)});
       touching_.emplace_back(pair.link1, pair.link2);
     }
   }
@@ -203,7 +203,7 @@ class Compiler {
       ground.points = keep(m_.point_storage, std::move(points));
       grounds_.add("ground contact", d.body, static_cast<int>(m_.grounds.size()), d.source);
       m_.grounds.push_back(ground);
-      m_.contact_info.push_back({d.body, "ground", ground.n_points, to_string(d.law)});
+      m_.contact_info.push_back({d.body, "ground", ground.n_points, law_name(d.law, d.ramp)});
     }
   }
 

@@ -50,6 +50,10 @@ const char* to_string(ContactLaw value) {
   return "unknown";
 }
 
+const char* law_name(ContactLaw law, double ramp) {
+  return law == ContactLaw::linear && ramp == 0 ? "published" : to_string(law);
+}
+
 bool is_inertia(const std::array<double, 6>& inertia) {
   const auto& [xx, xy, xz, yy, yz, zz] = inertia;
   // ∫ρ x xᵀ = ½ tr(I) 1 - I must be positive definite: its leading minors must be positive.

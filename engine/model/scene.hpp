@@ -93,11 +93,12 @@ struct EllipsoidShape {
 };
 /// The half-space z < 0 of the body frame: no mass, no contact points.
 struct PlaneShape {};
-/// A closed surface of triangles, whose corners are anticlockwise seen from outside. Contact
-/// points: its vertices. It has no distance, so nothing touches its faces.
+/// A closed surface of triangles, whose corners are anticlockwise seen from outside. It has no
+/// distance, so nothing touches its faces.
 struct MeshShape {
   std::vector<double> vertices;  ///< (n, 3), body frame [m]
   std::vector<std::array<int, 3>> triangles;
+  std::vector<double> contact_points = {};  ///< (n, 3), body frame [m]; empty: all vertices
 };
 /// A body given by its mass, inertia and contact points alone. It has no distance. Its centre of
 /// mass is the body frame's origin.
@@ -137,6 +138,9 @@ struct MotorDescription {
   MotorControl control = MotorControl::force;
   double P = 0, D = 0;                    ///< position: gains [N/m, N s/m or N m/rad, N m s/rad]
   MotorTiming timing = MotorTiming::end;  ///< position motors: when q and v are taken for the force
+  /// free2d, free: low and high of the dofs that turn, where they differ from those that slide
+  /// [N m].
+  std::optional<std::array<double, 2>> turning = {};
 };
 
 /// Rectangular array of tactile points: p(i, j) = corner0 + i Δ0 axis0 + j Δ1 axis1, in the body
@@ -187,7 +191,7 @@ struct GroundContactDescription {
   std::string body;
   ContactCoefficients coefficients{};
   ContactLaw law = ContactLaw::linear;
-  /// Depth [m] over which the linear law's damper fades in; 0: the published law.
+  /// Depth [m] over which the linear law's damper fades in; 0: the published law, which pulls.
   double ramp = 1e-5;
   Source source;
 };
@@ -274,6 +278,8 @@ struct Scene {
 /// The name users write and read: "free", "clamped" …
 const char* to_string(JointType value);
 const char* to_string(ContactLaw value);
+/// The same, but "published" for law linear with ramp 0.
+const char* law_name(ContactLaw law, double ramp);
 /// Returns "sphere", "cuboid" …
 const char* shape_name(const Shape& shape);
 

@@ -257,7 +257,11 @@ const std::vector<ShapeRow>& table() {
        .make = make<MeshShape>,
        .mass = [](const Shape& s,
                   double density) { return mesh_mass(std::get<MeshShape>(s), density); },
-       .points = [](const Shape& s) { return std::get<MeshShape>(s).vertices; }},
+       .points =
+           [](const Shape& s) {
+             const auto& mesh = std::get<MeshShape>(s);
+             return mesh.contact_points.empty() ? mesh.vertices : mesh.contact_points;
+           }},
       {.name = "abstract",
        .make = make<AbstractShape>,
        .mass =

@@ -31,6 +31,8 @@ class Attributes {
     idle.emplace_back(name);
   }
 
+  Attributes() { idle.insert(idle.end(), kLeftOver.begin(), kLeftOver.end()); }
+
   Names used = {"name", "type", "pos", "quat", "density", "mass", "rgba"};
   Names idle = {"scale",
                 "general_contact_resolution",
@@ -41,7 +43,8 @@ class Attributes {
                 "length",
                 "filename",
                 "transform_type",
-                "inertia"};
+                "inertia",
+                "mesh"};
 };
 
 /// Reads a shape that its size and the numbers of its contact points define completely.
@@ -75,7 +78,7 @@ void read_sized(const SceneNode& node, const ShapeRow& row, Shape& shape, Attrib
   if (const std::string fault = slenderness_fault(shape); !fault.empty()) node.fail(fault);
 }
 
-/// Reads contact points of an abstract body in the scene's unit, from a file or for a hemisphere.
+/// Reads contact points of a <collision> in the scene's unit, from a file or for a hemisphere.
 std::vector<double> read_collision(const SceneNode& node) {
   const bool generated = node.has("radius") || node.has("count");
   if (generated == node.has("contacts"))
@@ -88,6 +91,36 @@ std::vector<double> read_collision(const SceneNode& node) {
        hemisphere_points(node.positive("radius"), node.integer("count", 1, kMostPoints)))
     points.insert(points.end(), p.position.begin(), p.position.end());
   return points;
+}
+
+/// Appends contact points in the frame `at` of the body, in metres.
+void place_points(const std::vector<double>& points, const Pose& at, double length,
+                  std::vector<double>& out) {
+  for (std::size_t k = 0; k < points.size(); k += 3) {
+    const Vector3 p =
+        outer_point(at, {length * points[k], length * points[k + 1], length * points[k + 2]});
+    out.insert(out.end(), p.begin(), p.end());
+  }
+}
+
+/// Reads the contact points of an abstract body: those of its attribute `contacts`, which are in
+/// the body's frame, or those of its child <collision>.
+void read_contact_places(const SceneNode& node, double length, std::vector<double>& out) {
+  if (node.has("contacts"))
+    place_points(read_beside(node, "contacts", read_contact_points), Pose{}, length, out);
+  for (const SceneNode& child : node.children({"visual", "collision"})) {
+    if (child.name() == "visual") {
+      child.check_attributes({}, {"mesh", "pos", "quat"});
+      continue;
+    }
+    child.check_attributes({"contacts", "radius", "count", "pos", "quat"});
+    if (!out.empty())
+      child.fail(node.has("contacts") ? "the body has the attribute 'contacts' too; expected one"
+                                      : "given twice; expected once");
+    place_points(read_collision(child),
+                 {scaled(child.vector("pos", Vector3{0, 0, 0}), length), child.quaternion("quat")},
+                 length, out);
+  }
 }
 
 AbstractShape read_abstract(const SceneNode& node, double length) {
@@ -107,23 +140,21 @@ AbstractShape read_abstract(const SceneNode& node, double length) {
         fmt::format("no solid body of mass {1} has inertia=\"{0}\"; expected positive moments, "
                     "each at most the sum of the other two, or zeros with mass 0",
                     node.text("inertia"), node.text("mass")));
-  for (const SceneNode& child : node.children({"visual", "collision"})) {
-    if (child.name() == "visual") {
-      child.check_attributes({}, {"mesh", "pos", "quat"});
-      continue;
-    }
-    child.check_attributes({"contacts", "radius", "count", "pos", "quat"});
-    if (!shape.contact_points.empty()) child.fail("given twice; expected once");
-    const Pose at = {scaled(child.vector("pos", Vector3{0, 0, 0}), length),
-                     child.quaternion("quat")};
-    const std::vector<double> points = read_collision(child);
-    for (std::size_t k = 0; k < points.size(); k += 3) {
-      const Vector3 p =
-          outer_point(at, {length * points[k], length * points[k + 1], length * points[k + 2]});
-      shape.contact_points.insert(shape.contact_points.end(), p.begin(), p.end());
-    }
-  }
+  read_contact_places(node, length, shape.contact_points);
   return shape;
+}
+
+/// Reads how many of a mesh's vertices touch. Without a number, all do.
+void read_contact_count(const SceneNode& node, MeshShape& mesh) {
+  if (!node.has("general_contact_resolution")) return;
+  const auto vertices = static_cast<int>(mesh.vertices.size() / 3);
+  const int count = node.integer("general_contact_resolution", 1, kLargestResolution);
+  if (count > vertices)
+    node.fail(
+        fmt::format("general_contact_resolution=\"{}\"; expected at most the {} vertices of "
+                    "the mesh",
+                    count, vertices));
+  mesh.contact_points = spread_points(mesh.vertices, count);
 }
 
 Shape read_shape(const SceneNode& node, Attributes& attributes) {
@@ -133,11 +164,13 @@ Shape read_shape(const SceneNode& node, Attributes& attributes) {
   const ShapeRow& row = shape_rows()[std::size_t(node.choice("type", names))];
   Shape shape = row.make();
   if (std::holds_alternative<MeshShape>(shape)) {
-    attributes.use({"filename", "scale", "transform_type"});
-    return read_mesh(node, length);
+    attributes.use({"filename", "scale", "transform_type", "general_contact_resolution"});
+    MeshShape mesh = read_mesh(node, length);
+    read_contact_count(node, mesh);
+    return mesh;
   }
   if (std::holds_alternative<AbstractShape>(shape)) {
-    attributes.use({"inertia"});
+    attributes.use({"inertia", "contacts", "mesh"});
     attributes.leave("density");
     return read_abstract(node, length);
   }
@@ -151,7 +184,7 @@ MeshShape read_mesh(const SceneNode& node, double length) {
   const Vector3 scale = node.vector("scale", Vector3{1, 1, 1});
   for (double s : scale)
     if (!(s > 0)) node.fail(fmt::format("scale has {}; expected positive factors", s));
-  MeshShape shape = read_beside(node, "filename", read_obj);
+  MeshShape shape = read_beside(node, "filename", read_surface);
   for (std::size_t k = 0; k < shape.vertices.size(); ++k)
     shape.vertices[k] *= scale[k % 3] * length;
   return shape;
@@ -160,7 +193,7 @@ MeshShape read_mesh(const SceneNode& node, double length) {
 BodyDescription read_body(const SceneNode& node) {
   BodyDescription body;
   body.source = node.source();
-  body.name = node.text("name");
+  body.name = node.text("name", "");
   Attributes attributes;
   body.shape = read_shape(node, attributes);
   node.check_attributes(attributes.used, {"texture"}, attributes.idle);

@@ -60,9 +60,11 @@ bool has_effect(const JointEffects& e) {
   return e.damping != 0 || e.armature != 0 || e.stiffness != 0 || e.limit_stiffness != 0;
 }
 
-/// Reads range and gains of a motor. Its dofs either all slide or all turn.
-void read_motor(const SceneNode& node, bool turns, MotorDescription& motor) {
+/// Reads range and gains of a motor. Its dofs all slide or all turn, except those of a force motor
+/// on a free2d joint. There the range's numbers are forces and torques at once.
+void read_motor(const SceneNode& node, JointType type, MotorDescription& motor) {
   const SceneContext& c = node.context();
+  const bool mixed = type == JointType::free2d, turns = !mixed && dof_turns(type, 0);
   const bool position = motor.control == MotorControl::position;
   std::vector<std::string> used = {"joint", "ctrl", "ctrl_range"}, idle = {"name"};
   for (const char* name : {"P", "D", "timing"}) (position ? used : idle).emplace_back(name);
@@ -84,6 +86,18 @@ void read_motor(const SceneNode& node, bool turns, MotorDescription& motor) {
     node.fail(fmt::format("ctrl_range=\"{} {}\": expected low, then high", range[0], range[1]));
   motor.low = range[0] * (turns ? c.torque : c.force);
   motor.high = range[1] * (turns ? c.torque : c.force);
+  if (mixed) motor.turning = {range[0] * c.torque, range[1] * c.torque};
+}
+
+void check_driven(const SceneNode& node, JointType type, const MotorDescription& motor) {
+  const std::string joint = "joint '" + motor.joint + "' ";
+  if (type == JointType::fixed) node.fail(joint + "is fixed; a motor needs a joint that moves");
+  if (type == JointType::free)
+    node.fail(joint +
+              "mixes forces and torques; a motor needs a joint of one kind, or a free2d joint");
+  if (type == JointType::free2d && motor.control == MotorControl::position)
+    node.fail(joint +
+              "slides and turns, so its dofs cannot share P and D; expected ctrl=\"force\"");
 }
 
 }  // namespace
@@ -135,14 +149,10 @@ void read_actuators(Scene& scene, const SceneNode& section) {
     motor.joint = node.text("joint");
     motor.control = node.choice("ctrl", {"force", "position"}) == 1 ? MotorControl::position
                                                                     : MotorControl::force;
-    if (type == JointType::fixed)
-      node.fail("joint '" + motor.joint + "' is fixed; a motor needs a joint that moves");
-    if (type == JointType::free || type == JointType::free2d)
-      node.fail("joint '" + motor.joint +
-                "' mixes forces and torques; a motor needs a joint of one kind");
+    check_driven(node, type, motor);
     for (const MotorDescription& other : scene.motors)
       if (other.joint == motor.joint) node.fail("joint '" + motor.joint + "' already has a motor");
-    read_motor(node, dof_turns(type, 0), motor);
+    read_motor(node, type, motor);
     scene.motors.push_back(motor);
   }
 }

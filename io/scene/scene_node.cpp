@@ -10,6 +10,11 @@
 #include <cstdlib>
 
 namespace tangere {
+namespace {
+
+constexpr const char* kAllow = " (--allow-unknown ignores it)";
+
+}  // namespace
 
 void SceneContext::use_centimetres_and_grams() {
   length = 1e-2;
@@ -65,7 +70,7 @@ void SceneNode::check_attributes(const std::vector<std::string>& used,
     } else {
       std::vector<std::string> known = used;
       known.insert(known.end(), pictures.begin(), pictures.end());
-      fail("unknown attribute '" + attribute + "'" + suggestion(attribute, known));
+      fail("unknown attribute '" + attribute + "'" + suggestion(attribute, known) + kAllow);
     }
   }
 }
@@ -80,7 +85,8 @@ std::vector<SceneNode> SceneNode::children(const std::vector<std::string>& known
       } else if (context_->allow_unknown) {
         child.warn("unknown element is ignored");
       } else {
-        child.fail("unknown element inside <" + name() + ">" + suggestion(child.name(), known));
+        child.fail("unknown element inside <" + name() + ">" + suggestion(child.name(), known) +
+                   kAllow);
       }
     } else if (const tinyxml2::XMLText* t = n->ToText()) {
       const std::string text = t->Value();

@@ -37,6 +37,18 @@ class TreeReader {
     for (const SceneNode& link : robot.children({"link"})) read_link(link, -1, 0);
   }
 
+  /// Gives bodies without a name that of their link, with a number behind it if another body has
+  /// that name.
+  void name_bodies() {
+    for (LinkDescription& link : scene_.links) {
+      if (!link.body.name.empty()) continue;
+      link.body.name = link.name;
+      const int line = link.body.source.line;
+      for (int k = 2; !names_.try_emplace("body/" + link.body.name, line).second; ++k)
+        link.body.name = fmt::format("{}_{}", link.name, k);
+    }
+  }
+
  private:
   void read_link(const SceneNode& node, int parent, int depth) {
     if (depth > kDeepestTree) node.fail(fmt::format("links nested deeper than {}", kDeepestTree));
@@ -55,7 +67,7 @@ class TreeReader {
       } else if (child.name() == "body") {
         if (++bodies > 1) child.fail("a second body in link '" + link.name + "'; expected one");
         link.body = read_body(child);
-        unique("body", link.body.name, child);
+        if (!link.body.name.empty()) unique("body", link.body.name, child);
         in_world = placed_in_world(child, link.body);
       } else {
         inner.push_back(child);
@@ -87,6 +99,7 @@ class TreeReader {
     std::vector<std::string> used = {"name", "type", "pos", "quat", "frame", "damping"};
     std::vector<std::string> idle = {"lim",      "lim_stiffness", "stiffness", "rest",
                                      "armature", "axis",          "axis0",     "axis1"};
+    idle.insert(idle.end(), kLeftOver.begin(), kLeftOver.end());
     const auto take = [&](const char* attribute) {
       used.emplace_back(attribute);
       idle.erase(std::find(idle.begin(), idle.end(), attribute));
@@ -106,10 +119,19 @@ class TreeReader {
     node.check_attributes(used, {}, idle);
     joint.pose.position = scaled(node.vector("pos", Vector3{0, 0, 0}), length);
     joint.pose.orientation = node.quaternion("quat");
-    if (node.choice("frame", {"LOCAL", "WORLD"}, 0) == 1 && parent >= 0)
-      joint.pose = in_parent(joint.pose, parent);
+    if (node.choice("frame", {"LOCAL", "WORLD"}, 0) == 1) place_in_world(joint, parent);
     read_joint_effects(node, joint);
     return joint;
+  }
+
+  /// Converts the pose and the axes of a joint from the world, all joints at rest, into the parent
+  /// joint's frame and its own.
+  void place_in_world(JointDescription& joint, int parent) const {
+    const Quaternion& q = joint.pose.orientation;
+    const Pose from_world = {{0, 0, 0}, {q[0], -q[1], -q[2], -q[3]}};
+    joint.axis0 = outer_direction(from_world, joint.axis0);
+    joint.axis1 = outer_direction(from_world, joint.axis1);
+    if (parent >= 0) joint.pose = in_parent(joint.pose, parent);
   }
 
   /// Converts a pose given in the world into the frame of a parent joint at rest.
@@ -158,7 +180,8 @@ void read_defaults(const SceneNode& node) {
   for (const auto& [name, attributes] : known) names.push_back(name);
   for (const SceneNode& child : node.children(names)) {
     const std::vector<std::string>& attributes = known.at(child.name());
-    child.check_attributes(attributes);
+    const bool of_link = child.name() == "joint" || child.name() == "body";
+    child.check_attributes(attributes, {}, of_link ? kLeftOver : std::vector<std::string>{});
     for (const std::string& a : attributes)
       if (child.has(a.c_str()))
         node.context().defaults[child.name()][a] = {child.text(a.c_str()), child.source().line};
@@ -204,9 +227,11 @@ void read_root(const SceneNode& root, Scene& scene) {
   });
   TreeReader tree(scene);
   each("robot", [&](const SceneNode& s) { tree.read_robot(s); });
+  tree.name_bodies();
   if (scene.links.empty()) root.fail("no <link> in any <robot>: there is nothing to simulate");
   each("actuator", [&](const SceneNode& s) { read_actuators(scene, s); });
   each("contact", [&](const SceneNode& s) { read_contacts(scene, s); });
+  warn_of_dense_meshes(scene, root);
   each("sensor", [&](const SceneNode& s) { read_sensors(scene, s); });
   each("variable", [&](const SceneNode& s) { read_end_effectors(scene, s); });
   name_end_effectors(scene);

@@ -13,12 +13,20 @@ namespace tangere {
 /// Limit of the surface points of a body and of the points of a sensor.
 inline constexpr int kMostPoints = 1 << 20;
 
-/// Reads a body in its joint's frame, including files that it names.
+/// Attributes that published scenes leave on bodies and joints, and that no reader of the dialect
+/// uses there. They give warnings.
+inline const std::vector<std::string> kLeftOver = {"mu", "damping", "format", "contacts"};
+
+/// Reads a body in its joint's frame, including files that it names. The name is empty if it has
+/// none.
 BodyDescription read_body(const SceneNode& node);
 /// Whether the pose of a mesh is given in the world, not in the joint's frame.
 bool placed_in_world(const SceneNode& node, const BodyDescription& body);
 void read_actuators(Scene& scene, const SceneNode& section);
 void read_contacts(Scene& scene, const SceneNode& section);
+/// In the published dialect (root <redmax>), warns of meshes that touch with all their vertices:
+/// the published simulator takes about one in 50.
+void warn_of_dense_meshes(const Scene& scene, const SceneNode& root);
 void read_sensors(Scene& scene, const SceneNode& section);
 void read_end_effectors(Scene& scene, const SceneNode& section);
 /// Names end effectors that have no name: "endeffector" and their position in the file, or the next

@@ -12,6 +12,7 @@ namespace tangere {
 namespace {
 
 constexpr int kLargestArray = 4096;  // rows or columns of a tactile array
+constexpr double kFlatness = 1e-4;   // distance of a corner from an array's plane, by its diagonal
 const std::vector<std::string> kTypes = {"rect_array", "abstract", "hemisphere", "cylinder",
                                          "mesh"};
 using Names = std::vector<std::string>;
@@ -50,6 +51,24 @@ std::array<int, 2> read_resolution(const SceneNode& node) {
   return {static_cast<int>(n[0]), static_cast<int>(n[1])};
 }
 
+/// Refuses corners of which the second does not lie in the plane of the axes through the first.
+void check_in_plane(const SceneNode& node, const RectArray& array) {
+  const Vector3 &a = array.axis0, &b = array.axis1;
+  const Vector3 normal = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                          a[0] * b[1] - a[1] * b[0]};
+  double off = 0, square = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double way = array.corner1[i] - array.corner0[i];
+    off += way * normal[i];
+    square += way * way;
+  }
+  if (std::abs(off) > kFlatness * std::sqrt(square))
+    node.fail(fmt::format(
+        "rect_pos1=\"{}\" lies {:.3g} m outside the plane of axis0 and axis1 through rect_pos0; "
+        "expected it in this plane",
+        node.text("rect_pos1"), std::abs(off)));
+}
+
 RectArray read_array(const SceneNode& node) {
   const double length = node.context().length;
   RectArray array;
@@ -60,6 +79,7 @@ RectArray read_array(const SceneNode& node) {
   double slant = 0;
   for (int i = 0; i < 3; ++i) slant += array.axis0[i] * array.axis1[i];
   if (std::abs(slant) > 1e-6) node.fail("axis0 and axis1 are not perpendicular");
+  check_in_plane(node, array);
   const auto [rows, cols] = read_resolution(node);
   array.rows = rows, array.cols = cols;
   return array;

@@ -6,20 +6,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <string_view>
 
 #include "engine/base/error.hpp"
 #include "io/files/word_reader.hpp"
+#include "io/scene/triangle_files.hpp"
 
 namespace tangere {
 namespace {
-
-struct RawMesh {
-  std::vector<Vector3> positions;
-  std::vector<std::array<int, 3>> triangles;
-};
 
 /// Returns the index of a face's corner "7", "7/1", "7//2" or "-1". Files count from 1, or
 /// backwards from the latest vertex.
@@ -31,9 +29,10 @@ int corner(const WordReader& file, std::string_view word, std::size_t vertices) 
   return static_cast<int>(index);
 }
 
-RawMesh parse_obj(WordReader& file) {
+RawMesh read_obj(const std::string& path) {
   static const std::vector<std::string_view> kSkipped = {"vt", "vn",     "vp",     "o", "g",
                                                          "s",  "usemtl", "mtllib", "l", "p"};
+  WordReader file(path);
   RawMesh mesh;
   while (file.next()) {
     const std::vector<std::string_view>& words = file.words;
@@ -94,6 +93,15 @@ void check_closed(const MeshShape& mesh, const std::string& path) {
           path, place(edge.first), place(edge.second)));
 }
 
+/// Reads a file of the format that its name says: .stl, .ply, or an OBJ file.
+RawMesh read_triangles(const std::string& path) {
+  std::string end = std::filesystem::path(path).extension().string();
+  for (char& c : end) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (end == ".stl") return read_stl(path);
+  if (end == ".ply") return read_ply(path);
+  return read_obj(path);
+}
+
 /// Sums six times the volume over tetrahedra on the first vertex.
 double six_volumes(const MeshShape& mesh) {
   double sum = 0;
@@ -111,9 +119,8 @@ double six_volumes(const MeshShape& mesh) {
 
 }  // namespace
 
-MeshShape read_obj(const std::string& path) {
-  WordReader file(path);
-  MeshShape mesh = weld(parse_obj(file));
+MeshShape read_surface(const std::string& path) {
+  MeshShape mesh = weld(read_triangles(path));
   if (mesh.triangles.empty()) throw InputError(path + ": no faces; expected a closed surface");
   check_closed(mesh, path);
   const double volume = six_volumes(mesh) / 6;
@@ -122,6 +129,23 @@ MeshShape read_obj(const std::string& path) {
                      ": the faces point inwards; expected anticlockwise corners seen from outside");
   if (!(volume > 0)) throw InputError(path + ": the surface encloses no volume");
   return mesh;
+}
+
+std::vector<double> spread_points(const std::vector<double>& points, int count) {
+  std::vector<double> chosen, square(points.size() / 3, HUGE_VAL);  // of the way to a chosen one
+  std::size_t next = 0;
+  for (int i = 0; i < count; ++i) {
+    const double* const at = &points[3 * next];
+    chosen.insert(chosen.end(), at, at + 3);
+    for (std::size_t k = 0; k < square.size(); ++k) {
+      const double* const p = &points[3 * k];
+      const double x = p[0] - at[0], y = p[1] - at[1], z = p[2] - at[2];
+      square[k] = std::min(square[k], x * x + y * y + z * z);
+    }
+    next =
+        static_cast<std::size_t>(std::max_element(square.begin(), square.end()) - square.begin());
+  }
+  return chosen;
 }
 
 std::vector<double> read_contact_points(const std::string& path) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads files that bodies are made of: closed surfaces (OBJ) and lists of contact points.
+// Reads files that bodies are made of: closed surfaces (OBJ, STL, PLY) and lists of contact points.
 #pragma once
 
 #include <string>
@@ -8,15 +8,19 @@
 
 namespace tangere {
 
-/// Reads positions and faces of an OBJ file, in its own unit. Faces become fans of triangles, and
-/// equal positions become one vertex. Vertices that no face uses are left out. Texture, normals,
-/// groups and materials are skipped. Throws IoError if the file cannot be read, InputError with
-/// file:line if it is not an OBJ file, and InputError without a line if the surface is open,
-/// encloses no volume, or faces inwards.
-MeshShape read_obj(const std::string& path);
+/// Reads positions and faces of an OBJ file, or of an STL or PLY file where the path ends in .stl or
+/// .ply, in its own unit. Faces become fans of triangles, and equal positions become one vertex.
+/// Vertices that no face uses are left out. Texture, normals, groups and materials are skipped.
+/// Throws IoError if the file cannot be read, InputError with file:line if it is not of its format,
+/// and InputError without a line if the surface is open, encloses no volume, or faces inwards.
+MeshShape read_surface(const std::string& path);
+
+/// Returns `count` of the points, (n, 3): the first, then always the one that is farthest from those
+/// before it, the first of equals. `count` is at most n.
+std::vector<double> spread_points(const std::vector<double>& points, int count);
 
 /// Reads a count, then as many lines x y z. Returns (n, 3) numbers in the file's own unit. Throws
-/// like read_obj.
+/// like read_surface.
 std::vector<double> read_contact_points(const std::string& path);
 
 }  // namespace tangere

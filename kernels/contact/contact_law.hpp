@@ -4,10 +4,10 @@
 //
 //   N(d, ḋ) is the normal force, d < 0 the penetration;  f = N n + f_t
 //   R = (-k_n + k_d ḋ) d;  law linear: R = -k_n d - c ḋ, where c fades at depths below the ramp
-//   N = max(0, R);  law paper: N = R
+//   N = max(0, R);  law paper, and law linear with ramp 0: N = R
 //   f_t = -k_t v_t            if k_t |v_t| ≤ μ |N|    (stick; also at v_t = 0 and on the kink)
 //       = -μ |N| v_t / |v_t|  else                    (slip)
-// With ramp 0, law linear takes μ k_n |d| as its friction bound, as published.
+// With ramp 0, law linear is the published one: it pulls, and its friction bound is μ k_n |d|.
 #pragma once
 
 #include "kernels/contact/contact_types.hpp"
@@ -62,7 +62,7 @@ template <ContactLaw Law, class N, class M>
 void normal_force_alone(const N& minus_kn, const N& damping, const N& d, const N& rate,
                         const M& touching, N& force, N& bound) {
   const N zero(0.0), raw = raw_force<Fused>(Law, minus_kn, damping, d, rate);
-  force = Law == ContactLaw::paper ? raw : max(raw, zero);
+  force = Law == ContactLaw::clamped ? max(raw, zero) : raw;
   if constexpr (Law == ContactLaw::linear) {
     force = select(touching, force, zero);
     bound = minus_kn * d;
@@ -101,14 +101,14 @@ NormalForce<N> normal_force(const LawParameters<N>& p, const N& d, const N& rate
     }
     r.force = raw_force<Rounded>(p.law, -p.kn, damping, d, rate);
     r.rate_slope = -damping;
-    const auto pushing = active & (r.force > zero);
-    const auto bounded = active;
-    r.force = select(pushing, r.force, zero);
-    r.d_slope = select(pushing, r.d_slope, zero);
-    r.rate_slope = select(pushing, r.rate_slope, zero);
+    auto acting = active;
+    if (p.ramp > 0) acting = active & (r.force > zero);
+    r.force = select(acting, r.force, zero);
+    r.d_slope = select(acting, r.d_slope, zero);
+    r.rate_slope = select(acting, r.rate_slope, zero);
     if (p.ramp <= 0) {  // published: friction from the spring alone
-      r.bound = select(bounded, -(p.kn * d), zero);
-      r.bound_d = select(bounded, -p.kn, zero);
+      r.bound = select(active, -(p.kn * d), zero);
+      r.bound_d = select(active, -p.kn, zero);
       r.bound_rate = zero;
       return r;
     }
@@ -137,14 +137,14 @@ void pull_back_normal_force(const LawParameters<N>& p, const N& d, const N& rate
   const auto pulling = at.force < zero;  // law paper: B = -N
   const N both = force + select(pulling, -bound, bound);
   if (p.law == ContactLaw::linear) {
-    const N pushing = select(at.force > zero, one, zero);
-    const N ramp = p.ramp > 0 ? min(abs(d) * N(1.0 / (p.ramp > 0 ? p.ramp : 1)), one) : one;
     if (p.ramp > 0) {
+      const N pushing = select(at.force > zero, one, zero);
+      const N ramp = min(abs(d) * N(1.0 / p.ramp), one);
       out.kn -= pushing * both * d;
       out.damping -= pushing * both * ramp * rate;
-    } else {  // B = k_n |d|
-      out.kn -= (pushing * force + bound) * d;
-      out.damping -= pushing * force * rate;
+    } else {  // N = R, B = k_n |d|
+      out.kn -= (force + bound) * d;
+      out.damping -= force * rate;
     }
     return;
   }

@@ -12,7 +12,8 @@ namespace tangere {
 enum class ContactLaw : std::uint8_t {
   clamped,  ///< max(0, (-kn + kd ḋ) d), eq. 1 of the paper without adhesion
   paper,    ///< (-kn + kd ḋ) d, eq. 1 to the letter: pulls when ḋ > kn/kd
-  linear,   ///< max(0, -kn d - c min(1, |d|/ramp) ḋ); ramp = 0 is the published ground law
+  linear,   ///< max(0, -kn d - c min(1, |d|/ramp) ḋ); ramp = 0 is the published ground law, which
+            ///< pulls: -kn d - c ḋ
 };
 
 /// Coefficients of a contact or a tactile sensor, or one value for each of them. The order is the

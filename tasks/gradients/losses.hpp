@@ -11,7 +11,9 @@
 namespace tangere {
 
 enum class LossKind {
-  final_state,    ///< ½ |q_T - q(rest)|² + ½ |v_T|², by component, after the last step
+  /// ½ |q_T - q₀|² + ½ |v_T|², by component, after the last step. q₀ is where the scene starts,
+  /// before anything varies.
+  final_state,
   path,           ///< ½ Σ_t |v_t|²
   tactile,        ///< ½ Σ |T|² of all sensors, every k-th step
   shear,          ///< ½ Σ of the first two components squared, every k-th step

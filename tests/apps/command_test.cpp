@@ -254,6 +254,30 @@ TEST(Command, UnknownElementsMayBeAllowed) {
   EXPECT_THAT(run(folder, {"inspect", "odd.xml", "--allow-unknown", "-q"}).err, IsEmpty());
 }
 
+/// What a published scene leaves over is told with its line, whatever the command.
+TEST(Command, WarningsOfASceneGoToStderr) {
+  const Folder folder;
+  const std::string finger = std::string(TANGERE_TEST_DATA) + "/scenes/dialect_finger.xml";
+  for (const Words& words :
+       {Words{"inspect", finger, "--json"}, Words{"simulate", finger, "--steps", "2", "-o", "x.h5"},
+        Words{"bench", finger, "--envs", "1", "--steps", "2", "--repeat", "1"},
+        Words{"gradcheck", finger, "--steps", "2", "--entries", "1"},
+        Words{"generate", finger, "-o", "set", "--episodes", "1", "--steps", "2"}}) {
+    const Outcome outcome = run(folder, words);
+    EXPECT_THAT(outcome.err,
+                testing::AllOf(HasSubstr("warning: " + finger +
+                                         ":19: <body>: attribute 'damping' has no effect here"),
+                               HasSubstr("touches with all its 6 vertices")))
+        << words[0];
+    if (words[0] != "inspect") continue;
+    const json answer = json::parse(outcome.out);
+    EXPECT_THAT(undocumented_keys(answer), IsEmpty());
+    EXPECT_EQ(answer.at("motors").at(0).at("turning_range").at(1), 0.03);
+    EXPECT_EQ(answer.at("contacts").at(2).at("law"), "published");
+    EXPECT_THAT(outcome.err, HasSubstr("palm (turning): force, u from -1 to 1 is -0.03 to 0.03"));
+  }
+}
+
 TEST(Command, InspectTellsPeopleAndProgramsTheSame) {
   const Folder folder;
   const Outcome text = run(folder, {"inspect", scene("rolling_ball.xml")});

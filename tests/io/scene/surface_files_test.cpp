@@ -65,7 +65,7 @@ class SurfaceFiles : public ::testing::Test {
     return "";
   }
   std::string obj_error(const std::string& text) {
-    return error_of([&] { read_obj(write("a.obj", text)); });
+    return error_of([&] { read_surface(write("a.obj", text)); });
   }
   /// kBox with one piece replaced.
   std::string box_error(const std::string& what, const std::string& by) {
@@ -89,7 +89,7 @@ class SurfaceFiles : public ::testing::Test {
 };
 
 TEST_F(SurfaceFiles, ABoxHasTheMassOfTheCuboid) {
-  const MeshShape mesh = read_obj(write("box.obj", kBox));
+  const MeshShape mesh = read_surface(write("box.obj", kBox));
   EXPECT_EQ(mesh.vertices.size(), 24U);  // without the one that no face uses
   EXPECT_EQ(mesh.triangles.size(), 12U);
   const MassProperties got = mass_properties(mesh, 700),
@@ -106,7 +106,7 @@ TEST_F(SurfaceFiles, ABoxHasTheMassOfTheCuboid) {
 /// Any affine image A x + b of a solid has volume det A, centre A c + b and second moments A S Aᵀ.
 TEST_F(SurfaceFiles, MovedAndShearedMeshesFollowTheirVertices) {
   testing::Random random(3);
-  const MeshShape box = read_obj(write("box.obj", kBox));
+  const MeshShape box = read_surface(write("box.obj", kBox));
   for (int trial = 0; trial < 20; ++trial) {
     kernels::Mat3<double> A;
     for (auto& row : A.m)
@@ -137,12 +137,137 @@ TEST_F(SurfaceFiles, MovedAndShearedMeshesFollowTheirVertices) {
   }
 }
 
+TEST_F(SurfaceFiles, StlFilesAreTheSameSurfaceInTextAndInBytes) {
+  const MeshShape box = read_surface(write("box.obj", kBox));
+  std::string text = "solid box\n", bytes(80, 'x');
+  const auto put = [&](const auto& x) {
+    bytes.append(reinterpret_cast<const char*>(&x), sizeof x);
+  };
+  put(static_cast<std::uint32_t>(box.triangles.size()));
+  for (const std::array<int, 3>& t : box.triangles) {
+    text += "facet normal 0 0 0\n outer loop\n";
+    for (int k = 0; k < 3; ++k) put(0.0F);
+    for (const int v : t) {
+      text += "  vertex";
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double x = box.vertices[3 * std::size_t(v) + c];
+        text += " " + std::to_string(x);
+        put(static_cast<float>(x));
+      }
+      text += "\n";
+    }
+    text += " endloop\nendfacet\n";
+    put(std::uint16_t{0});
+  }
+  for (const MeshShape& mesh : {read_surface(write("a.stl", text + "endsolid box\n")),
+                                read_surface(write("b.STL", bytes))}) {
+    EXPECT_EQ(mesh.vertices.size(), 24U);
+    EXPECT_EQ(mesh.triangles.size(), 12U);
+    EXPECT_NEAR(mass_properties(mesh, 700).mass, 700 * 6, 1e-9);
+  }
+  const auto refusal = [&](const std::string& what) {
+    return error_of([&] { read_surface(write("c.stl", what)); });
+  };
+  EXPECT_THAT(refusal(bytes.substr(0, 300)), HasSubstr("c.stl: neither starts with 'solid'"));
+  EXPECT_THAT(refusal("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0\n"),
+              HasSubstr("c.stl:4: a vertex of 2 numbers; expected x y z"));
+  EXPECT_THAT(refusal("solid\nouter loop\nvertex 0 0 0\nendloop\n"),
+              HasSubstr("c.stl:4: a facet of 1 vertices"));
+  EXPECT_THAT(refusal("solid\nouter loop\nvertex 0 0 0\n"), HasSubstr("ends within a facet"));
+  EXPECT_THAT(refusal("solid\nv 0 0 0\n"), HasSubstr("c.stl:2: 'v'; expected vertex"));
+  EXPECT_THAT(refusal("solid\nendsolid\n"), HasSubstr("no faces"));
+  const float endless = 1e30F;
+  bytes.replace(96, 4, reinterpret_cast<const char*>(&endless), 4);
+  EXPECT_THAT(refusal(bytes), HasSubstr("c.stl: triangle 0 has the number 1"));
+}
+
+TEST_F(SurfaceFiles, PlyFilesAreTheSameSurfaceInTextAndInBytes) {
+  const MeshShape box = read_surface(write("box.obj", kBox));
+  const auto header = [](const std::string& format) {
+    return "ply\r\nformat " + format +
+           " 1.0\r\ncomment by hand\nelement vertex 8\nproperty double x\nproperty uchar red\n"
+           "property double y\nproperty double z\nelement edge 1\nproperty int v\n"
+           "element face 12\nproperty list uchar int vertex_indices\nend_header\n";
+  };
+  std::string text = header("ascii"), little = header("binary_little_endian"),
+              big = header("binary_big_endian");
+  const auto put = [&](const auto& x) {
+    std::string raw(reinterpret_cast<const char*>(&x), sizeof x);
+    little += raw;
+    big += std::string(raw.rbegin(), raw.rend());
+    text += std::to_string(x) + " ";
+  };
+  for (std::size_t k = 0; k < box.vertices.size(); k += 3) {
+    put(box.vertices[k]);
+    put(static_cast<unsigned char>(7));
+    put(box.vertices[k + 1]);
+    put(box.vertices[k + 2]);
+    text += "\n";
+  }
+  put(std::int32_t{5});
+  for (const std::array<int, 3>& t : box.triangles) {
+    put(static_cast<unsigned char>(3));
+    for (const int v : t) put(static_cast<std::int32_t>(v));
+    text += "\n";
+  }
+  for (const std::string& all : {text, little, big}) {
+    const MeshShape mesh = read_surface(write("a.ply", all));
+    EXPECT_EQ(mesh.vertices.size(), 24U);
+    EXPECT_NEAR(mass_properties(mesh, 700).mass, 700 * 6, 1e-9);
+  }
+  const auto refusal = [&](const std::string& what) {
+    return error_of([&] { read_surface(write("c.ply", what)); });
+  };
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string wrong = text;
+    return refusal(wrong.replace(wrong.find(from), from.size(), to));
+  };
+  EXPECT_THAT(refusal("plot\n"), HasSubstr("c.ply:1: expected 'ply'"));
+  EXPECT_THAT(refusal("ply\nformat ascii 1.0\n"), HasSubstr("no 'end_header'"));
+  EXPECT_THAT(refusal(little.substr(0, little.size() - 3)), HasSubstr("ends within its elements"));
+  EXPECT_THAT(refusal(text.substr(0, text.size() - 3)), HasSubstr("ends within its elements"));
+  EXPECT_THAT(changed("format ascii", "format utf8"),
+              HasSubstr("c.ply:2: format 'utf8'; expected ascii, binary_little_endian"));
+  EXPECT_THAT(changed("double x", "real x"), HasSubstr("c.ply:5: type 'real'"));
+  EXPECT_THAT(changed("double x", "double w"), HasSubstr("a vertex without x, y or z"));
+  EXPECT_THAT(changed("vertex_indices", "corners"), HasSubstr("list of vertex_indices"));
+  EXPECT_THAT(changed("element vertex 8", "element vertex many"), HasSubstr("c.ply:4: 'many'"));
+  EXPECT_THAT(changed("element vertex 8", "elements vertex 8"), HasSubstr("c.ply:4: 'elements'"));
+  EXPECT_THAT(changed("3 0 1 2", "3 0 1 8"), HasSubstr("vertex 8; expected one of 0 to 7"));
+  EXPECT_THAT(changed("3 0 1 2", "2 0 1 2"), HasSubstr("c.ply:22: a face of 2 vertices"));
+  EXPECT_THAT(changed("\n1.000000", "\nnan"), HasSubstr("c.ply:16: vertex 2 has nan"));
+  EXPECT_THAT(changed("\n1.000000", "\none"), HasSubstr("c.ply:16: 'one'; expected a number"));
+}
+
+/// A box with a fine side keeps its mass and touches with points that are far from each other.
+TEST_F(SurfaceFiles, AMeshMayTouchWithFewerPoints) {
+  write("box.obj", kBox);
+  const auto body = [](const std::string& count) {
+    return R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOINT" scale="2 1 1")" +
+           count + "/>";
+  };
+  const Scene all = scene(body("")).scene,
+              few = scene(body(" general_contact_resolution=\"3\"")).scene;
+  const auto points = [](const Scene& s) { return contact_points(s.links[0].body.shape); };
+  EXPECT_EQ(points(all).size(), 24U);
+  ASSERT_EQ(points(few).size(), 9U);
+  // The first vertex of the file's faces is the origin, the farthest is (2 2 3), then (0 0 3) or
+  // (2 2 0), which are equally far from both: the first in the order of faces is (2 2 0).
+  const std::vector<double> expected = {0, 0, 0, 0.02, 0.02, 0.03, 0.02, 0.02, 0};
+  for (std::size_t k = 0; k < 9; ++k) EXPECT_NEAR(points(few)[k], expected[k], 1e-15) << k;
+  EXPECT_EQ(compile(few)->links.back().mass, compile(all)->links.back().mass);
+  EXPECT_THAT(scene_error(body(" general_contact_resolution=\"9\"")),
+              HasSubstr("s.xml:3: <body>: general_contact_resolution=\"9\"; expected at most the 8 "
+                        "vertices"));
+  EXPECT_THAT(scene_error(body(" general_contact_resolution=\"0\"")), HasSubstr("from 1 to 1000"));
+}
+
 TEST_F(SurfaceFiles, SeamsAreWelded) {
   // The top has its own copies of its four vertices.
   std::string text = kBox;
   text.replace(text.find("f 5/1/1 6/2/1 7//1 -2"), 21,
                "v 0 0 3\nv 1 0 3\nv 1 2 3\nv -0 2 3\nf 10 11 12 13");
-  EXPECT_EQ(read_obj(write("box.obj", text)).vertices.size(), 24U);
+  EXPECT_EQ(read_surface(write("box.obj", text)).vertices.size(), 24U);
 }
 
 TEST_F(SurfaceFiles, WhatIsNoClosedSurfaceIsRefusedWithItsPlace) {
@@ -166,8 +291,8 @@ TEST_F(SurfaceFiles, WhatIsNoClosedSurfaceIsRefusedWithItsPlace) {
               HasSubstr("encloses no volume"));
   EXPECT_THAT(obj_error("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n"),
               HasSubstr("the faces point inwards"));
-  EXPECT_THROW(read_obj(folder_ + "none.obj"), IoError);
-  EXPECT_THROW(read_obj(folder_), IoError);
+  EXPECT_THROW(read_surface(folder_ + "none.obj"), IoError);
+  EXPECT_THROW(read_surface(folder_), IoError);
 }
 
 TEST_F(SurfaceFiles, ContactPointsFollowTheirCount) {

@@ -210,12 +210,47 @@ TEST(ContactLaw, ValuesAreTheFormulas) {
   EXPECT_EQ(force(ContactLaw::clamped, 0, -1e-3, 3, 50), 0);                // would pull
   EXPECT_DOUBLE_EQ(force(ContactLaw::paper, 0, -1e-3, 3, 50), 50 * -1e-3);  // does
   EXPECT_DOUBLE_EQ(force(ContactLaw::linear, 0, -1e-3, -0.1, 0.05), 0.1 + 0.005);
+  EXPECT_DOUBLE_EQ(force(ContactLaw::linear, 0, -1e-3, 3, 0.05), 0.1 - 0.15);  // pulls
+  EXPECT_EQ(force(ContactLaw::linear, 1e-5, -1e-3, 3, 0.05), 0);               // does not
   EXPECT_DOUBLE_EQ(force(ContactLaw::linear, 1e-5, -1e-3, -0.1, 0.05), 0.1 + 0.005);
   EXPECT_DOUBLE_EQ(force(ContactLaw::linear, 1e-5, -5e-6, -0.1, 0.05), 5e-4 + 0.5 * 0.005);
   for (ContactLaw law : {ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear}) {
     EXPECT_EQ(force(law, 1e-5, 0, -1, 1), 0);
     EXPECT_EQ(force(law, 1e-5, 1e-9, -1, 1), 0);
   }
+}
+
+/// Where it pushes and where it pulls. The bound of friction is that of the spring alone.
+TEST(ContactLaw, CotangentsOfThePublishedGroundLawAreItsDerivatives) {
+  Random random(31);
+  int pulls = 0;
+  for (int k = 0; k < 200; ++k) {
+    const double kn = random.uniform(10, 1e3), c = random.uniform(0, 2),
+                 d = -random.uniform(0, 1e-3), rate = random.uniform(-1, 1),
+                 of_force = random.uniform(-1, 1), of_bound = random.uniform(-1, 1);
+    const LawParameters<double> law = {kn, 1, 0.5, c, ContactLaw::linear, 0};
+    const NormalForce<double> at = normal_force(law, d, rate);
+    Coefficients<double> out{};
+    pull_back_normal_force(law, d, rate, at, of_force, of_bound, out);
+    const auto derivative = [&](double by_kn, double by_c, double by_d, double by_rate) {
+      const LawParameters<D> along = {D(kn, by_kn), D(1.0), D(0.5), D(c, by_c), law.law, law.ramp};
+      const NormalForce<D> n = normal_force(along, D(d, by_d), D(rate, by_rate));
+      return std::pair{n.force.epsilon, n.bound.epsilon};
+    };
+    const auto [force_kn, bound_kn] = derivative(1, 0, 0, 0);
+    const auto [force_c, bound_c] = derivative(0, 1, 0, 0);
+    const auto [force_d, bound_d] = derivative(0, 0, 1, 0);
+    const auto [force_rate, bound_rate] = derivative(0, 0, 0, 1);
+    EXPECT_NEAR(out.kn, of_force * force_kn + of_bound * bound_kn, 1e-15);
+    EXPECT_NEAR(out.damping, of_force * force_c + of_bound * bound_c, 1e-15);
+    EXPECT_EQ(at.d_slope, force_d);
+    EXPECT_EQ(at.rate_slope, force_rate);
+    EXPECT_EQ(at.bound_d, bound_d);
+    EXPECT_EQ(at.bound_rate, bound_rate);
+    EXPECT_DOUBLE_EQ(at.bound, -kn * d);
+    if (at.force < 0) ++pulls;
+  }
+  EXPECT_GT(pulls, 20);
 }
 
 TEST(ContactLaw, FrictionNeverExceedsItsBoundAndNeverDividesByZero) {

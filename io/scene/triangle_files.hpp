@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reads the triangles of STL and PLY files, in text and in bytes. surface_files.hpp makes closed
+// surfaces of them.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "engine/base/vector3.hpp"
+
+namespace tangere {
+
+/// Triangles as a file lists them: positions may repeat, and the surface may be open.
+struct RawMesh {
+  std::vector<Vector3> positions;             ///< [file's unit], at most a million each
+  std::vector<std::array<int, 3>> triangles;  ///< indices of positions
+};
+
+/// Reads an STL file. Its normals are ignored: corners are anticlockwise seen from outside. Throws
+/// IoError if the file cannot be read. Throws InputError if it is no STL file, with the line where
+/// it is text.
+RawMesh read_stl(const std::string& path);
+
+/// Reads the elements `vertex` (x y z) and `face` (a list of vertex_indices) of a PLY file. Faces
+/// become fans of triangles. Other elements and properties are skipped. Throws like read_stl.
+RawMesh read_ply(const std::string& path);
+
+}  // namespace tangere
