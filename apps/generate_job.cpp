@@ -30,21 +30,25 @@ struct Extent {
   std::int64_t episodes = 0, kept = 0;
 };
 
-/// What this process would make. Opens and creates nothing.
+/// What this process would make. Opens and creates nothing. A million shards take a second, so
+/// nothing is asked of each that is known of all.
 Extent extent_of(const GenerateOptions& options, const DatasetLayout& layout,
                  const DatasetOutput& output) {
   Extent extent;
-  for (std::int64_t shard = 0; shard < layout.shard_count(); ++shard) {
+  const bool all = !output.only && !options.resume;
+  if (all) extent.episodes = layout.episodes;
+  const std::string folder = (fs::path(options.output) / "shard-").string();
+  for (std::int64_t shard = 0, count = layout.shard_count(); shard < count; ++shard) {
     if (output.only && !std::binary_search(output.only->begin(), output.only->end(), shard))
       continue;
-    const std::string path =
-        (fs::path(options.output) / fmt::format("shard-{:05}.h5", shard)).string();
+    std::string path = fmt::format("{}{:05}.h5", folder, shard);
     if (options.resume && fs::exists(path)) {
       ++extent.kept;
       continue;
     }
+    extent.shards.push_back(std::move(path));
+    if (all) continue;
     const EpisodeRange range = layout.shard_episodes(shard);
-    extent.shards.push_back(path);
     extent.episodes += range.end - range.first;
   }
   return extent;
@@ -139,7 +143,10 @@ Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output) 
   merged.line = fmt::format("\nmerged: {}", result.file);
   if (result.minari_id.empty()) return merged;
   merged.keys["minari_id"] = result.minari_id;
+  merged.keys["minari_left_out"] = result.minari_left_out;
   merged.line += fmt::format(", {} for Minari", result.minari_id);
+  if (!result.minari_left_out.empty())
+    merged.line += fmt::format(" (too large for it: {})", fmt::join(result.minari_left_out, ", "));
   return merged;
 }
 

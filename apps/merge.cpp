@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // tangere merge: one file for a folder of shards, and the view that Minari reads.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -37,6 +38,9 @@ int merge(const std::string& path, MergeOptions options, const Console& console)
       result.demos, result.train, result.valid, result.failed));
   if (!result.minari.empty())
     console.print(fmt::format("wrote {}: {} for Minari", result.minari, result.minari_id));
+  if (!result.minari_left_out.empty())
+    console.note(fmt::format("too large for Minari, which does not show them: {}",
+                             fmt::join(result.minari_left_out, ", ")));
   console.result({{"command", "merge"},
                   {"exit_code", static_cast<int>(kDone)},
                   {"input", path},

@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
@@ -28,6 +29,8 @@ namespace tangere::apps {
 namespace {
 
 constexpr std::size_t kNoteBytes = 4096;
+// Of computing, for one call of HDF5. The longest reads one dataset of one episode.
+constexpr std::chrono::seconds kEndless{10};
 
 std::atomic<int> child{0}, passed_on{0};
 static_assert(std::atomic<int>::is_always_lock_free, "the handler may not wait");
@@ -80,6 +83,7 @@ std::span<char> shared_note() {
   prctl(PR_SET_PDEATHSIG, SIGKILL);  // who kills the command means all of it
   if (getppid() != parent) _exit(kInputOutput);
   h5::note_reading_in(note);
+  h5::end_endless_calls(kEndless);
   int code = command();
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
     std::fputs("tangere: writing to stdout failed\n", stderr);
@@ -129,6 +133,12 @@ int run_in_child(const std::function<int()>& command) {
   const int signal = WTERMSIG(status);
   if (signal == SIGINT) return kInterrupted;
   if (signal == SIGTERM) return kTerminated;
+  const std::string last = reading.empty() ? "nothing" : reading;
+  if (signal == SIGPROF)
+    throw IoError(fmt::format(
+        "the HDF5 library did not come back within {} s of computing; it had last read {}; a file "
+        "over which the library loops is damaged",
+        kEndless.count(), last));
   if (!is_crash(signal)) {  // a closed pipe, a limit: end as the child did
     signals.restore();
     std::signal(signal, SIG_DFL);
@@ -137,7 +147,7 @@ int run_in_child(const std::function<int()>& command) {
   throw IoError(fmt::format(
       "the reading process was ended by a signal ({}); it had last read {}; a file that makes the "
       "HDF5 library crash is damaged",
-      strsignal(signal), reading.empty() ? "nothing" : reading));
+      strsignal(signal), last));
 }
 
 }  // namespace tangere::apps

@@ -23,6 +23,10 @@ using kernels::Vec3;
 
 namespace {
 
+constexpr std::size_t kMostContactPoints = std::size_t{1} << 20;  // of one contact
+// A step may have to factor a full matrix of them, and the pattern has a table of all pairs.
+constexpr int kMostDofs = 3072;
+
 class Compiler {
  public:
   explicit Compiler(const Scene& scene) { m_.scene = scene; }
@@ -63,6 +67,10 @@ class Compiler {
     const int parent = d.parent < 0 ? -1 : m_.joints[d.parent].link;
     const Frame<double> base = d.parent < 0 ? kIdentityFrame : m_.joints[d.parent].frame;
     m_.joints.push_back(add_joint(m_, d.joint, parent, compose(base, to_frame(d.joint.pose))));
+    if (m_.nv > kMostDofs)
+      throw InputError(d.joint.source.prefix() + "joint '" + d.joint.name +
+                       "' is one too many: with it the scene has " + std::to_string(m_.nv) +
+                       " degrees of freedom; expected at most " + std::to_string(kMostDofs));
     add_body(d, m_.joints.back());
   }
 
@@ -90,6 +98,17 @@ class Compiler {
     return transformed(c, [](double value) { return kernels::Parameter{value, -1}; });
   }
 
+  /// Points (n, 3) of a body in one contact, in the body's frame [m].
+  static std::vector<double> points_in_contact(const Shape& shape, const std::string& body,
+                                               const Source& source) {
+    std::vector<double> points = contact_points(shape);
+    if (points.size() / 3 > kMostContactPoints)
+      throw InputError(source.prefix() + "body '" + body + "' touches with " +
+                       std::to_string(points.size() / 3) + " points; expected at most " +
+                       std::to_string(kMostContactPoints));
+    return points;
+  }
+
   const double* keep(std::vector<std::vector<double>>& storage, std::vector<double> values) {
     storage.push_back(std::move(values));
     return storage.back().data();  // moving a vector keeps its buffer
@@ -114,7 +133,7 @@ class Compiler {
       if (b1 == b2 || first.link == second.link)
         throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" +
                          d.primitive_body + "' cannot move against each other");
-      std::vector<double> points = contact_points(general);
+      std::vector<double> points = points_in_contact(general, d.general_body, d.source);
       double reach = 0;
       for (std::size_t k = 0; k < points.size(); k += 3) {
         const Vec3<double> p =
@@ -181,7 +200,7 @@ class Compiler {
         throw InputError(d.source.prefix() + "body '" + d.body + "' is fixed in the world");
       kernels::GroundContact ground{};
       const Shape& shape = m_.scene.links[b].body.shape;
-      std::vector<double> points = contact_points(shape);
+      std::vector<double> points = points_in_contact(shape, d.body, d.source);
       if (is_ball(shape)) {
         points = {0, 0, 0};
         ground.radius = body.size.x;

@@ -20,8 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kMostShards = 1'000'000;  // a damaged count must not fill the memory
-constexpr int kDeepest = 4;                      // nesting of the groups of a demo
+constexpr int kDeepest = 4;  // nesting of the groups of a demo
 
 /// Matches names like "shard-00042.h5".
 bool is_shard(std::string_view name) {

@@ -126,8 +126,9 @@ std::int64_t DatasetLayout::shard_count() const {
 }
 
 EpisodeRange DatasetLayout::shard_episodes(std::int64_t shard) const {
+  const std::int64_t each = shards == 0 ? episodes_per_shard() : 0;
   const auto first = [&](std::int64_t s) {
-    if (shards == 0) return std::min(episodes, s * episodes_per_shard());
+    if (shards == 0) return std::min(episodes, s * each);
     return std::min(episodes, s * blocks_of(episodes) / shards * kBlockEpisodes);
   };
   return {first(shard), first(shard + 1)};
@@ -144,6 +145,11 @@ void DatasetLayout::check() const {
     throw InputError(
         fmt::format("{} shards of {} episodes; expected at most {}, one for each block of {}",
                     shards, episodes, blocks_of(episodes), kBlockEpisodes));
+  if (const std::int64_t count = shard_count(); count > kMostShards)
+    throw InputError(fmt::format(
+        "{} episodes in {} shards; expected at most {} shards: a data set of fewer episodes, or of "
+        "episodes with fewer rows",
+        episodes, count, kMostShards));
   const std::vector<std::string> all = all_observation_names();
   for (const std::string& name : record)
     if (std::find(all.begin(), all.end(), name) == all.end())

@@ -23,6 +23,9 @@ struct Setting {
   std::string name, value;
 };
 
+/// Shards that a data set has at most: a damaged count must not fill the memory.
+constexpr std::int64_t kMostShards = 1'000'000;
+
 struct DatasetLayout {
   std::int64_t episodes = 0;  ///< N, of all shards
   std::int64_t steps = 0;     ///< of an episode
@@ -77,7 +80,7 @@ struct DatasetLayout {
   [[nodiscard]] EpisodeRange shard_episodes(std::int64_t shard) const;
   [[nodiscard]] std::int64_t shard_of(std::int64_t episode) const;
   /// Throws InputError when a sensor's name cannot be a name in a file, when there are more shards
-  /// than blocks, or when an observation to record does not exist.
+  /// than blocks or than kMostShards, or when an observation to record does not exist.
   void check() const;
 };
 

@@ -68,6 +68,7 @@ class Merger {
     result_.file = file_.output();
     if (view_) {  // without a demo there is none: Minari has no way to say that there is nothing
       result_.minari_id = view_->id();
+      result_.minari_left_out = view_->left_out();
       result_.minari = (fs::path(dataset_.folder) / "minari" / view_->id()).string();
     }
     return result_;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "io/dataset/dataset_files.hpp"
 
@@ -21,6 +22,7 @@ struct MergeResult {
   std::string file;       ///< FOLDER/robomimic.hdf5
   std::string minari;     ///< FOLDER/minari/tangere/NAME-v0; FOLDER/minari is a root for Minari
   std::string minari_id;  ///< tangere/NAME-v0
+  std::vector<std::string> minari_left_out;  ///< observations too large for Minari's metadata
   std::int64_t demos = 0, failed = 0, train = 0, valid = 0;
   std::uint64_t bytes = 0;  ///< of the file
   bool stopped = false;     ///< nothing was written, all else is empty

@@ -21,7 +21,10 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kMinariVersion = "0.5.3";    // the layout that is written here
+constexpr const char* kMinariVersion = "0.5.3";  // the layout that is written here
+// Of an observation that the view has. Minari needs both bounds of every number, and cannot be told
+// once that they are all equal: metadata.json has 22 bytes for each.
+constexpr std::uint64_t kMostNumbers = std::uint64_t{1} << 18;
 constexpr const char* kToFolder = "../../../../";  // from …/minari/tangere/NAME-v0/data
 
 /// Keeps letters, digits, - and _, which are all that Minari accepts.
@@ -53,6 +56,12 @@ std::string box(const DemoArray& array, const std::string& low, const std::strin
                      nested(array.shape, 0, high));
 }
 
+bool too_large(const DemoArray& array) {
+  std::uint64_t numbers = 1;
+  for (const std::uint64_t size : array.shape) numbers *= size;
+  return numbers > kMostNumbers;
+}
+
 std::string bound(double value) {
   if (std::isinf(value)) return value < 0 ? "-Infinity" : "Infinity";
   return fmt::format("{}", value);
@@ -62,6 +71,11 @@ std::string bound(double value) {
 
 MinariView::MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members)
     : members_(members) {
+  // Minari shows whatever the file has and looks for its space, so both lack what is too large.
+  std::erase_if(members_.observations, [this](const DemoArray& array) {
+    if (too_large(array)) left_out_.push_back(array.name);
+    return too_large(array);
+  });
   const h5::Id scene = h5::open_group(shard, "/scene");
   command_ = h5::read_text(h5::open_group(shard, "/"), "command");
   const std::string task = h5::read_text(scene, "task");

@@ -18,7 +18,7 @@ namespace tangere {
 class MinariView {
  public:
   /// Begins the view and replaces an existing one. `shard` is any object in one of the folder's
-  /// shards. `members` must outlive the view.
+  /// shards.
   MinariView(const std::string& folder, const h5::Id& shard, const DemoMembers& members);
 
   /// Adds demos of a file in ascending order. `file` is a name in the data set's folder, without
@@ -26,13 +26,16 @@ class MinariView {
   void add(std::string_view file, std::span<const LinkedDemo> demos);
   /// Writes what is left, and metadata.json.
   void commit();
+  /// Observations of more than 2^18 numbers, which the view does not have.
+  [[nodiscard]] const std::vector<std::string>& left_out() const { return left_out_; }
   /// "tangere/NAME-v0".
   [[nodiscard]] const std::string& id() const { return id_; }
 
  private:
   [[nodiscard]] std::string metadata() const;
 
-  const DemoMembers& members_;
+  DemoMembers members_;  // without those
+  std::vector<std::string> left_out_;
   std::string id_, folder_, command_, low_ = "-1.0", high_ = "1.0";
   std::optional<GrownFile> file_;
   std::vector<h5::FileMember> episodes_;

@@ -266,6 +266,7 @@ hid_t link_access(hid_t kind) {
 }
 
 Quiet::Quiet() {
+  note_call_begins();
   // Otherwise the library would try again, and complain, at the end of the program about a file
   // that a full disk kept it from closing. The call is refused without harm when the library is
   // already in use.
@@ -275,7 +276,10 @@ Quiet::Quiet() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
 
-Quiet::~Quiet() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
+Quiet::~Quiet() {
+  note_call_ends();
+  H5Eset_auto2(H5E_DEFAULT, function_, data_);
+}
 
 void Id::reset() noexcept {
   if (id_ < 0) return;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which object of which file is being read, kept where another process can look it up after a
-// crash of the library.
+// crash of the library; and an end to calls that never return.
 #pragma once
 
+#include <chrono>
 #include <span>
 #include <string_view>
 
@@ -15,5 +16,14 @@ void note_reading_in(std::span<char> memory) noexcept;
 /// last: "'<file>', object '<object>'", cut at the end of the memory, with a zero behind it.
 void note_file(std::string_view path) noexcept;
 void note_object(std::string_view name) noexcept;
+
+/// A call of the library begins; it ends.
+void note_call_begins() noexcept;
+void note_call_ends() noexcept;
+
+/// From now on one call that computes for so long, at most twice as long, ends the process by
+/// SIGPROF: the library loops for ever over some damaged files. Not for processes that use it in
+/// threads.
+void end_endless_calls(std::chrono::milliseconds computing) noexcept;
 
 }  // namespace tangere::h5

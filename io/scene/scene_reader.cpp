@@ -11,6 +11,7 @@
 
 #include "io/files/text_file.hpp"
 #include "io/scene/scene_sections.hpp"
+#include "io/scene/scene_tags.hpp"
 
 namespace tangere {
 
@@ -271,6 +272,7 @@ SceneFile parse_scene(const std::string& text, const std::string& name,
         "{}:{}: byte 0x{:02x} is no UTF-8; expected text in UTF-8", name,
         1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(bad), '\n'),
         static_cast<unsigned char>(text[bad])));
+  check_attribute_counts(text, name);
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
     const int line = document.ErrorLineNum();
     throw InputError(fmt::format("{}:{}: not well-formed XML: {}", name, std::max(line, 1),

@@ -6,6 +6,8 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -184,6 +186,43 @@ TEST(DamagedFile, HeapsThatTheLibraryTrustsEndInAMessage) {
     EXPECT_NE(outcome.exit_code, 0);
     EXPECT_THAT(outcome.err + outcome.out, HasSubstr("shard-00000.h5"));
   }
+}
+
+/// Sets the size of the free space in every heap of texts to zero. HDF5 1.10 then steps from object
+/// to object for ever.
+int empty_the_free_space(std::string& bytes) {
+  const auto number_at = [&](std::size_t at, std::size_t size) {
+    std::uint64_t number = 0;
+    std::memcpy(&number, &bytes.at(at), size);
+    return number;
+  };
+  int heaps = 0;
+  for (std::size_t heap = bytes.find("GCOL"); heap != std::string::npos;
+       heap = bytes.find("GCOL", heap + 4)) {
+    const std::uint64_t end = heap + number_at(heap + 8, 8);
+    // An object: its number (2 bytes), references (2), nothing (4), its size (8), the text.
+    std::uint64_t at = heap + 16;
+    while (at + 16 <= end && number_at(at, 2) != 0) at += 16 + (number_at(at + 8, 8) + 7) / 8 * 8;
+    if (at + 16 > end) continue;
+    bytes.replace(at + 8, 8, 8, '\0');
+    ++heaps;
+  }
+  return heaps;
+}
+
+TEST(DamagedFile, HeapsOverWhichTheLibraryLoopsEndInAMessage) {
+  const Folder folder;
+  ASSERT_EQ(
+      run(folder, {"simulate", scene("rolling_ball_small.xml"), "--steps", "4", "-o", "run.h5"})
+          .exit_code,
+      0);
+  std::string bytes = folder.read("run.h5");
+  ASSERT_GT(empty_the_free_space(bytes), 0);
+  folder.write("run.h5", bytes);
+  const Outcome outcome = run(folder, {"plot", "run.h5", "-o", "pads.svg"});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("the HDF5 library did not come back within 10 s of computing; "
+                                     "it had last read 'run.h5', object "));
 }
 
 TEST(DamagedFile, ATrajectoryWithoutFiniteForcesIsNotDrawn) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -146,6 +147,51 @@ TEST_F(GenerateStop, KilledAgainAndAgainItResumesToTheSameBytes) {
     EXPECT_TRUE(bytes() == expected) << "round " << round;
   }
   EXPECT_GE(killed, 3);
+}
+
+/// TANGERE_KILLS=30 kills each kind of merge 30 times; without it, four times.
+TEST_F(GenerateStop, MergeKilledAtAnyMomentLeavesWholeFilesAndMergesToTheSameBytes) {
+  const char* const given = std::getenv("TANGERE_KILLS");
+  const int kills = given == nullptr ? 4 : std::stoi(given);
+  ASSERT_EQ(run(folder_, words("800", {"--shards", "2"})).exit_code, 0);
+  const std::string merged = "set/robomimic.hdf5", view = "set/minari/tangere/free-v0/data/";
+  const std::vector<std::string> outputs = {merged, view + "main_data.hdf5",
+                                            view + "metadata.json"};
+  const auto clean = [&] {
+    fs::remove(folder_.path(merged));
+    fs::remove_all(folder_.path("set/minari"));
+  };
+  for (const Words& merge : {Words{"merge", "set"}, Words{"merge", "set", "--copy"}}) {
+    const auto begin = steady_clock::now();
+    ASSERT_EQ(run(folder_, merge).exit_code, 0);
+    const auto undisturbed = std::chrono::duration_cast<milliseconds>(steady_clock::now() - begin);
+    std::map<std::string, std::string> expected;
+    for (const std::string& name : outputs) expected[name] = folder_.read(name);
+    clean();
+    int killed = 0;
+    for (int k = 0; k < kills; ++k) {
+      Program program(folder_, merge);
+      // Spread over a run; the first has surely begun.
+      if (k == 0)
+        wait_for(merged + ".part");
+      else
+        std::this_thread::sleep_for(undisturbed * k / kills);
+      program.send(SIGKILL);
+      killed += program.wait().signal == SIGKILL ? 1 : 0;
+      for (const std::string& name : outputs)
+        if (fs::exists(folder_.path(name))) {
+          EXPECT_TRUE(folder_.read(name) == expected.at(name)) << name << ", kill " << k;
+        }
+      if (fs::exists(folder_.path(merged))) clean();  // it was faster
+    }
+    EXPECT_GE(killed, 1);
+    const Outcome last = run(folder_, merge);  // without --overwrite: no whole file is there
+    ASSERT_EQ(last.exit_code, 0) << last.err;
+    for (const std::string& name : outputs)
+      EXPECT_TRUE(folder_.read(name) == expected.at(name)) << name;
+    EXPECT_FALSE(fs::exists(folder_.path(merged + ".part")));
+    clean();
+  }
 }
 
 TEST_F(GenerateStop, APartOfAKilledRunIsCleanedWithoutAsking) {

@@ -108,6 +108,32 @@ TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
     }
 }
 
+/// Minari needs both bounds of every number in nested lists: its metadata must not grow with a pad.
+TEST(DatasetMerge, LeavesFieldsTooLargeForMinariOutOfItsSpaces) {
+  for (const int rows : {256, 512}) {
+    const Folder folder;
+    DatasetLayout l = dataset_layout(1);
+    SensorLayout& pad = l.sensors[0];
+    pad.rows = rows;
+    pad.cols = 341;  // 256 × 341 × 3 numbers are the most that go in
+    pad.points = rows * pad.cols;
+    {
+      DatasetWriter writer({folder / "set"}, l);
+      write_block(writer, l, 0);
+    }
+    const MergeResult result = merge_dataset(find_dataset(folder / "set"), {false, false});
+    const auto bytes = std::filesystem::file_size(result.minari + "/data/metadata.json");
+    if (rows == 256) {
+      EXPECT_THAT(result.minari_left_out, IsEmpty());
+      EXPECT_GT(bytes, 1'000'000U);
+    } else {
+      EXPECT_THAT(result.minari_left_out, ElementsAre("skin"));
+      EXPECT_LT(bytes, 10'000U);
+    }
+    EXPECT_THAT(examine_shard(result.file).problems, IsEmpty());
+  }
+}
+
 /// 20 episodes in two shards, of a sensor with this name.
 DatasetFiles write_named(const Folder& folder, const std::string& sensor) {
   DatasetLayout l = dataset_layout(20);

@@ -306,6 +306,38 @@ TEST(SceneError, DeepNestingIsAnErrorNotACrash) {
   EXPECT_NE(error_of(deep), "");
 }
 
+/// The XML parser compares each attribute with all others: minutes, where this is a message.
+TEST(SceneError, AnElementHasAHundredAttributesAtMost) {
+  const auto attributes = [](int count) {
+    std::string text = "<!-- a=1 --><tangere>\n<option";
+    for (int i = 0; i < count; ++i) text += " a" + std::to_string(i) + "='=\"=>'";
+    return text + "/></tangere>";
+  };
+  EXPECT_THAT(
+      error_of(attributes(200'000)),
+      ::testing::HasSubstr("s.xml:2: an element of 200000 attributes; expected at most 100"));
+  EXPECT_THAT(error_of(attributes(101)), ::testing::HasSubstr("an element of 101 attributes"));
+  EXPECT_THAT(error_of(attributes(100)), ::testing::HasSubstr("unknown attribute 'a0'"));
+}
+
+TEST(SceneError, SizesThatNoRunCouldHaveNameTheirLineAndTheLimit) {
+  std::string many;
+  for (int i = 0; i < 600; ++i) {
+    const std::string n = std::to_string(i);
+    many += "<link name=\"l" + n + "\"><joint name=\"j" + n + "\" type=\"free3d\"/><body name=\"b" +
+            n + "\" type=\"sphere\" radius=\"1\" density=\"1\"/></link>\n";
+  }
+  EXPECT_THAT(error_of("<tangere><robot>\n" + many + "</robot></tangere>"),
+              ::testing::HasSubstr("s.xml:514: joint 'j512' is one too many: with it the scene has "
+                                   "3078 degrees of freedom; expected at most 3072"));
+  EXPECT_THAT(
+      error_of(with("general_contact_resolution=\"4 4 2\"",
+                    "general_contact_resolution=\"600 600 600\"")),
+      ::testing::AllOf(::testing::HasSubstr("s.xml:21: "),
+                       ::testing::HasSubstr("'pad' touches with 2152808 points; expected at "
+                                            "most 1048576")));
+}
+
 TEST(SceneError, UnreadableFilesAreInputOutputErrors) {
   EXPECT_THROW(read_scene("/no/such/scene.xml"), IoError);
   EXPECT_THROW(read_scene("/"), IoError);

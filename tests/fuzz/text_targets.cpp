@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scenes are compiled and make one step too: a number that a reader lets through must not hurt
+// later.
+#include <algorithm>
+#include <filesystem>
+#include <span>
+
+#include "engine/sense/readout.hpp"
+#include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
+#include "io/files/csv.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "io/scene/surface_files.hpp"
+#include "io/scene/tactile_layouts.hpp"
+#include "tests/files.hpp"
+#include "tests/fuzz/targets.hpp"
+
+namespace tangere::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kScenes = TANGERE_TEST_DATA "/scenes/";
+
+/// Large grids are no mistakes, but take a mutant seconds.
+void make_small(Scene& scene) {
+  const auto few = [](int& n) { n = std::min(n, 12); };
+  for (LinkDescription& link : scene.links) {
+    if (auto* box = std::get_if<CuboidShape>(&link.body.shape))
+      for (int& n : box->contact_resolution) few(n);
+    if (auto* rod = std::get_if<CapsuleShape>(&link.body.shape)) few(rod->contact_rings);
+    if (auto* rod = std::get_if<CylinderShape>(&link.body.shape)) few(rod->contact_rings);
+  }
+  for (TactileDescription& sensor : scene.sensors)
+    for (int* n : {&sensor.array.rows, &sensor.array.cols}) *n = std::min(*n, 64);
+}
+
+void run_scene(const std::string& path) {
+  SceneFile file = read_scene(path);
+  make_small(file.scene);
+  const Model model(file.scene);
+  Batch batch(model, 2, 1);
+  Stepper stepper(model);
+  ControlProgram controls(model, model.timestep(), 0);
+  std::vector<double> u(2 * static_cast<std::size_t>(model.nu()), 0.5);
+  stepper.step(batch, u);
+  Readout readout(model);
+  for (std::size_t s = 0; s < model.sensors().size(); ++s) {
+    std::vector<double> field(3 * static_cast<std::size_t>(model.sensors()[s].points));
+    readout.tactile(batch, 0, static_cast<int>(s), field);
+  }
+}
+
+std::vector<std::string> scenes(const std::string& folder) {
+  for (const char* beside : {"tripod.txt", "wedge.obj", "meshes"})
+    fs::copy(std::string(kScenes) + beside, fs::path(folder) / beside, fs::copy_options::recursive);
+  std::vector<std::string> corpus;
+  for (const char* name : {"dialect_hand", "dialect_yard", "every_joint", "published_dialect_pad",
+                           "shapes", "two_balls", "units_cm_g", "units_m_kg"})
+    corpus.push_back(file_bytes(std::string(kScenes) + name + ".xml"));
+  for (const char* name : {"rolling_ball_small", "box_pushing", "cap_opening", "stable_grasp"})
+    corpus.push_back(file_bytes(std::string(TANGERE_SOURCE_DIR "/scenes/") + name + ".xml"));
+  return corpus;
+}
+
+std::vector<std::string> tables(const std::string&) {
+  return {"a,b,c\n0,0.5,-1\n# a remark\n\n1e-3,+2,3\n", "0,1,2\r\n3,4,5\r\n", "1,2,3",
+          file_bytes(TANGERE_TEST_DATA "/rolling_ball/u.csv").substr(0, 600)};
+}
+
+std::vector<std::string> meshes(const std::string&) {
+  return {file_bytes(TANGERE_TEST_DATA "/scenes/wedge.obj"),
+          file_bytes(TANGERE_TEST_DATA "/scenes/meshes/tetrahedron.obj")};
+}
+
+std::vector<std::string> contact_points(const std::string&) {
+  return {file_bytes(TANGERE_TEST_DATA "/scenes/tripod.txt"), "2\n1 +2 3\n\n-1e-3 0 5\n"};
+}
+
+std::vector<std::string> layouts(const std::string&) {
+  return {
+      "2\n\"0 0 1\" \"0 1\" \"0 0 1\" \"1 0 0\" \"0 1 0\"\n"
+      "\"1 0 1\" \"-1 -1\" \"0 0 2\" \"1 0 0\" \"0 1 0\" \"1 2 0.5 0\"\n",
+      "1 # points\n0.5 -2e-1 0 3 4 0 0 1 1 0 0 0 1 0\n"};
+}
+
+}  // namespace
+
+std::vector<Target> text_targets() {
+  const std::vector<std::string> names = {"a", "b", "c"};
+  const auto in = [](const std::string& folder) { return folder + "/mutant"; };
+  return {{"scene", false, "mutant", scenes, [=](const auto& f) { run_scene(in(f)); }},
+          {"table", false, "mutant", tables,
+           [=](const auto& f) { static_cast<void>(read_csv(in(f), 3, names)); }},
+          {"mesh", false, "mutant", meshes,
+           [=](const auto& f) { static_cast<void>(mesh_points(read_obj(in(f)), 0.1, 10'000)); }},
+          {"contact_points", false, "mutant", contact_points,
+           [=](const auto& f) { static_cast<void>(read_contact_points(in(f))); }},
+          {"layout", false, "mutant", layouts,
+           [=](const auto& f) { static_cast<void>(read_tactile_points(in(f))); }}};
+}
+
+}  // namespace tangere::fuzz
