@@ -118,10 +118,18 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const FixedEpi
   return code;
 }
 
+/// Refuses environments whose states alone would not fit.
+void check_states(const AccuracyArguments& o, const Model& model) {
+  const int environments = o.environments.value_or(kComparedEnvironments);
+  check_memory(3.0 * static_cast<double>(model.state_bytes_per_environment()) * environments,
+               fmt::format("--envs {}", environments));
+}
+
 int accuracy_of_task(const AccuracyArguments& o, const Console& console, const Task& task) {
   refuse_with_task(task, {{"--steps", o.steps.has_value()}, {"--allow-unknown", o.allow_unknown}});
   const PolicyKind kind = policy_named(o.policy, o.controls, PolicyKind::scripted);
   const Policy policy = make_policy(task, kind, o.controls);
+  check_states(o, task.model());
   const Batch start(task.model(), o.environments.value_or(kComparedEnvironments),
                     o.seed.value_or(0));
   console.note("controls are those that the policy asks for at the scene's own scheme and step");
@@ -140,6 +148,7 @@ int accuracy(const AccuracyArguments& o, const Console& console) {
   const Model model(read_scene_for(o.scene, o.allow_unknown, console));
   const ControlProgram controls =
       make_controls(o.controls, o.seed.value_or(0), model, Stepper(model), console);
+  check_states(o, model);
   const Batch start(model, o.environments.value_or(kComparedEnvironments), o.seed.value_or(0));
   return run_sweep(
       o, console,

@@ -92,8 +92,7 @@ struct DualStage::Impl {
     stretch.assign(std::size_t(kernels::kSizeNumbers * view.n_solids), 0.0);
     const std::size_t nv = std::size_t(m.nv);
     force_scale.resize(nv), mass_diagonal.resize(nv), excess.resize(1);
-    links.resize(m.links.size()),
-        columns.resize(2 * m.links.size());
+    links.resize(m.links.size()), columns.resize(2 * m.links.size());
     contacts.resize(std::size_t(view.n_link_pairs + view.n_grounded));
     for (const kernels::PairContact& p : pairs) {
       points.emplace_back(std::size_t(3 * p.n_points), D(0.0));

@@ -2,6 +2,7 @@
 // Samples are compared as they come; only the reference's are kept, without their zeros.
 #include "tasks/accuracy/accuracy_run.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <ctime>
@@ -16,6 +17,8 @@ namespace tangere {
 namespace {
 
 using kernels::kBlock;
+
+constexpr double kStill = 1e-6;  // of the widest range
 
 double thread_seconds() {
   timespec now{};
@@ -228,7 +231,8 @@ struct AccuracyRun::Impl {
         }
   }
 
-  /// A coordinate weighs by the range that it covers in all environments together.
+  /// A coordinate weighs by the range that it covers in all environments together. One that stands
+  /// still beside the others does not count: what it shows is rounding.
   void weigh_state() {
     std::vector<double> low(width, HUGE_VAL), high(width, -HUGE_VAL);
     for (int e = 0; e < episodes.start.environments(); ++e)
@@ -241,9 +245,11 @@ struct AccuracyRun::Impl {
           high[i] = std::max(high[i], q[i]);
         }
       }
+    double widest = 0;
+    for (std::size_t i = 0; i < width; ++i) widest = std::max(widest, high[i] - low[i]);
     weight.resize(width);
     for (std::size_t i = 0; i < width; ++i)
-      weight[i] = high[i] - low[i] > 1e-12 ? 1 / (high[i] - low[i]) : 0;
+      weight[i] = high[i] - low[i] > kStill * widest ? 1 / (high[i] - low[i]) : 0;
   }
 
   void errors(AccuracyOutcome& out) const {

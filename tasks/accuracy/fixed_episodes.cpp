@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Lays out all controls beforehand, so that every setting gets the same numbers.
 #include "tasks/accuracy/fixed_episodes.hpp"
 
 #include <algorithm>

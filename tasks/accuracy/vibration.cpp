@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Powers of single frequencies by Goertzel's recursion: some thousand steps need no fast transform.
 #include "tasks/accuracy/vibration.hpp"
 
 #include <array>

@@ -54,7 +54,7 @@ TEST(Accuracy, NamesTheCheapestSettingAndDrawsTheOthers) {
 
 TEST(Accuracy, ComparesTheStateWhereThereIsNoSensorOrItIsAskedFor) {
   const Folder folder;
-  const json answer = run_json(folder, {"accuracy", kSmall, "--steps", "60", "--envs", "2",
+  const json answer = run_json(folder, {"accuracy", kSmall, "--steps", "150", "--envs", "2",
                                         "--quantity", "state", "--tol", "1e-7"});
   EXPECT_EQ(answer.at("quantity"), "state");
   for (const json& point : answer.at("points")) {
@@ -107,7 +107,8 @@ TEST(Accuracy, StopsAndKeepsWhatThereIs) {
   const Folder folder;
   Program program(folder, {"accuracy", kSmall, "--envs", "48", "--svg", "cost.svg", "--json"}, {},
                   {"", "rows"});
-  while (file_bytes(folder.path("rows")).find("BDF1 ") == std::string::npos)
+  while (!std::filesystem::exists(folder.path("rows")) ||
+         file_bytes(folder.path("rows")).find("BDF1 ") == std::string::npos)
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   program.send(SIGINT);
   const Outcome outcome = program.wait();

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "engine/model/model.hpp"
 #include "io/hdf5/h5.hpp"
+#include "io/scene/scene_reader.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
 
@@ -195,7 +197,8 @@ TEST(Simulate, SaysWhatItDid) {
   EXPECT_EQ(answer.at("seed"), 9);
   EXPECT_EQ(answer.at("timestep"), 5e-3);
   EXPECT_EQ(answer.at("integrator"), "BDF2");
-  EXPECT_EQ(answer.at("tolerance"), 1e-9);
+  EXPECT_EQ(answer.at("tolerance"),
+            Model(read_scene(kSmall).scene).following_tolerance(Integrator::bdf2, 5e-3));
   EXPECT_EQ(answer.at("precision"), "double");
   EXPECT_EQ(answer.at("output"), "out.h5");
   EXPECT_EQ(answer.at("bytes"), std::filesystem::file_size(folder.path("out.h5")));
@@ -223,6 +226,16 @@ TEST(Simulate, WritesEndEffectorsBesideTheBodies) {
     for (std::size_t c = 0; c < 3; ++c)
       EXPECT_NEAR(mark.values[3 * row + c], pose.values[14 * row + c] + offset[c], 1e-15);
   EXPECT_LT(mark.values[62 * 3 + 2], mark.values[2] - 1e-4) << "the pad does not sink: no test";
+}
+
+TEST(Simulate, RunsWithGradientsAreSolvedTighter) {
+  const Folder folder;
+  EXPECT_EQ(simulate(folder, kSmall, {"--steps", "5", "--gradients", "path"}).at("tolerance"),
+            1e-9);
+  EXPECT_EQ(simulate(folder, kSmall,
+                     {"--steps", "5", "--gradients", "path", "--tol", "1e-6", "--overwrite"})
+                .at("tolerance"),
+            1e-6);
 }
 
 TEST(Simulate, SolverOptionsReachTheStepper) {
@@ -380,8 +393,7 @@ TEST_P(Continued, GoesOnBitForBit) {
   EXPECT_EQ(third.at("first_step"), 90);
   EXPECT_EQ(read_array(parts, "/q").values, rows_from(read_array(whole, "/q"), 90));
 }
-INSTANTIATE_TEST_SUITE_P(Schemes, Continued,
-                         ::testing::Values("BDF1", "BDF2", "SDIRK2", "SDIRK3"),
+INSTANTIATE_TEST_SUITE_P(Schemes, Continued, ::testing::Values("BDF1", "BDF2", "SDIRK2", "SDIRK3"),
                          [](const auto& scheme) { return scheme.param.substr(0, 6); });
 
 TEST(Continue, SaysWhatDoesNotFit) {

@@ -89,15 +89,16 @@ std::vector<std::string> layouts(const std::string&) {
 std::vector<Target> text_targets() {
   const std::vector<std::string> names = {"a", "b", "c"};
   const auto in = [](const std::string& folder) { return folder + "/mutant"; };
-  return {{"scene", false, "mutant", scenes, [=](const auto& f) { run_scene(in(f)); }},
-          {"table", false, "mutant", tables,
-           [=](const auto& f) { static_cast<void>(read_csv(in(f), 3, names)); }},
-          {"mesh", false, "mutant", meshes,
-           [=](const auto& f) { static_cast<void>(mesh_points(read_obj(in(f)), 0.1, 10'000)); }},
-          {"contact_points", false, "mutant", contact_points,
-           [=](const auto& f) { static_cast<void>(read_contact_points(in(f))); }},
-          {"layout", false, "mutant", layouts,
-           [=](const auto& f) { static_cast<void>(read_tactile_points(in(f))); }}};
+  return {
+      {"scene", false, "mutant", scenes, [=](const auto& f) { run_scene(in(f)); }},
+      {"table", false, "mutant", tables,
+       [=](const auto& f) { static_cast<void>(read_csv(in(f), 3, names)); }},
+      {"mesh", false, "mutant", meshes,
+       [=](const auto& f) { static_cast<void>(mesh_points(read_surface(in(f)), 0.1, 10'000)); }},
+      {"contact_points", false, "mutant", contact_points,
+       [=](const auto& f) { static_cast<void>(read_contact_points(in(f))); }},
+      {"layout", false, "mutant", layouts,
+       [=](const auto& f) { static_cast<void>(read_tactile_points(in(f))); }}};
 }
 
 }  // namespace tangere::fuzz

@@ -300,7 +300,7 @@ std::vector<Violation> check_heavy_headers(const Tree& tree) {
       {"CLI/", {{"apps", 1}}},
       {"Eigen/", {{"engine/derivative", 1}, {"engine/step", 1}, {"tasks/gradients", 1}}},
       {"hdf5.h", {{"io/hdf5", 5}, {"io/dataset", 10}, {"io/trajectory", 4}}},
-      {"nlohmann/json.hpp", {{"apps", 17}, {"io/dataset", 2}}},
+      {"nlohmann/json.hpp", {{"apps", 19}, {"io/dataset", 2}}},
       {"tbb/flow_graph.h", {{"tasks/run", 1}}},
       {"regex", {}},
       {"iostream", {}}};
@@ -331,6 +331,7 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"apps/export.cpp", "a subcommand: apps/command.hpp"},
       {"apps/generate.cpp", "a subcommand: apps/command.hpp"},
       {"apps/gradcheck.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/accuracy.cpp", "a subcommand: apps/command.hpp"},
       {"apps/identify_ball.cpp", "a program"},
       {"apps/info.cpp", "a subcommand: apps/command.hpp"},
       {"apps/inspect.cpp", "a subcommand: apps/command.hpp"},

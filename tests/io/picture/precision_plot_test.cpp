@@ -28,19 +28,18 @@ struct Drawn {
   double x, y;
   std::string fill;
 };
-std::vector<Drawn> dots(const std::string& svg) {
+std::vector<Drawn> drawn(const std::string& svg) {
   tinyxml2::XMLDocument document;
   EXPECT_EQ(document.Parse(svg.c_str()), tinyxml2::XML_SUCCESS) << svg;
-  std::vector<Drawn> drawn;
+  std::vector<Drawn> all;
   for (const auto* dot = document.RootElement()->FirstChildElement("circle"); dot != nullptr;
        dot = dot->NextSiblingElement("circle"))
-    drawn.push_back(
-        {dot->DoubleAttribute("cx"), dot->DoubleAttribute("cy"), dot->Attribute("fill")});
-  return drawn;
+    all.push_back({dot->DoubleAttribute("cx"), dot->DoubleAttribute("cy"), dot->Attribute("fill")});
+  return all;
 }
 
 TEST(PrecisionPlot, DecadesAreEquallyWide) {
-  const auto at = dots(render_precision_svg(
+  const auto at = drawn(render_precision_svg(
       plot_of({{1e-1, 1e-3, false, "25"}, {1e-2, 1e-2, false, "5"}, {1e-3, 1e-1, true, "1"}})));
   ASSERT_EQ(at.size(), 4U) << "three dots and the one of the legend";
   EXPECT_GT(at[0].x, at[1].x);
@@ -64,7 +63,7 @@ TEST(PrecisionPlot, SaysWhatIsDrawn) {
 
 TEST(PrecisionPlot, LeavesOutWhatHasNoPlace) {
   EXPECT_EQ(
-      dots(render_precision_svg(plot_of({{1e-1, 1, false, ""}, {HUGE_VAL, 1, false, ""}}))).size(),
+      drawn(render_precision_svg(plot_of({{1e-1, 1, false, ""}, {HUGE_VAL, 1, false, ""}}))).size(),
       2U);
   EXPECT_THROW(render_precision_svg(plot_of({{0, 1, false, ""}, {HUGE_VAL, 1, false, ""}})),
                InputError);

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests which tolerance is in force: the caller's, the scene's, or the one that follows the step.
+#include "engine/step/step_settings.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/engine/scenes.hpp"
+
+namespace tangere {
+namespace {
+
+double in_force(const Scene& scene, const StepperOptions& options = {}) {
+  return Stepper(Model(scene), options).tolerance();
+}
+
+TEST(StepTolerance, FollowsSchemeAndStep) {
+  const Model model(testing::rolling_ball(false, 4));
+  const auto at = [&](Integrator integrator, double h) {
+    return model.following_tolerance(integrator, h);
+  };
+  EXPECT_NEAR(at(Integrator::bdf1, 2e-3) / at(Integrator::bdf1, 1e-3), 4, 1e-9);
+  for (const Integrator high : {Integrator::bdf2, Integrator::sdirk2, Integrator::sdirk3})
+    EXPECT_NEAR(at(high, 4e-3) / at(high, 2e-3), 8, 1e-9);
+  EXPECT_EQ(at(Integrator::bdf1, 1), 1e-4) << "no looser than this";
+  EXPECT_EQ(at(Integrator::sdirk2, 1e-6), 1e-9) << "no tighter";
+}
+
+TEST(StepTolerance, MeansTheSameOnAnyScale) {
+  Scene small = testing::rolling_ball(false, 4), slow = small;
+  for (double& g : slow.gravity) g /= 100;  // falls take ten times as long
+  const double h = 2e-3;
+  EXPECT_NEAR(Model(slow).following_tolerance(Integrator::sdirk2, 10 * h) /
+                  Model(small).following_tolerance(Integrator::sdirk2, h),
+              1, 1e-9);
+  slow.gravity = {0, 0, 0};
+  EXPECT_EQ(Model(slow).following_tolerance(Integrator::sdirk2, h), 1e-9);
+}
+
+TEST(StepTolerance, IsTheCallersThenTheScenes) {
+  Scene scene = testing::rolling_ball(false, 4);
+  EXPECT_EQ(in_force(scene), Model(scene).following_tolerance(scene.integrator, scene.timestep));
+  EXPECT_EQ(in_force(scene, {.integrator = Integrator::sdirk3, .timestep = 1e-2, .tolerance = {}}),
+            Model(scene).following_tolerance(Integrator::sdirk3, 1e-2));
+  EXPECT_EQ(in_force(scene, for_gradients(Model(scene), {})), kGradientTolerance);
+  scene.solver.tolerance = 1e-7;
+  EXPECT_EQ(in_force(scene), 1e-7);
+  EXPECT_EQ(in_force(scene, for_gradients(Model(scene), {})), 1e-7);
+  EXPECT_EQ(in_force(scene, {.integrator = {}, .timestep = {}, .tolerance = 1e-6}), 1e-6);
+}
+
+}  // namespace
+}  // namespace tangere
