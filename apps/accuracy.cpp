@@ -18,6 +18,7 @@
 #include "io/files/part_file.hpp"
 #include "kernels/numbers/block.hpp"
 #include "kernels/table/isa.hpp"
+#include "tasks/run/episode_program.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -33,6 +34,10 @@ struct AccuracyArguments {
   bool overwrite = false, allow_unknown = false;
 };
 
+int environments_of(const AccuracyArguments& o) {
+  return o.environments.value_or(kComparedEnvironments);
+}
+
 /// The quantity as given. The default is tactile if there is a sensor, else the state.
 AccuracyQuantity quantity_named(const std::string& name, const Model& model) {
   if (name.empty())
@@ -47,7 +52,8 @@ AccuracyQuantity quantity_named(const std::string& name, const Model& model) {
 
 void check_arguments(const AccuracyArguments& o) {
   for (const std::string& output : {o.svg, o.csv})
-    if (!output.empty()) check_not_same_file(output, o.scene);
+    for (const std::string& input : {o.scene, o.controls})
+      if (!output.empty() && !input.empty()) check_not_same_file(output, input);
   if (!o.svg.empty() && o.svg == o.csv)
     throw InputError(fmt::format("--svg and --csv are both '{}'; expected two files", o.svg));
   if (o.target.value_or(0.5) >= 1)
@@ -61,6 +67,7 @@ class Output {
   Output(const std::string& path, bool overwrite) {
     if (!path.empty()) file_.emplace(path, overwrite);
   }
+  [[nodiscard]] bool wanted() const { return file_.has_value(); }
   template <class Text>
   void write(const Console& console, const Text& text) {
     if (!file_) return;
@@ -74,29 +81,61 @@ class Output {
   std::optional<PartFile> file_;
 };
 
-int run_sweep(const AccuracyArguments& o, const Console& console, const FixedEpisodes& episodes,
-              const std::string& name) {
-  const Model& model = episodes.start.model();
+/// Refuses states and controls that would not fit.
+void check_size(const AccuracyArguments& o, const Model& model, std::int64_t steps) {
+  const int environments = environments_of(o);
+  const double of_environment = 3.0 * static_cast<double>(model.state_bytes_per_environment()) +
+                                static_cast<double>(steps) * model.nu() * sizeof(double);
+  check_memory(of_environment * environments,
+               fmt::format("--envs {} of {} steps", environments, steps));
+}
+
+/// Makes the episodes; none when a signal came.
+using MakeEpisodes = std::function<std::optional<FixedEpisodes>(const AccuracyGoOn&)>;
+
+/// Ends with the report of a sweep.
+int report_sweep(const AccuracySubject& subject, const Console& console, const Model& model,
+                 const AccuracyReport& report, int signal, Output& svg, Output& csv) {
+  console.print("\n" + advice_text(subject, report, model));
+  if (can_draw(report))
+    svg.write(console, [&] { return accuracy_svg(subject, report); });
+  else if (svg.wanted())
+    console.note("no picture: no setting has both an error and a cost");
+  csv.write(console, [&] { return accuracy_csv(subject, report); });
+  int code = report.resolved && report.advice >= 0 ? kDone : kSomeFailed;
+  if (report.stopped) code = signal == SIGINT ? kInterrupted : kTerminated;
+  Json result = accuracy_json(subject, report, model);
+  result["exit_code"] = code;
+  console.result(result);
+  return code;
+}
+
+int run_sweep(const AccuracyArguments& o, const Console& console, const Model& model,
+              const std::string& name, const MakeEpisodes& make) {
   AccuracyOptions options;
   options.quantity = quantity_named(o.quantity, model);
   options.target = o.target.value_or(options.target);
   options.tolerance = o.tolerance;
-  options.threads = std::min(o.threads.value_or(processor_count()), episodes.start.blocks());
-  check_memory(accuracy_bytes(episodes, options.quantity),
-               fmt::format("--envs {}", episodes.start.environments()));
+  const int blocks = (environments_of(o) + kernels::kBlock - 1) / kernels::kBlock;
+  options.threads = std::min(o.threads.value_or(processor_count()), blocks);
+  const StopSignals signals;
+  Output svg(o.svg, o.overwrite), csv(o.csv, o.overwrite);
+  AccuracyListener listener;
+  listener.go_on = [&] { return signals.received() == 0; };
+  const std::optional<FixedEpisodes> episodes = make(listener.go_on);
+  if (!episodes)
+    return report_stop(console, "accuracy", signals.received(), "in the first episode");
+  check_memory(accuracy_bytes(*episodes, options.quantity),
+               fmt::format("--envs {}", environments_of(o)));
   const AccuracySubject subject{o.scene,
                                 name,
                                 processor_name(),
                                 kernels::active_isa_name(),
-                                episodes.start.environments(),
-                                episodes.samples * episodes.interval(),
+                                environments_of(o),
+                                episodes->samples * episodes->interval(),
                                 options.quantity,
                                 options.target};
-  const StopSignals signals;
-  Output svg(o.svg, o.overwrite), csv(o.csv, o.overwrite);
-  console.print(accuracy_heading(subject, episodes));
-  AccuracyListener listener;
-  listener.go_on = [&] { return signals.received() == 0; };
+  console.print(accuracy_heading(subject, *episodes));
   listener.reference = [&](const AccuracyReference& r) { console.print(reference_row(r)); };
   bool head = false;
   listener.setting = [&](std::span<const AccuracyPoint> points) {
@@ -104,40 +143,27 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const FixedEpi
     head = true;
     console.print(accuracy_row(points));
   };
-  const AccuracyReport report = accuracy_sweep(episodes, options, listener);
-  if (report.points.empty())
+  const AccuracyReport report = accuracy_sweep(*episodes, options, listener);
+  if (report.stopped && report.points.empty())
     return report_stop(console, "accuracy", signals.received(), "before the first setting");
-  console.print("\n" + advice_text(subject, report, model));
-  svg.write(console, [&] { return accuracy_svg(subject, report); });
-  csv.write(console, [&] { return accuracy_csv(subject, report); });
-  int code = report.resolved && report.advice >= 0 ? kDone : kSomeFailed;
-  if (report.stopped) code = signals.received() == SIGINT ? kInterrupted : kTerminated;
-  Json result = accuracy_json(subject, report, model);
-  result["exit_code"] = code;
-  console.result(result);
-  return code;
-}
-
-/// Refuses environments whose states alone would not fit.
-void check_states(const AccuracyArguments& o, const Model& model) {
-  const int environments = o.environments.value_or(kComparedEnvironments);
-  check_memory(3.0 * static_cast<double>(model.state_bytes_per_environment()) * environments,
-               fmt::format("--envs {}", environments));
+  return report_sweep(subject, console, model, report, signals.received(), svg, csv);
 }
 
 int accuracy_of_task(const AccuracyArguments& o, const Console& console, const Task& task) {
   refuse_with_task(task, {{"--steps", o.steps.has_value()}, {"--allow-unknown", o.allow_unknown}});
   const PolicyKind kind = policy_named(o.policy, o.controls, PolicyKind::scripted);
   const Policy policy = make_policy(task, kind, o.controls);
-  check_states(o, task.model());
-  const Batch start(task.model(), o.environments.value_or(kComparedEnvironments),
-                    o.seed.value_or(0));
-  console.note("controls are those that the policy asks for at the scene's own scheme and step");
+  check_size(o, task.model(), TaskProgram::steps(task.spec()));
+  const Batch start(task.model(), environments_of(o), o.seed.value_or(0));
+  if (task.spec().restarts && task.spec().opening)
+    console.note(
+        "every action of this task restarts: an episode is its opening, without the policy");
+  else
+    console.note("controls are those that the policy asks for at the scene's own scheme and step");
+  const int every = std::min(sample_interval(task.model()), task.spec().steps_per_action);
   return run_sweep(
-      o, console,
-      task_episodes(start, task, policy,
-                    std::min(sample_interval(task.model()), task.spec().steps_per_action)),
-      "task " + task.spec().name);
+      o, console, task.model(), "task " + task.spec().name,
+      [&](const AccuracyGoOn& go_on) { return task_episodes(start, task, policy, every, go_on); });
 }
 
 int accuracy(const AccuracyArguments& o, const Console& console) {
@@ -148,12 +174,12 @@ int accuracy(const AccuracyArguments& o, const Console& console) {
   const Model model(read_scene_for(o.scene, o.allow_unknown, console));
   const ControlProgram controls =
       make_controls(o.controls, o.seed.value_or(0), model, Stepper(model), console);
-  check_states(o, model);
-  const Batch start(model, o.environments.value_or(kComparedEnvironments), o.seed.value_or(0));
-  return run_sweep(
-      o, console,
-      scene_episodes(start, controls, step_count(o.steps, controls), sample_interval(model)),
-      model.scene().name);
+  const std::int64_t steps = step_count(o.steps, controls);
+  check_size(o, model, steps);
+  const Batch start(model, environments_of(o), o.seed.value_or(0));
+  return run_sweep(o, console, model, model.scene().name, [&](const AccuracyGoOn&) {
+    return scene_episodes(start, controls, steps, sample_interval(model));
+  });
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -12,13 +13,15 @@
 namespace tangere::apps {
 namespace {
 
+constexpr double kNotable = 0.01;  // share of a force's energy that is worth a sentence
+
 std::string percent(double error) {
   return std::isfinite(error) ? fmt::format("{:.2g} %", 100 * error) : std::string("-");
 }
 
-std::string setting_text(const AccuracyPoint& point) {
-  return fmt::format("{}, {:g} ms, tol {:.0e}", to_string(point.setting.integrator),
-                     1e3 * point.step, point.setting.tolerance);
+std::string setting_text(const AccuracySetting& setting, double step) {
+  return fmt::format("{}, {:g} ms, tol {:.0e}", to_string(setting.integrator), 1e3 * step,
+                     setting.tolerance);
 }
 
 Json point_json(const AccuracyPoint& p) {
@@ -42,24 +45,22 @@ Json points_json(const std::vector<AccuracyPoint>& points) {
   return all;
 }
 
-std::string method_text(const AccuracyReference& reference) {
-  return fmt::format("{}, {:g} ms, tol {:.0e}", to_string(reference.setting.integrator),
-                     1e3 * reference.step, reference.setting.tolerance);
-}
-
 /// Why the reference cannot judge, and what helps.
 std::string unresolved_text(const AccuracySubject& subject, const AccuracyReport& report,
                             const Model& model) {
   const AccuracyReference& r = report.reference;
+  if (!std::isfinite(r.error))
+    return fmt::format("Not resolved: at {:g} ms there is nothing to compare with, because {}.",
+                       1e3 * r.step, r.status);
   std::string text = fmt::format(
-      "not resolved: even at {:g} ms SDIRK4 and SDIRK2 differ by {}, so no error below {} can be "
+      "Not resolved: even at {:g} ms SDIRK4 and SDIRK2 differ by {}, so no error below {} can be "
       "told, and no setting is known to reach {}.",
       1e3 * r.step, percent(r.error), percent(3 * r.error), percent(subject.target));
-  if (report.vibration.sensor >= 0)
+  if (report.vibration.sensor >= 0 && report.vibration.share > kNotable)
     text += fmt::format(
         " {:.2g} % of the energy of the force on '{}' lies above half a swing between samples; the "
         "strongest vibration there has {:.3g} Hz. Give the contact or the joints that hold it more "
-        "damping, or average fields over that time, or compare --quantity state.",
+        "damping, or average fields over one period, or compare --quantity state.",
         100 * report.vibration.share,
         model.sensors()[static_cast<std::size_t>(report.vibration.sensor)].name,
         report.vibration.frequency);
@@ -71,15 +72,16 @@ std::string unresolved_text(const AccuracySubject& subject, const AccuracyReport
 std::string accuracy_heading(const AccuracySubject& subject, const FixedEpisodes& episodes) {
   return fmt::format(
       "{}: {} of {} environments over {:g} s, sampled every {:g} ms, against a reference; {}; {}\n"
-      "error: not exceeded in 95 % of the environments; ~: within a hundredfold of the "
+      "error: not exceeded in 95 % of the environments; ~: within a tenfold of the "
       "reference's own\n",
       subject.name, to_string(subject.quantity), subject.environments, subject.seconds,
       1e3 * episodes.interval(), subject.isa, subject.machine);
 }
 
 std::string reference_row(const AccuracyReference& reference) {
-  return fmt::format("reference {}: SDIRK2 at the same step differs by {:.1e}",
-                     method_text(reference), reference.error);
+  return fmt::format("reference {}: SDIRK2 at the same step differs by {:.1e}{}",
+                     setting_text(reference.setting, reference.step), reference.error,
+                     reference.failed == 0 ? "" : "; " + reference.status);
 }
 
 std::string accuracy_head() {
@@ -103,17 +105,20 @@ std::string accuracy_row(std::span<const AccuracyPoint> points) {
 std::string advice_text(const AccuracySubject& subject, const AccuracyReport& report,
                         const Model& model) {
   if (!report.resolved) return unresolved_text(subject, report, model);
-  const std::string own =
-      report.own.rate > 0
-          ? fmt::format(" The scene's own setting ({}) reaches {} at {:.4g}.",
-                        setting_text(report.own), percent(report.own.error), report.own.rate)
-          : std::string();
+  const std::string own = report.own.rate > 0
+                              ? fmt::format(" The scene's own setting ({}) reaches {} at {:.4g}.",
+                                            setting_text(report.own.setting, report.own.step),
+                                            percent(report.own.error), report.own.rate)
+                              : std::string();
   if (report.advice < 0)
-    return fmt::format("No setting reaches {}.{}", percent(subject.target), own);
+    return fmt::format("{} reaches {}.{}",
+                       report.stopped ? "Stopped: none of the settings so far" : "No setting",
+                       percent(subject.target), own);
   const AccuracyPoint& best = report.points[static_cast<std::size_t>(report.advice)];
   return fmt::format("For {} use {}, {} fields: {} at {:.4g} simulated seconds per CPU second.{}",
-                     percent(subject.target), setting_text(best), to_string(best.precision),
-                     percent(best.error), best.rate, own);
+                     report.stopped ? "Stopped: of the settings so far: " : "",
+                     percent(subject.target), setting_text(best.setting, best.step),
+                     to_string(best.precision), percent(best.error), best.rate, own);
 }
 
 Json accuracy_json(const AccuracySubject& subject, const AccuracyReport& report,
@@ -140,7 +145,7 @@ Json accuracy_json(const AccuracySubject& subject, const AccuracyReport& report,
           {"isa", subject.isa},
           {"stopped", report.stopped},
           {"reference",
-           {{"method", method_text(report.reference)},
+           {{"method", setting_text(report.reference.setting, report.reference.step)},
             {"step", report.reference.step},
             {"error", finite(report.reference.error)},
             {"envs", report.reference.environments}}},
@@ -152,21 +157,29 @@ Json accuracy_json(const AccuracySubject& subject, const AccuracyReport& report,
 }
 
 std::string accuracy_csv(const AccuracySubject& subject, const AccuracyReport& report) {
+  std::string name = "\"";
+  for (const char c : subject.name) name += c == '"' ? std::string("\"\"") : std::string(1, c);
+  name += '"';
   std::string text =
       "scene,quantity,sweep,scheme,step,precision,tolerance,error,median_error,"
       "simulated_seconds_per_cpu_second,evaluations_per_step,split_share,blurred,failed\n";
   const auto rows = [&](const char* sweep, const std::vector<AccuracyPoint>& points) {
     for (const AccuracyPoint& p : points)
-      text += fmt::format(
-          "\"{}\",{},{},{},{:.9g},{},{:g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{}\n",
-          subject.name, to_string(subject.quantity), sweep, to_string(p.setting.integrator), p.step,
-          to_string(p.precision), p.setting.tolerance, p.error, p.median, p.rate, p.evaluations,
-          p.split, p.blurred, p.failed);
+      text += fmt::format("{},{},{},{},{:.9g},{},{:g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{}\n",
+                          name, to_string(subject.quantity), sweep, to_string(p.setting.integrator),
+                          p.step, to_string(p.precision), p.setting.tolerance, p.error, p.median,
+                          p.rate, p.evaluations, p.split, p.blurred, p.failed);
   };
   rows("step", report.points);
   rows("tolerance", report.tolerances);
   if (report.own.rate > 0) rows("own", {report.own});
   return text;
+}
+
+bool can_draw(const AccuracyReport& report) {
+  return std::ranges::any_of(report.points, [](const AccuracyPoint& p) {
+    return p.error > 0 && std::isfinite(p.error) && p.rate > 0;
+  });
 }
 
 std::string accuracy_svg(const AccuracySubject& subject, const AccuracyReport& report) {
@@ -175,10 +188,12 @@ std::string accuracy_svg(const AccuracySubject& subject, const AccuracyReport& r
   plot.captions = {
       fmt::format("{} of {} environments over {:g} s; {}, {}", to_string(subject.quantity),
                   subject.environments, subject.seconds, subject.machine, subject.isa),
-      fmt::format("reference {}, its own error {:.1e} (line); hollow: within a hundredfold of it",
-                  method_text(report.reference), report.reference.error)};
-  plot.x_label = fmt::format("relative error of the {}, not exceeded in 95 % of the environments",
-                             report.points.empty() ? "" : to_string(subject.quantity));
+      fmt::format("reference {}, its own error {:.1e} (line); hollow: within a tenfold of it",
+                  setting_text(report.reference.setting, report.reference.step),
+                  report.reference.error)};
+  plot.x_label =
+      fmt::format("relative error of the {}, not exceeded in 95 % of the environments",
+                  subject.quantity == AccuracyQuantity::tactile ? "tactile fields" : "state");
   plot.y_label = "CPU seconds per simulated second [1]";
   plot.floor = report.reference.error;
   plot.target = subject.target;

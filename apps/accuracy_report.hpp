@@ -34,6 +34,8 @@ std::string advice_text(const AccuracySubject& subject, const AccuracyReport& re
 Json accuracy_json(const AccuracySubject& subject, const AccuracyReport& report,
                    const Model& model);
 std::string accuracy_csv(const AccuracySubject& subject, const AccuracyReport& report);
+/// Whether a setting has both an error and a cost.
+bool can_draw(const AccuracyReport& report);
 std::string accuracy_svg(const AccuracySubject& subject, const AccuracyReport& report);
 
 }  // namespace tangere::apps

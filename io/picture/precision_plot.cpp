@@ -126,7 +126,8 @@ class Picture {
            "stroke=\"#888\" stroke-dasharray=\"5 4\"");
       out_ += text(x(plot_.target), top_ - 4, "target", kMiddle);
     }
-    if (plot_.floor > 0 && std::log10(plot_.floor) > x_.low) {
+    const double floor = std::log10(plot_.floor);  // NaN or infinite: no line
+    if (floor > x_.low && floor < x_.high) {
       line(x(plot_.floor), top_, x(plot_.floor), below, "stroke=\"#c33\"");
       out_ += text(x(plot_.floor), top_ - 4, "reference", kMiddle);
     }

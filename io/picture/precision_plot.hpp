@@ -21,7 +21,7 @@ struct PrecisionCurve {
 struct PrecisionPlot {
   std::string title, x_label, y_label;
   std::vector<std::string> captions;
-  double floor = 0;                    ///< error of the reference, a line; 0: none
+  double floor = 0;                    ///< error of the reference: a line, if on the axis
   double target = 0;                   ///< a dashed line; 0: none
   std::vector<PrecisionCurve> curves;  ///< at most six
   PrecisionDot marked;                 ///< a star; error 0: none

@@ -20,7 +20,7 @@ constexpr std::array kParts = {1, 2, 5, 10, 20, 50, 100};
 constexpr std::array kTolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
 constexpr int kPasses = 3;
 constexpr double kEnoughSeconds = 0.3;  // of CPU time, after which a pass is not repeated
-constexpr double kBlur = 100, kFineEnough = 40;
+constexpr double kBlur = 10, kFineEnough = 40;
 
 /// The value that `share` of the numbers do not exceed. NaN entries do not count.
 double quantile(std::vector<double> numbers, double share) {
@@ -52,6 +52,7 @@ class Sweep {
     if (!find_reference()) return stop();
     report_.resolved = report_.reference.error <= options_.target / 3;
     if (!report_.resolved) look_for_vibration();
+    if (report_.reference.environments == 0) return std::move(report_);  // the reference failed
     if (!measure_points()) return stop();
     choose();
     if (!measure_own() || !measure_tolerances()) return stop();
@@ -76,33 +77,42 @@ class Sweep {
       const AccuracyOutcome other = run_.compare(setting, listener_.go_on);
       if (other.stopped) return false;
       setting.integrator = Integrator::sdirk4;
-      const std::vector<double>& errors = other.error[0];
-      report_.reference = {
-          setting, episodes_.interval() / setting.parts, quantile(errors, 0.95),
-          static_cast<int>(std::count_if(errors.begin(), errors.end(),
-                                         [](double x) { return !std::isnan(x); }))};
-      if (report_.reference.environments == 0)
-        throw InputError(made.failures.empty()
-                             ? "no environment has anything to compare: every field stays zero"
-                             : "the reference failed: " +
-                                   status_of(made, episodes_.start.environments()));
+      describe_reference(setting, made, other);
+      if (report_.reference.environments == 0 && made.failures.empty())
+        throw InputError(options_.quantity == AccuracyQuantity::tactile
+                             ? "nothing to compare: every field stays zero in every environment"
+                             : "nothing to compare: no coordinate moves in any environment");
       if (listener_.reference) listener_.reference(report_.reference);
       const double error = report_.reference.error;
-      errors_of_environments_ = errors;
       if (error <= options_.target / kFineEnough || error > 0.5 * last) break;
       last = error;
     }
     return true;
   }
 
+  void describe_reference(const AccuracySetting& setting, const AccuracyOutcome& made,
+                          const AccuracyOutcome& other) {
+    errors_of_environments_ = other.error[0];
+    const auto compared =
+        std::ranges::count_if(errors_of_environments_, [](double x) { return !std::isnan(x); });
+    const AccuracyOutcome& worse = made.failures.size() >= other.failures.size() ? made : other;
+    const double error = quantile(errors_of_environments_, 0.95);
+    report_.reference = {setting,
+                         episodes_.interval() / setting.parts,
+                         std::isnan(error) ? HUGE_VAL : error,
+                         static_cast<int>(compared),
+                         static_cast<int>(worse.failures.size()),
+                         status_of(worse, episodes_.start.environments())};
+  }
+
   /// Looks where the reference is as wrong as in the middle of the environments.
   void look_for_vibration() {
-    if (episodes_.start.model().sensors().empty()) return;
+    if (episodes_.start.model().sensors().empty() || report_.reference.environments == 0) return;
     const double middle = quantile(errors_of_environments_, 0.5);
     const auto at = std::ranges::find(errors_of_environments_, middle);
     report_.vibration = strongest_vibration(
         episodes_, static_cast<int>(at - errors_of_environments_.begin()), Integrator::sdirk2,
-        episodes_.every * kReferenceParts[0], kReferenceTolerance);
+        episodes_.every * kReferenceParts[0], kReferenceTolerance, listener_.go_on);
   }
 
   [[nodiscard]] double tolerance_of(const AccuracySetting& setting) const {
@@ -113,21 +123,23 @@ class Sweep {
   /// Plays a setting up to kPasses times; the least times count. Returns false when stopped.
   bool measure(const AccuracySetting& setting, std::vector<AccuracyPoint>& points) {
     AccuracyOutcome best = run_.compare(setting, listener_.go_on);
+    if (best.stopped) return false;
     double spent = best.step_seconds;
-    for (int pass = 1; pass < kPasses && spent < kEnoughSeconds && !best.stopped; ++pass) {
+    bool stopped = false;  // what the first pass measured is kept
+    for (int pass = 1; pass < kPasses && spent < kEnoughSeconds && !stopped; ++pass) {
       const AccuracyOutcome again = run_.compare(setting, listener_.go_on);
-      best.stopped = again.stopped;
+      stopped = again.stopped;
+      if (stopped) break;
       spent += again.step_seconds;
       best.step_seconds = std::min(best.step_seconds, again.step_seconds);
       for (std::size_t p = 0; p < kPrecisions.size(); ++p)
         best.read_seconds[p] = std::min(best.read_seconds[p], again.read_seconds[p]);
     }
-    if (best.stopped) return false;
     // A state has one precision, whatever fields are read in.
     const std::size_t count = options_.quantity == AccuracyQuantity::state ? 1 : kPrecisions.size();
     for (std::size_t p = 0; p < count; ++p) points.push_back(point_of(setting, best, p));
     if (listener_.setting) listener_.setting(std::span(points).last(count));
-    return true;
+    return !stopped;
   }
 
   [[nodiscard]] AccuracyPoint point_of(const AccuracySetting& setting,
@@ -176,7 +188,7 @@ class Sweep {
   void choose() {
     for (std::size_t i = 0; i < report_.points.size(); ++i) {
       const AccuracyPoint& p = report_.points[i];
-      if (!(p.error <= options_.target)) continue;
+      if (!(p.error <= options_.target) || p.failed > report_.reference.failed) continue;
       if (report_.advice < 0 || p.rate > report_.points[as_size(report_.advice)].rate)
         report_.advice = static_cast<int>(i);
     }

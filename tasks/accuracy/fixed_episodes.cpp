@@ -16,8 +16,16 @@ namespace {
 
 using kernels::kBlock;
 
-/// Throws InputError when an episode ends before its first sample.
+/// Steps of an episode and timesteps between samples, at most: a reference takes some hundred steps
+/// for each.
+constexpr std::int64_t kMostSteps = 10'000'000, kMostEvery = 1'000'000;
+
+/// Throws InputError when an episode ends before its first sample, or has too many steps.
 FixedEpisodes with_room(const Batch& start, std::int64_t steps, int every) {
+  if (steps > kMostSteps || every > kMostEvery)
+    throw InputError("an episode of " + std::to_string(steps) + " steps, sampled every " +
+                     std::to_string(every) + "; expected at most " + std::to_string(kMostSteps) +
+                     " and " + std::to_string(kMostEvery));
   if (steps < every)
     throw InputError("an episode of " + std::to_string(steps) +
                      " steps; expected at least one sample, which takes " + std::to_string(every));
@@ -63,7 +71,9 @@ FixedEpisodes scene_episodes(const Batch& start, const ControlProgram& controls,
   return episodes;
 }
 
-FixedEpisodes task_episodes(const Batch& start, const Task& task, const Policy& policy, int every) {
+std::optional<FixedEpisodes> task_episodes(const Batch& start, const Task& task,
+                                           const Policy& policy, int every,
+                                           const std::function<bool()>& go_on) {
   const std::int64_t steps =
       task.spec().restarts ? task.spec().steps_per_action : TaskProgram::steps(task.spec());
   FixedEpisodes episodes = with_room(start, steps, every);
@@ -77,18 +87,20 @@ FixedEpisodes task_episodes(const Batch& start, const Task& task, const Policy& 
   std::fill(episodes.samples_of.begin(), episodes.samples_of.end(), 0);
   for (int b = 0; b < batch.blocks(); ++b) {
     program.start(batch, b);
-    episodes.start.restore_block(b, batch.save_block(b));
     const int first = b * kBlock, lanes = lanes_of(batch, b);
     const auto controls_begin = static_cast<std::ptrdiff_t>(as_size(first) * nu);
     for (std::int64_t t = 0; t < std::int64_t{episodes.samples} * every; ++t) {
+      if (go_on && !go_on()) return std::nullopt;
       program.controls(t, batch, b, u);
+      // Where every action restarts, the first one sets the state.
+      if (t == 0) episodes.start.restore_block(b, batch.save_block(b));
       std::copy_n(
           u.begin() + controls_begin, as_size(lanes) * nu,
           episodes.controls.begin() + t * static_cast<std::ptrdiff_t>(width) + controls_begin);
+      stepper.step_block(batch, b, u);
       for (int e = first; e < first + lanes; ++e)
         if (!batch.held(e) && !failed(batch.status(e)))
           episodes.samples_of[as_size(e)] = static_cast<int>((t + 1) / every);
-      stepper.step_block(batch, b, u);
       program.look(t, batch, b);
       if ((t + 1) % task.spec().steps_per_action == 0) program.judge(batch, b);
     }
@@ -97,11 +109,13 @@ FixedEpisodes task_episodes(const Batch& start, const Task& task, const Policy& 
 }
 
 int sample_interval(const Model& model) {
-  int every = 0;
-  for (const SensorInfo& sensor : model.sensors())
-    every = every == 0 || every == sensor.every ? sensor.every : -1;
-  if (every > 0 && every * model.timestep() > 0.01 - 1e-9) return every;
-  return std::max(1, static_cast<int>(std::lround(0.025 / model.timestep())));
+  const std::span<const SensorInfo> sensors = model.sensors();
+  const int every = sensors.empty() ? 0 : sensors.front().every;
+  const bool agree =
+      std::ranges::all_of(sensors, [&](const SensorInfo& s) { return s.every == every; });
+  if (agree && every > 0 && every * model.timestep() > 0.01 - 1e-9) return every;
+  return static_cast<int>(
+      std::clamp(std::round(0.025 / model.timestep()), 1.0, double(kMostEvery)));
 }
 
 }  // namespace tangere

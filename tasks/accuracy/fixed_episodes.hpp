@@ -3,6 +3,8 @@
 // and any step.
 #pragma once
 
+#include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -31,14 +33,17 @@ struct FixedEpisodes {
 };
 
 /// Episodes of a scene from the states of `start`. Throws InputError when the controls are too
-/// short or `steps` does not reach the first sample.
+/// short, `steps` does not reach the first sample, or there are too many of them.
 FixedEpisodes scene_episodes(const Batch& start, const ControlProgram& controls, std::int64_t steps,
                              int every);
 
 /// Episodes of a task from `start`, whose states are replaced. The controls are those that the
 /// policy asks for at the scene's own scheme and step. Of a task whose actions restart, an episode
-/// is the first action.
-FixedEpisodes task_episodes(const Batch& start, const Task& task, const Policy& policy, int every);
+/// is its opening, or its first action if it has none. `go_on` is called before every step; false
+/// stops, and nothing is returned. Throws like scene_episodes.
+std::optional<FixedEpisodes> task_episodes(const Batch& start, const Task& task,
+                                           const Policy& policy, int every,
+                                           const std::function<bool()>& go_on = {});
 
 /// Timesteps between samples: those between fields if all sensors agree and that is 10 ms or more,
 /// else as many as make about 25 ms.

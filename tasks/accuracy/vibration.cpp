@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Powers of single frequencies by Goertzel's recursion: some thousand steps need no fast transform.
+// Powers of single frequencies by Goertzel's recursion: for some thousand steps that is quick enough.
 #include "tasks/accuracy/vibration.hpp"
 
 #include <array>
@@ -13,11 +13,14 @@
 namespace tangere {
 namespace {
 
+constexpr std::ptrdiff_t kMostSteps =
+    8192;  // the last ones; all frequencies take steps² operations
+
 /// Net force on each sensor after each step, (sensors, 3, steps) [N].
 using Series = std::vector<std::array<std::vector<double>, 3>>;
 
 Series net_forces(const FixedEpisodes& episodes, int environment, const StepperOptions& options,
-                  int parts) {
+                  int parts, const std::function<bool()>& go_on) {
   const Model& model = episodes.start.model();
   Batch batch = episodes.start;
   for (int e = 0; e < batch.environments(); ++e) batch.hold(e, e != environment);
@@ -29,7 +32,7 @@ Series net_forces(const FixedEpisodes& episodes, int environment, const StepperO
     for (int part = 0; part < parts; ++part) {
       stepper.step_block(batch, environment / kernels::kBlock,
                          episodes.controls_of(k, parts, part));
-      if (failed(batch.status(environment))) return series;
+      if (failed(batch.status(environment)) || (go_on && !go_on())) return series;
       for (std::size_t s = 0; s < series.size(); ++s) {
         field.resize(3 * as_size(model.sensors()[s].points));
         readout.tactile(batch, environment, static_cast<int>(s), field);
@@ -45,26 +48,30 @@ Series net_forces(const FixedEpisodes& episodes, int environment, const StepperO
 
 /// |Σ x e^{-iωt}|² at `turns` swings over the series.
 double power(const std::vector<double>& x, int turns) {
-  const double angle = 2 * std::numbers::pi * turns / static_cast<double>(x.size());
   // Goertzel: s_t = x_t + 2 cos ω s_{t-1} - s_{t-2}
+  const double twice_cosine =
+      2 * std::cos(2 * std::numbers::pi * turns / static_cast<double>(x.size()));
   double last = 0, before = 0;
   for (const double value : x) {
-    const double now = value + 2 * std::cos(angle) * last - before;
+    const double now = value + twice_cosine * last - before;
     before = last;
     last = now;
   }
-  return last * last + before * before - 2 * std::cos(angle) * last * before;
+  return last * last + before * before - twice_cosine * last * before;
 }
 
 }  // namespace
 
 Vibration strongest_vibration(const FixedEpisodes& episodes, int environment, Integrator integrator,
-                              int parts, double tolerance) {
+                              int parts, double tolerance, const std::function<bool()>& go_on) {
   StepperOptions options;
   options.integrator = integrator;
   options.timestep = episodes.interval() / parts;
   options.tolerance = tolerance;
-  const Series series = net_forces(episodes, environment, options, parts);
+  Series series = net_forces(episodes, environment, options, parts, go_on);
+  for (auto& forces : series)
+    for (std::vector<double>& x : forces)
+      if (std::ssize(x) > kMostSteps) x.erase(x.begin(), x.end() - kMostSteps);
   Vibration strongest;
   double most = 0;
   for (std::size_t s = 0; s < series.size(); ++s) {

@@ -188,7 +188,8 @@ EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& contr
   };
   const std::size_t nu = as_size(model.nu()), nv = as_size(model.nv());
   const auto s = std::make_shared<Scratch>(
-      Scratch{Stepper(model), StepJacobians(model), BlockTape(model, model.integrator(), run.every),
+      Scratch{Stepper(model, for_gradients(model, {})), StepJacobians(model),
+              BlockTape(model, model.integrator(), run.every),
               std::vector<RowChain>(kBlock, RowChain(model.nv(), nu))});
   std::vector<double> held(nu * (2 * nv + nu));  // (nu, 2 nv + nu): controls are the action
   for (std::size_t k = 0; k < nu; ++k) held[k * (2 * nv + nu) + 2 * nv + k] = 1;

@@ -52,7 +52,7 @@ TEST(Accuracy, NamesTheCheapestSettingAndDrawsTheOthers) {
                     HasSubstr(",own,BDF2,0.005,")));
 }
 
-TEST(Accuracy, ComparesTheStateWhereThereIsNoSensorOrItIsAskedFor) {
+TEST(Accuracy, ComparesTheStateWhereItIsAskedFor) {
   const Folder folder;
   const json answer = run_json(folder, {"accuracy", kSmall, "--steps", "150", "--envs", "2",
                                         "--quantity", "state", "--tol", "1e-7"});
@@ -68,7 +68,9 @@ TEST(Accuracy, TakesATask) {
   const Outcome outcome = run(folder, {"accuracy", "insertion", "--envs", "2", "--quantity",
                                        "state", "--target", "0.2", "--json"});
   const json answer = json::parse(outcome.out);
+  EXPECT_THAT(outcome.exit_code, ::testing::AnyOf(0, 1));
   EXPECT_EQ(answer.at("scene"), "insertion");
+  for (const json& point : answer.at("points")) EXPECT_LE(point.at("step"), 5e-3);
   EXPECT_FALSE(answer.at("points").empty());
 }
 
@@ -78,7 +80,7 @@ TEST(Accuracy, SaysWhyNothingIsResolved) {
       run_json(folder, {"accuracy", scene("stable_grasp.xml"), "--steps", "60", "--envs", "2"}, 1);
   EXPECT_EQ(answer.at("advice").at("resolved"), false);
   EXPECT_THAT(answer.at("advice").at("text").get<std::string>(),
-              AllOf(HasSubstr("not resolved"), HasSubstr(" Hz")));
+              AllOf(HasSubstr("Not resolved"), HasSubstr(" Hz")));
   EXPECT_GT(answer.at("vibration").at("frequency"), 20);
 }
 
@@ -101,15 +103,19 @@ INSTANTIATE_TEST_SUITE_P(
                       std::pair{Words{"--steps", "5"}, "every field stays zero"},
                       std::pair{Words{"--svg", "a", "--csv", "a"}, "expected two files"},
                       std::pair{Words{"--policy", "hold"}, "--policy"},
+                      std::pair{Words{"--steps", "1000000000000"}, "1000000000000 steps"},
                       std::pair{Words{"--envs", "900000000"}, "--envs"}));
 
 TEST(Accuracy, StopsAndKeepsWhatThereIs) {
   const Folder folder;
   Program program(folder, {"accuracy", kSmall, "--envs", "48", "--svg", "cost.svg", "--json"}, {},
                   {"", "rows"});
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(5);
   while (!std::filesystem::exists(folder.path("rows")) ||
-         file_bytes(folder.path("rows")).find("BDF1 ") == std::string::npos)
+         file_bytes(folder.path("rows")).find("BDF1 ") == std::string::npos) {
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline) << "no row appeared";
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
   program.send(SIGINT);
   const Outcome outcome = program.wait();
   EXPECT_EQ(outcome.exit_code, 130);

@@ -52,13 +52,21 @@ TEST(PrecisionPlot, DecadesAreEquallyWide) {
 
 TEST(PrecisionPlot, SaysWhatIsDrawn) {
   PrecisionPlot plot = plot_of({{1e-1, 1e-3, false, "25"}});
-  plot.floor = 1e-2;
+  plot.floor = 2e-2;
   plot.target = 1e-2;
   plot.marked = {5e-2, 2e-3, false, ""};
   const std::string svg = render_precision_svg(plot);
-  for (const char* part :
-       {"t&lt;1&gt;", "error [1]", "cost [s]", ">25<", ">SDIRK2<", ">target<", ">0.01<", "star"})
+  for (const char* part : {"t&lt;1&gt;", "error [1]", "cost [s]", ">25<", ">SDIRK2<", ">target<",
+                           ">0.01<", ">reference<", "#f2c500"})
     EXPECT_THAT(svg, HasSubstr(part));
+}
+
+TEST(PrecisionPlot, DrawsNoLineBeyondTheAxes) {
+  PrecisionPlot plot = plot_of({{1e-1, 1e-3, false, ""}, {1e-2, 1e-2, false, ""}});
+  for (const double floor : {HUGE_VAL, 10.0, 1e-5, 0.0}) {
+    plot.floor = floor;
+    EXPECT_THAT(render_precision_svg(plot), ::testing::Not(HasSubstr("reference"))) << floor;
+  }
 }
 
 TEST(PrecisionPlot, LeavesOutWhatHasNoPlace) {

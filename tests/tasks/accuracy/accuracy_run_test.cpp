@@ -10,7 +10,7 @@
 
 #include "io/scene/scene_reader.hpp"
 #include "tasks/accuracy/accuracy_sweep.hpp"
-#include "tasks/catalogue/task_list.hpp"
+#include "tasks/run/episode_program.hpp"
 #include "tests/tasks/task_check.hpp"
 
 namespace tangere {
@@ -19,14 +19,15 @@ namespace {
 using ::testing::Each;
 using ::testing::Gt;
 
-const Model& small_ball() {
+const Model& pressed_ball() {
   static const Model model(read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball_small.xml").scene);
   return model;
 }
 
 FixedEpisodes ball_episodes(int environments, int steps = 60) {
-  const Batch start(small_ball(), environments, 3);
-  return scene_episodes(start, ControlProgram(small_ball(), small_ball().timestep(), 3), steps, 5);
+  const Batch start(pressed_ball(), environments, 3);
+  return scene_episodes(start, ControlProgram(pressed_ball(), pressed_ball().timestep(), 3), steps,
+                        5);
 }
 
 /// A pad of 25 g on a spring, 1 mm deep in a ball. It begins with 0.5 m/s.
@@ -76,15 +77,50 @@ TEST(FixedEpisodes, CutWhereNoControlChanges) {
 
 TEST(FixedEpisodes, AreLongEnoughForASample) { EXPECT_THROW(ball_episodes(2, 4), InputError); }
 
-/// A task's own step gives the states that the policy saw, so nothing differs from playing it.
+/// At the scene's own scheme and step the states are those of the policy's episodes, bit for bit.
 TEST(FixedEpisodes, OfATaskReplayItsControls) {
+  for (const char* name : {"box_pushing", "stable_grasp", "insertion"}) {
+    const auto task = testing::task_named(name);
+    const Policy policy(*task, PolicyKind::scripted);
+    const std::int64_t steps =
+        task->spec().restarts ? task->spec().steps_per_action : TaskProgram::steps(task->spec());
+    const std::optional<FixedEpisodes> episodes =
+        task_episodes(Batch(task->model(), 3, 1), *task, policy, 5);
+    ASSERT_TRUE(episodes);
+    Batch played(task->model(), 3, 1), again = episodes->start;
+    const auto data = std::make_shared<EnvironmentData>(*task, 3);
+    data->restart(played);
+    TaskProgram program(*task, policy, data, Precision::f64);
+    Stepper stepper(task->model());
+    std::vector<double> u(data->u.size()), q(std::size_t(task->model().nq())), q_again(q.size());
+    program.start(played, 0);
+    int compared = 0;
+    for (int t = 0; t < steps / 5 * 5; ++t) {
+      program.controls(t, played, 0, u);
+      stepper.step_block(played, 0, u);
+      program.look(t, played, 0);
+      if ((t + 1) % task->spec().steps_per_action == 0) program.judge(played, 0);
+      stepper.step_block(again, 0, episodes->controls_of(t / 5, 5, t % 5));
+      if ((t + 1) % 5 != 0) continue;
+      for (int e = 0; e < 3; ++e) {
+        if (t / 5 >= episodes->samples_of[std::size_t(e)]) continue;
+        played.get_q(e, q);
+        again.get_q(e, q_again);
+        EXPECT_EQ(q, q_again) << name << " environment " << e << " step " << t;
+        ++compared;
+      }
+    }
+    EXPECT_GT(compared, 20) << name;
+  }
+}
+
+TEST(FixedEpisodes, StopAndRefuseWhatIsTooLong) {
   const auto task = testing::task_named("box_pushing");
   const Policy policy(*task, PolicyKind::scripted);
-  const FixedEpisodes episodes = task_episodes(Batch(task->model(), 3, 1), *task, policy, 5);
-  EXPECT_THAT(episodes.samples_of, Each(Gt(10)));
-  double largest = 0;
-  for (const double u : episodes.controls) largest = std::max(largest, std::abs(u));
-  EXPECT_GT(largest, 0.1);
+  EXPECT_FALSE(task_episodes(Batch(task->model(), 1, 1), *task, policy, 5, [] { return false; }));
+  const Batch start(pressed_ball(), 1, 3);
+  const ControlProgram controls(pressed_ball(), pressed_ball().timestep(), 3);
+  EXPECT_THROW(scene_episodes(start, controls, 1'000'000'000'000, 5), InputError);
 }
 
 TEST(AccuracyRun, AReferenceIsAtNoDistanceFromItself) {
@@ -158,6 +194,8 @@ TEST(AccuracySweep, NamesTheFastestSettingThatIsAccurateEnough) {
   for (const AccuracyPoint& p : report.points) EXPECT_TRUE(p.error > 0.03 || p.rate <= best.rate);
   EXPECT_EQ(report.own.setting.integrator, Integrator::bdf2);
   EXPECT_DOUBLE_EQ(report.own.step, 5e-3);
+  for (const AccuracyPoint& p : report.points)
+    EXPECT_EQ(p.blurred, p.error < 10 * report.reference.error);
   EXPECT_THAT(report.tolerances, ::testing::SizeIs(16));
   // Looser tolerances take fewer evaluations.
   EXPECT_LT(report.tolerances.front().evaluations, report.tolerances.back().evaluations);
@@ -176,10 +214,10 @@ TEST(AccuracySweep, KeepsWhatThereIsWhenItIsStopped) {
 }
 
 TEST(AccuracySweep, SaysThatNothingTouches) {
-  const Batch start(small_ball(), 2, 3);
+  const Batch start(pressed_ball(), 2, 3);
   // The pad is above the ball for the first 25 ms.
   const FixedEpisodes episodes =
-      scene_episodes(start, ControlProgram(small_ball(), small_ball().timestep(), 3), 5, 5);
+      scene_episodes(start, ControlProgram(pressed_ball(), pressed_ball().timestep(), 3), 5, 5);
   try {
     accuracy_sweep(episodes, quick(), {});
     FAIL();
