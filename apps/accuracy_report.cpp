@@ -115,7 +115,7 @@ std::string advice_text(const AccuracySubject& subject, const AccuracyReport& re
                        report.stopped ? "Stopped: none of the settings so far" : "No setting",
                        percent(subject.target), own);
   const AccuracyPoint& best = report.points[static_cast<std::size_t>(report.advice)];
-  return fmt::format("For {} use {}, {} fields: {} at {:.4g} simulated seconds per CPU second.{}",
+  return fmt::format("{}For {} use {}, {} fields: {} at {:.4g} simulated seconds per CPU second.{}",
                      report.stopped ? "Stopped: of the settings so far: " : "",
                      percent(subject.target), setting_text(best.setting, best.step),
                      to_string(best.precision), percent(best.error), best.rate, own);

@@ -13,7 +13,7 @@
 namespace tangere {
 namespace {
 
-constexpr std::ptrdiff_t kMostSteps =
+constexpr std::ptrdiff_t kMostForces =
     8192;  // the last ones; all frequencies take steps² operations
 
 /// Net force on each sensor after each step, (sensors, 3, steps) [N].
@@ -71,7 +71,7 @@ Vibration strongest_vibration(const FixedEpisodes& episodes, int environment, In
   Series series = net_forces(episodes, environment, options, parts, go_on);
   for (auto& forces : series)
     for (std::vector<double>& x : forces)
-      if (std::ssize(x) > kMostSteps) x.erase(x.begin(), x.end() - kMostSteps);
+      if (std::ssize(x) > kMostForces) x.erase(x.begin(), x.end() - kMostForces);
   Vibration strongest;
   double most = 0;
   for (std::size_t s = 0; s < series.size(); ++s) {
