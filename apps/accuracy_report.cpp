@@ -16,7 +16,8 @@ namespace {
 constexpr double kNotable = 0.01;  // share of a force's energy that is worth a sentence
 
 std::string percent(double error) {
-  return std::isfinite(error) ? fmt::format("{:.2g} %", 100 * error) : std::string("-");
+  if (!std::isfinite(error)) return "-";
+  return error < 0.1 ? fmt::format("{:.2g} %", 100 * error) : fmt::format("{:.0f} %", 100 * error);
 }
 
 std::string setting_text(const AccuracySetting& setting, double step) {

@@ -412,8 +412,9 @@ Command add_simulate(CLI::App& program) {
   add_positive_number(app, "--timestep", o.timestep, "Step size in s [default: the scene's]");
   add_text(app, "--integrator", o.integrator, "NAME",
            fmt::format("{} [default: the scene's]", fmt::join(integrator_names(), ", ")));
-  add_positive_number(app, "--tol", o.tolerance,
-                      "Largest scaled residual of a step [default: the scene's]");
+  add_positive_number(
+      app, "--tol", o.tolerance,
+      "Largest scaled residual of a step [default: the scene's, or what follows scheme and step]");
   add_text(
       app, "--gradients", o.gradients, "LOSS",
       "Also write derivatives of a loss by controls, start and the scene's numbers: final, path, "
