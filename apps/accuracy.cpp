@@ -14,8 +14,8 @@
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
+#include "apps/text_output.hpp"
 #include "io/files/nearest_name.hpp"
-#include "io/files/part_file.hpp"
 #include "kernels/numbers/block.hpp"
 #include "kernels/table/isa.hpp"
 #include "tasks/run/episode_program.hpp"
@@ -51,35 +51,11 @@ AccuracyQuantity quantity_named(const std::string& name, const Model& model) {
 }
 
 void check_arguments(const AccuracyArguments& o) {
-  for (const std::string& output : {o.svg, o.csv})
-    for (const std::string& input : {o.scene, o.controls})
-      if (!output.empty() && !input.empty()) check_not_same_file(output, input);
-  if (!o.svg.empty() && o.svg == o.csv)
-    throw InputError(fmt::format("--svg and --csv are both '{}'; expected two files", o.svg));
+  check_outputs(o.svg, o.csv, {o.scene, o.controls});
   if (o.target.value_or(0.5) >= 1)
     throw InputError(
         fmt::format("--target {:g}; expected a share below 1: 0.01 is one percent", *o.target));
 }
-
-/// A file that is reserved before the first step and written at the end.
-class Output {
- public:
-  Output(const std::string& path, bool overwrite) {
-    if (!path.empty()) file_.emplace(path, overwrite);
-  }
-  [[nodiscard]] bool wanted() const { return file_.has_value(); }
-  template <class Text>
-  void write(const Console& console, const Text& text) {
-    if (!file_) return;
-    const std::string content = text();
-    file_->write(content);
-    file_->commit();
-    console.print(fmt::format("wrote {} ({} bytes)", file_->output(), content.size()));
-  }
-
- private:
-  std::optional<PartFile> file_;
-};
 
 /// Refuses states and controls that would not fit.
 void check_size(const AccuracyArguments& o, const Model& model, std::int64_t steps) {
@@ -95,13 +71,13 @@ using MakeEpisodes = std::function<std::optional<FixedEpisodes>(const AccuracyGo
 
 /// Ends with the report of a sweep.
 int report_sweep(const AccuracySubject& subject, const Console& console, const Model& model,
-                 const AccuracyReport& report, int signal, Output& svg, Output& csv) {
+                 const AccuracyReport& report, int signal, TextOutput& svg, TextOutput& csv) {
   console.print("\n" + advice_text(subject, report, model));
-  if (can_draw(report))
-    svg.write(console, [&] { return accuracy_svg(subject, report); });
+  if (svg.wanted() && can_draw(report))
+    svg.write(accuracy_svg(subject, report), console);
   else if (svg.wanted())
     console.note("no picture: no setting has both an error and a cost");
-  csv.write(console, [&] { return accuracy_csv(subject, report); });
+  if (csv.wanted()) csv.write(accuracy_csv(subject, report), console);
   int code = report.resolved && report.advice >= 0 ? kDone : kSomeFailed;
   if (report.stopped) code = signal == SIGINT ? kInterrupted : kTerminated;
   Json result = accuracy_json(subject, report, model);
@@ -119,7 +95,7 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const Model& m
   const int blocks = (environments_of(o) + kernels::kBlock - 1) / kernels::kBlock;
   options.threads = std::min(o.threads.value_or(processor_count()), blocks);
   const StopSignals signals;
-  Output svg(o.svg, o.overwrite), csv(o.csv, o.overwrite);
+  TextOutput svg(o.svg, o.overwrite), csv(o.csv, o.overwrite);
   AccuracyListener listener;
   listener.go_on = [&] { return signals.received() == 0; };
   const std::optional<FixedEpisodes> episodes = make(listener.go_on);
@@ -136,7 +112,9 @@ int run_sweep(const AccuracyArguments& o, const Console& console, const Model& m
                                 options.quantity,
                                 options.target};
   console.print(accuracy_heading(subject, *episodes));
-  listener.reference = [&](const AccuracyReference& r) { console.print(reference_row(r)); };
+  listener.reference = [&](const AccuracyReference& r) {
+    console.print(reference_row(r, environments_of(o)));
+  };
   bool head = false;
   listener.setting = [&](std::span<const AccuracyPoint> points) {
     if (!head) console.print(accuracy_head());

@@ -23,7 +23,7 @@ struct AccuracySubject {
 };
 
 std::string accuracy_heading(const AccuracySubject& subject, const FixedEpisodes& episodes);
-std::string reference_row(const AccuracyReference& reference);
+std::string reference_row(const AccuracyReference& reference, int environments);
 std::string accuracy_head();
 /// One setting, in every precision.
 std::string accuracy_row(std::span<const AccuracyPoint> points);

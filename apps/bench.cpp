@@ -14,9 +14,9 @@
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
+#include "apps/text_output.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/files/nearest_name.hpp"
-#include "io/files/part_file.hpp"
 #include "kernels/numbers/block.hpp"
 #include "kernels/table/isa.hpp"
 #include "tasks/run/benchmark_run.hpp"
@@ -47,13 +47,6 @@ FrameKind frames_named(const std::string& name) {
   throw InputError("unknown frames '" + name + "'" + suggestion(name, names));
 }
 
-void check_arguments(const BenchArguments& options) {
-  for (const std::string& output : {options.svg, options.csv})
-    if (!output.empty()) check_not_same_file(output, options.scene);
-  if (!options.svg.empty() && options.svg == options.csv)
-    throw InputError(fmt::format("--svg and --csv are both '{}'; expected two files", options.svg));
-}
-
 /// `of_benchmark`: memory of the benchmark besides the batch from which it starts [bytes].
 void check_size(const Model& model, int environments, double of_benchmark) {
   const double start = static_cast<double>(model.state_bytes_per_environment()) * environments;
@@ -69,31 +62,6 @@ void note_idle_threads(const Console& console, int environments, int most_thread
     console.note(fmt::format("{} threads share {} processor{}", most_threads, processor_count(),
                              processor_count() == 1 ? "" : "s"));
 }
-
-/// The requested files. They are reserved before the first step; at the end they are complete or
-/// absent.
-class Outputs {
- public:
-  explicit Outputs(const BenchArguments& options) {
-    if (!options.svg.empty()) svg_.emplace(options.svg, options.overwrite);
-    if (!options.csv.empty()) csv_.emplace(options.csv, options.overwrite);
-  }
-
-  void write(const BenchSetting& setting, const std::vector<BenchRun>& runs, const Json& entries,
-             const Console& console) {
-    if (svg_) write(*svg_, bench_svg(setting, runs), console);
-    if (csv_) write(*csv_, bench_csv(setting, entries), console);
-  }
-
- private:
-  static void write(PartFile& file, const std::string& text, const Console& console) {
-    file.write(text);
-    file.commit();
-    console.print(fmt::format("wrote {} ({} bytes)", file.output(), text.size()));
-  }
-
-  std::optional<PartFile> svg_, csv_;
-};
 
 void tell_passes(const Console& console, const BenchRun& run) {
   for (const BenchmarkTime& time : run.result.times)
@@ -143,7 +111,7 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
             const std::vector<int>& threads, const Model& model, const Json& of_task,
             const Run& run) {
   const StopSignals signals;
-  Outputs outputs(options);
+  TextOutput svg(options.svg, options.overwrite), csv(options.csv, options.overwrite);
   console.print(bench_heading(setting));
   std::vector<BenchRun> runs;
   Json entries = Json::array();
@@ -159,7 +127,8 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
   }
   console.print(bench_footing(runs.front()));
   list_failures(console, "environment", failures_of(runs.front()), "--json names all");
-  outputs.write(setting, runs, entries, console);
+  if (svg.wanted()) svg.write(bench_svg(setting, runs), console);
+  if (csv.wanted()) csv.write(bench_csv(setting, entries), console);
   return report(options, console, setting, model, of_task, entries);
 }
 
@@ -200,7 +169,7 @@ int bench_task(const BenchArguments& options, const Console& console, const Task
 }
 
 int bench(const BenchArguments& options, const Console& console) {
-  check_arguments(options);
+  check_outputs(options.svg, options.csv, {options.scene});
   // Reports a wrong word before a scene is read.
   frames_named(options.frames);
   precision_named(options.precision);

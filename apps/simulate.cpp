@@ -176,6 +176,11 @@ struct Start {
                       "from that state",
                       saved->path, saved->integrator, saved->timestep,
                       to_string(stepper.integrator()), stepper.timestep()));
+    else if (saved->tolerance != stepper.tolerance())
+      console.note(
+          fmt::format("{} was solved to {:g}, this run is solved to {:g}: it goes on, but not with "
+                      "the bits of one long run; --tol sets the tolerance",
+                      saved->path, saved->tolerance, stepper.tolerance()));
     else if (saved->row == 0 && saved->step > 0)
       console.note(
           fmt::format("row 0 of {} has no row before it: a scheme of two steps starts anew there",

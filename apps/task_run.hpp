@@ -14,8 +14,8 @@
 namespace tangere::apps {
 
 /// Returns the task that `word` names, on its own scene; null if it names a file. Throws InputError
-/// with the nearest task for a plain word that is neither. `tolerance`: of its steps, where the scene
-/// names none.
+/// with the nearest task for a plain word that is neither. `tolerance`: of its steps, where the
+/// scene names none.
 std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
                                 std::optional<double> tolerance = std::nullopt);
 

@@ -55,7 +55,7 @@ const Scheme kBdf1 = runge_kutta("BDF1", 1, {{1}});
 
 const Scheme kSdirk2 = runge_kutta("SDIRK2", 2, {{kGamma}, {1 - kGamma, kGamma}});
 
-// Alexander 1977: the root of g³ - 3g² + 3g/2 - 1/6 that makes three stages L-stable and of order 3.
+// Alexander 1977: the root of g³ - 3g² + 3g/2 - 1/6 that makes three stages L-stable, of order 3.
 const double kThird = 0.43586652150845899942;
 const Scheme kSdirk3 = runge_kutta("SDIRK3", 3,
                                    {{kThird},

@@ -17,8 +17,8 @@ namespace {
 
 using svg::text;
 
-constexpr double kWidth = 760, kPlotHeight = 380, kLeft = 84, kRight = 150, kHead = 34, kLine = 17;
-constexpr double kBottom = 84, kMargin = 24;
+constexpr double kWidth = 760, kPlotHeight = 380, kLeft = 84, kRight = 150;
+constexpr double kBottom = 84;
 constexpr std::array kColours = {"#1e708e", "#c8553d", "#5b8c3e", "#7a5195", "#b8860b", "#555555"};
 constexpr const char* kMiddle = "text-anchor=\"middle\" font-size=\"11\"";
 constexpr const char* kEnd = "text-anchor=\"end\" font-size=\"11\"";
@@ -57,20 +57,12 @@ class Picture {
     if (plot.target > 0) x_.cover(plot.target);
     x_.round();
     y_.round();
-    top_ = kHead + kLine * static_cast<double>(plot.captions.size()) + 16;
+    top_ = svg::kHead + svg::kLine * static_cast<double>(plot.captions.size()) + 16;
   }
 
   std::string draw() {
     const double tall = top_ + kPlotHeight + kBottom;
-    out_ = fmt::format(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
-        "viewBox=\"0 0 {0:.0f} {1:.0f}\" font-family=\"Helvetica, Arial, sans-serif\" "
-        "font-size=\"12\" fill=\"#222\">\n<rect width=\"100%\" height=\"100%\" "
-        "fill=\"#ffffff\"/>\n",
-        kWidth, tall);
-    out_ += text(kMargin, kHead - 6, plot_.title, "font-size=\"16\" font-weight=\"bold\"");
-    for (std::size_t k = 0; k < plot_.captions.size(); ++k)
-      out_ += text(kMargin, kHead + kLine * (static_cast<double>(k) + 0.7), plot_.captions[k]);
+    out_ = svg::begin(kWidth, tall) + svg::heading(plot_.title, plot_.captions);
     axes();
     verticals();
     for (std::size_t k = 0; k < plot_.curves.size(); ++k)

@@ -16,8 +16,8 @@ namespace {
 
 using svg::text;
 
-constexpr double kWidth = 640, kPlotHeight = 320, kLeft = 88, kRight = 28, kHead = 34, kLine = 17;
-constexpr double kBottom = 78, kMargin = 24;
+constexpr double kWidth = 640, kPlotHeight = 320, kLeft = 88, kRight = 28;
+constexpr double kBottom = 78;
 constexpr double kLabelWidth = 26;  // labels of threads closer than this would touch
 constexpr const char* kEnd = "text-anchor=\"end\" font-size=\"11\"";
 constexpr const char* kMiddle = "text-anchor=\"middle\" font-size=\"11\"";
@@ -39,20 +39,12 @@ class Picture {
     highest_ = slope_ * most_threads_;
     for (const ScalingPoint& p : points_) highest_ = std::max(highest_, p.best);
     highest_ *= 1.06;  // so that the frame does not cut the highest dot
-    top_ = kHead + kLine * static_cast<double>(curve.captions.size()) + 12;
+    top_ = svg::kHead + svg::kLine * static_cast<double>(curve.captions.size()) + 12;
   }
 
   std::string draw() {
     const double tall = top_ + kPlotHeight + kBottom;
-    out_ = fmt::format(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
-        "viewBox=\"0 0 {0:.0f} {1:.0f}\" font-family=\"Helvetica, Arial, sans-serif\" "
-        "font-size=\"12\" fill=\"#222\">\n<rect width=\"100%\" height=\"100%\" "
-        "fill=\"#ffffff\"/>\n",
-        kWidth, tall);
-    out_ += text(kMargin, kHead - 6, curve_.title, "font-size=\"16\" font-weight=\"bold\"");
-    for (std::size_t k = 0; k < curve_.captions.size(); ++k)
-      out_ += text(kMargin, kHead + kLine * (static_cast<double>(k) + 0.7), curve_.captions[k]);
+    out_ = svg::begin(kWidth, tall) + svg::heading(curve_.title, curve_.captions);
     axes();
     curves();
     marks();

@@ -17,8 +17,7 @@ namespace {
 
 using svg::text;
 
-constexpr double kWidth = 720, kPanel = 190, kLeft = 88, kRight = 24, kHead = 34, kLine = 17,
-                 kMargin = 24;
+constexpr double kWidth = 720, kPanel = 190, kLeft = 88, kRight = 24;
 constexpr double kAbove = 46,
                  kBelow = 50;    // in a panel: space for title and curve names; for the x axis
 constexpr double kLetter = 6.2;  // mean width at 11 px
@@ -149,17 +148,9 @@ class Panel {
 
 std::string render_curves_svg(const std::string& title, std::span<const std::string> captions,
                               std::span<const CurvePanel> panels) {
-  const double head = kHead + kLine * static_cast<double>(captions.size()) + 8;
+  const double head = svg::kHead + svg::kLine * static_cast<double>(captions.size()) + 8;
   const double tall = head + (kAbove + kPanel + kBelow) * static_cast<double>(panels.size());
-  std::string out = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 "
-      "0 {0:.0f} {1:.0f}\" "
-      "font-family=\"Helvetica, Arial, sans-serif\" font-size=\"12\" fill=\"#222\">\n"
-      "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
-      kWidth, tall);
-  out += text(kMargin, kHead - 6, title, "font-size=\"16\" font-weight=\"bold\"");
-  for (std::size_t k = 0; k < captions.size(); ++k)
-    out += text(kMargin, kHead + kLine * (static_cast<double>(k) + 0.7), captions[k]);
+  std::string out = svg::begin(kWidth, tall) + svg::heading(title, captions);
   for (std::size_t k = 0; k < panels.size(); ++k)
     out += Panel(panels[k], head + kAbove + static_cast<double>(k) * (kAbove + kPanel + kBelow))
                .draw();

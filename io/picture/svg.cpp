@@ -27,6 +27,22 @@ std::string text(double x, double y, const std::string& content, const char* ext
                      escape(content));
 }
 
+std::string begin(double width, double height) {
+  return fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
+      "viewBox=\"0 0 {0:.0f} {1:.0f}\" font-family=\"Helvetica, Arial, sans-serif\" "
+      "font-size=\"12\" fill=\"#222\">\n<rect width=\"100%\" height=\"100%\" "
+      "fill=\"#ffffff\"/>\n",
+      width, height);
+}
+
+std::string heading(const std::string& title, std::span<const std::string> captions) {
+  std::string out = text(kMargin, kHead - 6, title, "font-size=\"16\" font-weight=\"bold\"");
+  for (std::size_t k = 0; k < captions.size(); ++k)
+    out += text(kMargin, kHead + kLine * (static_cast<double>(k) + 0.7), captions[k]);
+  return out;
+}
+
 double round_down(double x) {
   const double base = std::pow(10, std::floor(std::log10(x)));
   return x >= 5 * base ? 5 * base : x >= 2 * base ? 2 * base : base;

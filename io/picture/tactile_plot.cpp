@@ -123,12 +123,7 @@ class Picture {
   std::string draw() {
     const double total = kLeft + double(panels_.size()) * (width_ + kGap) + kBar;
     const double tall = kTop + height_ + kBottom;
-    out_ = fmt::format(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
-        "viewBox=\"0 0 {0:.0f} {1:.0f}\" "
-        "font-family=\"Helvetica, Arial, sans-serif\" font-size=\"12\" fill=\"#222\">\n"
-        "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
-        total, tall);
+    out_ = svg::begin(total, tall);
     out_ += text(
         kLeft, 28,
         fmt::format("{}: sensor '{}', environment {}", file_.scene_name(), s_.name, environment_),

@@ -20,6 +20,7 @@ struct SavedState {
   std::uint64_t seed = 0;
   std::int64_t first_episode = 0;
   double timestep = 0;  ///< [s]
+  double tolerance = 0;
   std::string integrator, scene_text;
   std::vector<std::string> q_names;            ///< (nq)
   std::vector<std::string> v_names;            ///< (nv)

@@ -32,7 +32,8 @@ inline constexpr std::array kPrecisions = {Precision::f64, Precision::mixed};
 
 /// What a setting costs and how far it is off. An environment that failed has an infinite error.
 struct AccuracyOutcome {
-  /// (precisions, E) ‖x - x_ref‖/‖x_ref‖ over samples; NaN where the reference is zero throughout, or failed.
+  /// (precisions, E) ‖x - x_ref‖/‖x_ref‖ over samples; NaN where the reference is zero throughout,
+  /// or failed.
   std::array<std::vector<double>, kPrecisions.size()> error;
   double step_seconds = 0;                                ///< CPU time of all steps
   std::array<double, kPrecisions.size()> read_seconds{};  ///< CPU time of reading fields

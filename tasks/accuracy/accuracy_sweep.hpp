@@ -31,7 +31,7 @@ struct AccuracyPoint {
   double evaluations = 0;  ///< of the residual, per step
   double split = 0;        ///< share of steps
   double rate = 0;         ///< simulated seconds per CPU second, over all environments
-  bool blurred = false;    ///< error within a tenfold of the reference's own
+  bool blurred = false;    ///< error at most ten times the reference's own
   int failed = 0;          ///< environments
   std::string status;      ///< "ok", or why environments failed
 };

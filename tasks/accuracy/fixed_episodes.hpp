@@ -38,7 +38,7 @@ FixedEpisodes scene_episodes(const Batch& start, const ControlProgram& controls,
                              int every);
 
 /// Episodes of a task from `start`, whose states are replaced. The controls are those that the
-/// policy asks for at the scene's own scheme and step. Of a task whose actions restart, an episode
+/// policy asks for at the scene's own scheme and step. For a task whose actions restart, an episode
 /// is its opening, or its first action if it has none. `go_on` is called before every step; false
 /// stops, and nothing is returned. Throws like scene_episodes.
 std::optional<FixedEpisodes> task_episodes(const Batch& start, const Task& task,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Powers of single frequencies by Goertzel's recursion: for some thousand steps that is quick enough.
+// Finds the power at single frequencies by Goertzel's recursion, which is quick enough for some
+// thousand steps.
 #include "tasks/accuracy/vibration.hpp"
 
 #include <array>

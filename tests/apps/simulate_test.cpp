@@ -238,6 +238,17 @@ TEST(Simulate, RunsWithGradientsAreSolvedTighter) {
             1e-6);
 }
 
+TEST(Simulate, ARunThatGoesOnWithAnotherToleranceIsTold) {
+  const Folder folder;
+  simulate(folder, kSmall, {"--steps", "5", "--tol", "1e-6"});
+  const Words onward{"simulate", kSmall, "--state-from", "out.h5", "--steps", "5", "-o", "on.h5"};
+  const Outcome other = run(folder, onward);
+  EXPECT_EQ(other.exit_code, 0);
+  EXPECT_THAT(other.err, HasSubstr("out.h5 was solved to 1e-06"));
+  const Outcome same = run(folder, onward + Words{"--tol", "1e-6", "--overwrite"});
+  EXPECT_EQ(same.err.find("was solved to"), std::string::npos) << same.err;
+}
+
 TEST(Simulate, SolverOptionsReachTheStepper) {
   const Folder folder;
   const json answer =

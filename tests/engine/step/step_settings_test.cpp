@@ -27,7 +27,7 @@ TEST(StepTolerance, FollowsSchemeAndStep) {
   EXPECT_EQ(at(Integrator::sdirk2, 1e-6), 1e-9) << "no tighter";
 }
 
-TEST(StepTolerance, MeansTheSameOnAnyScale) {
+TEST(StepTolerance, MeansTheSameUnderAnyGravity) {
   Scene small = testing::rolling_ball(false, 4), slow = small;
   for (double& g : slow.gravity) g /= 100;  // falls take ten times as long
   const double h = 2e-3;
