@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "io/picture/precision_plot.hpp"
@@ -21,6 +22,9 @@ std::string percent(double error) {
 }
 
 std::string setting_text(const AccuracySetting& setting, double step) {
+  if (setting.accuracy > 0)
+    return fmt::format("{}, accuracy {:g} in steps of {:g} ms", to_string(setting.integrator),
+                       setting.accuracy, 1e3 * step);
   return fmt::format("{}, {:g} ms, tol {:.0e}", to_string(setting.integrator), 1e3 * step,
                      setting.tolerance);
 }
@@ -30,6 +34,7 @@ Json point_json(const AccuracyPoint& p) {
           {"step", p.step},
           {"precision", to_string(p.precision)},
           {"tolerance", p.setting.tolerance},
+          {"accuracy", p.setting.accuracy},
           {"error", finite(p.error)},
           {"median_error", finite(p.median)},
           {"simulated_seconds_per_cpu_second", finite(p.rate)},
@@ -68,6 +73,18 @@ std::string unresolved_text(const AccuracySubject& subject, const AccuracyReport
   return text;
 }
 
+/// Adds a curve of the points whose settings belong to it: labelled by step in ms, or by accuracy.
+void add_curve(PrecisionPlot& plot, const AccuracyReport& report, const std::string& name,
+               const std::function<bool(const AccuracySetting&)>& belongs) {
+  PrecisionCurve curve{name, {}};
+  for (const AccuracyPoint& p : report.points) {
+    if (p.precision != Precision::f64 || !belongs(p.setting)) continue;
+    const double label = p.setting.accuracy > 0 ? p.setting.accuracy : 1e3 * p.step;
+    curve.points.push_back({p.error, 1 / p.rate, p.blurred, fmt::format("{:g}", label)});
+  }
+  if (!curve.points.empty()) plot.curves.push_back(std::move(curve));
+}
+
 }  // namespace
 
 std::string accuracy_heading(const AccuracySubject& subject, const FixedEpisodes& episodes) {
@@ -90,16 +107,18 @@ std::string reference_row(const AccuracyReference& reference, int environments) 
 }
 
 std::string accuracy_head() {
-  return fmt::format("\n{:<10} {:>9} {:>8} {:>10} {:>10} {:>11}   simulated seconds per CPU second",
-                     "scheme", "step [ms]", "tol", "error", "median", "evaluations");
+  return fmt::format(
+      "\n{:<10} {:>9} {:>8} {:>8} {:>10} {:>10} {:>11}   simulated seconds per CPU second",
+      "scheme", "step [ms]", "accuracy", "tol", "error", "median", "evaluations");
 }
 
 std::string accuracy_row(std::span<const AccuracyPoint> points) {
   const AccuracyPoint& p = points.front();
-  std::string row =
-      fmt::format("{:<10} {:>9.4g} {:>8.0e} {:>9}{} {:>10} {:>11.2f}   ",
-                  to_string(p.setting.integrator), 1e3 * p.step, p.setting.tolerance,
-                  percent(p.error), p.blurred ? "~" : " ", percent(p.median), p.evaluations);
+  std::string row = fmt::format(
+      "{:<10} {:>9.4g} {:>8} {:>8.0e} {:>9}{} {:>10} {:>11.2f}   ", to_string(p.setting.integrator),
+      1e3 * p.step, p.setting.accuracy > 0 ? fmt::format("{:g}", p.setting.accuracy) : "-",
+      p.setting.tolerance, percent(p.error), p.blurred ? "~" : " ", percent(p.median),
+      p.evaluations);
   for (const AccuracyPoint& q : points)
     row += fmt::format("{:.4g}{}", q.rate,
                        points.size() == 1 ? "" : fmt::format(" {}  ", to_string(q.precision)));
@@ -166,14 +185,15 @@ std::string accuracy_csv(const AccuracySubject& subject, const AccuracyReport& r
   for (const char c : subject.name) name += c == '"' ? std::string("\"\"") : std::string(1, c);
   name += '"';
   std::string text =
-      "scene,quantity,sweep,scheme,step,precision,tolerance,error,median_error,"
+      "scene,quantity,sweep,scheme,step,precision,tolerance,accuracy,error,median_error,"
       "simulated_seconds_per_cpu_second,evaluations_per_step,split_share,blurred,failed\n";
   const auto rows = [&](const char* sweep, const std::vector<AccuracyPoint>& points) {
     for (const AccuracyPoint& p : points)
-      text += fmt::format("{},{},{},{},{:.9g},{},{:g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{}\n",
-                          name, to_string(subject.quantity), sweep, to_string(p.setting.integrator),
-                          p.step, to_string(p.precision), p.setting.tolerance, p.error, p.median,
-                          p.rate, p.evaluations, p.split, p.blurred, p.failed);
+      text += fmt::format(
+          "{},{},{},{},{:.9g},{},{:g},{:g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:d},{}\n", name,
+          to_string(subject.quantity), sweep, to_string(p.setting.integrator), p.step,
+          to_string(p.precision), p.setting.tolerance, p.setting.accuracy, p.error, p.median,
+          p.rate, p.evaluations, p.split, p.blurred, p.failed);
   };
   rows("step", report.points);
   rows("tolerance", report.tolerances);
@@ -202,13 +222,11 @@ std::string accuracy_svg(const AccuracySubject& subject, const AccuracyReport& r
   plot.y_label = "CPU seconds per simulated second [1]";
   plot.floor = report.reference.error;
   plot.target = subject.target;
-  for (const Integrator integrator : integrators()) {
-    PrecisionCurve curve{to_string(integrator), {}};
-    for (const AccuracyPoint& p : report.points)
-      if (p.setting.integrator == integrator && p.precision == Precision::f64)
-        curve.points.push_back({p.error, 1 / p.rate, p.blurred, fmt::format("{:g}", 1e3 * p.step)});
-    if (!curve.points.empty()) plot.curves.push_back(std::move(curve));
-  }
+  for (const Integrator integrator : integrators())
+    add_curve(plot, report, to_string(integrator), [&](const AccuracySetting& s) {
+      return s.accuracy == 0 && s.integrator == integrator;
+    });
+  add_curve(plot, report, "cut steps", [](const AccuracySetting& s) { return s.accuracy > 0; });
   if (report.own.rate > 0)
     plot.marked = {report.own.error, 1 / report.own.rate, false, "the scene's"};
   return render_precision_svg(plot);

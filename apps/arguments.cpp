@@ -217,4 +217,10 @@ void check_not_same_file(const std::string& output, const std::string& input) {
         fmt::format("the output '{}' is the input '{}'; expected another file", output, input));
 }
 
+void add_accuracy_option(CLI::App& app, std::optional<double>& accuracy) {
+  add_positive_number(app, "--accuracy", accuracy,
+                      "Cut steps into parts that keep this relative accuracy, such as 0.01 "
+                      "[default: the scene's, or steps are not cut]");
+}
+
 }  // namespace tangere::apps

@@ -100,4 +100,7 @@ void add_console_options(CLI::App& command, Console& console);
 /// Throws InputError if writing `output` would replace `input`, even with --overwrite.
 void check_not_same_file(const std::string& output, const std::string& input);
 
+/// Adds --accuracy, which every command that plays a scene or a task has.
+void add_accuracy_option(CLI::App& app, std::optional<double>& accuracy);
+
 }  // namespace tangere::apps

@@ -33,6 +33,7 @@ struct BenchArguments {
   std::optional<std::int64_t> steps;
   std::optional<int> environments, every, repeat;
   std::optional<std::uint64_t> seed;
+  std::optional<double> accuracy;
   bool overwrite = false, allow_unknown = false;
 };
 
@@ -81,6 +82,7 @@ int report(const BenchArguments& options, const Console& console, const BenchSet
               {"timestep", model.timestep()},
               {"integrator", to_string(model.integrator())},
               {"tolerance", Stepper(model).tolerance()},
+              {"accuracy", Stepper(model).accuracy()},
               {"svg", options.svg.empty() ? Json() : Json(options.svg)},
               {"csv", options.csv.empty() ? Json() : Json(options.csv)},
               {"runs", entries}};
@@ -173,10 +175,11 @@ int bench(const BenchArguments& options, const Console& console) {
   // Reports a wrong word before a scene is read.
   frames_named(options.frames);
   precision_named(options.precision);
-  if (const std::unique_ptr<Task> task = find_task(options.scene, console))
+  const SolverOptions asked{.accuracy = options.accuracy};
+  if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return bench_task(options, console, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
-  const Model model(read_scene_for(options.scene, options.allow_unknown, console));
+  const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
   const std::uint64_t seed = options.seed.value_or(0);
   const ControlProgram controls(model, model.timestep(), seed);
   if (!model.scene().control && model.nu() > 0)
@@ -228,6 +231,7 @@ Command add_bench(CLI::App& program) {
                         "Timed passes over the episode; the best counts [default: 3]");
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between environments [default: 0]");
+  add_accuracy_option(app, o.accuracy);
   add_text(app, "--svg", o.svg, "F.svg", "Write a picture of speed against threads");
   add_text(app, "--csv", o.csv, "F.csv", "Write a table of all figures");
   add_flag(app, "--overwrite", o.overwrite, "Replace the outputs if they exist");

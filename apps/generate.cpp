@@ -186,10 +186,11 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
   console.print(fmt::format(
       "episodes: {}, rows: {}, time: {:.2f} s, {:.0f} env-steps/s with output, "
       "threads: {}\nlimited by {}: simulation {:.2f} s and {} {:.2f} s of all threads, writing "
-      "{:.2f} s of one\n{}\nsteps split: {}, episodes failed: {}\n{}wrote {}: {} ({} bytes){}",
+      "{:.2f} s of one\n{}\n{}, episodes failed: {}\n{}wrote {}: {} ({} bytes){}",
       summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, job),
       summary.simulation_seconds, preparation_of(job), summary.encoding_seconds,
-      summary.writing_seconds, done.task.line, summary.split_steps, summary.failures.size(), kept,
+      summary.writing_seconds, done.task.line,
+      split_text(summary.split_steps, summary.coarse_steps), summary.failures.size(), kept,
       options.output, shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()),
       bytes, merged.line));
   Json result{{"command", "generate"},
@@ -208,6 +209,7 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"timestep", job.layout.timestep},
               {"integrator", job.layout.integrator},
               {"tolerance", job.layout.tolerance},
+              {"accuracy", job.layout.accuracy},
               {"precision", options.precision},
               {"instruction_set", kernels::active_isa_name()},
               {"threads", run.threads},
@@ -224,6 +226,7 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"environment_steps_per_second", rate},
               {"newton_iterations", summary.newton_iterations},
               {"split_steps", summary.split_steps},
+              {"coarse_steps", summary.coarse_steps},
               {"failed", failures_json("episode", failures_of(summary))}};
   result.update(done.task.keys);
   result.update(merged.keys);
@@ -345,14 +348,12 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
     options.shards = shard.count;
   }
   // The same for the episodes and their gradients, which play them again.
-  std::optional<double> tolerance;
-  if (options.gradients != "none") tolerance = kGradientTolerance;
-  if (const std::unique_ptr<Task> task = find_task(options.scene, console, tolerance))
+  SolverOptions asked{.accuracy = options.accuracy};
+  if (options.gradients != "none") asked.tolerance = kGradientTolerance;
+  if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return generate_task(options, console, info, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
-  Scene scene = read_scene_for(options.scene, options.allow_unknown, console);
-  if (!scene.solver.tolerance) scene.solver.tolerance = tolerance;
-  const Model model(scene);
+  const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
   const Stepper stepper(model);
   const ControlProgram controls =
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
@@ -414,6 +415,7 @@ Command add_generate(CLI::App& program) {
            "Precision of tactile fields: double, or mixed, which stores float32 [default: mixed]");
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between episodes [default: 0]");
+  add_accuracy_option(app, o.accuracy);
   add_text(
       app, "--compress", o.compress, "NAME",
       "Compression of large observations: none, deflate, or lz4, which needs a plug-in to read "

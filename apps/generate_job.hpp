@@ -24,7 +24,7 @@ struct GenerateOptions {
   std::optional<std::int64_t> episodes, steps, shards;
   std::optional<int> every, threads;
   std::optional<std::uint64_t> seed;
-  std::optional<double> tape_memory;
+  std::optional<double> accuracy, tape_memory;
   bool overwrite = false, resume = false, dry_run = false, no_merge = false, allow_unknown = false;
 };
 

@@ -36,8 +36,21 @@ LossKind loss_named(const std::string& name) {
   throw InputError("unknown loss '" + name + "'" + suggestion(name, names));
 }
 
-Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console) {
+std::string split_text(std::int64_t split, std::int64_t coarse) {
+  std::string text = fmt::format("steps split: {}", split);
+  if (coarse > 0) text += fmt::format(", less accurate than asked: {}", coarse);
+  return text;
+}
+
+void ask_of_solver(SolverOptions& of_scene, const SolverOptions& asked) {
+  if (asked.accuracy) of_scene.accuracy = asked.accuracy;
+  if (!of_scene.tolerance) of_scene.tolerance = asked.tolerance;
+}
+
+Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,
+                     const SolverOptions& asked) {
   SceneFile file = read_scene(path, {allow_unknown});
+  ask_of_solver(file.scene.solver, asked);
   for (const std::string& warning : file.warnings) console.note("warning: " + warning);
   return std::move(file.scene);
 }

@@ -27,8 +27,16 @@ Precision precision_named(const std::string& name);
 /// Throws InputError for an unknown loss.
 LossKind loss_named(const std::string& name);
 
-/// Reads a scene; its warnings go to the console.
-Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console);
+/// Says how many steps were split, and how many missed the accuracy if any did.
+std::string split_text(std::int64_t split, std::int64_t coarse);
+
+/// Reads a scene; its warnings go to the console. `asked`: as in ask_of_solver().
+Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,
+                     const SolverOptions& asked = {});
+
+/// What the command line asks of the solver: an accuracy in place of the scene's, a tolerance where
+/// the scene names none.
+void ask_of_solver(SolverOptions& of_scene, const SolverOptions& asked);
 
 /// The controls of the table at `path`, or the scene's own if `path` is empty.
 ControlProgram make_controls(const std::string& path, std::uint64_t seed, const Model& model,

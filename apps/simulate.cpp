@@ -33,7 +33,7 @@ struct SimulateArguments {
                                                            gradients;
   std::optional<std::int64_t> steps, row;
   std::optional<int> environments, every;
-  std::optional<double> timestep, tolerance, tape_memory;
+  std::optional<double> timestep, tolerance, accuracy, tape_memory;
   std::optional<std::uint64_t> seed;
   bool point_gradients = false, overwrite = false, allow_unknown = false;
 };
@@ -110,12 +110,13 @@ int report(const SimulateArguments& options, const Console& console, const Batch
   const double per_step = static_cast<double>(summary.newton_iterations) /
                           static_cast<double>(std::max<std::int64_t>(1, summary.environment_steps));
   list_failures(console, "environment", failures_of(summary), "--json and the file name all");
-  console.print(fmt::format(
-      "environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
-      "Newton iterations per step: {:.2f}, steps split: {}, environments failed: {}\n{}\n"
-      "wrote {} ({} bytes)",
-      batch.environments(), summary.steps, summary.seconds, rate, per_step, summary.split_steps,
-      summary.failures.size(), of_task.line, options.output, bytes));
+  console.print(
+      fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
+                  "Newton iterations per step: {:.2f}, {}, environments failed: {}\n{}\n"
+                  "wrote {} ({} bytes)",
+                  batch.environments(), summary.steps, summary.seconds, rate, per_step,
+                  split_text(summary.split_steps, summary.coarse_steps), summary.failures.size(),
+                  of_task.line, options.output, bytes));
   Json sensors = Json::array();
   for (const SensorInfo& sensor : batch.model().sensors()) {
     const int every = tactile_interval(sensor, rollout);
@@ -135,6 +136,7 @@ int report(const SimulateArguments& options, const Console& console, const Batch
               {"timestep", stepper.timestep()},
               {"integrator", to_string(stepper.integrator())},
               {"tolerance", stepper.tolerance()},
+              {"accuracy", stepper.accuracy()},
               {"precision", options.precision},
               {"instruction_set", kernels::active_isa_name()},
               {"sensors", sensors},
@@ -144,6 +146,7 @@ int report(const SimulateArguments& options, const Console& console, const Batch
               {"newton_iterations", summary.newton_iterations},
               {"newton_iterations_per_step", per_step},
               {"split_steps", summary.split_steps},
+              {"coarse_steps", summary.coarse_steps},
               {"failed", failures_json("environment", failures_of(summary))}};
   result.update(of_task.keys);
   console.result(result);
@@ -228,7 +231,8 @@ struct Gradients {
     loss = make_loss(kind, model, every);
     GradientOptions options;
     options.steps = rollout.steps;
-    options.stepper = {stepper.integrator(), stepper.timestep(), stepper.tolerance()};
+    options.stepper = {stepper.integrator(), stepper.timestep(), stepper.tolerance(),
+                       stepper.accuracy()};
     options.precision = rollout.precision;
     options.parameters = true;
     options.points = arguments.point_gradients;
@@ -342,16 +346,20 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
       });
 }
 
+SolverOptions asked_of(const SimulateArguments& options) { return {.accuracy = options.accuracy}; }
+
 int simulate(const SimulateArguments& options, const Console& console, const ProgramInfo& info) {
   check_arguments(options);
   const Precision precision = precision_named(options.precision);
-  if (const std::unique_ptr<Task> task = find_task(options.scene, console))
+  if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked_of(options)))
     return simulate_task(options, console, info, *task, precision);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
-  StepperOptions solver{{}, options.timestep, options.tolerance};
+  StepperOptions solver{
+      .integrator = {}, .timestep = options.timestep, .tolerance = options.tolerance};
   if (!options.integrator.empty()) solver.integrator = integrator_named(options.integrator);
 
-  const Model model(read_scene_for(options.scene, options.allow_unknown, console));
+  const Model model(
+      read_scene_for(options.scene, options.allow_unknown, console, asked_of(options)));
   if (!options.gradients.empty()) solver = for_gradients(model, solver);
   Stepper stepper(model, solver);
   const Start start(options, stepper);
@@ -420,6 +428,7 @@ Command add_simulate(CLI::App& program) {
   add_positive_number(
       app, "--tol", o.tolerance,
       "Largest scaled residual of a step [default: the scene's, or what follows scheme and step]");
+  add_accuracy_option(app, o.accuracy);
   add_text(
       app, "--gradients", o.gradients, "LOSS",
       "Also write derivatives of a loss by controls, start and the scene's numbers: final, path, "

@@ -6,6 +6,7 @@
 
 #include <filesystem>
 
+#include "apps/scene_run.hpp"
 #include "io/files/csv.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/scene/scene_reader.hpp"
@@ -14,7 +15,7 @@
 namespace tangere::apps {
 
 std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
-                                std::optional<double> tolerance) {
+                                const SolverOptions& asked) {
   if (is_task(word)) {
     const TaskSpec spec = task_spec(word);
     const char* const text = task_scene(spec.scene);
@@ -22,7 +23,7 @@ std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
       throw InputError(fmt::format("task '{}': its scene {} is not there", word, spec.scene));
     SceneFile file = parse_scene(text, spec.scene);
     for (const std::string& warning : file.warnings) console.note("warning: " + warning);
-    if (!file.scene.solver.tolerance) file.scene.solver.tolerance = tolerance;
+    ask_of_solver(file.scene.solver, asked);
     return make_task(word, file.scene);
   }
   const bool plain = word.find('/') == std::string::npos && word.find('.') == std::string::npos;

@@ -14,10 +14,9 @@
 namespace tangere::apps {
 
 /// Returns the task that `word` names, on its own scene; null if it names a file. Throws InputError
-/// with the nearest task for a plain word that is neither. `tolerance`: of its steps, where the
-/// scene names none.
+/// with the nearest task for a plain word that is neither. `asked`: as in ask_of_solver().
 std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
-                                std::optional<double> tolerance = std::nullopt);
+                                const SolverOptions& asked = {});
 
 /// The policy called `name`, or `fallback` if that is empty. With a table it is csv. Throws
 /// InputError for another name, for csv without a table, and for a table with another policy.

@@ -154,10 +154,10 @@ void GroupAdjoint::find_inner_velocities(const StageInHand<L>& s, const Scheme& 
                                          double h) const {
   BasicWorkspace<L>& w = s.w;
   for (int k = 0; k < scheme.inner_stages(); ++k) {
-    set_stage(model_, scheme, k, h, w);
+    set_stage(model_, scheme, k, Row<L>::all(h), w);
     // c₀/h is computed anew from the product a_kk h, because the last bits of gradients depend on
     // it.
-    fill(w.stage.c0_over_h, 1 / (scheme.stages[std::size_t(k)].s_divisor * h));
+    w.stage.c0_over_h = Row<L>::all(1 / (scheme.stages[std::size_t(k)].s_divisor * h));
     std::copy_n(w.x_inner + k * model_.nv, model_.nv, w.stage.x);
     s.table.template stage<L>().kinematics(model_.view, w.stage);
     std::copy_n(w.stage.v, model_.nv, w.v_inner + k * model_.nv);
@@ -172,7 +172,7 @@ void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme,
     for (Row<L>* rows : {o.q_inner, o.v_inner}) clear(rows, last * model_.nv);
   find_inner_velocities(s, scheme, h);
   for (int k = last; k >= 0; --k) {
-    set_stage(model_, scheme, k, h, w);
+    set_stage(model_, scheme, k, Row<L>::all(h), w);
     if (scheme.needs_history()) state_difference(model_, w.q_before, w.q0, s.a.difference);
     if (k == last) {
       state_difference(model_, w.q1, w.q0, w.stage.x);

@@ -23,7 +23,9 @@ int Model::nu() const { return compiled_->nu; }
 int Model::nb() const { return static_cast<int>(compiled_->bodies.size()); }
 double Model::mass(int body) const { return compiled_->bodies[std::size_t(body)].mass; }
 double Model::timestep() const { return compiled_->scene.timestep; }
-Integrator Model::integrator() const { return compiled_->scene.integrator; }
+Integrator Model::integrator() const {
+  return keeping_accuracy(compiled_->scene.integrator, solver().accuracy.value_or(0));
+}
 const SolverOptions& Model::solver() const { return compiled_->scene.solver; }
 double Model::following_tolerance(Integrator integrator, double timestep) const {
   const double share = timestep / compiled_->fall_time;

@@ -253,6 +253,8 @@ struct SolverOptions {
   /// (docs/solver.md).
   std::optional<double> tolerance{};
   int max_iterations = 20;  ///< Newton passes before a step is split
+  /// Relative accuracy of the parts into which a step is cut. None or 0: every step is one part.
+  std::optional<double> accuracy{};
 };
 
 struct Scene {

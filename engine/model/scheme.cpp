@@ -4,6 +4,8 @@
 // Runge-Kutta: X_i = h Σ a_ij ẋ_j, V_i = v₀ + h Σ a_ij v̇_j. η solves η a_jk = a_ik over the rows
 // before i. Then
 //   ẋ_i = (X_i - Σ η_j X_j)/(a_ii h),  v̇_i = (V_i - v₀ - Σ η_j (V_j - v₀))/(a_ii h)
+// The estimate compares X_s with the interpolatory rule through t = 0 and the ends c_i of the stages:
+//   e = X_s - h (w_0 v₀ + Σ w_i ẋ_i),  Σ w_i c_i^p = 1/(p + 1) for p = 0 … s, with 0^0 = 1
 #include "engine/model/scheme.hpp"
 
 #include <algorithm>
@@ -19,12 +21,56 @@ int Scheme::most_inner_stages() const {
       {inner_stages(), start == nullptr ? 0 : start->inner_stages(), of_parts().inner_stages()});
 }
 
+namespace {
+
+/// Weights of the interpolatory rule on [0, 1] through 0 and `ends`: the integrals of Lagrange's
+/// polynomials. Not finite where two of the places coincide.
+std::vector<double> rule_through(const std::vector<double>& ends) {
+  std::vector<double> nodes = {0}, weights;
+  nodes.insert(nodes.end(), ends.begin(), ends.end());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    std::vector<double> polynomial = {1};  // coefficients, the constant first
+    for (std::size_t j = 0; j < nodes.size(); ++j) {
+      if (j == i) continue;
+      const double by = nodes[i] - nodes[j];
+      polynomial.push_back(0);
+      for (std::size_t p = polynomial.size(); p-- > 0;)
+        polynomial[p] = ((p > 0 ? polynomial[p - 1] : 0) - nodes[j] * polynomial[p]) / by;
+    }
+    double integral = 0;
+    for (std::size_t p = 0; p < polynomial.size(); ++p)
+      integral += polynomial[p] / static_cast<double>(p + 1);
+    weights.push_back(integral);
+  }
+  return weights;
+}
+
+/// Weights of e on h v₀ and on the stages' x. `eta`: η of every stage.
+std::vector<double> estimate_of(const std::vector<double>& ends,
+                                const std::vector<std::vector<double>>& eta,
+                                const std::vector<double>& diagonal) {
+  const std::vector<double> w = rule_through(ends);
+  std::vector<double> estimate(w.size(), 0.0);
+  estimate[0] = -w[0];
+  estimate.back() = 1;
+  for (std::size_t i = 0; i < ends.size(); ++i) {  // h w_i ẋ_i in terms of x
+    const double share = w[i + 1] / diagonal[i];
+    estimate[i + 1] -= share;
+    for (std::size_t j = 0; j < i; ++j) estimate[j + 1] += share * eta[i][j];
+  }
+  return estimate;
+}
+
+}  // namespace
+
 Scheme runge_kutta(const char* name, int order, std::initializer_list<std::vector<double>> matrix) {
   const std::vector<std::vector<double>> a(matrix);
   if (a.empty() || a.size() > kMostStages)
     throw InputError(std::string(name) + ": " + std::to_string(a.size()) +
                      " stages; expected 1 to " + std::to_string(kMostStages));
-  Scheme scheme{name, order, {}, 0, nullptr, nullptr};
+  Scheme scheme{name, order, {}, 0, nullptr, nullptr, {}};
+  std::vector<std::vector<double>> etas;
+  std::vector<double> ends, diagonal;
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (a[i].size() != i + 1 || !(a[i][i] > 0))
       throw InputError(std::string(name) + ": stage " + std::to_string(i) +
@@ -39,11 +85,17 @@ Scheme runge_kutta(const char* name, int order, std::initializer_list<std::vecto
     }
     SchemeStage stage{i + 1 == a.size() ? 1 : end, 1 / a[i][i], 0, -1, 0, a[i][i], {}};
     for (const double weight : eta) stage.inner.push_back({-(weight / a[i][i]), -weight});
+    ends.push_back(stage.end);
+    diagonal.push_back(a[i][i]);
+    etas.push_back(std::move(eta));
     scheme.stages.push_back(std::move(stage));
     if (i + 1 == a.size() && !(std::abs(end - 1) < 1e-9))
       throw InputError(std::string(name) + ": the last stage ends at " + std::to_string(end) +
                        " steps; expected 1");
   }
+  scheme.estimate = estimate_of(ends, etas, diagonal);
+  if (!std::ranges::all_of(scheme.estimate, [](double x) { return std::isfinite(x); }))
+    scheme.estimate.clear();
   return scheme;
 }
 
@@ -92,6 +144,11 @@ constinit const Integrator Integrator::bdf2{kBdf2};
 constinit const Integrator Integrator::sdirk2{kSdirk2};
 constinit const Integrator Integrator::sdirk3{kSdirk3};
 constinit const Integrator Integrator::sdirk4{kSdirk4};
+
+Integrator keeping_accuracy(Integrator of_scene, double accuracy) {
+  const bool keeps = !of_scene.scheme().estimate.empty() && of_scene.scheme().order > 1;
+  return accuracy > 0 && !keeps ? Integrator::sdirk2 : of_scene;
+}
 
 std::span<const Integrator> integrators() {
   static constexpr Integrator kAll[] = {Integrator(kBdf1), Integrator(kBdf2), Integrator(kSdirk2),

@@ -9,6 +9,10 @@
 //   s = (s_centre v₀ + s_before v_before + Σ s_inner (v_j - v₀)) / s_divisor
 // (q_before, v_before) is the state one step before. (x_j, v_j) is an earlier stage of the same
 // step. The last stage's result is the state after the step.
+//
+// The error of a step is estimated by another rule for q₁ = q₀ ⊕ ∫ ẋ dt. It passes through the rates
+// at the start (v₀) and at the end of every stage, and so is one order higher:
+//   e = estimate[0] h v₀ + Σ estimate[1 + k] x_k
 #pragma once
 
 #include <initializer_list>
@@ -43,6 +47,8 @@ struct Scheme {
   const Scheme* start;
   /// The scheme of the parts of a split step; null: this one.
   const Scheme* parts;
+  /// Weights of the error's estimate, of the start and of every stage; empty: there is none.
+  std::vector<double> estimate = {};
 
   /// Number of stages whose results a tape keeps.
   [[nodiscard]] int inner_stages() const { return static_cast<int>(stages.size()) - 1; }
@@ -70,6 +76,10 @@ class Integrator {
  private:
   const Scheme* scheme_;
 };
+
+/// The scheme with which steps of a scene keep an accuracy (0: they need not): SDIRK2 in place of
+/// one that has no estimate or is of order 1.
+Integrator keeping_accuracy(Integrator of_scene, double accuracy);
 
 /// Returns the schemes of the table.
 std::span<const Integrator> integrators();

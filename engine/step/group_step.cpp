@@ -27,7 +27,7 @@ constexpr int kPatience = 4, kSplitPatience = 40;
 /// Solves the stages of a step, each for the lanes that found the one before.
 template <int L>
 LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
-                        BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
+                        BasicWorkspace<L>& w, LaneBits lanes, const Row<L>& h, bool inside_split,
                         NewtonReport& report) const {
   const int n = model_.nv;
   const NewtonLimits limits = {
@@ -49,7 +49,7 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
 /// Computes q1 = centre ⊕ x, v1 = v. A joint that turned by π or more is not resolved: its chart
 /// ends there.
 template <int L>
-void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits& resolved,
+void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, const Row<L>& h, LaneBits& resolved,
                        NewtonReport& report) const {
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
@@ -64,7 +64,7 @@ void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits&
       const Vec3<double> turn = {x[0][l], x[1][l], x[2][l]};
       const Row<L>* v = w.stage.v + link.v;
       const Vec3<double> rate = {v[0][l], v[1][l], v[2][l]};
-      if (!(dot(turn, turn) < M_PI * M_PI) || !(dot(rate, rate) * h * h < M_PI * M_PI)) {
+      if (!(dot(turn, turn) < M_PI * M_PI) || !(dot(rate, rate) * h[l] * h[l] < M_PI * M_PI)) {
         resolved &= ~(1U << l);
         report.status[l] = StepStatus::rotation;
       }
@@ -72,6 +72,16 @@ void GroupStep::finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits&
       w.q1[link.q][l] = q.w, w.q1[link.q + 1][l] = q.x, w.q1[link.q + 2][l] = q.y,
       w.q1[link.q + 3][l] = q.z;
     }
+  }
+}
+
+/// Makes the result of the present solve the state.
+template <int L>
+void GroupStep::commit(BasicWorkspace<L>& w, LaneBits lanes) const {
+  for (int l = 0; l < L; ++l) {
+    if (!has(lanes, l)) continue;
+    for (int i = 0; i < model_.nq; ++i) w.q0[i][l] = w.q1[i][l];
+    for (int i = 0; i < model_.nv; ++i) w.v0[i][l] = w.v1[i][l];
   }
 }
 
@@ -89,15 +99,22 @@ void GroupStep::note(const BasicWorkspace<L>& w, int lane, const Scheme& scheme,
                  column(w.x_inner, scheme.inner_stages() * model_.nv)});
 }
 
+/// Keeps the inner stages of a plain step.
+template <int L>
+void GroupStep::log_inner(const BasicWorkspace<L>& w, int lane, const Scheme& scheme,
+                          SolveLog& log) const {
+  for (int i = 0; i < scheme.inner_stages() * model_.nv; ++i)
+    log.inner[i * kernels::kBlock + lane] = w.x_inner[i][lane];
+}
+
 /// Takes two half steps from q0, v0, split again where needed.
 bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
                       NewtonReport& report, std::vector<TapedSolve>* solves) const {
   if (depth > kDeepestSplit) return false;
   const Scheme& scheme = settings_.integrator.scheme().of_parts();
   for (int half = 0; half < 2; ++half) {
-    if (run(scheme, table, w, 1U, 0.5 * h, true, report) != 0) {
-      for (int i = 0; i < model_.nq; ++i) w.q0[i] = w.q1[i];
-      for (int i = 0; i < model_.nv; ++i) w.v0[i] = w.v1[i];
+    if (run(scheme, table, w, 1U, Row<1>::all(0.5 * h), true, report) != 0) {
+      commit(w, 1U);
       note(w, 0, scheme, 0.5 * h, solves);
     } else if (!split(table, w, 0.5 * h, depth + 1, report, solves)) {
       return false;
@@ -106,13 +123,13 @@ bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, dou
   return true;
 }
 
-/// Splits the step of one lane of a group. The other lanes wait.
+/// Splits a step of length h of one lane of a group. The other lanes wait.
 template <int L>
 bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane,
-                           SingleWorkspace& alone, NewtonReport& report,
+                           double h, SingleWorkspace& alone, NewtonReport& report,
                            std::vector<TapedSolve>* solves) const {
   if constexpr (L == 1) {
-    if (&w == &alone) return split(table, w, settings_.timestep, 1, report, solves);
+    if (&w == &alone) return split(table, w, h, 1, report, solves);
   }
   const auto to_one = [&](const Row<L>* from, Row<1>* to, int count) {
     for (int i = 0; i < count; ++i) to[i][0] = from[i][lane];
@@ -131,7 +148,7 @@ bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>&
   one.status[0] = report.status[lane];
   one.iterations[0] = report.iterations[lane];
   one.residual[0] = report.residual[lane];
-  const bool done = split(table, alone, settings_.timestep, 1, one, solves);
+  const bool done = split(table, alone, h, 1, one, solves);
   from_one(alone.q0, w.q0, model_.nq);
   from_one(alone.v0, w.v0, model_.nv);
   report.status[lane] = one.status[0];
@@ -144,6 +161,18 @@ template <int L>
 void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                         SingleWorkspace& alone, LaneBits lanes, LaneBits history,
                         NewtonReport& report, SolveLog* log) const {
+  clear_candidates(w);
+  if (settings_.accuracy > 0) {
+    advance_in_parts(table, w, alone, lanes, report, log);
+  } else {
+    advance_plainly(table, w, alone, lanes, history, report, log);
+  }
+}
+
+template <int L>
+void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                                SingleWorkspace& alone, LaneBits lanes, LaneBits history,
+                                NewtonReport& report, SolveLog* log) const {
   const double h = settings_.timestep;
   const Scheme& scheme = settings_.integrator.scheme();
   const LaneBits starting = scheme.needs_history() ? lanes & ~history : kNoLane;
@@ -151,32 +180,27 @@ void GroupStep::advance(const kernels::KernelTable& table, BasicWorkspace<L>& w,
     return log == nullptr ? nullptr : &log->special[std::size_t(l)];
   };
   LaneBits resolved = 0;
-  const auto commit = [&](LaneBits done) {
-    for (int l = 0; l < L; ++l) {
-      if (!has(done, l)) continue;
-      for (int i = 0; i < model_.nq; ++i) w.q0[i][l] = w.q1[i][l];
-      for (int i = 0; i < model_.nv; ++i) w.v0[i][l] = w.v1[i][l];
-    }
+  const auto run_and_commit = [&](const Scheme& by, LaneBits which) {
+    const LaneBits done = run(by, table, w, which, Row<L>::all(h), false, report);
+    commit(w, done);
     resolved |= done;
+    return done;
   };
-  clear_candidates(w);
   if ((lanes & ~starting) != 0) {
-    commit(run(scheme, table, w, lanes & ~starting, h, false, report));
+    run_and_commit(scheme, lanes & ~starting);
     if (log != nullptr)  // before starts or splits of other lanes overwrite them
-      for (int i = 0; i < scheme.inner_stages() * model_.nv; ++i)
-        for (int l = 0; l < L; ++l)
-          if (has(resolved, l)) log->inner[i * kernels::kBlock + l] = w.x_inner[i][l];
+      for (int l = 0; l < L; ++l)
+        if (has(resolved, l)) log_inner(w, l, scheme, *log);
   }
   if (starting != 0) {
-    const LaneBits done = run(*scheme.start, table, w, starting, h, false, report);
-    commit(done);
+    const LaneBits done = run_and_commit(*scheme.start, starting);
     for (int l = 0; l < L; ++l)
       if (has(done, l)) note(w, l, *scheme.start, h, solves_of(l));
   }
   for (int l = 0; l < L; ++l) {
     if (!has(lanes & ~resolved, l)) continue;
     const StepStatus first = report.status[l];
-    if (split_lane(table, w, l, alone, report, solves_of(l))) {
+    if (split_lane(table, w, l, h, alone, report, solves_of(l))) {
       report.status[l] = StepStatus::split;
     } else if (!failed(report.status[l])) {
       report.status[l] = first;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Takes one step of a group of eight environments by the stages of its scheme
-// (engine/model/scheme.hpp), and splits steps that do not converge.
+// (engine/model/scheme.hpp), splits steps that do not converge, and cuts steps into parts that keep
+// an accuracy.
 #pragma once
 
 #include "engine/step/newton.hpp"
@@ -13,6 +14,7 @@ struct StepSettings {
   double timestep;
   double tolerance;
   int max_iterations;
+  double accuracy = 0;  ///< relative, of the parts of a step; 0: every step is one part
 };
 
 /// What a tape needs to know about a step besides its result.
@@ -41,20 +43,37 @@ class GroupStep {
 
  private:
   template <int L>
+  void advance_plainly(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                       SingleWorkspace& alone, LaneBits lanes, LaneBits history,
+                       NewtonReport& report, SolveLog* log) const;
+  template <int L>
+  void advance_in_parts(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                        SingleWorkspace& alone, LaneBits lanes, NewtonReport& report,
+                        SolveLog* log) const;
+  template <int L>
+  kernels::Row<L> estimated_error(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                                  LaneBits lanes, const kernels::Row<L>& h,
+                                  NewtonReport& report) const;
+  template <int L>
   LaneBits run(const Scheme& scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-               LaneBits lanes, double h, bool inside_split, NewtonReport& report) const;
+               LaneBits lanes, const kernels::Row<L>& h, bool inside_split,
+               NewtonReport& report) const;
   bool split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
              NewtonReport& report, std::vector<TapedSolve>* solves) const;
   template <int L>
-  bool split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane,
+  bool split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane, double h,
                   SingleWorkspace& alone, NewtonReport& report,
                   std::vector<TapedSolve>* solves) const;
+  template <int L>
+  void log_inner(const BasicWorkspace<L>& w, int lane, const Scheme& scheme, SolveLog& log) const;
   template <int L>
   void note(const BasicWorkspace<L>& w, int lane, const Scheme& scheme, double h,
             std::vector<TapedSolve>* to) const;
   template <int L>
-  void finish(BasicWorkspace<L>& w, LaneBits lanes, double h, LaneBits& resolved,
+  void finish(BasicWorkspace<L>& w, LaneBits lanes, const kernels::Row<L>& h, LaneBits& resolved,
               NewtonReport& report) const;
+  template <int L>
+  void commit(BasicWorkspace<L>& w, LaneBits lanes) const;
 
   const CompiledModel& model_;
   StepSettings settings_;

@@ -285,6 +285,23 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
   return converged;
 }
 
+template <int L>
+void residual_elsewhere(const CompiledModel& model, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report,
+                        kernels::Row<L>& out) {
+  const NewtonLimits unused{};
+  Search<L> s{model, table, w, unused, report, magnitude(model.view.gravity), lanes};
+  s.locate(false);
+  s.kernel().residual(model.view, w.stage, s.lone(lanes));
+  s.scaled_residuals(out);
+  for (int l = 0; l < L; ++l)
+    if (has(lanes, l)) ++report.iterations[l];
+}
+
+template void residual_elsewhere(const CompiledModel&, const kernels::KernelTable&, Workspace&,
+                                 LaneBits, NewtonReport&, kernels::Row<kernels::kGroup>&);
+template void residual_elsewhere(const CompiledModel&, const kernels::KernelTable&,
+                                 SingleWorkspace&, LaneBits, NewtonReport&, kernels::Row<1>&);
 template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, Workspace&,
                               LaneBits, const NewtonLimits&, NewtonReport&);
 template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,

@@ -31,4 +31,10 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
                      BasicWorkspace<L>& w, LaneBits lanes, const NewtonLimits& limits,
                      NewtonReport& report);
 
+/// Computes the scaled residual at another x of a solved stage. The stage keeps that x.
+template <int L>
+void residual_elsewhere(const CompiledModel& model, const kernels::KernelTable& table,
+                        BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report,
+                        kernels::Row<L>& out);
+
 }  // namespace tangere

@@ -9,20 +9,17 @@
 
 namespace tangere {
 
-/// Sets all lanes to the same value.
-template <int L>
-void fill(kernels::Row<L>& row, double value) {
-  for (double& x : row.lane) x = value;
-}
-
 /// Sets centre, c₀/h, r and s of stage `k` from the states and the earlier stages in the workspace.
+/// `h`: the step of each lane [s].
 template <int L>
-void set_stage(const CompiledModel& m, const Scheme& scheme, int k, double h,
+void set_stage(const CompiledModel& m, const Scheme& scheme, int k, const kernels::Row<L>& h,
                BasicWorkspace<L>& w) {
   const SchemeStage& row = scheme.stages[std::size_t(k)];
   kernels::Stage<L>& s = w.stage;
-  fill(s.c0_over_h, row.c0 / h);
-  fill(s.inverse_h, 1 / h);
+  for (int l = 0; l < L; ++l) {
+    s.c0_over_h[l] = row.c0 / h[l];
+    s.inverse_h[l] = 1 / h[l];
+  }
   for (int i = 0; i < m.nq; ++i) s.centre[i] = w.q0[i];
   if (row.r_before != 0) state_difference(m, w.q_before, w.q0, s.r);
   for (int i = 0; i < m.nv; ++i)
@@ -43,13 +40,14 @@ void set_stage(const CompiledModel& m, const Scheme& scheme, int k, double h,
 /// Sets the first guess of x: from the stage before, moved with its velocity; for the first stage,
 /// from the start.
 template <int L>
-void guess_stage(const CompiledModel& m, const Scheme& scheme, int k, double h,
+void guess_stage(const CompiledModel& m, const Scheme& scheme, int k, const kernels::Row<L>& h,
                  BasicWorkspace<L>& w) {
   kernels::Stage<L>& s = w.stage;
   const double end = scheme.stages[std::size_t(k)].end, more = scheme.extrapolation;
-  const double way = k == 0 ? end * h : (end - scheme.stages[std::size_t(k) - 1].end) * h;
+  const double share = k == 0 ? end : end - scheme.stages[std::size_t(k) - 1].end;
   for (int i = 0; i < m.nv; ++i)
     for (int l = 0; l < L; ++l) {
+      const double way = share * h[l];
       if (k > 0) {
         s.x[i][l] += way * s.v[i][l];
       } else if (more == 0) {

@@ -15,13 +15,36 @@ namespace tangere {
 using kernels::kBlock;
 using kernels::kGroup;
 
+namespace {
+
+/// Parts that keep an accuracy are solved to this share of it, so that what is measured is the
+/// error of the scheme.
+constexpr double kShareOfAccuracy = 0.01, kTightest = 1e-9, kLoosest = 1e-4;
+
+void check_accuracy(const StepperOptions& o, double accuracy) {
+  if (!(accuracy >= 0 && accuracy < 1))
+    throw InputError("accuracy " + std::to_string(accuracy) +
+                     "; expected a share below 1 (0.01 is one percent), or 0 for plain steps");
+  if (accuracy > 0 && o.integrator && o.integrator->scheme().estimate.empty())
+    throw InputError(std::string(to_string(*o.integrator)) +
+                     " has no estimate of its error, so it cannot keep an accuracy; expected "
+                     "another scheme, or none");
+}
+
+}  // namespace
+
 StepSettings step_settings(const Model& model, const StepperOptions& o) {
-  StepSettings s = {o.integrator.value_or(model.integrator()),
-                    o.timestep.value_or(model.timestep()), 0, model.solver().max_iterations};
+  const double accuracy = o.accuracy.value_or(model.solver().accuracy.value_or(0));
+  check_accuracy(o, accuracy);
+  StepSettings s = {o.integrator.value_or(keeping_accuracy(model.scene().integrator, accuracy)),
+                    o.timestep.value_or(model.timestep()), 0, model.solver().max_iterations,
+                    accuracy};
   if (!(s.timestep > 0) || !std::isfinite(s.timestep))
     throw InputError("timestep " + std::to_string(s.timestep) + " s; expected a positive number");
-  s.tolerance = o.tolerance.value_or(
-      model.solver().tolerance.value_or(model.following_tolerance(s.integrator, s.timestep)));
+  const double following = accuracy > 0
+                               ? std::clamp(kShareOfAccuracy * accuracy, kTightest, kLoosest)
+                               : model.following_tolerance(s.integrator, s.timestep);
+  s.tolerance = o.tolerance.value_or(model.solver().tolerance.value_or(following));
   if (!(s.tolerance > 0) || !std::isfinite(s.tolerance))
     throw InputError("solver tolerance " + std::to_string(s.tolerance) +
                      "; expected a positive number");
@@ -109,6 +132,7 @@ Stepper& Stepper::operator=(Stepper&&) noexcept = default;
 double Stepper::timestep() const { return impl_->settings.timestep; }
 Integrator Stepper::integrator() const { return impl_->settings.integrator; }
 double Stepper::tolerance() const { return impl_->settings.tolerance; }
+double Stepper::accuracy() const { return impl_->settings.accuracy; }
 
 void Stepper::step(Batch& batch, std::span<const double> controls) {
   for (int b = 0; b < batch.blocks(); ++b) step_block(batch, b, controls);

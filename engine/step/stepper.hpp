@@ -18,6 +18,9 @@ struct StepperOptions {
   std::optional<Integrator> integrator;
   std::optional<double> timestep;   ///< [s]
   std::optional<double> tolerance;  ///< scaled residual, dimensionless
+  /// Steps are cut into parts that keep this accuracy (docs/accuracy.md), relative, below 1. 0:
+  /// every step is one part.
+  std::optional<double> accuracy{};
 };
 
 /// Tolerance of runs that gradients are taken of, where neither caller nor scene names one. A
@@ -38,6 +41,7 @@ class Stepper {
   [[nodiscard]] double timestep() const;        ///< the one in force [s]
   [[nodiscard]] Integrator integrator() const;  ///< the one in force
   [[nodiscard]] double tolerance() const;
+  [[nodiscard]] double accuracy() const;  ///< 0: every step is one part
 
   /// Advances every environment that has not failed by one step. `controls`: (E, nu), clipped to
   /// the motors' range.

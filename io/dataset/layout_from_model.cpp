@@ -74,8 +74,8 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));
   for (const StepStatus status :
-       {StepStatus::converged, StepStatus::split, StepStatus::not_converged, StepStatus::non_finite,
-        StepStatus::rotation, StepStatus::singular})
+       {StepStatus::converged, StepStatus::split, StepStatus::coarse, StepStatus::not_converged,
+        StepStatus::non_finite, StepStatus::rotation, StepStatus::singular})
     layout.statuses.push_back({static_cast<std::int8_t>(status), to_string(status)});
   describe_randomized(scene, layout);
   const int varied = static_cast<int>(layout.randomized_names.size());
@@ -88,6 +88,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.integrator = to_string(stepper.integrator());
   layout.timestep = stepper.timestep();
   layout.tolerance = stepper.tolerance();
+  layout.accuracy = stepper.accuracy();
   layout.every = run.every;
   layout.seed = batch.seed();
   layout.first_episode = batch.episode(0);
@@ -123,6 +124,7 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.integrator = to_string(stepper.integrator());
   layout.timestep = stepper.timestep();
   layout.tolerance = stepper.tolerance();
+  layout.accuracy = stepper.accuracy();
   layout.precision = run.precision;
   layout.version = run.version;
   layout.instruction_set = run.instruction_set;

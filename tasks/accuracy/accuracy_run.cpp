@@ -160,7 +160,8 @@ struct AccuracyRun::Impl {
       w.stepper = std::make_unique<Stepper>(episodes.start.model(),
                                             StepperOptions{.integrator = setting.integrator,
                                                            .timestep = interval / setting.parts,
-                                                           .tolerance = setting.tolerance});
+                                                           .tolerance = setting.tolerance,
+                                                           .accuracy = setting.accuracy});
     for (std::vector<double>& s : sum) s.assign(environments(), 0);
     Batch batch = episodes.start;
     std::vector<BlockOutcome> blocks(as_size(batch.blocks()));

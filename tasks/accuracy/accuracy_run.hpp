@@ -25,6 +25,7 @@ struct AccuracySetting {
   Integrator integrator = Integrator::bdf1;
   int parts = 1;  ///< steps between samples
   double tolerance = 1e-9;
+  double accuracy = 0;  ///< of the parts of a step; 0: every step is one part
 };
 
 /// The two precisions in which fields are read, as indices below.

@@ -17,6 +17,7 @@ constexpr double kReferenceTolerance = 1e-12;
 /// Steps of the reference in a timestep of the scene.
 constexpr std::array kReferenceParts = {8, 32, 128};
 constexpr std::array kParts = {1, 2, 5, 10, 20, 50, 100};
+constexpr std::array kAccuracies = {1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4};
 constexpr std::array kTolerances = {1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9};
 constexpr int kPasses = 3;
 constexpr double kEnoughSeconds = 0.3;  // of CPU time, after which a pass is not repeated
@@ -173,13 +174,31 @@ class Sweep {
         if (!measure(setting, report_.points)) return false;
       }
     }
+    return measure_cut_steps();
+  }
+
+  /// Steps as long as the controls allow, cut into parts that keep an accuracy.
+  bool measure_cut_steps() {
+    const Model& model = episodes_.start.model();
+    const auto parts = std::ranges::find_if(kParts, [&](int n) { return episodes_.can_cut(n); });
+    AccuracySetting setting{Integrator::sdirk2, parts == kParts.end() ? episodes_.every : *parts};
+    for (const double accuracy : kAccuracies) {
+      setting.accuracy = accuracy;
+      const Stepper as_set(model, {.integrator = setting.integrator,
+                                   .timestep = episodes_.interval() / setting.parts,
+                                   .tolerance = options_.tolerance,
+                                   .accuracy = accuracy});
+      setting.tolerance = as_set.tolerance();
+      if (!measure(setting, report_.points)) return false;
+    }
     return true;
   }
 
   bool measure_own() {
     const Model& model = episodes_.start.model();
     std::vector<AccuracyPoint> own;
-    if (!measure({model.integrator(), episodes_.every, Stepper(model).tolerance()}, own))
+    const Stepper as_set(model);
+    if (!measure({model.integrator(), episodes_.every, as_set.tolerance(), as_set.accuracy()}, own))
       return false;
     report_.own = own.front();
     return true;

@@ -47,7 +47,8 @@ struct AccuracyReference {
 
 struct AccuracyReport {
   AccuracyReference reference;
-  std::vector<AccuracyPoint> points;      ///< scheme by step by precision
+  /// Scheme by step by precision, then steps that are cut to keep an accuracy.
+  std::vector<AccuracyPoint> points;
   std::vector<AccuracyPoint> tolerances;  ///< tolerances alone, at the setting of the advice
   AccuracyPoint own;                      ///< the scene's setting: its scheme, step and tolerance
   int advice = -1;        ///< index of the cheapest point that meets the target; -1: none does

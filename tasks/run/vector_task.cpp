@@ -108,6 +108,7 @@ VectorCounts VectorTask::counts() const {
     sum.simulation_steps += tally.simulation_steps;
     sum.newton_iterations += tally.newton_iterations;
     sum.split_steps += tally.split_steps;
+    sum.coarse_steps += tally.coarse_steps;
   }
   return sum;
 }

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "engine/base/error.hpp"
 #include "tests/engine/runs.hpp"
 
@@ -31,6 +33,31 @@ TEST(Schemes, EveryStageKeepsUniformMotion) {
       EXPECT_FALSE(scheme.start->needs_history());
     }
   }
+}
+
+/// For ẋ = tᵖ a stage's rate is endᵖ. The estimate is then the exact error of the result, up to the
+/// power that the rule through all stages integrates.
+TEST(Schemes, EstimatesAreErrorsOfPowers) {
+  int with_estimate = 0;
+  for (const Integrator integrator : testing::all_integrators()) {
+    const Scheme& scheme = integrator.scheme();
+    if (scheme.estimate.empty()) continue;
+    SCOPED_TRACE(scheme.name);
+    ++with_estimate;
+    ASSERT_EQ(scheme.estimate.size(), scheme.stages.size() + 1);
+    for (std::size_t p = 0; p <= scheme.stages.size(); ++p) {
+      std::vector<double> x;
+      for (const SchemeStage& stage : scheme.stages) {  // c₀ x + Σ r x_j = endᵖ
+        double rate = std::pow(stage.end, static_cast<double>(p));
+        for (std::size_t j = 0; j < x.size(); ++j) rate -= stage.inner[j].r * x[j];
+        x.push_back(rate / stage.c0);
+      }
+      double e = p == 0 ? scheme.estimate[0] : 0;
+      for (std::size_t k = 0; k < x.size(); ++k) e += scheme.estimate[k + 1] * x[k];
+      EXPECT_NEAR(e, x.back() - 1 / static_cast<double>(p + 1), 1e-13) << "power " << p;
+    }
+  }
+  EXPECT_EQ(with_estimate, 4) << "BDF1, SDIRK2, SDIRK3 and SDIRK4";
 }
 
 TEST(Schemes, HaveNamesOfTheirOwn) {

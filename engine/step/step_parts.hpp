@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far one environment has come in a step that is cut into parts: h/2ⁿ long, each beginning at a
+// multiple of its length.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+namespace tangere {
+
+class StepParts {
+ public:
+  static constexpr int kFinest = 8;  ///< the shortest part: h / 2^8
+
+  [[nodiscard]] bool finished() const { return done_ == kUnits; }
+  [[nodiscard]] bool finest() const { return halved_ == kFinest; }
+  [[nodiscard]] bool whole() const { return halved_ == 0; }
+  /// Length of the next part, in steps.
+  [[nodiscard]] double length() const { return std::ldexp(1.0, -halved_); }
+
+  /// The next part will be shorter. `ratio`: estimated error over what is allowed; infinite where no
+  /// root was found. Must not be called when finest().
+  void shorten(double ratio) {
+    const double wanted = std::ceil(std::log2(ratio) / kPower);
+    halved_ += std::isfinite(wanted) ? std::clamp(static_cast<int>(wanted), 1, kMostHalvings) : 1;
+    halved_ = std::min(halved_, kFinest);
+  }
+  /// A part was taken. The next is twice as long where its estimate promises that it will do.
+  void take(double ratio) {
+    done_ += units();
+    if (halved_ > 0 && ratio < kDouble && done_ % (2 * units()) == 0) --halved_;
+  }
+
+ private:
+  static constexpr int kUnits = 1 << kFinest;
+  /// The estimate falls with at least the square of the length where contacts are stiff.
+  static constexpr double kPower = 2;
+  static constexpr int kMostHalvings = 4;  // at once
+  /// Twice the length brings 2^kPower times the error. Some of that is kept back.
+  static constexpr double kDouble = 0.7 / 4;
+
+  [[nodiscard]] int units() const { return kUnits >> halved_; }
+
+  int done_ = 0;    // of kUnits
+  int halved_ = 0;  // the next part is h / 2^halved_
+};
+
+}  // namespace tangere

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests steps that are cut into parts: errors follow the accuracy, parts are short only where they
+// must be, bits do not depend on company, and what was missed is said.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/engine/runs.hpp"
+#include "tests/engine/scenes.hpp"
+
+namespace tangere {
+namespace {
+
+using testing::q_of;
+using testing::v_of;
+
+constexpr double kLong = 25e-3;  // five of the scene's own steps, whose controls last longer
+
+StepperOptions keeping(double accuracy, double timestep = kLong) {
+  return {.integrator = {}, .timestep = timestep, .tolerance = {}, .accuracy = accuracy};
+}
+
+struct Played {
+  std::vector<double> q, v;
+  std::vector<double> way;  ///< the ball's places every 25 ms [m]
+  int evaluations = 0, coarse = 0;
+};
+
+/// Plays 1.5 s of the rolling ball and records one environment among others.
+Played play(const Model& model, const StepperOptions& options, int environments = 1,
+            int wanted = 0) {
+  Stepper stepper(model, options);
+  Batch batch(model, environments, 3, 20 - wanted);
+  Played run;
+  const int steps = static_cast<int>(std::lround(kLong / stepper.timestep()));
+  for (int k = 0; k < 300; k += 5) {
+    for (int part = 0; part < steps; ++part) {
+      testing::step_all(stepper, batch, testing::rolling_ball_control(k));
+      run.evaluations += batch.iterations(wanted);
+      run.coarse += batch.status(wanted) == StepStatus::coarse ? 1 : 0;
+      EXPECT_FALSE(failed(batch.status(wanted)));
+    }
+    const std::vector<double> q = q_of(batch, wanted);
+    run.way.insert(run.way.end(), q.begin() + 3, q.begin() + 6);
+  }
+  run.q = q_of(batch, wanted);
+  run.v = v_of(batch, wanted);
+  return run;
+}
+
+/// Root mean square distance of the ball's places [m].
+double distance(const Played& a, const Played& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.way.size(); ++i)
+    sum += (a.way[i] - b.way[i]) * (a.way[i] - b.way[i]);
+  return std::sqrt(sum / (static_cast<double>(a.way.size()) / 3));
+}
+
+TEST(StepParts, ErrorsAndCostFollowTheAccuracy) {
+  const Model model(testing::rolling_ball(false, 24));
+  const Played exact = play(model, testing::options(Integrator::sdirk4, 6.25e-4, 1e-12));
+  double last = HUGE_VAL;
+  int cost = 0;
+  for (const double accuracy : {1e-1, 1e-2, 1e-3, 1e-4}) {
+    const Played run = play(model, keeping(accuracy));
+    const double error = distance(run, exact) / 0.02;  // of the ball's radius
+    EXPECT_LT(error, 0.7 * last) << accuracy;
+    EXPECT_LT(error, accuracy);
+    EXPECT_GT(run.evaluations, cost);
+    last = error, cost = run.evaluations;
+  }
+}
+
+/// SDIRK2 is exact in free fall, so nothing is cut before the touch.
+TEST(StepParts, AreShortWhereTheyMustBe) {
+  Scene scene;
+  scene.ground = GroundDescription{};
+  scene.timestep = 0.01;
+  scene.integrator = Integrator::sdirk2;
+  scene.links = {testing::link("ball", JointType::free, {0, 0, 0.15}, SphereShape{0.05}, 1000)};
+  scene.ground_contacts.push_back({"ball", {1e4, 1, 0.5, 10}, ContactLaw::linear, 1e-5, {}});
+  const Model model(scene);
+  Stepper stepper(model, keeping(1e-3, 0.01));
+  Batch batch(model, 1);
+  int falling = 0, touching = 0;
+  for (int k = 0; k < 20; ++k) {
+    stepper.step(batch, {});
+    (k < 13 ? falling : touching) = std::max(k < 13 ? falling : touching, batch.iterations(0));
+  }
+  EXPECT_LE(falling, 8) << "two stages and the estimate";
+  EXPECT_GT(touching, 4 * falling) << "it touches after 0.143 s";
+}
+
+TEST(StepParts, BitsDoNotDependOnCompany) {
+  Scene scene = testing::rolling_ball(false, 24);
+  Distribution d;
+  d.a = -3e-3, d.b = 3e-3;
+  scene.randomizations.push_back({{NumberOwner::joint, NumberField::q, "ball_joint", 0}, d, {}});
+  const Model model(scene);
+  const Played alone = play(model, keeping(1e-3));
+  for (const int environments : {2, 8, 13}) {
+    const Played among = play(model, keeping(1e-3), environments, environments - 1);
+    EXPECT_EQ(alone.q, among.q) << environments;
+    EXPECT_EQ(alone.v, among.v);
+    EXPECT_EQ(alone.evaluations, among.evaluations);
+  }
+}
+
+TEST(StepParts, SayWhatTheyMissed) {
+  const Model model(testing::rolling_ball(false, 24));
+  EXPECT_EQ(play(model, keeping(1e-2)).coarse, 0);
+  EXPECT_GT(play(model, keeping(1e-9, 5e-3)).coarse, 0);
+}
+
+/// A step of one part has the bits of a plain one.
+TEST(StepParts, OnePartIsAPlainStep) {
+  const Model model(testing::rolling_ball(false, 24));
+  StepperOptions plain = testing::options(Integrator::sdirk2, 1e-3, 1e-6), cut = plain;
+  cut.accuracy = 0.999;
+  const Played a = play(model, plain), b = play(model, cut);
+  EXPECT_EQ(a.q, b.q);
+  EXPECT_EQ(a.v, b.v);
+}
+
+TEST(StepParts, SchemeThatKeepsAnAccuracy) {
+  Scene scene = testing::rolling_ball(false, 4);
+  for (const Integrator low : {Integrator::bdf1, Integrator::bdf2}) {
+    scene.integrator = low;
+    EXPECT_EQ(Stepper(Model(scene), keeping(1e-2)).integrator(), Integrator::sdirk2);
+    EXPECT_EQ(Stepper(Model(scene), keeping(0)).integrator(), low);
+    scene.solver.accuracy = 1e-2;
+    EXPECT_EQ(Model(scene).integrator(), Integrator::sdirk2);
+    scene.solver.accuracy.reset();
+  }
+  scene.integrator = Integrator::sdirk3;
+  EXPECT_EQ(Stepper(Model(scene), keeping(1e-2)).integrator(), Integrator::sdirk3);
+  StepperOptions asked = keeping(1e-2);
+  asked.integrator = Integrator::bdf1;
+  EXPECT_EQ(Stepper(Model(scene), asked).integrator(), Integrator::bdf1);
+  asked.integrator = Integrator::bdf2;
+  EXPECT_THROW(Stepper(Model(scene), asked), InputError) << "it has no estimate";
+  for (const double none : {-1e-3, 1.0, std::nan("")})
+    EXPECT_THROW(Stepper(Model(scene), keeping(none)), InputError) << none;
+}
+
+}  // namespace
+}  // namespace tangere
