@@ -62,6 +62,12 @@ Slope slope_of(const StressHistory& h) {
   return {down > 0 ? (1 / down) * along : along, down, into};
 }
 
+/// Of a body at the end that turns about z alone [rad].
+double angle_about_z(const StressHistory& h, int body) {
+  const Quaternion q = h.orientation(h.last(), body);
+  return 2 * std::atan2(q[3], q[0]);
+}
+
 const ContactCoefficients& on_ground(const StressHistory& h, int body) {
   const std::string& name = h.scene().links[as_size(body)].body.name;
   const auto& contacts = h.scene().ground_contacts;
@@ -176,12 +182,24 @@ Criterion release_speed(int body, double depth) {
   };
 }
 
+Criterion speed_error(int body, double share) {
+  return [=](const StressHistory& h) {
+    const double expected = share * length(h.velocity(0, body));
+    return std::abs(length(h.velocity(h.last(), body)) / expected - 1);
+  };
+}
+
+Criterion angle_error(int body, double angle) {
+  return [=](const StressHistory& h) {
+    return std::abs(std::remainder(angle_about_z(h, body) - angle, 2 * std::numbers::pi));
+  };
+}
+
 Criterion turn_error(int body) {
   return [=](const StressHistory& h) {
     constexpr double kTurn = 2 * std::numbers::pi;
     const double expected = h.spin(0, body)[2] * h.last() * h.step();
-    const Quaternion q = h.orientation(h.last(), body);
-    return std::abs(std::remainder(2 * std::atan2(q[3], q[0]) - expected, kTurn)) / kTurn;
+    return std::abs(std::remainder(angle_about_z(h, body) - expected, kTurn)) / kTurn;
   };
 }
 

@@ -46,6 +46,10 @@ Criterion fall_error(int body);
 /// The largest speed of the body over sqrt(kn/m) depth, with which a spring that starts at that
 /// depth [m] lets it go.
 Criterion release_speed(int body, double depth);
+/// The error of the body's speed at the end, as a share: `share` of that at the start.
+Criterion speed_error(int body, double share);
+/// The distance of the body's angle about z from `angle` at the end [rad].
+Criterion angle_error(int body, double angle);
 /// The error of the angle through which the body has turned about z at the end, as a share of a
 /// turn. It spins freely about z.
 Criterion turn_error(int body);

@@ -24,6 +24,7 @@ constexpr const char* kBetweenPoints = "only contact points touch, and none is n
 constexpr const char* kEndPoses =
     "a step looks at its end alone, where the nearest face is the far one";
 constexpr const char* kAcrossATouch = "a step across a touch can gain energy";
+constexpr const char* kShortTouch = "a step that is not much shorter than the touch misses it";
 constexpr const char* kOneNorm = "one norm for all bodies hides a light one's error";
 constexpr const char* kDamps = "the scheme damps rotation, or turns it too slowly, at these steps";
 constexpr const char* kFarStop = "Newton stops early where positions are large";
@@ -87,6 +88,16 @@ Cases geometry() {
        .quick = true,
        .known = all(),
        .why = kBetweenPoints},
+      {.name = "card_house",
+       .scene = "hard/card_house.xml",
+       .criterion = "largest sink of a card [m]",
+       .measure = largest_sink,
+       .bound = 5e-3,
+       .seconds = 2,
+       .steps = usual(),
+       .schemes = all(),
+       .known = all(),
+       .why = kOnEdges},
       {.name = "box_through_plate",
        .scene = "hard/box_through_plate.xml",
        .criterion = "depth of the box's middle below the plate's [m]",
@@ -174,6 +185,26 @@ Cases impacts() {
                    .steps = usual(),
                    .why = kAcrossATouch},
                   higher());
+  cases.push_back({.name = "rebound",
+                   .scene = "hard/rebound.xml",
+                   .criterion = "error of the speed after the touch",
+                   .measure = speed_error(0, 1),
+                   .bound = 0.05,
+                   .seconds = 0.05,
+                   .steps = {1e-4, 1e-3, 5e-3},
+                   .schemes = all(),
+                   .quick = true,
+                   .known = all(),
+                   .why = kShortTouch});
+  cases.push_back({.name = "pull_off",
+                   .scene = "hard/pull_off.xml",
+                   .criterion = "speed lost",
+                   .measure = speed_error(1, 1),
+                   .bound = 1e-6,
+                   .seconds = 0.05,
+                   .steps = usual(),
+                   .schemes = all(),
+                   .quick = true});
   cases.push_back({.name = "deep_overlap",
                    .scene = "hard/deep_overlap.xml",
                    .criterion = "speed over sqrt(kn/m) depth",
@@ -313,6 +344,24 @@ Cases closed_forms() {
        .quick = true,
        .known = all(),
        .why = kFarStop},
+      {.name = "rolling",
+       .scene = "hard/rolling.xml",
+       .criterion = "error of the rolling speed",
+       .measure = speed_error(0, 5.0 / 7),
+       .bound = 1e-3,
+       .seconds = 1,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true},
+      {.name = "motor_gain",
+       .scene = "hard/motor_gain.xml",
+       .criterion = "distance from the target [rad]",
+       .measure = angle_error(0, 0.5),
+       .bound = 1e-9,
+       .seconds = 0.5,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true},
       {.name = "slope_below",
        .scene = "hard/slope_below.xml",
        .criterion = "error of the creeping speed",
@@ -381,7 +430,8 @@ Cases stiff_scenes() {
   for (const StiffScene& of : {StiffScene{"rolling_ball_small", Integrator::bdf2, true, true, true},
                                StiffScene{"box_pushing", Integrator::bdf1, false, true, true},
                                StiffScene{"cap_opening", Integrator::bdf1, false, true, false},
-                               StiffScene{"insertion", Integrator::bdf1, false, true, false}}) {
+                               StiffScene{"insertion", Integrator::bdf1, false, true, false},
+                               StiffScene{"stable_grasp", Integrator::bdf1, false, false, false}}) {
     add(of, "_kn_1e3", {.kn = 1e3}, of.kn_1e3);
     add(of, "_kn_1e6", {.kn = 1e6}, of.kn_1e6);
     add(of, "_kt_1e4", {.kt = 1e4}, of.kt_1e4);

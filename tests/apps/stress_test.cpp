@@ -3,8 +3,10 @@
 // any machine, but for what is known to fail. No test looks at how long anything took.
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <csignal>
 #include <nlohmann/json.hpp>
-#include <set>
+#include <thread>
 
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
@@ -86,6 +88,23 @@ TEST(Stress, SaysThatASceneIsRefused) {
   if (row.at("verdict") != "flagged") GTEST_SKIP() << "it is not refused any more";
   EXPECT_THAT(row.at("reason").get<std::string>(), HasSubstr("refused: hard/chain_100.xml:"));
   EXPECT_TRUE(row.at("step").is_null());
+}
+
+TEST(Stress, StopsAndKeepsWhatThereIs) {
+  const Folder folder;
+  Program program(folder, {"stress", "--threads", "1", "--json"}, {}, {"", "rows"});
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(5);
+  while (!std::filesystem::exists(folder.path("rows")) ||
+         file_bytes(folder.path("rows")).find("BDF1 ") == std::string::npos) {
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline) << "no row appeared";
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  program.send(SIGINT);
+  const Outcome outcome = program.wait();
+  EXPECT_EQ(outcome.exit_code, 130);
+  const json answer = json::parse(outcome.out);
+  EXPECT_EQ(answer.at("stopped"), true);
+  EXPECT_FALSE(answer.at("rows").empty());
 }
 
 class StressRefuses : public ::testing::TestWithParam<std::pair<Words, const char*>> {};
