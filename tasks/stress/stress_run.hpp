@@ -63,7 +63,7 @@ struct StressListener {
 StressReport run_stress(std::span<const StressCase> cases, const StressOptions& options,
                         const StressScenes& scenes, const StressListener& listener);
 
-/// The names of the cases that the options choose.
+/// The names of the cases, in their order.
 std::vector<std::string> stress_names(std::span<const StressCase> cases);
 
 }  // namespace tangere
