@@ -113,6 +113,7 @@ std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const
   const int used = std::min(threads, run.batch.blocks());
   BlockThreads block_threads(used);
   std::vector<Worker> workers;
+  workers.reserve(as_size(used));
   for (int i = 0; i < used; ++i)
     workers.push_back(
         {Stepper(model, {setting.integrator, setting.step, std::nullopt}), Readout(model)});
