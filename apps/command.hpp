@@ -35,5 +35,6 @@ Command add_plot(CLI::App& program);
 Command add_bench(CLI::App& program);
 Command add_gradcheck(CLI::App& program);
 Command add_accuracy(CLI::App& program);
+Command add_stress(CLI::App& program);
 
 }  // namespace tangere::apps

@@ -27,6 +27,18 @@ Precision precision_named(const std::string& name) {
   throw InputError("unknown precision '" + name + "'" + suggestion(name, names));
 }
 
+std::vector<std::string> integrator_names() {
+  std::vector<std::string> names;
+  for (const Integrator known : integrators()) names.emplace_back(to_string(known));
+  return names;
+}
+
+Integrator integrator_named(const std::string& name) {
+  for (const Integrator known : integrators())
+    if (to_string(known) == name) return known;
+  throw InputError("unknown integrator '" + name + "'" + suggestion(name, integrator_names()));
+}
+
 LossKind loss_named(const std::string& name) {
   std::vector<std::string> names;
   for (const LossKind value : loss_kinds()) {

@@ -24,6 +24,10 @@ constexpr std::int64_t kMostSteps = 1'000'000'000'000;
 /// Throws InputError for an unknown --precision.
 Precision precision_named(const std::string& name);
 
+/// The schemes that can be chosen, and one of them by name. Throws InputError for an unknown name.
+std::vector<std::string> integrator_names();
+Integrator integrator_named(const std::string& name);
+
 /// Throws InputError for an unknown loss.
 LossKind loss_named(const std::string& name);
 

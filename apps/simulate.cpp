@@ -38,18 +38,6 @@ struct SimulateArguments {
   bool point_gradients = false, overwrite = false, allow_unknown = false;
 };
 
-std::vector<std::string> integrator_names() {
-  std::vector<std::string> names;
-  for (const Integrator known : integrators()) names.emplace_back(to_string(known));
-  return names;
-}
-
-Integrator integrator_named(const std::string& name) {
-  for (const Integrator known : integrators())
-    if (to_string(known) == name) return known;
-  throw InputError("unknown integrator '" + name + "'" + suggestion(name, integrator_names()));
-}
-
 void check_arguments(const SimulateArguments& options) {
   check_not_same_file(options.output, options.scene);
   for (const std::string& input : {options.controls, options.state_from})

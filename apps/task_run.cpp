@@ -18,7 +18,7 @@ std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
                                 const SolverOptions& asked) {
   if (is_task(word)) {
     const TaskSpec spec = task_spec(word);
-    const char* const text = task_scene(spec.scene);
+    const char* const text = program_scene(spec.scene);
     if (text == nullptr)
       throw InputError(fmt::format("task '{}': its scene {} is not there", word, spec.scene));
     SceneFile file = parse_scene(text, spec.scene);

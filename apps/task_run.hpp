@@ -33,7 +33,8 @@ void refuse_with_task(const Task& task, const std::vector<GivenOption>& options)
 /// Does the same for options that only tasks have.
 void refuse_with_scene(const std::string& scene, const std::vector<GivenOption>& options);
 
-/// Returns the text of a scene that the program contains; null for other names.
-const char* task_scene(const std::string& file);
+/// Returns the text of a scene that the program contains, those of tasks and the hard ones, by its
+/// path below scenes/; null for other names.
+const char* program_scene(const std::string& file);
 
 }  // namespace tangere::apps

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// Steps are shown in milliseconds for people, in seconds for programs.
+#include "apps/stress_report.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace tangere::apps {
+namespace {
+
+int count(const StressReport& report, StressVerdict verdict) {
+  return static_cast<int>(std::count_if(report.rows.begin(), report.rows.end(),
+                                        [&](const StressRow& r) { return r.verdict == verdict; }));
+}
+
+int known_failures(const StressReport& report) {
+  return static_cast<int>(std::count_if(report.rows.begin(), report.rows.end(),
+                                        [](const StressRow& r) { return r.known; }));
+}
+
+std::string verdict_text(const StressRow& row) {
+  std::string text = to_string(row.verdict);
+  if (row.known) text += " (known)";
+  if (row.verdict == StressVerdict::flagged) text += ": " + row.reason;
+  return text;
+}
+
+/// Whether it came to a step. A refused scene has neither scheme nor step.
+bool played(const StressRow& row) { return row.steps > 0; }
+
+Json row_json(const StressRow& row) {
+  return {{"case", row.of->name},
+          {"scene", row.of->scene},
+          {"scheme", played(row) ? Json(to_string(row.integrator)) : Json()},
+          {"step", played(row) ? Json(row.step) : Json()},
+          {"criterion", row.of->criterion},
+          {"bound", row.of->bound},
+          {"value", finite(row.value)},
+          {"evaluations_per_step", row.evaluations},
+          {"most_evaluations", row.most_evaluations},
+          {"environment_steps", row.steps},
+          {"split_steps", row.split_steps},
+          {"envs", row.environments},
+          {"failed", row.failed},
+          {"verdict", to_string(row.verdict)},
+          {"known", row.known},
+          {"reason", row.reason}};
+}
+
+}  // namespace
+
+std::string stress_head() {
+  return fmt::format("{:<26} {:<7} {:>5}  {:<48} {:>9} {:>8} {:>7} {:>6} {:>10}  verdict", "case",
+                     "scheme", "ms", "criterion", "measured", "at most", "passes", "splits",
+                     "failed");
+}
+
+std::string stress_row(const StressRow& row) {
+  return fmt::format("{:<26} {:<7} {:>5}  {:<48} {:>9} {:>8} {:>7} {:>6} {:>10}  {}", row.of->name,
+                     played(row) ? to_string(row.integrator) : "-",
+                     played(row) ? fmt::format("{:g}", 1e3 * row.step) : "-", row.of->criterion,
+                     std::isnan(row.value) ? "-" : fmt::format("{:.3g}", row.value),
+                     fmt::format("{:.4g}", row.of->bound), fmt::format("{:.2f}", row.evaluations),
+                     row.split_steps, fmt::format("{} of {}", row.failed, row.environments),
+                     verdict_text(row));
+}
+
+int unknown_failures(const StressReport& report) {
+  return count(report, StressVerdict::fails) - known_failures(report);
+}
+
+std::string stress_summary(const StressReport& report) {
+  std::string text =
+      fmt::format("Holds: {}. Flagged: {}. Fails and is known to: {}. Fails and is not: {}.",
+                  count(report, StressVerdict::holds), count(report, StressVerdict::flagged),
+                  known_failures(report), unknown_failures(report));
+  const StressCase* last = nullptr;
+  for (const StressRow& row : report.rows) {
+    if (!row.known || row.of == last) continue;
+    last = row.of;
+    text += fmt::format("\n{}: {}", last->name, last->why);
+  }
+  return text;
+}
+
+Json stress_json(const StressReport& report) {
+  Json rows = Json::array();
+  for (const StressRow& row : report.rows) rows.push_back(row_json(row));
+  return {{"stopped", report.stopped},
+          {"holds", count(report, StressVerdict::holds)},
+          {"flagged", count(report, StressVerdict::flagged)},
+          {"fails", count(report, StressVerdict::fails)},
+          {"known_fails", known_failures(report)},
+          {"rows", rows}};
+}
+
+}  // namespace tangere::apps

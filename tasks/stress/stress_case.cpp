@@ -1,0 +1,478 @@
+// SPDX-License-Identifier: Apache-2.0
+// The table of hard cases. A row puts into numbers what the comment in its scene file says.
+#include "tasks/stress/stress_case.hpp"
+
+namespace tangere {
+namespace {
+
+using Cases = std::vector<StressCase>;
+using Schemes = std::vector<Integrator>;
+using Steps = std::vector<double>;
+
+// Functions, because Integrator's own constants may not be there yet when a constant here is made.
+Schemes all() {
+  return {Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2, Integrator::sdirk3};
+}
+Schemes bdf1() { return {Integrator::bdf1}; }
+Schemes higher() { return {Integrator::bdf2, Integrator::sdirk2, Integrator::sdirk3}; }
+Steps usual() { return {5e-3, 1e-3, 20e-3}; }
+
+// Why cases fail.
+constexpr const char* kOnEdges =
+    "the nearest face is chosen for each point, and a corner that lies on an edge has none";
+constexpr const char* kBetweenPoints = "only contact points touch, and none is near";
+constexpr const char* kEndPoses =
+    "a step looks at its end alone, where the nearest face is the far one";
+constexpr const char* kAcrossATouch = "a step across a touch can gain energy";
+constexpr const char* kShortTouch = "a step that is not much shorter than the touch misses it";
+constexpr const char* kOneNorm = "one norm for all bodies hides a light one's error";
+constexpr const char* kDamps = "the scheme damps rotation, or turns it too slowly, at these steps";
+constexpr const char* kFarStop = "Newton stops early where positions are large";
+constexpr const char* kChains = "a whipping chain gains energy where steps are too long for it";
+constexpr const char* kKinks = "Newton's method converges slowly where contacts are stiff";
+
+constexpr double kNoGain = 1 + 1e-9;  // of energy, for BDF1
+constexpr double kSlightGain = 1.01;  // for the other schemes
+
+/// The same case for BDF1 and for the others, whose bounds on energy differ.
+void add_energy_case(Cases& cases, StressCase of, const Schemes& known_higher,
+                     const Schemes& known_bdf1 = {}) {
+  of.criterion = "energy over the start's";
+  of.measure = energy_ratio;
+  const auto add = [&](const char* suffix, const Schemes& schemes, double bound,
+                       const Schemes& known) {
+    cases.push_back(of);
+    StressCase& added = cases.back();
+    added.name += suffix;
+    added.schemes = schemes;
+    added.bound = bound;
+    added.known = known;
+    if (known.empty()) added.why.clear();
+  };
+  add("", bdf1(), kNoGain, known_bdf1);
+  add("_higher", higher(), kSlightGain, known_higher);
+}
+
+Cases geometry() {
+  return {
+      {.name = "stack_equal",
+       .scene = "hard/stack_equal.xml",
+       .criterion = "largest sink of a box [m]",
+       .measure = largest_sink,
+       .bound = 5e-3,
+       .seconds = 3,
+       .steps = usual(),
+       .schemes = all(),
+       .environments = 16,
+       .quick = true,
+       .known = all(),
+       .why = kOnEdges},
+      {.name = "stack_unequal",
+       .scene = "hard/stack_unequal.xml",
+       .criterion = "largest sink of a box [m]",
+       .measure = largest_sink,
+       .bound = 5e-3,
+       .seconds = 3,
+       .steps = usual(),
+       .schemes = all(),
+       .environments = 16,
+       .quick = true},
+      {.name = "post_between_points",
+       .scene = "hard/post_between_points.xml",
+       .criterion = "largest sink of the box [m]",
+       .measure = largest_sink,
+       .bound = 5e-3,
+       .seconds = 0.5,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true,
+       .known = all(),
+       .why = kBetweenPoints},
+      {.name = "card_house",
+       .scene = "hard/card_house.xml",
+       .criterion = "largest sink of a card [m]",
+       .measure = largest_sink,
+       .bound = 5e-3,
+       .seconds = 2,
+       .steps = usual(),
+       .schemes = all(),
+       .known = all(),
+       .why = kOnEdges},
+      {.name = "box_through_plate",
+       .scene = "hard/box_through_plate.xml",
+       .criterion = "depth of the box's middle below the plate's [m]",
+       .measure = sinks_below(1, 0),
+       .bound = 0,
+       .seconds = 0.3,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true,
+       .known = all(),
+       .why = kEndPoses},
+      {.name = "box_through_plate_fast",
+       .scene = "hard/box_through_plate.xml",
+       .criterion = "depth of the box's middle below the plate's [m]",
+       .measure = sinks_below(1, 0),
+       .bound = 0,
+       .seconds = 0.3,
+       .steps = usual(),
+       .schemes = all(),
+       .variant = {.speed = 5 / 1.5},
+       .quick = true,
+       .known = all(),
+       .why = kEndPoses},
+      {.name = "ball_through_pad",
+       .scene = "hard/ball_through_pad.xml",
+       .criterion = "depth of the ball's middle below the pad's [m]",
+       .measure = sinks_below(1, 0),
+       .bound = 0,
+       .seconds = 0.05,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true,
+       .known = all(),
+       .why = kEndPoses},
+      {.name = "edge_drop",
+       .scene = "hard/edge_drop.xml",
+       .criterion = "depth of the box's middle below the ground [m]",
+       .measure = sinks_below_ground(0),
+       .bound = 0,
+       .seconds = 1,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true},
+  };
+}
+
+Cases impacts() {
+  Cases cases;
+  add_energy_case(cases,
+                  {.name = "ball_impact",
+                   .scene = "hard/ball_impact.xml",
+                   .seconds = 0.1,
+                   .steps = usual(),
+                   .quick = true,
+                   .why = kAcrossATouch},
+                  higher());
+  add_energy_case(cases,
+                  {.name = "joint_limit",
+                   .scene = "hard/joint_limit.xml",
+                   .seconds = 0.2,
+                   .steps = usual(),
+                   .quick = true,
+                   .why = kAcrossATouch},
+                  higher());
+  add_energy_case(cases,
+                  {.name = "cradle",
+                   .scene = "hard/cradle.xml",
+                   .seconds = 0.4,
+                   .steps = usual(),
+                   .quick = true,
+                   .why = kAcrossATouch},
+                  higher(), bdf1());
+  add_energy_case(cases,
+                  {.name = "toss",
+                   .scene = "hard/toss.xml",
+                   .seconds = 1,
+                   .steps = usual(),
+                   .quick = true,
+                   .why = kAcrossATouch},
+                  higher());
+  add_energy_case(cases,
+                  {.name = "painleve_rod",
+                   .scene = "hard/painleve_rod.xml",
+                   .seconds = 1,
+                   .steps = usual(),
+                   .why = kAcrossATouch},
+                  higher());
+  cases.push_back({.name = "rebound",
+                   .scene = "hard/rebound.xml",
+                   .criterion = "error of the speed after the touch",
+                   .measure = speed_error(0, 1),
+                   .bound = 0.05,
+                   .seconds = 0.05,
+                   .steps = {1e-4, 1e-3, 5e-3},
+                   .schemes = all(),
+                   .quick = true,
+                   .known = all(),
+                   .why = kShortTouch});
+  cases.push_back({.name = "pull_off",
+                   .scene = "hard/pull_off.xml",
+                   .criterion = "speed lost",
+                   .measure = speed_error(1, 1),
+                   .bound = 1e-6,
+                   .seconds = 0.05,
+                   .steps = usual(),
+                   .schemes = all(),
+                   .quick = true});
+  cases.push_back({.name = "deep_overlap",
+                   .scene = "hard/deep_overlap.xml",
+                   .criterion = "speed over sqrt(kn/m) depth",
+                   .measure = release_speed(0, 9e-3),
+                   .bound = kSlightGain,
+                   .seconds = 0.1,
+                   .steps = usual(),
+                   .schemes = all(),
+                   .quick = true,
+                   .known = higher(),
+                   .why = kAcrossATouch});
+  return cases;
+}
+
+Cases masses() {
+  return {
+      {.name = "light_beside_heavy",
+       .scene = "hard/light_beside_heavy.xml",
+       .criterion = "error of the way that the ball falls",
+       .measure = fall_error(0),
+       .bound = 0.02,
+       .seconds = 0.5,
+       .steps = {5e-3, 1e-3},
+       .schemes = all(),
+       .quick = true,
+       .known = bdf1(),
+       .why = kOneNorm},
+      {.name = "heavy_on_light",
+       .scene = "hard/heavy_on_light.xml",
+       .criterion = "error of the light box's depth",
+       .measure = rest_depth_error(0, 0.05, 4, 1e6 + 1),
+       .bound = 0.01,
+       .seconds = 2,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true},
+      {.name = "cube_pair",
+       .scene = "hard/cube_pair.xml",
+       .criterion = "largest shift of a cube [m]",
+       .measure = largest_shift,
+       .bound = 1e-3,
+       .seconds = 1,
+       .steps = {1e-3, 5e-3},
+       .schemes = all(),
+       .quick = true},
+      {.name = "hard_batch",
+       .scene = "hard/hard_batch.xml",
+       .criterion = "depth of a box's middle below the ground [m]",
+       .measure = sinks_below_ground(0),
+       .bound = 0,
+       .seconds = 0.5,
+       .steps = {5e-3, 20e-3},
+       .schemes = all(),
+       .environments = 1024,
+       .may_fail = 1e-4},
+  };
+}
+
+Cases rotations() {
+  Cases cases{
+      {.name = "fast_spin",
+       .scene = "hard/fast_spin.xml",
+       .criterion = "error of the angle [turns]",
+       .measure = turn_error(0),
+       .bound = 1e-6,
+       .seconds = 1,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true},
+      {.name = "tumbling_momentum",
+       .scene = "hard/tumbling.xml",
+       .criterion = "change of angular momentum",
+       .measure = momentum_change,
+       .bound = 0.02,
+       .seconds = 1,
+       .steps = {5e-3, 1e-3},
+       .schemes = all(),
+       .quick = true,
+       .known = {Integrator::bdf1, Integrator::bdf2},
+       .why = kDamps},
+      {.name = "tumbling_energy",
+       .scene = "hard/tumbling.xml",
+       .criterion = "change of energy",
+       .measure = energy_change,
+       .bound = 0.02,
+       .seconds = 1,
+       .steps = {5e-3, 1e-3},
+       .schemes = all(),
+       .quick = true,
+       .known = {Integrator::bdf1, Integrator::bdf2},
+       .why = kDamps},
+      {.name = "heavy_top",
+       .scene = "hard/heavy_top.xml",
+       .criterion = "error of the rate around the vertical",
+       .measure = precession_error(0),
+       .bound = 0.01,
+       .seconds = 5,
+       .steps = {1e-3, 5e-3},
+       .schemes = all(),
+       .known = all(),
+       .why = kDamps},
+  };
+  add_energy_case(cases,
+                  {.name = "chain_whipped",
+                   .scene = "hard/chain_whipped.xml",
+                   .seconds = 1,
+                   .steps = usual(),
+                   .why = kChains},
+                  higher(), bdf1());
+  add_energy_case(cases,
+                  {.name = "chain_20",
+                   .scene = "hard/chain_20.xml",
+                   .seconds = 2,
+                   .steps = usual(),
+                   .why = kChains},
+                  higher(), bdf1());
+  add_energy_case(cases,
+                  {.name = "chain_100",
+                   .scene = "hard/chain_100.xml",
+                   .seconds = 1,
+                   .steps = usual(),
+                   .quick = true},
+                  {});
+  return cases;
+}
+
+Cases closed_forms() {
+  Cases cases{
+      {.name = "far_away",
+       .scene = "hard/far_away.xml",
+       .criterion = "error of the depth",
+       .measure = rest_depth_error(0, 0.01, 1),
+       .bound = 1e-9,
+       .seconds = 2,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true,
+       .known = all(),
+       .why = kFarStop},
+      {.name = "rolling",
+       .scene = "hard/rolling.xml",
+       .criterion = "error of the rolling speed",
+       .measure = speed_error(0, 5.0 / 7),
+       .bound = 1e-3,
+       .seconds = 1,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true},
+      {.name = "motor_gain",
+       .scene = "hard/motor_gain.xml",
+       .criterion = "distance from the target [rad]",
+       .measure = angle_error(0, 0.5),
+       .bound = 1e-9,
+       .seconds = 0.5,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true},
+      {.name = "slope_below",
+       .scene = "hard/slope_below.xml",
+       .criterion = "error of the creeping speed",
+       .measure = creep_error(0, 4),
+       .bound = 1e-6,
+       .seconds = 1,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true},
+      {.name = "slope_above",
+       .scene = "hard/slope_above.xml",
+       .criterion = "error of the acceleration",
+       .measure = slide_error(0),
+       .bound = 1e-3,
+       .seconds = 2,
+       .steps = usual(),
+       .schemes = all(),
+       .quick = true},
+      {.name = "sliding_cube",
+       .scene = "hard/sliding_cube.xml",
+       .criterion = "error of the way until it stops",
+       .measure = stop_error(0, 4),
+       .bound = 0.02,
+       .seconds = 1,
+       .steps = {5e-3, 1e-3},
+       .schemes = all(),
+       .quick = true},
+  };
+  for (const auto& [name, factor] :
+       {std::pair{"ball_at_rest_1e2", 1.0}, std::pair{"ball_at_rest_1e5", 1e3},
+        std::pair{"ball_at_rest_1e8", 1e6}})
+    cases.push_back({.name = name,
+                     .scene = "hard/ball_at_rest.xml",
+                     .criterion = "error of the depth",
+                     .measure = rest_depth_error(0, 0.01, 1),
+                     .bound = 0.01,
+                     .seconds = 2,
+                     .steps = usual(),
+                     .schemes = all(),
+                     .variant = {.kn = factor},
+                     .quick = true});
+  return cases;
+}
+
+/// Schemes of the scenes of the tasks, and which variants take too many passes.
+struct StiffScene {
+  const char* scene;
+  Integrator own;
+  bool kn_1e3, kn_1e6, kt_1e4;
+};
+
+/// The scenes of the tasks with stiffer contacts, at their own schemes and steps.
+Cases stiff_scenes() {
+  Cases cases;
+  const auto add = [&](const StiffScene& of, const char* suffix, const StressVariant& variant,
+                       bool known) {
+    cases.push_back({.name = std::string(of.scene) + suffix,
+                     .scene = std::string(of.scene) + ".xml",
+                     .criterion = "passes over the ordinary scene's",
+                     .bound = 2.5,
+                     .variant = variant,
+                     .environments = 16,
+                     .known = known ? Schemes{of.own} : Schemes{},
+                     .why = known ? kKinks : ""});
+  };
+  for (const StiffScene& of : {StiffScene{"rolling_ball_small", Integrator::bdf2, true, true, true},
+                               StiffScene{"box_pushing", Integrator::bdf1, false, true, true},
+                               StiffScene{"cap_opening", Integrator::bdf1, false, true, false},
+                               StiffScene{"insertion", Integrator::bdf1, false, true, false},
+                               StiffScene{"stable_grasp", Integrator::bdf1, false, false, false}}) {
+    add(of, "_kn_1e3", {.kn = 1e3}, of.kn_1e3);
+    add(of, "_kn_1e6", {.kn = 1e6}, of.kn_1e6);
+    add(of, "_kt_1e4", {.kt = 1e4}, of.kt_1e4);
+  }
+  return cases;
+}
+
+void scale(RandomizationDescription& drawn, const StressVariant& variant) {
+  const NumberOwner owner = drawn.number.owner;
+  if (owner != NumberOwner::contact && owner != NumberOwner::ground) return;
+  const double factor = drawn.number.field == NumberField::kn   ? variant.kn
+                        : drawn.number.field == NumberField::kt ? variant.kt
+                                                                : 1;
+  drawn.distribution.a *= factor;
+  drawn.distribution.b *= factor;
+  for (double& value : drawn.distribution.values) value *= factor;
+}
+
+}  // namespace
+
+std::span<const StressCase> stress_cases() {
+  static const Cases table = [] {
+    Cases cases;
+    for (const auto part : {geometry, impacts, masses, rotations, closed_forms, stiff_scenes})
+      for (StressCase& of : part()) cases.push_back(std::move(of));
+    return cases;
+  }();
+  return table;
+}
+
+Scene varied(Scene scene, const StressVariant& variant) {
+  const auto stiffen = [&](ContactCoefficients& c) {
+    c.kn *= variant.kn;
+    c.kt *= variant.kt;
+  };
+  for (GroundContactDescription& c : scene.ground_contacts) stiffen(c.coefficients);
+  for (PairContactDescription& c : scene.pair_contacts) stiffen(c.coefficients);
+  for (InitialState& state : scene.initial)
+    for (double& v : state.v) v *= variant.speed;
+  for (RandomizationDescription& drawn : scene.randomizations) scale(drawn, variant);
+  return scene;
+}
+
+}  // namespace tangere

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// The hard cases: which scene, how long, which schemes and steps, what is measured, and how much
+// of it is good.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tasks/stress/criteria.hpp"
+
+namespace tangere {
+
+/// Factors on numbers of a scene, so that one file serves several cases.
+struct StressVariant {
+  double kn = 1, kt = 1;  ///< of all contacts
+  double speed = 1;       ///< of all starting velocities
+};
+
+struct StressCase {
+  std::string name;
+  std::string scene;        ///< file below scenes/
+  std::string criterion{};  ///< in words; the bound follows it
+  /// Of each environment; the worst counts. None: passes a step over those of the scene without
+  /// its variant.
+  Criterion measure{};
+  double bound = 0;
+  double seconds = 0;           ///< simulated; 0: as long as the scene's controls
+  std::vector<double> steps{};  ///< [s]; none: the scene's own. The first is that of a quick run
+  std::vector<Integrator> schemes{};  ///< none: the scene's own
+  StressVariant variant{};
+  int environments = 1;
+  double may_fail = 0;  ///< share of environments that may fail
+  bool quick = false;   ///< belongs to a quick run
+  /// Schemes for which this version fails without saying so, and why. Whoever mends one takes it
+  /// off this list.
+  std::vector<Integrator> known{};
+  std::string why{};
+};
+
+/// All cases, those that are known to fail first.
+std::span<const StressCase> stress_cases();
+
+/// The scene with the factors of a variant, also on what <randomize> draws.
+Scene varied(Scene scene, const StressVariant& variant);
+
+}  // namespace tangere

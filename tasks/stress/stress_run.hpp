@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Plays hard cases over schemes and steps and judges each.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tasks/stress/stress_case.hpp"
+
+namespace tangere {
+
+/// What a setting of a case came to.
+enum class StressVerdict {
+  holds,    ///< the criterion is met
+  flagged,  ///< not met, and the engine said so: by a status, or by refusing the scene
+  fails,    ///< not met, and nothing was said
+};
+const char* to_string(StressVerdict value);
+
+/// One case with one scheme and one step.
+struct StressRow {
+  const StressCase* of = nullptr;
+  Integrator integrator = Integrator::bdf1;
+  double step = 0;           ///< [s]
+  double value = 0;          ///< measured, in the worst environment that did not fail; NaN: none
+  double evaluations = 0;    ///< of the residual, per step
+  int most_evaluations = 0;  ///< in one step of one environment
+  std::int64_t steps = 0;    ///< of all environments
+  std::int64_t split_steps = 0;
+  int environments = 0, failed = 0;
+  StressVerdict verdict = StressVerdict::fails;
+  bool known = false;  ///< fails, and is listed as failing
+  std::string reason;  ///< why it is flagged; "" otherwise
+};
+
+struct StressOptions {
+  std::string name;                      ///< of one case; "": all
+  std::optional<Integrator> integrator;  ///< instead of the case's schemes
+  std::optional<double> step;            ///< instead of the case's steps [s]
+  bool quick = false;                    ///< quick cases alone, each at its first step
+  int threads = 1;
+};
+
+struct StressReport {
+  std::vector<StressRow> rows;
+  bool stopped = false;
+};
+
+/// Returns a scene by its name below scenes/. Throws InputError where it cannot be read.
+using StressScenes = std::function<Scene(const std::string& file)>;
+
+struct StressListener {
+  /// Called before every step of every block, from any thread. False stops the run.
+  std::function<bool()> go_on;
+  std::function<void(const StressRow&)> row;  ///< each as it is measured
+};
+
+/// Plays the cases that the options name, in their order. A stop leaves the rows before it. A scene
+/// that is refused is a flagged row. Throws InputError when no case has the name.
+StressReport run_stress(std::span<const StressCase> cases, const StressOptions& options,
+                        const StressScenes& scenes, const StressListener& listener);
+
+/// The names of the cases, in their order.
+std::vector<std::string> stress_names(std::span<const StressCase> cases);
+
+}  // namespace tangere
