@@ -267,6 +267,10 @@ hid_t link_access(hid_t kind) {
       ->second;
 }
 
+std::string place_of(const Id& object) {
+  return fmt::format("'{}' in '{}'", name_of(object.get()), file_of(object.get()));
+}
+
 Quiet::Quiet() {
   note_call_begins();
   // Otherwise the library would try again, and complain, at the end of the program about a file

@@ -44,6 +44,9 @@ class Id {
   hid_t id_ = -1;
 };
 
+/// "'/scene' in 'balls/shard-00000.h5'", for messages.
+[[nodiscard]] std::string place_of(const Id& object);
+
 /// While this object lives, the library does not print its errors.
 class Quiet {
  public:
