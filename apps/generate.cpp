@@ -18,6 +18,7 @@
 #include "apps/workers.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/files/text_file.hpp"
+#include "io/hdf5/reading_note.hpp"
 #include "kernels/table/isa.hpp"
 #include "tasks/gradients/episode_gradients.hpp"
 #include "tasks/gradients/losses.hpp"
@@ -272,6 +273,7 @@ int make(const GenerateOptions& options, const Console& console, const Job& job)
                   run.steps, run.every, run.threads, output.kept()));
   JobResult done;
   if (episodes > 0) {
+    const h5::NotReading computing;
     Progress progress(console, job.unit,
                       episodes * (job.layout.task ? job.layout.rows() : run.steps), 1);
     done = job.simulate(
@@ -321,6 +323,11 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
     return {summary, report_of(task, kind, summary)};
   };
   return make(options, console, job);
+}
+
+/// Whether it may read shards that it did not write itself.
+bool meets_other_shards(const GenerateOptions& options) {
+  return options.resume || !options.shard.empty() || !worker_from_environment().source.empty();
 }
 
 void check_word(const char* what, const std::string& word, const std::vector<std::string>& known) {
@@ -446,7 +453,8 @@ Command add_generate(CLI::App& program) {
   add_flag(app, "--allow-unknown", o.allow_unknown,
            "Unknown elements and attributes of the scene are warnings, not errors");
   add_console_options(app, *console);
-  return {&app, [=](const ProgramInfo& info) { return generate(*options, *console, info); }};
+  return {&app, [=](const ProgramInfo& info) { return generate(*options, *console, info); },
+          [options] { return meets_other_shards(*options); }};
 }
 
 }  // namespace tangere::apps

@@ -133,13 +133,12 @@ int run_in_child(const std::function<int()>& command) {
   const int signal = WTERMSIG(status);
   if (signal == SIGINT) return kInterrupted;
   if (signal == SIGTERM) return kTerminated;
-  const std::string last = reading.empty() ? "nothing" : reading;
   if (signal == SIGPROF)
     throw IoError(fmt::format(
         "the HDF5 library did not come back within {} s of computing; it had last read {}; a file "
         "over which the library loops is damaged",
-        kEndless.count(), last));
-  if (!is_crash(signal)) {  // a closed pipe, a limit: end as the child did
+        kEndless.count(), reading));
+  if (!is_crash(signal) || reading.empty()) {  // a closed pipe, a limit: end as the child did
     signals.restore();
     std::signal(signal, SIG_DFL);
     raise(signal);
@@ -147,7 +146,7 @@ int run_in_child(const std::function<int()>& command) {
   throw IoError(fmt::format(
       "the reading process was ended by a signal ({}); it had last read {}; a file that makes the "
       "HDF5 library crash is damaged",
-      strsignal(signal), last));
+      strsignal(signal), reading));
 }
 
 }  // namespace tangere::apps

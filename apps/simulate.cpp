@@ -18,6 +18,7 @@
 #include "apps/task_run.hpp"
 #include "engine/derivative/number_gradients.hpp"
 #include "io/files/nearest_name.hpp"
+#include "io/hdf5/reading_note.hpp"
 #include "io/trajectory/saved_state.hpp"
 #include "io/trajectory/trajectory_file.hpp"
 #include "kernels/table/isa.hpp"
@@ -275,6 +276,7 @@ int write_run(const SimulateArguments& options, const Console& console, const Ba
                              rollout.steps, to_string(stepper.integrator()), stepper.timestep()));
   RolloutSummary summary;
   {
+    const h5::NotReading computing;
     Progress progress(console, "step", rollout.steps, batch.environments());
     summary = run([&](std::int64_t done) {
       progress.update(done);

@@ -66,7 +66,7 @@ DatasetFolder::~DatasetFolder() {
 void DatasetFolder::hold() {
   lock_.emplace(path_);
   if (shared_ ? lock_->take(FolderLock::Kind::shared, patience_.to_share)
-              : lock_->take(FolderLock::Kind::alone))
+              : lock_->take(FolderLock::Kind::alone, patience_.to_be_alone))
     return;
   throw IoError(
       fmt::format("cannot write into '{}': another process is writing shards there{}; start again "

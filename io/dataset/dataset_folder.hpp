@@ -13,8 +13,8 @@
 
 namespace tangere {
 
-/// How long a process that shares a folder waits until another one has merged, and how long it
-/// waits to be alone while others read it.
+/// How long a process that shares a folder waits until another one has merged, and how long a
+/// process waits to be alone while others read it, or while a killed one ends.
 struct FolderPatience {
   LockPatience to_share = LockPatience::seconds(10), to_be_alone = LockPatience::seconds(1);
 };

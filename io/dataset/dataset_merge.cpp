@@ -150,7 +150,7 @@ class Merger {
       h5::Bytes out;
       for (const h5::FileMember& group : add_demo_links(out, file_.here(), *members_, shard, batch))
         linked_.push_back(group);
-      file_.append(out);
+      file_.append(out, {"links from demo_", batch.front().number});
     }
     if (!view_) view_.emplace(dataset_.folder, data, *members_);
     view_->add(options_.copy ? fs::path(file_.output()).filename().string() : shard, batch);

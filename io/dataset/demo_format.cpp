@@ -52,7 +52,9 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
   shapes_ = {{layout.action_names().size()}, {}, {}};
   types_ = {NumberType::float32, NumberType::float32, NumberType::boolean};
   const std::vector<std::vector<std::uint64_t>> observed = layout.observation_shapes();
-  for (int twice = 0; twice < 2; ++twice) {
+  titles_ = {"actions", "rewards", "dones"};
+  for (const char* group : {"obs/", "final_obs/"}) {
+    for (const std::string& name : names_) titles_.push_back(group + name);
     shapes_.insert(shapes_.end(), observed.begin(), observed.end());
     types_.insert(types_.end(), observed.size(), number);
   }
@@ -62,7 +64,9 @@ DemoFormat::DemoFormat(const DatasetLayout& layout)
         (array.by_row ? 0 : 1);  // one per episode: the array's own first dimension counts its rows
     shapes_.emplace_back(from, array.shape.end());
     types_.push_back(NumberType::float64);
+    titles_.push_back(array.name);
   }
+  for (std::string& title : titles_) title += " of demo_";
   for (std::size_t k = 0; k < shapes_.size(); ++k)
     row_bytes_.push_back(std::accumulate(shapes_[k].begin(), shapes_[k].end(),
                                          h5::bytes_of(types_[k]), std::multiplies<>()));

@@ -53,6 +53,8 @@ class DemoFormat {
   }
   [[nodiscard]] std::size_t gradients() const { return gradients_.size(); }
   [[nodiscard]] std::size_t gradient(std::size_t k) const { return kFirst + 2 * names_.size() + k; }
+  /// "obs/pad of demo_": its number follows.
+  [[nodiscard]] const std::string& title(std::size_t dataset) const { return titles_[dataset]; }
   [[nodiscard]] std::size_t row_bytes(std::size_t dataset) const { return row_bytes_[dataset]; }
   [[nodiscard]] std::size_t rank(std::size_t dataset) const { return shapes_[dataset].size() + 1; }
   /// Rows of a dataset in a demo of `rows`.
@@ -93,7 +95,7 @@ class DemoFormat {
 
   bool of_task_;
   std::size_t randomized_;
-  std::vector<std::string> names_;
+  std::vector<std::string> names_, titles_;  // of observations; of datasets
   std::vector<std::size_t> sources_, gradient_sources_;
   std::vector<GradientArray> gradients_;            // by name
   std::vector<ChunkPlan> plans_;                    // per observation

@@ -31,7 +31,7 @@ class GrownFile {
   void close();
   /// Address of the next bytes.
   [[nodiscard]] std::uint64_t here() const { return here_; }
-  void append(const h5::Bytes& bytes);
+  void append(const h5::Bytes& bytes, const BytesOf& what);
   /// Appends a group to which the library may add members. The arguments are those of
   /// h5::add_large_group. Returns its address.
   std::uint64_t append_group(std::string_view prefix, std::vector<h5::FileMember> members,
@@ -39,7 +39,7 @@ class GrownFile {
   /// `root`: address of the group "/"; h5::kNowhere leaves the group where it was.
   void open(std::uint64_t root = h5::kNowhere);
 
-  /// Reads back what was appended, calls `last` with the path of the .part, syncs and renames.
+  /// Reads the file back and compares it with what was written, calls `last` with the path of the .part, syncs and renames.
   /// Returns the size in bytes.
   std::uint64_t commit(const std::function<void(const std::string&)>& last = {});
 

@@ -108,7 +108,7 @@ void MinariView::add(std::string_view file, std::span<const LinkedDemo> demos) {
        add_minari_episodes(out, file_->here(), members_, fmt::format("{}{}", kToFolder, file),
                            demos, count_, seed_))
     episodes_.push_back(episode);
-  file_->append(out);
+  file_->append(out, {"episodes from episode_", count_});
   count_ += std::ssize(demos);
   for (const LinkedDemo& demo : demos) steps_ += demo.facts.rows;
 }

@@ -5,19 +5,32 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "engine/rows/episode_sink.hpp"
 #include "io/dataset/demo_format.hpp"
-#include "io/dataset/placed_file.hpp"
+#include "io/dataset/shard_check.hpp"
 
 namespace tangere {
+
+/// Rows as ContentSum identifies them.
+struct PlacedRows {
+  std::int64_t episode = 0;
+  std::size_t name = 0;
+  std::int64_t first_row = 0, rows = 0;
+  std::size_t row_bytes = 0;
+};
 
 /// Rows of one dataset of one episode, as a piece has them.
 struct PieceSlice {
   PlacedRows rows;         ///< none if the piece has nothing of the dataset
   std::int64_t first = 0;  ///< row of the dataset that comes first
   const unsigned char* data = nullptr;
+
+  [[nodiscard]] std::span<const unsigned char> bytes() const {
+    return {data, static_cast<std::size_t>(rows.rows) * rows.row_bytes};
+  }
 };
 
 /// R of an episode of the piece. An episode that failed in its first action has no row. It gets

@@ -42,13 +42,13 @@ ShardFile::ShardFile(const std::string& path, const DatasetLayout& layout, const
   describe();
   texts_ = h5::aligned(part_.size());
   const h5::Bytes texts = format_.texts();
-  placed_.add(texts_, texts.all());
+  placed_.add(texts_, texts.all(), {"texts of demos"});
   placed_.flush();
   begin_ = free_ = texts_ + texts.size();
 }
 
 void ShardFile::describe() {
-  file_ = h5::create_file(part_.path());
+  file_ = h5::create_file(part_.path(), part_.written());
   describe_dataset(file_, layout_);
   h5::write_scalar<std::int64_t>(file_, "first_episode", first_episode_);
   h5::write_scalar<std::int64_t>(file_, "episodes", end_ - first_episode_);
@@ -99,11 +99,10 @@ void ShardFile::write(const EpisodeRows& rows, PreparedPiece prepared) {
   for (int e = 0; e < rows.episodes; ++e) {
     const ContentSum& sum = prepared.sums[static_cast<std::size_t>(e)];
     block.demos[static_cast<std::size_t>(e)].sum.add(sum);
-    if (!waits()) placed_.expect(sum);
     write_slices(block, rows, e);
   }
   placed_.flush();
-  hold(block, prepared.chunks);
+  hold(block, rows.first_episode, prepared.chunks);
 }
 
 void ShardFile::write_slices(Block& block, const EpisodeRows& rows, int episode) {
@@ -111,16 +110,17 @@ void ShardFile::write_slices(Block& block, const EpisodeRows& rows, int episode)
   const std::vector<PieceSlice> slices = slices_of(format_, rows, episode, demo.facts.rows);
   for (std::size_t k = 0; k < format_.datasets(); ++k) {
     const PieceSlice& slice = slices[k];
+    const BytesOf what{format_.title(k), rows.first_episode + episode};
     if (!waits()) {
       const std::span<const unsigned char> same = constant(k, demo.facts.rows);
       if (same.empty())
         placed_.add(
             demo.addresses[k] + static_cast<std::uint64_t>(slice.first) * slice.rows.row_bytes,
-            slice.rows, slice.data);
+            slice.bytes(), what);
       else if (rows.first_row == 0)
-        placed_.add(demo.addresses[k], same);
+        placed_.add(demo.addresses[k], same, what);
     } else if (format_.chunk_rows(k, demo.facts.rows) == 0 && slice.rows.rows > 0) {
-      hold(demo, k, slice);
+      hold(demo, k, slice, what);
     }
   }
 }
@@ -134,7 +134,7 @@ std::span<const unsigned char> ShardFile::constant(std::size_t dataset, std::int
   return {};
 }
 
-void ShardFile::hold(Block& block, std::vector<PreparedChunk>& chunks) {
+void ShardFile::hold(Block& block, std::int64_t first_episode, std::vector<PreparedChunk>& chunks) {
   for (PreparedChunk& chunk : chunks) {
     Chunk held{{chunk.first, 0, static_cast<std::uint32_t>(chunk.bytes.size())},
                std::move(chunk.bytes)};
@@ -143,7 +143,7 @@ void ShardFile::hold(Block& block, std::vector<PreparedChunk>& chunks) {
         kMostHeld) {  // bounds the memory; the place then depends on the order of pieces
       held_bytes_ -= held.bytes.size();
       held.place.address = free_;
-      placed_.add(free_, held.bytes);
+      placed_.add(free_, held.bytes, {format_.title(chunk.dataset), first_episode + chunk.episode});
       placed_.flush();
       free_ = h5::aligned(free_ + held.bytes.size());
       held.bytes = {};
@@ -154,10 +154,10 @@ void ShardFile::hold(Block& block, std::vector<PreparedChunk>& chunks) {
 }
 
 /// Does the same for rows. If memory is full, the whole dataset gets its place.
-void ShardFile::hold(Demo& demo, std::size_t dataset, const PieceSlice& slice) {
+void ShardFile::hold(Demo& demo, std::size_t dataset, const PieceSlice& slice,
+                     const BytesOf& what) {
   HeldRows& held = demo.held[dataset];
-  const std::span<const unsigned char> bytes(
-      slice.data, static_cast<std::size_t>(slice.rows.rows) * slice.rows.row_bytes);
+  const std::span<const unsigned char> bytes = slice.bytes();
   if (held.address == h5::kNowhere) {
     if (held_bytes_ + bytes.size() <= kMostHeld) {
       held.bytes.insert(held.bytes.end(), bytes.begin(), bytes.end());
@@ -167,12 +167,13 @@ void ShardFile::hold(Demo& demo, std::size_t dataset, const PieceSlice& slice) {
     held.address = free_;
     const auto rows = static_cast<std::uint64_t>(format_.rows_of(dataset, demo.facts.rows));
     free_ = h5::aligned(free_ + rows * slice.rows.row_bytes);
-    placed_.add(held.address, held.bytes);
+    placed_.add(held.address, held.bytes, what);
     placed_.flush();
     held_bytes_ -= held.bytes.size();
     held.bytes = {};
   }
-  placed_.add(held.address + static_cast<std::uint64_t>(slice.first) * slice.rows.row_bytes, bytes);
+  placed_.add(held.address + static_cast<std::uint64_t>(slice.first) * slice.rows.row_bytes, bytes,
+              what);
   placed_.flush();
 }
 
@@ -238,17 +239,19 @@ void ShardFile::give_place_to_held(Block& block) {
   close_block(block, next_, index);
 }
 
-void ShardFile::write_held(Block& block) {
-  for (const Demo& demo : block.demos)
+void ShardFile::write_held(Block& block, std::int64_t first_episode) {
+  for (std::size_t e = 0; e < block.demos.size(); ++e)
     for (std::size_t k = 0; k < format_.datasets(); ++k) {
+      const Demo& demo = block.demos[e];
+      const BytesOf what{format_.title(k), first_episode + static_cast<std::int64_t>(e)};
       const std::span<const unsigned char> same = constant(k, demo.facts.rows);
       if (format_.chunk_rows(k, demo.facts.rows) == 0)
         placed_.add(demo.addresses[k],
-                    same.empty() ? std::span<const unsigned char>(demo.held[k].bytes) : same);
+                    same.empty() ? std::span<const unsigned char>(demo.held[k].bytes) : same, what);
       held_bytes_ -= demo.held[k].bytes.size();
       for (const Chunk& chunk : demo.chunks[k]) {
         held_bytes_ -= chunk.bytes.size();
-        placed_.add(chunk.place.address, chunk.bytes);
+        placed_.add(chunk.place.address, chunk.bytes, what);
       }
     }
 }
@@ -265,8 +268,8 @@ void ShardFile::close_block(Block& block, std::int64_t first_episode, const h5::
     sum_.add(demo.sum);
   }
   descriptions.add(indexes.all());
-  placed_.add(block.base, descriptions.all());
-  if (waits()) write_held(block);
+  placed_.add(block.base, descriptions.all(), {"descriptions from demo_", first_episode});
+  if (waits()) write_held(block, first_episode);
   placed_.flush();
 }
 
@@ -288,7 +291,7 @@ void ShardFile::record_failures() {
 
 /// `data`: the address of the group of demos.
 void ShardFile::complete_description(std::uint64_t data) {
-  file_ = h5::change_file(part_.path());
+  file_ = h5::change_file(part_.path(), part_.written());
   h5::link_object(file_, "data", data);
   const h5::Id group = h5::open_group(file_, "data");
   const nlohmann::ordered_json environment = {
@@ -303,15 +306,12 @@ void ShardFile::complete_description(std::uint64_t data) {
 void ShardFile::commit() {
   h5::Bytes out;
   const std::uint64_t data = h5::add_large_group(out, free_, "demo_", std::move(members_));
-  const std::span<const unsigned char> members = out.all().first(data - free_),
-                                       group = out.all().subspan(data - free_);
-  placed_.add(free_, members);
+  placed_.add(free_, out.all(), {"names of demos"});
   placed_.flush();
-  placed_.write_unchecked(data, group);  // the library adds members to it later
   placed_.end_at(free_ + out.size());
   complete_description(data);
   h5::close_file(file_, part_.path());
-  placed_.verify();
+  part_.compare();
   sample_shard(part_.path());
   part_.commit();
 }

@@ -72,10 +72,10 @@ class ShardFile {
   void write_slices(Block& block, const EpisodeRows& rows, int episode);
   [[nodiscard]] std::span<const unsigned char> constant(std::size_t dataset,
                                                         std::int64_t rows) const;
-  void hold(Block& block, std::vector<PreparedChunk>& chunks);
-  void hold(Demo& demo, std::size_t dataset, const PieceSlice& slice);
+  void hold(Block& block, std::int64_t first_episode, std::vector<PreparedChunk>& chunks);
+  void hold(Demo& demo, std::size_t dataset, const PieceSlice& slice, const BytesOf& what);
   void give_place_to_held(Block& block);
-  void write_held(Block& block);
+  void write_held(Block& block, std::int64_t first_episode);
   void close_block(Block& block, std::int64_t first_episode, const h5::Bytes& indexes);
   void record_failures();
 

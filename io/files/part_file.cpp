@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <sys/uio.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 #include <cstring>
 #include <filesystem>
 #include <utility>
+#include <vector>
 
 #include "engine/base/error.hpp"
 
@@ -142,6 +144,7 @@ PartFile::PartFile(std::string output, bool overwrite)
     close(descriptor_);
     fail("create", path_, error);
   }
+  written_.emplace(descriptor_, path_);
 }
 
 PartFile::~PartFile() {
@@ -157,38 +160,40 @@ std::uint64_t PartFile::free_bytes() const {
 }
 
 void PartFile::write(std::string_view bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
-    if (written < 0) {
-      if (errno == EINTR) continue;
-      fail("write", path_, errno);
-    }
-    bytes.remove_prefix(static_cast<std::size_t>(written));
-  }
+  const NamedBytes text{{reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()},
+                        {"text"}};
+  write_at(size(), {&text, 1});
 }
 
-void PartFile::write_at(std::uint64_t offset, std::span<iovec> pieces) {
+void PartFile::write_at(std::uint64_t offset, std::span<const NamedBytes> pieces) {
   constexpr std::size_t kMostPieces = 1024;  // IOV_MAX of Linux
-  while (!pieces.empty()) {
-    const auto count = static_cast<int>(std::min(pieces.size(), kMostPieces));
-    const ssize_t result = pwritev(descriptor_, pieces.data(), count, static_cast<off_t>(offset));
+  std::vector<iovec> left;
+  for (std::uint64_t at = offset; const NamedBytes& piece : pieces) {
+    written_->add(at, piece.bytes, piece.what);
+    at += piece.bytes.size();
+    left.push_back({const_cast<unsigned char*>(piece.bytes.data()), piece.bytes.size()});
+  }
+  for (std::span<iovec> next = left; !next.empty();) {
+    const auto count = static_cast<int>(std::min(next.size(), kMostPieces));
+    const ssize_t result = pwritev(descriptor_, next.data(), count, static_cast<off_t>(offset));
     if (result < 0) {
       if (errno == EINTR) continue;
       fail("write", path_, errno);
     }
     auto written = static_cast<std::size_t>(result);
     offset += written;
-    while (!pieces.empty() && written >= pieces.front().iov_len) {
-      written -= pieces.front().iov_len;
-      pieces = pieces.subspan(1);
+    while (!next.empty() && written >= next.front().iov_len) {
+      written -= next.front().iov_len;
+      next = next.subspan(1);
     }
     if (written == 0) continue;
-    pieces.front().iov_base = static_cast<unsigned char*>(pieces.front().iov_base) + written;
-    pieces.front().iov_len -= written;
+    next.front().iov_base = static_cast<unsigned char*>(next.front().iov_base) + written;
+    next.front().iov_len -= written;
   }
 }
 
 void PartFile::read_at(std::uint64_t offset, std::span<unsigned char> bytes) const {
+  written_->compare(offset, bytes.size());
   while (!bytes.empty()) {
     const ssize_t result =
         pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
@@ -201,13 +206,8 @@ void PartFile::read_at(std::uint64_t offset, std::span<unsigned char> bytes) con
   }
 }
 
-std::uint64_t PartFile::size() const {
-  struct stat info {};
-  if (fstat(descriptor_, &info) != 0) fail("look at", path_, errno);
-  return static_cast<std::uint64_t>(info.st_size);
-}
-
 void PartFile::commit() {
+  compare();
   if (fsync(descriptor_) != 0) fail("flush", path_, errno);
   const int error = rename_to(path_, output_, overwrite_);
   if (error == EEXIST)

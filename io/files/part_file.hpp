@@ -2,14 +2,20 @@
 // An output appears under its name whole or not at all: it is written beside it as <name>.part.
 #pragma once
 
-#include <sys/uio.h>
-
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
+#include "io/files/written_bytes.hpp"
+
 namespace tangere {
+
+struct NamedBytes {
+  std::span<const unsigned char> bytes;
+  BytesOf what;
+};
 
 /// The file `<output>.part`, in the folder of the output, held exclusively while this lives.
 /// A .part that a killed run left behind is taken over; one that another process is writing is not.
@@ -29,19 +35,25 @@ class PartFile {
   /// Space that this user can still fill on the disk of the output [bytes].
   [[nodiscard]] std::uint64_t free_bytes() const;
 
+  /// Writes behind the last bytes.
   void write(std::string_view bytes);
-  /// Writes the pieces one after the other at a place of the file. Changes `pieces`.
-  void write_at(std::uint64_t offset, std::span<iovec> pieces);
-  /// Throws IoError if the file ends before.
+  /// Writes the pieces one after the other at a place of the file.
+  void write_at(std::uint64_t offset, std::span<const NamedBytes> pieces);
+  /// Throws IoError if the file ends before, or does not have what was written.
   void read_at(std::uint64_t offset, std::span<unsigned char> bytes) const;
-  [[nodiscard]] std::uint64_t size() const;
-  /// Forces the bytes to the disk and renames the .part to the output. Throws IoError.
+  [[nodiscard]] std::uint64_t size() const { return written_->size(); }
+  /// Whoever writes into the file without this object adds there what it writes.
+  [[nodiscard]] WrittenBytes* written() { return &*written_; }
+  /// Reads the file back. Throws IoError that says where it is not what was written.
+  void compare() { written_->compare_all(); }
+  /// Compares, forces the bytes to the disk and renames the .part to the output. Throws IoError.
   void commit();
 
  private:
   std::string output_, path_;
   bool overwrite_;
   int descriptor_ = -1;
+  std::optional<WrittenBytes> written_;
 };
 
 /// Writes a whole text file, or leaves what was there.

@@ -58,18 +58,20 @@ std::string file_of(hid_t object) {
 [[noreturn]] void fail(std::string_view operation, const Id& object, std::string_view child = {},
                        std::string reason = {}) {
   if (reason.empty()) reason = last_reason();  // before any other call of the library clears it
-  if (any_write_failure()) {                   // then what the library says is only a consequence
+  std::shared_ptr<const WriteFailure> failure;
+  if (any_write_failure()) {  // then what the library says is only a consequence
     const Id file(H5Iget_file_id(object.get()));
-    if (const auto failure = write_failure(file.get()); failure != nullptr && failure->error != 0)
-      reason = std::strerror(failure->error);
+    failure = write_failure(file.get());
   }
   std::string where = name_of(object.get());
   if (!child.empty()) {
     if (!where.ends_with('/')) where += '/';
     where += child;
   }
-  throw IoError(
-      fmt::format("cannot {} '{}' in '{}': {}", operation, where, file_of(object.get()), reason));
+  const std::string doing =
+      fmt::format("cannot {} '{}' in '{}'", operation, where, file_of(object.get()));
+  if (failure != nullptr && failure->any()) failure->tell(doing);
+  throw IoError(fmt::format("{}: {}", doing, reason));
 }
 
 /// Throws if the disk refused an earlier write: the library buffers bytes, and its driver hides
@@ -77,8 +79,8 @@ std::string file_of(hid_t object) {
 void check_written(const Id& object) {
   if (!any_write_failure()) return;
   const Id file(H5Iget_file_id(object.get()));
-  if (const auto failure = write_failure(file.get()); failure != nullptr && failure->error != 0)
-    fail("write", object, {}, std::strerror(failure->error));
+  if (const auto failure = write_failure(file.get()); failure != nullptr && failure->any())
+    fail("write", object, {}, "the disk refused it");
 }
 
 /// Whether a file may lead to another: to one beside it ("shard-00001.h5"), and Minari's view in
@@ -265,6 +267,10 @@ hid_t link_access(hid_t kind) {
       ->second;
 }
 
+std::string place_of(const Id& object) {
+  return fmt::format("'{}' in '{}'", name_of(object.get()), file_of(object.get()));
+}
+
 Quiet::Quiet() {
   note_call_begins();
   // Otherwise the library would try again, and complain, at the end of the program about a file
@@ -288,7 +294,8 @@ void Id::reset() noexcept {
   id_ = -1;
 }
 
-Id create_file(const std::string& path, hsize_t description_block, bool views) {
+Id create_file(const std::string& path, WrittenBytes* written, hsize_t description_block,
+               bool views) {
   const Quiet quiet;
   const Id access(H5Pcreate(H5P_FILE_ACCESS));
   // 1.8 objects: attributes above 64 KiB (long scenes), and a plain open works after a crash.
@@ -297,7 +304,7 @@ Id create_file(const std::string& path, hsize_t description_block, bool views) {
   H5Pset_meta_block_size(access.get(), description_block);
   H5Pset_file_locking(access.get(), false, true);  // io/files/part_file.hpp holds the lock
   const Id creation = without_times(H5P_FILE_CREATE);
-  use_checked_driver(access.get());
+  use_checked_driver(access.get(), written);
   Id file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.get(), access.get()));
   if (file.get() < 0) throw IoError(fmt::format("cannot create '{}': {}", path, open_reason()));
   return file;
@@ -330,16 +337,17 @@ Id open_file(const std::string& path, bool forget) {
   return file;
 }
 
-Id change_file(const std::string& path) {
+Id change_file(const std::string& path, WrittenBytes* written) {
   const Quiet quiet;
   const Id access(H5Pcreate(H5P_FILE_ACCESS));
   H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18);
   H5Pset_fclose_degree(access.get(), H5F_CLOSE_STRONG);
   H5Pset_file_locking(access.get(), false, true);
-  use_checked_driver(access.get());
+  use_checked_driver(access.get(), written);
   Id file(H5Fopen(path.c_str(), H5F_ACC_RDWR, access.get()));
-  if (file.get() < 0) throw IoError(fmt::format("cannot write into '{}': {}", path, open_reason()));
-  return file;
+  if (file.get() >= 0) return file;
+  if (written != nullptr) written->compare_all();  // says more if that is why
+  throw IoError(fmt::format("cannot write into '{}': {}", path, open_reason()));
 }
 
 void link_object(const Id& parent, const std::string& name, std::uint64_t address) {
@@ -357,7 +365,7 @@ void close_file(Id& file, const std::string& path) {
   if (H5Fflush(file.get(), H5F_SCOPE_GLOBAL) < 0) reason = last_reason();
   if (H5Fclose(file.get()) < 0 && reason.empty()) reason = last_reason();
   file.release();  // also where closing failed: a second try would find a file half closed
-  if (failure != nullptr && failure->error != 0) reason = std::strerror(failure->error);
+  if (failure != nullptr && failure->any()) failure->tell(fmt::format("cannot write '{}'", path));
   if (failure == nullptr) reason = "HDF5 does not say whether its writes succeeded";
   if (!reason.empty()) throw IoError(fmt::format("cannot write '{}': {}", path, reason));
 }
@@ -418,6 +426,7 @@ void create_flags(const Id& parent, const std::string& name, std::span<const std
   const Id dataset(H5Dcreate2(parent.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT,
                               creation.get(), H5P_DEFAULT));
   if (dataset.get() < 0) fail("create dataset", parent, name);
+  const NumbersOf numbers(dataset.get());
   if (H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, flags.data()) < 0)
     fail("write", dataset);
   check_written(dataset);
@@ -454,6 +463,7 @@ template <class T>
 void write_box(const Id& dataset, const Dims& offset, const Dims& count, const T* data) {
   const Quiet quiet;
   const Box box(dataset, offset, count);
+  const NumbersOf numbers(dataset.get());
   if (H5Dwrite(dataset.get(), Types<T>::memory(), box.memory.get(), box.disk.get(), H5P_DEFAULT,
                data) < 0)
     fail("write", dataset);

@@ -13,6 +13,8 @@
 #include <string_view>
 #include <vector>
 
+#include "io/files/written_bytes.hpp"
+
 namespace tangere::h5 {
 
 /// An identifier of the library (file, group, dataset, attribute, type …). The destructor closes
@@ -42,6 +44,9 @@ class Id {
   hid_t id_ = -1;
 };
 
+/// "'/scene' in 'balls/shard-00000.h5'", for messages.
+[[nodiscard]] std::string place_of(const Id& object);
+
 /// While this object lives, the library does not print its errors.
 class Quiet {
  public:
@@ -64,8 +69,9 @@ using Dims = std::vector<hsize_t>;
 /// Creates a file, replacing what is at `path`. Readable by HDF5 1.8 and later; two runs that write
 /// the same numbers write the same bytes. Descriptions of objects are put together in blocks of
 /// `description_block` bytes: large ones suit files of many objects. With `views` the file may have
-/// virtual datasets, and reading it needs HDF5 1.10.
-Id create_file(const std::string& path, hsize_t description_block = 2048, bool views = false);
+/// virtual datasets, and reading it needs HDF5 1.10. `written` learns what is written; null: nobody.
+Id create_file(const std::string& path, WrittenBytes* written = nullptr,
+               hsize_t description_block = 2048, bool views = false);
 /// A file that is never on disk.
 Id create_memory_file();
 /// Opens a file for reading. Devices, pipes and folders are refused. Links and views may name files
@@ -74,7 +80,7 @@ Id create_memory_file();
 /// them is slow.
 Id open_file(const std::string& path, bool forget = false);
 /// Opens a file for reading and writing, as create_file left it.
-Id change_file(const std::string& path);
+Id change_file(const std::string& path, WrittenBytes* written = nullptr);
 /// Gives a name to the object at an address of the file.
 void link_object(const Id& parent, const std::string& name, std::uint64_t address);
 /// Flushes and closes a file, and throws if any byte since it was opened could not be written. The

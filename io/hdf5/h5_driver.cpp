@@ -1,18 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 // The callbacks of a driver as the library wants them: C functions on a struct that begins with
-// its own. Features are those of the library's POSIX driver, so that files have the same bytes.
+// its own. Features are those of the library's POSIX driver, so that files have the same bytes,
+// except the sieve, which keeps numbers back until nobody knows any more whose they are.
 #include "io/hdf5/h5_driver.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <exception>
 #include <limits>
+#include <map>
 #include <new>
+#include <string_view>
 
 #include "engine/base/error.hpp"
 
@@ -25,6 +31,13 @@ namespace {
 
 std::atomic<bool> any_failure{false};
 thread_local int open_error = 0;
+thread_local hid_t numbers_of = -1;
+thread_local const char* numbers_of_child = nullptr;
+
+/// What the library copies for each file.
+struct DriverInfo {
+  WrittenBytes* written;
+};
 
 struct CheckedFile {
   H5FD_t library{};  // first: the library casts
@@ -33,17 +46,50 @@ struct CheckedFile {
   dev_t device = 0;
   ino_t inode = 0;
   std::shared_ptr<WriteFailure> failure;
+  WrittenBytes* written = nullptr;
+  std::map<hid_t, std::string> names;  // of datasets; the library does not use a number twice
 
   void fail(int error) noexcept {
     if (failure->error == 0) failure->error = error;
     any_failure = true;
+  }
+
+  /// Calls `use` with `written`, if there is one. The library knows no exceptions.
+  template <class Use>
+  void keep_track(const Use& use) noexcept {
+    if (written == nullptr || failure->any()) return;
+    try {
+      use(*written);
+    } catch (const std::bad_alloc&) {
+      fail(ENOMEM);
+    } catch (const std::exception& difference) {
+      fail(EIO);
+      try {
+        failure->damage = difference.what();
+      } catch (const std::bad_alloc&) {  // then EIO says it
+      }
+    }
+  }
+
+  /// What is being written.
+  std::string_view name(H5FD_mem_t kind) {
+    if (kind != H5FD_MEM_DRAW) return "descriptions of objects";
+    if (numbers_of < 0) return "texts of attributes";
+    std::string& name = names[numbers_of];
+    if (name.empty() || numbers_of_child != nullptr) {
+      std::array<char, 256> text{};
+      H5Iget_name(numbers_of, text.data(), text.size());
+      name = text.data();
+      if (numbers_of_child != nullptr) name += std::string("/") + numbers_of_child;
+    }
+    return name;
   }
 };
 
 CheckedFile* ours(H5FD_t* file) { return reinterpret_cast<CheckedFile*>(file); }
 const CheckedFile* ours(const H5FD_t* file) { return reinterpret_cast<const CheckedFile*>(file); }
 
-H5FD_t* open_file(const char* name, unsigned flags, hid_t, haddr_t) {
+H5FD_t* open_file(const char* name, unsigned flags, hid_t access, haddr_t) {
   int mode = (flags & H5F_ACC_RDWR) != 0 ? O_RDWR : O_RDONLY;
   if ((flags & H5F_ACC_TRUNC) != 0) mode |= O_TRUNC;
   if ((flags & H5F_ACC_CREAT) != 0) mode |= O_CREAT;
@@ -65,6 +111,11 @@ H5FD_t* open_file(const char* name, unsigned flags, hid_t, haddr_t) {
     delete file;
     return nullptr;
   }
+  // The library opens files that this one shows with the same properties.
+  if (const void* const given = H5Pget_driver_info(access); given != nullptr)
+    if (auto* const written = static_cast<const DriverInfo*>(given)->written;
+        written != nullptr && written->is_of(info.st_dev, info.st_ino))
+      file->written = written;
   file->descriptor = descriptor;
   file->end = static_cast<haddr_t>(info.st_size);
   file->device = info.st_dev;
@@ -87,7 +138,7 @@ int compare(const H5FD_t* a, const H5FD_t* b) {
 }
 
 herr_t features(const H5FD_t*, unsigned long* flags) {
-  *flags = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_ACCUMULATE_METADATA | H5FD_FEAT_DATA_SIEVE |
+  *flags = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_ACCUMULATE_METADATA |
            H5FD_FEAT_AGGREGATE_SMALLDATA | H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
   return 0;
 }
@@ -109,6 +160,8 @@ herr_t handle(H5FD_t* file, hid_t, void** out) {
 herr_t read(H5FD_t* file, H5FD_mem_t, hid_t, haddr_t address, size_t size, void* buffer) {
   CheckedFile* f = ours(file);
   auto* to = static_cast<unsigned char*>(buffer);
+  f->keep_track([&](const WrittenBytes& written) { written.compare(address, size); });
+  if (f->failure->any()) return -1;  // the library crashes over some damage
   while (size > 0) {
     const ssize_t got = pread(f->descriptor, to, size, static_cast<off_t>(address));
     if (got < 0 && errno == EINTR) continue;
@@ -127,12 +180,16 @@ herr_t read(H5FD_t* file, H5FD_mem_t, hid_t, haddr_t address, size_t size, void*
   return 0;
 }
 
-herr_t write(H5FD_t* file, H5FD_mem_t, hid_t, haddr_t address, size_t size, const void* buffer) {
+herr_t write(H5FD_t* file, H5FD_mem_t kind, hid_t, haddr_t address, size_t size,
+             const void* buffer) {
   CheckedFile* f = ours(file);
   const auto* from = static_cast<const unsigned char*>(buffer);
+  f->keep_track([&](WrittenBytes& written) {
+    written.add(address, {from, size}, {f->name(kind)});
+  });
   f->end = std::max(f->end, address + size);
   while (size > 0) {
-    if (f->failure->error != 0) return 0;  // the file is lost: spare a full disk the rest
+    if (f->failure->any()) return 0;  // the file is lost: spare a full disk the rest
     const ssize_t put = pwrite(f->descriptor, from, size, static_cast<off_t>(address));
     if (put < 0 && errno == EINTR) continue;
     if (put <= 0) {
@@ -149,7 +206,8 @@ herr_t write(H5FD_t* file, H5FD_mem_t, hid_t, haddr_t address, size_t size, cons
 herr_t truncate(H5FD_t* file, hid_t, hbool_t) {
   CheckedFile* f = ours(file);
   if (f->end == f->end_allocated) return 0;
-  if (f->failure->error == 0 && ftruncate(f->descriptor, static_cast<off_t>(f->end_allocated)) != 0)
+  f->keep_track([&](WrittenBytes& written) { written.end_at(f->end_allocated); });
+  if (!f->failure->any() && ftruncate(f->descriptor, static_cast<off_t>(f->end_allocated)) != 0)
     f->fail(errno);
   f->end = f->end_allocated;
   return 0;
@@ -164,6 +222,7 @@ H5FD_class_t driver() {
   c.name = "tangere";
   c.maxaddr = static_cast<haddr_t>(std::numeric_limits<off_t>::max());
   c.fc_degree = H5F_CLOSE_WEAK;
+  c.fapl_size = sizeof(DriverInfo);
   c.open = open_file;
   c.close = close_file;
   c.cmp = compare;
@@ -189,9 +248,22 @@ hid_t driver_id() {
 
 }  // namespace
 
-void use_checked_driver(hid_t access) {
+void WriteFailure::tell(const std::string& doing) const {
+  if (error == ENOMEM) throw std::bad_alloc();
+  if (!damage.empty()) throw IoError(damage);
+  throw IoError(fmt::format("{}: {}", doing, std::strerror(error)));
+}
+
+NumbersOf::NumbersOf(hid_t object, const char* child) noexcept {
+  numbers_of = object;
+  numbers_of_child = child;
+}
+NumbersOf::~NumbersOf() { numbers_of = -1; }
+
+void use_checked_driver(hid_t access, WrittenBytes* written) {
   open_error = 0;
-  if (driver_id() < 0 || H5Pset_driver(access, driver_id(), nullptr) < 0)
+  const DriverInfo info{written};
+  if (driver_id() < 0 || H5Pset_driver(access, driver_id(), &info) < 0)
     throw IoError("HDF5 does not take a driver for files");
 }
 

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "engine/base/error.hpp"
+#include "io/hdf5/h5_driver.hpp"
 #include "io/hdf5/h5_listing.hpp"
 #include "io/hdf5/h5_views.hpp"
 
@@ -58,6 +59,7 @@ void copy_group(const Id& from, const std::string& name, const Id& to, const std
       continue;
     }
     const Quiet quiet;
+    const NumbersOf numbers(copy.get(), child.c_str());
     check(H5Ocopy(source.get(), child.c_str(), copy.get(), child.c_str(), H5P_DEFAULT,
                   H5P_DEFAULT) >= 0,
           "copy", child);
@@ -129,6 +131,7 @@ void write_names(const Id& group, const std::string& name, const std::string& pr
   const Id dataset(H5Dcreate2(group.get(), name.c_str(), type.get(), space.get(), H5P_DEFAULT,
                               creation.get(), H5P_DEFAULT));
   check(dataset.get() >= 0, "create dataset", name);
+  const NumbersOf written(dataset.get());
   if (count > 0)
     check(H5Dwrite(dataset.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()) >= 0,
           "write", name);

@@ -26,7 +26,7 @@ std::vector<std::string> link_names(const Id& group) {
   };
   hsize_t at = 0;
   if (H5Literate(group.get(), H5_INDEX_NAME, H5_ITER_INC, &at, add, &names) < 0)
-    throw IoError("cannot list a group: HDF5 finds its links damaged");
+    throw IoError(fmt::format("cannot list {}: HDF5 finds its links damaged", place_of(group)));
   return names;
 }
 
@@ -34,7 +34,8 @@ std::size_t link_count(const Id& group) {
   const Quiet quiet;
   H5G_info_t info;
   if (H5Gget_info(group.get(), &info) < 0)
-    throw IoError("cannot count the links of a group: HDF5 finds them damaged");
+    throw IoError(
+        fmt::format("cannot count the links of {}: HDF5 finds them damaged", place_of(group)));
   return info.nlinks;
 }
 
@@ -47,7 +48,8 @@ std::vector<std::string> attribute_names(const Id& object) {
   };
   hsize_t at = 0;
   if (H5Aiterate2(object.get(), H5_INDEX_NAME, H5_ITER_INC, &at, add, &names) < 0)
-    throw IoError("cannot list attributes: HDF5 finds them damaged");
+    throw IoError(
+        fmt::format("cannot list attributes of {}: HDF5 finds them damaged", place_of(object)));
   return names;
 }
 
@@ -66,7 +68,8 @@ std::string attribute_text(const Id& object, const std::string& name) {
   if (kind == H5T_INTEGER && sign == H5T_SGN_NONE)
     return numbers_as_text<std::uint64_t>(object, name);
   if (kind == H5T_INTEGER) return numbers_as_text<std::int64_t>(object, name);
-  throw IoError(fmt::format("attribute '{}' is neither text nor numbers", name));
+  throw IoError(
+      fmt::format("attribute '{}' of {} is neither text nor numbers", name, place_of(object)));
 }
 
 bool is_dataset(const Id& parent, const std::string& name) {

@@ -3,8 +3,6 @@
 // memory begins with the file, and the object follows.
 #include "io/hdf5/reading_note.hpp"
 
-#include <sys/time.h>
-
 #include <algorithm>
 #include <atomic>
 #include <csignal>
@@ -46,7 +44,7 @@ void note_file(std::string_view path) noexcept {
 }
 
 void note_object(std::string_view name) noexcept {
-  if (note.empty()) return;
+  if (note.empty() || file_end == 0) return;
   put(put(put(file_end, ", object '"), name), "'");
 }
 
@@ -65,6 +63,19 @@ void end_endless_calls(std::chrono::milliseconds computing) noexcept {
   const timeval tick_length{computing.count() / 1000, computing.count() % 1000 * 1000};
   const itimerval every{tick_length, tick_length};
   setitimer(ITIMER_PROF, &every, nullptr);
+}
+
+NotReading::NotReading() noexcept : note_(note) {
+  if (!note.empty()) note.front() = '\0';
+  note = {};
+  const itimerval never{};
+  setitimer(ITIMER_PROF, &never, &timer_);
+}
+
+NotReading::~NotReading() {
+  note = note_;
+  file_end = 0;
+  setitimer(ITIMER_PROF, &timer_, nullptr);
 }
 
 }  // namespace tangere::h5

@@ -3,6 +3,8 @@
 // crash of the library; and an end to calls that never return.
 #pragma once
 
+#include <sys/time.h>
+
 #include <chrono>
 #include <span>
 #include <string_view>
@@ -22,8 +24,21 @@ void note_call_begins() noexcept;
 void note_call_ends() noexcept;
 
 /// From now on one call that computes for so long, at most twice as long, ends the process by
-/// SIGPROF: the library loops for ever over some damaged files. Not for processes that use it in
-/// threads.
+/// SIGPROF: the library loops for ever over some damaged files.
 void end_endless_calls(std::chrono::milliseconds computing) noexcept;
+
+/// While this lives, nothing is noted and no call is ended: the process computes in threads, whose
+/// time would count, and reads only what it wrote itself.
+class NotReading {
+ public:
+  NotReading() noexcept;
+  ~NotReading();
+  NotReading(const NotReading&) = delete;
+  NotReading& operator=(const NotReading&) = delete;
+
+ private:
+  std::span<char> note_;
+  itimerval timer_{};
+};
 
 }  // namespace tangere::h5

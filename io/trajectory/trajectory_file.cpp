@@ -68,7 +68,7 @@ struct TrajectoryFile::Impl {
     if (needed > available)
       throw IoError(fmt::format("{}: needs at least {} bytes and the disk has {} free", output,
                                 needed, available));
-    file = h5::create_file(part.path());
+    file = h5::create_file(part.path(), part.written());
     describe_run();
     create_trajectory();
     for (const SensorLayout& s : layout.sensors) create_sensor(s);

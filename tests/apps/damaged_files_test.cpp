@@ -14,6 +14,7 @@
 
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
+#include "tests/fuzz/mutator.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -223,6 +224,39 @@ TEST(DamagedFile, HeapsOverWhichTheLibraryLoopsEndInAMessage) {
   EXPECT_EQ(outcome.exit_code, 3);
   EXPECT_THAT(outcome.err, HasSubstr("the HDF5 library did not come back within 10 s of computing; "
                                      "it had last read 'run.h5', object "));
+}
+
+TEST(DamagedFile, ShardsOverWhichTheLibraryLoopsEndResuming) {
+  const Folder folder;
+  ASSERT_EQ(run(folder, generate()).exit_code, 0);
+  std::string bytes = folder.read("set/shard-00000.h5");
+  ASSERT_GT(empty_the_free_space(bytes), 0);
+  folder.write("set/shard-00000.h5", bytes);
+  const Outcome outcome = run(folder, generate() + Words{"--resume"});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("the HDF5 library did not come back within 10 s of computing; "
+                                     "it had last read 'set/shard-00000.h5', object "));
+}
+
+/// HDF5 1.10 ended the process that read mutants 79, 218 and 257 with a segmentation fault.
+TEST(DamagedFile, MutantsOfAShardDoNotCrashResuming) {
+  const Folder folder;
+  fs::copy_file(scene("rolling_ball_small.xml"),
+                folder.path("scene.xml"));  // same words, same bytes
+  Words words = generate();
+  words[1] = "scene.xml";
+  ASSERT_EQ(run(folder, words).exit_code, 0);
+  const std::string whole = folder.read("set/shard-00000.h5");
+  for (const std::uint64_t mutant : {2, 5, 79, 218, 257}) {
+    SCOPED_TRACE(mutant);
+    folder.write("set/shard-00000.h5", fuzz::Mutator(mutant).hdf5({whole}));
+    const Outcome outcome = run(folder, words + Words{"--resume"});
+    expect_answer(outcome, "resume", "");
+    EXPECT_GE(outcome.exit_code, 0);
+    if (outcome.exit_code != 0) {
+      EXPECT_THAT(outcome.err, HasSubstr("shard-00000.h5"));
+    }
+  }
 }
 
 TEST(DamagedFile, ATrajectoryWithoutFiniteForcesIsNotDrawn) {

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Preloaded into a program (LD_PRELOAD), it makes one call of the operating system fail.
+// Preloaded into a program (LD_PRELOAD), it makes one call of the operating system fail, or lie.
 //
 // TANGERE_FAULT=kind:n fails the n-th call of a kind, counted from 1, with EIO (writes: ENOSPC,
 // threads: EAGAIN, and all later ones too, memory: ENOMEM). TANGERE_FAULT_COUNT=file writes there,
 // when the program ends, how many calls of that kind there were. Kinds: write, sync, rename, close,
 // truncate, open, thread, memory. Allocations by HDF5 itself are not among memory: it uses about
-// one in thirty without asking whether it got it (docs/failures.md).
+// one in thirty without asking whether it got it (docs/failures.md). Two more kinds are those of a
+// disk that lies: the n-th write or truncation (lost) does nothing, or the n-th write puts zeros in
+// place of the bytes (zeros), and says that it succeeded.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <link.h>
@@ -111,24 +113,71 @@ __attribute__((destructor)) void report() {
     return call arguments;                                   \
   }
 
-FAULTY("write", ENOSPC, ssize_t, write, (int fd, const void* data, size_t size), (fd, data, size))
-FAULTY("write", ENOSPC, ssize_t, pwrite, (int fd, const void* data, size_t size, off_t at),
-       (fd, data, size, at))
-FAULTY("write", ENOSPC, ssize_t, pwrite64, (int fd, const void* data, size_t size, off64_t at),
-       (fd, data, size, at))
-FAULTY("write", ENOSPC, ssize_t, writev, (int fd, const iovec* pieces, int count),
-       (fd, pieces, count))
-FAULTY("write", ENOSPC, ssize_t, pwritev, (int fd, const iovec* pieces, int count, off_t at),
-       (fd, pieces, count, at))
-FAULTY("write", ENOSPC, ssize_t, pwritev64, (int fd, const iovec* pieces, int count, off64_t at),
-       (fd, pieces, count, at))
+namespace {
+
+size_t all_of(const iovec* pieces, int count) {
+  size_t size = 0;
+  for (int i = 0; i < count; ++i) size += pieces[i].iov_len;
+  return size;
+}
+
+/// Zeros at a place of a file; at = -1: where its writer stands.
+ssize_t put_zeros(int fd, size_t size, off_t at) {
+  static auto* const call = real<ssize_t(int, const void*, size_t)>("write");
+  static auto* const call_at = real<ssize_t(int, const void*, size_t, off_t)>("pwrite");
+  static const char zeros[4096] = {};
+  for (size_t done = 0; done < size;) {
+    const size_t some = size - done < sizeof zeros ? size - done : sizeof zeros;
+    const ssize_t put =
+        at < 0 ? call(fd, zeros, some) : call_at(fd, zeros, some, at + static_cast<off_t>(done));
+    if (put <= 0) return -1;
+    done += static_cast<size_t>(put);
+  }
+  return static_cast<ssize_t>(size);
+}
+
+}  // namespace
+
+// A write of `size` bytes at `at`.
+#define FAULTY_WRITE(name, parameters, arguments, size, at)    \
+  extern "C" ssize_t name parameters {                         \
+    static auto* const call = real<ssize_t parameters>(#name); \
+    if (fails("lost")) return static_cast<ssize_t>(size);      \
+    if (fails("zeros")) return put_zeros(fd, size, at);        \
+    if (fails("write")) {                                      \
+      errno = ENOSPC;                                          \
+      return -1;                                               \
+    }                                                          \
+    return call arguments;                                     \
+  }
+FAULTY_WRITE(write, (int fd, const void* data, size_t size), (fd, data, size), size, -1)
+FAULTY_WRITE(pwrite, (int fd, const void* data, size_t size, off_t at), (fd, data, size, at), size,
+             at)
+FAULTY_WRITE(pwrite64, (int fd, const void* data, size_t size, off64_t at), (fd, data, size, at),
+             size, at)
+FAULTY_WRITE(writev, (int fd, const iovec* pieces, int count), (fd, pieces, count),
+             all_of(pieces, count), -1)
+FAULTY_WRITE(pwritev, (int fd, const iovec* pieces, int count, off_t at), (fd, pieces, count, at),
+             all_of(pieces, count), at)
+FAULTY_WRITE(pwritev64, (int fd, const iovec* pieces, int count, off64_t at),
+             (fd, pieces, count, at), all_of(pieces, count), at)
 FAULTY("sync", EIO, int, fsync, (int fd), (fd))
 FAULTY("sync", EIO, int, fdatasync, (int fd), (fd))
 FAULTY("rename", EIO, int, rename, (const char* from, const char* to), (from, to))
 FAULTY("rename", EIO, int, renameat2,
        (int a, const char* from, int b, const char* to, unsigned flags), (a, from, b, to, flags))
-FAULTY("truncate", EIO, int, ftruncate, (int fd, off_t size), (fd, size))
-FAULTY("truncate", EIO, int, ftruncate64, (int fd, off64_t size), (fd, size))
+#define FAULTY_TRUNCATION(name, type)                      \
+  extern "C" int name(int fd, type size) {                 \
+    static auto* const call = real<int(int, type)>(#name); \
+    if (fails("lost")) return 0;                           \
+    if (fails("truncate")) {                               \
+      errno = EIO;                                         \
+      return -1;                                           \
+    }                                                      \
+    return call(fd, size);                                 \
+  }
+FAULTY_TRUNCATION(ftruncate, off_t)
+FAULTY_TRUNCATION(ftruncate64, off64_t)
 
 /// The file is closed even where closing says that something failed, as on Linux.
 extern "C" int close(int fd) {

@@ -293,7 +293,7 @@ TEST(H5Objects, AViewIsTheLibrarysOwn) {
       for (const std::uint64_t skipped : {0U, 1U, 4U, 5U}) {
         const Folder folder;
         write_sources(folder / "source.h5", shape, single);
-        h5::Id library = h5::create_file(folder / "library.h5", 2048, true);
+        h5::Id library = h5::create_file(folder / "library.h5", nullptr, 2048, true);
         {
           const h5::Id source = h5::open_file(folder / "source.h5");
           h5::create_virtual(library, "object", h5::open_dataset(source, "many"),
@@ -362,7 +362,7 @@ TEST(H5Objects, TheFirstGroupOfAFileMayBeALargeOne) {
     members.push_back({k, file.here() + out.size()});
     h5::add_group(out, {});
   }
-  file.append(out);
+  file.append(out, {"groups"});
   file.open(file.append_group("episode_", members, true));
   h5::write_scalar<std::int64_t>(file.file(), "total", kMany);
   EXPECT_FALSE(std::filesystem::exists(path));

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a file should hold. A disk may say that it wrote and not have written, so every output is
+// read back and compared with this before it gets its name.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace tangere {
+
+/// What some bytes of a file are, for messages: {"/q"}, or {"obs/pad of demo_", 7}.
+struct BytesOf {
+  std::string_view name;
+  std::int64_t number = -1;  ///< appended to the name; negative: nothing is
+};
+
+/// Checksums of the bytes that were handed over for a file, piece by piece. Later bytes replace
+/// earlier ones. Where nothing was handed over, the file has zeros. All functions throw IoError when
+/// the file cannot be read.
+class WrittenBytes {
+ public:
+  /// For an empty file, which `descriptor` can read. It is not closed here. `path`: for messages.
+  WrittenBytes(int descriptor, std::string path)
+      : descriptor_(descriptor), path_(std::move(path)) {}
+
+  /// Bytes that are about to be written at `offset`.
+  void add(std::uint64_t offset, std::span<const unsigned char> bytes, const BytesOf& what);
+  /// The file is about to be cut or extended to `size` bytes.
+  void end_at(std::uint64_t size);
+  /// Size that the file should have [bytes].
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+
+  /// Whether it is of the file with this number on this device.
+  [[nodiscard]] bool is_of(std::uint64_t device, std::uint64_t number) const;
+
+  /// Compares the pieces that have any of these bytes with the file. Whoever reads what was written
+  /// calls this first. Throws IoError that names the file, the bytes and what they are.
+  void compare(std::uint64_t offset, std::uint64_t bytes) const;
+  /// Compares the whole file, unless that was done since it changed. Throws IoError likewise.
+  void compare_all();
+
+ private:
+  struct Piece {
+    std::uint64_t end, sum;
+    const std::string* name;
+    std::int64_t number;
+  };
+  void forget(std::uint64_t begin, std::uint64_t end);
+  [[noreturn]] void tell_difference(std::uint64_t begin, std::uint64_t end, const std::string& name,
+                                    std::int64_t number) const;
+
+  int descriptor_;
+  std::string path_;
+  std::map<std::uint64_t, Piece> pieces_;  // by their first byte; none overlaps another
+  std::set<std::string, std::less<>> names_;
+  std::uint64_t size_ = 0;
+  bool compared_ = false;
+};
+
+}  // namespace tangere
