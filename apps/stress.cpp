@@ -22,7 +22,7 @@ namespace {
 
 struct StressArguments {
   std::string name, integrator;
-  std::optional<double> step;
+  std::optional<double> step, accuracy;
   std::optional<int> threads;
   bool quick = false;
 };
@@ -31,6 +31,7 @@ StressOptions options_of(const StressArguments& o) {
   StressOptions options;
   options.name = o.name;
   options.step = o.step;
+  options.accuracy = o.accuracy;
   options.quick = o.quick;
   options.threads = o.threads.value_or(processor_count());
   if (!o.integrator.empty()) options.integrator = integrator_named(o.integrator);
@@ -64,6 +65,7 @@ int stress(const StressArguments& o, const Console& console) {
               {"exit_code", code},
               {"machine", processor_name()},
               {"isa", kernels::active_isa_name()},
+              {"accuracy", o.accuracy.value_or(0)},
               {"quick", o.quick}};
   result.update(stress_json(report));
   console.result(result);
@@ -83,6 +85,8 @@ Command add_stress(CLI::App& program) {
   add_text(app, "--integrator", o.integrator, "NAME",
            fmt::format("{} [default: those of each case]", fmt::join(integrator_names(), ", ")));
   add_positive_number(app, "--timestep", o.step, "Step size in s [default: those of each case]");
+  add_positive_number(app, "--accuracy", o.accuracy,
+                      "Cut steps into parts that keep this relative accuracy [default: not cut]");
   add_flag(app, "--quick", o.quick, "Short cases alone, each with one step: some seconds");
   add_whole_number<int>(app, "--threads", o.threads, 1, kMostThreads,
                         "Threads [default: the processors here]");

@@ -43,6 +43,7 @@ Json row_json(const StressRow& row) {
           {"most_evaluations", row.most_evaluations},
           {"environment_steps", row.steps},
           {"split_steps", row.split_steps},
+          {"coarse_steps", row.coarse_steps},
           {"envs", row.environments},
           {"failed", row.failed},
           {"verdict", to_string(row.verdict)},

@@ -23,13 +23,14 @@ constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 struct Setting {
   Integrator integrator;
-  double step;  ///< [s]
+  double step;      ///< [s]
+  double accuracy;  ///< of its parts; 0: steps are not cut
 };
 
 /// What one block came to.
 struct BlockOutcome {
   double worst = -HUGE_VAL;  ///< of the environments that did not fail; NaN where one has no number
-  std::int64_t steps = 0, evaluations = 0, split_steps = 0;
+  std::int64_t steps = 0, evaluations = 0, split_steps = 0, coarse_steps = 0;
   int most_evaluations = 0;
   std::vector<FailedEnvironment> failures{};
 };
@@ -83,6 +84,7 @@ struct Play {
     out.steps = tally.environment_steps;
     out.evaluations = tally.newton_iterations;
     out.split_steps = tally.split_steps;
+    out.coarse_steps = tally.coarse_steps;
     out.failures = std::move(tally.failures);
   }
 
@@ -116,7 +118,8 @@ std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const
   workers.reserve(as_size(used));
   for (int i = 0; i < used; ++i)
     workers.push_back(
-        {Stepper(model, {setting.integrator, setting.step, std::nullopt}), Readout(model)});
+        {Stepper(model, {setting.integrator, setting.step, std::nullopt, setting.accuracy}),
+         Readout(model)});
   std::vector<double> u(as_size(of.environments) * as_size(model.nu()));
   std::vector<BlockOutcome> blocks(as_size(run.batch.blocks()));
   block_threads.for_each(run.batch.blocks(), workers,
@@ -128,6 +131,7 @@ std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const
     sum.steps += b.steps;
     sum.evaluations += b.evaluations;
     sum.split_steps += b.split_steps;
+    sum.coarse_steps += b.coarse_steps;
     sum.most_evaluations = std::max(sum.most_evaluations, b.most_evaluations);
     sum.failures.insert(sum.failures.end(), b.failures.begin(), b.failures.end());
   }
@@ -144,21 +148,28 @@ void judge(const BlockOutcome& out, StressRow& row) {
   row.most_evaluations = out.most_evaluations;
   row.steps = out.steps;
   row.split_steps = out.split_steps;
+  row.coarse_steps = out.coarse_steps;
   row.failed = static_cast<int>(out.failures.size());
   const bool nobody_left = row.of->measure && row.failed == row.environments;
   const bool met = nobody_left || row.value <= row.of->bound;  // false for NaN
   const bool few = row.failed <= row.of->may_fail * row.environments;
   // Passes are not a matter of right and wrong, so failed environments say more.
   const bool silent = row.of->measure || few;
-  row.verdict = !met && silent ? StressVerdict::fails
-                : few          ? StressVerdict::holds
-                               : StressVerdict::flagged;
-  if (row.failed > 0) row.reason = to_string(out.failures.front().status);
+  if (met) {
+    row.verdict = few ? StressVerdict::holds : StressVerdict::flagged;
+  } else {
+    const bool said = !silent || row.coarse_steps > 0;
+    row.verdict = said ? StressVerdict::flagged : StressVerdict::fails;
+  }
+  if (row.failed > 0)
+    row.reason = to_string(out.failures.front().status);
+  else if (row.coarse_steps > 0)
+    row.reason = to_string(StepStatus::coarse);
 }
 
 /// Fills in what a setting came to. False when it was stopped.
 bool measure(const Scene& scene, int threads, const std::function<bool()>& go_on, StressRow& row) {
-  const Setting setting{row.integrator, row.step};
+  const Setting setting{row.integrator, row.step, row.accuracy};
   const auto out = play(varied(scene, row.of->variant), *row.of, setting, threads, go_on);
   if (!out) return false;
   row.value = out->worst;
@@ -182,8 +193,11 @@ std::vector<Setting> settings_of(const StressCase& of, const StressOptions& opti
   std::vector<Integrator> schemes = of.schemes.empty() ? std::vector{scene.integrator} : of.schemes;
   if (options.integrator) schemes = {*options.integrator};
   std::vector<Setting> settings;
-  for (const Integrator scheme : schemes)
-    for (const double step : steps) settings.push_back({scheme, step});
+  for (const Integrator scheme : schemes) {
+    if (options.accuracy && !options.integrator && scheme.scheme().estimate.empty()) continue;
+    for (const double step : steps)
+      settings.push_back({scheme, step, options.accuracy.value_or(0)});
+  }
   return settings;
 }
 
@@ -217,6 +231,7 @@ bool run_case(const StressCase& of, const StressOptions& options, const StressSc
     row.of = &of;
     row.integrator = setting.integrator;
     row.step = setting.step;
+    row.accuracy = setting.accuracy;
     row.environments = of.environments;
     if (!measure(scene, options.threads, listener.go_on, row)) return false;
     add(std::move(row));

@@ -25,11 +25,13 @@ struct StressRow {
   const StressCase* of = nullptr;
   Integrator integrator = Integrator::bdf1;
   double step = 0;           ///< [s]
+  double accuracy = 0;       ///< of its parts; 0: steps are not cut
   double value = 0;          ///< measured, in the worst environment that did not fail; NaN: none
   double evaluations = 0;    ///< of the residual, per step
   int most_evaluations = 0;  ///< in one step of one environment
   std::int64_t steps = 0;    ///< of all environments
   std::int64_t split_steps = 0;
+  std::int64_t coarse_steps = 0;  ///< with parts that missed the accuracy
   int environments = 0, failed = 0;
   StressVerdict verdict = StressVerdict::fails;
   bool known = false;  ///< fails, and is listed as failing
@@ -40,7 +42,9 @@ struct StressOptions {
   std::string name;                      ///< of one case; "": all
   std::optional<Integrator> integrator;  ///< instead of the case's schemes
   std::optional<double> step;            ///< instead of the case's steps [s]
-  bool quick = false;                    ///< quick cases alone, each at its first step
+  /// Cuts steps into parts that keep it. Schemes without an estimate are then left out.
+  std::optional<double> accuracy;
+  bool quick = false;  ///< quick cases alone, each at its first step
   int threads = 1;
 };
 

@@ -25,7 +25,7 @@ namespace {
 
 using nlohmann::json;
 using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 using testing::IsEmpty;
 
 const std::string kSmall = scene("rolling_ball_small.xml"), kBox = scene("box_pushing.xml");

@@ -18,7 +18,7 @@ namespace tangere::apps {
 namespace {
 
 using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 using testing::IsEmpty;
 
 // Enough work that a signal always arrives in the middle of the run.

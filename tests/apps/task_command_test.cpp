@@ -13,7 +13,7 @@ namespace tangere::apps {
 namespace {
 
 using nlohmann::json;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 

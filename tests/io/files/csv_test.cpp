@@ -14,7 +14,7 @@ namespace tangere {
 namespace {
 
 using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 using Rows = std::vector<std::vector<double>>;
 
 class Csv : public testing::Test {

@@ -13,7 +13,7 @@
 namespace tangere {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 std::vector<std::pair<double, double>> dots(const std::string& svg) {
   tinyxml2::XMLDocument document;

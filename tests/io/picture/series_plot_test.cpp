@@ -14,7 +14,7 @@
 namespace tangere {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 std::string draw(CurvePanel panel) {
   const std::array<CurvePanel, 1> panels = {std::move(panel)};

@@ -15,7 +15,7 @@ namespace tangere {
 namespace {
 
 using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 /// A pad that sinks onto a ball, with a sensor read every 2 steps and one without an interval.
 Model pad_on_ball() {
