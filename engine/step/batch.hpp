@@ -16,6 +16,7 @@ namespace tangere {
 enum class StepStatus : std::int8_t {
   converged = 0,
   split = 1,           ///< converged after the step was split
+  passed = 2,          ///< converged, but a body came through a cuboid that it touches
   not_converged = -1,  ///< no root found down to h/64
   non_finite = -2,     ///< a control or state was NaN or infinite
   rotation = -3,       ///< a joint turned by π or more in one step
