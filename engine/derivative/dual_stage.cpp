@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "kernels/step/link_poses.hpp"
+#include "kernels/step/residual.hpp"
 
 namespace tangere {
 
@@ -37,6 +38,7 @@ struct DualStage::Impl {
   std::vector<std::vector<double>> ground_tangents;  ///< of the points in the ground
   std::vector<std::vector<D>> points, references;
   std::vector<kernels::CandidateList<D>> lists;
+  std::vector<D> faces;
 
   explicit Impl(const CompiledModel& model)
       : m(model),
@@ -94,6 +96,7 @@ struct DualStage::Impl {
     force_scale.resize(nv), mass_diagonal.resize(nv), excess.resize(1);
     links.resize(m.links.size()), columns.resize(2 * m.links.size());
     contacts.resize(std::size_t(view.n_link_pairs + view.n_grounded));
+    faces.assign(3 * pairs.size(), D(0.0));
     for (const kernels::PairContact& p : pairs) {
       points.emplace_back(std::size_t(3 * p.n_points), D(0.0));
       references.emplace_back(12, D(0.0));
@@ -148,14 +151,16 @@ struct DualStage::Impl {
         const kernels::Frame<double> shape = compose(in_1, pair.frame2);
         const kernels::Vec3<double> size =
             kernels::load_vector<double>(pair.size, pair.size_row, block.data(), 0);
+        const D* chosen = &faces[std::size_t(3 * at)];
+        const kernels::Vec3<double> side = {chosen[0].value, chosen[1].value, chosen[2].value};
         std::vector<D>& list = points[std::size_t(at)];
         int count = 0;
         for (int i = 0; i < pair.n_points; ++i) {
           const double* p = pair.points + 3 * i;
           const kernels::Vec3<double> y =
               transposed_times(shape.R, kernels::Vec3<double>{p[0], p[1], p[2]} - shape.p);
-          const double d = kernels::with_distance<double>(
-              pair.shape, size, [&](const auto& s) { return distance_at(s, y).d; });
+          const double d = kernels::with_touched<double>(
+              pair, size, side, [&](const auto& s) { return distance_at(s, y).d; });
           if (!(d < 1e-9)) continue;  // [m], above rounding
           const kernels::Vec3<double> moves =
               frozen ? kernels::zero3<double>() : stretched(pair.body1, {p[0], p[1], p[2]});
@@ -205,6 +210,7 @@ struct DualStage::Impl {
     a.block = block.data();
     a.group = 0;
     a.candidates = lists.data();
+    a.faces = faces.data();
     a.lone = -1;
     a.links = links.data();
     a.contacts = contacts.data();
@@ -248,6 +254,16 @@ void DualStage::set_numbers(const double* column, std::span<const double> tangen
   for (std::size_t k = 0; k < i.stretch.size(); ++k)
     i.stretch[k] = tangents.empty() ? 0 : tangents[sizes + k];
   i.heavier = std::any_of(i.inertia.begin(), i.inertia.end(), [](double t) { return t != 0; });
+}
+
+void DualStage::choose_faces() {
+  Impl& i = *impl_;
+  const std::vector<D> zero(v.size(), D(0.0));
+  kernels::StageArgs<D> a = i.arguments(*this);
+  a.x = a.r = a.s = zero.data();
+  a.c0_over_h = D(0.0);
+  a.inverse_h = D(1.0);
+  kernels::choose_faces_at(i.view, a, i.faces.data());
 }
 
 void DualStage::rates() { kernels::kinematics(impl_->view, impl_->arguments(*this)); }

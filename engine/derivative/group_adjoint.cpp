@@ -170,6 +170,7 @@ void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme,
   const int last = scheme.inner_stages();
   for (const LossRows<L>& o : s.a.losses)
     for (Row<L>* rows : {o.q_inner, o.v_inner}) clear(rows, last * model_.nv);
+  choose_faces(model_, s.table, w);
   find_inner_velocities(s, scheme, h);
   for (int k = last; k >= 0; --k) {
     set_stage(model_, scheme, k, Row<L>::all(h), w);

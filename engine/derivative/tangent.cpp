@@ -202,6 +202,7 @@ struct Tangent::Impl {
                        const double* q1, const double* x_inner, int stride) {
     stage.centre = at.q;
     stage.inverse_h = 1 / h;
+    stage.choose_faces();
     std::vector<DualState> found;  // (x, v) of the stages so far
     for (const SchemeStage& row : scheme.stages) {
       stage.c0_over_h = row.c0 / h;

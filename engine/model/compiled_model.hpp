@@ -187,6 +187,10 @@ void place_shape(const Shape& shape, CompiledBody& body);
 std::vector<double> contact_points(const Shape& shape);
 /// Returns the solid of a body that has these contact points.
 kernels::Solid solid_of(const Shape& shape, const CompiledBody& body);
+/// Whether a shape is convex and its own contact points lie on its surface.
+bool is_convex(const Shape& shape);
+/// Returns the widths of a convex body. It must have a distance, and be bounded.
+kernels::Hull hull_of(const CompiledBody& body);
 
 /// Reorders (n, 3) points so that every `tile` consecutive ones are neighbours. Returns the tiles'
 /// bounds, (tiles, 4).

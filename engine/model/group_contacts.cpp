@@ -67,13 +67,14 @@ void group_contacts(CompiledModel& m) {
       m.pair_order);
   for (std::size_t g = 0; g + 1 < pairs.size(); ++g) {
     const kernels::PairContact& first = m.pairs[std::size_t(m.pair_order[std::size_t(pairs[g])])];
-    kernels::LinkPair links = {first.link1, first.link2, pairs[g], pairs[g + 1] - pairs[g],
-                               0,           0,           false,    first.frame2.p};
+    kernels::LinkPair links = {first.link1, first.link2,    pairs[g], pairs[g + 1] - pairs[g], 0, 0,
+                               false,       first.frame2.p, false};
     links.ball = links.count == 1 && kernels::is_ball(first.shape);
     double pitch = INFINITY;
     for (int i = pairs[g]; i < pairs[g + 1]; ++i) {
       const kernels::PairContact& pair = m.pairs[std::size_t(m.pair_order[std::size_t(i)])];
       links.reach = std::max(links.reach, pair.reach);
+      links.faced = links.faced || pair.faced;
       pitch = std::min(pitch, pair.extent * std::sqrt(4 * M_PI / pair.n_points));
     }
     // How far a lane may move before it is searched again. Where points are far apart, a wide

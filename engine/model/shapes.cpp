@@ -370,4 +370,35 @@ kernels::Solid solid_of(const Shape& shape, const CompiledBody& body) {
   return {body.frame, row_of(shape).stretches(), body.shape, body.size};
 }
 
+bool is_convex(const Shape& shape) {
+  return row_of(shape).stretches() && row_of(shape).distance.has_value();
+}
+
+kernels::Hull hull_of(const CompiledBody& body) {
+  const kernels::Vec3<double>& s = body.size;
+  const auto hull = [&](const kernels::Vec3<double>& straight, const kernels::Vec3<double>& round) {
+    const double most = std::max({round.x, round.y, round.z});
+    return kernels::Hull{body.frame, straight, round, most > 0,
+                         std::sqrt(dot(straight, straight)) + most};
+  };
+  switch (body.shape) {
+    case PrimitiveShape::cuboid: return hull(s, {});
+    case PrimitiveShape::cylinder: return hull({0, 0, s.y}, {s.x, s.x, 0});
+    case PrimitiveShape::capsule: return hull({0, 0, s.y}, {s.x, s.x, s.x});
+    case PrimitiveShape::ellipsoid: return hull({}, s);
+    case PrimitiveShape::sphere: return hull({}, {s.x, s.x, s.x});
+    case PrimitiveShape::plane: break;
+  }
+  return hull({}, {});
+}
+
+std::array<double, 3> widths(const Shape& shape) {
+  if (!has_distance(shape)) return {0, 0, 0};
+  CompiledBody body;
+  place_shape(shape, body);
+  const kernels::Hull hull = hull_of(body);
+  const kernels::Vec3<double> half = hull.straight + hull.round;
+  return {2 * half.x, 2 * half.y, 2 * half.z};
+}
+
 }  // namespace tangere

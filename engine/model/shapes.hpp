@@ -3,6 +3,7 @@
 // (kernels/contact/shapes).
 #pragma once
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <span>
@@ -56,6 +57,9 @@ std::span<const ShapeRow> shape_rows();
 const ShapeRow& row_of(const Shape& shape);
 /// The row of a shape with a distance.
 const ShapeRow& row_of(PrimitiveShape shape);
+
+/// Returns the full widths of a shape with distance and size along its axes [m]; else zeros.
+std::array<double, 3> widths(const Shape& shape);
 
 /// Lists the shapes that satisfy `has`: "a sphere, cuboid or plane".
 std::string shapes_with(const std::function<bool(const ShapeRow&)>& has);

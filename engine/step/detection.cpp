@@ -24,6 +24,20 @@ kernels::Vec3<double> size_of(const kernels::PairContact& pair, const kernels::S
   return {one(0), one(1), one(2)};
 }
 
+/// Returns the faces of pair k that count in one lane.
+template <int L>
+kernels::Vec3<double> faces_of(const kernels::Stage<L>& stage, std::size_t k, int lane) {
+  const kernels::Row<L>* side = stage.faces + 3 * k;
+  return {side[0][lane], side[1][lane], side[2][lane]};
+}
+
+template <int L>
+void choose_faces(const CompiledModel& model, const kernels::KernelTable& table,
+                  BasicWorkspace<L>& w) {
+  if (model.view.faced)
+    table.stage<L>().choose_faces_at(model.view, w.stage, w.q0, w.zero, w.stage.faces);
+}
+
 template <int L>
 void find_candidates(const CompiledModel& model, const kernels::KernelTable& table,
                      BasicWorkspace<L>& w, LaneBits lanes) {
@@ -44,9 +58,9 @@ void find_candidates(const CompiledModel& model, const kernels::KernelTable& tab
       if (!has(w.near.lanes[k], l)) continue;
       double pose[12];
       for (int i = 0; i < 12; ++i) pose[i] = row[i][l];
-      list.own_count[l] =
-          table.find_candidates({&model.pairs[k], size_of<L>(model.pairs[k], w.stage, l), pose,
-                                 list.margin, list.own + 3 * list.stride * l, list.stride});
+      list.own_count[l] = table.find_candidates(
+          {&model.pairs[k], size_of<L>(model.pairs[k], w.stage, l), pose, list.margin,
+           list.own + 3 * list.stride * l, list.stride, faces_of<L>(w.stage, k, l)});
     }
   }
 }
@@ -57,6 +71,8 @@ void lists_to_rows(const kernels::KernelTable& table, Workspace& w, LaneBits lan
   w.in_rows = kAllLanes;
 }
 
+template void choose_faces(const CompiledModel&, const kernels::KernelTable&, Workspace&);
+template void choose_faces(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&);
 template void clear_candidates(Workspace&);
 template void clear_candidates(SingleWorkspace&);
 template void find_candidates(const CompiledModel&, const kernels::KernelTable&, Workspace&,

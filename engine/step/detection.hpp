@@ -14,6 +14,11 @@ template <int L>
 void find_candidates(const CompiledModel& model, const kernels::KernelTable& kernels,
                      BasicWorkspace<L>& w, LaneBits lanes);
 
+/// Chooses the faces that count in the solve which starts at q0 (kernels/step/faces.hpp). Call before its first stage. Overwrites the stage's v.
+template <int L>
+void choose_faces(const CompiledModel& model, const kernels::KernelTable& kernels,
+                  BasicWorkspace<L>& w);
+
 /// Copies the lists of `lanes` into rows, for evaluations of more than one lane.
 void lists_to_rows(const kernels::KernelTable& kernels, Workspace& w, LaneBits lanes);
 

@@ -33,6 +33,7 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
   const NewtonLimits limits = {
       settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
       inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience};
+  choose_faces(model_, table, w);
   for (int k = 0; k <= scheme.inner_stages(); ++k) {
     set_stage(model_, scheme, k, h, w);
     guess_stage(model_, scheme, k, h, w);
@@ -42,8 +43,28 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
     std::copy_n(w.stage.v, n, w.v_inner + k * n);
   }
   LaneBits resolved = lanes;
+  watch_faces(table, w, lanes, report);
   finish(w, lanes, h, resolved, report);
   return resolved;
+}
+
+/// Notes lanes in which a body came through a cuboid that it touches: the face that it met when the
+/// solve started, no other, is opposite to the only one that it meets at the end.
+template <int L>
+void GroupStep::watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
+                            NewtonReport& report) const {
+  if (!model_.view.faced) return;
+  table.stage<L>().choose_faces(model_.view, w.stage, w.faces_after);
+  for (std::size_t k = 0; k < 3 * model_.pairs.size(); k += 3)
+    for (int l = 0; l < L; ++l) {
+      double along = 0, all = 0;
+      for (std::size_t i = k; i < k + 3; ++i) {
+        const double before = w.stage.faces[i][l], after = w.faces_after[i][l];
+        along += before * after;
+        all += std::abs(before) + std::abs(after);
+      }
+      if (along == -1 && all == 2) report.passed |= lanes & (1U << l);
+    }
 }
 
 /// Computes q1 = centre ⊕ x, v1 = v. A joint that turned by π or more is not resolved: its chart
@@ -154,6 +175,7 @@ bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>&
   report.status[lane] = one.status[0];
   report.iterations[lane] = one.iterations[0];
   report.residual[lane] = one.residual[0];
+  report.passed |= one.passed << lane;
   return done;
 }
 
@@ -217,6 +239,9 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
       if (!(dot(rate, rate) * h * h < M_PI * M_PI)) report.status[l] = StepStatus::rotation;
     }
   }
+  for (int l = 0; l < L; ++l)
+    if (has(lanes & report.passed, l) && !failed(report.status[l]))
+      report.status[l] = StepStatus::passed;
 }
 
 template void GroupStep::advance(const kernels::KernelTable&, Workspace&, SingleWorkspace&,

@@ -70,6 +70,9 @@ class GroupStep {
   void note(const BasicWorkspace<L>& w, int lane, const Scheme& scheme, double h,
             std::vector<TapedSolve>* to) const;
   template <int L>
+  void watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
+                   NewtonReport& report) const;
+  template <int L>
   void finish(BasicWorkspace<L>& w, LaneBits lanes, const kernels::Row<L>& h, LaneBits& resolved,
               NewtonReport& report) const;
   template <int L>

@@ -10,6 +10,8 @@
 // arrived.
 #include "engine/step/step_parts.hpp"
 
+#include <utility>
+
 #include "engine/step/group_step.hpp"
 
 namespace tangere {
@@ -49,17 +51,20 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
                                  SolveLog* log) const {
   const Scheme& scheme = settings_.integrator.scheme();
   std::array<StepParts, L> at{};
-  LaneBits coarse = 0, split = 0;
+  LaneBits coarse = 0, split = 0, passed = 0;
   for (LaneBits open = lanes; open != 0;) {
     Row<L> h = Row<L>::all(settings_.timestep);
     for (int l = 0; l < L; ++l) h[l] *= at[l].length();
     const LaneBits solved = run(scheme, table, w, open, h, false, report);
+    const LaneBits through = std::exchange(report.passed, kNoLane);
     Row<L> error{};
     if (solved != 0) error = estimated_error(table, w, solved, h, report);
     for (int l = 0; l < L; ++l) {
       if (!has(open, l)) continue;
       const LaneBits bit = 1U << l;
-      const double ratio = has(solved, l) ? error[l] / settings_.accuracy : HUGE_VAL;
+      // A body that came through another is the worst error that there is.
+      const bool sound = has(solved & ~through, l);
+      const double ratio = sound ? error[l] / settings_.accuracy : HUGE_VAL;
       std::vector<TapedSolve>* solves = log == nullptr ? nullptr : &log->special[std::size_t(l)];
       if (!(ratio <= 1) && !at[l].finest()) {
         at[l].shorten(ratio);
@@ -67,6 +72,7 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
       }
       if (has(solved, l)) {
         if (!(ratio <= 1)) coarse |= bit;
+        passed |= bit & through;
         commit(w, bit);
         if (!at[l].whole()) {
           note(w, l, scheme, h[l], solves);
@@ -75,6 +81,7 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
         }
       } else if (split_lane(table, w, l, h[l], alone, report, solves)) {
         split |= bit;
+        passed |= std::exchange(report.passed, kNoLane);
       } else {
         open &= ~bit;  // its status says why
         continue;
@@ -82,7 +89,8 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
       at[l].take(ratio);
       if (!at[l].finished()) continue;
       open &= ~bit;
-      report.status[l] = has(split, l)    ? StepStatus::split
+      report.status[l] = has(passed, l)   ? StepStatus::passed
+                         : has(split, l)  ? StepStatus::split
                          : has(coarse, l) ? StepStatus::coarse
                                           : StepStatus::converged;
     }

@@ -29,6 +29,9 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   rows(s.LU, m.pattern.factor_entries);
   rows(s.work, std::max(m.pattern.factor_entries, 5 * m.nv));
   rows(s.excess, 1);
+  rows(s.faces, 3 * static_cast<int>(m.pairs.size()));
+  rows(w.faces_after, 3 * static_cast<int>(m.pairs.size()));
+  rows(w.zero, m.nv);
   for (LaneRow** p : {&w.q0, &w.q_before, &w.q1}) rows(*p, m.nq);
   for (LaneRow** p : {&w.v0, &w.v_before, &w.v1, &w.delta, &w.base, &w.test}) rows(*p, m.nv);
   for (LaneRow** p : {&w.x_inner, &w.v_inner}) rows(*p, w.inner_stages * m.nv);

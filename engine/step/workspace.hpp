@@ -43,6 +43,8 @@ struct BasicWorkspace {
 
   // The group's states: now, one step before, and the result of the present solve.
   LaneRow *q0, *v0, *q_before, *v_before, *q1, *v1;
+  LaneRow* faces_after;  ///< (n_pairs, 3) as stage.faces, but where the solve ended
+  LaneRow* zero;         ///< (nv) zeros
   // Inner stages: x relative to q0, (nv) each, one after another.
   int inner_stages;
   LaneRow *x_inner, *v_inner;

@@ -74,8 +74,9 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));
   for (const StepStatus status :
-       {StepStatus::converged, StepStatus::split, StepStatus::coarse, StepStatus::not_converged,
-        StepStatus::non_finite, StepStatus::rotation, StepStatus::singular})
+       {StepStatus::converged, StepStatus::split, StepStatus::coarse, StepStatus::passed,
+        StepStatus::not_converged, StepStatus::non_finite, StepStatus::rotation,
+        StepStatus::singular})
     layout.statuses.push_back({static_cast<std::int8_t>(status), to_string(status)});
   describe_randomized(scene, layout);
   const int varied = static_cast<int>(layout.randomized_names.size());

@@ -239,6 +239,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   each("actuator", [&](const SceneNode& s) { read_actuators(scene, s); });
   each("contact", [&](const SceneNode& s) { read_contacts(scene, s); });
   warn_of_dense_meshes(scene, root);
+  warn_of_coarse_points(scene, root);
   each("sensor", [&](const SceneNode& s) { read_sensors(scene, s); });
   each("variable", [&](const SceneNode& s) { read_end_effectors(scene, s); });
   name_end_effectors(scene);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "engine/model/shapes.hpp"
@@ -83,6 +84,34 @@ void warn_of_dense_meshes(const Scene& scene, const SceneNode& root) {
         "general_contact_resolution=\"{}\" takes as few",
         link.body.source.prefix(), link.body.name, all, kPublishedShare,
         std::max<std::size_t>(all / kPublishedShare, 1)));
+  }
+}
+
+void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
+  const auto shape_of = [&](const std::string& body) -> const Shape& {
+    return std::find_if(scene.links.begin(), scene.links.end(),
+                        [&](const LinkDescription& l) { return l.body.name == body; })
+        ->body.shape;
+  };
+  for (const PairContactDescription& c : scene.pair_contacts) {
+    const auto* const cuboid = std::get_if<CuboidShape>(&shape_of(c.general_body));
+    if (cuboid == nullptr) continue;
+    const bool both_ways =
+        std::any_of(scene.pair_contacts.begin(), scene.pair_contacts.end(), [&](const auto& other) {
+          return other.general_body == c.primitive_body && other.primitive_body == c.general_body;
+        });
+    if (both_ways) continue;
+    double pitch = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      pitch = std::max(pitch, cuboid->size[k] / (cuboid->contact_resolution[k] - 1));
+    std::array<double, 3> across = widths(shape_of(c.primitive_body));
+    std::sort(across.begin(), across.end());  // a post's second width is its thickness
+    if (across[1] == 0 || pitch <= across[1] * (1 + 1e-9)) continue;
+    root.context().warnings.push_back(fmt::format(
+        "{}<general_primitive_contact>: contact points of '{}' are up to {:.3g} m apart, and '{}' "
+        "is {:.3g} m across, so it can come between them unnoticed; expected a finer "
+        "general_contact_resolution, or the same contact the other way round as well",
+        c.source.prefix(), c.general_body, pitch, c.primitive_body, across[1]));
   }
 }
 

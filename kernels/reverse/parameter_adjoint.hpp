@@ -106,7 +106,7 @@ void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const L
     const Frame<N> at = compose(o.link2_in_1, broadcast<N>(pair.frame2));
     ContactCotangent<N> sum = zero_contact<N>();
     const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
-    with_distance<N>(pair.shape, size, [&]<class Shape>(const Shape& shape) {
+    with_touched<N>(pair, size, faces_of(a, pair, k), [&]<class Shape>(const Shape& shape) {
       pair_adjoint(shape, at, o.W, law, model.solids[pair.body1], a.candidates[k], a.lone, slip,
                    sum);
     });

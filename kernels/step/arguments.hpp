@@ -32,6 +32,7 @@ struct Stage {
     double margin;
   };
   List* lists;         ///< (n_pairs)
+  Row<L>* faces;       ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   std::byte* scratch;  ///< scratch_bytes(model)
   Row<L>*v, *g, *force_scale, *mass_diagonal, *A, *LU, *work, *excess;
   Row<L>*weight, *inverse_weight;  ///< (nv) D^½ and D^-½, D the mass diagonal
@@ -106,6 +107,7 @@ struct CandidateSearch {
   double margin;       ///< points nearer than this to the surface, or inside, are candidates [m]
   double* points;      ///< (3, stride)
   int stride;
+  Vec3<double> faces;  ///< of this lane (kernels/step/faces.hpp)
 };
 
 /// World pose and body twist of a link.

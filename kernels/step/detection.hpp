@@ -6,6 +6,7 @@
 #include "kernels/contact/distance.hpp"
 #include "kernels/numbers/one_lane.hpp"
 #include "kernels/step/arguments.hpp"
+#include "kernels/step/faces.hpp"
 #include "kernels/step/stage.hpp"
 
 namespace tangere::kernels {
@@ -44,7 +45,7 @@ void near_pairs(const ModelView& model, const StageArgs<N>& a, NearPairs<L>& out
           transposed_times(broadcast<N>(pair.frame2.R), in_2 - broadcast<N>(pair.frame2.p));
       const N reach(pair.extent + a.candidates[k].margin);
       const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
-      out.lanes[k] = with_distance<N>(pair.shape, size, [&](const auto& shape) {
+      out.lanes[k] = with_touched<N>(pair, size, faces_of(a, pair, k), [&](const auto& shape) {
         return lane_bits(nearer_than(shape, y, reach));
       });
       if (out.lanes[k] != 0)
@@ -106,9 +107,10 @@ int search_shape(const CandidateSearch& s, Shape shape) {
 
 template <class A>
 int search_candidates(const CandidateSearch& s) {
-  return with_distance<Lanes<A>>(s.pair->shape, s.size, [&]<class Shape>(const Shape& shape) {
-    return search_shape<A, Shape>(s, shape);
-  });
+  using N = Lanes<A>;
+  return with_touched<N>(
+      *s.pair, broadcast<N>(s.size), broadcast<N>(s.faces),
+      [&]<class Shape>(const Shape& shape) { return search_shape<A, Shape>(s, shape); });
 }
 
 /// Makes rows of eight lanes from the lanes' own lists. Shorter lists end in far points.

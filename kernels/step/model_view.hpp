@@ -72,6 +72,15 @@ struct DofEffects {
 
 using ContactParameters = Coefficients<Parameter>;
 
+/// A convex body for finding where it is widest: half its width along a unit vector e is
+/// Σ straight_i |e_i| + √Σ (round_i e_i)². A cuboid is straight, an ellipsoid round, a rod both.
+struct Hull {
+  Frame<double> frame;  ///< in its link (or the world)
+  Vec3<double> straight, round;
+  bool rounded;   ///< `round` is not zero
+  double radius;  ///< of a ball around its centre that holds it [m]
+};
+
 /// Points of body 1 against the distance function of body 2.
 struct PairContact {
   int link1, link2;      ///< -1: fixed in the world; then frame1/frame2 are world frames
@@ -93,6 +102,9 @@ struct PairContact {
   double reach;                ///< largest |point| [m]: bounds how far a rotation moves a point
   int size_row = -1;           ///< ≥ 0: size is read from three rows of the block instead
   int body1 = -1, body2 = -1;  ///< indices into ModelView::solids
+  bool faced = false;   ///< a convex body on a cuboid: its faces are chosen per solve (faces.hpp)
+  Hull hull{};          ///< body 1, if faced
+  double overhang = 0;  ///< how far beyond a chosen face's edges a point still touches it [m]
 };
 inline constexpr int kContactTile = 32;
 inline constexpr double kFarAway =
@@ -107,6 +119,7 @@ struct LinkPair {
   bool ball;  ///< its only shape is a sphere, centred at `centre` in link 2, so that turning it
               ///< changes nothing
   Vec3<double> centre;
+  bool faced;  ///< some member is
 };
 
 /// A body against the half-space below the ground: points of the body, or a sphere's lowest point.
@@ -179,6 +192,7 @@ struct ModelView {
   const PairContact* pairs;
   const GroundContact* grounds;
   int n_link_pairs, n_grounded;
+  bool faced;  ///< some pair is
   const LinkPair* link_pairs;
   const GroundedLink* grounded;
   const int *pair_order, *ground_order;  ///< (n_pairs), (n_grounds): members side by side

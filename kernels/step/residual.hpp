@@ -7,6 +7,7 @@
 // The base accelerates at -gravity, so gravity needs no term of its own.
 #pragma once
 
+#include "kernels/step/faces.hpp"
 #include "kernels/step/joint_effects.hpp"
 #include "kernels/step/point_sums.hpp"
 #include "kernels/step/stage.hpp"
@@ -128,13 +129,19 @@ void inertial_wrenches(const ModelView& model, const StageArgs<N>& a) {
   }
 }
 
-/// Computes relative pose and twist of two links. The world has its own frame and no twist.
+/// Returns link 2 in link 1. The world has its own frame.
 template <class N>
-void pair_motion(const LinkPair& pair, const StageArgs<N>& a, ContactScratch<N>& o) {
+Frame<N> link_pair_pose(const LinkPair& pair, const StageArgs<N>& a) {
   const Frame<N> origin = {diagonal(N(1.0)), zero3<N>()};
   const Frame<N>& w1 = pair.link1 < 0 ? origin : a.links[pair.link1].world;
   const Frame<N>& w2 = pair.link2 < 0 ? origin : a.links[pair.link2].world;
-  o.link2_in_1 = relative(w1, w2);
+  return relative(w1, w2);
+}
+
+/// Computes relative pose and twist of two links. The world has no twist.
+template <class N>
+void pair_motion(const LinkPair& pair, const StageArgs<N>& a, ContactScratch<N>& o) {
+  o.link2_in_1 = link_pair_pose(pair, a);
   o.Z = pair.link2 < 0 ? zero6<N>() : motion_to_parent(o.link2_in_1, a.links[pair.link2].V);
   o.W = pair.link1 < 0 ? o.Z : o.Z - a.links[pair.link1].V;
 }
@@ -222,7 +229,8 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
     law.friction_tangent = a.friction_tangent;
     const auto frame = [&] { return compose(o.link2_in_1, broadcast<N>(pair.frame2)); };
     const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
-    with_distance<N>(pair.shape, size, [&]<template <class> class Shape>(const Shape<N>& shape) {
+    const Vec3<N> side = faces_of(a, pair, k);
+    with_touched<N>(pair, size, side, [&]<template <class> class Shape>(const Shape<N>& shape) {
       if constexpr (Shape<N>::kSums == PointSumForm::about_centre) {
         const Vec3<N> centre = o.link2_in_1.R * broadcast<N>(pair.frame2.p) + o.link2_in_1.p;
         add_sphere<Derivatives>(sphere_motion(centre, o.W, shape.radius), law, list, a.lone, o.W,
@@ -343,6 +351,41 @@ void kinematics(const ModelView& model, const StageArgs<N>& a) {
     pair_motion(pair, a, a.contacts[k]);
     a.excess[0] = max(a.excess[0], list_excess(pair, list, a.contacts[k].link2_in_1));
   }
+}
+
+/// Chooses the faces of every pair that is faced, at the relative poses of its links, to
+/// (n_pairs, 3).
+template <class N>
+void choose_faces(const ModelView& model, const StageArgs<N>& a, N* out) {
+  for (int g = 0; g < model.n_link_pairs; ++g) {
+    const LinkPair& links = model.link_pairs[g];
+    if (!links.faced) continue;
+    for (int i = links.first; i < links.first + links.count; ++i) {
+      const int k = model.pair_order[i];
+      const PairContact& pair = model.pairs[k];
+      if (!pair.faced) continue;
+      const Frame<N> at = compose(a.contacts[g].link2_in_1, broadcast<N>(pair.frame2));
+      const Vec3<N> half = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
+      const Vec3<N> side = chosen_faces(pair, at, half);
+      out[3 * k] = side.x, out[3 * k + 1] = side.y, out[3 * k + 2] = side.z;
+    }
+  }
+}
+
+/// The same at the pose of `a`, whose rates do not matter. Overwrites the scratch and v.
+template <class N>
+void choose_faces_at(const ModelView& model, const StageArgs<N>& a, N* out) {
+  for (int i = 0; i < model.n_links; ++i) {
+    const Link& link = model.links[i];
+    LinkScratch<N>& o = a.links[i];
+    Vec6<N> rate, acceleration;
+    joint_motion(link, a, o, rate, acceleration);
+    o.world = link.parent < 0 ? o.local : compose(link, a.links[link.parent].world, o.local);
+  }
+  for (int g = 0; g < model.n_link_pairs; ++g)
+    if (model.link_pairs[g].faced)
+      a.contacts[g].link2_in_1 = link_pair_pose(model.link_pairs[g], a);
+  choose_faces(model, a, out);
 }
 
 /// Computes g at the x of kinematics() and leaves everything that the Jacobian needs in the

@@ -78,6 +78,7 @@ struct StageArgs {
   const double* block;                 ///< of the batch, for parameters that vary
   int group;                           ///< 0 or 1: which half of the block
   const CandidateList<N>* candidates;  ///< (n_pairs)
+  const N* faces;  ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   int lone;  ///< the only lane whose result matters; its contacts are summed across points. -1: all
              ///< lanes matter
   // scratch

@@ -22,6 +22,8 @@ constexpr StageKernels<L> stage_kernels() {
   using Adjoint = AdjointPart<N, L>;
   return {Adjoint::scratch_bytes,
           Step::kinematics,
+          Step::choose_faces,
+          Step::choose_faces_at,
           Step::near_pairs,
           Step::residual,
           Step::evaluate,

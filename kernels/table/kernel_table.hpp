@@ -16,6 +16,11 @@ struct StageKernels {
   std::size_t (*scratch_bytes)(const ModelView&);
   /// Computes poses and motions at x, and `excess`.
   void (*kinematics)(const ModelView&, const Stage<L>&);
+  /// Chooses faces (kernels/step/faces.hpp) at the poses of kinematics(), to (n_pairs, 3).
+  void (*choose_faces)(const ModelView&, const Stage<L>&, Row<L>* out);
+  /// The same at q. `zero`: (nv) zeros. Overwrites v and what kinematics() left.
+  void (*choose_faces_at)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* zero,
+                          Row<L>* out);
   /// Tests the bounds of pairs against shapes at the poses of kinematics().
   void (*near_pairs)(const ModelView&, const Stage<L>&, NearPairs<L>& out);
   /// Computes g, v and force_scale at the x of kinematics(). `lone`: the only lane whose result

@@ -13,6 +13,9 @@ namespace tangere::kernels {
 template <class N, int L>
 struct StepPart {
   static void kinematics(const ModelView&, const Stage<L>&);
+  static void choose_faces(const ModelView&, const Stage<L>&, Row<L>* out);
+  static void choose_faces_at(const ModelView&, const Stage<L>&, const Row<L>* q,
+                              const Row<L>* zero, Row<L>* out);
   static void near_pairs(const ModelView&, const Stage<L>&, NearPairs<L>& out);
   static void residual(const ModelView&, const Stage<L>&, int lone);
   static void evaluate(const ModelView&, const Stage<L>&, int lone);

@@ -47,6 +47,7 @@ struct StageView {
           l.own_count[lane], l.stride};
     }
     a.candidates = lists;
+    a.faces = view(s.faces);
     a.lone = lone;
     a.centre = view(s.centre);
     a.x = view(s.x);

@@ -20,6 +20,24 @@ void StepPart<N, L>::kinematics(const ModelView& m, const Stage<L>& s) {
 }
 
 template <class N, int L>
+void StepPart<N, L>::choose_faces(const ModelView& m, const Stage<L>& s, Row<L>* out) {
+  using View = StageView<N, L>;
+  kernels::choose_faces(m, View::arguments(m, s, -1), View::view(out));
+}
+
+template <class N, int L>
+void StepPart<N, L>::choose_faces_at(const ModelView& m, const Stage<L>& s, const Row<L>* q,
+                                     const Row<L>* zero, Row<L>* out) {
+  using View = StageView<N, L>;
+  StageArgs<N> a = View::arguments(m, s, -1);
+  a.centre = View::view(q);
+  a.x = a.r = a.s = View::view(zero);
+  a.c0_over_h = N(0.0);
+  a.inverse_h = N(1.0);
+  kernels::choose_faces_at(m, a, View::view(out));
+}
+
+template <class N, int L>
 void StepPart<N, L>::near_pairs(const ModelView& m, const Stage<L>& s, NearPairs<L>& out) {
   using View = StageView<N, L>;
   kernels::near_pairs(m, View::arguments(m, s, -1), out);

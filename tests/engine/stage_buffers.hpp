@@ -3,6 +3,7 @@
 // scalars.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "engine/model/compiled_model.hpp"
@@ -25,6 +26,7 @@ class StageBuffers {
     contacts_.resize(m.link_pairs.size() + m.grounded.size());
     columns_.resize(2 * m.links.size());
     excess_.assign(1, N(0.0));
+    faces.assign(3 * m.pairs.size(), N(0.0));
     for (const kernels::PairContact& p : m.pairs) {
       points_.emplace_back();
       for (int k = 0; k < 3 * p.n_points; ++k) points_.back().push_back(N(p.points[k]));
@@ -48,6 +50,7 @@ class StageBuffers {
     a.block = block;
     a.group = 0;
     a.candidates = lists_.data();
+    a.faces = faces.data();
     a.lone = -1;
     a.links = links_.data();
     a.contacts = contacts_.data();
@@ -78,6 +81,7 @@ class StageBuffers {
   }
 
   std::vector<N> centre, x, r, s, tau, target, v_out, g, force_scale, mass, A;
+  std::vector<N> faces;         ///< (pairs, 3) 0: nearest face, point by point
   double friction_tangent = 1;  ///< 0: the Jacobian takes friction by its secant
 
  private:
@@ -90,7 +94,7 @@ class StageBuffers {
   std::vector<kernels::CandidateList<N>> lists_;
 };
 
-/// A random stage: centre, unknown and history of the size of a step.
+/// A random stage: centre, unknown and history of the size of a step, and faces that count.
 template <class N>
 void randomise(StageBuffers<N>& b, const CompiledModel& m, Random& random, double h) {
   for (const kernels::Link& l : m.links) {
@@ -111,6 +115,7 @@ void randomise(StageBuffers<N>& b, const CompiledModel& m, Random& random, doubl
     b.tau[k] = N(0.1 * random.normal());
     b.target[k] = N(0.3 * random.normal());
   }
+  for (N& side : b.faces) side = N(std::floor(random.uniform(-1, 2)));
 }
 
 }  // namespace tangere::testing

@@ -44,6 +44,7 @@ void copy_stage(const StageBuffers<double>& from, StageBuffers<N>& to) {
   copy(from.s, to.s);
   copy(from.tau, to.tau);
   copy(from.target, to.target);
+  copy(from.faces, to.faces);
 }
 
 void compare_with_dual_numbers(const CompiledModel& m, StageBuffers<double>& b, double tolerance) {

@@ -48,6 +48,7 @@ void fill_lane(BasicWorkspace<L>& w, const CompiledModel& m, const StageBuffers<
     w.stage.x[i][lane] = b.x[k], w.stage.r[i][lane] = b.r[k], w.stage.s[i][lane] = b.s[k];
     w.stage.tau[i][lane] = b.tau[k], w.stage.target[i][lane] = b.target[k];
   }
+  for (std::size_t k = 0; k < b.faces.size(); ++k) w.stage.faces[k][lane] = b.faces[k];
 }
 
 template <int L>
@@ -107,6 +108,7 @@ void compare_tables(const Scene& scene, unsigned seed, double friction_tangent =
           if (l == lane) continue;
           for (int i = 0; i < m->nv; ++i) w.stage.x[i][l] = poison;
           for (int i = 0; i < m->nq; ++i) w.stage.centre[i][l] = poison;
+          for (std::size_t k = 0; k < b.faces.size(); ++k) w.stage.faces[k][l] = poison;
         }
         table->group.kinematics(m->view, w.stage);
         table->group.evaluate(m->view, w.stage, -1);
