@@ -191,9 +191,10 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
       summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, job),
       summary.simulation_seconds, preparation_of(job), summary.encoding_seconds,
       summary.writing_seconds, done.task.line,
-      split_text(summary.split_steps, summary.coarse_steps), summary.failures.size(), kept,
-      options.output, shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()),
-      bytes, merged.line));
+      split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps),
+      summary.failures.size(), kept, options.output,
+      shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes,
+      merged.line));
   Json result{{"command", "generate"},
               {"exit_code", static_cast<int>(code)},
               {"scene", options.scene},
@@ -228,6 +229,7 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"newton_iterations", summary.newton_iterations},
               {"split_steps", summary.split_steps},
               {"coarse_steps", summary.coarse_steps},
+              {"passed_steps", summary.passed_steps},
               {"failed", failures_json("episode", failures_of(summary))}};
   result.update(done.task.keys);
   result.update(merged.keys);

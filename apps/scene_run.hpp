@@ -31,8 +31,9 @@ Integrator integrator_named(const std::string& name);
 /// Throws InputError for an unknown loss.
 LossKind loss_named(const std::string& name);
 
-/// Says how many steps were split, and how many missed the accuracy if any did.
-std::string split_text(std::int64_t split, std::int64_t coarse);
+/// Says how many steps were split, and how many missed the accuracy or let a body through, if any
+/// did.
+std::string split_text(std::int64_t split, std::int64_t coarse, std::int64_t passed);
 
 /// Reads a scene; its warnings go to the console. `asked`: as in ask_of_solver().
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,

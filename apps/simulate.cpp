@@ -104,8 +104,8 @@ int report(const SimulateArguments& options, const Console& console, const Batch
                   "Newton iterations per step: {:.2f}, {}, environments failed: {}\n{}\n"
                   "wrote {} ({} bytes)",
                   batch.environments(), summary.steps, summary.seconds, rate, per_step,
-                  split_text(summary.split_steps, summary.coarse_steps), summary.failures.size(),
-                  of_task.line, options.output, bytes));
+                  split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps),
+                  summary.failures.size(), of_task.line, options.output, bytes));
   Json sensors = Json::array();
   for (const SensorInfo& sensor : batch.model().sensors()) {
     const int every = tactile_interval(sensor, rollout);
@@ -136,6 +136,7 @@ int report(const SimulateArguments& options, const Console& console, const Batch
               {"newton_iterations_per_step", per_step},
               {"split_steps", summary.split_steps},
               {"coarse_steps", summary.coarse_steps},
+              {"passed_steps", summary.passed_steps},
               {"failed", failures_json("environment", failures_of(summary))}};
   result.update(of_task.keys);
   console.result(result);

@@ -44,6 +44,7 @@ Json row_json(const StressRow& row) {
           {"environment_steps", row.steps},
           {"split_steps", row.split_steps},
           {"coarse_steps", row.coarse_steps},
+          {"passed_steps", row.passed_steps},
           {"envs", row.environments},
           {"failed", row.failed},
           {"verdict", to_string(row.verdict)},

@@ -17,6 +17,8 @@ namespace {
 const std::vector<std::string> kLaws = {"clamped", "paper", "linear", "published"};
 constexpr ContactLaw kLawOf[] = {ContactLaw::clamped, ContactLaw::paper, ContactLaw::linear,
                                  ContactLaw::linear};
+constexpr double kAsWide =
+    1e-3;  // share by which a body may be wider than a pitch and count as such
 constexpr std::size_t kPublishedShare = 50;  // vertices of a mesh for each that touches there
 constexpr int kClamped = 0, kLinear = 2, kPublished = 3;  // indices into them
 
@@ -106,10 +108,11 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root) {
       pitch = std::max(pitch, cuboid->size[k] / (cuboid->contact_resolution[k] - 1));
     std::array<double, 3> across = widths(shape_of(c.primitive_body));
     std::sort(across.begin(), across.end());  // a post's second width is its thickness
-    if (across[1] == 0 || pitch <= across[1] * (1 + 1e-9)) continue;
+    if (across[1] == 0 || pitch < across[1] * (1 - kAsWide)) continue;
     root.context().warnings.push_back(fmt::format(
         "{}<general_primitive_contact>: contact points of '{}' are up to {:.3g} m apart, and '{}' "
-        "is {:.3g} m across, so it can come between them unnoticed; expected a finer "
+        "is {:.3g} m across, so it can come between them, or out from under them, unnoticed; "
+        "expected a finer "
         "general_contact_resolution, or the same contact the other way round as well",
         c.source.prefix(), c.general_body, pitch, c.primitive_body, across[1]));
   }

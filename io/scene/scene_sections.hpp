@@ -27,8 +27,8 @@ void read_contacts(Scene& scene, const SceneNode& section);
 /// In the published dialect (root <redmax>), warns of meshes that touch with all their vertices:
 /// the published simulator takes about one in 50.
 void warn_of_dense_meshes(const Scene& scene, const SceneNode& root);
-/// Warns of pairs in which a cuboid's contact points are farther apart than the touched body is
-/// across, and the touched body has no points on the cuboid.
+/// Warns of pairs in which a cuboid's contact points are as far apart as the touched body is
+/// across, or farther, and the touched body has no points on the cuboid.
 void warn_of_coarse_points(const Scene& scene, const SceneNode& root);
 void read_sensors(Scene& scene, const SceneNode& section);
 void read_end_effectors(Scene& scene, const SceneNode& section);

@@ -29,6 +29,7 @@ struct StepTally {
   std::int64_t newton_iterations = 0;
   std::int64_t split_steps = 0;
   std::int64_t coarse_steps = 0;  ///< with parts that missed the accuracy that was asked for
+  std::int64_t passed_steps = 0;  ///< in which a body came through another
   std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
 
   /// Counts `environments` environments from number `first` on. Construct it before the first step.
@@ -55,6 +56,7 @@ struct StepTally {
       newton_iterations += batch.iterations(e);
       split_steps += status == StepStatus::split ? 1 : 0;
       coarse_steps += status == StepStatus::coarse ? 1 : 0;
+      passed_steps += status == StepStatus::passed ? 1 : 0;
       if (!failed(status)) continue;
       failures.push_back({e, step, status});
       live_[lane(e)] = false;

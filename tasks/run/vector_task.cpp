@@ -109,6 +109,7 @@ VectorCounts VectorTask::counts() const {
     sum.newton_iterations += tally.newton_iterations;
     sum.split_steps += tally.split_steps;
     sum.coarse_steps += tally.coarse_steps;
+    sum.passed_steps += tally.passed_steps;
   }
   return sum;
 }

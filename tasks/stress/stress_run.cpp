@@ -30,7 +30,7 @@ struct Setting {
 /// What one block came to.
 struct BlockOutcome {
   double worst = -HUGE_VAL;  ///< of the environments that did not fail; NaN where one has no number
-  std::int64_t steps = 0, evaluations = 0, split_steps = 0, coarse_steps = 0;
+  std::int64_t steps = 0, evaluations = 0, split_steps = 0, coarse_steps = 0, passed_steps = 0;
   int most_evaluations = 0;
   std::vector<FailedEnvironment> failures{};
 };
@@ -85,6 +85,7 @@ struct Play {
     out.evaluations = tally.newton_iterations;
     out.split_steps = tally.split_steps;
     out.coarse_steps = tally.coarse_steps;
+    out.passed_steps = tally.passed_steps;
     out.failures = std::move(tally.failures);
   }
 
@@ -132,6 +133,7 @@ std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const
     sum.evaluations += b.evaluations;
     sum.split_steps += b.split_steps;
     sum.coarse_steps += b.coarse_steps;
+    sum.passed_steps += b.passed_steps;
     sum.most_evaluations = std::max(sum.most_evaluations, b.most_evaluations);
     sum.failures.insert(sum.failures.end(), b.failures.begin(), b.failures.end());
   }
@@ -149,6 +151,7 @@ void judge(const BlockOutcome& out, StressRow& row) {
   row.steps = out.steps;
   row.split_steps = out.split_steps;
   row.coarse_steps = out.coarse_steps;
+  row.passed_steps = out.passed_steps;
   row.failed = static_cast<int>(out.failures.size());
   const bool nobody_left = row.of->measure && row.failed == row.environments;
   const bool met = nobody_left || row.value <= row.of->bound;  // false for NaN
@@ -158,11 +161,13 @@ void judge(const BlockOutcome& out, StressRow& row) {
   if (met) {
     row.verdict = few ? StressVerdict::holds : StressVerdict::flagged;
   } else {
-    const bool said = !silent || row.coarse_steps > 0;
+    const bool said = !silent || row.coarse_steps > 0 || row.passed_steps > 0;
     row.verdict = said ? StressVerdict::flagged : StressVerdict::fails;
   }
   if (row.failed > 0)
     row.reason = to_string(out.failures.front().status);
+  else if (row.passed_steps > 0)
+    row.reason = to_string(StepStatus::passed);
   else if (row.coarse_steps > 0)
     row.reason = to_string(StepStatus::coarse);
 }

@@ -50,8 +50,14 @@ TEST(CoarsePoints, ABodyThatFitsBetweenThemIsTold) {
               ElementsAre(HasSubstr("'below' is 0.04 m across")));
 }
 
-TEST(CoarsePoints, BoxesOnBoxesAndPlatesAreNot) {
-  EXPECT_THAT(warnings("2 2 2", "type=\"cuboid\" size=\"0.05 0.05 0.05\""), IsEmpty());
+/// A shift leaves the corners of a box without the box below.
+TEST(CoarsePoints, ABoxOnItsEqualIsTold) {
+  const std::string equal = "type=\"cuboid\" size=\"0.05 0.05 0.05\"";
+  EXPECT_THAT(warnings("2 2 2", equal), ElementsAre(HasSubstr("or out from under them")));
+  EXPECT_THAT(warnings("3 3 3", equal), IsEmpty());
+}
+
+TEST(CoarsePoints, BoxesOnPlatesAreNot) {
   EXPECT_THAT(warnings("2 2 2", "type=\"cuboid\" size=\"0.3 0.3 0.01\""), IsEmpty());
 }
 
