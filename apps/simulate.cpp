@@ -174,6 +174,11 @@ struct Start {
           fmt::format("{} was solved to {:g}, this run is solved to {:g}: it goes on, but not with "
                       "the bits of one long run; --tol sets the tolerance",
                       saved->path, saved->tolerance, stepper.tolerance()));
+    else if (saved->accuracy != stepper.accuracy())
+      console.note(fmt::format(
+          "{} was made with accuracy {:g}, this run has {:g} (0: steps are not cut): it goes on, "
+          "but not with the bits of one long run; --accuracy sets it",
+          saved->path, saved->accuracy, stepper.accuracy()));
     else if (saved->row == 0 && saved->step > 0)
       console.note(
           fmt::format("row 0 of {} has no row before it: a scheme of two steps starts anew there",

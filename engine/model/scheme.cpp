@@ -4,7 +4,7 @@
 // Runge-Kutta: X_i = h Σ a_ij ẋ_j, V_i = v₀ + h Σ a_ij v̇_j. η solves η a_jk = a_ik over the rows
 // before i. Then
 //   ẋ_i = (X_i - Σ η_j X_j)/(a_ii h),  v̇_i = (V_i - v₀ - Σ η_j (V_j - v₀))/(a_ii h)
-// The estimate compares X_s with the interpolatory rule through t = 0 and the ends c_i of the stages:
+// The estimate compares X_s with the interpolatory rule through t = 0 and the stages' ends c_i:
 //   e = X_s - h (w_0 v₀ + Σ w_i ẋ_i),  Σ w_i c_i^p = 1/(p + 1) for p = 0 … s, with 0^0 = 1
 #include "engine/model/scheme.hpp"
 

@@ -10,8 +10,8 @@
 // (q_before, v_before) is the state one step before. (x_j, v_j) is an earlier stage of the same
 // step. The last stage's result is the state after the step.
 //
-// The error of a step is estimated by another rule for q₁ = q₀ ⊕ ∫ ẋ dt. It passes through the rates
-// at the start (v₀) and at the end of every stage, and so is one order higher:
+// The error of a step is estimated by another rule for q₁ = q₀ ⊕ ∫ ẋ dt. It passes through the
+// rates at the start (v₀) and at the end of every stage, and so is one order higher:
 //   e = estimate[0] h v₀ + Σ estimate[1 + k] x_k
 #pragma once
 

@@ -14,7 +14,8 @@ template <int L>
 void find_candidates(const CompiledModel& model, const kernels::KernelTable& kernels,
                      BasicWorkspace<L>& w, LaneBits lanes);
 
-/// Chooses the faces that count in the solve which starts at q0 (kernels/step/faces.hpp). Call before its first stage. Overwrites the stage's v.
+/// Chooses the faces that count in the solve which starts at q0 (kernels/step/faces.hpp). Call it
+/// before the first stage. Overwrites the stage's v.
 template <int L>
 void choose_faces(const CompiledModel& model, const kernels::KernelTable& kernels,
                   BasicWorkspace<L>& w);

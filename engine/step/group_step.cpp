@@ -43,8 +43,8 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
     std::copy_n(w.stage.v, n, w.v_inner + k * n);
   }
   LaneBits resolved = lanes;
-  watch_faces(table, w, lanes, report);
   finish(w, lanes, h, resolved, report);
+  watch_faces(table, w, resolved, report);
   return resolved;
 }
 

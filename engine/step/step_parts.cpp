@@ -5,8 +5,8 @@
 // forces is the residual of the last stage at x - e, in the scale of the solver's tolerance: the
 // share of the acting forces that would have no counterpart. A part is taken when
 //   kSafety ‖residual(x - e)‖ ≤ accuracy
-// A step begins with a part of its whole length whatever was before it, so it depends on nothing but
-// its state. Lanes have parts of their own lengths and are solved side by side, until the last has
+// A step begins with a part of its whole length whatever was before it, so it depends on its state
+// alone. Lanes have parts of their own lengths and are solved side by side, until the last has
 // arrived.
 #include "engine/step/step_parts.hpp"
 

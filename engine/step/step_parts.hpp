@@ -18,8 +18,8 @@ class StepParts {
   /// Length of the next part, in steps.
   [[nodiscard]] double length() const { return std::ldexp(1.0, -halved_); }
 
-  /// The next part will be shorter. `ratio`: estimated error over what is allowed; infinite where no
-  /// root was found. Must not be called when finest().
+  /// The next part will be shorter. `ratio`: estimated error over what is allowed; infinite where
+  /// no root was found. Must not be called when finest().
   void shorten(double ratio) {
     const double wanted = std::ceil(std::log2(ratio) / kPower);
     halved_ += std::isfinite(wanted) ? std::clamp(static_cast<int>(wanted), 1, kMostHalvings) : 1;

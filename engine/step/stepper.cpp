@@ -51,6 +51,10 @@ StepSettings step_settings(const Model& model, const StepperOptions& o) {
   return s;
 }
 
+Integrator integrator_in_force(const Model& model, const StepperOptions& options) {
+  return step_settings(model, options).integrator;
+}
+
 StepperOptions for_gradients(const Model& model, StepperOptions options) {
   if (!options.tolerance && !model.solver().tolerance) options.tolerance = kGradientTolerance;
   return options;
@@ -109,7 +113,8 @@ struct Stepper::Impl {
       batch.iterations_[e] = report.iterations[l];
       batch.residual_[e] = report.residual[l];
       if (failed(report.status[l])) continue;
-      batch.has_history_[e] = 1;
+      // One step back is too long for BDF2's history where a step had to be cut.
+      batch.has_history_[e] = settings.accuracy > 0 ? 0 : 1;
       const auto shift = [&](int now, int before, const kernels::Row<L>* from, int count) {
         for (int i = 0; i < count; ++i) {
           double* row = g.rows + i * kBlock + lane + l;

@@ -23,6 +23,9 @@ struct StepperOptions {
   std::optional<double> accuracy{};
 };
 
+/// Returns the scheme that a stepper of these options takes. Throws like its constructor.
+Integrator integrator_in_force(const Model& model, const StepperOptions& options);
+
 /// Tolerance of runs that gradients are taken of, where neither caller nor scene names one. A
 /// gradient is exact for states that solve their equations, so it is off by about as much.
 inline constexpr double kGradientTolerance = 1e-9;

@@ -39,7 +39,8 @@ class GrownFile {
   /// `root`: address of the group "/"; h5::kNowhere leaves the group where it was.
   void open(std::uint64_t root = h5::kNowhere);
 
-  /// Reads the file back and compares it with what was written, calls `last` with the path of the .part, syncs and renames.
+  /// Reads the file back and compares it with what was written, calls `last` with the path of
+  /// the .part, syncs and renames.
   /// Returns the size in bytes.
   std::uint64_t commit(const std::function<void(const std::string&)>& last = {});
 

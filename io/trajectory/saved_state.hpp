@@ -21,6 +21,7 @@ struct SavedState {
   std::int64_t first_episode = 0;
   double timestep = 0;  ///< [s]
   double tolerance = 0;
+  double accuracy = 0;  ///< 0: steps were not cut, or the file does not say
   std::string integrator, scene_text;
   std::vector<std::string> q_names;            ///< (nq)
   std::vector<std::string> v_names;            ///< (nv)

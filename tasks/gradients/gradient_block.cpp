@@ -38,7 +38,7 @@ GradientBlock::GradientBlock(const Model& model, const StepperOptions& stepper,
       pullback_(model),
       parameters_(model),
       plan_(plan) {
-  const Integrator scheme = stepper.integrator.value_or(model.integrator());
+  const Integrator scheme = integrator_in_force(model, stepper);
   for (std::int64_t k = 0; k < plan.segment; ++k) tapes_.emplace_back(model, scheme, plan.steps);
 }
 

@@ -89,7 +89,7 @@ double gradient_bytes(const Model& model, int environments, const GradientOption
   const double numbers = o.parameters ? NumberGradients(model).count() : 0;
   const double results =
       double(o.steps) * model.nu() + 2.0 * model.nv() + numbers + double(point_count(model, o)) + 1;
-  const Integrator scheme = o.stepper.integrator.value_or(model.integrator());
+  const Integrator scheme = integrator_in_force(model, o.stepper);
   const double tape = std::min(double(BlockTape::bytes(model, scheme, o.steps)), o.tape_bytes);
   const double of_points =
       double(kernels::kBlock) * double(point_count(model, o)) * losses;  // each thread's own sums

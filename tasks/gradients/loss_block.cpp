@@ -14,7 +14,7 @@ namespace {
 std::size_t count(std::int64_t n) { return static_cast<std::size_t>(n); }
 
 TapePlan plan_of(const Model& model, const GradientOptions& o) {
-  const Integrator scheme = o.stepper.integrator.value_or(model.integrator());
+  const Integrator scheme = integrator_in_force(model, o.stepper);
   const auto tape = [&](std::int64_t steps) {
     return double(BlockTape::bytes(model, scheme, steps));
   };

@@ -19,7 +19,7 @@ using kernels::kBlock;
 namespace {
 
 double tape_bytes(const Task& task, const TaskGradientOptions& o) {
-  const Integrator scheme = o.stepper.integrator.value_or(task.model().integrator());
+  const Integrator scheme = integrator_in_force(task.model(), o.stepper);
   return double(BlockTape::bytes(task.model(), scheme, task.spec().steps_per_action));
 }
 

@@ -38,7 +38,7 @@ struct StressCase {
   std::string why{};
 };
 
-/// All cases, those that are known to fail first.
+/// All cases, by kind.
 std::span<const StressCase> stress_cases();
 
 /// The scene with the factors of a variant, also on what <randomize> draws.

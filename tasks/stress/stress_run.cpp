@@ -32,6 +32,7 @@ struct BlockOutcome {
   double worst = -HUGE_VAL;  ///< of the environments that did not fail; NaN where one has no number
   std::int64_t steps = 0, evaluations = 0, split_steps = 0, coarse_steps = 0, passed_steps = 0;
   int most_evaluations = 0;
+  bool silent = false;  ///< an environment misses the bound and no status of it says anything
   std::vector<FailedEnvironment> failures{};
 };
 
@@ -44,6 +45,7 @@ struct Worker {
 /// A case's scene with one setting, ready to be played.
 struct Play {
   const Criterion& measure;
+  double bound;
   Setting setting;
   Batch batch;
   ControlProgram controls;
@@ -64,6 +66,8 @@ struct Play {
           histories[l].add(w.readout, batch, e);
     };
     record();
+    std::vector<bool> said(
+        as_size(lanes));  // whose steps missed the accuracy, or let a body through
     const std::size_t nu = as_size(model().nu());
     for (std::int64_t k = 0; k < steps; ++k) {
       if (stopped || (go_on && !go_on())) {
@@ -73,14 +77,18 @@ struct Play {
       for (int e = first; e < first + lanes; ++e)
         controls.evaluate(k, batch.episode(e), u.subspan(as_size(e) * nu, nu));
       w.stepper.step_block(batch, b, u);
-      for (int e = first; e < first + lanes; ++e)
-        if (tally.live(e))
-          out.most_evaluations = std::max(out.most_evaluations, batch.iterations(e));
+      for (int e = first; e < first + lanes; ++e) {
+        if (!tally.live(e)) continue;
+        out.most_evaluations = std::max(out.most_evaluations, batch.iterations(e));
+        const StepStatus status = batch.status(e);
+        if (status == StepStatus::coarse || status == StepStatus::passed)
+          said[as_size(e - first)] = true;
+      }
       tally.count(batch, k);
       record();
     }
     for (std::size_t l = 0; l < histories.size(); ++l)
-      if (tally.live(first + static_cast<int>(l))) judge(histories[l], out);
+      if (tally.live(first + static_cast<int>(l))) judge(histories[l], said[l], out);
     out.steps = tally.environment_steps;
     out.evaluations = tally.newton_iterations;
     out.split_steps = tally.split_steps;
@@ -89,9 +97,10 @@ struct Play {
     out.failures = std::move(tally.failures);
   }
 
-  void judge(const StressHistory& history, BlockOutcome& out) const {
+  void judge(const StressHistory& history, bool said, BlockOutcome& out) const {
     const double value = measure(history);
     if (!(value <= out.worst)) out.worst = std::isnan(out.worst) ? out.worst : value;
+    if (!(value <= bound) && !said) out.silent = true;
   }
 };
 
@@ -107,11 +116,9 @@ std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const
   if (of.measure && bytes > kMostHistory)
     throw InputError("case '" + of.name + "' takes " + std::to_string(steps) +
                      " steps, whose history does not fit; expected a longer timestep");
-  Play run{of.measure,
-           setting,
-           Batch(model, of.environments),
-           controls,
-           std::max<std::int64_t>(steps, 1),
+  Play run{of.measure, of.bound,
+           setting,    Batch(model, of.environments),
+           controls,   std::max<std::int64_t>(steps, 1),
            go_on};
   const int used = std::min(threads, run.batch.blocks());
   BlockThreads block_threads(used);
@@ -131,6 +138,7 @@ std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const
     if (!(b.worst <= sum.worst)) sum.worst = std::isnan(sum.worst) ? sum.worst : b.worst;
     sum.steps += b.steps;
     sum.evaluations += b.evaluations;
+    sum.silent = sum.silent || b.silent;
     sum.split_steps += b.split_steps;
     sum.coarse_steps += b.coarse_steps;
     sum.passed_steps += b.passed_steps;
@@ -157,13 +165,13 @@ void judge(const BlockOutcome& out, StressRow& row) {
   const bool met = nobody_left || row.value <= row.of->bound;  // false for NaN
   const bool few = row.failed <= row.of->may_fail * row.environments;
   // Passes are not a matter of right and wrong, so failed environments say more.
-  const bool silent = row.of->measure || few;
+  const bool silent = row.of->measure ? out.silent || std::isnan(row.value) : few;
   if (met) {
     row.verdict = few ? StressVerdict::holds : StressVerdict::flagged;
   } else {
-    const bool said = !silent || row.coarse_steps > 0 || row.passed_steps > 0;
-    row.verdict = said ? StressVerdict::flagged : StressVerdict::fails;
+    row.verdict = silent ? StressVerdict::fails : StressVerdict::flagged;
   }
+  if (row.verdict != StressVerdict::flagged) return;
   if (row.failed > 0)
     row.reason = to_string(out.failures.front().status);
   else if (row.passed_steps > 0)
@@ -197,9 +205,15 @@ std::vector<Setting> settings_of(const StressCase& of, const StressOptions& opti
   if (options.step) steps = {*options.step};
   std::vector<Integrator> schemes = of.schemes.empty() ? std::vector{scene.integrator} : of.schemes;
   if (options.integrator) schemes = {*options.integrator};
+  if (options.accuracy && !options.integrator) {
+    std::erase_if(schemes, [](Integrator i) { return i.scheme().estimate.empty(); });
+    if (schemes.empty() && !options.name.empty())
+      throw InputError("case '" + of.name +
+                       "' is played with BDF2, which cannot keep an accuracy; "
+                       "expected --integrator as well");
+  }
   std::vector<Setting> settings;
   for (const Integrator scheme : schemes) {
-    if (options.accuracy && !options.integrator && scheme.scheme().estimate.empty()) continue;
     for (const double step : steps)
       settings.push_back({scheme, step, options.accuracy.value_or(0)});
   }

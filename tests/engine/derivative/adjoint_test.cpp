@@ -119,6 +119,8 @@ TEST_P(AdjointScheme, MachinesMatchDifferences) {
   EXPECT_GT(compared, 350);
 }
 
+/// Runs that split are left out: the run jumps where that decision changes, and these contacts are
+/// deep enough for it.
 TEST_P(AdjointScheme, ContactsMatchDifferences) {
   int compared = 0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
