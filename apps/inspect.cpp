@@ -94,6 +94,7 @@ Json as_json(const Model& model) {
           {"integrator", to_string(model.integrator())},
           {"timestep", model.timestep()},
           {"tolerance", Stepper(model).tolerance()},
+          {"accuracy", Stepper(model).accuracy()},
           {"gravity", scene.gravity},
           {"bodies", bodies},
           {"q_names", model.q_names()},
@@ -153,9 +154,12 @@ std::string end_effectors_text(const Model& model) {
 
 std::string as_text(const Model& model) {
   const Scene& scene = model.scene();
+  const Stepper stepper(model);
   std::string text =
-      fmt::format("scene {} ({}): {}, h = {} s, tolerance {}\n\n", scene.name, scene.path,
-                  to_string(model.integrator()), model.timestep(), Stepper(model).tolerance());
+      fmt::format("scene {} ({}): {}, h = {} s, tolerance {}", scene.name, scene.path,
+                  to_string(stepper.integrator()), stepper.timestep(), stepper.tolerance());
+  if (stepper.accuracy() > 0) text += fmt::format(", steps cut to accuracy {}", stepper.accuracy());
+  text += "\n\n";
   text += bodies_text(model) + '\n';
   text += names_line("coordinates", model.q_names());
   text += names_line("dofs", model.v_names());

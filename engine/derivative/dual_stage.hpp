@@ -31,7 +31,8 @@ class DualStage {
   /// While frozen, the numbers' tangents count as zero.
   void freeze_numbers(bool frozen);
 
-  /// Chooses the faces that count in solves from this centre (kernels/step/faces.hpp). Overwrites v.
+  /// Chooses the faces that count in solves from this centre (kernels/step/faces.hpp). Overwrites
+  /// v.
   void choose_faces();
 
   /// Computes v and g, with the tangents of masses included.

@@ -156,7 +156,8 @@ class Compiler {
       pair.reach = reach;
       pair.body1 = b1;
       pair.body2 = b2;
-      if (pair.shape == PrimitiveShape::cuboid && is_convex(general)) meet_faces(pair, first);
+      if (pair.shape == PrimitiveShape::cuboid && is_convex(general) && pair.n_points <= kCorners)
+        meet_faces(pair, first);
       pair.points = keep(m_.point_storage, std::move(points));
       lay_out_tiles(pair, tiles);
       contacts_.add("contact", d.general_body + " " + d.primitive_body,
@@ -167,6 +168,10 @@ class Compiler {
       touching_.emplace_back(pair.link1, pair.link2);
     }
   }
+
+  /// Bodies with more points have some inside the face that they touch, so the nearest face serves
+  /// them, and a point that slides over the edge of a chosen face loses its force at once.
+  static constexpr int kCorners = 8;
 
   /// Lets a convex body meet a cuboid face by face. Points just beyond the face's edges still touch
   /// it: where equal boxes stand flush, rounding would otherwise decide about each corner. A

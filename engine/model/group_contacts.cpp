@@ -74,10 +74,8 @@ void group_contacts(CompiledModel& m) {
     for (int i = pairs[g]; i < pairs[g + 1]; ++i) {
       kernels::PairContact& pair = m.pairs[std::size_t(m.pair_order[std::size_t(i)])];
       // Faces between the parts of a body that is put together of several are inside it, and a body
-      // that has several may be hollow. A body with more points than corners has some inside the
-      // face that it touches, and loses less at once where one slides over an edge.
-      constexpr int kCorners = 8;
-      if (links.count > 1 || pair.n_points > kCorners) pair.faced = false;
+      // that has several may be hollow.
+      if (links.count > 1) pair.faced = false;
       links.reach = std::max(links.reach, pair.reach);
       links.faced = links.faced || pair.faced;
       pitch = std::min(pitch, pair.extent * std::sqrt(4 * M_PI / pair.n_points));

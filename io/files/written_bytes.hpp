@@ -20,8 +20,8 @@ struct BytesOf {
 };
 
 /// Checksums of the bytes that were handed over for a file, piece by piece. Later bytes replace
-/// earlier ones. Where nothing was handed over, the file has zeros. All functions throw IoError when
-/// the file cannot be read.
+/// earlier ones. Where nothing was handed over, the file has zeros. All functions throw IoError
+/// when the file cannot be read.
 class WrittenBytes {
  public:
   /// For an empty file, which `descriptor` can read. It is not closed here. `path`: for messages.

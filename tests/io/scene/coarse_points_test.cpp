@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that a scene warns where a body fits between the contact points of a box, with both numbers.
+// Tests that a scene warns where a body fits between the contact points of a box, with both
+// numbers.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
