@@ -14,6 +14,7 @@
 namespace tangere {
 namespace {
 
+using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -154,16 +155,20 @@ TEST(StressCases, AreWhole) {
 
 /// A mistake in a file must not pass for a scene that is refused.
 TEST(StressCases, HaveScenesThatLoad) {
-  std::set<std::string> refused;
+  std::set<std::string> refused, coarse;
   for (const StressCase& of : stress_cases()) try {
       const SceneFile file = read_scene(TANGERE_SOURCE_DIR "/scenes/" + of.scene);
-      EXPECT_THAT(file.warnings, IsEmpty()) << of.scene;
+      EXPECT_THAT(file.warnings, Each(HasSubstr("it can come between them"))) << of.scene;
+      if (!file.warnings.empty()) coarse.insert(of.scene);
       EXPECT_GT(Model(varied(file.scene, of.variant)).nv(), 0) << of.scene;
       EXPECT_TRUE(of.seconds > 0 || file.scene.control) << of.name << " has no end";
     } catch (const InputError&) {
       refused.insert(of.scene);
     }
   EXPECT_THAT(refused, ::testing::ElementsAre("hard/chain_100.xml"));
+  // Boxes that touch at corners alone: the next box is as wide as the corners are apart, or less.
+  EXPECT_THAT(coarse, ::testing::ElementsAre("hard/post_between_points.xml", "hard/stack_equal.xml",
+                                             "hard/stack_shifted.xml"));
 }
 
 }  // namespace
