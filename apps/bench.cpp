@@ -11,6 +11,7 @@
 #include "apps/command.hpp"
 #include "apps/machine.hpp"
 #include "apps/memory.hpp"
+#include "apps/record.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
@@ -28,7 +29,7 @@ constexpr int kMostPasses = 1'000'000;
 constexpr int kDefaultEnvironments = 256;  // 16 blocks: several per thread on usual machines
 
 struct BenchArguments {
-  std::string scene, frames, policy, precision = "mixed", svg, csv;
+  std::string scene, frames, policy, precision = "mixed", record, svg, csv;
   std::vector<int> threads;
   std::optional<std::int64_t> steps;
   std::optional<int> environments, every, repeat;
@@ -100,7 +101,9 @@ BenchSetting setting_of(const BenchArguments& options, const Model& model,
   setting.isa = kernels::active_isa_name();
   setting.options.precision = precision_named(options.precision);
   setting.environments = options.environments.value_or(kDefaultEnvironments);
-  setting.options.rollout = {step_count(options.steps, controls), options.every.value_or(0)};
+  setting.options.rollout = {.steps = step_count(options.steps, controls),
+                             .every = options.every.value_or(0),
+                             .outputs = record_of(options.record, model).outputs};
   setting.options.frames = frames_named(options.frames);
   setting.options.repeat = options.repeat.value_or(setting.options.repeat);
   setting.every = common_interval(model, setting.options.rollout);
@@ -140,8 +143,9 @@ std::vector<int> thread_counts(const BenchArguments& options) {
 }
 
 int bench_task(const BenchArguments& options, const Console& console, const Task& task) {
-  refuse_with_task(task,
-                   {{"--every", options.every.has_value()}, {"--frames", !options.frames.empty()}});
+  refuse_with_task(task, {{"--every", options.every.has_value()},
+                          {"--frames", !options.frames.empty()},
+                          {"--record", !options.record.empty()}});
   const PolicyKind kind = policy_named(options.policy, "", PolicyKind::random);
   const Policy policy(task, kind);
   BenchSetting setting;
@@ -227,6 +231,9 @@ Command add_bench(CLI::App& program) {
                         "Read tactile fields every N steps [default: the scene's, or 1]");
   add_text(app, "--frames", o.frames, "NAME",
            "Fields to read: dense (every point), compact (touched tiles) or none [default: dense]");
+  add_record_option(app, o.record,
+                    "Readings to take, separated by commas: of a sensor its field (pad), "
+                    "pad.pressure, pad.shear or pad.sum [default: the scene's, or all fields]");
   add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,
                         "Timed passes over the episode; the best counts [default: 3]");
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,

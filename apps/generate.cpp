@@ -12,10 +12,12 @@
 #include "apps/generate_job.hpp"
 #include "apps/memory.hpp"
 #include "apps/progress.hpp"
+#include "apps/record.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
 #include "apps/workers.hpp"
+#include "io/files/name_list.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/files/text_file.hpp"
 #include "io/hdf5/reading_note.hpp"
@@ -55,20 +57,16 @@ std::string controls_named(const std::string& path) {
   return fmt::format("a table of checksum {:016x}", hash);
 }
 
-/// Splits a list at its commas. Throws InputError for empty words.
-std::vector<std::string> words_of(const std::string& list) {
-  std::vector<std::string> words;
-  if (list.empty()) return words;
-  for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
-    end = list.find(',', begin);
-    words.push_back(list.substr(begin, end == std::string::npos ? end : end - begin));
-    if (words.back().empty())
-      throw InputError(fmt::format("--record '{}'; expected names separated by commas", list));
-    if (std::count(words.begin(), words.end(), words.back()) > 1)
-      throw InputError(fmt::format("--record '{}': '{}' is listed twice; expected each name once",
-                                   list, words.back()));
-  }
-  return words;
+/// Poses of bodies are for trajectories: where the scene asks for them, a note says so.
+Record dataset_record(const GenerateOptions& options, const Model& model, const Console& console) {
+  Record record = record_of(options.record, model);
+  if (options.record.empty() && std::erase(record.names, "bodies") > 0)
+    console.note("a data set has no poses of bodies: 'bodies' of <outputs> is left out");
+  return record;
+}
+
+std::vector<std::string> split_if_any(const std::string& list) {
+  return list.empty() ? std::vector<std::string>{} : split_names("--record", list);
 }
 
 /// Returns the command that makes the same data set again, in any folder and on any number of
@@ -91,7 +89,7 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
 
 /// `task`: null for a scene alone.
 DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
-                          const Stepper& stepper, const EpisodeOptions& run,
+                          const Stepper& stepper, const EpisodeOptions& run, const Record& record,
                           const ProgramInfo& info, const GradientPlan& gradients,
                           const Task* task = nullptr, const std::string& policy = {}) {
   DatasetDescription description;
@@ -101,7 +99,8 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
   description.command = command_of(options, run, policy);
   description.shards = options.shards.value_or(0);
   description.compression = options.compress;
-  description.record = words_of(options.record);
+  description.record = task == nullptr ? record.names : split_if_any(options.record);
+  description.fields = record.outputs.fields;
   description.sparse = options.tactile == "sparse";
   description.gradients_of =
       options.loss.empty() ? options.gradients : options.gradients + " " + options.loss;
@@ -315,8 +314,8 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
   job.unit = "action";
   job.effects = effects_of(task.model());
-  job.layout = make_layout(options, task.model(), Stepper(task.model()), job.run, info, plan, &task,
-                           to_string(kind));
+  job.layout = make_layout(options, task.model(), Stepper(task.model()), job.run, {}, info, plan,
+                           &task, to_string(kind));
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
     const EpisodeSummary summary = with_gradients(plan_of(run), sink, [&](EpisodeSink& to) {
@@ -368,6 +367,8 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
   Job job;
   job.run = episode_options(options, model, controls);
+  const Record record = dataset_record(options, model, console);
+  job.run.fields = record.outputs.fields;
   const GradientKind gradients = gradients_wanted(options, false);
   std::unique_ptr<RolloutLoss> loss;
   if (!options.loss.empty()) loss = make_loss(loss_named(options.loss), model, job.run.every);
@@ -381,7 +382,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
   job.unit = "environment step";
   job.effects = effects_of(model);
-  job.layout = make_layout(options, model, stepper, job.run, info, plan);
+  job.layout = make_layout(options, model, stepper, job.run, record, info, plan);
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
     return {with_gradients(plan_of(run), sink,
@@ -432,8 +433,10 @@ Command add_generate(CLI::App& program) {
   add_text(app, "--tactile", o.tactile, "KIND",
            "Storage of large fields: dense, or sparse, which leaves out tiles of zeros [default: "
            "dense]");
-  add_text(app, "--record", o.record, "LIST",
-           "Observations to store, separated by commas [default: all]");
+  add_record_option(app, o.record,
+                    "Observations to compute and store, separated by commas: q, v, variables, of a "
+                    "sensor its field (pad), pad.pressure, pad.shear or pad.sum [default: the "
+                    "scene's, or all fields]");
   add_text(app, "--gradients", o.gradients, "KIND",
            "Derivatives to store: none, return (for a scene with --loss), or jacobians of each row "
            "[default: none]");

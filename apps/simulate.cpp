@@ -13,6 +13,7 @@
 #include "apps/command.hpp"
 #include "apps/memory.hpp"
 #include "apps/progress.hpp"
+#include "apps/record.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
@@ -31,7 +32,7 @@ namespace {
 
 struct SimulateArguments {
   std::string scene, output, controls, policy, integrator, precision = "double", state_from,
-                                                           gradients;
+                                                           gradients, record;
   std::optional<std::int64_t> steps, row;
   std::optional<int> environments, every;
   std::optional<double> timestep, tolerance, accuracy, tape_memory;
@@ -51,9 +52,9 @@ void check_arguments(const SimulateArguments& options) {
     throw InputError("--row without --state-from; expected both");
 }
 
-void check_size(const Model& model, int environments) {
+void check_size(const Model& model, int environments, const RolloutOptions& rollout) {
   const double state = static_cast<double>(model.state_bytes_per_environment());
-  check_memory(state * environments + rollout_bytes(model, environments) +
+  check_memory(state * environments + rollout_bytes(model, environments, rollout.outputs) +
                    static_cast<double>(Stepper::workspace_bytes(model)),
                fmt::format("--envs {}", environments));
 }
@@ -65,6 +66,9 @@ TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
   RunDescription run;
   if (task != nullptr) run.task = task->spec();
   run.policy = policy;
+  run.fields = fields_of(batch.model(), rollout.outputs);
+  run.bodies = rollout.outputs.bodies;
+  run.end_effectors = rollout.outputs.end_effectors;
   run.steps = rollout.steps;
   run.first_step = rollout.first_step;
   run.every = rollout.every;
@@ -107,10 +111,12 @@ int report(const SimulateArguments& options, const Console& console, const Batch
                   split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps),
                   summary.failures.size(), of_task.line, options.output, bytes));
   Json sensors = Json::array();
-  for (const SensorInfo& sensor : batch.model().sensors()) {
-    const int every = tactile_interval(sensor, rollout);
-    sensors.push_back(
-        {{"name", sensor.name}, {"every", every}, {"frames", tactile_frames(sensor, rollout)}});
+  for (const FieldOutput of : fields_of(batch.model(), rollout.outputs)) {
+    const SensorInfo& sensor = batch.model().sensors()[static_cast<std::size_t>(of.sensor)];
+    sensors.push_back({{"name", sensor.name},
+                       {"form", to_string(of.form)},
+                       {"every", tactile_interval(sensor, rollout)},
+                       {"frames", tactile_frames(sensor, rollout)}});
   }
   Json result{{"command", "simulate"},
               {"exit_code", static_cast<int>(code)},
@@ -309,9 +315,9 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
   const Model& model = task.model();
   Stepper stepper(model);
   const RolloutOptions rollout{TaskProgram::steps(task.spec()), options.every.value_or(0),
-                               precision, 0};
+                               precision, 0, record_of(options.record, model).outputs};
   note_empty_sensors(console, model, rollout);
-  check_size(model, options.environments.value_or(1));
+  check_size(model, options.environments.value_or(1), rollout);
   Batch batch(model, options.environments.value_or(1), options.seed.value_or(0));
   const auto data = std::make_shared<EnvironmentData>(task, batch.environments());
   data->restart(batch);
@@ -363,10 +369,11 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   const ControlProgram controls =
       make_controls(options.controls, start.seed, model, stepper, console);
   const RolloutOptions rollout{steps_left(options, controls, start.first_step),
-                               options.every.value_or(0), precision, start.first_step};
+                               options.every.value_or(0), precision, start.first_step,
+                               record_of(options.record, model).outputs};
   controls.check_covers(rollout.first_step + rollout.steps);
   note_empty_sensors(console, model, rollout);
-  check_size(model, start.environments);
+  check_size(model, start.environments, rollout);
   Batch batch(model, start.environments, start.seed, start.saved ? start.saved->first_episode : 0);
   if (start.saved) restore_state(*start.saved, start.continues, batch);
   Gradients gradients(options, batch, stepper, rollout);
@@ -412,6 +419,10 @@ Command add_simulate(CLI::App& program) {
                                  "Steps to take [default: as many as the controls last]");
   add_whole_number<int>(app, "--envs", o.environments, 1, kMostEnvironments,
                         "Environments stepped together [default: 1, or those of --state-from]");
+  add_record_option(app, o.record,
+                    "What to compute and store besides q and v, separated by commas: bodies, "
+                    "variables, of a sensor its field (pad), pad.pressure, pad.shear or pad.sum "
+                    "[default: the scene's, or bodies, variables and all fields]");
   add_whole_number<int>(app, "--every", o.every, 1, kMostEnvironments,
                         "Read tactile fields every N steps [default: the scene's, or 1]");
   add_text(app, "--state-from", o.state_from, "F.h5",

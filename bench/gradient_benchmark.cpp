@@ -56,8 +56,7 @@ class Rollout {
         program_(model_, model_.timestep(), 1),
         stepper_(model_),
         readout_(model_, Precision::f64),
-        fields_(model_, environments, tactile ? FrameKind::compact : FrameKind::none,
-                Precision::f64) {
+        fields_(model_, environments, {}, tactile ? FrameKind::compact : FrameKind::none) {
     options_.steps = program_.steps();
     if (tactile) {
       owned_.push_back(make_loss(LossKind::tactile, model_, kEvery));
@@ -83,7 +82,7 @@ class Rollout {
         stepper_.step_block(batch, b, u);
         if (tactile_ && (t + 1) % kEvery == 0)
           for (int s = 0; s < int(model_.sensors().size()); ++s)
-            fields_.read(readout_, batch, b, s);
+            fields_.read(readout_, batch, b, std::size_t(s));
       }
     return cpu_seconds() - begin;
   }

@@ -29,7 +29,7 @@ class RollingBall {
         batch_(start_),
         stepper_(model_),
         readout_(model_, precision),
-        fields_(model_, environments, frames, precision),
+        fields_(model_, environments, {.precision = precision}, frames),
         program_(model_, model_.timestep(), kSeed),
         row_(std::size_t(environments) * std::size_t(model_.nu())) {
     const auto nu = std::size_t(model_.nu());
@@ -68,7 +68,7 @@ class RollingBall {
   }
   void read(int sensor) {
     for (int block = 0; block < batch_.blocks(); ++block)
-      fields_.read(readout_, batch_, block, sensor);
+      fields_.read(readout_, batch_, block, std::size_t(sensor));
     benchmark::ClobberMemory();
   }
 

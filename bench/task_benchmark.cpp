@@ -90,7 +90,7 @@ void BM_Bare(benchmark::State& state) {
         for (std::size_t l = 0; l < parts.size(); ++l)
           parts[l] =
               std::span(fields).subspan((std::size_t(block) * parts.size() + l) * numbers, numbers);
-        readout.read_block(batch, block, 0, std::span<const std::span<double>>(parts));
+        readout.read_block(batch, block, {0}, std::span<const std::span<double>>(parts));
       }
     benchmark::ClobberMemory();
   }

@@ -248,6 +248,12 @@ struct RandomizationDescription {
   Source source;
 };
 
+/// What runs of the scene compute and store (engine/model/field_form.hpp).
+struct OutputsDescription {
+  std::vector<std::string> record;  ///< names of outputs
+  Source source;
+};
+
 struct SolverOptions {
   /// Of the scaled residual, dimensionless. None: the one that follows scheme and step
   /// (docs/solver.md).
@@ -275,6 +281,7 @@ struct Scene {
   std::vector<InitialState> initial;
   std::optional<ControlDescription> control;
   std::vector<RandomizationDescription> randomizations;
+  std::optional<OutputsDescription> outputs;  ///< none: everything
 };
 
 /// The name users write and read: "free", "clamped" …

@@ -125,6 +125,9 @@ double points_outward(const CompiledBody& body, const Vec3<double>& at,
 
 CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& body,
                               SensorInfo& info) {
+  if (d.law == ContactLaw::linear)
+    throw InputError(d.source.prefix() + "tactile sensor '" + d.name +
+                     "': law linear; expected clamped or paper");
   CompiledSensor s =
       d.points.empty() ? compile_array(d, body, info) : compile_points(d, body, info);
   s.law = d.law;

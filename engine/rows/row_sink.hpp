@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <span>
 
+#include "engine/model/field_form.hpp"
+
 namespace tangere {
 
 /// Row t of a trajectory, for all environments: the state before step t (row 0: the start).
@@ -14,12 +16,12 @@ struct StateRow {
   double time;                ///< t h [s]
   std::span<const double> q;  ///< (E, nq)
   std::span<const double> v;  ///< (E, nv)
-  std::span<const double>
-      body_pose;  ///< (E, nb, 7) x y z qw qx qy qz of each body frame in the world
-  std::span<const double>
-      body_twist;  ///< (E, nb, 6) angular, then linear velocity of its origin, world axes
-  std::span<const double> end_effectors =
-      {};  ///< (E, n, 3) world positions of the end effectors [m]; empty if n = 0
+  /// (E, nb, 7) x y z qw qx qy qz of each body frame in the world; empty if not asked for.
+  std::span<const double> body_pose;
+  /// (E, nb, 6) angular, then linear velocity of its origin, world axes; empty if not asked for.
+  std::span<const double> body_twist;
+  /// (E, n, 3) world positions of the end effectors [m]; empty if n = 0 or not asked for.
+  std::span<const double> end_effectors = {};
 };
 
 /// What step t (from row t to row t + 1) used, and how its solve went.
@@ -31,12 +33,12 @@ struct StepRow {
   std::span<const double> residual;          ///< (E) scaled residual at acceptance, dimensionless
 };
 
-/// A tactile field of one sensor, for all environments.
+/// A reading of one sensor in one form, for all environments.
 struct TactileRow {
-  int sensor;                     ///< index into Model::sensors()
-  std::int64_t frame;             ///< 0, 1, 2 …
-  std::int64_t step;              ///< row of q that it was read from
-  std::span<const double> force;  ///< (E, points, 3) [N]: f·axis0, f·axis1, -f·(axis0 × axis1)
+  FieldOutput output;               ///< sensor: index into Model::sensors()
+  std::int64_t frame;               ///< 0, 1, 2 …
+  std::int64_t step;                ///< row of q that it was read from
+  std::span<const double> numbers;  ///< (E, numbers_of(points, form))
 };
 
 /// Action j of a task and its result, for all environments. Environments whose episode is over take

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tiles of a (points, 3) array: zeroes them, fills them from (3, 64), or reads them into it.
+// Tiles of a (points, components) array: zeroes them, fills them from (components, 64), or reads
+// them into it.
 #pragma once
 
 #include <algorithm>
@@ -10,55 +11,58 @@
 namespace tangere {
 
 template <class T>
-void clear_tile(const kernels::PadTiles& pad, int tile, T* dense) {
+void clear_tile(const kernels::PadTiles& pad, int tile, int components, T* dense) {
   if (pad.curved()) {
     for (int k = 0; k < pad.points_of(tile); ++k)
-      std::fill_n(dense + 3 * pad.index[kernels::kTactileTile * tile + k], 3, T(0));
+      std::fill_n(dense + components * pad.index[kernels::kTactileTile * tile + k], components,
+                  T(0));
     return;
   }
-  const int rows = pad.rows_of(tile), numbers = 3 * pad.cols_of(tile);
-  T* row = dense + 3 * pad.first_of(tile);
-  for (int i = 0; i < rows; ++i, row += 3 * pad.cols) std::fill(row, row + numbers, T(0));
+  const int rows = pad.rows_of(tile), numbers = components * pad.cols_of(tile);
+  T* row = dense + components * pad.first_of(tile);
+  for (int i = 0; i < rows; ++i, row += components * pad.cols) std::fill(row, row + numbers, T(0));
 }
 
 /// Zeroes every tile that is not in `tiles` (rising). Rows of tiles without any of them are zeroed
 /// in one piece.
 template <class T>
-void clear_tiles_between(const kernels::PadTiles& pad, std::span<const int> tiles, T* dense) {
+void clear_tiles_between(const kernels::PadTiles& pad, std::span<const int> tiles, int components,
+                         T* dense) {
   std::size_t next = 0;
   for (int first = 0; first < pad.tiles(); first += pad.tile_cols) {
     const int end = first + pad.tile_cols;
     if (!pad.curved() && (next == tiles.size() || tiles[next] >= end)) {
-      T* row = dense + 3 * pad.first_of(first);
-      std::fill(row, row + 3 * pad.rows_of(first) * pad.cols, T(0));
+      T* row = dense + components * pad.first_of(first);
+      std::fill(row, row + components * pad.rows_of(first) * pad.cols, T(0));
       continue;
     }
     for (int tile = first; tile < end; ++tile) {
       if (next < tiles.size() && tiles[next] == tile) {
         ++next;
       } else {
-        clear_tile(pad, tile, dense);
+        clear_tile(pad, tile, components, dense);
       }
     }
   }
 }
 
-/// Writes (3, 64) to the tile's rows, converted to T.
+/// Writes the first `components` of a tile's (…, 64) to its rows, converted to T.
 template <class Real, class T>
-void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* dense) {
+void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, int components,
+                 T* dense) {
   if (pad.curved()) {
     const int* index = pad.index + kernels::kTactileTile * tile;
     for (int k = 0; k < pad.points_of(tile); ++k)
-      for (int c = 0; c < 3; ++c)
-        dense[3 * index[k] + c] = static_cast<T>(from[c * kernels::kTactileTile + k]);
+      for (int c = 0; c < components; ++c)
+        dense[components * index[k] + c] = static_cast<T>(from[c * kernels::kTactileTile + k]);
     return;
   }
   const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
-  T* row = dense + 3 * pad.first_of(tile);
-  for (int i = 0; i < rows; ++i, row += 3 * pad.cols)
+  T* row = dense + components * pad.first_of(tile);
+  for (int i = 0; i < rows; ++i, row += components * pad.cols)
     for (int j = 0; j < cols; ++j)
-      for (int c = 0; c < 3; ++c)
-        row[3 * j + c] =
+      for (int c = 0; c < components; ++c)
+        row[components * j + c] =
             static_cast<T>(from[c * kernels::kTactileTile + i * kernels::kTileSide + j]);
 }
 

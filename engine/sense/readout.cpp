@@ -10,6 +10,7 @@
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/sense/dense_tiles.hpp"
+#include "engine/sense/field_sum.hpp"
 #include "engine/sense/pad_reader.hpp"
 
 namespace tangere {
@@ -33,12 +34,16 @@ struct Readout::Impl {
   // block.
   AlignedVector<double> wide;
   AlignedVector<float> single;
+  std::vector<kernels::Frame<double>> in_body;  // (sensors) pad axes in the body
 
   Impl(const Model& m, Precision p) : model(m), precision(p), reader(m) {
     std::size_t room = 0;
-    for (const CompiledSensor& s : compiled(m).sensors)
+    for (const CompiledSensor& s : compiled(m).sensors) {
+      const kernels::Frame<double>& body = compiled(m).bodies[std::size_t(s.body)].frame;
+      in_body.push_back(relative(body, s.pad));
       room = std::max({room, std::size_t(s.n_tiles()) * 3 * kTactileTile,
                        small(s) ? std::size_t(kBlock * 3 * s.points()) : std::size_t(0)});
+    }
     (p == Precision::f64 ? wide.resize(room) : single.resize(room));
   }
 
@@ -89,43 +94,68 @@ struct Readout::Impl {
     reader.find_touches(batch, block, group, sensor);
   }
 
+  /// Components that the kernel computes for a form: a shear is two of three.
+  static int computed(FieldForm form) { return form == FieldForm::pressure ? 1 : 3; }
+
   /// Writes the touched tiles of an environment whose touches were found. Returns their number and
   /// lists them in reader.active.
   template <class T>
-  int write_touched(int environment, int sensor, T* dense) {
+  int write_touched(int environment, FieldOutput of, T* dense) {
     return in_precision([&](auto zero) {
       using Real = decltype(zero);
-      auto a = reader.arguments<Real>(sensor, environment % kBlock / kGroup, environment % kGroup);
+      auto a =
+          reader.arguments<Real>(of.sensor, environment % kBlock / kGroup, environment % kGroup);
+      a.pressure = of.form == FieldForm::pressure;
       if constexpr (std::is_same_v<Real, T>) {
-        a.dense = dense;
-        return run(a);
-      } else {
-        a.values = scratch<Real>();
-        const int count = run(a);
-        for (int k = 0; k < count; ++k)
-          expand_tile(*a.pad, a.active[k], a.values + 3 * kTactileTile * k, dense);
-        return count;
+        if (of.form != FieldForm::shear) {
+          a.dense = dense;
+          return run(a);
+        }
       }
+      a.values = scratch<Real>();
+      const int count = run(a), numbers = computed(of.form) * kTactileTile;
+      for (int k = 0; k < count; ++k)
+        expand_tile(*a.pad, a.active[k], a.values + numbers * k, components_of(of.form), dense);
+      return count;
     });
   }
 
   template <class T>
-  void fill(int environment, int sensor, T* dense) {
-    const int count = write_touched(environment, sensor, dense);
-    clear_tiles_between<T>(sensor_of(sensor).tiles(), {reader.active.data(), std::size_t(count)},
-                           dense);
+  void fill(int environment, FieldOutput of, T* dense) {
+    const int count = write_touched(environment, of, dense);
+    clear_tiles_between<T>(sensor_of(of.sensor).tiles(), {reader.active.data(), std::size_t(count)},
+                           components_of(of.form), dense);
+  }
+
+  /// Writes the sum of a field whose touches were found.
+  template <class T>
+  void add_up(int environment, int sensor, T* sum) {
+    in_precision([&](auto zero) {
+      using Real = decltype(zero);
+      auto a = reader.arguments<Real>(sensor, environment % kBlock / kGroup, environment % kGroup);
+      kernels::PadTiles pad = *a.pad;
+      pad.skewed = false;  // forces in the pad's own axes, which are perpendicular
+      a.pad = &pad;
+      a.values = scratch<Real>();
+      const int count = run(a);
+      const int sign = compiled(model).sensor_info[std::size_t(sensor)].pressure_sign;
+      const FieldSum total = field_sum(pad, in_body[std::size_t(sensor)], sign,
+                                       {reader.active.data(), std::size_t(count)}, a.values);
+      std::transform(total.begin(), total.end(), sum, [](double x) { return static_cast<T>(x); });
+    });
   }
 
   /// Writes the tiles touched now and zeroes those that no longer are.
   template <class T>
   void refresh(int environment, DenseFrame<T>& frame) {
     const kernels::PadTiles pad = sensor_of(frame.sensor_).tiles();
-    const int count = write_touched(environment, frame.sensor_, frame.values_.data());
+    const int count =
+        write_touched(environment, {frame.sensor_, frame.form_}, frame.values_.data());
     for (int old = 0, now = 0; old < frame.count_; ++old) {
       const int tile = frame.written_[std::size_t(old)];
       while (now < count && reader.active[std::size_t(now)] < tile) ++now;
       if (now == count || reader.active[std::size_t(now)] != tile)
-        clear_tile(pad, tile, frame.values_.data());
+        clear_tile(pad, tile, components_of(frame.form_), frame.values_.data());
     }
     std::copy(reader.active.begin(), reader.active.begin() + count, frame.written_.begin());
     frame.count_ = count;
@@ -134,30 +164,33 @@ struct Readout::Impl {
   /// Writes the touched tiles of a small pad to the arrays of `environments` environments, and
   /// zeros elsewhere.
   template <class T>
-  void fill_block(int sensor, int environments, const std::array<T*, kBlock>& dense) {
-    const auto numbers = 3 * std::size_t(sensor_of(sensor).points());
+  void fill_block(FieldOutput of, int environments, const std::array<T*, kBlock>& dense) {
+    const auto points = std::size_t(sensor_of(of.sensor).points()),
+               width = std::size_t(computed(of.form)), numbers = width * points;
     in_precision([&](auto zero) {
       using Real = decltype(zero);
       std::array<Real*, kBlock> out{};
+      bool direct = false;
+      if constexpr (std::is_same_v<Real, T>) {
+        direct = of.form != FieldForm::shear;
+        if (direct) out = dense;
+      }
       for (std::size_t e = 0; e < std::size_t(environments); ++e) {
-        if constexpr (std::is_same_v<Real, T>) {
-          out[e] = dense[e];
-        } else {
-          out[e] = scratch<Real>() + numbers * e;
-        }
+        if (!direct) out[e] = scratch<Real>() + numbers * e;
         std::fill(out[e], out[e] + numbers, Real(0));
       }
       constexpr int kLanes = std::is_same_v<Real, float> ? kBlock : kGroup;
       for (int first = 0; first < environments; first += kLanes) {
-        auto a = reader.block_arguments<Real>(sensor, first / kGroup);
+        auto a = reader.block_arguments<Real>(of.sensor, first / kGroup);
+        a.pressure = of.form == FieldForm::pressure;
         a.dense = out.data() + first;
         run(a);
       }
-      if constexpr (!std::is_same_v<Real, T>) {
-        for (std::size_t e = 0; e < std::size_t(environments); ++e)
-          std::transform(out[e], out[e] + numbers, dense[e],
-                         [](Real x) { return static_cast<T>(x); });
-      }
+      const auto kept = std::size_t(components_of(of.form));
+      for (std::size_t e = 0; !direct && e < std::size_t(environments); ++e)
+        for (std::size_t p = 0; p < points; ++p)
+          for (std::size_t c = 0; c < kept; ++c)
+            dense[e][kept * p + c] = static_cast<T>(out[e][width * p + c]);
     });
   }
 
@@ -202,24 +235,30 @@ struct Readout::Impl {
 
   /// Reads all environments at once, or calls `one` for each with its group placed.
   template <class T, class One>
-  void block(const Batch& batch, int number, int sensor, const std::array<T*, kBlock>& dense,
+  void block(const Batch& batch, int number, FieldOutput of, const std::array<T*, kBlock>& dense,
              const One& one) {
     const int environments = environments_of(batch, number);
-    place_block(batch, number, sensor);
-    if (together(batch, number, sensor)) {
-      fill_block(sensor, environments, dense);
+    place_block(batch, number, of.sensor);
+    if (of.form != FieldForm::sum && together(batch, number, of.sensor)) {
+      fill_block(of, environments, dense);
     } else {
       for (int e = 0; e < environments; ++e) one(e);
     }
   }
 
   template <class T>
-  void block_spans(const Batch& batch, int number, int sensor,
-                   std::span<const std::span<T>> fields) {
-    std::array<T*, kBlock> dense{};
-    for (std::size_t e = 0; e < std::min(fields.size(), std::size_t(kBlock)); ++e)
-      dense[e] = fields[e].data();
-    block<T>(batch, number, sensor, dense, [&](int e) { fill(e, sensor, dense[std::size_t(e)]); });
+  void block_spans(const Batch& batch, int number, FieldOutput of,
+                   std::span<const std::span<T>> readings) {
+    std::array<T*, kBlock> out{};
+    for (std::size_t e = 0; e < std::min(readings.size(), std::size_t(kBlock)); ++e)
+      out[e] = readings[e].data();
+    block<T>(batch, number, of, out, [&](int e) {
+      if (of.form == FieldForm::sum) {
+        add_up(e, of.sensor, out[std::size_t(e)]);
+      } else {
+        fill(e, of, out[std::size_t(e)]);
+      }
+    });
   }
 };
 
@@ -304,11 +343,11 @@ void Readout::end_effector_jacobian(const Batch& batch, int environment,
 
 void Readout::tactile(const Batch& batch, int environment, int sensor, std::span<double> force) {
   impl_->place(batch, environment, sensor);
-  impl_->fill(environment, sensor, force.data());
+  impl_->fill(environment, {sensor, FieldForm::field}, force.data());
 }
 void Readout::tactile(const Batch& batch, int environment, int sensor, std::span<float> force) {
   impl_->place(batch, environment, sensor);
-  impl_->fill(environment, sensor, force.data());
+  impl_->fill(environment, {sensor, FieldForm::field}, force.data());
 }
 
 template <class T>
@@ -323,13 +362,13 @@ void Readout::read(const Batch& batch, int environment, CompactFrame<T>& frame) 
   impl_->compact(environment, frame);
 }
 
-void Readout::read_block(const Batch& batch, int block, int sensor,
-                         std::span<const std::span<double>> fields) {
-  impl_->block_spans(batch, block, sensor, fields);
+void Readout::read_block(const Batch& batch, int block, FieldOutput output,
+                         std::span<const std::span<double>> readings) {
+  impl_->block_spans(batch, block, output, readings);
 }
-void Readout::read_block(const Batch& batch, int block, int sensor,
-                         std::span<const std::span<float>> fields) {
-  impl_->block_spans(batch, block, sensor, fields);
+void Readout::read_block(const Batch& batch, int block, FieldOutput output,
+                         std::span<const std::span<float>> readings) {
+  impl_->block_spans(batch, block, output, readings);
 }
 
 template <class T>
@@ -343,7 +382,7 @@ void Readout::read_block(const Batch& batch, int block, std::span<DenseFrame<T>>
       // A later reading of one of them alone must find all tiles in its list.
       frames[e].mark_all();
   }
-  impl_->block<T>(batch, block, frames[0].sensor_, dense,
+  impl_->block<T>(batch, block, {frames[0].sensor_, frames[0].form_}, dense,
                   [&](int e) { impl_->refresh(e, frames[std::size_t(e)]); });
 }
 

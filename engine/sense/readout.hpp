@@ -49,20 +49,20 @@ class Readout {
   void tactile(const Batch& batch, int environment, int sensor, std::span<double> force);
   void tactile(const Batch& batch, int environment, int sensor, std::span<float> force);
 
-  /// Reads the field of the frame's sensor.
+  /// Reads the frame's form of the field of its sensor.
   template <class T>
   void read(const Batch& batch, int environment, DenseFrame<T>& frame);
   template <class T>
   void read(const Batch& batch, int environment, CompactFrame<T>& frame);
 
-  /// Reads the fields of the environments from 16 block on, (points, 3) each, one array per
+  /// Reads the environments from 16 block on, numbers_of(points, form) each, one array per
   /// environment. Arrays beyond the batch's last environment are left alone and may be missing.
   /// Flat pads of up to kSmallPad points are read in all environments at once.
-  void read_block(const Batch& batch, int block, int sensor,
-                  std::span<const std::span<double>> fields);
-  void read_block(const Batch& batch, int block, int sensor,
-                  std::span<const std::span<float>> fields);
-  /// The same into one frame per environment, all of the same sensor.
+  void read_block(const Batch& batch, int block, FieldOutput output,
+                  std::span<const std::span<double>> readings);
+  void read_block(const Batch& batch, int block, FieldOutput output,
+                  std::span<const std::span<float>> readings);
+  /// The same into one frame per environment, all of the same sensor and form.
   template <class T>
   void read_block(const Batch& batch, int block, std::span<DenseFrame<T>> frames);
   template <class T>

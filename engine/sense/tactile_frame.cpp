@@ -24,11 +24,15 @@ const CompiledSensor& checked(const Model& model, int sensor) {
 }  // namespace
 
 template <class T>
-DenseFrame<T>::DenseFrame(const Model& model, int sensor)
+DenseFrame<T>::DenseFrame(const Model& model, int sensor, FieldForm form)
     : model_(model),
       sensor_(sensor),
-      values_(3 * std::size_t(checked(model, sensor).points())),
-      written_(std::size_t(checked(model, sensor).n_tiles())) {}
+      form_(form),
+      values_(numbers_of(checked(model, sensor).points(), form)),
+      written_(std::size_t(checked(model, sensor).n_tiles())) {
+  if (form == FieldForm::sum)
+    throw InputError("a frame of a sum; expected a field, a pressure or a shear");
+}
 
 template <class T>
 void DenseFrame<T>::mark_all() {
@@ -61,9 +65,9 @@ void CompactFrame<T>::expand(std::span<T> dense) const {
 template <class T>
 void CompactFrame<T>::spread(std::span<const T> of_tiles, std::span<T> dense) const {
   const kernels::PadTiles pad = compiled(model_).sensors[std::size_t(sensor_)].tiles();
-  clear_tiles_between<T>(pad, tiles(), dense.data());
+  clear_tiles_between<T>(pad, tiles(), 3, dense.data());
   for (std::size_t k = 0; k < std::size_t(count_); ++k)
-    expand_tile(pad, tiles_[k], of_tiles.data() + 3 * kernels::kTactileTile * k, dense.data());
+    expand_tile(pad, tiles_[k], of_tiles.data() + 3 * kernels::kTactileTile * k, 3, dense.data());
 }
 
 static_assert(kTilePoints == kernels::kTactileTile);

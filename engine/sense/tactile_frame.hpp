@@ -8,19 +8,22 @@
 #include <vector>
 
 #include "engine/base/aligned.hpp"
+#include "engine/model/field_form.hpp"
 #include "engine/model/model.hpp"
 
 namespace tangere {
 
-/// One field as (points, 3), row-major [N]. A reading zeroes the tiles that the previous reading
-/// wrote, and no others. T is float or double.
+/// One field, pressure or shear as (points, components), row-major [N]. A reading zeroes the tiles
+/// that the previous reading wrote, and no others. T is float or double.
 template <class T>
 class DenseFrame {
  public:
-  /// Makes a frame of zeros. Throws InputError when there is no such sensor.
-  DenseFrame(const Model& model, int sensor);
+  /// Makes a frame of zeros. Throws InputError when there is no such sensor, and for a sum, which
+  /// has no points.
+  DenseFrame(const Model& model, int sensor, FieldForm form = FieldForm::field);
 
   [[nodiscard]] int sensor() const { return sensor_; }
+  [[nodiscard]] FieldForm form() const { return form_; }
   [[nodiscard]] std::span<const T> values() const { return values_; }
 
  private:
@@ -28,6 +31,7 @@ class DenseFrame {
   void mark_all();
   Model model_;
   int sensor_;
+  FieldForm form_;
   AlignedVector<T> values_;
   // (tiles), of which `count_` are in use: those that may be nonzero, in rising order.
   std::vector<int> written_;

@@ -93,7 +93,18 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
   const h5::Id sensors = h5::create_group(scene, "sensors");
   for (const SensorLayout& sensor : layout.sensors) {
     const h5::Id group = h5::create_group(sensors, sensor.name);
-    describe_sensor(group, group, sensor);
+    describe_reading(group, sensor, FieldForm::field);
+    describe_points(group, sensor);
+    std::vector<std::string> readings, components;
+    for (const FieldOutput of : layout.fields)
+      if (&layout.sensors[static_cast<std::size_t>(of.sensor)] == &sensor &&
+          of.form != FieldForm::field) {
+        readings.push_back(output_name(sensor.name, of.form));
+        components.push_back(components_text(sensor, of.form));
+      }
+    if (readings.empty()) continue;
+    h5::write_attribute(group, "readings", std::span<const std::string>(readings));
+    h5::write_attribute(group, "reading_components", std::span<const std::string>(components));
   }
 }
 

@@ -77,7 +77,8 @@ std::vector<std::string> DatasetLayout::all_observation_names() const {
     return names;
   }
   if (!end_effector_names.empty()) names.emplace_back(kEndEffectors);
-  for (const SensorLayout& sensor : sensors) names.push_back(sensor.name);
+  for (const FieldOutput of : fields)
+    names.push_back(output_name(sensors[static_cast<std::size_t>(of.sensor)].name, of.form));
   return names;
 }
 
@@ -89,12 +90,8 @@ std::vector<std::vector<std::uint64_t>> DatasetLayout::observation_shapes() cons
     return chosen(shapes, recorded());
   }
   if (!end_effector_names.empty()) shapes.push_back({end_effector_names.size(), 3});
-  for (const SensorLayout& s : sensors) {
-    if (s.rectangular())
-      shapes.push_back({static_cast<std::uint64_t>(s.rows), static_cast<std::uint64_t>(s.cols), 3});
-    else
-      shapes.push_back({static_cast<std::uint64_t>(s.points), 3});
-  }
+  for (const FieldOutput of : fields)
+    shapes.push_back(reading_shape(sensors[static_cast<std::size_t>(of.sensor)], of.form));
   return chosen(shapes, recorded());
 }
 
@@ -156,19 +153,17 @@ void DatasetLayout::check() const {
       throw InputError(
           fmt::format("--record: unknown observation '{}'{}", name, suggestion(name, all)));
   check_lengths(all);
-  std::set<std::string> names{"q", "v"};
-  if (!end_effector_names.empty()) names.insert(kEndEffectors);
-  for (const SensorLayout& sensor : sensors) {
-    const std::string& name = sensor.name;
-    if (name.empty() || name == "." || name.find('/') != std::string::npos)
+  for (const SensorLayout& sensor : sensors)
+    if (sensor.name.empty() || sensor.name == "." || sensor.name.find('/') != std::string::npos)
       throw InputError(fmt::format(
-          "sensor '{}': a dataset cannot have this name; expected one without '/'", name));
+          "sensor '{}': a dataset cannot have this name; expected one without '/'", sensor.name));
+  std::set<std::string> names;
+  for (const std::string& name : all)
     if (!task && !names.insert(name).second)
       throw InputError(
           fmt::format("sensor '{}': another observation has this name; expected a name other than "
                       "q, v, variables (of end effectors) and those of other sensors",
                       name));
-  }
 }
 
 }  // namespace tangere

@@ -37,6 +37,7 @@ struct DatasetLayout {
   std::vector<std::string> u_names;             ///< (nu)
   std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
+  std::vector<FieldOutput> fields;  ///< what a scene's episodes hold of them
   std::vector<std::string> randomized_names, randomized_units;  ///< what varies between episodes
   std::optional<TaskSpec> task;  ///< defines actions, observations and rewards; none: only a scene
   std::string policy;            ///< of a task
@@ -63,7 +64,7 @@ struct DatasetLayout {
   /// Names of the numbers of an action.
   [[nodiscard]] std::vector<std::string> action_names() const;
   /// All observations: q and v, then what a task observes, or "variables" (if there are end
-  /// effectors) and the sensors.
+  /// effectors) and what is read of the sensors.
   [[nodiscard]] std::vector<std::string> all_observation_names() const;
   /// Indices of the stored observations in that list, and in pieces of episodes, ascending.
   [[nodiscard]] std::vector<std::size_t> recorded() const;
@@ -100,6 +101,7 @@ struct DatasetDescription {
   std::vector<GradientArray> gradients;
   bool sparse = false;
   std::vector<std::string> record = {};
+  std::optional<std::vector<FieldOutput>> fields = {};  ///< none: the field of every sensor
 };
 
 DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,

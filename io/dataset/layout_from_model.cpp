@@ -68,11 +68,12 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.v_units = copy(model.v_units());
   layout.u_names = copy(model.u_names());
   layout.u_units = copy(model.u_units());
-  layout.body_names = copy(model.body_names());
-  layout.end_effector_names = end_effector_names(model);
+  if (run.bodies) layout.body_names = copy(model.body_names());
+  if (run.end_effectors) layout.end_effector_names = end_effector_names(model);
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));
+  layout.fields = run.fields;
   for (const StepStatus status :
        {StepStatus::converged, StepStatus::split, StepStatus::coarse, StepStatus::passed,
         StepStatus::not_converged, StepStatus::non_finite, StepStatus::rotation,
@@ -140,6 +141,7 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.sparse = run.sparse;
   layout.tables = tables_of(model.scene());
   layout.record = run.record;
+  layout.fields = run.fields ? *run.fields : whole_fields(model);
   return layout;
 }
 

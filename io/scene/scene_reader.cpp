@@ -200,9 +200,9 @@ void read_root(const SceneNode& root, Scene& scene) {
     root.fail("not a scene; expected the root <redmax> or <tangere>");
   root.check_attributes({"model", "name"});
   scene.name = root.text("model", root.text("name", "scene"));
-  const std::vector<SceneNode> sections =
-      root.children({"option", "solver_option", "ground", "default", "robot", "actuator", "sensor",
-                     "contact", "variable", "virtual", "initial", "control", "randomize"});
+  const std::vector<SceneNode> sections = root.children(
+      {"option", "solver_option", "ground", "default", "robot", "actuator", "sensor", "contact",
+       "variable", "virtual", "initial", "control", "randomize", "outputs"});
   const auto each = [&](const char* name, auto&& read) {
     for (const SceneNode& s : sections)
       if (s.name() == name) read(s);
@@ -247,6 +247,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   each("initial", [&](const SceneNode& s) { read_initial(scene, s); });
   once("control", [&](const SceneNode& s) { read_control(scene, s); });
   once("randomize", [&](const SceneNode& s) { read_randomize(scene, s); });
+  once("outputs", [&](const SceneNode& s) { read_outputs(scene, s); });
 }
 
 /// Describes an error of the XML parser.

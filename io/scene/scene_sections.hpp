@@ -38,6 +38,7 @@ void name_end_effectors(Scene& scene);
 void read_initial(Scene& scene, const SceneNode& section);
 void read_control(Scene& scene, const SceneNode& section);
 void read_randomize(Scene& scene, const SceneNode& section);
+void read_outputs(Scene& scene, const SceneNode& section);
 
 /// Calls `read` with the file beside the scene that an attribute names. Errors name the element.
 template <class Read>

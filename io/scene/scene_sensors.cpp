@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads sensors of a scene file, by layout.
+// Reads sensors of a scene file, by layout, and which of their readings are wanted.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
+#include "engine/model/field_form.hpp"
+#include "io/files/name_list.hpp"
+#include "io/files/nearest_name.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/tactile_layouts.hpp"
 
@@ -163,6 +166,19 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     }
     scene.sensors.push_back(std::move(d));
   }
+}
+
+void read_outputs(Scene& scene, const SceneNode& section) {
+  section.check_attributes({"record"});
+  OutputsDescription outputs;
+  outputs.source = section.source();
+  outputs.record =
+      split_names(section.source().prefix() + "<outputs>: record", section.text("record"));
+  const std::vector<std::string> sensors = sensor_names(scene);
+  for (const std::string& name : outputs.record)
+    if (!is_plain_output(name) && !find_output(sensors, name))
+      section.fail(fmt::format("record has '{}'{}", name, suggestion(name, output_names(sensors))));
+  scene.outputs = std::move(outputs);
 }
 
 }  // namespace tangere

@@ -20,9 +20,6 @@ void write_vectors(const h5::Id& group, const char* name, const SensorLayout& se
 }
 
 void describe_array(const h5::Id& object, const SensorLayout& s) {
-  h5::write_attribute(object, "components",
-                      "f.axis0, f.axis1, -f.(axis0 x axis1); f is the force on the body");
-  h5::write_attribute(object, "frame", "axis0, axis1 of the sensor, in the body's axes");
   const std::int64_t resolution[] = {s.rows, s.cols};
   h5::write_list<std::int64_t>(object, "resolution", resolution);
   h5::write_list<double>(object, "corner0", s.corner0);
@@ -31,10 +28,10 @@ void describe_array(const h5::Id& object, const SensorLayout& s) {
   h5::write_list<double>(object, "axis1", s.axis1);
 }
 
-void describe_list(const h5::Id& object, const h5::Id& group, const SensorLayout& s) {
-  h5::write_attribute(object, "components",
-                      "f.axis0, f.axis1, -f.normal; f is the force on the body");
-  h5::write_attribute(object, "frame", "axis0, axis1, normal of each point, in the body's axes");
+}  // namespace
+
+void describe_points(const h5::Id& group, const SensorLayout& s) {
+  if (s.rectangular()) return;
   write_vectors(group, "position", s, &TactilePoint::position, "m");
   write_vectors(group, "normal", s, &TactilePoint::normal, "1");
   write_vectors(group, "axis0", s, &TactilePoint::axis0, "1");
@@ -50,17 +47,33 @@ void describe_list(const h5::Id& object, const h5::Id& group, const SensorLayout
   h5::write_box<std::int64_t>(dataset, {0, 0}, dims, pixels.data());
 }
 
-}  // namespace
+const char* dataset_of(FieldForm form) {
+  return form == FieldForm::field ? "force" : to_string(form);
+}
 
-void describe_sensor(const h5::Id& object, const h5::Id& group, const SensorLayout& sensor) {
-  h5::write_attribute(object, "units", "N");
+std::string components_text(const SensorLayout& sensor, FieldForm form) {
+  const std::string across = "f.axis0, f.axis1",
+                    along = sensor.rectangular() ? "-f.(axis0 x axis1)" : "-f.normal";
+  switch (form) {
+    case FieldForm::field: return across + ", " + along + "; f is the force on the body";
+    case FieldForm::pressure: return along + "; f is the force on the body without friction";
+    case FieldForm::shear: return across + "; f is the force on the body";
+    case FieldForm::sum: break;
+  }
+  return "force x y z on the body [N], centre of its pressure x y z [m]";
+}
+
+void describe_reading(const h5::Id& object, const SensorLayout& sensor, FieldForm form) {
+  h5::write_attribute(object, "units", form == FieldForm::sum ? "N, N, N, m, m, m" : "N");
   h5::write_attribute(object, "body", sensor.body);
   h5::write_scalar<std::int64_t>(object, "pressure_sign", sensor.pressure_sign);
-  if (sensor.rectangular()) {
-    describe_array(object, sensor);
-  } else {
-    describe_list(object, group, sensor);
-  }
+  h5::write_attribute(object, "components", components_text(sensor, form));
+  h5::write_attribute(object, "frame",
+                      form == FieldForm::sum ? "the body's"
+                      : sensor.rectangular()
+                          ? "axis0, axis1 of the sensor, in the body's axes"
+                          : "axis0, axis1, normal of each point, in the body's axes");
+  if (sensor.rectangular()) describe_array(object, sensor);
 }
 
 }  // namespace tangere

@@ -51,12 +51,12 @@ struct TrajectoryFile::Impl {
   TrajectoryLayout layout;
   PartFile part;
   h5::Id file, time, q, v, u, pose, twist, end_effectors, iterations, status, residual;
-  struct Sensor {
-    h5::Id force, step;
-    h5::Dims frame;  // dimensions of one row of force
+  struct Reading {
+    h5::Id numbers, step;
+    h5::Dims frame;  // dimensions of one row
     std::int64_t written = 0;
   };
-  std::vector<Sensor> sensors;
+  std::vector<Reading> readings;  // parallel to layout.fields
   struct Task {
     h5::Id action, step, reward, terminated, truncated, success;
   } task;
@@ -71,7 +71,7 @@ struct TrajectoryFile::Impl {
     file = h5::create_file(part.path(), part.written());
     describe_run();
     create_trajectory();
-    for (const SensorLayout& s : layout.sensors) create_sensor(s);
+    for (const FieldOutput of : layout.fields) create_reading(of);
     create_randomized();
     create_task();
   }
@@ -155,6 +155,14 @@ struct TrajectoryFile::Impl {
       h5::write_attribute(u, "meaning",
                           "as given; clipped to [-1, 1], then mapped to the motor's range");
     }
+    if (!layout.body_names.empty()) create_bodies(named);
+    if (!layout.end_effector_names.empty()) create_end_effectors();
+    create_solver();
+  }
+
+  void create_bodies(const auto& named) {
+    const hsize_t T = static_cast<hsize_t>(layout.steps),
+                  E = static_cast<hsize_t>(layout.environments);
     const h5::Id bodies = h5::create_group(file, "bodies");
     h5::write_attribute(bodies, "names", std::span<const std::string>(layout.body_names));
     const hsize_t nb = layout.body_names.size();
@@ -170,16 +178,23 @@ struct TrajectoryFile::Impl {
     h5::write_attribute(twist, "frame", "world axes; velocity of the body frame's origin");
     for (const h5::Id* d : {&pose, &twist})
       h5::write_attribute(*d, "bodies", std::span<const std::string>(layout.body_names));
-    if (!layout.end_effector_names.empty()) {
-      const h5::Id group = h5::create_group(file, "variables");
-      end_effectors =
-          rows<double>(group, "position", {T + 1, E, layout.end_effector_names.size(), 3});
-      h5::write_attribute(end_effectors, "names",
-                          std::span<const std::string>(layout.end_effector_names));
-      h5::write_attribute(end_effectors, "units", "m");
-      h5::write_attribute(end_effectors, "frame", "world");
-    }
+  }
 
+  void create_end_effectors() {
+    const hsize_t T = static_cast<hsize_t>(layout.steps),
+                  E = static_cast<hsize_t>(layout.environments);
+    const h5::Id group = h5::create_group(file, "variables");
+    end_effectors =
+        rows<double>(group, "position", {T + 1, E, layout.end_effector_names.size(), 3});
+    h5::write_attribute(end_effectors, "names",
+                        std::span<const std::string>(layout.end_effector_names));
+    h5::write_attribute(end_effectors, "units", "m");
+    h5::write_attribute(end_effectors, "frame", "world");
+  }
+
+  void create_solver() {
+    const hsize_t T = static_cast<hsize_t>(layout.steps),
+                  E = static_cast<hsize_t>(layout.environments);
     const h5::Id solver = h5::create_group(file, "solver");
     iterations = rows<std::int32_t>(solver, "iterations", {T, E});
     h5::write_attribute(iterations, "meaning", "evaluations of the residual, sub-steps included");
@@ -194,24 +209,33 @@ struct TrajectoryFile::Impl {
     h5::write_attribute(residual, "meaning", "scaled residual at acceptance, dimensionless");
   }
 
-  void create_sensor(const SensorLayout& s) {
+  void create_reading(FieldOutput of) {
+    const SensorLayout& s = layout.sensors[std::size_t(of.sensor)];
     const hsize_t E = static_cast<hsize_t>(layout.environments),
                   F = static_cast<hsize_t>(s.frames(layout.steps, layout.first_step));
     if (!h5::has_link(file, "tactile")) h5::create_group(file, "tactile");
-    const h5::Id group = h5::create_group(h5::open_group(file, "tactile"), s.name);
-    Sensor out;
-    out.frame = {E, static_cast<hsize_t>(s.points), 3};
-    if (s.rectangular())
-      out.frame = {E, static_cast<hsize_t>(s.rows), static_cast<hsize_t>(s.cols), 3};
+    const h5::Id tactile = h5::open_group(file, "tactile");
+    const bool first = !h5::has_link(tactile, s.name);
+    const h5::Id group =
+        first ? h5::create_group(tactile, s.name) : h5::open_group(tactile, s.name);
+    Reading out;
+    const std::vector<std::uint64_t> shape = reading_shape(s, of.form);
+    out.frame.assign(shape.begin(), shape.end());
+    out.frame.insert(out.frame.begin(), E);
     h5::Dims dims = out.frame;
     dims.insert(dims.begin(), F);
-    out.force = h5::create_dataset<double>(group, "force", dims,
-                                           F > 0 ? field_storage(dims) : h5::Storage{});
-    out.step = h5::create_dataset<std::int64_t>(group, "step", {F});
-    h5::write_attribute(out.step, "meaning", "row of /q that each field was read from");
-    h5::write_scalar<std::int64_t>(out.force, "every", s.every);
-    describe_sensor(out.force, group, s);
-    sensors.push_back(std::move(out));
+    const h5::Storage storage = of.form == FieldForm::sum ? rows_of(dims, sizeof(double))
+                                : F > 0                   ? field_storage(dims)
+                                                          : h5::Storage{};
+    out.numbers = h5::create_dataset<double>(group, dataset_of(of.form), dims, storage);
+    if (first) {
+      out.step = h5::create_dataset<std::int64_t>(group, "step", {F});
+      h5::write_attribute(out.step, "meaning", "row of /q that each field was read from");
+      describe_points(group, s);
+    }
+    h5::write_scalar<std::int64_t>(out.numbers, "every", s.every);
+    describe_reading(out.numbers, s, of.form);
+    readings.push_back(std::move(out));
   }
 
   void create_randomized() {
@@ -269,8 +293,10 @@ void TrajectoryFile::write(const StateRow& row) {
   h5::write_box<double>(f.time, {static_cast<hsize_t>(t)}, {one}, &row.time);
   Impl::put<double>(f.q, t, {E, f.layout.q_names.size()}, row.q.data());
   Impl::put<double>(f.v, t, {E, f.layout.v_names.size()}, row.v.data());
-  Impl::put<double>(f.pose, t, {E, nb, 7}, row.body_pose.data());
-  Impl::put<double>(f.twist, t, {E, nb, 6}, row.body_twist.data());
+  if (nb > 0) {
+    Impl::put<double>(f.pose, t, {E, nb, 7}, row.body_pose.data());
+    Impl::put<double>(f.twist, t, {E, nb, 6}, row.body_twist.data());
+  }
   if (const hsize_t n = f.layout.end_effector_names.size(); n > 0) {
     if (row.end_effectors.size() != E * n * 3)
       throw IoError(fmt::format("{}: row {} has {} numbers for {} end effectors of {} environments",
@@ -292,10 +318,13 @@ void TrajectoryFile::write(const StepRow& row) {
 }
 
 void TrajectoryFile::write(const TactileRow& row) {
-  Impl::Sensor& s = impl_->sensors[std::size_t(row.sensor)];
-  Impl::put<double>(s.force, row.frame, s.frame, row.force.data());
-  h5::write_box<std::int64_t>(s.step, {static_cast<hsize_t>(row.frame)}, {1}, &row.step);
-  ++s.written;
+  const std::vector<FieldOutput>& fields = impl_->layout.fields;
+  const auto at = std::find(fields.begin(), fields.end(), row.output);
+  Impl::Reading& r = impl_->readings.at(std::size_t(at - fields.begin()));
+  Impl::put<double>(r.numbers, row.frame, r.frame, row.numbers.data());
+  if (r.step.get() >= 0)  // once for all readings of a sensor
+    h5::write_box<std::int64_t>(r.step, {static_cast<hsize_t>(row.frame)}, {1}, &row.step);
+  ++r.written;
 }
 
 void TrajectoryFile::write(const ActionRow& row) {
@@ -353,13 +382,15 @@ void TrajectoryFile::commit() {
   expect("states", f.states, f.layout.steps + 1);
   expect("steps", f.steps, f.layout.steps);
   expect("actions", f.actions, f.layout.task ? f.layout.task->horizon : 0);
-  for (std::size_t i = 0; i < f.sensors.size(); ++i)
-    expect("fields of " + f.layout.sensors[i].name, f.sensors[i].written,
-           f.layout.sensors[i].frames(f.layout.steps, f.layout.first_step));
+  for (std::size_t i = 0; i < f.readings.size(); ++i) {
+    const SensorLayout& sensor = f.layout.sensors[std::size_t(f.layout.fields[i].sensor)];
+    expect("fields of " + sensor.name, f.readings[i].written,
+           sensor.frames(f.layout.steps, f.layout.first_step));
+  }
   for (h5::Id* d : {&f.time, &f.q, &f.v, &f.u, &f.pose, &f.twist, &f.end_effectors, &f.iterations,
                     &f.status, &f.residual})
     d->reset();
-  f.sensors.clear();
+  f.readings.clear();
   f.task = {};
   h5::close_file(f.file, f.part.path());
   f.part.commit();

@@ -72,6 +72,14 @@ void check_sensor(const SensorLayout& sensor, std::set<std::string>& names) {
 
 }  // namespace
 
+std::vector<std::uint64_t> reading_shape(const SensorLayout& sensor, FieldForm form) {
+  if (form == FieldForm::sum) return {numbers_of(sensor.points, form)};
+  const auto components = static_cast<std::uint64_t>(components_of(form));
+  if (!sensor.rectangular()) return {static_cast<std::uint64_t>(sensor.points), components};
+  return {static_cast<std::uint64_t>(sensor.rows), static_cast<std::uint64_t>(sensor.cols),
+          components};
+}
+
 std::array<double, 2> SensorLayout::pitch() const {
   double along0 = 0, along1 = 0;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -112,8 +120,11 @@ std::uint64_t TrajectoryLayout::bytes_without_tactile() const {
 std::uint64_t TrajectoryLayout::bytes() const {
   Bytes sum;
   add_small(*this, sum);
-  for (const SensorLayout& sensor : sensors)
-    sum.add({sensor.frames(steps, first_step), environments, sensor.points, 3, 8});
+  for (const FieldOutput of : fields) {
+    const SensorLayout& sensor = sensors[static_cast<std::size_t>(of.sensor)];
+    sum.add({sensor.frames(steps, first_step), environments,
+             static_cast<std::int64_t>(numbers_of(sensor.points, of.form)), 8});
+  }
   return sum.sum(*this);
 }
 

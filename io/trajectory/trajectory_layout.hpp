@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/model/field_form.hpp"
 #include "engine/rows/task_spec.hpp"
 #include "engine/step/stepper.hpp"
 
@@ -38,6 +39,9 @@ struct SensorLayout {
   }
 };
 
+/// Returns the shape of one reading: {rows, cols, components}, {points, components} or {6}.
+std::vector<std::uint64_t> reading_shape(const SensorLayout& sensor, FieldForm form);
+
 /// A value of /solver/status and what it means.
 struct StatusMeaning {
   std::int8_t value = 0;
@@ -51,9 +55,10 @@ struct TrajectoryLayout {
   std::vector<std::string> q_names, q_units;    ///< (nq)
   std::vector<std::string> v_names, v_units;    ///< (nv)
   std::vector<std::string> u_names, u_units;    ///< (nu)
-  std::vector<std::string> body_names;          ///< (nb)
+  std::vector<std::string> body_names;          ///< (nb), empty when poses are not recorded
   std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
+  std::vector<FieldOutput> fields;  ///< what is recorded of them
   std::vector<StatusMeaning> statuses;
   std::vector<std::string> randomized_names, randomized_units;  ///< (k), empty when nothing varies
   std::vector<double> randomized_values;                        ///< (E, k)
@@ -81,8 +86,10 @@ struct TrajectoryLayout {
 /// What the model and the batch do not know about a run.
 struct RunDescription {
   std::int64_t steps = 0, first_step = 0;
-  int every = 0;                       ///< the option as given; 0: each sensor's own interval
-  std::vector<int> tactile_intervals;  ///< K in force, one per sensor
+  int every = 0;                             ///< the option as given; 0: each sensor's own interval
+  std::vector<int> tactile_intervals;        ///< K in force, one per sensor
+  std::vector<FieldOutput> fields;           ///< what is recorded of them
+  bool bodies = true, end_effectors = true;  ///< recorded
   std::string precision, command_line, version, instruction_set;
   std::optional<TaskSpec> task;
   std::string policy;

@@ -10,6 +10,7 @@
 #include "engine/base/error.hpp"
 #include "io/files/nearest_name.hpp"
 #include "io/hdf5/h5.hpp"
+#include "io/trajectory/sensor_description.hpp"
 
 namespace tangere {
 
@@ -24,6 +25,7 @@ struct TrajectoryReader::Impl {
   std::int64_t environments = 0;
   double timestep = 0;
   std::vector<SensorLayout> sensors;
+  std::vector<FieldForm> forms;  // (sensors) what was recorded
   std::vector<std::int64_t> frames;
 
   explicit Impl(const std::string& p) : path(p), file(h5::open_file(p)) {
@@ -42,7 +44,12 @@ struct TrajectoryReader::Impl {
       if (H5Lget_name_by_idx(group.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, name, sizeof name,
                              H5P_DEFAULT) < 0)
         throw IoError(path + ": the list of sensors is damaged");
-      add_sensor(h5::open_group(group, name), name);
+      const h5::Id sensor = h5::open_group(group, name);
+      for (const FieldForm form : {FieldForm::field, FieldForm::pressure, FieldForm::shear})
+        if (h5::has_link(sensor, dataset_of(form))) {
+          add_sensor(sensor, name, form);
+          break;  // a field holds the others; of a sum there is nothing to draw
+        }
     }
   }
 
@@ -80,8 +87,8 @@ struct TrajectoryReader::Impl {
                         path, sensor, what, number));
   }
 
-  void add_sensor(const h5::Id& group, const std::string& name) {
-    const h5::Id force = h5::open_dataset(group, "force");
+  void add_sensor(const h5::Id& group, const std::string& name, FieldForm form) {
+    const h5::Id force = h5::open_dataset(group, dataset_of(form));
     SensorLayout s;
     s.name = name;
     s.body = h5::read_text(force, "body");
@@ -104,9 +111,9 @@ struct TrajectoryReader::Impl {
             fmt::format("{}: sensor '{}' claims {} points along one side", path, name, dims[i]));
     if (dims.size() == 5 && dims[2] * dims[3] > kMostPoints)
       throw IoError(fmt::format("{}: sensor '{}' claims {} points", path, name, dims[2] * dims[3]));
-    if (dims.size() > 1 && dims.back() != 3)
-      throw IoError(fmt::format("{}: sensor '{}' has {} numbers a point; expected 3", path, name,
-                                dims.back()));
+    if (dims.size() > 1 && dims.back() != static_cast<hsize_t>(components_of(form)))
+      throw IoError(fmt::format("{}: sensor '{}' has {} numbers a point; expected {}", path, name,
+                                dims.back(), components_of(form)));
     if (dims.size() == 5) {
       s.rows = static_cast<int>(dims[2]);
       s.cols = static_cast<int>(dims[3]);
@@ -123,6 +130,7 @@ struct TrajectoryReader::Impl {
                                 dims.size()));
     }
     sensors.push_back(std::move(s));
+    forms.push_back(form);
     frames.push_back(static_cast<std::int64_t>(dims[0]));
   }
 
@@ -148,7 +156,8 @@ std::size_t TrajectoryReader::find_sensor(const std::string& name) const {
     names.push_back(impl_->sensors[i].name);
     if (name.empty() || names.back() == name) return i;
   }
-  if (names.empty()) throw InputError(impl_->path + ": the run had no tactile sensor");
+  if (names.empty())
+    throw InputError(impl_->path + ": the run recorded no tactile field, pressure or shear");
   throw InputError(impl_->path + ": no sensor is named '" + name + "'" + suggestion(name, names));
 }
 
@@ -164,19 +173,21 @@ std::int64_t TrajectoryReader::step(std::size_t sensor, std::int64_t frame) cons
 std::vector<double> TrajectoryReader::force(std::size_t sensor, std::int64_t frame,
                                             std::int64_t environment) const {
   const SensorLayout& s = impl_->sensors[sensor];
-  std::vector<double> values(std::size_t(s.points) * 3);
-  h5::Dims offset = {static_cast<hsize_t>(frame), static_cast<hsize_t>(environment)},
-           count = {1, 1};
-  if (s.rectangular()) {
-    offset.insert(offset.end(), {0, 0, 0});
-    count.insert(count.end(), {static_cast<hsize_t>(s.rows), static_cast<hsize_t>(s.cols), 3});
-  } else {
-    offset.insert(offset.end(), {0, 0});
-    count.insert(count.end(), {static_cast<hsize_t>(s.points), 3});
-  }
-  h5::read_box<double>(impl_->open(sensor, "force"), offset, count, values.data());
+  const FieldForm form = impl_->forms[sensor];
+  const std::vector<std::uint64_t> shape = reading_shape(s, form);
+  h5::Dims offset(2 + shape.size(), 0), count = {1, 1};
+  offset[0] = static_cast<hsize_t>(frame), offset[1] = static_cast<hsize_t>(environment);
+  count.insert(count.end(), shape.begin(), shape.end());
+  std::vector<double> values(numbers_of(s.points, form));
+  h5::read_box<double>(impl_->open(sensor, dataset_of(form)), offset, count, values.data());
   impl_->check_finite(values, s.name, fmt::format("frame {}", frame));
-  return values;
+  if (form == FieldForm::field) return values;
+  std::vector<double> whole(numbers_of(s.points, FieldForm::field), 0.0);
+  const auto components = static_cast<std::size_t>(components_of(form)),
+             first = std::size_t(form == FieldForm::pressure ? 2 : 0);
+  for (std::size_t k = 0; k < values.size(); ++k)
+    whole[k / components * 3 + first + k % components] = values[k];
+  return whole;
 }
 
 }  // namespace tangere

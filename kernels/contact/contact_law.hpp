@@ -56,19 +56,15 @@ template <class Rounding, class N>
   return Rounding::add(damping, rate, minus_kn) * d;
 }
 
-/// Computes N and the friction bound divided by μ for a tactile point. Its linear law is the
-/// published one. d = 0 gives zeros.
-template <ContactLaw Law, class N, class M>
-void normal_force_alone(const N& minus_kn, const N& damping, const N& d, const N& rate,
-                        const M& touching, N& force, N& bound) {
+/// Computes N and the friction bound divided by μ for a tactile point, whose law is clamped or
+/// paper. d = 0 gives zeros.
+template <ContactLaw Law, class N>
+void normal_force_alone(const N& minus_kn, const N& damping, const N& d, const N& rate, N& force,
+                        N& bound) {
+  static_assert(Law != ContactLaw::linear);
   const N zero(0.0), raw = raw_force<Fused>(Law, minus_kn, damping, d, rate);
   force = Law == ContactLaw::clamped ? max(raw, zero) : raw;
-  if constexpr (Law == ContactLaw::linear) {
-    force = select(touching, force, zero);
-    bound = minus_kn * d;
-  } else {
-    bound = Law == ContactLaw::clamped ? force : max(force, zero - force);
-  }
+  bound = Law == ContactLaw::clamped ? force : max(force, zero - force);
 }
 
 /// Returns the scale in f_t = -scale v_t: the smaller of k_t and μ B/|v_t|. `square` = |v_t|² > 0.

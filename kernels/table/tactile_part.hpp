@@ -19,12 +19,12 @@ int TactilePart<Arch>::tactile_mixed(const TactileArgs<float>& a) {
 
 template <class Arch>
 void TactilePart<Arch>::tactile_block(const TactileBlockArgs<double>& a) {
-  kernels::tactile_block<InDouble<Arch>>(a);
+  any_block<InDouble<Arch>>(a);
 }
 
 template <class Arch>
 void TactilePart<Arch>::tactile_block_mixed(const TactileBlockArgs<float>& a) {
-  kernels::tactile_block<InMixed<Arch>>(a);
+  any_block<InMixed<Arch>>(a);
 }
 
 }  // namespace tangere::kernels

@@ -83,8 +83,14 @@ bool stored_force(const PadTiles& pad, int tile, int k, const Shape& shape, cons
   return true;
 }
 
-/// Computes the points of one tile. `out`, (3, 64), is written whole when `fresh` and something
-/// touches, else added to.
+/// Returns component c of those that are stored: the third one, where it is the only one.
+template <class P, class N>
+const N& stored(const Vec3<N>& force, int c) {
+  return P::kComponents == 1 ? force.z : (&force.x)[c];
+}
+
+/// Computes the points of one tile. `out`, (components, 64), is written whole when `fresh` and
+/// something touches, else added to.
 template <class P, ContactLaw Law, class Shape>
 bool tile_force(const PadTiles& pad, int tile, const Shape& shape,
                 const PointLaw<typename P::N>& law, bool fresh, typename P::Real* out) {
@@ -98,10 +104,10 @@ bool tile_force(const PadTiles& pad, int tile, const Shape& shape,
       if (!fresh) continue;
       f = zero3<N>();
     }
-    const N* component = &f.x;
-    for (int c = 0; c < 3; ++c) {
+    for (int c = 0; c < P::kComponents; ++c) {
       auto* at = out + c * kTactileTile + k;
-      P::store(fresh ? component[c] : P::load(at) + component[c], at);
+      const N& x = stored<P>(f, c);
+      P::store(fresh ? x : P::load(at) + x, at);
     }
   }
   return touched;
@@ -129,7 +135,8 @@ unsigned chunk_force(const TactileArgs<typename P::Real>& a, int touch, int firs
     shape.set(row);
     shape.u = {row[Shape::kRows - 3], row[Shape::kRows - 2], row[Shape::kRows - 1]};
     const bool fresh = ((written >> l) & 1U) == 0;
-    if (tile_force<P, Law>(pad, first + l, shape, law, fresh, buffer + 3 * kTactileTile * l))
+    if (tile_force<P, Law>(pad, first + l, shape, law, fresh,
+                           buffer + P::kComponents * kTactileTile * l))
       written |= 1U << l;
   }
   return written;
@@ -166,27 +173,26 @@ void interleave_row(const Real* from, Real* to) {
   __builtin_memcpy(to + 16, &third, sizeof third);
 }
 
-/// Writes (3, 64) to rows of (point, 3) in the array, or to the points' places in a list.
-template <class Arch, class Real>
+/// Writes (components, 64) to rows of (point, components) in the array, or to the points' places in
+/// a list.
+template <class P, class Real>
 void write_dense(const PadTiles& pad, int tile, const Real* from, Real* dense) {
+  constexpr int kC = P::kComponents;
   if (pad.curved()) {
     const int* index = pad.index + kTactileTile * tile;
     for (int k = 0; k < pad.points_of(tile); ++k)
-      for (int c = 0; c < 3; ++c) dense[3 * index[k] + c] = from[c * kTactileTile + k];
+      for (int c = 0; c < kC; ++c) dense[kC * index[k] + c] = from[c * kTactileTile + k];
     return;
   }
   const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
-  Real* to = dense + 3 * pad.first_of(tile);
-  for (int i = 0; i < rows; ++i, from += kTileSide, to += 3 * pad.cols) {
-    if (cols == kTileSide) {
-      interleave_row<Arch>(from, to);
+  Real* to = dense + kC * pad.first_of(tile);
+  for (int i = 0; i < rows; ++i, from += kTileSide, to += kC * pad.cols) {
+    if (kC == 3 && cols == kTileSide) {
+      interleave_row<typename P::Architecture>(from, to);
       continue;
     }
-    for (int j = 0; j < cols; ++j) {
-      to[3 * j] = from[j];
-      to[3 * j + 1] = from[kTactileTile + j];
-      to[3 * j + 2] = from[2 * kTactileTile + j];
-    }
+    for (int j = 0; j < cols; ++j)
+      for (int c = 0; c < kC; ++c) to[kC * j + c] = from[c * kTactileTile + j];
   }
 }
 
@@ -201,7 +207,8 @@ int tactile_field(const TactileArgs<typename P::Real>& a) {
   using Real = typename P::Real;
   static constexpr auto kForce =
       by_shape<P>([]<class Shape>() { return &chunk_force<P, Law, Shape>; });
-  alignas(64) Real buffer[kGroup * 3 * kTactileTile];
+  constexpr int kNumbers = P::kComponents * kTactileTile;  // of a tile
+  alignas(64) Real buffer[kGroup * kNumbers];
   int count = 0;
   for (int first = 0; first < a.pad->tiles(); first += kGroup) {
     unsigned written = 0;
@@ -209,32 +216,30 @@ int tactile_field(const TactileArgs<typename P::Real>& a) {
       written = kForce[std::size_t(a.shapes[k].shape)](a, k, first, written, buffer);
     for (int l = 0; written != 0; ++l, written >>= 1) {
       if ((written & 1U) == 0) continue;
-      const Real* tile = buffer + 3 * kTactileTile * l;
+      const Real* tile = buffer + kNumbers * l;
       if (a.values != nullptr)
-        for (int i = 0; i < 3 * kTactileTile; ++i) a.values[3 * kTactileTile * count + i] = tile[i];
-      if (a.dense != nullptr)
-        write_dense<typename P::Architecture>(*a.pad, first + l, tile, a.dense);
+        for (int i = 0; i < kNumbers; ++i) a.values[kNumbers * count + i] = tile[i];
+      if (a.dense != nullptr) write_dense<P>(*a.pad, first + l, tile, a.dense);
       a.active[count++] = first + l;
     }
   }
   return count;
 }
 
-/// Returns the number of tiles that something touches.
 template <class P>
 int tactile_field_of(const TactileArgs<typename P::Real>& a) {
-  switch (a.law) {
-    case ContactLaw::paper: return tactile_field<P, ContactLaw::paper>(a);
-    case ContactLaw::linear: return tactile_field<P, ContactLaw::linear>(a);
-    case ContactLaw::clamped: break;
-  }
-  return tactile_field<P, ContactLaw::clamped>(a);
+  return a.law == ContactLaw::paper ? tactile_field<P, ContactLaw::paper>(a)
+                                    : tactile_field<P, ContactLaw::clamped>(a);
 }
 
+/// Returns the number of tiles that something touches.
 template <class P>
 int any_field(const TactileArgs<typename P::Real>& a) {
-  return a.pad->curved() ? tactile_field_of<OnCurvedPad<P>>(a)
-                         : tactile_field_of<AcrossPoints<P>>(a);
+  using Curved = OnCurvedPad<P>;
+  using Flat = AcrossPoints<P>;
+  if (a.pad->curved())
+    return a.pressure ? tactile_field_of<PressureAlone<Curved>>(a) : tactile_field_of<Curved>(a);
+  return a.pressure ? tactile_field_of<PressureAlone<Flat>>(a) : tactile_field_of<Flat>(a);
 }
 
 }  // namespace tangere::kernels

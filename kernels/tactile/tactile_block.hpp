@@ -69,7 +69,7 @@ bool lane_brackets(const PadTiles& pad, int tile, const TouchShape& s, const Tou
   return true;
 }
 
-/// Computes one shape on one tile. `out`, (64, 3) lanes, is written whole when `fresh` and
+/// Computes one shape on one tile. `out`, (64, components) lanes, is written whole when `fresh` and
 /// something touches, else added to.
 template <class P, ContactLaw Law, class Shape>
 bool tile_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, int k, bool fresh,
@@ -101,25 +101,25 @@ bool tile_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, int k, bo
       } else if (pad.skewed) {
         f = in_skewed_axes(pad.axes, f);
       }
-      N* to = out + 3 * at;
-      to[0] = fresh ? f.x : to[0] + f.x;
-      to[1] = fresh ? f.y : to[1] + f.y;
-      to[2] = fresh ? f.z : to[2] + f.z;
+      N* to = out + P::kComponents * at;
+      for (int c = 0; c < P::kComponents; ++c)
+        to[c] = fresh ? stored<P>(f, c) : to[c] + stored<P>(f, c);
     }
   return touched;
 }
 
-/// Writes (64, 3) lanes to rows of (point, 3) in the array of each lane.
+/// Writes (64, components) lanes to rows of (point, components) in the array of each lane.
 template <class P>
 void write_lanes(const TactileBlockArgs<typename P::Real>& a, int tile, const typename P::N* from) {
   const PadTiles& pad = *a.pad;
-  const int rows = pad.rows_of(tile), numbers = 3 * pad.cols_of(tile);
+  constexpr int kC = P::kComponents;
+  const int rows = pad.rows_of(tile), numbers = kC * pad.cols_of(tile);
   const auto* values = reinterpret_cast<const typename P::Real*>(from);
   for (int l = 0; l < P::kLanes; ++l) {
     if (a.dense[l] == nullptr) continue;
-    auto* to = a.dense[l] + 3 * pad.first_of(tile);
-    for (int i = 0; i < rows; ++i, to += 3 * pad.cols)
-      for (int j = 0; j < numbers; ++j) to[j] = values[(3 * kTileSide * i + j) * P::kLanes + l];
+    auto* to = a.dense[l] + kC * pad.first_of(tile);
+    for (int i = 0; i < rows; ++i, to += kC * pad.cols)
+      for (int j = 0; j < numbers; ++j) to[j] = values[(kC * kTileSide * i + j) * P::kLanes + l];
   }
 }
 
@@ -127,7 +127,7 @@ template <class P, ContactLaw Law>
 void tactile_block(const TactileBlockArgs<typename P::Real>& a) {
   static constexpr auto kForce =
       by_shape<P>([]<class Shape>() { return &tile_lanes<P, Law, Shape>; });
-  typename P::N buffer[3 * kTactileTile];
+  typename P::N buffer[P::kComponents * kTactileTile];
   for (int tile = 0; tile < a.pad->tiles(); ++tile) {
     bool written = false;
     for (int k = 0; k < a.n_touches; ++k)
@@ -137,13 +137,21 @@ void tactile_block(const TactileBlockArgs<typename P::Real>& a) {
 }
 
 template <class P>
-void tactile_block(const TactileBlockArgs<typename P::Real>& a) {
-  switch (a.law) {
-    case ContactLaw::paper: return tactile_block<P, ContactLaw::paper>(a);
-    case ContactLaw::linear: return tactile_block<P, ContactLaw::linear>(a);
-    case ContactLaw::clamped: break;
+void tactile_block_of(const TactileBlockArgs<typename P::Real>& a) {
+  if (a.law == ContactLaw::paper) {
+    tactile_block<P, ContactLaw::paper>(a);
+  } else {
+    tactile_block<P, ContactLaw::clamped>(a);
   }
-  return tactile_block<P, ContactLaw::clamped>(a);
+}
+
+template <class P>
+void any_block(const TactileBlockArgs<typename P::Real>& a) {
+  if (a.pressure) {
+    tactile_block_of<PressureAlone<P>>(a);
+  } else {
+    tactile_block_of<P>(a);
+  }
 }
 
 }  // namespace tangere::kernels

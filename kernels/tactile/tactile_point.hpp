@@ -25,6 +25,7 @@ struct InDouble {
   using Real = double;
   using Offset = PointOffset<N, false>;
   static constexpr bool kSingle = false, kCurved = false;
+  static constexpr int kComponents = 3;  ///< of a force that are wanted
   static constexpr int kLanes = kGroup;
   static constexpr double kSmallest = 1e-150;  ///< its square is still a normal number
   static N load(const double* p) { return load_lanes<Arch>(p); }
@@ -42,6 +43,7 @@ struct InMixed {
   using Real = float;
   using Offset = PointOffset<N, false>;
   static constexpr bool kSingle = true, kCurved = false;
+  static constexpr int kComponents = 3;
   static constexpr int kLanes = kLanesF;
   static constexpr double kSmallest = 1e-18;
   static N load(const float* p) { return load_lanes_f<Arch>(p); }
@@ -58,6 +60,12 @@ struct OnCurvedPad : P {
   static constexpr bool kCurved = true;
 };
 
+/// The number type P where only the third component is wanted, without friction.
+template <class P>
+struct PressureAlone : P {
+  static constexpr int kComponents = 1;
+};
+
 /// Contact parameters and rotation, in the form that a point needs.
 template <class N>
 struct PointLaw {
@@ -71,6 +79,21 @@ Vec3<D> tile_velocity(const Touch<D>& at, const Vec3<D>& t) {
   return cross(t, at.omega) - at.v;
 }
 
+/// Computes the normal force on points at depth d, for n · (u + s × ω): d n has no part in it.
+template <class P, ContactLaw Law, class Shape, class N = typename P::N, class M>
+Vec3<N> pressing_force(const Shape& shape, const PointLaw<N>& law, const typename P::Offset& s,
+                       const N& d, const Vec3<N>& n, const M& touching) {
+  const N zero(0.0);
+  const Vec3<N>& w = law.omega;
+  Vec3<N> u = {mul_add(s.y, w.z, shape.u.x), mul_sub_from(s.x, w.z, shape.u.y),
+               mul_sub_from(s.y, w.x, mul_add(s.x, w.y, shape.u.z))};
+  if constexpr (P::kCurved) u = {mul_sub_from(s.z, w.y, u.x), mul_add(s.z, w.x, u.y), u.z};
+  N normal, bound;
+  normal_force_alone<Law>(law.minus_kn, law.damping, select(touching, d, zero), dot(n, u), normal,
+                          bound);
+  return {mul_add(normal, n.x, zero), mul_add(normal, n.y, zero), mul_sub_from(normal, n.z, zero)};
+}
+
 /// Computes the force on the points at offset s: (f·e0, f·e1, -f·e2) in pad axes, +0 where nothing
 /// touches. Returns false and leaves `force` alone where no lane touches.
 template <class P, ContactLaw Law, class Shape, class N = typename P::N>
@@ -80,6 +103,10 @@ bool point_force(const Shape& shape, const PointLaw<N>& law, const typename P::O
   Vec3<N> n;
   const auto touching = shape.distance(s, d, n);
   if (!any(touching)) return false;
+  if constexpr (P::kComponents == 1) {
+    force = pressing_force<P, Law>(shape, law, s, d, n, touching);
+    return true;
+  }
   const N zero(0.0);
   Vec3<N> arm = {mul_add(d, n.x, zero - s.x), mul_add(d, n.y, zero - s.y), d * n.z};
   if constexpr (P::kCurved) arm.z = arm.z - s.z;
@@ -91,8 +118,8 @@ bool point_force(const Shape& shape, const PointLaw<N>& law, const typename P::O
   const Vec3<N> slide = {mul_sub_from(rate, n.x, u.x), mul_sub_from(rate, n.y, u.y),
                          mul_sub_from(rate, n.z, u.z)};
   N normal, bound;
-  normal_force_alone<Law>(law.minus_kn, law.damping, select(touching, d, zero), rate, touching,
-                          normal, bound);
+  normal_force_alone<Law>(law.minus_kn, law.damping, select(touching, d, zero), rate, normal,
+                          bound);
   // Without sliding, the bound divided by |v_t| is huge, but nothing is divided by zero.
   const N square = max(dot(slide, slide), N(P::kSmallest * P::kSmallest));
   const N scale = friction_scale(law.kt, law.mu, bound, square);

@@ -69,6 +69,9 @@ struct TactileArgs {
   int* active;                   ///< (n_tiles) out
   Real* values;                  ///< (n_tiles, 3, 64) out [N], tile active[k] at k; or nullptr
   Real* dense;  ///< (rows, cols, 3) out [N], only active tiles are written; or nullptr
+  /// Only the third component, and that without friction: `values` is (n_tiles, 1, 64), `dense` is
+  /// (rows, cols).
+  bool pressure = false;
 };
 
 /// Arguments for the fields of a group of eight environments (double) or a block of sixteen
@@ -80,8 +83,9 @@ struct TactileBlockArgs {
   int n_touches;
   const TouchShape* shapes;              ///< (n_touches)
   const Touch<LaneRow>* const* touches;  ///< (n_touches) of one group, or of two groups in a row
-  Real* const* dense;  ///< (lanes) (rows, cols, 3) out [N], or nullptr for a lane that is not
-                       ///< wanted; tiles that nothing touches in any lane are not written
+  Real* const* dense;     ///< (lanes) (rows, cols, 3) out [N], or nullptr for a lane that is not
+                          ///< wanted; tiles that nothing touches in any lane are not written
+  bool pressure = false;  ///< as in TactileArgs
 };
 
 /// Sums over all points of one shape on a pad, or of one pair.

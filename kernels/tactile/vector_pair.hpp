@@ -78,6 +78,7 @@ struct Paired {
   using Real = typename P::Real;
   using Offset = PointOffset<N, false>;
   static constexpr bool kSingle = P::kSingle, kCurved = false;
+  static constexpr int kComponents = P::kComponents;
   static constexpr int kLanes = 2 * P::kLanes;
   static constexpr double kSmallest = P::kSmallest;
   static N load(const Real* p) { return {P::load(p), P::load(p + P::kLanes)}; }

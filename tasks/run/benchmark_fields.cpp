@@ -7,6 +7,7 @@
 
 #include "engine/base/as_size.hpp"
 #include "kernels/numbers/block.hpp"
+#include "tasks/run/block_reader.hpp"
 
 namespace tangere {
 namespace {
@@ -14,12 +15,27 @@ namespace {
 using kernels::kBlock;
 constexpr int kTileSide = 8;
 
+template <class T>
+DenseFrame<T> make_frame(const Model& model, FieldOutput of, const DenseFrame<T>*) {
+  return {model, of.sensor, of.form};
+}
+template <class T>
+CompactFrame<T> make_frame(const Model& model, FieldOutput of, const CompactFrame<T>*) {
+  if (of.form != FieldForm::field)
+    throw InputError("compact frames of a " + std::string(to_string(of.form)) +
+                     "; expected whole fields, or dense frames");
+  return {model, of.sensor};
+}
+
 template <class Frame>
-std::vector<std::vector<Frame>> make(const Model& model, int environments) {
-  std::vector<std::vector<Frame>> frames(model.sensors().size());
-  for (std::size_t s = 0; s < frames.size(); ++s) {
-    frames[s].reserve(as_size(environments));
-    for (int e = 0; e < environments; ++e) frames[s].emplace_back(model, static_cast<int>(s));
+std::vector<std::vector<Frame>> make(const Model& model, std::span<const FieldOutput> outputs,
+                                     int environments) {
+  std::vector<std::vector<Frame>> frames(outputs.size());
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    if (outputs[k].form == FieldForm::sum) continue;
+    frames[k].reserve(as_size(environments));
+    for (int e = 0; e < environments; ++e)
+      frames[k].push_back(make_frame(model, outputs[k], static_cast<const Frame*>(nullptr)));
   }
   return frames;
 }
@@ -36,30 +52,43 @@ std::uint64_t chain_field(std::uint64_t checksum, const CompactFrame<T>& frame) 
 }
 
 template <class T>
-double bytes_of(const SensorInfo& sensor, FrameKind kind) {
-  if (kind == FrameKind::dense) return 3.0 * sensor.points * sizeof(T);
+double bytes_of(const SensorInfo& sensor, FieldForm form, FrameKind kind) {
+  if (kind == FrameKind::none) return 0;
+  if (form == FieldForm::sum) return sizeof(FieldSum);
+  if (kind == FrameKind::dense)
+    return static_cast<double>(numbers_of(sensor.points, form) * sizeof(T));
   const double tiles = double((sensor.rows + kTileSide - 1) / kTileSide) *
                        ((sensor.cols + kTileSide - 1) / kTileSide);
-  return kind == FrameKind::none ? 0
-                                 : tiles * (3.0 * kTileSide * kTileSide * sizeof(T) + sizeof(int));
+  return tiles * (3.0 * kTileSide * kTileSide * sizeof(T) + sizeof(int));
 }
 
 }  // namespace
 
-BenchmarkFields::BenchmarkFields(const Model& model, int environments, FrameKind kind,
-                                 Precision precision) {
-  const bool wide = precision == Precision::f64;
-  if (kind == FrameKind::dense && wide) frames_ = make<DenseFrame<double>>(model, environments);
-  if (kind == FrameKind::dense && !wide) frames_ = make<DenseFrame<float>>(model, environments);
-  if (kind == FrameKind::compact && wide) frames_ = make<CompactFrame<double>>(model, environments);
-  if (kind == FrameKind::compact && !wide) frames_ = make<CompactFrame<float>>(model, environments);
+BenchmarkFields::BenchmarkFields(const Model& model, int environments,
+                                 const BenchmarkOptions& options, FrameKind kind)
+    : outputs_(kind == FrameKind::none ? std::vector<FieldOutput>{}
+                                       : fields_of(model, options.rollout.outputs)),
+      sums_(outputs_.size()) {
+  const bool wide = options.precision == Precision::f64;
+  const auto all = [&]<class Frame>() { frames_ = make<Frame>(model, outputs_, environments); };
+  if (kind == FrameKind::dense && wide) all.template operator()<DenseFrame<double>>();
+  if (kind == FrameKind::dense && !wide) all.template operator()<DenseFrame<float>>();
+  if (kind == FrameKind::compact && wide) all.template operator()<CompactFrame<double>>();
+  if (kind == FrameKind::compact && !wide) all.template operator()<CompactFrame<float>>();
+  for (std::size_t k = 0; k < outputs_.size(); ++k)
+    if (outputs_[k].form == FieldForm::sum) sums_[k].resize(as_size(environments));
 }
 
-void BenchmarkFields::read(Readout& readout, const Batch& batch, int block, int sensor) {
+void BenchmarkFields::read(Readout& readout, const Batch& batch, int block, std::size_t k) {
+  if (outputs_[k].form == FieldForm::sum) {
+    read_field<double>(readout, batch, block, outputs_[k],
+                       [&](int e) { return std::span(sums_[k][as_size(e)]); });
+    return;
+  }
   std::visit(
       [&](auto& store) {
         if constexpr (!std::is_same_v<std::decay_t<decltype(store)>, std::monostate>) {
-          auto& frames = store[as_size(sensor)];
+          auto& frames = store[k];
           const std::size_t first = as_size(block * kBlock);
           readout.read_block(
               batch, block,
@@ -69,23 +98,27 @@ void BenchmarkFields::read(Readout& readout, const Batch& batch, int block, int 
       frames_);
 }
 
-std::uint64_t BenchmarkFields::chain(std::uint64_t checksum, int environment, int sensor) const {
+std::uint64_t BenchmarkFields::chain(std::uint64_t checksum, int environment, std::size_t k) const {
+  if (outputs_[k].form == FieldForm::sum)
+    return chain_bits(checksum, std::span<const double>(sums_[k][as_size(environment)]));
   return std::visit(
       [&](const auto& store) {
         if constexpr (std::is_same_v<std::decay_t<decltype(store)>, std::monostate>) {
           return checksum;
         } else {
-          return chain_field(checksum, store[as_size(sensor)][as_size(environment)]);
+          return chain_field(checksum, store[k][as_size(environment)]);
         }
       },
       frames_);
 }
 
-double field_bytes(const Model& model, FrameKind kind, Precision precision) {
+double field_bytes(const Model& model, const BenchmarkOptions& options, FrameKind kind) {
   double bytes = 0;
-  for (const SensorInfo& sensor : model.sensors())
-    bytes += precision == Precision::f64 ? bytes_of<double>(sensor, kind)
-                                         : bytes_of<float>(sensor, kind);
+  for (const FieldOutput of : fields_of(model, options.rollout.outputs)) {
+    const SensorInfo& sensor = model.sensors()[as_size(of.sensor)];
+    bytes += options.precision == Precision::f64 ? bytes_of<double>(sensor, of.form, kind)
+                                                 : bytes_of<float>(sensor, of.form, kind);
+  }
   return bytes;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Memory for the tactile fields of a benchmark: one frame per sensor and environment, reused for
+// Memory for the tactile fields of a benchmark: one frame per output and environment, reused for
 // every reading.
 #pragma once
 
@@ -14,24 +14,28 @@ namespace tangere {
 
 class BenchmarkFields {
  public:
-  BenchmarkFields(const Model& model, int environments, FrameKind kind, Precision precision);
+  /// Throws InputError for compact frames of anything but whole fields.
+  BenchmarkFields(const Model& model, int environments, const BenchmarkOptions& options,
+                  FrameKind kind);
 
-  /// Reads one sensor of all environments of a block. The precision of the readout must be that of
+  [[nodiscard]] std::span<const FieldOutput> outputs() const { return outputs_; }
+  /// Reads output `k` of all environments of a block. The precision of the readout must be that of
   /// the fields.
-  void read(Readout& readout, const Batch& batch, int block, int sensor);
-  /// Continues a checksum with the bits of the last reading of a field: every point, whatever the
-  /// frames keep.
-  [[nodiscard]] std::uint64_t chain(std::uint64_t checksum, int environment, int sensor) const;
+  void read(Readout& readout, const Batch& batch, int block, std::size_t k);
+  /// Continues a checksum with the bits of the last reading: every point, whatever the frames keep.
+  [[nodiscard]] std::uint64_t chain(std::uint64_t checksum, int environment, std::size_t k) const;
 
  private:
   template <template <class> class Frame, class T>
-  using Store = std::vector<std::vector<Frame<T>>>;  // (sensors, environments)
+  using Store = std::vector<std::vector<Frame<T>>>;  // (outputs, environments); none for a sum
+  std::vector<FieldOutput> outputs_;
+  std::vector<std::vector<FieldSum>> sums_;  // (outputs, environments); none for fields
   std::variant<std::monostate, Store<DenseFrame, double>, Store<DenseFrame, float>,
                Store<CompactFrame, double>, Store<CompactFrame, float>>
       frames_;
 };
 
 /// Bytes that the fields of one environment take.
-double field_bytes(const Model& model, FrameKind kind, Precision precision);
+double field_bytes(const Model& model, const BenchmarkOptions& options, FrameKind kind);
 
 }  // namespace tangere

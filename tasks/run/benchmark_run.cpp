@@ -70,7 +70,7 @@ class Benchmark {
         data_(std::move(task_data)),
         frames_(data_ == nullptr ? options.frames : FrameKind::none),
         u_(as_size(start.environments()) * as_size(start.model().nu())),
-        fields_(start.model(), start.environments(), frames_, options.precision),
+        fields_(start.model(), start.environments(), options, frames_),
         tallies_(as_size(start.blocks())),
         checksums_(as_size(start.environments())),
         threads_(options.threads) {
@@ -181,14 +181,14 @@ class Benchmark {
   void read_fields(int first, int last, std::int64_t done, const StepTally& steps, Worker& worker,
                    bool checked, BlockTally& tally) {
     const std::span<const SensorInfo> sensors = batch_.model().sensors();
-    for (std::size_t s = 0; s < sensors.size(); ++s) {
-      const int sensor = static_cast<int>(s);
-      if (done % tactile_interval(sensors[s], options_.rollout) != 0) continue;
-      fields_.read(worker.readout, batch_, first / kBlock, sensor);
+    for (std::size_t k = 0; k < fields_.outputs().size(); ++k) {
+      const SensorInfo& sensor = sensors[as_size(fields_.outputs()[k].sensor)];
+      if (done % tactile_interval(sensor, options_.rollout) != 0) continue;
+      fields_.read(worker.readout, batch_, first / kBlock, k);
       for (int e = first; e < last; ++e) {
         if (!steps.live(e)) continue;
-        tally.tactile_points += sensors[s].points;
-        if (checked) checksums_[as_size(e)] = fields_.chain(checksums_[as_size(e)], e, sensor);
+        tally.tactile_points += sensor.points;
+        if (checked) checksums_[as_size(e)] = fields_.chain(checksums_[as_size(e)], e, k);
       }
     }
   }
@@ -319,7 +319,7 @@ BenchmarkResult run_benchmark(const Batch& start, const Task& task, const Policy
 
 double benchmark_bytes(const Model& model, int environments, const BenchmarkOptions& options) {
   const double per_environment = static_cast<double>(model.state_bytes_per_environment()) +
-                                 field_bytes(model, options.frames, options.precision) +
+                                 field_bytes(model, options, options.frames) +
                                  model.nu() * static_cast<double>(sizeof(double)) +
                                  sizeof(std::uint64_t);
   const double per_thread = static_cast<double>(Stepper::workspace_bytes(model));

@@ -40,11 +40,12 @@ void read_end_effectors(Readout& readout, const Batch& batch, int block, const P
     readout.read_end_effectors(batch, block, places_of<double>(batch, block, place));
 }
 
-/// Reads the field of one sensor, (points, 3) [N]. T: double or float.
+/// Reads one sensor in one form, numbers_of(points, form). T: double or float.
 template <class T, class Place>
-void read_field(Readout& readout, const Batch& batch, int block, int sensor, const Place& place) {
+void read_field(Readout& readout, const Batch& batch, int block, FieldOutput output,
+                const Place& place) {
   const auto places = places_of<T>(batch, block, place);
-  readout.read_block(batch, block, sensor, std::span<const std::span<T>>(places));
+  readout.read_block(batch, block, output, std::span<const std::span<T>>(places));
 }
 
 }  // namespace tangere

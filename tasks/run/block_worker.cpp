@@ -245,7 +245,7 @@ void BlockWorker::look(const Batch& batch, int block, std::size_t moment) {
   std::size_t offset = 0;
   for (std::size_t s = 0; s < task_.model().sensors().size(); ++s) {
     const std::size_t numbers = 3 * as_size(task_.model().sensors()[s].points);
-    read_field<double>(readout_, batch, block, static_cast<int>(s), [&](int e) {
+    read_field<double>(readout_, batch, block, {static_cast<int>(s)}, [&](int e) {
       return part(tactile_, moment, e - first).subspan(offset, numbers);
     });
     offset += numbers;

@@ -62,8 +62,10 @@ EpisodeSource shape_of(const Model& model, const EpisodeOptions& options) {
   s.action = as_size(model.nu());
   s.widths = {as_size(model.nq()), as_size(model.nv())};
   if (!model.end_effectors().empty()) s.widths.push_back(3 * model.end_effectors().size());
-  s.first_sensor = s.widths.size();
-  for (const SensorInfo& sensor : model.sensors()) s.widths.push_back(3 * as_size(sensor.points));
+  s.first_field = s.widths.size();
+  s.fields = options.fields ? *options.fields : whole_fields(model);
+  for (const FieldOutput output : s.fields)
+    s.widths.push_back(numbers_of(model.sensors()[as_size(output.sensor)].points, output.form));
   return s;
 }
 
@@ -74,7 +76,7 @@ EpisodeSource shape_of(const Task& task) {
   s.action = task.spec().action.size();
   s.widths = {as_size(task.model().nq()), as_size(task.model().nv())};
   for (const TensorSpec& tensor : task.spec().observations) s.widths.push_back(tensor.size());
-  s.first_sensor = s.widths.size();
+  s.first_field = s.widths.size();
   s.whole = true;
   return s;
 }
@@ -133,7 +135,7 @@ EpisodeSlot<T>::EpisodeSlot(const EpisodeSource& source, const EpisodeOptions& o
       observations_(source.widths.size()) {
   for (std::size_t name = 0; name < values_.size(); ++name) {
     values_[name].resize(kBlockEpisodes * as_size(piece_rows_) * source.widths[name]);
-    small_.resize(std::max(small_.size(), name < source.first_sensor ? source.widths[name] : 0));
+    small_.resize(std::max(small_.size(), name < source.first_field ? source.widths[name] : 0));
   }
 }
 
@@ -235,7 +237,7 @@ void EpisodeSlot<T>::observe_task(const TaskProgram& task, int row) {
 
 template <class T>
 void EpisodeSlot<T>::observe_scene(int row) {
-  if (source_.first_sensor > kThird) {
+  if (source_.first_field > kThird) {
     std::vector<double> positions(as_size(batch_->environments()) * source_.widths[kThird]);
     const auto place = [&](int e) {
       return std::span(positions).subspan(as_size(e) * source_.widths[kThird],
@@ -244,8 +246,8 @@ void EpisodeSlot<T>::observe_scene(int row) {
     read_end_effectors(readout_, *batch_, 0, place);
     for (int e = 0; e < batch_->environments(); ++e) put(kThird, e, row, place(e));
   }
-  for (std::size_t name = source_.first_sensor; name < source_.widths.size(); ++name)
-    read_field<T>(readout_, *batch_, 0, static_cast<int>(name - source_.first_sensor),
+  for (std::size_t name = source_.first_field; name < source_.widths.size(); ++name)
+    read_field<T>(readout_, *batch_, 0, source_.fields[name - source_.first_field],
                   [&](int e) { return numbers(name, e, row); });
 }
 

@@ -23,11 +23,12 @@ inline constexpr int kBlockEpisodes = 16;  // lanes of a block of a Batch: one s
 struct EpisodeSource {
   const Model* model = nullptr;
   StepperOptions solver;
-  std::int64_t rows = 0;         ///< R, actions of an episode, at most
-  std::size_t action = 0;        ///< numbers in one action
-  std::size_t first_sensor = 0;  ///< index of its field in widths
+  std::int64_t rows = 0;            ///< R, actions of an episode, at most
+  std::size_t action = 0;           ///< numbers in one action
+  std::vector<FieldOutput> fields;  ///< of a scene
+  std::size_t first_field = 0;      ///< index of the first of them in widths
   /// Numbers in a row of q and of v. Then, for a scene, of the end effectors if there are any and
-  /// of every sensor's field; for a task, of each observation.
+  /// of each of `fields`; for a task, of each observation.
   std::vector<std::size_t> widths;
   /// Episodes may end at any time. Their length is then known only at the end, so their blocks
   /// leave whole and in ascending order.

@@ -11,9 +11,11 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "engine/base/precision.hpp"
+#include "engine/model/field_form.hpp"
 #include "engine/rows/episode_sink.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
@@ -27,6 +29,8 @@ struct EpisodeOptions {
   std::int64_t steps = 0;                 ///< of a scene's episode, a multiple of `every`
   int every = 1;  ///< K: steps for which a scene's action is held, and between observations
   std::uint64_t seed = 0;
+  /// What is read of a scene's tactile fields; none: the field of every sensor.
+  std::optional<std::vector<FieldOutput>> fields = {};
   Precision precision =
       Precision::f64;  ///< mixed: fields are computed in it, observations leave as float32
   int threads = 1;

@@ -12,13 +12,17 @@
 namespace tangere {
 namespace {
 
-constexpr int kPoseWidth = 7, kTwistWidth = 6, kForceWidth = 3, kPositionWidth = 3;
+constexpr int kPoseWidth = 7, kTwistWidth = 6, kPositionWidth = 3;
 
-/// Numbers of one environment in the largest tactile field.
-std::size_t largest_field(const Model& model) {
+std::size_t numbers_in(const Model& model, FieldOutput output) {
+  return numbers_of(model.sensors()[static_cast<std::size_t>(output.sensor)].points, output.form);
+}
+
+/// Numbers of one environment in the largest reading.
+std::size_t largest_reading(const Model& model, const RolloutOutputs& outputs) {
   std::size_t largest = 0;
-  for (const SensorInfo& sensor : model.sensors())
-    largest = std::max(largest, static_cast<std::size_t>(sensor.points) * kForceWidth);
+  for (const FieldOutput output : fields_of(model, outputs))
+    largest = std::max(largest, numbers_in(model, output));
   return largest;
 }
 
@@ -34,7 +38,7 @@ class Recorder {
   }
 
  public:
-  Recorder(const Batch& batch, Precision precision, RowSink& sink)
+  Recorder(const Batch& batch, Precision precision, const RolloutOutputs& outputs, RowSink& sink)
       : batch_(batch),
         sink_(sink),
         readout_(batch.model(), precision),
@@ -43,10 +47,12 @@ class Recorder {
     const auto e = static_cast<std::size_t>(environments_);
     q_.resize(e * static_cast<std::size_t>(model.nq()));
     v_.resize(e * static_cast<std::size_t>(model.nv()));
-    pose_.resize(e * static_cast<std::size_t>(model.nb()) * kPoseWidth);
-    twist_.resize(e * static_cast<std::size_t>(model.nb()) * kTwistWidth);
-    end_effectors_.resize(e * model.end_effectors().size() * kPositionWidth);
-    force_.resize(e * largest_field(model));
+    const std::size_t bodies = outputs.bodies ? static_cast<std::size_t>(model.nb()) : 0;
+    pose_.resize(e * bodies * kPoseWidth);
+    twist_.resize(e * bodies * kTwistWidth);
+    if (outputs.end_effectors)
+      end_effectors_.resize(e * model.end_effectors().size() * kPositionWidth);
+    reading_.resize(e * largest_reading(model, outputs));
     iterations_.resize(e);
     status_.resize(e);
   }
@@ -54,9 +60,10 @@ class Recorder {
   void write_state(std::int64_t step, double time) {
     for (int block = 0; block < batch_.blocks(); ++block) {
       read_states(batch_, block, place(q_), place(v_));
-      read_end_effectors(readout_, batch_, block, place(end_effectors_));
+      if (!end_effectors_.empty())
+        read_end_effectors(readout_, batch_, block, place(end_effectors_));
     }
-    for (int e = 0; e < environments_; ++e)
+    for (int e = 0; e < environments_ && !pose_.empty(); ++e)
       readout_.bodies(batch_, e, part(pose_, e), part(twist_, e));
     sink_.write(StateRow{step, time, q_, v_, pose_, twist_, end_effectors_});
   }
@@ -71,14 +78,12 @@ class Recorder {
     sink_.write(StepRow{step, u, iterations_, status_, batch_.residuals()});
   }
 
-  void write_field(int sensor, std::int64_t frame, std::int64_t step) {
-    const auto points =
-        static_cast<std::size_t>(batch_.model().sensors()[static_cast<std::size_t>(sensor)].points);
-    const std::span<double> field =
-        std::span(force_).first(static_cast<std::size_t>(environments_) * points * kForceWidth);
+  void write_field(FieldOutput output, std::int64_t frame, std::int64_t step) {
+    const std::span<double> numbers = std::span(reading_).first(
+        static_cast<std::size_t>(environments_) * numbers_in(batch_.model(), output));
     for (int block = 0; block < batch_.blocks(); ++block)
-      read_field<double>(readout_, batch_, block, sensor, place(field));
-    sink_.write(TactileRow{sensor, frame, step, field});
+      read_field<double>(readout_, batch_, block, output, place(numbers));
+    sink_.write(TactileRow{output, frame, step, numbers});
   }
 
  private:
@@ -87,7 +92,7 @@ class Recorder {
   Readout readout_;
   int environments_;
   std::vector<double> q_, v_, pose_, twist_, end_effectors_;  // as in StateRow
-  std::vector<double> force_;                                 // shared by the sensors
+  std::vector<double> reading_;                               // shared by the sensors
   std::vector<std::int32_t> iterations_;
   std::vector<std::int8_t> status_;
 };
@@ -116,6 +121,10 @@ void write_action(EpisodeProgram& program, std::int64_t step, RowSink& sink) {
 
 }  // namespace
 
+std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs) {
+  return outputs.fields ? *outputs.fields : whole_fields(model);
+}
+
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options) {
   if (options.every > 0) return options.every;
   return sensor.every > 0 ? sensor.every : 1;
@@ -126,10 +135,11 @@ std::int64_t tactile_frames(const SensorInfo& sensor, const RolloutOptions& opti
   return (options.first_step + options.steps) / every - options.first_step / every;
 }
 
-double rollout_bytes(const Model& model, int environments) {
-  const double numbers =
-      model.nq() + model.nv() + model.nu() + double{kPoseWidth + kTwistWidth} * model.nb() +
-      static_cast<double>(model.end_effectors().size() * kPositionWidth + largest_field(model));
+double rollout_bytes(const Model& model, int environments, const RolloutOutputs& outputs) {
+  const double numbers = model.nq() + model.nv() + model.nu() +
+                         (outputs.bodies ? double{kPoseWidth + kTwistWidth} * model.nb() : 0.0) +
+                         static_cast<double>(model.end_effectors().size() * kPositionWidth +
+                                             largest_reading(model, outputs));
   constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
   return environments * (numbers * sizeof(double) + kFlags);
 }
@@ -152,7 +162,8 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
   check(options);
   const auto start = std::chrono::steady_clock::now();
   const auto sensors = batch.model().sensors();
-  Recorder recorder(batch, options.precision, sink);
+  Recorder recorder(batch, options.precision, options.outputs, sink);
+  const std::vector<FieldOutput> fields = fields_of(batch.model(), options.outputs);
   RolloutSummary summary;
   StepTally tally(batch, 0, batch.environments());
   std::vector<double> u(static_cast<std::size_t>(batch.environments()) *
@@ -177,12 +188,12 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
       write_action(program, t, sink);
     }
     recorder.write_state(t + 1, time(t + 1));
-    for (std::size_t s = 0; s < sensors.size(); ++s) {
-      const std::int64_t every = tactile_interval(sensors[s], options),
+    for (const FieldOutput output : fields) {
+      const std::int64_t every = tactile_interval(sensors[static_cast<std::size_t>(output.sensor)],
+                                                  options),
                          done = options.first_step + t + 1;
       if (done % every == 0)
-        recorder.write_field(static_cast<int>(s), done / every - options.first_step / every - 1,
-                             t + 1);
+        recorder.write_field(output, done / every - options.first_step / every - 1, t + 1);
     }
     summary.steps = t + 1;
     summary.stopped = progress && !progress(t + 1);

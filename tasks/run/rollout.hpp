@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "engine/base/precision.hpp"
@@ -16,6 +17,12 @@
 
 namespace tangere {
 
+/// What a rollout hands on besides q, v, controls and how steps went. The rest is not computed.
+struct RolloutOutputs {
+  std::optional<std::vector<FieldOutput>> fields;  ///< none: the field of every sensor
+  bool bodies = true, end_effectors = true;
+};
+
 struct RolloutOptions {
   std::int64_t steps = 0;
   int every = 0;  ///< steps between fields; 0: the scene's `every`, or 1 if it has none
@@ -23,6 +30,7 @@ struct RolloutOptions {
   /// Steps taken before row 0 by the run that this one continues. Times, controls and intervals of
   /// fields count them.
   std::int64_t first_step = 0;
+  RolloutOutputs outputs = {};
 };
 
 struct RolloutSummary {
@@ -55,12 +63,14 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram&
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});
 
+/// Returns what is read of tactile fields.
+std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs);
 /// Steps between the fields of a sensor under these options.
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options);
 /// Number of fields that a rollout reads of a sensor.
 std::int64_t tactile_frames(const SensorInfo& sensor, const RolloutOptions& options);
 
 /// Memory that a rollout allocates besides batch and stepper [bytes].
-double rollout_bytes(const Model& model, int environments);
+double rollout_bytes(const Model& model, int environments, const RolloutOutputs& outputs = {});
 
 }  // namespace tangere

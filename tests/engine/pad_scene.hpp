@@ -36,7 +36,7 @@ inline Scene pad_scene(PrimitiveShape shape, ContactLaw law, Pad pad) {
   TactileDescription t;
   t.name = "skin";
   t.body = "hand";
-  t.coefficients = {200, 2, 0.6, law == ContactLaw::linear ? 0.4 : 30};
+  t.coefficients = {200, 2, 0.6, 30};
   t.law = law;
   if (pad == Pad::curved) {
     Random random(3);

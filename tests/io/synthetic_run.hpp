@@ -63,6 +63,7 @@ inline TrajectoryLayout layout(std::int64_t steps = 5) {
   s.axis0 = {1, 0, 0};
   s.axis1 = {0, 1, 0};
   l.sensors = {s};
+  l.fields = {{0}};
   l.statuses = {{0, "converged"}, {-1, "not converged"}};
   l.randomized_names = {"joint a q[0]"};
   l.randomized_units = {"m"};
@@ -116,7 +117,7 @@ inline void write_run(RowSink& sink, const TrajectoryLayout& l, double force = 1
     sink.write(StepRow{t, u, iterations, status, residual});
     if ((t + 1) % 2 == 0) {
       const auto f = field((t + 1) / 2 - 1, force);
-      sink.write(TactileRow{0, (t + 1) / 2 - 1, t + 1, f});
+      sink.write(TactileRow{{0}, (t + 1) / 2 - 1, t + 1, f});
     }
   }
 }

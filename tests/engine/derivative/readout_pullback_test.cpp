@@ -159,8 +159,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Combine(::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid,
                                          PrimitiveShape::plane, PrimitiveShape::cylinder,
                                          PrimitiveShape::capsule, PrimitiveShape::ellipsoid),
-                       ::testing::Values(ContactLaw::clamped, ContactLaw::paper,
-                                         ContactLaw::linear),
+                       ::testing::Values(ContactLaw::clamped, ContactLaw::paper),
                        ::testing::Values(Pad::flat, Pad::skewed, Pad::curved)));
 
 }  // namespace

@@ -117,8 +117,8 @@ Result run(const Model& model, Batch& batch, int steps) {
       std::vector<std::vector<float>> singles(count, std::vector<float>(numbers));
       std::vector<std::span<double>> to(fields.begin(), fields.end());
       std::vector<std::span<float>> to_f(singles.begin(), singles.end());
-      wide.read_block(batch, b, static_cast<int>(s), to);
-      mixed.read_block(batch, b, static_cast<int>(s), to_f);
+      wide.read_block(batch, b, {static_cast<int>(s)}, to);
+      mixed.read_block(batch, b, {static_cast<int>(s)}, to_f);
       for (std::size_t e = 0; e < count; ++e) {
         r.fields[first + e].insert(r.fields[first + e].end(), fields[e].begin(), fields[e].end());
         r.mixed[first + e].insert(r.mixed[first + e].end(), singles[e].begin(), singles[e].end());

@@ -194,7 +194,6 @@ INSTANTIATE_TEST_SUITE_P(
     Shapes, CurvedPad,
     ::testing::Values(Case{PrimitiveShape::sphere, ContactLaw::clamped, false},
                       Case{PrimitiveShape::sphere, ContactLaw::paper, true},
-                      Case{PrimitiveShape::sphere, ContactLaw::linear, true},
                       Case{PrimitiveShape::cuboid, ContactLaw::clamped, true},
                       Case{PrimitiveShape::plane, ContactLaw::clamped, true},
                       Case{PrimitiveShape::cylinder, ContactLaw::clamped, true},

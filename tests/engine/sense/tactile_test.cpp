@@ -111,7 +111,7 @@ void check_blocks(const Reading& c) {
   for (int b = 0; b < 2; ++b) {
     std::fill(fields.begin(), fields.end(), untouched);
     const std::vector<std::span<T>> spans(fields.begin(), fields.end());
-    readout.read_block(batch, b, 0, spans);
+    readout.read_block(batch, b, {0}, spans);
     for (int l = 0; l < 16; ++l) {
       const int e = 16 * b + l;
       EXPECT_EQ(fields[std::size_t(l)], e < 21 ? field<T>(readout, batch, e) : untouched)

@@ -80,6 +80,7 @@ TEST(TactilePlot, DrawsTheFirstRectangularArrayAndNamesThemAll) {
   rod.rows = rod.cols = 0;
   second.name = "second";
   l.sensors = {rod, l.sensors[0], second};
+  l.fields = {{0}, {1}, {2}};
   TrajectoryFile file(folder / "run.h5", l, false);
   testing::write_run(file, l);
   file.commit();
@@ -129,6 +130,7 @@ TEST(TactilePlot, AnImageHasItsPointsAtTheirPixelsAndShearAlongRowsAndColumns) {
   for (std::size_t k = 0; k < 4; ++k)
     s.list[k].pixel = {static_cast<int>(k / 2), static_cast<int>(k % 2)};
   l.sensors = {s};
+  l.fields = {{0}};
   TrajectoryFile file(folder / "run.h5", l, false);
   testing::write_run(file, l);
   file.commit();

@@ -118,7 +118,7 @@ TEST(BenchmarkRun, StepsAndReadsWhatARolloutDoes) {
     }
     void write(const StepRow&) override {}
     void write(const TactileRow& row) override {
-      fields.emplace_back(row.force.begin(), row.force.end());
+      fields.emplace_back(row.numbers.begin(), row.numbers.end());
     }
   } sink;
   constexpr std::size_t kEnvironments = 3;

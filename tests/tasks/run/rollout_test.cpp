@@ -61,7 +61,7 @@ struct StoredStep {
   std::vector<double> residual;
 };
 struct StoredField {
-  int sensor;
+  FieldOutput output;
   std::int64_t frame, step;
   std::vector<double> force;
 };
@@ -85,9 +85,9 @@ class Memory : public RowSink {
         {row.step, copy(row.u), copy(row.iterations), copy(row.status), copy(row.residual)});
   }
   void write(const TactileRow& row) override {
-    order += "t" + std::to_string(row.sensor) + "[" + std::to_string(row.frame) + "]" +
+    order += "t" + std::to_string(row.output.sensor) + "[" + std::to_string(row.frame) + "]" +
              std::to_string(row.step) + " ";
-    fields.push_back({row.sensor, row.frame, row.step, copy(row.force)});
+    fields.push_back({row.output, row.frame, row.step, copy(row.numbers)});
   }
   std::string order;
   std::vector<StoredState> states;

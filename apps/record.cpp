@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Names of outputs become readings of sensors; bodies and end effectors are all or none.
+#include "apps/record.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "apps/arguments.hpp"
+#include "io/files/name_list.hpp"
+#include "io/files/nearest_name.hpp"
+
+namespace tangere::apps {
+
+Record record_of(const std::string& option, const Model& model) {
+  Record record;
+  if (!option.empty()) {
+    record.names = split_names("--record", option);
+  } else if (model.scene().outputs) {
+    record.names = model.scene().outputs->record;
+  }
+  if (record.names.empty()) return record;
+  const auto asked = [&](const char* name) {
+    return std::find(record.names.begin(), record.names.end(), name) != record.names.end();
+  };
+  const std::vector<std::string> sensors = sensor_names(model.scene());
+  record.outputs.bodies = asked("bodies");
+  record.outputs.end_effectors = asked("variables");
+  record.outputs.fields.emplace();
+  for (const std::string& name : record.names) {
+    if (is_plain_output(name)) continue;
+    const std::optional<FieldOutput> field = find_output(sensors, name);
+    if (!field)
+      throw InputError(fmt::format("--record: unknown observation '{}'{}", name,
+                                   suggestion(name, output_names(sensors))));
+    record.outputs.fields->push_back(*field);
+  }
+  return record;
+}
+
+void add_record_option(CLI::App& app, std::string& record, const std::string& text) {
+  add_text(app, "--record", record, "LIST", text);
+}
+
+}  // namespace tangere::apps

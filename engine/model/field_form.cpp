@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// Names and sizes of readings.
+#include "engine/model/field_form.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+namespace tangere {
+
+namespace {
+constexpr FieldForm kForms[] = {FieldForm::field, FieldForm::pressure, FieldForm::shear,
+                                FieldForm::sum};
+constexpr const char* kPlain[] = {"q", "v", "variables", "bodies"};
+}  // namespace
+
+const char* to_string(FieldForm form) {
+  switch (form) {
+    case FieldForm::field: return "field";
+    case FieldForm::pressure: return "pressure";
+    case FieldForm::shear: return "shear";
+    case FieldForm::sum: return "sum";
+  }
+  return "unknown";
+}
+
+int components_of(FieldForm form) {
+  switch (form) {
+    case FieldForm::field: return 3;
+    case FieldForm::pressure: return 1;
+    case FieldForm::shear: return 2;
+    case FieldForm::sum: break;
+  }
+  return 0;
+}
+
+std::size_t numbers_of(int points, FieldForm form) {
+  if (form == FieldForm::sum) return std::tuple_size_v<FieldSum>;
+  return static_cast<std::size_t>(components_of(form)) * static_cast<std::size_t>(points);
+}
+
+std::string output_name(const std::string& sensor, FieldForm form) {
+  return form == FieldForm::field ? sensor : sensor + "." + to_string(form);
+}
+
+std::vector<std::string> sensor_names(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const TactileDescription& sensor : scene.sensors) names.push_back(sensor.name);
+  return names;
+}
+
+bool is_plain_output(const std::string& name) {
+  return std::find(std::begin(kPlain), std::end(kPlain), name) != std::end(kPlain);
+}
+
+std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
+                                       const std::string& name) {
+  // A sensor may be called "pad.sum" itself: its field comes first.
+  for (const FieldForm form : kForms)
+    for (std::size_t s = 0; s < sensors.size(); ++s)
+      if (output_name(sensors[s], form) == name) return FieldOutput{static_cast<int>(s), form};
+  return std::nullopt;
+}
+
+std::vector<FieldOutput> whole_fields(const Model& model) {
+  std::vector<FieldOutput> outputs;
+  for (std::size_t s = 0; s < model.sensors().size(); ++s)
+    outputs.push_back({static_cast<int>(s), FieldForm::field});
+  return outputs;
+}
+
+std::vector<std::string> output_names(std::span<const std::string> sensors) {
+  std::vector<std::string> names(std::begin(kPlain), std::end(kPlain));
+  for (const std::string& sensor : sensors)
+    for (const FieldForm form : kForms) names.push_back(output_name(sensor, form));
+  return names;
+}
+
+}  // namespace tangere

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is read of a tactile field: all of it, its pressure, its shear or its sum. What nobody asks
+// for is neither computed nor stored.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/model/model.hpp"
+
+namespace tangere {
+
+enum class FieldForm {
+  field,     ///< (points, 3) [N]: f·axis0, f·axis1, -f·(axis0 × axis1)
+  pressure,  ///< (points, 1) [N]: the third of these, without friction (docs/effects.md)
+  shear,     ///< (points, 2) [N]: the first two
+  sum,       ///< (6): force on the body [N], then where it presses [m], body axes
+};
+
+/// Force x y z on the body [N], then its centre x y z [m]: the mean of the points' places, each
+/// weighted by its pressure. Body axes; the centre is 0 where nothing presses.
+using FieldSum = std::array<double, 6>;
+
+/// The words of files and options: "field", "pressure", "shear", "sum".
+const char* to_string(FieldForm form);
+
+/// Numbers of a point: 3, 1, 2; 0 for a sum.
+int components_of(FieldForm form);
+/// Numbers of a whole reading.
+std::size_t numbers_of(int points, FieldForm form);
+
+/// One reading of one sensor.
+struct FieldOutput {
+  int sensor = 0;
+  FieldForm form = FieldForm::field;
+  friend bool operator==(const FieldOutput&, const FieldOutput&) = default;
+};
+
+/// Returns "pad" for a field, else "pad.pressure", "pad.shear" or "pad.sum".
+std::string output_name(const std::string& sensor, FieldForm form);
+/// Returns the names of a scene's sensors, in file order.
+std::vector<std::string> sensor_names(const Scene& scene);
+/// Whether a name is that of an output which is not read of a sensor: q, v, variables (places of
+/// end effectors) or bodies (their poses and twists).
+bool is_plain_output(const std::string& name);
+/// Returns the reading of this name; none where no sensor has it.
+std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
+                                       const std::string& name);
+/// Returns the field of every sensor: what a scene gives where nothing else is asked for.
+std::vector<FieldOutput> whole_fields(const Model& model);
+/// Returns all names of outputs, the plain ones included.
+std::vector<std::string> output_names(std::span<const std::string> sensors);
+
+}  // namespace tangere

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+// --record and <outputs>: files hold what was asked for, and that is what a whole run holds.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "io/hdf5/h5.hpp"
+#include "tests/apps/program.hpp"
+#include "tests/files.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using nlohmann::json;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::vector<double> numbers(const Folder& folder, const std::string& file,
+                            const std::string& name) {
+  const h5::Id opened = h5::open_file(folder.path(file)), d = h5::open_dataset(opened, name);
+  const h5::Dims dims = h5::dimensions(d);
+  hsize_t count = 1;
+  for (const hsize_t n : dims) count *= n;
+  std::vector<double> x(count);
+  h5::read_box<double>(d, h5::Dims(dims.size(), 0), dims, x.data());
+  return x;
+}
+h5::Dims shape(const Folder& folder, const std::string& file, const std::string& name) {
+  const h5::Id opened = h5::open_file(folder.path(file));
+  return h5::dimensions(h5::open_dataset(opened, name));
+}
+bool has(const Folder& folder, const std::string& file, const std::string& group,
+         const std::string& name) {
+  const h5::Id opened = h5::open_file(folder.path(file));
+  return h5::has_link(h5::open_group(opened, group), name);
+}
+
+json simulate(const Folder& folder, const std::string& what, const std::string& out,
+              const Words& more) {
+  return run_json(folder, Words{"simulate", what, "--output", out, "--steps", "120", "--every",
+                                "60", "--envs", "2", "--seed", "3"} +
+                              more);
+}
+
+TEST(Record, ATrajectoryHoldsTheFormsOfAWholeOne) {
+  const Folder folder;
+  const std::string ball = scene("rolling_ball_small.xml");
+  simulate(folder, ball, "whole.h5", {});
+  const json said =
+      simulate(folder, ball, "some.h5", {"--record", "pad.pressure,pad.shear,pad.sum"});
+  EXPECT_EQ(said["sensors"][0]["form"], "pressure");
+  EXPECT_EQ(said["sensors"][2]["form"], "sum");
+  EXPECT_EQ(shape(folder, "some.h5", "tactile/pad/pressure"), (h5::Dims{2, 2, 32, 32, 1}));
+  EXPECT_EQ(shape(folder, "some.h5", "tactile/pad/sum"), (h5::Dims{2, 2, 6}));
+  EXPECT_FALSE(has(folder, "some.h5", "tactile/pad", "force"));
+  EXPECT_FALSE(has(folder, "some.h5", "/", "bodies"));
+  EXPECT_EQ(numbers(folder, "some.h5", "q"), numbers(folder, "whole.h5", "q"));
+  EXPECT_EQ(numbers(folder, "some.h5", "tactile/pad/step"),
+            numbers(folder, "whole.h5", "tactile/pad/step"));
+  const std::vector<double> whole = numbers(folder, "whole.h5", "tactile/pad/force"),
+                            shear = numbers(folder, "some.h5", "tactile/pad/shear");
+  ASSERT_EQ(3 * shear.size(), 2 * whole.size());
+  for (std::size_t k = 0; k < shear.size(); ++k) ASSERT_EQ(shear[k], whole[k / 2 * 3 + k % 2]) << k;
+}
+
+TEST(Record, AnythingElseOfATrajectoryStillWorks) {
+  const Folder folder;
+  const std::string ball = scene("rolling_ball_small.xml");
+  simulate(folder, ball, "some.h5", {"--record", "pad.pressure"});
+  EXPECT_EQ(run(folder, {"plot", "some.h5", "-o", "pad.svg"}).exit_code, 0);
+  simulate(folder, ball, "next.h5", {"--record", "bodies", "--state-from", "some.h5"});
+  EXPECT_TRUE(has(folder, "next.h5", "/", "bodies"));
+  EXPECT_FALSE(has(folder, "next.h5", "/", "tactile"));
+  simulate(folder, ball, "sum.h5", {"--record", "pad.sum"});
+  const Outcome none = run(folder, {"plot", "sum.h5", "-o", "sum.svg"});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("the run recorded no tactile field, pressure or shear"));
+}
+
+TEST(Record, ADataSetHoldsTheFormsOfAWholeOne) {
+  const Folder folder;
+  const std::string ball = scene("rolling_ball_small.xml");
+  const Words size{"generate", ball, "--episodes", "17", "--steps", "120", "--every", "20"};
+  run_json(folder, size + Words{"-o", "whole"});
+  run_json(folder, size + Words{"-o", "some", "--record", "q,pad.shear,pad.pressure,pad.sum"});
+  run_json(folder,
+           size + Words{"-o", "sparse", "--record", "pad.shear,pad", "--tactile", "sparse"});
+  const std::string shard = "some/shard-00000.h5", demo = "data/demo_16/obs/";
+  EXPECT_THAT(
+      h5::read_texts(h5::open_group(h5::open_file(folder.path(shard)), "scene"), "observations"),
+      ElementsAre("q", "pad.shear", "pad.pressure", "pad.sum"));
+  EXPECT_EQ(shape(folder, shard, demo + "pad.pressure"), (h5::Dims{6, 32, 32, 1}));
+  EXPECT_EQ(shape(folder, shard, demo + "pad.sum"), (h5::Dims{6, 6}));
+  const std::vector<double> whole = numbers(folder, "whole/shard-00000.h5", demo + "pad"),
+                            shear = numbers(folder, shard, demo + "pad.shear");
+  for (std::size_t k = 0; k < shear.size(); ++k) ASSERT_EQ(shear[k], whole[k / 2 * 3 + k % 2]) << k;
+  EXPECT_EQ(numbers(folder, "sparse/shard-00000.h5", demo + "pad.shear"), shear);
+  EXPECT_EQ(numbers(folder, "sparse/shard-00000.h5", demo + "pad"), whole);
+  EXPECT_THAT(h5::read_texts(h5::open_group(h5::open_file(folder.path(shard)), "scene/sensors/pad"),
+                             "readings"),
+              ElementsAre("pad.shear", "pad.pressure", "pad.sum"));
+  for (const char* set : {"some", "sparse"}) {
+    EXPECT_EQ(run(folder, {"validate", set}).exit_code, 0) << set;
+    EXPECT_EQ(run(folder, {"validate", std::string(set) + "/robomimic.hdf5"}).exit_code, 0) << set;
+  }
+}
+
+TEST(Record, TheSceneAsksAndTheOptionAsksInstead) {
+  const Folder folder;
+  std::string text = file_bytes(scene("rolling_ball_small.xml"));
+  const std::string end = "</tangere>";
+  const std::size_t at = text.find(end);
+  ASSERT_NE(at, std::string::npos);
+  text.insert(at, "<outputs record=\"bodies,pad.sum\"/>\n");
+  folder.write("ball.xml", text);
+  simulate(folder, "ball.xml", "scene.h5", {});
+  EXPECT_TRUE(has(folder, "scene.h5", "tactile/pad", "sum"));
+  EXPECT_FALSE(has(folder, "scene.h5", "tactile/pad", "force"));
+  simulate(folder, "ball.xml", "option.h5", {"--record", "pad"});
+  EXPECT_TRUE(has(folder, "option.h5", "tactile/pad", "force"));
+  EXPECT_FALSE(has(folder, "option.h5", "/", "bodies"));
+  const Outcome set =
+      run(folder, {"generate", "ball.xml", "-o", "set", "--episodes", "1", "--steps", "5"});
+  EXPECT_EQ(set.exit_code, 0) << set.err;
+  EXPECT_THAT(set.err, HasSubstr("'bodies' of <outputs> is left out"));
+  EXPECT_EQ(shape(folder, "set/shard-00000.h5", "data/demo_0/obs/pad.sum"), (h5::Dims{1, 6}));
+  text.replace(text.find("pad.sum"), 7, "pad.sun");
+  folder.write("wrong.xml", text);
+  const Outcome wrong = run(folder, {"inspect", "wrong.xml"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("record has 'pad.sun'; did you mean 'pad.sum'?"));
+  EXPECT_THAT(wrong.err, HasSubstr("wrong.xml:"));
+}
+
+TEST(Record, UnknownNamesAreRefused) {
+  const Folder folder;
+  const std::string ball = scene("rolling_ball_small.xml");
+  for (const Words& command : {Words{"simulate", ball, "-o", "x.h5"},
+                               Words{"generate", ball, "-o", "x", "--episodes", "1"},
+                               Words{"bench", ball, "--steps", "1"}}) {
+    const Outcome wrong = run(folder, command + Words{"--record", "pad.presure"});
+    EXPECT_EQ(wrong.exit_code, 2) << command[0];
+    EXPECT_THAT(wrong.err, HasSubstr("did you mean 'pad.pressure'?")) << command[0];
+  }
+  EXPECT_THAT(
+      run(folder, {"generate", ball, "-o", "x", "--episodes", "1", "--record", "bodies"}).err,
+      HasSubstr("unknown observation 'bodies'"));
+  const Outcome compact =
+      run(folder, {"bench", ball, "--steps", "1", "--frames", "compact", "--record", "pad.shear"});
+  EXPECT_EQ(compact.exit_code, 2);
+  EXPECT_THAT(compact.err, HasSubstr("compact frames of a shear"));
+  EXPECT_TRUE(folder.files().empty());
+}
+
+TEST(Record, ABenchmarkReadsWhatIsAskedFor) {
+  const Folder folder;
+  const auto points = [&](const std::string& list) {
+    const json said =
+        run_json(folder, {"bench", scene("rolling_ball_small.xml"), "--envs", "16", "--steps", "10",
+                          "--every", "5", "--threads", "1", "--repeat", "1", "--record", list});
+    const json& entry = said["runs"][0];
+    return std::lround(entry["tactile_points_per_second"].get<double>() *
+                       entry["seconds"].get<double>());
+  };
+  EXPECT_EQ(points("q"), 0);
+  EXPECT_EQ(points("pad"), 2 * 16 * 1024);
+  EXPECT_EQ(points("pad.pressure,pad.sum"), 2 * 2 * 16 * 1024);
+}
+
+}  // namespace
+}  // namespace tangere::apps
