@@ -68,7 +68,8 @@ TEST(Outputs, FieldsThatNobodyAskedForAreNotRead) {
   const Counting counting;
   EXPECT_EQ(run_with(model, std::vector<FieldOutput>{}), 0U);
   EXPECT_EQ(whole_calls + pressure_calls, 0);
-  EXPECT_EQ(run_with(model, std::vector<FieldOutput>{{0, FieldForm::pressure}}), 3 * points * sizeof(double));
+  EXPECT_EQ(run_with(model, std::vector<FieldOutput>{{0, FieldForm::pressure}}),
+            3 * points * sizeof(double));
   EXPECT_EQ(whole_calls, 0);
   EXPECT_GT(pressure_calls, 0);
   pressure_calls = 0;
