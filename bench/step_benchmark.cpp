@@ -29,7 +29,7 @@ class RollingBall {
         batch_(start_),
         stepper_(model_),
         readout_(model_, precision),
-        fields_(model_, environments, {.precision = precision}, frames),
+        fields_(model_, environments, reading_in(precision), frames),
         program_(model_, model_.timestep(), kSeed),
         row_(std::size_t(environments) * std::size_t(model_.nu())) {
     const auto nu = std::size_t(model_.nu());
@@ -61,6 +61,11 @@ class RollingBall {
   [[nodiscard]] int failed_count() const { return batch_.failed_count(); }
 
  private:
+  static BenchmarkOptions reading_in(Precision precision) {
+    BenchmarkOptions options;
+    options.precision = precision;
+    return options;
+  }
   static Scene scene(int resolution) {
     Scene scene = read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene;
     scene.sensors[0].array.rows = scene.sensors[0].array.cols = resolution;

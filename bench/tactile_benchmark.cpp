@@ -15,6 +15,9 @@
 #endif
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/sense/readout.hpp"
+#include "engine/step/control.hpp"
+#include "engine/step/stepper.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "kernels/contact/pair_contact.hpp"
 #include "kernels/table/isa.hpp"
@@ -52,6 +55,8 @@ struct Press {
 };
 /// Every point of the pad is in contact.
 const Press kEverywhere(0.5, 2e-3);
+/// The ball of the scene, 5 cm away: beyond a sphere around the pad.
+const Press kAway(0.02, -0.05);
 /// The ball of the scene at its greatest depth; it touches a 25th of the points.
 const Press kMiddle(0.02, 1e-3);
 
@@ -70,9 +75,10 @@ void count(benchmark::State& state, double points, double operations = 0) {
   state.SetLabel(kernels::active_isa_name());
 }
 
-/// Evaluates tiles into a list (compact) or an array (dense).
+/// Evaluates tiles into a list (compact) or an array (dense), whole or their pressure alone.
 template <class Real>
-void field(benchmark::State& state, const Press& press, int resolution, bool dense) {
+void field(benchmark::State& state, const Press& press, int resolution, bool dense,
+           bool pressure = false) {
   const Model model = pad_model(resolution);
   const CompiledSensor& sensor = compiled(model).sensors[0];
   const kernels::PadTiles pad = sensor.tiles();
@@ -86,7 +92,8 @@ void field(benchmark::State& state, const Press& press, int resolution, bool den
                                         &press.touch,
                                         active.data(),
                                         dense ? nullptr : values.data(),
-                                        dense ? array.data() : nullptr};
+                                        dense ? array.data() : nullptr,
+                                        pressure};
   int tiles = 0;
   for (auto _ : state) {
     tiles = run(args);
@@ -94,13 +101,13 @@ void field(benchmark::State& state, const Press& press, int resolution, bool den
   }
   const bool all = &press == &kEverywhere;
   count(state, sensor.points(),
-        all ? (sizeof(Real) == 4 ? kOperationsMixed : kOperationsDouble) : 0);
+        all && !pressure ? (sizeof(Real) == 4 ? kOperationsMixed : kOperationsDouble) : 0);
   state.counters["tiles"] = tiles;
 }
 
 /// Evaluates a small pad in every environment of a group or block, one point after the other.
 template <class Real>
-void block(benchmark::State& state, int resolution) {
+void block(benchmark::State& state, int resolution, bool pressure = false) {
   constexpr std::size_t kLanes = sizeof(Real) == 4 ? 16 : 8;
   const Model model = pad_model(resolution);
   const CompiledSensor& sensor = compiled(model).sensors[0];
@@ -117,8 +124,8 @@ void block(benchmark::State& state, int resolution) {
     arrays[l].resize(std::size_t(sensor.points()) * 3);
     dense[l] = arrays[l].data();
   }
-  const kernels::TactileBlockArgs<Real> args{&pad,     ContactLaw::clamped, 1, &kMiddle.shape,
-                                             of_shape, dense.data()};
+  const kernels::TactileBlockArgs<Real> args{&pad,     ContactLaw::clamped, 1,       &kMiddle.shape,
+                                             of_shape, dense.data(),        pressure};
   for (auto _ : state) {
     run(args);
     benchmark::ClobberMemory();
@@ -234,9 +241,51 @@ void BM_SmallPadDouble(benchmark::State& s) { field<double>(s, kMiddle, 20, true
 void BM_SmallPadMixed(benchmark::State& s) { field<float>(s, kMiddle, 20, true); }
 void BM_SmallPadAcrossEnvironmentsDouble(benchmark::State& s) { block<double>(s, 20); }
 void BM_SmallPadAcrossEnvironmentsMixed(benchmark::State& s) { block<float>(s, 20); }
+void BM_DensePressureDouble(benchmark::State& s) { field<double>(s, kEverywhere, 200, true, true); }
+void BM_DensePressureMixed(benchmark::State& s) { field<float>(s, kEverywhere, 200, true, true); }
+void BM_OutOfReachMixed(benchmark::State& s) { field<float>(s, kAway, 200, true); }
+void BM_CulledPressureMixed(benchmark::State& s) { field<float>(s, kMiddle, 200, true, true); }
+void BM_PressureAcrossEnvironmentsMixed(benchmark::State& s) { block<float>(s, 20, true); }
+
+/// Reads 16 environments with the ball of the scene at the end of its run, in mixed precision: the
+/// shapes' poses, the kernel, and zeros where nothing touches.
+void reading(benchmark::State& state, FieldForm form) {
+  const Model model = pad_model(200);
+  Batch batch(model, kernels::kBlock);
+  Stepper stepper(model);
+  const ControlProgram controls(model, model.timestep(), 0);
+  std::vector<double> u(std::size_t(kernels::kBlock * model.nu()));
+  for (std::int64_t t = 0; t < controls.steps(); ++t) {
+    for (int e = 0; e < kernels::kBlock; ++e)
+      controls.evaluate(t, e, std::span(u).subspan(std::size_t(e * model.nu()), 3));
+    stepper.step(batch, u);
+  }
+  Readout readout(model, Precision::mixed);
+  std::vector<std::vector<float>> arrays(
+      kernels::kBlock, std::vector<float>(numbers_of(model.sensors()[0].points, form)));
+  std::vector<std::span<float>> places(arrays.begin(), arrays.end());
+  for (auto _ : state) {
+    readout.read_block(batch, 0, {0, form}, std::span<const std::span<float>>(places));
+    benchmark::ClobberMemory();
+  }
+  count(state, double(kernels::kBlock) * model.sensors()[0].points);
+}
+void BM_ReadField(benchmark::State& s) { reading(s, FieldForm::field); }
+void BM_ReadPressure(benchmark::State& s) { reading(s, FieldForm::pressure); }
+void BM_ReadShear(benchmark::State& s) { reading(s, FieldForm::shear); }
+void BM_ReadSum(benchmark::State& s) { reading(s, FieldForm::sum); }
 BENCHMARK(BM_OnePointAtATime);
 BENCHMARK(BM_DenseDouble);
 BENCHMARK(BM_DenseMixed);
+BENCHMARK(BM_DensePressureDouble);
+BENCHMARK(BM_DensePressureMixed);
+BENCHMARK(BM_CulledPressureMixed);
+BENCHMARK(BM_OutOfReachMixed);
+BENCHMARK(BM_PressureAcrossEnvironmentsMixed);
+BENCHMARK(BM_ReadField);
+BENCHMARK(BM_ReadPressure);
+BENCHMARK(BM_ReadShear);
+BENCHMARK(BM_ReadSum);
 BENCHMARK(BM_CompactDouble);
 BENCHMARK(BM_CompactMixed);
 

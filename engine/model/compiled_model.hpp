@@ -63,6 +63,7 @@ struct CompiledSensor {
   std::vector<int> index;                 ///< (n_tiles, 64) curved, empty: flat
   AlignedVector<double> frames, factors;  ///< (n_tiles, 9, 64), (n_tiles, 4, 64) or empty
   AlignedVector<float> frames_f, factors_f;
+  double middle[3] = {}, reach = 0;  ///< a sphere around all points, pad axes [m]
   bool skewed = false;
   double axes[9] = {};  ///< rows axis0, axis1, -(axis0 × axis1), pad axes
   kernels::ContactParameters parameters{};

@@ -112,6 +112,21 @@ CompiledSensor compile_array(const TactileDescription& d, const CompiledBody& bo
   return s;
 }
 
+/// Puts a sphere around all tiles. Their radii have margins of their own.
+void bound_pad(CompiledSensor& s) {
+  const AlignedVector<double>* const centres[] = {&s.tile_x, &s.tile_y, &s.tile_z};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto [low, high] =
+        std::minmax_element(centres[c]->begin(), centres[c]->begin() + s.n_tiles());
+    s.middle[c] = 0.5 * (*low + *high);
+  }
+  for (std::size_t t = 0; t < std::size_t(s.n_tiles()); ++t) {
+    const Vec3<double> away = {s.tile_x[t] - s.middle[0], s.tile_y[t] - s.middle[1],
+                               s.tile_z[t] - s.middle[2]};
+    s.reach = std::max(s.reach, (std::sqrt(dot(away, away)) + s.tile_radius[t]) * (1 + 1e-5));
+  }
+}
+
 }  // namespace
 
 double points_outward(const CompiledBody& body, const Vec3<double>& at,
@@ -131,6 +146,7 @@ CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& b
   CompiledSensor s =
       d.points.empty() ? compile_array(d, body, info) : compile_points(d, body, info);
   s.law = d.law;
+  bound_pad(s);
   info.name = d.name;
   info.body = d.body;
   info.points = s.points();
@@ -150,6 +166,8 @@ kernels::PadTiles CompiledSensor::tiles() const {
     p.frames = frames.data(), p.frames_f = frames_f.data();
   }
   if (!factors.empty()) p.factors = factors.data(), p.factors_f = factors_f.data();
+  std::copy(middle, middle + 3, p.middle);
+  p.reach = reach;
   p.skewed = skewed;
   std::copy(axes, axes + 9, p.axes);
   return p;

@@ -46,24 +46,22 @@ void clear_tiles_between(const kernels::PadTiles& pad, std::span<const int> tile
   }
 }
 
-/// Writes the first `components` of a tile's (…, 64) to its rows, converted to T.
-template <class Real, class T>
-void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, int components,
-                 T* dense) {
+/// Writes the first `Components` of a tile's (…, 64) to its rows, converted to T.
+template <int Components, class Real, class T>
+void expand_tile(const kernels::PadTiles& pad, int tile, const Real* from, T* dense) {
   if (pad.curved()) {
     const int* index = pad.index + kernels::kTactileTile * tile;
     for (int k = 0; k < pad.points_of(tile); ++k)
-      for (int c = 0; c < components; ++c)
-        dense[components * index[k] + c] = static_cast<T>(from[c * kernels::kTactileTile + k]);
+      for (int c = 0; c < Components; ++c)
+        dense[Components * index[k] + c] = static_cast<T>(from[c * kernels::kTactileTile + k]);
     return;
   }
   const int rows = pad.rows_of(tile), cols = pad.cols_of(tile);
-  T* row = dense + components * pad.first_of(tile);
-  for (int i = 0; i < rows; ++i, row += components * pad.cols)
+  T* row = dense + Components * pad.first_of(tile);
+  for (int i = 0; i < rows; ++i, row += Components * pad.cols, from += kernels::kTileSide)
     for (int j = 0; j < cols; ++j)
-      for (int c = 0; c < components; ++c)
-        row[components * j + c] =
-            static_cast<T>(from[c * kernels::kTactileTile + i * kernels::kTileSide + j]);
+      for (int c = 0; c < Components; ++c)
+        row[Components * j + c] = static_cast<T>(from[c * kernels::kTactileTile + j]);
 }
 
 /// Calls f(slot in the tile, point of the array) for all points of a tile.

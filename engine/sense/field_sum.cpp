@@ -15,70 +15,89 @@ using kernels::Vec3;
 
 constexpr int kWide = 8;
 
-/// Partial sums of force, of pressure, and of pressure times place, pad axes.
+/// Sums of force, of pressure, and of pressure times place, each from eight partial ones.
+template <class N>
 struct Partial {
-  double force[3][kWide] = {}, pressure[kWide] = {}, moment[3][kWide] = {};
+  N force[3][kWide] = {}, pressure[kWide] = {}, moment[3][kWide] = {};
 };
 
-double total(const double (&x)[kWide]) {
-  return ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]));
+template <class N>
+double total(const N (&x)[kWide]) {
+  double wide[kWide];
+  for (int l = 0; l < kWide; ++l) wide[l] = static_cast<double>(x[l]);
+  return ((wide[0] + wide[1]) + (wide[2] + wide[3])) + ((wide[4] + wide[5]) + (wide[6] + wide[7]));
 }
 
-/// Turns stored components into a force in pad axes. Points of a list have axes of their own, whose
-/// rows are `frame`, (9, 64).
-void to_pad_axes(const double* frame, double (&f)[3][kWide]) {
-  if (frame == nullptr) {
-    for (double& z : f[2]) z = -z;
-    return;
-  }
-  for (int l = 0; l < kWide; ++l) {
-    double g[3];
-    for (int k = 0; k < 3; ++k) {
-      g[k] = 0;
-      for (int r = 0; r < 3; ++r) g[k] += frame[(3 * r + k) * kTactileTile + l] * f[r][l];
-    }
-    f[0][l] = g[0], f[1][l] = g[1], f[2][l] = -g[2];
-  }
-}
+/// Sums in double precision, pad axes.
+struct Sums {
+  Vec3<double> force{0, 0, 0}, moment{0, 0, 0};
+  double pressure = 0;
+};
 
-/// Adds the eight points from k on of tile `tile`, whose numbers are `values`, (3, 64).
+/// Adds the points of a flat tile in the precision of the field: eight of them are one partial sum,
+/// so little is lost. Places are relative to the tile's centre.
 template <class Real>
-void add_points(const PadTiles& pad, int tile, int k, int sign, const Real* values, Partial& sums) {
-  double f[3][kWide];
-  for (int c = 0; c < 3; ++c)
-    for (int l = 0; l < kWide; ++l) f[c][l] = static_cast<double>(values[c * kTactileTile + k + l]);
-  double w[kWide];
-  for (int l = 0; l < kWide; ++l) w[l] = std::max(0.0, sign * f[2][l]);
-  to_pad_axes(pad.curved() ? pad.frames + 9 * kTactileTile * tile + k : nullptr, f);
-  const int dimensions = pad.curved() ? 3 : 2;
-  const double* const offsets = pad.offsets + dimensions * kTactileTile * pad.kind[tile] + k;
-  const double centre[3] = {pad.x[tile], pad.y[tile], pad.z[tile]};
-  for (int c = 0; c < 3; ++c)
+void add_flat_tile(const PadTiles& pad, int tile, Real sign, const Real* values,
+                   const Real* offsets, Sums& sums) {
+  Partial<Real> of;
+  for (int k = 0; k < kTactileTile; k += kWide)
     for (int l = 0; l < kWide; ++l) {
-      const double at = centre[c] + (c < dimensions ? offsets[c * kTactileTile + l] : 0.0);
-      sums.force[c][l] += f[c][l];
-      sums.moment[c][l] += w[l] * at;
+      const Real x = values[k + l], y = values[kTactileTile + k + l],
+                 z = values[2 * kTactileTile + k + l];
+      const Real w = std::max(Real(0), sign * z);
+      of.force[0][l] += x, of.force[1][l] += y, of.force[2][l] -= z;
+      of.pressure[l] += w;
+      of.moment[0][l] += w * offsets[k + l];
+      of.moment[1][l] += w * offsets[kTactileTile + k + l];
     }
-  for (int l = 0; l < kWide; ++l) sums.pressure[l] += w[l];
+  const double pressure = total(of.pressure);
+  sums.pressure += pressure;
+  sums.force += Vec3<double>{total(of.force[0]), total(of.force[1]), total(of.force[2])};
+  sums.moment += pressure * Vec3<double>{pad.x[tile], pad.y[tile], pad.z[tile]} +
+                 Vec3<double>{total(of.moment[0]), total(of.moment[1]), 0};
 }
 
-Vec3<double> totals(const double (&x)[3][kWide]) { return {total(x[0]), total(x[1]), total(x[2])}; }
+/// Adds the points of a tile of a list. Each has axes of its own, whose rows are in pad.frames.
+template <class Real>
+void add_curved_tile(const PadTiles& pad, int tile, double sign, const Real* values, Sums& sums) {
+  const double* const offsets = pad.offsets + 3 * kTactileTile * tile;
+  const double* const frames = pad.frames + 9 * kTactileTile * tile;
+  for (int k = 0; k < pad.points_of(tile); ++k) {
+    double f[3], g[3] = {0, 0, 0};
+    for (int r = 0; r < 3; ++r) {
+      f[r] = static_cast<double>(values[r * kTactileTile + k]);
+      for (int c = 0; c < 3; ++c) g[c] += frames[(3 * r + c) * kTactileTile + k] * f[r];
+    }
+    const double w = std::max(0.0, sign * f[2]);
+    sums.force += Vec3<double>{g[0], g[1], -g[2]};
+    sums.pressure += w;
+    sums.moment +=
+        w * Vec3<double>{pad.x[tile] + offsets[k], pad.y[tile] + offsets[kTactileTile + k],
+                         pad.z[tile] + offsets[2 * kTactileTile + k]};
+  }
+}
+
+const double* offsets_of(const PadTiles& pad, const double*) { return pad.offsets; }
+const float* offsets_of(const PadTiles& pad, const float*) { return pad.offsets_f; }
 
 }  // namespace
 
 template <class Real>
 FieldSum field_sum(const PadTiles& pad, const kernels::Frame<double>& in_body, int pressure_sign,
                    std::span<const int> tiles, const Real* values) {
-  Partial sums;
+  Sums sums;
   for (const int tile : tiles) {
-    for (int k = 0; k < kTactileTile; k += kWide)
-      add_points(pad, tile, k, pressure_sign, values, sums);
+    if (pad.curved()) {
+      add_curved_tile(pad, tile, pressure_sign, values, sums);
+    } else {
+      add_flat_tile(pad, tile, static_cast<Real>(pressure_sign), values,
+                    offsets_of(pad, values) + 2 * kTactileTile * pad.kind[tile], sums);
+    }
     values += 3 * kTactileTile;
   }
-  const Vec3<double> force = in_body.R * totals(sums.force);
-  const double pressure = total(sums.pressure);
-  if (!(pressure > 0)) return {force.x, force.y, force.z, 0, 0, 0};
-  const Vec3<double> at = in_body.R * ((1 / pressure) * totals(sums.moment)) + in_body.p;
+  const Vec3<double> force = in_body.R * sums.force;
+  if (!(sums.pressure > 0)) return {force.x, force.y, force.z, 0, 0, 0};
+  const Vec3<double> at = in_body.R * ((1 / sums.pressure) * sums.moment) + in_body.p;
   return {force.x, force.y, force.z, at.x, at.y, at.z};
 }
 

@@ -114,8 +114,15 @@ struct Readout::Impl {
       }
       a.values = scratch<Real>();
       const int count = run(a), numbers = computed(of.form) * kTactileTile;
-      for (int k = 0; k < count; ++k)
-        expand_tile(*a.pad, a.active[k], a.values + numbers * k, components_of(of.form), dense);
+      const auto expand = [&]<int Components>() {
+        for (int k = 0; k < count; ++k)
+          expand_tile<Components>(*a.pad, a.active[k], a.values + numbers * k, dense);
+      };
+      switch (components_of(of.form)) {
+        case 1: expand.template operator()<1>(); break;
+        case 2: expand.template operator()<2>(); break;
+        default: expand.template operator()<3>(); break;
+      }
       return count;
     });
   }

@@ -67,7 +67,7 @@ void CompactFrame<T>::spread(std::span<const T> of_tiles, std::span<T> dense) co
   const kernels::PadTiles pad = compiled(model_).sensors[std::size_t(sensor_)].tiles();
   clear_tiles_between<T>(pad, tiles(), 3, dense.data());
   for (std::size_t k = 0; k < std::size_t(count_); ++k)
-    expand_tile(pad, tiles_[k], of_tiles.data() + 3 * kernels::kTactileTile * k, 3, dense.data());
+    expand_tile<3>(pad, tiles_[k], of_tiles.data() + 3 * kernels::kTactileTile * k, dense.data());
 }
 
 static_assert(kTilePoints == kernels::kTactileTile);

@@ -3,6 +3,8 @@
 // the tiles within reach.
 #pragma once
 
+#include <cstdint>
+
 #include "kernels/contact/distance.hpp"
 #include "kernels/tactile/tactile_point.hpp"
 #include "kernels/tactile/vector_pair.hpp"
@@ -202,18 +204,46 @@ constexpr auto by_shape(const F& f) {
   return by_pad<P>(f, Shapes{});
 }
 
+/// Whether a shape comes near the sphere around a pad in any lane.
+template <class P, class Shape, class D>
+bool near_pad(const PadTiles& pad, const TouchShape& shape, const Touch<D>& at) {
+  D row[kBracketRows];
+  const Vec3<D> middle = {D(pad.middle[0]), D(pad.middle[1]), D(pad.middle[2])};
+  return any(Shape::bracket(shape, at, middle, D(pad.reach), row) < D(0.0));
+}
+
+/// Bit k: shape k may touch the pad. From shape 64 on, all may.
+using NearShapes = std::uint64_t;
+inline bool may_touch(NearShapes near, int k) { return k >= 64 || ((near >> k) & 1U) != 0; }
+
+template <class P>
+NearShapes near_shapes(const TactileArgs<typename P::Real>& a) {
+  using D = Lanes<typename P::Architecture>;
+  static constexpr auto kNear = by_shape<P>([]<class Shape>() { return &near_pad<P, Shape, D>; });
+  NearShapes near = 0;
+  for (int k = 0; k < a.n_touches && k < 64; ++k) {
+    const bool here = kNear[std::size_t(a.shapes[k].shape)](*a.pad, a.shapes[k],
+                                                            broadcast_touch<D>(a.touches[k]));
+    near |= NearShapes(here) << k;
+  }
+  return near;
+}
+
 template <class P, ContactLaw Law>
 int tactile_field(const TactileArgs<typename P::Real>& a) {
   using Real = typename P::Real;
   static constexpr auto kForce =
       by_shape<P>([]<class Shape>() { return &chunk_force<P, Law, Shape>; });
+  const NearShapes near = near_shapes<P>(a);
+  if (near == 0 && a.n_touches <= 64) return 0;
   constexpr int kNumbers = P::kComponents * kTactileTile;  // of a tile
   alignas(64) Real buffer[kGroup * kNumbers];
   int count = 0;
   for (int first = 0; first < a.pad->tiles(); first += kGroup) {
     unsigned written = 0;
     for (int k = 0; k < a.n_touches; ++k)
-      written = kForce[std::size_t(a.shapes[k].shape)](a, k, first, written, buffer);
+      if (may_touch(near, k))
+        written = kForce[std::size_t(a.shapes[k].shape)](a, k, first, written, buffer);
     for (int l = 0; written != 0; ++l, written >>= 1) {
       if ((written & 1U) == 0) continue;
       const Real* tile = buffer + kNumbers * l;

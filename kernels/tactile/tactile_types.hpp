@@ -31,8 +31,10 @@ struct PadTiles {
   const float* frames_f;
   const double* factors;  ///< (n_tiles, 4, 64) factors of the coefficients; nullptr: all 1
   const float* factors_f;
-  bool skewed;     ///< axis0 and axis1 are not exactly unit and perpendicular: forces need `axes`
-  double axes[9];  ///< rows: axis0, axis1, -(axis0 × axis1), pad axes
+  double middle[3];  ///< of a sphere around all points, pad axes [m]
+  double reach;      ///< its radius, with a margin for rounding [m]
+  bool skewed;       ///< axis0 and axis1 are not exactly unit and perpendicular: forces need `axes`
+  double axes[9];    ///< rows: axis0, axis1, -(axis0 × axis1), pad axes
 
   [[nodiscard]] int tiles() const { return tile_rows * tile_cols; }
   [[nodiscard]] bool curved() const { return index != nullptr; }

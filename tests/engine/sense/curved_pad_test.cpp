@@ -155,6 +155,7 @@ void check(const Case& c, double tolerance) {
   const AlignedVector<double> far_reach(compiled(model).sensors[0].tile_radius.size(), 1e9);
   PadTiles unculled = pad;
   unculled.radius = far_reach.data();
+  unculled.reach = 1e9;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     Random random(seed);
     const TouchShape shape = shape_of(c.shape);

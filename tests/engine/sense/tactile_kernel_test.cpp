@@ -58,6 +58,7 @@ struct PoisonedPad {
   void stop_culling() {
     far_reach.assign(pad_sensor().tile_radius.size(), 1e9);
     tiles.radius = far_reach.data();
+    tiles.reach = 1e9;
   }
   [[nodiscard]] std::size_t numbers() const { return std::size_t(3 * tiles.rows * tiles.cols); }
   [[nodiscard]] Vec3<double> point(int row, int col) const {
