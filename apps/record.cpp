@@ -26,6 +26,8 @@ Record record_of(const std::string& option, const Model& model) {
   const std::vector<std::string> sensors = sensor_names(model.scene());
   record.outputs.bodies = asked("bodies");
   record.outputs.end_effectors = asked("variables");
+  if (record.outputs.end_effectors && model.end_effectors().empty())
+    throw InputError("--record: 'variables', but the scene has no end effectors");
   record.outputs.fields.emplace();
   for (const std::string& name : record.names) {
     if (is_plain_output(name)) continue;

@@ -146,6 +146,8 @@ TEST(Record, UnknownNamesAreRefused) {
   EXPECT_THAT(
       run(folder, {"generate", ball, "-o", "x", "--episodes", "1", "--record", "bodies"}).err,
       HasSubstr("unknown observation 'bodies'"));
+  EXPECT_THAT(run(folder, {"simulate", ball, "-o", "x.h5", "--record", "variables"}).err,
+              HasSubstr("the scene has no end effectors"));
   const Outcome compact =
       run(folder, {"bench", ball, "--steps", "1", "--frames", "compact", "--record", "pad.shear"});
   EXPECT_EQ(compact.exit_code, 2);
