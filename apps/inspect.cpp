@@ -82,7 +82,9 @@ Json as_json(const Model& model) {
   for (const EndEffectorInfo& v : model.end_effectors())
     end_effectors.push_back({{"name", v.name}, {"joint", v.joint}});
   for (const EffectInfo& e : model.effects())
-    effects.push_back({{"name", e.name}, {"on", e.on}, {"reason", e.reason}});
+    if (e.effect.element < 0)
+      effects.push_back(
+          {{"name", e.name}, {"on", e.on}, {"reason", e.reason}, {"lines", lines_of(e)}});
   Json stages = Json::array();
   for (const StageInfo& s : model.stages())
     stages.push_back({{"name", s.name}, {"of", s.of}, {"variant", s.variant}});
@@ -175,7 +177,8 @@ std::string as_text(const Model& model) {
                         c.points == 1 ? "" : "s", c.law);
   text += '\n' + sensors_text(model) + end_effectors_text(model) + "\neffects\n";
   for (const EffectInfo& e : model.effects())
-    text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);
+    if (e.effect.element < 0)
+      text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);
   text += "\nstages\n";
   for (const StageInfo& s : model.stages())
     text += fmt::format("  {:<16} {}: {}\n", s.name, s.of, s.variant);

@@ -275,6 +275,7 @@ struct Scene {
   std::vector<InitialState> initial;
   std::optional<ControlDescription> control;
   std::vector<RandomizationDescription> randomizations;
+  Source gravity_source{};  ///< the <option> that gives gravity; line 0: none does
 };
 
 /// The name users write and read: "free", "clamped" …

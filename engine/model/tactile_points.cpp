@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/frames.hpp"
 #include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
