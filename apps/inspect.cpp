@@ -7,6 +7,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/inspect_effects.hpp"
 #include "apps/inspect_joints.hpp"
 #include "apps/inspect_task.hpp"
 #include "apps/scene_run.hpp"
@@ -23,6 +24,7 @@ namespace {
 struct InspectArguments {
   std::string scene;
   bool allow_unknown = false;
+  bool effects = false;
 };
 
 std::string parent_name(const Scene& scene, const LinkDescription& link) {
@@ -190,11 +192,19 @@ std::string as_text(const Model& model) {
 }
 
 /// `task`: null for a scene alone.
-int report(const Model& model, const TaskSpec* task, const Console& console) {
-  if (task != nullptr) console.print(task_text(*task));
-  console.print(as_text(model));
+int report(const Model& model, const TaskSpec* task, const InspectArguments& options,
+           const Console& console) {
   Json result = as_json(model);
   result["task"] = task != nullptr ? task_json(*task) : Json();
+  if (options.effects) {
+    const EffectCosts costs = measure_effects(model);
+    console.print(effect_costs_text(costs, kernels::active_isa_name()));
+    result["effect_costs"] = effect_costs_json(costs);
+    result["effect_measurement"] = effect_measurement_json(costs);
+  } else {
+    if (task != nullptr) console.print(task_text(*task));
+    console.print(as_text(model));
+  }
   console.result(result);
   return kDone;
 }
@@ -202,10 +212,10 @@ int report(const Model& model, const TaskSpec* task, const Console& console) {
 int inspect(const InspectArguments& options, const Console& console) {
   if (const std::unique_ptr<Task> task = find_task(options.scene, console)) {
     refuse_with_task(*task, {{"--allow-unknown", options.allow_unknown}});
-    return report(task->model(), &task->spec(), console);
+    return report(task->model(), &task->spec(), options, console);
   }
   return report(Model(read_scene_for(options.scene, options.allow_unknown, console)), nullptr,
-                console);
+                options, console);
 }
 
 }  // namespace
@@ -219,6 +229,8 @@ Command add_inspect(CLI::App& program) {
   add_text(app, "SCENE", options->scene, "", "Scene file (XML), or the name of a task").required();
   add_flag(app, "--allow-unknown", options->allow_unknown,
            "Unknown elements and attributes are warnings, not errors");
+  add_flag(app, "--effects", options->effects,
+           "Measure what each effect of the scene costs, and print that instead");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return inspect(*options, *console); }};
 }

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// What each effect of a scene costs: the time of a step with it against the time without it, from
+// the same states. docs/effects.md says how to read the figures.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/model/model.hpp"
+
+namespace tangere {
+
+struct EffectCostOptions {
+  int environments = 64;
+  int instants = 16;     ///< of the run, from which single steps are timed
+  double seconds = 1.5;  ///< to spend, about; more where kLeastRounds take longer
+  std::uint64_t seed = 0;
+};
+
+/// A difference of two times, as a share of a step.
+struct MeasuredShare {
+  double share = 0;   ///< median over the rounds
+  double spread = 0;  ///< half of the range that holds the middle half of the rounds
+};
+
+struct EffectCost {
+  EffectInfo effect;
+  /// State and fields of one environment that go with the effect [bytes].
+  std::int64_t bytes = 0;
+  /// Of a step; 0 for an effect that is off, none where `note` says why.
+  std::optional<MeasuredShare> measured{};
+  std::string note{};          ///< why it is not measured, or what else to know; may be ""
+  double seconds_without = 0;  ///< a step of one environment without the effect [s]
+  double passes_without = 0;   ///< evaluations of the residual per step
+};
+
+struct EffectCosts {
+  int environments = 0, instants = 0;
+  int rounds = 0;              ///< pairs of sweeps per effect, the fewest
+  std::int64_t run_steps = 0;  ///< of the run that the instants come from
+  double seconds = 0;          ///< a step of one environment, and its share of reading fields [s]
+  double field_seconds = 0;    ///< of that, reading fields: each sensor in one of `every` steps
+  double passes = 0;           ///< evaluations of the residual per step
+  MeasuredShare itself{};      ///< the scene against itself: what chance alone shows
+  std::vector<EffectCost> effects;  ///< parallel to Model::effects()
+};
+
+/// Kinds with more elements than this are timed as a whole alone.
+inline constexpr int kMostElementsTimed = 12;
+/// Rounds that an effect gets at least.
+inline constexpr int kLeastRounds = 5;
+
+/// Plays a batch by the scene's own controls, then times single steps from states of that run with
+/// the model and with a model without the effect, in turn. Throws InputError like a rollout.
+EffectCosts measure_effects(const Model& model, const EffectCostOptions& options = {});
+
+}  // namespace tangere

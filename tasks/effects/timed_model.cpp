@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recorded states become blocks of the model's own layout once; a sweep only restores them.
+#include "tasks/effects/timed_model.hpp"
+
+#include <ctime>
+
+#include <algorithm>
+
+#include "engine/base/as_size.hpp"
+#include "kernels/numbers/block.hpp"
+
+namespace tangere {
+namespace {
+
+using kernels::kBlock;
+
+/// Returns the CPU time of this thread [s], which other processes do not disturb as they do the
+/// wall clock.
+double cpu_seconds() {
+  std::timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Controls have the names of the dofs that they drive, so a name stands for one control.
+std::vector<std::size_t> columns_of(const Model& model, const Model& of) {
+  std::vector<std::size_t> columns;
+  for (const std::string& name : model.u_names())
+    columns.push_back(static_cast<std::size_t>(
+        std::find(of.u_names().begin(), of.u_names().end(), name) - of.u_names().begin()));
+  return columns;
+}
+
+}  // namespace
+
+TimedModel::TimedModel(const Model& model, const RecordedStates& recorded,
+                       const StepperOptions& options)
+    : recorded_(recorded),
+      batch_(model, recorded.environments),
+      stepper_(model, options),
+      readout_(model) {
+  const std::vector<std::size_t> columns = columns_of(model, recorded.model);
+  const std::size_t nq = as_size(model.nq()), nv = as_size(model.nv());
+  const std::size_t nu = as_size(recorded.model.nu());
+  set_numbers();
+  for (const RecordedInstant& at : recorded.instants) {
+    std::vector<double> u;
+    for (int e = 0; e < batch_.environments(); ++e) {
+      const std::size_t i = as_size(e);
+      const std::span<const double> q = std::span(at.q).subspan(i * nq, nq);
+      const std::span<const double> v = std::span(at.v).subspan(i * nv, nv);
+      if (at.previous_q.empty())
+        batch_.set_state(e, q, v);
+      else
+        batch_.set_state(e, q, v, std::span(at.previous_q).subspan(i * nq, nq),
+                         std::span(at.previous_v).subspan(i * nv, nv));
+      for (const std::size_t column : columns) u.push_back(at.controls[i * nu + column]);
+    }
+    starts_.emplace_back();
+    for (int b = 0; b < batch_.blocks(); ++b) starts_.back().push_back(batch_.save_block(b));
+    controls_.push_back(std::move(u));
+  }
+  int points = 0;
+  for (const SensorInfo& sensor : model.sensors()) points = std::max(points, sensor.points);
+  field_.resize(as_size(3 * points) * kBlock);
+}
+
+void TimedModel::set_numbers() {
+  const Scene& own = batch_.model().scene();
+  for (std::size_t k = 0; k < own.randomizations.size(); ++k) {
+    const int at = static_cast<int>(k);
+    const int there = randomization_of(recorded_.model.scene(), own.randomizations[k].number);
+    if (!batch_.is_parameter(at) || there < 0) continue;
+    for (int e = 0; e < batch_.environments(); ++e)
+      batch_.set_randomized_value(e, at, recorded_.numbers[as_size(there)][as_size(e)]);
+  }
+}
+
+void TimedModel::restore(int instant) {
+  for (int b = 0; b < batch_.blocks(); ++b)
+    batch_.restore_block(b, starts_[as_size(instant)][as_size(b)]);
+  for (int e = 0; e < batch_.environments(); ++e)
+    batch_.hold(e, recorded_.instants[as_size(instant)].failed[as_size(e)] != 0);
+}
+
+SweepTime TimedModel::time_steps() {
+  SweepTime sum;
+  for (int i = 0; i < instants(); ++i) {
+    restore(i);
+    const double start = cpu_seconds();
+    stepper_.step(batch_, controls_[as_size(i)]);
+    sum.seconds += cpu_seconds() - start;
+    for (int e = 0; e < batch_.environments(); ++e) {
+      if (batch_.held(e)) continue;
+      ++sum.steps;
+      sum.newton_passes += batch_.iterations(e);
+      sum.failures += failed(batch_.status(e)) ? 1 : 0;
+    }
+  }
+  return sum;
+}
+
+SweepTime TimedModel::time_readings(int sensor, int most_instants) {
+  SweepTime sum;
+  const std::size_t size = as_size(3 * batch_.model().sensors()[as_size(sensor)].points);
+  const int stride = std::max(1, instants() / most_instants);
+  for (int i = stride / 2; i < instants(); i += stride) {
+    restore(i);
+    for (int b = 0; b < batch_.blocks(); ++b) {
+      const int count = std::min(int(kBlock), batch_.environments() - b * kBlock);
+      std::vector<std::span<double>> fields;
+      for (int e = 0; e < count; ++e)
+        fields.push_back(std::span(field_).subspan(as_size(e) * size, size));
+      const double start = cpu_seconds();
+      readout_.read_block(batch_, b, sensor, fields);
+      sum.seconds += cpu_seconds() - start;
+      sum.steps += count;
+    }
+  }
+  return sum;
+}
+
+}  // namespace tangere
