@@ -96,9 +96,9 @@ Json effect_measurement_json(const EffectCosts& costs) {
           {"run_steps", costs.run_steps},
           {"instants", costs.instants},
           {"rounds", costs.rounds},
-          {"step_seconds", costs.seconds},
-          {"field_seconds", costs.field_seconds},
-          {"newton", costs.passes},
+          {"step_seconds", costs.times.whole()},
+          {"field_seconds", costs.times.reading},
+          {"newton", costs.times.passes},
           {"share_of_nothing", costs.itself.share},
           {"spread_of_nothing", costs.itself.spread}};
 }
@@ -113,10 +113,10 @@ std::string effect_costs_text(const EffectCosts& costs, const std::string& instr
       "  measured with {} environments from {} instants of {} steps, {} rounds; the scene against "
       "itself shows {}\n"
       "  shares are of a step from the same states, and need not add up to 100 %\n\n",
-      microseconds(costs.seconds),
-      costs.field_seconds > 0 ? ", of it " + microseconds(costs.field_seconds) + " to read fields"
+      microseconds(costs.times.whole()),
+      costs.times.reading > 0 ? ", of it " + microseconds(costs.times.reading) + " to read fields"
                               : "",
-      costs.passes, instruction_set, costs.environments, costs.instants, costs.run_steps,
+      costs.times.passes, instruction_set, costs.environments, costs.instants, costs.run_steps,
       costs.rounds, percent(costs.itself));
   text +=
       fmt::format("  {} {} {} {} {:>7}  {}\n", padded("on", width), padded("share", 14, true),

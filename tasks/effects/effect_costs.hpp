@@ -9,20 +9,15 @@
 #include <vector>
 
 #include "engine/model/model.hpp"
+#include "tasks/effects/comparison.hpp"
 
 namespace tangere {
 
 struct EffectCostOptions {
-  int environments = 64;
-  int instants = 16;     ///< of the run, from which single steps are timed
+  int environments = 32;
+  int instants = 12;     ///< of the run, from which single steps are timed
   double seconds = 1.5;  ///< to spend, about; more where kLeastRounds take longer
   std::uint64_t seed = 0;
-};
-
-/// A difference of two times, as a share of a step.
-struct MeasuredShare {
-  double share = 0;   ///< median over the rounds
-  double spread = 0;  ///< half of the range that holds the middle half of the rounds
 };
 
 struct EffectCost {
@@ -33,17 +28,16 @@ struct EffectCost {
   std::optional<MeasuredShare> measured{};
   std::string note{};          ///< why it is not measured, or what else to know; may be ""
   double seconds_without = 0;  ///< a step of one environment without the effect [s]
-  double passes_without = 0;   ///< evaluations of the residual per step
+  /// Evaluations of the residual per step from the same states, to the same tolerance.
+  double passes_without = 0;
 };
 
 struct EffectCosts {
   int environments = 0, instants = 0;
-  int rounds = 0;              ///< pairs of sweeps per effect, the fewest
-  std::int64_t run_steps = 0;  ///< of the run that the instants come from
-  double seconds = 0;          ///< a step of one environment, and its share of reading fields [s]
-  double field_seconds = 0;    ///< of that, reading fields: each sensor in one of `every` steps
-  double passes = 0;           ///< evaluations of the residual per step
-  MeasuredShare itself{};      ///< the scene against itself: what chance alone shows
+  int rounds = 0;                   ///< pairs of sweeps per effect
+  std::int64_t run_steps = 0;       ///< of the run that the instants come from
+  StepTimes times{};                ///< of the scene as it is
+  MeasuredShare itself{};           ///< the scene against itself: what chance alone shows
   std::vector<EffectCost> effects;  ///< parallel to Model::effects()
 };
 

@@ -5,6 +5,7 @@
 #include <ctime>
 
 #include <algorithm>
+#include <utility>
 
 #include "engine/base/as_size.hpp"
 #include "kernels/numbers/block.hpp"
@@ -13,6 +14,8 @@ namespace tangere {
 namespace {
 
 using kernels::kBlock;
+/// Environments that are solved together; half a block.
+constexpr int kLanesOfGroup = kBlock / 2;
 
 /// Returns the CPU time of this thread [s], which other processes do not disturb as they do the
 /// wall clock.
@@ -36,6 +39,7 @@ std::vector<std::size_t> columns_of(const Model& model, const Model& of) {
 TimedModel::TimedModel(const Model& model, const RecordedStates& recorded,
                        const StepperOptions& options)
     : recorded_(recorded),
+      options_(options),
       batch_(model, recorded.environments),
       stepper_(model, options),
       readout_(model) {
@@ -83,41 +87,46 @@ void TimedModel::restore(int instant) {
     batch_.hold(e, recorded_.instants[as_size(instant)].failed[as_size(e)] != 0);
 }
 
-SweepTime TimedModel::time_steps() {
-  SweepTime sum;
-  for (int i = 0; i < instants(); ++i) {
-    restore(i);
-    const double start = cpu_seconds();
-    stepper_.step(batch_, controls_[as_size(i)]);
-    sum.seconds += cpu_seconds() - start;
-    for (int e = 0; e < batch_.environments(); ++e) {
-      if (batch_.held(e)) continue;
-      ++sum.steps;
-      sum.newton_passes += batch_.iterations(e);
-      sum.failures += failed(batch_.status(e)) ? 1 : 0;
-    }
-  }
-  return sum;
+void TimedModel::solve_to(double tolerance) {
+  if (options_.tolerance == tolerance) return;
+  options_.tolerance = tolerance;
+  stepper_ = Stepper(model(), options_);
 }
 
-SweepTime TimedModel::time_readings(int sensor, int most_instants) {
-  SweepTime sum;
-  const std::size_t size = as_size(3 * batch_.model().sensors()[as_size(sensor)].points);
-  const int stride = std::max(1, instants() / most_instants);
-  for (int i = stride / 2; i < instants(); i += stride) {
-    restore(i);
-    for (int b = 0; b < batch_.blocks(); ++b) {
-      const int count = std::min(int(kBlock), batch_.environments() - b * kBlock);
-      std::vector<std::span<double>> fields;
-      for (int e = 0; e < count; ++e)
-        fields.push_back(std::span(field_).subspan(as_size(e) * size, size));
-      const double start = cpu_seconds();
-      readout_.read_block(batch_, b, sensor, fields);
-      sum.seconds += cpu_seconds() - start;
-      sum.steps += count;
+TimedStep TimedModel::time_step(int instant) {
+  TimedStep step;
+  restore(instant);
+  const double start = cpu_seconds();
+  stepper_.step(batch_, controls_[as_size(instant)]);
+  step.seconds = (cpu_seconds() - start) / batch_.environments();
+  std::int32_t most = 0;
+  int groups = 0;
+  for (int e = 0; e < batch_.environments(); ++e) {
+    if (!batch_.held(e)) {
+      ++step.steps;
+      step.passes += batch_.iterations(e);
+      most = std::max(most, batch_.iterations(e));
+      step.failures += failed(batch_.status(e)) ? 1 : 0;
     }
+    if ((e + 1) % kLanesOfGroup != 0 && e + 1 < batch_.environments()) continue;
+    step.group_passes += std::exchange(most, 0);
+    ++groups;
   }
-  return sum;
+  step.passes /= std::max(1, step.steps);
+  step.group_passes /= groups;
+  return step;
+}
+
+double TimedModel::time_reading(int sensor, int instant) {
+  const std::size_t size = as_size(3 * model().sensors()[as_size(sensor)].points);
+  const int count = std::min(int(kBlock), batch_.environments());
+  std::vector<std::span<double>> fields;
+  for (int e = 0; e < count; ++e)
+    fields.push_back(std::span(field_).subspan(as_size(e) * size, size));
+  restore(instant);
+  const double start = cpu_seconds();
+  readout_.read_block(batch_, 0, sensor, std::span<const std::span<double>>(fields));
+  return (cpu_seconds() - start) / count;
 }
 
 }  // namespace tangere

@@ -12,12 +12,13 @@
 
 namespace tangere {
 
-/// Sums over the steps of one sweep.
-struct SweepTime {
-  double seconds = 0;      ///< CPU time of this thread
-  std::int64_t steps = 0;  ///< of single environments; failing ones included
-  std::int64_t newton_passes = 0;
-  std::int64_t failures = 0;  ///< steps that found no solution
+/// One step of all environments from an instant.
+struct TimedStep {
+  double seconds = 0;  ///< of one environment: CPU time of this thread
+  /// Evaluations of the residual: mean over the environments, and over groups of lanes, which go on
+  /// until their slowest lane is done.
+  double passes = 0, group_passes = 0;
+  int steps = 0, failures = 0;  ///< of environments; failures found no solution
 };
 
 class TimedModel {
@@ -26,20 +27,23 @@ class TimedModel {
   /// must outlive this object.
   TimedModel(const Model& model, const RecordedStates& recorded, const StepperOptions& options);
 
-  /// Takes one step of all environments from each instant, and times the steps alone.
-  SweepTime time_steps();
-  /// Reads one sensor in all environments at up to about `most_instants` of the instants, and times
-  /// the readings alone. Its steps are readings.
-  SweepTime time_readings(int sensor, int most_instants);
+  /// Sets the tolerance of the steps.
+  void solve_to(double tolerance);
+  /// Takes one step of all environments from an instant, and times the step alone.
+  TimedStep time_step(int instant);
+  /// Reads one sensor in the first block's environments, and times the reading of one [s].
+  double time_reading(int sensor, int instant);
 
   [[nodiscard]] const Model& model() const { return batch_.model(); }
 
- private:
   [[nodiscard]] int instants() const { return static_cast<int>(starts_.size()); }
+
+ private:
   void set_numbers();
   void restore(int instant);
 
   const RecordedStates& recorded_;
+  StepperOptions options_;
   Batch batch_;
   Stepper stepper_;
   Readout readout_;
