@@ -50,7 +50,7 @@ int elements_of(const EffectCosts& costs, EffectKind kind) {
 bool is_shown(const EffectCosts& costs, const EffectCost& cost) {
   const int elements = elements_of(costs, cost.effect.effect.kind);
   if (cost.effect.effect.element < 0) return elements != 1;
-  return elements <= kMostElementsTimed;
+  return times_elements(cost.effect.effect.kind, elements);
 }
 
 std::string row(const EffectCost& c, std::size_t width) {

@@ -4,8 +4,8 @@
 //   share = (S - S')/T + Σ_sensors (F - F')/(every T)      T = S + Σ_sensors F/every
 //
 // S is a step and F a reading of a field, per environment; S' and F' are those of the other model.
-// Each is a sum over the instants of medians over the rounds, so that what disturbs one round at
-// one instant disturbs nothing else.
+// Each is a sum over the instants of lower quartiles over the rounds: what disturbs a step makes it
+// longer, never shorter, and disturbs nothing else.
 #include "tasks/effects/comparison.hpp"
 
 #include <algorithm>
@@ -30,24 +30,24 @@ struct InstantTimes {
   std::vector<double> with, without;
 };
 
-double median(std::vector<double> times) {
-  const auto middle = times.begin() + std::ptrdiff_t(times.size() / 2);
-  std::nth_element(times.begin(), middle, times.end());
-  return *middle;
+double lower_quartile(std::vector<double> times) {
+  const auto quarter = times.begin() + std::ptrdiff_t(times.size() / 4);
+  std::nth_element(times.begin(), quarter, times.end());
+  return *quarter;
 }
 
-double median(const std::vector<double>& times, const std::vector<std::size_t>& which) {
+double lower_quartile(const std::vector<double>& times, const std::vector<std::size_t>& which) {
   std::vector<double> drawn;
   for (const std::size_t k : which) drawn.push_back(times[k]);
-  return median(std::move(drawn));
+  return lower_quartile(std::move(drawn));
 }
 
 /// Returns the share of its time that the first model would save by being the other.
 double saved(const std::vector<InstantTimes>& instants, const std::vector<std::size_t>& rounds) {
   double with = 0, without = 0;
   for (const InstantTimes& at : instants) {
-    with += median(at.with, rounds);
-    without += median(at.without, rounds);
+    with += lower_quartile(at.with, rounds);
+    without += lower_quartile(at.without, rounds);
   }
   return with > 0 ? 1 - without / with : 0;
 }
@@ -72,6 +72,7 @@ void take_turns(int rounds, const A& with, const B& without, InstantTimes& times
 
 /// Loosens the tolerance of a model until it needs as few passes as `passes`.
 void need_as_few(TimedModel& model, int instant, double passes, double tolerance) {
+  if (passes <= 1) return model.solve_to(kAnything);
   double low = std::log(tolerance), high = std::log(kAnything), best = low, least = HUGE_VAL;
   for (int k = 0; k < kBisections; ++k) {
     const double middle = (low + high) / 2;
@@ -83,47 +84,63 @@ void need_as_few(TimedModel& model, int instant, double passes, double tolerance
   model.solve_to(std::exp(best));
 }
 
-/// Makes both need the same number of passes. Returns by how much the other's time has still to be
-/// scaled. `other`: its step before.
-double match_passes(TimedModel& with, TimedModel& without, int instant, double tolerance,
+/// Makes both need as many passes as the one that needs fewer, at most `most`. Returns by how much
+/// the other's time has still to be scaled. `other`: its step before.
+double match_passes(TimedModel& with, TimedModel& without, int instant, double tolerance, int most,
                     TimedStep& other) {
   with.solve_to(tolerance), without.solve_to(tolerance);
-  const double passes = with.time_step(instant).group_passes;
+  const double needed = with.time_step(instant).group_passes;
   other = without.time_step(instant);
+  const double passes = std::min({needed, other.group_passes, double(most)});
+  if (needed > passes) need_as_few(with, instant, passes, tolerance);
   if (other.group_passes > passes) need_as_few(without, instant, passes, tolerance);
-  if (other.group_passes < passes) need_as_few(with, instant, other.group_passes, tolerance);
   const double left = without.time_step(instant).group_passes;
   return left > 0 ? with.time_step(instant).group_passes / left : 1;
 }
 
+/// A round of steps of one pass takes about half the time of others, and its noise counts twice.
+int rounds_of(const TimedParts& parts, int rounds) {
+  return parts.steps && parts.passes == 1 ? 2 * rounds : rounds;
+}
+
 }  // namespace
 
-StepTimes measure_times(TimedModel& model, int rounds) {
+StepTimes measure_times(TimedModel& model, double tolerance, int rounds) {
   StepTimes times;
   int readings = 0;
+  double repeated = 0;
   for (int i = 0; i < model.instants(); ++i) {
-    std::vector<double> steps, fields;
-    times.passes += model.time_step(i).passes / model.instants();  // also warms caches
+    std::vector<double> steps, first, fields;
+    model.solve_to(tolerance);
+    const TimedStep step = model.time_step(i);  // also warms caches
     for (int round = 0; round < rounds; ++round) steps.push_back(model.time_step(i).seconds);
-    times.step += median(steps) / model.instants();
+    times.passes += step.passes / model.instants();
+    times.step += lower_quartile(steps) / model.instants();
+    model.solve_to(kAnything);
+    model.time_step(i);
+    for (int round = 0; round < rounds; ++round) first.push_back(model.time_step(i).seconds);
+    repeated += step.group_passes * lower_quartile(first) / model.instants();
     if (i % kReadingStride != kReadingStride / 2) continue;
     for (int round = 0; round < rounds; ++round) fields.push_back(reading_time(model, i));
-    times.reading += median(fields);
+    times.reading += lower_quartile(fields);
     ++readings;
   }
+  model.solve_to(tolerance);
   times.reading /= std::max(1, readings);
+  times.of_first_pass = times.step > 0 ? repeated / times.step : 1;
   return times;
 }
 
 ModelComparison compare(TimedModel& with, TimedModel& without, const StepTimes& times,
                         TimedParts parts, double tolerance, int rounds) {
+  rounds = rounds_of(parts, rounds);
   ModelComparison result;
   if (!parts.steps) result.passes = times.passes;
   std::vector<InstantTimes> steps, readings;
   for (int i = 0; i < with.instants(); ++i) {
     if (parts.steps) {
       TimedStep other;
-      const double scale = match_passes(with, without, i, tolerance, other);
+      const double scale = match_passes(with, without, i, tolerance, parts.passes, other);
       result.passes += other.passes / with.instants();
       result.steps += other.steps;
       result.failures += other.failures;
@@ -137,8 +154,9 @@ ModelComparison compare(TimedModel& with, TimedModel& without, const StepTimes& 
           readings.emplace_back());
   }
   with.solve_to(tolerance), without.solve_to(tolerance);
+  const double of_step = parts.passes == 1 ? times.of_first_pass : 1;
   const auto share = [&](const std::vector<std::size_t>& which) {
-    return (times.step * saved(steps, which) + times.reading * saved(readings, which)) /
+    return (of_step * times.step * saved(steps, which) + times.reading * saved(readings, which)) /
            times.whole();
   };
   std::vector<std::size_t> which(as_size(rounds));

@@ -19,8 +19,8 @@ bool is_of_sensors(EffectKind kind) {
 }
 
 TimedParts parts_of(EffectKind kind) {
-  if (kind == EffectKind::varying_parameters) return {true, true};
-  return {!is_of_sensors(kind), is_of_sensors(kind)};
+  if (kind == EffectKind::varying_parameters) return {true, true, 1};
+  return {!is_of_sensors(kind), is_of_sensors(kind), kind == EffectKind::pair_contact ? 2 : 1};
 }
 
 /// Returns the bytes of one environment's state and fields.
@@ -41,7 +41,7 @@ std::ptrdiff_t elements_of(const Model& model, EffectKind kind) {
 std::string reason_not_to_time(const Model& model, const Effect& effect) {
   if (!has_way(effect.kind, Way::removed)) return "follows from the joints; cannot be removed";
   const std::ptrdiff_t elements = elements_of(model, effect.kind);
-  if (effect.element >= 0 && elements > kMostElementsTimed)
+  if (effect.element >= 0 && !times_elements(effect.kind, elements))
     return fmt::format("one of {}; timed together, as '{}'", elements, to_string(effect.kind));
   return "";
 }
@@ -60,7 +60,7 @@ struct Measurement {
         recorded(record_states(of, options.environments, options.instants, options.seed)),
         stepping{{}, {}, Stepper(of).tolerance()},
         timed(of, recorded, stepping),
-        times(measure_times(timed, kLeastRounds)),
+        times(measure_times(timed, *stepping.tolerance, kLeastRounds)),
         rounds(rounds_of(options)) {}
 
   /// Every effect gets the same share of the time.
@@ -103,6 +103,12 @@ EffectCost measure(Measurement& m, const EffectInfo& info) {
 
 }  // namespace
 
+bool times_elements(EffectKind kind, std::ptrdiff_t elements) {
+  const bool whole = kind == EffectKind::pair_contact || kind == EffectKind::ground_contact ||
+                     kind == EffectKind::tactile;
+  return elements <= (whole ? 12 : 4);
+}
+
 EffectCosts measure_effects(const Model& model, const EffectCostOptions& options) {
   Measurement m(model, options);
   EffectCosts costs;
@@ -111,7 +117,7 @@ EffectCosts measure_effects(const Model& model, const EffectCostOptions& options
   costs.run_steps = m.recorded.steps;
   costs.times = m.times;
   costs.rounds = m.rounds;
-  costs.itself = m.against(Model(model.scene()), {true, true}).saved;
+  costs.itself = m.against(Model(model.scene()), {true, true, 2}).saved;
   for (const EffectInfo& info : model.effects()) {
     // The only element of a kind is the kind, which has been measured just before.
     if (info.effect.element == 0 && elements_of(model, info.effect.kind) == 1) {

@@ -3,6 +3,7 @@
 // the same states. docs/effects.md says how to read the figures.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -15,8 +16,8 @@ namespace tangere {
 
 struct EffectCostOptions {
   int environments = 32;
-  int instants = 12;     ///< of the run, from which single steps are timed
-  double seconds = 1.5;  ///< to spend, about; more where kLeastRounds take longer
+  int instants = 12;   ///< of the run, from which single steps are timed
+  double seconds = 2;  ///< to spend, about; more where kLeastRounds take longer
   std::uint64_t seed = 0;
 };
 
@@ -34,15 +35,16 @@ struct EffectCost {
 
 struct EffectCosts {
   int environments = 0, instants = 0;
-  int rounds = 0;                   ///< pairs of sweeps per effect
+  int rounds = 0;                   ///< pairs of steps per effect and instant
   std::int64_t run_steps = 0;       ///< of the run that the instants come from
   StepTimes times{};                ///< of the scene as it is
   MeasuredShare itself{};           ///< the scene against itself: what chance alone shows
   std::vector<EffectCost> effects;  ///< parallel to Model::effects()
 };
 
-/// Kinds with more elements than this are timed as a whole alone.
-inline constexpr int kMostElementsTimed = 12;
+/// Whether the elements of a kind are timed one by one: up to 12 contacts or sensors, or up to 4 of
+/// which a coefficient is taken out. The shares of more are lost in the noise.
+bool times_elements(EffectKind kind, std::ptrdiff_t elements);
 /// Rounds that an effect gets at least.
 inline constexpr int kLeastRounds = 5;
 
