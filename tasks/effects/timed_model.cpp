@@ -64,9 +64,11 @@ TimedModel::TimedModel(const Model& model, const RecordedStates& recorded,
     for (int b = 0; b < batch_.blocks(); ++b) starts_.back().push_back(batch_.save_block(b));
     controls_.push_back(std::move(u));
   }
-  int points = 0;
-  for (const SensorInfo& sensor : model.sensors()) points = std::max(points, sensor.points);
-  field_.resize(as_size(3 * points) * kBlock);
+  const int read = std::min(int(kBlock), recorded.environments);
+  for (std::size_t k = 0; k < model.sensors().size(); ++k) {
+    frames_.emplace_back();
+    for (int e = 0; e < read; ++e) frames_.back().emplace_back(model, static_cast<int>(k));
+  }
 }
 
 void TimedModel::set_numbers() {
@@ -118,15 +120,11 @@ TimedStep TimedModel::time_step(int instant) {
 }
 
 double TimedModel::time_reading(int sensor, int instant) {
-  const std::size_t size = as_size(3 * model().sensors()[as_size(sensor)].points);
-  const int count = std::min(int(kBlock), batch_.environments());
-  std::vector<std::span<double>> fields;
-  for (int e = 0; e < count; ++e)
-    fields.push_back(std::span(field_).subspan(as_size(e) * size, size));
+  std::vector<DenseFrame<double>>& frames = frames_[as_size(sensor)];
   restore(instant);
   const double start = cpu_seconds();
-  readout_.read_block(batch_, 0, sensor, std::span<const std::span<double>>(fields));
-  return (cpu_seconds() - start) / count;
+  readout_.read_block(batch_, 0, std::span(frames));
+  return (cpu_seconds() - start) / double(frames.size());
 }
 
 }  // namespace tangere

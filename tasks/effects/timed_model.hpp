@@ -31,7 +31,8 @@ class TimedModel {
   void solve_to(double tolerance);
   /// Takes one step of all environments from an instant, and times the step alone.
   TimedStep time_step(int instant);
-  /// Reads one sensor in the first block's environments, and times the reading of one [s].
+  /// Reads one sensor into frames of the first block's environments, and times the reading of one
+  /// [s].
   double time_reading(int sensor, int instant);
 
   [[nodiscard]] const Model& model() const { return batch_.model(); }
@@ -49,7 +50,8 @@ class TimedModel {
   Readout readout_;
   std::vector<std::vector<BlockState>> starts_;  // (instants, blocks)
   std::vector<std::vector<double>> controls_;    // (instants), (E, nu) each
-  std::vector<double> field_;                    // of the environments of a block, (points, 3) each
+  std::vector<std::vector<DenseFrame<double>>>
+      frames_;  // (sensors), one per environment of a block
 };
 
 }  // namespace tangere
