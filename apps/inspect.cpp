@@ -181,7 +181,7 @@ std::string as_text(const Model& model) {
   for (const EffectInfo& e : model.effects())
     if (e.effect.element < 0)
       text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);
-  text += "\nstages\n";
+  text += "  (tangere inspect --effects measures what each costs)\n\nstages\n";
   for (const StageInfo& s : model.stages())
     text += fmt::format("  {:<16} {}: {}\n", s.name, s.of, s.variant);
   return text + fmt::format(
