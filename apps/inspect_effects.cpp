@@ -112,7 +112,8 @@ std::string effect_costs_text(const EffectCosts& costs, const std::string& instr
       "  a step of one environment takes {}{}, {:.2f} Newton passes ({})\n"
       "  measured with {} environments from {} instants of {} steps, {} rounds; the scene against "
       "itself shows {}\n"
-      "  shares are of a step from the same states, and need not add up to 100 %\n\n",
+      "  shares are work, and need not add up to 100 %; passes: those of a step from the same "
+      "states without it\n\n",
       microseconds(costs.times.whole()),
       costs.times.reading > 0 ? ", of it " + microseconds(costs.times.reading) + " to read fields"
                               : "",
