@@ -36,6 +36,8 @@ class TimedModel {
   double time_reading(int sensor, int instant);
 
   [[nodiscard]] const Model& model() const { return batch_.model(); }
+  /// What the last step or reading left.
+  [[nodiscard]] const Batch& batch() const { return batch_; }
 
   [[nodiscard]] int instants() const { return static_cast<int>(starts_.size()); }
 
