@@ -45,10 +45,20 @@ int elements_of(const EffectCosts& costs, EffectKind kind) {
       }));
 }
 
+/// Friction and damping of contacts and sensors.
+bool is_of_elements(EffectKind kind) {
+  constexpr EffectKind kKinds[] = {EffectKind::pair_friction,   EffectKind::pair_damping,
+                                   EffectKind::ground_friction, EffectKind::ground_damping,
+                                   EffectKind::tactile_shear,   EffectKind::tactile_damping};
+  return std::find(std::begin(kKinds), std::end(kKinds), kind) != std::end(kKinds);
+}
+
 /// Whether people see the row: a kind with one element is that element, and elements that are not
 /// timed one by one are left to --json.
 bool is_shown(const EffectCosts& costs, const EffectCost& cost) {
   const int elements = elements_of(costs, cost.effect.effect.kind);
+  // What no contact or sensor can have needs no row: that there is none is said once.
+  if (elements == 0 && is_of_elements(cost.effect.effect.kind)) return false;
   if (cost.effect.effect.element < 0) return elements != 1;
   return times_elements(cost.effect.effect.kind, elements);
 }
@@ -56,15 +66,13 @@ bool is_shown(const EffectCosts& costs, const EffectCost& cost) {
 std::string row(const EffectCost& c, std::size_t width) {
   const std::string lines = first_lines(c.effect);
   std::string why = lines.empty() ? c.effect.reason : lines + ": " + c.effect.reason;
+  if (!c.effect.variant.empty()) why += "; kernel: " + c.effect.variant;
   if (!c.note.empty()) why += "; " + c.note;
-  std::string text = fmt::format(
-      "  {} {} {} {} {:>7}  {}\n", padded(c.effect.name, width),
-      padded(c.measured ? percent(*c.measured) : "-", 14, true),
-      padded(c.measured ? microseconds(c.seconds_without) : "-", 9, true),
-      padded(c.measured ? fmt::format("{:.2f}", c.passes_without) : "-", 6, true), c.bytes, why);
-  if (!c.effect.variant.empty())
-    text += fmt::format("  {} kernel: {}\n", std::string(width + 41, ' '), c.effect.variant);
-  return text;
+  return fmt::format("  {} {} {} {} {:>7}  {}\n", padded(c.effect.name, width),
+                     padded(c.measured ? percent(*c.measured) : "-", 14, true),
+                     padded(c.measured ? microseconds(c.seconds_without) : "-", 9, true),
+                     padded(c.measured ? fmt::format("{:.2f}", c.passes_without) : "-", 6, true),
+                     c.bytes, why);
 }
 
 }  // namespace
@@ -93,6 +101,7 @@ Json effect_costs_json(const EffectCosts& costs) {
 
 Json effect_measurement_json(const EffectCosts& costs) {
   return {{"environments", costs.environments},
+          {"failed", costs.failed},
           {"run_steps", costs.run_steps},
           {"instants", costs.instants},
           {"rounds", costs.rounds},
@@ -119,6 +128,10 @@ std::string effect_costs_text(const EffectCosts& costs, const std::string& instr
                               : "",
       costs.times.passes, instruction_set, costs.environments, costs.instants, costs.run_steps,
       costs.rounds, percent(costs.itself));
+  if (costs.failed > 0)
+    text +=
+        fmt::format("  {} of {} environments fail along the run and are left out from there on\n\n",
+                    costs.failed, costs.environments);
   text +=
       fmt::format("  {} {} {} {} {:>7}  {}\n", padded("on", width), padded("share", 14, true),
                   padded("without", 9, true), padded("passes", 6, true), "bytes", "called for by");

@@ -91,6 +91,7 @@ EffectCost measure(Measurement& m, const EffectInfo& info) {
   const Model trimmed(without(m.model.scene(), info.effect));
   cost.bytes =
       static_cast<std::int64_t>(bytes_of(m.model)) - static_cast<std::int64_t>(bytes_of(trimmed));
+  if (m.times.passes == 0) cost.note = "every environment fails before the first instant";
   if (!cost.note.empty()) return cost;
   const ModelComparison c = m.against(trimmed, parts_of(info.effect.kind));
   cost.measured = c.saved;
@@ -115,6 +116,8 @@ EffectCosts measure_effects(const Model& model, const EffectCostOptions& options
   costs.environments = options.environments;
   costs.instants = static_cast<int>(m.recorded.instants.size());
   costs.run_steps = m.recorded.steps;
+  const std::vector<std::uint8_t>& failed = m.recorded.instants.back().failed;
+  costs.failed = static_cast<int>(std::count(failed.begin(), failed.end(), 1));
   costs.times = m.times;
   costs.rounds = m.rounds;
   costs.itself = m.against(Model(model.scene()), {true, true, 2}).saved;

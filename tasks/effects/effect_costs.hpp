@@ -35,6 +35,7 @@ struct EffectCost {
 
 struct EffectCosts {
   int environments = 0, instants = 0;
+  int failed = 0;                   ///< environments that fail along the run
   int rounds = 0;                   ///< pairs of steps per effect and instant
   std::int64_t run_steps = 0;       ///< of the run that the instants come from
   StepTimes times{};                ///< of the scene as it is

@@ -30,6 +30,7 @@ RecordedStates record_states(const Model& model, int environments, int instants,
   const ControlProgram program(model, model.timestep(), seed);
   const std::int64_t planned = program.steps();
   const std::int64_t steps = planned < 0 ? kOpenRunSteps : std::min(planned, kMostRunSteps);
+  const std::int64_t wanted = std::min<std::int64_t>(instants, steps);
   const std::size_t nu = as_size(model.nu());
   RecordedStates recorded{model, environments, steps, {}, {}};
   for (std::size_t k = 0; k < model.scene().randomizations.size(); ++k) {
@@ -42,7 +43,7 @@ RecordedStates record_states(const Model& model, int environments, int instants,
     for (int e = 0; e < environments; ++e)
       program.evaluate(step, batch.episode(e), std::span(u).subspan(as_size(e) * nu, nu));
     const auto next = static_cast<std::int64_t>(recorded.instants.size());
-    if (next < instants && step == (2 * next + 1) * steps / (2 * instants)) {
+    if (next < wanted && step == (2 * next + 1) * steps / (2 * wanted)) {
       RecordedInstant now;
       now.step = step;
       copy_states(batch, now.q, now.v);

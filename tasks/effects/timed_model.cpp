@@ -100,7 +100,7 @@ TimedStep TimedModel::time_step(int instant) {
   restore(instant);
   const double start = cpu_seconds();
   stepper_.step(batch_, controls_[as_size(instant)]);
-  step.seconds = (cpu_seconds() - start) / batch_.environments();
+  step.seconds = cpu_seconds() - start;
   std::int32_t most = 0;
   int groups = 0;
   for (int e = 0; e < batch_.environments(); ++e) {
@@ -114,6 +114,7 @@ TimedStep TimedModel::time_step(int instant) {
     step.group_passes += std::exchange(most, 0);
     ++groups;
   }
+  step.seconds /= std::max(1, step.steps);
   step.passes /= std::max(1, step.steps);
   step.group_passes /= groups;
   return step;

@@ -324,8 +324,9 @@ TEST(Command, InspectMeasuresWhatEffectsCost) {
   const Outcome outcome = run(folder, {"inspect", file, "--effects", "--json"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   const json answer = json::parse(outcome.out);
-  for (const char* key : {"environments", "instants", "rounds", "run_steps", "step_seconds",
-                          "field_seconds", "newton", "share_of_nothing", "spread_of_nothing"})
+  for (const char* key :
+       {"environments", "failed", "instants", "rounds", "run_steps", "step_seconds",
+        "field_seconds", "newton", "share_of_nothing", "spread_of_nothing"})
     EXPECT_TRUE(answer.at("effect_measurement").at(key).is_number()) << key;
   const json& costs = answer.at("effect_costs");
   std::istringstream text(file_bytes(file));
