@@ -119,7 +119,7 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
 std::vector<std::string> effects_of(const Model& model) {
   std::vector<std::string> names;
   for (const EffectInfo& effect : model.effects()) {
-    if (effect.on) names.emplace_back(effect.name);
+    if (effect.on && effect.effect.element < 0) names.emplace_back(effect.name);
   }
   return names;
 }

@@ -7,6 +7,7 @@
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/inspect_effects.hpp"
 #include "apps/inspect_joints.hpp"
 #include "apps/inspect_task.hpp"
 #include "apps/scene_run.hpp"
@@ -23,6 +24,7 @@ namespace {
 struct InspectArguments {
   std::string scene;
   bool allow_unknown = false;
+  bool effects = false;
 };
 
 std::string parent_name(const Scene& scene, const LinkDescription& link) {
@@ -82,7 +84,9 @@ Json as_json(const Model& model) {
   for (const EndEffectorInfo& v : model.end_effectors())
     end_effectors.push_back({{"name", v.name}, {"joint", v.joint}});
   for (const EffectInfo& e : model.effects())
-    effects.push_back({{"name", e.name}, {"on", e.on}, {"reason", e.reason}});
+    if (e.effect.element < 0)
+      effects.push_back(
+          {{"name", e.name}, {"on", e.on}, {"reason", e.reason}, {"lines", lines_of(e)}});
   Json stages = Json::array();
   for (const StageInfo& s : model.stages())
     stages.push_back({{"name", s.name}, {"of", s.of}, {"variant", s.variant}});
@@ -175,8 +179,9 @@ std::string as_text(const Model& model) {
                         c.points == 1 ? "" : "s", c.law);
   text += '\n' + sensors_text(model) + end_effectors_text(model) + "\neffects\n";
   for (const EffectInfo& e : model.effects())
-    text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);
-  text += "\nstages\n";
+    if (e.effect.element < 0)
+      text += fmt::format("  {:<4} {:<24} {}\n", e.on ? "on" : "off", e.name, e.reason);
+  text += "  (tangere inspect --effects measures what each costs)\n\nstages\n";
   for (const StageInfo& s : model.stages())
     text += fmt::format("  {:<16} {}: {}\n", s.name, s.of, s.variant);
   return text + fmt::format(
@@ -187,11 +192,19 @@ std::string as_text(const Model& model) {
 }
 
 /// `task`: null for a scene alone.
-int report(const Model& model, const TaskSpec* task, const Console& console) {
-  if (task != nullptr) console.print(task_text(*task));
-  console.print(as_text(model));
+int report(const Model& model, const TaskSpec* task, const InspectArguments& options,
+           const Console& console) {
   Json result = as_json(model);
   result["task"] = task != nullptr ? task_json(*task) : Json();
+  if (options.effects) {
+    const EffectCosts costs = measure_effects(model);
+    console.print(effect_costs_text(costs, kernels::active_isa_name()));
+    result["effect_costs"] = effect_costs_json(costs);
+    result["effect_measurement"] = effect_measurement_json(costs);
+  } else {
+    if (task != nullptr) console.print(task_text(*task));
+    console.print(as_text(model));
+  }
   console.result(result);
   return kDone;
 }
@@ -199,10 +212,10 @@ int report(const Model& model, const TaskSpec* task, const Console& console) {
 int inspect(const InspectArguments& options, const Console& console) {
   if (const std::unique_ptr<Task> task = find_task(options.scene, console)) {
     refuse_with_task(*task, {{"--allow-unknown", options.allow_unknown}});
-    return report(task->model(), &task->spec(), console);
+    return report(task->model(), &task->spec(), options, console);
   }
   return report(Model(read_scene_for(options.scene, options.allow_unknown, console)), nullptr,
-                console);
+                options, console);
 }
 
 }  // namespace
@@ -216,6 +229,8 @@ Command add_inspect(CLI::App& program) {
   add_text(app, "SCENE", options->scene, "", "Scene file (XML), or the name of a task").required();
   add_flag(app, "--allow-unknown", options->allow_unknown,
            "Unknown elements and attributes are warnings, not errors");
+  add_flag(app, "--effects", options->effects,
+           "Measure what each effect of the scene costs, and print that instead");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return inspect(*options, *console); }};
 }

@@ -37,6 +37,7 @@ set(public_headers
   engine/derivative/readout_pullback.hpp
   engine/derivative/step_jacobian.hpp
   engine/derivative/tangent.hpp
+  engine/model/effects.hpp
   engine/model/field_form.hpp
   engine/model/model.hpp
   engine/model/random.hpp

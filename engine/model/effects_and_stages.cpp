@@ -83,53 +83,32 @@ std::string field_variant(const CompiledSensor& s) {
          law;
 }
 
+/// Returns the variant of the kernel that computes an effect; "" where it has none of its own.
+std::string effect_variant(const CompiledModel& m, const Effect& effect) {
+  if (effect.kind == EffectKind::velocity_products) return motion_variant(m.links);
+  if (effect.element < 0) return "";
+  if (effect.kind == EffectKind::pair_contact) {
+    for (const kernels::LinkPair& links : m.link_pairs)
+      for (int i = links.first; i < links.first + links.count; ++i)
+        if (m.pair_order[std::size_t(i)] == effect.element) {
+          kernels::LinkPair alone = links;
+          alone.first = i, alone.count = 1;
+          return pair_variant(m, alone);
+        }
+  }
+  if (effect.kind == EffectKind::ground_contact)
+    return m.grounds[std::size_t(effect.element)].radius > 0 ? "sphere" : "points";
+  if (effect.kind == EffectKind::tactile)
+    return field_variant(m.sensors[std::size_t(effect.element)]);
+  return "";
+}
+
 }  // namespace
 
 void decide_effects(CompiledModel& m) {
-  const auto add = [&](const char* name, bool on, std::string reason) {
-    m.effects.push_back({name, on, std::move(reason)});
-  };
-  const Vector3& g = m.scene.gravity;
-  const bool gravity = g[0] != 0 || g[1] != 0 || g[2] != 0;
-  add("gravity", gravity, gravity ? "option gravity is not zero" : "option gravity is zero");
-  const bool turning = std::any_of(m.links.begin(), m.links.end(), [](const Link& l) {
-    return l.kind == JointKind::spherical || l.kind == JointKind::revolute;
-  });
-  add("velocity products", turning, turning ? "some joint turns" : "no joint turns");
-  const auto joints_with = [&](kernels::JointEffect effect) {
-    return std::size_t(
-        std::count_if(m.joints.begin(), m.joints.end(), [&](const CompiledJoint& joint) {
-          return std::any_of(m.links.begin() + std::max(joint.first_link, 0),
-                             m.links.begin() + std::max(joint.first_link, 0) + joint.link_count,
-                             [&](const Link& l) { return (l.effects & effect) != 0; });
-        }));
-  };
-  const std::pair<const char*, kernels::JointEffect> of_joints[] = {
-      {"joint damping", kernels::kDamped},
-      {"joint springs", kernels::kSprung},
-      {"joint limits", kernels::kLimited},
-      {"armature", kernels::kArmoured}};
-  for (const auto& [name, effect] : of_joints) {
-    const std::size_t n = joints_with(effect);
-    add(name, n > 0, counted(n, "joint", "joints"));
-  }
-  const auto controls_of = [&](MotorControl control) {
-    return std::size_t(
-        std::count_if(m.motors.begin(), m.motors.end(),
-                      [&](const CompiledMotor& motor) { return motor.control == control; }));
-  };
-  add("force motors", controls_of(MotorControl::force) > 0,
-      counted(controls_of(MotorControl::force), "control", "controls"));
-  add("position motors", controls_of(MotorControl::position) > 0,
-      counted(controls_of(MotorControl::position), "control", "controls"));
-  add("pair contact", !m.pairs.empty(), counted(m.pairs.size(), "pair declared", "pairs declared"));
-  add("ground contact", !m.grounds.empty(),
-      counted(m.grounds.size(), "body declared", "bodies declared"));
-  add("tactile", !m.sensors.empty(),
-      counted(m.sensors.size(), "sensor declared", "sensors declared"));
-  const std::size_t varying = m.layout.rows - m.layout.parameters;
-  add("varying parameters", varying > 0,
-      counted(varying, "number varies by environment", "numbers vary by environment"));
+  m.effects = effects_of(m.scene);
+  for (EffectInfo& info : m.effects)
+    if (info.on) info.variant = effect_variant(m, info.effect);
 }
 
 void list_stages(CompiledModel& m) {

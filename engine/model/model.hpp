@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/model/effects.hpp"
 #include "engine/model/scene.hpp"
 
 namespace tangere {
@@ -36,13 +37,6 @@ struct ContactInfo {
   std::string first, second;  ///< bodies; second is "ground" for a ground contact
   int points = 0;             ///< candidate points (1 for a sphere on the ground)
   std::string law;
-};
-
-/// An effect that compile() switched on or off, and why. `inspect` prints it.
-struct EffectInfo {
-  std::string name;
-  bool on = false;
-  std::string reason;
 };
 
 /// A stage of the step that the scene calls for, what it works on and the variant of its kernel.
@@ -74,6 +68,7 @@ class Model {
   [[nodiscard]] std::span<const EndEffectorInfo> end_effectors()
       const;  ///< end effectors, in file order
   [[nodiscard]] std::span<const ContactInfo> contacts() const;
+  /// What effects_of() lists for the scene, with the variants of the kernels.
   [[nodiscard]] std::span<const EffectInfo> effects() const;
   [[nodiscard]] std::span<const StageInfo> stages() const;     ///< in the order in which they run
   [[nodiscard]] std::span<const std::string> q_names() const;  ///< "object_joint.qw" …

@@ -282,6 +282,7 @@ struct Scene {
   std::optional<ControlDescription> control;
   std::vector<RandomizationDescription> randomizations;
   std::optional<OutputsDescription> outputs;  ///< none: everything
+  Source gravity_source{};  ///< the <option> that gives gravity; line 0: none does
 };
 
 /// The name users write and read: "free", "clamped" …

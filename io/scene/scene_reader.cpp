@@ -151,6 +151,7 @@ void read_option(Scene& scene, const SceneNode& node) {
   SceneContext& c = node.context();
   node.check_attributes({"gravity", "timestep", "integrator", "unit"});
   scene.gravity = scaled(node.vector("gravity", Vector3{0, 0, -9.8 / c.length}), c.length);
+  if (node.has("gravity")) scene.gravity_source = node.source();
   scene.timestep = node.positive("timestep", 0.02);
   std::vector<std::string> names;
   for (const Integrator known : integrators()) names.emplace_back(to_string(known));

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+// Costs of effects as a table for people and as JSON.
+#include "apps/inspect_effects.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+namespace tangere::apps {
+namespace {
+
+std::string microseconds(double seconds) { return fmt::format("{:.3g} µs", 1e6 * seconds); }
+
+std::string percent(const MeasuredShare& m) {
+  return fmt::format("{:.1f} % ± {:.1f}", 100 * m.share + 0.0, 100 * m.spread);
+}
+
+/// Pads by what is seen: "µ" and "±" are two bytes each.
+std::string padded(const std::string& text, std::size_t width, bool right = false) {
+  const auto seen = std::size_t(std::count_if(text.begin(), text.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
+  }));
+  const std::string blanks(width > seen ? width - seen : 0, ' ');
+  return right ? blanks + text : text + blanks;
+}
+
+/// The lines that call for an effect, at most three of them.
+std::string first_lines(EffectInfo effect) {
+  constexpr std::size_t kShown = 3;
+  const std::size_t all = effect.sources.size();
+  if (all > kShown) effect.sources.resize(kShown);
+  std::string text = lines_of(effect);
+  if (all > kShown) text += fmt::format(" and {} more", all - kShown);
+  return text;
+}
+
+int elements_of(const EffectCosts& costs, EffectKind kind) {
+  return static_cast<int>(
+      std::count_if(costs.effects.begin(), costs.effects.end(), [&](const EffectCost& c) {
+        return c.effect.effect.kind == kind && c.effect.effect.element >= 0;
+      }));
+}
+
+/// Friction and damping of contacts and sensors.
+bool is_of_elements(EffectKind kind) {
+  constexpr EffectKind kKinds[] = {EffectKind::pair_friction,   EffectKind::pair_damping,
+                                   EffectKind::ground_friction, EffectKind::ground_damping,
+                                   EffectKind::tactile_shear,   EffectKind::tactile_damping};
+  return std::find(std::begin(kKinds), std::end(kKinds), kind) != std::end(kKinds);
+}
+
+/// Whether people see the row: a kind with one element is that element, and elements that are not
+/// timed one by one are left to --json.
+bool is_shown(const EffectCosts& costs, const EffectCost& cost) {
+  const int elements = elements_of(costs, cost.effect.effect.kind);
+  // What no contact or sensor can have needs no row: that there is none is said once.
+  if (elements == 0 && is_of_elements(cost.effect.effect.kind)) return false;
+  if (cost.effect.effect.element < 0) return elements != 1;
+  return times_elements(cost.effect.effect.kind, elements);
+}
+
+std::string row(const EffectCost& c, std::size_t width) {
+  const std::string lines = first_lines(c.effect);
+  std::string why = lines.empty() ? c.effect.reason : lines + ": " + c.effect.reason;
+  if (!c.effect.variant.empty()) why += "; kernel: " + c.effect.variant;
+  if (!c.note.empty()) why += "; " + c.note;
+  return fmt::format("  {} {} {} {} {:>7}  {}\n", padded(c.effect.name, width),
+                     padded(c.measured ? percent(*c.measured) : "-", 14, true),
+                     padded(c.measured ? microseconds(c.seconds_without) : "-", 9, true),
+                     padded(c.measured ? fmt::format("{:.2f}", c.passes_without) : "-", 6, true),
+                     c.bytes, why);
+}
+
+}  // namespace
+
+Json effect_costs_json(const EffectCosts& costs) {
+  Json out = Json::object();
+  for (const EffectCost& c : costs.effects) {
+    Json lines = Json::array();
+    for (const Source& source : c.effect.sources)
+      lines.push_back(fmt::format("{}:{}", source.file, source.line));
+    const bool m = c.measured.has_value();
+    out[c.effect.name] = {{"kind", to_string(c.effect.effect.kind)},
+                          {"on", c.effect.on},
+                          {"why", c.effect.reason},
+                          {"lines", lines},
+                          {"variant", c.effect.variant.empty() ? Json() : Json(c.effect.variant)},
+                          {"bytes", c.bytes},
+                          {"share", m ? Json(c.measured->share) : Json()},
+                          {"spread", m ? Json(c.measured->spread) : Json()},
+                          {"step_seconds_without", m ? Json(c.seconds_without) : Json()},
+                          {"newton_without", m ? Json(c.passes_without) : Json()},
+                          {"note", c.note}};
+  }
+  return out;
+}
+
+Json effect_measurement_json(const EffectCosts& costs) {
+  return {{"environments", costs.environments},
+          {"failed", costs.failed},
+          {"run_steps", costs.run_steps},
+          {"instants", costs.instants},
+          {"rounds", costs.rounds},
+          {"step_seconds", costs.times.whole()},
+          {"field_seconds", costs.times.reading},
+          {"newton", costs.times.passes},
+          {"share_of_nothing", costs.itself.share},
+          {"spread_of_nothing", costs.itself.spread}};
+}
+
+std::string effect_costs_text(const EffectCosts& costs, const std::string& instruction_set) {
+  std::size_t width = 10;
+  for (const EffectCost& c : costs.effects)
+    if (c.effect.on && is_shown(costs, c)) width = std::max(width, c.effect.name.size());
+  std::string text = fmt::format(
+      "effects, and what they cost\n"
+      "  a step of one environment takes {}{}, {:.2f} Newton passes ({})\n"
+      "  measured with {} environments from {} instants of {} steps, {} rounds; the scene against "
+      "itself shows {}\n"
+      "  shares are work, and need not add up to 100 %; passes: those of a step from the same "
+      "states without it\n\n",
+      microseconds(costs.times.whole()),
+      costs.times.reading > 0 ? ", of it " + microseconds(costs.times.reading) + " to read fields"
+                              : "",
+      costs.times.passes, instruction_set, costs.environments, costs.instants, costs.run_steps,
+      costs.rounds, percent(costs.itself));
+  if (costs.failed > 0)
+    text +=
+        fmt::format("  {} of {} environments fail along the run and are left out from there on\n\n",
+                    costs.failed, costs.environments);
+  text +=
+      fmt::format("  {} {} {} {} {:>7}  {}\n", padded("on", width), padded("share", 14, true),
+                  padded("without", 9, true), padded("passes", 6, true), "bytes", "called for by");
+  std::vector<std::string> off;
+  for (const EffectCost& c : costs.effects) {
+    if (!is_shown(costs, c)) continue;
+    if (c.effect.on)
+      text += row(c, width);
+    else
+      off.push_back(fmt::format("{} ({})", c.effect.name, c.effect.reason));
+  }
+  if (!off.empty()) text += fmt::format("\n  off, at no cost: {}\n", fmt::join(off, ", "));
+  return text;
+}
+
+}  // namespace tangere::apps

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Reports what the effects of a scene cost, for `tangere inspect --effects`.
+#pragma once
+
+#include <string>
+
+#include "apps/console.hpp"
+#include "tasks/effects/effect_costs.hpp"
+
+namespace tangere::apps {
+
+/// One key per effect, kinds and their elements.
+Json effect_costs_json(const EffectCosts& costs);
+/// How it was measured.
+Json effect_measurement_json(const EffectCosts& costs);
+/// A row per effect that is on; those that are off in one paragraph.
+std::string effect_costs_text(const EffectCosts& costs, const std::string& instruction_set);
+
+}  // namespace tangere::apps

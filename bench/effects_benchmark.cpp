@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+// Measures what each effect of the shipped scenes costs: steps with it and without it from the same
+// states, steps in which it is named but idle, and steps without any contact.
+//
+// Google Benchmark runs each once per repetition, because a repetition is a whole comparison that
+// alternates between two models: only ratios of one run mean something on a busy machine.
+#include <benchmark/benchmark.h>
+
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "io/scene/scene_reader.hpp"
+#include "kernels/numbers/block.hpp"
+#include "kernels/table/isa.hpp"
+#include "tasks/effects/effect_costs.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kEnvironments = 32, kInstants = 12, kRounds = 15;
+
+/// A shipped scene, and the coordinates by which its bodies are moved out of each other's reach.
+struct Case {
+  const char* scene;
+  std::vector<std::pair<std::string, double>> away;  // coordinate, displacement [m or rad]
+  bool lifted = false;                               // off the ground too
+};
+const std::vector<Case>& cases() {
+  static const std::vector<Case> all = {
+      {"rolling_ball", {{"pad_joint.z", 1}}},
+      {"box_pushing", {{"hand_slide.axis0", -1}}},
+      {"cap_opening", {{"upper_1.angle", -1}, {"upper_2.angle", -1}, {"upper_3.angle", -1}}},
+      {"insertion", {{"hand_slide.z", 2}, {"box.z", 1}}},
+      {"stable_grasp", {{"hand_slide.z", 1}, {"bar.z", 2}}, true}};
+  return all;
+}
+
+RecordedStates states_of(const Model& model, const Case& of, bool moved) {
+  RecordedStates states = record_states(model, kEnvironments, kInstants, 0);
+  const auto names = model.q_names();
+  for (const auto& [name, by] : of.away)
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      if (!moved || names[k] != name) continue;
+      for (RecordedInstant& at : states.instants)
+        for (std::vector<double>* q : {&at.q, &at.previous_q})
+          for (std::size_t i = k; i < q->size(); i += names.size()) (*q)[i] += by;
+    }
+  return states;
+}
+
+/// A scene with states along its run, or with the same states moved apart.
+struct Recorded {
+  Model model;
+  RecordedStates states;
+  StepperOptions options;
+  TimedModel timed;
+  StepTimes times;
+
+  Recorded(const Case& of, bool moved)
+      : model(read_scene(TANGERE_SOURCE_DIR "/scenes/" + std::string(of.scene) + ".xml").scene),
+        states(states_of(model, of, moved)),
+        options{{}, {}, Stepper(model).tolerance()},
+        timed(model, states, options),
+        times(measure_times(timed, *options.tolerance, kRounds)) {
+    times.reading = 0;  // steps alone
+  }
+
+  /// What this model would save by being `scene`, as a share of its step.
+  ModelComparison saved_by(const Scene& scene, int passes) {
+    TimedModel other(Model(scene), states, options);
+    return compare(timed, other, times, {true, false, passes}, *options.tolerance, kRounds);
+  }
+};
+
+Recorded& recorded(const Case& of, bool moved) {
+  static std::map<std::pair<std::string, bool>, std::unique_ptr<Recorded>> all;
+  std::unique_ptr<Recorded>& found = all[{of.scene, moved}];
+  if (found == nullptr) found = std::make_unique<Recorded>(of, moved);
+  return *found;
+}
+
+int passes_of(EffectKind kind) { return kind == EffectKind::pair_contact ? 2 : 1; }
+
+/// Times of a step with an effect over those without it.
+double ratio(const ModelComparison& c) { return 1 / (1 - c.saved.share); }
+
+void count(benchmark::State& state, const Recorded& r, double with_over_without) {
+  state.SetIterationTime(r.times.step);
+  state.counters["step_us"] = 1e6 * r.times.step;
+  state.counters["ratio"] = with_over_without;
+  state.SetLabel(kernels::active_isa_name());
+}
+
+/// As the scene has it, over removed.
+void effect_on(benchmark::State& state, const Case& of, Effect effect) {
+  Recorded& r = recorded(of, false);
+  for (auto _ : state)
+    count(state, r, ratio(r.saved_by(without(r.model.scene(), effect), passes_of(effect.kind))));
+}
+
+/// With its coefficient at zero, or limits never met, over removed.
+void effect_idle(benchmark::State& state, const Case& of, Effect effect, Way way) {
+  Recorded& r = recorded(of, false);
+  const Scene& scene = r.model.scene();
+  for (auto _ : state) {
+    const int passes = passes_of(effect.kind);
+    const double idle = 1 - r.saved_by(without(scene, effect, way), passes).saved.share;
+    const double gone = 1 - r.saved_by(without(scene, effect), passes).saved.share;
+    count(state, r, idle / gone);
+  }
+}
+
+/// Out of reach, over removed. `first_pass`: without factor and solve, so what is left is the search.
+void contacts_away(benchmark::State& state, const Case& of, Effect effect) {
+  Recorded& r = recorded(of, true);
+  const Scene removed = without(r.model.scene(), effect);
+  for (auto _ : state) {
+    count(state, r, ratio(r.saved_by(removed, passes_of(effect.kind))));
+    state.counters["first_pass"] = ratio(r.saved_by(removed, 1));
+  }
+}
+
+/// Reads all sensors at one instant in every environment of a block, dense or compact. Returns the
+/// seconds that one environment takes.
+class FieldReader {
+ public:
+  explicit FieldReader(const Recorded& r) : batch_(r.model, kernels::kBlock), readout_(r.model) {
+    const RecordedInstant& at = r.states.instants[kInstants / 2];
+    const auto nq = std::size_t(r.model.nq()), nv = std::size_t(r.model.nv());
+    for (std::size_t e = 0; e < kernels::kBlock; ++e)
+      batch_.set_state(int(e), std::span(at.q).subspan(e * nq, nq),
+                       std::span(at.v).subspan(e * nv, nv));
+    for (std::size_t s = 0; s < r.model.sensors().size(); ++s) {
+      compact_.emplace_back();
+      dense_.emplace_back();
+      for (int e = 0; e < int(kernels::kBlock); ++e) {
+        compact_.back().emplace_back(r.model, int(s));
+        dense_.back().emplace_back(r.model, int(s));
+      }
+    }
+  }
+  double dense() { return seconds(dense_); }
+  double compact() { return seconds(compact_); }
+
+ private:
+  template <class Frames>
+  double seconds(Frames& frames) {
+    double least = HUGE_VAL;
+    for (int k = 0; k < kRounds; ++k) {
+      const auto start = std::chrono::steady_clock::now();
+      for (auto& of_sensor : frames) readout_.read_block(batch_, 0, std::span(of_sensor));
+      least = std::min(
+          least, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    }
+    return least / kernels::kBlock;
+  }
+  Batch batch_;
+  Readout readout_;
+  std::vector<std::vector<CompactFrame<double>>> compact_;
+  std::vector<std::vector<DenseFrame<double>>> dense_;
+};
+
+/// Readings of all sensors of an environment that touch nothing, over those in the middle of the
+/// run.
+void fields(benchmark::State& state, const Case& of) {
+  FieldReader touching(recorded(of, false)), away(recorded(of, true));
+  for (auto _ : state) {
+    const double dense = touching.dense(), compact = touching.compact();
+    const double dense_away = away.dense(), compact_away = away.compact();
+    count(state, recorded(of, false), dense_away / dense);
+    state.counters["dense_us"] = 1e6 * dense;
+    state.counters["dense_away_us"] = 1e6 * dense_away;
+    state.counters["compact_us"] = 1e6 * compact;
+    state.counters["compact_away_us"] = 1e6 * compact_away;
+  }
+}
+
+/// A scene without contacts, over the scene as it is.
+void contact_free(benchmark::State& state, const Case& of) {
+  Recorded& r = recorded(of, false);
+  Scene bare = without(r.model.scene(), {EffectKind::pair_contact});
+  bare = without(bare, {EffectKind::ground_contact});
+  bare = without(bare, {EffectKind::tactile});
+  for (auto _ : state) count(state, r, 1 - r.saved_by(bare, 2).saved.share);
+}
+
+/// The scene against itself: what chance shows.
+void itself(benchmark::State& state, const Case& of) {
+  Recorded& r = recorded(of, false);
+  for (auto _ : state) count(state, r, ratio(r.saved_by(r.model.scene(), 1)));
+}
+
+template <class F, class... Arguments>
+void add(const std::string& name, const F& run, Arguments... arguments) {
+  benchmark::RegisterBenchmark(name.c_str(), run, arguments...)
+      ->UseManualTime()
+      ->Iterations(1)
+      ->Unit(benchmark::kMicrosecond);
+}
+
+void add_all() {
+  for (const Case& of : cases()) {
+    const std::string scene = of.scene;
+    const Scene read = read_scene(TANGERE_SOURCE_DIR "/scenes/" + scene + ".xml").scene;
+    add(scene + "/itself", itself, of);
+    add(scene + "/contact_free", contact_free, of);
+    add(scene + "/fields_away", fields, of);
+    for (const EffectInfo& info : effects_of(read)) {
+      const EffectKind kind = info.effect.kind;
+      if (!info.on || info.effect.element >= 0 || !has_way(kind, Way::removed)) continue;
+      if (kind >= EffectKind::tactile && kind <= EffectKind::tactile_damping) continue;
+      add(scene + "/on/" + info.name, effect_on, of, info.effect);
+      if (has_way(kind, Way::zero))
+        add(scene + "/zero/" + info.name, effect_idle, of, info.effect, Way::zero);
+      if (has_way(kind, Way::idle))
+        add(scene + "/never_met/" + info.name, effect_idle, of, info.effect, Way::idle);
+      if (kind == EffectKind::pair_contact || (kind == EffectKind::ground_contact && of.lifted))
+        add(scene + "/away/" + info.name, contacts_away, of, info.effect);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace tangere
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  tangere::add_all();
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

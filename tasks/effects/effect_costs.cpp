@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+// Goes through the table of effects: the scene without each, and how the times compare.
+#include "tasks/effects/effect_costs.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "engine/base/as_size.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kMostRounds = 41;
+
+bool is_of_sensors(EffectKind kind) {
+  return kind == EffectKind::tactile || kind == EffectKind::tactile_shear ||
+         kind == EffectKind::tactile_damping;
+}
+
+TimedParts parts_of(EffectKind kind) {
+  if (kind == EffectKind::varying_parameters) return {true, true, 1};
+  return {!is_of_sensors(kind), is_of_sensors(kind), kind == EffectKind::pair_contact ? 2 : 1};
+}
+
+/// Returns the bytes of one environment's state and fields.
+std::size_t bytes_of(const Model& model) {
+  std::size_t bytes = model.state_bytes_per_environment();
+  for (const SensorInfo& sensor : model.sensors())
+    bytes += 3 * sizeof(double) * as_size(sensor.points);
+  return bytes;
+}
+
+std::ptrdiff_t elements_of(const Model& model, EffectKind kind) {
+  return std::count_if(model.effects().begin(), model.effects().end(), [&](const EffectInfo& e) {
+    return e.effect.kind == kind && e.effect.element >= 0;
+  });
+}
+
+/// Returns why an effect is not timed; "" where it is.
+std::string reason_not_to_time(const Model& model, const Effect& effect) {
+  if (!has_way(effect.kind, Way::removed)) return "follows from the joints; cannot be removed";
+  const std::ptrdiff_t elements = elements_of(model, effect.kind);
+  if (effect.element >= 0 && !times_elements(effect.kind, elements))
+    return fmt::format("one of {}; timed together, as '{}'", elements, to_string(effect.kind));
+  return "";
+}
+
+/// What all effects of a scene are measured with.
+struct Measurement {
+  const Model& model;
+  RecordedStates recorded;
+  StepperOptions stepping;
+  TimedModel timed;
+  StepTimes times;
+  int rounds;
+
+  Measurement(const Model& of, const EffectCostOptions& options)
+      : model(of),
+        recorded(record_states(of, options.environments, options.instants, options.seed)),
+        stepping{{}, {}, Stepper(of).tolerance()},
+        timed(of, recorded, stepping),
+        times(measure_times(timed, *stepping.tolerance, kLeastRounds)),
+        rounds(rounds_of(options)) {}
+
+  /// Every effect gets the same share of the time.
+  [[nodiscard]] int rounds_of(const EffectCostOptions& options) const {
+    int effects = 1;
+    for (const EffectInfo& info : model.effects())
+      effects += info.on && reason_not_to_time(model, info.effect).empty() ? 1 : 0;
+    const double pair = 2 * times.step * options.environments * options.instants;
+    return static_cast<int>(
+        std::clamp(options.seconds / (pair * effects), double(kLeastRounds), double(kMostRounds)));
+  }
+  [[nodiscard]] ModelComparison against(const Model& other, TimedParts parts) {
+    TimedModel timed_other(other, recorded, stepping);
+    return compare(timed, timed_other, times, parts, *stepping.tolerance, rounds);
+  }
+};
+
+EffectCost measure(Measurement& m, const EffectInfo& info) {
+  EffectCost cost{info};
+  cost.seconds_without = m.times.whole();
+  cost.passes_without = m.times.passes;
+  if (!info.on) {
+    cost.measured = MeasuredShare{};
+    return cost;
+  }
+  cost.note = reason_not_to_time(m.model, info.effect);
+  if (!has_way(info.effect.kind, Way::removed)) return cost;
+  const Model trimmed(without(m.model.scene(), info.effect));
+  cost.bytes =
+      static_cast<std::int64_t>(bytes_of(m.model)) - static_cast<std::int64_t>(bytes_of(trimmed));
+  if (m.times.passes == 0) cost.note = "every environment fails before the first instant";
+  if (!cost.note.empty()) return cost;
+  const ModelComparison c = m.against(trimmed, parts_of(info.effect.kind));
+  cost.measured = c.saved;
+  cost.seconds_without = m.times.whole() * (1 - c.saved.share);
+  cost.passes_without = c.passes;
+  if (c.failures > 0)
+    cost.note = fmt::format("without it {} of {} steps find no solution", c.failures, c.steps);
+  return cost;
+}
+
+}  // namespace
+
+bool times_elements(EffectKind kind, std::ptrdiff_t elements) {
+  const bool whole = kind == EffectKind::pair_contact || kind == EffectKind::ground_contact ||
+                     kind == EffectKind::tactile;
+  return elements <= (whole ? 12 : 4);
+}
+
+EffectCosts measure_effects(const Model& model, const EffectCostOptions& options) {
+  Measurement m(model, options);
+  EffectCosts costs;
+  costs.environments = options.environments;
+  costs.instants = static_cast<int>(m.recorded.instants.size());
+  costs.run_steps = m.recorded.steps;
+  const std::vector<std::uint8_t>& failed = m.recorded.instants.back().failed;
+  costs.failed = static_cast<int>(std::count(failed.begin(), failed.end(), 1));
+  costs.times = m.times;
+  costs.rounds = m.rounds;
+  costs.itself = m.against(Model(model.scene()), {true, true, 2}).saved;
+  for (const EffectInfo& info : model.effects()) {
+    // The only element of a kind is the kind, which has been measured just before.
+    if (info.effect.element == 0 && elements_of(model, info.effect.kind) == 1) {
+      EffectCost cost = costs.effects.back();
+      cost.effect = info;
+      costs.effects.push_back(std::move(cost));
+    } else {
+      costs.effects.push_back(measure(m, info));
+    }
+  }
+  return costs;
+}
+
+}  // namespace tangere

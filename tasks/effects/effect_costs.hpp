@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// What each effect of a scene costs: the time of a step with it against the time without it, from
+// the same states. docs/effects.md says how to read the figures.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/model/model.hpp"
+#include "tasks/effects/comparison.hpp"
+
+namespace tangere {
+
+struct EffectCostOptions {
+  int environments = 32;
+  int instants = 12;   ///< of the run, from which single steps are timed
+  double seconds = 2;  ///< to spend, about; more where kLeastRounds take longer
+  std::uint64_t seed = 0;
+};
+
+struct EffectCost {
+  EffectInfo effect;
+  /// State and fields of one environment that go with the effect [bytes].
+  std::int64_t bytes = 0;
+  /// Of a step; 0 for an effect that is off, none where `note` says why.
+  std::optional<MeasuredShare> measured{};
+  std::string note{};          ///< why it is not measured, or what else to know; may be ""
+  double seconds_without = 0;  ///< a step of one environment without the effect [s]
+  /// Evaluations of the residual per step from the same states, to the same tolerance.
+  double passes_without = 0;
+};
+
+struct EffectCosts {
+  int environments = 0, instants = 0;
+  int failed = 0;                   ///< environments that fail along the run
+  int rounds = 0;                   ///< pairs of steps per effect and instant
+  std::int64_t run_steps = 0;       ///< of the run that the instants come from
+  StepTimes times{};                ///< of the scene as it is
+  MeasuredShare itself{};           ///< the scene against itself: what chance alone shows
+  std::vector<EffectCost> effects;  ///< parallel to Model::effects()
+};
+
+/// Whether the elements of a kind are timed one by one: up to 12 contacts or sensors, or up to 4 of
+/// which a coefficient is taken out. The shares of more are lost in the noise.
+bool times_elements(EffectKind kind, std::ptrdiff_t elements);
+/// Rounds that an effect gets at least.
+inline constexpr int kLeastRounds = 5;
+
+/// Plays a batch by the scene's own controls, then times single steps from states of that run with
+/// the model and with a model without the effect, in turn. Throws InputError like a rollout.
+EffectCosts measure_effects(const Model& model, const EffectCostOptions& options = {});
+
+}  // namespace tangere

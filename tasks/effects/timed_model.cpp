@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// Recorded states become blocks of the model's own layout once; a sweep only restores them.
+#include "tasks/effects/timed_model.hpp"
+
+#include <ctime>
+
+#include <algorithm>
+#include <utility>
+
+#include "engine/base/as_size.hpp"
+#include "kernels/numbers/block.hpp"
+
+namespace tangere {
+namespace {
+
+using kernels::kBlock;
+/// Environments that are solved together; half a block.
+constexpr int kLanesOfGroup = kBlock / 2;
+
+/// Returns the CPU time of this thread [s], which other processes do not disturb as they do the
+/// wall clock.
+double cpu_seconds() {
+  std::timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Controls have the names of the dofs that they drive, so a name stands for one control.
+std::vector<std::size_t> columns_of(const Model& model, const Model& of) {
+  std::vector<std::size_t> columns;
+  for (const std::string& name : model.u_names())
+    columns.push_back(static_cast<std::size_t>(
+        std::find(of.u_names().begin(), of.u_names().end(), name) - of.u_names().begin()));
+  return columns;
+}
+
+}  // namespace
+
+TimedModel::TimedModel(const Model& model, const RecordedStates& recorded,
+                       const StepperOptions& options)
+    : recorded_(recorded),
+      options_(options),
+      batch_(model, recorded.environments),
+      stepper_(model, options),
+      readout_(model) {
+  const std::vector<std::size_t> columns = columns_of(model, recorded.model);
+  const std::size_t nq = as_size(model.nq()), nv = as_size(model.nv());
+  const std::size_t nu = as_size(recorded.model.nu());
+  set_numbers();
+  for (const RecordedInstant& at : recorded.instants) {
+    std::vector<double> u;
+    for (int e = 0; e < batch_.environments(); ++e) {
+      const std::size_t i = as_size(e);
+      const std::span<const double> q = std::span(at.q).subspan(i * nq, nq);
+      const std::span<const double> v = std::span(at.v).subspan(i * nv, nv);
+      if (at.previous_q.empty())
+        batch_.set_state(e, q, v);
+      else
+        batch_.set_state(e, q, v, std::span(at.previous_q).subspan(i * nq, nq),
+                         std::span(at.previous_v).subspan(i * nv, nv));
+      for (const std::size_t column : columns) u.push_back(at.controls[i * nu + column]);
+    }
+    starts_.emplace_back();
+    for (int b = 0; b < batch_.blocks(); ++b) starts_.back().push_back(batch_.save_block(b));
+    controls_.push_back(std::move(u));
+  }
+  const int read = std::min(int(kBlock), recorded.environments);
+  for (std::size_t k = 0; k < model.sensors().size(); ++k) {
+    frames_.emplace_back();
+    for (int e = 0; e < read; ++e) frames_.back().emplace_back(model, static_cast<int>(k));
+  }
+}
+
+void TimedModel::set_numbers() {
+  const Scene& own = batch_.model().scene();
+  for (std::size_t k = 0; k < own.randomizations.size(); ++k) {
+    const int at = static_cast<int>(k);
+    const int there = randomization_of(recorded_.model.scene(), own.randomizations[k].number);
+    if (!batch_.is_parameter(at) || there < 0) continue;
+    for (int e = 0; e < batch_.environments(); ++e)
+      batch_.set_randomized_value(e, at, recorded_.numbers[as_size(there)][as_size(e)]);
+  }
+}
+
+void TimedModel::restore(int instant) {
+  for (int b = 0; b < batch_.blocks(); ++b)
+    batch_.restore_block(b, starts_[as_size(instant)][as_size(b)]);
+  for (int e = 0; e < batch_.environments(); ++e)
+    batch_.hold(e, recorded_.instants[as_size(instant)].failed[as_size(e)] != 0);
+}
+
+void TimedModel::solve_to(double tolerance) {
+  if (options_.tolerance == tolerance) return;
+  options_.tolerance = tolerance;
+  stepper_ = Stepper(model(), options_);
+}
+
+TimedStep TimedModel::time_step(int instant) {
+  TimedStep step;
+  restore(instant);
+  const double start = cpu_seconds();
+  stepper_.step(batch_, controls_[as_size(instant)]);
+  step.seconds = cpu_seconds() - start;
+  std::int32_t most = 0;
+  int groups = 0;
+  for (int e = 0; e < batch_.environments(); ++e) {
+    if (!batch_.held(e)) {
+      ++step.steps;
+      step.passes += batch_.iterations(e);
+      most = std::max(most, batch_.iterations(e));
+      step.failures += failed(batch_.status(e)) ? 1 : 0;
+    }
+    if ((e + 1) % kLanesOfGroup != 0 && e + 1 < batch_.environments()) continue;
+    step.group_passes += std::exchange(most, 0);
+    ++groups;
+  }
+  step.seconds /= std::max(1, step.steps);
+  step.passes /= std::max(1, step.steps);
+  step.group_passes /= groups;
+  return step;
+}
+
+double TimedModel::time_reading(int sensor, int instant) {
+  std::vector<DenseFrame<double>>& frames = frames_[as_size(sensor)];
+  restore(instant);
+  const double start = cpu_seconds();
+  readout_.read_block(batch_, 0, std::span(frames));
+  return (cpu_seconds() - start) / double(frames.size());
+}
+
+}  // namespace tangere

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// A model with everything that is needed to time single steps and readings of it from recorded
+// states. Models of the same joints can be timed from the states of one run.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/sense/readout.hpp"
+#include "engine/step/stepper.hpp"
+#include "tasks/effects/recorded_states.hpp"
+
+namespace tangere {
+
+/// One step of all environments from an instant.
+struct TimedStep {
+  double seconds = 0;  ///< of one environment: CPU time of this thread
+  /// Evaluations of the residual: mean over the environments, and over groups of lanes, which go on
+  /// until their slowest lane is done.
+  double passes = 0, group_passes = 0;
+  int steps = 0, failures = 0;  ///< of environments; failures found no solution
+};
+
+class TimedModel {
+ public:
+  /// `recorded`: of a model that has the same joints, and every motor and number of this one. It
+  /// must outlive this object.
+  TimedModel(const Model& model, const RecordedStates& recorded, const StepperOptions& options);
+
+  /// Sets the tolerance of the steps.
+  void solve_to(double tolerance);
+  /// Takes one step of all environments from an instant, and times the step alone.
+  TimedStep time_step(int instant);
+  /// Reads one sensor into frames of the first block's environments, and times the reading of one
+  /// [s].
+  double time_reading(int sensor, int instant);
+
+  [[nodiscard]] const Model& model() const { return batch_.model(); }
+  /// What the last step or reading left.
+  [[nodiscard]] const Batch& batch() const { return batch_; }
+
+  [[nodiscard]] int instants() const { return static_cast<int>(starts_.size()); }
+
+ private:
+  void set_numbers();
+  void restore(int instant);
+
+  const RecordedStates& recorded_;
+  StepperOptions options_;
+  Batch batch_;
+  Stepper stepper_;
+  Readout readout_;
+  std::vector<std::vector<BlockState>> starts_;  // (instants, blocks)
+  std::vector<std::vector<double>> controls_;    // (instants), (E, nu) each
+  std::vector<std::vector<DenseFrame<double>>>
+      frames_;  // (sensors), one per environment of a block
+};
+
+}  // namespace tangere
