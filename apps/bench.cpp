@@ -2,6 +2,7 @@
 // tangere bench: measures how fast a scene or a task runs here, by number of threads. Everything is
 // checked before the first step.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -105,6 +106,12 @@ BenchSetting setting_of(const BenchArguments& options, const Model& model,
                              .every = options.every.value_or(0),
                              .outputs = record_of(options.record, model).outputs};
   setting.options.frames = frames_named(options.frames);
+  std::vector<std::string> names;
+  for (const FieldOutput of : fields_of(model, setting.options.rollout.outputs))
+    names.push_back(
+        output_name(model.sensors()[static_cast<std::size_t>(of.sensor)].name, of.form));
+  if (setting.options.frames != FrameKind::none)
+    setting.record = fmt::format("{}", fmt::join(names, ","));
   setting.options.repeat = options.repeat.value_or(setting.options.repeat);
   setting.every = common_interval(model, setting.options.rollout);
   return setting;
@@ -179,6 +186,8 @@ int bench(const BenchArguments& options, const Console& console) {
   // Reports a wrong word before a scene is read.
   frames_named(options.frames);
   precision_named(options.precision);
+  if (options.frames == "none" && !options.record.empty())
+    throw InputError("--frames none with --record; expected one of them");
   const SolverOptions asked{.accuracy = options.accuracy};
   if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return bench_task(options, console, *task);
@@ -231,9 +240,9 @@ Command add_bench(CLI::App& program) {
                         "Read tactile fields every N steps [default: the scene's, or 1]");
   add_text(app, "--frames", o.frames, "NAME",
            "Fields to read: dense (every point), compact (touched tiles) or none [default: dense]");
-  add_record_option(app, o.record,
-                    "Readings to take, separated by commas: of a sensor its field (pad), "
-                    "pad.pressure, pad.shear or pad.sum [default: the scene's, or all fields]");
+  add_text(app, "--record", o.record, "LIST",
+           "Readings to take, separated by commas: of a sensor its field (pad), "
+           "pad.pressure, pad.shear or pad.sum [default: the scene's, or all fields]");
   add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,
                         "Timed passes over the episode; the best counts [default: 3]");
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,

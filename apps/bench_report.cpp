@@ -23,10 +23,11 @@ std::string hexadecimal(std::uint64_t checksum) { return fmt::format("{:016x}", 
 
 std::string frames_text(const BenchSetting& setting) {
   const FrameKind frames = setting.options.frames;
-  if (frames == FrameKind::none || setting.every == 0)
-    return fmt::format("frames {}", to_string(frames));
-  return fmt::format("frames {} every {} step{}", to_string(frames), setting.every,
-                     setting.every == 1 ? "" : "s");
+  if (frames == FrameKind::none) return "frames none";
+  if (setting.record.empty()) return "no readings";
+  if (setting.every == 0) return fmt::format("frames {} of {}", to_string(frames), setting.record);
+  return fmt::format("frames {} of {} every {} step{}", to_string(frames), setting.record,
+                     setting.every, setting.every == 1 ? "" : "s");
 }
 
 std::string csv_field(const Json& value) {
@@ -48,8 +49,9 @@ std::vector<Failure> failures_of(const BenchRun& run) {
 
 int common_interval(const Model& model, const RolloutOptions& rollout) {
   int common = 0;
-  for (const SensorInfo& sensor : model.sensors()) {
-    const int every = tactile_interval(sensor, rollout);
+  for (const FieldOutput of : fields_of(model, rollout.outputs)) {
+    const int every =
+        tactile_interval(model.sensors()[static_cast<std::size_t>(of.sensor)], rollout);
     if (common != 0 && common != every) return 0;
     common = every;
   }
@@ -90,6 +92,7 @@ Json bench_entry(const BenchSetting& setting, const BenchRun& run) {
           {"steps", setting.options.rollout.steps},
           {"every", setting.every},
           {"frames", to_string(setting.options.frames)},
+          {"record", setting.record},
           {"precision", to_string(setting.options.precision)},
           {"isa", setting.isa},
           {"repeat", setting.options.repeat},

@@ -19,6 +19,7 @@ struct BenchSetting {
   int environments = 0;
   BenchmarkOptions options;  ///< its threads have no meaning here
   int every = 0;             ///< steps between fields; 0: none, or sensors differ
+  std::string record;        ///< names of the readings; empty: none
 };
 
 struct BenchRun {

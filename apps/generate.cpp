@@ -62,6 +62,10 @@ Record dataset_record(const GenerateOptions& options, const Model& model, const 
   Record record = record_of(options.record, model);
   if (options.record.empty() && std::erase(record.names, "bodies") > 0)
     console.note("a data set has no poses of bodies: 'bodies' of <outputs> is left out");
+  if (record.names.empty() && options.record.empty() && model.scene().outputs)
+    throw InputError(model.scene().outputs->source.prefix() +
+                     "<outputs>: nothing of record is in a data set; expected q, v, variables or "
+                     "readings of sensors, or --record");
   return record;
 }
 
@@ -433,10 +437,10 @@ Command add_generate(CLI::App& program) {
   add_text(app, "--tactile", o.tactile, "KIND",
            "Storage of large fields: dense, or sparse, which leaves out tiles of zeros [default: "
            "dense]");
-  add_record_option(app, o.record,
-                    "Observations to compute and store, separated by commas: q, v, variables, of a "
-                    "sensor its field (pad), pad.pressure, pad.shear or pad.sum [default: the "
-                    "scene's, or all fields]");
+  add_text(app, "--record", o.record, "LIST",
+           "Observations to compute and store, separated by commas: q, v, variables, of a "
+           "sensor its field (pad), pad.pressure, pad.shear or pad.sum [default: the "
+           "scene's, or all fields]");
   add_text(app, "--gradients", o.gradients, "KIND",
            "Derivatives to store: none, return (for a scene with --loss), or jacobians of each row "
            "[default: none]");

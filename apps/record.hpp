@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "apps/command.hpp"
 #include "tasks/run/rollout.hpp"
 
 namespace tangere::apps {
@@ -18,7 +17,5 @@ struct Record {
 /// Returns what the option asks for; if it is empty, what the scene asks for. Throws InputError for
 /// a name that the scene does not have.
 Record record_of(const std::string& option, const Model& model);
-
-void add_record_option(CLI::App& app, std::string& record, const std::string& text);
 
 }  // namespace tangere::apps

@@ -89,7 +89,8 @@ std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlP
 }
 
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout) {
-  for (const SensorInfo& sensor : model.sensors()) {
+  for (const FieldOutput of : fields_of(model, rollout.outputs)) {
+    const SensorInfo& sensor = model.sensors()[static_cast<std::size_t>(of.sensor)];
     const int every = tactile_interval(sensor, rollout);
     if (tactile_frames(sensor, rollout) == 0)
       console.note(fmt::format("sensor {} is read every {} steps: no field in {} steps",

@@ -55,6 +55,8 @@ struct Press {
 };
 /// Every point of the pad is in contact.
 const Press kEverywhere(0.5, 2e-3);
+/// The ball of the scene, 25 mm away: every tile is tested.
+const Press kNearby(0.02, -0.025);
 /// The ball of the scene, 5 cm away: beyond a sphere around the pad.
 const Press kAway(0.02, -0.05);
 /// The ball of the scene at its greatest depth; it touches a 25th of the points.
@@ -243,6 +245,7 @@ void BM_SmallPadAcrossEnvironmentsDouble(benchmark::State& s) { block<double>(s,
 void BM_SmallPadAcrossEnvironmentsMixed(benchmark::State& s) { block<float>(s, 20); }
 void BM_DensePressureDouble(benchmark::State& s) { field<double>(s, kEverywhere, 200, true, true); }
 void BM_DensePressureMixed(benchmark::State& s) { field<float>(s, kEverywhere, 200, true, true); }
+void BM_NearbyMixed(benchmark::State& s) { field<float>(s, kNearby, 200, true); }
 void BM_OutOfReachMixed(benchmark::State& s) { field<float>(s, kAway, 200, true); }
 void BM_CulledPressureMixed(benchmark::State& s) { field<float>(s, kMiddle, 200, true, true); }
 void BM_PressureAcrossEnvironmentsMixed(benchmark::State& s) { block<float>(s, 20, true); }
@@ -280,6 +283,7 @@ BENCHMARK(BM_DenseMixed);
 BENCHMARK(BM_DensePressureDouble);
 BENCHMARK(BM_DensePressureMixed);
 BENCHMARK(BM_CulledPressureMixed);
+BENCHMARK(BM_NearbyMixed);
 BENCHMARK(BM_OutOfReachMixed);
 BENCHMARK(BM_PressureAcrossEnvironmentsMixed);
 BENCHMARK(BM_ReadField);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <iterator>
 
+#include "engine/base/error.hpp"
+
 namespace tangere {
 
 namespace {
@@ -59,6 +61,19 @@ std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
     for (std::size_t s = 0; s < sensors.size(); ++s)
       if (output_name(sensors[s], form) == name) return FieldOutput{static_cast<int>(s), form};
   return std::nullopt;
+}
+
+void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors) {
+  for (std::size_t k = 0; k < outputs.size(); ++k) {
+    const FieldOutput of = outputs[k];
+    if (of.sensor < 0 || static_cast<std::size_t>(of.sensor) >= sensors)
+      throw InputError("an output of sensor " + std::to_string(of.sensor) + "; the scene has " +
+                       std::to_string(sensors));
+    if (std::find(outputs.begin(), outputs.begin() + static_cast<std::ptrdiff_t>(k), of) !=
+        outputs.begin() + static_cast<std::ptrdiff_t>(k))
+      throw InputError("the " + std::string(to_string(of.form)) + " of sensor " +
+                       std::to_string(of.sensor) + " is listed twice; expected it once");
+  }
 }
 
 std::vector<FieldOutput> whole_fields(const Model& model) {

@@ -15,13 +15,14 @@ namespace tangere {
 
 enum class FieldForm {
   field,     ///< (points, 3) [N]: f·axis0, f·axis1, -f·(axis0 × axis1)
-  pressure,  ///< (points, 1) [N]: the third of these, without friction (docs/effects.md)
+  pressure,  ///< (points, 1) [N]: the third of these, without friction (docs/outputs.md)
   shear,     ///< (points, 2) [N]: the first two
   sum,       ///< (6): force on the body [N], then where it presses [m], body axes
 };
 
 /// Force x y z on the body [N], then its centre x y z [m]: the mean of the points' places, each
-/// weighted by its pressure. Body axes; the centre is 0 where nothing presses.
+/// weighted by the third number of its field where that presses. Body axes; the centre is 0 where
+/// nothing presses.
 using FieldSum = std::array<double, 6>;
 
 /// The words of files and options: "field", "pressure", "shear", "sum".
@@ -49,6 +50,8 @@ bool is_plain_output(const std::string& name);
 /// Returns the reading of this name; none where no sensor has it.
 std::optional<FieldOutput> find_output(std::span<const std::string> sensors,
                                        const std::string& name);
+/// Throws InputError for a sensor that is not there and for an output that is listed twice.
+void check_outputs(std::span<const FieldOutput> outputs, std::size_t sensors);
 /// Returns the field of every sensor: what a scene gives where nothing else is asked for.
 std::vector<FieldOutput> whole_fields(const Model& model);
 /// Returns all names of outputs, the plain ones included.

@@ -114,7 +114,7 @@ ChunkPlan chunk_plan(const DatasetLayout& layout, const std::vector<std::uint64_
   plan.tile = shape;
   if (sparse) {
     plan.may_be_absent = true;
-    std::size_t tiled = shape.size() - 1;  // the last dimension, x y z, stays whole
+    std::size_t tiled = shape.size() - 1;  // the last dimension, a point's numbers, stays whole
     const std::uint64_t side = tiled == 1 ? kTilePoints
                                : *std::max_element(shape.begin(), shape.end()) < kLargeSide
                                    ? kTileSide

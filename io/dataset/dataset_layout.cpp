@@ -138,6 +138,7 @@ std::int64_t DatasetLayout::shard_of(std::int64_t episode) const {
 }
 
 void DatasetLayout::check() const {
+  check_outputs(fields, sensors.size());
   if (shards > blocks_of(episodes))
     throw InputError(
         fmt::format("{} shards of {} episodes; expected at most {}, one for each block of {}",

@@ -73,7 +73,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));
-  layout.fields = run.fields;
+  layout.fields = run.fields ? *run.fields : whole_fields(model);
   for (const StepStatus status :
        {StepStatus::converged, StepStatus::split, StepStatus::coarse, StepStatus::passed,
         StepStatus::not_converged, StepStatus::non_finite, StepStatus::rotation,

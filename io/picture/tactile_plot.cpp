@@ -103,6 +103,8 @@ class Picture {
           std::int64_t environment)
       : file_(file),
         s_(file.sensors()[sensor]),
+        with_pressure_(file.has_pressure(sensor)),
+        with_shear_(file.has_shear(sensor)),
         drawing_(drawing_of(s_)),
         panels_(std::move(panels)),
         environment_(environment) {
@@ -132,13 +134,15 @@ class Picture {
                                    ? fmt::format("{} × {} points", s_.rows, s_.cols)
                                    : fmt::format("{} points in an image of {} × {}", s_.points,
                                                  drawing_.rows, drawing_.cols);
-    out_ += text(kLeft, 48,
-                 points +
-                     "; colour: normal force per point (pressure positive); arrows: shear force on "
-                     "the body");
+    out_ +=
+        text(kLeft, 48,
+             points +
+                 (with_pressure_ ? "; colour: normal force per point (pressure positive)"
+                                 : "; pressure was not recorded") +
+                 (with_shear_ ? "; arrows: shear force on the body" : "; shear was not recorded"));
     for (std::size_t k = 0; k < panels_.size(); ++k)
       panel(panels_[k], kLeft + double(k) * (width_ + kGap), k == 0);
-    bar(kLeft + double(panels_.size()) * (width_ + kGap));
+    if (with_pressure_) bar(kLeft + double(panels_.size()) * (width_ + kGap));
     captions(tall);
     out_ += "</svg>\n";
     return std::move(out_);
@@ -176,8 +180,10 @@ class Picture {
         x0, kTop, width_, height_);
     axes(x0, first);
     const Unit u = unit_for(std::abs(p.total_pressure));
-    out_ += text(x0, kTop + height_ + 46,
-                 fmt::format("sum: pressure {:.3g} {}", p.total_pressure * u.factor, u.name));
+    if (with_pressure_)
+      out_ += text(x0, kTop + height_ + 46,
+                   fmt::format("sum: pressure {:.3g} {}", p.total_pressure * u.factor, u.name));
+    if (!with_shear_) return;
     const double shear = std::hypot(p.total_shear[0], p.total_shear[1]);
     const Unit v = unit_for(shear);
     out_ += text(x0, kTop + height_ + 61, fmt::format("shear {:.3g} {}", shear * v.factor, v.name));
@@ -254,13 +260,14 @@ class Picture {
           kLeft, tall - 10, length);
       note = fmt::format("= {:.3g} {} shear per point. ", shown * u.factor, u.name) + note;
       out_ += text(kLeft + length + 6, tall - 6, note, "font-size=\"11\"");
-    } else {
+    } else if (with_shear_) {
       out_ += text(kLeft, tall - 6, note + "No shear in these frames.", "font-size=\"11\"");
     }
   }
 
   const TrajectoryReader& file_;
   const SensorLayout& s_;
+  bool with_pressure_, with_shear_;  // whether they were recorded
   TactileDrawing drawing_;
   std::vector<Panel> panels_;
   std::int64_t environment_;

@@ -17,7 +17,7 @@ namespace tangere {
 
 namespace {
 
-constexpr std::int64_t kFormatVersion = 2;
+constexpr std::int64_t kFormatVersion = 3;
 constexpr hsize_t kChunkBytes = 1U << 20;
 
 /// A chunk has whole rows, about a megabyte.
@@ -270,6 +270,12 @@ struct TrajectoryFile::Impl {
     task.success = rows<std::int8_t>(group, "success", {A, E});
   }
 
+  void expect_numbers(const char* of, std::int64_t row, std::size_t found, hsize_t expected) const {
+    if (found != expected)
+      throw IoError(fmt::format("{}: row {} has {} numbers of {}; expected {}", part.output(), row,
+                                found, of, expected));
+  }
+
   /// Row `at` of a dataset whose other dimensions are `row`.
   template <class T>
   static void put(const h5::Id& d, std::int64_t at, h5::Dims row, const T* data) {
@@ -293,14 +299,14 @@ void TrajectoryFile::write(const StateRow& row) {
   h5::write_box<double>(f.time, {static_cast<hsize_t>(t)}, {one}, &row.time);
   Impl::put<double>(f.q, t, {E, f.layout.q_names.size()}, row.q.data());
   Impl::put<double>(f.v, t, {E, f.layout.v_names.size()}, row.v.data());
+  f.expect_numbers("poses and twists", t, row.body_pose.size() + row.body_twist.size(),
+                   E * nb * 13);
   if (nb > 0) {
     Impl::put<double>(f.pose, t, {E, nb, 7}, row.body_pose.data());
     Impl::put<double>(f.twist, t, {E, nb, 6}, row.body_twist.data());
   }
   if (const hsize_t n = f.layout.end_effector_names.size(); n > 0) {
-    if (row.end_effectors.size() != E * n * 3)
-      throw IoError(fmt::format("{}: row {} has {} numbers for {} end effectors of {} environments",
-                                f.part.output(), t, row.end_effectors.size(), n, E));
+    f.expect_numbers("end effectors", t, row.end_effectors.size(), E * n * 3);
     Impl::put<double>(f.end_effectors, t, {E, n, 3}, row.end_effectors.data());
   }
   ++f.states;
@@ -320,7 +326,14 @@ void TrajectoryFile::write(const StepRow& row) {
 void TrajectoryFile::write(const TactileRow& row) {
   const std::vector<FieldOutput>& fields = impl_->layout.fields;
   const auto at = std::find(fields.begin(), fields.end(), row.output);
-  Impl::Reading& r = impl_->readings.at(std::size_t(at - fields.begin()));
+  if (at == fields.end())
+    throw IoError(fmt::format("{}: row {} has the {} of sensor {}, which its layout lacks",
+                              impl_->part.output(), row.step, to_string(row.output.form),
+                              row.output.sensor));
+  Impl::Reading& r = impl_->readings[std::size_t(at - fields.begin())];
+  hsize_t numbers = 1;
+  for (const hsize_t n : r.frame) numbers *= n;
+  impl_->expect_numbers("a reading", row.step, row.numbers.size(), numbers);
   Impl::put<double>(r.numbers, row.frame, r.frame, row.numbers.data());
   if (r.step.get() >= 0)  // once for all readings of a sensor
     h5::write_box<std::int64_t>(r.step, {static_cast<hsize_t>(row.frame)}, {1}, &row.step);

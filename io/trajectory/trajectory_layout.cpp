@@ -108,6 +108,7 @@ void TrajectoryLayout::check() const {
                                  randomized_values.size(), randomized_names.size(), environments));
   std::set<std::string> names;
   for (const SensorLayout& sensor : sensors) check_sensor(sensor, names);
+  check_outputs(fields, sensors.size());
   static_cast<void>(bytes());
 }
 

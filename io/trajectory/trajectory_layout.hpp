@@ -86,9 +86,10 @@ struct TrajectoryLayout {
 /// What the model and the batch do not know about a run.
 struct RunDescription {
   std::int64_t steps = 0, first_step = 0;
-  int every = 0;                             ///< the option as given; 0: each sensor's own interval
-  std::vector<int> tactile_intervals;        ///< K in force, one per sensor
-  std::vector<FieldOutput> fields;           ///< what is recorded of them
+  int every = 0;                       ///< the option as given; 0: each sensor's own interval
+  std::vector<int> tactile_intervals;  ///< K in force, one per sensor
+  /// Recorded; none: the field of every sensor.
+  std::optional<std::vector<FieldOutput>> fields;
   bool bodies = true, end_effectors = true;  ///< recorded
   std::string precision, command_line, version, instruction_set;
   std::optional<TaskSpec> task;

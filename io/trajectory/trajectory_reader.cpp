@@ -25,7 +25,8 @@ struct TrajectoryReader::Impl {
   std::int64_t environments = 0;
   double timestep = 0;
   std::vector<SensorLayout> sensors;
-  std::vector<FieldForm> forms;  // (sensors) what was recorded
+  std::vector<std::vector<FieldForm>> forms;  // (sensors) what was recorded
+  std::vector<std::string> sums;              // sensors of which only the sum was
   std::vector<std::int64_t> frames;
 
   explicit Impl(const std::string& p) : path(p), file(h5::open_file(p)) {
@@ -44,12 +45,32 @@ struct TrajectoryReader::Impl {
       if (H5Lget_name_by_idx(group.get(), ".", H5_INDEX_NAME, H5_ITER_INC, i, name, sizeof name,
                              H5P_DEFAULT) < 0)
         throw IoError(path + ": the list of sensors is damaged");
-      const h5::Id sensor = h5::open_group(group, name);
-      for (const FieldForm form : {FieldForm::field, FieldForm::pressure, FieldForm::shear})
-        if (h5::has_link(sensor, dataset_of(form))) {
-          add_sensor(sensor, name, form);
-          break;  // a field holds the others; of a sum there is nothing to draw
-        }
+      add_readings(h5::open_group(group, name), name);
+    }
+  }
+
+  /// Takes a field, or where there is none pressure, shear or both. A sum has no points.
+  void add_readings(const h5::Id& group, const std::string& name) {
+    std::vector<FieldForm> found;
+    for (const FieldForm form : {FieldForm::field, FieldForm::pressure, FieldForm::shear})
+      if (h5::has_link(group, dataset_of(form))) found.push_back(form);
+    if (found.empty()) {
+      if (!h5::has_link(group, dataset_of(FieldForm::sum)))
+        throw IoError(
+            fmt::format("{}: sensor '{}' has no reading: the file is damaged", path, name));
+      sums.push_back(name);
+      return;
+    }
+    if (found[0] == FieldForm::field) found.resize(1);
+    add_sensor(group, name, found[0]);
+    forms.push_back(found);
+    for (const FieldForm form : found) {
+      h5::Dims dims = h5::dimensions(h5::open_dataset(group, dataset_of(form))),
+               expected = h5::dimensions(h5::open_dataset(group, dataset_of(found[0])));
+      expected.back() = static_cast<hsize_t>(components_of(form));
+      if (dims != expected)
+        throw IoError(fmt::format("{}: sensor '{}': '{}' has not the shape of '{}'", path, name,
+                                  dataset_of(form), dataset_of(found[0])));
     }
   }
 
@@ -130,7 +151,6 @@ struct TrajectoryReader::Impl {
                                 dims.size()));
     }
     sensors.push_back(std::move(s));
-    forms.push_back(form);
     frames.push_back(static_cast<std::int64_t>(dims[0]));
   }
 
@@ -156,9 +176,18 @@ std::size_t TrajectoryReader::find_sensor(const std::string& name) const {
     names.push_back(impl_->sensors[i].name);
     if (name.empty() || names.back() == name) return i;
   }
+  if (std::find(impl_->sums.begin(), impl_->sums.end(), name) != impl_->sums.end())
+    throw InputError(impl_->path + ": of sensor '" + name + "' the run recorded only the sum");
   if (names.empty())
     throw InputError(impl_->path + ": the run recorded no tactile field, pressure or shear");
   throw InputError(impl_->path + ": no sensor is named '" + name + "'" + suggestion(name, names));
+}
+
+bool TrajectoryReader::has_pressure(std::size_t sensor) const {
+  return impl_->forms[sensor].front() != FieldForm::shear;
+}
+bool TrajectoryReader::has_shear(std::size_t sensor) const {
+  return impl_->forms[sensor].back() != FieldForm::pressure;
 }
 
 std::int64_t TrajectoryReader::frames(std::size_t sensor) const { return impl_->frames[sensor]; }
@@ -173,20 +202,20 @@ std::int64_t TrajectoryReader::step(std::size_t sensor, std::int64_t frame) cons
 std::vector<double> TrajectoryReader::force(std::size_t sensor, std::int64_t frame,
                                             std::int64_t environment) const {
   const SensorLayout& s = impl_->sensors[sensor];
-  const FieldForm form = impl_->forms[sensor];
-  const std::vector<std::uint64_t> shape = reading_shape(s, form);
-  h5::Dims offset(2 + shape.size(), 0), count = {1, 1};
-  offset[0] = static_cast<hsize_t>(frame), offset[1] = static_cast<hsize_t>(environment);
-  count.insert(count.end(), shape.begin(), shape.end());
-  std::vector<double> values(numbers_of(s.points, form));
-  h5::read_box<double>(impl_->open(sensor, dataset_of(form)), offset, count, values.data());
-  impl_->check_finite(values, s.name, fmt::format("frame {}", frame));
-  if (form == FieldForm::field) return values;
   std::vector<double> whole(numbers_of(s.points, FieldForm::field), 0.0);
-  const auto components = static_cast<std::size_t>(components_of(form)),
-             first = std::size_t(form == FieldForm::pressure ? 2 : 0);
-  for (std::size_t k = 0; k < values.size(); ++k)
-    whole[k / components * 3 + first + k % components] = values[k];
+  for (const FieldForm form : impl_->forms[sensor]) {
+    const std::vector<std::uint64_t> shape = reading_shape(s, form);
+    h5::Dims offset(2 + shape.size(), 0), count = {1, 1};
+    offset[0] = static_cast<hsize_t>(frame), offset[1] = static_cast<hsize_t>(environment);
+    count.insert(count.end(), shape.begin(), shape.end());
+    std::vector<double> values(numbers_of(s.points, form));
+    h5::read_box<double>(impl_->open(sensor, dataset_of(form)), offset, count, values.data());
+    impl_->check_finite(values, s.name, fmt::format("frame {}", frame));
+    const auto components = static_cast<std::size_t>(components_of(form));
+    const std::size_t first = form == FieldForm::pressure ? 2 : 0;
+    for (std::size_t k = 0; k < values.size(); ++k)
+      whole[k / components * 3 + first + k % components] = values[k];
+  }
   return whole;
 }
 

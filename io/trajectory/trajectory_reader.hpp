@@ -28,7 +28,11 @@ class TrajectoryReader {
   [[nodiscard]] std::int64_t frames(std::size_t sensor) const;
   /// Returns the row of /q from which a frame was read.
   [[nodiscard]] std::int64_t step(std::size_t sensor, std::int64_t frame) const;
-  /// Returns a field, (points, 3) [N].
+  /// Whether the numbers along the normal and those across it were recorded.
+  [[nodiscard]] bool has_pressure(std::size_t sensor) const;
+  [[nodiscard]] bool has_shear(std::size_t sensor) const;
+  /// Returns a field, (points, 3) [N]. What was not recorded is 0. Where pressure was recorded
+  /// instead of the field, the third number is without friction.
   [[nodiscard]] std::vector<double> force(std::size_t sensor, std::int64_t frame,
                                           std::int64_t environment) const;
 

@@ -6,6 +6,7 @@
 // in brackets, which are computed in double once per tile:
 //   sphere: a = t - c;  D = a + s;  D² - r² = s·(s + 2a) + [a² - r²];  d = |D| - r from it
 //   others: y = Qᵀ(t - c), the tile's centre in the shape's axes, e = Qᵀs (kernels/contact/shapes)
+//   pressure alone: -N n·e₂, where ḋ = n·(u + s × ω), because n·(ω × d n) = 0
 //   velocity at x₂ = ξ - d n:  u = [-(v + ω × t)] + ω × (d n - s)
 // Every function acts lane by lane. Lanes are tiles or environments for brackets, and points or
 // environments for forces.

@@ -64,6 +64,7 @@ EpisodeSource shape_of(const Model& model, const EpisodeOptions& options) {
   if (!model.end_effectors().empty()) s.widths.push_back(3 * model.end_effectors().size());
   s.first_field = s.widths.size();
   s.fields = options.fields ? *options.fields : whole_fields(model);
+  check_outputs(s.fields, model.sensors().size());
   for (const FieldOutput output : s.fields)
     s.widths.push_back(numbers_of(model.sensors()[as_size(output.sensor)].points, output.form));
   return s;

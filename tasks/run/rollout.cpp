@@ -122,7 +122,9 @@ void write_action(EpisodeProgram& program, std::int64_t step, RowSink& sink) {
 }  // namespace
 
 std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs) {
-  return outputs.fields ? *outputs.fields : whole_fields(model);
+  if (!outputs.fields) return whole_fields(model);
+  check_outputs(*outputs.fields, model.sensors().size());
+  return *outputs.fields;
 }
 
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options) {
@@ -136,10 +138,12 @@ std::int64_t tactile_frames(const SensorInfo& sensor, const RolloutOptions& opti
 }
 
 double rollout_bytes(const Model& model, int environments, const RolloutOutputs& outputs) {
-  const double numbers = model.nq() + model.nv() + model.nu() +
-                         (outputs.bodies ? double{kPoseWidth + kTwistWidth} * model.nb() : 0.0) +
-                         static_cast<double>(model.end_effectors().size() * kPositionWidth +
-                                             largest_reading(model, outputs));
+  const double numbers =
+      model.nq() + model.nv() + model.nu() +
+      (outputs.bodies ? double{kPoseWidth + kTwistWidth} * model.nb() : 0.0) +
+      static_cast<double>((outputs.end_effectors ? model.end_effectors().size() : 0) *
+                              kPositionWidth +
+                          largest_reading(model, outputs));
   constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
   return environments * (numbers * sizeof(double) + kFlags);
 }

@@ -63,7 +63,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram&
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress = {});
 
-/// Returns what is read of tactile fields.
+/// Returns what is read of tactile fields. Throws InputError as check_outputs() does.
 std::vector<FieldOutput> fields_of(const Model& model, const RolloutOutputs& outputs);
 /// Steps between the fields of a sensor under these options.
 int tactile_interval(const SensorInfo& sensor, const RolloutOptions& options);

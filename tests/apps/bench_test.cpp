@@ -148,8 +148,8 @@ TEST(Bench, PeopleGetATable) {
       run(folder, bench({"--envs", "32", "--steps", "10", "--threads", "1,2", "--svg", "a.svg"}));
   EXPECT_EQ(text.exit_code, 0);
   for (const char* part :
-       {"rolling_ball_small: 32 environments, 10 steps, frames dense every 5 steps", "env-steps/s",
-        "speed-up", "checksum: ", "wrote a.svg"})
+       {"rolling_ball_small: 32 environments, 10 steps, frames dense of pad every 5 steps",
+        "env-steps/s", "speed-up", "checksum: ", "wrote a.svg"})
     EXPECT_THAT(text.out, HasSubstr(part));
   EXPECT_THAT(run(folder, bench({"--envs", "2", "--steps", "5", "--threads", "2"})).err,
               HasSubstr("1 block of 16 environments keep"));

@@ -69,6 +69,14 @@ TEST(Record, AnythingElseOfATrajectoryStillWorks) {
   const std::string ball = scene("rolling_ball_small.xml");
   simulate(folder, ball, "some.h5", {"--record", "pad.pressure"});
   EXPECT_EQ(run(folder, {"plot", "some.h5", "-o", "pad.svg"}).exit_code, 0);
+  EXPECT_THAT(file_bytes(folder.path("pad.svg")), HasSubstr("shear was not recorded"));
+  simulate(folder, ball, "shear.h5", {"--record", "pad.shear"});
+  EXPECT_EQ(run(folder, {"plot", "shear.h5", "-o", "shear.svg"}).exit_code, 0);
+  EXPECT_THAT(file_bytes(folder.path("shear.svg")), HasSubstr("pressure was not recorded"));
+  simulate(folder, ball, "both.h5",
+           {"--record", "pad.shear,pad.pressure", "--gradients", "tactile"});
+  EXPECT_EQ(run(folder, {"plot", "both.h5", "-o", "both.svg"}).exit_code, 0);
+  EXPECT_THAT(file_bytes(folder.path("both.svg")), ::testing::Not(HasSubstr("was not recorded")));
   simulate(folder, ball, "next.h5", {"--record", "bodies", "--state-from", "some.h5"});
   EXPECT_TRUE(has(folder, "next.h5", "/", "bodies"));
   EXPECT_FALSE(has(folder, "next.h5", "/", "tactile"));
@@ -76,6 +84,10 @@ TEST(Record, AnythingElseOfATrajectoryStillWorks) {
   const Outcome none = run(folder, {"plot", "sum.h5", "-o", "sum.svg"});
   EXPECT_EQ(none.exit_code, 2);
   EXPECT_THAT(none.err, HasSubstr("the run recorded no tactile field, pressure or shear"));
+  EXPECT_THAT(run(folder, {"plot", "sum.h5", "-o", "sum.svg", "--sensor", "pad"}).err,
+              HasSubstr("of sensor 'pad' the run recorded only the sum"));
+  run_json(folder, {"simulate", "stable_grasp", "-o", "task.h5", "--record", "left_pad.sum"});
+  EXPECT_EQ(shape(folder, "task.h5", "tactile/left_pad/sum").back(), 6U);
 }
 
 TEST(Record, ADataSetHoldsTheFormsOfAWholeOne) {
@@ -83,13 +95,21 @@ TEST(Record, ADataSetHoldsTheFormsOfAWholeOne) {
   const std::string ball = scene("rolling_ball_small.xml");
   const Words size{"generate", ball, "--episodes", "17", "--steps", "120", "--every", "20"};
   run_json(folder, size + Words{"-o", "whole"});
-  run_json(folder, size + Words{"-o", "some", "--record", "q,pad.shear,pad.pressure,pad.sum"});
+  run_json(folder, size + Words{"-o", "some", "--record", "pad.sum,q,pad.shear,pad.pressure"});
+  EXPECT_EQ(run(folder, size + Words{"-o", "some", "--record", "q,pad.shear,pad.pressure,pad.sum",
+                                     "--resume"})
+                .exit_code,
+            0)
+      << "the order of names does not matter";
+  EXPECT_THAT(
+      run(folder, size + Words{"-o", "some", "--record", "q,pad.sum", "--resume"}).err,
+      HasSubstr("observations: q, pad.pressure, pad.shear, pad.sum there, q, pad.sum here"));
   run_json(folder,
            size + Words{"-o", "sparse", "--record", "pad.shear,pad", "--tactile", "sparse"});
   const std::string shard = "some/shard-00000.h5", demo = "data/demo_16/obs/";
   EXPECT_THAT(
       h5::read_texts(h5::open_group(h5::open_file(folder.path(shard)), "scene"), "observations"),
-      ElementsAre("q", "pad.shear", "pad.pressure", "pad.sum"));
+      ElementsAre("q", "pad.pressure", "pad.shear", "pad.sum"));
   EXPECT_EQ(shape(folder, shard, demo + "pad.pressure"), (h5::Dims{6, 32, 32, 1}));
   EXPECT_EQ(shape(folder, shard, demo + "pad.sum"), (h5::Dims{6, 6}));
   const std::vector<double> whole = numbers(folder, "whole/shard-00000.h5", demo + "pad"),
@@ -99,7 +119,7 @@ TEST(Record, ADataSetHoldsTheFormsOfAWholeOne) {
   EXPECT_EQ(numbers(folder, "sparse/shard-00000.h5", demo + "pad"), whole);
   EXPECT_THAT(h5::read_texts(h5::open_group(h5::open_file(folder.path(shard)), "scene/sensors/pad"),
                              "readings"),
-              ElementsAre("pad.shear", "pad.pressure", "pad.sum"));
+              ElementsAre("pad.pressure", "pad.shear", "pad.sum"));
   for (const char* set : {"some", "sparse"}) {
     EXPECT_EQ(run(folder, {"validate", set}).exit_code, 0) << set;
     EXPECT_EQ(run(folder, {"validate", std::string(set) + "/robomimic.hdf5"}).exit_code, 0) << set;
@@ -125,6 +145,13 @@ TEST(Record, TheSceneAsksAndTheOptionAsksInstead) {
   EXPECT_EQ(set.exit_code, 0) << set.err;
   EXPECT_THAT(set.err, HasSubstr("'bodies' of <outputs> is left out"));
   EXPECT_EQ(shape(folder, "set/shard-00000.h5", "data/demo_0/obs/pad.sum"), (h5::Dims{1, 6}));
+  std::string bodies = text;
+  bodies.replace(bodies.find("bodies,pad.sum"), 14, "bodies");
+  folder.write("bodies.xml", bodies);
+  const Outcome nothing =
+      run(folder, {"generate", "bodies.xml", "-o", "none", "--episodes", "1", "--steps", "5"});
+  EXPECT_EQ(nothing.exit_code, 2);
+  EXPECT_THAT(nothing.err, HasSubstr("<outputs>: nothing of record is in a data set"));
   text.replace(text.find("pad.sum"), 7, "pad.sun");
   folder.write("wrong.xml", text);
   const Outcome wrong = run(folder, {"inspect", "wrong.xml"});

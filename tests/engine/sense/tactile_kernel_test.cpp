@@ -285,9 +285,9 @@ void check_pressure(const Case& c, double tolerance) {
         for (std::size_t k = 0; k < shapes.size(); ++k) {
           Touch<double> smooth = touches[k];
           smooth.law[1] = 0;
-          expected += reference(shapes[k], smooth, c.law,
-                                pad.point(n / pad.tiles.cols, n % pad.tiles.cols))
-                          .z;
+          expected +=
+              reference(shapes[k], smooth, c.law, pad.point(n / pad.tiles.cols, n % pad.tiles.cols))
+                  .z;
         }
         peak = std::max(peak, std::abs(expected));
         off = std::max(off, std::abs(double(got.dense[std::size_t(n)]) - expected));
@@ -329,9 +329,8 @@ void check_block(const Case& c, bool pressure) {
     std::vector<Real*> arrays;
     for (auto& d : dense) arrays.push_back(d.data());
     arrays[5] = nullptr;
-    run(*table,
-        kernels::TactileBlockArgs<Real>{&pad.tiles, c.law, 1, &shape, of_shape, arrays.data(),
-                                        pressure});
+    run(*table, kernels::TactileBlockArgs<Real>{&pad.tiles, c.law, 1, &shape, of_shape,
+                                                arrays.data(), pressure});
     for (int l = 0; l < kLanes; ++l) {
       if (l == 5) continue;
       const auto alone =
