@@ -203,7 +203,8 @@ TEST(Simulate, SaysWhatItDid) {
   EXPECT_EQ(answer.at("output"), "out.h5");
   EXPECT_EQ(answer.at("bytes"), std::filesystem::file_size(folder.path("out.h5")));
   EXPECT_THAT(answer.at("failed"), IsEmpty());
-  EXPECT_EQ(answer.at("sensors"), json::parse(R"([{"name": "pad", "every": 4, "frames": 10}])"));
+  EXPECT_EQ(answer.at("sensors"),
+            json::parse(R"([{"name": "pad", "form": "field", "every": 4, "frames": 10}])"));
   EXPECT_GT(answer.at("environment_steps_per_second"), 0);
   EXPECT_GE(answer.at("newton_iterations_per_step"), 1);
   EXPECT_THAT(folder.files(), ElementsAre("out.h5"));
@@ -515,7 +516,7 @@ TEST(Plot, ASceneWithoutSensorsHasNoPicture) {
   simulate(folder, "bare.xml", {"--steps", "3"});
   const Outcome outcome = run(folder, {"plot", "out.h5", "-o", "out.svg"});
   EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("sensor"));
+  EXPECT_THAT(outcome.err, HasSubstr("no tactile field"));
   EXPECT_THAT(folder.files(), ElementsAre("bare.xml", "out.h5"));
 }
 
