@@ -63,6 +63,12 @@ bool is_shown(const EffectCosts& costs, const EffectCost& cost) {
   return times_elements(cost.effect.effect.kind, elements);
 }
 
+std::string steps_text(const EffectCosts& costs) {
+  return costs.planned_steps > costs.run_steps
+             ? fmt::format("the first {} of {} steps", costs.run_steps, costs.planned_steps)
+             : fmt::format("{} steps", costs.run_steps);
+}
+
 std::string row(const EffectCost& c, std::size_t width) {
   const std::string lines = first_lines(c.effect);
   std::string why = lines.empty() ? c.effect.reason : lines + ": " + c.effect.reason;
@@ -84,17 +90,19 @@ Json effect_costs_json(const EffectCosts& costs) {
     for (const Source& source : c.effect.sources)
       lines.push_back(fmt::format("{}:{}", source.file, source.line));
     const bool m = c.measured.has_value();
-    out[c.effect.name] = {{"kind", to_string(c.effect.effect.kind)},
-                          {"on", c.effect.on},
-                          {"why", c.effect.reason},
-                          {"lines", lines},
-                          {"variant", c.effect.variant.empty() ? Json() : Json(c.effect.variant)},
-                          {"bytes", c.bytes},
-                          {"share", m ? Json(c.measured->share) : Json()},
-                          {"spread", m ? Json(c.measured->spread) : Json()},
-                          {"step_seconds_without", m ? Json(c.seconds_without) : Json()},
-                          {"newton_without", m ? Json(c.passes_without) : Json()},
-                          {"note", c.note}};
+    std::string key = c.effect.name;
+    while (out.contains(key)) key += "*";  // a sensor may be called "shear"
+    out[key] = {{"kind", to_string(c.effect.effect.kind)},
+                {"on", c.effect.on},
+                {"why", c.effect.reason},
+                {"lines", lines},
+                {"variant", c.effect.variant.empty() ? Json() : Json(c.effect.variant)},
+                {"bytes", c.bytes},
+                {"share", m ? Json(c.measured->share) : Json()},
+                {"spread", m ? Json(c.measured->spread) : Json()},
+                {"step_seconds_without", m ? Json(c.seconds_without) : Json()},
+                {"newton_without", m ? Json(c.passes_without) : Json()},
+                {"note", c.note}};
   }
   return out;
 }
@@ -103,6 +111,8 @@ Json effect_measurement_json(const EffectCosts& costs) {
   return {{"environments", costs.environments},
           {"failed", costs.failed},
           {"run_steps", costs.run_steps},
+          {"planned_steps", costs.planned_steps < 0 ? Json() : Json(costs.planned_steps)},
+          {"uncut", costs.uncut},
           {"instants", costs.instants},
           {"rounds", costs.rounds},
           {"step_seconds", costs.times.whole()},
@@ -119,15 +129,17 @@ std::string effect_costs_text(const EffectCosts& costs, const std::string& instr
   std::string text = fmt::format(
       "effects, and what they cost\n"
       "  a step of one environment takes {}{}, {:.2f} Newton passes ({})\n"
-      "  measured with {} environments from {} instants of {} steps, {} rounds; the scene against "
-      "itself shows {}\n"
+      "  measured with {} environments from {} instants of {}, {} rounds; the scene against itself "
+      "shows {}\n"
       "  shares are work, and need not add up to 100 %; passes: those of a step from the same "
       "states without it\n\n",
       microseconds(costs.times.whole()),
       costs.times.reading > 0 ? ", of it " + microseconds(costs.times.reading) + " to read fields"
                               : "",
-      costs.times.passes, instruction_set, costs.environments, costs.instants, costs.run_steps,
+      costs.times.passes, instruction_set, costs.environments, costs.instants, steps_text(costs),
       costs.rounds, percent(costs.itself));
+  if (costs.uncut)
+    text += "  the scene's accuracy cuts steps; the times are those of whole ones\n\n";
   if (costs.failed > 0)
     text +=
         fmt::format("  {} of {} environments fail along the run and are left out from there on\n\n",

@@ -9,6 +9,8 @@
 #include <iterator>
 #include <utility>
 
+#include "engine/model/field_form.hpp"
+
 namespace tangere {
 namespace {
 
@@ -419,6 +421,15 @@ bool has_way(EffectKind kind, Way way) {
   return way == Way::zero ? row.zero : row.idle;
 }
 
+/// Readings of sensors that are gone are no outputs.
+static void keep_known_outputs(Scene& scene) {
+  if (!scene.outputs) return;
+  const std::vector<std::string> sensors = sensor_names(scene);
+  std::erase_if(scene.outputs->record, [&](const std::string& name) {
+    return !is_plain_output(name) && !find_output(sensors, name);
+  });
+}
+
 Scene without(Scene scene, const Effect& effect, Way way) {
   const Row& row = row_of(effect.kind);
   const int count = static_cast<int>(element_names(scene, effect.kind).size());
@@ -426,6 +437,7 @@ Scene without(Scene scene, const Effect& effect, Way way) {
     throw InputError(fmt::format("a scene cannot be made without element {} of '{}' in this way",
                                  effect.element, row.name));
   row.drop(scene, effect.element, way);
+  keep_known_outputs(scene);
   return scene;
 }
 

@@ -72,7 +72,8 @@ void take_turns(int rounds, const A& with, const B& without, InstantTimes& times
 
 /// Loosens the tolerance of a model until it needs as few passes as `passes`.
 void need_as_few(TimedModel& model, int instant, double passes, double tolerance) {
-  if (passes <= 1) return model.solve_to(kAnything);
+  model.solve_to(kAnything);
+  if (model.time_step(instant).group_passes >= passes) return;
   double low = std::log(tolerance), high = std::log(kAnything), best = low, least = HUGE_VAL;
   for (int k = 0; k < kBisections; ++k) {
     const double middle = (low + high) / 2;
@@ -86,16 +87,21 @@ void need_as_few(TimedModel& model, int instant, double passes, double tolerance
 
 /// Makes both need as many passes as the one that needs fewer, at most `most`. Returns by how much
 /// the other's time has still to be scaled. `other`: its step before.
-double match_passes(TimedModel& with, TimedModel& without, int instant, double tolerance, int most,
-                    TimedStep& other) {
+double match_passes(TimedModel& with, TimedModel& without, int instant, double tolerance,
+                    double most, TimedStep& other) {
   with.solve_to(tolerance), without.solve_to(tolerance);
   const double needed = with.time_step(instant).group_passes;
   other = without.time_step(instant);
-  const double passes = std::min({needed, other.group_passes, double(most)});
+  const double passes = std::min({needed, other.group_passes, most});
   if (needed > passes) need_as_few(with, instant, passes, tolerance);
   if (other.group_passes > passes) need_as_few(without, instant, passes, tolerance);
   const double left = without.time_step(instant).group_passes;
   return left > 0 ? with.time_step(instant).group_passes / left : 1;
+}
+
+/// Readings of a short run are timed at its last instant.
+bool reads_at(const TimedModel& model, int instant) {
+  return instant % kReadingStride == std::min(kReadingStride / 2, model.instants() - 1);
 }
 
 /// A round of steps of one pass takes about half the time of others, and its noise counts twice.
@@ -107,27 +113,36 @@ int rounds_of(const TimedParts& parts, int rounds) {
 
 StepTimes measure_times(TimedModel& model, double tolerance, int rounds) {
   StepTimes times;
-  int readings = 0;
-  double repeated = 0;
+  int instants = 0, readings = 0;
+  double first = 0, repeated = 0, stages = 0;
   for (int i = 0; i < model.instants(); ++i) {
-    std::vector<double> steps, first, fields;
+    std::vector<double> steps, of_first, fields;
     model.solve_to(tolerance);
     const TimedStep step = model.time_step(i);  // also warms caches
+    if (step.steps == 0) continue;              // every environment has failed before
+    ++instants;
     for (int round = 0; round < rounds; ++round) steps.push_back(model.time_step(i).seconds);
-    times.passes += step.passes / model.instants();
-    times.step += lower_quartile(steps) / model.instants();
+    times.passes += step.passes;
+    times.step += lower_quartile(steps);
     model.solve_to(kAnything);
-    model.time_step(i);
-    for (int round = 0; round < rounds; ++round) first.push_back(model.time_step(i).seconds);
-    repeated += step.group_passes * lower_quartile(first) / model.instants();
-    if (i % kReadingStride != kReadingStride / 2) continue;
+    const double least = model.time_step(i).group_passes;
+    for (int round = 0; round < rounds; ++round) of_first.push_back(model.time_step(i).seconds);
+    stages += least;
+    first += lower_quartile(of_first);
+    repeated += step.group_passes / least * lower_quartile(of_first);
+    if (!reads_at(model, i)) continue;
     for (int round = 0; round < rounds; ++round) fields.push_back(reading_time(model, i));
     times.reading += lower_quartile(fields);
     ++readings;
   }
   model.solve_to(tolerance);
+  if (instants == 0) return times;
+  times.first_pass = first / times.step;
+  times.of_first_pass = repeated / times.step;
+  times.stages = stages / instants;
+  times.passes /= instants;
+  times.step /= instants;
   times.reading /= std::max(1, readings);
-  times.of_first_pass = times.step > 0 ? repeated / times.step : 1;
   return times;
 }
 
@@ -135,26 +150,32 @@ ModelComparison compare(TimedModel& with, TimedModel& without, const StepTimes& 
                         TimedParts parts, double tolerance, int rounds) {
   rounds = rounds_of(parts, rounds);
   ModelComparison result;
-  if (!parts.steps) result.passes = times.passes;
+  int instants = 0;
   std::vector<InstantTimes> steps, readings;
   for (int i = 0; i < with.instants(); ++i) {
     if (parts.steps) {
       TimedStep other;
-      const double scale = match_passes(with, without, i, tolerance, parts.passes, other);
-      result.passes += other.passes / with.instants();
+      const double scale =
+          match_passes(with, without, i, tolerance, parts.passes * times.stages, other);
+      if (other.steps == 0) continue;
+      ++instants;
+      result.passes += other.passes;
       result.steps += other.steps;
       result.failures += other.failures;
       take_turns(
           rounds, [&] { return with.time_step(i).seconds; },
           [&] { return scale * without.time_step(i).seconds; }, steps.emplace_back());
     }
-    if (parts.readings && i % kReadingStride == kReadingStride / 2)
+    if (parts.readings && reads_at(with, i))
       take_turns(
           rounds, [&] { return reading_time(with, i); }, [&] { return reading_time(without, i); },
           readings.emplace_back());
   }
   with.solve_to(tolerance), without.solve_to(tolerance);
-  const double of_step = parts.passes == 1 ? times.of_first_pass : 1;
+  result.passes = parts.steps ? result.passes / std::max(1, instants) : times.passes;
+  const double of_step = parts.once          ? times.first_pass
+                         : parts.passes == 1 ? times.of_first_pass
+                                             : 1;
   const auto share = [&](const std::vector<std::size_t>& which) {
     return (of_step * times.step * saved(steps, which) + times.reading * saved(readings, which)) /
            times.whole();

@@ -12,9 +12,11 @@ namespace tangere {
 struct TimedParts {
   bool steps = true;
   bool readings = false;
-  /// Newton passes of the steps that are compared. 1: what differs is evaluated once per pass. 2:
-  /// the search for contacts or the linear system differ too.
+  /// Newton passes of a stage of the steps that are compared. 1: what differs is evaluated once per
+  /// pass. 2: the search for contacts or the linear system differ too.
   int passes = 1;
+  /// What differs is done once per step, whatever its passes.
+  bool once = false;
 };
 
 /// A difference of two times, as a share of the first model's step.
@@ -28,7 +30,10 @@ struct StepTimes {
   double step = 0;     ///< [s]
   double reading = 0;  ///< all sensors, each in one of its `every` steps [s]
   double passes = 0;   ///< evaluations of the residual per step
-  /// What steps of one pass take, times the passes that steps need, over `step`. Above 1, because
+  double stages = 1;   ///< evaluations of a step that accepts every first guess
+  /// What such steps take over `step`.
+  double first_pass = 1;
+  /// The same times the evaluations that steps need, per evaluation of such a step. Above 1, because
   /// a step predicts and searches once.
   double of_first_pass = 1;
 

@@ -19,8 +19,9 @@ bool is_of_sensors(EffectKind kind) {
 }
 
 TimedParts parts_of(EffectKind kind) {
-  if (kind == EffectKind::varying_parameters) return {true, true, 1};
-  return {!is_of_sensors(kind), is_of_sensors(kind), kind == EffectKind::pair_contact ? 2 : 1};
+  if (kind == EffectKind::varying_parameters) return {true, true, 1, false};
+  return {!is_of_sensors(kind), is_of_sensors(kind), kind == EffectKind::pair_contact ? 2 : 1,
+          kind == EffectKind::force_motors};
 }
 
 /// Returns the bytes of one environment's state and fields.
@@ -46,6 +47,14 @@ std::string reason_not_to_time(const Model& model, const Effect& effect) {
   return "";
 }
 
+/// Steps that are cut to an accuracy take other parts in another model, so whole ones are timed.
+StepperOptions uncut(const Model& model) {
+  StepperOptions options;
+  options.accuracy = 0;
+  options.tolerance = Stepper(model, options).tolerance();
+  return options;
+}
+
 /// What all effects of a scene are measured with.
 struct Measurement {
   const Model& model;
@@ -58,7 +67,7 @@ struct Measurement {
   Measurement(const Model& of, const EffectCostOptions& options)
       : model(of),
         recorded(record_states(of, options.environments, options.instants, options.seed)),
-        stepping{{}, {}, Stepper(of).tolerance()},
+        stepping(uncut(of)),
         timed(of, recorded, stepping),
         times(measure_times(timed, *stepping.tolerance, kLeastRounds)),
         rounds(rounds_of(options)) {}
@@ -116,11 +125,12 @@ EffectCosts measure_effects(const Model& model, const EffectCostOptions& options
   costs.environments = options.environments;
   costs.instants = static_cast<int>(m.recorded.instants.size());
   costs.run_steps = m.recorded.steps;
-  const std::vector<std::uint8_t>& failed = m.recorded.instants.back().failed;
-  costs.failed = static_cast<int>(std::count(failed.begin(), failed.end(), 1));
+  costs.planned_steps = m.recorded.planned;
+  costs.failed = m.recorded.failed;
+  costs.uncut = Stepper(model).accuracy() > 0;
   costs.times = m.times;
   costs.rounds = m.rounds;
-  costs.itself = m.against(Model(model.scene()), {true, true, 2}).saved;
+  costs.itself = m.against(Model(model.scene()), {true, true, 1, false}).saved;
   for (const EffectInfo& info : model.effects()) {
     // The only element of a kind is the kind, which has been measured just before.
     if (info.effect.element == 0 && elements_of(model, info.effect.kind) == 1) {

@@ -29,7 +29,8 @@ struct EffectCost {
   std::optional<MeasuredShare> measured{};
   std::string note{};          ///< why it is not measured, or what else to know; may be ""
   double seconds_without = 0;  ///< a step of one environment without the effect [s]
-  /// Evaluations of the residual per step from the same states, to the same tolerance.
+  /// Evaluations of the residual per step from the same states, to the same tolerance of a residual
+  /// whose scale may have lost a force (docs/solver.md).
   double passes_without = 0;
 };
 
@@ -37,7 +38,9 @@ struct EffectCosts {
   int environments = 0, instants = 0;
   int failed = 0;                   ///< environments that fail along the run
   int rounds = 0;                   ///< pairs of steps per effect and instant
-  std::int64_t run_steps = 0;       ///< of the run that the instants come from
+  std::int64_t run_steps = 0;       ///< played, from which the instants come
+  std::int64_t planned_steps = -1;  ///< of the scene's controls; -1: they have no end
+  bool uncut = false;               ///< the scene's accuracy cuts steps; whole ones were timed
   StepTimes times{};                ///< of the scene as it is
   MeasuredShare itself{};           ///< the scene against itself: what chance alone shows
   std::vector<EffectCost> effects;  ///< parallel to Model::effects()

@@ -32,7 +32,7 @@ RecordedStates record_states(const Model& model, int environments, int instants,
   const std::int64_t steps = planned < 0 ? kOpenRunSteps : std::min(planned, kMostRunSteps);
   const std::int64_t wanted = std::min<std::int64_t>(instants, steps);
   const std::size_t nu = as_size(model.nu());
-  RecordedStates recorded{model, environments, steps, {}, {}};
+  RecordedStates recorded{model, environments, planned, steps, {}, 0, {}};
   for (std::size_t k = 0; k < model.scene().randomizations.size(); ++k) {
     recorded.numbers.emplace_back();
     for (int e = 0; e < environments; ++e)
@@ -55,6 +55,7 @@ RecordedStates record_states(const Model& model, int environments, int instants,
     copy_states(batch, before_q, before_v);
     stepper.step(batch, u);
   }
+  for (int e = 0; e < environments; ++e) recorded.failed += failed(batch.status(e)) ? 1 : 0;
   return recorded;
 }
 

@@ -22,8 +22,10 @@ struct RecordedInstant {
 struct RecordedStates {
   Model model;  ///< that was played
   int environments = 0;
-  std::int64_t steps = 0;  ///< of the run
+  std::int64_t planned = -1;  ///< steps of the scene's controls; -1: they have no end
+  std::int64_t steps = 0;     ///< that were played
   std::vector<RecordedInstant> instants;
+  int failed = 0;                            ///< environments that failed by the end of the run
   std::vector<std::vector<double>> numbers;  ///< (randomized numbers, E): the values drawn
 };
 

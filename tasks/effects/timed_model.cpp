@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "engine/base/as_size.hpp"
+#include "engine/base/error.hpp"
 #include "kernels/numbers/block.hpp"
 
 namespace tangere {
@@ -28,9 +29,12 @@ double cpu_seconds() {
 /// Controls have the names of the dofs that they drive, so a name stands for one control.
 std::vector<std::size_t> columns_of(const Model& model, const Model& of) {
   std::vector<std::size_t> columns;
-  for (const std::string& name : model.u_names())
-    columns.push_back(static_cast<std::size_t>(
-        std::find(of.u_names().begin(), of.u_names().end(), name) - of.u_names().begin()));
+  for (const std::string& name : model.u_names()) {
+    const auto at = std::find(of.u_names().begin(), of.u_names().end(), name);
+    if (at == of.u_names().end())
+      throw InputError("no control '" + name + "' in the run that was recorded");
+    columns.push_back(static_cast<std::size_t>(at - of.u_names().begin()));
+  }
   return columns;
 }
 
@@ -111,12 +115,12 @@ TimedStep TimedModel::time_step(int instant) {
       step.failures += failed(batch_.status(e)) ? 1 : 0;
     }
     if ((e + 1) % kLanesOfGroup != 0 && e + 1 < batch_.environments()) continue;
+    groups += most > 0 ? 1 : 0;  // groups whose environments have all failed take no passes
     step.group_passes += std::exchange(most, 0);
-    ++groups;
   }
   step.seconds /= std::max(1, step.steps);
   step.passes /= std::max(1, step.steps);
-  step.group_passes /= groups;
+  step.group_passes /= std::max(1, groups);
   return step;
 }
 
