@@ -50,6 +50,7 @@ std::string reason_not_to_time(const Model& model, const Effect& effect) {
 /// Steps that are cut to an accuracy take other parts in another model, so whole ones are timed.
 StepperOptions uncut(const Model& model) {
   StepperOptions options;
+  options.integrator = model.integrator();  // the one that can keep an accuracy
   options.accuracy = 0;
   options.tolerance = Stepper(model, options).tolerance();
   return options;
