@@ -438,9 +438,9 @@ Command add_generate(CLI::App& program) {
            "Storage of large fields: dense, or sparse, which leaves out tiles of zeros [default: "
            "dense]");
   add_text(app, "--record", o.record, "LIST",
-           "Observations to compute and store, separated by commas: q, v, variables, of a "
-           "sensor its field (pad), pad.pressure, pad.shear or pad.sum [default: the "
-           "scene's, or all fields]");
+           "Observations to store, separated by commas: q, v, variables, a sensor's field (pad), "
+           "pad.pressure, pad.shear or pad.sum; other fields are not computed [default: the "
+           "scene's <outputs>, or all]");
   add_text(app, "--gradients", o.gradients, "KIND",
            "Derivatives to store: none, return (for a scene with --loss), or jacobians of each row "
            "[default: none]");

@@ -115,7 +115,8 @@ void effect_idle(benchmark::State& state, const Case& of, Effect effect, Way way
   }
 }
 
-/// Out of reach, over removed. `first_pass`: without factor and solve, so what is left is the search.
+/// Out of reach, over removed. `first_pass`: without factor and solve, so what is left is the
+/// search.
 void contacts_away(benchmark::State& state, const Case& of, Effect effect) {
   Recorded& r = recorded(of, true);
   const Scene removed = without(r.model.scene(), effect);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// F = Σ Rᵢᵀ fᵢ and c = Σ pᵢ xᵢ / Σ pᵢ with pᵢ = max(0, sign f₃): fᵢ are a point's stored numbers, Rᵢ
-// its axes, xᵢ its place. Eight points are added side by side, which compilers turn into vectors. A
-// tile's missing points have no force, so they add nothing. NaN in a field makes the force NaN.
+// F = Σ Rᵢᵀ fᵢ and c = Σ pᵢ xᵢ / Σ pᵢ with pᵢ = max(0, sign f₃): fᵢ are a point's stored numbers,
+// Rᵢ its axes, xᵢ its place. Eight points are added side by side, which compilers turn into
+// vectors. A tile's missing points have no force, so they add nothing. NaN in a field makes the
+// force NaN.
 #include "engine/sense/field_sum.hpp"
 
 #include <algorithm>

@@ -10,9 +10,9 @@
 
 namespace tangere {
 
-/// Adds up a field. `values`: (tiles, 3, 64), as kernels write them where `pad` is not skewed. `in_body`: the pad's
-/// axes in the body. `pressure_sign`: of the third component under pressure. The order of the sum
-/// is fixed: eight partial sums, then theirs.
+/// Adds up a field. `values`: (tiles, 3, 64), as kernels write them where `pad` is not skewed.
+/// `in_body`: the pad's axes in the body. `pressure_sign`: of the third component under pressure.
+/// The order of the sum is fixed: eight partial sums, then theirs.
 template <class Real>
 FieldSum field_sum(const kernels::PadTiles& pad, const kernels::Frame<double>& in_body,
                    int pressure_sign, std::span<const int> tiles, const Real* values);

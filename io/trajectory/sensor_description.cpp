@@ -60,7 +60,7 @@ std::string components_text(const SensorLayout& sensor, FieldForm form) {
     case FieldForm::shear: return across + "; f is the force on the body";
     case FieldForm::sum: break;
   }
-  return "force x y z on the body [N], centre of its pressure x y z [m]";
+  return "force x y z on the body [N], then x y z of its centre of pressure [m]; body axes";
 }
 
 void describe_reading(const h5::Id& object, const SensorLayout& sensor, FieldForm form) {

@@ -33,8 +33,8 @@ struct StepTimes {
   double stages = 1;   ///< evaluations of a step that accepts every first guess
   /// What such steps take over `step`.
   double first_pass = 1;
-  /// The same times the evaluations that steps need, per evaluation of such a step. Above 1, because
-  /// a step predicts and searches once.
+  /// The same times the evaluations that steps need, per evaluation of such a step. Above 1,
+  /// because a step predicts and searches once.
   double of_first_pass = 1;
 
   [[nodiscard]] double whole() const { return step + reading; }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // One call of the operating system fails, whichever it is, or says that it succeeded and did not. A
 // file under its final name holds exactly what an undisturbed run writes, or is absent, and the
-// exit code tells which: 0 only if all is there. TANGERE_FAULTS=all tries every call; without it, calls
-// spread over all of them.
+// exit code tells which: 0 only if all is there. TANGERE_FAULTS=all tries every call; without it,
+// calls spread over all of them.
 #include <gmock/gmock.h>
 
 #include <algorithm>

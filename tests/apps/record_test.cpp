@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // --record and <outputs>: files hold what was asked for, and that is what a whole run holds.
 #include <gmock/gmock.h>
+#include <hdf5.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -88,6 +89,34 @@ TEST(Record, AnythingElseOfATrajectoryStillWorks) {
               HasSubstr("of sensor 'pad' the run recorded only the sum"));
   run_json(folder, {"simulate", "stable_grasp", "-o", "task.h5", "--record", "left_pad.sum"});
   EXPECT_EQ(shape(folder, "task.h5", "tactile/left_pad/sum").back(), 6U);
+}
+
+TEST(Record, DamagedReadingsEndInAMessage) {
+  const Folder folder;
+  simulate(folder, scene("rolling_ball_small.xml"), "run.h5",
+           {"--record", "pad.pressure,pad.shear"});
+  const auto damage = [&](const auto& change) {
+    const hid_t file = H5Fopen(folder.path("run.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    change(file);
+    H5Fclose(file);
+    return run(folder, {"plot", "run.h5", "-o", "pad.svg"});
+  };
+  const Outcome shape = damage([](hid_t file) {
+    H5Ldelete(file, "tactile/pad/shear", H5P_DEFAULT);
+    const hsize_t dims[] = {2, 2, 31, 32, 2};
+    const hid_t space = H5Screate_simple(5, dims, nullptr);
+    H5Dclose(H5Dcreate2(file, "tactile/pad/shear", H5T_NATIVE_DOUBLE, space, H5P_DEFAULT,
+                        H5P_DEFAULT, H5P_DEFAULT));
+    H5Sclose(space);
+  });
+  EXPECT_EQ(shape.exit_code, 3);
+  EXPECT_THAT(shape.err, HasSubstr("'shear' has not the shape of 'pressure'"));
+  const Outcome empty = damage([](hid_t file) {
+    for (const char* name : {"tactile/pad/shear", "tactile/pad/pressure"})
+      H5Ldelete(file, name, H5P_DEFAULT);
+  });
+  EXPECT_EQ(empty.exit_code, 3);
+  EXPECT_THAT(empty.err, HasSubstr("sensor 'pad' has no reading"));
 }
 
 TEST(Record, ADataSetHoldsTheFormsOfAWholeOne) {

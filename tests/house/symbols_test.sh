@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# No function of the kernels may stand in the objects of two instruction sets: the linker keeps one copy for all, and a
-# machine without AVX-512 would meet the AVX-512 one. Nor may the tactile kernels multiply unnoticed. Takes the kernels'
-# library.
+# No function of the kernels may stand in the objects of two instruction sets: the linker keeps one
+# copy for all, and a machine without AVX-512 would meet the AVX-512 one. Nor may the number of
+# tactile kernels grow unnoticed. Takes the kernels' library.
 set -euo pipefail
 library=$1
 command -v nm >/dev/null || { echo "nm is not there: skipped"; exit 77; }
@@ -19,8 +19,9 @@ if command -v objdump >/dev/null && objdump -d "$library" | grep -qE 'vfm(addsub
   echo "an instruction that fuses what the source does not: vfmaddsub or vfmsubadd"
   exit 1
 fi
-# Six shapes, two laws, two precisions, flat and curved pads, whole fields and pressure alone. Another bit doubles the compile
-# time and the size of the library: weigh it, then change the number.
+# Six shapes, two laws, two precisions, flat and curved pads, whole fields and pressure alone.
+# Another choice of two doubles the compile time and the size of the library: weigh it, then change
+# the number.
 for kernel in chunk_force:96 tile_lanes:48; do
   most=$(nm -C "$library" | awk -v name=" ${kernel%:*}<" '
     /^kernels\..*:$/ { split($1, parts, "."); isa = parts[2] }

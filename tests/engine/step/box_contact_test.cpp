@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests that boxes hold each other: stacks stand, whatever scheme, step and stiffness, fast boxes
-// do not pass thin plates, and boxes slide over seams. Faces are chosen per solve, so the bits and the
-// derivatives of such contacts are tested here too.
+// do not pass thin plates, and boxes slide over seams. Faces are chosen per solve, so the bits and
+// the derivatives of such contacts are tested here too.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -232,7 +232,8 @@ TEST(FastBox, HasTheSameBitsInAnyLane) {
 }
 
 /// A turned box comes down at 3 m/s over a corner of the plate, so that some of its corners end
-/// below the middle of the plate, where the nearest face would be the lower one, and some beside it.
+/// below the middle of the plate, where the nearest face would be the lower one, and some beside
+/// it.
 class Landing : public ::testing::TestWithParam<Integrator> {};
 
 TEST_P(Landing, GradientsMatchDifferences) {

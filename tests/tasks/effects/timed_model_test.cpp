@@ -86,8 +86,8 @@ TEST(TimedModel, FindsControlsAndNumbersOfATrimmedScene) {
   }
 }
 
-/// A step that accepts every first guess evaluates the residual once per stage, and steps are not cut
-/// to the scene's accuracy.
+/// A step that accepts every first guess evaluates the residual once per stage, and steps are not
+/// cut to the scene's accuracy.
 TEST(TimedModel, StagesAreCounted) {
   for (const auto& [scheme, stages] :
        {std::pair{"BDF1", 1.0}, std::pair{"SDIRK2", 2.0}, std::pair{"SDIRK3", 3.0}}) {
