@@ -13,13 +13,16 @@ namespace {
 
 Json tensor_json(const TensorSpec& t) {
   return {{"name", t.name},       {"shape", t.shape},     {"unit", t.unit},
-          {"meaning", t.meaning}, {"low", finite(t.low)}, {"high", finite(t.high)}};
+          {"meaning", t.meaning}, {"low", finite(t.low)}, {"high", finite(t.high)},
+          {"scale", t.scale},     {"privileged", t.privileged}};
 }
 
 std::string tensor_text(const TensorSpec& t) {
   const bool free = std::isinf(t.low) && std::isinf(t.high);
-  return fmt::format("{} ({}) [{}], {}: {}", t.name, fmt::join(t.shape, ", "), t.unit,
-                     free ? "no bounds" : fmt::format("{:g} to {:g}", t.low, t.high), t.meaning);
+  return fmt::format("{} ({}) [{}], {}{}{}: {}", t.name, fmt::join(t.shape, ", "), t.unit,
+                     free ? "no bounds" : fmt::format("{:g} to {:g}", t.low, t.high),
+                     t.scale.empty() ? "" : fmt::format(", scale {:g}", fmt::join(t.scale, " ")),
+                     t.privileged ? ", privileged" : "", t.meaning);
 }
 
 /// What belongs to a reset before the first action.

@@ -6,6 +6,7 @@ target_compile_options(tangere_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion
   -Wno-sign-conversion   # indices are int in loops over dofs and std::size_t in containers
   $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>  # GCC 12 sees an overlap in "text" + std::string() where there is none
+  $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition>  # the libraries are -fPIC and inline as other code does
   -ffp-contract=off      # a product and a sum are fused where the source says mul_add, nowhere else: same bits everywhere
   -fno-math-errno        # sqrt is one instruction
   -fno-trapping-math)    # branches on numbers may become selects; nobody reads the exception flags

@@ -17,6 +17,8 @@ foreach(library kernels engine tasks io)
   target_include_directories(tangere_${library} INTERFACE
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${headers}>)
   target_compile_features(tangere_${library} INTERFACE cxx_std_20)
+  # The libraries also become part of shared objects, such as the Python module.
+  set_target_properties(tangere_${library} PROPERTIES POSITION_INDEPENDENT_CODE ON)
 endforeach()
 set_target_properties(tangere_flags PROPERTIES EXPORT_NAME flags)  # passes a sanitizer on to users of the libraries
 

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <functional>
 #include <numeric>
 
@@ -34,12 +35,20 @@ void TaskSpec::check() const {
     fail(fmt::format("it must look after its last step, {}", steps_per_action));
   for (std::size_t i = 1; i < moments.size(); ++i)
     if (moments[i] <= moments[i - 1]) fail("the steps after which it looks must ascend");
+  if (!action.scale.empty()) fail("an action has bounds, not a scale");
   if (action.size() == 0 || observation_size() == 0) fail("expected an action and an observation");
   for (const TensorSpec& tensor : observations) {
     if (tensor.name.empty() || tensor.name.find('/') != std::string::npos || tensor.name == "q" ||
         tensor.name == "v")
       fail(fmt::format("observation '{}'; expected another name than q and v, without '/'",
                        tensor.name));
+    if (tensor.scale.size() > 1 && tensor.scale.size() != tensor.shape.back())
+      fail(fmt::format("observation '{}' has {} scales; expected one, or {} for its last axis",
+                       tensor.name, tensor.scale.size(), tensor.shape.back()));
+    for (const double scale : tensor.scale)
+      if (!(scale > 0) || !std::isfinite(scale))
+        fail(fmt::format("observation '{}' has the scale {}; expected a number above 0",
+                         tensor.name, scale));
     for (const TensorSpec& other : observations)
       if (&other != &tensor && other.name == tensor.name)
         fail("two observations are named " + tensor.name);

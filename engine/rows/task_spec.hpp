@@ -19,7 +19,11 @@ struct TensorSpec {
   std::vector<std::size_t> shape;  ///< row-major
   std::string unit;                ///< "m", "N", "1" …
   std::string meaning;
+  /// Typical sizes of the numbers, one for all or one per place on the last axis, in their unit. A
+  /// network sees the numbers divided by them. Empty: 1.
+  std::vector<double> scale;
   double low = -kUnbounded, high = kUnbounded;  ///< bounds of every number
+  bool privileged = false;  ///< a robot could not measure it
 
   [[nodiscard]] std::size_t size() const;
 };

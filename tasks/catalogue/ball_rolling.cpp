@@ -89,16 +89,19 @@ class BallRolling : public Task {
 TaskSpec declare_ball_rolling(BallPad pad) {
   const bool large = pad == BallPad::large;
   const std::size_t side = large ? 200 : 32;
+  // The small pad's points stand for (200/32)² times the area.
+  const std::vector<double> tactile_scale =
+      large ? std::vector{2e-6, 2e-6, 1.5e-5} : std::vector{7e-5, 7e-5, 6e-4};
   TaskSpec spec;
   spec.name = large ? "ball_rolling" : "ball_rolling_small";
   spec.summary = large ? "A pad of 200 × 200 tactile points rolls a ball to a goal."
                        : "The same with 32 × 32 tactile points.";
   spec.scene = large ? "rolling_ball.xml" : "rolling_ball_small.xml";
   spec.success = "the ball is within 2 mm of the goal after the last action";
-  spec.action = {"force", {3}, "1", "force on the pad, x y z, times 1 N", -1, 1};
-  spec.observations = {{"pad", {3}, "m", "position of the pad from its start"},
-                       {"goal", {2}, "m", "from the ball's centre to the goal, x y"},
-                       {"tactile", {side, side, 3}, "N", "field of the pad"}};
+  spec.action = {"force", {3}, "1", "force on the pad, x y z, times 1 N", {}, -1, 1};
+  spec.observations = {{"pad", {3}, "m", "position of the pad from its start", {0.01}},
+                       {"goal", {2}, "m", "from the ball's centre to the goal, x y", {0.005}},
+                       {"tactile", {side, side, 3}, "N", "field of the pad", tactile_scale}};
   spec.steps_per_action = 5;
   spec.moments = {5};
   spec.horizon = kActions;

@@ -3,7 +3,8 @@
 // experiment).
 //   reward = -0.01 |Δp/10 mm|² - 0.1 (Δθ/5°)² - |x_tip - x_face|²/(20 mm)² - 0.1 |u|²
 // Δp, Δθ: position and angle between box and goal. x_tip, x_face: horizontal middle of the pad and
-// of the face that it pushes. u: the action; its tanh drives the motors.
+// of the face that it pushes. u = atanh(a), a: the action, which drives the motors. The paper's
+// policy returns u and its motors take tanh(u), so effort and motion are the paper's.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,6 +20,7 @@ constexpr int kActions = 100;
 constexpr int kPushActions = 10;  // length of a random push [actions], 0.25 s
 constexpr double kAngleUnit = std::numbers::pi / 36, kLengthUnit = 0.01, kGap = 0.02;
 constexpr double kPosition = 0.01, kAngle = 0.1, kEffort = 0.1;  // weights
+constexpr double kMostDrive = 0.999;  // |a| beyond it counts as this much effort, |u| = 3.8
 constexpr double kNear = 0.03, kAligned = 0.1;  // a success is nearer than this [m], [rad]
 // Memory: the goal's x, y, yaw; the push on the box, in units of its motors.
 constexpr std::size_t kGoal = 0, kPush = 3;
@@ -49,9 +51,10 @@ class BoxPushing : public Task {
       return task_uniform(s.seed, s.episode, 0, k, low, high);
     };
     s.q[box_ + 1] = number(0, -0.02, 0.02);
-    s.memory[kGoal] = number(1, 0.15, 0.25);
-    s.memory[kGoal + 1] = number(2, -0.2, 0.2);
-    const double yaw = std::numbers::pi * s.memory[kGoal + 1], spread = std::numbers::pi / 16;
+    const double along = number(1, 0.15, 0.25), aside = number(2, -0.2, 0.2);
+    s.memory[kGoal] = script_.box_rest()[0] + along;
+    s.memory[kGoal + 1] = script_.box_rest()[1] + aside;
+    const double yaw = std::numbers::pi * aside, spread = std::numbers::pi / 16;
     s.memory[kGoal + 2] = number(3, yaw - spread, yaw + spread);
   }
 
@@ -66,7 +69,7 @@ class BoxPushing : public Task {
   }
 
   void controls(const TaskView& view, int, std::span<double> u) const override {
-    for (std::size_t k = 0; k < 3; ++k) u[k] = std::tanh(view.action[k]);
+    for (std::size_t k = 0; k < 3; ++k) u[k] = view.action[k];
     u[3] = view.memory[kPush];
     u[4] = view.memory[kPush + 1];
     u[5] = 0;
@@ -86,7 +89,7 @@ class BoxPushing : public Task {
     double gap = 0, effort = 0;
     for (std::size_t k = 0; k < 2; ++k)
       gap += square(now.end_effectors[kTip + k] - now.end_effectors[kFace + k]);
-    for (const double u : view.action) effort += u * u;
+    for (const double a : view.action) effort += square(push_of(a));
     const double distance = square(off[0]) + square(off[1]);
     const double reward = -kPosition * distance / square(kLengthUnit) -
                           kAngle * square(off[2] / kAngleUnit) - gap / square(kGap) -
@@ -112,13 +115,16 @@ class BoxPushing : public Task {
     const double by_yaw = weight * 2 * kAngle * off[2] / square(kAngleUnit);
     to.q[box_turn_] -= by_yaw;
     out.memory[kGoal + 2] += by_yaw;
-    for (std::size_t k = 0; k < 3; ++k) out.action[k] -= weight * 2 * kEffort * view.action[k];
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double a = view.action[k];
+      if (std::abs(a) <= kMostDrive)
+        out.action[k] -= weight * 2 * kEffort * push_of(a) / (1 - square(a));
+    }
   }
 
-  void controls_vjp(const TaskView& view, int, std::span<const double> weight,
+  void controls_vjp(const TaskView&, int, std::span<const double> weight,
                     const ViewCotangent& out) const override {
-    for (std::size_t k = 0; k < 3; ++k)
-      out.action[k] += weight[k] * (1 - square(std::tanh(view.action[k])));
+    for (std::size_t k = 0; k < 3; ++k) out.action[k] += weight[k];
     for (std::size_t k = 0; k < 2; ++k) out.memory[kPush + k] += weight[3 + k];
   }
 
@@ -138,11 +144,13 @@ class BoxPushing : public Task {
                              box,
                              {view.memory[kGoal], view.memory[kGoal + 1], view.memory[kGoal + 2]}};
     const std::array<double, 3> u = script_.controls(state);
-    for (std::size_t k = 0; k < 3; ++k) action[k] = std::atanh(std::clamp(u[k], -0.99, 0.99));
+    for (std::size_t k = 0; k < 3; ++k) action[k] = std::clamp(u[k], -0.99, 0.99);
   }
 
  private:
   static double square(double x) { return x * x; }
+  /// u of the reward.
+  static double push_of(double a) { return std::atanh(std::clamp(a, -kMostDrive, kMostDrive)); }
 
   /// x, y [m] and yaw [rad] in the world.
   [[nodiscard]] std::array<double, 3> box_pose(const Moment& now) const {
@@ -172,25 +180,30 @@ class BoxPushing : public Task {
 }  // namespace
 
 TaskSpec declare_box_pushing(PushObservation observation) {
+  const std::vector<double> pose_scale = {0.1, 0.1, 0.3}, tactile_scale = {0.01, 0.01, 0.02};
   TaskSpec spec;
   spec.name = "box_pushing";
   spec.summary = "A finger pushes a box to a pose; the goal and the field of the pad are observed.";
   spec.scene = "box_pushing.xml";
   spec.success = "the box is within 30 mm and 0.1 rad of its goal after the last action";
-  spec.action = {"u", {3}, "1", "tanh(u) times 1 N, 1 N (the hand's x, y) and 3 N m (its turn)"};
-  spec.observations = {{"goal", {3}, "m m rad", "goal of the box: x, y, yaw as seen from the pad"}};
+  spec.action = {"drive", {3}, "1", "times 1 N, 1 N (the hand's x, y) and 3 N m (its turn)",
+                 {},      -1,  1};
+  spec.observations = {{"goal", {3}, "m m rad", "goal of the box: x, y, yaw as seen from the pad",
+                        pose_scale}};
   spec.steps_per_action = 5;
   spec.moments = {5};
   spec.horizon = kActions;
   spec.memory = 5;
   spec.looks_at_end_effectors = true;
   if (observation == PushObservation::tactile) {
-    spec.observations.push_back({"tactile", {13, 10, 3}, "N", "field of the pad"});
+    spec.observations.push_back({"tactile", {13, 10, 3}, "N", "field of the pad", tactile_scale});
     spec.looks_at_tactile = true;
   } else if (observation == PushObservation::privileged) {
     spec.name = "box_pushing_privileged";
     spec.summary = "The same; the goal and the box's pose are observed.";
-    spec.observations.push_back({"box", {3}, "m m rad", "the box: x, y, yaw as seen from the pad"});
+    spec.observations.push_back(
+        {"box", {3}, "m m rad", "the box: x, y, yaw as seen from the pad", pose_scale});
+    spec.observations.back().privileged = true;
   } else {
     spec.name = "box_pushing_reduced";
     spec.summary = "The same; the goal alone is observed.";

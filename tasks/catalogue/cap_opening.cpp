@@ -219,9 +219,9 @@ TaskSpec declare_cap_opening(CapObservation observation) {
   spec.scene = "cap_opening.xml";
   spec.success = "the cap is turned by more than 45 degrees";
   spec.action = {"step", {kAngles}, "1", "of every angle's target from the angle, times 0.06 rad",
-                 -1,     1};
-  spec.observations = {{"angles", {kAngles}, "rad", "swing, upper and lower of each finger"},
-                       {"tips", {kFingers, 3}, "m", "middles of the fingertips' spheres"}};
+                 {},     -1,  1};
+  spec.observations = {{"angles", {kAngles}, "rad", "swing, upper and lower of each finger", {0.5}},
+                       {"tips", {kFingers, 3}, "m", "middles of the fingertips' spheres", {0.05}}};
   spec.steps_per_action = 5;
   spec.moments = {5};
   spec.horizon = kActions;
@@ -233,7 +233,8 @@ TaskSpec declare_cap_opening(CapObservation observation) {
         {"tactile",
          {kFingers, kSide, kSide, 3},
          "N",
-         "fields of the tips: rows up, columns to the left, zero where no point is"});
+         "fields of the tips: rows up, columns to the left, zero where no point is",
+         {0.1, 0.1, 0.4}});
   } else {
     spec.name = "cap_opening_blind";
     spec.summary = "The same; angles and fingertips alone are observed.";

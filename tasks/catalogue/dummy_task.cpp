@@ -20,9 +20,9 @@ class Dummy : public Task {
     spec.scene = "rolling_ball_small.xml";
     spec.success = "within 1 mm of the goal after 40 actions";
     spec.action = {"force", {1}, "1", "vertical force on the pad, over its weight of 0.245 N [N]",
-                   -0.5,    0.5};
-    spec.observations = {{"error", {1}, "m", "goal minus height of the pad"},
-                         {"speed", {1}, "m/s", "upward"}};
+                   {},      -0.5, 0.5};
+    spec.observations = {{"error", {1}, "m", "goal minus height of the pad", {0.01}},
+                         {"speed", {1}, "m/s", "upward", {0.05}}};
     spec.steps_per_action = 5;
     spec.moments = {5};
     spec.horizon = 40;

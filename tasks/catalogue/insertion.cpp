@@ -291,6 +291,7 @@ TaskSpec declare_insertion(InsertionMotion motion) {
                  !slides  ? "of the yaw, times 10 degrees"
                  : !turns ? "of x and y, times 20 mm"
                           : "of x and y, times 20 mm, and of the yaw, times 10 degrees",
+                 {},
                  -1,
                  1};
   spec.observations = {{"flow",
@@ -298,6 +299,7 @@ TaskSpec declare_insertion(InsertionMotion motion) {
                         "1",
                         "normalised change of shear from step 6 to 44: left pad up and to -y, "
                         "right pad down and to -y",
+                        {},
                         -1,
                         1}};
   spec.steps_per_action = kSteps;

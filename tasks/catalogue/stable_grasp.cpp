@@ -215,12 +215,13 @@ TaskSpec declare_stable_grasp() {
   spec.success = "lifted by more than 5 mm with a tilt below 0.02 rad";
   spec.action = {"shift", {1},
                  "1",     "how far the next grasp is from this one along the bar, times 50 mm",
-                 -1,      1};
+                 {},      -1,  1};
   spec.observations = {
       {"flow",
        {4, 13, 10},
        "1",
        "normalised shear while lifting: left pad up and to -y, right pad down and to -y",
+       {},
        -1,
        1}};
   spec.steps_per_action = kSteps;

@@ -31,8 +31,9 @@ struct VectorTask::Impl {
     tallies.resize(static_cast<std::size_t>(batch.blocks()));
   }
 
-  void reset(std::uint64_t seed) {
+  void reset(std::uint64_t seed, std::int64_t first_episode) {
     options.seed = seed;
+    options.first_episode = first_episode;
     if (batch.seed() != seed)
       batch = Batch(task.model(), batch.environments(), seed, options.first_episode);
     for (int e = 0; e < batch.environments(); ++e)
@@ -42,12 +43,38 @@ struct VectorTask::Impl {
     run({});
   }
 
+  /// An environment that is over is left alone, so that is what the others are for the time being.
+  void restart(std::span<const std::uint8_t> which) {
+    const std::vector<EnvironmentState> states = data.state;
+    const std::vector<double> rewards = data.reward;
+    for (std::size_t e = 0; e < which.size(); ++e) {
+      if (which[e] == 0) {
+        batch.hold(static_cast<int>(e));
+        data.state[e] = EnvironmentState::over;
+      } else if (states[e] != EnvironmentState::to_start) {
+        data.next_episode[e] = data.episodes[e] + std::ssize(states);
+        data.state[e] = EnvironmentState::to_start;
+      }
+    }
+    step_blocks({});
+    for (std::size_t e = 0; e < which.size(); ++e) {
+      if (which[e] != 0) continue;
+      data.state[e] = states[e];
+      data.reward[e] = rewards[e];
+      batch.hold(static_cast<int>(e), states[e] != EnvironmentState::running);
+    }
+  }
+
   void run(std::span<const double> actions) {
+    step_blocks(actions);
+    if (options.autoreset) data.start_next(0, batch.environments());
+  }
+
+  void step_blocks(std::span<const double> actions) {
     threads.for_each(batch.blocks(), workers, [&](Worker& worker, int block) {
       worker.block.act(batch, worker.stepper, data, block, actions,
                        tallies[static_cast<std::size_t>(block)]);
     });
-    if (options.autoreset) data.start_next(0, batch.environments());
   }
 
   const Task& task;
@@ -63,13 +90,22 @@ VectorTask::VectorTask(const Task& task, int environments, const VectorOptions& 
   if (options.threads < 1)
     throw InputError(std::to_string(options.threads) + " threads; expected at least 1");
   impl_ = std::make_unique<Impl>(task, environments, options);
-  impl_->reset(options.seed);
+  impl_->reset(options.seed, options.first_episode);
 }
 VectorTask::~VectorTask() = default;
 VectorTask::VectorTask(VectorTask&&) noexcept = default;
 VectorTask& VectorTask::operator=(VectorTask&&) noexcept = default;
 
-void VectorTask::reset(std::uint64_t seed) { impl_->reset(seed); }
+void VectorTask::reset(std::uint64_t seed) { impl_->reset(seed, impl_->options.first_episode); }
+void VectorTask::reset(std::uint64_t seed, std::int64_t first_episode) {
+  impl_->reset(seed, first_episode);
+}
+void VectorTask::restart(std::span<const std::uint8_t> which) {
+  if (which.size() != impl_->data.state.size())
+    throw InputError(std::to_string(which.size()) + " marks of environments; expected " +
+                     std::to_string(impl_->data.state.size()));
+  impl_->restart(which);
+}
 
 void VectorTask::step(std::span<const double> actions) {
   const std::size_t expected = impl_->data.action.size();
@@ -80,6 +116,7 @@ void VectorTask::step(std::span<const double> actions) {
 }
 
 const Task& VectorTask::task() const { return impl_->task; }
+std::uint64_t VectorTask::seed() const { return impl_->options.seed; }
 int VectorTask::environments() const { return impl_->batch.environments(); }
 std::span<const double> VectorTask::observations() const { return impl_->data.observation; }
 std::span<const double> VectorTask::observation(int environment) const {

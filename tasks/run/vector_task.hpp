@@ -42,14 +42,20 @@ class VectorTask {
   VectorTask(VectorTask&&) noexcept;
   VectorTask& operator=(VectorTask&&) noexcept;
 
-  /// Starts the first episodes of a seed.
+  /// Starts the first episodes of a seed: those from options.first_episode on, or from another.
   void reset(std::uint64_t seed);
+  void reset(std::uint64_t seed, std::int64_t first_episode);
+  /// Starts the next episode of every environment whose `which`, (E), is not 0, whether its episode
+  /// has ended or not. The results of the others stay, except that they are not `starting`. Throws
+  /// InputError when `which` has another size.
+  void restart(std::span<const std::uint8_t> which);
   /// Takes one action of every environment, (E, action). An environment whose episode ended in the
   /// step before ignores its action and shows the start of its next episode, with reward 0. Actions
   /// are clipped to their bounds. An action that is not a number fails its environment.
   void step(std::span<const double> actions);
 
   [[nodiscard]] const Task& task() const;
+  [[nodiscard]] std::uint64_t seed() const;
   [[nodiscard]] int environments() const;
   /// Views of the results of the last reset or step. They stay valid as long as the object.
   [[nodiscard]] std::span<const double> observations() const;  ///< (E, observation)

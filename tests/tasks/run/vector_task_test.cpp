@@ -155,6 +155,43 @@ TEST(VectorTask, AnActionThatIsNoNumberEndsItsEpisodeAlone) {
   EXPECT_EQ(vector.status(1), StepStatus::converged);
 }
 
+/// Stable grasp has an opening, so a restart takes steps while the others stand still.
+TEST(VectorTask, RestartsSomeEnvironmentsAndLeavesTheOthersAlone) {
+  for (const char* name : {"stable_grasp", "box_pushing"}) {
+    SCOPED_TRACE(name);
+    const auto task = task_named(name);
+    VectorOptions options;
+    options.autoreset = false;
+    VectorTask vector(*task, 3, options), alone(*task, 3, options);
+    const std::size_t width = task->spec().observation_size();
+    const std::vector<double> actions(3 * task->spec().action.size(), 0.3);
+    vector.step(actions);
+    alone.step(actions);
+    const std::vector<double> before(vector.observations().begin(), vector.observations().end()),
+        rewards(vector.rewards().begin(), vector.rewards().end());
+    vector.restart(std::vector<std::uint8_t>{0, 1, 0});
+    EXPECT_THAT(vector.starting(), ::testing::ElementsAre(0, 1, 0));
+    EXPECT_THAT(vector.episodes(), ::testing::ElementsAre(0, 4, 2));
+    EXPECT_EQ(vector.rewards()[0], rewards[0]);
+    EXPECT_EQ(vector.rewards()[1], 0);
+    EXPECT_EQ(vector.lengths()[1], 0);
+    options.first_episode = 4;
+    const VectorTask fourth(*task, 1, options);
+    EXPECT_THAT(vector.observation(1), ::testing::ElementsAreArray(fourth.observation(0)));
+    for (const int e : {0, 2}) {
+      EXPECT_THAT(vector.observation(e), ::testing::ElementsAreArray(
+                                             std::span(before).subspan(std::size_t(e) * width, width)));
+    }
+    vector.step(actions);
+    alone.step(actions);
+    for (const int e : {0, 2})
+      EXPECT_THAT(vector.observation(e), ::testing::ElementsAreArray(alone.observation(e)));
+    vector.reset(0, 7);
+    EXPECT_THAT(vector.episodes(), ::testing::ElementsAre(7, 8, 9));
+    EXPECT_THROW(vector.restart(std::vector<std::uint8_t>{1}), InputError);
+  }
+}
+
 TEST(VectorTask, ClipsActionsAndKeepsAnEndWithoutAutoreset) {
   const auto task = task_named("dummy");
   VectorOptions options;

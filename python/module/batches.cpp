@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: Apache-2.0
+// Batch in Python. Blocks of 16 environments are spread over threads, and the GIL is free while
+// they are stepped or read.
+#include "python/module/batches.hpp"
+
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "engine/step/control.hpp"
+#include "kernels/numbers/block.hpp"
+#include "tasks/run/block_reader.hpp"
+
+namespace tangere::python {
+
+using nb::literals::operator""_a;
+
+PythonBatch::PythonBatch(const Model& model, int environments, const BatchOptions& options)
+    : batch_(model, environments, options.seed, options.first_episode),
+      precision_(options.precision),
+      threads_(threads_of(options.threads)) {
+  for (int i = 0; i < threads_of(options.threads); ++i)
+    workers_.push_back({Stepper(model, options.stepper), Readout(model, options.precision)});
+}
+
+void PythonBatch::step(const Argument<double>& u) {
+  const std::vector<double> controls = rows_of(u, count(), as_size(model().nu()), "controls");
+  const InUse::Turn turn(in_use_);
+  const nb::gil_scoped_release free;
+  threads_.for_each(batch_.blocks(), workers_, [&](Worker& worker, int block) {
+    worker.stepper.step_block(batch_, block, controls);
+  });
+}
+
+FieldOutput PythonBatch::reading_named(const std::string& name) const {
+  const std::vector<std::string> sensors = sensor_names(model().scene());
+  if (const auto output = find_output(sensors, name)) return *output;
+  std::vector<std::string> names;
+  for (const std::string& n : output_names(sensors))
+    if (!is_plain_output(n)) names.push_back(n);
+  throw InputError(fmt::format("no reading is named '{}'; expected one of: {}", name,
+                               names.empty() ? "nothing, because the scene has no sensor"
+                                             : fmt::format("{}", fmt::join(names, ", "))));
+}
+
+Shape PythonBatch::shape_of_reading(FieldOutput output) const {
+  const SensorInfo& sensor = model().sensors()[as_size(output.sensor)];
+  if (output.form == FieldForm::sum) return {6};
+  Shape shape{as_size(sensor.points)};
+  if (sensor.rows > 0) shape = {as_size(sensor.rows), as_size(sensor.cols)};
+  if (const int components = components_of(output.form); components > 1)
+    shape.push_back(as_size(components));
+  return shape;
+}
+
+template <class T>
+nb::object PythonBatch::read(FieldOutput output, const nb::object& out) {
+  Shape shape = shape_of_reading(output);
+  shape.insert(shape.begin(), count());
+  std::span<T> numbers;
+  nb::object result = out;
+  if (out.is_none()) {
+    result = nb::cast(new_array<T>(shape, numbers));
+  } else {
+    nb::ndarray<T, nb::c_contig, nb::device::cpu> given;
+    if (!nb::try_cast(out, given, false))
+      throw InputError(fmt::format("out is no writable contiguous array of {}",
+                                   sizeof(T) == 4 ? "float32" : "float64"));
+    const Shape found(given.shape_ptr(), given.shape_ptr() + given.ndim());
+    if (found != shape)
+      throw InputError(fmt::format("out of shape ({}); expected ({})", fmt::join(found, ", "),
+                                   fmt::join(shape, ", ")));
+    numbers = {given.data(), given.size()};
+  }
+  const std::size_t width = numbers.size() / count();
+  const InUse::Turn turn(in_use_);
+  const nb::gil_scoped_release free;
+  threads_.for_each(batch_.blocks(), workers_, [&](Worker& worker, int block) {
+    read_field<T>(worker.readout, batch_, block, output,
+                  [&](int e) { return numbers.subspan(as_size(e) * width, width); });
+  });
+  return result;
+}
+
+nb::object PythonBatch::tactile(const std::string& reading, const nb::object& out) {
+  const FieldOutput output = reading_named(reading);
+  return precision_ == Precision::f64 ? read<double>(output, out) : read<float>(output, out);
+}
+
+Run PythonBatch::run(const Argument<double>& u, int every,
+                     const std::vector<std::string>& readings) {
+  if (u.ndim() == 0 || u.shape(0) == 0)
+    throw InputError("controls without a step; expected (T, E, nu)");
+  const std::size_t steps = u.shape(0), nu = as_size(model().nu());
+  if (every < 1 || steps % as_size(every) != 0)
+    throw InputError(fmt::format("{} steps with a frame every {}; expected a multiple of it", steps,
+                                 every));
+  const auto controls = numbers_of(u, {steps, count(), nu}, "controls");
+  return precision_ == Precision::f64 ? run_as<double>(controls, steps, as_size(every), readings)
+                                      : run_as<float>(controls, steps, as_size(every), readings);
+}
+
+template <class T>
+Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_t every,
+                        const std::vector<std::string>& readings) {
+  struct Asked {
+    FieldOutput output;
+    std::size_t width;
+    std::span<T> numbers;
+  };
+  const std::size_t frames = steps / every, nq = as_size(model().nq()), nv = as_size(model().nv()),
+                    nu = as_size(model().nu());
+  Run run;
+  std::span<double> q, v;
+  run.q = new_array<double>({frames, count(), nq}, q);
+  run.v = new_array<double>({frames, count(), nv}, v);
+  std::vector<Asked> asked;
+  for (const std::string& name : readings) {
+    asked.push_back({reading_named(name), 0, {}});
+    Shape shape = shape_of_reading(asked.back().output);
+    shape.insert(shape.begin(), {frames, count()});
+    run.readings[name] = nb::cast(new_array<T>(shape, asked.back().numbers));
+    asked.back().width = asked.back().numbers.size() / (frames * count());
+  }
+  const auto row = [&](auto numbers, std::size_t frame, int e, std::size_t width) {
+    return numbers.subspan((frame * count() + as_size(e)) * width, width);
+  };
+  {
+    const InUse::Turn turn(in_use_);
+    const nb::gil_scoped_release free;
+    threads_.for_each(batch_.blocks(), workers_, [&](Worker& worker, int block) {
+      for (std::size_t t = 0; t < steps; ++t) {
+        worker.stepper.step_block(batch_, block, u.subspan(t * count() * nu, count() * nu));
+        if ((t + 1) % every != 0) continue;
+        const std::size_t frame = t / every;
+        read_states(
+            batch_, block, [&](int e) { return row(q, frame, e, nq); },
+            [&](int e) { return row(v, frame, e, nv); });
+        for (const Asked& a : asked)
+          read_field<T>(worker.readout, batch_, block, a.output,
+                        [&](int e) { return row(a.numbers, frame, e, a.width); });
+      }
+    });
+  }
+  run.status = status();
+  return run;
+}
+
+Array<double> PythonBatch::q() {
+  const InUse::Turn turn(in_use_);
+  std::span<double> numbers;
+  const std::size_t width = as_size(model().nq());
+  auto array = new_array<double>({count(), width}, numbers);
+  for (int e = 0; e < environments(); ++e)
+    batch_.get_q(e, numbers.subspan(as_size(e) * width, width));
+  return array;
+}
+
+Array<double> PythonBatch::v() {
+  const InUse::Turn turn(in_use_);
+  std::span<double> numbers;
+  const std::size_t width = as_size(model().nv());
+  auto array = new_array<double>({count(), width}, numbers);
+  for (int e = 0; e < environments(); ++e)
+    batch_.get_v(e, numbers.subspan(as_size(e) * width, width));
+  return array;
+}
+
+Array<double> PythonBatch::end_effectors() {
+  const InUse::Turn turn(in_use_);
+  const std::size_t n = model().end_effectors().size();
+  std::span<double> numbers;
+  auto array = new_array<double>({count(), n, 3}, numbers);
+  for (int e = 0; e < environments() && n > 0; ++e)
+    workers_[0].readout.end_effectors(batch_, e, numbers.subspan(as_size(e) * 3 * n, 3 * n));
+  return array;
+}
+
+nb::tuple PythonBatch::bodies() {
+  const InUse::Turn turn(in_use_);
+  const std::size_t n = as_size(model().nb());
+  std::span<double> pose, twist;
+  const auto poses = new_array<double>({count(), n, 7}, pose);
+  const auto twists = new_array<double>({count(), n, 6}, twist);
+  for (int e = 0; e < environments(); ++e)
+    workers_[0].readout.bodies(batch_, e, pose.subspan(as_size(e) * 7 * n, 7 * n),
+                               twist.subspan(as_size(e) * 6 * n, 6 * n));
+  return nb::make_tuple(poses, twists);
+}
+
+Array<std::int8_t> PythonBatch::status() {
+  const InUse::Turn turn(in_use_);
+  return array_of<std::int8_t>({count()}, batch_.statuses());
+}
+
+std::vector<int> PythonBatch::listed(const std::optional<std::vector<int>>& environments) const {
+  std::vector<int> list;
+  if (environments) list = *environments;
+  for (int e = 0; e < this->environments() && !environments; ++e) list.push_back(e);
+  for (const int e : list)
+    if (e < 0 || e >= this->environments())
+      throw InputError(fmt::format("environment {}; expected 0 to {}", e, this->environments() - 1));
+  return list;
+}
+
+void PythonBatch::set_state(const Argument<double>& q, const Argument<double>& v,
+                            const std::optional<std::vector<int>>& environments) {
+  const std::vector<int> list = listed(environments);
+  const std::size_t nq = as_size(model().nq()), nv = as_size(model().nv());
+  const std::vector<double> qs = rows_of(q, list.size(), nq, "q"),
+                            vs = rows_of(v, list.size(), nv, "v");
+  const InUse::Turn turn(in_use_);
+  for (std::size_t k = 0; k < list.size(); ++k)
+    batch_.set_state(list[k], std::span(qs).subspan(k * nq, nq), std::span(vs).subspan(k * nv, nv));
+}
+
+void PythonBatch::reset(const std::optional<std::vector<int>>& environments,
+                        const std::optional<std::vector<std::int64_t>>& episodes) {
+  const std::vector<int> list = listed(environments);
+  if (episodes && episodes->size() != list.size())
+    throw InputError(fmt::format("{} episodes for {} environments; expected one for each",
+                                 episodes->size(), list.size()));
+  const InUse::Turn turn(in_use_);
+  for (std::size_t k = 0; k < list.size(); ++k)
+    batch_.reset(list[k], episodes ? (*episodes)[k] : batch_.episode(list[k]));
+}
+
+Array<double> PythonBatch::scene_controls(std::int64_t steps) {
+  if (steps < 1) throw InputError(fmt::format("{} steps; expected at least 1", steps));
+  const InUse::Turn turn(in_use_);
+  const ControlProgram program(model(), workers_[0].stepper.timestep(), batch_.seed());
+  program.check_covers(steps);
+  const std::size_t nu = as_size(model().nu());
+  std::span<double> numbers;
+  auto array = new_array<double>({as_size(steps), count(), nu}, numbers);
+  for (std::int64_t t = 0; t < steps; ++t)
+    for (int e = 0; e < environments(); ++e)
+      program.evaluate(t, batch_.episode(e),
+                       numbers.subspan((as_size(t) * count() + as_size(e)) * nu, nu));
+  return array;
+}
+
+void add_batches(nb::module_& m) {
+  nb::class_<Run>(m, "Run", "What Batch.run() leaves: F = steps / every frames.")
+      .def_prop_ro("q", [](const Run& r) { return r.q; }, nb::rv_policy::automatic, "(F, E, nq) coordinates.")
+      .def_prop_ro("v", [](const Run& r) { return r.v; }, nb::rv_policy::automatic, "(F, E, nv) velocities.")
+      .def_prop_ro("fields", [](const Run& r) { return r.readings; },
+                   "What was asked for by name: (F, E, …), as Batch.tactile() returns it.")
+      .def_prop_ro("status", [](const Run& r) { return r.status; }, nb::rv_policy::automatic,
+                   "(E) int8: of the last step; negative where an environment failed.");
+
+  nb::class_<PythonBatch>(
+      m, "Batch",
+      "Many environments of one model, stepped together on all cores. Results are new arrays.\n"
+      "The same seed gives the same bits for any number of environments and threads. One Python\n"
+      "thread uses a batch at a time.")
+      .def(
+          "__init__",
+          [](PythonBatch* self, const Model& model, int envs, std::uint64_t seed,
+             std::int64_t first_episode, const std::optional<int>& threads,
+             const std::string& precision, const std::optional<double>& timestep,
+             const std::optional<double>& tolerance) {
+            if (precision != "mixed" && precision != "double")
+              throw InputError(
+                  fmt::format("precision '{}'; expected 'mixed' or 'double'", precision));
+            BatchOptions options{seed, first_episode, threads,
+                                 precision == "mixed" ? Precision::mixed : Precision::f64, {}};
+            options.stepper.timestep = timestep;
+            options.stepper.tolerance = tolerance;
+            new (self) PythonBatch(model, envs, options);
+          },
+          "model"_a, "envs"_a = 1, "seed"_a = 0, "first_episode"_a = 0,
+          "threads"_a = nb::none(), "precision"_a = "mixed", "timestep"_a = nb::none(),
+          "tolerance"_a = nb::none(),
+          "Draws `envs` starting states: environment e is episode first_episode + e of `seed`.\n"
+          "`threads`: None for all cores. `precision`: of tactile fields; 'mixed' returns float32,\n"
+          "'double' float64. `timestep` [s] and `tolerance` (of a solve, dimensionless): None for\n"
+          "the scene's. InputError: a number is out of range.")
+      .def_prop_ro("model", &PythonBatch::model)
+      .def_prop_ro("envs", &PythonBatch::environments, "E")
+      .def_prop_ro("threads", &PythonBatch::threads)
+      .def_prop_ro("seed", &PythonBatch::seed)
+      .def_prop_ro("q", &PythonBatch::q, nb::rv_policy::automatic, "(E, nq) coordinates: m, rad, quaternions w x y z.")
+      .def_prop_ro("v", &PythonBatch::v, nb::rv_policy::automatic, "(E, nv) velocities: m/s, rad/s.")
+      .def_prop_ro("status", &PythonBatch::status, nb::rv_policy::automatic,
+                   "(E) int8: 0 for a step that converged, 1 after a split, 2 coarse, 3 passed\n"
+                   "through; negative where an environment has failed and stands still.")
+      .def("end_effectors", &PythonBatch::end_effectors, "(E, n, 3) places in the world [m].")
+      .def("bodies", &PythonBatch::bodies,
+           "Poses (E, nb, 7), x y z qw qx qy qz in the world, and twists (E, nb, 6), angular then\n"
+           "linear velocity in world axes.")
+      .def("step", &PythonBatch::step, "u"_a,
+           "Takes one step. `u`: (E, nu) controls, or (nu) for all environments; clipped to the\n"
+           "motors' ranges. InputError: another shape.")
+      .def("run", &PythonBatch::run, "u"_a, "every"_a = 1,
+           "fields"_a = std::vector<std::string>(),
+           "Takes T steps with the controls `u`, (T, E, nu), in one call. Keeps the state after\n"
+           "every `every` steps, and the readings named in `fields`. InputError: another shape, T\n"
+           "is no multiple of `every`, or there is no such reading.")
+      .def("tactile", &PythonBatch::tactile, "reading"_a, "out"_a = nb::none(),
+           "Reads one sensor in all environments: 'pad' (E, rows, cols, 3) or (E, points, 3),\n"
+           "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
+           "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes. `out`: an array\n"
+           "to fill instead of a new one.")
+      .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
+           "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
+           "`envs`, or of all. Releases a failed environment; forgets the state one step before.")
+      .def("reset", &PythonBatch::reset, "envs"_a = nb::none(), "episodes"_a = nb::none(),
+           "Draws the starting states again, or those of other `episodes`.")
+      .def("scene_controls", &PythonBatch::scene_controls, "steps"_a,
+           "(T, E, nu): what the scene's <control> gives for the first T steps.");
+}
+
+}  // namespace tangere::python

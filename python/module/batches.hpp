@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// A batch with all that steps and reads it: a stepper and a readout for each thread.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/sense/readout.hpp"
+#include "engine/step/stepper.hpp"
+#include "python/module/arrays.hpp"
+#include "tasks/run/block_threads.hpp"
+
+namespace tangere::python {
+
+struct BatchOptions {
+  std::uint64_t seed = 0;
+  std::int64_t first_episode = 0;
+  std::optional<int> threads;
+  Precision precision = Precision::mixed;
+  StepperOptions stepper;
+};
+
+/// What a run leaves, F = steps / every frames: (F, E, …).
+struct Run {
+  Array<double> q, v;
+  std::map<std::string, nb::object> readings;
+  Array<std::int8_t> status;  ///< (E) of the last step
+};
+
+class PythonBatch {
+ public:
+  PythonBatch(const Model& model, int environments, const BatchOptions& options);
+
+  void step(const Argument<double>& u);
+  Run run(const Argument<double>& u, int every, const std::vector<std::string>& readings);
+  nb::object tactile(const std::string& reading, const nb::object& out);
+  [[nodiscard]] Array<double> q();
+  [[nodiscard]] Array<double> v();
+  [[nodiscard]] Array<double> end_effectors();
+  nb::tuple bodies();
+  [[nodiscard]] Array<std::int8_t> status();
+  void set_state(const Argument<double>& q, const Argument<double>& v,
+                 const std::optional<std::vector<int>>& environments);
+  void reset(const std::optional<std::vector<int>>& environments,
+             const std::optional<std::vector<std::int64_t>>& episodes);
+  Array<double> scene_controls(std::int64_t steps);
+
+  [[nodiscard]] const Model& model() const { return batch_.model(); }
+  [[nodiscard]] int environments() const { return batch_.environments(); }
+  [[nodiscard]] int threads() const { return static_cast<int>(workers_.size()); }
+  [[nodiscard]] std::uint64_t seed() const { return batch_.seed(); }
+
+ private:
+  struct Worker {
+    Stepper stepper;
+    Readout readout;
+  };
+
+  [[nodiscard]] std::size_t count() const { return as_size(environments()); }
+  [[nodiscard]] FieldOutput reading_named(const std::string& name) const;
+  [[nodiscard]] Shape shape_of_reading(FieldOutput output) const;
+  [[nodiscard]] std::vector<int> listed(const std::optional<std::vector<int>>& environments) const;
+  template <class T>
+  nb::object read(FieldOutput output, const nb::object& out);
+  template <class T>
+  Run run_as(std::span<const double> u, std::size_t steps, std::size_t every,
+             const std::vector<std::string>& readings);
+
+  Batch batch_;
+  Precision precision_;
+  std::vector<Worker> workers_;  // by the thread's index in the arena
+  BlockThreads threads_;
+  InUse in_use_;
+};
+
+}  // namespace tangere::python

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// VectorTask in Python. tangere/gym.py makes Gymnasium's vector environment of it.
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "python/module/arrays.hpp"
+#include "python/module/observations.hpp"
+#include "tasks/catalogue/task_list.hpp"
+#include "tasks/run/policy.hpp"
+
+namespace tangere::python {
+
+using nb::literals::operator""_a;
+
+namespace {
+
+class Environments {
+ public:
+  Environments(const std::string& task, const Scene& scene, int environments,
+               const VectorOptions& options)
+      : task_(make_task(task, scene)),
+        vector_(*task_, environments, options),
+        policies_{Policy(*task_, PolicyKind::scripted), Policy(*task_, PolicyKind::random)} {}
+
+  void reset(std::uint64_t seed, std::int64_t first_episode) {
+    const InUse::Turn turn(in_use_);
+    const nb::gil_scoped_release free;
+    vector_.reset(seed, first_episode);
+  }
+  void restart(const Argument<bool>& which) {
+    const auto marks = numbers_of(which, {count()}, "a mask");
+    const std::vector<std::uint8_t> list(marks.begin(), marks.end());
+    const InUse::Turn turn(in_use_);
+    const nb::gil_scoped_release free;
+    vector_.restart(list);
+  }
+  void step(const Argument<double>& actions) {
+    const std::vector<double> rows =
+        rows_of(actions, count(), spec().action.size(), "actions");
+    const InUse::Turn turn(in_use_);
+    const nb::gil_scoped_release free;
+    vector_.step(rows);
+  }
+  nb::dict observations(bool scaled, const std::optional<std::vector<std::string>>& keys) {
+    const InUse::Turn turn(in_use_);
+    return observation_arrays(spec(), vector_.observations(), count(), scaled, keys);
+  }
+  Array<double> actions_of(std::size_t policy) {
+    std::span<double> numbers;
+    auto array = new_array<double>({count(), spec().action.size()}, numbers);
+    const InUse::Turn turn(in_use_);
+    policies_[policy].act(vector_, numbers);
+    return array;
+  }
+  nb::tuple state() {
+    const InUse::Turn turn(in_use_);
+    const std::size_t widths[] = {as_size(task_->model().nq()), as_size(task_->model().nv()),
+                                  as_size(spec().memory)};
+    std::span<double> numbers[3];
+    Array<double> arrays[3];
+    for (int k = 0; k < 3; ++k) arrays[k] = new_array<double>({count(), widths[k]}, numbers[k]);
+    for (std::size_t e = 0; e < count(); ++e) {
+      const TaskView view = vector_.view(static_cast<int>(e));
+      const std::span<const double> from[] = {view.now().q, view.now().v, view.memory};
+      for (int k = 0; k < 3; ++k)
+        std::copy(from[k].begin(), from[k].end(), numbers[k].begin() + std::ptrdiff_t(e * widths[k]));
+    }
+    return nb::make_tuple(arrays[0], arrays[1], arrays[2]);
+  }
+  Array<std::int8_t> status() {
+    std::span<std::int8_t> numbers;
+    auto array = new_array<std::int8_t>({count()}, numbers);
+    const InUse::Turn turn(in_use_);
+    for (std::size_t e = 0; e < count(); ++e)
+      numbers[e] = static_cast<std::int8_t>(vector_.status(static_cast<int>(e)));
+    return array;
+  }
+  template <class T, class From>
+  Array<T> per_environment(std::span<const From> (VectorTask::*get)() const) {
+    const InUse::Turn turn(in_use_);
+    return array_of<T>({count()}, (vector_.*get)());
+  }
+  nb::dict counts() {
+    const InUse::Turn turn(in_use_);
+    const VectorCounts c = vector_.counts();
+    nb::dict d;
+    d["environment_steps"] = c.environment_steps;
+    d["simulation_steps"] = c.simulation_steps;
+    d["newton_iterations"] = c.newton_iterations;
+    d["split_steps"] = c.split_steps;
+    return d;
+  }
+
+  [[nodiscard]] const TaskSpec& spec() const { return task_->spec(); }
+  [[nodiscard]] const Model& model() const { return task_->model(); }
+  [[nodiscard]] std::size_t count() const { return as_size(vector_.environments()); }
+
+ private:
+  std::unique_ptr<Task> task_;
+  VectorTask vector_;
+  Policy policies_[2];
+  InUse in_use_;
+};
+
+template <class T, class From>
+auto numbers(std::span<const From> (VectorTask::*get)() const) {
+  return [get](Environments& self) { return self.per_environment<T, From>(get); };
+}
+
+}  // namespace
+
+void add_environments(nb::module_& m) {
+  nb::class_<Environments>(
+      m, "Environments",
+      "Many environments of one task, stepped together. Environment e plays episodes first + e,\n"
+      "first + e + E, … of a seed. tangere.make_vec() wraps it for Gymnasium.")
+      .def(
+          "__init__",
+          [](Environments* self, const std::string& task, const Scene& scene, int envs,
+             std::uint64_t seed, std::int64_t first_episode, const std::optional<int>& threads,
+             bool autoreset) {
+            VectorOptions options{seed, first_episode, threads_of(threads)};
+            options.autoreset = autoreset;
+            new (self) Environments(task, scene, envs, options);
+          },
+          "task"_a, "scene"_a, "envs"_a, "seed"_a = 0, "first_episode"_a = 0,
+          "threads"_a = nb::none(), "autoreset"_a = true,
+          "Makes E environments and starts their episodes. InputError: no such task, or the scene\n"
+          "does not belong to it.")
+      .def("reset", &Environments::reset, "seed"_a, "first_episode"_a = 0,
+           "Starts the first episodes of a seed.")
+      .def("restart", &Environments::restart, "which"_a,
+           "Starts the next episode where `which`, (E) bool, is true, and leaves the others alone.")
+      .def("step", &Environments::step, "actions"_a,
+           "Takes one action of every environment, (E, action), clipped to its bounds. With\n"
+           "autoreset, an environment whose episode has ended starts the next one instead.")
+      .def("observations", &Environments::observations, "scaled"_a = true, "keys"_a = nb::none(),
+           "A dict of new float32 arrays (E, …), divided by their scales if `scaled`, else in SI\n"
+           "units.")
+      .def("rewards", numbers<double>(&VectorTask::rewards), "(E) of the last step.")
+      .def("terminated", numbers<bool>(&VectorTask::terminated), "(E) bool: the episode ended.")
+      .def("truncated", numbers<bool>(&VectorTask::truncated),
+           "(E) bool: out of time, or the simulation failed.")
+      .def("success", numbers<bool>(&VectorTask::success), "(E) bool.")
+      .def("starting", numbers<bool>(&VectorTask::starting), "(E) bool: the step was a reset.")
+      .def("returns", numbers<double>(&VectorTask::returns), "(E) sums of the episodes' rewards.")
+      .def("lengths", numbers<std::int64_t>(&VectorTask::lengths), "(E) actions so far.")
+      .def("episodes", numbers<std::int64_t>(&VectorTask::episodes), "(E) numbers of the episodes.")
+      .def("status", &Environments::status, "(E) int8, as in Batch.status.")
+      .def("scripted", [](Environments& self) { return self.actions_of(0); },
+           "(E, action): what the task's own script would do. It may look at the whole state.")
+      .def("random", [](Environments& self) { return self.actions_of(1); },
+           "(E, action): uniform within the bounds, the same for the same seed and episode.")
+      .def("state", &Environments::state,
+           "q (E, nq), v (E, nv) and the task's memory (E, memory): what a robot cannot see.")
+      .def("counts", &Environments::counts, "Steps and Newton passes since the last reset.")
+      .def_prop_ro("spec", &Environments::spec)
+      .def_prop_ro("model", &Environments::model)
+      .def_prop_ro("envs", &Environments::count);
+}
+
+}  // namespace tangere::python

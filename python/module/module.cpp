@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The module tangere._core: the classes of the libraries with arrays for arguments and results.
+// The package around it is python/tangere.
+#include <tbb/info.h>
+
+#include "kernels/table/isa.hpp"
+#include "python/module/arrays.hpp"
+
+namespace tangere::python {
+
+int threads_of(const std::optional<int>& asked) {
+  if (asked && *asked < 1)
+    throw InputError(fmt::format("{} threads; expected at least 1, or None", *asked));
+  return asked ? *asked : tbb::info::default_concurrency();
+}
+
+}  // namespace tangere::python
+
+NB_MODULE(_core, m) {
+  namespace nb = nanobind;
+  using namespace tangere::python;
+  m.doc() = "Batched differentiable tactile simulation on CPUs: the compiled part.";
+  m.attr("__version__") = TANGERE_VERSION;
+  m.attr("instruction_set") = tangere::kernels::active_isa_name();
+  // A request that cannot be carried out is a ValueError, a failing file an OSError.
+  nb::exception<tangere::InputError>(m, "InputError", PyExc_ValueError);
+  nb::exception<tangere::IoError>(m, "IoError", PyExc_OSError);
+  if (const char* const why = tangere::kernels::forced_isa_error(); *why != '\0')
+    throw nb::import_error(why);
+  add_scenes(m);
+  add_batches(m);
+  add_tasks(m);
+  add_environments(m);
+}

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// Scene and Model in Python.
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "engine/model/field_form.hpp"
+#include "engine/model/scheme.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "python/module/arrays.hpp"
+
+namespace tangere::python {
+namespace {
+
+using nb::literals::operator""_a;
+
+/// What the reader overlooked must reach the user: each warning is a UserWarning.
+Scene told(SceneFile file) {
+  for (const std::string& warning : file.warnings)
+    if (PyErr_WarnEx(PyExc_UserWarning, warning.c_str(), 1) < 0) throw nb::python_error();
+  return std::move(file.scene);
+}
+
+std::vector<std::string> copied(std::span<const std::string> names) {
+  return {names.begin(), names.end()};
+}
+
+void add_scene(nb::module_& m) {
+  nb::class_<Scene>(m, "Scene", "A scene as its file describes it, in SI units.")
+      .def(
+          "__init__",
+          [](Scene* self, const std::filesystem::path& path, bool allow_unknown) {
+            new (self) Scene(told(read_scene(path, {allow_unknown})));
+          },
+          "path"_a, "allow_unknown"_a = false,
+          "Reads a scene file. InputError: something in it is unknown, missing or impossible; the\n"
+          "message has file and line. OSError: it cannot be read. `allow_unknown` turns unknown\n"
+          "elements and attributes into warnings.")
+      .def_static(
+          "from_text",
+          [](const std::string& text, const std::string& name) {
+            return told(parse_scene(text, name));
+          },
+          "text"_a, "name"_a = "scene", "Reads a scene from text; `name` stands for the file.")
+      .def_ro("name", &Scene::name)
+      .def_ro("path", &Scene::path, "The file that it was read from.")
+      .def_ro("text", &Scene::text, "The file as read.")
+      .def_ro("timestep", &Scene::timestep, "[s]")
+      .def("__repr__", [](const Scene& s) { return fmt::format("Scene('{}')", s.path); });
+}
+
+void add_sensor(nb::module_& m) {
+  nb::class_<SensorInfo>(m, "Sensor", "A tactile sensor of a model.")
+      .def_ro("name", &SensorInfo::name)
+      .def_ro("body", &SensorInfo::body, "The body that carries it.")
+      .def_ro("rows", &SensorInfo::rows, "Of a rectangular array; 0 for other layouts.")
+      .def_ro("cols", &SensorInfo::cols)
+      .def_ro("points", &SensorInfo::points)
+      .def_ro("pressure_sign", &SensorInfo::pressure_sign,
+              "1 where the third component is positive under pressure, else -1.")
+      .def("__repr__", [](const SensorInfo& s) {
+        return fmt::format("Sensor('{}', points={})", s.name, s.points);
+      });
+}
+
+void add_model(nb::module_& m) {
+  nb::class_<Model>(m, "Model", "A compiled scene. It never changes; any number of batches use it.")
+      .def(nb::init<const Scene&>(), "scene"_a,
+           "Compiles a scene. InputError: it refers to something that is not there, or cannot move.")
+      .def_prop_ro("scene", &Model::scene)
+      .def_prop_ro("nq", &Model::nq, "Coordinates; a quaternion counts 4.")
+      .def_prop_ro("nv", &Model::nv, "Velocities.")
+      .def_prop_ro("nu", &Model::nu, "Controls.")
+      .def_prop_ro("nb", &Model::nb, "Bodies.")
+      .def_prop_ro("timestep", &Model::timestep, "[s]")
+      .def_prop_ro("integrator", [](const Model& s) { return std::string(s.integrator().scheme().name); })
+      .def_prop_ro("q_names", [](const Model& s) { return copied(s.q_names()); })
+      .def_prop_ro("v_names", [](const Model& s) { return copied(s.v_names()); })
+      .def_prop_ro("u_names", [](const Model& s) { return copied(s.u_names()); })
+      .def_prop_ro("q_units", [](const Model& s) { return copied(s.q_units()); })
+      .def_prop_ro("v_units", [](const Model& s) { return copied(s.v_units()); })
+      .def_prop_ro("body_names", [](const Model& s) { return copied(s.body_names()); })
+      .def_prop_ro("end_effector_names",
+                   [](const Model& s) {
+                     std::vector<std::string> names;
+                     for (const EndEffectorInfo& e : s.end_effectors()) names.push_back(e.name);
+                     return names;
+                   })
+      .def_prop_ro("sensors",
+                   [](const Model& s) {
+                     return std::vector<SensorInfo>(s.sensors().begin(), s.sensors().end());
+                   })
+      .def_prop_ro("readings",
+                   [](const Model& s) { return output_names(sensor_names(s.scene())); },
+                   "Names of everything that can be read: q, v, …, pad, pad.pressure, pad.sum.")
+      .def_prop_ro("initial_q",
+                   [](const Model& s) {
+                     return array_of<double>({as_size(s.nq())}, s.initial_q());
+                   },
+                   nb::rv_policy::automatic, "(nq) where the scene starts.")
+      .def("mass", &Model::mass, "body"_a, "Of a body, by its index [kg].")
+      .def("__repr__", [](const Model& s) {
+        return fmt::format("Model('{}', nq={}, nv={}, nu={})", s.scene().name, s.nq(), s.nv(),
+                           s.nu());
+      });
+}
+
+}  // namespace
+
+void add_scenes(nb::module_& m) {
+  add_scene(m);
+  add_sensor(m);
+  add_model(m);
+}
+
+}  // namespace tangere::python

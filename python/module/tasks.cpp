@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// What tasks declare, in Python.
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "python/module/arrays.hpp"
+#include "tasks/catalogue/task_list.hpp"
+
+namespace tangere::python {
+
+using nb::literals::operator""_a;
+
+void add_tasks(nb::module_& m) {
+  nb::class_<TensorSpec>(m, "TensorSpec", "An array of numbers that a task receives or returns.")
+      .def_ro("name", &TensorSpec::name)
+      .def_prop_ro("shape",
+                   [](const TensorSpec& t) { return nb::tuple(nb::cast(t.shape)); })
+      .def_ro("unit", &TensorSpec::unit)
+      .def_ro("meaning", &TensorSpec::meaning)
+      .def_ro("low", &TensorSpec::low, "Lower bound of every number, or -inf.")
+      .def_ro("high", &TensorSpec::high)
+      .def_ro("scale", &TensorSpec::scale,
+              "Typical sizes in `unit`: one, or one per place on the last axis. Empty: 1.")
+      .def_ro("privileged", &TensorSpec::privileged, "A robot could not measure it.")
+      .def("__repr__", [](const TensorSpec& t) {
+        return fmt::format("TensorSpec('{}', ({}), '{}')", t.name, fmt::join(t.shape, ", "), t.unit);
+      });
+  nb::class_<TaskSpec>(m, "TaskSpec", "What a task declares.")
+      .def_ro("name", &TaskSpec::name)
+      .def_ro("summary", &TaskSpec::summary)
+      .def_ro("scene", &TaskSpec::scene, "Its file among tangere.scenes().")
+      .def_ro("success", &TaskSpec::success, "When an episode counts as solved.")
+      .def_ro("action", &TaskSpec::action)
+      .def_ro("observations", &TaskSpec::observations)
+      .def_ro("steps_per_action", &TaskSpec::steps_per_action, "Simulation steps.")
+      .def_ro("horizon", &TaskSpec::horizon, "Actions after which an episode is truncated.")
+      .def_ro("memory", &TaskSpec::memory, "Numbers that an episode keeps for the task.")
+      .def("__repr__", [](const TaskSpec& s) { return fmt::format("TaskSpec('{}')", s.name); });
+  m.def("task_names", &task_names, "Names of all tasks.");
+  m.def("task_spec", &task_spec, "name"_a,
+        "What the task of that name declares. InputError: there is none.");
+}
+
+}  // namespace tangere::python

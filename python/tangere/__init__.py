@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tangere simulates what tactile skins feel: thousands of environments at once, on CPUs.
+
+    model = tangere.Model(tangere.Scene(tangere.scenes()["rolling_ball"]))
+    batch = tangere.Batch(model, envs=256)
+    batch.step([0.0, 0.0, -0.5])
+    batch.tactile("pad")                    # (256, 200, 200, 3) float32 [N]
+
+    env = tangere.make_vec("box_pushing", num_envs=256)      # Gymnasium's vector interface
+
+`tangere.gym` has the environments, `tangere.torch` gradients through PyTorch, `tangere.data` data
+sets for learning. The last two need packages that `import tangere` does not import.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ._core import (
+    Batch,
+    Environments,
+    InputError,
+    IoError,
+    Model,
+    Run,
+    Scene,
+    Sensor,
+    TaskSpec,
+    TensorSpec,
+    __version__,
+    instruction_set,
+    task_names,
+    task_spec,
+)
+from .gym import TaskEnv, VectorTaskEnv, gym_id, make_env, make_vec, register_tasks
+
+__all__ = [
+    "Batch",
+    "Environments",
+    "InputError",
+    "IoError",
+    "Model",
+    "Run",
+    "Scene",
+    "Sensor",
+    "TaskEnv",
+    "TaskSpec",
+    "TensorSpec",
+    "VectorTaskEnv",
+    "__version__",
+    "gym_id",
+    "instruction_set",
+    "make_env",
+    "make_vec",
+    "scenes",
+    "task_names",
+    "task_spec",
+]
+
+
+def scenes() -> dict[str, Path]:
+    """The scenes that come with the package: name without .xml → path of the file."""
+    folder = Path(__file__).resolve().parent / "scenes"
+    here = Path(__file__).parent / "scenes"
+    folder = here if here.is_dir() else folder
+    return {path.stem: path for path in sorted(folder.glob("*.xml"))}
+
+
+register_tasks()

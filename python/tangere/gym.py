@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tasks as Gymnasium environments: many at once (`make_vec`), or one (`gymnasium.make`).
+
+Observations are float32, divided by the scales that the task declares; actions are bounded by what
+the task declares, [-1, 1] for every task but `dummy`. Rewards are float64.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal, Sequence
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from . import _core
+
+Autoreset = Literal["next_step", "same_step", "disabled"]
+_MODES = {
+    "next_step": AutoresetMode.NEXT_STEP,
+    "same_step": AutoresetMode.SAME_STEP,
+    "disabled": AutoresetMode.DISABLED,
+}
+
+
+def gym_id(task: str) -> str:
+    """The id of a task: "box_pushing" → "tangere/BoxPushing-v0"."""
+    return f"tangere/{''.join(word.capitalize() for word in task.split('_'))}-v0"
+
+
+def task_scene(task: str) -> _core.Scene:
+    """The scene of a task, from the package."""
+    return _core.Scene(Path(__file__).parent / "scenes" / _core.task_spec(task).scene)
+
+
+def observation_scale(tensor: _core.TensorSpec) -> float | list[float]:
+    """What observations of a key are divided by: one number, or one per place on the last axis."""
+    if len(tensor.scale) > 1:
+        return list(tensor.scale)
+    return tensor.scale[0] if tensor.scale else 1.0
+
+
+def observation_space(
+    spec: _core.TaskSpec, keys: Sequence[str], normalise: bool, flatten: bool
+) -> spaces.Space:
+    """The space of one environment's observations."""
+    boxes = {}
+    for tensor in spec.observations:
+        if tensor.name not in keys:
+            continue
+        scale = np.broadcast_to(np.asarray(observation_scale(tensor)), tensor.shape)
+        by = scale if normalise else np.ones(tensor.shape)
+        boxes[tensor.name] = spaces.Box(
+            (tensor.low / by).astype(np.float32), (tensor.high / by).astype(np.float32)
+        )
+    if not flatten:
+        return spaces.Dict(boxes)
+    low = np.concatenate([boxes[key].low.ravel() for key in boxes])
+    high = np.concatenate([boxes[key].high.ravel() for key in boxes])
+    return spaces.Box(low, high)
+
+
+class VectorTaskEnv(VectorEnv):
+    """Many environments of one task, stepped in C++ on all cores with one call a step.
+
+    Environment e plays episodes first_episode + e, first_episode + e + E, … of a seed: an episode
+    is the same, bit for bit, for every number of environments and threads. `reset(seed=s)` starts
+    the first of them, `reset()` the next ones. `info` has `success`, `starting`, `episode_id` and
+    `status`, (E) each; `status` is negative where the simulation failed, which truncates the
+    episode.
+
+    Parameters
+    ----------
+    task: a name of `tangere.task_names()`.
+    num_envs: E.
+    threads: None for all cores.
+    seed, first_episode: which episodes the first reset starts, unless it is given a seed.
+    normalise: divide observations by `observation_scale`; otherwise they are in SI units.
+    flatten: one array (E, n) in the order of the keys instead of a dict.
+    autoreset: what follows the end of an episode. "next_step": the next step ignores its action
+        and shows the start of the next episode, with reward 0. "same_step": the observation is
+        that of the start already, and `info["final_obs"]` holds the last one of the episode.
+        "disabled": the environment stands still until `reset(options={"reset_mask": m})`.
+    keys: the observations to show; None for all that the task declares.
+    scene: another scene than the one of the task.
+    """
+
+    def __init__(
+        self,
+        task: str,
+        num_envs: int,
+        *,
+        threads: int | None = None,
+        seed: int = 0,
+        first_episode: int = 0,
+        normalise: bool = True,
+        flatten: bool = False,
+        autoreset: Autoreset = "next_step",
+        keys: Sequence[str] | None = None,
+        scene: _core.Scene | None = None,
+        render_mode: None = None,
+    ) -> None:
+        if autoreset not in _MODES:
+            raise _core.InputError(f"autoreset {autoreset!r}; expected one of {sorted(_MODES)}")
+        if render_mode is not None:
+            raise _core.InputError("there is no render_mode; see `tangere plot` for pictures")
+        self.metadata = {"autoreset_mode": _MODES[autoreset], "render_modes": []}
+        self.task = _core.task_spec(task)
+        names = [tensor.name for tensor in self.task.observations]
+        unknown = [key for key in keys or () if key not in names]
+        if unknown or keys is not None and not keys:
+            raise _core.InputError(f"keys {list(keys or ())}; task {task!r} has {names}")
+        self.keys = [name for name in names if keys is None or name in keys]
+        self.normalise, self.flatten = normalise, flatten
+        self.num_envs = num_envs
+        self._mode = autoreset
+        self._env = _core.Environments(
+            task,
+            scene or task_scene(task),
+            num_envs,
+            seed=seed,
+            first_episode=first_episode,
+            threads=threads,
+            autoreset=autoreset == "next_step",
+        )
+        self._seed, self._first_episode, self._fresh = seed, first_episode, True
+        action = self.task.action
+        self.single_action_space = spaces.Box(action.low, action.high, action.shape, np.float32)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.single_observation_space = observation_space(
+            self.task, self.keys, normalise, flatten
+        )
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+
+    @property
+    def observation_scale(self) -> dict[str, float | list[float]]:
+        """KEY → what its observations are divided by, in SI units."""
+        return {t.name: observation_scale(t) for t in self.task.observations}
+
+    @property
+    def model(self) -> _core.Model:
+        """The compiled scene."""
+        return self._env.model
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+        """Starts episodes: the first ones of `seed`, or without it the next ones.
+
+        `options`: "reset_mask" (E) bool starts those alone; "first_episode" goes with a seed.
+        """
+        options = dict(options or {})
+        mask = options.pop("reset_mask", None)
+        first = options.pop("first_episode", None)
+        if options:
+            raise _core.InputError(f"options {list(options)}; known: reset_mask, first_episode")
+        if isinstance(seed, (list, tuple, np.ndarray)):
+            raise _core.InputError(
+                "one seed for each environment; expected one number, because an environment's "
+                "episode already differs from the others' (docs/python.md)"
+            )
+        if mask is not None:
+            if seed is not None or first is not None:
+                raise _core.InputError("reset_mask goes with neither seed nor first_episode")
+            self._env.restart(np.asarray(mask, bool))
+        elif seed is not None or first is not None or self._fresh:
+            self._seed = self._seed if seed is None else int(seed)
+            self._first_episode = self._first_episode if first is None else int(first)
+            self._env.reset(self._seed, self._first_episode)
+        else:
+            self._env.restart(np.ones(self.num_envs, bool))
+        self._fresh = False
+        return self._observe(), self._info()
+
+    def step(self, actions):
+        """Takes one action (E, na) of every environment, clipped to its bounds.
+
+        Returns observations, rewards (E) float64, terminated, truncated (E) bool, info. Everything
+        is new at every step.
+        """
+        self._fresh = False
+        self._env.step(np.asarray(actions))
+        reward, terminated, truncated = (
+            self._env.rewards(),
+            self._env.terminated(),
+            self._env.truncated(),
+        )
+        info = self._info()
+        ended = terminated | truncated
+        if self._mode == "same_step" and ended.any():
+            last = self._observe()
+            info["final_obs"] = np.empty(self.num_envs, object)
+            for e in np.flatnonzero(ended):
+                info["final_obs"][e] = (
+                    last[e] if self.flatten else {k: v[e] for k, v in last.items()}
+                )
+            info["_final_obs"] = ended
+            self._env.restart(ended)
+            info["starting"] = self._env.starting()
+            info["episode_id"] = self._env.episodes()
+        return self._observe(), reward, terminated, truncated, info
+
+    def scripted_action(self) -> np.ndarray:
+        """(E, na): what the task's own script does here. It may look at the whole state."""
+        return self._env.scripted()
+
+    def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """q (E, nq), v (E, nv) and the task's memory, (E, n): privileged, float64, SI units."""
+        return self._env.state()
+
+    def counts(self) -> dict[str, int]:
+        """Environment steps, simulation steps and Newton passes since the last reset by seed."""
+        return self._env.counts()
+
+    def _observe(self):
+        arrays = self._env.observations(self.normalise, self.keys)
+        if not self.flatten:
+            return arrays
+        return np.concatenate([arrays[k].reshape(self.num_envs, -1) for k in self.keys], axis=1)
+
+    def _info(self) -> dict[str, Any]:
+        every = np.ones(self.num_envs, bool)
+        info = {
+            "success": self._env.success(),
+            "starting": self._env.starting(),
+            "episode_id": self._env.episodes(),
+            "status": self._env.status(),
+        }
+        return info | {f"_{key}": every.copy() for key in info}
+
+
+class TaskEnv(gymnasium.Env):
+    """One environment of a task, for evaluation. The episodes are those of `VectorTaskEnv`.
+
+    `reset(seed=s)` starts episode `first_episode` of seed s, `reset()` the next one.
+    """
+
+    metadata = {"render_modes": []}
+
+    def __init__(self, task: str, *, seed: int = 0, render_mode: None = None, **arguments: Any):
+        self._vector = VectorTaskEnv(
+            task, 1, threads=1, seed=seed, autoreset="disabled", render_mode=render_mode, **arguments
+        )
+        self.task = self._vector.task
+        self.action_space = self._vector.single_action_space
+        self.observation_space = self._vector.single_observation_space
+        self._over = True
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+        """Starts an episode; see the class."""
+        super().reset(seed=seed)
+        obs, info = self._vector.reset(seed=seed, options=options)
+        self._over = False
+        return self._one(obs), self._info(info)
+
+    def step(self, action):
+        """Takes one action (na). Raises InputError after the end of an episode."""
+        if self._over:
+            raise _core.InputError("step() without an episode; call reset() first")
+        obs, reward, terminated, truncated, info = self._vector.step(np.asarray(action)[None])
+        self._over = bool(terminated[0] or truncated[0])
+        return (
+            self._one(obs),
+            float(reward[0]),
+            bool(terminated[0]),
+            bool(truncated[0]),
+            self._info(info),
+        )
+
+    @property
+    def observation_scale(self) -> dict[str, float | list[float]]:
+        """KEY → what its observations are divided by, in SI units."""
+        return self._vector.observation_scale
+
+    def scripted_action(self) -> np.ndarray:
+        """(na): what the task's own script does here. It may look at the whole state."""
+        return self._vector.scripted_action()[0]
+
+    def state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """q, v and the task's memory: privileged, float64, SI units."""
+        q, v, memory = self._vector.state()
+        return q[0], v[0], memory[0]
+
+    def _one(self, obs):
+        return obs[0] if self._vector.flatten else {key: value[0] for key, value in obs.items()}
+
+    @staticmethod
+    def _info(info: dict[str, Any]) -> dict[str, Any]:
+        return {key: value[0].item() for key, value in info.items() if not key.startswith("_")}
+
+
+def make_vec(task: str, num_envs: int = 1, **arguments: Any) -> VectorTaskEnv:
+    """Many environments of one task; `arguments` are those of `VectorTaskEnv`."""
+    return VectorTaskEnv(task, num_envs, **arguments)
+
+
+def make_env(task: str, **arguments: Any) -> TaskEnv:
+    """One environment of a task; `arguments` are those of `VectorTaskEnv`, without its numbers."""
+    return TaskEnv(task, **arguments)
+
+
+def env_spec_json(task: str, **arguments: Any) -> str:
+    """The text from which `gymnasium.make` makes the environment, wherever it is read."""
+    return json.dumps(
+        {
+            "id": gym_id(task),
+            "entry_point": "tangere.gym:make_env",
+            "reward_threshold": None,
+            "nondeterministic": False,
+            "max_episode_steps": None,
+            "order_enforce": True,
+            "disable_env_checker": False,
+            "kwargs": {"task": task, **arguments},
+            "additional_wrappers": [],
+            "vector_entry_point": None,
+        }
+    )
+
+
+def register_tasks() -> None:
+    """Registers every task with Gymnasium. `import tangere` has done it."""
+    for task in _core.task_names():
+        if gym_id(task) not in gymnasium.registry:
+            gymnasium.register(
+                gym_id(task),
+                entry_point="tangere.gym:make_env",
+                vector_entry_point="tangere.gym:make_vec",
+                kwargs={"task": task},
+            )
