@@ -275,7 +275,8 @@ void BlockWorker::conclude_one(Batch& batch, EnvironmentData& data, int environm
     const bool lost = failed(batch.status(environment));
     ++counts.environment_steps;
     view.actions = ++data.length[e];
-    const Verdict verdict = task_.judge(view);
+    Verdict verdict = task_.judge(view);
+    if (lost && !std::isfinite(verdict.reward)) verdict.reward = 0;  // the action was no number
     data.reward[e] = verdict.reward;
     data.returns[e] += verdict.reward;
     data.terminated[e] = verdict.terminated && !lost;

@@ -74,7 +74,7 @@ class VectorTask {
   [[nodiscard]] std::span<const std::int64_t> lengths() const;   ///< (E) its actions so far
   [[nodiscard]] std::span<const std::int64_t> episodes() const;  ///< (E) its number
   /// Status of the simulation. A failure truncates the episode, with the reward of the last state
-  /// that was found.
+  /// that was found, or 0 where the action makes that no number.
   [[nodiscard]] StepStatus status(int environment) const;
   /// What a policy with access to the state looks at: the current q, v and memory of the task.
   [[nodiscard]] TaskView view(int environment) const;

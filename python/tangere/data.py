@@ -1,0 +1,314 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Data sets of `tangere generate` for learning: windows of rows, scaled, as PyTorch reads them.
+
+Needs h5py (`pip install tangere[data]`). PyTorch is not needed: `Windows` has the interface of
+`torch.utils.data.Dataset`, and its items are NumPy arrays, which PyTorch's loader collates.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import OrderedDict
+from pathlib import Path
+from typing import Any, Literal, Sequence
+
+import h5py
+import numpy as np
+
+from . import _core
+
+Form = Literal["stored", "image", "points"]
+Scale = Literal["task", "standard", "none"]
+
+_CACHED_BYTES = 1 << 28  # of compressed data sets, which cannot be mapped
+_MOST_IN_MEMORY = 4 << 30  # bytes of an array's rows that are read at once and kept
+_FLOOR = 0.05  # of a key's root mean square: the least standard deviation that is divided by
+
+
+class Episodes:
+    """The episodes of a data set, from its shards: `episodes[i]["tactile"]` is (rows, …).
+
+    Uncompressed data are mapped, not read: an array is a view of the file. A process opens the
+    files for itself, so an object may go to the workers of a loader.
+    """
+
+    def __init__(self, path: str | Path):
+        self.path = Path(path)
+        shards = sorted(self.path.glob("shard-*.h5"))
+        if not shards:
+            raise _core.InputError(f"{self.path}: no shard-*.h5; expected a folder of `tangere generate`")
+        self._shards = shards
+        self.names: list[str] = []  # demo_0, demo_1 … in order
+        self._shard_of: list[int] = []
+        lengths: list[int] = []
+        self.attributes: dict[str, Any] = {}
+        found = []
+        for number, shard in enumerate(shards):
+            with h5py.File(shard, "r") as file:
+                if number == 0:
+                    self.attributes = dict(file["scene"].attrs)
+                    self._describe(file)
+                for name, demo in file["data"].items():
+                    rows = int(demo.attrs["num_samples"])
+                    found.append((int(name.removeprefix("demo_")), name, number, rows))
+        for _, name, number, rows in sorted(found):
+            self.names.append(name)
+            self._shard_of.append(number)
+            lengths.append(rows)
+        self.lengths = np.asarray(lengths)
+        self._index = {name: i for i, name in enumerate(self.names)}
+        self._maps: dict[int, np.memmap] = {}
+        self._files: dict[int, h5py.File] = {}
+        self._open: OrderedDict[int, dict[str, np.ndarray]] = OrderedDict()
+        self._held = 0  # bytes of arrays in _open that are no views of a file
+
+    def _describe(self, file: h5py.File) -> None:
+        scene = file["scene"].attrs
+        self.keys = [str(key) for key in scene["observations"]]
+        self.task = str(scene["task"])
+        if self.task not in _core.task_names():
+            self.task = ""
+        self.scale: dict[str, Any] = {key: 1.0 for key in self.keys}
+        self.privileged = [key for key in ("q", "v") if key in self.keys]
+        if "observation_scale" in scene:
+            self.scale.update(json.loads(scene["observation_scale"]))
+            self.privileged = json.loads(scene["privileged"])
+        self.masks = self.path / "robomimic.hdf5"
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def named(self, names: Sequence[str]) -> list[int]:
+        """Indices of demos by name."""
+        return [self._index[name] for name in names]
+
+    def mask(self, name: str) -> list[int]:
+        """The episodes of a mask of robomimic.hdf5: train, valid, success …"""
+        if not self.masks.exists():
+            raise _core.InputError(f"{self.masks} is missing; expected a merged data set (tangere merge)")
+        with h5py.File(self.masks, "r") as file:
+            if name not in file["mask"]:
+                raise _core.InputError(f"{self.masks}: no mask {name!r}; it has {list(file['mask'])}")
+            return self.named([n.decode() for n in file["mask"][name][()]])
+
+    def succeeded(self) -> list[int]:
+        """The episodes that ended in success."""
+        return [i for i in range(len(self)) if self._demo(i).attrs.get("success", 0) == 1]
+
+    def __getitem__(self, episode: int) -> dict[str, np.ndarray]:
+        """Arrays by name: the observations, "actions", "rewards", and "grad_…" where there are any."""
+        if episode in self._open:
+            self._open.move_to_end(episode)
+            return self._open[episode]
+        demo = self._demo(episode)
+        arrays = {key: self._array(episode, demo["obs"][key]) for key in demo["obs"]}
+        for name, item in demo.items():
+            if isinstance(item, h5py.Dataset):
+                arrays[name] = self._array(episode, item)
+        self._open[episode] = arrays
+        self._held += _copied(arrays)
+        while self._held > _CACHED_BYTES and len(self._open) > 1:
+            self._held -= _copied(self._open.popitem(last=False)[1])
+        return arrays
+
+    def _demo(self, episode: int) -> h5py.Group:
+        number = self._shard_of[episode]
+        if number not in self._files:
+            self._files[number] = h5py.File(self._shards[number], "r")
+        return self._files[number]["data"][self.names[episode]]
+
+    def _array(self, episode: int, dataset: h5py.Dataset) -> np.ndarray:
+        offset = dataset.id.get_offset()
+        if offset is None or dataset.dtype.kind not in "fiu" or dataset.size == 0:
+            return dataset[()]
+        number = self._shard_of[episode]
+        if number not in self._maps:
+            self._maps[number] = np.memmap(self._shards[number], mode="r")
+        part = self._maps[number][offset : offset + dataset.size * dataset.dtype.itemsize]
+        return part.view(dataset.dtype).reshape(dataset.shape)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_maps": {}, "_files": {}, "_open": OrderedDict(), "_held": 0}
+
+
+def _copied(arrays: dict[str, np.ndarray]) -> int:
+    return sum(a.nbytes for a in arrays.values() if a.flags.owndata)
+
+
+class Windows:
+    """Windows of rows of a data set: a `torch.utils.data.Dataset`.
+
+    Item i is {"obs": {KEY: (before + 1, …)}, "actions": (ahead, na), "mask": (ahead)}: the
+    observations up to one row, oldest first, and the actions from that row on. Rows before the
+    start repeat the first one. Actions after the end repeat the last one, and `mask` is 0 there.
+    Observations are float32. `gradients`: names of derivatives stored for each action, such as
+    "grad_actions", that come along as (ahead, …).
+
+    Parameters
+    ----------
+    path: a folder of `tangere generate`, or an `Episodes`.
+    keys: observations to give. None: all but privileged ones.
+    before, ahead: rows before the present one, and actions from it on.
+    split: a mask of robomimic.hdf5, such as "train" or "valid"; None for all episodes.
+    only_success: leave out episodes that did not succeed.
+    form: of observations with a last axis of 3 and at least two before it: "stored", "image" (the
+        last axis first), or "points" (…, points, 3).
+    scale: "task" divides by the scales that the task declares, "standard" takes `mean` away and
+        divides by `std`, "none" leaves SI units. `mean` and `std` are of the chosen episodes.
+    """
+
+    def __init__(
+        self,
+        path: str | Path | Episodes,
+        keys: Sequence[str] | None = None,
+        before: int = 0,
+        ahead: int = 1,
+        split: str | None = "train",
+        only_success: bool = False,
+        form: Form = "stored",
+        scale: Scale = "task",
+        gradients: Sequence[str] = (),
+    ):
+        self.episodes = path if isinstance(path, Episodes) else Episodes(path)
+        for value, name, known in (
+            (form, "form", ("stored", "image", "points")),
+            (scale, "scale", ("task", "standard", "none")),
+        ):
+            if value not in known:
+                raise _core.InputError(f"{name} {value!r}; expected one of {known}")
+        if before < 0 or ahead < 1:
+            raise _core.InputError(f"before {before}, ahead {ahead}; expected at least 0 and 1")
+        default = [key for key in self.episodes.keys if key not in self.episodes.privileged]
+        self.keys = list(keys) if keys is not None else default
+        unknown = [key for key in self.keys if key not in self.episodes.keys]
+        if unknown or not self.keys:
+            raise _core.InputError(f"keys {unknown}; the data set has {self.episodes.keys}")
+        self.before, self.ahead, self.form, self.scale = before, ahead, form, scale
+        self.gradients = list(gradients)
+        chosen = range(len(self.episodes)) if split is None else self.episodes.mask(split)
+        if only_success:
+            solved = set(self.episodes.succeeded())
+            chosen = [i for i in chosen if i in solved]
+        self.chosen = np.asarray([i for i in chosen if self.episodes.lengths[i] > 0], int)
+        if len(self.chosen) == 0:
+            raise _core.InputError(f"{self.episodes.path}: no episode is left to learn from")
+        self._ends = np.cumsum(self.episodes.lengths[self.chosen])
+        self._statistics: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._flat: dict[str, np.ndarray | None] = {}  # by name; None: too large for memory
+        self._shift, self._factor = {}, {}
+        for key in self.keys:
+            shift, by = np.float32(0), np.asarray(1.0)
+            if scale == "task":
+                by = np.asarray(self.episodes.scale[key], float)
+            elif scale == "standard":
+                shift, by = self.mean[key].astype(np.float32), self.std[key]
+            self._shift[key] = shift
+            self._factor[key] = (1 / by).astype(np.float32)
+
+    def __len__(self) -> int:
+        return int(self._ends[-1])
+
+    @property
+    def mean(self) -> dict[str, np.ndarray]:
+        """KEY → mean of its rows, per place on the last axis."""
+        return {key: self._moments(key)[0] for key in self.keys}
+
+    @property
+    def std(self) -> dict[str, np.ndarray]:
+        """KEY → standard deviation, at least 5 % of the key's root mean square."""
+        return {key: self._moments(key)[1] for key in self.keys}
+
+    def _moments(self, key: str) -> tuple[np.ndarray, np.ndarray]:
+        if key not in self._statistics:
+            count, total, square = 0, 0.0, 0.0
+            for episode in self.chosen:
+                rows = np.asarray(self.episodes[episode][key], float)
+                rows = rows.reshape(-1, rows.shape[-1])
+                count += len(rows)
+                total = total + rows.sum(0)
+                square = square + (rows**2).sum(0)
+            mean, power = total / count, square / count
+            floor = _FLOOR * np.sqrt(power.mean())
+            std = np.sqrt(np.maximum(power - mean**2, max(floor, 1e-12) ** 2))
+            self._statistics[key] = mean, std
+        return self._statistics[key]
+
+    def __getitem__(self, item: int) -> dict[str, Any]:
+        if not 0 <= item < len(self):
+            raise IndexError(f"window {item}; there are {len(self)}")
+        batch = self.gather(np.asarray([item]))
+        one = {name: values[0] for name, values in batch.items() if name != "obs"}
+        return {"obs": {key: values[0] for key, values in batch["obs"].items()}, **one}
+
+    def batches(self, size: int, seed: int = 0, rows: int | None = None):
+        """Yields whole batches in random order, arrays as in an item with the batch in front.
+
+        Much quicker than a loader that collates items. `rows`: how many windows to give, None for
+        each once.
+        """
+        order = np.random.default_rng(seed).permutation(len(self))
+        order = order[:rows] if rows is not None else order
+        for first in range(0, len(order), size):
+            yield self.gather(order[first : first + size])
+
+    def gather(self, items: np.ndarray) -> dict[str, Any]:
+        """The windows `items`, (n), stacked."""
+        items = np.asarray(items)
+        places = np.searchsorted(self._ends, items, side="right")
+        first = np.concatenate([[0], self._ends])[places][:, None]
+        last = self._ends[places][:, None] - 1
+        rows = np.maximum(items[:, None] + np.arange(-self.before, 1), first)
+        after = items[:, None] + np.arange(self.ahead)
+        actions = np.minimum(after, last)
+        batch: dict[str, Any] = {
+            "obs": {key: self._shown(key, self._rows(key, rows)) for key in self.keys},
+            "actions": self._rows("actions", actions),
+            "mask": (after <= last).astype(np.float32),
+        }
+        return batch | {name: self._rows(name, actions) for name in self.gradients}
+
+    def _rows(self, name: str, rows: np.ndarray) -> np.ndarray:
+        """Rows of an array, counted over the chosen episodes, as float32 (…, shape)."""
+        if name not in self._flat:
+            self._flat[name] = self._flattened(name)
+        flat = self._flat[name]
+        if flat is not None:
+            return flat[rows]
+        wanted, back = np.unique(rows, return_inverse=True)
+        places = np.searchsorted(self._ends, wanted, side="right")
+        starts = np.concatenate([[0], self._ends])[places]
+        parts = [
+            self._of_episode(place, name)[wanted[places == place] - starts[places == place]]
+            for place in np.unique(places)
+        ]
+        return np.concatenate(parts).astype(np.float32)[back].reshape(*rows.shape, *parts[0].shape[1:])
+
+    def _flattened(self, name: str) -> np.ndarray | None:
+        """All rows in memory, if they are few enough."""
+        shape = self._of_episode(0, name).shape[1:]
+        if len(self) * int(np.prod(shape)) * 4 > _MOST_IN_MEMORY:
+            return None
+        flat = np.empty((len(self), *shape), np.float32)
+        for place, end in enumerate(self._ends):
+            rows = self._of_episode(place, name)
+            flat[end - len(rows) : end] = rows
+        return flat
+
+    def _of_episode(self, place: int, name: str) -> np.ndarray:
+        arrays = self.episodes[int(self.chosen[place])]
+        if name not in arrays:
+            raise _core.InputError(f"the data set has no {name!r}; it has {sorted(arrays)}")
+        return arrays[name]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_flat": {}}
+
+    def _shown(self, key: str, rows: np.ndarray) -> np.ndarray:
+        """Rows (…, rows, shape) of an observation, scaled and in the form that was asked for."""
+        shown = (np.asarray(rows, np.float32) - self._shift[key]) * self._factor[key]
+        shape = self._of_episode(0, key).shape[1:]
+        if self.form == "stored" or len(shape) < 3 or shape[-1] != 3:
+            return shown
+        if self.form == "points":
+            return shown.reshape(*shown.shape[: -len(shape)], -1, 3)
+        return np.moveaxis(shown, -1, -len(shape))

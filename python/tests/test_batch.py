@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes, models and batches: the numbers of C++, as new arrays, with errors that say what is wrong."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+
+import h5py
+import numpy as np
+import pytest
+
+import tangere
+
+
+@pytest.fixture(scope="module")
+def model():
+    return tangere.Model(tangere.Scene(tangere.scenes()["rolling_ball_small"]))
+
+
+def test_numbers_are_those_of_a_data_set(model, generate):
+    folder = generate(str(tangere.scenes()["rolling_ball_small"]), "--episodes", "3", "--every", "5",
+                      "--steps", "200", "--seed", "4")  # fmt: skip
+    batch = tangere.Batch(model, envs=3, seed=4)
+    start = batch.q
+    run = batch.run(batch.scene_controls(200), every=5, fields=["pad"])
+    with h5py.File(folder / "shard-00000.h5") as file:
+        for e in range(3):
+            obs = file[f"data/demo_{e}/obs"]
+            np.testing.assert_array_equal(obs["q"][0], start[e].astype(np.float32))
+            np.testing.assert_array_equal(obs["q"][1:], run.q[:-1, e].astype(np.float32))
+            np.testing.assert_array_equal(obs["v"][1:], run.v[:-1, e].astype(np.float32))
+            np.testing.assert_array_equal(obs["pad"][1:], run.fields["pad"][:-1, e])
+            final = file[f"data/demo_{e}/final_obs/pad"][0]
+            np.testing.assert_array_equal(final, run.fields["pad"][-1, e])
+    assert np.abs(run.fields["pad"]).max() > 0
+
+
+def test_a_run_is_its_steps(model):
+    one, many = (tangere.Batch(model, envs=5, seed=2, threads=t, precision="double") for t in (1, 3))
+    u = one.scene_controls(200)
+    run = many.run(u, every=100, fields=["pad", "pad.sum", "pad.pressure", "pad.shear"])
+    for t in range(200):
+        one.step(u[t])
+    np.testing.assert_array_equal(run.q[1], one.q)
+    np.testing.assert_array_equal(run.v[1], one.v)
+    np.testing.assert_array_equal(run.fields["pad"][1], one.tactile("pad"))
+    assert run.fields["pad"].dtype == np.float64
+    shapes = {name: values.shape for name, values in run.fields.items()}
+    assert shapes == {
+        "pad": (2, 5, 32, 32, 3),
+        "pad.pressure": (2, 5, 32, 32),
+        "pad.shear": (2, 5, 32, 32, 2),
+        "pad.sum": (2, 5, 6),
+    }
+    np.testing.assert_array_equal(run.fields["pad.shear"], run.fields["pad"][..., :2])
+    pressed = run.fields["pad"][1, ..., 2].sum((1, 2))  # the pad lies level, its third axis is up
+    np.testing.assert_allclose(np.abs(run.fields["pad.sum"][1, :, 2]), np.abs(pressed), rtol=1e-9)
+
+
+def test_an_episode_is_the_same_in_any_batch(model):
+    u = np.array([0.125, 0.0, -0.25])
+    wide = tangere.Batch(model, envs=20, seed=7)
+    alone = tangere.Batch(model, envs=1, seed=7, first_episode=18)
+    for _ in range(10):
+        wide.step(u)
+        alone.step(u.astype(np.float32))  # these numbers are the same in both types
+    np.testing.assert_array_equal(wide.q[18], alone.q[0])
+    again = tangere.Batch(model, envs=2, seed=7)
+    again.reset(envs=[1], episodes=[18])
+    for _ in range(10):
+        again.step(u)
+    np.testing.assert_array_equal(again.q[1], wide.q[18])
+    np.testing.assert_array_equal(again.q[0], wide.q[0])
+
+
+def test_states_can_be_set(model):
+    batch = tangere.Batch(model, envs=3)
+    q, v = batch.q, batch.v
+    q[1, 2] += 0.001
+    batch.set_state(q, v)
+    np.testing.assert_array_equal(batch.q, q)
+    batch.set_state(q[0], v[0], envs=[1, 2])
+    np.testing.assert_array_equal(batch.q[2], q[0])
+    assert batch.q is not batch.q
+    q[:] = 0
+    assert not np.array_equal(batch.q, q)
+
+
+def test_any_array_of_numbers_is_taken(model):
+    batches = [tangere.Batch(model, envs=4) for _ in range(4)]
+    u = np.linspace(-0.4, 0.4, 12).reshape(4, 3).round(3)
+    given = [u, np.asfortranarray(u), u.tolist(), np.repeat(u, 2, axis=1)[:, ::2]]
+    for batch, controls in zip(batches, given, strict=True):
+        batch.step(controls)
+        np.testing.assert_array_equal(batch.q, batches[0].q)
+
+
+def test_a_field_fills_an_array(model):
+    batch = tangere.Batch(model, envs=2)
+    batch.run(batch.scene_controls(200))
+    out = np.full((2, 32, 32, 3), np.nan, np.float32)
+    assert batch.tactile("pad", out=out) is out
+    np.testing.assert_array_equal(out, batch.tactile("pad"))
+    np.testing.assert_array_equal(np.from_dlpack(batch.tactile("pad")), out)
+    with pytest.raises(tangere.InputError, match=r"out of shape \(2, 3\); expected \(2, 32, 32, 3\)"):
+        batch.tactile("pad", out=np.zeros((2, 3), np.float32))
+    with pytest.raises(tangere.InputError, match="float32"):
+        batch.tactile("pad", out=np.zeros((2, 32, 32, 3)))
+
+
+def test_bodies_and_end_effectors(model):
+    batch = tangere.Batch(model, envs=2)
+    pose, twist = batch.bodies()
+    assert pose.shape == (2, model.nb, 7) and twist.shape == (2, model.nb, 6)
+    np.testing.assert_allclose(np.linalg.norm(pose[..., 3:], axis=-1), 1, atol=1e-12)
+    assert batch.end_effectors().shape == (2, len(model.end_effector_names), 3)
+
+
+def test_mistakes_say_what_was_expected(model, tmp_path):
+    batch = tangere.Batch(model, envs=2)
+    for call, message in [
+        (lambda: batch.step(np.zeros((2, 2))), r"controls of shape \(2, 2\); expected \(2, 3\)"),
+        (lambda: batch.step(np.zeros(4)), r"controls of shape \(4\); expected \(3\)"),
+        (lambda: batch.run(np.zeros((5, 2, 3)), every=2), "5 steps with a frame every 2"),
+        (lambda: batch.tactile("pda"), "no reading is named 'pda'; expected one of: pad"),
+        (lambda: batch.reset(envs=[2]), "environment 2; expected 0 to 1"),
+        (lambda: batch.reset(episodes=[1]), "1 episodes for 2 environments"),
+        (lambda: tangere.Batch(model, envs=0), "0 environments"),
+        (lambda: tangere.Batch(model, threads=0), "0 threads"),
+        (lambda: tangere.Batch(model, precision="half"), "precision 'half'"),
+        (lambda: tangere.task_spec("box_pushin"), "no task is named 'box_pushin'"),
+        (lambda: tangere.Scene.from_text("<tangere><robo/></tangere>", "a.xml"), "a.xml:1"),
+    ]:
+        with pytest.raises(tangere.InputError, match=message):
+            call()
+    assert issubclass(tangere.InputError, ValueError) and issubclass(tangere.IoError, OSError)
+    with pytest.raises(OSError, match="absent.xml"):
+        tangere.Scene(tmp_path / "absent.xml")
+    with pytest.raises(TypeError):
+        batch.step("fast")
+
+
+def test_what_a_scene_reader_overlooks_is_a_warning(model):
+    text = model.scene.text.replace("<ground ", '<ground colour="red" ', 1)
+    path = tangere.scenes()["rolling_ball_small"].parent
+    assert "colour" in text and path.is_dir()
+    with pytest.raises(tangere.InputError, match="colour"):
+        tangere.Scene.from_text(text)
+
+
+def test_a_failed_environment_is_told(model):
+    batch = tangere.Batch(model, envs=2)
+    u = np.zeros((2, 3))
+    u[1, 0] = np.nan
+    batch.step(u)
+    assert batch.status.tolist() == [0, -2]
+    batch.set_state(batch.q, batch.v)
+    assert batch.status.tolist() == [0, 0]
+
+
+def test_the_gil_is_free_and_one_thread_has_the_batch(model):
+    batch = tangere.Batch(model, envs=64, threads=1)
+    u = batch.scene_controls(300)
+    refused = []
+    runner = threading.Thread(target=batch.run, args=(u,))
+    runner.start()
+    while runner.is_alive():  # this loop runs only because run() has let the interpreter go
+        try:
+            batch.status
+        except tangere.InputError as error:
+            refused.append(str(error))
+            break
+    runner.join()
+    assert refused and "in use by another thread" in refused[0]
+    batch.step(np.zeros(3))
+
+
+def test_everything_has_a_docstring():
+    for name in ("Scene", "Model", "Batch", "Environments", "TaskSpec", "TensorSpec", "Sensor"):
+        kind = getattr(tangere, name)
+        assert kind.__doc__
+        for method in vars(kind):
+            if not method.startswith("_") and callable(getattr(kind, method)):
+                assert getattr(kind, method).__doc__.count("\n") > 0, f"{name}.{method}"
+
+
+def test_no_warning_on_the_scenes_that_come_along():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for path in tangere.scenes().values():
+            tangere.Model(tangere.Scene(path))
