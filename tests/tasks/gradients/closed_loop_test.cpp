@@ -13,6 +13,7 @@
 #include "engine/step/displacement.hpp"
 #include "tasks/gradients/task_tangent.hpp"
 #include "tasks/gradients/task_tape.hpp"
+#include "tests/tasks/gradients/observed_change.hpp"
 #include "tests/tasks/task_check.hpp"
 
 namespace tangere {
@@ -220,47 +221,8 @@ class ClosedLoop {
     }
   }
 
-  /// Differences of observe() alone, along a change of what it looks at.
-  Numbers observed_change(const TaskView& at, const ViewTangent& change) const {
-    double largest = 0;
-    const auto measure = [&](const Numbers& x) {
-      for (const double y : x) largest = std::max(largest, std::abs(y));
-    };
-    for (const auto* parts : {&change.q, &change.v, &change.end_effectors, &change.tactile})
-      for (const Numbers& x : *parts) measure(x);
-    measure(change.memory);
-    measure(change.action);
-    if (largest == 0) return Numbers(seen_);
-    const double step = 1e-6 / largest;
-    Numbers above(seen_), below(seen_);
-    observe_moved(at, change, step, above);
-    observe_moved(at, change, -step, below);
-    for (std::size_t k = 0; k < seen_; ++k) above[k] = (above[k] - below[k]) / (2 * step);
-    return above;
-  }
-  void observe_moved(const TaskView& at, const ViewTangent& change, double by, Numbers& o) const {
-    const auto moved = [by](std::span<const double> x, const Numbers& d) {
-      Numbers y(x.begin(), x.end());
-      for (std::size_t i = 0; i < d.size(); ++i) y[i] += by * d[i];
-      return y;
-    };
-    const Numbers memory = moved(at.memory, change.memory),
-                  action = moved(at.action, change.action);
-    std::vector<std::vector<Numbers>> kept(at.moments.size());
-    std::vector<Moment> moments;
-    for (std::size_t m = 0; m < at.moments.size(); ++m) {
-      const Moment& from = at.moments[m];
-      Numbers q(from.q.begin(), from.q.end());
-      for (std::size_t i = 0; i < nv_; ++i) displace(task_.model(), q, int(i), by * change.q[m][i]);
-      kept[m] = {q, moved(from.v, change.v[m]), moved(from.end_effectors, change.end_effectors[m]),
-                 moved(from.tactile, change.tactile[m])};
-      moments.push_back({kept[m][0], kept[m][1], kept[m][2], kept[m][3]});
-    }
-    TaskView view = at;
-    view.memory = memory;
-    view.action = action;
-    view.moments = moments;
-    task_.observe(view, o);
+  [[nodiscard]] Numbers observed_change(const TaskView& at, const ViewTangent& change) const {
+    return testing::observed_change(task_, at, change);
   }
 
   const Task& task_;
