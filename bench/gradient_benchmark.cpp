@@ -3,6 +3,7 @@
 // one thread.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <ctime>
 #include <memory>
 #include <optional>
@@ -17,8 +18,10 @@
 #include "engine/step/tape.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "kernels/table/isa.hpp"
+#include "tasks/catalogue/task_list.hpp"
 #include "tasks/gradients/gradients.hpp"
 #include "tasks/gradients/losses.hpp"
+#include "tasks/gradients/task_tape.hpp"
 #include "tasks/run/benchmark_fields.hpp"
 
 namespace tangere {
@@ -153,6 +156,96 @@ TANGERE_GRADIENTS(stable_grasp, "stable_grasp", false, 1, false);
 TANGERE_GRADIENTS(stable_grasp_tactile, "stable_grasp", true, 1, false);
 TANGERE_GRADIENTS(cap_opening, "cap_opening", false, 1, false);
 TANGERE_GRADIENTS(insertion, "insertion", false, 1, false);
+
+/// A closed loop without the time of its policy: 64 episodes of 100 actions that the task's script
+/// chose before, forward in a VectorTask and on a TaskTape, and back with derivatives by every
+/// observation and reward.
+class Loop {
+ public:
+  explicit Loop(const char* name) : task_(make(name)), vector_(*task_, kEnvironments, forward()) {
+    TaskTapeOptions options;
+    options.actions = kActions;
+    tape_.emplace(*task_, kEnvironments, options);
+    const std::size_t e = kEnvironments, seen = task_->spec().observation_size(),
+                      width = task_->spec().action.size();
+    by_observation_.assign(e * seen, 1e-3);
+    by_reward_.assign(e, 1.0);
+    by_action_.resize(e * width);
+    for (int t = 0; t < kActions; ++t) {
+      std::vector<double>& a = actions_.emplace_back(e * width);
+      for (int i = 0; i < kEnvironments; ++i)
+        task_->scripted(tape_->view(i), tape_->observations().subspan(std::size_t(i) * seen, seen),
+                        std::span(a).subspan(std::size_t(i) * width, width));
+      tape_->step(a);
+      for (const std::uint8_t alive : tape_->alive()) taken_ += alive;
+    }
+  }
+
+  /// Actions of all episodes.
+  [[nodiscard]] double taken() const { return taken_; }
+  double alone() {
+    vector_.reset(0);
+    const double begin = cpu_seconds();
+    for (const auto& a : actions_) vector_.step(a);
+    return cpu_seconds() - begin;
+  }
+  /// Processor times of forward, and of both directions.
+  std::pair<double, double> with_gradients() {
+    tape_->reset(0, 0);
+    const double begin = cpu_seconds();
+    for (const auto& a : actions_) tape_->step(a);
+    const double middle = cpu_seconds();
+    for (int t = 0; t < kActions; ++t) tape_->reverse(by_observation_, by_reward_, by_action_);
+    benchmark::DoNotOptimize(by_action_.data());
+    return {middle - begin, cpu_seconds() - begin};
+  }
+
+ private:
+  static constexpr int kEnvironments = 64, kActions = 100;
+  static std::unique_ptr<Task> make(const char* name) {
+    Scene scene =
+        read_scene(std::string(TANGERE_SOURCE_DIR "/scenes/") + task_spec(name).scene).scene;
+    scene.solver.tolerance = kGradientTolerance;  // the same steps with and without gradients
+    return make_task(name, scene);
+  }
+  static VectorOptions forward() {
+    VectorOptions options;
+    options.autoreset = false;
+    return options;
+  }
+
+  std::unique_ptr<Task> task_;
+  VectorTask vector_;
+  std::optional<TaskTape> tape_;
+  std::vector<std::vector<double>> actions_;
+  std::vector<double> by_observation_, by_reward_, by_action_;
+  double taken_ = 0;
+};
+
+void BM_ClosedLoop(benchmark::State& state, const char* name) {
+  Loop loop(name);
+  double alone = 1e300, forward = 1e300, both = 1e300;
+  for (auto _ : state) {
+    alone = std::min(alone, loop.alone());
+    const auto [first, all] = loop.with_gradients();
+    forward = std::min(forward, first);
+    both = std::min(both, all);
+  }
+  state.counters["alone/s"] = loop.taken() / alone;
+  state.counters["on_tape/s"] = loop.taken() / forward;
+  state.counters["with_gradients/s"] = loop.taken() / both;
+  state.counters["ratio"] = both / alone;
+  state.SetLabel(kernels::active_isa_name());
+}
+BENCHMARK_CAPTURE(BM_ClosedLoop, box_pushing, "box_pushing")
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(10);
+BENCHMARK_CAPTURE(BM_ClosedLoop, box_pushing_reduced, "box_pushing_reduced")
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(10);
+BENCHMARK_CAPTURE(BM_ClosedLoop, cap_opening, "cap_opening")
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(10);
 
 /// Returns processor time per point of the touched tiles [ns], best of several runs.
 template <class F>

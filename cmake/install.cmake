@@ -77,6 +77,7 @@ set(public_headers
   tasks/gradients/losses.hpp
   tasks/gradients/task_gradients.hpp
   tasks/gradients/task_rollout.hpp
+  tasks/gradients/task_tape.hpp
   tasks/gradients/gradient_check.hpp
   tasks/gradients/gradient_compare.hpp
   tasks/run/benchmark_run.hpp

@@ -23,6 +23,7 @@ class BallRolling : public Task {
       : Task(scene, declare_ball_rolling(pad)),
         pad_q_(coordinate("pad_joint")),
         ball_q_(coordinate("ball_joint")),
+        pad_v_(dof("pad_joint")),
         ball_v_(dof("ball_joint")) {}
 
   /// Stores the goal in the memory.
@@ -40,6 +41,17 @@ class BallRolling : public Task {
     for (std::size_t k = 0; k < 3; ++k) o[k] = now.q[pad_q_ + k];
     for (std::size_t k = 0; k < 2; ++k) o[3 + k] = to_goal(view, k);
     std::copy(now.tactile.begin(), now.tactile.end(), o.begin() + 5);
+  }
+
+  void observe_vjp(const TaskView&, std::span<const double> weight,
+                   const ViewCotangent& out) const override {
+    const MomentCotangent& to = out.moments.back();
+    for (std::size_t k = 0; k < 3; ++k) to.q[pad_v_ + k] += weight[k];
+    for (std::size_t k = 0; k < 2; ++k) {
+      to.q[ball_v_ + k] -= weight[3 + k];
+      out.memory[k] += weight[3 + k];
+    }
+    for (std::size_t i = 0; i < to.tactile.size(); ++i) to.tactile[i] += weight[5 + i];
   }
 
   Verdict judge(const TaskView& view) const override {
@@ -81,7 +93,7 @@ class BallRolling : public Task {
   [[nodiscard]] double to_goal(const TaskView& view, std::size_t k) const {
     return view.memory[k] - view.now().q[ball_q_ + k];
   }
-  std::size_t pad_q_, ball_q_, ball_v_;
+  std::size_t pad_q_, ball_q_, pad_v_, ball_v_;
 };
 
 }  // namespace

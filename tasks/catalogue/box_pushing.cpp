@@ -83,6 +83,23 @@ class BoxPushing : public Task {
       std::copy(now.tactile.begin(), now.tactile.end(), o.begin() + 3);
   }
 
+  void observe_vjp(const TaskView& view, std::span<const double> weight,
+                   const ViewCotangent& out) const override {
+    // Every joint here slides or turns about one axis: coordinates and dofs have the same places.
+    const Moment& now = view.now();
+    const MomentCotangent& to = out.moments.back();
+    const std::array<double, 3> by_goal = in_hand_vjp(
+        now, {view.memory[kGoal], view.memory[kGoal + 1], view.memory[kGoal + 2]}, weight, to);
+    for (std::size_t k = 0; k < 3; ++k) out.memory[kGoal + k] += by_goal[k];
+    if (observation_ == PushObservation::privileged) {
+      const std::array<double, 3> by_box = in_hand_vjp(now, box_pose(now), weight.subspan(3), to);
+      for (std::size_t k = 0; k < 2; ++k) to.q[box_ + k] += by_box[k];
+      to.q[box_turn_] += by_box[2];
+    }
+    if (observation_ == PushObservation::tactile)
+      for (std::size_t i = 0; i < to.tactile.size(); ++i) to.tactile[i] += weight[3 + i];
+  }
+
   Verdict judge(const TaskView& view) const override {
     const std::array<double, 3> off = to_goal(view);
     const Moment& now = view.now();
@@ -170,6 +187,20 @@ class BoxPushing : public Task {
     o[0] = c * x + s * y;
     o[1] = c * y - s * x;
     o[2] = pose[2] - now.q[turn_];
+  }
+  /// Reverse of in_hand(): returns derivatives by the pose and adds those by the hand. With θ the
+  /// hand's turn: ∂o_x/∂θ = o_y, ∂o_y/∂θ = -o_x.
+  std::array<double, 3> in_hand_vjp(const Moment& now, const std::array<double, 3>& pose,
+                                    std::span<const double> weight,
+                                    const MomentCotangent& to) const {
+    std::array<double, 3> o{};
+    in_hand(now, pose, o);
+    const double c = std::cos(now.q[turn_]), s = std::sin(now.q[turn_]);
+    const double by_x = c * weight[0] - s * weight[1], by_y = s * weight[0] + c * weight[1];
+    to.end_effectors[kTip] -= by_x;
+    to.end_effectors[kTip + 1] -= by_y;
+    to.q[turn_] += weight[0] * o[1] - weight[1] * o[0] - weight[2];
+    return {by_x, by_y, weight[2]};
   }
 
   PushObservation observation_;

@@ -115,6 +115,20 @@ class CapOpening : public Task {
       std::copy_n(&now.tactile[3 * p], 3, &images[3 * pixel_[p]]);
   }
 
+  void observe_vjp(const TaskView&, std::span<const double> weight,
+                   const ViewCotangent& out) const override {
+    // Every joint here turns about one axis: coordinates and dofs have the same places.
+    const MomentCotangent& to = out.moments.back();
+    for (std::size_t k = 0; k < kAngles; ++k) {
+      to.q[finger_ + k] += weight[k];
+      to.end_effectors[k] += weight[kAngles + k];  // three fingertips of three coordinates
+    }
+    if (observation_ == CapObservation::blind) return;
+    const std::span<const double> images = weight.subspan(2 * kAngles);
+    for (std::size_t p = 0; p < pixel_.size(); ++p)
+      for (std::size_t c = 0; c < 3; ++c) to.tactile[3 * p + c] += images[3 * pixel_[p] + c];
+  }
+
   Verdict judge(const TaskView& view) const override {
     double reward = 0;
     for (std::size_t f = 0; f < kFingers; ++f) reward -= touches(view.now(), f) ? 0 : kIdle;

@@ -38,6 +38,12 @@ class Dummy : public Task {
   void observe(const TaskView& view, std::span<double> o) const override {
     o[0] = error(view), o[1] = view.now().v[vz_];
   }
+  void observe_vjp(const TaskView&, std::span<const double> weight,
+                   const ViewCotangent& out) const override {
+    out.memory[0] += weight[0];
+    out.moments.back().q[vz_] -= weight[0];
+    out.moments.back().v[vz_] += weight[1];
+  }
   Verdict judge(const TaskView& view) const override {
     return {-1e4 * error(view) * error(view), false,
             view.actions == spec().horizon && std::abs(error(view)) < 1e-3};

@@ -113,27 +113,30 @@ class Insertion : public Task {
   }
 
   void observe(const TaskView& view, std::span<double> o) const override {
-    const std::span<const double> before = view.moments[0].tactile, after = view.moments[1].tactile;
-    constexpr std::size_t kReading = 3 * kPads * kPoints;
-    std::array<double, kReading> read{}, first{};
-    const auto noise = [&](std::size_t i) {
-      return task_normal(view.seed, view.episode, 1 + view.actions, static_cast<std::uint32_t>(i),
-                         kNoise);
-    };
-    for (std::size_t i = 0; i < kReading; ++i) {
-      read[i] = after[i] + noise(i);
-      first[i] = before[i] + noise(kReading + i);
-    }
-    std::array<ShearField<double>, kPads> pads;
-    for (std::size_t pad = 0; pad < kPads; ++pad)
-      pads[pad] = {std::span<const double>(read).subspan(3 * kPoints * pad, 3 * kPoints),
-                   std::span<const double>(first).subspan(3 * kPoints * pad, 3 * kPoints)};
+    const Readings read(view);
     std::array<double, 2 * kPads * kPoints> flow{};
-    normalised_flow(pads, flow, kTooLittle);
+    normalised_flow(read.pads(), flow, kTooLittle);
     for (std::size_t pad = 0; pad < kPads; ++pad)
       for (std::size_t p = 0; p < kPoints; ++p)
         for (std::size_t c = 0; c < 2; ++c)
           o[(2 * pad + c) * kPoints + p] = flow[(pad * kPoints + p) * 2 + c];
+  }
+
+  /// The readings' noise is given. The threshold of the normalisation only chooses between a flow
+  /// and none.
+  void observe_vjp(const TaskView& view, std::span<const double> weight,
+                   const ViewCotangent& out) const override {
+    const Readings read(view);
+    std::array<double, 2 * kPads * kPoints> by_flow{};
+    std::array<ShearCotangent, kPads> by_pads;
+    for (std::size_t pad = 0; pad < kPads; ++pad) {
+      by_pads[pad] = {out.moments[1].tactile.subspan(3 * kPoints * pad, 3 * kPoints),
+                      out.moments[0].tactile.subspan(3 * kPoints * pad, 3 * kPoints)};
+      for (std::size_t p = 0; p < kPoints; ++p)
+        for (std::size_t c = 0; c < 2; ++c)
+          by_flow[(pad * kPoints + p) * 2 + c] = weight[(2 * pad + c) * kPoints + p];
+    }
+    normalised_flow_vjp(read.pads(), by_flow, by_pads, kTooLittle);
   }
 
   Verdict judge(const TaskView& view) const override {
@@ -181,6 +184,30 @@ class Insertion : public Task {
  private:
   static constexpr std::array<double, 3> kHalf{0.0175, 0.025, 0.03};  // half edges of the box [m]
   static constexpr double kApart = -0.0177;  // position of the fingers: 0.2 mm from the box [m]
+
+  /// What the pads read at steps 6 and 44, noise included.
+  struct Readings {
+    static constexpr std::size_t kNumbers = 3 * kPads * kPoints;
+    std::array<double, kNumbers> read{}, first{};
+
+    explicit Readings(const TaskView& view) {
+      const auto noise = [&](std::size_t i) {
+        return task_normal(view.seed, view.episode, 1 + view.actions, static_cast<std::uint32_t>(i),
+                           kNoise);
+      };
+      for (std::size_t i = 0; i < kNumbers; ++i) {
+        read[i] = view.moments[1].tactile[i] + noise(i);
+        first[i] = view.moments[0].tactile[i] + noise(kNumbers + i);
+      }
+    }
+    [[nodiscard]] std::array<ShearField<double>, kPads> pads() const {
+      std::array<ShearField<double>, kPads> pads;
+      for (std::size_t pad = 0; pad < kPads; ++pad)
+        pads[pad] = {std::span<const double>(read).subspan(3 * kPoints * pad, 3 * kPoints),
+                     std::span<const double>(first).subspan(3 * kPoints * pad, 3 * kPoints)};
+      return pads;
+    }
+  };
 
   /// Height of the highest corner of the box's lower face [m]. A box that tilts in its grip is not
   /// inside.

@@ -121,6 +121,25 @@ class StableGrasp : public Task {
           o[(2 * pad + c) * kPoints + p] = flow[(pad * kPoints + p) * 2 + c];
   }
 
+  /// The threshold of the normalisation only chooses between a flow and none.
+  void observe_vjp(const TaskView& view, std::span<const double> weight,
+                   const ViewCotangent& out) const override {
+    const std::span<const double> field = view.moments.front().tactile;
+    const std::span<double> to = out.moments.front().tactile;
+    const std::array<ShearField<double>, kPads> pads{
+        ShearField<double>{field.first(field.size() / 2)},
+        ShearField<double>{field.subspan(field.size() / 2)}};
+    const std::array<ShearCotangent, kPads> by_pads{ShearCotangent{to.first(to.size() / 2), {}},
+                                                    ShearCotangent{to.subspan(to.size() / 2), {}}};
+    std::array<double, std::size_t{kPads} * kRows * kCols * 2> by_flow{};
+    constexpr std::size_t kPoints = std::size_t{kRows} * kCols;
+    for (std::size_t pad = 0; pad < kPads; ++pad)
+      for (std::size_t p = 0; p < kPoints; ++p)
+        for (std::size_t c = 0; c < 2; ++c)
+          by_flow[(pad * kPoints + p) * 2 + c] = weight[(2 * pad + c) * kPoints + p];
+    normalised_flow_vjp(pads, by_flow, by_pads, kTooLittle);
+  }
+
   Verdict judge(const TaskView& view) const override {
     const double tilt = std::abs(std::asin(slope(lifted(view))));
     const bool level = tilt < kLevel && lifted(view).q[bar_ + 2] - view.memory[kRest] > kLifted;

@@ -42,6 +42,12 @@ void Task::start(const TaskStart&) const {}
 void Task::begin_action(const TaskView&, std::span<double>) const {}
 void Task::place(const TaskView&, std::span<double>, std::span<double>) const {}
 
+void Task::observe_vjp(const TaskView&, std::span<const double>, const ViewCotangent&) const {
+  throw InputError(
+      fmt::format("task {} has no derivative of its observations; expected Task::observe_vjp, "
+                  "which adds those of weight · observation by what observe() looks at",
+                  spec_.name));
+}
 void Task::begin_action_vjp(const TaskView&, std::span<double>, const ViewCotangent&) const {}
 void Task::place_vjp(const TaskView&, std::span<const double>, std::span<const double>,
                      const ViewCotangent&) const {

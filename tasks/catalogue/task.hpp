@@ -93,6 +93,12 @@ class Task {
   /// Adds `weight` times the derivative of the reward to `out`. A choice between cases has no
   /// derivative.
   virtual void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const = 0;
+  /// Adds ∂(weight · o)/∂(moments, action, memory), where o is the result of observe(view, o) and
+  /// `weight` is (observation). Noise counts as given. At a choice between cases or a threshold it
+  /// is the derivative of the case at hand, at a clamp that of its inside. Gradients through
+  /// observations need it (tasks/gradients/task_tape.hpp); the default throws InputError.
+  virtual void observe_vjp(const TaskView& view, std::span<const double> weight,
+                           const ViewCotangent& out) const;
   /// Adds ∂(weight · u)/∂(action, memory, q and v of the action's start), where u is the result of
   /// controls(view, step, u) and `weight` is (nu).
   virtual void controls_vjp(const TaskView& view, int step, std::span<const double> weight,

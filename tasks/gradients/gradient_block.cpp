@@ -54,28 +54,43 @@ bool GradientBlock::may_go_on() {
 }
 
 void GradientBlock::run(Batch& batch, int block) {
-  checkpoints_.clear();
-  for (taken_ = 0; taken_ < plan_.stretches && may_go_on() && begin_stretch(taken_); ++taken_) {
-    if (!plan_.whole() && taken_ % plan_.segment == 0)
-      checkpoints_.push_back(batch.save_block(block));
-    take_steps(taken_, plan_.whole() ? &tapes_[as_size(taken_)] : nullptr);
-  }
+  start_forward();
+  while (taken_ < plan_.stretches && may_go_on() && begin_stretch(taken_))
+    take_stretch(batch, block);
   if (stopped_) return;
+  start_back();
+  while (left_ > 0 && may_go_on()) reverse_stretch(batch, block);
+}
+
+void GradientBlock::start_forward() {
+  checkpoints_.clear();
+  taken_ = left_ = 0;
+}
+
+void GradientBlock::take_stretch(Batch& batch, int block) {
+  if (!plan_.whole() && taken_ % plan_.segment == 0)
+    checkpoints_.push_back(batch.save_block(block));
+  take_steps(taken_, plan_.whole() ? &tapes_[as_size(taken_)] : nullptr);
+  ++taken_;
+}
+
+void GradientBlock::start_back() {
   adjoint_.clear();
-  if (plan_.whole()) {
-    for (std::int64_t s = taken_; s-- > 0 && may_go_on();) reverse(s, tapes_[as_size(s)]);
-    return;
-  }
-  for (std::size_t k = checkpoints_.size(); k-- > 0;) {
-    const std::int64_t first = std::int64_t(k) * plan_.segment,
-                       end = std::min(first + plan_.segment, taken_);
-    batch.restore_block(block, checkpoints_[k]);
-    for (std::int64_t s = first; s < end; ++s) {
-      retake_steps(s, s == first, tapes_[as_size(s - first)]);
-      recomputed_steps_ += tapes_[as_size(s - first)].steps();
+  left_ = taken_;
+}
+
+void GradientBlock::reverse_stretch(Batch& batch, int block) {
+  const std::int64_t s = left_ - 1;
+  const std::int64_t first = plan_.whole() ? 0 : s / plan_.segment * plan_.segment;
+  if (!plan_.whole() && (left_ == taken_ || left_ % plan_.segment == 0)) {
+    batch.restore_block(block, checkpoints_[as_size(s / plan_.segment)]);
+    for (std::int64_t k = first; k <= s; ++k) {
+      retake_steps(k, k == first, tapes_[as_size(k - first)]);
+      recomputed_steps_ += tapes_[as_size(k - first)].steps();
     }
-    for (std::int64_t s = end; s-- > first && may_go_on();) reverse(s, tapes_[as_size(s - first)]);
   }
+  reverse(s, tapes_[as_size(s - first)]);
+  left_ = s;
 }
 
 void GradientBlock::get_start(int loss, const Batch& batch, int environment, std::span<double> q,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Takes one block through a rollout and back: forward with tapes or checkpoints, then stretch by
 // stretch from the end. Derived classes define a stretch, its steps, and how derivatives enter and
-// leave: the losses of a scene (loss_block.hpp) and the return of a task (return_block.hpp).
+// leave: the losses of a scene (loss_block.hpp) and the actions of a task (action_block.hpp).
 #pragma once
 
 #include <algorithm>
@@ -51,6 +51,15 @@ class GradientBlock {
 
   /// Runs forward and back from the current state of `block`.
   void run(Batch& batch, int block);
+  // The parts of run(), for callers that choose when to go on and when to go back: start_forward;
+  // begin_stretch and take_stretch for each stretch; start_back; then reverse_stretch for each.
+  void start_forward();
+  /// Takes the steps of the stretch that has begun, with a checkpoint before it where one is due.
+  void take_stretch(Batch& batch, int block);
+  /// Sets all cotangents to zero after the last stretch. May be called again to go back again.
+  void start_back();
+  /// Reverses the last stretch that is not reversed yet. Steps that are on no tape are taken again.
+  void reverse_stretch(Batch& batch, int block);
   /// Returns false when no environment goes on.
   virtual bool begin_stretch(std::int64_t stretch) = 0;
   /// Takes the steps of a stretch. Clears `tape`, if any, and records them on it.
@@ -71,6 +80,7 @@ class GradientBlock {
   NumberGradients parameters_;
   TapePlan plan_;
   std::int64_t taken_ = 0;  // stretches
+  std::int64_t left_ = 0;   // of these, to reverse
   std::int64_t newton_iterations_ = 0;
 
  private:

@@ -62,6 +62,20 @@ void TaskRollout::displace(int lane, std::span<const double> q, std::span<const 
   std::copy(v.begin(), v.end(), number_row(data_->v, lane, v.size()).begin());
 }
 
+void TaskRollout::look_at_start() { worker_.look_at_start(*batch_, 0); }
+
+TaskView TaskRollout::start_view(int lane) const {
+  TaskView view = view_of(*batch_, *data_, lane);
+  const std::span<const Moment> seen = worker_.moments(lane);
+  view.moments = task_.spec().opening ? seen : seen.last(1);
+  return view;
+}
+
+void TaskRollout::observe_start(int lane) {
+  task_.observe(start_view(lane),
+                number_row(data_->observation, lane, task_.spec().observation_size()));
+}
+
 bool TaskRollout::running() const {
   return std::any_of(data_->state.begin(), data_->state.end(),
                      [](EnvironmentState s) { return s == EnvironmentState::running; });

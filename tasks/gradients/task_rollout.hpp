@@ -38,6 +38,12 @@ class TaskRollout {
   void start(std::uint64_t seed, std::span<const std::int64_t> episodes);
   /// Starts a lane's first action from another state. The history of a scheme of two steps stays.
   void displace(int lane, std::span<const double> q, std::span<const double> v);
+  /// Looks at the states in which the first actions begin, as the batch has them now.
+  void look_at_start();
+  /// What the task saw when it reset a lane, until the first action begins.
+  [[nodiscard]] TaskView start_view(int lane) const;
+  /// Observes a lane's reset again.
+  void observe_start(int lane);
 
   [[nodiscard]] bool running() const;  ///< whether some episode goes on
   /// Chooses the next action of every running lane into record.asked. Throws InputError for one

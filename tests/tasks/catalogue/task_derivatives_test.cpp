@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests the reward and the other functions of every task, one at a time, against differences.
+// Tests the reward, the observation and the other functions of every task, one at a time, against
+// differences.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,12 +18,19 @@ namespace {
 using testing::OwnView;
 using testing::task_named;
 
+/// A function of a view, and the function that adds its derivatives by all that the view shows.
+struct OfView {
+  std::function<double()> value;
+  std::function<void(const ViewCotangent& out)> reverse;
+};
+
 /// Changes one number of a view by a small step, however it is stored.
 class Differences {
  public:
-  Differences(const Task& task, OwnView& own) : task_(task), own_(own) {}
+  Differences(const Task& task, OwnView& own, OfView of)
+      : task_(task), own_(own), of_(std::move(of)) {}
 
-  /// Compares the derivative by every number with central differences.
+  /// Compares the derivative by every number, or by forty of many, with central differences.
   void check() {
     const std::size_t moments = own_.q.size();
     std::vector<std::vector<double>> q, v, end_effectors, tactile;
@@ -35,36 +43,36 @@ class Differences {
     for (std::size_t m = 0; m < moments; ++m)
       to.push_back({q[m], v[m], end_effectors[m], tactile[m]});
     std::vector<double> action(own_.action.size()), memory(own_.memory.size());
-    constexpr double kWeight = 1.7;
-    task_.reward_vjp(own_.view(), kWeight, {to, action, memory});
+    of_.reverse({to, action, memory});
     for (std::size_t m = 0; m < moments; ++m) {
-      for (std::size_t i = 0; i < q[m].size(); ++i) compare("q", kWeight, q[m][i], displaced(m, i));
-      each("v", kWeight, own_.v[m], v[m]);
-      each("variables", kWeight, own_.end_effectors[m], end_effectors[m]);
-      each("tactile", kWeight, own_.tactile[m], tactile[m]);
+      for (std::size_t i = 0; i < q[m].size(); ++i) compare("q", q[m][i], displaced(m, i));
+      each("v", own_.v[m], v[m]);
+      each("variables", own_.end_effectors[m], end_effectors[m]);
+      each("tactile", own_.tactile[m], tactile[m]);
     }
-    each("action", kWeight, own_.action, action);
-    each("memory", kWeight, own_.memory, memory);
+    each("action", own_.action, action);
+    each("memory", own_.memory, memory);
   }
 
  private:
   using Move = std::function<void(double)>;
-  void each(const char* what, double weight, std::vector<double>& x,
-            const std::vector<double>& slope) {
-    for (std::size_t i = 0; i < std::min<std::size_t>(x.size(), 40); ++i) {
+  void each(const char* what, std::vector<double>& x, const std::vector<double>& slope) {
+    const std::size_t count = std::min<std::size_t>(x.size(), 40);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t i = k * x.size() / count;
       const double at = x[i];
-      compare(what, weight, slope[i], [&x, i, at](double d) { x[i] = at + d; });
+      compare(what, slope[i], [&x, i, at](double d) { x[i] = at + d; });
       x[i] = at;
     }
   }
-  void compare(const char* what, double weight, double slope, const Move& move) {
+  void compare(const char* what, double slope, const Move& move) {
     constexpr double kStep = 1e-6;
     move(kStep);
-    const double above = task_.judge(own_.view()).reward;
+    const double above = of_.value();
     move(-kStep);
-    const double below = task_.judge(own_.view()).reward;
+    const double below = of_.value();
     move(0);
-    const double expected = weight * (above - below) / (2 * kStep);
+    const double expected = (above - below) / (2 * kStep);
     EXPECT_NEAR(slope, expected, 1e-5 * (1 + std::abs(expected))) << what;
   }
   Move displaced(std::size_t m, std::size_t dof) {
@@ -77,37 +85,64 @@ class Differences {
 
   const Task& task_;
   OwnView& own_;
+  OfView of_;
 };
 
 class EveryTask : public ::testing::TestWithParam<std::string> {};
 
+/// Fills a view with random numbers, quaternions of unit length among them.
+void draw_all(const Task& task, OwnView& own, std::uint64_t seed) {
+  std::uint32_t index = 0;
+  const auto number = [&] { return uniform({seed, 0, 0, Purpose::control, index++}, -1, 1); };
+  for (auto* part : {&own.memory, &own.action})
+    for (double& x : *part) x = number();
+  for (auto* parts : {&own.q, &own.v, &own.end_effectors, &own.tactile})
+    for (auto& part : *parts)
+      for (double& x : part) x = 0.1 * number();
+  std::size_t c = 0;
+  for (const LinkDescription& link : task.model().scene().links) {
+    const std::size_t count = std::size_t(position_count(link.joint.type));
+    const bool turns =
+        link.joint.type == JointType::free || link.joint.type == JointType::spherical;
+    for (auto& q : own.q) {
+      if (!turns) continue;
+      double square = 0;
+      q[c + count - 4] += 1;
+      for (std::size_t k = c + count - 4; k < c + count; ++k) square += q[k] * q[k];
+      for (std::size_t k = c + count - 4; k < c + count; ++k) q[k] /= std::sqrt(square);
+    }
+    c += count;
+  }
+}
+
 TEST_P(EveryTask, TheRewardsDerivativesAreThoseOfDifferences) {
   const auto task = task_named(GetParam());
-  std::uint32_t index = 0;
-  const auto number = [&] { return uniform({5, 0, 0, Purpose::control, index++}, -1, 1); };
-  for (int trial = 0; trial < 5; ++trial) {
+  constexpr double kWeight = 1.7;
+  for (std::uint64_t trial = 0; trial < 5; ++trial) {
     OwnView own(*task);
-    for (auto* part : {&own.memory, &own.action})
-      for (double& x : *part) x = number();
-    for (auto* parts : {&own.q, &own.v, &own.end_effectors, &own.tactile})
-      for (auto& part : *parts)
-        for (double& x : part) x = 0.1 * number();
-    // Quaternions of unit length.
-    std::size_t c = 0;
-    for (const LinkDescription& link : task->model().scene().links) {
-      const std::size_t count = std::size_t(position_count(link.joint.type));
-      const bool turns =
-          link.joint.type == JointType::free || link.joint.type == JointType::spherical;
-      for (auto& q : own.q) {
-        if (!turns) continue;
-        double square = 0;
-        q[c + count - 4] += 1;
-        for (std::size_t k = c + count - 4; k < c + count; ++k) square += q[k] * q[k];
-        for (std::size_t k = c + count - 4; k < c + count; ++k) q[k] /= std::sqrt(square);
-      }
-      c += count;
-    }
-    Differences(*task, own).check();
+    draw_all(*task, own, 5 + 100 * trial);
+    Differences(*task, own,
+                {[&] { return kWeight * task->judge(own.view()).reward; },
+                 [&](const ViewCotangent& out) { task->reward_vjp(own.view(), kWeight, out); }})
+        .check();
+  }
+}
+
+TEST_P(EveryTask, TheObservationsDerivativesAreThoseOfDifferences) {
+  const auto task = task_named(GetParam());
+  std::vector<double> weight(task->spec().observation_size()), o(weight.size());
+  for (std::size_t k = 0; k < weight.size(); ++k)
+    weight[k] = uniform({13, 0, 0, Purpose::control, std::uint32_t(k)}, -1, 1);
+  for (std::uint64_t trial = 0; trial < 3; ++trial) {
+    OwnView own(*task);
+    draw_all(*task, own, 6 + 100 * trial);
+    Differences(*task, own,
+                {[&] {
+                   task->observe(own.view(), o);
+                   return std::inner_product(o.begin(), o.end(), weight.begin(), 0.0);
+                 },
+                 [&](const ViewCotangent& out) { task->observe_vjp(own.view(), weight, out); }})
+        .check();
   }
 }
 

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: Apache-2.0
+// An action changes by its numbers, by the memory and by the state in which it begins.
+#include "tasks/gradients/task_tangent.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+#include "engine/base/as_size.hpp"
+
+namespace tangere {
+namespace {
+
+double product(std::span<const double> a, std::span<const double> b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+/// Lane 0 of an array of rows by lane.
+std::span<const double> first_lane(const std::vector<double>& all) {
+  return std::span(all).first(all.size() / kernels::kBlock);
+}
+
+std::vector<double> given(std::span<const double> x, std::size_t n) {
+  return x.empty() ? std::vector<double>(n) : std::vector<double>(x.begin(), x.end());
+}
+
+}  // namespace
+
+/// Room for the results of a task's reverse functions.
+struct TaskTangent::OwnCotangent {
+  std::vector<std::vector<double>> q, v, end_effectors, tactile;
+  std::vector<double> memory, action;
+  std::vector<MomentCotangent> moments;
+
+  OwnCotangent(const Task& task, std::size_t count)
+      : memory(as_size(task.spec().memory)), action(task.spec().action.size()) {
+    const std::vector<double> dofs(as_size(task.model().nv()));
+    for (std::size_t m = 0; m < count; ++m) {
+      q.push_back(dofs);
+      v.push_back(dofs);
+      end_effectors.emplace_back(task.end_effectors_size());
+      tactile.emplace_back(task.tactile_size());
+    }
+    for (std::size_t m = 0; m < count; ++m)
+      moments.push_back({q[m], v[m], end_effectors[m], tactile[m]});
+  }
+  [[nodiscard]] ViewCotangent out() { return {moments, action, memory}; }
+  /// Product with the changes of an action's start.
+  [[nodiscard]] double start_dot(const StateTangent& x, const std::vector<double>& dm,
+                                 const std::vector<double>& da) const {
+    return product(q[0], x.q) + product(v[0], x.v) + product(memory, dm) + product(action, da);
+  }
+};
+
+TaskTangent::TaskTangent(TaskRollout& rollout, std::span<const double> actions,
+                         const StepperOptions& options)
+    : rollout_(rollout),
+      task_(rollout.task()),
+      tangent_(task_.model(), options),
+      readout_(task_.model()),
+      memory_(as_size(task_.spec().memory)),
+      action_(task_.spec().action.size()) {
+  for (std::size_t a = 0; a * action_.size() < actions.size(); ++a) {
+    ActionRecord& r = records_.emplace_back(task_);
+    const auto own = actions.subspan(a * action_.size(), action_.size());
+    std::copy(own.begin(), own.end(), r.asked.begin());
+    rollout.begin(r);
+    tapes_.emplace_back(task_.model(), rollout.integrator(), task_.spec().steps_per_action);
+    rollout.take_steps(&tapes_.back());
+    rollout.conclude();
+  }
+}
+
+double TaskTangent::along(const InputDirection& d) {
+  start(d.q, d.v);
+  double sum = 0;
+  for (std::size_t a = 0; a < records_.size(); ++a)
+    sum += take(d.u.empty() ? d.u : d.u.subspan(a * action_.size(), action_.size()), d.numbers);
+  return sum;
+}
+
+void TaskTangent::start(std::span<const double> q, std::span<const double> v) {
+  const std::size_t nv = as_size(task_.model().nv());
+  state_ = {given(q, nv), given(v, nv), std::vector<double>(nv), std::vector<double>(nv)};
+  std::fill(memory_.begin(), memory_.end(), 0.0);
+  taken_ = 0;
+}
+
+double TaskTangent::take(std::span<const double> change, std::span<const double> numbers) {
+  const std::size_t action = taken_++;
+  action_ = given(change, action_.size());
+  rollout_.look_again(tapes_[action]);
+  begin(action);
+  seen_ = unseen(task_.spec().moments.size());
+  take_steps(action, numbers);
+  return reward(action);
+}
+
+ViewTangent TaskTangent::unseen(std::size_t moments) const {
+  ViewTangent seen;
+  seen.memory = memory_;
+  seen.action = action_;
+  for (auto* x : {&seen.q, &seen.v, &seen.end_effectors, &seen.tactile}) x->resize(moments);
+  return seen;
+}
+
+TaskView TaskTangent::view() const {
+  return rollout_.view(records_[taken_ - 1], std::int64_t(taken_), 0,
+                       first_lane(records_[taken_ - 1].memory), rollout_.moments(0));
+}
+
+ViewTangent TaskTangent::seen_at_start(std::span<const double> numbers) {
+  std::fill(action_.begin(), action_.end(), 0.0);
+  ViewTangent seen = unseen(1);
+  look(tapes_.front(), 0, 0, numbers, seen);
+  return seen;
+}
+
+TaskView TaskTangent::start_view() {
+  tapes_.front().show(0, rollout_.batch(), 0);
+  rollout_.look_at_start();
+  TaskView view = rollout_.start_view(0);
+  view.actions = 0;
+  view.memory = first_lane(records_.front().found);
+  view.moments = view.moments.last(1);
+  return view;
+}
+
+/// Computes the memory that the action keeps, and the state from which it starts.
+void TaskTangent::begin(std::size_t action) {
+  const ActionRecord& r = records_[action];
+  const Moment seen{first_lane(r.q), first_lane(r.v), {}, {}};
+  std::vector<double> memory(memory_.size());
+  for (std::size_t k = 0; k < memory.size(); ++k) {
+    OwnCotangent bar(task_, 1);
+    bar.memory[k] = 1;
+    task_.begin_action_vjp(
+        rollout_.view(r, std::int64_t(action), 0, first_lane(r.found), {&seen, 1}), bar.memory,
+        {bar.moments, bar.action});
+    memory[k] = bar.start_dot(state_, memory_, action_);
+  }
+  memory_ = memory;
+  if (!task_.spec().restarts) return;
+  const std::size_t nv = state_.q.size();
+  StateTangent placed{std::vector<double>(nv), std::vector<double>(nv), std::vector<double>(nv),
+                      std::vector<double>(nv)};
+  for (std::size_t i = 0; i < 2 * nv; ++i) {
+    OwnCotangent bar(task_, 1);
+    std::vector<double> q(nv), v(nv);
+    (i < nv ? q[i] : v[i - nv]) = 1;
+    task_.place_vjp(rollout_.view(r, std::int64_t(action), 0, first_lane(r.memory), {&seen, 1}), q,
+                    v, bar.out());
+    (i < nv ? placed.q[i] : placed.v[i - nv]) = bar.start_dot(state_, memory_, action_);
+  }
+  state_ = placed;
+}
+
+void TaskTangent::take_steps(std::size_t action, std::span<const double> numbers) {
+  const ActionRecord& r = records_[action];
+  const BlockTape& tape = tapes_[action];
+  const TaskSpec& spec = task_.spec();
+  const StateTangent start = state_;
+  const std::size_t nu = as_size(task_.model().nu());
+  std::vector<double> u_dot(nu);
+  std::size_t next = 0;
+  for (int t = 0; t < spec.steps_per_action; ++t) {
+    if (t % spec.control_every == 0) {
+      rollout_.ask_again(r, std::int64_t(action), t, tape);
+      for (std::size_t k = 0; k < nu; ++k) {
+        OwnCotangent bar(task_, 1);
+        std::vector<double> weight(nu);
+        weight[k] = 1;
+        const Moment first = rollout_.first_moment(tape, 0);
+        task_.controls_vjp(
+            rollout_.view(r, std::int64_t(action), 0, first_lane(r.memory), {&first, 1}), t, weight,
+            bar.out());
+        u_dot[k] = bar.start_dot(start, memory_, action_);
+      }
+    }
+    tape.show(t, rollout_.batch(), 0);
+    tangent_.step(rollout_.batch(), 0, 0, tape, t, rollout_.u().first(nu), u_dot, numbers, state_);
+    if (spec.moments[next] == t + 1) look(tape, t + 1, next++, numbers, seen_);
+  }
+}
+
+void TaskTangent::look(const BlockTape& tape, int step, std::size_t moment,
+                       std::span<const double> numbers, ViewTangent& seen) {
+  seen.q[moment] = state_.q;
+  seen.v[moment] = state_.v;
+  tape.show(step, rollout_.batch(), 0);
+  const std::size_t nv = state_.q.size();
+  if (task_.end_effectors_size() > 0) {
+    std::vector<double> jacobian(task_.end_effectors_size() * nv);
+    readout_.end_effector_jacobian(rollout_.batch(), 0, jacobian);
+    for (std::size_t i = 0; i < task_.end_effectors_size(); ++i)
+      seen.end_effectors[moment].push_back(
+          product(std::span(jacobian).subspan(i * nv, nv), state_.q));
+  }
+  if (task_.tactile_size() == 0) return;
+  const auto sensors = task_.model().sensors();
+  for (std::size_t s = 0; s < sensors.size(); ++s) {
+    std::vector<double> change(3 * as_size(sensors[s].points));
+    tangent_.field(rollout_.batch(), 0, 0, tape, step, static_cast<int>(s), numbers, {}, state_,
+                   change);
+    seen.tactile[moment].insert(seen.tactile[moment].end(), change.begin(), change.end());
+  }
+}
+
+double TaskTangent::reward(std::size_t action) const {
+  OwnCotangent bar(task_, seen_.q.size());
+  task_.reward_vjp(rollout_.view(records_[action], std::int64_t(action) + 1, 0,
+                                 first_lane(records_[action].memory), rollout_.moments(0)),
+                   1, bar.out());
+  double sum = product(bar.memory, seen_.memory) + product(bar.action, seen_.action);
+  for (std::size_t m = 0; m < seen_.q.size(); ++m)
+    sum += product(bar.q[m], seen_.q[m]) + product(bar.v[m], seen_.v[m]) +
+           product(bar.end_effectors[m], seen_.end_effectors[m]) +
+           product(bar.tactile[m], seen_.tactile[m]);
+  return sum;
+}
+
+}  // namespace tangere

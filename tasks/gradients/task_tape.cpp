@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+// Spreads blocks of sixteen environments over threads, and keeps the caller to the order of calls.
+#include "tasks/gradients/task_tape.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "engine/base/as_size.hpp"
+#include "tasks/gradients/tape_block.hpp"
+#include "tasks/run/block_threads.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+
+namespace {
+
+enum class Phase : std::uint8_t { forward, back, done, broken };
+
+TaskTapeOptions checked(const Task& task, int environments, TaskTapeOptions o) {
+  if (environments < 1 || o.threads < 1)
+    throw InputError(fmt::format("a tape of {} environments on {} threads; expected at least 1",
+                                 environments, o.threads));
+  if (o.actions < 0 || o.actions > task.spec().horizon)
+    throw InputError(
+        fmt::format("a tape of {} actions of task {}; expected 1 to {}, its horizon, or 0 for all",
+                    o.actions, task.spec().name, task.spec().horizon));
+  if (o.actions == 0) o.actions = task.spec().horizon;
+  if (!(o.tape_bytes > 0))
+    throw InputError(fmt::format("tapes of {} bytes; expected a positive number", o.tape_bytes));
+  return o;
+}
+
+std::int64_t blocks_of(int environments) {
+  return (std::int64_t{environments} + kBlock - 1) / kBlock;
+}
+
+ActionTapes tapes_of(const Task& task, int environments, const TaskTapeOptions& o) {
+  return {task, o.stepper, o.actions, blocks_of(environments), o.tape_bytes};
+}
+
+void expect_numbers(std::size_t found, std::size_t expected, bool may_be_empty, const char* what) {
+  if (found == expected || (may_be_empty && found == 0)) return;
+  throw InputError(fmt::format("{} numbers of {}; expected {}{}", found, what, expected,
+                               may_be_empty ? " or none" : ""));
+}
+
+}  // namespace
+
+struct TaskTape::Impl {
+  Impl(const Task& t, int environments, const TaskTapeOptions& asked)
+      : task(t),
+        options(checked(t, environments, asked)),
+        e(as_size(environments)),
+        nq(as_size(t.model().nq())),
+        nv(as_size(t.model().nv())),
+        width(t.spec().action.size()),
+        seen(t.spec().observation_size()),
+        numbers(options.parameters ? as_size(NumberGradients(t.model()).count()) : 0),
+        observation(e * seen),
+        reward(e),
+        q(e * nq),
+        v(e * nv),
+        status(e),
+        scratch(as_size(options.threads)),
+        threads(options.threads) {
+    for (std::vector<std::uint8_t>* flags : {&alive, &terminated, &truncated, &success})
+      flags->resize(e);
+    const ActionTapes tapes = tapes_of(t, environments, options);
+    blocks.reserve(as_size(tapes.blocks));
+    for (std::int64_t b = 0; b < tapes.blocks; ++b)
+      blocks.emplace_back(
+          tapes, options.precision, options.parameters,
+          static_cast<int>(std::min<std::int64_t>(kBlock, environments - b * kBlock)));
+  }
+
+  /// Environments of block b among rows of `row` numbers each; empty stays empty.
+  template <class T>
+  [[nodiscard]] std::span<T> of(std::span<T> all, int b, std::size_t row) const {
+    if (all.empty()) return all;
+    return all.subspan(as_size(b) * kBlock * row, as_size(blocks[as_size(b)].lanes()) * row);
+  }
+  [[nodiscard]] StateCotangents of(const StateCotangents& all, int b) const {
+    return {of(all.q, b, nv), of(all.v, b, nv)};
+  }
+
+  /// Calls body(block, its index) for every block. If it throws, only a reset helps.
+  template <class Body>
+  void each(Phase then, const Body& body) {
+    phase = Phase::broken;
+    threads.for_each(static_cast<int>(blocks.size()), scratch,
+                     [&](char&, int b) { body(blocks[as_size(b)], b); });
+    phase = then;
+  }
+
+  /// Copies what a block shows to the arrays of all environments.
+  void show(const TapeBlock& block, int b) {
+    const EnvironmentData& data = block.rollout().data();
+    const std::size_t first = as_size(b) * kBlock;
+    const auto copy = [&](const auto& from, auto& to, std::size_t row) {
+      std::copy(from.begin(), from.end(), to.begin() + static_cast<std::ptrdiff_t>(first * row));
+    };
+    copy(data.observation, observation, seen);
+    copy(data.q, q, nq);
+    copy(data.v, v, nv);
+    copy(data.terminated, terminated, 1);
+    copy(data.truncated, truncated, 1);
+    copy(data.success, success, 1);
+    for (int l = 0; l < block.lanes(); ++l) {
+      const std::size_t at = first + as_size(l);
+      alive[at] = block.took(l) ? 1 : 0;
+      reward[at] = block.took(l) ? data.reward[as_size(l)] : 0;
+      status[at] = block.rollout().batch().status(l);
+    }
+  }
+
+  void reset(std::uint64_t seed, std::int64_t first) {
+    taken = left = 0;
+    each(Phase::forward, [&](TapeBlock& block, int b) {
+      block.start(seed, first + std::int64_t{b} * kBlock);
+      show(block, b);
+    });
+  }
+
+  void check_actions(std::span<const double> actions) const {
+    check_sound();
+    if (phase != Phase::forward)
+      throw InputError("an action on a tape that has been reversed; expected reset() before it");
+    if (taken == options.actions)
+      throw InputError(fmt::format("action {} on a tape of {} actions; expected reset() before it",
+                                   taken, options.actions));
+    expect_numbers(actions.size(), e * width, false, "actions");
+    for (std::size_t i = 0; i < actions.size(); ++i)
+      if (!std::isfinite(actions[i]) && terminated[i / width] + truncated[i / width] == 0)
+        throw InputError(
+            fmt::format("number {} of action {} of environment {} is {}; expected a finite number",
+                        i % width, taken, i / width, actions[i]));
+  }
+
+  void check_cotangents(std::span<const double> by_observation, const StateCotangents& s) const {
+    expect_numbers(by_observation.size(), e * seen, true, "derivatives by observations");
+    expect_numbers(s.q.size(), e * nv, true, "derivatives by q");
+    expect_numbers(s.v.size(), e * nv, true, "derivatives by v");
+  }
+
+  void check_sound() const {
+    if (phase == Phase::broken)
+      throw InputError("a tape in which a call has failed halfway; expected reset()");
+  }
+  /// Steps that are left to reverse.
+  [[nodiscard]] std::int64_t to_reverse() const { return phase == Phase::forward ? taken : left; }
+
+  void begin_reverse() {
+    check_sound();
+    each(Phase::back, [](TapeBlock& block, int) { block.begin_reverse(); });
+    left = taken;
+  }
+
+  const Task& task;
+  const TaskTapeOptions options;
+  const std::size_t e, nq, nv, width, seen, numbers;  // numbers of one environment
+  std::vector<double> observation, reward, q, v;
+  std::vector<std::uint8_t> alive, terminated, truncated, success;
+  std::vector<StepStatus> status;
+  std::vector<TapeBlock> blocks;
+  std::vector<char> scratch;  // by the thread's index in the arena; what threads need is in blocks
+  BlockThreads threads;
+  Phase phase = Phase::forward;
+  std::int64_t taken = 0, left = 0;  // steps; of these, to reverse
+};
+
+TaskTape::TaskTape(const Task& task, int environments, const TaskTapeOptions& options)
+    : impl_(std::make_unique<Impl>(task, environments, options)) {
+  impl_->reset(options.seed, options.first_episode);
+}
+TaskTape::~TaskTape() = default;
+TaskTape::TaskTape(TaskTape&&) noexcept = default;
+TaskTape& TaskTape::operator=(TaskTape&&) noexcept = default;
+
+void TaskTape::reset(std::uint64_t seed, std::int64_t first_episode) {
+  impl_->reset(seed, first_episode);
+}
+
+void TaskTape::displace(int environment, std::span<const double> q, std::span<const double> v) {
+  Impl& i = *impl_;
+  if (i.phase != Phase::forward || i.taken > 0)
+    throw InputError("a first state after the first step; expected reset() before it");
+  if (environment < 0 || environment >= environments())
+    throw InputError(
+        fmt::format("environment {} of a tape; expected 0 to {}", environment, environments() - 1));
+  expect_numbers(q.size(), i.nq, false, "q");
+  expect_numbers(v.size(), i.nv, false, "v");
+  TapeBlock& block = i.blocks[as_size(environment / kBlock)];
+  block.displace(environment % kBlock, q, v);
+  i.show(block, environment / kBlock);
+}
+
+void TaskTape::step(std::span<const double> actions) {
+  Impl& i = *impl_;
+  i.check_actions(actions);
+  i.each(Phase::forward, [&](TapeBlock& block, int b) {
+    block.step(i.of(actions, b, i.width));
+    i.show(block, b);
+  });
+  ++i.taken;
+}
+
+void TaskTape::reverse(std::span<const double> by_observation, std::span<const double> by_reward,
+                       std::span<double> by_action, const StateCotangents& by_state) {
+  Impl& i = *impl_;
+  i.check_cotangents(by_observation, by_state);
+  expect_numbers(by_reward.size(), i.e, true, "derivatives by rewards");
+  expect_numbers(by_action.size(), i.e * i.width, false, "derivatives by actions");
+  i.check_sound();
+  if (i.to_reverse() == 0)
+    throw InputError(fmt::format(
+        "one more reverse than the {} actions on tape; expected reverse_start() or reset()",
+        i.taken));
+  if (i.phase == Phase::forward) i.begin_reverse();
+  i.each(Phase::back, [&](TapeBlock& block, int b) {
+    block.reverse(i.left - 1, i.of(by_observation, b, i.seen), i.of(by_reward, b, 1),
+                  i.of(by_state, b), i.of(by_action, b, i.width));
+  });
+  --i.left;
+}
+
+void TaskTape::reverse_start(std::span<const double> by_observation, std::span<double> by_q,
+                             std::span<double> by_v, const StateCotangents& by_state,
+                             std::span<double> by_parameter) {
+  Impl& i = *impl_;
+  i.check_cotangents(by_observation, by_state);
+  expect_numbers(by_q.size(), i.e * i.nv, true, "derivatives by the first q");
+  expect_numbers(by_v.size(), i.e * i.nv, true, "derivatives by the first v");
+  expect_numbers(by_parameter.size(), i.e * i.numbers, true, "derivatives by the scene's numbers");
+  i.check_sound();
+  if (i.phase == Phase::done)
+    throw InputError("a second end of a reverse pass; expected begin_reverse() or reset()");
+  if (i.to_reverse() > 0)
+    throw InputError(
+        fmt::format("the end of a reverse pass with {} of {} actions left; expected reverse() for "
+                    "each",
+                    i.to_reverse(), i.taken));
+  if (i.phase == Phase::forward) i.begin_reverse();
+  i.each(Phase::done, [&](TapeBlock& block, int b) {
+    block.reverse_reset(i.of(by_observation, b, i.seen), i.of(by_state, b), i.of(by_q, b, i.nv),
+                        i.of(by_v, b, i.nv), i.of(by_parameter, b, i.numbers));
+  });
+}
+
+void TaskTape::begin_reverse() { impl_->begin_reverse(); }
+
+const Task& TaskTape::task() const { return impl_->task; }
+int TaskTape::environments() const { return static_cast<int>(impl_->e); }
+std::int64_t TaskTape::taken() const { return impl_->taken; }
+std::span<const double> TaskTape::observations() const { return impl_->observation; }
+std::span<const double> TaskTape::rewards() const { return impl_->reward; }
+std::span<const std::uint8_t> TaskTape::alive() const { return impl_->alive; }
+std::span<const std::uint8_t> TaskTape::terminated() const { return impl_->terminated; }
+std::span<const std::uint8_t> TaskTape::truncated() const { return impl_->truncated; }
+std::span<const std::uint8_t> TaskTape::success() const { return impl_->success; }
+std::span<const double> TaskTape::q() const { return impl_->q; }
+std::span<const double> TaskTape::v() const { return impl_->v; }
+StepStatus TaskTape::status(int environment) const { return impl_->status[as_size(environment)]; }
+TaskView TaskTape::view(int environment) const {
+  const TaskRollout& r = impl_->blocks[as_size(environment / kBlock)].rollout();
+  return view_of(r.batch(), r.data(), environment % kBlock);
+}
+
+std::int64_t TaskTape::recomputed_steps() const {
+  std::int64_t sum = 0;
+  for (const TapeBlock& block : impl_->blocks) sum += block.recomputed_steps();
+  return sum;
+}
+
+double TaskTape::bytes(const Task& task, int environments, const TaskTapeOptions& asked) {
+  const TaskTapeOptions o = checked(task, environments, asked);
+  const std::size_t shown = task.spec().observation_size() + 2 * as_size(task.model().nv());
+  // Cotangents of moments, and what an opening has shown, take as much as moments.
+  const double moments = (task.spec().opening ? 2 : 1) * BlockWorker::bytes(task);
+  return bytes_of(tapes_of(task, environments, o)) +
+         double(blocks_of(environments)) * (ActionBlock::workspace_bytes(task) + moments) +
+         double(environments) * (2 * 8.0 * double(shown) + EnvironmentData::bytes(task));
+}
+
+}  // namespace tangere

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// Back-propagation through time of a task whose actions a caller chooses: one call per action
+// forward, one call per action back, each for all environments. What the caller does between two
+// actions (a policy) it differentiates itself:
+//   (o_(t+1), r_t) = step(a_t),   a_t = policy(o_t)
+//   ā_t = reverse(ō_(t+1), r̄_t),  ō_t += (∂policy/∂o)ᵀ ā_t
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "engine/base/precision.hpp"
+#include "engine/step/stepper.hpp"
+#include "tasks/catalogue/task.hpp"
+
+namespace tangere {
+
+struct TaskTapeOptions {
+  std::uint64_t seed = 0;
+  std::int64_t first_episode = 0;  ///< of environment 0
+  std::int64_t actions = 0;        ///< of an episode, at most; 0: the task's horizon
+  int threads = 1;
+  /// Steps are solved to kGradientTolerance where neither these nor the scene name a tolerance.
+  StepperOptions stepper;
+  Precision precision = Precision::mixed;  ///< of tactile fields; derivatives are in double
+  bool parameters =
+      false;  ///< also by the scene's numbers (engine/derivative/number_gradients.hpp)
+  /// Limit for the tapes of all environments together [bytes]. Longer episodes are run again from
+  /// checkpoints, with the same bits.
+  double tape_bytes = 1e9;
+};
+
+/// Derivatives of a loss by the states after an action; empty spans mean zeros.
+struct StateCotangents {
+  std::span<const double> q, v;  ///< (E, nv), q along the dofs of v
+};
+
+/// E environments of one task. Environment e plays episode first + e, once. Its bits are those of a
+/// VectorTask that solves to the same tolerance; they depend neither on E, nor on threads, nor on
+/// tape_bytes, nor on the other environments. An environment whose episode has ended, or whose
+/// simulation has failed, keeps its last state and shows it again.
+class TaskTape {
+ public:
+  /// Makes E environments and resets them. `task` must outlive this object. Throws InputError for
+  /// numbers of environments, actions or threads out of range, and for a tape_bytes that does not
+  /// hold the checkpoints.
+  TaskTape(const Task& task, int environments, const TaskTapeOptions& options = {});
+  ~TaskTape();
+  TaskTape(TaskTape&&) noexcept;
+  TaskTape& operator=(TaskTape&&) noexcept;
+
+  /// Starts episodes first_episode … first_episode + E - 1 of a seed and forgets what is on tape.
+  void reset(std::uint64_t seed, std::int64_t first_episode);
+  /// Moves the state in which an environment's first action begins: q (nq) with quaternions of unit
+  /// length, v (nv). It observes again. Throws InputError after the first step.
+  void displace(int environment, std::span<const double> q, std::span<const double> v);
+  /// Takes one action of every environment whose episode goes on, (E, action), clipped to its
+  /// bounds, and records it. Actions of the other environments are ignored. Throws InputError for
+  /// an action of theirs that is not finite, for one more than `actions`, and after reverse().
+  void step(std::span<const double> actions);
+
+  [[nodiscard]] const Task& task() const;
+  [[nodiscard]] int environments() const;
+  [[nodiscard]] std::int64_t taken() const;  ///< steps since the reset
+  /// Views of the results of the last reset or step. They stay valid as long as the object;
+  /// reverse() does not change them.
+  [[nodiscard]] std::span<const double> observations() const;      ///< (E, observation)
+  [[nodiscard]] std::span<const double> rewards() const;           ///< (E), 0 if not alive
+  [[nodiscard]] std::span<const std::uint8_t> alive() const;       ///< (E) 1: the action was taken
+  [[nodiscard]] std::span<const std::uint8_t> terminated() const;  ///< (E) the episode has ended
+  /// (E) it ran out of time or had no solution
+  [[nodiscard]] std::span<const std::uint8_t> truncated() const;
+  [[nodiscard]] std::span<const std::uint8_t> success() const;  ///< (E)
+  [[nodiscard]] std::span<const double> q() const;              ///< (E, nq)
+  [[nodiscard]] std::span<const double> v() const;              ///< (E, nv)
+  /// Status of the simulation. A failure truncates the episode, with the reward of the last state
+  /// that was found.
+  [[nodiscard]] StepStatus status(int environment) const;
+  /// What a policy with access to the state looks at: the current q, v and memory of the task.
+  [[nodiscard]] TaskView view(int environment) const;
+
+  /// Reverses the last step that is not reversed yet; the first call begins at the last step.
+  /// Derivatives of a loss L by what that step returned come in: ∂L/∂observations (E, observation)
+  /// and ∂L/∂rewards (E), and optionally by the states; an empty span means zeros. ∂L/∂actions
+  /// (E, action) goes out: all of it that passes through this step and later ones. It is 0 for a
+  /// component beyond its bounds and for an environment that did not take the action. What an ended
+  /// episode goes on showing counts for its last action. Throws InputError when every step is
+  /// reversed, and when a task has no Task::observe_vjp or place_vjp that it would need; then only
+  /// reset() is possible.
+  void reverse(std::span<const double> by_observation, std::span<const double> by_reward,
+               std::span<double> by_action, const StateCotangents& by_state = {});
+  /// Ends the reverse pass. Derivatives by the observation of the reset, (E, observation), and by
+  /// the states at the first action come in; those of the whole by these states go out: (E, nv)
+  /// each, positions along the dofs of v, and (E, NumberGradients::count()) by the scene's numbers
+  /// if they were asked for. Empty spans out are skipped. The reset and all random draws count as
+  /// given, with what was seen in an opening before its last moment. Throws InputError while steps
+  /// are left to reverse, and at a second call.
+  void reverse_start(std::span<const double> by_observation, std::span<double> by_q,
+                     std::span<double> by_v, const StateCotangents& by_state = {},
+                     std::span<double> by_parameter = {});
+  /// Begins another reverse pass over the same steps, from the last one.
+  void begin_reverse();
+
+  /// Simulation steps taken again from checkpoints since this object was made, counted by block.
+  [[nodiscard]] std::int64_t recomputed_steps() const;
+  /// Memory that a TaskTape takes [bytes].
+  static double bytes(const Task& task, int environments, const TaskTapeOptions& options = {});
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace tangere

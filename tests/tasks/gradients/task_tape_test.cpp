@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests for every task that going back on a TaskTape is the transpose of going forward, and that it
+// is the gradient of the return where only rewards count. Its other promises are tested in
+// tape_episodes_test.cpp.
+#include "tasks/gradients/task_tape.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "engine/derivative/number_gradients.hpp"
+#include "engine/model/random.hpp"
+#include "engine/step/displacement.hpp"
+#include "tasks/gradients/task_gradients.hpp"
+#include "tasks/gradients/task_tangent.hpp"
+#include "tests/tasks/gradients/observed_change.hpp"
+#include "tests/tasks/gradients/tape_sweep.hpp"
+
+namespace tangere {
+namespace {
+
+using Numbers = std::vector<double>;
+using testing::keyed;
+using testing::kTapeSeed;
+using testing::rows_of;
+using testing::scripted_actions;
+using testing::sweep_of;
+using testing::Swept;
+using testing::tape_options;
+using testing::task_named;
+
+struct TapeCase {
+  const char* task;
+  std::int64_t actions;
+};
+void PrintTo(const TapeCase& c, std::ostream* out) { *out << c.task << " " << c.actions; }
+
+class EveryTape : public ::testing::TestWithParam<TapeCase> {};
+
+/// With derivatives by rewards alone, and all one, it is the gradient of the return, bit for bit,
+/// with and without checkpoints.
+TEST_P(EveryTape, WithRewardsAloneItIsTheGradientOfTheReturn) {
+  const auto [name, actions] = GetParam();
+  const auto task = task_named(name);
+  constexpr int kEpisodes = 18;
+  TaskTapeOptions options = tape_options(actions, 2);
+  options.parameters = true;
+  const std::size_t numbers = std::size_t(NumberGradients(task->model()).count()),
+                    seen = task->spec().observation_size();
+  const testing::Incoming one = [&](int, std::int64_t, std::size_t k) {
+    return k == seen ? 1.0 : 0.0;
+  };
+  TaskTape tape(*task, kEpisodes, options);
+  const Swept swept = sweep_of(tape, actions, one, numbers);
+
+  TaskGradientOptions wanted;
+  wanted.episodes = kEpisodes;
+  wanted.seed = kTapeSeed;
+  wanted.actions = actions;
+  wanted.parameters = true;
+  const TaskGradients g = task_gradients(
+      *task,
+      [&](const TaskView& view, std::span<const double> o, std::span<double> a) {
+        task->scripted(view, o, a);
+        for (std::size_t k = 0; k < a.size(); ++k)
+          a[k] = std::clamp(0.8 * a[k], -0.4, 0.4) + 0.05 * keyed(view.episode, view.actions, k);
+      },
+      wanted);
+  Numbers by_action, value(kEpisodes);
+  for (std::size_t e = 0; e < kEpisodes; ++e) {
+    const Numbers own = rows_of(swept.by_action, kEpisodes, e, std::size_t(actions));
+    by_action.insert(by_action.end(), own.begin(), own.end());
+    for (const double r : rows_of(swept.rewards, kEpisodes, e, std::size_t(actions))) value[e] += r;
+  }
+  EXPECT_EQ(value, g.value);
+  EXPECT_EQ(by_action, g.by_action);
+  EXPECT_EQ(swept.by_q, g.by_q);
+  EXPECT_EQ(swept.by_v, g.by_v);
+  EXPECT_EQ(swept.by_parameter, g.by_parameter);
+  EXPECT_GT(std::inner_product(by_action.begin(), by_action.end(), by_action.begin(), 0.0), 0);
+  EXPECT_EQ(tape.recomputed_steps(), 0);
+  EXPECT_GT(g.newton_iterations, 0);
+
+  options.tape_bytes = testing::least_tape_bytes(*task, kEpisodes, options);
+  TaskTape small(*task, kEpisodes, options);
+  EXPECT_EQ(sweep_of(small, actions, one, numbers), swept);
+  if (actions > 3) {
+    EXPECT_GT(small.recomputed_steps(), 0);
+  }
+}
+
+/// Σ ō·δo + r̄ δr + q̄·δq + v̄·δv = Σ ā·δa + q̄₀·δq₀ + v̄₀·δv₀ + n̄·δn for any cotangents of what an
+/// open loop shows and any changes of what goes in. The changes of what it shows come from dual
+/// numbers, those of observations from differences of observe().
+TEST_P(EveryTape, GoingBackIsTheTransposeOfGoingForward) {
+  const auto [name, actions] = GetParam();
+  const auto task = task_named(name);
+  const std::size_t n = std::size_t(actions), width = task->spec().action.size(),
+                    seen = task->spec().observation_size(), nv = std::size_t(task->model().nv());
+  const NumberGradients parameters(task->model());
+  const std::size_t numbers = std::size_t(parameters.count());
+  const StepperOptions stepper{{}, {}, 1e-12};
+  TaskTapeOptions options = tape_options(actions);
+  options.stepper = stepper;
+  options.parameters = true;
+  options.precision = Precision::f64;
+  TaskTape tape(*task, 1, options);
+  // The first episode that goes on for all actions, from a state without symmetry.
+  Numbers q, v, played, by_action(n * width);
+  std::int64_t episode = -1;
+  do {
+    ASSERT_LT(++episode, 20);
+    tape.reset(kTapeSeed, episode);
+    q.assign(tape.q().begin(), tape.q().end());
+    v.assign(tape.v().begin(), tape.v().end());
+    if (std::string(name) == "stable_grasp")
+      for (const auto& [dof, by] : {std::pair{6, 2e-4}, std::pair{7, 3e-4}, std::pair{11, 4e-3}})
+        displace(task->model(), q, dof, by);
+    tape.displace(0, q, v);
+    played.clear();
+    for (std::size_t t = 0; t < n; ++t) {
+      const Numbers a = scripted_actions(tape);
+      played.insert(played.end(), a.begin(), a.end());
+      tape.step(a);
+    }
+  } while (tape.alive()[0] == 0);
+  // Forces are small; large weights give them a share.
+  const auto weights = [&](std::size_t count, std::int64_t action, double size) {
+    Numbers w(count);
+    for (std::size_t k = 0; k < count; ++k) w[k] = size * keyed(100, action, k);
+    return w;
+  };
+  const auto by_o = [&](std::size_t t) { return weights(seen, std::int64_t(t), 10); };
+  const auto by_r = [&](std::size_t t) { return weights(1, 1000 + std::int64_t(t), 1); };
+  const auto by_q = [&](std::size_t t) { return weights(nv, 2000 + std::int64_t(t), 10); };
+  const auto by_v = [&](std::size_t t) { return weights(nv, 3000 + std::int64_t(t), 1); };
+  for (std::size_t t = n; t-- > 0;) {
+    const Numbers to_q = by_q(t + 1), to_v = by_v(t + 1);
+    tape.reverse(by_o(t + 1), by_r(t + 1), std::span(by_action).subspan(t * width, width),
+                 {to_q, to_v});
+  }
+  const bool opens = task->spec().opening;
+  Numbers first_q(nv), first_v(nv), by_number(numbers);
+  const Numbers to_q = by_q(0), to_v = by_v(0);
+  tape.reverse_start(opens ? Numbers{} : by_o(0), first_q, first_v, {to_q, to_v}, by_number);
+
+  TaskRollout rollout(*task, stepper, Precision::f64);
+  rollout.start(kTapeSeed, {&episode, 1});
+  rollout.displace(0, q, v);
+  TaskTangent tangent(rollout, played, stepper);
+  const Numbers da = weights(n * width, 4000, 1), dq = weights(nv, 4001, 1e-2),
+                dv = weights(nv, 4002, 1);
+  Numbers dn = weights(numbers, 4003, 1), rows(std::size_t(parameter_rows(task->model())));
+  for (std::size_t k = 0; k < numbers; ++k) dn[k] *= parameters.infos()[k].value;
+  parameters.spread(dn, rollout.batch(), 0, rows);
+  const auto dot = [](const Numbers& a, const Numbers& b) {
+    return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+  };
+  const auto observed = [&](const TaskView& view, const ViewTangent& change) {
+    return testing::observed_change(*task, view, change);
+  };
+  tangent.start(dq, dv);
+  double forward = dot(to_q, dq) + dot(to_v, dv);
+  if (!opens) {
+    const ViewTangent change = tangent.seen_at_start(rows);
+    forward += dot(by_o(0), observed(tangent.start_view(), change));
+  }
+  for (std::size_t t = 0; t < n; ++t) {
+    forward += by_r(t + 1)[0] * tangent.take(std::span(da).subspan(t * width, width), rows);
+    forward += dot(by_o(t + 1), observed(tangent.view(), tangent.seen()));
+    forward +=
+        dot(by_q(t + 1), tangent.seen().q.back()) + dot(by_v(t + 1), tangent.seen().v.back());
+  }
+  const double parts[] = {dot(by_action, da), dot(first_q, dq), dot(first_v, dv),
+                          dot(by_number, dn)};
+  double back = 0, size = 0;
+  for (const double part : parts) back += part, size += std::abs(part);
+  EXPECT_NEAR(forward, back, 1e-8 * size) << "by actions " << parts[0] << ", q " << parts[1]
+                                          << ", v " << parts[2] << ", numbers " << parts[3];
+  EXPECT_NE(parts[0], 0);
+  EXPECT_NE(parts[3], 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Tasks, EveryTape,
+    ::testing::Values(TapeCase{"dummy", 20}, TapeCase{"ball_rolling_small", 20},
+                      TapeCase{"box_pushing", 20}, TapeCase{"box_pushing_privileged", 12},
+                      TapeCase{"box_pushing_reduced", 12}, TapeCase{"cap_opening", 8},
+                      TapeCase{"cap_opening_blind", 8}, TapeCase{"stable_grasp", 2},
+                      TapeCase{"insertion", 3}, TapeCase{"insertion_translation", 2},
+                      TapeCase{"insertion_rotation", 2}),
+    [](const auto& given) { return std::string(given.param.task); });
+
+}  // namespace
+}  // namespace tangere
