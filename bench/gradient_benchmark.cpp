@@ -239,13 +239,13 @@ void BM_ClosedLoop(benchmark::State& state, const char* name) {
 }
 BENCHMARK_CAPTURE(BM_ClosedLoop, box_pushing, "box_pushing")
     ->Unit(benchmark::kMillisecond)
-    ->Iterations(10);
+    ->Iterations(20);
 BENCHMARK_CAPTURE(BM_ClosedLoop, box_pushing_reduced, "box_pushing_reduced")
     ->Unit(benchmark::kMillisecond)
-    ->Iterations(10);
+    ->Iterations(20);
 BENCHMARK_CAPTURE(BM_ClosedLoop, cap_opening, "cap_opening")
     ->Unit(benchmark::kMillisecond)
-    ->Iterations(10);
+    ->Iterations(20);
 
 /// Returns processor time per point of the touched tiles [ns], best of several runs.
 template <class F>

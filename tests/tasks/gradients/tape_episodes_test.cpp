@@ -369,6 +369,18 @@ TEST(TapeEpisodes, AnActionBeyondItsBoundsHasNoDerivativeOnTape) {
   EXPECT_EQ(by_action[2], 0);
 }
 
+TEST(TapeEpisodes, MemoryGrowsByBlocksUpToTheLimitOfTapes) {
+  const auto task = task_named("box_pushing");
+  const double sixteen = TaskTape::bytes(*task, 16, tape_options(100)),
+               many = TaskTape::bytes(*task, 160, tape_options(100)),
+               fewer_actions = TaskTape::bytes(*task, 160, tape_options(10)),
+               limited = TaskTape::bytes(*task, 160, tape_options(100, 1, 4e6));
+  EXPECT_NEAR(many, 10 * sixteen, 1);
+  EXPECT_LT(limited, many);
+  EXPECT_LT(fewer_actions, many);
+  EXPECT_GT(many, 160 * 100 * 5 * 8.0 * (task->model().nq() + task->model().nv())) << "the states";
+}
+
 void expect_refusal(const std::function<void()>& call, const std::string& part) {
   try {
     call();
