@@ -20,6 +20,7 @@
 
 #include "engine/base/as_size.hpp"
 #include "engine/base/error.hpp"
+#include "engine/base/precision.hpp"
 
 namespace tangere::python {
 
@@ -95,6 +96,9 @@ std::vector<T> rows_of(const Argument<T>& array, std::size_t rows, std::size_t w
 /// Threads of a `threads` argument: as many as the process may use, for None.
 int threads_of(const std::optional<int>& asked);
 
+/// The precision of that name. Throws InputError for another name than "mixed" and "double".
+Precision precision_named(const std::string& name);
+
 /// An object that one Python thread uses at a time. The GIL is free while it works, so another
 /// thread could come in. It is refused with InputError.
 class InUse {
@@ -122,6 +126,7 @@ void add_scenes(nb::module_& m);
 void add_batches(nb::module_& m);
 void add_tasks(nb::module_& m);
 void add_environments(nb::module_& m);
+void add_tapes(nb::module_& m);
 
 }  // namespace tangere::python
 

@@ -261,11 +261,7 @@ void add_batches(nb::module_& m) {
              std::int64_t first_episode, const std::optional<int>& threads,
              const std::string& precision, const std::optional<double>& timestep,
              const std::optional<double>& tolerance) {
-            if (precision != "mixed" && precision != "double")
-              throw InputError(
-                  fmt::format("precision '{}'; expected 'mixed' or 'double'", precision));
-            BatchOptions options{seed, first_episode, threads,
-                                 precision == "mixed" ? Precision::mixed : Precision::f64, {}};
+            BatchOptions options{seed, first_episode, threads, precision_named(precision), {}};
             options.stepper.timestep = timestep;
             options.stepper.tolerance = tolerance;
             new (self) PythonBatch(model, envs, options);

@@ -14,6 +14,12 @@ int threads_of(const std::optional<int>& asked) {
   return asked ? *asked : tbb::info::default_concurrency();
 }
 
+Precision precision_named(const std::string& name) {
+  if (name != "mixed" && name != "double")
+    throw InputError(fmt::format("precision '{}'; expected 'mixed' or 'double'", name));
+  return name == "mixed" ? Precision::mixed : Precision::f64;
+}
+
 }  // namespace tangere::python
 
 NB_MODULE(_core, m) {
@@ -31,4 +37,5 @@ NB_MODULE(_core, m) {
   add_batches(m);
   add_tasks(m);
   add_environments(m);
+  add_tapes(m);
 }

@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Gradients through simulation in PyTorch: policies are trained through time.
+
+    tape = tangere.torch.Tape("box_pushing", num_envs=64)
+    obs = tape.reset(seed=1)
+    total = 0
+    for t in range(100):
+        obs, reward, alive = tape.step(torch.tanh(policy(obs)))
+        total = total + reward
+    (-total.mean()).backward()
+
+The derivatives are analytic (docs/gradients.md). Draws, resets and which point is touched count as
+given. `import tangere` does not import this module; it needs PyTorch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from . import _core
+from .gym import task_scene
+
+Observations = "torch.Tensor | dict[str, torch.Tensor]"
+
+
+class Tape:
+    """A batch of episodes of one task, recorded for the way back.
+
+    Parameters
+    ----------
+    task: a name of `tangere.task_names()`.
+    num_envs: E; environment e plays episode first_episode + e of a seed, once.
+    actions: of an episode, at most; None for the task's horizon.
+    threads: None for all cores. Training scripts should also call torch.set_num_threads(1).
+    normalise: observations are divided by their scales, as in `tangere.make_vec`.
+    flatten: observations as one tensor (E, n) instead of a dict of (E, …).
+    precision: of tactile fields, "mixed" or "double".
+    tape_bytes: limit for the tapes [bytes]. Longer episodes are played again from checkpoints.
+    dtype: of observations. Actions may have any floating type.
+    """
+
+    def __init__(
+        self,
+        task: str,
+        num_envs: int,
+        actions: int | None = None,
+        *,
+        threads: int | None = None,
+        normalise: bool = True,
+        flatten: bool = False,
+        precision: str = "mixed",
+        tape_bytes: float = 1e9,
+        dtype: torch.dtype = torch.float32,
+        scene: _core.Scene | None = None,
+    ):
+        self.num_envs, self.flatten, self.dtype = num_envs, flatten, dtype
+        self.tape = _core.TaskTape(
+            task,
+            scene or task_scene(task),
+            num_envs,
+            actions or 0,
+            threads=threads,
+            scaled=normalise,
+            precision=precision,
+            tape_bytes=tape_bytes,
+        )
+        self.spec = self.tape.spec
+        self.actions = actions or self.spec.horizon
+        self._token: torch.Tensor | None = None
+        self._run = _Run(self.tape)
+
+    def reset(self, seed: int = 0, first_episode: int = 0) -> Observations:
+        """Starts the episodes; returns the first observations, which have no derivative."""
+        self.tape.reset(seed, first_episode)
+        self._run = _Run(self.tape)
+        self._token = torch.zeros((), dtype=torch.float64)
+        return self._split(torch.from_numpy(self.tape.observations()).to(self.dtype))
+
+    def step(self, actions: torch.Tensor) -> tuple[Observations, torch.Tensor, torch.Tensor]:
+        """Takes one action (E, na) of every environment; one call for the whole batch.
+
+        Returns observations, rewards (E) float64 (0 where the episode had ended) and alive (E)
+        bool, whether the action was taken. Observations and rewards are differentiable by this and
+        all earlier actions. Raises InputError as `tangere.TaskTape.step` does.
+        """
+        if self._token is None:
+            raise _core.InputError("step() without episodes; call reset() first")
+        rows, reward, self._token = _Step.apply(actions, self._token, self._run, self.dtype)
+        return self._split(rows), reward, torch.from_numpy(self.tape.alive())
+
+    @property
+    def success(self) -> torch.Tensor:
+        """(E) bool."""
+        return torch.from_numpy(self.tape.success())
+
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        """q (E, nq) and v (E, nv) now, without derivatives."""
+        return self.tape.q(), self.tape.v()
+
+    def _split(self, rows: torch.Tensor) -> Observations:
+        if self.flatten:
+            return rows
+        parts = torch.split(rows, [int(np.prod(t.shape)) for t in self.spec.observations], dim=1)
+        return {
+            t.name: part.reshape(self.num_envs, *t.shape)
+            for t, part in zip(self.spec.observations, parts)
+        }
+
+
+class _Run:
+    """One pass over a tape, and the order in which its steps may be reversed."""
+
+    def __init__(self, tape: _core.TaskTape):
+        self.tape, self.taken, self.left = tape, 0, None
+
+    def reverse(self, step: int, by_rows: np.ndarray, by_reward: np.ndarray) -> np.ndarray:
+        if self.tape.taken != self.taken:
+            raise _core.InputError("backward() through a tape that was reset; call it before reset()")
+        if self.left is not None and step == self.taken - 1:
+            self.tape.begin_reverse()  # a second backward, with retain_graph
+            self.left = None
+        left = self.taken if self.left is None else self.left
+        for _ in range(left - 1 - step):  # later steps on which the loss does not hang
+            self.tape.reverse(np.zeros_like(by_rows), np.zeros_like(by_reward))
+        self.left = step
+        return self.tape.reverse(by_rows, by_reward)
+
+
+class _Step(torch.autograd.Function):
+    """One action. A token passes from step to step, so that backward takes them in order."""
+
+    @staticmethod
+    def forward(ctx, actions, token, run, dtype):
+        run.tape.step(actions.detach().cpu().numpy())
+        ctx.run, ctx.step, ctx.dtype = run, run.taken, actions.dtype
+        run.taken += 1
+        rows = torch.from_numpy(run.tape.observations()).to(dtype)
+        return rows, torch.from_numpy(run.tape.rewards()), token.clone()
+
+    @staticmethod
+    def backward(ctx, by_rows, by_reward, by_token):
+        by_action = ctx.run.reverse(
+            ctx.step, by_rows.to(torch.float64).numpy(), by_reward.to(torch.float64).numpy()
+        )
+        return torch.from_numpy(by_action).to(ctx.dtype), by_token, None, None
+
+
+@dataclass
+class Rollout:
+    """What `rollout` returns. Rewards and observations are differentiable by the actions."""
+
+    rewards: torch.Tensor  #: (E, A) float64
+    observations: dict[str, torch.Tensor]  #: KEY → (E, A + 1, …)
+    alive: torch.Tensor  #: (E, A) bool
+    success: torch.Tensor  #: (E) bool
+
+
+def rollout(
+    task: str,
+    actions: torch.Tensor,
+    *,
+    seed: int = 0,
+    first_episode: int = 0,
+    threads: int | None = None,
+    normalise: bool = True,
+    dtype: torch.dtype = torch.float32,
+) -> Rollout:
+    """Plays E episodes with the actions (E, A, na) and returns all that they show."""
+    if actions.ndim != 3:
+        raise _core.InputError(f"actions of shape {tuple(actions.shape)}; expected (E, A, na)")
+    tape = Tape(task, len(actions), actions.shape[1], threads=threads, normalise=normalise, dtype=dtype)
+    seen, rewards, alive = [tape.reset(seed, first_episode)], [], []
+    for t in range(actions.shape[1]):
+        obs, reward, taken = tape.step(actions[:, t])
+        seen.append(obs)
+        rewards.append(reward)
+        alive.append(taken)
+    return Rollout(
+        torch.stack(rewards, 1),
+        {key: torch.stack([obs[key] for obs in seen], 1) for key in seen[0]},
+        torch.stack(alive, 1),
+        tape.success,
+    )
+
+
+@dataclass
+class Check:
+    """How a gradient along one direction compares with differences."""
+
+    direction: int
+    analytic: float
+    difference: float
+    step: float  #: of the difference
+    error: float  #: |analytic - difference| / max(|analytic|, |difference|)
+
+
+def gradcheck(
+    task: str,
+    policy: torch.nn.Module,
+    *,
+    actions: int = 10,
+    num_envs: int = 4,
+    seed: int = 0,
+    directions: int = 3,
+    steps: tuple[float, ...] = (1e-5, 1e-6, 1e-7, 1e-8),
+) -> list[Check]:
+    """Compares the derivative of the mean return by a policy's weights with differences.
+
+    `policy` maps flattened observations (E, n) to actions (E, na), in float64. Each direction is a
+    random one in the space of all weights; of the `steps` the best one counts, because contacts
+    have kinks that large steps cross and small steps lose digits. Weights are left as they were.
+    """
+    policy = policy.double()
+    weights = list(policy.parameters())
+
+    def mean_return() -> torch.Tensor:
+        tape = Tape(task, num_envs, actions, flatten=True, precision="double", dtype=torch.float64)
+        obs, total = tape.reset(seed), torch.zeros(num_envs, dtype=torch.float64)
+        for _ in range(actions):
+            obs, reward, _ = tape.step(policy(obs))
+            total = total + reward
+        return total.mean()
+
+    gradient = torch.autograd.grad(mean_return(), weights)
+    generator = torch.Generator().manual_seed(seed)
+    checks = []
+    for k in range(directions):
+        along = [torch.randn(w.shape, generator=generator, dtype=w.dtype) for w in weights]
+        analytic = float(sum((g * d).sum() for g, d in zip(gradient, along)))
+        best = None
+        for step in steps:
+            values = []
+            for sign in (1, -2, 1):
+                with torch.no_grad():
+                    for w, d in zip(weights, along):
+                        w += sign * step * d
+                    values.append(float(mean_return()))
+            difference = (values[0] - values[1]) / (2 * step)
+            error = abs(analytic - difference) / max(abs(analytic), abs(difference), 1e-300)
+            if best is None or error < best.error:
+                best = Check(k, analytic, difference, step, error)
+        checks.append(best)
+    return checks
