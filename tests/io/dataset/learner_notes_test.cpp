@@ -21,10 +21,10 @@ DatasetLayout of_task() {
   DatasetLayout l = dataset_layout(20);
   TaskSpec task;
   task.name = "box_pushing_privileged";
-  task.action = {"u", {2}, "1", "controls"};
+  task.action = {"u", {2}, "1", "controls", {}};
   task.observations = {{"goal", {3}, "m m rad", "goal", {0.1, 0.1, 0.3}},
                        {"tactile", {3, 4, 3}, "N", "field", {0.5}},
-                       {"box", {3}, "m m rad", "box"}};
+                       {"box", {3}, "m m rad", "box", {}}};
   task.observations.back().privileged = true;
   l.task = task;
   l.played_by = {"scripted", {"scripted"}, 0, 0};
