@@ -18,7 +18,6 @@ namespace {
 
 using h5::Bytes;
 
-constexpr std::int64_t kMostPolicies = 16;   // that a data set may name
 constexpr std::int64_t kMostRows = 1 << 26;  // of a demo; a claim becomes that many bytes
 
 /// "/data/demo_3/obs/pad".
@@ -123,6 +122,8 @@ DemoMembers members_of(const h5::Id& demo) {
   members.actions = array_of(demo, "actions");
   const std::vector<std::string> said = h5::attribute_names(demo);
   members.of_task = std::binary_search(said.begin(), said.end(), "terminated");
+  if (members.of_task)
+    members.policies = std::ssize(h5::read_texts(h5::open_group(demo, "/scene"), "policies"));
   members.varies = std::binary_search(said.begin(), said.end(), "randomized");
   return members;
 }
@@ -138,8 +139,9 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
   if (members.of_task) {
     const double total = h5::read_number<double>(demo, "return");
     const auto policy = h5::read_number<std::int64_t>(demo, "policy");
-    if (policy < 0 || policy >= kMostPolicies)
-      throw IoError(fmt::format("its 'policy' is {}; expected 0 to {}", policy, kMostPolicies - 1));
+    if (policy < 0 || policy >= members.policies)
+      throw IoError(fmt::format("its policy is {}; expected 0 to {}, one of 'policies' in /scene",
+                                policy, members.policies - 1));
     facts.end = EpisodeEnd{facts.rows, total, flag("terminated"), flag("success"),
                            static_cast<int>(policy)};
   }

@@ -30,6 +30,7 @@ struct DemoMembers {
   DemoArray actions;
   std::vector<std::string> derivatives;  ///< grad_… and the loss, among `names`
   bool of_task = false, varies = false;
+  std::int64_t policies = 0;  ///< that played, for a task
 };
 
 /// Reads the members of a demo. Throws IoError.

@@ -196,14 +196,20 @@ TEST(GeneratePolicy, AnUnknownPlayerIsAProblem) {
   {
     const hid_t file =
         H5Fopen(folder.path("set/shard-00000.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
-    const hid_t said = H5Aopen_by_name(file, "data/demo_3", "policy", H5P_DEFAULT, H5P_DEFAULT);
+    const hid_t demo = H5Gopen2(file, "data/demo_3", H5P_DEFAULT), one = H5Screate(H5S_SCALAR);
+    EXPECT_GE(H5Adelete(demo, "policy"), 0);
+    const hid_t said = H5Acreate2(demo, "policy", H5T_STD_I64LE, one, H5P_DEFAULT, H5P_DEFAULT);
     const std::int64_t other = 2;
     EXPECT_GE(H5Awrite(said, H5T_NATIVE_INT64, &other), 0);
     H5Aclose(said);
+    H5Sclose(one);
+    H5Gclose(demo);
     H5Fclose(file);
   }
   EXPECT_THAT(run_json(folder, {"validate", "set"}, 3).at("problems").get<Words>(),
               ::testing::Contains(HasSubstr("demo_3: its policy is 2; expected 0 to 1")));
+  EXPECT_THAT(run_json(folder, {"merge", "set", "--overwrite"}, 3).at("error").get<std::string>(),
+              HasSubstr("shard-00000.h5' is damaged: demo_3: its policy is 2; expected 0 to 1"));
 }
 
 TEST(GeneratePolicy, WhatCannotBeVariedIsAnError) {

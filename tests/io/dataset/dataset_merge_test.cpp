@@ -161,9 +161,10 @@ TEST(DatasetMerge, RefusesAnIdThatIsNone) {
       const hid_t scene = H5Gopen2(file, "scene", H5P_DEFAULT);
       EXPECT_GE(H5Adelete(scene, "dataset_id"), 0);
       const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
-      H5Tset_size(type, id.size() + 1);
+      H5Tset_size(type, H5T_VARIABLE);
       const hid_t said = H5Acreate2(scene, "dataset_id", type, space, H5P_DEFAULT, H5P_DEFAULT);
-      EXPECT_GE(H5Awrite(said, type, id.c_str()), 0);
+      const char* const text = id.c_str();
+      EXPECT_GE(H5Awrite(said, type, &text), 0);
       H5Aclose(said);
       H5Sclose(space);
       H5Tclose(type);

@@ -7,6 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/base/error.hpp"
+#include "io/dataset/dataset_merge.hpp"
+#include "io/dataset/dataset_writer.hpp"
+#include "io/dataset/shard_check.hpp"
+#include "io/hdf5/h5.hpp"
 #include "tests/io/synthetic_episodes.hpp"
 
 namespace tangere {
@@ -14,6 +18,7 @@ namespace {
 
 using nlohmann::json;
 using ::tangere::testing::dataset_layout;
+using ::tangere::testing::Folder;
 using ::testing::HasSubstr;
 
 /// A task of three observations: one scale, one for each place of the last axis, none.
@@ -82,6 +87,42 @@ TEST(LearnerNotes, IdsSayWhoPlayed) {
       EXPECT_THAT(error.what(), HasSubstr("--name " + name + ": expected at most 100 letters"));
     }
   }
+}
+
+/// 16 episodes of which 2 failed. Policy 1 played every third, and every second solved the task.
+TEST(LearnerNotes, SayWhoPlayedEachEpisodeAndWhichSolvedIt) {
+  const Folder folder;
+  DatasetLayout l = of_task();
+  l.episodes = 16;
+  l.task->observations = {{"skin", {3, 4, 3}, "N", "field", {}}};
+  l.task->success = "always";
+  l.played_by = {"scripted", {"scripted", "random"}, 0, 0.3};
+  {
+    DatasetWriter writer({folder / "set"}, l);
+    const tangere::testing::SyntheticPiece<float> piece(l, 0, 0, 4);
+    EpisodeRows rows = piece.rows();
+    const std::vector<float> rewards(std::size_t{16} * 3, 0.5F);
+    std::vector<EpisodeEnd> ends;
+    for (int e = 0; e < 16; ++e) ends.push_back({3, 1.5, false, e % 2 == 0, e % 3 == 0 ? 1 : 0});
+    rows.rewards = rewards;
+    rows.ends = ends;
+    writer.write(rows);
+    writer.finish(0, std::vector{tangere::testing::failure(3), tangere::testing::failure(4)});
+  }
+  const MergeResult merged = merge_dataset(find_dataset(folder / "set"), {});
+  EXPECT_EQ(merged.successes, 7) << "the even ones without 4";
+  EXPECT_THAT(examine_shard(merged.file).problems, ::testing::IsEmpty());
+  const h5::Id file = h5::open_file(merged.file);
+  const auto policy = [&](const std::string& path) {
+    return h5::read_number<std::int64_t>(h5::open_group(file, path), "policy");
+  };
+  for (const int e : {0, 6, 9, 12, 15}) EXPECT_EQ(policy("data/demo_" + std::to_string(e)), 1) << e;
+  for (const int e : {1, 2, 5, 14}) EXPECT_EQ(policy("data/demo_" + std::to_string(e)), 0) << e;
+  EXPECT_EQ(policy("failed/episode_3"), 1);
+  EXPECT_EQ(policy("failed/episode_4"), 0);
+  EXPECT_EQ(h5::dimensions(h5::open_dataset(file, "mask/success")), h5::Dims{7});
+  EXPECT_EQ(h5::dimensions(h5::open_dataset(file, "mask/random")), h5::Dims{5});
+  EXPECT_EQ(h5::dimensions(h5::open_dataset(file, "mask/scripted")), h5::Dims{9});
 }
 
 }  // namespace
