@@ -81,6 +81,9 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
                                     options.scene, run.episodes, run.seed, options.precision);
   if (policy.empty()) command += fmt::format(" --steps {} --every {}", run.steps, run.every);
   if (!policy.empty()) command += " --policy " + policy;
+  if (options.noise) command += fmt::format(" --noise {}", *options.noise);
+  if (!options.mix.empty()) command += " --mix " + options.mix;
+  if (!options.name.empty()) command += " --name " + options.name;
   if (!options.controls.empty()) command += " --controls " + options.controls;
   if (options.compress != "none") command += " --compress " + options.compress;
   if (options.tactile != "dense") command += " --tactile " + options.tactile;
@@ -95,12 +98,13 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
 DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
                           const Stepper& stepper, const EpisodeOptions& run, const Record& record,
                           const ProgramInfo& info, const GradientPlan& gradients,
-                          const Task* task = nullptr, const std::string& policy = {}) {
+                          const Task* task = nullptr, const PlayedBy& played_by = {}) {
   DatasetDescription description;
   if (task != nullptr) description.task = task->spec();
-  description.policy = policy;
+  description.played_by = played_by;
+  description.set_name = options.name;
   description.controls = controls_named(options.controls);
-  description.command = command_of(options, run, policy);
+  description.command = command_of(options, run, played_by.policy);
   description.shards = options.shards.value_or(0);
   description.compression = options.compress;
   description.record = task == nullptr ? record.names : split_if_any(options.record);
@@ -290,12 +294,22 @@ int make(const GenerateOptions& options, const Console& console, const Job& job)
   return report(options, console, job, done, output);
 }
 
+PolicyVariation variation_of(const GenerateOptions& options, PolicyKind kind) {
+  for (const GivenOption& option : {GivenOption{"--noise", options.noise.has_value()},
+                                    GivenOption{"--mix", !options.mix.empty()}})
+    if (option.given && kind != PolicyKind::scripted)
+      throw InputError(
+          fmt::format("{} with --policy {}; expected scripted", option.name, to_string(kind)));
+  return {options.noise.value_or(0), options.mix.empty() ? 0 : random_share_of(options.mix)};
+}
+
 int generate_task(const GenerateOptions& options, const Console& console, const ProgramInfo& info,
                   const Task& task) {
   refuse_with_task(
       task, {{"--steps", options.steps.has_value()}, {"--every", options.every.has_value()}});
   const PolicyKind kind = policy_named(options.policy, options.controls, PolicyKind::scripted);
-  const Policy policy = make_policy(task, kind, options.controls);
+  const PolicyVariation variation = variation_of(options, kind);
+  const Policy policy = make_policy(task, kind, options.controls, variation);
   Job job;
   job.run.episodes = options.episodes.value_or(0);
   job.run.every = task.spec().steps_per_action;
@@ -318,8 +332,9 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
   job.unit = "action";
   job.effects = effects_of(task.model());
-  job.layout = make_layout(options, task.model(), Stepper(task.model()), job.run, {}, info, plan,
-                           &task, to_string(kind));
+  job.layout =
+      make_layout(options, task.model(), Stepper(task.model()), job.run, {}, info, plan, &task,
+                  {to_string(kind), policy.players(), variation.noise, variation.random_share});
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
     const EpisodeSummary summary = with_gradients(plan_of(run), sink, [&](EpisodeSink& to) {
@@ -364,7 +379,9 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   if (options.gradients != "none") asked.tolerance = kGradientTolerance;
   if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return generate_task(options, console, info, *task);
-  refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()}});
+  refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()},
+                                    {"--noise", options.noise.has_value()},
+                                    {"--mix", !options.mix.empty()}});
   const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
   const Stepper stepper(model);
   const ControlProgram controls =
@@ -418,6 +435,11 @@ Command add_generate(CLI::App& program) {
   add_text(
       app, "--policy", o.policy, "NAME",
       "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
+  add_positive_number(app, "--noise", o.noise,
+                      "Standard deviation of noise on every number of a scripted action, in its "
+                      "unit [default: none]");
+  add_text(app, "--mix", o.mix, "random=SHARE",
+           "Share of the episodes that random actions play instead of the script [default: none]");
   add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
                                  "Steps of an episode [default: as many as the controls last]");
   add_whole_number<int>(
@@ -449,6 +471,8 @@ Command add_generate(CLI::App& program) {
   add_memory_size(
       app, "--tape-memory", o.tape_memory,
       "With --gradients return: memory for the states that all threads keep [default: 1GB each]");
+  add_text(app, "--name", o.name, "NAME",
+           "Last part of the data set's id for Minari [default: the policy; of a scene, none]");
   add_whole_number<std::int64_t>(
       app, "--shards", o.shards, 1, kMostEpisodes,
       "Number of shards [default: as many as keep each below a gigabyte]");

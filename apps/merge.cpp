@@ -52,6 +52,7 @@ int merge(const std::string& path, MergeOptions options, const Console& console)
                   {"demos", result.demos},
                   {"train", result.train},
                   {"valid", result.valid},
+                  {"successes", result.successes ? Json(*result.successes) : Json()},
                   {"failed_episodes", result.failed}});
   return kDone;
 }

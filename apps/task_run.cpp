@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <filesystem>
 
 #include "apps/scene_run.hpp"
@@ -53,8 +54,22 @@ PolicyKind policy_named(const std::string& name, const std::string& table, Polic
   return kind;
 }
 
-Policy make_policy(const Task& task, PolicyKind kind, const std::string& table) {
-  if (kind != PolicyKind::csv) return Policy(task, kind);
+double random_share_of(const std::string& mix) {
+  constexpr std::string_view kBegin = "random=";
+  double share = 0;
+  const char* const end = mix.data() + mix.size();
+  const bool begins = mix.starts_with(kBegin);
+  const auto [at, error] =
+      begins ? std::from_chars(mix.data() + kBegin.size(), end, share) : std::from_chars_result{};
+  if (!begins || error != std::errc() || at != end || !(share > 0 && share < 1))
+    throw InputError(
+        fmt::format("--mix {}: expected random=SHARE with a share between 0 and 1", mix));
+  return share;
+}
+
+Policy make_policy(const Task& task, PolicyKind kind, const std::string& table,
+                   const PolicyVariation& variation) {
+  if (kind != PolicyKind::csv) return Policy(task, kind, {}, variation);
   return Policy(task, kind, read_csv(table, task.spec().action.size()));
 }
 

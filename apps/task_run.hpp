@@ -21,7 +21,10 @@ std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
 /// The policy called `name`, or `fallback` if that is empty. With a table it is csv. Throws
 /// InputError for another name, for csv without a table, and for a table with another policy.
 PolicyKind policy_named(const std::string& name, const std::string& table, PolicyKind fallback);
-Policy make_policy(const Task& task, PolicyKind kind, const std::string& table);
+/// Reads --mix, as in "random=0.3": a share between 0 and 1. Throws InputError for other text.
+double random_share_of(const std::string& mix);
+Policy make_policy(const Task& task, PolicyKind kind, const std::string& table,
+                   const PolicyVariation& variation = {});
 
 /// An option that has no meaning with a task, and whether it was given. The function below throws
 /// InputError for one that was given.

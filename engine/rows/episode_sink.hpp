@@ -22,6 +22,7 @@ struct EpisodeEnd {
   double total = 0;         ///< sum of its rewards
   bool terminated = false;  ///< the task ended it; false if time ran out
   bool success = false;
+  int policy = 0;  ///< which of the run's policies played it, from 0
 };
 
 /// Derivatives that are stored beside an episode's numbers, as float64.

@@ -9,6 +9,7 @@
 #include <charconv>
 #include <sstream>
 
+#include "io/dataset/learner_notes.hpp"
 #include "io/hdf5/h5_listing.hpp"
 #include "io/trajectory/sensor_description.hpp"
 
@@ -27,8 +28,13 @@ void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
     return;
   }
   const TaskSpec& task = *layout.task;
+  const PlayedBy& by = layout.played_by;
+  const std::vector<std::string> players = by.players.empty() ? std::vector{by.policy} : by.players;
   h5::write_attribute(scene, "task", task.name);
-  h5::write_attribute(scene, "policy", layout.policy);
+  h5::write_attribute(scene, "policy", by.policy);
+  h5::write_attribute(scene, "policies", std::span<const std::string>(players));
+  h5::write_scalar<double>(scene, "policy_noise", by.noise);
+  h5::write_scalar<double>(scene, "policy_random_share", by.random_share);
   h5::write_attribute(scene, "success", task.success);
   h5::write_attribute(scene, "action_unit", task.action.unit);
   h5::write_attribute(scene, "action_meaning", task.action.meaning);
@@ -50,6 +56,7 @@ void describe_task(const h5::Id& scene, const DatasetLayout& layout) {
 
 void describe_run(const h5::Id& scene, const DatasetLayout& layout) {
   h5::write_attribute(scene, "name", layout.scene_name);
+  h5::write_attribute(scene, "dataset_id", layout.dataset_id());
   h5::write_attribute(scene, "text", layout.scene_text);
   h5::write_attribute(scene, "tables", layout.tables);
   h5::write_attribute(scene, "controls", layout.controls);
@@ -84,6 +91,8 @@ void describe_numbers(const h5::Id& scene, const DatasetLayout& layout) {
     texts("randomized_names", layout.randomized_names);
     texts("randomized_units", layout.randomized_units);
   }
+  h5::write_attribute(scene, "observation_scale", observation_scale(layout));
+  h5::write_attribute(scene, "privileged", privileged_observations(layout));
   describe_task(scene, layout);
   if (!layout.task && !layout.end_effector_names.empty()) {
     texts("variable_names", layout.end_effector_names);

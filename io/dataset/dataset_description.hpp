@@ -13,7 +13,7 @@
 namespace tangere {
 
 /// `format_version` of shards: written, and required in checks and merges.
-inline constexpr std::int64_t kDatasetFormat = 3;
+inline constexpr std::int64_t kDatasetFormat = 4;
 /// `format` of all of them.
 inline constexpr const char* kFormatName = "tangere dataset";
 

@@ -36,6 +36,19 @@ bool is_shard(const std::string& name, const std::string& suffix) {
                      [](char c) { return c >= '0' && c <= '9'; });
 }
 
+/// Places of views for Minari: NAME-v0 and TASK/NAME-v0 below the folder, which may be missing.
+std::vector<fs::path> views_in(const fs::path& folder) {
+  std::vector<fs::path> views;
+  std::error_code none_there;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, none_there)) {
+    views.push_back(entry.path());
+    if (entry.is_symlink()) continue;
+    for (const fs::directory_entry& inner : fs::directory_iterator(entry.path(), none_there))
+      if (!inner.is_symlink() && inner.path().filename() != "data") views.push_back(inner.path());
+  }
+  return views;
+}
+
 }  // namespace
 
 DatasetFolder::DatasetFolder(std::string path, ExistingShards existing, bool shared,
@@ -112,12 +125,10 @@ std::vector<std::string> DatasetFolder::files_ending(const std::string& suffix) 
 /// exist. robomimic's file comes last.
 std::vector<std::string> DatasetFolder::merged_files(const std::string& suffix) const {
   std::vector<std::string> files;
-  std::error_code none_there;
-  for (const fs::directory_entry& entry :
-       fs::directory_iterator(fs::path(path_) / "minari" / "tangere", none_there))
+  for (const fs::path& view : views_in(fs::path(path_) / "minari" / "tangere"))
     for (const char* name :
          {"main_data.hdf5", "metadata.json"})  // removed first: without it there is no data set
-      files.push_back((entry.path() / "data" / name).string());
+      files.push_back((view / "data" / name).string());
   files.push_back((fs::path(path_) / "robomimic.hdf5").string());
   for (std::string& file : files) file += suffix;
   std::erase_if(files, [](const std::string& file) { return !fs::is_regular_file(file); });
@@ -150,9 +161,8 @@ void DatasetFolder::remove_old_shards(std::int64_t count) {
       fail("remove", file, errno);  // gone: other processes that share it remove it, too
   const fs::path views = fs::path(path_) / "minari" / "tangere";
   std::vector<fs::path> emptied;
-  std::error_code none_there;
-  for (const fs::directory_entry& entry : fs::directory_iterator(views, none_there))
-    emptied.insert(emptied.end(), {entry.path() / "data", entry.path()});
+  for (const fs::path& view : views_in(views))
+    emptied.insert(emptied.end(), {view / "data", view, view.parent_path()});
   emptied.insert(emptied.end(), {views, views.parent_path()});
   for (const fs::path& folder : emptied) rmdir(folder.c_str());  // fails if it is not empty
 }

@@ -40,6 +40,25 @@ void check_lengths(const std::vector<std::string>& observations) {
                     observations.size(), bytes, kAll));
 }
 
+/// Whether Minari accepts a character in a name.
+bool fits_minari(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+         c == '_';
+}
+
+std::string fitted(std::string name) {
+  for (char& c : name)
+    if (!fits_minari(c)) c = '-';
+  return name.empty() ? "dataset" : name;
+}
+
+void check_set_name(const std::string& name) {
+  constexpr std::size_t kLongest = 100;
+  if (name.size() > kLongest || !std::all_of(name.begin(), name.end(), fits_minari))
+    throw InputError(fmt::format("--name {}: expected at most {} letters, digits, - and _",
+                                 name.substr(0, kLongest), kLongest));
+}
+
 template <class T>
 std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>& places) {
   std::vector<T> some;
@@ -48,6 +67,15 @@ std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>&
 }
 
 }  // namespace
+
+std::string DatasetLayout::dataset_id() const {
+  std::string name = set_name;
+  if (name.empty() && task)
+    name = fmt::format("{}{}{}", fitted(played_by.policy), played_by.noise > 0 ? "-noise" : "",
+                       played_by.random_share > 0 ? "-random" : "");
+  return fmt::format("tangere/{}{}{}-v0", fitted(task ? task->name : scene_name),
+                     name.empty() ? "" : "/", name);
+}
 
 std::vector<std::string> DatasetLayout::action_names() const {
   if (!task) return u_names;
@@ -139,6 +167,7 @@ std::int64_t DatasetLayout::shard_of(std::int64_t episode) const {
 
 void DatasetLayout::check() const {
   check_outputs(fields, sensors.size());
+  check_set_name(set_name);
   if (shards > blocks_of(episodes))
     throw InputError(
         fmt::format("{} shards of {} episodes; expected at most {}, one for each block of {}",

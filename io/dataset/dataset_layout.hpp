@@ -26,6 +26,14 @@ struct Setting {
 /// Shards that a data set has at most: a damaged count must not fill the memory.
 constexpr std::int64_t kMostShards = 1'000'000;
 
+/// Who plays the episodes of a task.
+struct PlayedBy {
+  std::string policy;                ///< as it was asked for: "scripted"
+  std::vector<std::string> players;  ///< those that EpisodeEnd::policy counts; none: the policy
+  double noise = 0;         ///< standard deviation of what is added to actions, in their unit
+  double random_share = 0;  ///< share of the episodes that the random policy plays
+};
+
 struct DatasetLayout {
   std::int64_t episodes = 0;  ///< N, of all shards
   std::int64_t steps = 0;     ///< of an episode
@@ -40,7 +48,8 @@ struct DatasetLayout {
   std::vector<FieldOutput> fields;  ///< what a scene's episodes hold of them
   std::vector<std::string> randomized_names, randomized_units;  ///< what varies between episodes
   std::optional<TaskSpec> task;  ///< defines actions, observations and rewards; none: only a scene
-  std::string policy;            ///< of a task
+  PlayedBy played_by;            ///< of a task
+  std::string set_name;          ///< the part of dataset_id() that is asked for; none: as below
   std::string scene_name, scene_text;
   std::string tables = "none";  ///< checksum of the files that the text refers to
   std::string integrator;
@@ -59,6 +68,10 @@ struct DatasetLayout {
   std::string gradients_of;         ///< the quantity that derivatives are of, in words; empty: none
   std::vector<GradientArray> gradients;  ///< those stored with an episode
 
+  /// The data set's name for Minari: "tangere/TASK/NAME-v0", where NAME is set_name, or else the
+  /// policy with "-noise" and "-random" as they apply; "tangere/SCENE-v0" for a scene alone,
+  /// "tangere/SCENE/NAME-v0" if it has a set_name. Characters that Minari refuses become "-".
+  [[nodiscard]] std::string dataset_id() const;
   /// R: actions of an episode, for a task at most.
   [[nodiscard]] std::int64_t rows() const { return steps / every; }
   /// Names of the numbers of an action.
@@ -81,8 +94,9 @@ struct DatasetLayout {
   /// most one.
   [[nodiscard]] EpisodeRange shard_episodes(std::int64_t shard) const;
   [[nodiscard]] std::int64_t shard_of(std::int64_t episode) const;
-  /// Throws InputError when a sensor's name cannot be a name in a file, when there are more shards
-  /// than blocks or than kMostShards, or when an observation to record does not exist.
+  /// Throws InputError when a sensor's name cannot be a name in a file, when set_name has characters
+  /// that Minari refuses, when there are more shards than blocks or than kMostShards, or when an
+  /// observation to record does not exist.
   void check() const;
 };
 
@@ -94,7 +108,8 @@ struct DatasetDescription {
   bool single = false;  ///< observations are float32
   std::string precision, version, instruction_set;
   std::optional<TaskSpec> task;
-  std::string policy, controls, command;
+  PlayedBy played_by;
+  std::string set_name, controls, command;
   std::int64_t shards = 0;
   std::string compression = "none";
   std::string gradients_of;

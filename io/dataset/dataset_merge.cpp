@@ -35,6 +35,13 @@ std::uint64_t scramble(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
+/// What decides in which masks a demo is.
+struct MaskedDemo {
+  std::int64_t number = 0;
+  std::optional<EpisodeEnd> end;  // of a task
+  bool valid = false;
+};
+
 /// Writes both; numbers stay where they are unless they are to be copied.
 class Merger {
  public:
@@ -63,7 +70,7 @@ class Merger {
     result_.bytes = file_.commit([this](const std::string& part) {
       check_stop();
       if (options_.copy) check_copy(part);
-      if (view_) view_->commit();
+      if (view_) view_->commit(options_.copy ? fs::file_size(part) : shard_bytes_);
     });
     result_.file = file_.output();
     if (view_) {  // without a demo there is none: Minari has no way to say that there is nothing
@@ -93,6 +100,9 @@ class Merger {
     h5::write_scalar<std::int64_t>(file_.file(), "first_episode", 0);
     h5::write_scalar<std::int64_t>(file_.file(), "episodes", number("dataset_episodes"));
     few_each_ = number("dataset_episodes") <= kFewEpisodes * std::ssize(dataset_.files);
+    const h5::Id scene = h5::open_group(from, "scene");
+    if (!h5::read_text(scene, "task").starts_with("none"))
+      policies_ = h5::read_texts(scene, "policies");
     env_args_ = h5::read_text(h5::open_group(from, "data"), "env_args");
     h5::copy_group(from, "scene", file_.file(), "scene");
   }
@@ -110,6 +120,7 @@ class Merger {
 
   void add(const std::string& shard) {
     sample_shard(shard);
+    shard_bytes_ += fs::file_size(shard);
     const h5::Id from = h5::open_file(shard, !options_.copy && few_each_);
     const h5::Id data = h5::open_group(from, "data"), failed = h5::open_group(from, "failed");
     const std::string name = fs::path(shard).filename();
@@ -117,7 +128,7 @@ class Merger {
     for (const std::int64_t number : demo_numbers(data)) {
       check_stop();
       batch.push_back(described(shard, data, number));
-      demos_.push_back(number);
+      demos_.push_back({number, batch.back().facts.end});
       if (batch.size() == kBatch) put(data, name, batch);
     }
     put(data, name, batch);
@@ -198,23 +209,35 @@ class Merger {
     result_.failed = std::ssize(failed_);
   }
 
+  /// Filter keys of robomimic: demos to train on and to validate, those that solved the task, and, if
+  /// several policies played, the demos of each.
   void write_masks() {
-    std::vector<std::pair<std::uint64_t, std::int64_t>> order;
-    for (const std::int64_t demo : demos_)
-      order.emplace_back(scramble(static_cast<std::uint64_t>(demo)), demo);
+    std::vector<std::pair<std::uint64_t, std::size_t>> order;
+    for (std::size_t i = 0; i < demos_.size(); ++i)
+      order.emplace_back(scramble(static_cast<std::uint64_t>(demos_[i].number)), i);
     std::sort(order.begin(), order.end());
     const std::size_t few =
         order.size() < 2 ? 0 : std::max<std::size_t>(1, order.size() / kValidShare);
-    std::vector<std::int64_t> valid, train;
-    for (std::size_t i = 0; i < order.size(); ++i)
-      (i < few ? valid : train).push_back(order[i].second);
+    for (std::size_t i = 0; i < few; ++i) demos_[order[i].second].valid = true;
     const h5::Id masks = h5::create_group(file_.file(), "mask");
-    for (auto* list : {&train, &valid}) {
-      std::sort(list->begin(), list->end());
-      h5::write_names(masks, list == &train ? "train" : "valid", "demo_", *list);
-    }
-    result_.train = static_cast<std::int64_t>(train.size());
-    result_.valid = static_cast<std::int64_t>(valid.size());
+    const auto write = [&](const std::string& name, const auto& has) {
+      std::vector<std::int64_t> list;
+      for (const MaskedDemo& demo : demos_)
+        if (has(demo)) list.push_back(demo.number);
+      h5::write_names(masks, name, "demo_", list);
+      return std::ssize(list);
+    };
+    const auto solved = [](const MaskedDemo& demo) { return demo.end->success; };
+    result_.train = write("train", [](const MaskedDemo& demo) { return !demo.valid; });
+    result_.valid = write("valid", [](const MaskedDemo& demo) { return demo.valid; });
+    if (policies_.empty()) return;
+    result_.successes = write("success", solved);
+    write("train_success", [&](const MaskedDemo& demo) { return !demo.valid && solved(demo); });
+    write("valid_success", [&](const MaskedDemo& demo) { return demo.valid && solved(demo); });
+    for (std::size_t k = 0; k < policies_.size() && policies_.size() > 1; ++k)
+      write(policies_[k], [k](const MaskedDemo& demo) {
+        return static_cast<std::size_t>(demo.end->policy) == k;
+      });
   }
 
   const DatasetFiles& dataset_;
@@ -225,11 +248,12 @@ class Merger {
   bool few_each_ = false;  // episodes in a shard
   std::optional<DemoMembers> members_;
   std::optional<MinariView> view_;
-  std::vector<std::int64_t> demos_;                          // their numbers
+  std::vector<MaskedDemo> demos_;                            // ascending
+  std::vector<std::string> policies_;                        // of a task
   std::vector<h5::FileMember> linked_;                       // groups of demos
   std::vector<std::pair<std::string, std::string>> failed_;  // shard, episode
   std::int64_t rows_ = 0;
-  std::uint64_t sum_ = 0;
+  std::uint64_t sum_ = 0, shard_bytes_ = 0;
   MergeResult result_;
 };
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,12 +21,13 @@ struct MergeOptions {
 
 struct MergeResult {
   std::string file;       ///< FOLDER/robomimic.hdf5
-  std::string minari;     ///< FOLDER/minari/tangere/NAME-v0; FOLDER/minari is a root for Minari
-  std::string minari_id;  ///< tangere/NAME-v0
+  std::string minari;     ///< FOLDER/minari/<minari_id>; FOLDER/minari is a root for Minari
+  std::string minari_id;  ///< `dataset_id` of /scene: tangere/NAME-v0, tangere/TASK/NAME-v0
   std::vector<std::string> minari_left_out;  ///< observations too large for Minari's metadata
   std::int64_t demos = 0, failed = 0, train = 0, valid = 0;
-  std::uint64_t bytes = 0;  ///< of the file
-  bool stopped = false;     ///< nothing was written, all else is empty
+  std::optional<std::int64_t> successes;  ///< demos that solved their task; none for a scene alone
+  std::uint64_t bytes = 0;                ///< of the file
+  bool stopped = false;                   ///< nothing was written, all else is empty
 };
 
 /// Merges a folder's shards. Opens every member that it links, reads all numbers that it copies.

@@ -23,11 +23,13 @@ DemoAttributes::DemoAttributes(const DemoFacts& facts) : samples_(bytes_of_numbe
   total_ = bytes_of_number(end.total);
   terminated_ = bytes_of_number<std::int8_t>(end.terminated ? 1 : 0);
   success_ = bytes_of_number<std::int8_t>(end.success ? 1 : 0);
+  policy_ = bytes_of_number<std::int64_t>(end.policy);
   all_.push_back({"num_samples", h5::NumberType::int64, false, samples_});
   if (facts.end) {
     all_.push_back({"return", h5::NumberType::float64, false, total_});
     all_.push_back({"terminated", h5::NumberType::int8, false, terminated_});
     all_.push_back({"success", h5::NumberType::int8, false, success_});
+    all_.push_back({"policy", h5::NumberType::int64, false, policy_});
   }
   const std::span randomized(reinterpret_cast<const unsigned char*>(facts.randomized.data()),
                              facts.randomized.size() * sizeof(double));

@@ -32,7 +32,7 @@ class DemoAttributes {
   [[nodiscard]] std::span<const h5::FileAttribute> all() const { return all_; }
 
  private:
-  std::array<unsigned char, 8> samples_, total_;
+  std::array<unsigned char, 8> samples_, total_, policy_;
   std::array<unsigned char, 1> terminated_, success_;
   std::vector<h5::FileAttribute> all_;
 };

@@ -40,27 +40,32 @@ bool has_numbers(const DemoArray& array) {
 class ShownObservations {
  public:
   /// `skipped`: rows of obs to leave out before final_obs follows. Appends the contents.
-  ShownObservations(Bytes& out, std::uint64_t base, const DemoMembers& members,
+  ShownObservations(Bytes& out, std::uint64_t base, std::span<const DemoArray> arrays,
                     std::string_view file, std::span<const LinkedDemo> demos, std::uint64_t skipped)
-      : out_(out), base_(base), members_(members), skipped_(skipped) {
+      : out_(out), base_(base), arrays_(arrays), skipped_(skipped) {
     std::vector<std::string> texts;
     for (const LinkedDemo& demo : demos)
-      for (const DemoArray& array : members.observations)
+      for (const DemoArray& array : arrays)
         if (has_numbers(array)) texts.push_back(text(file, demo, array));
     out.align();
     texts_ = base + out.size();
     h5::add_texts(out, std::vector<std::string_view>(texts.begin(), texts.end()));
   }
 
-  /// Appends the group of the next demo. Returns its address.
-  std::uint64_t add(const DemoFacts& facts) {
+  /// Appends the datasets of the next demo. Returns links to them.
+  std::vector<h5::FileLink> add(const DemoFacts& facts) {
     std::vector<h5::FileLink> links;
-    for (const DemoArray& array : members_.observations) {
+    for (const DemoArray& array : arrays_) {
       links.push_back({array.name, base_ + out_.size()});
       h5::FileDataset dataset{array.type, dims_of(rows(facts), array)};
       if (has_numbers(array)) dataset.view = h5::FileView{texts_, next_++};
       h5::add_dataset(out_, dataset);
     }
+    return links;
+  }
+  /// The same in a group. Returns its address.
+  std::uint64_t add_group(const DemoFacts& facts) {
+    const std::vector<h5::FileLink> links = add(facts);
     const std::uint64_t group = base_ + out_.size();
     h5::add_group(out_, links);
     return group;
@@ -83,7 +88,7 @@ class ShownObservations {
 
   Bytes& out_;
   std::uint64_t base_, texts_ = 0;
-  const DemoMembers& members_;
+  std::span<const DemoArray> arrays_;
   std::uint64_t skipped_;
   std::uint32_t next_ = 0;
 };
@@ -117,6 +122,8 @@ DemoMembers members_of(const h5::Id& demo) {
   members.actions = array_of(demo, "actions");
   const std::vector<std::string> said = h5::attribute_names(demo);
   members.of_task = std::binary_search(said.begin(), said.end(), "terminated");
+  if (members.of_task)
+    members.policies = std::ssize(h5::read_texts(h5::open_group(demo, "/scene"), "policies"));
   members.varies = std::binary_search(said.begin(), said.end(), "randomized");
   return members;
 }
@@ -131,7 +138,12 @@ DemoFacts facts_of(const h5::Id& demo, const DemoMembers& members) {
     throw IoError(fmt::format("a demo has {} rows; expected 1 to {}", facts.rows, kMostRows));
   if (members.of_task) {
     const double total = h5::read_number<double>(demo, "return");
-    facts.end = EpisodeEnd{facts.rows, total, flag("terminated"), flag("success")};
+    const auto policy = h5::read_number<std::int64_t>(demo, "policy");
+    if (policy < 0 || policy >= members.policies)
+      throw IoError(fmt::format("its policy is {}; expected 0 to {}, one of 'policies' in /scene",
+                                policy, members.policies - 1));
+    facts.end = EpisodeEnd{facts.rows, total, flag("terminated"), flag("success"),
+                           static_cast<int>(policy)};
   }
   if (members.varies) facts.randomized = h5::read_numbers<double>(demo, "randomized");
   return facts;
@@ -160,7 +172,7 @@ void check_members(const h5::Id& demo, const DemoMembers& members, const DemoFac
 std::vector<h5::FileMember> add_demo_links(Bytes& out, std::uint64_t base,
                                            const DemoMembers& members, std::string_view file,
                                            std::span<const LinkedDemo> demos) {
-  ShownObservations next(out, base, members, file, demos, 1);
+  ShownObservations next(out, base, members.observations, file, demos, 1);
   std::vector<h5::FileMember> groups;
   for (const LinkedDemo& demo : demos) {
     std::vector<std::string> paths;
@@ -168,7 +180,7 @@ std::vector<h5::FileMember> add_demo_links(Bytes& out, std::uint64_t base,
     std::vector<h5::FileLink> links;
     for (std::size_t k = 0; k < paths.size(); ++k)
       links.push_back({members.names[k], h5::kNowhere, file, paths[k]});
-    links.push_back({"next_obs", next.add(demo.facts)});
+    links.push_back({"next_obs", next.add_group(demo.facts)});
     groups.push_back({demo.number, base + out.size()});
     h5::add_group(out, links, DemoAttributes(demo.facts).all());
   }
@@ -180,7 +192,8 @@ std::vector<h5::FileMember> add_minari_episodes(Bytes& out, std::uint64_t base,
                                                 std::span<const LinkedDemo> demos,
                                                 std::int64_t first, std::uint64_t seed) {
   using Number = std::array<unsigned char, sizeof(std::int64_t)>;
-  ShownObservations observations(out, base, members, file, demos, 0);
+  ShownObservations observations(out, base, members.observations, file, demos, 0),
+      states(out, base, members.states, file, demos, 0);
   std::vector<h5::FileMember> groups;
   for (const LinkedDemo& demo : demos) {
     const std::int64_t episode = first + static_cast<std::int64_t>(groups.size());
@@ -195,15 +208,14 @@ std::vector<h5::FileMember> add_minari_episodes(Bytes& out, std::uint64_t base,
     h5::add_dataset(
         out,
         {h5::NumberType::boolean, {static_cast<std::uint64_t>(demo.facts.rows)}, {}, all_false});
-    const std::uint64_t shown = observations.add(demo.facts);
+    const std::uint64_t shown = observations.add_group(demo.facts);
     std::vector<std::string> paths;
     for (const std::string& name : members.derivatives) paths.push_back(path_of(demo.number, name));
-    std::vector<h5::FileLink> derivatives;
+    std::vector<h5::FileLink> besides = states.add(demo.facts);
     for (std::size_t k = 0; k < paths.size(); ++k)
-      derivatives.push_back({members.derivatives[k], h5::kNowhere, file, paths[k]});
+      besides.push_back({members.derivatives[k], h5::kNowhere, file, paths[k]});
     const std::uint64_t infos = base + out.size();
-    h5::add_group(out,
-                  derivatives);  // also if empty, because Minari prints no episode without it
+    h5::add_group(out, besides);  // also if empty, because Minari prints no episode without it
     const std::array links{
         h5::FileLink{"actions", h5::kNowhere, file, actions},
         h5::FileLink{"infos", infos},

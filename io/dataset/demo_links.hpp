@@ -26,9 +26,11 @@ struct DemoArray {
 struct DemoMembers {
   std::vector<std::string> names;       ///< of its links
   std::vector<DemoArray> observations;  ///< below obs
+  std::vector<DemoArray> states;        ///< of these, what Minari gets below infos instead
   DemoArray actions;
   std::vector<std::string> derivatives;  ///< grad_… and the loss, among `names`
   bool of_task = false, varies = false;
+  std::int64_t policies = 0;  ///< that played, for a task
 };
 
 /// Reads the members of a demo. Throws IoError.
@@ -51,8 +53,8 @@ std::vector<h5::FileMember> add_demo_links(h5::Bytes& out, std::uint64_t base,
                                            const DemoMembers& members, std::string_view file,
                                            std::span<const LinkedDemo> demos);
 
-/// Does the same with groups episode_<j>, j from `first`, in Minari's layout, with derivatives
-/// below infos. `seed`: seed of the data set.
+/// Does the same with groups episode_<j>, j from `first`, in Minari's layout, with `states` and
+/// derivatives below infos. `seed`: seed of the data set.
 std::vector<h5::FileMember> add_minari_episodes(h5::Bytes& out, std::uint64_t base,
                                                 const DemoMembers& members, std::string_view file,
                                                 std::span<const LinkedDemo> demos,

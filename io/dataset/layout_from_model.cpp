@@ -131,7 +131,8 @@ DatasetLayout dataset_layout_from(const Model& model, const Stepper& stepper,
   layout.version = run.version;
   layout.instruction_set = run.instruction_set;
   layout.task = run.task;
-  layout.policy = run.policy;
+  layout.played_by = run.played_by;
+  layout.set_name = run.set_name;
   layout.controls = run.controls;
   layout.command = run.command;
   layout.shards = run.shards;

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/base/error.hpp"
+#include "io/dataset/learner_notes.hpp"
 #include "io/files/part_file.hpp"
 #include "io/hdf5/h5_listing.hpp"
 
@@ -25,16 +26,23 @@ constexpr const char* kMinariVersion = "0.5.3";  // the layout that is written h
 // Of an observation that the view has. Minari needs both bounds of every number, and cannot be told
 // once that they are all equal: metadata.json has 22 bytes for each.
 constexpr std::uint64_t kMostNumbers = std::uint64_t{1} << 18;
-constexpr const char* kToFolder = "../../../../";  // from …/minari/tangere/NAME-v0/data
-
-/// Keeps letters, digits, - and _, which are all that Minari accepts.
-std::string dataset_name(std::string name) {
-  for (char& c : name) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                       c == '-' || c == '_';
-    if (!plain) c = '-';
-  }
-  return name.empty() ? "dataset" : name;
+/// Returns the id that the file gives the data set. It becomes a path, so it must be one that is
+/// written: tangere/NAME-v0 or tangere/TASK/NAME-v0.
+std::string id_said(const std::string& folder, const h5::Id& scene) {
+  constexpr std::string_view kBegin = "tangere/", kEnd = "-v0", kPlain = "-_";
+  const std::string id = h5::read_text(scene, "dataset_id");
+  const bool plain = std::all_of(id.begin(), id.end(), [&](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '/' ||
+           kPlain.find(c) != std::string_view::npos;
+  });
+  const auto slashes = std::count(id.begin(), id.end(), '/');
+  if (!plain || !id.starts_with(kBegin) || !id.ends_with(kEnd) || slashes > 2 ||
+      id.find("//") != std::string::npos || id.find("/-v0") != std::string::npos)
+    throw IoError(
+        fmt::format("'{}': the 'dataset_id' of its shards is '{}'; expected tangere/NAME-v0 or "
+                    "tangere/TASK/NAME-v0 of letters, digits, - and _",
+                    folder, id));
+  return id;
 }
 
 /// Writes a number in nested lists of a given shape, because all bounds are equal.
@@ -78,14 +86,18 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
   });
   const h5::Id scene = h5::open_group(shard, "/scene");
   command_ = h5::read_text(h5::open_group(shard, "/"), "command");
-  const std::string task = h5::read_text(scene, "task");
-  id_ = fmt::format("tangere/{}-v0",
-                    dataset_name(task.starts_with("none") ? h5::read_text(scene, "name") : task));
+  version_ = h5::read_text(scene, "tangere_version");
+  id_ = id_said(folder, scene);
+  for (auto parts = std::count(id_.begin(), id_.end(), '/') + 3; parts > 0; --parts)
+    to_folder_ += "../";
   seed_ = h5::read_number<std::uint64_t>(scene, "seed");
   if (members.of_task) {
+    task_ = h5::read_text(scene, "task");
+    policy_ = h5::read_text(scene, "policy");
     low_ = bound(h5::read_number<double>(scene, "action_low"));
     high_ = bound(h5::read_number<double>(scene, "action_high"));
   }
+  if (members.of_task) hide_states();
   folder_ = (fs::path(folder) / "minari" / id_ / "data").string();
   std::error_code error;
   // A link on the way would lead the view, and what --overwrite removes, elsewhere.
@@ -102,31 +114,43 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
   file_->close();
 }
 
+/// The environment that a learner recovers shows neither q nor v. The view's observations have its
+/// keys, unless nothing else was recorded.
+void MinariView::hide_states() {
+  const auto is_state = [](const DemoArray& array) {
+    return array.name == "q" || array.name == "v";
+  };
+  std::vector<DemoArray>& shown = members_.observations;
+  if (std::all_of(shown.begin(), shown.end(), is_state)) return;
+  std::copy_if(shown.begin(), shown.end(), std::back_inserter(members_.states), is_state);
+  std::erase_if(shown, is_state);
+}
+
 void MinariView::add(std::string_view file, std::span<const LinkedDemo> demos) {
   h5::Bytes out;
-  for (const h5::FileMember& episode :
-       add_minari_episodes(out, file_->here(), members_, fmt::format("{}{}", kToFolder, file),
-                           demos, count_, seed_))
+  for (const h5::FileMember& episode : add_minari_episodes(
+           out, file_->here(), members_, to_folder_ + std::string(file), demos, count_, seed_))
     episodes_.push_back(episode);
   file_->append(out, {"episodes from episode_", count_});
   count_ += std::ssize(demos);
   for (const LinkedDemo& demo : demos) steps_ += demo.facts.rows;
 }
 
-void MinariView::commit() {
+void MinariView::commit(std::uint64_t linked) {
   file_->open(file_->append_group("episode_", std::move(episodes_), true));
   h5::write_scalar<std::int64_t>(file_->file(), "total_episodes", count_);
   h5::write_scalar<std::int64_t>(file_->file(), "total_steps", steps_);
-  file_->commit();
-  write_text_atomically((fs::path(folder_) / "metadata.json").string(), metadata(), true);
+  const std::uint64_t bytes = linked + file_->commit();
+  write_text_atomically((fs::path(folder_) / "metadata.json").string(), metadata(bytes), true);
 }
 
-std::string MinariView::metadata() const {
+std::string MinariView::metadata(std::uint64_t bytes) const {
   std::string subspaces;
   for (const DemoArray& array : members_.observations)
     subspaces += fmt::format("{}{}: {}", subspaces.empty() ? "" : ", ", Json(array.name).dump(),
                              box(array, "-Infinity", "Infinity"));
-  const Json metadata = {
+  constexpr double kTenths = 1e-5;  // of a megabyte, in a byte
+  Json metadata = {
       {"dataset_id", id_},
       {"data_format", "hdf5"},
       {"minari_version", kMinariVersion},
@@ -134,9 +158,16 @@ std::string MinariView::metadata() const {
       {"total_steps", steps_},
       {"observation_space", fmt::format(R"({{"type": "Dict", "subspaces": {{{}}}}})", subspaces)},
       {"action_space", box(members_.actions, low_, high_)},
-      {"algorithm_name", "tangere"},
+      {"algorithm_name", policy_.empty() ? "tangere" : policy_},
       {"description", command_},
+      {"dataset_size", std::round(static_cast<double>(bytes) * kTenths) / 10},
+      {"requirements", Json::array({"tangere>=" + version_})},
   };
+  if (!task_.empty()) {
+    const std::string environment = gymnasium_environment(task_);
+    metadata["env_spec"] = environment;
+    metadata["eval_env_spec"] = environment;
+  }
   // A command line may hold any bytes.
   return metadata.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -99,6 +99,7 @@ class ShardChecker {
                                 steps, every));
     rows_ = steps / every;
     of_task_ = !h5::read_text(scene_, "task").starts_with("none");
+    if (of_task_) policies_ = std::ssize(h5::read_texts(scene_, "policies"));
     gradients_ = gradients_said(scene_);
   }
   /// Whether there are as many as the file says: a claim alone must not become a loop.
@@ -148,6 +149,10 @@ class ShardChecker {
     if (of_task_ ? rows < 1 || rows > rows_ : rows != rows_)
       return fail(fmt::format("demo_{} has {} rows, expected {}{}", episode, rows,
                               of_task_ ? "1 to " : "", rows_));
+    if (const std::int64_t by = of_task_ ? number(demo, "policy") : 0;
+        of_task_ && (by < 0 || by >= policies_))
+      fail(fmt::format("demo_{}: its policy is {}; expected 0 to {}, one of 'policies' in /scene",
+                       episode, by, policies_ - 1));
     // These values need no checksum: without a task every reward is 0, and only the last row ends
     // the episode.
     if (of_task_) {
@@ -295,7 +300,7 @@ class ShardChecker {
   std::vector<std::string> names_;
   std::vector<GradientSaid> gradients_;
   bool single_ = false, of_task_ = false;
-  std::int64_t rows_ = 0, end_ = 0;
+  std::int64_t rows_ = 0, end_ = 0, policies_ = 0;
   std::tuple<std::vector<float>, std::vector<double>> buffers_;
   ContentSum sum_;
   ShardContent content_;

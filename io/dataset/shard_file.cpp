@@ -7,9 +7,9 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 
 #include "io/dataset/dataset_description.hpp"
+#include "io/dataset/learner_notes.hpp"
 
 namespace tangere {
 namespace {
@@ -183,8 +183,7 @@ void ShardFile::finish(std::int64_t first_episode, std::span<const FailedEpisode
     Demo& demo = block.demos[static_cast<std::size_t>(failure.episode - first_episode)];
     demo.failed = true;
     failures_.push_back(failure);
-    if (!layout_.randomized_names.empty())
-      randomized_of_failures_[failure.episode] = demo.facts.randomized;
+    facts_of_failures_[failure.episode] = demo.facts;
   }
   block.finished = true;
   --unfinished_;
@@ -284,8 +283,9 @@ void ShardFile::record_failures() {
     h5::write_attribute(group, "reason", to_string(failure.status));
     h5::write_list<double>(group, "q", failure.q);
     h5::write_list<double>(group, "v", failure.v);
-    const std::vector<double>& randomized = randomized_of_failures_[failure.episode];
-    if (!randomized.empty()) h5::write_list<double>(group, "randomized", randomized);
+    const DemoFacts& facts = facts_of_failures_[failure.episode];
+    if (facts.end) h5::write_scalar<std::int64_t>(group, "policy", facts.end->policy);
+    if (!facts.randomized.empty()) h5::write_list<double>(group, "randomized", facts.randomized);
   }
 }
 
@@ -294,10 +294,7 @@ void ShardFile::complete_description(std::uint64_t data) {
   file_ = h5::change_file(part_.path(), part_.written());
   h5::link_object(file_, "data", data);
   const h5::Id group = h5::open_group(file_, "data");
-  const nlohmann::ordered_json environment = {
-      {"env_name", layout_.scene_name}, {"type", 2}, {"env_kwargs", nlohmann::json::object()}};
-  h5::write_attribute(group, "env_args",
-                      environment.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  h5::write_attribute(group, "env_args", robomimic_environment(layout_));
   h5::write_scalar<std::int64_t>(group, "total", rows_);
   record_failures();
   h5::write_scalar<std::uint64_t>(file_, "content_sum", sum_.value());

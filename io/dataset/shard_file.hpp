@@ -95,8 +95,8 @@ class ShardFile {
   std::vector<std::int8_t> dones_;
   std::vector<h5::FileMember> members_;
   std::vector<FailedEpisode> failures_;
-  std::map<std::int64_t, std::vector<double>> randomized_of_failures_;  // by episode
-  std::int64_t rows_ = 0;  // in demos, without failed ones
+  std::map<std::int64_t, DemoFacts> facts_of_failures_;  // by episode
+  std::int64_t rows_ = 0;                                // in demos, without failed ones
   ContentSum sum_;
 };
 

@@ -83,13 +83,24 @@ void check_written(const Id& object) {
     fail("write", object, {}, "the disk refused it");
 }
 
-/// Whether a file may lead to another: to one beside it ("shard-00001.h5"), and Minari's view in
-/// DATASET/minari/tangere/NAME/data to one of the data set ("../../../../shard-00001.h5").
+/// The way from Minari's view, DATASET/minari/tangere/[TASK/]NAME/data/main_data.hdf5, to DATASET;
+/// empty for other files.
+std::filesystem::path way_up(const std::filesystem::path& from) {
+  if (from.filename() != "main_data.hdf5") return {};
+  std::filesystem::path up = "../../..", place = from.parent_path().parent_path().parent_path();
+  for (const bool with_task : {false, true}) {
+    up /= "..";
+    if (place.filename() == "tangere" && place.parent_path().filename() == "minari") return up;
+    if (!with_task) place = place.parent_path();
+  }
+  return {};
+}
+
+/// Whether a file may lead to another: to one beside it ("shard-00001.h5"), and Minari's view to one
+/// of the data set ("../../../../shard-00001.h5").
 bool may_lead_to(const std::filesystem::path& from, const std::filesystem::path& to) {
   if (to.empty() || to.is_absolute() || to.filename() == "..") return false;
-  std::filesystem::path up;
-  const std::filesystem::path view = from.parent_path().parent_path().parent_path().parent_path();
-  if (from.filename() == "main_data.hdf5" && view.filename() == "minari") up = "../../../..";
+  const std::filesystem::path up = way_up(from);
   return to.parent_path().empty() || (!up.empty() && to.parent_path() == up);
 }
 

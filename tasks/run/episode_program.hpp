@@ -82,6 +82,7 @@ class TaskProgram : public EpisodeProgram {
   [[nodiscard]] TaskProgram* judged() override { return this; }
 
   [[nodiscard]] const Task& task() const { return task_; }
+  [[nodiscard]] const Policy& policy() const { return policy_; }
   [[nodiscard]] const EnvironmentData& data() const { return *data_; }
   /// Counts over all blocks so far.
   [[nodiscard]] const VectorCounts& counts() const { return counts_; }

@@ -304,7 +304,9 @@ void EpisodeSlot<T>::collect() {
   if (const TaskProgram* const task = program_->judged()) {
     const EnvironmentData& d = task->data();
     for (std::size_t e = 0; e < d.length.size(); ++e)
-      ends_.push_back({d.length[e], d.returns[e], d.terminated[e] != 0, d.success[e] != 0});
+      ends_.push_back(
+          {d.length[e], d.returns[e], d.terminated[e] != 0, d.success[e] != 0,
+           task->policy().player(batch_->seed(), batch_->episode(static_cast<int>(e)))});
   }
   for (int e = 0; e < batch_->environments(); ++e) {
     if (!failed(batch_->status(e))) continue;

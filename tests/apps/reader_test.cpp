@@ -58,8 +58,12 @@ TEST(Readers, OfThePageReadADataSet) {
                    "4", "--steps", "20", "--every", "5", "--gradients", "jacobians", "--quiet"})
           .exit_code,
       0);
+  ASSERT_EQ(run(folder, {"generate", "box_pushing", "--output", "pushes", "--episodes", "32",
+                         "--mix", "random=0.3", "--quiet"})
+                .exit_code,
+            0);
   const std::vector<std::string> blocks = readers();
-  ASSERT_GE(blocks.size(), 5U);
+  ASSERT_GE(blocks.size(), 6U);
   int tried = 0;
   for (const std::string& block : blocks) {
     const bool needs_minari = block.find("import minari") != std::string::npos;
@@ -71,7 +75,7 @@ TEST(Readers, OfThePageReadADataSet) {
     EXPECT_FALSE(run_python(folder, interpreter, block).empty());
     ++tried;
   }
-  EXPECT_GE(tried, 4);
+  EXPECT_GE(tried, 5);
 }
 
 /// Checks what h5py makes of types, texts and counts. HDF5's C library hides mistakes in these.

@@ -85,7 +85,7 @@ TEST(DatasetFolder, RemovesOldShardsAndNothingElse) {
 
 TEST(DatasetFolder, RemovesWhatMergingMadeWithItsFolders) {
   const Folder place;
-  for (const char* name : {"one-v0", "two-v0"}) {
+  for (const char* name : {"one-v0", "two-v0", "task/three-v0"}) {
     const std::string data = place / "set/minari/tangere/" + name + "/data";
     fs::create_directories(data);
     for (const char* file : {"/main_data.hdf5", "/metadata.json"}) touch(data + file);

@@ -53,6 +53,21 @@ std::vector<double> row(const h5::Id& file, const std::string& dataset, hsize_t 
   return numbers;
 }
 
+std::string complaint(const DatasetFiles& dataset, bool copy) {
+  try {
+    merge_dataset(dataset, {copy, false});
+  } catch (const IoError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+void change(const std::string& file, const std::function<void(hid_t)>& by) {
+  const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  by(opened);
+  H5Fclose(opened);
+}
+
 TEST(DatasetMerge, ThatIsStoppedLeavesTheShardsAlone) {
   for (const bool copy : {false, true}) {
     const Folder folder;
@@ -106,6 +121,59 @@ TEST(DatasetMerge, LeavesOutWhatFailedAndNumbersEpisodesForMinari) {
       EXPECT_THAT(demos, ElementsAre(1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 32, 33, 34, 35,
                                      36, 37, 38, 39));
     }
+}
+
+/// The view of a data set with a name of its own is one folder deeper.
+TEST(DatasetMerge, ShowsNumbersFromAFolderOfItsOwnName) {
+  for (const bool copy : {false, true}) {
+    const Folder folder;
+    DatasetLayout l = dataset_layout(16);
+    l.scene_name = "ball";
+    l.set_name = "own";
+    {
+      DatasetWriter writer({folder / "set"}, l);
+      write_block(writer, l, 0);
+    }
+    const MergeResult result = merge_dataset(find_dataset(folder / "set"), {copy, false});
+    EXPECT_EQ(result.minari_id, "tangere/ball/own-v0");
+    EXPECT_EQ(result.minari, folder / "set/minari/tangere/ball/own-v0");
+    EXPECT_EQ(result.successes, std::nullopt);
+    const h5::Id view = h5::open_file(result.minari + "/data/main_data.hdf5");
+    for (hsize_t j = 0; j < 4; ++j)
+      EXPECT_EQ(row(view, "episode_9/observations/v", j)[1],
+                tangere::testing::dataset_number<double>(9, 2, static_cast<std::int64_t>(j), 1));
+    EXPECT_EQ(row(view, "episode_9/actions", 2)[1],
+              tangere::testing::dataset_number<float>(9, 0, 2, 1));
+  }
+}
+
+/// The id becomes a path.
+TEST(DatasetMerge, RefusesAnIdThatIsNone) {
+  for (const std::string id : {"tangere/../../x-v0", "elsewhere/x-v0", "tangere/x", "tangere/-v0",
+                               "tangere/a/b/c-v0", "/tangere/x-v0", "tangere//x-v0", ""}) {
+    const Folder folder;
+    DatasetLayout l = dataset_layout(16);
+    {
+      DatasetWriter writer({folder / "set"}, l);
+      write_block(writer, l, 0);
+    }
+    change(folder / "set/shard-00000.h5", [&](hid_t file) {
+      const hid_t scene = H5Gopen2(file, "scene", H5P_DEFAULT);
+      EXPECT_GE(H5Adelete(scene, "dataset_id"), 0);
+      const hid_t type = H5Tcopy(H5T_C_S1), space = H5Screate(H5S_SCALAR);
+      H5Tset_size(type, H5T_VARIABLE);
+      const hid_t said = H5Acreate2(scene, "dataset_id", type, space, H5P_DEFAULT, H5P_DEFAULT);
+      const char* const text = id.c_str();
+      EXPECT_GE(H5Awrite(said, type, &text), 0);
+      H5Aclose(said);
+      H5Sclose(space);
+      H5Tclose(type);
+      H5Gclose(scene);
+    });
+    EXPECT_THAT(complaint(find_dataset(folder / "set"), false),
+                HasSubstr("'dataset_id' of its shards is '" + id + "'; expected tangere/NAME-v0"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "set/minari")) << id;
+  }
 }
 
 /// Minari needs both bounds of every number in nested lists: its metadata must not grow with a pad.
@@ -163,21 +231,6 @@ TEST(DatasetMerge, ShowsSensorsWhosePercentSignsAreNoPattern) {
         EXPECT_EQ(row(view, "episode_17/observations/" + sensor, j)[5],
                   tangere::testing::dataset_number<double>(17, 3, static_cast<std::int64_t>(j), 5));
     }
-}
-
-std::string complaint(const DatasetFiles& dataset, bool copy) {
-  try {
-    merge_dataset(dataset, {copy, false});
-  } catch (const IoError& error) {
-    return error.what();
-  }
-  return "";
-}
-
-void change(const std::string& file, const std::function<void(hid_t)>& by) {
-  const hid_t opened = H5Fopen(file.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
-  by(opened);
-  H5Fclose(opened);
 }
 
 TEST(DatasetMerge, NamesTheShardAndTheMemberThatCannotBeOpened) {

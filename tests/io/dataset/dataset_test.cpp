@@ -132,7 +132,7 @@ TEST(Dataset, SaysWhatItsNumbersAre) {
     return h5::read_numbers<std::int64_t>(object, name).at(0);
   };
   EXPECT_EQ(h5::read_text(file, "format"), "tangere dataset");
-  EXPECT_EQ(whole(file, "format_version"), 3);
+  EXPECT_EQ(whole(file, "format_version"), 4);
   EXPECT_EQ(whole(file, "first_episode"), 0);
   EXPECT_EQ(whole(file, "episodes"), 20);
   EXPECT_EQ(whole(file, "dataset_episodes"), 20);
@@ -142,6 +142,9 @@ TEST(Dataset, SaysWhatItsNumbersAre) {
             R"({"env_name":"syn \"thetic\"","type":2,"env_kwargs":{}})");
   const h5::Id scene = h5::open_group(file, "scene");
   EXPECT_EQ(h5::read_text(scene, "text"), "<tangere/>");
+  EXPECT_EQ(h5::read_text(scene, "dataset_id"), "tangere/syn--thetic--v0");
+  EXPECT_EQ(h5::read_text(scene, "observation_scale"), "{}");
+  EXPECT_EQ(h5::read_text(scene, "privileged"), R"(["q","v"])");
   EXPECT_EQ(h5::read_numbers<std::uint64_t>(scene, "seed").at(0), 18446744073709551615ULL);
   EXPECT_EQ(whole(scene, "steps"), 6);
   EXPECT_EQ(whole(scene, "every"), 2);

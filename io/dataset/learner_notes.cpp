@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// The names are those of the Python package, tangere.gym.
+#include "io/dataset/learner_notes.hpp"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace tangere {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int kGymnasium = 2;  // robomimic's number for environments of Gym
+
+/// Names come from scene files and may hold any bytes.
+std::string text_of(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+}  // namespace
+
+std::string environment_id(const std::string& task) {
+  std::string words;
+  bool begins = true;
+  for (const char c : task) {
+    if (c != '_') words += begins && c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+    begins = c == '_';
+  }
+  return "tangere/" + words + "-v0";
+}
+
+std::string robomimic_environment(const DatasetLayout& layout) {
+  Json arguments = Json::object();
+  if (layout.task) arguments["task"] = layout.task->name;
+  Json environment = {
+      {"env_name", layout.task ? environment_id(layout.task->name) : layout.scene_name},
+      {"type", kGymnasium},
+      {"env_kwargs", std::move(arguments)}};
+  if (layout.task) environment["env_version"] = layout.version;
+  return text_of(environment);
+}
+
+std::string gymnasium_environment(const std::string& task) {
+  return text_of({{"id", environment_id(task)},
+                  {"entry_point", "tangere.gym:make_env"},
+                  {"reward_threshold", nullptr},
+                  {"nondeterministic", false},
+                  {"max_episode_steps", nullptr},
+                  {"order_enforce", true},
+                  {"disable_env_checker", false},
+                  {"kwargs", {{"task", task}, {"normalise", false}}},
+                  {"additional_wrappers", Json::array()},
+                  {"vector_entry_point", nullptr}});
+}
+
+std::string observation_scale(const DatasetLayout& layout) {
+  Json scales = Json::object();
+  const std::vector<std::string> stored = layout.observation_names();
+  if (layout.task)
+    for (const TensorSpec& tensor : layout.task->observations) {
+      if (tensor.scale.empty() ||
+          std::find(stored.begin(), stored.end(), tensor.name) == stored.end())
+        continue;
+      scales[tensor.name] =
+          tensor.scale.size() == 1 ? Json(tensor.scale.front()) : Json(tensor.scale);
+    }
+  return text_of(scales);
+}
+
+std::string privileged_observations(const DatasetLayout& layout) {
+  std::vector<std::string> hidden = {"q", "v"};
+  if (layout.task)
+    for (const TensorSpec& tensor : layout.task->observations)
+      if (tensor.privileged) hidden.push_back(tensor.name);
+  Json names = Json::array();
+  for (const std::string& name : layout.observation_names())
+    if (std::find(hidden.begin(), hidden.end(), name) != hidden.end()) names.push_back(name);
+  return text_of(names);
+}
+
+}  // namespace tangere
