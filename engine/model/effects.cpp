@@ -304,6 +304,37 @@ void drop_elements(Scene& scene, int element, Way way) {
     all.erase(all.begin() + element);
 }
 
+// --- imperfections of sensors ---
+
+EffectInfo find_imperfections(const Scene& scene, int element) {
+  EffectInfo info;
+  std::size_t on = 0;
+  for (std::size_t k = 0; k < scene.sensors.size(); ++k) {
+    const SensorImperfections& of = scene.sensors[k].imperfections;
+    if ((element >= 0 && std::size_t(element) != k) || !is_imperfect(of)) continue;
+    ++on;
+    add_source(info, of.source);
+  }
+  info.on = on > 0;
+  if (element < 0)
+    info.reason =
+        fmt::format("{} of {}", on, number_of_elements<Owner::tactile>(scene.sensors.size()));
+  else
+    info.reason = info.on ? text_of(scene.sensors[std::size_t(element)].imperfections)
+                          : "every coefficient is 0 or not given";
+  return info;
+}
+
+void drop_imperfections(Scene& scene, int element, Way way) {
+  for (std::size_t k = 0; k < scene.sensors.size(); ++k) {
+    if (element >= 0 && std::size_t(element) != k) continue;
+    SensorImperfections& of = scene.sensors[k].imperfections;
+    const Source source = of.source;
+    of = {};
+    if (way == Way::zero) of.source = source;
+  }
+}
+
 // --- numbers that vary ---
 
 EffectInfo find_varying(const Scene& scene, int /*element*/) {
@@ -373,6 +404,8 @@ constexpr Row kTable[] = {
     element_row<Owner::tactile, Part::tangential>(Kind::tactile_shear, "tactile shear", " shear"),
     element_row<Owner::tactile, Part::damping>(Kind::tactile_damping, "tactile damping",
                                                " damping"),
+    {Kind::sensor_imperfections, "sensor imperfections", " imperfections", true, false,
+     find_imperfections, drop_imperfections},
     {Kind::varying_parameters, "varying parameters", "", true, false, find_varying, drop_varying},
 };
 
@@ -393,7 +426,7 @@ std::vector<std::string> element_names(const Scene& scene, EffectKind kind) {
   };
   if (kind >= Kind::pair_contact && kind <= Kind::pair_damping) add(scene.pair_contacts);
   if (kind >= Kind::ground_contact && kind <= Kind::ground_damping) add(scene.ground_contacts);
-  if (kind >= Kind::tactile && kind <= Kind::tactile_damping) add(scene.sensors);
+  if (kind >= Kind::tactile && kind <= Kind::sensor_imperfections) add(scene.sensors);
   return names;
 }
 
