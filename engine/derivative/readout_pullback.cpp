@@ -143,6 +143,11 @@ struct ReadoutPullback::Impl {
   }
 };
 
+void check_has_no_memory(const Model& model) {
+  for (std::size_t s = 0; s < model.sensors().size(); ++s)
+    check_has_no_memory(model, static_cast<int>(s));
+}
+
 ReadoutPullback::ReadoutPullback(const Model& model) : impl_(std::make_unique<Impl>(model)) {}
 ReadoutPullback::~ReadoutPullback() = default;
 ReadoutPullback::ReadoutPullback(ReadoutPullback&&) noexcept = default;
@@ -192,6 +197,7 @@ void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int>
 void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
                             std::span<const double> cotangents, std::span<double> parameters,
                             std::span<double> points) {
+  check_has_no_memory(impl_->model, sensor);
   const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
   if (!s.imperfect) return impl_->pull_back(lane, sensor, tiles, cotangents, parameters, points);
   const kernels::PadTiles pad = s.tiles();
@@ -206,6 +212,7 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
 
 void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents,
                                   std::span<double> parameters, std::span<double> points) {
+  check_has_no_memory(impl_->model, sensor);
   const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
   if (s.imperfect) {
     std::copy(cotangents.begin(), cotangents.end(), impl_->whole.begin());

@@ -306,6 +306,7 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
                     std::span<double> field_dot) {
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
+  check_has_no_memory(i.model, sensor);
   const double* row = tape.state(step) + lane;
   i.stage.centre = with_tangent(m, row, kBlock, state.q);
   const Duals v = with_tangent(row + m.nq * kBlock, kBlock, state.v);

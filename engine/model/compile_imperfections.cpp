@@ -24,6 +24,13 @@ constexpr int kMostRandomPoints = (1 << 24) - 64;  // whose random numbers have 
       fmt::format("{}imperfections of '{}': {}", d.imperfections.source.prefix(), d.name, message));
 }
 
+/// The hash FNV-1a (Fowler, Noll, Vo) of a name. Part of every stored seed's meaning.
+std::uint64_t bits_of(const std::string& name) {
+  std::uint64_t bits = 0xcbf29ce484222325;
+  for (const char c : name) bits = (bits ^ static_cast<unsigned char>(c)) * 0x100000001b3;
+  return bits;
+}
+
 /// Turns delay and low-pass into weights of earlier steps. A delay that ends between two steps
 /// takes a share of both.
 void remember(const TactileDescription& d, double h, CompiledSensor& s) {
@@ -75,11 +82,11 @@ void compile_imperfections(const TactileDescription& d, double timestep, Compile
                            SensorInfo& info) {
   check_imperfections(d.imperfections, d.name, d.points.empty());
   if (!is_imperfect(d.imperfections)) return;
-  if (s.first_point > kMostRandomPoints - s.points())
-    fail(d, fmt::format("point {} of the scene's sensors; expected {} at most",
-                        double(s.first_point) + s.points(), kMostRandomPoints));
+  if (s.points() > kMostRandomPoints)
+    fail(d, fmt::format("{} points; expected {} at most", s.points(), kMostRandomPoints));
   info.imperfect = s.imperfect = true;
   s.imperfections = d.imperfections;
+  s.name_bits = bits_of(d.name);
   if (has_memory(d.imperfections)) remember(d, timestep, s);
   info.past_states = s.past_states();
   if (d.imperfections.spread == 0) return;

@@ -6,8 +6,8 @@
 
 namespace tangere {
 
-/// Fills what a sensor and its description to users say of imperfections. Points and
-/// `first_point` of the sensor are set. `timestep`: of the scene [s]. Throws InputError (file:line)
+/// Fills what a sensor and its description to users say of imperfections. Its points are
+/// set. `timestep`: of the scene [s]. Throws InputError (file:line)
 /// for values that are out of range.
 void compile_imperfections(const TactileDescription& description, double timestep,
                            CompiledSensor& sensor, SensorInfo& info);

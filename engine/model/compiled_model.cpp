@@ -254,8 +254,6 @@ class Compiler {
       CompiledSensor sensor = compile_sensor(d, m_.bodies[b], info);
       sensor.body = b;
       sensor.number = static_cast<int>(i);
-      if (!m_.sensors.empty())
-        sensor.first_point = m_.sensors.back().first_point + m_.sensors.back().points();
       compile_imperfections(d, m_.scene.timestep, sensor, info);
       m_.layout.past_states = std::max(m_.layout.past_states, info.past_states);
       sensor.parameters = constants(d.coefficients);

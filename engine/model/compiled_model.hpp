@@ -79,9 +79,11 @@ struct CompiledSensor {
   bool sizes_vary = false;   ///< some of their sizes vary
   SensorImperfections imperfections{};
   bool imperfect = false;  ///< some imperfection is on
-  int number = 0;          ///< of the sensor, for its random numbers
-  int first_point = 0;     ///< points of the sensors before it
-  int delay = 0;           ///< [steps]
+  int number = 0;          ///< of the sensor in the scene
+  /// Of the sensor's name. Seeds of its random numbers differ by it, so that other sensors do not
+  /// matter.
+  std::uint64_t name_bits = 0;
+  int delay = 0;  ///< [steps]
   /// (n) weights of the ideal fields `delay`, delay + 1, … steps ago; empty without memory.
   std::vector<double> weights{};
   std::array<LateralSpread, 2> spread{};  ///< from row to row, and from column to column

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <type_traits>
 #include <utility>
 
 #include "engine/model/field_form.hpp"
@@ -282,12 +283,20 @@ EffectInfo find_elements(const Scene& scene, int element) {
   return info;
 }
 
+void drop_imperfections(TactileDescription& d, Way way) {
+  const Source source = d.imperfections.source;
+  d.imperfections = {};
+  if (way == Way::zero) d.imperfections.source = source;
+}
+
 template <Part P, class Element>
 void still_element(Scene& scene, Element& d, Way way) {
   Fields fields{Field::kn, Field::kt, Field::mu, Field::damping};
   if (P == Part::damping) fields = {Field::damping};
   if (P == Part::tangential) fields = {Field::kt};
   if (P == Part::tangential && way == Way::removed) fields.push_back(Field::mu);
+  if constexpr (std::is_same_v<Element, TactileDescription>)
+    if (P == Part::whole) drop_imperfections(d, way);
   for (const Field field : fields) d.coefficients[std::size_t(from(Field::kn, field))] = 0;
   keep_constant(scene, number_of(d), fields);
 }
@@ -325,14 +334,9 @@ EffectInfo find_imperfections(const Scene& scene, int element) {
   return info;
 }
 
-void drop_imperfections(Scene& scene, int element, Way way) {
-  for (std::size_t k = 0; k < scene.sensors.size(); ++k) {
-    if (element >= 0 && std::size_t(element) != k) continue;
-    SensorImperfections& of = scene.sensors[k].imperfections;
-    const Source source = of.source;
-    of = {};
-    if (way == Way::zero) of.source = source;
-  }
+void drop_all_imperfections(Scene& scene, int element, Way way) {
+  for (std::size_t k = 0; k < scene.sensors.size(); ++k)
+    if (element < 0 || std::size_t(element) == k) drop_imperfections(scene.sensors[k], way);
 }
 
 // --- numbers that vary ---
@@ -405,7 +409,7 @@ constexpr Row kTable[] = {
     element_row<Owner::tactile, Part::damping>(Kind::tactile_damping, "tactile damping",
                                                " damping"),
     {Kind::sensor_imperfections, "sensor imperfections", " imperfections", true, false,
-     find_imperfections, drop_imperfections},
+     find_imperfections, drop_all_imperfections},
     {Kind::varying_parameters, "varying parameters", "", true, false, find_varying, drop_varying},
 };
 

@@ -4,6 +4,7 @@
 #include "engine/sense/imperfect_field.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "engine/model/random_run.hpp"
@@ -16,46 +17,50 @@ double of_component(const NormalAndShear& pair, int component) {
   return component == 2 ? pair.normal : pair.shear;
 }
 
-RandomKey random_key(const ReadingKey& key, std::int64_t step, Purpose purpose, int index) {
-  return {key.seed, key.episode, step, purpose, static_cast<std::uint32_t>(index)};
-}
+using Run = std::array<double, kRandomRun>;
 
-/// The random numbers of up to 64 points of a sensor in one reading.
+/// The random numbers of up to 64 points of a sensor in one reading. Loops go over all 64, which
+/// compilers turn into vectors.
 class Draws {
  public:
   Draws(const CompiledSensor& sensor, const ReadingKey& key)
-      : of_(sensor.imperfections), key_(key), first_point_(sensor.first_point) {
-    point_ = of_.gain != 0 || !(of_.bias == NormalAndShear{});
-    noise_ = !(of_.noise == NormalAndShear{});
+      : of_(sensor.imperfections), key_(key) {
+    key_.seed ^= sensor.name_bits;
+    points_ = of_.gain != 0 || !(of_.bias == NormalAndShear{});
+    noises_ = !(of_.noise == NormalAndShear{});
     if (of_.sensor_gain != 0)
-      sensor_ =
-          1 + normal(random_key(key, 0, Purpose::sensor_gain, sensor.number), 0, of_.sensor_gain);
+      sensor_ = 1 + normal(random_key(0, Purpose::sensor_gain, 0), 0, of_.sensor_gain);
+    if (!points_) of_point_ = {};
+    if (!noises_) of_step_ = {};
+    alive_.fill(1);
   }
 
   /// Draws for the points from `first` on.
   void draw(int first) {
-    const int index = first_point_ + first;
-    if (point_) fill(random_key(key_, 0, Purpose::sensor_point, index), points_);
-    if (noise_) fill(random_key(key_, key_.step, Purpose::sensor_noise, index), noises_);
-    if (of_.dead != 0) random_run(random_key(key_, 0, Purpose::dead_point, index), dead_);
+    if (points_) fill(random_key(0, Purpose::sensor_point, first), of_point_);
+    if (noises_) fill(random_key(key_.step, Purpose::sensor_noise, first), of_step_);
+    for (int l = 0; l < kRandomRun; ++l) gain_[l] = sensor_ + of_.gain * of_point_[3][l];
+    if (of_.dead == 0) return;
+    random_run(random_key(0, Purpose::dead_point, first), words_);
+    for (int l = 0; l < kRandomRun; ++l) alive_[l] = fraction_of(words_[0][l]) < of_.dead ? 0 : 1;
   }
 
-  // Of point `at` of the 64:
-  [[nodiscard]] double gain(int at) const {
-    return of_.gain != 0 ? sensor_ + of_.gain * points_[3][std::size_t(at)] : sensor_;
+  /// Scales a component of the 64 points, and adds to it.
+  void add_to(int component, Run& x) const {
+    const double bias = of_component(of_.bias, component),
+                 noise = of_component(of_.noise, component);
+    const auto c = std::size_t(component);
+    for (int l = 0; l < kRandomRun; ++l)
+      x[l] = gain_[l] * x[l] + bias * of_point_[c][l] + noise * of_step_[c][l];
   }
-  [[nodiscard]] double added(int at, int component) const {
-    const auto k = std::size_t(component), p = std::size_t(at);
-    double sum = 0;
-    if (point_) sum += of_component(of_.bias, component) * points_[k][p];
-    if (noise_) sum += of_component(of_.noise, component) * noises_[k][p];
-    return sum;
-  }
-  [[nodiscard]] bool dead(int at) const {
-    return of_.dead != 0 && fraction_of(dead_[0][std::size_t(at)]) < of_.dead;
-  }
+  [[nodiscard]] const Run& gain() const { return gain_; }
+  /// 1, or 0 for dead points.
+  [[nodiscard]] const Run& alive() const { return alive_; }
 
  private:
+  [[nodiscard]] RandomKey random_key(std::int64_t step, Purpose purpose, int point) const {
+    return {key_.seed, key_.episode, step, purpose, static_cast<std::uint32_t>(point)};
+  }
   void fill(const RandomKey& key, RandomNormals& to) {
     random_run(key, words_);
     normal_run(words_, to);
@@ -63,12 +68,29 @@ class Draws {
 
   const SensorImperfections& of_;
   ReadingKey key_;
-  int first_point_;
-  bool point_ = false, noise_ = false;
+  bool points_ = false, noises_ = false;
   double sensor_ = 1;
-  RandomWords words_, dead_;
-  RandomNormals points_, noises_;
+  RandomWords words_;
+  RandomNormals of_point_, of_step_;
+  Run gain_, alive_;
 };
+
+/// Rounds to a whole number, ties to even, without a call: adding 1.5 2^52 leaves no digits behind
+/// the point. Numbers too large for that are kept.
+double rounded(double x) {
+  constexpr double kShift = 0x1.8p52;
+  const double whole = (x + kShift) - kShift;
+  return std::abs(x) < 0x1p51 ? whole : x;
+}
+
+/// Limits and rounds the 64 points.
+void digitise(double limit, double step, const Run& alive, Run& x) {
+  if (limit != 0)
+    for (double& a : x) a = std::clamp(a, -limit, limit);
+  if (step != 0)
+    for (double& a : x) a = step * rounded(a / step);
+  for (int l = 0; l < kRandomRun; ++l) x[l] = alive[l] != 0 ? x[l] : 0;
+}
 
 /// Calls f(first point, one past the last) for runs of 64 points.
 template <class F>
@@ -145,19 +167,17 @@ void ImperfectField::apply(const CompiledSensor& s, const ReadingKey& key, Field
   share(s, part.count, field);
   const SensorImperfections& of = s.imperfections;
   Draws draws(s, key);
+  Run x{};
   for_runs(s.points(), [&](int first, int end) {
     draws.draw(first);
     for (int c = 0; c < part.count; ++c) {
+      double* const from = &field[std::size_t(first * part.count + c)];
       const int component = part.first + c;
-      const double limit = of_component(of.saturation, component),
-                   step = of_component(of.quantisation, component);
-      for (int p = first; p < end; ++p) {
-        double& x = field[std::size_t(p * part.count + c)];
-        x = draws.gain(p - first) * x + draws.added(p - first, component);
-        if (limit != 0) x = std::clamp(x, -limit, limit);
-        if (step != 0) x = step * std::nearbyint(x / step);
-        if (draws.dead(p - first)) x = 0;
-      }
+      for (int l = 0; l < end - first; ++l) x[l] = from[l * part.count];
+      draws.add_to(component, x);
+      digitise(of_component(of.saturation, component), of_component(of.quantisation, component),
+               draws.alive(), x);
+      for (int l = 0; l < end - first; ++l) from[l * part.count] = x[l];
     }
   });
 }
@@ -190,18 +210,30 @@ void ImperfectField::scale_by_slope(const CompiledSensor& s, const ReadingKey& k
     share(s, 3, shared);
   }
   Draws draws(s, key);
+  Run x{};
   for_runs(s.points(), [&](int first, int end) {
     draws.draw(first);
-    for (int p = first; p < end; ++p)
-      for (int c = 0; c < 3; ++c) {
-        const auto k = std::size_t(3 * p + c);
-        const double limit = of_component(of.saturation, c), gain = draws.gain(p - first);
-        const bool flat =
-            draws.dead(p - first) ||
-            (limit != 0 && std::abs(gain * shared[k] + draws.added(p - first, c)) > limit);
-        change[k] = flat ? 0 : gain * change[k];
+    for (int c = 0; c < 3; ++c) {
+      const auto k = std::size_t(3 * first + c);
+      const double limit = of_component(of.saturation, c);
+      for (int l = 0; l < end - first && limit != 0; ++l) x[l] = shared[k + std::size_t(3 * l)];
+      if (limit != 0) draws.add_to(c, x);
+      for (int l = 0; l < end - first; ++l) {
+        const bool flat = draws.alive()[l] == 0 || (limit != 0 && std::abs(x[l]) > limit);
+        double& changes = change[k + std::size_t(3 * l)];
+        changes = flat ? 0 : draws.gain()[l] * changes;
       }
+    }
   });
+}
+
+void check_has_no_memory(const Model& model, int sensor) {
+  const SensorInfo& info = model.sensors()[std::size_t(sensor)];
+  if (info.past_states == 0) return;
+  const std::string where =
+      model.scene().sensors[std::size_t(sensor)].imperfections.source.prefix();
+  throw InputError(where + "derivatives of sensor '" + info.name +
+                   "', which has low_pass or delay; expected a sensor without them");
 }
 
 void read_ideal(PadReader& reader, const CompiledSensor& sensor, int group, int lane,

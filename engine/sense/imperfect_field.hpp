@@ -52,6 +52,9 @@ class ImperfectField {
   std::vector<double> before_, shared_;  // fields before crosstalk; ideal ones after it
 };
 
+/// Throws InputError for a sensor with memory: its reading has no derivative by one state alone.
+void check_has_no_memory(const Model& model, int sensor);
+
 /// Computes the ideal field of a sensor, (points, 3), in a lane of the group whose touches were
 /// found.
 void read_ideal(PadReader& reader, const CompiledSensor& sensor, int group, int lane,

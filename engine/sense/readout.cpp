@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <optional>
 #include <type_traits>
 
 #include "engine/model/compiled_model.hpp"
@@ -40,6 +41,9 @@ struct Readout::Impl {
   // Of imperfect sensors: what they do, their reading, and those of a block of small pads.
   ImperfectField imperfections;
   std::vector<double> one_reading, block_readings, of_tiles;
+  // Of sensors with memory: a field of an earlier state, and a block that holds such states.
+  std::vector<double> earlier;
+  std::optional<Batch> past;
 
   Impl(const Model& m, Precision p) : model(m), precision(p), reader(m), imperfections(m) {
     std::size_t room = 0;
@@ -54,6 +58,10 @@ struct Readout::Impl {
       if (small(s))
         block_readings.resize(
             std::max(block_readings.size(), std::size_t(kBlock * 3 * s.points())));
+    }
+    if (compiled(m).layout.past_states > 0) {
+      earlier.resize(one_reading.size());
+      past.emplace(m, kBlock);
     }
     (p == Precision::f64 ? wide.resize(room) : single.resize(room));
   }
@@ -163,13 +171,46 @@ struct Readout::Impl {
       for (double& x : field) x = static_cast<double>(static_cast<float>(x));
   }
 
+  /// Computes the field of a sensor with memory: the mean of earlier ideal fields with the sensor's
+  /// weights. It depends on states alone, so it does not matter who reads when.
+  void read_past(const Batch& batch, int environment, FieldOutput of, std::span<double> field) {
+    const CompiledSensor& s = sensor_of(of.sensor);
+    const std::span<double> one = std::span(earlier).first(field.size());
+    std::fill(field.begin(), field.end(), 0.0);
+    for (std::size_t k = 0; k < s.weights.size(); ++k) {
+      recall(batch, environment, s.delay + static_cast<int>(k));
+      place(*past, environment % kBlock, of.sensor);
+      fill(environment, of, one.data());
+      for (std::size_t i = 0; i < field.size(); ++i) field[i] += s.weights[k] * one[i];
+    }
+  }
+
+  /// Copies an environment, as it was `lag` steps ago, to its lane of `past`.
+  void recall(const Batch& batch, int environment, int lag) {
+    const BlockLayout& layout = compiled(model).layout;
+    const double* const from = batch.block(environment / kBlock) + environment % kBlock;
+    double* const to = past->block(0) + environment % kBlock;
+    for (int row = 0; row < layout.past; ++row) to[row * kBlock] = from[row * kBlock];
+    if (lag == 0) return;
+    const int numbers = layout.previous_q - layout.q;
+    const std::int64_t states = layout.past_states;
+    const auto slot =
+        static_cast<int>(((batch.steps(environment) - lag) % states + states) % states);
+    for (int row = 0; row < numbers; ++row)
+      to[(layout.q + row) * kBlock] = from[(layout.past + slot * numbers + row) * kBlock];
+  }
+
   /// Computes the reading of an imperfect sensor in an environment whose touches were found. Of a
   /// sum: the field.
   std::span<const double> read_imperfect(const Batch& batch, int environment, FieldOutput of) {
     const FieldForm form = of.form == FieldForm::sum ? FieldForm::field : of.form;
     const std::span<double> field =
         std::span(one_reading).first(numbers_of(sensor_of(of.sensor).points(), form));
-    fill(environment, {of.sensor, form}, field.data());
+    if (sensor_of(of.sensor).past_states() > 0) {
+      read_past(batch, environment, {of.sensor, form}, field);
+    } else {
+      fill(environment, {of.sensor, form}, field.data());
+    }
     make_imperfect(batch, environment, {of.sensor, form}, field);
     return field;
   }
@@ -316,7 +357,7 @@ struct Readout::Impl {
   /// shapes differ in size between lanes.
   [[nodiscard]] bool together(const Batch& batch, int number, int sensor) const {
     return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary &&
-           environments_of(batch, number) >= kFewest;
+           sensor_of(sensor).past_states() == 0 && environments_of(batch, number) >= kFewest;
   }
   static int environments_of(const Batch& batch, int number) {
     return std::min(kBlock, batch.environments() - number * kBlock);

@@ -52,6 +52,7 @@ ReturnBlock::ReturnBlock(const Task& task, const TaskGradientOptions& options)
       by_u_(kBlock * as_size(task.model().nu())),
       by_memory_(kBlock * as_size(task.spec().memory)),
       sound_(kBlock) {
+  if (task.spec().looks_at_tactile) check_has_no_memory(task.model());
   records_.assign(as_size(options.actions), ActionRecord(task));
   by_action_.assign(as_size(options.actions),
                     std::vector<double>(kBlock * task.spec().action.size()));
