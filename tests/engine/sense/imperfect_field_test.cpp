@@ -77,12 +77,6 @@ void expect_normal(const Numbers& x, double deviation) {
   EXPECT_NEAR(m.correlation, 0, bound);
 }
 
-Numbers every(const Numbers& x, std::size_t first, std::size_t stride) {
-  Numbers part;
-  for (std::size_t i = first; i < x.size(); i += stride) part.push_back(x[i]);
-  return part;
-}
-
 TEST(RandomRun, WordsAreThoseOfTheGenerator) {
   const RandomKey key{0x123456789abcdef, 1234567890123, 98765, Purpose::sensor_noise, 4711};
   RandomWords words;
@@ -140,35 +134,35 @@ TEST(Imperfections, NoiseIsWhiteAndNewInEveryStep) {
 }
 
 TEST(Imperfections, BiasAndGainBelongToThePointAndTheEpisode) {
-  const Model model(imperfect_scene([](auto& i) {
+  const Model offset(imperfect_scene([](auto&i) {
     i.bias = {0.02, 0.01};
-    i.gain = 0.1;
-  }));
-  Batch batch(model, 60, 3);
-  Numbers bias, gain;
-  std::set<double> first_bias;
+  })),
+      scaled(imperfect_scene([](auto&i) { i.gain = 0.1; }));
+  Batch a(offset, 60, 3), b(scaled, 60, 3);
+  touch(a), touch(b);
+  Numbers normal, shear, gain;
+  std::set<double> first;
   for (int e = 0; e < 60; ++e) {
-    // Nothing touches: what is read is the bias.
-    Numbers q = testing::q_of(batch, e), v = testing::v_of(batch, e);
-    const Numbers near = q;
-    q[std::size_t(model.nq() - 7)] += 1;
-    batch.set_state(e, q, v);
-    const Numbers offset = field_of(batch, e);
-    batch.set_steps(e, 17);
-    EXPECT_EQ(offset, field_of(batch, e));
-    for (const double x : every(offset, 2, 3)) bias.push_back(x);
-    first_bias.insert(offset[2]);
-    batch.set_state(e, near, v);
-    const Numbers ideal = field_of(batch, e, FieldForm::ideal), read = field_of(batch, e);
+    const Numbers ideal = field_of(a, e, FieldForm::ideal), moved = field_of(a, e),
+                  stretched = field_of(b, e);
+    for (std::size_t i = 0; i < ideal.size(); ++i)
+      (i % 3 == 2 ? normal : shear).push_back(moved[i] - ideal[i]);
+    first.insert(normal[normal.size() - ideal.size() / 3]);
     for (std::size_t p = 0; p < ideal.size() / 3; ++p) {
-      if (std::abs(ideal[3 * p + 2]) < 1e-3) continue;
-      gain.push_back((read[3 * p + 2] - offset[3 * p + 2]) / ideal[3 * p + 2] - 1);
+      if (std::abs(ideal[3 * p + 2]) < 1e-4) continue;
+      gain.push_back(stretched[3 * p + 2] / ideal[3 * p + 2] - 1);
+      for (std::size_t c = 0; c < 2; ++c)  // one gain for all three
+        EXPECT_NEAR(stretched[3 * p + c], (1 + gain.back()) * ideal[3 * p + c], 1e-12);
     }
+    a.set_steps(e, 17), b.set_steps(e, 17);
+    EXPECT_EQ(field_of(a, e), moved);
+    EXPECT_EQ(field_of(b, e), stretched);
   }
-  expect_normal(bias, 0.02);
+  expect_normal(normal, 0.02);
+  expect_normal(shear, 0.01);
   ASSERT_GT(gain.size(), 500U);
   expect_normal(gain, 0.1);
-  EXPECT_EQ(first_bias.size(), 60U);
+  EXPECT_EQ(first.size(), 60U);
 }
 
 TEST(Imperfections, TheSensorsGainIsOneNumberOfAnEpisode) {
@@ -239,7 +233,7 @@ TEST(Imperfections, SaturationAndQuantisationAreExact) {
   EXPECT_GT(clipped, 100);
 }
 
-/// Plain loops over a grid of (rows, cols) points with `components` numbers each.
+/// Against plain loops over pairs of points.
 TEST(Imperfections, CrosstalkAndSpreadKeepTheSum) {
   const double c = 0.08, width = 0.006;
   const Model model(imperfect_scene([&](auto& i) {
@@ -247,9 +241,10 @@ TEST(Imperfections, CrosstalkAndSpreadKeepTheSum) {
     i.spread = width;
   }));
   const double pitch0 = 0.05 / 10, pitch1 = 0.05 / 12;
-  Batch batch(model, 4, 3);
+  Batch batch(model, 18, 3);
   touch(batch);
-  for (int e = 0; e < 4; ++e) {
+  int touched = 0;
+  for (int e = 0; e < 18; ++e) {
     const Numbers ideal = field_of(batch, e, FieldForm::ideal), read = field_of(batch, e);
     constexpr int kRows = 11, kCols = 13;
     const auto weight = [&](int way, double pitch) {
@@ -285,12 +280,15 @@ TEST(Imperfections, CrosstalkAndSpreadKeepTheSum) {
           sums[k] += read[number], ideal_sums[k] += ideal[number];
           peak = std::max(peak, std::abs(ideal[number]));
         }
-    ASSERT_GT(peak, 1e-3);
+    touched += peak > 1e-3 ? 1 : 0;
     for (std::size_t i = 0; i < read.size(); ++i) EXPECT_NEAR(read[i], expected[i], 1e-13 * peak);
     for (int k = 0; k < 3; ++k) EXPECT_NEAR(sums[k], ideal_sums[k], 1e-12 * peak);
-    EXPECT_GT(std::count_if(read.begin(), read.end(), [](double x) { return x != 0; }),
-              std::count_if(ideal.begin(), ideal.end(), [](double x) { return x != 0; }));
+    const auto moved = [](const Numbers& x) {
+      return std::count_if(x.begin(), x.end(), [](double a) { return a != 0; });
+    };
+    EXPECT_TRUE(peak == 0 || moved(read) > moved(ideal));
   }
+  EXPECT_GT(touched, 4);
 }
 
 void set_all(SensorImperfections& i, bool grid) {
@@ -446,7 +444,15 @@ TEST(Imperfections, MemoryIsAMeanOfEarlierFields) {
     touch(batch);
     Stepper stepper(model);
     const Numbers u(18 * std::size_t(model.nu()));
-    const int e = 17, steps = 30;
+    const int steps = 30;
+    const auto peak = [&](int e) {
+      double most = 0;
+      for (const double x : field_of(batch, e, FieldForm::ideal))
+        most = std::max(most, std::abs(x));
+      return most;
+    };
+    int e = 17;
+    while (e > 0 && peak(e) < 1e-3) --e;
     std::vector<Numbers> ideal = {field_of(batch, e, FieldForm::ideal)};
     const auto at = [&](int k) -> const Numbers& { return ideal[std::size_t(std::max(k, 0))]; };
     double change = 0;
