@@ -76,11 +76,17 @@ LateralSpread spread_over(const TactileDescription& d, int points, double pitch)
   return spread;
 }
 
+/// Whether the points of a sensor are those of its array, also where they have been moved since.
+bool has_grid(const TactileDescription& d) {
+  return d.points.empty() || d.points.size() == static_cast<std::size_t>(d.array.rows) *
+                                                    static_cast<std::size_t>(d.array.cols);
+}
+
 }  // namespace
 
 void compile_imperfections(const TactileDescription& d, double timestep, CompiledSensor& s,
                            SensorInfo& info) {
-  check_imperfections(d.imperfections, d.name, d.points.empty());
+  check_imperfections(d.imperfections, d.name, has_grid(d));
   if (!is_imperfect(d.imperfections)) return;
   if (s.points() > kMostRandomPoints)
     fail(d, fmt::format("{} points; expected {} at most", s.points(), kMostRandomPoints));
@@ -89,11 +95,15 @@ void compile_imperfections(const TactileDescription& d, double timestep, Compile
   s.name_bits = bits_of(d.name);
   if (has_memory(d.imperfections)) remember(d, timestep, s);
   info.past_states = s.past_states();
+  if (!has_grid(d)) return;
+  s.grid_rows = d.array.rows, s.grid_cols = d.array.cols;
   if (d.imperfections.spread == 0) return;
   const kernels::Vec3<double> diagonal = vec3_of(d.array.corner1) - vec3_of(d.array.corner0);
-  s.spread = {
-      spread_over(d, s.rows, std::abs(dot(diagonal, vec3_of(d.array.axis0))) / (s.rows - 1)),
-      spread_over(d, s.cols, std::abs(dot(diagonal, vec3_of(d.array.axis1))) / (s.cols - 1))};
+  const auto pitch = [&](const Vector3& axis, int points) {
+    return std::abs(dot(diagonal, vec3_of(axis))) / std::max(points - 1, 1);
+  };
+  s.spread = {spread_over(d, s.grid_rows, pitch(d.array.axis0, s.grid_rows)),
+              spread_over(d, s.grid_cols, pitch(d.array.axis1, s.grid_cols))};
 }
 
 }  // namespace tangere

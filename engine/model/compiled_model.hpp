@@ -78,8 +78,9 @@ struct CompiledSensor {
   std::vector<int> targets;  ///< bodies that it can feel
   bool sizes_vary = false;   ///< some of their sizes vary
   SensorImperfections imperfections{};
-  bool imperfect = false;  ///< some imperfection is on
-  int number = 0;          ///< of the sensor in the scene
+  bool imperfect = false;            ///< some imperfection is on
+  int number = 0;                    ///< of the sensor in the scene
+  int grid_rows = 0, grid_cols = 0;  ///< of points that have neighbours, row-major
   /// Of the sensor's name. Seeds of its random numbers differ by it, so that other sensors do not
   /// matter.
   std::uint64_t name_bits = 0;

@@ -117,7 +117,7 @@ ImperfectField::ImperfectField(const Model& model) {
 void ImperfectField::spread(const CompiledSensor& s, int components, bool back,
                             std::span<double> field) {
   if (s.imperfections.spread == 0) return;
-  const int row = components * s.cols;
+  const int row = components * s.grid_cols;
   const auto along = [&](const LateralSpread& of, int points, int stride, int others, auto place) {
     if (of.kernel.empty()) return;
     std::copy(field.begin(), field.end(), before_.begin());
@@ -136,8 +136,8 @@ void ImperfectField::spread(const CompiledSensor& s, int components, bool back,
       }
     }
   };
-  along(s.spread[0], s.rows, row, row, [&](int i, int other) { return i * row + other; });
-  along(s.spread[1], s.cols, components, components * s.rows, [&](int i, int other) {
+  along(s.spread[0], s.grid_rows, row, row, [&](int i, int other) { return i * row + other; });
+  along(s.spread[1], s.grid_cols, components, components * s.grid_rows, [&](int i, int other) {
     return other / components * row + i * components + other % components;
   });
 }
@@ -147,13 +147,13 @@ void ImperfectField::share(const CompiledSensor& s, int components, std::span<do
   const double c = s.imperfections.crosstalk;
   if (c == 0) return;
   std::copy(field.begin(), field.end(), before_.begin());
-  const auto width = std::size_t(components), row = width * std::size_t(s.cols);
+  const auto width = std::size_t(components), row = width * std::size_t(s.grid_cols);
   const double* const from = before_.data();
-  for (std::size_t i = 0; i < std::size_t(s.rows); ++i)
+  for (std::size_t i = 0; i < std::size_t(s.grid_rows); ++i)
     for (std::size_t k = i * row; k < (i + 1) * row; ++k) {
       double sum = 0;
       if (i > 0) sum += from[k - row] - from[k];
-      if (i + 1 < std::size_t(s.rows)) sum += from[k + row] - from[k];
+      if (i + 1 < std::size_t(s.grid_rows)) sum += from[k + row] - from[k];
       if (k >= i * row + width) sum += from[k - width] - from[k];
       if (k + width < (i + 1) * row) sum += from[k + width] - from[k];
       field[k] = from[k] + c * sum;

@@ -29,7 +29,7 @@ Scene with_imperfections(Scene scene, bool memory = false, double quantisation =
     if (d.points.empty()) i.crosstalk = 0.05, i.spread = 0.001;
     i.gain = 0.05, i.sensor_gain = 0.03, i.dead = 0.02;
     i.bias = {1e-4, 5e-5}, i.noise = {2e-4, 1e-4};
-    i.saturation = {5e-3, 2e-3};
+    i.saturation = {2e-2, 1e-2};
     i.quantisation = {quantisation, quantisation};
     if (memory) i.delay = 0.012, i.low_pass = 0.01;
   }
@@ -169,7 +169,7 @@ TEST(ImperfectSensors, GradientsOfALossAgreeByThreeRoutes) {
   const ControlProgram program(model, model.timestep(), 3);
   const auto loss = make_loss(LossKind::tactile, model, 5);
   CheckOptions options;
-  options.steps = 60;
+  options.steps = 100;
   options.entries = 3;
   options.settled = 1e-6;
   options.stepper.tolerance = 1e-12;
