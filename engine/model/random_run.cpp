@@ -12,35 +12,28 @@ namespace tangere {
 namespace {
 
 /// Returns ln x of a positive normal number, without a branch.
-inline double logarithm(double x) {
-  constexpr std::uint64_t kHalfRoot = 0x3FE6A09E667F3BCD;  // √½
-  constexpr std::uint64_t kMantissa = 0x000FFFFFFFFFFFFF;
-  const std::uint64_t bits = std::bit_cast<std::uint64_t>(x) - kHalfRoot;
-  // e + 2048 as the lowest bits of 2^52, so that it becomes a double without a conversion.
-  const std::uint64_t biased = (bits >> 52) ^ 0x800;
-  const double e = std::bit_cast<double>((biased & 0xFFF) | 0x4330000000000000) - (0x1p52 + 2048);
-  const double m = std::bit_cast<double>((bits & kMantissa) + kHalfRoot);
-  const double s = (m - 1) / (m + 1), z = s * s;
-  double sum = 1.0 / 17;
-  for (const double c : {1.0 / 15, 1.0 / 13, 1.0 / 11, 1.0 / 9, 1.0 / 7, 1.0 / 5, 1.0 / 3, 1.0})
-    sum = sum * z + c;
-  return e * std::numbers::ln2 + 2 * s * sum;
+inline float logarithm(float x) {
+  constexpr std::uint32_t kHalfRoot = 0x3f3504f3;  // √½
+  const std::uint32_t bits = std::bit_cast<std::uint32_t>(x) - kHalfRoot;
+  const auto e = static_cast<float>(static_cast<std::int32_t>(bits) >> 23);
+  const float m = std::bit_cast<float>((bits & 0x7fffff) + kHalfRoot);
+  const float s = (m - 1) / (m + 1), z = s * s;
+  float sum = 1.0F / 9;
+  for (const float c : {1.0F / 7, 1.0F / 5, 1.0F / 3, 1.0F}) sum = sum * z + c;
+  return e * std::numbers::ln2_v<float> + 2 * s * sum;
 }
 
 /// Fills cosine and sine of 2π word/2³².
-inline void cosine_and_sine(std::uint32_t word, double& cosine, double& sine) {
+inline void cosine_and_sine(std::uint32_t word, float& cosine, float& sine) {
   const std::uint32_t quarter = (word + 0x20000000U) >> 30;
-  const auto rest = static_cast<std::int32_t>(word - (quarter << 30));
-  const double x = double(rest) * (2 * std::numbers::pi * 0x1p-32), z = x * x;
-  double c = 1.0 / 87178291200 * -1, s = 1.0 / 6227020800;
-  for (const double next :
-       {1.0 / 479001600, -1.0 / 3628800, 1.0 / 40320, -1.0 / 720, 1.0 / 24, -1.0 / 2, 1.0})
-    c = c * z + next;
-  for (const double next : {-1.0 / 39916800, 1.0 / 362880, -1.0 / 5040, 1.0 / 120, -1.0 / 6, 1.0})
-    s = s * z + next;
+  const auto rest = static_cast<float>(static_cast<std::int32_t>(word - (quarter << 30)));
+  const float x = rest * (2 * std::numbers::pi_v<float> * 0x1p-32F), z = x * x;
+  float c = 1.0F / 40320, s = -1.0F / 5040;
+  for (const float next : {-1.0F / 720, 1.0F / 24, -0.5F, 1.0F}) c = c * z + next;
+  for (const float next : {1.0F / 120, -1.0F / 6, 1.0F}) s = s * z + next;
   s *= x;
   const bool odd = (quarter & 1U) != 0;
-  const double a = odd ? s : c, b = odd ? c : s;
+  const float a = odd ? s : c, b = odd ? c : s;
   cosine = ((quarter + 1) & 2U) != 0 ? -a : a;
   sine = (quarter & 2U) != 0 ? -b : b;
 }
@@ -70,8 +63,9 @@ void random_run(const RandomKey& first, RandomWords& words) {
 void normal_run(const RandomWords& words, RandomNormals& normals) {
   for (std::size_t pair = 0; pair < 4; pair += 2)
     for (int l = 0; l < kRandomRun; ++l) {
-      const double radius = std::sqrt(-2 * logarithm(fraction_of(words[pair][l])));
-      double cosine, sine;
+      const auto a = static_cast<float>(static_cast<std::int32_t>(words[pair][l] >> 1));
+      const float radius = std::sqrt(-2 * logarithm((a + 0.5F) * 0x1p-31F));
+      float cosine, sine;
       cosine_and_sine(words[pair + 1][l], cosine, sine);
       normals[pair][l] = radius * cosine;
       normals[pair + 1][l] = radius * sine;

@@ -42,7 +42,8 @@ class Draws {
     for (int l = 0; l < kRandomRun; ++l) gain_[l] = sensor_ + of_.gain * of_point_[3][l];
     if (of_.dead == 0) return;
     random_run(random_key(0, Purpose::dead_point, first), words_);
-    for (int l = 0; l < kRandomRun; ++l) alive_[l] = fraction_of(words_[0][l]) < of_.dead ? 0 : 1;
+    const auto deadly = static_cast<std::uint64_t>(of_.dead * 0x1p32);
+    for (int l = 0; l < kRandomRun; ++l) alive_[l] = words_[0][l] < deadly ? 0 : 1;
   }
 
   /// Scales a component of the 64 points, and adds to it.
@@ -160,26 +161,43 @@ void ImperfectField::share(const CompiledSensor& s, int components, std::span<do
     }
 }
 
+namespace {
+
+/// Does what happens to each point by itself. A field has `Components` numbers for each.
+template <int Components>
+void spoil_points(const CompiledSensor& s, const ReadingKey& key, int first_component,
+                  double* field) {
+  const SensorImperfections& of = s.imperfections;
+  Draws draws(s, key);
+  std::array<Run, Components> x{};
+  for_runs(s.points(), [&](int first, int end) {
+    draws.draw(first);
+    double* const from = field + Components * first;
+    for (int l = 0; l < end - first; ++l)
+      for (int c = 0; c < Components; ++c) x[c][l] = from[Components * l + c];
+    for (int c = 0; c < Components; ++c) {
+      const int component = first_component + c;
+      draws.add_to(component, x[c]);
+      digitise(of_component(of.saturation, component), of_component(of.quantisation, component),
+               draws.alive(), x[c]);
+    }
+    for (int l = 0; l < end - first; ++l)
+      for (int c = 0; c < Components; ++c) from[Components * l + c] = x[c][l];
+  });
+}
+
+}  // namespace
+
 void ImperfectField::apply(const CompiledSensor& s, const ReadingKey& key, FieldPart part,
                            std::span<double> field) {
   if (!s.imperfect) return;
   spread(s, part.count, false, field);
   share(s, part.count, field);
-  const SensorImperfections& of = s.imperfections;
-  Draws draws(s, key);
-  Run x{};
-  for_runs(s.points(), [&](int first, int end) {
-    draws.draw(first);
-    for (int c = 0; c < part.count; ++c) {
-      double* const from = &field[std::size_t(first * part.count + c)];
-      const int component = part.first + c;
-      for (int l = 0; l < end - first; ++l) x[l] = from[l * part.count];
-      draws.add_to(component, x);
-      digitise(of_component(of.saturation, component), of_component(of.quantisation, component),
-               draws.alive(), x);
-      for (int l = 0; l < end - first; ++l) from[l * part.count] = x[l];
-    }
-  });
+  switch (part.count) {
+    case 1: return spoil_points<1>(s, key, part.first, field.data());
+    case 2: return spoil_points<2>(s, key, part.first, field.data());
+    default: return spoil_points<3>(s, key, part.first, field.data());
+  }
 }
 
 void ImperfectField::push_forward(const CompiledSensor& s, const ReadingKey& key,

@@ -200,24 +200,34 @@ struct Readout::Impl {
       to[(layout.q + row) * kBlock] = from[(layout.past + slot * numbers + row) * kBlock];
   }
 
-  /// Computes the reading of an imperfect sensor in an environment whose touches were found. Of a
-  /// sum: the field.
+  /// Fills in the reading of an imperfect sensor in an environment whose touches were found.
+  void read_imperfect(const Batch& batch, int environment, FieldOutput of,
+                      std::span<double> field) {
+    if (sensor_of(of.sensor).past_states() > 0) {
+      read_past(batch, environment, of, field);
+    } else {
+      fill(environment, of, field.data());
+    }
+    make_imperfect(batch, environment, of, field);
+  }
+
+  /// The same into memory of the readout. Of a sum: the field.
   std::span<const double> read_imperfect(const Batch& batch, int environment, FieldOutput of) {
     const FieldForm form = of.form == FieldForm::sum ? FieldForm::field : of.form;
     const std::span<double> field =
         std::span(one_reading).first(numbers_of(sensor_of(of.sensor).points(), form));
-    if (sensor_of(of.sensor).past_states() > 0) {
-      read_past(batch, environment, {of.sensor, form}, field);
-    } else {
-      fill(environment, {of.sensor, form}, field.data());
-    }
-    make_imperfect(batch, environment, {of.sensor, form}, field);
+    read_imperfect(batch, environment, {of.sensor, form}, field);
     return field;
   }
 
   /// Writes a reading of an imperfect sensor whose touches were found.
   template <class T>
   void write_imperfect(const Batch& batch, int environment, FieldOutput of, T* to) {
+    if constexpr (std::is_same_v<T, double>)
+      if (of.form != FieldForm::sum) {
+        const std::size_t numbers = numbers_of(sensor_of(of.sensor).points(), of.form);
+        return read_imperfect(batch, environment, of, {to, numbers});
+      }
     const std::span<const double> field = read_imperfect(batch, environment, of);
     if (of.form == FieldForm::sum) return add_up_imperfect(of.sensor, field, to);
     std::transform(field.begin(), field.end(), to, [](double x) { return static_cast<T>(x); });

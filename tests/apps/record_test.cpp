@@ -250,7 +250,7 @@ TEST(Record, ImperfectSensorsReadAlikeInEveryFile) {
   const json inspected = run_json(folder, {"inspect", "ball.xml"});
   int on = 0;
   for (const json& effect : inspected.at("effects"))
-    on += effect.at("name") == "tactile pad imperfections" && effect.at("on") == true ? 1 : 0;
+    on += effect.at("name") == "sensor imperfections" && effect.at("on") == true ? 1 : 0;
   EXPECT_EQ(on, 1);
 }
 

@@ -90,7 +90,7 @@ TEST(RandomRun, WordsAreThoseOfTheGenerator) {
   }
 }
 
-TEST(RandomRun, NormalNumbersAreBoxAndMullers) {
+TEST(RandomRun, NormalNumbersAreThoseOfBoxAndMuller) {
   RandomWords words;
   RandomNormals z;
   for (std::uint32_t run = 0; run < 200; ++run) {
@@ -103,12 +103,36 @@ TEST(RandomRun, NormalNumbersAreBoxAndMullers) {
     normal_run(words, z);
     for (std::size_t l = 0; l < kRandomRun; ++l)
       for (std::size_t k = 0; k < 4; k += 2) {
-        const double radius = std::sqrt(-2 * std::log((words[k][l] + 0.5) * 0x1p-32)),
+        const double radius = std::sqrt(-2 * std::log((double(words[k][l] >> 1) + 0.5) * 0x1p-31)),
                      angle = 2 * std::numbers::pi * words[k + 1][l] * 0x1p-32;
-        EXPECT_NEAR(z[k][l], radius * std::cos(angle), 2e-12);
-        EXPECT_NEAR(z[k + 1][l], radius * std::sin(angle), 2e-12);
+        // Close to 1 the logarithm's argument has 24 bits.
+        const double bound = 2e-6 * (1 + radius) + 1e-7 / std::max(radius, 3e-4);
+        EXPECT_NEAR(double(z[k][l]), radius * std::cos(angle), bound);
+        EXPECT_NEAR(double(z[k + 1][l]), radius * std::sin(angle), bound);
       }
   }
+}
+
+TEST(RandomRun, NormalNumbersHaveTheirMoments) {
+  RandomWords words;
+  RandomNormals z;
+  double sums[4] = {}, n = 0, beyond = 0;
+  for (std::uint32_t run = 0; run < 4000; ++run) {
+    random_run({5, 1, run, Purpose::sensor_noise, 0}, words);
+    normal_run(words, z);
+    for (const auto& row : z)
+      for (const float x : row) {
+        for (int k = 0; k < 4; ++k) sums[k] += std::pow(double(x), k + 1);
+        beyond += std::abs(x) > 3 ? 1 : 0;
+        ++n;
+      }
+  }
+  // Five standard errors of each moment of a normal number.
+  EXPECT_NEAR(sums[0] / n, 0, 5 / std::sqrt(n));
+  EXPECT_NEAR(sums[1] / n, 1, 5 * std::sqrt(2 / n));
+  EXPECT_NEAR(sums[2] / n, 0, 5 * std::sqrt(15 / n));
+  EXPECT_NEAR(sums[3] / n, 3, 5 * std::sqrt(96 / n));
+  EXPECT_NEAR(beyond / n, 0.0026998, 5 * std::sqrt(0.0027 / n));
 }
 
 TEST(Imperfections, NoiseIsWhiteAndNewInEveryStep) {
