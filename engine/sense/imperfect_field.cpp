@@ -114,33 +114,39 @@ ImperfectField::ImperfectField(const Model& model) {
   shared_.resize(most);
 }
 
+/// Multiplies what belongs to each place along an axis, `stride` numbers apart, by its scale.
+/// `lines`: how often the axis repeats.
+static void scale_along(const LateralSpread& of, int stride, int lines, double* x) {
+  for (int line = 0; line < lines; ++line)
+    for (const double scale : of.scale)
+      for (int k = 0; k < stride; ++k) *x++ *= scale;
+}
+
 /// y_i = Σ_j kernel[|i - j|] scale_j x_j along rows, then along columns; `back`: the transpose.
 void ImperfectField::spread(const CompiledSensor& s, int components, bool back,
                             std::span<double> field) {
   if (s.imperfections.spread == 0) return;
   const int row = components * s.grid_cols;
-  const auto along = [&](const LateralSpread& of, int points, int stride, int others, auto place) {
+  const auto along = [&](const LateralSpread& of, int points, int stride, int lines) {
     if (of.kernel.empty()) return;
+    if (!back) scale_along(of, stride, lines, field.data());
     std::copy(field.begin(), field.end(), before_.begin());
+    std::fill(field.begin(), field.end(), 0.0);
     const int reach = static_cast<int>(of.kernel.size()) - 1;
-    for (int i = 0; i < points; ++i) {
-      const int low = std::max(0, i - reach), high = std::min(points - 1, i + reach);
-      for (int other = 0; other < others; ++other) field[std::size_t(place(i, other))] = 0;
-      for (int j = low; j <= high; ++j) {
-        const double share =
-            of.kernel[std::size_t(std::abs(i - j))] * of.scale[std::size_t(back ? i : j)];
-        const int shift = (j - i) * stride;
-        for (int other = 0; other < others; ++other) {
-          const int at = place(i, other);
-          field[std::size_t(at)] += share * before_[std::size_t(at + shift)];
-        }
+    for (int line = 0; line < lines; ++line) {
+      double* const to = field.data() + line * points * stride;
+      const double* const from = before_.data() + line * points * stride;
+      for (int way = -reach; way <= reach; ++way) {
+        const double share = of.kernel[std::size_t(std::abs(way))];
+        const int first = stride * std::max(0, -way), end = stride * std::min(points, points - way),
+                  shift = stride * way;
+        for (int k = first; k < end; ++k) to[k] += share * from[k + shift];
       }
     }
+    if (back) scale_along(of, stride, lines, field.data());
   };
-  along(s.spread[0], s.grid_rows, row, row, [&](int i, int other) { return i * row + other; });
-  along(s.spread[1], s.grid_cols, components, components * s.grid_rows, [&](int i, int other) {
-    return other / components * row + i * components + other % components;
-  });
+  along(s.spread[0], s.grid_rows, row, 1);
+  along(s.spread[1], s.grid_cols, components, s.grid_rows);
 }
 
 /// x += c Σ (neighbour - x) on a grid, component by component. The matrix is symmetric.
