@@ -240,9 +240,10 @@ Command add_bench(CLI::App& program) {
                         "Read tactile fields every N steps [default: the scene's, or 1]");
   add_text(app, "--frames", o.frames, "NAME",
            "Fields to read: dense (every point), compact (touched tiles) or none [default: dense]");
-  add_text(app, "--record", o.record, "LIST",
-           "Readings to take, separated by commas: a sensor's field (pad), pad.pressure, pad.shear "
-           "or pad.sum [default: the scene's <outputs>, or all fields]");
+  add_text(
+      app, "--record", o.record, "LIST",
+      "Readings to take, separated by commas: a sensor's field (pad), pad.pressure, pad.shear, "
+      "pad.sum or pad.ideal [default: the scene's <outputs>, or all fields]");
   add_whole_number<int>(app, "--repeat", o.repeat, 1, kMostPasses,
                         "Timed passes over the episode; the best counts [default: 3]");
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,

@@ -459,10 +459,11 @@ Command add_generate(CLI::App& program) {
   add_text(app, "--tactile", o.tactile, "KIND",
            "Storage of large fields: dense, or sparse, which leaves out tiles of zeros [default: "
            "dense]");
-  add_text(app, "--record", o.record, "LIST",
-           "Observations to store, separated by commas: q, v, variables, a sensor's field (pad), "
-           "pad.pressure, pad.shear or pad.sum; other fields are not computed [default: the "
-           "scene's <outputs>, or all]");
+  add_text(
+      app, "--record", o.record, "LIST",
+      "Observations to store, separated by commas: q, v, variables, a sensor's field (pad), "
+      "pad.pressure, pad.shear, pad.sum or pad.ideal; other fields are not computed [default: the "
+      "scene's <outputs>, or all]");
   add_text(app, "--gradients", o.gradients, "KIND",
            "Derivatives to store: none, return (for a scene with --loss), or jacobians of each row "
            "[default: none]");

@@ -45,11 +45,12 @@ int elements_of(const EffectCosts& costs, EffectKind kind) {
       }));
 }
 
-/// Friction and damping of contacts and sensors.
+/// Friction and damping of contacts and sensors, and what sensors add to their readings.
 bool is_of_elements(EffectKind kind) {
-  constexpr EffectKind kKinds[] = {EffectKind::pair_friction,   EffectKind::pair_damping,
-                                   EffectKind::ground_friction, EffectKind::ground_damping,
-                                   EffectKind::tactile_shear,   EffectKind::tactile_damping};
+  constexpr EffectKind kKinds[] = {EffectKind::pair_friction,       EffectKind::pair_damping,
+                                   EffectKind::ground_friction,     EffectKind::ground_damping,
+                                   EffectKind::tactile_shear,       EffectKind::tactile_damping,
+                                   EffectKind::sensor_imperfections};
   return std::find(std::begin(kKinds), std::end(kKinds), kind) != std::end(kKinds);
 }
 

@@ -12,8 +12,8 @@ namespace tangere::apps {
 namespace {
 
 Json tensor_json(const TensorSpec& t) {
-  return {{"name", t.name},       {"shape", t.shape},     {"unit", t.unit},
-          {"meaning", t.meaning}, {"low", finite(t.low)}, {"high", finite(t.high)},
+  return {{"name", t.name},       {"shape", t.shape},          {"unit", t.unit},
+          {"meaning", t.meaning}, {"low", finite(t.low)},      {"high", finite(t.high)},
           {"scale", t.scale},     {"privileged", t.privileged}};
 }
 

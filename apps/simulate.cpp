@@ -419,10 +419,11 @@ Command add_simulate(CLI::App& program) {
                                  "Steps to take [default: as many as the controls last]");
   add_whole_number<int>(app, "--envs", o.environments, 1, kMostEnvironments,
                         "Environments stepped together [default: 1, or those of --state-from]");
-  add_text(app, "--record", o.record, "LIST",
-           "What to compute and store besides q and v, separated by commas: bodies, variables, a "
-           "sensor's field (pad), pad.pressure, pad.shear or pad.sum [default: the scene's "
-           "<outputs>, or all]");
+  add_text(
+      app, "--record", o.record, "LIST",
+      "What to compute and store besides q and v, separated by commas: bodies, variables, a "
+      "sensor's field (pad), pad.pressure, pad.shear, pad.sum or pad.ideal [default: the scene's "
+      "<outputs>, or all]");
   add_whole_number<int>(app, "--every", o.every, 1, kMostEnvironments,
                         "Read tactile fields every N steps [default: the scene's, or 1]");
   add_text(app, "--state-from", o.state_from, "F.h5",

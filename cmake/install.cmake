@@ -46,6 +46,7 @@ set(public_headers
   engine/model/scene.hpp
   engine/model/scene_number.hpp
   engine/model/scheme.hpp
+  engine/model/sensor_imperfections.hpp
   engine/model/shapes.hpp
   engine/rows/episode_sink.hpp
   engine/rows/row_sink.hpp

@@ -328,7 +328,8 @@ PadPoint pad_point(const kernels::PadTiles& pad, int tile, int k) {
 }  // namespace
 
 void DualStage::field(int sensor, const double* column, std::span<const double> numbers,
-                      std::span<const double> points, std::span<double> field_dot) {
+                      std::span<const double> points, std::span<double> field,
+                      std::span<double> field_dot) {
   Impl& i = *impl_;
   const CompiledSensor& felt = i.m.sensors[std::size_t(sensor)];
   const kernels::PadTiles pad = felt.tiles();
@@ -349,6 +350,7 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
   });
   const kernels::Mat3<double> turn =
       transpose(felt.pad.R) * i.m.bodies[std::size_t(felt.body)].frame.R;
+  std::fill(field.begin(), field.end(), 0.0);
   std::fill(field_dot.begin(), field_dot.end(), 0.0);
   const kernels::LinkPose<D> hand = pose(felt.link);
   for (const int number : felt.targets) {
@@ -379,10 +381,13 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
         const kernels::LawParameters<D> law = {transformed(coefficients, of_point), felt.law, 0.0};
         const kernels::Vec3<D> xi = {{p.at.x, moves.x}, {p.at.y, moves.y}, {p.at.z, moves.z}};
         const auto at = kernels::point_contact(shape, law, t.Q, t.c, t.omega, t.v, xi);
-        const double f[3] = {at.force.x.epsilon, at.force.y.epsilon, at.force.z.epsilon};
+        const D f[3] = {at.force.x, at.force.y, at.force.z};
         for (int c = 0; c < 3; ++c)
-          for (int e = 0; e < 3; ++e)
-            field_dot[std::size_t(3 * p.index + c)] += p.rows[3 * c + e] * f[e];
+          for (int e = 0; e < 3; ++e) {
+            const auto at_c = std::size_t(3 * p.index + c);
+            if (!field.empty()) field[at_c] += p.rows[3 * c + e] * f[e].value;
+            field_dot[at_c] += p.rows[3 * c + e] * f[e].epsilon;
+          }
       }
     });
   }

@@ -43,8 +43,9 @@ class DualStage {
   /// Computes how the field of a sensor, (points, 3), changes at the state centre ⊕ 0 with twist r
   /// (c0_over_h = 0, inverse_h = 1). `numbers`: tangents as rows of BlockCotangent::parameters; or
   /// empty. `points`: (points, kPointNumbers), tangents of every point's own numbers; or empty.
+  /// `field`: the field itself, (points, 3); or empty.
   void field(int sensor, const double* column, std::span<const double> numbers,
-             std::span<const double> points, std::span<double> field_dot);
+             std::span<const double> points, std::span<double> field, std::span<double> field_dot);
 
  private:
   struct Impl;

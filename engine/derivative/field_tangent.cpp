@@ -6,6 +6,11 @@
 //       δW = Ad δV₂ - δV₁ - Z × ε  in a pad's axes
 #include "engine/derivative/field_tangent.hpp"
 
+#include <algorithm>
+#include <numeric>
+
+#include "engine/sense/dense_tiles.hpp"
+#include "engine/sense/imperfect_field.hpp"
 #include "engine/sense/pad_reader.hpp"
 
 namespace tangere {
@@ -44,12 +49,50 @@ struct FieldTangent::Impl {
   int met_group = -1, met_sensor = -1;  ///< group and sensor of the shapes that the reader holds
   std::vector<LinkTangent> links;
   std::vector<kernels::TouchTangent> touches;
+  ImperfectField imperfections;
+  std::vector<double> whole, ideal;  ///< (points, 3) of an imperfect sensor
+  std::vector<int> all;              ///< its tiles
+  std::vector<double> of_tiles;      ///< (tiles, 3, 64)
 
-  explicit Impl(const Model& m) : model(m), reader(m), links(compiled(m).links.size()) {
+  explicit Impl(const Model& m)
+      : model(m), reader(m), links(compiled(m).links.size()), imperfections(m) {
     std::size_t targets = 0;
-    for (const CompiledSensor& s : compiled(m).sensors)
+    for (const CompiledSensor& s : compiled(m).sensors) {
       targets = std::max(targets, s.targets.size());
+      if (!s.imperfect) continue;
+      whole.resize(std::max(whole.size(), 3 * std::size_t(s.points())));
+      all.resize(std::max(all.size(), std::size_t(s.n_tiles())));
+    }
     touches.resize(targets);
+    ideal.resize(whole.size());
+    of_tiles.resize(all.size() * 3 * kernels::kTactileTile);
+    std::iota(all.begin(), all.end(), 0);
+  }
+
+  /// Computes how the ideal field of a sensor changes in the tiles. Its touches were found.
+  void ideal_field(const CompiledSensor& s, std::span<const int> tiles, std::span<double> change) {
+    const auto a = reader.arguments<double>(s.number, lane / kGroup, lane % kGroup);
+    for (std::size_t k = 0; k < s.targets.size(); ++k)
+      touches[k] = against(s, compiled(model).bodies[std::size_t(s.targets[k])]);
+    kernels::active_kernels().field_tangent({a.pad, a.law, a.n_touches, a.shapes, a.touches,
+                                             touches.data(), static_cast<int>(tiles.size()),
+                                             tiles.data(), change.data()});
+  }
+
+  /// The same for the reading of an imperfect sensor.
+  void imperfect_field(const CompiledSensor& s, std::span<const int> tiles,
+                       std::span<double> change) {
+    const kernels::PadTiles pad = s.tiles();
+    const auto every = std::span(all).first(std::size_t(pad.tiles()));
+    const auto field = std::span(whole).first(3 * std::size_t(s.points()));
+    ideal_field(s, every, of_tiles);
+    for (const int tile : every)
+      expand_tile<3>(pad, tile, of_tiles.data() + 3 * kernels::kTactileTile * tile, field.data());
+    read_ideal(reader, s, lane / kGroup, lane % kGroup, ideal);
+    imperfections.push_forward(s, key_of(*batch, kBlock * block + lane),
+                               std::span(ideal).first(field.size()), field);
+    for (std::size_t k = 0; k < tiles.size(); ++k)
+      gather_tile(pad, tiles[k], field.data(), change.data() + 3 * kernels::kTactileTile * k);
   }
 
   [[nodiscard]] LinkPose<double> pose(int link) const {
@@ -105,18 +148,18 @@ void FieldTangent::move(int lane, std::span<const double> q, std::span<const dou
 
 void FieldTangent::field(int sensor, std::span<const int> tiles, std::span<double> change) {
   Impl& i = *impl_;
+  check_has_no_memory(i.model, sensor);
   const CompiledModel& m = compiled(i.model);
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   const int group = i.lane / kGroup;
   if (i.met_group != group || i.met_sensor != sensor)
     i.reader.find_touches(*i.batch, i.block, group, sensor);
   i.met_group = group, i.met_sensor = sensor;
-  const auto a = i.reader.arguments<double>(sensor, group, i.lane % kGroup);
-  for (std::size_t k = 0; k < s.targets.size(); ++k)
-    i.touches[k] = i.against(s, m.bodies[std::size_t(s.targets[k])]);
-  kernels::active_kernels().field_tangent({a.pad, a.law, a.n_touches, a.shapes, a.touches,
-                                           i.touches.data(), static_cast<int>(tiles.size()),
-                                           tiles.data(), change.data()});
+  if (s.imperfect) {
+    i.imperfect_field(s, tiles, change);
+  } else {
+    i.ideal_field(s, tiles, change);
+  }
 }
 
 }  // namespace tangere

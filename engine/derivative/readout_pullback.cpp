@@ -11,6 +11,7 @@
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/sense/dense_tiles.hpp"
+#include "engine/sense/imperfect_field.hpp"
 #include "engine/sense/pad_reader.hpp"
 
 namespace tangere {
@@ -49,15 +50,21 @@ struct ReadoutPullback::Impl {
   std::vector<int> tiles;  ///< tiles of a whole field that are not zero
   std::vector<double> of_tiles;
   AlignedVector<double> own;  ///< (tiles, kPointNumbers, 64)
+  ImperfectField imperfections;
+  std::vector<double> whole, ideal;  ///< (points, 3) of an imperfect sensor
 
-  explicit Impl(const Model& m) : model(m), reader(m), met(kGroups, -1) {
+  explicit Impl(const Model& m) : model(m), reader(m), met(kGroups, -1), imperfections(m) {
     const CompiledModel& c = compiled(m);
     for (auto& l : links) l.resize(c.links.size());
     rows.resize(std::size_t(c.nq + 5 * c.nv));
     std::size_t bytes = 0, targets = 0;
     for (const kernels::KernelTable* t : kernels::available_kernels())
       bytes = std::max(bytes, t->pullback_bytes(c.view));
-    for (const CompiledSensor& s : c.sensors) targets = std::max(targets, s.targets.size());
+    for (const CompiledSensor& s : c.sensors) {
+      targets = std::max(targets, s.targets.size());
+      if (s.imperfect) whole.resize(std::max(whole.size(), 3 * std::size_t(s.points())));
+    }
+    ideal.resize(whole.size());
     scratch.resize(bytes);
     touches.resize(targets);
   }
@@ -83,6 +90,39 @@ struct ReadoutPullback::Impl {
       });
   }
 
+  void find_touches(int group, int sensor) {
+    if (met[std::size_t(group)] == sensor) return;
+    reader.find_touches(*batch, block, group, sensor);
+    met[std::size_t(group)] = sensor;
+  }
+
+  /// Fills `tiles` and `of_tiles` with those of a whole field that are not zero.
+  void gather(const CompiledSensor& s, std::span<const double> field) {
+    const kernels::PadTiles pad = s.tiles();
+    tiles.clear();
+    of_tiles.resize(std::size_t(pad.tiles()) * 3 * kernels::kTactileTile);
+    for (int tile = 0; tile < pad.tiles(); ++tile)
+      if (gather_tile(pad, tile, field.data(),
+                      of_tiles.data() + 3 * kernels::kTactileTile * tiles.size()))
+        tiles.push_back(tile);
+  }
+
+  /// Turns the cotangent of an imperfect sensor's reading, in `whole`, into that of its ideal
+  /// field.
+  void pull_back_imperfections(const CompiledSensor& s, int lane) {
+    const std::span<double> cotangent = std::span(whole).first(3 * std::size_t(s.points()));
+    const std::span<double> field = std::span(ideal).first(cotangent.size());
+    if (!(s.imperfections.saturation == NormalAndShear{})) {
+      find_touches(lane / kGroup, s.number);
+      read_ideal(reader, s, lane / kGroup, lane % kGroup, field);
+    }
+    imperfections.pull_back(s, key_of(*batch, kBlock * block + lane), field, cotangent);
+  }
+
+  void pull_back(int lane, int sensor, std::span<const int> touched,
+                 std::span<const double> cotangents, std::span<double> parameters,
+                 std::span<double> points);
+
   /// Hands one shape's sums, in pad axes, on to its link and the sensor's.
   void hand_on(const kernels::TouchCotangent<double>& c, const CompiledSensor& s,
                const CompiledBody& body, int group, int lane) {
@@ -103,6 +143,11 @@ struct ReadoutPullback::Impl {
   }
 };
 
+void check_has_no_memory(const Model& model) {
+  for (std::size_t s = 0; s < model.sensors().size(); ++s)
+    check_has_no_memory(model, static_cast<int>(s));
+}
+
 ReadoutPullback::ReadoutPullback(const Model& model) : impl_(std::make_unique<Impl>(model)) {}
 ReadoutPullback::~ReadoutPullback() = default;
 ReadoutPullback::ReadoutPullback(ReadoutPullback&&) noexcept = default;
@@ -121,30 +166,26 @@ void ReadoutPullback::clear() {
   impl_->used.fill(false);
 }
 
-void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
-                            std::span<const double> cotangents, std::span<double> parameters,
-                            std::span<double> points) {
-  if (tiles.empty()) return;
-  Impl& i = *impl_;
+void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int> touched,
+                                      std::span<const double> cotangents,
+                                      std::span<double> parameters, std::span<double> points) {
+  if (touched.empty()) return;
   const int group = lane / kGroup, in_group = lane % kGroup;
-  if (i.met[std::size_t(group)] != sensor) {
-    i.reader.find_touches(*i.batch, i.block, group, sensor);
-    i.met[std::size_t(group)] = sensor;
-  }
-  const CompiledModel& m = compiled(i.model);
+  find_touches(group, sensor);
+  const CompiledModel& m = compiled(model);
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
-  const auto a = i.reader.arguments<double>(sensor, group, in_group);
-  if (!points.empty()) i.own.assign(tiles.size() * kPointNumbers * kernels::kTactileTile, 0.0);
+  const auto a = reader.arguments<double>(sensor, group, in_group);
+  if (!points.empty()) own.assign(touched.size() * kPointNumbers * kernels::kTactileTile, 0.0);
   kernels::active_kernels().pull_back_field(
-      {a.pad, a.law, a.n_touches, a.shapes, a.touches, static_cast<int>(tiles.size()), tiles.data(),
-       cotangents.data(), !parameters.empty(), points.empty() ? nullptr : i.own.data(),
-       i.touches.data()});
-  if (!points.empty()) i.hand_on_points(s, tiles, points);
-  i.used[std::size_t(group)] = true;
+      {a.pad, a.law, a.n_touches, a.shapes, a.touches, static_cast<int>(touched.size()),
+       touched.data(), cotangents.data(), !parameters.empty(),
+       points.empty() ? nullptr : own.data(), touches.data()});
+  if (!points.empty()) hand_on_points(s, touched, points);
+  used[std::size_t(group)] = true;
   const int row = kernels::parameter_numbers(m.view) + kCoefficients * sensor;
   for (std::size_t k = 0; k < s.targets.size(); ++k) {
-    const kernels::TouchCotangent<double>& c = i.touches[k];
-    i.hand_on(c, s, m.bodies[std::size_t(s.targets[k])], group, in_group);
+    const kernels::TouchCotangent<double>& c = touches[k];
+    hand_on(c, s, m.bodies[std::size_t(s.targets[k])], group, in_group);
     if (parameters.empty()) continue;
     const auto add = [&](int at, double x) { parameters[std::size_t(at * kBlock + lane)] += x; };
     for (int n = 0; n < kCoefficients; ++n) add(row + n, c.law[std::size_t(n)]);
@@ -153,19 +194,33 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
   }
 }
 
+void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
+                            std::span<const double> cotangents, std::span<double> parameters,
+                            std::span<double> points) {
+  check_has_no_memory(impl_->model, sensor);
+  const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
+  if (!s.imperfect) return impl_->pull_back(lane, sensor, tiles, cotangents, parameters, points);
+  const kernels::PadTiles pad = s.tiles();
+  std::fill(impl_->whole.begin(), impl_->whole.end(), 0.0);
+  for (std::size_t k = 0; k < tiles.size(); ++k)
+    expand_tile<3>(pad, tiles[k], cotangents.data() + 3 * kernels::kTactileTile * k,
+                   impl_->whole.data());
+  impl_->pull_back_imperfections(s, lane);
+  impl_->gather(s, impl_->whole);
+  impl_->pull_back(lane, sensor, impl_->tiles, impl_->of_tiles, parameters, points);
+}
+
 void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> cotangents,
                                   std::span<double> parameters, std::span<double> points) {
-  const kernels::PadTiles pad = compiled(impl_->model).sensors[std::size_t(sensor)].tiles();
-  std::vector<int>& tiles = impl_->tiles;
-  std::vector<double>& values = impl_->of_tiles;
-  tiles.clear();
-  values.resize(std::size_t(pad.tiles()) * 3 * kernels::kTactileTile);
-  for (int tile = 0; tile < pad.tiles(); ++tile)
-    if (gather_tile(pad, tile, cotangents.data(),
-                    values.data() + 3 * kernels::kTactileTile * tiles.size()))
-      tiles.push_back(tile);
-  field(lane, sensor, tiles, std::span(values).first(3 * kernels::kTactileTile * tiles.size()),
-        parameters, points);
+  check_has_no_memory(impl_->model, sensor);
+  const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
+  if (s.imperfect) {
+    std::copy(cotangents.begin(), cotangents.end(), impl_->whole.begin());
+    impl_->pull_back_imperfections(s, lane);
+    cotangents = impl_->whole;
+  }
+  impl_->gather(s, cotangents);
+  impl_->pull_back(lane, sensor, impl_->tiles, impl_->of_tiles, parameters, points);
 }
 
 void ReadoutPullback::end_effector(int lane, int end_effector, std::span<const double> cotangent) {

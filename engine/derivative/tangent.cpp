@@ -8,6 +8,7 @@
 
 #include "engine/derivative/dual_stage.hpp"
 #include "engine/derivative/number_gradients.hpp"
+#include "engine/sense/imperfect_field.hpp"
 #include "engine/step/group_step.hpp"
 #include "engine/step/motor_force.hpp"
 #include "engine/step/rotation_log.hpp"
@@ -127,8 +128,10 @@ struct Tangent::Impl {
   Model model;
   StepSettings settings;
   DualStage stage;
+  ImperfectField imperfections;
 
-  Impl(const Model& m, const StepSettings& s) : model(m), settings(s), stage(compiled(model)) {}
+  Impl(const Model& m, const StepSettings& s)
+      : model(m), settings(s), stage(compiled(model)), imperfections(m) {}
   [[nodiscard]] const CompiledModel& m() const { return compiled(model); }
 
   /// Computes the tangent of x with g(x) = 0 at the value of x. Leaves the v of that x in the
@@ -303,6 +306,7 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
                     std::span<double> field_dot) {
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
+  check_has_no_memory(i.model, sensor);
   const double* row = tape.state(step) + lane;
   i.stage.centre = with_tangent(m, row, kBlock, state.q);
   const Duals v = with_tangent(row + m.nq * kBlock, kBlock, state.v);
@@ -310,7 +314,12 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
     i.stage.x[k] = i.stage.s[k] = D(0.0), i.stage.r[k] = v[k];
   i.stage.c0_over_h = 0;
   i.stage.inverse_h = 1;
-  i.stage.field(sensor, batch.block(block) + lane, numbers_dot, points_dot, field_dot);
+  const CompiledSensor& s = m.sensors[std::size_t(sensor)];
+  std::vector<double> field(s.imperfect ? field_dot.size() : 0);
+  i.stage.field(sensor, batch.block(block) + lane, numbers_dot, points_dot, field, field_dot);
+  const ReadingKey key = {batch.seed(), batch.episode(block * kBlock + lane),
+                          tape.episode_step(step, lane)};
+  i.imperfections.push_forward(s, key, field, field_dot);
 }
 
 }  // namespace tangere

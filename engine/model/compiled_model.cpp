@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/model/compile_imperfections.hpp"
 #include "engine/model/compile_joints.hpp"
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/effects_and_stages.hpp"
@@ -252,6 +253,9 @@ class Compiler {
       SensorInfo info;
       CompiledSensor sensor = compile_sensor(d, m_.bodies[b], info);
       sensor.body = b;
+      sensor.number = static_cast<int>(i);
+      compile_imperfections(d, m_.scene.timestep, sensor, info);
+      m_.layout.past_states = std::max(m_.layout.past_states, info.past_states);
       sensor.parameters = constants(d.coefficients);
       for (int t = 0; t < static_cast<int>(m_.bodies.size()); ++t)
         if (m_.bodies[t].link != sensor.link && m_.bodies[t].touchable) sensor.targets.push_back(t);
@@ -293,14 +297,16 @@ class Compiler {
   }
 
   void randomizations() {
-    m_.layout = {0, m_.nq, m_.nq + m_.nv, 2 * m_.nq + m_.nv, 2 * (m_.nq + m_.nv), 0};
+    const int past = m_.layout.past_states;
+    m_.layout = {0, m_.nq, m_.nq + m_.nv, 2 * m_.nq + m_.nv, 2 * (m_.nq + m_.nv), 0, 0, past};
     int next = m_.layout.parameters;
     for (const RandomizationDescription& d : m_.scene.randomizations) {
       name_of(d.number);  // throws if there is no such number
       if (!is_of_start(d.number)) vary(d, next);
       m_.randomized_row.push_back(is_of_start(d.number) ? state_row(d) : next++);
     }
-    m_.layout.rows = add_derived_rows(m_, next);
+    m_.layout.past = add_derived_rows(m_, next);
+    m_.layout.rows = m_.layout.past + past * (m_.nq + m_.nv);
   }
 
   int state_row(const RandomizationDescription& d) const {

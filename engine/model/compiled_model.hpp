@@ -50,6 +50,13 @@ struct CompiledMotor {
 /// Flat pads with at most this many points are read in all environments at once.
 inline constexpr int kSmallPad = 512;
 
+/// How far a force spreads along an axis of a grid. The force of point j moves to point i by the
+/// share kernel[|i - j|] scale[j]; the shares of a point sum to 1.
+struct LateralSpread {
+  std::vector<double> kernel;  ///< (reach + 1); empty: no spread
+  std::vector<double> scale;   ///< (points along the axis)
+};
+
 /// Points of one sensor in tiles of 8×8, in its pad's axes (kernels/tactile/tactile_types.hpp).
 struct CompiledSensor {
   int body = -1, link = -1;
@@ -70,7 +77,22 @@ struct CompiledSensor {
   ContactLaw law = ContactLaw::clamped;
   std::vector<int> targets;  ///< bodies that it can feel
   bool sizes_vary = false;   ///< some of their sizes vary
+  SensorImperfections imperfections{};
+  bool imperfect = false;            ///< some imperfection is on
+  int number = 0;                    ///< of the sensor in the scene
+  int grid_rows = 0, grid_cols = 0;  ///< of points that have neighbours, row-major
+  /// Of the sensor's name. Seeds of its random numbers differ by it, so that other sensors do not
+  /// matter.
+  std::uint64_t name_bits = 0;
+  int delay = 0;  ///< [steps]
+  /// (n) weights of the ideal fields `delay`, delay + 1, … steps ago; empty without memory.
+  std::vector<double> weights{};
+  std::array<LateralSpread, 2> spread{};  ///< from row to row, and from column to column
 
+  /// Earlier states on which a reading depends.
+  [[nodiscard]] int past_states() const {
+    return weights.empty() ? 0 : delay + static_cast<int>(weights.size()) - 1;
+  }
   [[nodiscard]] int points() const { return rows * cols; }
   [[nodiscard]] int n_tiles() const { return tile_rows * tile_cols; }
   [[nodiscard]] kernels::PadTiles tiles() const;
@@ -82,9 +104,12 @@ struct CompiledEndEffector {
   kernels::Vec3<double> point{};  ///< link axes (or the world's) [m]
 };
 
-/// Rows of a block: q, v, the state one step before, then the varying numbers.
+/// Rows of a block: q, v, the state one step before, the varying numbers, then earlier states for
+/// sensors with memory: `past_states` times q and v; the state after n steps of the episode is in
+/// place n % past_states.
 struct BlockLayout {
   int q = 0, v = 0, previous_q = 0, previous_v = 0, parameters = 0, rows = 0;
+  int past = 0, past_states = 0;
 };
 
 /// Mass [kg], mass times centre of mass x y z [kg m], inertia xx xy xz yy yz zz about a link's

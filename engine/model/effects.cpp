@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <type_traits>
 #include <utility>
 
 #include "engine/model/field_form.hpp"
@@ -282,12 +283,20 @@ EffectInfo find_elements(const Scene& scene, int element) {
   return info;
 }
 
+void drop_imperfections(TactileDescription& d, Way way) {
+  const Source source = d.imperfections.source;
+  d.imperfections = {};
+  if (way == Way::zero) d.imperfections.source = source;
+}
+
 template <Part P, class Element>
 void still_element(Scene& scene, Element& d, Way way) {
   Fields fields{Field::kn, Field::kt, Field::mu, Field::damping};
   if (P == Part::damping) fields = {Field::damping};
   if (P == Part::tangential) fields = {Field::kt};
   if (P == Part::tangential && way == Way::removed) fields.push_back(Field::mu);
+  if constexpr (std::is_same_v<Element, TactileDescription>)
+    if (P == Part::whole) drop_imperfections(d, way);
   for (const Field field : fields) d.coefficients[std::size_t(from(Field::kn, field))] = 0;
   keep_constant(scene, number_of(d), fields);
 }
@@ -302,6 +311,32 @@ void drop_elements(Scene& scene, int element, Way way) {
     all.clear();
   else
     all.erase(all.begin() + element);
+}
+
+// --- imperfections of sensors ---
+
+EffectInfo find_imperfections(const Scene& scene, int element) {
+  EffectInfo info;
+  std::size_t on = 0;
+  for (std::size_t k = 0; k < scene.sensors.size(); ++k) {
+    const SensorImperfections& of = scene.sensors[k].imperfections;
+    if ((element >= 0 && std::size_t(element) != k) || !is_imperfect(of)) continue;
+    ++on;
+    add_source(info, of.source);
+  }
+  info.on = on > 0;
+  if (element < 0)
+    info.reason =
+        fmt::format("{} of {}", on, number_of_elements<Owner::tactile>(scene.sensors.size()));
+  else
+    info.reason = info.on ? text_of(scene.sensors[std::size_t(element)].imperfections)
+                          : "every coefficient is 0 or not given";
+  return info;
+}
+
+void drop_all_imperfections(Scene& scene, int element, Way way) {
+  for (std::size_t k = 0; k < scene.sensors.size(); ++k)
+    if (element < 0 || std::size_t(element) == k) drop_imperfections(scene.sensors[k], way);
 }
 
 // --- numbers that vary ---
@@ -373,6 +408,8 @@ constexpr Row kTable[] = {
     element_row<Owner::tactile, Part::tangential>(Kind::tactile_shear, "tactile shear", " shear"),
     element_row<Owner::tactile, Part::damping>(Kind::tactile_damping, "tactile damping",
                                                " damping"),
+    {Kind::sensor_imperfections, "sensor imperfections", " imperfections", true, false,
+     find_imperfections, drop_all_imperfections},
     {Kind::varying_parameters, "varying parameters", "", true, false, find_varying, drop_varying},
 };
 
@@ -393,7 +430,7 @@ std::vector<std::string> element_names(const Scene& scene, EffectKind kind) {
   };
   if (kind >= Kind::pair_contact && kind <= Kind::pair_damping) add(scene.pair_contacts);
   if (kind >= Kind::ground_contact && kind <= Kind::ground_damping) add(scene.ground_contacts);
-  if (kind >= Kind::tactile && kind <= Kind::tactile_damping) add(scene.sensors);
+  if (kind >= Kind::tactile && kind <= Kind::sensor_imperfections) add(scene.sensors);
   return names;
 }
 

@@ -31,9 +31,10 @@ enum class EffectKind : std::uint8_t {
   tactile,
   tactile_shear,
   tactile_damping,
+  sensor_imperfections,
   varying_parameters,
 };
-inline constexpr int kEffectKinds = 18;
+inline constexpr int kEffectKinds = 19;
 
 /// An effect of a scene.
 struct Effect {

@@ -11,7 +11,7 @@ namespace tangere {
 
 namespace {
 constexpr FieldForm kForms[] = {FieldForm::field, FieldForm::pressure, FieldForm::shear,
-                                FieldForm::sum};
+                                FieldForm::sum, FieldForm::ideal};
 constexpr const char* kPlain[] = {"q", "v", "variables", "bodies"};
 }  // namespace
 
@@ -21,13 +21,15 @@ const char* to_string(FieldForm form) {
     case FieldForm::pressure: return "pressure";
     case FieldForm::shear: return "shear";
     case FieldForm::sum: return "sum";
+    case FieldForm::ideal: return "ideal";
   }
   return "unknown";
 }
 
 int components_of(FieldForm form) {
   switch (form) {
-    case FieldForm::field: return 3;
+    case FieldForm::field:
+    case FieldForm::ideal: return 3;
     case FieldForm::pressure: return 1;
     case FieldForm::shear: return 2;
     case FieldForm::sum: break;

@@ -18,6 +18,7 @@ enum class FieldForm {
   pressure,  ///< (points, 1) [N]: the third of these, without friction (docs/outputs.md)
   shear,     ///< (points, 2) [N]: the first two
   sum,       ///< (6): force on the body [N], then where it presses [m], body axes
+  ideal,     ///< the field without the sensor's imperfections
 };
 
 /// Force x y z on the body [N], then its centre x y z [m]: the mean of the points' places, each
@@ -25,10 +26,10 @@ enum class FieldForm {
 /// nothing presses.
 using FieldSum = std::array<double, 6>;
 
-/// The words of files and options: "field", "pressure", "shear", "sum".
+/// The words of files and options: "field", "pressure", "shear", "sum", "ideal".
 const char* to_string(FieldForm form);
 
-/// Numbers of a point: 3, 1, 2; 0 for a sum.
+/// Numbers of a point: 3, 1, 2, 3; 0 for a sum.
 int components_of(FieldForm form);
 /// Numbers of a whole reading.
 std::size_t numbers_of(int points, FieldForm form);
@@ -40,7 +41,7 @@ struct FieldOutput {
   friend bool operator==(const FieldOutput&, const FieldOutput&) = default;
 };
 
-/// Returns "pad" for a field, else "pad.pressure", "pad.shear" or "pad.sum".
+/// Returns "pad" for a field, else "pad.pressure", "pad.shear", "pad.sum" or "pad.ideal".
 std::string output_name(const std::string& sensor, FieldForm form);
 /// Returns the names of a scene's sensors, in file order.
 std::vector<std::string> sensor_names(const Scene& scene);

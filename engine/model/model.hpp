@@ -22,8 +22,10 @@ struct SensorInfo {
   std::string body;
   int rows = 0, cols = 0;  ///< of a rectangular array; points = rows * cols, row-major
   int points = 0;
-  int every = 0;          ///< as in the scene; 0: the caller chooses
-  int pressure_sign = 1;  ///< +1: the third component is positive under pressure; -1: negative
+  int every = 0;           ///< as in the scene; 0: the caller chooses
+  int pressure_sign = 1;   ///< +1: the third component is positive under pressure; -1: negative
+  bool imperfect = false;  ///< its readings differ from the ideal field (docs/sensors.md)
+  int past_states = 0;     ///< earlier states on which a reading depends
 };
 
 /// An end effector after compilation.

@@ -11,30 +11,12 @@
 namespace tangere {
 namespace {
 
-constexpr int kRounds = 10;
-constexpr std::array<std::uint32_t, 2> kMultiplier{0xD2511F53, 0xCD9E8D57};
-// Added to the key after each round: the golden ratio and sqrt(3) - 1, in units of 2^-32.
-constexpr std::array<std::uint32_t, 2> kKeyStep{0x9E3779B9, 0xBB67AE85};
-
 constexpr int kCountBits = 48;  // bits of episode and of step
 constexpr int kIndexBits = 24;
 
-// Packs a key's counter into 128 bits: episode (48), step (48), purpose (8), index (24).
 std::array<std::uint32_t, 4> random_bits(const RandomKey& key) {
-  const auto episode = static_cast<std::uint64_t>(key.episode);
-  const auto step = static_cast<std::uint64_t>(key.step);
-  if ((episode | step) >> kCountBits != 0 || key.index >> kIndexBits != 0) {
-    throw InputError(
-        fmt::format("random number of episode {}, step {}, index {}: episode and step must be in "
-                    "[0, 2^{}), the index in [0, 2^{})",
-                    key.episode, key.step, key.index, kCountBits, kIndexBits));
-  }
-  const auto high = [](std::uint64_t x) { return static_cast<std::uint32_t>(x >> 32); };
-  const auto low = [](std::uint64_t x) { return static_cast<std::uint32_t>(x); };
-  const auto purpose = static_cast<std::uint32_t>(key.purpose);
-  return philox4x32({low(episode), low(step), high(episode) | high(step) << 16,
-                     purpose << kIndexBits | key.index},
-                    {low(key.seed), high(key.seed)});
+  const PhiloxCounter at = counter_of(key);
+  return philox4x32(at.counter, at.key);
 }
 
 // Returns the 53 highest of 64 bits as a fraction in [0, 1).
@@ -49,16 +31,34 @@ double fraction(std::uint32_t high, std::uint32_t low) {
 
 }  // namespace
 
+// Packs a key's counter into 128 bits: episode (48), step (48), purpose (8), index (24).
+PhiloxCounter counter_of(const RandomKey& key) {
+  const auto episode = static_cast<std::uint64_t>(key.episode);
+  const auto step = static_cast<std::uint64_t>(key.step);
+  if ((episode | step) >> kCountBits != 0 || key.index >> kIndexBits != 0) {
+    throw InputError(
+        fmt::format("random number of episode {}, step {}, index {}: episode and step must be in "
+                    "[0, 2^{}), the index in [0, 2^{})",
+                    key.episode, key.step, key.index, kCountBits, kIndexBits));
+  }
+  const auto high = [](std::uint64_t x) { return static_cast<std::uint32_t>(x >> 32); };
+  const auto low = [](std::uint64_t x) { return static_cast<std::uint32_t>(x); };
+  const auto purpose = static_cast<std::uint32_t>(key.purpose);
+  return {{low(episode), low(step), high(episode) | high(step) << 16,
+           purpose << kIndexBits | key.index},
+          {low(key.seed), high(key.seed)}};
+}
+
 std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> counter,
                                         std::array<std::uint32_t, 2> key) {
-  for (int round = 0; round < kRounds; ++round) {
-    const std::uint64_t even = std::uint64_t{kMultiplier[0]} * counter[0];
-    const std::uint64_t odd = std::uint64_t{kMultiplier[1]} * counter[2];
+  for (int round = 0; round < kPhiloxRounds; ++round) {
+    const std::uint64_t even = std::uint64_t{kPhiloxMultiplier[0]} * counter[0];
+    const std::uint64_t odd = std::uint64_t{kPhiloxMultiplier[1]} * counter[2];
     counter = {static_cast<std::uint32_t>(odd >> 32) ^ counter[1] ^ key[0],
                static_cast<std::uint32_t>(odd),
                static_cast<std::uint32_t>(even >> 32) ^ counter[3] ^ key[1],
                static_cast<std::uint32_t>(even)};
-    key = {key[0] + kKeyStep[0], key[1] + kKeyStep[1]};
+    key = {key[0] + kPhiloxKeyStep[0], key[1] + kPhiloxKeyStep[1]};
   }
   return counter;
 }

@@ -12,6 +12,11 @@
 
 namespace tangere {
 
+inline constexpr int kPhiloxRounds = 10;
+inline constexpr std::array<std::uint32_t, 2> kPhiloxMultiplier{0xD2511F53, 0xCD9E8D57};
+/// Added to the key after each round: the golden ratio and sqrt(3) - 1, in units of 2^-32.
+inline constexpr std::array<std::uint32_t, 2> kPhiloxKeyStep{0x9E3779B9, 0xBB67AE85};
+
 /// Returns 128 random bits for a counter and a key.
 std::array<std::uint32_t, 4> philox4x32(std::array<std::uint32_t, 4> counter,
                                         std::array<std::uint32_t, 2> key);
@@ -27,6 +32,10 @@ enum class Purpose : std::uint8_t {
   body = 5,           ///< <randomize> of a body
   task = 6,           ///< what a task draws at a reset or during an episode
   policy = 7,         ///< actions of a policy that draws them
+  sensor_noise = 8,   ///< noise of a tactile point in a step
+  sensor_point = 9,   ///< gain and bias of a tactile point
+  dead_point = 10,    ///< whether a tactile point is dead
+  sensor_gain = 11,   ///< gain of a sensor
 };
 
 /// Identifies one random number. Different keys give independent numbers. The same key always gives
@@ -38,6 +47,14 @@ struct RandomKey {
   Purpose purpose = Purpose::initial_state;
   std::uint32_t index = 0;  ///< [0, 2^24); counts the numbers of one purpose and step
 };
+
+/// What philox4x32() takes for a key. Neighbours in `index` differ by 1 in the last word.
+struct PhiloxCounter {
+  std::array<std::uint32_t, 4> counter;
+  std::array<std::uint32_t, 2> key;
+};
+/// Throws InputError when the key is out of range.
+PhiloxCounter counter_of(const RandomKey& key);
 
 /// Returns a uniform number in [0, 1), a multiple of 2^-53. Like all functions below, throws
 /// InputError when the key is out of range.

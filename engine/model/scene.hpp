@@ -14,6 +14,7 @@
 #include "engine/base/vector3.hpp"
 #include "engine/model/scene_number.hpp"
 #include "engine/model/scheme.hpp"
+#include "engine/model/sensor_imperfections.hpp"
 #include "kernels/contact/contact_types.hpp"
 
 namespace tangere {
@@ -169,6 +170,7 @@ struct TactileDescription {
   int every = 0;                     ///< read every k-th step; 0: not given, the caller chooses
   std::optional<int> pressure_sign;  ///< +1 or -1; found from the geometry when not given
   Source source;
+  SensorImperfections imperfections{};  ///< of its readings; none to begin with
 };
 
 /// An end effector: a point that moves with a joint. Its world position is an output.

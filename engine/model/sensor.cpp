@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/frames.hpp"
 #include "kernels/contact/distance.hpp"
 #include "kernels/table/kernel_table.hpp"
 

@@ -23,7 +23,7 @@ struct TensorSpec {
   /// network sees the numbers divided by them. Empty: 1.
   std::vector<double> scale;
   double low = -kUnbounded, high = kUnbounded;  ///< bounds of every number
-  bool privileged = false;  ///< a robot could not measure it
+  bool privileged = false;                      ///< a robot could not measure it
 
   [[nodiscard]] std::size_t size() const;
 };

@@ -5,12 +5,15 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
+#include <optional>
 #include <type_traits>
 
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/sense/dense_tiles.hpp"
 #include "engine/sense/field_sum.hpp"
+#include "engine/sense/imperfect_field.hpp"
 #include "engine/sense/pad_reader.hpp"
 
 namespace tangere {
@@ -35,14 +38,30 @@ struct Readout::Impl {
   AlignedVector<double> wide;
   AlignedVector<float> single;
   std::vector<kernels::Frame<double>> in_body;  // (sensors) pad axes in the body
+  // Of imperfect sensors: what they do, their reading, and those of a block of small pads.
+  ImperfectField imperfections;
+  std::vector<double> one_reading, block_readings, of_tiles;
+  // Of sensors with memory: a field of an earlier state, and a block that holds such states.
+  std::vector<double> earlier;
+  std::optional<Batch> past;
 
-  Impl(const Model& m, Precision p) : model(m), precision(p), reader(m) {
+  Impl(const Model& m, Precision p) : model(m), precision(p), reader(m), imperfections(m) {
     std::size_t room = 0;
     for (const CompiledSensor& s : compiled(m).sensors) {
       const kernels::Frame<double>& body = compiled(m).bodies[std::size_t(s.body)].frame;
       in_body.push_back(relative(body, s.pad));
       room = std::max({room, std::size_t(s.n_tiles()) * 3 * kTactileTile,
                        small(s) ? std::size_t(kBlock * 3 * s.points()) : std::size_t(0)});
+      if (!s.imperfect) continue;
+      one_reading.resize(std::max(one_reading.size(), std::size_t(3 * s.points())));
+      of_tiles.resize(std::max(of_tiles.size(), std::size_t(s.n_tiles()) * 3 * kTactileTile));
+      if (small(s))
+        block_readings.resize(
+            std::max(block_readings.size(), std::size_t(kBlock * 3 * s.points())));
+    }
+    if (compiled(m).layout.past_states > 0) {
+      earlier.resize(one_reading.size());
+      past.emplace(m, kBlock);
     }
     (p == Precision::f64 ? wide.resize(room) : single.resize(room));
   }
@@ -134,6 +153,105 @@ struct Readout::Impl {
                            components_of(of.form), dense);
   }
 
+  /// Whether a reading is not simply what the kernels compute.
+  [[nodiscard]] bool imperfect(FieldOutput of) const {
+    return of.form != FieldForm::ideal && sensor_of(of.sensor).imperfect;
+  }
+  static FieldPart part_of(FieldForm form) {
+    const int components = components_of(form);
+    if (form == FieldForm::sum) return {0, 3};
+    return {form == FieldForm::pressure ? 2 : 0, components};
+  }
+
+  /// Turns an ideal field into the reading of an imperfect sensor, in the readout's precision.
+  void make_imperfect(const Batch& batch, int environment, FieldOutput of,
+                      std::span<double> field) {
+    imperfections.apply(sensor_of(of.sensor), key_of(batch, environment), part_of(of.form), field);
+    if (precision != Precision::f64)
+      for (double& x : field) x = static_cast<double>(static_cast<float>(x));
+  }
+
+  /// Computes the field of a sensor with memory: the mean of earlier ideal fields with the sensor's
+  /// weights. It depends on states alone, so it does not matter who reads when.
+  void read_past(const Batch& batch, int environment, FieldOutput of, std::span<double> field) {
+    const CompiledSensor& s = sensor_of(of.sensor);
+    const std::span<double> one = std::span(earlier).first(field.size());
+    std::fill(field.begin(), field.end(), 0.0);
+    for (std::size_t k = 0; k < s.weights.size(); ++k) {
+      recall(batch, environment, s.delay + static_cast<int>(k));
+      place(*past, environment % kBlock, of.sensor);
+      fill(environment, of, one.data());
+      for (std::size_t i = 0; i < field.size(); ++i) field[i] += s.weights[k] * one[i];
+    }
+  }
+
+  /// Copies an environment, as it was `lag` steps ago, to its lane of `past`.
+  void recall(const Batch& batch, int environment, int lag) {
+    const BlockLayout& layout = compiled(model).layout;
+    const double* const from = batch.block(environment / kBlock) + environment % kBlock;
+    double* const to = past->block(0) + environment % kBlock;
+    for (int row = 0; row < layout.past; ++row) to[row * kBlock] = from[row * kBlock];
+    if (lag == 0) return;
+    const int numbers = layout.previous_q - layout.q;
+    const std::int64_t states = layout.past_states;
+    const auto slot =
+        static_cast<int>(((batch.steps(environment) - lag) % states + states) % states);
+    for (int row = 0; row < numbers; ++row)
+      to[(layout.q + row) * kBlock] = from[(layout.past + slot * numbers + row) * kBlock];
+  }
+
+  /// Fills in the reading of an imperfect sensor in an environment whose touches were found.
+  void read_imperfect(const Batch& batch, int environment, FieldOutput of,
+                      std::span<double> field) {
+    if (sensor_of(of.sensor).past_states() > 0) {
+      read_past(batch, environment, of, field);
+    } else {
+      fill(environment, of, field.data());
+    }
+    make_imperfect(batch, environment, of, field);
+  }
+
+  /// The same into memory of the readout. Of a sum: the field.
+  std::span<const double> read_imperfect(const Batch& batch, int environment, FieldOutput of) {
+    const FieldForm form = of.form == FieldForm::sum ? FieldForm::field : of.form;
+    const std::span<double> field =
+        std::span(one_reading).first(numbers_of(sensor_of(of.sensor).points(), form));
+    read_imperfect(batch, environment, {of.sensor, form}, field);
+    return field;
+  }
+
+  /// Writes a reading of an imperfect sensor whose touches were found.
+  template <class T>
+  void write_imperfect(const Batch& batch, int environment, FieldOutput of, T* to) {
+    if constexpr (std::is_same_v<T, double>)
+      if (of.form != FieldForm::sum) {
+        const std::size_t numbers = numbers_of(sensor_of(of.sensor).points(), of.form);
+        return read_imperfect(batch, environment, of, {to, numbers});
+      }
+    const std::span<const double> field = read_imperfect(batch, environment, of);
+    if (of.form == FieldForm::sum) return add_up_imperfect(of.sensor, field, to);
+    std::transform(field.begin(), field.end(), to, [](double x) { return static_cast<T>(x); });
+  }
+
+  /// Lists all tiles of a sensor in reader.active.
+  std::span<const int> all_tiles(int sensor) {
+    const auto tiles = std::span(reader.active).first(std::size_t(sensor_of(sensor).n_tiles()));
+    std::iota(tiles.begin(), tiles.end(), 0);
+    return tiles;
+  }
+
+  template <class T>
+  void add_up_imperfect(int sensor, std::span<const double> field, T* sum) {
+    const kernels::PadTiles pad = sensor_of(sensor).tiles();
+    const std::span<const int> tiles = all_tiles(sensor);
+    for (const int tile : tiles)
+      gather_tile(pad, tile, field.data(), of_tiles.data() + 3 * kTactileTile * tile);
+    const int sign = compiled(model).sensor_info[std::size_t(sensor)].pressure_sign;
+    const FieldSum total =
+        field_sum(pad, in_body[std::size_t(sensor)], sign, tiles, of_tiles.data());
+    std::transform(total.begin(), total.end(), sum, [](double x) { return static_cast<T>(x); });
+  }
+
   /// Writes the sum of a field whose touches were found.
   template <class T>
   void add_up(int environment, int sensor, T* sum) {
@@ -154,7 +272,12 @@ struct Readout::Impl {
 
   /// Writes the tiles touched now and zeroes those that no longer are.
   template <class T>
-  void refresh(int environment, DenseFrame<T>& frame) {
+  void refresh(const Batch& batch, int environment, DenseFrame<T>& frame) {
+    if (const FieldOutput of{frame.sensor_, frame.form_}; imperfect(of)) {
+      write_imperfect(batch, environment, of, frame.values_.data());
+      frame.mark_all();
+      return;
+    }
     const kernels::PadTiles pad = sensor_of(frame.sensor_).tiles();
     const int count =
         write_touched(environment, {frame.sensor_, frame.form_}, frame.values_.data());
@@ -202,7 +325,17 @@ struct Readout::Impl {
   }
 
   template <class T>
-  void compact(int environment, CompactFrame<T>& frame) {
+  void compact(const Batch& batch, int environment, CompactFrame<T>& frame) {
+    if (const FieldOutput of{frame.sensor_}; imperfect(of)) {
+      const std::span<const double> field = read_imperfect(batch, environment, of);
+      const std::span<const int> tiles = all_tiles(frame.sensor_);
+      const kernels::PadTiles pad = sensor_of(frame.sensor_).tiles();
+      std::copy(tiles.begin(), tiles.end(), frame.tiles_.begin());
+      for (const int tile : tiles)
+        gather_tile(pad, tile, field.data(), frame.values_.get() + 3 * kTactileTile * tile);
+      frame.count_ = static_cast<int>(tiles.size());
+      return;
+    }
     frame.count_ = in_precision([&](auto zero) {
       using Real = decltype(zero);
       auto a = reader.arguments<Real>(frame.sensor_, environment % kBlock / kGroup,
@@ -234,7 +367,7 @@ struct Readout::Impl {
   /// shapes differ in size between lanes.
   [[nodiscard]] bool together(const Batch& batch, int number, int sensor) const {
     return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary &&
-           environments_of(batch, number) >= kFewest;
+           sensor_of(sensor).past_states() == 0 && environments_of(batch, number) >= kFewest;
   }
   static int environments_of(const Batch& batch, int number) {
     return std::min(kBlock, batch.environments() - number * kBlock);
@@ -247,9 +380,28 @@ struct Readout::Impl {
     const int environments = environments_of(batch, number);
     place_block(batch, number, of.sensor);
     if (of.form != FieldForm::sum && together(batch, number, of.sensor)) {
+      if (imperfect(of)) return fill_imperfect_block(batch, number, of, dense);
       fill_block(of, environments, dense);
     } else {
       for (int e = 0; e < environments; ++e) one(e);
+    }
+  }
+
+  /// Reads an imperfect small pad in all environments at once.
+  template <class T>
+  void fill_imperfect_block(const Batch& batch, int number, FieldOutput of,
+                            const std::array<T*, kBlock>& dense) {
+    const int environments = environments_of(batch, number);
+    const std::size_t numbers = numbers_of(sensor_of(of.sensor).points(), of.form);
+    std::array<double*, kBlock> each{};
+    for (std::size_t e = 0; e < std::size_t(environments); ++e)
+      each[e] = block_readings.data() + numbers * e;
+    fill_block(of, environments, each);
+    for (int e = 0; e < environments; ++e) {
+      const std::span<double> field(each[std::size_t(e)], numbers);
+      make_imperfect(batch, kBlock * number + e, of, field);
+      std::transform(field.begin(), field.end(), dense[std::size_t(e)],
+                     [](double x) { return static_cast<T>(x); });
     }
   }
 
@@ -259,13 +411,20 @@ struct Readout::Impl {
     std::array<T*, kBlock> out{};
     for (std::size_t e = 0; e < std::min(readings.size(), std::size_t(kBlock)); ++e)
       out[e] = readings[e].data();
-    block<T>(batch, number, of, out, [&](int e) {
-      if (of.form == FieldForm::sum) {
-        add_up(e, of.sensor, out[std::size_t(e)]);
-      } else {
-        fill(e, of, out[std::size_t(e)]);
-      }
-    });
+    block<T>(batch, number, of, out,
+             [&](int e) { write(batch, kBlock * number + e, of, out[std::size_t(e)]); });
+  }
+
+  /// Writes a reading of an environment whose touches were found.
+  template <class T>
+  void write(const Batch& batch, int environment, FieldOutput of, T* to) {
+    if (imperfect(of)) {
+      write_imperfect(batch, environment, of, to);
+    } else if (of.form == FieldForm::sum) {
+      add_up(environment, of.sensor, to);
+    } else {
+      fill(environment, of, to);
+    }
   }
 };
 
@@ -350,23 +509,23 @@ void Readout::end_effector_jacobian(const Batch& batch, int environment,
 
 void Readout::tactile(const Batch& batch, int environment, int sensor, std::span<double> force) {
   impl_->place(batch, environment, sensor);
-  impl_->fill(environment, {sensor, FieldForm::field}, force.data());
+  impl_->write(batch, environment, {sensor}, force.data());
 }
 void Readout::tactile(const Batch& batch, int environment, int sensor, std::span<float> force) {
   impl_->place(batch, environment, sensor);
-  impl_->fill(environment, {sensor, FieldForm::field}, force.data());
+  impl_->write(batch, environment, {sensor}, force.data());
 }
 
 template <class T>
 void Readout::read(const Batch& batch, int environment, DenseFrame<T>& frame) {
   impl_->place(batch, environment, frame.sensor_);
-  impl_->refresh(environment, frame);
+  impl_->refresh(batch, environment, frame);
 }
 
 template <class T>
 void Readout::read(const Batch& batch, int environment, CompactFrame<T>& frame) {
   impl_->place(batch, environment, frame.sensor_);
-  impl_->compact(environment, frame);
+  impl_->compact(batch, environment, frame);
 }
 
 void Readout::read_block(const Batch& batch, int block, FieldOutput output,
@@ -389,8 +548,9 @@ void Readout::read_block(const Batch& batch, int block, std::span<DenseFrame<T>>
       // A later reading of one of them alone must find all tiles in its list.
       frames[e].mark_all();
   }
-  impl_->block<T>(batch, block, {frames[0].sensor_, frames[0].form_}, dense,
-                  [&](int e) { impl_->refresh(e, frames[std::size_t(e)]); });
+  impl_->block<T>(batch, block, {frames[0].sensor_, frames[0].form_}, dense, [&](int e) {
+    impl_->refresh(batch, kBlock * block + e, frames[std::size_t(e)]);
+  });
 }
 
 template <class T>
@@ -398,7 +558,8 @@ void Readout::read_block(const Batch& batch, int block, std::span<CompactFrame<T
   if (frames.empty()) return;
   impl_->place_block(batch, block, frames[0].sensor_);
   const int environments = Impl::environments_of(batch, block);
-  for (int e = 0; e < environments; ++e) impl_->compact(e, frames[std::size_t(e)]);
+  for (int e = 0; e < environments; ++e)
+    impl_->compact(batch, kBlock * block + e, frames[std::size_t(e)]);
 }
 
 template void Readout::read(const Batch&, int, DenseFrame<float>&);

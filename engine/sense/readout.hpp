@@ -15,7 +15,9 @@ namespace tangere {
 /// Reads any batch of its model. Owns the scratch of one thread. Allocates only when made.
 ///
 /// Tactile fields are in [N]: f·axis0, f·axis1, -f·(axis0 × axis1), where f is the force on the
-/// sensor's body. They are exactly zero where nothing touches. They feel every body that can move
+/// sensor's body. They are exactly zero where nothing touches, unless the sensor is imperfect:
+/// then every reading of it but FieldForm::ideal has its imperfections, and the same reading taken
+/// twice in a step has the same noise. They feel every body that can move
 /// relative to the sensor. Every way of reading gives the same numbers: those of the readout's
 /// precision, converted where T is the other type. T is float or double.
 class Readout {

@@ -62,6 +62,7 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
     has_history_.assign(lanes, 0);
     held_.assign(lanes, 0);
     episode_.resize(lanes);
+    steps_.assign(lanes, 0);
   } catch (const std::exception&) {
     throw InputError(
         "no memory for " + std::to_string(environments) + " environments (" +
@@ -107,6 +108,7 @@ void Batch::reset(int environment, std::int64_t episode) {
   residual_[lane] = 0;
   has_history_[lane] = 0;
   held_[lane] = 0;
+  steps_[lane] = 0;
 }
 
 void Batch::displace_state(int environment, std::span<const double> q, std::span<const double> v) {
@@ -121,7 +123,17 @@ void Batch::write_state(std::size_t lane, std::span<const double> q, std::span<c
   complete_state(lane);
 }
 
-/// Scales quaternions to length one. The state one step before becomes the same state.
+/// Fills the earlier states with the state of now.
+void Batch::remember_state(std::size_t lane) {
+  const BlockLayout& layout = compiled(model_).layout;
+  double* const own = column(lane);
+  const int numbers = layout.previous_q - layout.q;  // q, then v
+  for (int k = 0; k < layout.past_states * numbers; ++k)
+    own[(layout.past + k) * kBlock] = own[(layout.q + k % numbers) * kBlock];
+}
+
+/// Scales quaternions to length one. The state one step before becomes the same state, and those
+/// that sensors remember.
 void Batch::complete_state(std::size_t lane) {
   const CompiledModel& m = compiled(model_);
   double* const own = column(lane);
@@ -138,6 +150,7 @@ void Batch::complete_state(std::size_t lane) {
   }
   for (int i = 0; i < m.nq; ++i) at(m.layout.previous_q + i) = at(m.layout.q + i);
   for (int i = 0; i < m.nv; ++i) at(m.layout.previous_v + i) = at(m.layout.v + i);
+  remember_state(lane);
 }
 
 void Batch::get_q(int environment, std::span<double> q) const {
@@ -195,7 +208,8 @@ BlockState Batch::save_block(int block) const {
   const auto lane = std::ptrdiff_t(block) * kBlock;
   return {{rows, rows + block_stride_},
           {status_.begin() + lane, status_.begin() + lane + kBlock},
-          {has_history_.begin() + lane, has_history_.begin() + lane + kBlock}};
+          {has_history_.begin() + lane, has_history_.begin() + lane + kBlock},
+          {steps_.begin() + lane, steps_.begin() + lane + kBlock}};
 }
 
 void Batch::restore_block(int block, const BlockState& state) {
@@ -203,6 +217,7 @@ void Batch::restore_block(int block, const BlockState& state) {
   std::copy(state.rows.begin(), state.rows.end(), this->block(block));
   std::copy(state.status.begin(), state.status.end(), status_.begin() + lane);
   std::copy(state.has_history.begin(), state.has_history.end(), has_history_.begin() + lane);
+  std::copy(state.steps.begin(), state.steps.end(), steps_.begin() + lane);
 }
 
 bool Batch::is_parameter(int k) const {

@@ -31,6 +31,7 @@ struct BlockState {
   AlignedVector<double> rows;
   std::vector<StepStatus> status;
   std::vector<std::uint8_t> has_history;
+  std::vector<std::int64_t> steps;
 };
 
 /// Environments stepped together. A failed environment keeps its last good state and is not stepped
@@ -57,11 +58,19 @@ class Batch {
   void hold(int environment, bool held = true) { held_[std::size_t(environment)] = held ? 1 : 0; }
   [[nodiscard]] bool held(int environment) const { return held_[std::size_t(environment)] != 0; }
 
+  /// Steps that an environment has taken since its episode began. Steps that fail do not count.
+  /// Noise of sensors goes by it.
+  [[nodiscard]] std::int64_t steps(int environment) const {
+    return steps_[std::size_t(environment)];
+  }
+  /// Sets this count, for a run that goes on from a stored state, in [0, 2^48).
+  void set_steps(int environment, std::int64_t steps) { steps_[std::size_t(environment)] = steps; }
+
   /// Copy one environment's coordinates out of its lane: (nq), (nv).
   void get_q(int environment, std::span<double> q) const;
   void get_v(int environment, std::span<double> v) const;
-  /// Sets a state and drops the integrator's history, so the next step is a start. Quaternions are
-  /// normalised.
+  /// Sets a state and drops the integrator's history, so the next step is a start. Sensors with
+  /// memory have always seen this state. Quaternions are normalised.
   void set_state(int environment, std::span<const double> q, std::span<const double> v);
   /// Sets the two newest states of a BDF2 run: (q, v) now and one step before. The next step
   /// continues the run.
@@ -123,6 +132,7 @@ class Batch {
   friend class Stepper;
   void write_state(std::size_t lane, std::span<const double> q, std::span<const double> v);
   void complete_state(std::size_t lane);
+  void remember_state(std::size_t lane);
   void draw_episode(std::size_t lane);
   [[nodiscard]] double* column(std::size_t lane);
 
@@ -137,7 +147,7 @@ class Batch {
   std::vector<double> residual_;
   std::vector<std::uint8_t> has_history_;  // BDF2: the previous state is valid
   std::vector<std::uint8_t> held_;
-  std::vector<std::int64_t> episode_;
+  std::vector<std::int64_t> episode_, steps_;
 };
 
 }  // namespace tangere

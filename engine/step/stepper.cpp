@@ -60,6 +60,13 @@ StepperOptions for_gradients(const Model& model, StepperOptions options) {
   return options;
 }
 
+/// Keeps a lane's state, which a step is about to replace, for sensors with memory.
+static void remember(const BlockLayout& layout, double* column, std::int64_t steps) {
+  const int numbers = layout.previous_q - layout.q;
+  const int place = layout.past + numbers * static_cast<int>(steps % layout.past_states);
+  for (int k = 0; k < numbers; ++k) column[(place + k) * kBlock] = column[(layout.q + k) * kBlock];
+}
+
 /// Lanes of one group of a block. Environment `first` + l is in lane l.
 struct GroupOfBlock {
   double* rows;  ///< row r of lane l: rows[r * kBlock + l]
@@ -113,6 +120,8 @@ struct Stepper::Impl {
       batch.iterations_[e] = report.iterations[l];
       batch.residual_[e] = report.residual[l];
       if (failed(report.status[l])) continue;
+      if (m.layout.past_states > 0) remember(m.layout, g.rows + lane + l, batch.steps_[e]);
+      ++batch.steps_[e];
       // One step back is too long for BDF2's history where a step had to be cut.
       batch.has_history_[e] = settings.accuracy > 0 ? 0 : 1;
       const auto shift = [&](int now, int before, const kernels::Row<L>* from, int count) {

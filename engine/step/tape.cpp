@@ -25,7 +25,8 @@ BlockTape::BlockTape(const Model& model, Integrator integrator, std::int64_t ste
       nv_(model.nv()),
       row_count_(std::size_t(rows(model, integrator))),
       states_(bytes(model, integrator, steps) / sizeof(double)),
-      taken_(kBlock, 0) {}
+      taken_(kBlock, 0),
+      before_(kBlock, 0) {}
 
 void BlockTape::copy(const Batch& batch, int block, int first_row, double* to) const {
   const double* from = batch.block(block) + first_row * kBlock;
@@ -37,6 +38,10 @@ void BlockTape::start(const Batch& batch, int block) {
   steps_ = 0;
   special_.clear();
   std::fill(taken_.begin(), taken_.end(), 0);
+  for (int l = 0; l < kBlock; ++l) {
+    const int e = block * kBlock + l;
+    before_[std::size_t(l)] = e < batch.environments() ? batch.steps(e) : 0;
+  }
   copy(batch, block, layout.previous_q, slot(-1));
   copy(batch, block, layout.q, slot(0));
 }
@@ -53,6 +58,8 @@ void BlockTape::append(const Batch& batch, int block) {
 void BlockTape::show(std::int64_t step, Batch& batch, int block) const {
   std::copy_n(state(step), (nq_ + nv_) * kBlock,
               batch.block(block) + compiled(model_).layout.q * kBlock);
+  for (int l = 0; l < kBlock && block * kBlock + l < batch.environments(); ++l)
+    batch.set_steps(block * kBlock + l, episode_step(step, l));
 }
 
 double* BlockTape::next_inner() {

@@ -3,6 +3,7 @@
 // that were not plain steps of the scheme.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -44,8 +45,8 @@ class BlockTape {
   [[nodiscard]] double* next_inner();
   void add(TapedStep step) { special_.push_back(std::move(step)); }
 
-  /// Copies the states after `step` steps into a block, for reading. What the block needs to go on
-  /// is not restored.
+  /// Copies the states after `step` steps into a block, and how many steps they are into their
+  /// episodes, for reading. What the block needs to go on is not restored.
   void show(std::int64_t step, Batch& batch, int block) const;
 
   [[nodiscard]] std::int64_t steps() const { return steps_; }
@@ -63,6 +64,10 @@ class BlockTape {
   [[nodiscard]] bool took(std::int64_t step, int lane) const {
     return step < taken_[std::size_t(lane)];
   }
+  /// Steps of the lane's episode until the state after `step` steps.
+  [[nodiscard]] std::int64_t episode_step(std::int64_t step, int lane) const {
+    return before_[std::size_t(lane)] + std::min(step, taken_[std::size_t(lane)]);
+  }
   /// Memory of a block's tape for this many steps [bytes].
   static std::size_t bytes(const Model& model, Integrator integrator, std::int64_t steps);
 
@@ -77,9 +82,10 @@ class BlockTape {
   int nq_, nv_;
   std::size_t row_count_;
   std::int64_t steps_ = 0;
-  AlignedVector<double> states_;     // (steps + 2, rows, 16)
-  std::vector<TapedStep> special_;   // rising steps
-  std::vector<std::int64_t> taken_;  // (16)
+  AlignedVector<double> states_;      // (steps + 2, rows, 16)
+  std::vector<TapedStep> special_;    // rising steps
+  std::vector<std::int64_t> taken_;   // (16)
+  std::vector<std::int64_t> before_;  // (16) steps of the episodes before the tape began
 };
 
 }  // namespace tangere

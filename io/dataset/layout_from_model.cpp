@@ -37,6 +37,7 @@ SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& des
   layout.corner1 = description.array.corner1;
   layout.axis0 = description.array.axis0;
   layout.axis1 = description.array.axis1;
+  layout.imperfections = text_of(description.imperfections);
   layout.list = description.points;
   return layout;
 }

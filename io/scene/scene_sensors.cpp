@@ -133,6 +133,44 @@ std::vector<TactilePoint> read_points(const SceneNode& node, int type) {
   return all;
 }
 
+double factor_of(const SceneContext& context, std::string_view unit) {
+  return unit == "N" ? context.force : context.factor(unit);
+}
+
+/// Reads a coefficient of one or two numbers: for the third component of a field and for the first
+/// two.
+NormalAndShear read_coefficient(const SceneNode& node, const ImperfectionKind& kind) {
+  if (!node.has(kind.name)) return {};
+  const std::vector<double> x = node.numbers(kind.name);
+  const std::size_t most = kind.pair != nullptr ? 2 : 1;
+  if (x.empty() || x.size() > most)
+    node.fail_at(kind.name,
+                 fmt::format("{}=\"{}\" has {} numbers; expected {}", kind.name,
+                             node.text(kind.name), x.size(), most == 2 ? "1 or 2" : "1"));
+  return {x.front(), x.back()};
+}
+
+/// Reads <imperfections> inside <tactile>, at most once.
+void read_imperfections(const SceneNode& node, TactileDescription& sensor) {
+  const std::vector<SceneNode> all = node.children({"imperfections"});
+  if (all.empty()) return;
+  if (all.size() > 1) all[1].fail("a second time in one <tactile>; expected one");
+  std::vector<std::string> names;
+  for (const ImperfectionKind& kind : imperfection_kinds()) names.emplace_back(kind.name);
+  all[0].check_attributes(names);
+  SensorImperfections& of = sensor.imperfections;
+  of.source = all[0].source();
+  for (const ImperfectionKind& kind : imperfection_kinds()) {
+    const NormalAndShear value = read_coefficient(all[0], kind);
+    const double factor = factor_of(node.context(), kind.unit);
+    if (kind.pair != nullptr)
+      of.*kind.pair = {factor * value.normal, factor * value.shear};
+    else
+      of.*kind.number = factor * value.normal;
+  }
+  check_imperfections(of, sensor.name, sensor.points.empty());
+}
+
 }  // namespace
 
 void read_sensors(Scene& scene, const SceneNode& section) {
@@ -164,6 +202,7 @@ void read_sensors(Scene& scene, const SceneNode& section) {
     } else {
       d.points = read_points(node, type);
     }
+    read_imperfections(node, d);
     scene.sensors.push_back(std::move(d));
   }
 }

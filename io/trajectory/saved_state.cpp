@@ -100,6 +100,7 @@ void restore_state(const SavedState& from, bool continues, Batch& batch) {
     } else {
       batch.set_state(e, part(from.q, nq), part(from.v, nv));
     }
+    if (continues) batch.set_steps(e, from.step);  // the noise of sensors goes on
     const StepStatus status = from.status[static_cast<std::size_t>(e)];
     if (failed(status)) batch.set_failed(e, status);
   }

@@ -55,7 +55,8 @@ std::string components_text(const SensorLayout& sensor, FieldForm form) {
   const std::string across = "f.axis0, f.axis1",
                     along = sensor.rectangular() ? "-f.(axis0 x axis1)" : "-f.normal";
   switch (form) {
-    case FieldForm::field: return across + ", " + along + "; f is the force on the body";
+    case FieldForm::field:
+    case FieldForm::ideal: return across + ", " + along + "; f is the force on the body";
     case FieldForm::pressure: return along + "; f is the force on the body without friction";
     case FieldForm::shear: return across + "; f is the force on the body";
     case FieldForm::sum: break;
@@ -73,6 +74,9 @@ void describe_reading(const h5::Id& object, const SensorLayout& sensor, FieldFor
                       : sensor.rectangular()
                           ? "axis0, axis1 of the sensor, in the body's axes"
                           : "axis0, axis1, normal of each point, in the body's axes");
+  if (!sensor.imperfections.empty())
+    h5::write_attribute(object, "imperfections",
+                        form == FieldForm::ideal ? "none" : sensor.imperfections);
   if (sensor.rectangular()) describe_array(object, sensor);
 }
 

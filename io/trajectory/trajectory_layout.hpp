@@ -28,6 +28,7 @@ struct SensorLayout {
   std::array<double, 3> corner0{}, corner1{};
   std::array<double, 3> axis0{}, axis1{};  ///< unit, orthogonal
 
+  std::string imperfections;       ///< text_of() those of the sensor; "": none
   std::vector<TactilePoint> list;  ///< a list of points in the field's order; empty for arrays
 
   [[nodiscard]] bool rectangular() const { return rows > 0; }

@@ -49,10 +49,11 @@ struct TrajectoryReader::Impl {
     }
   }
 
-  /// Takes a field, or where there is none pressure, shear or both. A sum has no points.
+  /// Takes a field, or where there is none the ideal one, or pressure, shear or both. A sum has no points.
   void add_readings(const h5::Id& group, const std::string& name) {
     std::vector<FieldForm> found;
-    for (const FieldForm form : {FieldForm::field, FieldForm::pressure, FieldForm::shear})
+    for (const FieldForm form :
+         {FieldForm::field, FieldForm::ideal, FieldForm::pressure, FieldForm::shear})
       if (h5::has_link(group, dataset_of(form))) found.push_back(form);
     if (found.empty()) {
       if (!h5::has_link(group, dataset_of(FieldForm::sum)))
@@ -61,7 +62,7 @@ struct TrajectoryReader::Impl {
       sums.push_back(name);
       return;
     }
-    if (found[0] == FieldForm::field) found.resize(1);
+    if (components_of(found[0]) == 3) found.resize(1);
     add_sensor(group, name, found[0]);
     forms.push_back(found);
     for (const FieldForm form : found) {

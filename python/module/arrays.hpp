@@ -56,9 +56,8 @@ template <class T, class From>
 Array<T> array_of(const Shape& shape, std::span<const From> from) {
   std::span<T> to;
   Array<T> array = new_array<T>(shape, to);
-  std::transform(from.begin(), from.end(), to.begin(), [](const From& x) {
-    return static_cast<T>(x);
-  });
+  std::transform(from.begin(), from.end(), to.begin(),
+                 [](const From& x) { return static_cast<T>(x); });
   return array;
 }
 

@@ -94,8 +94,8 @@ Run PythonBatch::run(const Argument<double>& u, int every,
     throw InputError("controls without a step; expected (T, E, nu)");
   const std::size_t steps = u.shape(0), nu = as_size(model().nu());
   if (every < 1 || steps % as_size(every) != 0)
-    throw InputError(fmt::format("{} steps with a frame every {}; expected a multiple of it", steps,
-                                 every));
+    throw InputError(
+        fmt::format("{} steps with a frame every {}; expected a multiple of it", steps, every));
   const auto controls = numbers_of(u, {steps, count(), nu}, "controls");
   return precision_ == Precision::f64 ? run_as<double>(controls, steps, as_size(every), readings)
                                       : run_as<float>(controls, steps, as_size(every), readings);
@@ -200,7 +200,8 @@ std::vector<int> PythonBatch::listed(const std::optional<std::vector<int>>& envi
   for (int e = 0; e < this->environments() && !environments; ++e) list.push_back(e);
   for (const int e : list)
     if (e < 0 || e >= this->environments())
-      throw InputError(fmt::format("environment {}; expected 0 to {}", e, this->environments() - 1));
+      throw InputError(
+          fmt::format("environment {}; expected 0 to {}", e, this->environments() - 1));
   return list;
 }
 
@@ -243,12 +244,17 @@ Array<double> PythonBatch::scene_controls(std::int64_t steps) {
 
 void add_batches(nb::module_& m) {
   nb::class_<Run>(m, "Run", "What Batch.run() leaves: F = steps / every frames.")
-      .def_prop_ro("q", [](const Run& r) { return r.q; }, nb::rv_policy::automatic, "(F, E, nq) coordinates.")
-      .def_prop_ro("v", [](const Run& r) { return r.v; }, nb::rv_policy::automatic, "(F, E, nv) velocities.")
-      .def_prop_ro("fields", [](const Run& r) { return r.readings; },
-                   "What was asked for by name: (F, E, …), as Batch.tactile() returns it.")
-      .def_prop_ro("status", [](const Run& r) { return r.status; }, nb::rv_policy::automatic,
-                   "(E) int8: of the last step; negative where an environment failed.");
+      .def_prop_ro(
+          "q", [](const Run& r) { return r.q; }, nb::rv_policy::automatic,
+          "(F, E, nq) coordinates.")
+      .def_prop_ro(
+          "v", [](const Run& r) { return r.v; }, nb::rv_policy::automatic, "(F, E, nv) velocities.")
+      .def_prop_ro(
+          "fields", [](const Run& r) { return r.readings; },
+          "What was asked for by name: (F, E, …), as Batch.tactile() returns it.")
+      .def_prop_ro(
+          "status", [](const Run& r) { return r.status; }, nb::rv_policy::automatic,
+          "(E) int8: of the last step; negative where an environment failed.");
 
   nb::class_<PythonBatch>(
       m, "Batch",
@@ -266,19 +272,21 @@ void add_batches(nb::module_& m) {
             options.stepper.tolerance = tolerance;
             new (self) PythonBatch(model, envs, options);
           },
-          "model"_a, "envs"_a = 1, "seed"_a = 0, "first_episode"_a = 0,
-          "threads"_a = nb::none(), "precision"_a = "mixed", "timestep"_a = nb::none(),
-          "tolerance"_a = nb::none(),
+          "model"_a, "envs"_a = 1, "seed"_a = 0, "first_episode"_a = 0, "threads"_a = nb::none(),
+          "precision"_a = "mixed", "timestep"_a = nb::none(), "tolerance"_a = nb::none(),
           "Draws `envs` starting states: environment e is episode first_episode + e of `seed`.\n"
-          "`threads`: None for all cores. `precision`: of tactile fields; 'mixed' returns float32,\n"
+          "`threads`: None for all cores. `precision`: of tactile fields; 'mixed' returns "
+          "float32,\n"
           "'double' float64. `timestep` [s] and `tolerance` (of a solve, dimensionless): None for\n"
           "the scene's. InputError: a number is out of range.")
       .def_prop_ro("model", &PythonBatch::model)
       .def_prop_ro("envs", &PythonBatch::environments, "E")
       .def_prop_ro("threads", &PythonBatch::threads)
       .def_prop_ro("seed", &PythonBatch::seed)
-      .def_prop_ro("q", &PythonBatch::q, nb::rv_policy::automatic, "(E, nq) coordinates: m, rad, quaternions w x y z.")
-      .def_prop_ro("v", &PythonBatch::v, nb::rv_policy::automatic, "(E, nv) velocities: m/s, rad/s.")
+      .def_prop_ro("q", &PythonBatch::q, nb::rv_policy::automatic,
+                   "(E, nq) coordinates: m, rad, quaternions w x y z.")
+      .def_prop_ro("v", &PythonBatch::v, nb::rv_policy::automatic,
+                   "(E, nv) velocities: m/s, rad/s.")
       .def_prop_ro("status", &PythonBatch::status, nb::rv_policy::automatic,
                    "(E) int8: 0 for a step that converged, 1 after a split, 2 coarse, 3 passed\n"
                    "through; negative where an environment has failed and stands still.")
@@ -289,8 +297,7 @@ void add_batches(nb::module_& m) {
       .def("step", &PythonBatch::step, "u"_a,
            "Takes one step. `u`: (E, nu) controls, or (nu) for all environments; clipped to the\n"
            "motors' ranges. InputError: another shape.")
-      .def("run", &PythonBatch::run, "u"_a, "every"_a = 1,
-           "fields"_a = std::vector<std::string>(),
+      .def("run", &PythonBatch::run, "u"_a, "every"_a = 1, "fields"_a = std::vector<std::string>(),
            "Takes T steps with the controls `u`, (T, E, nu), in one call. Keeps the state after\n"
            "every `every` steps, and the readings named in `fields`. InputError: another shape, T\n"
            "is no multiple of `every`, or there is no such reading.")

@@ -36,8 +36,7 @@ class Environments {
     vector_.restart(list);
   }
   void step(const Argument<double>& actions) {
-    const std::vector<double> rows =
-        rows_of(actions, count(), spec().action.size(), "actions");
+    const std::vector<double> rows = rows_of(actions, count(), spec().action.size(), "actions");
     const InUse::Turn turn(in_use_);
     const nb::gil_scoped_release free;
     vector_.step(rows);
@@ -64,7 +63,8 @@ class Environments {
       const TaskView view = vector_.view(static_cast<int>(e));
       const std::span<const double> from[] = {view.now().q, view.now().v, view.memory};
       for (int k = 0; k < 3; ++k)
-        std::copy(from[k].begin(), from[k].end(), numbers[k].begin() + std::ptrdiff_t(e * widths[k]));
+        std::copy(from[k].begin(), from[k].end(),
+                  numbers[k].begin() + std::ptrdiff_t(e * widths[k]));
     }
     return nb::make_tuple(arrays[0], arrays[1], arrays[2]);
   }
@@ -148,10 +148,12 @@ void add_environments(nb::module_& m) {
       .def("lengths", numbers<std::int64_t>(&VectorTask::lengths), "(E) actions so far.")
       .def("episodes", numbers<std::int64_t>(&VectorTask::episodes), "(E) numbers of the episodes.")
       .def("status", &Environments::status, "(E) int8, as in Batch.status.")
-      .def("scripted", [](Environments& self) { return self.actions_of(0); },
-           "(E, action): what the task's own script would do. It may look at the whole state.")
-      .def("random", [](Environments& self) { return self.actions_of(1); },
-           "(E, action): uniform within the bounds, the same for the same seed and episode.")
+      .def(
+          "scripted", [](Environments& self) { return self.actions_of(0); },
+          "(E, action): what the task's own script would do. It may look at the whole state.")
+      .def(
+          "random", [](Environments& self) { return self.actions_of(1); },
+          "(E, action): uniform within the bounds, the same for the same seed and episode.")
       .def("state", &Environments::state,
            "q (E, nq), v (E, nv) and the task's memory (E, memory): what a robot cannot see.")
       .def("counts", &Environments::counts, "Steps and Newton passes since the last reset.")

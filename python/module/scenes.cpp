@@ -65,15 +65,17 @@ void add_sensor(nb::module_& m) {
 
 void add_model(nb::module_& m) {
   nb::class_<Model>(m, "Model", "A compiled scene. It never changes; any number of batches use it.")
-      .def(nb::init<const Scene&>(), "scene"_a,
-           "Compiles a scene. InputError: it refers to something that is not there, or cannot move.")
+      .def(
+          nb::init<const Scene&>(), "scene"_a,
+          "Compiles a scene. InputError: it refers to something that is not there, or cannot move.")
       .def_prop_ro("scene", &Model::scene)
       .def_prop_ro("nq", &Model::nq, "Coordinates; a quaternion counts 4.")
       .def_prop_ro("nv", &Model::nv, "Velocities.")
       .def_prop_ro("nu", &Model::nu, "Controls.")
       .def_prop_ro("nb", &Model::nb, "Bodies.")
       .def_prop_ro("timestep", &Model::timestep, "[s]")
-      .def_prop_ro("integrator", [](const Model& s) { return std::string(s.integrator().scheme().name); })
+      .def_prop_ro("integrator",
+                   [](const Model& s) { return std::string(s.integrator().scheme().name); })
       .def_prop_ro("q_names", [](const Model& s) { return copied(s.q_names()); })
       .def_prop_ro("v_names", [](const Model& s) { return copied(s.v_names()); })
       .def_prop_ro("u_names", [](const Model& s) { return copied(s.u_names()); })
@@ -90,14 +92,13 @@ void add_model(nb::module_& m) {
                    [](const Model& s) {
                      return std::vector<SensorInfo>(s.sensors().begin(), s.sensors().end());
                    })
-      .def_prop_ro("readings",
-                   [](const Model& s) { return output_names(sensor_names(s.scene())); },
-                   "Names of everything that can be read: q, v, …, pad, pad.pressure, pad.sum.")
-      .def_prop_ro("initial_q",
-                   [](const Model& s) {
-                     return array_of<double>({as_size(s.nq())}, s.initial_q());
-                   },
-                   nb::rv_policy::automatic, "(nq) where the scene starts.")
+      .def_prop_ro(
+          "readings", [](const Model& s) { return output_names(sensor_names(s.scene())); },
+          "Names of everything that can be read: q, v, …, pad, pad.pressure, pad.sum.")
+      .def_prop_ro(
+          "initial_q",
+          [](const Model& s) { return array_of<double>({as_size(s.nq())}, s.initial_q()); },
+          nb::rv_policy::automatic, "(nq) where the scene starts.")
       .def("mass", &Model::mass, "body"_a, "Of a body, by its index [kg].")
       .def("__repr__", [](const Model& s) {
         return fmt::format("Model('{}', nq={}, nv={}, nu={})", s.scene().name, s.nq(), s.nv(),

@@ -109,8 +109,8 @@ void add_tapes(nb::module_& m) {
           "__init__",
           [](Tape* self, const std::string& task, const Scene& scene, int envs,
              std::int64_t actions, std::uint64_t seed, std::int64_t first_episode,
-             const std::optional<int>& threads, bool scaled,
-             const std::string& precision, double tape_bytes) {
+             const std::optional<int>& threads, bool scaled, const std::string& precision,
+             double tape_bytes) {
             TaskTapeOptions options;
             options.precision = precision_named(precision);
             options.seed = seed;
@@ -133,29 +133,33 @@ void add_tapes(nb::module_& m) {
            "Takes one action (E, action) of every environment whose episode goes on. InputError:\n"
            "another shape, an action that is not finite, or one too many.")
       .def("observations", &Tape::observations, "(E, n) float64: all keys, one after the other.")
-      .def("rewards", [](Tape& t) { return t.per_environment<double>(&TaskTape::rewards, 0); },
-           "(E) of the last step, 0 where the episode had ended.")
-      .def("alive", [](Tape& t) { return t.per_environment<bool>(&TaskTape::alive, 0); },
-           "(E) bool: the action was taken.")
-      .def("terminated", [](Tape& t) { return t.per_environment<bool>(&TaskTape::terminated, 0); },
-           "(E) bool: the episode has ended.")
-      .def("truncated", [](Tape& t) { return t.per_environment<bool>(&TaskTape::truncated, 0); },
-           "(E) bool: out of time, or the simulation failed.")
-      .def("success", [](Tape& t) { return t.per_environment<bool>(&TaskTape::success, 0); },
-           "(E) bool.")
-      .def("q",
-           [](Tape& t) {
-             return t.per_environment<double>(&TaskTape::q, as_size(t.model().nq()));
-           },
-           "(E, nq) coordinates now.")
-      .def("v",
-           [](Tape& t) {
-             return t.per_environment<double>(&TaskTape::v, as_size(t.model().nv()));
-           },
-           "(E, nv) velocities now.")
+      .def(
+          "rewards", [](Tape& t) { return t.per_environment<double>(&TaskTape::rewards, 0); },
+          "(E) of the last step, 0 where the episode had ended.")
+      .def(
+          "alive", [](Tape& t) { return t.per_environment<bool>(&TaskTape::alive, 0); },
+          "(E) bool: the action was taken.")
+      .def(
+          "terminated", [](Tape& t) { return t.per_environment<bool>(&TaskTape::terminated, 0); },
+          "(E) bool: the episode has ended.")
+      .def(
+          "truncated", [](Tape& t) { return t.per_environment<bool>(&TaskTape::truncated, 0); },
+          "(E) bool: out of time, or the simulation failed.")
+      .def(
+          "success", [](Tape& t) { return t.per_environment<bool>(&TaskTape::success, 0); },
+          "(E) bool.")
+      .def(
+          "q",
+          [](Tape& t) { return t.per_environment<double>(&TaskTape::q, as_size(t.model().nq())); },
+          "(E, nq) coordinates now.")
+      .def(
+          "v",
+          [](Tape& t) { return t.per_environment<double>(&TaskTape::v, as_size(t.model().nv())); },
+          "(E, nv) velocities now.")
       .def("reverse", &Tape::reverse, "by_observation"_a, "by_reward"_a,
            "Reverses the last step that is not reversed yet: takes derivatives of a loss by its\n"
-           "observations (E, n) and rewards (E), returns those by its actions (E, action), all that\n"
+           "observations (E, n) and rewards (E), returns those by its actions (E, action), all "
+           "that\n"
            "passes through this step and later ones. 0 beyond an action's bounds.")
       .def("reverse_start", &Tape::reverse_start, "by_observation"_a,
            "Ends the reverse pass: takes derivatives by the first observations (E, n), returns\n"

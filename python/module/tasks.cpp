@@ -13,8 +13,7 @@ using nb::literals::operator""_a;
 void add_tasks(nb::module_& m) {
   nb::class_<TensorSpec>(m, "TensorSpec", "An array of numbers that a task receives or returns.")
       .def_ro("name", &TensorSpec::name)
-      .def_prop_ro("shape",
-                   [](const TensorSpec& t) { return nb::tuple(nb::cast(t.shape)); })
+      .def_prop_ro("shape", [](const TensorSpec& t) { return nb::tuple(nb::cast(t.shape)); })
       .def_ro("unit", &TensorSpec::unit)
       .def_ro("meaning", &TensorSpec::meaning)
       .def_ro("low", &TensorSpec::low, "Lower bound of every number, or -inf.")
@@ -23,7 +22,8 @@ void add_tasks(nb::module_& m) {
               "Typical sizes in `unit`: one, or one per place on the last axis. Empty: 1.")
       .def_ro("privileged", &TensorSpec::privileged, "A robot could not measure it.")
       .def("__repr__", [](const TensorSpec& t) {
-        return fmt::format("TensorSpec('{}', ({}), '{}')", t.name, fmt::join(t.shape, ", "), t.unit);
+        return fmt::format("TensorSpec('{}', ({}), '{}')", t.name, fmt::join(t.shape, ", "),
+                           t.unit);
       });
   nb::class_<TaskSpec>(m, "TaskSpec", "What a task declares.")
       .def_ro("name", &TaskSpec::name)

@@ -126,7 +126,7 @@ struct AccuracyRun::Impl {
     std::size_t offset = 0;
     for (std::size_t s = 0; s < batch.model().sensors().size(); ++s) {
       const std::size_t count = 3 * as_size(batch.model().sensors()[s].points);
-      read_field<T>(readout, batch, block, {static_cast<int>(s)},
+      read_field<T>(readout, batch, block, {static_cast<int>(s), FieldForm::ideal},
                     [&](int e) { return lane(to, e).subspan(offset, count); });
       offset += count;
     }

@@ -28,15 +28,17 @@ Series net_forces(const FixedEpisodes& episodes, int environment, const StepperO
   Stepper stepper(model, options);
   Readout readout(model);
   Series series(model.sensors().size());
-  std::vector<double> field;
+  std::vector<DenseFrame<double>> frames;
+  for (std::size_t s = 0; s < series.size(); ++s)
+    frames.emplace_back(model, static_cast<int>(s), FieldForm::ideal);
   for (int k = 0; k < episodes.samples_of[as_size(environment)]; ++k)
     for (int part = 0; part < parts; ++part) {
       stepper.step_block(batch, environment / kernels::kBlock,
                          episodes.controls_of(k, parts, part));
       if (failed(batch.status(environment)) || (go_on && !go_on())) return series;
       for (std::size_t s = 0; s < series.size(); ++s) {
-        field.resize(3 * as_size(model.sensors()[s].points));
-        readout.tactile(batch, environment, static_cast<int>(s), field);
+        readout.read(batch, environment, frames[s]);
+        const std::span<const double> field = frames[s].values();
         for (std::size_t axis = 0; axis < 3; ++axis) {
           double sum = 0;
           for (std::size_t i = axis; i < field.size(); i += 3) sum += field[i];

@@ -219,8 +219,8 @@ TaskSpec declare_box_pushing(PushObservation observation) {
   spec.success = "the box is within 30 mm and 0.1 rad of its goal after the last action";
   spec.action = {"drive", {3}, "1", "times 1 N, 1 N (the hand's x, y) and 3 N m (its turn)",
                  {},      -1,  1};
-  spec.observations = {{"goal", {3}, "m m rad", "goal of the box: x, y, yaw as seen from the pad",
-                        pose_scale}};
+  spec.observations = {
+      {"goal", {3}, "m m rad", "goal of the box: x, y, yaw as seen from the pad", pose_scale}};
   spec.steps_per_action = 5;
   spec.moments = {5};
   spec.horizon = kActions;

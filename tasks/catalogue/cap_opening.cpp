@@ -233,7 +233,7 @@ TaskSpec declare_cap_opening(CapObservation observation) {
   spec.scene = "cap_opening.xml";
   spec.success = "the cap is turned by more than 45 degrees";
   spec.action = {"step", {kAngles}, "1", "of every angle's target from the angle, times 0.06 rad",
-                 {},     -1,  1};
+                 {},     -1,        1};
   spec.observations = {{"angles", {kAngles}, "rad", "swing, upper and lower of each finger", {0.5}},
                        {"tips", {kFingers, 3}, "m", "middles of the fingertips' spheres", {0.05}}};
   spec.steps_per_action = 5;

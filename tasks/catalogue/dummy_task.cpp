@@ -19,7 +19,7 @@ class Dummy : public Task {
     spec.summary = "A pad is held at a height.";
     spec.scene = "rolling_ball_small.xml";
     spec.success = "within 1 mm of the goal after 40 actions";
-    spec.action = {"force", {1}, "1", "vertical force on the pad, over its weight of 0.245 N [N]",
+    spec.action = {"force", {1},  "1", "vertical force on the pad, over its weight of 0.245 N [N]",
                    {},      -0.5, 0.5};
     spec.observations = {{"error", {1}, "m", "goal minus height of the pad", {0.01}},
                          {"speed", {1}, "m/s", "upward", {0.05}}};

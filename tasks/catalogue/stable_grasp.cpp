@@ -232,9 +232,9 @@ TaskSpec declare_stable_grasp() {
       "A gripper looks for the place where a bar of unknown densities can be lifted level.";
   spec.scene = "stable_grasp.xml";
   spec.success = "lifted by more than 5 mm with a tilt below 0.02 rad";
-  spec.action = {"shift", {1},
-                 "1",     "how far the next grasp is from this one along the bar, times 50 mm",
-                 {},      -1,  1};
+  spec.action = {
+      "shift", {1}, "1", "how far the next grasp is from this one along the bar, times 50 mm",
+      {},      -1,  1};
   spec.observations = {
       {"flow",
        {4, 13, 10},

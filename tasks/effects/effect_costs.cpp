@@ -15,7 +15,7 @@ constexpr int kMostRounds = 41;
 
 bool is_of_sensors(EffectKind kind) {
   return kind == EffectKind::tactile || kind == EffectKind::tactile_shear ||
-         kind == EffectKind::tactile_damping;
+         kind == EffectKind::tactile_damping || kind == EffectKind::sensor_imperfections;
 }
 
 TimedParts parts_of(EffectKind kind) {

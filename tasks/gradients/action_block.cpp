@@ -56,6 +56,7 @@ ActionBlock::ActionBlock(const ActionTapes& tapes, Precision precision, bool par
       start_q_(kBlock * as_size(tapes.task.model().nv())),
       start_v_(start_q_.size()),
       by_u_(kBlock * as_size(tapes.task.model().nu())) {
+  if (task_.spec().looks_at_tactile) check_has_no_memory(task_.model());
   for (MomentRows& m : moments_) {
     m.q = m.v = start_q_;
     m.end_effectors.resize(kBlock * task_.end_effectors_size());

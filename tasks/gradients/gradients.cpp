@@ -59,9 +59,21 @@ struct GradientRollouts::Impl {
   }
 };
 
+/// Losses of fields cannot have sensors with memory.
+static void check_memories(const Model& model, const GradientOptions& options,
+                           std::span<const RolloutLoss* const> losses) {
+  const auto reads_fields = [&](const RolloutLoss* loss) {
+    for (std::int64_t step = 0; step <= options.steps; ++step)
+      if (loss->reads_fields(step)) return true;
+    return false;
+  };
+  if (std::any_of(losses.begin(), losses.end(), reads_fields)) check_has_no_memory(model);
+}
+
 GradientRollouts::GradientRollouts(const Model& model, const GradientOptions& options,
                                    std::span<const RolloutLoss* const> losses) {
   check(options);
+  check_memories(model, options, losses);
   impl_ = std::make_unique<Impl>(model, options, losses);
 }
 GradientRollouts::~GradientRollouts() = default;

@@ -67,6 +67,8 @@ std::vector<double> losses_of(const Setting& s, const Model& model,
   const auto nu = std::size_t(model.nu());
   Batch batch(model, static_cast<int>(inputs.size()), s.start.seed(), s.start.episode(0));
   for (int e = 0; e < batch.environments(); ++e) {
+    batch.reset(e, s.start.episode(0));  // with its own imperfections of sensors
+    batch.set_steps(e, s.start.steps(0));
     for (std::size_t k = 0; k < model.scene().randomizations.size(); ++k)
       if (batch.is_parameter(static_cast<int>(k)))
         batch.set_randomized_value(e, static_cast<int>(k), varying[k]);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reads states, end effectors and tactile fields of a block. The rollout, the player of episodes
+// Reads states, end effectors and tactile fields of a block. Imperfections of sensors are the
+// readout's, so whoever reads a field in a step gets the same. The rollout, the player of episodes
 // and tasks use it, each with its own destination.
 #pragma once
 
@@ -46,6 +47,17 @@ void read_field(Readout& readout, const Batch& batch, int block, FieldOutput out
                 const Place& place) {
   const auto places = places_of<T>(batch, block, place);
   readout.read_block(batch, block, output, std::span<const std::span<T>>(places));
+}
+
+/// Throws InputError where a sensor has a memory, which counts steps of the scene, and steps have
+/// another length [s].
+inline void check_sensor_memory(const Model& model, double timestep) {
+  for (std::size_t s = 0; s < model.sensors().size(); ++s)
+    if (model.sensors()[s].past_states > 0 && timestep != model.timestep())
+      throw InputError(model.scene().sensors[s].imperfections.source.prefix() +
+                       "delay and low_pass of '" + model.sensors()[s].name + "' count steps of " +
+                       std::to_string(model.timestep()) + " s; expected this timestep, found " +
+                       std::to_string(timestep) + " s");
 }
 
 }  // namespace tangere

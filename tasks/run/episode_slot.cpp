@@ -90,6 +90,7 @@ EpisodeSource source_of(const Model& model, const StepperOptions& solver,
   if (controls.timestep() != timestep)
     throw InputError(fmt::format("controls laid out for a timestep of {} s; the stepper's is {} s",
                                  controls.timestep(), timestep));
+  check_sensor_memory(model, timestep);
   controls.check_covers(options.steps);
   check_held(controls, options, model.nu());
   s.program = [&controls, every = options.every](const Batch&) {

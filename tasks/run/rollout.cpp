@@ -164,6 +164,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
                            const RolloutOptions& options, RowSink& sink,
                            const RolloutProgress& progress) {
   check(options);
+  check_sensor_memory(batch.model(), stepper.timestep());
   const auto start = std::chrono::steady_clock::now();
   const auto sensors = batch.model().sensors();
   Recorder recorder(batch, options.precision, options.outputs, sink);

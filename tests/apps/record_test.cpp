@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "io/hdf5/h5.hpp"
+#include "io/hdf5/h5_listing.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
 
@@ -187,6 +188,83 @@ TEST(Record, TheSceneAsksAndTheOptionAsksInstead) {
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_THAT(wrong.err, HasSubstr("record has 'pad.sun'; did you mean 'pad.sum'?"));
   EXPECT_THAT(wrong.err, HasSubstr("wrong.xml:"));
+}
+
+/// The small ball with an imperfect sensor.
+std::string imperfect_ball(const std::string& coefficients) {
+  std::string text = file_bytes(scene("rolling_ball_small.xml"));
+  const std::size_t tag = text.find("<tactile name"), end = text.find("/>", tag);
+  EXPECT_NE(end, std::string::npos);
+  return text.replace(end, 2, "><imperfections " + coefficients + "/></tactile>");
+}
+
+TEST(Record, ImperfectSensorsReadAlikeInEveryFile) {
+  const Folder folder;
+  folder.write("ball.xml", imperfect_ball("noise=\"2e-4 1e-4\" bias=\"1e-4\" dead=\"0.02\""));
+  const Words what{"--seed", "3", "--every", "20", "--record", "pad,pad.ideal,pad.sum"};
+  const auto steps = [&](const std::string& n) { return Words{"--steps", n}; };
+  run_json(folder,
+           Words{"simulate", "ball.xml", "-o", "run.h5", "--envs", "2"} + what + steps("120"));
+  run_json(folder,
+           Words{"simulate", "ball.xml", "-o", "half.h5", "--envs", "2"} + what + steps("60"));
+  run_json(folder, Words{"simulate", "ball.xml", "-o", "rest.h5", "--state-from", "half.h5",
+                         "--every", "20", "--record", "pad"} +
+                       steps("60"));
+  run_json(folder, Words{"simulate", scene("rolling_ball_small.xml"), "-o", "plain.h5", "--envs",
+                         "2", "--seed", "3", "--every", "20", "--record", "pad"} +
+                       steps("120"));
+  const std::vector<double> force = numbers(folder, "run.h5", "tactile/pad/force"),
+                            ideal = numbers(folder, "run.h5", "tactile/pad/ideal"),
+                            rest = numbers(folder, "rest.h5", "tactile/pad/force");
+  EXPECT_EQ(ideal, numbers(folder, "plain.h5", "tactile/pad/force"));
+  EXPECT_NE(force, ideal);
+  ASSERT_EQ(force.size(), 2 * rest.size());
+  EXPECT_TRUE(std::equal(rest.begin(), rest.end(), force.begin() + std::ptrdiff_t(rest.size())))
+      << "a run that goes on has the noise of one long run";
+  const h5::Id run_file = h5::open_file(folder.path("run.h5"));
+  const auto attribute = [&](const std::string& name) {
+    return h5::attribute_text(h5::open_dataset(run_file, name), "imperfections");
+  };
+  EXPECT_EQ(attribute("tactile/pad/force"), "bias 0.0001 N, noise 0.0002 0.0001 N, dead 0.02");
+  EXPECT_EQ(attribute("tactile/pad/ideal"), "none");
+
+  run_json(folder,
+           Words{"generate", "ball.xml", "-o", "set", "--episodes", "2", "--precision", "double"} +
+               what + steps("120"));
+  constexpr std::size_t kField = 32 * 32 * 3;
+  for (std::size_t e = 0; e < 2; ++e)
+    for (const auto& [name, all] : {std::pair("pad", &force), std::pair("pad.ideal", &ideal)}) {
+      const std::string demo = "set/shard-00000.h5",
+                        of = "data/demo_" + std::to_string(e) + "/obs/";
+      const std::vector<double> rows = numbers(folder, demo, of + name);
+      for (std::size_t row = 1; row < rows.size() / kField; ++row)  // fields follow a step
+        for (std::size_t i = 0; i < kField; ++i)
+          ASSERT_EQ(rows[row * kField + i], (*all)[((row - 1) * 2 + e) * kField + i]) << name;
+    }
+  EXPECT_EQ(h5::attribute_text(h5::open_group(h5::open_file(folder.path("set/shard-00000.h5")),
+                                              "scene/sensors/pad"),
+                               "imperfections"),
+            "bias 0.0001 N, noise 0.0002 0.0001 N, dead 0.02");
+  EXPECT_EQ(run(folder, {"validate", "set"}).exit_code, 0);
+  EXPECT_EQ(run(folder, {"plot", "run.h5", "-o", "run.svg"}).exit_code, 0);
+  const json inspected = run_json(folder, {"inspect", "ball.xml"});
+  int on = 0;
+  for (const json& effect : inspected.at("effects"))
+    on += effect.at("name") == "sensor imperfections" && effect.at("on") == true ? 1 : 0;
+  EXPECT_EQ(on, 1);
+}
+
+TEST(Record, ASensorWithMemoryKeepsToItsTimestepAndHasNoGradient) {
+  const Folder folder;
+  folder.write("ball.xml", imperfect_ball("delay=\"0.02\""));
+  const Words words{"simulate", "ball.xml", "-o", "x.h5", "--steps", "30", "--every", "10"};
+  const Outcome other = run(folder, words + Words{"--timestep", "0.0025"});
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr("delay and low_pass of 'pad' count steps of"));
+  const Outcome gradient = run(folder, words + Words{"--gradients", "tactile"});
+  EXPECT_EQ(gradient.exit_code, 2);
+  EXPECT_THAT(gradient.err, HasSubstr("derivatives of sensor 'pad', which has low_pass or delay"));
+  EXPECT_EQ(run(folder, words + Words{"--gradients", "final"}).exit_code, 0);
 }
 
 TEST(Record, UnknownNamesAreRefused) {

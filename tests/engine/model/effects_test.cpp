@@ -45,6 +45,7 @@ Scene scene_of_all_effects() {
   s.ground_contacts.push_back({"box", {500, 2, 0.5, 0.2}, ContactLaw::linear, 1e-5, {}});
   s.sensors.push_back(s.sensors.front());
   s.sensors.back().name = "second";
+  for (TactileDescription& d : s.sensors) d.imperfections.noise = {1e-4, 1e-4};
   s.initial.push_back({"pad_joint", {0.002, 0.001, -0.0152}, {0.05, -0.02, -0.01}, {}});
   s.initial.push_back({"box_joint", {}, {0.3, 0.1, 0, 1, 0, 2}, {}});
   s.initial.push_back({"arm_joint", {0.01}, {1}, {}});
@@ -165,6 +166,8 @@ TEST(Effects, RemovedIsOffAndLeavesTheOthersOn) {
       // Its own friction and damping, and numbers of it that vary, may go with an effect.
       const bool own = other.name.find(info.name) == 0 ||
                        other.effect.kind == EffectKind::varying_parameters ||
+                       (info.effect.kind == EffectKind::tactile &&
+                        other.effect.kind == EffectKind::sensor_imperfections) ||
                        (int(other.effect.kind) - int(info.effect.kind) <= 2 &&
                         int(other.effect.kind) >= int(info.effect.kind));
       if (before->on && !own) {

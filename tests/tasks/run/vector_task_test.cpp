@@ -179,8 +179,8 @@ TEST(VectorTask, RestartsSomeEnvironmentsAndLeavesTheOthersAlone) {
     const VectorTask fourth(*task, 1, options);
     EXPECT_THAT(vector.observation(1), ::testing::ElementsAreArray(fourth.observation(0)));
     for (const int e : {0, 2}) {
-      EXPECT_THAT(vector.observation(e), ::testing::ElementsAreArray(
-                                             std::span(before).subspan(std::size_t(e) * width, width)));
+      EXPECT_THAT(vector.observation(e), ::testing::ElementsAreArray(std::span(before).subspan(
+                                             std::size_t(e) * width, width)));
     }
     vector.step(actions);
     alone.step(actions);

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+// Turns the coefficients of a sensor's imperfections into weights of steps and points.
+#pragma once
+
+#include "engine/model/compiled_model.hpp"
+
+namespace tangere {
+
+/// Fills what a sensor and its description to users say of imperfections. Its points are
+/// set. `timestep`: of the scene [s]. Throws InputError (file:line)
+/// for values that are out of range.
+void compile_imperfections(const TactileDescription& description, double timestep,
+                           CompiledSensor& sensor, SensorInfo& info);
+
+}  // namespace tangere

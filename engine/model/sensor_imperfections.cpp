@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// The table of a sensor's imperfections: reader, files, effects and checks go by it.
+#include "engine/model/sensor_imperfections.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+namespace tangere {
+namespace {
+
+using Of = SensorImperfections;
+constexpr double kNoLimit = std::numeric_limits<double>::max();
+
+constexpr ImperfectionKind kKinds[] = {
+    {"low_pass", "s", 1e3, &Of::low_pass, nullptr},
+    {"delay", "s", 1e3, &Of::delay, nullptr},
+    {"spread", "m", 1e3, &Of::spread, nullptr},
+    {"crosstalk", "1", 0.25, &Of::crosstalk, nullptr},
+    {"gain", "1", 1, &Of::gain, nullptr},
+    {"sensor_gain", "1", 1, &Of::sensor_gain, nullptr},
+    {"bias", "N", kNoLimit, nullptr, &Of::bias},
+    {"noise", "N", kNoLimit, nullptr, &Of::noise},
+    {"dead", "1", 1, &Of::dead, nullptr},
+    {"saturation", "N", kNoLimit, nullptr, &Of::saturation},
+    {"quantisation", "N", kNoLimit, nullptr, &Of::quantisation},
+};
+
+}  // namespace
+
+std::span<const ImperfectionKind> imperfection_kinds() { return kKinds; }
+
+NormalAndShear value_of(const SensorImperfections& imperfections, const ImperfectionKind& kind) {
+  if (kind.pair != nullptr) return imperfections.*kind.pair;
+  return {imperfections.*kind.number, imperfections.*kind.number};
+}
+
+bool is_imperfect(const SensorImperfections& imperfections) {
+  for (const ImperfectionKind& kind : kKinds)
+    if (!(value_of(imperfections, kind) == NormalAndShear{})) return true;
+  return false;
+}
+
+bool has_memory(const SensorImperfections& imperfections) {
+  return imperfections.low_pass != 0 || imperfections.delay != 0;
+}
+
+std::string text_of(const SensorImperfections& imperfections) {
+  std::string text;
+  for (const ImperfectionKind& kind : kKinds) {
+    const NormalAndShear value = value_of(imperfections, kind);
+    if (value == NormalAndShear{}) continue;
+    const std::string unit = kind.unit, second = fmt::format(" {}", value.shear);
+    text += fmt::format("{}{} {}{}{}", text.empty() ? "" : ", ", kind.name, value.normal,
+                        value.shear == value.normal ? "" : second, unit == "1" ? "" : " " + unit);
+  }
+  return text;
+}
+
+void check_imperfections(const SensorImperfections& imperfections, const std::string& sensor,
+                         bool grid) {
+  const std::string where =
+      fmt::format("{}imperfections of '{}': ", imperfections.source.prefix(), sensor);
+  for (const ImperfectionKind& kind : kKinds) {
+    const NormalAndShear value = value_of(imperfections, kind);
+    for (const double x : {value.normal, value.shear}) {
+      if (x >= 0 && x <= kind.most) continue;
+      const bool bounded = kind.most < kNoLimit;
+      const std::string unit = kind.unit;
+      throw InputError(fmt::format("{}{}=\"{}\"; expected a number from 0{}{}", where, kind.name, x,
+                                   bounded ? fmt::format(" to {}", kind.most) : " on",
+                                   unit == "1" ? "" : " " + unit));
+    }
+  }
+  const char* const needs = imperfections.crosstalk != 0 ? "crosstalk"
+                            : imperfections.spread != 0  ? "spread"
+                                                         : nullptr;
+  if (needs != nullptr && !grid)
+    throw InputError(where + needs +
+                     " on a list of points, which have no neighbours; expected it on type "
+                     "rect_array");
+}
+
+}  // namespace tangere

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// The imperfections of sensors, at the one place where fields are read: what a sensor says for an
+// ideal field, and the derivative of that, forward and in reverse
+// (engine/model/sensor_imperfections.hpp has the equations).
+#pragma once
+
+#include <span>
+
+#include "engine/model/compiled_model.hpp"
+#include "engine/sense/pad_reader.hpp"
+#include "engine/step/batch.hpp"
+
+namespace tangere {
+
+/// What the random numbers of a reading are keyed by.
+struct ReadingKey {
+  std::uint64_t seed;
+  std::int64_t episode, step;
+};
+ReadingKey key_of(const Batch& batch, int environment);
+
+/// Components of a field: `count` from `first` on.
+struct FieldPart {
+  int first = 0, count = 3;
+};
+
+/// Owns the scratch of one thread. Allocates only when made, and only for a model with a sensor
+/// that is imperfect. Functions of a sensor that is not change nothing.
+class ImperfectField {
+ public:
+  explicit ImperfectField(const Model& model);
+
+  /// Turns the ideal field of a sensor, (points, part.count) [N], after delay and low-pass, into
+  /// its reading.
+  void apply(const CompiledSensor& sensor, const ReadingKey& key, FieldPart part,
+             std::span<double> field);
+
+  /// Turn a change of the ideal field, (points, 3), into that of the reading, and the cotangent of
+  /// the reading into that of the ideal field. Dead and saturated numbers have no derivative;
+  /// rounding passes derivatives straight through. `ideal`: the ideal field, used only where the
+  /// sensor saturates.
+  void push_forward(const CompiledSensor& sensor, const ReadingKey& key,
+                    std::span<const double> ideal, std::span<double> change);
+  void pull_back(const CompiledSensor& sensor, const ReadingKey& key, std::span<const double> ideal,
+                 std::span<double> cotangent);
+
+ private:
+  void spread(const CompiledSensor& sensor, int components, bool back, std::span<double> field);
+  void share(const CompiledSensor& sensor, int components, std::span<double> field);
+  void scale_by_slope(const CompiledSensor& sensor, const ReadingKey& key,
+                      std::span<const double> ideal, std::span<double> change);
+  std::vector<double> before_, shared_;  // fields before crosstalk; ideal ones after it
+};
+
+/// Throws InputError for a sensor with memory: its reading has no derivative by one state alone.
+void check_has_no_memory(const Model& model, int sensor);
+
+/// Computes the ideal field of a sensor, (points, 3), in a lane of the group whose touches were
+/// found.
+void read_ideal(PadReader& reader, const CompiledSensor& sensor, int group, int lane,
+                std::span<double> field);
+
+}  // namespace tangere
