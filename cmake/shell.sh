@@ -54,7 +54,7 @@ install_packages() {
 }
 
 # Every C++ file, for xargs -0.
-sources() { find kernels engine tasks io apps bench tests examples cmake -name '*.[ch]pp' -print0; }
+sources() { find kernels engine tasks io apps python bench tests examples cmake -name '*.[ch]pp' -print0; }
 
 # Prints the clang-format of the release in cmake/python.txt, fails when there is none.
 clang_format_version=$(sed -n 's/^clang-format==//p' cmake/python.txt)
@@ -75,6 +75,24 @@ install_tools() {
   if clang_format >/dev/null; then return; fi
   { python3 -m venv build/tools && build/tools/bin/pip install -q -r cmake/python.txt; } </dev/null >/dev/null 2>&1 ||
     say "There is no clang-format $clang_format_version here and PyPI is out of reach: formatting is not checked."
+}
+
+# Makes build/venv with what python/requirements.txt lists, and $python_options for the build. The distribution's
+# interpreter comes first, because its packages have PyTorch. Where PyPI is out of reach the module is left out.
+python_options=(-DTANGERE_PYTHON=OFF)
+install_python() {
+  local python stamp=build/venv/requirements.txt wanted
+  wanted=$(cat python/requirements.txt 2>/dev/null || true)
+  python=$(type -aP python3 | grep -x /usr/bin/python3 || type -P python3) || python=""
+  if [ ! -x build/venv/bin/python ] || [ "$wanted" != "$(cat "$stamp" 2>/dev/null)" ]; then
+    if [ -z "$python" ] || ! { "$python" -m venv --clear --system-site-packages build/venv &&
+      build/venv/bin/pip install -q --disable-pip-version-check -r python/requirements.txt &&
+      printf '%s\n' "$wanted" >"$stamp"; } </dev/null; then
+      say "There is no Python with venv and headers here, or PyPI is out of reach: the Python module is neither built nor tested."
+      return
+    fi
+  fi
+  python_options=(-DTANGERE_PYTHON=ON "-DPython_EXECUTABLE=$PWD/build/venv/bin/python")
 }
 
 check_cmake() {
@@ -99,7 +117,7 @@ build() {
   local preset=$1 isas=$2
   shift 2
   check_cmake
-  cmake --preset "$preset" "-DTANGERE_ISAS=$isas" "-DCMAKE_UNITY_BUILD=${unity:-OFF}" </dev/null || fail "cmake could not configure the build (its reason is above)." \
+  cmake --preset "$preset" "-DTANGERE_ISAS=$isas" "-DCMAKE_UNITY_BUILD=${unity:-OFF}" ${cmake_options[@]+"${cmake_options[@]}"} </dev/null || fail "cmake could not configure the build (its reason is above)." \
     "If build/$preset is left from another place or compiler, remove it: rm -r build/$preset"
   cmake --build "build/$preset" --parallel "$(jobs)" ${1:+--target "$@"} </dev/null ||
     fail "the build of build/$preset failed (the compiler's reason is above)." \

@@ -39,9 +39,10 @@ class Clone(nn.Module):
         return self.middle + self.half * torch.tanh(self.net(x))
 
 
-def flat(obs: dict[str, np.ndarray]) -> torch.Tensor:
-    """(n, rows, …) of every key → (n, inputs)."""
-    return torch.from_numpy(np.concatenate([v.reshape(len(v), -1) for v in obs.values()], axis=1))
+def flat(obs: dict[str, np.ndarray], past: np.ndarray) -> torch.Tensor:
+    """(n, rows, …) of every key, and the actions between them, (n, rows - 1, na) → (n, inputs)."""
+    parts = [*obs.values(), past]
+    return torch.from_numpy(np.concatenate([v.reshape(len(v), -1) for v in parts], axis=1))
 
 
 def train(windows: Windows, clone: Clone, epochs: int, batch: int, rate: float, seed: int) -> None:
@@ -50,7 +51,8 @@ def train(windows: Windows, clone: Clone, epochs: int, batch: int, rate: float, 
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
     for epoch in range(epochs):
         for rows in windows.batches(batch, seed=seed * 1000 + epoch):
-            loss = (clone(flat(rows["obs"])) - torch.from_numpy(rows["actions"][:, 0])).abs().mean()
+            seen = flat(rows["obs"], rows["past_actions"])
+            loss = (clone(seen) - torch.from_numpy(rows["actions"][:, 0])).square().mean()
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
@@ -74,15 +76,19 @@ def play(task: str, episodes: int, choose, keys=None) -> np.ndarray:
 
 def closed_loop(task: str, windows: Windows, clone: Clone, episodes: int) -> np.ndarray:
     history: list[dict[str, np.ndarray]] = []
+    past: list[np.ndarray] = []
 
-    def choose(_env, obs, _t):
-        while len(history) <= windows.before:
-            history.append(obs)
-        history.pop(0)
-        history.append(obs)
+    def choose(env, obs, t):
+        if t == 0:
+            history[:] = [obs] * (windows.before + 1)
+            past[:] = [np.zeros((episodes, *env.task.action.shape), np.float32)] * windows.before
+        history[:] = [*history[1:], obs]
         stacked = {k: np.stack([h[k] for h in history], axis=1) for k in windows.keys}
+        between = np.stack(past, axis=1) if past else np.zeros((episodes, 0), np.float32)
         with torch.no_grad():
-            return clone(flat(stacked)).numpy()
+            action = clone(flat(stacked, between)).numpy()
+        past[:] = [*past, action][len(past) + 1 - windows.before :] if windows.before else []
+        return action
 
     return play(task, episodes, choose, windows.keys)
 
@@ -101,7 +107,7 @@ def main() -> None:
     parser.add_argument("--batch", type=int, default=256)
     parser.add_argument("--rate", type=float, default=1e-3)
     parser.add_argument("--width", type=int, default=256)
-    parser.add_argument("--before", type=int, default=0, help="rows of history")
+    parser.add_argument("--before", type=int, default=0, help="rows of history, with their actions")
     parser.add_argument("--without", nargs="*", default=[], help="observations to leave out")
     parser.add_argument("--all", action="store_true", help="learn from failed episodes too")
     parser.add_argument("--episodes", type=int, default=1000, help="to play")
@@ -120,7 +126,7 @@ def main() -> None:
         torch.manual_seed(seed)
         begin = time.process_time()
         first = windows[0]
-        inputs = sum(v.size for v in first["obs"].values())
+        inputs = sum(v.size for v in first["obs"].values()) + first["past_actions"].size
         clone = Clone(inputs, first["actions"].shape[1], asked.width, task.action.low, task.action.high)
         train(windows, clone, asked.epochs, asked.batch, asked.rate, seed)
         trained = time.process_time() - begin

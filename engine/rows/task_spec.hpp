@@ -21,7 +21,7 @@ struct TensorSpec {
   std::string meaning;
   /// Typical sizes of the numbers, one for all or one per place on the last axis, in their unit. A
   /// network sees the numbers divided by them. Empty: 1.
-  std::vector<double> scale;
+  std::vector<double> scale = {};
   double low = -kUnbounded, high = kUnbounded;  ///< bounds of every number
   bool privileged = false;                      ///< a robot could not measure it
 

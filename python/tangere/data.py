@@ -70,9 +70,14 @@ class Episodes:
             self.task = ""
         self.scale: dict[str, Any] = {key: 1.0 for key in self.keys}
         self.privileged = [key for key in ("q", "v") if key in self.keys]
-        if "observation_scale" in scene:
+        if "observation_scale" in scene:  # format version 4 on
             self.scale.update(json.loads(scene["observation_scale"]))
             self.privileged = json.loads(scene["privileged"])
+        elif self.task:
+            raise _core.InputError(
+                f"{self.path}: a data set of an older version, without scales of observations; "
+                "make it again with `tangere generate`"
+            )
         self.masks = self.path / "robomimic.hdf5"
 
     def __len__(self) -> int:
@@ -138,9 +143,10 @@ def _copied(arrays: dict[str, np.ndarray]) -> int:
 class Windows:
     """Windows of rows of a data set: a `torch.utils.data.Dataset`.
 
-    Item i is {"obs": {KEY: (before + 1, …)}, "actions": (ahead, na), "mask": (ahead)}: the
-    observations up to one row, oldest first, and the actions from that row on. Rows before the
-    start repeat the first one. Actions after the end repeat the last one, and `mask` is 0 there.
+    Item i is {"obs": {KEY: (before + 1, …)}, "past_actions": (before, na), "actions": (ahead, na),
+    "mask": (ahead)}: the observations up to one row, oldest first, the actions between them, and
+    the actions from that row on. Rows before the start repeat the first observation, with actions
+    of 0. Actions after the end repeat the last one, and `mask` is 0 there.
     Observations are float32. `gradients`: names of derivatives stored for each action, such as
     "grad_actions", that come along as (ahead, …).
 
@@ -260,8 +266,11 @@ class Windows:
         rows = np.maximum(items[:, None] + np.arange(-self.before, 1), first)
         after = items[:, None] + np.arange(self.ahead)
         actions = np.minimum(after, last)
+        past = items[:, None] + np.arange(-self.before, 0)
         batch: dict[str, Any] = {
             "obs": {key: self._shown(key, self._rows(key, rows)) for key in self.keys},
+            "past_actions": self._rows("actions", np.maximum(past, first))
+            * (past >= first)[..., None].astype(np.float32),
             "actions": self._rows("actions", actions),
             "mask": (after <= last).astype(np.float32),
         }

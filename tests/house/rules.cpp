@@ -57,6 +57,7 @@ const std::map<std::string, Folder, std::less<>>& folders() {
       {"io/dataset", {{"io/trajectory", "io/scene", "io/hdf5", "io/files", "engine"}, of_io}},
       {"io/picture", {{"io/trajectory", "io/files", "engine"}, of_io}},
       {"apps", {{"tasks", "io", "engine", "kernels"}, {"hdf5", "H5", "tinyxml2", "xsimd"}}},
+      {"python/module", {{"tasks", "io", "engine", "kernels"}, {"hdf5", "H5", "tinyxml2", "xsimd"}}},
       {"cmake", {{}, {}}},
       {"bench", {{"tasks", "io", "engine", "kernels"}, {}}},
       {"tests", {{"apps", "tasks", "io", "engine", "kernels"}, {}}},

@@ -18,7 +18,7 @@ machine() {
   mkdir -p "$bin" "$home/project/cmake"
   : >"$log"
   cp "$project"/run-demo "$project"/run-tests "$project"/CMakePresets.json "$home/project"
-  cp "$project"/cmake/shell.sh "$project"/cmake/packages.txt "$project"/cmake/test-packages.txt "$project"/cmake/python.txt "$home/project/cmake"
+  cp "$project"/cmake/shell.sh "$project"/cmake/packages.txt "$project"/cmake/test-packages.txt "$project"/cmake/python-packages.txt "$project"/cmake/python.txt "$home/project/cmake"
   local tool
   for tool in bash sed grep tr sort head awk env nproc dirname readlink cat mkdir rm ls ctest sleep; do
     ln -s "$(type -P "$tool")" "$bin/$tool"
@@ -32,7 +32,7 @@ machine() {
       [ -n "${FAKE_LIE:-}" ] || for last; do echo "$last"; done >>"$FAKE_HOME/installed" ;;
     esac'
   fake cmake 'if [ "$1" = --version ]; then echo "cmake version ${FAKE_CMAKE:-3.25.1}"; fi'
-  sed -e 's/#.*//' "$project/cmake/packages.txt" "$project/cmake/test-packages.txt" >"$home/installed"
+  sed -e 's/#.*//' "$project/cmake/packages.txt" "$project/cmake/test-packages.txt" "$project/cmake/python-packages.txt" >"$home/installed"
 }
 fake() {
   printf '#!/usr/bin/env bash\necho "%s $*" >>"$FAKE_HOME/log"\n%s\n' "$1" "$2" >"$bin/$1"

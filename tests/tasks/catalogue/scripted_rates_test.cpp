@@ -18,13 +18,13 @@ using testing::task_named;
 constexpr int kEpisodes = 1000;
 
 /// `documented`: the rate in docs/tasks.md. The measured rate is at least that, less half of its 95
-/// % interval.
-void expect_solved(const std::string& name, double documented) {
+/// % interval. `failed`: simulations without a solution, flagged by their status (docs/tasks.md).
+void expect_solved(const std::string& name, double documented, int failed = 0) {
   const auto task = task_named(name);
   const Played scripted = play_episodes(*task, PolicyKind::scripted, kEpisodes);
   const double half_width = 1.96 * std::sqrt(documented * (1 - documented) / kEpisodes);
   EXPECT_GE(scripted.rate(), documented - half_width) << name;
-  EXPECT_EQ(scripted.failures, 0);
+  EXPECT_LE(scripted.failures, failed);
   const Played idle = play_episodes(*task, PolicyKind::hold, kEpisodes / 10);
   EXPECT_GT(scripted.rate(), idle.rate() + 2 * idle.half_width()) << name;
 }
@@ -36,7 +36,7 @@ TEST(Scripted, TurnsTheBoxIntoTheHole) { expect_solved("insertion_rotation", 1);
 TEST(Scripted, MovesTheBoxIntoTheHole) { expect_solved("insertion_translation", 0.981); }
 TEST(Scripted, InsertsTheBox) { expect_solved("insertion", 0.809); }
 TEST(Scripted, OpensTheCap) { expect_solved("cap_opening_blind", 0.969); }
-TEST(Scripted, PushesTheBox) { expect_solved("box_pushing_privileged", 0.711); }
+TEST(Scripted, PushesTheBox) { expect_solved("box_pushing_privileged", 0.763, 1); }
 
 }  // namespace
 }  // namespace tangere

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Windows of a data set against the file, read with h5py alone."""
+
+from __future__ import annotations
+
+import pickle
+
+import h5py
+import numpy as np
+import pytest
+
+import tangere
+from tangere.data import Episodes, Windows
+
+
+@pytest.fixture(scope="module")
+def demo(pushes):
+    with h5py.File(pushes / "robomimic.hdf5") as file:
+        names = [n.decode() for n in file["mask/train"]]
+        return {name: {k: file[f"data/{name}/obs/{k}"][()] for k in ("goal", "tactile")}
+                | {"actions": file[f"data/{name}/actions"][()]} for name in names}  # fmt: skip
+
+
+def test_windows_are_rows_of_the_file(pushes, demo):
+    windows = Windows(pushes, before=2, ahead=3, scale="none")
+    assert windows.keys == ["goal", "tactile"]  # q and v are privileged
+    assert len(windows) == sum(len(d["actions"]) for d in demo.values())
+    first = next(iter(demo.values()))
+    middle, start, end = windows[50], windows[0], windows[99]
+    np.testing.assert_array_equal(middle["obs"]["tactile"], first["tactile"][48:51])
+    np.testing.assert_array_equal(middle["actions"], first["actions"][50:53])
+    np.testing.assert_array_equal(middle["past_actions"], first["actions"][48:50])
+    np.testing.assert_array_equal(start["obs"]["goal"], first["goal"][[0, 0, 0]])
+    np.testing.assert_array_equal(start["past_actions"], np.zeros((2, 3)))
+    np.testing.assert_array_equal(windows[1]["past_actions"], [np.zeros(3), first["actions"][0]])
+    np.testing.assert_array_equal(end["actions"], first["actions"][[99, 99, 99]])
+    np.testing.assert_array_equal(end["mask"], [1, 0, 0])
+    second = list(demo.values())[1]
+    np.testing.assert_array_equal(windows[100]["obs"]["goal"], second["goal"][[0, 0, 0]])
+    with pytest.raises(IndexError):
+        windows[len(windows)]
+
+
+def test_batches_are_windows_each_once(pushes):
+    windows = Windows(pushes, before=1, ahead=2)
+    seen = [b["actions"] for b in windows.batches(300, seed=3)]
+    assert sum(len(a) for a in seen) == len(windows)
+    np.testing.assert_allclose(
+        np.sort(np.concatenate(seen)[:, 0, 0]),
+        np.sort([windows[i]["actions"][0, 0] for i in range(len(windows))]),
+    )
+
+
+def test_scales_are_those_of_the_environment(pushes):
+    env = tangere.make_vec("box_pushing", 1, seed=5)
+    windows = Windows(pushes, split=None)
+    obs, _ = env.reset()
+    for t in range(30):
+        for key in obs:
+            np.testing.assert_allclose(windows[t]["obs"][key][0], obs[key][0], rtol=1e-5, atol=1e-6)
+        obs = env.step(windows[t]["actions"])[0]
+    assert np.abs(obs["tactile"]).max() > 0
+
+
+def test_standard_scores(pushes):
+    windows = Windows(pushes, scale="standard")
+    rows = np.concatenate([b["obs"]["goal"][:, 0] for b in windows.batches(500)])
+    np.testing.assert_allclose(rows.mean(0), 0, atol=1e-3)
+    assert (rows.std(0) <= 1 + 1e-3).all() and windows.std["tactile"].shape == (3,)
+
+
+def test_forms(pushes):
+    stored, image, points = (Windows(pushes, form=f)[60] for f in ("stored", "image", "points"))
+    field = stored["obs"]["tactile"][0]
+    assert field.shape == (13, 10, 3)
+    np.testing.assert_array_equal(image["obs"]["tactile"][0], np.moveaxis(field, -1, 0))
+    np.testing.assert_array_equal(points["obs"]["tactile"][0], field.reshape(130, 3))
+    np.testing.assert_array_equal(points["obs"]["goal"], stored["obs"]["goal"])
+
+
+def test_successes_and_masks(pushes):
+    episodes = Episodes(pushes)
+    solved = episodes.succeeded()
+    assert 0 < len(solved) < 20
+    assert episodes.mask("success") == solved
+    assert len(Windows(episodes, split=None, only_success=True)) == 100 * len(solved)
+
+
+def test_compressed_and_whole_data_are_the_same(generate, pushes):
+    packed = generate("box_pushing", "--episodes", "20", "--seed", "5", "--compress", "lz4")
+    try:
+        Episodes(packed)[0]["tactile"]
+    except OSError:
+        pytest.skip("this h5py has no LZ4 filter")
+    a, b = Windows(pushes, scale="none"), Windows(packed, scale="none")
+    for i in (0, 50, 1500):
+        np.testing.assert_array_equal(a[i]["obs"]["tactile"], b[i]["obs"]["tactile"])
+
+
+def test_deflate_is_read_too(generate, pushes):
+    packed = generate("box_pushing", "--episodes", "20", "--seed", "5", "--compress", "deflate")
+    a, b = Windows(pushes, scale="none"), Windows(packed, scale="none")
+    np.testing.assert_array_equal(a[50]["obs"]["tactile"], b[50]["obs"]["tactile"])
+
+
+def test_rows_too_large_for_memory_are_read_one_by_one(pushes, monkeypatch):
+    import tangere.data
+
+    whole = Windows(pushes, before=1)
+    monkeypatch.setattr(tangere.data, "_MOST_IN_MEMORY", 0)
+    parts = Windows(pushes, before=1)
+    items = np.array([5, 700, 6, 0, 1700])
+    one, other = whole.gather(items), parts.gather(items)
+    np.testing.assert_array_equal(one["obs"]["tactile"], other["obs"]["tactile"])
+    np.testing.assert_array_equal(one["actions"], other["actions"])
+
+
+def test_windows_go_to_another_process(pushes):
+    windows = Windows(pushes)
+    copy = pickle.loads(pickle.dumps(windows))
+    np.testing.assert_array_equal(copy[7]["obs"]["goal"], windows[7]["obs"]["goal"])
+
+
+def test_torch_loads_them(pushes):
+    torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+    loader = torch.utils.data.DataLoader(Windows(pushes), batch_size=32, shuffle=True)
+    batch = next(iter(loader))
+    assert batch["obs"]["tactile"].shape == (32, 1, 13, 10, 3)
+
+
+def test_mistakes_are_told(pushes, tmp_path):
+    for arguments, message in [
+        ({"keys": ["touch"]}, r"keys \['touch'\]; the data set has"),
+        ({"scale": "unit"}, "scale 'unit'"),
+        ({"form": "cube"}, "form 'cube'"),
+        ({"before": -1}, "before -1"),
+        ({"split": "test"}, "no mask 'test'"),
+    ]:
+        with pytest.raises(tangere.InputError, match=message):
+            Windows(pushes, **arguments)
+    with pytest.raises(tangere.InputError, match="no shard"):
+        Windows(tmp_path)
+    with pytest.raises(tangere.InputError, match="no 'grad_actions'"):
+        Windows(pushes, gradients=["grad_actions"])[0]
