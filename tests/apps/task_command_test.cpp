@@ -188,8 +188,8 @@ TEST(Tasks, InspectShowsWhatATaskDeclares) {
   const Outcome text = run(folder, {"inspect", "box_pushing"});
   EXPECT_EQ(text.exit_code, 0) << text.err;
   for (const char* says :
-       {"task box_pushing: ", "action drive (3) [1], -1 to 1", "tactile (13, 10, 3) [N]", "5 steps per action",
-        "at most 100 actions", "scene box_pushing", "effects\n", "stages\n"})
+       {"task box_pushing: ", "action drive (3) [1], -1 to 1", "tactile (13, 10, 3) [N]",
+        "5 steps per action", "at most 100 actions", "scene box_pushing", "effects\n", "stages\n"})
     EXPECT_THAT(text.out, HasSubstr(says));
   const json answer = run_json(folder, {"inspect", "insertion"});
   const json& task = answer.at("task");
