@@ -35,9 +35,11 @@ nb::dict observation_arrays(const TaskSpec& spec, std::span<const double> rows,
     arrays[tensor.name.c_str()] = new_array<float>(shape, to);
     std::vector<double> by(size, 1.0);
     for (std::size_t i = 0; i < size && scaled; ++i) by[i] = 1 / scale_of(tensor, i);
-    for (std::size_t e = 0; e < environments; ++e)
-      for (std::size_t i = 0; i < size; ++i)
-        to[e * size + i] = static_cast<float>(rows[e * width + from + i] * by[i]);
+    for (std::size_t e = 0; e < environments; ++e) {
+      const double* const row = rows.data() + e * width + from;
+      float* const out = to.data() + e * size;
+      for (std::size_t i = 0; i < size; ++i) out[i] = static_cast<float>(row[i] * by[i]);
+    }
   }
   return arrays;
 }
