@@ -56,7 +56,8 @@ def test(task: str, policy: nn.Module, gains: torch.Tensor, episodes: int) -> di
     q, _, memory = env.state()
     names = env.model.q_names
     x, y, yaw = (names.index(n) for n in ("box_slide.x", "box_slide.y", "box_turn.angle"))
-    rest = 0.05  # [m] where the box's joint stands in the world
+    start = tangere.Batch(env.model)
+    rest = start.bodies()[0][0, env.model.body_names.index("box"), 0] - start.q[0, x]  # [m]
     place = np.hypot(q[:, x] + rest - memory[:, 0], q[:, y] - memory[:, 1])
     return {
         "position_m": float(place.mean()),
@@ -109,6 +110,8 @@ def main() -> None:
         schedule.step()
         if update % 20 == 19 and not asked.json:
             print(f"update {update + 1}: return {mean:.1f}, gradient norm {float(norm):.3g}", flush=True)
+    if kept is None:
+        raise SystemExit("no update had a finite return; try a smaller --rate or --touch")
     policy.load_state_dict(kept)
     trained = time.process_time() - begin
     result = test(asked.task, policy, gains, asked.goals)

@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
 
 #include <algorithm>
 #include <atomic>
@@ -14,6 +15,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -137,6 +139,11 @@ struct type_caster<tangere::python::Argument<T>> {
 
   bool from_python(handle source, std::uint8_t flags, cleanup_list* cleanup) noexcept {
     make_caster<typename Value::Base> caster;
+    try {
+      if (!of_numbers(source)) return false;
+    } catch (const python_error&) {
+      return false;
+    }
     const bool is_array = caster.from_python(source, flags, cleanup);
     if (!is_array && (flags & std::uint8_t(cast_flags::convert)) == 0) return false;
     try {
@@ -153,6 +160,15 @@ struct type_caster<tangere::python::Argument<T>> {
     } catch (const python_error&) {
       return false;  // not numbers: nanobind raises TypeError with the argument's type
     }
+  }
+  /// Complex numbers would lose a part, and None would become NaN.
+  static bool of_numbers(handle source) {
+    const object array = hasattr(source, "dtype")
+                             ? borrow(source)
+                             : module_::import_("numpy").attr("asarray")(source);
+    const object kind = getattr(array.attr("dtype"), "kind", none());  // PyTorch's types have none
+    return kind.is_none() || std::string_view("biuf").find(cast<std::string>(kind)) !=
+                                 std::string_view::npos;
   }
   static handle from_cpp(const Value&, rv_policy, cleanup_list*) noexcept { return {}; }
 };

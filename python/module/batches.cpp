@@ -8,6 +8,8 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <cmath>
+
 #include "engine/step/control.hpp"
 #include "kernels/numbers/block.hpp"
 #include "tasks/run/block_reader.hpp"
@@ -115,8 +117,13 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
   std::span<double> q, v;
   run.q = new_array<double>({frames, count(), nq}, q);
   run.v = new_array<double>({frames, count(), nv}, v);
+  std::span<std::int8_t> status;
+  run.status = new_array<std::int8_t>({count()}, status);
+  std::vector<StepStatus> statuses(count());
   std::vector<Asked> asked;
   for (const std::string& name : readings) {
+    if (run.readings.contains(name))
+      throw InputError(fmt::format("reading '{}' is listed twice; expected each once", name));
     asked.push_back({reading_named(name), 0, {}});
     Shape shape = shape_of_reading(asked.back().output);
     shape.insert(shape.begin(), {frames, count()});
@@ -142,8 +149,10 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
                         [&](int e) { return row(a.numbers, frame, e, a.width); });
       }
     });
+    std::copy(batch_.statuses().begin(), batch_.statuses().end(), statuses.begin());
   }
-  run.status = status();
+  std::transform(statuses.begin(), statuses.end(), status.begin(),
+                 [](StepStatus s) { return static_cast<std::int8_t>(s); });
   return run;
 }
 
@@ -194,10 +203,22 @@ Array<std::int8_t> PythonBatch::status() {
   return array_of<std::int8_t>({count()}, batch_.statuses());
 }
 
-std::vector<int> PythonBatch::listed(const std::optional<std::vector<int>>& environments) const {
+std::vector<int> PythonBatch::listed(const nb::object& environments) const {
   std::vector<int> list;
-  if (environments) list = *environments;
-  for (int e = 0; e < this->environments() && !environments; ++e) list.push_back(e);
+  if (environments.is_none()) {
+    for (int e = 0; e < this->environments(); ++e) list.push_back(e);
+    return list;
+  }
+  const nb::object array = nb::module_::import_("numpy").attr("asarray")(environments);
+  const auto kind = nb::cast<std::string>(array.attr("dtype").attr("kind"));
+  const bool is_mask = kind == "b";
+  if (!is_mask && kind != "i" && kind != "u" && nb::len(array) > 0)
+    throw InputError("envs of another kind; expected indices of environments, or a mask of bool");
+  const auto given = nb::cast<std::vector<int>>(array.attr("tolist")());
+  if (is_mask && given.size() != count())
+    throw InputError(fmt::format("a mask of {} environments; expected {}", given.size(), count()));
+  for (std::size_t k = 0; k < given.size(); ++k)
+    if (!is_mask || given[k] != 0) list.push_back(is_mask ? static_cast<int>(k) : given[k]);
   for (const int e : list)
     if (e < 0 || e >= this->environments())
       throw InputError(
@@ -205,18 +226,34 @@ std::vector<int> PythonBatch::listed(const std::optional<std::vector<int>>& envi
   return list;
 }
 
+/// Throws InputError for rows of q and v that are not finite, and for quaternions without length.
+void PythonBatch::check_state(std::span<const double> q, std::span<const double> v) const {
+  const auto finite = [](double x) { return std::isfinite(x); };
+  if (!std::all_of(q.begin(), q.end(), finite) || !std::all_of(v.begin(), v.end(), finite))
+    throw InputError("a state that is not finite; expected numbers");
+  const auto names = model().q_names();
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    if (!names[i % names.size()].ends_with(".qw")) continue;
+    const std::span<const double> quaternion = q.subspan(i, 4);
+    if (std::all_of(quaternion.begin(), quaternion.end(), [](double x) { return std::abs(x) < 1e-6; }))
+      throw InputError(fmt::format("{} and its three neighbours are 0; expected a unit quaternion",
+                                   names[i % names.size()]));
+  }
+}
+
 void PythonBatch::set_state(const Argument<double>& q, const Argument<double>& v,
-                            const std::optional<std::vector<int>>& environments) {
+                            const nb::object& environments) {
   const std::vector<int> list = listed(environments);
   const std::size_t nq = as_size(model().nq()), nv = as_size(model().nv());
   const std::vector<double> qs = rows_of(q, list.size(), nq, "q"),
                             vs = rows_of(v, list.size(), nv, "v");
+  check_state(qs, vs);
   const InUse::Turn turn(in_use_);
   for (std::size_t k = 0; k < list.size(); ++k)
     batch_.set_state(list[k], std::span(qs).subspan(k * nq, nq), std::span(vs).subspan(k * nv, nv));
 }
 
-void PythonBatch::reset(const std::optional<std::vector<int>>& environments,
+void PythonBatch::reset(const nb::object& environments,
                         const std::optional<std::vector<std::int64_t>>& episodes) {
   const std::vector<int> list = listed(environments);
   if (episodes && episodes->size() != list.size())
@@ -308,7 +345,7 @@ void add_batches(nb::module_& m) {
            "to fill instead of a new one.")
       .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
            "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
-           "`envs`, or of all. Releases a failed environment; forgets the state one step before.")
+           "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; forgets the state one step before.")
       .def("reset", &PythonBatch::reset, "envs"_a = nb::none(), "episodes"_a = nb::none(),
            "Draws the starting states again, or those of other `episodes`.")
       .def("scene_controls", &PythonBatch::scene_controls, "steps"_a,

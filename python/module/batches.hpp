@@ -42,8 +42,8 @@ class PythonBatch {
   nb::tuple bodies();
   [[nodiscard]] Array<std::int8_t> status();
   void set_state(const Argument<double>& q, const Argument<double>& v,
-                 const std::optional<std::vector<int>>& environments);
-  void reset(const std::optional<std::vector<int>>& environments,
+                 const nb::object& environments);
+  void reset(const nb::object& environments,
              const std::optional<std::vector<std::int64_t>>& episodes);
   Array<double> scene_controls(std::int64_t steps);
 
@@ -61,7 +61,8 @@ class PythonBatch {
   [[nodiscard]] std::size_t count() const { return as_size(environments()); }
   [[nodiscard]] FieldOutput reading_named(const std::string& name) const;
   [[nodiscard]] Shape shape_of_reading(FieldOutput output) const;
-  [[nodiscard]] std::vector<int> listed(const std::optional<std::vector<int>>& environments) const;
+  [[nodiscard]] std::vector<int> listed(const nb::object& environments) const;
+  void check_state(std::span<const double> q, std::span<const double> v) const;
   template <class T>
   nb::object read(FieldOutput output, const nb::object& out);
   template <class T>

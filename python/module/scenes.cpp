@@ -99,7 +99,14 @@ void add_model(nb::module_& m) {
           "initial_q",
           [](const Model& s) { return array_of<double>({as_size(s.nq())}, s.initial_q()); },
           nb::rv_policy::automatic, "(nq) where the scene starts.")
-      .def("mass", &Model::mass, "body"_a, "Of a body, by its index [kg].")
+      .def(
+          "mass",
+          [](const Model& s, int body) {
+            if (body < 0 || body >= s.nb())
+              throw InputError(fmt::format("body {}; expected 0 to {}", body, s.nb() - 1));
+            return s.mass(body);
+          },
+          "body"_a, "Of a body, by its index [kg].")
       .def("__repr__", [](const Model& s) {
         return fmt::format("Model('{}', nq={}, nv={}, nu={})", s.scene().name, s.nq(), s.nv(),
                            s.nu());

@@ -62,10 +62,7 @@ __all__ = [
 
 def scenes() -> dict[str, Path]:
     """The scenes that come with the package: name without .xml → path of the file."""
-    folder = Path(__file__).resolve().parent / "scenes"
-    here = Path(__file__).parent / "scenes"
-    folder = here if here.is_dir() else folder
-    return {path.stem: path for path in sorted(folder.glob("*.xml"))}
+    return {path.stem: path for path in sorted((Path(__file__).parent / "scenes").glob("*.xml"))}
 
 
 register_tasks()

@@ -8,6 +8,7 @@ Needs h5py (`pip install tangere[data]`). PyTorch is not needed: `Windows` has t
 from __future__ import annotations
 
 import json
+import os
 from collections import OrderedDict
 from pathlib import Path
 from typing import Any, Literal, Sequence
@@ -21,7 +22,6 @@ Form = Literal["stored", "image", "points"]
 Scale = Literal["task", "standard", "none"]
 
 _CACHED_BYTES = 1 << 28  # of compressed data sets, which cannot be mapped
-_MOST_IN_MEMORY = 4 << 30  # bytes of an array's rows that are read at once and kept
 _FLOOR = 0.05  # of a key's root mean square: the least standard deviation that is divided by
 
 
@@ -57,6 +57,7 @@ class Episodes:
             lengths.append(rows)
         self.lengths = np.asarray(lengths)
         self._index = {name: i for i, name in enumerate(self.names)}
+        self._process = os.getpid()
         self._maps: dict[int, np.memmap] = {}
         self._files: dict[int, h5py.File] = {}
         self._open: OrderedDict[int, dict[str, np.ndarray]] = OrderedDict()
@@ -102,6 +103,7 @@ class Episodes:
 
     def __getitem__(self, episode: int) -> dict[str, np.ndarray]:
         """Arrays by name: the observations, "actions", "rewards", and "grad_…" where there are any."""
+        self._here()
         if episode in self._open:
             self._open.move_to_end(episode)
             return self._open[episode]
@@ -116,7 +118,13 @@ class Episodes:
             self._held -= _copied(self._open.popitem(last=False)[1])
         return arrays
 
+    def _here(self) -> None:
+        """After a fork the child opens its own files: HDF5 does not share them."""
+        if self._process != os.getpid():
+            self.__dict__.update(self.__getstate__(), _process=os.getpid())
+
     def _demo(self, episode: int) -> h5py.Group:
+        self._here()
         number = self._shard_of[episode]
         if number not in self._files:
             self._files[number] = h5py.File(self._shards[number], "r")
@@ -141,7 +149,7 @@ def _copied(arrays: dict[str, np.ndarray]) -> int:
 
 
 class Windows:
-    """Windows of rows of a data set: a `torch.utils.data.Dataset`.
+    """Windows of rows of a data set, with the interface of `torch.utils.data.Dataset`.
 
     Item i is {"obs": {KEY: (before + 1, …)}, "past_actions": (before, na), "actions": (ahead, na),
     "mask": (ahead)}: the observations up to one row, oldest first, the actions between them, and
@@ -153,14 +161,17 @@ class Windows:
     Parameters
     ----------
     path: a folder of `tangere generate`, or an `Episodes`.
-    keys: observations to give. None: all but privileged ones.
+    keys: observations to give. None: those that the task shows; of a bare scene all but q and v.
     before, ahead: rows before the present one, and actions from it on.
     split: a mask of robomimic.hdf5, such as "train" or "valid"; None for all episodes.
     only_success: leave out episodes that did not succeed.
     form: of observations with a last axis of 3 and at least two before it: "stored", "image" (the
         last axis first), or "points" (…, points, 3).
     scale: "task" divides by the scales that the task declares, "standard" takes `mean` away and
-        divides by `std`, "none" leaves SI units. `mean` and `std` are of the chosen episodes.
+        divides by `std`, "none" leaves SI units. `mean` and `std` are of the chosen episodes, or
+        those of `statistics`: a validation set takes the ones of its training set.
+    memory: bytes of rows that may be kept in memory, over all keys. What does not fit is read from
+        the files window by window, which is slower.
     """
 
     def __init__(
@@ -174,6 +185,8 @@ class Windows:
         form: Form = "stored",
         scale: Scale = "task",
         gradients: Sequence[str] = (),
+        statistics: Windows | None = None,
+        memory: float = 2e9,
     ):
         self.episodes = path if isinstance(path, Episodes) else Episodes(path)
         for value, name, known in (
@@ -184,7 +197,9 @@ class Windows:
                 raise _core.InputError(f"{name} {value!r}; expected one of {known}")
         if before < 0 or ahead < 1:
             raise _core.InputError(f"before {before}, ahead {ahead}; expected at least 0 and 1")
-        default = [key for key in self.episodes.keys if key not in self.episodes.privileged]
+        if isinstance(keys, str):
+            raise _core.InputError(f"keys {keys!r}; expected a list, such as [{keys!r}]")
+        default = [key for key in self.episodes.keys if key not in ("q", "v")]
         self.keys = list(keys) if keys is not None else default
         unknown = [key for key in self.keys if key not in self.episodes.keys]
         if unknown or not self.keys:
@@ -201,6 +216,8 @@ class Windows:
         self._ends = np.cumsum(self.episodes.lengths[self.chosen])
         self._statistics: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._flat: dict[str, np.ndarray | None] = {}  # by name; None: too large for memory
+        self._free = memory
+        self._like = statistics
         self._shift, self._factor = {}, {}
         for key in self.keys:
             shift, by = np.float32(0), np.asarray(1.0)
@@ -225,6 +242,8 @@ class Windows:
         return {key: self._moments(key)[1] for key in self.keys}
 
     def _moments(self, key: str) -> tuple[np.ndarray, np.ndarray]:
+        if self._like is not None:
+            return self._like._moments(key)
         if key not in self._statistics:
             count, total, square = 0, 0.0, 0.0
             for episode in self.chosen:
@@ -240,11 +259,16 @@ class Windows:
         return self._statistics[key]
 
     def __getitem__(self, item: int) -> dict[str, Any]:
-        if not 0 <= item < len(self):
-            raise IndexError(f"window {item}; there are {len(self)}")
-        batch = self.gather(np.asarray([item]))
-        one = {name: values[0] for name, values in batch.items() if name != "obs"}
-        return {"obs": {key: values[0] for key, values in batch["obs"].items()}, **one}
+        return self.__getitems__([item])[0]
+
+    def __getitems__(self, items: Sequence[int]) -> list[dict[str, Any]]:
+        """Many at once: newer loaders of PyTorch ask for a batch so."""
+        batch = self.gather(np.asarray(items))
+        return [
+            {"obs": {key: values[i] for key, values in batch["obs"].items()}}
+            | {name: values[i] for name, values in batch.items() if name != "obs"}
+            for i in range(len(items))
+        ]
 
     def batches(self, size: int, seed: int = 0, rows: int | None = None):
         """Yields whole batches in random order, arrays as in an item with the batch in front.
@@ -260,6 +284,8 @@ class Windows:
     def gather(self, items: np.ndarray) -> dict[str, Any]:
         """The windows `items`, (n), stacked."""
         items = np.asarray(items)
+        if items.size and not (0 <= items.min() and items.max() < len(self)):
+            raise IndexError(f"windows {items.min()} to {items.max()}; there are {len(self)}")
         places = np.searchsorted(self._ends, items, side="right")
         first = np.concatenate([[0], self._ends])[places][:, None]
         last = self._ends[places][:, None] - 1
@@ -295,8 +321,10 @@ class Windows:
     def _flattened(self, name: str) -> np.ndarray | None:
         """All rows in memory, if they are few enough."""
         shape = self._of_episode(0, name).shape[1:]
-        if len(self) * int(np.prod(shape)) * 4 > _MOST_IN_MEMORY:
+        size = len(self) * int(np.prod(shape)) * 4
+        if size > self._free:
             return None
+        self._free -= size
         flat = np.empty((len(self), *shape), np.float32)
         for place, end in enumerate(self._ends):
             rows = self._of_episode(place, name)
@@ -310,7 +338,8 @@ class Windows:
         return arrays[name]
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_flat": {}}
+        kept = sum(a.nbytes for a in self._flat.values() if a is not None)
+        return {**self.__dict__, "_flat": {}, "_free": self._free + kept}
 
     def _shown(self, key: str, rows: np.ndarray) -> np.ndarray:
         """Rows (…, rows, shape) of an observation, scaled and in the form that was asked for."""

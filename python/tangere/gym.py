@@ -64,6 +64,21 @@ def observation_space(
     return spaces.Box(low, high)
 
 
+def _system_seed() -> int:
+    return int(np.random.default_rng().integers(2**63))
+
+
+def _checked(seed: Any) -> int:
+    if isinstance(seed, (list, tuple, np.ndarray)):
+        raise _core.InputError(
+            "one seed for each environment; expected one number, because an environment's "
+            "episode already differs from the others' (docs/python.md)"
+        )
+    if not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**64:
+        raise _core.InputError(f"seed {seed!r}; expected a whole number from 0 to 2^64 - 1")
+    return int(seed)
+
+
 class VectorTaskEnv(VectorEnv):
     """Many environments of one task, stepped in C++ on all cores with one call a step.
 
@@ -78,12 +93,14 @@ class VectorTaskEnv(VectorEnv):
     task: a name of `tangere.task_names()`.
     num_envs: E.
     threads: None for all cores.
-    seed, first_episode: which episodes the first reset starts, unless it is given a seed.
+    seed, first_episode: which episodes the first reset starts, unless it is given a seed. None: a
+        seed from the system, another one each time.
     normalise: divide observations by `observation_scale`; otherwise they are in SI units.
-    flatten: one array (E, n) in the order of the keys instead of a dict.
+    flatten: one array (E, n) instead of a dict, in the order in which the task declares its keys.
     autoreset: what follows the end of an episode. "next_step": the next step ignores its action
-        and shows the start of the next episode, with reward 0. "same_step": the observation is
-        that of the start already, and `info["final_obs"]` holds the last one of the episode.
+        and shows the start of the next episode, with reward 0. "same_step": observation and info
+        are those of the start already; `info["final_obs"]` and `info["final_info"]` hold the last
+        ones of the episode.
         "disabled": the environment stands still until `reset(options={"reset_mask": m})`.
     keys: the observations to show; None for all that the task declares.
     scene: another scene than the one of the task.
@@ -95,7 +112,7 @@ class VectorTaskEnv(VectorEnv):
         num_envs: int,
         *,
         threads: int | None = None,
-        seed: int = 0,
+        seed: int | None = None,
         first_episode: int = 0,
         normalise: bool = True,
         flatten: bool = False,
@@ -104,6 +121,9 @@ class VectorTaskEnv(VectorEnv):
         scene: _core.Scene | None = None,
         render_mode: None = None,
     ) -> None:
+        if isinstance(keys, str):
+            raise _core.InputError(f"keys {keys!r}; expected a list, such as [{keys!r}]")
+        seed = _system_seed() if seed is None else _checked(seed)
         if autoreset not in _MODES:
             raise _core.InputError(f"autoreset {autoreset!r}; expected one of {sorted(_MODES)}")
         if render_mode is not None:
@@ -156,17 +176,12 @@ class VectorTaskEnv(VectorEnv):
         first = options.pop("first_episode", None)
         if options:
             raise _core.InputError(f"options {list(options)}; known: reset_mask, first_episode")
-        if isinstance(seed, (list, tuple, np.ndarray)):
-            raise _core.InputError(
-                "one seed for each environment; expected one number, because an environment's "
-                "episode already differs from the others' (docs/python.md)"
-            )
         if mask is not None:
             if seed is not None or first is not None:
                 raise _core.InputError("reset_mask goes with neither seed nor first_episode")
             self._env.restart(np.asarray(mask, bool))
         elif seed is not None or first is not None or self._fresh:
-            self._seed = self._seed if seed is None else int(seed)
+            self._seed = self._seed if seed is None else _checked(seed)
             self._first_episode = self._first_episode if first is None else int(first)
             self._env.reset(self._seed, self._first_episode)
         else:
@@ -190,16 +205,15 @@ class VectorTaskEnv(VectorEnv):
         info = self._info()
         ended = terminated | truncated
         if self._mode == "same_step" and ended.any():
-            last = self._observe()
-            info["final_obs"] = np.empty(self.num_envs, object)
+            last, final = self._observe(), info
+            self._env.restart(ended)
+            info = self._info()
+            info["final_info"], info["_final_info"] = final, ended
+            info["final_obs"], info["_final_obs"] = np.empty(self.num_envs, object), ended.copy()
             for e in np.flatnonzero(ended):
                 info["final_obs"][e] = (
                     last[e] if self.flatten else {k: v[e] for k, v in last.items()}
                 )
-            info["_final_obs"] = ended
-            self._env.restart(ended)
-            info["starting"] = self._env.starting()
-            info["episode_id"] = self._env.episodes()
         return self._observe(), reward, terminated, truncated, info
 
     def scripted_action(self) -> np.ndarray:
@@ -239,9 +253,30 @@ class TaskEnv(gymnasium.Env):
 
     metadata = {"render_modes": []}
 
-    def __init__(self, task: str, *, seed: int = 0, render_mode: None = None, **arguments: Any):
+    def __init__(
+        self,
+        task: str,
+        *,
+        seed: int | None = None,
+        first_episode: int = 0,
+        normalise: bool = True,
+        flatten: bool = False,
+        keys: Sequence[str] | None = None,
+        scene: _core.Scene | None = None,
+        render_mode: None = None,
+    ):
         self._vector = VectorTaskEnv(
-            task, 1, threads=1, seed=seed, autoreset="disabled", render_mode=render_mode, **arguments
+            task,
+            1,
+            threads=1,
+            seed=seed,
+            first_episode=first_episode,
+            normalise=normalise,
+            flatten=flatten,
+            autoreset="disabled",
+            keys=keys,
+            scene=scene,
+            render_mode=render_mode,
         )
         self.task = self._vector.task
         self.action_space = self._vector.single_action_space
@@ -297,7 +332,7 @@ def make_vec(task: str, num_envs: int = 1, **arguments: Any) -> VectorTaskEnv:
 
 
 def make_env(task: str, **arguments: Any) -> TaskEnv:
-    """One environment of a task; `arguments` are those of `VectorTaskEnv`, without its numbers."""
+    """One environment of a task; `arguments` are those of `TaskEnv`."""
     return TaskEnv(task, **arguments)
 
 

@@ -15,6 +15,7 @@ given. `import tangere` does not import this module; it needs PyTorch.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,6 +76,7 @@ class Tape:
     def reset(self, seed: int = 0, first_episode: int = 0) -> Observations:
         """Starts the episodes; returns the first observations, which have no derivative."""
         self.tape.reset(seed, first_episode)
+        self._run.tape = None
         self._run = _Run(self.tape)
         self._token = torch.zeros((), dtype=torch.float64)
         return self._split(torch.from_numpy(self.tape.observations()).to(self.dtype))
@@ -84,10 +86,15 @@ class Tape:
 
         Returns observations, rewards (E) float64 (0 where the episode had ended) and alive (E)
         bool, whether the action was taken. Observations and rewards are differentiable by this and
-        all earlier actions. Raises InputError as `tangere.TaskTape.step` does.
+        all earlier actions. After a backward() no step can follow until reset(). Raises InputError
+        as `tangere.TaskTape.step` does, and under torch.no_grad() after recorded steps, where the
+        chain of derivatives would be cut.
         """
         if self._token is None:
             raise _core.InputError("step() without episodes; call reset() first")
+        if self._token.requires_grad and not torch.is_grad_enabled():
+            raise _core.InputError("step() under no_grad() after steps that are recorded; call reset()")
+        actions = torch.as_tensor(actions)
         rows, reward, self._token = _Step.apply(actions, self._token, self._run, self.dtype)
         return self._split(rows), reward, torch.from_numpy(self.tape.alive())
 
@@ -114,19 +121,28 @@ class _Run:
     """One pass over a tape, and the order in which its steps may be reversed."""
 
     def __init__(self, tape: _core.TaskTape):
-        self.tape, self.taken, self.left = tape, 0, None
+        self.tape: _core.TaskTape | None = tape  # None: the tape has begun another run
+        self.taken = 0
+        self.left: int | None = None  # the step reversed last; None: nothing is reversed
+        self.passing = False
 
     def reverse(self, step: int, by_rows: np.ndarray, by_reward: np.ndarray) -> np.ndarray:
-        if self.tape.taken != self.taken:
+        if self.tape is None:
             raise _core.InputError("backward() through a tape that was reset; call it before reset()")
-        if self.left is not None and step == self.taken - 1:
-            self.tape.begin_reverse()  # a second backward, with retain_graph
-            self.left = None
+        if not self.passing or (self.left is not None and step >= self.left):
+            # Another backward: it must not go on with what the one before has left.
+            if self.left is not None:
+                self.tape.begin_reverse()
+            self.left, self.passing = None, True
+            torch.autograd.Variable._execution_engine.queue_callback(self._end)
         left = self.taken if self.left is None else self.left
         for _ in range(left - 1 - step):  # later steps on which the loss does not hang
             self.tape.reverse(np.zeros_like(by_rows), np.zeros_like(by_reward))
         self.left = step
         return self.tape.reverse(by_rows, by_reward)
+
+    def _end(self) -> None:
+        self.passing = False
 
 
 class _Step(torch.autograd.Function):
@@ -134,13 +150,14 @@ class _Step(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx, actions, token, run, dtype):
-        run.tape.step(actions.detach().cpu().numpy())
+        run.tape.step(actions.detach().to("cpu", torch.float64).numpy())
         ctx.run, ctx.step, ctx.dtype = run, run.taken, actions.dtype
         run.taken += 1
         rows = torch.from_numpy(run.tape.observations()).to(dtype)
         return rows, torch.from_numpy(run.tape.rewards()), token.clone()
 
     @staticmethod
+    @torch.autograd.function.once_differentiable
     def backward(ctx, by_rows, by_reward, by_token):
         by_action = ctx.run.reverse(
             ctx.step, by_rows.to(torch.float64).numpy(), by_reward.to(torch.float64).numpy()
@@ -169,7 +186,7 @@ def rollout(
     dtype: torch.dtype = torch.float32,
 ) -> Rollout:
     """Plays E episodes with the actions (E, A, na) and returns all that they show."""
-    if actions.ndim != 3:
+    if actions.ndim != 3 or actions.shape[1] == 0:
         raise _core.InputError(f"actions of shape {tuple(actions.shape)}; expected (E, A, na)")
     tape = Tape(task, len(actions), actions.shape[1], threads=threads, normalise=normalise, dtype=dtype)
     seen, rewards, alive = [tape.reset(seed, first_episode)], [], []
@@ -211,9 +228,9 @@ def gradcheck(
 
     `policy` maps flattened observations (E, n) to actions (E, na), in float64. Each direction is a
     random one in the space of all weights; of the `steps` the best one counts, because contacts
-    have kinks that large steps cross and small steps lose digits. Weights are left as they were.
+    have kinks that large steps cross and small steps lose digits. It works on a copy of the policy.
     """
-    policy = policy.double()
+    policy = copy.deepcopy(policy).double()
     weights = list(policy.parameters())
 
     def mean_return() -> torch.Tensor:

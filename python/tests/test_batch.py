@@ -80,6 +80,8 @@ def test_states_can_be_set(model):
     q[1, 2] += 0.001
     batch.set_state(q, v)
     np.testing.assert_array_equal(batch.q, q)
+    batch.set_state(q[1], v[1], envs=[True, False, False])
+    np.testing.assert_array_equal(batch.q, q[[1, 1, 2]])
     batch.set_state(q[0], v[0], envs=[1, 2])
     np.testing.assert_array_equal(batch.q[2], q[0])
     assert batch.q is not batch.q
@@ -126,6 +128,13 @@ def test_mistakes_say_what_was_expected(model, tmp_path):
         (lambda: batch.tactile("pda"), "no reading is named 'pda'; expected one of: pad"),
         (lambda: batch.reset(envs=[2]), "environment 2; expected 0 to 1"),
         (lambda: batch.reset(episodes=[1]), "1 episodes for 2 environments"),
+        (lambda: batch.reset(envs=[True]), "a mask of 1 environments; expected 2"),
+        (lambda: batch.reset(envs=[0.5]), "expected indices"),
+        (lambda: batch.run(np.zeros((2, 2, 3)), fields=["pad", "pad"]), "'pad' is listed twice"),
+        (lambda: batch.set_state(np.full(model.nq, np.nan), np.zeros(model.nv)), "not finite"),
+        (lambda: batch.set_state(np.zeros(model.nq), np.zeros(model.nv)), "unit quaternion"),
+        (lambda: model.mass(model.nb), f"body {model.nb}; expected 0 to {model.nb - 1}"),
+        (lambda: model.mass(-1), "body -1"),
         (lambda: tangere.Batch(model, envs=0), "0 environments"),
         (lambda: tangere.Batch(model, threads=0), "0 threads"),
         (lambda: tangere.Batch(model, precision="half"), "precision 'half'"),
@@ -137,8 +146,9 @@ def test_mistakes_say_what_was_expected(model, tmp_path):
     assert issubclass(tangere.InputError, ValueError) and issubclass(tangere.IoError, OSError)
     with pytest.raises(OSError, match="absent.xml"):
         tangere.Scene(tmp_path / "absent.xml")
-    with pytest.raises(TypeError):
-        batch.step("fast")
+    for nonsense in ("fast", [[1, 2], [3]], np.array([1j, 0, 0]), [None, 0, 1]):
+        with pytest.raises(TypeError):
+            batch.step(nonsense)
 
 
 def test_what_a_scene_reader_overlooks_is_a_warning(model):
@@ -155,6 +165,7 @@ def test_a_failed_environment_is_told(model):
     u[1, 0] = np.nan
     batch.step(u)
     assert batch.status.tolist() == [0, -2]
+    assert batch.run(np.zeros((1, 2, 3))).status.tolist() == [0, -2]
     batch.set_state(batch.q, batch.v)
     assert batch.status.tolist() == [0, 0]
 

@@ -37,8 +37,9 @@ def test_windows_are_rows_of_the_file(pushes, demo):
     np.testing.assert_array_equal(end["mask"], [1, 0, 0])
     second = list(demo.values())[1]
     np.testing.assert_array_equal(windows[100]["obs"]["goal"], second["goal"][[0, 0, 0]])
-    with pytest.raises(IndexError):
-        windows[len(windows)]
+    for beyond in (len(windows), -1):
+        with pytest.raises(IndexError):
+            windows[beyond]
 
 
 def test_batches_are_windows_each_once(pushes):
@@ -67,6 +68,10 @@ def test_standard_scores(pushes):
     rows = np.concatenate([b["obs"]["goal"][:, 0] for b in windows.batches(500)])
     np.testing.assert_allclose(rows.mean(0), 0, atol=1e-3)
     assert (rows.std(0) <= 1 + 1e-3).all() and windows.std["tactile"].shape == (3,)
+    valid = Windows(pushes, split="valid", scale="standard", statistics=windows)
+    plain = Windows(pushes, split="valid", scale="none")
+    goal = (plain[5]["obs"]["goal"] - windows.mean["goal"]) / windows.std["goal"]
+    np.testing.assert_allclose(valid[5]["obs"]["goal"], goal, rtol=1e-4)
 
 
 def test_forms(pushes):
@@ -103,12 +108,8 @@ def test_deflate_is_read_too(generate, pushes):
     np.testing.assert_array_equal(a[50]["obs"]["tactile"], b[50]["obs"]["tactile"])
 
 
-def test_rows_too_large_for_memory_are_read_one_by_one(pushes, monkeypatch):
-    import tangere.data
-
-    whole = Windows(pushes, before=1)
-    monkeypatch.setattr(tangere.data, "_MOST_IN_MEMORY", 0)
-    parts = Windows(pushes, before=1)
+def test_rows_too_large_for_memory_are_read_one_by_one(pushes):
+    whole, parts = Windows(pushes, before=1), Windows(pushes, before=1, memory=0)
     items = np.array([5, 700, 6, 0, 1700])
     one, other = whole.gather(items), parts.gather(items)
     np.testing.assert_array_equal(one["obs"]["tactile"], other["obs"]["tactile"])
@@ -123,6 +124,9 @@ def test_windows_go_to_another_process(pushes):
 
 def test_torch_loads_them(pushes):
     torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+    for workers in (0, 2):
+        loader = torch.utils.data.DataLoader(Windows(pushes), 32, shuffle=True, num_workers=workers)
+        assert len({b["obs"]["tactile"].shape for b in loader}) <= 2
     loader = torch.utils.data.DataLoader(Windows(pushes), batch_size=32, shuffle=True)
     batch = next(iter(loader))
     assert batch["obs"]["tactile"].shape == (32, 1, 13, 10, 3)

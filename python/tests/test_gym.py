@@ -110,6 +110,17 @@ def test_seeds_name_episodes():
     np.testing.assert_array_equal(one.reset(seed=3)[0]["goal"], first["goal"][0])
     with pytest.raises(tangere.InputError, match="one number"):
         env.reset(seed=[1, 2])
+    for wrong in (-3, 2**64, 1.7):
+        with pytest.raises(tangere.InputError, match="whole number"):
+            env.reset(seed=wrong)
+
+
+def test_without_a_seed_no_two_are_alike():
+    goals = [tangere.make_env("box_pushing_reduced").reset()[0]["goal"].tolist() for _ in range(3)]
+    assert goals[0] != goals[1] != goals[2]
+    vector = gymnasium.make_vec("tangere/BoxPushingReduced-v0", 2, vectorization_mode="sync")
+    goal = vector.reset()[0]["goal"]
+    assert goal[0].tolist() != goal[1].tolist()
 
 
 def play(env, steps):
@@ -148,6 +159,11 @@ def test_same_step_shows_the_last_observation_beside_the_start():
     np.testing.assert_array_equal(done, b[2] | b[3])
     np.testing.assert_array_equal(a[1], b[1])
     np.testing.assert_array_equal(b[4]["_final_obs"], done)
+    np.testing.assert_array_equal(b[4]["final_info"]["success"], a[4]["success"])
+    np.testing.assert_array_equal(b[4]["final_info"]["episode_id"], [0, 1, 2, 3])
+    np.testing.assert_array_equal(b[4]["episode_id"], np.arange(4) + 4 * done)
+    np.testing.assert_array_equal(b[4]["starting"], done)
+    assert not b[4]["success"][done].any()
     next_obs = ones.step(action)[0]
     for e in range(4):
         if done[e]:
@@ -196,6 +212,7 @@ def test_mistakes_are_told():
     for arguments, message in [
         ({"keys": ["touch"]}, r"keys \['touch'\]; task 'box_pushing' has \['goal', 'tactile'\]"),
         ({"keys": []}, "keys"),
+        ({"keys": "goal"}, r"keys 'goal'; expected a list"),
         ({"autoreset": "never"}, "autoreset 'never'"),
         ({"num_envs": 0}, "0 environments"),
     ]:

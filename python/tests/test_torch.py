@@ -102,6 +102,65 @@ def test_a_second_backward_begins_anew():
     assert torch.equal(one, two)
 
 
+def recorded(steps: int = 6, seed: int = 0):
+    """A run of box pushing on tape: its actions, its rewards, and the tape."""
+    tape = tt.Tape("box_pushing_reduced", 1, steps, flatten=True, dtype=torch.float64)
+    tape.reset(seed)
+    actions = [torch.full((1, 3), 0.1 * k, dtype=torch.float64, requires_grad=True)
+               for k in range(1, steps + 1)]  # fmt: skip
+    return actions, [tape.step(a)[1].sum() for a in actions], tape
+
+
+def test_losses_of_one_run_do_not_mix():
+    actions, rewards, _ = recorded()
+    truth = {}
+    for k in (2, 5):
+        fresh = recorded()
+        truth[k] = torch.autograd.grad(fresh[1][k], fresh[0][1])[0]
+    for k in (5, 2, 2, 5, 2):
+        late = actions[4] if k == 5 else actions[1]
+        torch.autograd.grad(rewards[k], late, retain_graph=True)  # this one may stop early
+        (found,) = torch.autograd.grad(rewards[k], actions[1], retain_graph=True)
+        assert torch.equal(found, truth[k]), k
+
+
+def test_a_graph_of_an_earlier_run_is_refused():
+    _, rewards, tape = recorded()
+    tape.reset(5)
+    for _ in range(6):
+        tape.step(torch.zeros(1, 3))
+    with pytest.raises(tangere.InputError, match="reset"):
+        rewards[5].backward()
+
+
+def test_the_chain_is_not_cut_in_silence():
+    _, _, tape = recorded(4)
+    tape = tt.Tape("dummy", 1, 5)
+    tape.reset()
+    tape.step(torch.zeros(1, 1, requires_grad=True))
+    with torch.no_grad(), pytest.raises(tangere.InputError, match="no_grad"):
+        tape.step(torch.zeros(1, 1))
+    quiet = tt.Tape("dummy", 1, 5)
+    quiet.reset()
+    with torch.no_grad():
+        assert not quiet.step(torch.zeros(1, 1))[1].requires_grad
+
+
+def test_second_derivatives_are_refused():
+    actions, rewards, _ = recorded(2)
+    (g,) = torch.autograd.grad(rewards[1], actions[0], create_graph=True)
+    with pytest.raises(RuntimeError):
+        g.sum().backward()
+
+
+def test_gradcheck_leaves_the_policy_alone():
+    policy = Small("dummy", 0.1)
+    before = [w.clone() for w in policy.parameters()]
+    tt.gradcheck("dummy", policy, actions=3, num_envs=1, directions=1)
+    for old, new in zip(before, policy.parameters()):
+        assert new.dtype == torch.float32 and torch.equal(old, new)
+
+
 def test_threads_and_neighbours_change_no_bit():
     def gradient(envs, threads):
         tape = tt.Tape("box_pushing", envs, 6, threads=threads, flatten=True)
@@ -121,8 +180,9 @@ def test_threads_and_neighbours_change_no_bit():
 def test_mistakes_are_told():
     with pytest.raises(tangere.InputError, match="call reset"):
         tt.Tape("dummy", 1).step(torch.zeros(1, 1))
-    with pytest.raises(tangere.InputError, match=r"expected \(E, A, na\)"):
-        tt.rollout("dummy", torch.zeros(2, 3))
+    for shape in ((2, 3), (2, 0, 1)):
+        with pytest.raises(tangere.InputError, match=r"expected \(E, A, na\)"):
+            tt.rollout("dummy", torch.zeros(shape))
     tape = tt.Tape("dummy", 1, 2)
     tape.reset()
     with pytest.raises(tangere.InputError):
