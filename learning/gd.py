@@ -76,6 +76,8 @@ def main() -> None:
     parser.add_argument("--envs", type=int, default=16, help="episodes of an update")
     parser.add_argument("--rate", type=float, default=5e-3)
     parser.add_argument("--touch", type=float, default=1.0, help="factor of what is felt")
+    parser.add_argument("--clip", type=float, default=0.0,
+                        help="most that a return may change per unit of one action; 0: no limit")  # fmt: skip
     parser.add_argument("--goals", type=int, default=300, help="to test on")
     parser.add_argument("--threads", type=int, default=None)
     parser.add_argument("--json", action="store_true")
@@ -91,12 +93,20 @@ def main() -> None:
     schedule = torch.optim.lr_scheduler.LambdaLR(
         optimiser, lambda k: 1 - (1 - 1e-5 / asked.rate) * k / asked.updates
     )
+    def clipped(by_action: torch.Tensor) -> torch.Tensor:
+        """Keeps an episode whose loop amplifies from owning the update."""
+        norm = by_action.norm(dim=1, keepdim=True) * asked.envs  # of the episode's own return
+        return by_action * (asked.clip / norm.clamp(min=1e-30)).clamp(max=1)
+
     best, kept, curve = -np.inf, None, []
     for update in range(asked.updates):
         obs = tape.reset(seed=1 + asked.seed, first_episode=update * asked.envs)
         total = torch.zeros(asked.envs, dtype=torch.float64)
         for _ in range(tape.actions):
-            obs, reward, _ = tape.step(act(policy, obs, gains))
+            action = act(policy, obs, gains)
+            if asked.clip > 0:
+                action.register_hook(clipped)
+            obs, reward, _ = tape.step(action)
             total = total + reward
         mean = float(total.mean())
         curve.append(mean)
