@@ -167,8 +167,8 @@ struct type_caster<tangere::python::Argument<T>> {
                              ? borrow(source)
                              : module_::import_("numpy").attr("asarray")(source);
     const object kind = getattr(array.attr("dtype"), "kind", none());  // PyTorch's types have none
-    return kind.is_none() || std::string_view("biuf").find(cast<std::string>(kind)) !=
-                                 std::string_view::npos;
+    return kind.is_none() ||
+           std::string_view("biuf").find(cast<std::string>(kind)) != std::string_view::npos;
   }
   static handle from_cpp(const Value&, rv_policy, cleanup_list*) noexcept { return {}; }
 };

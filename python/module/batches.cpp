@@ -235,7 +235,8 @@ void PythonBatch::check_state(std::span<const double> q, std::span<const double>
   for (std::size_t i = 0; i < q.size(); ++i) {
     if (!names[i % names.size()].ends_with(".qw")) continue;
     const std::span<const double> quaternion = q.subspan(i, 4);
-    if (std::all_of(quaternion.begin(), quaternion.end(), [](double x) { return std::abs(x) < 1e-6; }))
+    if (std::all_of(quaternion.begin(), quaternion.end(),
+                    [](double x) { return std::abs(x) < 1e-6; }))
       throw InputError(fmt::format("{} and its three neighbours are 0; expected a unit quaternion",
                                    names[i % names.size()]));
   }
@@ -345,7 +346,8 @@ void add_batches(nb::module_& m) {
            "to fill instead of a new one.")
       .def("set_state", &PythonBatch::set_state, "q"_a, "v"_a, "envs"_a = nb::none(),
            "Sets states: `q` (n, nq) or (nq), `v` (n, nv) or (nv), of the environments listed in\n"
-           "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; forgets the state one step before.")
+           "`envs` (indices, or a mask (E)), or of all. Releases a failed environment; forgets the "
+           "state one step before.")
       .def("reset", &PythonBatch::reset, "envs"_a = nb::none(), "episodes"_a = nb::none(),
            "Draws the starting states again, or those of other `episodes`.")
       .def("scene_controls", &PythonBatch::scene_controls, "steps"_a,
