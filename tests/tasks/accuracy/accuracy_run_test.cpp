@@ -200,9 +200,9 @@ TEST(AccuracySweep, NamesTheFastestSettingThatIsAccurateEnough) {
   EXPECT_THAT(report.tolerances, ::testing::SizeIs(16));
   // Looser tolerances take fewer evaluations. The loosest may spoil the motion and take more, with
   // the step that was quickest on this machine.
-  const auto fewest = std::min_element(
-      report.tolerances.begin(), report.tolerances.end(),
-      [](const auto& a, const auto& b) { return a.evaluations < b.evaluations; });
+  const auto fewest =
+      std::min_element(report.tolerances.begin(), report.tolerances.end(),
+                       [](const auto& a, const auto& b) { return a.evaluations < b.evaluations; });
   EXPECT_LT(fewest->evaluations, report.tolerances.back().evaluations);
 }
 
