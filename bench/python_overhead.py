@@ -37,4 +37,5 @@ for _ in range(8):
     alone.append(cpu(lambda: env._env.step(actions)))
     more.append(cpu(rest))
 step, added = np.median(alone), np.median(more)
-print(f"{task}: step {1e3 * step:.2f} ms, Python adds {1e3 * added:.2f} ms: {step / (step + added):.3f} of C++")
+share = step / (step + added)
+print(f"{task}: step {1e3 * step:.2f} ms, Python adds {1e3 * added:.2f} ms: {share:.3f} of C++")

@@ -127,7 +127,8 @@ def main() -> None:
         begin = time.process_time()
         first = windows[0]
         inputs = sum(v.size for v in first["obs"].values()) + first["past_actions"].size
-        clone = Clone(inputs, first["actions"].shape[1], asked.width, task.action.low, task.action.high)
+        bounds = task.action.low, task.action.high
+        clone = Clone(inputs, first["actions"].shape[1], asked.width, *bounds)
         train(windows, clone, asked.epochs, asked.batch, asked.rate, seed)
         trained = time.process_time() - begin
         solved = closed_loop(task.name, windows, clone, asked.episodes)

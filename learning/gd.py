@@ -69,15 +69,15 @@ def test(task: str, policy: nn.Module, gains: torch.Tensor, episodes: int) -> di
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("task", nargs="?", default="box_pushing",
-                        choices=["box_pushing", "box_pushing_privileged", "box_pushing_reduced"])  # fmt: skip
+    tasks = [name for name in tangere.task_names() if name.startswith("box_pushing")]
+    parser.add_argument("task", nargs="?", default="box_pushing", choices=tasks)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--updates", type=int, default=300)
     parser.add_argument("--envs", type=int, default=16, help="episodes of an update")
     parser.add_argument("--rate", type=float, default=5e-3)
     parser.add_argument("--touch", type=float, default=1.0, help="factor of what is felt")
-    parser.add_argument("--clip", type=float, default=0.0,
-                        help="most that a return may change per unit of one action; 0: no limit")  # fmt: skip
+    limit = "most that a return may change per unit of one action; 0: no limit"
+    parser.add_argument("--clip", type=float, default=0.0, help=limit)
     parser.add_argument("--goals", type=int, default=300, help="to test on")
     parser.add_argument("--threads", type=int, default=None)
     parser.add_argument("--json", action="store_true")
@@ -119,7 +119,8 @@ def main() -> None:
             optimiser.step()
         schedule.step()
         if update % 20 == 19 and not asked.json:
-            print(f"update {update + 1}: return {mean:.1f}, gradient norm {float(norm):.3g}", flush=True)
+            state = f"return {mean:.1f}, gradient norm {float(norm):.3g}"
+            print(f"update {update + 1}: {state}", flush=True)
     if kept is None:
         raise SystemExit("no update had a finite return; try a smaller --rate or --touch")
     policy.load_state_dict(kept)
@@ -130,8 +131,8 @@ def main() -> None:
                           "train_cpu_s": trained, "test": result}))  # fmt: skip
         return
     print(
-        f"{asked.task}, seed {asked.seed}: {result['position_m']:.3f} m, {result['yaw_rad']:.3f} rad, "
-        f"return {result['return']:.0f}, success {result['success']:.2f}; {trained:.0f} CPU s, "
+        f"{asked.task}, seed {asked.seed}: {result['position_m']:.3f} m, "
+        f"{result['yaw_rad']:.3f} rad, return {result['return']:.0f}, success {result['success']:.2f}; {trained:.0f} CPU s, "
         f"{time.perf_counter() - clock:.0f} s on the clock"
     )
 

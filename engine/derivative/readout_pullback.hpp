@@ -11,14 +11,14 @@
 
 namespace tangere {
 
-/// Throws InputError (file:line) where a sensor of the scene has a memory (SensorInfo::past_states),
-/// for runs that take derivatives of fields.
+/// Throws InputError (file:line) where a sensor of the scene has a memory
+/// (SensorInfo::past_states), for runs that take derivatives of fields.
 void check_has_no_memory(const Model& model);
 
 /// Owns the scratch of one thread. Allocates when made, and when it meets more tiles at once than
-/// before. Fields of sensors with memory throw InputError. For each state call place(); then for each loss clear(), any number of fields and end
-/// effectors, and finish(). Fields are computed anew in double. The way they were read does not
-/// matter.
+/// before. Fields of sensors with memory throw InputError. For each state call place(); then for
+/// each loss clear(), any number of fields and end effectors, and finish(). Fields are computed
+/// anew in double. The way they were read does not matter.
 class ReadoutPullback {
  public:
   explicit ReadoutPullback(const Model& model);

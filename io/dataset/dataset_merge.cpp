@@ -209,8 +209,8 @@ class Merger {
     result_.failed = std::ssize(failed_);
   }
 
-  /// Filter keys of robomimic: demos to train on and to validate, those that solved the task, and, if
-  /// several policies played, the demos of each.
+  /// Filter keys of robomimic: demos to train on and to validate, those that solved the task,
+  /// and, if several policies played, the demos of each.
   void write_masks() {
     std::vector<std::pair<std::uint64_t, std::size_t>> order;
     for (std::size_t i = 0; i < demos_.size(); ++i)

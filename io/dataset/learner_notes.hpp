@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a learner is told besides numbers: the environment that a data set was played in, sizes to
-// divide observations by, and what a robot could not measure. All of it is JSON text, which robomimic
-// and Minari store as it is.
+// divide observations by, and what a robot could not measure. All of it is JSON text, which
+// robomimic and Minari store as it is.
 #pragma once
 
 #include <string>
@@ -13,8 +13,8 @@ namespace tangere {
 /// Returns the name under which Gymnasium knows a task: "box_pushing" → "tangere/BoxPushing-v0".
 std::string environment_id(const std::string& task);
 
-/// `env_args` of robomimic: {"env_name", "type", "env_kwargs", "env_version"}. For a scene alone the
-/// name is the scene's, and there are no arguments.
+/// `env_args` of robomimic: {"env_name", "type", "env_kwargs", "env_version"}. For a scene alone
+/// the name is the scene's, and there are no arguments.
 std::string robomimic_environment(const DatasetLayout& layout);
 
 /// `env_spec` of Minari: Gymnasium's EnvSpec of a task whose observations are those of the files,
@@ -25,8 +25,8 @@ std::string gymnasium_environment(const std::string& task);
 /// the observation's unit. Other observations have the scale 1.
 std::string observation_scale(const DatasetLayout& layout);
 
-/// [KEY, …] of the stored observations that a robot could not measure: q, v and what a task declares
-/// as privileged.
+/// [KEY, …] of the stored observations that a robot could not measure: q, v and what a task
+/// declares as privileged.
 std::string privileged_observations(const DatasetLayout& layout);
 
 }  // namespace tangere

@@ -14,7 +14,8 @@
 
 namespace tangere {
 
-/// The view at FOLDER/minari/ID/data, where ID is `dataset_id` of /scene. Everything throws IoError.
+/// The view at FOLDER/minari/ID/data, where ID is `dataset_id` of /scene. Everything throws
+/// IoError.
 class MinariView {
  public:
   /// Begins the view and replaces an existing one. `shard` is any object in one of the folder's

@@ -96,8 +96,8 @@ std::filesystem::path way_up(const std::filesystem::path& from) {
   return {};
 }
 
-/// Whether a file may lead to another: to one beside it ("shard-00001.h5"), and Minari's view to one
-/// of the data set ("../../../../shard-00001.h5").
+/// Whether a file may lead to another: to one beside it ("shard-00001.h5"), and Minari's view to
+/// one of the data set ("../../../../shard-00001.h5").
 bool may_lead_to(const std::filesystem::path& from, const std::filesystem::path& to) {
   if (to.empty() || to.is_absolute() || to.filename() == "..") return false;
   const std::filesystem::path up = way_up(from);

@@ -49,7 +49,8 @@ struct TrajectoryReader::Impl {
     }
   }
 
-  /// Takes a field, or where there is none the ideal one, or pressure, shear or both. A sum has no points.
+  /// Takes a field, or where there is none the ideal one, or pressure, shear or both. A sum
+  /// has no points.
   void add_readings(const h5::Id& group, const std::string& name) {
     std::vector<FieldForm> found;
     for (const FieldForm form :

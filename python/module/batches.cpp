@@ -156,25 +156,18 @@ Run PythonBatch::run_as(std::span<const double> u, std::size_t steps, std::size_
   return run;
 }
 
-Array<double> PythonBatch::q() {
+/// A row of `width` numbers for each environment, filled by `get`.
+Array<double> PythonBatch::coordinates(int width, GetCoordinates get) {
   const InUse::Turn turn(in_use_);
   std::span<double> numbers;
-  const std::size_t width = as_size(model().nq());
-  auto array = new_array<double>({count(), width}, numbers);
+  auto array = new_array<double>({count(), as_size(width)}, numbers);
   for (int e = 0; e < environments(); ++e)
-    batch_.get_q(e, numbers.subspan(as_size(e) * width, width));
+    (batch_.*get)(e, numbers.subspan(as_size(e) * as_size(width), as_size(width)));
   return array;
 }
 
-Array<double> PythonBatch::v() {
-  const InUse::Turn turn(in_use_);
-  std::span<double> numbers;
-  const std::size_t width = as_size(model().nv());
-  auto array = new_array<double>({count(), width}, numbers);
-  for (int e = 0; e < environments(); ++e)
-    batch_.get_v(e, numbers.subspan(as_size(e) * width, width));
-  return array;
-}
+Array<double> PythonBatch::q() { return coordinates(model().nq(), &Batch::get_q); }
+Array<double> PythonBatch::v() { return coordinates(model().nv(), &Batch::get_v); }
 
 Array<double> PythonBatch::end_effectors() {
   const InUse::Turn turn(in_use_);

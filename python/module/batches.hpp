@@ -58,6 +58,9 @@ class PythonBatch {
     Readout readout;
   };
 
+  using GetCoordinates = void (Batch::*)(int, std::span<double>) const;
+
+  [[nodiscard]] Array<double> coordinates(int width, GetCoordinates get);
   [[nodiscard]] std::size_t count() const { return as_size(environments()); }
   [[nodiscard]] FieldOutput reading_named(const std::string& name) const;
   [[nodiscard]] Shape shape_of_reading(FieldOutput output) const;

@@ -36,7 +36,9 @@ class Episodes:
         self.path = Path(path)
         shards = sorted(self.path.glob("shard-*.h5"))
         if not shards:
-            raise _core.InputError(f"{self.path}: no shard-*.h5; expected a folder of `tangere generate`")
+            raise _core.InputError(
+                f"{self.path}: no shard-*.h5; expected a folder of `tangere generate`"
+            )
         self._shards = shards
         self.names: list[str] = []  # demo_0, demo_1 … in order
         self._shard_of: list[int] = []
@@ -46,6 +48,12 @@ class Episodes:
         for number, shard in enumerate(shards):
             with h5py.File(shard, "r") as file:
                 if number == 0:
+                    expected = int(file.attrs["dataset_shards"])
+                    if expected != len(shards):
+                        raise _core.InputError(
+                            f"{self.path} has {len(shards)} shards of {expected}; expected all, "
+                            "see `tangere generate --resume`"
+                        )
                     self.attributes = dict(file["scene"].attrs)
                     self._describe(file)
                 for name, demo in file["data"].items():
@@ -91,10 +99,14 @@ class Episodes:
     def mask(self, name: str) -> list[int]:
         """The episodes of a mask of robomimic.hdf5: train, valid, success …"""
         if not self.masks.exists():
-            raise _core.InputError(f"{self.masks} is missing; expected a merged data set (tangere merge)")
+            raise _core.InputError(
+                f"{self.masks} is missing; expected a merged data set (tangere merge)"
+            )
         with h5py.File(self.masks, "r") as file:
             if name not in file["mask"]:
-                raise _core.InputError(f"{self.masks}: no mask {name!r}; it has {list(file['mask'])}")
+                raise _core.InputError(
+                    f"{self.masks}: no mask {name!r}; it has {list(file['mask'])}"
+                )
             return self.named([n.decode() for n in file["mask"][name][()]])
 
     def succeeded(self) -> list[int]:
@@ -102,7 +114,7 @@ class Episodes:
         return [i for i in range(len(self)) if self._demo(i).attrs.get("success", 0) == 1]
 
     def __getitem__(self, episode: int) -> dict[str, np.ndarray]:
-        """Arrays by name: the observations, "actions", "rewards", and "grad_…" where there are any."""
+        """Arrays by name: the observations, "actions", "rewards", and derivatives if stored."""
         self._here()
         if episode in self._open:
             self._open.move_to_end(episode)
@@ -316,7 +328,8 @@ class Windows:
             self._of_episode(place, name)[wanted[places == place] - starts[places == place]]
             for place in np.unique(places)
         ]
-        return np.concatenate(parts).astype(np.float32)[back].reshape(*rows.shape, *parts[0].shape[1:])
+        found = np.concatenate(parts).astype(np.float32)[back]
+        return found.reshape(*rows.shape, *parts[0].shape[1:])
 
     def _flattened(self, name: str) -> np.ndarray | None:
         """All rows in memory, if they are few enough."""

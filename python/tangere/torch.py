@@ -93,7 +93,9 @@ class Tape:
         if self._token is None:
             raise _core.InputError("step() without episodes; call reset() first")
         if self._token.requires_grad and not torch.is_grad_enabled():
-            raise _core.InputError("step() under no_grad() after steps that are recorded; call reset()")
+            raise _core.InputError(
+                "step() under no_grad() after steps that are recorded; call reset()"
+            )
         actions = torch.as_tensor(actions)
         rows, reward, self._token = _Step.apply(actions, self._token, self._run, self.dtype)
         return self._split(rows), reward, torch.from_numpy(self.tape.alive())
@@ -128,7 +130,9 @@ class _Run:
 
     def reverse(self, step: int, by_rows: np.ndarray, by_reward: np.ndarray) -> np.ndarray:
         if self.tape is None:
-            raise _core.InputError("backward() through a tape that was reset; call it before reset()")
+            raise _core.InputError(
+                "backward() through a tape that was reset; call it before reset()"
+            )
         if not self.passing or (self.left is not None and step >= self.left):
             # Another backward: it must not go on with what the one before has left.
             if self.left is not None:
@@ -188,7 +192,8 @@ def rollout(
     """Plays E episodes with the actions (E, A, na) and returns all that they show."""
     if actions.ndim != 3 or actions.shape[1] == 0:
         raise _core.InputError(f"actions of shape {tuple(actions.shape)}; expected (E, A, na)")
-    tape = Tape(task, len(actions), actions.shape[1], threads=threads, normalise=normalise, dtype=dtype)
+    envs, count, _ = actions.shape
+    tape = Tape(task, envs, count, threads=threads, normalise=normalise, dtype=dtype)
     seen, rewards, alive = [tape.reset(seed, first_episode)], [], []
     for t in range(actions.shape[1]):
         obs, reward, taken = tape.step(actions[:, t])

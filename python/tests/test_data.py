@@ -132,6 +132,14 @@ def test_torch_loads_them(pushes):
     assert batch["obs"]["tactile"].shape == (32, 1, 13, 10, 3)
 
 
+def test_a_missing_shard_is_told(generate):
+    folder = generate("dummy", "--episodes", "32", "--shards", "2", "--no-merge")
+    assert len(Episodes(folder)) == 32
+    (folder / "shard-00001.h5").unlink()
+    with pytest.raises(tangere.InputError, match="1 shards of 2"):
+        Episodes(folder)
+
+
 def test_mistakes_are_told(pushes, tmp_path):
     for arguments, message in [
         ({"keys": ["touch"]}, r"keys \['touch'\]; the data set has"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gradients through PyTorch: closed loops of every task against differences, and the order of calls."""
+"""Gradients through PyTorch: closed loops of tasks against differences, and the order of calls."""
 
 from __future__ import annotations
 

@@ -31,8 +31,8 @@ class TaskTangent {
   /// Begins anew with changes of the state at the first action, (nv) each; an empty span means
   /// none.
   void start(std::span<const double> q, std::span<const double> v);
-  /// How what the task sees at the reset changes, after start(), and the view itself, which is valid
-  /// until the next call. Its one moment is the state at the first action. For a task that does not
+  /// How what the task sees at the reset changes, after start(), and the view itself, which is
+  /// valid until the next call. Its one moment is the state at the first action. For a task that does not
   /// restart. `numbers`: as in take().
   ViewTangent seen_at_start(std::span<const double> numbers);
   [[nodiscard]] TaskView start_view();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests what a data set tells a learner: who played which episode, masks, names of environments, and
-// policies that are varied.
+// Tests what a data set tells a learner: who played which episode, masks, names of environments,
+// and policies that are varied.
 #include <gmock/gmock.h>
 
 #include <algorithm>

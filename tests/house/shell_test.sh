@@ -68,6 +68,8 @@ built() {
   printf '#!/usr/bin/env bash\necho "tangere $*" >>"$FAKE_HOME/log"\nexit "${FAKE_PROGRAM:-0}"\n' \
     >"$home/project/build/release/tangere"
   chmod +x "$home/project/build/release/tangere"
+  mkdir -p "$home/project/build/venv/bin"  # with what the missing list of python/requirements.txt asks for: nothing
+  ln -s "$(type -P true)" "$home/project/build/venv/bin/python"
 }
 test_in() {  # PRESET COMMAND
   printf 'add_test(one "%s")\nset_tests_properties(one PROPERTIES LABELS memory)\n' "$(type -P "$2")" \
@@ -168,6 +170,11 @@ test_in release "$bin/skipping_program"
 run run-tests
 expect "passes with what was skipped" passes
 expect "names what was skipped and why" prints "release: A.Skips: mpirun is not installed"
+expect "builds the Python module" called "-DTANGERE_PYTHON=ON -DPython_EXECUTABLE=$home/project/build/venv/bin/python"
+rm "$home/project/build/venv/bin/python"
+run run-tests
+expect "passes without Python" passes
+expect "names what was not tested" prints "release: the Python module and its tests"
 lacks openmpi-bin
 run run-tests
 expect "installs what tests need" called "install -y --no-install-recommends openmpi-bin"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests that gradients descend: open-loop pushes found by Adam bring a box nearer to its goals, and a
-// policy learns to push.
+// Tests that gradients descend: open-loop pushes found by Adam bring a box nearer to its goals, and
+// a policy learns to push.
 #include <gtest/gtest.h>
 
 #include <algorithm>

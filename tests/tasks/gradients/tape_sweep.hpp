@@ -33,7 +33,8 @@ inline TaskTapeOptions tape_options(std::int64_t actions, int threads = 1,
   return o;
 }
 
-/// The least tape_bytes with which such a tape can be made, by its own message: those of checkpoints.
+/// The least tape_bytes with which such a tape can be made, by its own message: those of
+/// checkpoints.
 inline double least_tape_bytes(const Task& task, int environments, TaskTapeOptions options) {
   options.tape_bytes = 1;
   try {
