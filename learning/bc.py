@@ -45,13 +45,16 @@ def flat(obs: dict[str, np.ndarray], past: np.ndarray) -> torch.Tensor:
     return torch.from_numpy(np.concatenate([v.reshape(len(v), -1) for v in parts], axis=1))
 
 
-def train(windows: Windows, clone: Clone, epochs: int, batch: int, rate: float, seed: int) -> None:
+def train(
+    windows: Windows, clone: Clone, recall: bool, epochs: int, batch: int, rate: float, seed: int
+) -> None:
     optimiser = torch.optim.AdamW(clone.parameters(), lr=rate, weight_decay=1e-4)
     steps = epochs * -(-len(windows) // batch)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
     for epoch in range(epochs):
         for rows in windows.batches(batch, seed=seed * 1000 + epoch):
-            seen = flat(rows["obs"], rows["past_actions"])
+            past = rows["past_actions"] if recall else rows["past_actions"][:, :0]
+            seen = flat(rows["obs"], past)
             loss = (clone(seen) - torch.from_numpy(rows["actions"][:, 0])).square().mean()
             optimiser.zero_grad()
             loss.backward()
@@ -74,7 +77,9 @@ def play(task: str, episodes: int, choose, keys=None) -> np.ndarray:
     return solved
 
 
-def closed_loop(task: str, windows: Windows, clone: Clone, episodes: int) -> np.ndarray:
+def closed_loop(
+    task: str, windows: Windows, clone: Clone, recall: bool, episodes: int
+) -> np.ndarray:
     history: list[dict[str, np.ndarray]] = []
     past: list[np.ndarray] = []
 
@@ -84,7 +89,7 @@ def closed_loop(task: str, windows: Windows, clone: Clone, episodes: int) -> np.
             past[:] = [np.zeros((episodes, *env.task.action.shape), np.float32)] * windows.before
         history[:] = [*history[1:], obs]
         stacked = {k: np.stack([h[k] for h in history], axis=1) for k in windows.keys}
-        between = np.stack(past, axis=1) if past else np.zeros((episodes, 0), np.float32)
+        between = np.stack(past, axis=1) if past and recall else np.zeros((episodes, 0), np.float32)
         with torch.no_grad():
             action = clone(flat(stacked, between)).numpy()
         past[:] = [*past, action][len(past) + 1 - windows.before :] if windows.before else []
@@ -107,7 +112,8 @@ def main() -> None:
     parser.add_argument("--batch", type=int, default=256)
     parser.add_argument("--rate", type=float, default=1e-3)
     parser.add_argument("--width", type=int, default=256)
-    parser.add_argument("--before", type=int, default=0, help="rows of history, with their actions")
+    parser.add_argument("--before", type=int, default=0, help="rows of history")
+    parser.add_argument("--recall", action="store_true", help="the actions between them, too")
     parser.add_argument("--without", nargs="*", default=[], help="observations to leave out")
     parser.add_argument("--all", action="store_true", help="learn from failed episodes too")
     parser.add_argument("--episodes", type=int, default=1000, help="to play")
@@ -126,12 +132,13 @@ def main() -> None:
         torch.manual_seed(seed)
         begin = time.process_time()
         first = windows[0]
-        inputs = sum(v.size for v in first["obs"].values()) + first["past_actions"].size
+        inputs = sum(v.size for v in first["obs"].values())
+        inputs += first["past_actions"].size if asked.recall else 0
         bounds = task.action.low, task.action.high
         clone = Clone(inputs, first["actions"].shape[1], asked.width, *bounds)
-        train(windows, clone, asked.epochs, asked.batch, asked.rate, seed)
+        train(windows, clone, asked.recall, asked.epochs, asked.batch, asked.rate, seed)
         trained = time.process_time() - begin
-        solved = closed_loop(task.name, windows, clone, asked.episodes)
+        solved = closed_loop(task.name, windows, clone, asked.recall, asked.episodes)
         runs.append({"seed": seed, "rate": solved.mean(), "train_cpu_s": trained})
         print(
             f"{task.name} {'+'.join(keys)}: clone {solved.mean():.3f} ± "
