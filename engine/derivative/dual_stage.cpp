@@ -100,7 +100,8 @@ struct DualStage::Impl {
     for (const kernels::PairContact& p : pairs) {
       points.emplace_back(std::size_t(3 * p.n_points), D(0.0));
       references.emplace_back(12, D(0.0));
-      lists.push_back({points.back().data(), 0, references.back().data(), 1e9, nullptr, 0, 0});
+      lists.push_back(
+          {points.back().data(), 0, references.back().data(), 1e9, nullptr, 0, 0, nullptr, nullptr});
     }
   }
 
@@ -374,7 +375,9 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
         const kernels::Vec3<double> moves = turn * kernels::Vec3<double>{own(0), own(1), own(2)};
         int n = 0;
         const auto of_point = [&](const D& of_sensor) {
-          const D scaled = D(p.factors[n]) * of_sensor + D(0.0, own(3 + n));
+          const bool is_ks = n == kPointCoefficients;
+          const D scaled = D(p.factors[is_ks ? 1 : n]) * of_sensor +
+                           D(0.0, is_ks ? 0.0 : own(3 + n));
           ++n;
           return scaled;
         };

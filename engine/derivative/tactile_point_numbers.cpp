@@ -8,7 +8,7 @@
 
 namespace tangere {
 
-static_assert(kPointNumbers == kernels::kPointNumbers && kPointNumbers == 3 + kCoefficients);
+static_assert(kPointNumbers == kernels::kPointNumbers && kPointNumbers == 3 + kPointCoefficients);
 
 const char* point_number_name(int k) {
   constexpr const char* kPlace[] = {"x", "y", "z"};
@@ -73,7 +73,7 @@ void add_to_points(TactileDescription& sensor, std::span<const double> change) {
   const double* own = change.data();
   for (TactilePoint& p : sensor.points) {
     for (std::size_t k = 0; k < 3; ++k) p.position[k] += own[k];
-    for (std::size_t k = 0; k < kCoefficients; ++k) {
+    for (std::size_t k = 0; k < kPointCoefficients; ++k) {
       if (own[3 + k] == 0) continue;
       if (c[k] == 0)
         throw InputError(

@@ -8,6 +8,7 @@
 
 #include "engine/model/compile_imperfections.hpp"
 #include "engine/model/compile_joints.hpp"
+#include "engine/model/compile_memories.hpp"
 #include "engine/model/compile_variations.hpp"
 #include "engine/model/effects_and_stages.hpp"
 #include "engine/model/frames.hpp"
@@ -325,7 +326,7 @@ class Compiler {
   void vary(const RandomizationDescription& d, int row) {
     const SceneNumber& n = d.number;
     const auto coefficient = [&](kernels::ContactParameters& of) {
-      of[std::size_t(from(NumberField::kn, n.field))].row = row;
+      of[coefficient_index(n.field)].row = row;
     };
     const auto at = [&](const NameIndex& names, const char* kind, const std::string& name) {
       return std::size_t(names.find(kind, name, d.source));
@@ -385,6 +386,10 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   v.ground_order = m->ground_order.data();
   for (std::size_t k = 0; k < m->bodies.size(); ++k)
     m->solids.push_back(solid_of(m->scene.links[k].body.shape, m->bodies[k]));
+  compile_memories(*m);
+  v.n_memories = static_cast<int>(m->memories.size());
+  v.memories = m->memories.data();
+  v.ground = ground_frame(v.ground_point, v.ground_normal);
   v.n_solids = static_cast<int>(m->solids.size());
   v.solids = m->solids.data();
   v.pattern = m->pattern.view();

@@ -232,19 +232,20 @@ std::string coefficient_text(const Scene& scene, const Element& d, Field field) 
   const char* const name = number_kind(number.owner, field).name;
   if (varies(scene, number, {field})) return fmt::format("{} varies", name);
   const std::string unit = unit_of(scene, number);
-  return fmt::format("{} {}{}", name, d.coefficients[std::size_t(from(Field::kn, field))],
+  return fmt::format("{} {}{}", name, d.coefficients[coefficient_index(field)],
                      unit == "1" ? "" : " " + unit);
 }
 
 template <class Element>
 bool acts(const Scene& scene, const Element& d, Field field) {
-  return d.coefficients[std::size_t(from(Field::kn, field))] != 0 ||
+  return d.coefficients[coefficient_index(field)] != 0 ||
          varies(scene, number_of(d), {field});
 }
 
 template <Part Of, class Element>
 bool element_on(const Scene& scene, const Element& d) {
-  if (Of == Part::tangential) return acts(scene, d, Field::kt) && acts(scene, d, Field::mu);
+  if (Of == Part::tangential)
+    return (acts(scene, d, Field::kt) || acts(scene, d, Field::ks)) && acts(scene, d, Field::mu);
   return Of == Part::whole || acts(scene, d, Field::damping);
 }
 
@@ -252,7 +253,9 @@ template <Part Of, class Element>
 std::string element_reason(const Scene& scene, const Element& d) {
   const auto text = [&](Field field) { return coefficient_text(scene, d, field); };
   if (Of == Part::whole) return "declared, " + text(Field::kn);
-  if (Of == Part::tangential) return text(Field::kt) + ", " + text(Field::mu);
+  if (Of == Part::tangential)
+    return text(Field::kt) + (acts(scene, d, Field::ks) ? ", " + text(Field::ks) : "") + ", " +
+           text(Field::mu);
   return text(Field::damping);
 }
 
@@ -291,13 +294,13 @@ void drop_imperfections(TactileDescription& d, Way way) {
 
 template <Part P, class Element>
 void still_element(Scene& scene, Element& d, Way way) {
-  Fields fields{Field::kn, Field::kt, Field::mu, Field::damping};
+  Fields fields{Field::kn, Field::kt, Field::mu, Field::damping, Field::ks};
   if (P == Part::damping) fields = {Field::damping};
-  if (P == Part::tangential) fields = {Field::kt};
+  if (P == Part::tangential) fields = {Field::kt, Field::ks};
   if (P == Part::tangential && way == Way::removed) fields.push_back(Field::mu);
   if constexpr (std::is_same_v<Element, TactileDescription>)
     if (P == Part::whole) drop_imperfections(d, way);
-  for (const Field field : fields) d.coefficients[std::size_t(from(Field::kn, field))] = 0;
+  for (const Field field : fields) d.coefficients[coefficient_index(field)] = 0;
   keep_constant(scene, number_of(d), fields);
 }
 

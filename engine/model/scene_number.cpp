@@ -17,14 +17,17 @@ constexpr NumberKind kKinds[] = {
     {Owner::contact, Field::kt, "kt", "N s/m", nullptr, false},
     {Owner::contact, Field::mu, "mu", "1", nullptr, false},
     {Owner::contact, Field::damping, "damping", "N s/m^2", "N s/m", false},
+    {Owner::contact, Field::ks, "ks", "N/m", nullptr, false},
     {Owner::ground, Field::kn, "kn", "N/m", nullptr, false},
     {Owner::ground, Field::kt, "kt", "N s/m", nullptr, false},
     {Owner::ground, Field::mu, "mu", "1", nullptr, false},
     {Owner::ground, Field::damping, "damping", "N s/m^2", "N s/m", false},
+    {Owner::ground, Field::ks, "ks", "N/m", nullptr, false},
     {Owner::tactile, Field::kn, "kn", "N/m", nullptr, false},
     {Owner::tactile, Field::kt, "kt", "N s/m", nullptr, false},
     {Owner::tactile, Field::mu, "mu", "1", nullptr, false},
     {Owner::tactile, Field::damping, "damping", "N s/m^2", "N s/m", false},
+    {Owner::tactile, Field::ks, "ks", "N/m", nullptr, false},
     {Owner::body, Field::density, "density", "kg/m^3", nullptr, false},
     {Owner::body, Field::mass, "mass", "kg", nullptr, false},
     {Owner::body, Field::radius, "radius", "m", nullptr, false},
@@ -124,7 +127,7 @@ const double* find_number(const Scene& scene, const SceneNumber& n) {
     return n.owner == Owner::body ? of_body(link->body, n) : of_joint(scene, link->joint, n);
   }
   with_law(scene, n, [&](const ContactCoefficients& c, ContactLaw) {
-    found = &c[std::size_t(from(Field::kn, n.field))];
+    found = &c[coefficient_index(n.field)];
   });
   return found;
 }

@@ -13,8 +13,8 @@ struct Scene;
 /// The owner of a number. The number's name begins with this word.
 enum class NumberOwner { contact, ground, tactile, body, joint, motor };
 
-/// Some fields are counted from the first of their kind: coefficients of a contact or a sensor from
-/// kn on, effects of a joint from damping on, numbers of a size from radius on.
+/// Some fields are counted from the first of their kind: effects of a joint from damping on,
+/// numbers of a size from radius on.
 enum class NumberField {
   kn,
   kt,
@@ -34,7 +34,8 @@ enum class NumberField {
   size,
   pos,
   q,
-  v
+  v,
+  ks
 };
 /// Returns how far a field is from the first of its kind.
 constexpr int from(NumberField first, NumberField field) {
@@ -68,8 +69,13 @@ std::span<const NumberKind> number_kinds();
 /// Throws InputError where an owner has no such field.
 const NumberKind& number_kind(NumberOwner owner, NumberField field);
 
-/// Returns the field of coefficient k of a contact or a sensor.
-constexpr NumberField coefficient_field(int k) { return static_cast<NumberField>(k); }
+/// Returns the field of coefficient k of a contact or a sensor. coefficient_index() is the inverse.
+constexpr NumberField coefficient_field(int k) {
+  return k < 4 ? static_cast<NumberField>(k) : NumberField::ks;
+}
+constexpr std::size_t coefficient_index(NumberField field) {
+  return field == NumberField::ks ? 4 : static_cast<std::size_t>(from(NumberField::kn, field));
+}
 /// Returns number `which` of a body's size (size_number). size_index() is the inverse.
 SceneNumber size_of_body(const std::string& body, int which);
 inline int size_index(const SceneNumber& number) {

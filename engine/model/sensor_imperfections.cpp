@@ -13,7 +13,7 @@ namespace {
 using Of = SensorImperfections;
 constexpr double kNoLimit = std::numeric_limits<double>::max();
 
-constexpr ImperfectionKind kKinds[] = {
+constexpr ImperfectionKind kImperfectionKinds[] = {
     {"low_pass", "s", 1e3, &Of::low_pass, nullptr},
     {"delay", "s", 1e3, &Of::delay, nullptr},
     {"spread", "m", 1e3, &Of::spread, nullptr},
@@ -29,7 +29,7 @@ constexpr ImperfectionKind kKinds[] = {
 
 }  // namespace
 
-std::span<const ImperfectionKind> imperfection_kinds() { return kKinds; }
+std::span<const ImperfectionKind> imperfection_kinds() { return kImperfectionKinds; }
 
 NormalAndShear value_of(const SensorImperfections& imperfections, const ImperfectionKind& kind) {
   if (kind.pair != nullptr) return imperfections.*kind.pair;
@@ -37,7 +37,7 @@ NormalAndShear value_of(const SensorImperfections& imperfections, const Imperfec
 }
 
 bool is_imperfect(const SensorImperfections& imperfections) {
-  for (const ImperfectionKind& kind : kKinds)
+  for (const ImperfectionKind& kind : kImperfectionKinds)
     if (!(value_of(imperfections, kind) == NormalAndShear{})) return true;
   return false;
 }
@@ -48,7 +48,7 @@ bool has_memory(const SensorImperfections& imperfections) {
 
 std::string text_of(const SensorImperfections& imperfections) {
   std::string text;
-  for (const ImperfectionKind& kind : kKinds) {
+  for (const ImperfectionKind& kind : kImperfectionKinds) {
     const NormalAndShear value = value_of(imperfections, kind);
     if (value == NormalAndShear{}) continue;
     const std::string unit = kind.unit, second = fmt::format(" {}", value.shear);
@@ -62,7 +62,7 @@ void check_imperfections(const SensorImperfections& imperfections, const std::st
                          bool grid) {
   const std::string where =
       fmt::format("{}imperfections of '{}': ", imperfections.source.prefix(), sensor);
-  for (const ImperfectionKind& kind : kKinds) {
+  for (const ImperfectionKind& kind : kImperfectionKinds) {
     const NormalAndShear value = value_of(imperfections, kind);
     for (const double x : {value.normal, value.shear}) {
       if (x >= 0 && x <= kind.most) continue;

@@ -63,6 +63,7 @@ Batch::Batch(const Model& model, int environments, std::uint64_t seed, std::int6
     held_.assign(lanes, 0);
     episode_.resize(lanes);
     steps_.assign(lanes, 0);
+    memory_.resize(lanes);
   } catch (const std::exception&) {
     throw InputError(
         "no memory for " + std::to_string(environments) + " environments (" +
@@ -109,6 +110,7 @@ void Batch::reset(int environment, std::int64_t episode) {
   has_history_[lane] = 0;
   held_[lane] = 0;
   steps_[lane] = 0;
+  memory_[lane].clear();
 }
 
 void Batch::displace_state(int environment, std::span<const double> q, std::span<const double> v) {
@@ -168,6 +170,7 @@ void Batch::get_v(int environment, std::span<double> v) const {
 void Batch::set_state(int environment, std::span<const double> q, std::span<const double> v) {
   const std::size_t lane = std::size_t(environment);
   write_state(lane, q, v);
+  memory_[lane].clear();
   status_[lane] = StepStatus::converged;
   has_history_[lane] = 0;
 }
@@ -186,8 +189,26 @@ void Batch::set_state(int environment, std::span<const double> q, std::span<cons
     column[std::size_t(m.layout.previous_q + i) * kBlock] = before_q[i];
   for (int i = 0; i < m.nv; ++i)
     column[std::size_t(m.layout.previous_v + i) * kBlock] = before_v[i];
+  memory_[lane].clear();
   status_[lane] = StepStatus::converged;
   has_history_[lane] = 1;
+}
+
+void Batch::set_memory(int environment, const ShearMemory& memory) {
+  const int points = compiled(model_).remembering_points;
+  int last = -1;
+  for (const ShearEntry& e : memory) {
+    if (e.point <= last || e.point >= points)
+      throw InputError("memory of friction: point " + std::to_string(e.point) + " after point " +
+                       std::to_string(last) + "; expected rising numbers below " +
+                       std::to_string(points));
+    for (const double s : e.s)
+      if (!std::isfinite(s))
+        throw InputError("memory of friction: point " + std::to_string(e.point) +
+                         " is not finite");
+    last = e.point;
+  }
+  memory_[std::size_t(environment)] = memory;
 }
 
 void Batch::set_failed(int environment, StepStatus status) {
@@ -209,7 +230,8 @@ BlockState Batch::save_block(int block) const {
   return {{rows, rows + block_stride_},
           {status_.begin() + lane, status_.begin() + lane + kBlock},
           {has_history_.begin() + lane, has_history_.begin() + lane + kBlock},
-          {steps_.begin() + lane, steps_.begin() + lane + kBlock}};
+          {steps_.begin() + lane, steps_.begin() + lane + kBlock},
+          {memory_.begin() + lane, memory_.begin() + lane + kBlock}};
 }
 
 void Batch::restore_block(int block, const BlockState& state) {
@@ -218,6 +240,7 @@ void Batch::restore_block(int block, const BlockState& state) {
   std::copy(state.status.begin(), state.status.end(), status_.begin() + lane);
   std::copy(state.has_history.begin(), state.has_history.end(), has_history_.begin() + lane);
   std::copy(state.steps.begin(), state.steps.end(), steps_.begin() + lane);
+  std::copy(state.memory.begin(), state.memory.end(), memory_.begin() + lane);
 }
 
 bool Batch::is_parameter(int k) const {

@@ -9,6 +9,7 @@
 
 #include "engine/base/aligned.hpp"
 #include "engine/model/model.hpp"
+#include "engine/step/shear_memory.hpp"
 
 namespace tangere {
 
@@ -32,6 +33,7 @@ struct BlockState {
   std::vector<StepStatus> status;
   std::vector<std::uint8_t> has_history;
   std::vector<std::int64_t> steps;
+  std::vector<ShearMemory> memory;
 };
 
 /// Environments stepped together. A failed environment keeps its last good state and is not stepped
@@ -76,6 +78,15 @@ class Batch {
   /// continues the run.
   void set_state(int environment, std::span<const double> q, std::span<const double> v,
                  std::span<const double> previous_q, std::span<const double> previous_v);
+
+  /// What the friction of an environment remembers (docs/shear.md). It is empty when an episode
+  /// begins and after set_state().
+  [[nodiscard]] const ShearMemory& memory(int environment) const {
+    return memory_[std::size_t(environment)];
+  }
+  /// Sets it, for a run that goes on from a stored state. Throws InputError unless the points rise
+  /// and the scene has them.
+  void set_memory(int environment, const ShearMemory& memory);
 
   /// Sets the newest state alone, for differences. Quaternions are taken as they are; history and
   /// status are kept.
@@ -148,6 +159,7 @@ class Batch {
   std::vector<std::uint8_t> has_history_;  // BDF2: the previous state is valid
   std::vector<std::uint8_t> held_;
   std::vector<std::int64_t> episode_, steps_;
+  std::vector<ShearMemory> memory_;
 };
 
 }  // namespace tangere

@@ -2,6 +2,8 @@
 // Runs the search kernel for one lane after another.
 #include "engine/step/detection.hpp"
 
+#include "engine/step/remember.hpp"
+
 namespace tangere {
 
 template <int L>
@@ -60,7 +62,9 @@ void find_candidates(const CompiledModel& model, const kernels::KernelTable& tab
       for (int i = 0; i < 12; ++i) pose[i] = row[i][l];
       list.own_count[l] = table.find_candidates(
           {&model.pairs[k], size_of<L>(model.pairs[k], w.stage, l), pose, list.margin,
-           list.own + 3 * list.stride * l, list.stride, faces_of<L>(w.stage, k, l)});
+           list.own + 3 * list.stride * l, list.stride, faces_of<L>(w.stage, k, l),
+           list.own_index == nullptr ? nullptr : list.own_index + list.stride * l});
+      if (list.own_index != nullptr) recall_list(model, table, w, static_cast<int>(k), l);
     }
   }
 }

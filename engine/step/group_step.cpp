@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "engine/step/detection.hpp"
+#include "engine/step/remember.hpp"
 #include "engine/step/scheme_stage.hpp"
 
 namespace tangere {
@@ -34,6 +35,7 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
       settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
       inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience};
   choose_faces(model_, table, w);
+  begin_memory(model_, table, w);
   for (int k = 0; k <= scheme.inner_stages(); ++k) {
     set_stage(model_, scheme, k, h, w);
     guess_stage(model_, scheme, k, h, w);
@@ -45,6 +47,7 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
   LaneBits resolved = lanes;
   finish(w, lanes, h, resolved, report);
   watch_faces(table, w, resolved, report);
+  advance_memory(model_, table, w, resolved);
   return resolved;
 }
 
@@ -103,6 +106,7 @@ void GroupStep::commit(BasicWorkspace<L>& w, LaneBits lanes) const {
     if (!has(lanes, l)) continue;
     for (int i = 0; i < model_.nq; ++i) w.q0[i][l] = w.q1[i][l];
     for (int i = 0; i < model_.nv; ++i) w.v0[i][l] = w.v1[i][l];
+    w.remembered.now[std::size_t(l)].swap(w.remembered.after[std::size_t(l)]);
   }
 }
 
@@ -117,7 +121,8 @@ void GroupStep::note(const BasicWorkspace<L>& w, int lane, const Scheme& scheme,
     return x;
   };
   to->push_back({Integrator(scheme), h, column(w.q0, model_.nq), column(w.v0, model_.nv),
-                 column(w.x_inner, scheme.inner_stages() * model_.nv)});
+                 column(w.x_inner, scheme.inner_stages() * model_.nv),
+                 w.remembered.now[std::size_t(lane)]});
 }
 
 /// Keeps the inner stages of a plain step.
@@ -165,6 +170,7 @@ bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>&
   alone.stage.block =
       w.stage.block == nullptr ? nullptr : w.stage.block + w.stage.group * kernels::kGroup + lane;
   alone.stage.group = 0;
+  alone.remembered.now[0] = w.remembered.now[std::size_t(lane)];
   NewtonReport one;
   one.status[0] = report.status[lane];
   one.iterations[0] = report.iterations[lane];
@@ -172,6 +178,7 @@ bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>&
   const bool done = split(table, alone, h, 1, one, solves);
   from_one(alone.q0, w.q0, model_.nq);
   from_one(alone.v0, w.v0, model_.nv);
+  w.remembered.now[std::size_t(lane)] = alone.remembered.now[0];
   report.status[lane] = one.status[0];
   report.iterations[lane] = one.iterations[0];
   report.residual[lane] = one.residual[0];

@@ -101,6 +101,9 @@ struct Stepper::Impl {
     gather(w.v0, m.layout.v, m.nv);
     gather(w.q_before, m.layout.previous_q, m.nq);
     gather(w.v_before, m.layout.previous_v, m.nv);
+    if (!m.memories.empty())
+      for (int l = 0; l < L; ++l)
+        w.remembered.now[std::size_t(l)] = batch.memory_[std::size_t(g.first + lane + l)];
     w.stage.block = g.rows + lane;
     w.stage.group = 0;
     const LaneBits live = g.live >> lane;
@@ -122,6 +125,7 @@ struct Stepper::Impl {
       if (failed(report.status[l])) continue;
       if (m.layout.past_states > 0) remember(m.layout, g.rows + lane + l, batch.steps_[e]);
       ++batch.steps_[e];
+      if (!m.memories.empty()) batch.memory_[e] = w.remembered.now[std::size_t(l)];
       // One step back is too long for BDF2's history where a step had to be cut.
       batch.has_history_[e] = settings.accuracy > 0 ? 0 : 1;
       const auto shift = [&](int now, int before, const kernels::Row<L>* from, int count) {

@@ -16,7 +16,10 @@ int BlockTape::rows(const Model& model, Integrator integrator) {
 }
 
 std::size_t BlockTape::bytes(const Model& model, Integrator integrator, std::int64_t steps) {
-  return std::size_t(steps + 2) * std::size_t(rows(model, integrator) * kBlock) * sizeof(double);
+  // Friction remembers at most all points of its contacts.
+  const std::size_t memory = std::size_t(compiled(model).remembering_points) * sizeof(ShearEntry);
+  return std::size_t(steps + 2) * kBlock *
+         (std::size_t(rows(model, integrator)) * sizeof(double) + memory);
 }
 
 BlockTape::BlockTape(const Model& model, Integrator integrator, std::int64_t steps)
@@ -24,7 +27,7 @@ BlockTape::BlockTape(const Model& model, Integrator integrator, std::int64_t ste
       nq_(model.nq()),
       nv_(model.nv()),
       row_count_(std::size_t(rows(model, integrator))),
-      states_(bytes(model, integrator, steps) / sizeof(double)),
+      states_(std::size_t(steps + 2) * row_count_ * kBlock),
       taken_(kBlock, 0),
       before_(kBlock, 0) {}
 
@@ -44,10 +47,14 @@ void BlockTape::start(const Batch& batch, int block) {
   }
   copy(batch, block, layout.previous_q, slot(-1));
   copy(batch, block, layout.q, slot(0));
+  memory_.clear();
+  memory_end_.clear();
+  keep_memory(batch, block);
 }
 
 void BlockTape::append(const Batch& batch, int block) {
   copy(batch, block, compiled(model_).layout.q, slot(++steps_));
+  keep_memory(batch, block);
   for (int l = 0; l < kBlock; ++l) {
     const int e = block * kBlock + l;
     if (e < batch.environments() && !failed(batch.status(e)) && !batch.held(e))
@@ -55,11 +62,32 @@ void BlockTape::append(const Batch& batch, int block) {
   }
 }
 
+void BlockTape::keep_memory(const Batch& batch, int block) {
+  if (compiled(model_).memories.empty()) return;
+  for (int l = 0; l < kBlock; ++l) {
+    if (const int e = block * kBlock + l; e < batch.environments()) {
+      const ShearMemory& m = batch.memory(e);
+      memory_.insert(memory_.end(), m.begin(), m.end());
+    }
+    memory_end_.push_back(memory_.size());
+  }
+}
+
+std::span<const ShearEntry> BlockTape::memory(std::int64_t step, int lane) const {
+  if (memory_end_.empty()) return {};
+  const std::size_t at = std::size_t(step) * kBlock + std::size_t(lane);
+  const std::size_t begin = at == 0 ? 0 : memory_end_[at - 1];
+  return std::span(memory_).subspan(begin, memory_end_[at] - begin);
+}
+
 void BlockTape::show(std::int64_t step, Batch& batch, int block) const {
   std::copy_n(state(step), (nq_ + nv_) * kBlock,
               batch.block(block) + compiled(model_).layout.q * kBlock);
-  for (int l = 0; l < kBlock && block * kBlock + l < batch.environments(); ++l)
+  for (int l = 0; l < kBlock && block * kBlock + l < batch.environments(); ++l) {
     batch.set_steps(block * kBlock + l, episode_step(step, l));
+    const std::span<const ShearEntry> remembered = memory(step, l);
+    batch.set_memory(block * kBlock + l, {remembered.begin(), remembered.end()});
+  }
 }
 
 double* BlockTape::next_inner() {

@@ -10,6 +10,7 @@
 
 #include "engine/base/aligned.hpp"
 #include "engine/model/model.hpp"
+#include "engine/step/shear_memory.hpp"
 
 namespace tangere {
 
@@ -21,6 +22,7 @@ struct TapedSolve {
   double h;                   ///< [s]
   std::vector<double> q, v;   ///< its result: (nq), (nv)
   std::vector<double> inner;  ///< inner stages relative to the solve's start, (inner_stages, nv)
+  ShearMemory memory;         ///< what friction remembers after it
 };
 
 /// The solves of one environment's step, first to last.
@@ -58,6 +60,8 @@ class BlockTape {
   [[nodiscard]] const double* inner(std::int64_t step) const {
     return state(step + 1) + std::size_t(nq_ + nv_) * 16;
   }
+  /// What friction remembers after `step` steps.
+  [[nodiscard]] std::span<const ShearEntry> memory(std::int64_t step, int lane) const;
   /// The solves of one environment's step; null for a plain step.
   [[nodiscard]] const TapedStep* special(std::int64_t step, int lane) const;
   /// Whether the environment took that step.
@@ -77,6 +81,7 @@ class BlockTape {
     return states_.data() + std::size_t(step + 1) * row_count_ * 16;
   }
   void copy(const Batch& batch, int block, int first_row, double* to) const;
+  void keep_memory(const Batch& batch, int block);
 
   Model model_;
   int nq_, nv_;
@@ -86,6 +91,9 @@ class BlockTape {
   std::vector<TapedStep> special_;    // rising steps
   std::vector<std::int64_t> taken_;   // (16)
   std::vector<std::int64_t> before_;  // (16) steps of the episodes before the tape began
+  // What friction remembers, and where each lane's part ends: (steps + 1, 16); empty without memory.
+  ShearMemory memory_;
+  std::vector<std::size_t> memory_end_;
 };
 
 }  // namespace tangere

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "kernels/contact/elastic_contact.hpp"
+
 namespace tangere {
 
 using kernels::kGroup;
@@ -43,11 +45,44 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
     typename kernels::Stage<L>::List& list = w.lists[k];
     list.stride = (m.pairs[k].n_points + kGroup - 1) / kGroup * kGroup + kGroup;
     rows(list.points, 3 * list.stride);
+    list.anchors = nullptr;
+    if (m.pairs[k].memory >= 0) rows(list.anchors, kernels::kAnchorNumbers * list.stride);
   }
+  rows(s.ground_anchors, kernels::kAnchorNumbers * m.ground_anchors);
   return used;
 }
 
 }  // namespace
+
+/// Makes room for what friction remembers.
+template <int L>
+void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
+  for (auto& list : lists) list.own_index = nullptr, list.own_anchors = nullptr;
+  if (m.memories.empty()) return;
+  std::size_t listed = 0, ground = 0, most = 0;
+  for (const kernels::RememberingContact& of : m.memories) {
+    const int stride = of.pair >= 0 ? lists[std::size_t(of.pair)].stride : of.stride;
+    most = std::max(most, std::size_t(stride));
+    if (of.pair >= 0) listed += std::size_t(L * stride);
+    if (of.ground) ground += std::size_t(L * stride);
+  }
+  own_index.resize(listed);
+  own_anchors.resize(listed * kernels::kAnchorNumbers);
+  std::size_t at = 0;
+  for (const kernels::RememberingContact& of : m.memories) {
+    if (of.pair < 0) continue;
+    auto& list = lists[std::size_t(of.pair)];
+    list.own_index = own_index.data() + at;
+    list.own_anchors = own_anchors.data() + kernels::kAnchorNumbers * at;
+    at += std::size_t(L * list.stride);
+  }
+  remembered.ground_anchors.resize(ground * kernels::kAnchorNumbers);
+  remembered.s.resize(4 * most);
+  remembered.start.resize(m.links.size());
+  remembered.end.resize(m.links.size());
+  for (auto* lanes : {&remembered.now, &remembered.after})
+    for (ShearMemory& lane : *lanes) lane.reserve(std::size_t(m.remembering_points));
+}
 
 template <int L>
 std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
@@ -74,6 +109,7 @@ BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
     list.own = own_points.data() + own;
     own += std::size_t(L * 3 * list.stride);
   }
+  make_memory(m);
   std::size_t bytes = 0;  // the largest of all instruction sets, any of which may be chosen later
   for (const kernels::KernelTable* table : kernels::available_kernels())
     bytes = std::max(bytes, table->stage<L>().scratch_bytes(m.view));

@@ -3,12 +3,14 @@
 // outlives the step.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "engine/base/aligned.hpp"
 #include "engine/model/compiled_model.hpp"
 #include "engine/step/pivoted_factors.hpp"
+#include "engine/step/shear_memory.hpp"
 #include "kernels/table/kernel_table.hpp"
 
 namespace tangere {
@@ -22,6 +24,16 @@ inline bool has(LaneBits bits, int lane) { return ((bits >> lane) & 1U) != 0; }
 /// The largest number of inner stages of a scheme in the table.
 inline constexpr int kInnerStages = 1;
 
+/// What friction remembers in the lanes of a group, and scratch. Empty where nothing remembers.
+template <int L>
+struct MemoryLanes {
+  std::array<ShearMemory, L> now, after;  ///< where a solve begins, and at its end
+  AlignedVector<kernels::LinkPose<kernels::Row<L>>> start, end;  ///< (n_links)
+  /// (L, kAnchorNumbers, stride) of each contact with the ground, one after another.
+  AlignedVector<double> ground_anchors;
+  AlignedVector<double> s;  ///< (4, largest stride)
+};
+
 template <int L>
 struct BasicWorkspace {
   using LaneRow = kernels::Row<L>;
@@ -29,6 +41,7 @@ struct BasicWorkspace {
   /// `inner_stages`: the largest number in the schemes that it will be used for.
   explicit BasicWorkspace(const CompiledModel& model, int inner_stages = kInnerStages);
   static std::size_t bytes(const CompiledModel& model);
+  void make_memory(const CompiledModel& model);
 
   using Rows = AlignedVector<LaneRow>;
   Rows memory;  ///< every row below, in one allocation
@@ -52,6 +65,9 @@ struct BasicWorkspace {
   LaneRow *delta, *base, *test;
   LaneRow sound;
   PivotedFactors pivoted;  ///< for lanes whose plain LU is useless
+  MemoryLanes<L> remembered;
+  AlignedVector<double> own_anchors;
+  std::vector<int> own_index;
 };
 using Workspace = BasicWorkspace<kernels::kGroup>;
 using SingleWorkspace = BasicWorkspace<1>;

@@ -234,7 +234,10 @@ void read_coefficient_variation(const Scene& scene, const SceneNode& node,
       node.fail("no tactile sensor is named '" + n.name + "'" + suggestion(n.name, names));
   }
   node.check_attributes(attributes);
-  n.field = read_field(node, n.owner, NumberField::kn, NumberField::damping);
+  std::vector<std::string> fields;
+  for (int k = 0; k < kCoefficients; ++k)
+    fields.emplace_back(number_kind(n.owner, coefficient_field(k)).name);
+  n.field = coefficient_field(int(node.choice("field", fields)));
   d.distribution = read_distribution(scene, node, n);
   check_coefficient(node, d.distribution);
 }

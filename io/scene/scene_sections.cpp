@@ -122,7 +122,7 @@ void read_contacts(Scene& scene, const SceneNode& section) {
   section.check_attributes({});
   for (const SceneNode& node : section.children({"ground_contact", "general_primitive_contact"})) {
     if (node.name() == "ground_contact") {
-      node.check_attributes({"body", "kn", "kt", "mu", "damping", "law", "ramp"},
+      node.check_attributes({"body", "kn", "kt", "mu", "ks", "damping", "law", "ramp"},
                             {"render", "scale"});
       if (!scene.ground) node.fail("the scene has no <ground> to touch");
       GroundContactDescription d;
@@ -137,7 +137,7 @@ void read_contacts(Scene& scene, const SceneNode& section) {
       scene.ground_contacts.push_back(std::move(d));
     } else {
       node.check_attributes(
-          {"general_body", "primitive_body", "kn", "kt", "mu", "damping", "law", "ramp"},
+          {"general_body", "primitive_body", "kn", "kt", "mu", "ks", "damping", "law", "ramp"},
           {"render", "scale"});
       PairContactDescription d;
       d.source = node.source();

@@ -32,8 +32,8 @@ Names attributes_of(int type) {
 }
 
 void check_attributes(const SceneNode& node, int type) {
-  Names used = {"name", "body",    "type", "kn",    "kt",
-                "mu",   "damping", "law",  "every", "pressure_sign"},
+  Names used = {"name", "body",    "type", "kn",    "kt", "mu",
+                "ks",   "damping", "law",  "every", "pressure_sign"},
         idle;
   const Names own = attributes_of(type);
   used.insert(used.end(), own.begin(), own.end());

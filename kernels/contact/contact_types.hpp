@@ -24,6 +24,7 @@ struct Coefficients {
   N kt;       ///< tangential damping [N s/m]
   N mu;       ///< friction coefficient [-]
   N damping;  ///< k_d [N s/m²]; law linear: c [N s/m]
+  N ks{};     ///< tangential stiffness [N/m]; 0: friction has no memory
 
   [[gnu::always_inline]] constexpr N& operator[](std::size_t k) { return this->*kOrder[k]; }
   [[gnu::always_inline]] constexpr const N& operator[](std::size_t k) const {
@@ -32,15 +33,19 @@ struct Coefficients {
 
  private:
   static constexpr N Coefficients::*kOrder[] = {&Coefficients::kn, &Coefficients::kt,
-                                                &Coefficients::mu, &Coefficients::damping};
+                                                &Coefficients::mu, &Coefficients::damping,
+                                                &Coefficients::ks};
 };
-inline constexpr int kCoefficients = 4;
+inline constexpr int kCoefficients = 5;
+/// The first of them, of which tactile points have factors. A point's factor of kt scales its ks
+/// too.
+inline constexpr int kPointCoefficients = 4;
 
 /// Applies f to each coefficient, in order.
 template <class N, class F>
 [[gnu::always_inline]] inline auto transformed(const Coefficients<N>& c, const F& f)
     -> Coefficients<decltype(f(c.kn))> {
-  return {f(c.kn), f(c.kt), f(c.mu), f(c.damping)};
+  return {f(c.kn), f(c.kt), f(c.mu), f(c.damping), f(c.ks)};
 }
 
 /// Shapes with a signed distance, which contact points and tactile points can touch.

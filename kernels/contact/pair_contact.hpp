@@ -34,9 +34,10 @@ struct PointContact {
   Mat3<N> hessian;  ///< Bending::general only: H
 };
 
-/// Computes distance, velocities and force at ξ. `Q`, `c`: shape frame in body 1. `omega`, `v`: W.
+/// Computes everything but friction and force at ξ. `Q`, `c`: shape frame in body 1. `omega`,
+/// `v`: W.
 template <class Shape, class N>
-PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, const Mat3<N>& Q,
+PointContact<N> meeting_point(const Shape& shape, const LawParameters<N>& law, const Mat3<N>& Q,
                               const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
                               const Vec3<N>& xi) {
   PointContact<N> p;
@@ -66,6 +67,15 @@ PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, c
   p.rate = dot(p.n, p.u);
   p.vt = p.u - p.rate * p.n;
   p.normal = normal_force(law, p.d, p.rate);
+  return p;
+}
+
+/// The same with friction and force.
+template <class Shape, class N>
+PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, const Mat3<N>& Q,
+                              const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
+                              const Vec3<N>& xi) {
+  PointContact<N> p = meeting_point(shape, law, Q, c, omega, v, xi);
   p.tangential = friction(law, p.normal, p.vt);
   const N touching = select(p.d < N(0.0), N(1.0), N(0.0));
   p.force = touching * (p.normal.force * p.n - p.tangential.scale * p.vt);
@@ -114,18 +124,14 @@ ForceDerivative<N> differentiate_force(const LawParameters<N>& law, const PointC
   return {diagonal(p.normal.force) + outer(g, p.u) + p.rate * T, outer(g, n) - T, f_depth};
 }
 
+/// δn = n_rho ρ₂ + n_theta θ; H = κ (P - e zzᵀ); n_theta = -(I - dH)[n], with P[n] = [n] and
+/// zzᵀ[n] = z (z × n)ᵀ. `P`: I - n nᵀ.
 template <class Shape, class N>
-PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact<N>& p,
-                                 const Vec3<N>& omega) {
-  PointDerivative<N> r;
+void differentiate_normal(const PointContact<N>& p, const Mat3<N>& P, Mat3<N>& n_rho,
+                          Mat3<N>& n_theta) {
   const N one(1.0);
   const Vec3<N>& n = p.n;
-  const Mat3<N> nn = outer(n, n);
-  const Mat3<N> P = diagonal(one) - nn;
-  // δn = n_rho ρ₂ + n_theta θ; H = κ (P - e zzᵀ); n_theta = -(I - dH)[n], with P[n] = [n] and
-  // zzᵀ[n] = z (z × n)ᵀ.
   constexpr bool kFlat = Shape::kBending == Bending::flat;
-  Mat3<N> n_rho, n_theta;
   if constexpr (Shape::kBending == Bending::general) {
     n_rho = -p.hessian;
     // Products are fused by hand. GCC 12 fuses sums of products with alternating signs in one
@@ -142,6 +148,17 @@ PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact
       n_theta = n_theta - outer((p.d * p.curvature) * p.axis, cross(p.axis, n));
     }
   }
+}
+
+template <class Shape, class N>
+PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact<N>& p,
+                                 const Vec3<N>& omega) {
+  PointDerivative<N> r;
+  const Vec3<N>& n = p.n;
+  const Mat3<N> nn = outer(n, n);
+  constexpr bool kFlat = Shape::kBending == Bending::flat;
+  Mat3<N> n_rho, n_theta;
+  differentiate_normal<Shape>(p, diagonal(N(1.0)) - nn, n_rho, n_theta);
   // δx₂ = nnᵀ ρ₂ - d δn.
   r.x_rho = kFlat ? nn : nn - p.d * n_rho;
   r.x_theta = (-p.d) * n_theta;
@@ -156,6 +173,28 @@ PointDerivative<N> differentiate(const LawParameters<N>& law, const PointContact
   return r;
 }
 
+/// Adds the derivative of a point's wrench.
+template <class N>
+void add_derivative(PairSums<N>& sums, const PointContact<N>& p, PointDerivative<N>& r) {
+  const N gate = select(p.d < N(0.0), N(1.0), N(0.0));
+  r.f_u = gate * r.f_u;
+  r.f_rho = gate * r.f_rho;
+  r.f_theta = gate * r.f_theta;
+  // By ε = (θ; ρ): ρ₂ = ρ - [x₂]θ. By δW = (δω; δv): δu = -(δv - [x₂]δω).
+  const Mat3<N> f_eps_a = r.f_theta - times_skew(r.f_rho, p.x2);
+  const Mat3<N> f_w_a = times_skew(r.f_u, p.x2);
+  const Mat3<N> x_eps_a = r.x_theta - times_skew(r.x_rho, p.x2);
+  sums.k[1][0] += f_eps_a;
+  sums.k[1][1] += r.f_rho;
+  // δ(x₂ × f) = x₂ × δf - f × δx₂.
+  sums.k[0][0] += cross_columns(p.x2, f_eps_a) - cross_columns(p.force, x_eps_a);
+  sums.k[0][1] += cross_columns(p.x2, r.f_rho) - cross_columns(p.force, r.x_rho);
+  sums.d[1][0] += f_w_a;
+  sums.d[1][1] = sums.d[1][1] - r.f_u;
+  sums.d[0][0] += cross_columns(p.x2, f_w_a);
+  sums.d[0][1] = sums.d[0][1] - cross_columns(p.x2, r.f_u);
+}
+
 /// Adds one point. Points that do not touch (d ≥ 0) add exact zeros.
 template <bool Derivatives, class Shape, class N>
 void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& law,
@@ -168,32 +207,16 @@ void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& l
   sums.wrench.l += p.force;
   if constexpr (Derivatives) {
     PointDerivative<N> r = differentiate<Shape>(law, p, omega);
-    const N gate = select(touching, N(1.0), N(0.0));
-    r.f_u = gate * r.f_u;
-    r.f_rho = gate * r.f_rho;
-    r.f_theta = gate * r.f_theta;
-    // By ε = (θ; ρ): ρ₂ = ρ - [x₂]θ. By δW = (δω; δv): δu = -(δv - [x₂]δω).
-    const Mat3<N> f_eps_a = r.f_theta - times_skew(r.f_rho, p.x2);
-    const Mat3<N> f_w_a = times_skew(r.f_u, p.x2);
-    const Mat3<N> x_eps_a = r.x_theta - times_skew(r.x_rho, p.x2);
-    sums.k[1][0] += f_eps_a;
-    sums.k[1][1] += r.f_rho;
-    // δ(x₂ × f) = x₂ × δf - f × δx₂.
-    sums.k[0][0] += cross_columns(p.x2, f_eps_a) - cross_columns(p.force, x_eps_a);
-    sums.k[0][1] += cross_columns(p.x2, r.f_rho) - cross_columns(p.force, r.x_rho);
-    sums.d[1][0] += f_w_a;
-    sums.d[1][1] = sums.d[1][1] - r.f_u;
-    sums.d[0][0] += cross_columns(p.x2, f_w_a);
-    sums.d[0][1] = sums.d[0][1] - cross_columns(p.x2, r.f_u);
+    add_derivative(sums, p, r);
   }
 }
 
-/// Computes a point or a sphere on the ground, with velocity and force at the body's own point
-/// p.x2 = ξ = ξ_c - r m (r = 0: a material point). m = Rᵀ n_ground, `height` = n·(p - ground point)
-/// and V = body twist, all in body axes. Returns false where no lane touches; then `p` holds d
-/// alone.
+/// Computes everything but friction and force of a point or a sphere on the ground, with velocity
+/// at the body's own point p.x2 = ξ = ξ_c - r m (r = 0: a material point). m = Rᵀ n_ground,
+/// `height` = n·(p - ground point) and V = body twist, all in body axes. Returns false where no
+/// lane touches; then `p` holds d alone.
 template <class N>
-bool ground_contact(const LawParameters<N>& law, const Vec3<N>& m, const N& height,
+bool meets_ground(const LawParameters<N>& law, const Vec3<N>& m, const N& height,
                     const Vec6<N>& V, const Vec3<N>& centre, const N& radius, PointContact<N>& p) {
   p.d = dot(m, centre) + height - radius;
   const auto touching = p.d < N(0.0);
@@ -204,43 +227,67 @@ bool ground_contact(const LawParameters<N>& law, const Vec3<N>& m, const N& heig
   p.rate = dot(m, p.u);
   p.vt = p.u - p.rate * m;
   p.normal = normal_force(law, p.d, p.rate);
+  return true;
+}
+
+/// The same with friction and force, which acts at ξ.
+template <class N>
+bool ground_contact(const LawParameters<N>& law, const Vec3<N>& m, const N& height,
+                    const Vec6<N>& V, const Vec3<N>& centre, const N& radius, PointContact<N>& p) {
+  if (!meets_ground(law, m, height, V, centre, radius, p)) return false;
   p.tangential = friction(law, p.normal, p.vt);
-  const N gate = select(touching, N(1.0), N(0.0));
+  const N gate = select(p.d < N(0.0), N(1.0), N(0.0));
   p.force = gate * (p.normal.force * m - p.tangential.scale * p.vt);
   return true;
 }
 
-/// Adds it to the sums. With θ and ρ of the body itself:
+/// Derivatives of a ground contact's force by the body's own displacement (θ; ρ) and velocity u.
 ///   δm = m × θ, δξ = -r m × θ, δd = m·(ρ + θ × ξ_c), u = v + ω × ξ, ḋ = m·u
-/// In the pair's convention body 2 is the ground: ε = -δ₁, δW = -δV₁. Hence the signs of k and d.
-/// Returns false where no lane touches.
+template <class N>
+struct GroundDerivative {
+  Mat3<N> f_u, f_rho, f_theta, xi_theta;
+};
+template <class N>
+GroundDerivative<N> differentiate_ground(const LawParameters<N>& law, const Vec6<N>& V,
+                                         const Vec3<N>& centre, const N& radius,
+                                         const PointContact<N>& p) {
+  const N gate = select(p.d < N(0.0), N(1.0), N(0.0));
+  const ForceDerivative<N> by = differentiate_force(law, p);
+  const Mat3<N> f_u = gate * by.by_u, f_m = gate * by.by_n;
+  const Mat3<N> f_d = gate * outer(by.by_d, p.n);  // by ρ; by θ: -f_d [ξ_c]
+  const Mat3<N> m_theta = skew(p.n);
+  const Mat3<N> xi_theta = (-radius) * m_theta;
+  const Mat3<N> u_theta = cross_columns(V.a, xi_theta);
+  return {f_u, f_d, f_u * u_theta + f_m * m_theta - times_skew(f_d, centre), xi_theta};
+}
+
+/// Adds it to the sums. In the pair's convention body 2 is the ground: ε = -δ₁, δW = -δV₁. Hence
+/// the signs of k and d.
+template <class N>
+void add_ground_derivative(PairSums<N>& sums, const PointContact<N>& p,
+                           const GroundDerivative<N>& r) {
+  const Vec3<N>&xi = p.x2, &f = p.force;
+  const Mat3<N> f_omega = times_skew(r.f_u, xi);  // f_u δω × ξ = -f_u [ξ] δω
+  sums.k[1][0] = sums.k[1][0] - r.f_theta;
+  sums.k[1][1] = sums.k[1][1] - r.f_rho;
+  sums.k[0][0] = sums.k[0][0] - (cross_columns(xi, r.f_theta) - cross_columns(f, r.xi_theta));
+  sums.k[0][1] = sums.k[0][1] - cross_columns(xi, r.f_rho);
+  sums.d[1][0] += f_omega;
+  sums.d[1][1] = sums.d[1][1] - r.f_u;
+  sums.d[0][0] += cross_columns(xi, f_omega);
+  sums.d[0][1] = sums.d[0][1] - cross_columns(xi, r.f_u);
+}
+
+/// Adds one point or sphere on the ground. Returns false where no lane touches.
 template <bool Derivatives, class N>
 bool accumulate_ground(PairSums<N>& sums, const LawParameters<N>& law, const Vec3<N>& m,
                        const N& height, const Vec6<N>& V, const Vec3<N>& centre, const N& radius) {
   PointContact<N> p;
   if (!ground_contact(law, m, height, V, centre, radius, p)) return false;
-  const Vec3<N>&xi = p.x2, &f = p.force;
-  sums.wrench.a += cross(xi, f);
-  sums.wrench.l += f;
-  if constexpr (Derivatives) {
-    const N gate = select(p.d < N(0.0), N(1.0), N(0.0));
-    const ForceDerivative<N> by = differentiate_force(law, p);
-    const Mat3<N> f_u = gate * by.by_u, f_m = gate * by.by_n;
-    const Mat3<N> f_d = gate * outer(by.by_d, m);  // by ρ; by θ: -f_d [ξ_c]
-    const Mat3<N> m_theta = skew(m);
-    const Mat3<N> xi_theta = (-radius) * m_theta;
-    const Mat3<N> u_theta = cross_columns(V.a, xi_theta);
-    const Mat3<N> f_theta = f_u * u_theta + f_m * m_theta - times_skew(f_d, centre);
-    const Mat3<N> f_omega = times_skew(f_u, xi);  // f_u δω × ξ = -f_u [ξ] δω
-    sums.k[1][0] = sums.k[1][0] - f_theta;
-    sums.k[1][1] = sums.k[1][1] - f_d;
-    sums.k[0][0] = sums.k[0][0] - (cross_columns(xi, f_theta) - cross_columns(f, xi_theta));
-    sums.k[0][1] = sums.k[0][1] - cross_columns(xi, f_d);
-    sums.d[1][0] += f_omega;
-    sums.d[1][1] = sums.d[1][1] - f_u;
-    sums.d[0][0] += cross_columns(xi, f_omega);
-    sums.d[0][1] = sums.d[0][1] - cross_columns(xi, f_u);
-  }
+  sums.wrench.a += cross(p.x2, p.force);
+  sums.wrench.l += p.force;
+  if constexpr (Derivatives)
+    add_ground_derivative(sums, p, differentiate_ground(law, V, centre, radius, p));
   return true;
 }
 

@@ -85,7 +85,8 @@ LawParameters<Lanes<A>> law_of_points(const PadTiles& pad, int tile, int k,
   const auto factor = [&](int i) {
     return load_lanes<A>(pad.factors + (4 * tile + i) * kTactileTile + k);
   };
-  for (int c = 0; c < kCoefficients; ++c) law[std::size_t(c)] = law[std::size_t(c)] * factor(c);
+  for (int c = 0; c < kPointCoefficients; ++c)
+    law[std::size_t(c)] = law[std::size_t(c)] * factor(c);
   return law;
 }
 
@@ -127,7 +128,7 @@ void pull_back_points(const PadTiles& pad, int tile, int k, const double* field,
     return pad.factors == nullptr ? N(1.0)
                                   : load_lanes<A>(pad.factors + (4 * tile + i) * kTactileTile + k);
   };
-  for (std::size_t c = 0; c < kCoefficients; ++c)
+  for (std::size_t c = 0; c < kPointCoefficients; ++c)
     sums.law[c] = mul_add(factor(static_cast<int>(c)), of_law[c], sums.law[c]);
 }
 

@@ -30,8 +30,13 @@ struct Stage {
     Row<L>* reference;  ///< (12) pose of link 2 in link 1 at which the list was made; pairs of the
                         ///< same links share it
     double margin;
+    // What friction remembers of the points; null in pairs without memory.
+    int* own_index;       ///< (L, stride) of each lane's points in PairContact::points
+    double* own_anchors;  ///< (L, kAnchorNumbers, stride)
+    Row<L>* anchors;      ///< (stride, kAnchorNumbers)
   };
   List* lists;         ///< (n_pairs)
+  Row<L>* ground_anchors;  ///< (points that remember, kAnchorNumbers)
   Row<L>* faces;       ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   std::byte* scratch;  ///< scratch_bytes(model)
   Row<L>*v, *g, *force_scale, *mass_diagonal, *A, *LU, *work, *excess;
@@ -108,6 +113,7 @@ struct CandidateSearch {
   double* points;      ///< (3, stride)
   int stride;
   Vec3<double> faces;  ///< of this lane (kernels/step/faces.hpp)
+  int* index;          ///< out: (stride) of the points in PairContact::points; or null
 };
 
 /// World pose and body twist of a link.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "kernels/contact/distance.hpp"
+#include "kernels/contact/elastic_contact.hpp"
 #include "kernels/numbers/one_lane.hpp"
 #include "kernels/step/arguments.hpp"
 #include "kernels/step/faces.hpp"
@@ -97,6 +98,11 @@ int search_shape(const CandidateSearch& s, Shape shape) {
         append(place.x, in, x + count);
         append(place.y, in, y + count);
         append(place.z, in, z + count);
+        if (s.index != nullptr) {
+          int* to = s.index + count;
+          for (unsigned left = in; left != 0; left &= left - 1)
+            *to++ = tile * kContactTile + k + __builtin_ctz(left);
+        }
         count += __builtin_popcount(in);
       }
     }
@@ -124,6 +130,15 @@ void transpose_rows(GroupStage::List& list) {
       const double* from = list.own + (l * 3 + c) * list.stride;
       for (int k = 0; k < list.own_count[l]; ++k) list.points[3 * k + c][l] = from[k];
       for (int k = list.own_count[l]; k < list.count; ++k) list.points[3 * k + c][l] = kFarAway;
+    }
+  if (list.anchors == nullptr) return;
+  for (int l = 0; l < kGroup; ++l)
+    for (int c = 0; c < kAnchorNumbers; ++c) {
+      const double* from = list.own_anchors + (l * kAnchorNumbers + c) * list.stride;
+      for (int k = 0; k < list.own_count[l]; ++k)
+        list.anchors[kAnchorNumbers * k + c][l] = from[k];
+      for (int k = list.own_count[l]; k < list.count; ++k)
+        list.anchors[kAnchorNumbers * k + c][l] = 0;
     }
 }
 

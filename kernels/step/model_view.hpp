@@ -105,6 +105,7 @@ struct PairContact {
   bool faced = false;   ///< a convex body on a cuboid: its faces are chosen per solve (faces.hpp)
   Hull hull{};          ///< body 1, if faced
   double overhang = 0;  ///< how far beyond a chosen face's edges a point still touches it [m]
+  int memory = -1;      ///< ≥ 0: index of what its friction remembers (ModelView::memories)
 };
 inline constexpr int kContactTile = 32;
 inline constexpr double kFarAway =
@@ -137,6 +138,23 @@ struct GroundContact {
   int body = -1;        ///< index into ModelView::solids
   /// (n_points, 3) tangents of `points`, used by dual numbers alone; nullptr: points stay fixed.
   const double* point_tangents = nullptr;
+  int memory = -1;        ///< as in PairContact
+  int first_anchor = -1;  ///< of its points among Stage::ground_anchors
+};
+
+/// Points whose friction remembers (kernels/contact/elastic_contact.hpp), against one shape: those
+/// of a pair of bodies, of a body on the ground, or of a tactile sensor.
+struct RememberingContact {
+  PairContact contact;  ///< the ground is a plane that is fixed in the world
+  bool ground = false;
+  double radius = 0;  ///< as in GroundContact
+  int radius_row = -1;
+  int first = 0;    ///< of its points among all that remember
+  int pair = -1;    ///< index into ModelView::pairs, or -1
+  int sensor = -1;  ///< index of the sensor, or -1
+  /// (3, stride) all points, padded with far points to whole vectors; of the ground and of sensors.
+  const double* places = nullptr;
+  int stride = 0;
 };
 
 /// A body of the scene, for derivatives by its size. Its own contact points keep their place on its
@@ -198,6 +216,9 @@ struct ModelView {
   const int *pair_order, *ground_order;  ///< (n_pairs), (n_grounds): members side by side
   int n_solids;
   const Solid* solids;  ///< (n_solids) all bodies of the scene
+  int n_memories;
+  const RememberingContact* memories;
+  Frame<double> ground;  ///< frame of the ground in the world; its third axis is the normal
   Pattern pattern;
 };
 

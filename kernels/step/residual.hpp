@@ -7,6 +7,7 @@
 // The base accelerates at -gravity, so gravity needs no term of its own.
 #pragma once
 
+#include "kernels/contact/elastic_contact.hpp"
 #include "kernels/step/faces.hpp"
 #include "kernels/step/joint_effects.hpp"
 #include "kernels/step/point_sums.hpp"
@@ -186,6 +187,27 @@ void add_candidates(const Shape& shape, const LawParameters<N>& law, const Candi
   }
 }
 
+/// Adds points whose friction remembers.
+template <bool Derivatives, class Shape, class N>
+[[gnu::noinline]] void add_elastic(const Shape& shape, const LawParameters<N>& law,
+                                   const CandidateList<N>& list, int lone, const Frame<N>& frame,
+                                   const Vec6<N>& W, PairSums<N>& sums) {
+  const auto add = [&](const Vec3<N>& xi, const Anchor<N>& anchor) {
+    accumulate_elastic<Derivatives>(sums, shape, law, frame.R, frame.p, W.a, W.l, xi, anchor);
+  };
+  if (lone < 0) {
+    for (int k = 0; k < list.count; ++k)
+      add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]},
+          load_anchor<N>([&](int number) { return list.anchors[kAnchorNumbers * k + number]; }));
+  } else {
+    const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
+    for (int k = 0; k < list.own_count; ++k)
+      add({N(x[k]), N(y[k]), N(z[k])},
+          load_anchor<N>(
+              [&](int number) { return N(list.own_anchors[number * list.stride + k]); }));
+  }
+}
+
 template <class N>
 bool has_candidates(const CandidateList<N>& list, int lone) {
   return (lone < 0 ? list.count : list.own_count) > 0;
@@ -231,6 +253,10 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
     const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
     const Vec3<N> side = faces_of(a, pair, k);
     with_touched<N>(pair, size, side, [&]<template <class> class Shape>(const Shape<N>& shape) {
+      if (pair.memory >= 0) {
+        add_elastic<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
+        return;
+      }
       if constexpr (Shape<N>::kSums == PointSumForm::about_centre) {
         const Vec3<N> centre = o.link2_in_1.R * broadcast<N>(pair.frame2.p) + o.link2_in_1.p;
         add_sphere<Derivatives>(sphere_motion(centre, o.W, shape.radius), law, list, a.lone, o.W,
@@ -266,6 +292,15 @@ bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const St
     LawParameters<N> law =
         load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
     law.friction_tangent = a.friction_tangent;
+    if (ground.memory >= 0) {
+      const Frame<N> in_body = ground_in_body(broadcast<N>(model.ground), link.world);
+      const N* anchors = a.ground_anchors + kAnchorNumbers * ground.first_anchor;
+      for (int k = 0; k < ground.n_points; ++k)
+        near |= accumulate_elastic_ground<Derivatives>(
+            sums, law, m, height, link.V, ground_point<N>(ground, k), radius, in_body,
+            load_anchor<N>([&](int number) { return anchors[kAnchorNumbers * k + number]; }));
+      continue;
+    }
     for (int k = 0; k < ground.n_points; ++k)
       near |= accumulate_ground<Derivatives>(sums, law, m, height, link.V,
                                              ground_point<N>(ground, k), radius);

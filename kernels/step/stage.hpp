@@ -54,6 +54,8 @@ struct CandidateList {
   const double* own;   ///< (3, stride) candidates of the lane that is evaluated alone, padded to
                        ///< multiples of eight with far points
   int own_count, stride;
+  const N* anchors;          ///< (count, kAnchorNumbers) of the points, or null without memory
+  const double* own_anchors;  ///< (kAnchorNumbers, stride) of `own`
 };
 
 /// The dofs of a joint that moves a body of a pair: S and Ψ̇ of each, in body 1's axes.
@@ -78,6 +80,7 @@ struct StageArgs {
   const double* block;                 ///< of the batch, for parameters that vary
   int group;                           ///< 0 or 1: which half of the block
   const CandidateList<N>* candidates;  ///< (n_pairs)
+  const N* ground_anchors;             ///< (points that remember, kAnchorNumbers)
   const N* faces;  ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
   int lone;  ///< the only lane whose result matters; its contacts are summed across points. -1: all
              ///< lanes matter

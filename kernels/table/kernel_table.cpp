@@ -24,6 +24,7 @@ constexpr StageKernels<L> stage_kernels() {
           Step::kinematics,
           Step::choose_faces,
           Step::choose_faces_at,
+          Step::poses_at,
           Step::near_pairs,
           Step::residual,
           Step::evaluate,
@@ -47,6 +48,7 @@ constexpr KernelTable table_of(const char* name) {
   using Group = GroupPart<Arch>;
   using Tactile = TactilePart<Arch>;
   using Pullback = ReadingPullbackPart<Arch>;
+  using Memory = MemoryPart<Arch>;
   return {name,
           stage_kernels<Lanes<Arch>, kGroup>(),
           stage_kernels<OneLane<Arch>, 1>(),
@@ -61,7 +63,10 @@ constexpr KernelTable table_of(const char* name) {
           Pullback::pull_back_links,
           Pullback::pullback_bytes,
           Pullback::pull_back_field,
-          Pullback::field_tangent};
+          Pullback::field_tangent,
+          Memory::recall,
+          Memory::advance,
+          Memory::pull_back_memory};
 }
 
 /// The tables that were built, and whether this machine runs them. Best first.

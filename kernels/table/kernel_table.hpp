@@ -5,6 +5,7 @@
 
 #include <span>
 
+#include "kernels/memory/memory_types.hpp"
 #include "kernels/step/arguments.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 
@@ -21,6 +22,10 @@ struct StageKernels {
   /// The same at q. `zero`: (nv) zeros. Overwrites v and what kinematics() left.
   void (*choose_faces_at)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* zero,
                           Row<L>* out);
+  /// Computes poses and twists of all links at (q, v). `zero`: (nv) zeros. Overwrites the stage's
+  /// `work`.
+  void (*poses_at)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* v,
+                   const Row<L>* zero, LinkPose<Row<L>>* out);
   /// Tests the bounds of pairs against shapes at the poses of kinematics().
   void (*near_pairs)(const ModelView&, const Stage<L>&, NearPairs<L>& out);
   /// Computes g, v and force_scale at the x of kinematics(). `lone`: the only lane whose result
@@ -88,6 +93,13 @@ struct KernelTable {
   void (*pull_back_field)(const TactilePullback&);
   /// Computes how a field changes with motion.
   void (*field_tangent)(const TactileTangent&);
+  /// Turns what friction remembers, in rows 3 to 5 of the anchors, into anchors.
+  void (*recall)(const RememberingTouch&, const RememberingPoints&);
+  /// Computes what is remembered at the end of a step, (4, stride): s in body 1's axes, then 1 at
+  /// points that touch, else 0; and the forces there, (3, stride), or null.
+  void (*advance)(const RememberingTouch& end, const RememberingPoints&, double* s, double* force);
+  /// Reverses both.
+  void (*pull_back_memory)(const MemoryPullback&);
 
   template <int L>
   [[nodiscard]] const StageKernels<L>& stage() const {

@@ -4,6 +4,7 @@
 // set, or ScalarArch.
 #pragma once
 
+#include "kernels/memory/memory_types.hpp"
 #include "kernels/step/arguments.hpp"
 #include "kernels/tactile/tactile_types.hpp"
 
@@ -16,6 +17,8 @@ struct StepPart {
   static void choose_faces(const ModelView&, const Stage<L>&, Row<L>* out);
   static void choose_faces_at(const ModelView&, const Stage<L>&, const Row<L>* q,
                               const Row<L>* zero, Row<L>* out);
+  static void poses_at(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* v,
+                       const Row<L>* zero, LinkPose<Row<L>>* out);
   static void near_pairs(const ModelView&, const Stage<L>&, NearPairs<L>& out);
   static void residual(const ModelView&, const Stage<L>&, int lone);
   static void evaluate(const ModelView&, const Stage<L>&, int lone);
@@ -60,6 +63,15 @@ struct TactilePart {
   static int tactile_mixed(const TactileArgs<float>&);
   static void tactile_block(const TactileBlockArgs<double>&);
   static void tactile_block_mixed(const TactileBlockArgs<float>&);
+};
+
+/// What friction remembers.
+template <class Arch>
+struct MemoryPart {
+  static void recall(const RememberingTouch&, const RememberingPoints&);
+  static void advance(const RememberingTouch& end, const RememberingPoints&, double* s,
+                      double* force);
+  static void pull_back_memory(const MemoryPullback&);
 };
 
 /// Readings in reverse, and their change along a change of motion.

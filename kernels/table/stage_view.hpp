@@ -2,6 +2,7 @@
 // Views the engine's rows of doubles as a kernel's numbers.
 #pragma once
 
+#include "kernels/contact/elastic_contact.hpp"
 #include "kernels/step/arguments.hpp"
 #include "kernels/step/stage.hpp"
 
@@ -44,9 +45,12 @@ struct StageView {
       const int lane = lone < 0 ? 0 : lone;
       lists[k] = {
           view(l.points),    l.count, view(l.reference), l.margin, l.own + 3 * l.stride * lane,
-          l.own_count[lane], l.stride};
+          l.own_count[lane], l.stride,
+          view(l.anchors),
+          l.own_anchors == nullptr ? nullptr : l.own_anchors + kAnchorNumbers * l.stride * lane};
     }
     a.candidates = lists;
+    a.ground_anchors = view(s.ground_anchors);
     a.faces = view(s.faces);
     a.lone = lone;
     a.centre = view(s.centre);

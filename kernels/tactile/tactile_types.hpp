@@ -100,7 +100,7 @@ struct TouchCotangent {
 };
 
 /// Numbers of a tactile point that have a derivative: its place x y z, then its own coefficients.
-inline constexpr int kPointNumbers = 3 + kCoefficients;
+inline constexpr int kPointNumbers = 3 + kPointCoefficients;
 
 /// One environment's field in reverse: turns cotangents of its touched tiles into those of every
 /// shape's motion.

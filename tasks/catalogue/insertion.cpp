@@ -47,7 +47,8 @@ Scene with_skin(Scene scene) {
   for (const char* pad : {"left_pad", "right_pad"}) {
     for (const NumberField field : {NumberField::kn, NumberField::kt, NumberField::mu})
       vary({NumberOwner::contact, field, pad, 0, "box"});
-    for (int k = 0; k < kCoefficients; ++k) vary({NumberOwner::tactile, coefficient_field(k), pad});
+    for (int k = 0; k < kPointCoefficients; ++k)
+      vary({NumberOwner::tactile, coefficient_field(k), pad});
   }
   return scene;
 }

@@ -273,7 +273,7 @@ class LossChecker : public GradientChecker {
   void points() {
     std::vector<double> coefficients;  // of this environment
     for (std::size_t s = 0; s < model_.sensors().size(); ++s)
-      for (std::size_t k = 0; k < kCoefficients; ++k)
+      for (std::size_t k = 0; k < kPointCoefficients; ++k)
         coefficients.push_back(sensor_coefficients(s_.start, 0, static_cast<int>(s))[k]);
     const std::vector<PointChange> changes = point_changes(model_, coefficients, s_.options.seed);
     const std::span<const double> all =

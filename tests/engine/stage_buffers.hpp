@@ -32,7 +32,8 @@ class StageBuffers {
       for (int k = 0; k < 3 * p.n_points; ++k) points_.back().push_back(N(p.points[k]));
       references_.emplace_back(12, N(0.0));
       lists_.push_back(
-          {points_.back().data(), p.n_points, references_.back().data(), 1e9, nullptr, 0, 0});
+          {points_.back().data(), p.n_points, references_.back().data(), 1e9, nullptr, 0, 0, nullptr,
+           nullptr});
     }
   }
 

@@ -160,7 +160,7 @@ struct PointForce {
   Vec3<double> x{}, x2{}, force{};  // world
 };
 PointForce point_force(const Pushing& at, const Vec3<double>& xi, bool switched, bool wrench_norm) {
-  const kernels::LawParameters<double> law = {100, 8, 1, 10, ContactLaw::paper, 0};
+  const kernels::LawParameters<double> law = {{100, 8, 1, 10}, ContactLaw::paper, 0};
   PointForce p;
   p.x = at.pad.R * xi + at.pad.p;
   double curvature = 0;

@@ -134,7 +134,7 @@ TEST_F(Reference, ItsStatesSolveOurResidual) {
     const Vec3<double> omega = turned * Vec3<double>{next_v[6], next_v[7], next_v[8]};
     const Vec3<double> relative = Vec3<double>{next_v[3], next_v[4], next_v[5]} -
                                   Vec3<double>{next_v[0], next_v[1], next_v[2]};
-    const kernels::LawParameters<double> law = {5, 1, 1, 1, ContactLaw::paper, 0};
+    const kernels::LawParameters<double> law = {{5, 1, 1, 1}, ContactLaw::paper, 0};
     std::vector<double> theirs = b.g;
     for (int k = 0; k < pair.n_points; ++k) {
       const Vec3<double> xi = {pair.points[3 * k], pair.points[3 * k + 1], pair.points[3 * k + 2]};

@@ -109,8 +109,8 @@ PairSums<N> sums(const State& s, const Case& test, const Vec6<double>& epsilon,
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) Q.m[i][j] = lift<N>(s.Q.m[i][j], turn.m[i][j]);
   const Vec3<N> c = lift<N>(s.c, epsilon.l + cross(epsilon.a, s.c));
-  const LawParameters<N> law = {N(s.law.kn),      N(s.law.kt), N(s.law.mu),
-                                N(s.law.damping), s.law.law,   s.law.ramp};
+  const LawParameters<N> law = {
+      {N(s.law.kn), N(s.law.kt), N(s.law.mu), N(s.law.damping)}, s.law.law, s.law.ramp};
   const Vec3<N> xi = lift<N>(s.xi, {0, 0, 0});
   const Vec3<N> omega = lift<N>(s.omega, rate.a), v = lift<N>(s.v, rate.l);
   constexpr bool kDerivatives = std::is_same_v<N, double>;
@@ -204,7 +204,7 @@ INSTANTIATE_TEST_SUITE_P(LawsAndShapes, PairDerivative,
 
 TEST(ContactLaw, ValuesAreTheFormulas) {
   const auto force = [](ContactLaw law, double ramp, double d, double rate, double damping) {
-    return normal_force(LawParameters<double>{100, 1, 0.5, damping, law, ramp}, d, rate).force;
+    return normal_force(LawParameters<double>{{100, 1, 0.5, damping}, law, ramp}, d, rate).force;
   };
   EXPECT_DOUBLE_EQ(force(ContactLaw::clamped, 0, -1e-3, -0.1, 50), (-100 + 50 * -0.1) * -1e-3);
   EXPECT_EQ(force(ContactLaw::clamped, 0, -1e-3, 3, 50), 0);                // would pull
@@ -228,12 +228,13 @@ TEST(ContactLaw, CotangentsOfThePublishedGroundLawAreItsDerivatives) {
     const double kn = random.uniform(10, 1e3), c = random.uniform(0, 2),
                  d = -random.uniform(0, 1e-3), rate = random.uniform(-1, 1),
                  of_force = random.uniform(-1, 1), of_bound = random.uniform(-1, 1);
-    const LawParameters<double> law = {kn, 1, 0.5, c, ContactLaw::linear, 0};
+    const LawParameters<double> law = {{kn, 1, 0.5, c}, ContactLaw::linear, 0};
     const NormalForce<double> at = normal_force(law, d, rate);
     Coefficients<double> out{};
     pull_back_normal_force(law, d, rate, at, of_force, of_bound, out);
     const auto derivative = [&](double by_kn, double by_c, double by_d, double by_rate) {
-      const LawParameters<D> along = {D(kn, by_kn), D(1.0), D(0.5), D(c, by_c), law.law, law.ramp};
+      const LawParameters<D> along = {
+          {D(kn, by_kn), D(1.0), D(0.5), D(c, by_c)}, law.law, law.ramp};
       const NormalForce<D> n = normal_force(along, D(d, by_d), D(rate, by_rate));
       return std::pair{n.force.epsilon, n.bound.epsilon};
     };
@@ -256,9 +257,10 @@ TEST(ContactLaw, CotangentsOfThePublishedGroundLawAreItsDerivatives) {
 TEST(ContactLaw, FrictionNeverExceedsItsBoundAndNeverDividesByZero) {
   Random random(23);
   for (int k = 0; k < 2000; ++k) {
-    const LawParameters<double> law = {random.uniform(1, 1e6), random.uniform(0, 1e3),
-                                       random.uniform(0, 3),   0,
-                                       ContactLaw::clamped,    0};
+    const LawParameters<double> law = {
+        {random.uniform(1, 1e6), random.uniform(0, 1e3), random.uniform(0, 3), 0},
+        ContactLaw::clamped,
+        0};
     const NormalForce<double> normal = normal_force(law, -random.uniform(0, 1e-2), 0.0);
     for (double speed : {0.0, 1e-300, 1e-30, 1e-3, 10.0}) {
       const Vec3<double> vt = speed * random.direction();
@@ -277,9 +279,10 @@ TEST(ContactLaw, FrictionBySecantHasTheSameForceAndAConstantScale) {
   Random random(29);
   int slips = 0;
   for (int k = 0; k < 200; ++k) {
-    LawParameters<double> law = {random.uniform(100, 1e4), random.uniform(1, 100),
-                                 random.uniform(0.1, 2),   10,
-                                 ContactLaw::clamped,      0};
+    LawParameters<double> law = {
+        {random.uniform(100, 1e4), random.uniform(1, 100), random.uniform(0.1, 2), 10},
+        ContactLaw::clamped,
+        0};
     const Vec3<double> omega = random.vector(1), v = random.vector(1), xi = {0, 0, 0};
     const auto sums = [&](double tangent) {
       law.friction_tangent = tangent;
@@ -310,7 +313,7 @@ TEST(ContactLaw, FrictionBySecantHasTheSameForceAndAConstantScale) {
 }
 
 TEST(ContactLaw, NoContactIsExactlyZero) {
-  const LawParameters<double> law = {10, 1, 1, 1, ContactLaw::clamped, 0};
+  const LawParameters<double> law = {{10, 1, 1, 1}, ContactLaw::clamped, 0};
   PairSums<double> s = PairSums<double>::zero();
   accumulate<true>(s, SphereDistance<double>{0.02}, law, diagonal(1.0), Vec3<double>{0, 0, 0.03},
                    Vec3<double>{1, 2, 3}, Vec3<double>{1, 1, 1}, Vec3<double>{0, 0, 0});
@@ -341,7 +344,7 @@ TEST(GroundContact, DerivativesMatchDualNumbersForPointsAndSpheres) {
           const N at = lift<N>(height, pose ? dot(normal, R * e.l) : 0);
           const Vec3<double> none = {0, 0, 0};
           const Vec6<N> Vn = {lift<N>(V.a, rate ? w.a : none), lift<N>(V.l, rate ? w.l : none)};
-          const LawParameters<N> law = {N(200.0), N(2.0), N(0.8), N(0.3), which, 1e-5};
+          const LawParameters<N> law = {{N(200.0), N(2.0), N(0.8), N(0.3)}, which, 1e-5};
           PairSums<N> s = PairSums<N>::zero();
           accumulate_ground<std::is_same_v<N, double>>(s, law, m, at, Vn, lift<N>(centre, none),
                                                        N(radius));

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// The memory of friction in the lanes of a workspace: anchors when a solve begins and lists are
+// made, the memory after it when it has found its root.
+#pragma once
+
+#include "engine/step/workspace.hpp"
+
+namespace tangere {
+
+/// Prepares a solve that begins at q0 with w.memory.now: poses there, and anchors on the ground.
+template <int L>
+void begin_memory(const CompiledModel& model, const kernels::KernelTable& table,
+                  BasicWorkspace<L>& w);
+
+/// Computes the anchors of the points that lane `lane` has listed for pair k.
+template <int L>
+void recall_list(const CompiledModel& model, const kernels::KernelTable& table,
+                 BasicWorkspace<L>& w, int k, int lane);
+
+/// Sets w.memory.after of `lanes` from the solve's result in q1, v1.
+template <int L>
+void advance_memory(const CompiledModel& model, const kernels::KernelTable& table,
+                    BasicWorkspace<L>& w, LaneBits lanes);
+
+}  // namespace tangere

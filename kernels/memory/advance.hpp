@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// The memory after an accepted step, s' = λ s at the points that touch, and the forces there.
+#pragma once
+
+#include "kernels/memory/recall.hpp"
+
+namespace tangere::kernels {
+
+/// The law of eight points with factors of their own.
+template <class A>
+LawParameters<Lanes<A>> law_at(const LoadedTouch<Lanes<A>>& t, const RememberingPoints& points,
+                               int k) {
+  LawParameters<Lanes<A>> law = t.law;
+  if (points.factors == nullptr) return law;
+  const auto factor = [&](int i) {
+    return load_lanes<A>(points.factors + i * points.stride + k);
+  };
+  for (int i = 0; i < kPointCoefficients; ++i)
+    law[std::size_t(i)] = law[std::size_t(i)] * factor(i);
+  law.ks = law.ks * factor(1);
+  return law;
+}
+
+template <class Shape, class N>
+ElasticPoint<N> meet_elastic(const Shape& shape, const LoadedTouch<N>& t,
+                             const LawParameters<N>& law, const Vec3<N>& xi,
+                             const Anchor<N>& anchor) {
+  ElasticPoint<N> p;
+  static_cast<PointContact<N>&>(p) = meet(shape, t, law, xi);
+  add_spring(law, t.Q, t.c, anchor, p);
+  return p;
+}
+
+/// Computes s' and the forces at the end of a step. `s`: (4, stride) out: s' in body 1's axes, then
+/// 1 at points that touch, else 0. `force`: (3, stride) out, on body 1, its axes; or null.
+template <class A>
+void advance(const RememberingTouch& end, const RememberingPoints& points, double* s,
+             double* force) {
+  using N = Lanes<A>;
+  const LoadedTouch<N> t = loaded<N>(end);
+  with_shape<N>(end, [&](const auto& shape) {
+    const int stride = points.stride;
+    for (int k = 0; k < points.count; k += kGroup) {
+      const ElasticPoint<N> p =
+          meet_elastic(shape, t, law_at<A>(t, points, k), load3<A>(points.places, stride, k),
+                       load_anchors<A>(points, k));
+      const N touches = select(p.d < N(0.0), N(1.0), N(0.0));
+      store3((touches * p.hold) * p.s, s, stride, k);
+      store_lanes(touches, s + 3 * stride + k);
+      if (force != nullptr) store3(p.force, force, stride, k);
+    }
+  });
+}
+
+}  // namespace tangere::kernels

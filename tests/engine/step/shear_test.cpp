@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tests friction that remembers against closed forms: what is held stands still, what slips does so
+// by Coulomb's law, a mass is dragged as a spring and a slider would, and energy does not grow.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "kernels/table/kernel_table.hpp"
+#include "tests/engine/runs.hpp"
+#include "tests/engine/scenes.hpp"
+#include "tests/sanitized.hpp"
+
+namespace tangere {
+namespace {
+
+using testing::link;
+
+constexpr double kGravity = 9.8;
+
+struct Held {
+  Model model;
+  Batch batch;
+  Stepper stepper;
+
+  Held(const Scene& scene, Integrator scheme, double h, double tolerance = 1e-12)
+      : model(scene),
+        batch(model, 1),
+        stepper(model, testing::options(scheme, h, tolerance)) {}
+  void go(double time) {
+    const int steps = int(std::lround(time / stepper.timestep()));
+    const std::vector<double> u(std::size_t(model.nu()));
+    for (int t = 0; t < steps && !failed(batch.status(0)); ++t) stepper.step(batch, u);
+    EXPECT_FALSE(failed(batch.status(0))) << to_string(batch.status(0));
+  }
+  [[nodiscard]] double q(int i) const { return testing::q_of(batch)[std::size_t(i)]; }
+  [[nodiscard]] double v(int i) const { return testing::v_of(batch)[std::size_t(i)]; }
+};
+
+/// A box of 0.2 kg on the ground, or on a plate, under gravity that is tilted by `angle` [deg].
+Scene slope(double angle, bool on_plate, double ks, double kt = 2) {
+  Scene s;
+  s.name = "slope";
+  const double a = angle * M_PI / 180;
+  s.gravity = {kGravity * std::sin(a), 0, -kGravity * std::cos(a)};
+  const Shape box = CuboidShape{{0.1, 0.1, 0.02}, {2, 2, 2}};
+  const ContactCoefficients c = {2000, kt, 0.5, 2e4, ks};
+  if (on_plate) {
+    s.links = {link("plate", JointType::fixed, {0, 0, -0.01},
+                    CuboidShape{{1000, 1, 0.02}, {2, 2, 2}}, 1000),
+               link("box", JointType::free, {0, 0, 0.01}, box, 1000)};
+    s.pair_contacts.push_back({"box", "plate", c, ContactLaw::clamped, 1e-5, {}});
+  } else {
+    s.ground = GroundDescription{};
+    s.links = {link("box", JointType::free, {0, 0, 0.01}, box, 1000)};
+    s.ground_contacts.push_back({"box", {2000, kt, 0.5, 20, ks}, ContactLaw::linear, 1e-5, {}});
+  }
+  return s;
+}
+
+using Where = std::tuple<Integrator, bool>;
+class Slope : public ::testing::TestWithParam<Where> {};
+
+TEST_P(Slope, BelowTheAngleOfFrictionABoxStandsStill) {
+  const auto [scheme, on_plate] = GetParam();
+  Held run(slope(20, on_plate, 500), scheme, 5e-3);
+  run.go(1);
+  const double x = run.q(0), z = run.q(2);
+  run.go(kSanitized ? 0.5 : 9);
+  EXPECT_NEAR(run.q(0), x, 1e-9);
+  EXPECT_NEAR(run.q(2), z, 1e-9);
+  double held = 0;  // by the springs alone
+  for (const ShearEntry& e : run.batch.memory(0)) held -= 500 * e.s[0];
+  EXPECT_NEAR(held, -0.2 * kGravity * std::sin(20 * M_PI / 180), 1e-6);
+}
+
+TEST_P(Slope, WithoutTheSpringItCreeps) {
+  const auto [scheme, on_plate] = GetParam();
+  Held run(slope(20, on_plate, 0), scheme, 5e-3);
+  run.go(1);
+  const double x = run.q(0);
+  run.go(1);
+  EXPECT_NEAR(run.q(0) - x, 0.2 * kGravity * std::sin(20 * M_PI / 180) / (4 * 2), 5e-3);
+}
+
+TEST_P(Slope, BeyondItTheBoxSlidesByCoulombsLaw) {
+  const auto [scheme, on_plate] = GetParam();
+  Held run(slope(35, on_plate, 500), scheme, 5e-3);
+  run.go(0.5);
+  const double v = run.v(0);
+  run.go(0.5);
+  const double a = 35 * M_PI / 180;
+  EXPECT_NEAR((run.v(0) - v) / 0.5, kGravity * (std::sin(a) - 0.5 * std::cos(a)), 1e-5);
+}
+
+INSTANTIATE_TEST_SUITE_P(Schemes, Slope,
+                         ::testing::Combine(::testing::Values(Integrator::bdf1, Integrator::bdf2,
+                                                              Integrator::sdirk2),
+                                            ::testing::Bool()));
+
+/// A mass on a belt that runs at 0.02 m/s, held by a spring of 40 N/m (docs/shear.md).
+Scene dragged() {
+  Scene s;
+  s.name = "dragged";
+  s.gravity = {0, 0, -kGravity};
+  LinkDescription belt = link("belt", JointType::prismatic, {0, 0, -0.01},
+                              CuboidShape{{10, 0.2, 0.02}, {2, 2, 2}}, 1e8);  // nothing slows it
+  belt.joint.axis0 = {1, 0, 0};
+  LinkDescription mass = link("mass", JointType::translational, {0, 0, 0.01},
+                              CuboidShape{{0.1, 0.05, 0.02}, {2, 2, 2}}, 1000);  // 0.1 kg
+  mass.joint.stiffness = 40;
+  s.links = {belt, mass};
+  s.pair_contacts.push_back({"mass", "belt", {2000, 0, 0.5, 100, 125}, ContactLaw::clamped, 1e-5, {}});
+  s.initial.push_back({"belt_joint", {0}, {0.02}, {}});
+  return s;
+}
+
+double dragged_error(double h) {
+  Scene s = dragged();
+  // The mass begins at the depth at which it rests, and its springs hold x alone.
+  s.initial.push_back({"mass_joint", {0, 0, -0.1 * kGravity / (4 * 2000 + 40)}, {}, {}});
+  Held run(s, Integrator::bdf2, h);
+  constexpr double m = 0.1, K = 40, ks = 500, V = 0.02, t = 0.4;
+  run.go(t);
+  const double omega = std::sqrt((K + ks) / m);
+  return std::abs(run.q(1) - ks * V / (K + ks) * (t - std::sin(omega * t) / omega));
+}
+
+TEST(Shear, AMassIsDraggedAsByASpring) {
+  // Second order: a quarter of the error at half the step.
+  const double coarse = dragged_error(2e-3), fine = dragged_error(1e-3);
+  EXPECT_LT(fine, 2e-5);
+  EXPECT_NEAR(coarse / fine, 4, 0.8);
+}
+
+TEST(Shear, WithoutStiffnessTheBitsAreThoseOfTheDamper) {
+  Scene plain = slope(20, true, 0), varied = slope(20, true, 0);
+  Distribution zero;
+  zero.kind = Distribution::Kind::list;
+  zero.values = {0};
+  varied.randomizations.push_back(
+      {{NumberOwner::contact, NumberField::ks, "box", 0, "plate"}, zero, {}});
+  Held a(plain, Integrator::bdf2, 5e-3, 1e-9), b(varied, Integrator::bdf2, 5e-3, 1e-9);
+  a.go(0.5), b.go(0.5);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(a.q(i), b.q(i), 1e-9);
+}
+
+TEST(Shear, AnEnvironmentHasTheSameBitsInEveryLane) {
+  const Model model(slope(20, true, 500));
+  Stepper stepper(model);
+  Batch one(model, 1), many(model, 21);
+  for (int t = 0; t < 60; ++t) {
+    if (t == 20)
+      for (int e = 0; e < 21; ++e)
+        if (e % 3 == 1) many.reset(e, e);
+    stepper.step(one, {});
+    stepper.step(many, {});
+  }
+  for (const int e : {0, 8, 15, 20}) {
+    EXPECT_EQ(testing::q_of(one), testing::q_of(many, e)) << e;
+    ASSERT_EQ(one.memory(0).size(), many.memory(e).size());
+    for (std::size_t k = 0; k < one.memory(0).size(); ++k)
+      for (int c = 0; c < 3; ++c) EXPECT_EQ(one.memory(0)[k].s[c], many.memory(e)[k].s[c]);
+  }
+}
+
+}  // namespace
+}  // namespace tangere
