@@ -104,6 +104,11 @@ struct Adjoint::Impl {
     gather(w.q1, g.tape.state(g.step + 1), m.nq, g.first);
     gather(w.x_inner, g.tape.inner(g.step), settings.integrator.scheme().inner_stages() * m.nv,
            g.first);
+    for (int l = 0; l < L && !m.memories.empty(); ++l) {
+      set_memory(x, l, g.tape.memory(g.step, g.first + l), g.tape.memory(g.step + 1, g.first + l));
+      for (std::size_t k = 0; k < losses.size(); ++k)
+        x.adjoint.losses[k].memory[std::size_t(l)] = losses[k].memory[std::size_t(g.first + l)];
+    }
     w.stage.block = rows.data() + g.first;
     w.stage.group = 0;
     for (std::size_t k = 0; k < losses.size(); ++k) {
@@ -115,6 +120,16 @@ struct Adjoint::Impl {
       if (o.parameters != nullptr)
         std::fill(o.parameters, o.parameters + kernels::parameter_numbers(m.view), Row<L>{});
     }
+  }
+
+  /// Sets what a lane remembers where a solve begins and at its end.
+  template <int L>
+  static void set_memory(Lanes<L>& x, int lane, std::span<const ShearEntry> now,
+                         std::span<const ShearEntry> after) {
+    x.work.remembered.now[std::size_t(lane)].assign(now.begin(), now.end());
+    x.work.remembered.after[std::size_t(lane)].assign(after.begin(), after.end());
+    for (LossRows<L>& o : x.adjoint.losses)
+      o.memory_before[std::size_t(lane)].assign(3 * now.size(), 0.0);
   }
 
   /// Reverses the solves of one lane's special step, last first. Cotangents of its inner states
@@ -129,6 +144,11 @@ struct Adjoint::Impl {
       const TapedSolve& solve = special.solves[k];
       set(w.q1, solve.q);
       set(w.x_inner, solve.inner);
+      if (!compiled(model).memories.empty())
+        set_memory(x, lane,
+                   k > 0 ? std::span<const ShearEntry>(special.solves[k - 1].memory)
+                         : g.tape.memory(g.step, g.first + lane),
+                   solve.memory);
       if (k > 0) {
         set(w.q0, special.solves[k - 1].q);
         set(w.v0, special.solves[k - 1].v);
@@ -141,11 +161,13 @@ struct Adjoint::Impl {
       group.reverse(solve.integrator.scheme(), solve.h, kernels::active_kernels(), w, x.adjoint,
                     1U << lane);
       if (k == 0) return;
-      for (LossRows<L>& o : x.adjoint.losses)
+      for (LossRows<L>& o : x.adjoint.losses) {
+        o.memory[std::size_t(lane)] = o.memory_before[std::size_t(lane)];
         for (int i = 0; i < model.nv(); ++i) {
           o.q[i][lane] = std::exchange(o.q_centre[i][lane], 0.0);
           o.v[i][lane] = std::exchange(o.v_centre[i][lane], 0.0);
         }
+      }
     }
   }
 
@@ -189,6 +211,8 @@ struct Adjoint::Impl {
       c.previous_q[at] = o.q_before[i][lane];
       c.previous_v[at] = o.v_before[i][lane];
     }
+    if (!m.memories.empty())
+      c.memory[std::size_t(column)] = o.memory_before[std::size_t(lane)];
     if (o.parameters == nullptr) return;
     for (int i = 0; i < kernels::parameter_numbers(m.view); ++i)
       c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];
@@ -231,6 +255,8 @@ void Adjoint::clear() {
   for (BlockCotangent& c : impl_->losses)
     for (auto* x : {&c.q, &c.v, &c.previous_q, &c.previous_v, &c.u, &c.parameters, &c.points})
       std::fill(x->begin(), x->end(), 0.0);
+  for (BlockCotangent& c : impl_->losses)
+    for (std::vector<double>& lane : c.memory) lane.clear();
 }
 
 void Adjoint::reverse_step(const Batch& batch, int block, const BlockTape& tape, std::int64_t step,

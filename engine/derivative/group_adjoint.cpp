@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "engine/step/detection.hpp"
+#include "engine/step/remember.hpp"
 #include "engine/step/scheme_stage.hpp"
 
 namespace tangere {
@@ -15,7 +16,9 @@ using kernels::Row;
 template <int L>
 AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count, bool parameters,
                                       int inner_stages)
-    : losses(std::size_t(loss_count)) {
+    : losses(std::size_t(loss_count)),
+      memory_adjoint(model, loss_count),
+      q_stage(std::size_t(model.nq)) {
   const std::size_t nv = std::size_t(model.nv), inner = std::size_t(inner_stages),
                     per_loss = 8 + 2 * inner, shared = 8 + 2 * (1 + inner);
   const std::size_t count = parameters ? std::size_t(kernels::parameter_numbers(model.view)) : 0;
@@ -164,6 +167,25 @@ void GroupAdjoint::find_inner_velocities(const StageInHand<L>& s, const Scheme& 
   }
 }
 
+/// Computes the coordinates of the stage in hand.
+template <int L>
+void GroupAdjoint::find_stage(const StageInHand<L>& s) const {
+  const kernels::Stage<L>& stage = s.w.stage;
+  for (const kernels::Link& link : model_.links) {
+    const Row<L>*centre = stage.centre + link.q, *x = stage.x + link.v;
+    Row<L>* q = s.a.q_stage.data() + link.q;
+    for (int l = 0; l < L; ++l) {
+      if (link.kind != kernels::JointKind::spherical) {
+        for (int k = 0; k < kernels::dofs(link.kind); ++k) q[k][l] = centre[k][l] + x[k][l];
+        continue;
+      }
+      const kernels::Quat<double> turned = rotate_by(
+          quat_at(centre, l), kernels::Vec3<double>{x[0][l], x[1][l], x[2][l]});
+      q[0][l] = turned.w, q[1][l] = turned.x, q[2][l] = turned.y, q[3][l] = turned.z;
+    }
+  }
+}
+
 template <int L>
 void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme, double h) const {
   BasicWorkspace<L>& w = s.w;
@@ -171,6 +193,8 @@ void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme,
   for (const LossRows<L>& o : s.a.losses)
     for (Row<L>* rows : {o.q_inner, o.v_inner}) clear(rows, last * model_.nv);
   choose_faces(model_, s.table, w);
+  begin_memory(model_, s.table, w);
+  s.a.memory_adjoint.begin(model_);
   find_inner_velocities(s, scheme, h);
   for (int k = last; k >= 0; --k) {
     set_stage(model_, scheme, k, Row<L>::all(h), w);
@@ -181,8 +205,18 @@ void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme,
       std::copy_n(w.x_inner + k * model_.nv, model_.nv, w.stage.x);
     }
     assemble(s);
-    for (const LossRows<L>& o : s.a.losses) hand_on(s, scheme, k, o);
+    if (!model_.memories.empty()) find_stage(s);
+    for (std::size_t n = 0; n < s.a.losses.size(); ++n) {
+      LossRows<L>& o = s.a.losses[n];
+      if (k == last)
+        s.a.memory_adjoint.reverse_end(model_, s.table, w, s.lanes, o, static_cast<int>(n));
+      hand_on(s, scheme, k, o);
+      s.a.memory_adjoint.reverse_forces(model_, s.table, w, s.lanes, s.a.q_stage.data(),
+                                        s.a.lambda, o, static_cast<int>(n));
+    }
   }
+  for (std::size_t n = 0; n < s.a.losses.size(); ++n)
+    s.a.memory_adjoint.finish(model_, s.table, w, s.lanes, s.a.losses[n], static_cast<int>(n));
 }
 
 template <int L>

@@ -6,21 +6,10 @@
 
 #include <memory>
 
+#include "engine/derivative/memory_adjoint.hpp"
 #include "engine/step/group_step.hpp"
 
 namespace tangere {
-
-/// Cotangents of one loss in a group, rows (nv). Positions are by their right tangent.
-template <int L>
-struct LossRows {
-  using Rows = kernels::Row<L>*;
-  Rows q, v;                ///< in: of the state after the step
-  Rows q_centre, v_centre;  ///< out: of the state before it
-  Rows q_before, v_before;  ///< out: of the one before that
-  Rows q_inner, v_inner;    ///< of inner stages, (nv) each, one after another
-  Rows tau, target;         ///< out: of forces known when the step begins, and of motors' targets
-  Rows parameters;          ///< out: (parameter_numbers), or null
-};
 
 /// Scratch of one thread, besides a workspace.
 template <int L>
@@ -35,10 +24,13 @@ struct AdjointWorkspace {
   Row *q_older, *v_older;  ///< (nv) for each state that a stage may depend on, one after another
   Row* numbers;            ///< (parameter_numbers), or null
   Row sound;
+  MemoryAdjoint<L> memory_adjoint;
+  AlignedVector<Row> q_stage;  ///< (nq) coordinates of the stage in hand
 };
 
 /// Reverses solves whose states are in the workspace: q0, v0 where the solve began, q_before,
-/// v_before one step earlier, q1 its result, x_inner its inner stages. tau, target and the block of
+/// v_before one step earlier, q1 its result, x_inner its inner stages; what friction remembers in
+/// remembered.now and after. tau, target and the block of
 /// parameters are as in the step.
 class GroupAdjoint {
  public:
@@ -72,6 +64,8 @@ class GroupAdjoint {
                const LossRows<L>& loss) const;
   template <int L>
   void find_inner_velocities(const StageInHand<L>& s, const Scheme& scheme, double h) const;
+  template <int L>
+  void find_stage(const StageInHand<L>& s) const;
   template <int L>
   void reverse_stages(const StageInHand<L>& s, const Scheme& scheme, double h) const;
 

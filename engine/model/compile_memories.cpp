@@ -35,9 +35,12 @@ int add(CompiledModel& m, kernels::RememberingContact of) {
 }
 
 void add_grounds(CompiledModel& m) {
+  int number = kCoefficients * (static_cast<int>(m.pairs.size()) - 1);
   for (kernels::GroundContact& g : m.grounds) {
+    number += kCoefficients;
     if (!remembers(g.parameters)) continue;
     kernels::RememberingContact of;
+    of.number = number;
     of.ground = true;
     of.radius = g.radius;
     of.radius_row = g.radius_row;
@@ -52,6 +55,7 @@ void add_grounds(CompiledModel& m) {
     of.contact.points = g.points;
     of.contact.n_points = g.n_points;
     of.contact.body1 = g.body;
+    of.contact.body2 = -1;
     keep_places(m, of);
     g.memory = add(m, of);
     g.first_anchor = m.ground_anchors;
@@ -77,6 +81,7 @@ void compile_memories(CompiledModel& m) {
     kernels::RememberingContact of;
     of.contact = pair;
     of.pair = static_cast<int>(k);
+    of.number = kCoefficients * of.pair;
     pair.memory = add(m, of);
   }
   add_grounds(m);

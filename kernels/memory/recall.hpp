@@ -49,7 +49,8 @@ PointContact<N> meet(const Shape& shape, const LoadedTouch<N>& t, const LawParam
   PointContact<N> p;
   p.n = {t.Q.m[0][2], t.Q.m[1][2], t.Q.m[2][2]};
   const N height = dot(p.n, xi - t.c);
-  p.d = select(height < N(kPlaneReach), height - t.radius, N(kPlaneReach));
+  const N reach(kPlaneReach);  // padding lies beyond it
+  p.d = select(dot(xi, xi) < reach * reach, height - t.radius, reach);
   p.x2 = xi - t.radius * p.n;
   p.u = -(t.v + cross(t.omega, p.x2));
   p.rate = dot(p.n, p.u);

@@ -101,6 +101,7 @@ void link_pair_parameters(const ModelView& model, const StageArgs<N>& a, const L
   for (int m = links.first; m < links.first + links.count; ++m) {
     const int k = model.pair_order[m];
     const PairContact& pair = model.pairs[k];
+    if (pair.memory >= 0) continue;  // kernels/memory/memory_pullback.hpp
     const LawParameters<N> law =
         load_law<N>(pair.parameters, pair.law, pair.ramp, a.block, a.group);
     const Frame<N> at = compose(o.link2_in_1, broadcast<N>(pair.frame2));
@@ -160,6 +161,7 @@ void contact_parameters(const ModelView& model, const StageArgs<N>& a, const Lin
     if (!a.contacts[model.n_link_pairs + k].near) continue;
     for (int m = grounded.first; m < grounded.first + grounded.count; ++m) {
       const int g = model.ground_order[m];
+      if (model.grounds[g].memory >= 0) continue;
       const ContactCotangent<N> sum =
           ground_adjoint(model, a, model.grounds[g], links[grounded.link].twist);
       subtract_law(sum.law, out.law + kCoefficients * (model.n_pairs + g));

@@ -152,6 +152,7 @@ struct RememberingContact {
   int first = 0;    ///< of its points among all that remember
   int pair = -1;    ///< index into ModelView::pairs, or -1
   int sensor = -1;  ///< index of the sensor, or -1
+  int number = 0;   ///< first of its coefficients among parameter_numbers()
   /// (3, stride) all points, padded with far points to whole vectors; of the ground and of sensors.
   const double* places = nullptr;
   int stride = 0;

@@ -38,7 +38,8 @@ constexpr StageKernels<L> stage_kernels() {
           Step::solve_transposed,
           Adjoint::adjoint_rhs,
           Adjoint::adjoint_products,
-          Adjoint::parameter_products};
+          Adjoint::parameter_products,
+          Adjoint::pull_back_poses};
 }
 
 /// The functions of this table are compiled elsewhere, with the flags of Arch

@@ -62,6 +62,11 @@ struct StageKernels {
   /// evaluate().
   void (*parameter_products)(const ModelView&, const Stage<L>&, const StageAdjoint<L>&, int lone,
                              Row<L>* out);
+  /// Adds cotangents of the links' poses and twists at (q, v) to those of q and v, (nv). Overwrites
+  /// those of links, (n_links), and the stage's `work`. `scratch`: pullback_bytes(model).
+  void (*pull_back_poses)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* v,
+                          const Row<L>* zero, std::byte* scratch, MotionCotangent<Row<L>>* links,
+                          Row<L>* q_bar, Row<L>* v_bar);
 };
 
 struct KernelTable {

@@ -43,6 +43,9 @@ struct AdjointPart {
   static void adjoint_products(const ModelView&, const Stage<L>&, const StageAdjoint<L>&);
   static void parameter_products(const ModelView&, const Stage<L>&, const StageAdjoint<L>&,
                                  int lone, Row<L>* out);
+  static void pull_back_poses(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* v,
+                              const Row<L>* zero, std::byte* scratch,
+                              MotionCotangent<Row<L>>* links, Row<L>* q_bar, Row<L>* v_bar);
 };
 
 /// What a group needs besides its stages. KernelTable documents these functions and those below.

@@ -67,6 +67,18 @@ void AdjointPart<N, L>::parameter_products(const ModelView& m, const Stage<L>& s
       View::view(out));
 }
 
+template <class N, int L>
+void AdjointPart<N, L>::pull_back_poses(const ModelView& m, const Stage<L>& s, const Row<L>* q,
+                                        const Row<L>* v, const Row<L>* zero, std::byte* scratch,
+                                        MotionCotangent<Row<L>>* links, Row<L>* q_bar,
+                                        Row<L>* v_bar) {
+  using View = StageView<N, L>;
+  kernels::pull_back_links(m, View::state_of(s, q, v, zero),
+                           reinterpret_cast<LinkMotion<N>*>(scratch),
+                           reinterpret_cast<MotionCotangent<N>*>(links), View::view(q_bar),
+                           View::view(v_bar));
+}
+
 template <class Arch>
 void ReadingPullbackPart<Arch>::pull_back_links(const ModelView& m, const GroupState& s,
                                                 std::byte* scratch, MotionCotangent<LaneRow>* links,

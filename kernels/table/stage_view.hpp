@@ -29,6 +29,21 @@ struct StageView {
       return p;
     }
   };
+  /// Presents (q, v) as a stage at x = 0 whose rates are v. Rates go to `work`.
+  static StageArgs<N> state_of(const StageOf& s, const RowOf* q, const RowOf* v,
+                               const RowOf* zero) {
+    StageArgs<N> a{};
+    a.centre = view(q);
+    a.x = a.s = view(zero);
+    a.r = view(v);
+    a.c0_over_h = N(0.0);
+    a.inverse_h = N(1.0);
+    a.v = view(s.work);
+    a.block = s.block;
+    a.group = s.group;
+    return a;
+  }
+
   static StageArgs<N> arguments(const ModelView& m, const StageOf& s, int lone) {
     Scratch scratch{s.scratch};
     return arguments(m, s, lone, scratch);

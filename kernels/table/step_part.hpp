@@ -41,16 +41,7 @@ template <class N, int L>
 void StepPart<N, L>::poses_at(const ModelView& m, const Stage<L>& s, const Row<L>* q,
                               const Row<L>* v, const Row<L>* zero, LinkPose<Row<L>>* out) {
   using View = StageView<N, L>;
-  StageArgs<N> a{};
-  a.centre = View::view(q);
-  a.x = a.s = View::view(zero);
-  a.r = View::view(v);
-  a.c0_over_h = N(0.0);
-  a.inverse_h = N(1.0);
-  a.v = View::view(s.work);
-  a.block = s.block;
-  a.group = s.group;
-  kernels::link_poses(m, a, reinterpret_cast<LinkPose<N>*>(out));
+  kernels::link_poses(m, View::state_of(s, q, v, zero), reinterpret_cast<LinkPose<N>*>(out));
 }
 
 template <class N, int L>

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+// Hands one lane after another to the kernels, and their sums on to the links.
+#include "engine/derivative/memory_adjoint.hpp"
+
+#include "engine/step/remembering_lane.hpp"
+
+namespace tangere {
+
+using kernels::Frame;
+using kernels::kGroup;
+using kernels::LinkPose;
+using kernels::MotionCotangent;
+using kernels::RememberingContact;
+using kernels::RememberingPoints;
+using kernels::RememberingTouch;
+using kernels::Row;
+using kernels::Vec6;
+
+namespace {
+
+template <int L>
+void add_lane(Vec6<Row<L>>& to, const Vec6<double>& x, int lane, double sign) {
+  auto* const rows = reinterpret_cast<Row<L>*>(&to);
+  const auto* const numbers = reinterpret_cast<const double*>(&x);
+  for (int i = 0; i < 6; ++i) rows[i][lane] += sign * numbers[i];
+}
+
+/// Hands cotangents of the motion of body 2 relative to body 1 on to the two links.
+template <int L>
+void hand_on(const RememberingContact& of, const AlignedVector<LinkPose<Row<L>>>& poses,
+             const Vec6<double>& displacement, const Vec6<double>& twist, int lane,
+             AlignedVector<MotionCotangent<Row<L>>>& links) {
+  const int first = of.contact.link1, second = of.contact.link2;
+  const LinkPose<double> one = pose_of<L>(poses, first, lane), two = pose_of<L>(poses, second, lane);
+  const Frame<double> second_in_first = relative(one.world, two.world);
+  const Vec6<double> Z = motion_to_parent(second_in_first, two.V);
+  const Vec6<double> pose = displacement + cross_wrench(Z, twist);
+  if (first >= 0) {
+    add_lane<L>(links[std::size_t(first)].pose, pose, lane, -1);
+    add_lane<L>(links[std::size_t(first)].twist, twist, lane, -1);
+  }
+  if (second >= 0) {
+    add_lane<L>(links[std::size_t(second)].pose, wrench_to_child(second_in_first, pose), lane, 1);
+    add_lane<L>(links[std::size_t(second)].twist, wrench_to_child(second_in_first, twist), lane, 1);
+  }
+}
+
+/// Adds numbers of points, (3, stride), to those of their entries, three each.
+void add_entries(const ShearMemory& memory, const RememberingContact& of, const int* index,
+                 const RememberingPoints& points, const double* numbers, std::vector<double>& to) {
+  std::size_t at = 0;
+  for (int k = 0; k < points.count; ++k) {
+    const int point = of.first + (index == nullptr ? k : index[k]);
+    while (at < memory.size() && memory[at].point < point) ++at;
+    if (at == memory.size()) return;
+    if (memory[at].point != point) continue;
+    for (std::size_t c = 0; c < 3; ++c)
+      to[3 * at + c] += numbers[c * std::size_t(points.stride) + std::size_t(k)];
+  }
+}
+
+}  // namespace
+
+template <int L>
+MemoryAdjoint<L>::MemoryAdjoint(const CompiledModel& m, int losses) {
+  if (m.memories.empty()) return;
+  start_.resize(std::size_t(losses));
+  for (Cotangents& of : start_) of.resize(m.links.size());
+  end_.resize(m.links.size());
+  at_.resize(m.links.size());
+  slip_.resize(m.links.size());
+  rows_.resize(2 * std::size_t(m.nv));
+  std::size_t bytes = 0, stride = 0;
+  for (const kernels::KernelTable* table : kernels::available_kernels())
+    bytes = std::max(bytes, table->pullback_bytes(m.view));
+  scratch_.resize(bytes);
+  for (const RememberingContact& of : m.memories)
+    stride = std::max(stride, std::size_t(of.contact.n_points + 2 * kGroup));
+  numbers_.resize(9 * stride);
+}
+
+template <int L>
+void MemoryAdjoint<L>::begin(const CompiledModel& m) {
+  if (m.memories.empty()) return;
+  for (Cotangents& of : start_) std::fill(of.begin(), of.end(), MotionCotangent<Row<L>>{});
+}
+
+template <int L>
+void MemoryAdjoint<L>::add_to_state(const CompiledModel& m, const kernels::KernelTable& table,
+                                    BasicWorkspace<L>& w, LaneBits lanes, const Row<L>* q,
+                                    const Row<L>* v, Cotangents& links, Row<L>* q_bar,
+                                    Row<L>* v_bar) {
+  std::fill(rows_.begin(), rows_.end(), Row<L>{});
+  Row<L> *const by_q = rows_.data(), *const by_v = by_q + m.nv;
+  table.stage<L>().pull_back_poses(m.view, w.stage, q, v, w.zero, scratch_.data(), links.data(),
+                                   by_q, by_v);
+  for (int i = 0; i < m.nv; ++i)
+    for (int l = 0; l < L; ++l)
+      if (has(lanes, l)) q_bar[i][l] += by_q[i][l], v_bar[i][l] += by_v[i][l];
+}
+
+/// Pulls back through all contacts: what is remembered at the end, or the forces along a slip.
+template <int L>
+void MemoryAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTable& table,
+                                 BasicWorkspace<L>& w, LaneBits lanes, bool of_forces,
+                                 LossRows<L>& loss, int number) {
+  for (int l = 0; l < L; ++l) {
+    if (!has(lanes, l)) continue;
+    const std::size_t lane = std::size_t(l);
+    const ShearMemory &now = w.remembered.now[lane], &after = w.remembered.after[lane];
+    const std::vector<double>& bar = loss.memory[lane];
+    std::vector<double>& before = loss.memory_before[lane];
+    before.resize(3 * now.size());
+    if (!of_forces && bar.empty()) continue;
+    for_each_contact(m, w, l, [&](const RememberingContact& of, const int* index,
+                                  const RememberingPoints& points) {
+      const std::size_t rows = 3 * std::size_t(points.stride);
+      double *const remembered = numbers_.data(), *const s_bar = remembered + rows,
+                    *const s_out = s_bar + rows;
+      look_up(now, of, index, points.count, points.stride, remembered);
+      if (!of_forces)
+        look_up(
+            after, of, index, points.count, points.stride,
+            [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, s_bar);
+      std::fill(s_out, s_out + rows, 0.0);
+      const RememberingTouch start = touch_of(w, of, w.remembered.start, l),
+                             end = touch_of(w, of, at_, l);
+      Vec6<double> slip{};
+      if (of_forces) slip = touch_of(w, of, slip_, l).twist;
+      kernels::MemoryCotangent sums{};
+      table.pull_back_memory({&start, &end, points, remembered, of_forces ? nullptr : s_bar,
+                              nullptr, of_forces ? &slip : nullptr, s_out, &sums});
+      if (!of_forces) hand_on<L>(of, at_, sums.end.displacement, sums.end.twist, l, end_);
+      hand_on<L>(of, w.remembered.start, sums.start, Vec6<double>{}, l,
+                 start_[std::size_t(number)]);
+      if (loss.parameters != nullptr)
+        for (std::size_t k = 0; k < kCoefficients; ++k)
+          loss.parameters[std::size_t(of.number) + k][l] += sums.end.law[k];
+      add_entries(now, of, index, points, s_out, before);
+    });
+  }
+}
+
+template <int L>
+void MemoryAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::KernelTable& table,
+                                   BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss,
+                                   int number) {
+  if (m.memories.empty()) return;
+  std::fill(end_.begin(), end_.end(), MotionCotangent<Row<L>>{});
+  table.stage<L>().poses_at(m.view, w.stage, w.q1, w.stage.v, w.zero, at_.data());
+  pull_back(m, table, w, lanes, false, loss, number);
+  add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v);
+}
+
+template <int L>
+void MemoryAdjoint<L>::reverse_forces(const CompiledModel& m, const kernels::KernelTable& table,
+                                      BasicWorkspace<L>& w, LaneBits lanes, const Row<L>* q,
+                                      const Row<L>* lambda, LossRows<L>& loss, int number) {
+  if (m.memories.empty()) return;
+  table.stage<L>().poses_at(m.view, w.stage, q, w.stage.v, w.zero, at_.data());
+  table.stage<L>().poses_at(m.view, w.stage, q, lambda, w.zero, slip_.data());
+  pull_back(m, table, w, lanes, true, loss, number);
+}
+
+template <int L>
+void MemoryAdjoint<L>::finish(const CompiledModel& m, const kernels::KernelTable& table,
+                              BasicWorkspace<L>& w, LaneBits lanes, LossRows<L>& loss, int number) {
+  if (m.memories.empty()) return;
+  add_to_state(m, table, w, lanes, w.q0, w.v0, start_[std::size_t(number)], loss.q_centre,
+               loss.v_centre);
+}
+
+template class MemoryAdjoint<kGroup>;
+template class MemoryAdjoint<1>;
+
+}  // namespace tangere

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+// One lane of a workspace as the kernels of memory take it: its contacts at a state, its points,
+// and what it remembers of them.
+#pragma once
+
+#include <algorithm>
+#include <span>
+
+#include "engine/step/workspace.hpp"
+#include "kernels/contact/elastic_contact.hpp"
+
+namespace tangere {
+
+/// Returns pose and twist of a link in one lane; link < 0: the world.
+template <int L>
+kernels::LinkPose<double> pose_of(const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int link, int lane) {
+  if (link < 0)
+    return {{kernels::diagonal(1.0), kernels::zero3<double>()}, kernels::zero6<double>()};
+  kernels::LinkPose<double> out;
+  static_assert(sizeof(kernels::LinkPose<kernels::Row<L>>) == L * sizeof(out));
+  const auto* const rows = reinterpret_cast<const kernels::Row<L>*>(&poses[std::size_t(link)]);
+  auto* const numbers = reinterpret_cast<double*>(&out);
+  for (std::size_t i = 0; i < sizeof(out) / sizeof(double); ++i) numbers[i] = rows[i][lane];
+  return out;
+}
+
+template <int L>
+double number_of(const kernels::Parameter& p, const kernels::Stage<L>& stage, int lane) {
+  return p.row < 0 ? p.value : kernels::row_of(stage.block, p.row, stage.group)[lane];
+}
+
+/// Returns a contact of one lane at the poses of one state.
+template <int L>
+kernels::RememberingTouch touch_of(const BasicWorkspace<L>& w, const kernels::RememberingContact& of,
+                          const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane) {
+  const kernels::PairContact& c = of.contact;
+  const kernels::LinkPose<double> one = pose_of<L>(poses, c.link1, lane), two = pose_of<L>(poses, c.link2, lane);
+  const kernels::Frame<double> second = relative(one.world, two.world);
+  kernels::RememberingTouch t{};
+  t.of = &of;
+  const auto size = [&](int i, double constant) {
+    return c.size_row < 0 ? constant : number_of<L>({0, c.size_row + i}, w.stage, lane);
+  };
+  t.size = {size(0, c.size.x), size(1, c.size.y), size(2, c.size.z)};
+  if (c.faced) {
+    const kernels::Row<L>* side = w.stage.faces + 3 * of.pair;
+    t.faces = {side[0][lane], side[1][lane], side[2][lane]};
+  }
+  t.radius = number_of<L>({of.radius, of.radius_row}, w.stage, lane);
+  t.shape = compose(second, c.frame2);
+  t.twist = motion_to_parent(second, two.V) - one.V;
+  t.law = transformed(c.parameters,
+                      [&](const kernels::Parameter& p) { return number_of<L>(p, w.stage, lane); });
+  return t;
+}
+
+/// Writes (3, stride) numbers of points: those of the entries that they have in a memory, else
+/// zeros. `index`: of each point in its contact, rising; null: all points in order. `number`(entry,
+/// c): component c of an entry.
+template <class Number>
+void look_up(std::span<const ShearEntry> memory, const kernels::RememberingContact& of,
+             const int* index, int count, int stride, const Number& number, double* out) {
+  std::size_t at = std::size_t(
+      std::lower_bound(memory.begin(), memory.end(), of.first,
+                       [](const ShearEntry& e, int point) { return e.point < point; }) -
+      memory.begin());
+  for (int k = 0; k < stride; ++k) {
+    const int point = of.first + (k >= count ? 0 : index == nullptr ? k : index[k]);
+    while (k < count && at < memory.size() && memory[at].point < point) ++at;
+    const bool found = k < count && at < memory.size() && memory[at].point == point;
+    for (int c = 0; c < 3; ++c) out[c * stride + k] = found ? number(at, c) : 0;
+  }
+}
+/// Writes what is remembered of points.
+inline void look_up(std::span<const ShearEntry> memory, const kernels::RememberingContact& of,
+                    const int* index, int count, int stride, double* out) {
+  look_up(
+      memory, of, index, count, stride,
+      [&](std::size_t entry, int c) { return memory[entry].s[c]; }, out);
+}
+
+/// Returns the listed points of one lane.
+template <int L>
+kernels::RememberingPoints listed(const typename kernels::Stage<L>::List& list, int lane) {
+  return {list.own + 3 * list.stride * lane, list.own_anchors + kernels::kAnchorNumbers * list.stride * lane,
+          nullptr, list.own_count[lane], list.stride};
+}
+
+/// Calls f(contact, its anchors of lane 0) for every contact with the ground that remembers.
+template <int L, class F>
+void for_each_ground(const CompiledModel& m, BasicWorkspace<L>& w, const F& f) {
+  double* at = w.remembered.ground_anchors.data();
+  for (const kernels::RememberingContact& of : m.memories) {
+    if (!of.ground) continue;
+    f(of, at);
+    at += L * kernels::kAnchorNumbers * of.stride;
+  }
+}
+
+/// Calls f(contact, numbers of its points or null, points) for every contact of one lane whose
+/// anchors are set: by recall_list() and begin_memory().
+template <int L, class F>
+void for_each_contact(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const F& f) {
+  for (const kernels::RememberingContact& of : m.memories) {
+    if (of.pair < 0) continue;
+    const auto& list = w.lists[std::size_t(of.pair)];
+    if (list.own_count[lane] > 0)
+      f(of, list.own_index + list.stride * lane, listed<L>(list, lane));
+  }
+  for_each_ground(m, w, [&](const kernels::RememberingContact& of, double* anchors) {
+    f(of, static_cast<const int*>(nullptr),
+      kernels::RememberingPoints{of.places, anchors + lane * kernels::kAnchorNumbers * of.stride,
+                                 nullptr, of.contact.n_points, of.stride});
+  });
+}
+
+}  // namespace tangere
