@@ -118,7 +118,7 @@ struct Adjoint::Impl {
       for (Row<L>* p : {o.q_centre, o.v_centre, o.q_before, o.v_before, o.tau, o.target})
         std::fill(p, p + m.nv, Row<L>{});
       if (o.parameters != nullptr)
-        std::fill(o.parameters, o.parameters + kernels::parameter_numbers(m.view), Row<L>{});
+        std::fill(o.parameters, o.parameters + parameter_rows(model), Row<L>{});
     }
   }
 
@@ -214,7 +214,7 @@ struct Adjoint::Impl {
     if (!m.memories.empty())
       c.memory[std::size_t(column)] = o.memory_before[std::size_t(lane)];
     if (o.parameters == nullptr) return;
-    for (int i = 0; i < kernels::parameter_numbers(m.view); ++i)
+    for (int i = 0; i < parameter_rows(model); ++i)
       c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];
   }
 

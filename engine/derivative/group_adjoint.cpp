@@ -21,8 +21,10 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
       q_stage(std::size_t(model.nq)) {
   const std::size_t nv = std::size_t(model.nv), inner = std::size_t(inner_stages),
                     per_loss = 8 + 2 * inner, shared = 8 + 2 * (1 + inner);
-  const std::size_t count = parameters ? std::size_t(kernels::parameter_numbers(model.view)) : 0;
-  memory.assign(nv * (per_loss * losses.size() + shared) + count * (losses.size() + 1), Row{});
+  const std::size_t count = parameters ? std::size_t(kernels::parameter_numbers(model.view)) : 0,
+                    more = parameters ? kCoefficients * model.sensors.size() : 0;
+  memory.assign(nv * (per_loss * losses.size() + shared) + (count + more) * losses.size() + count,
+                Row{});
   Row* at = memory.data();
   const auto take = [&](Row*& p, std::size_t rows) {
     p = at;
@@ -41,7 +43,7 @@ AdjointWorkspace<L>::AdjointWorkspace(const CompiledModel& model, int loss_count
   for (LossRows<L>& l : losses) l.parameters = nullptr;
   if (!parameters) return;
   take(numbers, count);
-  for (LossRows<L>& l : losses) take(l.parameters, count);
+  for (LossRows<L>& l : losses) take(l.parameters, count + more);
 }
 
 namespace {

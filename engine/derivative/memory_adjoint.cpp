@@ -45,20 +45,6 @@ void hand_on(const RememberingContact& of, const AlignedVector<LinkPose<Row<L>>>
   }
 }
 
-/// Adds numbers of points, (3, stride), to those of their entries, three each.
-void add_entries(const ShearMemory& memory, const RememberingContact& of, const int* index,
-                 const RememberingPoints& points, const double* numbers, std::vector<double>& to) {
-  std::size_t at = 0;
-  for (int k = 0; k < points.count; ++k) {
-    const int point = of.first + (index == nullptr ? k : index[k]);
-    while (at < memory.size() && memory[at].point < point) ++at;
-    if (at == memory.size()) return;
-    if (memory[at].point != point) continue;
-    for (std::size_t c = 0; c < 3; ++c)
-      to[3 * at + c] += numbers[c * std::size_t(points.stride) + std::size_t(k)];
-  }
-}
-
 }  // namespace
 
 template <int L>
@@ -112,8 +98,8 @@ void MemoryAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTa
     std::vector<double>& before = loss.memory_before[lane];
     before.resize(3 * now.size());
     if (!of_forces && bar.empty()) continue;
-    for_each_contact(m, w, l, [&](const RememberingContact& of, const int* index,
-                                  const RememberingPoints& points) {
+    const auto one = [&](const RememberingContact& of, const int* index,
+                         const RememberingPoints& points) {
       const std::size_t rows = 3 * std::size_t(points.stride);
       double *const remembered = numbers_.data(), *const s_bar = remembered + rows,
                     *const s_out = s_bar + rows;
@@ -136,8 +122,10 @@ void MemoryAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTa
       if (loss.parameters != nullptr)
         for (std::size_t k = 0; k < kCoefficients; ++k)
           loss.parameters[std::size_t(of.number) + k][l] += sums.end.law[k];
-      add_entries(now, of, index, points, s_out, before);
-    });
+      add_to_entries(now, of, index, points, s_out, before);
+    };
+    for_each_contact(m, w, l, one);
+    if (!of_forces) for_each_felt(m, table, w, at_, l, one);
   }
 }
 

@@ -23,7 +23,7 @@ struct LossRows {
   Rows q_before, v_before;  ///< out: of the one before that
   Rows q_inner, v_inner;    ///< of inner stages, (nv) each, one after another
   Rows tau, target;         ///< out: of forces known when the step begins, and of motors' targets
-  Rows parameters;          ///< out: (parameter_numbers), or null
+  Rows parameters;          ///< out: (parameter_rows), or null
   /// Of what friction remembers, three numbers for each entry: in, after the solve; out, before it.
   std::array<std::vector<double>, L> memory, memory_before;
 };

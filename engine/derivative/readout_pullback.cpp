@@ -11,6 +11,7 @@
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/sense/dense_tiles.hpp"
+#include "engine/sense/elastic_field.hpp"
 #include "engine/sense/imperfect_field.hpp"
 #include "engine/sense/pad_reader.hpp"
 
@@ -51,9 +52,11 @@ struct ReadoutPullback::Impl {
   std::vector<double> of_tiles;
   AlignedVector<double> own;  ///< (tiles, kPointNumbers, 64)
   ImperfectField imperfections;
+  ElasticField elastic;
+  std::array<std::vector<double>, kBlock> memory;  ///< cotangents of what friction remembers
   std::vector<double> whole, ideal;  ///< (points, 3) of an imperfect sensor
 
-  explicit Impl(const Model& m) : model(m), reader(m), met(kGroups, -1), imperfections(m) {
+  explicit Impl(const Model& m) : model(m), reader(m), met(kGroups, -1), imperfections(m), elastic(m) {
     const CompiledModel& c = compiled(m);
     for (auto& l : links) l.resize(c.links.size());
     rows.resize(std::size_t(c.nq + 5 * c.nv));
@@ -62,7 +65,7 @@ struct ReadoutPullback::Impl {
       bytes = std::max(bytes, t->pullback_bytes(c.view));
     for (const CompiledSensor& s : c.sensors) {
       targets = std::max(targets, s.targets.size());
-      if (s.imperfect) whole.resize(std::max(whole.size(), 3 * std::size_t(s.points())));
+      if (s.imperfect || s.elastic) whole.resize(std::max(whole.size(), 3 * std::size_t(s.points())));
     }
     ideal.resize(whole.size());
     scratch.resize(bytes);
@@ -114,7 +117,11 @@ struct ReadoutPullback::Impl {
     const std::span<double> field = std::span(ideal).first(cotangent.size());
     if (!(s.imperfections.saturation == NormalAndShear{})) {
       find_touches(lane / kGroup, s.number);
-      read_ideal(reader, s, lane / kGroup, lane % kGroup, field);
+      if (s.elastic) {
+        elastic.read(reader, *batch, kBlock * block + lane, s.number, field);
+      } else {
+        read_ideal(reader, s, lane / kGroup, lane % kGroup, field);
+      }
     }
     imperfections.pull_back(s, key_of(*batch, kBlock * block + lane), field, cotangent);
   }
@@ -123,22 +130,47 @@ struct ReadoutPullback::Impl {
                  std::span<const double> cotangents, std::span<double> parameters,
                  std::span<double> points);
 
-  /// Hands one shape's sums, in pad axes, on to its link and the sensor's.
-  void hand_on(const kernels::TouchCotangent<double>& c, const CompiledSensor& s,
-               const CompiledBody& body, int group, int lane) {
-    const LinkPose<double> one = reader.link(s.link, group, lane),
-                           two = reader.link(body.link, group, lane);
+  /// Pulls the cotangent in `whole` of an elastic sensor's field back.
+  void pull_back_elastic(int lane, const CompiledSensor& s, std::span<double> parameters,
+                         std::span<double> points) {
+    const CompiledModel& m = compiled(model);
+    if (!points.empty())
+      throw InputError("tactile sensor '" + m.scene.sensors[std::size_t(s.number)].name +
+                       "' has ks: derivatives by the numbers of single points are not known; "
+                       "expected none of them to be asked for");
+    const int environment = kBlock * block + lane, group = lane / kGroup;
+    std::vector<double>& remembered = memory[std::size_t(lane)];
+    remembered.resize(3 * batch->memory(environment).size());
+    used[std::size_t(group)] = true;
+    elastic.pull_back(
+        reader, *batch, environment, s.number,
+        std::span<const double>(whole).first(3 * std::size_t(s.points())), remembered,
+        [&](const ElasticField::Share& share) {
+          const CompiledBody& body = m.bodies[std::size_t(share.of->contact.body2)];
+          hand_on(share.motion, s.link, {kernels::diagonal(1.0), {0, 0, 0}}, body.link, group,
+                  lane % kGroup);
+          for (std::size_t k = 0; k < kCoefficients && !parameters.empty(); ++k)
+            parameters[(std::size_t(share.of->number) + k) * kBlock + std::size_t(lane)] +=
+                share.motion.law[k];
+        });
+  }
+
+  /// Hands one shape's sums, in the axes of a pad, on to its link and the sensor's.
+  void hand_on(const kernels::TouchCotangent<double>& c, int sensor_link, const Frame<double>& pad,
+               int body_link, int group, int lane) {
+    const LinkPose<double> one = reader.link(sensor_link, group, lane),
+                           two = reader.link(body_link, group, lane);
     const Frame<double> second_in_first = relative(one.world, two.world);
-    const Vec6<double> Z = motion_to_child(s.pad, motion_to_parent(second_in_first, two.V));
-    const Vec6<double> pose = wrench_to_parent(s.pad, c.displacement + cross_wrench(Z, c.twist));
-    const Vec6<double> twist = wrench_to_parent(s.pad, c.twist);
-    if (s.link >= 0) {
-      add_lane(link(group, s.link).pose, pose, lane, -1);
-      add_lane(link(group, s.link).twist, twist, lane, -1);
+    const Vec6<double> Z = motion_to_child(pad, motion_to_parent(second_in_first, two.V));
+    const Vec6<double> pose = wrench_to_parent(pad, c.displacement + cross_wrench(Z, c.twist));
+    const Vec6<double> twist = wrench_to_parent(pad, c.twist);
+    if (sensor_link >= 0) {
+      add_lane(link(group, sensor_link).pose, pose, lane, -1);
+      add_lane(link(group, sensor_link).twist, twist, lane, -1);
     }
-    if (body.link >= 0) {
-      add_lane(link(group, body.link).pose, wrench_to_child(second_in_first, pose), lane, 1);
-      add_lane(link(group, body.link).twist, wrench_to_child(second_in_first, twist), lane, 1);
+    if (body_link >= 0) {
+      add_lane(link(group, body_link).pose, wrench_to_child(second_in_first, pose), lane, 1);
+      add_lane(link(group, body_link).twist, wrench_to_child(second_in_first, twist), lane, 1);
     }
   }
 };
@@ -164,6 +196,7 @@ void ReadoutPullback::clear() {
   for (auto& group : impl_->links)
     std::fill(group.begin(), group.end(), kernels::MotionCotangent<LaneRow>{});
   impl_->used.fill(false);
+  for (std::vector<double>& lane : impl_->memory) lane.clear();
 }
 
 void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int> touched,
@@ -185,7 +218,7 @@ void ReadoutPullback::Impl::pull_back(int lane, int sensor, std::span<const int>
   const int row = kernels::parameter_numbers(m.view) + kCoefficients * sensor;
   for (std::size_t k = 0; k < s.targets.size(); ++k) {
     const kernels::TouchCotangent<double>& c = touches[k];
-    hand_on(c, s, m.bodies[std::size_t(s.targets[k])], group, in_group);
+    hand_on(c, s.link, s.pad, m.bodies[std::size_t(s.targets[k])].link, group, in_group);
     if (parameters.empty()) continue;
     const auto add = [&](int at, double x) { parameters[std::size_t(at * kBlock + lane)] += x; };
     for (int n = 0; n < kCoefficients; ++n) add(row + n, c.law[std::size_t(n)]);
@@ -199,13 +232,15 @@ void ReadoutPullback::field(int lane, int sensor, std::span<const int> tiles,
                             std::span<double> points) {
   check_has_no_memory(impl_->model, sensor);
   const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
-  if (!s.imperfect) return impl_->pull_back(lane, sensor, tiles, cotangents, parameters, points);
+  if (!s.imperfect && !s.elastic)
+    return impl_->pull_back(lane, sensor, tiles, cotangents, parameters, points);
   const kernels::PadTiles pad = s.tiles();
   std::fill(impl_->whole.begin(), impl_->whole.end(), 0.0);
   for (std::size_t k = 0; k < tiles.size(); ++k)
     expand_tile<3>(pad, tiles[k], cotangents.data() + 3 * kernels::kTactileTile * k,
                    impl_->whole.data());
-  impl_->pull_back_imperfections(s, lane);
+  if (s.imperfect) impl_->pull_back_imperfections(s, lane);
+  if (s.elastic) return impl_->pull_back_elastic(lane, s, parameters, points);
   impl_->gather(s, impl_->whole);
   impl_->pull_back(lane, sensor, impl_->tiles, impl_->of_tiles, parameters, points);
 }
@@ -214,9 +249,10 @@ void ReadoutPullback::dense_field(int lane, int sensor, std::span<const double> 
                                   std::span<double> parameters, std::span<double> points) {
   check_has_no_memory(impl_->model, sensor);
   const CompiledSensor& s = compiled(impl_->model).sensors[std::size_t(sensor)];
-  if (s.imperfect) {
+  if (s.imperfect || s.elastic) {
     std::copy(cotangents.begin(), cotangents.end(), impl_->whole.begin());
-    impl_->pull_back_imperfections(s, lane);
+    if (s.imperfect) impl_->pull_back_imperfections(s, lane);
+    if (s.elastic) return impl_->pull_back_elastic(lane, s, parameters, points);
     cotangents = impl_->whole;
   }
   impl_->gather(s, cotangents);
@@ -238,6 +274,12 @@ void ReadoutPullback::end_effector(int lane, int end_effector, std::span<const d
 void ReadoutPullback::finish(BlockCotangent& out) {
   Impl& i = *impl_;
   const CompiledModel& m = compiled(i.model);
+  for (std::size_t l = 0; l < kBlock; ++l) {
+    if (i.memory[l].empty()) continue;
+    std::vector<double>& to = out.memory[l];
+    to.resize(i.memory[l].size());
+    for (std::size_t k = 0; k < to.size(); ++k) to[k] += i.memory[l][k];
+  }
   LaneRow *q = i.rows.data(), *v = q + m.nq, *zero = v + m.nv, *rates = zero + m.nv,
           *q_bar = rates + m.nv, *v_bar = q_bar + m.nv;
   for (int g = 0; g < kGroups; ++g) {

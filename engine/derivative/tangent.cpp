@@ -43,6 +43,13 @@ void put(Duals& to, int i, const Vec3<D>& x) {
   const auto k = std::size_t(i);
   to[k] = x.x, to[k + 1] = x.y, to[k + 2] = x.z;
 }
+/// The forward route does not carry what friction remembers.
+void check_remembers_nothing(const CompiledModel& m) {
+  if (!m.memories.empty())
+    throw InputError("a scene with ks has no tangents forward in time; expected ks=\"0\", or "
+                     "gradients in reverse");
+}
+
 D scaled(double a, const D& x) { return {a * x.value, a * x.epsilon}; }
 
 /// Returns q with its tangent along the dofs of v.
@@ -274,6 +281,7 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
                    std::span<const double> numbers_dot, StateTangent& state) {
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
+  check_remembers_nothing(m);
   const auto rows = [&](std::int64_t t) { return tape.state(t) + lane; };
   const auto dual = [&](std::int64_t t, const std::vector<double>& q,
                         const std::vector<double>& v) {
@@ -307,6 +315,7 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
   check_has_no_memory(i.model, sensor);
+  check_remembers_nothing(m);
   const double* row = tape.state(step) + lane;
   i.stage.centre = with_tangent(m, row, kBlock, state.q);
   const Duals v = with_tangent(row + m.nq * kBlock, kBlock, state.v);

@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "engine/model/compiled_model.hpp"
+#include "engine/model/group_contacts.hpp"
+#include "kernels/step/arguments.hpp"
 
 namespace tangere {
 
@@ -63,6 +65,93 @@ void add_grounds(CompiledModel& m) {
   }
 }
 
+/// Points of a sensor in field order, link axes (n, 3), with their axes (n, 9) and factors (n, 4).
+struct PadPoints {
+  std::vector<double> places, axes, factors;
+};
+
+PadPoints points_of(const TactileDescription& d, const kernels::Frame<double>& body) {
+  PadPoints out;
+  const auto add = [&](const Vector3& place, const Vector3& axis0, const Vector3& axis1,
+                       const Vec3<double>& normal, const std::array<double, 4>& factors) {
+    const auto put = [](std::vector<double>& to, const Vec3<double>& x) {
+      to.insert(to.end(), {x.x, x.y, x.z});
+    };
+    put(out.places, body.R * vec3_of(place) + body.p);
+    for (const Vec3<double>& row : {vec3_of(axis0), vec3_of(axis1), -normal})
+      put(out.axes, body.R * row);
+    out.factors.insert(out.factors.end(), factors.begin(), factors.end());
+  };
+  for (const TactilePoint& p : d.points) add(p.position, p.axis0, p.axis1, vec3_of(p.normal), p.factors);
+  if (!d.points.empty()) return out;
+  const RectArray& a = d.array;
+  const Vec3<double> axis0 = vec3_of(a.axis0), axis1 = vec3_of(a.axis1), first = vec3_of(a.corner0),
+                     way = vec3_of(a.corner1) - first;
+  const double step0 = a.rows > 1 ? dot(way, axis0) / (a.rows - 1) : 0,
+               step1 = a.cols > 1 ? dot(way, axis1) / (a.cols - 1) : 0;
+  for (int i = 0; i < a.rows; ++i)
+    for (int j = 0; j < a.cols; ++j) {
+      const Vec3<double> p = first + (i * step0) * axis0 + (j * step1) * axis1;
+      add({p.x, p.y, p.z}, a.axis0, a.axis1, cross(axis0, axis1), {1, 1, 1, 1});
+    }
+  return out;
+}
+
+/// Puts the points of an elastic sensor in the order of tiles. Returns the tiles' bounds.
+std::vector<double> order_points(CompiledSensor& s, PadPoints& points) {
+  std::vector<double> tiles = sort_into_tiles(points.places, kernels::kContactTile, &s.in_field);
+  bool own = false;
+  for (const int from : s.in_field) {
+    const auto copy = [from](const std::vector<double>& all, int width, std::vector<double>& to) {
+      to.insert(to.end(), all.begin() + width * from, all.begin() + width * (from + 1));
+    };
+    copy(points.axes, 9, s.point_axes);
+    copy(points.factors, 4, s.point_factors);
+  }
+  for (const double factor : s.point_factors) own = own || factor != 1;
+  if (!own) s.point_factors.clear();
+  return tiles;
+}
+
+void add_sensors(CompiledModel& m) {
+  for (CompiledSensor& s : m.sensors) {
+    const TactileDescription& d = m.scene.sensors[std::size_t(s.number)];
+    if (!remembers(s.parameters)) continue;
+    if (s.past_states() > 0)
+      throw InputError(d.source.prefix() + "tactile sensor '" + d.name +
+                       "' has ks and low_pass or delay; expected one of them: friction does not "
+                       "remember further back than the last state");
+    s.elastic = true;
+    PadPoints points = points_of(d, m.bodies[std::size_t(s.body)].frame);
+    const std::vector<double> tiles = order_points(s, points);
+    m.point_storage.push_back(std::move(points.places));
+    kernels::PairContact contact{};
+    contact.link1 = s.link;
+    contact.law = s.law;
+    contact.parameters = s.parameters;
+    contact.points = m.point_storage.back().data();
+    contact.n_points = s.points();
+    contact.n_tiles = static_cast<int>(tiles.size() / 4);
+    contact.body1 = s.body;
+    bound(contact.points, contact.n_points, contact.middle, contact.extent);
+    lay_out_tiles(m, contact, tiles);
+    for (const int target : s.targets) {
+      const CompiledBody& body = m.bodies[std::size_t(target)];
+      kernels::RememberingContact of;
+      of.contact = contact;
+      of.contact.link2 = body.link;
+      of.contact.frame2 = body.frame;
+      of.contact.shape = body.shape;
+      of.contact.size = body.size;
+      of.contact.size_row = body.size_row;
+      of.contact.body2 = target;
+      of.sensor = s.number;
+      of.number = kernels::parameter_numbers(m.view) + kCoefficients * s.number;
+      add(m, of);
+    }
+  }
+}
+
 }  // namespace
 
 kernels::Frame<double> ground_frame(const Vec3<double>& point, const Vec3<double>& normal) {
@@ -85,6 +174,7 @@ void compile_memories(CompiledModel& m) {
     pair.memory = add(m, of);
   }
   add_grounds(m);
+  add_sensors(m);
 }
 
 }  // namespace tangere

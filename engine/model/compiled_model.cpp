@@ -161,7 +161,7 @@ class Compiler {
       if (pair.shape == PrimitiveShape::cuboid && is_convex(general) && pair.n_points <= kCorners)
         meet_faces(pair, first);
       pair.points = keep(m_.point_storage, std::move(points));
-      lay_out_tiles(pair, tiles);
+      lay_out_tiles(m_, pair, tiles);
       contacts_.add("contact", d.general_body + " " + d.primitive_body,
                     static_cast<int>(m_.pairs.size()), d.source);
       m_.pairs.push_back(pair);
@@ -185,28 +185,6 @@ class Compiler {
     pair.hull = hull_of(body);
     const Vec3<double>&a = pair.size, &b = pair.hull.straight, &c = pair.hull.round;
     pair.overhang = kOverhang * std::min({a.x, a.y, a.z, b.x + c.x, b.y + c.y, b.z + c.z});
-  }
-
-  /// Stores points and bounds of the tiles in the order in which vectors read them, padded to whole
-  /// tiles and whole vectors.
-  void lay_out_tiles(kernels::PairContact& pair, const std::vector<double>& tiles) {
-    constexpr int kTile = kernels::kContactTile, kLanes = kernels::kGroup;
-    AlignedVector<double> points(std::size_t(pair.n_tiles) * 3 * kTile, kernels::kFarAway);
-    for (int k = 0; k < pair.n_points; ++k)
-      for (int c = 0; c < 3; ++c)
-        points[std::size_t((k / kTile * 3 + c) * kTile + k % kTile)] = pair.points[3 * k + c];
-    const int groups = (pair.n_tiles + kLanes - 1) / kLanes;
-    AlignedVector<double> bounds(std::size_t(groups) * 4 * kLanes, kernels::kFarAway);
-    for (int t = 0; t < groups * kLanes; ++t)
-      for (int c = 0; c < 4; ++c)
-        bounds[std::size_t((t / kLanes * 4 + c) * kLanes + t % kLanes)] =
-            t < pair.n_tiles ? tiles[std::size_t(4 * t + c)]
-            : c < 3          ? kernels::kFarAway
-                             : 0;
-    m_.tile_storage.push_back(std::move(points));
-    pair.tile_points = m_.tile_storage.back().data();
-    m_.tile_storage.push_back(std::move(bounds));
-    pair.tile_bounds = m_.tile_storage.back().data();
   }
 
   void ground_contacts() {
@@ -386,12 +364,12 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   v.ground_order = m->ground_order.data();
   for (std::size_t k = 0; k < m->bodies.size(); ++k)
     m->solids.push_back(solid_of(m->scene.links[k].body.shape, m->bodies[k]));
+  v.n_solids = static_cast<int>(m->solids.size());
+  v.solids = m->solids.data();
   compile_memories(*m);
   v.n_memories = static_cast<int>(m->memories.size());
   v.memories = m->memories.data();
   v.ground = ground_frame(v.ground_point, v.ground_normal);
-  v.n_solids = static_cast<int>(m->solids.size());
-  v.solids = m->solids.data();
   v.pattern = m->pattern.view();
   return m;
 }

@@ -88,6 +88,11 @@ struct CompiledSensor {
   /// (n) weights of the ideal fields `delay`, delay + 1, … steps ago; empty without memory.
   std::vector<double> weights{};
   std::array<LateralSpread, 2> spread{};  ///< from row to row, and from column to column
+  bool elastic = false;                   ///< its friction remembers
+  /// Points of an elastic sensor in the order of the tiles of its contacts.
+  std::vector<int> in_field;  ///< (n) number in the field
+  std::vector<double> point_axes;  ///< (n, 9) rows axis0, axis1, -normal; axes of the link
+  std::vector<double> point_factors;  ///< (n, 4) or empty: all 1
 
   /// Earlier states on which a reading depends.
   [[nodiscard]] int past_states() const {
@@ -223,7 +228,13 @@ kernels::Hull hull_of(const CompiledBody& body);
 
 /// Reorders (n, 3) points so that every `tile` consecutive ones are neighbours. Returns the tiles'
 /// bounds, (tiles, 4).
-std::vector<double> sort_into_tiles(std::vector<double>& points, int tile);
+/// `order`: out, if not null, where each point was before.
+std::vector<double> sort_into_tiles(std::vector<double>& points, int tile,
+                                    std::vector<int>* order = nullptr);
+/// Stores points and bounds of a contact's tiles in the order in which vectors read them, padded to
+/// whole tiles and whole vectors. `pair` already has its points.
+void lay_out_tiles(CompiledModel& model, kernels::PairContact& pair,
+                   const std::vector<double>& tiles);
 
 /// Computes tiles, bounds, axes and pressure sign of a sensor. Throws InputError for degenerate
 /// arrays.

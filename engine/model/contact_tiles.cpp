@@ -35,7 +35,8 @@ void split(const std::vector<double>& points, std::vector<int>& order, std::size
 
 }  // namespace
 
-std::vector<double> sort_into_tiles(std::vector<double>& points, int tile) {
+std::vector<double> sort_into_tiles(std::vector<double>& points, int tile,
+                                    std::vector<int>* before) {
   const std::size_t n = points.size() / 3;
   std::vector<int> order(n);
   std::iota(order.begin(), order.end(), 0);
@@ -44,6 +45,7 @@ std::vector<double> sort_into_tiles(std::vector<double>& points, int tile) {
   for (std::size_t k = 0; k < n; ++k)
     std::copy_n(&points[3 * std::size_t(order[k])], 3, &sorted[3 * k]);
   points = std::move(sorted);
+  if (before != nullptr) *before = order;
   std::vector<double> bounds;
   for (std::size_t begin = 0; begin < n; begin += std::size_t(tile)) {
     const std::size_t end = std::min(n, begin + std::size_t(tile));
@@ -66,6 +68,26 @@ std::vector<double> sort_into_tiles(std::vector<double>& points, int tile) {
                   {centre[0], centre[1], centre[2], std::sqrt(square) * (1 + 1e-12) + 1e-300});
   }
   return bounds;
+}
+
+void lay_out_tiles(CompiledModel& m, kernels::PairContact& pair, const std::vector<double>& tiles) {
+  constexpr int kTile = kernels::kContactTile, kLanes = kernels::kGroup;
+  AlignedVector<double> points(std::size_t(pair.n_tiles) * 3 * kTile, kernels::kFarAway);
+  for (int k = 0; k < pair.n_points; ++k)
+    for (int c = 0; c < 3; ++c)
+      points[std::size_t((k / kTile * 3 + c) * kTile + k % kTile)] = pair.points[3 * k + c];
+  const int groups = (pair.n_tiles + kLanes - 1) / kLanes;
+  AlignedVector<double> bounds(std::size_t(groups) * 4 * kLanes, kernels::kFarAway);
+  for (int t = 0; t < groups * kLanes; ++t)
+    for (int c = 0; c < 4; ++c)
+      bounds[std::size_t((t / kLanes * 4 + c) * kLanes + t % kLanes)] =
+          t < pair.n_tiles ? tiles[std::size_t(4 * t + c)]
+          : c < 3          ? kernels::kFarAway
+                           : 0;
+  m.tile_storage.push_back(std::move(points));
+  pair.tile_points = m.tile_storage.back().data();
+  m.tile_storage.push_back(std::move(bounds));
+  pair.tile_bounds = m.tile_storage.back().data();
 }
 
 }  // namespace tangere

@@ -12,28 +12,6 @@ namespace tangere {
 
 namespace {
 
-/// Computes a ball around points (n, 3): its centre is the middle of their box, its radius the
-/// distance of the farthest of them.
-void bound(const double* points, int n, kernels::Vec3<double>& middle, double& extent) {
-  const kernels::Vec3<double> first = {points[0], points[1], points[2]};
-  kernels::Vec3<double> low = first, high = first;
-  for (int k = 0; k < n; ++k) {
-    const double* p = points + 3 * k;
-    low = {std::min(low.x, p[0]), std::min(low.y, p[1]), std::min(low.z, p[2])};
-    high = {std::max(high.x, p[0]), std::max(high.y, p[1]), std::max(high.z, p[2])};
-  }
-  middle = 0.5 * (low + high);
-  double square = 0;
-  for (int k = 0; k < n; ++k) {
-    const kernels::Vec3<double> arm =
-        kernels::Vec3<double>{points[3 * k], points[3 * k + 1], points[3 * k + 2]} - middle;
-    square = std::max(square, dot(arm, arm));
-  }
-  // Rounded up by far more than the rounding of poses: a bound that is too small by one bit would
-  // be no bound.
-  extent = std::sqrt(square) * (1 + 1e-9) + 1e-9;
-}
-
 /// Appends the indices of `items` to `order` group by group, in the order of first appearance.
 /// `same` tells which items belong together. Returns where each group begins, and the end.
 template <class Item, class Same>
@@ -54,6 +32,26 @@ std::vector<int> gather(const std::vector<Item>& items, const Same& same, std::v
 }
 
 }  // namespace
+
+void bound(const double* points, int n, kernels::Vec3<double>& middle, double& extent) {
+  const kernels::Vec3<double> first = {points[0], points[1], points[2]};
+  kernels::Vec3<double> low = first, high = first;
+  for (int k = 0; k < n; ++k) {
+    const double* p = points + 3 * k;
+    low = {std::min(low.x, p[0]), std::min(low.y, p[1]), std::min(low.z, p[2])};
+    high = {std::max(high.x, p[0]), std::max(high.y, p[1]), std::max(high.z, p[2])};
+  }
+  middle = 0.5 * (low + high);
+  double square = 0;
+  for (int k = 0; k < n; ++k) {
+    const kernels::Vec3<double> arm =
+        kernels::Vec3<double>{points[3 * k], points[3 * k + 1], points[3 * k + 2]} - middle;
+    square = std::max(square, dot(arm, arm));
+  }
+  // Rounded up by far more than the rounding of poses: a bound that is too small by one bit would
+  // be no bound.
+  extent = std::sqrt(square) * (1 + 1e-9) + 1e-9;
+}
 
 void group_contacts(CompiledModel& m) {
   for (kernels::PairContact& p : m.pairs) bound(p.points, p.n_points, p.middle, p.extent);

@@ -7,6 +7,10 @@
 
 namespace tangere {
 
+/// Computes a ball around points (n, 3): its centre is the middle of their box, its radius reaches
+/// the farthest of them.
+void bound(const double* points, int n, kernels::Vec3<double>& middle, double& extent);
+
 /// Finds the contacts that share their links. Fills link_pairs, grounded and the orders.
 void group_contacts(CompiledModel& m);
 

@@ -12,6 +12,7 @@
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/frames.hpp"
 #include "engine/sense/dense_tiles.hpp"
+#include "engine/sense/elastic_field.hpp"
 #include "engine/sense/field_sum.hpp"
 #include "engine/sense/imperfect_field.hpp"
 #include "engine/sense/pad_reader.hpp"
@@ -40,19 +41,23 @@ struct Readout::Impl {
   std::vector<kernels::Frame<double>> in_body;  // (sensors) pad axes in the body
   // Of imperfect sensors: what they do, their reading, and those of a block of small pads.
   ImperfectField imperfections;
+  ElasticField elastic;
+  std::vector<double> elastic_field;  // (points, 3)
   std::vector<double> one_reading, block_readings, of_tiles;
   // Of sensors with memory: a field of an earlier state, and a block that holds such states.
   std::vector<double> earlier;
   std::optional<Batch> past;
 
-  Impl(const Model& m, Precision p) : model(m), precision(p), reader(m), imperfections(m) {
+  Impl(const Model& m, Precision p) : model(m), precision(p), reader(m), imperfections(m), elastic(m) {
     std::size_t room = 0;
     for (const CompiledSensor& s : compiled(m).sensors) {
       const kernels::Frame<double>& body = compiled(m).bodies[std::size_t(s.body)].frame;
       in_body.push_back(relative(body, s.pad));
       room = std::max({room, std::size_t(s.n_tiles()) * 3 * kTactileTile,
                        small(s) ? std::size_t(kBlock * 3 * s.points()) : std::size_t(0)});
-      if (!s.imperfect) continue;
+      if (s.elastic)
+        elastic_field.resize(std::max(elastic_field.size(), std::size_t(3 * s.points())));
+      if (!s.imperfect && !s.elastic) continue;
       one_reading.resize(std::max(one_reading.size(), std::size_t(3 * s.points())));
       of_tiles.resize(std::max(of_tiles.size(), std::size_t(s.n_tiles()) * 3 * kTactileTile));
       if (small(s))
@@ -155,7 +160,8 @@ struct Readout::Impl {
 
   /// Whether a reading is not simply what the kernels compute.
   [[nodiscard]] bool imperfect(FieldOutput of) const {
-    return of.form != FieldForm::ideal && sensor_of(of.sensor).imperfect;
+    const CompiledSensor& s = sensor_of(of.sensor);
+    return s.elastic || (of.form != FieldForm::ideal && s.imperfect);
   }
   static FieldPart part_of(FieldForm form) {
     const int components = components_of(form);
@@ -166,7 +172,8 @@ struct Readout::Impl {
   /// Turns an ideal field into the reading of an imperfect sensor, in the readout's precision.
   void make_imperfect(const Batch& batch, int environment, FieldOutput of,
                       std::span<double> field) {
-    imperfections.apply(sensor_of(of.sensor), key_of(batch, environment), part_of(of.form), field);
+    if (of.form != FieldForm::ideal)
+      imperfections.apply(sensor_of(of.sensor), key_of(batch, environment), part_of(of.form), field);
     if (precision != Precision::f64)
       for (double& x : field) x = static_cast<double>(static_cast<float>(x));
   }
@@ -205,10 +212,22 @@ struct Readout::Impl {
                       std::span<double> field) {
     if (sensor_of(of.sensor).past_states() > 0) {
       read_past(batch, environment, of, field);
+    } else if (sensor_of(of.sensor).elastic) {
+      read_elastic(batch, environment, of, field);
     } else {
       fill(environment, of, field.data());
     }
     make_imperfect(batch, environment, of, field);
+  }
+
+  /// Computes the ideal field of a sensor whose friction remembers, or some of its components.
+  void read_elastic(const Batch& batch, int environment, FieldOutput of, std::span<double> field) {
+    const FieldPart part = part_of(of.form);
+    const auto width = std::size_t(part.count);
+    const auto whole = std::span(elastic_field).first(field.size() / width * 3);
+    elastic.read(reader, batch, environment, of.sensor, whole);
+    for (std::size_t k = 0; k < field.size(); ++k)
+      field[k] = whole[k / width * 3 + std::size_t(part.first) + k % width];
   }
 
   /// The same into memory of the readout. Of a sum: the field.
@@ -367,7 +386,7 @@ struct Readout::Impl {
   /// shapes differ in size between lanes.
   [[nodiscard]] bool together(const Batch& batch, int number, int sensor) const {
     return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary &&
-           sensor_of(sensor).past_states() == 0 && environments_of(batch, number) >= kFewest;
+           sensor_of(sensor).past_states() == 0 && !sensor_of(sensor).elastic && environments_of(batch, number) >= kFewest;
   }
   static int environments_of(const Batch& batch, int number) {
     return std::min(kBlock, batch.environments() - number * kBlock);

@@ -251,6 +251,21 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
       report.status[l] = StepStatus::passed;
 }
 
+// step_parts.cpp uses these.
+#define TANGERE_FOR_LANES(L)                                                                       \
+  template LaneBits GroupStep::run(const Scheme&, const kernels::KernelTable&, BasicWorkspace<L>&, \
+                                   LaneBits, const Row<L>&, bool, NewtonReport&) const;            \
+  template void GroupStep::commit(BasicWorkspace<L>&, LaneBits) const;                             \
+  template void GroupStep::note(const BasicWorkspace<L>&, int, const Scheme&, double,              \
+                                std::vector<TapedSolve>*) const;                                   \
+  template void GroupStep::log_inner(const BasicWorkspace<L>&, int, const Scheme&, SolveLog&)      \
+      const;                                                                                       \
+  template bool GroupStep::split_lane(const kernels::KernelTable&, BasicWorkspace<L>&, int,        \
+                                      double, SingleWorkspace&, NewtonReport&,                     \
+                                      std::vector<TapedSolve>*) const;
+TANGERE_FOR_LANES(kernels::kGroup)
+TANGERE_FOR_LANES(1)
+#undef TANGERE_FOR_LANES
 template void GroupStep::advance(const kernels::KernelTable&, Workspace&, SingleWorkspace&,
                                  LaneBits, LaneBits, NewtonReport&, SolveLog*) const;
 template void GroupStep::advance(const kernels::KernelTable&, SingleWorkspace&, SingleWorkspace&,

@@ -82,6 +82,11 @@ void advance_memory(const CompiledModel& m, const kernels::KernelTable& table, B
                          const RememberingPoints& points) {
                        advance_points(table, w, of, l, index, points);
                      });
+    for_each_felt(m, table, w, w.remembered.end, l,
+                  [&](const RememberingContact& of, const int* index,
+                      const RememberingPoints& points) {
+                    advance_points(table, w, of, l, index, points);
+                  });
   }
 }
 

@@ -61,7 +61,9 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   if (m.memories.empty()) return;
   std::size_t listed = 0, ground = 0, most = 0;
   for (const kernels::RememberingContact& of : m.memories) {
-    const int stride = of.pair >= 0 ? lists[std::size_t(of.pair)].stride : of.stride;
+    const int stride = of.pair >= 0 ? lists[std::size_t(of.pair)].stride
+                       : of.ground  ? of.stride
+                                    : of.contact.n_points + 2 * kGroup;
     most = std::max(most, std::size_t(stride));
     if (of.pair >= 0) listed += std::size_t(L * stride);
     if (of.ground) ground += std::size_t(L * stride);
@@ -78,6 +80,7 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   }
   remembered.ground_anchors.resize(ground * kernels::kAnchorNumbers);
   remembered.s.resize(4 * most);
+  remembered.felt = FeltPoints(m);
   remembered.start.resize(m.links.size());
   remembered.end.resize(m.links.size());
   for (auto* lanes : {&remembered.now, &remembered.after})

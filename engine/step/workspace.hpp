@@ -9,6 +9,7 @@
 
 #include "engine/base/aligned.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "engine/step/felt_points.hpp"
 #include "engine/step/pivoted_factors.hpp"
 #include "engine/step/shear_memory.hpp"
 #include "kernels/table/kernel_table.hpp"
@@ -32,6 +33,7 @@ struct MemoryLanes {
   /// (L, kAnchorNumbers, stride) of each contact with the ground, one after another.
   AlignedVector<double> ground_anchors;
   AlignedVector<double> s;  ///< (4, largest stride)
+  FeltPoints felt;
 };
 
 template <int L>

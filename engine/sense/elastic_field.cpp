@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// A reading is a step without a step: anchors follow from the state that is read, and the law is
+// taken at that state.
+#include "engine/sense/elastic_field.hpp"
+
+#include "engine/step/remembering_lane.hpp"
+
+namespace tangere {
+
+using kernels::kBlock;
+using kernels::kGroup;
+using kernels::RememberingContact;
+using kernels::RememberingPoints;
+using kernels::RememberingTouch;
+using kernels::Vec3;
+
+ElasticField::ElasticField(const Model& model) : model_(model), felt_(compiled(model)) {
+  std::size_t most = 0;
+  for (const CompiledSensor& s : compiled(model).sensors)
+    if (s.elastic) most = std::max(most, std::size_t(s.points() + 2 * kGroup));
+  remembered_.resize(3 * most);
+  s_.resize(4 * most);
+  force_.resize(3 * most);
+}
+
+/// Calls f(contact, touch, points) with anchors set for every body that the sensor touches.
+template <class F>
+void ElasticField::for_each_touched(const PadReader& reader, const Batch& batch, int environment,
+                                    int sensor, const F& f) {
+  const CompiledModel& m = compiled(model_);
+  const kernels::KernelTable& table = kernels::active_kernels();
+  const int block = environment / kBlock, group = environment % kBlock / kGroup,
+            lane = environment % kGroup;
+  const ShearMemory& memory = batch.memory(environment);
+  for (const RememberingContact& of : m.memories) {
+    if (of.sensor != sensor) continue;
+    const RememberingTouch touch = touch_between(
+        of, reader.link(of.contact.link1, group, lane), reader.link(of.contact.link2, group, lane),
+        [&](const kernels::Parameter& p) {
+          return p.row < 0 ? p.value : kernels::row_of(batch.block(block), p.row, group)[lane];
+        });
+    const RememberingPoints points = felt_.find(m.sensors[std::size_t(sensor)], table, touch);
+    if (points.count == 0) continue;
+    look_up(memory, of, felt_.index(), points.count, points.stride, remembered_.data());
+    std::copy_n(remembered_.data(), 3 * points.stride, points.anchors + 3 * points.stride);
+    table.recall(touch, points);
+    f(of, touch, points);
+  }
+}
+
+void ElasticField::read(const PadReader& reader, const Batch& batch, int environment, int sensor,
+                        std::span<double> field) {
+  const CompiledSensor& s = compiled(model_).sensors[std::size_t(sensor)];
+  std::fill(field.begin(), field.end(), 0.0);
+  for_each_touched(reader, batch, environment, sensor,
+                   [&](const RememberingContact&, const RememberingTouch& touch,
+                       const RememberingPoints& points) {
+                     kernels::active_kernels().advance(touch, points, s_.data(), force_.data());
+                     for (int k = 0; k < points.count; ++k) {
+                       const auto point = std::size_t(felt_.index()[k]);
+                       const double* const axes = &s.point_axes[9 * point];
+                       double* const to = &field[3 * std::size_t(s.in_field[point])];
+                       for (int c = 0; c < 3; ++c)
+                         for (int i = 0; i < 3; ++i)
+                           to[c] += axes[3 * c + i] * force_[std::size_t(i * points.stride + k)];
+                     }
+                   });
+}
+
+void ElasticField::pull_back(const PadReader& reader, const Batch& batch, int environment,
+                             int sensor, std::span<const double> cotangent,
+                             std::span<double> memory,
+                             const std::function<void(const Share&)>& hand_on) {
+  const CompiledSensor& s = compiled(model_).sensors[std::size_t(sensor)];
+  for_each_touched(
+      reader, batch, environment, sensor,
+      [&](const RememberingContact& of, const RememberingTouch& touch,
+          const RememberingPoints& points) {
+        std::fill(force_.begin(), force_.end(), 0.0);
+        std::fill(s_.begin(), s_.end(), 0.0);
+        for (int k = 0; k < points.count; ++k) {
+          const auto point = std::size_t(felt_.index()[k]);
+          const double* const axes = &s.point_axes[9 * point];
+          const double* const from = &cotangent[3 * std::size_t(s.in_field[point])];
+          for (int c = 0; c < 3; ++c)
+            for (int i = 0; i < 3; ++i)
+              force_[std::size_t(i * points.stride + k)] += axes[3 * c + i] * from[c];
+        }
+        kernels::MemoryCotangent sums{};
+        kernels::active_kernels().pull_back_memory({&touch, &touch, points, remembered_.data(),
+                                                    nullptr, force_.data(), nullptr, s_.data(),
+                                                    &sums});
+        sums.end.displacement += sums.start;
+        hand_on({&of, sums.end});
+        add_to_entries(batch.memory(environment), of, felt_.index(), points, s_.data(), memory);
+      });
+}
+
+}  // namespace tangere
