@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "kernels/memory/advance.hpp"
 #include "kernels/step/link_poses.hpp"
 #include "kernels/step/residual.hpp"
 
@@ -39,6 +40,11 @@ struct DualStage::Impl {
   std::vector<std::vector<D>> points, references;
   std::vector<kernels::CandidateList<D>> lists;
   std::vector<D> faces;
+  // What friction remembers: anchors of all points, and those in the order of the kernels.
+  std::vector<kernels::Anchor<D>> anchors;
+  std::vector<std::vector<D>> listed_anchors;  ///< of each pair
+  std::vector<D> ground_anchors;
+  std::vector<Coefficients<D>> sensor_laws;
 
   explicit Impl(const CompiledModel& model)
       : m(model),
@@ -102,7 +108,14 @@ struct DualStage::Impl {
       references.emplace_back(12, D(0.0));
       lists.push_back(
           {points.back().data(), 0, references.back().data(), 1e9, nullptr, 0, 0, nullptr, nullptr});
+      listed_anchors.emplace_back();
+      if (p.memory < 0) continue;
+      listed_anchors.back().assign(std::size_t(kernels::kAnchorNumbers * p.n_points), D(0.0));
+      lists.back().anchors = listed_anchors.back().data();
     }
+    anchors.resize(std::size_t(m.remembering_points));
+    ground_anchors.assign(std::size_t(kernels::kAnchorNumbers * m.ground_anchors), D(0.0));
+    sensor_laws.resize(m.sensors.size());
   }
 
   /// Returns the tangent of a body's contact point, link axes, with the body's size.
@@ -134,6 +147,102 @@ struct DualStage::Impl {
         t[k] = moves.x, t[k + 1] = moves.y, t[k + 2] = moves.z;
       }
     }
+  }
+
+  /// Copies an anchor, without tangents while numbers are frozen.
+  void put_anchor(int point, D* to) const {
+    const kernels::Anchor<D>& a = anchors[std::size_t(point)];
+    const D* const from = &a.b.x;
+    static_assert(sizeof a == kernels::kAnchorNumbers * sizeof(D));
+    for (int i = 0; i < kernels::kAnchorNumbers; ++i)
+      to[i] = frozen ? D(from[i].value) : from[i];
+  }
+  void put_ground_anchors() {
+    for (const kernels::RememberingContact& of : m.memories) {
+      if (!of.ground) continue;
+      const int first = grounds[ground_of(of)].first_anchor;
+      for (int i = 0; i < of.contact.n_points; ++i)
+        put_anchor(of.first + i,
+                   &ground_anchors[std::size_t(kernels::kAnchorNumbers * (first + i))]);
+    }
+  }
+  [[nodiscard]] std::size_t ground_of(const kernels::RememberingContact& of) const {
+    return std::size_t(of.number / kCoefficients) - pairs.size();
+  }
+
+  /// Returns a contact that remembers at the poses of all links.
+  [[nodiscard]] kernels::LoadedTouch<D> touch(const kernels::RememberingContact& of,
+                                              const std::vector<kernels::LinkPose<D>>& poses) const {
+    const auto pose = [&](int link) {
+      return link < 0 ? kernels::LinkPose<D>{{kernels::diagonal(D(1.0)), kernels::zero3<D>()},
+                                             kernels::zero6<D>()}
+                      : poses[std::size_t(link)];
+    };
+    const kernels::LinkPose<D> one = pose(of.contact.link1), two = pose(of.contact.link2);
+    const kernels::Frame<D> second = relative(one.world, two.world),
+                            shape = compose(second, kernels::broadcast<D>(of.contact.frame2));
+    const kernels::Vec6<D> twist = motion_to_parent(second, two.V) - one.V;
+    const auto loaded = [&](const kernels::ContactParameters& p) -> Coefficients<D> {
+      return kernels::load_law<D>(p, of.contact.law, of.contact.ramp, block.data(), 0);
+    };
+    const Coefficients<D> law = of.pair >= 0 ? loaded(pairs[std::size_t(of.pair)].parameters)
+                                : of.ground  ? loaded(grounds[ground_of(of)].parameters)
+                                             : sensor_laws[std::size_t(of.sensor)];
+    // Tangents of sizes are not carried: no gradient is taken by sizes where friction remembers.
+    D radius(0.0);
+    if (of.ground)
+      radius = D(kernels::ground_radius<D>(grounds[ground_of(of)], block.data(), 0).value);
+    return {shape.R, shape.p, twist.a, twist.l, {law, of.contact.law, of.contact.ramp}, radius,
+            of.ground};
+  }
+
+  /// Calls f with the shape that a contact touches.
+  template <class F>
+  void with_touched_shape(const kernels::RememberingContact& of, const F& f) const {
+    if (of.pair >= 0) {
+      const kernels::PairContact& pair = pairs[std::size_t(of.pair)];
+      const kernels::Vec3<double> size =
+          kernels::load_vector<double>(pair.size, pair.size_row, block.data(), 0);
+      const D* side = &faces[std::size_t(3 * of.pair)];
+      kernels::with_touched<D>(pair, kernels::broadcast<D>(size),
+                               kernels::Vec3<D>{side[0], side[1], side[2]}, f);
+    } else {
+      kernels::with_distance<D>(of.contact.shape, kernels::broadcast<D>(of.contact.size), f);
+    }
+  }
+
+  /// Returns the law at point i of a contact: a sensor's points may have factors.
+  [[nodiscard]] kernels::LawParameters<D> law_of(const kernels::RememberingContact& of, int i,
+                                                 const kernels::LoadedTouch<D>& t) const {
+    kernels::LawParameters<D> law = t.law;
+    if (of.sensor < 0) return law;
+    const std::vector<double>& factors = m.sensors[std::size_t(of.sensor)].point_factors;
+    if (factors.empty()) return law;
+    const double* own = &factors[std::size_t(kPointCoefficients * i)];
+    for (std::size_t k = 0; k < kPointCoefficients; ++k) law[k] = D(own[k]) * law[k];
+    law.ks = D(own[1]) * law.ks;
+    return law;
+  }
+
+  [[nodiscard]] std::vector<kernels::LinkPose<D>> poses_at(const std::vector<D>& q,
+                                                           const std::vector<D>& v) const {
+    std::vector<D> zero(v.size(), D(0.0)), rates(v.size());
+    kernels::StageArgs<D> a{};
+    a.centre = q.data();
+    a.x = a.s = zero.data();
+    a.r = v.data();
+    a.c0_over_h = D(0.0);
+    a.inverse_h = D(1.0);
+    a.v = rates.data();
+    a.block = block.data();
+    std::vector<kernels::LinkPose<D>> out(bodies.size());
+    kernels::link_poses(view, a, out.data());
+    return out;
+  }
+
+  static kernels::Vec3<D> place(const kernels::RememberingContact& of, int i) {
+    const double* p = of.contact.points + 3 * i;
+    return {D(p[0]), D(p[1]), D(p[2])};
   }
 
   /// Lists the points that touch at the poses of kinematics(). The others add nothing to values or
@@ -168,6 +277,9 @@ struct DualStage::Impl {
           list[std::size_t(3 * count)] = {p[0], moves.x};
           list[std::size_t(3 * count + 1)] = {p[1], moves.y};
           list[std::size_t(3 * count + 2)] = {p[2], moves.z};
+          if (pair.memory >= 0)
+            put_anchor(m.memories[std::size_t(pair.memory)].first + i,
+                       &listed_anchors[std::size_t(at)][std::size_t(7 * count)]);
           ++count;
         }
         lists[std::size_t(at)].count = count;
@@ -211,6 +323,7 @@ struct DualStage::Impl {
     a.block = block.data();
     a.group = 0;
     a.candidates = lists.data();
+    a.ground_anchors = ground_anchors.data();
     a.faces = faces.data();
     a.lone = -1;
     a.links = links.data();
@@ -228,6 +341,7 @@ struct DualStage::Impl {
 DualStage::DualStage(const CompiledModel& model) : impl_(std::make_unique<Impl>(model)) {
   centre.resize(std::size_t(model.nq));
   for (auto* p : {&x, &r, &s, &tau, &target, &v, &g}) p->assign(std::size_t(model.nv), D(0.0));
+  remembered.assign(3 * std::size_t(model.remembering_points), D(0.0));
 }
 DualStage::~DualStage() = default;
 
@@ -254,6 +368,14 @@ void DualStage::set_numbers(const double* column, std::span<const double> tangen
     i.inertia[k] = tangents.empty() ? 0 : tangents[first + k];
   for (std::size_t k = 0; k < i.stretch.size(); ++k)
     i.stretch[k] = tangents.empty() ? 0 : tangents[sizes + k];
+  for (std::size_t k = 0; k < i.sensor_laws.size(); ++k) {
+    std::size_t row = std::size_t(kernels::parameter_numbers(i.view)) + kCoefficients * k;
+    i.sensor_laws[k] = transformed(i.m.sensors[k].parameters, [&](const Parameter& p) {
+      const double tangent = tangents.size() > row ? tangents[row] : 0;
+      ++row;
+      return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent);
+    });
+  }
   i.heavier = std::any_of(i.inertia.begin(), i.inertia.end(), [](double t) { return t != 0; });
 }
 
@@ -265,6 +387,42 @@ void DualStage::choose_faces() {
   a.c0_over_h = D(0.0);
   a.inverse_h = D(1.0);
   kernels::choose_faces_at(i.view, a, i.faces.data());
+}
+
+void DualStage::recall() {
+  Impl& i = *impl_;
+  if (i.m.memories.empty()) return;
+  const std::vector<D> still(v.size(), D(0.0));
+  const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, still);
+  for (const kernels::RememberingContact& of : i.m.memories) {
+    const kernels::LoadedTouch<D> t = i.touch(of, poses);
+    i.with_touched_shape(of, [&](const auto& shape) {
+      for (int k = 0; k < of.contact.n_points; ++k) {
+        const D* kept = &remembered[3 * std::size_t(of.first + k)];
+        i.anchors[std::size_t(of.first + k)] =
+            kernels::recalled(shape, t, Impl::place(of, k), kernels::Vec3<D>{kept[0], kept[1], kept[2]});
+      }
+    });
+  }
+}
+
+void DualStage::advance(const std::vector<D>& q, const std::vector<D>& twist) {
+  Impl& i = *impl_;
+  if (i.m.memories.empty()) return;
+  const std::vector<kernels::LinkPose<D>> poses = i.poses_at(q, twist);
+  for (const kernels::RememberingContact& of : i.m.memories) {
+    const kernels::LoadedTouch<D> t = i.touch(of, poses);
+    i.with_touched_shape(of, [&](const auto& shape) {
+      for (int k = 0; k < of.contact.n_points; ++k) {
+        const auto p = kernels::meet_elastic(shape, t, i.law_of(of, k, t), Impl::place(of, k),
+                                             i.anchors[std::size_t(of.first + k)]);
+        D* kept = &remembered[3 * std::size_t(of.first + k)];
+        const kernels::Vec3<D> next =
+            p.d < D(0.0) ? p.hold * p.s : kernels::zero3<D>();
+        kept[0] = next.x, kept[1] = next.y, kept[2] = next.z;
+      }
+    });
+  }
 }
 
 void DualStage::rates() { kernels::kinematics(impl_->view, impl_->arguments(*this)); }
@@ -286,6 +444,7 @@ void DualStage::residual() {
   const auto a = i.arguments(*this);
   kernels::kinematics(i.view, a);
   i.find_touching();
+  i.put_ground_anchors();
   kernels::residual<false>(i.view, a);
   if (!i.heavier || i.frozen) return;
   std::vector<D> of_mass(g.size());
@@ -349,6 +508,7 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
   const Coefficients<D> coefficients = transformed(felt.parameters, [&](const Parameter& p) {
     return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent(first, next++));
   });
+  if (felt.elastic) return elastic_field(sensor, coefficients, field, field_dot);
   const kernels::Mat3<double> turn =
       transpose(felt.pad.R) * i.m.bodies[std::size_t(felt.body)].frame.R;
   std::fill(field.begin(), field.end(), 0.0);
@@ -390,6 +550,39 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
             const auto at_c = std::size_t(3 * p.index + c);
             if (!field.empty()) field[at_c] += p.rows[3 * c + e] * f[e].value;
             field_dot[at_c] += p.rows[3 * c + e] * f[e].epsilon;
+          }
+      }
+    });
+  }
+}
+
+/// The field of an elastic sensor: the law at the state `centre` with twist r, and what is
+/// remembered there.
+void DualStage::elastic_field(int sensor, const Coefficients<D>& law, std::span<double> field,
+                              std::span<double> field_dot) {
+  Impl& i = *impl_;
+  const CompiledSensor& felt = i.m.sensors[std::size_t(sensor)];
+  i.sensor_laws[std::size_t(sensor)] = law;
+  std::fill(field.begin(), field.end(), 0.0);
+  std::fill(field_dot.begin(), field_dot.end(), 0.0);
+  const std::vector<kernels::LinkPose<D>> poses = i.poses_at(centre, r);
+  for (const kernels::RememberingContact& of : i.m.memories) {
+    if (of.sensor != sensor) continue;
+    const kernels::LoadedTouch<D> t = i.touch(of, poses);
+    i.with_touched_shape(of, [&](const auto& shape) {
+      for (int k = 0; k < of.contact.n_points; ++k) {
+        const D* kept = &remembered[3 * std::size_t(of.first + k)];
+        const kernels::Vec3<D> xi = Impl::place(of, k);
+        const auto p = kernels::meet_elastic(
+            shape, t, i.law_of(of, k, t), xi,
+            kernels::recalled(shape, t, xi, kernels::Vec3<D>{kept[0], kept[1], kept[2]}));
+        const D f[3] = {p.force.x, p.force.y, p.force.z};
+        const double* axes = &felt.point_axes[9 * std::size_t(k)];
+        const auto to = 3 * std::size_t(felt.in_field[std::size_t(k)]);
+        for (std::size_t c = 0; c < 3; ++c)
+          for (std::size_t e = 0; e < 3; ++e) {
+            if (!field.empty()) field[to + c] += axes[3 * c + e] * f[e].value;
+            field_dot[to + c] += axes[3 * c + e] * f[e].epsilon;
           }
       }
     });

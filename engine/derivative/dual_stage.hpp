@@ -35,6 +35,13 @@ class DualStage {
   /// v.
   void choose_faces();
 
+  /// What friction remembers where a solve begins, three numbers for each point that remembers.
+  std::vector<DualNumber> remembered;
+  /// Sets the anchors of solves from this centre. Call after choose_faces() and set_numbers().
+  void recall();
+  /// Replaces what is remembered by that at the end of such a solve, at q and v.
+  void advance(const std::vector<DualNumber>& q, const std::vector<DualNumber>& v);
+
   /// Computes v and g, with the tangents of masses included.
   void residual();
   /// Computes v alone.
@@ -48,6 +55,8 @@ class DualStage {
              std::span<const double> points, std::span<double> field, std::span<double> field_dot);
 
  private:
+  void elastic_field(int sensor, const Coefficients<DualNumber>& law, std::span<double> field,
+                     std::span<double> field_dot);
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

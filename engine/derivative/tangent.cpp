@@ -43,13 +43,6 @@ void put(Duals& to, int i, const Vec3<D>& x) {
   const auto k = std::size_t(i);
   to[k] = x.x, to[k + 1] = x.y, to[k + 2] = x.z;
 }
-/// The forward route does not carry what friction remembers.
-void check_remembers_nothing(const CompiledModel& m) {
-  if (!m.memories.empty())
-    throw InputError("a scene with ks has no tangents forward in time; expected ks=\"0\", or "
-                     "gradients in reverse");
-}
-
 D scaled(double a, const D& x) { return {a * x.value, a * x.epsilon}; }
 
 /// Returns q with its tangent along the dofs of v.
@@ -213,6 +206,7 @@ struct Tangent::Impl {
     stage.centre = at.q;
     stage.inverse_h = 1 / h;
     stage.choose_faces();
+    stage.recall();
     std::vector<DualState> found;  // (x, v) of the stages so far
     for (const SchemeStage& row : scheme.stages) {
       stage.c0_over_h = row.c0 / h;
@@ -224,7 +218,27 @@ struct Tangent::Impl {
       Duals changing = solve(x);
       found.push_back({std::move(changing), stage.v});
     }
-    return {moved(m(), at.q, found.back().q), found.back().v};
+    DualState end = {moved(m(), at.q, found.back().q), found.back().v};
+    stage.advance(end.q, end.v);
+    return end;
+  }
+
+  /// Sets what friction remembers, with its tangents: three numbers for each entry, or none, zeros.
+  void set_memory(std::span<const ShearEntry> memory, const std::vector<double>& dot) {
+    std::fill(stage.remembered.begin(), stage.remembered.end(), D(0.0));
+    for (std::size_t k = 0; k < memory.size(); ++k)
+      for (std::size_t c = 0; c < 3; ++c)
+        stage.remembered[3 * std::size_t(memory[k].point) + c] =
+            D(memory[k].s[c], dot.empty() ? 0 : dot[3 * k + c]);
+  }
+
+  /// Returns the tangents of what friction remembers.
+  [[nodiscard]] std::vector<double> memory_dot(std::span<const ShearEntry> memory) const {
+    std::vector<double> out;
+    for (const ShearEntry& e : memory)
+      for (std::size_t c = 0; c < 3; ++c)
+        out.push_back(stage.remembered[3 * std::size_t(e.point) + c].epsilon);
+    return out;
   }
 
   /// Sets the motors as set_motors() does.
@@ -281,7 +295,6 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
                    std::span<const double> numbers_dot, StateTangent& state) {
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
-  check_remembers_nothing(m);
   const auto rows = [&](std::int64_t t) { return tape.state(t) + lane; };
   const auto dual = [&](std::int64_t t, const std::vector<double>& q,
                         const std::vector<double>& v) {
@@ -293,6 +306,7 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
   const double* column = batch.block(block) + lane;
   i.stage.set_numbers(column, numbers_dot);
   i.set_motors(start, u, u_dot, numbers_dot, column);
+  i.set_memory(tape.memory(step, lane), state.memory);
   DualState end = start;
   if (const TapedStep* special = tape.special(step, lane); special != nullptr) {
     for (const TapedSolve& s : special->solves)
@@ -301,6 +315,7 @@ void Tangent::step(const Batch& batch, int block, int lane, const BlockTape& tap
     end = i.solve_step(i.settings.integrator.scheme(), i.settings.timestep, start, before,
                        rows(step + 1), tape.inner(step) + lane, kBlock);
   }
+  state.memory = i.memory_dot(tape.memory(step + 1, lane));
   state.previous_q = std::move(state.q);
   state.previous_v = std::move(state.v);
   state.q = tangent_of(m, end.q);
@@ -315,7 +330,6 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
   Impl& i = *impl_;
   const CompiledModel& m = i.m();
   check_has_no_memory(i.model, sensor);
-  check_remembers_nothing(m);
   const double* row = tape.state(step) + lane;
   i.stage.centre = with_tangent(m, row, kBlock, state.q);
   const Duals v = with_tangent(row + m.nq * kBlock, kBlock, state.v);
@@ -325,6 +339,7 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
   i.stage.inverse_h = 1;
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   std::vector<double> field(s.imperfect ? field_dot.size() : 0);
+  i.set_memory(tape.memory(step, lane), state.memory);
   i.stage.field(sensor, batch.block(block) + lane, numbers_dot, points_dot, field, field_dot);
   const ReadingKey key = {batch.seed(), batch.episode(block * kBlock + lane),
                           tape.episode_step(step, lane)};

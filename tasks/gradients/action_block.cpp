@@ -215,6 +215,7 @@ void ActionBlock::reverse_start(const ActionRecord& r, std::int64_t action) {
         placed_v[i] += at(c.v, i);
         q[i] = v[i] = at(c.q, i) = at(c.v, i) = at(c.previous_q, i) = at(c.previous_v, i) = 0;
       }
+      c.memory[as_size(l)].clear();  // friction remembers nothing of before
       const MomentCotangent to{q, v, {}, {}};
       task_.place_vjp(rollout_.view(r, action, l, part(r.memory, l), {&seen, 1}), placed_q,
                       placed_v, {{&to, 1}, by_action, memory});

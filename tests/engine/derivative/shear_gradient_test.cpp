@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/derivative/readout_pullback.hpp"
+#include "engine/derivative/tangent.hpp"
 #include "tests/engine/gradient_run.hpp"
 #include "tests/engine/random_scene.hpp"
 #include "tests/engine/scenes.hpp"
@@ -16,7 +17,7 @@ using testing::RunGradient;
 using testing::RunInput;
 using testing::StateLoss;
 
-constexpr int kSteps = 6;
+constexpr int kShearSteps = 6;
 
 /// Random bodies that touch each other, a wall and the ground, with springs in all contacts.
 Scene elastic_contacts(unsigned seed, int links, ContactLaw law) {
@@ -27,7 +28,7 @@ Scene elastic_contacts(unsigned seed, int links, ContactLaw law) {
   return s;
 }
 
-double norm(const std::vector<double>& x) {
+double length_of(const std::vector<double>& x) {
   double sum = 0;
   for (const double a : x)
     if (std::isfinite(a)) sum += a * a;
@@ -39,17 +40,17 @@ int compare(const std::vector<double>& a, const std::vector<double>& b, double t
   int compared = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (!std::isfinite(b[i])) continue;
-    EXPECT_NEAR(a[i], b[i], tolerance * norm(b)) << what << " " << i;
+    EXPECT_NEAR(a[i], b[i], tolerance * length_of(b)) << what << " " << i;
     ++compared;
   }
   return compared;
 }
 
-int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance) {
+int check_contacts(const Scene& scene, Integrator scheme, unsigned seed, double tolerance) {
   const Model model(scene);
   const StepperOptions options = testing::options(scheme, scene.timestep, 1e-13);
-  const RunInput in = random_input(model, seed, kSteps);
-  const StateLoss loss(model, kSteps, seed + 1);
+  const RunInput in = random_input(model, seed, kShearSteps);
+  const StateLoss loss(model, kShearSteps, seed + 1);
   if (!std::isfinite(testing::loss_of_run(model, options, in, loss))) return 0;
   const RunGradient adjoint = testing::adjoint_of_run(model, options, {in}, loss, 0);
   const RunGradient difference = testing::differences_of_run(model, options, in, loss);
@@ -63,7 +64,7 @@ int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance
       const double size = parameters.infos()[k].value;
       a[k] *= size, b[k] *= size;
     }
-    return norm(b);
+    return length_of(b);
   }();
   for (std::size_t k = 0; k < a.size(); ++k) {
     if (!std::isfinite(b[k])) continue;
@@ -74,9 +75,9 @@ int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance
 }
 
 /// Whether a step of the run is split: the run jumps where that decision changes.
-bool splits(const Scene& scene, Integrator scheme, unsigned seed) {
+bool is_split(const Scene& scene, Integrator scheme, unsigned seed) {
   const Model model(scene);
-  const RunInput in = random_input(model, seed, kSteps);
+  const RunInput in = random_input(model, seed, kShearSteps);
   Batch batch(model, 1);
   batch.set_state(0, in.q, in.v);
   Stepper stepper(model, testing::options(scheme, scene.timestep, 1e-13));
@@ -188,9 +189,64 @@ TEST_P(ShearGradient, ContactsMatchDifferences) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Scene scene =
         elastic_contacts(seed, 2 + static_cast<int>(seed % 2), ContactLaw(seed % 3));
-    if (!splits(scene, GetParam(), seed)) compared += check(scene, GetParam(), seed, 1e-6);
+    if (!is_split(scene, GetParam(), seed)) compared += check_contacts(scene, GetParam(), seed, 1e-6);
   }
   EXPECT_GT(compared, 50);
+}
+
+/// The change of the loss along random directions, forward in dual numbers.
+TEST_P(ShearGradient, ContactsMatchTangents) {
+  int compared = 0;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Model model(elastic_contacts(seed, 2 + static_cast<int>(seed % 2), ContactLaw(seed % 3)));
+    const StepperOptions options = testing::options(GetParam(), model.timestep(), 1e-13);
+    const RunInput in = random_input(model, seed, kShearSteps);
+    const StateLoss loss(model, kShearSteps, seed + 1);
+    if (!std::isfinite(testing::loss_of_run(model, options, in, loss))) continue;
+    const RunGradient adjoint = testing::adjoint_of_run(model, options, {in}, loss, 0);
+    testing::Random random(seed + 70);
+    const auto draw = [&](std::size_t count) {
+      std::vector<double> x(count);
+      for (double& a : x) a = random.normal();
+      return x;
+    };
+    const std::size_t nv = std::size_t(model.nv()), nu = std::size_t(model.nu());
+    StateTangent state{draw(nv), draw(nv), std::vector<double>(nv), std::vector<double>(nv)};
+    const NumberGradients numbers(model);
+    std::vector<double> change = draw(std::size_t(numbers.count()));
+    for (std::size_t k = 0; k < change.size(); ++k) change[k] *= numbers.infos()[k].value;
+    double reverse = 0, forward = 0;
+    for (std::size_t i = 0; i < nv; ++i)
+      reverse += adjoint.q[i] * state.q[i] + adjoint.v[i] * state.v[i];
+    for (std::size_t k = 0; k < change.size(); ++k) reverse += adjoint.parameters[k] * change[k];
+    Batch batch(model, 1);
+    batch.set_state(0, in.q, in.v);
+    std::vector<double> rows(std::size_t(parameter_rows(model)));
+    numbers.spread(change, batch, 0, rows);
+    Stepper stepper(model, options);
+    BlockTape tape(model, stepper.integrator(), kShearSteps);
+    tape.start(batch, 0);
+    for (const auto& u : in.u) stepper.step_block(batch, 0, u, &tape);
+    Tangent tangent(model, options);
+    Adjoint cotangents(model, options);  // of the loss by each state
+    for (int t = 0; t <= kShearSteps; ++t) {
+      cotangents.clear();
+      std::vector<double> q(std::size_t(model.nq()));
+      for (std::size_t i = 0; i < q.size(); ++i) q[i] = tape.state(t)[16 * i];
+      loss.add(t, q, cotangents.loss(0), 0);
+      for (std::size_t i = 0; i < nv; ++i)
+        forward += cotangents.loss(0).q[16 * i] * state.q[i] +
+                   cotangents.loss(0).v[16 * i] * state.v[i];
+      if (t == kShearSteps) break;
+      const std::vector<double> u_dot = draw(nu);
+      for (std::size_t k = 0; k < nu; ++k) reverse += adjoint.u[std::size_t(t) * nu + k] * u_dot[k];
+      tangent.step(batch, 0, 0, tape, t, in.u[std::size_t(t)], u_dot, rows, state);
+    }
+    EXPECT_NEAR(reverse, forward, 1e-9 * (std::abs(forward) + adjoint.norm()));
+    ++compared;
+  }
+  EXPECT_GE(compared, 3);
 }
 
 TEST_P(ShearGradient, FieldsMatchDifferences) {
@@ -203,10 +259,10 @@ TEST_P(ShearGradient, FieldsMatchDifferences) {
     in.q = testing::q_of(batch);
     testing::Random random(3);
     for (int i = 0; i < model.nv(); ++i) in.v.push_back(0.02 * random.normal());
-    for (int t = 0; t < kSteps; ++t) in.u.push_back({0.3, -0.2, 0.4});
+    for (int t = 0; t < kShearSteps; ++t) in.u.push_back({0.3, -0.2, 0.4});
   }
   in.q[2] -= 3e-4;  // the plate presses on both balls
-  const FieldLoss loss(model, kSteps, 7);
+  const FieldLoss loss(model, kShearSteps, 7);
   const RunGradient adjoint = adjoint_of_fields(model, options, in, loss);
   const auto along = [&](const std::function<void(RunInput&, double)>& change) {
     return testing::best_difference(
@@ -233,27 +289,27 @@ TEST_P(ShearGradient, FieldsMatchDifferences) {
   compared += compare(adjoint.u, difference.u, 1e-5, "u");
   const NumberGradients parameters(model);
   for (int k = 0; k < parameters.count(); ++k) {
-    const NumberInfo& info = parameters.infos()[std::size_t(k)];
-    if (info.value == 0) continue;
+    const NumberInfo& of = parameters.infos()[std::size_t(k)];
+    if (of.value == 0) continue;
     const double numeric = testing::best_difference(
         [&](double e) {
           Scene other = model.scene();
-          number_in(other, info.number) += e * info.value;
+          number_in(other, of.number) += e * of.value;
           return field_loss_of_run(Model(other), options, in, loss);
         },
         1e-4);
     if (!std::isfinite(numeric)) continue;
     ++compared;
-    EXPECT_NEAR(adjoint.parameters[std::size_t(k)] * info.value, numeric,
+    EXPECT_NEAR(adjoint.parameters[std::size_t(k)] * of.value, numeric,
                 1e-5 * (1 + std::abs(numeric)))
-        << info.name;
+        << of.name;
   }
   EXPECT_GT(compared, 60);
 }
 
 INSTANTIATE_TEST_SUITE_P(Schemes, ShearGradient,
                          ::testing::ValuesIn(testing::all_integrators()),
-                         [](const auto& info) { return std::string(to_string(info.param)); });
+                         [](const auto& scheme) { return std::string(to_string(scheme.param)); });
 
 }  // namespace
 }  // namespace tangere

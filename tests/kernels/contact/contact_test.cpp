@@ -89,10 +89,8 @@ State random_state(Random& random, const Case& test) {
   s.xi = s.c + s.Q * point_under(test.shape, random, depth);
   s.omega = random.vector(1);
   s.v = random.vector(random.uniform(0, 1) < 0.5 ? 1e-3 : 0.3);
-  s.law = {random.uniform(10, 1000),
-           random.uniform(0.5, 5),
-           random.uniform(0.1, 1.5),
-           random.uniform(0, 20),
+  s.law = {{random.uniform(10, 1000), random.uniform(0.5, 5), random.uniform(0.1, 1.5),
+            random.uniform(0, 20)},
            test.law,
            test.ramp};
   if (test.law == ContactLaw::linear) s.law.damping = random.uniform(0, 0.05);
