@@ -49,7 +49,7 @@ struct ElasticPoint : PointContact<N> {
 
 /// Computes spring, bound and force of a point whose geometry, velocities and normal force are set.
 template <class N>
-void add_spring(const LawParameters<N>& law, const Mat3<N>& Q, const Vec3<N>& c,
+[[gnu::always_inline]] inline void add_spring(const LawParameters<N>& law, const Mat3<N>& Q, const Vec3<N>& c,
                 const Anchor<N>& anchor, ElasticPoint<N>& p) {
   const N zero(0.0), one(1.0);
   const Vec3<N> A = c + Q * anchor.a;
@@ -75,16 +75,6 @@ void add_spring(const LawParameters<N>& law, const Mat3<N>& Q, const Vec3<N>& c,
   p.force = gate * (p.normal.force * p.n - p.hold * p.w);
 }
 
-template <class Shape, class N>
-ElasticPoint<N> elastic_point(const Shape& shape, const LawParameters<N>& law, const Mat3<N>& Q,
-                              const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
-                              const Vec3<N>& xi, const Anchor<N>& anchor) {
-  ElasticPoint<N> p;
-  static_cast<PointContact<N>&>(p) = meeting_point(shape, law, Q, c, omega, v, xi);
-  add_spring(law, Q, c, anchor, p);
-  return p;
-}
-
 /// Returns λ k_s (I - t tᵀ).
 template <class N>
 Mat3<N> spring_matrix(const LawParameters<N>& law, const ElasticPoint<N>& p) {
@@ -94,7 +84,7 @@ Mat3<N> spring_matrix(const LawParameters<N>& law, const ElasticPoint<N>& p) {
 
 /// Adds the spring's share to the derivative of a point's force.
 template <class Shape, class N>
-void differentiate_spring(const LawParameters<N>& law, const ElasticPoint<N>& p,
+[[gnu::always_inline]] inline void differentiate_spring(const LawParameters<N>& law, const ElasticPoint<N>& p,
                           PointDerivative<N>& r) {
   const Mat3<N> P = diagonal(N(1.0)) - outer(p.n, p.n);
   Mat3<N> n_rho, n_theta;
@@ -113,8 +103,11 @@ template <bool Derivatives, class Shape, class N>
 void accumulate_elastic(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& law,
                         const Mat3<N>& Q, const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
                         const Vec3<N>& xi, const Anchor<N>& anchor) {
-  const ElasticPoint<N> p = elastic_point(shape, law, Q, c, omega, v, xi, anchor);
+  ElasticPoint<N> p;
+  find_place(shape, Q, c, xi, p);
   if (!any(p.d < N(0.0))) return;
+  find_motion(law, omega, v, p);
+  add_spring(law, Q, c, anchor, p);
   sums.wrench.a += cross(p.x2, p.force);
   sums.wrench.l += p.force;
   if constexpr (Derivatives) {

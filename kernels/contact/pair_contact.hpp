@@ -34,13 +34,12 @@ struct PointContact {
   Mat3<N> hessian;  ///< Bending::general only: H
 };
 
-/// Computes everything but friction and force at ξ. `Q`, `c`: shape frame in body 1. `omega`,
-/// `v`: W.
+/// Computes distance, normal, bending and the surface point x₂ at ξ. `Q`, `c`: shape frame in body
+/// 1.
 template <class Shape, class N>
-PointContact<N> meeting_point(const Shape& shape, const LawParameters<N>& law, const Mat3<N>& Q,
-                              const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
-                              const Vec3<N>& xi) {
-  PointContact<N> p;
+[[gnu::always_inline]] inline void find_place(const Shape& shape, const Mat3<N>& Q,
+                                              const Vec3<N>& c, const Vec3<N>& xi,
+                                              PointContact<N>& p) {
   const Vec3<N> arm = xi - c;
   if constexpr (Shape::kBending == Bending::flat) {
     const Distance<N> at = shape.evaluate(transposed_times(Q, arm), p.curvature);
@@ -63,19 +62,26 @@ PointContact<N> meeting_point(const Shape& shape, const LawParameters<N>& law, c
     p.n = at.n;
   }
   p.x2 = xi - p.d * p.n;
+}
+
+/// Computes velocities and normal force at a place that is found. `omega`, `v`: W.
+template <class N>
+[[gnu::always_inline]] inline void find_motion(const LawParameters<N>& law, const Vec3<N>& omega,
+                                               const Vec3<N>& v, PointContact<N>& p) {
   p.u = -(v + cross(omega, p.x2));
   p.rate = dot(p.n, p.u);
   p.vt = p.u - p.rate * p.n;
   p.normal = normal_force(law, p.d, p.rate);
-  return p;
 }
 
-/// The same with friction and force.
+/// Computes distance, velocities and force at ξ. `Q`, `c`: shape frame in body 1. `omega`, `v`: W.
 template <class Shape, class N>
 PointContact<N> point_contact(const Shape& shape, const LawParameters<N>& law, const Mat3<N>& Q,
                               const Vec3<N>& c, const Vec3<N>& omega, const Vec3<N>& v,
                               const Vec3<N>& xi) {
-  PointContact<N> p = meeting_point(shape, law, Q, c, omega, v, xi);
+  PointContact<N> p;
+  find_place(shape, Q, c, xi, p);
+  find_motion(law, omega, v, p);
   p.tangential = friction(law, p.normal, p.vt);
   const N touching = select(p.d < N(0.0), N(1.0), N(0.0));
   p.force = touching * (p.normal.force * p.n - p.tangential.scale * p.vt);

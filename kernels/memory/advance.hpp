@@ -26,7 +26,8 @@ ElasticPoint<N> meet_elastic(const Shape& shape, const LoadedTouch<N>& t,
                              const LawParameters<N>& law, const Vec3<N>& xi,
                              const Anchor<N>& anchor) {
   ElasticPoint<N> p;
-  static_cast<PointContact<N>&>(p) = meet(shape, t, law, xi);
+  find_place(shape, t, xi, p);
+  find_motion(law, t.omega, t.v, p);
   add_spring(law, t.Q, t.c, anchor, p);
   return p;
 }
@@ -41,10 +42,17 @@ void advance(const RememberingTouch& end, const RememberingPoints& points, doubl
   with_shape<N>(end, [&](const auto& shape) {
     const int stride = points.stride;
     for (int k = 0; k < points.count; k += kGroup) {
-      const ElasticPoint<N> p =
-          meet_elastic(shape, t, law_at<A>(t, points, k), load3<A>(points.places, stride, k),
-                       load_anchors<A>(points, k));
+      ElasticPoint<N> p;
+      find_place(shape, t, load3<A>(points.places, stride, k), p);
       const N touches = select(p.d < N(0.0), N(1.0), N(0.0));
+      if (!any(p.d < N(0.0))) {
+        store_lanes(touches, s + 3 * stride + k);
+        if (force != nullptr) store3(zero3<N>(), force, stride, k);
+        continue;
+      }
+      const LawParameters<N> law = law_at<A>(t, points, k);
+      find_motion(law, t.omega, t.v, p);
+      add_spring(law, t.Q, t.c, load_anchors<A>(points, k), p);
       store3((touches * p.hold) * p.s, s, stride, k);
       store_lanes(touches, s + 3 * stride + k);
       if (force != nullptr) store3(p.force, force, stride, k);

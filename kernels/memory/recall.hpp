@@ -41,23 +41,17 @@ void with_shape(const RememberingTouch& t, const F& f) {
   with_touched<N>(t.of->contact, broadcast<N>(t.size), broadcast<N>(t.faces), f);
 }
 
-/// Computes geometry, velocities and normal force of a point at ξ, wherever it is.
+/// Computes distance, normal and the place where the force acts of a point at ξ.
 template <class Shape, class N>
-PointContact<N> meet(const Shape& shape, const LoadedTouch<N>& t, const LawParameters<N>& law,
-                     const Vec3<N>& xi) {
-  if (!t.ground) return meeting_point(shape, law, t.Q, t.c, t.omega, t.v, xi);
-  PointContact<N> p;
+[[gnu::always_inline]] inline void find_place(const Shape& shape, const LoadedTouch<N>& t,
+                                              const Vec3<N>& xi, PointContact<N>& p) {
+  if (!t.ground) return find_place(shape, t.Q, t.c, xi, p);
   p.n = {t.Q.m[0][2], t.Q.m[1][2], t.Q.m[2][2]};
   const N height = dot(p.n, xi - t.c);
   const N reach(kPlaneReach);  // padding lies beyond it
   p.d = select(dot(xi, xi) < reach * reach, height - t.radius, reach);
   p.x2 = xi - t.radius * p.n;
-  p.u = -(t.v + cross(t.omega, p.x2));
-  p.rate = dot(p.n, p.u);
-  p.vt = p.u - p.rate * p.n;
-  p.normal = normal_force(law, p.d, p.rate);
   p.curvature = N(0.0);
-  return p;
 }
 
 /// Adds what cotangents of d, n and x come to, by (θ; ρ) of body 2.
@@ -91,7 +85,8 @@ Vec3<N> s_of(const PointContact<N>& p, const Vec3<N>& remembered) {
 template <class Shape, class N>
 Anchor<N> recalled(const Shape& shape, const LoadedTouch<N>& t, const Vec3<N>& xi,
                    const Vec3<N>& remembered) {
-  const PointContact<N> p = meet(shape, t, t.law, xi);
+  PointContact<N> p;
+  find_place(shape, t, xi, p);
   const Vec3<N> s = s_of(p, remembered);
   return {p.x2, transposed_times(t.Q, p.x2 - s - t.c), max(p.d, N(0.0))};
 }
@@ -101,7 +96,8 @@ template <class Shape, class N>
 Vec3<N> pull_back_recall(const Shape& shape, const LoadedTouch<N>& t, const Vec3<N>& xi,
                          const Vec3<N>& remembered, const Anchor<N>& bar, Vec6<N>& out) {
   const N zero(0.0);
-  const PointContact<N> p = meet(shape, t, t.law, xi);
+  PointContact<N> p;
+  find_place(shape, t, xi, p);
   const Vec3<N> y = t.Q * bar.a, at = p.x2 - s_of(p, remembered);
   out.l -= y;
   out.a -= cross(at, y);
