@@ -166,8 +166,12 @@ struct Start {
     if (continues) first_step = saved->step;
   }
 
-  void tell(const Console& console, const Scene& scene, const Stepper& stepper) const {
+  void tell(const Console& console, const Model& model, const Scene& scene,
+            const Stepper& stepper) const {
     if (!saved) return;
+    if (model.remembers())
+      console.note(saved->path +
+                   " does not hold what friction remembers: contacts with ks begin unsheared");
     if (!continues)
       console.note(
           fmt::format("{} was made by {} with steps of {} s, this run takes {} with {} s: it "
@@ -365,7 +369,7 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   if (!options.gradients.empty()) solver = for_gradients(model, solver);
   Stepper stepper(model, solver);
   const Start start(options, stepper);
-  start.tell(console, model.scene(), stepper);
+  start.tell(console, model, model.scene(), stepper);
   const ControlProgram controls =
       make_controls(options.controls, start.seed, model, stepper, console);
   const RolloutOptions rollout{steps_left(options, controls, start.first_step),

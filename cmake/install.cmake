@@ -57,6 +57,7 @@ set(public_headers
   engine/step/batch.hpp
   engine/step/control.hpp
   engine/step/displacement.hpp
+  engine/step/shear_memory.hpp
   engine/step/stepper.hpp
   engine/step/tape.hpp
   io/dataset/dataset_export.hpp

@@ -211,8 +211,7 @@ struct Adjoint::Impl {
       c.previous_q[at] = o.q_before[i][lane];
       c.previous_v[at] = o.v_before[i][lane];
     }
-    if (!m.memories.empty())
-      c.memory[std::size_t(column)] = o.memory_before[std::size_t(lane)];
+    if (!m.memories.empty()) c.memory[std::size_t(column)] = o.memory_before[std::size_t(lane)];
     if (o.parameters == nullptr) return;
     for (int i = 0; i < parameter_rows(model); ++i)
       c.parameters[std::size_t(i * kBlock + column)] += o.parameters[i][lane];

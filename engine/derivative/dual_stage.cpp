@@ -106,8 +106,8 @@ struct DualStage::Impl {
     for (const kernels::PairContact& p : pairs) {
       points.emplace_back(std::size_t(3 * p.n_points), D(0.0));
       references.emplace_back(12, D(0.0));
-      lists.push_back(
-          {points.back().data(), 0, references.back().data(), 1e9, nullptr, 0, 0, nullptr, nullptr});
+      lists.push_back({points.back().data(), 0, references.back().data(), 1e9, nullptr, 0, 0,
+                       nullptr, nullptr});
       listed_anchors.emplace_back();
       if (p.memory < 0) continue;
       listed_anchors.back().assign(std::size_t(kernels::kAnchorNumbers * p.n_points), D(0.0));
@@ -154,8 +154,7 @@ struct DualStage::Impl {
     const kernels::Anchor<D>& a = anchors[std::size_t(point)];
     const D* const from = &a.b.x;
     static_assert(sizeof a == kernels::kAnchorNumbers * sizeof(D));
-    for (int i = 0; i < kernels::kAnchorNumbers; ++i)
-      to[i] = frozen ? D(from[i].value) : from[i];
+    for (int i = 0; i < kernels::kAnchorNumbers; ++i) to[i] = frozen ? D(from[i].value) : from[i];
   }
   void put_ground_anchors() {
     for (const kernels::RememberingContact& of : m.memories) {
@@ -171,8 +170,8 @@ struct DualStage::Impl {
   }
 
   /// Returns a contact that remembers at the poses of all links.
-  [[nodiscard]] kernels::LoadedTouch<D> touch(const kernels::RememberingContact& of,
-                                              const std::vector<kernels::LinkPose<D>>& poses) const {
+  [[nodiscard]] kernels::LoadedTouch<D> touch(
+      const kernels::RememberingContact& of, const std::vector<kernels::LinkPose<D>>& poses) const {
     const auto pose = [&](int link) {
       return link < 0 ? kernels::LinkPose<D>{{kernels::diagonal(D(1.0)), kernels::zero3<D>()},
                                              kernels::zero6<D>()}
@@ -192,8 +191,8 @@ struct DualStage::Impl {
     D radius(0.0);
     if (of.ground)
       radius = D(kernels::ground_radius<D>(grounds[ground_of(of)], block.data(), 0).value);
-    return {shape.R, shape.p, twist.a, twist.l, {law, of.contact.law, of.contact.ramp}, radius,
-            of.ground};
+    return {shape.R, shape.p,  twist.a, twist.l, {law, of.contact.law, of.contact.ramp},
+            radius,  of.ground};
   }
 
   /// Calls f with the shape that a contact touches.
@@ -399,8 +398,8 @@ void DualStage::recall() {
     i.with_touched_shape(of, [&](const auto& shape) {
       for (int k = 0; k < of.contact.n_points; ++k) {
         const D* kept = &remembered[3 * std::size_t(of.first + k)];
-        i.anchors[std::size_t(of.first + k)] =
-            kernels::recalled(shape, t, Impl::place(of, k), kernels::Vec3<D>{kept[0], kept[1], kept[2]});
+        i.anchors[std::size_t(of.first + k)] = kernels::recalled(
+            shape, t, Impl::place(of, k), kernels::Vec3<D>{kept[0], kept[1], kept[2]});
       }
     });
   }
@@ -417,8 +416,7 @@ void DualStage::advance(const std::vector<D>& q, const std::vector<D>& twist) {
         const auto p = kernels::meet_elastic(shape, t, i.law_of(of, k, t), Impl::place(of, k),
                                              i.anchors[std::size_t(of.first + k)]);
         D* kept = &remembered[3 * std::size_t(of.first + k)];
-        const kernels::Vec3<D> next =
-            p.d < D(0.0) ? p.hold * p.s : kernels::zero3<D>();
+        const kernels::Vec3<D> next = p.d < D(0.0) ? p.hold * p.s : kernels::zero3<D>();
         kept[0] = next.x, kept[1] = next.y, kept[2] = next.z;
       }
     });
@@ -536,8 +534,8 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
         int n = 0;
         const auto of_point = [&](const D& of_sensor) {
           const bool is_ks = n == kPointCoefficients;
-          const D scaled = D(p.factors[is_ks ? 1 : n]) * of_sensor +
-                           D(0.0, is_ks ? 0.0 : own(3 + n));
+          const D scaled =
+              D(p.factors[is_ks ? 1 : n]) * of_sensor + D(0.0, is_ks ? 0.0 : own(3 + n));
           ++n;
           return scaled;
         };

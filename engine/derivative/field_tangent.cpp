@@ -151,6 +151,9 @@ void FieldTangent::field(int sensor, std::span<const int> tiles, std::span<doubl
   check_has_no_memory(i.model, sensor);
   const CompiledModel& m = compiled(i.model);
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
+  if (s.elastic)
+    throw InputError("tactile sensor '" + m.scene.sensors[std::size_t(sensor)].name +
+                     "' has ks: its field has no tangent by one state alone; expected ks=\"0\"");
   const int group = i.lane / kGroup;
   if (i.met_group != group || i.met_sensor != sensor)
     i.reader.find_touches(*i.batch, i.block, group, sensor);

@@ -181,8 +181,8 @@ void GroupAdjoint::find_stage(const StageInHand<L>& s) const {
         for (int k = 0; k < kernels::dofs(link.kind); ++k) q[k][l] = centre[k][l] + x[k][l];
         continue;
       }
-      const kernels::Quat<double> turned = rotate_by(
-          quat_at(centre, l), kernels::Vec3<double>{x[0][l], x[1][l], x[2][l]});
+      const kernels::Quat<double> turned =
+          rotate_by(quat_at(centre, l), kernels::Vec3<double>{x[0][l], x[1][l], x[2][l]});
       q[0][l] = turned.w, q[1][l] = turned.x, q[2][l] = turned.y, q[3][l] = turned.z;
     }
   }
@@ -213,8 +213,8 @@ void GroupAdjoint::reverse_stages(const StageInHand<L>& s, const Scheme& scheme,
       if (k == last)
         s.a.memory_adjoint.reverse_end(model_, s.table, w, s.lanes, o, static_cast<int>(n));
       hand_on(s, scheme, k, o);
-      s.a.memory_adjoint.reverse_forces(model_, s.table, w, s.lanes, s.a.q_stage.data(),
-                                        s.a.lambda, o, static_cast<int>(n));
+      s.a.memory_adjoint.reverse_forces(model_, s.table, w, s.lanes, s.a.q_stage.data(), s.a.lambda,
+                                        o, static_cast<int>(n));
     }
   }
   for (std::size_t n = 0; n < s.a.losses.size(); ++n)

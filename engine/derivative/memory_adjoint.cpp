@@ -31,7 +31,8 @@ void hand_on(const RememberingContact& of, const AlignedVector<LinkPose<Row<L>>>
              const Vec6<double>& displacement, const Vec6<double>& twist, int lane,
              AlignedVector<MotionCotangent<Row<L>>>& links) {
   const int first = of.contact.link1, second = of.contact.link2;
-  const LinkPose<double> one = pose_of<L>(poses, first, lane), two = pose_of<L>(poses, second, lane);
+  const LinkPose<double> one = pose_of<L>(poses, first, lane),
+                         two = pose_of<L>(poses, second, lane);
   const Frame<double> second_in_first = relative(one.world, two.world);
   const Vec6<double> Z = motion_to_parent(second_in_first, two.V);
   const Vec6<double> pose = displacement + cross_wrench(Z, twist);
@@ -77,7 +78,7 @@ void MemoryAdjoint<L>::add_to_state(const CompiledModel& m, const kernels::Kerne
                                     const Row<L>* v, Cotangents& links, Row<L>* q_bar,
                                     Row<L>* v_bar) {
   std::fill(rows_.begin(), rows_.end(), Row<L>{});
-  Row<L> *const by_q = rows_.data(), *const by_v = by_q + m.nv;
+  Row<L>*const by_q = rows_.data(), *const by_v = by_q + m.nv;
   table.stage<L>().pull_back_poses(m.view, w.stage, q, v, w.zero, scratch_.data(), links.data(),
                                    by_q, by_v);
   for (int i = 0; i < m.nv; ++i)

@@ -54,9 +54,10 @@ struct ReadoutPullback::Impl {
   ImperfectField imperfections;
   ElasticField elastic;
   std::array<std::vector<double>, kBlock> memory;  ///< cotangents of what friction remembers
-  std::vector<double> whole, ideal;  ///< (points, 3) of an imperfect sensor
+  std::vector<double> whole, ideal;                ///< (points, 3) of an imperfect sensor
 
-  explicit Impl(const Model& m) : model(m), reader(m), met(kGroups, -1), imperfections(m), elastic(m) {
+  explicit Impl(const Model& m)
+      : model(m), reader(m), met(kGroups, -1), imperfections(m), elastic(m) {
     const CompiledModel& c = compiled(m);
     for (auto& l : links) l.resize(c.links.size());
     rows.resize(std::size_t(c.nq + 5 * c.nv));
@@ -65,7 +66,8 @@ struct ReadoutPullback::Impl {
       bytes = std::max(bytes, t->pullback_bytes(c.view));
     for (const CompiledSensor& s : c.sensors) {
       targets = std::max(targets, s.targets.size());
-      if (s.imperfect || s.elastic) whole.resize(std::max(whole.size(), 3 * std::size_t(s.points())));
+      if (s.imperfect || s.elastic)
+        whole.resize(std::max(whole.size(), 3 * std::size_t(s.points())));
     }
     ideal.resize(whole.size());
     scratch.resize(bytes);

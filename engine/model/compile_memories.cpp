@@ -82,7 +82,8 @@ PadPoints points_of(const TactileDescription& d, const kernels::Frame<double>& b
       put(out.axes, body.R * row);
     out.factors.insert(out.factors.end(), factors.begin(), factors.end());
   };
-  for (const TactilePoint& p : d.points) add(p.position, p.axis0, p.axis1, vec3_of(p.normal), p.factors);
+  for (const TactilePoint& p : d.points)
+    add(p.position, p.axis0, p.axis1, vec3_of(p.normal), p.factors);
   if (!d.points.empty()) return out;
   const RectArray& a = d.array;
   const Vec3<double> axis0 = vec3_of(a.axis0), axis1 = vec3_of(a.axis1), first = vec3_of(a.corner0),

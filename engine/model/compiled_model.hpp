@@ -90,8 +90,8 @@ struct CompiledSensor {
   std::array<LateralSpread, 2> spread{};  ///< from row to row, and from column to column
   bool elastic = false;                   ///< its friction remembers
   /// Points of an elastic sensor in the order of the tiles of its contacts.
-  std::vector<int> in_field;  ///< (n) number in the field
-  std::vector<double> point_axes;  ///< (n, 9) rows axis0, axis1, -normal; axes of the link
+  std::vector<int> in_field;          ///< (n) number in the field
+  std::vector<double> point_axes;     ///< (n, 9) rows axis0, axis1, -normal; axes of the link
   std::vector<double> point_factors;  ///< (n, 4) or empty: all 1
 
   /// Earlier states on which a reading depends.

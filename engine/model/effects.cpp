@@ -238,8 +238,7 @@ std::string coefficient_text(const Scene& scene, const Element& d, Field field) 
 
 template <class Element>
 bool acts(const Scene& scene, const Element& d, Field field) {
-  return d.coefficients[coefficient_index(field)] != 0 ||
-         varies(scene, number_of(d), {field});
+  return d.coefficients[coefficient_index(field)] != 0 || varies(scene, number_of(d), {field});
 }
 
 template <Part Of, class Element>

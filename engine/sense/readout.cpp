@@ -48,7 +48,8 @@ struct Readout::Impl {
   std::vector<double> earlier;
   std::optional<Batch> past;
 
-  Impl(const Model& m, Precision p) : model(m), precision(p), reader(m), imperfections(m), elastic(m) {
+  Impl(const Model& m, Precision p)
+      : model(m), precision(p), reader(m), imperfections(m), elastic(m) {
     std::size_t room = 0;
     for (const CompiledSensor& s : compiled(m).sensors) {
       const kernels::Frame<double>& body = compiled(m).bodies[std::size_t(s.body)].frame;
@@ -173,7 +174,8 @@ struct Readout::Impl {
   void make_imperfect(const Batch& batch, int environment, FieldOutput of,
                       std::span<double> field) {
     if (of.form != FieldForm::ideal)
-      imperfections.apply(sensor_of(of.sensor), key_of(batch, environment), part_of(of.form), field);
+      imperfections.apply(sensor_of(of.sensor), key_of(batch, environment), part_of(of.form),
+                          field);
     if (precision != Precision::f64)
       for (double& x : field) x = static_cast<double>(static_cast<float>(x));
   }
@@ -386,7 +388,8 @@ struct Readout::Impl {
   /// shapes differ in size between lanes.
   [[nodiscard]] bool together(const Batch& batch, int number, int sensor) const {
     return small(sensor_of(sensor)) && !sensor_of(sensor).sizes_vary &&
-           sensor_of(sensor).past_states() == 0 && !sensor_of(sensor).elastic && environments_of(batch, number) >= kFewest;
+           sensor_of(sensor).past_states() == 0 && !sensor_of(sensor).elastic &&
+           environments_of(batch, number) >= kFewest;
   }
   static int environments_of(const Batch& batch, int number) {
     return std::min(kBlock, batch.environments() - number * kBlock);

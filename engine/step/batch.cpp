@@ -204,8 +204,7 @@ void Batch::set_memory(int environment, const ShearMemory& memory) {
                        std::to_string(points));
     for (const double s : e.s)
       if (!std::isfinite(s))
-        throw InputError("memory of friction: point " + std::to_string(e.point) +
-                         " is not finite");
+        throw InputError("memory of friction: point " + std::to_string(e.point) + " is not finite");
     last = e.point;
   }
   memory_[std::size_t(environment)] = memory;

@@ -13,6 +13,13 @@ using kernels::kAnchorNumbers;
 using kernels::kGroup;
 using kernels::Vec3;
 
+namespace {
+
+/// Above rounding: some shapes test squares of distances, and no square is below zero [m].
+constexpr double kMargin = 1e-9;
+
+}  // namespace
+
 FeltPoints::FeltPoints(const CompiledModel& m) {
   std::size_t most = 0;
   for (const CompiledSensor& s : m.sensors)
@@ -31,8 +38,7 @@ kernels::RememberingPoints FeltPoints::find(const CompiledSensor& sensor,
   const kernels::PairContact& c = touch.of->contact;
   const int stride = static_cast<int>(index_.size());
   kernels::RememberingPoints points = {places_.data(), anchors_.data(), nullptr, 0, stride};
-  const Vec3<double> middle =
-      transposed_times(touch.shape.R, c.middle - touch.shape.p);
+  const Vec3<double> middle = transposed_times(touch.shape.R, c.middle - touch.shape.p);
   const bool near = kernels::with_distance<double>(
       c.shape, touch.size,
       [&](const auto& shape) -> bool { return nearer_than(shape, middle, c.extent); });
@@ -41,7 +47,7 @@ kernels::RememberingPoints FeltPoints::find(const CompiledSensor& sensor,
   for (int i = 0; i < 9; ++i) pose[i] = touch.shape.R.m[i / 3][i % 3];
   pose[9] = touch.shape.p.x, pose[10] = touch.shape.p.y, pose[11] = touch.shape.p.z;
   points.count = table.find_candidates(
-      {&c, touch.size, pose, 0, places_.data(), stride, touch.faces, index_.data()});
+      {&c, touch.size, pose, kMargin, places_.data(), stride, touch.faces, index_.data()});
   if (sensor.point_factors.empty()) return points;
   points.factors = factors_.data();
   for (int k = 0; k < stride; ++k)

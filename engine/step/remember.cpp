@@ -77,16 +77,16 @@ void advance_memory(const CompiledModel& m, const kernels::KernelTable& table, B
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
     w.remembered.after[std::size_t(l)].clear();
-    for_each_contact(m, w, l,
-                     [&](const RememberingContact& of, const int* index,
-                         const RememberingPoints& points) {
-                       advance_points(table, w, of, l, index, points);
-                     });
-    for_each_felt(m, table, w, w.remembered.end, l,
-                  [&](const RememberingContact& of, const int* index,
-                      const RememberingPoints& points) {
-                    advance_points(table, w, of, l, index, points);
-                  });
+    for_each_contact(
+        m, w, l,
+        [&](const RememberingContact& of, const int* index, const RememberingPoints& points) {
+          advance_points(table, w, of, l, index, points);
+        });
+    for_each_felt(
+        m, table, w, w.remembered.end, l,
+        [&](const RememberingContact& of, const int* index, const RememberingPoints& points) {
+          advance_points(table, w, of, l, index, points);
+        });
   }
 }
 

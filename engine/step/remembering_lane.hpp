@@ -13,7 +13,8 @@ namespace tangere {
 
 /// Returns pose and twist of a link in one lane; link < 0: the world.
 template <int L>
-kernels::LinkPose<double> pose_of(const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int link, int lane) {
+kernels::LinkPose<double> pose_of(const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses,
+                                  int link, int lane) {
   if (link < 0)
     return {{kernels::diagonal(1.0), kernels::zero3<double>()}, kernels::zero6<double>()};
   kernels::LinkPose<double> out;
@@ -53,9 +54,10 @@ kernels::RememberingTouch touch_between(const kernels::RememberingContact& of,
 
 /// The same for one lane of a workspace.
 template <int L>
-kernels::RememberingTouch touch_of(
-    const BasicWorkspace<L>& w, const kernels::RememberingContact& of,
-    const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane) {
+kernels::RememberingTouch touch_of(const BasicWorkspace<L>& w,
+                                   const kernels::RememberingContact& of,
+                                   const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses,
+                                   int lane) {
   kernels::RememberingTouch t = touch_between(
       of, pose_of<L>(poses, of.contact.link1, lane), pose_of<L>(poses, of.contact.link2, lane),
       [&](const kernels::Parameter& p) { return number_of<L>(p, w.stage, lane); });
@@ -72,10 +74,10 @@ kernels::RememberingTouch touch_of(
 template <class Number>
 void look_up(std::span<const ShearEntry> memory, const kernels::RememberingContact& of,
              const int* index, int count, int stride, const Number& number, double* out) {
-  std::size_t at = std::size_t(
-      std::lower_bound(memory.begin(), memory.end(), of.first,
-                       [](const ShearEntry& e, int point) { return e.point < point; }) -
-      memory.begin());
+  std::size_t at =
+      std::size_t(std::lower_bound(memory.begin(), memory.end(), of.first,
+                                   [](const ShearEntry& e, int point) { return e.point < point; }) -
+                  memory.begin());
   const int end = (count + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
   for (int k = 0; k < end; ++k) {
     const int point = of.first + (k >= count ? 0 : index == nullptr ? k : index[k]);
@@ -104,16 +106,16 @@ inline void add_to_entries(std::span<const ShearEntry> memory,
     while (at < memory.size() && memory[at].point < point) ++at;
     if (at == memory.size()) return;
     if (memory[at].point != point) continue;
-    for (int c = 0; c < 3; ++c)
-      to[3 * at + std::size_t(c)] += numbers[c * points.stride + k];
+    for (int c = 0; c < 3; ++c) to[3 * at + std::size_t(c)] += numbers[c * points.stride + k];
   }
 }
 
 /// Returns the listed points of one lane.
 template <int L>
 kernels::RememberingPoints listed(const typename kernels::Stage<L>::List& list, int lane) {
-  return {list.own + 3 * list.stride * lane, list.own_anchors + kernels::kAnchorNumbers * list.stride * lane,
-          nullptr, list.own_count[lane], list.stride};
+  return {list.own + 3 * list.stride * lane,
+          list.own_anchors + kernels::kAnchorNumbers * list.stride * lane, nullptr,
+          list.own_count[lane], list.stride};
 }
 
 /// Calls f(contact, its anchors of lane 0) for every contact with the ground that remembers.
@@ -134,8 +136,7 @@ void for_each_contact(const CompiledModel& m, BasicWorkspace<L>& w, int lane, co
   for (const kernels::RememberingContact& of : m.memories) {
     if (of.pair < 0) continue;
     const auto& list = w.lists[std::size_t(of.pair)];
-    if (list.own_count[lane] > 0)
-      f(of, list.own_index + list.stride * lane, listed<L>(list, lane));
+    if (list.own_count[lane] > 0) f(of, list.own_index + list.stride * lane, listed<L>(list, lane));
   }
   for_each_ground(m, w, [&](const kernels::RememberingContact& of, double* anchors) {
     f(of, static_cast<const int*>(nullptr),

@@ -32,7 +32,7 @@ Names attributes_of(int type) {
 }
 
 void check_attributes(const SceneNode& node, int type) {
-  Names used = {"name", "body",    "type", "kn",    "kt", "mu",
+  Names used = {"name", "body",    "type", "kn",    "kt",           "mu",
                 "ks",   "damping", "law",  "every", "pressure_sign"},
         idle;
   const Names own = attributes_of(type);

@@ -40,17 +40,18 @@ Anchor<N> load_anchor(const Load& load) {
 
 template <class N>
 struct ElasticPoint : PointContact<N> {
-  Vec3<N> arm;     ///< m = x - A
+  Vec3<N> arm;  ///< m = x - A
   Vec3<N> r, s, w;
   N eta, beta, beta_d;
-  N hold;          ///< λ
-  N inverse_w;     ///< 1/|w| where the point slips, else 0
+  N hold;       ///< λ
+  N inverse_w;  ///< 1/|w| where the point slips, else 0
 };
 
 /// Computes spring, bound and force of a point whose geometry, velocities and normal force are set.
 template <class N>
-[[gnu::always_inline]] inline void add_spring(const LawParameters<N>& law, const Mat3<N>& Q, const Vec3<N>& c,
-                const Anchor<N>& anchor, ElasticPoint<N>& p) {
+[[gnu::always_inline]] inline void add_spring(const LawParameters<N>& law, const Mat3<N>& Q,
+                                              const Vec3<N>& c, const Anchor<N>& anchor,
+                                              ElasticPoint<N>& p) {
   const N zero(0.0), one(1.0);
   const Vec3<N> A = c + Q * anchor.a;
   p.arm = p.x2 - A;
@@ -84,8 +85,9 @@ Mat3<N> spring_matrix(const LawParameters<N>& law, const ElasticPoint<N>& p) {
 
 /// Adds the spring's share to the derivative of a point's force.
 template <class Shape, class N>
-[[gnu::always_inline]] inline void differentiate_spring(const LawParameters<N>& law, const ElasticPoint<N>& p,
-                          PointDerivative<N>& r) {
+[[gnu::always_inline]] inline void differentiate_spring(const LawParameters<N>& law,
+                                                        const ElasticPoint<N>& p,
+                                                        PointDerivative<N>& r) {
   const Mat3<N> P = diagonal(N(1.0)) - outer(p.n, p.n);
   Mat3<N> n_rho, n_theta;
   differentiate_normal<Shape>(p, P, n_rho, n_theta);

@@ -222,8 +222,8 @@ void accumulate(PairSums<N>& sums, const Shape& shape, const LawParameters<N>& l
 /// `height` = n·(p - ground point) and V = body twist, all in body axes. Returns false where no
 /// lane touches; then `p` holds d alone.
 template <class N>
-bool meets_ground(const LawParameters<N>& law, const Vec3<N>& m, const N& height,
-                    const Vec6<N>& V, const Vec3<N>& centre, const N& radius, PointContact<N>& p) {
+bool meets_ground(const LawParameters<N>& law, const Vec3<N>& m, const N& height, const Vec6<N>& V,
+                  const Vec3<N>& centre, const N& radius, PointContact<N>& p) {
   p.d = dot(m, centre) + height - radius;
   const auto touching = p.d < N(0.0);
   if (!any(touching)) return false;

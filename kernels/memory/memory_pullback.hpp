@@ -71,8 +71,8 @@ Anchor<N> pull_back_elastic(const LoadedTouch<N>& t, const LawParameters<N>& law
   for (std::size_t i = 0; i < kCoefficients; ++i) out.law[i] = out.law[i] + spring.law[i];
   const Vec3<N> slide = law.kt * spring.w;
   const N along_n = dot(p.n, f_bar);
-  const N rate = mul_add(p.normal.rate_slope, along_n, p.normal.bound_rate * spring.bound) -
-                 dot(p.n, slide);
+  const N rate =
+      mul_add(p.normal.rate_slope, along_n, p.normal.bound_rate * spring.bound) - dot(p.n, slide);
   const Vec3<N> u = mul_add(rate, p.n, slide);
   const N d = mul_add(p.normal.d_slope, along_n, p.normal.bound_d * spring.bound) + of.d;
   const Vec3<N> n =
@@ -115,8 +115,8 @@ void pull_back_memory(const MemoryPullback& m) {
       }
       const Anchor<N> bar =
           pull_back_elastic<Shape>(end, law, p, xi, anchor, f_bar, x_bar, s_bar, of_end);
-      const Vec3<N> s = pull_back_recall(shape, start, xi, load3<A>(m.remembered, stride, k), bar,
-                                         of_start);
+      const Vec3<N> s =
+          pull_back_recall(shape, start, xi, load3<A>(m.remembered, stride, k), bar, of_start);
       store3(load3<A>(m.s_out, stride, k) + s, m.s_out, stride, k);
     }
   });

@@ -11,11 +11,11 @@ namespace tangere::kernels {
 /// A contact that remembers, at one state.
 struct RememberingTouch {
   const RememberingContact* of;
-  Vec3<double> size;      ///< of the touched shape, as in PairContact
-  Vec3<double> faces;     ///< kernels/step/faces.hpp
-  double radius;          ///< as in GroundContact
-  Frame<double> shape;    ///< in body 1
-  Vec6<double> twist;     ///< W, body 1's axes and origin
+  Vec3<double> size;    ///< of the touched shape, as in PairContact
+  Vec3<double> faces;   ///< kernels/step/faces.hpp
+  double radius;        ///< as in GroundContact
+  Frame<double> shape;  ///< in body 1
+  Vec6<double> twist;   ///< W, body 1's axes and origin
   Coefficients<double> law;
 };
 

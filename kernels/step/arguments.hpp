@@ -35,10 +35,10 @@ struct Stage {
     double* own_anchors;  ///< (L, kAnchorNumbers, stride)
     Row<L>* anchors;      ///< (stride, kAnchorNumbers)
   };
-  List* lists;         ///< (n_pairs)
+  List* lists;             ///< (n_pairs)
   Row<L>* ground_anchors;  ///< (points that remember, kAnchorNumbers)
-  Row<L>* faces;       ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
-  std::byte* scratch;  ///< scratch_bytes(model)
+  Row<L>* faces;           ///< (n_pairs, 3) faces that count in this solve (kernels/step/faces.hpp)
+  std::byte* scratch;      ///< scratch_bytes(model)
   Row<L>*v, *g, *force_scale, *mass_diagonal, *A, *LU, *work, *excess;
   Row<L>*weight, *inverse_weight;  ///< (nv) D^½ and D^-½, D the mass diagonal
   /// 1: the Jacobian is that of g. 0: it takes friction of slipping points by its secant.

@@ -135,8 +135,7 @@ void transpose_rows(GroupStage::List& list) {
   for (int l = 0; l < kGroup; ++l)
     for (int c = 0; c < kAnchorNumbers; ++c) {
       const double* from = list.own_anchors + (l * kAnchorNumbers + c) * list.stride;
-      for (int k = 0; k < list.own_count[l]; ++k)
-        list.anchors[kAnchorNumbers * k + c][l] = from[k];
+      for (int k = 0; k < list.own_count[l]; ++k) list.anchors[kAnchorNumbers * k + c][l] = from[k];
       for (int k = list.own_count[l]; k < list.count; ++k)
         list.anchors[kAnchorNumbers * k + c][l] = 0;
     }

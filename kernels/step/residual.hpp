@@ -202,9 +202,9 @@ template <bool Derivatives, class Shape, class N>
   } else {
     const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
     for (int k = 0; k < list.own_count; ++k)
-      add({N(x[k]), N(y[k]), N(z[k])},
-          load_anchor<N>(
-              [&](int number) { return N(list.own_anchors[number * list.stride + k]); }));
+      add({N(x[k]), N(y[k]), N(z[k])}, load_anchor<N>([&](int number) {
+            return N(list.own_anchors[number * list.stride + k]);
+          }));
   }
 }
 

@@ -54,7 +54,7 @@ struct CandidateList {
   const double* own;   ///< (3, stride) candidates of the lane that is evaluated alone, padded to
                        ///< multiples of eight with far points
   int own_count, stride;
-  const N* anchors;          ///< (count, kAnchorNumbers) of the points, or null without memory
+  const N* anchors;           ///< (count, kAnchorNumbers) of the points, or null without memory
   const double* own_anchors;  ///< (kAnchorNumbers, stride) of `own`
 };
 

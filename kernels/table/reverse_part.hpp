@@ -73,10 +73,9 @@ void AdjointPart<N, L>::pull_back_poses(const ModelView& m, const Stage<L>& s, c
                                         MotionCotangent<Row<L>>* links, Row<L>* q_bar,
                                         Row<L>* v_bar) {
   using View = StageView<N, L>;
-  kernels::pull_back_links(m, View::state_of(s, q, v, zero),
-                           reinterpret_cast<LinkMotion<N>*>(scratch),
-                           reinterpret_cast<MotionCotangent<N>*>(links), View::view(q_bar),
-                           View::view(v_bar));
+  kernels::pull_back_links(
+      m, View::state_of(s, q, v, zero), reinterpret_cast<LinkMotion<N>*>(scratch),
+      reinterpret_cast<MotionCotangent<N>*>(links), View::view(q_bar), View::view(v_bar));
 }
 
 template <class Arch>

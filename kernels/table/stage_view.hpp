@@ -59,8 +59,13 @@ struct StageView {
       const typename StageOf::List& l = s.lists[k];
       const int lane = lone < 0 ? 0 : lone;
       lists[k] = {
-          view(l.points),    l.count, view(l.reference), l.margin, l.own + 3 * l.stride * lane,
-          l.own_count[lane], l.stride,
+          view(l.points),
+          l.count,
+          view(l.reference),
+          l.margin,
+          l.own + 3 * l.stride * lane,
+          l.own_count[lane],
+          l.stride,
           view(l.anchors),
           l.own_anchors == nullptr ? nullptr : l.own_anchors + kAnchorNumbers * l.stride * lane};
     }

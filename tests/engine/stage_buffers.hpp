@@ -31,9 +31,8 @@ class StageBuffers {
       points_.emplace_back();
       for (int k = 0; k < 3 * p.n_points; ++k) points_.back().push_back(N(p.points[k]));
       references_.emplace_back(12, N(0.0));
-      lists_.push_back(
-          {points_.back().data(), p.n_points, references_.back().data(), 1e9, nullptr, 0, 0, nullptr,
-           nullptr});
+      lists_.push_back({points_.back().data(), p.n_points, references_.back().data(), 1e9, nullptr,
+                        0, 0, nullptr, nullptr});
     }
   }
 

@@ -143,8 +143,8 @@ double field_loss_of_run(const Model& model, const StepperOptions& options, cons
   return sum;
 }
 
-RunGradient adjoint_of_fields(const Model& model, const StepperOptions& options,
-                              const RunInput& in, const FieldLoss& loss) {
+RunGradient adjoint_of_fields(const Model& model, const StepperOptions& options, const RunInput& in,
+                              const FieldLoss& loss) {
   Batch batch(model, 1);
   batch.set_state(0, in.q, in.v);
   Stepper stepper(model, options);
@@ -189,7 +189,8 @@ TEST_P(ShearGradient, ContactsMatchDifferences) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Scene scene =
         elastic_contacts(seed, 2 + static_cast<int>(seed % 2), ContactLaw(seed % 3));
-    if (!is_split(scene, GetParam(), seed)) compared += check_contacts(scene, GetParam(), seed, 1e-6);
+    if (!is_split(scene, GetParam(), seed))
+      compared += check_contacts(scene, GetParam(), seed, 1e-6);
   }
   EXPECT_GT(compared, 50);
 }
@@ -236,8 +237,8 @@ TEST_P(ShearGradient, ContactsMatchTangents) {
       for (std::size_t i = 0; i < q.size(); ++i) q[i] = tape.state(t)[16 * i];
       loss.add(t, q, cotangents.loss(0), 0);
       for (std::size_t i = 0; i < nv; ++i)
-        forward += cotangents.loss(0).q[16 * i] * state.q[i] +
-                   cotangents.loss(0).v[16 * i] * state.v[i];
+        forward +=
+            cotangents.loss(0).q[16 * i] * state.q[i] + cotangents.loss(0).v[16 * i] * state.v[i];
       if (t == kShearSteps) break;
       const std::vector<double> u_dot = draw(nu);
       for (std::size_t k = 0; k < nu; ++k) reverse += adjoint.u[std::size_t(t) * nu + k] * u_dot[k];
@@ -277,8 +278,8 @@ TEST_P(ShearGradient, FieldsMatchDifferences) {
   for (int i = 0; i < model.nv(); ++i) {
     difference.q.push_back(
         along([&](RunInput& x, double e) { x.q = testing::moved(model, x.q, i, e); }));
-    difference.v.push_back(
-        along([&](RunInput& x, double e) { x.v[std::size_t(i)] += 100 * e; }) / 100);
+    difference.v.push_back(along([&](RunInput& x, double e) { x.v[std::size_t(i)] += 100 * e; }) /
+                           100);
   }
   for (std::size_t t = 0; t < in.u.size(); ++t)
     for (int k = 0; k < model.nu(); ++k)
@@ -307,8 +308,7 @@ TEST_P(ShearGradient, FieldsMatchDifferences) {
   EXPECT_GT(compared, 60);
 }
 
-INSTANTIATE_TEST_SUITE_P(Schemes, ShearGradient,
-                         ::testing::ValuesIn(testing::all_integrators()),
+INSTANTIATE_TEST_SUITE_P(Schemes, ShearGradient, ::testing::ValuesIn(testing::all_integrators()),
                          [](const auto& scheme) { return std::string(to_string(scheme.param)); });
 
 }  // namespace

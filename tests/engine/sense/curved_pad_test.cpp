@@ -96,12 +96,11 @@ Touch<double> random_touch(Random& random, const TouchShape& s) {
 
 Vec3<double> reference(const TouchShape& s, const Touch<double>& t, ContactLaw law,
                        const TactilePoint& p) {
-  const kernels::LawParameters<double> own = {{t.law.kn * p.factors[0],
-                                              t.law.kt * p.factors[1],
-                                              t.law.mu * p.factors[2],
-                                              t.law.damping * p.factors[3]},
-                                              law,
-                                              0};
+  const kernels::LawParameters<double> own = {
+      {t.law.kn * p.factors[0], t.law.kt * p.factors[1], t.law.mu * p.factors[2],
+       t.law.damping * p.factors[3]},
+      law,
+      0};
   const Vec3<double> f = kernels::with_distance<double>(
       s.shape, {s.size[0], s.size[1], s.size[2]}, [&](const auto& shape) {
         return point_contact(shape, own, t.Q, t.c, t.omega, t.v, vec(p.position)).force;

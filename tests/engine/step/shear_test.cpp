@@ -23,9 +23,7 @@ struct Held {
   Stepper stepper;
 
   Held(const Scene& scene, Integrator scheme, double h, double tolerance = 1e-12)
-      : model(scene),
-        batch(model, 1),
-        stepper(model, testing::options(scheme, h, tolerance)) {}
+      : model(scene), batch(model, 1), stepper(model, testing::options(scheme, h, tolerance)) {}
   void go(double time) {
     const int steps = int(std::lround(time / stepper.timestep()));
     const std::vector<double> u(std::size_t(model.nu()));
@@ -97,6 +95,42 @@ INSTANTIATE_TEST_SUITE_P(Schemes, Slope,
                                                               Integrator::sdirk2),
                                             ::testing::Bool()));
 
+/// A skin under the box, on the plate, reads the shear that holds still when the box does: each of
+/// its points has its own spring, stretched by as much as the box has moved on it.
+TEST(Shear, ASkinKeepsItsShear) {
+  for (const double ks : {0.0, 30.0}) {
+    Scene s = slope(20, true, 500);
+    TactileDescription t;
+    t.name = t.body = "plate";
+    t.coefficients = {100, 0.1, 5, 1, ks};
+    t.array = {{-0.03, -0.03, 0.01}, {0.03, 0.03, 0.01}, {1, 0, 0}, {0, 1, 0}, 7, 7};
+    s.sensors.push_back(t);
+    Held run(s, Integrator::bdf2, 5e-3);
+    Readout readout(run.model);
+    const auto shear = [&] {
+      std::vector<double> field(3 * 49);
+      readout.tactile(run.batch, 0, 0, std::span<double>(field));
+      double sum = 0;
+      for (std::size_t k = 0; k < field.size(); k += 3) sum += field[k];
+      return sum;
+    };
+    run.go(2);
+    const double early = shear();
+    run.go(kSanitized ? 0.2 : 3);
+    if (ks == 0) {
+      EXPECT_NEAR(shear(), 0, 1e-3);  // at rest, but for the tilt of the box
+      continue;
+    }
+    EXPECT_NEAR(shear(), early, 1e-7);
+    // The skin's normal points at the box, so what it feels is the box's pull along x.
+    double moved = 0;
+    for (const ShearEntry& e : run.batch.memory(0))
+      if (e.point >= 8) moved -= e.s[0] / 49;
+    EXPECT_NEAR(early, 49 * ks * moved, 1e-3);
+    EXPECT_GT(early, 0.1);
+  }
+}
+
 /// A mass on a belt that runs at 0.02 m/s, held by a spring of 40 N/m (docs/shear.md).
 Scene dragged() {
   Scene s;
@@ -109,7 +143,8 @@ Scene dragged() {
                               CuboidShape{{0.1, 0.05, 0.02}, {2, 2, 2}}, 1000);  // 0.1 kg
   mass.joint.stiffness = 40;
   s.links = {belt, mass};
-  s.pair_contacts.push_back({"mass", "belt", {2000, 0, 0.5, 100, 125}, ContactLaw::clamped, 1e-5, {}});
+  s.pair_contacts.push_back(
+      {"mass", "belt", {2000, 0, 0.5, 100, 125}, ContactLaw::clamped, 1e-5, {}});
   s.initial.push_back({"belt_joint", {0}, {0.02}, {}});
   return s;
 }

@@ -77,8 +77,8 @@ Step random_step(Random& random, PrimitiveShape shape, bool ground) {
   x.xi = x.end.R * place + x.end.p;
   const bool first = random.uniform(0, 1) < 0.33;
   x.start = x.end;
-  const Vec3<double> way = x.end.R * ((first ? -1.5 * depth : 0.2 * depth) * out +
-                                      random.vector(2e-4));
+  const Vec3<double> way =
+      x.end.R * ((first ? -1.5 * depth : 0.2 * depth) * out + random.vector(2e-4));
   x.start.p = x.start.p + way;
   x.twist = random.motion(0.3);
   const Vec3<double> n = x.start.R * out;
@@ -151,8 +151,8 @@ TEST_P(Elastic, MemoryInReverseMatchesDualNumbers) {
       const Anchor<double> anchor = recalled(shape, start, x.xi, x.s);
       const ElasticPoint<double> p = meet_elastic(shape, end, end.law, x.xi, anchor);
       ASSERT_LT(p.d, 0);
-      const Anchor<double> bar = pull_back_elastic<Shape>(end, end.law, p, x.xi, anchor, f_bar,
-                                                          x_bar, s_bar, of_end);
+      const Anchor<double> bar =
+          pull_back_elastic<Shape>(end, end.law, p, x.xi, anchor, f_bar, x_bar, s_bar, of_end);
       of_s = pull_back_recall(shape, start, x.xi, x.s, bar, of_start);
     });
     for (int way = 0; way < 5; ++way) {
@@ -167,8 +167,8 @@ TEST_P(Elastic, MemoryInReverseMatchesDualNumbers) {
       double reverse = dot(of_start, c.start) + dot(of_end.displacement, c.end) +
                        dot(of_end.twist, c.twist) + dot(of_s, c.s);
       for (std::size_t i = 0; i < kCoefficients; ++i) reverse += of_end.law[i] * c.law[i];
-      const double forward = dot(f_bar, epsilon(o.force)) + dot(s_bar, epsilon(o.s)) +
-                             dot(x_bar, epsilon(o.place));
+      const double forward =
+          dot(f_bar, epsilon(o.force)) + dot(s_bar, epsilon(o.s)) + dot(x_bar, epsilon(o.place));
       const double scale = 1e-12 + std::abs(forward) + std::abs(dot(f_bar, epsilon(o.force))) +
                            std::abs(dot(s_bar, epsilon(o.s)));
       EXPECT_NEAR(reverse, forward, 1e-10 * scale) << "way " << way << ", case " << k;
@@ -195,8 +195,8 @@ PairSums<N> sums_of(const Step& x, const Anchor<double>& anchor, const Vec6<doub
   PairSums<N> out = PairSums<N>::zero();
   const Frame<N> at = displaced<N>(x.end, e);
   const Anchor<N> a = {with<N>(anchor.b, {0, 0, 0}), with<N>(anchor.a, {0, 0, 0}), N(anchor.gap)};
-  const LoadedTouch<N> t = touch<N>(
-      x, at, {with<N>(x.twist.a, rate.a), with<N>(x.twist.l, rate.l)}, {});
+  const LoadedTouch<N> t =
+      touch<N>(x, at, {with<N>(x.twist.a, rate.a), with<N>(x.twist.l, rate.l)}, {});
   constexpr bool kDerivatives = std::is_same_v<N, double>;
   const Vec3<N> xi = with<N>(x.xi, {0, 0, 0});
   if (x.ground) {
@@ -259,8 +259,7 @@ class SpherePatch {
     for (Point& p : points_) {
       const LoadedTouch<double> from = touch(x_, p.depth), to = touch(x, p.depth);
       const Anchor<double> anchor = recalled(PlaneDistance<double>{}, from, p.at, p.s);
-      const ElasticPoint<double> e =
-          meet_elastic(PlaneDistance<double>{}, to, law_, p.at, anchor);
+      const ElasticPoint<double> e = meet_elastic(PlaneDistance<double>{}, to, law_, p.at, anchor);
       p.s = e.hold * e.s;
       force -= e.force.x;
     }
@@ -296,8 +295,8 @@ TEST(Elastic, ASphereUnderTangentialLoadSlipsFromTheEdgeInwards) {
     EXPECT_NEAR(loaded, kMu * kP * (1 - (1 - y) * (1 - y)), 5e-3 * loaded) << y;
     double loop = 0, before = loaded, x = y * kU1;
     for (int k = 1; k <= 4 * kQuarter; ++k) {
-      const double to = y * kU1 * (k <= 2 * kQuarter ? 1 - double(k) / kQuarter
-                                                     : double(k) / kQuarter - 3);
+      const double to =
+          y * kU1 * (k <= 2 * kQuarter ? 1 - double(k) / kQuarter : double(k) / kQuarter - 3);
       const double force = patch.move(to);
       loop += 0.5 * (force + before) * (to - x);
       before = force, x = to;
@@ -326,8 +325,14 @@ TEST(Elastic, ACycleOfShearAndRockingGivesOutNoEnergy) {
   bool first = true;
   for (int k = 1; k <= 4 * kPart; ++k) {
     const double t = double(k) / kPart;
-    const double shear = kShear * (t < 1 ? t : t < 2 ? 1 : t < 3 ? 3 - t : 0),
-                 turn = kTurn * (t < 1 ? 0 : t < 2 ? t - 1 : t < 3 ? 1 : 4 - t);
+    const double shear = kShear * (t < 1   ? t
+                                   : t < 2 ? 1
+                                   : t < 3 ? 3 - t
+                                           : 0),
+                 turn = kTurn * (t < 1   ? 0
+                                 : t < 2 ? t - 1
+                                 : t < 3 ? 1
+                                         : 4 - t);
     const Frame<double> next = at(shear, turn);
     const Anchor<double> anchor = recalled(plane, touch(now), xi, s);
     const ElasticPoint<double> p = meet_elastic(plane, touch(next), law, xi, anchor);
