@@ -9,7 +9,8 @@
     env = tangere.make_vec("box_pushing", num_envs=256)      # Gymnasium's vector interface
 
 `tangere.gym` has the environments, `tangere.torch` gradients through PyTorch, `tangere.data` data
-sets for learning. The last two need packages that `import tangere` does not import.
+sets for learning, `tangere.lerobot` writes them for lerobot. All but the first need packages that
+`import tangere` does not import.
 """
 
 from __future__ import annotations

@@ -26,19 +26,23 @@ _FLOOR = 0.05  # of a key's root mean square: the least standard deviation that 
 
 
 class Episodes:
-    """The episodes of a data set, from its shards: `episodes[i]["tactile"]` is (rows, …).
+    """The episodes of a data set: `episodes[i]["tactile"]` is (rows, …).
 
-    Uncompressed data are mapped, not read: an array is a view of the file. A process opens the
-    files for itself, so an object may go to the workers of a loader.
+    `path` is a folder of `tangere generate`, whose shards are read, or one file: a shard or
+    robomimic.hdf5. Uncompressed shards are mapped, not read: an array is a view of the file. A
+    process opens the files for itself, so an object may go to the workers of a loader.
     """
 
     def __init__(self, path: str | Path):
         self.path = Path(path)
-        shards = sorted(self.path.glob("shard-*.h5"))
+        one = self.path.is_file()
+        shards = [self.path] if one else sorted(self.path.glob("shard-*.h5"))
         if not shards:
             raise _core.InputError(
-                f"{self.path}: no shard-*.h5; expected a folder of `tangere generate`"
+                f"{self.path}: no shard-*.h5; expected a folder of `tangere generate`, or one of "
+                "its files"
             )
+        self.masks = self.path if one else self.path / "robomimic.hdf5"
         self._shards = shards
         self.names: list[str] = []  # demo_0, demo_1 … in order
         self._shard_of: list[int] = []
@@ -48,13 +52,17 @@ class Episodes:
         for number, shard in enumerate(shards):
             with h5py.File(shard, "r") as file:
                 if number == 0:
-                    expected = int(file.attrs["dataset_shards"])
+                    if "dataset_shards" not in file.attrs:
+                        raise _core.InputError(f"{shard} is no file of `tangere generate`")
+                    expected = 1 if one else int(file.attrs["dataset_shards"])
                     if expected != len(shards):
                         raise _core.InputError(
                             f"{self.path} has {len(shards)} shards of {expected}; expected all, "
                             "see `tangere generate --resume`"
                         )
                     self.attributes = dict(file["scene"].attrs)
+                    self.command = str(file.attrs["command"])
+                    self._mapped = "mask" not in file  # else its numbers lie in other files
                     self._describe(file)
                 for name, demo in file["data"].items():
                     rows = int(demo.attrs["num_samples"])
@@ -87,7 +95,6 @@ class Episodes:
                 f"{self.path}: a data set of an older version, without scales of observations; "
                 "make it again with `tangere generate`"
             )
-        self.masks = self.path / "robomimic.hdf5"
 
     def __len__(self) -> int:
         return len(self.names)
@@ -103,10 +110,9 @@ class Episodes:
                 f"{self.masks} is missing; expected a merged data set (tangere merge)"
             )
         with h5py.File(self.masks, "r") as file:
-            if name not in file["mask"]:
-                raise _core.InputError(
-                    f"{self.masks}: no mask {name!r}; it has {list(file['mask'])}"
-                )
+            known = list(file.get("mask", ()))
+            if name not in known:
+                raise _core.InputError(f"{self.masks}: no mask {name!r}; it has {known}")
             return self.named([n.decode() for n in file["mask"][name][()]])
 
     def succeeded(self) -> list[int]:
@@ -144,7 +150,8 @@ class Episodes:
 
     def _array(self, episode: int, dataset: h5py.Dataset) -> np.ndarray:
         offset = dataset.id.get_offset()
-        if offset is None or dataset.dtype.kind not in "fiu" or dataset.size == 0:
+        plain = offset is not None and dataset.dtype.kind in "fiu" and dataset.size > 0
+        if not (plain and self._mapped):
             return dataset[()]
         number = self._shard_of[episode]
         if number not in self._maps:
@@ -172,7 +179,7 @@ class Windows:
 
     Parameters
     ----------
-    path: a folder of `tangere generate`, or an `Episodes`.
+    path: a folder of `tangere generate`, one of its files, or an `Episodes`.
     keys: observations to give. None: those that the task shows; of a bare scene all but q and v.
     before, ahead: rows before the present one, and actions from it on.
     split: a mask of robomimic.hdf5, such as "train" or "valid"; None for all episodes.
