@@ -17,6 +17,9 @@ import h5py
 import numpy as np
 
 from . import _core
+from ._generate import generate
+
+__all__ = ["Episodes", "Windows", "generate"]
 
 Form = Literal["stored", "image", "points"]
 Scale = Literal["task", "standard", "none"]
