@@ -68,7 +68,7 @@ class EnvTangere(EnvBase):
                 f"environment {env_name!r} with task {task!r}; expected one of {sorted(ids)} and "
                 "its task"
             )
-        self._name = env_name
+        self._id = env_name
         self._task = ids[env_name]
         self._given = {"task": self._task}
         self._env = TaskEnv(
@@ -172,8 +172,8 @@ class EnvTangere(EnvBase):
 
     @property
     def name(self) -> str:
-        """The id, such as "tangere/BoxPushing-v0"."""
-        return self._name
+        """Such as "BoxPushing-v0". robomimic makes names of files of it, so it has no slash."""
+        return self._id.partition("/")[2]
 
     @property
     def type(self) -> int:
@@ -188,7 +188,7 @@ class EnvTangere(EnvBase):
     def serialize(self) -> dict[str, Any]:
         """`env_args`, from which robomimic makes the environment again."""
         return {
-            "env_name": self.name,
+            "env_name": self._id,
             "type": self.type,
             "env_kwargs": deepcopy(self._given),
             "env_version": self.version,
@@ -215,7 +215,7 @@ class EnvTangere(EnvBase):
         return ()
 
     def __repr__(self) -> str:
-        return f"{self.name}\n{json.dumps(self._given, sort_keys=True)}"
+        return f"{self._id}\n{json.dumps(self._given, sort_keys=True)}"
 
 
 class _ByName:
