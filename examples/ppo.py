@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 
+import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
@@ -35,7 +36,7 @@ def main(arguments: list[str] | None = None) -> float:
         TASK, given.episodes, seed=1_000_003, flatten=True, autoreset="disabled"
     )
     obs, _ = fresh.reset()
-    solved = over = 0
+    solved = over = np.zeros(given.episodes, bool)
     for _ in range(fresh.task.horizon):
         action, _ = model.predict(obs, deterministic=True)
         obs, _, terminated, truncated, info = fresh.step(action)

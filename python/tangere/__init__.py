@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from . import _core
 from ._core import (
     Batch,
     Environments,
@@ -30,7 +31,6 @@ from ._core import (
     TaskSpec,
     TaskTape,
     TensorSpec,
-    __version__,
     instruction_set,
     task_names,
     task_spec,
@@ -60,6 +60,8 @@ __all__ = [
     "task_names",
     "task_spec",
 ]
+
+__version__: str = getattr(_core, "__version__")  # stubs leave such names out
 
 
 def scenes() -> dict[str, Path]:

@@ -234,7 +234,7 @@ class FrameWriter:
         self._table = None
 
 
-def _arrow_type(feature: _Feature) -> pa.DataType:
+def _arrow_type(feature: Feature) -> pa.DataType:
     """Numbers as a plain column, vectors as lists of fixed size, fields as nested lists."""
     plain = {"float32": pa.float32(), "int64": pa.int64(), "bool": pa.bool_()}[feature.dtype]
     if feature.shape == (1,):
@@ -246,7 +246,7 @@ def _arrow_type(feature: _Feature) -> pa.DataType:
     return plain
 
 
-def _arrow_array(rows: np.ndarray, feature: _Feature) -> pa.Array:
+def _arrow_array(rows: np.ndarray, feature: Feature) -> pa.Array:
     values = pa.array(np.ascontiguousarray(rows).reshape(-1))
     if feature.shape == (1,):
         return values

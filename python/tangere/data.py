@@ -11,7 +11,7 @@ import json
 import os
 from collections import OrderedDict
 from pathlib import Path
-from typing import Any, Literal, Sequence
+from typing import Any, Iterator, Literal, Sequence
 
 import h5py
 import numpy as np
@@ -240,9 +240,10 @@ class Windows:
         self._flat: dict[str, np.ndarray | None] = {}  # by name; None: too large for memory
         self._free = memory
         self._like = statistics
-        self._shift, self._factor = {}, {}
+        self._shift: dict[str, np.ndarray] = {}
+        self._factor: dict[str, np.ndarray] = {}
         for key in self.keys:
-            shift, by = np.float32(0), np.asarray(1.0)
+            shift, by = np.asarray(0, np.float32), np.asarray(1.0)
             if scale == "task":
                 by = np.asarray(self.episodes.scale[key], float)
             elif scale == "standard":
@@ -267,7 +268,7 @@ class Windows:
         if self._like is not None:
             return self._like._moments(key)
         if key not in self._statistics:
-            count, total, square = 0, 0.0, 0.0
+            count, total, square = 0, np.zeros(1), np.zeros(1)
             for episode in self.chosen:
                 rows = np.asarray(self.episodes[episode][key], float)
                 rows = rows.reshape(-1, rows.shape[-1])
@@ -292,7 +293,9 @@ class Windows:
             for i in range(len(items))
         ]
 
-    def batches(self, size: int, seed: int = 0, rows: int | None = None):
+    def batches(
+        self, size: int, seed: int = 0, rows: int | None = None
+    ) -> Iterator[dict[str, Any]]:
         """Yields whole batches in random order, arrays as in an item with the batch in front.
 
         Much quicker than a loader that collates items. `rows`: how many windows to give, None for

@@ -150,9 +150,9 @@ def _features(episodes: Episodes, first: int, privileged: bool) -> list[Feature]
             return [key]
         return [f"{key}{''.join(f'[{i}]' for i in at)}" for at in np.ndindex(*shapes[key])]
 
-    def joined(name: str, keys: list[str]) -> list[Feature]:
+    def joined(name: str, keys: Sequence[str]) -> list[Feature]:
         names = [n for key in keys for n in names_of(key)]
-        return [Feature(name, keys, (len(names),), names=names)] if keys else []
+        return [Feature(name, list(keys), (len(names),), names=names)] if keys else []
 
     seen = [key for key in episodes.keys if key not in episodes.privileged]
     features = joined("observation.state", [key for key in seen if len(shapes[key]) == 1])

@@ -137,7 +137,8 @@ def _hand_over() -> int:
     with socket.socket(socket.AF_UNIX) as to:
         to.connect(os.environ[ADDRESS])
         socket.send_fds(to, [b"x"], [0])
-        os.close(0), os.close(1)
+        os.close(0)
+        os.close(1)
         to.recv(1)  # until it is over
     return 0
 

@@ -15,7 +15,7 @@ import json
 import math
 import sys
 from copy import deepcopy
-from typing import Any, Sequence
+from typing import Any, NoReturn, Sequence
 
 import numpy as np
 import robomimic.utils.env_utils as env_utils
@@ -27,7 +27,7 @@ from .gym import TaskEnv, gym_id
 TEST_SEED = 1000003  # of the episodes that `python -m tangere.robomimic` plays
 
 
-class EnvTangere(EnvBase):
+class EnvTangere(EnvBase):  # type: ignore[misc]
     """One environment of a task with robomimic's interface.
 
     Observations have the keys, units and shapes of `obs` in the files of `tangere generate`: what
@@ -90,7 +90,9 @@ class EnvTangere(EnvBase):
         """Actions after which an episode ends at the latest."""
         return int(self._env.task.horizon)
 
-    def reset(self, *, seed: int | None = None, first_episode: int | None = None):
+    def reset(
+        self, *, seed: int | None = None, first_episode: int | None = None
+    ) -> dict[str, np.ndarray]:
         """Starts the next episode, or with a seed the first one of that seed.
 
         Returns the observation, as `step` does.
@@ -106,7 +108,7 @@ class EnvTangere(EnvBase):
         self._actions = []
         return self._take(seen, 0.0, False, info["success"])
 
-    def step(self, action):
+    def step(self, action: Any) -> tuple[dict[str, np.ndarray], float, bool, dict[str, Any]]:
         """Takes an action (na) in [-1, 1]. Returns observation, reward, done and info."""
         action = np.array(action, np.float64)
         seen, reward, terminated, truncated, info = self._env.step(action)
@@ -114,7 +116,9 @@ class EnvTangere(EnvBase):
         self._take(seen, reward, terminated or truncated, info["success"])
         return self.get_observation(), reward, self._done, info
 
-    def _take(self, seen: dict[str, np.ndarray], reward: float, done: bool, success: bool):
+    def _take(
+        self, seen: dict[str, np.ndarray], reward: float, done: bool, success: bool
+    ) -> dict[str, np.ndarray]:
         q, v, _ = self._env.state()
         self._observation = {"q": q.astype(np.float32), "v": v.astype(np.float32), **seen}
         self._reward, self._done, self._success = reward, done, success
@@ -153,22 +157,22 @@ class EnvTangere(EnvBase):
         """{"task": whether the task is solved now}."""
         return {"task": bool(self._success)}
 
-    def render(self, mode="human", height=None, width=None, camera_name=None):
+    def render(self, *arguments: Any, **named: Any) -> NoReturn:
         """Always raises InputError: there are no pictures. See `tangere plot`."""
         raise _core.InputError("there are no pictures of an environment; see `tangere plot`")
 
-    def get_goal(self):
+    def get_goal(self) -> NoReturn:
         """Always raises NotImplementedError: a goal is part of the observation."""
         raise NotImplementedError("a goal is part of the observation of a task")
 
-    def set_goal(self, **kwargs):
+    def set_goal(self, **named: Any) -> NoReturn:
         """Always raises NotImplementedError: a goal is drawn for each episode."""
         raise NotImplementedError("the goal of a task is drawn for each episode")
 
     @property
     def action_dimension(self) -> int:
         """na."""
-        return int(np.prod(self._env.action_space.shape))
+        return int(np.prod(self._env.task.action.shape))
 
     @property
     def name(self) -> str:
@@ -183,7 +187,7 @@ class EnvTangere(EnvBase):
     @property
     def version(self) -> str:
         """The version of Tangere, which a file names as `env_version`."""
-        return str(_core.__version__)
+        return str(getattr(_core, "__version__"))
 
     def serialize(self) -> dict[str, Any]:
         """`env_args`, from which robomimic makes the environment again."""
@@ -196,13 +200,13 @@ class EnvTangere(EnvBase):
 
     @classmethod
     def create_for_data_processing(
-        cls, env_name, camera_names=(), camera_height=None, camera_width=None,
-        reward_shaping=None, **kwargs,
-    ):  # fmt: skip
+        cls, env_name: str, camera_names: Sequence[str] = (), camera_height: Any = None,
+        camera_width: Any = None, reward_shaping: Any = None, **named: Any,
+    ) -> EnvTangere:  # fmt: skip
         """An environment as from the constructor. Rewards are those of the task in any case."""
         if camera_names:
             raise _core.InputError(f"{env_name} has no cameras; expected no camera_names")
-        return cls(env_name, **kwargs)
+        return cls(env_name, **named)
 
     @property
     def base_env(self) -> TaskEnv:
@@ -210,7 +214,7 @@ class EnvTangere(EnvBase):
         return self._env
 
     @property
-    def rollout_exceptions(self) -> tuple[type[Exception], ...]:
+    def rollout_exceptions(self) -> tuple[Any, ...]:
         """None: an episode whose simulation fails ends without success."""
         return ()
 
@@ -243,7 +247,7 @@ def register() -> None:
         return
     _ByName.others = env_utils.get_env_class
 
-    def get_env_class(env_meta=None, env_type=None, env=None):
+    def get_env_class(env_meta: Any = None, env_type: Any = None, env: Any = None) -> Any:
         if isinstance(env, EnvTangere):
             return EnvTangere
         kind = env_utils.get_env_type(env_meta=env_meta, env_type=env_type, env=env)

@@ -19,10 +19,10 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv as BaseVecEnv
 
 from . import _core
-from .gym import VectorTaskEnv, _checked
+from .gym import Observation, VectorTaskEnv, _checked
 
 
-class VecEnv(BaseVecEnv):
+class VecEnv(BaseVecEnv):  # type: ignore[misc]
     """Environments of one task with the interface of `stable_baselines3.common.vec_env.VecEnv`.
 
     The end of an episode shows the start of the next one at once. The `info` of an environment
@@ -63,7 +63,7 @@ class VecEnv(BaseVecEnv):
         if options:
             raise _core.InputError(f"options {options!r}; expected none")
 
-    def reset(self):
+    def reset(self) -> Observation:
         """Starts an episode of every environment and returns the observations."""
         seed, self._seed = self._seed, None
         obs, info = self.env.reset(seed=seed)
@@ -74,7 +74,7 @@ class VecEnv(BaseVecEnv):
         """Keeps actions, (E, na), for `step_wait`."""
         self._actions = np.asarray(actions)
 
-    def step_wait(self):
+    def step_wait(self) -> tuple[Observation, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Takes the actions. Returns observations, rewards (E), dones (E) bool and infos."""
         if self._actions is None:
             raise _core.InputError("step_wait() without step_async(); call that first")
