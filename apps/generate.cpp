@@ -11,6 +11,7 @@
 #include "apps/command.hpp"
 #include "apps/generate_job.hpp"
 #include "apps/memory.hpp"
+#include "apps/policy_program.hpp"
 #include "apps/progress.hpp"
 #include "apps/record.hpp"
 #include "apps/scene_run.hpp"
@@ -31,6 +32,7 @@ namespace {
 
 constexpr std::int64_t kMostEpisodes = 1'000'000'000;
 constexpr int kMostInterval = 1'000'000'000;
+constexpr double kProgramTimeout = 120;  // [s], enough to load a large network
 
 EpisodeOptions episode_options(const GenerateOptions& options, const Model& model,
                                const ControlProgram& controls) {
@@ -73,6 +75,13 @@ std::vector<std::string> split_if_any(const std::string& list) {
   return list.empty() ? std::vector<std::string>{} : split_names("--record", list);
 }
 
+/// For a shell that reads the command again.
+std::string quoted(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
 /// Returns the command that makes the same data set again, in any folder and on any number of
 /// threads.
 std::string command_of(const GenerateOptions& options, const EpisodeOptions& run,
@@ -84,6 +93,7 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
   if (options.noise) command += fmt::format(" --noise {}", *options.noise);
   if (!options.mix.empty()) command += " --mix " + options.mix;
   if (!options.name.empty()) command += " --name " + options.name;
+  if (!options.program.empty()) command += " --program " + quoted(options.program);
   if (!options.controls.empty()) command += " --controls " + options.controls;
   if (options.compress != "none") command += " --compress " + options.compress;
   if (options.tactile != "dense") command += " --tactile " + options.tactile;
@@ -138,20 +148,21 @@ std::vector<Failure> failures_of(const EpisodeSummary& summary) {
   return failures;
 }
 
-TaskReport report_of(const Task& task, PolicyKind policy, const EpisodeSummary& summary) {
+TaskReport report_of(const Task& task, PolicyKind kind, const std::string& player,
+                     const EpisodeSummary& summary) {
   const auto played = summary.episodes - static_cast<std::int64_t>(summary.failures.size());
   TaskReport report;
   report.keys = {{"task", task.spec().name},
-                 {"policy", to_string(policy)},
+                 {"policy", to_string(kind)},
                  {"successes", summary.successes},
                  {"success_rate", played > 0 ? Json(static_cast<double>(summary.successes) /
                                                     static_cast<double>(played))
                                              : Json()},
                  {"mean_return", played > 0 ? Json(summary.mean_return) : Json()},
                  {"simulation_steps", summary.simulation_steps}};
-  report.line = fmt::format("task {}, policy {}: {} of {} episodes solved, mean return {:.4g}",
-                            task.spec().name, to_string(policy), summary.successes, played,
-                            summary.mean_return);
+  report.line =
+      fmt::format("task {}, policy {}: {} of {} episodes solved, mean return {:.4g}",
+                  task.spec().name, player, summary.successes, played, summary.mean_return);
   return report;
 }
 
@@ -297,19 +308,51 @@ int make(const GenerateOptions& options, const Console& console, const Job& job)
 PolicyVariation variation_of(const GenerateOptions& options, PolicyKind kind) {
   for (const GivenOption& option : {GivenOption{"--noise", options.noise.has_value()},
                                     GivenOption{"--mix", !options.mix.empty()}})
-    if (option.given && kind != PolicyKind::scripted)
-      throw InputError(
-          fmt::format("{} with --policy {}; expected scripted", option.name, to_string(kind)));
+    if (option.given && kind != PolicyKind::scripted && kind != PolicyKind::program)
+      throw InputError(fmt::format("{} with --policy {}; expected scripted or program", option.name,
+                                   to_string(kind)));
   return {options.noise.value_or(0), options.mix.empty() ? 0 : random_share_of(options.mix)};
+}
+
+PolicyKind policy_kind(const GenerateOptions& options) {
+  const std::string program = to_string(PolicyKind::program);
+  if (options.program.empty()) {
+    if (options.policy == program)
+      throw InputError("--policy program without --program; expected both");
+    if (options.program_timeout)
+      throw InputError("--program-timeout without --program; expected both");
+    return policy_named(options.policy, options.controls, PolicyKind::scripted);
+  }
+  if (!options.policy.empty() && options.policy != program)
+    throw InputError(fmt::format("--policy {} with --program; expected program", options.policy));
+  if (!options.controls.empty())
+    throw InputError("--controls with --program; expected one of them");
+  if (options.gradients != "none")
+    throw InputError(fmt::format(
+        "--gradients {} with --program, which would be asked about every episode twice; expected "
+        "another policy",
+        options.gradients));
+  return PolicyKind::program;
 }
 
 int generate_task(const GenerateOptions& options, const Console& console, const ProgramInfo& info,
                   const Task& task) {
   refuse_with_task(
       task, {{"--steps", options.steps.has_value()}, {"--every", options.every.has_value()}});
-  const PolicyKind kind = policy_named(options.policy, options.controls, PolicyKind::scripted);
+  const PolicyKind kind = policy_kind(options);
   const PolicyVariation variation = variation_of(options, kind);
-  const Policy policy = make_policy(task, kind, options.controls, variation);
+  std::optional<PolicyProgram> program;
+  if (kind == PolicyKind::program)
+    program.emplace(task, options.seed.value_or(0), info.version, options.program,
+                    options.program_timeout.value_or(kProgramTimeout));
+  const Policy policy =
+      program ? Policy(
+                    task, program->name(),
+                    [&program](const PolicyQuestion& question, std::span<double> actions) {
+                      program->answer(question, actions);
+                    },
+                    variation)
+              : make_policy(task, kind, options.controls, variation);
   Job job;
   job.run.episodes = options.episodes.value_or(0);
   job.run.every = task.spec().steps_per_action;
@@ -337,10 +380,11 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
                   {to_string(kind), policy.players(), variation.noise, variation.random_share});
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
+    if (program) program->stop_when(stop);
     const EpisodeSummary summary = with_gradients(plan_of(run), sink, [&](EpisodeSink& to) {
       return run_episodes(task, policy, run, to, progress, stop);
     });
-    return {summary, report_of(task, kind, summary)};
+    return {summary, report_of(task, kind, policy.players()[0], summary)};
   };
   return make(options, console, job);
 }
@@ -380,6 +424,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   if (const std::unique_ptr<Task> task = find_task(options.scene, console, asked))
     return generate_task(options, console, info, *task);
   refuse_with_scene(options.scene, {{"--policy", !options.policy.empty()},
+                                    {"--program", !options.program.empty()},
                                     {"--noise", options.noise.has_value()},
                                     {"--mix", !options.mix.empty()}});
   const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
@@ -432,14 +477,21 @@ Command add_generate(CLI::App& program) {
   add_text(app, "--controls", o.controls, "U.csv",
            "Table of controls, one row per step, in place of the scene's <control>; for a task, of "
            "actions");
+  add_text(app, "--policy", o.policy, "NAME",
+           "Policy of a task: random, hold, csv (needs --controls), program (needs --program) or "
+           "scripted [default: scripted]");
   add_text(
-      app, "--policy", o.policy, "NAME",
-      "Policy of a task: random, hold, csv (needs --controls) or scripted [default: scripted]");
-  add_positive_number(app, "--noise", o.noise,
-                      "Standard deviation of noise on every number of a scripted action, in its "
-                      "unit [default: none]");
+      app, "--program", o.program, "CMD",
+      "Program that chooses the actions of a task, asked through its standard input and output; "
+      "Python: tangere.policy.serve");
+  add_positive_number(app, "--program-timeout", o.program_timeout,
+                      "Seconds for its start and for every answer [default: 120]");
+  add_positive_number(
+      app, "--noise", o.noise,
+      "Standard deviation of noise on every number of an action of the script or the "
+      "program, in its unit [default: none]");
   add_text(app, "--mix", o.mix, "random=SHARE",
-           "Share of the episodes that random actions play instead of the script [default: none]");
+           "Share of the episodes that random actions play instead [default: none]");
   add_whole_number<std::int64_t>(app, "--steps", o.steps, 1, kMostSteps,
                                  "Steps of an episode [default: as many as the controls last]");
   add_whole_number<int>(

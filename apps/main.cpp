@@ -30,6 +30,8 @@ constexpr const char* kCompiler = "GCC " __VERSION__;
 constexpr const char* kFooter =
     "Exit codes: 0 done; 1 finished, some environments failed; 2 usage or scene error;\n"
     "3 input or output failed; 75 stopped by SIGTERM; 130 stopped by SIGINT.\n"
+    "With the Python package (docs/python.md): python -m tangere.lerobot DIR OUT writes a data\n"
+    "set for lerobot, python -m tangere.robomimic MODEL.pth plays what robomimic has trained.\n"
     "Example:\n"
     "  tangere simulate scenes/rolling_ball.xml --output ball.h5 --envs 4";
 

@@ -71,8 +71,9 @@ std::vector<T> chosen(const std::vector<T>& all, const std::vector<std::size_t>&
 std::string DatasetLayout::dataset_id() const {
   std::string name = set_name;
   if (name.empty() && task)
-    name = fmt::format("{}{}{}", fitted(played_by.policy), played_by.noise > 0 ? "-noise" : "",
-                       played_by.random_share > 0 ? "-random" : "");
+    name = fmt::format(
+        "{}{}{}", fitted(played_by.players.empty() ? played_by.policy : played_by.players[0]),
+        played_by.noise > 0 ? "-noise" : "", played_by.random_share > 0 ? "-random" : "");
   return fmt::format("tangere/{}{}{}-v0", fitted(task ? task->name : scene_name),
                      name.empty() ? "" : "/", name);
 }

@@ -93,7 +93,8 @@ MinariView::MinariView(const std::string& folder, const h5::Id& shard, const Dem
   seed_ = h5::read_number<std::uint64_t>(scene, "seed");
   if (members.of_task) {
     task_ = h5::read_text(scene, "task");
-    policy_ = h5::read_text(scene, "policy");
+    const std::vector<std::string> players = h5::read_texts(scene, "policies");
+    if (!players.empty()) policy_ = players.front();  // a program by its own name
     low_ = bound(h5::read_number<double>(scene, "action_low"));
     high_ = bound(h5::read_number<double>(scene, "action_high"));
   }

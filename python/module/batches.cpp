@@ -282,6 +282,7 @@ void add_batches(nb::module_& m) {
           "v", [](const Run& r) { return r.v; }, nb::rv_policy::automatic, "(F, E, nv) velocities.")
       .def_prop_ro(
           "fields", [](const Run& r) { return r.readings; },
+          nb::for_getter(nb::sig("def fields(self) -> dict[str, numpy.typing.NDArray]")),
           "What was asked for by name: (F, E, …), as Batch.tactile() returns it.")
       .def_prop_ro(
           "status", [](const Run& r) { return r.status; }, nb::rv_policy::automatic,
@@ -323,6 +324,8 @@ void add_batches(nb::module_& m) {
                    "through; negative where an environment has failed and stands still.")
       .def("end_effectors", &PythonBatch::end_effectors, "(E, n, 3) places in the world [m].")
       .def("bodies", &PythonBatch::bodies,
+           nb::sig("def bodies(self) -> tuple[numpy.typing.NDArray[numpy.float64], "
+                   "numpy.typing.NDArray[numpy.float64]]"),
            "Poses (E, nb, 7), x y z qw qx qy qz in the world, and twists (E, nb, 6), angular then\n"
            "linear velocity in world axes.")
       .def("step", &PythonBatch::step, "u"_a,
@@ -333,6 +336,8 @@ void add_batches(nb::module_& m) {
            "every `every` steps, and the readings named in `fields`. InputError: another shape, T\n"
            "is no multiple of `every`, or there is no such reading.")
       .def("tactile", &PythonBatch::tactile, "reading"_a, "out"_a = nb::none(),
+           nb::sig("def tactile(self, reading: str, out: numpy.typing.NDArray | None = None) -> "
+                   "numpy.typing.NDArray"),
            "Reads one sensor in all environments: 'pad' (E, rows, cols, 3) or (E, points, 3),\n"
            "shear, shear, normal force of each point [N]; 'pad.pressure' and 'pad.shear' parts of\n"
            "it; 'pad.sum' (E, 6): force [N] and where it presses [m], body axes. `out`: an array\n"

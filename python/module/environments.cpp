@@ -136,6 +136,8 @@ void add_environments(nb::module_& m) {
            "Takes one action of every environment, (E, action), clipped to its bounds. With\n"
            "autoreset, an environment whose episode has ended starts the next one instead.")
       .def("observations", &Environments::observations, "scaled"_a = true, "keys"_a = nb::none(),
+           nb::sig("def observations(self, scaled: bool = True, keys: Sequence[str] | None = None) "
+                   "-> dict[str, numpy.typing.NDArray[numpy.float32]]"),
            "A dict of new float32 arrays (E, …), divided by their scales if `scaled`, else in SI\n"
            "units.")
       .def("rewards", numbers<double>(&VectorTask::rewards), "(E) of the last step.")
@@ -155,8 +157,11 @@ void add_environments(nb::module_& m) {
           "random", [](Environments& self) { return self.actions_of(1); },
           "(E, action): uniform within the bounds, the same for the same seed and episode.")
       .def("state", &Environments::state,
+           nb::sig("def state(self) -> tuple[numpy.typing.NDArray[numpy.float64], "
+                   "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64]]"),
            "q (E, nq), v (E, nv) and the task's memory (E, memory): what a robot cannot see.")
-      .def("counts", &Environments::counts, "Steps and Newton passes since the last reset.")
+      .def("counts", &Environments::counts, nb::sig("def counts(self) -> dict[str, int]"),
+           "Steps and Newton passes since the last reset.")
       .def_prop_ro("spec", &Environments::spec)
       .def_prop_ro("model", &Environments::model)
       .def_prop_ro("envs", &Environments::count);

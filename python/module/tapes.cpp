@@ -162,6 +162,9 @@ void add_tapes(nb::module_& m) {
            "that\n"
            "passes through this step and later ones. 0 beyond an action's bounds.")
       .def("reverse_start", &Tape::reverse_start, "by_observation"_a,
+           nb::sig("def reverse_start(self, by_observation: numpy.typing.ArrayLike) -> "
+                   "tuple[numpy.typing.NDArray[numpy.float64], "
+                   "numpy.typing.NDArray[numpy.float64]]"),
            "Ends the reverse pass: takes derivatives by the first observations (E, n), returns\n"
            "those by the first states, (E, nv) by q along the dofs of v, and by v.")
       .def("begin_reverse", &Tape::begin_reverse, "Begins another reverse pass over the tape.")

@@ -13,7 +13,9 @@ using nb::literals::operator""_a;
 void add_tasks(nb::module_& m) {
   nb::class_<TensorSpec>(m, "TensorSpec", "An array of numbers that a task receives or returns.")
       .def_ro("name", &TensorSpec::name)
-      .def_prop_ro("shape", [](const TensorSpec& t) { return nb::tuple(nb::cast(t.shape)); })
+      .def_prop_ro(
+          "shape", [](const TensorSpec& t) { return nb::tuple(nb::cast(t.shape)); },
+          nb::for_getter(nb::sig("def shape(self) -> tuple[int, ...]")))
       .def_ro("unit", &TensorSpec::unit)
       .def_ro("meaning", &TensorSpec::meaning)
       .def_ro("low", &TensorSpec::low, "Lower bound of every number, or -inf.")

@@ -9,13 +9,16 @@
     env = tangere.make_vec("box_pushing", num_envs=256)      # Gymnasium's vector interface
 
 `tangere.gym` has the environments, `tangere.torch` gradients through PyTorch, `tangere.data` data
-sets for learning. The last two need packages that `import tangere` does not import.
+sets for learning, `tangere.policy` policies that the command asks. `tangere.lerobot`,
+`tangere.robomimic` and `tangere.sb3` are doors to the libraries of these names. All but
+`tangere.gym` and `tangere.policy` need packages that `import tangere` does not import.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from . import _core
 from ._core import (
     Batch,
     Environments,
@@ -28,7 +31,6 @@ from ._core import (
     TaskSpec,
     TaskTape,
     TensorSpec,
-    __version__,
     instruction_set,
     task_names,
     task_spec,
@@ -58,6 +60,8 @@ __all__ = [
     "task_names",
     "task_spec",
 ]
+
+__version__: str = getattr(_core, "__version__")  # stubs leave such names out
 
 
 def scenes() -> dict[str, Path]:

@@ -11,12 +11,15 @@ import json
 import os
 from collections import OrderedDict
 from pathlib import Path
-from typing import Any, Literal, Sequence
+from typing import Any, Iterator, Literal, Sequence
 
 import h5py
 import numpy as np
 
 from . import _core
+from ._generate import generate
+
+__all__ = ["Episodes", "Windows", "generate"]
 
 Form = Literal["stored", "image", "points"]
 Scale = Literal["task", "standard", "none"]
@@ -26,19 +29,23 @@ _FLOOR = 0.05  # of a key's root mean square: the least standard deviation that 
 
 
 class Episodes:
-    """The episodes of a data set, from its shards: `episodes[i]["tactile"]` is (rows, …).
+    """The episodes of a data set: `episodes[i]["tactile"]` is (rows, …).
 
-    Uncompressed data are mapped, not read: an array is a view of the file. A process opens the
-    files for itself, so an object may go to the workers of a loader.
+    `path` is a folder of `tangere generate`, whose shards are read, or one file: a shard or
+    robomimic.hdf5. Uncompressed shards are mapped, not read: an array is a view of the file. A
+    process opens the files for itself, so an object may go to the workers of a loader.
     """
 
     def __init__(self, path: str | Path):
         self.path = Path(path)
-        shards = sorted(self.path.glob("shard-*.h5"))
+        one = self.path.is_file()
+        shards = [self.path] if one else sorted(self.path.glob("shard-*.h5"))
         if not shards:
             raise _core.InputError(
-                f"{self.path}: no shard-*.h5; expected a folder of `tangere generate`"
+                f"{self.path}: no shard-*.h5; expected a folder of `tangere generate`, or one of "
+                "its files"
             )
+        self.masks = self.path if one else self.path / "robomimic.hdf5"
         self._shards = shards
         self.names: list[str] = []  # demo_0, demo_1 … in order
         self._shard_of: list[int] = []
@@ -48,13 +55,17 @@ class Episodes:
         for number, shard in enumerate(shards):
             with h5py.File(shard, "r") as file:
                 if number == 0:
-                    expected = int(file.attrs["dataset_shards"])
+                    if "dataset_shards" not in file.attrs:
+                        raise _core.InputError(f"{shard} is no file of `tangere generate`")
+                    expected = 1 if one else int(file.attrs["dataset_shards"])
                     if expected != len(shards):
                         raise _core.InputError(
                             f"{self.path} has {len(shards)} shards of {expected}; expected all, "
                             "see `tangere generate --resume`"
                         )
                     self.attributes = dict(file["scene"].attrs)
+                    self.command = str(file.attrs["command"])
+                    self._mapped = "mask" not in file  # else its numbers lie in other files
                     self._describe(file)
                 for name, demo in file["data"].items():
                     rows = int(demo.attrs["num_samples"])
@@ -87,7 +98,6 @@ class Episodes:
                 f"{self.path}: a data set of an older version, without scales of observations; "
                 "make it again with `tangere generate`"
             )
-        self.masks = self.path / "robomimic.hdf5"
 
     def __len__(self) -> int:
         return len(self.names)
@@ -103,10 +113,9 @@ class Episodes:
                 f"{self.masks} is missing; expected a merged data set (tangere merge)"
             )
         with h5py.File(self.masks, "r") as file:
-            if name not in file["mask"]:
-                raise _core.InputError(
-                    f"{self.masks}: no mask {name!r}; it has {list(file['mask'])}"
-                )
+            known = list(file.get("mask", ()))
+            if name not in known:
+                raise _core.InputError(f"{self.masks}: no mask {name!r}; it has {known}")
             return self.named([n.decode() for n in file["mask"][name][()]])
 
     def succeeded(self) -> list[int]:
@@ -144,7 +153,8 @@ class Episodes:
 
     def _array(self, episode: int, dataset: h5py.Dataset) -> np.ndarray:
         offset = dataset.id.get_offset()
-        if offset is None or dataset.dtype.kind not in "fiu" or dataset.size == 0:
+        plain = offset is not None and dataset.dtype.kind in "fiu" and dataset.size > 0
+        if not (plain and self._mapped):
             return dataset[()]
         number = self._shard_of[episode]
         if number not in self._maps:
@@ -172,7 +182,7 @@ class Windows:
 
     Parameters
     ----------
-    path: a folder of `tangere generate`, or an `Episodes`.
+    path: a folder of `tangere generate`, one of its files, or an `Episodes`.
     keys: observations to give. None: those that the task shows; of a bare scene all but q and v.
     before, ahead: rows before the present one, and actions from it on.
     split: a mask of robomimic.hdf5, such as "train" or "valid"; None for all episodes.
@@ -230,9 +240,10 @@ class Windows:
         self._flat: dict[str, np.ndarray | None] = {}  # by name; None: too large for memory
         self._free = memory
         self._like = statistics
-        self._shift, self._factor = {}, {}
+        self._shift: dict[str, np.ndarray] = {}
+        self._factor: dict[str, np.ndarray] = {}
         for key in self.keys:
-            shift, by = np.float32(0), np.asarray(1.0)
+            shift, by = np.asarray(0, np.float32), np.asarray(1.0)
             if scale == "task":
                 by = np.asarray(self.episodes.scale[key], float)
             elif scale == "standard":
@@ -257,7 +268,7 @@ class Windows:
         if self._like is not None:
             return self._like._moments(key)
         if key not in self._statistics:
-            count, total, square = 0, 0.0, 0.0
+            count, total, square = 0, np.zeros(1), np.zeros(1)
             for episode in self.chosen:
                 rows = np.asarray(self.episodes[episode][key], float)
                 rows = rows.reshape(-1, rows.shape[-1])
@@ -282,7 +293,9 @@ class Windows:
             for i in range(len(items))
         ]
 
-    def batches(self, size: int, seed: int = 0, rows: int | None = None):
+    def batches(
+        self, size: int, seed: int = 0, rows: int | None = None
+    ) -> Iterator[dict[str, Any]]:
         """Yields whole batches in random order, arrays as in an item with the batch in front.
 
         Much quicker than a loader that collates items. `rows`: how many windows to give, None for

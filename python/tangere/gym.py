@@ -19,6 +19,8 @@ from gymnasium.vector.utils import batch_space
 
 from . import _core
 
+# KEY → array, or one array with `flatten`; which one it is hangs on an argument.
+Observation = Any
 Autoreset = Literal["next_step", "same_step", "disabled"]
 _MODES = {
     "next_step": AutoresetMode.NEXT_STEP,
@@ -48,19 +50,22 @@ def observation_space(
     spec: _core.TaskSpec, keys: Sequence[str], normalise: bool, flatten: bool
 ) -> spaces.Space:
     """The space of one environment's observations."""
-    boxes = {}
+    boxes: dict[str, spaces.Space] = {}
+    parts: list[spaces.Box] = []
     for tensor in spec.observations:
         if tensor.name not in keys:
             continue
         scale = np.broadcast_to(np.asarray(observation_scale(tensor)), tensor.shape)
         by = scale if normalise else np.ones(tensor.shape)
-        boxes[tensor.name] = spaces.Box(
+        box = spaces.Box(
             (tensor.low / by).astype(np.float32), (tensor.high / by).astype(np.float32)
         )
+        boxes[tensor.name] = box
+        parts.append(box)
     if not flatten:
         return spaces.Dict(boxes)
-    low = np.concatenate([boxes[key].low.ravel() for key in boxes])
-    high = np.concatenate([boxes[key].high.ravel() for key in boxes])
+    low = np.concatenate([box.low.ravel() for box in parts])
+    high = np.concatenate([box.high.ravel() for box in parts])
     return spaces.Box(low, high)
 
 
@@ -166,7 +171,9 @@ class VectorTaskEnv(VectorEnv):
         """The compiled scene."""
         return self._env.model
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
         """Starts episodes: the first ones of `seed`, or without it the next ones.
 
         `options`: "reset_mask" (E) bool starts those alone; "first_episode" goes with a seed.
@@ -189,7 +196,9 @@ class VectorTaskEnv(VectorEnv):
         self._fresh = False
         return self._observe(), self._info()
 
-    def step(self, actions):
+    def step(
+        self, actions: Any
+    ) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Takes one action (E, na) of every environment, clipped to its bounds.
 
         Returns observations, rewards (E) float64, terminated, truncated (E) bool, info. Everything
@@ -228,7 +237,7 @@ class VectorTaskEnv(VectorEnv):
         """Environment steps, simulation steps and Newton passes since the last reset by seed."""
         return self._env.counts()
 
-    def _observe(self):
+    def _observe(self) -> Observation:
         arrays = self._env.observations(self.normalise, self.keys)
         if not self.flatten:
             return arrays
@@ -283,14 +292,16 @@ class TaskEnv(gymnasium.Env):
         self.observation_space = self._vector.single_observation_space
         self._over = True
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
         """Starts an episode; see the class."""
         super().reset(seed=seed)
         obs, info = self._vector.reset(seed=seed, options=options)
         self._over = False
         return self._one(obs), self._info(info)
 
-    def step(self, action):
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Takes one action (na). Raises InputError after the end of an episode."""
         if self._over:
             raise _core.InputError("step() without an episode; call reset() first")
@@ -318,7 +329,7 @@ class TaskEnv(gymnasium.Env):
         q, v, memory = self._vector.state()
         return q[0], v[0], memory[0]
 
-    def _one(self, obs):
+    def _one(self, obs: Observation) -> Observation:
         return obs[0] if self._vector.flatten else {key: value[0] for key, value in obs.items()}
 
     @staticmethod

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -24,7 +25,8 @@ import torch
 from . import _core
 from .gym import task_scene
 
-Observations = "torch.Tensor | dict[str, torch.Tensor]"
+# KEY → tensor, or one tensor with `flatten`; which one it is hangs on an argument.
+Observations = Any
 
 
 class Tape:
@@ -149,11 +151,11 @@ class _Run:
         self.passing = False
 
 
-class _Step(torch.autograd.Function):
+class _Step(torch.autograd.Function):  # type: ignore[misc]
     """One action. A token passes from step to step, so that backward takes them in order."""
 
     @staticmethod
-    def forward(ctx, actions, token, run, dtype):
+    def forward(ctx: Any, actions: Any, token: Any, run: Any, dtype: Any) -> Any:
         run.tape.step(actions.detach().to("cpu", torch.float64).numpy())
         ctx.run, ctx.step, ctx.dtype = run, run.taken, actions.dtype
         run.taken += 1
@@ -161,8 +163,8 @@ class _Step(torch.autograd.Function):
         return rows, torch.from_numpy(run.tape.rewards()), token.clone()
 
     @staticmethod
-    @torch.autograd.function.once_differentiable
-    def backward(ctx, by_rows, by_reward, by_token):
+    @torch.autograd.function.once_differentiable  # type: ignore[untyped-decorator]
+    def backward(ctx: Any, by_rows: Any, by_reward: Any, by_token: Any) -> Any:
         by_action = ctx.run.reverse(
             ctx.step, by_rows.to(torch.float64).numpy(), by_reward.to(torch.float64).numpy()
         )
@@ -252,7 +254,7 @@ def gradcheck(
     for k in range(directions):
         along = [torch.randn(w.shape, generator=generator, dtype=w.dtype) for w in weights]
         analytic = float(sum((g * d).sum() for g, d in zip(gradient, along)))
-        best = None
+        tried: list[Check] = []
         for step in steps:
             values = []
             for sign in (1, -2, 1):
@@ -262,7 +264,6 @@ def gradcheck(
                     values.append(float(mean_return()))
             difference = (values[0] - values[1]) / (2 * step)
             error = abs(analytic - difference) / max(abs(analytic), abs(difference), 1e-300)
-            if best is None or error < best.error:
-                best = Check(k, analytic, difference, step, error)
-        checks.append(best)
+            tried.append(Check(k, analytic, difference, step, error))
+        checks.append(min(tried, key=lambda check: check.error))
     return checks

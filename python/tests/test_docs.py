@@ -3,11 +3,19 @@
 
 from __future__ import annotations
 
+import ast
+import importlib.util
 import re
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
+import h5py
 import pytest
+
+import tangere
+from tangere import _core
 
 ROOT = Path(__file__).parents[2]
 
@@ -20,6 +28,52 @@ def test_every_block_of_the_page_runs(command, tmp_path):
     names = {"TANGERE": str(command), "DATA": str(tmp_path / "data")}
     for block in blocks:  # in order: later ones use names of earlier ones
         exec(compile(block, "docs/python.md", "exec"), names)
+
+
+def test_the_reference_is_made_of_the_docstrings():
+    path = ROOT / "python/api_reference.py"
+    spec = importlib.util.spec_from_file_location("api_reference", path)
+    reference = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(reference)
+    text, silent = reference.page(Path(tangere.__path__[0]))
+    assert silent == []
+    assert text == (ROOT / "docs/python_api.md").read_text(encoding="utf-8"), (
+        "docs/python_api.md is not current; run python/api_reference.py"
+    )
+    for name in tangere.__all__:  # nothing of the package is left out
+        assert f"tangere.{name}" in text or f"tangere.gym.{name}" in text or name in (
+            "__version__", "instruction_set",
+        ), name  # fmt: skip
+
+
+def test_the_stub_has_what_the_module_has():
+    stub = ast.parse((Path(tangere.__path__[0]) / "_core.pyi").read_text())
+    said = {n.name: n for n in stub.body if isinstance(n, (ast.ClassDef, ast.FunctionDef))}
+    there = {n for n in vars(_core) if not n.startswith("_") and callable(getattr(_core, n))}
+    assert set(said) == there
+    for name, node in said.items():
+        if isinstance(node, ast.ClassDef) and name not in ("InputError", "IoError"):
+            members = {n.name for n in node.body if isinstance(n, ast.FunctionDef)}
+            own = {n for n in vars(getattr(_core, name)) if not n.startswith("_")}
+            assert {n for n in members if not n.startswith("_")} == own, name
+
+
+def test_every_block_of_the_page_of_policies_runs(command, tmp_path, monkeypatch):
+    page = (ROOT / "docs/policies.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    assert len(blocks) == 2
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").mkdir()
+    names = {"__name__": "my_policy"}
+    for block in blocks:
+        exec(compile(block, "docs/policies.md", "exec"), names)
+    assert names["said"]["policy"] == "program"
+    (tmp_path / "my_policy.py").write_text(blocks[0])
+    program = f"{sys.executable} my_policy.py"
+    words = ["box_pushing", "--episodes", "32", "--output", "out/own", "--program", program]
+    subprocess.run([command, "generate", *words], check=True, capture_output=True, cwd=tmp_path)
+    with h5py.File("out/own/shard-00000.h5") as own, h5py.File("out/mine/shard-00000.h5") as mine:
+        assert own.attrs["content_sum"] == mine.attrs["content_sum"]
 
 
 def test_the_example_draws_a_round_touch(capsys):

@@ -3,6 +3,7 @@
 #include "tasks/run/episode_program.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "tasks/run/step_tally.hpp"
 
@@ -29,6 +30,9 @@ TaskProgram::TaskProgram(const Task& task, const Policy& policy,
       at_end_(at_end) {
   workers_.reserve(static_cast<std::size_t>(in_turn));
   for (int b = 0; b < in_turn; ++b) workers_.emplace_back(task, precision);
+  if (!policy.asks_together()) return;
+  seen_.resize(kBlock * task.spec().observation_size());
+  chosen_.resize(kBlock * task.spec().action.size());
 }
 
 void TaskProgram::start(Batch& batch, int block) {
@@ -38,7 +42,38 @@ void TaskProgram::start(Batch& batch, int block) {
   worker(block).conclude(batch, *data_, block, counts_);
 }
 
+/// One question about the environments that go on. Those that the random policy plays are not part
+/// of it.
+void TaskProgram::choose_together(const Batch& batch, int block) {
+  const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
+  std::array<TaskView, kBlock> views;
+  std::array<std::size_t, kBlock> asked{};
+  std::size_t count = 0;
+  const int first = block * kBlock;
+  for (int e = first; e < first + lanes_of(batch, block); ++e) {
+    const auto at = static_cast<std::size_t>(e);
+    if (data_->state[at] != EnvironmentState::running) continue;
+    const TaskView view = view_of(batch, *data_, e);
+    const std::span observation = std::span(data_->observation).subspan(at * seen, seen);
+    if (policy_.player(view.seed, view.episode) > 0) {
+      policy_.act(view, observation, std::span(actions_).subspan(at * width, width));
+      continue;
+    }
+    std::copy(observation.begin(), observation.end(),
+              seen_.begin() + static_cast<std::ptrdiff_t>(count * seen));
+    views[count] = view;
+    asked[count++] = at;
+  }
+  if (count == 0) return;
+  policy_.act(std::span(views).first(count), std::span(seen_).first(count * seen),
+              std::span(chosen_).first(count * width));
+  for (std::size_t i = 0; i < count; ++i)
+    std::copy_n(chosen_.begin() + static_cast<std::ptrdiff_t>(i * width), width,
+                actions_.begin() + static_cast<std::ptrdiff_t>(asked[i] * width));
+}
+
 void TaskProgram::choose(const Batch& batch, int block) {
+  if (policy_.asks_together()) return choose_together(batch, block);
   const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
   const auto first = static_cast<std::size_t>(block) * kBlock,
              last = first + static_cast<std::size_t>(lanes_of(batch, block));

@@ -96,12 +96,14 @@ class TaskProgram : public EpisodeProgram {
     return workers_[static_cast<std::size_t>(block) % workers_.size()];
   }
   void choose(const Batch& batch, int block);
+  void choose_together(const Batch& batch, int block);
 
   const Task& task_;
   const Policy& policy_;
   std::shared_ptr<EnvironmentData> data_;
-  std::vector<BlockWorker> workers_;  // each holds what it last saw of its block
-  std::vector<double> actions_;       // (E, action)
+  std::vector<BlockWorker> workers_;   // each holds what it last saw of its block
+  std::vector<double> actions_;        // (E, action)
+  std::vector<double> seen_, chosen_;  // (16, observation), (16, action) for one question
   AtEnd at_end_;
   VectorCounts counts_;
 };

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "engine/model/random.hpp"
@@ -25,19 +26,21 @@ const char* to_string(PolicyKind kind) {
     case PolicyKind::hold: return "hold";
     case PolicyKind::csv: return "csv";
     case PolicyKind::scripted: return "scripted";
+    case PolicyKind::program: return "program";
   }
   return "unknown";
 }
 
 Policy::Policy(const Task& task, PolicyKind kind, std::vector<std::vector<double>> table,
                const PolicyVariation& variation)
-    : task_(task), kind_(kind), table_(std::move(table)), variation_(variation) {
-  if (!(variation.noise >= 0) || !std::isfinite(variation.noise))
-    throw InputError(
-        fmt::format("a noise of {}; expected a finite number, 0 or above", variation.noise));
-  if (!(variation.random_share >= 0 && variation.random_share <= 1))
-    throw InputError(
-        fmt::format("a share of {} random episodes; expected 0 to 1", variation.random_share));
+    : task_(task),
+      kind_(kind),
+      name_(to_string(kind)),
+      table_(std::move(table)),
+      variation_(variation) {
+  check(variation);
+  if (kind == PolicyKind::program)
+    throw InputError("a program without a name and answers; expected both");
   if (kind != PolicyKind::scripted && (variation.noise > 0 || variation.random_share > 0))
     throw InputError(fmt::format("noise, or random episodes, with the policy {}; expected scripted",
                                  to_string(kind)));
@@ -50,8 +53,27 @@ Policy::Policy(const Task& task, PolicyKind kind, std::vector<std::vector<double
           fmt::format("a row of {} numbers in a table of actions; expected {}", row.size(), width));
 }
 
+Policy::Policy(const Task& task, std::string name, PolicyAnswer answer,
+               const PolicyVariation& variation)
+    : task_(task),
+      kind_(PolicyKind::program),
+      name_(std::move(name)),
+      answer_(std::move(answer)),
+      variation_(variation) {
+  check(variation);
+}
+
+void Policy::check(const PolicyVariation& variation) const {
+  if (!(variation.noise >= 0) || !std::isfinite(variation.noise))
+    throw InputError(
+        fmt::format("a noise of {}; expected a finite number, 0 or above", variation.noise));
+  if (!(variation.random_share >= 0 && variation.random_share <= 1))
+    throw InputError(
+        fmt::format("a share of {} random episodes; expected 0 to 1", variation.random_share));
+}
+
 std::vector<std::string> Policy::players() const {
-  std::vector<std::string> names{to_string(kind_)};
+  std::vector<std::string> names{name_};
   if (variation_.random_share > 0) names.emplace_back(to_string(PolicyKind::random));
   return names;
 }
@@ -78,7 +100,28 @@ void Policy::act(const TaskView& view, std::span<const double> observation,
       task_.scripted(view, observation, action);
       if (variation_.noise > 0) disturb(view, action);
       return;
+    case PolicyKind::program: act(std::span(&view, 1), observation, action); return;
   }
+}
+
+void Policy::act(std::span<const TaskView> views, std::span<const double> observations,
+                 std::span<double> actions) const {
+  const std::size_t width = task_.spec().action.size(), seen = task_.spec().observation_size();
+  if (!asks_together()) {
+    for (std::size_t e = 0; e < views.size(); ++e)
+      act(views[e], observations.subspan(e * seen, seen), actions.subspan(e * width, width));
+    return;
+  }
+  std::array<std::int64_t, kernels::kBlock> episodes, taken;
+  for (std::size_t e = 0; e < views.size(); ++e) {
+    episodes.at(e) = views[e].episode;
+    taken[e] = views[e].actions;
+  }
+  answer_(
+      {std::span(episodes).first(views.size()), std::span(taken).first(views.size()), observations},
+      actions);
+  for (std::size_t e = 0; e < views.size(); ++e)
+    if (variation_.noise > 0) disturb(views[e], actions.subspan(e * width, width));
 }
 
 void Policy::draw(const TaskView& view, std::span<double> action) const {

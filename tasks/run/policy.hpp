@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Policies that need no learning. They drive data sets and benchmarks of tasks.
+// Who chooses the actions of data sets and benchmarks: policies that need no learning, or a program
+// from outside, which is asked for many environments at once.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,6 +19,7 @@ enum class PolicyKind {
   hold,      ///< zeros
   csv,       ///< row j of a table for action j of every episode; the last row after its end
   scripted,  ///< the task's own solution
+  program,   ///< one from outside, which sees what the task observes
 };
 const char* to_string(PolicyKind kind);
 
@@ -30,6 +33,16 @@ struct PolicyVariation {
   double random_share = 0;
 };
 
+/// What a program is asked: the next actions of n environments.
+struct PolicyQuestion {
+  std::span<const std::int64_t> episodes;  ///< (n) their numbers
+  std::span<const std::int64_t> actions;   ///< (n) actions taken in them so far
+  std::span<const double> observations;    ///< (n, observation)
+};
+/// Writes (n, action). Many threads may call it at once. An episode is always asked about with the
+/// same neighbours, those of its block of 16 whose episodes go on, whatever the number of threads.
+using PolicyAnswer = std::function<void(const PolicyQuestion&, std::span<double> actions)>;
+
 class Policy {
  public:
   /// `table`: (rows, action), for csv. Throws InputError when a row does not fit the task's action
@@ -37,6 +50,12 @@ class Policy {
   /// out of its range.
   Policy(const Task& task, PolicyKind kind, std::vector<std::vector<double>> table = {},
          const PolicyVariation& variation = {});
+  /// A program called `name`. Throws InputError for a noise or a share out of its range.
+  Policy(const Task& task, std::string name, PolicyAnswer answer,
+         const PolicyVariation& variation = {});
+
+  /// Whether act() for many environments is one question and not one for each.
+  [[nodiscard]] bool asks_together() const { return static_cast<bool>(answer_); }
 
   /// Names of those that play: the kind, and "random" where it has a share.
   [[nodiscard]] std::vector<std::string> players() const;
@@ -46,6 +65,9 @@ class Policy {
   /// The next action of an environment that shows `view` and `observation`.
   void act(const TaskView& view, std::span<const double> observation,
            std::span<double> action) const;
+  /// The same for n environments, at most a block: (n, observation) in, (n, action) out.
+  void act(std::span<const TaskView> views, std::span<const double> observations,
+           std::span<double> actions) const;
   /// Fills the actions of all environments, (E, action).
   void act(const VectorTask& environments, std::span<double> actions) const;
 
@@ -53,8 +75,12 @@ class Policy {
   void draw(const TaskView& view, std::span<double> action) const;
   void disturb(const TaskView& view, std::span<double> action) const;
 
+  void check(const PolicyVariation& variation) const;
+
   const Task& task_;
   PolicyKind kind_;
+  std::string name_;
+  PolicyAnswer answer_;
   std::vector<std::vector<double>> table_;
   PolicyVariation variation_;
 };

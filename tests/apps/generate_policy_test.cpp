@@ -190,6 +190,59 @@ TEST(GeneratePolicy, AnotherVariationIsAnotherDataSet) {
             "scripted --noise 0.2 --shards 2");
 }
 
+TEST(GeneratePolicy, AProgramThatDoesNotAnswerLeavesNothing) {
+  const Folder folder;
+  const std::string hello = R"(printf '{"protocol":"tangere policy 1","name":"mute"}\n'; )";
+  struct Case {
+    std::string program;
+    int exit_code;
+    const char* says;
+  };
+  for (const Case& c : {
+           Case{"exit 3", 3, "has ended with exit code 3"},
+           Case{"no_such_program_at_all", 3, "has ended with exit code 127"},
+           Case{"kill -9 $$", 3, "has ended by a signal (Killed)"},
+           Case{"echo good morning", 2, "answers 'good morning'; expected a line"},
+           Case{"printf '{\"protocol\":\"tangere policy 2\"}\\n'; sleep 9", 2, "policy 1"},
+           Case{"sleep 1000", 3, "has not answered within 0.3 s (--program-timeout)"},
+           Case{hello + "sleep 1000", 3, "has not answered within 0.3 s"},
+           Case{hello + "exit 5", 3, "has ended with exit code 5"},
+           Case{hello + "head -c 64 /dev/zero; sleep 9", 2,
+                "answers 0 numbers to a question about "
+                "16 environments; expected 48, 3"},
+       }) {
+    // What comes too late always does; everything else has all the time of a busy machine.
+    const bool late = std::string(c.says).find("0.3 s") != std::string::npos;
+    const Outcome outcome = run(folder, pushes("set", {"--program", c.program, "--program-timeout",
+                                                       late ? "0.3" : "300", "--quiet"}));
+    EXPECT_EQ(outcome.exit_code, c.exit_code) << c.program << "\n" << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(c.says)) << c.program;
+    EXPECT_THAT(folder.files(), ::testing::IsEmpty()) << c.program;
+  }
+}
+
+TEST(GeneratePolicy, AProgramGoesWithTasksAndItsOwnOptions) {
+  const Folder folder;
+  const auto complaint = [&](const std::string& what, const Words& more) {
+    const Outcome outcome =
+        run(folder, Words{"generate", what, "-o", "set", "--episodes", "4"} + more);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_THAT(complaint("box_pushing", {"--policy", "program"}),
+              HasSubstr("--policy program without --program; expected both"));
+  EXPECT_THAT(complaint("box_pushing", {"--program", "true", "--policy", "hold"}),
+              HasSubstr("--policy hold with --program; expected program"));
+  EXPECT_THAT(complaint("box_pushing", {"--program", "true", "--gradients", "return"}),
+              HasSubstr("--gradients return with --program"));
+  EXPECT_THAT(complaint("box_pushing", {"--program-timeout", "3"}),
+              HasSubstr("--program-timeout without --program"));
+  EXPECT_THAT(complaint("box_pushing", {"--program", "true", "--controls", "u.csv"}),
+              HasSubstr("--controls with --program"));
+  EXPECT_THAT(complaint(scene("rolling_ball_small.xml"), {"--program", "true"}),
+              HasSubstr("--program with the scene"));
+}
+
 TEST(GeneratePolicy, AnUnknownPlayerIsAProblem) {
   const Folder folder;
   run_json(folder, pushes("set", {"--mix", "random=0.4"}));
@@ -221,9 +274,9 @@ TEST(GeneratePolicy, WhatCannotBeVariedIsAnError) {
   };
   const Case cases[] = {
       {pushes("s", {"--policy", "random", "--noise", "0.1"}),
-       "--noise with --policy random; expected scripted"},
+       "--noise with --policy random; expected scripted or program"},
       {pushes("s", {"--policy", "hold", "--mix", "random=0.1"}),
-       "--mix with --policy hold; expected scripted"},
+       "--mix with --policy hold; expected scripted or program"},
       {pushes("s", {"--noise", "-0.1"}), "expected a positive number"},
       {pushes("s", {"--noise", "nan"}), "expected a positive number"},
       {pushes("s", {"--mix", "random"}), "--mix random: expected random=SHARE"},

@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <map>
+#include <mutex>
+#include <set>
 #include <thread>
 
 #include "tasks/run/episodes.hpp"
@@ -107,6 +110,67 @@ TEST(TaskEpisodes, AreTheSameInTheSameOrderOnAnyNumberOfThreads) {
     EXPECT_EQ(summary.rows, alone.rows);
     EXPECT_EQ(summary.environment_steps, kEpisodes * 40);
     EXPECT_LE(summary.peak_blocks_in_flight, 2 * threads + 1);
+  }
+}
+
+/// What a program was asked about an episode: its observations, in order.
+struct Asked {
+  std::mutex mutex;
+  std::map<std::int64_t, std::vector<double>> seen;
+  std::map<std::int64_t, std::set<std::vector<std::int64_t>>> among;
+  bool in_order = true;
+};
+
+TEST(TaskEpisodes, OfAProgramAreAskedForInBlocks) {
+  const auto task = task_named("stable_grasp");  // episodes of one to nine actions
+  const std::size_t width = task->spec().action.size(), size = task->spec().observation_size();
+  const auto played = [&](int threads, Keeper& keeper, Asked& asked) {
+    const Policy policy(*task, "half", [&](const PolicyQuestion& question, std::span<double> to) {
+      const std::lock_guard lock(asked.mutex);
+      EXPECT_EQ(question.observations.size(), question.episodes.size() * size);
+      EXPECT_EQ(to.size(), question.episodes.size() * width);
+      for (std::size_t e = 0; e < question.episodes.size(); ++e) {
+        std::vector<double>& seen = asked.seen[question.episodes[e]];
+        asked.in_order &= std::ssize(seen) == question.actions[e] * std::ssize(to) /
+                                                  std::ssize(question.episodes) *
+                                                  std::int64_t(size);
+        const auto row = question.observations.subspan(e * size, size);
+        seen.insert(seen.end(), row.begin(), row.end());
+        asked.among[question.episodes[e]].emplace(question.episodes.begin(),
+                                                  question.episodes.end());
+        for (std::size_t k = 0; k < width; ++k) to[e * width + k] = 0.5 * std::tanh(row[k]);
+      }
+    });
+    EXPECT_THAT(policy.players(), ::testing::ElementsAre("half"));
+    EpisodeOptions options = options_on(threads);
+    options.episodes = 40;
+    return run_episodes(*task, policy, options, keeper);
+  };
+  Keeper one, many;
+  Asked alone, together;
+  const EpisodeSummary summary = played(1, one, alone);
+  played(3, many, together);
+  EXPECT_TRUE(one.episodes == many.episodes);
+  EXPECT_TRUE(alone.seen == together.seen);
+  EXPECT_TRUE(alone.among == together.among) << "an episode's neighbours depend on threads";
+  EXPECT_TRUE(alone.in_order && together.in_order);
+  std::int64_t rows = 0;
+  for (const auto& [episode, seen] : alone.seen) rows += std::ssize(seen) / std::int64_t(size);
+  EXPECT_EQ(std::ssize(alone.seen), 40);
+  EXPECT_EQ(rows, summary.rows) << "asked about an episode that was over";
+  EXPECT_LT(rows, 40 * 9);
+  EXPECT_EQ(alone.among.at(39).begin()->size(), 8U) << "the last block has eight episodes";
+}
+
+TEST(TaskEpisodes, EndWithWhatAProgramThrows) {
+  const auto task = task_named("dummy");
+  for (const int threads : {1, 4}) {
+    const Policy policy(*task, "broken", [](const PolicyQuestion& question, std::span<double> to) {
+      if (question.actions[0] > 3) throw InputError("no answer");
+      std::fill(to.begin(), to.end(), 0.0);
+    });
+    Keeper keeper;
+    EXPECT_THROW(run_episodes(*task, policy, options_on(threads), keeper), InputError);
   }
 }
 

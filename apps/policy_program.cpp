@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: Apache-2.0
+// One socket is the program's input and output. A dead program is then an error of a call, not a
+// signal, and one descriptor tells of both directions.
+#include "apps/policy_program.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cctype>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <utility>
+
+#include "apps/console.hpp"
+#include "engine/base/error.hpp"
+#include "kernels/numbers/block.hpp"
+
+namespace tangere::apps {
+namespace {
+
+static_assert(std::endian::native == std::endian::little,
+              "the protocol's numbers are little-endian");
+
+constexpr const char* kProtocol = "tangere policy 1";
+constexpr std::size_t kLongestLine = 4096, kLongestName = 64;
+constexpr int kLookForStop = 100;  // [ms]
+constexpr double kTimeToEnd = 5;   // [s]
+constexpr const char* kTaken[] = {"train",    "valid",  "success", "train_success", "valid_success",
+                                  "touching", "random", "hold",    "csv",           "scripted"};
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// Names are masks of a data set and parts of its id.
+void check_name(const std::string& who, const std::string& name) {
+  const auto fits = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
+  if (name.empty() || name.size() > kLongestName || !std::all_of(name.begin(), name.end(), fits) ||
+      std::find(std::begin(kTaken), std::end(kTaken), name) != std::end(kTaken))
+    throw InputError(fmt::format(
+        "{} calls itself '{}'; expected 1 to {} letters, digits, - and _, and no name of a mask",
+        who, name.substr(0, kLongestName), kLongestName));
+}
+
+Json described(const TensorSpec& tensor) {
+  return {{"name", tensor.name},
+          {"shape", tensor.shape},
+          {"unit", tensor.unit},
+          {"scale", tensor.scale.empty() ? std::vector<double>{1} : tensor.scale}};
+}
+
+template <class T>
+char* put(char* at, std::span<const T> numbers) {
+  std::memcpy(at, numbers.data(), numbers.size_bytes());
+  return at + numbers.size_bytes();
+}
+
+}  // namespace
+
+void PolicyProgram::Socket::close() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  descriptor_ = -1;
+}
+
+PolicyProgram::PolicyProgram(const Task& task, std::uint64_t seed, const std::string& version,
+                             const std::string& command, double timeout)
+    : task_(task), command_(command), timeout_(timeout) {
+  start();
+  try {
+    introduce(seed, version);
+  } catch (...) {
+    end();
+    throw;
+  }
+  for (const TensorSpec& tensor : task.spec().observations)
+    for (std::size_t i = 0; i < tensor.size(); ++i)
+      factors_.push_back(
+          normalise_ && !tensor.scale.empty() ? 1 / tensor.scale[i % tensor.scale.size()] : 1.0);
+  constexpr std::size_t kHead = (1 + 2 * std::size_t{kernels::kBlock}) * sizeof(std::int64_t);
+  bytes_.resize(kHead + kernels::kBlock * factors_.size() * sizeof(float));
+}
+
+PolicyProgram::~PolicyProgram() { end(); }
+
+std::string PolicyProgram::who() const { return fmt::format("the program '{}'", command_); }
+
+void PolicyProgram::start() {
+  int pair[2];
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0)
+    throw IoError(fmt::format("no socket for {}: {}", who(), std::strerror(errno)));
+  socket_.open(pair[0]);
+  Socket other;
+  other.open(pair[1]);
+  process_ = fork();
+  if (process_ < 0)
+    throw IoError(fmt::format("{} cannot be started: {}", who(), std::strerror(errno)));
+  if (process_ > 0) {
+    setpgid(process_, process_);
+    return;
+  }
+  // Ctrl-C is for this program alone, which then ends the other one.
+  setpgid(0, 0);
+  for (const int signal : {SIGINT, SIGTERM, SIGXFSZ}) std::signal(signal, SIG_DFL);
+  dup2(pair[1], STDIN_FILENO);
+  dup2(pair[1], STDOUT_FILENO);
+  execl("/bin/sh", "sh", "-c", command_.c_str(), static_cast<char*>(nullptr));
+  _exit(127);
+}
+
+void PolicyProgram::introduce(std::uint64_t seed, const std::string& version) {
+  const TaskSpec& spec = task_.spec();
+  Json observations = Json::array();
+  for (const TensorSpec& tensor : spec.observations) observations.push_back(described(tensor));
+  const Json said{{"protocol", kProtocol},
+                  {"version", version},
+                  {"task", spec.name},
+                  {"seed", seed},
+                  {"horizon", spec.horizon},
+                  {"observations", observations},
+                  {"action",
+                   {{"name", spec.action.name},
+                    {"shape", spec.action.shape},
+                    {"low", spec.action.low},
+                    {"high", spec.action.high}}}};
+  const double deadline = now() + timeout_;
+  const std::string line = said.dump() + "\n";
+  write(line.data(), line.size(), deadline);
+  const std::string heard = read_line(deadline);
+  const Json reply = Json::parse(heard, nullptr, false);
+  if (!reply.is_object() || reply.value("protocol", Json()) != kProtocol ||
+      !reply.value("name", Json()).is_string() ||
+      !reply.value("normalise", Json(true)).is_boolean())
+    throw InputError(
+        fmt::format("{} answers '{}'; expected a line {{\"protocol\": \"{}\", \"name\": NAME}}, "
+                    "and nothing else "
+                    "on its standard output",
+                    who(), heard.substr(0, 200), kProtocol));
+  name_ = reply["name"].get<std::string>();
+  normalise_ = reply.value("normalise", true);
+  check_name(who(), name_);
+}
+
+void PolicyProgram::answer(const PolicyQuestion& question, std::span<double> actions) {
+  const std::lock_guard lock(mutex_);
+  if (stopping()) stopped_ = true;
+  if (stopped_) return std::fill(actions.begin(), actions.end(), 0.0);
+  const auto n = static_cast<std::int64_t>(question.episodes.size());
+  char* at = put(bytes_.data(), std::span(&n, 1));
+  at = put(at, question.episodes);
+  at = put(at, question.actions);
+  for (std::size_t i = 0; i < question.observations.size(); ++i) {
+    // The number that a Python environment shows, to the bit.
+    const auto shown = static_cast<float>(question.observations[i] * factors_[i % factors_.size()]);
+    std::memcpy(at, &shown, sizeof shown);
+    at += sizeof shown;
+  }
+  const double deadline = now() + timeout_;
+  write(bytes_.data(), static_cast<std::size_t>(at - bytes_.data()), deadline);
+  std::int64_t count = 0;
+  if (!read(reinterpret_cast<char*>(&count), sizeof count, deadline) && !stopped_) fail_ended();
+  if (!stopped_ && count != std::ssize(actions))
+    throw InputError(fmt::format(
+        "{} answers {} numbers to a question about {} environments; expected {}, {} for each, and "
+        "nothing else on its standard output",
+        who(), count, n, actions.size(), task_.spec().action.size()));
+  if (!stopped_ && !read(reinterpret_cast<char*>(actions.data()), actions.size_bytes(), deadline) &&
+      !stopped_)
+    fail_ended();
+  if (stopped_) return std::fill(actions.begin(), actions.end(), 0.0);
+  for (std::size_t i = 0; i < actions.size(); ++i) {
+    const std::size_t width = task_.spec().action.size(), e = i / width;
+    if (!std::isfinite(actions[i]))
+      throw InputError(fmt::format(
+          "{} answers {} as number {} of action {} of episode {}; expected a finite number", who(),
+          actions[i], i % width, question.actions[e], question.episodes[e]));
+  }
+}
+
+void PolicyProgram::wait_for(short events, double deadline) {
+  pollfd waiting{socket_.get(), events, 0};
+  while (!stopping()) {
+    const int ready = poll(&waiting, 1, kLookForStop);
+    if (ready > 0) return;
+    if (ready < 0 && errno != EINTR)
+      throw IoError(fmt::format("cannot wait for {}: {}", who(), std::strerror(errno)));
+    if (now() > deadline)
+      throw IoError(
+          fmt::format("{} has not answered within {} s (--program-timeout)", who(), timeout_));
+  }
+  stopped_ = true;
+}
+
+void PolicyProgram::write(const char* bytes, std::size_t count, double deadline) {
+  while (count > 0 && !stopped_) {
+    const ssize_t sent = send(socket_.get(), bytes, count, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (sent > 0) {
+      bytes += sent;
+      count -= static_cast<std::size_t>(sent);
+    } else if (errno == EAGAIN) {
+      wait_for(POLLOUT, deadline);
+    } else if (errno != EINTR) {
+      fail_ended();
+    }
+  }
+}
+
+/// Returns false at the end of what the program says, or when the run is to stop.
+bool PolicyProgram::read(char* bytes, std::size_t count, double deadline) {
+  while (count > 0) {
+    const ssize_t received = recv(socket_.get(), bytes, count, MSG_DONTWAIT);
+    if (received > 0) {
+      bytes += received;
+      count -= static_cast<std::size_t>(received);
+      continue;
+    }
+    if (received == 0) return false;
+    if (errno == EAGAIN) {
+      wait_for(POLLIN, deadline);
+      if (stopped_) return false;
+    } else if (errno != EINTR) {
+      return false;
+    }
+  }
+  return true;
+}
+
+std::string PolicyProgram::read_line(double deadline) {
+  std::string line;
+  for (char c = 0; line.size() < kLongestLine; line += c) {
+    if (!read(&c, 1, deadline)) fail_ended();
+    if (c == '\n') break;
+  }
+  return line;
+}
+
+/// It has closed its output, so its end is near.
+void PolicyProgram::fail_ended() {
+  int status = 0;
+  const double deadline = now() + 1;
+  pid_t ended = 0;
+  while ((ended = waitpid(process_, &status, WNOHANG)) == 0 && now() < deadline)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  if (ended <= 0) throw IoError(fmt::format("{} has closed its standard output", who()));
+  process_ = -1;
+  throw IoError(fmt::format(
+      "{} has ended {} while an answer was awaited; its standard error may say why", who(),
+      WIFSIGNALED(status) ? fmt::format("by a signal ({})", strsignal(WTERMSIG(status)))
+                          : fmt::format("with exit code {}", WEXITSTATUS(status))));
+}
+
+void PolicyProgram::end() {
+  const pid_t process = std::exchange(process_, -1);
+  socket_.close();
+  if (process < 0) return;
+  const double deadline = now() + kTimeToEnd;
+  int status = 0;
+  while (waitpid(process, &status, WNOHANG) == 0) {
+    if (now() > deadline || stopping()) {
+      kill(-process, SIGKILL);
+      waitpid(process, &status, 0);
+      return;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+}
+
+}  // namespace tangere::apps

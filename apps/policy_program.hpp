@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+// Another program that chooses the actions of a task: `generate --program CMD`. It is started once
+// and asked through its standard input and output; docs/policies.md describes the bytes.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "tasks/run/policy.hpp"
+
+namespace tangere::apps {
+
+class PolicyProgram {
+ public:
+  /// Starts `command` with the shell, tells it the task and reads its name. `timeout` [s] is for
+  /// this and for every answer. Throws IoError if it cannot be started, ends, or does not answer in
+  /// time, InputError if it says something else than a name.
+  PolicyProgram(const Task& task, std::uint64_t seed, const std::string& version,
+                const std::string& command, double timeout);
+  /// Closes its input. A program that does not end by itself within some seconds is killed.
+  ~PolicyProgram();
+  PolicyProgram(const PolicyProgram&) = delete;
+  PolicyProgram& operator=(const PolicyProgram&) = delete;
+
+  /// What it calls itself.
+  [[nodiscard]] const std::string& name() const { return name_; }
+  /// Asks it; threads take turns. Throws IoError if it has ended or is late, InputError if its
+  /// answer has another size or a number that is not finite. After a stop request the actions are
+  /// zeros.
+  void answer(const PolicyQuestion& question, std::span<double> actions);
+  /// While a run lasts, an answer is awaited no longer when this is true.
+  void stop_when(std::function<bool()> stop) { stop_ = std::move(stop); }
+
+ private:
+  class Socket {
+   public:
+    Socket() = default;
+    ~Socket() { close(); }
+    Socket(const Socket&) = delete;
+    Socket& operator=(const Socket&) = delete;
+    void open(int descriptor) { descriptor_ = descriptor; }
+    void close();
+    [[nodiscard]] int get() const { return descriptor_; }
+
+   private:
+    int descriptor_ = -1;
+  };
+
+  void start();
+  void introduce(std::uint64_t seed, const std::string& version);
+  void write(const char* bytes, std::size_t count, double deadline);
+  [[nodiscard]] bool read(char* bytes, std::size_t count, double deadline);
+  [[nodiscard]] std::string read_line(double deadline);
+  void wait_for(short events, double deadline);
+  [[nodiscard]] bool stopping() const { return stopped_ || (stop_ && stop_()); }
+  [[noreturn]] void fail_ended();
+  [[nodiscard]] std::string who() const;
+  void end();
+
+  const Task& task_;
+  std::string command_, name_;
+  double timeout_;
+  bool normalise_ = true;
+  pid_t process_ = -1;
+  Socket socket_;
+  std::function<bool()> stop_;
+  bool stopped_ = false;
+  std::mutex mutex_;             // of the conversation
+  std::vector<double> factors_;  // (observation) that an observation is multiplied by
+  std::vector<char> bytes_;      // of a question
+};
+
+}  // namespace tangere::apps

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`tangere.data.generate`: the command from Python, with a function of this process as the policy.
+
+The command starts `python -m tangere.policy`, which hands its standard input, a socket, over to
+this process and waits until the conversation is over. So the function runs here, where its network
+and its data are.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from . import _core, policy as policies
+
+_PROGRAM = '"$TANGERE_PYTHON" -m tangere.policy'  # the same text, so the same bytes of a data set
+
+
+def command_path() -> Path:
+    """The command `tangere` of this installation or build. Raises IoError if there is none."""
+    places = [os.environ.get("TANGERE_PROGRAM"), Path(sys.executable).parent / "tangere"]
+    places += [Path(__file__).resolve().parent / "tangere", _in_build(), shutil.which("tangere")]
+    for place in places:
+        if place and os.access(place, os.X_OK) and not Path(place).is_dir():
+            return Path(place)
+    raise _core.IoError(
+        "the command tangere is not on PATH; expected it there, or TANGERE_PROGRAM to name it"
+    )
+
+
+def _in_build() -> Path:
+    import tangere
+
+    return Path(tangere.__path__[0]).parents[1] / "tangere"
+
+
+def generate(
+    what: str | Path,
+    output: str | Path,
+    episodes: int,
+    *,
+    policy: policies.Choose | str | None = None,
+    name: str | None = None,
+    normalise: bool = True,
+    seed: int = 0,
+    threads: int | None = None,
+    options: tuple[str, ...] | list[str] = (),
+) -> dict[str, Any]:
+    """Makes a data set as `tangere generate` does, and returns what it says with --json.
+
+    Parameters
+    ----------
+    what: a task's name, or the path of a scene.
+    output: folder of the data set.
+    policy: a name, such as "random", or for a task a function as `tangere.policy.serve` takes. None:
+        the script of the task, the controls of a scene.
+    name: of the function, for the files.
+    normalise: of the function's observations.
+    options: more words of the command, such as ("--compress", "deflate", "--overwrite").
+
+    Raises InputError and IoError as the command does, with its message, and passes on what the
+    function raises. In both cases no half-written file has its final name.
+    """
+    words = [str(command_path()), "generate", str(what), "--output", str(output), "--json"]
+    words += ["--episodes", str(episodes), "--seed", str(seed), "--quiet", *options]
+    if threads is not None:
+        words += ["--threads", str(threads)]
+    if not callable(policy):
+        words += ["--policy", policy] if policy is not None else []
+        run = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+        return _result(run.returncode, run.stdout, run.stderr)
+    if name is None:
+        raise _core.InputError("a function as policy without a name; expected a name for the files")
+    with tempfile.TemporaryDirectory() as folder, socket.socket(socket.AF_UNIX) as listener:
+        address = str(Path(folder) / "policy")
+        listener.bind(address)
+        listener.listen(1)
+        listener.settimeout(0.1)
+        environment = os.environ | {
+            policies.ADDRESS: address,
+            "TANGERE_PYTHON": sys.executable,
+            "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
+        }
+        with (
+            tempfile.TemporaryFile("w+") as out,
+            tempfile.TemporaryFile("w+") as err,
+            subprocess.Popen(
+                [*words, "--program", _PROGRAM],
+                stdin=subprocess.DEVNULL, stdout=out, stderr=err, env=environment,
+            ) as process,
+        ):  # fmt: skip
+            try:
+                _converse(listener, process, policy, name, normalise)
+            except BaseException:
+                process.terminate()
+                raise
+            process.wait()
+            out.seek(0), err.seek(0)
+            return _result(process.returncode, out.read(), err.read())
+
+
+def _converse(
+    listener: socket.socket, process: subprocess.Popen, choose: policies.Choose, name: str,
+    normalise: bool,
+) -> None:  # fmt: skip
+    """Answers the command until it has no more questions. Returns at once if it ends before."""
+    while True:
+        try:
+            helper, _ = listener.accept()
+            break
+        except TimeoutError:
+            if process.poll() is not None:
+                return
+    with helper:
+        _, descriptors, _, _ = socket.recv_fds(helper, 1, 1)
+        with socket.socket(fileno=descriptors[0]) as conversation:
+            with conversation.makefile("rb") as input, conversation.makefile("wb") as output:
+                try:
+                    policies.converse(input, output, choose, name, normalise=normalise)
+                except (BrokenPipeError, ConnectionResetError):
+                    pass  # the command has stopped, and says why
+
+
+def _result(code: int, out: str, err: str) -> dict[str, Any]:
+    try:
+        said = json.loads(out)
+    except ValueError:
+        raise _core.IoError(f"tangere generate ended with code {code}: {err.strip()}") from None
+    if "error" in said:
+        raise (_core.InputError if code == 2 else _core.IoError)(said["error"])
+    return dict(said)
