@@ -289,7 +289,7 @@ def improve(agent: Agent, optimiser, batch, first: torch.Tensor, asked, draw: np
 
 def settings() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("task", choices=list(TASKS))
+    parser.add_argument("task", choices=tangere.task_names())
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=None)
     parser.add_argument("--episodes", type=int, default=1000, help="to test on")
@@ -299,7 +299,7 @@ def settings() -> argparse.Namespace:
         kind = {"action": "store_true"} if value is False else {"type": type(value)}
         parser.add_argument(f"--{name}", default=None, **kind)
     asked = parser.parse_args()
-    for name, value in (COMMON | TASKS[asked.task]).items():
+    for name, value in (COMMON | TASKS.get(asked.task, {})).items():
         if getattr(asked, name) is None:
             setattr(asked, name, value)
     if asked.steps < asked.envs * asked.length:
