@@ -11,6 +11,8 @@ goes back through the simulation and gives G_et = ∂R_e/∂a_et, all later reac
 included. The second is Σ_e s_e Σ_t G_et ∂a_et/∂w / E with the observations held. Between them one
 sees how large an episode's G_e is: the loop may amplify derivatives, and then one episode of
 10^5 times the others' size owns the update. `--limit k` sets s_e = min(1, k median|G| / |G_e|).
+`--carry c` lets the share c of ∂R/∂o pass each observation on the way back: what goes round the
+loop k times counts c^k. With c < 1 this is not the gradient of R any more.
 
 Every 10 updates the policy plays 300 goals of its own seed; the best one by mean return is kept,
 and is tested on fresh goals. Prints their mean errors in place [m] and yaw [rad].
@@ -75,7 +77,7 @@ def limited(by_action: torch.Tensor, limit: float) -> torch.Tensor:
 
 def update(
     tape: tangere.torch.Tape, policy: nn.Module, gains: torch.Tensor, limit: float,
-    seed: int, first_episode: int,
+    carry: float, seed: int, first_episode: int,
 ) -> float:  # fmt: skip
     """Leaves the gradient of minus the mean return in the policy's weights; returns that mean."""
     obs = tape.reset(seed=seed, first_episode=first_episode)
@@ -83,6 +85,8 @@ def update(
     total = torch.zeros(tape.num_envs, dtype=torch.float64)
     for t in range(tape.actions):
         seen.append(obs.detach())
+        if carry < 1 and obs.requires_grad:
+            obs.register_hook(lambda g: carry * g)
         action = act(policy, obs, gains)
         action.register_hook(lambda g, t=t: by_action.__setitem__(t, g))
         obs, reward, _ = tape.step(action)
@@ -107,6 +111,8 @@ def main() -> None:
     parser.add_argument("--touch", type=float, default=1.0, help="factor of what is felt")
     limit = "most that an episode counts, in medians of the update's episodes; 0: no limit"
     parser.add_argument("--limit", type=float, default=0.0, help=limit)
+    carry = "share of a derivative that passes an observation; 1: the gradient"
+    parser.add_argument("--carry", type=float, default=1.0, help=carry)
     parser.add_argument("--goals", type=int, default=1000, help="to test on")
     parser.add_argument("--threads", type=int, default=None)
     parser.add_argument("--json", action="store_true")
@@ -126,7 +132,8 @@ def main() -> None:
     choice = tangere.make_vec(asked.task, CHOICE_EPISODES, **still)
     best, kept, curve, chosen = -np.inf, None, [], []
     for k in range(asked.updates):
-        curve.append(update(tape, policy, gains, asked.limit, 1 + asked.seed, k * asked.envs))
+        curve.append(update(tape, policy, gains, asked.limit, asked.carry, 1 + asked.seed,
+                            k * asked.envs))  # fmt: skip
         norm = nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
         if torch.isfinite(norm):  # an update that overflowed teaches nothing
             optimiser.step()

@@ -39,8 +39,8 @@ COMMON = {
 TASKS: dict[str, dict[str, Any]] = {
     "stable_grasp": {"steps": 20_480, "envs": 32, "length": 64, "passes": 10, "deviation": 0.5,
                      "gamma": 0.9},
-    "cap_opening": {"minibatch": 512},
-    "cap_opening_blind": {},
+    "cap_opening": {"minibatch": 512, "gamma": 0.95},
+    "cap_opening_blind": {"minibatch": 512, "gamma": 0.95},
     "insertion": {"steps": 1_000_000, "envs": 32, "recurrent": True, "deviation": 0.5},
     "insertion_translation": {"steps": 200_000, "envs": 32, "recurrent": True, "deviation": 0.5},
     "insertion_rotation": {"steps": 200_000, "envs": 32, "recurrent": True, "deviation": 0.5},
