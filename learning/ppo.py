@@ -31,7 +31,7 @@ from torch import nn
 import tangere
 
 COMMON = {
-    "steps": 2_000_000, "envs": 64, "length": 128, "passes": 4, "minibatch": 256, "rate": 3e-4,
+    "steps": 2_000_000, "envs": 256, "length": 32, "passes": 4, "minibatch": 512, "rate": 3e-4,
     "gamma": 0.99, "trace": 0.95, "clip": 0.2, "value": 0.5, "entropy": 0.0, "norm": 0.5,
     "deviation": 1.0, "recurrent": False, "squash": False,
 }  # fmt: skip
@@ -39,12 +39,12 @@ COMMON = {
 TASKS: dict[str, dict[str, Any]] = {
     "stable_grasp": {"steps": 20_480, "envs": 32, "length": 64, "passes": 10, "deviation": 0.5,
                      "gamma": 0.9},
-    "cap_opening": {"minibatch": 512, "gamma": 0.95},
-    "cap_opening_blind": {"minibatch": 512, "gamma": 0.95},
+    "cap_opening": {"gamma": 0.95},
+    "cap_opening_blind": {"gamma": 0.95},
     "insertion": {"steps": 1_000_000, "envs": 32, "recurrent": True, "deviation": 0.5},
     "insertion_translation": {"steps": 200_000, "envs": 32, "recurrent": True, "deviation": 0.5},
     "insertion_rotation": {"steps": 200_000, "envs": 32, "recurrent": True, "deviation": 0.5},
-    "box_pushing": {"passes": 5, "squash": True},
+    "box_pushing": {"squash": True},
 }  # fmt: skip
 MOST_DRIVE = 0.999  # |a| of a squashed action, as in the reward of box pushing
 
