@@ -160,7 +160,7 @@ class Agent(nn.Module):
         return self.mean(h), self.worth(other)[:, 0], state
 
     def sequence(self, image, rest, state, past, begins):
-        """(T, n, …) with `begins` (T, n), where an episode starts → mean (T, n, na), value (T, n)."""
+        """(T, n, …), `begins` (T, n): where an episode starts → mean (T, n, na), value (T, n)."""
         T, n = image.shape[:2]
         h = self.body(image.flatten(0, 1), rest.flatten(0, 1))
         if self.memory is not None:
@@ -238,7 +238,8 @@ class Collector:
                 scaled[cut] += asked.gamma * self.agent(*seen, after[cut], action[cut])[1].numpy()
             if ended.any():
                 solved = info["final_info"]["success"]
-                ended_episodes += [(self.returns[e], bool(solved[e])) for e in np.flatnonzero(ended)]
+                these = np.flatnonzero(ended)
+                ended_episodes += [(self.returns[e], bool(solved[e])) for e in these]
             self.returns[ended] = self.discounted[ended] = 0
             self.obs, self.state = self.eyes(obs, learn=True), after
             self.begins = torch.from_numpy(ended)
@@ -273,7 +274,8 @@ def improve(agent: Agent, optimiser, batch, first: torch.Tensor, asked, draw: np
         for chosen in order.split(size):
             part = {k: v[:, chosen] for k, v in batch.items()}
             mean, value = agent.sequence(
-                part["image"], part["rest"], first[chosen], part["past"], part["begins"])  # fmt: skip
+                part["image"], part["rest"], first[chosen], part["past"], part["begins"]
+            )
             chance = log_likelihood(part["action"], mean, agent.log_deviation)
             ratio = (chance - part["chance"]).exp()
             a = part["advantage"]

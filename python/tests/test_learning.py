@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The programs of learning/: their mathematics against plain loops, and that each of them learns."""
+"""The programs of learning/: their mathematics against plain loops, and that each one learns."""
 
 from __future__ import annotations
 
