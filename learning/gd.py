@@ -14,7 +14,7 @@ sees how large an episode's G_e is: the loop may amplify derivatives, and then o
 `--carry c` lets the share c of ∂R/∂o pass each observation on the way back: what goes round the
 loop k times counts c^k. With c < 1 this is not the gradient of R any more.
 
-Every 10 updates the policy plays 300 goals of another seed. The one with the least mean error,
+Every 20 updates the policy plays 300 goals of another seed. The one with the least mean error,
 |Δp|/0.1 m + |Δθ|/0.276 rad in the reward's own proportion, is kept and tested on fresh goals. The
 reward is quadratic in the gap between hand and box, so a few lost boxes may decide a mean return.
 Prints the mean errors in place [m] and yaw [rad].
@@ -36,7 +36,7 @@ from torch import nn
 import tangere
 import tangere.torch
 
-CHOICE_EVERY = 10  # updates
+CHOICE_EVERY = 20  # updates
 PLACE_UNIT, YAW_UNIT = 0.1, 0.276  # [m], [rad]: what costs 1 in the reward
 
 
