@@ -70,8 +70,12 @@ def player(policy: nn.Module, gains: torch.Tensor):
 
 
 def limited(by_action: torch.Tensor, limit: float) -> torch.Tensor:
-    """G (A, E, na) with each episode's norm at most `limit` times the median of all; no NaN."""
-    by_action = torch.where(torch.isfinite(by_action), by_action, torch.zeros_like(by_action))
+    """G (A, E, na) with each episode's norm at most `limit` times the median of all.
+
+    An episode whose derivatives overflowed counts nothing.
+    """
+    sound = torch.isfinite(by_action).all(dim=2).all(dim=0)[:, None]
+    by_action = torch.where(sound, by_action, torch.zeros_like(by_action))
     norm = by_action.double().square().sum(dim=(0, 2)).sqrt()
     if limit <= 0:
         return by_action
