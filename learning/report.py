@@ -111,7 +111,8 @@ def tables() -> str:
         "| mixed data | score | success | CPU | runs |", ("offline-",),
         lambda runs: [mean(tested(runs, "score"), "", 1), rate(runs), cost(runs)],
     )  # fmt: skip
-    return "\n".join(("", pushed, reinforced, cloned, offline))
+    picture = "![Return against actions of training](results/box_pushing.svg)\n" if figure() else ""
+    return "\n" + "\n".join(filter(None, (pushed, picture, reinforced, cloned, offline)))
 
 
 def polyline(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> str:

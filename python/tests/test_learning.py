@@ -9,6 +9,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -245,3 +246,20 @@ def test_the_report_has_means_and_intervals(monkeypatch, tmp_path):
     lines = report.table("| what | place | runs | paper |", ("gd-",), lambda r: ["x"]).splitlines()
     assert lines == ["| what | place | runs | paper |", "|---|---|---|---|",
                      "| a row | x | 3 | 0.1 m |"]  # fmt: skip
+
+
+def test_the_figure_has_a_line_for_each_run(monkeypatch, tmp_path):
+    monkeypatch.setattr(experiments, "RESULTS", tmp_path)
+    assert report.figure() == ""
+    for name, program in (("gd-touch", "gd"), ("ppo-box", "ppo")):
+        each = next(e for e in experiments.EXPERIMENTS if e.name == name)
+        for seed in range(2):
+            result = {"program": program, "steps": 3200, "settings": {"updates": 2},
+                      "choice": [[1, -500.0], [2, -400.0]]}  # fmt: skip
+            experiments.result_of(each, seed).write_text(json.dumps(result))
+    root = ElementTree.fromstring(report.figure())
+    lines = root.findall("{http://www.w3.org/2000/svg}polyline")
+    assert len(lines) == 4
+    # Two updates of 1600 actions end at the right; -500 of -800 to 0 is 90 of 240 high.
+    assert lines[0].get("points").split()[0] == "320.0,180.0"
+    assert lines[0].get("points").split()[1].startswith("580.0,")
