@@ -20,7 +20,8 @@ from protocol import TEST_SEED, Played, play, provenance, source, wilson
 from torch import nn
 
 import tangere
-from tangere.data import Windows
+from tangere.data import Episodes, Windows
+
 
 class Clone(nn.Module):
     """Observations, flattened and stacked over rows, to an action within its bounds."""
@@ -43,14 +44,14 @@ def flat(obs: dict[str, np.ndarray], past: np.ndarray) -> torch.Tensor:
     return torch.from_numpy(np.concatenate([v.reshape(len(v), -1) for v in parts], axis=1))
 
 
-def train(
-    windows: Windows, clone: Clone, recall: bool, epochs: int, batch: int, rate: float, seed: int
-) -> None:
+def train(windows: Windows, clone: Clone, asked: argparse.Namespace) -> None:
+    """Least squares to the actions of the data set."""
+    recall, epochs, batch, rate = asked.recall, asked.epochs, asked.batch, asked.rate
     optimiser = torch.optim.AdamW(clone.parameters(), lr=rate, weight_decay=1e-4)
     steps = epochs * -(-len(windows) // batch)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
     for epoch in range(epochs):
-        for rows in windows.batches(batch, seed=seed * 1000 + epoch):
+        for rows in windows.batches(batch, seed=asked.seed * 1000 + epoch):
             past = rows["past_actions"] if recall else rows["past_actions"][:, :0]
             seen = flat(rows["obs"], past)
             loss = (clone(seen) - torch.from_numpy(rows["actions"][:, 0])).square().mean()
@@ -101,19 +102,19 @@ def main() -> None:
     torch.set_num_threads(1)
     torch.manual_seed(asked.seed)
 
-    windows = Windows(asked.data, before=asked.before, only_success=not asked.all)
-    keys = [key for key in windows.keys if key not in asked.without]
-    if not keys:
-        parser.error(f"--without {asked.without} leaves none of {windows.keys}")
-    if keys != windows.keys:
-        windows = Windows(asked.data, keys, before=asked.before, only_success=not asked.all)
+    episodes = Episodes(asked.data)
+    shown = [key for key in episodes.keys if key not in ("q", "v")]
+    keys = [key for key in shown if key not in asked.without]
+    if not keys or len(keys) + len(asked.without) != len(shown):
+        parser.error(f"--without {asked.without}; the data set shows {shown}")
+    windows = Windows(episodes, keys, before=asked.before, only_success=not asked.all)
     task = tangere.task_spec(windows.episodes.task)
     begin, clock = time.process_time(), time.perf_counter()
     first = windows[0]
     inputs = sum(v.size for v in first["obs"].values())
     inputs += first["past_actions"].size if asked.recall else 0
     clone = Clone(inputs, first["actions"].shape[1], asked.width, task.action.low, task.action.high)
-    train(windows, clone, asked.recall, asked.epochs, asked.batch, asked.rate, asked.seed)
+    train(windows, clone, asked)
     cost = {"train_cpu_s": time.process_time() - begin,
             "train_wall_s": time.perf_counter() - clock}  # fmt: skip
     env = tangere.make_vec(task.name, asked.episodes, autoreset="disabled")

@@ -35,15 +35,17 @@ COMMON = {
     "gamma": 0.99, "trace": 0.95, "clip": 0.2, "value": 0.5, "entropy": 0.0, "norm": 0.5,
     "deviation": 1.0, "recurrent": False, "squash": False,
 }  # fmt: skip
-# Where they differ from the paper's, learning/README.md says so.
+INSERTION = {"steps": 200_000, "envs": 32, "length": 128, "minibatch": 256, "deviation": 0.5,
+             "recurrent": True}  # fmt: skip
+# learning/README.md says where they differ from the paper's.
 TASKS: dict[str, dict[str, Any]] = {
-    "stable_grasp": {"steps": 20_480, "envs": 32, "length": 64, "passes": 10, "deviation": 0.5,
-                     "gamma": 0.9},
+    "stable_grasp": {"steps": 20_480, "envs": 32, "length": 64, "passes": 10, "minibatch": 256,
+                     "deviation": 0.5, "gamma": 0.9},
     "cap_opening": {"gamma": 0.95},
     "cap_opening_blind": {"gamma": 0.95},
-    "insertion": {"steps": 1_000_000, "envs": 32, "recurrent": True, "deviation": 0.5},
-    "insertion_translation": {"steps": 200_000, "envs": 32, "recurrent": True, "deviation": 0.5},
-    "insertion_rotation": {"steps": 200_000, "envs": 32, "recurrent": True, "deviation": 0.5},
+    "insertion": INSERTION | {"steps": 1_000_000},
+    "insertion_translation": INSERTION,
+    "insertion_rotation": INSERTION,
     "box_pushing": {"squash": True},
 }  # fmt: skip
 MOST_DRIVE = 0.999  # |a| of a squashed action, as in the reward of box pushing
