@@ -35,8 +35,7 @@ COMMON = {
     "gamma": 0.99, "trace": 0.95, "clip": 0.2, "value": 0.5, "entropy": 0.0, "norm": 0.5,
     "deviation": 1.0, "recurrent": False, "squash": False,
 }  # fmt: skip
-INSERTION = {"steps": 200_000, "envs": 32, "length": 128, "minibatch": 256, "deviation": 0.5,
-             "recurrent": True}  # fmt: skip
+INSERTION = {"steps": 200_000, "envs": 64, "minibatch": 256, "deviation": 0.5, "recurrent": True}
 # learning/README.md says where they differ from the paper's.
 TASKS: dict[str, dict[str, Any]] = {
     "stable_grasp": {"steps": 20_480, "envs": 32, "length": 64, "passes": 10, "minibatch": 256,
