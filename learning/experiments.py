@@ -40,7 +40,7 @@ class Experiment:
 PUSHES = "box_pushing --episodes 2000 --seed 1"
 MIXED = "box_pushing --episodes 1000 --seed 1 --noise 0.3 --mix random=0.5"
 CAPS = "cap_opening --episodes 300 --seed 1"
-GRASPS = "stable_grasp --episodes 5000 --seed 1"
+GRASPS = "stable_grasp --episodes 1000 --seed 1"
 INSERTIONS = "insertion --episodes 5000 --seed 1"
 CLONED = "bc.py out/learning/pushes --epochs 20 --batch 512 --before 1"
 

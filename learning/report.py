@@ -60,9 +60,9 @@ def steps(runs: list[dict[str, Any]]) -> str:
 
 
 def table(head: str, beginnings: tuple[str, ...], row) -> str:
-    """A row for each experiment whose name begins so; one line of text for those without result."""
+    """A row for each experiment that has results and whose name begins so; "" without any."""
     columns = head.count("|") - 1
-    lines, missing = [head, "|" + "---|" * columns], []
+    lines = [head, "|" + "---|" * columns]
     for experiment in EXPERIMENTS:
         if not experiment.name.startswith(beginnings):
             continue
@@ -70,13 +70,14 @@ def table(head: str, beginnings: tuple[str, ...], row) -> str:
         if runs:
             cells = [experiment.row, *row(runs), f"{len(runs)}", experiment.paper]
             lines.append("| " + " | ".join(cells[:columns]).rstrip() + " |")
-        else:
-            missing.append(experiment.name)
-    text = "\n".join(lines) + "\n" if len(lines) > 2 else ""
-    if missing:
-        names = [f"`{name}`" for name in missing]
-        text += ("\n" if text else "") + wrapped(f"Not run yet: {', '.join(names)}.") + "\n"
-    return text
+    return "\n".join(lines) + "\n" if len(lines) > 2 else ""
+
+
+def missing() -> str:
+    """A sentence with the runs that are still to be made; "" if there are none."""
+    names = [f"`{e.name}` ({e.seeds - len(stored(e))})" for e in EXPERIMENTS
+             if len(stored(e)) < e.seeds]  # fmt: skip
+    return wrapped(f"Not run yet: {', '.join(names)}.") + "\n" if names else ""
 
 
 def wrapped(text: str, width: int = 100) -> str:
@@ -112,7 +113,8 @@ def tables() -> str:
         lambda runs: [mean(tested(runs, "score"), "", 1), rate(runs), cost(runs)],
     )  # fmt: skip
     picture = "![Return against actions of training](results/box_pushing.svg)\n" if figure() else ""
-    return "\n" + "\n".join(filter(None, (pushed, picture, reinforced, cloned, offline)))
+    parts = (pushed, picture, reinforced, cloned, offline, missing())
+    return "\n" + "\n".join(filter(None, parts)) + "\n"
 
 
 def polyline(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> str:
