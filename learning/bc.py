@@ -5,7 +5,7 @@
     python learning/bc.py out/grasps
 
 Trains on the episodes that succeeded, those of mask/train, and plays 1000 fresh episodes, the same
-for clone and demonstrator. Prints one line a seed; --json adds all settings.
+for clone and demonstrator.
 """
 
 from __future__ import annotations
@@ -16,12 +16,11 @@ import time
 
 import numpy as np
 import torch
+from protocol import TEST_SEED, Played, play, provenance, source, wilson
 from torch import nn
 
 import tangere
-from tangere.data import Windows
-
-TEST_SEED = 1000003  # of the episodes that are played; no data set should be made with it
+from tangere.data import Episodes, Windows
 
 
 class Clone(nn.Module):
@@ -45,14 +44,14 @@ def flat(obs: dict[str, np.ndarray], past: np.ndarray) -> torch.Tensor:
     return torch.from_numpy(np.concatenate([v.reshape(len(v), -1) for v in parts], axis=1))
 
 
-def train(
-    windows: Windows, clone: Clone, recall: bool, epochs: int, batch: int, rate: float, seed: int
-) -> None:
+def train(windows: Windows, clone: Clone, asked: argparse.Namespace) -> None:
+    """Least squares to the actions of the data set."""
+    recall, epochs, batch, rate = asked.recall, asked.epochs, asked.batch, asked.rate
     optimiser = torch.optim.AdamW(clone.parameters(), lr=rate, weight_decay=1e-4)
     steps = epochs * -(-len(windows) // batch)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
     for epoch in range(epochs):
-        for rows in windows.batches(batch, seed=seed * 1000 + epoch):
+        for rows in windows.batches(batch, seed=asked.seed * 1000 + epoch):
             past = rows["past_actions"] if recall else rows["past_actions"][:, :0]
             seen = flat(rows["obs"], past)
             loss = (clone(seen) - torch.from_numpy(rows["actions"][:, 0])).square().mean()
@@ -62,24 +61,11 @@ def train(
             schedule.step()
 
 
-def play(task: str, episodes: int, choose, keys=None) -> np.ndarray:
-    """(episodes) bool: which were solved. `choose(env, obs, t)` returns the actions."""
-    env = tangere.make_vec(task, episodes, seed=TEST_SEED, autoreset="disabled", keys=keys)
-    obs, _ = env.reset()
-    over = np.zeros(episodes, bool)
-    solved = np.zeros(episodes, bool)
-    for t in range(env.task.horizon):
-        obs, _, terminated, truncated, info = env.step(choose(env, obs, t))
-        solved |= ~over & info["success"]
-        over |= terminated | truncated
-        if over.all():
-            break
-    return solved
-
-
-def closed_loop(
-    task: str, windows: Windows, clone: Clone, recall: bool, episodes: int
-) -> np.ndarray:
+def closed_loop(windows: Windows, clone: Clone, recall: bool, episodes: int) -> Played:
+    """The clone in the test episodes of its task."""
+    env = tangere.make_vec(
+        windows.episodes.task, episodes, autoreset="disabled", keys=windows.keys
+    )
     history: list[dict[str, np.ndarray]] = []
     past: list[np.ndarray] = []
 
@@ -95,19 +81,13 @@ def closed_loop(
         past[:] = [*past, action][len(past) + 1 - windows.before :] if windows.before else []
         return action
 
-    return play(task, episodes, choose, windows.keys)
-
-
-def interval(rate: float, n: int) -> float:
-    """Half of Wilson's 95 % interval."""
-    z = 1.96
-    return z * np.sqrt(rate * (1 - rate) / n + z * z / (4 * n * n)) / (1 + z * z / n)
+    return play(env, TEST_SEED, choose)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", help="a folder of tangere generate")
-    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--epochs", type=int, default=40)
     parser.add_argument("--batch", type=int, default=256)
     parser.add_argument("--rate", type=float, default=1e-3)
@@ -120,34 +100,38 @@ def main() -> None:
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
     torch.set_num_threads(1)
+    torch.manual_seed(asked.seed)
 
-    windows = Windows(asked.data, before=asked.before, only_success=not asked.all)
-    keys = [key for key in windows.keys if key not in asked.without]
-    if keys != windows.keys:
-        windows = Windows(asked.data, keys, before=asked.before, only_success=not asked.all)
+    episodes = Episodes(asked.data)
+    shown = [key for key in episodes.keys if key not in ("q", "v")]
+    keys = [key for key in shown if key not in asked.without]
+    if not keys or len(keys) + len(asked.without) != len(shown):
+        parser.error(f"--without {asked.without}; the data set shows {shown}")
+    windows = Windows(episodes, keys, before=asked.before, only_success=not asked.all)
     task = tangere.task_spec(windows.episodes.task)
-    script = play(task.name, asked.episodes, lambda env, _obs, _t: env.scripted_action())
-    runs = []
-    for seed in range(asked.seeds):
-        torch.manual_seed(seed)
-        begin = time.process_time()
-        first = windows[0]
-        inputs = sum(v.size for v in first["obs"].values())
-        inputs += first["past_actions"].size if asked.recall else 0
-        bounds = task.action.low, task.action.high
-        clone = Clone(inputs, first["actions"].shape[1], asked.width, *bounds)
-        train(windows, clone, asked.recall, asked.epochs, asked.batch, asked.rate, seed)
-        trained = time.process_time() - begin
-        solved = closed_loop(task.name, windows, clone, asked.recall, asked.episodes)
-        runs.append({"seed": seed, "rate": solved.mean(), "train_cpu_s": trained})
-        print(
-            f"{task.name} {'+'.join(keys)}: clone {solved.mean():.3f} ± "
-            f"{interval(solved.mean(), len(solved)):.3f}, script {script.mean():.3f}, "
-            f"ratio {solved.mean() / script.mean():.3f}; {len(windows)} rows, {trained:.0f} CPU s"
-        )
+    begin, clock = time.process_time(), time.perf_counter()
+    first = windows[0]
+    inputs = sum(v.size for v in first["obs"].values())
+    inputs += first["past_actions"].size if asked.recall else 0
+    clone = Clone(inputs, first["actions"].shape[1], asked.width, task.action.low, task.action.high)
+    train(windows, clone, asked)
+    cost = {"train_cpu_s": time.process_time() - begin,
+            "train_wall_s": time.perf_counter() - clock}  # fmt: skip
+    env = tangere.make_vec(task.name, asked.episodes, autoreset="disabled")
+    script = play(env, TEST_SEED, lambda env, _obs, _t: env.scripted_action()).summary()
+    result = closed_loop(windows, clone, asked.recall, asked.episodes).summary()
     if asked.json:
-        print(json.dumps({"task": task.name, "keys": keys, "settings": vars(asked),
-                          "script": script.mean(), "runs": runs}))  # fmt: skip
+        print(json.dumps({"program": "bc", "settings": vars(asked), **provenance(), **cost,
+                          "task": task.name, "keys": keys, "data": source(windows.episodes.masks),
+                          "rows": len(windows), "script": script, "test": result}))  # fmt: skip
+        return
+    low, high = wilson(result["success"], asked.episodes)
+    print(
+        f"{task.name} {'+'.join(keys)}, seed {asked.seed}: clone {result['success']:.3f} "
+        f"({low:.3f} to {high:.3f}), script {script['success']:.3f}, ratio "
+        f"{result['success'] / max(script['success'], 1e-9):.3f}; {len(windows)} rows, "
+        f"{cost['train_cpu_s']:.0f} CPU s"
+    )
 
 
 if __name__ == "__main__":

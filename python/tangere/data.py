@@ -122,6 +122,15 @@ class Episodes:
         """The episodes that ended in success."""
         return [i for i in range(len(self)) if self._demo(i).attrs.get("success", 0) == 1]
 
+    def terminated(self, episode: int) -> bool:
+        """Whether the task ended the episode; False if it ran out of time."""
+        return bool(self._demo(episode).attrs["terminated"])
+
+    def final(self, episode: int) -> dict[str, np.ndarray]:
+        """The observations after the last action, KEY → (1, …)."""
+        last = self._demo(episode)["final_obs"]
+        return {key: last[key][()] for key in last}
+
     def __getitem__(self, episode: int) -> dict[str, np.ndarray]:
         """Arrays by name: the observations, "actions", "rewards", and derivatives if stored."""
         self._here()

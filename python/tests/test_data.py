@@ -42,6 +42,22 @@ def test_windows_are_rows_of_the_file(pushes, demo):
             windows[beyond]
 
 
+def test_what_follows_the_last_action_is_that_of_the_file(pushes):
+    episodes = Episodes(pushes)
+    with h5py.File(pushes / "robomimic.hdf5") as file:
+        demo = file["data/demo_7"]
+        final = episodes.final(7)
+        np.testing.assert_array_equal(final["tactile"], demo["final_obs/tactile"][()])
+        np.testing.assert_array_equal(final["q"], demo["next_obs/q"][-1:])
+        assert np.abs(final["q"] - episodes[7]["q"][-1]).max() > 0
+        assert not episodes.terminated(7) and demo.attrs["terminated"] == 0  # out of time
+
+
+def test_an_episode_that_its_task_ended_is_told(generate):
+    episodes = Episodes(generate("insertion_rotation", "--episodes", "4", "--seed", "2"))
+    assert all(episodes.terminated(i) for i in episodes.succeeded()) and episodes.succeeded()
+
+
 def test_batches_are_windows_each_once(pushes):
     windows = Windows(pushes, before=1, ahead=2)
     seen = [b["actions"] for b in windows.batches(300, seed=3)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Python of docs/python.md and the examples run as they stand."""
+"""The Python of docs/python.md, docs/learning.md and the examples runs as it stands."""
 
 from __future__ import annotations
 
@@ -20,14 +20,25 @@ from tangere import _core
 ROOT = Path(__file__).parents[2]
 
 
+def run_blocks(page: str, names: dict[str, str]) -> int:
+    """Runs the blocks of a page in order, because later ones use names of earlier ones."""
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.DOTALL)
+    for block in blocks:
+        exec(compile(block, page, "exec"), names)
+    return len(blocks)
+
+
 def test_every_block_of_the_page_runs(command, tmp_path):
     pytest.importorskip("torch", reason="PyTorch is not installed")
-    page = (ROOT / "docs/python.md").read_text()
-    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    assert len(blocks) >= 5
     names = {"TANGERE": str(command), "DATA": str(tmp_path / "data")}
-    for block in blocks:  # in order: later ones use names of earlier ones
-        exec(compile(block, "docs/python.md", "exec"), names)
+    assert run_blocks("docs/python.md", names) >= 5
+
+
+def test_every_block_of_the_page_of_learning_runs(generate, capsys):
+    data = generate("stable_grasp", "--episodes", "20", "--seed", "1")
+    assert run_blocks("docs/learning.md", {"DATA": str(data)}) == 2
+    said = capsys.readouterr().out
+    assert "20 ['q', 'v', 'flow']" in said and "zeros" in said
 
 
 def test_the_reference_is_made_of_the_docstrings():

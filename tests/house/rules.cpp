@@ -112,8 +112,7 @@ bool is_cpp(std::string_view path) { return ends_with_any(path, {".cpp", ".hpp",
 bool is_script(std::string_view path) {
   const std::string_view name = path.substr(path.rfind('/') + 1);
   return ends_with_any(path, {".cmake", ".cmake.in", ".sh", ".py", ".js"}) ||
-         name == "CMakeLists.txt" || name == "run-demo" || name == "run-tests" || name == "dev" ||
-         path == ".ci/run";
+         name == "CMakeLists.txt" || name.starts_with("run-") || name == "dev" || path == ".ci/run";
 }
 
 /// The file that a quoted include names; "" if there is none.

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # shellcheck disable=SC2016  # fakes expand their own variables
 # SPDX-License-Identifier: Apache-2.0
-# run-demo and run-tests on machines that lack things: a PATH of fakes stands for each machine, nothing here is touched.
+# run-demo, run-tests and run-learning on machines that lack things: a PATH of fakes stands for each machine, nothing here is touched.
 # Usage: shell_test.sh PROJECT_ROOT
 set -euo pipefail
 project=$1
@@ -17,7 +17,7 @@ machine() {
   log=$home/log
   mkdir -p "$bin" "$home/project/cmake"
   : >"$log"
-  cp "$project"/run-demo "$project"/run-tests "$project"/CMakePresets.json "$home/project"
+  cp "$project"/run-demo "$project"/run-tests "$project"/run-learning "$project"/CMakePresets.json "$home/project"
   cp "$project"/cmake/shell.sh "$project"/cmake/packages.txt "$project"/cmake/test-packages.txt "$project"/cmake/python-packages.txt "$project"/cmake/python.txt "$home/project/cmake"
   local tool
   for tool in bash sed grep tr sort head awk env nproc dirname readlink cat mkdir rm ls ctest sleep; do
@@ -195,6 +195,24 @@ expect "names the case that crashed" ends_with "release: one: A.Crash (did not e
 : >"$home/project/build/release/CTestTestfile.cmake"
 run run-tests
 expect "fails when no test ran" fails
+
+machine learning
+built
+rm "$home/project/build/venv/bin/python"
+fake python 'case "$*" in *experiments*) exit "${FAKE_RUNS:-0}" ;; *torch*) exit "${FAKE_TORCH:-0}" ;; esac'
+ln -s "$bin/python" "$home/project/build/venv/bin/python"
+run run-learning
+expect "succeeds" passes
+expect "builds the module" called "tangere_python tangere_python_stub"
+expect "makes the runs" called "python learning/experiments.py"
+expect "writes the tables" called "python learning/report.py --write"
+: >"$log"
+run FAKE_RUNS=1 run-learning
+expect "fails with a run" fails
+expect "writes no table of a part" not_called "report.py"
+run FAKE_TORCH=1 run-learning
+expect "fails without PyTorch" fails
+expect "says what is missing" prints "PyTorch is missing"
 
 if [ "$failures" -gt 0 ]; then
   echo "$failures expectations failed"

@@ -1,0 +1,359 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Proximal policy optimisation of any task, with memory by a flag.
+
+    python learning/ppo.py stable_grasp --seed 0
+
+With r = π(a|o)/π_old(a|o) and the advantage A of generalised advantage estimation, minibatches of
+
+    L = mean( max(-A r, -A clip(r, 1 ± ε)) ) + ½ c_v mean (V - R)² ,
+    A_t = δ_t + γ λ (1 - end_t) A_{t+1},   δ_t = ρ_t + γ V_{t+1} - V_t,   R = A + V
+
+are taken by Adam, a few passes over each batch of E environments × T actions. Observations and
+returns are normalised while training goes on, and clipped to 10. An episode that runs out of time
+goes on in the value of its last observation, one that ends does not. Policies are Gaussian; their
+means act in tests. `TASKS` has the settings of each task; every one is an option as well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import json
+import sys
+import time
+from typing import Any
+
+import numpy as np
+import torch
+from protocol import CHOICE_EPISODES, CHOICE_SEED, TEST_SEED, play, provenance
+from torch import nn
+
+import tangere
+
+COMMON = {
+    "steps": 2_000_000, "envs": 256, "length": 32, "passes": 4, "minibatch": 512, "rate": 3e-4,
+    "gamma": 0.99, "trace": 0.95, "clip": 0.2, "value": 0.5, "entropy": 0.0, "norm": 0.5,
+    "deviation": 1.0, "recurrent": False, "squash": False,
+}  # fmt: skip
+INSERTION = {"steps": 200_000, "envs": 64, "minibatch": 256, "deviation": 0.5, "recurrent": True}
+# learning/README.md says where they differ from the paper's.
+TASKS: dict[str, dict[str, Any]] = {
+    "stable_grasp": {"steps": 20_480, "envs": 32, "length": 64, "passes": 10, "minibatch": 256,
+                     "deviation": 0.5, "gamma": 0.9},
+    "cap_opening": {"gamma": 0.95},
+    "cap_opening_blind": {"gamma": 0.95},
+    "insertion": INSERTION | {"steps": 1_000_000},
+    "insertion_translation": INSERTION,
+    "insertion_rotation": INSERTION,
+    "box_pushing": {"squash": True},
+}  # fmt: skip
+MOST_DRIVE = 0.999  # |a| of a squashed action, as in the reward of box pushing
+
+
+class Running:
+    """Mean and variance of all rows so far, per place, or per channel of an image (c, h, w)."""
+
+    def __init__(self, shape: tuple[int, ...]):
+        self.axes = (0, 2, 3) if len(shape) == 3 else (0,)
+        inner = (shape[0], 1, 1) if len(shape) == 3 else shape
+        self.count, self.mean, self.square = 1e-4, np.zeros(inner), np.ones(inner) * 1e-4
+
+    def add(self, rows: np.ndarray) -> None:
+        """Chan's update: joins the moments of two sets."""
+        n, mean = rows.size / self.mean.size, rows.mean(self.axes, keepdims=True)[0]
+        spread = rows.var(self.axes, keepdims=True)[0] * n
+        total, off = self.count + n, mean - self.mean
+        self.square = self.square + spread + off**2 * self.count * n / total
+        self.mean, self.count = self.mean + off * n / total, total
+
+    def shown(self, rows: np.ndarray) -> np.ndarray:
+        std = np.sqrt(self.square / self.count + 1e-8)
+        return np.clip((rows - self.mean) / std, -10, 10).astype(np.float32)
+
+
+class Eyes:
+    """Observations of the task as two normalised arrays: an image (E, c, h, w) and the rest (E, n).
+
+    Flow and fields become channels if the task is seen by a convolution, else numbers. In images of
+    20 × 20 pixels and more, the forces of 2 × 2 pixels are summed: most of those pixels are empty.
+    """
+
+    def __init__(self, spec: tangere.TaskSpec, convolve: bool):
+        self.channels_last = {t.name: t.shape[-1] == 3 for t in spec.observations}
+        images = [t for t in spec.observations if convolve and len(t.shape) >= 3]
+        self.images = [t.name for t in images]
+        self.flat = [t.name for t in spec.observations if t.name not in self.images]
+        zeros = {t.name: np.zeros((1, *t.shape), np.float32) for t in spec.observations}
+        image, rest = self._arrays(zeros)
+        self.shapes = (image.shape[1:], rest.shape[1:])
+        self.running = (Running(self.shapes[0]), Running(self.shapes[1]))
+
+    def _arrays(self, obs: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        n = len(next(iter(obs.values())))
+        parts = []
+        for name in self.images:  # (E, c, h, w), (E, h, w, 3) or (E, k, h, w, 3)
+            image = np.moveaxis(obs[name], -1, -3) if self.channels_last[name] else obs[name]
+            image = image.reshape(n, -1, *image.shape[-2:])
+            if min(image.shape[2:]) >= 20:
+                c, h, w = image.shape[1:]
+                image = image.reshape(n, c, h // 2, 2, w // 2, 2).sum((3, 5))
+            parts.append(image)
+        image = np.concatenate(parts, 1) if parts else np.zeros((n, 0, 1, 1), np.float32)
+        rest = [obs[name].reshape(n, -1) for name in self.flat]
+        return image, np.concatenate(rest, 1) if rest else np.zeros((n, 0), np.float32)
+
+    def __call__(self, obs: dict[str, np.ndarray], learn: bool = False) -> list[torch.Tensor]:
+        arrays = self._arrays(obs)
+        if learn:
+            for running, rows in zip(self.running, arrays):
+                if rows.size:
+                    running.add(rows)
+        return [torch.from_numpy(r.shown(rows)) for r, rows in zip(self.running, arrays)]
+
+
+def layer(module: nn.Module, gain: float) -> nn.Module:
+    nn.init.orthogonal_(module.weight, gain)
+    nn.init.zeros_(module.bias)
+    return module
+
+
+class Body(nn.Module):
+    """Observations to 64 numbers: two layers, or a shallow convolution before them."""
+
+    def __init__(self, shapes: tuple[tuple[int, ...], tuple[int, ...]]):
+        super().__init__()
+        (channels, height, width), (rest,) = shapes
+        self.see, seen = None, 0
+        if channels:
+            stride, pool = (2, nn.Identity()) if channels > 4 else (1, nn.MaxPool2d(2))
+            self.see = nn.Sequential(
+                layer(nn.Conv2d(channels, 32, 5, stride, 2), 2**0.5), nn.ReLU(), pool,
+                layer(nn.Conv2d(32, 16, 3), 2**0.5), nn.ReLU(), nn.Flatten(),
+            )  # fmt: skip
+            seen = self.see(torch.zeros(1, channels, height, width)).shape[1]
+        self.think = nn.Sequential(
+            layer(nn.Linear(seen + rest, 64), 2**0.5), nn.ELU(),
+            layer(nn.Linear(64, 64), 2**0.5), nn.ELU(),
+        )  # fmt: skip
+
+    def forward(self, image: torch.Tensor, rest: torch.Tensor) -> torch.Tensor:
+        return self.think(rest if self.see is None else torch.cat([self.see(image), rest], 1))
+
+
+class Agent(nn.Module):
+    """Means of actions and values. Without images or memory, actor and critic share nothing."""
+
+    def __init__(self, shapes, actions: int, deviation: float, recurrent: bool):
+        super().__init__()
+        self.body = Body(shapes)
+        shared = self.body.see is not None or recurrent
+        self.other = None if shared else Body(shapes)
+        self.memory = nn.GRUCell(64 + actions, 64) if recurrent else None
+        self.mean, self.worth = layer(nn.Linear(64, actions), 0.01), layer(nn.Linear(64, 1), 1)
+        self.log_deviation = nn.Parameter(torch.full((actions,), float(np.log(deviation))))
+
+    def forward(self, image, rest, state, past):
+        """(n, …), state (n, 64), the action before, (n, na) → mean, value (n), next state."""
+        h = self.body(image, rest)
+        if self.memory is not None:
+            h = state = self.memory(torch.cat([h, past], 1), state)
+        other = h if self.other is None else self.other(image, rest)
+        return self.mean(h), self.worth(other)[:, 0], state
+
+    def sequence(self, image, rest, state, past, begins):
+        """(T, n, …), `begins` (T, n): where an episode starts → mean (T, n, na), value (T, n)."""
+        T, n = image.shape[:2]
+        h = self.body(image.flatten(0, 1), rest.flatten(0, 1))
+        if self.memory is not None:
+            gates, states = torch.cat([h.view(T, n, -1), past], 2), []
+            for t in range(T):
+                state = self.memory(gates[t], state * ~begins[t, :, None])
+                states.append(state)
+            h = torch.stack(states).flatten(0, 1)
+        other = h if self.other is None else self.other(image.flatten(0, 1), rest.flatten(0, 1))
+        return self.mean(h).view(T, n, -1), self.worth(other).view(T, n)
+
+
+def log_likelihood(actions: torch.Tensor, mean: torch.Tensor, log_deviation: torch.Tensor):
+    z = (actions - mean) / log_deviation.exp()
+    return (-0.5 * z.square() - log_deviation - 0.5 * np.log(2 * np.pi)).sum(-1)
+
+
+class Actor:
+    """A policy's means in the test of protocol.py."""
+
+    def __init__(self, agent: Agent, eyes: Eyes, squash: bool):
+        self.agent, self.eyes, self.squash = agent, eyes, squash
+
+    def __call__(self, env, obs, t: int) -> np.ndarray:
+        if t == 0:
+            self.state = torch.zeros(env.num_envs, 64)
+            self.past = torch.zeros(env.num_envs, *env.task.action.shape)
+        with torch.no_grad():
+            self.past, _, self.state = self.agent(*self.eyes(obs), self.state, self.past)
+        return driven(self.past, self.squash)
+
+
+def driven(drawn: torch.Tensor, squash: bool) -> np.ndarray:
+    """What the environment is given; it clips to [-1, 1]."""
+    return (torch.tanh(drawn).clamp(-MOST_DRIVE, MOST_DRIVE) if squash else drawn).numpy()
+
+
+class Collector:
+    """Plays E environments and keeps what the next update needs, T actions at a time."""
+
+    def __init__(self, asked: argparse.Namespace, agent: Agent, eyes: Eyes):
+        self.asked, self.agent, self.eyes = asked, agent, eyes
+        self.env = tangere.make_vec(asked.task, asked.envs, seed=1 + asked.seed,
+                                    autoreset="same_step", threads=asked.threads)  # fmt: skip
+        obs, _ = self.env.reset()
+        self.obs = eyes(obs, learn=True)
+        self.state = torch.zeros(asked.envs, 64)
+        self.past = torch.zeros(asked.envs, *self.env.task.action.shape)
+        self.begins = torch.ones(asked.envs, dtype=torch.bool)
+        self.discounted, self.returns = np.zeros(asked.envs), np.zeros(asked.envs)
+        self.scale = Running((1,))
+
+    @torch.no_grad()
+    def collect(self) -> tuple[dict[str, torch.Tensor], torch.Tensor, list[tuple[float, bool]]]:
+        """(T, E, …) by name, the memory before them, and (return, success) of ended episodes."""
+        asked, rows, first, ended_episodes = self.asked, [], self.state, []
+        for _ in range(asked.length):
+            self.state = self.state * ~self.begins[:, None]
+            mean, value, after = self.agent(*self.obs, self.state, self.past)
+            action = mean + self.agent.log_deviation.exp() * torch.randn_like(mean)
+            row = {"image": self.obs[0], "rest": self.obs[1], "past": self.past, "action": action,
+                   "begins": self.begins, "value": value,
+                   "chance": log_likelihood(action, mean, self.agent.log_deviation)}  # fmt: skip
+            obs, reward, terminated, truncated, info = self.env.step(driven(action, asked.squash))
+            ended = terminated | truncated
+            self.returns += reward
+            self.discounted = self.discounted * asked.gamma + reward
+            self.scale.add(self.discounted[:, None])
+            scaled = reward / np.sqrt(self.scale.square[0] / self.scale.count + 1e-8)
+            scaled = np.clip(scaled, -10, 10)
+            cut = np.flatnonzero(truncated & ~terminated)
+            if len(cut):  # out of time: what would have come counts
+                last = [info["final_obs"][e] for e in cut]
+                seen = self.eyes({k: np.stack([o[k] for o in last]) for k in last[0]})
+                scaled[cut] += asked.gamma * self.agent(*seen, after[cut], action[cut])[1].numpy()
+            if ended.any():
+                solved = info["final_info"]["success"]
+                these = np.flatnonzero(ended)
+                ended_episodes += [(self.returns[e], bool(solved[e])) for e in these]
+            self.returns[ended] = self.discounted[ended] = 0
+            self.obs, self.state = self.eyes(obs, learn=True), after
+            self.begins = torch.from_numpy(ended)
+            self.past = action * ~self.begins[:, None]
+            rows.append(row | {"reward": torch.from_numpy(scaled).float(), "end": self.begins})
+        batch = {name: torch.stack([row[name] for row in rows]) for name in rows[0]}
+        state = self.state * ~self.begins[:, None]
+        batch["advantage"] = self._advantages(batch, self.agent(*self.obs, state, self.past)[1])
+        return batch, first, ended_episodes
+
+    def _advantages(self, batch: dict[str, torch.Tensor], value: torch.Tensor) -> torch.Tensor:
+        advantage, found = torch.zeros_like(value), []
+        for t in reversed(range(len(batch["value"]))):
+            on = (~batch["end"][t]).float()
+            delta = batch["reward"][t] + self.asked.gamma * value * on - batch["value"][t]
+            advantage = delta + self.asked.gamma * self.asked.trace * on * advantage
+            value = batch["value"][t]
+            found.append(advantage)
+        return torch.stack(found[::-1])
+
+
+def improve(agent: Agent, optimiser, batch, first: torch.Tensor, asked, draw: np.random.Generator):
+    """A few passes over the batch. With memory, minibatches are whole environments."""
+    T, E = batch["value"].shape
+    if agent.memory is None:  # every row on its own: T × E sequences of one action
+        batch = {k: v.reshape(1, T * E, *v.shape[2:]) for k, v in batch.items()}
+        first, T, E = first.new_zeros(T * E, 64), 1, T * E
+    target = batch["advantage"] + batch["value"]
+    size = max(1, asked.minibatch // T)
+    for _ in range(asked.passes):
+        order = torch.from_numpy(draw.permutation(E))
+        for chosen in order.split(size):
+            part = {k: v[:, chosen] for k, v in batch.items()}
+            mean, value = agent.sequence(
+                part["image"], part["rest"], first[chosen], part["past"], part["begins"]
+            )
+            chance = log_likelihood(part["action"], mean, agent.log_deviation)
+            ratio = (chance - part["chance"]).exp()
+            a = part["advantage"]
+            a = (a - a.mean()) / (a.std() + 1e-8)
+            loss = torch.max(-a * ratio, -a * ratio.clamp(1 - asked.clip, 1 + asked.clip)).mean()
+            loss = loss + 0.5 * asked.value * (value - target[:, chosen]).square().mean()
+            loss = loss - asked.entropy * agent.log_deviation.sum()
+            optimiser.zero_grad()
+            loss.backward()
+            nn.utils.clip_grad_norm_(agent.parameters(), asked.norm)
+            optimiser.step()
+
+
+def settings() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("task", choices=tangere.task_names())
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--threads", type=int, default=None)
+    parser.add_argument("--episodes", type=int, default=1000, help="to test on")
+    parser.add_argument("--choices", type=int, default=5, help="policies to choose from")
+    parser.add_argument("--json", action="store_true")
+    for name, value in COMMON.items():
+        kind = {"action": "store_true"} if value is False else {"type": type(value)}
+        parser.add_argument(f"--{name}", default=None, **kind)
+    asked = parser.parse_args()
+    for name, value in (COMMON | TASKS.get(asked.task, {})).items():
+        if getattr(asked, name) is None:
+            setattr(asked, name, value)
+    if asked.steps < asked.envs * asked.length:
+        parser.error(f"--steps {asked.steps}; an update takes {asked.envs * asked.length}")
+    return asked
+
+
+def main() -> None:
+    asked = settings()
+    torch.set_num_threads(1)
+    torch.manual_seed(asked.seed)
+    begin, clock = time.process_time(), time.perf_counter()
+    spec = tangere.task_spec(asked.task)
+    eyes = Eyes(spec, convolve=not asked.task.startswith("box_pushing"))
+    agent = Agent(eyes.shapes, spec.action.shape[0], asked.deviation, asked.recurrent)
+    optimiser = torch.optim.Adam(agent.parameters(), lr=asked.rate, eps=1e-5)
+    collector, draw = Collector(asked, agent, eyes), np.random.default_rng(asked.seed)
+    choice = tangere.make_vec(asked.task, CHOICE_EPISODES, autoreset="disabled",
+                              threads=asked.threads)  # fmt: skip
+    updates, curve, chosen = asked.steps // (asked.envs * asked.length), [], []
+    best, kept = -np.inf, (agent, eyes)
+    for k in range(updates):
+        optimiser.param_groups[0]["lr"] = asked.rate * (1 - k / updates)
+        batch, first, ended = collector.collect()
+        improve(agent, optimiser, batch, first, asked, draw)
+        steps = (k + 1) * asked.envs * asked.length
+        if ended:
+            curve.append([steps, *np.mean(ended, axis=0).round(4).tolist()])
+        if (k + 1) * asked.choices // updates == k * asked.choices // updates:
+            continue
+        played = play(choice, CHOICE_SEED, Actor(agent, eyes, asked.squash)).summary()
+        chosen.append([steps, played["return"], played["success"]])
+        if played["return"] > best:
+            best = played["return"]
+            kept = copy.deepcopy((agent, eyes))
+        reached = ", ".join(f"{name} {value:.4g}" for name, value in played.items())
+        print(f"{steps} steps, {time.process_time() - begin:.0f} CPU s: {reached}",
+              file=sys.stderr, flush=True)  # fmt: skip
+    cost = {"train_cpu_s": time.process_time() - begin,
+            "train_wall_s": time.perf_counter() - clock}  # fmt: skip
+    env = tangere.make_vec(asked.task, asked.episodes, autoreset="disabled", threads=asked.threads)
+    result = play(env, TEST_SEED, Actor(*kept, asked.squash)).summary()
+    if asked.json:
+        print(json.dumps({"program": "ppo", "settings": vars(asked), **provenance(), **cost,
+                          "steps": updates * asked.envs * asked.length,
+                          "curve": curve[:: max(1, len(curve) // 100)], "choice": chosen,
+                          "test": result}))  # fmt: skip
+        return
+    print(f"{asked.task}, seed {asked.seed}: {result}; {cost['train_cpu_s']:.0f} CPU s, "
+          f"{cost['train_wall_s']:.0f} s on the clock")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How every learner here is tested, so that their figures can be compared.
+
+Training, choice of the best policy of a run, and test use different seeds of the environment. The
+test episodes are the same for every policy. A result is one JSON object a run (`--json`).
+
+    rate of successes: Wilson's interval          (p + z²/2n ± z √(p(1-p)/n + z²/4n²)) / (1 + z²/n)
+    mean of k runs:    Student's interval         x̄ ± t_{0.975, k-1} s / √k
+"""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Callable, Sequence
+
+import numpy as np
+
+import tangere
+
+TEST_SEED = 1000003  # of the episodes that policies are tested on; no data set is made with it
+CHOICE_SEED = 2000003  # of those by which the best policy of a run is chosen
+CHOICE_EPISODES = 300
+
+# t_{0.975, k-1} for k = 2 … 10 runs, from a table of Student's distribution.
+_STUDENT = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262)
+
+Choose = Callable[[tangere.gym.VectorTaskEnv, Any, int], np.ndarray]
+
+
+@dataclass
+class Played:
+    """What E episodes came to; each (E)."""
+
+    solved: np.ndarray  #: bool
+    returns: np.ndarray  #: sums of rewards
+    actions: np.ndarray  #: how many were taken
+    position: np.ndarray | None = None  #: box pushing: distance from the goal at the end [m]
+    yaw: np.ndarray | None = None  #: box pushing: angle from the goal at the end [rad]
+
+    def summary(self) -> dict[str, float]:
+        """Means. `actions_solved` is that of the solved episodes alone, NaN-free."""
+        means = {
+            "episodes": len(self.solved),
+            "success": float(self.solved.mean()),
+            "return": float(self.returns.mean()),
+            "actions_solved": float(self.actions[self.solved].mean()) if self.solved.any() else 0.0,
+        }
+        if self.position is not None:
+            means |= {"position_m": float(self.position.mean()), "yaw_rad": float(self.yaw.mean())}
+        return means
+
+
+def play(env: tangere.gym.VectorTaskEnv, seed: int, choose: Choose) -> Played:
+    """Plays the first episodes of a seed to their ends. `env` has autoreset="disabled".
+
+    `choose(env, obs, t)` returns action t of every environment, (E, na).
+    """
+    obs, _ = env.reset(seed=seed)
+    over = np.zeros(env.num_envs, bool)
+    solved = np.zeros(env.num_envs, bool)
+    returns = np.zeros(env.num_envs)
+    actions = np.zeros(env.num_envs, int)
+    for t in range(env.task.horizon):
+        obs, reward, terminated, truncated, info = env.step(choose(env, obs, t))
+        returns += np.where(over, 0, reward)
+        actions += ~over
+        solved |= ~over & info["success"]
+        over |= terminated | truncated
+        if over.all():
+            break
+    position, yaw = box_errors(env) if env.task.name.startswith("box_pushing") else (None, None)
+    return Played(solved, returns, actions, position, yaw)
+
+
+def box_errors(env: tangere.gym.VectorTaskEnv) -> tuple[np.ndarray, np.ndarray]:
+    """Box pushing: distance [m] and angle [rad] between box and goal, each (E)."""
+    q, _, memory = env.state()
+    names = env.model.q_names
+    x, y, yaw = (names.index(n) for n in ("box_slide.x", "box_slide.y", "box_turn.angle"))
+    start = tangere.Batch(env.model)
+    box = start.bodies()[0][0, env.model.body_names.index("box"), :2]  # [m], in the world
+    off = q[:, [x, y]] + (box - start.q[0, [x, y]]) - memory[:, :2]
+    return np.hypot(*off.T), np.abs(q[:, yaw] - memory[:, 2])
+
+
+def wilson(rate: float, n: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a rate of successes among n episodes."""
+    z = 1.96
+    middle, half = rate + z * z / (2 * n), z * np.sqrt(rate * (1 - rate) / n + z * z / (4 * n * n))
+    scale = 1 + z * z / n
+    return float((middle - half) / scale), float((middle + half) / scale)
+
+
+def student(values: Sequence[float]) -> float:
+    """Half of Student's 95 % interval of the mean of 2 to 10 runs."""
+    if not 2 <= len(values) <= len(_STUDENT) + 1:
+        raise ValueError(f"{len(values)} runs; expected 2 to {len(_STUDENT) + 1}")
+    return float(_STUDENT[len(values) - 2] * np.std(values, ddof=1) / np.sqrt(len(values)))
+
+
+def provenance() -> dict[str, str]:
+    """The version and the machine of a result."""
+    cpu = platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        models = [line for line in info.read_text().splitlines() if line.startswith("model name")]
+        cpu = models[0].split(":", 1)[1].strip() if models else cpu
+    return {"version": tangere.__version__, "machine": cpu}
+
+
+def source(merged: Path) -> dict[str, str]:
+    """Which data set a policy learned from: what its robomimic.hdf5 says of itself."""
+    import h5py  # of those who learn from data sets alone
+
+    with h5py.File(merged, "r") as file:
+        return {name: str(file.attrs[name]) for name in ("command", "content_sum")}

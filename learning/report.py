@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tables of learning/README.md, and a figure, from learning/results and nothing else.
+
+    python learning/report.py             # prints the tables
+    python learning/report.py --write     # puts them into the README, and draws the figure
+
+A number is the mean over runs. ± is half of a 95 % interval: Student's over the runs; for rates of
+success the larger of that and Wilson's over all their episodes. One run of an error has none.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any, Sequence
+
+import numpy as np
+from experiments import EXPERIMENTS, Experiment, result_of
+from protocol import student, wilson
+
+PAGE = Path(__file__).parent / "README.md"
+FIGURE = Path(__file__).parent / "results" / "box_pushing.svg"
+BEGIN, END = "<!-- made by report.py -->\n", "<!-- end of what report.py made -->\n"
+
+
+def stored(experiment: Experiment) -> list[dict[str, Any]]:
+    """The results of an experiment that are there, by seed."""
+    paths = [result_of(experiment, seed) for seed in range(experiment.seeds)]
+    return [json.loads(path.read_text()) for path in paths if path.exists()]
+
+
+def mean(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
+    text = f"{np.mean(values):.{digits}f}"
+    if len(values) > 1:
+        text += f" ± {student(values):.{digits}f}"
+    return text + unit
+
+
+def rate(runs: list[dict[str, Any]]) -> str:
+    """Successes in percent."""
+    rates = [run["test"]["success"] for run in runs]
+    low, high = wilson(float(np.mean(rates)), sum(run["test"]["episodes"] for run in runs))
+    half = (high - low) / 2
+    if len(rates) > 1:
+        half = max(half, student(rates))
+    return f"{100 * np.mean(rates):.1f} ± {100 * half:.1f} %"
+
+
+def tested(runs: list[dict[str, Any]], name: str) -> list[float]:
+    return [run["test"][name] for run in runs]
+
+
+def cost(runs: list[dict[str, Any]]) -> str:
+    return f"{np.mean([run['train_cpu_s'] for run in runs]):.0f} s"
+
+
+def steps(runs: list[dict[str, Any]]) -> str:
+    return f"{runs[0]['steps'] / 1e6:.2f} M"
+
+
+def table(head: str, beginnings: tuple[str, ...], row) -> str:
+    """A row for each experiment that has results and whose name begins so; "" without any."""
+    columns = head.count("|") - 1
+    lines = [head, "|" + "---|" * columns]
+    for experiment in EXPERIMENTS:
+        if not experiment.name.startswith(beginnings):
+            continue
+        runs = stored(experiment)
+        if runs:
+            cells = [experiment.row, *row(runs), f"{len(runs)}", experiment.paper]
+            lines.append("| " + " | ".join(cells[:columns]).rstrip() + " |")
+    return "\n".join(lines) + "\n" if len(lines) > 2 else ""
+
+
+def missing() -> str:
+    """A sentence with the runs that are still to be made; "" if there are none."""
+    names = [f"`{e.name}` ({e.seeds - len(stored(e))})" for e in EXPERIMENTS
+             if len(stored(e)) < e.seeds]  # fmt: skip
+    return wrapped(f"Not run yet: {', '.join(names)}.") + "\n" if names else ""
+
+
+def wrapped(text: str, width: int = 100) -> str:
+    lines = [""]
+    for word in text.split(" "):
+        if len(lines[-1]) + len(word) >= width:
+            lines.append("")
+        lines[-1] += (" " if lines[-1] else "") + word
+    return "\n".join(lines)
+
+
+def tables() -> str:
+    """What stands in the README between the two marks."""
+    pushed = table(
+        "| box pushing | place | yaw [rad] | success | actions | CPU | runs | paper |",
+        ("gd-", "ppo-box"),
+        lambda runs: [mean(tested(runs, "position_m"), " m"), mean(tested(runs, "yaw_rad")),
+                      rate(runs), steps(runs), cost(runs)],
+    )  # fmt: skip
+    reinforced = table(
+        "| PPO | success | actions until it | actions | CPU | runs | paper |",
+        tuple(e.name for e in EXPERIMENTS if e.name.startswith("ppo-") and e.name != "ppo-box"),
+        lambda runs: [rate(runs), mean(tested(runs, "actions_solved"), "", 2), steps(runs),
+                      cost(runs)],
+    )  # fmt: skip
+    cloned = table(
+        "| clone | success | script | rows | CPU | runs |", ("bc-",),
+        lambda runs: [rate(runs), f"{100 * runs[0]['script']['success']:.1f} %",
+                      f"{runs[0]['rows']}", cost(runs)],
+    )  # fmt: skip
+    offline = table(
+        "| mixed data | score | success | CPU | runs |", ("offline-",),
+        lambda runs: [mean(tested(runs, "score"), "", 1), rate(runs), cost(runs)],
+    )  # fmt: skip
+    picture = "![Return against actions of training](results/box_pushing.svg)\n" if figure() else ""
+    parts = (pushed, picture, reinforced, cloned, offline, missing())
+    return "\n" + "\n".join(filter(None, parts)) + "\n"
+
+
+def polyline(points: np.ndarray, low: np.ndarray, high: np.ndarray) -> str:
+    place = (points - low) / (high - low)
+    return " ".join(f"{60 + 520 * x:.1f},{270 - 240 * y:.1f}" for x, y in np.clip(place, 0, 1))
+
+
+def figure() -> str:
+    """SVG: mean return in the goals of choice against actions of training, a line a run."""
+    colours = {"gd-privileged": "#2a7", "gd-reduced": "#999", "gd-touch": "#c33", "ppo-box": "#36c"}
+    curves = []
+    for experiment in EXPERIMENTS:
+        for run in stored(experiment) if experiment.name in colours else []:
+            each = run["steps"] / run["settings"]["updates"] if run["program"] == "gd" else 1
+            points = [[row[0] * each, row[1]] for row in run["choice"]]
+            curves.append((experiment, np.asarray(points, float)))
+    if not curves:
+        return ""
+    longest = max(points[-1, 0] for _, points in curves)
+    low, high = np.array([0.0, -800.0]), np.array([longest, 0.0])
+    lines = ['<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 620 320" '
+             'font-family="sans-serif" font-size="12">',
+             '<rect width="620" height="320" fill="#fff"/>',
+             '<path d="M60 30V270H580" fill="none" stroke="#333"/>']  # fmt: skip
+    for value in (-800, -600, -400, -200, 0):
+        y = 270 - 240 * (value - low[1]) / (high[1] - low[1])
+        lines.append(f'<text x="52" y="{y + 4:.0f}" text-anchor="end">{value}</text>')
+    for part in range(5):
+        lines.append(f'<text x="{60 + 130 * part}" y="288" text-anchor="middle">'
+                     f"{longest * part / 4e6:.2f}</text>")  # fmt: skip
+    lines.append('<text x="320" y="308" text-anchor="middle">actions of training [million]</text>')
+    lines.append('<text x="60" y="20">mean return in 300 goals</text>')
+    for experiment, points in curves:
+        lines.append(f'<polyline points="{polyline(points, low, high)}" fill="none" '
+                     f'stroke="{colours[experiment.name]}" stroke-width="1.2"/>')  # fmt: skip
+    shown = [e for e in EXPERIMENTS if any(c[0] is e for c in curves)]
+    for place, experiment in enumerate(shown):
+        lines.append(f'<text x="440" y="{200 + 16 * place}" fill="{colours[experiment.name]}">'
+                     f"{experiment.row}</text>")  # fmt: skip
+    return "\n".join([*lines, "</svg>"]) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--write", action="store_true", help="into learning/README.md")
+    asked = parser.parse_args()
+    if not asked.write:
+        print(tables(), end="")
+        return
+    page = PAGE.read_text()
+    if page.count(BEGIN) != 1 or page.count(END) != 1:
+        raise SystemExit(f"{PAGE}: expected one line {BEGIN.strip()!r} and one {END.strip()!r}")
+    before, after = page.split(BEGIN)[0], page.split(END)[1]
+    PAGE.write_text(before + BEGIN + tables() + END + after)
+    drawn = figure()
+    if drawn:
+        FIGURE.write_text(drawn)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The programs of learning/: their mathematics against plain loops, and that each one learns."""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import json
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+
+LEARNING = Path(__file__).parents[2] / "learning"
+sys.path.insert(0, str(LEARNING))
+
+import experiments  # noqa: E402
+import gd  # noqa: E402
+import ppo  # noqa: E402
+import protocol  # noqa: E402
+import report  # noqa: E402
+
+import tangere  # noqa: E402
+import tangere.torch  # noqa: E402
+
+
+def run(program: str, *arguments: str) -> dict:
+    """What a program prints with --json."""
+    done = subprocess.run(
+        [sys.executable, str(LEARNING / program), *arguments, "--json"],
+        check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("memory", [[], ["--recurrent"]])
+def test_ppo_learns_to_hold_a_ball(memory):
+    found = run("ppo.py", "dummy", "--steps", "8192", "--envs", "16", "--length", "64",
+                "--deviation", "0.3", "--rate", "3e-3", "--choices", "2", "--episodes", "50",
+                "--threads", "1", *memory)  # fmt: skip
+    first = np.mean([row[1] for row in found["curve"][:2]])
+    assert found["test"]["return"] > first + 20, (first, found["test"])
+    assert found["test"]["return"] > -15
+
+
+def test_gd_learns_to_push():
+    found = run("gd.py", "box_pushing_privileged", "--updates", "20", "--goals", "50",
+                "--threads", "1")  # fmt: skip
+    assert found["test"]["return"] > found["curve"][0] + 100, found
+    assert found["steps"] == 20 * 16 * 100 and len(found["choice"]) == 1
+
+
+def test_clones_learn_from_a_data_set(generate):
+    data = generate("insertion_translation", "--episodes", "300", "--seed", "1")
+    found = run("bc.py", str(data), "--epochs", "20", "--episodes", "200")
+    assert found["test"]["success"] > 0.5, found  # random actions: 0.35
+    assert found["data"]["command"].startswith("tangere generate insertion_translation")
+
+
+@pytest.mark.parametrize("method", ["bc", "td3", "iql"])
+def test_offline_methods_learn_from_mixed_data(generate, method):
+    data = generate("box_pushing", "--episodes", "40", "--seed", "1", "--noise", "0.3",
+                    "--mix", "random=0.5")  # fmt: skip
+    found = run("offline.py", str(data), "--method", method, "--updates", "100", "--episodes",
+                "50", "--threads", "1")  # fmt: skip
+    assert found["test"]["score"] > 30, found
+    assert found["rows"] == 36 * 100  # those of mask/train
+
+
+@pytest.mark.parametrize("carry", [1.0, 0.0])
+def test_the_gradient_of_two_passes_is_that_of_one(carry):
+    """With carry 0 observations count as given."""
+    tape = tangere.torch.Tape("box_pushing", 4, 12, threads=1, flatten=True)
+    gains = gd.touch_gains(tape.spec, 0.05)
+    torch.manual_seed(0)
+    policy = gd.small_policy(len(gains), 3)
+    gd.update(tape, policy, gains, 0, carry, 3, 0)
+    found = [p.grad.clone() for p in policy.parameters()]
+    for p in policy.parameters():
+        p.grad = None
+    obs, total = tape.reset(seed=3), 0
+    for _ in range(12):
+        seen = obs if carry else obs.detach()
+        obs, reward, _ = tape.step(gd.act(policy, seen, gains))
+        total = total + reward
+    (-total.mean()).backward()
+    for got, p in zip(found, policy.parameters()):
+        size = p.grad.abs().max()
+        assert size > 0 and (got - p.grad).abs().max() < 1e-4 * size
+
+
+def test_an_episode_counts_at_most_so_many_medians():
+    by_action = torch.ones(5, 4, 2)
+    by_action[:, 1] *= 1e6
+    by_action[2, 2, 0] = float("nan")
+    kept = gd.limited(by_action, 3.0)
+    norms = kept.square().sum(dim=(0, 2)).sqrt()
+    assert float(norms[1]) == pytest.approx(3 * float(norms[0]), rel=1e-5)
+    assert torch.equal(kept[:, 0], by_action[:, 0]) and not kept[:, 2].any()
+    assert torch.equal(gd.limited(by_action[:, :2], 0), by_action[:, :2])
+
+
+def collected(task: str, *options: str):
+    """A collector of a task and its first batch."""
+    argv, sys.argv = sys.argv, ["ppo.py", task, "--envs", "8", "--length", "12", *options]
+    try:
+        asked = ppo.settings()
+    finally:
+        sys.argv = argv
+    asked.threads = 1
+    torch.manual_seed(0)
+    spec = tangere.task_spec(task)
+    eyes = ppo.Eyes(spec, convolve=not task.startswith("box_pushing"))
+    agent = ppo.Agent(eyes.shapes, spec.action.shape[0], asked.deviation, asked.recurrent)
+    collector = ppo.Collector(asked, agent, eyes)
+    return asked, agent, collector, collector.collect()
+
+
+@pytest.mark.parametrize("task", ["insertion_rotation", "box_pushing", "cap_opening"])
+def test_before_an_update_all_chances_are_as_they_were_drawn(task):
+    """Sequences with memory, resets and images say what single steps said."""
+    _, agent, _, (batch, first, ended) = collected(task)
+    assert (task == "insertion_rotation") == bool(batch["end"].any()) and bool(ended) == bool(
+        batch["end"].any()
+    )
+    with torch.no_grad():
+        mean, value = agent.sequence(batch["image"], batch["rest"], first, batch["past"],
+                                     batch["begins"])  # fmt: skip
+    chance = ppo.log_likelihood(batch["action"], mean, agent.log_deviation)
+    assert (chance - batch["chance"]).abs().max() < 1e-4
+    assert (value - batch["value"]).abs().max() < 1e-4
+
+
+def test_advantages_are_sums_of_discounted_surprises():
+    asked, _, collector, (batch, _, _) = collected("insertion_rotation")
+    last = torch.randn(8)
+    found = collector._advantages(batch, last)
+    value = torch.cat([batch["value"], last[None]])
+    for e in range(8):
+        for t in range(asked.length):
+            total, weight = 0.0, 1.0
+            for k in range(t, asked.length):
+                on = 0.0 if batch["end"][k, e] else 1.0
+                delta = batch["reward"][k, e] + asked.gamma * on * value[k + 1, e] - value[k, e]
+                total, weight = total + weight * float(delta), weight * asked.gamma * asked.trace
+                if not on:
+                    break
+            assert float(found[t, e]) == pytest.approx(total, abs=1e-4)
+
+
+def test_running_moments_are_those_of_all_rows():
+    rows = np.random.default_rng(1).normal(3, 2, (500, 4))
+    running = ppo.Running((4,))
+    for part in np.split(rows, 5):
+        running.add(part)
+    np.testing.assert_allclose(running.mean, rows.mean(0), rtol=1e-5)
+    np.testing.assert_allclose(running.square / running.count, rows.var(0), rtol=1e-4)
+    image = np.random.default_rng(2).normal(0, 5, (20, 3, 4, 4))
+    running = ppo.Running((3, 4, 4))
+    running.add(image)
+    np.testing.assert_allclose(running.mean.ravel(), image.mean((0, 2, 3)), rtol=1e-4)
+
+
+def test_images_of_fields_sum_the_forces_of_four_pixels():
+    spec = tangere.task_spec("cap_opening")
+    field = np.random.default_rng(0).normal(size=(2, 3, 20, 20, 3)).astype(np.float32)
+    zeros = {t.name: np.zeros((2, *t.shape), np.float32) for t in spec.observations}
+    image, rest = ppo.Eyes(spec, convolve=True)._arrays(zeros | {"tactile": field})
+    assert image.shape == (2, 9, 10, 10) and rest.shape == (2, 18)
+    np.testing.assert_allclose(
+        image[1, 3 + 2, 4, 7], field[1, 1, 8:10, 14:16, 2].sum(), rtol=1e-5
+    )  # finger 1, normal force
+
+
+def test_play_counts_what_stepping_one_environment_counts():
+    env = tangere.make_vec("insertion_rotation", 6, autoreset="disabled", threads=1)
+    played = protocol.play(env, 5, lambda env, _obs, t: np.full((6, 1), 0.3 * (-1) ** t))
+    for e in range(6):
+        one = tangere.gym.TaskEnv("insertion_rotation", first_episode=e, seed=5)
+        one.reset()
+        total = 0.0
+        for t in range(one.task.horizon):
+            _, reward, terminated, truncated, info = one.step(np.full(1, 0.3 * (-1) ** t))
+            total += reward
+            if terminated or truncated:
+                break
+        assert (played.returns[e], played.actions[e], played.solved[e]) == (
+            total, t + 1, info["success"])  # fmt: skip
+
+
+def test_box_errors_are_distances_between_poses():
+    env = tangere.make_vec("box_pushing", 3, autoreset="disabled", threads=1)
+    played = protocol.play(env, 5, lambda env, _obs, _t: env.scripted_action())
+    _, _, memory = env.state()
+    np.testing.assert_array_equal(
+        played.solved, (played.position < 0.03) & (played.yaw < 0.1)
+    )  # the task's own criterion, in the world
+    assert np.all(memory[:, 0] > 0.19) and np.all(played.position < 0.1)
+
+
+def test_intervals_are_those_of_tables():
+    low, high = protocol.wilson(0.9, 100)
+    assert low == pytest.approx(0.8256, abs=1e-4) and high == pytest.approx(0.9448, abs=1e-4)
+    assert protocol.wilson(1.0, 1000)[1] == pytest.approx(1.0)
+    # Student, five values: t = 2.776, s = √2.5.
+    assert protocol.student([1, 2, 3, 4, 5]) == pytest.approx(2.776 * np.sqrt(2.5 / 5), rel=1e-6)
+    with pytest.raises(ValueError, match="1 runs; expected 2 to 10"):
+        protocol.student([1.0])
+
+
+def test_every_experiment_is_a_command_that_its_program_takes(monkeypatch):
+    names = [e.name for e in experiments.EXPERIMENTS]
+    assert len(set(names)) == len(names)
+    for experiment in experiments.EXPERIMENTS:
+        program = experiment.command.split()[0]
+        assert (LEARNING / program).is_file()
+        if program == "ppo.py":
+            monkeypatch.setattr(sys, "argv", experiment.command.split())
+            assert isinstance(ppo.settings(), argparse.Namespace)
+
+
+def test_the_page_says_what_the_results_say():
+    page = report.PAGE.read_text()
+    between = page.split(report.BEGIN)[1].split(report.END)[0]
+    assert between == report.tables()  # python learning/report.py --write
+
+
+def test_the_report_has_means_and_intervals(monkeypatch, tmp_path):
+    monkeypatch.setattr(experiments, "RESULTS", tmp_path)
+    each = experiments.Experiment("gd-x", "gd.py", 3, 1, "a row", "0.1 m")
+    test = {"episodes": 100, "position_m": 0.05, "yaw_rad": 0.1, "success": 0.8}
+    result = {"steps": 480000, "train_cpu_s": 60, "test": test}
+    for seed, place in enumerate((0.04, 0.05, 0.06)):
+        one = copy.deepcopy(result)
+        one["test"]["position_m"] = place
+        experiments.result_of(each, seed).write_text(json.dumps(one))
+    runs = report.stored(each)
+    assert report.mean(report.tested(runs, "position_m"), " m") == "0.050 ± 0.025 m"
+    assert report.rate(runs) == "80.0 ± 4.5 %"  # Wilson's of 300: the runs do not differ
+    monkeypatch.setattr(report, "EXPERIMENTS", [each])
+    lines = report.table("| what | place | runs | paper |", ("gd-",), lambda r: ["x"]).splitlines()
+    assert lines == ["| what | place | runs | paper |", "|---|---|---|---|",
+                     "| a row | x | 3 | 0.1 m |"]  # fmt: skip
+
+
+def test_the_figure_has_a_line_for_each_run(monkeypatch, tmp_path):
+    monkeypatch.setattr(experiments, "RESULTS", tmp_path)
+    assert report.figure() == ""
+    for name, program in (("gd-touch", "gd"), ("ppo-box", "ppo")):
+        each = next(e for e in experiments.EXPERIMENTS if e.name == name)
+        for seed in range(2):
+            result = {"program": program, "steps": 3200, "settings": {"updates": 2},
+                      "choice": [[1, -500.0], [2, -400.0]]}  # fmt: skip
+            experiments.result_of(each, seed).write_text(json.dumps(result))
+    root = ElementTree.fromstring(report.figure())
+    lines = root.findall("{http://www.w3.org/2000/svg}polyline")
+    assert len(lines) == 4
+    # Two updates of 1600 actions end at the right; -500 of -800 to 0 is 90 of 240 high.
+    assert lines[0].get("points").split()[0] == "320.0,180.0"
+    assert lines[0].get("points").split()[1].startswith("580.0,")
