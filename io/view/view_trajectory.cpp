@@ -20,7 +20,9 @@ class TrajectoryView {
         path_(path),
         file_(h5::open_file(path)),
         fields_(path),
-        scene_(text("scene_text"), text("scene_name"), path, options) {
+        scene_(text("scene_text"),
+               H5Aexists(file_.get(), "scene_path") > 0 ? text("scene_path") : text("scene_name"),
+               path, options) {
     steps_ = h5::read_number<std::int64_t>(file_, "steps");
     const h5::Id q = h5::open_dataset(file_, "q");
     q_names_ = h5::read_texts(q, "names");

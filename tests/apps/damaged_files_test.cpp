@@ -147,6 +147,7 @@ TEST_P(DamagedShard, EndsInAMessage) {
   expect_answer(run(folder, {"validate", "set"}), "validate", GetParam().said);
   expect_answer(run(folder, {"info", "set"}), "info", "");
   expect_answer(run(folder, {"export", "set", "--csv", "x.csv"}), "export", "");
+  expect_answer(run(folder, {"view", "set", "-o", "x.html"}), "view", "");
   expect_answer(run(folder, {"merge", "set", "--copy", "--overwrite"}), "merge", "");
   expect_answer(run(folder, generate() + Words{"--resume"}), "resume", "");
 }

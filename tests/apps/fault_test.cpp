@@ -57,6 +57,7 @@ std::vector<Job> jobs() {
       {"merge", {kGenerate + Words{"--no-merge"}}, {"merge", "set"}},
       {"export", {kGenerate}, {"export", "set", "--csv", "rows.csv"}},
       {"plot", {kSimulate}, {"plot", "run.h5", "-o", "pads.svg"}},
+      {"view", {kSimulate}, {"view", "run.h5", "-o", "run.html"}},
   };
 }
 

@@ -63,7 +63,8 @@ class SensorView {
         this.skinData[13 * c + 6 + k] = h1 * axis1[i];
         this.skinData[13 * c + 9 + k] = colour[k] / 255;
       }
-      this.skinData[13 * c + 12] = 1;
+      // What nothing presses lets one see through.
+      this.skinData[13 * c + 12] = field && field[3 * c + 2] !== 0 ? 1 : 0.35;
     }
     return this.skinData;
   }

@@ -44,7 +44,7 @@ class Player {
     }
     this.solids = this.data.shapes.map((bodies) => bodies.map((body) => {
       const solid = solidOf(body);
-      return solid && { radius: solid.radius(), drawn: this.renderer?.upload(solid) };
+      return { radius: body.kind === "plane" ? 0 : solid.radius(), drawn: this.renderer?.upload(solid) };
     }));
     this.sensors = this.data.sensors.map((s, k) => new SensorView(s, k, this.data.episodes, this.renderer));
     this.endSolids = this.data.end_effectors.map((end) => this.renderer?.upload(ball(end.radius)));
@@ -167,9 +167,8 @@ class Player {
     if (!(low[0] <= high[0])) { low.fill(-0.1); high.fill(0.1); }
     this.centre = scale(0.5, add(low, high));
     this.radius = Math.max(norm(sub(high, low)) / 2, 1e-4);
-    const seen = Math.max(high[2] - low[2], 0.8 * Math.hypot(high[0] - low[0], high[1] - low[1]));
     this.camera = { target: this.centre, turn: this.number("turn", 35), lift: this.number("lift", 18),
-      away: 1.25 * Math.max(seen, this.radius) / Math.tan(0.32) / this.number("zoom", 1) };
+      away: 0.95 * this.radius / Math.tan(0.32) / this.number("zoom", 1) };
   }
 
   eye() {
@@ -236,7 +235,7 @@ class Player {
     const bodies = [];
     shapes.forEach(({ rgba }, b) => {
       const solid = this.solids[episode.shapes][b];
-      if (!solid) return;
+      if (shapes[b].kind === "plane") models[b].forEach((x, k) => { if (k < 8) models[b][k] = 4 * this.radius * x; });
       const clear = $("through").checked && pads.has(b);
       bodies.push({ solid: solid.drawn, model: models[b], colour: [...rgba.slice(0, 3), clear ? 0.35 : rgba[3]] });
     });

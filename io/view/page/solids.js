@@ -110,7 +110,15 @@ function dots(points) {
   return solid;
 }
 
-// The triangles of a body of the data; null for a plane, which has no end.
+// A square of half-width 1, which the renderer stretches: a plane has no end.
+function square() {
+  const solid = new Solid(), n = [0, 0, 1];
+  const [a, b, c, d] = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]].map((p) => solid.corner(p, n));
+  solid.indices.push(a, b, c, a, c, d);
+  return solid;
+}
+
+// The triangles of a body of the data.
 function solidOf(body) {
   switch (body.kind) {
     case "sphere": return ball(body.radius);
@@ -120,7 +128,8 @@ function solidOf(body) {
     case "ellipsoid": return ball(0.5).stretched(body.size);
     case "mesh": return mesh(body.vertices, body.triangles);
     case "abstract": return dots(body.points);
-    default: return null;
+    case "plane": return square();
+    default: throw new Error(`no body is a ${body.kind}`);
   }
 }
 

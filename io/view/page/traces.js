@@ -2,12 +2,13 @@
 // Curves over an episode, a panel for each unit, with a line at the frame that is shown.
 const kInks = ["#3b82d6", "#e0702f", "#2f9e68", "#b85bc2", "#c9a227", "#d84a5f", "#3aa6b5", "#8a7a6a"];
 const kMostNamed = 8;
+const kStatus = ["converged", "split", "coarse", "passed"];  // what is negative failed
 
 class TracePanel {
   constructor(group, canvas, seek) {
     Object.assign(this, { group, canvas });
     const left = 52, right = 10;
-    this.margin = { left, right, top: 24, bottom: 22 };
+    this.margin = { left, right, top: 40, bottom: 22 };
     const go = (event) => {
       const box = canvas.getBoundingClientRect();
       seek((event.clientX - box.left - left) / (box.width - left - right));
@@ -63,15 +64,17 @@ class TracePanel {
   title(g, traces, frame, width, ink, soft) {
     g.textAlign = "left"; g.fillStyle = ink; g.font = "600 12px system-ui, sans-serif";
     g.fillText(this.group, 6, 11);
-    let at = 14 + g.measureText(this.group).width;
+    let at = 14 + g.measureText(this.group).width, line = 12;
     g.font = "11px system-ui, sans-serif";
     traces.forEach(({ name, values }, k) => {
-      const value = Number.isFinite(values[frame]) ? Number(values[frame].toPrecision(3)) : "–";
-      const text = traces.length === 1 ? `${value}` : `${name} ${value}`, size = g.measureText(text).width;
-      if (k >= kMostNamed || at + 14 + size > width) return;
-      g.fillStyle = kInks[k % kInks.length]; g.fillRect(at, 7, 9, 9);
-      g.fillStyle = soft; g.fillText(text, at + 12, 12);
-      at += 22 + size;
+      const x = values[frame], size = Math.abs(x);
+      const value = this.group === "solver status" ? kStatus[x] ?? "failed" : !Number.isFinite(x) ? "–" : size > 0 && size < 1e-3 ? x.toExponential(1) : Number(x.toPrecision(3));
+      const text = traces.length === 1 ? `${value}` : `${name} ${value}`, long = g.measureText(text).width;
+      if (at + 14 + long > width && line === 12) { line = 27; at = 6; }
+      if (k >= kMostNamed || at + 14 + long > width) return;
+      g.fillStyle = kInks[k % kInks.length]; g.fillRect(at, line - 5, 9, 9);
+      g.fillStyle = soft; g.fillText(text, at + 12, line);
+      at += 22 + long;
     });
   }
 }
