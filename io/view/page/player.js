@@ -168,7 +168,7 @@ class Player {
     this.centre = scale(0.5, add(low, high));
     this.radius = Math.max(norm(sub(high, low)) / 2, 1e-4);
     this.camera = { target: this.centre, turn: this.number("turn", 35), lift: this.number("lift", 18),
-      away: 0.95 * this.radius / Math.tan(0.32) / this.number("zoom", 1) };
+      away: 0.85 * this.radius / Math.tan(0.32) / this.number("zoom", 1) };
   }
 
   eye() {
@@ -331,7 +331,7 @@ class Player {
   record() {
     this.stage = document.createElement("canvas");
     this.seek(0);
-    const type = ["video/mp4", "video/webm;codecs=vp9", "video/webm"].find((t) => MediaRecorder.isTypeSupported(t));
+    const type = ["video/webm;codecs=vp9", "video/webm", "video/mp4"].find((t) => MediaRecorder.isTypeSupported(t));
     const recorder = new MediaRecorder(this.stage.captureStream(30), { mimeType: type, videoBitsPerSecond: 8e6 });
     const parts = [];
     recorder.ondataavailable = (event) => parts.push(event.data);

@@ -223,7 +223,7 @@ class Renderer {
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.shade.target);
     gl.viewport(0, 0, this.shade.size, this.shade.size);
     gl.clear(gl.DEPTH_BUFFER_BIT);
-    for (const body of scene.bodies) {
+    for (const body of scene.bodies.filter((b) => b.colour[3] >= 1)) {
       this.use(this.depth, { model: body.model, camera: sun, sun });
       this.draw(body.solid);
     }
