@@ -132,7 +132,7 @@ INSTANTIATE_TEST_SUITE_P(
                 {"qqqqqqqqq"},
                 2,
                 "expected one of inspect, simulate, generate, validate, info, merge, export, plot, "
-                "bench"},
+                "view, bench"},
         Mistake{"top_option",
                 {"--verison"},
                 2,

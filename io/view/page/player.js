@@ -44,7 +44,7 @@ class Player {
     }
     this.solids = this.data.shapes.map((bodies) => bodies.map((body) => {
       const solid = solidOf(body);
-      return { radius: body.kind === "plane" ? 0 : solid.radius(), drawn: this.renderer?.upload(solid) };
+      return solid && { radius: solid.radius(), drawn: this.renderer?.upload(solid) };
     }));
     this.sensors = this.data.sensors.map((s, k) => new SensorView(s, k, this.data.episodes, this.renderer));
     this.endSolids = this.data.end_effectors.map((end) => this.renderer?.upload(ball(end.radius)));
@@ -216,12 +216,10 @@ class Player {
     if (this.recording?.state === "recording") this.recording.stop();
   }
 
-  // The half-space of the ground as the renderer wants it; null: the scene has none.
-  groundOf() {
-    const { ground } = this.data, reach = 9 * this.radius;
-    if (!ground) return null;
-    const n = unit(ground.normal), [first, second] = Math.abs(n[2]) > 0.999 ? [[1, 0, 0], [0, 1, 0]] : across(n);
-    const foot = sub(this.centre, scale(dot(n, sub(this.centre, ground.position)), n));
+  // A half-space as the renderer wants it.
+  groundOf(position, normal) {
+    const reach = 9 * this.radius, n = unit(normal), [first, second] = Math.abs(n[2]) > 0.999 ? [[1, 0, 0], [0, 1, 0]] : across(n);
+    const foot = sub(this.centre, scale(dot(n, sub(this.centre, position)), n));
     const model = new Float32Array([...scale(reach, first), 0, ...scale(reach, second), 0, ...n, 0, ...foot, 1]);
     return { model, first, second, centre: foot, spacing: roundLength(this.radius / 3), reach };
   }
@@ -232,10 +230,14 @@ class Player {
     if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
     const shapes = this.data.shapes[episode.shapes], pads = new Set(this.data.sensors.map((s) => s.body));
     const models = shapes.map((_, b) => poseMatrix(episode.poses, 7 * (frame * shapes.length + b)));
-    const bodies = [];
+    const bodies = [], { ground } = this.data;
+    const grounds = ground ? [this.groundOf(ground.position, ground.normal)] : [];
     shapes.forEach(({ rgba }, b) => {
       const solid = this.solids[episode.shapes][b];
-      if (shapes[b].kind === "plane") models[b].forEach((x, k) => { if (k < 8) models[b][k] = 4 * this.radius * x; });
+      if (shapes[b].kind === "plane") {
+        grounds.push(this.groundOf(moved(models[b], [0, 0, 0]), turned(models[b], [0, 0, 1])));
+        return;
+      }
       const clear = $("through").checked && pads.has(b);
       bodies.push({ solid: solid.drawn, model: models[b], colour: [...rgba.slice(0, 3), clear ? 0.35 : rgba[3]] });
     });
@@ -250,15 +252,15 @@ class Player {
       skins.push({ skin: sensor.skin, model, data: sensor.paintSkin(field), count: sensor.sensor.cells });
       if ($("arrows").checked) sensor.addArrows(field, model, 0.45 * this.radius, arrows);
     }
-    const ground = this.groundOf(), dark = document.documentElement.dataset.theme === "dark";
-    renderer.render({ ...this.eye(), bodies, skins, ground, dark, radius: this.radius, centre: this.centre,
+    const dark = document.documentElement.dataset.theme === "dark";
+    renderer.render({ ...this.eye(), bodies, skins, grounds, dark, radius: this.radius, centre: this.centre,
       arrows: { data: new Float32Array(arrows), count: arrows.length / 6, thick: 0.008 * this.radius,
         colour: dark ? [1, 0.45, 0.35, 1] : [0.86, 0.18, 0.12, 1] } });
     document.body.dataset.arrows = arrows.length / 6;
     const largest = Math.max(0, ...this.sensors.map((s) => s.largest));
     $("clock").textContent = `t = ${episode.time[frame].toFixed(3)} s`;
     const parts = [];
-    if (ground) parts.push(`grid ${withUnit(ground.spacing, "m")}`);
+    if (grounds.length > 0) parts.push(`grid ${withUnit(grounds[0].spacing, "m")}`);
     if (largest > 0 && $("arrows").checked) parts.push(`longest arrow ${withUnit(largest, "N")} per point`);
     this.legend = parts.join(" · ");
     $("hint").textContent = [this.legend, "drag to turn · shift-drag to move · wheel to zoom · space to play"]

@@ -206,7 +206,7 @@ class Renderer {
   }
 
   // scene: { bodies: [{solid, model, colour}], skins: [{skin, model, data, count}], arrows: {data,
-  // count, thick, colour}, ground: {model, first, second, normal, centre, spacing, reach}, eye,
+  // count, thick, colour}, grounds: [{model, first, second, centre, spacing, reach}], eye,
   // target, up, angle, radius, centre, dark }.
   render(scene) {
     const gl = this.gl, { canvas } = this;
@@ -235,8 +235,8 @@ class Renderer {
     gl.bindTexture(gl.TEXTURE_2D, this.shade.texture);
     gl.enable(gl.BLEND);
     gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    if (scene.ground) {
-      this.use(this.ground, { ...light, ...scene.ground, background,
+    for (const ground of scene.grounds) {
+      this.use(this.ground, { ...light, ...ground, background,
         line: scene.dark ? [0.25, 0.29, 0.37] : [0.74, 0.78, 0.84] });
       this.draw(this.plane);
     }

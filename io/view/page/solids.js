@@ -99,7 +99,7 @@ function mesh(vertices, triangles) {
 function dots(points) {
   let reach = 0;
   for (let i = 0; i < points.length; ++i) reach = Math.max(reach, Math.abs(points[i]));
-  const solid = new Solid(), one = new Solid().cap(reach / 25 || 1e-3, 0, -kQuarter, kQuarter, 8);
+  const solid = new Solid(), one = new Solid().cap(reach / 15 || 1e-3, 0, -kQuarter, kQuarter, 8);
   for (let i = 0; i < points.length; i += 3) {
     const first = solid.positions.length / 3;
     for (let k = 0; k < one.positions.length; k += 3)
@@ -110,15 +110,7 @@ function dots(points) {
   return solid;
 }
 
-// A square of half-width 1, which the renderer stretches: a plane has no end.
-function square() {
-  const solid = new Solid(), n = [0, 0, 1];
-  const [a, b, c, d] = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]].map((p) => solid.corner(p, n));
-  solid.indices.push(a, b, c, a, c, d);
-  return solid;
-}
-
-// The triangles of a body of the data.
+// The triangles of a body of the data; null for a plane, which has no end and is drawn as ground.
 function solidOf(body) {
   switch (body.kind) {
     case "sphere": return ball(body.radius);
@@ -128,7 +120,7 @@ function solidOf(body) {
     case "ellipsoid": return ball(0.5).stretched(body.size);
     case "mesh": return mesh(body.vertices, body.triangles);
     case "abstract": return dots(body.points);
-    case "plane": return square();
+    case "plane": return null;
     default: throw new Error(`no body is a ${body.kind}`);
   }
 }

@@ -40,6 +40,7 @@ class TracePanel {
     for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
       g.strokeStyle = line; g.beginPath(); g.moveTo(left, y(v)); g.lineTo(left + w, y(v)); g.stroke();
       g.fillStyle = soft; g.textAlign = "right";
+      if (Math.abs(v) < 1e-6 * step) v = 0;  // not "-0.0"
       g.fillText(Math.abs(step) < 1e-3 || step >= 1e4 ? v.toExponential(1) : v.toFixed(Math.min(digits, 6)), left - 6, y(v));
     }
     g.textAlign = "center";
