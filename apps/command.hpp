@@ -36,5 +36,6 @@ Command add_bench(CLI::App& program);
 Command add_gradcheck(CLI::App& program);
 Command add_accuracy(CLI::App& program);
 Command add_stress(CLI::App& program);
+Command add_view(CLI::App& program);
 
 }  // namespace tangere::apps

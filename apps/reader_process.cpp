@@ -15,9 +15,11 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <span>
 
@@ -29,8 +31,22 @@ namespace tangere::apps {
 namespace {
 
 constexpr std::size_t kNoteBytes = 4096;
-// Of computing, for one call of HDF5. The longest reads one dataset of one episode.
-constexpr std::chrono::seconds kEndless{10};
+// Of computing, for one call of HDF5, unless TANGERE_READ_SECONDS says otherwise. The longest call
+// reads one dataset of one episode.
+constexpr std::chrono::seconds kEndless{10}, kLongest{86'400};
+
+std::chrono::seconds endless() {
+  const char* const text = std::getenv("TANGERE_READ_SECONDS");
+  if (text == nullptr) return kEndless;
+  const char* const end = text + std::strlen(text);
+  std::chrono::seconds::rep seconds = 0;
+  const auto [at, error] = std::from_chars(text, end, seconds);
+  if (error != std::errc() || at != end || seconds < 1 || seconds > kLongest.count())
+    throw InputError(
+        fmt::format("TANGERE_READ_SECONDS={}; expected a whole number of seconds, 1 to {}", text,
+                    kLongest.count()));
+  return std::chrono::seconds(seconds);
+}
 
 std::atomic<int> child{0}, passed_on{0};
 static_assert(std::atomic<int>::is_always_lock_free, "the handler may not wait");
@@ -78,12 +94,12 @@ std::span<char> shared_note() {
   return {static_cast<char*>(memory), kNoteBytes};
 }
 
-[[noreturn]] void be_child(pid_t parent, const std::function<int()>& command,
-                           std::span<char> note) {
+[[noreturn]] void be_child(pid_t parent, const std::function<int()>& command, std::span<char> note,
+                           std::chrono::seconds limit) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);  // who kills the command means all of it
   if (getppid() != parent) _exit(kInputOutput);
   h5::note_reading_in(note);
-  h5::end_endless_calls(kEndless);
+  h5::end_endless_calls(limit);
   int code = command();
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
     std::fputs("tangere: writing to stdout failed\n", stderr);
@@ -104,6 +120,7 @@ bool is_crash(int signal) {
 }  // namespace
 
 int run_in_child(const std::function<int()>& command) {
+  const std::chrono::seconds limit = endless();
   const std::span<char> note = shared_note();
   const pid_t parent = getpid();
   PassSignals signals;
@@ -113,7 +130,7 @@ int run_in_child(const std::function<int()>& command) {
   const pid_t process = fork();
   if (process == 0) {
     signals.restore();
-    be_child(parent, command, note);
+    be_child(parent, command, note, limit);
   }
   if (process < 0) {  // no process to be had: read without that protection
     signals.restore();
@@ -137,7 +154,7 @@ int run_in_child(const std::function<int()>& command) {
     throw IoError(fmt::format(
         "the HDF5 library did not come back within {} s of computing; it had last read {}; a file "
         "over which the library loops is damaged",
-        kEndless.count(), reading));
+        limit.count(), reading));
   if (!is_crash(signal) || reading.empty()) {  // a closed pipe, a limit: end as the child did
     signals.restore();
     std::signal(signal, SIG_DFL);

@@ -19,8 +19,8 @@ using ::testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-const Words kSubcommands{"inspect", "simulate", "generate", "validate", "info",
-                         "merge",   "export",   "plot",     "bench",    "gradcheck"};
+const Words kSubcommands{"inspect", "simulate", "generate", "validate", "info",     "merge",
+                         "export",  "plot",     "view",     "bench",    "gradcheck"};
 
 /// `tangere simulate small.xml --output out.h5` and more.
 Words simulate(const Words& more = {}) {
@@ -47,8 +47,8 @@ TEST(Command, HelpEndsWithAnExampleThatWorks) {
     const Outcome outcome = run(folder, example);
     EXPECT_EQ(outcome.exit_code, 0) << help.out << outcome.err;
   }
-  EXPECT_THAT(folder.files(), testing::ElementsAre("ball.h5", "ball.svg", "balls", "balls.csv",
-                                                   "scenes", "speed.svg"));
+  EXPECT_THAT(folder.files(), testing::ElementsAre("ball.h5", "ball.html", "ball.svg", "balls",
+                                                   "balls.csv", "scenes", "speed.svg"));
 }
 
 TEST(Command, EveryBodyTypeIsInspectedSimulatedAndDrawn) {
@@ -132,7 +132,7 @@ INSTANTIATE_TEST_SUITE_P(
                 {"qqqqqqqqq"},
                 2,
                 "expected one of inspect, simulate, generate, validate, info, merge, export, plot, "
-                "bench"},
+                "view, bench"},
         Mistake{"top_option",
                 {"--verison"},
                 2,

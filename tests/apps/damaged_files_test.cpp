@@ -147,6 +147,7 @@ TEST_P(DamagedShard, EndsInAMessage) {
   expect_answer(run(folder, {"validate", "set"}), "validate", GetParam().said);
   expect_answer(run(folder, {"info", "set"}), "info", "");
   expect_answer(run(folder, {"export", "set", "--csv", "x.csv"}), "export", "");
+  expect_answer(run(folder, {"view", "set", "-o", "x.html"}), "view", "");
   expect_answer(run(folder, {"merge", "set", "--copy", "--overwrite"}), "merge", "");
   expect_answer(run(folder, generate() + Words{"--resume"}), "resume", "");
 }
@@ -190,6 +191,9 @@ TEST(DamagedFile, HeapsThatTheLibraryTrustsEndInAMessage) {
   }
 }
 
+/// What the library loops over is ended after a second instead of ten.
+const std::vector<std::string> kSoon = {"TANGERE_READ_SECONDS=1"};
+
 /// Sets the size of the free space in every heap of texts to zero. HDF5 1.10 then steps from object
 /// to object for ever.
 int empty_the_free_space(std::string& bytes) {
@@ -221,9 +225,9 @@ TEST(DamagedFile, HeapsOverWhichTheLibraryLoopsEndInAMessage) {
   std::string bytes = folder.read("run.h5");
   ASSERT_GT(empty_the_free_space(bytes), 0);
   folder.write("run.h5", bytes);
-  const Outcome outcome = run(folder, {"plot", "run.h5", "-o", "pads.svg"});
+  const Outcome outcome = run(folder, {"plot", "run.h5", "-o", "pads.svg"}, kSoon);
   EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_THAT(outcome.err, HasSubstr("the HDF5 library did not come back within 10 s of computing; "
+  EXPECT_THAT(outcome.err, HasSubstr("the HDF5 library did not come back within 1 s of computing; "
                                      "it had last read 'run.h5', object "));
 }
 
@@ -233,10 +237,21 @@ TEST(DamagedFile, ShardsOverWhichTheLibraryLoopsEndResuming) {
   std::string bytes = folder.read("set/shard-00000.h5");
   ASSERT_GT(empty_the_free_space(bytes), 0);
   folder.write("set/shard-00000.h5", bytes);
-  const Outcome outcome = run(folder, generate() + Words{"--resume"});
+  const Outcome outcome = run(folder, generate() + Words{"--resume"}, kSoon);
   EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_THAT(outcome.err, HasSubstr("the HDF5 library did not come back within 10 s of computing; "
+  EXPECT_THAT(outcome.err, HasSubstr("the HDF5 library did not come back within 1 s of computing; "
                                      "it had last read 'set/shard-00000.h5', object "));
+}
+
+TEST(DamagedFile, TheLimitOfReadingIsAWholeNumberOfSeconds) {
+  const Folder folder;
+  for (const char* text : {"", "0", "-1", "1.5", "soon", "86401", "99999999999999999999"}) {
+    const Outcome outcome =
+        run(folder, {"validate", "set"}, {std::string("TANGERE_READ_SECONDS=") + text});
+    EXPECT_EQ(outcome.exit_code, 2) << text;
+    EXPECT_THAT(outcome.err, HasSubstr(std::string("TANGERE_READ_SECONDS=") + text +
+                                       "; expected a whole number of seconds, 1 to 86400"));
+  }
 }
 
 /// HDF5 1.10 ended the process that read mutants 79, 218 and 257 with a segmentation fault. The

@@ -75,6 +75,7 @@ INSTANTIATE_TEST_SUITE_P(
         Row{"merge", kDone, {"merge", "set", "--overwrite"}},
         Row{"export", kDone, {"export", "set", "--csv", "rows.csv"}},
         Row{"plot", kDone, {"plot", "run.h5", "-o", "pads.svg"}},
+        Row{"view", kDone, {"view", "run.h5", "-o", "run.html"}},
         Row{"simulate_failed",
             kSomeFailed,
             {"simulate", "failing.xml", "--steps", "2", "-o", "b.h5"}},
@@ -115,6 +116,7 @@ INSTANTIATE_TEST_SUITE_P(
         Row{"info_damaged", kInputOutput, {"info", "broken"}},
         Row{"merge_damaged", kInputOutput, {"merge", "broken"}},
         Row{"export_damaged", kInputOutput, {"export", "broken", "--csv", "d.csv"}},
+        Row{"view_damaged", kInputOutput, {"view", "broken", "-o", "d.html"}},
         Row{"plot_damaged", kInputOutput, {"plot", "broken/shard-00000.h5", "-o", "d.svg"}}),
     [](const auto& row) { return row.param.name; });
 

@@ -57,6 +57,7 @@ std::vector<Job> jobs() {
       {"merge", {kGenerate + Words{"--no-merge"}}, {"merge", "set"}},
       {"export", {kGenerate}, {"export", "set", "--csv", "rows.csv"}},
       {"plot", {kSimulate}, {"plot", "run.h5", "-o", "pads.svg"}},
+      {"view", {kSimulate}, {"view", "run.h5", "-o", "run.html"}},
   };
 }
 
@@ -65,10 +66,15 @@ bool lies(const std::string& kind) { return kind == "lost" || kind == "zeros"; }
 
 class Fault : public ::testing::TestWithParam<std::tuple<Job, const char*>> {
  protected:
-  void prepare(const Folder& folder) {
-    fs::copy_file(scene("rolling_ball_small.xml"), folder.path("scene.xml"));
+  /// What is there before the job: made once, copied for every call that fails.
+  void SetUp() override {
+    fs::copy_file(scene("rolling_ball_small.xml"), before_.path("scene.xml"));
     for (const Words& words : std::get<0>(GetParam()).before)
-      ASSERT_EQ(run(folder, words).exit_code, 0);
+      ASSERT_EQ(run(before_, words).exit_code, 0);
+  }
+  void prepare(const Folder& folder) const {
+    fs::copy(before_.path(), folder.path(),
+             fs::copy_options::recursive | fs::copy_options::copy_symlinks);
   }
   /// The n-th call fails; 0: none.
   Outcome run_with(const Folder& folder, long n, const std::string& count = "") {
@@ -84,6 +90,9 @@ class Fault : public ::testing::TestWithParam<std::tuple<Job, const char*>> {
         *(threads + 1) = "1";
     return run(folder, words, environment);
   }
+
+ private:
+  const Folder before_;
 };
 
 TEST_P(Fault, LeavesWholeFilesOrNone) {

@@ -82,18 +82,36 @@ class StateLoss {
   std::vector<double> weights_;
 };
 
+/// The loss of every run of `inputs`, which go together in one batch; NaN where a step finds no
+/// solution. An environment has the same bits alone and among others (AdjointScheme,
+/// CompanyChangesNothing), and sixteen together cost little more than one.
+inline std::vector<double> losses_of_runs(const Model& model, const StepperOptions& options,
+                                          const std::vector<RunInput>& inputs,
+                                          const StateLoss& loss) {
+  if (inputs.empty()) return {};
+  const int count = static_cast<int>(inputs.size());
+  Batch batch(model, count);
+  std::vector<double> sums, u;
+  for (int e = 0; e < count; ++e) {
+    batch.set_state(e, inputs[std::size_t(e)].q, inputs[std::size_t(e)].v);
+    sums.push_back(loss.value(0, q_of(batch, e), v_of(batch, e)));
+  }
+  Stepper stepper(model, options);
+  for (std::size_t t = 0; t < inputs[0].u.size(); ++t) {
+    u.clear();
+    for (const RunInput& in : inputs) u.insert(u.end(), in.u[t].begin(), in.u[t].end());
+    stepper.step(batch, u);
+    for (int e = 0; e < count; ++e)
+      sums[std::size_t(e)] += failed(batch.status(e)) ? NAN
+                                                      : loss.value(static_cast<int>(t) + 1,
+                                                                   q_of(batch, e), v_of(batch, e));
+  }
+  return sums;
+}
+
 inline double loss_of_run(const Model& model, const StepperOptions& options, const RunInput& in,
                           const StateLoss& loss) {
-  Batch batch(model, 1);
-  batch.set_state(0, in.q, in.v);
-  Stepper stepper(model, options);
-  double sum = loss.value(0, q_of(batch), v_of(batch));
-  for (std::size_t t = 0; t < in.u.size(); ++t) {
-    stepper.step(batch, in.u[t]);
-    if (failed(batch.status(0))) return NAN;
-    sum += loss.value(static_cast<int>(t) + 1, q_of(batch), v_of(batch));
-  }
-  return sum;
+  return losses_of_runs(model, options, {in}, loss)[0];
 }
 
 /// Gradient: q₀ (nv), v₀ (nv), u (steps, nu).
@@ -152,16 +170,25 @@ inline RunGradient adjoint_of_run(const Model& model, const StepperOptions& opti
   return g;
 }
 
-/// The central difference of least error; NaN if none settles (a kink). Its error is estimated as
-/// its change from the step size before, plus the effect of rounding. At the smallest steps, which
-/// serve runs with a kink or a split step close by, two differences can agree by chance.
-inline double best_difference(const std::function<double(double)>& f, double start) {
+/// The steps of central differences: four values of a function at each, at e, -e, 2e and -2e.
+inline std::vector<double> difference_steps(double start) {
+  std::vector<double> steps;
+  for (double e = start; e > 1e-5 * start; e *= 0.25) steps.push_back(e);
+  return steps;
+}
+
+/// The central difference of least error; NaN if none settles (a kink). `values`: of the function,
+/// four for each of the steps. A difference's error is estimated as its change from the step before,
+/// plus the effect of rounding. At the smallest steps, which serve runs with a kink or a split step
+/// close by, two differences can agree by chance.
+inline double best_of_differences(const std::vector<double>& steps, const double* values) {
   constexpr double kRounding = 1e-14;  // of a run's loss, relative
   double best = NAN, least = HUGE_VAL, before = NAN;
-  for (double e = start; e > 1e-5 * start; e *= 0.25) {
+  for (std::size_t i = 0; i < steps.size(); ++i) {
     // Richardson's extrapolation removes the error of second order.
-    const double above = f(e), below = f(-e);
-    const double coarse = (f(2 * e) - f(-2 * e)) / (4 * e), fine = (above - below) / (2 * e);
+    const double e = steps[i], above = values[4 * i], below = values[4 * i + 1];
+    const double coarse = (values[4 * i + 2] - values[4 * i + 3]) / (4 * e),
+                 fine = (above - below) / (2 * e);
     const double value = (4 * fine - coarse) / 3;
     const double rounding = kRounding * (std::abs(above) + std::abs(below)) / e;
     const double error = std::abs(value - before) + rounding;
@@ -171,26 +198,47 @@ inline double best_difference(const std::function<double(double)>& f, double sta
   return best;
 }
 
+inline double best_difference(const std::function<double(double)>& f, double start) {
+  const std::vector<double> steps = difference_steps(start);
+  std::vector<double> values;
+  for (const double e : steps)
+    for (const double at : {e, -e, 2 * e, -2 * e}) values.push_back(f(at));
+  return best_of_differences(steps, values.data());
+}
+
 inline RunGradient differences_of_run(const Model& model, const StepperOptions& options,
                                       const RunInput& in, const StateLoss& loss,
                                       double start = 1e-3) {
-  RunGradient g;
+  // All runs with other states and controls go in one batch.
+  const std::vector<double> steps = difference_steps(start);
+  std::vector<RunInput> runs;
   const auto along = [&](const std::function<void(RunInput&, double)>& change) {
-    return best_difference(
-        [&](double e) {
-          RunInput other = in;
-          change(other, e);
-          return loss_of_run(model, options, other, loss);
-        },
-        start);
+    for (const double e : steps)
+      for (const double at : {e, -e, 2 * e, -2 * e}) {
+        runs.push_back(in);
+        change(runs.back(), at);
+      }
   };
   for (int i = 0; i < model.nv(); ++i) {
-    g.q.push_back(along([&](RunInput& x, double e) { x.q = moved(model, x.q, i, e); }));
-    g.v.push_back(along([&](RunInput& x, double e) { x.v[std::size_t(i)] += 10 * e; }) / 10);
+    along([&](RunInput& x, double e) { x.q = moved(model, x.q, i, e); });
+    along([&](RunInput& x, double e) { x.v[std::size_t(i)] += 10 * e; });
   }
   for (std::size_t t = 0; t < in.u.size(); ++t)
     for (int k = 0; k < model.nu(); ++k)
-      g.u.push_back(along([&](RunInput& x, double e) { x.u[t][std::size_t(k)] += 10 * e; }) / 10);
+      along([&](RunInput& x, double e) { x.u[t][std::size_t(k)] += 10 * e; });
+  const std::vector<double> losses = losses_of_runs(model, options, runs, loss);
+  const double* next = losses.data();
+  const auto difference = [&] {
+    next += 4 * steps.size();
+    return best_of_differences(steps, next - 4 * steps.size());
+  };
+  RunGradient g;
+  for (int i = 0; i < model.nv(); ++i) {
+    g.q.push_back(difference());
+    g.v.push_back(difference() / 10);
+  }
+  for (std::size_t k = 0; k < in.u.size() * std::size_t(model.nu()); ++k)
+    g.u.push_back(difference() / 10);
   const NumberGradients parameters(model);
   for (int k = 0; k < parameters.count(); ++k) {
     const double size = parameters.infos()[std::size_t(k)].value;

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tactile fields: colours, the map of a sensor with its scale, and the arrows and skin in space.
+// A number triple of a cell is f·axis0, f·axis1 and pressure, in newtons per point.
+const kStops = [[20, 22, 60], [42, 60, 120], [30, 112, 142], [62, 162, 122], [158, 200, 88], [250, 236, 130]];
+
+// Dark blue to pale yellow: lightness rises evenly, so equal steps of force look equal.
+function pressureColour(x) {
+  const at = 5 * Math.min(1, Math.max(0, x)), k = Math.min(4, Math.floor(at));
+  return kStops[k].map((c, i) => Math.round(c + (at - k) * (kStops[k + 1][i] - c)));
+}
+
+class SensorView {
+  // `episodes`: of all, so that one scale serves them.
+  constructor(sensor, index, episodes, renderer) {
+    Object.assign(this, { sensor, index, low: 0, high: 0, longest: 0, largest: 0 });
+    for (const { fields } of episodes) {
+      const { values } = fields[index];
+      for (let i = 0; i < values.length; i += 3) {
+        const shear = Math.hypot(values[i], values[i + 1]);
+        this.low = Math.min(this.low, values[i + 2]);
+        this.high = Math.max(this.high, values[i + 2]);
+        this.longest = Math.max(this.longest, shear);
+        this.largest = Math.max(this.largest, Math.hypot(shear, values[i + 2]));
+      }
+    }
+    if (this.high <= this.low) this.high = this.low + 1e-9;
+    // Half the distance to a neighbour.
+    const area = sensor.rows > 1 && sensor.cols > 1 ? sensor.height * sensor.width : this.extent() ** 2 / 4;
+    this.half = 0.5 * Math.sqrt(area / Math.max(1, sensor.cells)) || 1e-4;
+    if (renderer) this.skin = renderer.makeSkin();
+    this.skinData = new Float32Array(13 * sensor.cells);
+  }
+
+  extent() {
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    const { position } = this.sensor;
+    for (let i = 0; i < position.length; ++i) {
+      low[i % 3] = Math.min(low[i % 3], position[i]);
+      high[i % 3] = Math.max(high[i % 3], position[i]);
+    }
+    return norm(sub(high, low));
+  }
+
+  // The triples of the newest field at a frame; null before the first.
+  at(episode, frame) {
+    const { at, values } = episode.fields[this.index], k = at[frame], n = 3 * this.sensor.cells;
+    return k < 0 ? null : values.subarray(k * n, (k + 1) * n);
+  }
+
+  share(pressure) { return (pressure - this.low) / (this.high - this.low); }
+
+  // Copies of a square for the renderer: centre, two half edges, colour.
+  paintSkin(field) {
+    const { position, axis0, axis1, press, cells, rows, cols, height, width } = this.sensor;
+    const grid = rows > 1 && cols > 1 && cells === rows * cols;
+    const h0 = grid ? height / (rows - 1) / 2 : this.half, h1 = grid ? width / (cols - 1) / 2 : this.half;
+    for (let c = 0; c < cells; ++c) {
+      const colour = pressureColour(this.share(field ? field[3 * c + 2] : 0));
+      for (let k = 0; k < 3; ++k) {
+        const i = 3 * c + k;
+        this.skinData[13 * c + k] = position[i] - 0.05 * this.half * press[i];
+        this.skinData[13 * c + 3 + k] = h0 * axis0[i];
+        this.skinData[13 * c + 6 + k] = h1 * axis1[i];
+        this.skinData[13 * c + 9 + k] = colour[k] / 255;
+      }
+      // What nothing presses lets one see through.
+      this.skinData[13 * c + 12] = field && field[3 * c + 2] !== 0 ? 1 : 0.35;
+    }
+    return this.skinData;
+  }
+
+  // Cells that share an arrow, so that one can see them apart.
+  groups() {
+    if (this.grouped) return this.grouped;
+    const { rows, cols, cells, place } = this.sensor, most = 12, groups = new Map();
+    const grid = rows > 0 && cells === rows * cols, step = Math.ceil(cells / (most * most));
+    for (let c = 0; c < cells; ++c) {
+      const key = grid ? `${Math.floor(place[2 * c] * Math.min(rows, most) / rows)} ${
+        Math.floor(place[2 * c + 1] * Math.min(cols, most) / cols)}` : Math.floor(c / step);
+      if (!groups.has(key)) groups.set(key, []);
+      groups.get(key).push(c);
+    }
+    this.grouped = [...groups.values()];
+    return this.grouped;
+  }
+
+  // Adds arrows to `out`: place and force on the body, world axes. `length`: of the largest force.
+  addArrows(field, model, length, out) {
+    const { position, axis0, axis1, press } = this.sensor;
+    if (!field || this.largest === 0) return;
+    for (const cells of this.groups()) {
+      let at = [0, 0, 0], force = [0, 0, 0];
+      for (const c of cells)
+        for (let k = 0; k < 3; ++k) {
+          at[k] += position[3 * c + k] / cells.length;
+          force[k] += (field[3 * c] * axis0[3 * c + k] + field[3 * c + 1] * axis1[3 * c + k]
+            + field[3 * c + 2] * press[3 * c + k]) / cells.length;
+        }
+      const size = norm(force) / this.largest;
+      if (size < 0.02) continue;
+      out.push(...moved(model, at), ...turned(model, scale(length / this.largest, force)));
+    }
+  }
+
+  hasMap() { return this.sensor.rows > 0; }
+
+  // Draws the map into a 2D context of `width` × `height`, in CSS pixels.
+  drawMap(g, width, height, field, episode, frame, ink, soft) {
+    const { name, rows, cols, cells, place, turn } = this.sensor;
+    const left = 8, top = 44, bar = 74, bottom = 38;
+    const tall = (this.sensor.height || 1e-3) / rows * (rows + 1), wide = (this.sensor.width || tall) ;
+    const size = Math.min((width - left - bar) / wide, (height - top - bottom) / tall);
+    const w = wide * size, h = tall * size;
+    g.font = "600 14px system-ui, sans-serif"; g.fillStyle = ink; g.textAlign = "left";
+    g.fillText(name, left, 17);
+    g.font = "12px system-ui, sans-serif"; g.fillStyle = soft;
+    g.fillText("colour: pressure · arrows: shear", left, 34);
+    const image = new ImageData(cols, rows), nothing = pressureColour(this.share(0));
+    for (let i = 0; i < rows * cols; ++i) image.data.set([...nothing, 255], 4 * i);
+    for (let c = 0; field && c < cells; ++c)
+      if (place[2 * c] >= 0)
+        image.data.set(pressureColour(this.share(field[3 * c + 2])),
+          4 * (place[2 * c] * cols + place[2 * c + 1]));
+    if (!this.small) this.small = document.createElement("canvas");
+    this.small.width = cols; this.small.height = rows;
+    this.small.getContext("2d").putImageData(image, 0, 0);
+    g.imageSmoothingEnabled = false;
+    g.drawImage(this.small, left, top, w, h);
+    if (field && this.longest > 0) {
+      g.strokeStyle = "#fff"; g.lineWidth = 1.3; g.beginPath();
+      const reach = 0.95 * Math.max(w, h) / 12 / this.longest;
+      for (const group of this.groups()) {
+        let down = 0, right = 0, y = 0, x = 0, n = 0;
+        for (const c of group) {
+          if (place[2 * c] < 0) continue;
+          ++n; y += place[2 * c] + 0.5; x += place[2 * c + 1] + 0.5;
+          down += turn[4 * c] * field[3 * c] + turn[4 * c + 1] * field[3 * c + 1];
+          right += turn[4 * c + 2] * field[3 * c] + turn[4 * c + 3] * field[3 * c + 1];
+        }
+        const dx = right / n * reach, dy = down / n * reach, long = Math.hypot(dx, dy);
+        if (!n || long < 1) continue;
+        const x0 = left + x / n / cols * w - dx / 2, y0 = top + y / n / rows * h - dy / 2;
+        const ux = dx / long, uy = dy / long, head = Math.min(5, 0.45 * long);
+        g.moveTo(x0, y0); g.lineTo(x0 + dx, y0 + dy);
+        g.moveTo(x0 + dx - head * (ux - 0.6 * uy), y0 + dy - head * (uy + 0.6 * ux));
+        g.lineTo(x0 + dx, y0 + dy);
+        g.lineTo(x0 + dx - head * (ux + 0.6 * uy), y0 + dy - head * (uy - 0.6 * ux));
+      }
+      g.stroke();
+    }
+    g.strokeStyle = soft; g.lineWidth = 1; g.strokeRect(left + 0.5, top + 0.5, w, h);
+    this.drawScale(g, left + w + 12, top, h, ink);
+    const sum = (kind) => episode.traces.find((t) => t.name === `${name} ${kind}`)?.values[frame] ?? NaN;
+    g.textAlign = "left"; g.fillStyle = ink;
+    g.fillText(field ? `normal ${withUnit(sum("normal"), "N")}, shear ${withUnit(sum("shear"), "N")} in all`
+      : "no field yet", left, top + h + 17);
+    g.fillStyle = soft;
+    g.fillText(`${(1e3 * this.sensor.width).toPrecision(3)} × ${(1e3 * this.sensor.height).toPrecision(3)} mm`
+      + `, ${this.sensor.points} points`, left, top + h + 33);
+    return { width: left + w + bar, height: top + h + bottom };
+  }
+
+  drawScale(g, x, top, h, ink) {
+    for (let k = 0; k < h; ++k) {
+      g.fillStyle = `rgb(${pressureColour(1 - k / h)})`;
+      g.fillRect(x, top + k, 12, 1.5);
+    }
+    g.fillStyle = ink; g.font = "11px system-ui, sans-serif"; g.textAlign = "left";
+    for (let k = 0; k <= 4; ++k)
+      g.fillText(withUnit(this.low + (this.high - this.low) * k / 4, "N"), x + 17,
+        top + h * (1 - k / 4) + (k === 4 ? 9 : k === 0 ? 0 : 4));
+  }
+}

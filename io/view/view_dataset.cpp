@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+// A demo of a data set is an episode of the page: its rows, then the state after the last action.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "engine/base/error.hpp"
+#include "io/dataset/dataset_description.hpp"
+#include "io/dataset/dataset_files.hpp"
+#include "io/view/view_source.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr std::int64_t kMostRows = std::int64_t{1} << 31;  // of a demo; more is damage
+
+/// A demo and the file that has it.
+struct Demo {
+  std::string file;
+  std::int64_t number, rows;
+};
+
+class DatasetView {
+ public:
+  DatasetView(const std::string& path, const ViewOptions& options)
+      : options_(options), path_(path), dataset_(find_dataset(path)) {}
+
+  ViewData read() {
+    choose_demos();
+    const h5::Id file = h5::open_file(demos_.front().file), scene = h5::open_group(file, "scene");
+    if (H5Aexists(scene.get(), "text") <= 0)
+      throw IoError(fmt::format("{}: /scene has no text: the file does not hold its scene",
+                                demos_.front().file));
+    data_.title = h5::read_text(scene, "name"), data_.source = path_, data_.kind = "data set";
+    scene_ =
+        std::make_unique<ViewScene>(h5::read_text(scene, "text"), data_.title, path_, options_);
+    data_.scene = scene_->scene();
+    q_names_ = h5::read_texts(scene, "q_names");
+    scene_->check_names(q_names_);
+    if (H5Aexists(scene.get(), "randomized_names") > 0)
+      randomized_ = h5::read_texts(scene, "randomized_names");
+    interval_ = h5::read_number<double>(scene, "timestep") *
+                static_cast<double>(h5::read_number<std::int64_t>(scene, "every"));
+    take_sensors(file);
+    std::vector<std::int64_t> rows;
+    for (const Demo& demo : demos_) rows.push_back(demo.rows + 1);
+    const std::size_t traces = q_names_.size() + 2 * data_.sensors.size() + 1;
+    data_.stride =
+        stride_for(rows, numbers_per_frame(data_.scene, data_.sensors, traces), options_);
+    for (const Demo& demo : demos_) add_demo(demo);
+    return std::move(data_);
+  }
+
+ private:
+  void choose_demos() {
+    std::size_t all = 0;
+    for (const std::string& path : dataset_.files) {
+      const h5::Id file = h5::open_file(path), data = h5::open_group(file, "data");
+      for (const std::int64_t number : demo_numbers(data)) {
+        ++all;
+        if (options_.episode ? number != *options_.episode
+                             : demos_.size() == static_cast<std::size_t>(options_.episodes))
+          continue;
+        const h5::Id demo = h5::open_group(data, fmt::format("demo_{}", number));
+        const auto rows = h5::read_number<std::int64_t>(demo, "num_samples");
+        if (rows < 1 || rows > kMostRows)
+          throw IoError(
+              fmt::format("{}: demo_{} has {} rows; expected 1 or more", path, number, rows));
+        demos_.push_back({path, number, rows});
+      }
+    }
+    if (demos_.empty() && options_.episode)
+      throw InputError(fmt::format(
+          "'{}' has no episode {}, or it failed; 'tangere info' says how many there are", path_,
+          *options_.episode));
+    if (demos_.empty()) throw IoError(path_ + ": no episode that did not fail, so nothing to show");
+    if (!options_.episode && demos_.size() < all)
+      data_.notes.push_back(fmt::format("The first {} of {} episodes.", demos_.size(), all));
+    for (const std::string& missing : dataset_.missing)
+      data_.notes.push_back(fmt::format("Shard '{}' is missing.", missing));
+  }
+
+  /// Takes the sensors that demos have fields of.
+  void take_sensors(const h5::Id& file) {
+    const h5::Id obs = h5::open_group(
+        h5::open_group(h5::open_group(file, "data"), fmt::format("demo_{}", demos_.front().number)),
+        "obs");
+    if (!h5::has_link(obs, "q"))
+      throw IoError(
+          fmt::format("{}: demo_{} has no obs/q, so nothing says where bodies are; record "
+                      "it: tangere generate --record q",
+                      demos_.front().file, demos_.front().number));
+    const h5::Id scene = h5::open_group(file, "scene");
+    for (ViewSensor& sensor : scene_->sensors()) {
+      std::string name;
+      for (const std::string& reading : {sensor.name, sensor.name + ".ideal"})
+        if (name.empty() && h5::has_link(obs, reading)) name = reading;
+      if (name.empty() || !h5::has_link(scene, "sensors")) {
+        data_.notes.push_back(
+            fmt::format("The field of sensor '{}' was not recorded.", sensor.name));
+        continue;
+      }
+      const h5::Id group = h5::open_group(h5::open_group(scene, "sensors"), sensor.name);
+      signs_.push_back(static_cast<int>(h5::read_number<std::int64_t>(group, "pressure_sign")));
+      readings_.push_back(name);
+      data_.sensors.push_back(std::move(sensor));
+    }
+  }
+
+  void add_demo(const Demo& which) {
+    const h5::Id file = h5::open_file(which.file);
+    const h5::Id demo =
+        h5::open_group(h5::open_group(file, "data"), fmt::format("demo_{}", which.number));
+    const h5::Id obs = h5::open_group(demo, "obs"), end = h5::open_group(demo, "final_obs");
+    ViewNumbers numbers;
+    if (!randomized_.empty()) numbers = {randomized_, h5::read_numbers<double>(demo, "randomized")};
+    ViewEpisode episode;
+    episode.label = fmt::format("episode {}", which.number);
+    episode.shapes = scene_->begin_episode(numbers, data_);
+    episode.rows = frames_of(which.rows + 1, data_.stride);
+    episode.traces = coordinate_traces(q_names_, scene_->q_units());
+    const auto rows = static_cast<hsize_t>(which.rows);
+    const h5::Id q = h5::open_dataset(obs, "q"), last = h5::open_dataset(end, "q");
+    check_shape(q, {rows, q_names_.size()}, "obs/q");
+    check_shape(last, {1, q_names_.size()}, "final_obs/q");
+    for (const std::int64_t row : episode.rows) {
+      episode.time.push_back(static_cast<float>(static_cast<double>(row) * interval_));
+      const std::vector<double> state = row < which.rows ? row_numbers(q, row, q_names_.size())
+                                                         : row_numbers(last, 0, q_names_.size());
+      scene_->add_state(state, episode);
+      for (std::size_t k = 0; k < state.size(); ++k)
+        episode.traces[k].values.push_back(static_cast<float>(state[k]));
+    }
+    for (std::size_t s = 0; s < data_.sensors.size(); ++s) add_fields(s, which, obs, end, episode);
+    add_reward(which, demo, episode);
+    data_.episodes.push_back(std::move(episode));
+  }
+
+  void add_fields(std::size_t sensor, const Demo& which, const h5::Id& obs, const h5::Id& end,
+                  ViewEpisode& episode) {
+    const ViewSensor& view = data_.sensors[sensor];
+    const h5::Id fields = h5::open_dataset(obs, readings_[sensor]),
+                 last = h5::open_dataset(end, readings_[sensor]);
+    const std::size_t width = 3 * static_cast<std::size_t>(view.points);
+    for (const h5::Id* dataset : {&fields, &last}) {
+      const h5::Dims dims = h5::dimensions(*dataset);
+      std::size_t numbers = 1;
+      for (std::size_t i = 1; i < dims.size(); ++i) numbers *= dims[i];
+      const auto rows = dataset == &last ? hsize_t{1} : static_cast<hsize_t>(which.rows);
+      if (dims.size() < 2 || dims[0] != rows || numbers != width)
+        throw IoError(fmt::format("{}: expected {} fields of {} points: the file is damaged",
+                                  h5::place_of(*dataset), rows, view.points));
+    }
+    ViewField field;
+    ViewTrace normal{"force [N]", view.name + " normal", "N", {}},
+        shear{"force [N]", view.name + " shear", "N", {}};
+    for (const std::int64_t row : episode.rows) {
+      const std::vector<double> force =
+          row < which.rows ? row_numbers(fields, row, width) : row_numbers(last, 0, width);
+      check_finite_field(force, fmt::format("{}: demo_{}: sensor '{}': row {}", which.file,
+                                            which.number, view.name, row));
+      const std::array<double, 2> sums = add_field(view, signs_[sensor], force, field);
+      field.at.push_back(static_cast<std::int32_t>(field.at.size()));
+      normal.values.push_back(static_cast<float>(sums[0]));
+      shear.values.push_back(static_cast<float>(sums[1]));
+    }
+    episode.fields.push_back(std::move(field));
+    episode.traces.push_back(std::move(normal));
+    episode.traces.push_back(std::move(shear));
+  }
+
+  /// Of the action that a row begins; the last state begins none. A scene alone has no rewards.
+  void add_reward(const Demo& which, const h5::Id& demo, ViewEpisode& episode) {
+    if (value_of(dataset_.settings, "policy").empty()) return;
+    const h5::Id dataset = h5::open_dataset(demo, "rewards");
+    check_shape(dataset, {static_cast<hsize_t>(which.rows)}, "rewards");
+    ViewTrace trace{"reward", "reward", "1", {}};
+    for (const std::int64_t row : episode.rows)
+      trace.values.push_back(row < which.rows ? static_cast<float>(row_numbers(dataset, row, 1)[0])
+                                              : kNoValue);
+    episode.traces.insert(episode.traces.begin(), std::move(trace));
+  }
+
+  const ViewOptions& options_;
+  std::string path_;
+  DatasetFiles dataset_;
+  std::vector<Demo> demos_;
+  std::unique_ptr<ViewScene> scene_;
+  ViewData data_;
+  std::vector<std::string> q_names_, randomized_, readings_;
+  std::vector<int> signs_;
+  double interval_ = 0;  // of rows [s]
+};
+
+}  // namespace
+
+ViewData read_dataset_view(const std::string& path, const ViewOptions& options) {
+  return DatasetView(path, options).read();
+}
+
+}  // namespace tangere

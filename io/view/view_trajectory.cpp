@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+// An environment of a trajectory file is an episode of the page.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "engine/base/error.hpp"
+#include "io/trajectory/trajectory_reader.hpp"
+#include "io/view/view_source.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr std::int64_t kMostSteps = std::int64_t{1} << 28;  // more is damage
+
+class TrajectoryView {
+ public:
+  TrajectoryView(const std::string& path, const ViewOptions& options)
+      : options_(options),
+        path_(path),
+        file_(h5::open_file(path)),
+        fields_(path),
+        scene_(text("scene_text"),
+               H5Aexists(file_.get(), "scene_path") > 0 ? text("scene_path") : text("scene_name"),
+               path, options) {
+    steps_ = h5::read_number<std::int64_t>(file_, "steps");
+    const h5::Id q = h5::open_dataset(file_, "q");
+    q_names_ = h5::read_texts(q, "names");
+    scene_.check_names(q_names_);
+    if (steps_ < 0 || steps_ > kMostSteps || fields_.environments() < 1)
+      throw IoError(fmt::format("{}: {} steps of {} environments: the file is damaged", path,
+                                steps_, fields_.environments()));
+    check_shape(q, {rows(), environments(), q_names_.size()}, "q");
+    check_shape(h5::open_dataset(h5::open_group(file_, "solver"), "status"),
+                {rows() - 1, environments()}, "status");
+  }
+
+  ViewData read() {
+    data_.title = text("scene_name"), data_.source = path_, data_.kind = "trajectory";
+    data_.scene = scene_.scene();
+    take_sensors();
+    std::int64_t first = 0,
+                 count = std::min<std::int64_t>(options_.episodes, fields_.environments());
+    if (options_.episode) first = *options_.episode, count = 1;
+    if (first >= fields_.environments())
+      throw InputError(
+          fmt::format("environment {}: {} has 0 to {}", first, path_, fields_.environments() - 1));
+    if (!options_.episode && count < fields_.environments())
+      data_.notes.push_back(
+          fmt::format("The first {} of {} environments.", count, fields_.environments()));
+    const std::size_t traces = q_names_.size() + 2 * data_.sensors.size() + 2;
+    data_.stride =
+        stride_for(std::vector<std::int64_t>(static_cast<std::size_t>(count), steps_ + 1),
+                   numbers_per_frame(data_.scene, data_.sensors, traces), options_);
+    for (std::int64_t e = first; e < first + count; ++e) add_environment(e);
+    return std::move(data_);
+  }
+
+ private:
+  [[nodiscard]] std::string text(const char* name) const {
+    if (H5Aexists(file_.get(), name) <= 0)
+      throw IoError(
+          fmt::format("{}: no attribute '{}': the file does not hold its scene", path_, name));
+    return h5::read_text(file_, name);
+  }
+  [[nodiscard]] hsize_t rows() const { return static_cast<hsize_t>(steps_) + 1; }
+  [[nodiscard]] hsize_t environments() const {
+    return static_cast<hsize_t>(fields_.environments());
+  }
+
+  /// Takes the sensors that the file has fields of.
+  void take_sensors() {
+    for (ViewSensor& sensor : scene_.sensors()) {
+      const auto& recorded = fields_.sensors();
+      const auto found = std::find_if(recorded.begin(), recorded.end(),
+                                      [&](const SensorLayout& s) { return s.name == sensor.name; });
+      if (found == recorded.end()) {
+        data_.notes.push_back(fmt::format("Sensor '{}' was not recorded.", sensor.name));
+        continue;
+      }
+      const auto index = static_cast<std::size_t>(found - recorded.begin());
+      if (found->points != sensor.points)
+        throw IoError(fmt::format("{}: sensor '{}' has {} points; its scene says {}", path_,
+                                  sensor.name, found->points, sensor.points));
+      if (!fields_.has_pressure(index) || !fields_.has_shear(index))
+        data_.notes.push_back(fmt::format("Of sensor '{}' only {} was recorded.", sensor.name,
+                                          fields_.has_shear(index) ? "shear" : "pressure"));
+      recorded_.push_back(index);
+      data_.sensors.push_back(std::move(sensor));
+    }
+  }
+
+  /// What `<randomize>` drew for an environment.
+  [[nodiscard]] ViewNumbers numbers(std::int64_t environment) const {
+    ViewNumbers numbers;
+    if (!h5::has_link(file_, "randomized")) return numbers;
+    const h5::Id dataset = h5::open_dataset(file_, "randomized");
+    numbers.names = h5::read_texts(dataset, "names");
+    check_shape(dataset, {environments(), numbers.names.size()}, "randomized");
+    numbers.values = row_numbers(dataset, environment, numbers.names.size());
+    return numbers;
+  }
+
+  void add_environment(std::int64_t environment) {
+    ViewEpisode episode;
+    episode.label = fmt::format("environment {}", environment);
+    episode.shapes = scene_.begin_episode(numbers(environment), data_);
+    episode.rows = frames_of(steps_ + 1, data_.stride);
+    episode.traces = coordinate_traces(q_names_, scene_.q_units());
+    const h5::Id q = h5::open_dataset(file_, "q");
+    std::vector<double> state(q_names_.size());
+    for (const std::int64_t row : episode.rows) {
+      episode.time.push_back(static_cast<float>(static_cast<double>(row) * fields_.timestep()));
+      h5::read_box<double>(q, {static_cast<hsize_t>(row), static_cast<hsize_t>(environment), 0},
+                           {1, 1, state.size()}, state.data());
+      scene_.add_state(state, episode);
+      for (std::size_t k = 0; k < state.size(); ++k)
+        episode.traces[k].values.push_back(static_cast<float>(state[k]));
+    }
+    for (std::size_t s = 0; s < data_.sensors.size(); ++s) add_fields(s, environment, episode);
+    add_reward(environment, episode);
+    add_status(environment, episode);
+    data_.episodes.push_back(std::move(episode));
+  }
+
+  /// Takes the newest field at each frame, once.
+  void add_fields(std::size_t sensor, std::int64_t environment, ViewEpisode& episode) {
+    const std::size_t index = recorded_[sensor];
+    const ViewSensor& view = data_.sensors[sensor];
+    const SensorLayout& layout = fields_.sensors()[index];
+    ViewField field;
+    ViewTrace normal{"force [N]", view.name + " normal", "N", {}},
+        shear{"force [N]", view.name + " shear", "N", {}};
+    std::int64_t newest = -1, taken = -1;
+    std::int32_t at = -1;
+    std::array<double, 2> sums{};
+    for (const std::int64_t row : episode.rows) {
+      while (newest + 1 < fields_.frames(index) && fields_.step(index, newest + 1) <= row) ++newest;
+      if (newest > taken) {
+        sums =
+            add_field(view, layout.pressure_sign, fields_.force(index, newest, environment), field);
+        taken = newest, ++at;
+      }
+      field.at.push_back(at);
+      normal.values.push_back(at < 0 ? kNoValue : static_cast<float>(sums[0]));
+      shear.values.push_back(at < 0 ? kNoValue : static_cast<float>(sums[1]));
+    }
+    episode.fields.push_back(std::move(field));
+    episode.traces.push_back(std::move(normal));
+    episode.traces.push_back(std::move(shear));
+  }
+
+  /// The reward of the newest action at each frame.
+  void add_reward(std::int64_t environment, ViewEpisode& episode) {
+    if (!h5::has_link(file_, "task")) return;
+    const h5::Id task = h5::open_group(file_, "task");
+    if (!h5::has_link(task, "reward") || !h5::has_link(task, "step")) return;
+    const h5::Id reward = h5::open_dataset(task, "reward"), step = h5::open_dataset(task, "step");
+    const h5::Dims dims = h5::dimensions(step);
+    check_shape(reward, {dims.at(0), environments()}, "reward");
+    std::vector<std::int64_t> steps(dims.at(0));
+    std::vector<double> rewards(dims.at(0));
+    if (!steps.empty()) {
+      h5::read_box<std::int64_t>(step, {0}, {dims[0]}, steps.data());
+      h5::read_box<double>(reward, {0, static_cast<hsize_t>(environment)}, {dims[0], 1},
+                           rewards.data());
+    }
+    ViewTrace trace{"reward", "reward", "1", {}};
+    for (const std::int64_t row : episode.rows) {
+      const auto after = std::upper_bound(steps.begin(), steps.end(), row) - steps.begin();
+      trace.values.push_back(after == 0 ? kNoValue
+                                        : static_cast<float>(rewards[std::size_t(after - 1)]));
+    }
+    episode.traces.insert(episode.traces.begin(), std::move(trace));
+  }
+
+  /// The worst status of the steps since the frame before: a failure, else the largest value.
+  void add_status(std::int64_t environment, ViewEpisode& episode) {
+    const h5::Id status = h5::open_dataset(h5::open_group(file_, "solver"), "status");
+    std::vector<std::int8_t> values(static_cast<std::size_t>(steps_));
+    if (steps_ > 0)
+      h5::read_box<std::int8_t>(status, {0, static_cast<hsize_t>(environment)},
+                                {static_cast<hsize_t>(steps_), 1}, values.data());
+    ViewTrace trace{"solver status", "status", "1", {}};
+    std::int64_t before = 0;
+    for (const std::int64_t row : episode.rows) {
+      int worst = 0;
+      for (std::int64_t step = before; step < row; ++step) {
+        const int value = values[static_cast<std::size_t>(step)];
+        if (value < 0 ? worst >= 0 || value < worst : worst >= 0 && value > worst) worst = value;
+      }
+      trace.values.push_back(static_cast<float>(worst));
+      before = row;
+    }
+    episode.traces.push_back(std::move(trace));
+  }
+
+  const ViewOptions& options_;
+  std::string path_;
+  h5::Id file_;
+  TrajectoryReader fields_;
+  ViewScene scene_;
+  ViewData data_;
+  std::int64_t steps_ = 0;
+  std::vector<std::string> q_names_;
+  std::vector<std::size_t> recorded_;  // (sensors) indices in the reader
+};
+
+}  // namespace
+
+ViewData read_trajectory_view(const std::string& path, const ViewOptions& options) {
+  return TrajectoryView(path, options).read();
+}
+
+}  // namespace tangere
