@@ -31,6 +31,7 @@ void keep_places(CompiledModel& m, kernels::RememberingContact& of) {
 
 int add(CompiledModel& m, kernels::RememberingContact of) {
   of.first = m.remembering_points;
+  if (of.sensor < 0) m.taped_points += of.contact.n_points;
   m.remembering_points += of.contact.n_points;
   m.memories.push_back(of);
   return static_cast<int>(m.memories.size()) - 1;
@@ -136,6 +137,7 @@ void add_sensors(CompiledModel& m) {
     contact.body1 = s.body;
     bound(contact.points, contact.n_points, contact.middle, contact.extent);
     lay_out_tiles(m, contact, tiles);
+    m.taped_points += s.points();
     for (const int target : s.targets) {
       const CompiledBody& body = m.bodies[std::size_t(target)];
       kernels::RememberingContact of;

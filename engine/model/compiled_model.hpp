@@ -169,7 +169,9 @@ struct CompiledModel {
   std::vector<kernels::Solid> solids;  ///< parallel to bodies
   std::vector<kernels::RememberingContact> memories;
   int remembering_points = 0;  ///< of all `memories`
-  int ground_anchors = 0;      ///< points of those on the ground
+  int taped_points =
+      0;  ///< the same, with those of a sensor once and not for every body that it feels
+  int ground_anchors = 0;  ///< points of those on the ground
   std::vector<kernels::LinkPair> link_pairs;
   std::vector<kernels::GroundedLink> grounded;
   std::vector<int> pair_order, ground_order;  ///< members of link_pairs and grounded, side by side

@@ -159,10 +159,14 @@ struct Readout::Impl {
                            components_of(of.form), dense);
   }
 
+  /// Whether what friction remembers is part of a reading. Pressure is that of a skin without
+  /// friction.
+  [[nodiscard]] bool is_elastic(FieldOutput of) const {
+    return sensor_of(of.sensor).elastic && of.form != FieldForm::pressure;
+  }
   /// Whether a reading is not simply what the kernels compute.
   [[nodiscard]] bool imperfect(FieldOutput of) const {
-    const CompiledSensor& s = sensor_of(of.sensor);
-    return s.elastic || (of.form != FieldForm::ideal && s.imperfect);
+    return is_elastic(of) || (of.form != FieldForm::ideal && sensor_of(of.sensor).imperfect);
   }
   static FieldPart part_of(FieldForm form) {
     const int components = components_of(form);
@@ -214,7 +218,7 @@ struct Readout::Impl {
                       std::span<double> field) {
     if (sensor_of(of.sensor).past_states() > 0) {
       read_past(batch, environment, of, field);
-    } else if (sensor_of(of.sensor).elastic) {
+    } else if (is_elastic(of)) {
       read_elastic(batch, environment, of, field);
     } else {
       fill(environment, of, field.data());

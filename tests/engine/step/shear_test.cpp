@@ -98,6 +98,7 @@ INSTANTIATE_TEST_SUITE_P(Schemes, Slope,
 /// A skin under the box, on the plate, reads the shear that holds still when the box does: each of
 /// its points has its own spring, stretched by as much as the box has moved on it.
 TEST(Shear, ASkinKeepsItsShear) {
+  std::vector<double> pressure[2];
   for (const double ks : {0.0, 30.0}) {
     Scene s = slope(20, true, 500);
     TactileDescription t;
@@ -116,6 +117,10 @@ TEST(Shear, ASkinKeepsItsShear) {
     };
     run.go(2);
     const double early = shear();
+    std::vector<double>& pressed = pressure[ks > 0 ? 1 : 0];
+    pressed.resize(49);
+    const std::span<double> reading[] = {pressed};
+    readout.read_block(run.batch, 0, {0, FieldForm::pressure}, reading);
     run.go(kSanitized ? 0.2 : 3);
     if (ks == 0) {
       EXPECT_NEAR(shear(), 0, 1e-3);  // at rest, but for the tilt of the box
@@ -129,6 +134,7 @@ TEST(Shear, ASkinKeepsItsShear) {
     EXPECT_NEAR(early, 49 * ks * moved, 1e-3);
     EXPECT_GT(early, 0.1);
   }
+  EXPECT_EQ(pressure[0], pressure[1]);  // without friction: the spring is no part of it
 }
 
 /// A mass on a belt that runs at 0.02 m/s, held by a spring of 40 N/m (docs/shear.md).
