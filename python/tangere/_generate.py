@@ -26,7 +26,7 @@ _PROGRAM = '"$TANGERE_PYTHON" -m tangere.policy'  # the same text, so the same b
 def command_path() -> Path:
     """The command `tangere` of this installation or build. Raises IoError if there is none."""
     places = [os.environ.get("TANGERE_PROGRAM"), Path(sys.executable).parent / "tangere"]
-    places += [Path(__file__).resolve().parent / "tangere", _in_build(), shutil.which("tangere")]
+    places += [_in_build(), shutil.which("tangere")]
     for place in places:
         if place and os.access(place, os.X_OK) and not Path(place).is_dir():
             return Path(place)
