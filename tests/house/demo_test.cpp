@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests that what ./run-demo says about its data set holds for the shard that its command writes.
+#include <unistd.h>
+
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -43,7 +45,8 @@ TEST(House, DemoTellsTheTruthAboutItsFile) {
   std::smatch match;
   const std::string text = demo_text();
   ASSERT_TRUE(std::regex_search(text, match, command));
-  const fs::path folder = fs::path(testing::TempDir()) / "tangere_demo_test";
+  const fs::path folder =
+      fs::path(testing::TempDir()) / ("tangere_demo_test_" + std::to_string(getpid()));
   fs::create_directories(folder);
   const fs::path file = folder / "shard-00000.h5";
   const std::string run = "cd '" TANGERE_SOURCE_DIR "' && '" TANGERE_PROGRAM "' " + match[1].str() +
