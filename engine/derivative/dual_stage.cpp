@@ -45,6 +45,7 @@ struct DualStage::Impl {
   std::vector<std::vector<D>> listed_anchors;  ///< of each pair
   std::vector<D> ground_anchors;
   std::vector<Coefficients<D>> sensor_laws;
+  std::vector<kernels::Vec3<double>> felt_sizes;  ///< of each body in this environment
 
   explicit Impl(const CompiledModel& model)
       : m(model),
@@ -116,6 +117,7 @@ struct DualStage::Impl {
     anchors.resize(std::size_t(m.remembering_points));
     ground_anchors.assign(std::size_t(kernels::kAnchorNumbers * m.ground_anchors), D(0.0));
     sensor_laws.resize(m.sensors.size());
+    felt_sizes.resize(m.bodies.size());
   }
 
   /// Returns the tangent of a body's contact point, link axes, with the body's size.
@@ -206,7 +208,11 @@ struct DualStage::Impl {
       kernels::with_touched<D>(pair, kernels::broadcast<D>(size),
                                kernels::Vec3<D>{side[0], side[1], side[2]}, f);
     } else {
-      kernels::with_distance<D>(of.contact.shape, kernels::broadcast<D>(of.contact.size), f);
+      kernels::with_distance<D>(
+          of.contact.shape,
+          of.ground ? kernels::zero3<D>()
+                    : kernels::broadcast<D>(felt_sizes[std::size_t(of.contact.body2)]),
+          f);
     }
   }
 
@@ -367,6 +373,9 @@ void DualStage::set_numbers(const double* column, std::span<const double> tangen
     i.inertia[k] = tangents.empty() ? 0 : tangents[first + k];
   for (std::size_t k = 0; k < i.stretch.size(); ++k)
     i.stretch[k] = tangents.empty() ? 0 : tangents[sizes + k];
+  for (std::size_t b = 0; b < i.felt_sizes.size(); ++b)
+    i.felt_sizes[b] =
+        kernels::load_vector<double>(i.m.bodies[b].size, i.m.bodies[b].size_row, column, 0);
   for (std::size_t k = 0; k < i.sensor_laws.size(); ++k) {
     std::size_t row = std::size_t(kernels::parameter_numbers(i.view)) + kCoefficients * k;
     i.sensor_laws[k] = transformed(i.m.sensors[k].parameters, [&](const Parameter& p) {

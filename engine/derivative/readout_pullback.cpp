@@ -136,25 +136,21 @@ struct ReadoutPullback::Impl {
   void pull_back_elastic(int lane, const CompiledSensor& s, std::span<double> parameters,
                          std::span<double> points) {
     const CompiledModel& m = compiled(model);
-    if (!points.empty())
-      throw InputError("tactile sensor '" + m.scene.sensors[std::size_t(s.number)].name +
-                       "' has ks: derivatives by the numbers of single points are not known; "
-                       "expected none of them to be asked for");
+    if (!points.empty()) check_has_plain_points(model);
     const int environment = kBlock * block + lane, group = lane / kGroup;
     std::vector<double>& remembered = memory[std::size_t(lane)];
     remembered.resize(3 * batch->memory(environment).size());
     used[std::size_t(group)] = true;
-    elastic.pull_back(
-        reader, *batch, environment, s.number,
-        std::span<const double>(whole).first(3 * std::size_t(s.points())), remembered,
-        [&](const ElasticField::Share& share) {
-          const CompiledBody& body = m.bodies[std::size_t(share.of->contact.body2)];
-          hand_on(share.motion, s.link, {kernels::diagonal(1.0), {0, 0, 0}}, body.link, group,
-                  lane % kGroup);
-          for (std::size_t k = 0; k < kCoefficients && !parameters.empty(); ++k)
-            parameters[(std::size_t(share.of->number) + k) * kBlock + std::size_t(lane)] +=
-                share.motion.law[k];
-        });
+    for (const ElasticField::Share& share : elastic.pull_back(
+             reader, *batch, environment, s.number,
+             std::span<const double>(whole).first(3 * std::size_t(s.points())), remembered)) {
+      const CompiledBody& body = m.bodies[std::size_t(share.of->contact.body2)];
+      hand_on(share.motion, s.link, {kernels::diagonal(1.0), {0, 0, 0}}, body.link, group,
+              lane % kGroup);
+      for (std::size_t k = 0; k < kCoefficients && !parameters.empty(); ++k)
+        parameters[(std::size_t(share.of->number) + k) * kBlock + std::size_t(lane)] +=
+            share.motion.law[k];
+    }
   }
 
   /// Hands one shape's sums, in the axes of a pad, on to its link and the sensor's.
@@ -176,6 +172,14 @@ struct ReadoutPullback::Impl {
     }
   }
 };
+
+void check_has_plain_points(const Model& model) {
+  for (const CompiledSensor& s : compiled(model).sensors)
+    if (s.elastic)
+      throw InputError("tactile sensor '" + model.scene().sensors[std::size_t(s.number)].name +
+                       "' has ks: derivatives by the numbers of single points are not known; "
+                       "expected none of them to be asked for");
+}
 
 void check_has_no_memory(const Model& model) {
   for (std::size_t s = 0; s < model.sensors().size(); ++s)

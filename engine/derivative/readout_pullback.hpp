@@ -15,6 +15,9 @@ namespace tangere {
 /// (SensorInfo::past_states), for runs that take derivatives of fields.
 void check_has_no_memory(const Model& model);
 
+/// Throws InputError if some sensor has ks: its points have no derivatives of their own.
+void check_has_plain_points(const Model& model);
+
 /// Owns the scratch of one thread. Allocates when made, and when it meets more tiles at once than
 /// before. Fields of sensors with memory throw InputError. For each state call place(); then for
 /// each loss clear(), any number of fields and end effectors, and finish(). Fields are computed

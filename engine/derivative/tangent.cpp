@@ -340,6 +340,7 @@ void Tangent::field(const Batch& batch, int block, int lane, const BlockTape& ta
   const CompiledSensor& s = m.sensors[std::size_t(sensor)];
   std::vector<double> field(s.imperfect ? field_dot.size() : 0);
   i.set_memory(tape.memory(step, lane), state.memory);
+  i.stage.set_numbers(batch.block(block) + lane, numbers_dot);
   i.stage.field(sensor, batch.block(block) + lane, numbers_dot, points_dot, field, field_dot);
   const ReadingKey key = {batch.seed(), batch.episode(block * kBlock + lane),
                           tape.episode_step(step, lane)};

@@ -15,8 +15,6 @@ using kernels::Vec3;
 
 namespace {
 
-bool remembers(const kernels::ContactParameters& p) { return p.ks.value != 0 || p.ks.row >= 0; }
-
 /// Keeps points (n, 3) as rows of coordinates that vectors can read.
 void keep_places(CompiledModel& m, kernels::RememberingContact& of) {
   constexpr int kLanes = kernels::kGroup;

@@ -155,6 +155,9 @@ struct VaryingPlace {
   std::vector<VaryingNumber> numbers;
 };
 
+/// What friction remembers of a point takes this much (ShearEntry).
+inline constexpr std::size_t kRememberedBytes = 32;
+
 struct CompiledModel {
   Scene scene;
   int nq = 0, nv = 0, nu = 0;

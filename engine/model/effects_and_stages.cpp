@@ -30,16 +30,29 @@ std::string counted(std::size_t n, const std::string& one, const std::string& ma
   return std::to_string(n) + " " + (n == 1 ? one : many);
 }
 
+/// Whether some friction remembers. CompiledModel::memories are made later.
+bool remembers(const CompiledModel& m) {
+  const auto any = [](const auto& all) {
+    return std::any_of(all.begin(), all.end(),
+                       [](const auto& x) { return kernels::remembers(x.parameters); });
+  };
+  return any(m.pairs) || any(m.grounds) || any(m.sensors);
+}
+
 /// Returns "cuboid: products, flat faces; …" with each shape once, then how many bodies move.
 std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links) {
   std::vector<PrimitiveShape> shapes;
+  bool remembers = false;
   for (int i = links.first; i < links.first + links.count; ++i) {
-    const PrimitiveShape shape = m.pairs[std::size_t(m.pair_order[std::size_t(i)])].shape;
+    const kernels::PairContact& pair = m.pairs[std::size_t(m.pair_order[std::size_t(i)])];
+    const PrimitiveShape shape = pair.shape;
+    remembers = remembers || kernels::remembers(pair.parameters);
     if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) shapes.push_back(shape);
   }
   std::string text;
   for (const PrimitiveShape shape : shapes)
-    text += std::string(row_of(shape).name) + ": " + sums_of(shape) + "; ";
+    text += std::string(row_of(shape).name) + ": " +
+            (remembers ? "point by point, remembers" : sums_of(shape)) + "; ";
   if (links.link1 < 0 || links.link2 < 0) return text + "one body moves";
   return text + "both bodies move";
 }
@@ -140,6 +153,7 @@ void list_stages(CompiledModel& m) {
       m.pattern.factor_entries == m.pattern.entries
           ? "no fill"
           : std::to_string(m.pattern.factor_entries - m.pattern.entries) + " filled in");
+  if (remembers(m)) add("memory of friction", "points that touch", "");
   for (std::size_t i = 0; i < m.sensors.size(); ++i)
     add("field", m.sensor_info[i].name, field_variant(m.sensors[i]));
 }

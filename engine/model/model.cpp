@@ -52,9 +52,11 @@ std::span<const std::string> Model::u_units() const { return compiled_->u_units;
 std::span<const std::string> Model::body_names() const { return compiled_->body_names; }
 
 std::size_t Model::state_bytes_per_environment() const {
-  // Rows of the block, then status, iterations, residual, the history flag and the steps so far.
+  // Rows of the block, then status, iterations, residual, the history flag and the steps so far,
+  // and all that friction can remember.
   return sizeof(double) * compiled_->layout.rows + sizeof(std::int8_t) + sizeof(std::int32_t) +
-         sizeof(double) + 1 + sizeof(std::int64_t);
+         sizeof(double) + 1 + sizeof(std::int64_t) +
+         kRememberedBytes * std::size_t(compiled_->taped_points);
 }
 
 }  // namespace tangere

@@ -21,6 +21,7 @@ ElasticField::ElasticField(const Model& model) : model_(model), felt_(compiled(m
   remembered_.resize(3 * most);
   s_.resize(4 * most);
   force_.resize(3 * most);
+  if (most > 0) shares_.reserve(compiled(model).bodies.size());
 }
 
 /// Calls f(contact, touch, points) with anchors set for every body that the sensor touches.
@@ -67,11 +68,13 @@ void ElasticField::read(const PadReader& reader, const Batch& batch, int environ
                    });
 }
 
-void ElasticField::pull_back(const PadReader& reader, const Batch& batch, int environment,
-                             int sensor, std::span<const double> cotangent,
-                             std::span<double> memory,
-                             const std::function<void(const Share&)>& hand_on) {
+std::span<const ElasticField::Share> ElasticField::pull_back(const PadReader& reader,
+                                                             const Batch& batch, int environment,
+                                                             int sensor,
+                                                             std::span<const double> cotangent,
+                                                             std::span<double> memory) {
   const CompiledSensor& s = compiled(model_).sensors[std::size_t(sensor)];
+  shares_.clear();
   for_each_touched(
       reader, batch, environment, sensor,
       [&](const RememberingContact& of, const RememberingTouch& touch,
@@ -91,9 +94,10 @@ void ElasticField::pull_back(const PadReader& reader, const Batch& batch, int en
                                                     nullptr, force_.data(), nullptr, s_.data(),
                                                     &sums});
         sums.end.displacement += sums.start;
-        hand_on({&of, sums.end});
+        shares_.push_back({&of, sums.end});
         add_to_entries(batch.memory(environment), of, felt_.index(), points, s_.data(), memory);
       });
+  return shares_;
 }
 
 }  // namespace tangere

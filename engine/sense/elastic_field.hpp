@@ -3,7 +3,6 @@
 // last step (docs/shear.md).
 #pragma once
 
-#include <functional>
 #include <span>
 
 #include "engine/sense/pad_reader.hpp"
@@ -26,11 +25,11 @@ class ElasticField {
     const kernels::RememberingContact* of;
     kernels::TouchCotangent<double> motion;  ///< body 1's axes and origin
   };
-  /// Turns a cotangent of the field into shares of bodies, one call each, and adds to `memory`,
-  /// three numbers for each entry of the environment's memory.
-  void pull_back(const PadReader& reader, const Batch& batch, int environment, int sensor,
-                 std::span<const double> cotangent, std::span<double> memory,
-                 const std::function<void(const Share&)>& hand_on);
+  /// Returns what a cotangent of the field comes to, valid until the next call, and adds to
+  /// `memory`, three numbers for each entry of the environment's memory.
+  std::span<const Share> pull_back(const PadReader& reader, const Batch& batch, int environment,
+                                   int sensor, std::span<const double> cotangent,
+                                   std::span<double> memory);
 
  private:
   template <class F>
@@ -38,6 +37,7 @@ class ElasticField {
                         const F& f);
   Model model_;
   FeltPoints felt_;
+  std::vector<Share> shares_;
   AlignedVector<double> remembered_, s_, force_;  // (3, stride), (4, stride), (3, stride)
 };
 

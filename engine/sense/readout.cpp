@@ -159,8 +159,7 @@ struct Readout::Impl {
                            components_of(of.form), dense);
   }
 
-  /// Whether what friction remembers is part of a reading. Pressure is that of a skin without
-  /// friction.
+  /// Whether memory of friction is part of a reading. Pressure is that of a skin without friction.
   [[nodiscard]] bool is_elastic(FieldOutput of) const {
     return sensor_of(of.sensor).elastic && of.form != FieldForm::pressure;
   }
@@ -353,12 +352,14 @@ struct Readout::Impl {
   void compact(const Batch& batch, int environment, CompactFrame<T>& frame) {
     if (const FieldOutput of{frame.sensor_}; imperfect(of)) {
       const std::span<const double> field = read_imperfect(batch, environment, of);
-      const std::span<const int> tiles = all_tiles(frame.sensor_);
       const kernels::PadTiles pad = sensor_of(frame.sensor_).tiles();
-      std::copy(tiles.begin(), tiles.end(), frame.tiles_.begin());
-      for (const int tile : tiles)
-        gather_tile(pad, tile, field.data(), frame.values_.get() + 3 * kTactileTile * tile);
-      frame.count_ = static_cast<int>(tiles.size());
+      frame.count_ = 0;
+      for (const int tile : all_tiles(frame.sensor_)) {
+        T* const to = frame.values_.get() + 3 * kTactileTile * frame.count_;
+        const bool any = gather_tile(pad, tile, field.data(), to);
+        if (any || sensor_of(frame.sensor_).imperfect)
+          frame.tiles_[std::size_t(frame.count_++)] = tile;
+      }
       return;
     }
     frame.count_ = in_precision([&](auto zero) {

@@ -88,8 +88,8 @@ class Batch {
   /// and the scene has them.
   void set_memory(int environment, const ShearMemory& memory);
 
-  /// Sets the newest state alone, for differences. Quaternions are taken as they are; history and
-  /// status are kept.
+  /// Sets the newest state alone, for differences. Quaternions are taken as they are; history,
+  /// status and what friction remembers are kept.
   void displace_state(int environment, std::span<const double> q, std::span<const double> v);
 
   /// Freezes an environment as a failed step would. Throws InputError when `status` is not a

@@ -50,7 +50,8 @@ kernels::RememberingPoints FeltPoints::find(const CompiledSensor& sensor,
       {&c, touch.size, pose, kMargin, places_.data(), stride, touch.faces, index_.data()});
   if (sensor.point_factors.empty()) return points;
   points.factors = factors_.data();
-  for (int k = 0; k < stride; ++k)
+  const int end = (points.count + kGroup - 1) / kGroup * kGroup;
+  for (int k = 0; k < end; ++k)
     for (int i = 0; i < kPointCoefficients; ++i)
       factors_[std::size_t(i * stride + k)] =
           k < points.count

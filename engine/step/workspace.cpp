@@ -84,13 +84,16 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   remembered.start.resize(m.links.size());
   remembered.end.resize(m.links.size());
   for (auto* lanes : {&remembered.now, &remembered.after})
-    for (ShearMemory& lane : *lanes) lane.reserve(std::size_t(m.remembering_points));
+    for (ShearMemory& lane : *lanes) lane.reserve(std::size_t(m.taped_points));
 }
 
 template <int L>
 std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   BasicWorkspace w(m);
-  return w.memory.size() * sizeof(LaneRow) + w.own_points.size() * sizeof(double) +
+  const std::size_t remembered =
+      2 * L * std::size_t(m.taped_points) * sizeof(ShearEntry) + w.own_index.size() * sizeof(int) +
+      (w.own_anchors.size() + w.remembered.ground_anchors.size()) * sizeof(double);
+  return remembered + w.memory.size() * sizeof(LaneRow) + w.own_points.size() * sizeof(double) +
          w.scratch.size() + PivotedFactors::bytes(L, m.nv);
 }
 

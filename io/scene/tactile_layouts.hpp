@@ -31,8 +31,8 @@ std::vector<TactilePoint> cylinder_points(double radius, double length, int alon
 std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::size_t most);
 
 /// Reads a count, then a line for each point: "position" "row col" "normal" "axis0" "axis1",
-/// optionally followed by "kn kt mu damping" as factors of the sensor's coefficients. Directions
-/// are normalised. Positions are in the file's unit. Throws IoError if the file cannot be read,
+/// optionally followed by "kn kt mu damping" as factors of the sensor's coefficients, of which that
+/// of kt is of ks, too. Directions are normalised. Positions are in the file's unit. Throws IoError if the file cannot be read,
 /// InputError with file:line and what was expected.
 std::vector<TactilePoint> read_tactile_points(const std::string& path);
 

@@ -9,7 +9,7 @@
 //   λ = 1 if |w| ≤ μ B, else μ B/|w|,   f = N n - λ w
 // β = d/(d - g) is the share of the step after the point crossed the surface, where g ≥ 0 is how
 // far it was from it at the last accepted state. It is 1 for points that touched then.
-// Accepted states hand on s' = λ s, from which b, a and g follow (kernels/memory/anchors.hpp).
+// Accepted states hand on s' = λ s, from which b, a and g follow (kernels/memory/recall.hpp).
 //
 // Derivatives by ε = (θ; ρ₂) as in kernels/contact/pair_contact.hpp, with m = x - A, Z = η I + n rᵀ
 // and s̃ = β'_d P r, β'_d = -g/(d - g)²:
@@ -32,7 +32,7 @@ struct Anchor {
 };
 inline constexpr int kAnchorNumbers = 7;
 
-/// Where the numbers of an anchor are read: number i at [i * stride].
+/// Returns an anchor whose number i is load(i).
 template <class N, class Load>
 Anchor<N> load_anchor(const Load& load) {
   return {{load(0), load(1), load(2)}, {load(3), load(4), load(5)}, load(6)};

@@ -71,6 +71,8 @@ struct DofEffects {
 };
 
 using ContactParameters = Coefficients<Parameter>;
+/// Whether friction with these coefficients remembers.
+inline bool remembers(const ContactParameters& p) { return p.ks.value != 0 || p.ks.row >= 0; }
 
 /// A convex body for finding where it is widest: half its width along a unit vector e is
 /// Σ straight_i |e_i| + √Σ (round_i e_i)². A cuboid is straight, an ellipsoid round, a rod both.

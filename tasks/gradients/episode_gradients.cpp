@@ -178,6 +178,14 @@ EpisodeGradients task_returns(const Task& task, const TaskActions& actions,
   };
 }
 
+/// Refuses scenes in which a state is more than q and v.
+void check_remembers_nothing(const Model& model) {
+  if (model.remembers())
+    throw InputError("scene '" + model.scene().name +
+                     "' has contacts with ks; expected none: the derivative of a state by the one "
+                     "before leaves out what friction remembers");
+}
+
 EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& controls,
                                  const EpisodeOptions& run) {
   struct Scratch {
@@ -187,6 +195,7 @@ EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& contr
     std::vector<RowChain> chains;
   };
   const std::size_t nu = as_size(model.nu()), nv = as_size(model.nv());
+  check_remembers_nothing(model);
   const auto s = std::make_shared<Scratch>(
       Scratch{Stepper(model, for_gradients(model, {})), StepJacobians(model),
               BlockTape(model, model.integrator(), run.every),
@@ -222,6 +231,7 @@ EpisodeGradients scene_jacobians(const Model& model, const ControlProgram& contr
 
 EpisodeGradients task_jacobians(const Task& task, const TaskActions& actions,
                                 const EpisodeOptions& run) {
+  check_remembers_nothing(task.model());
   struct Scratch {
     TaskRollout rollout;
     ActionJacobians jacobians;

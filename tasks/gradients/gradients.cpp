@@ -59,7 +59,8 @@ struct GradientRollouts::Impl {
   }
 };
 
-/// Losses of fields cannot have sensors with memory.
+/// Losses of fields cannot have sensors with memory. Points of sensors with ks have no derivatives
+/// of their own.
 static void check_memories(const Model& model, const GradientOptions& options,
                            std::span<const RolloutLoss* const> losses) {
   const auto reads_fields = [&](const RolloutLoss* loss) {
@@ -67,7 +68,9 @@ static void check_memories(const Model& model, const GradientOptions& options,
       if (loss->reads_fields(step)) return true;
     return false;
   };
-  if (std::any_of(losses.begin(), losses.end(), reads_fields)) check_has_no_memory(model);
+  if (!std::any_of(losses.begin(), losses.end(), reads_fields)) return;
+  check_has_no_memory(model);
+  if (options.points) check_has_plain_points(model);
 }
 
 GradientRollouts::GradientRollouts(const Model& model, const GradientOptions& options,

@@ -43,6 +43,7 @@ void TapeBlock::start(std::uint64_t seed, std::int64_t first) {
   ActionBlock::start(seed, episodes);
   start_forward();
   took_.fill(false);
+  for (int l = 0; l < lanes_; ++l) start_memory_[as_size(l)] = rollout_.batch().memory(l);
   if (!task_.spec().opening) return;
   for (int l = 0; l < lanes_; ++l) {
     const std::span<const Moment> seen = rollout_.start_view(l).moments;
@@ -128,6 +129,7 @@ void TapeBlock::show_start() {
     rollout_.batch().displace_state(
         l, began ? part(records_[0].q, l) : number_row(rollout.data().q, l, nq),
         began ? part(records_[0].v, l) : number_row(rollout.data().v, l, nv));
+    rollout_.batch().set_memory(l, start_memory_[as_size(l)]);
   }
   rollout_.look_at_start();
 }

@@ -190,6 +190,7 @@ void BlockWorker::start(Batch& batch, EnvironmentData& data, int environment) {
   std::fill(action.begin(), action.end(), 0.0);
   if (spec.settling_steps > 0) settle(batch, data, environment);
   batch.set_state(environment, q, v);
+  if (spec.settling_steps > 0) batch.set_memory(environment, settling_->memory(0));
   if (spec.opening) {
     task_.begin_action(view_of(batch, data, environment), memory);
   } else {
