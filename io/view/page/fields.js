@@ -107,7 +107,7 @@ class SensorView {
   // Draws the map into a 2D context of `width` × `height`, in CSS pixels.
   drawMap(g, width, height, field, episode, frame, ink, soft) {
     const { name, rows, cols, cells, place, turn } = this.sensor;
-    const left = 8, top = 44, bar = 74, bottom = 38;
+    const left = 8, top = 44, bar = 86, bottom = 38;
     const tall = (this.sensor.height || 1e-3) / rows * (rows + 1), wide = (this.sensor.width || tall) ;
     const size = Math.min((width - left - bar) / wide, (height - top - bottom) / tall);
     const w = wide * size, h = tall * size;
