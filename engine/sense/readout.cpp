@@ -356,8 +356,7 @@ struct Readout::Impl {
       frame.count_ = 0;
       for (const int tile : all_tiles(frame.sensor_)) {
         T* const to = frame.values_.get() + 3 * kTactileTile * frame.count_;
-        const bool any = gather_tile(pad, tile, field.data(), to);
-        if (any || sensor_of(frame.sensor_).imperfect)
+        if (gather_tile(pad, tile, field.data(), to) || sensor_of(frame.sensor_).imperfect)
           frame.tiles_[std::size_t(frame.count_++)] = tile;
       }
       return;
