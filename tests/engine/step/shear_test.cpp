@@ -137,6 +137,47 @@ TEST(Shear, ASkinKeepsItsShear) {
   EXPECT_EQ(pressure[0], pressure[1]);  // without friction: the spring is no part of it
 }
 
+TEST(Shear, ABlockIsSavedAndRestoredWithItsMemory) {
+  Held run(slope(20, true, 500), Integrator::sdirk2, 5e-3);
+  run.go(0.5);
+  const BlockState saved = run.batch.save_block(0);
+  const ShearMemory memory = run.batch.memory(0);
+  EXPECT_EQ(memory.size(), 4U);
+  run.go(0.2);
+  const std::vector<double> went = testing::q_of(run.batch);
+  run.batch.restore_block(0, saved);
+  run.go(0.2);
+  EXPECT_EQ(testing::q_of(run.batch), went);
+  // The same from q, v and the memory, and not without it.
+  const auto again = [&](bool with_memory) {
+    run.batch.restore_block(0, saved);
+    const std::vector<double> q = testing::q_of(run.batch), v = testing::v_of(run.batch);
+    run.batch.set_state(0, q, v);
+    EXPECT_TRUE(run.batch.memory(0).empty());
+    if (with_memory) run.batch.set_memory(0, memory);
+    run.go(0.2);
+    return testing::q_of(run.batch);
+  };
+  EXPECT_EQ(again(true), went);
+  EXPECT_GT(std::abs(again(false)[0] - went[0]), 1e-5);
+}
+
+TEST(Shear, MemoryThatTheSceneDoesNotHaveIsRefused) {
+  Held run(slope(20, true, 500), Integrator::bdf1, 5e-3);
+  const auto message = [&](const ShearMemory& memory) {
+    try {
+      run.batch.set_memory(0, memory);
+    } catch (const InputError& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(message({{0, {0, 0, 0}}, {7, {1e-4, 0, 0}}}), "");
+  EXPECT_NE(message({{8, {0, 0, 0}}}).find("point 8"), std::string::npos);
+  EXPECT_NE(message({{3, {0, 0, 0}}, {3, {0, 0, 0}}}).find("rising"), std::string::npos);
+  EXPECT_NE(message({{1, {NAN, 0, 0}}}).find("not finite"), std::string::npos);
+}
+
 /// A mass on a belt that runs at 0.02 m/s, held by a spring of 40 N/m (docs/shear.md).
 Scene dragged() {
   Scene s;
