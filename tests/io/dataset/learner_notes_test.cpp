@@ -67,7 +67,7 @@ TEST(LearnerNotes, SayScalesAndWhatIsPrivilegedOfWhatIsStored) {
 TEST(LearnerNotes, IdsSayWhoPlayed) {
   DatasetLayout l = of_task();
   EXPECT_EQ(l.dataset_id(), "tangere/box_pushing_privileged/scripted-v0");
-  l.played_by.policy = "random";
+  l.played_by = {"random", {"random"}, 0, 0};
   EXPECT_EQ(l.dataset_id(), "tangere/box_pushing_privileged/random-v0");
   l.played_by = {"scripted", {"scripted", "random"}, 0.1, 0.3};
   EXPECT_EQ(l.dataset_id(), "tangere/box_pushing_privileged/scripted-noise-random-v0");

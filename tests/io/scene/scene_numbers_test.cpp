@@ -76,14 +76,18 @@ const Row kRows[] = {
      "contact skin ball mu", "1", true, 0.7},
     {R"(general_primitive_contact general_body="skin" primitive_body="ball" field="damping")",
      "contact skin ball damping", "N s/m^2", true, 1},
+    {R"(general_primitive_contact general_body="skin" primitive_body="ball" field="ks")",
+     "contact skin ball ks", "N/m", true, 0},
     {R"(ground_contact body="ball" field="kn")", "ground ball kn", "N/m", true, 5e3},
     {R"(ground_contact body="ball" field="kt")", "ground ball kt", "N s/m", true, 1},
     {R"(ground_contact body="ball" field="mu")", "ground ball mu", "1", true, 0.8},
     {R"(ground_contact body="ball" field="damping")", "ground ball damping", "N s/m", true, 0.03},
+    {R"(ground_contact body="ball" field="ks")", "ground ball ks", "N/m", true, 0},
     {R"(tactile name="skin" field="kn")", "tactile skin kn", "N/m", true, 11},
     {R"(tactile name="skin" field="kt")", "tactile skin kt", "N s/m", true, 0.01},
     {R"(tactile name="skin" field="mu")", "tactile skin mu", "1", true, 2},
     {R"(tactile name="skin" field="damping")", "tactile skin damping", "N s/m^2", true, 0.003},
+    {R"(tactile name="skin" field="ks")", "tactile skin ks", "N/m", true, 0},
     {R"(body name="can" field="density")", "body can density", "kg/m^3", true, 400},
     {"", "body puck mass", "kg", true, 0.2},
     {R"(body name="can" field="radius")", "body can radius", "m", true, 0.02},
@@ -173,7 +177,9 @@ TEST(SceneNumbers, NoKindIsForgotten) {
   const NumberGradients gradients(model);
   for (const Row& row : kRows) {
     const NumberInfo* const info = find(gradients, row.name);
-    ASSERT_EQ(info != nullptr, row.has_gradient) << row.name;
+    // Without ks there is no memory to take a derivative of; <randomize> above gives it one.
+    const bool idle = std::string(row.name).ends_with(" ks");
+    ASSERT_EQ(info != nullptr, row.has_gradient && !idle) << row.name;
     if (info == nullptr) continue;
     EXPECT_EQ(info->unit, row.unit) << row.name;
     EXPECT_EQ(info->value, row.value) << row.name;
