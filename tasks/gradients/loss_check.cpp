@@ -242,13 +242,24 @@ bool reads_fields(const RolloutLoss& loss, const CheckOptions& options) {
   return false;
 }
 
+/// Whether points of fields are checked: those of sensors with ks have no derivatives of their own.
+bool checks_points(const Model& model, const RolloutLoss& loss, const CheckOptions& options) {
+  const Scene& scene = model.scene();
+  const auto is_plain = [&](const TactileDescription& d) {
+    const SceneNumber ks = {NumberOwner::tactile, NumberField::ks, d.name};
+    return d.coefficients.ks == 0 && randomization_of(scene, ks) < 0;
+  };
+  return reads_fields(loss, options) &&
+         std::all_of(scene.sensors.begin(), scene.sensors.end(), is_plain);
+}
+
 LossGradient gradient_of(const Batch& start, const StepControls& controls, const RolloutLoss& loss,
                          const CheckOptions& options) {
   GradientOptions wanted;
   wanted.steps = options.steps;
   wanted.stepper = options.stepper;
   wanted.parameters = true;
-  wanted.points = reads_fields(loss, options);
+  wanted.points = checks_points(start.model(), loss, options);
   const RolloutLoss* const losses[] = {&loss};
   return rollout_gradients(start, controls, wanted, losses).losses[0];
 }
@@ -344,7 +355,7 @@ GradientCheck check_gradient(const Batch& start, const StepControls& controls,
   const LossGradient g = gradient_of(start, controls, loss, options);
   LossChecker checker(s, g);
   checker.check();
-  if (reads_fields(loss, options)) checker.points();
+  if (checks_points(start.model(), loss, options)) checker.points();
   return checker.result();
 }
 
