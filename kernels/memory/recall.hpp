@@ -41,11 +41,30 @@ void with_shape(const RememberingTouch& t, const F& f) {
   with_touched<N>(t.of->contact, broadcast<N>(t.size), broadcast<N>(t.faces), f);
 }
 
+/// The same as find_place() where a point touches. Elsewhere it takes the nearest face without
+/// rounding its edges, so that H has the form of the inside for points that have not landed, too.
+template <class Shape, class N>
+[[gnu::always_inline]] inline void find_face_place(const Shape& shape, const LoadedTouch<N>& t,
+                                                   const Vec3<N>& xi, PointContact<N>& p) {
+  const Distance<N> at = shape.inside(transposed_times(t.Q, xi - t.c), p.curvature);
+  p.d = at.d;
+  p.n = t.Q * at.n;
+  if constexpr (Shape::kBending == Bending::rod) p.axis = {t.Q.m[0][2], t.Q.m[1][2], t.Q.m[2][2]};
+  p.x2 = xi - p.d * p.n;
+}
+
 /// Computes distance, normal and the place where the force acts of a point at ξ.
 template <class Shape, class N>
 [[gnu::always_inline]] inline void find_place(const Shape& shape, const LoadedTouch<N>& t,
                                               const Vec3<N>& xi, PointContact<N>& p) {
-  if (!t.ground) return find_place(shape, t.Q, t.c, xi, p);
+  if (!t.ground) {
+    if constexpr (Shape::kSums == PointSumForm::faces) {
+      find_face_place(shape, t, xi, p);
+    } else {
+      find_place(shape, t.Q, t.c, xi, p);
+    }
+    return;
+  }
   p.n = {t.Q.m[0][2], t.Q.m[1][2], t.Q.m[2][2]};
   const N height = dot(p.n, xi - t.c);
   const N reach(kPlaneReach);  // padding lies beyond it

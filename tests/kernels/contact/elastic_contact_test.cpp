@@ -62,7 +62,7 @@ Step random_step(Random& random, PrimitiveShape shape, bool ground) {
   const auto frame = [&] { return Frame<double>{random.rotation(), random.vector(0.05)}; };
   x.end = frame();
   Vec3<double> place, out;
-  const double depth = random.uniform(1e-4, 2e-3);
+  double depth = random.uniform(1e-4, 2e-3);
   if (shape == PrimitiveShape::sphere) {
     out = random.direction();
     place = (kSize.x - depth) * out;
@@ -70,13 +70,20 @@ Step random_step(Random& random, PrimitiveShape shape, bool ground) {
     const double around = random.uniform(-3, 3);
     out = {std::cos(around), std::sin(around), 0};
     place = (kSize.x - depth) * out + Vec3<double>{0, 0, random.uniform(-0.004, 0.004)};
+  } else if (shape == PrimitiveShape::cuboid) {  // near an edge, which the point may come across
+    depth = random.uniform(5e-5, 9e-5);
+    out = {0, 0, 1};
+    place = {kSize.x - 1e-4, 0.01 * random.uniform(-1, 1), kSize.z - depth};
   } else {
     out = {0, 0, 1};
     place = {0.01 * random.normal(), 0.01 * random.normal(), x.radius - depth};
   }
   x.xi = x.end.R * place + x.end.p;
   const bool first = random.uniform(0, 1) < 0.33;
-  x.start = x.end;
+  // The shape turned about the point and moved.
+  const Vec3<double> turn = random.vector(0.02);
+  const Mat3<double> turned = rotation_exp(turn, rotation_series(turn));
+  x.start = {turned * x.end.R, x.xi + turned * (x.end.p - x.xi)};
   const Vec3<double> way =
       x.end.R * ((first ? -1.5 * depth : 0.2 * depth) * out + random.vector(2e-4));
   x.start.p = x.start.p + way;
@@ -84,7 +91,8 @@ Step random_step(Random& random, PrimitiveShape shape, bool ground) {
   const Vec3<double> n = x.start.R * out;
   const Vec3<double> s = random.vector(5e-4);
   x.s = s - dot(n, s) * n;
-  x.law = {{random.uniform(100, 1000), random.uniform(0.05, 2), random.uniform(0.1, 1),
+  const double stiffer = shape == PrimitiveShape::cuboid ? 1e2 : 1;  // it is less deep
+  x.law = {{stiffer * random.uniform(100, 1000), random.uniform(0.05, 2), random.uniform(0.1, 1),
             random.uniform(0, 10), random.uniform(50, 500)},
            ContactLaw::clamped,
            0};
@@ -185,6 +193,7 @@ TEST_P(Elastic, MemoryInReverseMatchesDualNumbers) {
 INSTANTIATE_TEST_SUITE_P(Shapes, Elastic,
                          ::testing::Values(std::tuple{PrimitiveShape::plane, false},
                                            std::tuple{PrimitiveShape::plane, true},
+                                           std::tuple{PrimitiveShape::cuboid, false},
                                            std::tuple{PrimitiveShape::sphere, false},
                                            std::tuple{PrimitiveShape::cylinder, false}));
 
