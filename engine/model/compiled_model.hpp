@@ -172,8 +172,8 @@ struct CompiledModel {
   std::vector<kernels::Solid> solids;  ///< parallel to bodies
   std::vector<kernels::RememberingContact> memories;
   int remembering_points = 0;  ///< of all `memories`
-  int taped_points =
-      0;  ///< the same, with those of a sensor once and not for every body that it feels
+  /// The same with the points of a sensor counted once, not for every body that it feels.
+  int taped_points = 0;
   int ground_anchors = 0;  ///< points of those on the ground
   std::vector<kernels::LinkPair> link_pairs;
   std::vector<kernels::GroundedLink> grounded;

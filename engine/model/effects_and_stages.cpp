@@ -153,7 +153,8 @@ void list_stages(CompiledModel& m) {
       m.pattern.factor_entries == m.pattern.entries
           ? "no fill"
           : std::to_string(m.pattern.factor_entries - m.pattern.entries) + " filled in");
-  if (remembers(m)) add("memory of friction", "points that touch", "");
+  if (remembers(m))
+    add("memory of friction", "points that touch", "looked up before a solve, kept after a step");
   for (std::size_t i = 0; i < m.sensors.size(); ++i)
     add("field", m.sensor_info[i].name, field_variant(m.sensors[i]));
 }

@@ -68,9 +68,9 @@ kernels::RememberingTouch touch_of(const BasicWorkspace<L>& w,
   return t;
 }
 
-/// Writes (3, stride) numbers of points, whole vectors of them: those of the entries that they have in a memory, else
-/// zeros. `index`: of each point in its contact, rising; null: all points in order. `number`(entry,
-/// c): component c of an entry.
+/// Writes (3, stride) numbers of points, up to the end of the last vector: those of the entries that
+/// they have in a memory, else zeros. `index`: number of each point in its contact, rising; null:
+/// all points in order. `number`(entry, c): component c of an entry.
 template <class Number>
 void look_up(std::span<const ShearEntry> memory, const kernels::RememberingContact& of,
              const int* index, int count, int stride, const Number& number, double* out) {

@@ -91,7 +91,8 @@ class BlockTape {
   std::vector<TapedStep> special_;    // rising steps
   std::vector<std::int64_t> taken_;   // (16)
   std::vector<std::int64_t> before_;  // (16) steps of the episodes before the tape began
-  // What friction remembers, and where each lane's part ends: (steps + 1, 16); empty without memory.
+  // What friction remembers, and where each lane's part ends: (steps + 1, 16). Empty where nothing
+  // remembers.
   ShearMemory memory_;
   std::vector<std::size_t> memory_end_;
 };

@@ -32,8 +32,8 @@ std::vector<TactilePoint> mesh_points(const MeshShape& mesh, double pitch, std::
 
 /// Reads a count, then a line for each point: "position" "row col" "normal" "axis0" "axis1",
 /// optionally followed by "kn kt mu damping" as factors of the sensor's coefficients, of which that
-/// of kt is of ks, too. Directions are normalised. Positions are in the file's unit. Throws IoError if the file cannot be read,
-/// InputError with file:line and what was expected.
+/// of kt is of ks, too. Directions are normalised. Positions are in the file's unit. Throws IoError
+/// if the file cannot be read, InputError with file:line and what was expected.
 std::vector<TactilePoint> read_tactile_points(const std::string& path);
 
 /// Moves points by a pose: directions rotate, positions rotate and shift.

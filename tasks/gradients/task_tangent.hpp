@@ -32,8 +32,8 @@ class TaskTangent {
   /// none.
   void start(std::span<const double> q, std::span<const double> v);
   /// How what the task sees at the reset changes, after start(), and the view itself, which is
-  /// valid until the next call. Its one moment is the state at the first action. For a task that does not
-  /// restart. `numbers`: as in take().
+  /// valid until the next call. Its one moment is the state at the first action. For a task that
+  /// does not restart. `numbers`: as in take().
   ViewTangent seen_at_start(std::span<const double> numbers);
   [[nodiscard]] TaskView start_view();
   /// Takes the next action, whose numbers change by `change`, and the scene's by `numbers` (as rows

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tests `tangere view`: what the data block of a page holds, compared number by number with the file
-// that it shows, and what the command says where there is nothing to show.
+// Tests `tangere view`: what the data block of a page holds, compared number by number with the
+// file that it shows, and what the command says where there is nothing to show.
 #include <gmock/gmock.h>
 #include <hdf5.h>
 

@@ -3,7 +3,7 @@
 // joint kind, contact law and motor.
 #include <gtest/gtest.h>
 
-#include "tests/engine/gradient_run.hpp"
+#include "tests/engine/gradient_differences.hpp"
 #include "tests/engine/random_machine.hpp"
 #include "tests/sanitized.hpp"
 
@@ -16,72 +16,6 @@ using testing::RunInput;
 using testing::StateLoss;
 
 constexpr int kSteps = 6;
-
-/// Compares every entry relative to the gradient's norm over its group. Returns how many it
-/// compared.
-int compare(const std::vector<double>& a, const std::vector<double>& b, double scale,
-            double tolerance, const char* what) {
-  int compared = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    if (!std::isfinite(b[i])) continue;
-    EXPECT_NEAR(a[i], b[i], tolerance * scale) << what << " " << i;
-    ++compared;
-  }
-  return compared;
-}
-
-double norm(const std::vector<double>& x) {
-  double sum = 0;
-  for (double a : x)
-    if (std::isfinite(a)) sum += a * a;
-  return std::sqrt(sum);
-}
-
-/// Returns how many derivatives were compared; 0 if a step of the run finds no solution.
-int check(const Scene& scene, Integrator scheme, unsigned seed, double tolerance,
-          double accuracy = 0) {
-  const Model model(scene);
-  StepperOptions options = testing::options(scheme, scene.timestep, 1e-13);
-  options.accuracy = accuracy;
-  const RunInput in = random_input(model, seed, kSteps);
-  const StateLoss loss(model, kSteps, seed + 1);
-  if (!std::isfinite(testing::loss_of_run(model, options, in, loss))) return 0;
-  const RunGradient adjoint = testing::adjoint_of_run(model, options, {in}, loss, 0);
-  const RunGradient difference = testing::differences_of_run(model, options, in, loss);
-  int compared = compare(adjoint.q, difference.q, norm(difference.q), tolerance, "q");
-  compared += compare(adjoint.v, difference.v, norm(difference.v), tolerance, "v");
-  compared += compare(adjoint.u, difference.u, norm(difference.u), tolerance, "u");
-  const NumberGradients parameters(model);
-  std::vector<double> a = adjoint.parameters,
-                      b = difference.parameters;  // by their relative changes: units differ
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    const double size = parameters.infos()[k].value;
-    a[k] *= size, b[k] *= size;
-  }
-  const double scale = norm(b);
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    if (!std::isfinite(b[k])) continue;
-    EXPECT_NEAR(a[k], b[k], tolerance * scale) << parameters.infos()[k].name;
-    ++compared;
-  }
-  return compared;
-}
-
-/// Whether a step of the run is split. The run jumps where that decision changes, and a difference
-/// across the jump is no derivative.
-bool splits(const Scene& scene, Integrator scheme, unsigned seed) {
-  const Model model(scene);
-  const RunInput in = random_input(model, seed, kSteps);
-  Batch batch(model, 1);
-  batch.set_state(0, in.q, in.v);
-  Stepper stepper(model, testing::options(scheme, scene.timestep, 1e-13));
-  bool split = false;
-  for (const std::vector<double>& u : in.u) {
-    stepper.step(batch, u);
-    split = split || batch.status(0) == StepStatus::split;
-  }
-  return split;
-}
 
 /// An accuracy for which some steps of these scenes are cut.
 double cutting(Integrator scheme) { return scheme.scheme().order > 1 ? 0.01 : 0.1; }
@@ -103,8 +37,8 @@ TEST_P(AdjointScheme, TreesMatchDifferences) {
   int compared = 0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    compared +=
-        check(testing::random_tree(seed, 2 + static_cast<int>(seed % 5)), GetParam(), seed, 1e-7);
+    compared += testing::check_gradient(testing::random_tree(seed, 2 + static_cast<int>(seed % 5)),
+                                        GetParam(), seed, kSteps, 1e-7);
   }
   EXPECT_GT(compared, 150);
 }
@@ -113,8 +47,9 @@ TEST_P(AdjointScheme, MachinesMatchDifferences) {
   int compared = 0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    compared += check(testing::random_machine(seed, 2 + static_cast<int>(seed % 5)), GetParam(),
-                      seed, 1e-7);
+    compared +=
+        testing::check_gradient(testing::random_machine(seed, 2 + static_cast<int>(seed % 5)),
+                                GetParam(), seed, kSteps, 1e-7);
   }
   EXPECT_GT(compared, 350);
 }
@@ -127,7 +62,8 @@ TEST_P(AdjointScheme, ContactsMatchDifferences) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Scene scene =
         testing::random_contacts(seed, 2 + static_cast<int>(seed % 2), ContactLaw(seed % 3));
-    if (!splits(scene, GetParam(), seed)) compared += check(scene, GetParam(), seed, 1e-6);
+    if (!testing::splits(scene, GetParam(), seed, kSteps))
+      compared += testing::check_gradient(scene, GetParam(), seed, kSteps, 1e-6);
   }
   EXPECT_GT(compared, 130);
 }
@@ -140,7 +76,8 @@ TEST_P(AdjointScheme, MotorsTimedAtTheStartMatchDifferences) {
     for (MotorDescription& m : s.motors)
       m.timing = MotorTiming::start, motors += m.control == MotorControl::position;
     SCOPED_TRACE("seed " + std::to_string(seed));
-    if (!splits(s, GetParam(), seed)) compared += check(s, GetParam(), seed, 1e-7);
+    if (!testing::splits(s, GetParam(), seed, kSteps))
+      compared += testing::check_gradient(s, GetParam(), seed, kSteps, 1e-7);
   }
   EXPECT_GT(motors, 10);
   EXPECT_GT(compared, 500);
@@ -156,7 +93,7 @@ TEST_P(AdjointScheme, CutStepsMatchDifferences) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Scene scene = testing::random_contacts(seed, 2, ContactLaw(seed % 3));
     cut += is_cut(scene, GetParam(), seed) ? 1 : 0;
-    compared += check(scene, GetParam(), seed, 1e-6, cutting(GetParam()));
+    compared += testing::check_gradient(scene, GetParam(), seed, kSteps, 1e-6, cutting(GetParam()));
   }
   EXPECT_GT(compared, 15 * static_cast<int>(kSeeds));
   EXPECT_GE(cut + 1, kSeeds);

@@ -214,7 +214,8 @@ TEST(Shear, AMassIsDraggedAsByASpring) {
   EXPECT_NEAR(coarse / fine, 4, 0.8);
 }
 
-TEST(Shear, WithoutStiffnessTheBitsAreThoseOfTheDamper) {
+/// A stiffness that varies and is 0 leaves the damper alone, by another way of summing.
+TEST(Shear, WithAStiffnessOfZeroOnlyTheDamperIsLeft) {
   Scene plain = slope(20, true, 0), varied = slope(20, true, 0);
   Distribution zero;
   zero.kind = Distribution::Kind::list;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests the kernels of friction that remembers against dual numbers: stiffness and damping of a
-// point, of a point on the ground, and the memory of a step in reverse. Points stick, slip and touch
-// for the first time.
+// point, of a point on the ground, and the memory of a step in reverse. Points stick, slip and
+// touch for the first time.
 #include <gtest/gtest.h>
 
 #include <cmath>

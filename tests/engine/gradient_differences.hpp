@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// The adjoint of a short run of a scene against differences of whole runs.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include "tests/engine/gradient_run.hpp"
+
+namespace tangere::testing {
+
+/// Compares every entry relative to the gradient's norm over its group. Returns how many it
+/// compared.
+inline int compare(const std::vector<double>& a, const std::vector<double>& b, double scale,
+                   double tolerance, const char* what) {
+  int compared = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!std::isfinite(b[i])) continue;
+    EXPECT_NEAR(a[i], b[i], tolerance * scale) << what << " " << i;
+    ++compared;
+  }
+  return compared;
+}
+
+inline double norm(const std::vector<double>& x) {
+  double sum = 0;
+  for (double a : x)
+    if (std::isfinite(a)) sum += a * a;
+  return std::sqrt(sum);
+}
+
+/// Returns how many derivatives were compared; 0 if a step of the run finds no solution.
+inline int check_gradient(const Scene& scene, Integrator scheme, unsigned seed, int steps,
+                          double tolerance, double accuracy = 0) {
+  const Model model(scene);
+  StepperOptions o = options(scheme, scene.timestep, 1e-13);
+  o.accuracy = accuracy;
+  const RunInput in = random_input(model, seed, steps);
+  const StateLoss loss(model, steps, seed + 1);
+  if (!std::isfinite(loss_of_run(model, o, in, loss))) return 0;
+  const RunGradient adjoint = adjoint_of_run(model, o, {in}, loss, 0);
+  const RunGradient difference = differences_of_run(model, o, in, loss);
+  int compared = compare(adjoint.q, difference.q, norm(difference.q), tolerance, "q");
+  compared += compare(adjoint.v, difference.v, norm(difference.v), tolerance, "v");
+  compared += compare(adjoint.u, difference.u, norm(difference.u), tolerance, "u");
+  const NumberGradients parameters(model);
+  std::vector<double> a = adjoint.parameters,
+                      b = difference.parameters;  // by their relative changes: units differ
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    const double size = parameters.infos()[k].value;
+    a[k] *= size, b[k] *= size;
+  }
+  const double scale = norm(b);
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    if (!std::isfinite(b[k])) continue;
+    EXPECT_NEAR(a[k], b[k], tolerance * scale) << parameters.infos()[k].name;
+    ++compared;
+  }
+  return compared;
+}
+
+/// Whether a step of the run is split. The run jumps where that decision changes, and a difference
+/// across the jump is no derivative.
+inline bool splits(const Scene& scene, Integrator scheme, unsigned seed, int steps) {
+  const Model model(scene);
+  const RunInput in = random_input(model, seed, steps);
+  Batch batch(model, 1);
+  batch.set_state(0, in.q, in.v);
+  Stepper stepper(model, options(scheme, scene.timestep, 1e-13));
+  bool split = false;
+  for (const std::vector<double>& u : in.u) {
+    stepper.step(batch, u);
+    split = split || batch.status(0) == StepStatus::split;
+  }
+  return split;
+}
+
+}  // namespace tangere::testing
