@@ -152,6 +152,16 @@ void PolicyProgram::introduce(std::uint64_t seed, const std::string& version) {
 
 void PolicyProgram::answer(const PolicyQuestion& question, std::span<double> actions) {
   const std::lock_guard lock(mutex_);
+  if (failure_) std::rethrow_exception(failure_);  // other threads do not wait for it again
+  try {
+    ask(question, actions);
+  } catch (...) {
+    failure_ = std::current_exception();
+    throw;
+  }
+}
+
+void PolicyProgram::ask(const PolicyQuestion& question, std::span<double> actions) {
   if (stopping()) stopped_ = true;
   if (stopped_) return std::fill(actions.begin(), actions.end(), 0.0);
   const auto n = static_cast<std::int64_t>(question.episodes.size());

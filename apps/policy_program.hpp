@@ -6,6 +6,7 @@
 #include <sys/types.h>
 
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -52,6 +53,7 @@ class PolicyProgram {
   };
 
   void start();
+  void ask(const PolicyQuestion& question, std::span<double> actions);
   void introduce(std::uint64_t seed, const std::string& version);
   void write(const char* bytes, std::size_t count, double deadline);
   [[nodiscard]] bool read(char* bytes, std::size_t count, double deadline);
@@ -71,6 +73,7 @@ class PolicyProgram {
   std::function<bool()> stop_;
   bool stopped_ = false;
   std::mutex mutex_;             // of the conversation
+  std::exception_ptr failure_;   // what ended it
   std::vector<double> factors_;  // (observation) that an observation is multiplied by
   std::vector<char> bytes_;      // of a question
 };

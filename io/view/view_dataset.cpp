@@ -92,10 +92,12 @@ class DatasetView {
                       "it: tangere generate --record q",
                       demos_.front().file, demos_.front().number));
     const h5::Id scene = h5::open_group(file, "scene");
+    // The observations of a task have names of their own, which may be those of sensors.
+    const bool of_task = !value_of(dataset_.settings, "policy").empty();
     for (ViewSensor& sensor : scene_->sensors()) {
       std::string name;
       for (const std::string& reading : {sensor.name, sensor.name + ".ideal"})
-        if (name.empty() && h5::has_link(obs, reading)) name = reading;
+        if (!of_task && name.empty() && h5::has_link(obs, reading)) name = reading;
       if (name.empty() || !h5::has_link(scene, "sensors")) {
         data_.notes.push_back(
             fmt::format("The field of sensor '{}' was not recorded.", sensor.name));

@@ -33,7 +33,7 @@ std::int64_t stride_for(const std::vector<std::int64_t>& rows, std::size_t numbe
     total += static_cast<double>(count), longest = std::max(longest, count);
   // frames_of() may add the last row.
   const std::int64_t most = std::max(1, options.frames - 1);
-  const std::int64_t by_frames = (longest + most - 1) / most;
+  const std::int64_t by_frames = longest <= options.frames ? 1 : (longest + most - 1) / most;
   const double room =
       options.bytes - kFixedBytes - kBytesOfNumber * static_cast<double>(numbers * rows.size());
   const double needed = kBytesOfNumber * static_cast<double>(numbers) * total;

@@ -24,6 +24,7 @@ class TrajectoryView {
                H5Aexists(file_.get(), "scene_path") > 0 ? text("scene_path") : text("scene_name"),
                path, options) {
     steps_ = h5::read_number<std::int64_t>(file_, "steps");
+    first_step_ = h5::read_number<std::int64_t>(file_, "first_step");
     const h5::Id q = h5::open_dataset(file_, "q");
     q_names_ = h5::read_texts(q, "names");
     scene_.check_names(q_names_);
@@ -110,7 +111,8 @@ class TrajectoryView {
     const h5::Id q = h5::open_dataset(file_, "q");
     std::vector<double> state(q_names_.size());
     for (const std::int64_t row : episode.rows) {
-      episode.time.push_back(static_cast<float>(static_cast<double>(row) * fields_.timestep()));
+      episode.time.push_back(
+          static_cast<float>(static_cast<double>(first_step_ + row) * fields_.timestep()));
       h5::read_box<double>(q, {static_cast<hsize_t>(row), static_cast<hsize_t>(environment), 0},
                            {1, 1, state.size()}, state.data());
       scene_.add_state(state, episode);
@@ -146,8 +148,8 @@ class TrajectoryView {
       shear.values.push_back(at < 0 ? kNoValue : static_cast<float>(sums[1]));
     }
     episode.fields.push_back(std::move(field));
-    episode.traces.push_back(std::move(normal));
-    episode.traces.push_back(std::move(shear));
+    if (fields_.has_pressure(index)) episode.traces.push_back(std::move(normal));
+    if (fields_.has_shear(index)) episode.traces.push_back(std::move(shear));
   }
 
   /// The reward of the newest action at each frame.
@@ -202,6 +204,7 @@ class TrajectoryView {
   ViewScene scene_;
   ViewData data_;
   std::int64_t steps_ = 0;
+  std::int64_t first_step_ = 0;  // of a run that went on from another's state
   std::vector<std::string> q_names_;
   std::vector<std::size_t> recorded_;  // (sensors) indices in the reader
 };

@@ -150,10 +150,12 @@ class SensorView {
     }
     g.strokeStyle = soft; g.lineWidth = 1; g.strokeRect(left + 0.5, top + 0.5, w, h);
     this.drawScale(g, left + w + 12, top, h, ink);
-    const sum = (kind) => episode.traces.find((t) => t.name === `${name} ${kind}`)?.values[frame] ?? NaN;
+    const sums = ["normal", "shear"]
+      .map((kind) => [kind, episode.traces.find((t) => t.name === `${name} ${kind}`)])
+      .filter(([, trace]) => trace)
+      .map(([kind, trace]) => `${kind} ${withUnit(trace.values[frame], "N")}`);
     g.textAlign = "left"; g.fillStyle = ink;
-    g.fillText(field ? `normal ${withUnit(sum("normal"), "N")}, shear ${withUnit(sum("shear"), "N")} in all`
-      : "no field yet", left, top + h + 17);
+    g.fillText(field ? `${sums.join(", ")} in all` : "no field yet", left, top + h + 17);
     g.fillStyle = soft;
     g.fillText(`${(1e3 * this.sensor.width).toPrecision(3)} × ${(1e3 * this.sensor.height).toPrecision(3)} mm`
       + `, ${this.sensor.points} points`, left, top + h + 33);

@@ -192,12 +192,14 @@ class Player {
       if (times[middle] <= time + 1e-9) low = middle; else high = middle - 1;
     }
     this.frame = low;
+    this.clock = time;
     this.redraw();
   }
 
   play() {
     if (this.frame >= this.episode.time.length - 1) this.seek(0);
     this.playing = true;
+    cancelAnimationFrame(this.pending);  // one loop at a time
     $("play").textContent = "Pause";
     let before = null;
     const step = (now) => {
@@ -205,9 +207,10 @@ class Player {
       if (before !== null) this.clock += (now - before) / 1000 * Number($("speed").value);
       before = now;
       this.seekTime(this.clock);
-      if (this.clock >= this.last) this.pause(); else requestAnimationFrame(step);
+      if (this.clock >= this.last) this.pause();
+      else this.pending = requestAnimationFrame(step);
     };
-    requestAnimationFrame(step);
+    this.pending = requestAnimationFrame(step);
   }
 
   pause() {
