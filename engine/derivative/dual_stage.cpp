@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "engine/derivative/dual_field.hpp"
 #include "kernels/memory/advance.hpp"
 #include "kernels/step/link_poses.hpp"
 #include "kernels/step/residual.hpp"
@@ -459,108 +460,20 @@ void DualStage::residual() {
   for (std::size_t k = 0; k < g.size(); ++k) g[k].epsilon += of_mass[k].value;
 }
 
-namespace {
-
-/// A point of a pad in pad axes, and the rows that turn a force into its field.
-struct PadPoint {
-  kernels::Vec3<double> at;
-  double rows[9];
-  double factors[4];
-  int index;  ///< in the field; -1: filler
-};
-PadPoint pad_point(const kernels::PadTiles& pad, int tile, int k) {
-  using kernels::kTactileTile;
-  PadPoint p{
-      {pad.x[tile], pad.y[tile], pad.z[tile]}, {1, 0, 0, 0, 1, 0, 0, 0, -1}, {1, 1, 1, 1}, -1};
-  const double* s = pad.offsets + (pad.curved() ? 3 : 2) * kTactileTile * pad.kind[tile] + k;
-  p.at.x += s[0], p.at.y += s[kTactileTile];
-  if (pad.curved()) {
-    p.at.z += s[2 * kTactileTile];
-    if (k < pad.points_of(tile)) p.index = pad.index[kTactileTile * tile + k];
-    for (int i = 0; i < 9; ++i) {  // rows act on (f·x, f·y, -f·z)
-      const double row = pad.frames[(9 * tile + i) * kTactileTile + k];
-      p.rows[i] = i % 3 == 2 ? -row : row;
-    }
-    for (int i = 0; i < 4 && pad.factors != nullptr; ++i)
-      p.factors[i] = pad.factors[(4 * tile + i) * kTactileTile + k];
-    return p;
-  }
-  if (pad.skewed) std::copy(pad.axes, pad.axes + 9, p.rows);
-  const int row = k / kernels::kTileSide, col = k % kernels::kTileSide;
-  if (row < pad.rows_of(tile) && col < pad.cols_of(tile))
-    p.index = pad.first_of(tile) + row * pad.cols + col;
-  return p;
-}
-
-}  // namespace
-
 void DualStage::field(int sensor, const double* column, std::span<const double> numbers,
                       std::span<const double> points, std::span<double> field,
                       std::span<double> field_dot) {
   Impl& i = *impl_;
   const CompiledSensor& felt = i.m.sensors[std::size_t(sensor)];
-  const kernels::PadTiles pad = felt.tiles();
   kernels::kinematics(i.view, i.arguments(*this));
-  const auto pose = [&](int link) {
-    return link < 0 ? kernels::LinkPose<D>{{kernels::diagonal(D(1.0)), kernels::zero3<D>()},
-                                           kernels::zero6<D>()}
-                    : kernels::LinkPose<D>{i.links[std::size_t(link)].world,
-                                           i.links[std::size_t(link)].V};
-  };
-  const auto tangent = [&](int first, int k) {
-    return numbers.empty() ? 0.0 : numbers[std::size_t(first + k)];
-  };
-  const int first = kernels::parameter_numbers(i.m.view) + kCoefficients * sensor;
-  int next = 0;
+  auto number = std::size_t(kernels::parameter_numbers(i.m.view) + kCoefficients * sensor);
   const Coefficients<D> coefficients = transformed(felt.parameters, [&](const Parameter& p) {
-    return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent(first, next++));
+    const double tangent = numbers.empty() ? 0.0 : numbers[number];
+    ++number;
+    return D(p.row < 0 ? p.value : column[p.row * kBlock], tangent);
   });
   if (felt.elastic) return elastic_field(sensor, coefficients, field, field_dot);
-  const kernels::Mat3<double> turn =
-      transpose(felt.pad.R) * i.m.bodies[std::size_t(felt.body)].frame.R;
-  std::fill(field.begin(), field.end(), 0.0);
-  std::fill(field_dot.begin(), field_dot.end(), 0.0);
-  const kernels::LinkPose<D> hand = pose(felt.link);
-  for (const int number : felt.targets) {
-    const CompiledBody& body = i.m.bodies[std::size_t(number)];
-    const kernels::LinkPose<D> other = pose(body.link);
-    kernels::Touch<D> t;
-    kernels::pad_touch(&hand, felt.pad, &other, body.frame, t);
-    const int first_size = kernels::first_size_number(i.m.view) + kernels::kSizeNumbers * number;
-    const kernels::Vec3<double> has =
-        kernels::load_vector<double>(body.size, body.size_row, column, 0);
-    const kernels::Vec3<D> size = {{has.x, tangent(first_size, 0)},
-                                   {has.y, tangent(first_size, 1)},
-                                   {has.z, tangent(first_size, 2)}};
-    kernels::with_distance<D>(body.shape, size, [&](const auto& shape) {
-      for (int k = 0; k < pad.tiles() * kernels::kTactileTile; ++k) {
-        const PadPoint p = pad_point(pad, k / kernels::kTactileTile, k % kernels::kTactileTile);
-        if (p.index < 0) continue;
-        const auto own = [&](int n) {
-          return points.empty() ? 0.0 : points[std::size_t(p.index * kernels::kPointNumbers + n)];
-        };
-        const kernels::Vec3<double> moves = turn * kernels::Vec3<double>{own(0), own(1), own(2)};
-        int n = 0;
-        const auto of_point = [&](const D& of_sensor) {
-          const bool is_ks = n == kPointCoefficients;
-          const D scaled =
-              D(p.factors[is_ks ? 1 : n]) * of_sensor + D(0.0, is_ks ? 0.0 : own(3 + n));
-          ++n;
-          return scaled;
-        };
-        const kernels::LawParameters<D> law = {transformed(coefficients, of_point), felt.law, 0.0};
-        const kernels::Vec3<D> xi = {{p.at.x, moves.x}, {p.at.y, moves.y}, {p.at.z, moves.z}};
-        const auto at = kernels::point_contact(shape, law, t.Q, t.c, t.omega, t.v, xi);
-        const D f[3] = {at.force.x, at.force.y, at.force.z};
-        for (int c = 0; c < 3; ++c)
-          for (int e = 0; e < 3; ++e) {
-            const auto at_c = std::size_t(3 * p.index + c);
-            if (!field.empty()) field[at_c] += p.rows[3 * c + e] * f[e].value;
-            field_dot[at_c] += p.rows[3 * c + e] * f[e].epsilon;
-          }
-      }
-    });
-  }
+  read_dual_field(i.m, sensor, i.links, coefficients, column, numbers, points, field, field_dot);
 }
 
 /// The field of an elastic sensor: the law at the state `centre` with twist r, and what is

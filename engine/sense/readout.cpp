@@ -15,6 +15,7 @@
 #include "engine/sense/elastic_field.hpp"
 #include "engine/sense/field_sum.hpp"
 #include "engine/sense/imperfect_field.hpp"
+#include "engine/sense/motion_reading.hpp"
 #include "engine/sense/pad_reader.hpp"
 
 namespace tangere {
@@ -25,10 +26,6 @@ using kernels::kTactileTile;
 
 /// If fewer environments of a block are wanted, they are read one by one: the same bits, less work.
 constexpr int kFewest = 6;
-
-static void write3(const kernels::Vec3<double>& a, double* to) {
-  to[0] = a.x, to[1] = a.y, to[2] = a.z;
-}
 
 struct Readout::Impl {
   Model model;
@@ -99,18 +96,6 @@ struct Readout::Impl {
   template <class Body>
   auto in_precision(const Body& body) {
     return precision == Precision::f64 ? body(double{}) : body(float{});
-  }
-
-  /// Returns an end effector's world position in the group moved last.
-  [[nodiscard]] kernels::Vec3<double> position_of(const CompiledEndEffector& v, int group,
-                                                  int lane) const {
-    const kernels::Frame<double> at = reader.link(v.link, group, lane).world;
-    return at.R * v.point + at.p;
-  }
-  void write_end_effectors(int group, int lane, std::span<double> position) const {
-    double* to = position.data();
-    for (const CompiledEndEffector& v : compiled(model).end_effectors)
-      write3(position_of(v, group, lane), to), to += 3;
   }
 
   void place(const Batch& batch, int environment, int sensor) {
@@ -463,74 +448,20 @@ Precision Readout::precision() const { return impl_->precision; }
 
 void Readout::bodies(const Batch& batch, int environment, std::span<double> pose,
                      std::span<double> twist) {
-  const int group = environment % kBlock / kGroup, lane = environment % kGroup;
-  impl_->reader.move(batch, environment / kBlock, group);
-  const CompiledModel& m = compiled(impl_->model);
-  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
-    const CompiledBody& body = m.bodies[b];
-    const kernels::LinkPose<double> link = impl_->reader.link(body.link, group, lane);
-    const kernels::Frame<double> at = compose(link.world, body.frame);
-    const kernels::Quat<double> o = quaternion_of(at.R);
-    const double values[7] = {at.p.x, at.p.y, at.p.z, o.w, o.x, o.y, o.z};
-    std::copy(values, values + 7, &pose[7 * b]);
-    const kernels::Vec3<double> omega = link.world.R * link.V.a;
-    const kernels::Vec3<double> v = link.world.R * (link.V.l + cross(link.V.a, body.frame.p));
-    const double rates[6] = {omega.x, omega.y, omega.z, v.x, v.y, v.z};
-    std::copy(rates, rates + 6, &twist[6 * b]);
-  }
+  read_bodies(compiled(impl_->model), impl_->reader, batch, environment, pose, twist);
 }
-
 void Readout::end_effectors(const Batch& batch, int environment, std::span<double> position,
                             std::span<double> velocity) {
-  const int group = environment % kBlock / kGroup, lane = environment % kGroup;
-  impl_->reader.move(batch, environment / kBlock, group);
-  impl_->write_end_effectors(group, lane, position);
-  const std::vector<CompiledEndEffector>& all = compiled(impl_->model).end_effectors;
-  for (std::size_t k = 0; k < all.size() && !velocity.empty(); ++k) {
-    const kernels::LinkPose<double> link = impl_->reader.link(all[k].link, group, lane);
-    write3(link.world.R * (link.V.l + cross(link.V.a, all[k].point)), &velocity[3 * k]);
-  }
+  tangere::read_end_effectors(compiled(impl_->model), impl_->reader, batch, environment, position,
+                              velocity);
 }
-
 void Readout::read_end_effectors(const Batch& batch, int block,
                                  std::span<const std::span<double>> positions) {
-  const int environments = Impl::environments_of(batch, block);
-  for (int e = 0; e < environments; ++e) {
-    if (e % kGroup == 0) impl_->reader.move(batch, block, e / kGroup);
-    impl_->write_end_effectors(e / kGroup, e % kGroup, positions[std::size_t(e)]);
-  }
+  tangere::read_end_effectors(compiled(impl_->model), impl_->reader, batch, block, positions);
 }
-
 void Readout::end_effector_jacobian(const Batch& batch, int environment,
                                     std::span<double> jacobian) {
-  const int group = environment % kBlock / kGroup, lane = environment % kGroup;
-  impl_->reader.move(batch, environment / kBlock, group);
-  const CompiledModel& m = compiled(impl_->model);
-  const auto nv = std::size_t(m.nv);
-  std::fill(jacobian.begin(), jacobian.end(), 0.0);
-  for (std::size_t k = 0; k < m.end_effectors.size(); ++k) {
-    const auto column = [&](int dof, const kernels::Vec3<double>& c) {
-      double* const at = &jacobian[3 * k * nv + std::size_t(dof)];
-      at[0] = c.x, at[nv] = c.y, at[2 * nv] = c.z;
-    };
-    const CompiledEndEffector& end_effector = m.end_effectors[k];
-    const kernels::Vec3<double> x = impl_->position_of(end_effector, group, lane);
-    for (int i = end_effector.link; i >= 0; i = m.links[std::size_t(i)].parent) {
-      const kernels::Link& link = m.links[std::size_t(i)];
-      const kernels::Frame<double> at = impl_->reader.link(i, group, lane).world;
-      const auto along = [&](const kernels::Vec3<double>& axis) {
-        const kernels::Vec3<double> a = at.R * axis;
-        return kernels::slides(link.kind) ? a : cross(a, x - at.p);
-      };
-      if (kernels::dofs(link.kind) == 1) {
-        column(link.v, along(link.axis));
-      } else {
-        column(link.v, along({1, 0, 0}));
-        column(link.v + 1, along({0, 1, 0}));
-        column(link.v + 2, along({0, 0, 1}));
-      }
-    }
-  }
+  read_end_effector_jacobian(compiled(impl_->model), impl_->reader, batch, environment, jacobian);
 }
 
 void Readout::tactile(const Batch& batch, int environment, int sensor, std::span<double> force) {
