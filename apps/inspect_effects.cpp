@@ -45,21 +45,12 @@ int elements_of(const EffectCosts& costs, EffectKind kind) {
       }));
 }
 
-/// Friction and damping of contacts and sensors, and what sensors add to their readings.
-bool is_of_elements(EffectKind kind) {
-  constexpr EffectKind kKinds[] = {EffectKind::pair_friction,       EffectKind::pair_damping,
-                                   EffectKind::ground_friction,     EffectKind::ground_damping,
-                                   EffectKind::tactile_shear,       EffectKind::tactile_damping,
-                                   EffectKind::sensor_imperfections};
-  return std::find(std::begin(kKinds), std::end(kKinds), kind) != std::end(kKinds);
-}
-
 /// Whether people see the row: a kind with one element is that element, and elements that are not
 /// timed one by one are left to --json.
 bool is_shown(const EffectCosts& costs, const EffectCost& cost) {
   const int elements = elements_of(costs, cost.effect.effect.kind);
   // What no contact or sensor can have needs no row: that there is none is said once.
-  if (elements == 0 && is_of_elements(cost.effect.effect.kind)) return false;
+  if (elements == 0 && is_part(cost.effect.effect.kind)) return false;
   if (cost.effect.effect.element < 0) return elements != 1;
   return times_elements(cost.effect.effect.kind, elements);
 }

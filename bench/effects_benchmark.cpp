@@ -214,7 +214,7 @@ void add_all() {
     for (const EffectInfo& info : effects_of(read)) {
       const EffectKind kind = info.effect.kind;
       if (!info.on || info.effect.element >= 0 || !has_way(kind, Way::removed)) continue;
-      if (kind >= EffectKind::tactile && kind <= EffectKind::sensor_imperfections) continue;
+      if (element_owner(kind) == NumberOwner::tactile) continue;
       add(scene + "/on/" + info.name, effect_on, of, info.effect);
       if (has_way(kind, Way::zero))
         add(scene + "/zero/" + info.name, effect_idle, of, info.effect, Way::zero);

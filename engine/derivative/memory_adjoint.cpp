@@ -2,6 +2,7 @@
 // Hands one lane after another to the kernels, and their sums on to the links.
 #include "engine/derivative/memory_adjoint.hpp"
 
+#include "engine/derivative/link_cotangents.hpp"
 #include "engine/step/remembering_lane.hpp"
 
 namespace tangere {
@@ -18,13 +19,6 @@ using kernels::Vec6;
 
 namespace {
 
-template <int L>
-void add_lane(Vec6<Row<L>>& to, const Vec6<double>& x, int lane, double sign) {
-  auto* const rows = reinterpret_cast<Row<L>*>(&to);
-  const auto* const numbers = reinterpret_cast<const double*>(&x);
-  for (int i = 0; i < 6; ++i) rows[i][lane] += sign * numbers[i];
-}
-
 /// Hands cotangents of the motion of body 2 relative to body 1 on to the two links.
 template <int L>
 void hand_on(const RememberingContact& of, const AlignedVector<LinkPose<Row<L>>>& poses,
@@ -36,14 +30,8 @@ void hand_on(const RememberingContact& of, const AlignedVector<LinkPose<Row<L>>>
   const Frame<double> second_in_first = relative(one.world, two.world);
   const Vec6<double> Z = motion_to_parent(second_in_first, two.V);
   const Vec6<double> pose = displacement + cross_wrench(Z, twist);
-  if (first >= 0) {
-    add_lane<L>(links[std::size_t(first)].pose, pose, lane, -1);
-    add_lane<L>(links[std::size_t(first)].twist, twist, lane, -1);
-  }
-  if (second >= 0) {
-    add_lane<L>(links[std::size_t(second)].pose, wrench_to_child(second_in_first, pose), lane, 1);
-    add_lane<L>(links[std::size_t(second)].twist, wrench_to_child(second_in_first, twist), lane, 1);
-  }
+  const auto link = [&](int k) { return k < 0 ? nullptr : &links[std::size_t(k)]; };
+  hand_on_to_links<L>(second_in_first, pose, twist, lane, link(first), link(second));
 }
 
 }  // namespace

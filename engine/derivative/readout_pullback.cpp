@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 
+#include "engine/derivative/link_cotangents.hpp"
 #include "engine/derivative/number_gradients.hpp"
 #include "engine/derivative/tactile_point_numbers.hpp"
 #include "engine/sense/dense_tiles.hpp"
@@ -28,12 +29,6 @@ using kernels::Vec6;
 namespace {
 
 constexpr int kGroups = kBlock / kGroup;
-
-void add_lane(Vec6<LaneRow>& to, const Vec6<double>& x, int lane, double sign) {
-  LaneRow* rows = &to.a.x;
-  const double* from = &x.a.x;
-  for (int i = 0; i < 6; ++i) rows[i][lane] += sign * from[i];
-}
 
 }  // namespace
 
@@ -74,8 +69,9 @@ struct ReadoutPullback::Impl {
     touches.resize(targets);
   }
 
-  kernels::MotionCotangent<LaneRow>& link(int group, int link) {
-    return links[std::size_t(group)][std::size_t(link)];
+  /// Returns null for the world, link -1.
+  kernels::MotionCotangent<LaneRow>* link(int group, int link) {
+    return link < 0 ? nullptr : &links[std::size_t(group)][std::size_t(link)];
   }
 
   /// Adds the derivatives by the points' own numbers, turned from pad axes to the body's.
@@ -162,14 +158,8 @@ struct ReadoutPullback::Impl {
     const Vec6<double> Z = motion_to_child(pad, motion_to_parent(second_in_first, two.V));
     const Vec6<double> pose = wrench_to_parent(pad, c.displacement + cross_wrench(Z, c.twist));
     const Vec6<double> twist = wrench_to_parent(pad, c.twist);
-    if (sensor_link >= 0) {
-      add_lane(link(group, sensor_link).pose, pose, lane, -1);
-      add_lane(link(group, sensor_link).twist, twist, lane, -1);
-    }
-    if (body_link >= 0) {
-      add_lane(link(group, body_link).pose, wrench_to_child(second_in_first, pose), lane, 1);
-      add_lane(link(group, body_link).twist, wrench_to_child(second_in_first, twist), lane, 1);
-    }
+    hand_on_to_links<kGroup>(second_in_first, pose, twist, lane, link(group, sensor_link),
+                             link(group, body_link));
   }
 };
 
@@ -273,7 +263,7 @@ void ReadoutPullback::end_effector(int lane, int end_effector, std::span<const d
   const LinkPose<double> at = i.reader.link(v.link, group, lane % kGroup);
   const Vec3<double> f =
       transposed_times(at.world.R, Vec3<double>{cotangent[0], cotangent[1], cotangent[2]});
-  add_lane(i.link(group, v.link).pose, {cross(v.point, f), f}, lane % kGroup, 1);
+  add_to_lane<kGroup>(i.link(group, v.link)->pose, {cross(v.point, f), f}, lane % kGroup, 1);
   i.used[std::size_t(group)] = true;
 }
 

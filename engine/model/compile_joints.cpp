@@ -53,7 +53,7 @@ void name_coordinates(CompiledModel& m, const JointDescription& d) {
 }
 
 /// Returns the effects that apply to one dof of a joint.
-const JointEffects& effects_of(const JointDescription& d, int k) {
+const JointEffects& joint_effects_of_dof(const JointDescription& d, int k) {
   return d.turning && dof_turns(d.type, k) ? *d.turning : d;
 }
 
@@ -198,7 +198,7 @@ void compile_joint_effects(CompiledModel& m) {
                        std::to_string(count));
     for (int k = 0; k < count; ++k) {
       const int dof = m.joints[i].v + k;
-      const JointEffects& e = effects_of(d, k);
+      const JointEffects& e = joint_effects_of_dof(d, k);
       check_effects(d, e);
       m.dof_effects[std::size_t(dof)] = dof_effects(e, d.rest.empty() ? 0 : d.rest[std::size_t(k)]);
       m.links[std::size_t(link_of_dof(m, dof))].effects |= flags_of(e);

@@ -370,15 +370,16 @@ void drop_varying(Scene& scene, int /*element*/, Way way) {
 struct Row {
   EffectKind kind;
   const char* name;
-  const char* of_element;  ///< what follows the element's name
+  const char* of_element;  ///< what follows an element's name; not empty for a part
   bool zero, idle;         ///< has_way(); `removed` is there where `drop` is
   EffectInfo (*find)(const Scene&, int element);
   void (*drop)(Scene&, int element, Way);
+  std::optional<Owner> owner{};  ///< element_owner()
 };
 
 template <Owner Of, Part P>
 constexpr Row element_row(EffectKind kind, const char* name, const char* of_element) {
-  return {kind, name, of_element, true, false, find_elements<Of, P>, drop_elements<Of, P>};
+  return {kind, name, of_element, true, false, find_elements<Of, P>, drop_elements<Of, P>, Of};
 }
 
 using Kind = EffectKind;
@@ -411,7 +412,7 @@ constexpr Row kTable[] = {
     element_row<Owner::tactile, Part::damping>(Kind::tactile_damping, "tactile damping",
                                                " damping"),
     {Kind::sensor_imperfections, "sensor imperfections", " imperfections", true, false,
-     find_imperfections, drop_all_imperfections},
+     find_imperfections, drop_all_imperfections, Owner::tactile},
     {Kind::varying_parameters, "varying parameters", "", true, false, find_varying, drop_varying},
 };
 
@@ -430,9 +431,10 @@ std::vector<std::string> element_names(const Scene& scene, EffectKind kind) {
   const auto add = [&](const auto& all) {
     for (const auto& d : all) names.push_back(owner_of(number_of(d)) + row_of(kind).of_element);
   };
-  if (kind >= Kind::pair_contact && kind <= Kind::pair_damping) add(scene.pair_contacts);
-  if (kind >= Kind::ground_contact && kind <= Kind::ground_damping) add(scene.ground_contacts);
-  if (kind >= Kind::tactile && kind <= Kind::sensor_imperfections) add(scene.sensors);
+  const std::optional<Owner> owner = row_of(kind).owner;
+  if (owner == Owner::contact) add(scene.pair_contacts);
+  if (owner == Owner::ground) add(scene.ground_contacts);
+  if (owner == Owner::tactile) add(scene.sensors);
   return names;
 }
 
@@ -453,6 +455,9 @@ std::vector<EffectInfo> effects_of(const Scene& scene) {
   }
   return effects;
 }
+
+std::optional<NumberOwner> element_owner(EffectKind kind) { return row_of(kind).owner; }
+bool is_part(EffectKind kind) { return *row_of(kind).of_element != '\0'; }
 
 bool has_way(EffectKind kind, Way way) {
   const Row& row = row_of(kind);

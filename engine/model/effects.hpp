@@ -5,11 +5,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "engine/model/scene.hpp"
+#include "engine/model/scene_number.hpp"
 
 namespace tangere {
 
@@ -64,6 +66,12 @@ enum class Way : std::uint8_t {
 /// Returns one row per kind, in their order, and behind each kind of contacts and sensors a row per
 /// element.
 std::vector<EffectInfo> effects_of(const Scene& scene);
+
+/// What the elements of a kind are: pair contacts, ground contacts or sensors; none where it has no
+/// elements.
+std::optional<NumberOwner> element_owner(EffectKind kind);
+/// Whether a kind is a part of its elements, such as friction. They stay when it goes.
+bool is_part(EffectKind kind);
 
 /// Whether a kind has this way. Velocity products have none: they follow from joints that turn.
 bool has_way(EffectKind kind, Way way);

@@ -194,7 +194,7 @@ void Batch::set_state(int environment, std::span<const double> q, std::span<cons
   has_history_[lane] = 1;
 }
 
-void Batch::set_memory(int environment, const ShearMemory& memory) {
+void Batch::set_memory(int environment, std::span<const ShearEntry> memory) {
   const int points = compiled(model_).remembering_points;
   int last = -1;
   for (const ShearEntry& e : memory) {
@@ -207,7 +207,7 @@ void Batch::set_memory(int environment, const ShearMemory& memory) {
         throw InputError("memory of friction: point " + std::to_string(e.point) + " is not finite");
     last = e.point;
   }
-  memory_[std::size_t(environment)] = memory;
+  memory_[std::size_t(environment)].assign(memory.begin(), memory.end());
 }
 
 void Batch::set_failed(int environment, StepStatus status) {

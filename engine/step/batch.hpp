@@ -86,7 +86,7 @@ class Batch {
   }
   /// Sets it, for a run that goes on from a stored state. Throws InputError unless the points rise
   /// and the scene has them.
-  void set_memory(int environment, const ShearMemory& memory);
+  void set_memory(int environment, std::span<const ShearEntry> memory);
 
   /// Sets the newest state alone, for differences. Quaternions are taken as they are; history,
   /// status and what friction remembers are kept.

@@ -86,8 +86,7 @@ void BlockTape::show(std::int64_t step, Batch& batch, int block) const {
               batch.block(block) + compiled(model_).layout.q * kBlock);
   for (int l = 0; l < kBlock && block * kBlock + l < batch.environments(); ++l) {
     batch.set_steps(block * kBlock + l, episode_step(step, l));
-    const std::span<const ShearEntry> remembered = memory(step, l);
-    batch.set_memory(block * kBlock + l, {remembered.begin(), remembered.end()});
+    batch.set_memory(block * kBlock + l, memory(step, l));
   }
 }
 

@@ -107,7 +107,7 @@ struct PairContact {
   bool faced = false;   ///< a convex body on a cuboid: its faces are chosen per solve (faces.hpp)
   Hull hull{};          ///< body 1, if faced
   double overhang = 0;  ///< how far beyond a chosen face's edges a point still touches it [m]
-  int memory = -1;      ///< ≥ 0: index of what its friction remembers (ModelView::memories)
+  int memory = -1;      ///< ≥ 0: index of its RememberingContact
 };
 inline constexpr int kContactTile = 32;
 inline constexpr double kFarAway =
@@ -218,9 +218,7 @@ struct ModelView {
   const GroundedLink* grounded;
   const int *pair_order, *ground_order;  ///< (n_pairs), (n_grounds): members side by side
   int n_solids;
-  const Solid* solids;  ///< (n_solids) all bodies of the scene
-  int n_memories;
-  const RememberingContact* memories;
+  const Solid* solids;   ///< (n_solids) all bodies of the scene
   Frame<double> ground;  ///< frame of the ground in the world; its third axis is the normal
   Pattern pattern;
 };

@@ -13,10 +13,7 @@ namespace {
 
 constexpr int kMostRounds = 41;
 
-bool is_of_sensors(EffectKind kind) {
-  return kind == EffectKind::tactile || kind == EffectKind::tactile_shear ||
-         kind == EffectKind::tactile_damping || kind == EffectKind::sensor_imperfections;
-}
+bool is_of_sensors(EffectKind kind) { return element_owner(kind) == NumberOwner::tactile; }
 
 TimedParts parts_of(EffectKind kind) {
   if (kind == EffectKind::varying_parameters) return {true, true, 1, false};
@@ -115,9 +112,7 @@ EffectCost measure(Measurement& m, const EffectInfo& info) {
 }  // namespace
 
 bool times_elements(EffectKind kind, std::ptrdiff_t elements) {
-  const bool whole = kind == EffectKind::pair_contact || kind == EffectKind::ground_contact ||
-                     kind == EffectKind::tactile;
-  return elements <= (whole ? 12 : 4);
+  return elements <= (is_part(kind) ? 4 : 12);
 }
 
 EffectCosts measure_effects(const Model& model, const EffectCostOptions& options) {
