@@ -39,7 +39,7 @@ int view(const ViewArguments& options, const Console& console) {
                             data.episodes.size(),
                             data.kind == "trajectory" ? "environments" : "episodes", frames));
   if (data.stride > 1)
-    console.note(fmt::format("every {} rows of the file is a frame", data.stride));
+    console.note(fmt::format("one frame for every {} rows of the file", data.stride));
   for (const std::string& note : data.notes) console.note(note);
   console.result({{"command", "view"},
                   {"exit_code", static_cast<int>(kDone)},

@@ -62,7 +62,7 @@ struct ViewData {
   std::vector<ViewSensor> sensors;
   std::vector<ViewEpisode> episodes;
   std::vector<std::string> notes;  ///< what was left out, in words
-  std::int64_t stride = 1;         ///< every so many rows of the file is a frame
+  std::int64_t stride = 1;         ///< rows of the file for a frame
 };
 
 /// What of a file a page shows.

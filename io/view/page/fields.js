@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tactile fields: colours, the map of a sensor with its scale, and the arrows and skin in space.
 // A number triple of a cell is f·axis0, f·axis1 and pressure, in newtons per point.
-const kStops = [[20, 22, 60], [42, 60, 120], [30, 112, 142], [62, 162, 122], [158, 200, 88], [250, 236, 130]];
+const kStops = [[20, 22, 60], [42, 60, 120], [30, 112, 142], [62, 162, 122], [158, 200, 88],
+  [250, 236, 130]];
 
 // Dark blue to pale yellow: lightness rises evenly, so equal steps of force look equal.
 function pressureColour(x) {
@@ -12,20 +13,27 @@ function pressureColour(x) {
 class SensorView {
   // `episodes`: of all, so that one scale serves them.
   constructor(sensor, index, episodes, renderer) {
+    // Of all fields: least and most pressure of a cell, and of the means that arrows show: the
+    // longest shear and the largest force.
     Object.assign(this, { sensor, index, low: 0, high: 0, longest: 0, largest: 0 });
     for (const { fields } of episodes) {
-      const { values } = fields[index];
-      for (let i = 0; i < values.length; i += 3) {
-        const shear = Math.hypot(values[i], values[i + 1]);
-        this.low = Math.min(this.low, values[i + 2]);
-        this.high = Math.max(this.high, values[i + 2]);
-        this.longest = Math.max(this.longest, shear);
-        this.largest = Math.max(this.largest, Math.hypot(shear, values[i + 2]));
+      const { values } = fields[index], size = 3 * sensor.cells;
+      for (let i = 2; i < values.length; i += 3) {
+        this.low = Math.min(this.low, values[i]);
+        this.high = Math.max(this.high, values[i]);
+      }
+      for (let from = 0; size > 0 && from < values.length; from += size) {
+        const field = values.subarray(from, from + size);
+        for (const cells of this.groups()) {
+          this.longest = Math.max(this.longest, norm([...this.meanShear(field, cells), 0]));
+          this.largest = Math.max(this.largest, norm(this.meanForce(field, cells)));
+        }
       }
     }
     if (this.high <= this.low) this.high = this.low + 1e-9;
     // Half the distance to a neighbour.
-    const area = sensor.rows > 1 && sensor.cols > 1 ? sensor.height * sensor.width : this.extent() ** 2 / 4;
+    const area = sensor.rows > 1 && sensor.cols > 1 ? sensor.height * sensor.width
+      : this.extent() ** 2 / 4;
     this.half = 0.5 * Math.sqrt(area / Math.max(1, sensor.cells)) || 1e-4;
     if (renderer) this.skin = renderer.makeSkin();
     this.skinData = new Float32Array(13 * sensor.cells);
@@ -53,7 +61,8 @@ class SensorView {
   paintSkin(field) {
     const { position, axis0, axis1, press, cells, rows, cols, height, width } = this.sensor;
     const grid = rows > 1 && cols > 1 && cells === rows * cols;
-    const h0 = grid ? height / (rows - 1) / 2 : this.half, h1 = grid ? width / (cols - 1) / 2 : this.half;
+    const h0 = grid ? height / (rows - 1) / 2 : this.half;
+    const h1 = grid ? width / (cols - 1) / 2 : this.half;
     for (let c = 0; c < cells; ++c) {
       const colour = pressureColour(this.share(field ? field[3 * c + 2] : 0));
       for (let k = 0; k < 3; ++k) {
@@ -84,21 +93,40 @@ class SensorView {
     return this.grouped;
   }
 
-  // Adds arrows to `out`: place and force on the body, world axes. `length`: of the largest force.
-  addArrows(field, model, length, out) {
-    const { position, axis0, axis1, press } = this.sensor;
-    if (!field || this.largest === 0) return;
+  // The mean force on the body at some cells, body axes.
+  meanForce(field, cells) {
+    const { axis0, axis1, press } = this.sensor, force = [0, 0, 0];
+    for (const c of cells)
+      for (let k = 0; k < 3; ++k)
+        force[k] += (field[3 * c] * axis0[3 * c + k] + field[3 * c + 1] * axis1[3 * c + k]
+          + field[3 * c + 2] * press[3 * c + k]) / cells.length;
+    return force;
+  }
+
+  // The mean shear at those of some cells that have a place in the map: down, right.
+  meanShear(field, cells) {
+    const { place, turn } = this.sensor;
+    let down = 0, right = 0, n = 0;
+    for (const c of cells) {
+      if (place[2 * c] < 0) continue;
+      ++n;
+      down += turn[4 * c] * field[3 * c] + turn[4 * c + 1] * field[3 * c + 1];
+      right += turn[4 * c + 2] * field[3 * c] + turn[4 * c + 3] * field[3 * c + 1];
+    }
+    return n ? [down / n, right / n] : [0, 0];
+  }
+
+  // Adds arrows to `out`: place and force on the body, world axes. `length`: of the force
+  // `largest`, which all sensors of a page share.
+  addArrows(field, model, length, largest, out) {
+    const { position } = this.sensor;
+    if (!field || largest === 0) return;
     for (const cells of this.groups()) {
-      let at = [0, 0, 0], force = [0, 0, 0];
+      const at = [0, 0, 0], force = this.meanForce(field, cells);
+      if (norm(force) < 0.02 * largest) continue;
       for (const c of cells)
-        for (let k = 0; k < 3; ++k) {
-          at[k] += position[3 * c + k] / cells.length;
-          force[k] += (field[3 * c] * axis0[3 * c + k] + field[3 * c + 1] * axis1[3 * c + k]
-            + field[3 * c + 2] * press[3 * c + k]) / cells.length;
-        }
-      const size = norm(force) / this.largest;
-      if (size < 0.02) continue;
-      out.push(...moved(model, at), ...turned(model, scale(length / this.largest, force)));
+        for (let k = 0; k < 3; ++k) at[k] += position[3 * c + k] / cells.length;
+      out.push(...moved(model, at), ...turned(model, scale(length / largest, force)));
     }
   }
 
@@ -106,9 +134,9 @@ class SensorView {
 
   // Draws the map into a 2D context of `width` × `height`, in CSS pixels.
   drawMap(g, width, height, field, episode, frame, ink, soft) {
-    const { name, rows, cols, cells, place, turn } = this.sensor;
+    const { name, rows, cols, cells, place, points } = this.sensor;
     const left = 8, top = 44, bar = 86, bottom = 38;
-    const tall = (this.sensor.height || 1e-3) / rows * (rows + 1), wide = (this.sensor.width || tall) ;
+    const tall = (this.sensor.height || 1e-3) / rows * (rows + 1), wide = this.sensor.width || tall;
     const size = Math.min((width - left - bar) / wide, (height - top - bottom) / tall);
     const w = wide * size, h = tall * size;
     g.font = "600 14px system-ui, sans-serif"; g.fillStyle = ink; g.textAlign = "left";
@@ -130,15 +158,14 @@ class SensorView {
       g.strokeStyle = "#fff"; g.lineWidth = 1.3; g.beginPath();
       const reach = 0.95 * Math.max(w, h) / 12 / this.longest;
       for (const group of this.groups()) {
-        let down = 0, right = 0, y = 0, x = 0, n = 0;
+        let y = 0, x = 0, n = 0;
         for (const c of group) {
           if (place[2 * c] < 0) continue;
           ++n; y += place[2 * c] + 0.5; x += place[2 * c + 1] + 0.5;
-          down += turn[4 * c] * field[3 * c] + turn[4 * c + 1] * field[3 * c + 1];
-          right += turn[4 * c + 2] * field[3 * c] + turn[4 * c + 3] * field[3 * c + 1];
         }
-        const dx = right / n * reach, dy = down / n * reach, long = Math.hypot(dx, dy);
-        if (!n || long < 1) continue;
+        const [down, right] = this.meanShear(field, group);
+        const dx = right * reach, dy = down * reach, long = Math.hypot(dx, dy);
+        if (long < 1) continue;
         const x0 = left + x / n / cols * w - dx / 2, y0 = top + y / n / rows * h - dy / 2;
         const ux = dx / long, uy = dy / long, head = Math.min(5, 0.45 * long);
         g.moveTo(x0, y0); g.lineTo(x0 + dx, y0 + dy);
@@ -157,8 +184,9 @@ class SensorView {
     g.textAlign = "left"; g.fillStyle = ink;
     g.fillText(field ? `${sums.join(", ")} in all` : "no field yet", left, top + h + 17);
     g.fillStyle = soft;
-    g.fillText(`${(1e3 * this.sensor.width).toPrecision(3)} × ${(1e3 * this.sensor.height).toPrecision(3)} mm`
-      + `, ${this.sensor.points} points`, left, top + h + 33);
+    const millimetres = (x) => (1e3 * x).toPrecision(3), { sensor } = this;
+    g.fillText(`${millimetres(sensor.width)} × ${millimetres(sensor.height)} mm, ${points} points`,
+      left, top + h + 33);
     return { width: left + w + bar, height: top + h + bottom };
   }
 

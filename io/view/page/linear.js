@@ -40,7 +40,8 @@ function perspective(angle, aspect, near, far) {
 
 function orthographic(half, near, far) {
   const m = new Float32Array(16);
-  m[0] = m[5] = 1 / half; m[10] = -2 / (far - near); m[14] = -(far + near) / (far - near); m[15] = 1;
+  m[0] = m[5] = 1 / half;
+  m[10] = -2 / (far - near); m[14] = -(far + near) / (far - near); m[15] = 1;
   return m;
 }
 

@@ -16,15 +16,17 @@ function unpack(value) {
 }
 
 const kSpeeds = [0.05, 0.1, 0.25, 0.5, 1, 2, 4];
+const kHint = "drag to turn · shift-drag to move · wheel to zoom · space to play";
 
 class Player {
   constructor(data) {
     this.data = data;
     this.wanted = new URLSearchParams(location.hash.slice(1));
-    this.number = (key, otherwise) => this.wanted.has(key) ? Number(this.wanted.get(key)) : otherwise;
+    this.number = (key, otherwise) =>
+      this.wanted.has(key) ? Number(this.wanted.get(key)) : otherwise;
     this.frame = 0; this.clock = 0; this.playing = false;
-    const dark = this.wanted.get("theme") ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-    document.documentElement.dataset.theme = dark;
+    const usual = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
+    document.documentElement.dataset.theme = this.wanted.get("theme") ?? usual;
     this.makeSolids();
     this.makePanels();
     this.makeControls();
@@ -38,7 +40,8 @@ class Player {
   makeSolids() {
     try {
       this.renderer = new Renderer($("view"));
-      $("view").addEventListener("webglcontextlost", () => this.fail("The graphics driver stopped: load the page again."));
+      $("view").addEventListener("webglcontextlost",
+        () => this.fail("The graphics driver stopped: load the page again."));
     } catch (error) {
       this.fail(error.message);
     }
@@ -46,7 +49,10 @@ class Player {
       const solid = solidOf(body);
       return solid && { radius: solid.radius(), drawn: this.renderer?.upload(solid) };
     }));
-    this.sensors = this.data.sensors.map((s, k) => new SensorView(s, k, this.data.episodes, this.renderer));
+    this.sensors = this.data.sensors.map(
+      (s, k) => new SensorView(s, k, this.data.episodes, this.renderer));
+    // One scale for the arrows of all sensors.
+    this.largest = Math.max(0, ...this.sensors.map((s) => s.largest));
     this.endSolids = this.data.end_effectors.map((end) => this.renderer?.upload(ball(end.radius)));
   }
 
@@ -63,7 +69,7 @@ class Player {
     $("source").textContent = data.source;
     $("source").title = data.source;
     const notes = [...data.notes];
-    if (data.stride > 1) notes.unshift(`Every ${data.stride} rows of the file is a frame.`);
+    if (data.stride > 1) notes.unshift(`One frame for every ${data.stride} rows of the file.`);
     if (data.sensors.some((s) => s.rows * s.cols > 0 && s.points > s.cells))
       notes.push("Maps of many points show means over cells.");
     $("notes").textContent = notes.join(" ");
@@ -92,7 +98,8 @@ class Player {
     const { episodes } = this.data;
     episodes.forEach(({ label }, k) => $("episode").add(new Option(label, k)));
     $("episode-label").hidden = episodes.length < 2;
-    for (const speed of kSpeeds) $("speed").add(new Option(`${speed} ×`, speed, speed === 1, speed === 1));
+    for (const speed of kSpeeds)
+      $("speed").add(new Option(`${speed} ×`, speed, speed === 1, speed === 1));
     $("episode").onchange = () => { this.choose(Number($("episode").value)); this.seek(0); };
     $("play").onclick = () => this.playing ? this.pause() : this.play();
     $("frame").oninput = () => { this.pause(); this.seek(Number($("frame").value)); };
@@ -106,7 +113,7 @@ class Player {
       root.theme = root.theme === "dark" ? "light" : "dark";
       this.redraw();
     };
-    $("hint").textContent = "drag to turn · shift-drag to move · wheel to zoom · space to play";
+    $("hint").textContent = kHint;
     addEventListener("keydown", (event) => {
       if (event.target.tagName === "SELECT") return;
       const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
@@ -167,14 +174,16 @@ class Player {
     if (!(low[0] <= high[0])) { low.fill(-0.1); high.fill(0.1); }
     this.centre = scale(0.5, add(low, high));
     this.radius = Math.max(norm(sub(high, low)) / 2, 1e-4);
-    this.camera = { target: this.centre, turn: this.number("turn", 35), lift: this.number("lift", 18),
+    this.camera = { target: this.centre,
+      turn: this.number("turn", 35), lift: this.number("lift", 18),
       away: 0.85 * this.radius / Math.tan(0.32) / this.number("zoom", 1) };
   }
 
   eye() {
-    const { turn, lift, away, target } = this.camera, a = turn * Math.PI / 180, b = lift * Math.PI / 180;
-    const eye = add(target, scale(away, [Math.sin(a) * Math.cos(b), -Math.cos(a) * Math.cos(b), Math.sin(b)]));
-    return { eye, target, up: [0, 0, 1], angle: 0.64 };
+    const { turn, lift, away, target } = this.camera;
+    const a = turn * Math.PI / 180, b = lift * Math.PI / 180;
+    const back = [Math.sin(a) * Math.cos(b), -Math.cos(a) * Math.cos(b), Math.sin(b)];
+    return { eye: add(target, scale(away, back)), target, up: [0, 0, 1], angle: 0.64 };
   }
 
   seek(frame) {
@@ -221,17 +230,27 @@ class Player {
 
   // A half-space as the renderer wants it.
   groundOf(position, normal) {
-    const reach = 9 * this.radius, n = unit(normal), [first, second] = Math.abs(n[2]) > 0.999 ? [[1, 0, 0], [0, 1, 0]] : across(n);
+    const reach = 9 * this.radius, n = unit(normal);
+    const [first, second] = Math.abs(n[2]) > 0.999 ? [[1, 0, 0], [0, 1, 0]] : across(n);
     const foot = sub(this.centre, scale(dot(n, sub(this.centre, position)), n));
-    const model = new Float32Array([...scale(reach, first), 0, ...scale(reach, second), 0, ...n, 0, ...foot, 1]);
+    const model = new Float32Array(
+      [...scale(reach, first), 0, ...scale(reach, second), 0, ...n, 0, ...foot, 1]);
     return { model, first, second, centre: foot, spacing: roundLength(this.radius / 3), reach };
   }
 
+  // Gives a canvas as many pixels as a size [CSS pixels] has on this screen.
+  fit(canvas, width, height) {
+    const ratio = window.devicePixelRatio || 1;
+    const pixels = (size) => Math.max(1, Math.round(size * ratio));
+    if (canvas.width === pixels(width) && canvas.height === pixels(height)) return;
+    canvas.width = pixels(width); canvas.height = pixels(height);
+  }
+
   drawScene() {
-    const { renderer, episode, frame } = this, canvas = $("view"), ratio = window.devicePixelRatio || 1;
-    const width = Math.max(1, Math.round(canvas.clientWidth * ratio)), height = Math.max(1, Math.round(canvas.clientHeight * ratio));
-    if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
-    const shapes = this.data.shapes[episode.shapes], pads = new Set(this.data.sensors.map((s) => s.body));
+    const { renderer, episode, frame } = this;
+    this.fit($("view"), $("view").clientWidth, $("view").clientHeight);
+    const shapes = this.data.shapes[episode.shapes];
+    const pads = new Set(this.data.sensors.map((s) => s.body));
     const models = shapes.map((_, b) => poseMatrix(episode.poses, 7 * (frame * shapes.length + b)));
     const bodies = [], { ground } = this.data;
     const grounds = ground ? [this.groundOf(ground.position, ground.normal)] : [];
@@ -242,54 +261,60 @@ class Player {
         return;
       }
       const clear = $("through").checked && pads.has(b);
-      bodies.push({ solid: solid.drawn, model: models[b], colour: [...rgba.slice(0, 3), clear ? 0.35 : rgba[3]] });
+      bodies.push({ solid: solid.drawn, model: models[b],
+        colour: [...rgba.slice(0, 3), clear ? 0.35 : rgba[3]] });
     });
     this.data.end_effectors.forEach(({ rgba }, k) => {
-      const at = 3 * (frame * this.data.end_effectors.length + k), p = episode.end_effectors.subarray(at, at + 3);
+      const at = 3 * (frame * this.data.end_effectors.length + k);
+      const p = episode.end_effectors.subarray(at, at + 3);
       bodies.push({ solid: this.endSolids[k], colour: rgba,
         model: new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...p, 1]) });
     });
     const arrows = [], skins = [];
     for (const sensor of this.sensors) {
       const field = sensor.at(episode, frame), model = models[sensor.sensor.body];
-      skins.push({ skin: sensor.skin, model, data: sensor.paintSkin(field), count: sensor.sensor.cells });
-      if ($("arrows").checked) sensor.addArrows(field, model, 0.45 * this.radius, arrows);
+      skins.push({ skin: sensor.skin, model, data: sensor.paintSkin(field),
+        count: sensor.sensor.cells });
+      if ($("arrows").checked)
+        sensor.addArrows(field, model, 0.45 * this.radius, this.largest, arrows);
     }
     const dark = document.documentElement.dataset.theme === "dark";
-    renderer.render({ ...this.eye(), bodies, skins, grounds, dark, radius: this.radius, centre: this.centre,
-      arrows: { data: new Float32Array(arrows), count: arrows.length / 6, thick: 0.008 * this.radius,
+    const { radius, centre } = this;
+    renderer.render({ ...this.eye(), bodies, skins, grounds, dark, radius, centre,
+      arrows: { data: new Float32Array(arrows), count: arrows.length / 6, thick: 0.008 * radius,
         colour: dark ? [1, 0.45, 0.35, 1] : [0.86, 0.18, 0.12, 1] } });
     document.body.dataset.arrows = arrows.length / 6;
-    const largest = Math.max(0, ...this.sensors.map((s) => s.largest));
     $("clock").textContent = `t = ${episode.time[frame].toFixed(3)} s`;
     const parts = [];
     if (grounds.length > 0) parts.push(`grid ${withUnit(grounds[0].spacing, "m")}`);
-    if (largest > 0 && $("arrows").checked) parts.push(`longest arrow ${withUnit(largest, "N")} per point`);
+    if (this.largest > 0 && $("arrows").checked)
+      parts.push(`longest arrow ${withUnit(this.largest, "N")} per point`);
     this.legend = parts.join(" · ");
-    $("hint").textContent = [this.legend, "drag to turn · shift-drag to move · wheel to zoom · space to play"]
-      .filter((part) => part).join(" — ");
+    $("hint").textContent = [this.legend, kHint].filter((part) => part).join(" — ");
   }
 
   inks() {
     const style = getComputedStyle(document.documentElement);
-    return ["--ink", "--soft", "--line", "--panel"].map((name) => style.getPropertyValue(name).trim());
+    return ["--ink", "--soft", "--line", "--panel"]
+      .map((name) => style.getPropertyValue(name).trim());
   }
 
   redraw() {
     if (!this.camera) return;
     const { episode, frame } = this, [ink, soft, line] = this.inks();
     $("frame").value = frame;
-    $("time").textContent = `row ${episode.rows[frame]} · ${episode.time[frame].toFixed(3)} of ${this.last.toFixed(3)} s`;
+    const seconds = (time) => time.toFixed(3);
+    $("time").textContent =
+      `row ${episode.rows[frame]} · ${seconds(episode.time[frame])} of ${seconds(this.last)} s`;
     document.body.dataset.frame = frame;
     if (this.renderer && !document.body.dataset.failure) this.drawScene();
     const ratio = window.devicePixelRatio || 1, maps = this.sensors.filter((s) => s.canvas);
     const room = $("scene").clientHeight / Math.max(1, Math.min(maps.length, 2)) - 30;
     for (const sensor of maps) {
-      const { canvas } = sensor, width = Math.min(360, Math.max(240, room + 20)), height = Math.min(360, Math.max(190, room));
-      if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-        canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
-        canvas.style.width = `${width}px`; canvas.style.height = `${height}px`;
-      }
+      const { canvas } = sensor, width = Math.min(360, Math.max(240, room + 20));
+      const height = Math.min(360, Math.max(190, room));
+      this.fit(canvas, width, height);
+      canvas.style.width = `${width}px`; canvas.style.height = `${height}px`;
       const g = canvas.getContext("2d");
       g.setTransform(ratio, 0, 0, ratio, 0, 0);
       g.clearRect(0, 0, width, height);
@@ -301,22 +326,33 @@ class Player {
 
   // The scene, the maps and the curves in one picture, for files.
   compose() {
-    const [ink, soft, , panel] = this.inks(), view = $("view"), ratio = window.devicePixelRatio || 1;
+    const [ink, soft, , panel] = this.inks(), view = $("view");
+    const ratio = window.devicePixelRatio || 1, room = (size) => size > 0 ? size + gap : 0;
     const side = this.sensors.filter((s) => s.canvas).map((s) => s.canvas);
     const low = this.panels.map((p) => p.canvas), gap = Math.round(10 * ratio);
-    const wide = Math.max(0, ...side.map((c) => c.width)), tall = low.length ? Math.max(...low.map((c) => c.height)) : 0;
-    const width = 2 * Math.ceil((view.width + (wide ? wide + gap : 0)) / 2), height = 2 * Math.ceil((view.height + (tall ? tall + gap : 0)) / 2);
+    const wide = room(Math.max(0, ...side.map((c) => c.width)));
+    const tall = room(Math.max(0, ...low.map((c) => c.height)));
+    const width = 2 * Math.ceil((view.width + wide) / 2);  // videos want even numbers
+    const height = 2 * Math.ceil((view.height + tall) / 2);
     const stage = this.stage ?? document.createElement("canvas");
-    if (stage.width !== width || stage.height !== height) { stage.width = width; stage.height = height; }
+    if (stage.width !== width || stage.height !== height) {
+      stage.width = width; stage.height = height;
+    }
     const g = stage.getContext("2d");
     g.fillStyle = panel; g.fillRect(0, 0, width, height);
     g.drawImage(view, 0, 0);
-    side.reduce((y, canvas) => { g.drawImage(canvas, view.width + gap, y); return y + canvas.height + gap; }, 0);
+    let y = 0;
+    for (const canvas of side) {
+      g.drawImage(canvas, view.width + gap, y);
+      y += canvas.height + gap;
+    }
     const each = low.length ? width / low.length : 0;
-    low.forEach((canvas, k) => g.drawImage(canvas, k * each, view.height + gap, Math.min(each, canvas.width), canvas.height));
+    low.forEach((canvas, k) => g.drawImage(
+      canvas, k * each, view.height + gap, Math.min(each, canvas.width), canvas.height));
     g.textBaseline = "alphabetic"; g.textAlign = "left";
     g.font = `600 ${16 * ratio}px system-ui, sans-serif`; g.fillStyle = ink;
-    g.fillText(`${this.data.title}, ${this.episode.label}, ${$("clock").textContent}`, 14 * ratio, 26 * ratio);
+    const title = `${this.data.title}, ${this.episode.label}, ${$("clock").textContent}`;
+    g.fillText(title, 14 * ratio, 26 * ratio);
     g.font = `${12 * ratio}px system-ui, sans-serif`; g.fillStyle = soft;
     g.fillText(this.legend ?? "", 14 * ratio, view.height - 12 * ratio);
     return stage;
@@ -325,7 +361,8 @@ class Player {
   save(blob, ending) {
     const link = document.createElement("a");
     link.href = URL.createObjectURL(blob);
-    link.download = `${this.data.title || "tangere"}-${this.episode.label}-${this.frame}.${ending}`.replaceAll(" ", "-");
+    const name = `${this.data.title || "tangere"}-${this.episode.label}-${this.frame}.${ending}`;
+    link.download = name.replaceAll(" ", "-");
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
   }
@@ -336,8 +373,10 @@ class Player {
   record() {
     this.stage = document.createElement("canvas");
     this.seek(0);
-    const type = ["video/webm;codecs=vp9", "video/webm", "video/mp4"].find((t) => MediaRecorder.isTypeSupported(t));
-    const recorder = new MediaRecorder(this.stage.captureStream(30), { mimeType: type, videoBitsPerSecond: 8e6 });
+    const type = ["video/webm;codecs=vp9", "video/webm", "video/mp4"]
+      .find((t) => MediaRecorder.isTypeSupported(t));
+    const recorder = new MediaRecorder(this.stage.captureStream(30),
+      { mimeType: type, videoBitsPerSecond: 8e6 });
     const parts = [];
     recorder.ondataavailable = (event) => parts.push(event.data);
     recorder.onstop = () => {

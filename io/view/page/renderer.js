@@ -75,7 +75,9 @@ void main() {
 const kArrow = `#version 300 es
 precision highp float;
 in vec3 facing; out vec4 pixel; uniform vec3 toSun; uniform vec4 colour;
-void main() { pixel = vec4(colour.rgb * (0.65 + 0.35 * dot(normalize(facing), toSun)), colour.a); }`;
+void main() {
+  pixel = vec4(colour.rgb * (0.65 + 0.35 * dot(normalize(facing), toSun)), colour.a);
+}`;
 const kSkinVertex = `#version 300 es
 layout(location=0) in vec2 corner; layout(location=2) in vec3 centre; layout(location=3) in vec3 u;
 layout(location=4) in vec3 v; layout(location=5) in vec4 tint;
@@ -130,7 +132,8 @@ class Renderer {
     const gl = this.gl, size = 2048, texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT24, size, size);
-    for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR],
+    for (const [name, value] of [
+      [gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR],
       [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE],
       [gl.TEXTURE_COMPARE_MODE, gl.COMPARE_REF_TO_TEXTURE], [gl.TEXTURE_COMPARE_FUNC, gl.LEQUAL]])
       gl.texParameteri(gl.TEXTURE_2D, name, value);
@@ -211,14 +214,15 @@ class Renderer {
   render(scene) {
     const gl = this.gl, { canvas } = this;
     const aspect = canvas.width / canvas.height, away = norm(sub(scene.eye, scene.target));
-    const camera = product(perspective(scene.angle, aspect, away / 100, away * 4 + 20 * scene.radius),
+    const camera = product(
+      perspective(scene.angle, aspect, away / 100, away * 4 + 20 * scene.radius),
       lookAt(scene.eye, scene.target, scene.up));
     const toSun = unit([0.35, -0.5, 1.0]), far = 4 * scene.radius;
     const sun = product(orthographic(1.6 * scene.radius, 0, 2 * far),
       lookAt(add(scene.centre, scale(far, toSun)), scene.centre, [0, 1, 0.01]));
     const background = scene.dark ? [0.09, 0.11, 0.15] : [0.933, 0.945, 0.965];
-    const light = { camera, sun, toSun, eye: scene.eye, sky: scene.dark ? [0.75, 0.8, 0.9] : [1, 1, 1],
-      soil: [0.45, 0.43, 0.42] };
+    const light = { camera, sun, toSun, eye: scene.eye,
+      sky: scene.dark ? [0.75, 0.8, 0.9] : [1, 1, 1], soil: [0.45, 0.43, 0.42] };
     gl.enable(gl.DEPTH_TEST); gl.disable(gl.BLEND); gl.depthMask(true);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.shade.target);
     gl.viewport(0, 0, this.shade.size, this.shade.size);
@@ -240,7 +244,8 @@ class Renderer {
         line: scene.dark ? [0.25, 0.29, 0.37] : [0.74, 0.78, 0.84] });
       this.draw(this.plane);
     }
-    const solid = scene.bodies.filter((b) => b.colour[3] >= 1), clear = scene.bodies.filter((b) => b.colour[3] < 1);
+    const solid = scene.bodies.filter((b) => b.colour[3] >= 1);
+    const clear = scene.bodies.filter((b) => b.colour[3] < 1);
     for (const body of solid) { this.use(this.body, { ...light, ...body }); this.draw(body.solid); }
     for (const { skin, model, data, count } of scene.skins) {
       this.use(this.skin, { camera, model });

@@ -46,8 +46,9 @@ class Solid {
   // The farthest corner from the origin.
   radius() {
     let most = 0;
-    for (let i = 0; i < this.positions.length; i += 3)
-      most = Math.max(most, Math.hypot(this.positions[i], this.positions[i + 1], this.positions[i + 2]));
+    const at = this.positions;
+    for (let i = 0; i < at.length; i += 3)
+      most = Math.max(most, Math.hypot(at[i], at[i + 1], at[i + 2]));
     return most;
   }
 }

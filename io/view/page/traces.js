@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Curves over an episode, a panel for each unit, with a line at the frame that is shown.
-const kInks = ["#3b82d6", "#e0702f", "#2f9e68", "#b85bc2", "#c9a227", "#d84a5f", "#3aa6b5", "#8a7a6a"];
+const kInks = ["#3b82d6", "#e0702f", "#2f9e68", "#b85bc2", "#c9a227", "#d84a5f", "#3aa6b5",
+  "#8a7a6a"];
 const kMostNamed = 8;
 const kStatus = ["converged", "split", "coarse", "passed"];  // what is negative failed
 
@@ -13,7 +14,10 @@ class TracePanel {
       const box = canvas.getBoundingClientRect();
       seek((event.clientX - box.left - left) / (box.width - left - right));
     };
-    canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); go(event); });
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      go(event);
+    });
     canvas.addEventListener("pointermove", (event) => { if (event.buttons) go(event); });
   }
 
@@ -27,26 +31,32 @@ class TracePanel {
     const traces = episode.traces.filter((t) => t.group === this.group), { time } = episode;
     let low = Infinity, high = -Infinity;
     for (const { values } of traces)
-      for (const x of values) if (Number.isFinite(x)) { low = Math.min(low, x); high = Math.max(high, x); }
+      for (const x of values)
+        if (Number.isFinite(x)) { low = Math.min(low, x); high = Math.max(high, x); }
     if (!(low <= high)) low = 0, high = 1;
     if (high - low < 1e-9 * Math.max(1, Math.abs(high))) { low -= 0.5; high += 0.5; }
     const room = 0.06 * (high - low);
     low -= room; high += room;
-    const { left, right, top, bottom } = this.margin, w = width - left - right, h = height - top - bottom;
+    const { left, right, top, bottom } = this.margin;
+    const w = width - left - right, h = height - top - bottom;
     const begin = time[0], end = Math.max(time[time.length - 1], begin + 1e-9);
-    const x = (t) => left + (t - begin) / (end - begin) * w, y = (v) => top + (high - v) / (high - low) * h;
+    const x = (t) => left + (t - begin) / (end - begin) * w;
+    const y = (v) => top + (high - v) / (high - low) * h;
     g.font = "11px system-ui, sans-serif"; g.textBaseline = "middle";
     const step = roundLength((high - low) / 3), digits = Math.max(0, -Math.floor(Math.log10(step)));
     for (let v = Math.ceil(low / step) * step; v <= high; v += step) {
-      g.strokeStyle = line; g.beginPath(); g.moveTo(left, y(v)); g.lineTo(left + w, y(v)); g.stroke();
+      g.strokeStyle = line; g.beginPath();
+      g.moveTo(left, y(v)); g.lineTo(left + w, y(v)); g.stroke();
       g.fillStyle = soft; g.textAlign = "right";
       if (Math.abs(v) < 1e-6 * step) v = 0;  // not "-0.0"
-      g.fillText(Math.abs(step) < 1e-3 || step >= 1e4 ? v.toExponential(1) : v.toFixed(Math.min(digits, 6)), left - 6, y(v));
+      const plain = step >= 1e-3 && step < 1e4;
+      g.fillText(plain ? v.toFixed(Math.min(digits, 6)) : v.toExponential(1), left - 6, y(v));
     }
     g.textAlign = "center";
     const tick = roundLength((end - begin) / 3);
     for (let t = Math.ceil(begin / tick) * tick; t <= end + 1e-9; t += tick)
-      g.fillText(`${Number(t.toPrecision(6))} s`, Math.min(Math.max(x(t), left + 12), left + w - 12), height - bottom / 2);
+      g.fillText(`${Number(t.toPrecision(6))} s`,
+        Math.min(Math.max(x(t), left + 12), left + w - 12), height - bottom / 2);
     traces.forEach(({ values }, k) => {
       g.strokeStyle = kInks[k % kInks.length]; g.lineWidth = 1.6; g.beginPath();
       let on = false;
@@ -62,15 +72,23 @@ class TracePanel {
     this.title(g, traces, frame, width, ink, soft);
   }
 
+  // What stands for a value beside its name.
+  textOf(x) {
+    if (this.group === "solver status") return kStatus[x] ?? "failed";
+    if (!Number.isFinite(x)) return "–";
+    const size = Math.abs(x);
+    return `${size > 0 && size < 1e-3 ? x.toExponential(1) : Number(x.toPrecision(3))}`;
+  }
+
   title(g, traces, frame, width, ink, soft) {
     g.textAlign = "left"; g.fillStyle = ink; g.font = "600 12px system-ui, sans-serif";
     g.fillText(this.group, 6, 11);
     let at = 14 + g.measureText(this.group).width, line = 12;
     g.font = "11px system-ui, sans-serif";
     traces.forEach(({ name, values }, k) => {
-      const x = values[frame], size = Math.abs(x);
-      const value = this.group === "solver status" ? kStatus[x] ?? "failed" : !Number.isFinite(x) ? "–" : size > 0 && size < 1e-3 ? x.toExponential(1) : Number(x.toPrecision(3));
-      const text = traces.length === 1 ? `${value}` : `${name} ${value}`, long = g.measureText(text).width;
+      const value = this.textOf(values[frame]);
+      const text = traces.length === 1 ? value : `${name} ${value}`;
+      const long = g.measureText(text).width;
       if (at + 14 + long > width && line === 12) { line = 27; at = 6; }
       if (k >= kMostNamed || at + 14 + long > width) return;
       g.fillStyle = kInks[k % kInks.length]; g.fillRect(at, line - 5, 9, 9);
