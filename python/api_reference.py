@@ -193,7 +193,8 @@ def page(package: Path) -> tuple[str, list[str]]:
             for member in properties:
                 kind = ast.unparse(member.returns) if member.returns else ""
                 doc = " ".join((ast.get_docstring(member) or "").split())
-                shown += wrapped(f"- `{member.name}`: {f'`{kind}`. ' if kind else ''}{doc}".rstrip())
+                of_kind = f"`{kind}`. " if kind else ""
+                shown += wrapped(f"- `{member.name}`: {of_kind}{doc}".rstrip())
             if properties or any(isinstance(f, ast.AnnAssign) for f in node.body):
                 shown.append("")
             for member in methods:

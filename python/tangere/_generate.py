@@ -59,8 +59,8 @@ def generate(
     ----------
     what: a task's name, or the path of a scene.
     output: folder of the data set.
-    policy: a name, such as "random", or for a task a function as `tangere.policy.serve` takes. None:
-        the script of the task, the controls of a scene.
+    policy: a name, such as "random", or for a task a function as `tangere.policy.serve` takes.
+        None: the script of the task, the controls of a scene.
     name: of the function, for the files.
     normalise: of the function's observations.
     options: more words of the command, such as ("--compress", "deflate", "--overwrite").

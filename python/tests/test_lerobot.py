@@ -216,7 +216,11 @@ def test_nothing_half_written_gets_the_name(pushes, tmp_path, monkeypatch):
         fcntl.flock(lock, fcntl.LOCK_EX)
         with pytest.raises(tangere.InputError, match="by another process"):
             lerobot.export(pushes, tmp_path / "held")
-    monkeypatch.setattr(lerobot, "write_task", lambda *_: (_ for _ in ()).throw(OSError(28, "full")))
+
+    def fail(*_):
+        raise OSError(28, "full")
+
+    monkeypatch.setattr(lerobot, "write_task", fail)
     assert lerobot.main([str(pushes), str(tmp_path / "full")]) == 3
     assert not list(tmp_path.glob("full*"))
 

@@ -102,7 +102,7 @@ def test_noise_and_random_episodes_go_with_a_function(tmp_path):
     [
         (lambda n: np.zeros((n, 2)), tangere.InputError, r"shape \(16, 2\); expected \(16, 3\)"),
         (lambda n: np.zeros(3 * n), tangere.InputError, "actions of shape"),
-        (lambda n: np.full((n, 3), np.nan), tangere.InputError, "answers nan as number 0 of action"),
+        (lambda n: np.full((n, 3), np.nan), tangere.InputError, "nan as number 0 of action"),
         (lambda n: 1 / 0, ZeroDivisionError, "division"),
     ],
 )

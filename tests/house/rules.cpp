@@ -384,8 +384,15 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
   return found;
 }
 
+/// Characters of a line: bytes of UTF-8 that begin one.
+static std::ptrdiff_t columns_of(const std::string& line) {
+  return std::count_if(line.begin(), line.end(),
+                       [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; });
+}
+
 std::vector<Violation> check_sources(const Tree& tree) {
   constexpr std::size_t kMostLines = 600;
+  constexpr std::ptrdiff_t kMostColumns = 100;  // clang-format sees to those of C++
   std::vector<Violation> found;
   for (const auto& [path, text] : tree) {
     if (!is_cpp(path) && !is_script(path)) continue;
@@ -403,6 +410,12 @@ std::vector<Violation> check_sources(const Tree& tree) {
                      });
     if (spdx == lines.begin() + std::ptrdiff_t(std::min(head, lines.size())))
       found.push_back({path, 1, "has no line 'SPDX-License-Identifier: Apache-2.0' at its head"});
+    if (ends_with_any(path, {".js", ".py"}))
+      for (std::size_t i = 0; i < lines.size(); ++i)
+        if (const std::ptrdiff_t columns = columns_of(lines[i]); columns > kMostColumns)
+          found.push_back(
+              {path, static_cast<int>(i) + 1,
+               std::to_string(columns) + " columns, at most " + std::to_string(kMostColumns)});
     if (is_cpp(path) && (lines.size() < 2 || !lines[1].starts_with("//")))
       found.push_back({path, 2, "expected a comment that says why the file exists"});
   }

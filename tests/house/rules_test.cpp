@@ -153,14 +153,18 @@ TEST(HouseRules, SeeASourceWithoutItsHeader) {
 
 TEST(HouseRules, SeeAHeadlessOrOverlongSource) {
   const std::string head = "// SPDX-License-Identifier: Apache-2.0\n// Why.\n";
-  std::string longest = head, too_long = head + "\n";
+  std::string longest = head, too_long = head + "\n", marks;
   for (int i = 2; i < 600; ++i) longest += "\n", too_long += "\n";
+  for (int i = 0; i < 99; ++i) marks += "µ";
   const Tree tree{
       {"engine/bare.hpp", "#pragma once\n"},
       {"engine/empty.cpp", ""},
       {"engine/longest.cpp", longest},
       {"engine/mute.cpp", "// SPDX-License-Identifier: Apache-2.0\n#include <vector>\n"},
       {"engine/too_long.cpp", too_long},
+      {"io/page/wide.js",
+       "// SPDX-License-Identifier: Apache-2.0\n" + std::string(101, 'x') + "\n"},
+      {"python/fits.py", "# SPDX-License-Identifier: Apache-2.0\n#" + marks + "\n"},
       {"run-demo", "#!/usr/bin/env bash\n# SPDX-License-Identifier: Apache-2.0\n"},
       {"tests/CMakeLists.txt", "add_test()\n"}};
   EXPECT_THAT(
@@ -168,6 +172,7 @@ TEST(HouseRules, SeeAHeadlessOrOverlongSource) {
       ElementsAre(Says("engine/bare.hpp", 1, "SPDX"), Says("engine/bare.hpp", 2, "why"),
                   Says("engine/empty.cpp", 1, "SPDX"), Says("engine/empty.cpp", 2, "why"),
                   Says("engine/mute.cpp", 2, "why"), Says("engine/too_long.cpp", 0, "601 lines"),
+                  Says("io/page/wide.js", 2, "101 columns"),
                   Says("tests/CMakeLists.txt", 1, "SPDX")));
 }
 

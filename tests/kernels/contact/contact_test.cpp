@@ -11,6 +11,7 @@
 #include "kernels/contact/pair_contact.hpp"
 #include "kernels/contact/sphere_contact.hpp"
 #include "kernels/numbers/dual.hpp"
+#include "tests/kernels/lift.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
 namespace tangere {
@@ -18,6 +19,7 @@ namespace {
 
 using namespace kernels;
 using D = Dual<double>;
+using testing::lift;
 using testing::Random;
 
 struct Case {
@@ -34,18 +36,6 @@ Vec3<double> size_of(PrimitiveShape shape) {
 }
 
 class PairDerivative : public ::testing::TestWithParam<Case> {};
-
-template <class N>
-N lift(double x, double e) {
-  if constexpr (std::is_same_v<N, double>)
-    return x;
-  else
-    return N(x, e);
-}
-template <class N>
-Vec3<N> lift(const Vec3<double>& x, const Vec3<double>& e) {
-  return {lift<N>(x.x, e.x), lift<N>(x.y, e.y), lift<N>(x.z, e.z)};
-}
 
 struct State {
   Mat3<double> Q;

@@ -8,33 +8,24 @@
 
 #include "kernels/memory/memory_pullback.hpp"
 #include "kernels/numbers/dual.hpp"
+#include "tests/kernels/lift.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
 namespace tangere::kernels {
 namespace {
 
 using D = Dual<double>;
+using testing::lift;
 using testing::Random;
 
-template <class N>
-N with(double x, double e) {
-  if constexpr (std::is_same_v<N, double>)
-    return x;
-  else
-    return N(x, e);
-}
-template <class N>
-Vec3<N> with(const Vec3<double>& x, const Vec3<double>& e) {
-  return {with<N>(x.x, e.x), with<N>(x.y, e.y), with<N>(x.z, e.z)};
-}
 /// A frame displaced by ε = (θ; ρ) in the outer axes.
 template <class N>
 Frame<N> displaced(const Frame<double>& f, const Vec6<double>& e) {
   const Mat3<double> turn = skew(e.a) * f.R;
   Frame<N> out;
   for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) out.R.m[i][j] = with<N>(f.R.m[i][j], turn.m[i][j]);
-  out.p = with<N>(f.p, e.l + cross(e.a, f.p));
+    for (int j = 0; j < 3; ++j) out.R.m[i][j] = lift<N>(f.R.m[i][j], turn.m[i][j]);
+  out.p = lift<N>(f.p, e.l + cross(e.a, f.p));
   return out;
 }
 Vec3<double> epsilon(const Vec3<D>& x) { return {x.x.epsilon, x.y.epsilon, x.z.epsilon}; }
@@ -110,7 +101,7 @@ template <class N>
 LoadedTouch<N> touch(const Step& x, const Frame<N>& at, const Vec6<N>& twist,
                      const Coefficients<double>& change) {
   Coefficients<N> law;
-  for (std::size_t k = 0; k < kCoefficients; ++k) law[k] = with<N>(x.law[k], change[k]);
+  for (std::size_t k = 0; k < kCoefficients; ++k) law[k] = lift<N>(x.law[k], change[k]);
   return {at.R, at.p, twist.a, twist.l, {law, x.law.law, x.law.ramp}, N(x.radius), x.ground};
 }
 
@@ -121,13 +112,13 @@ struct Outcome {
 };
 template <class N>
 Outcome<N> outcome(const Step& x, const Change& c) {
-  const Vec3<N> xi = with<N>(x.xi, {0, 0, 0});
-  const Vec6<N> twist = {with<N>(x.twist.a, c.twist.a), with<N>(x.twist.l, c.twist.l)};
+  const Vec3<N> xi = lift<N>(x.xi, {0, 0, 0});
+  const Vec6<N> twist = {lift<N>(x.twist.a, c.twist.a), lift<N>(x.twist.l, c.twist.l)};
   const LoadedTouch<N> start = touch<N>(x, displaced<N>(x.start, c.start), twist, c.law),
                        end = touch<N>(x, displaced<N>(x.end, c.end), twist, c.law);
   Outcome<N> out;
   with_distance<N>(x.shape, kSize, [&](const auto& shape) {
-    const Anchor<N> anchor = recalled(shape, start, xi, with<N>(x.s, c.s));
+    const Anchor<N> anchor = recalled(shape, start, xi, lift<N>(x.s, c.s));
     const ElasticPoint<N> p = meet_elastic(shape, end, end.law, xi, anchor);
     out.s = p.hold * p.s;
     out.force = p.force;
@@ -203,11 +194,11 @@ PairSums<N> sums_of(const Step& x, const Anchor<double>& anchor, const Vec6<doub
                     const Vec6<double>& rate) {
   PairSums<N> out = PairSums<N>::zero();
   const Frame<N> at = displaced<N>(x.end, e);
-  const Anchor<N> a = {with<N>(anchor.b, {0, 0, 0}), with<N>(anchor.a, {0, 0, 0}), N(anchor.gap)};
+  const Anchor<N> a = {lift<N>(anchor.b, {0, 0, 0}), lift<N>(anchor.a, {0, 0, 0}), N(anchor.gap)};
   const LoadedTouch<N> t =
-      touch<N>(x, at, {with<N>(x.twist.a, rate.a), with<N>(x.twist.l, rate.l)}, {});
+      touch<N>(x, at, {lift<N>(x.twist.a, rate.a), lift<N>(x.twist.l, rate.l)}, {});
   constexpr bool kDerivatives = std::is_same_v<N, double>;
-  const Vec3<N> xi = with<N>(x.xi, {0, 0, 0});
+  const Vec3<N> xi = lift<N>(x.xi, {0, 0, 0});
   if (x.ground) {
     // The ground moves against the body, whose own twist is the opposite.
     const Vec3<N> m = {at.R.m[0][2], at.R.m[1][2], at.R.m[2][2]};
