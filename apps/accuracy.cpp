@@ -11,11 +11,11 @@
 #include "apps/command.hpp"
 #include "apps/machine.hpp"
 #include "apps/memory.hpp"
+#include "apps/named_value.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
 #include "apps/text_output.hpp"
-#include "io/files/nearest_name.hpp"
 #include "kernels/numbers/block.hpp"
 #include "kernels/table/isa.hpp"
 #include "tasks/run/episode_program.hpp"
@@ -42,12 +42,7 @@ int environments_of(const AccuracyArguments& o) {
 AccuracyQuantity quantity_named(const std::string& name, const Model& model) {
   if (name.empty())
     return model.sensors().empty() ? AccuracyQuantity::state : AccuracyQuantity::tactile;
-  std::vector<std::string> names;
-  for (const AccuracyQuantity value : {AccuracyQuantity::tactile, AccuracyQuantity::state}) {
-    names.emplace_back(to_string(value));
-    if (names.back() == name) return value;
-  }
-  throw InputError("unknown quantity '" + name + "'" + suggestion(name, names));
+  return named_value("quantity", name, {AccuracyQuantity::tactile, AccuracyQuantity::state});
 }
 
 void check_arguments(const AccuracyArguments& o) {

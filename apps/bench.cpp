@@ -12,13 +12,13 @@
 #include "apps/command.hpp"
 #include "apps/machine.hpp"
 #include "apps/memory.hpp"
+#include "apps/named_value.hpp"
 #include "apps/record.hpp"
 #include "apps/scene_run.hpp"
 #include "apps/stop_signals.hpp"
 #include "apps/task_run.hpp"
 #include "apps/text_output.hpp"
 #include "engine/step/stepper.hpp"
-#include "io/files/nearest_name.hpp"
 #include "kernels/numbers/block.hpp"
 #include "kernels/table/isa.hpp"
 #include "tasks/run/benchmark_run.hpp"
@@ -42,12 +42,7 @@ struct BenchArguments {
 /// The kind as given, or dense.
 FrameKind frames_named(const std::string& name) {
   if (name.empty()) return FrameKind::dense;
-  std::vector<std::string> names;
-  for (const FrameKind value : {FrameKind::dense, FrameKind::compact, FrameKind::none}) {
-    names.emplace_back(to_string(value));
-    if (names.back() == name) return value;
-  }
-  throw InputError("unknown frames '" + name + "'" + suggestion(name, names));
+  return named_value("frames", name, {FrameKind::dense, FrameKind::compact, FrameKind::none});
 }
 
 /// `of_benchmark`: memory of the benchmark besides the batch from which it starts [bytes].

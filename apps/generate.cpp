@@ -83,7 +83,7 @@ std::string quoted(const std::string& word) {
 }
 
 /// Returns the command that makes the same data set again, in any folder and on any number of
-/// threads.
+/// threads. With --program, this holds if the program is found from there and answers the same.
 std::string command_of(const GenerateOptions& options, const EpisodeOptions& run,
                        const std::string& policy) {
   std::string command = fmt::format("tangere generate {} --episodes {} --seed {} --precision {}",
@@ -95,6 +95,7 @@ std::string command_of(const GenerateOptions& options, const EpisodeOptions& run
   if (!options.name.empty()) command += " --name " + options.name;
   if (!options.program.empty()) command += " --program " + quoted(options.program);
   if (!options.controls.empty()) command += " --controls " + options.controls;
+  if (options.accuracy) command += fmt::format(" --accuracy {}", *options.accuracy);
   if (options.compress != "none") command += " --compress " + options.compress;
   if (options.tactile != "dense") command += " --tactile " + options.tactile;
   if (!options.record.empty()) command += " --record " + options.record;
@@ -134,7 +135,8 @@ DatasetLayout make_layout(const GenerateOptions& options, const Model& model,
   return dataset_layout_from(model, stepper, description);
 }
 
-std::vector<std::string> effects_of(const Model& model) {
+/// Names of the kinds of effects that the model has on.
+std::vector<std::string> effect_names(const Model& model) {
   std::vector<std::string> names;
   for (const EffectInfo& effect : model.effects()) {
     if (effect.on && effect.effect.element < 0) names.emplace_back(effect.name);
@@ -277,12 +279,11 @@ auto with_gradients(const GradientPlan& plan, EpisodeSink& sink, const Run& run)
   return run(adding);
 }
 
-/// Makes the missing shards.
-int make(const GenerateOptions& options, const Console& console, const Job& job) {
-  if (options.dry_run) return dry_run(options, console, job);
-  // Lives from before the folder is made until it is gone or complete, so nothing half-written
-  // stays.
-  const StopSignals signals;
+/// Makes the missing shards. `signals` live from before the folder is made until it is gone or
+/// complete, so nothing half-written stays.
+int make(const GenerateOptions& options, const Console& console, const Job& job,
+         const StopSignals& signals) {
+  if (options.dry_run) return dry_run(options, console, job, signals);
   DatasetWriter output(output_for(options, job.layout, console), job.layout);
   EpisodeOptions run = job.run;
   run.ranges = output.missing();
@@ -341,10 +342,14 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
       task, {{"--steps", options.steps.has_value()}, {"--every", options.every.has_value()}});
   const PolicyKind kind = policy_kind(options);
   const PolicyVariation variation = variation_of(options, kind);
+  const StopSignals signals;  // from before a program starts, so that none outlives this one
   std::optional<PolicyProgram> program;
   if (kind == PolicyKind::program)
     program.emplace(task, options.seed.value_or(0), info.version, options.program,
-                    options.program_timeout.value_or(kProgramTimeout));
+                    options.program_timeout.value_or(kProgramTimeout),
+                    [&signals] { return signals.received() != 0; });
+  if (signals.received() != 0)
+    return report_stop(console, "generate", signals.received(), "before the first episode");
   const Policy policy =
       program ? Policy(
                     task, program->name(),
@@ -374,19 +379,18 @@ int generate_task(const GenerateOptions& options, const Console& console, const 
   job.memory_bytes = episode_bytes(task, job.run) + job.run.threads * plan.bytes;
   check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
   job.unit = "action";
-  job.effects = effects_of(task.model());
+  job.effects = effect_names(task.model());
   job.layout =
       make_layout(options, task.model(), Stepper(task.model()), job.run, {}, info, plan, &task,
                   {to_string(kind), policy.players(), variation.noise, variation.random_share});
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
-    if (program) program->stop_when(stop);
     const EpisodeSummary summary = with_gradients(plan_of(run), sink, [&](EpisodeSink& to) {
       return run_episodes(task, policy, run, to, progress, stop);
     });
     return {summary, report_of(task, kind, policy.players()[0], summary)};
   };
-  return make(options, console, job);
+  return make(options, console, job, signals);
 }
 
 /// Whether it may read shards that it did not write itself.
@@ -447,7 +451,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   job.memory_bytes = episode_bytes(model, job.run) + job.run.threads * plan.bytes;
   check_memory(job.memory_bytes, fmt::format("--threads {}", job.run.threads));
   job.unit = "environment step";
-  job.effects = effects_of(model);
+  job.effects = effect_names(model);
   job.layout = make_layout(options, model, stepper, job.run, record, info, plan);
   job.simulate = [&](const EpisodeOptions& run, EpisodeSink& sink, const EpisodeProgress& progress,
                      const StopRequest& stop) -> JobResult {
@@ -457,7 +461,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
                            }),
             {}};
   };
-  return make(options, console, job);
+  return make(options, console, job, StopSignals());
 }
 
 }  // namespace

@@ -8,10 +8,11 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "apps/named_value.hpp"
+#include "apps/scene_run.hpp"
 #include "apps/workers.hpp"
 #include "engine/base/error.hpp"
 #include "io/dataset/dataset_merge.hpp"
-#include "io/files/nearest_name.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -55,7 +56,7 @@ Extent extent_of(const GenerateOptions& options, const DatasetLayout& layout,
 }
 
 /// Environment steps per second. Simulates a first block for each thread, for about a second.
-double measured_rate(const Job& job) {
+double measured_rate(const Job& job, const StopRequest& stop) {
   EpisodeOptions some = job.run;
   some.ranges.clear();
   some.episodes = std::min<std::int64_t>(job.run.episodes, 16LL * job.run.threads);
@@ -63,8 +64,8 @@ double measured_rate(const Job& job) {
   const bool by_steps = !job.layout.task;  // a task plays whole episodes
   if (by_steps) some.steps = std::min<std::int64_t>(job.run.steps, some.every);
   for (;;) {
-    const EpisodeSummary summary = job.simulate(some, sink, {}, {}).summary;
-    if (!by_steps || some.steps >= job.run.steps || summary.seconds > 0.5)
+    const EpisodeSummary summary = job.simulate(some, sink, {}, stop).summary;
+    if (summary.stopped || !by_steps || some.steps >= job.run.steps || summary.seconds > 0.5)
       return static_cast<double>(summary.environment_steps) / summary.seconds;
     some.steps = std::min(job.run.steps, some.steps * 4);
   }
@@ -79,13 +80,8 @@ double free_bytes_at(const std::string& path) {
 }
 
 GradientKind gradient_kind_named(const std::string& name) {
-  std::vector<std::string> names;
-  for (const GradientKind kind :
-       {GradientKind::none, GradientKind::returns, GradientKind::jacobians}) {
-    names.emplace_back(to_string(kind));
-    if (names.back() == name) return kind;
-  }
-  throw InputError("unknown gradients '" + name + "'" + suggestion(name, names));
+  return named_value("gradients", name,
+                     {GradientKind::none, GradientKind::returns, GradientKind::jacobians});
 }
 
 }  // namespace
@@ -150,12 +146,16 @@ Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output) 
   return merged;
 }
 
-int dry_run(const GenerateOptions& options, const Console& console, const Job& job) {
+int dry_run(const GenerateOptions& options, const Console& console, const Job& job,
+            const StopSignals& signals) {
   job.layout.check();
   const Extent extent = extent_of(options, job.layout, output_for(options, job.layout, console));
   const double of_one = job.layout.episode_bytes(),
                bytes = of_one * static_cast<double>(extent.episodes);
-  const double free = free_bytes_at(options.output), rate = measured_rate(job);
+  const double free = free_bytes_at(options.output),
+               rate = measured_rate(job, [&] { return signals.received() != 0; });
+  if (signals.received() != 0)
+    return report_stop(console, "generate", signals.received(), "while it measured");
   // For a task these are actions, if every episode lasts as long as it can.
   const double steps = static_cast<double>(extent.episodes) *
                        static_cast<double>(job.layout.task ? job.layout.rows() : job.layout.steps);

@@ -11,6 +11,7 @@
 
 #include "apps/command.hpp"
 #include "apps/console.hpp"
+#include "apps/stop_signals.hpp"
 #include "io/dataset/dataset_writer.hpp"
 #include "tasks/gradients/episode_gradients.hpp"
 #include "tasks/run/episodes.hpp"
@@ -71,6 +72,7 @@ Merged merge_if_complete(const GenerateOptions& options, DatasetWriter& output);
 
 /// Prints what would be made and how long it may take. It simulates some episodes for this, and
 /// writes nothing.
-int dry_run(const GenerateOptions& options, const Console& console, const Job& job);
+int dry_run(const GenerateOptions& options, const Console& console, const Job& job,
+            const StopSignals& signals);
 
 }  // namespace tangere::apps

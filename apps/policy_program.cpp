@@ -73,8 +73,8 @@ void PolicyProgram::Socket::close() {
 }
 
 PolicyProgram::PolicyProgram(const Task& task, std::uint64_t seed, const std::string& version,
-                             const std::string& command, double timeout)
-    : task_(task), command_(command), timeout_(timeout) {
+                             const std::string& command, double timeout, std::function<bool()> stop)
+    : task_(task), command_(command), timeout_(timeout), stop_(std::move(stop)) {
   start();
   try {
     introduce(seed, version);
@@ -136,6 +136,7 @@ void PolicyProgram::introduce(std::uint64_t seed, const std::string& version) {
   const std::string line = said.dump() + "\n";
   write(line.data(), line.size(), deadline);
   const std::string heard = read_line(deadline);
+  if (stopped_) return;
   const Json reply = Json::parse(heard, nullptr, false);
   if (!reply.is_object() || reply.value("protocol", Json()) != kProtocol ||
       !reply.value("name", Json()).is_string() ||
@@ -247,7 +248,10 @@ bool PolicyProgram::read(char* bytes, std::size_t count, double deadline) {
 std::string PolicyProgram::read_line(double deadline) {
   std::string line;
   for (char c = 0; line.size() < kLongestLine; line += c) {
-    if (!read(&c, 1, deadline)) fail_ended();
+    if (!read(&c, 1, deadline)) {
+      if (stopped_) break;
+      fail_ended();
+    }
     if (c == '\n') break;
   }
   return line;

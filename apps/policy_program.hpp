@@ -19,10 +19,11 @@ namespace tangere::apps {
 class PolicyProgram {
  public:
   /// Starts `command` with the shell, tells it the task and reads its name. `timeout` [s] is for
-  /// this and for every answer. Throws IoError if it cannot be started, ends, or does not answer in
-  /// time, InputError if it says something else than a name.
+  /// this and for every answer. Once `stop` returns true nothing is awaited any longer: then the
+  /// name may be missing, and actions are zeros. Throws IoError if the program cannot be started,
+  /// ends, or does not answer in time, InputError if it says something else than a name.
   PolicyProgram(const Task& task, std::uint64_t seed, const std::string& version,
-                const std::string& command, double timeout);
+                const std::string& command, double timeout, std::function<bool()> stop);
   /// Closes its input. A program that does not end by itself within some seconds is killed.
   ~PolicyProgram();
   PolicyProgram(const PolicyProgram&) = delete;
@@ -31,11 +32,8 @@ class PolicyProgram {
   /// What it calls itself.
   [[nodiscard]] const std::string& name() const { return name_; }
   /// Asks it; threads take turns. Throws IoError if it has ended or is late, InputError if its
-  /// answer has another size or a number that is not finite. After a stop request the actions are
-  /// zeros.
+  /// answer has another size or a number that is not finite.
   void answer(const PolicyQuestion& question, std::span<double> actions);
-  /// While a run lasts, an answer is awaited no longer when this is true.
-  void stop_when(std::function<bool()> stop) { stop_ = std::move(stop); }
 
  private:
   class Socket {
@@ -59,7 +57,7 @@ class PolicyProgram {
   [[nodiscard]] bool read(char* bytes, std::size_t count, double deadline);
   [[nodiscard]] std::string read_line(double deadline);
   void wait_for(short events, double deadline);
-  [[nodiscard]] bool stopping() const { return stopped_ || (stop_ && stop_()); }
+  [[nodiscard]] bool stopping() const { return stopped_ || stop_(); }
   [[noreturn]] void fail_ended();
   [[nodiscard]] std::string who() const;
   void end();

@@ -7,8 +7,8 @@
 #include <csignal>
 #include <nlohmann/json.hpp>
 
+#include "apps/named_value.hpp"
 #include "io/files/csv.hpp"
-#include "io/files/nearest_name.hpp"
 #include "io/scene/scene_reader.hpp"
 
 namespace tangere::apps {
@@ -19,12 +19,7 @@ constexpr std::size_t kMostFailuresListed = 20;
 }  // namespace
 
 Precision precision_named(const std::string& name) {
-  std::vector<std::string> names;
-  for (const Precision value : {Precision::f64, Precision::mixed}) {
-    names.emplace_back(to_string(value));
-    if (names.back() == name) return value;
-  }
-  throw InputError("unknown precision '" + name + "'" + suggestion(name, names));
+  return named_value("precision", name, {Precision::f64, Precision::mixed});
 }
 
 std::vector<std::string> integrator_names() {
@@ -34,18 +29,11 @@ std::vector<std::string> integrator_names() {
 }
 
 Integrator integrator_named(const std::string& name) {
-  for (const Integrator known : integrators())
-    if (to_string(known) == name) return known;
-  throw InputError("unknown integrator '" + name + "'" + suggestion(name, integrator_names()));
+  return named_value("integrator", name, integrators());
 }
 
 LossKind loss_named(const std::string& name) {
-  std::vector<std::string> names;
-  for (const LossKind value : loss_kinds()) {
-    names.emplace_back(to_string(value));
-    if (names.back() == name) return value;
-  }
-  throw InputError("unknown loss '" + name + "'" + suggestion(name, names));
+  return named_value("loss", name, std::span<const LossKind>(loss_kinds()));
 }
 
 std::string split_text(std::int64_t split, std::int64_t coarse, std::int64_t passed) {

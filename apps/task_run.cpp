@@ -7,6 +7,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include "apps/named_value.hpp"
 #include "apps/scene_run.hpp"
 #include "io/files/csv.hpp"
 #include "io/files/nearest_name.hpp"
@@ -36,16 +37,10 @@ std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
 
 PolicyKind policy_named(const std::string& name, const std::string& table, PolicyKind fallback) {
   PolicyKind kind = table.empty() ? fallback : PolicyKind::csv;
-  std::vector<std::string> names;
-  bool found = name.empty();
-  for (const PolicyKind value :
-       {PolicyKind::random, PolicyKind::hold, PolicyKind::csv, PolicyKind::scripted}) {
-    names.emplace_back(to_string(value));
-    if (names.back() != name) continue;
-    found = true;
-    kind = value;
-  }
-  if (!found) throw InputError("unknown policy '" + name + "'" + suggestion(name, names));
+  if (!name.empty())
+    kind =
+        named_value("policy", name,
+                    {PolicyKind::random, PolicyKind::hold, PolicyKind::csv, PolicyKind::scripted});
   if (kind == PolicyKind::csv && table.empty())
     throw InputError("--policy csv without --controls; expected both");
   if (kind != PolicyKind::csv && !table.empty())

@@ -22,26 +22,6 @@ std::vector<std::string> end_effector_names(const Model& model) {
   return names;
 }
 
-SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& description,
-                           int interval) {
-  SensorLayout layout;
-  layout.name = info.name;
-  layout.body = info.body;
-  layout.rows = info.rows;
-  layout.cols = info.cols;
-  layout.points = info.points;
-  layout.every = interval;
-  layout.pressure_sign = info.pressure_sign;
-  layout.law = description.law;
-  layout.corner0 = description.array.corner0;
-  layout.corner1 = description.array.corner1;
-  layout.axis0 = description.array.axis0;
-  layout.axis1 = description.array.axis1;
-  layout.imperfections = text_of(description.imperfections);
-  layout.list = description.points;
-  return layout;
-}
-
 /// Fills in the names and units of what varies.
 template <class Layout>
 void describe_randomized(const Scene& scene, Layout& layout) {
@@ -52,6 +32,26 @@ void describe_randomized(const Scene& scene, Layout& layout) {
 }
 
 }  // namespace
+
+SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& description,
+                           int every) {
+  SensorLayout layout;
+  layout.name = info.name;
+  layout.body = info.body;
+  layout.rows = info.rows;
+  layout.cols = info.cols;
+  layout.points = info.points;
+  layout.every = every;
+  layout.pressure_sign = info.pressure_sign;
+  layout.law = description.law;
+  layout.corner0 = description.array.corner0;
+  layout.corner1 = description.array.corner1;
+  layout.axis0 = description.array.axis0;
+  layout.axis1 = description.array.axis1;
+  layout.imperfections = text_of(description.imperfections);
+  layout.list = description.points;
+  return layout;
+}
 
 TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
                              const RunDescription& run) {

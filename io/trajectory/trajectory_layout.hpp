@@ -97,6 +97,10 @@ struct RunDescription {
   std::string policy;
 };
 
+/// Describes a sensor of a model. `every`: SensorLayout::every.
+SensorLayout sensor_layout(const SensorInfo& info, const TactileDescription& description,
+                           int every);
+
 /// The layout of a rollout of `batch` by `stepper`.
 TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper, const RunDescription& run);
 

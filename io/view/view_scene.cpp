@@ -15,6 +15,7 @@
 #include "engine/sense/readout.hpp"
 #include "io/picture/tactile_drawing.hpp"
 #include "io/scene/scene_reader.hpp"
+#include "io/trajectory/trajectory_layout.hpp"
 
 namespace tangere {
 namespace {
@@ -39,18 +40,8 @@ void append(std::vector<float>& to, const Vector3& x) {
   for (const double number : x) to.push_back(static_cast<float>(number));
 }
 
-SensorLayout layout_of(const SensorInfo& info, const TactileDescription& d) {
-  SensorLayout layout;
-  layout.name = info.name, layout.body = info.body;
-  layout.rows = info.rows, layout.cols = info.cols, layout.points = info.points;
-  layout.corner0 = d.array.corner0, layout.corner1 = d.array.corner1;
-  layout.axis0 = d.array.axis0, layout.axis1 = d.array.axis1;
-  layout.list = d.points;
-  return layout;
-}
-
 ViewSensor view_sensor(const SensorInfo& info, const TactileDescription& d, int body) {
-  const SensorLayout layout = layout_of(info, d);
+  const SensorLayout layout = sensor_layout(info, d, 1);
   const double push = -info.pressure_sign;
   ViewSensor s;
   s.name = info.name, s.body = body, s.points = info.points;

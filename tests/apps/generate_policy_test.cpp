@@ -4,8 +4,12 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "io/hdf5/h5.hpp"
 #include "io/hdf5/h5_listing.hpp"
@@ -219,6 +223,58 @@ TEST(GeneratePolicy, AProgramThatDoesNotAnswerLeavesNothing) {
     EXPECT_THAT(outcome.err, HasSubstr(c.says)) << c.program;
     EXPECT_THAT(folder.files(), ::testing::IsEmpty()) << c.program;
   }
+}
+
+/// Waits for a file with a whole line in it and returns the line. After a minute, something is
+/// broken.
+std::string line_of(const Folder& folder, const std::string& name) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+  std::string text;
+  while (!text.ends_with('\n') && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    if (fs::exists(folder.path(name))) text = folder.read(name);
+  }
+  EXPECT_TRUE(text.ends_with('\n')) << name << " never appeared";
+  return text;
+}
+
+TEST(GeneratePolicy, AProgramThatStartsEndsWithTheRun) {
+  for (const Words& more : {Words{}, Words{"--dry-run"}}) {
+    const Folder folder;
+    Program command(folder,
+                    pushes("set", Words{"--program", "echo $$ >started; sleep 1000"} + more));
+    const pid_t program = std::stoi("0" + line_of(folder, "started"));
+    command.send(SIGINT);
+    const Outcome outcome = command.wait();
+    EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr("stopped by SIGINT before the first episode"));
+    EXPECT_THAT(folder.files(), ElementsAre("started"));
+    ASSERT_GT(program, 1);
+    EXPECT_EQ(kill(program, 0), -1) << "it goes on";
+    EXPECT_EQ(errno, ESRCH);
+  }
+}
+
+TEST(GeneratePolicy, ManyThreadsWaitOnceForAProgramThatIsMute) {
+  const Folder folder;
+  const std::string mute =
+      R"(printf '{"protocol":"tangere policy 1","name":"mute"}\n'; cat >heard)";
+  const Outcome outcome =
+      run(folder, {"generate", "box_pushing", "-o", "set", "--episodes", "400", "--threads", "6",
+                   "--program", mute, "--program-timeout", "3", "--quiet"});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("has not answered within 3 s (--program-timeout)"));
+  // It heard who asks, and one question about 16 environments.
+  const std::string heard = folder.read("heard");
+  const std::size_t first = heard.find('\n') + 1;
+  const json said = json::parse(heard.substr(0, first));
+  std::size_t width = 0;
+  for (const json& observation : said.at("observations")) {
+    std::size_t size = 1;
+    for (const json& n : observation.at("shape")) size *= n.get<std::size_t>();
+    width += size;
+  }
+  EXPECT_EQ(heard.size() - first, 8 + 16 * (8 + 8 + 4 * width));
 }
 
 TEST(GeneratePolicy, AProgramGoesWithTasksAndItsOwnOptions) {

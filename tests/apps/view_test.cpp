@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <hdf5.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -23,6 +24,7 @@ using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 const std::string kBall = scene("rolling_ball_small.xml");
@@ -268,6 +270,42 @@ TEST(View, RewardsOfATaskAreShown) {
                   static_cast<float>(paid.back()));
 }
 
+TEST(View, EveryTaskIsShown) {
+  for (const std::string task :
+       {"ball_rolling_small", "box_pushing", "cap_opening", "insertion", "stable_grasp"}) {
+    SCOPED_TRACE(task);
+    const Folder folder;
+    simulate(folder, {task});
+    const json data = view(folder, "run.h5");
+    expect_poses(data, folder.path("run.h5"), 1);
+    const json& episode = data.at("episodes")[0];
+    ASSERT_THAT(data.at("sensors"), Not(IsEmpty()));
+    for (std::size_t k = 0; k < data.at("sensors").size(); ++k) {
+      const std::vector<float> fields = unpacked<float>(episode.at("fields")[k].at("values"));
+      EXPECT_GT(*std::max_element(fields.begin(), fields.end()), 0) << "its script touches";
+    }
+  }
+}
+
+TEST(View, ARunThatGoesOnKeepsItsClock) {
+  const Folder folder;
+  const auto play = [&](const Words& words) {
+    const Outcome outcome = run(folder, Words{"simulate", kBall} + words);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  };
+  play({"--steps", "30", "--every", "1", "-o", "first.h5"});
+  play({"--steps", "20", "--every", "1", "--state-from", "first.h5", "-o", "on.h5"});
+  play({"--steps", "50", "--every", "1", "-o", "whole.h5"});
+  const json on = view(folder, "on.h5"), whole = view(folder, "whole.h5");
+  expect_poses(on, folder.path("on.h5"), 1);
+  for (const char* what : {"time", "poses"}) {
+    const std::vector<float> part = unpacked<float>(on.at("episodes")[0].at(what)),
+                             all = unpacked<float>(whole.at("episodes")[0].at(what));
+    ASSERT_LT(part.size(), all.size());
+    EXPECT_TRUE(std::equal(part.begin(), part.end(), all.end() - std::ssize(part))) << what;
+  }
+}
+
 /// Sizes and places that vary by environment: each has its own shapes, and poses follow.
 TEST(View, NumbersThatVaryAreThoseOfTheEnvironment) {
   const Folder folder;
@@ -300,7 +338,7 @@ TEST(View, EveryShapeIsShown) {
   for (const json& body : data.at("shapes")[0]) {
     kinds.push_back(body.at("kind"));
     if (kinds.back() == "mesh") {
-      EXPECT_THAT(unpacked<std::int32_t>(body.at("triangles")), ::testing::Not(IsEmpty()));
+      EXPECT_THAT(unpacked<std::int32_t>(body.at("triangles")), Not(IsEmpty()));
     }
   }
   EXPECT_THAT(kinds, ::testing::IsSupersetOf({"cuboid", "cylinder", "capsule", "ellipsoid", "plane",
