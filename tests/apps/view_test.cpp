@@ -15,6 +15,7 @@
 #include "io/view/view_reader.hpp"
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
+#include "tests/sanitized.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -272,7 +273,8 @@ TEST(View, RewardsOfATaskAreShown) {
 
 TEST(View, EveryTaskIsShown) {
   for (const std::string task :
-       {"ball_rolling_small", "box_pushing", "cap_opening", "insertion", "stable_grasp"}) {
+       {"cap_opening", "ball_rolling_small", "box_pushing", "insertion", "stable_grasp"}) {
+    if (kSanitized && task != "cap_opening") continue;  // a list of points with an image
     SCOPED_TRACE(task);
     const Folder folder;
     simulate(folder, {task});
