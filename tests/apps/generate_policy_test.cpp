@@ -197,6 +197,8 @@ TEST(GeneratePolicy, AnotherVariationIsAnotherDataSet) {
 TEST(GeneratePolicy, AProgramThatDoesNotAnswerLeavesNothing) {
   const Folder folder;
   const std::string hello = R"(printf '{"protocol":"tangere policy 1","name":"mute"}\n'; )";
+  // It listens until its input ends. A program that sleeps is given 5 s to end.
+  const std::string idle = "cat >/dev/null";
   struct Case {
     std::string program;
     int exit_code;
@@ -207,11 +209,11 @@ TEST(GeneratePolicy, AProgramThatDoesNotAnswerLeavesNothing) {
            Case{"no_such_program_at_all", 3, "has ended with exit code 127"},
            Case{"kill -9 $$", 3, "has ended by a signal (Killed)"},
            Case{"echo good morning", 2, "answers 'good morning'; expected a line"},
-           Case{"printf '{\"protocol\":\"tangere policy 2\"}\\n'; sleep 9", 2, "policy 1"},
+           Case{"printf '{\"protocol\":\"tangere policy 2\"}\\n'; " + idle, 2, "policy 1"},
            Case{"sleep 1000", 3, "has not answered within 0.3 s (--program-timeout)"},
-           Case{hello + "sleep 1000", 3, "has not answered within 0.3 s"},
+           Case{hello + idle, 3, "has not answered within 0.3 s"},
            Case{hello + "exit 5", 3, "has ended with exit code 5"},
-           Case{hello + "head -c 64 /dev/zero; sleep 9", 2,
+           Case{hello + "head -c 64 /dev/zero; " + idle, 2,
                 "answers 0 numbers to a question about "
                 "16 environments; expected 48, 3"},
        }) {
@@ -261,9 +263,9 @@ TEST(GeneratePolicy, ManyThreadsWaitOnceForAProgramThatIsMute) {
       R"(printf '{"protocol":"tangere policy 1","name":"mute"}\n'; cat >heard)";
   const Outcome outcome =
       run(folder, {"generate", "box_pushing", "-o", "set", "--episodes", "400", "--threads", "6",
-                   "--program", mute, "--program-timeout", "3", "--quiet"});
+                   "--program", mute, "--program-timeout", "2", "--quiet"});
   EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_THAT(outcome.err, HasSubstr("has not answered within 3 s (--program-timeout)"));
+  EXPECT_THAT(outcome.err, HasSubstr("has not answered within 2 s (--program-timeout)"));
   // It heard who asks, and one question about 16 environments.
   const std::string heard = folder.read("heard");
   const std::size_t first = heard.find('\n') + 1;
