@@ -151,6 +151,24 @@ TEST(Effects, RemovedEqualsZeroCoefficients) {
   }
 }
 
+TEST(Effects, PartsGoWithoutTheirElements) {
+  const auto elements = [](const Scene& s) {
+    return s.pair_contacts.size() + s.ground_contacts.size() + s.sensors.size();
+  };
+  const Scene scene = scene_of_all_effects();
+  for (const EffectInfo& info : effects_of(scene)) {
+    SCOPED_TRACE(info.name);
+    const EffectKind kind = info.effect.kind;
+    if (info.effect.element < 0) continue;
+    EXPECT_TRUE(element_owner(kind).has_value());
+    EXPECT_EQ(elements(without(scene, info.effect)), elements(scene) - (is_part(kind) ? 0U : 1U));
+  }
+  EXPECT_EQ(element_owner(EffectKind::ground_damping), NumberOwner::ground);
+  EXPECT_EQ(element_owner(EffectKind::sensor_imperfections), NumberOwner::tactile);
+  EXPECT_FALSE(element_owner(EffectKind::gravity).has_value());
+  EXPECT_FALSE(is_part(EffectKind::varying_parameters));
+}
+
 TEST(Effects, RemovedIsOffAndLeavesTheOthersOn) {
   const Scene scene = scene_of_all_effects();
   for (const EffectInfo& info : effects_of(scene)) {
