@@ -121,6 +121,11 @@ class Sweep {
         setting.integrator, episodes_.interval() / setting.parts));
   }
 
+  /// Whether settings are played with the tolerance that the engine chooses.
+  [[nodiscard]] bool tolerance_follows() const {
+    return !options_.tolerance && !episodes_.start.model().solver().tolerance;
+  }
+
   /// Plays a setting up to kPasses times; the least times count. Returns false when stopped.
   bool measure(const AccuracySetting& setting, std::vector<AccuracyPoint>& points) {
     AccuracyOutcome best = run_.compare(setting, listener_.go_on);
@@ -171,6 +176,7 @@ class Sweep {
       for (const Integrator integrator : integrators()) {
         AccuracySetting setting{integrator, parts, 0};
         setting.tolerance = tolerance_of(setting);
+        setting.follows = tolerance_follows();
         if (!measure(setting, report_.points)) return false;
       }
     }
@@ -189,6 +195,7 @@ class Sweep {
                                    .tolerance = options_.tolerance,
                                    .accuracy = accuracy});
       setting.tolerance = as_set.tolerance();
+      setting.follows = tolerance_follows();
       if (!measure(setting, report_.points)) return false;
     }
     return true;
@@ -198,7 +205,9 @@ class Sweep {
     const Model& model = episodes_.start.model();
     std::vector<AccuracyPoint> own;
     const Stepper as_set(model);
-    if (!measure({model.integrator(), episodes_.every, as_set.tolerance(), as_set.accuracy()}, own))
+    if (!measure({model.integrator(), episodes_.every, as_set.tolerance(), as_set.accuracy(),
+                  !model.solver().tolerance},
+                 own))
       return false;
     report_.own = own.front();
     return true;
@@ -216,6 +225,7 @@ class Sweep {
   bool measure_tolerances() {
     AccuracySetting setting = report_.own.setting;
     if (report_.advice >= 0) setting = report_.points[as_size(report_.advice)].setting;
+    setting.follows = false;
     for (const double tolerance : kTolerances) {
       setting.tolerance = tolerance;
       if (!measure(setting, report_.tolerances)) return false;
