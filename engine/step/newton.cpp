@@ -167,6 +167,7 @@ struct Search {
           take_chord(l, test_norm[l]);
         } else {
           accepted |= 1U << l;
+          expected[l] = 0;
         }
       } else if (descends(l, test_norm[l], residual[l])) {
         report.residual[l] = residual[l];
