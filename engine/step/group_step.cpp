@@ -31,10 +31,10 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, LaneBits lanes, const Row<L>& h, bool inside_split,
                         NewtonReport& report) const {
   const int n = model_.nv;
-  const NewtonLimits limits = {
-      settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
-      inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience,
-      settings_.spare};
+  const NewtonLimits limits = {settings_.tolerance,
+                               inside_split ? kSplitIterations : settings_.max_iterations,
+                               inside_split ? kSplitHalvings : kHalvings,
+                               inside_split ? kSplitPatience : kPatience, settings_.spare};
   StageFactors<L> factors;
   choose_faces(model_, table, w);
   begin_memory(model_, table, w);

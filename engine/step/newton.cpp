@@ -25,6 +25,12 @@
 // taken where three of them should meet the tolerance. A chord step that fails the natural test is
 // undone, and a Newton step follows.
 //
+// The stages of a step have the same c₀. A later one takes chord steps by the factor of the stage
+// before from its start, under the same condition, with kNextStage times the share.
+//
+// Where the tolerance need not be checked (NewtonLimits::spare), a chord step that should meet it
+// ends the search.
+//
 // Whether an evaluation includes the Jacobian is a guess that affects cost, never results. g alone
 // is evaluated where every lane should be done or take a chord step, and the Jacobian afterwards if
 // one was not. The Jacobian of one lane costs its contacts a third of a group's. Where a single
@@ -58,9 +64,9 @@ struct Search {
   NewtonReport& report;
   double gravity;
   LaneBits searching;
-  LaneBits on_trial = 0;  ///< lanes whose x is a trial along delta
-  LaneBits spared = 0;    ///< lanes that ended without the last evaluation
-  LaneBits by_secant = 0; ///< lanes whose factor takes friction by its secant
+  LaneBits on_trial = 0;   ///< lanes whose x is a trial along delta
+  LaneBits spared = 0;     ///< lanes that ended without the last evaluation
+  LaneBits by_secant = 0;  ///< lanes whose factor takes friction by its secant
   std::array<double, L> alpha{}, delta_norm{};
   std::array<double, L> last{};    ///< scaled residual of the last accepted point
   std::array<double, L> lowest{};  ///< lowest scaled residual of all accepted points
@@ -104,8 +110,7 @@ struct Search {
     LaneBits open = 0;
     for (int l = 0; l < L; ++l)
       if (has(searching, l) && !(expected[l] <= limits.tolerance)) open |= 1U << l;
-    with_jacobian =
-        !factors.weighted || (open != 0 && (lone(open) < 0 || open == searching));
+    with_jacobian = !factors.weighted || (open != 0 && (lone(open) < 0 || open == searching));
     (with_jacobian ? kernel().evaluate : kernel().residual)(model.view, w.stage, lone(searching));
     if (!std::exchange(factors.weighted, true)) {
       kernel().set_weights(model.view, w.stage);

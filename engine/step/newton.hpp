@@ -21,16 +21,16 @@ struct NewtonLimits {
 /// What the stages of one step hand on to each other.
 template <int L>
 struct StageFactors {
-  bool weighted = false;       ///< the norm's weights and floor are those of this step
-  LaneBits lanes = kNoLane;    ///< lanes with a factor at hand
-  LaneBits pivoted = kNoLane;  ///< lanes in which that is the pivoted one
+  bool weighted = false;          ///< the norm's weights and floor are those of this step
+  LaneBits lanes = kNoLane;       ///< lanes with a factor at hand
+  LaneBits pivoted = kNoLane;     ///< lanes in which that is the pivoted one
   std::array<double, L> share{};  ///< of the residual that a step by that factor left
 };
 
 /// How the solve went, per lane. Lanes that were not requested keep their values.
 struct NewtonReport {
   std::array<StepStatus, kernels::kGroup> status{};
-  std::array<int, kernels::kGroup> iterations{};   ///< evaluations of the residual, accumulated
+  std::array<int, kernels::kGroup> iterations{};  ///< evaluations of the residual, accumulated
   /// Scaled residual at the last accepted point; the expected one where its evaluation was spared.
   std::array<double, kernels::kGroup> residual{};
   LaneBits passed = 0;  ///< lanes in which a body came through a cuboid that it touches

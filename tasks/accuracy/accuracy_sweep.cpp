@@ -32,6 +32,15 @@ double quantile(std::vector<double> numbers, double share) {
   return numbers[as_size(std::max(0, static_cast<int>(rank) - 1))];
 }
 
+/// Share of the errors that are 0.3 to 3 times `wanted`. NaN entries do not count.
+double share_near(double wanted, const std::vector<double>& errors) {
+  if (!(wanted > 0)) return std::nan("");
+  const auto known = std::ranges::count_if(errors, [](double x) { return !std::isnan(x); });
+  const auto near =
+      std::ranges::count_if(errors, [&](double x) { return x >= 0.3 * wanted && x <= 3 * wanted; });
+  return static_cast<double>(near) / static_cast<double>(known);
+}
+
 std::string status_of(const AccuracyOutcome& outcome, int environments) {
   if (outcome.failures.empty()) return "ok";
   const FailedEnvironment& first = outcome.failures.front();
@@ -49,9 +58,13 @@ class Sweep {
         listener_(listener),
         run_(episodes, options.quantity, options.threads) {}
 
+  AccuracyReport run_own() {
+    report_.stopped = !find_reference() || !measure_own();
+    return std::move(report_);
+  }
+
   AccuracyReport run() {
     if (!find_reference()) return stop();
-    report_.resolved = report_.reference.error <= options_.target / 3;
     if (!report_.resolved) look_for_vibration();
     if (report_.reference.environments == 0) return std::move(report_);  // the reference failed
     if (!measure_points()) return stop();
@@ -88,6 +101,7 @@ class Sweep {
       if (error <= options_.target / kFineEnough || error > 0.5 * last) break;
       last = error;
     }
+    report_.resolved = report_.reference.error <= options_.target / 3;
     return true;
   }
 
@@ -156,6 +170,7 @@ class Sweep {
     point.step = episodes_.interval() / setting.parts;
     point.error = quantile(outcome.error[p], 0.95);
     point.median = quantile(outcome.error[p], 0.5);
+    point.within = share_near(setting.accuracy, outcome.error[p]);
     const auto steps = static_cast<double>(std::max<std::int64_t>(1, outcome.environment_steps));
     point.evaluations = static_cast<double>(outcome.evaluations) / steps;
     point.split = static_cast<double>(outcome.split_steps) / steps;
@@ -246,6 +261,11 @@ class Sweep {
 AccuracyReport accuracy_sweep(const FixedEpisodes& episodes, const AccuracyOptions& options,
                               const AccuracyListener& listener) {
   return Sweep(episodes, options, listener).run();
+}
+
+AccuracyReport own_accuracy(const FixedEpisodes& episodes, const AccuracyOptions& options,
+                            const AccuracyListener& listener) {
+  return Sweep(episodes, options, listener).run_own();
 }
 
 }  // namespace tangere
