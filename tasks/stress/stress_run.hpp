@@ -33,6 +33,7 @@ struct StressRow {
   std::int64_t split_steps = 0;
   std::int64_t coarse_steps = 0;  ///< with parts that missed the accuracy
   std::int64_t passed_steps = 0;  ///< in which a body came through another
+  std::int64_t damped_steps = 0;  ///< that would have created energy
   int environments = 0, failed = 0;
   StressVerdict verdict = StressVerdict::fails;
   bool known = false;  ///< fails, and is listed as failing
