@@ -22,7 +22,7 @@ using kernels::Row;
 
 namespace {
 
-constexpr double kJump = 0.1;
+constexpr double kJump = 0.05;
 /// The share of the moving energy that a step may create.
 constexpr double kMayCreate = 1e-3;
 
@@ -104,10 +104,14 @@ LaneBits GroupStep::creating(const kernels::KernelTable& table, BasicWorkspace<L
     if (!has(looked_at, l)) continue;
     const LaneEnergy before = energy_of_bodies(model_, w, w.poses_before, w.q0, w.v0, l),
                      after = energy_of_bodies(model_, w, w.poses_after, w.q1, w.v1, l);
-    double gain = after.total - before.total;
-    for (int i = 0; i < model_.nv; ++i) gain -= w.stage.tau[i][l] * w.stage.x[i][l];
-    // What contacts hold takes as long to find as they take in a solve.
-    if (!(gain > kMayCreate * std::max(before.moving, after.moving))) continue;
+    double gain = after.total - before.total, most = 0;
+    for (int i = 0; i < model_.nv; ++i) {
+      gain -= w.stage.tau[i][l] * w.stage.x[i][l];
+      most += w.stage.force_scale[i][l] * std::abs(w.stage.x[i][l]);
+    }
+    // What contacts hold takes as long to find as they take in a solve. It has not risen by more
+    // than the force at the end times the way.
+    if (!(gain + most > kMayCreate * std::max(before.moving, after.moving))) continue;
     const double held = energy_of_contacts(model_, table, w, w.poses_before, l),
                  holds = energy_of_contacts(model_, table, w, w.poses_after, l);
     if (gain + holds - held > kMayCreate * std::max(before.moving + held, after.moving + holds))
