@@ -245,8 +245,11 @@ bool run_case(const StressCase& of, const StressOptions& options, const StressSc
     if (listener.row) listener.row(rows.back());
   };
   Scene scene;
+  std::vector<std::string> warnings;
   try {
-    scene = scenes(of.scene);
+    StressScene read = scenes(of.scene);
+    scene = std::move(read.scene);
+    warnings = std::move(read.warnings);
     const Model compiled(varied(scene, of.variant));  // which may refuse it, too
   } catch (const InputError& error) {
     add(refused(of, error.what()));
@@ -260,6 +263,11 @@ bool run_case(const StressCase& of, const StressOptions& options, const StressSc
     row.accuracy = setting.accuracy;
     row.environments = of.environments;
     if (!measure(scene, options.threads, listener.go_on, row)) return false;
+    if (row.verdict == StressVerdict::fails && !warnings.empty()) {
+      row.verdict = StressVerdict::flagged;
+      row.known = false;
+      row.reason = "warning: " + warnings.front();
+    }
     add(std::move(row));
   }
   return true;

@@ -15,7 +15,7 @@ namespace tangere {
 /// What a setting of a case came to.
 enum class StressVerdict {
   holds,    ///< the criterion is met
-  flagged,  ///< not met, and the engine said so: by a status, or by refusing the scene
+  flagged,  ///< not met, and it was said: by a status, by a warning, or by refusing the scene
   fails,    ///< not met, and nothing was said
 };
 const char* to_string(StressVerdict value);
@@ -55,8 +55,13 @@ struct StressReport {
   bool stopped = false;
 };
 
+/// A scene, and what was warned of when it was read.
+struct StressScene {
+  Scene scene;
+  std::vector<std::string> warnings{};
+};
 /// Returns a scene by its name below scenes/. Throws InputError where it cannot be read.
-using StressScenes = std::function<Scene(const std::string& file)>;
+using StressScenes = std::function<StressScene(const std::string& file)>;
 
 struct StressListener {
   /// Called before every step of every block, from any thread. False stops the run.

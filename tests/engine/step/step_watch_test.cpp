@@ -47,7 +47,8 @@ Bounce bounce(const Scene& scene, Integrator scheme, double h, double speed) {
     v = v_of(batch);
     const double depth = std::min(q_of(batch)[2] + 0.0023, 0.0),
                  held = scene.ground_contacts[0].coefficients.kn * depth * depth / 0.01;
-    b.energy = std::max(b.energy, (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + held) / (speed * speed));
+    b.energy =
+        std::max(b.energy, (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] + held) / (speed * speed));
   }
   return b;
 }
@@ -142,7 +143,8 @@ TEST(BoundedEnergy, BitsDoNotDependOnCompany) {
 TEST(BoundedEnergy, GradientsGoThroughDampedSteps) {
   for (const Integrator scheme : {Integrator::bdf2, Integrator::sdirk2, Integrator::sdirk3}) {
     const Model model(impact(1e5));
-    const StepperOptions o = testing::options(scheme, scheme == Integrator::bdf2 ? 2e-3 : 1e-3, 1e-13);
+    const StepperOptions o =
+        testing::options(scheme, scheme == Integrator::bdf2 ? 2e-3 : 1e-3, 1e-13);
     testing::RunInput in = testing::random_input(model, 5, 6);
     in.q = q_of(Batch(model, 1));
     in.v = {0.2, 0.1, -1, 1, 2, 3};
@@ -158,16 +160,18 @@ TEST(BoundedEnergy, GradientsGoThroughDampedSteps) {
     const testing::StateLoss loss(model, 6, 7);
     const testing::RunGradient adjoint = testing::adjoint_of_run(model, o, {in}, loss, 0);
     const testing::RunGradient differences = testing::differences_of_run(model, o, in, loss);
-    EXPECT_EQ(testing::compare(adjoint.q, differences.q, testing::norm(differences.q), 1e-6, "q"), 6);
-    EXPECT_EQ(testing::compare(adjoint.v, differences.v, testing::norm(differences.v), 1e-6, "v"), 6);
+    EXPECT_EQ(testing::compare(adjoint.q, differences.q, testing::norm(differences.q), 1e-6, "q"),
+              6);
+    EXPECT_EQ(testing::compare(adjoint.v, differences.v, testing::norm(differences.v), 1e-6, "v"),
+              6);
   }
 }
 
 /// A ball above a pad of a millimetre.
 Scene ball_on_pad(double kn) {
   Scene s;
-  s.links = {link("pad", JointType::fixed, {0, 0, -5e-4}, CuboidShape{{0.04, 0.04, 1e-3}, {21, 21, 2}},
-                  1000),
+  s.links = {link("pad", JointType::fixed, {0, 0, -5e-4},
+                  CuboidShape{{0.04, 0.04, 1e-3}, {21, 21, 2}}, 1000),
              link("ball", JointType::free, {0, 0, 0.1}, SphereShape{0.01}, 1000)};
   s.pair_contacts.push_back({"pad", "ball", {kn, 1, 0.5, 1e3}, ContactLaw::clamped, 1e-5, {}});
   return s;
@@ -213,8 +217,8 @@ TEST(Components, ALightBodyIsAsExactAsAlone) {
   Scene s;
   s.ground = GroundDescription{};
   s.links = {link("light", JointType::free, {0, 0, 2}, SphereShape{0.01}, 238.73241),
-             link("heavy", JointType::translational, {2, 0, 0.49755}, CuboidShape{{1, 1, 1}, {2, 2, 2}},
-                  1e9)};
+             link("heavy", JointType::translational, {2, 0, 0.49755},
+                  CuboidShape{{1, 1, 1}, {2, 2, 2}}, 1e9)};
   s.ground_contacts.push_back({"heavy", {1e12, 1e9, 0.5, 1e10}, ContactLaw::clamped, 1e-5, {}});
   const Model model(s);
   EXPECT_EQ(compiled(model).components(), 2);
