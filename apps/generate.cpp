@@ -211,7 +211,8 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
       summary.episodes, summary.rows, summary.seconds, rate, run.threads, limit_of(summary, job),
       summary.simulation_seconds, preparation_of(job), summary.encoding_seconds,
       summary.writing_seconds, done.task.line,
-      split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps),
+      split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
+                 summary.damped_steps),
       summary.failures.size(), kept, options.output,
       shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes,
       merged.line));
@@ -250,6 +251,7 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"split_steps", summary.split_steps},
               {"coarse_steps", summary.coarse_steps},
               {"passed_steps", summary.passed_steps},
+              {"damped_steps", summary.damped_steps},
               {"failed", failures_json("episode", failures_of(summary))}};
   result.update(done.task.keys);
   result.update(merged.keys);

@@ -36,10 +36,12 @@ LossKind loss_named(const std::string& name) {
   return named_value("loss", name, std::span<const LossKind>(loss_kinds()));
 }
 
-std::string split_text(std::int64_t split, std::int64_t coarse, std::int64_t passed) {
+std::string split_text(std::int64_t split, std::int64_t coarse, std::int64_t passed,
+                       std::int64_t damped) {
   std::string text = fmt::format("steps split: {}", split);
   if (coarse > 0) text += fmt::format(", less accurate than asked: {}", coarse);
   if (passed > 0) text += fmt::format(", a body came through another: {}", passed);
+  if (damped > 0) text += fmt::format(", damped because they created energy: {}", damped);
   return text;
 }
 

@@ -31,9 +31,10 @@ Integrator integrator_named(const std::string& name);
 /// Throws InputError for an unknown loss.
 LossKind loss_named(const std::string& name);
 
-/// Says how many steps were split, and how many missed the accuracy or let a body through, if any
-/// did.
-std::string split_text(std::int64_t split, std::int64_t coarse, std::int64_t passed);
+/// Says how many steps were split, and how many missed the accuracy, let a body through or were
+/// damped, if any were.
+std::string split_text(std::int64_t split, std::int64_t coarse, std::int64_t passed,
+                       std::int64_t damped);
 
 /// Reads a scene; its warnings go to the console. `asked`: as in ask_of_solver().
 Scene read_scene_for(const std::string& path, bool allow_unknown, const Console& console,

@@ -108,7 +108,8 @@ int report(const SimulateArguments& options, const Console& console, const Batch
                   "Newton iterations per step: {:.2f}, {}, environments failed: {}\n{}\n"
                   "wrote {} ({} bytes)",
                   batch.environments(), summary.steps, summary.seconds, rate, per_step,
-                  split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps),
+                  split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
+                             summary.damped_steps),
                   summary.failures.size(), of_task.line, options.output, bytes));
   Json sensors = Json::array();
   for (const FieldOutput of : fields_of(batch.model(), rollout.outputs)) {
@@ -143,6 +144,7 @@ int report(const SimulateArguments& options, const Console& console, const Batch
               {"split_steps", summary.split_steps},
               {"coarse_steps", summary.coarse_steps},
               {"passed_steps", summary.passed_steps},
+              {"damped_steps", summary.damped_steps},
               {"failed", failures_json("environment", failures_of(summary))}};
   result.update(of_task.keys);
   console.result(result);

@@ -42,10 +42,11 @@ StressOptions options_of(const StressArguments& o) {
   return options;
 }
 
-Scene scene_of_program(const std::string& file) {
+StressScene scene_of_program(const std::string& file) {
   const char* const text = program_scene(file);
   if (text == nullptr) throw IoError("the scene " + file + " is not in the program");
-  return parse_scene(text, file).scene;
+  SceneFile read = parse_scene(text, file);
+  return {std::move(read.scene), std::move(read.warnings)};
 }
 
 int stress(const StressArguments& o, const Console& console) {

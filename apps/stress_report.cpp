@@ -45,6 +45,7 @@ Json row_json(const StressRow& row) {
           {"split_steps", row.split_steps},
           {"coarse_steps", row.coarse_steps},
           {"passed_steps", row.passed_steps},
+          {"damped_steps", row.damped_steps},
           {"envs", row.environments},
           {"failed", row.failed},
           {"verdict", to_string(row.verdict)},

@@ -187,6 +187,10 @@ struct CompiledModel {
   std::vector<kernels::DofEffects> dof_effects;  ///< (nv)
   /// (nv) magnitude to which an unknown is rounded: extent of the scene [m], 1 [rad].
   std::vector<double> unknown_scale;
+  /// Dofs of bodies that can reach each other by joints and contacts, component by component: those
+  /// of component c are component_dofs[component_begin[c]] … component_begin[c + 1] - 1.
+  std::vector<int> component_dofs, component_begin;
+  [[nodiscard]] int components() const { return static_cast<int>(component_begin.size()) - 1; }
   double fall_time = 0;  ///< √(extent of the scene/|gravity|) [s]; infinite without gravity
   std::vector<double> initial_q, initial_v;
   PatternStorage pattern;

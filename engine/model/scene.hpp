@@ -263,6 +263,8 @@ struct SolverOptions {
   int max_iterations = 20;  ///< Newton passes before a step is split
   /// Relative accuracy of the parts into which a step is cut. None or 0: every step is one part.
   std::optional<double> accuracy{};
+  /// Steps that would create energy are taken again by BDF1 or in parts (docs/solver.md).
+  bool bounded_energy = true;
 };
 
 struct Scene {

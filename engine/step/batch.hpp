@@ -17,8 +17,10 @@ namespace tangere {
 enum class StepStatus : std::int8_t {
   converged = 0,
   split = 1,           ///< converged after the step was split
-  coarse = 2,          ///< converged, but a part of h/256 missed the accuracy that was asked for
-  passed = 3,          ///< converged, but a body came through a cuboid that it touches
+  coarse = 2,          ///< converged, but a part of h/256 missed the accuracy that was asked for,
+                       ///< or one of h/64 created energy
+  passed = 3,          ///< converged, but a body came through another that it touches
+  damped = 4,          ///< converged by BDF1 or in parts: the scheme would have created energy
   not_converged = -1,  ///< no root found down to h/64
   non_finite = -2,     ///< a control or state was NaN or infinite
   rotation = -3,       ///< a joint turned by π or more in one step

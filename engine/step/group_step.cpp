@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "engine/step/detection.hpp"
 #include "engine/step/remember.hpp"
@@ -22,6 +23,28 @@ constexpr int kDeepestSplit = 6;  // h / 2^6
 // Inside a split the search may be long: a tight limit loses runs that a patient search finishes.
 constexpr int kHalvings = 10, kSplitHalvings = 20, kSplitIterations = 40;
 constexpr int kPatience = 4, kSplitPatience = 40;
+
+/// Where a part begins in one lane, to go back to.
+struct LaneState {
+  std::vector<double> q, v;
+  ShearMemory memory;
+};
+
+template <int L>
+LaneState state_of(const BasicWorkspace<L>& w, const CompiledModel& m, int lane) {
+  LaneState s{std::vector<double>(std::size_t(m.nq)), std::vector<double>(std::size_t(m.nv)),
+              w.remembered.now[std::size_t(lane)]};
+  for (int i = 0; i < m.nq; ++i) s.q[std::size_t(i)] = w.q0[i][lane];
+  for (int i = 0; i < m.nv; ++i) s.v[std::size_t(i)] = w.v0[i][lane];
+  return s;
+}
+
+template <int L>
+void set_state(const LaneState& s, BasicWorkspace<L>& w, int lane) {
+  for (std::size_t i = 0; i < s.q.size(); ++i) w.q0[i][lane] = s.q[i];
+  for (std::size_t i = 0; i < s.v.size(); ++i) w.v0[i][lane] = s.v[i];
+  w.remembered.now[std::size_t(lane)] = s.memory;
+}
 
 }  // namespace
 
@@ -49,6 +72,7 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
   LaneBits resolved = lanes;
   finish(w, lanes, h, resolved, report);
   watch_faces(table, w, resolved, report);
+  watch_passing(table, w, resolved, report);
   advance_memory(model_, table, w, resolved);
   return resolved;
 }
@@ -138,17 +162,44 @@ void GroupStep::log_inner(const BasicWorkspace<L>& w, int lane, const Scheme& sc
 /// Takes two half steps from q0, v0, split again where needed.
 bool GroupStep::split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
                       NewtonReport& report, std::vector<TapedSolve>* solves) const {
-  if (depth > kDeepestSplit) return false;
-  const Scheme& scheme = settings_.integrator.scheme().of_parts();
-  for (int half = 0; half < 2; ++half) {
-    if (run(scheme, table, w, 1U, Row<1>::all(0.5 * h), true, report) != 0) {
-      commit(w, 1U);
-      note(w, 0, scheme, 0.5 * h, solves);
-    } else if (!split(table, w, 0.5 * h, depth + 1, report, solves)) {
-      return false;
+  return depth <= kDeepestSplit && take_part(table, w, 0.5 * h, depth, report, solves) &&
+         take_part(table, w, 0.5 * h, depth, report, solves);
+}
+
+/// Takes a part of a split step: as one solve if that is sound, else split again. A root that is
+/// not sound is better than none.
+bool GroupStep::take_part(const kernels::KernelTable& table, SingleWorkspace& w, double h,
+                          int depth, NewtonReport& report, std::vector<TapedSolve>* solves) const {
+  const Scheme* scheme = &settings_.integrator.scheme().of_parts();
+  const auto solve = [&] { return solve_and_watch(*scheme, table, w, 1U, h, true, report); };
+  const auto take = [&] {
+    commit(w, 1U);
+    note(w, 0, *scheme, h, solves);
+    return true;
+  };
+  Solved one = solve();
+  if (one.created != 0 && scheme->order > 1) {
+    const Scheme* const own = std::exchange(scheme, &Integrator::bdf1.scheme());
+    const Solved damped = solve();
+    if (damped.found != 0) {
+      one = damped;
+    } else {
+      scheme = own;
     }
   }
-  return true;
+  if (one.sound() != 0) return take();
+  if (one.found == 0) return split(table, w, h, depth + 1, report, solves);
+  const LaneState start = state_of(w, model_, 0);
+  const std::size_t noted = solves == nullptr ? 0 : solves->size();
+  const LaneBits passed = report.passed, created = report.created;
+  if (split(table, w, h, depth + 1, report, solves)) return true;
+  set_state(start, w, 0);
+  if (solves != nullptr) solves->erase(solves->begin() + std::ptrdiff_t(noted), solves->end());
+  report.passed = passed, report.created = created;
+  solve();
+  report.passed |= one.passed;
+  report.created |= one.created;
+  return take();
 }
 
 /// Splits a step of length h of one lane of a group. The other lanes wait.
@@ -185,6 +236,7 @@ bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>&
   report.iterations[lane] = one.iterations[0];
   report.residual[lane] = one.residual[0];
   report.passed |= one.passed << lane;
+  report.created |= one.created << lane;
   return done;
 }
 
@@ -210,29 +262,45 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
   const auto solves_of = [log](int l) {
     return log == nullptr ? nullptr : &log->special[std::size_t(l)];
   };
-  LaneBits resolved = 0;
-  const auto run_and_commit = [&](const Scheme& by, LaneBits which) {
-    const LaneBits done = run(by, table, w, which, Row<L>::all(h), false, report);
-    commit(w, done);
-    resolved |= done;
-    return done;
+  LaneBits resolved = 0, passed = 0, created = 0;
+  const auto solve_and_commit = [&](const Scheme& by, LaneBits which) {
+    const Solved s = solve_and_watch(by, table, w, which, h, false, report);
+    commit(w, s.sound());
+    resolved |= s.sound(), passed |= s.passed, created |= s.created;
+    return s.sound();
   };
   if ((lanes & ~starting) != 0) {
-    run_and_commit(scheme, lanes & ~starting);
+    const LaneBits done = solve_and_commit(scheme, lanes & ~starting);
     if (log != nullptr)  // before starts or splits of other lanes overwrite them
       for (int l = 0; l < L; ++l)
-        if (has(resolved, l)) log_inner(w, l, scheme, *log);
+        if (has(done, l)) log_inner(w, l, scheme, *log);
   }
-  if (starting != 0) {
-    const LaneBits done = run_and_commit(*scheme.start, starting);
+  const auto take_by = [&](const Scheme& by, LaneBits which) {
+    const LaneBits done = solve_and_commit(by, which);
     for (int l = 0; l < L; ++l)
-      if (has(done, l)) note(w, l, *scheme.start, h, solves_of(l));
-  }
+      if (has(done, l)) note(w, l, by, h, solves_of(l));
+  };
+  if (starting != 0) take_by(*scheme.start, starting);
+  if (scheme.order > 1 && created != 0) take_by(Integrator::bdf1.scheme(), created);
   for (int l = 0; l < L; ++l) {
     if (!has(lanes & ~resolved, l)) continue;
+    const bool has_root = has(passed | created, l);
     const StepStatus first = report.status[l];
+    const LaneState start = has_root ? state_of(w, model_, l) : LaneState{};
     if (split_lane(table, w, l, h, alone, report, solves_of(l))) {
       report.status[l] = StepStatus::split;
+    } else if (has_root) {  // better than none
+      set_state(start, w, l);
+      if (log != nullptr) solves_of(l)->clear();
+      const Scheme& by = has(starting, l) ? *scheme.start : scheme;
+      run(by, table, w, 1U << l, Row<L>::all(h), false, report);
+      commit(w, 1U << l);
+      if (has(starting, l)) {
+        note(w, l, by, h, solves_of(l));
+      } else if (log != nullptr) {
+        log_inner(w, l, by, *log);
+      }
+      (has(passed, l) ? report.passed : report.created) |= 1U << l;
     } else if (!failed(report.status[l])) {
       report.status[l] = first;
     }
@@ -248,9 +316,13 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
       if (!(dot(rate, rate) * h * h < M_PI * M_PI)) report.status[l] = StepStatus::rotation;
     }
   }
-  for (int l = 0; l < L; ++l)
-    if (has(lanes & report.passed, l) && !failed(report.status[l]))
-      report.status[l] = StepStatus::passed;
+  for (int l = 0; l < L; ++l) {
+    if (!has(lanes & (report.passed | created | report.created), l) || failed(report.status[l]))
+      continue;
+    report.status[l] = has(report.passed, l)    ? StepStatus::passed
+                       : has(report.created, l) ? StepStatus::coarse
+                                                : StepStatus::damped;
+  }
 }
 
 // step_parts.cpp uses these.

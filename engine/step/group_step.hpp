@@ -5,6 +5,7 @@
 #pragma once
 
 #include "engine/step/newton.hpp"
+#include "engine/step/passing.hpp"
 #include "engine/step/tape.hpp"
 
 namespace tangere {
@@ -17,6 +18,7 @@ struct StepSettings {
   double accuracy = 0;  ///< relative, of the parts of a step; 0: every step is one part
   /// Solves may end unchecked where they promise to meet the tolerance. False where it was named.
   bool spare = false;
+  bool bounded_energy = true;  ///< steps that create energy are taken by BDF1 or in parts
 };
 
 /// What a tape needs to know about a step besides its result.
@@ -30,8 +32,7 @@ struct SolveLog {
 /// States of a group enter and leave through the workspace's rows q0, v0, q_before, v_before.
 class GroupStep {
  public:
-  GroupStep(const CompiledModel& model, const StepSettings& settings)
-      : model_(model), settings_(settings) {}
+  GroupStep(const CompiledModel& model, const StepSettings& settings);
 
   /// Advances `lanes` by one step. `history`: lanes with a valid state one step before. Afterwards
   /// q0, v0 hold the new state of every lane whose status is not a failure. Rows of other lanes are
@@ -44,6 +45,13 @@ class GroupStep {
                SolveLog* log = nullptr) const;
 
  private:
+  /// Lanes that found a root. Those in which a body came through another, or that created energy,
+  /// should not be taken.
+  struct Solved {
+    LaneBits found = 0, passed = 0, created = 0;
+    [[nodiscard]] LaneBits sound() const { return found & ~(passed | created); }
+  };
+
   template <int L>
   void advance_plainly(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                        SingleWorkspace& alone, LaneBits lanes, LaneBits history,
@@ -62,6 +70,8 @@ class GroupStep {
                NewtonReport& report) const;
   bool split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
              NewtonReport& report, std::vector<TapedSolve>* solves) const;
+  bool take_part(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
+                 NewtonReport& report, std::vector<TapedSolve>* solves) const;
   template <int L>
   bool split_lane(const kernels::KernelTable& table, BasicWorkspace<L>& w, int lane, double h,
                   SingleWorkspace& alone, NewtonReport& report,
@@ -75,6 +85,20 @@ class GroupStep {
   void watch_faces(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                    NewtonReport& report) const;
   template <int L>
+  void watch_passing(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
+                     NewtonReport& report) const;
+  template <int L>
+  void find_poses(const kernels::KernelTable& table, BasicWorkspace<L>& w) const;
+  template <int L>
+  LaneBits jumping(const BasicWorkspace<L>& w, LaneBits lanes, double h) const;
+  template <int L>
+  LaneBits creating(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
+                    double h) const;
+  template <int L>
+  Solved solve_and_watch(const Scheme& scheme, const kernels::KernelTable& table,
+                         BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
+                         NewtonReport& report) const;
+  template <int L>
   void finish(BasicWorkspace<L>& w, LaneBits lanes, const kernels::Row<L>& h, LaneBits& resolved,
               NewtonReport& report) const;
   template <int L>
@@ -82,6 +106,8 @@ class GroupStep {
 
   const CompiledModel& model_;
   StepSettings settings_;
+  Passing passing_;
+  std::vector<double> component_mass_;  ///< [kg] without densities that vary
 };
 
 }  // namespace tangere

@@ -40,6 +40,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/step/component_norms.hpp"
 #include "engine/step/detection.hpp"
 
 namespace tangere {
@@ -121,6 +122,7 @@ struct Search {
   }
 
   void set_floor(LaneBits lanes) {
+    if (model.components() > 1) return set_floors(model, w, lanes);
     kernel().set_floor(model.view, w.stage, model.unknown_scale.data(), row_of(lanes));
   }
 
@@ -131,6 +133,7 @@ struct Search {
   }
 
   void scaled_residuals(LaneRow& out) const {
+    if (model.components() > 1) return worst_scaled_residuals(model, w, gravity, out);
     kernel().scaled_residual(model.view, w.stage, gravity, out);
   }
   void weighted_norms(const LaneRow* a, LaneRow& out) const {

@@ -34,7 +34,8 @@ struct NewtonReport {
   std::array<int, kernels::kGroup> iterations{};  ///< evaluations of the residual, accumulated
   /// Scaled residual at the last accepted point; the expected one where its evaluation was spared.
   std::array<double, kernels::kGroup> residual{};
-  LaneBits passed = 0;  ///< lanes in which a body came through a cuboid that it touches
+  LaneBits passed = 0;  ///< lanes in which a body came through another that it touches
+  LaneBits created = 0;  ///< lanes in which a part created energy, however short it was
 };
 
 /// Solves g(x) = 0 for the lanes in `lanes`, from the x in the stage. On return the stage's x and v

@@ -34,6 +34,7 @@ std::size_t lay_out(const CompiledModel& m, BasicWorkspace<L>& w, Row<L>* base) 
   rows(s.faces, 3 * static_cast<int>(m.pairs.size()));
   rows(w.faces_after, 3 * static_cast<int>(m.pairs.size()));
   rows(w.zero, m.nv);
+  rows(w.floors, m.components());
   for (LaneRow** p : {&w.q0, &w.q_before, &w.q1}) rows(*p, m.nq);
   for (LaneRow** p : {&w.v0, &w.v_before, &w.v1, &w.delta, &w.base, &w.test}) rows(*p, m.nv);
   for (LaneRow** p : {&w.x_inner, &w.v_inner}) rows(*p, w.inner_stages * m.nv);
@@ -93,8 +94,10 @@ std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   const std::size_t remembered =
       2 * L * std::size_t(m.taped_points) * sizeof(ShearEntry) + w.own_index.size() * sizeof(int) +
       (w.own_anchors.size() + w.remembered.ground_anchors.size()) * sizeof(double);
-  return remembered + w.memory.size() * sizeof(LaneRow) + w.own_points.size() * sizeof(double) +
-         w.scratch.size() + PivotedFactors::bytes(L, m.nv);
+  const std::size_t watched = 2 * w.poses_before.size() * sizeof(kernels::LinkPose<LaneRow>) +
+                              w.search.size() * sizeof(double);
+  return remembered + watched + w.memory.size() * sizeof(LaneRow) +
+         w.own_points.size() * sizeof(double) + w.scratch.size() + PivotedFactors::bytes(L, m.nv);
 }
 
 template <int L>
@@ -116,6 +119,11 @@ BasicWorkspace<L>::BasicWorkspace(const CompiledModel& m, int inner)
     own += std::size_t(L * 3 * list.stride);
   }
   make_memory(m);
+  poses_before.resize(m.links.size());
+  poses_after.resize(m.links.size());
+  int most = 0;
+  for (const auto& list : lists) most = std::max(most, list.stride);
+  search.resize(3 * std::size_t(most));
   std::size_t bytes = 0;  // the largest of all instruction sets, any of which may be chosen later
   for (const kernels::KernelTable* table : kernels::available_kernels())
     bytes = std::max(bytes, table->stage<L>().scratch_bytes(m.view));

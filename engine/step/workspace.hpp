@@ -59,7 +59,11 @@ struct BasicWorkspace {
   // The group's states: now, one step before, and the result of the present solve.
   LaneRow *q0, *v0, *q_before, *v_before, *q1, *v1;
   LaneRow* faces_after;  ///< (n_pairs, 3) as stage.faces, but where the solve ended
-  LaneRow* zero;         ///< (nv) zeros
+  /// (n_links) where a solve began and ended, of steps that are looked at more closely.
+  AlignedVector<kernels::LinkPose<LaneRow>> poses_before, poses_after;
+  AlignedVector<double> search;  ///< (3, largest stride of a list)
+  LaneRow* zero;                 ///< (nv) zeros
+  LaneRow* floors;               ///< (components) stage.floor of each, where there are several
   // Inner stages: x relative to q0, (nv) each, one after another.
   int inner_stages;
   LaneRow *x_inner, *v_inner;

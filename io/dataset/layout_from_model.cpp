@@ -77,7 +77,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.fields = run.fields ? *run.fields : whole_fields(model);
   for (const StepStatus status :
        {StepStatus::converged, StepStatus::split, StepStatus::coarse, StepStatus::passed,
-        StepStatus::not_converged, StepStatus::non_finite, StepStatus::rotation,
+        StepStatus::damped, StepStatus::not_converged, StepStatus::non_finite, StepStatus::rotation,
         StepStatus::singular})
     layout.statuses.push_back({static_cast<std::int8_t>(status), to_string(status)});
   describe_randomized(scene, layout);

@@ -164,7 +164,7 @@ void read_option(Scene& scene, const SceneNode& node) {
 }
 
 void read_solver(Scene& scene, const SceneNode& node) {
-  node.check_attributes({"tol", "max_iter", "accuracy"}, {}, {"max_ls"});
+  node.check_attributes({"tol", "max_iter", "accuracy", "energy"}, {}, {"max_ls"});
   if (node.has("tol")) scene.solver.tolerance = node.positive("tol");
   if (node.has("accuracy")) {
     scene.solver.accuracy = node.positive("accuracy");
@@ -172,6 +172,8 @@ void read_solver(Scene& scene, const SceneNode& node) {
       throw InputError(node.source().prefix() + "accuracy " + node.text("accuracy") +
                        "; expected a share below 1: 0.01 is one percent");
   }
+  if (node.has("energy"))
+    scene.solver.bounded_energy = node.choice("energy", {"bounded", "free"}, 0) == 0;
   scene.solver.max_iterations = node.integer("max_iter", 1, 100000, scene.solver.max_iterations);
 }
 

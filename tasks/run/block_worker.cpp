@@ -147,6 +147,7 @@ void BlockWorker::look_after(const Batch& batch, int block, int step, VectorCoun
     counts.split_steps += batch.status(e) == StepStatus::split ? 1 : 0;
     counts.coarse_steps += batch.status(e) == StepStatus::coarse ? 1 : 0;
     counts.passed_steps += batch.status(e) == StepStatus::passed ? 1 : 0;
+    counts.damped_steps += batch.status(e) == StepStatus::damped ? 1 : 0;
   }
   const std::vector<int>& moments = task_.spec().moments;
   const auto moment = std::lower_bound(moments.begin(), moments.end(), step + 1);

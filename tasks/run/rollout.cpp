@@ -209,6 +209,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
   summary.split_steps = tally.split_steps;
   summary.coarse_steps = tally.coarse_steps;
   summary.passed_steps = tally.passed_steps;
+  summary.damped_steps = tally.damped_steps;
   summary.failures = std::move(tally.failures);
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;

@@ -30,6 +30,7 @@ struct StepTally {
   std::int64_t split_steps = 0;
   std::int64_t coarse_steps = 0;  ///< with parts that missed the accuracy that was asked for
   std::int64_t passed_steps = 0;  ///< in which a body came through another
+  std::int64_t damped_steps = 0;  ///< that would have created energy
   std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
 
   /// Counts `environments` environments from number `first` on. Construct it before the first step.
@@ -57,6 +58,7 @@ struct StepTally {
       split_steps += status == StepStatus::split ? 1 : 0;
       coarse_steps += status == StepStatus::coarse ? 1 : 0;
       passed_steps += status == StepStatus::passed ? 1 : 0;
+      damped_steps += status == StepStatus::damped ? 1 : 0;
       if (!failed(status)) continue;
       failures.push_back({e, step, status});
       live_[lane(e)] = false;

@@ -147,6 +147,7 @@ VectorCounts VectorTask::counts() const {
     sum.split_steps += tally.split_steps;
     sum.coarse_steps += tally.coarse_steps;
     sum.passed_steps += tally.passed_steps;
+    sum.damped_steps += tally.damped_steps;
   }
   return sum;
 }

@@ -30,7 +30,8 @@ struct Setting {
 /// What one block came to.
 struct BlockOutcome {
   double worst = -HUGE_VAL;  ///< of the environments that did not fail; NaN where one has no number
-  std::int64_t steps = 0, evaluations = 0, split_steps = 0, coarse_steps = 0, passed_steps = 0;
+  std::int64_t steps = 0, evaluations = 0, split_steps = 0, coarse_steps = 0, passed_steps = 0,
+               damped_steps = 0;
   int most_evaluations = 0;
   bool silent = false;  ///< an environment misses the bound and no status of it says anything
   std::vector<FailedEnvironment> failures{};
@@ -67,7 +68,7 @@ struct Play {
     };
     record();
     std::vector<bool> said(
-        as_size(lanes));  // whose steps missed the accuracy, or let a body through
+        as_size(lanes));  // whose steps missed the accuracy, let a body through or were damped
     const std::size_t nu = as_size(model().nu());
     for (std::int64_t k = 0; k < steps; ++k) {
       if (stopped || (go_on && !go_on())) {
@@ -81,7 +82,8 @@ struct Play {
         if (!tally.live(e)) continue;
         out.most_evaluations = std::max(out.most_evaluations, batch.iterations(e));
         const StepStatus status = batch.status(e);
-        if (status == StepStatus::coarse || status == StepStatus::passed)
+        if (status == StepStatus::coarse || status == StepStatus::passed ||
+            status == StepStatus::damped)
           said[as_size(e - first)] = true;
       }
       tally.count(batch, k);
@@ -94,6 +96,7 @@ struct Play {
     out.split_steps = tally.split_steps;
     out.coarse_steps = tally.coarse_steps;
     out.passed_steps = tally.passed_steps;
+    out.damped_steps = tally.damped_steps;
     out.failures = std::move(tally.failures);
   }
 
@@ -142,6 +145,7 @@ std::optional<BlockOutcome> play(const Scene& scene, const StressCase& of, const
     sum.split_steps += b.split_steps;
     sum.coarse_steps += b.coarse_steps;
     sum.passed_steps += b.passed_steps;
+    sum.damped_steps += b.damped_steps;
     sum.most_evaluations = std::max(sum.most_evaluations, b.most_evaluations);
     sum.failures.insert(sum.failures.end(), b.failures.begin(), b.failures.end());
   }
@@ -160,6 +164,7 @@ void judge(const BlockOutcome& out, StressRow& row) {
   row.split_steps = out.split_steps;
   row.coarse_steps = out.coarse_steps;
   row.passed_steps = out.passed_steps;
+  row.damped_steps = out.damped_steps;
   row.failed = static_cast<int>(out.failures.size());
   const bool nobody_left = row.of->measure && row.failed == row.environments;
   const bool met = nobody_left || row.value <= row.of->bound;  // false for NaN
@@ -178,6 +183,8 @@ void judge(const BlockOutcome& out, StressRow& row) {
     row.reason = to_string(StepStatus::passed);
   else if (row.coarse_steps > 0)
     row.reason = to_string(StepStatus::coarse);
+  else if (row.damped_steps > 0)
+    row.reason = to_string(StepStatus::damped);
 }
 
 /// Fills in what a setting came to. False when it was stopped.
@@ -238,8 +245,11 @@ bool run_case(const StressCase& of, const StressOptions& options, const StressSc
     if (listener.row) listener.row(rows.back());
   };
   Scene scene;
+  std::vector<std::string> warnings;
   try {
-    scene = scenes(of.scene);
+    StressScene read = scenes(of.scene);
+    scene = std::move(read.scene);
+    warnings = std::move(read.warnings);
     const Model compiled(varied(scene, of.variant));  // which may refuse it, too
   } catch (const InputError& error) {
     add(refused(of, error.what()));
@@ -253,6 +263,11 @@ bool run_case(const StressCase& of, const StressOptions& options, const StressSc
     row.accuracy = setting.accuracy;
     row.environments = of.environments;
     if (!measure(scene, options.threads, listener.go_on, row)) return false;
+    if (row.verdict == StressVerdict::fails && !warnings.empty()) {
+      row.verdict = StressVerdict::flagged;
+      row.known = false;
+      row.reason = "warning: " + warnings.front();
+    }
     add(std::move(row));
   }
   return true;

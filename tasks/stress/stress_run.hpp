@@ -15,7 +15,7 @@ namespace tangere {
 /// What a setting of a case came to.
 enum class StressVerdict {
   holds,    ///< the criterion is met
-  flagged,  ///< not met, and the engine said so: by a status, or by refusing the scene
+  flagged,  ///< not met, and it was said: by a status, by a warning, or by refusing the scene
   fails,    ///< not met, and nothing was said
 };
 const char* to_string(StressVerdict value);
@@ -33,6 +33,7 @@ struct StressRow {
   std::int64_t split_steps = 0;
   std::int64_t coarse_steps = 0;  ///< with parts that missed the accuracy
   std::int64_t passed_steps = 0;  ///< in which a body came through another
+  std::int64_t damped_steps = 0;  ///< that would have created energy
   int environments = 0, failed = 0;
   StressVerdict verdict = StressVerdict::fails;
   bool known = false;  ///< fails, and is listed as failing
@@ -54,8 +55,13 @@ struct StressReport {
   bool stopped = false;
 };
 
+/// A scene, and what was warned of when it was read.
+struct StressScene {
+  Scene scene;
+  std::vector<std::string> warnings{};
+};
 /// Returns a scene by its name below scenes/. Throws InputError where it cannot be read.
-using StressScenes = std::function<Scene(const std::string& file)>;
+using StressScenes = std::function<StressScene(const std::string& file)>;
 
 struct StressListener {
   /// Called before every step of every block, from any thread. False stops the run.

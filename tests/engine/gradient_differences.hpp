@@ -58,7 +58,7 @@ inline int check_gradient(const Scene& scene, Integrator scheme, unsigned seed, 
   return compared;
 }
 
-/// Whether a step of the run is split. The run jumps where that decision changes, and a difference
+/// Whether a step of the run is split or damped. The run jumps where that decision changes, and a difference
 /// across the jump is no derivative.
 inline bool splits(const Scene& scene, Integrator scheme, unsigned seed, int steps) {
   const Model model(scene);
@@ -69,7 +69,7 @@ inline bool splits(const Scene& scene, Integrator scheme, unsigned seed, int ste
   bool split = false;
   for (const std::vector<double>& u : in.u) {
     stepper.step(batch, u);
-    split = split || batch.status(0) == StepStatus::split;
+    split = split || batch.status(0) == StepStatus::split || batch.status(0) == StepStatus::damped;
   }
   return split;
 }

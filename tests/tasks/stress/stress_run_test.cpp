@@ -29,7 +29,7 @@ const char* const kFalling = R"(<tangere model="falling">
   <randomize><ground_contact body="b" field="kn" uniform="900 1100"/></randomize>
 </tangere>)";
 
-Scene falling(const std::string& file) { return parse_scene(kFalling, file).scene; }
+StressScene falling(const std::string& file) { return {parse_scene(kFalling, file).scene}; }
 
 StressCase a_case(Criterion measure, double bound) {
   return {.name = "falling",
@@ -81,7 +81,7 @@ TEST(StressRun, FlagsEnvironmentsThatFail) {
   of.steps = {86400};
   of.seconds = 2 * 86400;
   const StressScenes shipped = [](const std::string& file) {
-    return read_scene(TANGERE_SOURCE_DIR "/scenes/" + file).scene;
+    return StressScene{read_scene(TANGERE_SOURCE_DIR "/scenes/" + file).scene};
   };
   const StressRow row = only_row(of, shipped);
   EXPECT_EQ(row.verdict, StressVerdict::flagged);
@@ -95,9 +95,18 @@ TEST(StressRun, FlagsEnvironmentsThatFail) {
 TEST(StressRun, FlagsASceneThatIsRefused) {
   const StressCase of = a_case(largest_sink, 1);
   const StressRow row = only_row(
-      of, [](const std::string& file) -> Scene { throw InputError(file + ":7: too deep"); });
+      of, [](const std::string& file) -> StressScene { throw InputError(file + ":7: too deep"); });
   EXPECT_EQ(row.verdict, StressVerdict::flagged);
   EXPECT_EQ(row.reason, "refused: falling.xml:7: too deep");
+}
+
+TEST(StressRun, FlagsWhatWasWarnedOf) {
+  const StressCase of = a_case(largest_sink, 1e-3);
+  const StressRow row = only_row(of, [](const std::string& file) {
+    return StressScene{falling(file).scene, {"points are far apart"}};
+  });
+  EXPECT_EQ(row.verdict, StressVerdict::flagged);
+  EXPECT_EQ(row.reason, "warning: points are far apart");
 }
 
 TEST(StressRun, ComparesPassesWithTheOrdinaryScene) {
@@ -135,7 +144,7 @@ TEST(StressRun, RefusesANameThatIsNotThere) {
 }
 
 TEST(StressRun, VariesStiffnessAndSpeedWithWhatIsDrawn) {
-  const Scene scene = varied(falling("falling.xml"), {.kn = 10, .kt = 3, .speed = 2});
+  const Scene scene = varied(falling("falling.xml").scene, {.kn = 10, .kt = 3, .speed = 2});
   EXPECT_EQ(scene.ground_contacts.at(0).coefficients.kn, 1e4);
   EXPECT_EQ(scene.ground_contacts.at(0).coefficients.kt, 3);
   EXPECT_EQ(scene.initial.at(0).v.at(2), -2);

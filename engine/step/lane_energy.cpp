@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+// One lane in doubles: steps that are looked at so closely are few.
+#include "engine/step/lane_energy.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/step/rotation_log.hpp"
+#include "engine/step/state_difference.hpp"
+#include "kernels/step/faces.hpp"
+
+namespace tangere {
+
+using kernels::Frame;
+using kernels::JointKind;
+using kernels::kBlock;
+using kernels::LinkPose;
+using kernels::Quat;
+using kernels::Row;
+using kernels::Vec3;
+
+namespace {
+
+/// One lane of a workspace at the poses of a state.
+template <int L>
+struct LaneAt {
+  const CompiledModel& model;
+  const BasicWorkspace<L>& w;
+  const AlignedVector<LinkPose<Row<L>>>& poses;
+  int lane;
+  LaneEnergy sum{};
+
+  [[nodiscard]] const double* block() const {
+    if (w.stage.block == nullptr) return nullptr;
+    return w.stage.block + w.stage.group * kernels::kGroup + lane;
+  }
+  [[nodiscard]] double number(const kernels::Parameter& p) const {
+    return p.row < 0 ? p.value : block()[p.row * kBlock];
+  }
+  [[nodiscard]] Vec3<double> size(const Vec3<double>& value, int row) const {
+    return kernels::load_vector<double>(value, row, block(), 0);
+  }
+  [[nodiscard]] Frame<double> world(int link) const {
+    if (link < 0) return {kernels::diagonal(1.0), {0, 0, 0}};
+    return frame_in_lane<L>(poses[std::size_t(link)], lane);
+  }
+
+  void add_motion() {
+    for (std::size_t i = 0; i < model.links.size(); ++i) {
+      const kernels::Link& link = model.links[i];
+      if (!link.massive) continue;
+      const auto& [mass, c, J] = kernels::load_inertia<double>(link, block(), 0);
+      const auto& V = poses[i].V;
+      const Vec3<double> turn = {V.a.x[lane], V.a.y[lane], V.a.z[lane]},
+                         slide = {V.l.x[lane], V.l.y[lane], V.l.z[lane]};
+      sum.moving +=
+          0.5 * (mass * dot(slide, slide) + 2 * dot(turn, cross(c, slide)) + dot(turn, J * turn));
+      const Frame<double> at = world(static_cast<int>(i));
+      sum.total -= dot(model.view.gravity, mass * at.p + at.R * c);
+    }
+  }
+
+  /// Adds what springs, limits and a motor hold at a coordinate. `error`: distance from the target.
+  void add_held(const kernels::Link& link, int k, double place, double stretch, double error) {
+    const kernels::DofEffects& e = model.dof_effects[std::size_t(link.v + k)];
+    if ((link.effects & kernels::kSprung) != 0)
+      sum.moving += 0.5 * number(e.stiffness) * stretch * stretch;
+    if ((link.effects & kernels::kLimited) != 0) {
+      const double beyond = std::max({e.low - place, place - e.high, 0.0});
+      sum.moving += 0.5 * number(e.limit_stiffness) * beyond * beyond;
+    }
+    if ((link.effects & kernels::kDriven) == 0) return;
+    const double P = number(e.P), force = std::clamp(P * error, e.force_low, e.force_high);
+    if (P > 0) sum.moving += force * (error - force / (2 * P));
+  }
+
+  void add_joints(const Row<L>* q, const Row<L>* v) {
+    for (const kernels::Link& link : model.links) {
+      if ((link.effects & kernels::kBeyondDamping) == 0) continue;
+      for (int k = 0; k < kernels::dofs(link.kind); ++k) {
+        const double rate = v[link.v + k][lane];
+        if ((link.effects & kernels::kArmoured) != 0)
+          sum.moving +=
+              0.5 * number(model.dof_effects[std::size_t(link.v + k)].armature) * rate * rate;
+      }
+      const kernels::DofEffects* e = &model.dof_effects[std::size_t(link.v)];
+      const Row<L>* target = w.stage.target + link.v;
+      if (link.kind != JointKind::spherical) {
+        for (int k = 0; k < kernels::dofs(link.kind); ++k) {
+          const double place = q[link.q + k][lane];
+          add_held(link, k, place, place - e[k].rest, target[k][lane] - place);
+        }
+        continue;
+      }
+      const Quat<double> at = quat_at(q + link.q, lane);
+      const auto from = [&](const Vec3<double>& x) {
+        return rotation_log(conjugate(kernels::quaternion_exp(x)) * at);
+      };
+      const Vec3<double> place = rotation_log(at),
+                         stretch = from({e[0].rest, e[1].rest, e[2].rest}),
+                         error = from({target[0][lane], target[1][lane], target[2][lane]});
+      add_held(link, 0, place.x, stretch.x, -error.x);
+      add_held(link, 1, place.y, stretch.y, -error.y);
+      add_held(link, 2, place.z, stretch.z, -error.z);
+    }
+  }
+
+  void add_pair(const kernels::KernelTable& table, std::size_t k, const Frame<double>& link2_in_1,
+                double* found) {
+    const kernels::PairContact& pair = model.pairs[k];
+    const Frame<double> at = compose(link2_in_1, pair.frame2);
+    const Vec3<double> half = size(pair.size, pair.size_row);
+    Vec3<double> faces = {0, 0, 0};
+    if (pair.faced) {
+      const Row<L>* side = w.stage.faces + 3 * k;
+      faces = {side[0][lane], side[1][lane], side[2][lane]};
+    }
+    const bool far =
+        kernels::with_touched<double>(pair, half, faces, [&]<class Shape>(const Shape& shape) {
+          return !nearer_than(shape, transposed_times(at.R, pair.middle - at.p), pair.extent);
+        });
+    if (far) return;
+    double pose[12];
+    for (int i = 0; i < 9; ++i) pose[i] = at.R.m[i / 3][i % 3];
+    pose[9] = at.p.x, pose[10] = at.p.y, pose[11] = at.p.z;
+    const auto& list = w.lists[k];
+    double *x = found, *y = x + list.stride, *z = y + list.stride;
+    const int count =
+        table.find_candidates({&pair, half, pose, list.margin, x, list.stride, faces, nullptr});
+    double square = 0;
+    kernels::with_touched<double>(pair, half, faces, [&]<class Shape>(const Shape& shape) {
+      for (int i = 0; i < count; ++i) {
+        const Vec3<double> arm = Vec3<double>{x[i], y[i], z[i]} - at.p;
+        const double d = std::min(kernels::distance_at(shape, transposed_times(at.R, arm)).d, 0.0);
+        square += d * d;
+      }
+    });
+    sum.moving += 0.5 * number(pair.parameters.kn) * square;
+  }
+
+  void add_contacts(const kernels::KernelTable& table, double* found) {
+    for (const kernels::LinkPair& links : model.link_pairs) {
+      const Frame<double> link2_in_1 = relative(world(links.link1), world(links.link2));
+      for (int i = 0; i < links.count; ++i)
+        add_pair(table, std::size_t(model.pair_order[std::size_t(links.first + i)]), link2_in_1,
+                 found);
+    }
+    for (const kernels::GroundContact& ground : model.grounds) {
+      const Frame<double> at = world(ground.link);
+      const double radius = kernels::ground_radius<double>(ground, block(), 0);
+      double square = 0;
+      for (int k = 0; k < ground.n_points; ++k) {
+        const double* p = ground.points + 3 * k;
+        const Vec3<double> place = at.R * Vec3<double>{p[0], p[1], p[2]} + at.p;
+        const double d =
+            std::min(dot(model.view.ground_normal, place - model.view.ground_point) - radius, 0.0);
+        square += d * d;
+      }
+      sum.moving += 0.5 * number(ground.parameters.kn) * square;
+    }
+  }
+};
+
+}  // namespace
+
+template <int L>
+LaneEnergy energy_of_bodies(const CompiledModel& model, const BasicWorkspace<L>& w,
+                            const AlignedVector<LinkPose<Row<L>>>& poses, const Row<L>* q,
+                            const Row<L>* v, int lane) {
+  LaneAt<L> at{model, w, poses, lane};
+  at.add_motion();
+  at.add_joints(q, v);
+  at.sum.total += at.sum.moving;
+  return at.sum;
+}
+
+template <int L>
+double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable& table,
+                          BasicWorkspace<L>& w, const AlignedVector<LinkPose<Row<L>>>& poses,
+                          int lane) {
+  LaneAt<L> at{model, w, poses, lane};
+  at.add_contacts(table, w.search.data());
+  return at.sum.moving;
+}
+
+#define TANGERE_FOR_LANES(L)                                                                     \
+  template LaneEnergy energy_of_bodies(const CompiledModel&, const BasicWorkspace<L>&,           \
+                                       const AlignedVector<LinkPose<Row<L>>>&, const Row<L>*,    \
+                                       const Row<L>*, int);                                      \
+  template double energy_of_contacts(const CompiledModel&, const kernels::KernelTable&,          \
+                                     BasicWorkspace<L>&, const AlignedVector<LinkPose<Row<L>>>&, \
+                                     int);
+TANGERE_FOR_LANES(kernels::kGroup)
+TANGERE_FOR_LANES(1)
+#undef TANGERE_FOR_LANES
+
+}  // namespace tangere

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// The energy of one environment, to find steps that create some.
+//
+//   E = Σ (m v² + 2 ω·(c × v) + ω·Jω)/2 + I_a v²/2 - Σ gravity·(m p + R c)
+//       + Σ k (q - rest)²/2 + Σ k_l (q beyond a limit)²/2 + Σ f (e - f/2P) + Σ k_n d²/2
+// with c the moment and J the inertia of a link about its origin, e the distance of a position
+// motor from its target, and f = clip(P e, range). Damping and friction only take energy away, and
+// gravity, springs, limits, motors whose target stays and contacts whose faces stay give back what
+// they hold. So E can only rise by the work of forces that are known at the start of the step.
+#pragma once
+
+#include "engine/step/workspace.hpp"
+
+namespace tangere {
+
+struct LaneEnergy {
+  double total = 0;   ///< [J]
+  double moving = 0;  ///< the part of it that cannot be negative: all but height [J]
+};
+
+/// Computes E without contacts of one lane at (q, v). `poses`: those of its links there. Targets
+/// and parameters are those in the workspace.
+template <int L>
+LaneEnergy energy_of_bodies(const CompiledModel& model, const BasicWorkspace<L>& w,
+                            const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses,
+                            const kernels::Row<L>* q, const kernels::Row<L>* v, int lane);
+
+/// Computes what the contacts of one lane hold [J], by the faces in the workspace. Overwrites its
+/// `search`.
+template <int L>
+double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable& table,
+                          BasicWorkspace<L>& w,
+                          const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane);
+
+/// Frame and body twist of a link in one lane.
+template <int L>
+kernels::Frame<double> frame_in_lane(const kernels::LinkPose<kernels::Row<L>>& pose, int lane) {
+  kernels::Frame<double> f;
+  for (int i = 0; i < 9; ++i) f.R.m[i / 3][i % 3] = pose.world.R.m[i / 3][i % 3][lane];
+  f.p = {pose.world.p.x[lane], pose.world.p.y[lane], pose.world.p.z[lane]};
+  return f;
+}
+
+}  // namespace tangere

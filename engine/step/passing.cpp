@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// A wall is a body of a pair. The other body has come through it when its middle changes sides of
+// the plane that halves the wall where it is thinnest, well within the wall's edges. Contacts at
+// rest are far less deep. Only steps in which links move against each other by more than half the
+// wall's thickness are looked at.
+#include "engine/step/passing.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/step/lane_energy.hpp"
+
+namespace tangere {
+
+using kernels::Frame;
+using kernels::LinkPose;
+using kernels::Row;
+using kernels::Vec3;
+
+namespace {
+
+/// Of the wall's half edges: what crosses its plane farther out may go past it.
+constexpr double kWithin = 0.7;
+
+double component(const Vec3<double>& a, int k) { return k == 0 ? a.x : k == 1 ? a.y : a.z; }
+
+}  // namespace
+
+void Passing::add(int link, const Frame<double>& at, PrimitiveShape shape, const Vec3<double>& size,
+                  int other, const Vec3<double>& middle) {
+  CompiledBody body;
+  body.shape = shape;
+  body.size = size;
+  const kernels::Hull hull = hull_of(body);
+  const Vec3<double> half = hull.straight + hull.round;
+  if (!(half.x > 0 && half.y > 0 && half.z > 0)) return;  // a plane has one side
+  int axis = 0;
+  for (const int k : {1, 2})
+    if (component(half, k) < component(half, axis)) axis = k;
+  walls_.push_back({link, other, at, half, axis, middle});
+  const double thin = component(half, axis);
+  const auto same = [&](const Gate& g) {
+    return std::minmax(g.link, g.other) == std::minmax(link, other);
+  };
+  const auto gate = std::find_if(gates_.begin(), gates_.end(), same);
+  if (gate == gates_.end()) {
+    gates_.push_back({link, other, thin});
+  } else {
+    gate->half = std::min(gate->half, thin);
+  }
+}
+
+Passing::Passing(const CompiledModel& m) : model_(m), arm_(m.links.size(), 0.0) {
+  for (const kernels::PairContact& p : m.pairs) {
+    add(p.link2, p.frame2, p.shape, p.size, p.link1, p.middle);
+    if (p.body1 < 0) continue;
+    const kernels::Solid& solid = m.solids[std::size_t(p.body1)];
+    // Bodies with points of their own need not be convex.
+    if (solid.stretches) add(p.link1, solid.frame, solid.shape, solid.size, p.link2, p.frame2.p);
+  }
+  for (const Wall& wall : walls_)
+    for (const auto& [link, place] : {std::pair{wall.link, wall.at.p}, {wall.other, wall.middle}}) {
+      double arm = std::sqrt(dot(place, place));
+      for (int i = link; i >= 0; i = m.links[std::size_t(i)].parent) {
+        arm_[std::size_t(i)] = std::max(arm_[std::size_t(i)], arm);
+        const Vec3<double>& p = m.links[std::size_t(i)].frame.p;
+        arm += std::sqrt(dot(p, p));
+      }
+    }
+}
+
+template <int L>
+LaneBits Passing::far_movers(const Row<L>* x, Row<L>* way) const {
+  if (gates_.empty()) return kNoLane;
+  for (std::size_t i = 0; i < model_.links.size(); ++i) {  // links are no more than dofs
+    const kernels::Link& link = model_.links[i];
+    const double arm = kernels::slides(link.kind) ? 1 : arm_[i];
+    for (int l = 0; l < L; ++l) {
+      double sum = link.parent < 0 ? 0 : way[link.parent][l];
+      for (int k = 0; k < kernels::dofs(link.kind); ++k) sum += std::abs(x[link.v + k][l]) * arm;
+      way[i][l] = sum;
+    }
+  }
+  LaneBits far = 0;
+  for (const Gate& gate : gates_)
+    for (int l = 0; l < L; ++l) {
+      const double sum =
+          (gate.link < 0 ? 0 : way[gate.link][l]) + (gate.other < 0 ? 0 : way[gate.other][l]);
+      if (sum > gate.half) far |= 1U << l;
+    }
+  return far;
+}
+
+template <int L>
+bool Passing::passed(const AlignedVector<LinkPose<Row<L>>>& before,
+                     const AlignedVector<LinkPose<Row<L>>>& after, int lane) const {
+  const auto place = [&](const Wall& wall, const AlignedVector<LinkPose<Row<L>>>& poses) {
+    const auto world = [&](int link, const Frame<double>& x) {
+      return link < 0 ? x : compose(frame_in_lane<L>(poses[std::size_t(link)], lane), x);
+    };
+    const Frame<double> middle = {kernels::diagonal(1.0), wall.middle};
+    return relative(world(wall.link, wall.at), world(wall.other, middle)).p;
+  };
+  return std::any_of(walls_.begin(), walls_.end(), [&](const Wall& wall) {
+    const Vec3<double> from = place(wall, before), to = place(wall, after);
+    const double a = component(from, wall.axis), b = component(to, wall.axis);
+    if (!(a * b < 0)) return false;
+    const double share = a / (a - b);
+    for (int k = 0; k < 3; ++k) {
+      const double at = component(from, k) + share * (component(to, k) - component(from, k));
+      if (k != wall.axis && !(std::abs(at) < kWithin * component(wall.half, k))) return false;
+    }
+    return true;
+  });
+}
+
+#define TANGERE_FOR_LANES(L)                                               \
+  template LaneBits Passing::far_movers<L>(const Row<L>*, Row<L>*) const;  \
+  template bool Passing::passed<L>(const AlignedVector<LinkPose<Row<L>>>&, \
+                                   const AlignedVector<LinkPose<Row<L>>>&, int) const;
+TANGERE_FOR_LANES(kernels::kGroup)
+TANGERE_FOR_LANES(1)
+#undef TANGERE_FOR_LANES
+
+}  // namespace tangere

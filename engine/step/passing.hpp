@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finds bodies that came through each other within a step, which a look at its end alone misses.
+#pragma once
+
+#include <vector>
+
+#include "engine/step/workspace.hpp"
+
+namespace tangere {
+
+/// The pairs of a model, and how thin their bodies are.
+class Passing {
+ public:
+  explicit Passing(const CompiledModel& model);
+
+  /// Returns the lanes in which some link moved so far against another that it could have come
+  /// through a body of a pair. `x`: displacements of the step, (nv). `way`: scratch, (nv).
+  template <int L>
+  [[nodiscard]] LaneBits far_movers(const kernels::Row<L>* x, kernels::Row<L>* way) const;
+
+  /// Whether in one lane the middle of a body came through the middle plane of another that it
+  /// touches, between these poses of the links.
+  template <int L>
+  [[nodiscard]] bool passed(const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& before,
+                            const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& after,
+                            int lane) const;
+
+ private:
+  /// A convex body of a pair, and the middle of the other one.
+  struct Wall {
+    int link, other;            ///< -1: the world
+    kernels::Frame<double> at;  ///< the body in its link
+    kernels::Vec3<double> half;
+    int axis;                      ///< along which it is thinnest: 0, 1, 2
+    kernels::Vec3<double> middle;  ///< of the other body, in its link
+  };
+  void add(int link, const kernels::Frame<double>& at, PrimitiveShape shape,
+           const kernels::Vec3<double>& size, int other, const kernels::Vec3<double>& middle);
+
+  /// Two links, and half of what is thinnest between them [m].
+  struct Gate {
+    int link, other;
+    double half;
+  };
+
+  const CompiledModel& model_;
+  std::vector<Wall> walls_;
+  std::vector<Gate> gates_;
+  std::vector<double> arm_;  ///< (links) from a link's origin to any middle that it moves [m]
+};
+
+}  // namespace tangere

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+// Looks at solved steps that a scheme does not promise to be right: bodies that came through each
+// other, and energy from nowhere.
+//
+// A scheme of order two or three takes the forces of a step for smooth. Across a touch, a release or
+// the limit of a joint they are not, and the bodies can leave with more than they came with. The
+// energy of a step (lane_energy.hpp) is compared with that of its start where some component's
+// velocities changed by a fair share:
+//   ‖D^½ (v₁ - v₀)‖ > kJump max(‖D^½ v₀‖, ‖D^½ v₁‖)   and   > h |gravity| √(3 mass)
+// which costs next to nothing and is false in smooth motion once the step is short enough. So
+// orders are kept.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine/step/group_step.hpp"
+#include "engine/step/lane_energy.hpp"
+
+namespace tangere {
+
+using kernels::Row;
+
+namespace {
+
+constexpr double kJump = 0.05;
+/// The share of the moving energy that a step may create.
+constexpr double kMayCreate = 1e-3;
+
+}  // namespace
+
+GroupStep::GroupStep(const CompiledModel& model, const StepSettings& settings)
+    : model_(model), settings_(settings), passing_(model) {
+  std::vector<double> of_dof(std::size_t(model.nv));  // a link's mass counts at its first dof
+  for (const kernels::Link& link : model.links) of_dof[std::size_t(link.v)] = link.mass;
+  for (int c = 0; c < model.components(); ++c) {
+    double sum = 0;
+    for (int k = model.component_begin[std::size_t(c)];
+         k < model.component_begin[std::size_t(c) + 1]; ++k)
+      sum += of_dof[std::size_t(model.component_dofs[std::size_t(k)])];
+    component_mass_.push_back(sum);
+  }
+}
+
+/// Computes the poses of links where the present solve began and ended.
+template <int L>
+void GroupStep::find_poses(const kernels::KernelTable& table, BasicWorkspace<L>& w) const {
+  const auto at = [&](const Row<L>* q, const Row<L>* v, auto& poses) {
+    table.stage<L>().poses_at(model_.view, w.stage, q, v, w.zero, poses.data());
+  };
+  at(w.q0, w.v0, w.poses_before);
+  at(w.q1, w.v1, w.poses_after);
+}
+
+/// Notes lanes in which a body came through another that it touches.
+template <int L>
+void GroupStep::watch_passing(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                              LaneBits lanes, NewtonReport& report) const {
+  const LaneBits far = lanes & passing_.far_movers<L>(w.stage.x, w.test);
+  if (far == 0) return;
+  find_poses(table, w);
+  for (int l = 0; l < L; ++l)
+    if (has(far, l) && passing_.passed<L>(w.poses_before, w.poses_after, l))
+      report.passed |= 1U << l;
+}
+
+/// Returns the lanes whose velocities jumped.
+template <int L>
+LaneBits GroupStep::jumping(const BasicWorkspace<L>& w, LaneBits lanes, double h) const {
+  const double fall = dot(model_.view.gravity, model_.view.gravity) * h * h;
+  LaneBits found = 0;
+  for (int c = 0; c < model_.components(); ++c) {
+    Row<L> jump{}, before{}, after{};
+    const std::size_t begin = std::size_t(model_.component_begin[std::size_t(c)]),
+                      end = std::size_t(model_.component_begin[std::size_t(c) + 1]);
+    for (std::size_t k = begin; k < end; ++k) {
+      const int i = model_.component_dofs[k];
+      for (int l = 0; l < L; ++l) {
+        const double D = w.stage.weight[i][l] * w.stage.weight[i][l];
+        const double v0 = w.v0[i][l], v1 = w.v1[i][l];
+        jump[l] += D * (v1 - v0) * (v1 - v0);
+        before[l] += D * v0 * v0;
+        after[l] += D * v1 * v1;
+      }
+    }
+    const double by_gravity = 3 * fall * component_mass_[std::size_t(c)];
+    for (int l = 0; l < L; ++l)
+      if (jump[l] > kJump * kJump * std::max(before[l], after[l]) && jump[l] > by_gravity)
+        found |= 1U << l;
+  }
+  return found & lanes;
+}
+
+/// Returns the lanes whose solve, which ended in q1, v1, created energy.
+template <int L>
+LaneBits GroupStep::creating(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                             LaneBits lanes, double h) const {
+  // What a spring of friction holds is not counted.
+  if (!settings_.bounded_energy || !model_.memories.empty()) return kNoLane;
+  const LaneBits looked_at = jumping(w, lanes, h);
+  if (looked_at == 0) return kNoLane;
+  find_poses(table, w);
+  LaneBits found = 0;
+  for (int l = 0; l < L; ++l) {
+    if (!has(looked_at, l)) continue;
+    const LaneEnergy before = energy_of_bodies(model_, w, w.poses_before, w.q0, w.v0, l),
+                     after = energy_of_bodies(model_, w, w.poses_after, w.q1, w.v1, l);
+    double gain = after.total - before.total, most = 0;
+    for (int i = 0; i < model_.nv; ++i) {
+      gain -= w.stage.tau[i][l] * w.stage.x[i][l];
+      most += w.stage.force_scale[i][l] * std::abs(w.stage.x[i][l]);
+    }
+    // What contacts hold takes as long to find as they take in a solve. It has not risen by more
+    // than the force at the end times the way.
+    if (!(gain + most > kMayCreate * std::max(before.moving, after.moving))) continue;
+    const double held = energy_of_contacts(model_, table, w, w.poses_before, l),
+                 holds = energy_of_contacts(model_, table, w, w.poses_after, l);
+    if (gain + holds - held > kMayCreate * std::max(before.moving + held, after.moving + holds))
+      found |= 1U << l;
+  }
+  return found;
+}
+
+/// Solves a step of length h, and looks at what it came to.
+template <int L>
+GroupStep::Solved GroupStep::solve_and_watch(const Scheme& scheme,
+                                             const kernels::KernelTable& table,
+                                             BasicWorkspace<L>& w, LaneBits lanes, double h,
+                                             bool inside_split, NewtonReport& report) const {
+  Solved solved;
+  const LaneBits of_other_parts = std::exchange(report.passed, kNoLane);
+  solved.found = run(scheme, table, w, lanes, Row<L>::all(h), inside_split, report);
+  solved.passed = std::exchange(report.passed, of_other_parts) & solved.found;
+  solved.created = creating(table, w, solved.found & ~solved.passed, h);
+  return solved;
+}
+
+#define TANGERE_FOR_LANES(L)                                                                  \
+  template void GroupStep::watch_passing(const kernels::KernelTable&, BasicWorkspace<L>&,     \
+                                         LaneBits, NewtonReport&) const;                      \
+  template GroupStep::Solved GroupStep::solve_and_watch(                                      \
+      const Scheme&, const kernels::KernelTable&, BasicWorkspace<L>&, LaneBits, double, bool, \
+      NewtonReport&) const;
+TANGERE_FOR_LANES(kernels::kGroup)
+TANGERE_FOR_LANES(1)
+#undef TANGERE_FOR_LANES
+
+}  // namespace tangere
