@@ -48,7 +48,7 @@ void NumberGradients::add_contacts() {
   const CompiledModel& m = compiled(model_);
   int row = 0;
   for (const PairContactDescription& c : m.scene.pair_contacts) {
-    add_coefficients({Owner::contact, Field::kn, c.general_body, 0, c.primitive_body}, row);
+    add_coefficients({Owner::contact, Field::kn, c.first_name(), 0, c.primitive_body}, row);
     row += kCoefficients;
   }
   for (const GroundContactDescription& c : m.scene.ground_contacts) {

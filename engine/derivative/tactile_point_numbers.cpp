@@ -41,29 +41,8 @@ ContactCoefficients sensor_coefficients(const Batch& batch, int environment, int
   return transformed(c, in_force);
 }
 
-std::vector<TactilePoint> list_points(const RectArray& a) {
-  using kernels::Vec3;
-  const Vec3<double> p0 = vec3_of(a.corner0), axis0 = vec3_of(a.axis0), axis1 = vec3_of(a.axis1),
-                     diagonal = vec3_of(a.corner1) - p0;
-  const Vec3<double> normal = cross(axis0, axis1);
-  const double step0 = a.rows > 1 ? dot(diagonal, axis0) / (a.rows - 1) : 0;
-  const double step1 = a.cols > 1 ? dot(diagonal, axis1) / (a.cols - 1) : 0;
-  std::vector<TactilePoint> points;
-  for (int i = 0; i < a.rows; ++i)
-    for (int j = 0; j < a.cols; ++j) {
-      const Vec3<double> at = p0 + (i * step0) * axis0 + (j * step1) * axis1;
-      TactilePoint point;
-      point.position = {at.x, at.y, at.z};
-      point.normal = {normal.x, normal.y, normal.z};
-      point.axis0 = a.axis0, point.axis1 = a.axis1;
-      point.pixel = {i, j};
-      points.push_back(point);
-    }
-  return points;
-}
-
 void add_to_points(TactileDescription& sensor, std::span<const double> change) {
-  if (sensor.points.empty()) sensor.points = list_points(sensor.array);
+  if (sensor.points.empty()) sensor.points = tactile_points(sensor);
   const std::size_t expected = sensor.points.size() * kPointNumbers;
   if (change.size() != expected)
     throw InputError(sensor.source.prefix() + "tactile sensor '" + sensor.name +

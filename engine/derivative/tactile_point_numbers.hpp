@@ -30,10 +30,6 @@ int first_tactile_point(const Model& model, int sensor);
 /// Returns kn, kt, mu and damping of a sensor in an environment.
 ContactCoefficients sensor_coefficients(const Batch& batch, int environment, int sensor);
 
-/// Lists the points of an array, row by row, with its axes. The list has the same field as the
-/// array.
-std::vector<TactilePoint> list_points(const RectArray& array);
-
 /// Adds `change`, (points, kPointNumbers), to the own numbers of a sensor's points, in their units.
 /// An array becomes a list, which has neither rows nor columns. Throws InputError if `change` has
 /// another size, or changes a coefficient that is 0 for the sensor: points only have factors of it.

@@ -71,29 +71,15 @@ struct PadPoints {
 
 PadPoints points_of(const TactileDescription& d, const kernels::Frame<double>& body) {
   PadPoints out;
-  const auto add = [&](const Vector3& place, const Vector3& axis0, const Vector3& axis1,
-                       const Vec3<double>& normal, const std::array<double, 4>& factors) {
-    const auto put = [](std::vector<double>& to, const Vec3<double>& x) {
-      to.insert(to.end(), {x.x, x.y, x.z});
-    };
-    put(out.places, body.R * vec3_of(place) + body.p);
-    for (const Vec3<double>& row : {vec3_of(axis0), vec3_of(axis1), -normal})
-      put(out.axes, body.R * row);
-    out.factors.insert(out.factors.end(), factors.begin(), factors.end());
+  const auto put = [](std::vector<double>& to, const Vec3<double>& x) {
+    to.insert(to.end(), {x.x, x.y, x.z});
   };
-  for (const TactilePoint& p : d.points)
-    add(p.position, p.axis0, p.axis1, vec3_of(p.normal), p.factors);
-  if (!d.points.empty()) return out;
-  const RectArray& a = d.array;
-  const Vec3<double> axis0 = vec3_of(a.axis0), axis1 = vec3_of(a.axis1), first = vec3_of(a.corner0),
-                     way = vec3_of(a.corner1) - first;
-  const double step0 = a.rows > 1 ? dot(way, axis0) / (a.rows - 1) : 0,
-               step1 = a.cols > 1 ? dot(way, axis1) / (a.cols - 1) : 0;
-  for (int i = 0; i < a.rows; ++i)
-    for (int j = 0; j < a.cols; ++j) {
-      const Vec3<double> p = first + (i * step0) * axis0 + (j * step1) * axis1;
-      add({p.x, p.y, p.z}, a.axis0, a.axis1, cross(axis0, axis1), {1, 1, 1, 1});
-    }
+  for (const TactilePoint& p : tactile_points(d)) {
+    put(out.places, body.R * vec3_of(p.position) + body.p);
+    for (const Vec3<double>& row : {vec3_of(p.axis0), vec3_of(p.axis1), -vec3_of(p.normal)})
+      put(out.axes, body.R * row);
+    out.factors.insert(out.factors.end(), p.factors.begin(), p.factors.end());
+  }
   return out;
 }
 

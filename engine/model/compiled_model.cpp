@@ -101,12 +101,11 @@ class Compiler {
     return transformed(c, [](double value) { return kernels::Parameter{value, -1}; });
   }
 
-  /// Points (n, 3) of a body in one contact, in the body's frame [m].
-  static std::vector<double> points_in_contact(const Shape& shape, const std::string& body,
+  /// Returns `points` (n, 3) unless they are too many for one contact.
+  static std::vector<double> points_in_contact(std::vector<double> points, const std::string& of,
                                                const Source& source) {
-    std::vector<double> points = contact_points(shape);
     if (points.size() / 3 > kMostContactPoints)
-      throw InputError(source.prefix() + "body '" + body + "' touches with " +
+      throw InputError(source.prefix() + "'" + of + "' touches with " +
                        std::to_string(points.size() / 3) + " points; expected at most " +
                        std::to_string(kMostContactPoints));
     return points;
@@ -124,7 +123,7 @@ class Compiler {
       const CompiledBody &first = m_.bodies[b1], &second = m_.bodies[b2];
       const Shape &general = m_.scene.links[b1].body.shape,
                   &primitive = m_.scene.links[b2].body.shape;
-      if (!has_contact_points(general))
+      if (d.points.empty() && !has_contact_points(general))
         throw InputError(d.source.prefix() + "general_body '" + d.general_body + "' (" +
                          shape_name(general) + ") has no contact points; expected " +
                          shapes_with([](const ShapeRow& row) { return row.stretches(); }) +
@@ -136,7 +135,8 @@ class Compiler {
       if (b1 == b2 || first.link == second.link)
         throw InputError(d.source.prefix() + "bodies '" + d.general_body + "' and '" +
                          d.primitive_body + "' cannot move against each other");
-      std::vector<double> points = points_in_contact(general, d.general_body, d.source);
+      std::vector<double> points = points_in_contact(
+          d.points.empty() ? contact_points(general) : d.points, d.first_name(), d.source);
       double reach = 0;
       for (std::size_t k = 0; k < points.size(); k += 3) {
         const Vec3<double> p =
@@ -159,15 +159,16 @@ class Compiler {
       pair.reach = reach;
       pair.body1 = b1;
       pair.body2 = b2;
-      if (pair.shape == PrimitiveShape::cuboid && is_convex(general) && pair.n_points <= kCorners)
+      if (pair.shape == PrimitiveShape::cuboid && d.points.empty() && is_convex(general) &&
+          pair.n_points <= kCorners)
         meet_faces(pair, first);
       pair.points = keep(m_.point_storage, std::move(points));
       lay_out_tiles(m_, pair, tiles);
-      contacts_.add("contact", d.general_body + " " + d.primitive_body,
+      contacts_.add("contact", d.first_name() + " " + d.primitive_body,
                     static_cast<int>(m_.pairs.size()), d.source);
       m_.pairs.push_back(pair);
       m_.contact_info.push_back(
-          {d.general_body, d.primitive_body, pair.n_points, law_name(d.law, d.ramp)});
+          {d.first_name(), d.primitive_body, pair.n_points, law_name(d.law, d.ramp)});
       touching_.emplace_back(pair.link1, pair.link2);
     }
   }
@@ -199,7 +200,7 @@ class Compiler {
         throw InputError(d.source.prefix() + "body '" + d.body + "' is fixed in the world");
       kernels::GroundContact ground{};
       const Shape& shape = m_.scene.links[b].body.shape;
-      std::vector<double> points = points_in_contact(shape, d.body, d.source);
+      std::vector<double> points = points_in_contact(contact_points(shape), d.body, d.source);
       if (is_ball(shape)) {
         points = {0, 0, 0};
         ground.radius = body.size.x;

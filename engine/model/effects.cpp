@@ -217,7 +217,7 @@ auto& elements(AnyScene& scene) {
 }
 
 SceneNumber number_of(const PairContactDescription& d) {
-  return {Owner::contact, Field::kn, d.general_body, 0, d.primitive_body};
+  return {Owner::contact, Field::kn, d.first_name(), 0, d.primitive_body};
 }
 SceneNumber number_of(const GroundContactDescription& d) {
   return {Owner::ground, Field::kn, d.body};

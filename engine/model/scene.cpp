@@ -27,6 +27,29 @@ Pose pose_at_end(std::span<const Pose> way, const Pose& pose) {
   return {{local.p.x, local.p.y, local.p.z}, {q.w, q.x, q.y, q.z}};
 }
 
+std::vector<TactilePoint> tactile_points(const TactileDescription& sensor) {
+  if (!sensor.points.empty()) return sensor.points;
+  const RectArray& a = sensor.array;
+  using kernels::Vec3;
+  const Vec3<double> p0 = vec3_of(a.corner0), axis0 = vec3_of(a.axis0), axis1 = vec3_of(a.axis1),
+                     diagonal = vec3_of(a.corner1) - p0;
+  const Vec3<double> normal = cross(axis0, axis1);
+  const double step0 = a.rows > 1 ? dot(diagonal, axis0) / (a.rows - 1) : 0;
+  const double step1 = a.cols > 1 ? dot(diagonal, axis1) / (a.cols - 1) : 0;
+  std::vector<TactilePoint> points;
+  for (int i = 0; i < a.rows; ++i)
+    for (int j = 0; j < a.cols; ++j) {
+      const Vec3<double> at = p0 + (i * step0) * axis0 + (j * step1) * axis1;
+      TactilePoint point;
+      point.position = {at.x, at.y, at.z};
+      point.normal = {normal.x, normal.y, normal.z};
+      point.axis0 = a.axis0, point.axis1 = a.axis1;
+      point.pixel = {i, j};
+      points.push_back(point);
+    }
+  return points;
+}
+
 const char* to_string(JointType value) {
   switch (value) {
     case JointType::fixed: return "fixed";

@@ -173,6 +173,10 @@ struct TactileDescription {
   SensorImperfections imperfections{};  ///< of its readings; none to begin with
 };
 
+/// Lists the points of a sensor in field order: those of an array row by row, with its axes. The
+/// list has the same field as the array.
+std::vector<TactilePoint> tactile_points(const TactileDescription& sensor);
+
 /// An end effector: a point that moves with a joint. Its world position is an output.
 struct EndEffectorDescription {
   std::string name;
@@ -205,6 +209,14 @@ struct PairContactDescription {
   ContactLaw law = ContactLaw::clamped;
   double ramp = 1e-5;  ///< [m]; law linear only
   Source source;
+  /// A tactile sensor of general_body whose points touch instead of the body's own; empty: none.
+  std::string sensor = {};
+  std::vector<double> points = {};  ///< its points (n, 3), in the frame of general_body [m]
+
+  /// The first part of the contact's name; the second is primitive_body.
+  [[nodiscard]] std::string first_name() const {
+    return sensor.empty() ? general_body : "tactile " + sensor;
+  }
 };
 
 /// Starting state of one joint; empty vectors leave the default (q = 0 or the identity, v = 0).

@@ -67,7 +67,7 @@ bool with_law(const Scene& scene, const SceneNumber& n, const Function& f) {
   switch (n.owner) {
     case Owner::contact:
       return use(scene.pair_contacts, [&](const PairContactDescription& c) {
-        return c.general_body == n.name && c.primitive_body == n.second_name;
+        return c.first_name() == n.name && c.primitive_body == n.second_name;
       });
     case Owner::ground:
       return use(scene.ground_contacts,

@@ -232,6 +232,11 @@ void read_coefficient_variation(const Scene& scene, const SceneNode& node,
     for (const auto& s : scene.sensors) names.push_back(s.name);
     if (std::find(names.begin(), names.end(), n.name) == names.end())
       node.fail("no tactile sensor is named '" + n.name + "'" + suggestion(n.name, names));
+    for (const PairContactDescription& c : scene.pair_contacts)
+      if (c.sensor == n.name)
+        node.fail("tactile sensor '" + n.name +
+                  "' has feedback, so its coefficients act on the motion as well; they cannot vary "
+                  "between environments");
   }
   node.check_attributes(attributes);
   std::vector<std::string> fields;

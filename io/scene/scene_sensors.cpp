@@ -32,8 +32,8 @@ Names attributes_of(int type) {
 }
 
 void check_attributes(const SceneNode& node, int type) {
-  Names used = {"name", "body",    "type", "kn",    "kt",           "mu",
-                "ks",   "damping", "law",  "every", "pressure_sign"},
+  Names used = {"name",    "body", "type",  "kn",            "kt",      "mu", "ks",
+                "damping", "law",  "every", "pressure_sign", "feedback"},
         idle;
   const Names own = attributes_of(type);
   used.insert(used.end(), own.begin(), own.end());
@@ -171,6 +171,50 @@ void read_imperfections(const SceneNode& node, TactileDescription& sensor) {
   check_imperfections(of, sensor.name, sensor.points.empty());
 }
 
+/// Returns the first link of those that a link is fixed to, itself included; -1: the world.
+int moving_link(const Scene& scene, int link) {
+  while (link >= 0 && scene.links[std::size_t(link)].joint.type == JointType::fixed)
+    link = scene.links[std::size_t(link)].parent;
+  return link;
+}
+
+/// Lets the points of a sensor touch what they feel: a pair with every body that has a distance and
+/// moves against the sensor's.
+void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription& d, int body) {
+  PairContactDescription pair;
+  for (const TactilePoint& p : tactile_points(d)) {
+    if (p.factors != TactilePoint{}.factors)
+      node.fail("feedback needs points with the sensor's own coefficients, and this layout has "
+                "factors of them");
+    pair.points.insert(pair.points.end(), p.position.begin(), p.position.end());
+  }
+  pair.general_body = d.body;
+  pair.sensor = d.name;
+  pair.coefficients = d.coefficients;
+  pair.law = d.law;
+  pair.source = d.source;
+  bool felt = false;
+  for (int other = 0; other < static_cast<int>(scene.links.size()); ++other) {
+    const BodyDescription& touched = scene.links[std::size_t(other)].body;
+    if (!has_distance(touched.shape) || moving_link(scene, other) == moving_link(scene, body))
+      continue;
+    for (const PairContactDescription& c : scene.pair_contacts)
+      if (c.points.empty() && c.general_body == d.body && c.primitive_body == touched.name)
+        node.context().warnings.push_back(fmt::format(
+            "{}<general_primitive_contact>: '{}' and '{}' touch by the body's points and by those "
+            "of its tactile sensor '{}', which has feedback. Where both lie, the contact is as "
+            "many times stiffer, and the field shows its own share alone",
+            c.source.prefix(), d.body, touched.name, d.name));
+    pair.primitive_body = touched.name;
+    scene.pair_contacts.push_back(pair);
+    felt = true;
+  }
+  if (!felt)
+    node.fail(fmt::format("feedback of '{}' would touch nothing; expected a body with a distance "
+                          "that moves against '{}'",
+                          d.name, d.body));
+}
+
 }  // namespace
 
 void read_sensors(Scene& scene, const SceneNode& section) {
@@ -178,7 +222,7 @@ void read_sensors(Scene& scene, const SceneNode& section) {
   for (const SceneNode& node : section.children({"tactile"})) {
     TactileDescription d;
     d.source = node.source();
-    find_body(scene, node, "body");
+    const int body = find_body(scene, node, "body");
     d.body = node.text("body");
     d.name = node.text("name", d.body);
     if (d.name.find('/') != std::string::npos)
@@ -203,6 +247,7 @@ void read_sensors(Scene& scene, const SceneNode& section) {
       d.points = read_points(node, type);
     }
     read_imperfections(node, d);
+    if (node.choice("feedback", {"false", "true"}, 0) == 1) add_feedback(scene, node, d, body);
     scene.sensors.push_back(std::move(d));
   }
 }

@@ -99,8 +99,7 @@ struct PointChange {
 };
 
 double extent_of(const TactileDescription& sensor) {
-  const std::vector<TactilePoint> points =
-      sensor.points.empty() ? list_points(sensor.array) : sensor.points;
+  const std::vector<TactilePoint> points = tactile_points(sensor);
   double extent = 0;
   for (const TactilePoint& p : points)
     for (std::size_t k = 0; k < 3; ++k)
