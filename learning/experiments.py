@@ -5,13 +5,17 @@
     python learning/experiments.py --only gd-touch ppo-box --jobs 2
 
 A run is one command with one seed. What it prints with --json is kept as
-learning/results/NAME-SEED.json; a file that exists is not made again. Data sets go to out/. Every
-program runs on one thread. ./run-learning builds what is needed and calls this.
+learning/results/NAME-SEED.json, with the command, the arguments of its data set and the commit. A
+file that has the same command and arguments as here is not made again; another one is stale and
+does not count. Data sets go to out/. Every program runs on one thread. With `--device cuda` those
+that learn from batches have their networks on a GPU. ./run-learning builds what is needed and calls
+this.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import subprocess
 import sys
@@ -19,6 +23,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[1]
 RESULTS = Path(__file__).parent / "results"
@@ -78,8 +83,36 @@ EXPERIMENTS = [
 ]  # fmt: skip
 
 
+WITH_DEVICE = ("ppo.py", "bc.py")  # programs that have --device
+
+
 def result_of(experiment: Experiment, seed: int) -> Path:
     return RESULTS / f"{experiment.name}-{seed}.json"
+
+
+def made_by(experiment: Experiment) -> dict[str, str]:
+    """What a result says of the experiment that it belongs to."""
+    return {"command": experiment.command, "data": experiment.data}
+
+
+def stored(experiment: Experiment, seed: int) -> dict[str, Any] | None:
+    """The result of a run; None if there is none, or one of another command or data set."""
+    path = result_of(experiment, seed)
+    if not path.exists():
+        return None
+    result = json.loads(path.read_text())
+    return result if result.get("experiment") == made_by(experiment) else None
+
+
+def commit() -> str:
+    """The commit that is checked out, with "-dirty" if files differ from it; "" without git."""
+    try:
+        return subprocess.run(
+            ["git", "describe", "--always", "--dirty", "--abbrev=12"],
+            cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True,
+        ).stdout.strip()  # fmt: skip
+    except (OSError, subprocess.CalledProcessError):
+        return ""
 
 
 def make_data(experiment: Experiment) -> None:
@@ -96,12 +129,17 @@ def make_data(experiment: Experiment) -> None:
     )  # fmt: skip
 
 
-def make(experiment: Experiment, seed: int) -> bool:
-    """Makes one result; says how it went and returns whether it is there."""
+def command_of(experiment: Experiment, seed: int, device: str) -> list[str]:
+    """The words after the interpreter."""
     program, *arguments = experiment.command.split()
-    command = [sys.executable, f"learning/{program}", *arguments, "--seed", str(seed), "--json"]
-    if program != "bc.py":
-        command += ["--threads", "1"]
+    command = [f"learning/{program}", *arguments, "--seed", str(seed), "--json"]
+    command += ["--threads", "1"] if program != "matching.py" else []
+    return command + (["--device", device] if program in WITH_DEVICE else [])
+
+
+def make(experiment: Experiment, seed: int, device: str) -> bool:
+    """Makes one result; says how it went and returns whether it is there."""
+    command = [sys.executable, *command_of(experiment, seed, device)]
     begin = time.perf_counter()
     done = subprocess.run(
         command, cwd=ROOT, env=os.environ | {"OMP_NUM_THREADS": "1"}, stdin=subprocess.DEVNULL,
@@ -113,7 +151,8 @@ def make(experiment: Experiment, seed: int) -> bool:
               file=sys.stderr, flush=True)  # fmt: skip
         return False
     partial = result_of(experiment, seed).with_suffix(".part")
-    partial.write_text(done.stdout)
+    said = {"experiment": made_by(experiment), "commit": commit()} | json.loads(done.stdout)
+    partial.write_text(json.dumps(said) + "\n")
     partial.rename(result_of(experiment, seed))
     print(f"{experiment.name} {seed}: {took}", flush=True)
     return True
@@ -125,16 +164,18 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=names, default=names, metavar="NAME")
     parser.add_argument("--seeds", type=int, help="at most; the default is each one's own number")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="at once")
+    parser.add_argument("--device", default="cpu", help="of networks that learn from batches")
     parser.add_argument("--list", action="store_true", help="say what there is and what it costs")
     asked = parser.parse_args()
     wanted = [e for e in EXPERIMENTS if e.name in asked.only]
     runs = [(e, s) for e in wanted for s in range(min(e.seeds, asked.seeds or e.seeds))
-            if not result_of(e, s).exists()]  # fmt: skip
+            if stored(e, s) is None]  # fmt: skip
     if asked.list:
         for e in wanted:
             missing = sum(run[0] is e for run in runs)
-            print(f"{e.name:16} {e.seeds} runs of {e.seconds:5} CPU s, {missing} missing: "
-                  f"{e.command}")  # fmt: skip
+            stale = sum(run[0] is e and result_of(*run).exists() for run in runs)
+            print(f"{e.name:16} {e.seeds} runs of {e.seconds:5} CPU s, {missing} missing, "
+                  f"{stale} of them stale: {e.command}")  # fmt: skip
         return
     print(f"{len(runs)} runs, about {sum(e.seconds for e, _ in runs) / 60:.0f} CPU minutes, "
           f"{asked.jobs} at once", flush=True)  # fmt: skip
@@ -142,7 +183,7 @@ def main() -> None:
     for experiment in {e.name: e for e, _ in runs}.values():
         make_data(experiment)
     with ThreadPoolExecutor(asked.jobs) as pool:
-        made = list(pool.map(lambda run: make(*run), runs))
+        made = list(pool.map(lambda run: make(*run, asked.device), runs))
     if not all(made):
         raise SystemExit(f"{made.count(False)} of {len(made)} runs failed (reasons above)")
 

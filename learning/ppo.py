@@ -68,7 +68,8 @@ class Running:
 
     def shown(self, rows: np.ndarray) -> np.ndarray:
         std = np.sqrt(self.square / self.count + 1e-8)
-        return np.clip((rows - self.mean) / std, -10, 10).astype(np.float32)
+        mean, share = self.mean.astype(np.float32), (1 / std).astype(np.float32)
+        return np.clip((rows - mean) * share, -10, 10).astype(np.float32)
 
 
 class Eyes:
@@ -76,13 +77,20 @@ class Eyes:
 
     Flow and fields become channels if the task is seen by a convolution, else numbers. In images of
     20 × 20 pixels and more, the forces of 2 × 2 pixels are summed: most of those pixels are empty.
+    Of a field that is seen as n numbers each counts 4/√n, so that it does not outweigh the goal.
     """
 
-    def __init__(self, spec: tangere.TaskSpec, convolve: bool):
+    def __init__(self, spec: tangere.TaskSpec, convolve: bool, device: str = "cpu"):
+        self.device = device
         self.channels_last = {t.name: t.shape[-1] == 3 for t in spec.observations}
         images = [t for t in spec.observations if convolve and len(t.shape) >= 3]
         self.images = [t.name for t in images]
         self.flat = [t.name for t in spec.observations if t.name not in self.images]
+        sizes = {t.name: int(np.prod(t.shape)) for t in spec.observations}
+        self.share = np.concatenate(
+            [np.full(sizes[n], min(1, 4 / sizes[n] ** 0.5), np.float32) for n in self.flat]
+            or [np.zeros(0, np.float32)]
+        )
         zeros = {t.name: np.zeros((1, *t.shape), np.float32) for t in spec.observations}
         image, rest = self._arrays(zeros)
         self.shapes = (image.shape[1:], rest.shape[1:])
@@ -93,11 +101,10 @@ class Eyes:
         parts = []
         for name in self.images:  # (E, c, h, w), (E, h, w, 3) or (E, k, h, w, 3)
             image = np.moveaxis(obs[name], -1, -3) if self.channels_last[name] else obs[name]
-            image = image.reshape(n, -1, *image.shape[-2:])
-            if min(image.shape[2:]) >= 20:
-                c, h, w = image.shape[1:]
-                image = image.reshape(n, c, h // 2, 2, w // 2, 2).sum((3, 5))
-            parts.append(image)
+            if min(image.shape[-2:]) >= 20:
+                image = image[..., ::2, :] + image[..., 1::2, :]
+                image = image[..., ::2] + image[..., 1::2]
+            parts.append(image.reshape(n, -1, *image.shape[-2:]))
         image = np.concatenate(parts, 1) if parts else np.zeros((n, 0, 1, 1), np.float32)
         rest = [obs[name].reshape(n, -1) for name in self.flat]
         return image, np.concatenate(rest, 1) if rest else np.zeros((n, 0), np.float32)
@@ -108,7 +115,9 @@ class Eyes:
             for running, rows in zip(self.running, arrays):
                 if rows.size:
                     running.add(rows)
-        return [torch.from_numpy(r.shown(rows)) for r, rows in zip(self.running, arrays)]
+        shown = [r.shown(rows) for r, rows in zip(self.running, arrays)]
+        shown[1] *= self.share
+        return [torch.from_numpy(rows).to(self.device) for rows in shown]
 
 
 def layer(module: nn.Module, gain: float) -> nn.Module:
@@ -187,8 +196,9 @@ class Actor:
 
     def __call__(self, env, obs, t: int) -> np.ndarray:
         if t == 0:
-            self.state = torch.zeros(env.num_envs, 64)
-            self.past = torch.zeros(env.num_envs, *env.task.action.shape)
+            at = self.eyes.device
+            self.state = torch.zeros(env.num_envs, 64, device=at)
+            self.past = torch.zeros(env.num_envs, *env.task.action.shape, device=at)
         with torch.no_grad():
             self.past, _, self.state = self.agent(*self.eyes(obs), self.state, self.past)
         return driven(self.past, self.squash)
@@ -196,7 +206,7 @@ class Actor:
 
 def driven(drawn: torch.Tensor, squash: bool) -> np.ndarray:
     """What the environment is given; it clips to [-1, 1]."""
-    return (torch.tanh(drawn).clamp(-MOST_DRIVE, MOST_DRIVE) if squash else drawn).numpy()
+    return (torch.tanh(drawn).clamp(-MOST_DRIVE, MOST_DRIVE) if squash else drawn).cpu().numpy()
 
 
 class Collector:
@@ -208,9 +218,9 @@ class Collector:
                                     autoreset="same_step", threads=asked.threads)  # fmt: skip
         obs, _ = self.env.reset()
         self.obs = eyes(obs, learn=True)
-        self.state = torch.zeros(asked.envs, 64)
-        self.past = torch.zeros(asked.envs, *self.env.task.action.shape)
-        self.begins = torch.ones(asked.envs, dtype=torch.bool)
+        self.state = torch.zeros(asked.envs, 64, device=eyes.device)
+        self.past = torch.zeros(asked.envs, *self.env.task.action.shape, device=eyes.device)
+        self.begins = torch.ones(asked.envs, dtype=torch.bool, device=eyes.device)
         self.discounted, self.returns = np.zeros(asked.envs), np.zeros(asked.envs)
         self.scale = Running((1,))
 
@@ -221,7 +231,8 @@ class Collector:
         for _ in range(asked.length):
             self.state = self.state * ~self.begins[:, None]
             mean, value, after = self.agent(*self.obs, self.state, self.past)
-            action = mean + self.agent.log_deviation.exp() * torch.randn_like(mean)
+            drawn = torch.randn(mean.shape).to(mean.device)  # the same on every device
+            action = mean + self.agent.log_deviation.exp() * drawn
             row = {"image": self.obs[0], "rest": self.obs[1], "past": self.past, "action": action,
                    "begins": self.begins, "value": value,
                    "chance": log_likelihood(action, mean, self.agent.log_deviation)}  # fmt: skip
@@ -236,16 +247,18 @@ class Collector:
             if len(cut):  # out of time: what would have come counts
                 last = [info["final_obs"][e] for e in cut]
                 seen = self.eyes({k: np.stack([o[k] for o in last]) for k in last[0]})
-                scaled[cut] += asked.gamma * self.agent(*seen, after[cut], action[cut])[1].numpy()
+                worth = self.agent(*seen, after[cut], action[cut])[1].cpu().numpy()
+                scaled[cut] += asked.gamma * worth
             if ended.any():
                 solved = info["final_info"]["success"]
                 these = np.flatnonzero(ended)
                 ended_episodes += [(self.returns[e], bool(solved[e])) for e in these]
             self.returns[ended] = self.discounted[ended] = 0
             self.obs, self.state = self.eyes(obs, learn=True), after
-            self.begins = torch.from_numpy(ended)
+            self.begins = torch.from_numpy(ended).to(self.eyes.device)
             self.past = action * ~self.begins[:, None]
-            rows.append(row | {"reward": torch.from_numpy(scaled).float(), "end": self.begins})
+            gained = torch.from_numpy(scaled).float().to(self.eyes.device)
+            rows.append(row | {"reward": gained, "end": self.begins})
         batch = {name: torch.stack([row[name] for row in rows]) for name in rows[0]}
         state = self.state * ~self.begins[:, None]
         batch["advantage"] = self._advantages(batch, self.agent(*self.obs, state, self.past)[1])
@@ -271,7 +284,7 @@ def improve(agent: Agent, optimiser, batch, first: torch.Tensor, asked, draw: np
     target = batch["advantage"] + batch["value"]
     size = max(1, asked.minibatch // T)
     for _ in range(asked.passes):
-        order = torch.from_numpy(draw.permutation(E))
+        order = torch.from_numpy(draw.permutation(E)).to(first.device)
         for chosen in order.split(size):
             part = {k: v[:, chosen] for k, v in batch.items()}
             mean, value = agent.sequence(
@@ -295,11 +308,13 @@ def settings() -> argparse.Namespace:
     parser.add_argument("task", choices=tangere.task_names())
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--threads", type=int, default=None)
+    parser.add_argument("--device", default="cpu", help="where the networks are: cpu, cuda")
     parser.add_argument("--episodes", type=int, default=1000, help="to test on")
     parser.add_argument("--choices", type=int, default=5, help="policies to choose from")
     parser.add_argument("--json", action="store_true")
     for name, value in COMMON.items():
-        kind = {"action": "store_true"} if value is False else {"type": type(value)}
+        flag = isinstance(value, bool)
+        kind = {"action": argparse.BooleanOptionalAction} if flag else {"type": type(value)}
         parser.add_argument(f"--{name}", default=None, **kind)
     asked = parser.parse_args()
     for name, value in (COMMON | TASKS.get(asked.task, {})).items():
@@ -316,8 +331,9 @@ def main() -> None:
     torch.manual_seed(asked.seed)
     begin, clock = time.process_time(), time.perf_counter()
     spec = tangere.task_spec(asked.task)
-    eyes = Eyes(spec, convolve=not asked.task.startswith("box_pushing"))
+    eyes = Eyes(spec, not asked.task.startswith("box_pushing"), asked.device)
     agent = Agent(eyes.shapes, spec.action.shape[0], asked.deviation, asked.recurrent)
+    agent.to(asked.device)
     optimiser = torch.optim.Adam(agent.parameters(), lr=asked.rate, eps=1e-5)
     collector, draw = Collector(asked, agent, eyes), np.random.default_rng(asked.seed)
     choice = tangere.make_vec(asked.task, CHOICE_EPISODES, autoreset="disabled",
@@ -346,7 +362,7 @@ def main() -> None:
     env = tangere.make_vec(asked.task, asked.episodes, autoreset="disabled", threads=asked.threads)
     result = play(env, TEST_SEED, Actor(*kept, asked.squash)).summary()
     if asked.json:
-        print(json.dumps({"program": "ppo", "settings": vars(asked), **provenance(), **cost,
+        print(json.dumps({"program": "ppo", "settings": vars(asked), **provenance(asked.device), **cost,
                           "steps": updates * asked.envs * asked.length,
                           "curve": curve[:: max(1, len(curve) // 100)], "choice": chosen,
                           "test": result}))  # fmt: skip

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Callable, Sequence
 
 import numpy as np
+import torch
 
 import tangere
 
@@ -100,14 +101,16 @@ def student(values: Sequence[float]) -> float:
     return float(_STUDENT[len(values) - 2] * np.std(values, ddof=1) / np.sqrt(len(values)))
 
 
-def provenance() -> dict[str, str]:
-    """The version and the machine of a result."""
+def provenance(device: str = "cpu") -> dict[str, str]:
+    """The version and the machine of a result. `device`: where PyTorch's networks were."""
     cpu = platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
         models = [line for line in info.read_text().splitlines() if line.startswith("model name")]
         cpu = models[0].split(":", 1)[1].strip() if models else cpu
-    return {"version": tangere.__version__, "machine": cpu}
+    said = {"version": tangere.__version__, "machine": cpu,
+            "instruction_set": tangere._core.instruction_set}  # fmt: skip
+    return said | ({"device": torch.cuda.get_device_name(device)} if device != "cpu" else {})
 
 
 def source(merged: Path) -> dict[str, str]:
