@@ -15,8 +15,7 @@ sees how large an episode's G_e is: the loop may amplify derivatives, and then o
 update.
 
 Every 10 updates the policy plays 300 goals of another seed. The one with the least mean error,
-|Δp|/0.1 m + |Δθ|/0.276 rad in the reward's own proportion, is kept and tested on fresh goals. The
-reward is quadratic in the gap between hand and box, so a few lost boxes may decide a mean return.
+|Δp|/0.1 m + |Δθ|/0.276 rad in the reward's own proportion, is kept and tested on fresh goals.
 Prints the mean errors in place [m] and yaw [rad].
 """
 
@@ -30,14 +29,13 @@ import time
 
 import numpy as np
 import torch
-from protocol import CHOICE_EPISODES, CHOICE_SEED, TEST_SEED, play, provenance
+from protocol import CHOICE_EPISODES, CHOICE_SEED, TEST_SEED, merit, play, provenance
 from torch import nn
 
 import tangere
 import tangere.torch
 
 CHOICE_EVERY = 10  # updates
-PLACE_UNIT, YAW_UNIT = 0.1, 0.276  # [m], [rad]: what costs 1 in the reward
 
 
 def small_policy(inputs: int, actions: int) -> nn.Module:
@@ -137,7 +135,7 @@ def main() -> None:
     )
     still = {"flatten": True, "autoreset": "disabled", "threads": asked.threads}
     choice = tangere.make_vec(asked.task, CHOICE_EPISODES, **still)
-    best, kept, curve, chosen = np.inf, None, [], []
+    best, kept, curve, chosen = -np.inf, None, [], []
     for k in range(asked.updates):
         curve.append(update(tape, policy, gains, asked.limit, 1 + asked.seed, k * asked.envs))
         norm = nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
@@ -152,9 +150,8 @@ def main() -> None:
             continue
         played = play(choice, CHOICE_SEED, player(shown, gains)).summary()
         chosen.append([k + 1, played["return"], played["position_m"], played["yaw_rad"]])
-        error = played["position_m"] / PLACE_UNIT + played["yaw_rad"] / YAW_UNIT
-        if error < best:
-            best, kept = error, copy.deepcopy(shown)
+        if merit(played) > best:
+            best, kept = merit(played), copy.deepcopy(shown)
         errors = f"{played['position_m']:.3f} m, {played['yaw_rad']:.3f} rad"
         print(f"update {k + 1}: return {played['return']:.1f}, {errors}, "
               f"gradient norm {float(norm):.3g}", file=sys.stderr, flush=True)  # fmt: skip

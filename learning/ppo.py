@@ -11,7 +11,12 @@ With r = π(a|o)/π_old(a|o) and the advantage A of generalised advantage estima
 are taken by Adam, a few passes over each batch of E environments × T actions. Observations and
 returns are normalised while training goes on, and clipped to 10. An episode that runs out of time
 goes on in the value of its last observation, one that ends does not. Policies are Gaussian; their
-means act in tests. `TASKS` has the settings of each task; every one is an option as well.
+means act in tests.
+
+With `--last_gamma` the horizon 1 / (1 - γ) grows or shrinks by the same factor at every update, to
+that of this γ at the end. `--imitate s`: in the first share s of all updates the policy plays, but
+learns what the script would have done where it came to, |mean - a_script|² in place of the first
+term of L. `TASKS` has the settings of each task; every one is an option as well.
 """
 
 from __future__ import annotations
@@ -25,14 +30,14 @@ from typing import Any
 
 import numpy as np
 import torch
-from protocol import CHOICE_EPISODES, CHOICE_SEED, TEST_SEED, play, provenance
+from protocol import CHOICE_EPISODES, CHOICE_SEED, TEST_SEED, merit, play, provenance
 from torch import nn
 
 import tangere
 
 COMMON = {
     "steps": 2_000_000, "envs": 256, "length": 32, "passes": 4, "minibatch": 512, "rate": 3e-4,
-    "gamma": 0.99, "trace": 0.95, "clip": 0.2, "value": 0.5, "entropy": 0.0, "norm": 0.5,
+    "gamma": 0.99, "last_gamma": 0.0, "imitate": 0.0, "trace": 0.95, "clip": 0.2, "value": 0.5, "entropy": 0.0, "norm": 0.5,
     "deviation": 1.0, "recurrent": False, "squash": False,
 }  # fmt: skip
 INSERTION = {"steps": 200_000, "envs": 64, "minibatch": 256, "deviation": 0.5, "recurrent": True}
@@ -45,7 +50,8 @@ TASKS: dict[str, dict[str, Any]] = {
     "insertion": INSERTION | {"steps": 1_000_000},
     "insertion_translation": INSERTION,
     "insertion_rotation": INSERTION,
-    "box_pushing": {"squash": True},
+    "box_pushing": {"squash": True, "passes": 10, "minibatch": 1024, "rate": 1e-3,
+                    "deviation": 0.5},
 }  # fmt: skip
 MOST_DRIVE = 0.999  # |a| of a squashed action, as in the reward of box pushing
 
@@ -223,6 +229,7 @@ class Collector:
         self.begins = torch.ones(asked.envs, dtype=torch.bool, device=eyes.device)
         self.discounted, self.returns = np.zeros(asked.envs), np.zeros(asked.envs)
         self.scale = Running((1,))
+        self.gamma, self.imitating = asked.gamma, False
 
     @torch.no_grad()
     def collect(self) -> tuple[dict[str, torch.Tensor], torch.Tensor, list[tuple[float, bool]]]:
@@ -236,10 +243,13 @@ class Collector:
             row = {"image": self.obs[0], "rest": self.obs[1], "past": self.past, "action": action,
                    "begins": self.begins, "value": value,
                    "chance": log_likelihood(action, mean, self.agent.log_deviation)}  # fmt: skip
+            if self.imitating:
+                script = torch.from_numpy(self.env.scripted_action()).float()
+                row["script"] = script.to(self.eyes.device)
             obs, reward, terminated, truncated, info = self.env.step(driven(action, asked.squash))
             ended = terminated | truncated
             self.returns += reward
-            self.discounted = self.discounted * asked.gamma + reward
+            self.discounted = self.discounted * self.gamma + reward
             self.scale.add(self.discounted[:, None])
             scaled = reward / np.sqrt(self.scale.square[0] / self.scale.count + 1e-8)
             scaled = np.clip(scaled, -10, 10)
@@ -248,7 +258,7 @@ class Collector:
                 last = [info["final_obs"][e] for e in cut]
                 seen = self.eyes({k: np.stack([o[k] for o in last]) for k in last[0]})
                 worth = self.agent(*seen, after[cut], action[cut])[1].cpu().numpy()
-                scaled[cut] += asked.gamma * worth
+                scaled[cut] += self.gamma * worth
             if ended.any():
                 solved = info["final_info"]["success"]
                 these = np.flatnonzero(ended)
@@ -268,8 +278,8 @@ class Collector:
         advantage, found = torch.zeros_like(value), []
         for t in reversed(range(len(batch["value"]))):
             on = (~batch["end"][t]).float()
-            delta = batch["reward"][t] + self.asked.gamma * value * on - batch["value"][t]
-            advantage = delta + self.asked.gamma * self.asked.trace * on * advantage
+            delta = batch["reward"][t] + self.gamma * value * on - batch["value"][t]
+            advantage = delta + self.gamma * self.asked.trace * on * advantage
             value = batch["value"][t]
             found.append(advantage)
         return torch.stack(found[::-1])
@@ -295,6 +305,8 @@ def improve(agent: Agent, optimiser, batch, first: torch.Tensor, asked, draw: np
             a = part["advantage"]
             a = (a - a.mean()) / (a.std() + 1e-8)
             loss = torch.max(-a * ratio, -a * ratio.clamp(1 - asked.clip, 1 + asked.clip)).mean()
+            if "script" in part:
+                loss = (mean - part["script"]).square().mean()
             loss = loss + 0.5 * asked.value * (value - target[:, chosen]).square().mean()
             loss = loss - asked.entropy * agent.log_deviation.sum()
             optimiser.zero_grad()
@@ -340,8 +352,11 @@ def main() -> None:
                               threads=asked.threads)  # fmt: skip
     updates, curve, chosen = asked.steps // (asked.envs * asked.length), [], []
     best, kept = -np.inf, (agent, eyes)
+    grown = (1 - asked.last_gamma) / (1 - asked.gamma) if asked.last_gamma else 1.0
     for k in range(updates):
         optimiser.param_groups[0]["lr"] = asked.rate * (1 - k / updates)
+        collector.imitating = k < asked.imitate * updates
+        collector.gamma = 1 - (1 - asked.gamma) * (grown ** (k / updates))
         batch, first, ended = collector.collect()
         improve(agent, optimiser, batch, first, asked, draw)
         steps = (k + 1) * asked.envs * asked.length
@@ -351,8 +366,8 @@ def main() -> None:
             continue
         played = play(choice, CHOICE_SEED, Actor(agent, eyes, asked.squash)).summary()
         chosen.append([steps, played["return"], played["success"]])
-        if played["return"] > best:
-            best = played["return"]
+        if merit(played) > best:
+            best = merit(played)
             kept = copy.deepcopy((agent, eyes))
         reached = ", ".join(f"{name} {value:.4g}" for name, value in played.items())
         print(f"{steps} steps, {time.process_time() - begin:.0f} CPU s: {reached}",
