@@ -42,40 +42,45 @@ class Experiment:
     data: str = ""  #: arguments of `tangere generate`; the data set is out/learning/NAME
 
 
-PUSHES = "box_pushing --episodes 2000 --seed 1"
+PUSHES = "box_pushing --episodes 5000 --seed 1"
 MIXED = "box_pushing --episodes 1000 --seed 1 --noise 0.3 --mix random=0.5"
-CAPS = "cap_opening --episodes 300 --seed 1"
+DERIVED = "box_pushing --episodes 150 --seed 1 --noise 0.3 --gradients jacobians"
+CAPS = "cap_opening --episodes 1000 --seed 1"
 GRASPS = "stable_grasp --episodes 1000 --seed 1"
 INSERTIONS = "insertion --episodes 5000 --seed 1"
-CLONED = "bc.py out/learning/pushes --epochs 20 --batch 512 --before 1"
+CLONED = "bc.py out/learning/pushes --epochs 30 --batch 1024 --before 7 --width 1024"
+CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 
 # In the order in which they are made: what is worth most and costs least comes first.
 EXPERIMENTS = [
-    Experiment("gd-touch", "gd.py box_pushing --touch 0.05 --limit 3", 5, 100,
-               "GD, goal and touch", "0.058 m, 0.074"),
-    Experiment("gd-privileged", "gd.py box_pushing_privileged", 5, 90,
+    Experiment("gd-touch", "gd.py box_pushing --touch 0.05 --limit 30 --envs 64 --updates 600", 5,
+               310, "GD, goal and touch", "0.058 m, 0.074"),
+    Experiment("ppo-box", "ppo.py box_pushing", 5, 190, "PPO, goal and touch", "0.123 m, 0.241"),
+    Experiment("gd-privileged", "gd.py box_pushing_privileged", 5, 60,
                "GD, goal and box", "0.037 m, 0.043"),
-    Experiment("gd-reduced", "gd.py box_pushing_reduced", 5, 80, "GD, goal", "0.126 m, 0.255"),
-    Experiment("ppo-box", "ppo.py box_pushing", 5, 300, "PPO, goal and touch", "0.123 m, 0.241"),
-    Experiment("ppo-grasp", "ppo.py stable_grasp", 3, 300, "stable grasp, flow", "98.5 %, 2.1"),
-    Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 3, 250, "cap, blind", "59.7 %"),
-    Experiment("ppo-rotation", "ppo.py insertion_rotation", 3, 400, "insertion, yaw",
+    Experiment("gd-reduced", "gd.py box_pushing_reduced", 5, 60, "GD, goal", "0.126 m, 0.255"),
+    Experiment("ppo-rotation", "ppo.py insertion_rotation", 3, 120, "insertion, yaw",
                "100 %, 1.53"),
-    Experiment("ppo-cap", "ppo.py cap_opening", 3, 700, "cap, touch", "87.3 %"),
-    Experiment("ppo-translation", "ppo.py insertion_translation", 3, 400, "insertion, x and y",
+    Experiment("ppo-translation", "ppo.py insertion_translation", 3, 120, "insertion, x and y",
                "100 %, 2.33"),
-    Experiment("ppo-insertion", "ppo.py insertion", 3, 2000, "insertion, all", "83 %, 4.81"),
-    Experiment("bc-push", CLONED, 3, 120, "box pushing, goal and touch", data=f"pushes {PUSHES}"),
+    Experiment("ppo-insertion", "ppo.py insertion", 5, 220, "insertion, all", "83 %, 4.81"),
+    Experiment("ppo-grasp", "ppo.py stable_grasp", 3, 250, "stable grasp, flow", "98.5 %, 2.1"),
+    Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 3, 600, "cap, blind", "59.7 %"),
+    Experiment("ppo-cap", "ppo.py cap_opening", 3, 600, "cap, touch", "87.3 %"),
+    Experiment("bc-push", CLONED, 3, 250, "box pushing, goal and touch", data=f"pushes {PUSHES}"),
     Experiment("bc-push-blind", f"{CLONED} --without tactile", 3, 60, "box pushing, goal",
                data=f"pushes {PUSHES}"),
-    Experiment("bc-grasp", "bc.py out/learning/grasps", 3, 60, "stable grasp, flow",
+    Experiment("bc-grasp", "bc.py out/learning/grasps", 3, 10, "stable grasp, flow",
                data=f"grasps {GRASPS}"),
     Experiment("bc-insertion", "bc.py out/learning/insertions --epochs 60 --before 4 --recall", 3,
-               300, "insertion, flow", data=f"insertions {INSERTIONS}"),
-    Experiment("bc-cap", "bc.py out/learning/caps --epochs 20", 3, 200, "cap, touch",
+               200, "insertion, flow", data=f"insertions {INSERTIONS}"),
+    Experiment("bc-cap", CAPPED, 3, 200, "cap, touch", data=f"caps {CAPS}"),
+    Experiment("bc-cap-blind", f"{CAPPED} --without tactile", 3, 60, "cap, blind",
                data=f"caps {CAPS}"),
-    Experiment("bc-cap-blind", "bc.py out/learning/caps --epochs 20 --without tactile", 3, 60,
-               "cap, blind", data=f"caps {CAPS}"),
+    *(Experiment(f"match-{name}", f"matching.py out/learning/derived --match {weight}", 3, 60,
+                 text, data=f"derived {DERIVED}")
+      for name, weight, text in (("none", 0, "rows alone"), ("some", 0.01, "weight 0.01"),
+                                 ("more", 0.1, "weight 0.1"))),
     *(Experiment(f"offline-{method}", f"offline.py out/learning/mixed --method {method}", 3,
                  seconds, text, data=f"mixed {MIXED}")
       for method, seconds, text in (("bc", 60, "cloning"), ("td3", 250, "TD3 with cloning"),
