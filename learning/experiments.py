@@ -45,10 +45,10 @@ class Experiment:
 PUSHES = "box_pushing --episodes 5000 --seed 1"
 MIXED = "box_pushing --episodes 1000 --seed 1 --noise 0.3 --mix random=0.5"
 DERIVED = "box_pushing --episodes 150 --seed 1 --noise 0.3 --gradients jacobians"
-CAPS = "cap_opening --episodes 1000 --seed 1"
+CAPS = "cap_opening --episodes 300 --seed 1"
 GRASPS = "stable_grasp --episodes 1000 --seed 1"
 INSERTIONS = "insertion --episodes 5000 --seed 1"
-CLONED = "bc.py out/learning/pushes --epochs 30 --batch 1024 --before 7 --width 1024"
+CLONED = "bc.py out/learning/pushes --epochs 20 --batch 1024 --before 7 --width 512"
 CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 
 # In the order in which they are made: what is worth most and costs least comes first.
@@ -63,10 +63,10 @@ EXPERIMENTS = [
                "100 %, 1.53"),
     Experiment("ppo-translation", "ppo.py insertion_translation", 3, 120, "insertion, x and y",
                "100 %, 2.33"),
-    Experiment("ppo-insertion", "ppo.py insertion", 5, 220, "insertion, all", "83 %, 4.81"),
+    Experiment("ppo-insertion", "ppo.py insertion", 3, 220, "insertion, all", "83 %, 4.81"),
     Experiment("ppo-grasp", "ppo.py stable_grasp", 3, 250, "stable grasp, flow", "98.5 %, 2.1"),
-    Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 3, 600, "cap, blind", "59.7 %"),
-    Experiment("ppo-cap", "ppo.py cap_opening", 3, 600, "cap, touch", "87.3 %"),
+    Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 2, 500, "cap, blind", "59.7 %"),
+    Experiment("ppo-cap", "ppo.py cap_opening", 2, 600, "cap, touch", "87.3 %"),
     Experiment("bc-push", CLONED, 3, 250, "box pushing, goal and touch", data=f"pushes {PUSHES}"),
     Experiment("bc-push-blind", f"{CLONED} --without tactile", 3, 60, "box pushing, goal",
                data=f"pushes {PUSHES}"),

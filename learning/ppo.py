@@ -45,8 +45,10 @@ INSERTION = {"steps": 100_000, "envs": 64, "minibatch": 256, "deviation": 0.5, "
 TASKS: dict[str, dict[str, Any]] = {
     "stable_grasp": {"steps": 20_480, "envs": 32, "length": 64, "passes": 10, "minibatch": 256,
                      "deviation": 0.5, "gamma": 0.9},
-    "cap_opening": {"gamma": 0.95},
-    "cap_opening_blind": {"gamma": 0.95},
+    "cap_opening": {"steps": 1_500_000, "imitate": 0.8, "minibatch": 2048, "rate": 1e-3,
+                    "deviation": 0.3, "recurrent": True},
+    "cap_opening_blind": {"steps": 4_000_000, "imitate": 0.3, "minibatch": 1024, "rate": 5e-4,
+                          "deviation": 0.5},
     "insertion": INSERTION | {"steps": 200_000},
     "insertion_translation": INSERTION,
     "insertion_rotation": INSERTION,
