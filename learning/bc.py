@@ -87,7 +87,7 @@ def closed_loop(windows: Windows, clone: Clone, asked: argparse.Namespace) -> Pl
     return play(env, TEST_SEED, choose)
 
 
-def main() -> None:
+def settings() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", help="a folder of tangere generate")
     parser.add_argument("--seed", type=int, default=0)
@@ -103,7 +103,11 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=None, help="of the simulation")
     parser.add_argument("--device", default="cpu", help="where the network is: cpu, cuda")
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    asked = settings()
     torch.set_num_threads(1)
     torch.manual_seed(asked.seed)
 
@@ -111,7 +115,7 @@ def main() -> None:
     shown = [key for key in episodes.keys if key not in ("q", "v")]
     keys = [key for key in shown if key not in asked.without]
     if not keys or len(keys) + len(asked.without) != len(shown):
-        parser.error(f"--without {asked.without}; the data set shows {shown}")
+        raise SystemExit(f"--without {asked.without}; the data set shows {shown}")
     windows = Windows(episodes, keys, before=asked.before, only_success=not asked.all)
     task = tangere.task_spec(windows.episodes.task)
     begin, clock = time.process_time(), time.perf_counter()

@@ -124,14 +124,17 @@ def make_data(experiment: Experiment) -> None:
     """Generates the data set of an experiment if it is not there."""
     name, _, arguments = experiment.data.partition(" ")
     folder = ROOT / "out/learning" / name
+    folder.parent.mkdir(parents=True, exist_ok=True)
     if not name or (folder / "robomimic.hdf5").exists():
         return
     print(f"data set: tangere generate {arguments}", flush=True)
-    subprocess.run(
+    done = subprocess.run(
         [ROOT / "build/release/tangere", "generate", *arguments.split(), "--output", folder,
          "--overwrite", "--quiet"],
-        check=True, cwd=ROOT, stdin=subprocess.DEVNULL,
+        cwd=ROOT, stdin=subprocess.DEVNULL,
     )  # fmt: skip
+    if done.returncode not in (0, 1):  # 1: some episodes failed and are kept apart
+        raise SystemExit(f"the data set {name} could not be made (reason above)")
 
 
 def command_of(experiment: Experiment, seed: int, device: str) -> list[str]:

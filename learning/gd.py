@@ -104,7 +104,7 @@ def update(
     return float(total.detach().mean())
 
 
-def main() -> None:
+def settings() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     tasks = [name for name in tangere.task_names() if name.startswith("box_pushing")]
     parser.add_argument("task", nargs="?", default="box_pushing", choices=tasks)
@@ -120,7 +120,11 @@ def main() -> None:
     parser.add_argument("--goals", type=int, default=1000, help="to test on")
     parser.add_argument("--threads", type=int, default=None)
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    asked = settings()
     torch.set_num_threads(1)
     torch.manual_seed(asked.seed)
 

@@ -88,7 +88,7 @@ def fit(
     return model
 
 
-def main() -> None:
+def settings() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", help="a folder of tangere generate --gradients jacobians")
     parser.add_argument("--match", type=float, default=0.0, help="weight of the derivatives")
@@ -97,7 +97,11 @@ def main() -> None:
     parser.add_argument("--batch", type=int, default=256)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    asked = settings()
     torch.set_num_threads(1)
     torch.manual_seed(asked.seed)
     draw = np.random.default_rng(asked.seed)
@@ -105,7 +109,7 @@ def main() -> None:
     episodes = Episodes(asked.data)
     train, valid = episodes.mask("train"), episodes.mask("valid")
     if max(asked.sizes) > len(train):
-        parser.error(f"--sizes {asked.sizes}; the data set has {len(train)} episodes to learn from")
+        raise SystemExit(f"--sizes {asked.sizes}; the data set has {len(train)} episodes to learn from")
     begin, clock = time.process_time(), time.perf_counter()
     test = rows_of(episodes, valid)
     order = draw.permutation(train)
