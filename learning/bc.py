@@ -46,26 +46,28 @@ def flat(obs: dict[str, np.ndarray], past: np.ndarray) -> torch.Tensor:
 
 def train(windows: Windows, clone: Clone, asked: argparse.Namespace) -> None:
     """Least squares to the actions of the data set."""
-    recall, epochs, batch, rate = asked.recall, asked.epochs, asked.batch, asked.rate
-    optimiser = torch.optim.AdamW(clone.parameters(), lr=rate, weight_decay=1e-4)
-    steps = epochs * -(-len(windows) // batch)
+    optimiser = torch.optim.AdamW(clone.parameters(), lr=asked.rate, weight_decay=1e-4)
+    steps = asked.epochs * -(-len(windows) // asked.batch)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
-    for epoch in range(epochs):
-        for rows in windows.batches(batch, seed=asked.seed * 1000 + epoch):
-            past = rows["past_actions"] if recall else rows["past_actions"][:, :0]
-            seen = flat(rows["obs"], past)
-            loss = (clone(seen) - torch.from_numpy(rows["actions"][:, 0])).square().mean()
+    for epoch in range(asked.epochs):
+        for rows in windows.batches(asked.batch, seed=asked.seed * 1000 + epoch):
+            past = rows["past_actions"] if asked.recall else rows["past_actions"][:, :0]
+            seen = flat(rows["obs"], past).to(asked.device)
+            wanted = torch.from_numpy(rows["actions"][:, 0]).to(asked.device)
+            loss = (clone(seen) - wanted).square().mean()
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
             schedule.step()
 
 
-def closed_loop(windows: Windows, clone: Clone, recall: bool, episodes: int) -> Played:
+def closed_loop(windows: Windows, clone: Clone, asked: argparse.Namespace) -> Played:
     """The clone in the test episodes of its task."""
+    episodes = asked.episodes
     env = tangere.make_vec(
-        windows.episodes.task, episodes, autoreset="disabled", keys=windows.keys
-    )
+        windows.episodes.task, episodes, autoreset="disabled", keys=windows.keys,
+        threads=asked.threads,
+    )  # fmt: skip
     history: list[dict[str, np.ndarray]] = []
     past: list[np.ndarray] = []
 
@@ -75,16 +77,17 @@ def closed_loop(windows: Windows, clone: Clone, recall: bool, episodes: int) -> 
             past[:] = [np.zeros((episodes, *env.task.action.shape), np.float32)] * windows.before
         history[:] = [*history[1:], obs]
         stacked = {k: np.stack([h[k] for h in history], axis=1) for k in windows.keys}
-        between = np.stack(past, axis=1) if past and recall else np.zeros((episodes, 0), np.float32)
+        recalled = past if past and asked.recall else [np.zeros((episodes, 0), np.float32)]
         with torch.no_grad():
-            action = clone(flat(stacked, between)).numpy()
+            seen = flat(stacked, np.stack(recalled, axis=1))
+            action = clone(seen.to(asked.device)).cpu().numpy()
         past[:] = [*past, action][len(past) + 1 - windows.before :] if windows.before else []
         return action
 
     return play(env, TEST_SEED, choose)
 
 
-def main() -> None:
+def settings() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", help="a folder of tangere generate")
     parser.add_argument("--seed", type=int, default=0)
@@ -97,8 +100,14 @@ def main() -> None:
     parser.add_argument("--without", nargs="*", default=[], help="observations to leave out")
     parser.add_argument("--all", action="store_true", help="learn from failed episodes too")
     parser.add_argument("--episodes", type=int, default=1000, help="to play")
+    parser.add_argument("--threads", type=int, default=None, help="of the simulation")
+    parser.add_argument("--device", default="cpu", help="where the network is: cpu, cuda")
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    asked = settings()
     torch.set_num_threads(1)
     torch.manual_seed(asked.seed)
 
@@ -106,7 +115,7 @@ def main() -> None:
     shown = [key for key in episodes.keys if key not in ("q", "v")]
     keys = [key for key in shown if key not in asked.without]
     if not keys or len(keys) + len(asked.without) != len(shown):
-        parser.error(f"--without {asked.without}; the data set shows {shown}")
+        raise SystemExit(f"--without {asked.without}; the data set shows {shown}")
     windows = Windows(episodes, keys, before=asked.before, only_success=not asked.all)
     task = tangere.task_spec(windows.episodes.task)
     begin, clock = time.process_time(), time.perf_counter()
@@ -114,14 +123,17 @@ def main() -> None:
     inputs = sum(v.size for v in first["obs"].values())
     inputs += first["past_actions"].size if asked.recall else 0
     clone = Clone(inputs, first["actions"].shape[1], asked.width, task.action.low, task.action.high)
+    clone.to(asked.device)
     train(windows, clone, asked)
     cost = {"train_cpu_s": time.process_time() - begin,
             "train_wall_s": time.perf_counter() - clock}  # fmt: skip
-    env = tangere.make_vec(task.name, asked.episodes, autoreset="disabled")
+    env = tangere.make_vec(
+        task.name, asked.episodes, autoreset="disabled", threads=asked.threads
+    )
     script = play(env, TEST_SEED, lambda env, _obs, _t: env.scripted_action()).summary()
-    result = closed_loop(windows, clone, asked.recall, asked.episodes).summary()
+    result = closed_loop(windows, clone, asked).summary()
     if asked.json:
-        print(json.dumps({"program": "bc", "settings": vars(asked), **provenance(), **cost,
+        print(json.dumps({"program": "bc", "settings": vars(asked), **provenance(asked.device), **cost,
                           "task": task.name, "keys": keys, "data": source(windows.episodes.masks),
                           "rows": len(windows), "script": script, "test": result}))  # fmt: skip
         return

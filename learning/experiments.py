@@ -5,13 +5,17 @@
     python learning/experiments.py --only gd-touch ppo-box --jobs 2
 
 A run is one command with one seed. What it prints with --json is kept as
-learning/results/NAME-SEED.json; a file that exists is not made again. Data sets go to out/. Every
-program runs on one thread. ./run-learning builds what is needed and calls this.
+learning/results/NAME-SEED.json, with the command, the arguments of its data set and the commit. A
+file that has the same command and arguments as here is not made again; another one is stale and
+does not count. Data sets go to out/. Every program runs on one thread. With `--device cuda` those
+that learn from batches have their networks on a GPU. ./run-learning builds what is needed and calls
+this.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import subprocess
 import sys
@@ -19,6 +23,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[1]
 RESULTS = Path(__file__).parent / "results"
@@ -37,40 +42,45 @@ class Experiment:
     data: str = ""  #: arguments of `tangere generate`; the data set is out/learning/NAME
 
 
-PUSHES = "box_pushing --episodes 2000 --seed 1"
+PUSHES = "box_pushing --episodes 5000 --seed 1"
 MIXED = "box_pushing --episodes 1000 --seed 1 --noise 0.3 --mix random=0.5"
+DERIVED = "box_pushing --episodes 150 --seed 1 --noise 0.3 --gradients jacobians"
 CAPS = "cap_opening --episodes 300 --seed 1"
 GRASPS = "stable_grasp --episodes 1000 --seed 1"
 INSERTIONS = "insertion --episodes 5000 --seed 1"
-CLONED = "bc.py out/learning/pushes --epochs 20 --batch 512 --before 1"
+CLONED = "bc.py out/learning/pushes --epochs 20 --batch 1024 --before 7 --width 512"
+CAPPED = "bc.py out/learning/caps --epochs 20 --before 3 --width 512"
 
 # In the order in which they are made: what is worth most and costs least comes first.
 EXPERIMENTS = [
-    Experiment("gd-touch", "gd.py box_pushing --touch 0.05 --limit 3", 5, 100,
-               "GD, goal and touch", "0.058 m, 0.074"),
-    Experiment("gd-privileged", "gd.py box_pushing_privileged", 5, 90,
+    Experiment("gd-touch", "gd.py box_pushing --touch 0.05 --limit 30 --envs 64 --updates 600", 5,
+               310, "GD, goal and touch", "0.058 m, 0.074"),
+    Experiment("ppo-box", "ppo.py box_pushing", 5, 190, "PPO, goal and touch", "0.123 m, 0.241"),
+    Experiment("gd-privileged", "gd.py box_pushing_privileged", 5, 60,
                "GD, goal and box", "0.037 m, 0.043"),
-    Experiment("gd-reduced", "gd.py box_pushing_reduced", 5, 80, "GD, goal", "0.126 m, 0.255"),
-    Experiment("ppo-box", "ppo.py box_pushing", 5, 300, "PPO, goal and touch", "0.123 m, 0.241"),
-    Experiment("ppo-grasp", "ppo.py stable_grasp", 3, 300, "stable grasp, flow", "98.5 %, 2.1"),
-    Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 3, 250, "cap, blind", "59.7 %"),
-    Experiment("ppo-rotation", "ppo.py insertion_rotation", 3, 400, "insertion, yaw",
+    Experiment("gd-reduced", "gd.py box_pushing_reduced", 5, 60, "GD, goal", "0.126 m, 0.255"),
+    Experiment("ppo-rotation", "ppo.py insertion_rotation", 3, 120, "insertion, yaw",
                "100 %, 1.53"),
-    Experiment("ppo-cap", "ppo.py cap_opening", 3, 700, "cap, touch", "87.3 %"),
-    Experiment("ppo-translation", "ppo.py insertion_translation", 3, 400, "insertion, x and y",
+    Experiment("ppo-translation", "ppo.py insertion_translation", 3, 120, "insertion, x and y",
                "100 %, 2.33"),
-    Experiment("ppo-insertion", "ppo.py insertion", 3, 2000, "insertion, all", "83 %, 4.81"),
-    Experiment("bc-push", CLONED, 3, 120, "box pushing, goal and touch", data=f"pushes {PUSHES}"),
+    Experiment("ppo-insertion", "ppo.py insertion", 3, 220, "insertion, all", "83 %, 4.81"),
+    Experiment("ppo-grasp", "ppo.py stable_grasp", 3, 250, "stable grasp, flow", "98.5 %, 2.1"),
+    Experiment("ppo-cap-blind", "ppo.py cap_opening_blind", 3, 470, "cap, blind", "59.7 %"),
+    Experiment("ppo-cap", "ppo.py cap_opening", 3, 300, "cap, touch", "87.3 %"),
+    Experiment("bc-push", CLONED, 3, 250, "box pushing, goal and touch", data=f"pushes {PUSHES}"),
     Experiment("bc-push-blind", f"{CLONED} --without tactile", 3, 60, "box pushing, goal",
                data=f"pushes {PUSHES}"),
-    Experiment("bc-grasp", "bc.py out/learning/grasps", 3, 60, "stable grasp, flow",
+    Experiment("bc-grasp", "bc.py out/learning/grasps", 3, 10, "stable grasp, flow",
                data=f"grasps {GRASPS}"),
     Experiment("bc-insertion", "bc.py out/learning/insertions --epochs 60 --before 4 --recall", 3,
-               300, "insertion, flow", data=f"insertions {INSERTIONS}"),
-    Experiment("bc-cap", "bc.py out/learning/caps --epochs 20", 3, 200, "cap, touch",
+               200, "insertion, flow", data=f"insertions {INSERTIONS}"),
+    Experiment("bc-cap", CAPPED, 3, 200, "cap, touch", data=f"caps {CAPS}"),
+    Experiment("bc-cap-blind", f"{CAPPED} --without tactile", 3, 60, "cap, blind",
                data=f"caps {CAPS}"),
-    Experiment("bc-cap-blind", "bc.py out/learning/caps --epochs 20 --without tactile", 3, 60,
-               "cap, blind", data=f"caps {CAPS}"),
+    *(Experiment(f"match-{name}", f"matching.py out/learning/derived --match {weight}", 3, 60,
+                 text, data=f"derived {DERIVED}")
+      for name, weight, text in (("none", 0, "rows alone"), ("some", 0.01, "weight 0.01"),
+                                 ("more", 0.1, "weight 0.1"))),
     *(Experiment(f"offline-{method}", f"offline.py out/learning/mixed --method {method}", 3,
                  seconds, text, data=f"mixed {MIXED}")
       for method, seconds, text in (("bc", 60, "cloning"), ("td3", 250, "TD3 with cloning"),
@@ -78,30 +88,66 @@ EXPERIMENTS = [
 ]  # fmt: skip
 
 
+WITH_DEVICE = ("ppo.py", "bc.py")  # programs that have --device
+
+
 def result_of(experiment: Experiment, seed: int) -> Path:
     return RESULTS / f"{experiment.name}-{seed}.json"
+
+
+def made_by(experiment: Experiment) -> dict[str, str]:
+    """What a result says of the experiment that it belongs to."""
+    return {"command": experiment.command, "data": experiment.data}
+
+
+def stored(experiment: Experiment, seed: int) -> dict[str, Any] | None:
+    """The result of a run; None if there is none, or one of another command or data set."""
+    path = result_of(experiment, seed)
+    if not path.exists():
+        return None
+    result = json.loads(path.read_text())
+    return result if result.get("experiment") == made_by(experiment) else None
+
+
+def commit() -> str:
+    """The commit that is checked out, with "-dirty" if files differ from it; "" without git."""
+    try:
+        return subprocess.run(
+            ["git", "describe", "--always", "--dirty", "--abbrev=12"],
+            cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=True,
+        ).stdout.strip()  # fmt: skip
+    except (OSError, subprocess.CalledProcessError):
+        return ""
 
 
 def make_data(experiment: Experiment) -> None:
     """Generates the data set of an experiment if it is not there."""
     name, _, arguments = experiment.data.partition(" ")
     folder = ROOT / "out/learning" / name
+    folder.parent.mkdir(parents=True, exist_ok=True)
     if not name or (folder / "robomimic.hdf5").exists():
         return
     print(f"data set: tangere generate {arguments}", flush=True)
-    subprocess.run(
+    done = subprocess.run(
         [ROOT / "build/release/tangere", "generate", *arguments.split(), "--output", folder,
          "--overwrite", "--quiet"],
-        check=True, cwd=ROOT, stdin=subprocess.DEVNULL,
+        cwd=ROOT, stdin=subprocess.DEVNULL,
     )  # fmt: skip
+    if done.returncode not in (0, 1):  # 1: some episodes failed and are kept apart
+        raise SystemExit(f"the data set {name} could not be made (reason above)")
 
 
-def make(experiment: Experiment, seed: int) -> bool:
-    """Makes one result; says how it went and returns whether it is there."""
+def command_of(experiment: Experiment, seed: int, device: str) -> list[str]:
+    """The words after the interpreter."""
     program, *arguments = experiment.command.split()
-    command = [sys.executable, f"learning/{program}", *arguments, "--seed", str(seed), "--json"]
-    if program != "bc.py":
-        command += ["--threads", "1"]
+    command = [f"learning/{program}", *arguments, "--seed", str(seed), "--json"]
+    command += ["--threads", "1"] if program != "matching.py" else []
+    return command + (["--device", device] if program in WITH_DEVICE else [])
+
+
+def make(experiment: Experiment, seed: int, device: str) -> bool:
+    """Makes one result; says how it went and returns whether it is there."""
+    command = [sys.executable, *command_of(experiment, seed, device)]
     begin = time.perf_counter()
     done = subprocess.run(
         command, cwd=ROOT, env=os.environ | {"OMP_NUM_THREADS": "1"}, stdin=subprocess.DEVNULL,
@@ -113,7 +159,8 @@ def make(experiment: Experiment, seed: int) -> bool:
               file=sys.stderr, flush=True)  # fmt: skip
         return False
     partial = result_of(experiment, seed).with_suffix(".part")
-    partial.write_text(done.stdout)
+    said = {"experiment": made_by(experiment), "commit": commit()} | json.loads(done.stdout)
+    partial.write_text(json.dumps(said) + "\n")
     partial.rename(result_of(experiment, seed))
     print(f"{experiment.name} {seed}: {took}", flush=True)
     return True
@@ -125,16 +172,18 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=names, default=names, metavar="NAME")
     parser.add_argument("--seeds", type=int, help="at most; the default is each one's own number")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="at once")
+    parser.add_argument("--device", default="cpu", help="of networks that learn from batches")
     parser.add_argument("--list", action="store_true", help="say what there is and what it costs")
     asked = parser.parse_args()
     wanted = [e for e in EXPERIMENTS if e.name in asked.only]
     runs = [(e, s) for e in wanted for s in range(min(e.seeds, asked.seeds or e.seeds))
-            if not result_of(e, s).exists()]  # fmt: skip
+            if stored(e, s) is None]  # fmt: skip
     if asked.list:
         for e in wanted:
             missing = sum(run[0] is e for run in runs)
-            print(f"{e.name:16} {e.seeds} runs of {e.seconds:5} CPU s, {missing} missing: "
-                  f"{e.command}")  # fmt: skip
+            stale = sum(run[0] is e and result_of(*run).exists() for run in runs)
+            print(f"{e.name:16} {e.seeds} runs of {e.seconds:5} CPU s, {missing} missing, "
+                  f"{stale} of them stale: {e.command}")  # fmt: skip
         return
     print(f"{len(runs)} runs, about {sum(e.seconds for e, _ in runs) / 60:.0f} CPU minutes, "
           f"{asked.jobs} at once", flush=True)  # fmt: skip
@@ -142,7 +191,7 @@ def main() -> None:
     for experiment in {e.name: e for e, _ in runs}.values():
         make_data(experiment)
     with ThreadPoolExecutor(asked.jobs) as pool:
-        made = list(pool.map(lambda run: make(*run), runs))
+        made = list(pool.map(lambda run: make(*run, asked.device), runs))
     if not all(made):
         raise SystemExit(f"{made.count(False)} of {len(made)} runs failed (reasons above)")
 

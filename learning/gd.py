@@ -11,12 +11,11 @@ goes back through the simulation and gives G_et = ∂R_e/∂a_et, all later reac
 included. The second is Σ_e s_e Σ_t G_et ∂a_et/∂w / E with the observations held. Between them one
 sees how large an episode's G_e is: the loop may amplify derivatives, and then one episode of
 10^5 times the others' size owns the update. `--limit k` sets s_e = min(1, k median|G| / |G_e|).
-`--carry c` lets the share c of ∂R/∂o pass each observation on the way back: what goes round the
-loop k times counts c^k. With c < 1 this is not the gradient of R any more.
+`--average d` plays, chooses and tests an average of the weights, w̄ ← d w̄ + (1 - d) w at every
+update.
 
-Every 20 updates the policy plays 300 goals of another seed. The one with the least mean error,
-|Δp|/0.1 m + |Δθ|/0.276 rad in the reward's own proportion, is kept and tested on fresh goals. The
-reward is quadratic in the gap between hand and box, so a few lost boxes may decide a mean return.
+Every 10 updates the policy plays 300 goals of another seed. The one with the least mean error,
+|Δp|/0.1 m + |Δθ|/0.276 rad in the reward's own proportion, is kept and tested on fresh goals.
 Prints the mean errors in place [m] and yaw [rad].
 """
 
@@ -30,14 +29,13 @@ import time
 
 import numpy as np
 import torch
-from protocol import CHOICE_EPISODES, CHOICE_SEED, TEST_SEED, play, provenance
+from protocol import CHOICE_EPISODES, CHOICE_SEED, TEST_SEED, merit, play, provenance
 from torch import nn
 
 import tangere
 import tangere.torch
 
-CHOICE_EVERY = 20  # updates
-PLACE_UNIT, YAW_UNIT = 0.1, 0.276  # [m], [rad]: what costs 1 in the reward
+CHOICE_EVERY = 10  # updates
 
 
 def small_policy(inputs: int, actions: int) -> nn.Module:
@@ -85,7 +83,7 @@ def limited(by_action: torch.Tensor, limit: float) -> torch.Tensor:
 
 def update(
     tape: tangere.torch.Tape, policy: nn.Module, gains: torch.Tensor, limit: float,
-    carry: float, seed: int, first_episode: int,
+    seed: int, first_episode: int,
 ) -> float:  # fmt: skip
     """Leaves the gradient of minus the mean return in the policy's weights; returns that mean."""
     obs = tape.reset(seed=seed, first_episode=first_episode)
@@ -93,8 +91,6 @@ def update(
     total = torch.zeros(tape.num_envs, dtype=torch.float64)
     for t in range(tape.actions):
         seen.append(obs.detach())
-        if carry < 1 and obs.requires_grad:
-            obs.register_hook(lambda g: carry * g)
         action = act(policy, obs, gains)
         action.register_hook(lambda g, t=t: by_action.__setitem__(t, g))
         obs, reward, _ = tape.step(action)
@@ -108,7 +104,7 @@ def update(
     return float(total.detach().mean())
 
 
-def main() -> None:
+def settings() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     tasks = [name for name in tangere.task_names() if name.startswith("box_pushing")]
     parser.add_argument("task", nargs="?", default="box_pushing", choices=tasks)
@@ -119,12 +115,16 @@ def main() -> None:
     parser.add_argument("--touch", type=float, default=1.0, help="factor of what is felt")
     limit = "most that an episode counts, in medians of the update's episodes; 0: no limit"
     parser.add_argument("--limit", type=float, default=0.0, help=limit)
-    carry = "share of a derivative that passes an observation; 1: the gradient"
-    parser.add_argument("--carry", type=float, default=1.0, help=carry)
+    average = "decay of the average of weights that is played; 0: the last weights"
+    parser.add_argument("--average", type=float, default=0.0, help=average)
     parser.add_argument("--goals", type=int, default=1000, help="to test on")
     parser.add_argument("--threads", type=int, default=None)
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    asked = settings()
     torch.set_num_threads(1)
     torch.manual_seed(asked.seed)
 
@@ -132,27 +132,30 @@ def main() -> None:
     tape = tangere.torch.Tape(asked.task, asked.envs, threads=asked.threads, flatten=True)
     gains = touch_gains(tape.spec, asked.touch)
     policy = small_policy(len(gains), tape.spec.action.shape[0])
+    shown = copy.deepcopy(policy)
     optimiser = torch.optim.Adam(policy.parameters(), lr=asked.rate, betas=(0.7, 0.95))
     schedule = torch.optim.lr_scheduler.LambdaLR(
         optimiser, lambda k: 1 - (1 - 1e-5 / asked.rate) * k / asked.updates
     )
     still = {"flatten": True, "autoreset": "disabled", "threads": asked.threads}
     choice = tangere.make_vec(asked.task, CHOICE_EPISODES, **still)
-    best, kept, curve, chosen = np.inf, None, [], []
+    best, kept, curve, chosen = -np.inf, None, [], []
     for k in range(asked.updates):
-        curve.append(update(tape, policy, gains, asked.limit, asked.carry, 1 + asked.seed,
-                            k * asked.envs))  # fmt: skip
+        curve.append(update(tape, policy, gains, asked.limit, 1 + asked.seed, k * asked.envs))
         norm = nn.utils.clip_grad_norm_(policy.parameters(), 1.0)
         if torch.isfinite(norm):  # an update that overflowed teaches nothing
             optimiser.step()
         schedule.step()
+        with torch.no_grad():
+            decay = asked.average if k else 0.0
+            for mean, now in zip(shown.parameters(), policy.parameters()):
+                mean.copy_(decay * mean + (1 - decay) * now)
         if (k + 1) % CHOICE_EVERY and k + 1 < asked.updates:
             continue
-        played = play(choice, CHOICE_SEED, player(policy, gains)).summary()
+        played = play(choice, CHOICE_SEED, player(shown, gains)).summary()
         chosen.append([k + 1, played["return"], played["position_m"], played["yaw_rad"]])
-        error = played["position_m"] / PLACE_UNIT + played["yaw_rad"] / YAW_UNIT
-        if error < best:
-            best, kept = error, copy.deepcopy(policy)
+        if merit(played) > best:
+            best, kept = merit(played), copy.deepcopy(shown)
         errors = f"{played['position_m']:.3f} m, {played['yaw_rad']:.3f} rad"
         print(f"update {k + 1}: return {played['return']:.1f}, {errors}, "
               f"gradient norm {float(norm):.3g}", file=sys.stderr, flush=True)  # fmt: skip

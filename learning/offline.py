@@ -158,7 +158,7 @@ class Learner:
             old.lerp_(new, FOLLOW)
 
 
-def main() -> None:
+def settings() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", help="a folder of tangere generate")
     parser.add_argument("--method", choices=["bc", "td3", "iql"], default="iql")
@@ -169,7 +169,11 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=1000, help="to play")
     parser.add_argument("--threads", type=int, default=None)
     parser.add_argument("--json", action="store_true")
-    asked = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    asked = settings()
     torch.set_num_threads(1)
     torch.manual_seed(asked.seed)
 
@@ -177,7 +181,7 @@ def main() -> None:
     keys = [key for key in episodes.keys if key not in episodes.privileged]
     task = tangere.task_spec(episodes.task)
     if (task.action.low, task.action.high) != (-1.0, 1.0):
-        parser.error(f"{task.name}: actions are not within [-1, 1]")
+        raise SystemExit(f"{task.name}: actions are not within [-1, 1]")
     rows = rows_of(episodes, keys)
     draw = np.random.default_rng(asked.seed)
     begin, clock = time.process_time(), time.perf_counter()

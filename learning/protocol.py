@@ -16,12 +16,14 @@ from pathlib import Path
 from typing import Any, Callable, Sequence
 
 import numpy as np
+import torch
 
 import tangere
 
 TEST_SEED = 1000003  # of the episodes that policies are tested on; no data set is made with it
 CHOICE_SEED = 2000003  # of those by which the best policy of a run is chosen
 CHOICE_EPISODES = 300
+PLACE_UNIT, YAW_UNIT = 0.1, 0.276  # [m], [rad]: what costs 1 in the reward of box pushing
 
 # t_{0.975, k-1} for k = 2 … 10 runs, from a table of Student's distribution.
 _STUDENT = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262)
@@ -74,6 +76,17 @@ def play(env: tangere.gym.VectorTaskEnv, seed: int, choose: Choose) -> Played:
     return Played(solved, returns, actions, position, yaw)
 
 
+def merit(played: dict[str, float]) -> float:
+    """By which the best policy of a run is chosen, from a summary.
+
+    It is the mean return. In box pushing it is minus the mean errors, in the reward's proportion:
+    the reward is quadratic in the gap between hand and box, so a few lost boxes decide a mean.
+    """
+    if "position_m" not in played:
+        return played["return"]
+    return -(played["position_m"] / PLACE_UNIT + played["yaw_rad"] / YAW_UNIT)
+
+
 def box_errors(env: tangere.gym.VectorTaskEnv) -> tuple[np.ndarray, np.ndarray]:
     """Box pushing: distance [m] and angle [rad] between box and goal, each (E)."""
     q, _, memory = env.state()
@@ -100,14 +113,16 @@ def student(values: Sequence[float]) -> float:
     return float(_STUDENT[len(values) - 2] * np.std(values, ddof=1) / np.sqrt(len(values)))
 
 
-def provenance() -> dict[str, str]:
-    """The version and the machine of a result."""
+def provenance(device: str = "cpu") -> dict[str, str]:
+    """The version and the machine of a result. `device`: where PyTorch's networks were."""
     cpu = platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
         models = [line for line in info.read_text().splitlines() if line.startswith("model name")]
         cpu = models[0].split(":", 1)[1].strip() if models else cpu
-    return {"version": tangere.__version__, "machine": cpu}
+    said = {"version": tangere.__version__, "machine": cpu,
+            "instruction_set": tangere._core.instruction_set}  # fmt: skip
+    return said | ({"device": torch.cuda.get_device_name(device)} if device != "cpu" else {})
 
 
 def source(merged: Path) -> dict[str, str]:

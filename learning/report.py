@@ -5,29 +5,31 @@
     python learning/report.py --write     # puts them into the README, and draws the figure
 
 A number is the mean over runs. ± is half of a 95 % interval: Student's over the runs; for rates of
-success the larger of that and Wilson's over all their episodes. One run of an error has none.
+success the larger of that and Wilson's over the episodes of a test, which all runs share. An error
+of one run has no interval.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any, Sequence
 
 import numpy as np
-from experiments import EXPERIMENTS, Experiment, result_of
+import experiments
+from experiments import EXPERIMENTS, Experiment
 from protocol import student, wilson
 
 PAGE = Path(__file__).parent / "README.md"
 FIGURE = Path(__file__).parent / "results" / "box_pushing.svg"
+MATCHED = (1, 2, 5, 10, 25, 100)  # episodes that a model is learned from
 BEGIN, END = "<!-- made by report.py -->\n", "<!-- end of what report.py made -->\n"
 
 
 def stored(experiment: Experiment) -> list[dict[str, Any]]:
-    """The results of an experiment that are there, by seed."""
-    paths = [result_of(experiment, seed) for seed in range(experiment.seeds)]
-    return [json.loads(path.read_text()) for path in paths if path.exists()]
+    """The results of an experiment that are there and not stale, by seed."""
+    found = [experiments.stored(experiment, seed) for seed in range(experiment.seeds)]
+    return [result for result in found if result is not None]
 
 
 def mean(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
@@ -40,7 +42,7 @@ def mean(values: Sequence[float], unit: str = "", digits: int = 3) -> str:
 def rate(runs: list[dict[str, Any]]) -> str:
     """Successes in percent."""
     rates = [run["test"]["success"] for run in runs]
-    low, high = wilson(float(np.mean(rates)), sum(run["test"]["episodes"] for run in runs))
+    low, high = wilson(float(np.mean(rates)), min(run["test"]["episodes"] for run in runs))
     half = (high - low) / 2
     if len(rates) > 1:
         half = max(half, student(rates))
@@ -49,6 +51,12 @@ def rate(runs: list[dict[str, Any]]) -> str:
 
 def tested(runs: list[dict[str, Any]], name: str) -> list[float]:
     return [run["test"][name] for run in runs]
+
+
+def until(runs: list[dict[str, Any]]) -> str:
+    """Actions of the episodes that were solved, of the runs that solved any."""
+    counts = [run["test"]["actions_solved"] for run in runs if run["test"]["success"] > 0]
+    return mean(counts, "", 2) if counts else "–"
 
 
 def cost(runs: list[dict[str, Any]]) -> str:
@@ -100,8 +108,7 @@ def tables() -> str:
     reinforced = table(
         "| PPO | success | actions until it | actions | CPU | runs | paper |",
         tuple(e.name for e in EXPERIMENTS if e.name.startswith("ppo-") and e.name != "ppo-box"),
-        lambda runs: [rate(runs), mean(tested(runs, "actions_solved"), "", 2), steps(runs),
-                      cost(runs)],
+        lambda runs: [rate(runs), until(runs), steps(runs), cost(runs)],
     )  # fmt: skip
     cloned = table(
         "| clone | success | script | rows | CPU | runs |", ("bc-",),
@@ -112,8 +119,13 @@ def tables() -> str:
         "| mixed data | score | success | CPU | runs |", ("offline-",),
         lambda runs: [mean(tested(runs, "score"), "", 1), rate(runs), cost(runs)],
     )  # fmt: skip
+    matched = table(
+        "| derivatives | " + " | ".join(str(n) for n in MATCHED) + " | CPU | runs |", ("match-",),
+        lambda runs: [*(mean([dict(map(tuple, run["curve"]))[n] for run in runs])
+                        for n in MATCHED), cost(runs)],
+    )  # fmt: skip
     picture = "![Return against actions of training](results/box_pushing.svg)\n" if figure() else ""
-    parts = (pushed, picture, reinforced, cloned, offline, missing())
+    parts = (pushed, picture, reinforced, cloned, offline, matched, missing())
     return "\n" + "\n".join(filter(None, parts)) + "\n"
 
 

@@ -10,7 +10,7 @@
 
 `tangere.gym` has the environments, `tangere.torch` gradients through PyTorch, `tangere.data` data
 sets for learning, `tangere.policy` policies that the command asks. `tangere.lerobot`,
-`tangere.robomimic` and `tangere.sb3` are doors to the libraries of these names. All but
+`tangere.robomimic` and `tangere.sb3` connect to the libraries of these names. All but
 `tangere.gym` and `tangere.policy` need packages that `import tangere` does not import.
 """
 

@@ -111,6 +111,16 @@ def _converse(
     normalise: bool,
 ) -> None:  # fmt: skip
     """Answers the command until it has no more questions. Returns at once if it ends before."""
+    failed = False
+
+    def answer(*question: Any) -> Any:
+        nonlocal failed
+        try:
+            return choose(*question)
+        except BaseException:
+            failed = True
+            raise
+
     while True:
         try:
             helper, _ = listener.accept()
@@ -123,9 +133,11 @@ def _converse(
         with socket.socket(fileno=descriptors[0]) as conversation:
             with conversation.makefile("rb") as input, conversation.makefile("wb") as output:
                 try:
-                    policies.converse(input, output, choose, name, normalise=normalise)
+                    policies.converse(input, output, answer, name, normalise=normalise)
                 except (BrokenPipeError, ConnectionResetError):
-                    pass  # the command has stopped, and says why
+                    if failed:  # the policy's own
+                        raise
+                    # Else the command has stopped, and says why.
 
 
 def _result(code: int, out: str, err: str) -> dict[str, Any]:

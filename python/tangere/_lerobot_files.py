@@ -296,14 +296,13 @@ def _sync(file: Any) -> None:
 def new_folder(output: Path, overwrite: bool) -> Iterator[Path]:
     """A folder OUTPUT.part, which gets its name at the end and is removed if anything fails.
 
+    What was called OUTPUT is OUTPUT.old.part while the names change. A run that was killed then
+    left it so: it gets its name back first.
+
     Throws InputError if `output` is there and is not to be replaced, or is no LeRobot data set, and
     if another process writes it.
     """
-    if output.exists() or output.is_symlink():
-        if not overwrite:
-            raise _core.InputError(f"{output} exists; expected a new folder, or overwrite")
-        if not (output / "meta/info.json").is_file():
-            raise _core.InputError(f"{output} is no LeRobot data set; it is not overwritten")
+    _check_free(output, overwrite)
     part, old = (output.with_name(output.name + end) for end in (".part", ".old.part"))
     part.mkdir(parents=True, exist_ok=True)
     with open(part / ".lock", "w") as lock:
@@ -313,8 +312,11 @@ def new_folder(output: Path, overwrite: bool) -> Iterator[Path]:
             raise _core.InputError(f"{part} is being written by another process") from None
         try:
             _empty(part)  # what a run that was killed has left
-            if old.exists():
+            if old.exists() and output.exists():
                 shutil.rmtree(old)
+            elif old.exists():
+                old.rename(output)
+                _check_free(output, overwrite)
             yield part
             if output.exists():
                 output.rename(old)
@@ -327,6 +329,14 @@ def new_folder(output: Path, overwrite: bool) -> Iterator[Path]:
             raise
     if old.exists():
         shutil.rmtree(old)
+
+
+def _check_free(output: Path, overwrite: bool) -> None:
+    if output.exists() or output.is_symlink():
+        if not overwrite:
+            raise _core.InputError(f"{output} exists; expected a new folder, or overwrite")
+        if not (output / "meta/info.json").is_file():
+            raise _core.InputError(f"{output} is no LeRobot data set; it is not overwritten")
 
 
 def _empty(folder: Path) -> None:

@@ -123,8 +123,8 @@ class Episodes:
         return [i for i in range(len(self)) if self._demo(i).attrs.get("success", 0) == 1]
 
     def terminated(self, episode: int) -> bool:
-        """Whether the task ended the episode; False if it ran out of time."""
-        return bool(self._demo(episode).attrs["terminated"])
+        """Whether the task ended the episode; False if it ran out of time, and for a scene."""
+        return bool(self._demo(episode).attrs.get("terminated", 0))
 
     def final(self, episode: int) -> dict[str, np.ndarray]:
         """The observations after the last action, KEY → (1, …)."""
@@ -132,7 +132,10 @@ class Episodes:
         return {key: last[key][()] for key in last}
 
     def __getitem__(self, episode: int) -> dict[str, np.ndarray]:
-        """Arrays by name: the observations, "actions", "rewards", and derivatives if stored."""
+        """Arrays by name: the observations, "actions", "rewards", and derivatives if stored.
+
+        Raises InputError if an observation has the name of one of the other arrays.
+        """
         self._here()
         if episode in self._open:
             self._open.move_to_end(episode)
@@ -140,8 +143,14 @@ class Episodes:
         demo = self._demo(episode)
         arrays = {key: self._array(episode, demo["obs"][key]) for key in demo["obs"]}
         for name, item in demo.items():
-            if isinstance(item, h5py.Dataset):
-                arrays[name] = self._array(episode, item)
+            if not isinstance(item, h5py.Dataset):
+                continue
+            if name in arrays:
+                raise _core.InputError(
+                    f"{self.path}: an observation is called {name!r}, as an array of every episode "
+                    "is; expected another name of the sensor"
+                )
+            arrays[name] = self._array(episode, item)
         self._open[episode] = arrays
         self._held += _copied(arrays)
         while self._held > _CACHED_BYTES and len(self._open) > 1:

@@ -19,7 +19,7 @@ from gymnasium.vector.utils import batch_space
 
 from . import _core
 
-# KEY → array, or one array with `flatten`; which one it is hangs on an argument.
+# KEY → array, or with `flatten` one array.
 Observation = Any
 Autoreset = Literal["next_step", "same_step", "disabled"]
 _MODES = {

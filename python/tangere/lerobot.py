@@ -30,6 +30,8 @@ from ._lerobot_files import write_task
 from .data import Episodes
 
 _VERSION = "v3.0"
+_RESERVED = {*BOOKKEEPING, "success"}  # columns and arrays that are not observations
+_RESERVED_FIELDS = {"state", "environment_state"}  # what vectors are joined to
 
 
 @dataclass
@@ -143,6 +145,13 @@ def _features(episodes: Episodes, first: int, privileged: bool) -> list[Feature]
     arrays, said = episodes[first], episodes.attributes
     shapes = {key: np.shape(arrays[key])[1:] for key in episodes.keys}
 
+    for key in episodes.keys:
+        if key in _RESERVED or (key in _RESERVED_FIELDS and len(shapes[key]) > 1):
+            raise _core.InputError(
+                f"{episodes.path}: an observation is called {key!r}, which the format has for "
+                "something else; expected another name of the sensor"
+            )
+
     def names_of(key: str) -> list[str]:
         if key in ("q", "v"):
             return [str(name) for name in said[f"{key}_names"]]
@@ -207,6 +216,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         done = export(data, output, **given)
     except _core.InputError as error:
         print(f"tangere.lerobot: {error}", file=sys.stderr)
+        return 2
+    except KeyError as error:
+        print(f"tangere.lerobot: {data} is damaged: it has no {error}", file=sys.stderr)
         return 2
     except OSError as error:
         print(f"tangere.lerobot: {error}", file=sys.stderr)

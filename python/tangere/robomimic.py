@@ -274,7 +274,14 @@ def evaluate(
 
     if episodes < 1:
         raise _core.InputError(f"{episodes} episodes; expected at least 1")
-    policy, checkpoint = file_utils.policy_from_checkpoint(ckpt_path=str(model))
+    try:
+        policy, checkpoint = file_utils.policy_from_checkpoint(ckpt_path=str(model))
+    except OSError:
+        raise
+    except Exception as error:  # whatever unpickling and building a network may meet
+        raise _core.InputError(
+            f"{model}: {error!r}; expected a checkpoint of robomimic"
+        ) from error
     meta = checkpoint["env_metadata"]
     if not str(meta["env_name"]).startswith("tangere/"):
         raise _core.InputError(

@@ -59,7 +59,7 @@ class VecEnv(BaseVecEnv):  # type: ignore[misc]
         return [self._seed] * self.num_envs
 
     def set_options(self, options: Any = None) -> None:
-        """Options of the next reset: none are known, except that there are none."""
+        """Raises InputError if there are any: a reset has no options."""
         if options:
             raise _core.InputError(f"options {options!r}; expected none")
 

@@ -25,7 +25,7 @@ import torch
 from . import _core
 from .gym import task_scene
 
-# KEY → tensor, or one tensor with `flatten`; which one it is hangs on an argument.
+# KEY → tensor, or with `flatten` one tensor.
 Observations = Any
 
 

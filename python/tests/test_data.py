@@ -148,6 +148,22 @@ def test_torch_loads_them(pushes):
     assert batch["obs"]["tactile"].shape == (32, 1, 13, 10, 3)
 
 
+def test_an_observation_that_hides_an_array_is_told(pushes, tmp_path):
+    with h5py.File(pushes / "shard-00000.h5") as file, h5py.File(tmp_path / "a.h5", "w") as copy:
+        for name in file:
+            file.copy(name, copy)
+        copy.attrs.update(file.attrs)
+        copy["data/demo_0/obs"].move("goal", "rewards")
+    with pytest.raises(tangere.InputError, match="an observation is called 'rewards'"):
+        Episodes(tmp_path / "a.h5")[0]
+
+
+def test_a_scene_ends_no_episode(generate):
+    balls = generate(str(tangere.scenes()["rolling_ball_small"]), "--episodes", "1", "--steps", "5",
+                     "--every", "5", "--record", "q")  # fmt: skip
+    assert Episodes(balls).terminated(0) is False
+
+
 def test_a_missing_shard_is_told(generate):
     folder = generate("dummy", "--episodes", "32", "--shards", "2", "--no-merge")
     assert len(Episodes(folder)) == 32

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-import argparse
 import copy
+import dataclasses
+import importlib
 import json
 import subprocess
 import sys
@@ -21,6 +22,7 @@ sys.path.insert(0, str(LEARNING))
 
 import experiments  # noqa: E402
 import gd  # noqa: E402
+import matching  # noqa: E402
 import ppo  # noqa: E402
 import protocol  # noqa: E402
 import report  # noqa: E402
@@ -38,7 +40,7 @@ def run(program: str, *arguments: str) -> dict:
     return json.loads(done.stdout)
 
 
-@pytest.mark.parametrize("memory", [[], ["--recurrent"]])
+@pytest.mark.parametrize("memory", [["--no-recurrent"], ["--recurrent", "--last_gamma", "0.995"]])
 def test_ppo_learns_to_hold_a_ball(memory):
     found = run("ppo.py", "dummy", "--steps", "8192", "--envs", "16", "--length", "64",
                 "--deviation", "0.3", "--rate", "3e-3", "--choices", "2", "--episodes", "50",
@@ -48,11 +50,36 @@ def test_ppo_learns_to_hold_a_ball(memory):
     assert found["test"]["return"] > -15
 
 
+def test_ppo_imitates_the_script():
+    found = run("ppo.py", "dummy", "--steps", "8192", "--envs", "16", "--length", "64", "--rate",
+                "3e-3", "--choices", "1", "--episodes", "50", "--threads", "1", "--imitate", "1",
+                "--passes", "10")  # fmt: skip
+    assert found["test"]["return"] > found["curve"][0][1] + 20, found
+    assert found["test"]["success"] > 0.8, found["test"]
+
+
+def test_a_model_learns_the_derivatives_that_it_is_shown(generate):
+    data = generate("box_pushing", "--episodes", "12", "--seed", "1", "--gradients", "jacobians")
+    words = (str(data), "--sizes", "8", "--updates", "300")
+    plain, shown = (run("matching.py", *words, "--match", m)["curve"] for m in ("0", "0.1"))
+    assert plain[0][0] == 8 and 0 < plain[0][1] < 1 and 0 < shown[0][1] < 1
+    assert plain != shown
+
+
+def test_the_model_differentiates_itself():
+    model = matching.Model(4, 3, 8).double()
+    z, r = torch.randn(5, 4).double(), torch.randn(5, 4).double()
+    found = model(z, r)[1]
+    step = 1e-6
+    difference = (model(z + step * r, r)[0] - model(z - step * r, r)[0]) / (2 * step)
+    assert (found - difference).abs().max() < 1e-8
+
+
 def test_gd_learns_to_push():
     found = run("gd.py", "box_pushing_privileged", "--updates", "20", "--goals", "50",
                 "--threads", "1")  # fmt: skip
     assert found["test"]["return"] > found["curve"][0] + 100, found
-    assert found["steps"] == 20 * 16 * 100 and len(found["choice"]) == 1
+    assert found["steps"] == 20 * 16 * 100 and len(found["choice"]) == 2
 
 
 def test_clones_learn_from_a_data_set(generate):
@@ -72,21 +99,18 @@ def test_offline_methods_learn_from_mixed_data(generate, method):
     assert found["rows"] == 36 * 100  # those of mask/train
 
 
-@pytest.mark.parametrize("carry", [1.0, 0.0])
-def test_the_gradient_of_two_passes_is_that_of_one(carry):
-    """With carry 0 observations count as given."""
+def test_the_gradient_of_two_passes_is_that_of_one():
     tape = tangere.torch.Tape("box_pushing", 4, 12, threads=1, flatten=True)
     gains = gd.touch_gains(tape.spec, 0.05)
     torch.manual_seed(0)
     policy = gd.small_policy(len(gains), 3)
-    gd.update(tape, policy, gains, 0, carry, 3, 0)
+    gd.update(tape, policy, gains, 0, 3, 0)
     found = [p.grad.clone() for p in policy.parameters()]
     for p in policy.parameters():
         p.grad = None
     obs, total = tape.reset(seed=3), 0
     for _ in range(12):
-        seen = obs if carry else obs.detach()
-        obs, reward, _ = tape.step(gd.act(policy, seen, gains))
+        obs, reward, _ = tape.step(gd.act(policy, obs, gains))
         total = total + reward
     (-total.mean()).backward()
     for got, p in zip(found, policy.parameters()):
@@ -217,11 +241,23 @@ def test_every_experiment_is_a_command_that_its_program_takes(monkeypatch):
     names = [e.name for e in experiments.EXPERIMENTS]
     assert len(set(names)) == len(names)
     for experiment in experiments.EXPERIMENTS:
-        program = experiment.command.split()[0]
-        assert (LEARNING / program).is_file()
-        if program == "ppo.py":
-            monkeypatch.setattr(sys, "argv", experiment.command.split())
-            assert isinstance(ppo.settings(), argparse.Namespace)
+        words = experiments.command_of(experiment, 3, "cpu")
+        monkeypatch.setattr(sys, "argv", words)
+        asked = importlib.import_module(Path(words[0]).stem).settings()
+        assert asked.seed == 3 and asked.json
+        assert experiment.data.split()[0] in experiment.command if experiment.data else True
+
+
+def test_a_result_of_another_command_or_data_set_is_stale(monkeypatch, tmp_path):
+    monkeypatch.setattr(experiments, "RESULTS", tmp_path)
+    each = experiments.Experiment("bc-x", "bc.py out/learning/x", 1, 1, "a row", data="x task")
+    assert experiments.stored(each, 0) is None
+    experiments.result_of(each, 0).write_text(json.dumps({"experiment": experiments.made_by(each)}))
+    assert experiments.stored(each, 0) and report.stored(each)
+    for other in ({"command": "bc.py out/learning/x --all"}, {"data": "x task --seed 2"}):
+        assert not report.stored(dataclasses.replace(each, **other))
+    experiments.result_of(each, 0).write_text("{}")  # one that does not say
+    assert experiments.stored(each, 0) is None
 
 
 def test_the_page_says_what_the_results_say():
@@ -234,14 +270,19 @@ def test_the_report_has_means_and_intervals(monkeypatch, tmp_path):
     monkeypatch.setattr(experiments, "RESULTS", tmp_path)
     each = experiments.Experiment("gd-x", "gd.py", 3, 1, "a row", "0.1 m")
     test = {"episodes": 100, "position_m": 0.05, "yaw_rad": 0.1, "success": 0.8}
-    result = {"steps": 480000, "train_cpu_s": 60, "test": test}
+    result = {"steps": 480000, "train_cpu_s": 60, "test": test,
+              "experiment": experiments.made_by(each)}  # fmt: skip
     for seed, place in enumerate((0.04, 0.05, 0.06)):
         one = copy.deepcopy(result)
         one["test"]["position_m"] = place
         experiments.result_of(each, seed).write_text(json.dumps(one))
     runs = report.stored(each)
     assert report.mean(report.tested(runs, "position_m"), " m") == "0.050 ± 0.025 m"
-    assert report.rate(runs) == "80.0 ± 4.5 %"  # Wilson's of 300: the runs do not differ
+    assert report.rate(runs) == "80.0 ± 7.8 %"  # Wilson's of 100: the runs share their episodes
+    for run, (success, actions) in zip(runs, ((0.5, 3.0), (0.0, 0.0), (0.2, 5.0))):
+        run["test"] |= {"success": success, "actions_solved": actions}
+    assert report.until(runs[:2]) == "3.00" and report.until(runs[1:2]) == "–"
+    assert report.until(runs).startswith("4.00 ± ")
     monkeypatch.setattr(report, "EXPERIMENTS", [each])
     lines = report.table("| what | place | runs | paper |", ("gd-",), lambda r: ["x"]).splitlines()
     assert lines == ["| what | place | runs | paper |", "|---|---|---|---|",
@@ -255,7 +296,8 @@ def test_the_figure_has_a_line_for_each_run(monkeypatch, tmp_path):
         each = next(e for e in experiments.EXPERIMENTS if e.name == name)
         for seed in range(2):
             result = {"program": program, "steps": 3200, "settings": {"updates": 2},
-                      "choice": [[1, -500.0], [2, -400.0]]}  # fmt: skip
+                      "choice": [[1, -500.0], [2, -400.0]],
+                      "experiment": experiments.made_by(each)}  # fmt: skip
             experiments.result_of(each, seed).write_text(json.dumps(result))
     root = ElementTree.fromstring(report.figure())
     lines = root.findall("{http://www.w3.org/2000/svg}polyline")

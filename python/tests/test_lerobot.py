@@ -206,6 +206,14 @@ def test_nothing_half_written_gets_the_name(pushes, tmp_path, monkeypatch):
     lerobot.export(pushes, out, overwrite=True, mask="valid")
     assert not list(out.rglob("left")) and not (out / ".lock").exists()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["damaged", "out"]
+    out.rename(tmp_path / "out.old.part")  # as a run that was killed between two names left it
+    with pytest.raises(tangere.InputError, match="demo_7"):
+        lerobot.export(copy, out, overwrite=True)
+    assert (out / "meta/info.json").is_file() and not (tmp_path / "out.old.part").exists()
+    out.rename(tmp_path / "out.old.part")
+    with pytest.raises(tangere.InputError, match="exists"):
+        lerobot.export(pushes, out)
+    assert (out / "meta/info.json").is_file()
     mine = tmp_path / "mine"
     mine.mkdir()
     with pytest.raises(tangere.InputError, match="no LeRobot data set"):
@@ -223,6 +231,24 @@ def test_nothing_half_written_gets_the_name(pushes, tmp_path, monkeypatch):
     monkeypatch.setattr(lerobot, "write_task", fail)
     assert lerobot.main([str(pushes), str(tmp_path / "full")]) == 3
     assert not list(tmp_path.glob("full*"))
+
+
+def test_names_that_mean_something_else_are_refused(pushes, tmp_path, capsys):
+    copy = tmp_path / "copy.h5"
+    for name, message in (("success", "called 'success'"), ("index", "called 'index'"),
+                          ("state", "called 'state'")):  # fmt: skip
+        shutil.copy(pushes / "shard-00000.h5", copy)
+        with h5py.File(copy, "r+") as file:
+            file["scene"].attrs["observations"] = ["goal", name]
+            for demo in file["data"].values():
+                demo["obs"].move("tactile", name)
+        with pytest.raises(tangere.InputError, match=message):
+            lerobot.export(copy, tmp_path / "out")
+    shutil.copy(pushes / "shard-00000.h5", copy)
+    with h5py.File(copy, "r+") as file:
+        del file["data/demo_3/obs/goal"]
+    assert lerobot.main([str(copy), str(tmp_path / "out")]) == 2
+    assert "goal" in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
 def test_the_command_tells_mistakes(tmp_path, capsys, pushes):

@@ -97,6 +97,10 @@ def test_noise_and_random_episodes_go_with_a_function(tmp_path):
     assert np.abs(actions.std() - 0.1) < 0.01
 
 
+def raised(error):
+    raise error
+
+
 @pytest.mark.parametrize(
     "answer, error, message",
     [
@@ -104,6 +108,7 @@ def test_noise_and_random_episodes_go_with_a_function(tmp_path):
         (lambda n: np.zeros(3 * n), tangere.InputError, "actions of shape"),
         (lambda n: np.full((n, 3), np.nan), tangere.InputError, "nan as number 0 of action"),
         (lambda n: 1 / 0, ZeroDivisionError, "division"),
+        (lambda n: raised(BrokenPipeError("its own")), BrokenPipeError, "its own"),
     ],
 )
 def test_a_wrong_answer_leaves_nothing(tmp_path, answer, error, message):

@@ -123,3 +123,5 @@ def test_a_policy_is_trained_and_played(pushes, tmp_path, capsys):
     assert found["mean_actions"] == 100 and -1e4 < found["mean_return"] < 0
     assert rm.main([str(model), "--episodes", "0"]) == 2
     assert rm.main([str(tmp_path / "absent.pth")]) == 3
+    (tmp_path / "damaged.pth").write_bytes(model.read_bytes()[:1000])
+    assert rm.main([str(tmp_path / "damaged.pth")]) == 2
