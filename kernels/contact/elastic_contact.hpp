@@ -38,11 +38,17 @@ Anchor<N> load_anchor(const Load& load) {
   return {{load(0), load(1), load(2)}, {load(3), load(4), load(5)}, load(6)};
 }
 
-/// A point at ξ with what it remembers.
+/// A point at ξ, and where the numbers of its anchor are: i at numbers[i stride]. They are read
+/// where the point touches.
 template <class N>
 struct ElasticPlace {
   Vec3<N> xi;
-  Anchor<N> anchor;
+  const N* numbers;
+  int stride;
+
+  [[gnu::always_inline]] Anchor<N> anchor() const {
+    return load_anchor<N>([this](int i) { return numbers[i * stride]; });
+  }
 };
 
 /// The spring of one point.

@@ -74,7 +74,7 @@ void clear(ElasticFaceSums<N>& s) {
 
 template <class N>
 struct ElasticFacePass : FacePass<N> {
-  const Anchor<N>* anchor;
+  const ElasticPlace<N>* place;
   Vec3<N> A;
   Spring<N> spring;
 };
@@ -83,7 +83,7 @@ template <template <class> class Shape, class N>
 auto find_distance(const ElasticFaceMotion<Shape, N>& z, const ElasticPlace<N>& place,
                    typename ElasticFaceMotion<Shape, N>::Point& out, ElasticFacePass<N>& pass) {
   const FaceMotion<Shape, N>& plain = z;
-  pass.anchor = &place.anchor;
+  pass.place = &place;
   return find_distance(plain, place.xi, out, static_cast<FacePass<N>&>(pass));
 }
 
@@ -92,9 +92,9 @@ void find_slide(const ElasticFaceMotion<Shape, N>& z,
                 const typename ElasticFaceMotion<Shape, N>::Point&, ElasticFacePass<N>& pass) {
   const FaceMotion<Shape, N>& plain = z;
   find_velocity(plain, pass);
-  pass.A = z.frame.p + z.frame.R * pass.anchor->a;
-  pass.spring =
-      stretched(z.ks, z.kt, pass.d, pass.n, pass.vt, pass.anchor->b - pass.A, pass.anchor->gap);
+  const Anchor<N> anchor = pass.place->anchor();
+  pass.A = z.frame.p + z.frame.R * anchor.a;
+  pass.spring = stretched(z.ks, z.kt, pass.d, pass.n, pass.vt, anchor.b - pass.A, anchor.gap);
 }
 
 /// Adds the spring to what differentiate_face() has set. `k`: λ β k_s, `first`: λ k_s β'_d, both

@@ -76,7 +76,7 @@ void clear(ElasticSphereSums<N>& s) {
 
 template <class N>
 struct ElasticSpherePass : SpherePass<N> {
-  const Anchor<N>* anchor;
+  const ElasticPlace<N>* place;
   Vec3<N> a;
   Spring<N> spring;
 };
@@ -84,7 +84,7 @@ struct ElasticSpherePass : SpherePass<N> {
 template <class N>
 auto find_distance(const ElasticSphereMotion<N>& z, const ElasticPlace<N>& place,
                    ElasticSpherePoint<N>& out, ElasticSpherePass<N>& pass) {
-  pass.anchor = &place.anchor;
+  pass.place = &place;
   return find_distance(static_cast<const SphereMotion<N>&>(z), place.xi,
                        static_cast<SpherePoint<N>&>(out), static_cast<SpherePass<N>&>(pass));
 }
@@ -93,9 +93,10 @@ template <class N>
 void find_slide(const ElasticSphereMotion<N>& z, const ElasticSpherePoint<N>& out,
                 ElasticSpherePass<N>& pass) {
   find_velocity(static_cast<const SphereMotion<N>&>(z), out, pass);
-  pass.a = z.Q * pass.anchor->a;
-  pass.spring = stretched(z.ks, z.kt, pass.d, out.n, pass.vt, pass.anchor->b - z.centre - pass.a,
-                          pass.anchor->gap);
+  const Anchor<N> anchor = pass.place->anchor();
+  pass.a = z.Q * anchor.a;
+  pass.spring =
+      stretched(z.ks, z.kt, pass.d, out.n, pass.vt, anchor.b - z.centre - pass.a, anchor.gap);
 }
 
 /// Adds the spring to what differentiate_sphere() has set. `k`: λ β k_s, `stiffness`: λ k_s, both

@@ -17,7 +17,8 @@ void load_place(const CandidateList<N>& list, int k, Vec3<N>& to) {
 template <class N>
 void load_place(const CandidateList<N>& list, int k, ElasticPlace<N>& to) {
   load_place(list, k, to.xi);
-  to.anchor = load_anchor<N>([&](int i) { return list.anchors[kAnchorNumbers * k + i]; });
+  to.numbers = list.anchors + kAnchorNumbers * k;
+  to.stride = 1;
 }
 template <class A, class List>
 void load_own_place(const List& list, int first, Vec3<Lanes<A>>& to) {
@@ -27,8 +28,8 @@ void load_own_place(const List& list, int first, Vec3<Lanes<A>>& to) {
 template <class A, class List>
 void load_own_place(const List& list, int first, ElasticPlace<Lanes<A>>& to) {
   load_own_place<A>(list, first, to.xi);
-  to.anchor = load_anchor<Lanes<A>>(
-      [&](int i) { return load_lanes<A>(list.own_anchors + i * list.stride + first); });
+  to.numbers = reinterpret_cast<const Lanes<A>*>(list.own_anchors + first);
+  to.stride = list.stride / kGroup;
 }
 
 /// Adds the list row by row.

@@ -192,16 +192,19 @@ template <bool Derivatives, class Shape, class N>
 [[gnu::noinline]] void add_elastic(const Shape& shape, const LawParameters<N>& law,
                                    const CandidateList<N>& list, int lone, const Frame<N>& frame,
                                    const Vec6<N>& W, PairSums<N>& sums) {
-  ElasticPlace<N> at;
   for (int k = 0, count = lone < 0 ? list.count : list.own_count; k < count; ++k) {
+    const auto number = [&](int i) {
+      return lone < 0 ? list.anchors[kAnchorNumbers * k + i]
+                      : N(list.own_anchors[i * list.stride + k]);
+    };
+    Vec3<N> xi;
     if (lone < 0) {
-      load_place(list, k, at);
+      load_place(list, k, xi);
     } else {
-      const double* own = list.own + k;
-      at.xi = {N(own[0]), N(own[list.stride]), N(own[2 * list.stride])};
-      at.anchor = load_anchor<N>([&](int i) { return N(list.own_anchors[i * list.stride + k]); });
+      xi = {N(list.own[k]), N(list.own[list.stride + k]), N(list.own[2 * list.stride + k])};
     }
-    accumulate_elastic<Derivatives>(sums, shape, law, frame.R, frame.p, W.a, W.l, at.xi, at.anchor);
+    accumulate_elastic<Derivatives>(sums, shape, law, frame.R, frame.p, W.a, W.l, xi,
+                                    load_anchor<N>(number));
   }
 }
 

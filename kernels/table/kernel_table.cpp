@@ -9,7 +9,6 @@
 #include <string>
 
 #include "kernels/numbers/one_lane.hpp"
-#include "kernels/table/memory_rows_part.hpp"
 #include "kernels/table/parts.hpp"
 
 #include "kernels/table/isa.hpp"

@@ -70,7 +70,7 @@ struct StageKernels {
   /// Computes the touched shape in body 1 and the twist W of each contact that remembers,
   /// (n_memories), from poses and twists of the links.
   void (*touches_at)(const ModelView&, const LinkPose<Row<L>>* links, LinkPose<Row<L>>* out);
-  /// Computes Stage::ground_anchors from what is remembered, (points, 3) in body 1's axes, and the
+  /// Computes Stage::ground_anchors from what is remembered (body 1's axes, or null) and from the
   /// touches where a solve begins.
   void (*recall_ground)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
                         const Row<L>* s);

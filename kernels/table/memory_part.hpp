@@ -5,7 +5,6 @@
 #include "kernels/memory/memory_pullback.hpp"
 #include "kernels/memory/memory_rows.hpp"
 #include "kernels/numbers/one_lane.hpp"
-#include "kernels/table/memory_rows_part.hpp"
 #include "kernels/table/parts.hpp"
 #include "kernels/table/stage_view.hpp"
 

@@ -253,18 +253,22 @@ TEST_P(Elastic, StiffnessAndDampingMatchDualNumbers) {
 /// Places of a few points that stick, slip, land and do not touch, with the general sums of them.
 struct Several {
   Step of;
+  std::vector<Anchor<double>> anchors;
   std::vector<ElasticPlace<double>> places;
   PairSums<double> general;
 };
 Several random_points(Random& random, PrimitiveShape shape_kind) {
-  Several out{random_step(random, shape_kind, false), {}, PairSums<double>::zero()};
+  Several out{random_step(random, shape_kind, false), {}, {}, PairSums<double>::zero()};
+  constexpr int kCount = 12;
+  out.anchors.reserve(kCount);  // places point at them
   const Step& x = out.of;
   with_distance<double>(x.shape, kSize, [&](const auto& shape) {
-    for (int k = 0; k < 12; ++k) {
+    for (int k = 0; k < kCount; ++k) {
       const Vec3<double> xi = k == 0 ? x.xi : x.xi + random.vector(k < 6 ? 2e-4 : 3e-3);
       const auto start = touch<double>(x, x.start, x.twist, {});
       const Anchor<double> anchor = recalled(shape, start, xi, k < 3 ? x.s : random.vector(1e-4));
-      out.places.push_back({xi, anchor});
+      out.anchors.push_back(anchor);
+      out.places.push_back({xi, reinterpret_cast<const double*>(&out.anchors.back()), 1});
       accumulate_elastic<true>(out.general, shape, x.law, x.end.R, x.end.p, x.twist.a, x.twist.l,
                                xi, anchor);
     }
