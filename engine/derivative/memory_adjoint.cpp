@@ -44,6 +44,8 @@ MemoryAdjoint<L>::MemoryAdjoint(const CompiledModel& m, int losses) {
   end_.resize(m.links.size());
   at_.resize(m.links.size());
   slip_.resize(m.links.size());
+  at_touches_.resize(m.memories.size());
+  slip_touches_.resize(m.memories.size());
   rows_.resize(2 * std::size_t(m.nv));
   std::size_t bytes = 0, stride = 0;
   for (const kernels::KernelTable* table : kernels::available_kernels())
@@ -92,16 +94,17 @@ void MemoryAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTa
       const std::size_t rows = 3 * std::size_t(points.stride);
       double *const remembered = numbers_.data(), *const s_bar = remembered + rows,
                     *const s_out = s_bar + rows;
-      look_up(now, of, index, points.count, points.stride, remembered);
+      std::size_t next = 0;
+      look_up(now, of, index, points.count, points.stride, remembered, next);
       if (!of_forces)
         look_up(
             after, of, index, points.count, points.stride,
-            [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, s_bar);
+            [&](std::size_t entry, int c) { return bar[3 * entry + std::size_t(c)]; }, s_bar, next);
       std::fill(s_out, s_out + rows, 0.0);
-      const RememberingTouch start = touch_of(w, of, w.remembered.start, l),
-                             end = touch_of(w, of, at_, l);
+      const RememberingTouch start = touch_of(m, w, of, w.remembered.start_touches, l),
+                             end = touch_of(m, w, of, at_touches_, l);
       Vec6<double> slip{};
-      if (of_forces) slip = touch_of(w, of, slip_, l).twist;
+      if (of_forces) slip = touch_of(m, w, of, slip_touches_, l).twist;
       kernels::MemoryCotangent sums{};
       table.pull_back_memory({&start, &end, points, remembered, of_forces ? nullptr : s_bar,
                               nullptr, of_forces ? &slip : nullptr, s_out, &sums});
@@ -114,7 +117,7 @@ void MemoryAdjoint<L>::pull_back(const CompiledModel& m, const kernels::KernelTa
       add_to_entries(now, of, index, points, s_out, before);
     };
     for_each_contact(m, w, l, one);
-    if (!of_forces) for_each_felt(m, table, w, at_, l, one);
+    if (!of_forces) for_each_felt(m, table, w, at_touches_, l, one);
   }
 }
 
@@ -125,6 +128,7 @@ void MemoryAdjoint<L>::reverse_end(const CompiledModel& m, const kernels::Kernel
   if (m.memories.empty()) return;
   std::fill(end_.begin(), end_.end(), MotionCotangent<Row<L>>{});
   table.stage<L>().poses_at(m.view, w.stage, w.q1, w.stage.v, w.zero, at_.data());
+  table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
   pull_back(m, table, w, lanes, false, loss, number);
   add_to_state(m, table, w, lanes, w.q1, w.stage.v, end_, loss.q, loss.v);
 }
@@ -136,6 +140,8 @@ void MemoryAdjoint<L>::reverse_forces(const CompiledModel& m, const kernels::Ker
   if (m.memories.empty()) return;
   table.stage<L>().poses_at(m.view, w.stage, q, w.stage.v, w.zero, at_.data());
   table.stage<L>().poses_at(m.view, w.stage, q, lambda, w.zero, slip_.data());
+  table.stage<L>().touches_at(m.view, at_.data(), at_touches_.data());
+  table.stage<L>().touches_at(m.view, slip_.data(), slip_touches_.data());
   pull_back(m, table, w, lanes, true, loss, number);
 }
 

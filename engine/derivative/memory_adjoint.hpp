@@ -61,7 +61,8 @@ class MemoryAdjoint {
 
   std::vector<Cotangents> start_;  ///< of each loss: (n_links) where the solve began
   Cotangents end_;
-  Poses at_, slip_;
+  Poses at_, slip_;                      ///< (n_links)
+  Poses at_touches_, slip_touches_;      ///< (n_memories), see StageKernels::touches_at
   AlignedVector<kernels::Row<L>> rows_;  ///< (nv) twice
   AlignedVector<std::byte> scratch_;
   AlignedVector<double> numbers_;  ///< (9, largest stride)

@@ -3,6 +3,7 @@
 #include "engine/model/effects_and_stages.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "engine/model/shapes.hpp"
 #include "kernels/contact/distance.hpp"
@@ -39,20 +40,19 @@ bool remembers(const CompiledModel& m) {
   return any(m.pairs) || any(m.grounds) || any(m.sensors);
 }
 
-/// Returns "cuboid: products, flat faces; …" with each shape once, then how many bodies move.
+/// Returns "cuboid: products, flat faces; …" with each shape once, and once more where only some of
+/// its contacts remember, then how many bodies move.
 std::string pair_variant(const CompiledModel& m, const kernels::LinkPair& links) {
-  std::vector<PrimitiveShape> shapes;
-  bool remembers = false;
+  std::vector<std::pair<PrimitiveShape, bool>> kinds;
   for (int i = links.first; i < links.first + links.count; ++i) {
     const kernels::PairContact& pair = m.pairs[std::size_t(m.pair_order[std::size_t(i)])];
-    const PrimitiveShape shape = pair.shape;
-    remembers = remembers || kernels::remembers(pair.parameters);
-    if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) shapes.push_back(shape);
+    const std::pair kind = {pair.shape, kernels::remembers(pair.parameters)};
+    if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) kinds.push_back(kind);
   }
   std::string text;
-  for (const PrimitiveShape shape : shapes)
-    text += std::string(row_of(shape).name) + ": " +
-            (remembers ? "point by point, remembers" : sums_of(shape)) + "; ";
+  for (const auto& [shape, remembers] : kinds)
+    text += std::string(row_of(shape).name) + ": " + sums_of(shape) +
+            (remembers ? ", remembers; " : "; ");
   if (links.link1 < 0 || links.link2 < 0) return text + "one body moves";
   return text + "both bodies move";
 }

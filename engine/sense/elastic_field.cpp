@@ -33,6 +33,7 @@ void ElasticField::for_each_touched(const PadReader& reader, const Batch& batch,
   const int block = environment / kBlock, group = environment % kBlock / kGroup,
             lane = environment % kGroup;
   const ShearMemory& memory = batch.memory(environment);
+  std::size_t next = 0;
   for (const RememberingContact& of : m.memories) {
     if (of.sensor != sensor) continue;
     const RememberingTouch touch = touch_between(
@@ -42,7 +43,7 @@ void ElasticField::for_each_touched(const PadReader& reader, const Batch& batch,
         });
     const RememberingPoints points = felt_.find(m.sensors[std::size_t(sensor)], table, touch);
     if (points.count == 0) continue;
-    look_up(memory, of, felt_.index(), points.count, points.stride, remembered_.data());
+    look_up(memory, of, felt_.index(), points.count, points.stride, remembered_.data(), next);
     std::copy_n(remembered_.data(), 3 * points.stride, points.anchors + 3 * points.stride);
     table.recall(touch, points);
     f(of, touch, points);

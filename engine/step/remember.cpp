@@ -2,40 +2,74 @@
 // Hands one environment after another to the kernels of memory.
 #include "engine/step/remember.hpp"
 
+#include <algorithm>
+
 #include "engine/step/remembering_lane.hpp"
 
 namespace tangere {
 
-using kernels::kAnchorNumbers;
 using kernels::RememberingContact;
 using kernels::RememberingPoints;
 using kernels::Row;
 
 namespace {
 
-template <int L>
-void recall_points(const kernels::KernelTable& table, const BasicWorkspace<L>& w,
-                   const RememberingContact& of, int lane, const int* index,
-                   const RememberingPoints& points) {
-  look_up(w.remembered.now[std::size_t(lane)], of, index, points.count, points.stride,
-          points.anchors + 3 * points.stride);
-  table.recall(touch_of(w, of, w.remembered.start, lane), points);
-}
-
 /// Appends what is remembered of the points that touch at the end.
 template <int L>
-void advance_points(const kernels::KernelTable& table, BasicWorkspace<L>& w,
+void advance_points(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                     const RememberingContact& of, int lane, const int* index,
                     const RememberingPoints& points) {
-  if (points.count == 0) return;
   double* const s = w.remembered.s.data();
-  table.advance(touch_of(w, of, w.remembered.end, lane), points, s, nullptr);
+  table.advance(touch_of(m, w, of, w.remembered.end_touches, lane), points, s, nullptr);
   ShearMemory& after = w.remembered.after[std::size_t(lane)];
   const double* const touches = s + 3 * points.stride;
   for (int k = 0; k < points.count; ++k) {
     if (!(touches[k] > 0)) continue;
-    after.push_back({of.first + (index == nullptr ? k : index[k]),
-                     {s[k], s[points.stride + k], s[2 * points.stride + k]}});
+    after.push_back({of.first + index[k], {s[k], s[points.stride + k], s[2 * points.stride + k]}});
+  }
+}
+
+/// The first point on the ground among all that remember; there are CompiledModel::ground_anchors.
+int first_on_ground(const CompiledModel& m) {
+  const auto first = std::find_if(m.memories.begin(), m.memories.end(),
+                                  [](const RememberingContact& of) { return of.ground; });
+  return first == m.memories.end() ? 0 : first->first;
+}
+
+/// Computes poses at (q, v), and from them how every contact touches.
+template <int L>
+void find_touches(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
+                  const Row<L>* q, const Row<L>* v, typename MemoryLanes<L>::Poses& poses,
+                  typename MemoryLanes<L>::Poses& touches) {
+  table.stage<L>().poses_at(m.view, w.stage, q, v, w.zero, poses.data());
+  table.stage<L>().touches_at(m.view, poses.data(), touches.data());
+}
+
+/// Fills rows (points on the ground, 3) with what is remembered of them. Returns false, and leaves
+/// them alone, where no lane remembers any.
+template <int L>
+bool put_ground(const CompiledModel& m, int first, const std::array<ShearMemory, L>& now,
+                Row<L>* rows) {
+  bool any = false;
+  for (int l = 0; l < L; ++l)
+    for (const ShearEntry& e : now[std::size_t(l)]) {
+      const int point = e.point - first;
+      if (point < 0 || point >= m.ground_anchors) continue;
+      if (!any) std::fill_n(rows, 3 * m.ground_anchors, Row<L>{});
+      any = true;
+      for (int c = 0; c < 3; ++c) rows[3 * point + c][l] = e.s[c];
+    }
+  return any;
+}
+
+/// Lists the points on the ground that touch in some lane. `kept`: as of advance_ground().
+template <int L>
+void find_grounded(const AlignedVector<Row<L>>& kept, std::vector<int>& out) {
+  out.clear();
+  for (std::size_t k = 0; 4 * k < kept.size(); ++k) {
+    double touches = 0;
+    for (int l = 0; l < L; ++l) touches += kept[4 * k + 3][l];
+    if (touches > 0) out.push_back(static_cast<int>(k));
   }
 }
 
@@ -44,20 +78,12 @@ void advance_points(const kernels::KernelTable& table, BasicWorkspace<L>& w,
 template <int L>
 void begin_memory(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w) {
   if (m.memories.empty()) return;
-  table.stage<L>().poses_at(m.view, w.stage, w.q0, w.v0, w.zero, w.remembered.start.data());
-  Row<L>* rows = w.stage.ground_anchors;
-  for_each_ground(m, w, [&](const RememberingContact& of, double* anchors) {
-    const int count = of.contact.n_points;
-    for (int l = 0; l < L; ++l) {
-      const RememberingPoints points = {of.places, anchors + l * kAnchorNumbers * of.stride,
-                                        nullptr, count, of.stride};
-      recall_points(table, w, of, l, nullptr, points);
-      for (int k = 0; k < count; ++k)
-        for (int c = 0; c < kAnchorNumbers; ++c)
-          rows[kAnchorNumbers * k + c][l] = points.anchors[c * of.stride + k];
-    }
-    rows += kAnchorNumbers * count;
-  });
+  MemoryLanes<L>& lanes = w.remembered;
+  find_touches(m, table, w, w.q0, w.v0, lanes.start, lanes.start_touches);
+  if (m.ground_anchors == 0) return;
+  Row<L>* const s = lanes.ground.data();
+  const bool any = put_ground<L>(m, first_on_ground(m), lanes.now, s);
+  table.stage<L>().recall_ground(m.view, w.stage, lanes.start_touches.data(), any ? s : nullptr);
 }
 
 template <int L>
@@ -66,27 +92,39 @@ void recall_list(const CompiledModel& m, const kernels::KernelTable& table, Basi
   const auto& list = w.lists[std::size_t(k)];
   if (list.own_count[lane] == 0) return;
   const RememberingContact& of = m.memories[std::size_t(m.pairs[std::size_t(k)].memory)];
-  recall_points(table, w, of, lane, list.own_index + list.stride * lane, listed<L>(list, lane));
+  const RememberingPoints points = listed<L>(list, lane);
+  look_up(w.remembered.now[std::size_t(lane)], of, list.own_index + list.stride * lane,
+          points.count, points.stride, points.anchors + 3 * points.stride,
+          w.remembered.next[std::size_t(lane)]);
+  table.recall(touch_of(m, w, of, w.remembered.start_touches, lane), points);
 }
 
 template <int L>
 void advance_memory(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                     LaneBits lanes) {
   if (m.memories.empty() || lanes == 0) return;
-  table.stage<L>().poses_at(m.view, w.stage, w.q1, w.v1, w.zero, w.remembered.end.data());
+  MemoryLanes<L>& of_lanes = w.remembered;
+  find_touches(m, table, w, w.q1, w.v1, of_lanes.end, of_lanes.end_touches);
+  if (m.ground_anchors > 0) {
+    table.stage<L>().advance_ground(m.view, w.stage, of_lanes.end_touches.data(),
+                                    of_lanes.ground.data());
+    find_grounded<L>(of_lanes.ground, of_lanes.grounded);
+  }
+  const int first = first_on_ground(m);
   for (int l = 0; l < L; ++l) {
     if (!has(lanes, l)) continue;
-    w.remembered.after[std::size_t(l)].clear();
-    for_each_contact(
-        m, w, l,
-        [&](const RememberingContact& of, const int* index, const RememberingPoints& points) {
-          advance_points(table, w, of, l, index, points);
-        });
-    for_each_felt(
-        m, table, w, w.remembered.end, l,
-        [&](const RememberingContact& of, const int* index, const RememberingPoints& points) {
-          advance_points(table, w, of, l, index, points);
-        });
+    ShearMemory& after = of_lanes.after[std::size_t(l)];
+    after.clear();
+    const auto advance = [&](const RememberingContact& of, const int* index,
+                             const RememberingPoints& points) {
+      advance_points(m, table, w, of, l, index, points);
+    };
+    for_each_pair(m, w, l, advance);
+    for (const int k : of_lanes.grounded) {
+      const Row<L>* kept = &of_lanes.ground[4 * std::size_t(k)];
+      if (kept[3][l] > 0) after.push_back({first + k, {kept[0][l], kept[1][l], kept[2][l]}});
+    }
+    for_each_felt(m, table, w, of_lanes.end_touches, l, advance);
   }
 }
 

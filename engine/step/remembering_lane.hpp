@@ -30,15 +30,12 @@ double number_of(const kernels::Parameter& p, const kernels::Stage<L>& stage, in
   return p.row < 0 ? p.value : kernels::row_of(stage.block, p.row, stage.group)[lane];
 }
 
-/// Returns a contact of one environment at the poses of one state. `number`(p): the value of a
-/// kernels::Parameter there.
+/// Returns a contact of one environment. `at`: the touched shape in body 1, and W. `number`(p): the
+/// value of a kernels::Parameter there.
 template <class Number>
-kernels::RememberingTouch touch_between(const kernels::RememberingContact& of,
-                                        const kernels::LinkPose<double>& one,
-                                        const kernels::LinkPose<double>& two,
-                                        const Number& number) {
+kernels::RememberingTouch touch_at(const kernels::RememberingContact& of,
+                                   const kernels::LinkPose<double>& at, const Number& number) {
   const kernels::PairContact& c = of.contact;
-  const kernels::Frame<double> second = relative(one.world, two.world);
   kernels::RememberingTouch t{};
   t.of = &of;
   const auto size = [&](int i, double constant) {
@@ -46,21 +43,32 @@ kernels::RememberingTouch touch_between(const kernels::RememberingContact& of,
   };
   t.size = {size(0, c.size.x), size(1, c.size.y), size(2, c.size.z)};
   t.radius = number(kernels::Parameter{of.radius, of.radius_row});
-  t.shape = compose(second, c.frame2);
-  t.twist = motion_to_parent(second, two.V) - one.V;
+  t.shape = at.world;
+  t.twist = at.V;
   t.law = transformed(c.parameters, number);
   return t;
 }
 
-/// The same for one lane of a workspace.
+/// The same from the poses of its two links.
+template <class Number>
+kernels::RememberingTouch touch_between(const kernels::RememberingContact& of,
+                                        const kernels::LinkPose<double>& one,
+                                        const kernels::LinkPose<double>& two,
+                                        const Number& number) {
+  const kernels::Frame<double> second = relative(one.world, two.world);
+  return touch_at(of, {compose(second, of.contact.frame2), motion_to_parent(second, two.V) - one.V},
+                  number);
+}
+
+/// The same for one lane of a workspace. `touches`: (n_memories), see StageKernels::touches_at.
 template <int L>
-kernels::RememberingTouch touch_of(const BasicWorkspace<L>& w,
+kernels::RememberingTouch touch_of(const CompiledModel& m, const BasicWorkspace<L>& w,
                                    const kernels::RememberingContact& of,
-                                   const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses,
+                                   const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& touches,
                                    int lane) {
-  kernels::RememberingTouch t = touch_between(
-      of, pose_of<L>(poses, of.contact.link1, lane), pose_of<L>(poses, of.contact.link2, lane),
-      [&](const kernels::Parameter& p) { return number_of<L>(p, w.stage, lane); });
+  kernels::RememberingTouch t =
+      touch_at(of, pose_of<L>(touches, static_cast<int>(&of - m.memories.data()), lane),
+               [&](const kernels::Parameter& p) { return number_of<L>(p, w.stage, lane); });
   if (of.contact.faced) {
     const kernels::Row<L>* side = w.stage.faces + 3 * of.pair;
     t.faces = {side[0][lane], side[1][lane], side[2][lane]};
@@ -70,28 +78,35 @@ kernels::RememberingTouch touch_of(const BasicWorkspace<L>& w,
 
 /// Writes (3, stride) numbers of points, up to the end of the last vector: those of the entries that
 /// they have in a memory, else zeros. `index`: number of each point in its contact, rising; null:
-/// all points in order. `number`(entry, c): component c of an entry.
+/// all points in order. `number`(entry, c): component c of an entry. `next`: any place in the
+/// memory; contacts are found soonest one after the other. It moves on to the end of this one.
 template <class Number>
 void look_up(std::span<const ShearEntry> memory, const kernels::RememberingContact& of,
-             const int* index, int count, int stride, const Number& number, double* out) {
-  std::size_t at =
-      std::size_t(std::lower_bound(memory.begin(), memory.end(), of.first,
-                                   [](const ShearEntry& e, int point) { return e.point < point; }) -
-                  memory.begin());
-  const int end = (count + kernels::kGroup - 1) / kernels::kGroup * kernels::kGroup;
-  for (int k = 0; k < end; ++k) {
-    const int point = of.first + (k >= count ? 0 : index == nullptr ? k : index[k]);
-    while (k < count && at < memory.size() && memory[at].point < point) ++at;
-    const bool found = k < count && at < memory.size() && memory[at].point == point;
-    for (int c = 0; c < 3; ++c) out[c * stride + k] = found ? number(at, c) : 0;
+             const int* index, int count, int stride, const Number& number, double* out,
+             std::size_t& next) {
+  const std::size_t end =
+      std::size_t((count + kernels::kGroup - 1) / kernels::kGroup) * std::size_t(kernels::kGroup);
+  for (int c = 0; c < 3; ++c) std::fill_n(out + c * stride, end, 0.0);
+  if (next > memory.size() || (next > 0 && memory[next - 1].point >= of.first)) next = 0;
+  while (next < memory.size() && memory[next].point < of.first) ++next;
+  for (int k = 0; next < memory.size(); ++next) {
+    const int point = memory[next].point - of.first;
+    if (point >= of.contact.n_points) return;
+    if (index == nullptr) {
+      k = point;
+    } else {
+      while (k < count && index[k] < point) ++k;
+    }
+    if (k < count && (index == nullptr || index[k] == point))
+      for (int c = 0; c < 3; ++c) out[c * stride + k] = number(next, c);
   }
 }
 /// Writes what is remembered of points.
 inline void look_up(std::span<const ShearEntry> memory, const kernels::RememberingContact& of,
-                    const int* index, int count, int stride, double* out) {
+                    const int* index, int count, int stride, double* out, std::size_t& next) {
   look_up(
       memory, of, index, count, stride,
-      [&](std::size_t entry, int c) { return memory[entry].s[c]; }, out);
+      [&](std::size_t entry, int c) { return memory[entry].s[c]; }, out, next);
 }
 
 /// Adds (3, stride) numbers of points to those of their entries, three each. Points without an
@@ -118,35 +133,35 @@ kernels::RememberingPoints listed(const typename kernels::Stage<L>::List& list, 
           list.own_count[lane], list.stride};
 }
 
-/// Calls f(contact, its anchors of lane 0) for every contact with the ground that remembers.
+/// Calls f(contact, numbers of its points or null, points) for every pair of one lane whose anchors
+/// are set, by recall_list().
 template <int L, class F>
-void for_each_ground(const CompiledModel& m, BasicWorkspace<L>& w, const F& f) {
-  double* at = w.remembered.ground_anchors.data();
+void for_each_pair(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const F& f) {
   for (const kernels::RememberingContact& of : m.memories) {
-    if (!of.ground) continue;
-    f(of, at);
-    at += L * kernels::kAnchorNumbers * of.stride;
-  }
-}
-
-/// Calls f(contact, numbers of its points or null, points) for every contact of one lane whose
-/// anchors are set: by recall_list() and begin_memory().
-template <int L, class F>
-void for_each_contact(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const F& f) {
-  for (const kernels::RememberingContact& of : m.memories) {
-    if (of.pair < 0) continue;
+    if (of.pair < 0) return;  // pairs come first
     const auto& list = w.lists[std::size_t(of.pair)];
     if (list.own_count[lane] > 0) f(of, list.own_index + list.stride * lane, listed<L>(list, lane));
   }
-  for_each_ground(m, w, [&](const kernels::RememberingContact& of, double* anchors) {
-    f(of, static_cast<const int*>(nullptr),
-      kernels::RememberingPoints{of.places, anchors + lane * kernels::kAnchorNumbers * of.stride,
-                                 nullptr, of.contact.n_points, of.stride});
-  });
 }
 
-/// Calls f as for_each_contact() does for the points of elastic sensors that touch at the poses
-/// `end`. The anchors are those of w.remembered.now.
+/// The same for every pair and every contact with the ground, whose anchors begin_memory() sets.
+template <int L, class F>
+void for_each_contact(const CompiledModel& m, BasicWorkspace<L>& w, int lane, const F& f) {
+  for_each_pair(m, w, lane, f);
+  const kernels::Row<L>* rows = w.stage.ground_anchors;
+  double* const anchors = w.remembered.ground_anchors.data();
+  for (const kernels::RememberingContact& of : m.memories) {
+    if (!of.ground) continue;
+    for (int k = 0; k < of.contact.n_points; ++k)
+      for (int c = 0; c < kernels::kAnchorNumbers; ++c)
+        anchors[c * of.stride + k] = (*rows++)[lane];
+    f(of, static_cast<const int*>(nullptr),
+      kernels::RememberingPoints{of.places, anchors, nullptr, of.contact.n_points, of.stride});
+  }
+}
+
+/// Calls f as for_each_contact() does for the points of elastic sensors that touch where `end`
+/// says. The anchors are those of w.remembered.now.
 template <int L, class F>
 void for_each_felt(const CompiledModel& m, const kernels::KernelTable& table, BasicWorkspace<L>& w,
                    const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& end, int lane,
@@ -155,11 +170,11 @@ void for_each_felt(const CompiledModel& m, const kernels::KernelTable& table, Ba
   for (const kernels::RememberingContact& of : m.memories) {
     if (of.sensor < 0) continue;
     const kernels::RememberingPoints points =
-        felt.find(m.sensors[std::size_t(of.sensor)], table, touch_of(w, of, end, lane));
+        felt.find(m.sensors[std::size_t(of.sensor)], table, touch_of(m, w, of, end, lane));
     if (points.count == 0) continue;
     look_up(w.remembered.now[std::size_t(lane)], of, felt.index(), points.count, points.stride,
-            points.anchors + 3 * points.stride);
-    table.recall(touch_of(w, of, w.remembered.start, lane), points);
+            points.anchors + 3 * points.stride, w.remembered.next[std::size_t(lane)]);
+    table.recall(touch_of(m, w, of, w.remembered.start_touches, lane), points);
     f(of, felt.index(), points);
   }
 }

@@ -60,14 +60,14 @@ template <int L>
 void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
   for (auto& list : lists) list.own_index = nullptr, list.own_anchors = nullptr;
   if (m.memories.empty()) return;
-  std::size_t listed = 0, ground = 0, most = 0;
+  std::size_t listed = 0, most_on_ground = 0, most = 0;
   for (const kernels::RememberingContact& of : m.memories) {
     const int stride = of.pair >= 0 ? lists[std::size_t(of.pair)].stride
                        : of.ground  ? of.stride
                                     : of.contact.n_points + 2 * kGroup;
     most = std::max(most, std::size_t(stride));
     if (of.pair >= 0) listed += std::size_t(L * stride);
-    if (of.ground) ground += std::size_t(L * stride);
+    if (of.ground) most_on_ground = std::max(most_on_ground, std::size_t(stride));
   }
   own_index.resize(listed);
   own_anchors.resize(listed * kernels::kAnchorNumbers);
@@ -79,11 +79,15 @@ void BasicWorkspace<L>::make_memory(const CompiledModel& m) {
     list.own_anchors = own_anchors.data() + kernels::kAnchorNumbers * at;
     at += std::size_t(L * list.stride);
   }
-  remembered.ground_anchors.resize(ground * kernels::kAnchorNumbers);
+  remembered.ground.resize(4 * std::size_t(m.ground_anchors));
+  remembered.grounded.reserve(std::size_t(m.ground_anchors));
+  remembered.ground_anchors.resize(most_on_ground * kernels::kAnchorNumbers);
   remembered.s.resize(4 * most);
   remembered.felt = FeltPoints(m);
   remembered.start.resize(m.links.size());
   remembered.end.resize(m.links.size());
+  remembered.start_touches.resize(m.memories.size());
+  remembered.end_touches.resize(m.memories.size());
   for (auto* lanes : {&remembered.now, &remembered.after})
     for (ShearMemory& lane : *lanes) lane.reserve(std::size_t(m.taped_points));
 }
@@ -93,7 +97,7 @@ std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   BasicWorkspace w(m);
   const std::size_t remembered =
       2 * L * std::size_t(m.taped_points) * sizeof(ShearEntry) + w.own_index.size() * sizeof(int) +
-      (w.own_anchors.size() + w.remembered.ground_anchors.size()) * sizeof(double);
+      w.own_anchors.size() * sizeof(double) + w.remembered.ground.size() * sizeof(LaneRow);
   const std::size_t watched = 2 * w.poses_before.size() * sizeof(kernels::LinkPose<LaneRow>) +
                               w.search.size() * sizeof(double);
   return remembered + watched + w.memory.size() * sizeof(LaneRow) +

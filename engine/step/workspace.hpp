@@ -28,11 +28,16 @@ inline constexpr int kInnerStages = 1;
 /// What friction remembers in the lanes of a group, and scratch. Empty where nothing remembers.
 template <int L>
 struct MemoryLanes {
+  using Poses = AlignedVector<kernels::LinkPose<kernels::Row<L>>>;
   std::array<ShearMemory, L> now, after;  ///< where a solve begins, and at its end
-  AlignedVector<kernels::LinkPose<kernels::Row<L>>> start, end;  ///< (n_links)
-  /// (L, kAnchorNumbers, stride) of each contact with the ground, one after another.
-  AlignedVector<double> ground_anchors;
-  AlignedVector<double> s;  ///< (4, largest stride)
+  Poses start, end;                       ///< (n_links) poses there
+  /// (n_memories) of each contact that remembers: the touched shape in body 1, and W.
+  Poses start_touches, end_touches;
+  AlignedVector<kernels::Row<L>> ground;  ///< (points on the ground, 4)
+  std::vector<int> grounded;              ///< those of them that touch in some lane
+  AlignedVector<double> ground_anchors;   ///< (kAnchorNumbers, largest stride) of one lane
+  AlignedVector<double> s;                ///< (4, largest stride)
+  std::array<std::size_t, L> next{};      ///< where look_up() was in `now`
   FeltPoints felt;
 };
 

@@ -244,6 +244,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   warn_of_dense_meshes(scene, root);
   warn_of_coarse_points(scene, root);
   each("sensor", [&](const SceneNode& s) { read_sensors(scene, s); });
+  warn_of_unlike_skins(scene, root);
   each("variable", [&](const SceneNode& s) { read_end_effectors(scene, s); });
   name_end_effectors(scene);
   each("virtual", [&](const SceneNode& s) { s.warn("shapes for pictures only; ignored"); });

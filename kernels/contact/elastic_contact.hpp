@@ -38,6 +38,74 @@ Anchor<N> load_anchor(const Load& load) {
   return {{load(0), load(1), load(2)}, {load(3), load(4), load(5)}, load(6)};
 }
 
+/// A point at ξ, and where the numbers of its anchor are: i at numbers[i stride]. They are read
+/// where the point touches.
+template <class N>
+struct ElasticPlace {
+  Vec3<N> xi;
+  const N* numbers;
+  int stride;
+
+  [[gnu::always_inline]] Anchor<N> anchor() const {
+    return load_anchor<N>([this](int i) { return numbers[i * stride]; });
+  }
+};
+
+/// The spring of one point.
+template <class N>
+struct Spring {
+  Vec3<N> r, along;  ///< r and P r
+  Vec3<N> s, w;
+  N eta, beta, beta_d;
+  N square, inverse_size;  ///< |w|², 1/|w|
+};
+/// Computes the spring from r = b - A. Points that touched at the last state have β = 1 to the bit,
+/// whatever the other lanes do.
+template <class N>
+[[gnu::always_inline]] inline Spring<N> stretched(const N& ks, const N& kt, const N& d,
+                                                  const Vec3<N>& n, const Vec3<N>& vt,
+                                                  const Vec3<N>& r, const N& gap) {
+  const N zero(0.0), one(1.0);
+  Spring<N> e;
+  e.r = r;
+  e.eta = dot(n, r);
+  e.along = mul_add(-e.eta, n, r);
+  e.beta = one;
+  e.beta_d = zero;
+  const auto landing = (d < zero) & (gap > zero);
+  if (any(landing)) {
+    const N inverse = one / select(landing, d - gap, -one);
+    e.beta = select(landing, d * inverse, one);
+    e.beta_d = select(landing, -(gap * inverse * inverse), zero);
+  }
+  e.s = e.beta * e.along;
+  e.w = mul_add(ks, e.s, kt * vt);
+  e.square = dot(e.w, e.w);
+  e.inverse_size = inverse_sqrt(e.square);
+  return e;
+}
+
+/// λ, what it does to the damper, and 1/|w| where the point slips, else 0.
+template <class N>
+struct Grip {
+  N hold, inverse_w;
+  Friction<N> damper;
+};
+template <class N>
+[[gnu::always_inline]] inline Grip<N> gripped(const LawParameters<N>& law,
+                                              const NormalForce<N>& normal, const Spring<N>& e) {
+  const N zero(0.0);
+  const N limit = law.mu * normal.bound;
+  const auto slipping = e.square * e.inverse_size > limit;  // false at w = 0
+  Grip<N> g;
+  g.inverse_w = select(slipping, e.inverse_size, zero);
+  g.hold = select(slipping, limit * g.inverse_w, N(1.0));
+  g.damper.scale = g.hold * law.kt;
+  g.damper.slip = select(slipping, law.friction_tangent, zero);
+  g.damper.direction = (g.damper.slip * g.inverse_w) * e.w;
+  return g;
+}
+
 template <class N>
 struct ElasticPoint : PointContact<N> {
   Vec3<N> arm;  ///< m = x - A
@@ -52,27 +120,16 @@ template <class N>
 [[gnu::always_inline]] inline void add_spring(const LawParameters<N>& law, const Mat3<N>& Q,
                                               const Vec3<N>& c, const Anchor<N>& anchor,
                                               ElasticPoint<N>& p) {
-  const N zero(0.0), one(1.0);
   const Vec3<N> A = c + Q * anchor.a;
   p.arm = p.x2 - A;
-  p.r = anchor.b - A;
-  p.eta = dot(p.n, p.r);
-  const auto touching = p.d < zero;
-  const N inverse = one / select(touching, p.d - anchor.gap, -one);
-  p.beta = select(touching, p.d * inverse, one);
-  p.beta_d = -(anchor.gap * inverse * inverse);
-  p.s = p.beta * mul_add(-p.eta, p.n, p.r);
-  p.w = mul_add(law.ks, p.s, law.kt * p.vt);
-  const N square = dot(p.w, p.w), inverse_size = inverse_sqrt(square);
-  const N limit = law.mu * p.normal.bound;
-  const auto slipping = square * inverse_size > limit;  // false at w = 0
-  p.inverse_w = select(slipping, inverse_size, zero);
-  p.hold = select(slipping, limit * p.inverse_w, one);
-  Friction<N>& f = p.tangential;
-  f.scale = p.hold * law.kt;
-  f.slip = select(slipping, law.friction_tangent, zero);
-  f.direction = (f.slip * p.inverse_w) * p.w;
-  const N gate = select(touching, one, zero);
+  const Spring<N> e = stretched(law.ks, law.kt, p.d, p.n, p.vt, anchor.b - A, anchor.gap);
+  p.r = e.r, p.s = e.s, p.w = e.w;
+  p.eta = e.eta, p.beta = e.beta, p.beta_d = e.beta_d;
+  const Grip<N> g = gripped(law, p.normal, e);
+  p.hold = g.hold;
+  p.inverse_w = g.inverse_w;
+  p.tangential = g.damper;
+  const N gate = select(p.d < N(0.0), N(1.0), N(0.0));
   p.force = gate * (p.normal.force * p.n - p.hold * p.w);
 }
 
@@ -119,13 +176,8 @@ void accumulate_elastic(PairSums<N>& sums, const Shape& shape, const LawParamete
   }
 }
 
-/// The ground in a body's axes: its normal is the third column of Q, c a point of it.
-template <class N>
-Frame<N> ground_in_body(const Frame<N>& ground, const Frame<N>& body) {
-  return relative(body, ground);
-}
-
-/// Adds one point or sphere on the ground. `ground`: its frame in the body's axes. Returns false
+/// Adds one point or sphere on the ground. `ground`: its frame in the body's axes,
+/// with the normal as its third column. Returns false
 /// where no lane touches.
 template <bool Derivatives, class N>
 bool accumulate_elastic_ground(PairSums<N>& sums, const LawParameters<N>& law, const Vec3<N>& m,
@@ -139,14 +191,14 @@ bool accumulate_elastic_ground(PairSums<N>& sums, const LawParameters<N>& law, c
   if constexpr (Derivatives) {
     GroundDerivative<N> r = differentiate_ground(law, V, centre, radius, p);
     const N gate = select(p.d < N(0.0), N(1.0), N(0.0));
-    const Mat3<N> P = diagonal(N(1.0)) - outer(m, m);
-    const Mat3<N> Z = diagonal(p.eta) + outer(m, p.r);
-    const Vec3<N> first_touch = p.beta_d * mul_add(-p.eta, m, p.r);
-    const Mat3<N> S = gate * spring_matrix(law, p);
-    const Mat3<N> by_d = outer(first_touch, m);
-    const Vec3<N> A = p.x2 - p.arm;
-    r.f_rho = r.f_rho - S * (p.beta * P + by_d);
-    r.f_theta += S * (p.beta * (times_skew(P, A) + Z * skew(m)) + times_skew(by_d, centre));
+    const N stiffness = gate * p.hold * law.ks, k = stiffness * p.beta, k_eta = k * p.eta;
+    const Vec3<N>&t = p.tangential.direction, A = p.x2 - p.arm;
+    // k (P - t tᵀ) δr and what m does; σ = β'_d (P r - t (t·P r)) by δd
+    const Vec3<N> along = mul_add(-p.eta, m, p.r);
+    const Vec3<N> by_d = (stiffness * p.beta_d) * (along - dot(t, along) * t);
+    r.f_rho += outer(k * m - by_d, m) + outer(k * t, t) - diagonal(k);
+    r.f_theta += skew(mul_add(k, A, k_eta * m)) + outer(k * m, cross(p.r + A, m)) -
+                 outer(t, k * cross(t, A) + k_eta * cross(t, m)) + outer(by_d, cross(m, centre));
     add_ground_derivative(sums, p, r);
   }
   return true;

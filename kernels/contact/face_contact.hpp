@@ -35,6 +35,7 @@ struct FaceSums;
 template <template <class> class Shape, class N>
 struct FaceMotion {
   static constexpr bool kBent = Shape<N>::kBending == Bending::rod;
+  using Place = Vec3<N>;
   using Point = FacePoint<N, kBent>;
   using Pass = FacePass<N>;
   using Sums = FaceSums<N>;
@@ -51,6 +52,7 @@ struct FaceMotion {
 template <class N, bool Bent>
 struct FacePoint {
   using Number = N;
+  static constexpr bool kBends = Bent, kElastic = false;
   Vec3<N> f, xf;            ///< force, x × f
   Vec3<N> n, xn, an, axn;   ///< ñ and A ñ
   Vec3<N> p, xp, e;         ///< p and x × p + n × f; e
@@ -149,12 +151,17 @@ auto find_distance(const FaceMotion<Shape, N>& z, const Vec3<N>& xi,
 }
 
 template <template <class> class Shape, class N>
-void find_slide(const FaceMotion<Shape, N>& z, const typename FaceMotion<Shape, N>::Point&,
-                FacePass<N>& pass) {
+void find_velocity(const FaceMotion<Shape, N>& z, FacePass<N>& pass) {
   pass.x = pass.xi - pass.d * pass.n;
   const Vec3<N> u = -(z.W.l + cross(z.W.a, pass.x));
   pass.rate = dot(pass.n, u);
   pass.vt = u - pass.rate * pass.n;
+}
+
+template <template <class> class Shape, class N>
+void find_slide(const FaceMotion<Shape, N>& z, const typename FaceMotion<Shape, N>::Point&,
+                FacePass<N>& pass) {
+  find_velocity(z, pass);
   pass.square = dot(pass.vt, pass.vt);
   pass.inverse_speed = inverse_sqrt(pass.square);
 }
@@ -194,23 +201,15 @@ void slip(const Vec3<N>& omega, const FacePass<N>& pass, const Vec3<N>& t, const
   }
 }
 
-/// Computes the force and what its derivative needs. Returns where the point slips.
-template <bool Derivatives, template <class> class Shape, class N>
-auto find_force(const FaceMotion<Shape, N>& z, const LawParameters<N>& law, const FacePass<N>& pass,
-                typename FaceMotion<Shape, N>::Point& out) {
-  constexpr bool kBent = FaceMotion<Shape, N>::kBent;
-  const N zero(0.0);
+/// Sets what the derivative needs but the moments of p and r. `out` already has f. `m` as above.
+template <template <class> class Shape, class N, class Mask>
+void differentiate_face(const FaceMotion<Shape, N>& z, const LawParameters<N>& law,
+                        const NormalForce<N>& normal, const Friction<N>& friction_at,
+                        const Mask& slipping, const FacePass<N>& pass, const N& s, const N& m,
+                        typename FaceMotion<Shape, N>::Point& out) {
   const Vec3<N>&n = pass.n, &x = pass.x, &omega = z.W.a;
   const N& d = pass.d;
-  const auto touching = d < zero;
-  const NormalForce<N> normal = normal_force(law, d, pass.rate);
-  const Friction<N> friction_at = friction(law, normal, pass.vt, pass.square, pass.inverse_speed);
-  const N s = select(touching, friction_at.scale, zero);
-  out.f = normal.force * n - s * pass.vt;
-  out.xf = cross(x, out.f);
-  const auto slipping = touching & (friction_at.slip > zero);
-  if constexpr (!Derivatives) return slipping;
-  const N slope = normal.rate_slope + s, m = mul_add(pass.rate, s, normal.force), ds = d * s;
+  const N slope = normal.rate_slope + s, ds = d * s;
   const N spin = dot(n, omega);
   out.s = s;
   out.n = n;
@@ -226,21 +225,44 @@ auto find_force(const FaceMotion<Shape, N>& z, const LawParameters<N>& law, cons
   out.dxn = ds * out.xn;
   out.dwx = (ds * spin) * x;
   out.p = s * cross(omega, n) - normal.d_slope * n;
-  if constexpr (kBent) bend(omega, pass, m, slope, out);
+  if constexpr (FaceMotion<Shape, N>::kBent) bend(omega, pass, m, slope, out);
   if (any(slipping)) {
-    const N gate = select(slipping, N(1.0), zero);
+    const N gate = select(slipping, N(1.0), N(0.0));
     slip(omega, pass, gate * friction_at.direction, gate * (law.mu * normal.bound_rate),
          gate * (law.mu * normal.bound_d), out);
   }
-  out.xp = cross(x, out.p) + cross(n, out.f);
-  if constexpr (kBent) out.xr = cross(x, out.r) + (d * pass.kappa) * cross(pass.a, out.f);
+}
+
+/// Sets the moments of p and r.
+template <bool Bent, class N>
+void finish_moments(const FacePass<N>& pass, FacePoint<N, Bent>& out) {
+  out.xp = cross(pass.x, out.p) + cross(pass.n, out.f);
+  if constexpr (Bent) out.xr = cross(pass.x, out.r) + (pass.d * pass.kappa) * cross(pass.a, out.f);
+}
+
+/// Computes the force and what its derivative needs. Returns where the point slips.
+template <bool Derivatives, template <class> class Shape, class N>
+auto find_force(const FaceMotion<Shape, N>& z, const LawParameters<N>& law, const FacePass<N>& pass,
+                typename FaceMotion<Shape, N>::Point& out) {
+  const N zero(0.0);
+  const auto touching = pass.d < zero;
+  const NormalForce<N> normal = normal_force(law, pass.d, pass.rate);
+  const Friction<N> friction_at = friction(law, normal, pass.vt, pass.square, pass.inverse_speed);
+  const N s = select(touching, friction_at.scale, zero);
+  out.f = normal.force * pass.n - s * pass.vt;
+  out.xf = cross(pass.x, out.f);
+  const auto slipping = touching & (friction_at.slip > zero);
+  if constexpr (!Derivatives) return slipping;
+  differentiate_face(z, law, normal, friction_at, slipping, pass, s,
+                     mul_add(pass.rate, s, normal.force), out);
+  finish_moments(pass, out);
   return slipping;
 }
 
 /// Adds the points of a chunk in order.
-template <bool Derivatives, bool Bent, class N>
-[[gnu::noinline]] void add_chunk(FaceSums<N>& sums, const PointChunk<FacePoint<N, Bent>>& chunk) {
-  using Point = FacePoint<N, Bent>;
+template <bool Derivatives, class Point, class N>
+[[gnu::noinline]] void add_chunk(FaceSums<N>& sums, const PointChunk<Point>& chunk) {
+  constexpr bool Bent = Point::kBends;
   const auto each = [&](auto& sum, const auto& f) {
     add_each(sum, chunk.point, chunk.touching, chunk.count, f);
   };
@@ -266,8 +288,10 @@ template <bool Derivatives, bool Bent, class N>
     add_p(&Point::xp, &Point::n, &Point::xr, &Point::a, sums.pn.m[0][1]);
     add_p(&Point::p, &Point::xn, &Point::r, &Point::xa, sums.pn.m[1][0]);
     add_p(&Point::p, &Point::n, &Point::r, &Point::a, sums.pn.m[1][1]);
-    each(sums.ne[0], [](Mat3<N>& m, const Point& p) { add_outer(m, p.axn, p.e); });
-    each(sums.ne[1], [](Mat3<N>& m, const Point& p) { add_outer(m, p.an, p.e); });
+    each(sums.ne[0],
+         [](Mat3<N>& m, const Point& p) { add_outer(m, Point::kElastic ? p.xn : p.axn, p.e); });
+    each(sums.ne[1],
+         [](Mat3<N>& m, const Point& p) { add_outer(m, Point::kElastic ? p.n : p.an, p.e); });
     each(sums.moments, [](MomentSums<N>& m, const Point& p) {
       m.s += p.s;
       m.sx += p.sx;

@@ -4,8 +4,8 @@
 // in FaceSums, so the bits are the same.
 #pragma once
 
-#include "kernels/contact/face_contact.hpp"
-#include "kernels/contact/sphere_contact.hpp"
+#include "kernels/contact/elastic_face_contact.hpp"
+#include "kernels/contact/elastic_sphere_contact.hpp"
 #include "kernels/numbers/one_lane.hpp"
 
 namespace tangere::kernels {
@@ -22,12 +22,31 @@ struct PackedFaceSums {
   N linear, spins, rest;  ///< s x, m n; d s ñ; from lane 4: d s (n·ω) x, s
   N tt[6], tn[6], te[3];
 };
+/// With the sums of a spring.
+template <class A>
+struct PackedElasticFaceSums : PackedFaceSums<A> {
+  using N = Lanes<A>;
+  N spring;           ///< k A, k x, k
+  N anchor_place[3];  ///< row i: k A_i x
+  N spring_tt[6];     ///< as tt: k t̃ t̃ᵀ
+};
 
 template <bool Derivatives, class A>
 void clear(PackedFaceSums<A>& s) {
   Lanes<A>* all = reinterpret_cast<Lanes<A>*>(&s);
   const std::size_t count = Derivatives ? sizeof(s) / sizeof(Lanes<A>) : 1;
   for (std::size_t i = 0; i < count; ++i) all[i] = Lanes<A>(0.0);
+}
+
+template <bool Derivatives, class A>
+void clear(PackedElasticFaceSums<A>& s) {
+  using N = Lanes<A>;
+  clear<Derivatives>(static_cast<PackedFaceSums<A>&>(s));
+  if constexpr (Derivatives) {
+    s.spring = N(0.0);
+    for (N& x : s.anchor_place) x = N(0.0);
+    for (N& x : s.spring_tt) x = N(0.0);
+  }
 }
 
 /// Loads eight numbers of a point, starting at a vector.
@@ -44,8 +63,8 @@ template <int Count, class A>
   for (int i = 0; i < Count; ++i) sum[i] = mul_add(Lanes<A>(x[i]), right, sum[i]);
 }
 
-template <bool Derivatives, class A, bool Bent>
-void add_chunk(PackedFaceSums<A>& sums, const PointChunk<FacePoint<OneLane<A>, Bent>>& chunk) {
+template <bool Derivatives, class A, class Point>
+void add_chunk(PackedFaceSums<A>& sums, const PointChunk<Point>& chunk) {
   using N = Lanes<A>;
   PackedFaceSums<A> s = sums;
   for (int c = 0; c < chunk.count; ++c) {
@@ -55,8 +74,8 @@ void add_chunk(PackedFaceSums<A>& sums, const PointChunk<FacePoint<OneLane<A>, B
       const N n = eight_from<A>(p.n), an = eight_from<A>(p.an);
       add_products(s.nn, p.an, n);
       add_products(s.pn, p.p, n);
-      if constexpr (Bent) add_products(s.pn, p.r, eight_from<A>(p.a));
-      add_products(s.ne, p.e, an);
+      if constexpr (Point::kBends) add_products(s.pn, p.r, eight_from<A>(p.a));
+      add_products(s.ne, p.e, Point::kElastic ? n : an);
       add_products(s.sxx, p.sx, eight_from<A>(p.x));
       add_products(s.n_turn, p.n, eight_from<A>(p.turn));
       s.linear += eight_from<A>(p.sx);
@@ -76,57 +95,104 @@ void add_chunk(PackedFaceSums<A>& sums, const PointChunk<FacePoint<OneLane<A>, B
   sums = s;
 }
 
+/// Adds the points of a chunk in order.
+template <bool Derivatives, class A, class Point>
+void add_chunk(PackedElasticFaceSums<A>& sums, const PointChunk<Point>& chunk) {
+  add_chunk<Derivatives>(static_cast<PackedFaceSums<A>&>(sums), chunk);
+  if constexpr (Derivatives) {
+    PackedElasticFaceSums<A> s = sums;
+    for (int c = 0; c < chunk.count; ++c) {
+      const auto& p = chunk.point[chunk.touching[c]];
+      s.spring += eight_from<A>(p.k_anchor);
+      add_products(s.anchor_place, p.k_anchor, eight_from<A>(p.x));
+    }
+    for (int c = 0; c < chunk.slips; ++c) {
+      const auto& p = chunk.point[chunk.slipping[c]];
+      add_products(s.spring_tt, p.k_t, eight_from<A>(p.t));
+    }
+    sums = s;
+  }
+}
+
+// Numbers, vectors and blocks of packed sums. Torques come first in blocks, forces in vectors.
+template <class A>
+OneLane<A> packed_number(const Lanes<A>& row, int i) {
+  return OneLane<A>(reinterpret_cast<const double*>(&row)[i]);
+}
+template <class A>
+Vec3<OneLane<A>> packed_vector(const Lanes<A>& row, int first) {
+  return {packed_number<A>(row, first), packed_number<A>(row, first + 1),
+          packed_number<A>(row, first + 2)};
+}
+/// The 3×3 block that starts at (row, column).
+template <class A>
+Mat3<OneLane<A>> packed_block(const Lanes<A>* rows, int row, int column) {
+  Mat3<OneLane<A>> m;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) m.m[i][j] = packed_number<A>(rows[row + i], column + j);
+  return m;
+}
+template <class A>
+UpperTriangle<OneLane<A>> packed_upper(const Lanes<A>* rows, int row, int column) {
+  const Mat3<OneLane<A>> m = packed_block<A>(rows, row, column);
+  return {{m.m[0][0], m.m[0][1], m.m[0][2], m.m[1][1], m.m[1][2], m.m[2][2]}};
+}
+template <class A>
+SymmetricSums<OneLane<A>> packed_symmetric(const Lanes<A>* rows) {
+  return {packed_upper<A>(rows, 3, 3), packed_upper<A>(rows, 0, 0), packed_block<A>(rows, 3, 0)};
+}
+template <class A>
+ProductSums<OneLane<A>> packed_product(const Lanes<A>* rows) {
+  return {{{packed_block<A>(rows, 3, 3), packed_block<A>(rows, 3, 0)},
+           {packed_block<A>(rows, 0, 3), packed_block<A>(rows, 0, 0)}}};
+}
+
+/// Writes the same sums number by number.
+template <bool Derivatives, class A>
+void unpack(const PackedFaceSums<A>& s, FaceSums<OneLane<A>>& out) {
+  out.f = packed_vector<A>(s.wrench, 0);
+  out.xf = packed_vector<A>(s.wrench, 3);
+  if constexpr (Derivatives) {
+    out.nn = packed_symmetric<A>(s.nn);
+    out.tt = packed_symmetric<A>(s.tt);
+    out.pn = packed_product<A>(s.pn);
+    out.tn = packed_product<A>(s.tn);
+    for (int part = 0; part < 2; ++part) {
+      out.ne[part] = transpose(packed_block<A>(s.ne, 0, 3 - 3 * part));
+      out.te[part] = transpose(packed_block<A>(s.te, 0, 3 - 3 * part));
+    }
+    out.moments = {packed_number<A>(s.rest, 7), packed_vector<A>(s.linear, 0),
+                   packed_vector<A>(s.linear, 3), packed_upper<A>(s.sxx, 0, 0)};
+    out.turns = {packed_block<A>(s.n_turn, 0, 0), packed_vector<A>(s.spins, 0),
+                 packed_vector<A>(s.spins, 3), packed_vector<A>(s.rest, 4)};
+  }
+}
+
 /// Returns the same sums number by number.
 template <bool Derivatives, class A>
 FaceSums<OneLane<A>> unpacked(const PackedFaceSums<A>& s) {
-  const auto at = [](const Lanes<A>& row, int i) {
-    return OneLane<A>(reinterpret_cast<const double*>(&row)[i]);
-  };
-  const auto vector = [&](const Lanes<A>& row, int first) {
-    return Vec3<OneLane<A>>{at(row, first), at(row, first + 1), at(row, first + 2)};
-  };
-  // The 3×3 block that starts at (row, column).
-  const auto block = [&](const Lanes<A>* rows, int row, int column) {
-    Mat3<OneLane<A>> m;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) m.m[i][j] = at(rows[row + i], column + j);
-    return m;
-  };
-  const auto upper = [](const Mat3<OneLane<A>>& m) {
-    return UpperTriangle<OneLane<A>>{
-        {m.m[0][0], m.m[0][1], m.m[0][2], m.m[1][1], m.m[1][2], m.m[2][2]}};
-  };
-  const auto symmetric = [&](const Lanes<A>* rows) {
-    return SymmetricSums<OneLane<A>>{upper(block(rows, 3, 3)), upper(block(rows, 0, 0)),
-                                     block(rows, 3, 0)};
-  };
-  const auto product =
-      [&](const Lanes<A>* rows) {  // torques come first in blocks, forces in vectors
-        return ProductSums<OneLane<A>>{
-            {{block(rows, 3, 3), block(rows, 3, 0)}, {block(rows, 0, 3), block(rows, 0, 0)}}};
-      };
   FaceSums<OneLane<A>> out;
-  out.f = vector(s.wrench, 0);
-  out.xf = vector(s.wrench, 3);
+  unpack<Derivatives>(s, out);
+  return out;
+}
+template <bool Derivatives, class A>
+ElasticFaceSums<OneLane<A>> unpacked(const PackedElasticFaceSums<A>& s) {
+  ElasticFaceSums<OneLane<A>> out;
+  unpack<Derivatives>(s, out);
   if constexpr (Derivatives) {
-    out.nn = symmetric(s.nn);
-    out.tt = symmetric(s.tt);
-    out.pn = product(s.pn);
-    out.tn = product(s.tn);
-    for (int part = 0; part < 2; ++part) {
-      out.ne[part] = transpose(block(s.ne, 0, 3 - 3 * part));
-      out.te[part] = transpose(block(s.te, 0, 3 - 3 * part));
-    }
-    out.moments = {at(s.rest, 7), vector(s.linear, 0), vector(s.linear, 3),
-                   upper(block(s.sxx, 0, 0))};
-    out.turns = {block(s.n_turn, 0, 0), vector(s.spins, 0), vector(s.spins, 3), vector(s.rest, 4)};
+    out.spring = {packed_vector<A>(s.spring, 0), packed_vector<A>(s.spring, 3),
+                  packed_number<A>(s.spring, 6), packed_block<A>(s.anchor_place, 0, 0),
+                  packed_symmetric<A>(s.spring_tt)};
   }
   return out;
 }
-
 /// Spheres do not pack their sums.
 template <bool Derivatives, class A>
 const SphereSums<OneLane<A>>& unpacked(const SphereSums<OneLane<A>>& s) {
+  return s;
+}
+template <bool Derivatives, class A>
+const ElasticSphereSums<OneLane<A>>& unpacked(const ElasticSphereSums<OneLane<A>>& s) {
   return s;
 }
 /// The type in which a lone lane keeps the sums of a family of shapes.
@@ -137,6 +203,10 @@ struct OwnSums {
 template <class A>
 struct OwnSums<FaceSums, A> {
   using Type = PackedFaceSums<A>;
+};
+template <class A>
+struct OwnSums<ElasticFaceSums, A> {
+  using Type = PackedElasticFaceSums<A>;
 };
 
 }  // namespace tangere::kernels

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // A few contact points that go together through the law and into the sums of their pair.
 //
-// A family of shapes provides a Motion (numbers only, the same for all points), its Point, Pass and
-// Sums, and
-//   find_distance(motion, ξ, point, pass)    distance and normal; returns where the point touches
+// A family of shapes provides a Motion (numbers only, the same for all points), its Place (ξ, or ξ
+// with what the point remembers), Point, Pass and Sums, and
+//   find_distance(motion, place, point, pass)
+//       distance and normal; returns where the point touches
 //   find_slide(motion, point, pass)          velocities
 //   find_force<Derivatives>(…)
 //       force and what its derivative needs; returns where the point slips
 //   add_chunk<Derivatives>(sums, chunk)      the chunk's points in order
-// Families: kernels/contact/sphere_contact.hpp, kernels/contact/face_contact.hpp.
+// Families: kernels/contact/sphere_contact.hpp, kernels/contact/face_contact.hpp, and both where
+// friction remembers: kernels/contact/elastic_sphere_contact.hpp, elastic_face_contact.hpp.
 #pragma once
 
 #include <utility>
@@ -29,15 +31,15 @@ struct PointChunk {
   int count = 0, slips = 0;
 };
 
-/// Evaluates the law at `count` ≤ kPoints points. Each pass waits for one root, so roots of
+/// Evaluates the law at `count` ≤ kPoints places. Each pass waits for one root, so roots of
 /// different points overlap.
 template <bool Derivatives, class Motion, class N>
-void fill_chunk(const Motion& z, const LawParameters<N>& law, const Vec3<N>* xi, int count,
-                PointChunk<typename Motion::Point>& chunk) {
+void fill_chunk(const Motion& z, const LawParameters<N>& law, const typename Motion::Place* place,
+                int count, PointChunk<typename Motion::Point>& chunk) {
   typename Motion::Pass pass[PointChunk<typename Motion::Point>::kPoints];
   chunk.count = chunk.slips = 0;
   for (int i = 0; i < count; ++i) {
-    chunk.touch[i] = find_distance(z, xi[i], chunk.point[i], pass[i]);
+    chunk.touch[i] = find_distance(z, place[i], chunk.point[i], pass[i]);
     if (any(chunk.touch[i])) chunk.touching[chunk.count++] = i;
   }
   for (int c = 0; c < chunk.count; ++c)

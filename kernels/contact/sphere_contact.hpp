@@ -31,6 +31,7 @@ struct SphereSums;
 /// Motion of the sphere relative to body 1, in body 1's axes.
 template <class N>
 struct SphereMotion {
+  using Place = Vec3<N>;
   using Point = SpherePoint<N>;
   using Pass = SpherePass<N>;
   using Sums = SphereSums<N>;
@@ -58,6 +59,7 @@ struct SpherePoint {
   Vec3<N> t, b, st, sb, ke, turn;  ///< t, b, s t, s b, κ e, s t - γ n
   N k_gamma;                       ///< κ γ
 
+  static constexpr bool kElastic = false;
   static constexpr int kValues = 6, kDerivatives = kValues + 18, kSlipping = kDerivatives + 19;
   static constexpr int kBent = kSlipping, kNumbers = kSlipping;
 };
@@ -111,30 +113,29 @@ auto find_distance(const SphereMotion<N>& z, const Vec3<N>& xi, SpherePoint<N>& 
   return at.d < N(0.0);
 }
 
-/// Computes ḋ, v_t and 1/|v_t|.
+/// Computes ḋ and v_t.
 template <class N>
-void find_slide(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePass<N>& pass) {
+void find_velocity(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePass<N>& pass) {
   pass.rate = dot(out.n, z.q);
   pass.turned = cross(z.o, out.n);
   pass.vt = z.q + pass.turned - pass.rate * out.n;
+}
+
+/// Computes ḋ, v_t and 1/|v_t|.
+template <class N>
+void find_slide(const SphereMotion<N>& z, const SpherePoint<N>& out, SpherePass<N>& pass) {
+  find_velocity(z, out, pass);
   pass.square = dot(pass.vt, pass.vt);
   pass.inverse_speed = inverse_sqrt(pass.square);
 }
 
-/// Computes the force and what its derivative needs. Returns where the point slips.
-template <bool Derivatives, class N>
-auto find_force(const SphereMotion<N>& z, const LawParameters<N>& law, const SpherePass<N>& pass,
-                SpherePoint<N>& out) {
-  const N zero(0.0);
+/// Sets what the derivative needs. `out` already has n and m.
+template <class N, class Mask>
+void differentiate_sphere(const SphereMotion<N>& z, const LawParameters<N>& law,
+                          const NormalForce<N>& normal, const Friction<N>& friction_at,
+                          const Mask& slipping, const SpherePass<N>& pass, const N& s,
+                          SpherePoint<N>& out) {
   const Vec3<N>& n = out.n;
-  const auto touching = pass.d < zero;
-  const NormalForce<N> normal = normal_force(law, pass.d, pass.rate);
-  const Friction<N> friction_at = friction(law, normal, pass.vt, pass.square, pass.inverse_speed);
-  const N s = select(touching, friction_at.scale, zero);
-  out.f = normal.force * n - s * pass.vt;
-  out.m = cross(n, out.f);
-  const auto slipping = touching & (friction_at.slip > zero);
-  if constexpr (!Derivatives) return slipping;
   const N slope = normal.rate_slope + s;
   const N ks = pass.kappa * s;
   out.s = s;
@@ -146,8 +147,8 @@ auto find_force(const SphereMotion<N>& z, const LawParameters<N>& law, const Sph
   out.alpha = slope * n;
   out.g = mul_add(g_n, n, ks * pass.turned);
   out.k = mul_add(ks, z.o - dot(z.o, n) * n, (-pass.kappa) * out.m);
-  if (!any(slipping)) return slipping;
-  const N gate = select(slipping, N(1.0), zero);
+  if (!any(slipping)) return;
+  const N gate = select(slipping, N(1.0), N(0.0));
   const Vec3<N> t = gate * friction_at.direction;
   out.t = t;
   out.b = cross(n, t);
@@ -162,13 +163,28 @@ auto find_force(const SphereMotion<N>& z, const LawParameters<N>& law, const Sph
   out.ke = pass.kappa * (cross(t, z.o) - pass.rate * t);
   out.turn = out.st - gamma * n;
   out.k_gamma = pass.kappa * gamma;
+}
+
+/// Computes the force and what its derivative needs. Returns where the point slips.
+template <bool Derivatives, class N>
+auto find_force(const SphereMotion<N>& z, const LawParameters<N>& law, const SpherePass<N>& pass,
+                SpherePoint<N>& out) {
+  const N zero(0.0);
+  const auto touching = pass.d < zero;
+  const NormalForce<N> normal = normal_force(law, pass.d, pass.rate);
+  const Friction<N> friction_at = friction(law, normal, pass.vt, pass.square, pass.inverse_speed);
+  const N s = select(touching, friction_at.scale, zero);
+  out.f = normal.force * out.n - s * pass.vt;
+  out.m = cross(out.n, out.f);
+  const auto slipping = touching & (friction_at.slip > zero);
+  if constexpr (Derivatives)
+    differentiate_sphere(z, law, normal, friction_at, slipping, pass, s, out);
   return slipping;
 }
 
 /// Adds the points of a chunk in order.
-template <bool Derivatives, class N>
-[[gnu::noinline]] void add_chunk(SphereSums<N>& sums, const PointChunk<SpherePoint<N>>& chunk) {
-  using Point = SpherePoint<N>;
+template <bool Derivatives, class Point, class N>
+[[gnu::noinline]] void add_chunk(SphereSums<N>& sums, const PointChunk<Point>& chunk) {
   const auto each = [&](auto& sum, const auto& f) {
     add_each(sum, chunk.point, chunk.touching, chunk.count, f);
   };
@@ -193,10 +209,20 @@ template <bool Derivatives, class N>
     if (chunk.slips > 0) {
       slipping(sums.s_tt, [](Mat3<N>& m, const Point& p) { add_outer(m, p.st, p.t); });
       slipping(sums.s_tb, [](Mat3<N>& m, const Point& p) { add_outer(m, p.st, p.b); });
-      slipping(sums.s_t_ke, [](Mat3<N>& m, const Point& p) { add_outer(m, p.st, p.ke); });
+      slipping(sums.s_t_ke, [](Mat3<N>& m, const Point& p) {
+        if constexpr (Point::kElastic)
+          add_outer(m, p.t, p.s_ke);
+        else
+          add_outer(m, p.st, p.ke);
+      });
       slipping(sums.b_turn, [](Mat3<N>& m, const Point& p) { add_outer(m, p.b, p.turn); });
       slipping(sums.s_bb, [](UpperTriangle<N>& m, const Point& p) { add_upper(m, p.sb, p.b); });
-      slipping(sums.s_b_ke, [](Mat3<N>& m, const Point& p) { add_outer(m, p.sb, p.ke); });
+      slipping(sums.s_b_ke, [](Mat3<N>& m, const Point& p) {
+        if constexpr (Point::kElastic)
+          add_outer(m, p.b, p.s_ke);
+        else
+          add_outer(m, p.sb, p.ke);
+      });
       slipping(sums.k_gamma_b, [](Vec3<N>& v, const Point& p) { v = mul_add(p.k_gamma, p.b, v); });
     }
   }

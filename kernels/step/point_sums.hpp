@@ -9,6 +9,29 @@
 
 namespace tangere::kernels {
 
+// Places of a list: rows, and vectors of one lane's own points.
+template <class N>
+void load_place(const CandidateList<N>& list, int k, Vec3<N>& to) {
+  to = {list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]};
+}
+template <class N>
+void load_place(const CandidateList<N>& list, int k, ElasticPlace<N>& to) {
+  load_place(list, k, to.xi);
+  to.numbers = list.anchors + kAnchorNumbers * k;
+  to.stride = 1;
+}
+template <class A, class List>
+void load_own_place(const List& list, int first, Vec3<Lanes<A>>& to) {
+  const double* at = list.own + first;
+  to = {load_lanes<A>(at), load_lanes<A>(at + list.stride), load_lanes<A>(at + 2 * list.stride)};
+}
+template <class A, class List>
+void load_own_place(const List& list, int first, ElasticPlace<Lanes<A>>& to) {
+  load_own_place<A>(list, first, to.xi);
+  to.numbers = reinterpret_cast<const Lanes<A>*>(list.own_anchors + first);
+  to.stride = list.stride / kGroup;
+}
+
 /// Adds the list row by row.
 template <bool Derivatives, class Motion, class N>
 void add_rows(const Motion& motion, const LawParameters<N>& law, const CandidateList<N>& list,
@@ -17,11 +40,9 @@ void add_rows(const Motion& motion, const LawParameters<N>& law, const Candidate
   Chunk chunk;
   for (int k = 0; k < list.count; k += Chunk::kPoints) {
     const int count = list.count - k < Chunk::kPoints ? list.count - k : Chunk::kPoints;
-    Vec3<N> xi[Chunk::kPoints];
-    for (int i = 0; i < count; ++i)
-      xi[i] = {list.points[3 * (k + i)], list.points[3 * (k + i) + 1],
-               list.points[3 * (k + i) + 2]};
-    fill_chunk<Derivatives>(motion, law, xi, count, chunk);
+    typename Motion::Place place[Chunk::kPoints];
+    for (int i = 0; i < count; ++i) load_place(list, k + i, place[i]);
+    fill_chunk<Derivatives>(motion, law, place, count, chunk);
     add_chunk<Derivatives>(sums, chunk);
   }
 }
@@ -43,6 +64,8 @@ void add_row(const Rows& rows, int i, Sums& sums, PointChunk<Point>& chunk) {
     if (Derivatives) copy(Point::kValues, Point::kDerivatives);
     if (Derivatives && slips) copy(Point::kDerivatives, Point::kSlipping);
     if (Derivatives) copy(Point::kSlipping, Point::kBent);
+    if constexpr (Derivatives && Point::kElastic)
+      copy(Point::kSpring, slips ? Point::kNumbers : Point::kSpringSlipping);
     chunk.touching[chunk.count++] = to;
     if (slips) chunk.slipping[chunk.slips++] = to;
   }
@@ -60,13 +83,9 @@ void add_own_points(const Motion& motion, const LawParameters<Lanes<A>>& law, co
   for (int first = 0; first < list.own_count; first += kRows * kGroup) {
     const int rest = (list.own_count - first + kGroup - 1) / kGroup,
               count = rest < kRows ? rest : kRows;
-    Vec3<Lanes<A>> xi[kRows];
-    for (int i = 0; i < count; ++i) {
-      const double* at = list.own + first + i * kGroup;
-      xi[i] = {load_lanes<A>(at), load_lanes<A>(at + list.stride),
-               load_lanes<A>(at + 2 * list.stride)};
-    }
-    fill_chunk<Derivatives>(motion, law, xi, count, rows);
+    typename Motion::Place place[kRows];
+    for (int i = 0; i < count; ++i) load_own_place<A>(list, first + i * kGroup, place[i]);
+    fill_chunk<Derivatives>(motion, law, place, count, rows);
     for (int c = 0; c < rows.count; ++c) add_row<Derivatives>(rows, rows.touching[c], sums, chunk);
   }
 }

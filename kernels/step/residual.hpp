@@ -187,24 +187,24 @@ void add_candidates(const Shape& shape, const LawParameters<N>& law, const Candi
   }
 }
 
-/// Adds points whose friction remembers.
+/// The same where friction remembers.
 template <bool Derivatives, class Shape, class N>
 [[gnu::noinline]] void add_elastic(const Shape& shape, const LawParameters<N>& law,
                                    const CandidateList<N>& list, int lone, const Frame<N>& frame,
                                    const Vec6<N>& W, PairSums<N>& sums) {
-  const auto add = [&](const Vec3<N>& xi, const Anchor<N>& anchor) {
-    accumulate_elastic<Derivatives>(sums, shape, law, frame.R, frame.p, W.a, W.l, xi, anchor);
-  };
-  if (lone < 0) {
-    for (int k = 0; k < list.count; ++k)
-      add({list.points[3 * k], list.points[3 * k + 1], list.points[3 * k + 2]},
-          load_anchor<N>([&](int number) { return list.anchors[kAnchorNumbers * k + number]; }));
-  } else {
-    const double *x = list.own, *y = x + list.stride, *z = y + list.stride;
-    for (int k = 0; k < list.own_count; ++k)
-      add({N(x[k]), N(y[k]), N(z[k])}, load_anchor<N>([&](int number) {
-            return N(list.own_anchors[number * list.stride + k]);
-          }));
+  for (int k = 0, count = lone < 0 ? list.count : list.own_count; k < count; ++k) {
+    const auto number = [&](int i) {
+      return lone < 0 ? list.anchors[kAnchorNumbers * k + i]
+                      : N(list.own_anchors[i * list.stride + k]);
+    };
+    Vec3<N> xi;
+    if (lone < 0) {
+      load_place(list, k, xi);
+    } else {
+      xi = {N(list.own[k]), N(list.own[list.stride + k]), N(list.own[2 * list.stride + k])};
+    }
+    accumulate_elastic<Derivatives>(sums, shape, law, frame.R, frame.p, W.a, W.l, xi,
+                                    load_anchor<N>(number));
   }
 }
 
@@ -214,11 +214,11 @@ bool has_candidates(const CandidateList<N>& list, int lone) {
 }
 
 /// Adds the points around a sphere.
-template <bool Derivatives, class N>
-[[gnu::noinline]] void add_sphere(const SphereMotion<N>& motion, const LawParameters<N>& law,
+template <bool Derivatives, template <class> class Sums, class Motion, class N>
+[[gnu::noinline]] void add_sphere(const Motion& motion, const LawParameters<N>& law,
                                   const CandidateList<N>& list, int lone, const Vec6<N>& W,
                                   PairSums<N>& sums) {
-  PointSums<Derivatives, SphereSums, N> sphere;
+  PointSums<Derivatives, Sums, N> sphere;
   sphere.start(lone);
   sphere.add(motion, law, list, lone);
   add_finished<Derivatives>(motion, W, sphere.result(lone), sums);
@@ -235,13 +235,14 @@ void start(PairSums<N>& sums) {
 }
 
 /// Computes the sums over all shapes of two links. Flat and bent faces share their sums, which are
-/// about body 1's origin.
+/// about body 1's origin; those whose friction remembers share sums of their own.
 template <bool Derivatives, class N>
 void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArgs<N>& a,
                    ContactScratch<N>& o) {
   start<Derivatives>(o.sums);
   PointSums<Derivatives, FaceSums, N> faces;
-  bool any_face = false;
+  PointSums<Derivatives, ElasticFaceSums, N> elastic_faces;
+  bool any_face = false, any_elastic = false;
   for (int i = 0; i < links.count; ++i) {
     const int k = model.pair_order[links.first + i];
     const PairContact& pair = model.pairs[k];
@@ -253,24 +254,39 @@ void sum_link_pair(const ModelView& model, const LinkPair& links, const StageArg
     const Vec3<N> size = load_vector<N>(pair.size, pair.size_row, a.block, a.group);
     const Vec3<N> side = faces_of(a, pair, k);
     with_touched<N>(pair, size, side, [&]<template <class> class Shape>(const Shape<N>& shape) {
-      if (pair.memory >= 0) {
-        add_elastic<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
-        return;
-      }
+      const bool elastic = pair.memory >= 0;
       if constexpr (Shape<N>::kSums == PointSumForm::about_centre) {
         const Vec3<N> centre = o.link2_in_1.R * broadcast<N>(pair.frame2.p) + o.link2_in_1.p;
-        add_sphere<Derivatives>(sphere_motion(centre, o.W, shape.radius), law, list, a.lone, o.W,
-                                o.sums);
+        const SphereMotion<N> motion = sphere_motion(centre, o.W, shape.radius);
+        if (elastic) {
+          add_sphere<Derivatives, ElasticSphereSums>(
+              ElasticSphereMotion<N>{motion, frame().R, law.kt, law.ks}, law, list, a.lone, o.W,
+              o.sums);
+        } else {
+          add_sphere<Derivatives, SphereSums>(motion, law, list, a.lone, o.W, o.sums);
+        }
       } else if constexpr (Shape<N>::kSums == PointSumForm::points) {
-        add_candidates<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
+        if (elastic) {
+          add_elastic<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
+        } else {
+          add_candidates<Derivatives>(shape, law, list, a.lone, frame(), o.W, o.sums);
+        }
       } else {
-        if (!any_face) faces.start(a.lone);
-        any_face = true;
-        faces.add(FaceMotion<Shape, N>{frame(), o.W, shape}, law, list, a.lone);
+        const FaceMotion<Shape, N> motion = {frame(), o.W, shape};
+        if (elastic) {
+          if (!any_elastic) elastic_faces.start(a.lone);
+          any_elastic = true;
+          elastic_faces.add(ElasticFaceMotion<Shape, N>{motion, law.kt, law.ks}, law, list, a.lone);
+        } else {
+          if (!any_face) faces.start(a.lone);
+          any_face = true;
+          faces.add(motion, law, list, a.lone);
+        }
       }
     });
   }
   if (any_face) add_finished<Derivatives>(o.W, faces.result(a.lone), o.sums);
+  if (any_elastic) add_finished<Derivatives>(o.W, elastic_faces.result(a.lone), o.sums);
 }
 
 /// Adds the points of one link that are in the ground. Returns false where no lane has any.
@@ -293,7 +309,7 @@ bool sum_grounded(const ModelView& model, const GroundedLink& grounded, const St
         load_law<N>(ground.parameters, ground.law, ground.ramp, a.block, a.group);
     law.friction_tangent = a.friction_tangent;
     if (ground.memory >= 0) {
-      const Frame<N> in_body = ground_in_body(broadcast<N>(model.ground), link.world);
+      const Frame<N> in_body = relative(link.world, broadcast<N>(model.ground));
       const N* anchors = a.ground_anchors + kAnchorNumbers * ground.first_anchor;
       for (int k = 0; k < ground.n_points; ++k)
         near |= accumulate_elastic_ground<Derivatives>(

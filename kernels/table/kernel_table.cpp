@@ -20,6 +20,7 @@ template <class N, int L>
 constexpr StageKernels<L> stage_kernels() {
   using Step = StepPart<N, L>;
   using Adjoint = AdjointPart<N, L>;
+  using Memory = MemoryRowsPart<N, L>;
   return {Adjoint::scratch_bytes,
           Step::kinematics,
           Step::choose_faces,
@@ -39,7 +40,10 @@ constexpr StageKernels<L> stage_kernels() {
           Adjoint::adjoint_rhs,
           Adjoint::adjoint_products,
           Adjoint::parameter_products,
-          Adjoint::pull_back_poses};
+          Adjoint::pull_back_poses,
+          Memory::touches_at,
+          Memory::recall_ground,
+          Memory::advance_ground};
 }
 
 /// The functions of this table are compiled elsewhere, with the flags of Arch

@@ -67,6 +67,17 @@ struct StageKernels {
   void (*pull_back_poses)(const ModelView&, const Stage<L>&, const Row<L>* q, const Row<L>* v,
                           const Row<L>* zero, std::byte* scratch, MotionCotangent<Row<L>>* links,
                           Row<L>* q_bar, Row<L>* v_bar);
+  /// Computes the touched shape in body 1 and the twist W of each contact that remembers,
+  /// (n_memories), from poses and twists of the links.
+  void (*touches_at)(const ModelView&, const LinkPose<Row<L>>* links, LinkPose<Row<L>>* out);
+  /// Computes Stage::ground_anchors from what is remembered (body 1's axes, or null) and from the
+  /// touches where a solve begins.
+  void (*recall_ground)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
+                        const Row<L>* s);
+  /// Computes what is remembered where a solve ends, (points, 4): s', then 1 at points that touch,
+  /// else 0. s' is only set where a point touches.
+  void (*advance_ground)(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
+                         Row<L>* kept);
 };
 
 struct KernelTable {

@@ -3,7 +3,10 @@
 #pragma once
 
 #include "kernels/memory/memory_pullback.hpp"
+#include "kernels/memory/memory_rows.hpp"
+#include "kernels/numbers/one_lane.hpp"
 #include "kernels/table/parts.hpp"
+#include "kernels/table/stage_view.hpp"
 
 namespace tangere::kernels {
 
@@ -21,6 +24,29 @@ void MemoryPart<Arch>::advance(const RememberingTouch& end, const RememberingPoi
 template <class Arch>
 void MemoryPart<Arch>::pull_back_memory(const MemoryPullback& m) {
   kernels::pull_back_memory<Arch>(m);
+}
+
+template <class N, int L>
+void MemoryRowsPart<N, L>::touches_at(const ModelView& m, const LinkPose<Row<L>>* links,
+                                      LinkPose<Row<L>>* out) {
+  find_touches(m, reinterpret_cast<const LinkPose<N>*>(links), reinterpret_cast<LinkPose<N>*>(out));
+}
+
+template <class N, int L>
+void MemoryRowsPart<N, L>::recall_ground(const ModelView& m, const Stage<L>& stage,
+                                         const LinkPose<Row<L>>* touches, const Row<L>* s) {
+  using View = StageView<N, L>;
+  kernels::recall_ground(m, reinterpret_cast<const LinkPose<N>*>(touches), View::view(s),
+                         View::view(stage.ground_anchors), stage.block, stage.group);
+}
+
+template <class N, int L>
+void MemoryRowsPart<N, L>::advance_ground(const ModelView& m, const Stage<L>& stage,
+                                          const LinkPose<Row<L>>* touches, Row<L>* kept) {
+  using View = StageView<N, L>;
+  kernels::advance_ground(m, reinterpret_cast<const LinkPose<N>*>(touches),
+                          View::view(stage.ground_anchors), View::view(kept), stage.block,
+                          stage.group);
 }
 
 }  // namespace tangere::kernels

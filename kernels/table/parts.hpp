@@ -77,6 +77,16 @@ struct MemoryPart {
   static void pull_back_memory(const MemoryPullback&);
 };
 
+/// The same of all lanes of a group, in numbers N of L lanes.
+template <class N, int L>
+struct MemoryRowsPart {
+  static void touches_at(const ModelView&, const LinkPose<Row<L>>* links, LinkPose<Row<L>>* out);
+  static void recall_ground(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
+                            const Row<L>* s);
+  static void advance_ground(const ModelView&, const Stage<L>&, const LinkPose<Row<L>>* touches,
+                             Row<L>* kept);
+};
+
 /// Readings in reverse, and their change along a change of motion.
 template <class Arch>
 struct ReadingPullbackPart {

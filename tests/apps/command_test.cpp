@@ -19,8 +19,8 @@ using ::testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-const Words kSubcommands{"inspect", "simulate", "generate", "validate", "info",     "merge",
-                         "export",  "plot",     "view",     "bench",    "gradcheck"};
+const Words kSubcommands{"inspect", "simulate", "generate", "validate", "info",      "merge",
+                         "export",  "plot",     "view",     "bench",    "gradcheck", "skin"};
 
 /// `tangere simulate small.xml --output out.h5` and more.
 Words simulate(const Words& more = {}) {
@@ -62,6 +62,30 @@ TEST(Command, EveryBodyTypeIsInspectedSimulatedAndDrawn) {
   const Outcome simulated = run(folder, {"simulate", shapes, "-o", "s.h5", "--json"});
   EXPECT_EQ(simulated.exit_code, 0) << simulated.err;
   EXPECT_EQ(run(folder, {"plot", "s.h5", "-o", "s.svg"}).exit_code, 0);
+}
+
+/// E = 0.2 MPa, ν = 0.49, 3 mm: per mm² G/t = 22.4 and E'/t = 87.7 N/m.
+TEST(Command, ASkinOfRubberHasItsCoefficients) {
+  const Folder folder;
+  const Words words{"skin", "--modulus",       "2e5",  "--thickness", "3e-3", "--pitch",
+                    "1e-3", "--contact-pitch", "2e-3", "--json"};
+  const Outcome outcome = run(folder, words);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const json answer = json::parse(outcome.out);
+  EXPECT_THAT(undocumented_keys(answer), IsEmpty());
+  const json &felt = answer.at("tactile"), &pressed = answer.at("contact");
+  const double ks = 2e5 / (2 * 1.49) * 1e-6 / 3e-3, kn = 2e5 / (1 - 0.49 * 0.49) * 1e-6 / 3e-3;
+  EXPECT_NEAR(felt.at("ks").get<double>(), ks, 1e-9 * ks);
+  EXPECT_NEAR(felt.at("kn").get<double>(), kn, 1e-9 * kn);
+  EXPECT_NEAR(felt.at("kt").get<double>(), ks * 5e-3, 1e-9 * ks);
+  EXPECT_NEAR(felt.at("damping").get<double>(), kn * 5e-3 / 3e-4, 1e-9 * kn / 3e-4);
+  for (const char* name : {"kn", "kt", "damping", "ks"})
+    EXPECT_NEAR(pressed.at(name).get<double>(), 4 * felt.at(name).get<double>(),
+                1e-12 * pressed.at(name).get<double>())
+        << name;
+  EXPECT_THAT(outcome.err, HasSubstr("<tactile kn=\"87.73\" kt=\"0.1119\" mu=\"0.6\""));
+  const double wide = 2e5 * 0.51 / (1.49 * 0.02);
+  EXPECT_NEAR(answer.at("wide_modulus").get<double>(), wide, 1e-9 * wide);
 }
 
 TEST(Command, ThePageNamesEveryOption) {

@@ -342,6 +342,7 @@ std::vector<Violation> check_own_headers(const Tree& tree) {
       {"apps/generate.cpp", "a subcommand: apps/command.hpp"},
       {"apps/gradcheck.cpp", "a subcommand: apps/command.hpp"},
       {"apps/accuracy.cpp", "a subcommand: apps/command.hpp"},
+      {"apps/skin.cpp", "a subcommand: apps/command.hpp"},
       {"apps/stress.cpp", "a subcommand: apps/command.hpp"},
       {"apps/identify_ball.cpp", "a program"},
       {"apps/info.cpp", "a subcommand: apps/command.hpp"},

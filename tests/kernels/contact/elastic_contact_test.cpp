@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
+#include "kernels/contact/elastic_face_contact.hpp"
+#include "kernels/contact/elastic_sphere_contact.hpp"
 #include "kernels/memory/memory_pullback.hpp"
 #include "kernels/numbers/dual.hpp"
 #include "tests/kernels/lift.hpp"
@@ -235,6 +238,99 @@ TEST_P(Elastic, StiffnessAndDampingMatchDualNumbers) {
                 1e-11 * (1e-9 + std::sqrt(dot(analytic, analytic))))
           << "case " << k << (by_pose ? " by pose" : " by rate");
     }
+  }
+}
+
+/// Places of a few points that stick, slip, land and do not touch, with the general sums of them.
+struct Several {
+  Step of;
+  std::vector<Anchor<double>> anchors;
+  std::vector<ElasticPlace<double>> places;
+  PairSums<double> general;
+};
+Several random_points(Random& random, PrimitiveShape shape_kind) {
+  Several out{random_step(random, shape_kind, false), {}, {}, PairSums<double>::zero()};
+  constexpr int kCount = 12;
+  out.anchors.reserve(kCount);  // places point at them
+  const Step& x = out.of;
+  with_distance<double>(x.shape, kSize, [&](const auto& shape) {
+    for (int k = 0; k < kCount; ++k) {
+      const Vec3<double> xi = k == 0 ? x.xi : x.xi + random.vector(k < 6 ? 2e-4 : 3e-3);
+      const auto start = touch<double>(x, x.start, x.twist, {});
+      const Anchor<double> anchor = recalled(shape, start, xi, k < 3 ? x.s : random.vector(1e-4));
+      out.anchors.push_back(anchor);
+      out.places.push_back({xi, reinterpret_cast<const double*>(&out.anchors.back()), 1});
+      accumulate_elastic<true>(out.general, shape, x.law, x.end.R, x.end.p, x.twist.a, x.twist.l,
+                               xi, anchor);
+    }
+  });
+  return out;
+}
+
+/// Compares sums in products, chunk by chunk, with the general sums. Returns how many points slip.
+template <class Motion, class Finish>
+int expect_same_sums(const Motion& motion, const Several& points, const Finish& finish) {
+  PairSums<double> finished = PairSums<double>::zero(), values = finished;
+  typename Motion::Sums sums, forces;
+  clear<true>(sums);
+  clear<false>(forces);
+  PointChunk<typename Motion::Point> chunk;
+  int slips = 0;
+  for (std::size_t k = 0; k < points.places.size(); k += 6) {
+    fill_chunk<true>(motion, points.of.law, &points.places[k], 6, chunk);
+    add_chunk<true>(sums, chunk);
+    slips += chunk.slips;
+    fill_chunk<false>(motion, points.of.law, &points.places[k], 6, chunk);
+    add_chunk<false>(forces, chunk);
+  }
+  finish(sums, finished, std::true_type{});
+  finish(forces, values, std::false_type{});
+  const auto close = [](const double* a, const double* b, int count) {
+    double scale = 1e-300;
+    for (int i = 0; i < count; ++i) scale = std::max(scale, std::abs(b[i]));
+    for (int i = 0; i < count; ++i) EXPECT_NEAR(a[i], b[i], 2e-11 * scale) << i;
+  };
+  const PairSums<double>& general = points.general;
+  close(&finished.wrench.l.x, &general.wrench.l.x, 3);
+  close(&finished.wrench.a.x, &general.wrench.a.x, 3);
+  EXPECT_EQ(values.wrench.l.x, finished.wrench.l.x);
+  EXPECT_EQ(values.wrench.a.z, finished.wrench.a.z);
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j) {
+      SCOPED_TRACE(std::to_string(i) + std::to_string(j));
+      close(&finished.k[i][j].m[0][0], &general.k[i][j].m[0][0], 9);
+      close(&finished.d[i][j].m[0][0], &general.d[i][j].m[0][0], 9);
+    }
+  return slips;
+}
+
+TEST(Elastic, SumsInProductsAreTheGeneralSums) {
+  for (const PrimitiveShape kind : {PrimitiveShape::sphere, PrimitiveShape::plane,
+                                    PrimitiveShape::cuboid, PrimitiveShape::cylinder}) {
+    SCOPED_TRACE(int(kind));
+    Random random(8);
+    int slips = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+      const Several points = random_points(random, kind);
+      const Step& x = points.of;
+      with_distance<double>(
+          kind, kSize, [&]<template <class> class Shape>(const Shape<double>& shape) {
+            if constexpr (Shape<double>::kSums == PointSumForm::about_centre) {
+              const ElasticSphereMotion<double> motion = {
+                  sphere_motion(x.end.p, x.twist, shape.radius), x.end.R, x.law.kt, x.law.ks};
+              slips += expect_same_sums(motion, points, [&](const auto& sums, auto& to, auto with) {
+                add_finished<with()>(motion, x.twist, sums, to);
+              });
+            } else if constexpr (Shape<double>::kSums == PointSumForm::faces) {
+              const ElasticFaceMotion<Shape, double> motion = {
+                  {x.end, x.twist, shape}, x.law.kt, x.law.ks};
+              slips += expect_same_sums(motion, points, [&](const auto& sums, auto& to, auto with) {
+                add_finished<with()>(x.twist, sums, to);
+              });
+            }
+          });
+    }
+    EXPECT_GT(slips, 50);
   }
 }
 
