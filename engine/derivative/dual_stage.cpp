@@ -212,7 +212,7 @@ struct DualStage::Impl {
           of.contact.shape,
           of.ground ? kernels::zero3<D>()
                     : kernels::broadcast<D>(felt_sizes[std::size_t(of.contact.body2)]),
-          f);
+          f, of.contact.grid);
     }
   }
 
@@ -532,7 +532,7 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
     const kernels::Vec3<D> size = {{has.x, tangent(first_size, 0)},
                                    {has.y, tangent(first_size, 1)},
                                    {has.z, tangent(first_size, 2)}};
-    kernels::with_distance<D>(body.shape, size, [&](const auto& shape) {
+    const auto add = [&](const auto& shape) {
       for (int k = 0; k < pad.tiles() * kernels::kTactileTile; ++k) {
         const PadPoint p = pad_point(pad, k / kernels::kTactileTile, k % kernels::kTactileTile);
         if (p.index < 0) continue;
@@ -559,7 +559,8 @@ void DualStage::field(int sensor, const double* column, std::span<const double> 
             field_dot[at_c] += p.rows[3 * c + e] * f[e].epsilon;
           }
       }
-    });
+    };
+    kernels::with_distance<D>(body.shape, size, add, body.grid);
   }
 }
 

@@ -30,6 +30,9 @@ void warn_of_dense_meshes(const Scene& scene, const SceneNode& root);
 /// Warns of pairs in which a cuboid's contact points are as far apart as the touched body is
 /// across, or farther, and the touched body has no points on the cuboid.
 void warn_of_coarse_points(const Scene& scene, const SceneNode& root);
+
+/// Warns of tactile sensors that nothing can touch, or whose body has no contact with another.
+void warn_of_idle_sensors(const Scene& scene, const SceneNode& root);
 void read_sensors(Scene& scene, const SceneNode& section);
 void read_end_effectors(Scene& scene, const SceneNode& section);
 /// Names end effectors that have no name: "endeffector" and their position in the file, or the next
