@@ -214,8 +214,9 @@ int inspect(const InspectArguments& options, const Console& console) {
     refuse_with_task(*task, {{"--allow-unknown", options.allow_unknown}});
     return report(task->model(), &task->spec(), options, console);
   }
-  return report(Model(read_scene_for(options.scene, options.allow_unknown, console)), nullptr,
-                options, console);
+  const Model model(read_scene_for(options.scene, options.allow_unknown, console));
+  warn_of_overlaps(console, model);
+  return report(model, nullptr, options, console);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/named_value.hpp"
+#include "engine/sense/start_overlaps.hpp"
 #include "io/files/csv.hpp"
 #include "io/scene/scene_reader.hpp"
 
@@ -76,6 +77,10 @@ std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlP
     throw InputError("the controls have no end, so the number of steps is not known; give --steps");
   controls.check_covers(steps);
   return steps;
+}
+
+void warn_of_overlaps(const Console& console, const Model& model) {
+  for (const std::string& line : start_overlaps(model)) console.note("warning: " + line);
 }
 
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout) {

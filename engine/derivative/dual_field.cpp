@@ -81,7 +81,7 @@ void read_dual_field(const CompiledModel& m, int sensor,
     const kernels::Vec3<D> size = {{has.x, tangent(first_size, 0)},
                                    {has.y, tangent(first_size, 1)},
                                    {has.z, tangent(first_size, 2)}};
-    kernels::with_distance<D>(body.shape, size, [&](const auto& shape) {
+    const auto add = [&](const auto& shape) {
       for (int k = 0; k < pad.tiles() * kernels::kTactileTile; ++k) {
         const PadPoint p = pad_point(pad, k / kernels::kTactileTile, k % kernels::kTactileTile);
         if (p.index < 0) continue;
@@ -108,7 +108,8 @@ void read_dual_field(const CompiledModel& m, int sensor,
             field_dot[at_c] += p.rows[3 * c + e] * f[e].epsilon;
           }
       }
-    });
+    };
+    kernels::with_distance<D>(body.shape, size, add, body.grid);
   }
 }
 

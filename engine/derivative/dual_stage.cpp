@@ -213,7 +213,7 @@ struct DualStage::Impl {
           of.contact.shape,
           of.ground ? kernels::zero3<D>()
                     : kernels::broadcast<D>(felt_sizes[std::size_t(of.contact.body2)]),
-          f);
+          f, of.contact.grid);
     }
   }
 

@@ -131,6 +131,7 @@ void add_sensors(CompiledModel& m) {
       of.contact.shape = body.shape;
       of.contact.size = body.size;
       of.contact.size_row = body.size_row;
+      of.contact.grid = body.grid;
       of.contact.body2 = target;
       of.sensor = s.number;
       of.number = kernels::parameter_numbers(m.view) + kCoefficients * s.number;

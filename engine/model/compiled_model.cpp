@@ -42,6 +42,7 @@ class Compiler {
     compile_motors(m_, joints_);
     compile_initial_state(m_, joints_);
     unknown_scales();
+    mesh_distances();
     pair_contacts();
     ground_contacts();
     group_contacts(m_);
@@ -93,6 +94,49 @@ class Compiler {
     if (body.link >= 0 && body.mass > 0) add_inertia(m_.links[body.link], body, properties);
     m_.bodies.push_back(body);
     m_.body_names.push_back(d.body.name);
+  }
+
+  /// Whether something in the scene asks for the distance to a body.
+  [[nodiscard]] bool is_touched(std::size_t body) const {
+    const std::string& name = m_.scene.links[body].body.name;
+    const auto of_contact = [&](const PairContactDescription& d) {
+      return d.primitive_body == name;
+    };
+    // A sensor feels what moves against it, and its signs are those of its own body's surface.
+    const auto of_sensor = [&](const TactileDescription& d) {
+      const int b = bodies_.find("body", d.body, d.source);
+      return b == int(body) || m_.bodies[std::size_t(b)].link != m_.bodies[body].link;
+    };
+    const Scene& s = m_.scene;
+    return std::any_of(s.pair_contacts.begin(), s.pair_contacts.end(), of_contact) ||
+           std::any_of(s.sensors.begin(), s.sensors.end(), of_sensor);
+  }
+
+  /// Makes the distances to meshes. Bodies with the same mesh share one.
+  void mesh_distances() {
+    std::vector<std::pair<const MeshShape*, std::shared_ptr<const MeshGrid>>> made;
+    for (std::size_t b = 0; b < m_.bodies.size(); ++b) {
+      const BodyDescription& d = m_.scene.links[b].body;
+      const auto* const mesh = std::get_if<MeshShape>(&d.shape);
+      if (mesh == nullptr || mesh->resolution == 0 || !is_touched(b)) continue;
+      const auto same = std::find_if(made.begin(), made.end(), [&](const auto& other) {
+        return other.first->resolution == mesh->resolution &&
+               other.first->vertices == mesh->vertices && other.first->triangles == mesh->triangles;
+      });
+      std::shared_ptr<const MeshGrid> grid;
+      try {
+        grid = same != made.end() ? same->second : make_mesh_grid(*mesh);
+      } catch (const InputError& error) {
+        throw InputError(d.source.prefix() + "body '" + d.name + "': " + error.what());
+      }
+      if (same == made.end()) {
+        made.emplace_back(mesh, grid);
+        m_.mesh_grids.push_back(grid);
+      }
+      m_.bodies[b].touchable = true;
+      m_.bodies[b].shape = PrimitiveShape::mesh;
+      m_.bodies[b].grid = &grid->view;
+    }
   }
 
   // --- contacts ---
@@ -151,6 +195,7 @@ class Compiler {
       pair.frame2 = second.frame;
       pair.shape = second.shape;
       pair.size = second.size;
+      pair.grid = second.grid;
       pair.law = d.law;
       pair.ramp = d.ramp;
       pair.parameters = constants(d.coefficients);

@@ -4,9 +4,11 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "engine/base/aligned.hpp"
+#include "engine/model/mesh_grid.hpp"
 #include "engine/model/model.hpp"
 #include "engine/model/pattern.hpp"
 #include "kernels/numbers/so3.hpp"
@@ -19,12 +21,15 @@ namespace tangere {
 struct CompiledBody {
   int link = -1;
   kernels::Frame<double> frame;  ///< body frame in the link (or the world)
-  bool touchable = true;         ///< has a distance; else `shape` is unused and size.x the extent
+  /// Has a distance. If not, or if it is a mesh, size.x is the extent. A mesh has one if the scene
+  /// needs it: where something touches it, or where there are sensors that might.
+  bool touchable = true;
   PrimitiveShape shape = PrimitiveShape::sphere;
   kernels::Vec3<double> size{};    ///< as in kernels::PairContact
   kernels::Vec3<double> centre{};  ///< centre of mass, body frame [m]
   double mass = 0;                 ///< [kg]
   int size_row = -1;               ///< ≥ 0: size is read from three rows of the block instead
+  const kernels::DistanceGrid* grid = nullptr;  ///< of a mesh that can be touched
 };
 
 /// A joint of the scene: its elementary links and its coordinates.
@@ -178,7 +183,8 @@ struct CompiledModel {
   std::vector<kernels::LinkPair> link_pairs;
   std::vector<kernels::GroundedLink> grounded;
   std::vector<int> pair_order, ground_order;  ///< members of link_pairs and grounded, side by side
-  std::vector<std::vector<double>> point_storage;  ///< what pairs and grounds point into
+  std::vector<std::vector<double>> point_storage;           ///< what pairs and grounds point into
+  std::vector<std::shared_ptr<const MeshGrid>> mesh_grids;  ///< what bodies' grids are in
   std::vector<AlignedVector<double>>
       tile_storage;  ///< what pairs' tile_points and tile_bounds point into
   std::vector<VaryingInertia> varying_inertia;
@@ -223,7 +229,7 @@ InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& propert
 InertiaRows inertia_rows(const kernels::Link& link);
 /// Adds a body to its link.
 void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProperties& properties);
-/// Sets shape and size of a body, and whether it can be touched.
+/// Sets shape and size of a body, and whether it can be touched. Meshes get their distance later.
 void place_shape(const Shape& shape, CompiledBody& body);
 
 /// Returns the points of the body that meet other bodies, (n, 3) in its body frame; may be empty.

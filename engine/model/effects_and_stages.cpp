@@ -3,6 +3,7 @@
 #include "engine/model/effects_and_stages.hpp"
 
 #include <algorithm>
+#include <cstdio>
 #include <utility>
 
 #include "engine/model/shapes.hpp"
@@ -128,6 +129,15 @@ void list_stages(CompiledModel& m) {
   const auto add = [&](const char* name, std::string of, std::string variant) {
     m.stages.push_back({name, std::move(of), std::move(variant)});
   };
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    const kernels::DistanceGrid* const g = m.bodies[b].grid;
+    if (g == nullptr) continue;
+    char text[160];
+    std::snprintf(text, sizeof text, "%d x %d x %d cells of %.3g m, %.2f MB", g->cells[0],
+                  g->cells[1], g->cells[2], g->cell,
+                  1e-6 * sizeof(float) * g->plane * (g->cells[0] + 3));
+    add("mesh distance", m.body_names[b], text);
+  }
   add("kinematics", counted(m.links.size(), "link", "links"), motion_variant(m.links));
   if (!m.pairs.empty())
     add("search", counted(m.pairs.size(), "pair of shapes", "pairs of shapes"),

@@ -94,12 +94,13 @@ struct EllipsoidShape {
 };
 /// The half-space z < 0 of the body frame: no mass, no contact points.
 struct PlaneShape {};
-/// A closed surface of triangles, whose corners are anticlockwise seen from outside. It has no
-/// distance, so nothing touches its faces.
+/// A closed surface of triangles, whose corners are anticlockwise seen from outside.
 struct MeshShape {
   std::vector<double> vertices;  ///< (n, 3), body frame [m]
   std::vector<std::array<int, 3>> triangles;
   std::vector<double> contact_points = {};  ///< (n, 3), body frame [m]; empty: all vertices
+  /// Cells of its distance along the longest side. 0: it has no distance, and nothing touches it.
+  int resolution = 64;
 };
 /// A body given by its mass, inertia and contact points alone. It has no distance. Its centre of
 /// mass is the body frame's origin.

@@ -134,9 +134,9 @@ double points_outward(const CompiledBody& body, const Vec3<double>& at,
                       const Vec3<double>& direction) {
   if (!body.touchable) return dot(direction, at - body.centre);
   return dot(direction,
-             kernels::with_distance<double>(body.shape, body.size, [&](const auto& shape) {
-               return kernels::distance_at(shape, at).n;
-             }));
+             kernels::with_distance<double>(
+                 body.shape, body.size,
+                 [&](const auto& shape) { return kernels::distance_at(shape, at).n; }, body.grid));
 }
 
 CompiledSensor compile_sensor(const TactileDescription& d, const CompiledBody& body,

@@ -255,6 +255,7 @@ const std::vector<ShapeRow>& table() {
       {.name = "plane", .make = make<PlaneShape>, .distance = PrimitiveShape::plane},
       {.name = "mesh",
        .make = make<MeshShape>,
+       .distance = PrimitiveShape::mesh,
        .mass = [](const Shape& s,
                   double density) { return mesh_mass(std::get<MeshShape>(s), density); },
        .points =
@@ -325,9 +326,12 @@ std::string slenderness_fault(const Shape& shape) {
 // --- what the rest of the engine asks of a shape ---
 
 const char* shape_name(const Shape& shape) { return row_of(shape).name; }
-bool has_distance(const Shape& shape) { return row_of(shape).distance.has_value(); }
+bool has_distance(const Shape& shape) {
+  const auto* const mesh = std::get_if<MeshShape>(&shape);
+  return row_of(shape).distance.has_value() && (mesh == nullptr || mesh->resolution > 0);
+}
 bool is_ball(const Shape& shape) {
-  return has_distance(shape) && kernels::is_ball(*row_of(shape).distance);
+  return row_of(shape).distance.has_value() && kernels::is_ball(*row_of(shape).distance);
 }
 bool has_contact_points(const Shape& shape) {
   const ShapeRow& row = row_of(shape);
@@ -354,7 +358,7 @@ std::vector<double> contact_points(const Shape& shape) {
 
 void place_shape(const Shape& shape, CompiledBody& body) {
   const ShapeRow& row = row_of(shape);
-  body.touchable = row.distance.has_value();
+  body.touchable = row.distance.has_value() && row.distance != PrimitiveShape::mesh;
   if (body.touchable) {
     body.shape = *row.distance;
     Shape copy = shape;
@@ -387,13 +391,14 @@ kernels::Hull hull_of(const CompiledBody& body) {
     case PrimitiveShape::capsule: return hull({0, 0, s.y}, {s.x, s.x, s.x});
     case PrimitiveShape::ellipsoid: return hull({}, s);
     case PrimitiveShape::sphere: return hull({}, {s.x, s.x, s.x});
-    case PrimitiveShape::plane: break;
+    case PrimitiveShape::plane:
+    case PrimitiveShape::mesh: break;
   }
   return hull({}, {});
 }
 
 std::array<double, 3> widths(const Shape& shape) {
-  if (!has_distance(shape)) return {0, 0, 0};
+  if (!has_distance(shape) || row_of(shape).sizes.empty()) return {0, 0, 0};
   CompiledBody body;
   place_shape(shape, body);
   const kernels::Hull hull = hull_of(body);

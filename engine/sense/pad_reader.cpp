@@ -36,7 +36,7 @@ PadReader::PadReader(const Model& model)
     Pad pad{s.tiles(), {}};
     for (const int body : s.targets) {
       const CompiledBody& b = compiled(model).bodies[std::size_t(body)];
-      pad.shapes.push_back({b.shape, {b.size.x, b.size.y, b.size.z}});
+      pad.shapes.push_back({b.shape, {b.size.x, b.size.y, b.size.z}, b.grid});
     }
     tiles = std::max(tiles, std::size_t(s.n_tiles()));
     targets = std::max(targets, s.targets.size());

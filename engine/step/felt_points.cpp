@@ -41,7 +41,7 @@ kernels::RememberingPoints FeltPoints::find(const CompiledSensor& sensor,
   const Vec3<double> middle = transposed_times(touch.shape.R, c.middle - touch.shape.p);
   const bool near = kernels::with_distance<double>(
       c.shape, touch.size,
-      [&](const auto& shape) -> bool { return nearer_than(shape, middle, c.extent); });
+      [&](const auto& shape) -> bool { return nearer_than(shape, middle, c.extent); }, c.grid);
   if (!near) return points;
   double pose[12];
   for (int i = 0; i < 9; ++i) pose[i] = touch.shape.R.m[i / 3][i % 3];

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "engine/model/shapes.hpp"
 #include "io/scene/scene_sections.hpp"
@@ -14,6 +15,8 @@ namespace tangere {
 namespace {
 
 constexpr int kLargestResolution = 1000;  // contact points along one edge or around one ring
+constexpr int kMostCells = 128;           // of a mesh's distance along its longest side
+constexpr int kMostSpread = 4096;         // contact points spread over a mesh
 
 using Names = std::vector<std::string>;
 
@@ -44,7 +47,10 @@ class Attributes {
                 "filename",
                 "transform_type",
                 "inertia",
-                "mesh"};
+                "mesh",
+                "resolution",
+                "count",
+                "pitch"};
 };
 
 /// Reads a shape that its size and the numbers of its contact points define completely.
@@ -144,8 +150,31 @@ AbstractShape read_abstract(const SceneNode& node, double length) {
   return shape;
 }
 
-/// Reads how many of a mesh's vertices touch. Without a number, all do.
-void read_contact_count(const SceneNode& node, MeshShape& mesh) {
+/// Reads with which points a mesh touches: with some of its vertices, or with points that are
+/// spread over its area. Without a number, it touches with all vertices.
+void read_contact_count(const SceneNode& node, double length, MeshShape& mesh) {
+  const char* given = nullptr;
+  for (const char* name : {"general_contact_resolution", "count", "pitch"}) {
+    if (!node.has(name)) continue;
+    if (given != nullptr)
+      node.fail(fmt::format("both '{}' and '{}'; expected one of them", given, name));
+    given = name;
+  }
+  if (node.has("count")) {
+    mesh.contact_points = points_by_area(mesh, node.integer("count", 1, kMostSpread));
+    return;
+  }
+  if (node.has("pitch")) {
+    const double pitch = node.positive("pitch") * length, area = area_of(mesh),
+                 count = std::round(area / (pitch * pitch));
+    if (!(count >= 1 && count <= kMostSpread))
+      node.fail(
+          fmt::format("a pitch of {:g} m on an area of {:g} m² takes {:g} points; expected 1 "
+                      "to {}",
+                      pitch, area, count, kMostSpread));
+    mesh.contact_points = points_by_area(mesh, static_cast<int>(count));
+    return;
+  }
   if (!node.has("general_contact_resolution")) return;
   const auto vertices = static_cast<int>(mesh.vertices.size() / 3);
   const int count = node.integer("general_contact_resolution", 1, kLargestResolution);
@@ -164,9 +193,11 @@ Shape read_shape(const SceneNode& node, Attributes& attributes) {
   const ShapeRow& row = shape_rows()[std::size_t(node.choice("type", names))];
   Shape shape = row.make();
   if (std::holds_alternative<MeshShape>(shape)) {
-    attributes.use({"filename", "scale", "transform_type", "general_contact_resolution"});
+    attributes.use({"filename", "scale", "transform_type", "general_contact_resolution",
+                    "resolution", "count", "pitch"});
     MeshShape mesh = read_mesh(node, length);
-    read_contact_count(node, mesh);
+    mesh.resolution = node.integer("resolution", 0, kMostCells, mesh.resolution);
+    read_contact_count(node, length, mesh);
     return mesh;
   }
   if (std::holds_alternative<AbstractShape>(shape)) {

@@ -252,6 +252,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   once("control", [&](const SceneNode& s) { read_control(scene, s); });
   once("randomize", [&](const SceneNode& s) { read_randomize(scene, s); });
   once("outputs", [&](const SceneNode& s) { read_outputs(scene, s); });
+  warn_of_idle_sensors(scene, root);
 }
 
 /// Describes an error of the XML parser.

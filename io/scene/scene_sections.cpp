@@ -205,6 +205,11 @@ void read_contacts(Scene& scene, const SceneNode& section) {
             with_article(shape_name(points)),
             has_distance(points) ? "swap the two bodies" : "give it a <collision contacts>"));
       const Shape& touched = scene.links[std::size_t(primitive)].body.shape;
+      if (!has_distance(touched) && std::holds_alternative<MeshShape>(touched))
+        node.fail(
+            fmt::format("primitive_body '{}' is a mesh with resolution=\"0\", which has no "
+                        "distance function; expected a resolution of 1 or more",
+                        d.primitive_body));
       if (!has_distance(touched))
         node.fail(fmt::format(
             "primitive_body '{}' is {} body, which has no distance function; expected {}",

@@ -148,6 +148,53 @@ std::vector<double> spread_points(const std::vector<double>& points, int count) 
   return chosen;
 }
 
+namespace {
+
+/// Returns a corner of a triangle and two edges from there.
+std::array<Vector3, 3> corner_and_edges(const MeshShape& mesh, const std::array<int, 3>& t) {
+  std::array<Vector3, 3> out{};
+  for (std::size_t k = 0; k < 3; ++k)
+    for (std::size_t c = 0; c < 3; ++c)
+      out[k][c] = mesh.vertices[3 * std::size_t(t[k]) + c] - (k == 0 ? 0 : out[0][c]);
+  return out;
+}
+double triangle_area(const MeshShape& mesh, const std::array<int, 3>& t) {
+  const auto [at, a, b] = corner_and_edges(mesh, t);
+  return 0.5 * std::hypot(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                          a[0] * b[1] - a[1] * b[0]);
+}
+
+}  // namespace
+
+double area_of(const MeshShape& mesh) {
+  double sum = 0;
+  for (const std::array<int, 3>& t : mesh.triangles) sum += triangle_area(mesh, t);
+  return sum;
+}
+
+/// Many more points are laid out by area, in a sequence that fills a triangle evenly. Of these,
+/// those are taken that are farthest from one another.
+std::vector<double> points_by_area(const MeshShape& mesh, int count) {
+  constexpr int kMore = 16;
+  constexpr double kFirst = 0.7548776662466927, kSecond = 0.5698402909980532;
+  const int all = kMore * count;
+  const double step = area_of(mesh) / all;
+  std::vector<double> points;
+  double before = 0;  // area of the triangles so far
+  int n = 0;
+  for (const std::array<int, 3>& t : mesh.triangles) {
+    before += triangle_area(mesh, t);
+    const auto [at, a, b] = corner_and_edges(mesh, t);
+    for (; n < all && (n + 0.5) * step < before; ++n) {
+      double whole = 0, u = std::modf(0.5 + n * kFirst, &whole),
+             v = std::modf(0.5 + n * kSecond, &whole);
+      if (u + v > 1) u = 1 - u, v = 1 - v;
+      for (std::size_t c = 0; c < 3; ++c) points.push_back(at[c] + u * a[c] + v * b[c]);
+    }
+  }
+  return spread_points(points, std::min(count, static_cast<int>(points.size() / 3)));
+}
+
 std::vector<double> read_contact_points(const std::string& path) {
   WordReader file(path);
   if (!file.next())

@@ -19,6 +19,13 @@ MeshShape read_surface(const std::string& path);
 /// before it, the first of equals. `count` is at most n.
 std::vector<double> spread_points(const std::vector<double>& points, int count);
 
+/// Returns the area of a surface, in the square of its vertices' unit.
+double area_of(const MeshShape& mesh);
+
+/// Returns `count` points on the surface, (n, 3), spread so that each stands for about the same
+/// area. The same mesh has the same points everywhere.
+std::vector<double> points_by_area(const MeshShape& mesh, int count);
+
 /// Reads a count, then as many lines x y z. Returns (n, 3) numbers in the file's own unit. Throws
 /// like read_surface.
 std::vector<double> read_contact_points(const std::string& path);

@@ -49,7 +49,15 @@ template <class N, class F>
 }
 
 /// Shapes with a signed distance, which contact points and tactile points can touch.
-enum class PrimitiveShape : std::uint8_t { sphere, cuboid, plane, cylinder, capsule, ellipsoid };
-inline constexpr int kPrimitiveShapes = 6;
+enum class PrimitiveShape : std::uint8_t {
+  sphere,
+  cuboid,
+  plane,
+  cylinder,
+  capsule,
+  ellipsoid,
+  mesh
+};
+inline constexpr int kPrimitiveShapes = 7;
 
 }  // namespace tangere

@@ -9,6 +9,7 @@
 #include "kernels/contact/shapes/cuboid.hpp"
 #include "kernels/contact/shapes/cylinder.hpp"
 #include "kernels/contact/shapes/ellipsoid.hpp"
+#include "kernels/contact/shapes/mesh.hpp"
 #include "kernels/contact/shapes/plane.hpp"
 #include "kernels/contact/shapes/sphere.hpp"
 
@@ -18,7 +19,7 @@ template <template <class> class... S>
 struct ShapeList {};
 /// In the order of PrimitiveShape.
 using Shapes = ShapeList<SphereDistance, CuboidDistance, PlaneDistance, CylinderDistance,
-                         CapsuleDistance, EllipsoidDistance>;
+                         CapsuleDistance, EllipsoidDistance, MeshDistance>;
 
 template <template <class> class... S>
 constexpr bool in_order(ShapeList<S...>) {
@@ -28,22 +29,29 @@ constexpr bool in_order(ShapeList<S...>) {
 static_assert(in_order(Shapes{}));
 
 template <class N, class F, template <class> class First, template <class> class... Rest>
-auto with_distance_of(PrimitiveShape shape, const Vec3<N>& size, const F& f,
-                      ShapeList<First, Rest...>) {
+auto with_distance_of(PrimitiveShape shape, const Vec3<N>& size, const DistanceGrid* grid,
+                      const F& f, ShapeList<First, Rest...>) {
   if constexpr (sizeof...(Rest) > 0)
-    if (shape != First<N>::kShape) return with_distance_of<N>(shape, size, f, ShapeList<Rest...>{});
-  return f(First<N>::of(size));
+    if (shape != First<N>::kShape)
+      return with_distance_of<N>(shape, size, grid, f, ShapeList<Rest...>{});
+  if constexpr (First<N>::kShape == PrimitiveShape::mesh) {
+    return f(First<N>::of(size, grid));
+  } else {
+    return f(First<N>::of(size));
+  }
 }
-/// Calls f with the distance of a shape. `size` is as in PairContact.
+/// Calls f with the distance of a shape. `size` is as in PairContact. `grid`: of a mesh.
 template <class N, class F>
-auto with_distance(PrimitiveShape shape, const Vec3<N>& size, const F& f) {
-  return with_distance_of<N>(shape, size, f, Shapes{});
+auto with_distance(PrimitiveShape shape, const Vec3<N>& size, const F& f,
+                   const DistanceGrid* grid = nullptr) {
+  return with_distance_of<N>(shape, size, grid, f, Shapes{});
 }
 /// The same with one size for every lane.
 template <class N, class F>
 requires(!std::is_same_v<N, double>) auto with_distance(PrimitiveShape shape,
-                                                        const Vec3<double>& size, const F& f) {
-  return with_distance<N>(shape, broadcast<N>(size), f);
+                                                        const Vec3<double>& size, const F& f,
+                                                        const DistanceGrid* grid = nullptr) {
+  return with_distance<N>(shape, broadcast<N>(size), f, grid);
 }
 
 /// Returns value and gradient alone.

@@ -52,10 +52,11 @@ template <class Shape, class N>
     p.n = Q * at.n;
     p.axis = straight * Vec3<N>{Q.m[0][2], Q.m[1][2], Q.m[2][2]};
   } else if constexpr (Shape::kBending == Bending::general) {
-    const Distance<N> at = shape.evaluate(transposed_times(Q, arm));
+    Mat3<N> hessian;
+    const Distance<N> at = shape.evaluate(transposed_times(Q, arm), hessian);
     p.d = at.d;
     p.n = Q * at.n;
-    p.hessian = Q * shape.hessian(at) * transpose(Q);
+    p.hessian = Q * hessian * transpose(Q);
   } else {  // a sphere has no orientation
     const Distance<N> at = shape.evaluate(arm, p.curvature);
     p.d = at.d;

@@ -203,6 +203,13 @@ inline void store_lanes_f(const LanesF<A>& d, float* p) {  // 64-byte aligned
   }
 }
 
+/// Returns the nearest integer, ties to even, for |a| < 2^22, as for doubles.
+template <class A>
+inline LanesF<A> round_nearest(const LanesF<A>& a) {
+  const LanesF<A> shift(12582912.0);
+  return (a + shift) - shift;
+}
+
 /// Rounds two groups of eight doubles to the sixteen floats of their block.
 template <class A>
 inline LanesF<A> narrow(const Lanes<A>& low, const Lanes<A>& high) {

@@ -94,7 +94,10 @@ LawParameters<Lanes<A>> law_of_points(const PadTiles& pad, int tile, int k,
 template <class Shape, class N>
 bool reaches(const Shape& shape, const PadMotion<N>& m, const PadTiles& pad, int tile) {
   const Vec3<N> centre = {N(pad.x[tile]), N(pad.y[tile]), N(pad.z[tile])};
-  return any(distance_at(shape, transposed_times(m.Q, centre - m.c)).d < N(pad.radius[tile]));
+  const Vec3<N> y = transposed_times(m.Q, centre - m.c);
+  if constexpr (Shape::kShape == PrimitiveShape::mesh)
+    return any(nearer_than(shape, y, N(pad.radius[tile])));
+  return any(distance_at(shape, y).d < N(pad.radius[tile]));
 }
 
 /// Adds to the own numbers of eight points. `to`: (kPointNumbers, 64), at the first of the points.
@@ -149,7 +152,8 @@ void pull_back_touch(const TactilePullback& a, int touch, TouchCotangent<double>
   const TouchShape& s = a.shapes[touch];
   TouchCotangent<N> sums = {zero6<N>(), zero6<N>(), {N(0.0), N(0.0), N(0.0), N(0.0)}, zero3<N>()};
   with_distance<N>(
-      s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]}, [&]<class Shape>(const Shape& shape) {
+      s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]},
+      [&]<class Shape>(const Shape& shape) {
         for (int i = 0; i < a.count; ++i) {
           const int tile = a.tiles[i];
           if (!reaches(shape, m, *a.pad, tile)) continue;
@@ -159,7 +163,8 @@ void pull_back_touch(const TactilePullback& a, int touch, TouchCotangent<double>
           for (int k = 0; k < kTactileTile; k += kGroup)
             pull_back_points<A, OfLaw>(*a.pad, tile, k, field, shape, m, own, sums);
         }
-      });
+      },
+      s.grid);
   const N* from = &sums.displacement.a.x;
   double* to = &out.displacement.a.x;
   constexpr int kSums = sizeof(TouchCotangent<double>) / sizeof(double);

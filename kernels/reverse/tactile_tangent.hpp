@@ -48,7 +48,8 @@ void add_touch_tangent(const TactileTangent& a, int touch) {
                                 broadcast<N>(moves.displacement.l)};
   const Vec6<N> twist = {broadcast<N>(moves.twist.a), broadcast<N>(moves.twist.l)};
   with_distance<N>(
-      s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]}, [&]<class Shape>(const Shape& shape) {
+      s.shape, Vec3<double>{s.size[0], s.size[1], s.size[2]},
+      [&]<class Shape>(const Shape& shape) {
         for (int i = 0; i < a.count; ++i) {
           const int tile = a.tiles[i];
           if (!reaches(shape, m, *a.pad, tile)) continue;
@@ -68,7 +69,8 @@ void add_touch_tangent(const TactileTangent& a, int touch) {
                            to + 2 * kTactileTile);
           }
         }
-      });
+      },
+      s.grid);
 }
 
 template <class A>

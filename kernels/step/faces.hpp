@@ -33,7 +33,7 @@ Vec3<N> faces_of(const StageArgs<N>& a, const PairContact& pair, int k) {
 template <class N, class F>
 auto with_touched(const PairContact& pair, const Vec3<N>& size, const Vec3<N>& faces, const F& f) {
   if (pair.faced) return f(CuboidFace<N>::of(size, faces, pair.overhang));
-  return with_distance<N>(pair.shape, size, f);
+  return with_distance<N>(pair.shape, size, f, pair.grid);
 }
 
 /// Half the width of a hull along e, a unit vector in its axes.

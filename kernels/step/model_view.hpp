@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "kernels/contact/contact_types.hpp"
+#include "kernels/contact/shapes/distance_grid.hpp"
 #include "kernels/numbers/linalg.hpp"
 
 namespace tangere::kernels {
@@ -88,7 +89,8 @@ struct PairContact {
   int link1, link2;      ///< -1: fixed in the world; then frame1/frame2 are world frames
   Frame<double> frame2;  ///< shape frame in link2 (or the world)
   PrimitiveShape shape;
-  /// Sphere: radius in x; cuboid: half edges; rods: radius, half axis; ellipsoid: semi-axes.
+  /// Sphere: radius in x; cuboid: half edges; rods: radius, half axis; ellipsoid: semi-axes. Not
+  /// read for planes and meshes.
   Vec3<double> size;
   ContactLaw law;
   double ramp;
@@ -108,6 +110,7 @@ struct PairContact {
   Hull hull{};          ///< body 1, if faced
   double overhang = 0;  ///< how far beyond a chosen face's edges a point still touches it [m]
   int memory = -1;      ///< ≥ 0: index of its RememberingContact
+  const DistanceGrid* grid = nullptr;  ///< of a mesh
 };
 inline constexpr int kContactTile = 32;
 inline constexpr double kFarAway =

@@ -65,6 +65,10 @@ inline Twice<N> select(const TwiceMask<M>& m, const Twice<N>& x, const Twice<N>&
   return {select(m.a, x.a, y.a), select(m.b, x.b, y.b)};
 }
 template <class N>
+inline Twice<N> round_nearest(const Twice<N>& x) {
+  return {round_nearest(x.a), round_nearest(x.b)};
+}
+template <class N>
 inline Twice<N> inverse_sqrt(const Twice<N>& x) {
   return {inverse_sqrt(x.a), inverse_sqrt(x.b)};
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "tests/engine/gradient_run.hpp"
+#include "tests/engine/meshes.hpp"
 #include "tests/engine/scenes.hpp"
 
 namespace tangere::testing {
@@ -16,6 +17,11 @@ inline Shape shape_of(PrimitiveShape s) {
     case PrimitiveShape::plane: return PlaneShape{};
     case PrimitiveShape::cylinder: return CylinderShape{0.05, 0.02, 8, 2};
     case PrimitiveShape::ellipsoid: return EllipsoidShape{{0.07, 0.05, 0.04}, 12};
+    case PrimitiveShape::mesh: {
+      MeshShape mesh = ellipsoid_mesh(2, {0.035, 0.025, 0.02});
+      mesh.resolution = 20;
+      return mesh;
+    }
     case PrimitiveShape::capsule: break;
   }
   return CapsuleShape{0.04, 0.02, 3, 4};

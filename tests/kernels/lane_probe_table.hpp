@@ -23,8 +23,8 @@ struct LaneProbeOf {
       kernels::Distance<Number> at;
       Number straight;
       if constexpr (Shape::kBending == kernels::Bending::general) {
-        at = shape.evaluate(y);
-        const kernels::Mat3<Number> H = shape.hessian(at);
+        kernels::Mat3<Number> H;
+        at = shape.evaluate(y, H);
         row[4] = H.m[0][0] + H.m[1][1] + H.m[2][2];
       } else if constexpr (Shape::kBending == kernels::Bending::rod) {
         at = shape.evaluate(y, row[4], straight);

@@ -76,6 +76,13 @@ struct EllipsoidDistance {
     return {dot(n, y) - support(n), n};
   }
 
+  /// Returns H as well.
+  Distance<N> evaluate(const Vec3<N>& y, Mat3<N>& H) const {
+    const Distance<N> at = evaluate(y);
+    H = hessian(at);
+    return at;
+  }
+
   /// Returns H at a distance and its normal.
   Mat3<N> hessian(const Distance<N>& at) const {
     const Vec3<N>& n = at.n;

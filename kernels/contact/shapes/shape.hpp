@@ -14,8 +14,8 @@
 //   stretched(to, from, y)       where the contact point y of a shape `from` is on a shape `to`
 //   stretch_share(size, y, ȳ)    the same in reverse: Σ ȳ·∂y/∂size
 // and for faces, inside(y, κ): like evaluate() where d < 0, elsewhere some d ≥ 0. A shape that does
-// not specialise one of these gets a general form: Bending::general with hessian(d, n), sums point
-// by point, GeneralPad.
+// not specialise one of these gets a general form: Bending::general with evaluate(y, H), sums point
+// by point, GeneralPad. A mesh also takes its DistanceGrid in of().
 #pragma once
 
 #include "kernels/contact/contact_types.hpp"

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "kernels/contact/contact_types.hpp"
+#include "kernels/contact/shapes/distance_grid.hpp"
 #include "kernels/numbers/linalg.hpp"
 
 namespace tangere::kernels {
@@ -20,7 +21,8 @@ struct Touch {
 
 struct TouchShape {
   PrimitiveShape shape;
-  double size[3];  ///< as in PairContact [m]
+  double size[3];                      ///< as in PairContact [m]
+  const DistanceGrid* grid = nullptr;  ///< of a mesh
 };
 
 /// A point relative to its tile's centre, pad axes [m].

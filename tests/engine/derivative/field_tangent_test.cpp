@@ -186,7 +186,8 @@ INSTANTIATE_TEST_SUITE_P(
     All, AlongADirection,
     ::testing::Combine(::testing::Values(PrimitiveShape::sphere, PrimitiveShape::cuboid,
                                          PrimitiveShape::plane, PrimitiveShape::cylinder,
-                                         PrimitiveShape::capsule, PrimitiveShape::ellipsoid),
+                                         PrimitiveShape::capsule, PrimitiveShape::ellipsoid,
+                                         PrimitiveShape::mesh),
                        ::testing::Values(ContactLaw::clamped, ContactLaw::paper),
                        ::testing::Values(Pad::flat, Pad::skewed, Pad::curved)));
 

@@ -403,7 +403,7 @@ TEST_P(TactileKernel, KinksHaveTheForceOfOnePoint) {
 
 std::vector<Case> shapes_and_laws() {
   std::vector<Case> cases;
-  for (int shape = 0; shape < kPrimitiveShapes; ++shape)
+  for (int shape = 0; shape < static_cast<int>(PrimitiveShape::mesh); ++shape)
     for (const ContactLaw law : {ContactLaw::clamped, ContactLaw::paper})
       cases.push_back({static_cast<PrimitiveShape>(shape), law});
   return cases;

@@ -107,9 +107,9 @@ TEST(ShippedScenes, AreAllRunHere) {
   for (const auto& entry :
        std::filesystem::directory_iterator(std::string(TANGERE_SOURCE_DIR) + "/scenes"))
     if (entry.path().extension() == ".xml") found.insert(entry.path().stem().string());
-  const std::set<std::string> run = {"box_pushing", "cap_opening",  "identify_ball",
-                                     "insertion",   "rolling_ball", "rolling_ball_small",
-                                     "stable_grasp"};
+  const std::set<std::string> run = {
+      "box_pushing", "cap_opening",  "identify_ball", "insertion",
+      "mug",         "rolling_ball", "stable_grasp",  "rolling_ball_small"};
   EXPECT_EQ(found, run) << "a scene without a test of what it does, or a test without a scene";
 }
 
@@ -164,6 +164,22 @@ TEST(ShippedScenes, BarIsLiftedAndPutDown) {
     EXPECT_LT(std::abs(r.body(r.steps - 1, e, "block_5", 2) - start), 1e-3);
     EXPECT_LT(std::abs(r.body(r.at(0.5), e, "block_5", 4)), 0.1)
         << "held near its centre of mass: nearly level";
+  }
+}
+
+TEST(ShippedScenes, TheMugIsFeltAndLifted) {
+  const SceneRun r("mug");
+  EXPECT_EQ(r.steps, 200);
+  EXPECT_EQ(r.failed, 0);
+  for (int e = 0; e < kEnvironments; ++e) {
+    for (int s = 0; s < 2; ++s) {
+      EXPECT_EQ(r.touch(1, e, s).points, 0) << "open";
+      for (int k = r.at(0.3); k < r.steps; ++k) {
+        ASSERT_GT(r.touch(k, e, s).points, 24) << "step " << k << ": a line on a round wall";
+        ASSERT_GT(r.touch(k, e, s).pressure, 0.05);
+      }
+    }
+    EXPECT_GT(r.body(r.steps - 1, e, "mug", 2) - r.body(0, e, "mug", 2), 0.02);
   }
 }
 

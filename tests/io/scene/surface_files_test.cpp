@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -134,6 +135,22 @@ TEST_F(SurfaceFiles, MovedAndShearedMeshesFollowTheirVertices) {
       for (int j = 0; j < 3; ++j)
         EXPECT_NEAR(got.inertia.m[i][j], 2 * 6 * det / 12 * ((i == j ? trace : 0) - S.m[i][j]),
                     1e-8);
+  }
+}
+
+/// Every point stands for nearly the same area: each face has its share of them, and none is much
+/// nearer to its neighbour than a grid's.
+TEST_F(SurfaceFiles, PointsAreSpreadByArea) {
+  const MeshShape box = read_surface(write("box.obj", kBox));
+  const double area = area_of(box);
+  for (const int count : {1, 7, 60, 500}) {
+    const std::vector<double> p = points_by_area(box, count);
+    ASSERT_EQ(p.size(), std::size_t(3 * count));
+    EXPECT_EQ(p, points_by_area(box, count));
+    for (std::size_t a = 0; a < p.size(); a += 3)
+      for (std::size_t b = 0; b < a; b += 3)
+        EXPECT_GT(std::hypot(p[a] - p[b], p[a + 1] - p[b + 1], p[a + 2] - p[b + 2]),
+                  0.5 * std::sqrt(area / count));
   }
 }
 
@@ -418,34 +435,77 @@ TEST_F(SurfaceFiles, ScenesSayWhatIsWrongWithTheirBodies) {
               HasSubstr("no solid body"));
 }
 
-/// Without a distance function a body can touch but not be touched, in a file or in a scene built
-/// in code. No sensor feels it.
-TEST_F(SurfaceFiles, NothingTouchesAMesh) {
-  write("box.obj", kBox);
-  const std::string cans =
-      R"(<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOINT"/></link>
-<link name="b"><joint name="b" type="free3d"/><body name="b" type="cuboid" size="1 1 1"/>)";
-  const auto with_contact = [&](const std::string& general, const std::string& primitive) {
+class TouchedMesh : public SurfaceFiles {
+ protected:
+  /// A mesh and a box that touches, and a sensor on the box.
+  SceneFile with_contact(const std::string& resolution, const std::string& general,
+                         const std::string& primitive) {
+    write("box.obj", kBox);
+    const std::string contact =
+        general.empty() ? ""
+                        : "<contact><general_primitive_contact general_body=\"" + general +
+                              "\" primitive_body=\"" + primitive + "\"/></contact>";
     return parse_scene(
-               R"(<tangere><robot><link name="a"><joint name="a" type="free3d"/>
-)" + cans + R"(</link></robot><contact><general_primitive_contact general_body=")" +
-                   general + R"(" primitive_body=")" + primitive +
-                   R"("/></contact><sensor><tactile body="b" type="rect_array" rect_pos0="0 0 0.5"
+        R"(<tangere><robot><link name="a"><joint name="a" type="free3d"/>
+<body name="a" type="mesh" filename="box.obj" transform_type="OBJ_TO_JOINT" )" +
+            resolution + R"(/></link>
+<link name="b"><joint name="b" type="free3d"/><body name="b" type="cuboid" size="1 1 1"/></link></robot>)" +
+            contact + R"(<sensor><tactile name="skin" body="b" type="rect_array" rect_pos0="0 0 0.5"
 rect_pos1="0.1 0.1 0.5" axis0="1 0 0" axis1="0 1 0" resolution="2 2"/></sensor></tangere>)",
-               folder_ + "s.xml")
-        .scene;
-  };
-  EXPECT_THAT(
-      error_of([&] { with_contact("b", "a"); }),
-      HasSubstr(
-          "primitive_body 'a' is a mesh body, which has no distance function; expected a sphere"));
-  Scene s = with_contact("a", "b");
+        folder_ + "s.xml");
+  }
+};
+
+/// Without a distance function a body can touch but not be touched, in a file or in a scene built
+/// in code. No sensor feels it, and that is told.
+TEST_F(TouchedMesh, NothingTouchesAMeshWithoutCells) {
+  const std::string none = "resolution=\"0\"";
+  EXPECT_THAT(error_of([&] { with_contact(none, "b", "a"); }),
+              HasSubstr("primitive_body 'a' is a mesh with resolution=\"0\", which has no distance "
+                        "function"));
+  SceneFile file = with_contact(none, "a", "b");
+  ASSERT_EQ(file.warnings.size(), 1U);
+  EXPECT_THAT(file.warnings[0], HasSubstr("sensor 'skin' on body 'b' can feel nothing"));
+  EXPECT_THAT(file.warnings[0], HasSubstr("'a' has none"));
+  Scene& s = file.scene;
   const auto model = compile(s);
   EXPECT_EQ(model->pairs[0].n_points, 8);
   EXPECT_TRUE(model->sensors[0].targets.empty());
   std::swap(s.pair_contacts[0].general_body, s.pair_contacts[0].primitive_body);
   EXPECT_THAT(error_of([&] { compile(s); }),
               HasSubstr("primitive_body 'a' (mesh) has no distance"));
+}
+
+TEST_F(TouchedMesh, ItsDistanceIsMadeWhereSomethingAsksForIt) {
+  const SceneFile file = with_contact("resolution=\"20\"", "b", "a");
+  EXPECT_TRUE(file.warnings.empty());
+  const auto model = compile(file.scene);
+  ASSERT_EQ(model->mesh_grids.size(), 1U);
+  EXPECT_EQ(model->sensors[0].targets.size(), 1U);
+  EXPECT_EQ(model->pairs[0].grid, model->bodies[0].grid);
+  const auto longest =
+      *std::max_element(model->bodies[0].grid->cells, model->bodies[0].grid->cells + 3);
+  EXPECT_EQ(longest, 20 + 8);
+  Scene s = file.scene;
+  s.sensors.clear();
+  s.pair_contacts.clear();
+  EXPECT_TRUE(compile(s)->mesh_grids.empty());
+}
+
+TEST_F(TouchedMesh, AWallThatIsFeltAndPassedThroughIsTold) {
+  const SceneFile file = with_contact("", "", "");
+  ASSERT_EQ(file.warnings.size(), 1U);
+  EXPECT_THAT(file.warnings[0],
+              HasSubstr("sensor 'skin' on body 'b' reads forces that nothing exerts"));
+}
+
+TEST_F(TouchedMesh, NumbersOfPointsAndCellsAreChecked) {
+  for (const auto& [bad, message] : {std::pair{"count=\"0\"", "count"},
+                                     {"count=\"5\" pitch=\"0.1\"", "both 'count' and 'pitch'"},
+                                     {"pitch=\"1e-6\"", "points; expected 1 to 4096"},
+                                     {"resolution=\"300\"", "resolution"}})
+    EXPECT_THAT(error_of([&] { with_contact(bad, "b", "a"); }), HasSubstr(message)) << bad;
+  EXPECT_EQ(compile(with_contact("count=\"50\"", "a", "b").scene)->pairs[0].n_points, 50);
 }
 
 }  // namespace

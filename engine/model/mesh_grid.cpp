@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sign of a distance is that of the winding number: how often the surface encloses a place. On
+// a line along z it changes by one where a triangle crosses the line. Which triangles do is decided
+// by sides of edges. Two triangles with a common edge take the same decision about it, so that none
+// is missed and none is counted twice.
+//
+// The coefficients solve (c[i-1] + 4 c[i] + c[i+1])/6 = d[i] along each axis in turn. Beyond the
+// last nodes they go on along a straight line. That is felt a few cells far, so the grid reaches
+// kPadding cells beyond the mesh.
+#include "engine/model/mesh_grid.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/base/error.hpp"
+#include "engine/model/triangle_tree.hpp"
+
+namespace tangere {
+
+using kernels::Vec3;
+
+namespace {
+
+constexpr int kPadding = 4, kBeyond = 2;  // cells: of the grid, of the box of what touches
+
+/// The nodes of a grid, z fastest.
+struct Nodes {
+  int count[3];
+  double origin[3], cell;
+
+  [[nodiscard]] std::size_t all() const {
+    return std::size_t(count[0]) * std::size_t(count[1]) * std::size_t(count[2]);
+  }
+  [[nodiscard]] std::size_t at(int i, int j, int k) const {
+    return (std::size_t(i) * std::size_t(count[1]) + std::size_t(j)) * std::size_t(count[2]) +
+           std::size_t(k);
+  }
+  [[nodiscard]] double place(int axis, int i) const { return origin[axis] + i * cell; }
+};
+
+struct Crossing {
+  double z;
+  int turn;  ///< +1: the triangle faces upwards
+};
+
+/// Finds where the vertical lines through the nodes cross the surface. The lines are moved aside by
+/// so little that it does not matter, and by so much that they miss the corners of what people
+/// draw.
+class Crossings {
+ public:
+  Crossings(const MeshShape& mesh, const Nodes& nodes)
+      : mesh_(mesh),
+        nodes_(nodes),
+        of_line_(std::size_t(nodes.count[0]) * std::size_t(nodes.count[1])) {
+    for (const std::array<int, 3>& t : mesh.triangles) add(t);
+  }
+
+  /// Calls f(k, winding number) for the nodes of a line from above.
+  template <class F>
+  void for_each(int i, int j, const F& f) {
+    std::vector<Crossing>& all = line(i, j);
+    std::sort(all.begin(), all.end(),
+              [](const Crossing& a, const Crossing& b) { return a.z > b.z; });
+    int winding = 0;
+    std::size_t next = 0;
+    for (int k = nodes_.count[2] - 1; k >= 0; --k) {
+      for (; next < all.size() && all[next].z > nodes_.place(2, k); ++next)
+        winding += all[next].turn;
+      f(k, winding);
+    }
+  }
+
+ private:
+  std::vector<Crossing>& line(int i, int j) {
+    return of_line_[std::size_t(i) * std::size_t(nodes_.count[1]) + std::size_t(j)];
+  }
+  [[nodiscard]] const double* vertex(int k) const { return &mesh_.vertices[3 * std::size_t(k)]; }
+  [[nodiscard]] double aside(int axis) const {
+    return nodes_.cell * (axis == 0 ? 1.234567e-7 : 2.718281e-7);
+  }
+  /// Whether a place lies to the left of an edge. The edge turned round gives the opposite.
+  [[nodiscard]] bool left_of(int a, int b, double x, double y) const {
+    const bool turned = a > b;
+    const double *from = vertex(turned ? b : a), *to = vertex(turned ? a : b);
+    const bool left = (to[0] - from[0]) * (y - from[1]) - (to[1] - from[1]) * (x - from[0]) > 0;
+    return left != turned;
+  }
+  void add(const std::array<int, 3>& t) {
+    const double *a = vertex(t[0]), *b = vertex(t[1]), *c = vertex(t[2]);
+    const double area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    int first[2], last[2];
+    for (int axis = 0; axis < 2; ++axis) {
+      const auto [low, high] = std::minmax({a[axis], b[axis], c[axis]});
+      const double from = nodes_.origin[axis] + aside(axis);
+      first[axis] = std::max(0, static_cast<int>(std::floor((low - from) / nodes_.cell)));
+      last[axis] = std::min(nodes_.count[axis] - 1,
+                            static_cast<int>(std::ceil((high - from) / nodes_.cell)));
+    }
+    for (int i = first[0]; i <= last[0]; ++i)
+      for (int j = first[1]; j <= last[1]; ++j) {
+        const double x = nodes_.place(0, i) + aside(0), y = nodes_.place(1, j) + aside(1);
+        const bool left = left_of(t[0], t[1], x, y);
+        if (left_of(t[1], t[2], x, y) != left || left_of(t[2], t[0], x, y) != left) continue;
+        if (area == 0) continue;  // sides disagree by rounding alone
+        const double u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area,
+                     v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area;
+        line(i, j).push_back({u * a[2] + v * b[2] + (1 - u - v) * c[2], left ? 1 : -1});
+      }
+  }
+
+  const MeshShape& mesh_;
+  const Nodes& nodes_;
+  std::vector<std::vector<Crossing>> of_line_;
+};
+
+/// Returns the signed distance at every node.
+std::vector<double> distances(const MeshShape& mesh, const Nodes& nodes) {
+  const TriangleTree tree(mesh.vertices, mesh.triangles);
+  Crossings crossings(mesh, nodes);
+  std::vector<double> d(nodes.all());
+  double before = HUGE_VAL;  // no node is farther than its neighbour by more than a cell
+  for (int i = 0; i < nodes.count[0]; ++i)
+    for (int j = 0; j < nodes.count[1]; ++j) {
+      before = HUGE_VAL;
+      if (j > 0) before = std::abs(d[nodes.at(i, j - 1, nodes.count[2] - 1)]);
+      crossings.for_each(i, j, [&](int k, int winding) {
+        const Vec3<double> at = {nodes.place(0, i), nodes.place(1, j), nodes.place(2, k)};
+        if (winding != 0 && winding != 1)
+          throw InputError(fmt::format(
+              "the surface encloses the place ({:g} {:g} {:g}) m {} times; expected a surface that "
+              "does not overlap itself, or resolution=\"0\" for a mesh that nothing touches",
+              at.x, at.y, at.z, winding));
+        const double bound = (before + nodes.cell) * (1 + 1e-9);
+        before = std::sqrt(tree.squared_distance(at, bound * bound));
+        d[nodes.at(i, j, k)] = winding == 1 ? -before : before;
+      });
+    }
+  return d;
+}
+
+/// Turns values along one axis into coefficients, two more than values. `count`: of values along
+/// the axes, of which `axis` grows by two.
+std::vector<double> coefficients_along(const std::vector<double>& values, int (&count)[3],
+                                       int axis) {
+  const auto n = std::size_t(count[axis]);
+  std::size_t inner = 1, outer = 1;
+  for (int c = 0; c < 3; ++c) {
+    if (c < axis) outer *= std::size_t(count[c]);
+    if (c > axis) inner *= std::size_t(count[c]);
+  }
+  // Thomas' algorithm with the factors of (1 4 1), rows 1 … n - 2. The first and the last
+  // coefficient are the values there.
+  std::vector<double> factor(n);
+  for (std::size_t i = 1; i + 1 < n; ++i) factor[i] = 1 / (4 - (i > 1 ? factor[i - 1] : 0));
+  std::vector<double> out((n + 2) * inner * outer);
+  for (std::size_t o = 0; o < outer; ++o) {
+    const double* from = &values[o * n * inner];
+    double* to = &out[o * (n + 2) * inner + inner];  // its first row is the one beyond
+    for (std::size_t s = 0; s < inner; ++s) {
+      to[s] = from[s];
+      to[(n - 1) * inner + s] = from[(n - 1) * inner + s];
+    }
+    for (std::size_t i = 1; i + 1 < n; ++i)
+      for (std::size_t s = 0; s < inner; ++s) {
+        double right = 6 * from[i * inner + s] - to[(i - 1) * inner + s];
+        if (i + 2 == n) right -= to[(i + 1) * inner + s];
+        to[i * inner + s] = right * factor[i];
+      }
+    for (std::size_t i = n - 2; i-- > 1;)
+      for (std::size_t s = 0; s < inner; ++s)
+        to[i * inner + s] -= factor[i] * to[(i + 1) * inner + s];
+    for (std::size_t s = 0; s < inner; ++s) {
+      double* const row = to + s;
+      row[0 - std::ptrdiff_t(inner)] = 2 * row[0] - row[inner];
+      row[n * inner] = 2 * row[(n - 1) * inner] - row[(n - 2) * inner];
+    }
+  }
+  count[axis] += 2;
+  return out;
+}
+
+/// Returns a bound of |∇φ| where φ > 0. In a cell, a derivative lies between the differences of
+/// neighbouring coefficients. What is deep inside, where the nearest place jumps, is left out: on
+/// the way to a place that touches, φ falls from its value to zero outside.
+double steepest(const kernels::DistanceGrid& g) {
+  double most = 0;
+  const int step[3] = {g.plane, g.row, 1};
+  for (int i = 0; i < g.cells[0]; ++i)
+    for (int j = 0; j < g.cells[1]; ++j)
+      for (int k = 0; k < g.cells[2]; ++k) {
+        const float* c =
+            g.coefficients + std::ptrdiff_t(i) * g.plane + std::ptrdiff_t(j) * g.row + k;
+        float highest = 0, largest[3] = {0, 0, 0};
+        for (int a = 0; a < 4; ++a)
+          for (int b = 0; b < 4; ++b)
+            for (int e = 0; e < 4; ++e) highest = std::max(highest, c[a * g.plane + b * g.row + e]);
+        if (highest <= 0) continue;
+        for (int axis = 0; axis < 3; ++axis)
+          for (int a = 0; a < (axis == 0 ? 3 : 4); ++a)
+            for (int b = 0; b < (axis == 1 ? 3 : 4); ++b)
+              for (int e = 0; e < (axis == 2 ? 3 : 4); ++e) {
+                const float* at = c + a * g.plane + b * g.row + e;
+                largest[axis] = std::max(largest[axis], std::abs(at[step[axis]] - at[0]));
+              }
+        double square = 0;
+        for (const float x : largest) square += double(x) * double(x);
+        most = std::max(most, square);
+      }
+  return std::sqrt(most) / g.cell * (1 + 1e-6);
+}
+
+}  // namespace
+
+std::shared_ptr<const MeshGrid> make_mesh_grid(const MeshShape& mesh) {
+  double low[3] = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, high[3] = {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    low[v % 3] = std::min(low[v % 3], mesh.vertices[v]);
+    high[v % 3] = std::max(high[v % 3], mesh.vertices[v]);
+  }
+  const double longest = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+  auto out = std::make_shared<MeshGrid>();
+  kernels::DistanceGrid& g = out->view;
+  Nodes nodes{};
+  nodes.cell = g.cell = longest / mesh.resolution;
+  for (int c = 0; c < 3; ++c) {
+    g.cells[c] = static_cast<int>(std::ceil((high[c] - low[c]) / g.cell - 1e-9)) + 2 * kPadding;
+    g.origin[c] = nodes.origin[c] = 0.5 * (low[c] + high[c] - g.cells[c] * g.cell);
+    g.low[c] = low[c] - kBeyond * g.cell;
+    g.high[c] = high[c] + kBeyond * g.cell;
+    nodes.count[c] = g.cells[c] + 1;
+  }
+  std::vector<double> values = distances(mesh, nodes);
+  int count[3] = {nodes.count[0], nodes.count[1], nodes.count[2]};
+  for (int axis = 2; axis >= 0; --axis) values = coefficients_along(values, count, axis);
+  out->coefficients.assign(values.begin(), values.end());
+  g.coefficients = out->coefficients.data();
+  g.row = count[2];
+  g.plane = count[1] * count[2];
+  g.slope = steepest(g);
+  return out;
+}
+
+}  // namespace tangere

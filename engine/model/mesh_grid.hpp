@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// Makes the distance to a mesh: exact at the nodes of a grid, a spline between them.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "engine/model/scene.hpp"
+#include "kernels/contact/shapes/distance_grid.hpp"
+
+namespace tangere {
+
+struct MeshGrid {
+  kernels::DistanceGrid view{};
+  std::vector<float> coefficients;
+
+  MeshGrid() = default;
+  MeshGrid(const MeshGrid&) = delete;  // the view points into the coefficients
+  MeshGrid& operator=(const MeshGrid&) = delete;
+
+  [[nodiscard]] std::size_t bytes() const { return coefficients.size() * sizeof(float); }
+};
+
+/// Returns the distance to a closed mesh with `mesh.resolution` cells along its longest side.
+/// Throws InputError, which names the place, where the surface overlaps itself, so that its parts
+/// lie inside of what it encloses.
+std::shared_ptr<const MeshGrid> make_mesh_grid(const MeshShape& mesh);
+
+}  // namespace tangere

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+// A closed mesh, by the spline of its distance (spline.hpp): d = φ, n = ∇φ, H = ∇∇φ. |n| is
+// 1 up to the error of the spline. It falls below 1 where the nearest place of the surface jumps:
+// at edges from inside, and deep within. Every formula of contact takes n as the gradient that it
+// is, so forces and their derivatives agree there as well.
+//
+// Beyond the grid, nothing touches. There d is that of the tangent plane at the nearest place of
+// the grid, and H = 0.
+#pragma once
+
+#include "kernels/contact/shapes/shape.hpp"
+#include "kernels/contact/shapes/spline.hpp"
+
+namespace tangere::kernels {
+
+/// Clamps U to the grid and splits it.
+template <class N>
+GridPlace<N> place_in_grid(const DistanceGrid& g, const Vec3<N>& U, Vec3<N>& clamped) {
+  GridPlace<N> at;
+  const N zero(0.0), one(1.0), half(0.5);
+  const N* u = &U.x;
+  N* c = &clamped.x;
+  for (int k = 0; k < 3; ++k) {
+    const N most(double(g.cells[k]));
+    c[k] = min(max(u[k], zero), most);  // NaN becomes zero
+    at.whole[k] = min(round_nearest(c[k] - half), most - one);
+    at.rest[k] = c[k] - at.whole[k];
+  }
+  const Vec3<N> away = U - clamped;
+  const double longest = g.cells[0] + g.cells[1] + g.cells[2];
+  at.whole[0] = select(dot(away, away) > N(longest * longest), N(kNowhere), at.whole[0]);
+  return at;
+}
+template <class N>
+Vec3<N> in_cells(const DistanceGrid& g, const Vec3<N>& y) {
+  const N inverse(1 / g.cell);
+  return {(y.x - N(g.origin[0])) * inverse, (y.y - N(g.origin[1])) * inverse,
+          (y.z - N(g.origin[2])) * inverse};
+}
+
+/// Whether a place may be nearer than m to a mesh: not beyond m of the box of what touches, and not
+/// where φ is more than it can fall on the way. Also true for slightly larger distances.
+template <class N>
+auto near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
+  const N zero(0.0);
+  const N* p = &y.x;
+  N square(0.0);
+  for (int k = 0; k < 3; ++k) {
+    const N beyond = max(max(N(g.low[k]) - p[k], p[k] - N(g.high[k])), zero);
+    square = mul_add(beyond, beyond, square);
+  }
+  auto near = square < m * m;
+  if (!any(near)) return near;
+  const Vec3<N> U = in_cells(g, y);
+  Vec3<N> clamped;
+  const GridPlace<N> at = place_in_grid(g, U, clamped);
+  const Vec3<N> away = U - clamped;
+  SplineValue<N, 0> phi;
+  spline_at(g, at, phi);
+  near = near & ((dot(away, away) > zero) | (phi.value < N(g.slope) * m));
+  return near;
+}
+
+template <class P>
+struct MeshPad;
+
+template <class N>
+struct MeshDistance {
+  static constexpr Bending kBending = Bending::general;
+  static constexpr PrimitiveShape kShape = PrimitiveShape::mesh;
+  static constexpr PointSumForm kSums = PointSumForm::points;
+  template <class P>
+  using Pad = MeshPad<P>;
+  const DistanceGrid* grid;
+
+  static MeshDistance of(const Vec3<N>&, const DistanceGrid* grid) { return {grid}; }
+
+  Distance<N> evaluate(const Vec3<N>& y) const {
+    SplineValue<N, 1> phi;
+    return value_at<1>(y, phi);
+  }
+  /// Returns H as well.
+  Distance<N> evaluate(const Vec3<N>& y, Mat3<N>& H) const {
+    SplineValue<N, 2> phi;
+    const Distance<N> at = value_at<2>(y, phi);
+    const N scale = select(outside(y), N(0.0), N(1 / (grid->cell * grid->cell)));
+    constexpr int kEntry[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) H.m[i][j] = scale * phi.second[kEntry[i][j]];
+    return at;
+  }
+  /// A mesh has no numbers of a size.
+  Vec3<N> size_share(const Vec3<N>&, const Vec3<N>&, const Vec3<N>&) const { return zero3<N>(); }
+
+ private:
+  auto outside(const Vec3<N>& y) const {
+    const Vec3<N> U = in_cells(*grid, y);
+    const N* u = &U.x;
+    const auto beyond = [&](int k) { return (u[k] < N(0.0)) | (u[k] > N(double(grid->cells[k]))); };
+    return beyond(0) | beyond(1) | beyond(2);
+  }
+  template <int Order>
+  Distance<N> value_at(const Vec3<N>& y, SplineValue<N, Order>& phi) const {
+    const Vec3<N> U = in_cells(*grid, y);
+    Vec3<N> clamped;
+    const GridPlace<N> at = place_in_grid(*grid, U, clamped);
+    spline_at(*grid, at, phi);
+    const N slope(1 / grid->cell);
+    Distance<N> inside = {
+        phi.value, {slope * phi.gradient[0], slope * phi.gradient[1], slope * phi.gradient[2]}};
+    const auto beyond = outside(y);
+    if (!any(beyond)) return inside;
+    const Vec3<N> way = phi.value * inside.n + N(grid->cell) * (U - clamped);
+    const N square = select(beyond, dot(way, way), N(1.0)), inverse = inverse_sqrt(square);
+    return {select(beyond, root_of(square, inverse), inside.d),
+            select(beyond, inverse * way, inside.n)};
+  }
+};
+
+template <class N>
+auto nearer_than(const MeshDistance<N>& shape, const Vec3<N>& y, const N& m) {
+  return near_mesh(*shape.grid, y, m);
+}
+
+/// Under a pad, a tile's centre is split into a cell, which is a whole number, and what is left.
+/// Offsets are added to that. φ is then as accurate in single precision as it is small.
+template <class P>
+struct MeshPad {
+  using N = typename P::N;
+  using Offset = typename P::Offset;
+  static constexpr bool kTurns = true;
+  static constexpr int kRows = 9;  // whole cells, what is left, u
+
+  const DistanceGrid* grid;
+  Mat3<N> Q;
+  Vec3<N> whole, rest;
+  Vec3<N> u;
+
+  MeshPad(const TouchShape& s, const Mat3<N>& pose) : grid(s.grid), Q(pose) {}
+
+  template <class D>
+  static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach,
+                   D* row) {
+    const Vec3<D> y = transposed_times(at.Q, t - at.c), U = in_cells(*s.grid, y);
+    const D* from = &U.x;
+    for (int k = 0; k < 3; ++k) {
+      row[k] = round_nearest(from[k]);
+      row[3 + k] = from[k] - row[k];
+    }
+    return select(near_mesh(*s.grid, y, reach), D(-1.0), D(1.0));
+  }
+
+  void set(const N* row) {
+    whole = {row[0], row[1], row[2]};
+    rest = {row[3], row[4], row[5]};
+  }
+
+  auto distance(const Offset& s, N& d, Vec3<N>& n) const {
+    const N zero(0.0), one(1.0), half(0.5), inverse(1 / grid->cell);
+    const N e[3] = {along(Q.m[0][0], Q.m[1][0], Q.m[2][0], s),
+                    along(Q.m[0][1], Q.m[1][1], Q.m[2][1], s),
+                    along(Q.m[0][2], Q.m[1][2], Q.m[2][2], s)};
+    GridPlace<N> at;
+    N inside = one;
+    for (int k = 0; k < 3; ++k) {
+      const N most(double(grid->cells[k] - 1));
+      const N from = mul_add(e[k], inverse, (&rest.x)[k]);
+      const N step = round_nearest(from - half), cell = (&whole.x)[k] + step;
+      at.rest[k] = min(max(from - step, zero), one);  // finite for points that are far away
+      at.whole[k] = min(max(cell, zero), most);
+      inside = select((cell >= zero) & (cell < most + half), inside, zero);
+    }
+    SplineValue<N, 1> phi;
+    spline_at(*grid, at, phi);
+    d = select(inside > half, phi.value, one);
+    n = Q * (inverse * Vec3<N>{phi.gradient[0], phi.gradient[1], phi.gradient[2]});
+    return d < zero;
+  }
+};
+
+}  // namespace tangere::kernels

@@ -1,0 +1,493 @@
+// SPDX-License-Identifier: Apache-2.0
+// The distance to a mesh as one smooth function: a tricubic B-spline on a grid (docs/contact.md).
+//
+// With U = (y - origin)/cell, i the whole parts of U and t the rest,
+//   φ(y) = Σ c[i + a, j + b, k + c] w_a(t_x) w_b(t_y) w_c(t_z),  a, b, c = 0 … 3
+//   w = ((1 - t)³, 3t³ - 6t² + 4, …, t³)/6
+// φ, ∇φ and ∇∇φ are continuous. Derivatives take w' and w'' in place of w, divided by the cell.
+// Sums run over y first, then x, then z. Rows along z are four neighbours in memory, so a vector
+// holds several of them. The order of sums is the same for every number type.
+#pragma once
+
+#include <type_traits>
+
+#include "kernels/contact/shapes/distance_grid.hpp"
+#include "kernels/numbers/lanes_f32.hpp"
+#include "kernels/numbers/linalg.hpp"
+#include "kernels/numbers/one_lane.hpp"
+
+namespace tangere::kernels {
+
+/// The four weights as polynomials of t: factors of t³, t², t and 1.
+inline constexpr double kSplineWeights[4][4] = {{-1.0 / 6, 0.5, -0.5, 1.0 / 6},
+                                                {0.5, -1, 0, 2.0 / 3},
+                                                {-0.5, 0.5, 0.5, 1.0 / 6},
+                                                {1.0 / 6, 0, 0, 0}};
+/// Returns a weight or its derivative of this order. f: factors of t³, t², t and 1, times the
+/// factors that differentiating brings.
+template <int Order, class N>
+[[gnu::always_inline]] inline N weight_at(const N (&f)[4], const N& t) {
+  N sum = f[0];
+  for (int k = 1; k < 4 - Order; ++k) sum = mul_add(sum, t, f[k]);
+  return sum;
+}
+template <class N, int Order>
+[[gnu::always_inline]] inline N weight_at(int which, const N& t) {
+  const double* f = kSplineWeights[which];
+  if constexpr (Order == 0) {
+    const N factors[4] = {N(f[0]), N(f[1]), N(f[2]), N(f[3])};
+    return weight_at<0>(factors, t);
+  } else if constexpr (Order == 1) {
+    const N factors[4] = {N(3 * f[0]), N(2 * f[1]), N(f[2]), N(0.0)};
+    return weight_at<1>(factors, t);
+  } else {
+    const N factors[4] = {N(6 * f[0]), N(2 * f[1]), N(0.0), N(0.0)};
+    return weight_at<2>(factors, t);
+  }
+}
+
+/// Weights of four coefficients along one axis, and their derivatives by t.
+template <class N, int Order>
+struct SplineWeights {
+  N w[Order + 1][4];
+
+  explicit SplineWeights(const N& t) {
+    for (int a = 0; a < 4; ++a) {
+      w[0][a] = weight_at<N, 0>(a, t);
+      if constexpr (Order > 0) w[1][a] = weight_at<N, 1>(a, t);
+      if constexpr (Order > 1) w[2][a] = weight_at<N, 2>(a, t);
+    }
+  }
+};
+
+/// Sums over y and x for derivatives by x and y of these orders: 00, 01, 10, then 02, 11, 20.
+template <int Order>
+inline constexpr int kSplineSums = Order == 0   ? 1
+                                   : Order == 1 ? 3
+                                                : 6;
+inline constexpr int kSplineX[6] = {0, 0, 1, 0, 1, 2}, kSplineY[6] = {0, 1, 0, 2, 1, 0};
+
+/// φ and its derivatives by U.
+template <class N, int Order>
+struct SplineValue {
+  N value;
+  N gradient[Order > 0 ? 3 : 1];
+  N second[Order > 1 ? 6 : 1];  ///< xx xy xz yy yz zz
+};
+
+/// Sums over z. sums: (kSplineSums, 4).
+template <int Order, class N>
+[[gnu::always_inline]] inline void sum_over_z(const N (*sums)[4], const SplineWeights<N, Order>& z,
+                                              SplineValue<N, Order>& out) {
+  const auto sum = [&](int which, int order) {
+    N total = z.w[order][0] * sums[which][0];
+    for (int k = 1; k < 4; ++k) total = mul_add(z.w[order][k], sums[which][k], total);
+    return total;
+  };
+  out.value = sum(0, 0);
+  if constexpr (Order > 0) {
+    out.gradient[0] = sum(2, 0);
+    out.gradient[1] = sum(1, 0);
+    out.gradient[2] = sum(0, 1);
+  }
+  if constexpr (Order > 1) {
+    out.second[0] = sum(5, 0);
+    out.second[1] = sum(4, 0);
+    out.second[2] = sum(2, 1);
+    out.second[3] = sum(3, 0);
+    out.second[4] = sum(1, 1);
+    out.second[5] = sum(0, 2);
+  }
+}
+
+/// Where a point is in the grid: whole parts and rests of U, which is clamped to the grid. whole[0]
+/// is kNowhere where a point is farther away than the grid is long. There φ is taken as zero.
+template <class N>
+struct GridPlace {
+  N whole[3], rest[3];
+};
+inline constexpr double kNowhere = -1;
+
+/// The number of a cell's first coefficient.
+inline long first_coefficient(const DistanceGrid& g, double x, double y, double z) {
+  return long(x) * g.plane + long(y) * g.row + long(z);
+}
+
+template <class N>
+double plain_value(const N& x) {
+  if constexpr (std::is_same_v<N, double>) {
+    return x;
+  } else {
+    return plain_value(x.value);
+  }
+}
+
+/// One number after the other: plain and dual numbers.
+template <int Order, class N>
+void spline_at(const DistanceGrid& g, const GridPlace<N>& at, SplineValue<N, Order>& out) {
+  if (plain_value(at.whole[0]) < 0) {
+    out = {};
+    return;
+  }
+  const SplineWeights<N, Order> x(at.rest[0]), y(at.rest[1]), z(at.rest[2]);
+  const float* c =
+      g.coefficients + first_coefficient(g, plain_value(at.whole[0]), plain_value(at.whole[1]),
+                                         plain_value(at.whole[2]));
+  N sums[kSplineSums<Order>][4];
+  for (int k = 0; k < 4; ++k) {
+    N of_y[Order + 1][4];
+    for (int i = 0; i < 4; ++i)
+      for (int o = 0; o <= Order; ++o) {
+        const float* at_row = c + i * g.plane + k;
+        of_y[o][i] = y.w[o][0] * N(double(at_row[0]));
+        for (int j = 1; j < 4; ++j)
+          of_y[o][i] = mul_add(y.w[o][j], N(double(at_row[j * g.row])), of_y[o][i]);
+      }
+    for (int s = 0; s < kSplineSums<Order>; ++s) {
+      const N(&w)[4] = x.w[kSplineX[s]];
+      const N(&r)[4] = of_y[kSplineY[s]];
+      sums[s][k] = mul_add(w[2], r[2], w[0] * r[0]) + mul_add(w[3], r[3], w[1] * r[1]);
+    }
+  }
+  sum_over_z<Order>(sums, z, out);
+}
+
+/// Loads two rows of four coefficients.
+template <class A>
+[[gnu::always_inline]] inline Lanes<A> load_two_rows(const float* a, const float* b) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    Lanes<A> out;
+    out.r[0] = _mm512_cvtps_pd(
+        _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(a)), _mm_loadu_ps(b), 1));
+    return out;
+  }
+#endif
+  alignas(64) double both[kGroup];
+  for (int k = 0; k < 4; ++k) both[k] = double(a[k]), both[4 + k] = double(b[k]);
+  return load_lanes<A>(both);
+}
+/// Returns a in the first four lanes and b in the others.
+template <class A>
+[[gnu::always_inline]] inline Lanes<A> two_halves(double a, double b) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    Lanes<A> out;
+    out.r[0] = _mm512_mask_blend_pd(0xF0, _mm512_set1_pd(a), _mm512_set1_pd(b));
+    return out;
+  }
+#endif
+  alignas(64) const double both[kGroup] = {a, a, a, a, b, b, b, b};
+  return load_lanes<A>(both);
+}
+
+/// Adds the two halves of a vector.
+template <class A>
+[[gnu::always_inline]] inline void add_halves(const Lanes<A>& x, double* out) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    const __m512d all = x.r[0];
+    _mm256_storeu_pd(out,
+                     _mm256_add_pd(_mm512_castpd512_pd256(all), _mm512_extractf64x4_pd(all, 1)));
+    return;
+  }
+#endif
+  alignas(64) double halves[kGroup];
+  store_lanes(x, halves);
+  for (int k = 0; k < 4; ++k) out[k] = halves[k] + halves[4 + k];
+}
+
+/// Turns four numbers of each lane, `stride` apart, into four vectors.
+template <class A>
+[[gnu::always_inline]] inline void across_lanes(const double* own, int stride, Lanes<A>* out) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    const auto two = [&](int a, int b) {
+      return _mm512_insertf64x4(_mm512_castpd256_pd512(_mm256_loadu_pd(own + a * stride)),
+                                _mm256_loadu_pd(own + b * stride), 1);
+    };
+    const __m512d a = two(0, 2), b = two(1, 3), c = two(4, 6), d = two(5, 7);
+    const __m512d ab0 = _mm512_unpacklo_pd(a, b), ab1 = _mm512_unpackhi_pd(a, b),
+                  cd0 = _mm512_unpacklo_pd(c, d), cd1 = _mm512_unpackhi_pd(c, d);
+    out[0].r[0] = _mm512_shuffle_f64x2(ab0, cd0, 0x88);
+    out[1].r[0] = _mm512_shuffle_f64x2(ab1, cd1, 0x88);
+    out[2].r[0] = _mm512_shuffle_f64x2(ab0, cd0, 0xDD);
+    out[3].r[0] = _mm512_shuffle_f64x2(ab1, cd1, 0xDD);
+    return;
+  }
+#endif
+  alignas(64) double row[kGroup];
+  for (int k = 0; k < 4; ++k) {
+    for (int l = 0; l < kGroup; ++l) row[l] = own[l * stride + k];
+    out[k] = load_lanes<A>(row);
+  }
+}
+
+/// Sums over y and x at one place. Weight number w of an axis is at axis[stride * w].
+template <int Order, class A>
+[[gnu::always_inline]] inline void sum_rows(const float* c, const DistanceGrid& g, const double* x,
+                                            const double* y, int stride, double (*out)[4]) {
+  Lanes<A> of_y[Order + 1][2];
+  for (int j = 0; j < 4; ++j) {
+    const float* from = c + j * g.row;
+    // Rows 0 and 1, then 2 and 3: each vector has two neighbours along x.
+    const Lanes<A> rows[2] = {load_two_rows<A>(from, from + g.plane),
+                              load_two_rows<A>(from + 2 * g.plane, from + 3 * g.plane)};
+    for (int o = 0; o <= Order; ++o) {
+      const Lanes<A> w(y[stride * (4 * o + j)]);
+      for (int half = 0; half < 2; ++half)
+        of_y[o][half] = j == 0 ? w * rows[half] : mul_add(w, rows[half], of_y[o][half]);
+    }
+  }
+  Lanes<A> of_x[Order + 1][2];
+  for (int o = 0; o <= Order; ++o)
+    for (int half = 0; half < 2; ++half)
+      of_x[o][half] =
+          two_halves<A>(x[stride * (4 * o + 2 * half)], x[stride * (4 * o + 2 * half + 1)]);
+  for (int s = 0; s < kSplineSums<Order>; ++s) {
+    const Lanes<A>*w = of_x[kSplineX[s]], *r = of_y[kSplineY[s]];
+    add_halves(mul_add(w[1], r[1], w[0] * r[0]), out[s]);
+  }
+}
+
+/// One lane on its own.
+template <int Order, class A>
+void spline_at(const DistanceGrid& g, const GridPlace<OneLane<A>>& at,
+               SplineValue<OneLane<A>, Order>& out) {
+  using N = OneLane<A>;
+  if (at.whole[0].x < 0) {
+    out = {};
+    return;
+  }
+  const SplineWeights<N, Order> x(at.rest[0]), y(at.rest[1]), z(at.rest[2]);
+  static_assert(sizeof(N) == sizeof(double));
+  N sums[kSplineSums<Order>][4];
+  sum_rows<Order, A>(
+      g.coefficients + first_coefficient(g, at.whole[0].x, at.whole[1].x, at.whole[2].x), g,
+      &x.w[0][0].x, &y.w[0][0].x, 1, reinterpret_cast<double(*)[4]>(sums));
+  sum_over_z<Order>(sums, z, out);
+}
+
+/// Lane after lane up to the sums over z.
+template <int Order, class A>
+void spline_at(const DistanceGrid& g, const GridPlace<Lanes<A>>& at,
+               SplineValue<Lanes<A>, Order>& out) {
+  using N = Lanes<A>;
+  constexpr int kWeights = 4 * (Order + 1), kSums = 4 * kSplineSums<Order>;
+  alignas(64) double whole[3][kGroup], x[kWeights][kGroup], y[kWeights][kGroup];
+  for (int c = 0; c < 3; ++c) store_lanes(at.whole[c], whole[c]);
+  {
+    const SplineWeights<N, Order> of_x(at.rest[0]), of_y(at.rest[1]);
+    for (int w = 0; w < kWeights; ++w) {
+      store_lanes((&of_x.w[0][0])[w], x[w]);
+      store_lanes((&of_y.w[0][0])[w], y[w]);
+    }
+  }
+  double own[kGroup][kSplineSums<Order>][4];
+  for (int l = 0; l < kGroup; ++l) {
+    if (whole[0][l] < 0) {
+      for (int s = 0; s < kSums; ++s) (&own[l][0][0])[s] = 0;
+    } else {
+      sum_rows<Order, A>(
+          g.coefficients + first_coefficient(g, whole[0][l], whole[1][l], whole[2][l]), g, &x[0][l],
+          &y[0][l], kGroup, own[l]);
+    }
+  }
+  N sums[kSplineSums<Order>][4];
+  for (int s = 0; s < kSplineSums<Order>; ++s) across_lanes<A>(own[0][s], kSums, sums[s]);
+  sum_over_z<Order>(sums, SplineWeights<N, Order>(at.rest[2]), out);
+}
+
+/// Loads four rows of four coefficients.
+template <class A>
+[[gnu::always_inline]] inline LanesF<A> load_four_rows(const float* from, int plane) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    const auto row = [&](int i) { return _mm_loadu_ps(from + i * plane); };
+    __m512 all = _mm512_castps128_ps512(row(0));
+    all = _mm512_insertf32x4(all, row(1), 1);
+    all = _mm512_insertf32x4(all, row(2), 2);
+    LanesF<A> out;
+    out.r[0] = _mm512_insertf32x4(all, row(3), 3);
+    return out;
+  }
+#endif
+  alignas(64) float all[kLanesF];
+  for (int i = 0; i < 4; ++i)
+    for (int k = 0; k < 4; ++k) all[4 * i + k] = from[i * plane + k];
+  return load_lanes_f<A>(all);
+}
+
+/// Sums over y and x at one place, in single precision, all four rows along x in a vector. x, y:
+/// (2, 4) weights and their derivatives, each four times.
+template <class A>
+[[gnu::always_inline]] inline void sum_rows_f(const float* c, const DistanceGrid& g,
+                                              const LanesF<A>* x, const LanesF<A> (*y)[4],
+                                              float* out) {
+  LanesF<A> of_y[2];
+  for (int j = 0; j < 4; ++j) {
+    const LanesF<A> rows = load_four_rows<A>(c + j * g.row, g.plane);
+    for (int o = 0; o < 2; ++o) of_y[o] = j == 0 ? y[o][j] * rows : mul_add(y[o][j], rows, of_y[o]);
+  }
+  for (int s = 0; s < 3; ++s) {
+    const LanesF<A> all = x[kSplineX[s]] * of_y[kSplineY[s]];
+#if defined(__AVX512F__)
+    if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+      const __m512 v = all.r[0];
+      const __m256 half =
+          _mm256_add_ps(_mm512_castps512_ps256(v),
+                        _mm256_castpd_ps(_mm512_extractf64x4_pd(_mm512_castps_pd(v), 1)));
+      _mm_storeu_ps(out + 4 * s,
+                    _mm_add_ps(_mm256_castps256_ps128(half), _mm256_extractf128_ps(half, 1)));
+      continue;
+    }
+#endif
+    alignas(64) float parts[kLanesF];
+    store_lanes_f(all, parts);
+    for (int k = 0; k < 4; ++k)
+      out[4 * s + k] = (parts[k] + parts[8 + k]) + (parts[4 + k] + parts[12 + k]);
+  }
+}
+
+/// Returns the weights of one place along an axis: lanes 4 a … 4 a + 3 have weight a.
+template <class A>
+[[gnu::always_inline]] inline void spread_weights(float t, LanesF<A>* out) {
+  struct Factors {
+    alignas(64) float f[2][4][kLanesF];
+  };
+  static constexpr Factors kFactors = [] {
+    Factors all{};
+    for (int a = 0; a < kLanesF; ++a)
+      for (int k = 0; k < 4; ++k) {
+        all.f[0][k][a] = float(kSplineWeights[a / 4][k]);
+        all.f[1][k][a] = float((3 - k) * kSplineWeights[a / 4][k]);
+      }
+    return all;
+  }();
+  const LanesF<A> at(double{t});
+  const auto factors = [&](int o, int k) { return load_lanes_f<A>(kFactors.f[o][k]); };
+  const LanesF<A> value[4] = {factors(0, 0), factors(0, 1), factors(0, 2), factors(0, 3)},
+                  slope[4] = {factors(1, 0), factors(1, 1), factors(1, 2), factors(1, 3)};
+  out[0] = weight_at<0>(value, at);
+  out[1] = weight_at<1>(slope, at);
+}
+/// Returns lanes 4 k … 4 k + 3 four times.
+template <int K, class A>
+[[gnu::always_inline]] inline LanesF<A> quarter(const LanesF<A>& x) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    LanesF<A> out;
+    out.r[0] = _mm512_shuffle_f32x4(x.r[0], x.r[0], 0x55 * K);
+    return out;
+  }
+#endif
+  alignas(64) float all[kLanesF];
+  store_lanes_f(x, all);
+  for (int l = 0; l < kLanesF; ++l) all[l] = all[4 * K + l % 4];
+  return load_lanes_f<A>(all);
+}
+
+/// Turns four numbers of each lane, `stride` apart, into four vectors.
+template <class A>
+[[gnu::always_inline]] inline void across_lanes_f(const float* own, int stride, LanesF<A>* out) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<A, xsimd::avx512bw>) {
+    const auto four = [&](int l) { return load_four_rows<A>(own + l * stride, 4 * stride).r[0]; };
+    const __m512 a = four(0), b = four(1), c = four(2), d = four(3);
+    const __m512d ab0 = _mm512_castps_pd(_mm512_unpacklo_ps(a, b)),
+                  ab1 = _mm512_castps_pd(_mm512_unpackhi_ps(a, b)),
+                  cd0 = _mm512_castps_pd(_mm512_unpacklo_ps(c, d)),
+                  cd1 = _mm512_castps_pd(_mm512_unpackhi_ps(c, d));
+    out[0].r[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(ab0, cd0));
+    out[1].r[0] = _mm512_castpd_ps(_mm512_unpackhi_pd(ab0, cd0));
+    out[2].r[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(ab1, cd1));
+    out[3].r[0] = _mm512_castpd_ps(_mm512_unpackhi_pd(ab1, cd1));
+    return;
+  }
+#endif
+  alignas(64) float row[kLanesF];
+  for (int k = 0; k < 4; ++k) {
+    for (int l = 0; l < kLanesF; ++l) row[l] = own[l * stride + k];
+    out[k] = load_lanes_f<A>(row);
+  }
+}
+
+/// Sums over y and x with the coefficients of one cell for all lanes: the same sums.
+template <class A>
+[[gnu::always_inline]] inline void sum_cell_f(const float* c, const DistanceGrid& g,
+                                              const SplineWeights<LanesF<A>, 1>& x,
+                                              const SplineWeights<LanesF<A>, 1>& y,
+                                              LanesF<A> (*out)[4]) {
+  using N = LanesF<A>;
+  for (int k = 0; k < 4; ++k) {
+    N of_y[2][4];
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) {
+        const N at(double{c[i * g.plane + j * g.row + k]});
+        for (int o = 0; o < 2; ++o)
+          of_y[o][i] = j == 0 ? y.w[o][0] * at : mul_add(y.w[o][j], at, of_y[o][i]);
+      }
+    for (int s = 0; s < 3; ++s) {
+      const N(&w)[4] = x.w[kSplineX[s]];
+      const N(&r)[4] = of_y[kSplineY[s]];
+      out[s][k] = (w[0] * r[0] + w[2] * r[2]) + (w[1] * r[1] + w[3] * r[3]);
+    }
+  }
+}
+
+/// Sixteen points in single precision. On a dense pad all of them are often in one cell. Then its
+/// coefficients are read once, for the same sums.
+template <class A>
+void spline_at(const DistanceGrid& g, const GridPlace<LanesF<A>>& at,
+               SplineValue<LanesF<A>, 1>& out) {
+  using N = LanesF<A>;
+  alignas(64) float whole[3][kLanesF], rest[2][kLanesF];
+  for (int c = 0; c < 3; ++c) store_lanes_f(at.whole[c], whole[c]);
+  const auto first = [&](int l) {
+    return g.coefficients + long(whole[0][l]) * g.plane + long(whole[1][l]) * g.row +
+           long(whole[2][l]);
+  };
+  bool several = false;
+  for (int c = 0; c < 3; ++c) {
+    const N one(double{whole[c][0]});
+    several = several || any(at.whole[c] < one) || any(at.whole[c] > one);
+  }
+  N sums[3][4];
+  if (!several) {
+    sum_cell_f<A>(first(0), g, SplineWeights<N, 1>(at.rest[0]), SplineWeights<N, 1>(at.rest[1]),
+                  sums);
+  } else {
+    for (int c = 0; c < 2; ++c) store_lanes_f(at.rest[c], rest[c]);
+    float own[kLanesF][3][4];
+    for (int l = 0; l < kLanesF; ++l) {
+      N x[2], y[2];
+      spread_weights<A>(rest[0][l], x);
+      spread_weights<A>(rest[1][l], y);
+      const N of_y[2][4] = {
+          {quarter<0>(y[0]), quarter<1>(y[0]), quarter<2>(y[0]), quarter<3>(y[0])},
+          {quarter<0>(y[1]), quarter<1>(y[1]), quarter<2>(y[1]), quarter<3>(y[1])}};
+      sum_rows_f<A>(first(l), g, x, of_y, own[l][0]);
+    }
+    for (int s = 0; s < 3; ++s) across_lanes_f<A>(own[0][s], 12, sums[s]);
+  }
+  sum_over_z<1>(sums, SplineWeights<N, 1>(at.rest[2]), out);
+}
+
+/// Two vectors side by side (kernels/tactile/vector_pair.hpp).
+template <int Order, template <class> class Pair, class M>
+requires requires { &Pair<M>::a; }
+void spline_at(const DistanceGrid& g, const GridPlace<Pair<M>>& at,
+               SplineValue<Pair<M>, Order>& out) {
+  const auto part = [&](M Pair<M>::*of) {
+    GridPlace<M> one;
+    for (int c = 0; c < 3; ++c) one.whole[c] = at.whole[c].*of, one.rest[c] = at.rest[c].*of;
+    SplineValue<M, Order> value;
+    spline_at(g, one, value);
+    return value;
+  };
+  const SplineValue<M, Order> a = part(&Pair<M>::a), b = part(&Pair<M>::b);
+  out.value = {a.value, b.value};
+  for (int c = 0; c < 3; ++c) out.gradient[c] = {a.gradient[c], b.gradient[c]};
+}
+
+}  // namespace tangere::kernels
