@@ -60,8 +60,9 @@ std::string layout_text(const std::string& what, const std::string& layout) {
 }
 
 PadRequest read_pad(const std::string& text) {
-  const auto [link, rest] = split("--pad", text, "LINK=LAYOUT, LINK=LAYOUT@+x or "
-                                                 "LINK=LAYOUT@x,y,z,roll,pitch,yaw");
+  const auto [link, rest] = split("--pad", text,
+                                  "LINK=LAYOUT, LINK=LAYOUT@+x or "
+                                  "LINK=LAYOUT@x,y,z,roll,pitch,yaw");
   PadRequest pad;
   pad.link = link;
   const std::size_t at = rest.rfind('@');
@@ -75,9 +76,10 @@ PadRequest read_pad(const std::string& text) {
   }
   const std::vector<double> x = numbers_of("--pad " + text, place);
   if (x.size() != 3 && x.size() != 6)
-    throw InputError(fmt::format("--pad {}: {} numbers behind '@'; expected x,y,z [m] or "
-                                 "x,y,z,roll,pitch,yaw [m, rad]",
-                                 text, x.size()));
+    throw InputError(
+        fmt::format("--pad {}: {} numbers behind '@'; expected x,y,z [m] or "
+                    "x,y,z,roll,pitch,yaw [m, rad]",
+                    text, x.size()));
   pad.pose.position = {x[0], x[1], x[2]};
   if (x.size() == 6) pad.pose.orientation = from_rpy({x[3], x[4], x[5]});
   return pad;

@@ -43,8 +43,8 @@ std::string find_mesh(const RobotNode& node, const std::string& name, const std:
     return fs::is_regular_file(path, none);
   });
   if (found == tried.end())
-    node.fail(fmt::format("the file \"{}\" is not there; looked for {}", name,
-                          fmt::join(tried, ", ")));
+    node.fail(
+        fmt::format("the file \"{}\" is not there; looked for {}", name, fmt::join(tried, ", ")));
   std::string ending = fs::path(*found).extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

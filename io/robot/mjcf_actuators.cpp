@@ -75,8 +75,7 @@ class Actuators {
 
   /// The joint that the actuator drives; "" if it drives something else, which is listed.
   std::string joint_of(const RobotNode& node) const {
-    for (const char* other :
-         {"tendon", "site", "body", "cranksite", "slidersite", "refsite"})
+    for (const char* other : {"tendon", "site", "body", "cranksite", "slidersite", "refsite"})
       if (node.has(other)) {
         node.lost(fmt::format("<{}> on a {}: scenes drive joints", node.name(), other));
         return "";
@@ -141,9 +140,10 @@ class Actuators {
     if (control[0] > -kNone || control[1] < kNone)
       node.changed("<" + node.name() + "> ctrlrange: targets of position motors are not clipped");
     if (gear != 1)
-      node.changed(fmt::format("<{}> gear: the target of '{}' is the joint's coordinate, the "
-                               "file's control over {}",
-                               node.name(), motor.joint, gear));
+      node.changed(
+          fmt::format("<{}> gear: the target of '{}' is the joint's coordinate, the "
+                      "file's control over {}",
+                      node.name(), motor.joint, gear));
     if (end.ref != 0)
       node.changed(fmt::format("<{}>: the target of '{}' is less by its joint's ref", node.name(),
                                motor.joint));
@@ -160,9 +160,10 @@ class Actuators {
       motor.low = force[0];
       motor.high = force[1];
     } else if (!bounded) {
-      node.changed(fmt::format("<{}> without ctrlrange: the control of '{}' is that of the file "
-                               "from -1 to 1",
-                               node.name(), motor.joint));
+      node.changed(
+          fmt::format("<{}> without ctrlrange: the control of '{}' is that of the file "
+                      "from -1 to 1",
+                      node.name(), motor.joint));
     }
     if (!(motor.low < motor.high)) node.fail("its ranges leave no force");
     if (law.kv == 0) return;
@@ -182,8 +183,8 @@ class Actuators {
 void read_mjcf_actuators(MjcfFile& file, const RobotNode& section) {
   Words known;
   for (const std::string& name : kActuators) known.push_back({name.c_str()});
-  for (const char* other : {"intvelocity", "damper", "cylinder", "muscle", "adhesion", "plugin",
-                            "dcmotor"})
+  for (const char* other :
+       {"intvelocity", "damper", "cylinder", "muscle", "adhesion", "plugin", "dcmotor"})
     known.push_back({other, Fate::lost, "an actuator that scenes do not have"});
   Actuators actuators(file);
   for (const RobotNode& part : section.parts(known)) actuators.read(file.with_class(part, "main"));

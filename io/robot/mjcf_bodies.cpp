@@ -75,7 +75,8 @@ class Bodies {
  private:
   void gather(const RobotNode& node, const Pose& frame, const std::string& defaults,
               const Words& known, std::vector<Placed>& out, int depth) {
-    if (depth > kDeepestBodies) node.fail(fmt::format("frames nested deeper than {}", kDeepestBodies));
+    if (depth > kDeepestBodies)
+      node.fail(fmt::format("frames nested deeper than {}", kDeepestBodies));
     for (const RobotNode& part : node.parts(known)) {
       if (part.name() != "frame") {
         out.push_back({part, frame, defaults});
@@ -103,7 +104,8 @@ class Bodies {
 
   void read_body(const Placed& placed, int parent, const Pose& parent_offset, int depth) {
     const RobotNode& node = placed.node;
-    if (depth > kDeepestBodies) node.fail(fmt::format("bodies nested deeper than {}", kDeepestBodies));
+    if (depth > kDeepestBodies)
+      node.fail(fmt::format("bodies nested deeper than {}", kDeepestBodies));
     node.check(with_rotations({{"name"},
                                {"childclass"},
                                {"mocap"},
@@ -113,10 +115,8 @@ class Bodies {
     if (node.flag("mocap", false)) node.lost("<body> mocap: moved by another program");
     const std::string defaults =
         node.has("childclass") ? file_.known_class(node, "childclass") : placed.defaults;
-    const std::string name =
-        node.has("name") ? unique_body(node) : file_.names.free_name("body");
-    const Pose place =
-        compose(parent_offset, compose(placed.frame, file_.read_pose(node)));
+    const std::string name = node.has("name") ? unique_body(node) : file_.names.free_name("body");
+    const Pose place = compose(parent_offset, compose(placed.frame, file_.read_pose(node)));
     static const Words known = body_parts();
     std::vector<Placed> parts;
     gather(node, {}, defaults, known, parts, 0);
@@ -130,8 +130,7 @@ class Bodies {
     std::string name = node.text("name");
     const auto [first, is_new] = bodies_.try_emplace(name, node.source().line);
     if (!is_new)
-      node.fail(
-          fmt::format("body name '{}' is used twice, first in line {}", name, first->second));
+      node.fail(fmt::format("body name '{}' is used twice, first in line {}", name, first->second));
     return name;
   }
 
@@ -150,8 +149,9 @@ class Bodies {
       JointDescription joint = free_joint ? read_free_joint(part.node, name)
                                           : read_joint(joint_node, part.frame, name, at, end);
       if (joint.type == JointType::free && (parent >= 0 || !chain.empty()))
-        part.node.fail("a free joint inside another body, or beside another joint; expected it "
-                       "alone in a body of the world");
+        part.node.fail(
+            "a free joint inside another body, or beside another joint; expected it "
+            "alone in a body of the world");
       if (!chain.empty() && chain.front().type == JointType::free)
         part.node.fail("a joint beside a free joint; expected it alone");
       if (joint.type == JointType::free) at = {0, 0, 0};
@@ -177,8 +177,8 @@ class Bodies {
                         "a joint of body '" + name + "'", chain[k].source);
       keep_joint(chain[k].name, ends[k], parent);
     }
-    const int index = add_link(robot_, file_.names, name, parent, chain.back(), pieces, "<body>",
-                               node.source());
+    const int index =
+        add_link(robot_, file_.names, name, parent, chain.back(), pieces, "<body>", node.source());
     keep_joint(chain.back().name, ends.back(), index);
     return index;
   }
@@ -214,8 +214,8 @@ class Bodies {
                               Vector3& anchor, MjcfJoint& end) {
     node.check(mjcf_words("joint"));
     JointDescription joint;
-    constexpr JointType kMjcfJointTypes[] = {JointType::revolute, JointType::prismatic, JointType::spherical,
-                                    JointType::free};
+    constexpr JointType kMjcfJointTypes[] = {JointType::revolute, JointType::prismatic,
+                                             JointType::spherical, JointType::free};
     joint.type = kMjcfJointTypes[node.choice("type", {"hinge", "slide", "ball", "free"}, 0)];
     joint.name = joint_name(node, body);
     joint.source = node.source();
@@ -326,11 +326,10 @@ class Bodies {
     const int group = node.integer("group", 0, 1000, 0);
     const bool counts =
         massive && group >= file_.inertia_groups[0] && group <= file_.inertia_groups[1];
-    const bool touches =
-        node.integer("contype", std::numeric_limits<int>::min(), std::numeric_limits<int>::max(),
-                     1) != 0 ||
-        node.integer("conaffinity", std::numeric_limits<int>::min(),
-                     std::numeric_limits<int>::max(), 1) != 0;
+    const bool touches = node.integer("contype", std::numeric_limits<int>::min(),
+                                      std::numeric_limits<int>::max(), 1) != 0 ||
+                         node.integer("conaffinity", std::numeric_limits<int>::min(),
+                                      std::numeric_limits<int>::max(), 1) != 0;
     const double density = node.not_negative("density", 1000.0);
     const double mass = node.not_negative("mass", 0.0);
     const bool heavy = counts && (node.has("mass") ? mass > 0 : density > 0);
@@ -374,9 +373,8 @@ class Bodies {
 
   /// Reads type, size and place. Returns false for a shape that scenes do not have.
   bool read_shape(const RobotNode& node, RobotPiece& piece) {
-    static const std::vector<std::string> types = {"sphere",    "capsule", "cylinder", "box",
-                                                   "ellipsoid", "plane",   "mesh",     "hfield",
-                                                   "sdf"};
+    static const std::vector<std::string> types = {
+        "sphere", "capsule", "cylinder", "box", "ellipsoid", "plane", "mesh", "hfield", "sdf"};
     const std::string type = types[std::size_t(
         node.choice("type", types, node.has("mesh") && !node.has("type") ? 6 : 0))];
     if (type == "hfield" || type == "sdf") {
@@ -412,8 +410,11 @@ class Bodies {
       else
         piece.shape = CylinderShape{2 * half, x[0]};
     } else {
-      const std::vector<double> x = sizes(node, stretched ? 2 : 3);
-      const Vector3 full = {2 * x[0], 2 * x[1], stretched ? 2 * half : 2 * x[2]};
+      const std::vector<double> x = sizes(node, stretched ? 1 : 3);
+      const Vector3 full =
+          stretched ? Vector3{2 * x[0], 2 * x[0], 2 * half} : Vector3{2 * x[0], 2 * x[1], 2 * x[2]};
+      if (stretched && x.size() > 1 && x[1] != x[0])
+        node.changed("<geom> size with fromto: the first number counts for x and y, as in MuJoCo");
       if (type == "box") {
         CuboidShape box;
         box.size = full;

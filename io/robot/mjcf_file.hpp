@@ -51,7 +51,9 @@ class MjcfFile {
   std::map<std::string, MjcfJoint> joints;
   RobotNames names;
 
-  [[nodiscard]] double angle(double x) const { return degrees ? x * 3.14159265358979323846 / 180 : x; }
+  [[nodiscard]] double angle(double x) const {
+    return degrees ? x * 3.14159265358979323846 / 180 : x;
+  }
 
   /// Reads <default>, whose classes inherit from those around them.
   void read_defaults(const RobotNode& node, const std::string& parent);

@@ -68,13 +68,29 @@ Words solver_words() {
                  {"viscosity", Fate::zero, "the air's or the water's"},
                  {"wind", Fate::zero, "moves the air"},
                  {"magnetic", Fate::idle, "for a sensor of MuJoCo"}};
-  for (const char* name :
-       {"impratio",         "tolerance",     "ls_tolerance",   "noslip_tolerance",
-        "ccd_tolerance",    "o_margin",      "o_solref",       "o_solimp",
-        "o_friction",       "cone",          "jacobian",       "solver",
-        "iterations",       "ls_iterations", "noslip_iterations", "ccd_iterations",
-        "sdf_iterations",   "sdf_initpoints", "actuatorgroupdisable", "apirate",
-        "sleep_tolerance",  "mpr_tolerance", "mpr_iterations"})
+  for (const char* name : {"impratio",
+                           "tolerance",
+                           "ls_tolerance",
+                           "noslip_tolerance",
+                           "ccd_tolerance",
+                           "o_margin",
+                           "o_solref",
+                           "o_solimp",
+                           "o_friction",
+                           "cone",
+                           "jacobian",
+                           "solver",
+                           "iterations",
+                           "ls_iterations",
+                           "noslip_iterations",
+                           "ccd_iterations",
+                           "sdf_iterations",
+                           "sdf_initpoints",
+                           "actuatorgroupdisable",
+                           "apirate",
+                           "sleep_tolerance",
+                           "mpr_tolerance",
+                           "mpr_iterations"})
     words.push_back({name, Fate::idle, kSolver});
   return words;
 }
@@ -124,10 +140,9 @@ void read_option(MjcfFile& file, const RobotNode& node) {
     for (const tinyxml2::XMLAttribute* a = flag.element().FirstAttribute(); a != nullptr;
          a = a->Next()) {
       const std::string name = a->Name();
-      static const std::vector<std::string> forces = {"gravity",  "spring",      "damper",
-                                                      "passive",  "actuation",   "limit",
-                                                      "contact",  "constraint",  "equality",
-                                                      "clampctrl", "frictionloss"};
+      static const std::vector<std::string> forces = {
+          "gravity", "spring",     "damper",   "passive",   "actuation",   "limit",
+          "contact", "constraint", "equality", "clampctrl", "frictionloss"};
       const bool matters = std::find(forces.begin(), forces.end(), name) != forces.end();
       const std::string text = "<flag> " + name + ": " + (matters ? "switches forces" : kSolver);
       if (matters && std::string(a->Value()) != "enable")
@@ -145,15 +160,13 @@ void read_mesh(MjcfFile& file, const RobotNode& node) {
     node.lost("<mesh> refquat: turns the mesh");
   std::string given = node.text("file");
   if (file.strip_path) given = std::filesystem::path(given).filename().string();
-  const std::string name =
-      node.text("name", std::filesystem::path(given).stem().string());
+  const std::string name = node.text("name", std::filesystem::path(given).stem().string());
   MjcfMesh mesh;
   mesh.line = node.source().line;
   if (const auto first = file.meshes.find(name); first != file.meshes.end())
-    node.fail(fmt::format("mesh name '{}' is used twice, first in line {}", name,
-                          first->second.line));
-  mesh.file = {find_mesh(node, given, file.mesh_folder),
-               node.vector("scale", Vector3{1, 1, 1})};
+    node.fail(
+        fmt::format("mesh name '{}' is used twice, first in line {}", name, first->second.line));
+  mesh.file = {find_mesh(node, given, file.mesh_folder), node.vector("scale", Vector3{1, 1, 1})};
   mesh.shell = node.has("inertia") && node.text("inertia") == "shell";
   if (node.has("inertia"))
     static_cast<void>(node.choice("inertia", {"exact", "legacy", "convex", "shell"}));
@@ -209,8 +222,8 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
                  {"pair", Fate::idle, "of pairs of geoms, which --contact names"},
                  {"equality", Fate::idle, "of constraints"},
                  {"tendon", Fate::idle, "of tendons"}};
-  for (const char* other : {"intvelocity", "damper", "cylinder", "muscle", "adhesion", "plugin",
-                            "dcmotor"})
+  for (const char* other :
+       {"intvelocity", "damper", "cylinder", "muscle", "adhesion", "plugin", "dcmotor"})
     known.push_back({other, Fate::idle, "of actuators that are not read"});
   for (const std::string& actuator : kActuators) known.push_back({actuator.c_str()});
   for (const RobotNode& part : node.parts(known)) {
@@ -221,7 +234,7 @@ void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
     part.check(mjcf_words(part.name()));
     const bool drives =
         std::find(kActuators.begin(), kActuators.end(), part.name()) != kActuators.end();
-    static const std::vector<std::string> gains = {"kp",     "kv",      "gainprm", "biasprm",
+    static const std::vector<std::string> gains = {"kp",     "kv",      "gainprm",  "biasprm",
                                                    "dynprm", "dyntype", "gaintype", "biastype"};
     for (const tinyxml2::XMLAttribute* a = part.element().FirstAttribute(); a != nullptr;
          a = a->Next()) {

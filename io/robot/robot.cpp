@@ -32,8 +32,7 @@ std::vector<std::string> Remarks::lines() const {
 std::string RobotNames::free_name(const std::string& wanted) {
   if (names_.insert(wanted).second) return wanted;
   for (int k = 2;; ++k)
-    if (std::string name = fmt::format("{}_{}", wanted, k); names_.insert(name).second)
-      return name;
+    if (std::string name = fmt::format("{}_{}", wanted, k); names_.insert(name).second) return name;
 }
 
 int add_link(Robot& robot, RobotNames& names, const std::string& name, int parent,
@@ -72,8 +71,7 @@ int add_link(Robot& robot, RobotNames& names, const std::string& name, int paren
 
 RobotPiece inertial_piece(double mass, const std::array<double, 6>& inertia, const Pose& pose,
                           const std::string& origin, const Source& source) {
-  const bool none =
-      std::all_of(inertia.begin(), inertia.end(), [](double x) { return x == 0; });
+  const bool none = std::all_of(inertia.begin(), inertia.end(), [](double x) { return x == 0; });
   if (!(mass >= 0) || (mass == 0 ? !none : !is_inertia(inertia)))
     throw InputError(fmt::format(
         "{}{}: no solid body of mass {} kg has the inertia xx xy xz yy yz zz = {} kg m^2; expected "

@@ -37,10 +37,10 @@ struct Robot {
   std::map<std::string, MeshFile> meshes;      ///< by body
   std::map<std::string, std::string> origins;  ///< by link: what of the file it was, for a comment
   std::set<std::string> pieces;  ///< links made for further shapes of the link that they hang on
-  std::map<std::string, double> efforts;       ///< by joint: largest force or torque [N or N m]
-  Remarks idle;     ///< left out, and of no effect on the motion
-  Remarks changed;  ///< said in another way
-  Remarks lost;     ///< left out although it changes the motion
+  std::map<std::string, double> efforts;  ///< by joint: largest force or torque [N or N m]
+  Remarks idle;                           ///< left out, and of no effect on the motion
+  Remarks changed;                        ///< said in another way
+  Remarks lost;                           ///< left out although it changes the motion
 };
 
 /// Gives new links, joints and bodies names that no other has.

@@ -88,8 +88,7 @@ void add_motors(Robot& robot, const std::vector<MotorRequest>& requests, const s
                                    request.joint, file, suggestion(request.joint, names)));
     for (const MotorDescription& m : robot.scene.motors)
       if (m.joint == request.joint)
-        throw InputError(
-            fmt::format("--motor {}: the joint has a motor already", request.joint));
+        throw InputError(fmt::format("--motor {}: the joint has a motor already", request.joint));
     MotorDescription motor;
     motor.joint = request.joint;
     const auto effort = robot.efforts.find(request.joint);
@@ -131,6 +130,17 @@ std::vector<std::string> shapes_of(const Robot& robot, const std::string& name,
   return shapes;
 }
 
+/// Whether the link hangs on a joint that moves.
+bool moves(const Scene& scene, const std::string& name) {
+  auto at = std::find_if(scene.links.begin(), scene.links.end(),
+                         [&](const LinkDescription& l) { return l.name == name; });
+  while (at->joint.type == JointType::fixed) {
+    if (at->parent < 0) return false;
+    at = scene.links.begin() + at->parent;
+  }
+  return true;
+}
+
 std::string contacts_text(Robot& robot, const std::vector<TouchRequest>& requests,
                           const std::string& file) {
   std::string text;
@@ -143,6 +153,8 @@ std::string contacts_text(Robot& robot, const std::vector<TouchRequest>& request
     const std::string what = fmt::format("--contact {}={}", request.first, request.second);
     const std::vector<std::string> first = shapes_of(robot, request.first, what, file);
     if (request.second == "ground") {
+      if (!moves(robot.scene, request.first))
+        throw InputError(fmt::format("{}: link '{}' stands in the world", what, request.first));
       if (!robot.scene.ground) robot.scene.ground = GroundDescription{};
       for (const std::string& body : first)
         text += fmt::format("    <ground_contact body=\"{}\"/>\n", attribute_text(body));
@@ -154,9 +166,10 @@ std::string contacts_text(Robot& robot, const std::vector<TouchRequest>& request
           return has_contact_points(shape_of(points)) && has_distance(shape_of(touched));
         };
         if (!fits(a, b) && !fits(b, a))
-          throw InputError(fmt::format("{}: neither of '{}' and '{}' has points that could touch "
-                                       "the other",
-                                       what, a, b));
+          throw InputError(
+              fmt::format("{}: neither of '{}' and '{}' has points that could touch "
+                          "the other",
+                          what, a, b));
         const bool straight = fits(a, b);
         text += fmt::format(
             "    <general_primitive_contact general_body=\"{}\" primitive_body=\"{}\"/>\n",
@@ -194,8 +207,7 @@ Robot read_robot(const std::string& text, const std::string& name, const RobotOp
   SceneContext context;
   context.file = name;
   context.allow_unknown = options.allow_unknown;
-  const tinyxml2::XMLElement& element =
-      parse_xml(document, text, name, kRoots, context.warnings);
+  const tinyxml2::XMLElement& element = parse_xml(document, text, name, kRoots, context.warnings);
   const RobotNode root(element, context, robot);
   if (root.name() == "robot") {
     read_urdf(root, options.free_base);
@@ -204,10 +216,9 @@ Robot read_robot(const std::string& text, const std::string& name, const RobotOp
       throw InputError("--base free with " + name + ": a MJCF file says itself what moves freely");
     read_mjcf(root);
   } else {
-    root.fail(std::string("no robot; expected ") + kRoots +
-              (root.name() == "tangere" || root.name() == "redmax"
-                   ? ". This is a scene already"
-                   : ""));
+    root.fail(
+        std::string("no robot; expected ") + kRoots +
+        (root.name() == "tangere" || root.name() == "redmax" ? ". This is a scene already" : ""));
   }
   if (robot.scene.links.empty()) root.fail("has no body: there is nothing to simulate");
   warnings = std::move(context.warnings);
@@ -237,7 +248,8 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
   out.changed = robot.changed.lines();
   out.lost = robot.lost.lines();
   sections.head = fmt::format(
-      "Made by 'tangere import' from {} ({}). All numbers are in SI units; line numbers are those of "
+      "Made by 'tangere import' from {} ({}). All numbers are in SI units; line numbers are those "
+      "of "
       "that file.\n",
       path.filename().string(), robot.format);
   sections.head += list_text("Left out, and the motion differs by it:", out.lost) +
@@ -252,7 +264,8 @@ ImportedScene import_robot(const fs::path& path, const fs::path& output,
     if (link.joint.type != JointType::fixed) ++out.joints;
   out.motors = scene.scene.motors.size();
   out.sensors = scene.scene.sensors.size();
-  static_cast<void>(Model(scene.scene));  // whatever it would refuse is refused before it is written
+  static_cast<void>(
+      Model(scene.scene));  // whatever it would refuse is refused before it is written
   return out;
 }
 

@@ -44,8 +44,8 @@ struct RobotOptions {
 };
 
 struct ImportedScene {
-  std::string text;    ///< of the scene file
-  std::string format;  ///< "URDF" or "MJCF"
+  std::string text;                                            ///< of the scene file
+  std::string format;                                          ///< "URDF" or "MJCF"
   std::size_t links = 0, joints = 0, motors = 0, sensors = 0;  ///< joints: those that move
   std::vector<std::string> idle;     ///< left out, and of no effect on the motion
   std::vector<std::string> changed;  ///< said in another way

@@ -18,8 +18,8 @@ std::vector<std::string> names_of(const Words& words) {
 }
 
 const Word* word_in(const Words& words, std::string_view name) {
-  const auto at = std::find_if(words.begin(), words.end(),
-                               [&](const Word& w) { return name == w.name; });
+  const auto at =
+      std::find_if(words.begin(), words.end(), [&](const Word& w) { return name == w.name; });
   return at == words.end() ? nullptr : &*at;
 }
 

@@ -41,9 +41,7 @@ class RobotNode : public SceneNode {
   /// Returns the children that are read, in order, and lists the others likewise.
   [[nodiscard]] std::vector<RobotNode> parts(const Words& known) const;
   /// The same in another context, which has defaults of its own.
-  [[nodiscard]] RobotNode in(SceneContext& context) const {
-    return {element(), context, *robot_};
-  }
+  [[nodiscard]] RobotNode in(SceneContext& context) const { return {element(), context, *robot_}; }
 
   void idle(const std::string& text) const { robot_->idle.add(source(), text); }
   void changed(const std::string& text) const { robot_->changed.add(source(), text); }

@@ -29,14 +29,14 @@ Pose place_of(const PadRequest& pad, const LinkDescription& link, const std::str
   if (pad.face.empty()) return compose(inverse(link.body.pose), pad.pose);
   const auto* const box = std::get_if<CuboidShape>(&link.body.shape);
   if (box == nullptr)
-    throw InputError(fmt::format("{}: the first shape of '{}' is no box, so it has no face {}; "
-                                 "expected @x,y,z or @x,y,z,roll,pitch,yaw in the link's frame",
-                                 what, pad.link, pad.face));
+    throw InputError(
+        fmt::format("{}: the first shape of '{}' is no box, so it has no face {}; "
+                    "expected @x,y,z or @x,y,z,roll,pitch,yaw in the link's frame",
+                    what, pad.link, pad.face));
   const auto face = std::find_if(std::begin(kFaces), std::end(kFaces),
                                  [&](const Face& f) { return pad.face == f.name; });
   if (face == std::end(kFaces))
-    throw InputError(
-        fmt::format("{}: face {}; expected +x, -x, +y, -y, +z or -z", what, pad.face));
+    throw InputError(fmt::format("{}: face {}; expected +x, -x, +y, -y, +z or -z", what, pad.face));
   const Vector3 normal = cross(face->x, face->y);
   Pose pose{{0, 0, 0}, from_axes(face->x, face->y)};
   for (std::size_t k = 0; k < 3; ++k) pose.position[k] = 0.5 * box->size[k] * normal[k];
@@ -45,8 +45,7 @@ Pose place_of(const PadRequest& pad, const LinkDescription& link, const std::str
 
 void check_metres(const tinyxml2::XMLElement& root, SceneContext& context) {
   const SceneNode node(root, context);
-  if (node.name() != "sensor")
-    node.fail("not a layout; expected the root <sensor unit=\"m-kg\">");
+  if (node.name() != "sensor") node.fail("not a layout; expected the root <sensor unit=\"m-kg\">");
   node.check_attributes({"unit", "name"});
   if (node.choice("unit", {"cm-g", "m-kg"}, 0) != 1)
     node.fail("unit=\"cm-g\"; expected unit=\"m-kg\", which the scene has");
@@ -56,9 +55,10 @@ void check_metres(const tinyxml2::XMLElement& root, SceneContext& context) {
 void refuse_files(const SceneNode& sensor) {
   for (const char* name : {"spec", "filename"})
     if (sensor.has(name))
-      sensor.fail(fmt::format("{}: a layout that names a file; write it into the scene with "
-                              "<include file=\"…\"/>",
-                              name));
+      sensor.fail(
+          fmt::format("{}: a layout that names a file; write it into the scene with "
+                      "<include file=\"…\"/>",
+                      name));
 }
 
 /// The elements inside a sensor, such as <imperfections>.

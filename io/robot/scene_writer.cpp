@@ -31,8 +31,7 @@ class Writer {
   Writer(const Robot& robot, const std::string& folder)
       : robot_(robot), scene_(robot.scene), folder_(folder), children_(scene_.links.size()) {
     for (std::size_t i = 0; i < scene_.links.size(); ++i)
-      if (scene_.links[i].parent >= 0)
-        children_[std::size_t(scene_.links[i].parent)].push_back(i);
+      if (scene_.links[i].parent >= 0) children_[std::size_t(scene_.links[i].parent)].push_back(i);
   }
 
   std::string text(const SceneSections& sections) {
@@ -118,12 +117,12 @@ class Writer {
     out_ += fmt::format(" size=\"{}\"", vector_text(s.size));
   }
   void write_size(const CylinderShape& s, const std::string&) {
-    out_ += fmt::format(" radius=\"{}\" length=\"{}\"", number_text(s.radius),
-                        number_text(s.length));
+    out_ +=
+        fmt::format(" radius=\"{}\" length=\"{}\"", number_text(s.radius), number_text(s.length));
   }
   void write_size(const CapsuleShape& s, const std::string&) {
-    out_ += fmt::format(" radius=\"{}\" length=\"{}\"", number_text(s.radius),
-                        number_text(s.length));
+    out_ +=
+        fmt::format(" radius=\"{}\" length=\"{}\"", number_text(s.radius), number_text(s.length));
   }
   void write_size(const EllipsoidShape& s, const std::string&) {
     out_ += fmt::format(" size=\"{}\"", vector_text(s.size));
@@ -156,8 +155,7 @@ class Writer {
       const bool position = m.control == MotorControl::position;
       out_ += fmt::format("    <motor joint=\"{}\" ctrl=\"{}\"", attribute_text(m.joint),
                           position ? "position" : "force");
-      if (position)
-        out_ += fmt::format(" P=\"{}\" D=\"{}\"", number_text(m.P), number_text(m.D));
+      if (position) out_ += fmt::format(" P=\"{}\" D=\"{}\"", number_text(m.P), number_text(m.D));
       if (std::isfinite(m.low) || std::isfinite(m.high))
         out_ += fmt::format(" ctrl_range=\"{} {}\"", number_text(bounded(m.low)),
                             number_text(bounded(m.high)));

@@ -20,18 +20,18 @@ constexpr int kDeepestChain = 150;  // links of a chain; a scene's limit is 200,
 const char* const kPictures = "for pictures only";
 const char* const kSoftware = "a setting of other software";
 
-const Words kRobotChildren = {{"link"},
-                              {"joint"},
-                              {"material", Fate::idle, kPictures},
-                              {"transmission", Fate::idle,
-                               "a setting of other software; --motor JOINT=… drives a joint"},
-                              {"gazebo", Fate::idle, kSoftware},
-                              {"mujoco", Fate::idle, kSoftware},
-                              {"drake", Fate::idle, kSoftware},
-                              {"ros2_control", Fate::idle, kSoftware},
-                              {"sensor", Fate::idle, "no sensor of touch; --pad LINK=LAYOUT adds one"},
-                              {"group", Fate::idle, kSoftware},
-                              {"disable_collisions", Fate::idle, kSoftware}};
+const Words kRobotChildren = {
+    {"link"},
+    {"joint"},
+    {"material", Fate::idle, kPictures},
+    {"transmission", Fate::idle, "a setting of other software; --motor JOINT=… drives a joint"},
+    {"gazebo", Fate::idle, kSoftware},
+    {"mujoco", Fate::idle, kSoftware},
+    {"drake", Fate::idle, kSoftware},
+    {"ros2_control", Fate::idle, kSoftware},
+    {"sensor", Fate::idle, "no sensor of touch; --pad LINK=LAYOUT adds one"},
+    {"group", Fate::idle, kSoftware},
+    {"disable_collisions", Fate::idle, kSoftware}};
 const Words kLinkChildren = {{"inertial"},
                              {"collision"},
                              {"visual", Fate::idle, kPictures},
@@ -110,9 +110,8 @@ class UrdfReader {
     for (const Joint& joint : joints_) names_.keep(joint.joint.name);
     int roots = 0;
     for (std::size_t i = 0; i < links.size(); ++i) {
-      const bool carried = std::any_of(joints_.begin(), joints_.end(), [&](const Joint& j) {
-        return j.child == link_names_[i];
-      });
+      const bool carried = std::any_of(joints_.begin(), joints_.end(),
+                                       [&](const Joint& j) { return j.child == link_names_[i]; });
       if (carried) continue;
       if (++roots > 1)
         links[i].fail("link '" + link_names_[i] +
@@ -134,8 +133,8 @@ class UrdfReader {
     node.check({{"name"}, {"type"}});
     Joint out{{}, "", "", "", node};
     const std::vector<RobotNode> parts = node.parts(kJointChildren);
-    static const std::vector<std::string> types = {"fixed",    "revolute", "continuous", "prismatic",
-                                                   "floating", "planar"};
+    static const std::vector<std::string> types = {"fixed",     "revolute", "continuous",
+                                                   "prismatic", "floating", "planar"};
     out.type = types[std::size_t(node.choice("type", types))];
     JointDescription& joint = out.joint;
     joint.name = node.text("name");
@@ -222,7 +221,8 @@ class UrdfReader {
   void add(const std::vector<RobotNode>& links, std::size_t i, int parent, JointDescription joint,
            const std::string& how, int depth) {
     const RobotNode& node = links[i];
-    if (depth > kDeepestChain) node.fail(fmt::format("more than {} links in a chain", kDeepestChain));
+    if (depth > kDeepestChain)
+      node.fail(fmt::format("more than {} links in a chain", kDeepestChain));
     const std::string& name = link_names_[i];
     const std::string origin = fmt::format("<link>, {}", how);
     // A planar joint moves across its axis, and a free2d joint across z.

@@ -42,8 +42,8 @@ void read_head(const tinyxml2::XMLElement& root, SceneContext& context) {
                               : std::vector<std::string>{"unit", "name"});
   const tinyxml2::XMLElement* const option = root.FirstChildElement("option");
   const SceneNode of_unit = scene && option != nullptr ? SceneNode(*option, context) : node;
-  const bool metres = (!scene || option != nullptr) &&
-                      of_unit.choice("unit", {"cm-g", "m-kg"}, 0) == 1;
+  const bool metres =
+      (!scene || option != nullptr) && of_unit.choice("unit", {"cm-g", "m-kg"}, 0) == 1;
   if (!metres) context.use_centimetres_and_grams();
 }
 
@@ -53,12 +53,12 @@ void check_units(const SceneNode& include, const tinyxml2::XMLElement& element,
   if (include.context().length == inner.length) return;
   for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a != nullptr; a = a->Next()) {
     const std::string_view value = a->Value();
-    const bool number =
-        !value.empty() && value.find_first_not_of(" \t\n0123456789+-.,eE") == std::string_view::npos;
+    const bool number = !value.empty() &&
+                        value.find_first_not_of(" \t\n0123456789+-.,eE") == std::string_view::npos;
     if (number && std::string_view(a->Name()) != "file")
-      include.fail(fmt::format(
-          "{}=\"{}\": this file is in {} and {} in {}; expected the same unit", a->Name(), value,
-          inner.length == 1 ? "cm-g" : "m-kg", inner.file, inner.length == 1 ? "m-kg" : "cm-g"));
+      include.fail(fmt::format("{}=\"{}\": this file is in {} and {} in {}; expected the same unit",
+                               a->Name(), value, inner.length == 1 ? "cm-g" : "m-kg", inner.file,
+                               inner.length == 1 ? "m-kg" : "cm-g"));
   }
 }
 

@@ -102,9 +102,10 @@ void SceneNode::add_children(const std::vector<std::string>& known,
         out.push_back(child);
       } else if (child.name() == "include") {
         if (include != nullptr)
-          child.fail(fmt::format("the <include> of line {} gives attributes to this one; expected "
-                                 "them here",
-                                 include->GetLineNum()));
+          child.fail(
+              fmt::format("the <include> of line {} gives attributes to this one; expected "
+                          "them here",
+                          include->GetLineNum()));
         const IncludedFile& file = include_file(child, *this);
         const bool gives = e->FirstAttribute()->Next() != nullptr;  // more than the file's name
         SceneNode(*file.root, *file.context).add_children(known, gives ? e : nullptr, out);
@@ -117,9 +118,8 @@ void SceneNode::add_children(const std::vector<std::string>& known,
     } else if (const tinyxml2::XMLText* t = n->ToText()) {
       const std::string text = t->Value();
       if (!std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isspace(c); }))
-        context_->outermost().warnings.push_back(
-            fmt::format("{}:{}: stray text inside <{}> is ignored", context_->file,
-                        n->GetLineNum(), name()));
+        context_->outermost().warnings.push_back(fmt::format(
+            "{}:{}: stray text inside <{}> is ignored", context_->file, n->GetLineNum(), name()));
     }
   }
 }

@@ -270,8 +270,7 @@ SceneFile parse_scene(const std::string& text, const std::string& name,
   SceneContext context;
   context.file = name;
   context.allow_unknown = options.allow_unknown;
-  const tinyxml2::XMLElement& root =
-      parse_xml(document, text, name, kSceneRoots, context.warnings);
+  const tinyxml2::XMLElement& root = parse_xml(document, text, name, kSceneRoots, context.warnings);
   SceneFile out;
   read_root(SceneNode(root, context), out.scene);
   out.scene.path = name;

@@ -70,7 +70,7 @@ const std::map<std::string, Folder, std::less<>>& folders() {
       {"cmake", {{}, {}}},
       {"bench", {{"tasks", "io", "engine", "kernels"}, {}}},
       {"tests", {{"apps", "tasks", "io", "engine", "kernels"}, {}}},
-      {"examples", {{"tasks", "io", "engine"}, {"xsimd", "hdf5", "H5", "tinyxml2"}}}};
+      {"examples", {{"apps", "tasks", "io", "engine"}, {"xsimd", "hdf5", "H5", "tinyxml2"}}}};
   return table;
 }
 

@@ -119,7 +119,7 @@ def write(path):
             if model.body_jntnum[b] > 0:
                 last = model.body_jntadr[b] + model.body_jntnum[b] - 1
                 if model.jnt_type[last] != FREE:
-                    place = data.xanchor[last]
+                    place = place + rotation(data.xquat[b]) @ model.jnt_pos[last]
             text += line("pose", model.body(b).name, np.concatenate([place, data.xquat[b]]))
     (HERE / f"{path.stem}_reference.txt").write_text(text)
 

@@ -68,49 +68,50 @@ class SceneFiles {
   std::string first_;
 };
 
-std::string scene_with(const std::string& more) {
+std::string metric_scene(const std::string& more) {
   return "<tangere>\n<option unit=\"m-kg\"/>\n" + more + "\n</tangere>\n";
 }
-const std::string kRobot =
+const std::string kSlider =
     "<robot><link name=\"a\"><joint name=\"a\" type=\"prismatic\" axis=\"0 0 1\"/>"
     "<body name=\"a\" type=\"sphere\" radius=\"1\"/></link></robot>";
 
 TEST(SceneInclude, ErrorsNameTheFileInWhichTheyStand) {
   EXPECT_EQ(SceneFiles()
-                .add("a.xml", scene_with("<include file=\"b.xml\"/>"))
-                .add("b.xml", scene_with(kRobot))
+                .add("a.xml", metric_scene("<include file=\"b.xml\"/>"))
+                .add("b.xml", metric_scene(kSlider))
                 .fault(),
             "");
   EXPECT_THAT(SceneFiles()
-                  .add("a.xml", scene_with("<include file=\"b.xml\"/>"))
-                  .add("b.xml", scene_with("<robott/>"))
+                  .add("a.xml", metric_scene("<include file=\"b.xml\"/>"))
+                  .add("b.xml", metric_scene("<robott/>"))
                   .fault(),
               HasSubstr("b.xml:3: <robott>: unknown element inside <tangere>"));
-  EXPECT_THAT(SceneFiles().add("a.xml", scene_with("<include file=\"b.xml\"/>")).fault(),
+  EXPECT_THAT(SceneFiles().add("a.xml", metric_scene("<include file=\"b.xml\"/>")).fault(),
               HasSubstr("a.xml:3: <include>: "));
-  EXPECT_THAT(SceneFiles().add("a.xml", scene_with("<include/>")).fault(),
+  EXPECT_THAT(SceneFiles().add("a.xml", metric_scene("<include/>")).fault(),
               HasSubstr("a.xml:3: <include>: attribute 'file' is missing"));
-  EXPECT_THAT(SceneFiles()
-                  .add("a.xml", scene_with("<sensor><include file=\"b.xml\"/></sensor>"))
-                  .add("b.xml", scene_with(kRobot))
-                  .fault(),
-              HasSubstr("a.xml:3: <include>: b.xml has the root <tangere>; expected the root "
-                        "<sensor>"));
+  EXPECT_THAT(
+      SceneFiles()
+          .add("a.xml", metric_scene(kSlider + "<sensor><include file=\"b.xml\"/></sensor>"))
+          .add("b.xml", metric_scene(kSlider))
+          .fault(),
+      HasSubstr("a.xml:3: <include>: b.xml has the root <tangere>; expected the root "
+                "<sensor>"));
 }
 
 TEST(SceneInclude, RingsAndFloodsAreRefused) {
   EXPECT_THAT(SceneFiles()
-                  .add("a.xml", scene_with("<include file=\"b.xml\"/>"))
-                  .add("b.xml", scene_with("<include file=\"./a.xml\"/>"))
+                  .add("a.xml", metric_scene("<include file=\"b.xml\"/>"))
+                  .add("b.xml", metric_scene("<include file=\"./a.xml\"/>"))
                   .fault(),
               HasSubstr("b.xml:3: <include>: files that include each other: a.xml includes b.xml "
                         "includes a.xml"));
   SceneFiles flood;
   for (int k = 0; k < 12; ++k) {
     const std::string next = "<include file=\"" + std::to_string(k + 1) + ".xml\"/>\n";
-    flood.add(std::to_string(k) + ".xml", scene_with(next + next));
+    flood.add(std::to_string(k) + ".xml", metric_scene(next + next));
   }
-  flood.add("12.xml", scene_with(""));
+  flood.add("12.xml", metric_scene(""));
   EXPECT_THAT(flood.fault(), HasSubstr("more than 1000 files in one scene"));
 }
 
@@ -120,8 +121,8 @@ TEST(SceneInclude, AttributesGoToWhatIsIncluded) {
       "</sensor>";
   const auto with = [&](const std::string& attributes) {
     return SceneFiles()
-        .add("a.xml", scene_with(kRobot + "<sensor><include file=\"b.xml\" " + attributes +
-                                 "/></sensor>"))
+        .add("a.xml", metric_scene(kSlider + "<sensor><include file=\"b.xml\" " + attributes +
+                                   "/></sensor>"))
         .add("b.xml", sensor)
         .fault();
   };
@@ -130,25 +131,26 @@ TEST(SceneInclude, AttributesGoToWhatIsIncluded) {
   EXPECT_THAT(with("body=\"b\""), HasSubstr("no body has this name; did you mean 'a'"));
   EXPECT_THAT(with("body=\"a\" colour=\"red\""),
               HasSubstr("a.xml:3: <include>: unknown attribute 'colour' of <tactile>"));
-  EXPECT_THAT(with("body=\"a\" kn=\"2\""),
-              HasSubstr("kn=\"2\": this file is in m-kg and b.xml in cm-g; expected the same unit"));
+  EXPECT_THAT(
+      with("body=\"a\" kn=\"2\""),
+      HasSubstr("kn=\"2\": this file is in m-kg and b.xml in cm-g; expected the same unit"));
 }
 
 TEST(SceneInclude, OneOfTheFilesMayHaveASectionThatIsGivenOnce) {
   const std::string ground = "<ground pos=\"0 0 -1\"/>";
   EXPECT_THAT(SceneFiles()
-                  .add("a.xml", scene_with("<include file=\"b.xml\"/><include file=\"c.xml\"/>"))
-                  .add("b.xml", scene_with(kRobot + ground))
-                  .add("c.xml", scene_with(ground))
+                  .add("a.xml", metric_scene("<include file=\"b.xml\"/><include file=\"c.xml\"/>"))
+                  .add("b.xml", metric_scene(kSlider + ground))
+                  .add("c.xml", metric_scene(ground))
                   .fault(),
               HasSubstr("given twice"));
-  EXPECT_EQ(SceneFiles()
-                .add("a.xml",
-                     scene_with("<ground/><include file=\"b.xml\"/><include file=\"c.xml\"/>"))
-                .add("b.xml", scene_with(kRobot + ground))
-                .add("c.xml", scene_with(ground))
-                .fault(),
-            "");
+  EXPECT_EQ(
+      SceneFiles()
+          .add("a.xml", metric_scene("<ground/><include file=\"b.xml\"/><include file=\"c.xml\"/>"))
+          .add("b.xml", metric_scene(kSlider + ground))
+          .add("c.xml", metric_scene(ground))
+          .fault(),
+      "");
 }
 
 }  // namespace
