@@ -187,13 +187,24 @@ void add_memory_size(CLI::App& command, const std::string& flags, std::optional<
   command.add_option_function<std::string>(flags, read, description)->type_name("SIZE");
 }
 
+namespace {
+std::string fault_of_text(const std::string& text) {
+  return text.empty() ? std::string("expected text, found none") : std::string();
+}
+}  // namespace
+
 AddedOption add_text(CLI::App& command, const std::string& flags, std::string& value,
                      const std::string& type, const std::string& description) {
-  const auto not_empty = [](const std::string& text) {
-    return text.empty() ? std::string("expected text, found none") : std::string();
-  };
   return AddedOption(
-      *command.add_option(flags, value, description)->check(not_empty)->type_name(type));
+      *command.add_option(flags, value, description)->check(fault_of_text)->type_name(type));
+}
+
+void add_texts(CLI::App& command, const std::string& flags, std::vector<std::string>& values,
+               const std::string& type, const std::string& description) {
+  command.add_option(flags, values, description)
+      ->check(fault_of_text)
+      ->type_name(type)
+      ->allow_extra_args(false);
 }
 
 AddedOption add_flag(CLI::App& command, const std::string& flags, bool& value,

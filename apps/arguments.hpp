@@ -90,6 +90,10 @@ void add_memory_size(CLI::App& command, const std::string& flags, std::optional<
 AddedOption add_text(CLI::App& command, const std::string& flags, std::string& value,
                      const std::string& type, const std::string& description);
 
+/// Adds an option that may be given several times, each time with one text.
+void add_texts(CLI::App& command, const std::string& flags, std::vector<std::string>& values,
+               const std::string& type, const std::string& description);
+
 /// Adds an option without a value; `value` becomes true when it is given.
 AddedOption add_flag(CLI::App& command, const std::string& flags, bool& value,
                      const std::string& description);

@@ -25,6 +25,7 @@ struct Command {
 };
 
 Command add_inspect(CLI::App& program);
+Command add_import(CLI::App& program);
 Command add_simulate(CLI::App& program);
 Command add_generate(CLI::App& program);
 Command add_validate(CLI::App& program);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The program contains the scenes of tasks, so it needs no folder of scenes to run a task.
+// The program contains the scenes of its own tasks, so it needs no folder of scenes to run them.
 #include "apps/task_run.hpp"
 
 #include <fmt/format.h>
@@ -21,9 +21,8 @@ std::unique_ptr<Task> find_task(const std::string& word, const Console& console,
   if (is_task(word)) {
     const TaskSpec spec = task_spec(word);
     const char* const text = program_scene(spec.scene);
-    if (text == nullptr)
-      throw InputError(fmt::format("task '{}': its scene {} is not there", word, spec.scene));
-    SceneFile file = parse_scene(text, spec.scene);
+    // A task of another program names a file.
+    SceneFile file = text != nullptr ? parse_scene(text, spec.scene) : read_scene(spec.scene);
     for (const std::string& warning : file.warnings) console.note("warning: " + warning);
     ask_of_solver(file.scene.solver, asked);
     return make_task(word, file.scene);

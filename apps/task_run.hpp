@@ -36,8 +36,10 @@ void refuse_with_task(const Task& task, const std::vector<GivenOption>& options)
 /// Does the same for options that only tasks have.
 void refuse_with_scene(const std::string& scene, const std::vector<GivenOption>& options);
 
-/// Returns the text of a scene that the program contains, those of tasks and the hard ones, by its
-/// path below scenes/; null for other names.
+/// Returns the text of a scene that the program contains, those of tasks, the hard ones
+/// and layouts of sensors, by its path below scenes/; null for other names.
 const char* program_scene(const std::string& file);
+/// Names of the layouts of sensors among them: "digit" is sensors/digit.xml.
+std::vector<std::string> program_sensors();
 
 }  // namespace tangere::apps

@@ -13,19 +13,20 @@ add_library(tangere::tangere ALIAS tangere_umbrella)
 target_link_libraries(tangere_umbrella INTERFACE tangere::tasks tangere::io)
 set_target_properties(tangere_umbrella PROPERTIES EXPORT_NAME tangere)
 
-foreach(library kernels engine tasks io)
+foreach(library kernels engine tasks io command)
   target_include_directories(tangere_${library} INTERFACE
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${headers}>)
   target_compile_features(tangere_${library} INTERFACE cxx_std_20)
-  # The libraries also become part of shared objects, such as the Python module.
-  set_target_properties(tangere_${library} PROPERTIES POSITION_INDEPENDENT_CODE ON)
 endforeach()
+# These also become part of shared objects, such as the Python module.
+set_target_properties(tangere_kernels tangere_engine tangere_tasks tangere_io PROPERTIES POSITION_INDEPENDENT_CODE ON)
 set_target_properties(tangere_flags PROPERTIES EXPORT_NAME flags)  # passes a sanitizer on to users of the libraries
 
-install(TARGETS tangere_kernels tangere_engine tangere_tasks tangere_io tangere_umbrella tangere_flags
+install(TARGETS tangere_kernels tangere_engine tangere_tasks tangere_io tangere_command tangere_umbrella tangere_flags
   EXPORT tangere ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS tangere RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 set(public_headers
+  apps/program.hpp
   engine/base/aligned.hpp
   engine/base/as_size.hpp
   engine/base/error.hpp
@@ -66,6 +67,7 @@ set(public_headers
   io/dataset/dataset_merge.hpp
   io/dataset/dataset_writer.hpp
   io/dataset/shard_check.hpp
+  io/robot/robot_import.hpp
   io/scene/scene_reader.hpp
   io/trajectory/trajectory_file.hpp
   io/trajectory/trajectory_layout.hpp

@@ -31,7 +31,7 @@ struct TensorSpec {
 struct TaskSpec {
   std::string name;
   std::string summary;  ///< one sentence
-  std::string scene;    ///< file below scenes/
+  std::string scene;    ///< file below scenes/, or the path of a scene file
   std::string success;  ///< when an episode counts as solved, in words
   TensorSpec action;
   /// Stored one after another for each environment, in this order.

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "io/scene/included_file.hpp"
+
 namespace tangere {
 namespace {
 
@@ -45,13 +47,15 @@ void SceneNode::fail(const std::string& message) const {
 
 void SceneNode::fail_at(const char* attribute, const std::string& message) const {
   const SceneContext::Default* given =
-      element_->Attribute(attribute) == nullptr ? find_default(attribute) : nullptr;
+      find_own(attribute) == nullptr ? find_default(attribute) : nullptr;
+  if (include_ != nullptr && include_->Attribute(attribute) != nullptr)
+    fail(fmt::format("{} (from the <include>, line {})", message, include_->GetLineNum()));
   fail(given == nullptr ? message
                         : fmt::format("{} (from <default>, line {})", message, given->line));
 }
 
 void SceneNode::warn(const std::string& message) const {
-  context_->warnings.push_back(source().prefix() + "<" + name() + ">: " + message);
+  context_->outermost().warnings.push_back(source().prefix() + "<" + name() + ">: " + message);
 }
 
 void SceneNode::check_attributes(const std::vector<std::string>& used,
@@ -60,28 +64,51 @@ void SceneNode::check_attributes(const std::vector<std::string>& used,
   const auto in = [](const std::vector<std::string>& list, const std::string& word) {
     return std::find(list.begin(), list.end(), word) != list.end();
   };
-  for (const tinyxml2::XMLAttribute* a = element_->FirstAttribute(); a != nullptr; a = a->Next()) {
-    const std::string attribute = a->Name();
-    if (in(used, attribute) || in(pictures, attribute)) continue;
-    if (in(unused, attribute)) {
-      warn("attribute '" + attribute + "' has no effect here");
-    } else if (context_->allow_unknown) {
-      warn("unknown attribute '" + attribute + "' is ignored");
-    } else {
-      std::vector<std::string> known = used;
-      known.insert(known.end(), pictures.begin(), pictures.end());
-      fail("unknown attribute '" + attribute + "'" + suggestion(attribute, known) + kAllow);
+  const auto check = [&](const tinyxml2::XMLElement& of, const std::string& skipped) {
+    const SceneNode at(of, &of == element_ ? *context_ : *context_->includer);
+    for (const tinyxml2::XMLAttribute* a = of.FirstAttribute(); a != nullptr; a = a->Next()) {
+      const std::string attribute = a->Name();
+      if (attribute == skipped || in(used, attribute) || in(pictures, attribute)) continue;
+      if (in(unused, attribute)) {
+        warn("attribute '" + attribute + "' has no effect here");
+      } else if (context_->allow_unknown) {
+        warn("unknown attribute '" + attribute + "' is ignored");
+      } else {
+        std::vector<std::string> known = used;
+        known.insert(known.end(), pictures.begin(), pictures.end());
+        at.fail("unknown attribute '" + attribute + "'" +
+                (&of == element_ ? "" : " of <" + name() + ">") + suggestion(attribute, known) +
+                kAllow);
+      }
     }
-  }
+  };
+  check(*element_, "");
+  if (include_ != nullptr) check(*include_, "file");
 }
 
 std::vector<SceneNode> SceneNode::children(const std::vector<std::string>& known) const {
   std::vector<SceneNode> out;
+  add_children(known, nullptr, out);
+  return out;
+}
+
+void SceneNode::add_children(const std::vector<std::string>& known,
+                             const tinyxml2::XMLElement* include,
+                             std::vector<SceneNode>& out) const {
   for (const tinyxml2::XMLNode* n = element_->FirstChild(); n != nullptr; n = n->NextSibling()) {
     if (const tinyxml2::XMLElement* e = n->ToElement()) {
-      const SceneNode child(*e, *context_);
+      const SceneNode child(*e, *context_, include);
       if (std::find(known.begin(), known.end(), child.name()) != known.end()) {
         out.push_back(child);
+      } else if (child.name() == "include") {
+        if (include != nullptr)
+          child.fail(
+              fmt::format("the <include> of line {} gives attributes to this one; expected "
+                          "them here",
+                          include->GetLineNum()));
+        const IncludedFile& file = include_file(child, *this);
+        const bool gives = e->FirstAttribute()->Next() != nullptr;  // more than the file's name
+        SceneNode(*file.root, *file.context).add_children(known, gives ? e : nullptr, out);
       } else if (context_->allow_unknown) {
         child.warn("unknown element is ignored");
       } else {
@@ -91,15 +118,21 @@ std::vector<SceneNode> SceneNode::children(const std::vector<std::string>& known
     } else if (const tinyxml2::XMLText* t = n->ToText()) {
       const std::string text = t->Value();
       if (!std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::isspace(c); }))
-        context_->warnings.push_back(fmt::format("{}:{}: stray text inside <{}> is ignored",
-                                                 context_->file, n->GetLineNum(), name()));
+        context_->outermost().warnings.push_back(fmt::format(
+            "{}:{}: stray text inside <{}> is ignored", context_->file, n->GetLineNum(), name()));
     }
   }
-  return out;
+}
+
+const char* SceneNode::find_own(const char* attribute) const {
+  const std::string_view name = attribute;
+  if (include_ != nullptr && name != "file")
+    if (const char* value = include_->Attribute(attribute)) return value;
+  return element_->Attribute(attribute);
 }
 
 const char* SceneNode::find(const char* attribute) const {
-  if (const char* value = element_->Attribute(attribute)) return value;
+  if (const char* value = find_own(attribute)) return value;
   const SceneContext::Default* given = find_default(attribute);
   return given == nullptr ? nullptr : given->value.c_str();
 }

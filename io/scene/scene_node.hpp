@@ -6,6 +6,7 @@
 
 #include <array>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,6 +16,8 @@
 #include "io/files/nearest_name.hpp"
 
 namespace tangere {
+
+struct IncludedFile;
 
 /// What all elements of one file share.
 struct SceneContext {
@@ -33,18 +36,31 @@ struct SceneContext {
   double length = 1, stiffness = 1, damping_force = 1, damping_area = 1, density = 1, force = 1,
          torque = 1, rotational = 1;
   void use_centimetres_and_grams();
+  /// The file whose <include> names this one; nullptr for the file that the user names.
+  SceneContext* includer = nullptr;
+  /// Files that <include> has brought in, in the context of the user's file. Elements refer to them.
+  std::vector<std::shared_ptr<IncludedFile>> included = {};
+  /// The context of the file that the user names.
+  [[nodiscard]] SceneContext& outermost() {
+    return includer == nullptr ? *this : includer->outermost();
+  }
+
   /// Factor from the scene's units to a unit of the table in engine/model/scene_number.cpp.
   [[nodiscard]] double factor(std::string_view unit) const;
 };
 
 class SceneNode {
  public:
-  SceneNode(const tinyxml2::XMLElement& element, SceneContext& context)
-      : element_(&element), context_(&context) {}
+  /// `include`: of an element that an <include> brings in, this <include>, whose attributes take the
+  /// place of the element's own; nullptr if it gives none.
+  SceneNode(const tinyxml2::XMLElement& element, SceneContext& context,
+            const tinyxml2::XMLElement* include = nullptr)
+      : element_(&element), context_(&context), include_(include) {}
 
   [[nodiscard]] std::string name() const { return element_->Name(); }
   [[nodiscard]] Source source() const { return {context_->file, element_->GetLineNum()}; }
   [[nodiscard]] SceneContext& context() const { return *context_; }
+  [[nodiscard]] const tinyxml2::XMLElement& element() const { return *element_; }
   [[noreturn]] void fail(const std::string& message) const;
   /// Fails because of an attribute's value. The message says if the value comes from <default>.
   [[noreturn]] void fail_at(const char* attribute, const std::string& message) const;
@@ -58,6 +74,7 @@ class SceneNode {
                         const std::vector<std::string>& unused = {}) const;
 
   /// Returns the children in order. Names outside `known` are errors. Stray text gives a warning.
+  /// The children of a file that an <include> names stand in its place (included_file.hpp).
   [[nodiscard]] std::vector<SceneNode> children(const std::vector<std::string>& known) const;
 
   [[nodiscard]] bool has(const char* attribute) const { return find(attribute) != nullptr; }
@@ -86,11 +103,15 @@ class SceneNode {
   [[nodiscard]] Quaternion quaternion(const char* attribute) const;  ///< default: identity
 
  private:
+  void add_children(const std::vector<std::string>& known, const tinyxml2::XMLElement* include,
+                    std::vector<SceneNode>& out) const;
   [[nodiscard]] const char* find(const char* attribute) const;
+  [[nodiscard]] const char* find_own(const char* attribute) const;
   [[nodiscard]] const SceneContext::Default* find_default(const char* attribute) const;
 
   const tinyxml2::XMLElement* element_;
   SceneContext* context_;
+  const tinyxml2::XMLElement* include_;
 };
 
 }  // namespace tangere

@@ -11,7 +11,7 @@
 
 #include "io/files/text_file.hpp"
 #include "io/scene/scene_sections.hpp"
-#include "io/scene/scene_tags.hpp"
+#include "io/scene/xml_document.hpp"
 
 namespace tangere {
 
@@ -20,6 +20,7 @@ namespace {
 constexpr std::uintmax_t kLargestFile = 64U
                                         << 20;  // people write scenes; larger files are a mistake
 constexpr int kDeepestTree = 200;
+constexpr const char* kSceneRoots = "the root <redmax> or <tangere>";
 
 const std::vector<std::string> kJointTypes = {
     "fixed",     "revolute",        "prismatic",     "planar", "free2d",       "translational",
@@ -200,7 +201,10 @@ void read_defaults(const SceneNode& node) {
 
 void read_root(const SceneNode& root, Scene& scene) {
   if (root.name() != "redmax" && root.name() != "tangere")
-    root.fail("not a scene; expected the root <redmax> or <tangere>");
+    root.fail(std::string("not a scene; expected ") + kSceneRoots +
+              (root.name() == "robot" || root.name() == "mujoco"
+                   ? ". 'tangere import' makes a scene of it"
+                   : ""));
   root.check_attributes({"model", "name"});
   scene.name = root.text("model", root.text("name", "scene"));
   const std::vector<SceneNode> sections = root.children(
@@ -210,19 +214,26 @@ void read_root(const SceneNode& root, Scene& scene) {
     for (const SceneNode& s : sections)
       if (s.name() == name) read(s);
   };
+  // What the user's file says itself takes the place of what files that it includes say.
   const auto once = [&](const char* name, auto&& read) {
+    const auto own = [&](const SceneNode& s) { return &s.context() == &root.context(); };
+    const bool by_itself = std::any_of(sections.begin(), sections.end(), [&](const SceneNode& s) {
+      return s.name() == name && own(s);
+    });
     int count = 0;
     each(name, [&](const SceneNode& s) {
+      if (by_itself && !own(s)) return;
       if (++count > 1) s.fail("given twice; expected once");
       read(s);
     });
-    return count > 0;
   };
   // Units come first because every other number depends on them. Then come sections to which others
   // refer.
   SceneContext& c = root.context();
   bool metres = false;
-  each("option", [&](const SceneNode& s) { metres = s.choice("unit", {"cm-g", "m-kg"}, 0) == 1; });
+  each("option", [&](const SceneNode& s) {
+    if (&s.context() == &c) metres = s.choice("unit", {"cm-g", "m-kg"}, 0) == 1;
+  });
   if (!metres) c.use_centimetres_and_grams();
   scene.timestep = 0.02;
   scene.integrator = Integrator::bdf1;
@@ -232,7 +243,7 @@ void read_root(const SceneNode& root, Scene& scene) {
   each("default", [&](const SceneNode& s) { read_defaults(s); });
   once("ground", [&](const SceneNode& s) {
     s.check_attributes({"pos", "normal"}, {"size", "texture", "rgba"});
-    scene.ground = GroundDescription{scaled(s.vector("pos", Vector3{0, 0, 0}), c.length),
+    scene.ground = GroundDescription{scaled(s.vector("pos", Vector3{0, 0, 0}), s.context().length),
                                      s.direction("normal", Vector3{0, 0, 1})};
   });
   TreeReader tree(scene);
@@ -255,59 +266,17 @@ void read_root(const SceneNode& root, Scene& scene) {
   warn_of_idle_sensors(scene, root);
 }
 
-/// Describes an error of the XML parser.
-const char* fault_of(tinyxml2::XMLError error) {
-  switch (error) {
-    case tinyxml2::XML_ERROR_MISMATCHED_ELEMENT:
-      return "an element is closed by another's end tag, or never";
-    case tinyxml2::XML_ERROR_PARSING_ELEMENT:
-      return "a tag that is not of the form <name attribute=\"value\">";
-    case tinyxml2::XML_ERROR_PARSING_ATTRIBUTE:
-      return "an attribute that is not of the form name=\"value\"";
-    case tinyxml2::XML_ERROR_PARSING_COMMENT: return "a comment without its end -->";
-    case tinyxml2::XML_ERROR_PARSING_DECLARATION: return "a declaration without its end ?>";
-    case tinyxml2::XML_ERROR_EMPTY_DOCUMENT:
-      return "no element; expected the root <redmax> or <tangere>";
-    case tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED: return "elements nested too deep";
-    default: return tinyxml2::XMLDocument::ErrorIDToName(error);
-  }
-}
-
 }  // namespace
 
 SceneFile parse_scene(const std::string& text, const std::string& name,
                       const SceneReadOptions& options) {
   tinyxml2::XMLDocument document;
-  if (text.find('\0') != std::string::npos)
-    throw InputError(name + ": holds a zero byte; expected XML text");
-  if (const std::size_t bad = find_invalid_utf8(text); bad != std::string_view::npos)
-    throw InputError(fmt::format(
-        "{}:{}: byte 0x{:02x} is no UTF-8; expected text in UTF-8", name,
-        1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(bad), '\n'),
-        static_cast<unsigned char>(text[bad])));
-  check_attribute_counts(text, name);
-  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
-    const int line = document.ErrorLineNum();
-    throw InputError(fmt::format("{}:{}: not well-formed XML: {}", name, std::max(line, 1),
-                                 fault_of(document.ErrorID())));
-  }
-  const tinyxml2::XMLElement* root = document.RootElement();
-  if (root == nullptr)
-    throw InputError(name + ":1: no element; expected the root <redmax> or <tangere>");
   SceneContext context;
   context.file = name;
   context.allow_unknown = options.allow_unknown;
-  for (const tinyxml2::XMLNode* node = document.FirstChild(); node != nullptr;
-       node = node->NextSibling()) {
-    if (node->ToText() != nullptr)
-      context.warnings.push_back(fmt::format("{}:{}: stray text outside <{}> is ignored", name,
-                                             node->GetLineNum(), root->Name()));
-    if (node->ToElement() != nullptr && node != root)
-      throw InputError(fmt::format("{}:{}: <{}> after the end of <{}>; expected one root", name,
-                                   node->GetLineNum(), node->ToElement()->Name(), root->Name()));
-  }
+  const tinyxml2::XMLElement& root = parse_xml(document, text, name, kSceneRoots, context.warnings);
   SceneFile out;
-  read_root(SceneNode(*root, context), out.scene);
+  read_root(SceneNode(root, context), out.scene);
   out.scene.path = name;
   out.scene.text = text;
   out.warnings = std::move(context.warnings);

@@ -23,7 +23,7 @@ using Names = std::vector<std::string>;
 /// Attributes that only some layouts use, each with these layouts.
 Names attributes_of(int type) {
   switch (type) {
-    case 0: return {"rect_pos0", "rect_pos1", "axis0", "axis1", "resolution"};
+    case 0: return {"rect_pos0", "rect_pos1", "axis0", "axis1", "resolution", "pos", "quat"};
     case 1: return {"spec", "pos", "quat"};
     case 2: return {"radius", "count", "resolution", "pos", "quat"};
     case 3: return {"radius", "length", "resolution", "pos", "quat"};
@@ -85,6 +85,10 @@ RectArray read_array(const SceneNode& node) {
   check_in_plane(node, array);
   const auto [rows, cols] = read_resolution(node);
   array.rows = rows, array.cols = cols;
+  if (!node.has("pos") && !node.has("quat")) return array;
+  const Pose pose{scaled(node.vector("pos", Vector3{0, 0, 0}), length), node.quaternion("quat")};
+  for (Vector3* corner : {&array.corner0, &array.corner1}) *corner = outer_point(pose, *corner);
+  for (Vector3* axis : {&array.axis0, &array.axis1}) *axis = outer_direction(pose, *axis);
   return array;
 }
 

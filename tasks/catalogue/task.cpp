@@ -42,6 +42,20 @@ void Task::start(const TaskStart&) const {}
 void Task::begin_action(const TaskView&, std::span<double>) const {}
 void Task::place(const TaskView&, std::span<double>, std::span<double>) const {}
 
+void Task::reward_vjp(const TaskView&, double, const ViewCotangent&) const {
+  throw InputError(fmt::format("task {} has no derivative of its reward; expected Task::reward_vjp",
+                               spec_.name));
+}
+void Task::controls_vjp(const TaskView&, int, std::span<const double>, const ViewCotangent&) const {
+  throw InputError(fmt::format(
+      "task {} has no derivative of its controls; expected Task::controls_vjp", spec_.name));
+}
+void Task::scripted(const TaskView&, std::span<const double>, std::span<double>) const {
+  throw InputError(fmt::format(
+      "task {} has no script; expected another policy, such as --policy random, or Task::scripted",
+      spec_.name));
+}
+
 void Task::observe_vjp(const TaskView&, std::span<const double>, const ViewCotangent&) const {
   throw InputError(
       fmt::format("task {} has no derivative of its observations; expected Task::observe_vjp, "

@@ -91,8 +91,8 @@ class Task {
   virtual Verdict judge(const TaskView& view) const = 0;
 
   /// Adds `weight` times the derivative of the reward to `out`. A choice between cases has no
-  /// derivative.
-  virtual void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const = 0;
+  /// derivative. Only gradients of returns need it; the default throws InputError.
+  virtual void reward_vjp(const TaskView& view, double weight, const ViewCotangent& out) const;
   /// Adds ∂(weight · o)/∂(moments, action, memory), where o is the result of observe(view, o) and
   /// `weight` is (observation). Noise counts as given. At a choice between cases or a threshold it
   /// is the derivative of the case at hand, at a clamp that of its inside. Gradients through
@@ -100,9 +100,10 @@ class Task {
   virtual void observe_vjp(const TaskView& view, std::span<const double> weight,
                            const ViewCotangent& out) const;
   /// Adds ∂(weight · u)/∂(action, memory, q and v of the action's start), where u is the result of
-  /// controls(view, step, u) and `weight` is (nu).
+  /// controls(view, step, u) and `weight` is (nu). Only gradients need it; the default throws
+  /// InputError.
   virtual void controls_vjp(const TaskView& view, int step, std::span<const double> weight,
-                            const ViewCotangent& out) const = 0;
+                            const ViewCotangent& out) const;
 
   /// Reverses begin_action. On entry `memory` holds derivatives by the memory after begin_action,
   /// on return by the memory before it, view.memory. Adds derivatives by the action and by q and v
@@ -115,9 +116,9 @@ class Task {
   virtual void place_vjp(const TaskView& view, std::span<const double> q, std::span<const double> v,
                          const ViewCotangent& out) const;
 
-  /// Fills an action that solves the task without learning.
+  /// Fills an action that solves the task without learning. The default throws InputError.
   virtual void scripted(const TaskView& view, std::span<const double> observation,
-                        std::span<double> action) const = 0;
+                        std::span<double> action) const;
 
  protected:
   /// First coordinate of a joint of the scene, or its first dof. Throws InputError when the scene

@@ -5,15 +5,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <functional>
 
 namespace tangere {
 namespace {
 
-struct Entry {
-  std::function<TaskSpec()> declare;
-  std::function<std::unique_ptr<Task>(const Scene&)> make;
-};
+using Entry = OwnTask;
 
 /// Entry of a task with variants; both functions receive `variant`.
 template <class Declare, class Make, class Variant>
@@ -22,9 +18,9 @@ Entry entry(Declare declare, Make make, Variant variant) {
           [=](const Scene& scene) { return make(scene, variant); }};
 }
 
-const std::vector<Entry>& entries() {
+std::vector<Entry>& entries() {
   using Push = PushObservation;
-  static const std::vector<Entry> all{
+  static std::vector<Entry> all{
       entry(declare_ball_rolling, make_ball_rolling, BallPad::large),
       entry(declare_ball_rolling, make_ball_rolling, BallPad::small),
       {declare_stable_grasp, make_stable_grasp},
@@ -59,6 +55,12 @@ std::vector<std::string> task_names() {
 bool is_task(const std::string& name) {
   const std::vector<std::string> names = task_names();
   return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+void add_task(const OwnTask& task) {
+  const std::string name = task.declare().name;
+  if (is_task(name)) throw InputError(fmt::format("there is a task named '{}' already", name));
+  entries().push_back(task);
 }
 
 TaskSpec task_spec(const std::string& name) { return find(name).declare(); }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// All tasks by name. A new task needs its two functions here and a line in task_list.cpp.
+// All tasks by name. A new task of the project needs its two functions here and a line in
+// task_list.cpp; a task of another program is added by add_task().
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,6 +21,15 @@ TaskSpec task_spec(const std::string& name);
 /// distributions replace what the file randomises. Throws InputError for an unknown name and for a
 /// scene that does not belong to the task.
 std::unique_ptr<Task> make_task(const std::string& name, const Scene& scene);
+
+/// A task of another program: what it declares, and how to make it on its scene.
+struct OwnTask {
+  std::function<TaskSpec()> declare;
+  std::function<std::unique_ptr<Task>(const Scene&)> make;
+};
+/// Makes a task known by its name to all functions here and to the command. Call it before any of
+/// them, in one thread. Throws InputError if there is a task of this name.
+void add_task(const OwnTask& task);
 
 TaskSpec declare_dummy();
 std::unique_ptr<Task> make_dummy(const Scene& scene);

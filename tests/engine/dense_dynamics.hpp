@@ -151,6 +151,12 @@ class DenseDynamics {
       const S m = density * 4 * std::acos(S(-1)) / 3 * a.prod();
       return {m, M3(V3(a2.y() + a2.z(), a2.x() + a2.z(), a2.x() + a2.y()).asDiagonal()) * (m / 5)};
     }
+    if (const auto* given = std::get_if<AbstractShape>(&body.shape)) {
+      const auto& [xx, xy, xz, yy, yz, zz] = given->inertia;
+      M3 inertia;
+      inertia << S(xx), S(xy), S(xz), S(xy), S(yy), S(yz), S(xz), S(yz), S(zz);
+      return {S(given->mass), inertia};
+    }
     const auto* box = std::get_if<CuboidShape>(&body.shape);
     if (box == nullptr) throw std::logic_error("dense dynamics: a shape without a formula here");
     const V3 s = vec(box->size), s2 = s.cwiseProduct(s);

@@ -9,6 +9,7 @@
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
 #include "io/files/csv.hpp"
+#include "io/robot/robot_import.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "io/scene/surface_files.hpp"
 #include "io/scene/tactile_layouts.hpp"
@@ -60,7 +61,35 @@ std::vector<std::string> scenes(const std::string& folder) {
     corpus.push_back(file_bytes(std::string(kScenes) + name + ".xml"));
   for (const char* name : {"rolling_ball_small", "box_pushing", "cap_opening", "stable_grasp"})
     corpus.push_back(file_bytes(std::string(TANGERE_SOURCE_DIR "/scenes/") + name + ".xml"));
+  // A scene of two files, of which the mutants change the first.
+  fs::copy(TANGERE_SOURCE_DIR "/scenes/sensors/fingertip.xml", fs::path(folder) / "tip.xml");
+  fs::copy(std::string(kScenes) + "included_ball.xml", fs::path(folder) / "included_ball.xml");
+  corpus.push_back(file_bytes(std::string(kScenes) + "including.xml"));
   return corpus;
+}
+
+constexpr const char* kRobots = TANGERE_TEST_DATA "/robots/";
+
+/// Robots become scenes, which are compiled. What is left out is no error here.
+void run_robot(const std::string& folder) {
+  static_cast<void>(import_robot(folder + "/mutant", folder + "/scene.xml"));
+}
+
+/// The robots of a format, with the meshes that they name beside them.
+auto robots(std::initializer_list<const char*> names) {
+  return [names = std::vector<std::string>(names.begin(), names.end())](const std::string& folder) {
+    fs::copy(std::string(kRobots) + "meshes", fs::path(folder) / "meshes",
+             fs::copy_options::recursive);
+    std::vector<std::string> corpus;
+    for (const std::string& name : names) {
+      std::string text = file_bytes(kRobots + name);
+      const std::string package = "package://robots/";
+      for (std::size_t at = 0; (at = text.find(package)) != std::string::npos;)
+        text.erase(at, package.size());
+      corpus.push_back(std::move(text));
+    }
+    return corpus;
+  };
 }
 
 std::vector<std::string> tables(const std::string&) {
@@ -91,6 +120,8 @@ std::vector<Target> text_targets() {
   const auto in = [](const std::string& folder) { return folder + "/mutant"; };
   return {
       {"scene", false, "mutant", scenes, [=](const auto& f) { run_scene(in(f)); }},
+      {"urdf", false, "mutant", robots({"hand.urdf", "gripper.urdf"}), run_robot},
+      {"mjcf", false, "mutant", robots({"machine.xml", "arm.xml"}), run_robot},
       {"table", false, "mutant", tables,
        [=](const auto& f) { static_cast<void>(read_csv(in(f), 3, names)); }},
       {"mesh", false, "mutant", meshes,

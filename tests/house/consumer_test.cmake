@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Installs the build into an empty folder, builds examples/consumer against it and nothing else of ours, and runs it.
+# Installs the build into an empty folder, builds examples/consumer and
+# examples/own_task against it and nothing else of ours, and runs them.
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
   if(NOT result EQUAL 0)
@@ -31,3 +32,18 @@ if(NOT output MATCHES "peak normal tactile force: [0-9.e+-]+ N")
   message(FATAL_ERROR "the consumer printed something else:\n${output}")
 endif()
 run(${prefix}/bin/tangere --help)
+
+# The command with a task of another program.
+run(${CMAKE_COMMAND} -S ${SOURCE}/examples/own_task -B ${WORK}/own_task -G ${GENERATOR}
+  -D CMAKE_PREFIX_PATH=${prefix} -D CMAKE_CXX_COMPILER=${CXX} -D CMAKE_BUILD_TYPE=${CONFIG})
+run(${CMAKE_COMMAND} --build ${WORK}/own_task --config ${CONFIG})
+set(own ${WORK}/own_task/own_task)
+run(${own} inspect press)
+run(${own} generate press -o ${WORK}/presses --episodes 16)
+run(${own} validate ${WORK}/presses)
+run(${own} simulate press -o ${WORK}/press.h5 --envs 2)
+run(${own} bench press --envs 16 --threads 1 --repeat 1)
+execute_process(COMMAND ${own} gradcheck press RESULT_VARIABLE result ERROR_VARIABLE output OUTPUT_QUIET)
+if(result EQUAL 0 OR NOT output MATCHES "task press has no derivative")
+  message(FATAL_ERROR "gradcheck of a task without derivatives ended with ${result}:\n${output}")
+endif()

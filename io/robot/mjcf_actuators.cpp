@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+// Actuators on hinges and slides. With the gear G the length of the transmission is G q, and the
+// force f of the actuator acts on the joint as G f:
+//   motor     f = c                        a force motor from G c_low to G c_high
+//   position  f = kp (c - G q) - kv G v    P = kp G², D = kv G², target c/G - ref
+//   velocity  f = kv (c - G v)             a force motor from G kv c_low on, and damping kv G²
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "io/robot/mjcf_file.hpp"
+#include "io/robot/mjcf_words.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::infinity();
+using Range = std::array<double, 2>;
+
+/// Force per control and per state: f = gain c - kp (G q) - kv (G v).
+struct Law {
+  double gain = 1, kp = 0, kv = 0;
+};
+
+class Actuators {
+ public:
+  explicit Actuators(MjcfFile& file) : file_(file), scene_(file.robot.scene) {}
+
+  void read(const RobotNode& node) {
+    node.check(mjcf_words(node.name()));
+    Law law;
+    if (!read_law(node, law)) return;
+    const std::string name = joint_of(node);
+    if (name.empty()) return;
+    const MjcfJoint& end = file_.joints.at(name);
+    LinkDescription& link = scene_.links[std::size_t(end.link)];
+    if (link.joint.type != JointType::revolute && link.joint.type != JointType::prismatic)
+      return node.lost("<" + node.name() + "> of a ball or a free joint");
+    if (std::any_of(scene_.motors.begin(), scene_.motors.end(),
+                    [&](const MotorDescription& m) { return m.joint == name; }))
+      return node.lost("<" + node.name() + ">: a second actuator of joint '" + name + "'");
+    const double gear = node.has("gear") ? node.numbers("gear").at(0) : 1;
+    if (node.has("gear") && gear == 0) node.fail("gear=\"0\"; expected another number");
+    MotorDescription motor;
+    motor.joint = name;
+    motor.source = node.source();
+    const Range control = range(node, "ctrlrange", "ctrllimited");
+    Range force = scaled(range(node, "forcerange", "forcelimited"), gear);
+    if (end.actuator_range)
+      force = {std::max(force[0], (*end.actuator_range)[0]),
+               std::min(force[1], (*end.actuator_range)[1])};
+    if (!(force[0] < force[1])) node.fail("its ranges leave no force");
+    if (law.kp > 0)
+      set_position(node, law, gear, end, control, force, motor);
+    else
+      set_force(node, law, gear, control, force, link.joint, motor);
+    scene_.motors.push_back(motor);
+  }
+
+ private:
+  static Range scaled(const Range& x, double by) {
+    return by > 0 ? Range{by * x[0], by * x[1]} : Range{by * x[1], by * x[0]};
+  }
+
+  [[nodiscard]] Range range(const RobotNode& node, const char* name, const char* limited) const {
+    const int word = node.choice(limited, {"auto", "true", "false"}, 0);
+    const bool on = word == 1 || (word == 0 && file_.auto_limits);
+    if (!node.has(name) || !on) return {-kNone, kNone};
+    const std::vector<double> x = node.numbers(name, 2);
+    if (!(x[0] < x[1]))
+      node.fail(fmt::format("{}=\"{} {}\": expected low, then high", name, x[0], x[1]));
+    return {x[0], x[1]};
+  }
+
+  /// The joint that the actuator drives; "" if it drives something else, which is listed.
+  std::string joint_of(const RobotNode& node) const {
+    for (const char* other : {"tendon", "site", "body", "cranksite", "slidersite", "refsite"})
+      if (node.has(other)) {
+        node.lost(fmt::format("<{}> on a {}: scenes drive joints", node.name(), other));
+        return "";
+      }
+    const char* const attribute = node.has("jointinparent") ? "jointinparent" : "joint";
+    const std::string name = node.text(attribute);
+    std::vector<std::string> names;
+    for (const auto& [known, joint] : file_.joints) names.push_back(known);
+    if (!file_.joints.contains(name))
+      node.fail(fmt::format("{}=\"{}\": no joint has this name{}", attribute, name,
+                            suggestion(name, names)));
+    return name;
+  }
+
+  static bool read_law(const RobotNode& node, Law& law) {
+    if (node.name() == "position") {
+      law.kp = law.gain = node.positive("kp", 1.0);
+      law.kv = node.not_negative("kv", 0.0);
+    } else if (node.name() == "velocity") {
+      law.kv = law.gain = node.not_negative("kv", 1.0);
+    } else if (node.name() == "general") {
+      return read_general(node, law);
+    }
+    return true;
+  }
+
+  static bool read_general(const RobotNode& node, Law& law) {
+    const auto is = [&](const char* attribute, const char* usual) {
+      return node.text(attribute, usual) == usual;
+    };
+    const std::string bias_type = node.text("biastype", "none");
+    if (!is("dyntype", "none") || !is("gaintype", "fixed") ||
+        (bias_type != "none" && bias_type != "affine")) {
+      node.lost("<general> with a state, or with a gain or bias that is no plain spring");
+      return false;
+    }
+    const std::vector<double> gain =
+        node.has("gainprm") ? node.numbers("gainprm") : std::vector<double>{1};
+    std::vector<double> bias =
+        node.has("biasprm") ? node.numbers("biasprm") : std::vector<double>{};
+    bias.resize(std::max<std::size_t>(bias.size(), 3));
+    if (bias_type == "none") bias = {0, 0, 0};
+    law.gain = gain.empty() ? 1 : gain[0];
+    law.kp = 0 - bias[1];
+    law.kv = 0 - bias[2];
+    const bool spring = law.kp == law.gain && law.kp > 0;
+    const bool damper = law.kp == 0;
+    if (bias[0] != 0 || law.kv < 0 || !(spring || damper)) {
+      node.lost("<general> whose bias is no spring to the control with damping");
+      return false;
+    }
+    return true;
+  }
+
+  void set_position(const RobotNode& node, const Law& law, double gear, const MjcfJoint& end,
+                    const Range& control, const Range& force, MotorDescription& motor) const {
+    motor.control = MotorControl::position;
+    motor.P = law.kp * gear * gear;
+    motor.D = law.kv * gear * gear;
+    motor.low = force[0];
+    motor.high = force[1];
+    if (control[0] > -kNone || control[1] < kNone)
+      node.changed("<" + node.name() + "> ctrlrange: targets of position motors are not clipped");
+    if (gear != 1)
+      node.changed(
+          fmt::format("<{}> gear: the target of '{}' is the joint's coordinate, the "
+                      "file's control over {}",
+                      node.name(), motor.joint, gear));
+    if (end.ref != 0)
+      node.changed(fmt::format("<{}>: the target of '{}' is less by its joint's ref", node.name(),
+                               motor.joint));
+  }
+
+  void set_force(const RobotNode& node, const Law& law, double gear, const Range& control,
+                 const Range& force, JointDescription& joint, MotorDescription& motor) const {
+    motor.control = MotorControl::force;
+    const bool bounded = control[0] > -kNone && control[1] < kNone;
+    const Range asked = scaled(bounded ? control : Range{-1, 1}, gear * law.gain);
+    motor.low = std::max(asked[0], force[0]);
+    motor.high = std::min(asked[1], force[1]);
+    if (!bounded && force[0] > -kNone && force[1] < kNone) {
+      motor.low = force[0];
+      motor.high = force[1];
+    } else if (!bounded) {
+      node.changed(
+          fmt::format("<{}> without ctrlrange: the control of '{}' is that of the file "
+                      "from -1 to 1",
+                      node.name(), motor.joint));
+    }
+    if (!(motor.low < motor.high)) node.fail("its ranges leave no force");
+    if (law.kv == 0) return;
+    joint.damping += law.kv * gear * gear;
+    node.changed(fmt::format("<{}>: a motor for the control, and damping of joint '{}'",
+                             node.name(), motor.joint));
+    if (force[0] > -kNone || force[1] < kNone)
+      node.lost("<" + node.name() + "> forcerange: the damping is not clipped");
+  }
+
+  MjcfFile& file_;
+  Scene& scene_;
+};
+
+}  // namespace
+
+void read_mjcf_actuators(MjcfFile& file, const RobotNode& section) {
+  Words known;
+  for (const std::string& name : kActuators) known.push_back({name.c_str()});
+  for (const char* other :
+       {"intvelocity", "damper", "cylinder", "muscle", "adhesion", "plugin", "dcmotor"})
+    known.push_back({other, Fate::lost, "an actuator that scenes do not have"});
+  Actuators actuators(file);
+  for (const RobotNode& part : section.parts(known)) actuators.read(file.with_class(part, "main"));
+}
+
+}  // namespace tangere

@@ -1,0 +1,458 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bodies, joints and geoms. A body of MJCF has any number of joints, which become a chain of links
+// of which the last has the body. A link's origin is at the anchor of its joint.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/model/shapes.hpp"
+#include "io/robot/mjcf_file.hpp"
+#include "io/robot/mjcf_words.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kDeepestBodies = 90;  // bodies in bodies; a scene's limit is 200 links
+
+const char* const kSite = "sites are not read";
+
+const Words kWorldParts = {{"body"},
+                           {"geom"},
+                           {"frame"},
+                           {"site", Fate::idle, kSite},
+                           {"camera", Fate::idle, kSight},
+                           {"light", Fate::idle, kSight},
+                           {"composite", Fate::lost, "bodies made by MuJoCo; write them out"},
+                           {"flexcomp", Fate::lost, "bodies that bend; scenes have none"},
+                           {"replicate", Fate::lost, "copies made by MuJoCo; write them out"},
+                           {"attach", Fate::lost, "a model inside a model"},
+                           {"plugin", Fate::lost, "plug-ins of MuJoCo"}};
+Words body_parts() {
+  Words words = kWorldParts;
+  for (const char* name : {"joint", "freejoint", "inertial"}) words.push_back({name});
+  return words;
+}
+
+/// A child of a body, with the frames around it and the class that they give it.
+struct Placed {
+  RobotNode node;
+  Pose frame;
+  std::string defaults;
+};
+
+class Bodies {
+ public:
+  explicit Bodies(MjcfFile& file) : file_(file), robot_(file.robot) {}
+
+  void read_world(const RobotNode& world) {
+    world.check({{"name", Fate::idle, kSight}});
+    std::vector<Placed> parts;
+    gather(world, {}, "main", kWorldParts, parts, 0);
+    std::vector<RobotPiece> fixed;
+    for (const Placed& part : parts)
+      if (part.node.name() == "geom") read_world_geom(part, fixed);
+    if (!fixed.empty()) {
+      JointDescription joint;
+      joint.name = file_.names.free_name("world");
+      joint.source = world.source();
+      for (RobotPiece& piece : fixed) piece.density = 0;
+      add_link(robot_, file_.names, joint.name, -1, joint, fixed, "<worldbody>", world.source());
+    }
+    for (const Placed& part : parts)
+      if (part.node.name() == "body") read_body(part, -1, {}, 0);
+  }
+
+  /// Keeps all names that the file gives, so that made-up ones differ from them.
+  void keep_names(const tinyxml2::XMLElement& element, int depth) {
+    if (depth > 2 * kDeepestBodies) return;  // such a file is refused later
+    if (const char* name = element.Attribute("name")) file_.names.keep(name);
+    for (const auto* e = element.FirstChildElement(); e != nullptr; e = e->NextSiblingElement())
+      keep_names(*e, depth + 1);
+  }
+
+ private:
+  void gather(const RobotNode& node, const Pose& frame, const std::string& defaults,
+              const Words& known, std::vector<Placed>& out, int depth) {
+    if (depth > kDeepestBodies)
+      node.fail(fmt::format("frames nested deeper than {}", kDeepestBodies));
+    for (const RobotNode& part : node.parts(known)) {
+      if (part.name() != "frame") {
+        out.push_back({part, frame, defaults});
+        continue;
+      }
+      part.check(with_rotations({{"name", Fate::read}, {"childclass"}}));
+      gather(part, compose(frame, file_.read_pose(part)),
+             part.has("childclass") ? file_.known_class(part, "childclass") : defaults, known, out,
+             depth + 1);
+    }
+  }
+
+  void read_world_geom(const Placed& part, std::vector<RobotPiece>& out) {
+    const RobotNode geom = file_.with_class(part.node, part.defaults);
+    const std::optional<RobotPiece> piece = read_geom(geom, part.frame, false);
+    if (!piece) return;
+    Scene& scene = robot_.scene;
+    if (!std::holds_alternative<PlaneShape>(piece->shape) || scene.ground) {
+      out.push_back(*piece);
+      return;
+    }
+    scene.ground = GroundDescription{piece->pose.position, outer_direction(piece->pose, {0, 0, 1})};
+    geom.changed("<geom> type=\"plane\" of the world: it is the scene's <ground>");
+  }
+
+  void read_body(const Placed& placed, int parent, const Pose& parent_offset, int depth) {
+    const RobotNode& node = placed.node;
+    if (depth > kDeepestBodies)
+      node.fail(fmt::format("bodies nested deeper than {}", kDeepestBodies));
+    node.check(with_rotations({{"name"},
+                               {"childclass"},
+                               {"mocap"},
+                               {"gravcomp", Fate::zero, "takes away a body's weight"},
+                               {"sleep", Fate::idle, "a setting of MuJoCo's solver"},
+                               {"user", Fate::idle, "numbers for other programs"}}));
+    if (node.flag("mocap", false)) node.lost("<body> mocap: moved by another program");
+    const std::string defaults =
+        node.has("childclass") ? file_.known_class(node, "childclass") : placed.defaults;
+    const std::string name = node.has("name") ? unique_body(node) : file_.names.free_name("body");
+    const Pose place = compose(parent_offset, compose(placed.frame, file_.read_pose(node)));
+    static const Words known = body_parts();
+    std::vector<Placed> parts;
+    gather(node, {}, defaults, known, parts, 0);
+    Pose offset;  // of the body's frame in that of its link
+    const int index = add_chain(node, name, parent, place, parts, offset);
+    for (const Placed& part : parts)
+      if (part.node.name() == "body") read_body(part, index, offset, depth + 1);
+  }
+
+  std::string unique_body(const RobotNode& node) {
+    std::string name = node.text("name");
+    const auto [first, is_new] = bodies_.try_emplace(name, node.source().line);
+    if (!is_new)
+      node.fail(fmt::format("body name '{}' is used twice, first in line {}", name, first->second));
+    return name;
+  }
+
+  /// Adds the links of a body: one for each joint, or one that does not move.
+  int add_chain(const RobotNode& node, const std::string& name, int parent, const Pose& place,
+                const std::vector<Placed>& parts, Pose& offset) {
+    std::vector<JointDescription> chain;
+    std::vector<MjcfJoint> ends;
+    Vector3 anchor = {0, 0, 0};
+    for (const Placed& part : parts) {
+      const bool free_joint = part.node.name() == "freejoint";
+      if (part.node.name() != "joint" && !free_joint) continue;
+      const RobotNode joint_node = file_.with_class(part.node, part.defaults);
+      MjcfJoint end;
+      Vector3 at{};
+      JointDescription joint = free_joint ? read_free_joint(part.node, name)
+                                          : read_joint(joint_node, part.frame, name, at, end);
+      if (joint.type == JointType::free && (parent >= 0 || !chain.empty()))
+        part.node.fail(
+            "a free joint inside another body, or beside another joint; expected it "
+            "alone in a body of the world");
+      if (!chain.empty() && chain.front().type == JointType::free)
+        part.node.fail("a joint beside a free joint; expected it alone");
+      if (joint.type == JointType::free) at = {0, 0, 0};
+      const Pose step{{at[0] - anchor[0], at[1] - anchor[1], at[2] - anchor[2]}, {1, 0, 0, 0}};
+      joint.pose = chain.empty() ? compose(place, step) : step;
+      anchor = at;
+      chain.push_back(std::move(joint));
+      ends.push_back(end);
+    }
+    offset.position = {0 - anchor[0], 0 - anchor[1], 0 - anchor[2]};
+    if (chain.empty()) {
+      JointDescription fixed;
+      fixed.name = file_.names.free_name(name + "_fixed");
+      fixed.pose = place;
+      fixed.source = node.source();
+      chain.push_back(fixed);
+      ends.push_back({-2, 0, {}});
+    }
+    const std::vector<RobotPiece> pieces = read_pieces(node, parts, offset);
+    for (std::size_t k = 0; k + 1 < chain.size(); ++k) {
+      const std::string link = file_.names.free_name(name + "_" + chain[k].name);
+      parent = add_link(robot_, file_.names, link, parent, chain[k], {},
+                        "a joint of body '" + name + "'", chain[k].source);
+      keep_joint(chain[k].name, ends[k], parent);
+    }
+    const int index =
+        add_link(robot_, file_.names, name, parent, chain.back(), pieces, "<body>", node.source());
+    keep_joint(chain.back().name, ends.back(), index);
+    return index;
+  }
+
+  void keep_joint(const std::string& name, MjcfJoint joint, int link) {
+    if (joint.link == -2) return;  // the fixed joint of a body without joints
+    joint.link = link;
+    file_.joints[name] = joint;
+  }
+
+  std::string joint_name(const RobotNode& node, const std::string& body) {
+    if (!node.given("name")) return file_.names.free_name(body + "_joint");
+    std::string name = node.text("name");
+    const auto [first, is_new] = joints_.try_emplace(name, node.source().line);
+    if (!is_new)
+      node.fail(
+          fmt::format("joint name '{}' is used twice, first in line {}", name, first->second));
+    return name;
+  }
+
+  JointDescription read_free_joint(const RobotNode& node, const std::string& body) {
+    node.check({{"name"},
+                {"group", Fate::idle, kSight},
+                {"align", Fate::idle, "the body keeps the frame that the file gives"}});
+    JointDescription joint;
+    joint.type = JointType::free;
+    joint.name = joint_name(node, body);
+    joint.source = node.source();
+    return joint;
+  }
+
+  JointDescription read_joint(const RobotNode& node, const Pose& frame, const std::string& body,
+                              Vector3& anchor, MjcfJoint& end) {
+    node.check(mjcf_words("joint"));
+    JointDescription joint;
+    constexpr JointType kMjcfJointTypes[] = {JointType::revolute, JointType::prismatic,
+                                             JointType::spherical, JointType::free};
+    joint.type = kMjcfJointTypes[node.choice("type", {"hinge", "slide", "ball", "free"}, 0)];
+    joint.name = joint_name(node, body);
+    joint.source = node.source();
+    const bool turns = joint.type == JointType::revolute;
+    const bool single = turns || joint.type == JointType::prismatic;
+    const auto measure = [&](double x) { return turns ? file_.angle(x) : x; };
+    anchor = outer_point(frame, node.vector("pos", Vector3{0, 0, 0}));
+    if (single) joint.axis0 = outer_direction(frame, node.direction("axis", Vector3{0, 0, 1}));
+    joint.damping = node.not_negative("damping", 0.0);
+    joint.armature = node.not_negative("armature", 0.0);
+    joint.stiffness = node.not_negative("stiffness", 0.0);
+    if (single) {
+      end.ref = measure(node.number("ref", 0.0));
+      const double rest = measure(node.number("springref", 0.0)) - end.ref;
+      if (joint.stiffness != 0 && rest != 0) joint.rest = {rest};
+      if (end.ref != 0)
+        node.changed(fmt::format("<joint> ref: the coordinate of '{}' is that of the file minus {}",
+                                 joint.name, end.ref));
+    }
+    if (joint.type == JointType::free && joint.stiffness != 0) {
+      node.lost("<joint> stiffness: a spring of a free joint to its place in the world");
+      joint.stiffness = 0;
+    }
+    read_range(node, single, measure, end.ref, joint);
+    if (node.has("actuatorfrcrange") && limited(node, "actuatorfrclimited")) {
+      const std::vector<double> x = node.numbers("actuatorfrcrange", 2);
+      if (!(x[0] < x[1])) node.fail("actuatorfrcrange: expected low, then high");
+      end.actuator_range = {x[0], x[1]};
+    }
+    return joint;
+  }
+
+  [[nodiscard]] bool limited(const RobotNode& node, const char* attribute) const {
+    const int word = node.choice(attribute, {"auto", "true", "false"}, 0);
+    return word == 1 || (word == 0 && file_.auto_limits);
+  }
+
+  template <class Measure>
+  void read_range(const RobotNode& node, bool single, Measure&& measure, double ref,
+                  JointDescription& joint) const {
+    const bool on = limited(node, "limited");
+    if (!node.has("range")) {
+      if (node.has("limited") && on && node.text("limited") == "true")
+        node.fail("limited=\"true\" without a range; expected range=\"low high\"");
+      return;
+    }
+    const std::vector<double> x = node.numbers("range", 2);
+    if (!on) return node.idle("<joint> range of a joint that is not limited");
+    if (joint.type == JointType::spherical)
+      return node.lost("<joint> range of a ball joint: the angle of a cone");
+    if (!single) return node.idle("<joint> range of a free joint");
+    if (!(x[0] < x[1]))
+      node.fail(fmt::format("range=\"{} {}\": expected low, then high", x[0], x[1]));
+    joint.limits = {measure(x[0]) - ref, measure(x[1]) - ref};
+  }
+
+  /// The geoms of a body and its mass, in the frame of its link.
+  std::vector<RobotPiece> read_pieces(const RobotNode& node, const std::vector<Placed>& parts,
+                                      const Pose& offset) {
+    std::optional<RobotPiece> inertial;
+    for (const Placed& part : parts) {
+      if (part.node.name() != "inertial") continue;
+      if (inertial) part.node.fail("given twice; expected once");
+      inertial = read_inertial(part.node);
+      inertial->pose = compose(offset, compose(part.frame, inertial->pose));
+    }
+    if (inertial && file_.inertia_from == InertiaFrom::geoms) {
+      node.changed("<inertial>: left out, because inertiafromgeom=\"true\"");
+      inertial.reset();
+    }
+    const bool massive = !inertial && file_.inertia_from != InertiaFrom::inertials;
+    std::vector<RobotPiece> pieces;
+    for (const Placed& part : parts) {
+      if (part.node.name() != "geom") continue;
+      const RobotNode geom = file_.with_class(part.node, part.defaults);
+      if (auto piece = read_geom(geom, part.frame, massive)) {
+        piece->pose = compose(offset, piece->pose);
+        pieces.push_back(std::move(*piece));
+      }
+    }
+    if (inertial && std::get<AbstractShape>(inertial->shape).mass > 0) pieces.push_back(*inertial);
+    return pieces;
+  }
+
+  RobotPiece read_inertial(const RobotNode& node) {
+    node.check(with_rotations({{"mass"}, {"diaginertia"}, {"fullinertia"}}));
+    const double mass = node.not_negative("mass");
+    if (node.has("fullinertia") == node.has("diaginertia"))
+      node.fail("expected one of diaginertia and fullinertia");
+    std::array<double, 6> inertia{};
+    if (node.has("diaginertia")) {
+      const Vector3 x = node.vector("diaginertia");
+      inertia = {x[0], 0, 0, x[1], 0, x[2]};
+    } else {
+      const std::vector<double> x = node.numbers("fullinertia", 6);  // xx yy zz xy xz yz
+      inertia = {x[0], x[3], x[4], x[1], x[5], x[2]};
+    }
+    return inertial_piece(mass, inertia, file_.read_pose(node), "<inertial>", node.source());
+  }
+
+  /// Reads a geom; none if it is for pictures only. `massive`: it may have a mass of its own.
+  std::optional<RobotPiece> read_geom(const RobotNode& node, const Pose& frame, bool massive) {
+    node.check(mjcf_words("geom"));
+    static_cast<void>(node.parts({{"plugin", Fate::lost, "plug-ins of MuJoCo"}}));
+    RobotPiece piece;
+    piece.origin = "<geom>" + (node.given("name") ? " '" + node.text("name") + "'" : std::string());
+    piece.source = node.source();
+    const int group = node.integer("group", 0, 1000, 0);
+    const bool counts =
+        massive && group >= file_.inertia_groups[0] && group <= file_.inertia_groups[1];
+    const bool touches = node.integer("contype", std::numeric_limits<int>::min(),
+                                      std::numeric_limits<int>::max(), 1) != 0 ||
+                         node.integer("conaffinity", std::numeric_limits<int>::min(),
+                                      std::numeric_limits<int>::max(), 1) != 0;
+    const double density = node.not_negative("density", 1000.0);
+    const double mass = node.not_negative("mass", 0.0);
+    const bool heavy = counts && (node.has("mass") ? mass > 0 : density > 0);
+    if (!touches && !heavy) {
+      node.idle("<geom> that touches nothing: " + std::string(kSight));
+      return std::nullopt;
+    }
+    if (!read_shape(node, piece)) return std::nullopt;
+    piece.pose = compose(frame, piece.pose);
+    const bool plane = std::holds_alternative<PlaneShape>(piece.shape);
+    if (heavy && !plane) {
+      if (node.flag("shellinertia", false))
+        node.lost("<geom> shellinertia: the mass of a thin shell; it is that of a solid here");
+      piece.density = node.has("mass") ? mass / volume_of(piece.shape) : density;
+      if (!std::isfinite(piece.density))
+        node.fail(fmt::format("mass=\"{}\" of a geom without volume", mass));
+    }
+    read_colour(node, piece);
+    return piece;
+  }
+
+  void read_colour(const RobotNode& node, RobotPiece& piece) const {
+    if (node.has("material")) {
+      const auto material = file_.materials.find(node.text("material"));
+      if (material != file_.materials.end()) piece.rgba = material->second;
+    }
+    if (!node.has("rgba")) return;
+    const std::vector<double> x = node.numbers("rgba", 4);
+    piece.rgba = {x[0], x[1], x[2], x[3]};
+  }
+
+  /// Half sizes of a geom: `count` numbers, all positive.
+  [[nodiscard]] std::vector<double> sizes(const RobotNode& node, std::size_t count) const {
+    std::vector<double> x = node.numbers("size");
+    if (x.size() < count)
+      node.fail(fmt::format("size has {} numbers; expected {}", x.size(), count));
+    for (std::size_t k = 0; k < count; ++k)
+      if (!(x[k] > 0)) node.fail(fmt::format("size has {}; expected positive lengths", x[k]));
+    return x;
+  }
+
+  /// Reads type, size and place. Returns false for a shape that scenes do not have.
+  bool read_shape(const RobotNode& node, RobotPiece& piece) {
+    static const std::vector<std::string> types = {
+        "sphere", "capsule", "cylinder", "box", "ellipsoid", "plane", "mesh", "hfield", "sdf"};
+    const std::string type = types[std::size_t(
+        node.choice("type", types, node.has("mesh") && !node.has("type") ? 6 : 0))];
+    if (type == "hfield" || type == "sdf") {
+      node.lost("<geom> type=\"" + type + "\"");
+      return false;
+    }
+    piece.pose = file_.read_pose(node);
+    const bool stretched = node.has("fromto") && (type == "capsule" || type == "cylinder" ||
+                                                  type == "box" || type == "ellipsoid");
+    double half = 0;  // of the length along z, where two ends give it
+    if (stretched) {
+      const std::vector<double> x = node.numbers("fromto", 6);
+      const Vector3 back = {x[0] - x[3], x[1] - x[4], x[2] - x[5]};
+      half = 0.5 * std::sqrt(dot(back, back));
+      if (!(half > 0) || !std::isfinite(half))
+        node.fail("fromto has two equal ends; expected a length");
+      piece.pose = {{0.5 * (x[0] + x[3]), 0.5 * (x[1] + x[4]), 0.5 * (x[2] + x[5])}, from_z(back)};
+    }
+    if (type == "mesh") return read_mesh(node, piece);
+    if (node.has("mesh")) {
+      node.lost("<geom> mesh: a primitive fitted to a mesh");
+      return false;
+    }
+    if (type == "plane") {
+      piece.shape = PlaneShape{};
+    } else if (type == "sphere") {
+      piece.shape = SphereShape{sizes(node, 1)[0]};
+    } else if (type == "capsule" || type == "cylinder") {
+      const std::vector<double> x = sizes(node, stretched ? 1 : 2);
+      if (!stretched) half = x[1];
+      if (type == "capsule")
+        piece.shape = CapsuleShape{2 * half, x[0]};
+      else
+        piece.shape = CylinderShape{2 * half, x[0]};
+    } else {
+      const std::vector<double> x = sizes(node, stretched ? 1 : 3);
+      const Vector3 full =
+          stretched ? Vector3{2 * x[0], 2 * x[0], 2 * half} : Vector3{2 * x[0], 2 * x[1], 2 * x[2]};
+      if (stretched && x.size() > 1 && x[1] != x[0])
+        node.changed("<geom> size with fromto: the first number counts for x and y, as in MuJoCo");
+      if (type == "box") {
+        CuboidShape box;
+        box.size = full;
+        piece.shape = box;
+      } else {
+        piece.shape = EllipsoidShape{full};
+        if (const std::string fault = slenderness_fault(piece.shape); !fault.empty())
+          node.fail(fault);
+      }
+    }
+    return true;
+  }
+
+  bool read_mesh(const RobotNode& node, RobotPiece& piece) {
+    const std::string name = node.text("mesh");
+    const auto mesh = file_.meshes.find(name);
+    if (mesh == file_.meshes.end()) {
+      std::vector<std::string> names;
+      for (const auto& [known, m] : file_.meshes) names.push_back(known);
+      node.fail(fmt::format("mesh=\"{}\": no mesh has this name{}", name, suggestion(name, names)));
+    }
+    piece.shape = mesh->second.shape;
+    piece.mesh = mesh->second.file;
+    if (mesh->second.shell) node.lost("<mesh> inertia=\"shell\": the mass is that of a solid here");
+    return true;
+  }
+
+  MjcfFile& file_;
+  Robot& robot_;
+  std::map<std::string, int> bodies_, joints_;  // name, line
+};
+
+}  // namespace
+
+void read_mjcf_bodies(MjcfFile& file, const RobotNode& world) {
+  Bodies bodies(file);
+  bodies.keep_names(world.element(), 0);
+  bodies.read_world(world);
+}
+
+}  // namespace tangere

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the parts of a MJCF file share while it is read: settings of <compiler>, default classes,
+// assets, and the joints that actuators refer to.
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "io/robot/mesh_files.hpp"
+#include "io/robot/robot_node.hpp"
+#include "io/robot/rotations.hpp"
+
+namespace tangere {
+
+struct MjcfMesh {
+  MeshFile file;
+  MeshShape shape;
+  bool shell = false;  ///< inertia="shell"
+  int line = 0;
+};
+
+/// A joint of the file, for actuators: those of hinges and slides can be driven.
+struct MjcfJoint {
+  int link = -1;   ///< of the scene
+  double ref = 0;  ///< the file's coordinate where ours is zero [m or rad]
+  std::optional<std::array<double, 2>> actuator_range;  ///< [N or N m]
+};
+
+enum class InertiaFrom { automatic, geoms, inertials };
+
+/// In defaults all actuators share the attributes of <general>.
+inline const std::vector<std::string> kActuators = {"general", "motor", "position", "velocity"};
+
+class MjcfFile {
+ public:
+  explicit MjcfFile(const RobotNode& root) : robot(root.robot()), root_(root) {}
+
+  Robot& robot;
+  bool degrees = true;
+  std::string euler_sequence = "xyz";
+  std::string mesh_folder;
+  bool strip_path = false;
+  bool auto_limits = true;
+  InertiaFrom inertia_from = InertiaFrom::automatic;
+  std::array<int, 2> inertia_groups{0, 5};
+  std::map<std::string, MjcfMesh> meshes;
+  std::map<std::string, std::array<double, 4>> materials;
+  std::map<std::string, MjcfJoint> joints;
+  RobotNames names;
+
+  [[nodiscard]] double angle(double x) const {
+    return degrees ? x * 3.14159265358979323846 / 180 : x;
+  }
+
+  /// Reads <default>, whose classes inherit from those around them.
+  void read_defaults(const RobotNode& node, const std::string& parent);
+  /// The node with the defaults of its own class, or of `inherited` if it names none.
+  [[nodiscard]] RobotNode with_class(const RobotNode& node, const std::string& inherited);
+  [[nodiscard]] std::string known_class(const RobotNode& node, const char* attribute);
+  /// Warnings of all classes, moved out.
+  std::vector<std::string> take_warnings();
+
+  /// Reads pos and one of quat, axisangle, euler, xyaxes, zaxis.
+  [[nodiscard]] Pose read_pose(const RobotNode& node) const;
+
+ private:
+  [[nodiscard]] Quaternion read_orientation(const RobotNode& node) const;
+
+  const RobotNode& root_;
+  std::map<std::string, SceneContext> classes_;
+};
+
+/// Reads <worldbody> and all bodies in it.
+void read_mjcf_bodies(MjcfFile& file, const RobotNode& world);
+/// Reads an <actuator> section.
+void read_mjcf_actuators(MjcfFile& file, const RobotNode& section);
+
+}  // namespace tangere

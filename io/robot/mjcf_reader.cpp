@@ -1,0 +1,353 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sections of a MJCF file, in the order in which they depend on each other.
+#include "io/robot/mjcf_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+
+#include "io/robot/mjcf_file.hpp"
+#include "io/robot/mjcf_words.hpp"
+
+namespace tangere {
+namespace {
+
+const char* const kState = "stored states; <initial> gives a scene its own";
+
+const Words kSections = {
+    {"compiler"},
+    {"option"},
+    {"default"},
+    {"asset"},
+    {"worldbody"},
+    {"actuator"},
+    {"contact"},
+    {"size", Fate::idle, "sizes of MuJoCo's memory"},
+    {"visual", Fate::idle, kSight},
+    {"statistic", Fate::idle, kSight},
+    {"custom", Fate::idle, "numbers for other programs"},
+    {"sensor", Fate::idle, "readings of MuJoCo; --pad LINK=LAYOUT adds a skin"},
+    {"keyframe", Fate::idle, kState},
+    {"equality", Fate::lost, "constraints between bodies or joints; scenes have none"},
+    {"tendon", Fate::lost, "tendons; scenes have none"},
+    {"deformable", Fate::lost, "bodies that bend; scenes have none"},
+    {"extension", Fate::lost, "plug-ins of MuJoCo"}};
+
+const Words kCompiler = {{"angle"},
+                         {"meshdir"},
+                         {"assetdir"},
+                         {"autolimits"},
+                         {"eulerseq"},
+                         {"inertiafromgeom"},
+                         {"inertiagrouprange"},
+                         {"strippath"},
+                         {"coordinate"},
+                         {"balanceinertia"},
+                         {"boundmass", Fate::zero, "raises masses"},
+                         {"boundinertia", Fate::zero, "raises inertias"},
+                         {"settotalmass"},
+                         {"alignfree"},
+                         {"texturedir", Fate::idle, kSight},
+                         {"discardvisual", Fate::idle, "shapes without mass are left out anyway"},
+                         {"fusestatic", Fate::idle, "bodies without joints cost nothing here"},
+                         {"convexhull", Fate::idle, "meshes are not replaced by hulls"},
+                         {"exactmeshinertia", Fate::idle, "masses of meshes are volume integrals"},
+                         {"fitaabb", Fate::idle, "no primitive is fitted to a mesh"},
+                         {"usethread", Fate::idle, kSolver},
+                         {"saveinertial", Fate::idle, kSolver},
+                         {"conflict", Fate::idle, kSolver}};
+
+Words solver_words() {
+  Words words = {{"timestep"},
+                 {"gravity"},
+                 {"integrator"},
+                 {"density", Fate::zero, "the air's or the water's"},
+                 {"viscosity", Fate::zero, "the air's or the water's"},
+                 {"wind", Fate::zero, "moves the air"},
+                 {"magnetic", Fate::idle, "for a sensor of MuJoCo"}};
+  for (const char* name : {"impratio",
+                           "tolerance",
+                           "ls_tolerance",
+                           "noslip_tolerance",
+                           "ccd_tolerance",
+                           "o_margin",
+                           "o_solref",
+                           "o_solimp",
+                           "o_friction",
+                           "cone",
+                           "jacobian",
+                           "solver",
+                           "iterations",
+                           "ls_iterations",
+                           "noslip_iterations",
+                           "ccd_iterations",
+                           "sdf_iterations",
+                           "sdf_initpoints",
+                           "actuatorgroupdisable",
+                           "apirate",
+                           "sleep_tolerance",
+                           "mpr_tolerance",
+                           "mpr_iterations"})
+    words.push_back({name, Fate::idle, kSolver});
+  return words;
+}
+
+void read_compiler(MjcfFile& file, const RobotNode& node) {
+  node.check(kCompiler);
+  static_cast<void>(node.parts({{"lengthrange", Fate::idle, kSolver}}));
+  if (node.has("angle")) file.degrees = node.choice("angle", {"degree", "radian"}) == 0;
+  if (node.has("assetdir")) file.mesh_folder = node.text("assetdir");
+  if (node.has("meshdir")) file.mesh_folder = node.text("meshdir");
+  file.strip_path = node.flag("strippath", file.strip_path);
+  file.auto_limits = node.flag("autolimits", file.auto_limits);
+  if (node.has("coordinate")) static_cast<void>(node.choice("coordinate", {"local"}));
+  if (node.flag("balanceinertia", false))
+    node.lost("<compiler> balanceinertia: changes inertias that no body has");
+  if (node.has("settotalmass") && node.number("settotalmass") > 0)
+    node.lost("<compiler> settotalmass: scales all masses");
+  if (node.flag("alignfree", false))
+    node.changed("<compiler> alignfree: free bodies keep the frame that the file gives");
+  if (node.has("eulerseq")) {
+    file.euler_sequence = node.text("eulerseq");
+    const bool axes = file.euler_sequence.size() == 3 &&
+                      file.euler_sequence.find_first_not_of("xyzXYZ") == std::string::npos;
+    if (!axes)
+      node.fail("eulerseq=\"" + file.euler_sequence + "\"; expected three of x, y, z, X, Y, Z");
+  }
+  if (node.has("inertiafromgeom")) {
+    constexpr InertiaFrom kFrom[] = {InertiaFrom::automatic, InertiaFrom::geoms,
+                                     InertiaFrom::inertials};
+    file.inertia_from = kFrom[node.choice("inertiafromgeom", {"auto", "true", "false"})];
+  }
+  if (node.has("inertiagrouprange")) {
+    const std::vector<int> x = node.integers("inertiagrouprange", {0, 5}, 0, 5);
+    file.inertia_groups = {x[0], x[1]};
+  }
+}
+
+void read_option(MjcfFile& file, const RobotNode& node) {
+  static const Words words = solver_words();
+  node.check(words);
+  Scene& scene = file.robot.scene;
+  scene.timestep = node.positive("timestep", scene.timestep);
+  scene.gravity = node.vector("gravity", scene.gravity);
+  if (node.given("integrator"))
+    node.changed("<option> integrator: the scene steps by BDF2, with an implicit solver");
+  for (const RobotNode& flag : node.parts({{"flag"}}))
+    for (const tinyxml2::XMLAttribute* a = flag.element().FirstAttribute(); a != nullptr;
+         a = a->Next()) {
+      const std::string name = a->Name();
+      static const std::vector<std::string> forces = {
+          "gravity", "spring",     "damper",   "passive",   "actuation",   "limit",
+          "contact", "constraint", "equality", "clampctrl", "frictionloss"};
+      const bool matters = std::find(forces.begin(), forces.end(), name) != forces.end();
+      const std::string text = "<flag> " + name + ": " + (matters ? "switches forces" : kSolver);
+      if (matters && std::string(a->Value()) != "enable")
+        flag.lost(text);
+      else
+        flag.idle(text);
+    }
+}
+
+void read_mesh(MjcfFile& file, const RobotNode& node) {
+  node.check(mjcf_words("mesh"));
+  if (!node.has("file") || node.has("vertex") || node.has("builtin"))
+    node.fail("a mesh without a file; expected file=\"….obj\", .stl or .ply");
+  if (node.has("refquat") && node.numbers("refquat", 4) != std::vector<double>{1, 0, 0, 0})
+    node.lost("<mesh> refquat: turns the mesh");
+  std::string given = node.text("file");
+  if (file.strip_path) given = std::filesystem::path(given).filename().string();
+  const std::string name = node.text("name", std::filesystem::path(given).stem().string());
+  MjcfMesh mesh;
+  mesh.line = node.source().line;
+  if (const auto first = file.meshes.find(name); first != file.meshes.end())
+    node.fail(
+        fmt::format("mesh name '{}' is used twice, first in line {}", name, first->second.line));
+  mesh.file = {find_mesh(node, given, file.mesh_folder), node.vector("scale", Vector3{1, 1, 1})};
+  mesh.shell = node.has("inertia") && node.text("inertia") == "shell";
+  if (node.has("inertia"))
+    static_cast<void>(node.choice("inertia", {"exact", "legacy", "convex", "shell"}));
+  if (node.has("inertia") && node.text("inertia") == "convex")
+    node.changed("<mesh> inertia: the mass is that of the mesh, not of its hull");
+  mesh.shape = read_robot_mesh(node, mesh.file);
+  file.meshes.emplace(name, std::move(mesh));
+}
+
+void read_asset(MjcfFile& file, const RobotNode& section) {
+  const Words known = {{"mesh"},
+                       {"material"},
+                       {"texture", Fate::idle, kSight},
+                       {"skin", Fate::idle, kSight},
+                       {"hfield", Fate::lost, "height fields; scenes have none"},
+                       {"model", Fate::lost, "models inside a model"}};
+  for (const RobotNode& part : section.parts(known)) {
+    const RobotNode node = file.with_class(part, "main");
+    if (node.name() == "mesh") {
+      read_mesh(file, node);
+      continue;
+    }
+    node.check(mjcf_words("material"));
+    static_cast<void>(node.parts({{"layer", Fate::idle, kSight}}));
+    if (!node.has("rgba")) continue;
+    const std::vector<double> x = node.numbers("rgba", 4);
+    file.materials[node.text("name")] = {x[0], x[1], x[2], x[3]};
+  }
+}
+
+}  // namespace
+
+void MjcfFile::read_defaults(const RobotNode& node, const std::string& parent) {
+  node.check({{"class"}});
+  const bool top = parent.empty();
+  if (!top && !node.given("class")) node.fail("a default inside a default has no class");
+  const std::string name = node.text("class", "main");
+  if (!top && classes_.contains(name)) node.fail("class '" + name + "' is given twice");
+  SceneContext& context = classes_[name];
+  if (!top) context = classes_.at(parent);
+  context.warnings.clear();
+  context.file = node.context().file;
+  context.allow_unknown = node.context().allow_unknown;
+  if (top && name != "main") classes_["main"] = context;
+  Words known = {{"default"},
+                 {"geom"},
+                 {"joint"},
+                 {"mesh"},
+                 {"material"},
+                 {"site", Fate::idle, "sites are not read"},
+                 {"camera", Fate::idle, kSight},
+                 {"light", Fate::idle, kSight},
+                 {"pair", Fate::idle, "of pairs of geoms, which --contact names"},
+                 {"equality", Fate::idle, "of constraints"},
+                 {"tendon", Fate::idle, "of tendons"}};
+  for (const char* other :
+       {"intvelocity", "damper", "cylinder", "muscle", "adhesion", "plugin", "dcmotor"})
+    known.push_back({other, Fate::idle, "of actuators that are not read"});
+  for (const std::string& actuator : kActuators) known.push_back({actuator.c_str()});
+  for (const RobotNode& part : node.parts(known)) {
+    if (part.name() == "default") {
+      read_defaults(part, name);
+      continue;
+    }
+    part.check(mjcf_words(part.name()));
+    const bool drives =
+        std::find(kActuators.begin(), kActuators.end(), part.name()) != kActuators.end();
+    static const std::vector<std::string> gains = {"kp",     "kv",      "gainprm",  "biasprm",
+                                                   "dynprm", "dyntype", "gaintype", "biastype"};
+    for (const tinyxml2::XMLAttribute* a = part.element().FirstAttribute(); a != nullptr;
+         a = a->Next()) {
+      const SceneContext::Default value{a->Value(), part.source().line};
+      const bool gain = std::find(gains.begin(), gains.end(), a->Name()) != gains.end();
+      if (drives && !gain)
+        for (const std::string& actuator : kActuators)
+          context.defaults[actuator][a->Name()] = value;
+      else
+        context.defaults[part.name()][a->Name()] = value;
+    }
+  }
+  if (top && name != "main") classes_["main"] = context;
+}
+
+RobotNode MjcfFile::with_class(const RobotNode& node, const std::string& inherited) {
+  std::string name = inherited.empty() ? "main" : inherited;
+  if (node.given("class")) name = known_class(node, "class");
+  SceneContext& context = classes_[name];
+  if (context.file.empty()) {
+    context.file = root_.context().file;
+    context.allow_unknown = root_.context().allow_unknown;
+  }
+  return node.in(context);
+}
+
+std::string MjcfFile::known_class(const RobotNode& node, const char* attribute) {
+  const std::string name = node.text(attribute);
+  if (name == "main" || classes_.contains(name)) return name;
+  std::vector<std::string> all;
+  for (const auto& [known, context] : classes_) all.push_back(known);
+  node.fail(fmt::format("{}=\"{}\": no default has this class{}", attribute, name,
+                        suggestion(name, all)));
+}
+
+std::vector<std::string> MjcfFile::take_warnings() {
+  std::vector<std::string> all;
+  for (auto& [name, context] : classes_) {
+    all.insert(all.end(), context.warnings.begin(), context.warnings.end());
+    context.warnings.clear();
+  }
+  return all;
+}
+
+Quaternion MjcfFile::read_orientation(const RobotNode& node) const {
+  const char* chosen = nullptr;
+  for (const bool own : {true, false})
+    for (const char* name : {"quat", "axisangle", "euler", "xyaxes", "zaxis"}) {
+      if (own ? !node.given(name) : chosen != nullptr || !node.has(name)) continue;
+      if (chosen != nullptr)
+        node.fail(fmt::format("both '{}' and '{}'; expected one rotation", chosen, name));
+      chosen = name;
+    }
+  if (chosen == nullptr) return {1, 0, 0, 0};
+  const std::string_view kind = chosen;
+  if (kind == "quat") return node.quaternion("quat");
+  if (kind == "zaxis") return from_z(node.direction("zaxis"));
+  if (kind == "euler") {
+    const Vector3 x = node.vector("euler");
+    return from_euler({angle(x[0]), angle(x[1]), angle(x[2])}, euler_sequence);
+  }
+  const auto unit = [&](const Vector3& a) {
+    const double length = std::sqrt(dot(a, a));
+    if (!(length > 1e-100) || !std::isfinite(length))
+      node.fail(fmt::format("{}=\"{}\" has an axis without a length", chosen, node.text(chosen)));
+    return Vector3{a[0] / length, a[1] / length, a[2] / length};
+  };
+  if (kind == "axisangle") {
+    const std::vector<double> x = node.numbers("axisangle", 4);
+    return turn(unit({x[0], x[1], x[2]}), angle(x[3]));
+  }
+  const std::vector<double> x = node.numbers("xyaxes", 6);
+  const Vector3 first = unit({x[0], x[1], x[2]}), second = unit({x[3], x[4], x[5]});
+  const Vector3 normal = cross(first, second);
+  if (!(dot(normal, normal) > 1e-20)) node.fail("xyaxes are parallel; expected a plane");
+  return from_axes(first, second);
+}
+
+Pose MjcfFile::read_pose(const RobotNode& node) const {
+  return {node.vector("pos", Vector3{0, 0, 0}), read_orientation(node)};
+}
+
+void read_mjcf(const RobotNode& root) {
+  Robot& robot = root.robot();
+  robot.format = "MJCF";
+  root.check({{"model"}});
+  Scene& scene = robot.scene;
+  scene.name = root.text("model", "robot");
+  scene.timestep = 0.002;  // MuJoCo's
+  Words known = kSections;
+  known.push_back({"include"});
+  const std::vector<RobotNode> sections = root.parts(known);
+  for (const RobotNode& s : sections)
+    if (s.name() == "include")
+      s.fail("files inside a file are not read; import the file that it names, or one whole file");
+  MjcfFile file(root);
+  const auto each = [&](const char* name, auto&& read) {
+    for (const RobotNode& s : sections)
+      if (s.name() == name) read(s);
+  };
+  each("compiler", [&](const RobotNode& s) { read_compiler(file, s); });
+  each("option", [&](const RobotNode& s) { read_option(file, s); });
+  each("default", [&](const RobotNode& s) { file.read_defaults(s, ""); });
+  each("asset", [&](const RobotNode& s) { read_asset(file, s); });
+  each("worldbody", [&](const RobotNode& s) { read_mjcf_bodies(file, s); });
+  each("actuator", [&](const RobotNode& s) { read_mjcf_actuators(file, s); });
+  each("contact", [&](const RobotNode& s) {
+    static_cast<void>(s.parts(
+        {{"pair", Fate::lost, "a contact with coefficients of MuJoCo's; --contact A=B adds one"},
+         {"exclude", Fate::idle, "a scene has only the contacts that it names"}}));
+  });
+  for (std::string& warning : file.take_warnings())
+    root.context().warnings.push_back(std::move(warning));
+}
+
+}  // namespace tangere

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// One table for each element.
+#include "io/robot/mjcf_words.hpp"
+
+#include <map>
+
+namespace tangere {
+namespace {
+
+const char* const kUser = "numbers for other programs";
+const char* const kLaw = "coefficients of MuJoCo's contacts; scenes have laws of their own";
+
+Words actuator_words(std::initializer_list<const char*> own) {
+  Words words = {{"name"},
+                 {"class"},
+                 {"joint"},
+                 {"jointinparent"},
+                 {"ctrllimited"},
+                 {"forcelimited"},
+                 {"ctrlrange"},
+                 {"forcerange"},
+                 {"gear"},
+                 {"tendon"},
+                 {"site"},
+                 {"body"},
+                 {"cranksite"},
+                 {"slidersite"},
+                 {"refsite"},
+                 {"cranklength", Fate::zero, "of a slider-crank"},
+                 {"group", Fate::idle, kSight},
+                 {"user", Fate::idle, kUser},
+                 {"lengthrange", Fate::idle, "for muscles"},
+                 {"actlimited", Fate::idle, "for actuators with a state"},
+                 {"actrange", Fate::idle, "for actuators with a state"},
+                 {"actearly", Fate::idle, "for actuators with a state"},
+                 {"actdim", Fate::idle, "for actuators with a state"},
+                 {"delay", Fate::zero, "delays the control"},
+                 {"nsample", Fate::zero, "delays the control"},
+                 {"interp", Fate::idle, "of a delayed control"}};
+  for (const char* name : own) words.push_back({name});
+  return words;
+}
+
+std::map<std::string, Words> all_words() {
+  std::map<std::string, Words> all;
+  all["joint"] = {{"name"},
+                  {"class"},
+                  {"type"},
+                  {"pos"},
+                  {"axis"},
+                  {"range"},
+                  {"limited"},
+                  {"stiffness"},
+                  {"springref"},
+                  {"damping"},
+                  {"armature"},
+                  {"ref"},
+                  {"actuatorfrcrange"},
+                  {"actuatorfrclimited"},
+                  {"frictionloss", Fate::zero, "dry friction of a joint"},
+                  {"springdamper", Fate::zero, "chooses stiffness and damping from a frequency"},
+                  {"actuatorgravcomp", Fate::idle, "of bodies without weight"},
+                  {"group", Fate::idle, kSight},
+                  {"user", Fate::idle, kUser},
+                  {"margin", Fate::idle, "of MuJoCo's limits; here limits are springs"},
+                  {"solreflimit", Fate::idle, "of MuJoCo's limits; here limits are springs"},
+                  {"solimplimit", Fate::idle, "of MuJoCo's limits; here limits are springs"},
+                  {"solreffriction", Fate::idle, kSolver},
+                  {"solimpfriction", Fate::idle, kSolver}};
+  all["geom"] = with_rotations({{"name"},
+                                {"class"},
+                                {"type"},
+                                {"size"},
+                                {"fromto"},
+                                {"mass"},
+                                {"density"},
+                                {"mesh"},
+                                {"rgba"},
+                                {"material"},
+                                {"contype"},
+                                {"conaffinity"},
+                                {"group"},
+                                {"shellinertia"},
+                                {"hfield"},
+                                {"condim", Fate::idle, kLaw},
+                                {"friction", Fate::idle, kLaw},
+                                {"solref", Fate::idle, kLaw},
+                                {"solimp", Fate::idle, kLaw},
+                                {"solmix", Fate::idle, kLaw},
+                                {"priority", Fate::idle, kLaw},
+                                {"margin", Fate::idle, kLaw},
+                                {"gap", Fate::idle, kLaw},
+                                {"fitscale", Fate::idle, "no primitive is fitted to a mesh"},
+                                {"fluidshape", Fate::lost, "forces of a fluid"},
+                                {"fluidcoef", Fate::idle, "of a fluid"},
+                                {"user", Fate::idle, kUser}});
+  all["mesh"] = {{"name"},
+                 {"class"},
+                 {"file"},
+                 {"scale"},
+                 {"inertia"},
+                 {"refpos", Fate::zero, "shifts the mesh"},
+                 {"refquat"},
+                 {"vertex"},
+                 {"builtin"},
+                 {"content_type", Fate::idle, kSolver},
+                 {"face", Fate::idle, kSight},
+                 {"normal", Fate::idle, kSight},
+                 {"texcoord", Fate::idle, kSight},
+                 {"smoothnormal", Fate::idle, kSight},
+                 {"maxhullvert", Fate::idle, "meshes are not replaced by hulls"},
+                 {"octree_maxdepth", Fate::idle, kSolver},
+                 {"material", Fate::idle, kSight}};
+  all["material"] = {{"name"}, {"class"}, {"rgba"}};
+  for (const char* name : {"texture", "texrepeat", "texuniform", "emission", "specular",
+                           "shininess", "reflectance", "metallic", "roughness"})
+    all["material"].push_back({name, Fate::idle, kSight});
+  all["general"] = actuator_words({"dyntype", "gaintype", "biastype", "gainprm", "biasprm"});
+  all["general"].push_back({"dynprm", Fate::idle, "for actuators with a state"});
+  all["motor"] = actuator_words({});
+  all["position"] = actuator_words({"kp", "kv"});
+  all["position"].push_back({"dampratio", Fate::zero, "chooses the damping from the inertia"});
+  all["position"].push_back({"timeconst", Fate::zero, "filters the control"});
+  all["position"].push_back({"inheritrange", Fate::idle, "bounds controls"});
+  all["velocity"] = actuator_words({"kv"});
+  return all;
+}
+
+}  // namespace
+
+Words with_rotations(Words words) {
+  for (const char* name : {"pos", "quat", "axisangle", "euler", "xyaxes", "zaxis"})
+    words.push_back({name});
+  return words;
+}
+
+const Words& mjcf_words(const std::string& element) {
+  static const std::map<std::string, Words> all = all_words();
+  return all.at(element);
+}
+
+}  // namespace tangere

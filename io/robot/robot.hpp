@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a robot file becomes before it is written as a scene.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "engine/model/scene.hpp"
+
+namespace tangere {
+
+/// Places of a file that share a remark. The remark names the element and what becomes of it.
+class Remarks {
+ public:
+  void add(const Source& at, const std::string& text);
+  [[nodiscard]] bool empty() const { return texts_.empty(); }
+  /// "file: text (lines 3, 7)", in the order in which the remarks came.
+  [[nodiscard]] std::vector<std::string> lines() const;
+
+ private:
+  std::vector<std::string> texts_;
+  std::map<std::string, std::vector<int>> places_;  // text with its file, lines
+};
+
+/// The surface file of a mesh body.
+struct MeshFile {
+  std::string path;
+  Vector3 scale{1, 1, 1};
+};
+
+struct Robot {
+  std::string format;  ///< "URDF" or "MJCF"
+  /// In SI. Every source is a line of the robot's file, so errors of a model name it.
+  Scene scene;
+  std::map<std::string, MeshFile> meshes;      ///< by body
+  std::map<std::string, std::string> origins;  ///< by link: what of the file it was, for a comment
+  std::set<std::string> pieces;  ///< links made for further shapes of the link that they hang on
+  std::map<std::string, double> efforts;  ///< by joint: largest force or torque [N or N m]
+  Remarks idle;                           ///< left out, and of no effect on the motion
+  Remarks changed;                        ///< said in another way
+  Remarks lost;                           ///< left out although it changes the motion
+};
+
+/// Gives new links, joints and bodies names that no other has.
+class RobotNames {
+ public:
+  /// `wanted`, or `wanted` with the next free number behind it.
+  std::string free_name(const std::string& wanted);
+  /// Keeps a name that a file gives for whoever has it there.
+  void keep(const std::string& name) { names_.insert(name); }
+
+ private:
+  std::set<std::string> names_;
+};
+
+/// A piece of a link: its shape in the link's frame, and how heavy it is.
+struct RobotPiece {
+  Shape shape;
+  Pose pose;
+  double density = 0;  ///< [kg/m³]; 0: it has no mass of its own
+  std::array<double, 4> rgba{0.7, 0.7, 0.7, 1};
+  MeshFile mesh;       ///< of mesh shapes
+  std::string origin;  ///< "<collision>", "<geom>"
+  Source source;
+};
+
+/// Appends a link with its pieces to the robot. The first piece is the link's own body and has its
+/// name; each other piece hangs on a fixed joint, and is named after the link with a number. A link
+/// without pieces is a frame without mass. Returns the link's index.
+int add_link(Robot& robot, RobotNames& names, const std::string& name, int parent,
+             JointDescription joint, const std::vector<RobotPiece>& pieces,
+             const std::string& origin, const Source& source);
+
+/// A piece that is a mass alone. `inertia`: xx xy xz yy yz zz in the frame `pose` at the centre of
+/// mass. Throws InputError at `source` if no body has these numbers.
+RobotPiece inertial_piece(double mass, const std::array<double, 6>& inertia, const Pose& pose,
+                          const std::string& origin, const Source& source);
+
+/// Volume of a solid [m³]; 0 for a plane.
+double volume_of(const Shape& shape);
+
+}  // namespace tangere

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a robot's file does not say is chosen here: how stiff limits are, which links touch, where
+// skins lie.
+#include "io/robot/robot_import.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/model/model.hpp"
+#include "engine/model/shapes.hpp"
+#include "io/files/text_file.hpp"
+#include "io/robot/mjcf_reader.hpp"
+#include "io/robot/robot_pads.hpp"
+#include "io/robot/rotations.hpp"
+#include "io/robot/scene_writer.hpp"
+#include "io/robot/urdf_reader.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "io/scene/xml_document.hpp"
+
+namespace tangere {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLargestRobot = std::size_t{64} << 20;
+constexpr const char* kRoots = "the root <robot> (URDF) or <mujoco> (MJCF)";
+constexpr double kYieldAngle = 0.01, kYieldLength = 1e-3;  // of a limit under its load [rad], [m]
+constexpr double kLeastReach = 0.01;  // between a joint and what hangs on it [m]
+constexpr int kDeepestLinks = 200;    // of a scene
+
+/// Rounds up to two digits, because such a number is a choice.
+double two_digits(double x) {
+  const double unit = std::pow(10.0, std::floor(std::log10(x)) - 1);
+  return std::ceil(x / unit - 1e-9) * unit;
+}
+
+/// Chooses the stiffness of limits: under the weight of what hangs on the joint, or its motor's
+/// largest force, it yields by kYieldAngle or kYieldLength.
+void stiffen_limits(Robot& robot) {
+  Scene& scene = robot.scene;
+  const Model model(scene);
+  const double g = std::max(std::sqrt(dot(scene.gravity, scene.gravity)), 1.0);
+  std::vector<Pose> at;
+  for (const LinkDescription& link : scene.links)
+    at.push_back(link.parent < 0 ? link.joint.pose
+                                 : compose(at[std::size_t(link.parent)], link.joint.pose));
+  for (std::size_t i = 0; i < scene.links.size(); ++i) {
+    JointDescription& joint = scene.links[i].joint;
+    if (!joint.limits) continue;
+    double mass = 0, reach = kLeastReach;
+    for (std::size_t k = i; k < scene.links.size(); ++k) {
+      auto up = static_cast<int>(k);
+      while (up > static_cast<int>(i)) up = scene.links[std::size_t(up)].parent;
+      if (up != static_cast<int>(i)) continue;
+      mass += model.mass(static_cast<int>(k));
+      const Vector3 p = outer_point(at[k], scene.links[k].body.pose.position);
+      const Vector3 way = {p[0] - at[i].position[0], p[1] - at[i].position[1],
+                           p[2] - at[i].position[2]};
+      reach = std::max(reach, std::sqrt(dot(way, way)));
+    }
+    double load = mass * g;
+    const bool turns = joint.type == JointType::revolute;
+    if (turns) load *= reach;
+    if (const auto effort = robot.efforts.find(joint.name); effort != robot.efforts.end())
+      load = std::max(load, effort->second);
+    for (const MotorDescription& m : scene.motors)
+      if (m.joint == joint.name)
+        for (const double f : {-m.low, m.high})
+          if (std::isfinite(f)) load = std::max(load, f);
+    joint.limit_stiffness = two_digits(load / (turns ? kYieldAngle : kYieldLength));
+  }
+}
+
+void add_motors(Robot& robot, const std::vector<MotorRequest>& requests, const std::string& file) {
+  for (const MotorRequest& request : requests) {
+    std::vector<std::string> names;
+    const LinkDescription* link = nullptr;
+    for (const LinkDescription& l : robot.scene.links) {
+      if (l.joint.type == JointType::fixed) continue;
+      names.push_back(l.joint.name);
+      if (l.joint.name == request.joint) link = &l;
+    }
+    if (link == nullptr)
+      throw InputError(fmt::format("--motor {}: {} has no joint of this name that moves{}",
+                                   request.joint, file, suggestion(request.joint, names)));
+    for (const MotorDescription& m : robot.scene.motors)
+      if (m.joint == request.joint)
+        throw InputError(fmt::format("--motor {}: the joint has a motor already", request.joint));
+    MotorDescription motor;
+    motor.joint = request.joint;
+    const auto effort = robot.efforts.find(request.joint);
+    const bool bounded = effort != robot.efforts.end();
+    if (!request.P && !bounded)
+      throw InputError(fmt::format(
+          "--motor {}=force: {} gives the joint no <limit effort>; expected one, or {}=P,D",
+          request.joint, link->joint.source.prefix(), request.joint));
+    motor.high = bounded ? effort->second : std::numeric_limits<double>::infinity();
+    motor.low = -motor.high;
+    if (request.P) {
+      motor.control = MotorControl::position;
+      motor.P = *request.P;
+      motor.D = request.D;
+    }
+    robot.scene.motors.push_back(motor);
+  }
+}
+
+/// The bodies of a link that have a shape.
+std::vector<std::string> shapes_of(const Robot& robot, const std::string& name,
+                                   const std::string& what, const std::string& file) {
+  std::vector<std::string> names, shapes;
+  for (const LinkDescription& l : robot.scene.links) names.push_back(l.name);
+  const auto link = std::find(names.begin(), names.end(), name);
+  if (link == names.end())
+    throw InputError(
+        fmt::format("{}: {} has no link '{}'{}", what, file, name, suggestion(name, names)));
+  const auto index = static_cast<int>(link - names.begin());
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const LinkDescription& l = robot.scene.links[k];
+    const bool piece = l.parent == index && robot.pieces.contains(l.name);
+    if ((static_cast<int>(k) == index || piece) &&
+        !std::holds_alternative<AbstractShape>(l.body.shape))
+      shapes.push_back(l.body.name);
+  }
+  if (shapes.empty())
+    throw InputError(fmt::format("{}: link '{}' has no shape to touch with", what, name));
+  return shapes;
+}
+
+/// Whether the link hangs on a joint that moves.
+bool moves(const Scene& scene, const std::string& name) {
+  auto at = std::find_if(scene.links.begin(), scene.links.end(),
+                         [&](const LinkDescription& l) { return l.name == name; });
+  while (at->joint.type == JointType::fixed) {
+    if (at->parent < 0) return false;
+    at = scene.links.begin() + at->parent;
+  }
+  return true;
+}
+
+std::string contacts_text(Robot& robot, const std::vector<TouchRequest>& requests,
+                          const std::string& file) {
+  std::string text;
+  const auto shape_of = [&](const std::string& body) -> const Shape& {
+    return std::find_if(robot.scene.links.begin(), robot.scene.links.end(),
+                        [&](const LinkDescription& l) { return l.body.name == body; })
+        ->body.shape;
+  };
+  for (const TouchRequest& request : requests) {
+    const std::string what = fmt::format("--contact {}={}", request.first, request.second);
+    const std::vector<std::string> first = shapes_of(robot, request.first, what, file);
+    if (request.second == "ground") {
+      if (!moves(robot.scene, request.first))
+        throw InputError(fmt::format("{}: link '{}' stands in the world", what, request.first));
+      if (!robot.scene.ground) robot.scene.ground = GroundDescription{};
+      for (const std::string& body : first)
+        text += fmt::format("    <ground_contact body=\"{}\"/>\n", attribute_text(body));
+      continue;
+    }
+    for (const std::string& a : first)
+      for (const std::string& b : shapes_of(robot, request.second, what, file)) {
+        const auto fits = [&](const std::string& points, const std::string& touched) {
+          return has_contact_points(shape_of(points)) && has_distance(shape_of(touched));
+        };
+        if (!fits(a, b) && !fits(b, a))
+          throw InputError(
+              fmt::format("{}: neither of '{}' and '{}' has points that could touch "
+                          "the other",
+                          what, a, b));
+        const bool straight = fits(a, b);
+        text += fmt::format(
+            "    <general_primitive_contact general_body=\"{}\" primitive_body=\"{}\"/>\n",
+            attribute_text(straight ? a : b), attribute_text(straight ? b : a));
+      }
+  }
+  return text;
+}
+
+std::string list_text(const char* title, const std::vector<std::string>& lines) {
+  if (lines.empty()) return "";
+  std::string text = fmt::format("\n     {}\n", title);
+  for (const std::string& line : lines) text += "       " + line + "\n";
+  return text;
+}
+
+void refuse_deep(const Scene& scene) {
+  std::vector<int> depth;
+  for (const LinkDescription& link : scene.links) {
+    depth.push_back(link.parent < 0 ? 0 : depth[std::size_t(link.parent)] + 1);
+    if (depth.back() > kDeepestLinks)
+      throw InputError(fmt::format("{}link '{}' is deeper than {} links", link.body.source.prefix(),
+                                   link.name, kDeepestLinks));
+  }
+}
+
+Robot read_robot(const std::string& text, const std::string& name, const RobotOptions& options,
+                 std::vector<std::string>& warnings) {
+  Robot robot;
+  robot.scene.path = name;
+  robot.scene.gravity = {0, 0, -9.81};
+  robot.scene.timestep = 5e-3;
+  robot.scene.integrator = Integrator::bdf2;
+  tinyxml2::XMLDocument document;
+  SceneContext context;
+  context.file = name;
+  context.allow_unknown = options.allow_unknown;
+  const tinyxml2::XMLElement& element = parse_xml(document, text, name, kRoots, context.warnings);
+  const RobotNode root(element, context, robot);
+  if (root.name() == "robot") {
+    read_urdf(root, options.free_base);
+  } else if (root.name() == "mujoco") {
+    if (options.free_base)
+      throw InputError("--base free with " + name + ": a MJCF file says itself what moves freely");
+    read_mjcf(root);
+  } else {
+    root.fail(
+        std::string("no robot; expected ") + kRoots +
+        (root.name() == "tangere" || root.name() == "redmax" ? ". This is a scene already" : ""));
+  }
+  if (robot.scene.links.empty()) root.fail("has no body: there is nothing to simulate");
+  warnings = std::move(context.warnings);
+  return robot;
+}
+
+}  // namespace
+
+ImportedScene import_robot(const fs::path& path, const fs::path& output,
+                           const RobotOptions& options) {
+  const std::string name = path.string();
+  ImportedScene out;
+  Robot robot = read_robot(read_text_file(name, kLargestRobot, "a robot's file"), name, options,
+                           out.warnings);
+  refuse_deep(robot.scene);
+  add_motors(robot, options.motors, name);
+  stiffen_limits(robot);
+  SceneSections sections;
+  sections.contacts = contacts_text(robot, options.touches, name);
+  if (!sections.contacts.empty())
+    sections.defaults =
+        "    <!-- a guess, per contact point: set them for your materials -->\n"
+        "    <general_primitive_contact kn=\"500\" kt=\"5\" mu=\"1\" damping=\"1\"/>\n"
+        "    <ground_contact kn=\"500\" kt=\"5\" mu=\"1\" damping=\"1\"/>\n";
+  sections.sensors = pads_text(robot, options.pads, name);
+  out.idle = robot.idle.lines();
+  out.changed = robot.changed.lines();
+  out.lost = robot.lost.lines();
+  sections.head = fmt::format(
+      "Made by 'tangere import' from {} ({}). All numbers are in SI units; line numbers are those "
+      "of "
+      "that file.\n",
+      path.filename().string(), robot.format);
+  sections.head += list_text("Left out, and the motion differs by it:", out.lost) +
+                   list_text("Said in another way:", out.changed) +
+                   list_text("Left out, and of no effect on the motion:", out.idle);
+  out.text = write_scene(robot, sections, output.parent_path().string());
+  out.format = robot.format;
+  SceneFile scene = parse_scene(out.text, output.string());
+  for (std::string& warning : scene.warnings) out.warnings.push_back(std::move(warning));
+  out.links = scene.scene.links.size();
+  for (const LinkDescription& link : scene.scene.links)
+    if (link.joint.type != JointType::fixed) ++out.joints;
+  out.motors = scene.scene.motors.size();
+  out.sensors = scene.scene.sensors.size();
+  static_cast<void>(
+      Model(scene.scene));  // whatever it would refuse is refused before it is written
+  return out;
+}
+
+}  // namespace tangere

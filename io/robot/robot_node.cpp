@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// Robot files have elements by the hundred that mean nothing to a simulator of motion and touch.
+// The tables name each, so that a misspelt one is noticed.
+#include "io/robot/robot_node.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+
+namespace tangere {
+namespace {
+
+std::vector<std::string> names_of(const Words& words) {
+  std::vector<std::string> names;
+  for (const Word& w : words) names.emplace_back(w.name);
+  return names;
+}
+
+const Word* word_in(const Words& words, std::string_view name) {
+  const auto at =
+      std::find_if(words.begin(), words.end(), [&](const Word& w) { return name == w.name; });
+  return at == words.end() ? nullptr : &*at;
+}
+
+}  // namespace
+
+bool RobotNode::given(const char* attribute) const {
+  return element().Attribute(attribute) != nullptr;
+}
+
+void RobotNode::check(const Words& attributes) const {
+  for (const tinyxml2::XMLAttribute* a = element().FirstAttribute(); a != nullptr; a = a->Next()) {
+    const std::string_view name = a->Name();
+    if (name.starts_with("xmlns")) continue;
+    const Word* const word = word_in(attributes, name);
+    if (word == nullptr) {
+      if (!context().allow_unknown)
+        fail(fmt::format("unknown attribute '{}'{} (--allow-unknown ignores it)", name,
+                         suggestion(name, names_of(attributes))));
+      warn(fmt::format("unknown attribute '{}' is ignored", name));
+      continue;
+    }
+    if (word->fate == Fate::read) continue;
+    const std::string text = fmt::format("<{}> {}: {}", this->name(), name, word->why);
+    if (word->fate == Fate::idle) {
+      idle(text);
+    } else {
+      const auto all_zero = [&] {
+        const std::vector<double> x = numbers(word->name);
+        return std::all_of(x.begin(), x.end(), [](double n) { return n == 0; });
+      };
+      if (word->fate == Fate::lost || !all_zero()) lost(text);
+    }
+  }
+}
+
+std::vector<RobotNode> RobotNode::parts(const Words& known) const {
+  std::vector<RobotNode> out;
+  for (const tinyxml2::XMLNode* n = element().FirstChild(); n != nullptr; n = n->NextSibling()) {
+    if (const tinyxml2::XMLText* t = n->ToText()) {
+      const std::string text = t->Value();
+      if (!std::all_of(text.begin(), text.end(),
+                       [](unsigned char c) { return std::isspace(c) != 0; }))
+        context().warnings.push_back(fmt::format("{}:{}: stray text inside <{}> is ignored",
+                                                 context().file, n->GetLineNum(), name()));
+    }
+    const tinyxml2::XMLElement* const e = n->ToElement();
+    if (e == nullptr) continue;
+    const RobotNode child(*e, context(), *robot_);
+    if (child.name().starts_with("xacro:"))
+      child.fail("a macro of xacro; expected plain XML, which 'xacro FILE' writes");
+    const Word* const word = word_in(known, child.name());
+    if (word == nullptr) {
+      if (!context().allow_unknown)
+        child.fail(fmt::format("unknown element inside <{}>{} (--allow-unknown ignores it)", name(),
+                               suggestion(child.name(), names_of(known))));
+      child.warn("unknown element is ignored");
+    } else if (word->fate == Fate::read) {
+      out.push_back(child);
+    } else {
+      const std::string text = fmt::format("<{}>: {}", child.name(), word->why);
+      word->fate == Fate::idle ? child.idle(text) : child.lost(text);
+    }
+  }
+  return out;
+}
+
+bool RobotNode::flag(const char* attribute, bool fallback) const {
+  if (!has(attribute)) return fallback;
+  return choice(attribute, {"true", "false", "1", "0"}) % 2 == 0;
+}
+
+}  // namespace tangere

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// One element of a robot file. A table says of every attribute and child whether it is read, left
+// out without an effect, or left out although it matters; nothing else passes.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/robot/robot.hpp"
+#include "io/scene/scene_node.hpp"
+
+namespace tangere {
+
+/// What becomes of an attribute or a child element.
+enum class Fate {
+  read,
+  idle,  ///< of no effect on the motion
+  lost,  ///< matters, and scenes have no such thing
+  zero   ///< an attribute: idle if its numbers are all zero, else lost
+};
+
+struct Word {
+  const char* name;
+  Fate fate = Fate::read;
+  const char* why = "";  ///< what it is, for the list: "pictures only"
+};
+using Words = std::vector<Word>;
+
+class RobotNode : public SceneNode {
+ public:
+  RobotNode(const tinyxml2::XMLElement& element, SceneContext& context, Robot& robot)
+      : SceneNode(element, context), robot_(&robot) {}
+
+  [[nodiscard]] Robot& robot() const { return *robot_; }
+  /// Whether the element itself has the attribute; has() counts defaults too.
+  [[nodiscard]] bool given(const char* attribute) const;
+
+  /// Checks the element's own attributes against the table and lists those that are left out. An
+  /// unknown one is an error, or a warning with --allow-unknown.
+  void check(const Words& attributes) const;
+  /// Returns the children that are read, in order, and lists the others likewise.
+  [[nodiscard]] std::vector<RobotNode> parts(const Words& known) const;
+  /// The same in another context, which has defaults of its own.
+  [[nodiscard]] RobotNode in(SceneContext& context) const { return {element(), context, *robot_}; }
+
+  void idle(const std::string& text) const { robot_->idle.add(source(), text); }
+  void changed(const std::string& text) const { robot_->changed.add(source(), text); }
+  void lost(const std::string& text) const { robot_->lost.add(source(), text); }
+
+  /// Whether the attribute is "true" or "1"; "false" and "0" are the others.
+  [[nodiscard]] bool flag(const char* attribute, bool fallback) const;
+
+ private:
+  Robot* robot_;
+};
+
+}  // namespace tangere

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+// A layout's sensors are written out, so that the scene stands on its own and each number can be
+// changed. The frame of a layout has z out of the skin, x to the right and y up, seen from outside.
+#include "io/robot/robot_pads.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "io/robot/rotations.hpp"
+#include "io/robot/scene_writer.hpp"
+#include "io/scene/scene_node.hpp"
+#include "io/scene/xml_document.hpp"
+
+namespace tangere {
+namespace {
+
+struct Face {
+  const char* name;
+  Vector3 x, y;  ///< of the skin, in the box's axes
+};
+constexpr Face kFaces[] = {{"+x", {0, 1, 0}, {0, 0, 1}},  {"-x", {0, -1, 0}, {0, 0, 1}},
+                           {"+y", {-1, 0, 0}, {0, 0, 1}}, {"-y", {1, 0, 0}, {0, 0, 1}},
+                           {"+z", {1, 0, 0}, {0, 1, 0}},  {"-z", {-1, 0, 0}, {0, 1, 0}}};
+
+/// The frame in the body's own frame in which the layout lies.
+Pose place_of(const PadRequest& pad, const LinkDescription& link, const std::string& what) {
+  if (pad.face.empty()) return compose(inverse(link.body.pose), pad.pose);
+  const auto* const box = std::get_if<CuboidShape>(&link.body.shape);
+  if (box == nullptr)
+    throw InputError(
+        fmt::format("{}: the first shape of '{}' is no box, so it has no face {}; "
+                    "expected @x,y,z or @x,y,z,roll,pitch,yaw in the link's frame",
+                    what, pad.link, pad.face));
+  const auto face = std::find_if(std::begin(kFaces), std::end(kFaces),
+                                 [&](const Face& f) { return pad.face == f.name; });
+  if (face == std::end(kFaces))
+    throw InputError(fmt::format("{}: face {}; expected +x, -x, +y, -y, +z or -z", what, pad.face));
+  const Vector3 normal = cross(face->x, face->y);
+  Pose pose{{0, 0, 0}, from_axes(face->x, face->y)};
+  for (std::size_t k = 0; k < 3; ++k) pose.position[k] = 0.5 * box->size[k] * normal[k];
+  return pose;
+}
+
+void check_metres(const tinyxml2::XMLElement& root, SceneContext& context) {
+  const SceneNode node(root, context);
+  if (node.name() != "sensor") node.fail("not a layout; expected the root <sensor unit=\"m-kg\">");
+  node.check_attributes({"unit", "name"});
+  if (node.choice("unit", {"cm-g", "m-kg"}, 0) != 1)
+    node.fail("unit=\"cm-g\"; expected unit=\"m-kg\", which the scene has");
+}
+
+/// Attributes of a layout that name a file lie beside the layout, not beside the scene.
+void refuse_files(const SceneNode& sensor) {
+  for (const char* name : {"spec", "filename"})
+    if (sensor.has(name))
+      sensor.fail(
+          fmt::format("{}: a layout that names a file; write it into the scene with "
+                      "<include file=\"…\"/>",
+                      name));
+}
+
+/// The elements inside a sensor, such as <imperfections>.
+std::string children_text(const tinyxml2::XMLElement& sensor) {
+  std::string text;
+  for (const auto* child = sensor.FirstChildElement(); child != nullptr;
+       child = child->NextSiblingElement()) {
+    tinyxml2::XMLPrinter printer(nullptr, true);
+    child->Accept(&printer);
+    text += fmt::format("      {}\n", printer.CStr());
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string pads_text(const Robot& robot, const std::vector<PadRequest>& pads,
+                      const std::string& file) {
+  std::string text;
+  std::set<std::string> names;
+  for (const PadRequest& pad : pads) {
+    const std::string what = fmt::format("--pad {}={}", pad.link, pad.layout_name);
+    std::vector<std::string> links;
+    for (const LinkDescription& l : robot.scene.links) links.push_back(l.name);
+    const auto at = std::find(links.begin(), links.end(), pad.link);
+    if (at == links.end())
+      throw InputError(fmt::format("{}: {} has no link of this name{}", what, file,
+                                   suggestion(pad.link, links)));
+    const LinkDescription& link = robot.scene.links[std::size_t(at - links.begin())];
+    const Pose place = place_of(pad, link, what);
+    tinyxml2::XMLDocument document;
+    SceneContext context;
+    context.file = pad.layout_name;
+    const tinyxml2::XMLElement& root =
+        parse_xml(document, pad.layout, pad.layout_name, "the root <sensor>", context.warnings);
+    check_metres(root, context);
+    text += fmt::format("    <!-- {} on link '{}' -->\n", comment_text(pad.layout_name),
+                        comment_text(pad.link));
+    for (const SceneNode& sensor : SceneNode(root, context).children({"tactile"})) {
+      refuse_files(sensor);
+      std::string name = pad.link + "_" + sensor.text("name", "skin");
+      std::replace(name.begin(), name.end(), '/', '_');  // files use it as a separator
+      for (int k = 2; !names.insert(name).second; ++k)
+        name = fmt::format("{}_{}_{}", pad.link, sensor.text("name", "skin"), k);
+      const Pose own{sensor.vector("pos", Vector3{0, 0, 0}), sensor.quaternion("quat")};
+      text += fmt::format("    <tactile name=\"{}\" body=\"{}\"{}", attribute_text(name),
+                          attribute_text(link.body.name), pose_text(compose(place, own)));
+      for (const auto* a = sensor.element().FirstAttribute(); a != nullptr; a = a->Next()) {
+        const std::string_view known = a->Name();
+        if (known != "name" && known != "body" && known != "pos" && known != "quat")
+          text += fmt::format(" {}=\"{}\"", known, attribute_text(a->Value()));
+      }
+      const std::string inside = children_text(sensor.element());
+      text += inside.empty() ? "/>\n" : ">\n" + inside + "    </tactile>\n";
+    }
+  }
+  return text;
+}
+
+}  // namespace tangere

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+// Attributes that have their default are left out, so that what is there can be read.
+#include "io/robot/scene_writer.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "engine/model/shapes.hpp"
+
+namespace tangere {
+namespace {
+
+std::string vector_text(const Vector3& v) {
+  return fmt::format("{} {} {}", number_text(v[0]), number_text(v[1]), number_text(v[2]));
+}
+
+std::string attribute(const char* name, double x, double usual) {
+  return x == usual ? "" : fmt::format(" {}=\"{}\"", name, number_text(x));
+}
+
+const char* joint_word(JointType type) {
+  return type == JointType::free ? "free3d" : to_string(type);
+}
+
+class Writer {
+ public:
+  Writer(const Robot& robot, const std::string& folder)
+      : robot_(robot), scene_(robot.scene), folder_(folder), children_(scene_.links.size()) {
+    for (std::size_t i = 0; i < scene_.links.size(); ++i)
+      if (scene_.links[i].parent >= 0) children_[std::size_t(scene_.links[i].parent)].push_back(i);
+  }
+
+  std::string text(const SceneSections& sections) {
+    out_ = fmt::format("<!-- {}-->\n<tangere model=\"{}\">\n", comment_text(sections.head),
+                       attribute_text(scene_.name));
+    out_ += fmt::format(
+        "  <option unit=\"m-kg\" gravity=\"{}\" timestep=\"{}\" integrator=\"{}\"/>\n",
+        vector_text(scene_.gravity), number_text(scene_.timestep), to_string(scene_.integrator));
+    if (scene_.ground) write_ground(*scene_.ground);
+    section("default", sections.defaults);
+    for (std::size_t i = 0; i < scene_.links.size(); ++i) {
+      if (scene_.links[i].parent >= 0) continue;
+      out_ += "  <robot>\n";
+      write_link(i, 4);
+      out_ += "  </robot>\n";
+    }
+    if (!scene_.motors.empty()) write_motors();
+    section("contact", sections.contacts);
+    section("sensor", sections.sensors);
+    return out_ + "</tangere>\n";
+  }
+
+ private:
+  void section(const char* name, const std::string& inside) {
+    if (!inside.empty()) out_ += fmt::format("  <{0}>\n{1}  </{0}>\n", name, inside);
+  }
+
+  void write_ground(const GroundDescription& ground) {
+    out_ += "  <ground";
+    if (ground.position != Vector3{0, 0, 0})
+      out_ += fmt::format(" pos=\"{}\"", vector_text(ground.position));
+    if (ground.normal != Vector3{0, 0, 1})
+      out_ += fmt::format(" normal=\"{}\"", vector_text(ground.normal));
+    out_ += "/>\n";
+  }
+
+  void write_link(std::size_t i, int indent) {
+    const LinkDescription& link = scene_.links[i];
+    const std::string space(std::size_t(indent), ' ');
+    const auto origin = robot_.origins.find(link.name);
+    out_ += fmt::format(
+        "{}<link name=\"{}\">  <!-- {} -->\n", space, attribute_text(link.name),
+        comment_text(origin == robot_.origins.end() ? std::string("<link>") : origin->second));
+    write_joint(link.joint, space + "  ");
+    write_body(link.body, space + "  ");
+    for (const std::size_t child : children_[i]) write_link(child, indent + 2);
+    out_ += space + "</link>\n";
+  }
+
+  void write_joint(const JointDescription& joint, const std::string& space) {
+    out_ += fmt::format("{}<joint name=\"{}\" type=\"{}\"{}", space, attribute_text(joint.name),
+                        joint_word(joint.type), pose_text(joint.pose));
+    if (joint.type == JointType::revolute || joint.type == JointType::prismatic)
+      out_ += fmt::format(" axis=\"{}\"", vector_text(joint.axis0));
+    out_ += attribute("damping", joint.damping, 0) + attribute("armature", joint.armature, 0) +
+            attribute("stiffness", joint.stiffness, 0);
+    if (!joint.rest.empty()) out_ += attribute("rest", joint.rest[0], 0);
+    if (joint.limits)
+      out_ += fmt::format(" lim=\"{} {}\" lim_stiffness=\"{}\"", number_text((*joint.limits)[0]),
+                          number_text((*joint.limits)[1]), number_text(joint.limit_stiffness));
+    out_ += "/>\n";
+  }
+
+  void write_body(const BodyDescription& body, const std::string& space) {
+    out_ += fmt::format("{}<body name=\"{}\" type=\"{}\"{}", space, attribute_text(body.name),
+                        shape_name(body.shape), pose_text(body.pose));
+    std::visit([&](const auto& shape) { write_size(shape, body.name); }, body.shape);
+    if (!std::holds_alternative<AbstractShape>(body.shape) &&
+        !std::holds_alternative<PlaneShape>(body.shape))
+      out_ += body.density > 0 ? fmt::format(" density=\"{}\"", number_text(body.density))
+                               : std::string(" mass=\"0\"");
+    constexpr std::array<double, 4> kUsual{0.7, 0.7, 0.7, 1};
+    if (body.rgba != kUsual)
+      out_ += fmt::format(" rgba=\"{} {} {} {}\"", body.rgba[0], body.rgba[1], body.rgba[2],
+                          body.rgba[3]);
+    out_ += "/>\n";
+  }
+
+  void write_size(const SphereShape& s, const std::string&) {
+    out_ += fmt::format(" radius=\"{}\"", number_text(s.radius));
+  }
+  void write_size(const CuboidShape& s, const std::string&) {
+    out_ += fmt::format(" size=\"{}\"", vector_text(s.size));
+  }
+  void write_size(const CylinderShape& s, const std::string&) {
+    out_ +=
+        fmt::format(" radius=\"{}\" length=\"{}\"", number_text(s.radius), number_text(s.length));
+  }
+  void write_size(const CapsuleShape& s, const std::string&) {
+    out_ +=
+        fmt::format(" radius=\"{}\" length=\"{}\"", number_text(s.radius), number_text(s.length));
+  }
+  void write_size(const EllipsoidShape& s, const std::string&) {
+    out_ += fmt::format(" size=\"{}\"", vector_text(s.size));
+  }
+  void write_size(const PlaneShape&, const std::string&) {}
+  void write_size(const MeshShape&, const std::string& body) {
+    const MeshFile& file = robot_.meshes.at(body);
+    namespace fs = std::filesystem;
+    std::error_code none;
+    const fs::path path = fs::absolute(file.path, none).lexically_normal();
+    const fs::path from = fs::absolute(folder_.empty() ? "." : folder_, none).lexically_normal();
+    const fs::path relative = path.lexically_relative(from);
+    out_ += fmt::format(" transform_type=\"OBJ_TO_JOINT\" filename=\"{}\"",
+                        attribute_text((relative.empty() ? path : relative).generic_string()));
+    if (file.scale != Vector3{1, 1, 1})
+      out_ += fmt::format(" scale=\"{}\"", vector_text(file.scale));
+  }
+  void write_size(const AbstractShape& s, const std::string&) {
+    const auto& [xx, xy, xz, yy, yz, zz] = s.inertia;
+    out_ += fmt::format(" mass=\"{}\" inertia=\"", number_text(s.mass));
+    if (xy == 0 && xz == 0 && yz == 0)
+      out_ += vector_text({xx, yy, zz}) + "\"";
+    else
+      out_ += vector_text({xx, xy, xz}) + " " + vector_text({yy, yz, zz}) + "\"";
+  }
+
+  void write_motors() {
+    out_ += "  <actuator>\n";
+    for (const MotorDescription& m : scene_.motors) {
+      const bool position = m.control == MotorControl::position;
+      out_ += fmt::format("    <motor joint=\"{}\" ctrl=\"{}\"", attribute_text(m.joint),
+                          position ? "position" : "force");
+      if (position) out_ += fmt::format(" P=\"{}\" D=\"{}\"", number_text(m.P), number_text(m.D));
+      if (std::isfinite(m.low) || std::isfinite(m.high))
+        out_ += fmt::format(" ctrl_range=\"{} {}\"", number_text(bounded(m.low)),
+                            number_text(bounded(m.high)));
+      out_ += m.source.line > 0 ? fmt::format("/>  <!-- line {} -->\n", m.source.line) : "/>\n";
+    }
+    out_ += "  </actuator>\n";
+  }
+
+  /// A range that is open on one side only: this far beyond any force, the bound is never met.
+  static double bounded(double x) { return std::isfinite(x) ? x : std::copysign(1e30, x); }
+
+  const Robot& robot_;
+  const Scene& scene_;
+  std::string folder_, out_;
+  std::vector<std::vector<std::size_t>> children_;
+};
+
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size())
+    text.replace(at, what.size(), by);
+  return text;
+}
+
+}  // namespace
+
+std::string number_text(double x) { return x == 0 ? "0" : fmt::format("{}", x); }
+
+std::string pose_text(const Pose& pose) {
+  std::string text;
+  if (pose.position != Vector3{0, 0, 0})
+    text += fmt::format(" pos=\"{}\"", vector_text(pose.position));
+  const Quaternion& q = pose.orientation;
+  if (q != Quaternion{1, 0, 0, 0} && q != Quaternion{-1, 0, 0, 0})
+    text += fmt::format(" quat=\"{} {} {} {}\"", number_text(q[0]), number_text(q[1]),
+                        number_text(q[2]), number_text(q[3]));
+  return text;
+}
+
+std::string attribute_text(const std::string& text) {
+  return replaced(replaced(replaced(replaced(text, "&", "&amp;"), "<", "&lt;"), ">", "&gt;"), "\"",
+                  "&quot;");
+}
+
+std::string comment_text(const std::string& text) { return replaced(text, "--", "- -"); }
+
+std::string write_scene(const Robot& robot, const SceneSections& sections,
+                        const std::string& folder) {
+  return Writer(robot, folder).text(sections);
+}
+
+}  // namespace tangere

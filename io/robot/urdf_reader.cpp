@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+// A link's frame is that of the joint which carries it. All numbers are in SI, angles in radians.
+#include "io/robot/urdf_reader.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "io/robot/mesh_files.hpp"
+#include "io/robot/rotations.hpp"
+
+namespace tangere {
+namespace {
+
+constexpr int kDeepestChain = 150;  // links of a chain; a scene's limit is 200, and some take two
+
+const char* const kPictures = "for pictures only";
+const char* const kSoftware = "a setting of other software";
+
+const Words kRobotChildren = {
+    {"link"},
+    {"joint"},
+    {"material", Fate::idle, kPictures},
+    {"transmission", Fate::idle, "a setting of other software; --motor JOINT=… drives a joint"},
+    {"gazebo", Fate::idle, kSoftware},
+    {"mujoco", Fate::idle, kSoftware},
+    {"drake", Fate::idle, kSoftware},
+    {"ros2_control", Fate::idle, kSoftware},
+    {"sensor", Fate::idle, "no sensor of touch; --pad LINK=LAYOUT adds one"},
+    {"group", Fate::idle, kSoftware},
+    {"disable_collisions", Fate::idle, kSoftware}};
+const Words kLinkChildren = {{"inertial"},
+                             {"collision"},
+                             {"visual", Fate::idle, kPictures},
+                             {"contact", Fate::idle, "coefficients of another contact law"},
+                             {"self_collision_checking", Fate::idle, kSoftware}};
+const Words kJointChildren = {{"origin"},
+                              {"parent"},
+                              {"child"},
+                              {"axis"},
+                              {"limit"},
+                              {"dynamics"},
+                              {"mimic", Fate::lost, "ties a joint to another; scenes cannot"},
+                              {"calibration", Fate::idle, kSoftware},
+                              {"safety_controller", Fate::idle, kSoftware}};
+
+/// The only child of this name; none if it is missing.
+std::optional<RobotNode> only(const std::vector<RobotNode>& parts, const std::string& name) {
+  std::optional<RobotNode> found;
+  for (const RobotNode& part : parts) {
+    if (part.name() != name) continue;
+    if (found)
+      part.fail(fmt::format("given twice, first in line {}; expected once", found->source().line));
+    found.emplace(part);
+  }
+  return found;
+}
+
+RobotNode required(const RobotNode& node, const std::vector<RobotNode>& parts,
+                   const std::string& name) {
+  const std::optional<RobotNode> found = only(parts, name);
+  if (!found) node.fail("has no <" + name + ">");
+  return *found;
+}
+
+Pose read_origin(const std::optional<RobotNode>& node) {
+  if (!node) return {};
+  node->check({{"xyz"}, {"rpy"}});
+  const Pose pose{node->vector("xyz", Vector3{0, 0, 0}),
+                  from_rpy(node->vector("rpy", Vector3{0, 0, 0}))};
+  static_cast<void>(node->parts({}));
+  return pose;
+}
+
+/// A joint of the file, with the names of its links.
+struct Joint {
+  JointDescription joint;
+  std::string type, parent, child;
+  RobotNode node;
+  bool used = false;
+};
+
+class UrdfReader {
+ public:
+  UrdfReader(const RobotNode& root, bool free_base)
+      : root_(root), robot_(root.robot()), free_base_(free_base) {}
+
+  void read() {
+    root_.check({{"name"}, {"version", Fate::read}});
+    robot_.scene.name = root_.text("name", "robot");
+    std::vector<RobotNode> links;
+    for (const RobotNode& node : root_.parts(kRobotChildren)) {
+      if (node.name() == "link") {
+        node.check({{"name"}, {"type", Fate::idle, kSoftware}});
+        const std::string name = node.text("name");
+        if (std::find(link_names_.begin(), link_names_.end(), name) != link_names_.end())
+          node.fail("link name '" + name + "' is used twice");
+        link_names_.push_back(name);
+        links.push_back(node);
+      } else {
+        read_joint(node);
+      }
+    }
+    if (links.empty()) root_.fail("has no <link>");
+    for (const Joint& joint : joints_) check_ends(joint);
+    for (const std::string& name : link_names_) names_.keep(name);
+    for (const Joint& joint : joints_) names_.keep(joint.joint.name);
+    int roots = 0;
+    for (std::size_t i = 0; i < links.size(); ++i) {
+      const bool carried = std::any_of(joints_.begin(), joints_.end(),
+                                       [&](const Joint& j) { return j.child == link_names_[i]; });
+      if (carried) continue;
+      if (++roots > 1)
+        links[i].fail("link '" + link_names_[i] +
+                      "' hangs on no joint, and neither does another; expected one root");
+      JointDescription base;
+      base.name = names_.free_name(link_names_[i] + "_base");
+      base.type = free_base_ ? JointType::free : JointType::fixed;
+      base.source = links[i].source();
+      add(links, i, -1, base, free_base_ ? "moves freely" : "stands in the world", 0);
+    }
+    for (const Joint& joint : joints_)
+      if (!joint.used)
+        joint.node.fail("joint '" + joint.joint.name + "' is part of a ring of links, or of " +
+                        "nothing that hangs on a root; expected a tree");
+  }
+
+ private:
+  void read_joint(const RobotNode& node) {
+    node.check({{"name"}, {"type"}});
+    Joint out{{}, "", "", "", node};
+    const std::vector<RobotNode> parts = node.parts(kJointChildren);
+    static const std::vector<std::string> types = {"fixed",     "revolute", "continuous",
+                                                   "prismatic", "floating", "planar"};
+    out.type = types[std::size_t(node.choice("type", types))];
+    JointDescription& joint = out.joint;
+    joint.name = node.text("name");
+    joint.source = node.source();
+    for (const Joint& other : joints_)
+      if (other.joint.name == joint.name)
+        node.fail(fmt::format("joint name '{}' is used twice, first in line {}", joint.name,
+                              other.joint.source.line));
+    const auto end_of = [&](const char* which) {
+      const RobotNode end = required(node, parts, which);
+      end.check({{"link"}});
+      return end.text("link");
+    };
+    out.parent = end_of("parent");
+    out.child = end_of("child");
+    joint.pose = read_origin(only(parts, "origin"));
+    const bool has_axis = out.type == "revolute" || out.type == "continuous" ||
+                          out.type == "prismatic" || out.type == "planar";
+    joint.axis0 = {1, 0, 0};
+    if (const auto axis = only(parts, "axis")) {
+      axis->check({{"xyz"}});
+      if (has_axis)
+        joint.axis0 = axis->direction("xyz", joint.axis0);
+      else
+        axis->idle("<axis> of a joint that has none");
+    }
+    if (out.type == "revolute" || out.type == "continuous") joint.type = JointType::revolute;
+    if (out.type == "prismatic") joint.type = JointType::prismatic;
+    if (out.type == "planar") joint.type = JointType::free2d;
+    if (out.type == "floating") joint.type = JointType::free;
+    read_limit(node, parts, out);
+    if (const auto dynamics = only(parts, "dynamics")) {
+      dynamics->check({{"damping"}, {"friction", Fate::zero, "dry friction of a joint"}});
+      joint.damping = dynamics->not_negative("damping", 0.0);
+      if (joint.type == JointType::fixed && joint.damping != 0) {
+        joint.damping = 0;
+        dynamics->idle("<dynamics> of a fixed joint");
+      }
+    }
+    joints_.push_back(std::move(out));
+  }
+
+  void read_limit(const RobotNode& node, const std::vector<RobotNode>& parts, Joint& out) const {
+    const auto limit = only(parts, "limit");
+    const bool needed = out.type == "revolute" || out.type == "prismatic";
+    if (!limit) {
+      if (needed) node.fail("a " + out.type + " joint has no <limit>; expected one");
+      return;
+    }
+    limit->check({{"lower"},
+                  {"upper"},
+                  {"effort"},
+                  {"velocity", Fate::idle, "the largest speed, which the controller keeps"},
+                  {"acceleration", Fate::idle, kSoftware},
+                  {"jerk", Fate::idle, kSoftware}});
+    if (const double effort = limit->not_negative("effort", 0.0); effort > 0)
+      robot_.efforts[out.joint.name] = effort;
+    const bool bounded = limit->given("lower") || limit->given("upper");
+    if (!needed) {
+      if (bounded) limit->idle("<limit> lower, upper: of a " + out.type + " joint");
+      return;
+    }
+    const double low = limit->number("lower", 0.0), high = limit->number("upper", 0.0);
+    if (!(low <= high))
+      limit->fail(fmt::format("lower=\"{}\" upper=\"{}\": expected low, then high", low, high));
+    if (low < high)
+      out.joint.limits = {low, high};
+    else
+      limit->changed("<limit> lower and upper are equal, so the joint is without limits");
+  }
+
+  void check_ends(const Joint& joint) const {
+    for (const std::string& end : {joint.parent, joint.child})
+      if (std::find(link_names_.begin(), link_names_.end(), end) == link_names_.end())
+        joint.node.fail(fmt::format("joint '{}': no link is named '{}'{}", joint.joint.name, end,
+                                    suggestion(end, link_names_)));
+    for (const Joint& other : joints_)
+      if (&other != &joint && other.child == joint.child)
+        joint.node.fail(fmt::format("link '{}' is the child of two joints, '{}' and '{}'",
+                                    joint.child, other.joint.name, joint.joint.name));
+  }
+
+  /// Adds link `i` and all that hang on it.
+  void add(const std::vector<RobotNode>& links, std::size_t i, int parent, JointDescription joint,
+           const std::string& how, int depth) {
+    const RobotNode& node = links[i];
+    if (depth > kDeepestChain)
+      node.fail(fmt::format("more than {} links in a chain", kDeepestChain));
+    const std::string& name = link_names_[i];
+    const std::string origin = fmt::format("<link>, {}", how);
+    // A planar joint moves across its axis, and a free2d joint across z.
+    const Pose aligned{{0, 0, 0}, from_z(joint.axis0)};
+    if (joint.type == JointType::free2d && aligned.orientation[0] < 1) {
+      joint.pose = compose(joint.pose, aligned);
+      JointDescription rest;
+      rest.name = names_.free_name(name + "_turn");
+      rest.pose = inverse(aligned);
+      rest.source = joint.source;
+      const std::string plane = names_.free_name(name + "_plane");
+      parent = add_link(robot_, names_, plane, parent, joint, {}, "z across the plane of the joint",
+                        joint.source);
+      joint = rest;
+    }
+    const int index = add_link(robot_, names_, name, parent, std::move(joint), pieces_of(node),
+                               origin, node.source());
+    for (Joint& next : joints_) {
+      if (next.parent != name) continue;
+      next.used = true;
+      const auto child = std::find(link_names_.begin(), link_names_.end(), next.child);
+      add(links, std::size_t(child - link_names_.begin()), index, next.joint,
+          fmt::format("on the {} joint '{}' of line {}", next.type, next.joint.name,
+                      next.joint.source.line),
+          depth + 1);
+    }
+  }
+
+  [[nodiscard]] std::vector<RobotPiece> pieces_of(const RobotNode& node) const {
+    std::vector<RobotPiece> pieces;
+    const std::vector<RobotNode> parts = node.parts(kLinkChildren);
+    for (const RobotNode& part : parts)
+      if (part.name() == "collision") pieces.push_back(read_collision(part));
+    const auto inertial = only(parts, "inertial");
+    if (!inertial) return pieces;
+    inertial->check({});
+    const std::vector<RobotNode> inside = inertial->parts({{"origin"}, {"mass"}, {"inertia"}});
+    const RobotNode mass = required(*inertial, inside, "mass");
+    const RobotNode inertia = required(*inertial, inside, "inertia");
+    mass.check({{"value"}});
+    Words six;
+    std::array<double, 6> I{};
+    for (const char* name : {"ixx", "ixy", "ixz", "iyy", "iyz", "izz"}) {
+      I[six.size()] = inertia.number(name, 0.0);
+      six.push_back({name});
+    }
+    inertia.check(six);
+    const double kg = mass.number("value");
+    const Pose at = read_origin(only(inside, "origin"));
+    if (kg != 0 || std::any_of(I.begin(), I.end(), [](double x) { return x != 0; }))
+      pieces.push_back(inertial_piece(kg, I, at, "<inertial>", inertial->source()));
+    return pieces;
+  }
+
+  [[nodiscard]] RobotPiece read_collision(const RobotNode& node) const {
+    node.check({{"name", Fate::read}, {"group", Fate::idle, kSoftware}});
+    const std::vector<RobotNode> parts =
+        node.parts({{"origin"},
+                    {"geometry"},
+                    {"verbose", Fate::idle, kSoftware},
+                    {"material", Fate::idle, kPictures},
+                    {"contact_coefficients", Fate::idle, "coefficients of another contact law"}});
+    RobotPiece piece;
+    piece.pose = read_origin(only(parts, "origin"));
+    piece.origin = "<collision>";
+    piece.source = node.source();
+    const RobotNode geometry = required(node, parts, "geometry");
+    geometry.check({});
+    const std::vector<RobotNode> shapes =
+        geometry.parts({{"box"}, {"sphere"}, {"cylinder"}, {"capsule"}, {"mesh"}});
+    if (shapes.size() != 1)
+      geometry.fail(fmt::format("has {} shapes; expected one", shapes.size()));
+    read_shape(shapes[0], piece);
+    return piece;
+  }
+
+  void read_shape(const RobotNode& node, RobotPiece& piece) const {
+    const std::string type = node.name();
+    if (type == "box") {
+      node.check({{"size"}});
+      CuboidShape box;
+      box.size = node.vector("size");
+      for (const double edge : box.size)
+        if (!(edge > 0)) node.fail(fmt::format("size has {}; expected positive lengths", edge));
+      piece.shape = box;
+    } else if (type == "sphere") {
+      node.check({{"radius"}});
+      piece.shape = SphereShape{node.positive("radius")};
+    } else if (type == "mesh") {
+      node.check({{"filename"}, {"scale"}});
+      piece.mesh = {find_mesh(node, node.text("filename"), ""),
+                    node.vector("scale", Vector3{1, 1, 1})};
+      piece.shape = read_robot_mesh(node, piece.mesh);
+    } else {
+      node.check({{"radius"}, {"length"}});
+      const double radius = node.positive("radius"), length = node.positive("length");
+      if (type == "cylinder")
+        piece.shape = CylinderShape{length, radius};
+      else
+        piece.shape = CapsuleShape{length, radius};
+    }
+  }
+
+  const RobotNode& root_;
+  Robot& robot_;
+  bool free_base_;
+  RobotNames names_;
+  std::vector<std::string> link_names_;
+  std::vector<Joint> joints_;
+};
+
+}  // namespace
+
+void read_urdf(const RobotNode& root, bool free_base) {
+  root.robot().format = "URDF";
+  UrdfReader(root, free_base).read();
+}
+
+}  // namespace tangere

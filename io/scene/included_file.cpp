@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// An included file keeps its unit and its defaults to itself, so that a file means the same
+// wherever it is included.
+#include "io/scene/included_file.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "io/files/text_file.hpp"
+#include "io/scene/xml_document.hpp"
+
+namespace tangere {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLargestInclude = std::size_t{64} << 20;
+constexpr std::size_t kMostFiles = 1000;  // a few files that each name two others would never end
+
+bool is_scene(const std::string& root) { return root == "redmax" || root == "tangere"; }
+
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code not_both_there;
+  return fs::equivalent(a, b, not_both_there) ||
+         fs::path(a).lexically_normal() == fs::path(b).lexically_normal();
+}
+
+void refuse_rings(const SceneNode& include, const std::string& path) {
+  std::string way = path;
+  for (const SceneContext* c = &include.context(); c != nullptr; c = c->includer) {
+    way = c->file + " includes " + way;
+    if (same_file(c->file, path)) include.fail("files that include each other: " + way);
+  }
+}
+
+/// Reads the root's own attributes. The unit of a scene stands in its <option>.
+void read_head(const tinyxml2::XMLElement& root, SceneContext& context) {
+  const bool scene = is_scene(root.Name());
+  const SceneNode node(root, context);
+  node.check_attributes(scene ? std::vector<std::string>{"model", "name"}
+                              : std::vector<std::string>{"unit", "name"});
+  const tinyxml2::XMLElement* const option = root.FirstChildElement("option");
+  const SceneNode of_unit = scene && option != nullptr ? SceneNode(*option, context) : node;
+  const bool metres =
+      (!scene || option != nullptr) && of_unit.choice("unit", {"cm-g", "m-kg"}, 0) == 1;
+  if (!metres) context.use_centimetres_and_grams();
+}
+
+/// Numbers of an <include> would be taken in the unit of the file that it names.
+void check_units(const SceneNode& include, const tinyxml2::XMLElement& element,
+                 const SceneContext& inner) {
+  if (include.context().length == inner.length) return;
+  for (const tinyxml2::XMLAttribute* a = element.FirstAttribute(); a != nullptr; a = a->Next()) {
+    const std::string_view value = a->Value();
+    const bool number = !value.empty() &&
+                        value.find_first_not_of(" \t\n0123456789+-.,eE") == std::string_view::npos;
+    if (number && std::string_view(a->Name()) != "file")
+      include.fail(fmt::format("{}=\"{}\": this file is in {} and {} in {}; expected the same unit",
+                               a->Name(), value, inner.length == 1 ? "cm-g" : "m-kg", inner.file,
+                               inner.length == 1 ? "m-kg" : "cm-g"));
+  }
+}
+
+}  // namespace
+
+const IncludedFile& include_file(const SceneNode& include, const SceneNode& parent) {
+  SceneContext& outer = include.context();
+  const std::string path =
+      (fs::path(outer.file).parent_path() / include.text("file")).lexically_normal().string();
+  refuse_rings(include, path);
+  auto& all = outer.outermost().included;
+  if (all.size() >= kMostFiles)
+    include.fail(fmt::format("more than {} files in one scene", kMostFiles));
+  const std::string name = parent.name();
+  const std::string expected = is_scene(name) ? "the root <tangere>" : "the root <" + name + ">";
+  const auto file = std::make_shared<IncludedFile>();
+  all.push_back(file);
+  file->context = std::make_unique<SceneContext>();
+  SceneContext& context = *file->context;
+  context.file = path;
+  context.allow_unknown = outer.allow_unknown;
+  context.includer = &outer;
+  try {
+    const std::string text = read_text_file(path, kLargestInclude, "a scene file");
+    file->root = &parse_xml(file->document, text, path, expected, outer.outermost().warnings);
+  } catch (const IoError& e) {
+    throw IoError(include.source().prefix() + "<include>: " + e.what());
+  }
+  const std::string root = file->root->Name();
+  if (root != name && !(is_scene(root) && is_scene(name)))
+    include.fail(fmt::format("{} has the root <{}>; expected {}", path, root, expected));
+  read_head(*file->root, context);
+  check_units(include, include.element(), context);
+  return *file;
+}
+
+}  // namespace tangere

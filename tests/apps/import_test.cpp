@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// tangere import as a user runs it: a gripper and a vase become a data set, word for word as in
+// docs/robots.md, and what is refused.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "tests/apps/program.hpp"
+
+namespace tangere::apps {
+namespace {
+
+using nlohmann::json;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+const std::string kGrasp = TANGERE_SOURCE_DIR "/examples/grasp";
+const std::string kHand = TANGERE_TEST_DATA "/robots/hand.urdf";
+
+TEST(Import, AGripperAndAnObjectBecomeADataSet) {
+  const Folder folder;
+  std::filesystem::copy(kGrasp, folder.path("grasp"), std::filesystem::copy_options::recursive);
+  const Words command = {"import",  "grasp/gripper.urdf",
+                         "-o",      "grasp/gripper.xml",
+                         "--pad",   "left_finger=gelsight_mini@-y",
+                         "--pad",   "right_finger=gelsight_mini@+y",
+                         "--motor", "lift=2000,100",
+                         "--motor", "left_slide=400,20",
+                         "--motor", "right_slide=400,20"};
+  const Outcome refused = run(folder, command);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("<mimic>: ties a joint to another; scenes cannot (line "));
+  EXPECT_FALSE(std::filesystem::exists(folder.path("grasp/gripper.xml")));
+  const json made = run_json(folder, command + Words{"--drop"});
+  EXPECT_EQ(made["format"], "URDF");
+  EXPECT_EQ(made["joints"], 3);
+  EXPECT_EQ(made["motors"], 3);
+  EXPECT_EQ(made["sensors"], 2);
+  EXPECT_THAT(made["lost"], SizeIs(1));
+  EXPECT_EQ(run(folder, command + Words{"--drop"}).exit_code, 3) << "an output is kept";
+  EXPECT_EQ(run_json(folder, {"inspect", "grasp/grasp.xml"})["u_names"],
+            json({"lift.rate", "left_slide.rate", "right_slide.rate"}));
+  run_json(folder, {"simulate", "grasp/grasp.xml", "-o", "run.h5", "--steps", "20"});
+  run_json(folder, {"view", "run.h5", "-o", "run.html"});
+  run_json(folder, {"generate", "grasp/grasp.xml", "-o", "data", "--episodes", "2", "--steps", "20",
+                    "--every", "10"});
+  run_json(folder, {"view", "data", "-o", "data.html", "--scene", "grasp/grasp.xml"});
+}
+
+TEST(Import, WhatIsNoRequestIsSaid) {
+  const Folder folder;
+  const auto fault = [&](const Words& more) {
+    const Outcome outcome =
+        run(folder, Words{"import", kHand, "--output", "hand.xml", "--overwrite"} + more);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_THAT(fault({"--pad", "tip"}), HasSubstr("--pad tip: expected LINK=LAYOUT"));
+  EXPECT_THAT(fault({"--pad", "tip=digt"}), HasSubstr("did you mean 'digit'"));
+  EXPECT_THAT(fault({"--pad", "tipp=digit"}), HasSubstr("did you mean 'tip'"));
+  EXPECT_THAT(fault({"--pad", "tip=digit@+x"}), HasSubstr("is no box"));
+  EXPECT_THAT(fault({"--pad", "tip=digit@1,2"}), HasSubstr("2 numbers behind '@'"));
+  EXPECT_THAT(fault({"--motor", "slid=force"}), HasSubstr("did you mean 'slide'"));
+  EXPECT_THAT(fault({"--motor", "slide=-1"}), HasSubstr("a gain P above 0"));
+  EXPECT_THAT(fault({"--motor", "loose=force"}), HasSubstr("no <limit effort>"));
+  EXPECT_THAT(fault({"--contact", "finger=groun"}), HasSubstr("has no link 'groun'"));
+  EXPECT_THAT(fault({"--base", "afloat"}), HasSubstr("expected fixed or free"));
+  const Outcome same = run(folder, {"import", kHand, "-o", kHand, "--overwrite"});
+  EXPECT_EQ(same.exit_code, 2);
+  EXPECT_THAT(run(folder, {"inspect", kHand}).err,
+              HasSubstr("'tangere import' makes a scene of it"));
+  EXPECT_EQ(run(folder, {"import", "none.urdf", "-o", "none.xml"}).exit_code, 3);
+  EXPECT_THAT(folder.files(), ElementsAre());
+}
+
+TEST(Import, EveryLayoutLoads) {
+  const Folder folder;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(TANGERE_SOURCE_DIR "/scenes/sensors")) {
+    if (entry.path().extension() != ".xml") continue;
+    const std::string name = entry.path().stem().string();
+    const json made = run_json(folder, {"import", kHand, "-o", name + ".xml", "--pad",
+                                        "finger=" + name + "@0,0,0.06", "--quiet"});
+    EXPECT_EQ(made["sensors"], 1) << name;
+    EXPECT_EQ(run_json(folder, {"inspect", name + ".xml"})["sensors"][0]["pressure_sign"], 1);
+  }
+}
+
+}  // namespace
+}  // namespace tangere::apps

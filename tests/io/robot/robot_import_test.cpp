@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+// What import says about robots that it cannot take over whole, and what it writes.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "io/robot/robot_import.hpp"
+#include "io/robot/rotations.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "tests/files.hpp"
+#include "tests/io/synthetic_run.hpp"
+
+namespace tangere {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+const std::string kRobots = TANGERE_TEST_DATA "/robots/";
+
+ImportedScene import(const std::string& text, const RobotOptions& options = {}) {
+  const testing::Folder folder;
+  const std::string path = folder / "robot.xml";
+  std::ofstream(path) << text;
+  return import_robot(path, folder / "scene.xml", options);
+}
+
+std::string fault_of(const std::string& text, const RobotOptions& options = {}) {
+  try {
+    import(text, options);
+  } catch (const InputError& error) {
+    const std::string what = error.what();
+    return what.substr(what.find("robot.xml"));
+  }
+  return "";
+}
+
+/// A robot of one link that turns, with `more` inside <robot> from line 5 on.
+std::string urdf(const std::string& more) {
+  return "<robot name=\"r\">\n"
+         "<link name=\"a\"/>\n"
+         "<link name=\"b\"><inertial><mass value=\"1\"/>"
+         "<inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial></link>\n"
+         "<joint name=\"j\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/></joint>\n" +
+         more + "</robot>\n";
+}
+/// A model of one body that turns, with `more` inside it from line 2 on.
+std::string mjcf(const std::string& more, const std::string& after = "") {
+  return "<mujoco><worldbody><body name=\"b\">\n" + more + "</body></worldbody>\n" + after +
+         "</mujoco>\n";
+}
+const std::string kBall = "<joint name=\"j\"/><geom size=\"0.1\"/>\n";
+
+TEST(RobotImport, UrdfMistakesNameTheLine) {
+  EXPECT_EQ(fault_of(urdf("")), "");
+  EXPECT_THAT(fault_of(urdf("<lnk/>")),
+              HasSubstr("robot.xml:5: <lnk>: unknown element inside <robot>; did you mean 'link'"));
+  EXPECT_THAT(fault_of(urdf("<link name=\"a\"/>")), HasSubstr(":5: <link>: link name 'a' is used"));
+  EXPECT_THAT(fault_of(urdf("<link name=\"c\"/>")), HasSubstr("expected one root"));
+  const auto joint = [](const std::string& type, const std::string& inside) {
+    return urdf("<link name=\"c\"/>\n<joint name=\"k\" type=\"" + type +
+                "\"><parent link=\"b\"/><child link=\"c\"/>" + inside + "</joint>");
+  };
+  EXPECT_EQ(fault_of(joint("fixed", "")), "");
+  EXPECT_THAT(fault_of(joint("revolt", "")),
+              HasSubstr(":6: <joint>: type=\"revolt\" is not known"));
+  EXPECT_THAT(fault_of(joint("revolute", "")), HasSubstr("has no <limit>"));
+  EXPECT_THAT(fault_of(joint("prismatic", "<limit lower=\"1\" upper=\"0\"/>")),
+              HasSubstr("expected low, then high"));
+  EXPECT_THAT(fault_of(joint("fixed", "<origin xyz=\"0 0\"/>")),
+              HasSubstr(":6: <origin>: xyz=\"0 0\" has 2 numbers; expected 3"));
+  EXPECT_THAT(fault_of(joint("continuous", "<axis xyz=\"0 0 0\"/>")), HasSubstr("no direction"));
+  EXPECT_THAT(fault_of(joint("continuous", "")),
+              HasSubstr(":6: joint 'k' moves nothing that has mass"));
+  EXPECT_THAT(fault_of(urdf("<joint name=\"k\" type=\"fixed\"><parent link=\"a\"/>"
+                            "<child link=\"bb\"/></joint>")),
+              HasSubstr("no link is named 'bb'; did you mean 'b'"));
+  EXPECT_THAT(fault_of(urdf("<link name=\"c\"/><link name=\"d\"/>\n"
+                            "<joint name=\"k\" type=\"fixed\"><parent link=\"c\"/>"
+                            "<child link=\"d\"/></joint>\n"
+                            "<joint name=\"l\" type=\"fixed\"><parent link=\"d\"/>"
+                            "<child link=\"c\"/></joint>")),
+              HasSubstr(":6: <joint>: joint 'k' is part of a ring"));
+  EXPECT_THAT(fault_of(urdf("<link name=\"c\"><inertial><mass value=\"1\"/>"
+                            "<inertia ixx=\"1\" iyy=\"1\" izz=\"5\"/></inertial></link>"
+                            "<joint name=\"k\" type=\"fixed\"><parent link=\"a\"/>"
+                            "<child link=\"c\"/></joint>")),
+              HasSubstr("no solid body of mass 1 kg has the inertia"));
+  EXPECT_THAT(fault_of(urdf("<xacro:macro/>")), HasSubstr("a macro of xacro"));
+  const std::string mesh = "<link name=\"c\"><collision><geometry>\n<mesh filename=\"";
+  EXPECT_THAT(fault_of(urdf(mesh + "none.obj\"/></geometry></collision></link>"
+                                   "<joint name=\"k\" type=\"fixed\"><parent link=\"a\"/>"
+                                   "<child link=\"c\"/></joint>")),
+              HasSubstr("robot.xml:6: <mesh>: the file \"none.obj\" is not there; looked for"));
+}
+
+TEST(RobotImport, MjcfMistakesNameTheLine) {
+  EXPECT_EQ(fault_of(mjcf(kBall)), "");
+  EXPECT_THAT(fault_of(mjcf("<joint name=\"j\" rang=\"0 1\"/>" + kBall)),
+              HasSubstr("robot.xml:2: <joint>: unknown attribute 'rang'; did you mean 'range'"));
+  EXPECT_THAT(fault_of(mjcf(kBall, "<default><geom rgb=\"1 0 0 1\"/></default>")),
+              HasSubstr(":4: <geom>: unknown attribute 'rgb'"));
+  EXPECT_THAT(fault_of(mjcf("<geom class=\"smal\" size=\"1\"/>",
+                            "<default><default class=\"small\"/></default>")),
+              HasSubstr("class=\"smal\": no default has this class; did you mean 'small'"));
+  EXPECT_THAT(fault_of(mjcf("<geom type=\"box\" size=\"1 1\"/>")),
+              HasSubstr("size has 2 numbers; expected 3"));
+  EXPECT_THAT(fault_of(mjcf(kBall + "<freejoint/>")), HasSubstr("a free joint"));
+  EXPECT_THAT(fault_of(mjcf(kBall, "<actuator><motor joint=\"k\"/></actuator>")),
+              HasSubstr(":4: <motor>: joint=\"k\": no joint has this name; did you mean 'j'"));
+  EXPECT_THAT(fault_of(mjcf("<geom type=\"mesh\" mesh=\"m\"/>")),
+              HasSubstr("mesh=\"m\": no mesh has this name"));
+  EXPECT_THAT(fault_of(mjcf("<joint/><geom size=\"0.1\" quat=\"1 0 0 0\" euler=\"0 0 0\"/>")),
+              HasSubstr("both 'quat' and 'euler'"));
+  EXPECT_THAT(fault_of("<mujoco><include file=\"a.xml\"/></mujoco>"),
+              HasSubstr("files inside a file are not read"));
+  EXPECT_THAT(fault_of("<tangere/>"), HasSubstr("This is a scene already"));
+}
+
+TEST(RobotImport, ListsWhatChangesTheMotion) {
+  const ImportedScene arm = import_robot(kRobots + "arm.xml", kRobots + "scene.xml");
+  const std::string file = kRobots + "arm.xml: ";
+  EXPECT_THAT(arm.lost,
+              ElementsAre(file + "<tendon>: tendons; scenes have none (line 17)",
+                          file + "<equality>: constraints between bodies or joints; scenes have "
+                                 "none (line 20)",
+                          file + "<flag> contact: switches forces (line 5)",
+                          file + "<joint> frictionloss: dry friction of a joint (line 9)",
+                          file + "<muscle>: an actuator that scenes do not have (line 27)",
+                          file + "<motor> on a tendon: scenes drive joints (line 24)",
+                          file + "<position>: a second actuator of joint 'elbow' (line 26)"));
+  EXPECT_THAT(arm.idle, Contains(HasSubstr("<geom> friction: coefficients of MuJoCo's contacts")));
+  EXPECT_THAT(arm.idle, Contains(HasSubstr("<keyframe>: stored states")));
+  EXPECT_THAT(arm.changed, Contains(HasSubstr("<motor> without ctrlrange")));
+  EXPECT_THAT(arm.text, HasSubstr("Left out, and the motion differs by it:"));
+  const ImportedScene gripper = import_robot(kRobots + "gripper.urdf", kRobots + "scene.xml");
+  EXPECT_THAT(gripper.lost, ElementsAre(HasSubstr("<mimic>")));
+}
+
+TEST(RobotImport, AddsSkinsMotorsAndContacts) {
+  RobotOptions options;
+  options.pads = {{"left_finger",
+                   "grid_16x16",
+                   file_bytes(TANGERE_SOURCE_DIR "/scenes/sensors/grid_16x16.xml"),
+                   {},
+                   "-y"}};
+  options.motors = {{"left_slide", 400.0, 20.0}, {"right_slide"}};
+  options.touches = {{"left_finger", "right_finger"}, {"left_finger", "ground"}};
+  const ImportedScene made = import_robot(kRobots + "gripper.urdf", kRobots + "scene.xml", options);
+  const Scene scene = parse_scene(made.text, kRobots + "scene.xml").scene;
+  ASSERT_EQ(scene.sensors.size(), 1U);
+  EXPECT_EQ(scene.sensors[0].body, "left_finger");
+  EXPECT_EQ(scene.sensors[0].name, "left_finger_taxels");
+  // Row 0 on top, column 0 on the left as seen from outside, on the face y = -6 mm.
+  const RectArray& array = scene.sensors[0].array;
+  EXPECT_THAT(array.corner0, ElementsAre(::testing::DoubleNear(-0.0075, 1e-15),
+                                         ::testing::DoubleNear(-0.006, 1e-15),
+                                         ::testing::DoubleNear(0.0075, 1e-15)));
+  ASSERT_EQ(scene.motors.size(), 2U);
+  EXPECT_EQ(scene.motors[0].P, 400);
+  EXPECT_EQ(scene.motors[0].high, 40);
+  EXPECT_EQ(scene.motors[1].control, MotorControl::force);
+  EXPECT_EQ(scene.pair_contacts.size(), 1U);
+  EXPECT_EQ(scene.ground_contacts.size(), 1U);
+  EXPECT_GT(scene.pair_contacts[0].coefficients[0], 0);
+  ASSERT_TRUE(scene.links[2].joint.limits.has_value());
+  EXPECT_EQ(scene.links[2].joint.limit_stiffness, 40 / 1e-3);  // the effort, a millimetre deep
+  options.motors = {{"left_slid"}};
+  EXPECT_THROW(import_robot(kRobots + "gripper.urdf", kRobots + "scene.xml", options), InputError);
+}
+
+TEST(RobotImport, AFreeBaseFalls) {
+  RobotOptions options;
+  options.free_base = true;
+  const ImportedScene made = import_robot(kRobots + "gripper.urdf", kRobots + "scene.xml", options);
+  const Scene scene = parse_scene(made.text, "scene.xml").scene;
+  EXPECT_EQ(scene.links[0].joint.type, JointType::free);
+  EXPECT_THAT(fault_of("<mujoco/>", options),
+              HasSubstr("a MJCF file says itself what moves freely"));
+}
+
+TEST(RobotImport, RotationsAreThoseOfTheFormats) {
+  const Quaternion yaw = from_rpy({0, 0, M_PI / 2});
+  EXPECT_NEAR(yaw[3], std::sqrt(0.5), 1e-15);
+  // Roll, then yaw about fixed axes: y of the inner frame points along -x, its z stays.
+  const Pose pose{{0, 0, 0}, from_rpy({M_PI / 2, 0, M_PI / 2})};
+  const Vector3 z = outer_direction(pose, {0, 0, 1});
+  EXPECT_NEAR(z[0], 1, 1e-15);  // roll takes z to -y, yaw takes -y to x
+  for (const Vector3& d : {Vector3{0, 0, -1}, Vector3{0.3, -0.4, 0.2}, Vector3{0, 0, 2}}) {
+    const Vector3 turned = outer_direction({{0, 0, 0}, from_z(d)}, {0, 0, 1});
+    const double length = std::sqrt(dot(d, d));
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(turned[k], d[k] / length, 1e-15);
+  }
+}
+
+}  // namespace
+}  // namespace tangere

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// Imported robots move as MuJoCo moves them: masses, poses, bias forces and accelerations at random
+// states (tests/data/robots/make_reference.py).
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "engine/sense/readout.hpp"
+#include "io/robot/robot_import.hpp"
+#include "io/robot/rotations.hpp"
+#include "io/scene/scene_reader.hpp"
+#include "tests/engine/dense_dynamics.hpp"
+#include "tests/engine/stage_buffers.hpp"
+
+namespace tangere {
+namespace {
+
+using Dense = testing::DenseDynamics<double>;
+using Vector = Eigen::VectorXd;
+using Numbers = std::vector<double>;
+const std::string kRobots = TANGERE_TEST_DATA "/robots/";
+constexpr double kClose = 1e-9;
+
+struct ReferenceState {
+  std::map<std::string, Numbers> q, v, u, bias, acceleration, pose;  // by joint; pose by body
+};
+struct RobotReference {
+  std::map<std::string, double> mass;
+  std::vector<ReferenceState> states;
+};
+
+RobotReference read_reference(const std::string& path) {
+  RobotReference out;
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::string kind, name;
+    words >> kind >> name;
+    if (kind.empty() || kind == "#") continue;
+    Numbers numbers;
+    for (double x = 0; words >> x;) numbers.push_back(x);
+    if (kind == "mass") {
+      out.mass[name] = numbers.at(0);
+    } else if (kind == "state") {
+      out.states.emplace_back();
+    } else {
+      ReferenceState& s = out.states.at(out.states.size() - 1);
+      (kind == "q"              ? s.q
+       : kind == "v"            ? s.v
+       : kind == "u"            ? s.u
+       : kind == "bias"         ? s.bias
+       : kind == "acceleration" ? s.acceleration
+                                : s.pose)[name] = numbers;
+    }
+  }
+  return out;
+}
+
+/// Puts the numbers of each joint where the scene has them.
+Vector in_order(const Scene& scene, const std::map<std::string, Numbers>& by_joint,
+                int (*count)(JointType)) {
+  Numbers all;
+  for (const LinkDescription& link : scene.links) {
+    const int n = count(link.joint.type);
+    if (n == 0) continue;
+    const auto numbers = by_joint.find(link.joint.name);
+    if (numbers == by_joint.end() || static_cast<int>(numbers->second.size()) != n) {
+      ADD_FAILURE() << "the reference has no " << n << " numbers of joint " << link.joint.name;
+      return Vector::Zero(1000);
+    }
+    all.insert(all.end(), numbers->second.begin(), numbers->second.end());
+  }
+  return Eigen::Map<const Vector>(all.data(), static_cast<int>(all.size()));
+}
+
+void expect_close(const Vector& ours, const Vector& theirs, const char* what) {
+  ASSERT_EQ(ours.size(), theirs.size());
+  const double scale = std::max(1.0, theirs.cwiseAbs().maxCoeff());
+  for (int i = 0; i < ours.size(); ++i)
+    EXPECT_NEAR(ours[i], theirs[i], kClose * scale) << what << " " << i;
+}
+
+/// Accelerations by the kernels: the residual of a stage is linear in them.
+Vector kernel_acceleration(const Scene& scene, const Vector& q, const Vector& v,
+                           const std::vector<double>& u) {
+  const auto m = compile(scene);
+  testing::StageBuffers<double> b(*m);
+  for (int i = 0; i < m->nq; ++i) b.centre[std::size_t(i)] = q[i];
+  for (int i = 0; i < m->nv; ++i) b.r[std::size_t(i)] = v[i];
+  for (std::size_t k = 0; k < m->motors.size(); ++k) {
+    const CompiledMotor& motor = m->motors[k];
+    const auto dof = std::size_t(motor.dof);
+    if (motor.control == MotorControl::position)
+      b.target[dof] = u[k];
+    else
+      b.tau[dof] += motor.low + 0.5 * (u[k] + 1) * (motor.high - motor.low);
+  }
+  const auto residual = [&](const Vector& a) {
+    for (int i = 0; i < m->nv; ++i) b.s[std::size_t(i)] = a[i];
+    b.residual(0, 1);
+    return Vector(Eigen::Map<const Vector>(b.g.data(), m->nv));
+  };
+  const Vector rest = residual(Vector::Zero(m->nv));
+  Eigen::MatrixXd mass(m->nv, m->nv);
+  for (int k = 0; k < m->nv; ++k)
+    mass.col(k) = (residual(1e3 * Vector::Unit(m->nv, k)) - rest) / 1e3;
+  Vector a = mass.ldlt().solve(-rest);
+  return a - mass.ldlt().solve(residual(a));
+}
+
+void compare(const std::string& robot, const std::string& name) {
+  const ImportedScene imported = import_robot(kRobots + robot, kRobots + "scene.xml");
+  EXPECT_EQ(imported.lost, std::vector<std::string>());
+  Scene scene = parse_scene(imported.text, kRobots + "scene.xml").scene;
+  for (LinkDescription& link : scene.links) link.joint.limits.reset();
+  const RobotReference reference = read_reference(kRobots + name);
+  ASSERT_EQ(reference.states.size(), 5U);
+  const Model model(scene);
+  std::map<std::string, int> index;
+  for (std::size_t i = 0; i < scene.links.size(); ++i)
+    index[scene.links[i].name] = static_cast<int>(i);
+  std::map<std::string, double> mass;
+  for (std::size_t i = 0; i < scene.links.size(); ++i) {
+    auto at = static_cast<int>(i);
+    while (at >= 0 && !reference.mass.contains(scene.links[std::size_t(at)].name))
+      at = scene.links[std::size_t(at)].parent;
+    if (at >= 0) mass[scene.links[std::size_t(at)].name] += model.mass(static_cast<int>(i));
+  }
+  for (const auto& [body, kg] : reference.mass) EXPECT_NEAR(mass[body], kg, kClose * kg) << body;
+
+  // The dense equations know no meshes: here these are given by mass and inertia.
+  Scene plain = scene;
+  for (LinkDescription& link : plain.links) {
+    if (!std::holds_alternative<MeshShape>(link.body.shape)) continue;
+    const MassProperties p = mass_properties(link.body.shape, link.body.density);
+    const auto& I = p.inertia.m;
+    link.body.shape =
+        AbstractShape{p.mass, {I[0][0], I[0][1], I[0][2], I[1][1], I[1][2], I[2][2]}, {}};
+    link.body.pose.position = outer_point(link.body.pose, {p.centre.x, p.centre.y, p.centre.z});
+  }
+  const Dense dense(plain);
+  Batch batch(model, 1, 1);
+  Readout readout(model);
+  for (const ReferenceState& state : reference.states) {
+    const Vector q = in_order(scene, state.q, position_count);
+    const Vector v = in_order(scene, state.v, dof_count);
+    ASSERT_EQ(q.size(), model.nq());
+    std::vector<double> u;
+    for (const MotorDescription& motor : scene.motors) u.push_back(state.u.at(motor.joint).at(0));
+    expect_close(dense.terms(q, v, u).bias, in_order(scene, state.bias, dof_count), "bias");
+    const Vector theirs = in_order(scene, state.acceleration, dof_count);
+    expect_close(dense.acceleration(q, v, u), theirs, "acceleration");
+    expect_close(kernel_acceleration(scene, q, v, u), theirs, "acceleration by kernels");
+    batch.set_state(0, {q.data(), std::size_t(q.size())}, {v.data(), std::size_t(v.size())});
+    Numbers poses(7 * scene.links.size()), twists(6 * scene.links.size());
+    readout.bodies(batch, 0, poses, twists);
+    for (const auto& [body, pose] : state.pose) {
+      const auto i = std::size_t(index.at(body));
+      const double* const p = &poses[7 * i];
+      const Pose at = compose({{p[0], p[1], p[2]}, {p[3], p[4], p[5], p[6]}},
+                              inverse(scene.links[i].body.pose));
+      const Quaternion& turn = at.orientation;
+      const double sign =
+          turn[0] * pose[3] + turn[1] * pose[4] + turn[2] * pose[5] + turn[3] * pose[6] < 0 ? -1
+                                                                                            : 1;
+      for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(at.position[k], pose[k], kClose) << body;
+      for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(sign * turn[k], pose[3 + k], kClose) << body;
+    }
+  }
+}
+
+TEST(RobotPhysics, UrdfMovesAsInMujoco) { compare("hand.urdf", "hand_reference.txt"); }
+TEST(RobotPhysics, MjcfMovesAsInMujoco) { compare("machine.xml", "machine_reference.txt"); }
+
+}  // namespace
+}  // namespace tangere
