@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <limits>
 
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
@@ -303,6 +304,51 @@ TEST(DamagedFile, ATrajectoryWithoutFiniteForcesIsNotDrawn) {
   change(folder.path("run.h5"),
          [](hid_t file) { put_numbers(file, "tactile/pad/force", "every", {0}); });
   EXPECT_THAT(run(folder, {"plot", "run.h5", "-o", "pads.svg"}).err, HasSubstr("every 0 steps"));
+}
+
+/// Every status of the steps becomes 77, which means nothing.
+void damage_status(hid_t file) {
+  const hid_t status = H5Dopen2(file, "solver/status", H5P_DEFAULT), all = H5Dget_space(status);
+  const std::vector<std::int8_t> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(all)),
+                                        77);
+  EXPECT_GE(H5Dwrite(status, H5T_NATIVE_INT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+  H5Sclose(all);
+  H5Dclose(status);
+}
+
+/// What a trajectory claims is checked before anyone counts with it.
+TEST(DamagedFile, ATrajectoryThatClaimsWhatNoRunHasIsRefused) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  struct Claim {
+    std::function<void(hid_t)> edit;
+    const char *of_run, *of_page;  // said by `simulate --state-from` and `view`; "": nothing
+  };
+  const Folder folder;
+  const Words run_words{"simulate", scene("rolling_ball_small.xml"), "--steps", "20"};
+  ASSERT_EQ(run(folder, run_words + Words{"-o", "whole.h5"}).exit_code, 0);
+  for (const Claim& claim :
+       {Claim{number(".", "first_step", kMost), "'first_step' is 9223372036854775807; expected 0",
+              "after 9223372036854775807 steps: the file is damaged"},
+        Claim{number(".", "first_step", -1), "'first_step' is -1; expected 0 to",
+              "after -1 steps: the file is damaged"},
+        Claim{number(".", "steps", kMost), "'steps' is 9223372036854775807; expected 0 to",
+              "9223372036854775807 steps of 1 environments"},
+        Claim{number(".", "steps", 3), "the states are damaged", "claims 4 fields of 3 steps"},
+        Claim{number(".", "environments", (std::int64_t{1} << 32) + 1),
+              "'environments' is 4294967297; expected 1 to 2147483647", "has the shape"},
+        Claim{number(".", "first_episode", kMost), "'first_episode' is 9223372036854775807", ""},
+        Claim{damage_status, "solver status 77 of row 20: the file is damaged", ""}}) {
+    fs::copy_file(folder.path("whole.h5"), folder.path("run.h5"),
+                  fs::copy_options::overwrite_existing);
+    change(folder.path("run.h5"), claim.edit);
+    const Outcome more = run(folder, run_words + Words{"--state-from", "run.h5", "-o", "more.h5"});
+    expect_answer(more, "simulate --state-from", claim.of_run);
+    EXPECT_EQ(more.exit_code, 3) << more.err;
+    expect_answer(run(folder, {"view", "run.h5", "-o", "run.html", "--overwrite"}), "view",
+                  claim.of_page);
+    expect_answer(run(folder, {"plot", "run.h5", "-o", "run.svg", "--overwrite"}), "plot", "");
+    EXPECT_FALSE(fs::exists(folder.path("more.h5")));
+  }
 }
 
 TEST(DamagedFile, OtherThanRegularFilesAreRefused) {

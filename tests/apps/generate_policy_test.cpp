@@ -221,6 +221,60 @@ TEST(GeneratePolicy, AProgramThatDoesNotAnswerLeavesNothing) {
   }
 }
 
+/// Goes wrong at the question whose number is given; shards that were complete then stay.
+TEST(GeneratePolicy, AProgramThatGoesWrongLeavesWholeShards) {
+  const Folder folder;
+  const std::string program = "exec " TANGERE_POLICY_PROGRAM " ";
+  const Words words = pushes("set", {"--shards", "3", "--threads", "1", "--quiet", "--program"});
+  ASSERT_EQ(run(folder, words + Words{program}).exit_code, 0);
+  const std::string whole = folder.read("set/shard-00000.h5");
+  struct Case {
+    const char* what;
+    int exit_code;
+    const char* says;
+  };
+  for (const Case& c :
+       {Case{"dies", 3, "has ended with exit code 7"}, Case{"crashes", 3, "has ended by a signal"},
+        Case{"hangs", 3, "has not answered within 1 s"},
+        Case{"closes", 3, "has closed its standard output"},
+        Case{"half", 3, "has ended with exit code 0"},
+        Case{"nan", 2, "answers nan as number 2 of action"},
+        Case{"garbage", 2, "nan as number 0 of action"}, Case{"negative", 2, "answers -1 numbers"},
+        Case{"endless", 2, "answers 9223372036854775807 numbers"},
+        Case{"floods", 2, "answers 0 numbers"}})
+    for (const char* const when : {"0", "150"}) {
+      SCOPED_TRACE(std::string(c.what) + " at question " + when);
+      fs::remove_all(folder.path("set"));
+      const bool late = std::string(c.what) == "hangs";
+      const Outcome outcome = run(folder, words + Words{program + c.what + " " + when,
+                                                        "--program-timeout", late ? "1" : "300"});
+      EXPECT_EQ(outcome.signal, 0);
+      EXPECT_EQ(outcome.exit_code, c.exit_code) << outcome.err;
+      EXPECT_THAT(outcome.err, HasSubstr(c.says));
+      std::vector<std::string> names;
+      if (fs::exists(folder.path("set")))
+        for (const auto& entry : fs::directory_iterator(folder.path("set")))
+          names.push_back(entry.path().filename());
+      // A block of 16 episodes takes 100 questions, and the first shard has one block.
+      if (std::string(when) == "0") {
+        EXPECT_THAT(names, ::testing::IsEmpty());
+        continue;
+      }
+      ASSERT_THAT(names, ElementsAre("shard-00000.h5"));
+    }
+}
+
+/// An answer that trickles in is late as well.
+TEST(GeneratePolicy, AProgramThatAnswersBitByBitIsLate) {
+  const Folder folder;
+  const Outcome outcome =
+      run(folder, pushes("set", {"--program", "while printf x; do sleep 0.02; done",
+                                 "--program-timeout", "0.5", "--quiet"}));
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("has not answered within 0.5 s (--program-timeout)"));
+  EXPECT_THAT(folder.files(), ::testing::IsEmpty());
+}
+
 TEST(GeneratePolicy, AProgramGoesWithTasksAndItsOwnOptions) {
   const Folder folder;
   const auto complaint = [&](const std::string& what, const Words& more) {
