@@ -3,6 +3,7 @@
 // and a message, never by a signal, and never as "a mistake in tangere".
 #include <gmock/gmock.h>
 #include <hdf5.h>
+#include <sys/stat.h>
 
 #include <array>
 #include <cmath>
@@ -103,6 +104,21 @@ void contain_itself(hid_t file) {
             0);
 }
 
+void nest_deep(hid_t file) {
+  hid_t group = H5Gopen2(file, "data/demo_0/obs", H5P_DEFAULT);
+  for (int depth = 0; depth < 20'000; ++depth) {
+    const hid_t inner = H5Gcreate2(group, "g", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    ASSERT_GE(inner, 0);
+    H5Gclose(group);
+    group = inner;
+  }
+  H5Gclose(group);
+}
+
+void number_backwards(hid_t file) {
+  ASSERT_GE(H5Lmove(file, "data/demo_0", file, "data/demo_-7", H5P_DEFAULT, H5P_DEFAULT), 0);
+}
+
 /// Garbage where the texts of attributes lie, which HDF5 1.10 does not check.
 void damage_heaps(const std::string& path) {
   std::string bytes = file_bytes(path);
@@ -135,6 +151,7 @@ void expect_answer(const Outcome& outcome, const std::string& command, const std
   EXPECT_EQ(outcome.signal, 0) << outcome.err;
   EXPECT_THAT(outcome.err, Not(HasSubstr("mistake in tangere")));
   EXPECT_THAT(outcome.out, Not(HasSubstr("root:")));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("-7")));
   if (said.empty()) return;
   EXPECT_NE(outcome.exit_code, 0);
   EXPECT_THAT(outcome.err + outcome.out, HasSubstr(said));
@@ -175,7 +192,9 @@ INSTANTIATE_TEST_SUITE_P(
         Damage{"numbers_of_the_system", show_a_system_file, "its numbers lie in another file"},
         Damage{"more_than_any_file", claim_too_much, "more numbers than any file holds"},
         Damage{"a_link_outside", link_outside, "cannot open dataset"},
-        Damage{"a_group_in_itself", contain_itself, ""}),
+        Damage{"a_group_in_itself", contain_itself, ""},
+        Damage{"groups_nested_deep", nest_deep, ""},
+        Damage{"a_negative_episode", number_backwards, "expected 3 together"}),
     [](const auto& damage) { return damage.param.name; });
 
 TEST(DamagedFile, HeapsThatTheLibraryTrustsEndInAMessage) {
@@ -288,19 +307,27 @@ TEST(DamagedFile, ATrajectoryWithoutFiniteForcesIsNotDrawn) {
                          "1", "-o", "run.h5"})
                 .exit_code,
             0);
-  change(folder.path("run.h5"), [](hid_t file) {
-    const hid_t force = H5Dopen2(file, "tactile/pad/force", H5P_DEFAULT), all = H5Dget_space(force);
-    const std::array<hsize_t, 5> first{0, 0, 0, 0, 0}, one{1, 1, 1, 1, 1};
-    H5Sselect_hyperslab(all, H5S_SELECT_SET, first.data(), nullptr, one.data(), nullptr);
-    const hid_t memory = H5Screate_simple(5, one.data(), nullptr);
-    const double nan = NAN;
-    EXPECT_GE(H5Dwrite(force, H5T_NATIVE_DOUBLE, memory, all, H5P_DEFAULT, &nan), 0);
-    for (const hid_t space : {all, memory}) H5Sclose(space);
-    H5Dclose(force);
-  });
-  const Outcome outcome = run(folder, {"plot", "run.h5", "-o", "pads.svg"});
-  EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_THAT(outcome.err, HasSubstr("sensor 'pad': frame 0 has a number that is nan"));
+  const auto put_force = [&](double value) {
+    change(folder.path("run.h5"), [&](hid_t file) {
+      const hid_t force = H5Dopen2(file, "tactile/pad/force", H5P_DEFAULT),
+                  all = H5Dget_space(force);
+      const std::array<hsize_t, 5> first{0, 0, 0, 0, 0}, one{1, 1, 1, 1, 1};
+      H5Sselect_hyperslab(all, H5S_SELECT_SET, first.data(), nullptr, one.data(), nullptr);
+      const hid_t memory = H5Screate_simple(5, one.data(), nullptr);
+      EXPECT_GE(H5Dwrite(force, H5T_NATIVE_DOUBLE, memory, all, H5P_DEFAULT, &value), 0);
+      for (const hid_t space : {all, memory}) H5Sclose(space);
+      H5Dclose(force);
+    });
+  };
+  for (const auto& [value, shown] : {std::pair{double{NAN}, "nan"}, {HUGE_VAL, "inf"}}) {
+    put_force(value);
+    const Outcome outcome = run(folder, {"plot", "run.h5", "-o", "pads.svg"});
+    EXPECT_EQ(outcome.exit_code, 3);
+    EXPECT_THAT(outcome.err, HasSubstr(std::string("frame 0 has a number that is ") + shown));
+    const Outcome page = run(folder, {"view", "run.h5", "-o", "run.html"});
+    EXPECT_EQ(page.exit_code, 3);
+    EXPECT_THAT(page.err, HasSubstr(std::string("has a number that is ") + shown));
+  }
   change(folder.path("run.h5"),
          [](hid_t file) { put_numbers(file, "tactile/pad/force", "every", {0}); });
   EXPECT_THAT(run(folder, {"plot", "run.h5", "-o", "pads.svg"}).err, HasSubstr("every 0 steps"));
@@ -359,6 +386,21 @@ TEST(DamagedFile, OtherThanRegularFilesAreRefused) {
     const Outcome outcome = run(folder, words);
     EXPECT_EQ(outcome.exit_code, 3) << words[0];
     EXPECT_THAT(outcome.err, HasSubstr("/dev/zero: is a device")) << words[0];
+  }
+  // Nobody writes into it: who opened it would wait for ever.
+  ASSERT_EQ(mkfifo(folder.path("pipe").c_str(), 0600), 0);
+  const std::string small = scene("rolling_ball_small.xml");
+  folder.write("mesh.xml", R"(<tangere><robot><link name="a"><joint name="a" type="free3d"/>
+<body name="a" type="mesh" filename="pipe.obj" density="1"/></link></robot></tangere>)");
+  fs::create_symlink("pipe", folder.path("pipe.obj"));
+  for (const Words& words :
+       {Words{"inspect", "pipe"}, Words{"inspect", "mesh.xml"}, Words{"info", "pipe"},
+        Words{"simulate", small, "--controls", "pipe", "-o", "x.h5"},
+        Words{"simulate", small, "--state-from", "pipe", "--steps", "2", "-o", "x.h5"},
+        Words{"view", "pipe", "-o", "x.html"}, Words{"export", "pipe", "--csv", "x.csv"}}) {
+    const Outcome outcome = run(folder, words);
+    EXPECT_EQ(outcome.exit_code, 3) << words[0];
+    EXPECT_THAT(outcome.err, HasSubstr(": is a FIFO; expected ")) << words[0];
   }
 }
 
