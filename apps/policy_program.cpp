@@ -134,7 +134,8 @@ void PolicyProgram::introduce(std::uint64_t seed, const std::string& version) {
                     {"high", spec.action.high}}}};
   const double deadline = now() + timeout_;
   const std::string line = said.dump() + "\n";
-  write(line.data(), line.size(), deadline);
+  // A program that has ended may have said something before: read_line() tells.
+  static_cast<void>(write(line.data(), line.size(), deadline));
   const std::string heard = read_line(deadline);
   const Json reply = Json::parse(heard, nullptr, false);
   if (!reply.is_object() || reply.value("protocol", Json()) != kProtocol ||
@@ -175,7 +176,7 @@ void PolicyProgram::ask(const PolicyQuestion& question, std::span<double> action
     at += sizeof shown;
   }
   const double deadline = now() + timeout_;
-  write(bytes_.data(), static_cast<std::size_t>(at - bytes_.data()), deadline);
+  if (!write(bytes_.data(), static_cast<std::size_t>(at - bytes_.data()), deadline)) fail_ended();
   std::int64_t count = 0;
   if (!read(reinterpret_cast<char*>(&count), sizeof count, deadline) && !stopped_) fail_ended();
   if (!stopped_ && count != std::ssize(actions))
@@ -210,7 +211,8 @@ void PolicyProgram::wait_for(short events, double deadline) {
   stopped_ = true;
 }
 
-void PolicyProgram::write(const char* bytes, std::size_t count, double deadline) {
+/// Returns false when the program does not listen any more.
+bool PolicyProgram::write(const char* bytes, std::size_t count, double deadline) {
   while (count > 0 && !stopped_) {
     const ssize_t sent = send(socket_.get(), bytes, count, MSG_NOSIGNAL | MSG_DONTWAIT);
     if (sent > 0) {
@@ -219,9 +221,10 @@ void PolicyProgram::write(const char* bytes, std::size_t count, double deadline)
     } else if (errno == EAGAIN) {
       wait_for(POLLOUT, deadline);
     } else if (errno != EINTR) {
-      fail_ended();
+      return false;
     }
   }
+  return true;
 }
 
 /// Returns false at the end of what the program says, or when the run is to stop.

@@ -55,7 +55,7 @@ class PolicyProgram {
   void start();
   void ask(const PolicyQuestion& question, std::span<double> actions);
   void introduce(std::uint64_t seed, const std::string& version);
-  void write(const char* bytes, std::size_t count, double deadline);
+  [[nodiscard]] bool write(const char* bytes, std::size_t count, double deadline);
   [[nodiscard]] bool read(char* bytes, std::size_t count, double deadline);
   [[nodiscard]] std::string read_line(double deadline);
   void wait_for(short events, double deadline);

@@ -194,7 +194,7 @@ INSTANTIATE_TEST_SUITE_P(
         Damage{"a_link_outside", link_outside, "cannot open dataset"},
         Damage{"a_group_in_itself", contain_itself, ""},
         Damage{"groups_nested_deep", nest_deep, ""},
-        Damage{"a_negative_episode", number_backwards, "expected 3 together"}),
+        Damage{"a_negative_episode", number_backwards, "episode 0 is not in exactly one of"}),
     [](const auto& damage) { return damage.param.name; });
 
 TEST(DamagedFile, HeapsThatTheLibraryTrustsEndInAMessage) {

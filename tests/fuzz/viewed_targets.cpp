@@ -39,7 +39,8 @@ constexpr const char* kViewedScene = R"(<tangere model="viewed">
 </tactile></sensor>
 <variable><endeffector joint="ball" pos="0 0 0" radius="0.001"/></variable>
 <outputs record="q,v,skin,skin.ideal,variables"/>
-<control><random amplitude="0.1" period="0.03"/></control>
+<control><piecewise end="1"><at time="0" value="0.1 0 -0.2"/>
+<at time="0.02" value="-0.1 0 -0.2"/></piecewise></control>
 <randomize><body name="ball" field="radius" uniform="0.018 0.021"/></randomize></tangere>)";
 
 constexpr int kEnvironments = 2, kViewedSteps = 6;
