@@ -253,8 +253,9 @@ TEST(GeneratePolicy, AProgramThatGoesWrongLeavesWholeShards) {
         Case{"floods", 2, "answers 0 numbers"}})
     for (const char* const when : {"0", "450"}) {
       SCOPED_TRACE(std::string(c.what) + " at question " + when);
+      const bool late = std::string(c.what) == "hangs", deaf = std::string(c.what) == "closes";
+      if ((late || deaf) && std::string(when) == "0") continue;  // the end takes such a program 5 s
       fs::remove_all(folder.path("set"));
-      const bool late = std::string(c.what) == "hangs";
       folder.write("wrong", std::string(c.what) + " " + when);
       const Outcome outcome =
           run(folder, words + Words{program, "--program-timeout", late ? "1" : "300"});

@@ -75,7 +75,7 @@ int main(int argc, char** argv) {
           std::memcpy(&x, &bits, sizeof x);
         }
       if (wrong == "closes") {
-        close(STDOUT_FILENO);
+        for (const int end : {STDIN_FILENO, STDOUT_FILENO}) close(end);
         pause();
       }
     }
