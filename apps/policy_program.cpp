@@ -202,7 +202,7 @@ void PolicyProgram::wait_for(short events, double deadline) {
   pollfd waiting{socket_.get(), events, 0};
   while (!stopping()) {
     const int ready = poll(&waiting, 1, kLookForStop);
-    if (ready > 0) return;
+    if (ready > 0 && now() <= deadline) return;  // what comes bit by bit comes to an end, too
     if (ready < 0 && errno != EINTR)
       throw IoError(fmt::format("cannot wait for {}: {}", who(), std::strerror(errno)));
     if (now() > deadline)

@@ -162,7 +162,7 @@ int run_in_child(const std::function<int()>& command) {
   }
   throw IoError(fmt::format(
       "the reading process was ended by a signal ({}); it had last read {}; a file that makes the "
-      "HDF5 library crash is damaged",
+      "HDF5 library crash is damaged, or the disk could not read it",
       strsignal(signal), reading));
 }
 

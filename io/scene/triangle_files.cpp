@@ -21,7 +21,9 @@ namespace tangere {
 namespace {
 
 constexpr std::size_t kLargestSurface = std::size_t{256} << 20;
-constexpr double kFarthest = 1e6;  // as in lists of points
+constexpr double kFarthest = 1e6;        // as in lists of points
+constexpr double kMostInList = 1 << 16;  // corners of a face: more would need their memory first
+constexpr std::size_t kMostHeaderLines = 1000;
 constexpr std::size_t kStlHeader = 80, kStlTriangle = 50;
 
 /// Returns the bytes at `at` as a number, of which the lowest byte comes first unless `big`.
@@ -178,7 +180,9 @@ std::vector<PlyElement> PlyFile::read_header() {
   if (header_line()[0] != "ply") fail("expected 'ply', the first line of a PLY file");
   PlyFormat body = PlyFormat::text;
   std::vector<PlyElement> elements;
-  for (;;) {
+  for (std::size_t line = 0;; ++line) {
+    if (line > kMostHeaderLines)
+      fail(fmt::format("a header of more than {} lines", kMostHeaderLines));
     ++at_;  // the end of the line before
     const std::vector<std::string> words = header_line();
     const std::string& what = words[0];
@@ -241,7 +245,8 @@ void take_element(PlyFile& file, const PlyElement& kind, std::vector<std::vector
   for (std::size_t k = 0; k < kind.properties.size(); ++k) {
     const PlyProperty& p = kind.properties[k];
     const double count = p.list ? file.take(p.count) : 1;
-    if (!(count >= 0)) file.fail(fmt::format("a list of {} numbers; expected zero or more", count));
+    if (!(count >= 0 && count <= kMostInList))
+      file.fail(fmt::format("a list of {} numbers; expected 0 to {}", count, kMostInList));
     out[k].clear();
     for (double i = 0; i < count; ++i) out[k].push_back(file.take(p.type));
   }

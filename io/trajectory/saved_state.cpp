@@ -4,11 +4,25 @@
 
 #include <fmt/format.h>
 
+#include <limits>
+#include <string_view>
+
 #include "engine/base/error.hpp"
 #include "io/hdf5/h5.hpp"
 
 namespace tangere {
 namespace {
+
+constexpr std::int64_t kMost = std::int64_t{1} << 53;  // steps, episodes; more is damage
+
+/// Throws IoError unless `found` lies in [least, most].
+std::int64_t within(const std::string& path, const char* what, std::int64_t found,
+                    std::int64_t least, std::int64_t most) {
+  if (found < least || found > most)
+    throw IoError(fmt::format("{}: attribute '{}' is {}; expected {} to {}: the file is damaged",
+                              path, what, found, least, most));
+  return found;
+}
 
 /// Reads row `row` of a (rows, E, width) dataset.
 std::vector<double> read_row(const h5::Id& dataset, std::int64_t row) {
@@ -26,7 +40,12 @@ std::vector<StepStatus> read_status(const h5::Id& file, std::int64_t step,
   h5::read_box<std::int8_t>(h5::open_dataset(h5::open_group(file, "solver"), "status"),
                             {static_cast<hsize_t>(step), 0}, {1, environments}, values.data());
   std::vector<StepStatus> status;
-  for (const std::int8_t value : values) status.push_back(static_cast<StepStatus>(value));
+  for (const std::int8_t value : values) {
+    status.push_back(static_cast<StepStatus>(value));
+    if (std::string_view(to_string(status.back())) == "unknown")
+      throw IoError(fmt::format("{}: solver status {} of row {}: the file is damaged",
+                                h5::place_of(file), value, step + 1));
+  }
   return status;
 }
 
@@ -49,14 +68,17 @@ SavedState read_state(const std::string& path, std::optional<std::int64_t> row) 
     throw IoError(path + ": not a trajectory file of 'tangere simulate'");
   SavedState state;
   state.path = path;
-  const auto steps = h5::read_number<std::int64_t>(file, "steps");
+  const auto number = [&](const char* name, std::int64_t least, std::int64_t most) {
+    return within(path, name, h5::read_number<std::int64_t>(file, name), least, most);
+  };
+  const std::int64_t steps = number("steps", 0, kMost);
   state.row = row.value_or(steps);
   if (state.row < 0 || state.row > steps)
     throw InputError(fmt::format("row {} of {}; expected 0 to {}", state.row, path, steps));
-  state.step = h5::read_number<std::int64_t>(file, "first_step") + state.row;
-  state.environments = static_cast<int>(h5::read_number<std::int64_t>(file, "environments"));
+  state.step = number("first_step", 0, kMost) + state.row;
+  state.environments = static_cast<int>(number("environments", 1, std::numeric_limits<int>::max()));
   state.seed = h5::read_number<std::uint64_t>(file, "seed");
-  state.first_episode = h5::read_number<std::int64_t>(file, "first_episode");
+  state.first_episode = number("first_episode", 0, kMost);
   state.timestep = h5::read_number<double>(file, "timestep");
   state.tolerance = h5::read_number<double>(file, "tolerance");
   if (H5Aexists(file.get(), "accuracy") > 0)

@@ -22,7 +22,7 @@ constexpr hsize_t kMostPoints = hsize_t{1} << 26;              // of a sensor
 struct TrajectoryReader::Impl {
   std::string path, scene_name;
   h5::Id file;
-  std::int64_t environments = 0;
+  std::int64_t environments = 0, steps = 0;
   double timestep = 0;
   std::vector<SensorLayout> sensors;
   std::vector<std::vector<FieldForm>> forms;  // (sensors) what was recorded
@@ -36,6 +36,7 @@ struct TrajectoryReader::Impl {
     scene_name = h5::read_text(file, "scene_name");
     environments = h5::read_number<std::int64_t>(file, "environments");
     timestep = h5::read_number<double>(file, "timestep");
+    steps = h5::read_number<std::int64_t>(file, "steps");
     if (!h5::has_link(file, "tactile")) return;
     const h5::Id group = h5::open_group(file, "tactile");
     H5G_info_t info;
@@ -152,6 +153,10 @@ struct TrajectoryReader::Impl {
       throw IoError(fmt::format("{}: sensor '{}' has {} dimensions; expected 4 or 5", path, name,
                                 dims.size()));
     }
+    // Whoever looks for the newest field goes through all of them.
+    if (dims[0] > static_cast<hsize_t>(std::max<std::int64_t>(steps, 0)))
+      throw IoError(fmt::format("{}: sensor '{}' claims {} fields of {} steps: the file is damaged",
+                                path, name, dims[0], steps));
     sensors.push_back(std::move(s));
     frames.push_back(static_cast<std::int64_t>(dims[0]));
   }

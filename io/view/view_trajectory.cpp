@@ -11,7 +11,8 @@
 namespace tangere {
 namespace {
 
-constexpr std::int64_t kMostSteps = std::int64_t{1} << 28;  // more is damage
+constexpr std::int64_t kMostSteps = std::int64_t{1} << 28,  // more is damage
+    kMostBefore = std::int64_t{1} << 53;                    // of the runs that came before
 
 class TrajectoryView {
  public:
@@ -28,9 +29,11 @@ class TrajectoryView {
     const h5::Id q = h5::open_dataset(file_, "q");
     q_names_ = h5::read_texts(q, "names");
     scene_.check_names(q_names_);
-    if (steps_ < 0 || steps_ > kMostSteps || fields_.environments() < 1)
-      throw IoError(fmt::format("{}: {} steps of {} environments: the file is damaged", path,
-                                steps_, fields_.environments()));
+    if (steps_ < 0 || steps_ > kMostSteps || fields_.environments() < 1 || first_step_ < 0 ||
+        first_step_ > kMostBefore)
+      throw IoError(
+          fmt::format("{}: {} steps of {} environments after {} steps: the file is damaged", path,
+                      steps_, fields_.environments(), first_step_));
     check_shape(q, {rows(), environments(), q_names_.size()}, "q");
     check_shape(h5::open_dataset(h5::open_group(file_, "solver"), "status"),
                 {rows() - 1, environments()}, "status");

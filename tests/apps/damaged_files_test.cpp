@@ -3,6 +3,7 @@
 // and a message, never by a signal, and never as "a mistake in tangere".
 #include <gmock/gmock.h>
 #include <hdf5.h>
+#include <sys/stat.h>
 
 #include <array>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <limits>
 
 #include "tests/apps/program.hpp"
 #include "tests/files.hpp"
@@ -102,6 +104,21 @@ void contain_itself(hid_t file) {
             0);
 }
 
+void nest_deep(hid_t file) {
+  hid_t group = H5Gopen2(file, "data/demo_0/obs", H5P_DEFAULT);
+  for (int depth = 0; depth < 20'000; ++depth) {
+    const hid_t inner = H5Gcreate2(group, "g", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    ASSERT_GE(inner, 0);
+    H5Gclose(group);
+    group = inner;
+  }
+  H5Gclose(group);
+}
+
+void number_backwards(hid_t file) {
+  ASSERT_GE(H5Lmove(file, "data/demo_0", file, "data/demo_-7", H5P_DEFAULT, H5P_DEFAULT), 0);
+}
+
 /// Garbage where the texts of attributes lie, which HDF5 1.10 does not check.
 void damage_heaps(const std::string& path) {
   std::string bytes = file_bytes(path);
@@ -134,6 +151,7 @@ void expect_answer(const Outcome& outcome, const std::string& command, const std
   EXPECT_EQ(outcome.signal, 0) << outcome.err;
   EXPECT_THAT(outcome.err, Not(HasSubstr("mistake in tangere")));
   EXPECT_THAT(outcome.out, Not(HasSubstr("root:")));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("-7")));
   if (said.empty()) return;
   EXPECT_NE(outcome.exit_code, 0);
   EXPECT_THAT(outcome.err + outcome.out, HasSubstr(said));
@@ -174,7 +192,9 @@ INSTANTIATE_TEST_SUITE_P(
         Damage{"numbers_of_the_system", show_a_system_file, "its numbers lie in another file"},
         Damage{"more_than_any_file", claim_too_much, "more numbers than any file holds"},
         Damage{"a_link_outside", link_outside, "cannot open dataset"},
-        Damage{"a_group_in_itself", contain_itself, ""}),
+        Damage{"a_group_in_itself", contain_itself, ""},
+        Damage{"groups_nested_deep", nest_deep, ""},
+        Damage{"a_negative_episode", number_backwards, "episode 0 is not in exactly one of"}),
     [](const auto& damage) { return damage.param.name; });
 
 TEST(DamagedFile, HeapsThatTheLibraryTrustsEndInAMessage) {
@@ -287,22 +307,75 @@ TEST(DamagedFile, ATrajectoryWithoutFiniteForcesIsNotDrawn) {
                          "1", "-o", "run.h5"})
                 .exit_code,
             0);
-  change(folder.path("run.h5"), [](hid_t file) {
-    const hid_t force = H5Dopen2(file, "tactile/pad/force", H5P_DEFAULT), all = H5Dget_space(force);
-    const std::array<hsize_t, 5> first{0, 0, 0, 0, 0}, one{1, 1, 1, 1, 1};
-    H5Sselect_hyperslab(all, H5S_SELECT_SET, first.data(), nullptr, one.data(), nullptr);
-    const hid_t memory = H5Screate_simple(5, one.data(), nullptr);
-    const double nan = NAN;
-    EXPECT_GE(H5Dwrite(force, H5T_NATIVE_DOUBLE, memory, all, H5P_DEFAULT, &nan), 0);
-    for (const hid_t space : {all, memory}) H5Sclose(space);
-    H5Dclose(force);
-  });
-  const Outcome outcome = run(folder, {"plot", "run.h5", "-o", "pads.svg"});
-  EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_THAT(outcome.err, HasSubstr("sensor 'pad': frame 0 has a number that is nan"));
+  const auto put_force = [&](double value) {
+    change(folder.path("run.h5"), [&](hid_t file) {
+      const hid_t force = H5Dopen2(file, "tactile/pad/force", H5P_DEFAULT),
+                  all = H5Dget_space(force);
+      const std::array<hsize_t, 5> first{0, 0, 0, 0, 0}, one{1, 1, 1, 1, 1};
+      H5Sselect_hyperslab(all, H5S_SELECT_SET, first.data(), nullptr, one.data(), nullptr);
+      const hid_t memory = H5Screate_simple(5, one.data(), nullptr);
+      EXPECT_GE(H5Dwrite(force, H5T_NATIVE_DOUBLE, memory, all, H5P_DEFAULT, &value), 0);
+      for (const hid_t space : {all, memory}) H5Sclose(space);
+      H5Dclose(force);
+    });
+  };
+  for (const auto& [value, shown] : {std::pair{double{NAN}, "nan"}, {HUGE_VAL, "inf"}}) {
+    put_force(value);
+    const Outcome outcome = run(folder, {"plot", "run.h5", "-o", "pads.svg"});
+    EXPECT_EQ(outcome.exit_code, 3);
+    EXPECT_THAT(outcome.err, HasSubstr(std::string("frame 0 has a number that is ") + shown));
+    const Outcome page = run(folder, {"view", "run.h5", "-o", "run.html"});
+    EXPECT_EQ(page.exit_code, 3);
+    EXPECT_THAT(page.err, HasSubstr(std::string("has a number that is ") + shown));
+  }
   change(folder.path("run.h5"),
          [](hid_t file) { put_numbers(file, "tactile/pad/force", "every", {0}); });
   EXPECT_THAT(run(folder, {"plot", "run.h5", "-o", "pads.svg"}).err, HasSubstr("every 0 steps"));
+}
+
+/// Every status of the steps becomes 77, which means nothing.
+void damage_status(hid_t file) {
+  const hid_t status = H5Dopen2(file, "solver/status", H5P_DEFAULT), all = H5Dget_space(status);
+  const std::vector<std::int8_t> values(static_cast<std::size_t>(H5Sget_simple_extent_npoints(all)),
+                                        77);
+  EXPECT_GE(H5Dwrite(status, H5T_NATIVE_INT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), 0);
+  H5Sclose(all);
+  H5Dclose(status);
+}
+
+/// What a trajectory claims is checked before anyone counts with it.
+TEST(DamagedFile, ATrajectoryThatClaimsWhatNoRunHasIsRefused) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  struct Claim {
+    std::function<void(hid_t)> edit;
+    const char *of_run, *of_page;  // said by `simulate --state-from` and `view`; "": nothing
+  };
+  const Folder folder;
+  const Words run_words{"simulate", scene("rolling_ball_small.xml"), "--steps", "20"};
+  ASSERT_EQ(run(folder, run_words + Words{"-o", "whole.h5"}).exit_code, 0);
+  for (const Claim& claim :
+       {Claim{number(".", "first_step", kMost), "'first_step' is 9223372036854775807; expected 0",
+              "after 9223372036854775807 steps: the file is damaged"},
+        Claim{number(".", "first_step", -1), "'first_step' is -1; expected 0 to",
+              "after -1 steps: the file is damaged"},
+        Claim{number(".", "steps", kMost), "'steps' is 9223372036854775807; expected 0 to",
+              "9223372036854775807 steps of 1 environments"},
+        Claim{number(".", "steps", 3), "the states are damaged", "claims 4 fields of 3 steps"},
+        Claim{number(".", "environments", (std::int64_t{1} << 32) + 1),
+              "'environments' is 4294967297; expected 1 to 2147483647", "has the shape"},
+        Claim{number(".", "first_episode", kMost), "'first_episode' is 9223372036854775807", ""},
+        Claim{damage_status, "solver status 77 of row 20: the file is damaged", ""}}) {
+    fs::copy_file(folder.path("whole.h5"), folder.path("run.h5"),
+                  fs::copy_options::overwrite_existing);
+    change(folder.path("run.h5"), claim.edit);
+    const Outcome more = run(folder, run_words + Words{"--state-from", "run.h5", "-o", "more.h5"});
+    expect_answer(more, "simulate --state-from", claim.of_run);
+    EXPECT_EQ(more.exit_code, 3) << more.err;
+    expect_answer(run(folder, {"view", "run.h5", "-o", "run.html", "--overwrite"}), "view",
+                  claim.of_page);
+    expect_answer(run(folder, {"plot", "run.h5", "-o", "run.svg", "--overwrite"}), "plot", "");
+    EXPECT_FALSE(fs::exists(folder.path("more.h5")));
+  }
 }
 
 TEST(DamagedFile, OtherThanRegularFilesAreRefused) {
@@ -313,6 +386,21 @@ TEST(DamagedFile, OtherThanRegularFilesAreRefused) {
     const Outcome outcome = run(folder, words);
     EXPECT_EQ(outcome.exit_code, 3) << words[0];
     EXPECT_THAT(outcome.err, HasSubstr("/dev/zero: is a device")) << words[0];
+  }
+  // Nobody writes into it: who opened it would wait for ever.
+  ASSERT_EQ(mkfifo(folder.path("pipe").c_str(), 0600), 0);
+  const std::string small = scene("rolling_ball_small.xml");
+  folder.write("mesh.xml", R"(<tangere><robot><link name="a"><joint name="a" type="free3d"/>
+<body name="a" type="mesh" filename="pipe.obj" density="1"/></link></robot></tangere>)");
+  fs::create_symlink("pipe", folder.path("pipe.obj"));
+  for (const Words& words :
+       {Words{"inspect", "pipe"}, Words{"inspect", "mesh.xml"}, Words{"info", "pipe"},
+        Words{"simulate", small, "--controls", "pipe", "-o", "x.h5"},
+        Words{"simulate", small, "--state-from", "pipe", "--steps", "2", "-o", "x.h5"},
+        Words{"view", "pipe", "-o", "x.html"}, Words{"export", "pipe", "--csv", "x.csv"}}) {
+    const Outcome outcome = run(folder, words);
+    EXPECT_EQ(outcome.exit_code, 3) << words[0];
+    EXPECT_THAT(outcome.err, HasSubstr(": is a FIFO; expected ")) << words[0];
   }
 }
 

@@ -4,7 +4,7 @@
 // TANGERE_FAULT=kind:n fails the n-th call of a kind, counted from 1, with EIO (writes: ENOSPC,
 // threads: EAGAIN, and all later ones too, memory: ENOMEM). TANGERE_FAULT_COUNT=file writes there,
 // when the program ends, how many calls of that kind there were. Kinds: write, sync, rename, close,
-// truncate, open, thread, memory. Allocations by HDF5 itself are not among memory: it uses about
+// truncate, open, read, thread, memory. Allocations by HDF5 itself are not among memory: it uses about
 // one in thirty without asking whether it got it (docs/failures.md). Two more kinds are those of a
 // disk that lies: the n-th write or truncation (lost) does nothing, or the n-th write puts zeros in
 // place of the bytes (zeros), and says that it succeeded.
@@ -161,6 +161,11 @@ FAULTY_WRITE(pwritev, (int fd, const iovec* pieces, int count, off_t at), (fd, p
              all_of(pieces, count), at)
 FAULTY_WRITE(pwritev64, (int fd, const iovec* pieces, int count, off64_t at),
              (fd, pieces, count, at), all_of(pieces, count), at)
+FAULTY("read", EIO, ssize_t, read, (int fd, void* to, size_t size), (fd, to, size))
+FAULTY("read", EIO, ssize_t, pread, (int fd, void* to, size_t size, off_t at), (fd, to, size, at))
+FAULTY("read", EIO, ssize_t, pread64, (int fd, void* to, size_t size, off64_t at),
+       (fd, to, size, at))
+FAULTY("read", EIO, ssize_t, readv, (int fd, const iovec* pieces, int count), (fd, pieces, count))
 FAULTY("sync", EIO, int, fsync, (int fd), (fd))
 FAULTY("sync", EIO, int, fdatasync, (int fd), (fd))
 FAULTY("rename", EIO, int, rename, (const char* from, const char* to), (from, to))

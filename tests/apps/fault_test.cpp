@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // One call of the operating system fails, whichever it is, or says that it succeeded and did not. A
 // file under its final name holds exactly what an undisturbed run writes, or is absent, and the
-// exit code tells which: 0 only if all is there. TANGERE_FAULTS=all tries every call; without it,
-// calls spread over all of them.
+// exit code tells which: 0 only if all is there. Where a run replaces a file, the name may hold what
+// it held before. TANGERE_FAULTS=all tries every call, TANGERE_FAULTS=N some N calls of each kind;
+// without it, a few calls spread over all of them.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -41,6 +42,9 @@ struct Job {
 void PrintTo(const Job& job, std::ostream* out) { *out << job.name; }
 
 const Words kSimulate = {"simulate", "scene.xml", "--steps", "20", "-o", "run.h5"};
+/// Its programs are asked by the one that is tried, and keep out of its way.
+const Words kProgram = {"--program", "LD_PRELOAD= exec " TANGERE_POLICY_PROGRAM};
+const Words kTask = {"generate", "box_pushing", "--episodes", "2", "--threads", "1", "-o", "task"};
 const Words kGenerate = {"generate",  "scene.xml", "--episodes", "40",       "--steps",
                          "10",        "--every",   "5",          "--shards", "2",
                          "--threads", "2",         "-o",         "set"};
@@ -48,6 +52,7 @@ const Words kGenerate = {"generate",  "scene.xml", "--episodes", "40",       "--
 std::vector<Job> jobs() {
   return {
       {"simulate", {}, kSimulate},
+      {"controls", {}, kSimulate + Words{"--controls", "u.csv"}},
       {"simulate_gradients", {}, kSimulate + Words{"--gradients", "final"}},
       {"generate", {}, kGenerate},
       {"generate_deflate", {}, kGenerate + Words{"--compress", "deflate"}},
@@ -55,10 +60,27 @@ std::vector<Job> jobs() {
       {"resume", {kGenerate + Words{"--shard", "0/2"}}, kGenerate + Words{"--resume"}},
       {"merge_copy", {kGenerate + Words{"--no-merge"}}, {"merge", "set", "--copy"}},
       {"merge", {kGenerate + Words{"--no-merge"}}, {"merge", "set"}},
+      {"overwrite",
+       {kGenerate + Words{"--seed", "3"}},
+       kGenerate + Words{"--seed", "4", "--overwrite"}},
+      {"go_on",
+       {kSimulate},
+       Words{"simulate", "scene.xml", "--steps", "9", "-o", "more.h5"} +
+           Words{"--state-from", "run.h5"}},
+      {"simulate_task", {}, {"simulate", "box_pushing", "-o", "task.h5"}},
+      {"generate_program", {}, kTask + kProgram},
       {"export", {kGenerate}, {"export", "set", "--csv", "rows.csv"}},
       {"plot", {kSimulate}, {"plot", "run.h5", "-o", "pads.svg"}},
       {"view", {kSimulate}, {"view", "run.h5", "-o", "run.html"}},
+      {"view_set", {kGenerate}, {"view", "set", "-o", "set.html"}},
   };
+}
+
+/// Calls of each kind that are tried; none given: about six, one of every `calls` / 6.
+long tries_of(long calls) {
+  const char* const given = std::getenv("TANGERE_FAULTS");
+  if (given == nullptr) return std::min(calls, 6L);
+  return std::string(given) == "all" ? calls : std::stol(given);
 }
 
 /// Whether calls of a kind say that they succeeded, and did not.
@@ -69,6 +91,9 @@ class Fault : public ::testing::TestWithParam<std::tuple<Job, const char*>> {
   /// What is there before the job: made once, copied for every call that fails.
   void SetUp() override {
     fs::copy_file(scene("rolling_ball_small.xml"), before_.path("scene.xml"));
+    std::string table;  // of many buffers
+    for (int row = 0; row < 5000; ++row) table += "0.01,0,0.19999\n";
+    before_.write("u.csv", table);
     for (const Words& words : std::get<0>(GetParam()).before)
       ASSERT_EQ(run(before_, words).exit_code, 0);
   }
@@ -96,7 +121,6 @@ class Fault : public ::testing::TestWithParam<std::tuple<Job, const char*>> {
 };
 
 TEST_P(Fault, LeavesWholeFilesOrNone) {
-  const bool all = std::getenv("TANGERE_FAULTS") != nullptr;
   const std::string kind = std::get<1>(GetParam());
   const Folder undisturbed, counts;
   prepare(undisturbed);
@@ -104,9 +128,9 @@ TEST_P(Fault, LeavesWholeFilesOrNone) {
   const Outcome whole = run_with(undisturbed, 0, counts.path("calls"));
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
   const auto expected = final_files(undisturbed.path());
-  ASSERT_GT(expected.size(), given.size());
+  ASSERT_NE(expected, given);
   const long calls = std::stol(file_bytes(counts.path("calls")));
-  const long step = all ? 1 : std::max(1L, calls / 6);
+  const long step = std::max(1L, calls / std::max(1L, tries_of(calls)));
   int failed = 0, tried = 0;
   // oneTBB crashes where it is refused a thread, so the program asks for threads beforehand: a
   // limit shows at the first.
@@ -117,15 +141,20 @@ TEST_P(Fault, LeavesWholeFilesOrNone) {
     prepare(folder);
     const Outcome outcome = run_with(folder, n);
     ASSERT_EQ(outcome.signal, 0) << outcome.err;
-    ASSERT_THAT(outcome.err, Not(HasSubstr("ended by a signal")));
+    // HDF5 1.10 crashes over some reads that fail while it copies; the command survives that.
+    if (kind != "read") {
+      ASSERT_THAT(outcome.err, Not(HasSubstr("ended by a signal")));
+    }
     const auto files = final_files(folder.path());
     for (const auto& [name, bytes] : files) {
-      const auto same = expected.find(name);
+      const auto same = expected.find(name), old = given.find(name);
       ASSERT_TRUE(same != expected.end()) << name << "\n" << outcome.err;
-      ASSERT_TRUE(same->second == bytes) << name << " differs\n" << outcome.err;
+      ASSERT_TRUE(same->second == bytes || (old != given.end() && old->second == bytes))
+          << name << " differs\n"
+          << outcome.err;
     }
     if (outcome.exit_code == 0) {
-      ASSERT_EQ(files.size(), expected.size()) << outcome.err;
+      ASSERT_TRUE(files == expected) << outcome.err;
       continue;
     }
     ASSERT_FALSE(outcome.err.empty());
@@ -145,7 +174,7 @@ TEST_P(Fault, LeavesWholeFilesOrNone) {
 INSTANTIATE_TEST_SUITE_P(Calls, Fault,
                          ::testing::Combine(::testing::ValuesIn(jobs()),
                                             ::testing::Values("write", "sync", "rename", "close",
-                                                              "truncate", "open", "thread",
+                                                              "truncate", "open", "read", "thread",
                                                               "memory", "lost", "zeros")),
                          [](const auto& fault) {
                            return std::get<0>(fault.param).name + "_" + std::get<1>(fault.param);

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -277,6 +278,71 @@ TEST(GeneratePolicy, ManyThreadsWaitOnceForAProgramThatIsMute) {
     width += size;
   }
   EXPECT_EQ(heard.size() - first, 8 + 16 * (8 + 8 + 4 * width));
+}
+
+/// Goes wrong at the question whose number is given; shards that were complete then stay.
+TEST(GeneratePolicy, AProgramThatGoesWrongLeavesWholeShards) {
+  const Folder folder;
+  // The same words each time: files name the command.
+  const std::string program = "exec " TANGERE_POLICY_PROGRAM " $(cat wrong)";
+  folder.write("wrong", "");
+  const Words words{"generate",  "box_pushing", "-o",      "set",      "--episodes",
+                    "80",        "--seed",      "5",       "--shards", "5",
+                    "--threads", "1",           "--quiet", "--program"};
+  ASSERT_EQ(run(folder, words + Words{program}).exit_code, 0);
+  std::map<std::string, std::string> whole;
+  for (const char* const number : {"0", "1", "2", "3", "4"}) {
+    const std::string name = std::string("shard-0000") + number + ".h5";
+    whole[name] = folder.read("set/" + name);
+  }
+  struct Case {
+    const char* what;
+    int exit_code;
+    const char* says;
+  };
+  for (const Case& c :
+       {Case{"dies", 3, "has ended with exit code 7"}, Case{"crashes", 3, "has ended by a signal"},
+        Case{"hangs", 3, "has not answered within 1 s"},
+        Case{"closes", 3, "has closed its standard output"},
+        Case{"half", 3, "has ended with exit code 0"},
+        Case{"nan", 2, "answers nan as number 2 of action"},
+        Case{"garbage", 2, "nan as number 0 of action"}, Case{"negative", 2, "answers -1 numbers"},
+        Case{"endless", 2, "answers 9223372036854775807 numbers"},
+        Case{"floods", 2, "answers 0 numbers"}})
+    for (const char* const when : {"0", "450"}) {
+      SCOPED_TRACE(std::string(c.what) + " at question " + when);
+      const bool late = std::string(c.what) == "hangs", deaf = std::string(c.what) == "closes";
+      if ((late || deaf) && std::string(when) == "0") continue;  // the end takes such a program 5 s
+      fs::remove_all(folder.path("set"));
+      folder.write("wrong", std::string(c.what) + " " + when);
+      const Outcome outcome =
+          run(folder, words + Words{program, "--program-timeout", late ? "1" : "300"});
+      EXPECT_EQ(outcome.signal, 0);
+      EXPECT_EQ(outcome.exit_code, c.exit_code) << outcome.err;
+      EXPECT_THAT(outcome.err, HasSubstr(c.says));
+      if (std::string(when) == "0") {
+        EXPECT_FALSE(fs::exists(folder.path("set")));
+        continue;
+      }
+      // A block of 16 episodes takes 100 questions and is a shard here. The fourth block begins when
+      // the first one is written.
+      EXPECT_TRUE(fs::exists(folder.path("set/shard-00000.h5")));
+      for (const auto& entry : fs::directory_iterator(folder.path("set"))) {
+        const std::string name = entry.path().filename();
+        EXPECT_TRUE(folder.read("set/" + name) == whole[name]) << name;
+      }
+    }
+}
+
+/// An answer that trickles in is late as well.
+TEST(GeneratePolicy, AProgramThatAnswersBitByBitIsLate) {
+  const Folder folder;
+  const Outcome outcome =
+      run(folder, pushes("set", {"--program", "while printf x; do sleep 0.02; done",
+                                 "--program-timeout", "0.5", "--quiet"}));
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("has not answered within 0.5 s (--program-timeout)"));
+  EXPECT_THAT(folder.files(), ::testing::IsEmpty());
 }
 
 TEST(GeneratePolicy, AProgramGoesWithTasksAndItsOwnOptions) {

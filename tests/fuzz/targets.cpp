@@ -10,7 +10,8 @@ namespace tangere::fuzz {
 
 std::vector<Target> targets() {
   std::vector<Target> all = text_targets();
-  for (Target& target : hdf5_targets()) all.push_back(std::move(target));
+  for (auto* const more : {hdf5_targets, viewed_targets})
+    for (Target& target : more()) all.push_back(std::move(target));
   return all;
 }
 

@@ -19,10 +19,16 @@ struct Target {
   std::function<void(const std::string& folder)> read;
 };
 
-/// scene, urdf, mjcf, table, mesh, contact_points, layout.
+/// scene, urdf, mjcf, table, obj, stl, ply, contact_points, layout.
 std::vector<Target> text_targets();
 /// shard, merged (links to shards), copied (all numbers in it), trajectory.
 std::vector<Target> hdf5_targets();
+/// viewed_trajectory, viewed_shard: files of a real scene, as `view` and `simulate --state-from`
+/// read them.
+std::vector<Target> viewed_targets();
+/// The scene of those files: a pad with flaws and friction that remembers, on a ball whose radius
+/// varies.
+std::string small_scene();
 /// All of them.
 std::vector<Target> targets();
 

@@ -56,15 +56,18 @@ std::vector<std::string> scenes(const std::string& folder) {
   for (const char* beside : {"tripod.txt", "wedge.obj", "meshes"})
     fs::copy(std::string(kScenes) + beside, fs::path(folder) / beside, fs::copy_options::recursive);
   std::vector<std::string> corpus;
-  for (const char* name : {"dialect_hand", "dialect_yard", "every_joint", "published_dialect_pad",
-                           "shapes", "two_balls", "units_cm_g", "units_m_kg"})
+  for (const char* name :
+       {"dialect_finger", "dialect_hand", "dialect_yard", "every_joint", "published_dialect_pad",
+        "shapes", "two_balls", "units_cm_g", "units_m_kg"})
     corpus.push_back(file_bytes(std::string(kScenes) + name + ".xml"));
-  for (const char* name : {"rolling_ball_small", "box_pushing", "cap_opening", "stable_grasp"})
+  for (const char* name :
+       {"rolling_ball_small", "box_pushing", "cap_opening", "insertion", "stable_grasp"})
     corpus.push_back(file_bytes(std::string(TANGERE_SOURCE_DIR "/scenes/") + name + ".xml"));
   // A scene of two files, of which the mutants change the first.
   fs::copy(TANGERE_SOURCE_DIR "/scenes/sensors/fingertip.xml", fs::path(folder) / "tip.xml");
   fs::copy(std::string(kScenes) + "included_ball.xml", fs::path(folder) / "included_ball.xml");
   corpus.push_back(file_bytes(std::string(kScenes) + "including.xml"));
+  corpus.push_back(small_scene());
   return corpus;
 }
 
@@ -102,6 +105,62 @@ std::vector<std::string> meshes(const std::string&) {
           file_bytes(TANGERE_TEST_DATA "/scenes/meshes/tetrahedron.obj")};
 }
 
+/// A tetrahedron, its faces seen from outside.
+constexpr float kCorners[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+constexpr std::int32_t kFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+
+template <class T>
+void put(std::string& bytes, const T& number) {
+  bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
+}
+
+std::vector<std::string> stl_files(const std::string&) {
+  std::string text = "solid t\n", bytes(80, 'x');
+  put(bytes, std::uint32_t{4});
+  for (const auto& face : kFaces) {
+    text += "facet normal 0 0 0\n outer loop\n";
+    for (int k = 0; k < 3; ++k) put(bytes, 0.0F);
+    for (const std::int32_t corner : face) {
+      text += "  vertex";
+      for (const float x : kCorners[corner]) {
+        text += " " + std::to_string(x);
+        put(bytes, x);
+      }
+      text += "\n";
+    }
+    text += " endloop\nendfacet\n";
+    put(bytes, std::uint16_t{0});
+  }
+  return {text + "endsolid t\n", bytes};
+}
+
+std::vector<std::string> ply_files(const std::string&) {
+  const auto header = [](const std::string& format) {
+    return "ply\nformat " + format +
+           " 1.0\ncomment by hand\nelement vertex 4\nproperty float x\nproperty float y\n"
+           "property float z\nelement edge 1\nproperty list uchar int v\nelement face 4\n"
+           "property list uchar int vertex_indices\nend_header\n";
+  };
+  std::string text = header("ascii"), little = header("binary_little_endian"),
+              big = header("binary_big_endian");
+  const auto put_all = [&](const auto& number) {
+    std::string raw;
+    put(raw, number);
+    little += raw;
+    big += std::string(raw.rbegin(), raw.rend());
+    text += std::to_string(number) + " ";
+  };
+  for (const auto& corner : kCorners)
+    for (const float x : corner) put_all(x);
+  put_all(std::uint8_t{1}), put_all(std::int32_t{2});
+  for (const auto& face : kFaces) {
+    put_all(std::uint8_t{3});
+    for (const std::int32_t corner : face) put_all(corner);
+    text += "\n";
+  }
+  return {text, little, big};
+}
+
 std::vector<std::string> contact_points(const std::string&) {
   return {file_bytes(TANGERE_TEST_DATA "/scenes/tripod.txt"), "2\n1 +2 3\n\n-1e-3 0 5\n"};
 }
@@ -118,18 +177,25 @@ std::vector<std::string> layouts(const std::string&) {
 std::vector<Target> text_targets() {
   const std::vector<std::string> names = {"a", "b", "c"};
   const auto in = [](const std::string& folder) { return folder + "/mutant"; };
-  return {
-      {"scene", false, "mutant", scenes, [=](const auto& f) { run_scene(in(f)); }},
-      {"urdf", false, "mutant", robots({"hand.urdf", "gripper.urdf"}), run_robot},
-      {"mjcf", false, "mutant", robots({"machine.xml", "arm.xml"}), run_robot},
-      {"table", false, "mutant", tables,
-       [=](const auto& f) { static_cast<void>(read_csv(in(f), 3, names)); }},
-      {"mesh", false, "mutant", meshes,
-       [=](const auto& f) { static_cast<void>(mesh_points(read_surface(in(f)), 0.1, 10'000)); }},
-      {"contact_points", false, "mutant", contact_points,
-       [=](const auto& f) { static_cast<void>(read_contact_points(in(f))); }},
-      {"layout", false, "mutant", layouts,
-       [=](const auto& f) { static_cast<void>(read_tactile_points(in(f))); }}};
+  // The name of a surface says how it is written.
+  const auto surface = [](const std::string& name, const auto& corpus) {
+    const std::string file = "mutant." + name;
+    return Target{name, false, file, corpus, [=](const std::string& folder) {
+                    static_cast<void>(mesh_points(read_surface(folder + "/" + file), 0.1, 10'000));
+                  }};
+  };
+  return {{"scene", false, "mutant", scenes, [=](const auto& f) { run_scene(in(f)); }},
+          {"urdf", false, "mutant", robots({"hand.urdf", "gripper.urdf"}), run_robot},
+          {"mjcf", false, "mutant", robots({"machine.xml", "arm.xml"}), run_robot},
+          {"table", false, "mutant", tables,
+           [=](const auto& f) { static_cast<void>(read_csv(in(f), 3, names)); }},
+          surface("obj", meshes),
+          surface("stl", stl_files),
+          surface("ply", ply_files),
+          {"contact_points", false, "mutant", contact_points,
+           [=](const auto& f) { static_cast<void>(read_contact_points(in(f))); }},
+          {"layout", false, "mutant", layouts,
+           [=](const auto& f) { static_cast<void>(read_tactile_points(in(f))); }}};
 }
 
 }  // namespace tangere::fuzz

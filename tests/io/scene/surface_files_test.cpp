@@ -252,6 +252,11 @@ TEST_F(SurfaceFiles, PlyFilesAreTheSameSurfaceInTextAndInBytes) {
   EXPECT_THAT(changed("element vertex 8", "elements vertex 8"), HasSubstr("c.ply:4: 'elements'"));
   EXPECT_THAT(changed("3 0 1 2", "3 0 1 8"), HasSubstr("vertex 8; expected one of 0 to 7"));
   EXPECT_THAT(changed("3 0 1 2", "2 0 1 2"), HasSubstr("c.ply:22: a face of 2 vertices"));
+  EXPECT_THAT(changed("3 0 1 2", "70000 0 1 2"),
+              HasSubstr("c.ply:22: a list of 70000 numbers; expected 0 to 65536"));
+  std::string remarks;
+  for (int k = 0; k < 1001; ++k) remarks += "comment\n";
+  EXPECT_THAT(changed("comment by hand\n", remarks), HasSubstr("a header of more than 1000 lines"));
   EXPECT_THAT(changed("\n1.000000", "\nnan"), HasSubstr("c.ply:16: vertex 2 has nan"));
   EXPECT_THAT(changed("\n1.000000", "\none"), HasSubstr("c.ply:16: 'one'; expected a number"));
 }
