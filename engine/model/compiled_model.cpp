@@ -437,6 +437,8 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   v.n_solids = static_cast<int>(m->solids.size());
   v.solids = m->solids.data();
   compile_memories(*m);
+  v.n_memories = static_cast<int>(m->memories.size());
+  v.memories = m->memories.data();
   v.ground = ground_frame(v.ground_point, v.ground_normal);
   v.pattern = m->pattern.view();
   return m;

@@ -109,7 +109,7 @@ struct PairContact {
   bool faced = false;   ///< a convex body on a cuboid: its faces are chosen per solve (faces.hpp)
   Hull hull{};          ///< body 1, if faced
   double overhang = 0;  ///< how far beyond a chosen face's edges a point still touches it [m]
-  int memory = -1;      ///< ≥ 0: index of its RememberingContact
+  int memory = -1;      ///< ≥ 0: index of what its friction remembers (ModelView::memories)
   const DistanceGrid* grid = nullptr;  ///< of a mesh
 };
 inline constexpr int kContactTile = 32;
@@ -221,7 +221,9 @@ struct ModelView {
   const GroundedLink* grounded;
   const int *pair_order, *ground_order;  ///< (n_pairs), (n_grounds): members side by side
   int n_solids;
-  const Solid* solids;   ///< (n_solids) all bodies of the scene
+  const Solid* solids;  ///< (n_solids) all bodies of the scene
+  int n_memories;
+  const RememberingContact* memories;
   Frame<double> ground;  ///< frame of the ground in the world; its third axis is the normal
   Pattern pattern;
 };
