@@ -37,6 +37,7 @@ Json point_json(const AccuracyPoint& p) {
           {"accuracy", p.setting.accuracy},
           {"error", finite(p.error)},
           {"median_error", finite(p.median)},
+          {"within_share", finite(p.within)},
           {"simulated_seconds_per_cpu_second", finite(p.rate)},
           {"evaluations_per_step", p.evaluations},
           {"split_share", p.split},

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "apps/arguments.hpp"
@@ -21,6 +22,7 @@
 #include "io/files/nearest_name.hpp"
 #include "kernels/numbers/block.hpp"
 #include "kernels/table/isa.hpp"
+#include "tasks/accuracy/accuracy_sweep.hpp"
 #include "tasks/run/benchmark_run.hpp"
 
 namespace tangere::apps {
@@ -36,7 +38,15 @@ struct BenchArguments {
   std::optional<int> environments, every, repeat;
   std::optional<std::uint64_t> seed;
   std::optional<double> accuracy;
-  bool overwrite = false, allow_unknown = false;
+  bool error = false, overwrite = false, allow_unknown = false;
+};
+
+constexpr int kErrorEnvironments = 32;
+
+/// How far the scene's own setting is off, for the console and as JSON.
+struct BenchError {
+  std::string text;
+  Json json;
 };
 
 /// The kind as given, or dense.
@@ -93,6 +103,35 @@ int report(const BenchArguments& options, const Console& console, const BenchSet
   return code;
 }
 
+/// Compares what the scene's setting gives with a reference, in environments of its own.
+BenchError error_of(const BenchArguments& options, const Model& model,
+                    const ControlProgram& controls, std::int64_t steps, const AccuracyGoOn& go_on) {
+  const int environments =
+      std::min(options.environments.value_or(kDefaultEnvironments), kErrorEnvironments);
+  const Batch start(model, environments, options.seed.value_or(0));
+  const FixedEpisodes episodes = scene_episodes(start, controls, steps, sample_interval(model));
+  AccuracyOptions of;
+  of.quantity = model.sensors().empty() ? AccuracyQuantity::state : AccuracyQuantity::tactile;
+  of.threads = 1;
+  check_memory(accuracy_bytes(episodes, of.quantity), "--error");
+  const AccuracyReport report = own_accuracy(episodes, of, {go_on, {}, {}});
+  const AccuracyReference& reference = report.reference;
+  Json json{{"quantity", to_string(of.quantity)},
+            {"envs", reference.environments},
+            {"reference_error", finite(reference.error)},
+            {"resolved", report.resolved},
+            {"error", report.resolved ? finite(report.own.error) : Json()},
+            {"median_error", report.resolved ? finite(report.own.median) : Json()}};
+  const char* const what = of.quantity == AccuracyQuantity::tactile ? "tactile fields" : "state";
+  if (!report.resolved)
+    return {fmt::format("error: not resolved; two references differ by {:.2g} %",
+                        100 * reference.error),
+            json};
+  return {fmt::format("error of the {}: {:.2g} %, not exceeded in 95 % of {} environments", what,
+                      100 * report.own.error, reference.environments),
+          json};
+}
+
 BenchSetting setting_of(const BenchArguments& options, const Model& model,
                         const ControlProgram& controls) {
   BenchSetting setting;
@@ -121,7 +160,7 @@ BenchSetting setting_of(const BenchArguments& options, const Model& model,
 template <class Run>
 int measure(const BenchArguments& options, const Console& console, BenchSetting& setting,
             const std::vector<int>& threads, const Model& model, const Json& of_task,
-            const Run& run) {
+            const Run& run, const std::function<BenchError(const AccuracyGoOn&)>& error = {}) {
   const StopSignals signals;
   TextOutput svg(options.svg, options.overwrite), csv(options.csv, options.overwrite);
   console.print(bench_heading(setting));
@@ -139,9 +178,17 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
   }
   console.print(bench_footing(runs.front()));
   list_failures(console, "environment", failures_of(runs.front()), "--json names all");
+  Json more = of_task;
+  if (error) {
+    const BenchError found = error([&] { return signals.received() == 0; });
+    if (signals.received() != 0)
+      return report_stop(console, "bench", signals.received(), "while measuring the error");
+    console.print(found.text);
+    more["error"] = found.json;
+  }
   if (svg.wanted()) svg.write(bench_svg(setting, runs), console);
   if (csv.wanted()) csv.write(bench_csv(setting, entries), console);
-  return report(options, console, setting, model, of_task, entries);
+  return report(options, console, setting, model, more, entries);
 }
 
 /// The requested thread counts, or the default ones.
@@ -152,7 +199,8 @@ std::vector<int> thread_counts(const BenchArguments& options) {
 int bench_task(const BenchArguments& options, const Console& console, const Task& task) {
   refuse_with_task(task, {{"--every", options.every.has_value()},
                           {"--frames", !options.frames.empty()},
-                          {"--record", !options.record.empty()}});
+                          {"--record", !options.record.empty()},
+                          {"--error", options.error}});
   const PolicyKind kind = policy_named(options.policy, "", PolicyKind::random);
   const Policy policy(task, kind);
   BenchSetting setting;
@@ -208,10 +256,17 @@ int bench(const BenchArguments& options, const Console& console) {
              benchmark_bytes(model, setting.environments, setting.options));
   const Batch start(model, setting.environments, seed);
 
-  return measure(options, console, setting, threads, model, {{"task", nullptr}},
-                 [&](const BenchmarkGoOn& go_on) {
-                   return run_benchmark(start, controls, setting.options, go_on);
-                 });
+  std::function<BenchError(const AccuracyGoOn&)> error;
+  if (options.error)
+    error = [&](const AccuracyGoOn& go_on) {
+      return error_of(options, model, controls, setting.options.rollout.steps, go_on);
+    };
+  return measure(
+      options, console, setting, threads, model, {{"task", nullptr}},
+      [&](const BenchmarkGoOn& go_on) {
+        return run_benchmark(start, controls, setting.options, go_on);
+      },
+      error);
 }
 
 }  // namespace
@@ -249,6 +304,9 @@ Command add_bench(CLI::App& program) {
   add_whole_number<std::uint64_t>(app, "--seed", o.seed, 0, UINT64_MAX,
                                   "Seed of all that varies between environments [default: 0]");
   add_accuracy_option(app, o.accuracy);
+  add_flag(
+      app, "--error", o.error,
+      "Say beside the speed how far the setting is from a reference, in up to 32 environments");
   add_text(app, "--svg", o.svg, "F.svg", "Write a picture of speed against threads");
   add_text(app, "--csv", o.csv, "F.csv", "Write a table of all figures");
   add_flag(app, "--overwrite", o.overwrite, "Replace the outputs if they exist");

@@ -31,15 +31,17 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
                         BasicWorkspace<L>& w, LaneBits lanes, const Row<L>& h, bool inside_split,
                         NewtonReport& report) const {
   const int n = model_.nv;
-  const NewtonLimits limits = {
-      settings_.tolerance, inside_split ? kSplitIterations : settings_.max_iterations,
-      inside_split ? kSplitHalvings : kHalvings, inside_split ? kSplitPatience : kPatience};
+  const NewtonLimits limits = {settings_.tolerance,
+                               inside_split ? kSplitIterations : settings_.max_iterations,
+                               inside_split ? kSplitHalvings : kHalvings,
+                               inside_split ? kSplitPatience : kPatience, settings_.spare};
+  StageFactors<L> factors;
   choose_faces(model_, table, w);
   begin_memory(model_, table, w);
   for (int k = 0; k <= scheme.inner_stages(); ++k) {
     set_stage(model_, scheme, k, h, w);
     guess_stage(model_, scheme, k, h, w);
-    lanes = solve_stage(model_, table, w, lanes, limits, report);
+    lanes = solve_stage(model_, table, w, lanes, limits, factors, report);
     if (k == scheme.inner_stages()) break;
     std::copy_n(w.stage.x, n, w.x_inner + k * n);
     std::copy_n(w.stage.v, n, w.v_inner + k * n);

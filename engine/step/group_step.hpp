@@ -15,6 +15,8 @@ struct StepSettings {
   double tolerance;
   int max_iterations;
   double accuracy = 0;  ///< relative, of the parts of a step; 0: every step is one part
+  /// Solves may end unchecked where they promise to meet the tolerance. False where it was named.
+  bool spare = false;
 };
 
 /// What a tape needs to know about a step besides its result.

@@ -25,6 +25,12 @@
 // taken where three of them should meet the tolerance. A chord step that fails the natural test is
 // undone, and a Newton step follows.
 //
+// The stages of a step have the same c₀. A later one takes chord steps by the factor of the stage
+// before from its start, under the same condition, with kNextStage times the share.
+//
+// Where the tolerance need not be checked (NewtonLimits::spare), a chord step that should meet it
+// ends the search.
+//
 // Whether an evaluation includes the Jacobian is a guess that affects cost, never results. g alone
 // is evaluated where every lane should be done or take a chord step, and the Jacobian afterwards if
 // one was not. The Jacobian of one lane costs its contacts a third of a group's. Where a single
@@ -32,6 +38,7 @@
 #include "engine/step/newton.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "engine/step/detection.hpp"
 
@@ -43,6 +50,8 @@ namespace {
 // which `kSecants` follow in a row.
 constexpr double kDecrease = 0.25, kSecantDecrease = 0.01;
 constexpr int kSecants = 3;
+/// The factor of the stage before may leave this many times as much of the residual as it did there.
+constexpr double kNextStage = 4;
 
 template <int L>
 struct Search {
@@ -51,11 +60,13 @@ struct Search {
   const kernels::KernelTable& table;
   BasicWorkspace<L>& w;
   const NewtonLimits& limits;
+  StageFactors<L>& factors;
   NewtonReport& report;
   double gravity;
   LaneBits searching;
-  LaneBits on_trial = 0;     ///< lanes whose x is a trial along delta
-  LaneBits use_pivoted = 0;  ///< lanes whose present factor is the pivoted one
+  LaneBits on_trial = 0;   ///< lanes whose x is a trial along delta
+  LaneBits spared = 0;     ///< lanes that ended without the last evaluation
+  LaneBits by_secant = 0;  ///< lanes whose factor takes friction by its secant
   std::array<double, L> alpha{}, delta_norm{};
   std::array<double, L> last{};    ///< scaled residual of the last accepted point
   std::array<double, L> lowest{};  ///< lowest scaled residual of all accepted points
@@ -85,6 +96,13 @@ struct Search {
       if (lone(searching) < 0) lists_to_rows(table, w, searching);
   }
 
+  /// Lanes that have a factor of the stage before take chord steps by it from the start.
+  void take_over() {
+    for (int l = 0; l < L; ++l)
+      if (!has(factors.lanes, l)) expected[l] = HUGE_VAL;
+    alpha.fill(1);
+  }
+
   /// Makes the evaluation that is due: g alone where all lanes but one should be done, else
   /// everything.
   void evaluate(bool first) {
@@ -92,9 +110,9 @@ struct Search {
     LaneBits open = 0;
     for (int l = 0; l < L; ++l)
       if (has(searching, l) && !(expected[l] <= limits.tolerance)) open |= 1U << l;
-    with_jacobian = first || (open != 0 && (lone(open) < 0 || open == searching));
+    with_jacobian = !factors.weighted || (open != 0 && (lone(open) < 0 || open == searching));
     (with_jacobian ? kernel().evaluate : kernel().residual)(model.view, w.stage, lone(searching));
-    if (first) {
+    if (!std::exchange(factors.weighted, true)) {
       kernel().set_weights(model.view, w.stage);
       set_floor(searching);
     }
@@ -128,31 +146,39 @@ struct Search {
   LaneBits judge() {
     LaneRow residual, test_norm{};
     scaled_residuals(residual);
-    if (on_trial != 0) {
+    if ((factors.lanes & searching) != 0) {
       kernel().solve(model.view, w.stage, w.stage.g, w.test);
       for (int l = 0; l < L; ++l)
-        if (has(on_trial & use_pivoted, l)) w.pivoted.solve(l, w.stage.g, w.test);
+        if (has(factors.pivoted & searching, l)) w.pivoted.solve(l, w.stage.g, w.test);
       weighted_norms(w.test, test_norm);
     }
     LaneBits accepted = 0;
     for (int l = 0; l < L; ++l) {
       if (!has(searching, l)) continue;
       ++report.iterations[l];
+      const double ratio = residual[l] / last[l];
+      if (has(on_trial, l) && alpha[l] == 1) factors.share[l] = has(chord, l) ? ratio : 2 * ratio;
       if (residual[l] <= limits.tolerance) {
         report.residual[l] = residual[l];
         stop(l, StepStatus::converged);
       } else if (!has(on_trial, l)) {
-        if (std::isfinite(residual[l])) {
-          accepted |= 1U << l;
-          last[l] = lowest[l] = residual[l];
-        } else {
+        if (!std::isfinite(residual[l])) {
           stop(l, StepStatus::non_finite);
+          continue;
+        }
+        last[l] = lowest[l] = residual[l];
+        if (has(factors.lanes, l) && chord_suffices(l, residual[l], kNextStage)) {
+          on_trial |= 1U << l;
+          take_chord(l, test_norm[l]);
+        } else {
+          accepted |= 1U << l;
+          expected[l] = 0;
         }
       } else if (descends(l, test_norm[l], residual[l])) {
         report.residual[l] = residual[l];
-        const double ratio = residual[l] / last[l];
-        if (chord_suffices(l, residual[l], has(chord, l) ? ratio : 2 * ratio)) {
+        if (chord_suffices(l, residual[l], 1)) {
           take_chord(l, test_norm[l]);
+          if (limits.spare && residual[l] * factors.share[l] <= limits.tolerance) spare(l);
         } else if (stalls(l, residual[l])) {
           stop(l, StepStatus::not_converged);
         } else {
@@ -197,7 +223,9 @@ struct Search {
     w.stage.friction_tangent[l] = directions_left > 0 ? 0 : 1;
   }
 
-  [[nodiscard]] bool chord_suffices(int l, double residual, double share) const {
+  /// `caution`: how much more than the last step a chord step may leave.
+  [[nodiscard]] bool chord_suffices(int l, double residual, double caution) const {
+    const double share = caution * factors.share[l];
     return alpha[l] == 1 && !has(no_chord, l) &&
            residual * share * share * share <= limits.tolerance;
   }
@@ -211,6 +239,12 @@ struct Search {
       w.delta[i][l] = w.test[i][l];
       w.stage.x[i][l] -= w.test[i][l];
     }
+  }
+  /// Ends a lane where the chord step just taken leads.
+  void spare(int l) {
+    report.residual[l] *= factors.share[l];
+    spared |= 1U << l;
+    stop(l, StepStatus::converged);
   }
   /// Returns to where the chord step began, for a Newton direction from there.
   void take_back(int l) {
@@ -230,9 +264,11 @@ struct Search {
     kernel().solve_watched(model.view, w.stage, w.stage.g, w.test, &w.sound);
     for (int l = 0; l < L; ++l) {
       if (!has(accepted, l)) continue;
-      use_pivoted &= ~(1U << l);
+      factors.lanes |= 1U << l;
+      by_secant = secants[l] > 0 ? by_secant | (1U << l) : by_secant & ~(1U << l);
+      factors.pivoted &= ~(1U << l);
       if (w.sound[l] > 0) continue;
-      use_pivoted |= 1U << l;
+      factors.pivoted |= 1U << l;
       w.pivoted.factor(model.view.pattern, w.stage.A, l, false);
       w.pivoted.solve(l, w.stage.g, w.test);
     }
@@ -269,8 +305,9 @@ double magnitude(const kernels::Vec3<double>& a) { return std::sqrt(dot(a, a)); 
 template <int L>
 LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table,
                      BasicWorkspace<L>& w, LaneBits lanes, const NewtonLimits& limits,
-                     NewtonReport& report) {
-  Search<L> s{model, table, w, limits, report, magnitude(model.view.gravity), lanes};
+                     StageFactors<L>& factors, NewtonReport& report) {
+  Search<L> s{model, table, w, limits, factors, report, magnitude(model.view.gravity), lanes};
+  s.take_over();
   bool first = true;
   while (s.searching != 0) {
     s.evaluate(first);
@@ -278,6 +315,11 @@ LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& tab
     const LaneBits accepted = s.judge();
     if (accepted != 0) s.new_directions(accepted);
   }
+  if (s.spared != 0) {  // v and candidates where they ended
+    s.searching = s.spared;
+    s.locate(false);
+  }
+  s.factors.lanes &= ~s.by_secant;
   for (int l = 0; l < L; ++l) w.stage.friction_tangent[l] = 1;
   LaneBits converged = 0;
   for (int l = 0; l < L; ++l)
@@ -290,7 +332,8 @@ void residual_elsewhere(const CompiledModel& model, const kernels::KernelTable& 
                         BasicWorkspace<L>& w, LaneBits lanes, NewtonReport& report,
                         kernels::Row<L>& out) {
   const NewtonLimits unused{};
-  Search<L> s{model, table, w, unused, report, magnitude(model.view.gravity), lanes};
+  StageFactors<L> none;
+  Search<L> s{model, table, w, unused, none, report, magnitude(model.view.gravity), lanes};
   s.locate(false);
   s.kernel().residual(model.view, w.stage, s.lone(lanes));
   s.scaled_residuals(out);
@@ -303,7 +346,8 @@ template void residual_elsewhere(const CompiledModel&, const kernels::KernelTabl
 template void residual_elsewhere(const CompiledModel&, const kernels::KernelTable&,
                                  SingleWorkspace&, LaneBits, NewtonReport&, kernels::Row<1>&);
 template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, Workspace&,
-                              LaneBits, const NewtonLimits&, NewtonReport&);
+                              LaneBits, const NewtonLimits&, StageFactors<kernels::kGroup>&,
+                              NewtonReport&);
 template LaneBits solve_stage(const CompiledModel&, const kernels::KernelTable&, SingleWorkspace&,
-                              LaneBits, const NewtonLimits&, NewtonReport&);
+                              LaneBits, const NewtonLimits&, StageFactors<1>&, NewtonReport&);
 }  // namespace tangere

@@ -14,23 +14,35 @@ struct NewtonLimits {
   int max_iterations;  ///< largest number of Newton directions
   int max_halvings;    ///< per direction
   int patience;        ///< directions in a row that may bring no new lowest residual
+  /// The last evaluation is spared where the contraction so far promises that it would pass.
+  bool spare;
+};
+
+/// What the stages of one step hand on to each other.
+template <int L>
+struct StageFactors {
+  bool weighted = false;          ///< the norm's weights and floor are those of this step
+  LaneBits lanes = kNoLane;       ///< lanes with a factor at hand
+  LaneBits pivoted = kNoLane;     ///< lanes in which that is the pivoted one
+  std::array<double, L> share{};  ///< of the residual that a step by that factor left
 };
 
 /// How the solve went, per lane. Lanes that were not requested keep their values.
 struct NewtonReport {
   std::array<StepStatus, kernels::kGroup> status{};
-  std::array<int, kernels::kGroup> iterations{};   ///< evaluations of the residual, accumulated
-  std::array<double, kernels::kGroup> residual{};  ///< scaled residual at the last accepted point
+  std::array<int, kernels::kGroup> iterations{};  ///< evaluations of the residual, accumulated
+  /// Scaled residual at the last accepted point; the expected one where its evaluation was spared.
+  std::array<double, kernels::kGroup> residual{};
   LaneBits passed = 0;  ///< lanes in which a body came through a cuboid that it touches
 };
 
 /// Solves g(x) = 0 for the lanes in `lanes`, from the x in the stage. On return the stage's x and v
 /// hold the solution of converged lanes. Returns the lanes that converged; the others have a
-/// failure in `report.status`.
+/// failure in `report.status`. `factors`: of the stages before, which must have the same c₀.
 template <int L>
 LaneBits solve_stage(const CompiledModel& model, const kernels::KernelTable& table,
                      BasicWorkspace<L>& w, LaneBits lanes, const NewtonLimits& limits,
-                     NewtonReport& report);
+                     StageFactors<L>& factors, NewtonReport& report);
 
 /// Computes the scaled residual at another x of a solved stage. The stage keeps that x.
 template <int L>

@@ -45,6 +45,7 @@ StepSettings step_settings(const Model& model, const StepperOptions& o) {
                                ? std::clamp(kShareOfAccuracy * accuracy, kTightest, kLoosest)
                                : model.following_tolerance(s.integrator, s.timestep);
   s.tolerance = o.tolerance.value_or(model.solver().tolerance.value_or(following));
+  s.spare = !o.tolerance && !model.solver().tolerance;
   if (!(s.tolerance > 0) || !std::isfinite(s.tolerance))
     throw InputError("solver tolerance " + std::to_string(s.tolerance) +
                      "; expected a positive number");

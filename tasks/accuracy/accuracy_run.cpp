@@ -156,11 +156,13 @@ struct AccuracyRun::Impl {
 
   AccuracyOutcome play(const AccuracySetting& setting, const AccuracyGoOn& go_on, bool keep) {
     const double interval = episodes.interval();
+    const std::optional<double> tolerance =
+        setting.follows ? std::nullopt : std::optional(setting.tolerance);
     for (Worker& w : workers)
       w.stepper = std::make_unique<Stepper>(episodes.start.model(),
                                             StepperOptions{.integrator = setting.integrator,
                                                            .timestep = interval / setting.parts,
-                                                           .tolerance = setting.tolerance,
+                                                           .tolerance = tolerance,
                                                            .accuracy = setting.accuracy});
     for (std::vector<double>& s : sum) s.assign(environments(), 0);
     Batch batch = episodes.start;

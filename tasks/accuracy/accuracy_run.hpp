@@ -26,6 +26,8 @@ struct AccuracySetting {
   int parts = 1;  ///< steps between samples
   double tolerance = 1e-9;
   double accuracy = 0;  ///< of the parts of a step; 0: every step is one part
+  /// The tolerance is left to the engine, which then spares evaluations; `tolerance` says which.
+  bool follows = false;
 };
 
 /// The two precisions in which fields are read, as indices below.

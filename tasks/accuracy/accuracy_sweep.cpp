@@ -32,6 +32,15 @@ double quantile(std::vector<double> numbers, double share) {
   return numbers[as_size(std::max(0, static_cast<int>(rank) - 1))];
 }
 
+/// Share of the errors that are 0.3 to 3 times `wanted`. NaN entries do not count.
+double share_near(double wanted, const std::vector<double>& errors) {
+  if (!(wanted > 0)) return std::nan("");
+  const auto known = std::ranges::count_if(errors, [](double x) { return !std::isnan(x); });
+  const auto near =
+      std::ranges::count_if(errors, [&](double x) { return x >= 0.3 * wanted && x <= 3 * wanted; });
+  return static_cast<double>(near) / static_cast<double>(known);
+}
+
 std::string status_of(const AccuracyOutcome& outcome, int environments) {
   if (outcome.failures.empty()) return "ok";
   const FailedEnvironment& first = outcome.failures.front();
@@ -49,9 +58,13 @@ class Sweep {
         listener_(listener),
         run_(episodes, options.quantity, options.threads) {}
 
+  AccuracyReport run_own() {
+    report_.stopped = !find_reference() || !measure_own();
+    return std::move(report_);
+  }
+
   AccuracyReport run() {
     if (!find_reference()) return stop();
-    report_.resolved = report_.reference.error <= options_.target / 3;
     if (!report_.resolved) look_for_vibration();
     if (report_.reference.environments == 0) return std::move(report_);  // the reference failed
     if (!measure_points()) return stop();
@@ -88,6 +101,7 @@ class Sweep {
       if (error <= options_.target / kFineEnough || error > 0.5 * last) break;
       last = error;
     }
+    report_.resolved = report_.reference.error <= options_.target / 3;
     return true;
   }
 
@@ -121,6 +135,11 @@ class Sweep {
         setting.integrator, episodes_.interval() / setting.parts));
   }
 
+  /// Whether settings are played with the tolerance that the engine chooses.
+  [[nodiscard]] bool tolerance_follows() const {
+    return !options_.tolerance && !episodes_.start.model().solver().tolerance;
+  }
+
   /// Plays a setting up to kPasses times; the least times count. Returns false when stopped.
   bool measure(const AccuracySetting& setting, std::vector<AccuracyPoint>& points) {
     AccuracyOutcome best = run_.compare(setting, listener_.go_on);
@@ -151,6 +170,7 @@ class Sweep {
     point.step = episodes_.interval() / setting.parts;
     point.error = quantile(outcome.error[p], 0.95);
     point.median = quantile(outcome.error[p], 0.5);
+    point.within = share_near(setting.accuracy, outcome.error[p]);
     const auto steps = static_cast<double>(std::max<std::int64_t>(1, outcome.environment_steps));
     point.evaluations = static_cast<double>(outcome.evaluations) / steps;
     point.split = static_cast<double>(outcome.split_steps) / steps;
@@ -171,6 +191,7 @@ class Sweep {
       for (const Integrator integrator : integrators()) {
         AccuracySetting setting{integrator, parts, 0};
         setting.tolerance = tolerance_of(setting);
+        setting.follows = tolerance_follows();
         if (!measure(setting, report_.points)) return false;
       }
     }
@@ -189,6 +210,7 @@ class Sweep {
                                    .tolerance = options_.tolerance,
                                    .accuracy = accuracy});
       setting.tolerance = as_set.tolerance();
+      setting.follows = tolerance_follows();
       if (!measure(setting, report_.points)) return false;
     }
     return true;
@@ -198,7 +220,9 @@ class Sweep {
     const Model& model = episodes_.start.model();
     std::vector<AccuracyPoint> own;
     const Stepper as_set(model);
-    if (!measure({model.integrator(), episodes_.every, as_set.tolerance(), as_set.accuracy()}, own))
+    if (!measure({model.integrator(), episodes_.every, as_set.tolerance(), as_set.accuracy(),
+                  !model.solver().tolerance},
+                 own))
       return false;
     report_.own = own.front();
     return true;
@@ -216,6 +240,7 @@ class Sweep {
   bool measure_tolerances() {
     AccuracySetting setting = report_.own.setting;
     if (report_.advice >= 0) setting = report_.points[as_size(report_.advice)].setting;
+    setting.follows = false;
     for (const double tolerance : kTolerances) {
       setting.tolerance = tolerance;
       if (!measure(setting, report_.tolerances)) return false;
@@ -236,6 +261,11 @@ class Sweep {
 AccuracyReport accuracy_sweep(const FixedEpisodes& episodes, const AccuracyOptions& options,
                               const AccuracyListener& listener) {
   return Sweep(episodes, options, listener).run();
+}
+
+AccuracyReport own_accuracy(const FixedEpisodes& episodes, const AccuracyOptions& options,
+                            const AccuracyListener& listener) {
+  return Sweep(episodes, options, listener).run_own();
 }
 
 }  // namespace tangere

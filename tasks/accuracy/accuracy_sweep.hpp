@@ -27,7 +27,9 @@ struct AccuracyPoint {
   Precision precision = Precision::f64;  ///< of fields
   double step = 0;                       ///< [s]
   double error = 0;  ///< not exceeded in 95 % of the environments; infinite if more than 5 % failed
-  double median = 0;       ///< of the errors of environments
+  double median = 0;  ///< of the errors of environments
+  /// Of cut steps: share of the environments whose error is 0.3 to 3 times the accuracy; else NaN.
+  double within = 0;
   double evaluations = 0;  ///< of the residual, per step
   double split = 0;        ///< share of steps
   double rate = 0;         ///< simulated seconds per CPU second, over all environments
@@ -68,5 +70,10 @@ struct AccuracyListener {
 /// or nothing moves.
 AccuracyReport accuracy_sweep(const FixedEpisodes& episodes, const AccuracyOptions& options,
                               const AccuracyListener& listener);
+
+/// Makes the reference and compares the scene's own setting with it: `reference`, `own` and
+/// `resolved` of a report. Throws like accuracy_sweep.
+AccuracyReport own_accuracy(const FixedEpisodes& episodes, const AccuracyOptions& options,
+                            const AccuracyListener& listener);
 
 }  // namespace tangere

@@ -40,6 +40,7 @@ TEST(Accuracy, NamesTheCheapestSettingAndDrawsTheOthers) {
   for (const json& point : answer.at("points")) {
     EXPECT_GT(point.at("simulated_seconds_per_cpu_second"), 0);
     EXPECT_EQ(point.at("status"), "ok");
+    EXPECT_EQ(point.at("within_share").is_null(), point.at("accuracy") == 0);
     if (point.at("error") <= 0.03) {
       EXPECT_LE(point.at("simulated_seconds_per_cpu_second"),
                 advice.at("simulated_seconds_per_cpu_second"));

@@ -100,6 +100,27 @@ TEST(Bench, StepsAndThreadsHaveDefaults) {
   EXPECT_EQ(runs[0].at("every"), 5);
 }
 
+/// The error is the one that `accuracy` finds for the scene's own setting.
+TEST(Bench, SaysTheErrorBesideTheSpeed) {
+  const Folder folder;
+  const Words size{"--envs", "3", "--steps", "100", "--threads", "1"};
+  Words words = size;
+  words.emplace_back("--error");
+  const json error = bench_json(folder, words).at("error");
+  Words sweep{"accuracy", kSmall};
+  sweep.insert(sweep.end(), size.begin(), size.end());
+  const json own = run_json(folder, sweep).at("own");
+  EXPECT_EQ(error.at("quantity"), "tactile");
+  EXPECT_EQ(error.at("envs"), 3);
+  EXPECT_EQ(error.at("resolved"), true);
+  EXPECT_EQ(error.at("error"), own.at("error"));
+  EXPECT_EQ(error.at("median_error"), own.at("median_error"));
+  EXPECT_LT(error.at("reference_error"), 1e-2 / 3);
+  EXPECT_FALSE(bench_json(folder, size).contains("error"));
+  const Outcome told = run(folder, bench(words));
+  EXPECT_THAT(told.out, HasSubstr("error of the tactile fields: "));
+}
+
 TEST(Bench, ThePictureHasOneMarkPerThreadCount) {
   const Folder folder;
   const json answer = bench_json(

@@ -143,5 +143,68 @@ TEST(StepParts, SchemeThatKeepsAnAccuracy) {
     EXPECT_THROW(Stepper(Model(scene), keeping(none)), InputError) << none;
 }
 
+/// A yardstick of Drake's CENIC: a ball of 0.1 m that rolls at 0.8 m/s goes 0.8 m in a second.
+TEST(StepParts, ARollingBallKeepsItsWay) {
+  constexpr double kRadius = 0.1, kStiffness = 1e5, kSpeed = 0.8;
+  Scene scene;
+  scene.ground = GroundDescription{};
+  scene.links = {
+      testing::link("ball", JointType::free, {0, 0, kRadius}, SphereShape{kRadius}, 1000)};
+  scene.ground_contacts.push_back({"ball", {kStiffness, 100, 0.5, 10}, ContactLaw::linear, 0, {}});
+  const Model model(scene);
+  Stepper stepper(model, keeping(1e-3));
+  Batch batch(model, 1);
+  std::vector<double> q = q_of(batch);
+  q[2] = -9.8 * model.mass(0) / kStiffness;
+  batch.set_state(0, q, std::vector<double>{kSpeed, 0, 0, 0, kSpeed / kRadius, 0});
+  for (int k = 0; k < 40; ++k) stepper.step(batch, {});
+  EXPECT_NEAR(q_of(batch)[0], kSpeed, 1e-3);
+  EXPECT_NEAR(q_of(batch)[1], 0, 1e-6);
+}
+
+/// Another: an undamped double pendulum that falls from the horizontal for two seconds. Its energy
+/// error falls with the accuracy.
+TEST(StepParts, EnergyErrorsFallWithTheAccuracy) {
+  constexpr double kLength = 0.5, kWidth = 0.05, kMiddle = kLength / 2;
+  Scene scene;
+  scene.timestep = kLong;
+  for (const char* name : {"upper", "lower"}) {
+    LinkDescription link = testing::link(name, JointType::revolute, {0, 0, 0},
+                                         CuboidShape{{kWidth, kWidth, kLength}, {2, 2, 2}}, 1000);
+    link.joint.axis0 = {0, 1, 0};
+    link.body.pose.position = {0, 0, -kMiddle};
+    scene.links.push_back(link);
+  }
+  scene.links[1].parent = 0;
+  scene.links[1].joint.pose.position = {0, 0, -kLength};
+  const Model model(scene);
+  const double mass = model.mass(0);
+  const double inertia = mass / 12 * (kLength * kLength + kWidth * kWidth);
+  const auto energy = [&](const Batch& batch) {
+    const std::vector<double> q = q_of(batch), v = v_of(batch);
+    const double a = q[0], b = q[0] + q[1], va = v[0], vb = v[0] + v[1];
+    const double moving = 0.5 * (inertia + mass * kMiddle * kMiddle) * (va * va + vb * vb) +
+                          0.5 * mass * kLength * kLength * va * va +
+                          mass * kLength * kMiddle * std::cos(a - b) * va * vb;
+    return moving - mass * 9.8 * ((kMiddle + kLength) * std::cos(a) + kMiddle * std::cos(b));
+  };
+  double last = HUGE_VAL;
+  for (const double accuracy : {1e-1, 1e-2, 1e-3, 1e-4, 1e-5}) {
+    Batch batch(model, 1);
+    batch.set_state(0, std::vector<double>{M_PI / 2, 0}, std::vector<double>{0, 0});
+    const double start = energy(batch);
+    Stepper stepper(model, keeping(accuracy));
+    double error = 0;
+    for (int k = 0; k < 80; ++k) {
+      stepper.step(batch, {});
+      error = std::max(error, std::abs(energy(batch) - start));
+    }
+    error /= 2 * mass * 9.8 * kLength;  // by what a fall of both would free
+    EXPECT_LT(error, 0.5 * last) << accuracy;
+    EXPECT_LT(error, 2 * accuracy) << accuracy;
+    last = error;
+  }
+}
+
 }  // namespace
 }  // namespace tangere

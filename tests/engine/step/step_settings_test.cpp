@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"
 
 namespace tangere {
@@ -48,6 +49,39 @@ TEST(StepTolerance, IsTheCallersThenTheScenes) {
   EXPECT_EQ(in_force(scene), 1e-7);
   EXPECT_EQ(in_force(scene, for_gradients(Model(scene), {})), 1e-7);
   EXPECT_EQ(in_force(scene, {.integrator = {}, .timestep = {}, .tolerance = 1e-6}), 1e-6);
+}
+
+/// Solves whose tolerance follows the step end where their contraction promises it; a tolerance
+/// that somebody named is checked. Both are as near to the root.
+TEST(StepTolerance, ChecksWhatWasNamed) {
+  const Model model(testing::rolling_ball(false, 4));
+  struct Played {
+    std::vector<double> q;
+    int evaluations = 0;
+    double residual = 0;  // largest
+  };
+  const auto play = [&](const StepperOptions& options) {
+    Stepper stepper(model, options);
+    Batch batch(model, 1);
+    Played run;
+    for (int k = 0; k < 350; ++k) {
+      testing::step_all(stepper, batch, testing::rolling_ball_control(k));
+      run.evaluations += batch.iterations(0);
+      run.residual = std::max(run.residual, batch.residual(0));
+    }
+    run.q = testing::q_of(batch);
+    return run;
+  };
+  for (const Integrator integrator : {Integrator::bdf2, Integrator::sdirk2}) {
+    const double tolerance = model.following_tolerance(integrator, model.timestep());
+    const Played spared = play({.integrator = integrator, .timestep = {}, .tolerance = {}});
+    const Played checked = play({.integrator = integrator, .timestep = {}, .tolerance = tolerance});
+    const Played exact = play({.integrator = integrator, .timestep = {}, .tolerance = 1e-12});
+    EXPECT_LT(spared.evaluations, checked.evaluations) << to_string(integrator);
+    EXPECT_LE(spared.residual, tolerance) << to_string(integrator);
+    for (const std::size_t i : {3, 4})  // the ball's place [m]
+      EXPECT_NEAR(spared.q[i], exact.q[i], 1e-7) << to_string(integrator);
+  }
 }
 
 }  // namespace
