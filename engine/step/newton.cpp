@@ -50,7 +50,7 @@ namespace {
 // which `kSecants` follow in a row.
 constexpr double kDecrease = 0.25, kSecantDecrease = 0.01;
 constexpr int kSecants = 3;
-/// The factor of the stage before may leave this many times as much of the residual as it did there.
+/// The factor of the stage before may leave this many times the share that it left there.
 constexpr double kNextStage = 4;
 
 template <int L>
@@ -260,7 +260,8 @@ struct Search {
     if (!with_jacobian) kernel().evaluate(model.view, w.stage, lone(accepted));
     set_floor(accepted);
     const LaneRow accept = row_of(accepted);
-    kernel().factor(model.view, w.stage, (searching & ~accepted) == 0 ? nullptr : &accept);
+    // Lanes that have ended keep their factors for the next stage.
+    kernel().factor(model.view, w.stage, (factors.lanes & ~accepted) == 0 ? nullptr : &accept);
     kernel().solve_watched(model.view, w.stage, w.stage.g, w.test, &w.sound);
     for (int l = 0; l < L; ++l) {
       if (!has(accepted, l)) continue;

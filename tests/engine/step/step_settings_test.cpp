@@ -55,7 +55,7 @@ TEST(StepTolerance, IsTheCallersThenTheScenes) {
 /// that somebody named is checked. Both are as near to the root.
 TEST(StepTolerance, ChecksWhatWasNamed) {
   const Model model(testing::rolling_ball(false, 4));
-  struct Played {
+  struct Solved {
     std::vector<double> q;
     int evaluations = 0;
     double residual = 0;  // largest
@@ -63,7 +63,7 @@ TEST(StepTolerance, ChecksWhatWasNamed) {
   const auto play = [&](const StepperOptions& options) {
     Stepper stepper(model, options);
     Batch batch(model, 1);
-    Played run;
+    Solved run;
     for (int k = 0; k < 350; ++k) {
       testing::step_all(stepper, batch, testing::rolling_ball_control(k));
       run.evaluations += batch.iterations(0);
@@ -74,9 +74,9 @@ TEST(StepTolerance, ChecksWhatWasNamed) {
   };
   for (const Integrator integrator : {Integrator::bdf2, Integrator::sdirk2}) {
     const double tolerance = model.following_tolerance(integrator, model.timestep());
-    const Played spared = play({.integrator = integrator, .timestep = {}, .tolerance = {}});
-    const Played checked = play({.integrator = integrator, .timestep = {}, .tolerance = tolerance});
-    const Played exact = play({.integrator = integrator, .timestep = {}, .tolerance = 1e-12});
+    const Solved spared = play({.integrator = integrator, .timestep = {}, .tolerance = {}});
+    const Solved checked = play({.integrator = integrator, .timestep = {}, .tolerance = tolerance});
+    const Solved exact = play({.integrator = integrator, .timestep = {}, .tolerance = 1e-12});
     EXPECT_LT(spared.evaluations, checked.evaluations) << to_string(integrator);
     EXPECT_LE(spared.residual, tolerance) << to_string(integrator);
     for (const std::size_t i : {3, 4})  // the ball's place [m]
