@@ -98,8 +98,10 @@ struct Search {
 
   /// Lanes that have a factor of the stage before take chord steps by it from the start.
   void take_over() {
-    for (int l = 0; l < L; ++l)
-      if (!has(factors.lanes, l)) expected[l] = HUGE_VAL;
+    for (int l = 0; l < L; ++l) {
+      const double share = kNextStage * factors.share[l];
+      expected[l] = has(factors.lanes, l) ? factors.start[l] * share * share * share : HUGE_VAL;
+    }
     alpha.fill(1);
   }
 
@@ -166,7 +168,7 @@ struct Search {
           stop(l, StepStatus::non_finite);
           continue;
         }
-        last[l] = lowest[l] = residual[l];
+        last[l] = lowest[l] = factors.start[l] = residual[l];
         if (has(factors.lanes, l) && chord_suffices(l, residual[l], kNextStage)) {
           on_trial |= 1U << l;
           take_chord(l, test_norm[l]);

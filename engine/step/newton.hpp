@@ -25,6 +25,7 @@ struct StageFactors {
   LaneBits lanes = kNoLane;       ///< lanes with a factor at hand
   LaneBits pivoted = kNoLane;     ///< lanes in which that is the pivoted one
   std::array<double, L> share{};  ///< of the residual that a step by that factor left
+  std::array<double, L> start{};  ///< residual at the first point of the stage before
 };
 
 /// How the solve went, per lane. Lanes that were not requested keep their values.
