@@ -179,7 +179,7 @@ int measure(const BenchArguments& options, const Console& console, BenchSetting&
     if (signals.received() != 0)
       return report_stop(console, "bench", signals.received(), "while measuring the error");
     console.print(found.text);
-    more["error"] = found.json;
+    more["own_error"] = found.json;
   }
   if (svg.wanted()) svg.write(bench_svg(setting, runs), console);
   if (csv.wanted()) csv.write(bench_csv(setting, entries), console);
