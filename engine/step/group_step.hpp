@@ -6,6 +6,7 @@
 
 #include "engine/step/newton.hpp"
 #include "engine/step/passing.hpp"
+#include "engine/step/step_watch.hpp"
 #include "engine/step/tape.hpp"
 
 namespace tangere {
@@ -45,13 +46,6 @@ class GroupStep {
                SolveLog* log = nullptr) const;
 
  private:
-  /// Lanes that found a root. Those in which a body came through another, or that created energy,
-  /// should not be taken.
-  struct Solved {
-    LaneBits found = 0, passed = 0, created = 0;
-    [[nodiscard]] LaneBits sound() const { return found & ~(passed | created); }
-  };
-
   template <int L>
   void advance_plainly(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                        SingleWorkspace& alone, LaneBits lanes, LaneBits history,

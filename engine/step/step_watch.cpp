@@ -9,6 +9,8 @@
 //   ‖D^½ (v₁ - v₀)‖ > kJump max(‖D^½ v₀‖, ‖D^½ v₁‖)   and   > h |gravity| √(3 mass)
 // which costs next to nothing and is false in smooth motion once the step is short enough. So
 // orders are kept.
+#include "engine/step/step_watch.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -122,10 +124,9 @@ LaneBits GroupStep::creating(const kernels::KernelTable& table, BasicWorkspace<L
 
 /// Solves a step of length h, and looks at what it came to.
 template <int L>
-GroupStep::Solved GroupStep::solve_and_watch(const Scheme& scheme,
-                                             const kernels::KernelTable& table,
-                                             BasicWorkspace<L>& w, LaneBits lanes, double h,
-                                             bool inside_split, NewtonReport& report) const {
+Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTable& table,
+                                  BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,
+                                  NewtonReport& report) const {
   Solved solved;
   const LaneBits of_other_parts = std::exchange(report.passed, kNoLane);
   solved.found = run(scheme, table, w, lanes, Row<L>::all(h), inside_split, report);
@@ -134,12 +135,12 @@ GroupStep::Solved GroupStep::solve_and_watch(const Scheme& scheme,
   return solved;
 }
 
-#define TANGERE_FOR_LANES(L)                                                                  \
-  template void GroupStep::watch_passing(const kernels::KernelTable&, BasicWorkspace<L>&,     \
-                                         LaneBits, NewtonReport&) const;                      \
-  template GroupStep::Solved GroupStep::solve_and_watch(                                      \
-      const Scheme&, const kernels::KernelTable&, BasicWorkspace<L>&, LaneBits, double, bool, \
-      NewtonReport&) const;
+#define TANGERE_FOR_LANES(L)                                                              \
+  template void GroupStep::watch_passing(const kernels::KernelTable&, BasicWorkspace<L>&, \
+                                         LaneBits, NewtonReport&) const;                  \
+  template Solved GroupStep::solve_and_watch(const Scheme&, const kernels::KernelTable&,  \
+                                             BasicWorkspace<L>&, LaneBits, double, bool,  \
+                                             NewtonReport&) const;
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)
 #undef TANGERE_FOR_LANES
