@@ -133,7 +133,8 @@ def main() -> None:
     script = play(env, TEST_SEED, lambda env, _obs, _t: env.scripted_action()).summary()
     result = closed_loop(windows, clone, asked).summary()
     if asked.json:
-        print(json.dumps({"program": "bc", "settings": vars(asked), **provenance(asked.device), **cost,
+        print(json.dumps({"program": "bc", "settings": vars(asked),
+                          **provenance(asked.device), **cost,
                           "task": task.name, "keys": keys, "data": source(windows.episodes.masks),
                           "rows": len(windows), "script": script, "test": result}))  # fmt: skip
         return

@@ -10,10 +10,10 @@ makes. With all numbers divided by their standard deviations, it minimises
 
     |f(z) - Δx|² + m |∂f/∂z r - J r|²,   z = (x, a),  r random with E r rᵀ = 1,
 
-where J is what the data set has as grad_state_by_state - 1 and grad_state_by_action. m is `--match`;
-0 leaves the derivatives out. Contacts have kinks, where J jumps, so each row's |J r|² is cut at a
-bound. It is trained with 1, 2, … episodes of mask/train, and tested on the episodes of mask/valid:
-the root mean square error of Δx, in standard deviations of Δx.
+where J is what the data set has as grad_state_by_state - 1 and grad_state_by_action. m is
+`--match`; 0 leaves the derivatives out. Contacts have kinks, where J jumps, so the entries of J are
+bounded. It is trained with 1, 2, … episodes of mask/train, and tested on the episodes of
+mask/valid: the root mean square error of Δx, in standard deviations of Δx.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def main() -> None:
     episodes = Episodes(asked.data)
     train, valid = episodes.mask("train"), episodes.mask("valid")
     if max(asked.sizes) > len(train):
-        raise SystemExit(f"--sizes {asked.sizes}; the data set has {len(train)} episodes to learn from")
+        raise SystemExit(f"--sizes {asked.sizes}; there are {len(train)} episodes to learn from")
     begin, clock = time.process_time(), time.perf_counter()
     test = rows_of(episodes, valid)
     order = draw.permutation(train)

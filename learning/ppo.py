@@ -37,7 +37,8 @@ import tangere
 
 COMMON = {
     "steps": 2_000_000, "envs": 256, "length": 32, "passes": 4, "minibatch": 512, "rate": 3e-4,
-    "gamma": 0.99, "last_gamma": 0.0, "imitate": 0.0, "trace": 0.95, "clip": 0.2, "value": 0.5, "entropy": 0.0, "norm": 0.5,
+    "gamma": 0.99, "last_gamma": 0.0, "imitate": 0.0, "trace": 0.95, "clip": 0.2, "value": 0.5,
+    "entropy": 0.0, "norm": 0.5,
     "deviation": 1.0, "recurrent": False, "squash": False,
 }  # fmt: skip
 INSERTION = {"steps": 40_960, "envs": 64, "minibatch": 256, "deviation": 0.5, "recurrent": True}
@@ -379,7 +380,8 @@ def main() -> None:
     env = tangere.make_vec(asked.task, asked.episodes, autoreset="disabled", threads=asked.threads)
     result = play(env, TEST_SEED, Actor(*kept, asked.squash)).summary()
     if asked.json:
-        print(json.dumps({"program": "ppo", "settings": vars(asked), **provenance(asked.device), **cost,
+        print(json.dumps({"program": "ppo", "settings": vars(asked),
+                          **provenance(asked.device), **cost,
                           "steps": updates * asked.envs * asked.length,
                           "curve": curve[:: max(1, len(curve) // 100)], "choice": chosen,
                           "test": result}))  # fmt: skip
