@@ -144,7 +144,7 @@ double contact_points_per_area(const Shape& shape, const RectArray& array) {
 }
 
 void warn_of_unlike_skins(const Scene& scene, const SceneNode& root) {
-  constexpr double kUnlike = 10;
+  constexpr double kUnlike = 20;
   for (const TactileDescription& d : scene.sensors) {
     const RectArray& a = d.array;
     if (!d.points.empty() || a.rows < 2 || a.cols < 2 || d.coefficients.kn == 0) continue;
