@@ -18,8 +18,8 @@ inline Shape shape_of(PrimitiveShape s) {
     case PrimitiveShape::cylinder: return CylinderShape{0.05, 0.02, 8, 2};
     case PrimitiveShape::ellipsoid: return EllipsoidShape{{0.07, 0.05, 0.04}, 12};
     case PrimitiveShape::mesh: {
-      MeshShape mesh = ellipsoid_mesh(2, {0.035, 0.025, 0.02});
-      mesh.resolution = 20;
+      MeshShape mesh = ellipsoid_mesh(1, {0.035, 0.025, 0.02});
+      mesh.resolution = 12;
       return mesh;
     }
     case PrimitiveShape::capsule: break;
