@@ -63,9 +63,11 @@ class Press : public Task {
   std::size_t z_;  // of the pad
 };
 
+std::unique_ptr<Task> make_press(const Scene& scene) { return std::make_unique<Press>(scene); }
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  add_task({Press::declare, [](const Scene& scene) { return std::make_unique<Press>(scene); }});
+  add_task({Press::declare, make_press});
   return run_program(argc, argv);
 }
