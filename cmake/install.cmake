@@ -54,6 +54,7 @@ set(public_headers
   engine/rows/task_spec.hpp
   engine/sense/flow_map.hpp
   engine/sense/readout.hpp
+  engine/sense/start_overlaps.hpp
   engine/sense/tactile_frame.hpp
   engine/step/batch.hpp
   engine/step/control.hpp

@@ -34,7 +34,7 @@ struct NewtonReport {
   std::array<int, kernels::kGroup> iterations{};  ///< evaluations of the residual, accumulated
   /// Scaled residual at the last accepted point; the expected one where its evaluation was spared.
   std::array<double, kernels::kGroup> residual{};
-  LaneBits passed = 0;  ///< lanes in which a body came through another that it touches
+  LaneBits passed = 0;   ///< lanes in which a body came through another that it touches
   LaneBits created = 0;  ///< lanes in which a part created energy, however short it was
 };
 

@@ -11,6 +11,7 @@
 
 #include "io/files/text_file.hpp"
 #include "io/scene/scene_sections.hpp"
+#include "io/scene/scene_warnings.hpp"
 #include "io/scene/xml_document.hpp"
 
 namespace tangere {

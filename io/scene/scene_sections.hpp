@@ -34,8 +34,6 @@ void warn_of_coarse_points(const Scene& scene, const SceneNode& root);
 /// points of their own body.
 void warn_of_unlike_skins(const Scene& scene, const SceneNode& root);
 
-/// Warns of tactile sensors that nothing can touch, or whose body has no contact with another.
-void warn_of_idle_sensors(const Scene& scene, const SceneNode& root);
 void read_sensors(Scene& scene, const SceneNode& section);
 void read_end_effectors(Scene& scene, const SceneNode& section);
 /// Names end effectors that have no name: "endeffector" and their position in the file, or the next

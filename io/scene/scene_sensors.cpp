@@ -32,8 +32,8 @@ Names attributes_of(int type) {
 }
 
 void check_attributes(const SceneNode& node, int type) {
-  Names used = {"name",    "body", "type",  "kn",            "kt",      "mu", "ks",
-                "damping", "law",  "every", "pressure_sign", "feedback"},
+  Names used = {"name", "body",  "type",          "kn",      "kt", "mu", "ks", "damping",
+                "law",  "every", "pressure_sign", "feedback"},
         idle;
   const Names own = attributes_of(type);
   used.insert(used.end(), own.begin(), own.end());
@@ -188,8 +188,9 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
   PairContactDescription pair;
   for (const TactilePoint& p : tactile_points(d)) {
     if (p.factors != TactilePoint{}.factors)
-      node.fail("feedback needs points with the sensor's own coefficients, and this layout has "
-                "factors of them");
+      node.fail(
+          "feedback needs points with the sensor's own coefficients, and this layout has "
+          "factors of them");
     pair.points.insert(pair.points.end(), p.position.begin(), p.position.end());
   }
   pair.general_body = d.body;
@@ -214,9 +215,10 @@ void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription&
     felt = true;
   }
   if (!felt)
-    node.fail(fmt::format("feedback of '{}' would touch nothing; expected a body with a distance "
-                          "that moves against '{}'",
-                          d.name, d.body));
+    node.fail(
+        fmt::format("feedback of '{}' would touch nothing; expected a body with a distance "
+                    "that moves against '{}'",
+                    d.name, d.body));
 }
 
 }  // namespace

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Warns of sensors that read zero for ever, or forces that nothing exerts.
+#include "io/scene/scene_warnings.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <set>
-
-#include "io/scene/scene_sections.hpp"
 
 namespace tangere {
 namespace {

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes what MuJoCo makes of the robots beside this file, for tests/io/robot/robot_physics_test.cpp.
+"""Writes what MuJoCo makes of the robots beside this file: for robot_physics_test.cpp.
 
     python3 -m venv venv && venv/bin/pip install mujoco
     venv/bin/python tests/data/robots/make_reference.py

@@ -48,8 +48,8 @@ bool has_mesh(const Scene& s) {
 }
 
 TEST(MeshContact, JacobiansMatchDualNumbers) {
-  using D = kernels::Dual<double>;
-  constexpr double kStep = 0.004, kC0 = 1.5;
+  using Number = kernels::Dual<double>;
+  constexpr double kLength = 0.004, kFirst = 1.5;
   int touched = 0, meshes = 0;
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const Scene scene = random_meshes(seed, 2 + static_cast<int>(seed % 4), ContactLaw(seed % 3));
@@ -57,20 +57,20 @@ TEST(MeshContact, JacobiansMatchDualNumbers) {
     ++meshes;
     const auto m = compile(scene);
     testing::StageBuffers<double> b(*m);
-    testing::StageBuffers<D> dual(*m);
+    testing::StageBuffers<Number> dual(*m);
     testing::Random random(seed);
     for (int k = 0; k < 3; ++k) {
-      testing::randomise(b, *m, random, kStep);
-      const auto copy = [](const std::vector<double>& a, std::vector<D>& to) {
-        for (std::size_t i = 0; i < a.size(); ++i) to[i] = D(a[i]);
+      testing::randomise(b, *m, random, kLength);
+      const auto copy = [](const std::vector<double>& a, std::vector<Number>& to) {
+        for (std::size_t i = 0; i < a.size(); ++i) to[i] = Number(a[i]);
       };
       copy(b.centre, dual.centre), copy(b.x, dual.x), copy(b.r, dual.r), copy(b.s, dual.s);
       copy(b.tau, dual.tau), copy(b.target, dual.target), copy(b.faces, dual.faces);
-      b.residual_and_jacobian(kC0 / kStep, 1 / kStep);
+      b.residual_and_jacobian(kFirst / kLength, 1 / kLength);
       for (const double f : b.force_scale) touched += f > 1e-3;
       for (int j = 0; j < m->nv; ++j) {
         dual.x[std::size_t(j)].epsilon = 1;
-        dual.residual(kC0 / kStep, 1 / kStep);
+        dual.residual(kFirst / kLength, 1 / kLength);
         dual.x[std::size_t(j)].epsilon = 0;
         for (int i = 0; i < m->nv; ++i) {
           double scale = 0;

@@ -47,11 +47,11 @@ const std::string kTable = R"(<tangere model="table">
 </tangere>
 )";
 
-Scene read(const std::string& text) { return parse_scene(text, "s.xml").scene; }
+Scene feedback_scene(const std::string& text) { return parse_scene(text, "s.xml").scene; }
 
-std::string refusal(const std::string& text) {
+std::string feedback_refusal(const std::string& text) {
   try {
-    read(text);
+    feedback_scene(text);
   } catch (const InputError& error) {
     return error.what();
   }
@@ -68,7 +68,7 @@ std::array<double, 3> sum_of(Readout& readout, const Batch& batch, std::vector<d
 
 /// Checks in each of 100 steps that the ball's momentum changes by gravity and the field alone.
 void expect_balance(const std::string& text) {
-  const Model model(read(text));
+  const Model model(feedback_scene(text));
   Batch batch(model, 1, 0);
   Stepper stepper(model);
   Readout readout(model);
@@ -101,12 +101,12 @@ TEST(Feedback, FrictionThatRemembersActsAsItIsRead) {
 }
 
 TEST(Feedback, WithoutItTheBallFallsThrough) {
-  const Model model(read(with(" feedback=\"true\"", "", kTable)));
+  const Model model(feedback_scene(with(" feedback=\"true\"", "", kTable)));
   EXPECT_TRUE(model.contacts().empty());
 }
 
 TEST(Feedback, TouchesEveryBodyThatMovesAgainstTheSensor) {
-  const Scene scene = read(kTable);
+  const Scene scene = feedback_scene(kTable);
   ASSERT_EQ(scene.pair_contacts.size(), 1U);
   EXPECT_EQ(scene.pair_contacts[0].primitive_body, "shell");
   const Model model(scene);
@@ -115,15 +115,17 @@ TEST(Feedback, TouchesEveryBodyThatMovesAgainstTheSensor) {
 }
 
 TEST(Feedback, RefusesAndWarns) {
-  EXPECT_THAT(refusal(with("type=\"free3d-exp\"", "type=\"fixed\"",
-                           with("<initial><joint name=\"ball\" v=\"0.05 -0.02 0 0 0 3\"/></initial>",
-                                "", kTable))),
-              AllOf(HasSubstr("s.xml:23:"), HasSubstr("feedback of 'skin' would touch nothing")));
-  EXPECT_THAT(refusal(with("</tangere>",
-                           "<randomize><tactile name=\"skin\" field=\"kn\" uniform=\"1 2\"/>"
-                           "</randomize></tangere>",
-                           kTable)),
-              HasSubstr("'skin' has feedback, so its coefficients act on the motion as well"));
+  EXPECT_THAT(
+      feedback_refusal(with(
+          "type=\"free3d-exp\"", "type=\"fixed\"",
+          with("<initial><joint name=\"ball\" v=\"0.05 -0.02 0 0 0 3\"/></initial>", "", kTable))),
+      AllOf(HasSubstr("s.xml:23:"), HasSubstr("feedback of 'skin' would touch nothing")));
+  EXPECT_THAT(
+      feedback_refusal(with("</tangere>",
+                            "<randomize><tactile name=\"skin\" field=\"kn\" uniform=\"1 2\"/>"
+                            "</randomize></tangere>",
+                            kTable)),
+      HasSubstr("'skin' has feedback, so its coefficients act on the motion as well"));
   const std::string both =
       with("<sensor>",
            "<contact><general_primitive_contact general_body=\"table\" primitive_body=\"shell\" "

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a scene that can be read will probably not do as its author expects.
+#pragma once
+
+#include "engine/model/scene.hpp"
+#include "io/scene/scene_node.hpp"
+
+namespace tangere {
+
+/// Warns of tactile sensors that nothing can touch, or whose body has no contact with another.
+void warn_of_idle_sensors(const Scene& scene, const SceneNode& root);
+
+}  // namespace tangere
