@@ -95,7 +95,7 @@ void add_motors(Robot& robot, const std::vector<MotorRequest>& requests, const s
     const bool bounded = effort != robot.efforts.end();
     if (!request.P && !bounded)
       throw InputError(fmt::format(
-          "--motor {}=force: {} gives the joint no <limit effort>; expected one, or {}=P,D",
+          "--motor {}=force: {}the joint has no <limit effort>; expected one, or {}=P,D",
           request.joint, link->joint.source.prefix(), request.joint));
     motor.high = bounded ? effort->second : std::numeric_limits<double>::infinity();
     motor.low = -motor.high;
