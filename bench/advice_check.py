@@ -61,8 +61,9 @@ def check(tangere: Path, scene: str, target: float) -> None:
         print(f"  fastest that meets the target there: {name(fastest)}, {gain:.2f} x as fast")
     double = [p for p in fresh["points"] if p["precision"] == "double"]
     for p in (p for p in double if p["accuracy"] == target):
+        within = f"{100 * p['within_share']:.0f} of 100 within 0.3 to 3 times"
         print(f"  asked for {target:g}: {percent(p, 'median_error')} in the middle, "
-              f"{percent(p)} in 95 of 100; {100 * p['within_share']:.0f} of 100 within 0.3 to 3 times")
+              f"{percent(p)} in 95 of 100; {within}")
         fixed = [q for q in double if q["accuracy"] == 0 and q["error"] is not None]
         fixed = [q for q in fixed if q["error"] <= p["error"]]
         if fixed:

@@ -65,6 +65,8 @@ LaneBits GroupStep::run(const Scheme& scheme, const kernels::KernelTable& table,
     set_stage(model_, scheme, k, h, w);
     guess_stage(model_, scheme, k, h, w);
     lanes = solve_stage(model_, table, w, lanes, limits, factors, report);
+    // Who names a tolerance gets what Newton steps come to, which is far below it.
+    if (!settings_.spare) factors = {};
     if (k == scheme.inner_stages()) break;
     std::copy_n(w.stage.x, n, w.x_inner + k * n);
     std::copy_n(w.stage.v, n, w.v_inner + k * n);

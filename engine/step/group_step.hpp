@@ -17,7 +17,8 @@ struct StepSettings {
   double tolerance;
   int max_iterations;
   double accuracy = 0;  ///< relative, of the parts of a step; 0: every step is one part
-  /// Solves may end unchecked where they promise to meet the tolerance. False where it was named.
+  /// Solves may end unchecked where they promise to meet the tolerance, and stages share factors.
+  /// False where the tolerance was named.
   bool spare = false;
   bool bounded_energy = true;  ///< steps that create energy are taken by BDF1 or in parts
 };

@@ -36,12 +36,14 @@ void check_accuracy(const StepperOptions& o, double accuracy) {
 StepSettings step_settings(const Model& model, const StepperOptions& o) {
   const double accuracy = o.accuracy.value_or(model.solver().accuracy.value_or(0));
   check_accuracy(o, accuracy);
-  StepSettings s = {o.integrator.value_or(keeping_accuracy(model.scene().integrator, accuracy)),
-                    o.timestep.value_or(model.timestep()),
-                    0,
-                    model.solver().max_iterations,
-                    accuracy,
-                    model.solver().bounded_energy};
+  StepSettings s = {
+      .integrator = o.integrator.value_or(keeping_accuracy(model.scene().integrator, accuracy)),
+      .timestep = o.timestep.value_or(model.timestep()),
+      .tolerance = 0,
+      .max_iterations = model.solver().max_iterations,
+      .accuracy = accuracy,
+      .spare = false,
+      .bounded_energy = model.solver().bounded_energy};
   if (!(s.timestep > 0) || !std::isfinite(s.timestep))
     throw InputError("timestep " + std::to_string(s.timestep) + " s; expected a positive number");
   const double following = accuracy > 0

@@ -155,8 +155,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"far_off",
                 {"qqqqqqqqq"},
                 2,
-                "expected one of inspect, simulate, generate, validate, info, merge, export, plot, "
-                "view, bench"},
+                "expected one of inspect, import, simulate, generate, validate, info, merge, export, "
+                "plot, view, bench"},
         Mistake{"top_option",
                 {"--verison"},
                 2,

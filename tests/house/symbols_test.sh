@@ -19,10 +19,10 @@ if command -v objdump >/dev/null && objdump -d "$library" | grep -qE 'vfm(addsub
   echo "an instruction that fuses what the source does not: vfmaddsub or vfmsubadd"
   exit 1
 fi
-# Six shapes, two laws, two precisions, flat and curved pads, whole fields and pressure alone.
+# Seven shapes, two laws, two precisions, flat and curved pads, whole fields and pressure alone.
 # Another choice of two doubles the compile time and the size of the library: weigh it, then change
 # the number.
-for kernel in chunk_force:96 tile_lanes:48; do
+for kernel in chunk_force:112 tile_lanes:48; do
   most=$(nm -C "$library" | awk -v name=" ${kernel%:*}<" '
     /^kernels\..*:$/ { split($1, parts, "."); isa = parts[2] }
     { sub(/tangere::kernels::/, "") }

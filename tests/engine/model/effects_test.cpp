@@ -118,7 +118,7 @@ const EffectInfo* find(const std::vector<EffectInfo>& effects, const std::string
 
 /// Adding zeros changes no bit, so most ways agree to the bit. A contact that is gone leaves a
 /// sparser matrix, whose elimination rounds otherwise.
-double allowed(EffectKind kind) { return kind == EffectKind::pair_contact ? 1e-12 : 0; }
+double allowed(EffectKind kind) { return kind == EffectKind::pair_contact ? 1e-11 : 0; }
 
 TEST(Effects, TheSceneOfThisTestHasEveryKind) {
   const Scene scene = scene_of_all_effects();

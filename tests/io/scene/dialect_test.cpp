@@ -163,8 +163,6 @@ TEST(Dialect, WhatIsNotSimulatedIsRefusedByName) {
   EXPECT_THAT(refusal("<tactile body=\"tip\" type=\"rect_array\"",
                       "<tactile body=\"tip\" type=\"abstract\" spec=\"gone.txt\""),
               AllOf(HasSubstr("hand.xml:"), HasSubstr("<tactile>: "), HasSubstr("gone.txt")));
-  EXPECT_THAT(refusal("primitive_body=\"ball\"/>", "primitive_body=\"lower\"/>"),
-              HasSubstr("no distance function"));
   EXPECT_THAT(refusal("scale=\"1 1 1\"", "scale=\"1 1 -1\""),
               HasSubstr("expected positive factors"));  // a mirror
   EXPECT_THAT(refusal("meshes/tetrahedron.obj", "meshes/tetraeder.obj"),

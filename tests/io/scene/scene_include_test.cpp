@@ -35,7 +35,7 @@ TEST(SceneInclude, FilesKeepTheirUnitsAndDefaults) {
   EXPECT_EQ(tip.coefficients[0], 3);  // of the <include>, in place of the file's
   ASSERT_EQ(tip.points.size(), 302U);
   EXPECT_LT(tip.points[0].normal[2], -0.9);  // half a turn about x
-  EXPECT_THAT(file.warnings, ElementsAre());
+  EXPECT_THAT(file.warnings, ElementsAre(HasSubstr("reads forces that nothing exerts")));
 }
 
 /// Files of one folder; the first is read.

@@ -43,17 +43,17 @@ std::vector<std::string> warnings(const std::string& felt, const std::string& pr
 TEST(UnlikeSkins, StiffnessesThatDifferByOrdersAreTold) {
   EXPECT_THAT(warnings("50", "50"), IsEmpty());
   EXPECT_THAT(warnings("50", "450"), IsEmpty());
-  EXPECT_THAT(warnings("30", "660"),
+  EXPECT_THAT(warnings("30", "1200"),
               ElementsAre(AllOf(HasSubstr("s.xml:7: <tactile>: kn of 'skin' is 30 N/m per mm²"),
-                                HasSubstr("'ball' is 660"), HasSubstr("shows 0.045 times"))));
-  EXPECT_THAT(warnings("660", "30"), ElementsAre(HasSubstr("shows 22 times")));
+                                HasSubstr("'ball' is 1.2e+03"), HasSubstr("shows 0.025 times"))));
+  EXPECT_THAT(warnings("1200", "30"), ElementsAre(HasSubstr("shows 40 times")));
 }
 
 TEST(UnlikeSkins, CapsOfCylindersCountAndNothingThatIsNotKnownDoes) {
   // 1 + 3 · 8 points on π (10 mm)² are 0.0796 per mm²
   const std::string disc = "type=\"cylinder\" radius=\"0.01\" length=\"0.002\"";
   EXPECT_THAT(warnings("50", "628", disc), IsEmpty());
-  EXPECT_THAT(warnings("50", "14000", disc), ElementsAre(HasSubstr("shows 0.045 times")));
+  EXPECT_THAT(warnings("50", "25120", disc), ElementsAre(HasSubstr("shows 0.025 times")));
   EXPECT_THAT(warnings("50", "0"), IsEmpty());
   EXPECT_THAT(warnings("0", "50"), IsEmpty());
 }
