@@ -156,7 +156,8 @@ void warn_of_unlike_skins(const Scene& scene, const SceneNode& root) {
     const double density = contact_points_per_area(link->body.shape, a),
                  felt = d.coefficients.kn * (a.rows - 1) * (a.cols - 1) / area;
     for (const PairContactDescription& c : scene.pair_contacts) {
-      if (c.general_body != d.body || !c.points.empty() || density == 0 || c.coefficients.kn == 0) continue;
+      if (c.general_body != d.body || !c.points.empty() || density == 0 || c.coefficients.kn == 0)
+        continue;
       const double pressed = c.coefficients.kn * density, share = felt / pressed;
       if (share < kUnlike && share > 1 / kUnlike) continue;
       root.context().warnings.push_back(fmt::format(

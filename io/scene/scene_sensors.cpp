@@ -186,8 +186,9 @@ int moving_link(const Scene& scene, int link) {
 /// moves against the sensor's.
 void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription& d, int body) {
   if (d.coefficients.ks != 0)
-    node.fail("feedback and ks: a contact and the reading of its skin would each remember a touch "
-              "in their own way; expected one of them");
+    node.fail(
+        "feedback and ks: a contact and the reading of its skin would each remember a touch "
+        "in their own way; expected one of them");
   PairContactDescription pair;
   for (const TactilePoint& p : tactile_points(d)) {
     if (p.factors != TactilePoint{}.factors)

@@ -152,11 +152,12 @@ INSTANTIATE_TEST_SUITE_P(
                 {"simualte", "x"},
                 2,
                 "unknown subcommand 'simualte'; did you mean 'simulate'?"},
-        Mistake{"far_off",
-                {"qqqqqqqqq"},
-                2,
-                "expected one of inspect, import, simulate, generate, validate, info, merge, export, "
-                "plot, view, bench"},
+        Mistake{
+            "far_off",
+            {"qqqqqqqqq"},
+            2,
+            "expected one of inspect, import, simulate, generate, validate, info, merge, export, "
+            "plot, view, bench"},
         Mistake{"top_option",
                 {"--verison"},
                 2,

@@ -117,7 +117,8 @@ const EffectInfo* find(const std::vector<EffectInfo>& effects, const std::string
 }
 
 /// Adding zeros changes no bit, so most ways agree to the bit. A contact that is gone leaves a
-/// sparser matrix, whose elimination rounds otherwise.
+/// sparser matrix, whose elimination rounds otherwise, and bodies that no longer share a norm, so
+/// that Newton's method stops elsewhere.
 double allowed(EffectKind kind) { return kind == EffectKind::pair_contact ? 1e-11 : 0; }
 
 TEST(Effects, TheSceneOfThisTestHasEveryKind) {
