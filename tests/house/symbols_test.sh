@@ -22,7 +22,7 @@ fi
 # Seven shapes, two laws, two precisions, flat and curved pads, whole fields and pressure alone.
 # Another choice of two doubles the compile time and the size of the library: weigh it, then change
 # the number.
-for kernel in chunk_force:112 tile_lanes:48; do
+for kernel in chunk_force:112 tile_lanes:56; do
   most=$(nm -C "$library" | awk -v name=" ${kernel%:*}<" '
     /^kernels\..*:$/ { split($1, parts, "."); isa = parts[2] }
     { sub(/tangere::kernels::/, "") }
