@@ -86,6 +86,13 @@ bool is_remembered(const CompiledModel& m, int body) {
   });
 }
 
+/// Whether a tactile sensor's points touch for the body: they stay where they are when it grows.
+bool has_feedback(const Scene& scene, const std::string& body) {
+  return std::any_of(
+      scene.pair_contacts.begin(), scene.pair_contacts.end(),
+      [&](const PairContactDescription& c) { return !c.points.empty() && c.general_body == body; });
+}
+
 bool varies(const Scene& scene, const std::string& body) {
   return std::any_of(scene.randomizations.begin(), scene.randomizations.end(),
                      [&](const RandomizationDescription& r) {
@@ -114,7 +121,7 @@ void NumberGradients::add_bodies() {
         std::holds_alternative<AbstractShape>(d.shape);  // its inertia stays as given
     if (massive) add_with_masses({Owner::body, given ? Field::mass : Field::density, d.name}, {});
     // How anchors depend on sizes is not worked out.
-    const bool known = size_matters(m, b) && !is_remembered(m, b);
+    const bool known = size_matters(m, b) && !is_remembered(m, b) && !has_feedback(m.scene, d.name);
     for (int which = 0; which < kSizeIndices && known; ++which) {
       const SizeNumber* const size = row_of(d.shape).size(which);
       if (size == nullptr) continue;

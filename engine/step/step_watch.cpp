@@ -96,8 +96,10 @@ LaneBits GroupStep::jumping(const BasicWorkspace<L>& w, LaneBits lanes, double h
 template <int L>
 LaneBits GroupStep::creating(const kernels::KernelTable& table, BasicWorkspace<L>& w,
                              LaneBits lanes, double h) const {
-  // What a spring of friction holds is not counted.
-  if (!settings_.bounded_energy || !model_.memories.empty()) return kNoLane;
+  // What a spring of friction holds is not counted. A sensor's holds nothing.
+  const bool elastic = std::any_of(model_.memories.begin(), model_.memories.end(),
+                                   [](const auto& of) { return of.sensor < 0; });
+  if (!settings_.bounded_energy || elastic || settings_.accuracy > 0) return kNoLane;
   const LaneBits looked_at = jumping(w, lanes, h);
   if (looked_at == 0) return kNoLane;
   find_poses(table, w);
@@ -106,14 +108,8 @@ LaneBits GroupStep::creating(const kernels::KernelTable& table, BasicWorkspace<L
     if (!has(looked_at, l)) continue;
     const LaneEnergy before = energy_of_bodies(model_, w, w.poses_before, w.q0, w.v0, l),
                      after = energy_of_bodies(model_, w, w.poses_after, w.q1, w.v1, l);
-    double gain = after.total - before.total, most = 0;
-    for (int i = 0; i < model_.nv; ++i) {
-      gain -= w.stage.tau[i][l] * w.stage.x[i][l];
-      most += w.stage.force_scale[i][l] * std::abs(w.stage.x[i][l]);
-    }
-    // What contacts hold takes as long to find as they take in a solve. It has not risen by more
-    // than the force at the end times the way.
-    if (!(gain + most > kMayCreate * std::max(before.moving, after.moving))) continue;
+    double gain = after.total - before.total;
+    for (int i = 0; i < model_.nv; ++i) gain -= w.stage.tau[i][l] * w.stage.x[i][l];
     const double held = energy_of_contacts(model_, table, w, w.poses_before, l),
                  holds = energy_of_contacts(model_, table, w, w.poses_after, l);
     if (gain + holds - held > kMayCreate * std::max(before.moving + held, after.moving + holds))

@@ -97,9 +97,12 @@ std::size_t BasicWorkspace<L>::bytes(const CompiledModel& m) {
   BasicWorkspace w(m);
   const std::size_t remembered =
       2 * L * std::size_t(m.taped_points) * sizeof(ShearEntry) + w.own_index.size() * sizeof(int) +
-      w.own_anchors.size() * sizeof(double) + w.remembered.ground.size() * sizeof(LaneRow);
-  const std::size_t watched = 2 * w.poses_before.size() * sizeof(kernels::LinkPose<LaneRow>) +
-                              w.search.size() * sizeof(double);
+      w.own_anchors.size() * sizeof(double) + w.remembered.ground.size() * sizeof(LaneRow) +
+      w.remembered.ground_anchors.size() * sizeof(double);
+  const std::size_t poses =
+      w.poses_before.size() + w.remembered.start.size() + w.remembered.start_touches.size();
+  const std::size_t watched =
+      2 * poses * sizeof(kernels::LinkPose<LaneRow>) + w.search.size() * sizeof(double);
   return remembered + watched + w.memory.size() * sizeof(LaneRow) +
          w.own_points.size() * sizeof(double) + w.scratch.size() + PivotedFactors::bytes(L, m.nv);
 }

@@ -215,7 +215,7 @@ void read_coefficient_variation(const Scene& scene, const SceneNode& node,
     n.name = node.text("general_body");
     n.second_name = node.text("primitive_body");
     declared(scene.pair_contacts, [&](const PairContactDescription& c) {
-      return c.general_body == n.name && c.primitive_body == n.second_name;
+      return c.first_name() == n.name && c.primitive_body == n.second_name;
     });
   } else if (node.name() == "ground_contact") {
     attributes.emplace_back("body");
