@@ -68,6 +68,12 @@ int find_body(const Scene& scene, const SceneNode& node, const char* attribute) 
                     [](const LinkDescription& l) { return l.body.name; });
 }
 
+int moving_link(const Scene& scene, int link) {
+  while (link >= 0 && scene.links[std::size_t(link)].joint.type == JointType::fixed)
+    link = scene.links[std::size_t(link)].parent;
+  return link;
+}
+
 void warn_of_dense_meshes(const Scene& scene, const SceneNode& root) {
   if (root.name() != "redmax") return;
   const auto touches = [&](const std::string& body) {

@@ -175,13 +175,6 @@ void read_imperfections(const SceneNode& node, TactileDescription& sensor) {
   check_imperfections(of, sensor.name, sensor.points.empty());
 }
 
-/// Returns the first link of those that a link is fixed to, itself included; -1: the world.
-int moving_link(const Scene& scene, int link) {
-  while (link >= 0 && scene.links[std::size_t(link)].joint.type == JointType::fixed)
-    link = scene.links[std::size_t(link)].parent;
-  return link;
-}
-
 /// Lets the points of a sensor touch what they feel: a pair with every body that has a distance and
 /// moves against the sensor's.
 void add_feedback(Scene& scene, const SceneNode& node, const TactileDescription& d, int body) {

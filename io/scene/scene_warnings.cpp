@@ -7,19 +7,10 @@
 #include <algorithm>
 #include <set>
 
+#include "io/scene/scene_sections.hpp"
+
 namespace tangere {
 namespace {
-
-/// Returns for each body the number of the body that it is rigidly joined to first, -1: the world.
-std::vector<int> rigid_groups(const Scene& scene) {
-  std::vector<int> group;
-  for (std::size_t k = 0; k < scene.links.size(); ++k) {
-    const LinkDescription& link = scene.links[k];
-    const int above = link.parent < 0 ? -1 : group[std::size_t(link.parent)];
-    group.push_back(link.joint.type == JointType::fixed ? above : static_cast<int>(k));
-  }
-  return group;
-}
 
 std::string listed(const std::set<std::string>& names) {
   std::string text;
@@ -30,10 +21,9 @@ std::string listed(const std::set<std::string>& names) {
 }  // namespace
 
 void warn_of_idle_sensors(const Scene& scene, const SceneNode& root) {
-  const std::vector<int> group = rigid_groups(scene);
   const auto group_of = [&](const std::string& body) {
     for (std::size_t k = 0; k < scene.links.size(); ++k)
-      if (scene.links[k].body.name == body) return group[k];
+      if (scene.links[k].body.name == body) return moving_link(scene, static_cast<int>(k));
     return -1;
   };
   for (const TactileDescription& sensor : scene.sensors) {
@@ -41,7 +31,7 @@ void warn_of_idle_sensors(const Scene& scene, const SceneNode& root) {
     std::set<std::string> without;  // distance, and free to move against the sensor
     bool feels = false;
     for (std::size_t k = 0; k < scene.links.size(); ++k) {
-      if (group[k] == own) continue;
+      if (moving_link(scene, static_cast<int>(k)) == own) continue;
       const BodyDescription& body = scene.links[k].body;
       feels = feels || has_distance(body.shape);
       if (!has_distance(body.shape)) without.insert(body.name);
