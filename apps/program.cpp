@@ -65,7 +65,7 @@ const Command& chosen_command(const Program& program) {
 }
 
 int run(const Command& command, int argc, char** argv) {
-  if (*kernels::forced_isa_error() != '\0') throw InputError(kernels::forced_isa_error());
+  if (*kernels::isa_error() != '\0') throw InputError(kernels::isa_error());
   ProgramInfo info{TANGERE_VERSION, {}};
   for (int i = 0; i < argc; ++i) info.command_line += (i > 0 ? " " : "") + std::string(argv[i]);
   return command.run(info);

@@ -8,8 +8,8 @@ namespace tangere::kernels {
 /// the environment variable TANGERE_ISA when the program started.
 const char* active_isa_name();
 
-/// Returns "", or why TANGERE_ISA cannot be honoured, with the names that can. Programs check it at
-/// start.
-const char* forced_isa_error();
+/// Returns "", or why no kernels can run: TANGERE_ISA names none that were built and run here, or
+/// this machine runs none of those that were built. Programs check it at start.
+const char* isa_error();
 
 }  // namespace tangere::kernels

@@ -94,7 +94,10 @@ constexpr Built kBuilt[] = {
 #if TANGERE_SSE2
     {table_of<xsimd::sse2>("sse2"), [] { return true; }},
 #endif
-    {table_of<ScalarArch>("scalar"), [] { return true; }}};
+#if TANGERE_SCALAR
+    {table_of<ScalarArch>("scalar"), [] { return true; }},
+#endif
+};
 
 struct Registry {
   std::array<const KernelTable*, std::size(kBuilt)> tables{};
@@ -106,11 +109,19 @@ struct Registry {
 #if TANGERE_AVX2 || TANGERE_AVX512
     __builtin_cpu_init();
 #endif
-    std::string names;
+    std::string names, all_names;
     for (const Built& built : kBuilt) {
+      all_names += (all_names.empty() ? "" : ", ") + std::string(built.table.name);
       if (!built.runs()) continue;
       tables[count++] = &built.table;
       names += (names.empty() ? "" : ", ") + std::string(built.table.name);
+    }
+    if (count == 0) {
+      active = &kBuilt[0].table;
+      error =
+          "this processor runs none of the instruction sets that this program was built for: " +
+          all_names + "; build it with -DTANGERE_ISAS=all, or here";
+      return;
     }
     active = tables[0];
     const char* wanted = std::getenv("TANGERE_ISA");
@@ -141,7 +152,7 @@ std::span<const KernelTable* const> available_kernels() {
 }
 const KernelTable& active_kernels() { return *registry().active; }
 const char* active_isa_name() { return active_kernels().name; }
-const char* forced_isa_error() { return registry().error.c_str(); }
+const char* isa_error() { return registry().error.c_str(); }
 void use_kernels(const KernelTable& table) { registry().active = &table; }
 
 }  // namespace tangere::kernels

@@ -131,7 +131,7 @@ struct KernelTable {
 std::span<const KernelTable* const> available_kernels();
 
 /// Returns the table in use: the best one, or the one named by the environment variable TANGERE_ISA
-/// when the program started. Throws nothing; forced_isa_error() (isa.hpp) reports an unknown or
+/// when the program started. Throws nothing; isa_error() (isa.hpp) reports an unknown or
 /// unsupported name.
 const KernelTable& active_kernels();
 

@@ -31,7 +31,7 @@ NB_MODULE(_core, m) {
   // A request that cannot be carried out is a ValueError, a failing file an OSError.
   nb::exception<tangere::InputError>(m, "InputError", PyExc_ValueError);
   nb::exception<tangere::IoError>(m, "IoError", PyExc_OSError);
-  if (const char* const why = tangere::kernels::forced_isa_error(); *why != '\0')
+  if (const char* const why = tangere::kernels::isa_error(); *why != '\0')
     throw nb::import_error(why);
   add_scenes(m);
   add_batches(m);

@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 #include <limits>
+#include <string>
 
 #include "engine/step/workspace.hpp"
 #include "tests/engine/random_machine.hpp"
@@ -244,9 +245,11 @@ TEST(KernelTable, AUselessFactorIsNotSound) {
   }
 }
 
-TEST(KernelTable, NamesAreKnownAndScalarIsAlwaysThere) {
+TEST(KernelTable, TheReferenceIsAmongThoseCompared) {
   const auto tables = kernels::available_kernels();
   ASSERT_FALSE(tables.empty());
+  if (std::string(TANGERE_BUILT_ISAS).find("scalar") == std::string::npos)
+    GTEST_SKIP() << "this build has the kernels of " << TANGERE_BUILT_ISAS << " only";
   EXPECT_STREQ(tables.back()->name, "scalar");
 }
 
