@@ -434,7 +434,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
                                     {"--noise", options.noise.has_value()},
                                     {"--mix", !options.mix.empty()}});
   const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
-  warn_of_overlaps(console, model);
+  warn_of_geometry(console, model);
   const Stepper stepper(model);
   const ControlProgram controls =
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);

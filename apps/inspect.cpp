@@ -59,6 +59,7 @@ std::int64_t steps_of(const Model& model) {
 Json as_json(const Model& model) {
   const Scene& scene = model.scene();
   Json bodies = Json::array(), contacts = Json::array(), sensors = Json::array();
+  Json meshes = Json::array();
   Json effects = Json::array();
   for (std::size_t b = 0; b < scene.links.size(); ++b) {
     const LinkDescription& link = scene.links[b];
@@ -72,6 +73,13 @@ Json as_json(const Model& model) {
   for (const ContactInfo& c : model.contacts())
     contacts.push_back(
         {{"first", c.first}, {"second", c.second}, {"points", c.points}, {"law", c.law}});
+  for (const MeshInfo& m : model.meshes())
+    meshes.push_back({{"body", m.body},
+                      {"cells", m.cells},
+                      {"cell", m.cell},
+                      {"bytes", m.bytes},
+                      {"error", m.error},
+                      {"unresolved", m.unresolved}});
   for (const SensorInfo& s : model.sensors())
     sensors.push_back({{"name", s.name},
                        {"body", s.body},
@@ -108,6 +116,7 @@ Json as_json(const Model& model) {
           {"joint_effects", joint_effects_json(scene)},
           {"motors", motors_json(scene)},
           {"contacts", contacts},
+          {"meshes", meshes},
           {"sensors", sensors},
           {"variables", end_effectors},
           {"control", control_name(scene)},
@@ -215,7 +224,7 @@ int inspect(const InspectArguments& options, const Console& console) {
     return report(task->model(), &task->spec(), options, console);
   }
   const Model model(read_scene_for(options.scene, options.allow_unknown, console));
-  warn_of_overlaps(console, model);
+  warn_of_geometry(console, model);
   return report(model, nullptr, options, console);
 }
 

@@ -79,7 +79,14 @@ std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlP
   return steps;
 }
 
-void warn_of_overlaps(const Console& console, const Model& model) {
+void warn_of_geometry(const Console& console, const Model& model) {
+  for (const MeshInfo& mesh : model.meshes())
+    if (mesh.unresolved > MeshInfo::kMostUnresolved)
+      console.note(fmt::format(
+          "warning: the cells of body '{}', {:.3g} m, are too coarse for {:.0f} % of its surface: "
+          "its walls or details are thinner than about one and a half of them; expected a larger "
+          "resolution",
+          mesh.body, mesh.cell, 100 * mesh.unresolved));
   for (const std::string& line : start_overlaps(model)) console.note("warning: " + line);
 }
 

@@ -368,7 +368,7 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
 
   const Model model(
       read_scene_for(options.scene, options.allow_unknown, console, asked_of(options)));
-  warn_of_overlaps(console, model);
+  warn_of_geometry(console, model);
   if (!options.gradients.empty()) solver = for_gradients(model, solver);
   Stepper stepper(model, solver);
   const Start start(options, stepper);

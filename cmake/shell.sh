@@ -77,13 +77,18 @@ install_tools() {
     say "There is no clang-format $clang_format_version here and PyPI is out of reach: formatting is not checked."
 }
 
-# Makes build/venv with what python/requirements.txt lists, and $python_options for the build. The distribution's
-# interpreter comes first, because its packages have PyTorch. Where PyPI is out of reach the module is left out.
+# Prints the path of the Python to use. The distribution's comes first, because its packages have PyTorch.
+python_program() {
+  hash -r  # of a program that this shell has run before, type prints that path alone
+  type -aP python3 | grep -x /usr/bin/python3 || type -P python3
+}
+# Makes build/venv with what python/requirements.txt lists, and $python_options for the build. Where PyPI is out of reach the
+# module is left out.
 python_options=(-DTANGERE_PYTHON=OFF)
 install_python() {
   local python stamp=build/venv/requirements.txt wanted
   wanted=$(cat python/requirements.txt 2>/dev/null || true)
-  python=$(type -aP python3 | grep -x /usr/bin/python3 || type -P python3) || python=""
+  python=$(python_program) || python=""
   if [ ! -x build/venv/bin/python ] || [ "$wanted" != "$(cat "$stamp" 2>/dev/null)" ]; then
     if [ -z "$python" ] || ! { "$python" -m venv --clear --system-site-packages build/venv &&
       build/venv/bin/pip install -q --disable-pip-version-check -r python/requirements.txt &&

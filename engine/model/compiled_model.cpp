@@ -112,30 +112,28 @@ class Compiler {
            std::any_of(s.sensors.begin(), s.sensors.end(), of_sensor);
   }
 
-  /// Makes the distances to meshes. Bodies with the same mesh share one.
   void mesh_distances() {
-    std::vector<std::pair<const MeshShape*, std::shared_ptr<const MeshGrid>>> made;
     for (std::size_t b = 0; b < m_.bodies.size(); ++b) {
       const BodyDescription& d = m_.scene.links[b].body;
       const auto* const mesh = std::get_if<MeshShape>(&d.shape);
       if (mesh == nullptr || mesh->resolution == 0 || !is_touched(b)) continue;
-      const auto same = std::find_if(made.begin(), made.end(), [&](const auto& other) {
-        return other.first->resolution == mesh->resolution &&
-               other.first->vertices == mesh->vertices && other.first->triangles == mesh->triangles;
-      });
       std::shared_ptr<const MeshGrid> grid;
       try {
-        grid = same != made.end() ? same->second : make_mesh_grid(*mesh);
+        grid = shared_mesh_grid(*mesh);
       } catch (const InputError& error) {
         throw InputError(d.source.prefix() + "body '" + d.name + "': " + error.what());
       }
-      if (same == made.end()) {
-        made.emplace_back(mesh, grid);
-        m_.mesh_grids.push_back(grid);
-      }
+      const kernels::DistanceGrid& view = grid->view;
+      m_.mesh_info.push_back({d.name,
+                              {view.cells[0], view.cells[1], view.cells[2]},
+                              view.cell,
+                              grid->bytes(),
+                              grid->fit.error,
+                              grid->fit.unresolved});
       m_.bodies[b].touchable = true;
       m_.bodies[b].shape = PrimitiveShape::mesh;
-      m_.bodies[b].grid = &grid->view;
+      m_.bodies[b].grid = &view;
+      m_.mesh_grids.push_back(std::move(grid));
     }
   }
 

@@ -207,6 +207,7 @@ struct CompiledModel {
   std::vector<SensorInfo> sensor_info;
   std::vector<EndEffectorInfo> end_effector_info;
   std::vector<ContactInfo> contact_info;
+  std::vector<MeshInfo> mesh_info;  ///< of bodies with a grid, in their order
   std::vector<EffectInfo> effects;  ///< of the whole scene
   std::vector<StageInfo> stages;
   std::vector<std::string> q_names, v_names, u_names, q_units, v_units, u_units, body_names;

@@ -129,14 +129,12 @@ void list_stages(CompiledModel& m) {
   const auto add = [&](const char* name, std::string of, std::string variant) {
     m.stages.push_back({name, std::move(of), std::move(variant)});
   };
-  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
-    const kernels::DistanceGrid* const g = m.bodies[b].grid;
-    if (g == nullptr) continue;
+  for (const MeshInfo& mesh : m.mesh_info) {
     char text[160];
-    std::snprintf(text, sizeof text, "%d x %d x %d cells of %.3g m, %.2f MB", g->cells[0],
-                  g->cells[1], g->cells[2], g->cell,
-                  1e-6 * sizeof(float) * g->plane * (g->cells[0] + 3));
-    add("mesh distance", m.body_names[b], text);
+    std::snprintf(text, sizeof text, "%d x %d x %d cells of %.3g m, %.2f MB, error %.2g m",
+                  mesh.cells[0], mesh.cells[1], mesh.cells[2], mesh.cell, 1e-6 * double(mesh.bytes),
+                  mesh.error);
+    add("mesh distance", mesh.body, text);
   }
   add("kinematics", counted(m.links.size(), "link", "links"), motion_variant(m.links));
   if (!m.pairs.empty())

@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 
 #include "engine/base/error.hpp"
 #include "engine/model/triangle_tree.hpp"
@@ -239,7 +240,28 @@ std::shared_ptr<const MeshGrid> make_mesh_grid(const MeshShape& mesh) {
   g.row = count[2];
   g.plane = count[1] * count[2];
   g.slope = steepest(g);
+  out->fit = mesh_fit(mesh, g);
   return out;
+}
+
+std::shared_ptr<const MeshGrid> shared_mesh_grid(const MeshShape& mesh) {
+  struct Made {
+    std::vector<double> vertices;
+    std::vector<std::array<int, 3>> triangles;
+    int resolution;
+    std::weak_ptr<const MeshGrid> grid;
+  };
+  static std::mutex mutex;
+  static std::vector<Made> made;
+  const std::lock_guard lock(mutex);
+  std::erase_if(made, [](const Made& old) { return old.grid.expired(); });
+  for (const Made& old : made)
+    if (old.resolution == mesh.resolution && old.vertices == mesh.vertices &&
+        old.triangles == mesh.triangles)
+      if (auto grid = old.grid.lock()) return grid;
+  auto grid = make_mesh_grid(mesh);
+  made.push_back({mesh.vertices, mesh.triangles, mesh.resolution, grid});
+  return grid;
 }
 
 }  // namespace tangere

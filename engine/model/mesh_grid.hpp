@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "engine/model/mesh_fit.hpp"
 #include "engine/model/scene.hpp"
 #include "kernels/contact/shapes/distance_grid.hpp"
 
@@ -14,6 +15,7 @@ namespace tangere {
 struct MeshGrid {
   kernels::DistanceGrid view{};
   std::vector<float> coefficients;
+  MeshFit fit;
 
   MeshGrid() = default;
   MeshGrid(const MeshGrid&) = delete;  // the view points into the coefficients
@@ -26,5 +28,9 @@ struct MeshGrid {
 /// Throws InputError, which names the place, where the surface overlaps itself, so that its parts
 /// lie inside of what it encloses.
 std::shared_ptr<const MeshGrid> make_mesh_grid(const MeshShape& mesh);
+
+/// The same, made once for all bodies and models of this process that have an equal mesh, as long as
+/// one of them lives. May be called from any thread.
+std::shared_ptr<const MeshGrid> shared_mesh_grid(const MeshShape& mesh);
 
 }  // namespace tangere

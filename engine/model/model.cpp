@@ -41,6 +41,7 @@ std::span<const EndEffectorInfo> Model::end_effectors() const {
   return compiled_->end_effector_info;
 }
 std::span<const ContactInfo> Model::contacts() const { return compiled_->contact_info; }
+std::span<const MeshInfo> Model::meshes() const { return compiled_->mesh_info; }
 std::span<const EffectInfo> Model::effects() const { return compiled_->effects; }
 std::span<const StageInfo> Model::stages() const { return compiled_->stages; }
 std::span<const std::string> Model::q_names() const { return compiled_->q_names; }

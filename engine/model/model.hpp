@@ -3,6 +3,7 @@
 // batches and threads share it.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <span>
@@ -41,6 +42,19 @@ struct ContactInfo {
   std::string law;
 };
 
+/// A mesh that can be touched, after compilation.
+struct MeshInfo {
+  std::string body;
+  std::array<int, 3> cells{};  ///< of its grid, x y z
+  double cell = 0;             ///< edge of a cell [m]
+  std::size_t bytes = 0;       ///< memory of the grid; bodies with the same mesh share one
+  /// Of the distance on the surface [m], and the share of the area where the grid is too coarse
+  /// for it (engine/model/mesh_fit.hpp says by what).
+  double error = 0, unresolved = 0;
+  /// The share from which on programs warn. Edges alone stay below it.
+  static constexpr double kMostUnresolved = 0.1;
+};
+
 /// A stage of the step that the scene calls for, what it works on and the variant of its kernel.
 struct StageInfo {
   std::string name, of, variant;
@@ -72,6 +86,7 @@ class Model {
   [[nodiscard]] std::span<const EndEffectorInfo> end_effectors()
       const;  ///< end effectors, in file order
   [[nodiscard]] std::span<const ContactInfo> contacts() const;
+  [[nodiscard]] std::span<const MeshInfo> meshes() const;  ///< those with a distance, by body
   /// What effects_of() lists for the scene, with the variants of the kernels.
   [[nodiscard]] std::span<const EffectInfo> effects() const;
   [[nodiscard]] std::span<const StageInfo> stages() const;     ///< in the order in which they run

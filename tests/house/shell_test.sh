@@ -196,6 +196,15 @@ expect "names the case that crashed" ends_with "release: one: A.Crash (did not e
 run run-tests
 expect "fails when no test ran" fails
 
+machine two-pythons
+fake python3 ''
+if [ -x /usr/bin/python3 ]; then
+  status=0
+  output=$(cd "$home/project" && env -i PATH="$bin:/usr/bin" FAKE_HOME="$home" bash -c '. cmake/shell.sh; python3; python_program' 2>&1) ||
+    status=$?
+  expect "takes the distribution's Python although another one was run" prints "/usr/bin/python3"
+fi
+
 machine learning
 built
 rm "$home/project/build/venv/bin/python"

@@ -205,5 +205,45 @@ TEST(MeshGrid, RefusesASurfaceThatOverlapsItself) {
   }
 }
 
+MeshFit fit_of(const MeshShape& mesh, int resolution) { return grid_of(mesh, resolution)->fit; }
+
+/// A plate of so many cells. The nodes of a thin one miss what is inside.
+TEST(MeshGrid, ThinWallsAreNotLostInSilence) {
+  constexpr int kCells = 48;
+  const auto plate = [&](double cells) {
+    return fit_of(cuboid_mesh({0.05, 0.05, 0.05 * cells / kCells}), kCells).unresolved;
+  };
+  for (double cells : {0.2, 0.4, 0.7}) EXPECT_GT(plate(cells), 0.4) << cells;
+  for (double cells : {2.0, 3.0, 4.3, 6.0, 48.0}) EXPECT_LT(plate(cells), 0.05) << cells;
+}
+
+/// Edges between triangles are kinks, which no grid follows: the error falls with the triangles.
+TEST(MeshGrid, TheFitOfARoundBodyIsItsError) {
+  double before = 1;
+  for (int times = 3; times <= 5; ++times) {
+    const MeshFit fit = fit_of(ellipsoid_mesh(times, {0.02, 0.02, 0.02}), 4 << times);
+    EXPECT_EQ(fit.unresolved, 0) << times;
+    EXPECT_LT(fit.error, before / 3) << times;
+    before = fit.error;
+  }
+  EXPECT_LT(before, 1e-4 * 0.02);
+}
+
+TEST(MeshGrid, EqualMeshesShareAGrid) {
+  MeshShape mesh = cuboid_mesh({0.01, 0.02, 0.01});
+  mesh.resolution = 8;
+  auto first = shared_mesh_grid(mesh);
+  EXPECT_EQ(shared_mesh_grid(MeshShape(mesh)), first);
+  MeshShape other = mesh;
+  other.vertices[0] -= 0.001;
+  EXPECT_NE(shared_mesh_grid(other), first);
+  other = mesh;
+  other.resolution = 9;
+  EXPECT_NE(shared_mesh_grid(other), first);
+  const std::weak_ptr<const MeshGrid> lives = first;
+  first.reset();
+  EXPECT_TRUE(lives.expired());
+}
+
 }  // namespace
 }  // namespace tangere::testing

@@ -11,6 +11,7 @@
 #include "kernels/contact/pair_contact.hpp"
 #include "kernels/contact/sphere_contact.hpp"
 #include "kernels/numbers/dual.hpp"
+#include "tests/kernels/contact/product_sums.hpp"
 #include "tests/kernels/lift.hpp"
 #include "tests/kernels/random_numbers.hpp"
 
@@ -377,21 +378,7 @@ void expect_same_sums(const Motion& motion, const State& s, const std::vector<Ve
     add_finished<true>(W, sums, finished);
     add_finished<false>(W, forces, values);
   }
-  const auto close = [](const double* a, const double* b, int count) {
-    double scale = 1e-300;
-    for (int i = 0; i < count; ++i) scale = std::max(scale, std::abs(b[i]));
-    for (int i = 0; i < count; ++i) EXPECT_NEAR(a[i], b[i], 2e-12 * scale) << i;
-  };
-  close(&finished.wrench.l.x, &general.wrench.l.x, 3);
-  close(&finished.wrench.a.x, &general.wrench.a.x, 3);
-  EXPECT_EQ(values.wrench.l.x, finished.wrench.l.x);
-  EXPECT_EQ(values.wrench.a.z, finished.wrench.a.z);
-  for (int i = 0; i < 2; ++i)
-    for (int j = 0; j < 2; ++j) {
-      SCOPED_TRACE(std::to_string(i) + std::to_string(j));
-      close(&finished.k[i][j].m[0][0], &general.k[i][j].m[0][0], 9);
-      close(&finished.d[i][j].m[0][0], &general.d[i][j].m[0][0], 9);
-    }
+  testing::expect_finished_sums(finished, values, general, 2e-12);
 }
 
 class ProductSumsOf : public PairDerivative {};

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+// How well the grid of a mesh resolves its surface, so that a wall thinner than its cells is not
+// lost in silence.
+#pragma once
+
+#include "engine/model/scene.hpp"
+#include "kernels/contact/shapes/distance_grid.hpp"
+
+namespace tangere {
+
+struct MeshFit {
+  double error = 0;  ///< root of the mean square of the distance on the surface, which is 0 [m]
+  /// Share of the surface's area where the distance is off by more than a tenth of a cell, or its
+  /// gradient along the triangle's normal is below a half.
+  double unresolved = 0;
+};
+
+/// Compares the grid with its mesh at some ten thousand places, spread evenly over the triangles.
+MeshFit mesh_fit(const MeshShape& mesh, const kernels::DistanceGrid& grid);
+
+}  // namespace tangere
