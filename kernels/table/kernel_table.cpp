@@ -118,9 +118,8 @@ struct Registry {
     }
     if (count == 0) {
       active = &kBuilt[0].table;
-      error =
-          "this processor runs none of the instruction sets that this program was built for: " +
-          all_names + "; build it with -DTANGERE_ISAS=all, or here";
+      error = "this processor runs none of the instruction sets that this program was built for: " +
+              all_names + "; build it with -DTANGERE_ISAS=all, or here";
       return;
     }
     active = tables[0];

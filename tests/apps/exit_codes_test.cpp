@@ -142,12 +142,12 @@ TEST(ExitCode, OfASignalIsThatOfTheTable) {
 /// Every code has one row in the table, and no row has a code that does not exist.
 TEST(ExitCode, IsDocumentedOnce) {
   const std::string page = file_bytes(TANGERE_SOURCE_DIR "/docs/command.md");
-  std::string table = page.substr(page.find("| exit code |"));
-  table = table.substr(0, table.find("\n\n"));
+  const std::string item = "\n- **";
+  std::string list = page.substr(page.find("**Exit codes.**"));
+  list = list.substr(0, list.find("\n\n", list.find(item)));
   std::multiset<int> codes;
-  for (std::size_t at = table.find("\n| "); at != std::string::npos;
-       at = table.find("\n| ", at + 1))
-    codes.insert(std::stoi(table.substr(at + 3)));
+  for (std::size_t at = list.find(item); at != std::string::npos; at = list.find(item, at + 1))
+    codes.insert(std::stoi(list.substr(at + item.size())));
   EXPECT_EQ(codes, (std::multiset<int>{kDone, kSomeFailed, kUsage, kInputOutput, kTerminated,
                                        kInterrupted}));
   const Folder folder;
@@ -155,7 +155,7 @@ TEST(ExitCode, IsDocumentedOnce) {
   std::replace(help.begin(), help.end(), '\n', ' ');
   for (const int code : codes) EXPECT_THAT(help, HasSubstr(" " + std::to_string(code) + " "));
   for (const char* other : {"/apps/README.md", "/docs/failures.md", "/README.md"})
-    EXPECT_EQ(file_bytes(std::string(TANGERE_SOURCE_DIR) + other).find("| exit code |"),
+    EXPECT_EQ(file_bytes(std::string(TANGERE_SOURCE_DIR) + other).find("**Exit codes.**"),
               std::string::npos)
         << other;
 }

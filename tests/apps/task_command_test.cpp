@@ -8,6 +8,7 @@
 #include "io/dataset/shard_check.hpp"
 #include "io/hdf5/h5.hpp"
 #include "tests/apps/program.hpp"
+#include "tests/sanitized.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -178,6 +179,7 @@ TEST(Tasks, GradcheckThatComparesNothingFails) {
               HasSubstr("nothing could be compared with differences: no input acts on the return"));
   EXPECT_THAT(text.err, HasSubstr("try another --seed or --policy"));
   EXPECT_THAT(text.out, Not(HasSubstr("largest error")));
+  if (kSanitized) return;  // the same once more
   EXPECT_EQ(run_json(folder, words, 1).at("entries"), 0);
 }
 

@@ -122,6 +122,7 @@ struct Asked {
 };
 
 TEST(TaskEpisodes, OfAProgramAreAskedForInBlocks) {
+  constexpr std::int64_t kAsked = kSanitized ? 24 : 40;  // a block and a half
   const auto task = task_named("stable_grasp");  // episodes of one to nine actions
   const std::size_t width = task->spec().action.size(), size = task->spec().observation_size();
   const auto played = [&](int threads, Keeper& keeper, Asked& asked) {
@@ -143,7 +144,7 @@ TEST(TaskEpisodes, OfAProgramAreAskedForInBlocks) {
     });
     EXPECT_THAT(policy.players(), ::testing::ElementsAre("half"));
     EpisodeOptions options = options_on(threads);
-    options.episodes = 40;
+    options.episodes = kAsked;
     return run_episodes(*task, policy, options, keeper);
   };
   Keeper one, many;
@@ -156,10 +157,10 @@ TEST(TaskEpisodes, OfAProgramAreAskedForInBlocks) {
   EXPECT_TRUE(alone.in_order && together.in_order);
   std::int64_t rows = 0;
   for (const auto& [episode, seen] : alone.seen) rows += std::ssize(seen) / std::int64_t(size);
-  EXPECT_EQ(std::ssize(alone.seen), 40);
+  EXPECT_EQ(std::ssize(alone.seen), kAsked);
   EXPECT_EQ(rows, summary.rows) << "asked about an episode that was over";
-  EXPECT_LT(rows, 40 * 9);
-  EXPECT_EQ(alone.among.at(39).begin()->size(), 8U) << "the last block has eight episodes";
+  EXPECT_LT(rows, kAsked * 9);
+  EXPECT_EQ(alone.among.at(kAsked - 1).begin()->size(), 8U) << "the last block has eight episodes";
 }
 
 TEST(TaskEpisodes, EndWithWhatAProgramThrows) {
