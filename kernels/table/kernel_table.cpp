@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the tables that were built and that the processor can run. The compiler's own detection
-// decides, which also checks the operating system.
+// Finds the tables that were built and that the processor can run.
 #include "kernels/table/kernel_table.hpp"
 
 #include <array>
@@ -10,6 +9,7 @@
 
 #include "kernels/numbers/one_lane.hpp"
 #include "kernels/table/parts.hpp"
+#include "kernels/table/processor.hpp"
 
 #include "kernels/table/isa.hpp"
 
@@ -74,28 +74,19 @@ constexpr KernelTable table_of(const char* name) {
           Memory::pull_back_memory};
 }
 
-/// The tables that were built, and whether this machine runs them. Best first.
-struct Built {
-  KernelTable table;
-  bool (*runs)();
-};
-constexpr Built kBuilt[] = {
+/// The tables that were built. Best first.
+constexpr KernelTable kBuilt[] = {
 #if TANGERE_AVX512
-    {table_of<xsimd::avx512bw>("avx512"),
-     [] {
-       return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512cd") &&
-              __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw");
-     }},
+    table_of<xsimd::avx512bw>("avx512"),
 #endif
 #if TANGERE_AVX2
-    {table_of<xsimd::avx2>("avx2"),
-     [] { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }},
+    table_of<xsimd::avx2>("avx2"),
 #endif
 #if TANGERE_SSE2
-    {table_of<xsimd::sse2>("sse2"), [] { return true; }},
+    table_of<xsimd::sse2>("sse2"),
 #endif
 #if TANGERE_SCALAR
-    {table_of<ScalarArch>("scalar"), [] { return true; }},
+    table_of<ScalarArch>("scalar"),
 #endif
 };
 
@@ -106,18 +97,15 @@ struct Registry {
   std::string error;
 
   Registry() {
-#if TANGERE_AVX2 || TANGERE_AVX512
-    __builtin_cpu_init();
-#endif
     std::string names, all_names;
-    for (const Built& built : kBuilt) {
-      all_names += (all_names.empty() ? "" : ", ") + std::string(built.table.name);
-      if (!built.runs()) continue;
-      tables[count++] = &built.table;
-      names += (names.empty() ? "" : ", ") + std::string(built.table.name);
+    for (const KernelTable& built : kBuilt) {
+      all_names += (all_names.empty() ? "" : ", ") + std::string(built.name);
+      if (!processor_runs(built.name)) continue;
+      tables[count++] = &built;
+      names += (names.empty() ? "" : ", ") + std::string(built.name);
     }
     if (count == 0) {
-      active = &kBuilt[0].table;
+      active = &kBuilt[0];
       error = "this processor runs none of the instruction sets that this program was built for: " +
               all_names + "; build it with -DTANGERE_ISAS=all, or here";
       return;

@@ -45,7 +45,8 @@ TEST(Command, HelpEndsWithAnExampleThatWorks) {
     EXPECT_EQ(help.exit_code, 0) << name;
     EXPECT_THAT(help.err, IsEmpty());
     ASSERT_THAT(help.out, HasSubstr("Example:\n  tangere " + name + " "));
-    if (kSanitized && (name == "accuracy" || name == "stress" || name == "bench")) continue;  // long runs
+    if (kSanitized && (name == "accuracy" || name == "stress" || name == "bench"))
+      continue;  // long runs
     const Words example = example_of(help.out);
     const Outcome outcome = run(folder, example);
     EXPECT_EQ(outcome.exit_code, 0) << help.out << outcome.err;

@@ -2,10 +2,9 @@
 // Finds the probes that this machine can run.
 #include "tests/kernels/lane_probe.hpp"
 
-#include <cstring>
 #include <vector>
 
-#include "kernels/table/kernel_table.hpp"
+#include "kernels/table/processor.hpp"
 
 namespace tangere::testing {
 
@@ -20,8 +19,7 @@ std::span<const LaneProbe* const> lane_probes() {
 #define PROBE(isa) &kProbe_##isa,
     for (const LaneProbe* p : {TANGERE_PROBES})
 #undef PROBE
-      for (const kernels::KernelTable* table : kernels::available_kernels())
-        if (std::strcmp(p->name, table->name) == 0) built.push_back(p);
+      if (kernels::processor_runs(p->name)) built.push_back(p);
     return built;
   }();
   return probes;

@@ -123,7 +123,7 @@ struct Asked {
 
 TEST(TaskEpisodes, OfAProgramAreAskedForInBlocks) {
   constexpr std::int64_t kAsked = kSanitized ? 24 : 40;  // a block and a half
-  const auto task = task_named("stable_grasp");  // episodes of one to nine actions
+  const auto task = task_named("stable_grasp");          // episodes of one to nine actions
   const std::size_t width = task->spec().action.size(), size = task->spec().observation_size();
   const auto played = [&](int threads, Keeper& keeper, Asked& asked) {
     const Policy policy(*task, "half", [&](const PolicyQuestion& question, std::span<double> to) {
