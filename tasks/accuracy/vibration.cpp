@@ -10,6 +10,7 @@
 #include "engine/base/as_size.hpp"
 #include "engine/sense/readout.hpp"
 #include "engine/step/stepper.hpp"
+#include "kernels/numbers/block.hpp"
 
 namespace tangere {
 namespace {

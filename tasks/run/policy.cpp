@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "engine/model/random.hpp"
+#include "kernels/numbers/block.hpp"
 
 namespace tangere {
 namespace {
