@@ -167,6 +167,7 @@ TEST_P(Fault, LeavesWholeFilesOrNone) {
   if (kind == "write" || kind == "sync" || kind == "rename" || lies(kind)) {
     EXPECT_GT(failed, 0);
   }
+  RecordProperty("calls", static_cast<int>(last));
   RecordProperty("tried", tried);
   RecordProperty("failed", failed);
 }
