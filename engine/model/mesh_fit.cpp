@@ -46,9 +46,10 @@ MeshFit mesh_fit(const MeshShape& mesh, const kernels::DistanceGrid& grid) {
     const double weight = of.area / area / (double(n) * n);
     for (int i = 0; i < n; ++i)
       for (int j = 0; j <= 2 * i; ++j) {
+        const int place = j / 2;  // in its row
         const bool turned = j % 2 == 1;
         const double u = (i + (turned ? 1.0 / 3 : 2.0 / 3)) / n,
-                     v = (j / 2 + (turned ? 2.0 / 3 : 1.0 / 3)) / n;
+                     v = (place + (turned ? 2.0 / 3 : 1.0 / 3)) / n;
         const auto here = distance.evaluate(of.a + (u - v) * of.ab + v * of.ac);
         square += weight * here.d * here.d;
         if (std::abs(here.d) > 0.1 * grid.cell || dot(here.n, of.normal) < 0.5)
