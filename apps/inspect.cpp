@@ -59,8 +59,7 @@ std::int64_t steps_of(const Model& model) {
 Json as_json(const Model& model) {
   const Scene& scene = model.scene();
   Json bodies = Json::array(), contacts = Json::array(), sensors = Json::array();
-  Json meshes = Json::array();
-  Json effects = Json::array();
+  Json meshes = Json::array(), effects = Json::array();
   for (std::size_t b = 0; b < scene.links.size(); ++b) {
     const LinkDescription& link = scene.links[b];
     bodies.push_back({{"name", link.body.name},

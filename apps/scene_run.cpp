@@ -83,9 +83,8 @@ void warn_of_geometry(const Console& console, const Model& model) {
   for (const MeshInfo& mesh : model.meshes())
     if (mesh.unresolved > MeshInfo::kMostUnresolved)
       console.note(fmt::format(
-          "warning: the cells of body '{}', {:.3g} m, are too coarse for {:.0f} % of its surface: "
-          "its walls or details are thinner than about one and a half of them; expected a larger "
-          "resolution",
+          "warning: body '{}': cells of {:.3g} m do not resolve {:.0f} % of the mesh's surface, "
+          "where walls or details are thinner than about 1.5 cells; expected a larger 'resolution'",
           mesh.body, mesh.cell, 100 * mesh.unresolved));
   for (const std::string& line : start_overlaps(model)) console.note("warning: " + line);
 }

@@ -51,7 +51,7 @@ ControlProgram make_controls(const std::string& path, std::uint64_t seed, const 
 /// --steps, or the number of steps that the controls last. Throws InputError if neither is given.
 std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlProgram& controls);
 
-/// Warns of meshes that their grids do not resolve and of bodies that start deep inside one another.
+/// Warns of meshes whose grids are too coarse and of bodies that start deep inside one another.
 void warn_of_geometry(const Console& console, const Model& model);
 
 /// Prints notes on sensors that are not read after every step.

@@ -8,7 +8,7 @@ target_compile_options(tangere_flags INTERFACE
   $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>  # GCC 12 sees an overlap in "text" + std::string() where there is none
   $<$<CXX_COMPILER_ID:GNU>:-fno-semantic-interposition>  # the libraries are -fPIC and inline as other code does
   -ffp-contract=off      # a product and a sum are fused where the source says mul_add, nowhere else: same bits everywhere
-  # Not -O0: GCC 12 keeps the pragmas of fmt in precompiled headers, and code believes that it is optimised.
+  # Not -O0: after fmt's pragmas in a precompiled header GCC 12 keeps __OPTIMIZE__ defined, and Eigen does not compile.
   $<$<CONFIG:Debug>:-Og>
   -fno-math-errno        # sqrt is one instruction
   -fno-trapping-math)    # branches on numbers may become selects; nobody reads the exception flags

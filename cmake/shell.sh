@@ -79,7 +79,7 @@ install_tools() {
 
 # Prints the path of the Python to use. The distribution's comes first, because its packages have PyTorch.
 python_program() {
-  hash -r  # of a program that this shell has run before, type prints that path alone
+  hash -r  # or type prints only one path of a program that this shell has run
   type -aP python3 | grep -x /usr/bin/python3 || type -P python3
 }
 # Makes build/venv with what python/requirements.txt lists, and $python_options for the build. Where PyPI is out of reach the

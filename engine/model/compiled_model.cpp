@@ -112,6 +112,7 @@ class Compiler {
            std::any_of(s.sensors.begin(), s.sensors.end(), of_sensor);
   }
 
+  /// Makes the distances to meshes. Bodies with the same mesh share one.
   void mesh_distances() {
     for (std::size_t b = 0; b < m_.bodies.size(); ++b) {
       const BodyDescription& d = m_.scene.links[b].body;

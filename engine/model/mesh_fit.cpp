@@ -37,6 +37,7 @@ MeshFit mesh_fit(const MeshShape& mesh, const kernels::DistanceGrid& grid) {
   const kernels::MeshDistance<double> distance{&grid};
   double area = 0;
   for (const auto& t : mesh.triangles) area += triangle_of(mesh, t).area;
+  if (!std::isfinite(area)) return {HUGE_VAL, 1};
   double square = 0, unresolved = 0;
   for (const auto& t : mesh.triangles) {
     const Triangle of = triangle_of(mesh, t);

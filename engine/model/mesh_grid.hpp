@@ -29,8 +29,8 @@ struct MeshGrid {
 /// lie inside of what it encloses.
 std::shared_ptr<const MeshGrid> make_mesh_grid(const MeshShape& mesh);
 
-/// The same, made once for all bodies and models of this process that have an equal mesh, as long as
-/// one of them lives. May be called from any thread.
+/// Returns the grid of an equal mesh that some model of this process holds, or makes one. May be
+/// called from any thread; one grid is made at a time.
 std::shared_ptr<const MeshGrid> shared_mesh_grid(const MeshShape& mesh);
 
 }  // namespace tangere

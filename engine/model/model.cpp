@@ -2,7 +2,9 @@
 // The public face of a compiled scene.
 #include <algorithm>
 
+#include "engine/base/error.hpp"
 #include "engine/model/compiled_model.hpp"
+#include "kernels/table/isa.hpp"
 
 namespace tangere {
 namespace {
@@ -14,7 +16,9 @@ constexpr double kTightTolerance = 1e-9, kLooseTolerance = 1e-4;
 
 const CompiledModel& compiled(const Model& model) { return *model.compiled_; }
 
-Model::Model(const Scene& scene) : compiled_(compile(scene)) {}
+Model::Model(const Scene& scene) : compiled_(compile(scene)) {
+  if (*kernels::isa_error() != '\0') throw InputError(kernels::isa_error());
+}
 
 const Scene& Model::scene() const { return compiled_->scene; }
 int Model::nq() const { return compiled_->nq; }

@@ -63,7 +63,7 @@ struct StageInfo {
 class Model {
  public:
   /// Compiles a scene. Throws InputError (file:line) for references to names that do not exist,
-  /// massless leaves, degenerate sensors, …
+  /// massless leaves, degenerate sensors, …, and if kernels cannot run here (kernels::isa_error()).
   explicit Model(const Scene& scene);
 
   [[nodiscard]] const Scene& scene() const;

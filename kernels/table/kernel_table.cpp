@@ -107,7 +107,8 @@ struct Registry {
     if (count == 0) {
       active = &kBuilt[0];
       error = "this processor runs none of the instruction sets that this program was built for: " +
-              all_names + "; build it with -DTANGERE_ISAS=all, or here";
+              all_names +
+              "; expected a program that was built on this machine, or with -DTANGERE_ISAS=all";
       return;
     }
     active = tables[0];

@@ -131,8 +131,8 @@ struct KernelTable {
 std::span<const KernelTable* const> available_kernels();
 
 /// Returns the table in use: the best one, or the one named by the environment variable TANGERE_ISA
-/// when the program started. Throws nothing; isa_error() (isa.hpp) reports an unknown or
-/// unsupported name.
+/// when the program started. Throws nothing; isa_error() (isa.hpp) says why that table
+/// cannot be used.
 const KernelTable& active_kernels();
 
 /// Makes `table` the table in use (tests visit every one).

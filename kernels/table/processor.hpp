@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which instruction sets this machine's processor runs, for the kernels and for tests of their
-// lanes, which need no kernels.
+// Which instruction sets the processor runs. Tests of lanes use it without linking the kernels.
 #pragma once
 
 #include <string_view>

@@ -45,8 +45,7 @@ TEST(Command, HelpEndsWithAnExampleThatWorks) {
     EXPECT_EQ(help.exit_code, 0) << name;
     EXPECT_THAT(help.err, IsEmpty());
     ASSERT_THAT(help.out, HasSubstr("Example:\n  tangere " + name + " "));
-    if (kSanitized && (name == "accuracy" || name == "stress" || name == "bench"))
-      continue;  // long runs
+    if (kSanitized && (name == "accuracy" || name == "bench")) continue;  // long runs
     const Words example = example_of(help.out);
     const Outcome outcome = run(folder, example);
     EXPECT_EQ(outcome.exit_code, 0) << help.out << outcome.err;
@@ -309,6 +308,46 @@ TEST(Command, WarningsOfASceneGoToStderr) {
     EXPECT_EQ(answer.at("contacts").at(2).at("law"), "published");
     EXPECT_THAT(outcome.err, HasSubstr("palm (turning): force, u from -1 to 1 is -0.03 to 0.03"));
   }
+}
+
+/// A plate of half a cell is lost between the nodes of a grid, a thick one is not.
+TEST(Command, AMeshThatItsGridLosesIsWarnedOf) {
+  const Folder folder;
+  const auto plate = [&](const std::string& half) {
+    std::string text;
+    for (const char* z : {"-", ""})
+      for (const char* corner : {"-1 -1 ", "1 -1 ", "1 1 ", "-1 1 "})
+        text += std::string("v ") + corner + z + half + "\n";
+    folder.write("plate.obj", text +
+                                  "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\n"
+                                  "f 4 1 5 8\n");
+  };
+  folder.write("plate.xml", R"(<tangere><option unit="m-kg"/><robot><link name="box">
+<joint name="box" type="free3d" pos="0 0 2"/><body name="box" type="cuboid" size="0.2 0.2 0.2" density="1"/></link></robot>
+<robot><link name="plate"><joint name="plate" type="fixed"/>
+<body name="plate" type="mesh" filename="plate.obj" transform_type="OBJ_TO_JOINT" resolution="16" density="1"/>
+</link></robot><contact><general_primitive_contact general_body="box" primitive_body="plate"/></contact>
+</tangere>)");
+  plate("0.03");
+  for (const Words& words :
+       {Words{"inspect", "plate.xml"},
+        Words{"simulate", "plate.xml", "--steps", "1", "-o", "plate.h5"},
+        Words{"generate", "plate.xml", "--episodes", "1", "--steps", "1", "-o", "set"}}) {
+    const Outcome outcome = run(folder, words);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr("warning: body 'plate': cells of 0.125 m do not resolve "));
+  }
+  plate("0.5");
+  const Outcome thick = run(folder, {"inspect", "plate.xml", "--json"});
+  EXPECT_THAT(thick.err, Not(HasSubstr("warning: ")));
+  const json mesh = json::parse(thick.out).at("meshes").at(0);
+  EXPECT_EQ(mesh.at("body"), "plate");
+  EXPECT_EQ(mesh.at("cells"), (json{24, 24, 16}));
+  EXPECT_EQ(mesh.at("cell"), 0.125);
+  EXPECT_EQ(mesh.at("bytes"), 27 * 27 * 19 * 4);
+  EXPECT_GT(mesh.at("error"), 0);
+  EXPECT_LT(mesh.at("error"), 0.1 * 0.125);
+  EXPECT_LT(mesh.at("unresolved"), 0.1);
 }
 
 TEST(Command, InspectTellsPeopleAndProgramsTheSame) {

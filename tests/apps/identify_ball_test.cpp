@@ -60,5 +60,13 @@ TEST(IdentifyBall, SaysWhatIsWrong) {
   EXPECT_THAT(run(folder, {"--help"}).out, HasSubstr("Example:"));
 }
 
+/// The program never asks kernels::isa_error(): its models do.
+TEST(IdentifyBall, RefusesAnInstructionSetThatIsNotThere) {
+  const Folder folder;
+  const Outcome outcome = run(folder, {scene("identify_ball.xml")}, {"TANGERE_ISA=avx1024"});
+  EXPECT_NE(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("TANGERE_ISA=avx1024: an instruction set that"));
+}
+
 }  // namespace
 }  // namespace tangere::apps

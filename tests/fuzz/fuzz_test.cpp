@@ -50,27 +50,37 @@ TEST_P(Fuzz, EveryMutantIsReadOrRefused) {
   };
   for (const std::string& whole : corpus) EXPECT_TRUE(read_mutant(target, folder, whole));
   const auto read = [&](std::uint64_t seed) { return read_mutant(target, folder, mutant(seed)); };
-  std::uint64_t accepted = 0, crashes = 0;
+  std::uint64_t accepted = 0, crashes = 0, forgiven = 0;
   int findings = 0;
   for (std::uint64_t next = first; next < end && findings < 5;) {
     const ChildEnd child = run_in_watched_child(next, std::min(next + in_child, end), read);
     next += child.done;
     accepted += child.accepted;
+    if (child.leaked && !child.finding.empty()) {
+      ++findings;
+      ADD_FAILURE() << "a mutant of " << target.name << " up to " << next << ": " << child.finding;
+    }
     if (!child.crashed) continue;
-    // HDF5 may have damaged the memory of the child over the mutants before.
-    if (!child.finding.empty() && run_in_watched_child(next, next + 1, read).finding != "") {
+    // HDF5 may have damaged the memory of the child over the mutants before, and a machine that
+    // pauses makes any of them slow. Nothing else needs a second look.
+    const bool again = target.hdf5 || child.slow;
+    if (!child.finding.empty() &&
+        (!again || run_in_watched_child(next, next + 1, read).finding != "")) {
       ++findings;
       const std::string name = "tangere-" + target.name + "-" + std::to_string(next);
       ADD_FAILURE() << "mutant " << next << " of " << target.name << " ("
                     << keep(name, mutant(next)) << "): " << child.finding;
+    } else {
+      ++forgiven;
     }
-    crashes += 1;
+    ++crashes;
     ++next;
   }
-  std::printf("%s: %llu mutants, %llu read, %llu crashes of the HDF5 library, %d findings\n",
-              target.name.c_str(), static_cast<unsigned long long>(end - first),
-              static_cast<unsigned long long>(accepted),
-              static_cast<unsigned long long>(crashes - std::uint64_t(findings)), findings);
+  std::printf(
+      "%s: %llu mutants, %llu read, %llu ended by the HDF5 library or by a pause, %d findings\n",
+      target.name.c_str(), static_cast<unsigned long long>(end - first),
+      static_cast<unsigned long long>(accepted), static_cast<unsigned long long>(forgiven),
+      findings);
   EXPECT_GT(accepted, 0U);                     // else only the first check is tested
   EXPECT_LT(accepted, end - first - crashes);  // else nothing is
 }
@@ -101,6 +111,17 @@ TEST(WatchedChild, TellsOurCrashesFromOthers) {
     return much.back() == 'x';
   });
   EXPECT_NE(full.finding, "");
+#ifdef __SANITIZE_ADDRESS__
+  const ChildEnd leaky = end_of([](std::uint64_t) {
+    int* volatile lost = new int(3);
+    const bool three = *lost == 3;
+    lost = nullptr;
+    return three;
+  });
+  EXPECT_TRUE(leaky.leaked);
+  EXPECT_EQ(leaky.done, 2U);
+  EXPECT_THAT(leaky.finding, ::testing::HasSubstr("leak of"));
+#endif
 }
 
 }  // namespace

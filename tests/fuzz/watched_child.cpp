@@ -126,6 +126,19 @@ bool in_hdf5(const std::string& words) {
   return false;
 }
 
+/// Whether in_hdf5() holds for every leak of a report.
+bool leaks_in_hdf5(const std::string& words) {
+  constexpr const char* kLeakOf = " leak of ";
+  std::size_t at = words.find(kLeakOf);
+  if (at == std::string::npos) return false;
+  while (at != std::string::npos) {
+    const std::size_t next = words.find(kLeakOf, at + 1);
+    if (!in_hdf5(words.substr(at, next - at))) return false;
+    at = next;
+  }
+  return true;
+}
+
 std::string text_of(int file) {
   lseek(file, 0, SEEK_SET);
   std::string text(1 << 14, '\0');
@@ -150,15 +163,18 @@ ChildEnd run_in_watched_child(std::uint64_t first, std::uint64_t end,
   int status = 0;
   while (waitpid(child, &status, 0) < 0) {
   }
-  ChildEnd result{counts.done, counts.accepted, false, {}};
+  ChildEnd result{.done = counts.done, .accepted = counts.accepted, .finding = {}};
   const bool well = WIFEXITED(status) && WEXITSTATUS(status) == 0;
   if (!well) {
     const std::string told = text_of(fileno(words));
-    const bool ours =
-        WIFEXITED(status) && WEXITSTATUS(status) >= kException && WEXITSTATUS(status) <= kLeak;
-    result.crashed = true;
-    const bool endless = WIFSIGNALED(status) && WTERMSIG(status) == SIGPROF;
-    if (ours || !(endless || in_hdf5(told)))
+    const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 0;
+    const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+    result.leaked = code == kLeak;
+    result.crashed = !result.leaked;
+    result.slow = signal == SIGALRM;
+    const bool ours = code == kException || code == kTooMuch;
+    const bool library = signal == SIGPROF || (result.leaked ? leaks_in_hdf5(told) : in_hdf5(told));
+    if (ours || !library)
       result.finding = told.empty() ? "ended with status " + std::to_string(status) : told;
   }
   std::fclose(words);
