@@ -120,7 +120,7 @@ Vec3<N> pull_back_recall(const Shape& shape, const LoadedTouch<N>& t, const Vec3
   const Vec3<N> y = t.Q * bar.a, at = p.x2 - s_of(p, remembered);
   out.l -= y;
   out.a -= cross(at, y);
-  pull_back_meeting<Shape>(t, p, xi, select(p.d < zero, zero, bar.gap), zero3<N>(), bar.b + y, out);
+  pull_back_meeting<Shape>(t, p, xi, select(p.d > zero, bar.gap, zero), zero3<N>(), bar.b + y, out);
   return select(p.d < zero, -y, zero3<N>());
 }
 
