@@ -113,6 +113,20 @@ double largest_shift(const StressHistory& h) {
   });
 }
 
+Criterion creep_after(double start, double fall) {
+  return [=](const StressHistory& h) {
+    const double sink = largest_sink(h);
+    if (!(sink <= fall)) return sink;
+    const int first = std::min(h.last(), static_cast<int>(std::lround(start / h.step())));
+    return largest(h, [&](int k) {
+      double most = 0;
+      for (int b = 0; b < h.bodies() && k > first; ++b)
+        most = std::max(most, length(h.position(k, b) - h.position(first, b)));
+      return most;
+    });
+  };
+}
+
 Criterion sinks_below(int moving, int fixed) {
   return [=](const StressHistory& h) {
     return largest(h, [&](int k) { return h.position(k, fixed)[2] - h.position(k, moving)[2]; });

@@ -24,6 +24,9 @@ double momentum_change(const StressHistory& history);
 double largest_sink(const StressHistory& history);
 /// The largest distance of any body from its start [m].
 double largest_shift(const StressHistory& history);
+/// The largest distance of any body from where it was `start` [s] after the run began, at any later
+/// time [m]. Where a body sinks by more than `fall` [m], what was built fell: its sink.
+Criterion creep_after(double start, double fall);
 /// How far body `moving` gets below body `fixed` at any time [m]. Negative: never below.
 Criterion sinks_below(int moving, int fixed);
 /// How far the body gets below the ground's level at any time [m]. Negative: never below.

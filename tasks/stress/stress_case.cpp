@@ -26,6 +26,7 @@ constexpr const char* kKinks = "Newton's method converges slowly where contacts 
 
 constexpr double kNoGain = 1 + 1e-9;  // of energy, for BDF1
 constexpr double kSlightGain = 1.01;  // for the other schemes
+constexpr double kRelaxation = 5e-3;  // kt over ks of a contact that is given ks [s]
 
 /// The same case for BDF1 and for the others, whose bounds on energy differ.
 void add_energy_case(Cases& cases, StressCase of, const Schemes& known_bdf1 = {}) {
@@ -365,6 +366,29 @@ Cases closed_forms() {
   return cases;
 }
 
+/// Friction that remembers holds what dampers let creep.
+Cases held() {
+  Cases cases;
+  const auto add = [&](const char* name, const char* scene, const StressVariant& variant,
+                       bool quick) {
+    cases.push_back({.name = name,
+                     .scene = scene,
+                     .criterion = "way after the first second [m]",
+                     .measure = creep_after(1, 5e-3),
+                     .bound = 1e-6,
+                     .seconds = 10,
+                     .steps = usual(),
+                     .schemes = all(),
+                     .variant = variant,
+                     .quick = quick});
+  };
+  add("slope_kept", "hard/slope_below.xml", {.ks = 0.25}, true);
+  add("grasp_kept", "hard/held_box.xml", {}, true);
+  add("card_house_kept", "hard/card_house.xml", {.ks = 0.25}, false);
+  add("arch_kept", "hard/arch.xml", {}, true);
+  return cases;
+}
+
 /// Schemes of the scenes of the tasks, and which variants take too many passes.
 struct StiffScene {
   const char* scene;
@@ -414,7 +438,7 @@ void scale(RandomizationDescription& drawn, const StressVariant& variant) {
 std::span<const StressCase> stress_cases() {
   static const Cases table = [] {
     Cases cases;
-    for (const auto part : {geometry, impacts, masses, rotations, closed_forms, stiff_scenes})
+    for (const auto part : {geometry, impacts, masses, rotations, closed_forms, held, stiff_scenes})
       for (StressCase& of : part()) cases.push_back(std::move(of));
     return cases;
   }();
@@ -425,6 +449,9 @@ Scene varied(Scene scene, const StressVariant& variant) {
   const auto stiffen = [&](ContactCoefficients& c) {
     c.kn *= variant.kn;
     c.kt *= variant.kt;
+    if (variant.ks == 0) return;
+    c.ks = variant.ks * c.kn;
+    c.kt = kRelaxation * c.ks;
   };
   for (GroundContactDescription& c : scene.ground_contacts) stiffen(c.coefficients);
   for (PairContactDescription& c : scene.pair_contacts) stiffen(c.coefficients);

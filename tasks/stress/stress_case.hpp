@@ -15,6 +15,8 @@ namespace tangere {
 struct StressVariant {
   double kn = 1, kt = 1;  ///< of all contacts
   double speed = 1;       ///< of all starting velocities
+  /// Of all contacts, as a share of kn; kt is then ks times 5 ms. 0: those of the scene.
+  double ks = 0;
 };
 
 struct StressCase {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 
 #include "kernels/table/kernel_table.hpp"
 #include "tests/engine/runs.hpp"
@@ -22,8 +23,13 @@ struct Held {
   Batch batch;
   Stepper stepper;
 
-  Held(const Scene& scene, Integrator scheme, double h, double tolerance = 1e-12)
-      : model(scene), batch(model, 1), stepper(model, testing::options(scheme, h, tolerance)) {}
+  Held(const Scene& scene, Integrator scheme, double h, std::optional<double> tolerance = 1e-12)
+      : model(scene), batch(model, 1), stepper(model, options(scheme, h, tolerance)) {}
+  static StepperOptions options(Integrator scheme, double h, std::optional<double> tolerance) {
+    StepperOptions o = testing::options(scheme, h);
+    o.tolerance = tolerance;  // none: the one that users get
+    return o;
+  }
   void go(double time) {
     const int steps = int(std::lround(time / stepper.timestep()));
     const std::vector<double> u(std::size_t(model.nu()));
@@ -94,6 +100,47 @@ INSTANTIATE_TEST_SUITE_P(Schemes, Slope,
                          ::testing::Combine(::testing::Values(Integrator::bdf1, Integrator::bdf2,
                                                               Integrator::sdirk2),
                                             ::testing::Bool()));
+
+/// A box of 0.2 kg between a wall and a finger that presses with 5 N, 66 points on each side.
+Scene grasp(double ks, double kt) {
+  Scene s;
+  s.name = "grasp";
+  s.gravity = {0, 0, -kGravity};
+  const Shape pad = CuboidShape{{0.01, 0.03, 0.05}, {2, 6, 11}};
+  LinkDescription finger = link("finger", JointType::prismatic, {0.03, 0, 0}, pad, 2000);
+  finger.joint.axis0 = {-1, 0, 0};
+  s.links = {link("wall", JointType::fixed, {-0.03, 0, 0}, pad, 1000), finger,
+             link("box", JointType::free, {}, CuboidShape{{0.05, 0.05, 0.08}, {2, 2, 2}}, 1000)};
+  s.motors.push_back({"finger_joint", -5, 5, {}});
+  for (const char* body : {"wall", "finger"})
+    s.pair_contacts.push_back({body, "box", {400, kt, 1, 2e4, ks}, ContactLaw::clamped, 1e-5, {}});
+  return s;
+}
+
+class Grasp : public ::testing::TestWithParam<Integrator> {};
+
+/// It sinks by m g/(132 ks) while it is gripped and stays there.
+TEST_P(Grasp, HoldsWithoutCreep) {
+  Held run(grasp(100, 0.5), GetParam(), 5e-3, {});
+  const auto hold = [&](double time) {
+    for (int t = 0; t < int(std::lround(time / 5e-3)); ++t)
+      run.stepper.step(run.batch, std::vector<double>{1});
+  };
+  hold(1);
+  const std::vector<double> held = testing::q_of(run.batch);
+  EXPECT_NEAR(held[3], -0.2 * kGravity / (132 * 100), 1e-7);
+  for (int second = 0; second < (kSanitized ? 1 : 9); ++second) {
+    hold(1);
+    for (int i = 0; i < 4; ++i) EXPECT_NEAR(run.q(i), held[std::size_t(i)], 1e-6) << second;
+  }
+  Held viscous(grasp(0, 0.5), GetParam(), 5e-3, {});
+  for (int t = 0; t < 40; ++t) viscous.stepper.step(viscous.batch, std::vector<double>{1});
+  EXPECT_NEAR(viscous.v(3), -0.2 * kGravity / (132 * 0.5), 2e-3) << "without springs it creeps";
+}
+
+INSTANTIATE_TEST_SUITE_P(Schemes, Grasp,
+                         ::testing::Values(Integrator::bdf1, Integrator::bdf2, Integrator::sdirk2,
+                                           Integrator::sdirk3));
 
 /// A skin under the box, on the plate, reads the shear that holds still when the box does: each of
 /// its points has its own spring, stretched by as much as the box has moved on it.

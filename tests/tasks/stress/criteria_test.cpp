@@ -75,6 +75,17 @@ TEST(Criteria, CountEnergyFromTheLowestPlaceOfTheRun) {
   EXPECT_THAT(largest_shift(falling), DoubleNear(0.05, 1e-6));
 }
 
+/// From 0.5 s on, and from the start where it falls farther than may be.
+TEST(Criteria, TellCreepFromAFall) {
+  const std::string ball = R"(<body type="sphere" radius="0.1" density="1000"/>)";
+  const StressHistory slow = played(scene_of(free_body(ball, "0.03 0 0 0 0 0"), "0 0 0"), 200);
+  EXPECT_THAT(creep_after(0.05, 1e-3)(slow), DoubleNear(0.03 * 0.15, 1e-9));
+  EXPECT_THAT(creep_after(0, 1e-3)(slow), DoubleNear(0.03 * 0.2, 1e-9));
+  const StressHistory falling = played(scene_of(free_body(ball, "0 0 0 0 0 0"), "0 0 -10"), 100);
+  EXPECT_THAT(creep_after(0.09, 1e-3)(falling), DoubleNear(0.05, 1e-6));
+  EXPECT_THAT(creep_after(0.09, 0.1)(falling), DoubleNear(0.05 - 0.0405, 1e-6));
+}
+
 TEST(Criteria, SeeWhatPassesAPlane) {
   const Scene scene = scene_of(
       R"(<ground pos="0 0 -0.02"/>)" + free_body(R"(<body name="b" type="sphere" radius="0.01"

@@ -152,6 +152,15 @@ TEST(StressRun, VariesStiffnessAndSpeedWithWhatIsDrawn) {
   EXPECT_EQ(scene.randomizations.at(0).distribution.b, 11000);
 }
 
+TEST(StressRun, GivesContactsSpringsWithTheirDampers) {
+  const ContactCoefficients c = varied(falling("falling.xml").scene, {.kn = 2, .ks = 0.25})
+                                    .ground_contacts.at(0)
+                                    .coefficients;
+  EXPECT_EQ(c.ks, 500);
+  EXPECT_EQ(c.kt, 2.5);
+  EXPECT_EQ(varied(falling("falling.xml").scene, {}).ground_contacts.at(0).coefficients.ks, 0);
+}
+
 TEST(StressCases, AreWhole) {
   std::set<std::string> names;
   for (const StressCase& of : stress_cases()) {
