@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "tasks/catalogue/box_pushing_script.hpp"
 #include "tasks/catalogue/task_list.hpp"
@@ -33,14 +34,14 @@ Scene without_randomisation(Scene scene) {
 
 class BoxPushing : public Task {
  public:
-  BoxPushing(const Scene& scene, PushObservation observation)
-      : Task(without_randomisation(scene), declare_box_pushing(observation)),
+  BoxPushing(const Scene& scene, PushObservation observation, Friction friction)
+      : Task(without_randomisation(scene), declare_box_pushing(observation, friction)),
         observation_(observation),
         turn_(coordinate("hand_turn")),
         slide_(coordinate("hand_slide")),
         box_(coordinate("box_slide")),
         box_turn_(coordinate("box_turn")),
-        script_(model().scene()) {
+        script_(model().scene(), friction) {
     if (model().end_effectors().size() != 2 || model().end_effectors()[0].name != "tip" ||
         model().end_effectors()[1].name != "face")
       throw InputError(model().scene().path + ": box pushing needs the end effectors tip and face");
@@ -210,7 +211,7 @@ class BoxPushing : public Task {
 
 }  // namespace
 
-TaskSpec declare_box_pushing(PushObservation observation) {
+TaskSpec declare_box_pushing(PushObservation observation, Friction friction) {
   const std::vector<double> pose_scale = {0.1, 0.1, 0.3}, tactile_scale = {0.01, 0.01, 0.02};
   TaskSpec spec;
   spec.name = "box_pushing";
@@ -239,11 +240,12 @@ TaskSpec declare_box_pushing(PushObservation observation) {
     spec.name = "box_pushing_reduced";
     spec.summary = "The same; the goal alone is observed.";
   }
-  return spec;
+  return with_friction(std::move(spec), friction);
 }
 
-std::unique_ptr<Task> make_box_pushing(const Scene& scene, PushObservation observation) {
-  return std::make_unique<BoxPushing>(scene, observation);
+std::unique_ptr<Task> make_box_pushing(const Scene& scene, PushObservation observation,
+                                       Friction friction) {
+  return std::make_unique<BoxPushing>(scene, observation, friction);
 }
 
 }  // namespace tangere

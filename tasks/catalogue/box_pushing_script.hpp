@@ -6,6 +6,7 @@
 #include <array>
 
 #include "engine/model/scene.hpp"
+#include "tasks/catalogue/task_list.hpp"
 
 namespace tangere {
 
@@ -16,10 +17,26 @@ struct PushState {
   std::array<double, 3> goal{};
 };
 
+/// How the script pushes. Skins and grounds with other friction ask for other values.
+struct PushGains {
+  double swing, cone;  ///< the face looks past the goal by `swing` rad per rad of its yaw, at most
+                       ///< `cone` [rad]
+  double rate, fastest;            ///< approach to the goal [1/s], [m/s]
+  double turn_rate, fastest_turn;  ///< of the hand [1/s], [rad/s]
+  double lead, most_lead;          ///< lead of the hand: per rad that the box lacks, at most [rad]
+  double sideways;                 ///< largest angle between push and the box's x axis [rad]
+  double here;                     ///< [m]: nearer than this, the box turns to the goal's yaw
+  double grip;                     ///< tip to face [1/s]
+  double press;                    ///< depth of the tip's target in the face [m]
+  double slowing;                  ///< [rad]: if the way is farther off, the box is slower
+  double creep;                    ///< [m/s]: below this speed less force is added for the ground
+  double friction;  ///< force that is added for the ground [N]; its limit μ m g is 0.59 N
+};
+
 class PushScript {
  public:
   /// Reads the places of the joints and of the end effectors "tip" and "face" from the scene.
-  explicit PushScript(const Scene& scene);
+  PushScript(const Scene& scene, Friction friction);
 
   /// Returns the controls of the hand's motors: x, y, turn. They exceed ±1 where a motor is too
   /// weak.
@@ -29,6 +46,7 @@ class PushScript {
   }  ///< where q = 0 is [m]
 
  private:
+  PushGains gains_;
   std::array<double, 2> base_{}, tip_{}, face_{}, box_rest_{};
 };
 

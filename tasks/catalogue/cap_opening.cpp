@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "tasks/catalogue/cap_opening_script.hpp"
@@ -53,8 +54,8 @@ Scene with_cap_varying(Scene scene) {
 
 class CapOpening : public Task {
  public:
-  CapOpening(const Scene& scene, CapObservation observation)
-      : Task(with_cap_varying(scene), declare_cap_opening(observation)),
+  CapOpening(const Scene& scene, CapObservation observation, Friction friction)
+      : Task(with_cap_varying(scene), declare_cap_opening(observation, friction)),
         observation_(observation),
         cap_(coordinate("cap")),
         finger_(coordinate("swing_1")),
@@ -224,7 +225,7 @@ class CapOpening : public Task {
 
 }  // namespace
 
-TaskSpec declare_cap_opening(CapObservation observation) {
+TaskSpec declare_cap_opening(CapObservation observation, Friction friction) {
   TaskSpec spec;
   spec.name = "cap_opening";
   spec.summary =
@@ -253,11 +254,12 @@ TaskSpec declare_cap_opening(CapObservation observation) {
     spec.name = "cap_opening_blind";
     spec.summary = "The same; angles and fingertips alone are observed.";
   }
-  return spec;
+  return with_friction(std::move(spec), friction);
 }
 
-std::unique_ptr<Task> make_cap_opening(const Scene& scene, CapObservation observation) {
-  return std::make_unique<CapOpening>(scene, observation);
+std::unique_ptr<Task> make_cap_opening(const Scene& scene, CapObservation observation,
+                                       Friction friction) {
+  return std::make_unique<CapOpening>(scene, observation, friction);
 }
 
 }  // namespace tangere

@@ -27,15 +27,25 @@ constexpr double kSuccess = 10, kNoise = 1e-5,
 constexpr double kShift = 4.1e-3,
                  kTurn = 5 * kDegree;  // steps of the script: a mean e that misses
 constexpr double kApartNoise = 0.01, kTurningNoise = 0.04;  // smaller readings are noise
-constexpr int kPatience = 3;    // attempts between turns of the script, at least
+constexpr int kPatience = 3;  // attempts between turns of the script, at least
+// A skin with ks (docs/skin.md): ks over kn, its time of relaxation [s], and the depth at which the
+// normal damping relaxes in this time [m].
+constexpr double kLeastShare = 0.25, kLargestShare = 0.67, kRelaxation = 5e-3, kDepth = 3e-4;
 constexpr double kLift = 6e-3;  // targets start this far above the grip, end as far below [m]
 // Memory: e before the current action, e in it, height of the grip [m], gripping force as a share
 // of 20 N, yaw that actions have added [rad], which a script may know.
 constexpr std::size_t kBefore = 0, kNow = 3, kHeight = 6, kGrip = 7, kTurned = 8;
 
+constexpr int kSkinNumbers = kPointCoefficients + 1;  // kn, kt, mu, damping, ks
+
+/// Those of points with this stiffness and friction whose shear is `share` as stiff.
+std::array<double, kSkinNumbers> elastic_skin(double kn, double mu, double share) {
+  return {kn, share * kn * kRelaxation, mu, kn * kRelaxation / kDepth, share * kn};
+}
+
 /// Returns the scene with the unknown coefficients of the skin as its varying numbers, equal for
-/// both pads.
-Scene with_skin(Scene scene) {
+/// both pads: those of the paper, or all.
+Scene with_skin(Scene scene, Friction friction) {
   scene.randomizations.clear();
   const auto vary = [&](const SceneNumber& number) {
     RandomizationDescription d;
@@ -45,9 +55,10 @@ Scene with_skin(Scene scene) {
     scene.randomizations.push_back(d);
   };
   for (const char* pad : {"left_pad", "right_pad"}) {
-    for (const NumberField field : {NumberField::kn, NumberField::kt, NumberField::mu})
-      vary({NumberOwner::contact, field, pad, 0, "box"});
-    for (int k = 0; k < kPointCoefficients; ++k)
+    const bool elastic = friction == Friction::elastic;
+    for (int k = 0; k < (elastic ? kSkinNumbers : 3); ++k)
+      vary({NumberOwner::contact, coefficient_field(k), pad, 0, "box"});
+    for (int k = 0; k < (elastic ? kSkinNumbers : kPointCoefficients); ++k)
       vary({NumberOwner::tactile, coefficient_field(k), pad});
   }
   return scene;
@@ -55,8 +66,9 @@ Scene with_skin(Scene scene) {
 
 class Insertion : public Task {
  public:
-  Insertion(const Scene& scene, InsertionMotion motion)
-      : Task(with_skin(scene), declare_insertion(motion)),
+  Insertion(const Scene& scene, InsertionMotion motion, Friction friction)
+      : Task(with_skin(scene, friction), declare_insertion(motion, friction)),
+        friction_(friction),
         moved_(motion == InsertionMotion::rotation      ? std::vector<std::size_t>{2}
                : motion == InsertionMotion::translation ? std::vector<std::size_t>{0, 1}
                                                         : std::vector<std::size_t>{0, 1, 2}),
@@ -83,9 +95,17 @@ class Insertion : public Task {
           number(static_cast<std::uint32_t>(k), -kOff[k], kOff[k]);
     s.memory[kHeight] = number(3, -0.01, 5e-3);
     s.memory[kGrip] = number(4, 0.125, 0.8);
-    const std::array<double, 7> skin{
-        number(5, 2e3, 14e3), number(6, 20, 140),   number(7, 0.5, 2.5), number(8, 50, 450),
-        number(9, 0.2, 2.3),  number(10, 0.5, 2.5), number(11, 0, 100)};
+    const double contact_kn = number(5, 2e3, 14e3), contact_mu = number(7, 0.5, 2.5);
+    const double tactile_kn = number(8, 50, 450), tactile_mu = number(10, 0.5, 2.5);
+    std::vector<double> skin{contact_kn,          number(6, 20, 140), contact_mu,        tactile_kn,
+                             number(9, 0.2, 2.3), tactile_mu,         number(11, 0, 100)};
+    if (friction_ == Friction::elastic) {
+      const double share = number(12, kLeastShare, kLargestShare);
+      const auto contact = elastic_skin(contact_kn, contact_mu, share),
+                 tactile = elastic_skin(tactile_kn, tactile_mu, share);
+      skin.assign(contact.begin(), contact.end());
+      skin.insert(skin.end(), tactile.begin(), tactile.end());
+    }
     for (std::size_t k = 0; k < s.varying.size(); ++k) s.varying[k] = skin[k % skin.size()];
     hold({0, 0, 0, s.memory, {}, {}}, s.q, s.v);
   }
@@ -252,6 +272,7 @@ class Insertion : public Task {
     q[box_ + 6] = std::sin(e[2] / 2);
   }
 
+  Friction friction_;
   std::vector<std::size_t> moved_;          // the components of e that an action changes
   std::size_t hand_, turn_, finger_, box_;  // coordinates
   std::size_t hand_v_, turn_v_, box_v_;     // dofs
@@ -303,7 +324,7 @@ void Insertion::scripted(const TaskView& view, std::span<const double> o,
 
 }  // namespace
 
-TaskSpec declare_insertion(InsertionMotion motion) {
+TaskSpec declare_insertion(InsertionMotion motion, Friction friction) {
   const bool turns = motion != InsertionMotion::translation,
              slides = motion != InsertionMotion::rotation;
   TaskSpec spec;
@@ -338,11 +359,12 @@ TaskSpec declare_insertion(InsertionMotion motion) {
   spec.restarts = true;
   spec.memory = 9;
   spec.looks_at_tactile = true;
-  return spec;
+  return with_friction(std::move(spec), friction);
 }
 
-std::unique_ptr<Task> make_insertion(const Scene& scene, InsertionMotion motion) {
-  return std::make_unique<Insertion>(scene, motion);
+std::unique_ptr<Task> make_insertion(const Scene& scene, InsertionMotion motion,
+                                     Friction friction) {
+  return std::make_unique<Insertion>(scene, motion, friction);
 }
 
 }  // namespace tangere

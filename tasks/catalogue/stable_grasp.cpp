@@ -49,11 +49,12 @@ Scene with_densities(Scene scene) {
 
 class StableGrasp : public Task {
  public:
-  explicit StableGrasp(const Scene& scene)
-      : Task(with_densities(scene), declare_stable_grasp()),
+  StableGrasp(const Scene& scene, Friction friction)
+      : Task(with_densities(scene), declare_stable_grasp(friction)),
         hand_(coordinate("hand_slide")),
         bar_(coordinate("bar")),
-        bar_v_(dof("bar")) {
+        bar_v_(dof("bar")),
+        gain_(friction == Friction::elastic ? kElasticGain : 1) {
     for (const SensorInfo& sensor : model().sensors())
       if (model().sensors().size() != kPads || sensor.rows != kRows || sensor.cols != kCols)
         throw InputError(model().scene().path + ": stable grasp needs two pads of 13 × 10 points");
@@ -176,7 +177,7 @@ class StableGrasp : public Task {
   /// Moves towards the heavier side. The bar slides and turns in the grip at rates proportional to
   /// its weight and its moment, and shear is proportional to a point's velocity. With v downward
   /// and ω about the grip, the centre of mass is ω/v Σ r²/n away, the mean over the points that
-  /// hold the bar.
+  /// hold the bar. Elastic friction shows how far it has slid and turned in the same way.
   void scripted(const TaskView&, std::span<const double> o,
                 std::span<double> action) const override {
     double weight = 0, moment = 0, square = 0;
@@ -197,14 +198,14 @@ class StableGrasp : public Task {
     }
     constexpr double kPoints = kPads * kRows * kCols;
     const double away = moment / square / (weight / kPoints) * kMeanSquare;
-    action[0] = std::isfinite(away) ? std::clamp(kGain * away / kReach, -1.0, 1.0) : 0;
+    action[0] = std::isfinite(away) ? std::clamp(gain_ * away / kReach, -1.0, 1.0) : 0;
   }
 
  private:
   static constexpr double kPitch = 1.5e-3;  // distance between neighbouring points of a pad [m]
   static constexpr double kMeanSquare =
-      0.4545 * 0.018 * 0.018;  // mean of r² over a pad's 33 contact points [m²]
-  static constexpr double kGain = 1;
+      0.4545 * 0.018 * 0.018;                  // mean of r² over a pad's 33 contact points [m²]
+  static constexpr double kElasticGain = 0.4;  // from a search; larger ones overshoot
 
   /// Where the current action grasps [m].
   static double place(const TaskView& view) {
@@ -221,11 +222,12 @@ class StableGrasp : public Task {
   }
 
   std::size_t hand_, bar_, bar_v_;
+  double gain_;  // share of the distance that the script moves
 };
 
 }  // namespace
 
-TaskSpec declare_stable_grasp() {
+TaskSpec declare_stable_grasp(Friction friction) {
   TaskSpec spec;
   spec.name = "stable_grasp";
   spec.summary =
@@ -252,11 +254,11 @@ TaskSpec declare_stable_grasp() {
   spec.settling_timestep = 0.05;
   spec.memory = 3;
   spec.looks_at_tactile = true;
-  return spec;
+  return with_friction(std::move(spec), friction);
 }
 
-std::unique_ptr<Task> make_stable_grasp(const Scene& scene) {
-  return std::make_unique<StableGrasp>(scene);
+std::unique_ptr<Task> make_stable_grasp(const Scene& scene, Friction friction) {
+  return std::make_unique<StableGrasp>(scene, friction);
 }
 
 }  // namespace tangere

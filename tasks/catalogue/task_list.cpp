@@ -12,10 +12,10 @@ namespace {
 using Entry = OwnTask;
 
 /// Entry of a task with variants; both functions receive `variant`.
-template <class Declare, class Make, class Variant>
-Entry entry(Declare declare, Make make, Variant variant) {
-  return {[=] { return declare(variant); },
-          [=](const Scene& scene) { return make(scene, variant); }};
+template <class Declare, class Make, class... Variant>
+Entry entry(Declare declare, Make make, Variant... variant) {
+  return {[=] { return declare(variant...); },
+          [=](const Scene& scene) { return make(scene, variant...); }};
 }
 
 std::vector<Entry>& entries() {
@@ -23,15 +23,19 @@ std::vector<Entry>& entries() {
   static std::vector<Entry> all{
       entry(declare_ball_rolling, make_ball_rolling, BallPad::large),
       entry(declare_ball_rolling, make_ball_rolling, BallPad::small),
-      {declare_stable_grasp, make_stable_grasp},
-      entry(declare_box_pushing, make_box_pushing, Push::tactile),
-      entry(declare_box_pushing, make_box_pushing, Push::privileged),
-      entry(declare_box_pushing, make_box_pushing, Push::reduced),
-      entry(declare_cap_opening, make_cap_opening, CapObservation::tactile),
-      entry(declare_cap_opening, make_cap_opening, CapObservation::blind),
-      entry(declare_insertion, make_insertion, InsertionMotion::both),
-      entry(declare_insertion, make_insertion, InsertionMotion::translation),
-      entry(declare_insertion, make_insertion, InsertionMotion::rotation),
+      entry(declare_stable_grasp, make_stable_grasp, Friction::viscous),
+      entry(declare_stable_grasp, make_stable_grasp, Friction::elastic),
+      entry(declare_box_pushing, make_box_pushing, Push::tactile, Friction::viscous),
+      entry(declare_box_pushing, make_box_pushing, Push::privileged, Friction::viscous),
+      entry(declare_box_pushing, make_box_pushing, Push::reduced, Friction::viscous),
+      entry(declare_box_pushing, make_box_pushing, Push::tactile, Friction::elastic),
+      entry(declare_cap_opening, make_cap_opening, CapObservation::tactile, Friction::viscous),
+      entry(declare_cap_opening, make_cap_opening, CapObservation::blind, Friction::viscous),
+      entry(declare_cap_opening, make_cap_opening, CapObservation::tactile, Friction::elastic),
+      entry(declare_insertion, make_insertion, InsertionMotion::both, Friction::viscous),
+      entry(declare_insertion, make_insertion, InsertionMotion::translation, Friction::viscous),
+      entry(declare_insertion, make_insertion, InsertionMotion::rotation, Friction::viscous),
+      entry(declare_insertion, make_insertion, InsertionMotion::both, Friction::elastic),
       {declare_dummy, make_dummy},
   };
   return all;
@@ -61,6 +65,14 @@ void add_task(const OwnTask& task) {
   const std::string name = task.declare().name;
   if (is_task(name)) throw InputError(fmt::format("there is a task named '{}' already", name));
   entries().push_back(task);
+}
+
+TaskSpec with_friction(TaskSpec spec, Friction friction) {
+  if (friction == Friction::viscous) return spec;
+  spec.name += "_elastic";
+  spec.scene = spec.name + ".xml";
+  spec.summary = "The same; contacts and skins keep their shear.";
+  return spec;
 }
 
 TaskSpec task_spec(const std::string& name) { return find(name).declare(); }

@@ -39,22 +39,30 @@ enum class BallPad { large, small };
 TaskSpec declare_ball_rolling(BallPad pad);
 std::unique_ptr<Task> make_ball_rolling(const Scene& scene, BallPad pad);
 
-TaskSpec declare_stable_grasp();
-std::unique_ptr<Task> make_stable_grasp(const Scene& scene);
+/// The friction of contacts and skins: the paper's dampers alone, or springs beside them (`ks`), on
+/// the scene NAME_elastic.xml.
+enum class Friction { viscous, elastic };
+/// Returns the declaration of a task with that friction.
+TaskSpec with_friction(TaskSpec spec, Friction friction);
+
+TaskSpec declare_stable_grasp(Friction friction);
+std::unique_ptr<Task> make_stable_grasp(const Scene& scene, Friction friction);
 
 /// What the task observes of the box besides the goal: touch, its pose, or nothing.
 enum class PushObservation { tactile, privileged, reduced };
-TaskSpec declare_box_pushing(PushObservation observation);
-std::unique_ptr<Task> make_box_pushing(const Scene& scene, PushObservation observation);
+TaskSpec declare_box_pushing(PushObservation observation, Friction friction);
+std::unique_ptr<Task> make_box_pushing(const Scene& scene, PushObservation observation,
+                                       Friction friction);
 
 /// What the task observes besides angles and fingertips: touch or nothing.
 enum class CapObservation { tactile, blind };
-TaskSpec declare_cap_opening(CapObservation observation);
-std::unique_ptr<Task> make_cap_opening(const Scene& scene, CapObservation observation);
+TaskSpec declare_cap_opening(CapObservation observation, Friction friction);
+std::unique_ptr<Task> make_cap_opening(const Scene& scene, CapObservation observation,
+                                       Friction friction);
 
 /// Which components are off at the start and corrected by actions.
 enum class InsertionMotion { both, translation, rotation };
-TaskSpec declare_insertion(InsertionMotion motion);
-std::unique_ptr<Task> make_insertion(const Scene& scene, InsertionMotion motion);
+TaskSpec declare_insertion(InsertionMotion motion, Friction friction);
+std::unique_ptr<Task> make_insertion(const Scene& scene, InsertionMotion motion, Friction friction);
 
 }  // namespace tangere

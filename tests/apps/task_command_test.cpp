@@ -49,6 +49,18 @@ TEST(Tasks, GenerateStoresRewardsAndEnds) {
   EXPECT_NEAR(answer.at("mean_return"), mean, 1e-9 * std::abs(mean));
 }
 
+TEST(Tasks, GenerateStoresASkinThatRemembers) {
+  const Folder folder;
+  const json answer =
+      run_json(folder, {"generate", "insertion_elastic", "-o", "set", "--episodes", "2"});
+  EXPECT_EQ(answer.at("task"), "insertion_elastic");
+  const std::string shard = folder.path("set/shard-00000.h5");
+  EXPECT_EQ(check_shard(shard).rows, answer.at("rows"));
+  const h5::Id file = h5::open_file(shard);
+  EXPECT_EQ(h5::dimensions(h5::open_dataset(file, "data/demo_0/obs/flow")).at(2), 13U);
+  EXPECT_THAT(h5::read_text(h5::open_group(file, "scene"), "text"), HasSubstr("ks=\"62.5\""));
+}
+
 TEST(Tasks, GenerateWritesTheSameBytesOnAnyNumberOfThreads) {
   const Folder folder;
   for (const char* threads : {"1", "3"})

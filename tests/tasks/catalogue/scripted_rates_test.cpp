@@ -23,9 +23,10 @@ int episodes() {
 
 /// `documented`: the rate in docs/tasks.md. The measured rate is at least that, less half of its 95
 /// % interval. `failed`: simulations without a solution, flagged by their status (docs/tasks.md).
-void expect_solved(const std::string& name, double documented, int failed = 0) {
+/// `share`: one of so many episodes is played.
+void expect_solved(const std::string& name, double documented, int failed = 0, int share = 1) {
   const auto task = task_named(name);
-  const int count = episodes();
+  const int count = episodes() / share;
   const Played scripted = play_episodes(*task, PolicyKind::scripted, count);
   const double half_width = 1.96 * std::sqrt(documented * (1 - documented) / count);
   EXPECT_GE(scripted.rate(), documented - half_width) << name;
@@ -42,6 +43,12 @@ TEST(Scripted, MovesTheBoxIntoTheHole) { expect_solved("insertion_translation", 
 TEST(Scripted, InsertsTheBox) { expect_solved("insertion", 0.809); }
 TEST(Scripted, OpensTheCap) { expect_solved("cap_opening_blind", 0.969); }
 TEST(Scripted, PushesTheBox) { expect_solved("box_pushing_privileged", 0.763, 1); }
+
+// Friction that remembers.
+TEST(Scripted, GraspsTheBarElastically) { expect_solved("stable_grasp_elastic", 0.993, 0, 2); }
+TEST(Scripted, InsertsTheBoxElastically) { expect_solved("insertion_elastic", 0.789, 0, 2); }
+TEST(Scripted, OpensTheCapElastically) { expect_solved("cap_opening_elastic", 1, 0, 4); }
+TEST(Scripted, PushesTheBoxElastically) { expect_solved("box_pushing_elastic", 0.828, 1, 2); }
 
 }  // namespace
 }  // namespace tangere

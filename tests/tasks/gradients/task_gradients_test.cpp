@@ -66,20 +66,24 @@ TEST_P(TaskReturn, GradientsAgreeByThreeRoutes) {
   expect_agreement(check, 5e-6);
 }
 
-INSTANTIATE_TEST_SUITE_P(Tasks, TaskReturn,
-                         ::testing::Values(Checked{"dummy", PolicyKind::scripted, 40},
-                                           Checked{"ball_rolling_small", PolicyKind::scripted, 30},
-                                           Checked{"box_pushing", PolicyKind::scripted, 40},
-                                           Checked{"box_pushing_privileged", PolicyKind::random,
-                                                   20},
-                                           Checked{"box_pushing_reduced", PolicyKind::scripted, 20},
-                                           Checked{"cap_opening", PolicyKind::scripted, 20},
-                                           Checked{"cap_opening_blind", PolicyKind::random, 20},
-                                           Checked{"stable_grasp", PolicyKind::random, 2, 0, 3},
-                                           Checked{"insertion", PolicyKind::random, 3},
-                                           Checked{"insertion_translation", PolicyKind::random, 2},
-                                           Checked{"insertion_rotation", PolicyKind::random, 2, 1}),
-                         [](const auto& given) { return std::string(given.param.task); });
+INSTANTIATE_TEST_SUITE_P(
+    Tasks, TaskReturn,
+    ::testing::Values(Checked{"dummy", PolicyKind::scripted, 40},
+                      Checked{"ball_rolling_small", PolicyKind::scripted, 30},
+                      Checked{"box_pushing", PolicyKind::scripted, 40},
+                      Checked{"box_pushing_privileged", PolicyKind::random, 20},
+                      Checked{"box_pushing_reduced", PolicyKind::scripted, 20},
+                      Checked{"cap_opening", PolicyKind::scripted, 20},
+                      Checked{"cap_opening_blind", PolicyKind::random, 20},
+                      Checked{"stable_grasp", PolicyKind::random, 2, 0, 3},
+                      Checked{"insertion", PolicyKind::random, 3},
+                      Checked{"insertion_translation", PolicyKind::random, 2},
+                      Checked{"insertion_rotation", PolicyKind::random, 2, 1},
+                      Checked{"box_pushing_elastic", PolicyKind::scripted, 20},
+                      Checked{"cap_opening_elastic", PolicyKind::scripted, 10},
+                      Checked{"stable_grasp_elastic", PolicyKind::random, 2, 0, 3},
+                      Checked{"insertion_elastic", PolicyKind::random, 2}),
+    [](const auto& given) { return std::string(given.param.task); });
 
 /// A task that looks at everything possible, at two moments, and restarts from the place that it
 /// remembers.

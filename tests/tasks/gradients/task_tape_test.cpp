@@ -115,7 +115,7 @@ TEST_P(EveryTape, GoingBackIsTheTransposeOfGoingForward) {
     tape.reset(kTapeSeed, episode);
     q.assign(tape.q().begin(), tape.q().end());
     v.assign(tape.v().begin(), tape.v().end());
-    if (std::string(name) == "stable_grasp")
+    if (std::string(name).starts_with("stable_grasp"))
       for (const auto& [dof, by] : {std::pair{6, 2e-4}, std::pair{7, 3e-4}, std::pair{11, 4e-3}})
         displace(task->model(), q, dof, by);
     tape.displace(0, q, v);
@@ -190,7 +190,8 @@ INSTANTIATE_TEST_SUITE_P(
                       TapeCase{"box_pushing_reduced", 12}, TapeCase{"cap_opening", 8},
                       TapeCase{"cap_opening_blind", 8}, TapeCase{"stable_grasp", 2},
                       TapeCase{"insertion", 3}, TapeCase{"insertion_translation", 2},
-                      TapeCase{"insertion_rotation", 2}),
+                      TapeCase{"insertion_rotation", 2}, TapeCase{"box_pushing_elastic", 12},
+                      TapeCase{"stable_grasp_elastic", 2}, TapeCase{"insertion_elastic", 2}),
     [](const auto& given) { return std::string(given.param.task); });
 
 }  // namespace
