@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// tangere plot: draws tactile fields of a trajectory file.
+// tangere plot: draws tactile fields of a trajectory file, or a scene at its start.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
 
 #include "apps/arguments.hpp"
 #include "apps/command.hpp"
+#include "apps/scene_run.hpp"
 #include "io/files/part_file.hpp"
+#include "io/picture/scene_plot.hpp"
 #include "io/picture/tactile_plot.hpp"
 
 namespace tangere::apps {
@@ -19,12 +22,46 @@ constexpr int kMostFrames = 1000;  // in a strip; each is a panel of its own
 struct PlotArguments {
   std::string input, output, sensor;
   std::optional<std::int64_t> environment, frame;
-  std::optional<int> strip;
+  std::optional<int> strip, turn, lift;
   bool overwrite = false;
 };
 
-int plot(const PlotArguments& options, const Console& console) {
+bool is_scene(const std::string& path) { return std::filesystem::path(path).extension() == ".xml"; }
+
+/// Refuses options of the other kind of picture.
+void check_arguments(const PlotArguments& options) {
   check_not_same_file(options.output, options.input);
+  const bool of_fields =
+                 !options.sensor.empty() || options.environment || options.frame || options.strip,
+             of_scene = options.turn || options.lift;
+  if (is_scene(options.input) && of_fields)
+    throw InputError("--sensor, --env, --frame and --strip with a scene; expected a trajectory");
+  if (!is_scene(options.input) && of_scene)
+    throw InputError("--turn or --lift with a trajectory; expected a scene, F.xml");
+}
+
+int plot_scene(const PlotArguments& options, const Console& console) {
+  const Scene scene = read_scene_for(options.input, false, console);
+  SceneCamera camera;
+  if (options.turn) camera.turn = *options.turn;
+  if (options.lift) camera.lift = *options.lift;
+  const std::string svg = render_scene_svg(scene, camera);
+  write_text_atomically(options.output, svg, options.overwrite);
+  console.print(
+      fmt::format("wrote {} ({} bytes): the scene at its start", options.output, svg.size()));
+  console.result({{"command", "plot"},
+                  {"exit_code", 0},
+                  {"input", options.input},
+                  {"output", options.output},
+                  {"bytes", svg.size()},
+                  {"turn", camera.turn},
+                  {"lift", camera.lift}});
+  return kDone;
+}
+
+int plot(const PlotArguments& options, const Console& console) {
+  check_arguments(options);
+  if (is_scene(options.input)) return plot_scene(options, console);
   PlotOptions what;
   what.sensor = options.sensor;
   what.environment = options.environment.value_or(0);
@@ -58,9 +95,12 @@ Command add_plot(CLI::App& program) {
   const auto console = std::make_shared<Console>();
   PlotArguments& o = *options;
   constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
-  CLI::App& app = add_command(program, "plot", "Draw tactile fields of a trajectory as SVG",
-                              "tangere plot ball.h5 -o ball.svg --sensor pad --env 2 --strip 4");
-  add_text(app, "FILE", o.input, "", "HDF5 file written by 'tangere simulate'").required();
+  CLI::App& app =
+      add_command(program, "plot", "Draw tactile fields of a trajectory, or a scene, as SVG",
+                  "tangere plot ball.h5 -o ball.svg --sensor pad --env 2 --strip 4");
+  add_text(app, "FILE", o.input, "",
+           "HDF5 file written by 'tangere simulate', or a scene file F.xml")
+      .required();
   add_text(app, "-o,--output", o.output, "F.svg", "SVG file to write").required();
   add_text(app, "--sensor", o.sensor, "NAME",
            "Tactile sensor, a rectangular array or one with an image [default: the first by name]");
@@ -71,6 +111,10 @@ Command add_plot(CLI::App& program) {
   add_whole_number<int>(app, "--strip", o.strip, 1, kMostFrames,
                         "Most frames in a row, spread over those with contact [default: 6]")
       .excludes(frame);
+  add_whole_number<int>(app, "--turn", o.turn, -360, 360,
+                        "Of a scene: degrees about z from which it is seen [default: 30]");
+  add_whole_number<int>(app, "--lift", o.lift, -90, 90,
+                        "Of a scene: degrees above the horizon [default: 25]");
   add_flag(app, "--overwrite", o.overwrite, "Replace the output if it exists");
   add_console_options(app, *console);
   return {&app, [=](const ProgramInfo&) { return plot(*options, *console); }, [] { return true; }};

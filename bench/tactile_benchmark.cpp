@@ -20,6 +20,7 @@
 #include "engine/step/stepper.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "kernels/contact/pair_contact.hpp"
+#include "kernels/numbers/so3.hpp"
 #include "kernels/table/isa.hpp"
 #include "kernels/table/kernel_table.hpp"
 
@@ -38,6 +39,41 @@ Model pad_model(int resolution) {
   Scene scene = read_scene(TANGERE_SOURCE_DIR "/scenes/rolling_ball.xml").scene;
   scene.sensors[0].array.rows = scene.sensors[0].array.cols = resolution;
   return Model(scene);
+}
+
+/// A ball of triangles between circles around z.
+MeshShape ball_of_triangles(double radius, int around) {
+  MeshShape mesh;
+  mesh.vertices = {0, 0, -radius, 0, 0, radius};
+  const int rings = around / 2 - 1;
+  const auto vertex = [&](int ring, int k) { return 2 + ring * around + k % around; };
+  for (int i = 0; i < rings; ++i)
+    for (int k = 0; k < around; ++k) {
+      const double polar = M_PI * (i + 1) / (rings + 1), turn = 2 * M_PI * k / around;
+      mesh.vertices.insert(mesh.vertices.end(),
+                           {radius * std::sin(polar) * std::cos(turn),
+                            radius * std::sin(polar) * std::sin(turn), -radius * std::cos(polar)});
+    }
+  for (int k = 0; k < around; ++k) {
+    mesh.triangles.push_back({0, vertex(0, k + 1), vertex(0, k)});
+    mesh.triangles.push_back({1, vertex(rings - 1, k), vertex(rings - 1, k + 1)});
+    for (int i = 0; i + 1 < rings; ++i) {
+      mesh.triangles.push_back({vertex(i, k), vertex(i, k + 1), vertex(i + 1, k + 1)});
+      mesh.triangles.push_back({vertex(i, k), vertex(i + 1, k + 1), vertex(i + 1, k)});
+    }
+  }
+  return mesh;
+}
+
+/// The pad's scene with such a ball: 64 cells along it.
+const Model& mesh_model() {
+  static const Model model = [] {
+    Scene scene = pad_model(200).scene();
+    for (LinkDescription& link : scene.links)
+      if (link.body.name == "ball") link.body.shape = ball_of_triangles(0.02, 64);
+    return Model(scene);
+  }();
+  return model;
 }
 
 /// A rolling ball whose lowest point is `depth` inside a pad of 5 × 5 cm.
@@ -61,6 +97,18 @@ const Press kNearby(0.02, -0.025);
 const Press kAway(0.02, -0.05);
 /// The ball of the scene at its greatest depth; it touches a 25th of the points.
 const Press kMiddle(0.02, 1e-3);
+
+/// The same ball as a mesh.
+Press mesh_in_middle() {
+  Press press = kMiddle;
+  const auto& bodies = compiled(mesh_model()).bodies;
+  const auto ball = std::find_if(bodies.begin(), bodies.end(),
+                                 [](const CompiledBody& b) { return b.grid != nullptr; });
+  press.shape = {PrimitiveShape::mesh, {1, 0, 0}, ball->grid};
+  const kernels::Vec3<double> axis = {0.36, 0.48, 0.8};  // no axis of the grid is one of the pad
+  press.touch.Q = kernels::to_matrix(kernels::quaternion_exp(axis));
+  return press;
+}
 
 int run(const kernels::TactileArgs<double>& a) { return kernels::active_kernels().tactile(a); }
 int run(const kernels::TactileArgs<float>& a) { return kernels::active_kernels().tactile_mixed(a); }
@@ -239,6 +287,8 @@ void BM_CompactDouble(benchmark::State& s) { field<double>(s, kEverywhere, 200, 
 void BM_CompactMixed(benchmark::State& s) { field<float>(s, kEverywhere, 200, false); }
 void BM_CulledDouble(benchmark::State& s) { field<double>(s, kMiddle, 200, true); }
 void BM_CulledMixed(benchmark::State& s) { field<float>(s, kMiddle, 200, true); }
+void BM_CulledMeshDouble(benchmark::State& s) { field<double>(s, mesh_in_middle(), 200, true); }
+void BM_CulledMeshMixed(benchmark::State& s) { field<float>(s, mesh_in_middle(), 200, true); }
 void BM_SmallPadDouble(benchmark::State& s) { field<double>(s, kMiddle, 20, true); }
 void BM_SmallPadMixed(benchmark::State& s) { field<float>(s, kMiddle, 20, true); }
 void BM_SmallPadAcrossEnvironmentsDouble(benchmark::State& s) { block<double>(s, 20); }
@@ -297,6 +347,8 @@ BENCHMARK(BM_CurvedDouble);
 BENCHMARK(BM_CurvedMixed);
 BENCHMARK(BM_CulledDouble);
 BENCHMARK(BM_CulledMixed);
+BENCHMARK(BM_CulledMeshDouble);
+BENCHMARK(BM_CulledMeshMixed);
 BENCHMARK(BM_SmallPadDouble);
 BENCHMARK(BM_SmallPadMixed);
 BENCHMARK(BM_SmallPadAcrossEnvironmentsDouble);

@@ -144,9 +144,9 @@ NumberGradients::Masses NumberGradients::masses_by(const SceneNumber& number, in
   const CompiledBody& at = compiled(model_).bodies[std::size_t(body)];
   if (number.field == Field::mass)
     return inertia_rows(at, {1, at.centre, kernels::zero33<double>()});
-  return inertia_rows(at, number.field == Field::density
-                              ? mass_properties(shape, 1)
-                              : mass_properties_by_size(shape, density, size_index(number)));
+  if (number.field == Field::density) return inertia_rows(at, mass_properties(shape, 1));
+  return inertia_slopes(at, mass_properties(shape, density),
+                        mass_properties_by_size(shape, density, size_index(number)));
 }
 
 NumberGradients::Masses NumberGradients::masses_by(std::size_t k, const Batch& batch,
@@ -154,7 +154,7 @@ NumberGradients::Masses NumberGradients::masses_by(std::size_t k, const Batch& b
   const Scene& scene = model_.scene();
   const int body = entries_[k].body;
   const BodyDescription& d = scene.links[std::size_t(body)].body;
-  std::optional<Shape> sized;  // a mesh, whose size cannot vary, is not copied
+  std::optional<Shape> sized;  // a mesh is copied only if its scale varies
   double density = d.density;
   for (std::size_t r = 0; r < scene.randomizations.size(); ++r) {  // the last one applies
     const SceneNumber& varied = scene.randomizations[r].number;

@@ -194,9 +194,7 @@ void update_derived_rows(const CompiledModel& m, double* column) {
     Shape shape = m.scene.links[std::size_t(size.body)].body.shape;
     for (const VaryingNumber& n : size.numbers)
       *size_number(shape, n.which) = column[n.row * kBlock];
-    CompiledBody body;
-    place_shape(shape, body);
-    put(size.row, body.size);
+    put(size.row, kernels_size(shape));
   }
   for (const VaryingPlace& place : m.varying_places) {
     Pose pose = m.scene.links[std::size_t(place.joint)].joint.pose;

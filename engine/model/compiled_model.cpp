@@ -127,12 +127,11 @@ class Compiler {
       const kernels::DistanceGrid& view = grid->view;
       m_.mesh_info.push_back({d.name,
                               {view.cells[0], view.cells[1], view.cells[2]},
-                              view.cell,
+                              mesh->scale * view.cell,
                               grid->bytes(),
-                              grid->fit.error,
+                              mesh->scale * grid->fit.error,
                               grid->fit.unresolved});
       m_.bodies[b].touchable = true;
-      m_.bodies[b].shape = PrimitiveShape::mesh;
       m_.bodies[b].grid = &view;
       m_.mesh_grids.push_back(std::move(grid));
     }
@@ -310,7 +309,7 @@ class Compiler {
       world.push_back(l.parent < 0 ? l.frame : compose(world[std::size_t(l.parent)], l.frame));
     for (const CompiledBody& b : m_.bodies) {
       const Frame<double> at = b.link < 0 ? b.frame : compose(world[std::size_t(b.link)], b.frame);
-      extent = std::max(extent, std::sqrt(dot(at.p, at.p)) + std::sqrt(dot(b.size, b.size)));
+      extent = std::max(extent, std::sqrt(dot(at.p, at.p)) + b.extent);
     }
     m_.fall_time =
         std::sqrt(extent / std::sqrt(dot(vec3_of(m_.scene.gravity), vec3_of(m_.scene.gravity))));

@@ -21,11 +21,12 @@ namespace tangere {
 struct CompiledBody {
   int link = -1;
   kernels::Frame<double> frame;  ///< body frame in the link (or the world)
-  /// Has a distance. If not, or if it is a mesh, size.x is the extent. A mesh has one if the scene
-  /// needs it: where something touches it, or where there are sensors that might.
+  /// Has a distance. A mesh has one if the scene needs it: where something touches it, or where
+  /// there are sensors that might.
   bool touchable = true;
   PrimitiveShape shape = PrimitiveShape::sphere;
   kernels::Vec3<double> size{};    ///< as in kernels::PairContact
+  double extent = 0;               ///< greatest distance of its points from its origin, about [m]
   kernels::Vec3<double> centre{};  ///< centre of mass, body frame [m]
   double mass = 0;                 ///< [kg]
   int size_row = -1;               ///< ≥ 0: size is read from three rows of the block instead
@@ -222,16 +223,21 @@ struct MassProperties {
 MassProperties mass_properties(const Shape& shape, double density);
 MassProperties mesh_mass(const MeshShape& mesh, double density);
 /// Derivative of the mass properties by a number of the shape's size (size_number). The shape must
-/// have that number. The centre of mass does not move.
+/// have that number.
 MassProperties mass_properties_by_size(const Shape& shape, double density, int which);
 /// Returns what a body with these properties adds to its link.
 InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& properties);
+/// Returns the derivative of that for a change `by` of the properties.
+InertiaRows inertia_slopes(const CompiledBody& body, const MassProperties& properties,
+                           const MassProperties& by);
 /// Returns the rows of a link's own inertia.
 InertiaRows inertia_rows(const kernels::Link& link);
 /// Adds a body to its link.
 void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProperties& properties);
 /// Sets shape and size of a body, and whether it can be touched. Meshes get their distance later.
 void place_shape(const Shape& shape, CompiledBody& body);
+/// Returns the size as in kernels::PairContact.
+kernels::Vec3<double> kernels_size(const Shape& shape);
 
 /// Returns the points of the body that meet other bodies, (n, 3) in its body frame; may be empty.
 std::vector<double> contact_points(const Shape& shape);

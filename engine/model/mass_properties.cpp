@@ -45,6 +45,19 @@ InertiaRows inertia_rows(const CompiledBody& body, const MassProperties& propert
   return inertia_rows(link);
 }
 
+InertiaRows inertia_slopes(const CompiledBody& body, const MassProperties& properties,
+                           const MassProperties& by) {
+  const kernels::Mat3<double>& R = body.frame.R;
+  const kernels::Vec3<double> centre = R * properties.centre + body.frame.p, moves = R * by.centre;
+  const kernels::Mat3<double> p = kernels::skew(centre), dp = kernels::skew(moves);
+  kernels::Link link{};
+  link.mass = by.mass;
+  link.moment = by.mass * centre + properties.mass * moves;
+  link.inertia = R * by.inertia * kernels::transpose(R) - by.mass * (p * p) -
+                 properties.mass * (p * dp + dp * p);
+  return inertia_rows(link);
+}
+
 void add_inertia(kernels::Link& link, const CompiledBody& body, const MassProperties& properties) {
   const kernels::Mat3<double>& R = body.frame.R;
   const kernels::Vec3<double> centre = R * properties.centre + body.frame.p;

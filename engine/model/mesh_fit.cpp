@@ -34,7 +34,7 @@ Triangle triangle_of(const MeshShape& mesh, const std::array<int, 3>& t) {
 }  // namespace
 
 MeshFit mesh_fit(const MeshShape& mesh, const kernels::DistanceGrid& grid) {
-  const kernels::MeshDistance<double> distance{&grid};
+  const auto distance = kernels::MeshDistance<double>::of({1, 1, 1}, &grid);
   double area = 0;
   for (const auto& t : mesh.triangles) area += triangle_of(mesh, t).area;
   if (!std::isfinite(area)) return {HUGE_VAL, 1};

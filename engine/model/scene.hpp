@@ -101,6 +101,7 @@ struct MeshShape {
   std::vector<double> contact_points = {};  ///< (n, 3), body frame [m]; empty: all vertices
   /// Cells of its distance along the longest side. 0: it has no distance, and nothing touches it.
   int resolution = 64;
+  double scale = 1;  ///< of all lengths above; what is above is at scale 1
 };
 /// A body given by its mass, inertia and contact points alone. It has no distance. Its centre of
 /// mass is the body frame's origin.
@@ -310,10 +311,11 @@ const char* law_name(ContactLaw law, double ramp);
 /// Returns "sphere", "cuboid" …
 const char* shape_name(const Shape& shape);
 
-/// Returns a number of a shape's size: 0 radius, 1 length, 2 … 4 lengths along the axes [m].
+/// Returns a number of a shape's size: 0 radius, 1 length, 2 … 4 lengths along the axes [m], 5
+/// scale of a mesh [1].
 /// nullptr where the shape has no such number.
 double* size_number(Shape& shape, int which);
-inline constexpr int kSizeIndices = 5;
+inline constexpr int kSizeIndices = 6;
 
 /// Whether contact points may touch the shape, and whether it has contact points itself.
 bool has_distance(const Shape& shape);

@@ -33,6 +33,7 @@ constexpr NumberKind kKinds[] = {
     {Owner::body, Field::radius, "radius", "m", nullptr, false},
     {Owner::body, Field::length, "length", "m", nullptr, false},
     {Owner::body, Field::size, "size", "m", nullptr, true},
+    {Owner::body, Field::scale, "scale", "1", nullptr, false},
     {Owner::joint, Field::q, "q", "m", "rad", true},
     {Owner::joint, Field::v, "v", "m/s", "rad/s", true},
     {Owner::joint, Field::pos, "pos", "m", nullptr, true},
@@ -152,6 +153,7 @@ const NumberKind& number_kind(NumberOwner owner, NumberField field) {
 }
 
 SceneNumber size_of_body(const std::string& body, int which) {
+  if (which == kScaleIndex) return {Owner::body, Field::scale, body};
   const int edge = std::max(0, which - from(Field::radius, Field::size));
   return {Owner::body, static_cast<Field>(static_cast<int>(Field::radius) + which - edge), body,
           edge};

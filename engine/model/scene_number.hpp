@@ -14,7 +14,7 @@ struct Scene;
 enum class NumberOwner { contact, ground, tactile, body, joint, motor };
 
 /// Some fields are counted from the first of their kind: effects of a joint from damping on,
-/// numbers of a size from radius on.
+/// numbers of a size from radius on, but for the scale of a mesh.
 enum class NumberField {
   kn,
   kt,
@@ -35,7 +35,8 @@ enum class NumberField {
   pos,
   q,
   v,
-  ks
+  ks,
+  scale
 };
 /// Returns how far a field is from the first of its kind.
 constexpr int from(NumberField first, NumberField field) {
@@ -76,10 +77,13 @@ constexpr NumberField coefficient_field(int k) {
 constexpr std::size_t coefficient_index(NumberField field) {
   return field == NumberField::ks ? 4 : static_cast<std::size_t>(from(NumberField::kn, field));
 }
+inline constexpr int kScaleIndex = 5;  ///< of the scale of a mesh in size_number()
 /// Returns number `which` of a body's size (size_number). size_index() is the inverse.
 SceneNumber size_of_body(const std::string& body, int which);
 inline int size_index(const SceneNumber& number) {
-  return from(NumberField::radius, number.field) + number.component;
+  return number.field == NumberField::scale
+             ? kScaleIndex
+             : from(NumberField::radius, number.field) + number.component;
 }
 /// Whether it is a number of the starting state.
 inline bool is_of_start(const SceneNumber& number) {

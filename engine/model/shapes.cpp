@@ -94,6 +94,21 @@ MassProperties mass_slope(const Shape& shape, double density, int which) {
   return centred({p.mass.epsilon, p.xx.epsilon, p.yy.epsilon, p.zz.epsilon});
 }
 
+/// Volume, its moment and its second moments grow with the third, fourth and fifth power.
+MassProperties scaled_mass(const Shape& shape, double density, double s, double by_mass,
+                           double by_centre, double by_inertia) {
+  const MassProperties one = mesh_mass(std::get<MeshShape>(shape), density);
+  return {by_mass * s * s * one.mass, by_centre * one.centre,
+          (by_inertia * s * s * s * s) * one.inertia};
+}
+MassProperties mesh_mass_of(const Shape& shape, double density) {
+  const double s = std::get<MeshShape>(shape).scale;
+  return scaled_mass(shape, density, s, s, s, s);
+}
+MassProperties mesh_mass_slope(const Shape& shape, double density, int) {
+  return scaled_mass(shape, density, std::get<MeshShape>(shape).scale, 3, 1, 5);
+}
+
 // --- contact points ---
 
 /// Returns the surface nodes of the grid.
@@ -157,6 +172,12 @@ std::vector<double> points_of(const EllipsoidShape& shape) {
   return points;
 }
 
+std::vector<double> points_of(const MeshShape& mesh) {
+  std::vector<double> points = mesh.contact_points.empty() ? mesh.vertices : mesh.contact_points;
+  for (double& x : points) x *= mesh.scale;
+  return points;
+}
+
 template <class S>
 std::vector<double> points_on(const Shape& shape) {
   return points_of(std::get<S>(shape));
@@ -188,6 +209,8 @@ template <int Axis>
 int* cuboid_nodes(Shape& shape) {
   return &std::get<CuboidShape>(shape).contact_resolution[Axis];
 }
+
+double* mesh_scale(Shape& shape) { return &std::get<MeshShape>(shape).scale; }
 
 /// Returns a size as three lengths along the body's axes.
 template <class S>
@@ -256,13 +279,10 @@ const std::vector<ShapeRow>& table() {
       {.name = "mesh",
        .make = make<MeshShape>,
        .distance = PrimitiveShape::mesh,
-       .mass = [](const Shape& s,
-                  double density) { return mesh_mass(std::get<MeshShape>(s), density); },
-       .points =
-           [](const Shape& s) {
-             const auto& mesh = std::get<MeshShape>(s);
-             return mesh.contact_points.empty() ? mesh.vertices : mesh.contact_points;
-           }},
+       .sizes = {{kScaleIndex, 0, 1, mesh_scale}},
+       .mass = mesh_mass_of,
+       .mass_by_size = mesh_mass_slope,
+       .points = points_on<MeshShape>},
       {.name = "abstract",
        .make = make<AbstractShape>,
        .mass =
@@ -356,18 +376,25 @@ std::vector<double> contact_points(const Shape& shape) {
   return row.points != nullptr ? row.points(shape) : std::vector<double>{};
 }
 
+kernels::Vec3<double> kernels_size(const Shape& shape) {
+  kernels::Vec3<double> size{};
+  for (const SizeNumber& s : row_of(shape).sizes)
+    (&size.x)[s.component] = s.scale * *s.at(const_cast<Shape&>(shape));  // only read
+  return size;
+}
+
 void place_shape(const Shape& shape, CompiledBody& body) {
   const ShapeRow& row = row_of(shape);
   body.touchable = row.distance.has_value() && row.distance != PrimitiveShape::mesh;
+  if (row.distance.has_value()) body.shape = *row.distance;
+  body.size = kernels_size(shape);
   if (body.touchable) {
-    body.shape = *row.distance;
-    Shape copy = shape;
-    for (const SizeNumber& s : row.sizes) (&body.size.x)[s.component] = s.scale * *s.at(copy);
+    body.extent = std::sqrt(dot(body.size, body.size));
     return;
   }
   const std::vector<double> p = contact_points(shape);
   for (std::size_t k = 0; k < p.size(); k += 3)
-    body.size.x = std::max(body.size.x, std::hypot(p[k], p[k + 1], p[k + 2]));
+    body.extent = std::max(body.extent, std::hypot(p[k], p[k + 1], p[k + 2]));
 }
 
 kernels::Solid solid_of(const Shape& shape, const CompiledBody& body) {
@@ -375,7 +402,8 @@ kernels::Solid solid_of(const Shape& shape, const CompiledBody& body) {
 }
 
 bool is_convex(const Shape& shape) {
-  return row_of(shape).stretches() && row_of(shape).distance.has_value();
+  return row_of(shape).stretches() && row_of(shape).distance.has_value() &&
+         !std::holds_alternative<MeshShape>(shape);
 }
 
 kernels::Hull hull_of(const CompiledBody& body) {
@@ -398,9 +426,9 @@ kernels::Hull hull_of(const CompiledBody& body) {
 }
 
 std::array<double, 3> widths(const Shape& shape) {
-  if (!has_distance(shape) || row_of(shape).sizes.empty()) return {0, 0, 0};
   CompiledBody body;
   place_shape(shape, body);
+  if (!body.touchable) return {0, 0, 0};
   const kernels::Hull hull = hull_of(body);
   const kernels::Vec3<double> half = hull.straight + hull.round;
   return {2 * half.x, 2 * half.y, 2 * half.z};

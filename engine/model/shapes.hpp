@@ -21,7 +21,7 @@ struct MassProperties;  // engine/model/compiled_model.hpp
 struct SizeNumber {
   int which, component;
   double scale;
-  double* (*at)(Shape& shape);  ///< [m]
+  double* (*at)(Shape& shape);  ///< [m]; scale of a mesh: [1]
 };
 
 /// Integers that determine how many contact points a shape has.
@@ -39,8 +39,7 @@ struct ShapeRow {
   std::vector<SizeNumber> sizes = {};  ///< in the order in which scene files are read
   std::vector<PointCounts> counts = {};
   MassProperties (*mass)(const Shape& shape, double density) = nullptr;  ///< nullptr: massless
-  /// Derivative by number `which` of the size. The centre of mass does not move. nullptr: it has no
-  /// size.
+  /// Derivative by number `which` of the size; nullptr: it has no size.
   MassProperties (*mass_by_size)(const Shape& shape, double density, int which) = nullptr;
   /// Contact points, body frame, (n, 3); nullptr: it has none.
   std::vector<double> (*points)(const Shape& shape) = nullptr;

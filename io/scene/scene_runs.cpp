@@ -176,13 +176,13 @@ void read_body_variation(const Scene& scene, const SceneNode& node, Randomizatio
   const BodyDescription& body = scene.links[std::size_t(find_body(scene, node, "name"))].body;
   if (node.has("field") == node.has("size"))
     node.fail("expected exactly one of field and size (the index of an edge)");
-  constexpr NumberField kFields[] = {NumberField::radius, NumberField::length,
-                                     NumberField::density};
+  constexpr NumberField kFields[] = {NumberField::radius, NumberField::length, NumberField::density,
+                                     NumberField::scale};
   d.number = {NumberOwner::body, NumberField::size, body.name};
   if (node.has("size")) {
     d.number.component = node.integer("size", 0, 2);
   } else {
-    d.number.field = kFields[node.choice("field", {"radius", "length", "density"})];
+    d.number.field = kFields[node.choice("field", {"radius", "length", "density", "scale"})];
   }
   if (d.number.field != NumberField::density) {
     Shape shape = body.shape;

@@ -59,8 +59,10 @@ struct ShapeOf {
     std::vector<std::int32_t> corners;
     for (const auto& triangle : s.triangles)
       corners.insert(corners.end(), triangle.begin(), triangle.end());
+    std::vector<double> vertices = s.vertices;
+    for (double& x : vertices) x *= s.scale;
     return {
-        {"kind", "mesh"}, {"vertices", packed(single(s.vertices))}, {"triangles", packed(corners)}};
+        {"kind", "mesh"}, {"vertices", packed(single(vertices))}, {"triangles", packed(corners)}};
   }
   Json operator()(const AbstractShape& s) const {
     return {{"kind", "abstract"}, {"points", packed(single(s.contact_points))}};

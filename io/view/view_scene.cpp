@@ -26,7 +26,7 @@ constexpr int kMostCells = 48;  // along one side of a map: 1000 frames of a sen
 std::vector<SceneNumber> geometry_of(const Scene& scene) {
   std::vector<SceneNumber> numbers;
   for (const LinkDescription& link : scene.links) {
-    for (const NumberField field : {NumberField::radius, NumberField::length})
+    for (const NumberField field : {NumberField::radius, NumberField::length, NumberField::scale})
       numbers.push_back({NumberOwner::body, field, link.body.name});
     for (int k = 0; k < 3; ++k) {
       numbers.push_back({NumberOwner::body, NumberField::size, link.body.name, k});

@@ -63,11 +63,12 @@ Vec3<N> bend(const PointContact<N>& p, const Vec3<N>& n_bar) {
 }
 
 /// Cotangents of the places of a point and a shape: ρ̄ is that of ρ₂, through which d and n depend
-/// on the shape's place, and x̄ is that of x₂ at fixed d and n. If the point moves instead of the
-/// shape, ξ̄ = x̄ - ρ̄.
+/// on the shape's place, d̄ its part through d, and x̄ is that of x₂ at fixed d and n. If the point
+/// moves instead of the shape, ξ̄ = x̄ - ρ̄.
 template <class N>
 struct PlaceCotangent {
   Vec3<N> x, rho;
+  N d;
 };
 
 /// Adds one point's share of the motion's cotangents. f̄ is zero where nothing touches.
@@ -90,24 +91,28 @@ PlaceCotangent<N> pull_back_motion(const LawParameters<N>& law, const PointConta
   }
   out.displacement.a += cross(p.x2, rho) + cross(p.n, turned);
   out.displacement.l += rho;
-  return {x_bar, rho};
+  return {x_bar, rho, -minus_d_bar};
 }
 
-/// Returns what a cotangent x̄ of x₂ = ξ - d n contributes alone: x̄ and ρ̄ = n (n·x̄) + d H x̄.
+/// Returns what a cotangent x̄ of x₂ = ξ - d n contributes alone: x̄, ρ̄ = n (n·x̄) + d H x̄ and
+/// d̄ = -n·x̄.
 template <class Shape, class N>
 PlaceCotangent<N> pull_back_place(const PointContact<N>& p, const Vec3<N>& x_bar) {
-  Vec3<N> rho = dot(p.n, x_bar) * p.n;
+  const N along = dot(p.n, x_bar);
+  Vec3<N> rho = along * p.n;
   if constexpr (Shape::kBending != Bending::flat) rho += p.d * bend<Shape>(p, x_bar);
-  return {x_bar, rho};
+  return {x_bar, rho, -along};
 }
 
-/// Returns the cotangent of a shape's size from that of ρ₂. y: the point in the shape's axes, which
-/// are the columns of Q.
+/// Returns the cotangent of a shape's size from those of its place and of d. Q: the shape's axes in
+/// its columns.
 template <class Shape, class N>
 Vec3<N> pull_back_size(const Shape& shape, const PointContact<N>& p, const Mat3<N>& Q,
-                       const Vec3<N>& c, const Vec3<N>& xi, const Vec3<N>& rho) {
+                       const Vec3<N>& c, const Vec3<N>& xi, const Vec3<N>& rho, const N& d_bar) {
   if constexpr (Shape::kBending == Bending::ball) {  // the same in any axes
     return shape.size_share(xi, p.n, rho);
+  } else if constexpr (requires { shape.size_share(xi, p.d, rho, d_bar); }) {
+    return shape.size_share(transposed_times(Q, xi - c), p.d, transposed_times(Q, rho), d_bar);
   } else {
     return shape.size_share(transposed_times(Q, xi - c), transposed_times(Q, p.n),
                             transposed_times(Q, rho));

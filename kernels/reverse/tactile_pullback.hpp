@@ -123,7 +123,7 @@ void pull_back_points(const PadTiles& pad, int tile, int k, const double* field,
   const Vec3<N> f_bar = select(touching, N(1.0), N(0.0)) * force_cotangent<A>(pad, tile, k, field);
   const PlaceCotangent<N> place = pull_back_motion<Shape>(law, p, m.omega, f_bar, sums);
   if constexpr (!OfLaw) return;
-  sums.size += pull_back_size(shape, p, m.Q, m.c, xi, place.rho);
+  sums.size += pull_back_size(shape, p, m.Q, m.c, xi, place.rho, place.d);
   Coefficients<N> of_law = {N(0.0), N(0.0), N(0.0), N(0.0)};
   pull_back_law(law, p, f_bar, of_law);
   if (own != nullptr) add_to_points<A>(place, of_law, own + k);

@@ -244,11 +244,28 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"controls_endless", simulate({"--controls", "/dev/zero"}), 3,
                 "/dev/zero: is a device; expected a csv file"},
         Mistake{"plot_missing", {"plot", "nowhere.h5", "-o", "x.svg"}, 3, "nowhere.h5"},
-        Mistake{"plot_no_trajectory",
-                {"plot", scene("rolling_ball_small.xml"), "-o", "x.svg"},
-                3,
-                "rolling_ball_small.xml"}),
+        Mistake{"plot_no_trajectory", {"plot", scene("README.md"), "-o", "x.svg"}, 3, "README.md"},
+        Mistake{"plot_scene_of_a_sensor",
+                {"plot", scene("rolling_ball_small.xml"), "-o", "x.svg", "--sensor", "pad"},
+                2,
+                "with a scene; expected a trajectory"},
+        Mistake{"plot_fields_from_a_side",
+                {"plot", "run.h5", "-o", "x.svg", "--turn", "5"},
+                2,
+                "expected a scene, F.xml"}),
     [](const auto& test) { return test.param.name; });
+
+TEST(Command, ASceneIsDrawnAtItsStart) {
+  const Folder folder;
+  const Outcome drawn =
+      run(folder, {"plot", scene("box_pushing.xml"), "-o", "box.svg", "--turn", "-40", "--json"});
+  EXPECT_EQ(drawn.exit_code, 0) << drawn.err;
+  const json answer = json::parse(drawn.out);
+  EXPECT_EQ(answer.at("turn"), -40);
+  EXPECT_EQ(answer.at("lift"), 25);
+  EXPECT_EQ(answer.at("bytes"), folder.read("box.svg").size());
+  EXPECT_THAT(folder.read("box.svg"), HasSubstr("</svg>"));
+}
 
 TEST(Command, NothingToDoIsAMistake) {
   const Folder folder;

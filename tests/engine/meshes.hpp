@@ -2,6 +2,7 @@
 // Closed meshes of shapes whose distance is known.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -119,6 +120,53 @@ inline MeshShape capsule_mesh(double radius, double half, int around) {
     }
   }
   return mesh;
+}
+
+/// A plate with a square hole along z, by half widths.
+inline MeshShape frame_mesh(double outer, double inner, double height) {
+  MeshShape mesh;
+  for (const double z : {-height, height})
+    for (const double r : {outer, inner})
+      for (const auto& [x, y] : {std::pair{-r, -r}, {r, -r}, {r, r}, {-r, r}})
+        mesh.vertices.insert(mesh.vertices.end(), {x, y, z});
+  const auto quad = [&](int a, int b, int c, int d) {
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  };
+  for (int k = 0; k < 4; ++k) {  // 0 … 3 outer and 4 … 7 inner below, 8 … above
+    const int n = (k + 1) % 4;
+    quad(k, n, 8 + n, 8 + k);            // outside
+    quad(4 + n, 4 + k, 12 + k, 12 + n);  // the hole
+    quad(8 + k, 8 + n, 12 + n, 12 + k);  // above
+    quad(n, k, 4 + k, 4 + n);            // below
+  }
+  return mesh;
+}
+
+/// Makes meshes of a scene's ellipsoids and spheres.
+inline Scene with_meshes(Scene s) {
+  for (LinkDescription& link : s.links) {
+    MeshShape mesh;
+    if (const auto* ball = std::get_if<SphereShape>(&link.body.shape)) {
+      mesh = ellipsoid_mesh(1, {ball->radius, ball->radius, ball->radius});
+    } else if (const auto* e = std::get_if<EllipsoidShape>(&link.body.shape)) {
+      mesh = ellipsoid_mesh(1, {e->size[0] / 2, e->size[1] / 2, e->size[2] / 2});
+    } else {
+      continue;
+    }
+    mesh.resolution = 12;
+    link.body.shape = mesh;
+  }
+  // Points of a body that was a ball touch now, too: contacts that were left out stay left out.
+  return s;
+}
+/// Whether something touches a mesh.
+inline bool has_mesh(const Scene& s) {
+  return std::any_of(s.pair_contacts.begin(), s.pair_contacts.end(), [&](const auto& c) {
+    return std::any_of(s.links.begin(), s.links.end(), [&](const LinkDescription& l) {
+      return l.body.name == c.primitive_body && std::holds_alternative<MeshShape>(l.body.shape);
+    });
+  });
 }
 
 }  // namespace tangere::testing

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A closed mesh, by the spline of its distance (spline.hpp): d = φ, n = ∇φ, H = ∇∇φ. |n| is
-// 1 up to the error of the spline. It falls below 1 where the nearest place of the surface jumps:
-// at edges from inside, and deep within. Every formula of contact takes n as the gradient that it
-// is, so forces and their derivatives agree there as well.
+// A closed mesh of scale s, by the spline φ of its distance at scale 1 (spline.hpp): with x = y/s,
+//   d = s φ(x);  n = ∇φ(x);  H = ∇∇φ(x)/s;  ∂d/∂s = (d - n·y)/s;  ∂n/∂s = -H y/s
+// |n| is 1 up to the error of the spline. It falls below 1 where the nearest place of the surface
+// jumps: at edges from inside, and deep within. Every formula of contact takes n as the gradient
+// that it is, so forces and their derivatives agree there as well.
 //
 // Beyond the grid, nothing touches. There d is that of the tangent plane at the nearest place of
 // the grid, and H = 0.
@@ -10,6 +11,7 @@
 
 #include "kernels/contact/shapes/shape.hpp"
 #include "kernels/contact/shapes/spline.hpp"
+#include "kernels/contact/shapes/spline_f32.hpp"
 
 namespace tangere::kernels {
 
@@ -38,8 +40,9 @@ Vec3<N> in_cells(const DistanceGrid& g, const Vec3<N>& y) {
           (y.z - N(g.origin[2])) * inverse};
 }
 
-/// Whether a place may be nearer than m to a mesh: not beyond m of the box of what touches, and not
-/// where φ is more than it can fall on the way. Also true for slightly larger distances.
+/// Whether a place may be nearer than m to a mesh of scale 1: not beyond m of the box of what
+/// touches, and not where φ is more than it can fall on the way. Also true for slightly larger
+/// distances.
 template <class N>
 auto near_mesh(const DistanceGrid& g, const Vec3<N>& y, const N& m) {
   const N zero(0.0);
@@ -72,54 +75,69 @@ struct MeshDistance {
   template <class P>
   using Pad = MeshPad<P>;
   const DistanceGrid* grid;
+  N scale, inverse;
 
-  static MeshDistance of(const Vec3<N>&, const DistanceGrid* grid) { return {grid}; }
+  static MeshDistance of(const Vec3<N>& size, const DistanceGrid* grid) {
+    return {grid, size.x, N(1.0) / size.x};
+  }
 
   Distance<N> evaluate(const Vec3<N>& y) const {
     SplineValue<N, 1> phi;
-    return value_at<1>(y, phi);
+    return value_at<1>(inverse * y, phi);
   }
   /// Returns H as well.
   Distance<N> evaluate(const Vec3<N>& y, Mat3<N>& H) const {
     SplineValue<N, 2> phi;
-    const Distance<N> at = value_at<2>(y, phi);
-    const N scale = select(outside(y), N(0.0), N(1 / (grid->cell * grid->cell)));
+    const Vec3<N> x = inverse * y;
+    const Distance<N> at = value_at<2>(x, phi);
+    const N slope = select(outside(x), N(0.0), N(1 / (grid->cell * grid->cell)) * inverse);
     constexpr int kEntry[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
     for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) H.m[i][j] = scale * phi.second[kEntry[i][j]];
+      for (int j = 0; j < 3; ++j) H.m[i][j] = slope * phi.second[kEntry[i][j]];
     return at;
   }
-  /// A mesh has no numbers of a size.
-  Vec3<N> size_share(const Vec3<N>&, const Vec3<N>&, const Vec3<N>&) const { return zero3<N>(); }
+  /// The cotangent of the scale from those of the shape's place, ρ̄ = -d̄ n - H n̄, and of d, d̄.
+  Vec3<N> size_share(const Vec3<N>& y, const N& d, const Vec3<N>& rho, const N& d_bar) const {
+    return {inverse * mul_add(d_bar, d, dot(y, rho)), N(0.0), N(0.0)};
+  }
+
+  static Vec3<N> stretched(const Vec3<N>& to, const Vec3<double>& from, const Vec3<double>& y) {
+    return to.x * Vec3<N>{N(y.x / from.x), N(y.y / from.x), N(y.z / from.x)};
+  }
+  static Vec3<N> stretch_share(const Vec3<double>& size, const Vec3<N>& y, const Vec3<N>& bar) {
+    return {N(1 / size.x) * dot(y, bar), N(0.0), N(0.0)};
+  }
 
  private:
-  auto outside(const Vec3<N>& y) const {
-    const Vec3<N> U = in_cells(*grid, y);
+  auto outside(const Vec3<N>& x) const {
+    const Vec3<N> U = in_cells(*grid, x);
     const N* u = &U.x;
     const auto beyond = [&](int k) { return (u[k] < N(0.0)) | (u[k] > N(double(grid->cells[k]))); };
     return beyond(0) | beyond(1) | beyond(2);
   }
+  /// Leaves the spline at x in `phi`, and returns d and n.
   template <int Order>
-  Distance<N> value_at(const Vec3<N>& y, SplineValue<N, Order>& phi) const {
-    const Vec3<N> U = in_cells(*grid, y);
+  Distance<N> value_at(const Vec3<N>& x, SplineValue<N, Order>& phi) const {
+    const Vec3<N> U = in_cells(*grid, x);
     Vec3<N> clamped;
     const GridPlace<N> at = place_in_grid(*grid, U, clamped);
     spline_at(*grid, at, phi);
     const N slope(1 / grid->cell);
-    Distance<N> inside = {
-        phi.value, {slope * phi.gradient[0], slope * phi.gradient[1], slope * phi.gradient[2]}};
-    const auto beyond = outside(y);
+    const Distance<N> inside = {
+        scale * phi.value,
+        {slope * phi.gradient[0], slope * phi.gradient[1], slope * phi.gradient[2]}};
+    const auto beyond = outside(x);
     if (!any(beyond)) return inside;
     const Vec3<N> way = phi.value * inside.n + N(grid->cell) * (U - clamped);
-    const N square = select(beyond, dot(way, way), N(1.0)), inverse = inverse_sqrt(square);
-    return {select(beyond, root_of(square, inverse), inside.d),
-            select(beyond, inverse * way, inside.n)};
+    const N square = select(beyond, dot(way, way), N(1.0)), one_over = inverse_sqrt(square);
+    return {select(beyond, scale * root_of(square, one_over), inside.d),
+            select(beyond, one_over * way, inside.n)};
   }
 };
 
 template <class N>
 auto nearer_than(const MeshDistance<N>& shape, const Vec3<N>& y, const N& m) {
-  return near_mesh(*shape.grid, y, m);
+  return near_mesh(*shape.grid, shape.inverse * y, shape.inverse * m);
 }
 
 /// Under a pad, a tile's centre is split into a cell, which is a whole number, and what is left.
@@ -132,22 +150,24 @@ struct MeshPad {
   static constexpr int kRows = 9;  // whole cells, what is left, u
 
   const DistanceGrid* grid;
+  double scale;
   Mat3<N> Q;
   Vec3<N> whole, rest;
   Vec3<N> u;
 
-  MeshPad(const TouchShape& s, const Mat3<N>& pose) : grid(s.grid), Q(pose) {}
+  MeshPad(const TouchShape& s, const Mat3<N>& pose) : grid(s.grid), scale(s.size[0]), Q(pose) {}
 
   template <class D>
   static D bracket(const TouchShape& s, const Touch<D>& at, const Vec3<D>& t, const D& reach,
                    D* row) {
-    const Vec3<D> y = transposed_times(at.Q, t - at.c), U = in_cells(*s.grid, y);
+    const D inverse(1 / s.size[0]);
+    const Vec3<D> x = inverse * transposed_times(at.Q, t - at.c), U = in_cells(*s.grid, x);
     const D* from = &U.x;
     for (int k = 0; k < 3; ++k) {
       row[k] = round_nearest(from[k]);
       row[3 + k] = from[k] - row[k];
     }
-    return select(near_mesh(*s.grid, y, reach), D(-1.0), D(1.0));
+    return select(near_mesh(*s.grid, x, inverse * reach), D(-1.0), D(1.0));
   }
 
   void set(const N* row) {
@@ -156,7 +176,7 @@ struct MeshPad {
   }
 
   auto distance(const Offset& s, N& d, Vec3<N>& n) const {
-    const N zero(0.0), one(1.0), half(0.5), inverse(1 / grid->cell);
+    const N zero(0.0), one(1.0), half(0.5), slope(1 / grid->cell), cells(1 / (grid->cell * scale));
     const N e[3] = {along(Q.m[0][0], Q.m[1][0], Q.m[2][0], s),
                     along(Q.m[0][1], Q.m[1][1], Q.m[2][1], s),
                     along(Q.m[0][2], Q.m[1][2], Q.m[2][2], s)};
@@ -164,7 +184,7 @@ struct MeshPad {
     N inside = one;
     for (int k = 0; k < 3; ++k) {
       const N most(double(grid->cells[k] - 1));
-      const N from = mul_add(e[k], inverse, (&rest.x)[k]);
+      const N from = mul_add(e[k], cells, (&rest.x)[k]);
       const N step = round_nearest(from - half), cell = (&whole.x)[k] + step;
       at.rest[k] = min(max(from - step, zero), one);  // finite for points that are far away
       at.whole[k] = min(max(cell, zero), most);
@@ -172,8 +192,8 @@ struct MeshPad {
     }
     SplineValue<N, 1> phi;
     spline_at(*grid, at, phi);
-    d = select(inside > half, phi.value, one);
-    n = Q * (inverse * Vec3<N>{phi.gradient[0], phi.gradient[1], phi.gradient[2]});
+    d = select(inside > half, N(scale) * phi.value, one);
+    n = Q * (slope * Vec3<N>{phi.gradient[0], phi.gradient[1], phi.gradient[2]});
     return d < zero;
   }
 };

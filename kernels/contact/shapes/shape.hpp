@@ -8,7 +8,8 @@
 //   Pad<P>                       its distance under a pad, relative to a tile
 //   of(size)                     the shape of a size as in PairContact
 //   evaluate(y, …)               d and n; ball and flat: also κ; rod: also κ and e
-//   size_share(y, n, ρ̄)          cotangent of the size from that of the shape's place, inside
+//   size_share(y, n, ρ̄)          cotangent of the size from that of the shape's place, inside; a
+//                                mesh, where |n| is not 1, takes (y, d, ρ̄, d̄)
 //   nearer_than(shape, y, m)     whether d < m, m > 0; may also be true for slightly larger d
 // and, for bodies whose own contact points follow their size,
 //   stretched(to, from, y)       where the contact point y of a shape `from` is on a shape `to`

@@ -6,6 +6,7 @@
 #include "engine/derivative/readout_pullback.hpp"
 #include "engine/derivative/tangent.hpp"
 #include "tests/engine/gradient_differences.hpp"
+#include "tests/engine/meshes.hpp"
 #include "tests/engine/random_scene.hpp"
 #include "tests/engine/scenes.hpp"
 
@@ -134,6 +135,18 @@ TEST_P(ShearGradient, ContactsMatchDifferences) {
   EXPECT_GT(compared, 50);
 }
 
+/// Points whose friction remembers touch meshes.
+TEST_P(ShearGradient, ContactsOfMeshesMatchDifferences) {
+  int compared = 0;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Scene scene = testing::with_meshes(elastic_contacts(seed, 2, ContactLaw(seed % 3)));
+    if (testing::has_mesh(scene) && !testing::splits(scene, GetParam(), seed, kShearSteps))
+      compared += testing::check_gradient(scene, GetParam(), seed, kShearSteps, 1e-5);
+  }
+  EXPECT_GT(compared, 20);
+}
+
 /// Steps that are cut to keep an accuracy hand memory from part to part.
 TEST_P(ShearGradient, CutStepsMatchDifferences) {
   const Integrator scheme = GetParam();
@@ -204,10 +217,9 @@ TEST_P(ShearGradient, ContactsMatchTangents) {
   EXPECT_GE(compared, 3);
 }
 
-TEST_P(ShearGradient, FieldsMatchDifferences) {
-  const Scene scene = elastic_skin();
+void expect_fields_match(const Scene& scene, Integrator scheme) {
   const Model model(scene);
-  const StepperOptions options = testing::options(GetParam(), scene.timestep, 1e-13);
+  const StepperOptions options = testing::options(scheme, scene.timestep, 1e-13);
   RunInput in;
   {
     Batch batch(model, 1);
@@ -260,6 +272,12 @@ TEST_P(ShearGradient, FieldsMatchDifferences) {
         << of.name;
   }
   EXPECT_GT(compared, 60);
+}
+
+TEST_P(ShearGradient, FieldsMatchDifferences) { expect_fields_match(elastic_skin(), GetParam()); }
+
+TEST_P(ShearGradient, FieldsOnMeshesMatchDifferences) {
+  expect_fields_match(testing::with_meshes(elastic_skin()), GetParam());
 }
 
 INSTANTIATE_TEST_SUITE_P(Schemes, ShearGradient, ::testing::ValuesIn(testing::all_integrators()),

@@ -49,7 +49,7 @@ std::shared_ptr<const MeshGrid> grid_of(MeshShape mesh, int resolution) {
 template <class Shape, class At>
 std::array<double, 2> errors(const MeshGrid& grid, const Shape& shape, const At& at) {
   std::array<double, 2> most{};
-  const Spline spline{&grid.view};
+  const Spline spline = Spline::of({1, 1, 1}, &grid.view);
   for (int k = 0; k < 2000; ++k) {
     const Vec3<double> y = at();
     const auto is = spline.evaluate(y), was = distance_at(shape, y);
@@ -114,7 +114,7 @@ TEST(MeshGrid, IsTheDistanceToTheSameShapeAsAPrimitive) {
 TEST(MeshGrid, NonConvexNormalsDoNotJump) {
   const double ring = 0.02, tube = 0.006;
   const auto grid = grid_of(torus_mesh(ring, tube, 160, 80), 64);
-  const Spline spline{&grid->view};
+  const Spline spline = Spline::of({1, 1, 1}, &grid->view);
   Draw draw;
   for (int path = 0; path < 200; ++path) {
     const double u = draw(0, 2 * M_PI), v = draw(0, 2 * M_PI), turn = draw(-1, 1);
@@ -137,7 +137,7 @@ TEST(MeshGrid, NonConvexNormalsDoNotJump) {
 
 TEST(MeshGrid, GradientAndHessianAreTheDerivatives) {
   const auto grid = grid_of(torus_mesh(0.02, 0.006, 40, 20), 24);
-  const Spline spline{&grid->view};
+  const Spline spline = Spline::of({1, 1, 1}, &grid->view);
   const double cell = grid->view.cell, step = 1e-4 * cell;
   Draw draw;
   for (int k = 0; k < 500; ++k) {
@@ -151,7 +151,8 @@ TEST(MeshGrid, GradientAndHessianAreTheDerivatives) {
       EXPECT_NEAR((&at.n.x)[c], (high.d - low.d) / (2 * step), 1e-6);
       const Vec3<Dual<double>> moved = {
           {y.x, c == 0 ? 1.0 : 0.0}, {y.y, c == 1 ? 1.0 : 0.0}, {y.z, c == 2 ? 1.0 : 0.0}};
-      const auto dual = kernels::MeshDistance<Dual<double>>{&grid->view}.evaluate(moved);
+      const auto dual =
+          kernels::MeshDistance<Dual<double>>::of({1, 1, 1}, &grid->view).evaluate(moved);
       EXPECT_NEAR((&at.n.x)[c], dual.d.epsilon, 1e-12);
       for (int i = 0; i < 3; ++i) {
         EXPECT_NEAR(cell * H.m[i][c], cell * ((&high.n.x)[i] - (&low.n.x)[i]) / (2 * step), 1e-6);
@@ -161,10 +162,50 @@ TEST(MeshGrid, GradientAndHessianAreTheDerivatives) {
   }
 }
 
+/// The scale of a mesh scales its distance, and the tile search with it.
+TEST(MeshGrid, ScalesLikeTheMesh) {
+  const MeshShape mesh = torus_mesh(0.02, 0.006, 24, 12);
+  MeshShape large = mesh;
+  for (double& x : large.vertices) x *= 1.7;
+  const auto grid = grid_of(mesh, 20), own = grid_of(large, 20);
+  const Spline scaled = Spline::of({1.7, 0, 0}, &grid->view),
+               direct = Spline::of({1, 0, 0}, &own->view);
+  Draw draw;
+  int near = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const Vec3<double> y = {draw(-0.05, 0.05), draw(-0.05, 0.05), draw(-0.014, 0.014)};
+    Mat3<double> H, G;
+    const auto is = scaled.evaluate(y, H), was = direct.evaluate(y, G);
+    EXPECT_NEAR(is.d, was.d, 1e-8);  // coefficients are rounded to single precision
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR((&is.n.x)[i], (&was.n.x)[i], 1e-5);
+      for (int j = 0; j < 3; ++j) EXPECT_NEAR(0.001 * H.m[i][j], 0.001 * G.m[i][j], 1e-5);
+    }
+    EXPECT_EQ(nearer_than(scaled, y, 0.002), nearer_than(direct, y, 0.002));
+    near += nearer_than(scaled, y, 0.002);
+    using D = Dual<double>;
+    const auto dual = kernels::MeshDistance<D>::of({D(1.7, 1), D(0.0), D(0.0)}, &grid->view)
+                          .evaluate({D(y.x), D(y.y), D(y.z)});
+    EXPECT_NEAR(dual.d.epsilon, (is.d - dot(is.n, y)) / 1.7, 1e-12);
+    const Vec3<double> turn = (-1 / 1.7) * (H * y);
+    EXPECT_NEAR(dual.n.x.epsilon, turn.x, 1e-10);
+    EXPECT_NEAR(dual.n.y.epsilon, turn.y, 1e-10);
+    EXPECT_NEAR(dual.n.z.epsilon, turn.z, 1e-10);
+    // Cotangents of d and n: ρ̄ = -d̄ n - H n̄.
+    const double d_bar = draw(-1, 1);
+    const Vec3<double> n_bar = draw.direction(), rho = -d_bar * is.n - H * n_bar;
+    EXPECT_NEAR(scaled.size_share(y, is.d, rho, d_bar).x,
+                d_bar * dual.d.epsilon + n_bar.x * dual.n.x.epsilon + n_bar.y * dual.n.y.epsilon +
+                    n_bar.z * dual.n.z.epsilon,
+                1e-10);
+  }
+  EXPECT_GT(near, 100);
+}
+
 /// What is left out of a search, because it is not nearer than m, does not touch after a way of m.
 TEST(MeshGrid, WhatIsNotNearCannotTouchAfterAsFarAWay) {
   const auto grid = grid_of(torus_mesh(0.02, 0.006, 24, 12), 20);
-  const Spline spline{&grid->view};
+  const Spline spline = Spline::of({1, 1, 1}, &grid->view);
   Draw draw;
   int far = 0;
   for (int k = 0; k < 20000; ++k) {
@@ -180,7 +221,7 @@ TEST(MeshGrid, WhatIsNotNearCannotTouchAfterAsFarAWay) {
 
 TEST(MeshGrid, BeyondTheGridNothingTouches) {
   const auto grid = grid_of(cuboid_mesh({0.02, 0.02, 0.02}), 16);
-  const Spline spline{&grid->view};
+  const Spline spline = Spline::of({1, 1, 1}, &grid->view);
   for (const double x : {0.04, 0.1, 3.0, 1e6}) {
     const auto at = spline.evaluate(Vec3<double>{x, 0.001, 0.002});
     EXPECT_GT(at.d, 0.015);

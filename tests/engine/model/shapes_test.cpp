@@ -12,6 +12,7 @@
 #include "engine/model/compiled_model.hpp"
 #include "engine/model/shapes.hpp"
 #include "kernels/contact/distance.hpp"
+#include "tests/engine/meshes.hpp"
 #include "tests/engine/runs.hpp"
 #include "tests/engine/scenes.hpp"
 
@@ -101,10 +102,17 @@ TEST(Shapes, AnEllipsoidsMassIsTheIntegral) {
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(p.inertia.m[i][i], sum[i + 1], 1e-9 * sum[i + 1]);
 }
 
+Shape off_centre_mesh() {
+  MeshShape mesh = testing::cuboid_mesh({0.15, 0.1, 0.05});
+  for (double& x : mesh.vertices) x += 0.04;
+  mesh.scale = 1.3;
+  return mesh;
+}
+
 TEST(Shapes, MassesFollowSizes) {
   for (const Shape& shape : {Shape(SphereShape{0.07}), Shape(CuboidShape{{0.3, 0.2, 0.1}}),
                              Shape(CylinderShape{0.3, 0.07}), Shape(CapsuleShape{0.3, 0.07}),
-                             Shape(EllipsoidShape{{0.3, 0.2, 0.1}})})
+                             Shape(EllipsoidShape{{0.3, 0.2, 0.1}}), off_centre_mesh()})
     for (int which = 0; which < kSizeIndices; ++which) {
       Shape more = shape, less = shape;
       if (size_number(more, which) == nullptr) continue;
@@ -112,6 +120,8 @@ TEST(Shapes, MassesFollowSizes) {
       const MassProperties slope = mass_properties_by_size(shape, 800, which),
                            up = mass_properties(more, 800), down = mass_properties(less, 800);
       EXPECT_NEAR(slope.mass, (up.mass - down.mass) / 2e-6, 1e-6 * std::abs(slope.mass));
+      EXPECT_NEAR(slope.centre.x, (up.centre.x - down.centre.x) / 2e-6, 1e-7);
+      EXPECT_NEAR(slope.centre.z, (up.centre.z - down.centre.z) / 2e-6, 1e-7);
       for (int i = 0; i < 3; ++i)
         EXPECT_NEAR(slope.inertia.m[i][i], (up.inertia.m[i][i] - down.inertia.m[i][i]) / 2e-6,
                     1e-7 * up.mass)

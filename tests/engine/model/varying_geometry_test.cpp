@@ -12,6 +12,7 @@
 #include "engine/step/stepper.hpp"
 #include "io/scene/scene_reader.hpp"
 #include "kernels/table/kernel_table.hpp"
+#include "tests/engine/meshes.hpp"
 #include "tests/engine/scenes.hpp"
 
 namespace tangere {
@@ -167,7 +168,11 @@ std::vector<Case> cases() {
     numbers.push_back(varying(density("anvil"), 500, 900));
     return pad_on(shape, numbers);
   };
+  MeshShape mesh = testing::ellipsoid_mesh(2, {0.03, 0.025, 0.03});
+  for (std::size_t k = 0; k < mesh.vertices.size(); k += 3) mesh.vertices[k] += 0.002;
+  mesh.resolution = 16;
   return {{"cap_opening", cap, 160},
+          {"mesh", on(mesh, {varying(size("anvil", kScaleIndex), 0.9, 1.1)}), 60},
           {"rolling_ball_small", ball, 160},
           {"sphere", on(SphereShape{0.03}, {varying(size("anvil", 0), 0.028, 0.032)}), 60},
           {"cuboid",

@@ -15,36 +15,12 @@
 namespace tangere {
 namespace {
 
+using testing::has_mesh;
 using testing::q_of;
 using testing::v_of;
 
-/// Makes meshes of a scene's ellipsoids and spheres.
-Scene with_meshes(Scene s) {
-  for (LinkDescription& link : s.links) {
-    MeshShape mesh;
-    if (const auto* ball = std::get_if<SphereShape>(&link.body.shape)) {
-      mesh = testing::ellipsoid_mesh(1, {ball->radius, ball->radius, ball->radius});
-    } else if (const auto* e = std::get_if<EllipsoidShape>(&link.body.shape)) {
-      mesh = testing::ellipsoid_mesh(1, {e->size[0] / 2, e->size[1] / 2, e->size[2] / 2});
-    } else {
-      continue;
-    }
-    mesh.resolution = 12;
-    link.body.shape = mesh;
-  }
-  // Points of a body that was a ball touch now, too: contacts that were left out stay left out.
-  return s;
-}
 Scene random_meshes(unsigned seed, int links, ContactLaw law) {
-  return with_meshes(testing::random_contacts(seed, links, law));
-}
-
-bool has_mesh(const Scene& s) {
-  return std::any_of(s.pair_contacts.begin(), s.pair_contacts.end(), [&](const auto& c) {
-    return std::any_of(s.links.begin(), s.links.end(), [&](const LinkDescription& l) {
-      return l.body.name == c.primitive_body && std::holds_alternative<MeshShape>(l.body.shape);
-    });
-  });
+  return testing::with_meshes(testing::random_contacts(seed, links, law));
 }
 
 TEST(MeshContact, JacobiansMatchDualNumbers) {
@@ -189,6 +165,56 @@ TEST(MeshContact, NeighboursChangeNoBit) {
     EXPECT_EQ(alone.states, crowded.states);
     EXPECT_EQ(alone.fields, crowded.fields);
   }
+}
+
+/// A peg falls into a hole with half a millimetre to spare and a floor: a mesh, or four cuboids.
+Scene peg_over_hole(bool mesh) {
+  constexpr double kWidth = 0.021, kOuter = 0.05, kHeight = 0.02, kWall = (kOuter - kWidth) / 2;
+  Scene s;
+  s.gravity = {0, 0, -9.8};
+  s.timestep = 2e-3;
+  s.links = {testing::link("peg", JointType::free, {0.0002, -0.0003, 0.0255},
+                           CuboidShape{{0.02, 0.02, 0.03}, {6, 6, 9}}, 2000)};
+  s.links[0].joint.damping = 0.2;
+  s.links[0].joint.turning.emplace().damping = 1e-4;
+  const auto touch = [&](const std::string& wall, const Vector3& at, const Shape& shape) {
+    s.links.push_back(testing::link(wall, JointType::fixed, at, shape, 1000));
+    s.pair_contacts.push_back({"peg", wall, {500, 2, 0.2, 200}, ContactLaw::clamped, 1e-5, {}});
+  };
+  touch("floor", {0, 0, -0.02}, CuboidShape{{kOuter, kOuter, 0.02}, {2, 2, 2}});
+  if (mesh) {
+    touch("hole", {0, 0, 0}, testing::frame_mesh(kOuter / 2, kWidth / 2, kHeight / 2));
+    std::get<MeshShape>(s.links.back().body.shape).resolution = 64;
+  } else {
+    const double off = (kWidth + kWall) / 2;
+    const CuboidShape along_y{{kWall, kOuter, kHeight}, {2, 2, 2}},
+        along_x{{kWidth, kWall, kHeight}, {2, 2, 2}};
+    touch("right", {off, 0, 0}, along_y), touch("left", {-off, 0, 0}, along_y);
+    touch("back", {0, off, 0}, along_x), touch("front", {0, -off, 0}, along_x);
+  }
+  return s;
+}
+
+TEST(MeshContact, APegSlidesIntoAHoleOfAMeshAsIntoOneOfCuboids) {
+  std::vector<std::vector<double>> ends;
+  for (const bool mesh : {true, false}) {
+    const Model model(peg_over_hole(mesh));
+    Batch batch(model, 1);
+    Stepper stepper(model);
+    std::vector<double> v = v_of(batch);
+    v[0] = 0.02, v[5] = 0.3;  // towards a wall, and turning about the hole's axis
+    batch.set_state(0, q_of(batch), v);
+    for (int t = 0; t < 400; ++t) stepper.step(batch, {});
+    EXPECT_FALSE(failed(batch.status(0)));
+    ends.push_back(q_of(batch));
+  }
+  for (const std::vector<double>& q : ends) {
+    EXPECT_NEAR(q[2], 0.005 - 0.0255, 1e-4) << "the peg stands on the floor";
+    EXPECT_LT(std::abs(q[0] + 0.0002), 6e-4);
+    EXPECT_LT(std::abs(q[1] - 0.0003), 6e-4);
+    EXPECT_GT(std::abs(q[3]), 0.999) << "upright";
+  }
+  for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(ends[0][i], ends[1][i], 2e-3 * (i < 3 ? 0.1 : 1));
 }
 
 TEST(MeshContact, BodiesThatStartInsideOneAnotherAreNamed) {
