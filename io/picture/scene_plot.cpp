@@ -123,7 +123,7 @@ class Picture {
           places.push_back(eye_(at.back()));
         }
         const Vector3 out = cross(at[1] - at[0], at[2] - at[0]);
-        if (!(eye_.nearness(out) > 0)) continue;  // it looks away
+        if (!(eye_.nearness(unit(out)) > 1e-6)) continue;  // it looks away, or is seen on edge
         const double bright = 0.72 + 0.28 * dot(light, unit(out));
         const auto tone = [&](int c) {
           return std::clamp(static_cast<int>(255 * bright * body.rgba[std::size_t(c)]), 0, 255);
@@ -153,11 +153,10 @@ class Picture {
     };
     for (int tries = 0; tries < 40 && taken(at); ++tries) at.y += 12;
     labels_.push_back({at.x, at.y, width});
+    // Its white edge is a text of its own: not every program knows paint-order.
     return svg::text(at.x, at.y, name,
-                     fmt::format("font-size=\"11\" fill=\"{}\" stroke=\"#fff\" stroke-width=\"3\" "
-                                 "paint-order=\"stroke\"",
-                                 colour)
-                         .c_str());
+                     "font-size=\"11\" fill=\"#fff\" stroke=\"#fff\" stroke-width=\"3\"") +
+           svg::text(at.x, at.y, name, fmt::format("font-size=\"11\" fill=\"{}\"", colour).c_str());
   }
 
   std::string straight(const Vector3& from, const Vector3& way, const char* colour) {
@@ -290,7 +289,7 @@ class Picture {
       out += svg::text(x + 8, kHeight - 16, words, "font-size=\"11\"");
       x += 26 + 6.0 * double(words.size());
     };
-    entry(kJoint, "ways of joints");
+    entry(kJoint, "how joints move");
     if (scene_.sensors.empty()) return out;
     entry(kSkin, "points of sensors");
     entry(kFirst, "axis0");
