@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <mutex>
 
@@ -182,34 +183,56 @@ std::vector<double> coefficients_along(const std::vector<double>& values, int (&
   return out;
 }
 
-/// Returns a bound of |∇φ| where φ > 0. In a cell, a derivative lies between the differences of
-/// neighbouring coefficients. What is deep inside, where the nearest place jumps, is left out: on
-/// the way to a place that touches, φ falls from its value to zero outside.
+/// Control points of φ in a cell, (4, 4, 4).
+using Cell = std::array<double, 64>;
+constexpr int kStride[3] = {16, 4, 1};
+
+/// Returns a bound of |∇φ| in a cell: a derivative by an axis lies between `factor` times the least
+/// and the greatest difference of neighbours along it.
+double steepest_in(const Cell& c, double factor) {
+  double square = 0;
+  for (const int stride : kStride) {
+    double most = 0;
+    for (int k = 0; k < 64; ++k)
+      if (k / stride % 4 < 3)
+        most = std::max(most, std::abs(c[std::size_t(k + stride)] - c[std::size_t(k)]));
+    square += most * most;
+  }
+  return factor * std::sqrt(square);
+}
+
+/// Turns the control points of the spline into those of the same polynomial as a Bézier form, which
+/// lie far closer to it: (c₀ + 4 c₁ + c₂)/6, (2 c₁ + c₂)/3, (c₁ + 2 c₂)/3, (c₁ + 4 c₂ + c₃)/6.
+Cell bezier(Cell c) {
+  for (const int stride : kStride)
+    for (int k = 0; k < 64; ++k) {
+      if (k / stride % 4 != 0) continue;
+      double* const at[4] = {&c[std::size_t(k)], &c[std::size_t(k + stride)],
+                             &c[std::size_t(k + 2 * stride)], &c[std::size_t(k + 3 * stride)]};
+      const double c0 = *at[0], c1 = *at[1], c2 = *at[2], c3 = *at[3];
+      *at[0] = (c0 + 4 * c1 + c2) / 6, *at[1] = (2 * c1 + c2) / 3;
+      *at[2] = (c1 + 2 * c2) / 3, *at[3] = (c1 + 4 * c2 + c3) / 6;
+    }
+  return c;
+}
+
+/// Returns a bound of |∇φ| where φ > 0. What is deep inside, where the nearest place jumps, is left
+/// out: on the way to a place that touches, φ falls from its value to zero outside.
 double steepest(const kernels::DistanceGrid& g) {
   double most = 0;
-  const int step[3] = {g.plane, g.row, 1};
   for (int i = 0; i < g.cells[0]; ++i)
     for (int j = 0; j < g.cells[1]; ++j)
       for (int k = 0; k < g.cells[2]; ++k) {
-        const float* c =
+        const float* from =
             g.coefficients + std::ptrdiff_t(i) * g.plane + std::ptrdiff_t(j) * g.row + k;
-        float highest = 0, largest[3] = {0, 0, 0};
-        for (int a = 0; a < 4; ++a)
-          for (int b = 0; b < 4; ++b)
-            for (int e = 0; e < 4; ++e) highest = std::max(highest, c[a * g.plane + b * g.row + e]);
-        if (highest <= 0) continue;
-        for (int axis = 0; axis < 3; ++axis)
-          for (int a = 0; a < (axis == 0 ? 3 : 4); ++a)
-            for (int b = 0; b < (axis == 1 ? 3 : 4); ++b)
-              for (int e = 0; e < (axis == 2 ? 3 : 4); ++e) {
-                const float* at = c + a * g.plane + b * g.row + e;
-                largest[axis] = std::max(largest[axis], std::abs(at[step[axis]] - at[0]));
-              }
-        double square = 0;
-        for (const float x : largest) square += double(x) * double(x);
-        most = std::max(most, square);
+        Cell c;
+        for (int n = 0; n < 64; ++n)
+          c[std::size_t(n)] = from[n / 16 * g.plane + n / 4 % 4 * g.row + n % 4];
+        if (*std::max_element(c.begin(), c.end()) <= 0 || steepest_in(c, 1) <= most) continue;
+        c = bezier(c);
+        if (*std::max_element(c.begin(), c.end()) > 0) most = std::max(most, steepest_in(c, 3));
       }
-  return std::sqrt(most) / g.cell * (1 + 1e-6);
+  return most / g.cell * (1 + 1e-6);
 }
 
 }  // namespace

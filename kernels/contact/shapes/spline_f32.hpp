@@ -133,10 +133,9 @@ template <class A>
   for (int k = 0; k < 4; ++k) x[k] = load_lanes_f<A>(out[k]);
 }
 
-/// Sums over y and x at sixteen places, one after the other. first: numbers of their first
-/// coefficients.
+/// Sums over y and x at sixteen places, one after the other. first: their first coefficients.
 template <class A>
-void sum_places_f(const DistanceGrid& g, const int* first, const SplineWeights<LanesF<A>, 1>& x,
+void sum_places_f(const DistanceGrid& g, const float* const* first, const SplineWeights<LanesF<A>, 1>& x,
                   const SplineWeights<LanesF<A>, 1>& y, LanesF<A> (*out)[4]) {
   using N = LanesF<A>;
   alignas(64) float of_x[2][4][kLanesF];  // the four weights of place 4 q + j at [j][4 q]
@@ -147,11 +146,13 @@ void sum_places_f(const DistanceGrid& g, const int* first, const SplineWeights<L
     for (int j = 0; j < 4; ++j) store_lanes_f(rows[j], of_x[o][j]);
     for (int b = 0; b < 4; ++b) store_lanes_f(y.w[o][b], of_y[o][b]);
   }
+#pragma GCC unroll 1
   for (int j = 0; j < 4; ++j) {
     N part[3][4];
+#pragma GCC unroll 1
     for (int q = 0; q < 4; ++q) {
       const int place = 4 * q + j;
-      const float* const c = g.coefficients + first[place];
+      const float* const c = first[place];
       N sum[2];
       for (int b = 0; b < 4; ++b) {
         const N rows = load_four_rows<A>(c + b * g.row, g.plane);
@@ -199,10 +200,11 @@ void spline_at(const DistanceGrid& g, const GridPlace<LanesF<A>>& at,
                SplineValue<LanesF<A>, 1>& out) {
   using N = LanesF<A>;
   alignas(64) float whole[3][kLanesF];
-  int first[kLanesF];
+  const float* first[kLanesF];
   for (int c = 0; c < 3; ++c) store_lanes_f(at.whole[c], whole[c]);
   for (int l = 0; l < kLanesF; ++l)
-    first[l] = int(whole[0][l]) * g.plane + int(whole[1][l]) * g.row + int(whole[2][l]);
+    first[l] = g.coefficients +
+               (int(whole[0][l]) * g.plane + int(whole[1][l]) * g.row + int(whole[2][l]));
   bool several = false;
   for (int c = 0; c < 3; ++c) {
     const N one(double{whole[c][0]});
@@ -213,7 +215,7 @@ void spline_at(const DistanceGrid& g, const GridPlace<LanesF<A>>& at,
   if (several) {
     sum_places_f<A>(g, first, x, y, sums);
   } else {
-    sum_cell_f<A>(g.coefficients + first[0], g, x, y, sums);
+    sum_cell_f<A>(first[0], g, x, y, sums);
   }
   sum_over_z<1>(sums, SplineWeights<N, 1>(at.rest[2]), out);
 }
