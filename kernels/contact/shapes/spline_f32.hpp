@@ -149,7 +149,7 @@ void sum_places_f(const DistanceGrid& g, const float* const* first, const Spline
 #pragma GCC unroll 1
   for (int j = 0; j < 4; ++j) {
     N part[3][4];
-#pragma GCC unroll 1
+#pragma GCC unroll 4
     for (int q = 0; q < 4; ++q) {
       const int place = 4 * q + j;
       const float* const c = first[place];
