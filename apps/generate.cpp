@@ -216,6 +216,9 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
       summary.failures.size(), kept, options.output,
       shards.size() == 1 ? "1 shard" : fmt::format("{} shards", shards.size()), bytes,
       merged.line));
+  const Json costly = note_costly_steps(
+      console, integrator_named(job.layout.integrator), job.layout.accuracy,
+      summary.simulation_steps, summary.newton_iterations, summary.split_steps);
   Json result{{"command", "generate"},
               {"exit_code", static_cast<int>(code)},
               {"scene", options.scene},
@@ -252,6 +255,7 @@ int report(const GenerateOptions& options, const Console& console, const Job& jo
               {"coarse_steps", summary.coarse_steps},
               {"passed_steps", summary.passed_steps},
               {"damped_steps", summary.damped_steps},
+              {"costly", costly},
               {"failed", failures_json("episode", failures_of(summary))}};
   result.update(done.task.keys);
   result.update(merged.keys);
@@ -436,6 +440,7 @@ int generate(GenerateOptions options, const Console& console, const ProgramInfo&
   const Model model(read_scene_for(options.scene, options.allow_unknown, console, asked));
   warn_of_geometry(console, model);
   const Stepper stepper(model);
+  warn_of_touches(console, model, stepper);
   const ControlProgram controls =
       make_controls(options.controls, options.seed.value_or(0), model, stepper, console);
   Job job;

@@ -8,9 +8,11 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/named_value.hpp"
+#include "engine/model/short_touches.hpp"
 #include "engine/sense/start_overlaps.hpp"
 #include "io/files/csv.hpp"
 #include "io/scene/scene_reader.hpp"
+#include "tasks/run/costly_steps.hpp"
 
 namespace tangere::apps {
 namespace {
@@ -86,7 +88,22 @@ void warn_of_geometry(const Console& console, const Model& model) {
           "warning: body '{}': cells of {:.3g} m do not resolve {:.0f} % of the mesh's surface, "
           "where walls or details are thinner than about 1.5 cells; expected a larger 'resolution'",
           mesh.body, mesh.cell, 100 * mesh.unresolved));
-  for (const std::string& line : start_overlaps(model)) console.note("warning: " + line);
+  for (const auto& lines : {start_overlaps(model), rounded_places(model)})
+    for (const std::string& line : lines) console.note("warning: " + line);
+}
+
+void warn_of_touches(const Console& console, const Model& model, const Stepper& stepper) {
+  if (stepper.accuracy() > 0) return;
+  for (const std::string& line : short_touches(model, stepper.integrator(), stepper.timestep()))
+    console.note("warning: " + line);
+}
+
+Json note_costly_steps(const Console& console, Integrator integrator, double accuracy,
+                       std::int64_t steps, std::int64_t evaluations, std::int64_t split_steps) {
+  const std::string line = costly_steps(integrator, steps, evaluations, split_steps);
+  if (line.empty() || accuracy > 0) return nullptr;
+  console.note("warning: " + line);
+  return line;
 }
 
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout) {

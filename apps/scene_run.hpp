@@ -51,8 +51,15 @@ ControlProgram make_controls(const std::string& path, std::uint64_t seed, const 
 /// --steps, or the number of steps that the controls last. Throws InputError if neither is given.
 std::int64_t step_count(const std::optional<std::int64_t>& asked, const ControlProgram& controls);
 
-/// Warns of meshes whose grids are too coarse and of bodies that start deep inside one another.
+/// Warns of meshes whose grids are too coarse, and of bodies that start deep inside one another or
+/// too far away.
 void warn_of_geometry(const Console& console, const Model& model);
+/// Warns of contacts whose touches are too short for the steps.
+void warn_of_touches(const Console& console, const Model& model, const Stepper& stepper);
+/// Says on stderr that steps were costly, if they were, and returns it; null if not, or if steps were
+/// cut to keep an accuracy.
+Json note_costly_steps(const Console& console, Integrator integrator, double accuracy,
+                       std::int64_t steps, std::int64_t evaluations, std::int64_t split_steps);
 
 /// Prints notes on sensors that are not read after every step.
 void note_empty_sensors(const Console& console, const Model& model, const RolloutOptions& rollout);

@@ -37,7 +37,7 @@ struct SimulateArguments {
   std::optional<int> environments, every;
   std::optional<double> timestep, tolerance, accuracy, tape_memory;
   std::optional<std::uint64_t> seed;
-  bool point_gradients = false, overwrite = false, allow_unknown = false;
+  bool audit = false, point_gradients = false, overwrite = false, allow_unknown = false;
 };
 
 void check_arguments(const SimulateArguments& options) {
@@ -59,6 +59,12 @@ void check_size(const Model& model, int environments, const RolloutOptions& roll
                fmt::format("--envs {}", environments));
 }
 
+RolloutOutputs outputs_of(const SimulateArguments& options, const Model& model) {
+  RolloutOutputs outputs = record_of(options.record, model).outputs;
+  outputs.audit = options.audit;
+  return outputs;
+}
+
 /// `task`: null for a scene alone.
 TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
                              const RolloutOptions& rollout, const ProgramInfo& info,
@@ -69,6 +75,7 @@ TrajectoryLayout make_layout(const Batch& batch, const Stepper& stepper,
   run.fields = fields_of(batch.model(), rollout.outputs);
   run.bodies = rollout.outputs.bodies;
   run.end_effectors = rollout.outputs.end_effectors;
+  run.audit = rollout.outputs.audit;
   run.steps = rollout.steps;
   run.first_step = rollout.first_step;
   run.every = rollout.every;
@@ -94,6 +101,24 @@ struct TaskReport {
   std::string line = "no task: every reward is 0";
 };
 
+/// What `--audit` adds to the report: a line for people, which ends in a line break, and keys.
+std::string audit_text(const std::optional<AuditSummary>& audit) {
+  if (!audit) return "";
+  return fmt::format(
+      "audit: motors did {:.4g} J, damping and friction took {:.4g} J, the scheme made {:.4g} J; "
+      "at worst {:.2g} % of what environment {} had\n",
+      audit->motors, audit->taken, audit->made, 100 * audit->worst_share,
+      audit->worst_environment);
+}
+Json audit_json(const std::optional<AuditSummary>& audit) {
+  if (!audit) return nullptr;
+  return {{"motors", audit->motors},
+          {"taken", audit->taken},
+          {"made", audit->made},
+          {"worst_share", audit->worst_share},
+          {"worst_environment", audit->worst_environment}};
+}
+
 int report(const SimulateArguments& options, const Console& console, const Batch& batch,
            const Stepper& stepper, const RolloutOptions& rollout, const RolloutSummary& summary,
            const TaskReport& of_task = {}) {
@@ -105,12 +130,13 @@ int report(const SimulateArguments& options, const Console& console, const Batch
   list_failures(console, "environment", failures_of(summary), "--json and the file name all");
   console.print(
       fmt::format("environments: {}, steps: {}, time: {:.2f} s, {:.0f} env-steps/s with output\n"
-                  "Newton iterations per step: {:.2f}, {}, environments failed: {}\n{}\n"
+                  "Newton iterations per step: {:.2f}, {}, environments failed: {}\n{}{}\n"
                   "wrote {} ({} bytes)",
                   batch.environments(), summary.steps, summary.seconds, rate, per_step,
                   split_text(summary.split_steps, summary.coarse_steps, summary.passed_steps,
                              summary.damped_steps),
-                  summary.failures.size(), of_task.line, options.output, bytes));
+                  summary.failures.size(), audit_text(summary.audit), of_task.line, options.output,
+                  bytes));
   Json sensors = Json::array();
   for (const FieldOutput of : fields_of(batch.model(), rollout.outputs)) {
     const SensorInfo& sensor = batch.model().sensors()[static_cast<std::size_t>(of.sensor)];
@@ -119,6 +145,9 @@ int report(const SimulateArguments& options, const Console& console, const Batch
                        {"every", tactile_interval(sensor, rollout)},
                        {"frames", tactile_frames(sensor, rollout)}});
   }
+  const Json costly = note_costly_steps(console, stepper.integrator(), stepper.accuracy(),
+                                        summary.environment_steps, summary.newton_iterations,
+                                        summary.split_steps);
   Json result{{"command", "simulate"},
               {"exit_code", static_cast<int>(code)},
               {"scene", options.scene},
@@ -145,6 +174,8 @@ int report(const SimulateArguments& options, const Console& console, const Batch
               {"coarse_steps", summary.coarse_steps},
               {"passed_steps", summary.passed_steps},
               {"damped_steps", summary.damped_steps},
+              {"costly", costly},
+              {"audit", audit_json(summary.audit)},
               {"failed", failures_json("environment", failures_of(summary))}};
   result.update(of_task.keys);
   console.result(result);
@@ -321,7 +352,7 @@ int simulate_task(const SimulateArguments& options, const Console& console, cons
   const Model& model = task.model();
   Stepper stepper(model);
   const RolloutOptions rollout{TaskProgram::steps(task.spec()), options.every.value_or(0),
-                               precision, 0, record_of(options.record, model).outputs};
+                               precision, 0, outputs_of(options, model)};
   note_empty_sensors(console, model, rollout);
   check_size(model, options.environments.value_or(1), rollout);
   Batch batch(model, options.environments.value_or(1), options.seed.value_or(0));
@@ -371,13 +402,14 @@ int simulate(const SimulateArguments& options, const Console& console, const Pro
   warn_of_geometry(console, model);
   if (!options.gradients.empty()) solver = for_gradients(model, solver);
   Stepper stepper(model, solver);
+  warn_of_touches(console, model, stepper);
   const Start start(options, stepper);
   start.tell(console, model, model.scene(), stepper);
   const ControlProgram controls =
       make_controls(options.controls, start.seed, model, stepper, console);
   const RolloutOptions rollout{steps_left(options, controls, start.first_step),
                                options.every.value_or(0), precision, start.first_step,
-                               record_of(options.record, model).outputs};
+                               outputs_of(options, model)};
   controls.check_covers(rollout.first_step + rollout.steps);
   note_empty_sensors(console, model, rollout);
   check_size(model, start.environments, rollout);
@@ -431,6 +463,9 @@ Command add_simulate(CLI::App& program) {
       "What to compute and store besides q and v, separated by commas: bodies, variables, a "
       "sensor's field (pad), pad.pressure, pad.shear, pad.sum or pad.ideal [default: the scene's "
       "<outputs>, or all]");
+  add_flag(app, "--audit", o.audit,
+           "Also compute and store energy and momentum, what motors, damping and friction did, and "
+           "what the scheme made");
   add_whole_number<int>(app, "--every", o.every, 1, kMostEnvironments,
                         "Read tactile fields every N steps [default: the scene's, or 1]");
   add_text(app, "--state-from", o.state_from, "F.h5",

@@ -49,9 +49,11 @@ set(public_headers
   engine/model/scheme.hpp
   engine/model/sensor_imperfections.hpp
   engine/model/shapes.hpp
+  engine/model/short_touches.hpp
   engine/rows/episode_sink.hpp
   engine/rows/row_sink.hpp
   engine/rows/task_spec.hpp
+  engine/sense/audit.hpp
   engine/sense/flow_map.hpp
   engine/sense/readout.hpp
   engine/sense/start_overlaps.hpp

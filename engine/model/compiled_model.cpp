@@ -35,6 +35,7 @@ class Compiler {
 
   CompiledModel run() {
     for (int i = 0; i < static_cast<int>(m_.scene.links.size()); ++i) add_link(i);
+    move_near();
     if (m_.nv == 0)
       throw InputError(where() + "nothing in the scene can move: every joint is fixed");
     check_masses(m_);
@@ -300,17 +301,50 @@ class Compiler {
 
   // --- state and what varies ---
 
-  /// Sets the scales of unknowns. Lengths are rounded relative to the greatest distance of any
-  /// body's point from the world's origin at rest.
-  void unknown_scales() {
+  /// Returns where bodies are at rest.
+  [[nodiscard]] std::vector<Vec3<double>> places() const {
     std::vector<Frame<double>> world;
-    double extent = 0;
+    std::vector<Vec3<double>> found;
     for (const Link& l : m_.links)
       world.push_back(l.parent < 0 ? l.frame : compose(world[std::size_t(l.parent)], l.frame));
-    for (const CompiledBody& b : m_.bodies) {
-      const Frame<double> at = b.link < 0 ? b.frame : compose(world[std::size_t(b.link)], b.frame);
-      extent = std::max(extent, std::sqrt(dot(at.p, at.p)) + b.extent);
+    for (const CompiledBody& b : m_.bodies)
+      found.push_back((b.link < 0 ? b.frame : compose(world[std::size_t(b.link)], b.frame)).p);
+    return found;
+  }
+
+  /// Returns the greatest distance of any body's point from a place at rest.
+  [[nodiscard]] double extent_about(const Vec3<double>& middle) const {
+    const std::vector<Vec3<double>> all = places();
+    double extent = 0;
+    for (std::size_t b = 0; b < all.size(); ++b) {
+      const Vec3<double> arm = all[b] - middle;
+      extent = std::max(extent, std::sqrt(dot(arm, arm)) + m_.bodies[b].extent);
     }
+    return extent;
+  }
+
+  /// Measures a scene that is far from the world's origin from its own middle.
+  void move_near() {
+    constexpr double kFar = 100;  // extents
+    Vec3<double> middle = {0, 0, 0};
+    const std::vector<Vec3<double>> all = places();
+    for (const Vec3<double>& p : all) middle = middle + (1.0 / double(all.size())) * p;
+    const double away = std::sqrt(dot(middle, middle));
+    if (!(away > kFar * extent_about(middle)) || !std::isfinite(away)) return;
+    m_.moved = true;
+    m_.origin = middle;
+    for (Link& l : m_.links)
+      if (l.parent < 0) l.frame.p = l.frame.p - middle;
+    for (CompiledBody& b : m_.bodies)
+      if (b.link < 0) b.frame.p = b.frame.p - middle;
+    for (CompiledJoint& j : m_.joints)
+      if (j.link < 0) j.frame.p = j.frame.p - middle;
+  }
+
+  /// Sets the scales of unknowns. Lengths are rounded relative to the greatest distance of any
+  /// body's point from the model's origin at rest.
+  void unknown_scales() {
+    const double extent = extent_about({0, 0, 0});
     m_.fall_time =
         std::sqrt(extent / std::sqrt(dot(vec3_of(m_.scene.gravity), vec3_of(m_.scene.gravity))));
     for (const Link& l : m_.links) {
@@ -417,6 +451,7 @@ std::shared_ptr<const CompiledModel> compile(const Scene& scene) {
   v.gravity = vec3_of(g);
   const GroundDescription ground = m->scene.ground.value_or(GroundDescription{});
   v.ground_point = vec3_of(ground.position);
+  if (m->moved) v.ground_point = v.ground_point - m->origin;
   v.ground_normal = vec3_of(ground.normal);
   v.effects = m->dof_effects.data();
   v.n_pairs = static_cast<int>(m->pairs.size());

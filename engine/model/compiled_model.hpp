@@ -166,6 +166,13 @@ inline constexpr std::size_t kRememberedBytes = 32;
 
 struct CompiledModel {
   Scene scene;
+  /// Where links, bodies and the ground are measured from, in the world [m]. It is the world's origin
+  /// but for scenes far from it, whose positions would be rounded. Outputs add it.
+  kernels::Vec3<double> origin{0, 0, 0};
+  bool moved = false;  ///< origin is not the world's
+  [[nodiscard]] kernels::Vec3<double> in_world(const kernels::Vec3<double>& p) const {
+    return moved ? p + origin : p;  // not p + 0, which would lose the sign of -0
+  }
   int nq = 0, nv = 0, nu = 0;
   std::vector<kernels::Link> links;
   std::vector<CompiledJoint> joints;  ///< parallel to scene.links

@@ -16,9 +16,13 @@
 
 namespace tangere {
 
+const Scheme& Scheme::of_turns() const {
+  return order > 1 ? of_parts() : Integrator::sdirk2.scheme();
+}
+
 int Scheme::most_inner_stages() const {
-  return std::max(
-      {inner_stages(), start == nullptr ? 0 : start->inner_stages(), of_parts().inner_stages()});
+  return std::max({inner_stages(), start == nullptr ? 0 : start->inner_stages(),
+                   of_parts().inner_stages(), of_turns().inner_stages()});
 }
 
 namespace {

@@ -54,7 +54,9 @@ struct Scheme {
   [[nodiscard]] int inner_stages() const { return static_cast<int>(stages.size()) - 1; }
   [[nodiscard]] bool needs_history() const { return start != nullptr; }
   [[nodiscard]] const Scheme& of_parts() const { return parts == nullptr ? *this : *parts; }
-  /// The largest number of inner stages of this scheme, its start and its parts.
+  /// The scheme of steps in which bodies turn too far for this one.
+  [[nodiscard]] const Scheme& of_turns() const;
+  /// The largest number of inner stages of this scheme, its start, its parts and its turns.
   [[nodiscard]] int most_inner_stages() const;
 };
 

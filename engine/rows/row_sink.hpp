@@ -52,6 +52,16 @@ struct ActionRow {
   std::span<const std::uint8_t> terminated, truncated, success;
 };
 
+/// The books of row t of a trajectory, for all environments (engine/sense/audit.hpp).
+struct AuditRow {
+  std::int64_t step;                 ///< t
+  std::span<const double> energy;    ///< (E, 3) of motion, of height, held [J]
+  std::span<const double> momentum;  ///< (E, 6) linear [kg m/s], angular [kg m²/s]
+  /// (E, 3) what motors did, what damping and friction took, and what the scheme made in the step
+  /// before this row [J]; empty at row 0. Zeros where an environment took no step.
+  std::span<const double> passed;
+};
+
 /// Receives rows in ascending order. A sink that cannot store throws IoError; the rollout stops and
 /// passes it on.
 class RowSink {
@@ -61,6 +71,7 @@ class RowSink {
   virtual void write(const StepRow& row) = 0;
   virtual void write(const TactileRow& row) = 0;
   virtual void write(const ActionRow&) {}  ///< tasks only
+  virtual void write(const AuditRow&) {}   ///< only if it was asked for
 };
 
 }  // namespace tangere

@@ -15,7 +15,7 @@ namespace {
 
 void write3(const kernels::Vec3<double>& a, double* to) { to[0] = a.x, to[1] = a.y, to[2] = a.z; }
 
-/// Returns an end effector's world position in the group moved last.
+/// Returns an end effector's position, by the model's origin, in the group moved last.
 kernels::Vec3<double> position_of(const PadReader& reader, const CompiledEndEffector& v, int group,
                                   int lane) {
   const kernels::Frame<double> at = reader.link(v.link, group, lane).world;
@@ -26,7 +26,7 @@ void write_positions(const CompiledModel& m, const PadReader& reader, int group,
                      std::span<double> position) {
   double* to = position.data();
   for (const CompiledEndEffector& v : m.end_effectors)
-    write3(position_of(reader, v, group, lane), to), to += 3;
+    write3(m.in_world(position_of(reader, v, group, lane)), to), to += 3;
 }
 
 }  // namespace
@@ -40,7 +40,8 @@ void read_bodies(const CompiledModel& m, PadReader& reader, const Batch& batch, 
     const kernels::LinkPose<double> link = reader.link(body.link, group, lane);
     const kernels::Frame<double> at = compose(link.world, body.frame);
     const kernels::Quat<double> o = quaternion_of(at.R);
-    const double values[7] = {at.p.x, at.p.y, at.p.z, o.w, o.x, o.y, o.z};
+    const kernels::Vec3<double> p = m.in_world(at.p);
+    const double values[7] = {p.x, p.y, p.z, o.w, o.x, o.y, o.z};
     std::copy(values, values + 7, &pose[7 * b]);
     const kernels::Vec3<double> omega = link.world.R * link.V.a;
     const kernels::Vec3<double> v = link.world.R * (link.V.l + cross(link.V.a, body.frame.p));

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "engine/model/compiled_model.hpp"
 #include "engine/sense/pad_reader.hpp"
@@ -76,6 +77,28 @@ std::vector<std::string> start_overlaps(const Model& model) {
     const double extent = ground.radius > 0 ? ground.radius : ground.extent;
     if (depth > kDeep * extent && extent > 0)
       found.push_back(message(model.contacts()[m.pairs.size() + g], depth));
+  }
+  return found;
+}
+
+std::vector<std::string> rounded_places(const Model& model) {
+  constexpr double kShare = 1e-9;
+  const CompiledModel& m = compiled(model);
+  const Batch batch(model, 1, 0);
+  PadReader reader(model);
+  reader.move(batch, 0, 0);
+  std::vector<std::string> found;
+  for (std::size_t b = 0; b < m.bodies.size(); ++b) {
+    const CompiledBody& body = m.bodies[b];
+    const Vec3<double> p = compose(reader.link(body.link, 0, 0).world, body.frame).p;
+    const double far = std::sqrt(std::max(dot(p, p), dot(m.origin, m.origin))),
+                 rounded = far * std::numeric_limits<double>::epsilon(),
+                 size = body.extent;
+    if (rounded > kShare * size && size > 0)
+      found.push_back(fmt::format(
+          "'{}' starts {:.3g} m away, where positions are rounded to {:.2g} m; expected a scene "
+          "nearer to the world's origin",
+          model.body_names()[b], far, rounded));
   }
   return found;
 }

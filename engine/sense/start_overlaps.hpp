@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bodies that start deep inside one another. Springs as deep throw them apart at the first step.
+// Bodies that start where a step cannot do well: deep inside one another, so that springs as deep
+// throw them apart, or so far away that their positions are rounded.
 #pragma once
 
 #include <string>
@@ -13,5 +14,9 @@ namespace tangere {
 /// their own extent, or of a sphere's radius, at the starting state of the scene's first
 /// environment with seed 0.
 std::vector<std::string> start_overlaps(const Model& model);
+
+/// Returns a line for each body that starts so far from the middle of its scene, or whose scene is
+/// so far from the world's origin, that its position is rounded to more than 1e-9 of its size.
+std::vector<std::string> rounded_places(const Model& model);
 
 }  // namespace tangere

@@ -188,19 +188,23 @@ bool GroupStep::take_part(const kernels::KernelTable& table, SingleWorkspace& w,
     } else {
       scheme = own;
     }
+  } else if (one.turned != 0 && scheme != &scheme->of_turns()) {
+    scheme = &scheme->of_turns();
+    one = solve();
   }
   if (one.sound() != 0) return take();
   if (one.found == 0) return split(table, w, h, depth + 1, report, solves);
   const LaneState start = state_of(w, model_, 0);
   const std::size_t noted = solves == nullptr ? 0 : solves->size();
-  const LaneBits passed = report.passed, created = report.created;
+  const LaneBits passed = report.passed, created = report.created, turned = report.turned;
   if (split(table, w, h, depth + 1, report, solves)) return true;
   set_state(start, w, 0);
   if (solves != nullptr) solves->erase(solves->begin() + std::ptrdiff_t(noted), solves->end());
-  report.passed = passed, report.created = created;
+  report.passed = passed, report.created = created, report.turned = turned;
   solve();
   report.passed |= one.passed;
   report.created |= one.created;
+  report.turned |= one.turned;
   return take();
 }
 
@@ -239,6 +243,7 @@ bool GroupStep::split_lane(const kernels::KernelTable& table, BasicWorkspace<L>&
   report.residual[lane] = one.residual[0];
   report.passed |= one.passed << lane;
   report.created |= one.created << lane;
+  report.turned |= one.turned << lane;
   return done;
 }
 
@@ -264,11 +269,11 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
   const auto solves_of = [log](int l) {
     return log == nullptr ? nullptr : &log->special[std::size_t(l)];
   };
-  LaneBits resolved = 0, passed = 0, created = 0;
+  LaneBits resolved = 0, passed = 0, created = 0, turned = 0;
   const auto solve_and_commit = [&](const Scheme& by, LaneBits which) {
     const Solved s = solve_and_watch(by, table, w, which, h, false, report);
     commit(w, s.sound());
-    resolved |= s.sound(), passed |= s.passed, created |= s.created;
+    resolved |= s.sound(), passed |= s.passed, created |= s.created, turned |= s.turned;
     return s.sound();
   };
   if ((lanes & ~starting) != 0) {
@@ -284,9 +289,10 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
   };
   if (starting != 0) take_by(*scheme.start, starting);
   if (scheme.order > 1 && created != 0) take_by(Integrator::bdf1.scheme(), created);
+  if (scheme.order == 1 && turned != 0) take_by(scheme.of_turns(), turned);
   for (int l = 0; l < L; ++l) {
     if (!has(lanes & ~resolved, l)) continue;
-    const bool has_root = has(passed | created, l);
+    const bool has_root = has(passed | created | turned, l);
     const StepStatus first = report.status[l];
     const LaneState start = has_root ? state_of(w, model_, l) : LaneState{};
     if (split_lane(table, w, l, h, alone, report, solves_of(l))) {
@@ -302,7 +308,9 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
       } else if (log != nullptr) {
         log_inner(w, l, by, *log);
       }
-      (has(passed, l) ? report.passed : report.created) |= 1U << l;
+      (has(passed, l)    ? report.passed
+       : has(created, l) ? report.created
+                         : report.turned) |= 1U << l;
     } else if (!failed(report.status[l])) {
       report.status[l] = first;
     }
@@ -319,11 +327,13 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
     }
   }
   for (int l = 0; l < L; ++l) {
-    if (!has(lanes & (report.passed | created | report.created), l) || failed(report.status[l]))
+    const LaneBits coarse = report.created | report.turned;
+    if (!has(lanes & (report.passed | created | turned | coarse), l) || failed(report.status[l]))
       continue;
-    report.status[l] = has(report.passed, l)    ? StepStatus::passed
-                       : has(report.created, l) ? StepStatus::coarse
-                                                : StepStatus::damped;
+    report.status[l] = has(report.passed, l) ? StepStatus::passed
+                       : has(coarse, l)      ? StepStatus::coarse
+                       : has(created, l)     ? StepStatus::damped
+                                             : StepStatus::split;
   }
 }
 

@@ -20,7 +20,9 @@ struct StepSettings {
   /// Solves may end unchecked where they promise to meet the tolerance, and stages share factors.
   /// False where the tolerance was named.
   bool spare = false;
-  bool bounded_energy = true;  ///< steps that create energy are taken by BDF1 or in parts
+  /// Steps that create energy are taken by BDF1 or in parts, and those in which bodies turn too far
+  /// by SDIRK2 or in parts.
+  bool bounded_energy = true;
 };
 
 /// What a tape needs to know about a step besides its result.
@@ -89,6 +91,9 @@ class GroupStep {
   template <int L>
   LaneBits creating(const kernels::KernelTable& table, BasicWorkspace<L>& w, LaneBits lanes,
                     double h) const;
+  template <int L>
+  LaneBits turning(const Scheme& scheme, const BasicWorkspace<L>& w, LaneBits lanes,
+                   double h) const;
   template <int L>
   Solved solve_and_watch(const Scheme& scheme, const kernels::KernelTable& table,
                          BasicWorkspace<L>& w, LaneBits lanes, double h, bool inside_split,

@@ -3,10 +3,12 @@
 #include "engine/step/lane_energy.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "engine/step/rotation_log.hpp"
 #include "engine/step/state_difference.hpp"
+#include "kernels/contact/pair_contact.hpp"
 #include "kernels/step/faces.hpp"
 
 namespace tangere {
@@ -29,6 +31,7 @@ struct LaneAt {
   const AlignedVector<LinkPose<Row<L>>>& poses;
   int lane;
   LaneEnergy sum{};
+  LaneBooks* books = nullptr;  ///< if not null, motors do work and hold nothing
 
   [[nodiscard]] const double* block() const {
     if (w.stage.block == nullptr) return nullptr;
@@ -61,7 +64,8 @@ struct LaneAt {
   }
 
   /// Adds what springs, limits and a motor hold at a coordinate. `error`: distance from the target.
-  void add_held(const kernels::Link& link, int k, double place, double stretch, double error) {
+  void add_held(const kernels::Link& link, int k, double place, double stretch, double error,
+                double rate) {
     const kernels::DofEffects& e = model.dof_effects[std::size_t(link.v + k)];
     if ((link.effects & kernels::kSprung) != 0)
       sum.moving += 0.5 * number(e.stiffness) * stretch * stretch;
@@ -70,8 +74,25 @@ struct LaneAt {
       sum.moving += 0.5 * number(e.limit_stiffness) * beyond * beyond;
     }
     if ((link.effects & kernels::kDriven) == 0) return;
-    const double P = number(e.P), force = std::clamp(P * error, e.force_low, e.force_high);
+    const double P = number(e.P);
+    if (books != nullptr) {
+      books->motors +=
+          rate * std::clamp(P * error - number(e.D) * rate, e.force_low, e.force_high);
+      return;
+    }
+    const double force = std::clamp(P * error, e.force_low, e.force_high);
     if (P > 0) sum.moving += force * (error - force / (2 * P));
+  }
+
+  /// Adds what known forces of motors and damping do.
+  void add_powers(const Row<L>* v) {
+    for (const kernels::Link& link : model.links)
+      for (int k = link.v; k < link.v + kernels::dofs(link.kind); ++k) {
+        const double rate = v[k][lane];
+        books->motors += w.stage.tau[k][lane] * rate;
+        if ((link.effects & kernels::kDamped) != 0)
+          books->taken += number(model.dof_effects[std::size_t(k)].damping) * rate * rate;
+      }
   }
 
   void add_joints(const Row<L>* q, const Row<L>* v) {
@@ -79,16 +100,19 @@ struct LaneAt {
       if ((link.effects & kernels::kBeyondDamping) == 0) continue;
       for (int k = 0; k < kernels::dofs(link.kind); ++k) {
         const double rate = v[link.v + k][lane];
-        if ((link.effects & kernels::kArmoured) != 0)
-          sum.moving +=
-              0.5 * number(model.dof_effects[std::size_t(link.v + k)].armature) * rate * rate;
+        if ((link.effects & kernels::kArmoured) == 0) continue;
+        const double energy =
+            0.5 * number(model.dof_effects[std::size_t(link.v + k)].armature) * rate * rate;
+        sum.moving += energy;
+        if (books != nullptr) books->motion += energy;
       }
+      const auto rate = [&](int k) { return v[link.v + k][lane]; };
       const kernels::DofEffects* e = &model.dof_effects[std::size_t(link.v)];
       const Row<L>* target = w.stage.target + link.v;
       if (link.kind != JointKind::spherical) {
         for (int k = 0; k < kernels::dofs(link.kind); ++k) {
           const double place = q[link.q + k][lane];
-          add_held(link, k, place, place - e[k].rest, target[k][lane] - place);
+          add_held(link, k, place, place - e[k].rest, target[k][lane] - place, rate(k));
         }
         continue;
       }
@@ -99,9 +123,51 @@ struct LaneAt {
       const Vec3<double> place = rotation_log(at),
                          stretch = from({e[0].rest, e[1].rest, e[2].rest}),
                          error = from({target[0][lane], target[1][lane], target[2][lane]});
-      add_held(link, 0, place.x, stretch.x, -error.x);
-      add_held(link, 1, place.y, stretch.y, -error.y);
-      add_held(link, 2, place.z, stretch.z, -error.z);
+      add_held(link, 0, place.x, stretch.x, -error.x, rate(0));
+      add_held(link, 1, place.y, stretch.y, -error.y, rate(1));
+      add_held(link, 2, place.z, stretch.z, -error.z, rate(2));
+    }
+  }
+
+  [[nodiscard]] kernels::Vec6<double> twist(int link) const {
+    if (link < 0) return kernels::zero6<double>();
+    const auto& V = poses[std::size_t(link)].V;
+    return {{V.a.x[lane], V.a.y[lane], V.a.z[lane]}, {V.l.x[lane], V.l.y[lane], V.l.z[lane]}};
+  }
+
+  /// Returns the power that a touching point takes: what its force does to the motion, less what
+  /// its spring gives back.
+  static double taken_at(const kernels::LawParameters<double>& law,
+                         const kernels::PointContact<double>& p) {
+    return p.d < 0 ? -dot(p.force, p.u) - law.kn * p.d * p.rate : 0;
+  }
+
+  /// Adds what damping and friction take at points of a pair, one array a component.
+  void add_taken(const kernels::PairContact& pair, const Vec3<double>& half,
+                 const Vec3<double>& faces, const Frame<double>& link2_in_1,
+                 const std::array<const double*, 3>& points, int count) {
+    const Frame<double> at = compose(link2_in_1, pair.frame2);
+    const auto W = motion_to_parent(link2_in_1, twist(pair.link2)) - twist(pair.link1);
+    const auto law = kernels::load_law<double>(pair.parameters, pair.law, pair.ramp, block(), 0);
+    kernels::with_touched<double>(pair, half, faces, [&]<class Shape>(const Shape& shape) {
+      for (int i = 0; i < count; ++i)
+        books->taken += taken_at(law, point_contact(shape, law, at.R, at.p, W.a, W.l,
+                                                    {points[0][i], points[1][i], points[2][i]}));
+    });
+  }
+
+  /// The same on the ground.
+  void add_taken(const kernels::GroundContact& ground, const Frame<double>& at, double radius) {
+    const auto law =
+        kernels::load_law<double>(ground.parameters, ground.law, ground.ramp, block(), 0);
+    const Vec3<double> m = transposed_times(at.R, model.view.ground_normal);
+    const double height = dot(model.view.ground_normal, at.p - model.view.ground_point);
+    for (int k = 0; k < ground.n_points; ++k) {
+      const double* x = ground.points + 3 * k;
+      kernels::PointContact<double> p;
+      if (ground_contact(law, m, height, twist(ground.link), Vec3<double>{x[0], x[1], x[2]}, radius,
+                         p))
+        books->taken += taken_at(law, p);
     }
   }
 
@@ -128,6 +194,7 @@ struct LaneAt {
     const int count =
         table.find_candidates({&pair, half, pose, list.margin, x, list.stride, faces, nullptr});
     double square = 0;
+    if (books != nullptr) add_taken(pair, half, faces, link2_in_1, {x, y, z}, count);
     kernels::with_touched<double>(pair, half, faces, [&]<class Shape>(const Shape& shape) {
       for (int i = 0; i < count; ++i) {
         const Vec3<double> arm = Vec3<double>{x[i], y[i], z[i]} - at.p;
@@ -148,6 +215,7 @@ struct LaneAt {
     for (const kernels::GroundContact& ground : model.grounds) {
       const Frame<double> at = world(ground.link);
       const double radius = kernels::ground_radius<double>(ground, block(), 0);
+      if (books != nullptr) add_taken(ground, at, radius);
       double square = 0;
       for (int k = 0; k < ground.n_points; ++k) {
         const double* p = ground.points + 3 * k;
@@ -181,6 +249,20 @@ double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable
   LaneAt<L> at{model, w, poses, lane};
   at.add_contacts(table, w.search.data());
   return at.sum.moving;
+}
+
+LaneBooks lane_books(const CompiledModel& model, const kernels::KernelTable& table,
+                     SingleWorkspace& w) {
+  LaneBooks books;
+  LaneAt<1> at{model, w, w.poses_before, 0, {}, &books};
+  at.add_motion();
+  books.motion = at.sum.moving;
+  books.height = at.sum.total;
+  at.add_powers(w.v0);
+  at.add_joints(w.q0, w.v0);
+  at.add_contacts(table, w.search.data());
+  books.held = at.sum.moving - books.motion;
+  return books;
 }
 
 #define TANGERE_FOR_LANES(L)                                                                     \

@@ -32,6 +32,20 @@ double energy_of_contacts(const CompiledModel& model, const kernels::KernelTable
                           BasicWorkspace<L>& w,
                           const AlignedVector<kernels::LinkPose<kernels::Row<L>>>& poses, int lane);
 
+/// The books of one environment: what it holds, and what passes through motors and damping.
+struct LaneBooks {
+  double motion = 0;  ///< energy of moving bodies and armatures [J]
+  double height = 0;  ///< -Σ gravity·(m p + R c) [J]
+  double held = 0;    ///< by springs, limits and contacts [J]
+  double motors = 0;  ///< power of the motors [W]
+  double taken = 0;   ///< power that damping and friction take [W]
+};
+
+/// Keeps the books of the state q0, v0 in a workspace that has its poses (poses_before), faces and
+/// what motors do. Friction that remembers counts as if it did not. Overwrites its `search`.
+LaneBooks lane_books(const CompiledModel& model, const kernels::KernelTable& table,
+                     SingleWorkspace& w);
+
 /// Frame and body twist of a link in one lane.
 template <int L>
 kernels::Frame<double> frame_in_lane(const kernels::LinkPose<kernels::Row<L>>& pose, int lane) {

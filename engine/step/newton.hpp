@@ -36,6 +36,7 @@ struct NewtonReport {
   std::array<double, kernels::kGroup> residual{};
   LaneBits passed = 0;   ///< lanes in which a body came through another that it touches
   LaneBits created = 0;  ///< lanes in which a part created energy, however short it was
+  LaneBits turned = 0;   ///< lanes in which a part turned too far, however short it was
 };
 
 /// Solves g(x) = 0 for the lanes in `lanes`, from the x in the stage. On return the stage's x and v

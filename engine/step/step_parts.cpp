@@ -57,13 +57,17 @@ void GroupStep::advance_in_parts(const kernels::KernelTable& table, BasicWorkspa
     for (int l = 0; l < L; ++l) h[l] *= at[l].length();
     const LaneBits solved = run(scheme, table, w, open, h, false, report);
     const LaneBits through = std::exchange(report.passed, kNoLane);
+    LaneBits turned = 0;
+    for (int l = 0; l < L; ++l)
+      if (has(solved, l)) turned |= turning(scheme, w, 1U << l, h[l]);
     Row<L> error{};
     if (solved != 0) error = estimated_error(table, w, solved, h, report);
     for (int l = 0; l < L; ++l) {
       if (!has(open, l)) continue;
       const LaneBits bit = 1U << l;
-      // A body that came through another is the worst error that there is.
-      const bool sound = has(solved & ~through, l);
+      // A body that came through another is the worst error that there is. One that turned too far
+      // is off by more than the displacement shows.
+      const bool sound = has(solved & ~(through | turned), l);
       const double ratio = sound ? error[l] / settings_.accuracy : HUGE_VAL;
       std::vector<TapedSolve>* solves = log == nullptr ? nullptr : &log->special[std::size_t(l)];
       if (!(ratio <= 1) && !at[l].finest()) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Looks at solved steps that a scheme does not promise to be right: bodies that came through each
-// other, and energy from nowhere.
+// other, energy from nowhere, and bodies that turn too far for it (turn_defect.hpp).
 //
 // A scheme of order two or three takes the forces of a step for smooth. Across a touch, a release or
 // the limit of a joint they are not, and the bodies can leave with more than they came with. The
@@ -17,6 +17,7 @@
 
 #include "engine/step/group_step.hpp"
 #include "engine/step/lane_energy.hpp"
+#include "engine/step/turn_defect.hpp"
 
 namespace tangere {
 
@@ -118,6 +119,18 @@ LaneBits GroupStep::creating(const kernels::KernelTable& table, BasicWorkspace<L
   return found;
 }
 
+/// Returns the lanes in which a body turned too far for the scheme of the solve.
+template <int L>
+LaneBits GroupStep::turning(const Scheme& scheme, const BasicWorkspace<L>& w, LaneBits lanes,
+                            double h) const {
+  if (!settings_.bounded_energy) return kNoLane;
+  const LaneBits far = far_turners(model_, scheme, w, lanes, h);
+  LaneBits found = 0;
+  for (int l = 0; l < L; ++l)
+    if (has(far, l) && turned_too_far(model_, scheme, w, h, l)) found |= 1U << l;
+  return found;
+}
+
 /// Solves a step of length h, and looks at what it came to.
 template <int L>
 Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTable& table,
@@ -128,12 +141,15 @@ Solved GroupStep::solve_and_watch(const Scheme& scheme, const kernels::KernelTab
   solved.found = run(scheme, table, w, lanes, Row<L>::all(h), inside_split, report);
   solved.passed = std::exchange(report.passed, of_other_parts) & solved.found;
   solved.created = creating(table, w, solved.found & ~solved.passed, h);
+  solved.turned = turning(scheme, w, solved.found & ~(solved.passed | solved.created), h);
   return solved;
 }
 
 #define TANGERE_FOR_LANES(L)                                                              \
   template void GroupStep::watch_passing(const kernels::KernelTable&, BasicWorkspace<L>&, \
                                          LaneBits, NewtonReport&) const;                  \
+  template LaneBits GroupStep::turning(const Scheme&, const BasicWorkspace<L>&, LaneBits, \
+                                       double) const;                                     \
   template Solved GroupStep::solve_and_watch(const Scheme&, const kernels::KernelTable&,  \
                                              BasicWorkspace<L>&, LaneBits, double, bool,  \
                                              NewtonReport&) const;

@@ -6,11 +6,11 @@
 
 namespace tangere {
 
-/// Lanes that found a root. Those in which a body came through another, or that created energy,
-/// should not be taken.
+/// Lanes that found a root. Those in which a body came through another, that created energy, or in
+/// which a body turned too far for the scheme should not be taken.
 struct Solved {
-  LaneBits found = 0, passed = 0, created = 0;
-  [[nodiscard]] LaneBits sound() const { return found & ~(passed | created); }
+  LaneBits found = 0, passed = 0, created = 0, turned = 0;
+  [[nodiscard]] LaneBits sound() const { return found & ~(passed | created | turned); }
 };
 
 }  // namespace tangere

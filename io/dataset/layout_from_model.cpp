@@ -71,6 +71,7 @@ TrajectoryLayout layout_from(const Batch& batch, const Stepper& stepper,
   layout.u_units = copy(model.u_units());
   if (run.bodies) layout.body_names = copy(model.body_names());
   if (run.end_effectors) layout.end_effector_names = end_effector_names(model);
+  layout.audit = run.audit;
   for (std::size_t i = 0; i < model.sensors().size(); ++i)
     layout.sensors.push_back(
         sensor_layout(model.sensors()[i], scene.sensors[i], run.tactile_intervals[i]));

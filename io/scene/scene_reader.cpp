@@ -9,6 +9,7 @@
 #include <cmath>
 #include <map>
 
+#include "io/files/nearest_name.hpp"
 #include "io/files/text_file.hpp"
 #include "io/scene/scene_sections.hpp"
 #include "io/scene/scene_warnings.hpp"
@@ -37,7 +38,7 @@ class TreeReader {
 
   void read_robot(const SceneNode& robot) {
     robot.check_attributes({"name"});
-    for (const SceneNode& link : robot.children({"link"})) read_link(link, -1, 0);
+    for (const SceneNode& link : robot.children({"link"})) read_link(link, parent_of(link), 0);
   }
 
   /// Gives bodies without a name that of their link, with a number behind it if another body has
@@ -53,9 +54,27 @@ class TreeReader {
   }
 
  private:
+  /// Returns the link that a link directly in <robot> names as its parent; -1: it is a root.
+  int parent_of(const SceneNode& node) const {
+    if (!node.has("parent")) return -1;
+    const std::string name = node.text("parent");
+    std::vector<std::string> before;
+    for (const LinkDescription& link : scene_.links) before.push_back(link.name);
+    const auto found = std::find(before.begin(), before.end(), name);
+    if (found == before.end())
+      node.fail(fmt::format("parent=\"{}\"; expected a link that stands before it{}", name,
+                            suggestion(name, before)));
+    return static_cast<int>(found - before.begin());
+  }
+
   void read_link(const SceneNode& node, int parent, int depth) {
     if (depth > kDeepestTree) node.fail(fmt::format("links nested deeper than {}", kDeepestTree));
-    node.check_attributes({"name"}, {}, {"design_params"});
+    std::vector<std::string> used = {"name"};
+    if (depth == 0) used.emplace_back("parent");
+    if (depth > 0 && node.has("parent"))
+      node.fail("parent=\"" + node.text("parent") +
+                "\" of a link inside another; expected it of links directly in <robot>");
+    node.check_attributes(used, {}, {"design_params"});
     LinkDescription link;
     link.name = node.text("name");
     link.parent = parent;

@@ -60,6 +60,10 @@ struct TrajectoryFile::Impl {
   struct Task {
     h5::Id action, step, reward, terminated, truncated, success;
   } task;
+  struct Audit {
+    h5::Id energy, momentum, step;
+    std::int64_t written = 0;
+  } audit;
   std::int64_t states = 0, steps = 0, actions = 0;
 
   Impl(const std::string& output, const TrajectoryLayout& l, bool overwrite)
@@ -158,6 +162,7 @@ struct TrajectoryFile::Impl {
     if (!layout.body_names.empty()) create_bodies(named);
     if (!layout.end_effector_names.empty()) create_end_effectors();
     create_solver();
+    if (layout.audit) create_audit(named);
   }
 
   void create_bodies(const auto& named) {
@@ -190,6 +195,25 @@ struct TrajectoryFile::Impl {
                         std::span<const std::string>(layout.end_effector_names));
     h5::write_attribute(end_effectors, "units", "m");
     h5::write_attribute(end_effectors, "frame", "world");
+  }
+
+  void create_audit(const auto& named) {
+    const hsize_t T = static_cast<hsize_t>(layout.steps),
+                  E = static_cast<hsize_t>(layout.environments);
+    const h5::Id group = h5::create_group(file, "audit");
+    audit.energy = rows<double>(group, "energy", {T + 1, E, 3});
+    named(audit.energy, {"motion", "height", "held"}, {"J", "J", "J"});
+    h5::write_attribute(audit.energy, "meaning",
+                        "of moving bodies; -m gravity.x; by springs, limits and contacts");
+    audit.momentum = rows<double>(group, "momentum", {T + 1, E, 6});
+    named(audit.momentum, {"x", "y", "z", "about_x", "about_y", "about_z"},
+          {"kg m/s", "kg m/s", "kg m/s", "kg m^2/s", "kg m^2/s", "kg m^2/s"});
+    h5::write_attribute(audit.momentum, "frame", "world; angular about its origin");
+    audit.step = rows<double>(group, "step", {T, E, 3});
+    named(audit.step, {"motors", "taken", "made"}, {"J", "J", "J"});
+    h5::write_attribute(audit.step, "meaning",
+                        "work of the motors; what damping and friction took; what the scheme made: "
+                        "the change of energy less the first, plus the second");
   }
 
   void create_solver() {
@@ -356,6 +380,16 @@ void TrajectoryFile::write(const ActionRow& row) {
   ++f.actions;
 }
 
+void TrajectoryFile::write(const AuditRow& row) {
+  Impl& f = *impl_;
+  const hsize_t E = static_cast<hsize_t>(f.layout.environments);
+  Impl::put<double>(f.audit.energy, row.step, {E, 3}, row.energy.data());
+  Impl::put<double>(f.audit.momentum, row.step, {E, 6}, row.momentum.data());
+  if (!row.passed.empty())
+    Impl::put<double>(f.audit.step, row.step - 1, {E, 3}, row.passed.data());
+  ++f.audit.written;
+}
+
 void TrajectoryFile::write(const GradientArrays& g) {
   const TrajectoryLayout& l = impl_->layout;
   const hsize_t E = static_cast<hsize_t>(l.environments), T = static_cast<hsize_t>(l.steps),
@@ -395,6 +429,7 @@ void TrajectoryFile::commit() {
   expect("states", f.states, f.layout.steps + 1);
   expect("steps", f.steps, f.layout.steps);
   expect("actions", f.actions, f.layout.task ? f.layout.task->horizon : 0);
+  expect("audits", f.audit.written, f.layout.audit ? f.layout.steps + 1 : 0);
   for (std::size_t i = 0; i < f.readings.size(); ++i) {
     const SensorLayout& sensor = f.layout.sensors[std::size_t(f.layout.fields[i].sensor)];
     expect("fields of " + sensor.name, f.readings[i].written,
@@ -405,6 +440,7 @@ void TrajectoryFile::commit() {
     d->reset();
   f.readings.clear();
   f.task = {};
+  f.audit = {};
   h5::close_file(f.file, f.part.path());
   f.part.commit();
 }

@@ -36,6 +36,7 @@ class TrajectoryFile : public RowSink {
   void write(const StepRow& row) override;
   void write(const TactileRow& row) override;
   void write(const ActionRow& row) override;
+  void write(const AuditRow& row) override;
   /// Called at most once. Sizes are those of the layout.
   void write(const GradientArrays& gradients);
 

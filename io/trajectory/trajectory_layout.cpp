@@ -44,6 +44,11 @@ void add_small(const TrajectoryLayout& layout, Bytes& bytes) {
                            3 * count_of(layout.end_effector_names);
   bytes.add({t, e, row, 8});
   bytes.add({e, row, 8});
+  if (layout.audit) {
+    constexpr std::int64_t kOfRow = 9, kOfStep = 3;
+    bytes.add({t, e, kOfRow + kOfStep, 8});
+    bytes.add({e, kOfRow, 8});
+  }
   bytes.add({t, e, count_of(layout.u_names), 8});
   bytes.add({t, e, 8 + 4 + 1});  // residual, iterations, status
   bytes.add({e, count_of(layout.randomized_names), 8});

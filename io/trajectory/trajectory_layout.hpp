@@ -60,6 +60,7 @@ struct TrajectoryLayout {
   std::vector<std::string> end_effector_names;  ///< (n) end effectors, empty when there are none
   std::vector<SensorLayout> sensors;
   std::vector<FieldOutput> fields;  ///< what is recorded of them
+  bool audit = false;               ///< the books are recorded
   std::vector<StatusMeaning> statuses;
   std::vector<std::string> randomized_names, randomized_units;  ///< (k), empty when nothing varies
   std::vector<double> randomized_values;                        ///< (E, k)
@@ -91,7 +92,7 @@ struct RunDescription {
   std::vector<int> tactile_intervals;  ///< K in force, one per sensor
   /// Recorded; none: the field of every sensor.
   std::optional<std::vector<FieldOutput>> fields;
-  bool bodies = true, end_effectors = true;  ///< recorded
+  bool bodies = true, end_effectors = true, audit = false;  ///< recorded
   std::string precision, command_line, version, instruction_set;
   std::optional<TaskSpec> task;
   std::string policy;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "kernels/numbers/block.hpp"
+#include "tasks/run/audit_recorder.hpp"
 #include "tasks/run/block_reader.hpp"
 
 namespace tangere {
@@ -145,7 +146,8 @@ double rollout_bytes(const Model& model, int environments, const RolloutOutputs&
                               kPositionWidth +
                           largest_reading(model, outputs));
   constexpr double kFlags = sizeof(std::int32_t) + sizeof(std::int8_t);
-  return environments * (numbers * sizeof(double) + kFlags);
+  return environments * (numbers * sizeof(double) + kFlags) +
+         (outputs.audit ? AuditRecorder::bytes(environments) : 0);
 }
 
 RolloutSummary run_rollout(Batch& batch, Stepper& stepper, const ControlProgram& controls,
@@ -168,6 +170,8 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
   const auto start = std::chrono::steady_clock::now();
   const auto sensors = batch.model().sensors();
   Recorder recorder(batch, options.precision, options.outputs, sink);
+  std::optional<AuditRecorder> audit;
+  if (options.outputs.audit) audit.emplace(batch, stepper.timestep(), sink);
   const std::vector<FieldOutput> fields = fields_of(batch.model(), options.outputs);
   RolloutSummary summary;
   StepTally tally(batch, 0, batch.environments());
@@ -182,10 +186,13 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
     return static_cast<double>(options.first_step + row) * stepper.timestep();
   };
   recorder.write_state(0, time(0));
+  if (audit) audit->start();
   for (std::int64_t t = 0; t < options.steps; ++t) {
     each_block([&](int b) { program.controls(t, batch, b, u); });
+    if (audit) audit->before(u);
     stepper.step(batch, u);
     recorder.write_step(t, u, tally);
+    if (audit) audit->after(t, u, tally);
     tally.count(batch, t);
     each_block([&](int b) { program.look(t, batch, b); });
     if ((t + 1) % program.steps_per_row() == 0) {
@@ -210,6 +217,7 @@ RolloutSummary run_rollout(Batch& batch, Stepper& stepper, EpisodeProgram& progr
   summary.coarse_steps = tally.coarse_steps;
   summary.passed_steps = tally.passed_steps;
   summary.damped_steps = tally.damped_steps;
+  if (audit) summary.audit = audit->summary();
   summary.failures = std::move(tally.failures);
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;

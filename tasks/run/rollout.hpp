@@ -21,6 +21,16 @@ namespace tangere {
 struct RolloutOutputs {
   std::optional<std::vector<FieldOutput>> fields;  ///< none: the field of every sensor
   bool bodies = true, end_effectors = true;
+  bool audit = false;  ///< the books of energy and momentum
+};
+
+/// What the books of a run come to.
+struct AuditSummary {
+  double motors = 0, taken = 0, made = 0;  ///< sums over environments and steps [J]
+  /// The largest |sum of what the scheme made| of an environment, as a share of what it had: the
+  /// largest energy of motion and held, what motors did, or what was taken, whichever is most.
+  double worst_share = 0;
+  int worst_environment = 0;
 };
 
 struct RolloutOptions {
@@ -41,6 +51,7 @@ struct RolloutSummary {
   std::int64_t coarse_steps = 0;  ///< with parts that missed the accuracy that was asked for
   std::int64_t passed_steps = 0;  ///< in which a body came through another
   std::int64_t damped_steps = 0;  ///< that would have created energy
+  std::optional<AuditSummary> audit;        ///< if it was asked for
   std::vector<FailedEnvironment> failures;  ///< in the order in which they failed
   bool stopped = false;                     ///< progress returned false
   double seconds = 0;                       ///< wall clock of the whole rollout, sink included

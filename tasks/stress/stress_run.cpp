@@ -10,9 +10,11 @@
 #include <memory>
 
 #include "engine/base/as_size.hpp"
+#include "engine/model/short_touches.hpp"
 #include "engine/step/control.hpp"
 #include "engine/step/stepper.hpp"
 #include "tasks/run/block_threads.hpp"
+#include "tasks/run/costly_steps.hpp"
 #include "tasks/run/step_tally.hpp"
 
 namespace tangere {
@@ -187,6 +189,16 @@ void judge(const BlockOutcome& out, StressRow& row) {
     row.reason = to_string(StepStatus::damped);
 }
 
+/// What a run of the same steps warns of; "" if of nothing.
+std::string warning_of(const Scene& scene, const StressRow& row) {
+  if (row.accuracy > 0) return "";
+  if (!row.of->measure)
+    return costly_steps(row.integrator, row.steps, std::llround(row.evaluations * double(row.steps)),
+                        row.split_steps);
+  const auto lines = short_touches(Model(scene), row.integrator, row.step);
+  return lines.empty() ? "" : lines.front();
+}
+
 /// Fills in what a setting came to. False when it was stopped.
 bool measure(const Scene& scene, int threads, const std::function<bool()>& go_on, StressRow& row) {
   const Setting setting{row.integrator, row.step, row.accuracy};
@@ -199,6 +211,12 @@ bool measure(const Scene& scene, int threads, const std::function<bool()>& go_on
     row.value = passes(*out) / passes(*ordinary);
   }
   judge(*out, row);
+  if (row.verdict == StressVerdict::fails)
+    if (const std::string warning = warning_of(varied(scene, row.of->variant), row);
+        !warning.empty()) {
+      row.verdict = StressVerdict::flagged;
+      row.reason = "warning: " + warning;
+    }
   const auto& known = row.of->known;
   row.known = row.verdict == StressVerdict::fails &&
               std::find(known.begin(), known.end(), row.integrator) != known.end();

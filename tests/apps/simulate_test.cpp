@@ -530,5 +530,60 @@ TEST(Simulate, RunsShorterThanASensorsIntervalHaveNoField) {
   EXPECT_THAT(folder.files(), ElementsAre("again.h5", "out.h5"));
 }
 
+/// The books of every step stand beside the trajectory, and change nothing of it.
+TEST(Simulate, AuditsEnergyAndMomentum) {
+  const Folder folder;
+  const Words words{"--envs", "3", "--steps", "90", "--record", "bodies"};
+  const json plain = simulate(folder, kSmall, words);
+  EXPECT_EQ(plain.at("audit"), nullptr);
+  {
+    const h5::Id file = h5::open_file(folder.path("out.h5"));
+    EXPECT_FALSE(h5::has_link(file, "audit"));
+  }
+  const Array q = read_array(folder, "/q");
+  const json audited = simulate(folder, kSmall, words + Words{"--audit", "--overwrite"});
+  EXPECT_EQ(read_array(folder, "/q").values, q.values);
+  const Array energy = read_array(folder, "/audit/energy"), step = read_array(folder, "/audit/step"),
+              momentum = read_array(folder, "/audit/momentum");
+  EXPECT_THAT(energy.dims, ElementsAre(91, 3, 3));
+  EXPECT_THAT(momentum.dims, ElementsAre(91, 3, 6));
+  ASSERT_THAT(step.dims, ElementsAre(90, 3, 3));
+  double sums[3] = {};
+  for (std::size_t e = 0; e < 3; ++e) {
+    double changed = 0, passed = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      changed += energy.values[(90 * 3 + e) * 3 + k] - energy.values[e * 3 + k];
+    for (std::size_t t = 0; t < 90; ++t) {
+      const double* of = &step.values[(t * 3 + e) * 3];
+      for (std::size_t k = 0; k < 3; ++k) sums[k] += of[k];
+      passed += of[0] - of[1] + of[2];
+    }
+    EXPECT_NEAR(changed, passed, 1e-12) << e;
+  }
+  const json& audit = audited.at("audit");
+  EXPECT_NEAR(audit.at("motors"), sums[0], 1e-12);
+  EXPECT_NEAR(audit.at("taken"), sums[1], 1e-12);
+  EXPECT_NEAR(audit.at("made"), sums[2], 1e-12);
+  EXPECT_LT(audit.at("motors"), 0) << "the motor holds the pad while it sinks";
+  EXPECT_GT(audit.at("taken"), 0);
+  const double share = audit.at("worst_share");
+  EXPECT_TRUE(share > 0 && share < 0.2) << share;
+}
+
+/// Of all that may be said of a run, these are for people, on stderr, and for programs.
+TEST(Simulate, WarnsOfTouchesThatAreTooShortAndOfCostlySteps) {
+  const Folder folder;
+  const Outcome rebound = run(folder, {"simulate", scene("hard/rebound.xml"), "--output", "a.h5",
+                                       "--steps", "3", "--integrator", "SDIRK2"});
+  EXPECT_THAT(rebound.err, HasSubstr("warning: the contact of 'ball' with 'ground' has no damping, "
+                                     "and a touch lasts 0.0031 s"));
+  const json usual = simulate(folder, kSmall, {"--steps", "100"});
+  EXPECT_EQ(usual.at("costly"), nullptr);
+  const json tumbling =
+      simulate(folder, scene("hard/tumbling.xml"), {"--steps", "20", "--overwrite"});
+  EXPECT_THAT(tumbling.at("costly").get<std::string>(), HasSubstr("steps are costly: "));
+  EXPECT_THAT(tumbling.at("costly").get<std::string>(), HasSubstr("or bodies turn far in it"));
+}
+
 }  // namespace
 }  // namespace tangere::apps

@@ -39,6 +39,17 @@ TEST(StepTolerance, MeansTheSameUnderAnyGravity) {
   EXPECT_EQ(Model(slow).following_tolerance(Integrator::sdirk2, h), 1e-9);
 }
 
+/// A hundredth of the accuracy, but not much looser than plain steps.
+TEST(StepTolerance, FollowsTheAccuracyAndTheStep) {
+  const Scene scene = testing::rolling_ball(false, 4);
+  const auto at = [&](double h, double accuracy) {
+    return in_force(scene, {Integrator::sdirk2, h, std::nullopt, accuracy});
+  };
+  EXPECT_DOUBLE_EQ(at(2e-2, 1e-4), 1e-6);
+  EXPECT_DOUBLE_EQ(at(1e-3, 1e-2),
+                   10 * Model(scene).following_tolerance(Integrator::sdirk2, 1e-3));
+}
+
 TEST(StepTolerance, IsTheCallersThenTheScenes) {
   Scene scene = testing::rolling_ball(false, 4);
   EXPECT_EQ(in_force(scene), Model(scene).following_tolerance(scene.integrator, scene.timestep));

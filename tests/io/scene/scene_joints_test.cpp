@@ -95,5 +95,66 @@ TEST(SceneJoints, ASceneOfEveryJointRuns) {
   }
 }
 
+/// A chain of links, nested or by name.
+std::string chain(const std::string& links) {
+  return "<tangere><option unit=\"m-kg\"/><robot>" + links + "</robot></tangere>";
+}
+std::string head(const std::string& name, const std::string& parent = "") {
+  return "<link name=\"" + name + "\"" + (parent.empty() ? "" : " parent=\"" + parent + "\"") +
+         "><joint name=\"" + name + "\" type=\"revolute\" axis=\"0 1 0\" pos=\"0.05 0 0\"/>" +
+         "<body type=\"sphere\" radius=\"0.01\" pos=\"0.02 0 0\"/>";
+}
+
+TEST(SceneJoints, ALinkMayNameItsParent) {
+  const Scene nested =
+      parse_scene(chain(head("a") + head("b") + head("c") + "</link></link></link>"), "s.xml")
+          .scene;
+  const Scene flat = parse_scene(chain(head("a") + "</link>" + head("b", "a") + "</link>" +
+                                       head("c", "b") + "</link>"),
+                                 "s.xml")
+                         .scene;
+  ASSERT_EQ(flat.links.size(), 3U);
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_EQ(flat.links[k].name, nested.links[k].name);
+    EXPECT_EQ(flat.links[k].parent, nested.links[k].parent);
+    EXPECT_EQ(flat.links[k].joint.pose.position, nested.links[k].joint.pose.position);
+  }
+  // Also with links inside it, beside others, and of another robot.
+  const Scene mixed =
+      parse_scene(chain(head("a") + head("b") + "</link></link></robot><robot>" + head("c", "b") +
+                        head("d") + "</link></link>" + head("e", "a") + "</link>"),
+                  "s.xml")
+          .scene;
+  std::vector<int> parents;
+  for (const LinkDescription& l : mixed.links) parents.push_back(l.parent);
+  EXPECT_EQ(parents, (std::vector<int>{-1, 0, 1, 2, 0}));
+}
+
+TEST(SceneJoints, AParentStandsBeforeAndIsNamedOnce) {
+  const auto error_of = [](const std::string& links) -> std::string {
+    try {
+      parse_scene(chain(links), "s.xml");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(error_of(head("arm") + "</link>" + head("hand", "amr") + "</link>"),
+              HasSubstr("<link>: parent=\"amr\"; expected a link that stands before it; did you "
+                        "mean 'arm'?"));
+  EXPECT_THAT(error_of(head("hand", "arm") + "</link>" + head("arm") + "</link>"),
+              HasSubstr("parent=\"arm\"; expected a link that stands before it"));
+  EXPECT_THAT(error_of(head("arm") + head("hand", "arm") + "</link></link>"),
+              HasSubstr("parent=\"arm\" of a link inside another; expected it of links directly"));
+}
+
+TEST(SceneJoints, AHundredLinksMakeAChain) {
+  std::string links = head("link0") + "</link>";
+  for (int k = 1; k < 300; ++k)
+    links += head("link" + std::to_string(k), "link" + std::to_string(k - 1)) + "</link>";
+  const Model model(parse_scene(chain(links), "s.xml").scene);
+  EXPECT_EQ(model.nv(), 300);
+}
+
 }  // namespace
 }  // namespace tangere

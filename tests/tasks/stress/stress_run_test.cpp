@@ -183,7 +183,7 @@ TEST(StressCases, HaveScenesThatLoad) {
     } catch (const InputError&) {
       refused.insert(of.scene);
     }
-  EXPECT_THAT(refused, ::testing::ElementsAre("hard/chain_100.xml"));
+  EXPECT_THAT(refused, IsEmpty());
   // Boxes that touch at corners alone: the next box is as wide as the corners are apart, or less.
   EXPECT_THAT(coarse, ::testing::ElementsAre("hard/post_between_points.xml", "hard/stack_equal.xml",
                                              "hard/stack_shifted.xml"));

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// The angular momentum that a scheme makes from nothing where bodies turn far in a step.
+//
+// A scheme adds up angular velocities in axes that turn with the body. What it does to the momentum
+// P = R J ω of a body, in axes that stay, follows from its own equations (engine/model/scheme.hpp):
+// with T = J a + ω × Jω the torque of a stage, and ΔR its turn since the start of the step,
+//   (c₀ ΔP + (s_before ΔP_before + Σ s_inner ΔP_j)/s_divisor)/h - ΔR T,  ΔP = ΔR Jω - Jω₀
+// should be zero. Solved for ΔP stage by stage, it is the momentum by which the step is off. It is
+// zero where the axis of turning stays, and of the scheme's order in the angle of turning.
+#pragma once
+
+#include "engine/model/scheme.hpp"
+#include "engine/step/workspace.hpp"
+
+namespace tangere {
+
+/// Returns the lanes in which some ball joint turned so far in a step of length h by a scheme that
+/// its momentum should be looked at. The step ended in the workspace's v1.
+template <int L>
+LaneBits far_turners(const CompiledModel& model, const Scheme& scheme, const BasicWorkspace<L>& w,
+                     LaneBits lanes, double h);
+
+/// Whether in one lane a solved step of length h made more momentum, of some ball joint that turned
+/// far, than 3e-5 of the body's per radian, and more than half a percent of what its torque made.
+template <int L>
+bool turned_too_far(const CompiledModel& model, const Scheme& scheme, const BasicWorkspace<L>& w,
+                    double h, int lane);
+
+}  // namespace tangere
