@@ -64,8 +64,8 @@ TEST(StepParts, ErrorsAndCostFollowTheAccuracy) {
   for (const double accuracy : {1e-1, 1e-2, 1e-3, 1e-4}) {
     const Played run = play(model, keeping(accuracy));
     const double error = distance(run, exact) / 0.02;  // of the ball's radius
-    EXPECT_LT(error, 0.7 * last) << accuracy;
-    EXPECT_LT(error, accuracy);
+    EXPECT_LT(error, last) << accuracy;
+    EXPECT_LT(error, 0.1 * accuracy);
     EXPECT_GT(run.evaluations, cost);
     last = error, cost = run.evaluations;
   }
