@@ -9,10 +9,11 @@
 //   e = X_s - h (w_0 v₀ + Σ w_i ẋ_i),  w_0 + Σ w_i = 1,  Σ w_i (Aᵏ 1)_i = 1/(k + 1)! for k = 1 … s
 #include "engine/model/scheme.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
+#include <utility>
 
 #include "engine/base/error.hpp"
 
@@ -25,25 +26,44 @@ int Scheme::most_inner_stages() const {
 
 namespace {
 
+/// Solves equations, each a row of coefficients and the right-hand side. Not finite where they
+/// determine nothing.
+std::vector<double> solution_of(std::vector<std::vector<double>> rows) {
+  const std::size_t n = rows.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    std::size_t largest = k;
+    for (std::size_t i = k + 1; i < n; ++i)
+      if (std::abs(rows[i][k]) > std::abs(rows[largest][k])) largest = i;
+    std::swap(rows[k], rows[largest]);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i == k) continue;
+      const double share = rows[i][k] / rows[k][k];
+      for (std::size_t j = k; j <= n; ++j) rows[i][j] -= share * rows[k][j];
+    }
+  }
+  std::vector<double> x;
+  for (std::size_t k = 0; k < n; ++k) x.push_back(rows[k][n] / rows[k][k]);
+  return x;
+}
+
 /// Weights, on the rates at the start and at the stages' ends, of the rule that is exact for the
 /// first terms of ẋ = λx.
 std::vector<double> rule_of(const std::vector<std::vector<double>>& a) {
-  const auto stages = static_cast<Eigen::Index>(a.size());
-  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(stages, stages), conditions(stages, stages);
-  for (std::size_t i = 0; i < a.size(); ++i)
-    for (std::size_t j = 0; j <= i; ++j)
-      matrix(Eigen::Index(i), Eigen::Index(j)) = a[i][j];
-  Eigen::VectorXd power = Eigen::VectorXd::Ones(stages), integrals(stages);
-  double factorial = 1;
-  for (Eigen::Index k = 0; k < stages; ++k) {
-    power = matrix * power;
-    factorial *= static_cast<double>(k + 2);
-    conditions.row(k) = power;
-    integrals[k] = 1 / factorial;
+  std::vector<std::vector<double>> conditions;
+  std::vector<double> power(a.size(), 1.0);  // Aᵏ 1
+  double integral = 1;                       // 1/(k + 1)!
+  for (std::size_t k = 1; k <= a.size(); ++k) {
+    for (std::size_t i = a.size(); i-- > 0;) {  // row i reads what rows above it still hold
+      double sum = 0;
+      for (std::size_t j = 0; j <= i; ++j) sum += a[i][j] * power[j];
+      power[i] = sum;
+    }
+    integral /= static_cast<double>(k + 1);
+    conditions.push_back(power);
+    conditions.back().push_back(integral);
   }
-  const Eigen::VectorXd of_stages = conditions.partialPivLu().solve(integrals);
-  std::vector<double> weights = {1 - of_stages.sum()};
-  weights.insert(weights.end(), of_stages.begin(), of_stages.end());
+  std::vector<double> weights = solution_of(std::move(conditions));
+  weights.insert(weights.begin(), 1 - std::accumulate(weights.begin(), weights.end(), 0.0));
   return weights;
 }
 
@@ -145,7 +165,7 @@ constinit const Integrator Integrator::sdirk4{kSdirk4};
 
 Integrator keeping_accuracy(Integrator of_scene, double accuracy) {
   const bool keeps = !of_scene.scheme().estimate.empty() && of_scene.scheme().order > 1;
-  return accuracy > 0 && !keeps ? Integrator::sdirk2 : of_scene;
+  return accuracy > 0 && !keeps ? Integrator::sdirk3 : of_scene;
 }
 
 std::span<const Integrator> integrators() {

@@ -108,12 +108,12 @@ double ContactForces::change(const Row<L>* start, const Row<L>* end, const Row<L
                              const Row<L>* b, int lane) const {
   double worst = 0;
   for (int group = 0; group < static_cast<int>(floor_.size()); ++group) {
-    const double moved = squared_distance(a, end, group, lane) + squared_distance(b, end, group, lane);
+    const double moved =
+        squared_distance(a, end, group, lane) + squared_distance(b, end, group, lane);
     if (moved == 0) continue;
-    const double scale =
-        std::sqrt(std::max(squared_distance<L>(start, nullptr, group, lane),
-                           squared_distance<L>(end, nullptr, group, lane))) +
-        floor_[std::size_t(group)];
+    const double scale = std::sqrt(std::max(squared_distance<L>(start, nullptr, group, lane),
+                                            squared_distance<L>(end, nullptr, group, lane))) +
+                         floor_[std::size_t(group)];
     const double share = std::sqrt(moved) / scale;
     if (!(share <= worst)) worst = share;
   }
@@ -129,9 +129,9 @@ LaneBits ContactForces::touching(const Row<L>* wrenches) const {
   return lanes;
 }
 
-#define TANGERE_FOR_LANES(L)                                                                      \
-  template double ContactForces::change(const Row<L>*, const Row<L>*, const Row<L>*,              \
-                                        const Row<L>*, int) const;                                \
+#define TANGERE_FOR_LANES(L)                                                         \
+  template double ContactForces::change(const Row<L>*, const Row<L>*, const Row<L>*, \
+                                        const Row<L>*, int) const;                   \
   template LaneBits ContactForces::touching(const Row<L>*) const;
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)

@@ -331,8 +331,8 @@ void GroupStep::advance_plainly(const kernels::KernelTable& table, BasicWorkspac
 // step_parts.cpp uses these.
 #define TANGERE_FOR_LANES(L)                                                                       \
   template LaneBits GroupStep::run(const Scheme&, const kernels::KernelTable&, BasicWorkspace<L>&, \
-                                   LaneBits, const Row<L>&, bool, NewtonReport&,                   \
-                                   StageFactors<L>&) const;                                        \
+                                   LaneBits, const Row<L>&, bool, NewtonReport&, StageFactors<L>&) \
+      const;                                                                                       \
   template void GroupStep::commit(BasicWorkspace<L>&, LaneBits) const;                             \
   template void GroupStep::note(const BasicWorkspace<L>&, int, const Scheme&, double,              \
                                 std::vector<TapedSolve>*) const;                                   \

@@ -68,8 +68,8 @@ class GroupStep {
                                   const StageFactors<L>& factors, NewtonReport& report) const;
   template <int L>
   LaneBits run(const Scheme& scheme, const kernels::KernelTable& table, BasicWorkspace<L>& w,
-               LaneBits lanes, const kernels::Row<L>& h, bool inside_split,
-               NewtonReport& report, StageFactors<L>& factors) const;
+               LaneBits lanes, const kernels::Row<L>& h, bool inside_split, NewtonReport& report,
+               StageFactors<L>& factors) const;
   bool split(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,
              NewtonReport& report, std::vector<TapedSolve>* solves) const;
   bool take_part(const kernels::KernelTable& table, SingleWorkspace& w, double h, int depth,

@@ -355,12 +355,12 @@ void solve_by_factor(const CompiledModel& model, const kernels::KernelTable& tab
     if (has(factors.pivoted & factors.any, l)) w.pivoted.solve(l, w.stage.g, out);
 }
 
-#define TANGERE_FOR_LANES(L)                                                                      \
-  template void evaluate_elsewhere(const CompiledModel&, const kernels::KernelTable&,             \
-                                   BasicWorkspace<L>&, LaneBits, NewtonReport&);                  \
-  template void scaled_residual(const CompiledModel&, const kernels::KernelTable&,                \
-                                const BasicWorkspace<L>&, kernels::Row<L>&);                      \
-  template void solve_by_factor(const CompiledModel&, const kernels::KernelTable&,                \
+#define TANGERE_FOR_LANES(L)                                                          \
+  template void evaluate_elsewhere(const CompiledModel&, const kernels::KernelTable&, \
+                                   BasicWorkspace<L>&, LaneBits, NewtonReport&);      \
+  template void scaled_residual(const CompiledModel&, const kernels::KernelTable&,    \
+                                const BasicWorkspace<L>&, kernels::Row<L>&);          \
+  template void solve_by_factor(const CompiledModel&, const kernels::KernelTable&,    \
                                 BasicWorkspace<L>&, const StageFactors<L>&, kernels::Row<L>*);
 TANGERE_FOR_LANES(kernels::kGroup)
 TANGERE_FOR_LANES(1)

@@ -10,8 +10,8 @@
 // taken when both of these are at most the accuracy:
 //   the share of the contact forces that moving the end by δ and by δ_v changes
 //       (contact_forces.hpp)
-//   the share of all acting forces, in the scale of the solver's tolerance, that would displace by e
-//       within the part: 2 M e/h²
+//   M (c₀/h)² e, in the scale of the solver's tolerance: the share of all acting forces that would
+//       displace by e in a stage
 // A step begins with a part of its whole length whatever was before it, so it depends on its state
 // alone. Lanes have parts of their own lengths and are solved side by side, until the last has
 // arrived.
@@ -44,8 +44,7 @@ void GroupStep::weigh_displacement(const kernels::KernelTable& table, BasicWorks
   for (int i = 0; i < n; ++i)
     for (int l = 0; l < L; ++l) {
       double e = estimate.front() * h[l] * w.v0[i][l] + estimate.back() * s.x[i][l];
-      for (int k = 0; k < inner; ++k)
-        e += estimate[std::size_t(1 + k)] * w.x_inner[k * n + i][l];
+      for (int k = 0; k < inner; ++k) e += estimate[std::size_t(1 + k)] * w.x_inner[k * n + i][l];
       s.s[i][l] += s.c0_over_h[l] * s.c0_over_h[l] / s.inverse_h[l] * e;
     }
   evaluate_elsewhere(model_, table, w, lanes, report);
@@ -88,8 +87,6 @@ Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorksp
   kernel.contact_wrenches(model_.view, s, end);
   Row<L> error{};
   scaled_residual(model_, table, w, error);
-  const double c0 = scheme.stages.back().c0;
-  for (int l = 0; l < L; ++l) error[l] *= 2 / (c0 * c0);
   if (contact_forces_.none()) return error;
   solve_by_factor(model_, table, w, factors, w.delta);
   weigh_velocity(table, w, lanes, h, report);
@@ -97,8 +94,7 @@ Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorksp
   solve_by_factor(model_, table, w, factors, w.test);
   // Where the first guess of every stage was a root there is no factor, and the motion is smooth.
   const LaneBits touching =
-      lanes & factors.any &
-      (contact_forces_.touching<L>(start) | contact_forces_.touching<L>(end));
+      lanes & factors.any & (contact_forces_.touching<L>(start) | contact_forces_.touching<L>(end));
   if (touching == 0) return error;
   set_stage(model_, scheme, scheme.inner_stages(), h, w);
   const auto move = [&](const Row<L>* way, double share, Row<L>* wrenches) {
@@ -108,7 +104,7 @@ Row<L> GroupStep::estimated_error(const kernels::KernelTable& table, BasicWorksp
     kernel.contact_wrenches(model_.view, s, wrenches);
   };
   move(w.delta, 1, by_displacement);
-  move(w.test, -c0 * scheme.estimate.front(), by_velocity);
+  move(w.test, -scheme.stages.back().c0 * scheme.estimate.front(), by_velocity);
   for (int l = 0; l < L; ++l) {
     if (!has(touching, l)) continue;
     const double change = contact_forces_.change<L>(start, end, by_displacement, by_velocity, l);

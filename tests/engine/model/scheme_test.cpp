@@ -61,7 +61,8 @@ TEST(Schemes, EstimatesAreErrorsOfLinearEquations) {
       const auto [wrong, error] = off(0.2 * sign);
       const auto [half_wrong, half_error] = off(0.1 * sign);
       EXPECT_NEAR(std::log2(error / half_error), scheme.order + 1, 0.3);
-      EXPECT_NEAR(std::log2(wrong / half_wrong), static_cast<double>(scheme.stages.size()) + 2, 0.3);
+      EXPECT_NEAR(std::log2(wrong / half_wrong), static_cast<double>(scheme.stages.size()) + 2,
+                  0.3);
       EXPECT_LT(std::abs(half_wrong), 0.2 * std::abs(half_error));
     }
   }
